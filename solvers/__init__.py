@@ -1,1 +1,37 @@
-"""Placeholder."""
+"""Time integration of linear structures with local contacts: systems, methods, events.
+
+Nothing is compiled or imported from numba before a method is used.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+from solvers.result import ContactLog, Cost, Energy, Solution, SolverError, Status
+from solvers.system import Contact, System
+
+_LATER = {"integrate": "integration", "HenonRK2": "henon", "DormandPrince": "dormand_prince"}
+
+__all__ = [
+    "Contact",
+    "ContactLog",
+    "Cost",
+    "DormandPrince",
+    "Energy",
+    "HenonRK2",
+    "Solution",
+    "SolverError",
+    "Status",
+    "System",
+    "integrate",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Import methods when they are asked for."""
+    if name not in _LATER:
+        raise AttributeError(f"module 'solvers' has no attribute {name!r}; it offers {__all__}")
+    value = getattr(import_module(f"solvers.{_LATER[name]}"), name)
+    globals()[name] = value
+    return value

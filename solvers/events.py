@@ -1,0 +1,121 @@
+"""Where, within one step, a stop leaves its piece of the law: flight, or a stretch between two knots.
+
+Inside a step the indentation is the polynomial of the method's dense output,
+``δ(θ) = δ₀ + θ(r₀ + (1-θ)(r₁ + θ(r₂ + (1-θ)(r₃ + ...))))``, θ in [0, 1].
+"""
+
+import numpy as np
+from numba import njit
+
+from solvers.kernels import dot, indentation
+
+# finer near 0, where a contact just left may come back
+_NODES = np.array([0.0, 1 / 64, 1 / 32, 1 / 16, 1 / 8, 1 / 4, 3 / 8, 1 / 2, 5 / 8, 3 / 4, 7 / 8, 1.0])
+UNRESOLVED = -1.0
+NONE = 2.0
+
+
+@njit(cache=True)
+def polynomial(coefficients, theta):  # type: ignore[no-untyped-def]
+    """Value at θ of the nested form; coefficients (δ₀, r₀ ... r₆)."""
+    u = 1.0 - theta
+    r = coefficients
+    return r[0] + theta * (
+        r[1] + u * (r[2] + theta * (r[3] + u * (r[4] + theta * (r[5] + u * (r[6] + theta * r[7])))))
+    )
+
+
+@njit(cache=True)
+def coefficients_of(row, offset, x, dense, out):  # type: ignore[no-untyped-def]
+    """Nested coefficients of ``row·z - offset``."""
+    size = row.size
+    out[0] = dot(row, x, size) - offset
+    for i in range(7):
+        out[1 + i] = dot(row, dense[i], size)
+
+
+@njit(cache=True)
+def surface_tolerance(problem, s, x):  # type: ignore[no-untyped-def]
+    """Distance within which a stop counts as on a level: rounding of δ."""
+    total = abs(problem.gap[s])
+    for i in range(2 * problem.k.size):
+        total += abs(problem.read[s, i] * x[i])
+    return 1e-15 * total + 1e-20
+
+
+@njit(cache=True)
+def _maximum(coefficients, level, sign, a, b):  # type: ignore[no-untyped-def]
+    """Golden-section place of the largest sign·(δ - level) on [a, b]."""
+    ratio = 0.6180339887498949
+    c, d = b - ratio * (b - a), a + ratio * (b - a)
+    for _ in range(40):
+        if sign * polynomial(coefficients, c) > sign * polynomial(coefficients, d):
+            b = d
+        else:
+            a = c
+        c, d = b - ratio * (b - a), a + ratio * (b - a)
+    return 0.5 * (a + b)
+
+
+@njit(cache=True)
+def _root(coefficients, level, sign, a, b):  # type: ignore[no-untyped-def]
+    """Bisection for the outward crossing in [a, b]."""
+    for _ in range(50):
+        middle = 0.5 * (a + b)
+        if sign * (polynomial(coefficients, middle) - level) > 0.0:
+            b = middle
+        else:
+            a = middle
+    return b
+
+
+@njit(cache=True)
+def crossing(coefficients, level, sign, tolerance):  # type: ignore[no-untyped-def]
+    """First θ at which sign·(δ - level) becomes positive; NONE, or UNRESOLVED when it does so at once."""
+    before_last = -np.inf
+    last = min(sign * (coefficients[0] - level), 0.0)
+    for i in range(1, _NODES.size):
+        value = sign * (polynomial(coefficients, _NODES[i]) - level)
+        if value > tolerance:
+            if i == 1 and last >= -tolerance:
+                return UNRESOLVED
+            return _root(coefficients, level, sign, _NODES[i - 1], _NODES[i])
+        rise = last - min(before_last, value)
+        if i > 1 and last >= before_last and last > value and last + rise > 0.0:
+            top = _maximum(coefficients, level, sign, _NODES[i - 2], _NODES[i])
+            if sign * (polynomial(coefficients, top) - level) > tolerance:
+                return _root(coefficients, level, sign, _NODES[i - 2], top)
+        before_last, last = last, value
+    return NONE
+
+
+@njit(cache=True)
+def first_event(problem, x, dense, piece, coefficients):  # type: ignore[no-untyped-def]
+    """(θ, stop, direction ±1) of the earliest crossing of the step by any stop."""
+    theta, stop, direction = NONE, -1, 0
+    for s in range(problem.gap.size):
+        coefficients_of(problem.read[s], problem.gap[s], x, dense, coefficients)
+        tolerance = surface_tolerance(problem, s, x)
+        found = crossing(coefficients, problem.levels[s, piece[s]], 1.0, tolerance)
+        if found < theta:
+            theta, stop, direction = found, s, 1
+        if piece[s] > 0:
+            found = crossing(coefficients, problem.levels[s, piece[s] - 1], -1.0, tolerance)
+            if found < theta:
+                theta, stop, direction = found, s, -1
+    return theta, stop, direction
+
+
+@njit(cache=True)
+def entry_by_sign(problem, x, x_new, piece):  # type: ignore[no-untyped-def]
+    """(θ, stop) of the stop that is inside at the end of a step but was not at its start; the paper's test."""
+    theta, stop = NONE, -1
+    for s in range(problem.gap.size):
+        if piece[s] == 0:
+            after = indentation(problem, s, x_new)
+            if after > 0.0:
+                before = indentation(problem, s, x)
+                found = before / (before - after)
+                if found < theta:
+                    theta, stop = found, s
+    return theta, stop

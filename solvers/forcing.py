@@ -1,0 +1,91 @@
+r"""How signals reach the compiled integrators.
+
+A signal is any callable t -> value that broadcasts. It is handed over as exactly one of
+
+* *tones*: ``signal.tones() -> (omega (k,), amplitude (k,) complex)``, value Re Σ a e^{iωt}, exact;
+* *nodes*: ``signal.nodes(duration, rtol) -> (dt, (N, 3))``, rows [s, s', s''] at t = 0, dt, ...; between them the
+  quintic through both ends' values, slopes and curvatures, within ``rtol`` times the signal's size;
+* nothing of either: sampled here by a quintic spline, refined until its midpoints agree.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from solvers.system import Array, Signal
+
+_MOST_NODES = 20_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Forcing:
+    """All signals of a system as arrays: tones (K,) and node tables (sum N, 3), each with the load it drives."""
+
+    tone_omega: Array
+    tone_amplitude: Any
+    tone_load: Any
+    table: Array
+    table_dt: Array
+    table_start: Any
+    table_load: Any
+
+
+def hand_over(signals: list[Signal], duration: float, rtol: float) -> Forcing:
+    """Arrays of all signals on [0, duration]."""
+    tones: list[tuple] = []
+    tables: list[tuple[float, Array, int]] = []
+    for load, signal in enumerate(signals):
+        if hasattr(signal, "tones"):
+            omega, amplitude = signal.tones()
+            tones += [(float(w), complex(a), load) for w, a in zip(omega, amplitude, strict=True)]
+        else:
+            provider = getattr(signal, "nodes", None)
+            dt, rows = provider(duration, rtol) if provider else _sample(signal, duration, rtol, load)
+            _check_nodes(rows, dt, duration, load)
+            tables.append((dt, rows, load))
+    starts = np.cumsum([0] + [len(rows) for _, rows, _ in tables])
+    return Forcing(
+        np.array([t[0] for t in tones], dtype=float),
+        np.array([t[1] for t in tones], dtype=complex),
+        np.array([t[2] for t in tones], dtype=np.int64),
+        np.ascontiguousarray(np.concatenate([rows for _, rows, _ in tables] or [np.empty((0, 3))])),
+        np.array([dt for dt, _, _ in tables], dtype=float),
+        starts.astype(np.int64),
+        np.array([load for _, _, load in tables], dtype=np.int64),
+    )
+
+
+def _check_nodes(rows: Array, dt: float, duration: float, load: int) -> None:
+    """A node table is finite and covers the run."""
+    if not np.all(np.isfinite(rows)):
+        bad = int(np.argwhere(~np.isfinite(rows))[0, 0])
+        raise ValueError(f"the signal of load {load} is not finite at t = {bad * dt:g} s")
+    if (len(rows) - 1) * dt < duration * (1.0 - 1e-12):
+        raise ValueError(f"the signal of load {load} ends at {(len(rows) - 1) * dt:g} s, the run at {duration:g} s")
+
+
+def _sample(signal: Signal, duration: float, rtol: float, load: int) -> tuple[float, Array]:
+    """Nodes of a plain callable: double a quintic spline's grid until its midpoints agree to ``rtol``."""
+    from scipy.interpolate import make_interp_spline
+
+    cells = 64
+    while cells <= _MOST_NODES:
+        t = np.linspace(0.0, duration, cells + 1)
+        values = np.asarray(signal(t), dtype=float)
+        if values.shape != t.shape:
+            raise ValueError(f"the signal of load {load} must broadcast: {t.shape} times gave {values.shape} values")
+        if not np.all(np.isfinite(values)):
+            raise ValueError(f"the signal of load {load} is {values[~np.isfinite(values)][0]} on [0, {duration:g}] s")
+        spline = make_interp_spline(t, values, k=5)
+        # thirds rather than midpoints, so that no period of the signal hides between the samples
+        between = t[:-1] + duration / cells * np.where(np.arange(cells) % 2, 1 / 3, 0.58)
+        error = np.abs(spline(between) - signal(between)).max()
+        if error <= rtol * np.abs(values).max():
+            return duration / cells, np.stack([values, spline(t, 1), spline(t, 2)], axis=1)
+        cells *= 2
+    raise ValueError(
+        f"the signal of load {load} is too rough to sample to {rtol:g}; give it tones() or nodes(), or loosen rtol"
+    )

@@ -1,0 +1,275 @@
+"""The front door: check, hand over to a method's compiled loop in short stretches, collect the result.
+
+Stretches are short so that Ctrl-C is heard and progress shown; the state between them is complete, so an
+interrupted run keeps everything computed.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from solvers.forcing import Forcing, hand_over
+from solvers.kernels import Problem
+from solvers.march import (
+    CALLS,
+    DONE,
+    EVENTS,
+    H_CONTACT,
+    H_FLIGHT,
+    LOG_COLUMNS,
+    LOG_FULL,
+    LOGGED,
+    REJECTED,
+    RUNNING,
+    SAMPLED,
+    STEP,
+    STEPS,
+    State,
+    T,
+    contact_row,
+    march,
+    new_space,
+    new_state,
+    start,
+)
+from solvers.result import ContactLog, Cost, Energy, Solution, SolverError, Status
+from solvers.system import Array, System
+
+_BUDGET = 20_000  # steps between two looks at the world outside
+_MOST_SAMPLES = 500_000_000
+
+
+def integrate(
+    system: System,
+    q0: ArrayLike,
+    q_dot0: ArrayLike,
+    duration: float,
+    dt: float | None = None,
+    method: Any = None,
+    tangent: bool = False,
+    *,
+    progress: Callable[[float], None] | None = None,
+    check: bool = True,
+) -> Solution:
+    """Integrate a system from (q0, q_dot0) at t = 0 over ``duration``.
+
+    Parameters
+    ----------
+    system : the problem.
+    q0, q_dot0 : (n,) initial coordinates and rates; not changed.
+    duration : s, > 0.
+    dt : output sampling, s; None keeps the final state and the contact log only.
+    method : `DormandPrince` or `HenonRK2`; None takes ``DormandPrince(rtol=1e-8)``.
+    tangent : not offered by these methods.
+    progress : called with the simulated time now and then.
+    check : raise when the run fails; False returns the partial solution with its status instead.
+
+    Returns
+    -------
+    Solution. After Ctrl-C it is partial, with `Status.INTERRUPTED`.
+
+    Raises
+    ------
+    ValueError for bad input, before computing; SolverError (with ``.solution``) when the method fails.
+
+    Examples
+    --------
+    >>> system = System.modal(omega=[2.0], zeta=[0.0])
+    >>> end = integrate(system, [1.0], [0.0], duration=np.pi)
+    >>> bool(abs(end.q[-1, 0] - 1.0) < 1e-7)
+    True
+    """
+    if method is None:
+        from solvers.dormand_prince import DormandPrince
+
+        method = DormandPrince()
+    if tangent:
+        raise ValueError(f"tangent=True is not offered by {type(method).__name__}")
+    z = _start(system, q0, q_dot0)
+    samples = _samples(duration, dt)
+    _check_laws(system)
+    forcing = hand_over([signal for _, signal in system.loads], duration, min(max(method.rtol, 1e-12), 1e-6))
+    run = _Run(system, method, z, forcing, duration, dt, samples)
+    begin = time.perf_counter()
+    status = run.to_the_end(progress)
+    solution = run.solution(status, time.perf_counter() - begin)
+    if check and status not in (Status.DONE, Status.INTERRUPTED):
+        raise SolverError(f"stopped at t = {run.time:.9g} s of {duration:g} s: {status.value}", solution)
+    return solution
+
+
+def _start(system: System, q0: ArrayLike, q_dot0: ArrayLike) -> Array:
+    """Checked start in block coordinates."""
+    checked = []
+    for name, value in (("q0", q0), ("q_dot0", q_dot0)):
+        vector = np.array(value, dtype=float, ndmin=1)
+        if vector.shape != (system.size,):
+            raise ValueError(f"{name} must have shape ({system.size},), got {vector.shape}")
+        if not np.all(np.isfinite(vector)):
+            bad = int(np.argmin(np.isfinite(vector)))
+            raise ValueError(f"{name} must be finite, got {vector[bad]} at coordinate {bad}")
+        checked.append(vector)
+    return system.blocks.to_blocks(*checked)
+
+
+def _samples(duration: float, dt: float | None) -> int:
+    """Number of output samples, both ends included."""
+    if not 0.0 < duration < math.inf:
+        raise ValueError(f"duration must be positive and finite (s), got {duration!r}")
+    if dt is None:
+        return 0
+    if not 0.0 < dt < math.inf:
+        raise ValueError(f"dt must be positive and finite (s), got {dt!r}")
+    count = math.floor(duration / dt * (1.0 + 1e-12)) + 1
+    if count > _MOST_SAMPLES:
+        raise ValueError(f"dt = {dt:g} s over {duration:g} s asks for {count} samples; choose a larger dt")
+    return count
+
+
+def _check_laws(system: System) -> None:
+    """Every law is finite at rest, so that a NaN is met before the run."""
+    delta = np.array([1e-12, 1e-6, 1e-3])
+    for i, contact in enumerate(system.contacts):
+        force = contact.law.force(delta, 0.0, 1.0)
+        if not np.all(np.isfinite(force)):
+            where = delta[~np.isfinite(force)][0]
+            raise ValueError(f"the law of contact {i} is not finite at delta = {where:g} m: {contact.law!r}")
+
+
+def problem_of(system: System, forcing: Forcing) -> Problem:
+    """Arrays the kernels read."""
+    blocks, contacts = system.blocks, system.contacts
+    n, m = system.size, len(contacts)
+    direction = np.array([c.direction for c in contacts]).reshape(m, n)
+    vectors = np.array([vector for vector, _ in system.loads]).reshape(len(system.loads), n)
+    inverse_mass = blocks.inverse[:, n:] @ np.linalg.inv(system.M)
+    read = -direction @ blocks.T[:n]
+    state_matrix = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(blocks.k), -np.diag(blocks.c)]])
+    parameters = [np.asarray(c.law.parameters, dtype=float) for c in contacts]
+    width = max([p.size for p in parameters], default=1)
+    most = max([len(c.law.knots) for c in contacts], default=0) + 1
+    levels = np.full((m, most + 1), math.inf)
+    for i, contact in enumerate(contacts):
+        levels[i, : len(contact.law.knots) + 1] = (0.0, *contact.law.knots)
+    return Problem(
+        k=blocks.k,
+        c=blocks.c,
+        loss=np.ascontiguousarray(blocks.loss),
+        push=np.ascontiguousarray((inverse_mass @ direction.T).T),
+        read=np.ascontiguousarray(read),
+        read_rate=np.ascontiguousarray(read @ state_matrix),
+        levels=levels,
+        gap=np.array([c.gap for c in contacts], dtype=float),
+        law=np.array([c.law.address for c in contacts], dtype=np.int64),
+        parameters=np.array([np.pad(p, (0, width - p.size)) for p in parameters]).reshape(m, width),
+        floor=np.array([c.law.entry_rate_floor for c in contacts], dtype=float),
+        load=np.ascontiguousarray((inverse_mass @ vectors.T).T),
+        power=np.ascontiguousarray(vectors @ blocks.T[n:]),
+        tone_omega=forcing.tone_omega,
+        tone_amplitude=forcing.tone_amplitude,
+        tone_load=forcing.tone_load,
+        table=forcing.table,
+        table_dt=forcing.table_dt,
+        table_start=forcing.table_start,
+        table_load=forcing.table_load,
+    )
+
+
+class _Run:
+    """One run of a stepping method: its state, output, and the loop over stretches."""
+
+    def __init__(
+        self,
+        system: System,
+        method: Any,
+        z: Array,
+        forcing: Forcing,
+        duration: float,
+        dt: float | None,
+        samples: int,
+    ) -> None:
+        self.system, self.method, self.duration, self.dt = system, method, duration, dt
+        self.problem = problem_of(system, forcing)
+        if not method.locates_exit:
+            self.problem.levels[:, 1:] = math.inf  # kinks are not looked for
+        self.state: State = new_state(z, len(system.contacts))
+        self.space = new_space(self.state, method.work_rows)
+        self.initial_energy = float(system.energy(*system.blocks.from_blocks(z)))
+        self.log = np.empty((max(256, 2 * len(system.contacts)), LOG_COLUMNS))
+        self.out = np.empty((samples, self.state.x.size))
+        fastest = max([math.sqrt(abs(k)) for k in self.problem.k] + list(self.problem.c) + [1.0 / duration])
+        self.state.now[[H_FLIGHT, H_CONTACT]] = 0.1 / fastest, 0.01 / fastest
+        if not method.adaptive:
+            self.state.now[[H_FLIGHT, H_CONTACT]] = method.dt_flight, method.dt_contact
+        start(self.problem, self.state, self.space)
+        if samples:
+            self.out[0] = self.state.x
+            self.state.count[SAMPLED] = 1
+
+    @property
+    def time(self) -> float:
+        """Simulated time reached."""
+        return float(self.state.now[T])
+
+    def to_the_end(self, progress: Callable[[float], None] | None) -> Status:
+        """Stretch after stretch until done, failed or interrupted."""
+        method = self.method
+        numbers = (method.dt_flight, method.dt_contact, method.rtol, getattr(method, "atol", 0.0))
+        flags = (method.adaptive, method.locates_exit)
+        code = RUNNING
+        try:
+            while code in (RUNNING, LOG_FULL):
+                if code == LOG_FULL:
+                    self.log = np.concatenate((self.log, np.empty_like(self.log)))
+                code = march(
+                    *(method.step, self.problem, self.state, self.space, self.duration, _BUDGET),
+                    *(*numbers, *flags, self.log, self.out, self.dt or math.inf),
+                )
+                if progress:
+                    progress(self.time)
+        except KeyboardInterrupt:
+            return Status.INTERRUPTED
+        return list(Status)[code]
+
+    def solution(self, status: Status, seconds: float) -> Solution:
+        """Collect outputs, log and ledger."""
+        n, state = self.system.size, self.state
+        if self.dt is None:
+            x, t = state.x[None, :].copy(), np.array([self.time])
+        else:
+            x = self.out[: self._sampled(status)]
+            t = np.arange(len(x)) * self.dt
+        q, q_dot = self.system.blocks.from_blocks(x[:, : 2 * n])
+        energy = Energy(
+            *(x[:, 2 * n], x[:, 2 * n + 1], x[:, 2 * n + 2 :: 2].sum(axis=1)),
+            *(self.system.energy(q, q_dot), self.initial_energy),
+        )
+        count = state.count
+        cost = Cost(int(count[STEPS]), int(count[REJECTED]), int(count[CALLS]), int(count[EVENTS]), seconds)
+        return Solution(t, q, q_dot, self._contacts(), energy, status, cost)
+
+    def _sampled(self, status: Status) -> int:
+        """Samples written; the last one may lie a rounding beyond the end."""
+        written = int(self.state.count[SAMPLED])
+        if status is Status.DONE and written == len(self.out) - 1:
+            self.out[-1] = self.state.x
+            return len(self.out)
+        return written
+
+    def _contacts(self) -> ContactLog:
+        """The log, contacts under way last."""
+        rows = [self.log[: self.state.count[LOGGED]]]
+        for s in np.flatnonzero(self.state.piece > 0):
+            row = np.empty(LOG_COLUMNS)
+            contact_row(self.problem, self.state, s, math.nan, math.nan, row)
+            rows.append(row[None, :])
+        return ContactLog.of_rows(np.concatenate(rows))
+
+
+__all__ = ["DONE", "STEP", "integrate", "problem_of"]

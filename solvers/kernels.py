@@ -1,0 +1,177 @@
+r"""Compiled ground floor of the stepping methods: problem data, law calls, signals, right-hand side.
+
+The state a stepping method integrates is x = [p (n), v (n), ledger (2 + 2m)]:
+
+    p' = v + b^p·F,   v' = -k p - c v + b^v·F + l·s(t),   δ_s = r_s·[p, v] - g_s
+    ledger: input power, damping power, then per stop force × indentation rate and force.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from llvmlite import ir
+from numba import njit, types
+from numba.extending import intrinsic
+
+
+class Problem(NamedTuple):
+    """Everything a kernel reads and never writes."""
+
+    k: Any  # (n,) block stiffness
+    c: Any  # (n,) block damping
+    loss: Any  # (2n, 2n) damping power zᵀ loss z, or (0, 0): then Σ c v²
+    push: Any  # (m, 2n) state rate per newton of stop s
+    read: Any  # (m, 2n) indentation = read·z - gap
+    read_rate: Any  # (m, 2n) indentation rate = read_rate·z
+    levels: Any  # (m, J) ascending indentations where a stop changes piece: 0, knots, then inf
+    gap: Any  # (m,)
+    law: Any  # (m,) addresses of the compiled forces
+    parameters: Any  # (m, P) their parameters
+    floor: Any  # (m,) smallest entry rates
+    load: Any  # (L, 2n) state rate per unit of signal l
+    power: Any  # (L, 2n) input power = signal × power·z
+    tone_omega: Any
+    tone_amplitude: Any
+    tone_load: Any
+    table: Any
+    table_dt: Any
+    table_start: Any
+    table_load: Any
+
+
+_VECTOR = types.Array(types.float64, 1, "C")
+_MATRIX = types.Array(types.float64, 2, "C")
+_INTEGERS = types.Array(types.int64, 1, "C")
+_COMPLEX = types.Array(types.complex128, 1, "C")
+PROBLEM = types.NamedTuple(
+    [
+        *[_VECTOR, _VECTOR, _MATRIX, _MATRIX, _MATRIX, _MATRIX, _MATRIX, _VECTOR, _INTEGERS, _MATRIX],
+        *[_VECTOR, _MATRIX, _MATRIX, _VECTOR, _COMPLEX, _INTEGERS, _MATRIX, _VECTOR, _INTEGERS, _INTEGERS],
+    ],
+    Problem,
+)
+
+
+@intrinsic
+def _call_law(typingctx, address, n, delta, delta_dot, entry_rate, parameters, force):  # type: ignore[no-untyped-def]
+    """Call the C function at ``address``; arrays are passed by their data pointers."""
+    arrays = (delta, delta_dot, parameters, force)
+    signature = types.void(types.int64, types.int64, *arrays[:2], types.float64, *arrays[2:])
+
+    def codegen(context, builder, sig, args):  # type: ignore[no-untyped-def]
+        def data(i):  # type: ignore[no-untyped-def]
+            return context.make_array(sig.args[i])(context, builder, args[i]).data
+
+        real, reals = ir.DoubleType(), ir.DoubleType().as_pointer()
+        declared = ir.FunctionType(ir.VoidType(), [ir.IntType(64), reals, reals, real, reals, reals])
+        function = builder.inttoptr(args[0], declared.as_pointer())
+        builder.call(function, [args[1], data(2), data(3), args[4], data(5), data(6)])
+        return context.get_dummy_value()
+
+    return signature, codegen
+
+
+@njit(cache=True)
+def contact_forces(problem, stop, delta, delta_dot, entry_rate, force):  # type: ignore[no-untyped-def]
+    """Forces of one stop at a batch of indentations; below the surface the law is continued from it."""
+    for i in range(delta.size):
+        delta[i] = max(delta[i], 0.0)
+    _call_law(problem.law[stop], delta.size, delta, delta_dot, entry_rate, problem.parameters[stop], force)
+
+
+@njit(cache=True)
+def dot(a, b, n):  # type: ignore[no-untyped-def]
+    """Sum of the first n products."""
+    total = 0.0
+    for i in range(n):
+        total += a[i] * b[i]
+    return total
+
+
+@njit(cache=True)
+def table_value(problem, j, t):  # type: ignore[no-untyped-def]
+    """Quintic Hermite value of node table j at time t."""
+    dt, start = problem.table_dt[j], problem.table_start[j]
+    cell = min(max(int(t / dt), 0), problem.table_start[j + 1] - start - 2)
+    x = t / dt - cell
+    a, b = problem.table[start + cell], problem.table[start + cell + 1]
+    s0, s1 = a[1] * dt, a[2] * dt * dt * 0.5
+    e0 = b[0] - a[0] - s0 - s1
+    e1 = b[1] * dt - s0 - 2.0 * s1
+    e2 = b[2] * dt * dt * 0.5 - s1
+    c3 = 10.0 * e0 - 4.0 * e1 + e2
+    c4 = -15.0 * e0 + 7.0 * e1 - 2.0 * e2
+    c5 = 6.0 * e0 - 3.0 * e1 + e2
+    return a[0] + x * (s0 + x * (s1 + x * (c3 + x * (c4 + x * c5))))
+
+
+@njit(cache=True)
+def add_loads(problem, t, x, rate):  # type: ignore[no-untyped-def]
+    """Add all loads at time t to the state's rate and their power to the ledger."""
+    size = 2 * problem.k.size
+    for i in range(problem.tone_omega.size):
+        angle = problem.tone_omega[i] * t
+        a = problem.tone_amplitude[i]
+        value = a.real * np.cos(angle) - a.imag * np.sin(angle)
+        _add_load(problem, problem.tone_load[i], value, size, x, rate)
+    for j in range(problem.table_dt.size):
+        _add_load(problem, problem.table_load[j], table_value(problem, j, t), size, x, rate)
+
+
+@njit(cache=True)
+def _add_load(problem, load, value, size, x, rate):  # type: ignore[no-untyped-def]
+    """One signal's share."""
+    for i in range(size):
+        rate[i] += problem.load[load, i] * value
+    rate[size] += value * dot(problem.power[load], x, size)
+
+
+@njit(cache=True)
+def _damping_power(problem, x):  # type: ignore[no-untyped-def]
+    """Power the linear damping takes."""
+    n, power = problem.k.size, 0.0
+    if problem.loss.shape[0] == 0:
+        for i in range(n):
+            power += problem.c[i] * x[n + i] ** 2
+        return power
+    for i in range(2 * n):
+        power += x[i] * dot(problem.loss[i], x, 2 * n)
+    return power
+
+
+@njit(cache=True)
+def rhs(problem, t, x, piece, entry_rate, rate, batch):  # type: ignore[no-untyped-def]
+    """State rate with the stops' pieces frozen (piece > 0: in contact); returns the number of law calls.
+
+    ``batch`` is working space of three numbers.
+    """
+    n, calls = problem.k.size, 0
+    size = 2 * n
+    for i in range(n):
+        rate[i] = x[n + i]
+        rate[n + i] = -problem.k[i] * x[i] - problem.c[i] * x[n + i]
+    rate[size] = 0.0
+    rate[size + 1] = _damping_power(problem, x)
+    add_loads(problem, t, x, rate)
+    for s in range(problem.gap.size):
+        rate[size + 2 + 2 * s] = 0.0
+        rate[size + 3 + 2 * s] = 0.0
+        if piece[s] > 0:
+            delta_dot = dot(problem.read_rate[s], x, size)
+            batch[0] = indentation(problem, s, x)
+            batch[1] = delta_dot
+            contact_forces(problem, s, batch[0:1], batch[1:2], entry_rate[s], batch[2:3])
+            calls += 1
+            for i in range(size):
+                rate[i] += problem.push[s, i] * batch[2]
+            rate[size + 2 + 2 * s] = batch[2] * delta_dot
+            rate[size + 3 + 2 * s] = batch[2]
+    return calls
+
+
+@njit(cache=True)
+def indentation(problem, s, x):  # type: ignore[no-untyped-def]
+    """Indentation of stop s."""
+    return dot(problem.read[s], x, 2 * problem.k.size) - problem.gap[s]

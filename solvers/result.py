@@ -1,0 +1,121 @@
+"""What a run returns: states, contact log, energy ledger, status, cost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from enum import Enum
+from typing import Any
+
+import numpy as np
+
+from solvers.system import Array
+
+
+class Status(Enum):
+    """How a run ended, as the sentence shown to the user. The order is the compiled kernels' code."""
+
+    DONE = "finished"
+    RUNNING = "not finished yet"
+    INTERRUPTED = "interrupted: partial result up to the time reached"
+    STEP_TOO_SMALL = "the step fell below the resolution of time; the problem may be singular there: loosen rtol"
+    DIVERGED = "the state is not finite any more; the method is unstable at this step: use a smaller one"
+    CHATTER = "more events than progress in time; a contact chatters: add damping, or change its law"
+    LOG_FULL = "the contact log is full"
+    LAW_NOT_FINITE = "a contact law gave a force that is not finite"
+
+    @property
+    def good(self) -> bool:
+        """Whether the result is what was asked for."""
+        return self is Status.DONE
+
+
+class SolverError(RuntimeError):
+    """A run that failed; ``solution`` holds what was computed before."""
+
+    def __init__(self, message: str, solution: Any = None) -> None:
+        super().__init__(message)
+        self.solution = solution
+
+
+@dataclass(frozen=True, eq=False)
+class ContactLog:
+    """Contacts in order of their end, one array entry each; a contact still open at the end has t_out = NaN.
+
+    Attributes
+    ----------
+    stop : index of the stop. t_in, t_out : s. speed_in, speed_out : m/s, both positive.
+    peak_indentation : m. peak_force : N. impulse : N s. energy_loss : J taken out of the beam.
+    floored : whether the entry speed was below the law's floor (also for a contact that began at t = 0).
+    """
+
+    stop: Any
+    t_in: Array
+    t_out: Array
+    speed_in: Array
+    speed_out: Array
+    peak_indentation: Array
+    peak_force: Array
+    impulse: Array
+    energy_loss: Array
+    floored: Any
+
+    def __len__(self) -> int:
+        return len(self.stop)
+
+    @classmethod
+    def of_rows(cls, rows: Array) -> ContactLog:
+        """From the kernels' table, one contact a row."""
+        columns = [np.array(column) for column in rows.T]
+        return cls(columns[0].astype(int), *columns[1:9], columns[9].astype(bool))
+
+    def arrays(self) -> dict[str, Any]:
+        """All columns by name."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
+
+COLUMNS = len(fields(ContactLog))
+
+
+@dataclass(frozen=True, eq=False)
+class Energy:
+    """Ledger at the output times, J: stored - initial = input - damping - contact + residual.
+
+    ``input`` is the work of all loads, ``damping`` what C took, ``contact`` the work done on the stops (in a contact
+    it contains what the stop will give back), ``residual`` the error.
+    """
+
+    input: Array
+    damping: Array
+    contact: Array
+    stored: Array
+    initial: float
+
+    @property
+    def residual(self) -> Array:
+        """What the ledger does not account for."""
+        return self.stored - self.initial - self.input + self.damping + self.contact
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Work of a run: accepted steps, rejected ones, law calls (values), events, wall seconds."""
+
+    steps: int
+    rejections: int
+    law_calls: int
+    events: int
+    seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A run: t (k,), q and q_dot (k, n), contact log, energy ledger, status, cost, tangent."""
+
+    t: Array
+    q: Array
+    q_dot: Array
+    contacts: ContactLog
+    energy: Energy
+    status: Status
+    cost: Cost
+    tangent: Array | None = None

@@ -1,0 +1,284 @@
+r"""The mechanical problem an integrator is handed, and its decoupled form.
+
+.. math:: M \ddot q + C \dot q + K q = \sum_l v_l s_l(t) + \sum_s w_s F_s(δ_s, \dot δ_s),\qquad δ_s = -w_s^T q - g_s
+
+Every method here integrates the same decoupled form: n blocks (p_j, v_j) with
+
+    p_j' = v_j + ...,   v_j' = -k_j p_j - c_j v_j + ...,   z = [p, v],   [q, q'] = T z.
+
+With proportional damping p is the modal coordinate and T = diag(Φ, Φ). Otherwise each complex pair (or pair
+of real eigenvalues) of the state matrix gives one block, and loads and contacts push p as well as v.
+Runge–Kutta and exact propagation commute with this change of coordinates, so nothing is lost by it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+class Law(Protocol):
+    """What a contact law must offer; the C signature of ``address`` is
+
+    ``void (int64 n, double *delta, double *delta_dot, double entry_rate, double *parameters, double *force)``.
+    """
+
+    knots: tuple[float, ...]
+    jump: bool
+    exponent: float
+    entry_rate_floor: float
+
+    @property
+    def address(self) -> int:
+        """Address of the compiled force."""
+
+    @property
+    def parameters(self) -> Array:
+        """Numbers for the compiled force."""
+
+    def force(self, delta: ArrayLike, delta_dot: ArrayLike, entry_rate: ArrayLike) -> Array:
+        """Force on arrays."""
+
+
+Signal = Callable[[Any], Any]
+"""t -> value, broadcasting. May offer ``tones()`` or ``nodes(duration, rtol)``; see `solvers.forcing`."""
+
+
+@dataclass(frozen=True)
+class Contact:
+    """One stop: ``delta = -direction @ q - gap``; it pushes with ``+direction * force`` while ``delta > 0``.
+
+    Parameters
+    ----------
+    direction : (n,), the way the stop pushes.
+    law : a contact law, such as those of the package `contacts`.
+    gap : clearance in m; negative for a preload.
+    """
+
+    direction: Array
+    law: Law
+    gap: float = 0.0
+
+    def __post_init__(self) -> None:
+        direction = np.array(self.direction, dtype=float, ndmin=1)
+        if direction.ndim != 1 or not np.all(np.isfinite(direction)):
+            raise ValueError(f"direction of a Contact must be a finite vector, got {self.direction!r}")
+        if not np.isfinite(self.gap):
+            raise ValueError(f"gap must be finite, got {self.gap!r}; use no Contact at all for a stop out of reach")
+        if not hasattr(self.law, "entry_rate_floor"):
+            hint = "decorate the function with @law and call it" if callable(self.law) else "use one of contacts"
+            raise TypeError(f"law of a Contact must be a contact law, got {self.law!r}; {hint}")
+        direction.setflags(write=False)
+        object.__setattr__(self, "direction", direction)
+        object.__setattr__(self, "gap", float(self.gap))
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """Matrices, contacts and loads of one problem; see the module for the equation.
+
+    Parameters
+    ----------
+    M, C, K : (n, n), dense or SciPy sparse; M symmetric positive definite, C and K symmetric.
+    contacts : sequence of `Contact`.
+    loads : sequence of ``(vector (n,), signal)``.
+
+    Raises
+    ------
+    ValueError for shapes that do not fit, entries that are not finite, or M not positive definite.
+
+    Examples
+    --------
+    >>> mass = System(M=[[2.0]], C=[[0.0]], K=[[0.0]])
+    >>> mass.size
+    1
+    """
+
+    M: Any
+    C: Any
+    K: Any
+    contacts: Sequence[Contact] = ()
+    loads: Sequence[tuple[ArrayLike, Signal]] = ()
+
+    def __post_init__(self) -> None:
+        for name in "MCK":
+            object.__setattr__(self, name, _square(name, getattr(self, name)))
+        if not self.M.shape == self.C.shape == self.K.shape:
+            raise ValueError(f"M, C, K must have one shape, got {self.M.shape}, {self.C.shape}, {self.K.shape}")
+        object.__setattr__(self, "contacts", tuple(self.contacts))
+        object.__setattr__(self, "loads", tuple(self._load(i, pair) for i, pair in enumerate(self.loads)))
+        for i, contact in enumerate(self.contacts):
+            if contact.direction.size != self.size:
+                raise ValueError(f"contact {i} has a direction of {contact.direction.size}, the system {self.size}")
+
+    def _load(self, i: int, pair: tuple[ArrayLike, Signal]) -> tuple[Array, Signal]:
+        """One checked load."""
+        vector, signal = pair
+        vector = np.array(vector, dtype=float, ndmin=1)
+        if vector.shape != (self.size,) or not np.all(np.isfinite(vector)):
+            raise ValueError(f"load {i} needs a finite vector of {self.size}, got {vector!r}")
+        if not callable(signal):
+            raise TypeError(f"load {i} needs a signal t -> value, got {signal!r}")
+        return vector, signal
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates n."""
+        return int(self.M.shape[0])
+
+    @classmethod
+    def modal(
+        cls,
+        omega: ArrayLike,
+        zeta: ArrayLike,
+        contacts: Sequence[Contact] = (),
+        loads: Sequence[tuple[ArrayLike, Signal]] = (),
+    ) -> System:
+        """Mass-normalised modes: M = I, C = diag(2 ζ ω), K = diag(ω²); one ζ serves all modes."""
+        omega = np.atleast_1d(np.asarray(omega, dtype=float))
+        zeta = np.broadcast_to(np.asarray(zeta, dtype=float), omega.shape)
+        if not (np.all(np.isfinite(omega)) and np.all(omega >= 0.0)):
+            raise ValueError(f"omega must be finite and >= 0 (rad/s), got {omega}")
+        if not (np.all(np.isfinite(zeta)) and np.all(zeta >= 0.0)):
+            raise ValueError(f"zeta must be finite and >= 0, got {zeta}")
+        return cls(np.eye(omega.size), np.diag(2.0 * zeta * omega), np.diag(omega**2), contacts, loads)
+
+    @cached_property
+    def blocks(self) -> Blocks:
+        """The decoupled form."""
+        return decouple(self.M, self.C, self.K)
+
+    def energy(self, q: Array, q_dot: Array) -> Array:
+        """Stored energy ½ q'ᵀ M q' + ½ qᵀ K q in J, for (..., n) arrays."""
+        return 0.5 * (np.sum((q_dot @ self.M) * q_dot, axis=-1) + np.sum((q @ self.K) * q, axis=-1))
+
+
+def _square(name: str, matrix: Any) -> Array:
+    """A dense, finite, symmetric copy of a matrix."""
+    dense = np.array(matrix.toarray() if hasattr(matrix, "toarray") else matrix, dtype=float, ndmin=2)
+    if dense.ndim != 2 or dense.shape[0] != dense.shape[1]:
+        raise ValueError(f"{name} must be square, got shape {dense.shape}")
+    if not np.all(np.isfinite(dense)):
+        row, column = np.argwhere(~np.isfinite(dense))[0]
+        raise ValueError(f"{name} must be finite, got {dense[row, column]} at row {row}, column {column}")
+    if np.abs(dense - dense.T).max() > 1e-9 * np.abs(dense).max():
+        raise ValueError(f"{name} must be symmetric; its largest asymmetry is {np.abs(dense - dense.T).max():g}")
+    dense.setflags(write=False)
+    return dense
+
+
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """Decoupled form: stiffness k (n,), damping c (n,), transformation T and its inverse (2n, 2n).
+
+    ``loss`` (2n, 2n) gives the damping power zᵀ loss z where damping couples modes, and is empty otherwise.
+    """
+
+    k: Array
+    c: Array
+    T: Array
+    inverse: Array
+    loss: Array
+
+    def to_blocks(self, q: Array, q_dot: Array) -> Array:
+        """Block coordinates of a state."""
+        return self.inverse @ np.concatenate((q, q_dot))
+
+    def from_blocks(self, z: Array) -> tuple[Array, Array]:
+        """(q, q_dot) of block coordinates (..., 2n)."""
+        x = z @ self.T.T
+        n = self.k.size
+        return x[..., :n], x[..., n:]
+
+
+def decouple(M: Array, C: Array, K: Array) -> Blocks:
+    """Find the decoupled form of (M, C, K)."""
+    n = M.shape[0]
+    if _is_diagonal(M) and _is_diagonal(K) and np.all(np.diag(M) == 1.0):
+        phi, k = np.eye(n), np.diag(K).copy()
+    else:
+        phi, k = _modes(M, K)
+    damping = phi.T @ C @ phi
+    spread = damping - np.diag(np.diag(damping))
+    if np.abs(spread).max(initial=0.0) <= 1e-12 * np.abs(damping).max(initial=0.0):
+        zero = np.zeros((n, n))
+        inverse = phi.T @ M
+        return Blocks(
+            k,
+            np.diag(damping).copy(),
+            np.block([[phi, zero], [zero, phi]]),
+            np.block([[inverse, zero], [zero, inverse]]),
+            np.empty((0, 0)),
+        )
+    return _state_blocks(phi, k, damping)
+
+
+def _is_diagonal(matrix: Array) -> bool:
+    """Whether all entries off the diagonal are zero."""
+    return not np.any(matrix - np.diag(np.diag(matrix)))
+
+
+def _modes(M: Array, K: Array) -> tuple[Array, Array]:
+    """Mass-normalised modes and squared frequencies; rounding-size ones become exact zeros."""
+    from scipy.linalg import LinAlgError, eigh
+
+    try:
+        k, phi = eigh(K, M)
+    except LinAlgError:
+        lowest = np.linalg.eigvalsh(M)[0]
+        raise ValueError(
+            f"M must be positive definite, its lowest eigenvalue is {lowest:g}; "
+            "give every coordinate a mass or condense the massless ones"
+        ) from None
+    k[np.abs(k) < 1e-13 * np.abs(k).max(initial=0.0)] = 0.0
+    return phi, k
+
+
+def _state_blocks(phi: Array, k: Array, damping: Array) -> Blocks:
+    """Blocks of the state matrix [[0, I], [-diag(k), -damping]] whose damping couples the modes."""
+    n = k.size
+    A = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(k), -damping]])
+    values, vectors = np.linalg.eig(A)
+    order = np.argsort(np.abs(values))
+    values, vectors = values[order], vectors[:, order]
+    scale = np.abs(values).max()
+    complex_ones = np.flatnonzero(values.imag > 1e-12 * scale)
+    real_ones = np.flatnonzero(np.abs(values.imag) <= 1e-12 * scale)
+    half = real_ones.size // 2
+    pairs = [_complex_pair(values[i], vectors[:, i], n) for i in complex_ones]
+    pairs += [
+        _real_pair(values[i].real, values[j].real, vectors[:, i].real, vectors[:, j].real)
+        for i, j in zip(real_ones[:half], real_ones[half:], strict=True)
+    ]
+    columns = np.array([p[2] for p in pairs] + [p[3] for p in pairs]).T
+    if len(pairs) != n or np.linalg.cond(columns) > 1e12:
+        raise ValueError(
+            "the damped modes cannot be separated (two coincide, as for a dashpot on a body that can float, or a "
+            "critically damped mode); change a dashpot by one part in 10^6"
+        )
+    lift = np.block([[phi, np.zeros((n, n))], [np.zeros((n, n)), phi]])
+    loss = columns[n:].T @ damping @ columns[n:]
+    back = np.linalg.solve(columns, np.linalg.inv(lift))
+    return Blocks(np.array([p[0] for p in pairs]), np.array([p[1] for p in pairs]), lift @ columns, back, loss)
+
+
+def _complex_pair(value: complex, vector: NDArray, n: int) -> tuple[float, float, Array, Array]:
+    """k, c and the two columns of a conjugate pair; the phase makes p as near to a displacement as it can be."""
+    vector = vector * 1j * np.exp(-0.5j * np.angle(np.sum(vector[:n] ** 2)))
+    a, b = vector.real, vector.imag
+    return abs(value) ** 2, -2.0 * value.real, b + (value.real / value.imag) * a, -a / value.imag
+
+
+def _real_pair(first: float, second: float, x: Array, y: Array) -> tuple[float, float, Array, Array]:
+    """k, c and the two columns of two real eigenvalues."""
+    if first == second:
+        return first * second, -(first + second), np.zeros_like(x), np.zeros_like(x)
+    difference = first - second
+    return first * second, -(first + second), (-second * x - first * y) / difference, (x + y) / difference
