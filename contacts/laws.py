@@ -123,7 +123,9 @@ class Hertz(Law):
             if not -1.0 < value <= 0.5:
                 raise ValueError(f"{name} of Hertz.of_spheres must lie in (-1, 0.5], got {value!r}")
         if math.isinf(R1) and math.isinf(R2):
-            raise ValueError("R1 and R2 of Hertz.of_spheres are both infinite; two flats are no Hertz contact")
+            raise ValueError(
+                "R1 and R2 of Hertz.of_spheres are both infinite; two flats are no Hertz contact"
+            )
         modulus = 2.0 / ((1.0 - nu1**2) / E1 + (1.0 - nu2**2) / E2)
         radius = 1.0 / (1.0 / R1 + 1.0 / R2)
         return cls(2.0 / 3.0 * modulus * math.sqrt(radius))

@@ -13,10 +13,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numba import njit
 from scipy.integrate import DOP853
 
-from solvers.kernels import rhs
+from solvers.kernels import copy, kernel, rhs
 
 STAGES, EXTENDED = 12, 16
 A = np.zeros((EXTENDED, EXTENDED))
@@ -27,18 +26,18 @@ C = np.concatenate([DOP853.C[:STAGES], [1.0], DOP853.C_EXTRA])
 E3, E5, D = np.array(DOP853.E3), np.array(DOP853.E5), np.array(DOP853.D)
 
 
-@njit(cache=True)
+@kernel
 def step(problem, t, h, x, rate, piece, entry_rate, x_new, rate_new, dense, work, rtol, atol):  # type: ignore[no-untyped-def]
     """One step; returns (error estimate in units of the tolerance, law calls). ``work`` holds the stages."""
     trial, batch = work[EXTENDED], work[EXTENDED + 1]
-    work[0, : x.size] = rate
+    copy(rate, work[0], x.size)
     calls = 0
     for i in range(1, STAGES + 1):
         _stage(i, h, x, work, trial)
         if i == STAGES:  # its weights are the step's: the stage is the new state, its rate the new rate
-            x_new[:] = trial[: x.size]
+            copy(trial, x_new, x.size)
         calls += rhs(problem, t + C[i] * h, trial, piece, entry_rate, work[i], batch)
-    rate_new[:] = work[STAGES, : x.size]
+    copy(work[STAGES], rate_new, x.size)
     error = _error(2 * problem.k.size, h, x, x_new, work, rtol, atol)
     if error <= 4.0:  # a landing step may exceed the tolerance a little; it needs its interpolant too
         for i in range(STAGES + 1, EXTENDED):
@@ -48,7 +47,7 @@ def step(problem, t, h, x, rate, piece, entry_rate, x_new, rate_new, dense, work
     return error, calls
 
 
-@njit(cache=True)
+@kernel
 def _stage(i, h, x, work, trial):  # type: ignore[no-untyped-def]
     """State at which stage i is evaluated."""
     for e in range(x.size):
@@ -58,7 +57,7 @@ def _stage(i, h, x, work, trial):  # type: ignore[no-untyped-def]
         trial[e] = x[e] + h * total
 
 
-@njit(cache=True)
+@kernel
 def _error(size, h, x, x_new, work, rtol, atol):  # type: ignore[no-untyped-def]
     """DOP853's mixed estimate in the energy-like norm: positions and rates against their largest."""
     # one scale for all positions and one for all rates: a mode at rest must not dictate the step
@@ -81,7 +80,7 @@ def _error(size, h, x, x_new, work, rtol, atol):  # type: ignore[no-untyped-def]
     return abs(h) * e5 / math.sqrt((e5 + 0.01 * e3) * size)
 
 
-@njit(cache=True)
+@kernel
 def _interpolant(h, x, x_new, work, dense):  # type: ignore[no-untyped-def]
     """Rows F of x + θ(F₀ + (1-θ)(F₁ + θ(F₂ + (1-θ)(F₃ + ...))))."""
     for e in range(x.size):

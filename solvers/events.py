@@ -5,9 +5,7 @@ Inside a step the indentation is the polynomial of the method's dense output,
 """
 
 import numpy as np
-from numba import njit
-
-from solvers.kernels import dot, indentation
+from solvers.kernels import dot, indentation, kernel
 
 # finer near 0, where a contact just left may come back
 _NODES = np.array([0.0, 1 / 64, 1 / 32, 1 / 16, 1 / 8, 1 / 4, 3 / 8, 1 / 2, 5 / 8, 3 / 4, 7 / 8, 1.0])
@@ -15,7 +13,7 @@ UNRESOLVED = -1.0
 NONE = 2.0
 
 
-@njit(cache=True)
+@kernel
 def polynomial(coefficients, theta):  # type: ignore[no-untyped-def]
     """Value at θ of the nested form; coefficients (δ₀, r₀ ... r₆)."""
     u = 1.0 - theta
@@ -25,7 +23,7 @@ def polynomial(coefficients, theta):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True)
+@kernel
 def coefficients_of(row, offset, x, dense, out):  # type: ignore[no-untyped-def]
     """Nested coefficients of ``row·z - offset``."""
     size = row.size
@@ -34,7 +32,7 @@ def coefficients_of(row, offset, x, dense, out):  # type: ignore[no-untyped-def]
         out[1 + i] = dot(row, dense[i], size)
 
 
-@njit(cache=True)
+@kernel
 def surface_tolerance(problem, s, x):  # type: ignore[no-untyped-def]
     """Distance within which a stop counts as on a level: rounding of δ."""
     total = abs(problem.gap[s])
@@ -43,7 +41,7 @@ def surface_tolerance(problem, s, x):  # type: ignore[no-untyped-def]
     return 1e-15 * total + 1e-20
 
 
-@njit(cache=True)
+@kernel
 def _maximum(coefficients, level, sign, a, b):  # type: ignore[no-untyped-def]
     """Golden-section place of the largest sign·(δ - level) on [a, b]."""
     ratio = 0.6180339887498949
@@ -57,7 +55,7 @@ def _maximum(coefficients, level, sign, a, b):  # type: ignore[no-untyped-def]
     return 0.5 * (a + b)
 
 
-@njit(cache=True)
+@kernel
 def _root(coefficients, level, sign, a, b):  # type: ignore[no-untyped-def]
     """Bisection for the outward crossing in [a, b]."""
     for _ in range(50):
@@ -69,7 +67,7 @@ def _root(coefficients, level, sign, a, b):  # type: ignore[no-untyped-def]
     return b
 
 
-@njit(cache=True)
+@kernel
 def crossing(coefficients, level, sign, tolerance):  # type: ignore[no-untyped-def]
     """First θ at which sign·(δ - level) becomes positive; NONE, or UNRESOLVED when it does so at once."""
     before_last = -np.inf
@@ -89,7 +87,7 @@ def crossing(coefficients, level, sign, tolerance):  # type: ignore[no-untyped-d
     return NONE
 
 
-@njit(cache=True)
+@kernel
 def first_event(problem, x, dense, piece, coefficients):  # type: ignore[no-untyped-def]
     """(θ, stop, direction ±1) of the earliest crossing of the step by any stop."""
     theta, stop, direction = NONE, -1, 0
@@ -106,7 +104,7 @@ def first_event(problem, x, dense, piece, coefficients):  # type: ignore[no-unty
     return theta, stop, direction
 
 
-@njit(cache=True)
+@kernel
 def entry_by_sign(problem, x, x_new, piece):  # type: ignore[no-untyped-def]
     """(θ, stop) of the stop that is inside at the end of a step but was not at its start; the paper's test."""
     theta, stop = NONE, -1

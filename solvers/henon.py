@@ -20,12 +20,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from numba import njit
-
-from solvers.kernels import dot, rhs
+from solvers.kernels import dot, kernel, rhs
 
 
-@njit(cache=True)
+@kernel
 def hermite(h, x, rate, x_new, rate_new, dense):  # type: ignore[no-untyped-def]
     """Dense output of a step that has only its ends: the cubic Hermite interpolant."""
     for i in range(x.size):
@@ -33,10 +31,11 @@ def hermite(h, x, rate, x_new, rate_new, dense):  # type: ignore[no-untyped-def]
         dense[0, i] = change
         dense[1, i] = h * rate[i] - change
         dense[2, i] = 2.0 * change - h * (rate[i] + rate_new[i])
-        dense[3:, i] = 0.0
+        for j in range(3, 7):
+            dense[j, i] = 0.0
 
 
-@njit(cache=True)
+@kernel
 def step(problem, t, h, x, rate, piece, entry_rate, x_new, rate_new, dense, work, rtol, atol):  # type: ignore[no-untyped-def]
     """One Heun step; returns (error estimate 0, law calls). ``dense`` gets the cubic Hermite interpolant."""
     size = x.size
@@ -51,7 +50,7 @@ def step(problem, t, h, x, rate, piece, entry_rate, x_new, rate_new, dense, work
     return 0.0, calls
 
 
-@njit(cache=True)
+@kernel
 def land(problem, t, h, x, rate, piece, entry_rate, stop, level, x_new, work):  # type: ignore[no-untyped-def]
     """Hénon's step of stop ``stop`` onto ``level``; returns its duration, or -1 where it fails (δ̇ near 0)."""
     size = 2 * problem.k.size

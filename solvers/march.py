@@ -21,7 +21,7 @@ from solvers.events import (
 )
 from solvers.henon import hermite
 from solvers.henon import land as henon_landing
-from solvers.kernels import PROBLEM, contact_forces, dot, indentation, rhs
+from solvers.kernels import PROBLEM, contact_forces, copy, dot, indentation, kernel, rhs
 from solvers.result import COLUMNS, Status
 
 _VECTOR = types.Array(types.float64, 1, "C")
@@ -80,7 +80,7 @@ STATE = types.NamedTuple(
 SPACE = types.NamedTuple([_VECTOR, _VECTOR, _MATRIX, _MATRIX, _MATRIX], Space)
 
 
-@njit(cache=True)
+@kernel
 def start(problem, state, space):  # type: ignore[no-untyped-def]
     """Put every stop on its piece and evaluate the first rate."""
     t = state.now[T]
@@ -96,7 +96,7 @@ def start(problem, state, space):  # type: ignore[no-untyped-def]
     state.count[CALLS] += rhs(problem, t, state.x, state.piece, state.entry_rate, state.rate, space.work[0])
 
 
-@njit(cache=True)
+@kernel
 def _open(problem, state, s, t, delta_dot):  # type: ignore[no-untyped-def]
     """Latch the entry rate and begin a row of the contact log."""
     ledger = 2 * problem.k.size + 2 + 2 * s
@@ -110,7 +110,7 @@ def _open(problem, state, s, t, delta_dot):  # type: ignore[no-untyped-def]
     state.open[s, FLOORED] = 1.0 if abs(delta_dot) < problem.floor[s] else 0.0
 
 
-@njit(cache=True)
+@kernel
 def contact_row(problem, state, s, t_out, speed_out, row):  # type: ignore[no-untyped-def]
     """Write the log row of the contact under way at stop s."""
     ledger = 2 * problem.k.size + 2 + 2 * s
@@ -126,7 +126,7 @@ def contact_row(problem, state, s, t_out, speed_out, row):  # type: ignore[no-un
     row[9] = state.open[s, FLOORED]
 
 
-@njit(cache=True)
+@kernel
 def _switch(problem, state, s, direction, log):  # type: ignore[no-untyped-def]
     """Move stop s one piece up or down; open or close its contact."""
     t = state.now[T]
@@ -142,7 +142,7 @@ def _switch(problem, state, s, direction, log):  # type: ignore[no-untyped-def]
     state.now[LAST_EVENT] = t
 
 
-@njit(cache=True)
+@kernel
 def _switch_on_surface(problem, state, log, locates):  # type: ignore[no-untyped-def]
     """Switch every stop that sits on a border of its piece and moves out of it; returns whether any did."""
     switched = False
@@ -153,13 +153,26 @@ def _switch_on_surface(problem, state, log, locates):  # type: ignore[no-untyped
         if delta >= problem.levels[s, state.piece[s]] - tolerance and delta_dot > 0.0:
             _switch(problem, state, s, 1, log)
             switched = True
-        elif state.piece[s] > 0 and delta <= problem.levels[s, state.piece[s] - 1] + tolerance and delta_dot < 0.0:
+        elif (
+            state.piece[s] > 0
+            and delta <= problem.levels[s, state.piece[s] - 1] + tolerance
+            and delta_dot < 0.0
+        ):
             _switch(problem, state, s, -1, log)
             switched = True
     return switched
 
 
-@njit(cache=True)
+@kernel
+def _touching(state):  # type: ignore[no-untyped-def]
+    """Whether any stop is in contact."""
+    for s in range(state.piece.size):
+        if state.piece[s] > 0:
+            return True
+    return False
+
+
+@kernel
 def _peaks(problem, state, space):  # type: ignore[no-untyped-def]
     """Largest indentation and force of the step just accepted, for every stop in contact."""
     delta_of, rate_of = space.coefficients[0], space.coefficients[1]
@@ -171,7 +184,9 @@ def _peaks(problem, state, space):  # type: ignore[no-untyped-def]
         for column in (PEAK_DELTA, PEAK_FORCE):
             best, place = -np.inf, 0
             for i in range(_PEAK_NODES.size):
-                value = _peak_value(problem, state, s, column, delta_of, rate_of, _PEAK_NODES[i], space.work[0])
+                value = _peak_value(
+                    problem, state, s, column, delta_of, rate_of, _PEAK_NODES[i], space.work[0]
+                )
                 if value > best:
                     best, place = value, i
             if best > 0.9 * state.open[s, column]:
@@ -189,7 +204,7 @@ def _peaks(problem, state, space):  # type: ignore[no-untyped-def]
                 state.open[s, column] = max(state.open[s, column], best)
 
 
-@njit(cache=True)
+@kernel
 def _peak_value(problem, state, s, column, delta_of, rate_of, theta, batch):  # type: ignore[no-untyped-def]
     """Indentation or force at θ of the step."""
     batch[0] = polynomial(delta_of, theta)
@@ -200,7 +215,7 @@ def _peak_value(problem, state, s, column, delta_of, rate_of, theta, batch):  # 
     return batch[2]
 
 
-@njit(cache=True)
+@kernel
 def _sample(state, space, h, out, dt):  # type: ignore[no-untyped-def]
     """Write the output samples that lie within the step."""
     t = state.now[T]
@@ -208,14 +223,14 @@ def _sample(state, space, h, out, dt):  # type: ignore[no-untyped-def]
         theta = min(max((state.count[SAMPLED] * dt - t) / h, 0.0), 1.0) if h > 0.0 else 0.0
         row, u = out[state.count[SAMPLED]], 1.0 - theta
         for i in range(state.x.size):
-            r = space.dense[:, i]
-            row[i] = state.x[i] + theta * (
-                r[0] + u * (r[1] + theta * (r[2] + u * (r[3] + theta * (r[4] + u * (r[5] + theta * r[6])))))
-            )
+            value = 0.0
+            for j in range(6, -1, -1):
+                value = space.dense[j, i] + (u if j % 2 == 0 else theta) * value
+            row[i] = state.x[i] + theta * value
         state.count[SAMPLED] += 1
 
 
-@njit(cache=True)
+@kernel
 def _land(step, problem, state, space, h, stop, level, rtol, atol):  # type: ignore[no-untyped-def]
     """Repeat the step with the duration that ends on ``level``: Newton on the true step; returns it."""
     tolerance = surface_tolerance(problem, stop, state.x)
@@ -243,9 +258,26 @@ def _land(step, problem, state, space, h, stop, level, rtol, atol):  # type: ign
         *[_REAL, _REAL, types.boolean, types.boolean, _MATRIX, _MATRIX, _REAL],
     ),
     cache=True,
+    nogil=True,
+    error_model="numpy",
+    _nrt=False,
 )
 def march(  # type: ignore[no-untyped-def]
-    step, problem, state, space, t_end, budget, dt_flight, dt_contact, rtol, atol, adaptive, locates, log, out, dt
+    step,
+    problem,
+    state,
+    space,
+    t_end,
+    budget,
+    dt_flight,
+    dt_contact,
+    rtol,
+    atol,
+    adaptive,
+    locates,
+    log,
+    out,
+    dt,
 ):
     """Advance the state to ``t_end`` or for ``budget`` steps; returns a status code."""
     now, count, stops = state.now, state.count, problem.gap.size
@@ -258,14 +290,20 @@ def march(  # type: ignore[no-untyped-def]
         if count[AT_ONCE] > _EVENTS_AT_ONCE:
             return CHATTER
         if _switch_on_surface(problem, state, log, locates):
-            count[CALLS] += rhs(problem, now[T], state.x, state.piece, state.entry_rate, state.rate, space.work[0])
+            count[CALLS] += rhs(
+                problem, now[T], state.x, state.piece, state.entry_rate, state.rate, space.work[0]
+            )
             continue
 
         # --- try a step
-        phase = H_CONTACT if np.any(state.piece > 0) else H_FLIGHT
+        phase = H_CONTACT if _touching(state) else H_FLIGHT
         h = min(now[phase], dt_contact if phase == H_CONTACT else dt_flight, t_end - now[T])
         if now[T] + h == now[T] and h < t_end - now[T]:
-            return LAW_NOT_FINITE if not np.all(np.isfinite(state.rate)) else STEP_TOO_SMALL
+            return (
+                STEP_TOO_SMALL
+                if np.isfinite(dot(state.rate, state.rate, state.rate.size))
+                else LAW_NOT_FINITE
+            )
         error, calls = step(
             *(problem, now[T], h, state.x, state.rate, state.piece, state.entry_rate),
             *(space.x_new, space.rate_new, space.dense, space.work, rtol, atol),
@@ -279,7 +317,9 @@ def march(  # type: ignore[no-untyped-def]
         # --- events
         stop, direction, landed = -1, 0, False
         if locates:
-            theta, stop, direction = first_event(problem, state.x, space.dense, state.piece, space.coefficients[0])
+            theta, stop, direction = first_event(
+                problem, state.x, space.dense, state.piece, space.coefficients[0]
+            )
             if theta == UNRESOLVED:
                 now[phase] = h / 32.0
                 count[REJECTED] += 1
@@ -308,8 +348,8 @@ def march(  # type: ignore[no-untyped-def]
         # --- accept, record
         _sample(state, space, h, out, dt)
         _peaks(problem, state, space)
-        state.x[:] = space.x_new
-        state.rate[:] = space.rate_new
+        copy(space.x_new, state.x, state.x.size)
+        copy(space.rate_new, state.rate, state.x.size)
         at_end = not landed and h >= t_end - now[T]
         now[T] = t_end if at_end else now[T] + h
         count[STEPS] += 1
@@ -317,7 +357,9 @@ def march(  # type: ignore[no-untyped-def]
             return DIVERGED
         if landed:
             _switch(problem, state, stop, direction, log)
-            count[CALLS] += rhs(problem, now[T], state.x, state.piece, state.entry_rate, state.rate, space.work[0])
+            count[CALLS] += rhs(
+                problem, now[T], state.x, state.piece, state.entry_rate, state.rate, space.work[0]
+            )
 
         # --- adapt
         if adaptive and not landed and not at_end:

@@ -1,0 +1,206 @@
+"""The reduced model: a scene seen through a few modes, ready to be simulated.
+
+q_i'' + 2 ζ_i ω_i q_i' + ω_i² q_i = -Γ_i ÿ + Σ φ_i(z_f) f + Σ_s w_si F_s,    u(z, t) = Σ φ_i(z) q_i(t)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+import reduction
+import solvers
+from fembeam.beam import hermite_rows
+from fembeam.section import require
+
+if TYPE_CHECKING:
+    from fembeam.assembly import Matrices
+    from fembeam.run import Run
+    from fembeam.scene import Scene
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Shapes:
+    """Shape functions φ_i(z): values (2m, n) of (u, u_z) at the nodes (m,), the elements' cubics between."""
+
+    nodes: Vector
+    values: Vector
+
+    def __call__(self, z: ArrayLike, derivative: int = 0) -> Vector:
+        """φ(z): (n,) at one z, (k, n) at z (k,); derivative 1 is the slope, 2 the curvature."""
+        places = np.asarray(z, dtype=float)
+        outside = ~((places >= self.nodes[0]) & (places <= self.nodes[-1]))
+        require(not np.any(outside), f"z must lie on the beam, 0 to {self.nodes[-1]} m",
+                places[outside].tolist(), "phi", "keep to the beam")  # fmt: skip
+        rows = hermite_rows(self.nodes, places.ravel(), derivative) @ self.values
+        return rows.reshape(*places.shape, self.values.shape[1])
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A scene reduced to n modes; made by `Scene.reduce`.
+
+    Attributes
+    ----------
+    omega, zeta : (n,) rad/s and damping ratios (the modes' own; dashpots couple modes and come on top).
+    participation : Γ (n,) = Φᵀ M r in √kg: the load of a base motion y is -Γ ÿ.
+    effective_mass : Γ² (n,) in kg; over all modes it sums to the moving mass.
+    modes : numbers of the kept modes, 0 the lowest.
+    shapes : φ(z); call ``model.phi(z)``.
+    """
+
+    scene: Scene
+    matrices: Matrices
+    basis: reduction.Basis
+    modes: tuple[int, ...]
+    shapes: Shapes
+
+    @property
+    def omega(self) -> Vector:
+        """Natural frequencies (n,), rad/s."""
+        return self.basis.omega
+
+    @cached_property
+    def zeta(self) -> Vector:
+        """Damping ratios (n,) of the structure without dashpots."""
+        return self.scene.damping.ratios(self.omega, self.modes)
+
+    @cached_property
+    def participation(self) -> Vector:
+        """Γ (n,) in √kg."""
+        return self.basis.participation(self.matrices.base_load)
+
+    @property
+    def effective_mass(self) -> Vector:
+        """Γ² (n,) in kg."""
+        return self.participation**2
+
+    def phi(self, z: ArrayLike, derivative: int = 0) -> Vector:
+        """Mass-normalised mode shapes in 1/√kg: (n,) at one z, (k, n) at z (k,)."""
+        return self.shapes(z, derivative)
+
+    @cached_property
+    def system(self) -> solvers.System:
+        """The matrix-level problem: M = I, C, K = diag(ω²), contacts, loads."""
+        scene, n = self.scene, len(self.omega)
+        C = np.diag(scene.damping.modal_coefficients(self.omega, self.modes))
+        C = C + self.basis.project_matrix(self.matrices.dashpots)
+        contacts = [solvers.Contact(stop.push * self.phi(stop.z), stop.law, stop.gap) for stop in scene.stops]
+        loads = [(self.phi(force.z), force.signal) for force in scene.forces]
+        if scene.base is not None:
+            loads.append((-self.participation, scene.base.derivative(2)))
+        return solvers.System(np.eye(n), C, np.diag(self.omega**2), contacts, loads)
+
+    def rest(self) -> Vector:
+        """The start at rest: (2n,) zeros."""
+        return np.zeros(2 * len(self.omega))
+
+    def state(
+        self,
+        displacement: Callable[[Vector], Any] | None = None,
+        velocity: Callable[[Vector], Any] | None = None,
+    ) -> Vector:
+        """The start [q, q_dot] (2n,) nearest, in the mass norm, to given fields u(z) in m and u̇(z) in m/s.
+
+        Parameters
+        ----------
+        displacement, velocity : functions of z (k,), relative to the frame; None is zero.
+        """
+        return np.concatenate([self._coordinates(field) for field in (displacement, velocity)])
+
+    def _coordinates(self, field: Callable[[Vector], Any] | None) -> Vector:
+        """q = Φᵀ M u of a field, its slopes from a cubic spline through the nodes."""
+        if field is None:
+            return np.zeros(len(self.omega))
+        from scipy.interpolate import CubicSpline
+
+        nodes = self.matrices.nodes
+        values = np.broadcast_to(np.asarray(field(nodes), dtype=float), nodes.shape)
+        require(bool(np.all(np.isfinite(values))), "the field must be finite on the beam", values[~np.isfinite(values)][:1],
+                "Model.state", "check the function")  # fmt: skip
+        both = np.stack([values, CubicSpline(nodes, values)(nodes, 1)], axis=1)
+        return self.basis.project(self.matrices.M @ both[self.matrices.dofs >= 0])
+
+    def lasting(self, duration: float) -> Model:
+        """The same model with every signal good for ``duration``; noise without a period gets one."""
+        from dataclasses import replace
+
+        scene, base = self.scene, self.scene.base
+        if hasattr(base, "lasting"):
+            base = base.lasting(duration)
+        forces = [
+            replace(force, signal=force.signal.lasting(duration))
+            if hasattr(force.signal, "lasting")
+            else force
+            for force in scene.forces
+        ]
+        if base is scene.base and all(a is b for a, b in zip(forces, scene.forces, strict=True)):
+            return self
+        return replace(self, scene=replace(scene, base=base, forces=forces))
+
+    def simulate(
+        self,
+        duration: float,
+        dt: float | None = None,
+        start: ArrayLike | None = None,
+        solver: Any = None,
+        progress: bool = False,
+    ) -> Run:
+        """Integrate the model from t = 0.
+
+        Parameters
+        ----------
+        duration : s.
+        dt : output sampling in s; None keeps the final state and the contact log only.
+        start : (2n,) as made by `rest` or `state`; None is rest.
+        solver : one of the methods in `solvers`; None is the library's best.
+        progress : show a bar (only on a terminal).
+
+        Returns
+        -------
+        Run : after Ctrl-C partial, and its status says so.
+
+        Raises
+        ------
+        ValueError for bad input before computing; solvers.SolverError when the method fails.
+        """
+        from fembeam.run import Run, bar
+
+        start = self.rest() if start is None else np.asarray(start, dtype=float)
+        n = len(self.omega)
+        require(start.shape == (2 * n,), f"start must have shape ({2 * n},), [q, q_dot]", start.shape,
+                "Model.simulate", "use model.state(displacement, velocity)")  # fmt: skip
+        lasting = self.lasting(duration) if 0.0 < duration < np.inf else self
+        with bar(duration, progress) as report:
+            solution = solvers.integrate(
+                lasting.system, start[:n], start[n:], duration, dt, solver, progress=report
+            )
+        return Run.of(lasting, solution)
+
+
+def reduced(scene: Scene, modes: int | Sequence[int], elements: int | None) -> Model:
+    """The model of a scene; `Scene.reduce` explains the arguments."""
+    listed = None if isinstance(modes, (int, np.integer)) else [int(i) for i in modes]
+    highest = int(modes) if listed is None else 1 + max(listed, default=-1)  # type: ignore[arg-type]
+    require(highest > 0, "modes must be a count above 0 or a list of mode numbers", modes, "Scene.reduce",
+            "ask for modes=2, or modes=[0, 2]")  # fmt: skip
+    matrices = scene.matrices(elements, highest)
+    basis = reduction.modal_basis(
+        matrices.M, matrices.K, highest if listed is None else None, listed, matrices.root
+    )
+    if scene.stops:
+        direction = matrices.interpolation(scene.stops[0].z)
+    else:
+        direction = matrices.interpolation(matrices.nodes)
+    basis = reduction.oriented(basis, direction)
+    values = np.zeros((matrices.dofs.size, basis.count))
+    values[matrices.dofs.ravel() >= 0] = basis.vectors
+    chosen = tuple(range(highest)) if listed is None else tuple(sorted(listed))
+    return Model(scene, matrices, basis, chosen, Shapes(matrices.nodes, values))

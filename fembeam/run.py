@@ -1,0 +1,203 @@
+"""What a simulation gives: histories at any place, forces, contact log, energy ledger; saved whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, fields
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+import solvers
+from fembeam.model import Shapes
+from fembeam.section import require
+
+if TYPE_CHECKING:
+    from fembeam.model import Model
+
+Vector = NDArray[np.float64]
+FORMAT = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A simulated motion of a reduced model.
+
+    Attributes
+    ----------
+    t, q, q_dot : (k,) s, (k, n) and (k, n) modal coordinates and rates.
+    contacts : log of contacts: stop, t_in, t_out, speed_in, speed_out, peak_indentation, peak_force, impulse,
+        energy_loss, floored (arrays).
+    energy : ledger at t: input, damping, contact, stored, residual in J.
+    status : how it ended, a sentence.
+    cost : steps, rejections, law_calls, events, seconds.
+    """
+
+    t: Vector
+    q: Vector
+    q_dot: Vector
+    contacts: solvers.ContactLog
+    energy: solvers.Energy
+    status: str
+    cost: solvers.Cost
+    shapes: Shapes
+    stops: Vector  # (m, 3): z, push, gap
+    scene: str
+    model: Model | None = None
+    stored_forces: Vector | None = None  # (m, k) of a run read from a file
+
+    @classmethod
+    def of(cls, model: Model, solution: solvers.Solution) -> Run:
+        """A model's solution with what it takes to read it."""
+        stops = np.array([(s.z, s.push, s.gap) for s in model.scene.stops], dtype=float).reshape(-1, 3)
+        status = solution.status.value
+        if not solution.status.good:
+            status += f" (t = {solution.t[-1]:g} s)" if len(solution.t) else " (before the first sample)"
+        return cls(
+            *(
+                solution.t,
+                solution.q,
+                solution.q_dot,
+                solution.contacts,
+                solution.energy,
+                status,
+                solution.cost,
+            ),
+            *(model.shapes, stops, repr(model.scene), model),
+        )
+
+    @property
+    def complete(self) -> bool:
+        """Whether the run reached its end."""
+        return self.status == solvers.Status.DONE.value
+
+    def displacement(self, z: ArrayLike) -> Vector:
+        """u(z, t) relative to the frame, m: (k,) at one z, (k, j) at z (j,)."""
+        return self.q @ self.shapes(z).T
+
+    def velocity(self, z: ArrayLike) -> Vector:
+        """u̇(z, t) relative to the frame, m/s."""
+        return self.q_dot @ self.shapes(z).T
+
+    def indentation(self, stop: int = 0) -> Vector:
+        """δ(t) (k,) of a stop, m; negative while it is open."""
+        z, push, gap = self._stop(stop)
+        return -push * self.displacement(z) - gap
+
+    def force(self, stop: int = 0) -> Vector:
+        """Contact force (k,) of a stop, N, from its law and the entry rate latched at the time."""
+        self._stop(stop)
+        return self._forces[stop]
+
+    def _stop(self, stop: int) -> Vector:
+        """One checked row of ``stops``."""
+        count = len(self.stops)
+        require(-count <= stop < count, f"stop must be below {count}, the number of stops", stop, "Run",
+                "count from 0")  # fmt: skip
+        return self.stops[stop]
+
+    @cached_property
+    def _forces(self) -> Vector:
+        """Forces (m, k)."""
+        if self.stored_forces is not None:
+            return self.stored_forces
+        assert self.model is not None
+        forces = [self._force_of(s, stop.law) for s, stop in enumerate(self.model.scene.stops)]
+        return np.array(forces).reshape(len(forces), len(self.t))
+
+    def _force_of(self, stop: int, law: Any) -> Vector:
+        """Force history of one stop."""
+        z, push, _ = self.stops[stop]
+        mine = self.contacts.stop == stop
+        entered, speed = self.contacts.t_in[mine], self.contacts.speed_in[mine]
+        if not len(entered):
+            return np.zeros(len(self.t))
+        order = np.argsort(entered)
+        last = np.searchsorted(entered[order], self.t, side="right") - 1
+        entry_rate = np.maximum(np.abs(speed[order])[np.maximum(last, 0)], law.entry_rate_floor)
+        delta = np.where(last >= 0, self.indentation(stop), -1.0)
+        return np.asarray(law.force(delta, -push * self.velocity(z), entry_rate))
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write everything to one ``.npz`` file, whole or not at all; read it with `load`."""
+        about = {
+            "format": FORMAT,
+            "status": self.status,
+            "scene": self.scene,
+            "cost": {f.name: getattr(self.cost, f.name) for f in fields(self.cost)},
+            "units": "SI: s, m, kg, N, J, rad",
+        }
+        arrays = {
+            **{"t": self.t, "q": self.q, "q_dot": self.q_dot, "force": self._forces},
+            **{"stops": self.stops, "nodes": self.shapes.nodes, "shapes": self.shapes.values},
+            **{f"contact_{name}": column for name, column in self.contacts.arrays().items()},
+            **{f"energy_{f.name}": getattr(self.energy, f.name) for f in fields(self.energy)},
+        }
+        target = Path(path)
+        target = target if target.suffix == ".npz" else target.with_name(target.name + ".npz")
+        with written_whole(target) as file:
+            np.savez(file, about=json.dumps(about), **arrays)  # type: ignore[arg-type]
+        return target
+
+
+def load(path: str | os.PathLike[str]) -> Run:
+    """Read a run written by `Run.save`.
+
+    Raises
+    ------
+    FileNotFoundError; ValueError when the file is not a run of this library, or is damaged.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            about = json.loads(str(data["about"]))
+            arrays = {name: data[name] for name in data.files if name != "about"}
+    except FileNotFoundError:
+        raise
+    except Exception as error:
+        raise ValueError(f"{path} is not a saved run, or is damaged: {error}") from error
+    if about["format"] != FORMAT:
+        raise ValueError(f"{path} has format {about['format']}, this version reads {FORMAT}")
+    return Run(
+        *(arrays["t"], arrays["q"], arrays["q_dot"]),
+        contacts=solvers.ContactLog(*(arrays[f"contact_{f.name}"] for f in fields(solvers.ContactLog))),
+        energy=solvers.Energy(*(arrays[f"energy_{f.name}"] for f in fields(solvers.Energy))),
+        status=about["status"],
+        cost=solvers.Cost(**about["cost"]),
+        shapes=Shapes(arrays["nodes"], arrays["shapes"]),
+        stops=arrays["stops"],
+        scene=about["scene"],
+        stored_forces=arrays["force"],
+    )
+
+
+@contextmanager
+def written_whole(target: Path) -> Iterator[Any]:
+    """A binary file that appears under its name only once it is complete."""
+    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            yield file
+        os.replace(name, target)
+    except BaseException:
+        os.unlink(name)
+        raise
+
+
+@contextmanager
+def bar(duration: float, wanted: bool) -> Iterator[Callable[[float], None] | None]:
+    """A progress bar over simulated seconds, silent when not on a terminal."""
+    if not wanted:
+        yield None
+        return
+    from tqdm import tqdm
+
+    shape = "{percentage:3.0f}%|{bar}| {n:.4g}/{total:.4g} s simulated [{elapsed}<{remaining}]"
+    with tqdm(total=duration, disable=None, bar_format=shape) as shown:
+        yield lambda t: shown.update(t - shown.n)
