@@ -59,9 +59,7 @@ class Law(ABC):
         """Address of the compiled force."""
         return int(self.kernel.address)
 
-    def force(
-        self, delta: ArrayLike, delta_dot: ArrayLike = 0.0, entry_rate: ArrayLike = 1.0
-    ) -> NDArray[np.float64]:
+    def force(self, delta: ArrayLike, delta_dot: ArrayLike = 0.0, entry_rate: ArrayLike = 1.0) -> NDArray[np.float64]:
         """Contact force in N, zero where ``delta <= 0``.
 
         Parameters
@@ -190,14 +188,10 @@ def law(
         try:
             bound = probe.bind(**values)
         except TypeError as error:
-            raise TypeError(
-                f"law {function.__name__!r}: {error}; its parameters are {list(names[3:])}"
-            ) from None
+            raise TypeError(f"law {function.__name__!r}: {error}; its parameters are {list(names[3:])}") from None
         bound.apply_defaults()
         pairs = tuple((key, float(value)) for key, value in bound.arguments.items())
-        made = CustomLaw(
-            function.__name__, function, pairs, tuple(map(float, knots)), jump, exponent, entry_rate_floor
-        )
+        made = CustomLaw(function.__name__, function, pairs, tuple(map(float, knots)), jump, exponent, entry_rate_floor)
         _check_force(made)
         return made
 
@@ -240,7 +234,7 @@ def _compiled(function: Callable[..., float], count: int) -> Any:
 
     scalar = njit(error_model="numpy")(function)
 
-    def batch(n, delta, delta_dot, entry_rate, parameters, force):  # type: ignore[no-untyped-def]
+    def batch(n, delta, delta_dot, entry_rate, parameters, force):
         values = to_fixed_tuple(carray(parameters, (count,)), count)
         for i in range(n):
             force[i] = scalar(delta[i], delta_dot[i], entry_rate, *values)

@@ -123,9 +123,7 @@ class Hertz(Law):
             if not -1.0 < value <= 0.5:
                 raise ValueError(f"{name} of Hertz.of_spheres must lie in (-1, 0.5], got {value!r}")
         if math.isinf(R1) and math.isinf(R2):
-            raise ValueError(
-                "R1 and R2 of Hertz.of_spheres are both infinite; two flats are no Hertz contact"
-            )
+            raise ValueError("R1 and R2 of Hertz.of_spheres are both infinite; two flats are no Hertz contact")
         modulus = 2.0 / ((1.0 - nu1**2) / E1 + (1.0 - nu2**2) / E2)
         radius = 1.0 / (1.0 / R1 + 1.0 / R2)
         return cls(2.0 / 3.0 * modulus * math.sqrt(radius))
@@ -212,9 +210,7 @@ class PiecewiseLinear(Law):
         if not np.all(np.isfinite(slopes)) or slopes[0] <= 0.0:
             raise ValueError(f"slopes of PiecewiseLinear must be finite, the first positive, got {slopes}")
         if len(knots) != len(slopes) - 1:
-            raise ValueError(
-                f"PiecewiseLinear with {len(slopes)} slopes needs {len(slopes) - 1} knots, got {knots}"
-            )
+            raise ValueError(f"PiecewiseLinear with {len(slopes)} slopes needs {len(slopes) - 1} knots, got {knots}")
         if not (np.all(np.isfinite(knots)) and np.all(np.diff(knots, prepend=0.0) > 0.0)):
             raise ValueError(f"knots of PiecewiseLinear must be finite, positive and ascending, got {knots}")
         if np.any(self._corner_forces() < 0.0) or (len(slopes) > 1 and slopes[-1] < 0.0):
@@ -222,7 +218,8 @@ class PiecewiseLinear(Law):
 
     def _corner_forces(self) -> NDArray[np.float64]:
         """Force at (0, knots...)."""
-        return np.concatenate(([0.0], np.cumsum(np.diff(self.knots, prepend=0.0) * self.slopes[:-1])))  # type: ignore[index]
+        rises = np.diff(self.knots, prepend=0.0) * np.asarray(self.slopes)[:-1]
+        return np.concatenate((np.zeros(1), np.cumsum(rises)))
 
     @property
     def parameters(self) -> NDArray[np.float64]:

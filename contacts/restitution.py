@@ -38,7 +38,7 @@ def achieved_restitution(damping_factor: float) -> float:
 
 
 def _h(x: float) -> float:
-    """x - ln(1 + x), by its series where the difference would cancel."""
+    """X - ln(1 + x), by its series where the difference would cancel."""
     if abs(x) > 0.1:
         return x - math.log1p(x)
     return sum((-x) ** k / k for k in range(17, 1, -1))

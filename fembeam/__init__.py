@@ -25,23 +25,46 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 _ROOMS = {
-    "section": ["Section"],
-    "beam": ["Beam"],
-    "scene": [
-        *["Clamped", "Dashpot", "Guided", "LumpedMass", "Pinned", "PointForce", "Scene", "Spring", "Stop"],
-    ],
-    "damping": ["ModalDamping", "Rayleigh"],
-    "excitation": ["Harmonic", "Multisine"],
-    "noise": ["BandNoise"],
-    "record": ["Record"],
-    "model": ["Model"],
-    "run": ["Run", "load"],
-    "statistics": ["moments", "pdf", "psd"],
+    "section": "Section",
+    "beam": "Beam",
+    "scene": "Clamped Dashpot Guided LumpedMass Pinned PointForce Scene Spring Stop",
+    "damping": "ModalDamping Rayleigh",
+    "excitation": "Harmonic Multisine",
+    "noise": "BandNoise",
+    "record": "Record",
+    "model": "Model",
+    "run": "Run load",
+    "statistics": "moments pdf psd",
 }
-_HOME = {name: room for room, names in _ROOMS.items() for name in names}
+_HOME = {name: room for room, names in _ROOMS.items() for name in names.split()}
 _MODULES = ["plot"]
 
-__all__ = [*sorted(_HOME), *_MODULES]
+__all__ = [
+    "Beam",
+    "BandNoise",
+    "Clamped",
+    "Dashpot",
+    "Guided",
+    "Harmonic",
+    "LumpedMass",
+    "ModalDamping",
+    "Model",
+    "Multisine",
+    "Pinned",
+    "PointForce",
+    "Rayleigh",
+    "Record",
+    "Run",
+    "Scene",
+    "Section",
+    "Spring",
+    "Stop",
+    "load",
+    "moments",
+    "pdf",
+    "plot",
+    "psd",
+]
 
 if TYPE_CHECKING:
     from fembeam import plot

@@ -116,15 +116,15 @@ class Model:
         return np.concatenate([self._coordinates(field) for field in (displacement, velocity)])
 
     def _coordinates(self, field: Callable[[Vector], Any] | None) -> Vector:
-        """q = Φᵀ M u of a field, its slopes from a cubic spline through the nodes."""
+        """Q = Φᵀ M u of a field, its slopes from a cubic spline through the nodes."""
         if field is None:
             return np.zeros(len(self.omega))
         from scipy.interpolate import CubicSpline
 
         nodes = self.matrices.nodes
         values = np.broadcast_to(np.asarray(field(nodes), dtype=float), nodes.shape)
-        require(bool(np.all(np.isfinite(values))), "the field must be finite on the beam", values[~np.isfinite(values)][:1],
-                "Model.state", "check the function")  # fmt: skip
+        bad = values[~np.isfinite(values)]
+        require(not bad.size, "the field must be finite on the beam", bad[:1], "Model.state", "check the function")
         both = np.stack([values, CubicSpline(nodes, values)(nodes, 1)], axis=1)
         return self.basis.project(self.matrices.M @ both[self.matrices.dofs >= 0])
 
@@ -136,9 +136,7 @@ class Model:
         if hasattr(base, "lasting"):
             base = base.lasting(duration)
         forces = [
-            replace(force, signal=force.signal.lasting(duration))
-            if hasattr(force.signal, "lasting")
-            else force
+            replace(force, signal=force.signal.lasting(duration)) if hasattr(force.signal, "lasting") else force
             for force in scene.forces
         ]
         if base is scene.base and all(a is b for a, b in zip(forces, scene.forces, strict=True)):
@@ -179,9 +177,7 @@ class Model:
                 "Model.simulate", "use model.state(displacement, velocity)")  # fmt: skip
         lasting = self.lasting(duration) if 0.0 < duration < np.inf else self
         with bar(duration, progress) as report:
-            solution = solvers.integrate(
-                lasting.system, start[:n], start[n:], duration, dt, solver, progress=report
-            )
+            solution = solvers.integrate(lasting.system, start[:n], start[n:], duration, dt, solver, progress=report)
         return Run.of(lasting, solution)
 
 
@@ -192,9 +188,7 @@ def reduced(scene: Scene, modes: int | Sequence[int], elements: int | None) -> M
     require(highest > 0, "modes must be a count above 0 or a list of mode numbers", modes, "Scene.reduce",
             "ask for modes=2, or modes=[0, 2]")  # fmt: skip
     matrices = scene.matrices(elements, highest)
-    basis = reduction.modal_basis(
-        matrices.M, matrices.K, highest if listed is None else None, listed, matrices.root
-    )
+    basis = reduction.modal_basis(matrices.M, matrices.K, highest if listed is None else None, listed, matrices.root)
     if scene.stops:
         direction = matrices.interpolation(scene.stops[0].z)
     else:

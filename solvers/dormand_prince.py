@@ -27,7 +27,7 @@ E3, E5, D = np.array(DOP853.E3), np.array(DOP853.E5), np.array(DOP853.D)
 
 
 @kernel
-def step(problem, t, h, x, rate, piece, entry_rate, x_new, rate_new, dense, work, rtol, atol):  # type: ignore[no-untyped-def]
+def step(problem, t, h, x, rate, piece, entry_rate, x_new, rate_new, dense, work, rtol, atol):
     """One step; returns (error estimate in units of the tolerance, law calls). ``work`` holds the stages."""
     trial, batch = work[EXTENDED], work[EXTENDED + 1]
     copy(rate, work[0], x.size)
@@ -48,7 +48,7 @@ def step(problem, t, h, x, rate, piece, entry_rate, x_new, rate_new, dense, work
 
 
 @kernel
-def _stage(i, h, x, work, trial):  # type: ignore[no-untyped-def]
+def _stage(i, h, x, work, trial):
     """State at which stage i is evaluated."""
     for e in range(x.size):
         total = 0.0
@@ -58,7 +58,7 @@ def _stage(i, h, x, work, trial):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _error(size, h, x, x_new, work, rtol, atol):  # type: ignore[no-untyped-def]
+def _error(size, h, x, x_new, work, rtol, atol):
     """DOP853's mixed estimate in the energy-like norm: positions and rates against their largest."""
     # one scale for all positions and one for all rates: a mode at rest must not dictate the step
     half = size // 2
@@ -81,7 +81,7 @@ def _error(size, h, x, x_new, work, rtol, atol):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _interpolant(h, x, x_new, work, dense):  # type: ignore[no-untyped-def]
+def _interpolant(h, x, x_new, work, dense):
     """Rows F of x + θ(F₀ + (1-θ)(F₁ + θ(F₂ + (1-θ)(F₃ + ...))))."""
     for e in range(x.size):
         change = x_new[e] - x[e]
@@ -130,6 +130,6 @@ class DormandPrince:
             raise ValueError(f"atol must be positive and finite, got {self.atol!r}")
 
     @property
-    def step(self):  # type: ignore[no-untyped-def]
+    def step(self):
         """The compiled step."""
         return step

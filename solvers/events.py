@@ -5,6 +5,7 @@ Inside a step the indentation is the polynomial of the method's dense output,
 """
 
 import numpy as np
+
 from solvers.kernels import dot, indentation, kernel
 
 # finer near 0, where a contact just left may come back
@@ -14,17 +15,15 @@ NONE = 2.0
 
 
 @kernel
-def polynomial(coefficients, theta):  # type: ignore[no-untyped-def]
+def polynomial(coefficients, theta):
     """Value at θ of the nested form; coefficients (δ₀, r₀ ... r₆)."""
     u = 1.0 - theta
     r = coefficients
-    return r[0] + theta * (
-        r[1] + u * (r[2] + theta * (r[3] + u * (r[4] + theta * (r[5] + u * (r[6] + theta * r[7])))))
-    )
+    return r[0] + theta * (r[1] + u * (r[2] + theta * (r[3] + u * (r[4] + theta * (r[5] + u * (r[6] + theta * r[7]))))))
 
 
 @kernel
-def coefficients_of(row, offset, x, dense, out):  # type: ignore[no-untyped-def]
+def coefficients_of(row, offset, x, dense, out):
     """Nested coefficients of ``row·z - offset``."""
     size = row.size
     out[0] = dot(row, x, size) - offset
@@ -33,7 +32,7 @@ def coefficients_of(row, offset, x, dense, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def surface_tolerance(problem, s, x):  # type: ignore[no-untyped-def]
+def surface_tolerance(problem, s, x):
     """Distance within which a stop counts as on a level: rounding of δ."""
     total = abs(problem.gap[s])
     for i in range(2 * problem.k.size):
@@ -42,7 +41,7 @@ def surface_tolerance(problem, s, x):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _maximum(coefficients, level, sign, a, b):  # type: ignore[no-untyped-def]
+def _maximum(coefficients, level, sign, a, b):
     """Golden-section place of the largest sign·(δ - level) on [a, b]."""
     ratio = 0.6180339887498949
     c, d = b - ratio * (b - a), a + ratio * (b - a)
@@ -56,7 +55,7 @@ def _maximum(coefficients, level, sign, a, b):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _root(coefficients, level, sign, a, b):  # type: ignore[no-untyped-def]
+def _root(coefficients, level, sign, a, b):
     """Bisection for the outward crossing in [a, b]."""
     for _ in range(50):
         middle = 0.5 * (a + b)
@@ -68,7 +67,7 @@ def _root(coefficients, level, sign, a, b):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def crossing(coefficients, level, sign, tolerance):  # type: ignore[no-untyped-def]
+def crossing(coefficients, level, sign, tolerance):
     """First θ at which sign·(δ - level) becomes positive; NONE, or UNRESOLVED when it does so at once."""
     before_last = -np.inf
     last = min(sign * (coefficients[0] - level), 0.0)
@@ -88,7 +87,7 @@ def crossing(coefficients, level, sign, tolerance):  # type: ignore[no-untyped-d
 
 
 @kernel
-def first_event(problem, x, dense, piece, coefficients):  # type: ignore[no-untyped-def]
+def first_event(problem, x, dense, piece, coefficients):
     """(θ, stop, direction ±1) of the earliest crossing of the step by any stop."""
     theta, stop, direction = NONE, -1, 0
     for s in range(problem.gap.size):
@@ -105,7 +104,7 @@ def first_event(problem, x, dense, piece, coefficients):  # type: ignore[no-unty
 
 
 @kernel
-def entry_by_sign(problem, x, x_new, piece):  # type: ignore[no-untyped-def]
+def entry_by_sign(problem, x, x_new, piece):
     """(θ, stop) of the stop that is inside at the end of a step but was not at its start; the paper's test."""
     theta, stop = NONE, -1
     for s in range(problem.gap.size):

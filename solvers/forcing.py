@@ -64,9 +64,7 @@ def _check_nodes(rows: Array, dt: float, duration: float, load: int) -> None:
         bad = int(np.argwhere(~np.isfinite(rows))[0, 0])
         raise ValueError(f"the signal of load {load} is not finite at t = {bad * dt:g} s")
     if (len(rows) - 1) * dt < duration * (1.0 - 1e-12):
-        raise ValueError(
-            f"the signal of load {load} ends at {(len(rows) - 1) * dt:g} s, the run at {duration:g} s"
-        )
+        raise ValueError(f"the signal of load {load} ends at {(len(rows) - 1) * dt:g} s, the run at {duration:g} s")
 
 
 def _sample(signal: Signal, duration: float, rtol: float, load: int) -> tuple[float, Array]:
@@ -78,13 +76,9 @@ def _sample(signal: Signal, duration: float, rtol: float, load: int) -> tuple[fl
         t = np.linspace(0.0, duration, cells + 1)
         values = np.asarray(signal(t), dtype=float)
         if values.shape != t.shape:
-            raise ValueError(
-                f"the signal of load {load} must broadcast: {t.shape} times gave {values.shape} values"
-            )
+            raise ValueError(f"the signal of load {load} must broadcast: {t.shape} times gave {values.shape} values")
         if not np.all(np.isfinite(values)):
-            raise ValueError(
-                f"the signal of load {load} is {values[~np.isfinite(values)][0]} on [0, {duration:g}] s"
-            )
+            raise ValueError(f"the signal of load {load} is {values[~np.isfinite(values)][0]} on [0, {duration:g}] s")
         spline = make_interp_spline(t, values, k=5)
         # thirds rather than midpoints, so that no period of the signal hides between the samples
         between = t[:-1] + duration / cells * np.where(np.arange(cells) % 2, 1 / 3, 0.58)

@@ -24,7 +24,7 @@ from solvers.kernels import dot, kernel, rhs
 
 
 @kernel
-def hermite(h, x, rate, x_new, rate_new, dense):  # type: ignore[no-untyped-def]
+def hermite(h, x, rate, x_new, rate_new, dense):
     """Dense output of a step that has only its ends: the cubic Hermite interpolant."""
     for i in range(x.size):
         change = x_new[i] - x[i]
@@ -36,7 +36,7 @@ def hermite(h, x, rate, x_new, rate_new, dense):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def step(problem, t, h, x, rate, piece, entry_rate, x_new, rate_new, dense, work, rtol, atol):  # type: ignore[no-untyped-def]
+def step(problem, t, h, x, rate, piece, entry_rate, x_new, rate_new, dense, work, rtol, atol):
     """One Heun step; returns (error estimate 0, law calls). ``dense`` gets the cubic Hermite interpolant."""
     size = x.size
     trial, second, batch = work[0], work[1], work[2]
@@ -51,7 +51,7 @@ def step(problem, t, h, x, rate, piece, entry_rate, x_new, rate_new, dense, work
 
 
 @kernel
-def land(problem, t, h, x, rate, piece, entry_rate, stop, level, x_new, work):  # type: ignore[no-untyped-def]
+def land(problem, t, h, x, rate, piece, entry_rate, stop, level, x_new, work):
     """Hénon's step of stop ``stop`` onto ``level``; returns its duration, or -1 where it fails (δ̇ near 0)."""
     size = 2 * problem.k.size
     trial, second, batch = work[0], work[1], work[2]
@@ -108,6 +108,6 @@ class HenonRK2:
                 raise ValueError(f"{name} must be positive and finite (s), got {value!r}")
 
     @property
-    def step(self):  # type: ignore[no-untyped-def]
+    def step(self):
         """The compiled step."""
         return step

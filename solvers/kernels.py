@@ -15,8 +15,8 @@ from llvmlite import ir
 from numba import njit, types
 from numba.extending import intrinsic
 
-
-kernel = njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+OPTIONS: Any = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": False}
+kernel = njit(**OPTIONS)
 """Decorator of every compiled function here. They allocate nothing, so reference counting is switched off: passing
 twenty arrays down a call would otherwise cost ten times the arithmetic of a two-mode step."""
 
@@ -60,13 +60,13 @@ PROBLEM = types.NamedTuple(
 
 
 @intrinsic
-def _call_law(typingctx, address, n, delta, delta_dot, entry_rate, parameters, force):  # type: ignore[no-untyped-def]
+def _call_law(typingctx, address, n, delta, delta_dot, entry_rate, parameters, force):
     """Call the C function at ``address``; arrays are passed by their data pointers."""
     arrays = (delta, delta_dot, parameters, force)
     signature = types.void(types.int64, types.int64, *arrays[:2], types.float64, *arrays[2:])
 
-    def codegen(context, builder, sig, args):  # type: ignore[no-untyped-def]
-        def data(i):  # type: ignore[no-untyped-def]
+    def codegen(context, builder, sig, args):
+        def data(i):
             return context.make_array(sig.args[i])(context, builder, args[i]).data
 
         real, reals = ir.DoubleType(), ir.DoubleType().as_pointer()
@@ -79,7 +79,7 @@ def _call_law(typingctx, address, n, delta, delta_dot, entry_rate, parameters, f
 
 
 @kernel
-def contact_forces(problem, stop, delta, delta_dot, entry_rate, force):  # type: ignore[no-untyped-def]
+def contact_forces(problem, stop, delta, delta_dot, entry_rate, force):
     """Forces of one stop at a batch of indentations; below the surface the law is continued from it."""
     for i in range(delta.size):
         delta[i] = max(delta[i], 0.0)
@@ -87,14 +87,14 @@ def contact_forces(problem, stop, delta, delta_dot, entry_rate, force):  # type:
 
 
 @kernel
-def copy(source, target, n):  # type: ignore[no-untyped-def]
+def copy(source, target, n):
     """First n entries; a slice assignment would allocate."""
     for i in range(n):
         target[i] = source[i]
 
 
 @kernel
-def dot(a, b, n):  # type: ignore[no-untyped-def]
+def dot(a, b, n):
     """Sum of the first n products."""
     total = 0.0
     for i in range(n):
@@ -103,7 +103,7 @@ def dot(a, b, n):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def table_value(problem, j, t):  # type: ignore[no-untyped-def]
+def table_value(problem, j, t):
     """Quintic Hermite value of node table j at time t."""
     dt, start = problem.table_dt[j], problem.table_start[j]
     cell = min(max(int(t / dt), 0), problem.table_start[j + 1] - start - 2)
@@ -120,7 +120,7 @@ def table_value(problem, j, t):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def add_loads(problem, t, x, rate):  # type: ignore[no-untyped-def]
+def add_loads(problem, t, x, rate):
     """Add all loads at time t to the state's rate and their power to the ledger."""
     size = 2 * problem.k.size
     for i in range(problem.tone_omega.size):
@@ -133,7 +133,7 @@ def add_loads(problem, t, x, rate):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _add_load(problem, load, value, size, x, rate):  # type: ignore[no-untyped-def]
+def _add_load(problem, load, value, size, x, rate):
     """One signal's share."""
     for i in range(size):
         rate[i] += problem.load[load, i] * value
@@ -141,7 +141,7 @@ def _add_load(problem, load, value, size, x, rate):  # type: ignore[no-untyped-d
 
 
 @kernel
-def _damping_power(problem, x):  # type: ignore[no-untyped-def]
+def _damping_power(problem, x):
     """Power the linear damping takes."""
     n, power = problem.k.size, 0.0
     if problem.loss.shape[0] == 0:
@@ -154,7 +154,7 @@ def _damping_power(problem, x):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def rhs(problem, t, x, piece, entry_rate, rate, batch):  # type: ignore[no-untyped-def]
+def rhs(problem, t, x, piece, entry_rate, rate, batch):
     """State rate with the stops' pieces frozen (piece > 0: in contact); returns the number of law calls.
 
     ``batch`` is working space of three numbers.
@@ -184,6 +184,6 @@ def rhs(problem, t, x, piece, entry_rate, rate, batch):  # type: ignore[no-untyp
 
 
 @kernel
-def indentation(problem, s, x):  # type: ignore[no-untyped-def]
+def indentation(problem, s, x):
     """Indentation of stop s."""
     return dot(problem.read[s], x, 2 * problem.k.size) - problem.gap[s]

@@ -21,7 +21,7 @@ from solvers.events import (
 )
 from solvers.henon import hermite
 from solvers.henon import land as henon_landing
-from solvers.kernels import PROBLEM, contact_forces, copy, dot, indentation, kernel, rhs
+from solvers.kernels import OPTIONS, PROBLEM, contact_forces, copy, dot, indentation, kernel, rhs
 from solvers.result import COLUMNS, Status
 
 _VECTOR = types.Array(types.float64, 1, "C")
@@ -81,7 +81,7 @@ SPACE = types.NamedTuple([_VECTOR, _VECTOR, _MATRIX, _MATRIX, _MATRIX], Space)
 
 
 @kernel
-def start(problem, state, space):  # type: ignore[no-untyped-def]
+def start(problem, state, space):
     """Put every stop on its piece and evaluate the first rate."""
     t = state.now[T]
     for s in range(problem.gap.size):
@@ -97,7 +97,7 @@ def start(problem, state, space):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _open(problem, state, s, t, delta_dot):  # type: ignore[no-untyped-def]
+def _open(problem, state, s, t, delta_dot):
     """Latch the entry rate and begin a row of the contact log."""
     ledger = 2 * problem.k.size + 2 + 2 * s
     state.entry_rate[s] = max(abs(delta_dot), problem.floor[s])
@@ -111,7 +111,7 @@ def _open(problem, state, s, t, delta_dot):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def contact_row(problem, state, s, t_out, speed_out, row):  # type: ignore[no-untyped-def]
+def contact_row(problem, state, s, t_out, speed_out, row):
     """Write the log row of the contact under way at stop s."""
     ledger = 2 * problem.k.size + 2 + 2 * s
     row[0] = s
@@ -127,7 +127,7 @@ def contact_row(problem, state, s, t_out, speed_out, row):  # type: ignore[no-un
 
 
 @kernel
-def _switch(problem, state, s, direction, log):  # type: ignore[no-untyped-def]
+def _switch(problem, state, s, direction, log):
     """Move stop s one piece up or down; open or close its contact."""
     t = state.now[T]
     delta_dot = dot(problem.read_rate[s], state.x, 2 * problem.k.size)
@@ -143,7 +143,7 @@ def _switch(problem, state, s, direction, log):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _switch_on_surface(problem, state, log, locates):  # type: ignore[no-untyped-def]
+def _switch_on_surface(problem, state, log, locates):
     """Switch every stop that sits on a border of its piece and moves out of it; returns whether any did."""
     switched = False
     for s in range(problem.gap.size):
@@ -153,27 +153,23 @@ def _switch_on_surface(problem, state, log, locates):  # type: ignore[no-untyped
         if delta >= problem.levels[s, state.piece[s]] - tolerance and delta_dot > 0.0:
             _switch(problem, state, s, 1, log)
             switched = True
-        elif (
-            state.piece[s] > 0
-            and delta <= problem.levels[s, state.piece[s] - 1] + tolerance
-            and delta_dot < 0.0
-        ):
+        elif state.piece[s] > 0 and delta <= problem.levels[s, state.piece[s] - 1] + tolerance and delta_dot < 0.0:
             _switch(problem, state, s, -1, log)
             switched = True
     return switched
 
 
 @kernel
-def _touching(state):  # type: ignore[no-untyped-def]
+def _touching(state):
     """Whether any stop is in contact."""
-    for s in range(state.piece.size):
-        if state.piece[s] > 0:
-            return True
-    return False
+    most = 0
+    for piece in state.piece:
+        most = max(most, piece)
+    return most > 0
 
 
 @kernel
-def _peaks(problem, state, space):  # type: ignore[no-untyped-def]
+def _peaks(problem, state, space):
     """Largest indentation and force of the step just accepted, for every stop in contact."""
     delta_of, rate_of = space.coefficients[0], space.coefficients[1]
     for s in range(problem.gap.size):
@@ -184,9 +180,7 @@ def _peaks(problem, state, space):  # type: ignore[no-untyped-def]
         for column in (PEAK_DELTA, PEAK_FORCE):
             best, place = -np.inf, 0
             for i in range(_PEAK_NODES.size):
-                value = _peak_value(
-                    problem, state, s, column, delta_of, rate_of, _PEAK_NODES[i], space.work[0]
-                )
+                value = _peak_value(problem, state, s, column, delta_of, rate_of, _PEAK_NODES[i], space.work[0])
                 if value > best:
                     best, place = value, i
             if best > 0.9 * state.open[s, column]:
@@ -205,7 +199,7 @@ def _peaks(problem, state, space):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _peak_value(problem, state, s, column, delta_of, rate_of, theta, batch):  # type: ignore[no-untyped-def]
+def _peak_value(problem, state, s, column, delta_of, rate_of, theta, batch):
     """Indentation or force at θ of the step."""
     batch[0] = polynomial(delta_of, theta)
     if column == PEAK_DELTA:
@@ -216,7 +210,7 @@ def _peak_value(problem, state, s, column, delta_of, rate_of, theta, batch):  # 
 
 
 @kernel
-def _sample(state, space, h, out, dt):  # type: ignore[no-untyped-def]
+def _sample(state, space, h, out, dt):
     """Write the output samples that lie within the step."""
     t = state.now[T]
     while state.count[SAMPLED] < out.shape[0] and state.count[SAMPLED] * dt <= t + h:
@@ -231,7 +225,7 @@ def _sample(state, space, h, out, dt):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _land(step, problem, state, space, h, stop, level, rtol, atol):  # type: ignore[no-untyped-def]
+def _land(step, problem, state, space, h, stop, level, rtol, atol):
     """Repeat the step with the duration that ends on ``level``: Newton on the true step; returns it."""
     tolerance = surface_tolerance(problem, stop, state.x)
     longest = 1.000001 * h
@@ -257,12 +251,9 @@ def _land(step, problem, state, space, h, stop, level, rtol, atol):  # type: ign
         *[STEP, PROBLEM, STATE, SPACE, _REAL, types.int64, _REAL, _REAL],
         *[_REAL, _REAL, types.boolean, types.boolean, _MATRIX, _MATRIX, _REAL],
     ),
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-    _nrt=False,
+    **OPTIONS,
 )
-def march(  # type: ignore[no-untyped-def]
+def march(
     step,
     problem,
     state,
@@ -290,20 +281,14 @@ def march(  # type: ignore[no-untyped-def]
         if count[AT_ONCE] > _EVENTS_AT_ONCE:
             return CHATTER
         if _switch_on_surface(problem, state, log, locates):
-            count[CALLS] += rhs(
-                problem, now[T], state.x, state.piece, state.entry_rate, state.rate, space.work[0]
-            )
+            count[CALLS] += rhs(problem, now[T], state.x, state.piece, state.entry_rate, state.rate, space.work[0])
             continue
 
         # --- try a step
         phase = H_CONTACT if _touching(state) else H_FLIGHT
         h = min(now[phase], dt_contact if phase == H_CONTACT else dt_flight, t_end - now[T])
         if now[T] + h == now[T] and h < t_end - now[T]:
-            return (
-                STEP_TOO_SMALL
-                if np.isfinite(dot(state.rate, state.rate, state.rate.size))
-                else LAW_NOT_FINITE
-            )
+            return STEP_TOO_SMALL if np.isfinite(dot(state.rate, state.rate, state.rate.size)) else LAW_NOT_FINITE
         error, calls = step(
             *(problem, now[T], h, state.x, state.rate, state.piece, state.entry_rate),
             *(space.x_new, space.rate_new, space.dense, space.work, rtol, atol),
@@ -317,9 +302,7 @@ def march(  # type: ignore[no-untyped-def]
         # --- events
         stop, direction, landed = -1, 0, False
         if locates:
-            theta, stop, direction = first_event(
-                problem, state.x, space.dense, state.piece, space.coefficients[0]
-            )
+            theta, stop, direction = first_event(problem, state.x, space.dense, state.piece, space.coefficients[0])
             if theta == UNRESOLVED:
                 now[phase] = h / 32.0
                 count[REJECTED] += 1
@@ -357,9 +340,7 @@ def march(  # type: ignore[no-untyped-def]
             return DIVERGED
         if landed:
             _switch(problem, state, stop, direction, log)
-            count[CALLS] += rhs(
-                problem, now[T], state.x, state.piece, state.entry_rate, state.rate, space.work[0]
-            )
+            count[CALLS] += rhs(problem, now[T], state.x, state.piece, state.entry_rate, state.rate, space.work[0])
 
         # --- adapt
         if adaptive and not landed and not at_end:
@@ -386,9 +367,7 @@ def new_state(z: Any, stops: int) -> State:
 def new_space(state: State, work_rows: int) -> Space:
     """Working arrays for a state."""
     size = state.x.size
-    return Space(
-        np.empty(size), np.empty(size), np.zeros((7, size)), np.empty((work_rows, size)), np.empty((2, 8))
-    )
+    return Space(np.empty(size), np.empty(size), np.zeros((7, size)), np.empty((work_rows, size)), np.empty((2, 8)))
 
 
 LOG_COLUMNS = COLUMNS

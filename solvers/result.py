@@ -17,9 +17,7 @@ class Status(Enum):
     DONE = "finished"
     RUNNING = "not finished yet"
     INTERRUPTED = "interrupted: partial result up to the time reached"
-    STEP_TOO_SMALL = (
-        "the step fell below the resolution of time; the problem may be singular there: loosen rtol"
-    )
+    STEP_TOO_SMALL = "the step fell below the resolution of time; the problem may be singular there: loosen rtol"
     DIVERGED = "the state is not finite any more; the method is unstable at this step: use a smaller one"
     CHATTER = "more events than progress in time; a contact chatters: add damping, or change its law"
     LOG_FULL = "the contact log is full"
@@ -67,8 +65,9 @@ class ContactLog:
     @classmethod
     def of_rows(cls, rows: Array) -> ContactLog:
         """From the kernels' table, one contact a row."""
-        columns = [np.array(column) for column in rows.T]
-        return cls(columns[0].astype(int), *columns[1:9], columns[9].astype(bool))
+        columns: list[Any] = [np.array(column) for column in rows.T]
+        columns[0], columns[-1] = columns[0].astype(int), columns[-1].astype(bool)
+        return cls(*columns)
 
     def arrays(self) -> dict[str, Any]:
         """All columns by name."""

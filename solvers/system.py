@@ -25,8 +25,9 @@ Array = NDArray[np.float64]
 
 
 class Law(Protocol):
-    """What a contact law must offer; the C signature of ``address`` is
+    """What a contact law must offer.
 
+    The C signature of ``address`` is
     ``void (int64 n, double *delta, double *delta_dot, double entry_rate, double *parameters, double *force)``.
     """
 
@@ -48,7 +49,7 @@ class Law(Protocol):
 
 
 Signal = Callable[[Any], Any]
-"""t -> value, broadcasting. May offer ``tones()`` or ``nodes(duration, rtol)``; see `solvers.forcing`."""
+"""A function t -> value that broadcasts; may offer ``tones()`` or ``nodes(duration, rtol)``, see `solvers.forcing`."""
 
 
 @dataclass(frozen=True)
@@ -71,13 +72,9 @@ class Contact:
         if direction.ndim != 1 or not np.all(np.isfinite(direction)):
             raise ValueError(f"direction of a Contact must be a finite vector, got {self.direction!r}")
         if not np.isfinite(self.gap):
-            raise ValueError(
-                f"gap must be finite, got {self.gap!r}; use no Contact at all for a stop out of reach"
-            )
+            raise ValueError(f"gap must be finite, got {self.gap!r}; use no Contact at all for a stop out of reach")
         if not hasattr(self.law, "entry_rate_floor"):
-            hint = (
-                "decorate the function with @law and call it" if callable(self.law) else "use one of contacts"
-            )
+            hint = "decorate the function with @law and call it" if callable(self.law) else "use one of contacts"
             raise TypeError(f"law of a Contact must be a contact law, got {self.law!r}; {hint}")
         direction.setflags(write=False)
         object.__setattr__(self, "direction", direction)
@@ -115,16 +112,12 @@ class System:
         for name in "MCK":
             object.__setattr__(self, name, _square(name, getattr(self, name)))
         if not self.M.shape == self.C.shape == self.K.shape:
-            raise ValueError(
-                f"M, C, K must have one shape, got {self.M.shape}, {self.C.shape}, {self.K.shape}"
-            )
+            raise ValueError(f"M, C, K must have one shape, got {self.M.shape}, {self.C.shape}, {self.K.shape}")
         object.__setattr__(self, "contacts", tuple(self.contacts))
         object.__setattr__(self, "loads", tuple(self._load(i, pair) for i, pair in enumerate(self.loads)))
         for i, contact in enumerate(self.contacts):
             if contact.direction.size != self.size:
-                raise ValueError(
-                    f"contact {i} has a direction of {contact.direction.size}, the system {self.size}"
-                )
+                raise ValueError(f"contact {i} has a direction of {contact.direction.size}, the system {self.size}")
 
     def _load(self, i: int, pair: tuple[ArrayLike, Signal]) -> tuple[Array, Signal]:
         """One checked load."""
@@ -177,9 +170,7 @@ def _square(name: str, matrix: Any) -> Array:
         row, column = np.argwhere(~np.isfinite(dense))[0]
         raise ValueError(f"{name} must be finite, got {dense[row, column]} at row {row}, column {column}")
     if np.abs(dense - dense.T).max() > 1e-9 * np.abs(dense).max():
-        raise ValueError(
-            f"{name} must be symmetric; its largest asymmetry is {np.abs(dense - dense.T).max():g}"
-        )
+        raise ValueError(f"{name} must be symmetric; its largest asymmetry is {np.abs(dense - dense.T).max():g}")
     dense.setflags(write=False)
     return dense
 
@@ -274,11 +265,9 @@ def _state_blocks(phi: Array, k: Array, damping: Array) -> Blocks:
             "critically damped mode); change a dashpot by one part in 10^6"
         )
     lift = np.block([[phi, np.zeros((n, n))], [np.zeros((n, n)), phi]])
-    loss = columns[n:].T @ damping @ columns[n:]
+    loss = np.asarray(columns[n:].T @ damping @ columns[n:], dtype=float)
     back = np.linalg.solve(columns, np.linalg.inv(lift))
-    return Blocks(
-        np.array([p[0] for p in pairs]), np.array([p[1] for p in pairs]), lift @ columns, back, loss
-    )
+    return Blocks(np.array([p[0] for p in pairs]), np.array([p[1] for p in pairs]), lift @ columns, back, loss)
 
 
 def _complex_pair(value: complex, vector: NDArray, n: int) -> tuple[float, float, Array, Array]:

@@ -1,0 +1,451 @@
+"""Gaussian noise as a sum of equally spaced lines, and the line spectrum it shares with measured records.
+
+    s(t) = Re Σ_k c_k exp(i k Δω t),        c_k = √(2 S(k Δω) Δω) exp(i φ_k),        period 2π/Δω
+
+S is the one-sided power spectral density per rad/s, so that the variance over one period is Δω Σ S exactly.
+The lines are known, hence every derivative is exact: multiply by (i k Δω)^n.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Table = tuple[Sequence[float], Sequence[float]]
+Psd = Callable[[NDArray[np.float64]], ArrayLike]
+
+AUTOMATIC_LINES = 4096  # kurtosis 3 - 1.5/4096: Gaussian to far below any sampling error
+FEWEST_LINES = 8  # below this a sum of cosines is visibly not Gaussian (kurtosis under 2.8)
+HERMITE_CONSTANT = 46080.0  # |error| <= h^6/46080 max|s^(6)| for the quintic Hermite interpolant: 6! * 2^6
+OVERSAMPLING = 8  # grid points per period of the top line when the peak is bounded
+FINEST_RTOL = 1e-13  # finer is below the rounding of the FFT
+
+
+def number(name: str, value: Any, above: float = -math.inf, least: float = -math.inf) -> float:
+    """The value as a finite float above one bound and not below another, or a clear error."""
+    try:
+        result = float(value)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} must be a number, got {value!r}") from None
+    if not (math.isfinite(result) and result > above and result >= least):
+        bound = f" above {above:g}" if above > -math.inf else f" of at least {least:g}"
+        raise ValueError(f"{name} must be finite{bound if max(above, least) > -math.inf else ''}, got {value!r}")
+    return result
+
+
+def frozen(values: ArrayLike, dtype: type = np.float64) -> NDArray[Any]:
+    """A read-only copy, so that neither side can change the other's numbers."""
+    result: NDArray[Any] = np.array(values, dtype=dtype)
+    result.flags.writeable = False
+    return result
+
+
+def checked_band(name: str, band: Any) -> tuple[float, float]:
+    """The band as two floats 0 <= lo < hi, or a clear error."""
+    try:
+        lo, hi = band
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} must be a pair (lo, hi) in rad/s, got {band!r}") from None
+    lo, hi = number(f"{name}[0]", lo, least=0.0), number(f"{name}[1]", hi, least=0.0)
+    if not lo < hi:
+        raise ValueError(f"{name} must run from lo to hi > lo in rad/s, got ({lo:g}, {hi:g}); swap or widen it")
+    return lo, hi
+
+
+def checked_order(order: Any) -> int:
+    """The number of derivatives as an int >= 0, or a clear error."""
+    if isinstance(order, bool) or not isinstance(order, (int, np.integer)) or order < 0:
+        raise ValueError(f"order of the derivative must be an integer of at least 0, got {order!r}")
+    return int(order)
+
+
+@dataclass(frozen=True, eq=False)
+class LineSpectrum:
+    """A periodic signal s(t) = Re Σ_j amplitude_j exp(i (first + j) spacing t).
+
+    Parameters
+    ----------
+    spacing : float
+        Δω in rad/s; the signal repeats after 2π/Δω.
+    first : int
+        Number k >= 1 of the first line.
+    amplitude : complex array, shape (n,)
+        Complex amplitudes of the lines first, first + 1, …
+    """
+
+    spacing: float
+    first: int
+    amplitude: NDArray[np.complex128]
+
+    @property
+    def omega(self) -> NDArray[np.float64]:
+        """Angular frequencies of the lines in rad/s, shape (n,)."""
+        return self.spacing * (self.first + np.arange(self.amplitude.size, dtype=np.float64))
+
+    @property
+    def top(self) -> int:
+        """Number of the highest line."""
+        return self.first + self.amplitude.size - 1
+
+    @property
+    def period(self) -> float:
+        """Seconds after which the signal repeats."""
+        return 2 * math.pi / self.spacing
+
+    @property
+    def rms(self) -> float:
+        """Root mean square over one period, exact by Parseval."""
+        return float(np.linalg.norm(self.amplitude)) / math.sqrt(2)
+
+    def derivative(self, order: int) -> LineSpectrum:
+        """d^order s/dt^order; a negative order integrates, without constants."""
+        unit = (1, 1j, -1, -1j)[order % 4]  # i^order without rounding
+        return replace(self, amplitude=unit * self.omega**order * self.amplitude)
+
+    def grid(self, n: int) -> NDArray[np.float64]:
+        """One period at n > 2 top equally spaced instants from t = 0, by FFT."""
+        from scipy.fft import irfft
+
+        half = np.zeros(n // 2 + 1, dtype=np.complex128)
+        half[self.first : self.top + 1] = self.amplitude / 2
+        return irfft(half, n, norm="forward")
+
+    def at(self, t: ArrayLike) -> Any:
+        """The sum at any instants; exp(i k Δω t) is split in k = a + b, which leaves a matrix product."""
+        times = np.asarray(t, dtype=np.float64)
+        width = math.ceil(math.sqrt(self.amplitude.size))
+        rows = math.ceil(self.amplitude.size / width)
+        table = np.zeros(rows * width, dtype=np.complex128)
+        table[: self.amplitude.size] = self.amplitude
+        low = 1j * self.spacing * np.arange(width)
+        high = 1j * self.spacing * (self.first + width * np.arange(rows))
+        flat, result = times.ravel(), np.empty(times.size)
+        chunk = max(1, 2**19 // width)  # some tens of MB at a time
+        for i in range(0, times.size, chunk):
+            part = flat[i : i + chunk, None]
+            inner = np.exp(low * part) @ table.reshape(rows, width).T
+            result[i : i + chunk] = np.einsum("ij,ij->i", np.exp(high * part), inner).real
+        return result.reshape(times.shape)[()]
+
+    def peak(self) -> float:
+        """Upper bound of |s|, at most 8 % above the maximum.
+
+        A trigonometric polynomial of degree N, sampled at M > 2N points, obeys
+        max|s| <= max|samples| / cos(π N/M): H. Ehlich, K. Zeller, Math. Zeitschrift 86 (1964) 41.
+        """
+        return float(np.abs(self.grid(OVERSAMPLING * self.top)).max()) / math.cos(math.pi / OVERSAMPLING)
+
+    def nodes(self, duration: float, rtol: float) -> tuple[float, NDArray[np.float64]]:
+        """Rows [s, s', s''] so dense that quintic Hermite interpolation errs by at most rtol rms(s)."""
+        from scipy.fft import next_fast_len
+
+        if not FINEST_RTOL <= rtol < 1:
+            raise ValueError(f"rtol must lie in [{FINEST_RTOL:g}, 1), got {rtol!r}")
+        sixth = self.derivative(6).peak()
+        widest = (HERMITE_CONSTANT * rtol * self.rms / sixth) ** (1 / 6) if sixth > 0 else self.period
+        n = next_fast_len(max(math.ceil(self.period / widest), 2 * self.top + 1), real=True)
+        dt = self.period / n
+        values = np.empty((math.ceil(duration / dt) + 1, 3))
+        for order in range(3):
+            wave = self.derivative(order).grid(n)
+            values[:n, order] = wave[: len(values)]
+            values[n:, order] = wave[: max(0, len(values) - n)]  # the last node may close the period
+        return dt, values
+
+
+@dataclass(frozen=True, repr=False)
+class BandNoise:
+    """One realisation of Gaussian noise with a flat power spectral density in a band.
+
+        y(t) = √Δω Re Σ_k √(2 S(ω_k)) exp(i φ_k) exp(i ω_k t),    ω_k = k Δω in [lo, hi],    Δω = 2π/period
+
+    Parameters
+    ----------
+    std : float
+        Standard deviation of y (m), > 0; the level S is such that Δω Σ S(ω_k) = std² exactly.
+    band : (lo, hi)
+        Band in rad/s, 0 <= lo < hi; no line lies outside, and none at ω = 0.
+    seed : int >= 0 or numpy.random.SeedSequence
+        Seed of the phases φ_k, uniform in [0, 2π): the same seed gives the same bits.
+    period : float, optional
+        Time in s after which the realisation repeats. Left out, it is 4096 * 2π/(hi - lo), that is 4096
+        lines, and `lasting` may take a longer one. The attribute is always a number.
+    psd, order : keyword only
+        Density behind `of_psd`, and how many derivatives of y this signal is; use `of_psd` and `derivative`.
+
+    Raises
+    ------
+    ValueError
+        std not positive, band upside down, seed not a whole number, fewer than 8 lines in the band.
+
+    Notes
+    -----
+    A sum of n lines of equal amplitude has kurtosis 3 - 1.5/n. `std` belongs to y also when this object is
+    one of its derivatives; `rms` is that of the signal itself. Another `period` is another realisation.
+
+    References
+    ----------
+    van de Wouw et al., Int. J. Non-Linear Mech. 38 (2003) 767, section 4.1, Eqs (9)-(11).
+
+    Examples
+    --------
+    >>> noise = BandNoise(1e-3, (0.0, 1226.6), seed=1)
+    >>> t, y = noise.series()
+    >>> bool(abs(y.var() / 1e-6 - 1) < 1e-12)
+    True
+    """
+
+    std: float | None
+    band: tuple[float, float]
+    seed: int | np.random.SeedSequence = 0
+    period: float | None = None
+    psd: Psd | Table | None = field(default=None, kw_only=True)
+    order: int = field(default=0, kw_only=True)
+    # (std, period) where computed and not asked for: dataclasses.replace hands them back as if asked for
+    _computed: tuple[float | None, float | None] = field(default=(None, None), kw_only=True, compare=False)
+
+    def __post_init__(self) -> None:
+        band = checked_band("BandNoise band", self.band)
+        computed_std, computed_period = self._computed
+        free = self.period is None or self.period == computed_period
+        automatic = AUTOMATIC_LINES * 2 * math.pi / (band[1] - band[0])
+        period = automatic if free else number("BandNoise period (s)", self.period, above=0.0)
+        self._set(band=band, period=period, seed=_checked_seed(self.seed), order=checked_order(self.order))
+        first, last = self._span
+        if last - first + 1 < FEWEST_LINES:
+            raise ValueError(
+                f"BandNoise needs at least {FEWEST_LINES} lines in the band, got {max(0, last - first + 1)} "
+                f"in {band} rad/s at a spacing of {self._spacing:.6g} rad/s; make the period longer"
+            )
+        if self.psd is None:
+            std = number("BandNoise std", self.std, above=0.0)
+        elif self.std is None or self.std == computed_std:
+            self._set(psd=self.psd if callable(self.psd) else _checked_table(self.psd, band))
+            std = math.sqrt(self._spacing * float(np.sum(self._density(self.omega))))
+            if std == 0:
+                raise ValueError(f"psd is zero on every line of the band {band} rad/s; check the units of omega")
+        else:
+            raise ValueError(f"BandNoise std follows from psd, got std = {self.std!r} as well; scale the psd")
+        self._set(std=std, _computed=(None if self.psd is None else std, period if free else None))
+
+    @classmethod
+    def of_psd(
+        cls,
+        psd: Psd | Table,
+        band: tuple[float, float],
+        seed: int | np.random.SeedSequence = 0,
+        period: float | None = None,
+    ) -> BandNoise:
+        """Gaussian noise of any one-sided power spectral density S(ω) within a band.
+
+            std² = Δω Σ_k S(ω_k)
+
+        Parameters
+        ----------
+        psd : callable or (omega, S)
+            S per rad/s, >= 0: a function of an array of ω in rad/s, or a table of two sequences that
+            covers the band, interpolated linearly.
+        band, seed, period
+            As for `BandNoise`; the automatic period puts 4096 lines in the band.
+
+        Raises
+        ------
+        ValueError
+            S negative, not finite or zero everywhere, a table that is unsorted or does not cover the band.
+
+        Examples
+        --------
+        >>> coloured = BandNoise.of_psd(lambda w: 1e-9 / (1 + (w / 300) ** 2), (0.0, 1226.6), seed=1)
+        >>> float(round(coloured.std**2 / (1e-9 * 300 * np.arctan(1226.6 / 300)), 3))
+        1.0
+        """
+        if psd is None:
+            raise ValueError("psd must be a function of omega or a table (omega, S), got None")
+        return cls(None, band, seed, period, psd=psd)
+
+    def __repr__(self) -> str:
+        head = f"BandNoise(std={self.std!r}" if self.psd is None else "BandNoise.of_psd(psd=…"
+        tail = f".derivative({self.order})" if self.order else ""
+        return f"{head}, band={self.band!r}, seed={self.seed!r}, period={self.period!r}){tail}"
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields without the lines: those come back from the seed, and a pickle stays small."""
+        return {name: value for name, value in self.__dict__.items() if name != "_lines"}
+
+    def _set(self, **values: Any) -> None:
+        """Set checked fields of the frozen object while it is being made."""
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    @property
+    def _spacing(self) -> float:
+        """Δω in rad/s."""
+        assert self.period is not None
+        return 2 * math.pi / self.period
+
+    @property
+    def _span(self) -> tuple[int, int]:
+        """Numbers of the first and last line; a line on the edge counts in spite of rounding."""
+        lo, hi = self.band
+        return max(1, math.ceil(lo / self._spacing - 1e-9)), math.floor(hi / self._spacing + 1e-9)
+
+    def _density(self, omega: NDArray[np.float64]) -> NDArray[np.float64]:
+        """S of y itself at frequencies inside the band, checked."""
+        if self.psd is None:
+            first, last = self._span
+            assert self.std is not None
+            return np.full(omega.shape, self.std**2 / (self._spacing * (last - first + 1)))
+        raw = self.psd(omega) if callable(self.psd) else np.interp(omega, *self.psd)
+        density = np.asarray(raw, dtype=np.float64)
+        if density.shape not in ((), omega.shape):
+            raise ValueError(f"psd must return one value per omega, got shape {density.shape} for {omega.shape}")
+        return _checked_density(omega, np.broadcast_to(density, omega.shape))
+
+    @cached_property
+    def _lines(self) -> LineSpectrum:
+        """The lines of this signal, drawn from the seed."""
+        phase = np.random.default_rng(self.seed).uniform(0.0, 2 * math.pi, self.omega.size)
+        amplitude = np.sqrt(2 * self._spacing * self._density(self.omega)) * np.exp(1j * phase)
+        lines = LineSpectrum(self._spacing, self._span[0], amplitude).derivative(self.order)
+        lines.amplitude.flags.writeable = False
+        return lines
+
+    @property
+    def omega(self) -> NDArray[np.float64]:
+        """Angular frequencies of the lines in rad/s, shape (n,)."""
+        first, last = self._span
+        return self._spacing * np.arange(first, last + 1, dtype=np.float64)
+
+    @property
+    def amplitude(self) -> NDArray[np.complex128]:
+        """Complex amplitudes of the lines, shape (n,): value(t) = Re Σ amplitude exp(i omega t)."""
+        return self._lines.amplitude
+
+    @property
+    def rms(self) -> float:
+        """Standard deviation over one period of this signal, y or the derivative it stands for."""
+        return self._lines.rms
+
+    def psd_at(self, omega: ArrayLike) -> NDArray[np.float64]:
+        """One-sided target density per rad/s of this signal at any omega (rad/s), zero outside the band."""
+        at = np.atleast_1d(np.asarray(omega, dtype=np.float64))
+        inside = (at >= self.band[0]) & (at <= self.band[1])
+        result = np.zeros(at.shape)
+        result[inside] = self._density(at[inside]) * at[inside] ** (2 * self.order)
+        return result.reshape(np.shape(omega))
+
+    def __call__(self, t: ArrayLike) -> Any:
+        """Value at the instants t (s), of any shape, by summation; for long uniform grids see `series`."""
+        return self._lines.at(t)
+
+    def series(self, dt: float | None = None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """One period (t, y) on a uniform grid by FFT.
+
+        Parameters
+        ----------
+        dt : float, optional
+            Largest step in s; the one taken divides the period. Left out: 4 points per period of the top
+            line.
+        """
+        from scipy.fft import next_fast_len
+
+        lines = self._lines
+        widest = lines.period / (4 * lines.top) if dt is None else number("dt (s)", dt, above=0.0)
+        n = next_fast_len(max(math.ceil(lines.period / widest - 1e-9), 2 * lines.top + 1), real=True)
+        return lines.period / n * np.arange(n), lines.grid(n)
+
+    def nodes(self, duration: float, rtol: float) -> tuple[float, NDArray[np.float64]]:
+        """Hermite data of the signal on a uniform grid, with a proven interpolation error.
+
+            |error| <= dt^6/46080 max|s^(6)| <= rtol rms(s)
+
+        Parameters
+        ----------
+        duration : float
+            The grid covers [0, duration], in s; at most the period.
+        rtol : float
+            Error of the quintic Hermite interpolant relative to the rms of the signal, in [1e-13, 1).
+
+        Returns
+        -------
+        dt : float
+            Step in s.
+        values : array, shape (N, 3)
+            Rows [s, s', s''] at t = j dt.
+
+        Raises
+        ------
+        ValueError
+            duration beyond the period, or rtol out of range.
+
+        Notes
+        -----
+        Derivatives come from the lines; max|s^(6)| is bounded from an oversampled FFT, not estimated.
+        """
+        self._check_lasts(number("duration (s)", duration, least=0.0))
+        return self._lines.nodes(duration, rtol)
+
+    def derivative(self, order: int) -> BandNoise:
+        """The signal d^order s/dt^order: the same lines times (i ω)^order."""
+        return replace(self, order=self.order + checked_order(order))
+
+    def lasting(self, duration: float) -> BandNoise:
+        """A signal that does not repeat within `duration` (s).
+
+        It is this one when its period is long enough. When the period was left out it is another realisation,
+        with period = duration; a period that was asked for and is too short is an error.
+        """
+        duration = number("duration (s)", duration, least=0.0)
+        if self._computed[1] is not None and duration > self._computed[1]:
+            return replace(self, period=duration)
+        self._check_lasts(duration)
+        return self
+
+    def _check_lasts(self, duration: float) -> None:
+        """Refuse to repeat a realisation silently."""
+        assert self.period is not None
+        if duration > self.period * (1 + 1e-9):
+            raise ValueError(
+                f"BandNoise would repeat after its period of {self.period:.6g} s, got a duration of "
+                f"{duration:.6g} s; set period to at least the duration, or leave it out"
+            )
+
+
+def _checked_seed(seed: Any) -> int | np.random.SeedSequence:
+    """A seed that gives the same bits every time, or a clear error."""
+    if isinstance(seed, np.random.SeedSequence):
+        return seed
+    if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
+        raise ValueError(f"BandNoise seed must be an integer of at least 0 or a SeedSequence, got {seed!r}")
+    return int(seed)
+
+
+def _checked_density(omega: NDArray[np.float64], density: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The density, or an error that names its first bad value."""
+    bad = ~(np.isfinite(density) & (density >= 0))
+    if bad.any():
+        i = int(np.argmax(bad))
+        raise ValueError(f"psd must be finite and at least 0, got {density[i]} at omega = {omega[i]:.6g} rad/s")
+    return density
+
+
+def _checked_table(psd: Any, band: tuple[float, float]) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """The table as tuples that nobody can change, or a clear error."""
+    try:
+        omega, density = (np.asarray(column, dtype=np.float64) for column in psd)
+    except (TypeError, ValueError):
+        raise ValueError(f"psd must be a function of omega or a table (omega, S), got {type(psd).__name__}") from None
+    if omega.ndim != 1 or omega.shape != density.shape or omega.size < 2:
+        raise ValueError(f"psd table needs two columns of equal length >= 2, got {omega.shape} and {density.shape}")
+    if not np.all(np.diff(omega) > 0):
+        raise ValueError("psd table must have strictly increasing omega; sort it")
+    if not (omega[0] <= band[0] and band[1] <= omega[-1]):
+        raise ValueError(f"psd table spans [{omega[0]:g}, {omega[-1]:g}] rad/s and must cover the band {band}")
+    _checked_density(omega, density)
+    return tuple(omega.tolist()), tuple(density.tolist())

@@ -1,0 +1,301 @@
+"""The scene: one beam, what holds it, what hangs on it, what it may hit, and what drives it.
+
+SI units; z along the beam, u its displacement relative to the frame, positive up. Everything is checked when
+it is made, before anything is computed: positions, signs, conflicts.
+"""
+
+from __future__ import annotations
+
+import inspect
+import warnings
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, get_args
+
+import numpy as np
+
+from fembeam.assembly import Matrices, assemble
+from fembeam.beam import Beam
+from fembeam.damping import ModalDamping, Rayleigh
+from fembeam.section import require, require_finite, require_non_negative
+
+if TYPE_CHECKING:
+    from fembeam.model import Model
+
+
+@dataclass(frozen=True)
+class Clamped:
+    """u = 0 and u_z = 0 at z (m)."""
+
+    z: float
+    fixed = (True, True)
+
+
+@dataclass(frozen=True)
+class Pinned:
+    """u = 0 at z (m), free to turn."""
+
+    z: float
+    fixed = (True, False)
+
+
+@dataclass(frozen=True)
+class Guided:
+    """u_z = 0 at z (m), free to move."""
+
+    z: float
+    fixed = (False, True)
+
+
+Support = Clamped | Pinned | Guided
+
+
+@dataclass(frozen=True)
+class LumpedMass:
+    """A rigid body fixed to the beam at z: T = ½ m (u̇ + e u̇_z)² + ½ J u̇_z².
+
+    `mass` m in kg, `inertia` J about its own centre in kg m², both ≥ 0; `offset` e in m: the centre sits
+    ahead of z by e on a rigid arm, which may reach beyond the beam's end.
+    """
+
+    z: float
+    mass: float
+    inertia: float = 0.0
+    offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_non_negative("mass", self.mass, f"LumpedMass at z = {self.z}", "give kg")
+        require_non_negative("inertia", self.inertia, f"LumpedMass at z = {self.z}", "give kg m²")
+        require_finite("offset", self.offset, f"LumpedMass at z = {self.z}", "give m")
+
+
+@dataclass(frozen=True)
+class Spring:
+    """A spring to the frame: force -k u (`stiffness`, N/m), moment -κ u_z (`rotational`, N m/rad); ≥ 0."""
+
+    z: float
+    stiffness: float
+    rotational: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_non_negative("stiffness", self.stiffness, f"Spring at z = {self.z}", "give N/m")
+        require_non_negative("rotational", self.rotational, f"Spring at z = {self.z}", "give N m/rad")
+
+
+@dataclass(frozen=True)
+class Dashpot:
+    """A dashpot to the frame: force -c u̇ (`damping`, N s/m), moment -γ u̇_z (`rotational`, N m s); ≥ 0."""
+
+    z: float
+    damping: float
+    rotational: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_non_negative("damping", self.damping, f"Dashpot at z = {self.z}", "give N s/m")
+        require_non_negative("rotational", self.rotational, f"Dashpot at z = {self.z}", "give N m s/rad")
+
+
+@dataclass(frozen=True)
+class Stop:
+    """A one-sided stop on the frame: δ = -u - gap below the beam, δ = u - gap above it.
+
+    `law` gives the repulsive force for δ > 0; `gap` in m, negative = preload.
+    """
+
+    z: float
+    law: Any
+    gap: float = 0.0
+    side: str = "below"
+
+    def __post_init__(self) -> None:
+        where = f"Stop at z = {self.z}"
+        require_finite("gap", self.gap, where, "give the clearance in m, negative for a preload")
+        require(self.side in ("below", "above"), "side must be 'below' or 'above'", self.side, where, "choose one")
+        bare = inspect.isroutine(self.law) and not hasattr(self.law, "force")
+        require(
+            not bare,
+            "law must not be a bare function",
+            self.law,
+            where,
+            "decorate it with @law from contacts",
+        )
+        valid = callable(getattr(self.law, "force", None)) and not inspect.isclass(self.law)
+        require(valid, "law must offer force(delta, delta_dot, entry_rate)", self.law, where,
+                "give a law such as contacts.Hertz(stiffness)")  # fmt: skip
+
+    @property
+    def push(self) -> float:
+        """Direction in which the stop pushes the beam: +1 (up) from below, -1 from above."""
+        return 1.0 if self.side == "below" else -1.0
+
+
+@dataclass(frozen=True)
+class PointForce:
+    """A force on the beam at z: signal(t) in N, positive up."""
+
+    z: float
+    signal: Any
+
+    def __post_init__(self) -> None:
+        require(self.signal is not None, "signal must be given", self.signal, f"PointForce at z = {self.z}",
+                "give a signal such as Harmonic(amplitude, omega)")  # fmt: skip
+
+
+FEATURES: dict[str, tuple[type, ...]] = {
+    "supports": get_args(Support),
+    "masses": (LumpedMass,),
+    "springs": (Spring,),
+    "dashpots": (Dashpot,),
+    "stops": (Stop,),
+    "forces": (PointForce,),
+}
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A beam with supports, masses, springs, dashpots, stops, damping, base motion and forces.
+
+    M ü + C u̇ + K u = -M r ÿ + Σ b f(t) + Σ w F(δ, δ̇)
+
+    Parameters
+    ----------
+    beam : Beam.
+    supports : of Clamped, Pinned, Guided; at most one per place. None at all is allowed (free body).
+    masses, springs, dashpots, stops, forces : lists, any length; kept as tuples.
+    damping : ModalDamping or Rayleigh, of the structure without dashpots.
+    base : frame motion y(t), or None.
+
+    Raises
+    ------
+    ValueError : anything outside the beam, not finite, or in conflict; the message names it.
+    TypeError : something of the wrong kind in a list.
+
+    Warns
+    -----
+    UserWarning : the supports and springs leave rigid-body modes; says how many.
+
+    Examples
+    --------
+    >>> from fembeam.section import Section
+    >>> steel = Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)
+    >>> scene = Scene(Beam(0.2599, steel), [Clamped(0.0)], [LumpedMass(0.24445, 25.4e-3, inertia=3.0e-6)])
+    >>> scene.matrices(modes=3).elements
+    44
+    """
+
+    beam: Beam
+    supports: Sequence[Support] = ()
+    masses: Sequence[LumpedMass] = ()
+    springs: Sequence[Spring] = ()
+    dashpots: Sequence[Dashpot] = ()
+    stops: Sequence[Stop] = ()
+    damping: ModalDamping | Rayleigh = ModalDamping(0.0)  # noqa: RUF009 (frozen)
+    base: Any = None
+    forces: Sequence[PointForce] = ()
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.beam, Beam):
+            raise TypeError(f"beam must be a Beam, got {self.beam!r} in Scene; make one: Beam(length, section)")
+        for name, kinds in FEATURES.items():
+            object.__setattr__(self, name, _listed(name, getattr(self, name), kinds))
+            self._check_places(name)
+        if not callable(getattr(self.damping, "modal_coefficients", None)):
+            raise TypeError(f"damping must be ModalDamping or Rayleigh, got {self.damping!r} in Scene; "
+                            "write ModalDamping(0.01)")  # fmt: skip
+        self._check_conflicts()
+        if count := self.rigid_body_modes:
+            what = "1 rigid-body mode appears" if count == 1 else "2 rigid-body modes appear"
+            advice = "supports and springs do not hold the beam, it may drift"
+            warnings.warn(f"{what} in Scene: {advice}", UserWarning, stacklevel=3)
+
+    def matrices(self, elements: int | None = None, modes: int | None = None, probes: Sequence[float] = ()) -> Matrices:
+        """Sparse M, C, K on the free dofs of a Hermite mesh with a node on every feature and probe.
+
+        Parameters
+        ----------
+        elements :
+            Number of elements (more if the features need them); None: as few as make each of the lowest
+            `modes` frequencies right to 1e-6 relative, by the local wavelength: (β h)⁴/1440 ≤ 0.65e-6.
+        modes :
+            How many modes will be kept; None: 10. With `elements` it is only checked against the dofs.
+        probes :
+            Further coordinates that shall be nodes. (A feature or probe closer than 1e-4 of the length to
+            another one is interpolated inside its element instead, for rounding.)
+
+        Returns
+        -------
+        Matrices : its `accuracy` says what the mesh promises.
+
+        Raises
+        ------
+        ValueError : elements or modes not a positive integer, more modes than dofs, a probe outside the beam.
+        """
+        return assemble(self, elements, modes, probes)
+
+    def reduce(self, modes: int | Sequence[int] = 2, elements: int | None = None) -> Model:
+        """The scene in its lowest `modes` modes, or in a list of them such as [0, 2, 5].
+
+        Parameters
+        ----------
+        modes : a count, or mode numbers from 0.
+        elements : of the mesh; None: as few as make every kept frequency right to 1e-6.
+
+        Returns
+        -------
+        Model : mass-normalised modes, positive at the first stop (else where they move most).
+
+        Raises
+        ------
+        ValueError : no modes, repeated or negative numbers, more than the mesh has.
+        """
+        from fembeam.model import reduced
+
+        return reduced(self, modes, elements)
+
+    @property
+    def places(self) -> list[float]:
+        """Coordinates of all features, in no order."""
+        return [feature.z for name in FEATURES for feature in getattr(self, name)]
+
+    @property
+    def rigid_body_modes(self) -> int:
+        """How many of the motions u = a + b z neither a support nor a spring resists: 0, 1 or 2."""
+        rows = [row for s in self.supports for row, fixed in zip(_rigid_rows(s.z), s.fixed, strict=True) if fixed]
+        for spring in self.springs:
+            translation, rotation = _rigid_rows(spring.z)
+            rows += [translation] * (spring.stiffness > 0) + [rotation] * (spring.rotational > 0)
+        scaled = np.array([*rows, (0.0, 0.0)]) / (1.0, self.beam.length)
+        return 2 - int(np.linalg.matrix_rank(scaled, tol=1e-9))
+
+    def _check_places(self, name: str) -> None:
+        """Raise ValueError unless every feature of one list sits on the beam."""
+        for index, feature in enumerate(getattr(self, name)):
+            where = f"{name}[{index}] ({type(feature).__name__}) of Scene"
+            require_finite("z", feature.z, where, "give the coordinate along the beam in m")
+            require(0 <= feature.z <= self.beam.length, f"z must lie on the beam, 0 to {self.beam.length} m",
+                    feature.z, where, "move it, or lengthen the beam")  # fmt: skip
+
+    def _check_conflicts(self) -> None:
+        """Raise ValueError if two supports share one place."""
+        ordered = sorted(self.supports, key=lambda support: support.z)
+        for first, second in pairwise(ordered):
+            apart = second.z - first.z > 1e-9 * self.beam.length
+            require(apart, "supports must not share one place", (first, second), "Scene", "keep one")
+
+
+def _listed(name: str, value: Any, kinds: tuple[type, ...]) -> tuple[Any, ...]:
+    """The list as a tuple, each entry of one of the kinds."""
+    names = " or ".join(kind.__name__ for kind in kinds)
+    if not isinstance(value, Iterable) or isinstance(value, (str, dict)):
+        raise TypeError(f"{name} must be a list of {names}, got {value!r} in Scene; put it in brackets")
+    entries = tuple(value)
+    for index, entry in enumerate(entries):
+        if not isinstance(entry, kinds):
+            raise TypeError(f"{name}[{index}] must be a {names}, got {entry!r} in Scene; move it to its own list")
+    return entries
+
+
+def _rigid_rows(z: float) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Rows u and u_z at z of the rigid motions (1, z)."""
+    return (1.0, z), (0.0, 1.0)

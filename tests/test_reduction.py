@@ -1,0 +1,179 @@
+"""Modal basis: normalisation, choice, signs, self-checks, dense against sparse, and what is refused."""
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+import reduction
+from fembeam.beam import Beam
+from fembeam.scene import Clamped, LumpedMass, Scene
+from fembeam.section import Section
+from reduction import modal
+
+UNIT = Section(E=1.0, rho=1.0, A=1.0, I=1.0)
+
+
+@pytest.fixture(scope="module")
+def cantilever():
+    return Scene(Beam(1.0, UNIT), [Clamped(0.0)], [LumpedMass(0.8, 0.5, 0.01)]).matrices(elements=50)
+
+
+@pytest.fixture(scope="module")
+def chain():
+    """Free chain of 200 unit masses and springs: omega = 2 sin(i π / 2n)."""
+    n = 200
+    K = sparse.diags([[-1.0] * (n - 1), [1.0, *[2.0] * (n - 2), 1.0], [-1.0] * (n - 1)], [-1, 0, 1]).tocsr()
+    return sparse.eye(n, format="csr"), K, 2 * np.sin(np.arange(n) * np.pi / (2 * n))
+
+
+@pytest.mark.parametrize("count", [1, 5, 60, 200])
+def test_chain(chain, count):
+    M, K, omega = chain
+    basis = reduction.modal_basis(M, K, count)
+    np.testing.assert_allclose(basis.omega, omega[:count], rtol=1e-9)
+    assert basis.omega[0] == 0.0
+    assert basis.count == count
+    np.testing.assert_allclose(basis.project_matrix(M), np.eye(count), atol=1e-12)
+    np.testing.assert_allclose(basis.project_matrix(K), np.diag(omega[:count] ** 2), atol=1e-12)
+
+
+def test_dense_and_sparse_agree(cantilever, monkeypatch):
+    found = []
+    for limit in (0, 1000):
+        monkeypatch.setattr(modal, "DENSE_LIMIT", limit)
+        found.append(reduction.modal_basis(cantilever.M, cantilever.K, 5, root=cantilever.root))
+    np.testing.assert_allclose(found[0].omega, found[1].omega, rtol=1e-11)
+    np.testing.assert_allclose(found[0].vectors, found[1].vectors, atol=1e-7 * np.abs(found[0].vectors).max())
+
+
+def test_list_of_modes_is_a_part_of_the_whole(cantilever):
+    M, K = cantilever.M, cantilever.K
+    whole, part = reduction.modal_basis(M, K, 6), reduction.modal_basis(M, K, indices=[5, 0, 2])
+    np.testing.assert_allclose(part.omega, whole.omega[[0, 2, 5]], rtol=1e-9)
+    np.testing.assert_allclose(part.vectors, whole.vectors[:, [0, 2, 5]], atol=1e-6 * np.abs(whole.vectors).max())
+
+
+def test_all_modes_rebuild_the_matrices():
+    matrices = Scene(Beam(1.0, UNIT), [Clamped(0.0)]).matrices(elements=6)
+    basis = reduction.modal_basis(matrices.M, matrices.K, root=matrices.root)
+    inverse = np.linalg.inv(matrices.M.toarray())
+    np.testing.assert_allclose(basis.vectors @ basis.vectors.T, inverse, rtol=1e-8, atol=1e-8 * abs(inverse).max())
+
+
+def test_same_basis_every_time(cantilever):
+    first, second = (reduction.modal_basis(cantilever.M, cantilever.K, 4) for _ in range(2))
+    assert np.array_equal(first.vectors, second.vectors)
+
+
+def test_expand_and_project(cantilever):
+    basis = reduction.modal_basis(cantilever.M, cantilever.K, 3)
+    q = np.arange(24.0).reshape(2, 4, 3)
+    u = basis.expand(q)
+    assert u.shape == (2, 4, 100)
+    np.testing.assert_allclose(u[1, 2], basis.vectors @ q[1, 2], rtol=1e-12)
+    np.testing.assert_allclose(basis.project(cantilever.M @ u[1, 2]), q[1, 2], rtol=1e-8)
+    rows = cantilever.interpolation([0.3, 0.8])
+    np.testing.assert_allclose(basis.project(rows.T), basis.project(rows.toarray().T), rtol=1e-14)
+    load = cantilever.base_load
+    np.testing.assert_allclose(basis.effective_mass(load), basis.participation(load) ** 2)
+
+
+def test_arrays_are_untouched_and_basis_is_frozen():
+    M, K = np.diag([1.0, 2.0, 3.0]), np.diag([3.0, 2.0, 1.0])
+    copies = M.copy(), K.copy()
+    basis = reduction.modal_basis(M, K, 2, root=np.sqrt(K))
+    assert np.array_equal(M, copies[0])
+    assert np.array_equal(K, copies[1])
+    with pytest.raises(ValueError, match="read-only"):
+        basis.vectors[0, 0] = 1.0
+    vectors = np.eye(2)
+    reduction.Basis(vectors, np.ones(2))
+    vectors[0, 0] = 2.0  # the caller's array stays writable
+
+
+# --- signs -----------------------------------------------------------------------------------------------
+
+
+def test_sign_by_direction(cantilever):
+    basis = reduction.modal_basis(cantilever.M, cantilever.K, 5)
+    for z in (0.8, 0.3):
+        direction = cantilever.interpolation(z).toarray()[0]
+        assert np.all(reduction.oriented(basis, direction).project(direction) > 0)
+        flipped = reduction.oriented(basis, -direction)
+        assert np.all(flipped.project(direction) < 0)
+        np.testing.assert_array_equal(np.abs(flipped.vectors), np.abs(basis.vectors))
+
+
+def test_sign_by_largest_displacement_nearest_the_end():
+    vectors = np.array([[-3.0, 1.0], [2.0, -0.5], [1.0, -1.0]])
+    oriented = reduction.oriented(reduction.Basis(vectors, np.ones(2)), np.eye(3))
+    np.testing.assert_array_equal(oriented.vectors, [[3, -1], [-2, 0.5], [-1, 1]])
+    matrices = Scene(Beam(1.0, UNIT), [Clamped(0.0)]).matrices(elements=10)
+    basis = reduction.oriented(reduction.modal_basis(matrices.M, matrices.K, 4), matrices.interpolation(matrices.nodes))
+    np.testing.assert_allclose(basis.project(matrices.interpolation(1.0).T).ravel(), 2.0, rtol=1e-2)
+
+
+def test_a_node_at_the_direction_falls_back():
+    basis = reduction.Basis(np.array([[0.0, 1e-17], [-2.0, -2.0]]), np.ones(2))
+    np.testing.assert_array_equal(reduction.oriented(basis, [1.0, 0.0]).vectors[1], [2.0, 2.0])
+
+
+# --- self-checks and bad input ---------------------------------------------------------------------------
+
+
+def test_wrong_vectors_are_noticed(cantilever, monkeypatch):
+    solve = modal._solve
+
+    def skewed(M, K, count):
+        omega_squared, vectors = solve(M, K, count)
+        return omega_squared, vectors * (1 + 1e-6)
+
+    monkeypatch.setattr(modal, "_solve", skewed)
+    with pytest.raises(reduction.AccuracyError, match="modes must be orthonormal to 1e-09, got 2e-06"):
+        reduction.modal_basis(cantilever.M, cantilever.K, 3)
+
+
+def test_wrong_frequencies_are_noticed(chain, monkeypatch):
+    solve = modal._solve
+    monkeypatch.setattr(modal, "_solve", lambda M, K, count: (solve(M, K, count)[0] + 1e-6, solve(M, K, count)[1]))
+    with pytest.raises(reduction.AccuracyError, match="must be below 1e-09, got"):
+        reduction.modal_basis(*chain[:2], 3)
+
+
+EYE = np.eye(3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((EYE, EYE, 0), r"count must be 1 to 3 \(free dofs\), got 0 in modal_basis"),
+        ((EYE, EYE, 4), r"count must be 1 to 3 \(free dofs\), got 4 in modal_basis; ask for fewer"),
+        ((EYE, EYE, 1.5), "count must be 1 to 3"),
+        ((EYE, EYE, 1, [0]), "count or indices, not both"),
+        ((EYE, EYE, None, []), "indices must be a list of mode numbers"),
+        ((EYE, EYE, None, [0.5]), "indices must be a list of mode numbers"),
+        ((EYE, EYE, None, [0, 0]), "indices must be distinct, 0 to 2, got"),
+        ((EYE, EYE, None, [-1]), "indices must be distinct, 0 to 2, got"),
+        ((EYE, EYE, None, [3]), "indices must be distinct, 0 to 2, got"),
+        ((EYE[:2], EYE), r"M must be square, got shape \(2, 3\)"),
+        ((EYE, EYE[:2]), "K must be square"),
+        ((np.eye(2), EYE), "M and K must have the same shape"),
+        ((EYE, EYE * np.nan), "K must be finite"),
+        ((EYE + np.eye(3, k=1), EYE), "M must be symmetric, got a difference of 1 "),
+        ((EYE, EYE + np.eye(3, k=1)), "K must be symmetric"),
+        ((np.diag([1.0, 0.0, 1.0]), EYE), "M must be positive definite, got a pivot of 0"),
+        ((np.array([[1.0, 2.0], [2.0, 1.0]]), np.eye(2)), "M must be positive definite, got a pivot of -3"),
+        ((np.ones((2, 2)), np.eye(2)), "M must be positive definite"),
+        ((EYE, np.diag([1.0, 2.0, -3.0])), "K must be positive semi-definite, got omega² = -3"),
+        ((EYE, EYE, 1, None, 2 * EYE), "root must satisfy rootᵀ root = K, got a difference of 3"),
+        ((EYE, EYE, 1, None, np.eye(2)), "root must satisfy"),
+    ],
+)
+def test_modal_basis_rejects(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        reduction.modal_basis(*arguments)
+
+
+def test_basis_rejects_shapes():
+    with pytest.raises(ValueError, match=r"vectors \(N, n\) and omega \(n,\) must match"):
+        reduction.Basis(np.eye(3), np.ones(2))

@@ -1,0 +1,373 @@
+"""Scenes: the paper's beam, features on the mesh, damping, and what is refused."""
+
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from scipy import linalg
+
+import reduction
+from fembeam.beam import Beam
+from fembeam.damping import ModalDamping, Rayleigh
+from fembeam.scene import (
+    Clamped,
+    Dashpot,
+    Guided,
+    LumpedMass,
+    Pinned,
+    PointForce,
+    Scene,
+    Spring,
+    Stop,
+)
+from fembeam.section import Section
+
+STEEL = Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)
+UNIT = Section(E=1.0, rho=1.0, A=1.0, I=1.0)
+BEAM = Beam(1.0, UNIT)
+
+
+class Linear:
+    """Stand-in for a law."""
+
+    def force(self, delta, delta_dot, entry_rate):
+        return delta
+
+
+def paper(inertia=3.0e-6, **parts):
+    mass = LumpedMass(0.24445, mass=25.4e-3, inertia=inertia)
+    return Scene(Beam(0.2599, STEEL), [Clamped(0.0)], [mass], **parts)
+
+
+def basis_of(scene, modes, **mesh):
+    matrices = scene.matrices(modes=modes, **mesh)
+    return matrices, reduction.modal_basis(matrices.M, matrices.K, modes, root=matrices.root)
+
+
+@pytest.mark.parametrize("modes", [3, 10, 30])
+@pytest.mark.parametrize(
+    ("inertia", "omega"),
+    [
+        (3.0e-6, [109.1299120547, 790.6100943811, 2303.729838331]),
+        (0.0, [109.2243455999, 800.0303389402, 2379.248123522]),
+    ],
+)
+def test_paper_frequencies(inertia, omega, modes):
+    _, basis = basis_of(paper(inertia), modes)
+    np.testing.assert_allclose(basis.omega[:3], omega, rtol=1e-6 if modes == 3 else 1e-8)
+
+
+def test_nodes_on_every_feature_and_probe():
+    beam = Beam.of_spans([(0.31, UNIT), (0.69, UNIT)])
+    scene = Scene(
+        beam,
+        [Clamped(0.0), Pinned(0.97)],
+        [LumpedMass(0.123, 1.0)],
+        [Spring(0.456, 1.0)],
+        [Dashpot(0.511, 1.0)],
+        [Stop(0.789, Linear())],
+        forces=[PointForce(0.832, object())],
+    )
+    for matrices in (scene.matrices(modes=3, probes=[0.6543]), scene.matrices(elements=20, probes=[0.6543])):
+        for z in (0.0, 0.31, 0.123, 0.456, 0.511, 0.789, 0.832, 0.6543, 0.97, 1.0):
+            assert np.min(np.abs(matrices.nodes - z)) < 1e-15
+        assert np.all(np.diff(matrices.nodes) > 0)
+    assert scene.matrices(elements=20).elements == 20
+    assert scene.matrices(elements=1).elements == 8  # the features alone
+
+
+def test_dof_map_and_sizes():
+    matrices = Scene(BEAM, [Clamped(0.0), Pinned(0.5), Guided(1.0)]).matrices(elements=4)
+    assert matrices.dofs.tolist() == [[-1, -1], [0, 1], [-1, 2], [3, 4], [5, -1]]
+    assert matrices.M.shape == matrices.K.shape == matrices.C.shape == (6, 6)
+    assert all(A.format == "csr" for A in (matrices.M, matrices.K, matrices.C, matrices.dashpots))
+    assert matrices.influence.tolist() == [1, 0, 0, 1, 0, 1]
+    assert abs(matrices.K - matrices.root.T @ matrices.root).max() < 1e-12
+
+
+def test_interpolation_sees_supported_dofs_as_zero():
+    matrices = Scene(BEAM, [Clamped(0.0)]).matrices(elements=7)
+    free = matrices.dofs >= 0
+    nodal = np.column_stack([matrices.nodes**2 * (3 - matrices.nodes), 6 * matrices.nodes - 3 * matrices.nodes**2])
+    u, z = nodal[free], np.linspace(0, 1, 23)
+    np.testing.assert_allclose(matrices.interpolation(z) @ u, z**2 * (3 - z), atol=1e-13)
+    np.testing.assert_allclose(matrices.interpolation(z, 1) @ u, 6 * z - 3 * z**2, atol=1e-12)
+    np.testing.assert_allclose(matrices.interpolation(z, 2) @ u, 6 - 6 * z, atol=1e-11)
+    assert matrices.interpolation(0.5).shape == (1, 14)
+    for bad in (1.0001, -1e-6, math.nan):
+        with pytest.raises(ValueError, match=r"z must lie on the beam, 0 to 1.0 m, got .* in interpolation"):
+            matrices.interpolation([0.5, bad])
+
+
+def test_base_load_includes_the_columns_of_supported_dofs():
+    # A uniform field u = 1 of the whole beam: the momentum of all free and supported dofs is the mass.
+    coarse = Scene(BEAM, [Clamped(0.0)]).matrices(elements=1)
+    np.testing.assert_allclose(coarse.base_load, [(156 + 54) / 420, (-22 - 13) / 420 + 0.0], rtol=1e-13)
+    assert not np.allclose(coarse.base_load, coarse.M @ coarse.influence)
+
+
+def test_cantilever_effective_masses():
+    matrices, basis = basis_of(Scene(BEAM, [Clamped(0.0)]), 40)
+    mass = basis.effective_mass(matrices.base_load)
+    np.testing.assert_allclose(mass[:3], [0.613076, 0.188300, 0.064732], atol=1e-6)
+    assert 0.98 < mass.sum() < 1.0
+
+
+def test_tip_flexibility_by_modes():
+    matrices, basis = basis_of(Scene(BEAM, [Clamped(0.0)]), 3)
+    phi = basis.project(matrices.interpolation(1.0).toarray()[0])
+    carried = np.cumsum(phi**2 / basis.omega**2) * 3  # exact: L³/3EI
+    np.testing.assert_allclose(carried, [0.970688, 0.995404, 0.998556], atol=1e-6)
+
+
+def test_offset_mass_is_a_rigid_arm():
+    m, J, e = 0.7, 0.02, 0.15
+    matrices = Scene(BEAM, [Clamped(0.0)], [LumpedMass(1.0, m, J, e)]).matrices(elements=3)
+    bare = Scene(BEAM, [Clamped(0.0)]).matrices(elements=3)
+    expected = [[m, m * e], [m * e, J + m * e**2]]
+    np.testing.assert_allclose((matrices.M - bare.M).toarray()[-2:, -2:], expected, rtol=1e-12)
+    assert matrices.base_load[-2:] - bare.base_load[-2:] == pytest.approx([m, m * e])
+
+
+def test_offset_mass_against_a_stiff_light_span():
+    arm = Section(E=1e6, rho=1e-9, A=1.0, I=1.0)
+    long = Scene(Beam.of_spans([(1.0, UNIT), (0.15, arm)]), [Clamped(0.0)], [LumpedMass(1.15, 0.7, 0.02)])
+    short = Scene(BEAM, [Clamped(0.0)], [LumpedMass(1.0, 0.7, 0.02, offset=0.15)])
+    np.testing.assert_allclose(basis_of(long, 3)[1].omega, basis_of(short, 3)[1].omega, rtol=5e-6)
+
+
+def test_inertia_matters_and_position_of_offset_too():
+    ahead, behind = (Scene(BEAM, [Clamped(0.0)], [LumpedMass(1.0, 1.0, 0.0, e)]) for e in (0.1, -0.1))
+    assert basis_of(ahead, 1)[1].omega[0] < basis_of(behind, 1)[1].omega[0]
+
+
+def test_spring_and_rotational_spring():
+    k, kappa = 5.0, 2.0
+    scene = Scene(BEAM, [Clamped(0.0)], springs=[Spring(1.0, k, kappa)])
+    matrices = scene.matrices(elements=2)
+    bare = Scene(BEAM, [Clamped(0.0)]).matrices(elements=2)
+    np.testing.assert_allclose((matrices.K - bare.K).toarray()[-2:, -2:], np.diag([k, kappa]), atol=1e-12)
+    push = matrices.interpolation(1.0).toarray()[0]
+    tip = push @ np.linalg.solve(matrices.K.toarray(), push)
+    flexibility = np.linalg.inv(np.array([[1 / 3, 1 / 2], [1 / 2, 1.0]]))  # tip of a cantilever, EI = L = 1
+    assert tip == pytest.approx(np.linalg.inv(flexibility + np.diag([k, kappa]))[0, 0], rel=1e-12)
+
+
+def test_very_stiff_spring_is_a_support():
+    spring = Scene(BEAM, [Clamped(0.0)], springs=[Spring(1.0, 1e13)])
+    pinned = Scene(BEAM, [Clamped(0.0), Pinned(1.0)])
+    np.testing.assert_allclose(basis_of(spring, 4)[1].omega, basis_of(pinned, 4)[1].omega, rtol=1e-9)
+
+
+@pytest.mark.parametrize("gap", [1e-5, 1e-7, 1e-12])
+def test_features_close_together_keep_their_digits(gap):
+    two = Scene(BEAM, [Clamped(0.0)], [LumpedMass(0.5 - gap / 2, 1.0), LumpedMass(0.5 + gap / 2, 1.0)])
+    one = Scene(BEAM, [Clamped(0.0)], [LumpedMass(0.5, 2.0)])
+    np.testing.assert_allclose(basis_of(two, 3)[1].omega, basis_of(one, 3)[1].omega, rtol=1e-7)
+
+
+def test_mesh_says_what_it_promises():
+    scene = paper()
+    matrices, basis = basis_of(scene, 3)
+    assert str(matrices) == "Matrices: 44 elements, 88 free dofs: the lowest 3 frequencies are right to 1e-06 relative"
+    assert 3e-7 < matrices.frequency_error(basis.omega[-1]) < 1e-6
+    assert "as asked" in scene.matrices(elements=5).accuracy
+    assert scene.matrices().modes == 10
+
+
+def test_elements_follow_the_local_wavelength():
+    thin = Section(1.0, 1.0, 0.1, 1e-5)  # wavenumber 10 times the unit section's
+    matrices = Scene(Beam.of_spans([(1.0, UNIT), (1.0, thin)]), [Clamped(0.0)]).matrices(modes=20)
+    inside = np.diff(matrices.nodes)
+    assert inside[0] / inside[-1] == pytest.approx(10, rel=0.1)
+
+
+# --- damping ---------------------------------------------------------------------------------------------
+
+
+def test_modal_damping_matrix_gives_its_ratios_back():
+    matrices, basis = basis_of(Scene(BEAM, [Clamped(0.0)], damping=ModalDamping([0.02, 0.01])), 4, elements=10)
+    coefficients = basis.project_matrix(matrices.C)
+    expected = 2 * np.array([0.02, 0.01, 0.01, 0.01]) * basis.omega
+    np.testing.assert_allclose(coefficients, np.diag(expected), atol=1e-9 * expected.max())
+    assert ModalDamping([0.02, 0.01]).ratios(basis.omega[[0, 3]], indices=[0, 3]).tolist() == [0.02, 0.01]
+    assert ModalDamping(1.5).ratios([1.0]).tolist() == [1.5]
+
+
+def test_rayleigh():
+    damping = Rayleigh(alpha=0.3, beta=0.02)
+    matrices = Scene(BEAM, [Clamped(0.0)], damping=damping).matrices(elements=4)
+    np.testing.assert_allclose((matrices.C - 0.3 * matrices.M - 0.02 * matrices.K).toarray(), 0, atol=1e-12)
+    omega = np.array([0.0, 2.0])
+    np.testing.assert_allclose(damping.modal_coefficients(omega), [0.3, 0.38])
+    np.testing.assert_allclose(damping.ratios(omega), [np.inf, 0.095])
+    assert Rayleigh(0.0, 0.1).ratios([0.0]).tolist() == [0.0]
+
+
+def test_dashpots_come_on_top():
+    scene = Scene(BEAM, [Clamped(0.0)], dashpots=[Dashpot(1.0, 3.0, 0.5)], damping=Rayleigh(0.1, 0.0))
+    matrices = scene.matrices(elements=2)
+    assert matrices.dashpots.toarray()[-2:, -2:] == pytest.approx(np.diag([3.0, 0.5]))
+    np.testing.assert_allclose((matrices.C - matrices.dashpots - 0.1 * matrices.M).toarray(), 0, atol=1e-13)
+
+
+def test_rigid_body_modes_are_not_damped_by_modal_ratios():
+    with pytest.warns(UserWarning, match="2 rigid-body modes appear in Scene"):
+        scene = Scene(BEAM, damping=ModalDamping(0.1))
+    matrices = scene.matrices(elements=4)
+    assert np.abs(matrices.C @ matrices.influence).max() < 1e-9 * abs(matrices.C).max()
+
+
+def test_full_modal_damping_has_a_size_limit():
+    matrices = Scene(BEAM, [Clamped(0.0)], damping=ModalDamping(0.1)).matrices(elements=1001)
+    with pytest.raises(ValueError, match="at most 2000 free dofs, got 2002 in ModalDamping"):
+        _ = matrices.C
+    free = Scene(BEAM, [Clamped(0.0)]).matrices(elements=1001)
+    assert free.C.nnz == 0
+
+
+@pytest.mark.parametrize("bad", [-0.1, math.nan, [0.1, math.inf], [], "x", [0.1, None]])
+def test_damping_rejects(bad):
+    with pytest.raises(ValueError, match=r"zeta.* must .* in ModalDamping"):
+        ModalDamping(bad)
+
+
+def test_rayleigh_rejects():
+    with pytest.raises(ValueError, match="alpha must be finite and not negative, got -1 in Rayleigh"):
+        Rayleigh(-1, 0)
+    with pytest.raises(ValueError, match="beta must be finite and not negative, got nan"):
+        Rayleigh(0, math.nan)
+
+
+# --- bad input -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "feature"),
+    [
+        ("supports", lambda z: Pinned(z)),
+        ("masses", lambda z: LumpedMass(z, 1.0)),
+        ("springs", lambda z: Spring(z, 1.0)),
+        ("dashpots", lambda z: Dashpot(z, 1.0)),
+        ("stops", lambda z: Stop(z, Linear())),
+        ("forces", lambda z: PointForce(z, object())),
+    ],
+)
+def test_features_must_sit_on_the_beam(name, feature):
+    good = [Clamped(0.0)] if name == "supports" else [feature(0.5)]
+    supports = {} if name == "supports" else {"supports": [Clamped(0.0)]}
+    for z in (1.001, -0.001):
+        with pytest.raises(ValueError, match=rf"z must lie on the beam, 0 to 1.0 m, got {z} in {name}\[1\]"):
+            Scene(BEAM, **{name: [*good, feature(z)]}, **supports)
+    with pytest.raises(ValueError, match=rf"z must be finite, got nan in {name}\[1\]"):
+        Scene(BEAM, **{name: [*good, feature(math.nan)]}, **supports)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (
+            lambda: LumpedMass(0.5, -1.0),
+            "mass must be finite and not negative, got -1.0 in LumpedMass at z = 0.5",
+        ),
+        (lambda: LumpedMass(0.5, 1.0, math.nan), "inertia must be finite and not negative, got nan"),
+        (lambda: LumpedMass(0.5, 1.0, 0.0, math.inf), "offset must be finite, got inf"),
+        (lambda: Spring(0.5, -2.0), "stiffness must be finite and not negative"),
+        (lambda: Spring(0.5, 2.0, "a"), "rotational must be finite and not negative, got 'a'"),
+        (lambda: Dashpot(0.5, -2.0), "damping must be finite and not negative"),
+        (lambda: Stop(0.5, Linear(), gap=math.nan), "gap must be finite, got nan in Stop at z = 0.5"),
+        (lambda: Stop(0.5, Linear(), side="left"), "side must be 'below' or 'above', got 'left'"),
+        (lambda: Stop(0.5, lambda d, v, e: d), "law must not be a bare function, .*decorate it with @law"),
+        (lambda: Stop(0.5, 3.0), "law must offer force"),
+        (lambda: Stop(0.5, Linear), "law must offer force"),
+        (lambda: PointForce(0.5, None), "signal must be given"),
+    ],
+)
+def test_features_reject(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+def test_stop_pushes_towards_the_beam():
+    assert Stop(0.5, Linear()).push == 1.0
+    assert Stop(0.5, Linear(), side="above", gap=-1e-3).push == -1.0
+
+
+def test_scene_rejects_conflicts_and_wrong_kinds():
+    with pytest.raises(ValueError, match=r"supports must not share one place, got \(Clamped\(z=0.0\), Pinned"):
+        Scene(BEAM, [Clamped(0.0), Pinned(0.0)])
+    with pytest.raises(ValueError, match=r"supports and span ends must be 0\.0001 m apart"):
+        Scene(BEAM, [Clamped(0.0), Pinned(1e-6)]).matrices()
+    with pytest.raises(TypeError, match="supports must be a list of Clamped or Pinned or Guided"):
+        Scene(BEAM, Clamped(0.0))
+    with pytest.raises(TypeError, match=r"masses\[0\] must be a LumpedMass"):
+        Scene(BEAM, [Clamped(0.0)], [Spring(0.1, 1.0)])
+    with pytest.raises(TypeError, match=r"damping must be ModalDamping or Rayleigh, got 0\.1"):
+        Scene(BEAM, [Clamped(0.0)], damping=0.1)
+    with pytest.raises(TypeError, match="beam must be a Beam"):
+        Scene(1.0)
+
+
+def test_rigid_body_modes_are_announced():
+    cases = [
+        ([], [], 2),
+        ([Pinned(0.3)], [], 1),
+        ([Guided(0.3)], [], 1),
+        ([Pinned(0.3), Pinned(0.5)], [], 0),
+        ([Pinned(0.3), Guided(0.5)], [], 0),
+        ([Guided(0.3), Guided(0.5)], [], 1),
+        ([Pinned(0.3)], [Spring(0.9, 1.0)], 0),
+        ([Pinned(0.3)], [Spring(0.3, 1.0)], 1),
+        ([Pinned(0.3)], [Spring(0.3, 0.0, 1.0)], 0),
+        ([], [Spring(0.3, 1.0, 1.0)], 0),
+    ]
+    for supports, springs, count in cases:
+        with pytest.warns(UserWarning, match=f"{count} rigid-body") if count else _silent():
+            scene = Scene(BEAM, supports, springs=springs)
+        assert scene.rigid_body_modes == count
+        assert np.sum(basis_of(scene, 4)[1].omega == 0.0) == count
+
+
+def _silent():
+    import warnings
+
+    context = warnings.catch_warnings(action="error")
+    return context
+
+
+def test_matrices_reject():
+    scene = paper()
+    for bad in (0, -1, 2.5, True, "10"):
+        with pytest.raises(ValueError, match="elements must be a whole number above 0"):
+            scene.matrices(elements=bad)
+        with pytest.raises(ValueError, match="modes must be a whole number above 0"):
+            scene.matrices(modes=bad)
+    with pytest.raises(ValueError, match=r"modes must be at most 8 \(free dofs\), got 9"):
+        scene.matrices(elements=4, modes=9)
+    with pytest.raises(ValueError, match=r"z must lie on the beam, .* got \[0.3\] in probes"):
+        scene.matrices(probes=[0.1, 0.3])
+    with pytest.raises(ValueError, match=r"probes\[0\] must be finite"):
+        scene.matrices(probes=[math.nan])
+
+
+def test_lists_become_tuples_and_stay_the_callers():
+    supports = [Clamped(0.0)]
+    scene = Scene(BEAM, supports)
+    supports.append(Pinned(1.0))
+    assert scene.supports == (Clamped(0.0),)
+    assert scene.masses == scene.stops == ()
+
+
+def test_independent_formulation_of_the_free_beam():
+    with pytest.warns(UserWarning, match="2 rigid-body"):
+        scene = Scene(BEAM)
+    matrices, basis = basis_of(scene, 6, elements=12)
+    reference = linalg.eigh(matrices.K.toarray(), matrices.M.toarray(), eigvals_only=True)
+    np.testing.assert_allclose(basis.omega[2:] ** 2, reference[2:6], rtol=1e-8)
+
+
+def test_import_is_light():
+    code = "import sys, fembeam.scene; print({'skfem', 'matplotlib', 'numba'} & set(sys.modules))"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout == "set()\n"
