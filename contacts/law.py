@@ -72,10 +72,12 @@ class Law(ABC):
         """
         d, v, r = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (delta, delta_dot, entry_rate)))
         out = np.where(np.isnan(d + v + r), math.nan, 0.0)
-        touching = (d > 0.0) & ~np.isnan(out)
-        for rate in np.unique(r[touching]):
-            chosen = touching & (r == rate)
-            out[chosen] = self._batch(d[chosen], v[chosen], float(rate))
+        touching = np.flatnonzero((d > 0.0) & ~np.isnan(out))
+        touching = touching[np.argsort(r.flat[touching], kind="stable")]
+        rates, starts = np.unique(r.flat[touching], return_index=True)
+        for rate, start, count in zip(rates, starts, np.diff(starts, append=len(touching)), strict=True):
+            chosen = touching[start : start + count]
+            out.flat[chosen] = self._batch(d.flat[chosen], v.flat[chosen], float(rate))
         return out[()]
 
     def _batch(self, delta: NDArray, delta_dot: NDArray, entry_rate: float) -> NDArray:
@@ -185,6 +187,11 @@ def law(
     probe = inspect.Signature(list(signature.parameters.values())[3:])
 
     def bind(**values: float) -> CustomLaw:
+        unknown = [name for name in values if name not in probe.parameters]
+        if unknown:
+            raise TypeError(
+                f"law {function.__name__!r}: unexpected {unknown[0]!r}; its parameters are {list(names[3:])}"
+            )
         try:
             bound = probe.bind(**values)
         except TypeError as error:

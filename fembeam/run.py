@@ -158,12 +158,17 @@ def load(path: str | os.PathLike[str]) -> Run:
         with np.load(path, allow_pickle=False) as data:
             about = json.loads(str(data["about"]))
             arrays = {name: data[name] for name in data.files if name != "about"}
+        if about["format"] != FORMAT:
+            raise ValueError(f"it has format {about['format']}, this version reads {FORMAT}")
+        return _of_arrays(about, arrays)
     except FileNotFoundError:
         raise
     except Exception as error:
         raise ValueError(f"{path} is not a saved run, or is damaged: {error}") from error
-    if about["format"] != FORMAT:
-        raise ValueError(f"{path} has format {about['format']}, this version reads {FORMAT}")
+
+
+def _of_arrays(about: dict[str, Any], arrays: dict[str, Any]) -> Run:
+    """A run from the contents of its file."""
     return Run(
         *(arrays["t"], arrays["q"], arrays["q_dot"]),
         contacts=solvers.ContactLog(*(arrays[f"contact_{f.name}"] for f in fields(solvers.ContactLog))),
@@ -184,6 +189,9 @@ def written_whole(target: Path) -> Iterator[Any]:
     try:
         with os.fdopen(handle, "wb") as file:
             yield file
+        mask = os.umask(0)  # mkstemp makes private files; results are for the user's group too
+        os.umask(mask)
+        os.chmod(name, 0o666 & ~mask)
         os.replace(name, target)
     except BaseException:
         os.unlink(name)

@@ -11,7 +11,12 @@ from typing import Any
 from solvers.result import ContactLog, Cost, Energy, Solution, SolverError, Status
 from solvers.system import Contact, System
 
-_LATER = {"integrate": "integration", "HenonRK2": "henon", "DormandPrince": "dormand_prince"}
+_LATER = {
+    "integrate": "integration",
+    "HenonRK2": "henon",
+    "DormandPrince": "dormand_prince",
+    "Exponential": "exponential",
+}
 
 __all__ = [
     "Contact",
@@ -19,6 +24,7 @@ __all__ = [
     "Cost",
     "DormandPrince",
     "Energy",
+    "Exponential",
     "HenonRK2",
     "Solution",
     "SolverError",

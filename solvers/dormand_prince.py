@@ -10,12 +10,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from scipy.integrate import DOP853
 
+from solvers.forcing import Forcing
 from solvers.kernels import copy, kernel, rhs
+from solvers.system import Array, System
 
 STAGES, EXTENDED = 12, 16
 A = np.zeros((EXTENDED, EXTENDED))
@@ -130,6 +132,12 @@ class DormandPrince:
             raise ValueError(f"atol must be positive and finite, got {self.atol!r}")
 
     @property
-    def step(self):
+    def step(self) -> Any:
         """The compiled step."""
         return step
+
+    def engine(self, system: System, z: Array, forcing: Forcing, duration: float) -> Any:
+        """The method made ready for one run."""
+        from solvers.march import Engine  # here: the loop knows this module
+
+        return Engine(self, system, z, forcing, duration)

@@ -7,6 +7,7 @@ Inside a step the indentation is the polynomial of the method's dense output,
 import numpy as np
 
 from solvers.kernels import dot, indentation, kernel
+from solvers.state import surface_tolerance
 
 # finer near 0, where a contact just left may come back
 _NODES = np.array([0.0, 1 / 64, 1 / 32, 1 / 16, 1 / 8, 1 / 4, 3 / 8, 1 / 2, 5 / 8, 3 / 4, 7 / 8, 1.0])
@@ -29,15 +30,6 @@ def coefficients_of(row, offset, x, dense, out):
     out[0] = dot(row, x, size) - offset
     for i in range(7):
         out[1 + i] = dot(row, dense[i], size)
-
-
-@kernel
-def surface_tolerance(problem, s, x):
-    """Distance within which a stop counts as on a level: rounding of δ."""
-    total = abs(problem.gap[s])
-    for i in range(2 * problem.k.size):
-        total += abs(problem.read[s, i] * x[i])
-    return 1e-15 * total + 1e-20
 
 
 @kernel
@@ -67,22 +59,26 @@ def _root(coefficients, level, sign, a, b):
 
 
 @kernel
-def crossing(coefficients, level, sign, tolerance):
-    """First θ at which sign·(δ - level) becomes positive; NONE, or UNRESOLVED when it does so at once."""
-    before_last = -np.inf
-    last = min(sign * (coefficients[0] - level), 0.0)
+def crossing(coefficients, rates, level, sign, tolerance):
+    """First θ at which sign·(δ - level) becomes positive; NONE, or UNRESOLVED when it does so at once.
+
+    Between two nodes δ may rise and fall again; that it does is seen by its rate, the polynomial ``rates``.
+    """
+    last = sign * (coefficients[0] - level)
+    tolerance = max(tolerance, 2.0 * last)  # a start a little outside, after a graze, is no crossing yet
+    rising = sign * rates[0] > 0.0
     for i in range(1, _NODES.size):
         value = sign * (polynomial(coefficients, _NODES[i]) - level)
         if value > tolerance:
             if i == 1 and last >= -tolerance:
                 return UNRESOLVED
             return _root(coefficients, level, sign, _NODES[i - 1], _NODES[i])
-        rise = last - min(before_last, value)
-        if i > 1 and last >= before_last and last > value and last + rise > 0.0:
-            top = _maximum(coefficients, level, sign, _NODES[i - 2], _NODES[i])
+        rises = sign * polynomial(rates, _NODES[i]) > 0.0
+        if rising and not rises:
+            top = _maximum(coefficients, level, sign, _NODES[i - 1], _NODES[i])
             if sign * (polynomial(coefficients, top) - level) > tolerance:
-                return _root(coefficients, level, sign, _NODES[i - 2], top)
-        before_last, last = last, value
+                return _root(coefficients, level, sign, _NODES[i - 1], top)
+        last, rising = value, rises
     return NONE
 
 
@@ -91,13 +87,14 @@ def first_event(problem, x, dense, piece, coefficients):
     """(θ, stop, direction ±1) of the earliest crossing of the step by any stop."""
     theta, stop, direction = NONE, -1, 0
     for s in range(problem.gap.size):
-        coefficients_of(problem.read[s], problem.gap[s], x, dense, coefficients)
+        coefficients_of(problem.read[s], problem.gap[s], x, dense, coefficients[0])
+        coefficients_of(problem.read_rate[s], 0.0, x, dense, coefficients[1])
         tolerance = surface_tolerance(problem, s, x)
-        found = crossing(coefficients, problem.levels[s, piece[s]], 1.0, tolerance)
+        found = crossing(coefficients[0], coefficients[1], problem.levels[s, piece[s]], 1.0, tolerance)
         if found < theta:
             theta, stop, direction = found, s, 1
         if piece[s] > 0:
-            found = crossing(coefficients, problem.levels[s, piece[s] - 1], -1.0, tolerance)
+            found = crossing(coefficients[0], coefficients[1], problem.levels[s, piece[s] - 1], -1.0, tolerance)
             if found < theta:
                 theta, stop, direction = found, s, -1
     return theta, stop, direction

@@ -18,9 +18,11 @@ Hénon, Physica D 5 (1982) 412.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
+from solvers.forcing import Forcing
 from solvers.kernels import dot, kernel, rhs
+from solvers.system import Array, System
 
 
 @kernel
@@ -82,9 +84,10 @@ class HenonRK2:
 
     Notes
     -----
-    Order 2. Unstable for every step on an undamped mode (|R|² = 1 + (hω)⁴/4); with damping ratio ζ stable
-    for about hω < (8ζ)^(1/3). Two contacts of one stop inside one flight step are missed. Where the beam grazes a stop Hénon's
-    step divides by zero; that step is then taken with ``dt_contact`` instead, without landing.
+    Order 2; only 1 for a law whose force jumps, as the exit is not located. Unstable for every step on an undamped
+    mode (|R|² = 1 + (hω)⁴/4); with damping ratio ζ stable for about hω < (8ζ)^(1/3). Two contacts of one stop inside
+    one flight step are missed. Where the beam grazes a stop Hénon's step divides by zero; it is then approached with
+    ``dt_contact`` instead, without landing.
 
     Examples
     --------
@@ -108,6 +111,12 @@ class HenonRK2:
                 raise ValueError(f"{name} must be positive and finite (s), got {value!r}")
 
     @property
-    def step(self):
+    def step(self) -> Any:
         """The compiled step."""
         return step
+
+    def engine(self, system: System, z: Array, forcing: Forcing, duration: float) -> Any:
+        """The method made ready for one run."""
+        from solvers.march import Engine  # here: the loop knows this module
+
+        return Engine(self, system, z, forcing, duration)

@@ -14,31 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from solvers.forcing import Forcing, hand_over
-from solvers.kernels import Problem
-from solvers.march import (
-    CALLS,
-    DONE,
-    EVENTS,
-    H_CONTACT,
-    H_FLIGHT,
-    LOG_COLUMNS,
-    LOG_FULL,
-    LOGGED,
-    REJECTED,
-    RUNNING,
-    SAMPLED,
-    STEP,
-    STEPS,
-    State,
-    T,
-    contact_row,
-    march,
-    new_space,
-    new_state,
-    start,
-)
-from solvers.result import ContactLog, Cost, Energy, Solution, SolverError, Status
+from solvers.forcing import hand_over
+from solvers.result import COLUMNS, ContactLog, Cost, Energy, Solution, SolverError, Status
+from solvers.state import CALLS, EVENTS, LOG_FULL, LOGGED, REJECTED, RUNNING, SAMPLED, STEPS, T, contact_row
 from solvers.system import Array, System
 
 _BUDGET = 20_000  # steps between two looks at the world outside
@@ -89,13 +67,15 @@ def integrate(
         from solvers.dormand_prince import DormandPrince
 
         method = DormandPrince()
+    if not hasattr(method, "engine") or isinstance(method, type):
+        raise TypeError(f"method must be one of solvers, made with its settings, such as Exponential(), got {method!r}")
     if tangent:
         raise ValueError(f"tangent=True is not offered by {type(method).__name__}")
     z = _start(system, q0, q_dot0)
     samples = _samples(duration, dt)
     _check_laws(system)
     forcing = hand_over([signal for _, signal in system.loads], duration, min(max(method.rtol, 1e-12), 1e-6))
-    run = _Run(system, method, z, forcing, duration, dt, samples)
+    run = _Run(system, method.engine(system, z, forcing, duration), dt, samples)
     begin = time.perf_counter()
     status = run.to_the_end(progress)
     solution = run.solution(status, time.perf_counter() - begin)
@@ -142,72 +122,16 @@ def _check_laws(system: System) -> None:
             raise ValueError(f"the law of contact {i} is not finite at delta = {where:g} m: {contact.law!r}")
 
 
-def problem_of(system: System, forcing: Forcing) -> Problem:
-    """Arrays the kernels read."""
-    blocks, contacts = system.blocks, system.contacts
-    n, m = system.size, len(contacts)
-    direction = np.array([c.direction for c in contacts]).reshape(m, n)
-    vectors = np.array([vector for vector, _ in system.loads]).reshape(len(system.loads), n)
-    inverse_mass = blocks.inverse[:, n:] @ np.linalg.inv(system.M)
-    read = -direction @ blocks.T[:n]
-    state_matrix = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(blocks.k), -np.diag(blocks.c)]])
-    parameters = [np.asarray(c.law.parameters, dtype=float) for c in contacts]
-    width = max([p.size for p in parameters], default=1)
-    most = max([len(c.law.knots) for c in contacts], default=0) + 1
-    levels = np.full((m, most + 1), math.inf)
-    for i, contact in enumerate(contacts):
-        levels[i, : len(contact.law.knots) + 1] = (0.0, *contact.law.knots)
-    return Problem(
-        k=blocks.k,
-        c=blocks.c,
-        loss=np.ascontiguousarray(blocks.loss),
-        push=np.ascontiguousarray((inverse_mass @ direction.T).T),
-        read=np.ascontiguousarray(read),
-        read_rate=np.ascontiguousarray(read @ state_matrix),
-        levels=levels,
-        gap=np.array([c.gap for c in contacts], dtype=float),
-        law=np.array([c.law.address for c in contacts], dtype=np.int64),
-        parameters=np.array([np.pad(p, (0, width - p.size)) for p in parameters]).reshape(m, width),
-        floor=np.array([c.law.entry_rate_floor for c in contacts], dtype=float),
-        load=np.ascontiguousarray((inverse_mass @ vectors.T).T),
-        power=np.ascontiguousarray(vectors @ blocks.T[n:]),
-        tone_omega=forcing.tone_omega,
-        tone_amplitude=forcing.tone_amplitude,
-        tone_load=forcing.tone_load,
-        table=forcing.table,
-        table_dt=forcing.table_dt,
-        table_start=forcing.table_start,
-        table_load=forcing.table_load,
-    )
-
-
 class _Run:
-    """One run of a stepping method: its state, output, and the loop over stretches."""
+    """One run: a method's engine, its output, and the loop over stretches."""
 
-    def __init__(
-        self,
-        system: System,
-        method: Any,
-        z: Array,
-        forcing: Forcing,
-        duration: float,
-        dt: float | None,
-        samples: int,
-    ) -> None:
-        self.system, self.method, self.duration, self.dt = system, method, duration, dt
-        self.problem = problem_of(system, forcing)
-        if not method.locates_exit:
-            self.problem.levels[:, 1:] = math.inf  # kinks are not looked for
-        self.state: State = new_state(z, len(system.contacts))
-        self.space = new_space(self.state, method.work_rows)
-        self.initial_energy = float(system.energy(*system.blocks.from_blocks(z)))
-        self.log = np.empty((max(256, 2 * len(system.contacts)), LOG_COLUMNS))
+    def __init__(self, system: System, engine: Any, dt: float | None, samples: int) -> None:
+        self.system, self.engine, self.dt = system, engine, dt
+        self.state = engine.state
+        self.log = np.empty((max(256, 2 * len(system.contacts)), COLUMNS))
         self.out = np.empty((samples, self.state.x.size))
-        fastest = max([math.sqrt(abs(k)) for k in self.problem.k] + list(self.problem.c) + [1.0 / duration])
-        self.state.now[[H_FLIGHT, H_CONTACT]] = 0.1 / fastest, 0.01 / fastest
-        if not method.adaptive:
-            self.state.now[[H_FLIGHT, H_CONTACT]] = method.dt_flight, method.dt_contact
-        start(self.problem, self.state, self.space)
+        n = 2 * engine.problem.k.size
+        self.initial_energy = float(system.energy(*np.split(engine.back @ self.state.x[:n], 2)))
         if samples:
             self.out[0] = self.state.x
             self.state.count[SAMPLED] = 1
@@ -219,18 +143,13 @@ class _Run:
 
     def to_the_end(self, progress: Callable[[float], None] | None) -> Status:
         """Stretch after stretch until done, failed or interrupted."""
-        method = self.method
-        numbers = (method.dt_flight, method.dt_contact, method.rtol, getattr(method, "atol", 0.0))
-        flags = (method.adaptive, method.locates_exit)
         code = RUNNING
         try:
+            self.engine.start()
             while code in (RUNNING, LOG_FULL):
                 if code == LOG_FULL:
                     self.log = np.concatenate((self.log, np.empty_like(self.log)))
-                code = march(
-                    *(method.step, self.problem, self.state, self.space, self.duration, _BUDGET),
-                    *(*numbers, *flags, self.log, self.out, self.dt or math.inf),
-                )
+                code = self.engine.march(_BUDGET, self.log, self.out, self.dt or math.inf)
                 if progress:
                     progress(self.time)
         except KeyboardInterrupt:
@@ -239,19 +158,21 @@ class _Run:
 
     def solution(self, status: Status, seconds: float) -> Solution:
         """Collect outputs, log and ledger."""
-        n, state = self.system.size, self.state
+        size = 2 * self.engine.problem.k.size
         if self.dt is None:
-            x, t = state.x[None, :].copy(), np.array([self.time])
+            x, t = self.state.x[None, :].copy(), np.array([self.time])
         else:
             x = self.out[: self._sampled(status)]
             t = np.arange(len(x)) * self.dt
-        q, q_dot = self.system.blocks.from_blocks(x[:, : 2 * n])
+        motion = x[:, :size] @ self.engine.back.T
+        q, q_dot = motion[:, : self.system.size], motion[:, self.system.size :]
+        ledger = x[:, size:]
         energy = Energy(
-            *(x[:, 2 * n], x[:, 2 * n + 1], x[:, 2 * n + 2 :: 2].sum(axis=1)),
+            *(ledger[:, 0], ledger[:, 1], ledger[:, 2::2].sum(axis=1)),
             *(self.system.energy(q, q_dot), self.initial_energy),
         )
-        count = state.count
-        cost = Cost(int(count[STEPS]), int(count[REJECTED]), int(count[CALLS]), int(count[EVENTS]), seconds)
+        count = self.state.count
+        cost = Cost(*(int(count[i]) for i in (STEPS, REJECTED, CALLS, EVENTS)), seconds)
         return Solution(t, q, q_dot, self._contacts(), energy, status, cost)
 
     def _sampled(self, status: Status) -> int:
@@ -266,10 +187,7 @@ class _Run:
         """The log, contacts under way last."""
         rows = [self.log[: self.state.count[LOGGED]]]
         for s in np.flatnonzero(self.state.piece > 0):
-            row = np.empty(LOG_COLUMNS)
-            contact_row(self.problem, self.state, s, math.nan, math.nan, row)
+            row = np.empty(COLUMNS)
+            contact_row(self.engine.problem, self.state, s, math.nan, math.nan, row)
             rows.append(row[None, :])
         return ContactLog.of_rows(np.concatenate(rows))
-
-
-__all__ = ["DONE", "STEP", "integrate", "problem_of"]

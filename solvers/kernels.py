@@ -19,6 +19,9 @@ OPTIONS: Any = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": Fa
 kernel = njit(**OPTIONS)
 """Decorator of every compiled function here. They allocate nothing, so reference counting is switched off: passing
 twenty arrays down a call would otherwise cost ten times the arithmetic of a two-mode step."""
+inlined = njit(**OPTIONS, forceinline=True)
+"""The same for what the innermost loops call, from few places: there even passing the arrays' descriptors costs more
+than the arithmetic. Everywhere else it would only cost compile time."""
 
 
 class Problem(NamedTuple):
@@ -78,7 +81,7 @@ def _call_law(typingctx, address, n, delta, delta_dot, entry_rate, parameters, f
     return signature, codegen
 
 
-@kernel
+@inlined
 def contact_forces(problem, stop, delta, delta_dot, entry_rate, force):
     """Forces of one stop at a batch of indentations; below the surface the law is continued from it."""
     for i in range(delta.size):
@@ -86,14 +89,14 @@ def contact_forces(problem, stop, delta, delta_dot, entry_rate, force):
     _call_law(problem.law[stop], delta.size, delta, delta_dot, entry_rate, problem.parameters[stop], force)
 
 
-@kernel
+@inlined
 def copy(source, target, n):
     """First n entries; a slice assignment would allocate."""
     for i in range(n):
         target[i] = source[i]
 
 
-@kernel
+@inlined
 def dot(a, b, n):
     """Sum of the first n products."""
     total = 0.0
@@ -140,7 +143,7 @@ def _add_load(problem, load, value, size, x, rate):
     rate[size] += value * dot(problem.power[load], x, size)
 
 
-@kernel
+@inlined
 def _damping_power(problem, x):
     """Power the linear damping takes."""
     n, power = problem.k.size, 0.0
@@ -183,7 +186,7 @@ def rhs(problem, t, x, piece, entry_rate, rate, batch):
     return calls
 
 
-@kernel
+@inlined
 def indentation(problem, s, x):
     """Indentation of stop s."""
     return dot(problem.read[s], x, 2 * problem.k.size) - problem.gap[s]

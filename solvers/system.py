@@ -73,7 +73,7 @@ class Contact:
             raise ValueError(f"direction of a Contact must be a finite vector, got {self.direction!r}")
         if not np.isfinite(self.gap):
             raise ValueError(f"gap must be finite, got {self.gap!r}; use no Contact at all for a stop out of reach")
-        if not hasattr(self.law, "entry_rate_floor"):
+        if not hasattr(self.law, "entry_rate_floor") or isinstance(self.law, type):
             hint = "decorate the function with @law and call it" if callable(self.law) else "use one of contacts"
             raise TypeError(f"law of a Contact must be a contact law, got {self.law!r}; {hint}")
         direction.setflags(write=False)
@@ -113,6 +113,7 @@ class System:
             object.__setattr__(self, name, _square(name, getattr(self, name)))
         if not self.M.shape == self.C.shape == self.K.shape:
             raise ValueError(f"M, C, K must have one shape, got {self.M.shape}, {self.C.shape}, {self.K.shape}")
+        _check_mass(self.M)
         object.__setattr__(self, "contacts", tuple(self.contacts))
         object.__setattr__(self, "loads", tuple(self._load(i, pair) for i, pair in enumerate(self.loads)))
         for i, contact in enumerate(self.contacts):
@@ -175,6 +176,18 @@ def _square(name: str, matrix: Any) -> Array:
     return dense
 
 
+def _check_mass(M: Array) -> None:
+    """M is positive definite."""
+    try:
+        np.linalg.cholesky(M)
+    except np.linalg.LinAlgError:
+        lowest = np.linalg.eigvalsh(M)[0]
+        raise ValueError(
+            f"M must be positive definite, its lowest eigenvalue is {lowest:g}; "
+            "give every coordinate a mass or condense the massless ones"
+        ) from None
+
+
 @dataclass(frozen=True, eq=False)
 class Blocks:
     """Decoupled form: stiffness k (n,), damping c (n,), transformation T and its inverse (2n, 2n).
@@ -228,23 +241,19 @@ def _is_diagonal(matrix: Array) -> bool:
 
 def _modes(M: Array, K: Array) -> tuple[Array, Array]:
     """Mass-normalised modes and squared frequencies; rounding-size ones become exact zeros."""
-    from scipy.linalg import LinAlgError, eigh
+    from scipy.linalg import eigh
 
-    try:
-        k, phi = eigh(K, M)
-    except LinAlgError:
-        lowest = np.linalg.eigvalsh(M)[0]
-        raise ValueError(
-            f"M must be positive definite, its lowest eigenvalue is {lowest:g}; "
-            "give every coordinate a mass or condense the massless ones"
-        ) from None
+    k, phi = eigh(K, M)
     k[np.abs(k) < 1e-13 * np.abs(k).max(initial=0.0)] = 0.0
     return phi, k
 
 
 def _state_blocks(phi: Array, k: Array, damping: Array) -> Blocks:
     """Blocks of the state matrix [[0, I], [-diag(k), -damping]] whose damping couples the modes."""
-    n = k.size
+    phi, damping, free = _floating(phi, k, damping)
+    k, n = k[free:], k.size - free
+    rigid, damping = phi[:, :free], damping[free:, free:]
+    phi = phi[:, free:]
     A = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(k), -damping]])
     values, vectors = np.linalg.eig(A)
     order = np.argsort(np.abs(values))
@@ -264,10 +273,33 @@ def _state_blocks(phi: Array, k: Array, damping: Array) -> Blocks:
             "the damped modes cannot be separated (two coincide, as for a dashpot on a body that can float, or a "
             "critically damped mode); change a dashpot by one part in 10^6"
         )
-    lift = np.block([[phi, np.zeros((n, n))], [np.zeros((n, n)), phi]])
-    loss = np.asarray(columns[n:].T @ damping @ columns[n:], dtype=float)
-    back = np.linalg.solve(columns, np.linalg.inv(lift))
-    return Blocks(np.array([p[0] for p in pairs]), np.array([p[1] for p in pairs]), lift @ columns, back, loss)
+    zero = np.zeros((phi.shape[0], free))
+    T = np.hstack(
+        (
+            np.vstack((rigid, zero)),
+            np.vstack((zero, rigid)),
+            *(np.vstack((phi @ c[:n], phi @ c[n:])) for c in (columns[:, :n], columns[:, n:])),
+        )
+    )
+    order = np.concatenate((np.arange(free), 2 * free + np.arange(n)))
+    T = T[:, np.concatenate((order, order + np.where(np.arange(free + n) < free, free, n)))]
+    loss = np.zeros((2 * (free + n), 2 * (free + n)))
+    places = np.concatenate((free + np.arange(n), 2 * free + n + np.arange(n)))
+    loss[np.ix_(places, places)] = columns[n:].T @ damping @ columns[n:]
+    none = [0.0] * free
+    return Blocks(
+        np.array(none + [p[0] for p in pairs]), np.array(none + [p[1] for p in pairs]), T, np.linalg.inv(T), loss
+    )
+
+
+def _floating(phi: Array, k: Array, damping: Array) -> tuple[Array, Array, int]:
+    """Turn the rigid-body modes so that those no dashpot resists come first; they are blocks of their own."""
+    rigid = int(np.sum(k == 0.0))
+    values, turn = np.linalg.eigh(damping[:rigid, :rigid])
+    values[np.abs(values) < 1e-12 * np.abs(damping).max()] = 0.0
+    rotation = np.eye(k.size)
+    rotation[:rigid, :rigid] = turn
+    return phi @ rotation, rotation.T @ damping @ rotation, int(np.sum(values == 0.0))
 
 
 def _complex_pair(value: complex, vector: NDArray, n: int) -> tuple[float, float, Array, Array]:

@@ -1,0 +1,386 @@
+"""Scene files: TOML tables in, a Scene and its studies out.
+
+    [beam] [[supports]] [[masses]] [[springs]] [[dashpots]] [[stops]] [[forces]] [damping] [base]
+    [reduce] [simulate]
+
+The keys of a table are the arguments of the constructor behind it, read from its signature, so that nothing is
+declared twice: a constructor that gains an argument gains a key. Units are SI, names those of the library.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import Any, Literal, NoReturn, Union, get_args, get_origin
+
+import numpy as np
+
+import contacts
+import solvers
+from fembeam.beam import Beam
+from fembeam.damping import ModalDamping, Rayleigh
+from fembeam.excitation import Harmonic, Multisine
+from fembeam.noise import BandNoise
+from fembeam.record import Record
+from fembeam.scene import FEATURES, Scene
+from fembeam.section import Section, require_non_negative, require_positive
+
+Table = Mapping[str, Any]
+Constructors = Mapping[str, Callable[..., Any]]
+
+
+class SceneFileError(ValueError):
+    """A scene file that cannot be read; the message names file, table, key, and what would be valid."""
+
+
+@dataclass(frozen=True)
+class Simulate:
+    """The table [simulate]: integrate from rest.
+
+    Parameters
+    ----------
+    duration : s, > 0.
+    dt : output sampling in s, > 0.
+    solver : a method of `solvers`; None is the library's best. In a file { kind = "…", … }.
+    discard : s at the beginning that statistics leave out, 0 to below the duration.
+    """
+
+    duration: float
+    dt: float
+    solver: Any = None
+    discard: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_positive("duration", self.duration, "simulate", "give s")
+        require_positive("dt", self.dt, "simulate", "give the output sampling in s")
+        require_non_negative("discard", self.discard, "simulate", "give s")
+        for name in ("dt", "discard"):
+            if not getattr(self, name) < self.duration:
+                raise ValueError(
+                    f"{name} must be below the duration of {self.duration:g} s, got {getattr(self, name):g}"
+                )
+
+
+@dataclass(frozen=True)
+class SceneFile:
+    """What a scene file says: the scene, the arguments of `Scene.reduce`, and the study tables by name."""
+
+    path: Path
+    scene: Scene
+    reduce: dict[str, Any] = field(default_factory=dict)
+    studies: dict[str, Any] = field(default_factory=dict)
+
+
+SHAPES: Constructors = {
+    "general": Section,
+    "rectangle": Section.rectangle,
+    "circle": Section.circle,
+    "tube": Section.tube,
+}
+LAWS: Constructors = {
+    "hertz": contacts.Hertz,
+    "hertz_of_spheres": contacts.Hertz.of_spheres,
+    "hysteretic": contacts.Hysteretic,
+    "lankarani_nikravesh": contacts.Hysteretic.lankarani_nikravesh,
+    "achieving": contacts.Hysteretic.achieving,
+    "kelvin_voigt": contacts.KelvinVoigt,
+    "piecewise_linear": contacts.PiecewiseLinear,
+}
+SIGNALS: Constructors = {
+    "harmonic": Harmonic,
+    "multisine": Multisine,
+    "band_noise": BandNoise,
+    "record": Record.from_csv,
+}
+SOLVERS = {"exponential": "Exponential", "dormand_prince": "DormandPrince", "henon_rk2": "HenonRK2"}
+STUDIES: Constructors = {"simulate": Simulate}
+UNSEEN = {"Model": Any}  # names in annotations that exist only for type checkers
+ALIASES = {"kind": "quantity"}  # an argument `kind` would hide behind the key that chooses the constructor
+
+
+def read(path: str | Path) -> SceneFile:
+    """Read and check a scene file; nothing is computed.
+
+    Parameters
+    ----------
+    path : a TOML file; paths inside it are relative to its folder.
+
+    Returns
+    -------
+    SceneFile : with the Scene, the arguments of `Scene.reduce`, the study tables.
+
+    Raises
+    ------
+    SceneFileError : the file cannot be read, is no TOML (with the line), has an unknown or missing key, a value
+        of the wrong type, or one its constructor refuses.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> path = Path(tempfile.mkdtemp(), "cantilever.toml")
+    >>> _ = path.write_text('''
+    ... [beam]
+    ... length = 0.5
+    ... section = { shape = "circle", E = 2.1e11, rho = 7800, diameter = 0.01 }
+    ... [[supports]]
+    ... kind = "clamped"
+    ... z = 0
+    ... ''')
+    >>> read(path).scene.supports
+    (Clamped(z=0.0),)
+    """
+    path = Path(path)
+    try:
+        tables = tomllib.loads(path.read_bytes().decode("utf-8"))
+    except OSError as error:
+        raise SceneFileError(f"{path}: cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise SceneFileError(f"{path}: is not a text file in UTF-8") from None
+    except (ValueError, RecursionError) as error:
+        raise SceneFileError(f"{path}: is not valid TOML: {error}") from None
+    return _Reader(path).scene_file(tables)
+
+
+@dataclass(frozen=True)
+class _Reader:
+    """Turns tables into objects; knows the file for messages and relative paths."""
+
+    path: Path
+
+    def scene_file(self, tables: Table) -> SceneFile:
+        """The whole file."""
+        parts = inspect.signature(Scene).parameters
+        self.check_keys(tables, [*parts, "reduce", *STUDIES], "the file", "table")
+        if "beam" not in tables:
+            self.fail("the file", "needs a table [beam]")
+        for name in tables:
+            self.check_form(name, tables[name])
+        built = {name: self.part(name, tables[name]) for name in parts if name in tables}
+        try:
+            scene = Scene(**built)
+        except (ValueError, TypeError) as error:
+            self.fail("the scene", str(error), error)
+        reduce = self.arguments(Scene.reduce, tables.get("reduce", {}), "[reduce]")
+        studies = {
+            name: self.build(study, tables[name], f"[{name}]") for name, study in STUDIES.items() if name in tables
+        }
+        return SceneFile(self.path, scene, reduce, studies)
+
+    def check_form(self, name: str, value: Any) -> None:
+        """Features come as [[name]], everything else as [name]."""
+        if name in FEATURES:
+            if not (isinstance(value, list) and all(isinstance(entry, dict) for entry in value)):
+                self.fail(name, f"must be a list of tables; write [[{name}]]")
+        elif not isinstance(value, dict):
+            self.fail(name, f"must be a table; write [{name}]" + (", once" if isinstance(value, list) else ""))
+
+    def part(self, name: str, value: Any) -> Any:
+        """One argument of Scene from its table or list of tables."""
+        if name == "beam":
+            return self.beam(value)
+        if name == "damping":
+            if "zeta" in value and {"alpha", "beta"} & set(value):
+                self.fail("[damping]", "give either zeta, or alpha and beta, not both")
+            if {"alpha", "beta"} & set(value):
+                return self.build(Rayleigh, value, "[damping]")
+            return self.build(ModalDamping, value, "[damping]", "alpha", "beta")
+        if name == "base":
+            return self.choose(SIGNALS, value, "[base]")
+        kinds = {_snake(kind.__name__): kind for kind in FEATURES[name]}
+        made = []
+        for number, table in enumerate(value):
+            where = f"[[{name}]] number {number + 1}"
+            only = next(iter(kinds.values())) if len(kinds) == 1 else None
+            made.append(self.build(only, table, where) if only else self.choose(kinds, table, where))
+        return made
+
+    def beam(self, table: Table) -> Beam:
+        """A beam of one section, or of `spans`."""
+        if "spans" not in table:
+            return self.build(Beam, table, "[beam]")
+        self.check_keys(table, ["spans"], "[beam]", "key")
+        if not isinstance(table["spans"], list):
+            self.fail("[beam]", "spans must be a list of tables with length and section")
+        spans = [
+            self.build(_span, entry, f"[beam] span {number}") for number, entry in enumerate(table["spans"], start=1)
+        ]
+        return self.made(Beam.of_spans, {"spans": spans}, "[beam]")
+
+    def choose(self, kinds: Constructors, table: Any, where: str, key: str = "kind", default: str = "") -> Any:
+        """Build the constructor that `kind` (or `shape`) names."""
+        if not isinstance(table, dict):
+            self.fail(where, f"must be a table {{ {key} = …, … }}, got {table!r}")
+        name = table.get(key, default)
+        if name not in list(kinds):  # a list: what a file gives need not be hashable
+            got = f"got {name!r}{_nearest(name, kinds)}" if key in table else "it is missing"
+            self.fail(where, f"{key} must be one of {_listed(kinds)}; {got}")
+        return self.build(kinds[name], {k: v for k, v in table.items() if k != key}, where, chosen_by=key)
+
+    def build(self, constructor: Callable[..., Any], table: Any, where: str, *also: str, chosen_by: str = "") -> Any:
+        """Call the constructor with a table's values."""
+        return self.made(constructor, self.arguments(constructor, table, where, *also, chosen_by=chosen_by), where)
+
+    def made(self, constructor: Callable[..., Any], arguments: Table, where: str) -> Any:
+        """Call a constructor; what it refuses is said with the table."""
+        try:
+            return constructor(**arguments)
+        except SceneFileError:
+            raise
+        except OSError as error:
+            self.fail(where, f"{error.filename}: {error.strerror}", error)
+        except (ValueError, TypeError) as error:
+            self.fail(where, str(error), error)
+
+    def arguments(
+        self, constructor: Callable[..., Any], table: Any, where: str, *also: str, chosen_by: str = ""
+    ) -> dict[str, Any]:
+        """The values of a table, checked against the constructor's signature."""
+        if not isinstance(table, dict):
+            self.fail(where, f"must be a table, got {table!r}")
+        parameters = _parameters(constructor)
+        self.check_keys(table, [chosen_by, *parameters, *also] if chosen_by else [*parameters, *also], where, "key")
+        for key, parameter in parameters.items():
+            if key not in table and parameter.default is inspect.Parameter.empty:
+                self.fail(where, f"the key {key!r} is missing; it needs {_listed(_required(parameters))}")
+        return {
+            parameter.name: self.value(table[key], key, parameter, where)
+            for key, parameter in parameters.items()
+            if key in table
+        }
+
+    def value(self, value: Any, key: str, parameter: inspect.Parameter, where: str) -> Any:
+        """One value: a table for what has its own constructor, else checked by the annotation."""
+        inner = f"{where} {key}"
+        if key == "section":
+            return self.choose(SHAPES, value, inner, "shape", "general")
+        if key == "law":
+            return self.choose(LAWS, value, inner)
+        if key == "signal":
+            return self.choose(SIGNALS, value, inner)
+        if key == "solver":
+            offered = {name: method for name, method in SOLVERS.items() if method in solvers.__all__}
+            methods = {name: getattr(solvers, method) for name, method in offered.items()}  # here: slow to import
+            return self.choose(methods, value, inner)
+        if not _fits(value, parameter.annotation):
+            wanted = " or ".join(dict.fromkeys(_wanted(parameter.annotation)))
+            self.fail(where, f"{key} must be {wanted}, got {_shown(value)}")
+        if key == "path":
+            return self.path.parent / value
+        return _as(value, parameter.annotation)
+
+    def check_keys(self, table: Table, valid: Sequence[str], where: str, what: str) -> None:
+        """Every key is a valid one; the nearest one is named otherwise."""
+        for key in table:
+            if key not in valid:
+                self.fail(where, f"unknown {what} {key!r}{_nearest(key, valid)} (valid: {_listed(valid)})")
+
+    def fail(self, where: str, message: str, cause: Exception | None = None) -> NoReturn:
+        """Raise with file and table in front."""
+        raise SceneFileError(f"{self.path}: {where}: {message}") from cause
+
+
+def _span(length: float, section: Section) -> tuple[float, Section]:
+    """One span of a beam."""
+    return length, section
+
+
+def _parameters(constructor: Callable[..., Any]) -> dict[str, inspect.Parameter]:
+    """Keys of a table: what can be given by position, and the class's own options where **options are taken."""
+    signature = inspect.signature(constructor, eval_str=True, locals=UNSEEN).parameters
+    plain = [p for p in signature.values() if p.kind is p.POSITIONAL_OR_KEYWORD]
+    if any(p.kind is p.VAR_KEYWORD for p in signature.values()):
+        options = inspect.signature(constructor.__self__, eval_str=True).parameters.values()  # type: ignore[attr-defined]
+        plain += [p for p in options if p.default is not p.empty]
+    return {ALIASES.get(p.name, p.name): p for p in plain if p.name != "self"}
+
+
+def _required(parameters: Mapping[str, inspect.Parameter]) -> list[str]:
+    """Keys without a default."""
+    return [key for key, parameter in parameters.items() if parameter.default is inspect.Parameter.empty]
+
+
+def _fits(value: Any, hint: Any) -> bool:
+    """Whether a TOML value has the annotated type; whole numbers pass as numbers, true and false do not."""
+    origin, inner = get_origin(hint), get_args(hint)
+    if origin in (Union, UnionType):
+        return any(_fits(value, option) for option in inner)
+    if origin is Literal:
+        return value in inner
+    if hint in (float, int):
+        too_long = isinstance(value, int) and value.bit_length() > 1000
+        return isinstance(value, (int, hint)) and not isinstance(value, bool) and not too_long
+    if hint in (bool, str):
+        return isinstance(value, hint)
+    if hint is Path:
+        return isinstance(value, str)
+    entry = _entry(hint)
+    if entry is None or not isinstance(value, list):
+        return False
+    fixed = origin is tuple and Ellipsis not in inner
+    return all(_fits(item, entry) for item in value) and (not fixed or len(value) == len(inner))
+
+
+def _entry(hint: Any) -> Any:
+    """Type of the entries of an annotated sequence; None when it is none."""
+    origin = get_origin(hint)
+    if origin is np.ndarray:
+        return float
+    if origin in (list, tuple, Sequence) and get_args(hint):
+        return get_args(hint)[0]
+    return None
+
+
+def _wanted(hint: Any) -> list[str]:
+    """The annotated type in words."""
+    words = {float: "a number", int: "a whole number", bool: "true or false", str: "text", Path: "text"}
+    origin, inner = get_origin(hint), get_args(hint)
+    if origin in (Union, UnionType):
+        return [word for option in inner if option is not NoneType for word in _wanted(option)]
+    if origin is Literal:
+        return [repr(option) for option in inner]
+    if hint in words:
+        return [words[hint]]
+    entry = _entry(hint)
+    if entry is None:
+        return []
+    count = f"{len(inner)} " if origin is tuple and Ellipsis not in inner else ""
+    return [f"a list of {count}{'whole ' if entry is int else ''}numbers"]
+
+
+def _as(value: Any, hint: Any) -> Any:
+    """Whole numbers as floats where a number is wanted, lists as tuples where a tuple is."""
+    options = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
+    if isinstance(value, list):
+        pair = any(get_origin(option) is tuple for option in options)
+        return tuple(value) if pair else value
+    if isinstance(value, int) and not isinstance(value, bool) and float in options and int not in options:
+        return float(value)
+    return value
+
+
+def _nearest(key: Any, valid: Sequence[str] | Constructors) -> str:
+    """A hint at the nearest valid name."""
+    close = get_close_matches(str(key).lower(), list(valid), n=1, cutoff=0.5)
+    return f"; did you mean {close[0]!r}?" if close else ""
+
+
+def _listed(names: Sequence[str] | Constructors) -> str:
+    """Names for a message."""
+    return ", ".join(names)
+
+
+def _shown(value: Any) -> str:
+    """A value as the file would write it, shortened."""
+    text = {True: "true", False: "false"}[value] if isinstance(value, bool) else repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _snake(name: str) -> str:
+    """LumpedMass -> lumped_mass."""
+    return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()

@@ -1,0 +1,323 @@
+r"""Contact: propagate the linear structure exactly, collocate the force alone.
+
+On a step of length h the unknowns are the forces at S nodes of every stop in contact, whatever the number of modes:
+
+    δ(t_i) = free response + Σ_u Σ_j C_ij F_uj,   the same for δ̇,   F_sj ← law_s(δ(t_j), δ̇(t_j))
+
+iterated from the extrapolated polynomial of the step before. The state at the end is E(h) y + Σ kick F. The first
+step of a power law with a broken exponent uses t = h s² and F = s^{2p} g(s), which restores full order at the
+singular start; the last one, onto δ = 0, is one Runge–Kutta step in √δ (see `solvers.regular`).
+
+Step control: with A₁ >= A₂ the sizes of the last two and the two before of the force's S Jacobi coefficients, the force
+beyond the polynomial is taken as A₁ max((A₁/A₂)^{S/2}, A₁/F_max), and what it does to the indentation rate is
+compared with rtol × a reference speed. Fast modes whose oscillation the nodes cannot follow are charged for it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from solvers.flight import energy_norms, turn
+from solvers.kernels import contact_forces, dot, inlined, kernel, table_value
+from solvers.state import CALLS, PEAK_DELTA, PEAK_FORCE, T
+from solvers.tables import S, propagate
+
+_MOST_ITERATIONS = 16
+ACCEPTED, TOO_LONG = 0, 1
+
+
+class Space(NamedTuple):
+    """Working arrays of the exponential integrator; stops are the first index of the contact ones."""
+
+    x_new: Any  # (x.size,)
+    terms: Any  # (8, 2N)
+    six: Any  # (6,)
+    values: Any  # (7,)
+    norms: Any  # (N,)
+    bounds: Any  # (L,)
+    m: Any  # (m,)
+    delta: Any  # (m, S)
+    rate: Any  # (m, S)
+    clipped: Any  # (S,)
+    free: Any  # (m, 2, S)
+    force: Any  # (m + L, S) forces of the stops, then values of the signals
+    trial: Any  # (S,)
+    previous: Any  # (m, S) forces of the last accepted step
+    work: Any  # (18, x.size + 2) of the Runge–Kutta steps
+
+
+@inlined
+def free_response(problem, tables, state, space, family, level):
+    """Indentations and rates at the nodes without the contact forces, signals included."""
+    stops, size = problem.gap.size, 2 * problem.k.size
+    h = tables.step[level]
+    for j in range(problem.table_dt.size):
+        for i in range(S):
+            time = state.now[T] + h * tables.times[family, i]
+            space.force[stops + problem.table_load[j], i] = table_value(problem, j, time)
+    for s in range(stops):
+        for d in range(2):
+            rows = tables.free[family, level, s, d]
+            for i in range(S):
+                value = dot(rows[i], state.x, size) - (problem.gap[s] if d == 0 else 0.0)
+                for j in range(problem.table_dt.size):
+                    u = stops + problem.table_load[j]
+                    value += dot(tables.forced[family, level, s, u, d, i], space.force[u], S)
+                space.free[s, d, i] = value
+
+
+@inlined
+def respond(problem, tables, state, space, family, level, s):
+    """Indentation and rate of stop s at the nodes under the present forces."""
+    for d in range(2):
+        target = space.delta[s] if d == 0 else space.rate[s]
+        for i in range(S):
+            target[i] = space.free[s, d, i]
+        for u in range(problem.gap.size):
+            if state.piece[u] > 0:
+                matrix = tables.forced[family, level, s, u, d]
+                for i in range(S):
+                    target[i] += dot(matrix[i], space.force[u], S)
+
+
+@inlined
+def solve_forces(problem, tables, state, space, family, level, accuracy):
+    """Fixed point of the forces to ``accuracy`` (N, of the first stop's scale); whether it converged."""
+    stops = problem.gap.size
+    before = np.inf
+    ratio = 0.3
+    for iteration in range(_MOST_ITERATIONS):
+        for s in range(stops):
+            if state.piece[s] > 0:
+                respond(problem, tables, state, space, family, level, s)
+        change, largest = 0.0, 0.0
+        for s in range(stops):
+            if state.piece[s] == 0:
+                continue
+            for i in range(S):
+                space.clipped[i] = space.delta[s, i]
+            contact_forces(problem, s, space.clipped, space.rate[s], state.entry_rate[s], space.trial)
+            state.count[CALLS] += S
+            for i in range(S):
+                change = max(change, abs(space.trial[i] - space.force[s, i]))
+                largest = max(largest, abs(space.trial[i]))
+                space.force[s, i] = space.trial[i]
+        if not change < np.inf:
+            return False
+        if iteration > 0:
+            ratio = min(change / before, 0.9)
+            if change >= before and iteration > 3 and change > 1e-13 * largest:
+                return False
+        if change * ratio <= (1.0 - ratio) * accuracy or change <= 1e-15 * largest:
+            return True
+        before = change
+    return False
+
+
+@inlined
+def step_error(problem, tables, state, space, family, level):
+    """Error of the indentation rate, m/s, that the forces' unresolved part makes; the largest over the stops."""
+    stops, n = problem.gap.size, problem.k.size
+    h = tables.step[level]
+    energy_norms(problem, state.x, space.norms)
+    worst = 0.0
+    for s in range(stops):
+        error = 0.0
+        for u in range(stops):
+            if state.piece[u] == 0:
+                continue
+            last, before, largest, deepest = 0.0, 0.0, 0.0, 0.0
+            for i in range(S):
+                largest = max(largest, abs(space.force[u, i]))
+                deepest = max(deepest, space.delta[u, i])
+            for i in range(4):
+                coefficient = abs(dot(tables.spectrum[family, i], space.force[u], S))
+                if i < 2:
+                    before = max(before, coefficient)
+                else:
+                    last = max(last, coefficient)
+            if last <= 1e-14 * largest:
+                continue
+            decay = min(last / before, 1.0) if before > 0.0 else 1.0
+            beyond = last * max(decay ** (S // 2), min(last / largest, 1.0))
+            ripple = 0.0
+            for b in range(n):
+                if tables.alias[family, level, b] > 1e-13 and problem.k[b] > 0.0:
+                    row = abs(problem.read[u, b]) / math.sqrt(problem.k[b]) + abs(problem.read[u, n + b])
+                    ripple += tables.alias[family, level, b] * row * space.norms[b]
+            stiffness = tables.exponent[u] * largest / max(deepest, 1e-300)
+            error += abs(tables.mobility[s, u]) * h * (beyond + 0.1 * stiffness * ripple)
+        worst = max(worst, error)
+    return worst
+
+
+@inlined
+def leaves_piece(problem, tables, state, space, family, level):
+    """Whether any stop crosses a border of its piece at a node."""
+    for s in range(problem.gap.size):
+        piece = state.piece[s]
+        if piece == 0:
+            respond(problem, tables, state, space, family, level, s)
+        upper = problem.levels[s, piece]
+        lower = problem.levels[s, piece - 1] if piece > 0 else -np.inf
+        for i in range(S):
+            if not lower <= space.delta[s, i] <= upper:
+                return True
+    return False
+
+
+@inlined
+def finish_step(problem, tables, state, space, family, level):
+    """Move the state to the end of the step; ledger and peaks of the contacts."""
+    stops, size = problem.gap.size, 2 * problem.k.size
+    h = tables.step[level]
+    flight = tables.step_propagator[level]
+    turn(problem, flight[0], flight[1], state.x)
+    for u in range(space.force.shape[0]):
+        if u >= stops or state.piece[u] > 0:
+            for j in range(S):
+                force = space.force[u, j]
+                row = tables.kick[family, level, u, j]
+                for e in range(size):
+                    state.x[e] += row[e] * force
+    for s in range(stops):
+        if state.piece[s] > 0:
+            for i in range(S):
+                state.x[size + 2 + 2 * s] += h * tables.weights[family, i] * space.force[s, i] * space.rate[s, i]
+                state.x[size + 3 + 2 * s] += h * tables.weights[family, i] * space.force[s, i]
+            state.open[s, PEAK_FORCE] = _peak(tables, family, space.force[s], state.open[s, PEAK_FORCE], space.trial)
+            state.open[s, PEAK_DELTA] = _peak(tables, family, space.delta[s], state.open[s, PEAK_DELTA], space.trial)
+    state.now[T] += h
+
+
+@kernel
+def _legendre(coefficients, x):
+    """Legendre sum at x in [-1, 1] by Clenshaw's recurrence."""
+    later, latest = 0.0, 0.0
+    for k in range(S - 1, 0, -1):
+        later, latest = (
+            coefficients[k] + (2.0 * k + 1.0) / (k + 1.0) * x * later - (k + 1.0) / (k + 2.0) * latest,
+            later,
+        )
+    return coefficients[0] + x * later - 0.5 * latest
+
+
+@kernel
+def _peak(tables, family, values, known, coefficients):
+    """Largest value of the polynomial through the node values, if it exceeds the known peak."""
+    place = 0
+    for i in range(S):
+        if values[i] > values[place]:
+            place = i
+    if values[place] < 0.95 * known or values[place] <= 0.0:
+        return known
+    best = max(known, values[place])
+    if family > 0:
+        return best
+    for k in range(S):
+        coefficients[k] = dot(tables.legendre[k], values, S)
+    nodes = tables.nodes[0]
+    a = 2.0 * nodes[place - 1] - 1.0 if place > 0 else -1.0
+    c = 2.0 * nodes[place + 1] - 1.0 if place < S - 1 else 1.0
+    best = max(best, _legendre(coefficients, a), _legendre(coefficients, c))
+    b = 2.0 * nodes[place] - 1.0
+    fa, fb, fc = _legendre(coefficients, a), values[place], _legendre(coefficients, c)
+    for _ in range(5):  # successive parabolas
+        denominator = (b - a) * (fb - fc) - (b - c) * (fb - fa)
+        if denominator == 0.0:
+            break
+        x = b - 0.5 * ((b - a) ** 2 * (fb - fc) - (b - c) ** 2 * (fb - fa)) / denominator
+        if not a < x < c or x == b:
+            break
+        f = _legendre(coefficients, x)
+        best = max(best, f)
+        if x < b:
+            if f > fb:
+                c, fc, b, fb = b, fb, x, f
+            else:
+                a, fa = x, f
+        elif f > fb:
+            a, fa, b, fb = b, fb, x, f
+        else:
+            c, fc = x, f
+    return best
+
+
+@kernel
+def _on_nodes(tables, family, exponent, values, sigma, basis):
+    """Value at σ of the force whose node values on a family's nodes are given."""
+    nodes = tables.nodes[family]
+    total = 0.0
+    for j in range(S):
+        term = values[j] * (sigma / nodes[j]) ** (2.0 * exponent) if exponent > 0.0 else values[j]
+        for i in range(S):
+            if i != j:
+                term *= (sigma - nodes[i]) / (nodes[j] - nodes[i])
+        total += term
+    return total
+
+
+@inlined
+def _between(nodes, exponent, values, sigma):
+    """Value at σ of σ^exponent × the polynomial through the node values."""
+    total = 0.0
+    for j in range(S):
+        term = values[j] * (sigma / nodes[j]) ** exponent if exponent > 0.0 else values[j]
+        for i in range(S):
+            if i != j:
+                term *= (sigma - nodes[i]) / (nodes[j] - nodes[i])
+        total += term
+    return total
+
+
+@kernel
+def inside(problem, tables, state, space, family, level, span, row):
+    """State at ``span`` after the start of a converged step, by quadrature of its forces; ``row`` holds the start."""
+    stops, n, h = problem.gap.size, problem.k.size, tables.step[level]
+    entry = tables.times[family, 0] < tables.nodes[family, 0]  # t = h σ²
+    for b in range(n):
+        alpha, beta = propagate(problem.k[b], problem.c[b], span)
+        p, v = row[b], row[n + b]
+        row[b] = alpha * p + beta * v
+        row[n + b] = alpha * v - beta * (problem.k[b] * p + problem.c[b] * v)
+    end = math.sqrt(span / h) if entry else span / h
+    panels = 1 + int(tables.fastest * span / 4.0)
+    for g in range(panels * S):
+        sigma = end * (g // S + tables.nodes[0, g % S]) / panels
+        time = h * sigma * sigma if entry else h * sigma
+        measure = end * tables.weights[0, g % S] / panels * h * (2.0 * sigma if entry else 1.0)
+        for u in range(stops + problem.load.shape[0]):
+            if u < stops and state.piece[u] == 0:
+                continue
+            exponent = 2.0 * tables.exponent[u] if entry and u == family - 1 else 0.0
+            impulse = measure * _between(tables.nodes[family], exponent, space.force[u], sigma)
+            push = problem.push[u] if u < stops else problem.load[u - stops]
+            for b in range(n):
+                alpha, beta = propagate(problem.k[b], problem.c[b], span - time)
+                p, v = push[b] * impulse, push[n + b] * impulse
+                row[b] += alpha * p + beta * v
+                row[n + b] += alpha * v - beta * (problem.k[b] * p + problem.c[b] * v)
+            if u < stops:
+                row[2 * n + 2 + 2 * u] += impulse * _between(tables.nodes[family], 0.0, space.rate[u], sigma)
+                row[2 * n + 3 + 2 * u] += impulse
+
+
+@kernel
+def contact_time(problem, tables, state, space, s, speed):
+    """Duration a free impact at this speed would have, from the law's energy: T = 3.2 δ_m/v."""
+    speed = max(speed, 1e-12)
+    mobility = max(tables.mobility[s, s], 1e-300)
+    target = 0.5 * speed * speed / mobility
+    p = tables.exponent[s]
+    deepest = 1e-3 * speed
+    for _ in range(4):
+        space.clipped[0], space.trial[0] = deepest, 0.0
+        contact_forces(problem, s, space.clipped[0:1], space.trial[0:1], speed, space.trial[1:2])
+        energy = space.trial[1] * deepest / (p + 1.0)
+        if not energy > 0.0:
+            break
+        deepest *= (target / energy) ** (1.0 / (p + 1.0))
+    return 3.2 * deepest / speed

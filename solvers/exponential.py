@@ -1,0 +1,446 @@
+r"""The main method: exact flight, collocated contact, every event landed on.
+
+A tone Re(a e^{iΩt}) of a load is subtracted as its steady response, which then is one more undamped block with
+k = Ω², c = 0 that no force pushes; so flight under tones is an autonomous linear system and exact in one multiplication per
+block. Sampled signals are quintics per cell, exact likewise. `solvers.flight` proves its steps safe, `solvers.collocation`
+solves the contacts, `solvers.regular` lands on their ends.
+
+Limitations
+-----------
+* In flight no contact of the model is missed, however short. While one stop is in contact the others are watched at 8
+  nodes per step only: a second contact shorter than the distance of two nodes can be missed.
+* Touching is no contact: a stop counts as entered where δ becomes positive. An entry at rest counts when δ̈ > 0.
+* A law that bends (clamp=True, a table) between its declared knots is integrated with smaller steps, at lower order.
+* K must be positive semi-definite (no buckled modes).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit, types
+
+from solvers.collocation import (
+    Space,
+    contact_time,
+    finish_step,
+    free_response,
+    inside,
+    leaves_piece,
+    solve_forces,
+    step_error,
+)
+from solvers.flight import energy_norms, fly
+from solvers.forcing import Forcing
+from solvers.kernels import OPTIONS, PROBLEM, Problem, contact_forces, copy, dot, indentation, inlined, kernel
+from solvers.regular import INDENTATION, ROOT, TIME, regular_step
+from solvers.state import (
+    AT_ONCE,
+    CALLS,
+    CHATTER,
+    DONE,
+    LOG_FULL,
+    LOGGED,
+    MOST_EVENTS_AT_ONCE,
+    PEAK_DELTA,
+    REJECTED,
+    RUNNING,
+    SAMPLED,
+    STATE,
+    STEP_TOO_SMALL,
+    STEPS,
+    T_IN,
+    State,
+    T,
+    begin_contacts,
+    new_state,
+    problem_of,
+    rate_rows,
+    switch,
+    switch_on_surface,
+    touching,
+)
+from solvers.system import Array, System
+from solvers.tables import S, Tables, build
+
+_REAL = types.float64
+_VECTOR = types.Array(_REAL, 1, "C")
+_MATRIX = types.Array(_REAL, 2, "C")
+_INTEGERS = types.Array(types.int64, 1, "C")
+
+
+def _arrays(*dimensions):  # shapes of a named tuple's contiguous float arrays
+    return [types.Array(_REAL, d, "C") if d else _REAL for d in dimensions]
+
+
+TABLES = types.NamedTuple(
+    [
+        *_arrays(1, 3, 4, 2, 3, 2, 2, 2, 2, 0, 2, 1),
+        *_arrays(1, 3, 2, 2, 2, 3, 2, 6, 7, 5, 3, 4),
+    ],
+    Tables,
+)
+SPACE = types.NamedTuple(_arrays(1, 2, 1, 1, 1, 1, 1, 2, 2, 1, 3, 2, 1, 2, 2), Space)
+
+SCALE, SHARE = 0, 1  # places in Memory.numbers: reference speed, then per stop the first step's share of T_c
+LEVEL, FAMILY, FRESH, STOP, WANTED = range(5)  # places in Memory.last
+_GOAL = 0.3  # error aimed at, in units of the tolerance
+_ORDER = 15.0  # the error estimate falls like h^15
+
+
+@kernel
+def _begin(problem, tables, state, space, numbers, last, stop):
+    """Scale, first step and family of a contact that begins (or changes piece) at ``stop``."""
+    size, n = 2 * problem.k.size, problem.k.size
+    speed = abs(dot(problem.read_rate[stop], state.x, size))
+    energy_norms(problem, state.x, space.norms)
+    possible = dot(tables.reach[stop], space.norms, n)
+    numbers[SCALE] = max(speed, 0.1 * possible, 1e-30)
+    delta = indentation(problem, stop, state.x)
+    entering = state.piece[stop] == 1 and delta < 1e-9 * max(state.open[stop, PEAK_DELTA], 1e-6)
+    duration = contact_time(problem, tables, state, space, stop, max(speed, 1e-3 * numbers[SCALE]))
+    if numbers[SHARE + stop] == 0.0:
+        numbers[SHARE + stop] = min(0.1, 4.0 / (tables.fastest * duration))
+    last[FAMILY] = 1 + stop if entering else 0
+    last[WANTED] = _level(tables, numbers[SHARE + stop] * duration)
+    last[FRESH], last[STOP] = 1, stop
+
+
+@inlined
+def _level(tables, h):
+    """Contact step of about h, the shortest one if need be."""
+    last = tables.step.size - 1
+    j = min(max(int(np.ceil(2.0 * math.log2(tables.step[0] / h))), 0), last)
+    return j + 1 if tables.step[j] > h and j < last else j
+
+
+@inlined
+def _nearest_surface(problem, state):
+    """(time, stop, direction) of the border of a piece that will be met first at the present rates."""
+    size = 2 * problem.k.size
+    near, stop, direction = np.inf, -1, 0
+    for s in range(problem.gap.size):
+        delta = indentation(problem, s, state.x)
+        rate = dot(problem.read_rate[s], state.x, size)
+        piece = state.piece[s]
+        if rate < 0.0 and piece > 0:
+            time, way = (delta - problem.levels[s, piece - 1]) / -rate, -1
+        elif rate > 0.0:
+            time, way = (problem.levels[s, piece] - delta) / rate, 1
+        else:
+            continue
+        if time < near:
+            near, stop, direction = time, s, way
+    return near, stop, direction
+
+
+@kernel
+def _land(problem, tables, state, space, numbers, stop, direction, near, rtol, t_end, out, dt):
+    """Try to land on the border ahead by one regular step; whether it succeeded."""
+    size, t = state.x.size, state.now[T]
+    delta = indentation(problem, stop, state.x)
+    level = problem.levels[stop, state.piece[stop] - (1 if direction < 0 else 0)]
+    leaving = direction < 0 and state.piece[stop] == 1
+    if tables.fastest * near > 1.5:
+        return False
+    if leaving and delta > 0.09 * state.open[stop, PEAK_DELTA]:
+        return False
+    if not leaving and state.piece[stop] > 0 and abs(level - delta) > 0.2 * max(level, delta):
+        return False
+    w = space.work[17]
+    copy(state.x, w, size)
+    w[size], w[size + 1] = t, math.sqrt(max(delta, 0.0))
+    broken = tables.exponent[stop] % 1.0 != 0.0
+    variable = ROOT if leaving and broken else INDENTATION
+    span = -w[size + 1] if variable == ROOT else level - delta
+    landed, trying = np.inf, True
+    while True:  # first the landing itself, then the samples (and the end of the run) that lie on the way
+        time = min(state.count[SAMPLED] * dt, t_end) if state.count[SAMPLED] < out.shape[0] else t_end
+        if not trying and time > landed:
+            return True
+        way = variable if trying else TIME
+        error, calls = regular_step(
+            *(problem, way, stop, span if trying else time - t, w, state.piece, state.entry_rate, space.work)
+        )
+        state.count[CALLS] += calls
+        if trying:
+            landed, trying = space.work[15][size], False
+            if not (error <= rtol * numbers[SCALE] and t <= landed <= t + 4.0 * near):
+                return False
+            copy(space.work[15], state.x, size)
+            state.now[T] = landed
+        else:
+            if state.count[SAMPLED] < out.shape[0] and time == state.count[SAMPLED] * dt:
+                copy(space.work[15], out[state.count[SAMPLED]], size)
+                state.count[SAMPLED] += 1
+            if time == t_end:
+                copy(space.work[15], state.x, size)
+                state.now[T] = t_end
+                return True
+
+
+@inlined
+def _predict(problem, tables, state, space, last, family, level):
+    """First guess of the forces: the last step's polynomial, or the law on the free response."""
+    for s in range(problem.gap.size):
+        if state.piece[s] == 0:
+            continue
+        if last[FRESH]:
+            copy(space.free[s, 0], space.clipped, S)
+            contact_forces(problem, s, space.clipped, space.free[s, 1], state.entry_rate[s], space.force[s])
+            state.count[CALLS] += S
+            continue
+        shift = level - last[LEVEL] + 2
+        for i in range(S):
+            if 0 <= shift < tables.extend.shape[1]:
+                space.force[s, i] = dot(tables.extend[last[FAMILY], shift, i], space.previous[s], S)
+            else:
+                space.force[s, i] = space.previous[s, S - 1]
+
+
+@inlined
+def _try(problem, tables, state, space, numbers, last, family, level, rtol):
+    """Attempt one contact step; error in units of the tolerance, inf when it must be shorter anyway."""
+    h = tables.step[level]
+    bottom = level == tables.step.size - 1
+    free_response(problem, tables, state, space, family, level)
+    _predict(problem, tables, state, space, last, family, level)
+    mobility = 1e-300
+    for s in range(problem.gap.size):
+        if state.piece[s] > 0:
+            mobility = max(mobility, tables.mobility[s, s])
+    tolerance = rtol * numbers[SCALE]
+    if not solve_forces(problem, tables, state, space, family, level, 0.05 * tolerance / (h * mobility)):
+        return np.inf
+    if leaves_piece(problem, tables, state, space, family, level):
+        return 1.0 if bottom else np.inf
+    error = step_error(problem, tables, state, space, family, level) / tolerance
+    return min(error, 1.0) if bottom else error
+
+
+@kernel
+def _record(problem, tables, state, space, family, level, t_end, out, dt):
+    """Samples inside the converged step, and the state at the end of the run if that lies inside."""
+    t, h = state.now[T], tables.step[level]
+    end = min(t + h, t_end)
+    while state.count[SAMPLED] < out.shape[0] and state.count[SAMPLED] * dt <= end:
+        row = out[state.count[SAMPLED]]
+        copy(state.x, row, row.size)
+        inside(problem, tables, state, space, family, level, state.count[SAMPLED] * dt - t, row)
+        state.count[SAMPLED] += 1
+    if t + h >= t_end:
+        copy(state.x, space.x_new, state.x.size)
+        inside(problem, tables, state, space, family, level, t_end - t, space.x_new)
+
+
+@kernel
+def touch(problem, tables, state, space, numbers, last, t_end, rtol, log, out, dt):
+    """One accepted step in contact: land if a border is near, else collocate; returns a status code."""
+    near, stop, direction = _nearest_surface(problem, state)
+    if stop >= 0 and not last[FRESH]:
+        if _land(problem, tables, state, space, numbers, stop, direction, near, rtol, t_end, out, dt):
+            state.count[STEPS] += 1
+            if state.now[T] < t_end:
+                switch(problem, state, stop, direction, log)
+                if touching(state):
+                    _begin(problem, tables, state, space, numbers, last, stop)
+            return RUNNING
+    family = last[FAMILY] if last[FRESH] else 0
+    longest = np.inf if last[FRESH] else 0.8 * near
+    if problem.table_dt.size:
+        longest = min(longest, t_end - state.now[T] + problem.table_dt[0])
+    wanted, bottom = last[WANTED], tables.step.size - 1
+    level = _level(tables, longest) if longest < tables.step[wanted] else wanted
+    while True:
+        error = _try(problem, tables, state, space, numbers, last, family, level, rtol)
+        if error <= 1.0:
+            break
+        if level == bottom:
+            return STEP_TOO_SMALL
+        level = min(bottom, level + (1 + int(2.0 / _ORDER * math.log2(error / _GOAL)) if error < np.inf else 2))
+        wanted = level
+        state.count[REJECTED] += 1
+    end = state.now[T] + tables.step[level]
+    ends = end >= t_end
+    if ends or dt * state.count[SAMPLED] <= end:
+        _record(problem, tables, state, space, family, level, t_end, out, dt)
+    for s in range(problem.gap.size):
+        copy(space.force[s], space.previous[s], S)
+    finish_step(problem, tables, state, space, family, level)
+    if ends:  # the step was finished for the sake of the peaks; the state is the one inside it
+        copy(space.x_new, state.x, state.x.size)
+        state.now[T] = t_end
+    _adapt(numbers, last, level, family, wanted, error)
+    state.count[STEPS] += 1
+    return RUNNING
+
+
+@kernel
+def _adapt(numbers, last, level, family, wanted, error):
+    """Size of the next step from the error of this one."""
+    longer = 2.0 / _ORDER * math.log2(_GOAL / max(error, 1e-30))  # in levels
+    if last[FRESH] and family > 0:
+        numbers[SHARE + last[STOP]] *= 2.0 ** (0.5 * min(max(longer, -2.0), 1.0))
+    suggested = max(level - int(min(math.floor(longer), 2.0)), 0)
+    last[WANTED] = suggested if level == wanted else min(suggested, wanted)
+    last[LEVEL], last[FAMILY], last[FRESH] = level, family, 0
+
+
+@kernel
+def _latest(state):
+    """The stop in contact that was entered last."""
+    stop = -1
+    for s in range(state.piece.size):
+        if state.piece[s] > 0 and (stop < 0 or state.open[s, T_IN] >= state.open[stop, T_IN]):
+            stop = s
+    return stop
+
+
+@njit(
+    types.int64(
+        *[PROBLEM, TABLES, STATE, SPACE, _VECTOR, _INTEGERS, _REAL, types.int64, _REAL, _MATRIX, _MATRIX, _REAL]
+    ),
+    **OPTIONS,
+)
+def advance(problem, tables, state, space, numbers, last, t_end, budget, rtol, log, out, dt):
+    """Advance the state to ``t_end`` or for about ``budget`` steps; returns a status code."""
+    begun = state.count[STEPS] + state.count[REJECTED]
+    while state.count[STEPS] + state.count[REJECTED] - begun < budget:
+        if state.now[T] >= t_end:
+            return DONE
+        if state.count[LOGGED] + problem.gap.size > log.shape[0]:
+            return LOG_FULL
+        if state.count[AT_ONCE] > MOST_EVENTS_AT_ONCE:
+            return CHATTER
+        if switch_on_surface(problem, state, log, True):
+            if touching(state):
+                _begin(problem, tables, state, space, numbers, last, _latest(state))
+            continue
+        if touching(state):
+            code = touch(problem, tables, state, space, numbers, last, t_end, rtol, log, out, dt)
+            if code != RUNNING:
+                return code
+            continue
+        stop = fly(problem, tables, state, space, t_end, budget, out, dt)
+        if stop >= 0:
+            switch(problem, state, stop, 1, log)
+            _begin(problem, tables, state, space, numbers, last, stop)
+    return RUNNING
+
+
+@dataclass(frozen=True)
+class Exponential:
+    """Exact flight and collocated contact; the library's best method for any linear structure with stops.
+
+    Parameters
+    ----------
+    rtol : error of an indentation rate that one contact step may make, relative to the speed of entry (or a tenth of
+        what the motion could reach at the stop, whichever is larger), in [1e-12, 1e-2]. Flight is exact.
+
+    Notes
+    -----
+    Cost is nearly independent of rtol and grows linearly with the number of modes. See the module for its limits.
+
+    Examples
+    --------
+    >>> Exponential(rtol=1e-10).rtol
+    1e-10
+    """
+
+    rtol: float = 1e-8
+
+    def __post_init__(self) -> None:
+        if not 1e-12 <= self.rtol <= 1e-2:
+            raise ValueError(f"rtol must lie in [1e-12, 1e-2], got {self.rtol!r}")
+
+    def engine(self, system: System, z: Array, forcing: Forcing, duration: float) -> Engine:
+        """The method made ready for one run."""
+        return Engine(self, system, z, forcing, duration)
+
+
+class Engine:
+    """One run: problem with tones among the blocks, tables, state."""
+
+    def __init__(self, method: Exponential, system: System, z: Array, forcing: Forcing, duration: float) -> None:
+        self.method, self.duration = method, duration
+        problem, steady = with_tones(problem_of(system, forcing), forcing)
+        self.problem = problem
+        laws = [contact.law for contact in system.contacts]
+        dt_cell = float(forcing.table_dt[0]) if forcing.table_dt.size else 1.0
+        self.tables = build(problem, [law.exponent for law in laws], [law.jump for law in laws], dt_cell)
+        stops, loads, size = len(problem.gap), len(problem.load), 2 * len(problem.k)
+        self.back = system.blocks.T @ steady
+        self.state: State = new_state(_start(z, steady, forcing), stops)
+        self.space = Space(
+            *(np.zeros(shape) for shape in (self.state.x.size, (8, size), 6, 7, size // 2, loads, stops)),
+            *(np.zeros(shape) for shape in ((stops, S), (stops, S), S, (stops, 2, S), (stops + loads, S), S)),
+            *(np.zeros(shape) for shape in ((stops, S), (18, self.state.x.size + 2))),
+        )
+        self.numbers = np.zeros(1 + stops)
+        self.last = np.zeros(5, dtype=np.int64)
+
+    def start(self) -> None:
+        """Put every stop on its piece."""
+        begin_contacts(self.problem, self.state)
+        if np.any(self.state.piece > 0):
+            _begin(*(self.problem, self.tables, self.state, self.space, self.numbers, self.last), _latest(self.state))
+
+    def march(self, budget: int, log: Array, out: Array, dt: float) -> int:
+        """Go on for a stretch."""
+        return advance(
+            *(self.problem, self.tables, self.state, self.space, self.numbers, self.last),
+            *(self.duration, budget, self.method.rtol, log, out, dt),
+        )
+
+
+def with_tones(problem: Problem, forcing: Forcing) -> tuple[Problem, Array]:
+    """The problem with one undamped block per tone, and the map (2n, 2N) from its state to the blocks' z.
+
+    The steady response to Re(a e^{iΩt}) is Re(Z e^{iΩt}) = Re Z · p + Im Z/Ω · v with p = cos Ωt, v = -Ω sin Ωt.
+    """
+    n, tones = len(problem.k), len(forcing.tone_omega)
+    steady = np.zeros((2 * n, 2 * (n + tones)))
+    steady[:n, :n] = steady[n:, n + tones : 2 * n + tones] = np.eye(n)
+    for i, (omega, amplitude, load) in enumerate(
+        zip(forcing.tone_omega, forcing.tone_amplitude, forcing.tone_load, strict=True)
+    ):
+        lp, lv = problem.load[load, :n] * amplitude, problem.load[load, n:] * amplitude
+        # (iΩ - A)⁻¹ of a block: [[iΩ + c, 1], [-k, iΩ]] / (k - Ω² + iΩc)
+        denominator = problem.k - omega**2 + 1j * omega * problem.c
+        response = np.concatenate(
+            [((1j * omega + problem.c) * lp + lv) / denominator, (-problem.k * lp + 1j * omega * lv) / denominator]
+        )
+        steady[:, n + i] = response.real
+        if omega > 0.0:
+            steady[:, 2 * n + tones + i] = response.imag / omega
+    none = np.zeros(0)
+    push = np.zeros((len(problem.gap), 2 * (n + tones)))
+    push[:, :n], push[:, n + tones : 2 * n + tones] = problem.push[:, :n], problem.push[:, n:]
+    sampled = np.zeros((len(problem.load), 2 * (n + tones)))
+    for load in forcing.table_load:
+        sampled[load, :n], sampled[load, n + tones : 2 * n + tones] = problem.load[load, :n], problem.load[load, n:]
+    k = np.concatenate((problem.k, forcing.tone_omega**2))
+    c = np.concatenate((problem.c, np.zeros(tones)))
+    return problem._replace(
+        k=k,
+        c=c,
+        loss=np.empty((0, 0)),
+        push=push,
+        read=problem.read @ steady,
+        read_rate=rate_rows(problem.read @ steady, k, c),
+        load=sampled,
+        power=problem.power @ steady,
+        tone_omega=none,
+        tone_amplitude=none.astype(complex),
+        tone_load=none.astype(np.int64),
+    ), steady
+
+
+def _start(z: Array, steady: Array, forcing: Forcing) -> Array:
+    """State with the tones' blocks at t = 0: p = 1, v = 0, the structure's less their steady response."""
+    n, tones = len(z) // 2, len(forcing.tone_omega)
+    pseudo = np.concatenate((np.zeros(n), np.ones(tones), np.zeros(n + tones)))
+    rest = z - steady @ pseudo
+    return pseudo + np.concatenate((rest[:n], np.zeros(tones), rest[n:], np.zeros(tones)))

@@ -1,0 +1,202 @@
+"""The state of a run, and what happens to it when a stop switches: pieces, latched rates, contact log."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import types
+
+from solvers.forcing import Forcing
+from solvers.kernels import Problem, dot, indentation, kernel
+from solvers.result import Status
+from solvers.system import Array, System
+
+_VECTOR = types.Array(types.float64, 1, "C")
+_MATRIX = types.Array(types.float64, 2, "C")
+_INTEGERS = types.Array(types.int64, 1, "C")
+
+_CODES = list(Status)
+DONE, RUNNING, STEP_TOO_SMALL, DIVERGED, CHATTER, LOG_FULL, LAW_NOT_FINITE = (
+    _CODES.index(status)
+    for status in (
+        *[Status.DONE, Status.RUNNING, Status.STEP_TOO_SMALL, Status.DIVERGED],
+        *[Status.CHATTER, Status.LOG_FULL, Status.LAW_NOT_FINITE],
+    )
+)
+T, H_FLIGHT, H_CONTACT, LAST_EVENT = range(4)  # places in State.now
+STEPS, REJECTED, CALLS, EVENTS, LOGGED, SAMPLED, AT_ONCE = range(7)  # places in State.count
+T_IN, SPEED_IN, PEAK_DELTA, PEAK_FORCE, WORK_IN, IMPULSE_IN, FLOORED = range(7)  # columns of State.open
+MOST_EVENTS_AT_ONCE = 100
+
+
+class State(NamedTuple):
+    """Everything a run changes; it can be continued from here."""
+
+    now: Any  # time, flight step, contact step, time of the last event
+    x: Any
+    rate: Any
+    piece: Any  # (m,) 0 in flight, j > 0 between levels j-1 and j
+    entry_rate: Any  # (m,) latched
+    open: Any  # (m, 7) of the contacts under way
+    count: Any
+
+
+STATE = types.NamedTuple(
+    [_VECTOR, _VECTOR, _VECTOR, _INTEGERS, _VECTOR, _MATRIX, _INTEGERS],
+    State,
+)
+
+
+@kernel
+def surface_tolerance(problem, s, x):
+    """Distance within which a stop counts as on a level: rounding of δ."""
+    total = abs(problem.gap[s])
+    for i in range(2 * problem.k.size):
+        total += abs(problem.read[s, i] * x[i])
+    return 1e-15 * total + 1e-20
+
+
+@kernel
+def _open(problem, state, s, t, delta_dot):
+    """Latch the entry rate and begin a row of the contact log."""
+    ledger = 2 * problem.k.size + 2 + 2 * s
+    state.entry_rate[s] = max(abs(delta_dot), problem.floor[s])
+    state.open[s, T_IN] = t
+    state.open[s, SPEED_IN] = abs(delta_dot)
+    state.open[s, PEAK_DELTA] = 0.0
+    state.open[s, PEAK_FORCE] = 0.0
+    state.open[s, WORK_IN] = state.x[ledger]
+    state.open[s, IMPULSE_IN] = state.x[ledger + 1]
+    state.open[s, FLOORED] = 1.0 if abs(delta_dot) < problem.floor[s] else 0.0
+
+
+@kernel
+def begin_contacts(problem, state):
+    """Put every stop on its piece at the start of a run and open the contacts under way."""
+    for s in range(problem.gap.size):
+        delta = indentation(problem, s, state.x)
+        piece = 0
+        while delta > problem.levels[s, piece]:
+            piece += 1
+        state.piece[s] = piece
+        if piece > 0:
+            _open(problem, state, s, state.now[T], dot(problem.read_rate[s], state.x, 2 * problem.k.size))
+            state.open[s, PEAK_DELTA] = delta
+
+
+@kernel
+def contact_row(problem, state, s, t_out, speed_out, row):
+    """Write the log row of the contact under way at stop s."""
+    ledger = 2 * problem.k.size + 2 + 2 * s
+    row[0] = s
+    row[1] = state.open[s, T_IN]
+    row[2] = t_out
+    row[3] = state.open[s, SPEED_IN]
+    row[4] = speed_out
+    row[5] = state.open[s, PEAK_DELTA]
+    row[6] = state.open[s, PEAK_FORCE]
+    row[7] = state.x[ledger + 1] - state.open[s, IMPULSE_IN]
+    row[8] = state.x[ledger] - state.open[s, WORK_IN]
+    row[9] = state.open[s, FLOORED]
+
+
+@kernel
+def switch(problem, state, s, direction, log):
+    """Move stop s one piece up or down; open or close its contact."""
+    t = state.now[T]
+    delta_dot = dot(problem.read_rate[s], state.x, 2 * problem.k.size)
+    if direction > 0 and state.piece[s] == 0:
+        _open(problem, state, s, t, delta_dot)
+    if direction < 0 and state.piece[s] == 1:
+        contact_row(problem, state, s, t, -delta_dot, log[state.count[LOGGED]])
+        state.count[LOGGED] += 1
+    state.piece[s] += direction
+    state.count[EVENTS] += 1
+    state.count[AT_ONCE] = state.count[AT_ONCE] + 1 if t == state.now[LAST_EVENT] else 0
+    state.now[LAST_EVENT] = t
+
+
+@kernel
+def switch_on_surface(problem, state, log, locates):
+    """Switch every stop that sits on a border of its piece and moves out of it; returns whether any did."""
+    switched = False
+    for s in range(problem.gap.size):
+        delta = indentation(problem, s, state.x)
+        delta_dot = dot(problem.read_rate[s], state.x, 2 * problem.k.size)
+        tolerance = surface_tolerance(problem, s, state.x) if locates else 0.0
+        if delta >= problem.levels[s, state.piece[s]] - tolerance and delta_dot > 0.0:
+            switch(problem, state, s, 1, log)
+            switched = True
+        elif state.piece[s] > 0 and delta <= problem.levels[s, state.piece[s] - 1] + tolerance and delta_dot < 0.0:
+            switch(problem, state, s, -1, log)
+            switched = True
+    return switched
+
+
+@kernel
+def touching(state):
+    """Whether any stop is in contact."""
+    most = 0
+    for piece in state.piece:
+        most = max(most, piece)
+    return most > 0
+
+
+def new_state(z: Any, stops: int) -> State:
+    """State of a run at t = 0 from block coordinates."""
+    x = np.concatenate((z, np.zeros(2 + 2 * stops)))
+    return State(
+        np.array([0.0, np.inf, np.inf, -1.0]),
+        x,
+        np.zeros_like(x),
+        np.zeros(stops, dtype=np.int64),
+        np.ones(stops),
+        np.zeros((stops, 7)),
+        np.zeros(7, dtype=np.int64),
+    )
+
+
+def problem_of(system: System, forcing: Forcing) -> Problem:
+    """Arrays the kernels read."""
+    blocks, contacts = system.blocks, system.contacts
+    n, m = system.size, len(contacts)
+    direction = np.array([c.direction for c in contacts]).reshape(m, n)
+    vectors = np.array([vector for vector, _ in system.loads]).reshape(len(system.loads), n)
+    inverse_mass = blocks.inverse[:, n:] @ np.linalg.inv(system.M)
+    read = -direction @ blocks.T[:n]
+    parameters = [np.asarray(c.law.parameters, dtype=float) for c in contacts]
+    width = max([p.size for p in parameters], default=1)
+    most = max([len(c.law.knots) for c in contacts], default=0) + 1
+    levels = np.full((m, most + 1), math.inf)
+    for i, contact in enumerate(contacts):
+        levels[i, : len(contact.law.knots) + 1] = (0.0, *contact.law.knots)
+    return Problem(
+        k=blocks.k,
+        c=blocks.c,
+        loss=np.ascontiguousarray(blocks.loss),
+        push=np.ascontiguousarray((inverse_mass @ direction.T).T),
+        read=np.ascontiguousarray(read),
+        read_rate=rate_rows(read, blocks.k, blocks.c),
+        levels=levels,
+        gap=np.array([c.gap for c in contacts], dtype=float),
+        law=np.array([c.law.address for c in contacts], dtype=np.int64),
+        parameters=np.array([np.pad(p, (0, width - p.size)) for p in parameters]).reshape(m, width),
+        floor=np.array([c.law.entry_rate_floor for c in contacts], dtype=float),
+        load=np.ascontiguousarray((inverse_mass @ vectors.T).T),
+        power=np.ascontiguousarray(vectors @ blocks.T[n:]),
+        tone_omega=forcing.tone_omega,
+        tone_amplitude=forcing.tone_amplitude,
+        tone_load=forcing.tone_load,
+        table=forcing.table,
+        table_dt=forcing.table_dt,
+        table_start=forcing.table_start,
+        table_load=forcing.table_load,
+    )
+
+
+def rate_rows(read: Array, k: Array, c: Array) -> Array:
+    """Rows of δ̇ from rows of δ: r A with A = [[0, 1], [-k, -c]] per block."""
+    p, v = np.split(read, 2, axis=1)
+    return np.ascontiguousarray(np.concatenate((-v * k, p - v * c), axis=1))

@@ -1,0 +1,335 @@
+r"""Everything the exponential integrator knows before it starts: propagators and force responses per step size.
+
+A block p'' + c p' + k p = 0 moves by E(x) = exp(A x) = α I + β A with A = [[0, 1], [-k, -c]], A² = -k I - c A, so two
+numbers (α, β) are a propagator and products stay of this form. Flight steps are h_l = h_0 2^{-l/4}; contact steps
+are every second of them.
+
+On a contact step a force is known by its values F_j at S nodes σ_j of (0, 1), t = h σ^κ:
+
+    F(t) = w(σ) Σ_j L_j(σ) F_j / w(σ_j),
+
+*smooth*: κ = 1, w = 1, Gauss–Legendre nodes; *entry*: κ = 2, w = σ^{2p}, Gauss–Jacobi nodes for the weight σ^{2p+1},
+because a power law of exponent p entered at t = 0 is F = t^p × (a smooth function of √t). Responses of a block
+to such a force, ∫ E(t_i - τ) F(τ) dτ, are computed by composite Gauss quadrature fine enough for the fastest block.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from solvers.kernels import Problem, kernel
+
+S = 8  # nodes of a contact step: 6 is a little faster at 1e-6, 10 and 12 bring nothing
+TAYLOR_REACH = 0.02  # |λ| x up to which a Taylor step of order 6 is exact to rounding
+_PANEL = 6.0  # radians of the fastest oscillation per quadrature panel of 12 points
+_CONTACT_REACH = 1e-6  # smallest contact step in units of 1/|λ|, and not above
+_SHORT = 1e-9  # s: a stop may be far stiffer than the structure
+_MOST_RADIANS = 2000.0  # largest contact step in the same units
+
+
+class Tables(NamedTuple):
+    """Numbers per step size; l counts flight steps, j contact steps."""
+
+    h: Any  # (l,)
+    propagator: Any  # (l, 2, N): α, β of every block
+    signal: Any  # (l, L, 6, 2N): state change by a signal t^k/k!
+    cell: Any  # (2, N) propagator of a whole cell of the sampled signals
+    cell_signal: Any  # (L, 6, 2N)
+    weight: Any  # (m, N): |δ̈| <= Σ weight × energy norm
+    reach: Any  # (m, N): |δ̇| <= Σ reach × energy norm
+    direct: Any  # (m, L): δ̈ per unit of a signal
+    load_norm: Any  # (L, N): energy norm of a load per block
+    fastest: float  # |λ|max
+    mobility: Any  # (m, m): δ̈ of stop s per newton at stop u, positive where the force opens the contact
+    exponent: Any  # (m,) leading exponents p
+    step: Any  # (j,) contact steps
+    step_propagator: Any  # (j, 2, N)
+    nodes: Any  # (f, S) σ
+    times: Any  # (f, S) σ^κ
+    weights: Any  # (f, S): ∫F dt = h Σ weights F
+    spectrum: Any  # (f, 4, S): last four Jacobi coefficients of the force from its node values
+    legendre: Any  # (S, S): all Legendre coefficients from smooth nodes
+    free: Any  # (f, j, m, 2, S, 2N): δ and δ̇ at the nodes from the state
+    forced: Any  # (f, j, m, m + L, 2, S, S): the same from the forces and signals at the nodes
+    kick: Any  # (f, j, m + L, S, 2N): state change at the end
+    alias: Any  # (f, j, N): interpolation error of a block's oscillation on the nodes
+    extend: Any  # (f, 5, S, S): the force on the next smooth step, 2^{(i-2)/2} times shorter, by extrapolation
+
+
+@kernel
+def propagate(k, c, x):
+    """(α, β) of exp(A x), any damping: e^{-cx/2} [cos θ, sin θ / ω_d], its hyperbolic form, or their limit."""
+    half = 0.5 * c
+    discriminant = half * half - k
+    if discriminant < 0.0:
+        omega = math.sqrt(-discriminant)
+        decay = math.exp(-half * x)
+        beta = decay * math.sin(omega * x) / omega
+        return decay * math.cos(omega * x) + half * beta, beta
+    root = math.sqrt(discriminant)
+    slow = -k / (half + root) if half + root > 0.0 else 0.0
+    decay = math.exp(slow * x)
+    beta = decay * x if root * x < 1e-12 else -decay * math.expm1(-2.0 * root * x) / (2.0 * root)
+    return decay - slow * beta, beta
+
+
+@kernel
+def _lagrange(nodes, sigma, out):
+    """Lagrange polynomials of the nodes at σ."""
+    for j in range(nodes.size):
+        value = 1.0
+        for i in range(nodes.size):
+            if i != j:
+                value *= (sigma - nodes[i]) / (nodes[j] - nodes[i])
+        out[j] = value
+
+
+@kernel
+def _block_response(k, c, h, rate, power, exponent, nodes, gauss, out, basis):
+    """out[i, j] = (α, β) of ∫_0^{t_i} E(t_i - τ) w(σ) L_j(σ)/w(σ_j) dτ; i = S is the end of the step."""
+    count = nodes.size
+    for i in range(count + 1):
+        a = nodes[i - 1] if i > 0 else 0.0
+        b = nodes[i] if i < count else 1.0
+        ta, tb = h * a**power, h * b**power
+        ea, eb = propagate(k, c, tb - ta)
+        for j in range(count):  # carry the integral so far to the new node
+            alpha = out[i - 1, j, 0] if i > 0 else 0.0
+            beta = out[i - 1, j, 1] if i > 0 else 0.0
+            out[i, j, 0] = ea * alpha - k * eb * beta
+            out[i, j, 1] = ea * beta + eb * alpha - c * eb * beta
+        panels = 1 + int(rate * (tb - ta) / _PANEL)
+        for panel in range(panels):
+            left = a + (b - a) * panel / panels
+            width = (b - a) / panels
+            for g in range(gauss.shape[1]):
+                sigma = left + width * gauss[0, g]
+                t = h * sigma**power
+                measure = width * gauss[1, g] * h * power * sigma ** (power - 1.0)
+                alpha, beta = propagate(k, c, tb - t)
+                _lagrange(nodes, sigma, basis)
+                for j in range(count):
+                    part = measure * basis[j]
+                    if exponent > 0.0:
+                        part *= (sigma / nodes[j]) ** (2.0 * exponent)
+                    out[i, j, 0] += alpha * part
+                    out[i, j, 1] += beta * part
+
+
+@kernel
+def _fill_level(
+    problem, h, family, level, entering, power, exponent, nodes, gauss, inputs, free, forced, kick, work, basis
+):
+    """All tables of one family and contact level."""
+    count, size, stops = nodes.size, problem.k.size, problem.gap.size
+    for b in range(size):
+        k, c = problem.k[b], problem.c[b]
+        rate = math.sqrt(k) + c
+        for i in range(count):
+            alpha, beta = propagate(k, c, h * nodes[i] ** power)
+            for s in range(stops):
+                for d in range(2):
+                    r = problem.read[s] if d == 0 else problem.read_rate[s]
+                    free[family, level, s, d, i, b] = r[b] * alpha - r[size + b] * k * beta
+                    free[family, level, s, d, i, size + b] = r[b] * beta + r[size + b] * (alpha - c * beta)
+        for weighted in range(2):
+            if weighted == 1 and exponent == 0.0:
+                continue
+            _block_response(k, c, h, rate, power, exponent * weighted, nodes, gauss, work, basis)
+            for u in range(inputs.shape[0]):
+                if (u == entering and exponent > 0.0) != (weighted == 1):
+                    continue
+                bp, bv = inputs[u, b], inputs[u, size + b]
+                if bp == 0.0 and bv == 0.0:
+                    continue
+                for j in range(count):
+                    for i in range(count + 1):
+                        alpha, beta = work[i, j, 0], work[i, j, 1]
+                        p = alpha * bp + beta * bv
+                        v = -k * beta * bp + (alpha - c * beta) * bv
+                        if i == count:
+                            kick[family, level, u, j, b] = p
+                            kick[family, level, u, j, size + b] = v
+                            continue
+                        for s in range(stops):
+                            forced[family, level, s, u, 0, i, j] += (
+                                problem.read[s, b] * p + problem.read[s, size + b] * v
+                            )
+                            forced[family, level, s, u, 1, i, j] += (
+                                problem.read_rate[s, b] * p + problem.read_rate[s, size + b] * v
+                            )
+
+
+def build(problem: Problem, exponents: list[float], jumps: list[bool], dt_cell: float) -> Tables:
+    """Tables of a problem whose tones are already among its blocks."""
+    stops, loads, size = len(problem.gap), len(problem.load), len(problem.k)
+    omega = np.sqrt(problem.k)
+    fastest = float(max((omega + problem.c).max(), 1e-3))
+    moving = np.concatenate((omega[omega > 0], problem.c[problem.c > 0]))
+    longest = 4.0 * math.pi / (moving.min() if moving.size else fastest)
+    levels = 2 + math.ceil(4.0 * math.log2(longest * fastest / TAYLOR_REACH))
+    h = longest * 2.0 ** (-0.25 * np.arange(levels))
+    first = int(np.searchsorted(-h, -_MOST_RADIANS / fastest))
+    bottom = math.ceil(4.0 * math.log2(longest / min(_CONTACT_REACH / fastest, _SHORT)))
+    contact_h = longest * 2.0 ** (-0.25 * np.arange(first, bottom + 2, 2))
+    families = [_family(1.0, 0.0)]
+    for p, jump in zip(exponents, jumps, strict=True):
+        entry = p if not jump and p % 1.0 else 0.0
+        families.append(_family(2.0 if entry else 1.0, entry))
+    inputs = np.ascontiguousarray(np.concatenate((problem.push, problem.load)).reshape(stops + loads, 2 * size))
+    free, forced, kick = _responses(problem, contact_h, families, inputs)
+    damping = problem.c
+    return Tables(
+        h=h,
+        propagator=_propagators(problem, h),
+        signal=_signals(problem, h),
+        cell=_propagators(problem, np.array([dt_cell]))[0],
+        cell_signal=_signals(problem, np.array([dt_cell]))[0],
+        weight=np.abs(problem.read[:, :size]) * (omega + damping)
+        + np.abs(problem.read[:, size:]) * (problem.k + damping * (omega + damping)),
+        reach=np.abs(problem.read[:, :size]) + np.abs(problem.read[:, size:]) * (omega + damping),
+        direct=problem.read_rate @ problem.load.T,
+        load_norm=np.sqrt(problem.load[:, size:] ** 2 + problem.k * problem.load[:, :size] ** 2),
+        fastest=fastest,
+        mobility=-problem.read_rate @ problem.push.T,
+        exponent=np.array(exponents, dtype=float),
+        step=contact_h,
+        step_propagator=_propagators(problem, contact_h),
+        nodes=np.array([f.nodes for f in families]),
+        times=np.array([f.nodes**f.power for f in families]),
+        weights=np.array([f.weights for f in families]),
+        spectrum=np.ascontiguousarray([f.spectrum[-4:] for f in families]),
+        legendre=np.ascontiguousarray(families[0].spectrum),
+        free=free,
+        forced=forced,
+        kick=kick,
+        alias=_aliasing(contact_h, omega, families),
+        extend=np.ascontiguousarray([_extensions(f, families[0]) for f in families]),
+    )
+
+
+def _propagators(problem: Problem, h: Any) -> Any:
+    """(len(h), 2, N): α, β of every block."""
+    blocks = list(zip(problem.k, problem.c, strict=True))
+    both = np.array([[propagate(k, c, x) for k, c in blocks] for x in h])
+    return np.ascontiguousarray(both.transpose(0, 2, 1))
+
+
+class _Family(NamedTuple):
+    """Nodes of a kind of contact step, t = h σ^power, F = σ^{2 exponent} × polynomial."""
+
+    power: float
+    exponent: float
+    nodes: Any
+    weights: Any
+    spectrum: Any
+
+
+def _family(power: float, exponent: float) -> _Family:
+    """Gauss–Jacobi nodes on (0, 1) for the weight of ∫F dt, and the coefficients they give."""
+    from scipy.special import eval_jacobi, roots_jacobi
+
+    beta = 2.0 * exponent + power - 1.0
+    x, w = roots_jacobi(S, 0.0, beta)
+    sigma = 0.5 * (1.0 + x)
+    measure = power * w / 2.0 ** (beta + 1.0)
+    polynomials = np.array([eval_jacobi(k, 0.0, beta, x) for k in range(S)])
+    norm = (polynomials**2 * w).sum(axis=1)
+    scale = sigma ** (-2.0 * exponent)
+    return _Family(power, exponent, sigma, measure * scale, polynomials * w * scale / norm[:, None])
+
+
+def _responses(problem: Problem, h: Any, families: list[_Family], inputs: Any) -> tuple[Any, Any, Any]:
+    """free, forced and kick of all families and contact levels."""
+    stops, size, channels = len(problem.gap), len(problem.k), len(inputs)
+    free = np.zeros((len(families), h.size, stops, 2, S, 2 * size))
+    forced = np.zeros((len(families), h.size, stops, channels, 2, S, S))
+    kick = np.zeros((len(families), h.size, channels, S, 2 * size))
+    x, w = np.polynomial.legendre.leggauss(12)
+    gauss = np.array([0.5 * (1.0 + x), 0.5 * w])
+    work, basis = np.zeros((S + 1, S, 2)), np.zeros(S)
+    for f, family in enumerate(families):
+        if f > 0 and family.exponent == 0.0:  # an analytic entry is a smooth step
+            free[f], forced[f], kick[f] = free[0], forced[0], kick[0]
+            continue
+        for level in range(h.size):
+            _fill_level(
+                *(problem, h[level], f, level, f - 1, family.power, family.exponent, family.nodes, gauss, inputs),
+                *(free, forced, kick, work, basis),
+            )
+    return free, forced, kick
+
+
+def _signals(problem: Problem, h: Any) -> Any:
+    """State change (len(h), L, 6, 2N) by loads t^k/k!, k = 0..5: φ-functions by Taylor series and doubling."""
+    loads, size = len(problem.load), len(problem.k)
+    out = np.zeros((len(h), loads, 6, 2 * size))
+    if not np.any(problem.load):
+        return out
+    A = np.zeros((size, 2, 2))
+    A[:, 0, 1], A[:, 1, 0], A[:, 1, 1] = 1.0, -problem.k, -problem.c
+    vectors = problem.load.reshape(loads, 2, size).transpose(0, 2, 1)  # (L, N, 2)
+    phi = _phi(h[:, None, None, None] * A)
+    for k in range(6):
+        change = np.einsum("hnab,lnb->hlan", phi[k + 1], vectors) * (h ** (k + 1))[:, None, None, None]
+        out[:, :, k] = change.reshape(len(h), loads, 2 * size)
+    return out
+
+
+def _phi(Z: Any) -> list[Any]:
+    """φ_0(Z) ... φ_6(Z) of a stack of 2x2 matrices, φ_k(Z) = Σ_i Z^i/(i + k)!."""
+    halvings = max(0, math.ceil(math.log2(max(np.abs(Z).sum(axis=-1).max(), 1e-300))) + 1)
+    small = Z / 2.0**halvings
+    phi = []
+    for k in range(7):
+        term = np.broadcast_to(np.eye(2), Z.shape) / math.factorial(k)
+        total = term.copy()
+        for i in range(1, 20):
+            term = term @ small / (i + k)
+            total = total + term
+        phi.append(total)
+    for _ in range(halvings):
+        doubled = [phi[0] @ phi[0]]
+        for k in range(1, 7):
+            rest = sum(phi[j] / math.factorial(k - j) for j in range(1, k + 1))
+            doubled.append((phi[0] @ phi[k] + rest) / 2.0**k)
+        phi = doubled
+    return phi
+
+
+def _aliasing(h: Any, omega: Any, families: list[_Family]) -> Any:
+    """Largest error between nodes of the interpolant of e^{iωt}."""
+    out = np.zeros((len(families), h.size, omega.size))
+    check = (np.arange(24) + 0.5) / 24
+    for f, family in enumerate(families):
+        basis = _interpolation(family.nodes, check)
+        for level, x in enumerate(h):
+            phase = np.exp(1j * np.outer(family.nodes**family.power, omega * x))
+            exact = np.exp(1j * np.outer(check**family.power, omega * x))
+            out[f, level] = np.abs(basis @ phase - exact).max(axis=0)
+    return np.minimum(out, 2.0)
+
+
+def _interpolation(nodes: Any, points: Any) -> Any:
+    """Lagrange matrix (points, nodes)."""
+    out = np.empty((len(points), len(nodes)))
+    row = np.empty(len(nodes))
+    for i, x in enumerate(points):
+        _lagrange(nodes, float(x), row)
+        out[i] = row
+    return out
+
+
+def _extensions(family: _Family, smooth: _Family) -> Any:
+    """Extrapolation of a step's force to the nodes of the next smooth step, 2^{-(i-2)/2} times as long."""
+    out = np.empty((5, S, S))
+    for i in range(5):
+        times = 1.0 + 2.0 ** (-0.5 * (i - 2)) * smooth.nodes
+        sigma = times ** (1.0 / family.power)
+        out[i] = _interpolation(family.nodes, sigma)
+        if family.exponent:
+            out[i] *= np.outer(sigma ** (2.0 * family.exponent), family.nodes ** (-2.0 * family.exponent))
+    return out

@@ -1,0 +1,64 @@
+"""Who may import whom, and what a plain `import fembeam` loads."""
+
+import ast
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+HOME = Path(__file__).parent.parent
+OURS = {"contacts", "reduction", "solvers", "fembeam"}
+BASIC = {"numpy", "scipy"}
+COMPILED = BASIC | {"numba", "llvmlite"}  # llvmlite is numba's own back end
+MAY = {
+    "contacts": COMPILED,
+    "reduction": BASIC,
+    "solvers": COMPILED,
+    "fembeam": BASIC | {"contacts", "reduction", "solvers", "skfem", "meshio", "matplotlib", "tqdm"},
+}
+FILES = [path for package in sorted(OURS) for path in sorted((HOME / package).rglob("*.py"))]
+
+
+def imported(path):
+    """Top-level names of everything a file imports, wherever in it."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name.split(".")[0] for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield path.relative_to(HOME).parts[0] if node.level else node.module.split(".")[0]
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(HOME)))
+def test_arrows(path):
+    package = path.relative_to(HOME).parts[0]
+    foreign = set(imported(path)) - set(sys.stdlib_module_names) - {package}
+    assert foreign <= MAY[package]
+
+
+def python(code, cwd=None, **environment):
+    command, variables = [sys.executable, "-c", code], {**os.environ, **environment}
+    return subprocess.run(command, cwd=cwd, env=variables, capture_output=True, text=True, check=False)
+
+
+def test_the_import_is_light():
+    heavy = ["matplotlib", "skfem", "numba", "meshio"]
+    done = python(f"import sys, fembeam; print([name for name in {heavy} if name in sys.modules])")
+    assert done.stdout.strip() == "[]", done.stderr
+
+
+def test_every_public_name_exists():
+    done = python("import fembeam as fb; [getattr(fb, name) for name in fb.__all__]")
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("name", ["contacts", "reduction", "solvers"])
+def test_a_shadowed_package_is_named(tmp_path, name):
+    (tmp_path / f"{name}.py").write_text("")
+    paths = os.pathsep.join([str(tmp_path), str(HOME)])
+    done = python("import fembeam", cwd=tmp_path, PYTHONPATH=paths)
+    assert done.returncode == 1
+    last = done.stderr.strip().splitlines()[-1]
+    assert last.startswith(f"ImportError: fembeam needs its own package {name!r}")
+    assert f"{name}.py" in last

@@ -1,0 +1,407 @@
+"""The reduced model and its runs: hand-over, starts, histories, forces, files."""
+
+import math
+import os
+import pickle
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from problems import PAPER_OMEGA, TIP, paper_scene, two_sided_scene
+
+import fembeam as fb
+import solvers
+from contacts import Hertz, Hysteretic, KelvinVoigt
+from fembeam.run import written_whole
+
+PERIOD = 2 * math.pi / 195.0
+
+
+@pytest.fixture(scope="module")
+def model():
+    return paper_scene().reduce(2)
+
+
+@pytest.fixture(scope="module")
+def run(model):
+    return model.simulate(3 * PERIOD, PERIOD / 200)
+
+
+# --- model --------------------------------------------------------------------------------------------------------
+
+
+def test_paper_scene_has_its_frequencies():
+    np.testing.assert_allclose(paper_scene().reduce(3).omega, PAPER_OMEGA, rtol=1e-6)
+
+
+def test_system_is_the_modal_one(model):
+    system = model.system
+    np.testing.assert_array_equal(system.M, np.eye(2))
+    np.testing.assert_allclose(system.K, np.diag(model.omega**2), rtol=1e-15)
+    np.testing.assert_allclose(system.C, np.diag(2 * model.zeta * model.omega), rtol=1e-14, atol=1e-15)
+    np.testing.assert_array_equal(model.zeta, [0.02, 0.01])
+    np.testing.assert_array_equal(system.contacts[0].direction, model.phi(TIP))
+    vector, signal = system.loads[0]
+    np.testing.assert_array_equal(vector, -model.participation)
+    assert signal(0.013) == model.scene.base.derivative(2)(0.013)
+    assert model.phi(TIP)[0] > 0.0
+
+
+def test_stop_above_pushes_down():
+    system = two_sided_scene(gap=3e-4).reduce(2).system
+    np.testing.assert_array_equal(system.contacts[1].direction, -system.contacts[0].direction)
+    assert [contact.gap for contact in system.contacts] == [3e-4, 3e-4]
+
+
+def test_dashpots_couple_the_modes():
+    scene = replace(paper_scene(), dashpots=[fb.Dashpot(0.1, 2.0)])
+    bare, damped = paper_scene().reduce(2, elements=40), scene.reduce(2, elements=40)
+    phi = damped.phi(0.1)
+    np.testing.assert_allclose(damped.system.C - np.diag(np.diag(bare.system.C)), 2.0 * np.outer(phi, phi), rtol=1e-5)
+
+
+def test_chosen_modes_keep_their_own_damping():
+    chosen = paper_scene(zeta=(0.02, 0.01, 0.03)).reduce([0, 2])
+    np.testing.assert_allclose(chosen.omega, [PAPER_OMEGA[0], PAPER_OMEGA[2]], rtol=1e-6)
+    np.testing.assert_array_equal(chosen.zeta, [0.02, 0.03])
+
+
+def test_effective_mass_is_bounded_by_the_moving_mass():
+    model = paper_scene().reduce(6)
+    total = 8000.0 * 58.3e-6 * 0.2599 + 25.4e-3
+    assert 0.8 * total < model.effective_mass.sum() < total
+
+
+def test_static_point_force_bends_the_beam_by_its_flexibility():
+    # u(tip) = Σ φ_i²/ω_i² F; a slow overdamped settling reaches it
+    scene = replace(
+        paper_scene(zeta=(1.0, 1.0)), base=None, stops=[], forces=[fb.PointForce(TIP, fb.Harmonic(0.5, 0.0))]
+    )
+    model = scene.reduce(2)
+    run = model.simulate(0.5)
+    exact = 0.5 * np.sum(model.phi(TIP) ** 2 / model.omega**2)
+    assert run.displacement(TIP)[-1] == pytest.approx(exact, rel=1e-9)
+    assert exact == pytest.approx(0.5 * TIP**3 / (3 * 1.9e11 * 18.5e-12), rel=5e-3)
+
+
+def test_start_of_a_mode_shape_is_that_mode(model):
+    start = model.state(displacement=lambda z: 2e-3 * model.phi(z)[:, 1], velocity=lambda z: 0.3 * model.phi(z)[:, 0])
+    np.testing.assert_allclose(start, [0.0, 2e-3, 0.3, 0.0], atol=3e-6 * 0.3)
+    assert not model.rest().any()
+    assert model.rest().shape == (4,)
+    np.testing.assert_array_equal(model.state(), model.rest())
+
+
+def test_start_field_must_be_finite(model):
+    with pytest.raises(ValueError, match=r"the field must be finite on the beam"):
+        model.state(displacement=lambda z: np.full_like(z, np.nan))
+
+
+def test_start_of_wrong_length_is_refused(model):
+    for start in (np.zeros(2), np.zeros((2, 2)), np.zeros(5)):
+        with pytest.raises(ValueError, match=r"start must have shape \(4,\), \[q, q_dot\]"):
+            model.simulate(0.1, start=start)
+    with pytest.raises(ValueError, match=r"q0 must be finite, got nan at coordinate 1"):
+        model.simulate(0.1, start=[0.0, math.nan, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("duration", [0.0, -1.0, math.nan, math.inf])
+def test_duration_must_be_positive(model, duration):
+    with pytest.raises(ValueError, match=r"duration must be positive and finite"):
+        model.simulate(duration)
+
+
+def test_dt_must_be_positive(model):
+    with pytest.raises(ValueError, match=r"dt must be positive and finite"):
+        model.simulate(0.1, dt=-1e-3)
+
+
+def test_place_off_the_beam_is_refused(model, run):
+    for z in (-1e-3, 0.26, math.nan):
+        with pytest.raises(ValueError, match=r"z must lie on the beam, 0 to 0.2599 m"):
+            model.phi(z)
+        with pytest.raises(ValueError, match=r"z must lie on the beam"):
+            run.displacement([0.1, z])
+
+
+# --- run ----------------------------------------------------------------------------------------------------------
+
+
+def test_run_is_the_systems_solution(model, run):
+    solution = solvers.integrate(model.system, np.zeros(2), np.zeros(2), 3 * PERIOD, PERIOD / 200)
+    np.testing.assert_array_equal(run.t, solution.t)
+    np.testing.assert_allclose(run.q, solution.q, atol=1e-6 * np.abs(solution.q).max())
+    assert len(run.contacts) == len(solution.contacts) == 4
+    assert run.status == "finished"
+    assert run.complete
+
+
+def test_explicit_solver_is_used(model):
+    run = model.simulate(PERIOD, PERIOD / 10, solver=solvers.HenonRK2(1e-5, 1e-6))
+    assert run.cost.steps >= PERIOD / 1e-5
+    assert run.cost.rejections == 0
+
+
+def test_start_is_used_and_kept(model):
+    start = np.array([1e-5, 2e-6, 0.01, 0.02])
+    kept = start.copy()
+    run = model.simulate(0.01, 0.005, start=start)
+    np.testing.assert_array_equal(start, kept)
+    np.testing.assert_allclose(np.concatenate([run.q[0], run.q_dot[0]]), start, rtol=1e-15)
+
+
+def test_displacement_is_the_modal_sum(model, run):
+    u, v = run.displacement([0.1, TIP]), run.velocity(0.1)
+    assert u.shape == (len(run.t), 2)
+    assert v.shape == run.t.shape
+    np.testing.assert_allclose(u[:, 0], run.q @ model.phi(0.1), rtol=1e-13)
+    np.testing.assert_allclose(u[:, 1], run.displacement(TIP), rtol=1e-13)
+    np.testing.assert_allclose(v, run.q_dot @ model.phi(0.1), rtol=1e-13)
+    np.testing.assert_array_equal(run.displacement(0.0), 0.0)
+
+
+def test_indentation_follows_the_side_and_the_gap():
+    scene = two_sided_scene(gap=2e-4)
+    run = scene.reduce(2).simulate(PERIOD, PERIOD / 100)
+    u = run.displacement(TIP)
+    np.testing.assert_allclose(run.indentation(0), -u - 2e-4, rtol=1e-12)
+    np.testing.assert_allclose(run.indentation(1), u - 2e-4, rtol=1e-12)
+    np.testing.assert_array_equal(run.indentation(-1), run.indentation(1))
+    for stop in (2, -3):
+        with pytest.raises(ValueError, match=r"stop must be below 2, the number of stops"):
+            run.indentation(stop)
+        with pytest.raises(ValueError, match=r"stop must be below 2, the number of stops"):
+            run.force(stop)
+
+
+@pytest.mark.parametrize("law", [Hysteretic(2.1e8, 0.9), KelvinVoigt(1e5, 5.0), Hertz(2.1e8)], ids=repr)
+def test_force_is_the_law_with_the_latched_entry_rate(law):
+    run = paper_scene(law=law).reduce(2).simulate(3 * PERIOD, PERIOD / 2000)
+    log, delta, rate, force = run.contacts, run.indentation(), -run.velocity(TIP), run.force()
+    assert len(log) >= 3
+    expected = np.zeros_like(run.t)
+    for t_in, t_out, speed in zip(log.t_in, log.t_out, log.speed_in, strict=True):
+        during = (run.t > t_in) & (run.t < t_out)
+        assert during.sum() > 20
+        expected[during] = law.force(delta[during], rate[during], speed)
+    np.testing.assert_allclose(force, expected, rtol=1e-12, atol=1e-9)
+    # and its time integral is the logged impulse
+    impulse = np.sum(force) * PERIOD / 2000
+    assert impulse == pytest.approx(log.impulse.sum(), rel=2e-3)
+    assert force.max() <= log.peak_force.max() * (1 + 1e-9)
+
+
+def test_force_uses_the_floor_of_slow_entries():
+    law = Hysteretic(2.1e8, 0.9, entry_rate_floor=10.0)
+    run = paper_scene(law=law).reduce(2).simulate(PERIOD, PERIOD / 2000)
+    assert run.contacts.floored.all()
+    during = run.indentation() > 0.0
+    expected = law.force(run.indentation()[during], -run.velocity(TIP)[during], 10.0)
+    np.testing.assert_allclose(run.force()[during], expected, rtol=1e-13)
+
+
+def test_run_without_stops_has_no_forces():
+    run = replace(paper_scene(), stops=[]).reduce(2).simulate(PERIOD, PERIOD / 10)
+    assert len(run.contacts) == 0
+    with pytest.raises(ValueError, match=r"stop must be below 0, the number of stops"):
+        run.force()
+
+
+def test_energy_balance_of_a_run(run):
+    energy = run.energy
+    assert energy.initial == 0.0
+    np.testing.assert_allclose(
+        energy.stored + energy.damping + energy.contact, energy.input, atol=1e-7 * energy.stored.max()
+    )
+
+
+def test_noise_gets_a_period_for_the_run():
+    base = fb.BandNoise(std=1e-3, band=(0.0, 1226.6), seed=3)
+    run = paper_scene(base=base).reduce(2).simulate(0.5, 1e-2)
+    again = paper_scene(base=base).reduce(2).simulate(0.5, 1e-2)
+    assert len(run.contacts) > 3
+    np.testing.assert_array_equal(run.q, again.q)
+    other = paper_scene(base=replace(base, seed=4)).reduce(2).simulate(0.5, 1e-2)
+    assert not np.allclose(run.q[-1], other.q[-1])
+
+
+def test_record_shorter_than_the_run_is_refused():
+    t = np.linspace(0.0, 0.1, 501)
+    scene = paper_scene(base=fb.Record(t, 1e-3 * np.sin(195.0 * t)))
+    with pytest.raises(ValueError, match=r"0\.1.*0\.5"):
+        scene.reduce(2).simulate(0.5)
+    assert scene.reduce(2).simulate(0.09).complete
+
+
+def test_progress_bar_changes_nothing(model, run):
+    with_bar = model.simulate(3 * PERIOD, PERIOD / 200, progress=True)
+    np.testing.assert_array_equal(with_bar.q, run.q)
+
+
+def interrupted(model, monkeypatch):
+    """A run stopped by Ctrl-C at its third report."""
+    from contextlib import contextmanager
+
+    calls = []
+
+    def report(t):
+        calls.append(t)
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+
+    @contextmanager
+    def fake_bar(duration, wanted):
+        yield report
+
+    monkeypatch.setattr("fembeam.run.bar", fake_bar)
+    return model.simulate(1000.0, 1e-3, solver=solvers.HenonRK2(2e-5, 2e-6))
+
+
+def test_interrupted_run_is_marked_partial_and_can_be_saved(model, monkeypatch, tmp_path):
+    partial = interrupted(model, monkeypatch)
+    assert not partial.complete
+    assert partial.status.startswith("interrupted: partial result up to the time reached (t = ")
+    assert 0.1 < partial.t[-1] < 10.0
+    whole = model.simulate(partial.t[-1], 1e-3, solver=solvers.HenonRK2(2e-5, 2e-6))
+    np.testing.assert_allclose(partial.q[:50], whole.q[:50], rtol=1e-12, atol=1e-18)
+    again = fb.load(partial.save(tmp_path / "partial"))
+    assert again.status == partial.status
+    assert not again.complete
+
+
+def test_failing_run_raises_with_what_was_computed(model):
+    with pytest.raises(solvers.SolverError, match=r"the method is unstable at this step") as caught:
+        model.simulate(5.0, 1e-2, start=[0, 1e-9, 0, 0], solver=solvers.HenonRK2(5e-3, 5e-3))
+    assert np.all(np.isfinite(caught.value.solution.q))
+
+
+# --- files --------------------------------------------------------------------------------------------------------
+
+
+def test_saved_run_comes_back_exactly(run, tmp_path):
+    path = run.save(tmp_path / "first")
+    assert path == tmp_path / "first.npz"
+    again = fb.load(path)
+    for name in ("t", "q", "q_dot", "stops"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(run, name))
+    for name, column in run.contacts.arrays().items():
+        np.testing.assert_array_equal(again.contacts.arrays()[name], column)
+        assert again.contacts.arrays()[name].dtype == column.dtype
+    for field in fields(run.energy):
+        np.testing.assert_array_equal(getattr(again.energy, field.name), getattr(run.energy, field.name))
+    assert (again.status, again.scene, again.cost) == (run.status, run.scene, run.cost)
+    np.testing.assert_array_equal(again.displacement([0.1, TIP]), run.displacement([0.1, TIP]))
+    np.testing.assert_array_equal(again.velocity(0.2), run.velocity(0.2))
+    np.testing.assert_array_equal(again.indentation(), run.indentation())
+    np.testing.assert_array_equal(again.force(), run.force())
+    np.testing.assert_array_equal(again.energy.residual, run.energy.residual)
+
+
+def test_loaded_run_can_be_saved_again(run, tmp_path):
+    again = fb.load(fb.load(run.save(tmp_path / "a.npz")).save(tmp_path / "b.npz"))
+    np.testing.assert_array_equal(again.force(), run.force())
+    np.testing.assert_array_equal(again.q, run.q)
+
+
+def test_final_state_only_can_be_saved(model, tmp_path):
+    run = model.simulate(PERIOD)
+    again = fb.load(run.save(tmp_path / "final.npz"))
+    assert again.t.tolist() == [PERIOD]
+    np.testing.assert_array_equal(again.contacts.t_in, run.contacts.t_in)
+
+
+def test_open_contact_survives_the_file(model, tmp_path):
+    log = model.simulate(PERIOD).contacts
+    inside = 0.5 * (log.t_in[0] + log.t_out[0])
+    run = model.simulate(inside, inside / 20)
+    assert np.isnan(run.contacts.t_out).all()
+    assert run.force()[-1] > 0.0
+    again = fb.load(run.save(tmp_path / "open.npz"))
+    assert np.isnan(again.contacts.t_out).all()
+    assert again.force()[-1] == run.force()[-1]
+
+
+def test_missing_file_is_missing(tmp_path):
+    with pytest.raises(FileNotFoundError):
+        fb.load(tmp_path / "nowhere.npz")
+
+
+@pytest.mark.parametrize("damage", ["cut", "flip", "text", "empty"])
+def test_damaged_file_is_refused(run, tmp_path, damage):
+    path = run.save(tmp_path / "run.npz")
+    whole = path.read_bytes()
+    middle = len(whole) // 2
+    path.write_bytes(
+        {
+            "cut": whole[:middle],
+            "flip": whole[:middle] + bytes(255 - b for b in whole[middle : middle + 64]) + whole[middle + 64 :],
+            "text": b"hello",
+            "empty": b"",
+        }[damage]
+    )
+    with pytest.raises(ValueError, match=r"run.npz is not a saved run, or is damaged"):
+        fb.load(path)
+
+
+def test_archive_of_something_else_is_refused(tmp_path):
+    np.savez(tmp_path / "other.npz", x=np.arange(3))
+    with pytest.raises(ValueError, match=r"other.npz is not a saved run"):
+        fb.load(tmp_path / "other.npz")
+
+
+@pytest.mark.parametrize("about", ['{"format": 1}', "{}", "[1]"])
+def test_archive_without_its_arrays_is_refused(tmp_path, about):
+    np.savez(tmp_path / "hollow.npz", about=about)
+    with pytest.raises(ValueError, match=r"hollow.npz is not a saved run"):
+        fb.load(tmp_path / "hollow.npz")
+
+
+def test_other_format_is_refused(run, tmp_path):
+    np.savez(tmp_path / "new.npz", about='{"format": 99}')
+    with pytest.raises(ValueError, match=r"has format 99, this version reads 1"):
+        fb.load(tmp_path / "new.npz")
+
+
+def test_failing_write_leaves_nothing_behind(run, tmp_path, monkeypatch):
+    def full_disk(file, **arrays):
+        file.write(b"half of it")
+        raise OSError("no space left on device")
+
+    monkeypatch.setattr(np, "savez", full_disk)
+    with pytest.raises(OSError, match=r"no space left"):
+        run.save(tmp_path / "run.npz")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_failing_write_keeps_the_old_file(run, tmp_path):
+    target = tmp_path / "run.npz"
+    target.write_bytes(b"old")
+
+    def write_half():
+        with written_whole(target) as file:
+            file.write(b"new")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_half()
+    assert target.read_bytes() == b"old"
+    assert os.listdir(tmp_path) == ["run.npz"]
+    with written_whole(target) as file:
+        file.write(b"new")
+    assert target.read_bytes() == b"new"
+
+
+def test_saved_file_has_the_usual_permissions(run, tmp_path):
+    plain = tmp_path / "plain"
+    plain.write_bytes(b"")
+    assert run.save(tmp_path / "run").stat().st_mode == plain.stat().st_mode
+
+
+def test_folder_that_does_not_exist_is_an_error(run, tmp_path):
+    with pytest.raises(FileNotFoundError):
+        run.save(tmp_path / "no" / "run.npz")
+
+
+def test_model_survives_pickling(model):
+    again = pickle.loads(pickle.dumps(model))
+    np.testing.assert_array_equal(again.simulate(PERIOD).q, model.simulate(PERIOD).q)

@@ -1,0 +1,87 @@
+"""Figures: what they show, without a display."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import fembeam as fb
+from contacts import Hertz
+from fembeam import plot, report
+
+
+@pytest.fixture(scope="module")
+def run():
+    steel = fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)
+    scene = fb.Scene(
+        beam=fb.Beam(0.2599, steel),
+        supports=[fb.Clamped(0.0)],
+        stops=[fb.Stop(0.24445, law=Hertz(2.1e8)), fb.Stop(0.2, law=Hertz(2.1e8), gap=1e-3, side="above")],
+        damping=fb.ModalDamping(0.02),
+        base=fb.BandNoise(2e-4, (0.0, 1226.6), seed=3),
+    )
+    return scene.reduce(2).simulate(2.0, 1e-3)
+
+
+def texts(figure):
+    return " ".join(text.get_text() for text in figure.findobj(lambda artist: hasattr(artist, "get_text")))
+
+
+def test_every_figure_draws_with_units(run):
+    drawn = report.figures(run, discard=0.5)
+    assert list(drawn) == ["time_history", "psd", "densities", "contacts", "modes"]
+    for draw, unit in zip(drawn.values(), ("mm", "rad", "mm", "m s⁻¹", "mm"), strict=True):
+        figure = draw()
+        figure.canvas.draw()
+        assert unit in texts(figure)
+        assert all(axis.get_xlabel() or axis.get_ylabel() for axis in figure.axes)
+
+
+def test_histories_are_those_of_the_run(run):
+    window = 1.0, 1.2
+    line = plot.time_history(run, window).axes[0].lines[0]
+    t, u = line.get_data()
+    assert window[0] - 2e-3 <= t[0] <= window[0]
+    assert np.interp(1.1, t, u) == pytest.approx(1e3 * run.displacement(0.2599)[1100], rel=1e-9)
+
+
+def test_peaks_of_two_tones():
+    t = 1e-3 * np.arange(60_000)
+    noise = 1e-3 * np.random.default_rng(0).standard_normal(t.size)
+    found = plot.peaks(fb.psd(np.sin(200 * t) + 0.1 * np.sin(780 * t) + noise, 1e-3, 4096), count=2)
+    assert found == pytest.approx([200.0, 780.0], abs=3.0)
+
+
+def test_a_partial_run_says_so(run):
+    partial = dataclasses.replace(run, status="interrupted: partial result")
+    assert "PARTIAL RESULT: interrupted" in texts(plot.densities(partial))
+    assert "PARTIAL" not in texts(plot.densities(run))
+
+
+def test_a_run_too_short_gets_the_figures_it_can(run):
+    short = run.model.simulate(2e-3, 1e-3)
+    drawn = report.figures(short)
+    assert list(drawn) == ["time_history", "modes"]
+    drawn["time_history"]()
+    with pytest.raises(ValueError, match="no finished contact"):
+        plot.contacts(short)
+    report.summary(run.model.simulate(1e-3, None))
+
+
+def test_a_loaded_run_draws_without_its_model(run, tmp_path):
+    loaded = fb.load(run.save(tmp_path / "run"))
+    for draw in report.figures(loaded).values():
+        draw()
+
+
+def test_the_users_settings_are_left_alone(run):
+    import matplotlib
+
+    before = dict(matplotlib.rcParams)
+    plot.mode_shapes(run.model)
+    assert dict(matplotlib.rcParams) == before
+
+
+def test_segments_resolve_two_rad_per_second_on_long_runs():
+    assert 2 * np.pi / (plot.segment_for(600_000, 1e-3) * 1e-3) <= 2.0
+    assert plot.segment_for(800, 1e-3) == 100

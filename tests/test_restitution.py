@@ -1,0 +1,188 @@
+"""Restitution: the exact relation a (1 + r) = ln[(1 + a)/(1 - a r)], and free masses that obey it."""
+
+import math
+
+import numpy as np
+import pytest
+from problems import DampedHalfWave, HertzBounce, bounce
+
+from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, achieved_restitution, damping_factor_for
+
+FACTORS = [1e-6, 1e-3, 0.05, 0.5625, 1.432750533, 5.0, 60.0]
+
+
+def relation(a, r):
+    """Residual of the exact relation."""
+    return a * (1.0 + r) - math.log1p(a) + math.log1p(-a * r)
+
+
+def test_published_values():
+    assert Hysteretic.lankarani_nikravesh(1e8, 0.5).damping_factor == 0.5625
+    assert achieved_restitution(0.5625) == pytest.approx(0.725241114010, abs=5e-13)
+    assert damping_factor_for(0.5) == pytest.approx(1.432750533, abs=5e-10)
+    assert Hysteretic.achieving(1e8, 0.5).damping_factor == damping_factor_for(0.5)
+
+
+@pytest.mark.parametrize("a", FACTORS)
+def test_achieved_restitution_satisfies_the_relation(a):
+    r = achieved_restitution(a)
+    assert 0.0 < r < 1.0
+    # rounding of the logarithms, seen through the relation's slope a - a/(1 - a r)
+    slope = abs(a - a / (1.0 - a * r)) if a * r < 1.0 else math.inf
+    assert abs(relation(a, r)) <= 1e-13 * max(slope, 1e-2) if math.isfinite(slope) else r == 1.0 / a
+
+
+def test_small_factors_follow_the_series():
+    # r = 1 - 2a/3 + 4a²/9 + O(a³)
+    for a in (1e-4, 1e-6, 1e-8):
+        assert achieved_restitution(a) == pytest.approx(1 - 2 * a / 3 + 4 * a**2 / 9, abs=a**3 + 2e-16)
+
+
+@pytest.mark.parametrize("r", [0.02, 0.1, 0.3, 0.5, 0.725, 0.9, 0.99, 0.999999])
+def test_the_two_functions_are_inverse(r):
+    assert achieved_restitution(damping_factor_for(r)) == pytest.approx(r, rel=1e-12)
+
+
+def test_elastic_limits():
+    assert achieved_restitution(0.0) == 1.0
+    assert damping_factor_for(1.0) == 0.0
+
+
+@pytest.mark.parametrize("bad", [0.0, -0.1, 1.0000001, math.nan, math.inf, "half"])
+def test_restitution_out_of_range_is_refused(bad):
+    with pytest.raises(ValueError, match=r"restitution must lie in \(0, 1\]"):
+        Hysteretic.achieving(1e8, bad)
+    if not isinstance(bad, str) and bad != 0.0:
+        with pytest.raises(ValueError, match=r"restitution of lankarani_nikravesh must lie in \[0, 1\]"):
+            Hysteretic.lankarani_nikravesh(1e8, bad)
+
+
+@pytest.mark.parametrize("bad", [-0.1, math.nan, math.inf])
+def test_damping_factor_out_of_range_is_refused(bad):
+    with pytest.raises(ValueError, match=r"damping_factor must be finite and >= 0"):
+        achieved_restitution(bad)
+
+
+# --- a free mass on each law --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("a", [0.05, 0.5625, 1.432750533, 5.0])
+@pytest.mark.parametrize(
+    ("mass", "speed", "stiffness", "exponent"),
+    [(1.0, 1.0, 2.1e8, 1.5), (0.03, 0.02, 2.1e8, 1.5), (40.0, 8.0, 1e6, 1.0), (2.0, 0.5, 1e9, 2.5)],
+)
+def test_free_mass_rebounds_by_the_relation(a, mass, speed, stiffness, exponent):
+    log = bounce(Hysteretic(stiffness, a, exponent), speed, mass, duration=100.0).contacts
+    assert len(log) == 1
+    assert log.speed_in[0] == pytest.approx(speed, rel=1e-15)
+    assert log.speed_out[0] / speed == pytest.approx(achieved_restitution(a), rel=1e-10)
+    assert abs(relation(a, log.speed_out[0] / speed)) < 1e-9
+
+
+@pytest.mark.parametrize("restitution", [0.1, 0.5, 0.9])
+def test_achieving_achieves(restitution):
+    log = bounce(Hysteretic.achieving(2.1e8, restitution), speed=0.7, duration=10.0).contacts
+    assert log.speed_out[0] / log.speed_in[0] == pytest.approx(restitution, rel=1e-10)
+
+
+def test_lankarani_nikravesh_does_not_achieve_its_nominal_value():
+    log = bounce(Hysteretic.lankarani_nikravesh(2.1e8, 0.5), duration=10.0).contacts
+    assert log.speed_out[0] == pytest.approx(0.725241114010, rel=1e-10)
+
+
+@pytest.mark.parametrize("speed", [0.01, 1.0, 7.0])
+@pytest.mark.parametrize("exponent", [1.0, 1.5, 2.0, 3.0])
+def test_elastic_power_law_bounce(speed, exponent):
+    exact = HertzBounce(stiffness=3e8, mass=2.5, speed=speed, exponent=exponent)
+    log = bounce(Hertz(3e8, exponent), speed, 2.5, duration=100.0).contacts
+    assert log.speed_out[0] == pytest.approx(speed, rel=1e-11)
+    assert log.t_out[0] - log.t_in[0] == pytest.approx(exact.duration, rel=1e-10)
+    assert log.peak_indentation[0] == pytest.approx(exact.peak_indentation, rel=1e-10)
+    assert log.peak_force[0] == pytest.approx(exact.peak_force, rel=1e-10)
+
+
+def test_hertz_closed_numbers():
+    K, m, v = 2.1e8, 0.037, 0.6
+    log = bounce(Hertz(K), v, m, duration=1.0).contacts
+    peak = (5 * m * v**2 / (4 * K)) ** 0.4
+    assert log.peak_indentation[0] == pytest.approx(peak, rel=1e-10)
+    assert (log.t_out[0] - log.t_in[0]) * v / peak == pytest.approx(2.943275184325, abs=2e-12)
+    assert log.peak_force[0] == pytest.approx(1.143262629818 * K**0.4 * (m * v**2) ** 0.6, rel=1e-10)
+
+
+@pytest.mark.parametrize("damping", [0.0, 20.0, 200.0, 1500.0])
+def test_kelvin_voigt_bounce_is_a_damped_half_wave(damping):
+    exact = DampedHalfWave(stiffness=1e6, damping=damping, mass=2.0, speed=1.3)
+    solution = bounce(KelvinVoigt(1e6, damping), 1.3, 2.0, duration=0.02)
+    log = solution.contacts
+    assert log.t_out[0] == pytest.approx(exact.exit_time, rel=1e-11)
+    assert log.speed_out[0] == pytest.approx(exact.exit_speed, rel=1e-11)
+    assert log.peak_indentation[0] == pytest.approx(exact.peak_indentation, rel=1e-11)
+    assert log.peak_force[0] >= damping * 1.3 * (1 - 1e-12)  # the dashpot's force at entry
+    assert solution.q[-1, 0] == pytest.approx(exact.exit_speed * (0.02 - exact.exit_time), rel=1e-10)
+
+
+def test_kelvin_voigt_pulls_before_it_lets_go_unless_clamped():
+    exact = DampedHalfWave(stiffness=1e6, damping=200.0, mass=2.0, speed=1.3)
+    free, clamped = (
+        bounce(KelvinVoigt(1e6, 200.0, clamp), 1.3, 2.0, duration=0.02).contacts for clamp in (False, True)
+    )
+    release = exact.release_time
+    assert release < exact.exit_time
+    # after the release nothing acts: the mass coasts out of the remaining indentation
+    speed = -exact.delta_dot(release)
+    assert clamped.speed_out[0] == pytest.approx(speed, rel=1e-10)
+    assert clamped.t_out[0] == pytest.approx(release + exact.delta(release) / speed, rel=1e-10)
+    assert clamped.speed_out[0] > free.speed_out[0] * 1.01
+    assert clamped.impulse[0] > free.impulse[0]
+
+
+def test_clamped_hysteretic_law_leaves_no_slower_than_one_over_a():
+    # without the clamp the stop pulls once delta_dot < -entry_rate/a, which a bounce from rest never reaches
+    plain, clamped = (bounce(Hysteretic(1e8, 3.0, clamp=c), duration=1.0).contacts for c in (False, True))
+    assert clamped.speed_out[0] == pytest.approx(plain.speed_out[0], rel=1e-10)
+    assert plain.speed_out[0] < 1.0 / 3.0
+
+
+def test_piecewise_linear_bounce_against_its_pieces():
+    k1, k2, knot, mass, speed = 1e5, 2e6, 1e-3, 3.0, 0.8
+    omega_1, omega_2 = math.sqrt(k1 / mass), math.sqrt(k2 / mass)
+    to_knot = math.asin(knot * omega_1 / speed) / omega_1
+    speed_at_knot = speed * math.cos(omega_1 * to_knot)
+    # beyond the knot: δ - knot = A cos(ω₂ t - ψ) - k1 knot/k2
+    shift = k1 * knot / k2
+    radius = math.hypot(shift, speed_at_knot / omega_2)
+    beyond = 2.0 * math.acos(shift / radius) / omega_2
+    log = bounce(PiecewiseLinear([k1, k2], [knot]), speed, mass, duration=0.1).contacts
+    assert log.t_out[0] == pytest.approx(2 * to_knot + beyond, rel=1e-11)
+    assert log.peak_indentation[0] == pytest.approx(knot + radius - shift, rel=1e-11)
+    assert log.peak_force[0] == pytest.approx(k2 * radius, rel=1e-11)
+    assert log.speed_out[0] == pytest.approx(speed, rel=1e-11)
+
+
+def test_bounce_that_turns_before_the_knot_sees_one_slope():
+    log = bounce(PiecewiseLinear([1e5, 2e6], [1e-2]), 0.8, 3.0, duration=0.1).contacts
+    assert log.t_out[0] == pytest.approx(math.pi / math.sqrt(1e5 / 3.0), rel=1e-12)
+
+
+LAWS = [
+    Hertz(2.1e8),
+    Hysteretic(2.1e8, 1.4),
+    KelvinVoigt(1e6, 150.0),
+    KelvinVoigt(1e6, 150.0, clamp=True),
+    PiecewiseLinear([1e5, 2e6], [1e-3]),
+]
+
+
+@pytest.mark.parametrize("one", LAWS, ids=repr)
+def test_ledger_of_a_bounce(one):
+    mass, speed = 1.7, 1.1
+    solution = bounce(one, speed, mass, duration=0.1)
+    log = solution.contacts
+    before, after = 0.5 * mass * speed**2, 0.5 * mass * log.speed_out[0] ** 2
+    assert log.energy_loss[0] == pytest.approx(before - after, abs=1e-12 * before)
+    assert log.impulse[0] == pytest.approx(mass * (speed + log.speed_out[0]), rel=1e-12)
+    assert solution.energy.contact[-1] == log.energy_loss[0]
+    assert solution.energy.input[-1] == solution.energy.damping[-1] == 0.0
+    assert abs(solution.energy.residual[-1]) < 1e-12 * before
+    assert np.isclose(solution.energy.stored[-1], after, rtol=1e-12)

@@ -1,0 +1,166 @@
+"""Scene files: what they make, and what they say when they are wrong."""
+
+from pathlib import Path
+
+import pytest
+
+import fembeam as fb
+import solvers
+from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear
+from fembeam import scene_file
+from fembeam.scene_file import SceneFileError
+
+EXAMPLE = (Path(__file__).parent.parent / "examples" / "beam_stop.toml").read_text(encoding="utf-8")
+SIMPLE = """
+[beam]
+length = 1.0
+section = { E = 2.1e11, rho = 7800, A = 1e-4, I = 1e-9 }
+[[supports]]
+kind = "clamped"
+z = 0
+"""
+
+
+def read(tmp_path, text):
+    path = tmp_path / "scene.toml"
+    path.write_text(text, encoding="utf-8")
+    return scene_file.read(path)
+
+
+def test_the_example_is_the_papers_scene(tmp_path):
+    file = read(tmp_path, EXAMPLE)
+    steel = fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)
+    expected = fb.Scene(
+        beam=fb.Beam(0.2599, steel),
+        supports=[fb.Clamped(0.0)],
+        masses=[fb.LumpedMass(0.24445, mass=25.4e-3, inertia=3.0e-6)],
+        stops=[fb.Stop(0.24445, law=Hysteretic.lankarani_nikravesh(2.1e8, restitution=0.5))],
+        damping=fb.ModalDamping([0.02, 0.01]),
+        base=fb.BandNoise(2.5e-4, (0.0, 1226.6), seed=1),
+    )
+    assert repr(file.scene) == repr(expected)
+    assert file.reduce == {"modes": 2}
+    assert file.studies["simulate"].solver is None
+
+
+@pytest.mark.parametrize(
+    ("text", "law"),
+    [
+        ('kind = "hertz", stiffness = 1e9', Hertz(1e9)),
+        ('kind = "hysteretic", stiffness = 1e9, damping_factor = 0.5', Hysteretic(1e9, 0.5)),
+        ('kind = "achieving", stiffness = 1e9, restitution = 0.5, clamp = true',
+         Hysteretic.achieving(1e9, 0.5, clamp=True)),
+        ('kind = "kelvin_voigt", stiffness = 1e6, damping = 10', KelvinVoigt(1e6, 10.0)),
+        ('kind = "piecewise_linear", slopes = [1e4, 1e6], knots = [1e-3]', PiecewiseLinear([1e4, 1e6], (1e-3,))),
+    ],
+)  # fmt: skip
+def test_laws(tmp_path, text, law):
+    file = read(tmp_path, SIMPLE + f'[[stops]]\nz = 0.5\ngap = 1e-3\nside = "above"\nlaw = {{ {text} }}')
+    assert file.scene.stops == (fb.Stop(0.5, law=law, gap=1e-3, side="above"),)
+
+
+def test_everything_that_hangs_on_a_beam(tmp_path):
+    scene = read(tmp_path, """
+[beam]
+spans = [
+  { length = 0.5, section = { shape = "rectangle", E = 2e11, rho = 7800, width = 0.02, height = 0.01 } },
+  { length = 0.3, section = { shape = "tube", E = 2e11, rho = 7800, outer = 0.02, inner = 0.01 } },
+]
+[[supports]]
+kind = "pinned"
+z = 0
+[[supports]]
+kind = "guided"
+z = 0.8
+[[springs]]
+z = 0.4
+stiffness = 100
+[[dashpots]]
+z = 0.4
+damping = 2
+[[forces]]
+z = 0.4
+signal = { kind = "multisine", amplitude = [1, 2], omega = [10, 20] }
+[damping]
+alpha = 1
+beta = 1e-5
+[reduce]
+modes = [0, 2]
+""").scene  # fmt: skip
+    assert scene.beam.borders == (0.0, 0.5, 0.8)
+    assert scene.supports == (fb.Pinned(0), fb.Guided(0.8))
+    assert scene.springs == (fb.Spring(0.4, 100.0),)
+    assert scene.dashpots == (fb.Dashpot(0.4, 2.0),)
+    assert scene.damping == fb.Rayleigh(1.0, 1e-5)
+    assert float(scene.forces[0].signal(0.0)) == 3.0
+
+
+def test_a_record_is_found_beside_the_scene(tmp_path):
+    rows = [f"{0.01 * i},{i % 5}" for i in range(100)]
+    (tmp_path / "motion.csv").write_text("\n".join(["t,a", *rows]))
+    text = '[base]\nkind = "record"\npath = "motion.csv"\nquantity = "acceleration"\nscale = 1e-3'
+    base = read(tmp_path, SIMPLE + text).scene.base
+    assert isinstance(base, fb.Record)
+    assert base.kind == "acceleration"
+    assert base.y.max() == pytest.approx(4e-3)
+
+
+def test_solvers_by_name(tmp_path):
+    simulate = "[simulate]\nduration = 1\ndt = 1e-3\nsolver = "
+    dopri = read(tmp_path, SIMPLE + simulate + '{ kind = "dormand_prince", rtol = 1e-6 }')
+    assert dopri.studies["simulate"].solver == solvers.DormandPrince(rtol=1e-6)
+    heun = read(tmp_path, SIMPLE + simulate + '{ kind = "henon_rk2", dt_flight = 1e-5, dt_contact = 1e-6 }')
+    assert heun.studies["simulate"].solver == solvers.HenonRK2(1e-5, 1e-6)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("mass = 25.4e-3", "mas = 1", r"\[\[masses\]\] number 1: unknown key 'mas'; did you mean 'mass'\?"),
+        ("mass = 25.4e-3", "", r"\[\[masses\]\] number 1: the key 'mass' is missing"),
+        ("mass = 25.4e-3", 'mass = "25"', r"\[\[masses\]\] number 1: mass must be a number, got '25'"),
+        ("mass = 25.4e-3", "mass = true", r"mass must be a number, got true"),
+        ("mass = 25.4e-3", "mass = nan", r"\[\[masses\]\] number 1: mass must be finite"),
+        ("stiffness =", "stifness =", r"\[\[stops\]\] number 1 law: unknown key 'stifness'; did you mean 'stiffness'"),
+        ('"lankarani_nikravesh"', '"hysteretc"', r"law: kind must be one of .*did you mean 'hysteretic'"),
+        ('"lankarani_nikravesh"', '["hertz"]', r"law: kind must be one of"),
+        (
+            'kind = "clamped"',
+            "",
+            r"\[\[supports\]\] number 1: kind must be one of clamped, pinned, guided; it is missing",
+        ),
+        ("[damping]", "[dampning]", r"unknown table 'dampning'; did you mean 'damping'"),
+        ("[[stops]]", "[stops]", r"write \[\[stops\]\]"),
+        ("[base]", "[[base]]", r"write \[base\], once"),
+        ("zeta = ", "alpha = 1\nzeta = ", r"\[damping\]: give either zeta, or alpha and beta"),
+        ("E = 1.9e11", "E = -1.9e11", r"\[beam\] section: E must be finite and positive"),
+        ("[0.0, 1226.6]", "[1226.6, 0.0]", r"\[base\]: BandNoise band must run from lo to hi"),
+        ("[0.0, 1226.6]", "[1226.6]", r"\[base\]: band must be a list of 2 numbers"),
+        ("modes = 2", "modes = true", r"\[reduce\]: modes must be a whole number or a list of whole numbers, got true"),
+        ("modes = 2", "mode = 2", r"\[reduce\]: unknown key 'mode'; did you mean 'modes'"),
+        ("dt = 1e-3", "dt = 0", r"\[simulate\]: dt must be finite and positive"),
+        ("discard = 5", "discard = 700", r"\[simulate\]: discard must be below the duration of 600 s"),
+        ("discard = 5", 'solver = { kind = "henon" }', r"\[simulate\] solver: kind must be one of .*henon_rk2"),
+        ("duration = 600", "duration = 600 s", r"not valid TOML: .*line \d+"),
+        ("z = 0.24445", "z = 0.3", r"z must lie on the beam.*LumpedMass"),
+        ("length = 0.2599", "length = 1" + 400 * "0", r"length must be a number"),
+        ("[beam]", "[beam]\nspans = 3\n#", r"spans must be a list|unknown key"),
+    ],
+)
+def test_mistakes_are_named(tmp_path, old, new, message):
+    assert old in EXAMPLE
+    with pytest.raises(SceneFileError, match=message) as caught:
+        read(tmp_path, EXAMPLE.replace(old, new, 1))
+    assert "scene.toml" in str(caught.value)
+
+
+def test_files_that_are_none(tmp_path):
+    with pytest.raises(SceneFileError, match="cannot be read"):
+        scene_file.read(tmp_path / "nothing.toml")
+    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(SceneFileError, match="UTF-8"):
+        scene_file.read(tmp_path / "binary.toml")
+    with pytest.raises(SceneFileError, match=r"needs a table \[beam\]"):
+        read(tmp_path, "")
+    with pytest.raises(SceneFileError, match=r"nothing\.csv"):
+        read(tmp_path, SIMPLE + '[base]\nkind = "record"\npath = "nothing.csv"')

@@ -1,0 +1,240 @@
+"""The hand-over: matrices, contacts and loads are checked, copied, and decoupled without loss."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from scipy import sparse
+from scipy.linalg import expm
+
+import solvers
+from contacts import Hertz
+from solvers import Contact, System
+from solvers.system import decouple
+
+LAW = Hertz(1e8)
+
+
+def state_matrix(M, C, K):
+    """A of x' = A x, x = [q, q_dot]."""
+    n = len(M)
+    return np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]])
+
+
+def block_matrix(blocks):
+    """The same in block coordinates."""
+    n = blocks.k.size
+    return np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(blocks.k), -np.diag(blocks.c)]])
+
+
+def check_decoupled(M, C, K, times=(0.0, 0.3, 1.7)):
+    """T and its inverse fit, and the blocks move as the system does."""
+    blocks = decouple(M, C, K)
+    n = len(M)
+    condition = np.linalg.cond(blocks.T)
+    np.testing.assert_allclose(blocks.T @ blocks.inverse, np.eye(2 * n), atol=1e-14 * n * condition)
+    A, B = state_matrix(M, C, K), block_matrix(blocks)
+    for t in times:
+        exact = expm(A * t)
+        bound = 1e-13 * n * condition * max(1.0, np.abs(exact).max()) * (1.0 + np.abs(A).max() * t)
+        np.testing.assert_allclose(blocks.T @ expm(B * t) @ blocks.inverse, exact, atol=bound)
+    return blocks
+
+
+def random_matrices(seed, n, coupled, floating, strength):
+    rng = np.random.default_rng(seed)
+
+    def definite(rank):
+        root = rng.normal(size=(n, rank))
+        return root @ root.T
+
+    M = definite(n) + 0.5 * np.eye(n)
+    K = 4.0 * definite(n - 1 if floating and n > 1 else n)
+    C = strength * (definite(max(1, n - 1)) if coupled else 0.3 * M + 0.1 * K)
+    return M, C, K
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    n=st.integers(1, 5),
+    coupled=st.booleans(),
+    floating=st.booleans(),
+    strength=st.sampled_from([1e-3, 0.1, 1.0, 5.0]),
+)
+@settings(max_examples=150, deadline=None, derandomize=True)
+def test_blocks_move_as_the_matrices_do(seed, n, coupled, floating, strength):
+    M, C, K = random_matrices(seed, n, coupled, floating, strength)
+    kept = [matrix.copy() for matrix in (M, C, K)]
+    try:
+        check_decoupled(M, C, K)
+    except ValueError as refusal:
+        assume("cannot be separated" not in str(refusal))
+        raise
+    for matrix, before in zip((M, C, K), kept, strict=True):
+        np.testing.assert_array_equal(matrix, before)
+
+
+@pytest.mark.parametrize("zeta", [0.0, 0.01, 0.999999, 1.0, 1.000001, 3.0])
+def test_a_mode_of_any_damping_is_one_block(zeta):
+    blocks = check_decoupled(np.eye(1), np.array([[2 * zeta * 3.0]]), np.array([[9.0]]))
+    assert blocks.k[0] == 9.0
+    assert blocks.c[0] == 6.0 * zeta
+
+
+def test_rigid_body_modes_become_exact_zeros():
+    K = 1e6 * np.array([[1.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+    blocks = check_decoupled(np.diag([1.0, 2.0, 3.0]), 1e-5 * K, K, times=(0.01,))
+    assert blocks.k[0] == 0.0
+    assert np.all(blocks.k[1:] > 1e5)
+
+
+def test_proportional_damping_needs_no_complex_modes():
+    M, K = np.diag([1.0, 2.0]), np.array([[3.0, -1.0], [-1.0, 1.0]])
+    blocks = decouple(M, 0.1 * M + 0.02 * K, K)
+    assert blocks.loss.size == 0
+    np.testing.assert_allclose(blocks.c, 0.1 + 0.02 * blocks.k, rtol=1e-13)
+    phi = blocks.T[:2, :2]
+    np.testing.assert_allclose(phi.T @ M @ phi, np.eye(2), atol=1e-14)
+
+
+def test_coupled_damping_power_is_that_of_the_matrix():
+    M, K = np.diag([1.0, 2.0, 0.5]), np.diag([5.0, 6.0, 7.0]) - 1.0
+    C = np.diag([0.0, 0.0, 0.4])
+    blocks = check_decoupled(M, C, K)
+    rng = np.random.default_rng(4)
+    q, q_dot = rng.normal(size=(2, 3))
+    z = blocks.to_blocks(q, q_dot)
+    assert z @ blocks.loss @ z == pytest.approx(q_dot @ C @ q_dot, rel=1e-12)
+    for got, put in zip(blocks.from_blocks(z), (q, q_dot), strict=True):
+        np.testing.assert_allclose(got, put, rtol=1e-12)
+
+
+def test_strongly_coupled_dashpot_gives_overdamped_pairs():
+    M, K = np.eye(2), np.array([[2.0, -1.0], [-1.0, 2.0]])
+    blocks = check_decoupled(M, np.diag([0.0, 30.0]), K)
+    assert np.any(blocks.c**2 > 4 * blocks.k)
+
+
+def test_several_rigid_body_modes_that_are_all_damped():
+    check_decoupled(np.eye(2), np.array([[2.0, 1.0], [1.0, 2.0]]), np.zeros((2, 2)))
+
+
+def test_rigid_body_modes_of_which_one_is_undamped():
+    # two free masses joined by a dashpot only: their common motion is neither held nor damped
+    check_decoupled(np.eye(2), np.array([[1.0, -1.0], [-1.0, 1.0]]), np.zeros((2, 2)))
+
+
+def test_energy_is_kinetic_plus_elastic():
+    M, K = np.diag([2.0, 3.0]), np.array([[3.0, -1.0], [-1.0, 1.0]])
+    system = System(M, np.zeros((2, 2)), K)
+    q, q_dot = np.array([[1.0, 2.0], [0.5, 0.0]]), np.array([[3.0, -1.0], [0.0, 0.0]])
+    exact = [0.5 * v @ M @ v + 0.5 * x @ K @ x for x, v in zip(q, q_dot, strict=True)]
+    np.testing.assert_allclose(system.energy(q, q_dot), exact, rtol=1e-14)
+
+
+def test_modal_system_is_its_matrices():
+    system = System.modal([2.0, 5.0], [0.1, 0.2])
+    np.testing.assert_array_equal(system.M, np.eye(2))
+    np.testing.assert_allclose(system.C, np.diag([0.4, 2.0]), rtol=1e-15)
+    np.testing.assert_array_equal(system.K, np.diag([4.0, 25.0]))
+    np.testing.assert_array_equal(System.modal([2.0, 5.0], 0.1).C, np.diag([0.4, 1.0]))
+
+
+def test_sparse_matrices_are_taken():
+    K = np.array([[2.0, -1.0], [-1.0, 2.0]])
+    system = System(sparse.eye(2), sparse.csr_matrix((2, 2)), sparse.csc_array(K))
+    np.testing.assert_array_equal(system.K, K)
+
+
+def test_system_keeps_its_own_copies():
+    M, direction, vector = np.eye(2), np.array([1.0, 0.0]), np.array([0.0, 1.0])
+    system = System(M, np.zeros((2, 2)), np.eye(2), [Contact(direction, LAW)], [(vector, np.cos)])
+    for array in (M, direction, vector):
+        array[:] = 7.0
+    np.testing.assert_array_equal(system.M, np.eye(2))
+    np.testing.assert_array_equal(system.contacts[0].direction, [1.0, 0.0])
+    np.testing.assert_array_equal(system.loads[0][0], [0.0, 1.0])
+    with pytest.raises(ValueError, match=r"read-only"):
+        system.M[0, 0] = 2.0
+
+
+ZERO = np.zeros((2, 2))
+
+
+@pytest.mark.parametrize(
+    ("matrices", "message"),
+    [
+        ((np.ones((2, 3)), ZERO, ZERO), r"M must be square, got shape \(2, 3\)"),
+        ((np.eye(2), ZERO, np.diag([1.0, math.nan])), "K must be finite, got nan at row 1, column 1"),
+        ((np.eye(2), np.diag([math.inf, 0.0]), ZERO), "C must be finite, got inf at row 0, column 0"),
+        ((np.eye(2), ZERO, np.array([[1.0, 0.5], [0.0, 1.0]])), "K must be symmetric; its largest asymmetry is 0.5"),
+        ((np.eye(2), np.array([[0.0, 1.0], [-1.0, 0.0]]), ZERO), "C must be symmetric"),
+        ((np.eye(2), ZERO, np.eye(3)), r"M, C, K must have one shape, got \(2, 2\), \(2, 2\), \(3, 3\)"),
+        ((np.eye(2)[0], ZERO, ZERO), r"M must be square, got shape \(1, 2\)"),
+    ],
+)
+def test_matrices_are_refused(matrices, message):
+    with pytest.raises(ValueError, match=message):
+        System(*matrices)
+
+
+@pytest.mark.parametrize(
+    "M", [np.diag([1.0, -1.0]), np.diag([1.0, 0.0]), -np.eye(2), np.array([[1.0, 2.0], [2.0, 1.0]])]
+)
+def test_indefinite_mass_is_refused_before_computing(M):
+    with pytest.raises(ValueError, match=r"M must be positive definite, its lowest eigenvalue is"):
+        solvers.integrate(System(M, ZERO, np.eye(2)), [0, 0], [0, 0], 1.0)
+
+
+def test_indefinite_mass_is_refused_when_the_system_is_made():
+    with pytest.raises(ValueError, match=r"M must be positive definite, its lowest eigenvalue is -1"):
+        System(np.diag([1.0, -1.0]), ZERO, np.eye(2))
+
+
+def test_modal_arguments_are_refused():
+    for omega in ([1.0, -2.0], [math.nan, 1.0], [math.inf]):
+        with pytest.raises(ValueError, match=r"omega must be finite and >= 0"):
+            System.modal(omega, 0.1)
+    for zeta in ([0.1, -0.1], math.nan):
+        with pytest.raises(ValueError, match=r"zeta must be finite and >= 0"):
+            System.modal([1.0, 2.0], zeta)
+
+
+@pytest.mark.parametrize("gap", [math.nan, math.inf, -math.inf])
+def test_gap_must_be_finite(gap):
+    with pytest.raises(ValueError, match=r"gap must be finite, got"):
+        Contact([1.0], LAW, gap)
+
+
+def test_a_bare_function_is_no_law():
+    with pytest.raises(TypeError, match=r"must be a contact law.*decorate the function with @law and call it"):
+        Contact([1.0], lambda delta, delta_dot, entry_rate: delta)
+    with pytest.raises(TypeError, match=r"must be a contact law, got 5; use one of contacts"):
+        Contact([1.0], 5)
+
+
+def test_a_class_of_laws_is_no_law():
+    with pytest.raises(TypeError, match=r"must be a contact law"):
+        Contact([1.0], Hertz)
+
+
+def test_contacts_and_loads_must_fit():
+    with pytest.raises(ValueError, match=r"direction of a Contact must be a finite vector"):
+        Contact([1.0, math.nan], LAW)
+    with pytest.raises(ValueError, match=r"direction of a Contact must be a finite vector"):
+        Contact(np.eye(2), LAW)
+    with pytest.raises(ValueError, match=r"contact 1 has a direction of 3, the system 2"):
+        System(np.eye(2), ZERO, ZERO, [Contact([1.0, 0.0], LAW), Contact([1.0, 0.0, 0.0], LAW)])
+    with pytest.raises(ValueError, match=r"load 0 needs a finite vector of 2"):
+        System(np.eye(2), ZERO, ZERO, loads=[([1.0], np.cos)])
+    with pytest.raises(ValueError, match=r"load 0 needs a finite vector of 2"):
+        System(np.eye(2), ZERO, ZERO, loads=[([1.0, math.inf], np.cos)])
+    with pytest.raises(TypeError, match=r"load 0 needs a signal t -> value, got 3.0"):
+        System(np.eye(2), ZERO, ZERO, loads=[([1.0, 0.0], 3.0)])
+
+
+def test_unknown_names_of_the_package_are_named_with_the_known_ones():
+    with pytest.raises(AttributeError, match=r"no attribute 'Exponentail'; it offers \[.*'DormandPrince'"):
+        _ = solvers.Exponentail
