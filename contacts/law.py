@@ -4,6 +4,7 @@ A law is a force ``F(delta, delta_dot, entry_rate; parameters)`` for ``delta > 0
 through the address of one compiled function with a declared C signature,
 
     void kernel(int64 n, double *delta, double *delta_dot, double entry_rate, double *parameters, double *force)
+    void gradient(..., double *parameters, double *by_delta, double *by_rate, double *by_entry_rate)
 
 so a new law never recompiles an integrator, and a batch of ``n`` values costs one call.
 """
@@ -55,9 +56,19 @@ class Law(ABC):
         """The compiled force (a numba ``cfunc``) with the module's C signature."""
 
     @property
+    @abstractmethod
+    def gradient(self) -> Any:
+        """The compiled derivatives of the force, likewise."""
+
+    @property
     def address(self) -> int:
         """Address of the compiled force."""
         return int(self.kernel.address)
+
+    @property
+    def gradient_address(self) -> int:
+        """Address of the compiled derivatives."""
+        return int(self.gradient.address)
 
     def force(self, delta: ArrayLike, delta_dot: ArrayLike = 0.0, entry_rate: ArrayLike = 1.0) -> NDArray[np.float64]:
         """Contact force in N, zero where ``delta <= 0``.
@@ -121,7 +132,12 @@ class CustomLaw(Law):
     @property
     def kernel(self) -> Any:
         """The function compiled once per process."""
-        return _compiled(self.function, len(self.values))
+        return _compiled(self.function, len(self.values))[0]
+
+    @property
+    def gradient(self) -> Any:
+        """Central differences of the function, compiled."""
+        return _compiled(self.function, len(self.values))[1]
 
     def __reduce__(self) -> tuple:
         """Pickle by the decorated function's name, so that laws travel to worker processes."""
@@ -231,13 +247,13 @@ def _check_force(made: CustomLaw) -> None:
 
 
 @lru_cache(maxsize=256)
-def _compiled(function: Callable[..., float], count: int) -> Any:
-    """Compile a scalar force into the batch kernel of the declared signature."""
+def _compiled(function: Callable[..., float], count: int) -> tuple[Any, Any]:
+    """Compile a scalar force into the batch kernels of the declared signatures."""
     from numba import carray, cfunc, njit
     from numba.core.errors import NumbaError
     from numba.np.unsafe.ndarray import to_fixed_tuple
 
-    from contacts.kernels import SIGNATURE
+    from contacts.kernels import GRADIENT, SIGNATURE
 
     scalar = njit(error_model="numpy")(function)
 
@@ -246,8 +262,20 @@ def _compiled(function: Callable[..., float], count: int) -> Any:
         for i in range(n):
             force[i] = scalar(delta[i], delta_dot[i], entry_rate, *values)
 
+    def differences(n, delta, delta_dot, entry_rate, parameters, by_delta, by_rate, by_entry):  # type: ignore[no-untyped-def]
+        values = to_fixed_tuple(carray(parameters, (count,)), count)
+        for i in range(n):
+            d, v, r = delta[i], delta_dot[i], entry_rate
+            h = 1e-5 * d + 1e-14  # relative to the cube root of rounding; below the surface the law is not asked
+            low = max(d - h, 0.0)
+            by_delta[i] = (scalar(d + h, v, r, *values) - scalar(low, v, r, *values)) / (d + h - low)
+            h = 1e-5 * max(abs(v), r)
+            by_rate[i] = (scalar(d, v + h, r, *values) - scalar(d, v - h, r, *values)) / (2.0 * h)
+            h = 1e-5 * r
+            by_entry[i] = (scalar(d, v, r + h, *values) - scalar(d, v, r - h, *values)) / (2.0 * h)
+
     try:
-        return cfunc(SIGNATURE)(batch)
+        return cfunc(SIGNATURE)(batch), cfunc(GRADIENT)(differences)
     except NumbaError as error:
         source = inspect.getsourcefile(function)
         raise TypeError(

@@ -83,6 +83,13 @@ class Hysteretic(Law):
 
         return power
 
+    @property
+    def gradient(self) -> Any:
+        """Its compiled derivatives."""
+        from contacts.kernels import power_gradient
+
+        return power_gradient
+
 
 @dataclass(frozen=True)
 class Hertz(Law):
@@ -140,6 +147,13 @@ class Hertz(Law):
 
         return power
 
+    @property
+    def gradient(self) -> Any:
+        """Its compiled derivatives."""
+        from contacts.kernels import power_gradient
+
+        return power_gradient
+
 
 @dataclass(frozen=True)
 class KelvinVoigt(Law):
@@ -181,6 +195,13 @@ class KelvinVoigt(Law):
         from contacts.kernels import power
 
         return power
+
+    @property
+    def gradient(self) -> Any:
+        """Its compiled derivatives."""
+        from contacts.kernels import power_gradient
+
+        return power_gradient
 
 
 @dataclass(frozen=True)
@@ -233,3 +254,10 @@ class PiecewiseLinear(Law):
         from contacts.kernels import piecewise
 
         return piecewise
+
+    @property
+    def gradient(self) -> Any:
+        """Its compiled derivatives."""
+        from contacts.kernels import piecewise_gradient
+
+        return piecewise_gradient

@@ -28,6 +28,8 @@ FREQUENCY_TOLERANCE = 1e-6  # relative, promised for each mode asked for
 ERROR_CONSTANT = 1 / 1440  # relative error of omega of a cubic Hermite mesh: (beta h)^4/1440
 WAVE_STEP = (0.65 * FREQUENCY_TOLERANCE / ERROR_CONSTANT) ** 0.25  # beta h = 0.175, a third below the promise
 DEFAULT_MODES = 10
+MOST_MODES = 300  # 5400 elements, about a minute; a slender beam has lost its meaning long before
+MOST_ELEMENTS = 10_000  # above it rounding of K hides the lowest frequencies
 SAME_PLACE = 1e-9  # of the length: features closer than this share a node
 SHORTEST = 1e-4  # of the length: rounding of K grows like (length/h)³, 2e-4 of the first omega² here
 
@@ -99,19 +101,36 @@ class Matrices:
 
 def assemble(scene: Scene, elements: int | None, modes: int | None, probes: Sequence[float]) -> Matrices:
     """Matrices of the scene; `Scene.matrices` explains the arguments."""
+    _check_counts(elements, modes)
+    borders = _borders(scene, probes)
+    if elements is None:
+        modes = DEFAULT_MODES if modes is None else int(modes)
+        _check_modes(modes)
+        return _on_nodes(scene, _resolving(scene, borders, modes), modes)
+    matrices = _on_nodes(scene, _spread(scene.beam, borders, elements), None)
+    if modes is not None:
+        size = matrices.M.shape[0]
+        require(modes <= size, f"modes must be at most {size} (free dofs)", modes, "Scene.matrices",
+                "ask for fewer modes or more elements")  # fmt: skip
+        _check_modes(modes)
+    return matrices
+
+
+def _check_counts(elements: int | None, modes: int | None) -> None:
+    """Raise ValueError unless both are counts, and the elements few enough to be right."""
     for name, number in (("elements", elements), ("modes", modes)):
         whole = isinstance(number, (int, np.integer)) and not isinstance(number, bool)
         require(number is None or (whole and number > 0), f"{name} must be a whole number above 0", number,
                 "Scene.matrices", "give a count, or None")  # fmt: skip
-    borders = _borders(scene, probes)
-    if elements is not None:
-        matrices = _on_nodes(scene, _spread(scene.beam, borders, elements), None)
-        size = matrices.M.shape[0]
-        require(modes is None or modes <= size, f"modes must be at most {size} (free dofs)", modes,
-                "Scene.matrices", "ask for fewer modes or more elements")  # fmt: skip
-        return matrices
-    modes = DEFAULT_MODES if modes is None else int(modes)
-    return _on_nodes(scene, _resolving(scene, borders, modes), modes)
+    few = elements is None or elements <= MOST_ELEMENTS
+    require(few, f"elements must be at most {MOST_ELEMENTS}, where rounding takes over", elements, "Scene.matrices",
+            "leave them out: as few as the modes need are made")  # fmt: skip
+
+
+def _check_modes(modes: int) -> None:
+    """Raise ValueError for more modes than are computed within a minute or so."""
+    require(modes <= MOST_MODES, f"modes must be at most {MOST_MODES}", modes, "Scene.matrices",
+            "keep the modes up to a few times the highest frequency of interest")  # fmt: skip
 
 
 def _borders(scene: Scene, probes: Sequence[float]) -> Vector:

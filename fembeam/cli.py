@@ -6,19 +6,18 @@ written), 2 bad input, 130 interrupted (what was computed is written and marked 
 
 from __future__ import annotations
 
-import argparse
+import math
 import sys
 import time
 import warnings
-from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from fembeam import __version__
+from fembeam import __version__  # nothing slow up here: Ctrl-C before `main` would print a traceback
 
 if TYPE_CHECKING:
+    import argparse
+    from collections.abc import Sequence
+
     from fembeam.model import Model
     from fembeam.run import Run
     from fembeam.scene_file import SceneFile
@@ -29,22 +28,25 @@ MODES_SHOWN = 10
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit code."""
-    arguments = _parser().parse_args(argv)
-    with warnings.catch_warnings():
-        warnings.simplefilter("default", UserWarning)
-        warnings.showwarning = _show_warning
-        try:
+    try:
+        arguments = _parser().parse_args(argv)
+        with warnings.catch_warnings():
+            warnings.simplefilter("default", UserWarning)
+            warnings.showwarning = _show_warning
             return int(arguments.command(arguments))
-        except (ValueError, TypeError, OSError) as error:
-            _say(f"error: {_one_line(error)}")
-            return BAD_INPUT
-        except KeyboardInterrupt:
-            _say("interrupted before there was anything to write")
-            return INTERRUPTED
+    except (ValueError, TypeError, OSError, ArithmeticError, MemoryError) as error:
+        _say(f"error: {_one_line(error)}")
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        _say("interrupted; files that were written are whole")
+        return INTERRUPTED
 
 
 def _parser() -> argparse.ArgumentParser:
     """Commands and options."""
+    import argparse
+    from pathlib import Path
+
     parser = argparse.ArgumentParser(prog="fembeam", description="Beams that meet stops: simulate a scene file.")
     parser.add_argument("--version", action="version", version=f"fembeam {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
@@ -89,7 +91,7 @@ def _reduced(file: SceneFile, **arguments: Any) -> Model:
     """The reduced model; what is wrong is said with the file."""
     try:
         return file.scene.reduce(**arguments)
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, RuntimeError) as error:  # RuntimeError: modes that cannot be computed
         raise ValueError(f"{file.path}: [reduce]: {error}") from error
 
 
@@ -127,7 +129,7 @@ def mode_table(model: Model) -> str:
         (
             f"{mode + 1}",
             f"{w:.6f}",
-            f"{w / (2 * np.pi):.6f}",
+            f"{w / (2 * math.pi):.6f}",
             f"{z:.4g}",
             f"{g:.6g}",
             f"{g**2:.6g}",
@@ -149,7 +151,7 @@ def moving_mass(model: Model) -> float:
     from scipy.sparse.linalg import spsolve
 
     b = model.matrices.base_load
-    return float(b @ np.atleast_1d(spsolve(model.matrices.M.tocsc(), b)))
+    return float(b @ spsolve(model.matrices.M.tocsc(), b).reshape(b.shape))
 
 
 def _say(message: str) -> None:

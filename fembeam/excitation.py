@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fembeam.noise import BandNoise, checked_order, frozen, number
+from fembeam.lines import checked_order, frozen, number
+from fembeam.noise import BandNoise
 from fembeam.record import Record
 
 __all__ = ["BandNoise", "Harmonic", "Multisine", "Record"]

@@ -134,7 +134,8 @@ def spectrum(run: Run, discard: float = 0.0, omega_max: float | None = None) -> 
     lower.set_xlabel("ω / rad s⁻¹")
     lower.set_xlim(0, top)
     line = spectra[main]
-    about = f"{line.n_segments} segments, {line.omega[1]:.2g} rad/s apart, {len(run.t) * _dt(run):.4g} s"
+    lasting = np.count_nonzero(run.t >= discard) * _dt(run)
+    about = f"{lasting:.4g} s, {line.n_segments} segments, lines {line.omega[1]:.2g} rad/s apart"
     return _titled(figure, run, f"Power spectral densities ({about})")
 
 
@@ -157,7 +158,7 @@ def densities(run: Run, discard: float = 0.0) -> Figure:
         axis.set_ylim(bottom=0)
     axes[0].set_ylabel("probability density / mm⁻¹")
     axes[0].legend(loc="upper left")
-    return _titled(figure, run, "Probability densities against the Gaussian of the same moments")
+    return _titled(figure, run, "Probability densities against the Gaussian of the same mean and deviation")
 
 
 @styled
@@ -292,8 +293,8 @@ def _draw_forces(axis: Axes, run: Run, lo: float, hi: float) -> None:
 
 def _axis_end(run: Run, line: Spectrum) -> float:
     """2.5 times the highest frequency kept, within what the samples resolve."""
-    highest = np.inf if run.model is None else 2.5 * float(run.model.omega[-1])
-    return float(min(highest, line.omega[-1]))
+    highest = 0.0 if run.model is None else 2.5 * float(run.model.omega[-1])
+    return float(min(highest or np.inf, line.omega[-1]))  # 0: rigid-body modes alone
 
 
 def _drawable(line: Spectrum, top: float) -> tuple[Vector, Vector]:
@@ -316,7 +317,8 @@ def peaks(line: Spectrum, omega_max: float = np.inf, count: int = 10) -> Vector:
 
     omega, density = _drawable(line, omega_max)
     smooth = gaussian_filter1d(np.log(density), max(2.0, 5.0 / line.omega[1]))
-    found, about = find_peaks(smooth, prominence=0.3)
+    scatter = 3 / np.sqrt(line.n_segments)  # of ln S; what stands out less may be chance
+    found, about = find_peaks(smooth, prominence=max(0.3, scatter), distance=max(1, len(omega) // 30))
     best = found[np.argsort(about["prominences"])[::-1][:count]]
     return np.sort(omega[best])
 
@@ -353,18 +355,18 @@ def _histogram(axis: Axes, values: Vector, label: str) -> None:
     axis.hist(values, edges.tolist(), color=BLUE, alpha=0.7)
     axis.axvline(values.mean(), color=RED, linestyle="--")
     axis.set_title(f"mean {values.mean():.3g} (dashed), largest {values.max():.4g}")
-    axis.set_xlabel(label)
+    axis.set_xlabel(f"{label}, without the top 1 %")
     axis.set_ylabel("contacts")
 
 
 def _restitutions(axis: Axes, speed_in: Vector, speed_out: Vector) -> None:
     """Restitution against entry speed, at most MOST_DOTS evenly picked contacts."""
     moving = np.flatnonzero(speed_in > 0)
-    picked = moving[:: max(1, len(moving) // MOST_DOTS)]
+    picked = moving[:: max(1, -(-len(moving) // MOST_DOTS))]
     restitution = speed_out[picked] / speed_in[picked]
     axis.semilogx(speed_in[picked], restitution, ".", markersize=2, alpha=0.4, color=GREEN)
     axis.axhline(float(np.median(restitution)), color=RED, linestyle="--")
-    axis.set_title(f"restitution: median {np.median(restitution):.3f} (dashed)")
+    axis.set_title(f"median {np.median(restitution):.3f} of the {len(picked)} shown (dashed)")
     axis.set_xlim(0.8 * np.quantile(speed_in[picked], 0.005), 1.2 * speed_in[picked].max())
     axis.set_ylim(0, max(1.05, 1.1 * float(np.quantile(restitution, 0.98))))
     axis.set_xlabel("entry speed / m s⁻¹")

@@ -18,7 +18,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fembeam.noise import LineSpectrum, checked_band, checked_order, frozen, number
+from fembeam.lines import LineSpectrum, checked_band, checked_order, frozen, number
 
 FEWEST_SAMPLES = 8
 UNIFORM = 1e-4  # samples this close to a uniform grid, in steps, count as uniform

@@ -229,7 +229,8 @@ class Scene:
 
         Raises
         ------
-        ValueError : elements or modes not a positive integer, more modes than dofs, a probe outside the beam.
+        ValueError : elements or modes not a positive integer, more modes than dofs, more than 300 modes or 10 000
+            elements, a probe outside the beam.
         """
         return assemble(self, elements, modes, probes)
 
@@ -247,7 +248,8 @@ class Scene:
 
         Raises
         ------
-        ValueError : no modes, repeated or negative numbers, more than the mesh has.
+        ValueError : no modes, repeated or negative numbers, more than the mesh has or than 300.
+        reduction.AccuracyError : stiffnesses too far apart, or a mesh too fine, for double precision.
         """
         from fembeam.model import reduced
 

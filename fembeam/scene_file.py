@@ -14,12 +14,8 @@ import re
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from pathlib import Path
-from types import NoneType, UnionType
-from typing import Any, Literal, NoReturn, Union, get_args, get_origin
-
-import numpy as np
+from typing import Any, NoReturn
 
 import contacts
 import solvers
@@ -29,10 +25,10 @@ from fembeam.excitation import Harmonic, Multisine
 from fembeam.noise import BandNoise
 from fembeam.record import Record
 from fembeam.scene import FEATURES, Scene
+from fembeam.schema import Constructors, converted, fits, listed, nearest, parameters, required, shown, wanted
 from fembeam.section import Section, require_non_negative, require_positive
 
 Table = Mapping[str, Any]
-Constructors = Mapping[str, Callable[..., Any]]
 
 
 class SceneFileError(ValueError):
@@ -100,8 +96,6 @@ SIGNALS: Constructors = {
 }
 SOLVERS = {"exponential": "Exponential", "dormand_prince": "DormandPrince", "henon_rk2": "HenonRK2"}
 STUDIES: Constructors = {"simulate": Simulate}
-UNSEEN = {"Model": Any}  # names in annotations that exist only for type checkers
-ALIASES = {"kind": "quantity"}  # an argument `kind` would hide behind the key that chooses the constructor
 
 
 def read(path: str | Path) -> SceneFile:
@@ -218,8 +212,8 @@ class _Reader:
             self.fail(where, f"must be a table {{ {key} = …, … }}, got {table!r}")
         name = table.get(key, default)
         if name not in list(kinds):  # a list: what a file gives need not be hashable
-            got = f"got {name!r}{_nearest(name, kinds)}" if key in table else "it is missing"
-            self.fail(where, f"{key} must be one of {_listed(kinds)}; {got}")
+            got = f"got {name!r}{nearest(name, kinds)}" if key in table else "it is missing"
+            self.fail(where, f"{key} must be one of {listed(kinds)}; {got}")
         return self.build(kinds[name], {k: v for k, v in table.items() if k != key}, where, chosen_by=key)
 
     def build(self, constructor: Callable[..., Any], table: Any, where: str, *also: str, chosen_by: str = "") -> Any:
@@ -243,14 +237,14 @@ class _Reader:
         """The values of a table, checked against the constructor's signature."""
         if not isinstance(table, dict):
             self.fail(where, f"must be a table, got {table!r}")
-        parameters = _parameters(constructor)
-        self.check_keys(table, [chosen_by, *parameters, *also] if chosen_by else [*parameters, *also], where, "key")
-        for key, parameter in parameters.items():
+        keys = parameters(constructor)
+        self.check_keys(table, [chosen_by, *keys, *also] if chosen_by else [*keys, *also], where, "key")
+        for key, parameter in keys.items():
             if key not in table and parameter.default is inspect.Parameter.empty:
-                self.fail(where, f"the key {key!r} is missing; it needs {_listed(_required(parameters))}")
+                self.fail(where, f"the key {key!r} is missing; it needs {listed(required(keys))}")
         return {
             parameter.name: self.value(table[key], key, parameter, where)
-            for key, parameter in parameters.items()
+            for key, parameter in keys.items()
             if key in table
         }
 
@@ -267,18 +261,17 @@ class _Reader:
             offered = {name: method for name, method in SOLVERS.items() if method in solvers.__all__}
             methods = {name: getattr(solvers, method) for name, method in offered.items()}  # here: slow to import
             return self.choose(methods, value, inner)
-        if not _fits(value, parameter.annotation):
-            wanted = " or ".join(dict.fromkeys(_wanted(parameter.annotation)))
-            self.fail(where, f"{key} must be {wanted}, got {_shown(value)}")
+        if not fits(value, parameter.annotation):
+            self.fail(where, f"{key} must be {wanted(parameter.annotation)}, got {shown(value)}")
         if key == "path":
             return self.path.parent / value
-        return _as(value, parameter.annotation)
+        return converted(value, parameter.annotation)
 
     def check_keys(self, table: Table, valid: Sequence[str], where: str, what: str) -> None:
         """Every key is a valid one; the nearest one is named otherwise."""
         for key in table:
             if key not in valid:
-                self.fail(where, f"unknown {what} {key!r}{_nearest(key, valid)} (valid: {_listed(valid)})")
+                self.fail(where, f"unknown {what} {key!r}{nearest(key, valid)} (valid: {listed(valid)})")
 
     def fail(self, where: str, message: str, cause: Exception | None = None) -> NoReturn:
         """Raise with file and table in front."""
@@ -288,97 +281,6 @@ class _Reader:
 def _span(length: float, section: Section) -> tuple[float, Section]:
     """One span of a beam."""
     return length, section
-
-
-def _parameters(constructor: Callable[..., Any]) -> dict[str, inspect.Parameter]:
-    """Keys of a table: what can be given by position, and the class's own options where **options are taken."""
-    signature = inspect.signature(constructor, eval_str=True, locals=UNSEEN).parameters
-    plain = [p for p in signature.values() if p.kind is p.POSITIONAL_OR_KEYWORD]
-    if any(p.kind is p.VAR_KEYWORD for p in signature.values()):
-        options = inspect.signature(constructor.__self__, eval_str=True).parameters.values()  # type: ignore[attr-defined]
-        plain += [p for p in options if p.default is not p.empty]
-    return {ALIASES.get(p.name, p.name): p for p in plain if p.name != "self"}
-
-
-def _required(parameters: Mapping[str, inspect.Parameter]) -> list[str]:
-    """Keys without a default."""
-    return [key for key, parameter in parameters.items() if parameter.default is inspect.Parameter.empty]
-
-
-def _fits(value: Any, hint: Any) -> bool:
-    """Whether a TOML value has the annotated type; whole numbers pass as numbers, true and false do not."""
-    origin, inner = get_origin(hint), get_args(hint)
-    if origin in (Union, UnionType):
-        return any(_fits(value, option) for option in inner)
-    if origin is Literal:
-        return value in inner
-    if hint in (float, int):
-        too_long = isinstance(value, int) and value.bit_length() > 1000
-        return isinstance(value, (int, hint)) and not isinstance(value, bool) and not too_long
-    if hint in (bool, str):
-        return isinstance(value, hint)
-    if hint is Path:
-        return isinstance(value, str)
-    entry = _entry(hint)
-    if entry is None or not isinstance(value, list):
-        return False
-    fixed = origin is tuple and Ellipsis not in inner
-    return all(_fits(item, entry) for item in value) and (not fixed or len(value) == len(inner))
-
-
-def _entry(hint: Any) -> Any:
-    """Type of the entries of an annotated sequence; None when it is none."""
-    origin = get_origin(hint)
-    if origin is np.ndarray:
-        return float
-    if origin in (list, tuple, Sequence) and get_args(hint):
-        return get_args(hint)[0]
-    return None
-
-
-def _wanted(hint: Any) -> list[str]:
-    """The annotated type in words."""
-    words = {float: "a number", int: "a whole number", bool: "true or false", str: "text", Path: "text"}
-    origin, inner = get_origin(hint), get_args(hint)
-    if origin in (Union, UnionType):
-        return [word for option in inner if option is not NoneType for word in _wanted(option)]
-    if origin is Literal:
-        return [repr(option) for option in inner]
-    if hint in words:
-        return [words[hint]]
-    entry = _entry(hint)
-    if entry is None:
-        return []
-    count = f"{len(inner)} " if origin is tuple and Ellipsis not in inner else ""
-    return [f"a list of {count}{'whole ' if entry is int else ''}numbers"]
-
-
-def _as(value: Any, hint: Any) -> Any:
-    """Whole numbers as floats where a number is wanted, lists as tuples where a tuple is."""
-    options = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
-    if isinstance(value, list):
-        pair = any(get_origin(option) is tuple for option in options)
-        return tuple(value) if pair else value
-    if isinstance(value, int) and not isinstance(value, bool) and float in options and int not in options:
-        return float(value)
-    return value
-
-
-def _nearest(key: Any, valid: Sequence[str] | Constructors) -> str:
-    """A hint at the nearest valid name."""
-    close = get_close_matches(str(key).lower(), list(valid), n=1, cutoff=0.5)
-    return f"; did you mean {close[0]!r}?" if close else ""
-
-
-def _listed(names: Sequence[str] | Constructors) -> str:
-    """Names for a message."""
-    return ", ".join(names)
-
-
-def _shown(value: Any) -> str:
-    """A value as the file would write it, shortened."""
-    text = {True: "true", False: "false"}[value] if isinstance(value, bool) else repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
 
 
 def _snake(name: str) -> str:

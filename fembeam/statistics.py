@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fembeam.noise import number
+from fembeam.lines import number
 
 DEFAULT_SEGMENTS = 32  # with half overlap about 63 segments: the standard error of a level is near 13 %
 SHORTEST_DEFAULT = 256  # samples per segment that a short signal still gets

@@ -20,9 +20,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from solvers.flight import energy_norms, turn
-from solvers.kernels import contact_forces, dot, inlined, kernel, table_value
-from solvers.state import CALLS, PEAK_DELTA, PEAK_FORCE, T
+from solvers.flight import add_taylor, energy_norms, taylor, turn
+from solvers.kernels import contact_forces, contact_gradient, copy, dot, inlined, kernel, table_value
+from solvers.state import CALLS, PEAK_DELTA, PEAK_FORCE, T, touching
 from solvers.tables import S, propagate
 
 _MOST_ITERATIONS = 16
@@ -46,18 +46,29 @@ class Space(NamedTuple):
     force: Any  # (m + L, S) forces of the stops, then values of the signals
     trial: Any  # (S,)
     previous: Any  # (m, S) forces of the last accepted step
+    slope: Any  # (m, 3, S) derivatives of the laws at the nodes
+    jacobian: Any  # (m S, m S)
+    residual: Any  # (m S,)
+    pivots: Any  # (m S,)
     work: Any  # (18, x.size + 2) of the Runge–Kutta steps
+
+
+@kernel
+def sample_signals(problem, tables, space, family, t, h):
+    """Values of the sampled signals at the nodes of a step."""
+    for j in range(problem.table_dt.size):
+        for i in range(S):
+            space.force[problem.gap.size + problem.table_load[j], i] = table_value(
+                problem, j, t + h * tables.times[family, i]
+            )
 
 
 @inlined
 def free_response(problem, tables, state, space, family, level):
     """Indentations and rates at the nodes without the contact forces, signals included."""
     stops, size = problem.gap.size, 2 * problem.k.size
-    h = tables.step[level]
-    for j in range(problem.table_dt.size):
-        for i in range(S):
-            time = state.now[T] + h * tables.times[family, i]
-            space.force[stops + problem.table_load[j], i] = table_value(problem, j, time)
+    if problem.table_dt.size:
+        sample_signals(problem, tables, space, family, state.now[T], tables.step[level])
     for s in range(stops):
         for d in range(2):
             rows = tables.free[family, level, s, d]
@@ -83,17 +94,110 @@ def respond(problem, tables, state, space, family, level, s):
                     target[i] += dot(matrix[i], space.force[u], S)
 
 
+@kernel
+def linearise(problem, tables, state, space, family, level):
+    """J = 1 - ∂law/∂(δ, δ̇) ∂(δ, δ̇)/∂F of all nodes of all stops in contact, row by row; returns its size."""
+    stops, row = problem.gap.size, 0
+    for s in range(stops):
+        if state.piece[s] == 0:
+            continue
+        copy(space.delta[s], space.clipped, S)
+        contact_gradient(
+            *(problem, s, space.clipped, space.rate[s], state.entry_rate[s]),
+            *(space.slope[s, 0], space.slope[s, 1], space.slope[s, 2]),
+        )
+        state.count[CALLS] += S
+        for i in range(S):
+            column = 0
+            for u in range(stops):
+                if state.piece[u] == 0:
+                    continue
+                matrix = tables.forced[family, level, s, u]
+                for j in range(S):
+                    value = space.slope[s, 0, i] * matrix[0, i, j] + space.slope[s, 1, i] * matrix[1, i, j]
+                    space.jacobian[row + i, column + j] = (1.0 if s == u and i == j else 0.0) - value
+                column += S
+        row += S
+    return row
+
+
+@kernel
+def factorise(matrix, pivots, n):
+    """LU factors with partial pivoting, in place (Golub, Van Loan, Matrix Computations, Section 3.4)."""
+    for k in range(n):
+        best = k
+        for i in range(k + 1, n):
+            if abs(matrix[i, k]) > abs(matrix[best, k]):
+                best = i
+        pivots[k] = best
+        for j in range(n):
+            matrix[k, j], matrix[best, j] = matrix[best, j], matrix[k, j]
+        for i in range(k + 1, n):
+            matrix[i, k] /= matrix[k, k]
+            for j in range(k + 1, n):
+                matrix[i, j] -= matrix[i, k] * matrix[k, j]
+
+
+@kernel
+def substitute(matrix, pivots, n, x):
+    """Solve with the factors, in place."""
+    for k in range(n):
+        best = pivots[k]
+        x[k], x[best] = x[best], x[k]
+    for i in range(n):
+        for j in range(i):
+            x[i] -= matrix[i, j] * x[j]
+    for i in range(n - 1, -1, -1):
+        for j in range(i + 1, n):
+            x[i] -= matrix[i, j] * x[j]
+        x[i] /= matrix[i, i]
+
+
+@kernel
+def newton(problem, tables, state, space, family, level, accuracy):
+    """Newton's method for the forces, where a stiff or strongly damped law defeats the plain iteration."""
+    stops = problem.gap.size
+    for _ in range(_MOST_ITERATIONS):
+        row = 0
+        for s in range(stops):
+            if state.piece[s] == 0:
+                continue
+            respond(problem, tables, state, space, family, level, s)
+            copy(space.delta[s], space.clipped, S)
+            contact_forces(problem, s, space.clipped, space.rate[s], state.entry_rate[s], space.trial)
+            state.count[CALLS] += S
+            for i in range(S):
+                space.residual[row + i] = space.trial[i] - space.force[s, i]
+            row += S
+        n = linearise(problem, tables, state, space, family, level)
+        factorise(space.jacobian, space.pivots, n)
+        substitute(space.jacobian, space.pivots, n, space.residual)
+        change, largest, row = 0.0, 0.0, 0
+        for s in range(stops):
+            if state.piece[s] > 0:
+                for i in range(S):
+                    space.force[s, i] += space.residual[row + i]
+                    change = max(change, abs(space.residual[row + i]))
+                    largest = max(largest, abs(space.force[s, i]))
+                row += S
+        if not change < np.inf:
+            return False
+        if change <= accuracy or change <= 1e-14 * largest:
+            return True
+    return False
+
+
 @inlined
 def solve_forces(problem, tables, state, space, family, level, accuracy):
-    """Fixed point of the forces to ``accuracy`` (N, of the first stop's scale); whether it converged."""
+    """Fixed point of the forces to ``accuracy`` in N; whether it was found."""
     stops = problem.gap.size
     before = np.inf
     ratio = 0.3
     for iteration in range(_MOST_ITERATIONS):
+        change, largest = 0.0, 0.0
         for s in range(stops):
             if state.piece[s] > 0:
                 respond(problem, tables, state, space, family, level, s)
-        change, largest = 0.0, 0.0
         for s in range(stops):
             if state.piece[s] == 0:
                 continue
@@ -109,12 +213,12 @@ def solve_forces(problem, tables, state, space, family, level, accuracy):
             return False
         if iteration > 0:
             ratio = min(change / before, 0.9)
-            if change >= before and iteration > 3 and change > 1e-13 * largest:
-                return False
         if change * ratio <= (1.0 - ratio) * accuracy or change <= 1e-15 * largest:
             return True
+        if iteration > 2 and ratio > 0.6:
+            break
         before = change
-    return False
+    return newton(problem, tables, state, space, family, level, accuracy)
 
 
 @inlined
@@ -273,16 +377,31 @@ def _between(nodes, exponent, values, sigma):
     return total
 
 
+@inlined
+def powers(problem, tables, t, x):
+    """Power of the loads and of the damping at time t, W."""
+    size, gain, loss = 2 * problem.k.size, 0.0, 0.0
+    for load in range(tables.power_rows.shape[0]):
+        gain += dot(tables.signal_rows[load], x, size) * dot(tables.power_rows[load], x, size)
+    for j in range(problem.table_dt.size):
+        gain += table_value(problem, j, t) * dot(tables.power_rows[problem.table_load[j]], x, size)
+    for r in range(tables.loss_rows.shape[0]):
+        loss += dot(tables.loss_rows[r], x, size) ** 2
+    return gain, loss
+
+
 @kernel
-def inside(problem, tables, state, space, family, level, span, row):
-    """State at ``span`` after the start of a converged step, by quadrature of its forces; ``row`` holds the start."""
-    stops, n, h = problem.gap.size, problem.k.size, tables.step[level]
+def inside(problem, tables, state, space, family, h, span, row):
+    """State at ``span`` after the start of a step of length h, by quadrature of its forces; ``row`` holds the start."""
+    stops, n = problem.gap.size, problem.k.size
     entry = tables.times[family, 0] < tables.nodes[family, 0]  # t = h σ²
     for b in range(n):
         alpha, beta = propagate(problem.k[b], problem.c[b], span)
         p, v = row[b], row[n + b]
         row[b] = alpha * p + beta * v
         row[n + b] = alpha * v - beta * (problem.k[b] * p + problem.c[b] * v)
+    if problem.table_dt.size == 0 and not touching(state):
+        return
     end = math.sqrt(span / h) if entry else span / h
     panels = 1 + int(tables.fastest * span / 4.0)
     for g in range(panels * S):
@@ -303,6 +422,38 @@ def inside(problem, tables, state, space, family, level, span, row):
             if u < stops:
                 row[2 * n + 2 + 2 * u] += impulse * _between(tables.nodes[family], 0.0, space.rate[u], sigma)
                 row[2 * n + 3 + 2 * u] += impulse
+
+
+@kernel
+def account(problem, tables, state, space, family, h, length, x, row):
+    """Add to the ledger of ``row`` what loads and damping do over ``length`` of a step of length h from ``x`` on."""
+    size, inner = 2 * problem.k.size, space.work[16]
+    for i in range(tables.gauss.shape[1]):
+        span = length * tables.gauss[0, i]
+        copy(x, inner, x.size)
+        inside(problem, tables, state, space, family, h, span, inner)
+        gain, loss = powers(problem, tables, state.now[T] + span, inner)
+        row[size] += length * tables.gauss[1, i] * gain
+        row[size + 1] += length * tables.gauss[1, i] * loss
+
+
+@kernel
+def account_flight(problem, tables, state, space, h, x):
+    """The same for a whole flight step: on its Taylor polynomial where that reaches, else as above."""
+    if tables.fastest * h > 0.6:
+        if problem.table_dt.size:
+            sample_signals(problem, tables, space, 0, state.now[T], h)
+        account(problem, tables, state, space, 0, h, h, x, state.x)
+        return
+    size, inner = 2 * problem.k.size, space.work[16]
+    taylor(problem, x, state.now[T], space.terms, space.six)
+    for i in range(3):
+        span = h * (0.5 + 0.3872983346207417 * (i - 1))  # Gauss's three points, sqrt(3/5)/2 apart
+        add_taylor(space.terms, inner, span, size)
+        gain, loss = powers(problem, tables, state.now[T] + span, inner)
+        weight = h * (4.0 if i == 1 else 2.5) / 9.0
+        state.x[size] += weight * gain
+        state.x[size + 1] += weight * loss
 
 
 @kernel

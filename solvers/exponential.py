@@ -1,9 +1,9 @@
 r"""The main method: exact flight, collocated contact, every event landed on.
 
 A tone Re(a e^{iΩt}) of a load is subtracted as its steady response, which then is one more undamped block with
-k = Ω², c = 0 that no force pushes; so flight under tones is an autonomous linear system and exact in one multiplication per
-block. Sampled signals are quintics per cell, exact likewise. `solvers.flight` proves its steps safe, `solvers.collocation`
-solves the contacts, `solvers.regular` lands on their ends.
+k = Ω², c = 0 that no force pushes; so flight under tones is an autonomous linear system and exact in one
+multiplication per block. Sampled signals are quintics per cell, exact likewise. `solvers.certify` proves flight steps
+safe, `solvers.collocation` solves the contacts, `solvers.regular` lands on their ends.
 
 Limitations
 -----------
@@ -18,12 +18,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit, types
 
+from solvers.certify import fly
 from solvers.collocation import (
     Space,
+    account,
     contact_time,
     finish_step,
     free_response,
@@ -32,7 +35,7 @@ from solvers.collocation import (
     solve_forces,
     step_error,
 )
-from solvers.flight import energy_norms, fly
+from solvers.flight import energy_norms
 from solvers.forcing import Forcing
 from solvers.kernels import OPTIONS, PROBLEM, Problem, contact_forces, copy, dot, indentation, inlined, kernel
 from solvers.regular import INDENTATION, ROOT, TIME, regular_step
@@ -78,13 +81,15 @@ def _arrays(*dimensions):  # shapes of a named tuple's contiguous float arrays
 TABLES = types.NamedTuple(
     [
         *_arrays(1, 3, 4, 2, 3, 2, 2, 2, 2, 0, 2, 1),
-        *_arrays(1, 3, 2, 2, 2, 3, 2, 6, 7, 5, 3, 4),
+        *_arrays(1, 3, 2, 2, 2, 3, 2, 6, 7, 5, 3, 2, 2, 2, 2, 4),
     ],
     Tables,
 )
-SPACE = types.NamedTuple(_arrays(1, 2, 1, 1, 1, 1, 1, 2, 2, 1, 3, 2, 1, 2, 2), Space)
+SPACE = types.NamedTuple([*_arrays(1, 2, 1, 1, 1, 1, 1, 2, 2, 1, 3, 2, 1, 2, 3, 2, 1), _INTEGERS, _MATRIX], Space)
 
-SCALE, SHARE = 0, 1  # places in Memory.numbers: reference speed, then per stop the first step's share of T_c
+SCALE, DURATION, SHARE = range(
+    3
+)  # places in `numbers`: reference speed, T_c, then per stop a first step's share of T_c
 LEVEL, FAMILY, FRESH, STOP, WANTED = range(5)  # places in Memory.last
 _GOAL = 0.3  # error aimed at, in units of the tolerance
 _ORDER = 15.0  # the error estimate falls like h^15
@@ -97,7 +102,7 @@ def _begin(problem, tables, state, space, numbers, last, stop):
     speed = abs(dot(problem.read_rate[stop], state.x, size))
     energy_norms(problem, state.x, space.norms)
     possible = dot(tables.reach[stop], space.norms, n)
-    numbers[SCALE] = max(speed, 0.1 * possible, 1e-30)
+    numbers[SCALE] = max(speed, 0.1 * possible, 0.1 * problem.floor[stop])
     delta = indentation(problem, stop, state.x)
     entering = state.piece[stop] == 1 and delta < 1e-9 * max(state.open[stop, PEAK_DELTA], 1e-6)
     duration = contact_time(problem, tables, state, space, stop, max(speed, 1e-3 * numbers[SCALE]))
@@ -105,6 +110,7 @@ def _begin(problem, tables, state, space, numbers, last, stop):
         numbers[SHARE + stop] = min(0.1, 4.0 / (tables.fastest * duration))
     last[FAMILY] = 1 + stop if entering else 0
     last[WANTED] = _level(tables, numbers[SHARE + stop] * duration)
+    numbers[DURATION] = duration
     last[FRESH], last[STOP] = 1, stop
 
 
@@ -137,7 +143,7 @@ def _nearest_surface(problem, state):
 
 
 @kernel
-def _land(problem, tables, state, space, numbers, stop, direction, near, rtol, t_end, out, dt):
+def _land(problem, tables, state, space, numbers, stop, direction, near, rtol, t_end, out, dt, ledger):
     """Try to land on the border ahead by one regular step; whether it succeeded."""
     size, t = state.x.size, state.now[T]
     delta = indentation(problem, stop, state.x)
@@ -162,7 +168,18 @@ def _land(problem, tables, state, space, numbers, stop, direction, near, rtol, t
             return True
         way = variable if trying else TIME
         error, calls = regular_step(
-            *(problem, way, stop, span if trying else time - t, w, state.piece, state.entry_rate, space.work)
+            *(
+                problem,
+                tables,
+                ledger,
+                way,
+                stop,
+                span if trying else time - t,
+                w,
+                state.piece,
+                state.entry_rate,
+                space.work,
+            )
         )
         state.count[CALLS] += calls
         if trying:
@@ -221,32 +238,43 @@ def _try(problem, tables, state, space, numbers, last, family, level, rtol):
 
 
 @kernel
-def _record(problem, tables, state, space, family, level, t_end, out, dt):
+def _record(problem, tables, state, space, family, level, t_end, out, dt, ledger):
     """Samples inside the converged step, and the state at the end of the run if that lies inside."""
     t, h = state.now[T], tables.step[level]
-    end = min(t + h, t_end)
-    while state.count[SAMPLED] < out.shape[0] and state.count[SAMPLED] * dt <= end:
-        row = out[state.count[SAMPLED]]
+    while True:
+        due = state.count[SAMPLED] < out.shape[0] and state.count[SAMPLED] * dt <= min(t + h, t_end)
+        if not due and t + h < t_end:
+            return
+        span = state.count[SAMPLED] * dt - t if due else t_end - t
+        row = out[state.count[SAMPLED]] if due else space.x_new
         copy(state.x, row, row.size)
-        inside(problem, tables, state, space, family, level, state.count[SAMPLED] * dt - t, row)
+        inside(problem, tables, state, space, family, h, span, row)
+        if ledger:
+            account(problem, tables, state, space, family, h, span, state.x, row)
+        if not due:
+            return
         state.count[SAMPLED] += 1
-    if t + h >= t_end:
-        copy(state.x, space.x_new, state.x.size)
-        inside(problem, tables, state, space, family, level, t_end - t, space.x_new)
 
 
 @kernel
-def touch(problem, tables, state, space, numbers, last, t_end, rtol, log, out, dt):
+def touch(problem, tables, state, space, numbers, last, t_end, rtol, log, out, dt, ledger):
     """One accepted step in contact: land if a border is near, else collocate; returns a status code."""
     near, stop, direction = _nearest_surface(problem, state)
-    if stop >= 0 and not last[FRESH]:
-        if _land(problem, tables, state, space, numbers, stop, direction, near, rtol, t_end, out, dt):
-            state.count[STEPS] += 1
-            if state.now[T] < t_end:
-                switch(problem, state, stop, direction, log)
-                if touching(state):
-                    _begin(problem, tables, state, space, numbers, last, stop)
-            return RUNNING
+    if (
+        stop >= 0
+        and not last[FRESH]
+        and _land(problem, tables, state, space, numbers, stop, direction, near, rtol, t_end, out, dt, ledger)
+    ):
+        state.count[STEPS] += 1
+        if state.now[T] < t_end:
+            switch(problem, state, stop, direction, log)
+            if touching(state):
+                _begin(problem, tables, state, space, numbers, last, stop)
+        return RUNNING
+    for s in range(problem.gap.size):  # a stop the loads lean on moves faster than it was entered
+        if state.piece[s] > 0:
+            rate = abs(dot(problem.read_rate[s], state.x, 2 * problem.k.size))
+            numbers[SCALE] = max(numbers[SCALE], rate)
     family = last[FAMILY] if last[FRESH] else 0
     longest = np.inf if last[FRESH] else 0.8 * near
     if problem.table_dt.size:
@@ -265,24 +293,29 @@ def touch(problem, tables, state, space, numbers, last, t_end, rtol, log, out, d
     end = state.now[T] + tables.step[level]
     ends = end >= t_end
     if ends or dt * state.count[SAMPLED] <= end:
-        _record(problem, tables, state, space, family, level, t_end, out, dt)
+        _record(problem, tables, state, space, family, level, t_end, out, dt, ledger)
     for s in range(problem.gap.size):
         copy(space.force[s], space.previous[s], S)
+    if ledger and not ends:
+        account(problem, tables, state, space, family, tables.step[level], tables.step[level], state.x, state.x)
     finish_step(problem, tables, state, space, family, level)
     if ends:  # the step was finished for the sake of the peaks; the state is the one inside it
         copy(space.x_new, state.x, state.x.size)
         state.now[T] = t_end
-    _adapt(numbers, last, level, family, wanted, error)
+    _adapt(tables, numbers, last, level, family, wanted, error)
     state.count[STEPS] += 1
     return RUNNING
 
 
 @kernel
-def _adapt(numbers, last, level, family, wanted, error):
+def _adapt(tables, numbers, last, level, family, wanted, error):
     """Size of the next step from the error of this one."""
     longer = 2.0 / _ORDER * math.log2(_GOAL / max(error, 1e-30))  # in levels
-    if last[FRESH] and family > 0:
-        numbers[SHARE + last[STOP]] *= 2.0 ** (0.5 * min(max(longer, -2.0), 1.0))
+    if last[FRESH]:  # the next contact of this stop begins with what was right here
+        share = SHARE + last[STOP]
+        if level != last[WANTED]:
+            numbers[share] = tables.step[level] / numbers[DURATION]
+        numbers[share] *= 2.0 ** (0.5 * min(max(longer, -1.0), 0.5))
     suggested = max(level - int(min(math.floor(longer), 2.0)), 0)
     last[WANTED] = suggested if level == wanted else min(suggested, wanted)
     last[LEVEL], last[FAMILY], last[FRESH] = level, family, 0
@@ -300,11 +333,12 @@ def _latest(state):
 
 @njit(
     types.int64(
-        *[PROBLEM, TABLES, STATE, SPACE, _VECTOR, _INTEGERS, _REAL, types.int64, _REAL, _MATRIX, _MATRIX, _REAL]
+        *[PROBLEM, TABLES, STATE, SPACE, _VECTOR, _INTEGERS, _REAL, types.int64, _REAL, _MATRIX, _MATRIX, _REAL],
+        types.boolean,
     ),
     **OPTIONS,
 )
-def advance(problem, tables, state, space, numbers, last, t_end, budget, rtol, log, out, dt):
+def advance(problem, tables, state, space, numbers, last, t_end, budget, rtol, log, out, dt, ledger):
     """Advance the state to ``t_end`` or for about ``budget`` steps; returns a status code."""
     begun = state.count[STEPS] + state.count[REJECTED]
     while state.count[STEPS] + state.count[REJECTED] - begun < budget:
@@ -319,11 +353,11 @@ def advance(problem, tables, state, space, numbers, last, t_end, budget, rtol, l
                 _begin(problem, tables, state, space, numbers, last, _latest(state))
             continue
         if touching(state):
-            code = touch(problem, tables, state, space, numbers, last, t_end, rtol, log, out, dt)
+            code = touch(problem, tables, state, space, numbers, last, t_end, rtol, log, out, dt, ledger)
             if code != RUNNING:
                 return code
             continue
-        stop = fly(problem, tables, state, space, t_end, budget, out, dt)
+        stop = fly(problem, tables, state, space, t_end, budget, out, dt, ledger)
         if stop >= 0:
             switch(problem, state, stop, 1, log)
             _begin(problem, tables, state, space, numbers, last, stop)
@@ -339,6 +373,9 @@ class Exponential:
     rtol : error of an indentation rate that one contact step may make, relative to the speed of entry (or a tenth of
         what the motion could reach at the stop, whichever is larger), in [1e-12, 1e-2]. Flight is exact.
 
+    ledger : keep the energy ledger of runs with output samples, by quadrature; without it their input and damping
+        are NaN and the run several times quicker. Runs with ``dt=None`` keep none.
+
     Notes
     -----
     Cost is nearly independent of rtol and grows linearly with the number of modes. See the module for its limits.
@@ -350,6 +387,7 @@ class Exponential:
     """
 
     rtol: float = 1e-8
+    ledger: bool = True
 
     def __post_init__(self) -> None:
         if not 1e-12 <= self.rtol <= 1e-2:
@@ -365,20 +403,20 @@ class Engine:
 
     def __init__(self, method: Exponential, system: System, z: Array, forcing: Forcing, duration: float) -> None:
         self.method, self.duration = method, duration
-        problem, steady = with_tones(problem_of(system, forcing), forcing)
-        self.problem = problem
-        laws = [contact.law for contact in system.contacts]
-        dt_cell = float(forcing.table_dt[0]) if forcing.table_dt.size else 1.0
-        self.tables = build(problem, [law.exponent for law in laws], [law.jump for law in laws], dt_cell)
+        prepared = _prepared(system, forcing)
+        self.tables, steady = prepared.tables, prepared.steady
+        self.problem = problem = prepared.problem._replace(table=forcing.table, table_start=forcing.table_start)
         stops, loads, size = len(problem.gap), len(problem.load), 2 * len(problem.k)
-        self.back = system.blocks.T @ steady
+        self.back = prepared.back
         self.state: State = new_state(_start(z, steady, forcing), stops)
         self.space = Space(
             *(np.zeros(shape) for shape in (self.state.x.size, (8, size), 6, 7, size // 2, loads, stops)),
             *(np.zeros(shape) for shape in ((stops, S), (stops, S), S, (stops, 2, S), (stops + loads, S), S)),
-            *(np.zeros(shape) for shape in ((stops, S), (18, self.state.x.size + 2))),
+            *(np.zeros(shape) for shape in ((stops, S), (stops, 3, S), (stops * S, stops * S), stops * S)),
+            np.zeros(stops * S, dtype=np.int64),
+            np.zeros((18, self.state.x.size + 2)),
         )
-        self.numbers = np.zeros(1 + stops)
+        self.numbers = np.zeros(2 + stops)
         self.last = np.zeros(5, dtype=np.int64)
 
     def start(self) -> None:
@@ -391,8 +429,58 @@ class Engine:
         """Go on for a stretch."""
         return advance(
             *(self.problem, self.tables, self.state, self.space, self.numbers, self.last),
-            *(self.duration, budget, self.method.rtol, log, out, dt),
+            *(self.duration, budget, self.method.rtol, log, out, dt, self.method.ledger and len(out) > 0),
         )
+
+
+class _Prepared(NamedTuple):
+    """What does not change from run to run of one system."""
+
+    problem: Problem
+    tables: Tables
+    steady: Array
+    back: Array
+
+
+def _prepared(system: System, forcing: Forcing) -> _Prepared:
+    """Tables of a system, made once and kept on it; signals may be sampled finer from run to run."""
+    dt_cell = float(forcing.table_dt[0]) if forcing.table_dt.size else 1.0
+    key = ("exponential", dt_cell)
+    if key not in system.kept:
+        if np.any(system.blocks.k < 0.0):
+            raise ValueError(
+                f"K must be positive semi-definite for Exponential, its lowest ω² is "
+                f"{system.blocks.k.min():g} (buckled?); "
+                "use DormandPrince"
+            )
+        plain = problem_of(system, forcing)
+        problem, steady = with_tones(plain, forcing)
+        laws = [contact.law for contact in system.contacts]
+        ledger = (_signal_rows(problem, forcing), problem.power, _loss_rows(plain) @ steady)
+        tables = build(problem, [law.exponent for law in laws], [law.jump for law in laws], dt_cell, ledger)
+        system.kept[key] = _Prepared(problem, tables, steady, system.blocks.T @ steady)
+    return system.kept[key]
+
+
+def _signal_rows(problem: Problem, forcing: Forcing) -> Array:
+    """Each load's tones as a row of the state: Re(a e^{iΩt}) = Re a · p + Im a/Ω · v."""
+    tones, N = len(forcing.tone_omega), len(problem.k)
+    rows = np.zeros((len(problem.load), 2 * N))
+    for i, (omega, amplitude, load) in enumerate(
+        zip(forcing.tone_omega, forcing.tone_amplitude, forcing.tone_load, strict=True)
+    ):
+        rows[load, N - tones + i] = amplitude.real
+        rows[load, 2 * N - tones + i] = amplitude.imag / omega if omega > 0.0 else 0.0
+    return rows
+
+
+def _loss_rows(problem: Problem) -> Array:
+    """Rows whose squares sum to the damping power: √c v, or a root of the coupled loss."""
+    n = len(problem.k)
+    if not problem.loss.size:
+        return np.hstack((np.zeros((n, n)), np.diag(np.sqrt(problem.c))))
+    values, vectors = np.linalg.eigh(0.5 * (problem.loss + problem.loss.T))
+    return np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
 
 
 def with_tones(problem: Problem, forcing: Forcing) -> tuple[Problem, Array]:

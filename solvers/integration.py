@@ -43,7 +43,7 @@ def integrate(
     q0, q_dot0 : (n,) initial coordinates and rates; not changed.
     duration : s, > 0.
     dt : output sampling, s; None keeps the final state and the contact log only.
-    method : `DormandPrince` or `HenonRK2`; None takes ``DormandPrince(rtol=1e-8)``.
+    method : `Exponential`, `DormandPrince` or `HenonRK2`; None takes ``Exponential(rtol=1e-8)``.
     tangent : not offered by these methods.
     progress : called with the simulated time now and then.
     check : raise when the run fails; False returns the partial solution with its status instead.
@@ -64,9 +64,9 @@ def integrate(
     True
     """
     if method is None:
-        from solvers.dormand_prince import DormandPrince
+        from solvers.exponential import Exponential
 
-        method = DormandPrince()
+        method = Exponential()
     if not hasattr(method, "engine") or isinstance(method, type):
         raise TypeError(f"method must be one of solvers, made with its settings, such as Exponential(), got {method!r}")
     if tangent:
@@ -172,7 +172,7 @@ class _Run:
             *(self.system.energy(q, q_dot), self.initial_energy),
         )
         count = self.state.count
-        cost = Cost(*(int(count[i]) for i in (STEPS, REJECTED, CALLS, EVENTS)), seconds)
+        cost = Cost(int(count[STEPS]), int(count[REJECTED]), int(count[CALLS]), int(count[EVENTS]), seconds)
         return Solution(t, q, q_dot, self._contacts(), energy, status, cost)
 
     def _sampled(self, status: Status) -> int:

@@ -36,6 +36,7 @@ class Problem(NamedTuple):
     levels: Any  # (m, J) ascending indentations where a stop changes piece: 0, knots, then inf
     gap: Any  # (m,)
     law: Any  # (m,) addresses of the compiled forces
+    gradient: Any  # (m,) addresses of their derivatives
     parameters: Any  # (m, P) their parameters
     floor: Any  # (m,) smallest entry rates
     load: Any  # (L, 2n) state rate per unit of signal l
@@ -55,30 +56,41 @@ _INTEGERS = types.Array(types.int64, 1, "C")
 _COMPLEX = types.Array(types.complex128, 1, "C")
 PROBLEM = types.NamedTuple(
     [
-        *[_VECTOR, _VECTOR, _MATRIX, _MATRIX, _MATRIX, _MATRIX, _MATRIX, _VECTOR, _INTEGERS, _MATRIX],
-        *[_VECTOR, _MATRIX, _MATRIX, _VECTOR, _COMPLEX, _INTEGERS, _MATRIX, _VECTOR, _INTEGERS, _INTEGERS],
+        *[_VECTOR, _VECTOR, _MATRIX, _MATRIX, _MATRIX, _MATRIX, _MATRIX, _VECTOR, _INTEGERS, _INTEGERS],
+        *[_MATRIX, _VECTOR, _MATRIX, _MATRIX, _VECTOR, _COMPLEX, _INTEGERS, _MATRIX, _VECTOR, _INTEGERS, _INTEGERS],
     ],
     Problem,
 )
 
 
-@intrinsic
-def _call_law(typingctx, address, n, delta, delta_dot, entry_rate, parameters, force):
-    """Call the C function at ``address``; arrays are passed by their data pointers."""
-    arrays = (delta, delta_dot, parameters, force)
-    signature = types.void(types.int64, types.int64, *arrays[:2], types.float64, *arrays[2:])
+def _c_function(outputs):
+    """An intrinsic that calls a law's C function at an address, passing arrays by their data pointers."""
 
-    def codegen(context, builder, sig, args):
-        def data(i):
-            return context.make_array(sig.args[i])(context, builder, args[i]).data
+    @intrinsic
+    def call(typingctx, address, n, delta, delta_dot, entry_rate, parameters, results):
+        signature = types.void(types.int64, types.int64, delta, delta_dot, types.float64, parameters, results)
 
-        real, reals = ir.DoubleType(), ir.DoubleType().as_pointer()
-        declared = ir.FunctionType(ir.VoidType(), [ir.IntType(64), reals, reals, real, reals, reals])
-        function = builder.inttoptr(args[0], declared.as_pointer())
-        builder.call(function, [args[1], data(2), data(3), args[4], data(5), data(6)])
-        return context.get_dummy_value()
+        def codegen(context, builder, sig, args):
+            def data(kind, value):
+                return context.make_array(kind)(context, builder, value).data
 
-    return signature, codegen
+            tuple_type = sig.args[6]
+            arrays = [builder.extract_value(args[6], i) for i in range(outputs)]
+            out = [data(tuple_type[i], array) for i, array in enumerate(arrays)]
+            real, reals = ir.DoubleType(), ir.DoubleType().as_pointer()
+            declared = ir.FunctionType(ir.VoidType(), [ir.IntType(64), reals, reals, real, reals, *[reals] * outputs])
+            function = builder.inttoptr(args[0], declared.as_pointer())
+            known = [data(sig.args[i], args[i]) for i in (2, 3, 5)]
+            builder.call(function, [args[1], known[0], known[1], args[4], known[2], *out])
+            return context.get_dummy_value()
+
+        return signature, codegen
+
+    return call
+
+
+_call_force = _c_function(1)
+_call_gradient = _c_function(3)
 
 
 @inlined
@@ -86,7 +98,16 @@ def contact_forces(problem, stop, delta, delta_dot, entry_rate, force):
     """Forces of one stop at a batch of indentations; below the surface the law is continued from it."""
     for i in range(delta.size):
         delta[i] = max(delta[i], 0.0)
-    _call_law(problem.law[stop], delta.size, delta, delta_dot, entry_rate, problem.parameters[stop], force)
+    _call_force(problem.law[stop], delta.size, delta, delta_dot, entry_rate, problem.parameters[stop], (force,))
+
+
+@kernel
+def contact_gradient(problem, stop, delta, delta_dot, entry_rate, by_delta, by_rate, by_entry):
+    """Derivatives of the forces, likewise."""
+    for i in range(delta.size):
+        delta[i] = max(delta[i], 0.0)
+    results = (by_delta, by_rate, by_entry)
+    _call_gradient(problem.gradient[stop], delta.size, delta, delta_dot, entry_rate, problem.parameters[stop], results)
 
 
 @inlined

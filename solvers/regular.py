@@ -5,24 +5,28 @@ r"""Runge–Kutta steps in a variable in which a contact is smooth: DOP853 with 
     ROOT          dt = 2u du/δ̇      u = √δ: lands exactly on δ = 0, where δ^{3/2} is singular in t
     STRETCHED     dt = u dτ, u' = δ̇/2   analytic through entry and exit; u is carried as an unknown
 
-The unknowns are [p, v, ledger, t, u].
+The unknowns are [p, v, ledger, t, u]. The error is estimated by a tenth of the embedded fifth-order difference: in
+these variables that stays a few times above the true one, where DOP853's own mixed estimate falls below it.
 """
 
 from __future__ import annotations
 
-import math
-
-from solvers.dormand_prince import E3, E5, STAGES, A
+from solvers.collocation import powers
+from solvers.dormand_prince import E5, STAGES, A
 from solvers.kernels import dot, kernel, rhs
 
 TIME, INDENTATION, ROOT, STRETCHED = range(4)
 
 
 @kernel
-def _rate(problem, variable, stop, w, piece, entry_rate, out, batch):
+def _rate(problem, tables, ledger, variable, stop, w, piece, entry_rate, out, batch):
     """Derivative of the unknowns with respect to the chosen variable; ``w[-1]`` is u."""
     size = w.size - 2
     calls = rhs(problem, w[size], w, piece, entry_rate, out, batch)
+    out[2 * problem.k.size], out[2 * problem.k.size + 1] = 0.0, 0.0
+    if ledger:
+        gain, loss = powers(problem, tables, w[size], w)
+        out[2 * problem.k.size], out[2 * problem.k.size + 1] = gain, loss
     delta_dot = dot(problem.read_rate[stop], w, 2 * problem.k.size)
     u = w[size + 1]
     if variable == TIME:
@@ -41,7 +45,7 @@ def _rate(problem, variable, stop, w, piece, entry_rate, out, batch):
 
 
 @kernel
-def regular_step(problem, variable, stop, span, w, piece, entry_rate, work):
+def regular_step(problem, tables, ledger, variable, stop, span, w, piece, entry_rate, work):
     """One DOP853 step of the chosen variable from ``w`` into ``work[-1]``; (error of δ̇ of the stop, law calls)."""
     size, calls = w.size, 0
     trial, batch = work[STAGES + 1], work[STAGES + 2]
@@ -52,18 +56,14 @@ def regular_step(problem, variable, stop, span, w, piece, entry_rate, work):
                 total += A[i, j] * work[j, e]
             trial[e] = w[e] + span * total
         if i < STAGES:
-            calls += _rate(problem, variable, stop, trial, piece, entry_rate, work[i], batch)
+            calls += _rate(problem, tables, ledger, variable, stop, trial, piece, entry_rate, work[i], batch)
     result = work[STAGES + 3]
     for e in range(size):
         result[e] = trial[e]
-    three, five = 0.0, 0.0
+    error = 0.0
     for e in range(2 * problem.k.size):
-        e3, e5 = 0.0, 0.0
+        total = 0.0
         for j in range(STAGES):
-            e3 += E3[j] * work[j, e]
-            e5 += E5[j] * work[j, e]
-        three += abs(problem.read_rate[stop, e] * e3)
-        five += abs(problem.read_rate[stop, e] * e5)
-    if five == 0.0 and three == 0.0:
-        return 0.0, calls
-    return abs(span) * five * five / math.sqrt(five * five + 0.01 * three * three), calls
+            total += E5[j] * work[j, e]
+        error += abs(problem.read_rate[stop, e] * total)
+    return 0.1 * abs(span) * error, calls

@@ -59,6 +59,15 @@ def surface_tolerance(problem, s, x):
 
 
 @kernel
+def rate_tolerance(problem, s, x):
+    """Indentation rate below which a stop counts as at rest: rounding of δ̇."""
+    total = 0.0
+    for i in range(2 * problem.k.size):
+        total += abs(problem.read_rate[s, i] * x[i])
+    return 1e-15 * total
+
+
+@kernel
 def _open(problem, state, s, t, delta_dot):
     """Latch the entry rate and begin a row of the contact log."""
     ledger = 2 * problem.k.size + 2 + 2 * s
@@ -126,10 +135,11 @@ def switch_on_surface(problem, state, log, locates):
         delta = indentation(problem, s, state.x)
         delta_dot = dot(problem.read_rate[s], state.x, 2 * problem.k.size)
         tolerance = surface_tolerance(problem, s, state.x) if locates else 0.0
-        if delta >= problem.levels[s, state.piece[s]] - tolerance and delta_dot > 0.0:
+        still = rate_tolerance(problem, s, state.x)
+        if delta >= problem.levels[s, state.piece[s]] - tolerance and delta_dot > still:
             switch(problem, state, s, 1, log)
             switched = True
-        elif state.piece[s] > 0 and delta <= problem.levels[s, state.piece[s] - 1] + tolerance and delta_dot < 0.0:
+        elif state.piece[s] > 0 and delta <= problem.levels[s, state.piece[s] - 1] + tolerance and delta_dot < -still:
             switch(problem, state, s, -1, log)
             switched = True
     return switched
@@ -182,6 +192,7 @@ def problem_of(system: System, forcing: Forcing) -> Problem:
         levels=levels,
         gap=np.array([c.gap for c in contacts], dtype=float),
         law=np.array([c.law.address for c in contacts], dtype=np.int64),
+        gradient=np.array([c.law.gradient_address for c in contacts], dtype=np.int64),
         parameters=np.array([np.pad(p, (0, width - p.size)) for p in parameters]).reshape(m, width),
         floor=np.array([c.law.entry_rate_floor for c in contacts], dtype=float),
         load=np.ascontiguousarray((inverse_mass @ vectors.T).T),

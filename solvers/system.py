@@ -14,7 +14,7 @@ Runge–Kutta and exact propagation commute with this change of coordinates, so 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -39,6 +39,10 @@ class Law(Protocol):
     @property
     def address(self) -> int:
         """Address of the compiled force."""
+
+    @property
+    def gradient_address(self) -> int:
+        """Address of its derivatives: the same arguments, then arrays for ∂F/∂δ, ∂F/∂δ̇ and ∂F/∂entry_rate."""
 
     @property
     def parameters(self) -> Array:
@@ -107,6 +111,7 @@ class System:
     K: Any
     contacts: Sequence[Contact] = ()
     loads: Sequence[tuple[ArrayLike, Signal]] = ()
+    kept: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)  # what methods prepare once
 
     def __post_init__(self) -> None:
         for name in "MCK":

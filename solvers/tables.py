@@ -56,6 +56,10 @@ class Tables(NamedTuple):
     forced: Any  # (f, j, m, m + L, 2, S, S): the same from the forces and signals at the nodes
     kick: Any  # (f, j, m + L, S, 2N): state change at the end
     alias: Any  # (f, j, N): interpolation error of a block's oscillation on the nodes
+    signal_rows: Any  # (L, 2N): a load's tones from the state
+    power_rows: Any  # (L, 2N): input power = signal × power row
+    loss_rows: Any  # (r, 2N): damping power = Σ (row·z)²
+    gauss: Any  # (2, 5) points and weights on (0, 1) for the energy ledger
     extend: Any  # (f, 5, S, S): the force on the next smooth step, 2^{(i-2)/2} times shorter, by extrapolation
 
 
@@ -163,7 +167,9 @@ def _fill_level(
                             )
 
 
-def build(problem: Problem, exponents: list[float], jumps: list[bool], dt_cell: float) -> Tables:
+def build(
+    problem: Problem, exponents: list[float], jumps: list[bool], dt_cell: float, ledger: tuple[Any, Any, Any]
+) -> Tables:
     """Tables of a problem whose tones are already among its blocks."""
     stops, loads, size = len(problem.gap), len(problem.load), len(problem.k)
     omega = np.sqrt(problem.k)
@@ -207,8 +213,18 @@ def build(problem: Problem, exponents: list[float], jumps: list[bool], dt_cell: 
         forced=forced,
         kick=kick,
         alias=_aliasing(contact_h, omega, families),
+        signal_rows=ledger[0],
+        power_rows=ledger[1],
+        loss_rows=ledger[2],
+        gauss=_gauss(5),
         extend=np.ascontiguousarray([_extensions(f, families[0]) for f in families]),
     )
+
+
+def _gauss(count: int) -> Any:
+    """Gauss–Legendre points and weights on (0, 1): (2, count)."""
+    x, w = np.polynomial.legendre.leggauss(count)
+    return np.array([0.5 * (1.0 + x), 0.5 * w])
 
 
 def _propagators(problem: Problem, h: Any) -> Any:
@@ -248,8 +264,7 @@ def _responses(problem: Problem, h: Any, families: list[_Family], inputs: Any) -
     free = np.zeros((len(families), h.size, stops, 2, S, 2 * size))
     forced = np.zeros((len(families), h.size, stops, channels, 2, S, S))
     kick = np.zeros((len(families), h.size, channels, S, 2 * size))
-    x, w = np.polynomial.legendre.leggauss(12)
-    gauss = np.array([0.5 * (1.0 + x), 0.5 * w])
+    gauss = _gauss(12)
     work, basis = np.zeros((S + 1, S, 2)), np.zeros(S)
     for f, family in enumerate(families):
         if f > 0 and family.exponent == 0.0:  # an analytic entry is a smooth step

@@ -1,15 +1,19 @@
 """The command line: results, tables, exit codes."""
 
 import json
+import os
 import re
 import signal
-from contextlib import contextmanager
+import subprocess
+import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import fembeam as fb
+import reduction
 from fembeam.cli import main
 
 EXAMPLE = Path(__file__).parent.parent / "examples" / "beam_stop.toml"
@@ -102,6 +106,8 @@ def test_bad_input_is_one_line_and_exit_code_two(tmp_path, capsys):
     no_study = tmp_path / "no_study.toml"
     no_study.write_text(path.read_text().split("[reduce]")[0])
     assert "needs a table [simulate]" in refused(capsys, "run", no_study, *out)
+    path = scene(tmp_path, ("std = 2.5e-4", "std = 1e300"))
+    assert "out of range" in refused(capsys, "run", path, *out, "--quiet")
     (tmp_path / "file").write_text("")
     path = scene(tmp_path, duration="1e7")
     assert "is not writable" in refused(capsys, "run", path, "--out", tmp_path / "file")
@@ -121,6 +127,8 @@ def test_a_free_beam_is_warned_about(tmp_path, capsys):
     assert main(["modes", str(path)]) == 0
     said = capsys.readouterr()
     assert re.fullmatch(r"fembeam: warning: 2 rigid-body modes appear.*\n", said.err)
+    assert main(["run", str(path), "--out", str(tmp_path / "out"), "--quiet"]) == 0
+    assert capsys.readouterr().err.count("\n") == 1
 
 
 def test_a_failing_method_leaves_what_it_computed(tmp_path, capsys):
@@ -133,19 +141,65 @@ def test_a_failing_method_leaves_what_it_computed(tmp_path, capsys):
     assert "not finite any more" in summary["status"]
 
 
-def test_ctrl_c_leaves_what_was_computed(tmp_path, capsys, monkeypatch):
-    @contextmanager
-    def bar(duration, wanted):
-        yield lambda t: signal.raise_signal(signal.SIGINT) if t > 5.0 else None
+def test_a_record_that_is_unsorted_or_not_finite(tmp_path, capsys):
+    head, _, tail = scene(tmp_path).read_text().partition("[base]")
+    path = tmp_path / "record.toml"
+    path.write_text(head + '[base]\nkind = "record"\npath = "y.csv"\n[reduce]' + tail.partition("[reduce]")[2])
+    for bad, message in (("0.05,0", "must increase strictly"), ("0.5,nan", "must be finite, got nan in row 50")):
+        rows = [f"{0.01 * i},{1e-6 * (i % 7)}" for i in range(100)]
+        rows[50] = bad
+        (tmp_path / "y.csv").write_text("\n".join(rows))
+        assert message in refused(capsys, "run", path, "--out", tmp_path / "out")
 
-    monkeypatch.setattr("fembeam.run.bar", bar)
+
+def test_modes_that_cannot_be_computed_are_bad_input(capsys, monkeypatch):
+    def fails(*_, **__):
+        raise reduction.AccuracyError("frequencies must settle")
+
+    monkeypatch.setattr(reduction, "modal_basis", fails)
+    assert "[reduce]: frequencies must settle" in refused(capsys, "modes", EXAMPLE)
+
+
+RUN_THAT_TELLS = """
+import sys, fembeam.run
+from contextlib import contextmanager
+from fembeam.cli import main
+
+@contextmanager
+def bar(duration, wanted):
+    yield lambda t: print("at", t, file=sys.stderr, flush=True)
+
+fembeam.run.bar = bar
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="sends SIGINT to another process")
+def test_ctrl_c_leaves_what_was_computed(tmp_path):
     out = tmp_path / "out"
-    assert main(["run", str(scene(tmp_path, duration="60")), "--out", str(out)]) == 130
-    assert "interrupted" in capsys.readouterr().err
-    summary = json.loads((out / "summary.json").read_text())
+    command = [sys.executable, "-c", RUN_THAT_TELLS, "run", str(scene(tmp_path, duration="600")), "--out", str(out)]
+    heard = partial(signal.signal, signal.SIGINT, signal.default_int_handler)  # background jobs ignore it
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, preexec_fn=heard) as process:
+        while not process.stderr.readline().startswith("at"):
+            assert process.poll() is None
+        process.send_signal(signal.SIGINT)
+        said = process.communicate(timeout=120)[1]
+    assert process.returncode == 130, said
+    assert "interrupted: partial result" in said
+    assert "Traceback" not in said
+    summary, run = json.loads((out / "summary.json").read_text()), fb.load(out / "run.npz")
     assert not summary["complete"]
     assert "interrupted" in summary["status"]
-    run = fb.load(out / "run.npz")
-    assert 5.0 < run.t[-1] < 60.0
+    assert not run.complete
+    assert 0.0 < run.t[-1] < 600.0
     assert summary["simulated_seconds"] == run.t[-1]
     assert (out / "psd.png").exists()
+
+
+def test_ctrl_c_before_the_run_is_one_line(capsys, monkeypatch):
+    def interrupted(path):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("fembeam.scene_file.read", interrupted)
+    assert main(["modes", str(EXAMPLE)]) == 130
+    assert capsys.readouterr().err.count("\n") == 1

@@ -48,6 +48,12 @@ def test_the_import_is_light():
     assert done.stdout.strip() == "[]", done.stderr
 
 
+def test_the_command_line_starts_light():
+    # so that Ctrl-C is handled from the first moment on
+    done = python("import sys, fembeam.cli; print([n for n in ('numpy', 'scipy', 'argparse') if n in sys.modules])")
+    assert done.stdout.strip() == "[]", done.stderr
+
+
 def test_every_public_name_exists():
     done = python("import fembeam as fb; [getattr(fb, name) for name in fb.__all__]")
     assert done.returncode == 0, done.stderr

@@ -163,7 +163,7 @@ def test_no_sampling_keeps_the_last_sample(paper, dt):
     assert sampled.t[-1] == pytest.approx(0.05, rel=1e-15)
     np.testing.assert_allclose(sampled.q[-1], final.q[0], rtol=1e-12)
     np.testing.assert_allclose(sampled.q_dot[-1], final.q_dot[0], rtol=1e-12)
-    np.testing.assert_array_equal(sampled.contacts.t_out, final.contacts.t_out)
+    np.testing.assert_allclose(sampled.contacts.t_out, final.contacts.t_out, rtol=1e-12)
 
 
 def test_sampling_interval_that_does_not_divide_the_duration():
@@ -502,7 +502,7 @@ def test_arguments_are_refused(arguments, message):
 
 def test_tangent_is_refused_where_it_is_not_offered():
     with pytest.raises(ValueError, match=r"tangent=True is not offered by DormandPrince"):
-        integrate(linear_stop(), [0.0], [0.0], 1.0, tangent=True)
+        integrate(linear_stop(), [0.0], [0.0], 1.0, method=DormandPrince(), tangent=True)
 
 
 @pytest.mark.parametrize("method", ["DormandPrince", DormandPrince, 3])

@@ -337,6 +337,18 @@ def _silent():
     return context
 
 
+@pytest.mark.parametrize("elements", [5000, 10_000])
+def test_the_finest_meshes_keep_their_digits(elements):
+    omega = paper().reduce(2, elements=elements).omega
+    assert omega == pytest.approx([109.1299120547, 790.6100943811], rel=1e-9)
+
+
+def test_a_mesh_too_fine_is_noticed(monkeypatch):
+    monkeypatch.setattr(reduction.modal, "MOST_CORRECTIONS", 1)
+    with pytest.raises(reduction.AccuracyError, match="frequencies must settle to 1e-09, got a change of"):
+        paper().reduce(2, elements=10_000)
+
+
 def test_matrices_reject():
     scene = paper()
     for bad in (0, -1, 2.5, True, "10"):
@@ -346,6 +358,12 @@ def test_matrices_reject():
             scene.matrices(modes=bad)
     with pytest.raises(ValueError, match=r"modes must be at most 8 \(free dofs\), got 9"):
         scene.matrices(elements=4, modes=9)
+    with pytest.raises(ValueError, match=r"modes must be at most 300, got 5000 .*; keep the modes"):
+        scene.reduce(modes=5000)
+    with pytest.raises(ValueError, match="modes must be at most 300, got 5001 "):
+        scene.reduce(modes=[0, 5000])
+    with pytest.raises(ValueError, match=r"elements must be at most 10000, .* got 1000000000 "):
+        scene.matrices(elements=10**9)
     with pytest.raises(ValueError, match=r"z must lie on the beam, .* got \[0.3\] in probes"):
         scene.matrices(probes=[0.1, 0.3])
     with pytest.raises(ValueError, match=r"probes\[0\] must be finite"):

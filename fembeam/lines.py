@@ -1,0 +1,151 @@
+"""Periodic signals as equally spaced lines, shared by noise and measured records, and the checks signals share.
+
+    s(t) = Re Σ_j a_j exp(i (first + j) Δω t)
+
+The lines are known, hence every derivative is exact: multiply by (i k Δω)^n.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+HERMITE_CONSTANT = 46080.0  # |error| <= h^6/46080 max|s^(6)| for the quintic Hermite interpolant: 6! * 2^6
+OVERSAMPLING = 8  # grid points per period of the top line when the peak is bounded
+FINEST_RTOL = 1e-13  # finer is below the rounding of the FFT
+
+
+def number(name: str, value: Any, above: float = -math.inf, least: float = -math.inf) -> float:
+    """The value as a finite float above one bound and not below another, or a clear error."""
+    try:
+        result = float(value)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} must be a number, got {value!r}") from None
+    if not (math.isfinite(result) and result > above and result >= least):
+        bound = f" above {above:g}" if above > -math.inf else f" of at least {least:g}"
+        raise ValueError(f"{name} must be finite{bound if max(above, least) > -math.inf else ''}, got {value!r}")
+    return result
+
+
+def frozen(values: ArrayLike, dtype: type = np.float64) -> NDArray[Any]:
+    """A read-only copy, so that neither side can change the other's numbers."""
+    result: NDArray[Any] = np.array(values, dtype=dtype)
+    result.flags.writeable = False
+    return result
+
+
+def checked_band(name: str, band: Any) -> tuple[float, float]:
+    """The band as two floats 0 <= lo < hi, or a clear error."""
+    try:
+        lo, hi = band
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} must be a pair (lo, hi) in rad/s, got {band!r}") from None
+    lo, hi = number(f"{name}[0]", lo, least=0.0), number(f"{name}[1]", hi, least=0.0)
+    if not lo < hi:
+        raise ValueError(f"{name} must run from lo to hi > lo in rad/s, got ({lo:g}, {hi:g}); swap or widen it")
+    return lo, hi
+
+
+def checked_order(order: Any) -> int:
+    """The number of derivatives as an int >= 0, or a clear error."""
+    if isinstance(order, bool) or not isinstance(order, (int, np.integer)) or order < 0:
+        raise ValueError(f"order of the derivative must be an integer of at least 0, got {order!r}")
+    return int(order)
+
+
+@dataclass(frozen=True, eq=False)
+class LineSpectrum:
+    """A periodic signal s(t) = Re Σ_j amplitude_j exp(i (first + j) spacing t).
+
+    Parameters
+    ----------
+    spacing : float
+        Δω in rad/s; the signal repeats after 2π/Δω.
+    first : int
+        Number k >= 1 of the first line.
+    amplitude : complex array, shape (n,)
+        Complex amplitudes of the lines first, first + 1, …
+    """
+
+    spacing: float
+    first: int
+    amplitude: NDArray[np.complex128]
+
+    @property
+    def omega(self) -> NDArray[np.float64]:
+        """Angular frequencies of the lines in rad/s, shape (n,)."""
+        return self.spacing * (self.first + np.arange(self.amplitude.size, dtype=np.float64))
+
+    @property
+    def top(self) -> int:
+        """Number of the highest line."""
+        return self.first + self.amplitude.size - 1
+
+    @property
+    def period(self) -> float:
+        """Seconds after which the signal repeats."""
+        return 2 * math.pi / self.spacing
+
+    @property
+    def rms(self) -> float:
+        """Root mean square over one period, exact by Parseval."""
+        return float(np.linalg.norm(self.amplitude)) / math.sqrt(2)
+
+    def derivative(self, order: int) -> LineSpectrum:
+        """d^order s/dt^order; a negative order integrates, without constants."""
+        unit = (1, 1j, -1, -1j)[order % 4]  # i^order without rounding
+        return replace(self, amplitude=unit * self.omega**order * self.amplitude)
+
+    def grid(self, n: int) -> NDArray[np.float64]:
+        """One period at n > 2 top equally spaced instants from t = 0, by FFT."""
+        from scipy.fft import irfft
+
+        half = np.zeros(n // 2 + 1, dtype=np.complex128)
+        half[self.first : self.top + 1] = self.amplitude / 2
+        return irfft(half, n, norm="forward")
+
+    def at(self, t: ArrayLike) -> Any:
+        """The sum at any instants; exp(i k Δω t) is split in k = a + b, which leaves a matrix product."""
+        times = np.asarray(t, dtype=np.float64)
+        width = math.ceil(math.sqrt(self.amplitude.size))
+        rows = math.ceil(self.amplitude.size / width)
+        table = np.zeros(rows * width, dtype=np.complex128)
+        table[: self.amplitude.size] = self.amplitude
+        low = 1j * self.spacing * np.arange(width)
+        high = 1j * self.spacing * (self.first + width * np.arange(rows))
+        flat, result = times.ravel(), np.empty(times.size)
+        chunk = max(1, 2**19 // width)  # some tens of MB at a time
+        for i in range(0, times.size, chunk):
+            part = flat[i : i + chunk, None]
+            inner = np.exp(low * part) @ table.reshape(rows, width).T
+            result[i : i + chunk] = np.einsum("ij,ij->i", np.exp(high * part), inner).real
+        return result.reshape(times.shape)[()]
+
+    def peak(self) -> float:
+        """Upper bound of |s|, at most 8 % above the maximum.
+
+        A trigonometric polynomial of degree N, sampled at M > 2N points, obeys
+        max|s| <= max|samples| / cos(π N/M): H. Ehlich, K. Zeller, Math. Zeitschrift 86 (1964) 41.
+        """
+        return float(np.abs(self.grid(OVERSAMPLING * self.top)).max()) / math.cos(math.pi / OVERSAMPLING)
+
+    def nodes(self, duration: float, rtol: float) -> tuple[float, NDArray[np.float64]]:
+        """Rows [s, s', s''] so dense that quintic Hermite interpolation errs by at most rtol rms(s)."""
+        from scipy.fft import next_fast_len
+
+        if not FINEST_RTOL <= rtol < 1:
+            raise ValueError(f"rtol must lie in [{FINEST_RTOL:g}, 1), got {rtol!r}")
+        sixth = self.derivative(6).peak()
+        widest = (HERMITE_CONSTANT * rtol * self.rms / sixth) ** (1 / 6) if sixth > 0 else self.period
+        n = next_fast_len(max(math.ceil(self.period / widest), 2 * self.top + 1), real=True)
+        dt = self.period / n
+        values = np.empty((math.ceil(duration / dt) + 1, 3))
+        for order in range(3):
+            wave = self.derivative(order).grid(n)
+            values[:n, order] = wave[: len(values)]
+            values[n:, order] = wave[: max(0, len(values) - n)]  # the last node may close the period
+        return dt, values

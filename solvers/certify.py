@@ -1,0 +1,184 @@
+r"""Flight without contact, evaluated exactly, and steps that provably miss no contact.
+
+With ε_b = √(v_b² + k_b p_b²), which no damped block increases, M = Σ weight_b ε_b bounds |δ̈| from now on. A stop at
+distance g = -δ that opens at the rate v = -δ̇ cannot be reached before
+
+    τ = (v + √(v² + 2 M g))/M,
+
+so steps of at most τ are safe. Close to a contact τ tends to the root from below; within reach of a Taylor
+polynomial of order 6 the root is found on that polynomial, which is exact to rounding there.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from solvers.collocation import account_flight
+from solvers.flight import ORDER, add_signals, add_taylor, cell_of, energy_norms, level_within, taylor, turn
+from solvers.kernels import copy, dot, indentation, inlined, kernel
+from solvers.state import SAMPLED, STEPS, T, rate_tolerance, surface_tolerance
+
+_REFRESH = 8  # flight steps between two evaluations of the bound
+
+
+@kernel
+def _signal_bound(problem, j, cell):
+    """Bound of |s| on a cell: the largest Bézier coefficient of the quintic."""
+    dt = problem.table_dt[j]
+    row = problem.table_start[j] + cell
+    a, b = problem.table[row], problem.table[row + 1]
+    da, db = 0.2 * dt * a[1], 0.2 * dt * b[1]
+    bound = max(abs(a[0]), abs(b[0]), abs(a[0] + da), abs(b[0] - db))
+    bound = max(bound, abs(a[0] + 2.0 * da + 0.05 * dt * dt * a[2]))
+    return max(bound, abs(b[0] - 2.0 * db + 0.05 * dt * dt * b[2]))
+
+
+@inlined
+def _acceleration_bound(problem, tables, s, norms, signal_bounds, horizon):
+    """M: bound of |δ̈| of stop s over the horizon, signals included."""
+    n = problem.k.size
+    total = dot(tables.weight[s], norms, n)
+    for j in range(problem.table_dt.size):
+        load = problem.table_load[j]
+        growth = dot(tables.weight[s], tables.load_norm[load], n)
+        total += signal_bounds[j] * (horizon * growth + abs(tables.direct[s, load]))
+    return total
+
+
+@inlined
+def _safe(g, v, bound):
+    """Time before which a stop at distance g, opening at v, cannot be reached."""
+    if bound <= 0.0:
+        return g / -v if v < 0.0 else np.inf
+    root = math.sqrt(v * v + 2.0 * bound * max(g, 0.0))
+    return (v + root) / bound if v >= 0.0 else 2.0 * max(g, 0.0) / (root - v)
+
+
+@kernel
+def _first_root(problem, terms, s, x, longest, values):
+    """First time in [0, longest] at which δ becomes positive on the Taylor polynomial; -1 if it does not."""
+    for i in range(ORDER + 1):
+        values[i] = dot(problem.read[s], terms[i], 2 * problem.k.size)
+    values[0] -= problem.gap[s]
+    if abs(values[0]) <= surface_tolerance(problem, s, x) and abs(values[1]) <= rate_tolerance(problem, s, x):
+        values[0], values[1] = 0.0, 0.0  # at rest on the surface: the acceleration decides
+    if values[0] >= 0.0 and (values[1] > 0.0 or (values[1] == 0.0 and values[2] > 0.0)):
+        return 0.0
+    end = longest
+    if values[1] > 0.0 and _polynomial(values, 1, longest) < 0.0:  # δ has its maximum inside
+        end = _bisect(values, 1, -1.0, 0.0, longest)
+    if not _polynomial(values, 0, end) > 0.0:
+        return -1.0
+    return _bisect(values, 0, 1.0, 0.0, end)
+
+
+@inlined
+def _polynomial(values, derivative, x):
+    """Taylor polynomial of a derivative at x."""
+    total = values[ORDER]
+    for i in range(ORDER - 1, derivative - 1, -1):
+        total = values[i] + x / (i + 1.0 - derivative) * total
+    return total
+
+
+@kernel
+def _bisect(values, derivative, sign, a, b):
+    """Newton with bisection as its guard for the sign change of a derivative in [a, b]."""
+    x = b
+    for _ in range(60):
+        f = sign * _polynomial(values, derivative, x)
+        if f > 0.0:
+            b = x
+        else:
+            a = x
+        slope = sign * _polynomial(values, derivative + 1, x)
+        step = f / slope if slope != 0.0 else np.inf
+        following = x - step
+        if not a < following < b:
+            following = 0.5 * (a + b)
+        if following == x or abs(following - x) <= 1e-17 * b:
+            break
+        x = following
+    return x
+
+
+@kernel
+def _energetic(problem, norms):
+    """Fastest block that carries more than 1e-10 of the energy, rad/s."""
+    total, fastest = 0.0, 1e-3
+    for b in range(problem.k.size):
+        total += norms[b] ** 2
+    for b in range(problem.k.size):
+        if norms[b] ** 2 > 1e-10 * total:
+            fastest = max(fastest, math.sqrt(problem.k[b]) + problem.c[b])
+    return fastest
+
+
+@kernel
+def fly(problem, tables, state, space, t_end, budget, out, dt, ledger):
+    """Fly until a stop is reached (returns its index), the end (-1), or the budget is spent (-2).
+
+    Steps end on the output times too: flight is exact, so that this costs nothing but the steps.
+    """
+    stops, size, now = problem.gap.size, 2 * problem.k.size, state.now
+    shortest = tables.h[tables.h.size - 1]
+    sampled = problem.table_dt.size > 0
+    dt_cell = problem.table_dt[0] if sampled else np.inf
+    for count in range(budget):
+        if state.count[SAMPLED] < out.shape[0] and state.count[SAMPLED] * dt <= now[T]:
+            copy(state.x, out[state.count[SAMPLED]], state.x.size)
+            state.count[SAMPLED] += 1
+        if now[T] >= t_end:
+            return -1
+
+        # --- how far the output, the end and the signals' cell allow
+        target = min(t_end, state.count[SAMPLED] * dt) if state.count[SAMPLED] < out.shape[0] else t_end
+        span, rest, offset = target - now[T], np.inf, 0.0
+        if sampled:
+            cell, offset = cell_of(problem, now[T])
+            rest = max(dt_cell - offset, 1e-9 * dt_cell)
+            for j in range(problem.table_dt.size):
+                space.bounds[j] = _signal_bound(problem, j, cell)
+        if sampled or count % _REFRESH == 0:
+            energy_norms(problem, state.x, space.norms)
+            for s in range(stops):
+                space.m[s] = _acceleration_bound(problem, tables, s, space.norms, space.bounds, rest)
+        span = min(span, rest)
+        if ledger:
+            span = min(span, 3.0 / _energetic(problem, space.norms))
+            copy(state.x, space.x_new, state.x.size)
+
+        # --- how far no stop can be reached
+        for s in range(stops):
+            g, v = -indentation(problem, s, state.x), -dot(problem.read_rate[s], state.x, size)
+            span = min(span, _safe(g, v, space.m[s]))
+
+        # --- go: a Taylor step that looks for roots, a whole cell, or a tabulated step
+        stop = -1
+        if span < shortest:
+            taylor(problem, state.x, now[T], space.terms, space.six)
+            h = min(shortest, target - now[T], rest)
+            for s in range(stops):
+                root = _first_root(problem, space.terms, s, state.x, h, space.values)
+                if root >= 0.0:
+                    h, stop = root, s
+            add_taylor(space.terms, state.x, h, size)
+        elif span == rest and abs(offset) < 1e-7 * dt_cell:
+            h = rest
+            turn(problem, tables.cell[0], tables.cell[1], state.x)
+            add_signals(problem, tables.cell_signal, state.x, now[T], space.six)
+        else:
+            level = level_within(tables, span)
+            h = tables.h[level]
+            turn(problem, tables.propagator[level, 0], tables.propagator[level, 1], state.x)
+            if sampled:
+                add_signals(problem, tables.signal[level], state.x, now[T], space.six)
+        if ledger:
+            account_flight(problem, tables, state, space, h, space.x_new)
+        now[T] = target if now[T] + h >= target else now[T] + h
+        state.count[STEPS] += 1
+        if stop >= 0:
+            return stop
+    return -2
