@@ -36,7 +36,7 @@ from solvers.collocation import (
     step_error,
 )
 from solvers.flight import energy_norms
-from solvers.forcing import Forcing
+from solvers.forcing import Forcing, on_one_grid, tones_as_nodes
 from solvers.kernels import OPTIONS, PROBLEM, Problem, contact_forces, copy, dot, indentation, inlined, kernel
 from solvers.regular import INDENTATION, ROOT, TIME, regular_step
 from solvers.state import (
@@ -403,6 +403,7 @@ class Engine:
 
     def __init__(self, method: Exponential, system: System, z: Array, forcing: Forcing, duration: float) -> None:
         self.method, self.duration = method, duration
+        forcing = on_one_grid(_without_resonance(system, forcing, duration, method.rtol), duration)
         prepared = _prepared(system, forcing)
         self.tables, steady = prepared.tables, prepared.steady
         self.problem = problem = prepared.problem._replace(table=forcing.table, table_start=forcing.table_start)
@@ -462,6 +463,20 @@ def _prepared(system: System, forcing: Forcing) -> _Prepared:
     return system.kept[key]
 
 
+def _without_resonance(system: System, forcing: Forcing, duration: float, rtol: float) -> Forcing:
+    """Tones on the frequency of a block hardly damped have no steady response: they are sampled instead."""
+    blocks = system.blocks
+    resonant = []
+    for i, (omega, load) in enumerate(zip(forcing.tone_omega, forcing.tone_load, strict=True)):
+        distance = np.abs(blocks.k - omega**2 + 1j * omega * blocks.c)
+        near = distance <= 1e-6 * np.maximum(blocks.k, omega**2)
+        vector = blocks.inverse[:, system.size :] @ np.linalg.solve(system.M, system.loads[load][0])
+        pushed = np.hypot(*np.split(vector, 2)) > 0.0
+        if np.any(near & pushed):
+            resonant.append(i)
+    return tones_as_nodes(forcing, resonant, duration, rtol) if resonant else forcing
+
+
 def _signal_rows(problem: Problem, forcing: Forcing) -> Array:
     """Each load's tones as a row of the state: Re(a e^{iΩt}) = Re a · p + Im a/Ω · v."""
     tones, N = len(forcing.tone_omega), len(problem.k)
@@ -497,6 +512,7 @@ def with_tones(problem: Problem, forcing: Forcing) -> tuple[Problem, Array]:
         lp, lv = problem.load[load, :n] * amplitude, problem.load[load, n:] * amplitude
         # (iΩ - A)⁻¹ of a block: [[iΩ + c, 1], [-k, iΩ]] / (k - Ω² + iΩc)
         denominator = problem.k - omega**2 + 1j * omega * problem.c
+        denominator = np.where((lp == 0.0) & (lv == 0.0), 1.0, denominator)
         response = np.concatenate(
             [((1j * omega + problem.c) * lp + lv) / denominator, (-problem.k * lp + 1j * omega * lv) / denominator]
         )

@@ -10,7 +10,7 @@ A signal is any callable t -> value that broadcasts. It is handed over as exactl
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -56,6 +56,56 @@ def hand_over(signals: list[Signal], duration: float, rtol: float) -> Forcing:
         starts.astype(np.int64),
         np.array([load for _, _, load in tables], dtype=np.int64),
     )
+
+
+def tones_as_nodes(forcing: Forcing, chosen: list[int], duration: float, rtol: float) -> Forcing:
+    """The same forcing with some tones as node tables: quintics within ``rtol`` of them, |error| <= (ω dt)⁶/46080."""
+    tables = [forcing.table]
+    for i in chosen:
+        omega, amplitude = forcing.tone_omega[i], forcing.tone_amplitude[i]
+        longest = (4608.0 * rtol) ** (1.0 / 6.0) / omega if omega > 0.0 else duration
+        cells = max(1, int(np.ceil(duration / longest)))
+        t = np.linspace(0.0, duration, cells + 1)
+        wave = amplitude * np.exp(1j * omega * t)
+        tables.append(np.stack([wave.real, (1j * omega * wave).real, (-(omega**2) * wave).real], axis=1))
+    kept = np.setdiff1d(np.arange(len(forcing.tone_omega)), chosen)
+    sizes = [len(table) for table in tables[1:]]
+    return Forcing(
+        forcing.tone_omega[kept],
+        forcing.tone_amplitude[kept],
+        forcing.tone_load[kept],
+        np.ascontiguousarray(np.concatenate(tables)),
+        np.concatenate((forcing.table_dt, [duration / (size - 1) for size in sizes])),
+        np.concatenate((forcing.table_start, forcing.table_start[-1] + np.cumsum(sizes, dtype=np.int64))),
+        np.concatenate((forcing.table_load, forcing.tone_load[chosen])),
+    )
+
+
+def on_one_grid(forcing: Forcing, duration: float) -> Forcing:
+    """The same forcing with every node table on the finest table's grid; coarser quintics are evaluated there."""
+    dt = forcing.table_dt.min(initial=np.inf)
+    if np.all(forcing.table_dt == dt):
+        return forcing
+    cells = int(np.ceil(duration / dt * (1.0 - 1e-12)))
+    tables = []
+    for j, own in enumerate(forcing.table_dt):
+        rows = forcing.table[forcing.table_start[j] : forcing.table_start[j + 1]]
+        tables.append(rows[: cells + 1] if own == dt else _quintic(rows, own, np.arange(cells + 1) * dt))
+    starts = np.cumsum([0] + [len(table) for table in tables]).astype(np.int64)
+    return replace(
+        forcing,
+        table=np.ascontiguousarray(np.concatenate(tables)),
+        table_dt=np.full(len(tables), dt),
+        table_start=starts,
+    )
+
+
+def _quintic(rows: Array, dt: float, t: Array) -> Array:
+    """s, s', s'' of a node table's quintics at times t."""
+    from scipy.interpolate import BPoly
+
+    spline = BPoly.from_derivatives(np.arange(len(rows)) * dt, rows)
+    return np.stack([spline(t), spline(t, 1), spline(t, 2)], axis=1)
 
 
 def _check_nodes(rows: Array, dt: float, duration: float, load: int) -> None:
