@@ -89,10 +89,10 @@ def _check_neighbours() -> None:
     for name in ("contacts", "reduction", "solvers"):
         spec = find_spec(name)
         if spec is None or spec.origin is None or Path(spec.origin).resolve().parent.parent != home:
-            found = "nothing" if spec is None else spec.origin or "a folder without __init__.py"
+            found = "nothing" if spec is None else spec.origin or ", ".join(spec.submodule_search_locations or ())
             raise ImportError(
                 f"fembeam needs its own package {name!r} beside it in {home}, but Python finds {found}; "
-                "rename that module or put fembeam's folder first on sys.path"
+                "rename or remove that, or put fembeam's folder first on sys.path"
             )
 
 

@@ -17,13 +17,13 @@ import numpy as np
 
 from solvers.collocation import account_flight
 from solvers.flight import ORDER, add_signals, add_taylor, cell_of, energy_norms, level_within, taylor, turn
-from solvers.kernels import copy, dot, indentation, inlined, kernel
+from solvers.kernels import copy, dot, indentation, inlined, inner
 from solvers.state import SAMPLED, STEPS, T, rate_tolerance, surface_tolerance
 
 _REFRESH = 8  # flight steps between two evaluations of the bound
 
 
-@kernel
+@inner
 def _signal_bound(problem, j, cell):
     """Bound of |s| on a cell: the largest Bézier coefficient of the quintic."""
     dt = problem.table_dt[j]
@@ -56,7 +56,7 @@ def _safe(g, v, bound):
     return (v + root) / bound if v >= 0.0 else 2.0 * max(g, 0.0) / (root - v)
 
 
-@kernel
+@inner
 def _first_root(problem, terms, s, x, longest, values):
     """First time in [0, longest] at which δ becomes positive on the Taylor polynomial; -1 if it does not."""
     for i in range(ORDER + 1):
@@ -83,7 +83,7 @@ def _polynomial(values, derivative, x):
     return total
 
 
-@kernel
+@inner
 def _bisect(values, derivative, sign, a, b):
     """Newton with bisection as its guard for the sign change of a derivative in [a, b]."""
     x = b
@@ -104,7 +104,7 @@ def _bisect(values, derivative, sign, a, b):
     return x
 
 
-@kernel
+@inner
 def _energetic(problem, norms):
     """Fastest block that carries more than 1e-10 of the energy, rad/s."""
     total, fastest = 0.0, 1e-3
@@ -116,7 +116,7 @@ def _energetic(problem, norms):
     return fastest
 
 
-@kernel
+@inner
 def fly(problem, tables, state, space, t_end, budget, out, dt, ledger):
     """Fly until a stop is reached (returns its index), the end (-1), or the budget is spent (-2).
 

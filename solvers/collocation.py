@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solvers.flight import add_taylor, energy_norms, taylor, turn
-from solvers.kernels import contact_forces, contact_gradient, copy, dot, inlined, kernel, table_value
+from solvers.kernels import contact_forces, contact_gradient, copy, dot, inlined, inner, table_value
 from solvers.state import CALLS, PEAK_DELTA, PEAK_FORCE, T, touching
 from solvers.tables import S, propagate
 
@@ -53,7 +53,7 @@ class Space(NamedTuple):
     work: Any  # (18, x.size + 2) of the Runge–Kutta steps
 
 
-@kernel
+@inner
 def sample_signals(problem, tables, space, family, t, h):
     """Values of the sampled signals at the nodes of a step."""
     for j in range(problem.table_dt.size):
@@ -94,7 +94,7 @@ def respond(problem, tables, state, space, family, level, s):
                     target[i] += dot(matrix[i], space.force[u], S)
 
 
-@kernel
+@inner
 def linearise(problem, tables, state, space, family, level):
     """J = 1 - ∂law/∂(δ, δ̇) ∂(δ, δ̇)/∂F of all nodes of all stops in contact, row by row; returns its size."""
     stops, row = problem.gap.size, 0
@@ -121,7 +121,7 @@ def linearise(problem, tables, state, space, family, level):
     return row
 
 
-@kernel
+@inner
 def factorise(matrix, pivots, n):
     """LU factors with partial pivoting, in place (Golub, Van Loan, Matrix Computations, Section 3.4)."""
     for k in range(n):
@@ -138,7 +138,7 @@ def factorise(matrix, pivots, n):
                 matrix[i, j] -= matrix[i, k] * matrix[k, j]
 
 
-@kernel
+@inner
 def substitute(matrix, pivots, n, x):
     """Solve with the factors, in place."""
     for k in range(n):
@@ -153,7 +153,7 @@ def substitute(matrix, pivots, n, x):
         x[i] /= matrix[i, i]
 
 
-@kernel
+@inner
 def newton(problem, tables, state, space, family, level, accuracy):
     """Newton's method for the forces, where a stiff or strongly damped law defeats the plain iteration."""
     stops = problem.gap.size
@@ -297,7 +297,7 @@ def finish_step(problem, tables, state, space, family, level):
     state.now[T] += h
 
 
-@kernel
+@inner
 def _legendre(coefficients, x):
     """Legendre sum at x in [-1, 1] by Clenshaw's recurrence."""
     later, latest = 0.0, 0.0
@@ -309,7 +309,7 @@ def _legendre(coefficients, x):
     return coefficients[0] + x * later - 0.5 * latest
 
 
-@kernel
+@inner
 def _peak(tables, family, values, known, coefficients):
     """Largest value of the polynomial through the node values, if it exceeds the known peak."""
     place = 0
@@ -350,7 +350,7 @@ def _peak(tables, family, values, known, coefficients):
     return best
 
 
-@kernel
+@inner
 def _on_nodes(tables, family, exponent, values, sigma, basis):
     """Value at σ of the force whose node values on a family's nodes are given."""
     nodes = tables.nodes[family]
@@ -390,7 +390,7 @@ def powers(problem, tables, t, x):
     return gain, loss
 
 
-@kernel
+@inner
 def inside(problem, tables, state, space, family, h, span, row):
     """State at ``span`` after the start of a step of length h, by quadrature of its forces; ``row`` holds the start."""
     stops, n = problem.gap.size, problem.k.size
@@ -424,7 +424,7 @@ def inside(problem, tables, state, space, family, h, span, row):
                 row[2 * n + 3 + 2 * u] += impulse
 
 
-@kernel
+@inner
 def account(problem, tables, state, space, family, h, length, x, row):
     """Add to the ledger of ``row`` what loads and damping do over ``length`` of a step of length h from ``x`` on."""
     size, inner = 2 * problem.k.size, space.work[16]
@@ -437,7 +437,7 @@ def account(problem, tables, state, space, family, h, length, x, row):
         row[size + 1] += length * tables.gauss[1, i] * loss
 
 
-@kernel
+@inner
 def account_flight(problem, tables, state, space, h, x):
     """The same for a whole flight step: on its Taylor polynomial where that reaches, else as above."""
     if tables.fastest * h > 0.6:
@@ -456,7 +456,7 @@ def account_flight(problem, tables, state, space, h, x):
         state.x[size + 1] += weight * loss
 
 
-@kernel
+@inner
 def contact_time(problem, tables, state, space, s, speed):
     """Duration a free impact at this speed would have, from the law's energy: T = 3.2 δ_m/v."""
     speed = max(speed, 1e-12)

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.integrate import DOP853
 
 from solvers.forcing import Forcing
-from solvers.kernels import copy, kernel, rhs
+from solvers.kernels import copy, inner, kernel, rhs
 from solvers.system import Array, System
 
 STAGES, EXTENDED = 12, 16
@@ -49,7 +49,7 @@ def step(problem, t, h, x, rate, piece, entry_rate, x_new, rate_new, dense, work
     return error, calls
 
 
-@kernel
+@inner
 def _stage(i, h, x, work, trial):
     """State at which stage i is evaluated."""
     for e in range(x.size):
@@ -59,7 +59,7 @@ def _stage(i, h, x, work, trial):
         trial[e] = x[e] + h * total
 
 
-@kernel
+@inner
 def _error(size, h, x, x_new, work, rtol, atol):
     """DOP853's mixed estimate in the energy-like norm: positions and rates against their largest."""
     # one scale for all positions and one for all rates: a mode at rest must not dictate the step
@@ -82,7 +82,7 @@ def _error(size, h, x, x_new, work, rtol, atol):
     return abs(h) * e5 / math.sqrt((e5 + 0.01 * e3) * size)
 
 
-@kernel
+@inner
 def _interpolant(h, x, x_new, work, dense):
     """Rows F of x + θ(F₀ + (1-θ)(F₁ + θ(F₂ + (1-θ)(F₃ + ...))))."""
     for e in range(x.size):

@@ -6,7 +6,7 @@ Inside a step the indentation is the polynomial of the method's dense output,
 
 import numpy as np
 
-from solvers.kernels import dot, indentation, kernel
+from solvers.kernels import dot, indentation, inner
 from solvers.state import surface_tolerance
 
 # finer near 0, where a contact just left may come back
@@ -15,7 +15,7 @@ UNRESOLVED = -1.0
 NONE = 2.0
 
 
-@kernel
+@inner
 def polynomial(coefficients, theta):
     """Value at θ of the nested form; coefficients (δ₀, r₀ ... r₆)."""
     u = 1.0 - theta
@@ -23,7 +23,7 @@ def polynomial(coefficients, theta):
     return r[0] + theta * (r[1] + u * (r[2] + theta * (r[3] + u * (r[4] + theta * (r[5] + u * (r[6] + theta * r[7]))))))
 
 
-@kernel
+@inner
 def coefficients_of(row, offset, x, dense, out):
     """Nested coefficients of ``row·z - offset``."""
     size = row.size
@@ -32,7 +32,7 @@ def coefficients_of(row, offset, x, dense, out):
         out[1 + i] = dot(row, dense[i], size)
 
 
-@kernel
+@inner
 def _maximum(coefficients, level, sign, a, b):
     """Golden-section place of the largest sign·(δ - level) on [a, b]."""
     ratio = 0.6180339887498949
@@ -46,7 +46,7 @@ def _maximum(coefficients, level, sign, a, b):
     return 0.5 * (a + b)
 
 
-@kernel
+@inner
 def _root(coefficients, level, sign, a, b):
     """Bisection for the outward crossing in [a, b]."""
     for _ in range(50):
@@ -58,7 +58,7 @@ def _root(coefficients, level, sign, a, b):
     return b
 
 
-@kernel
+@inner
 def crossing(coefficients, rates, level, sign, tolerance):
     """First θ at which sign·(δ - level) becomes positive; NONE, or UNRESOLVED when it does so at once.
 
@@ -82,7 +82,7 @@ def crossing(coefficients, rates, level, sign, tolerance):
     return NONE
 
 
-@kernel
+@inner
 def first_event(problem, x, dense, piece, coefficients):
     """(θ, stop, direction ±1) of the earliest crossing of the step by any stop."""
     theta, stop, direction = NONE, -1, 0
@@ -100,7 +100,7 @@ def first_event(problem, x, dense, piece, coefficients):
     return theta, stop, direction
 
 
-@kernel
+@inner
 def entry_by_sign(problem, x, x_new, piece):
     """(θ, stop) of the stop that is inside at the end of a step but was not at its start; the paper's test."""
     theta, stop = NONE, -1

@@ -37,7 +37,7 @@ from solvers.collocation import (
 )
 from solvers.flight import energy_norms
 from solvers.forcing import Forcing, on_one_grid, tones_as_nodes
-from solvers.kernels import OPTIONS, PROBLEM, Problem, contact_forces, copy, dot, indentation, inlined, kernel
+from solvers.kernels import OPTIONS, PROBLEM, Problem, contact_forces, copy, dot, indentation, inlined, inner, kernel
 from solvers.regular import INDENTATION, ROOT, TIME, regular_step
 from solvers.state import (
     AT_ONCE,
@@ -142,7 +142,7 @@ def _nearest_surface(problem, state):
     return near, stop, direction
 
 
-@kernel
+@inner
 def _land(problem, tables, state, space, numbers, stop, direction, near, rtol, t_end, out, dt, ledger):
     """Try to land on the border ahead by one regular step; whether it succeeded."""
     size, t = state.x.size, state.now[T]
@@ -237,7 +237,7 @@ def _try(problem, tables, state, space, numbers, last, family, level, rtol):
     return min(error, 1.0) if bottom else error
 
 
-@kernel
+@inner
 def _record(problem, tables, state, space, family, level, t_end, out, dt, ledger):
     """Samples inside the converged step, and the state at the end of the run if that lies inside."""
     t, h = state.now[T], tables.step[level]
@@ -256,7 +256,7 @@ def _record(problem, tables, state, space, family, level, t_end, out, dt, ledger
         state.count[SAMPLED] += 1
 
 
-@kernel
+@inner
 def touch(problem, tables, state, space, numbers, last, t_end, rtol, log, out, dt, ledger):
     """One accepted step in contact: land if a border is near, else collocate; returns a status code."""
     near, stop, direction = _nearest_surface(problem, state)
@@ -307,7 +307,7 @@ def touch(problem, tables, state, space, numbers, last, t_end, rtol, log, out, d
     return RUNNING
 
 
-@kernel
+@inner
 def _adapt(tables, numbers, last, level, family, wanted, error):
     """Size of the next step from the error of this one."""
     longer = 2.0 / _ORDER * math.log2(_GOAL / max(error, 1e-30))  # in levels
@@ -410,13 +410,11 @@ class Engine:
         stops, loads, size = len(problem.gap), len(problem.load), 2 * len(problem.k)
         self.back = prepared.back
         self.state: State = new_state(_start(z, steady, forcing), stops)
-        self.space = Space(
-            *(np.zeros(shape) for shape in (self.state.x.size, (8, size), 6, 7, size // 2, loads, stops)),
-            *(np.zeros(shape) for shape in ((stops, S), (stops, S), S, (stops, 2, S), (stops + loads, S), S)),
-            *(np.zeros(shape) for shape in ((stops, S), (stops, 3, S), (stops * S, stops * S), stops * S)),
-            np.zeros(stops * S, dtype=np.int64),
-            np.zeros((18, self.state.x.size + 2)),
-        )
+        shapes = [self.state.x.size, (8, size), 6, 7, size // 2, loads, stops]
+        shapes += [(stops, S), (stops, S), S, (stops, 2, S), (stops + loads, S), S, (stops, S), (stops, 3, S)]
+        shapes += [(stops * S, stops * S), stops * S, stops * S, (18, self.state.x.size + 2)]
+        types_of = ["i8" if name == "pivots" else "f8" for name in Space._fields]
+        self.space = Space._make(np.zeros(shape, kind) for shape, kind in zip(shapes, types_of, strict=True))
         self.numbers = np.zeros(2 + stops)
         self.last = np.zeros(5, dtype=np.int64)
 

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from solvers.kernels import inlined, kernel
+from solvers.kernels import inlined, inner
 
 ORDER = 6
 
@@ -24,7 +24,7 @@ def level_within(tables, span):
     return level
 
 
-@kernel
+@inner
 def cell_of(problem, t):
     """(cell, offset) of the sampled signals' common grid."""
     dt = problem.table_dt[0]
@@ -33,7 +33,7 @@ def cell_of(problem, t):
     return cell, t - cell * dt
 
 
-@kernel
+@inner
 def signal_derivatives(problem, j, t, out):
     """s, s', ..., s⁽⁵⁾ of node table j at time t."""
     dt = problem.table_dt[j]
@@ -69,7 +69,7 @@ def turn(problem, alpha, beta, x):
         x[n + b] = alpha[b] * v - beta[b] * (problem.k[b] * p + problem.c[b] * v)
 
 
-@kernel
+@inner
 def add_signals(problem, response, x, t, six):
     """Add the response to the polynomial signals of the step that began at t."""
     size = 2 * problem.k.size
@@ -81,7 +81,7 @@ def add_signals(problem, response, x, t, six):
                 x[e] += six[i] * rows[i, e]
 
 
-@kernel
+@inner
 def taylor(problem, x, t, terms, six):
     """Rows y, y', ..., y⁽⁶⁾ at time t in flight."""
     n = problem.k.size
@@ -106,7 +106,7 @@ def taylor(problem, x, t, terms, six):
                     terms[ORDER + 1, n + b] = -problem.k[b] * p - problem.c[b] * v
 
 
-@kernel
+@inner
 def add_taylor(terms, x, span, size):
     """Taylor step of the given duration."""
     for e in range(size):

@@ -21,11 +21,11 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from solvers.forcing import Forcing
-from solvers.kernels import dot, kernel, rhs
+from solvers.kernels import dot, inner, kernel, rhs
 from solvers.system import Array, System
 
 
-@kernel
+@inner
 def hermite(h, x, rate, x_new, rate_new, dense):
     """Dense output of a step that has only its ends: the cubic Hermite interpolant."""
     for i in range(x.size):
@@ -52,7 +52,7 @@ def step(problem, t, h, x, rate, piece, entry_rate, x_new, rate_new, dense, work
     return 0.0, calls
 
 
-@kernel
+@inner
 def land(problem, t, h, x, rate, piece, entry_rate, stop, level, x_new, work):
     """Hénon's step of stop ``stop`` onto ``level``; returns its duration, or -1 where it fails (δ̇ near 0)."""
     size = 2 * problem.k.size

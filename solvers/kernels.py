@@ -17,9 +17,12 @@ from numba.extending import intrinsic
 
 OPTIONS: Any = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": False}
 kernel = njit(**OPTIONS)
-"""Decorator of every compiled function here. They allocate nothing, so reference counting is switched off: passing
-twenty arrays down a call would otherwise cost ten times the arithmetic of a two-mode step."""
-inlined = njit(**OPTIONS, forceinline=True)
+"""Decorator of the compiled functions Python calls. They allocate nothing, so reference counting is switched off:
+passing twenty arrays down a call would otherwise cost ten times the arithmetic of a two-mode step."""
+_INNER: Any = {**OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+inner = njit(**_INNER)
+"""The same for functions only kernels call: no wrappers, which would take most of their compile time."""
+inlined = njit(**_INNER, forceinline=True)
 """The same for what the innermost loops call, from few places: there even passing the arrays' descriptors costs more
 than the arithmetic. Everywhere else it would only cost compile time."""
 
@@ -101,7 +104,7 @@ def contact_forces(problem, stop, delta, delta_dot, entry_rate, force):
     _call_force(problem.law[stop], delta.size, delta, delta_dot, entry_rate, problem.parameters[stop], (force,))
 
 
-@kernel
+@inner
 def contact_gradient(problem, stop, delta, delta_dot, entry_rate, by_delta, by_rate, by_entry):
     """Derivatives of the forces, likewise."""
     for i in range(delta.size):
@@ -126,7 +129,7 @@ def dot(a, b, n):
     return total
 
 
-@kernel
+@inner
 def table_value(problem, j, t):
     """Quintic Hermite value of node table j at time t."""
     dt, start = problem.table_dt[j], problem.table_start[j]
@@ -143,7 +146,7 @@ def table_value(problem, j, t):
     return a[0] + x * (s0 + x * (s1 + x * (c3 + x * (c4 + x * c5))))
 
 
-@kernel
+@inner
 def add_loads(problem, t, x, rate):
     """Add all loads at time t to the state's rate and their power to the ledger."""
     size = 2 * problem.k.size
@@ -156,7 +159,7 @@ def add_loads(problem, t, x, rate):
         _add_load(problem, problem.table_load[j], table_value(problem, j, t), size, x, rate)
 
 
-@kernel
+@inner
 def _add_load(problem, load, value, size, x, rate):
     """One signal's share."""
     for i in range(size):

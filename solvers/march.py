@@ -15,7 +15,7 @@ from solvers.events import NONE, UNRESOLVED, coefficients_of, entry_by_sign, fir
 from solvers.forcing import Forcing
 from solvers.henon import hermite
 from solvers.henon import land as henon_landing
-from solvers.kernels import OPTIONS, PROBLEM, contact_forces, copy, dot, indentation, kernel, rhs
+from solvers.kernels import OPTIONS, PROBLEM, contact_forces, copy, dot, indentation, inner, rhs
 from solvers.state import (
     AT_ONCE,
     CALLS,
@@ -76,7 +76,7 @@ class Space(NamedTuple):
 SPACE = types.NamedTuple([_VECTOR, _VECTOR, _MATRIX, _MATRIX, _MATRIX], Space)
 
 
-@kernel
+@inner
 def _peaks(problem, state, space):
     """Largest indentation and force of the step just accepted, for every stop in contact."""
     delta_of, rate_of = space.coefficients[0], space.coefficients[1]
@@ -106,7 +106,7 @@ def _peaks(problem, state, space):
                 state.open[s, column] = max(state.open[s, column], best)
 
 
-@kernel
+@inner
 def _peak_value(problem, state, s, column, delta_of, rate_of, theta, batch):
     """Indentation or force at θ of the step."""
     batch[0] = polynomial(delta_of, theta)
@@ -117,7 +117,7 @@ def _peak_value(problem, state, s, column, delta_of, rate_of, theta, batch):
     return batch[2]
 
 
-@kernel
+@inner
 def _law_fails(problem, state, space, h):
     """Whether a law is not finite where an Euler step would take its stop."""
     batch = space.work[0]
@@ -131,7 +131,7 @@ def _law_fails(problem, state, space, h):
     return False
 
 
-@kernel
+@inner
 def _sample(state, space, h, out, dt):
     """Write the output samples that lie within the step."""
     t = state.now[T]
@@ -146,7 +146,7 @@ def _sample(state, space, h, out, dt):
         state.count[SAMPLED] += 1
 
 
-@kernel
+@inner
 def _land(step, problem, state, space, h, stop, level, rtol, atol):
     """Repeat the step with the duration that ends on ``level``: Newton on the true step; returns it, -1 if it fails."""
     tolerance = 4.0 * surface_tolerance(problem, stop, state.x)

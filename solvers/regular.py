@@ -3,7 +3,6 @@ r"""Runge–Kutta steps in a variable in which a contact is smooth: DOP853 with 
     TIME          dt = dt
     INDENTATION   dt = dδ/δ̇         lands exactly on a kink, or on another stop's surface
     ROOT          dt = 2u du/δ̇      u = √δ: lands exactly on δ = 0, where δ^{3/2} is singular in t
-    STRETCHED     dt = u dτ, u' = δ̇/2   analytic through entry and exit; u is carried as an unknown
 
 The unknowns are [p, v, ledger, t, u]. The error is estimated by a tenth of the embedded fifth-order difference: in
 these variables that stays a few times above the true one, where DOP853's own mixed estimate falls below it.
@@ -13,38 +12,50 @@ from __future__ import annotations
 
 from solvers.collocation import powers
 from solvers.dormand_prince import E5, STAGES, A
-from solvers.kernels import dot, kernel, rhs
+from solvers.kernels import contact_forces, dot, indentation, inlined, inner, table_value
 
-TIME, INDENTATION, ROOT, STRETCHED = range(4)
+TIME, INDENTATION, ROOT = range(3)
 
 
-@kernel
+@inlined
 def _rate(problem, tables, ledger, variable, stop, w, piece, entry_rate, out, batch):
-    """Derivative of the unknowns with respect to the chosen variable; ``w[-1]`` is u."""
-    size = w.size - 2
-    calls = rhs(problem, w[size], w, piece, entry_rate, out, batch)
-    out[2 * problem.k.size], out[2 * problem.k.size + 1] = 0.0, 0.0
-    if ledger:
-        gain, loss = powers(problem, tables, w[size], w)
-        out[2 * problem.k.size], out[2 * problem.k.size + 1] = gain, loss
-    delta_dot = dot(problem.read_rate[stop], w, 2 * problem.k.size)
-    u = w[size + 1]
+    """Derivative of the unknowns with respect to the chosen variable; ``w[-2:]`` is (t, u)."""
+    n, calls = problem.k.size, 0
+    size = 2 * n
+    for b in range(n):
+        out[b] = w[n + b]
+        out[n + b] = -problem.k[b] * w[b] - problem.c[b] * w[n + b]
+    for j in range(problem.table_dt.size):
+        value, load = table_value(problem, j, w[w.size - 2]), problem.load[problem.table_load[j]]
+        for e in range(size):
+            out[e] += load[e] * value
+    out[size], out[size + 1] = powers(problem, tables, w[w.size - 2], w) if ledger else (0.0, 0.0)
+    for s in range(problem.gap.size):
+        batch[2] = 0.0
+        batch[1] = dot(problem.read_rate[s], w, size)
+        if piece[s] > 0:
+            batch[0] = indentation(problem, s, w)
+            contact_forces(problem, s, batch[0:1], batch[1:2], entry_rate[s], batch[2:3])
+            calls += 1
+            for e in range(size):
+                out[e] += problem.push[s, e] * batch[2]
+        out[size + 2 + 2 * s] = batch[2] * batch[1]
+        out[size + 3 + 2 * s] = batch[2]
+    delta_dot, u = dot(problem.read_rate[stop], w, size), w[w.size - 1]
     if variable == TIME:
         factor = 1.0
     elif variable == INDENTATION:
         factor = 1.0 / delta_dot
-    elif variable == ROOT:
-        factor = 2.0 * u / delta_dot
     else:
-        factor = u
-    for e in range(size):
+        factor = 2.0 * u / delta_dot
+    for e in range(w.size - 2):
         out[e] *= factor
-    out[size] = factor
-    out[size + 1] = 1.0 if variable == ROOT else 0.5 * delta_dot if variable == STRETCHED else 0.0
+    out[w.size - 2] = factor
+    out[w.size - 1] = 1.0 if variable == ROOT else 0.0
     return calls
 
 
-@kernel
+@inner
 def regular_step(problem, tables, ledger, variable, stop, span, w, piece, entry_rate, work):
     """One DOP853 step of the chosen variable from ``w`` into ``work[-1]``; (error of δ̇ of the stop, law calls)."""
     size, calls = w.size, 0

@@ -9,7 +9,7 @@ import numpy as np
 from numba import types
 
 from solvers.forcing import Forcing
-from solvers.kernels import Problem, dot, indentation, kernel
+from solvers.kernels import Problem, dot, indentation, inner, kernel
 from solvers.result import Status
 from solvers.system import Array, System
 
@@ -49,7 +49,7 @@ STATE = types.NamedTuple(
 )
 
 
-@kernel
+@inner
 def surface_tolerance(problem, s, x):
     """Distance within which a stop counts as on a level: rounding of δ."""
     total = abs(problem.gap[s])
@@ -58,7 +58,7 @@ def surface_tolerance(problem, s, x):
     return 1e-15 * total + 1e-20
 
 
-@kernel
+@inner
 def rate_tolerance(problem, s, x):
     """Indentation rate below which a stop counts as at rest: rounding of δ̇."""
     total = 0.0
@@ -67,7 +67,7 @@ def rate_tolerance(problem, s, x):
     return 1e-15 * total
 
 
-@kernel
+@inner
 def _open(problem, state, s, t, delta_dot):
     """Latch the entry rate and begin a row of the contact log."""
     ledger = 2 * problem.k.size + 2 + 2 * s
@@ -111,7 +111,7 @@ def contact_row(problem, state, s, t_out, speed_out, row):
     row[9] = state.open[s, FLOORED]
 
 
-@kernel
+@inner
 def switch(problem, state, s, direction, log):
     """Move stop s one piece up or down; open or close its contact."""
     t = state.now[T]
@@ -127,7 +127,7 @@ def switch(problem, state, s, direction, log):
     state.now[LAST_EVENT] = t
 
 
-@kernel
+@inner
 def switch_on_surface(problem, state, log, locates):
     """Switch every stop that sits on a border of its piece and moves out of it; returns whether any did."""
     switched = False
@@ -145,7 +145,7 @@ def switch_on_surface(problem, state, log, locates):
     return switched
 
 
-@kernel
+@inner
 def touching(state):
     """Whether any stop is in contact."""
     most = 0

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from solvers.kernels import Problem, kernel
+from solvers.kernels import Problem, inner, kernel
 
 S = 8  # nodes of a contact step: 6 is a little faster at 1e-6, 10 and 12 bring nothing
 TAYLOR_REACH = 0.02  # |λ| x up to which a Taylor step of order 6 is exact to rounding
@@ -91,7 +91,7 @@ def _lagrange(nodes, sigma, out):
         out[j] = value
 
 
-@kernel
+@inner
 def _block_response(k, c, h, rate, power, exponent, nodes, gauss, out, basis):
     """out[i, j] = (α, β) of ∫_0^{t_i} E(t_i - τ) w(σ) L_j(σ)/w(σ_j) dτ; i = S is the end of the step."""
     count = nodes.size
