@@ -116,7 +116,7 @@ def _energetic(problem, norms):
     return fastest
 
 
-@inner
+@inlined
 def fly(problem, tables, state, space, t_end, budget, out, dt, ledger):
     """Fly until a stop is reached (returns its index), the end (-1), or the budget is spent (-2).
 

@@ -33,8 +33,8 @@ class Space(NamedTuple):
     """Working arrays of the exponential integrator; stops are the first index of the contact ones."""
 
     x_new: Any  # (x.size,)
-    terms: Any  # (8, 2N)
-    six: Any  # (6,)
+    terms: Any  # (7, 2N) derivatives of the state
+    six: Any  # (tables, 6) derivatives of the signals
     values: Any  # (7,)
     norms: Any  # (N,)
     bounds: Any  # (L,)

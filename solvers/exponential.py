@@ -37,7 +37,7 @@ from solvers.collocation import (
 )
 from solvers.flight import energy_norms
 from solvers.forcing import Forcing, on_one_grid, tones_as_nodes
-from solvers.kernels import OPTIONS, PROBLEM, Problem, contact_forces, copy, dot, indentation, inlined, inner, kernel
+from solvers.kernels import OPTIONS, PROBLEM, Problem, contact_forces, copy, dot, indentation, inlined, inner
 from solvers.regular import INDENTATION, ROOT, TIME, regular_step
 from solvers.state import (
     AT_ONCE,
@@ -85,7 +85,7 @@ TABLES = types.NamedTuple(
     ],
     Tables,
 )
-SPACE = types.NamedTuple([*_arrays(1, 2, 1, 1, 1, 1, 1, 2, 2, 1, 3, 2, 1, 2, 3, 2, 1), _INTEGERS, _MATRIX], Space)
+SPACE = types.NamedTuple([*_arrays(1, 2, 2, 1, 1, 1, 1, 2, 2, 1, 3, 2, 1, 2, 3, 2, 1), _INTEGERS, _MATRIX], Space)
 
 SCALE, DURATION, SHARE = range(
     3
@@ -95,7 +95,7 @@ _GOAL = 0.3  # error aimed at, in units of the tolerance
 _ORDER = 15.0  # the error estimate falls like h^15
 
 
-@kernel
+@inner
 def _begin(problem, tables, state, space, numbers, last, stop):
     """Scale, first step and family of a contact that begins (or changes piece) at ``stop``."""
     size, n = 2 * problem.k.size, problem.k.size
@@ -142,7 +142,7 @@ def _nearest_surface(problem, state):
     return near, stop, direction
 
 
-@inner
+@inlined
 def _land(problem, tables, state, space, numbers, stop, direction, near, rtol, t_end, out, dt, ledger):
     """Try to land on the border ahead by one regular step; whether it succeeded."""
     size, t = state.x.size, state.now[T]
@@ -256,7 +256,7 @@ def _record(problem, tables, state, space, family, level, t_end, out, dt, ledger
         state.count[SAMPLED] += 1
 
 
-@inner
+@inlined
 def touch(problem, tables, state, space, numbers, last, t_end, rtol, log, out, dt, ledger):
     """One accepted step in contact: land if a border is near, else collocate; returns a status code."""
     near, stop, direction = _nearest_surface(problem, state)
@@ -307,7 +307,7 @@ def touch(problem, tables, state, space, numbers, last, t_end, rtol, log, out, d
     return RUNNING
 
 
-@inner
+@inlined
 def _adapt(tables, numbers, last, level, family, wanted, error):
     """Size of the next step from the error of this one."""
     longer = 2.0 / _ORDER * math.log2(_GOAL / max(error, 1e-30))  # in levels
@@ -321,7 +321,7 @@ def _adapt(tables, numbers, last, level, family, wanted, error):
     last[LEVEL], last[FAMILY], last[FRESH] = level, family, 0
 
 
-@kernel
+@inner
 def _latest(state):
     """The stop in contact that was entered last."""
     stop = -1
@@ -341,6 +341,8 @@ def _latest(state):
 def advance(problem, tables, state, space, numbers, last, t_end, budget, rtol, log, out, dt, ledger):
     """Advance the state to ``t_end`` or for about ``budget`` steps; returns a status code."""
     begun = state.count[STEPS] + state.count[REJECTED]
+    if last[STOP] < 0 and touching(state):  # the run starts in contact
+        _begin(problem, tables, state, space, numbers, last, _latest(state))
     while state.count[STEPS] + state.count[REJECTED] - begun < budget:
         if state.now[T] >= t_end:
             return DONE
@@ -410,19 +412,17 @@ class Engine:
         stops, loads, size = len(problem.gap), len(problem.load), 2 * len(problem.k)
         self.back = prepared.back
         self.state: State = new_state(_start(z, steady, forcing), stops)
-        shapes = [self.state.x.size, (8, size), 6, 7, size // 2, loads, stops]
+        shapes = [self.state.x.size, (7, size), (forcing.table_dt.size, 6), 7, size // 2, loads, stops]
         shapes += [(stops, S), (stops, S), S, (stops, 2, S), (stops + loads, S), S, (stops, S), (stops, 3, S)]
         shapes += [(stops * S, stops * S), stops * S, stops * S, (18, self.state.x.size + 2)]
         types_of = ["i8" if name == "pivots" else "f8" for name in Space._fields]
         self.space = Space._make(np.zeros(shape, kind) for shape, kind in zip(shapes, types_of, strict=True))
         self.numbers = np.zeros(2 + stops)
-        self.last = np.zeros(5, dtype=np.int64)
+        self.last = np.full(5, -1)
 
     def start(self) -> None:
         """Put every stop on its piece."""
         begin_contacts(self.problem, self.state)
-        if np.any(self.state.piece > 0):
-            _begin(*(self.problem, self.tables, self.state, self.space, self.numbers, self.last), _latest(self.state))
 
     def march(self, budget: int, log: Array, out: Array, dt: float) -> int:
         """Go on for a stretch."""
@@ -463,16 +463,23 @@ def _prepared(system: System, forcing: Forcing) -> _Prepared:
 
 def _without_resonance(system: System, forcing: Forcing, duration: float, rtol: float) -> Forcing:
     """Tones on the frequency of a block hardly damped have no steady response: they are sampled instead."""
-    blocks = system.blocks
-    resonant = []
-    for i, (omega, load) in enumerate(zip(forcing.tone_omega, forcing.tone_load, strict=True)):
-        distance = np.abs(blocks.k - omega**2 + 1j * omega * blocks.c)
-        near = distance <= 1e-6 * np.maximum(blocks.k, omega**2)
-        vector = blocks.inverse[:, system.size :] @ np.linalg.solve(system.M, system.loads[load][0])
-        pushed = np.hypot(*np.split(vector, 2)) > 0.0
-        if np.any(near & pushed):
-            resonant.append(i)
+    if "resonant" not in system.kept:
+        system.kept["resonant"] = [
+            i
+            for i, (omega, load) in enumerate(zip(forcing.tone_omega, forcing.tone_load, strict=True))
+            if _resonates(system, omega, load)
+        ]
+    resonant = system.kept["resonant"]
     return tones_as_nodes(forcing, resonant, duration, rtol) if resonant else forcing
+
+
+def _resonates(system: System, omega: float, load: int) -> bool:
+    """Whether a block that the load pushes has an eigenvalue within 1e-6 of iω."""
+    blocks = system.blocks
+    distance = np.abs(blocks.k - omega**2 + 1j * omega * blocks.c)
+    vector = blocks.inverse[:, system.size :] @ np.linalg.solve(system.M, system.loads[load][0])
+    pushed = np.hypot(*np.split(vector, 2)) > 0.0
+    return bool(np.any(pushed & (distance <= 1e-6 * np.maximum(blocks.k, omega**2))))
 
 
 def _signal_rows(problem: Problem, forcing: Forcing) -> Array:

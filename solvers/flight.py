@@ -74,36 +74,29 @@ def add_signals(problem, response, x, t, six):
     """Add the response to the polynomial signals of the step that began at t."""
     size = 2 * problem.k.size
     for j in range(problem.table_dt.size):
-        signal_derivatives(problem, j, t, six)
+        signal_derivatives(problem, j, t, six[j])
         rows = response[problem.table_load[j]]
         for i in range(6):
             for e in range(size):
-                x[e] += six[i] * rows[i, e]
+                x[e] += six[j, i] * rows[i, e]
 
 
 @inner
 def taylor(problem, x, t, terms, six):
-    """Rows y, y', ..., y⁽⁶⁾ at time t in flight."""
+    """Rows y, y', ..., y⁽⁶⁾ at time t in flight: y⁽ⁱ⁺¹⁾ = A y⁽ⁱ⁾ + load s⁽ⁱ⁾."""
     n = problem.k.size
     for e in range(2 * n):
         terms[0, e] = x[e]
+    for j in range(problem.table_dt.size):
+        signal_derivatives(problem, j, t, six[j])
     for i in range(ORDER):
         for b in range(n):
             terms[i + 1, b] = terms[i, n + b]
             terms[i + 1, n + b] = -problem.k[b] * terms[i, b] - problem.c[b] * terms[i, n + b]
-    for j in range(problem.table_dt.size):
-        signal_derivatives(problem, j, t, six)
-        load = problem.load[problem.table_load[j]]
-        for i in range(ORDER):  # each derivative of the signal enters one row and is carried on by A
+        for j in range(problem.table_dt.size):
+            load = problem.load[problem.table_load[j]]
             for e in range(2 * n):
-                terms[ORDER + 1, e] = six[i] * load[e] if i < 6 else 0.0
-            for k in range(i + 1, ORDER + 1):
-                for e in range(2 * n):
-                    terms[k, e] += terms[ORDER + 1, e]
-                for b in range(n):
-                    p, v = terms[ORDER + 1, b], terms[ORDER + 1, n + b]
-                    terms[ORDER + 1, b] = v
-                    terms[ORDER + 1, n + b] = -problem.k[b] * p - problem.c[b] * v
+                terms[i + 1, e] += six[j, i] * load[e]
 
 
 @inner

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from solvers.collocation import powers
 from solvers.dormand_prince import E5, STAGES, A
-from solvers.kernels import contact_forces, dot, indentation, inlined, inner, table_value
+from solvers.kernels import contact_forces, dot, indentation, inlined, table_value
 
 TIME, INDENTATION, ROOT = range(3)
 
@@ -55,7 +55,7 @@ def _rate(problem, tables, ledger, variable, stop, w, piece, entry_rate, out, ba
     return calls
 
 
-@inner
+@inlined
 def regular_step(problem, tables, ledger, variable, stop, span, w, piece, entry_rate, work):
     """One DOP853 step of the chosen variable from ``w`` into ``work[-1]``; (error of δ̇ of the stop, law calls)."""
     size, calls = w.size, 0

@@ -9,7 +9,7 @@ import numpy as np
 from numba import types
 
 from solvers.forcing import Forcing
-from solvers.kernels import Problem, dot, indentation, inner, kernel
+from solvers.kernels import Problem, dot, indentation, inlined, inner, kernel
 from solvers.result import Status
 from solvers.system import Array, System
 
@@ -127,7 +127,7 @@ def switch(problem, state, s, direction, log):
     state.now[LAST_EVENT] = t
 
 
-@inner
+@inlined
 def switch_on_surface(problem, state, log, locates):
     """Switch every stop that sits on a border of its piece and moves out of it; returns whether any did."""
     switched = False
@@ -145,7 +145,7 @@ def switch_on_surface(problem, state, log, locates):
     return switched
 
 
-@inner
+@inlined
 def touching(state):
     """Whether any stop is in contact."""
     most = 0
