@@ -477,7 +477,7 @@ def _resonates(system: System, omega: float, load: int) -> bool:
     """Whether a block that the load pushes has an eigenvalue within 1e-6 of iω."""
     blocks = system.blocks
     distance = np.abs(blocks.k - omega**2 + 1j * omega * blocks.c)
-    vector = blocks.inverse[:, system.size :] @ np.linalg.solve(system.M, system.loads[load][0])
+    vector = blocks.inverse[:, system.size :] @ np.linalg.solve(system.M, np.asarray(system.loads[load][0]))
     pushed = np.hypot(*np.split(vector, 2)) > 0.0
     return bool(np.any(pushed & (distance <= 1e-6 * np.maximum(blocks.k, omega**2))))
 
