@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solvers.flight import add_taylor, energy_norms, taylor, turn
-from solvers.kernels import contact_forces, contact_gradient, copy, dot, inlined, inner, table_value
+from solvers.kernels import contact_forces, contact_gradient, copy, dot, indentation, inlined, inner, table_value
 from solvers.state import CALLS, PEAK_DELTA, PEAK_FORCE, T, touching
 from solvers.tables import S, propagate
 
@@ -258,45 +258,6 @@ def step_error(problem, tables, state, space, family, level):
     return worst
 
 
-@inlined
-def leaves_piece(problem, tables, state, space, family, level):
-    """Whether any stop crosses a border of its piece at a node."""
-    for s in range(problem.gap.size):
-        piece = state.piece[s]
-        if piece == 0:
-            respond(problem, tables, state, space, family, level, s)
-        upper = problem.levels[s, piece]
-        lower = problem.levels[s, piece - 1] if piece > 0 else -np.inf
-        for i in range(S):
-            if not lower <= space.delta[s, i] <= upper:
-                return True
-    return False
-
-
-@inlined
-def finish_step(problem, tables, state, space, family, level):
-    """Move the state to the end of the step; ledger and peaks of the contacts."""
-    stops, size = problem.gap.size, 2 * problem.k.size
-    h = tables.step[level]
-    flight = tables.step_propagator[level]
-    turn(problem, flight[0], flight[1], state.x)
-    for u in range(space.force.shape[0]):
-        if u >= stops or state.piece[u] > 0:
-            for j in range(S):
-                force = space.force[u, j]
-                row = tables.kick[family, level, u, j]
-                for e in range(size):
-                    state.x[e] += row[e] * force
-    for s in range(stops):
-        if state.piece[s] > 0:
-            for i in range(S):
-                state.x[size + 2 + 2 * s] += h * tables.weights[family, i] * space.force[s, i] * space.rate[s, i]
-                state.x[size + 3 + 2 * s] += h * tables.weights[family, i] * space.force[s, i]
-            state.open[s, PEAK_FORCE] = _peak(tables, family, space.force[s], state.open[s, PEAK_FORCE], space.trial)
-            state.open[s, PEAK_DELTA] = _peak(tables, family, space.delta[s], state.open[s, PEAK_DELTA], space.trial)
-    state.now[T] += h
-
-
 @inner
 def _legendre(coefficients, x):
     """Legendre sum at x in [-1, 1] by Clenshaw's recurrence."""
@@ -362,6 +323,72 @@ def _on_nodes(tables, family, exponent, values, sigma, basis):
                 term *= (sigma - nodes[i]) / (nodes[j] - nodes[i])
         total += term
     return total
+
+
+@inlined
+def arrive(problem, tables, state, space, family, level):
+    """State at the end of the step, into ``space.x_new``."""
+    size = 2 * problem.k.size
+    copy(state.x, space.x_new, size)
+    turn(problem, tables.step_propagator[level, 0], tables.step_propagator[level, 1], space.x_new)
+    for u in range(space.force.shape[0]):
+        if u >= problem.gap.size or state.piece[u] > 0:
+            for j in range(S):
+                force = space.force[u, j]
+                row = tables.kick[family, level, u, j]
+                for e in range(size):
+                    space.x_new[e] += row[e] * force
+
+
+@inlined
+def leaves_piece(problem, tables, state, space, family, level):
+    """Whether any stop crosses a border of its piece at a node or the end of the step."""
+    for s in range(problem.gap.size):
+        piece = state.piece[s]
+        if piece == 0:
+            respond(problem, tables, state, space, family, level, s)
+        upper = problem.levels[s, piece]
+        lower = problem.levels[s, piece - 1] if piece > 0 else -np.inf
+        if not lower <= indentation(problem, s, space.x_new) <= upper:
+            return True
+        for i in range(S):
+            if not lower <= space.delta[s, i] <= upper:
+                return True
+    return False
+
+
+@inlined
+def finish_step(problem, tables, state, space, family, level):
+    """Move the state to the end of the step; ledger and peaks of the contacts."""
+    stops, size = problem.gap.size, 2 * problem.k.size
+    h = tables.step[level]
+    copy(space.x_new, state.x, size)
+    for s in range(stops):
+        if state.piece[s] > 0:
+            for i in range(S):
+                state.x[size + 2 + 2 * s] += h * tables.weights[family, i] * space.force[s, i] * space.rate[s, i]
+                state.x[size + 3 + 2 * s] += h * tables.weights[family, i] * space.force[s, i]
+            state.open[s, PEAK_FORCE] = _peak(tables, family, space.force[s], state.open[s, PEAK_FORCE], space.trial)
+            state.open[s, PEAK_DELTA] = _peak(tables, family, space.delta[s], state.open[s, PEAK_DELTA], space.trial)
+    state.now[T] += h
+
+
+@inner
+def peaks_so_far(problem, tables, state, space, family, share, x):
+    """Peaks of the contacts when the run ends at ``x``, within a step of which the ``share`` lies behind."""
+    for s in range(problem.gap.size):
+        if state.piece[s] == 0:
+            continue
+        space.clipped[0] = indentation(problem, s, x)
+        space.clipped[1] = dot(problem.read_rate[s], x, 2 * problem.k.size)
+        delta = space.clipped[0]
+        contact_forces(*(problem, s, space.clipped[0:1], space.clipped[1:2], state.entry_rate[s], space.trial[0:1]))
+        force = space.trial[0]
+        for i in range(S):
+            if tables.times[family, i] <= share:
+                delta, force = max(delta, space.delta[s, i]), max(force, space.force[s, i])
+        state.open[s, PEAK_DELTA] = max(state.open[s, PEAK_DELTA], delta)
+        state.open[s, PEAK_FORCE] = max(state.open[s, PEAK_FORCE], force)
 
 
 @inlined

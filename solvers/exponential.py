@@ -27,11 +27,13 @@ from solvers.certify import fly
 from solvers.collocation import (
     Space,
     account,
+    arrive,
     contact_time,
     finish_step,
     free_response,
     inside,
     leaves_piece,
+    peaks_so_far,
     solve_forces,
     step_error,
 )
@@ -231,6 +233,7 @@ def _try(problem, tables, state, space, numbers, last, family, level, rtol):
     tolerance = rtol * numbers[SCALE]
     if not solve_forces(problem, tables, state, space, family, level, 0.05 * tolerance / (h * mobility)):
         return np.inf
+    arrive(problem, tables, state, space, family, level)
     if leaves_piece(problem, tables, state, space, family, level):
         return 1.0 if bottom else np.inf
     error = step_error(problem, tables, state, space, family, level) / tolerance
@@ -246,8 +249,8 @@ def _record(problem, tables, state, space, family, level, t_end, out, dt, ledger
         if not due and t + h < t_end:
             return
         span = state.count[SAMPLED] * dt - t if due else t_end - t
-        row = out[state.count[SAMPLED]] if due else space.x_new
-        copy(state.x, row, row.size)
+        row = out[state.count[SAMPLED]] if due else space.work[17]
+        copy(state.x, row, state.x.size)
         inside(problem, tables, state, space, family, h, span, row)
         if ledger:
             account(problem, tables, state, space, family, h, span, state.x, row)
@@ -294,14 +297,18 @@ def touch(problem, tables, state, space, numbers, last, t_end, rtol, log, out, d
     ends = end >= t_end
     if ends or dt * state.count[SAMPLED] <= end:
         _record(problem, tables, state, space, family, level, t_end, out, dt, ledger)
+    if ends:
+        share = (t_end - state.now[T]) / tables.step[level]
+        peaks_so_far(problem, tables, state, space, family, share, space.work[17])
+        copy(space.work[17], state.x, state.x.size)
+        state.now[T] = t_end
+        state.count[STEPS] += 1
+        return RUNNING
     for s in range(problem.gap.size):
         copy(space.force[s], space.previous[s], S)
-    if ledger and not ends:
+    if ledger:
         account(problem, tables, state, space, family, tables.step[level], tables.step[level], state.x, state.x)
     finish_step(problem, tables, state, space, family, level)
-    if ends:  # the step was finished for the sake of the peaks; the state is the one inside it
-        copy(space.x_new, state.x, state.x.size)
-        state.now[T] = t_end
     _adapt(tables, numbers, last, level, family, wanted, error)
     state.count[STEPS] += 1
     return RUNNING
@@ -444,7 +451,7 @@ class _Prepared(NamedTuple):
 def _prepared(system: System, forcing: Forcing) -> _Prepared:
     """Tables of a system, made once and kept on it; signals may be sampled finer from run to run."""
     dt_cell = float(forcing.table_dt[0]) if forcing.table_dt.size else 1.0
-    key = ("exponential", dt_cell)
+    key = ("exponential", dt_cell, tuple(forcing.tone_omega))
     if key not in system.kept:
         if np.any(system.blocks.k < 0.0):
             raise ValueError(
@@ -462,24 +469,31 @@ def _prepared(system: System, forcing: Forcing) -> _Prepared:
 
 
 def _without_resonance(system: System, forcing: Forcing, duration: float, rtol: float) -> Forcing:
-    """Tones on the frequency of a block hardly damped have no steady response: they are sampled instead."""
-    if "resonant" not in system.kept:
-        system.kept["resonant"] = [
-            i
-            for i, (omega, load) in enumerate(zip(forcing.tone_omega, forcing.tone_load, strict=True))
-            if _resonates(system, omega, load)
-        ]
-    resonant = system.kept["resonant"]
+    """Tones without a useful steady response are sampled instead.
+
+    That is those on the frequency of a block hardly damped, and those whose steady response l/|k - Ω² + iΩc| is a
+    thousand times what the load can do within the duration, l duration²/2: their difference would lose its digits.
+    """
+    if "distances" not in system.kept:
+        tones = zip(forcing.tone_omega, forcing.tone_load, strict=True)
+        system.kept["distances"] = [_distance(system, omega, load) for omega, load in tones]
+    resonant = [
+        i
+        for i, (absolute, relative) in enumerate(system.kept["distances"])
+        if relative <= 1e-6 or absolute * duration**2 < 2e-3
+    ]
     return tones_as_nodes(forcing, resonant, duration, rtol) if resonant else forcing
 
 
-def _resonates(system: System, omega: float, load: int) -> bool:
-    """Whether a block that the load pushes has an eigenvalue within 1e-6 of iω."""
+def _distance(system: System, omega: float, load: int) -> tuple[float, float]:
+    """Smallest |k - Ω² + iΩc| of the blocks a load pushes, absolute and relative to max(k, Ω²)."""
     blocks = system.blocks
     distance = np.abs(blocks.k - omega**2 + 1j * omega * blocks.c)
     vector = blocks.inverse[:, system.size :] @ np.linalg.solve(system.M, np.asarray(system.loads[load][0]))
-    pushed = np.hypot(*np.split(vector, 2)) > 0.0
-    return bool(np.any(pushed & (distance <= 1e-6 * np.maximum(blocks.k, omega**2))))
+    distance = distance[np.hypot(*np.split(vector, 2)) > 0.0]
+    scale = np.maximum(blocks.k, omega**2)[np.hypot(*np.split(vector, 2)) > 0.0]
+    relative = np.divide(distance, scale, out=np.zeros_like(distance), where=scale > 0.0)
+    return float(distance.min(initial=np.inf)), float(relative.min(initial=np.inf))
 
 
 def _signal_rows(problem: Problem, forcing: Forcing) -> Array:

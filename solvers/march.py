@@ -154,7 +154,14 @@ def _land(step, problem, state, space, h, stop, level, rtol, atol):
     for _ in range(12):
         _, calls = step(
             *(problem, state.now[T], h, state.x, state.rate, state.piece, state.entry_rate),
-            *(space.x_new, space.rate_new, space.dense, space.work, rtol, atol),
+            *(
+                space.x_new,
+                space.rate_new,
+                space.dense,
+                space.work,
+                1e300,
+                atol,
+            ),  # for its interpolant, whatever the error
         )
         state.count[CALLS] += calls
         distance = indentation(problem, stop, space.x_new) - level

@@ -1,0 +1,157 @@
+"""No contact of the model is missed: random flights against brute force, grazes of any shortness."""
+
+import math
+
+import numpy as np
+import pytest
+
+from contacts import Hertz
+from solvers import Contact, Exponential, Status, System, integrate
+
+FLIGHTS = 1000
+SOFT = Hertz(1e-3)  # hardly disturbs the motion: the first entry is that of the flight
+
+
+class Flight:
+    """Modes in free decay seen through one stop: δ(t) = Σ e^{-ζωt} (a cos ω_d t + b sin ω_d t) - gap."""
+
+    def __init__(self, rng, n):
+        self.omega = np.sort(10.0 ** rng.uniform(2.0, 3.3, n))
+        self.zeta = 10.0 ** rng.uniform(-3.0, -1.0, n)
+        self.row = rng.standard_normal(n) / math.sqrt(n)
+        self.system = System.modal(self.omega, self.zeta, [Contact(self.row, SOFT, 1.0)])
+        self.damped = self.omega * np.sqrt(1.0 - self.zeta**2)
+        self.decay = self.zeta * self.omega
+
+    def throw(self, rng):
+        """Another start."""
+        self.q0 = rng.standard_normal(self.omega.size) / self.omega
+        self.q_dot0 = rng.standard_normal(self.omega.size)
+        self.size = np.abs(self.row * np.hypot(self.q0, self.q_dot0 / self.omega)).sum()
+
+    def reading(self, t, order=0):
+        """-row·q (order 0) or its rate (order 1) at times t."""
+        lam = -self.decay + 1j * self.damped
+        z = self.q0 - 1j * (self.q_dot0 + self.decay * self.q0) / self.damped
+        return -(np.exp(np.multiply.outer(t, lam)) * (z * lam**order)).real @ self.row
+
+    def maxima(self, duration):
+        """Times and values of all local maxima: dense samples of the rate, then bisection, all at once."""
+        t = np.linspace(0.0, duration, int(duration * self.omega[-1] * 4) + 2)
+        rate = self.reading(t, 1)
+        up = np.flatnonzero((rate[:-1] > 0.0) & (rate[1:] <= 0.0))
+        a, b = t[up], t[up + 1]
+        for _ in range(48):
+            middle = 0.5 * (a + b)
+            rising = self.reading(middle, 1) > 0.0
+            a, b = np.where(rising, middle, a), np.where(rising, b, middle)
+        return a, self.reading(a)
+
+    def first_entry(self, gap, times, values):
+        """First time the reading exceeds the gap, by bisection from the minimum before the first high maximum."""
+        k = int(np.argmax(values > gap))
+        low = times[k - 1] if k else 0.0
+        t = np.linspace(low, times[k], 4001)
+        a, b = t[np.flatnonzero(self.reading(t) <= gap)[-1]], times[k]
+        for _ in range(60):
+            middle = 0.5 * (a + b)
+            a, b = (a, middle) if self.reading(middle) > gap else (middle, b)
+        return b
+
+    def run(self, gap, duration, rtol=1e-6):
+        """The same flight in units of the gap, so that one system serves many starts."""
+        return integrate(self.system, self.q0 / gap, self.q_dot0 / gap, duration, method=Exponential(rtol))
+
+
+def flights(count, seed=0):
+    """Random flights whose highest maximum is not the start."""
+    rng = np.random.default_rng(seed)
+    for i in range(count):
+        if i % 50 == 0:
+            n = (2, 3, 4, 5, 8, 12, 30)[(i // 50 + seed) % 7]
+            flight = Flight(rng, n)
+        while True:
+            flight.throw(rng)
+            duration = rng.uniform(8.0, 60.0) / flight.omega[n // 2]
+            times, values = flight.maxima(duration)
+            if len(times) > 1 and values.max() > max(2.0 * flight.reading(np.zeros(1))[0], 0.0):
+                break
+        yield rng, flight, duration, times, values
+
+
+def test_no_contact_of_random_flights_is_missed():
+    """The gap lies just below one of the highest maxima, so that most flights are long and end in a graze."""
+    missed, wrong = [], []
+    for i, (rng, flight, duration, times, values) in enumerate(flights(FLIGHTS)):
+        top, depth = values.max(), 10.0 ** rng.uniform(-8.0, -0.5)
+        gap = top * (1.0 - depth)
+        entry = flight.first_entry(gap, times, values)
+        run = flight.run(gap, min(duration, entry * (1.0 + 1e-9) + 1e-9))
+        if len(run.contacts) != 1:
+            missed.append((i, depth))
+        elif abs(run.contacts.t_in[0] - entry) * run.contacts.speed_in[0] > 1e-12 * flight.size / gap:
+            wrong.append((i, run.contacts.t_in[0] - entry))
+    assert missed == []
+    assert wrong == []
+
+
+def test_stops_just_out_of_reach_are_not_met():
+    for _, flight, duration, _, values in flights(100, seed=1):
+        run = flight.run(values.max() * (1.0 + 1e-9), duration)
+        assert run.status is Status.DONE
+        last = flight.reading(np.array([duration]))[0]
+        assert len(run.contacts) == 0 or last > values.max()
+
+
+@pytest.mark.parametrize("share", [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6])
+@pytest.mark.parametrize("n", [2, 6, 20])
+def test_grazes_down_to_a_millionth_of_the_fastest_period(n, share):
+    """A dip that lasts ``share`` of the fastest period is found while the rounding of δ can tell it."""
+    found = 0
+    for _, flight, duration, times, values in flights(6, seed=n):
+        k = int(np.argmax(values))
+        length = share * 2 * math.pi / flight.omega[-1]
+        lam = -flight.decay + 1j * flight.damped
+        z = flight.q0 - 1j * (flight.q_dot0 + flight.decay * flight.q0) / flight.damped
+        curvature = (np.exp(lam * times[k]) * z * lam**2).real @ flight.row
+        depth = abs(curvature) * length**2 / 8.0
+        if depth < 64 * np.finfo(float).eps * np.abs(flight.row * z).sum():
+            continue  # beyond what the state's digits hold
+        run = flight.run(values[k] - depth, min(duration, times[k] + length))
+        assert len(run.contacts) >= 1, (depth, length)
+        found += 1
+    assert found or share <= 1e-5
+
+
+def test_grazes_of_one_fast_mode_at_the_limit():
+    """A single mode of 1000 rad/s touches for 1e-6 of its period: depth 5e-12 of its swing."""
+    omega, share = 1e3, 1e-6
+    depth = (math.pi * share) ** 2 / 2.0
+    for phase in np.linspace(0.1, 6.0, 60):
+        stop = Contact([1.0], SOFT, 1.0 - depth)
+        start = [-math.cos(phase)], [omega * math.sin(phase)]
+        run = integrate(
+            System.modal([omega], 0.0, [stop]), *start, 1.5 * 2 * math.pi / omega, method=Exponential(1e-12)
+        )
+        # -q = cos(ωt + φ'): maxima wherever the phase is a whole turn
+        assert len(run.contacts) in (1, 2)
+        length = (run.contacts.t_out - run.contacts.t_in) * omega / (2 * math.pi)
+        np.testing.assert_allclose(length, share, rtol=0.1)
+
+
+def test_entries_land_on_the_surface():
+    for _, flight, duration, _, values in flights(100, seed=2):
+        gap = 0.6 * values.max()
+        run = flight.run(gap, duration)
+        first = run.contacts.t_in[:1]
+        assert np.abs(flight.reading(first) - gap).max() < 1e-13 * flight.size
+
+
+def test_flight_after_an_exit_does_not_find_the_same_contact_again():
+    """Bounces of every strength: one contact each, and the log ascends."""
+    system = System.modal([100.0, 700.0], 0.001, [Contact([1.0, -0.6], Hertz(1e7), 1e-4)])
+    run = integrate(system, [0.0, 0.0], [-1.0, 0.4], 2.0, method=Exponential(1e-8))
+    log = run.contacts
+    assert len(log) > 20
+    assert np.all(log.t_in[1:] > log.t_out[:-1])
+    assert np.all(log.peak_indentation > 0.0)
