@@ -323,7 +323,7 @@ def _adapt(tables, numbers, last, level, family, wanted, error):
         if level != last[WANTED]:
             numbers[share] = tables.step[level] / numbers[DURATION]
         numbers[share] *= 2.0 ** (0.5 * min(max(longer, -1.0), 0.5))
-    suggested = max(level - int(min(math.floor(longer), 2.0)), 0)
+    suggested = min(max(level - int(min(math.floor(longer), 2.0)), 0), tables.step.size - 1)
     last[WANTED] = suggested if level == wanted else min(suggested, wanted)
     last[LEVEL], last[FAMILY], last[FRESH] = level, family, 0
 

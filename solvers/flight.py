@@ -18,7 +18,7 @@ ORDER = 6
 @inlined
 def level_within(tables, span):
     """Index of the longest tabulated step not above ``span``, which is at least the shortest one."""
-    level = max(int(np.ceil(4.0 * math.log2(tables.h[0] / span))), 0)
+    level = min(max(int(np.ceil(4.0 * math.log2(tables.h[0] / span))), 0), tables.h.size - 1)
     while tables.h[level] > span and level < tables.h.size - 1:
         level += 1
     return level

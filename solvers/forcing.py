@@ -60,14 +60,14 @@ def hand_over(signals: list[Signal], duration: float, rtol: float) -> Forcing:
 
 def tones_as_nodes(forcing: Forcing, chosen: list[int], duration: float, rtol: float) -> Forcing:
     """The same forcing with some tones as node tables: quintics within ``rtol`` of them, |error| <= (ω dt)⁶/46080."""
-    tables = [forcing.table]
-    for i in chosen:
-        omega, amplitude = forcing.tone_omega[i], forcing.tone_amplitude[i]
-        longest = (4608.0 * rtol) ** (1.0 / 6.0) / omega if omega > 0.0 else duration
-        cells = max(1, int(np.ceil(duration / longest)))
-        t = np.linspace(0.0, duration, cells + 1)
-        wave = amplitude * np.exp(1j * omega * t)
-        tables.append(np.stack([wave.real, (1j * omega * wave).real, (-(omega**2) * wave).real], axis=1))
+    tables, loads = [forcing.table], sorted(set(forcing.tone_load[chosen].tolist()))
+    for load in loads:  # one table per load, as for any signal
+        mine = [i for i in chosen if forcing.tone_load[i] == load]
+        omega = forcing.tone_omega[mine]
+        longest = (4608.0 * rtol) ** (1.0 / 6.0) / omega.max() if omega.max() > 0.0 else duration
+        t = np.linspace(0.0, duration, max(1, int(np.ceil(duration / longest))) + 1)
+        waves = forcing.tone_amplitude[mine] * np.exp(1j * np.outer(t, omega))
+        tables.append(np.stack([(waves * (1j * omega) ** k).sum(axis=1).real for k in range(3)], axis=1))
     kept = np.setdiff1d(np.arange(len(forcing.tone_omega)), chosen)
     sizes = [len(table) for table in tables[1:]]
     return Forcing(
@@ -77,7 +77,7 @@ def tones_as_nodes(forcing: Forcing, chosen: list[int], duration: float, rtol: f
         np.ascontiguousarray(np.concatenate(tables)),
         np.concatenate((forcing.table_dt, [duration / (size - 1) for size in sizes])),
         np.concatenate((forcing.table_start, forcing.table_start[-1] + np.cumsum(sizes, dtype=np.int64))),
-        np.concatenate((forcing.table_load, forcing.tone_load[chosen])),
+        np.concatenate((forcing.table_load, np.array(loads, dtype=np.int64))),
     )
 
 

@@ -369,3 +369,11 @@ def test_samples_of_the_reference_at_small_atol():
     ours = integrate(system, [0.01], [-0.3], 0.25, 0.025, Exponential(1e-10))
     theirs = integrate(system, [0.01], [-0.3], 0.25, 0.025, DormandPrince(1e-13, atol=1e-18))
     np.testing.assert_allclose(theirs.q, ours.q, atol=1e-10)
+
+
+def test_several_resonant_tones_of_one_load():
+    tones = fb.Multisine([1.0, 0.7, 0.4], [1e-3, 2e-3, 5e-3], [0.1, 0.2, 0.3])
+    system = free_mass(Hertz(1e5), gap=0.01, loads=[([-1.0], tones)])
+    ours, theirs = (integrate(system, [0.0], [0.0], 0.4, 0.1, m) for m in (Exponential(1e-10), RK))
+    assert len(ours.contacts) == len(theirs.contacts) > 0
+    np.testing.assert_allclose(ours.q, theirs.q, atol=1e-9 * np.abs(theirs.q).max())
