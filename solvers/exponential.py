@@ -431,11 +431,15 @@ class Engine:
         """Put every stop on its piece."""
         begin_contacts(self.problem, self.state)
 
+    def keeps_ledger(self, sampled: bool) -> bool:
+        """Whether input and damping of the energy ledger are known."""
+        return self.method.ledger and sampled
+
     def march(self, budget: int, log: Array, out: Array, dt: float) -> int:
         """Go on for a stretch."""
         return advance(
             *(self.problem, self.tables, self.state, self.space, self.numbers, self.last),
-            *(self.duration, budget, self.method.rtol, log, out, dt, self.method.ledger and len(out) > 0),
+            *(self.duration, budget, self.method.rtol, log, out, dt, self.keeps_ledger(len(out) > 0)),
         )
 
 

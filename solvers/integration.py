@@ -169,7 +169,9 @@ class _Run:
             t = np.arange(len(x)) * self.dt
         motion = x[:, :size] @ self.engine.back.T
         q, q_dot = motion[:, : self.system.size], motion[:, self.system.size :]
-        ledger = x[:, size:]
+        ledger = x[:, size:].copy()
+        if not self.engine.keeps_ledger(self.dt is not None):
+            ledger[:, :2] = math.nan
         energy = Energy(
             *(ledger[:, 0], ledger[:, 1], ledger[:, 2::2].sum(axis=1)),
             *(self.system.energy(q, q_dot), self.initial_energy),

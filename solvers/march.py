@@ -316,6 +316,10 @@ class Engine:
             *(self.problem, 0.0, state.x, state.piece, state.entry_rate, state.rate, self.space.work[0])
         )
 
+    def keeps_ledger(self, sampled: bool) -> bool:
+        """The ledger is integrated along, always."""
+        return True
+
     def march(self, budget: int, log: Array, out: Array, dt: float) -> int:
         """Go on for a stretch."""
         method = self.method
