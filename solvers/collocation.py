@@ -201,8 +201,7 @@ def solve_forces(problem, tables, state, space, family, level, accuracy):
         for s in range(stops):
             if state.piece[s] == 0:
                 continue
-            for i in range(S):
-                space.clipped[i] = space.delta[s, i]
+            copy(space.delta[s], space.clipped, S)
             contact_forces(problem, s, space.clipped, space.rate[s], state.entry_rate[s], space.trial)
             state.count[CALLS] += S
             for i in range(S):
@@ -309,20 +308,6 @@ def _peak(tables, family, values, known, coefficients):
         else:
             c, fc = x, f
     return best
-
-
-@inner
-def _on_nodes(tables, family, exponent, values, sigma, basis):
-    """Value at σ of the force whose node values on a family's nodes are given."""
-    nodes = tables.nodes[family]
-    total = 0.0
-    for j in range(S):
-        term = values[j] * (sigma / nodes[j]) ** (2.0 * exponent) if exponent > 0.0 else values[j]
-        for i in range(S):
-            if i != j:
-                term *= (sigma - nodes[i]) / (nodes[j] - nodes[i])
-        total += term
-    return total
 
 
 @inlined

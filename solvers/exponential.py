@@ -92,7 +92,7 @@ SPACE = types.NamedTuple([*_arrays(1, 2, 2, 1, 1, 1, 1, 2, 2, 1, 3, 2, 1, 2, 3, 
 SCALE, DURATION, SHARE = range(
     3
 )  # places in `numbers`: reference speed, T_c, then per stop a first step's share of T_c
-LEVEL, FAMILY, FRESH, STOP, WANTED = range(5)  # places in Memory.last
+LEVEL, FAMILY, FRESH, STOP, WANTED = range(5)  # places in `last`
 _GOAL = 0.3  # error aimed at, in units of the tolerance
 _ORDER = 15.0  # the error estimate falls like h^15
 
@@ -169,19 +169,10 @@ def _land(problem, tables, state, space, numbers, stop, direction, near, rtol, t
         if not trying and time > landed:
             return True
         way = variable if trying else TIME
+        length = span if trying else time - t
         error, calls = regular_step(
-            *(
-                problem,
-                tables,
-                ledger,
-                way,
-                stop,
-                span if trying else time - t,
-                w,
-                state.piece,
-                state.entry_rate,
-                space.work,
-            )
+            *(problem, tables, ledger, way, stop, length, w),
+            *(state.piece, state.entry_rate, space.work),
         )
         state.count[CALLS] += calls
         if trying:
@@ -381,7 +372,6 @@ class Exponential:
     ----------
     rtol : error of an indentation rate that one contact step may make, relative to the speed of entry (or a tenth of
         what the motion could reach at the stop, whichever is larger), in [1e-12, 1e-2]. Flight is exact.
-
     ledger : keep the energy ledger of runs with output samples, by quadrature; without it their input and damping
         are NaN and the run several times quicker. Runs with ``dt=None`` keep none.
 
@@ -453,23 +443,23 @@ class _Prepared(NamedTuple):
 
 
 def _prepared(system: System, forcing: Forcing) -> _Prepared:
-    """Tables of a system, made once and kept on it; signals may be sampled finer from run to run."""
+    """Tables of a system, made once and kept on it, those of the last grid of its sampled signals only."""
     dt_cell = float(forcing.table_dt[0]) if forcing.table_dt.size else 1.0
-    key = ("exponential", dt_cell, tuple(forcing.tone_omega))
-    if key not in system.kept:
+    key = (dt_cell, tuple(forcing.tone_omega))
+    if system.kept.get("exponential", (None,))[0] != key:
         if np.any(system.blocks.k < 0.0):
             raise ValueError(
-                f"K must be positive semi-definite for Exponential, its lowest ω² is "
-                f"{system.blocks.k.min():g} (buckled?); "
-                "use DormandPrince"
+                "K must be positive semi-definite for Exponential, its lowest ω² is "
+                f"{system.blocks.k.min():g} (buckled?); use DormandPrince"
             )
         plain = problem_of(system, forcing)
         problem, steady = with_tones(plain, forcing)
         laws = [contact.law for contact in system.contacts]
         ledger = (_signal_rows(problem, forcing), problem.power, _loss_rows(plain) @ steady)
         tables = build(problem, [law.exponent for law in laws], [law.jump for law in laws], dt_cell, ledger)
-        system.kept[key] = _Prepared(problem, tables, steady, system.blocks.T @ steady)
-    return system.kept[key]
+        system.kept["exponential"] = (key, _Prepared(problem, tables, steady, system.blocks.T @ steady))
+    prepared: _Prepared = system.kept["exponential"][1]
+    return prepared
 
 
 def _without_resonance(system: System, forcing: Forcing, duration: float, rtol: float) -> Forcing:
