@@ -37,7 +37,7 @@ _ROOMS = {
     "statistics": "moments pdf psd",
 }
 _HOME = {name: room for room, names in _ROOMS.items() for name in names.split()}
-_MODULES = ["plot"]
+_MODULES = ["plot", "study"]
 
 __all__ = [
     "Beam",
@@ -64,10 +64,11 @@ __all__ = [
     "pdf",
     "plot",
     "psd",
+    "study",
 ]
 
 if TYPE_CHECKING:
-    from fembeam import plot
+    from fembeam import plot, study
     from fembeam.beam import Beam
     from fembeam.damping import ModalDamping, Rayleigh
     from fembeam.excitation import Harmonic, Multisine

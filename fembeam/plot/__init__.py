@@ -1,0 +1,29 @@
+"""Figures: one function per question, each returns a matplotlib figure. `response` holds those of one run."""
+
+from fembeam.plot.response import (
+    contacts,
+    densities,
+    mode_shapes,
+    peaks,
+    places,
+    responses,
+    segment_for,
+    spectra_of,
+    spectrum,
+    styled,
+    time_history,
+)
+
+__all__ = [
+    "contacts",
+    "densities",
+    "mode_shapes",
+    "peaks",
+    "places",
+    "responses",
+    "segment_for",
+    "spectra_of",
+    "spectrum",
+    "styled",
+    "time_history",
+]
