@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import Any
 
 from solvers.result import ContactLog, Cost, Energy, Solution, SolverError, Status
-from solvers.system import Contact, System
+from solvers.system import Contact, Parameter, System
 
 _LATER = {
     "integrate": "integration",
@@ -26,6 +26,7 @@ __all__ = [
     "Energy",
     "Exponential",
     "HenonRK2",
+    "Parameter",
     "Solution",
     "SolverError",
     "Status",

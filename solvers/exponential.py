@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numba import njit, types
@@ -40,23 +40,28 @@ from solvers.collocation import (
 from solvers.flight import energy_norms
 from solvers.forcing import Forcing, on_one_grid, tones_as_nodes
 from solvers.kernels import OPTIONS, PROBLEM, Problem, contact_forces, copy, dot, indentation, inlined, inner
-from solvers.regular import INDENTATION, ROOT, TIME, regular_step
+from solvers.regular import INDENTATION, ROOT, regular_step
 from solvers.state import (
     AT_ONCE,
     CALLS,
     CHATTER,
     DONE,
+    HEAD,
+    LANDING,
     LOG_FULL,
     LOGGED,
     MOST_EVENTS_AT_ONCE,
+    PART,
     PEAK_DELTA,
     REJECTED,
     RUNNING,
     SAMPLED,
     STATE,
+    STEP,
     STEP_TOO_SMALL,
     STEPS,
     T_IN,
+    TAPED,
     State,
     T,
     begin_contacts,
@@ -65,6 +70,7 @@ from solvers.state import (
     rate_rows,
     switch,
     switch_on_surface,
+    tape,
     touching,
 )
 from solvers.system import Array, System
@@ -94,6 +100,7 @@ SCALE, DURATION, SHARE = range(
 )  # places in `numbers`: reference speed, T_c, then per stop a first step's share of T_c
 LEVEL, FAMILY, FRESH, STOP, WANTED = range(5)  # places in `last`
 _GOAL = 0.3  # error aimed at, in units of the tolerance
+_MOST_TRIES = 8  # to meet an output time on the way to a landing
 _ORDER = 15.0  # the error estimate falls like h^15
 
 
@@ -163,32 +170,44 @@ def _land(problem, tables, state, space, numbers, stop, direction, near, rtol, t
     broken = tables.exponent[stop] % 1.0 != 0.0
     variable = ROOT if leaving and broken else INDENTATION
     span = -w[size + 1] if variable == ROOT else level - delta
-    landed, trying = np.inf, True
+    landed, length, time, tries = np.inf, span, np.inf, 0
     while True:  # first the landing itself, then the samples (and the end of the run) that lie on the way
-        time = min(state.count[SAMPLED] * dt, t_end) if state.count[SAMPLED] < out.shape[0] else t_end
-        if not trying and time > landed:
-            return True
-        way = variable if trying else TIME
-        length = span if trying else time - t
         error, calls = regular_step(
-            *(problem, tables, ledger, way, stop, length, w),
+            *(problem, tables, ledger, variable, stop, length, w),
             *(state.piece, state.entry_rate, space.work),
         )
         state.count[CALLS] += calls
-        if trying:
-            landed, trying = space.work[15][size], False
+        x = space.work[15]
+        if landed == np.inf:
+            landed = x[size]
             if not (error <= rtol * numbers[SCALE] and t <= landed <= t + 4.0 * near):
                 return False
-            copy(space.work[15], state.x, size)
+            copy(x, state.x, size)
             state.now[T] = landed
         else:
+            late, tries = x[size] - time, tries + 1
+            pace = dot(problem.read_rate[stop], x, 2 * problem.k.size)  # d(variable)/dt
+            if variable == ROOT:
+                pace /= 2.0 * x[size + 1]
+            if abs(late) > 1e-15 * landed and abs(pace) < np.inf and tries < _MOST_TRIES:
+                length -= late * pace
+                continue
             if state.count[SAMPLED] < out.shape[0] and time == state.count[SAMPLED] * dt:
-                copy(space.work[15], out[state.count[SAMPLED]], size)
+                copy(x, out[state.count[SAMPLED]], size)
                 state.count[SAMPLED] += 1
             if time == t_end:
-                copy(space.work[15], state.x, size)
+                if state.tape.shape[0]:
+                    tape(state, LANDING, t, t_end, length, variable, stop, w)
+                copy(x, state.x, size)
                 state.now[T] = t_end
                 return True
+        time = min(state.count[SAMPLED] * dt, t_end) if state.count[SAMPLED] < out.shape[0] else t_end
+        if time > landed:
+            if state.tape.shape[0]:
+                tape(state, LANDING, t, landed, span, variable, stop, w)
+            return True
+        left = (landed - time) / (landed - t) if landed > t else 0.0
+        length, tries = span * (1.0 - (math.sqrt(left) if variable == ROOT else left)), 0
 
 
 @inlined
@@ -291,6 +310,8 @@ def touch(problem, tables, state, space, numbers, last, t_end, rtol, log, out, d
     if ends:
         share = (t_end - state.now[T]) / tables.step[level]
         peaks_so_far(problem, tables, state, space, family, share, space.work[17])
+        if state.tape.shape[0]:
+            _tape_forces(problem, state, space, PART, t_end, family, level)
         copy(space.work[17], state.x, state.x.size)
         state.now[T] = t_end
         state.count[STEPS] += 1
@@ -299,10 +320,21 @@ def touch(problem, tables, state, space, numbers, last, t_end, rtol, log, out, d
         copy(space.force[s], space.previous[s], S)
     if ledger:
         account(problem, tables, state, space, family, tables.step[level], tables.step[level], state.x, state.x)
+    if state.tape.shape[0]:
+        _tape_forces(problem, state, space, STEP, state.now[T] + tables.step[level], family, level)
     finish_step(problem, tables, state, space, family, level)
     _adapt(tables, numbers, last, level, family, wanted, error)
     state.count[STEPS] += 1
     return RUNNING
+
+
+@inner
+def _tape_forces(problem, state, space, kind, ended, family, level):
+    """A row of the tape with the forces at the nodes."""
+    forces = state.tape[state.count[TAPED], HEAD + state.x.size :]
+    for s in range(problem.gap.size):
+        copy(space.force[s], forces[s * S : (s + 1) * S], S)
+    tape(state, kind, state.now[T], ended, ended - state.now[T], family, level, state.x)
 
 
 @inlined
@@ -346,6 +378,8 @@ def advance(problem, tables, state, space, numbers, last, t_end, budget, rtol, l
             return DONE
         if state.count[LOGGED] + problem.gap.size > log.shape[0]:
             return LOG_FULL
+        if state.tape.shape[0] and state.count[TAPED] + problem.gap.size + 2 > state.tape.shape[0]:
+            return RUNNING
         if state.count[AT_ONCE] > MOST_EVENTS_AT_ONCE:
             return CHATTER
         if switch_on_surface(problem, state, log, True):
@@ -387,6 +421,7 @@ class Exponential:
 
     rtol: float = 1e-8
     ledger: bool = True
+    has_tangent: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         if not 1e-12 <= self.rtol <= 1e-2:

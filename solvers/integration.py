@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from numpy.typing import ArrayLike
 from solvers.forcing import hand_over
 from solvers.result import COLUMNS, ContactLog, Cost, Energy, Solution, SolverError, Status
 from solvers.state import CALLS, EVENTS, LOG_FULL, LOGGED, REJECTED, RUNNING, SAMPLED, STEPS, T, contact_row
-from solvers.system import Array, System
+from solvers.system import Array, Parameter, System
 
 _BUDGET = 20_000  # steps between two looks at the world outside
 _MOST_SAMPLES = 500_000_000
@@ -30,7 +31,7 @@ def integrate(
     duration: float,
     dt: float | None = None,
     method: Any = None,
-    tangent: bool = False,
+    tangent: bool | Parameter = False,
     *,
     progress: Callable[[float], None] | None = None,
     check: bool = True,
@@ -44,7 +45,8 @@ def integrate(
     duration : s, > 0.
     dt : output sampling, s; None keeps the final state and the contact log only.
     method : `Exponential`, `DormandPrince` or `HenonRK2`; None takes ``Exponential(rtol=1e-8)``.
-    tangent : not offered by these methods.
+    tangent : True adds the derivative of the final [q, q̇] with respect to [q0, q_dot0], (2n, 2n), to the solution; a
+        `Parameter` adds one more column, with respect to that parameter at fixed duration. `Exponential` only.
     progress : called with the simulated time now and then.
     check : raise when the run fails; False returns the partial solution with its status instead.
 
@@ -69,19 +71,36 @@ def integrate(
         method = Exponential()
     if not hasattr(method, "engine") or isinstance(method, type):
         raise TypeError(f"method must be one of solvers, made with its settings, such as Exponential(), got {method!r}")
-    if tangent:
-        raise ValueError(f"tangent=True is not offered by {type(method).__name__}")
+    _check_tangent(tangent, method)
     z = _start(system, q0, q_dot0)
     samples = _samples(duration, dt)
     _check_laws(system)
     forcing = hand_over([signal for _, signal in system.loads], duration, min(max(method.rtol, 1e-12), 1e-6))
-    run = _Run(system, method.engine(system, z, forcing, duration), dt, samples)
+    run = _Run(system, method.engine(system, z, forcing, duration), dt, samples, tangent)
     begin = time.perf_counter()
     status = run.to_the_end(progress)
     solution = run.solution(status, time.perf_counter() - begin)
+    if isinstance(tangent, Parameter) and status is Status.DONE and not run.tangent.exact:
+        ends = [_end(s, q0, q_dot0, duration, method) for s in (tangent.behind, tangent.ahead)]
+        column = (ends[1] - ends[0]) / (2.0 * tangent.step)
+        solution = replace(solution, tangent=np.column_stack((run.tangent.matrix(), column)))
     if check and status not in (Status.DONE, Status.INTERRUPTED):
         raise SolverError(f"stopped at t = {run.time:.9g} s of {duration:g} s: {status.value}", solution)
     return solution
+
+
+def _check_tangent(tangent: Any, method: Any) -> None:
+    """A tangent is asked for in one of its forms, of a method that has one."""
+    if not isinstance(tangent, bool | Parameter):
+        raise TypeError(f"tangent must be True, False or a solvers.Parameter, got {tangent!r}")
+    if tangent and not getattr(method, "has_tangent", False):
+        raise ValueError(f"tangent is not offered by {type(method).__name__}; use Exponential")
+
+
+def _end(system: System, q0: ArrayLike, q_dot0: ArrayLike, duration: float, method: Any) -> Array:
+    """Final [q, q̇] of a plain run."""
+    solution = integrate(system, q0, q_dot0, duration, method=method)
+    return np.concatenate((solution.q[-1], solution.q_dot[-1]))
 
 
 def _start(system: System, q0: ArrayLike, q_dot0: ArrayLike) -> Array:
@@ -128,8 +147,13 @@ def _check_laws(system: System) -> None:
 class _Run:
     """One run: a method's engine, its output, and the loop over stretches."""
 
-    def __init__(self, system: System, engine: Any, dt: float | None, samples: int) -> None:
+    def __init__(self, system: System, engine: Any, dt: float | None, samples: int, tangent: Any) -> None:
         self.system, self.engine, self.dt = system, engine, dt
+        self.tangent: Any = None
+        if tangent:
+            from solvers.tangent import Tangent
+
+            self.tangent = Tangent(system, engine, tangent if isinstance(tangent, Parameter) else None)
         self.state = engine.state
         self.log = np.empty((max(256, 2 * len(system.contacts)), COLUMNS))
         self.out = np.empty((samples, self.state.x.size))
@@ -149,10 +173,14 @@ class _Run:
         code = RUNNING
         try:
             self.engine.start()
+            if self.tangent:
+                self.tangent.start()
             while code in (RUNNING, LOG_FULL):
                 if code == LOG_FULL:
                     self.log = np.concatenate((self.log, np.empty_like(self.log)))
                 code = self.engine.march(_BUDGET, self.log, self.out, self.dt or math.inf)
+                if self.tangent:
+                    self.tangent.follow()
                 if progress:
                     progress(self.time)
         except KeyboardInterrupt:
@@ -178,7 +206,8 @@ class _Run:
         )
         count = self.state.count
         cost = Cost(int(count[STEPS]), int(count[REJECTED]), int(count[CALLS]), int(count[EVENTS]), seconds)
-        return Solution(t, q, q_dot, self._contacts(), energy, status, cost)
+        tangent = self.tangent.matrix() if self.tangent and status is Status.DONE else None
+        return Solution(t, q, q_dot, self._contacts(), energy, status, cost, tangent)
 
     def _sampled(self, status: Status) -> int:
         """Samples written; the last one may lie a rounding beyond the end."""

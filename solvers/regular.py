@@ -1,6 +1,5 @@
 r"""Runge–Kutta steps in a variable in which a contact is smooth: DOP853 with t as one of the unknowns.
 
-    TIME          dt = dt
     INDENTATION   dt = dδ/δ̇         lands exactly on a kink, or on another stop's surface
     ROOT          dt = 2u du/δ̇      u = √δ: lands exactly on δ = 0, where δ^{3/2} is singular in t
 
@@ -14,7 +13,7 @@ from solvers.collocation import powers
 from solvers.dormand_prince import E5, STAGES, A
 from solvers.kernels import contact_forces, dot, indentation, inlined, table_value
 
-TIME, INDENTATION, ROOT = range(3)
+INDENTATION, ROOT = range(2)
 
 
 @inlined
@@ -42,12 +41,7 @@ def _rate(problem, tables, ledger, variable, stop, w, piece, entry_rate, out, ba
         out[size + 2 + 2 * s] = batch[2] * batch[1]
         out[size + 3 + 2 * s] = batch[2]
     delta_dot, u = dot(problem.read_rate[stop], w, size), w[w.size - 1]
-    if variable == TIME:
-        factor = 1.0
-    elif variable == INDENTATION:
-        factor = 1.0 / delta_dot
-    else:
-        factor = 2.0 * u / delta_dot
+    factor = 1.0 / delta_dot if variable == INDENTATION else 2.0 * u / delta_dot
     for e in range(w.size - 2):
         out[e] *= factor
     out[w.size - 2] = factor

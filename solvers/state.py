@@ -26,9 +26,12 @@ DONE, RUNNING, STEP_TOO_SMALL, DIVERGED, CHATTER, LOG_FULL, LAW_NOT_FINITE = (
     )
 )
 T, H_FLIGHT, H_CONTACT, LAST_EVENT = range(4)  # places in State.now
-STEPS, REJECTED, CALLS, EVENTS, LOGGED, SAMPLED, AT_ONCE = range(7)  # places in State.count
+STEPS, REJECTED, CALLS, EVENTS, LOGGED, SAMPLED, AT_ONCE, TAPED = range(8)  # places in State.count
 T_IN, SPEED_IN, PEAK_DELTA, PEAK_FORCE, WORK_IN, IMPULSE_IN, FLOORED = range(7)  # columns of State.open
 MOST_EVENTS_AT_ONCE = 100
+STEP, PART, LANDING, EVENT = range(4)  # kinds of tape rows
+KIND, BEGAN, ENDED, SPAN, FIRST, SECOND, HEAD = range(7)  # columns of the tape: two whole numbers that the kind
+# explains, then the state a row begins with and the forces at the nodes of a step
 
 
 class State(NamedTuple):
@@ -41,10 +44,11 @@ class State(NamedTuple):
     entry_rate: Any  # (m,) latched
     open: Any  # (m, 7) of the contacts under way
     count: Any
+    tape: Any  # (rows, HEAD + x.size + forces) what happened in contact, for the tangent; no rows, no tape
 
 
 STATE = types.NamedTuple(
-    [_VECTOR, _VECTOR, _VECTOR, _INTEGERS, _VECTOR, _MATRIX, _INTEGERS],
+    [_VECTOR, _VECTOR, _VECTOR, _INTEGERS, _VECTOR, _MATRIX, _INTEGERS, _MATRIX],
     State,
 )
 
@@ -65,6 +69,16 @@ def rate_tolerance(problem, s, x):
     for i in range(2 * problem.k.size):
         total += abs(problem.read_rate[s, i] * x[i])
     return 1e-15 * total
+
+
+@inner
+def tape(state, kind, began, ended, span, first, second, x):
+    """Write a row of the tape: what happened from ``began`` at x to ``ended``."""
+    row = state.tape[state.count[TAPED]]
+    row[KIND], row[BEGAN], row[ENDED], row[SPAN], row[FIRST], row[SECOND] = kind, began, ended, span, first, second
+    for e in range(state.x.size):
+        row[HEAD + e] = x[e]
+    state.count[TAPED] += 1
 
 
 @inner
@@ -116,6 +130,8 @@ def switch(problem, state, s, direction, log):
     """Move stop s one piece up or down; open or close its contact."""
     t = state.now[T]
     delta_dot = dot(problem.read_rate[s], state.x, 2 * problem.k.size)
+    if state.tape.shape[0]:
+        tape(state, EVENT, t, t, 0.0, s, direction, state.x)
     if direction > 0 and state.piece[s] == 0:
         _open(problem, state, s, t, delta_dot)
     if direction < 0 and state.piece[s] == 1:
@@ -164,7 +180,8 @@ def new_state(z: Any, stops: int) -> State:
         np.zeros(stops, dtype=np.int64),
         np.ones(stops),
         np.zeros((stops, 7)),
-        np.zeros(7, dtype=np.int64),
+        np.zeros(8, dtype=np.int64),
+        np.empty((0, 0)),
     )
 
 

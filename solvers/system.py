@@ -13,6 +13,7 @@ Runge–Kutta and exact propagation commute with this change of coordinates, so 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -165,6 +166,38 @@ class System:
     def energy(self, q: Array, q_dot: Array) -> Array:
         """Stored energy ½ q'ᵀ M q' + ½ qᵀ K q in J, for (..., n) arrays."""
         return 0.5 * (np.sum((q_dot @ self.M) * q_dot, axis=-1) + np.sum((q @ self.K) * q, axis=-1))
+
+
+@dataclass(frozen=True, eq=False)
+class Parameter:
+    """A scalar of the problem, given by the systems at its value less and plus ``step``.
+
+    The derivative d[q, q̇]/d(parameter) at fixed start and fixed duration. Where the systems differ in loads' tones,
+    gaps and laws' parameters only, these data are differenced and the motion's derivative is exact; where anything
+    else differs (matrices, directions, knots, sampled signals), it is the central difference of two runs.
+
+    Parameters
+    ----------
+    behind, ahead : systems of one size, with the same number of contacts and loads.
+    step : half the difference of the parameter, > 0.
+
+    Examples
+    --------
+    >>> soft, stiff = (System.modal(omega=[w], zeta=[0.0]) for w in (1.99, 2.01))
+    >>> Parameter(soft, stiff, step=0.01).step
+    0.01
+    """
+
+    behind: System
+    ahead: System
+    step: float
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.step < math.inf:
+            raise ValueError(f"step of a Parameter must be positive and finite, got {self.step!r}")
+        sizes = [(s.size, len(s.contacts), len(s.loads)) for s in (self.behind, self.ahead)]
+        if sizes[0] != sizes[1]:
+            raise ValueError(f"the systems of a Parameter differ in coordinates, contacts or loads: {sizes}")
 
 
 def _square(name: str, matrix: Any) -> Array:

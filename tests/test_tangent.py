@@ -1,0 +1,199 @@
+"""The derivative of a whole run, against differences of runs, closed forms and the volume of state space."""
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, law
+from solvers import Contact, DormandPrince, Exponential, Parameter, System, integrate
+
+OMEGA, ZETA = np.array([109.13, 790.6, 2303.7, 4700.0, 7800.0]), np.array([0.02, 0.01, 0.01, 0.01, 0.01])
+PHI, GAMMA = np.array([6.2, -1.9, 3.0, -2.5, 2.2]), np.array([0.16, 0.02, 0.01, 0.01, 0.005])
+LAWS = {
+    "hysteretic": Hysteretic(2.1e8, damping_factor=0.5625),
+    "hertz": Hertz(2.1e8),
+    "kelvin_voigt": KelvinVoigt(2e5, 30.0),
+    "piecewise": PiecewiseLinear([1e5, 4e5], knots=[2e-5]),
+}
+
+
+class Tone:
+    """a cos ωt, as a tone."""
+
+    def __init__(self, amplitude, omega):
+        self.amplitude, self.omega = amplitude, omega
+
+    def __call__(self, t):
+        return self.amplitude * np.cos(self.omega * np.asarray(t))
+
+    def tones(self):
+        return np.array([self.omega]), np.array([self.amplitude + 0j])
+
+
+def beam(n=2, law=LAWS["hysteretic"], amplitude=40.0, omega=195.0, gap=0.0, opposite=None, sampled=False, zeta=1.0):
+    contacts = [Contact(PHI[:n], law, gap)]
+    if opposite:
+        contacts.append(Contact(-0.8 * PHI[:n], opposite, 3e-4))
+    tone = Tone(amplitude, omega)
+    signal = (lambda t: tone(t)) if sampled else tone
+    return System.modal(OMEGA[:n], zeta * ZETA[:n], contacts, [(GAMMA[:n], signal)])
+
+
+def start(n, seed=0):
+    rng = np.random.default_rng(seed)
+    return rng.normal(size=n) * 1e-4 / np.arange(1, n + 1) ** 2, rng.normal(size=n) * 2e-2 / np.arange(1, n + 1)
+
+
+def end(system, q, q_dot, duration, rtol=1e-12):
+    solution = integrate(system, q, q_dot, duration, method=Exponential(rtol))
+    return np.concatenate((solution.q[-1], solution.q_dot[-1]))
+
+
+def extrapolated(function, step):
+    """Central differences of two widths, Richardson."""
+    wide, narrow = ((function(h) - function(-h)) / (2 * h) for h in (step, step / 2))
+    return (4 * narrow - wide) / 3
+
+
+def differences(system, q, q_dot, duration):
+    n, scale = len(q), np.abs(np.concatenate((q, q_dot))) + 1e-3 * np.abs(np.concatenate((q, q_dot))).max()
+    columns = []
+    for unit in np.diag(scale):
+        columns.append(
+            extrapolated(lambda h, d=unit: end(system, q + h * d[:n], q_dot + h * d[n:], duration), 3e-5) / unit.sum()
+        )
+    return np.transpose(columns)
+
+
+@pytest.mark.parametrize("modes", [1, 2, 5])
+@pytest.mark.parametrize("name", LAWS)
+def test_against_differences_of_runs(name, modes):
+    system, (q, q_dot) = beam(modes, LAWS[name]), start(modes, seed=3)
+    solution = integrate(system, q, q_dot, 0.06, method=Exponential(1e-11), tangent=True)
+    assert len(solution.contacts) >= 2
+    expected = differences(system, q, q_dot, 0.06)
+    np.testing.assert_allclose(solution.tangent, expected, rtol=0, atol=1e-7 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("sampled", [False, True])
+@pytest.mark.parametrize("name", ["hysteretic", "kelvin_voigt"])
+def test_two_stops_on_opposite_sides(name, sampled):
+    system, (q, q_dot) = beam(2, LAWS[name], opposite=LAWS["hertz"], sampled=sampled), start(2, seed=1)
+    solution = integrate(system, q, q_dot, 0.03, method=Exponential(1e-11), tangent=True)
+    assert set(solution.contacts.stop) == {0, 1}
+    expected = differences(system, q, q_dot, 0.03)
+    np.testing.assert_allclose(solution.tangent, expected, rtol=0, atol=1e-7 * np.abs(expected).max())
+
+
+def test_preload_end_in_contact_and_user_law():
+    @law
+    def cubic(delta, delta_dot, entry_rate, stiffness):
+        return stiffness * (delta + 1e3 * delta**3)
+
+    system, (q, q_dot) = beam(2, cubic(stiffness=3e5), gap=-2e-5), start(2)
+    for duration in (1e-3, 2.3e-3):
+        solution = integrate(system, q, q_dot, duration, method=Exponential(1e-11), tangent=True)
+        expected = differences(system, q, q_dot, duration)
+        np.testing.assert_allclose(solution.tangent, expected, rtol=0, atol=1e-7 * np.abs(expected).max())
+
+
+def test_the_end_within_every_kind_of_contact_step():
+    system, (q, q_dot) = beam(2), start(2)
+    log = integrate(system, q, q_dot, 0.05).contacts
+    for share in (0.003, 0.3, 0.97, 0.9999):
+        duration = log.t_in[-1] + share * (log.t_out[-1] - log.t_in[-1])
+        solution = integrate(system, q, q_dot, duration, method=Exponential(1e-11), tangent=True)
+        expected = differences(system, q, q_dot, duration)
+        np.testing.assert_allclose(solution.tangent, expected, rtol=0, atol=1e-7 * np.abs(expected).max())
+
+
+PARAMETERS = {
+    "omega": (lambda p: beam(omega=p), 195.0),
+    "omega, two stops": (lambda p: beam(omega=p, opposite=LAWS["hertz"]), 195.0),
+    "amplitude": (lambda p: beam(amplitude=p), 40.0),
+    "gap": (lambda p: beam(gap=p), 1e-5),
+    "stiffness": (lambda p: beam(law=Hysteretic(p, damping_factor=0.5)), 2.1e8),
+    "damping_factor": (lambda p: beam(law=Hysteretic(2.1e8, damping_factor=p)), 0.5),
+    "dashpot": (lambda p: beam(law=KelvinVoigt(2e5, p)), 30.0),
+    "slope": (lambda p: beam(law=PiecewiseLinear([1e5, p], knots=[2e-5])), 4e5),
+    "knot": (lambda p: beam(law=PiecewiseLinear([1e5, 4e5], knots=[p])), 2e-5),
+    "zeta": (lambda p: beam(zeta=p), 1.0),
+    "sampled": (lambda p: beam(omega=p, sampled=True), 195.0),
+}
+DIFFERENCED = {"knot", "zeta", "sampled"}
+
+
+@pytest.mark.parametrize("name", PARAMETERS)
+def test_parameter(name):
+    make, value = PARAMETERS[name]
+    step, (q, q_dot) = 1e-5 * value, start(2, seed=3)
+    parameter = Parameter(make(value - step), make(value + step), step)
+    solution = integrate(make(value), q, q_dot, 0.05, method=Exponential(1e-11), tangent=parameter)
+    assert solution.tangent.shape == (4, 5)
+    assert len(solution.contacts) >= 1
+    expected = extrapolated(lambda h: end(make(value + h), q, q_dot, 0.05), 3e-5 * value)
+    tolerance = 1e-6 if name in DIFFERENCED else 1e-7
+    np.testing.assert_allclose(solution.tangent[:, -1], expected, rtol=0, atol=tolerance * np.abs(expected).max())
+
+
+def test_flight_is_the_matrix_exponential():
+    C = np.array([[3.0, -1.0], [-1.0, 4.0]])  # couples the modes
+    K = np.diag([100.0, 900.0])
+    system = System(np.eye(2), C, K)
+    A = np.block([[np.zeros((2, 2)), np.eye(2)], [-K, -C]])
+    found = integrate(system, [1.0, 0.0], [0.0, 1.0], 0.3, tangent=True).tangent
+    np.testing.assert_allclose(found, expm(0.3 * A), atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["hertz", "piecewise"])
+def test_an_elastic_stop_keeps_the_volume_of_state_space(name):
+    # Liouville: det = exp(-∫ trace C dt), whatever the elastic stops do
+    system, (q, q_dot) = beam(3, LAWS[name], opposite=LAWS["hertz"]), start(3)
+    solution = integrate(system, q, q_dot, 0.02, method=Exponential(1e-11), tangent=True)
+    assert len(solution.contacts) >= 3
+    expected = np.exp(-2.0 * 0.02 * np.sum(ZETA[:3] * OMEGA[:3]))
+    assert np.linalg.det(solution.tangent) == pytest.approx(expected, rel=1e-8)
+
+
+def test_saltation_of_a_force_jump_in_closed_form():
+    # without stiffness the dashpot alone acts: a mass m at speed v meets c v at once, so v' = -c v/m from then on
+    m, c, v, gap = 2.0, 3.0, 0.7, 0.1
+    system = System([[m]], [[0.0]], [[0.0]], [Contact([-1.0], KelvinVoigt(1e-9, c), gap)])
+    duration = 0.5
+    inside = duration - gap / v
+    found = integrate(system, [0.0], [v], duration, method=Exponential(1e-12), tangent=True).tangent
+    decay = np.exp(-c * inside / m)
+    # q = gap + (v m/c)(1 - decay), with the entry at (gap - q0)/v
+    expected = [[decay, (1.0 - decay) * m / c + gap / v * decay], [-c / m * decay, decay * (1.0 - c / m * gap / v)]]
+    np.testing.assert_allclose(found, expected, atol=1e-8)
+
+
+def test_error_falls_with_the_tolerance():
+    system, (q, q_dot) = beam(2), start(2, seed=3)
+    found = [
+        integrate(system, q, q_dot, 0.06, method=Exponential(r), tangent=True).tangent for r in (1e-5, 1e-8, 1e-12)
+    ]
+    errors = [np.abs(x - found[-1]).max() / np.abs(found[-1]).max() for x in found[:-1]]
+    assert errors[0] < 1e-3
+    assert errors[1] < 1e-6
+
+
+def test_the_run_is_the_same_and_long_runs_replay_in_pieces():
+    system, (q, q_dot) = beam(2), start(2)
+    plain, followed = (integrate(system, q, q_dot, 3.0, tangent=flag) for flag in (False, True))
+    assert plain.tangent is None
+    np.testing.assert_array_equal(plain.q, followed.q)
+    np.testing.assert_array_equal(plain.contacts.t_in, followed.contacts.t_in)
+    assert followed.cost.steps > 1024  # more than one tape
+
+
+def test_bad_input():
+    system = beam(1)
+    with pytest.raises(ValueError, match="tangent is not offered by DormandPrince; use Exponential"):
+        integrate(system, [0.0], [0.0], 1.0, method=DormandPrince(), tangent=True)
+    with pytest.raises(TypeError, match=r"tangent must be True, False or a solvers\.Parameter"):
+        integrate(system, [0.0], [0.0], 1.0, tangent="omega")
+    with pytest.raises(ValueError, match="differ in coordinates"):
+        Parameter(beam(1), beam(2), 1.0)
+    with pytest.raises(ValueError, match="step"):
+        Parameter(beam(1), beam(1), 0.0)
