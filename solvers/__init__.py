@@ -16,9 +16,15 @@ _LATER = {
     "HenonRK2": "henon",
     "DormandPrince": "dormand_prince",
     "Exponential": "exponential",
+    "orbit": "shooting",
+    "Orbit": "shooting",
+    "OrbitError": "shooting",
+    "branch": "continuation",
+    "Branch": "continuation",
 }
 
 __all__ = [
+    "Branch",
     "Contact",
     "ContactLog",
     "Cost",
@@ -26,12 +32,16 @@ __all__ = [
     "Energy",
     "Exponential",
     "HenonRK2",
+    "Orbit",
+    "OrbitError",
     "Parameter",
     "Solution",
     "SolverError",
     "Status",
     "System",
+    "branch",
     "integrate",
+    "orbit",
 ]
 
 

@@ -206,8 +206,10 @@ class _Run:
         )
         count = self.state.count
         cost = Cost(int(count[STEPS]), int(count[REJECTED]), int(count[CALLS]), int(count[EVENTS]), seconds)
-        tangent = self.tangent.matrix() if self.tangent and status is Status.DONE else None
-        return Solution(t, q, q_dot, self._contacts(), energy, status, cost, tangent)
+        solution = Solution(t, q, q_dot, self._contacts(), energy, status, cost)
+        if self.tangent is None or status is not Status.DONE:
+            return solution
+        return replace(solution, tangent=self.tangent.matrix(), rate=self.tangent.rate())
 
     def _sampled(self, status: Status) -> int:
         """Samples written; the last one may lie a rounding beyond the end."""

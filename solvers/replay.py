@@ -30,7 +30,7 @@ import numpy as np
 from solvers.collocation import arrive, factorise, free_response, inside, linearise, respond, substitute
 from solvers.dormand_prince import STAGES, A
 from solvers.flight import signal_derivatives, turn
-from solvers.kernels import contact_forces, contact_gradient, copy, dot, indentation, inner, kernel, rhs
+from solvers.kernels import contact_forces, contact_gradient, copy, dot, indentation, inlined, inner, kernel, rhs
 from solvers.regular import regular_step
 from solvers.state import BEGAN, ENDED, EVENT, FIRST, HEAD, KIND, LANDING, PART, SECOND, SPAN, T
 from solvers.tables import S, propagate
@@ -61,7 +61,7 @@ class Nudge(NamedTuple):
     gap: Any  # (m,)
 
 
-@inner
+@inlined
 def _explicit(nudge, s, d, t):
     """Change of δ (d = 0) or δ̇ that the parameter makes by itself at time t."""
     total = -nudge.gap[s] if d == 0 else 0.0
@@ -72,7 +72,7 @@ def _explicit(nudge, s, d, t):
     return total
 
 
-@inner
+@inlined
 def _change(problem, nudge, slopes, column, s, d, t):
     """Change of δ or δ̇ of a stop at fixed time."""
     row = problem.read[s] if d == 0 else problem.read_rate[s]
@@ -80,7 +80,7 @@ def _change(problem, nudge, slopes, column, s, d, t):
     return value + _explicit(nudge, s, d, t) if _is_parameter(nudge, slopes, column) else value
 
 
-@inner
+@inlined
 def _is_parameter(nudge, slopes, column):
     """Whether a column is the parameter's."""
     return nudge.step > 0.0 and column == slopes.y.shape[0] - 1
@@ -151,7 +151,7 @@ def _cross(problem, shadow, slopes, nudge, s, direction):
     shadow.piece[s] += direction
 
 
-@inner
+@inlined
 def _by_parameter(ahead, behind, shadow, space, nudge, slopes, s):
     """∂F/∂parameter at the nodes of a stop, from the law at both parameters."""
     for i in range(S):
@@ -165,7 +165,7 @@ def _by_parameter(ahead, behind, shadow, space, nudge, slopes, s):
         slopes.by_parameter[s, i] = (slopes.by_parameter[s, i] - space.trial[i]) / (2.0 * nudge.step)
 
 
-@inner
+@inlined
 def _signal_slopes(problem, tables, space, slopes, family, level, t):
     """Slopes of the sampled signals at the nodes, and the response to them."""
     stops, h = problem.gap.size, tables.step[level]
@@ -182,7 +182,7 @@ def _signal_slopes(problem, tables, space, slopes, family, level, t):
                     slopes.response[s, d, i] += dot(row, slopes.signal[load], S)
 
 
-@inner
+@inlined
 def _solve(problem, tables, shadow, space, slopes, nudge, family, level, column, shift):
     """Changes of all forces (and, in a moving frame, signals) at the nodes, one column."""
     row, size, stops = 0, 2 * problem.k.size, problem.gap.size
@@ -213,7 +213,7 @@ def _solve(problem, tables, shadow, space, slopes, nudge, family, level, column,
             slopes.force[stops + load, i] = shift * slopes.signal[load, i]
 
 
-@inner
+@inlined
 def _move(problem, tables, shadow, space, slopes, family, level, y, part):
     """Take one column to the end of the step, or to the ``part`` of it that lies within the run."""
     size, stops = 2 * problem.k.size, problem.gap.size
@@ -275,7 +275,7 @@ def _inside_piece(problem, shadow, s, x):
     return min(max(indentation(problem, s, x), lower * (1.0 + 1e-12)), upper * (1.0 - 1e-12))
 
 
-@inner
+@inlined
 def _stage_rates(problem, ahead, behind, shadow, space, slopes, nudge, w, factor, out):
     """Variational equation at one stage of a landing; ``w`` is the state with its time, factor dt/d(variable)."""
     n, size, t, batch = problem.k.size, 2 * problem.k.size, w[w.size - 2], slopes.batch

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 from enum import Enum
 from typing import Any
 
@@ -69,6 +70,12 @@ class ContactLog:
         columns[0], columns[-1] = columns[0].astype(int), columns[-1].astype(bool)
         return cls(*columns)
 
+    @classmethod
+    def joined(cls, logs: Sequence[ContactLog], begins: Sequence[float]) -> ContactLog:
+        """One log of several runs, each of whose times counts from its own begin."""
+        moved = [replace(log, t_in=log.t_in + t, t_out=log.t_out + t) for log, t in zip(logs, begins, strict=True)]
+        return cls(*(np.concatenate([getattr(log, f.name) for log in moved]) for f in fields(cls)))
+
     def arrays(self) -> dict[str, Any]:
         """All columns by name."""
         return {f.name: getattr(self, f.name) for f in fields(self)}
@@ -110,7 +117,11 @@ class Cost:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """A run: t (k,), q and q_dot (k, n), contact log, energy ledger, status, cost, tangent."""
+    """A run: t (k,), q and q_dot (k, n), contact log, energy ledger, status, cost.
+
+    With a tangent asked for: ``tangent`` (2n, 2n or 2n + 1), derivative of the final [q, q̇], and ``rate`` (2n,), its
+    derivative by time.
+    """
 
     t: Array
     q: Array
@@ -120,3 +131,4 @@ class Solution:
     status: Status
     cost: Cost
     tangent: Array | None = None
+    rate: Array | None = None

@@ -10,7 +10,7 @@ import numpy as np
 from solvers.dormand_prince import STAGES
 from solvers.exponential import with_tones
 from solvers.forcing import Forcing, hand_over
-from solvers.kernels import Problem
+from solvers.kernels import Problem, rhs
 from solvers.replay import Nudge, Slopes, begin, replay
 from solvers.state import HEAD, TAPED, T, new_state, problem_of
 from solvers.system import Array, Parameter, System
@@ -65,6 +65,13 @@ class Tangent:
             *(self.change.nudge, engine.state.tape, engine.state.count[TAPED], engine.state.now[T]),
         )
         engine.state.count[TAPED] = 0
+
+    def rate(self) -> Array:
+        """(2n,) derivative of [q, q̇] by time at the time reached."""
+        problem, state = self.engine.problem, self.engine.state
+        rate = np.zeros_like(state.x)
+        rhs(problem, state.now[T], state.x, state.piece, state.entry_rate, rate, np.zeros(3))
+        return self.engine.back @ rate[: 2 * len(problem.k)]
 
     def matrix(self) -> Array:
         """(2n, columns) derivatives of [q, q̇] at the time reached."""
