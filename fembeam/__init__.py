@@ -33,6 +33,8 @@ _ROOMS = {
     "noise": "BandNoise",
     "record": "Record",
     "model": "Model",
+    "orbit": "Attractor Orbit",
+    "branch": "Branch",
     "run": "Run load",
     "statistics": "moments pdf psd",
 }
@@ -40,8 +42,10 @@ _HOME = {name: room for room, names in _ROOMS.items() for name in names.split()}
 _MODULES = ["plot", "study"]
 
 __all__ = [
+    "Attractor",
     "Beam",
     "BandNoise",
+    "Branch",
     "Clamped",
     "Dashpot",
     "Guided",
@@ -50,6 +54,7 @@ __all__ = [
     "ModalDamping",
     "Model",
     "Multisine",
+    "Orbit",
     "Pinned",
     "PointForce",
     "Rayleigh",
@@ -70,10 +75,12 @@ __all__ = [
 if TYPE_CHECKING:
     from fembeam import plot, study
     from fembeam.beam import Beam
+    from fembeam.branch import Branch
     from fembeam.damping import ModalDamping, Rayleigh
     from fembeam.excitation import Harmonic, Multisine
     from fembeam.model import Model
     from fembeam.noise import BandNoise
+    from fembeam.orbit import Attractor, Orbit
     from fembeam.record import Record
     from fembeam.run import Run, load
     from fembeam.scene import Clamped, Dashpot, Guided, LumpedMass, Pinned, PointForce, Scene, Spring, Stop

@@ -5,6 +5,7 @@ q_i'' + 2 ζ_i ω_i q_i' + ω_i² q_i = -Γ_i ÿ + Σ φ_i(z_f) f + Σ_s w_si F_
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,7 +20,11 @@ from fembeam.beam import hermite_rows
 from fembeam.section import require
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from fembeam.assembly import Matrices
+    from fembeam.branch import Branch
+    from fembeam.orbit import Attractor, Orbit
     from fembeam.run import Run
     from fembeam.scene import Scene
 
@@ -89,7 +94,11 @@ class Model:
     @cached_property
     def system(self) -> solvers.System:
         """The matrix-level problem: M = I, C, K = diag(ω²), contacts, loads."""
-        scene, n = self.scene, len(self.omega)
+        return self.system_of(self.scene)
+
+    def system_of(self, scene: Scene) -> solvers.System:
+        """The problem of a scene that differs from the model's in loads, gaps and laws only."""
+        n = len(self.omega)
         C = np.diag(scene.damping.modal_coefficients(self.omega, self.modes))
         C = C + self.basis.project_matrix(self.matrices.dashpots)
         contacts = [solvers.Contact(stop.push * self.phi(stop.z), stop.law, stop.gap) for stop in scene.stops]
@@ -179,6 +188,86 @@ class Model:
         with bar(duration, progress) as report:
             solution = solvers.integrate(lasting.system, start[:n], start[n:], duration, dt, solver, progress=report)
         return Run.of(lasting, solution)
+
+    def orbit(self, period: int = 1, start: ArrayLike | Orbit | None = None, shots: int | None = None) -> Orbit:
+        """Find a periodic motion by shooting.
+
+        Parameters
+        ----------
+        period : in periods of the load; 2 is a 1/2 subharmonic.
+        start : (2n,) state at t = 0 or an orbit near it; None tries what a run from rest settles to, then other starts.
+        shots : per period; None takes as many as it needs.
+
+        Returns
+        -------
+        Orbit : state, multipliers, stable, contacts, extremes(z), run.
+
+        Raises
+        ------
+        ValueError for a period below 1 or loads without a period; solvers.OrbitError with what was tried.
+        """
+        from fembeam.orbit import orbit
+
+        return orbit(self, period, start, shots)
+
+    def attractors(
+        self, omega: float | None = None, starts: int | Sequence[ArrayLike] = 12, longest: int = 8, seed: int = 0
+    ) -> list[Attractor]:
+        """Settle many starts and name what they come to, the most frequent first.
+
+        Parameters
+        ----------
+        omega : rad/s of the load; None leaves the scene as it is.
+        starts : how many (rest and random states of the size of the motion from rest), or a list of states (2n,).
+        longest : periods above this many of the load's count as "not periodic".
+        seed : of the random states.
+
+        Returns
+        -------
+        list of Attractor : orbit (None when not periodic), period, impacts, count, state, name.
+        """
+        from fembeam.orbit import attractors
+        from fembeam.parameters import with_value
+
+        model = self if omega is None else dataclasses.replace(self, scene=with_value(self.scene, "omega", omega))
+        return attractors(model, starts, longest, seed)
+
+    def branch(
+        self,
+        parameter: str = "omega",
+        span: tuple[float, float] = (0.0, 0.0),
+        period: int = 1,
+        start: ArrayLike | Orbit | None = None,
+        at: float | None = None,
+        **options: Any,
+    ) -> Branch:
+        """Follow an orbit along one number of the scene, in both directions.
+
+        Parameters
+        ----------
+        parameter : such as "omega", "amplitude", "gap", "stops[0].law.stiffness"; see `fembeam.parameters`.
+        span : (lowest, highest) value.
+        period : in periods of the load.
+        start : as for `orbit`. at : the parameter's value there; None: the scene's, if it lies in the span.
+        options : step (largest, in units of the span), shots, method; see `solvers.branch`.
+
+        Returns
+        -------
+        Branch : computes as it is iterated over; ``run()`` computes all. Orbits carry a ``mark`` where special.
+
+        Raises
+        ------
+        ValueError : unknown parameter (lists the valid ones), empty span. solvers.OrbitError : no orbit at the start.
+        """
+        from fembeam.branch import follow
+
+        return follow(self, parameter, span, period, start, at, options)
+
+    def resume(self, path: str | Path) -> Branch:
+        """A branch that `Branch.save` wrote, ready to be gone on with; refused if it belongs to another scene."""
+        from fembeam.branch import resumed
+
+        return resumed(self, path)
 
 
 def reduced(scene: Scene, modes: int | Sequence[int], elements: int | None) -> Model:
