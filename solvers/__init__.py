@@ -16,6 +16,7 @@ _LATER = {
     "HenonRK2": "henon",
     "DormandPrince": "dormand_prince",
     "Exponential": "exponential",
+    "lyapunov": "lyapunov",
     "orbit": "shooting",
     "Orbit": "shooting",
     "OrbitError": "shooting",
@@ -41,6 +42,7 @@ __all__ = [
     "System",
     "branch",
     "integrate",
+    "lyapunov",
     "orbit",
 ]
 

@@ -69,14 +69,7 @@ def integrate(
         from solvers.exponential import Exponential
 
         method = Exponential()
-    if not hasattr(method, "engine") or isinstance(method, type):
-        raise TypeError(f"method must be one of solvers, made with its settings, such as Exponential(), got {method!r}")
-    _check_tangent(tangent, method)
-    z = _start(system, q0, q_dot0)
-    samples = _samples(duration, dt)
-    _check_laws(system)
-    forcing = hand_over([signal for _, signal in system.loads], duration, min(max(method.rtol, 1e-12), 1e-6))
-    run = _Run(system, method.engine(system, z, forcing, duration), dt, samples, tangent)
+    run = prepared_run(system, q0, q_dot0, duration, dt, method, tangent)
     begin = time.perf_counter()
     status = run.to_the_end(progress)
     solution = run.solution(status, time.perf_counter() - begin)
@@ -87,6 +80,20 @@ def integrate(
     if check and status not in (Status.DONE, Status.INTERRUPTED):
         raise SolverError(f"stopped at t = {run.time:.9g} s of {duration:g} s: {status.value}", solution)
     return solution
+
+
+def prepared_run(
+    system: System, q0: ArrayLike, q_dot0: ArrayLike, duration: float, dt: float | None, method: Any, tangent: Any
+) -> _Run:
+    """A run ready to start, everything checked."""
+    if not hasattr(method, "engine") or isinstance(method, type):
+        raise TypeError(f"method must be one of solvers, made with its settings, such as Exponential(), got {method!r}")
+    _check_tangent(tangent, method)
+    z = _start(system, q0, q_dot0)
+    samples = _samples(duration, dt)
+    _check_laws(system)
+    forcing = hand_over([signal for _, signal in system.loads], duration, min(max(method.rtol, 1e-12), 1e-6))
+    return _Run(system, method.engine(system, z, forcing, duration), dt, samples, tangent)
 
 
 def _check_tangent(tangent: Any, method: Any) -> None:

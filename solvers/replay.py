@@ -233,7 +233,7 @@ def _move(problem, tables, shadow, space, slopes, family, level, y, part):
 
 
 @inner
-def _step(problem, ahead, behind, tables, shadow, space, slopes, nudge, row):
+def _step(problem, ahead, behind, tables, shadow, space, slopes, nudge, row, modes):
     """A collocated step, linearised as it was taken."""
     family, level, t = int(row[FIRST]), int(row[SECOND]), row[BEGAN]
     size, stops = 2 * problem.k.size, problem.gap.size
@@ -264,8 +264,11 @@ def _step(problem, ahead, behind, tables, shadow, space, slopes, nudge, row):
             y[e] += slopes.rate[0, e] * shift
         _solve(problem, tables, shadow, space, slopes, nudge, family, level, c, shift)
         _move(problem, tables, shadow, space, slopes, family, level, y, part)
-        for e in range(size if moving else 0):
-            y[e] -= slopes.rate[1, e] * shift
+        if moving:
+            for e in range(size):
+                y[e] -= slopes.rate[1, e] * shift
+            for b in range(modes, problem.k.size):  # tones do not change; their rounding would outlive the rest
+                y[b], y[problem.k.size + b] = 0.0, 0.0
 
 
 @inner
@@ -336,8 +339,8 @@ def _land(problem, ahead, behind, tables, shadow, space, slopes, nudge, row):
 
 
 @kernel
-def replay(problem, ahead, behind, tables, shadow, space, slopes, nudge, tape, rows, t_end):
-    """Carry the derivatives over what the tape tells, up to ``t_end``."""
+def replay(problem, ahead, behind, tables, shadow, space, slopes, nudge, tape, rows, t_end, modes):
+    """Carry the derivatives over what the tape tells, up to ``t_end``; blocks beyond the ``modes`` are tones."""
     for r in range(rows):
         row = tape[r]
         _coast(problem, row[BEGAN] - shadow.now[T], slopes.y)
@@ -348,7 +351,7 @@ def replay(problem, ahead, behind, tables, shadow, space, slopes, nudge, tape, r
         elif row[KIND] == LANDING:
             _land(problem, ahead, behind, tables, shadow, space, slopes, nudge, row)
         else:
-            _step(problem, ahead, behind, tables, shadow, space, slopes, nudge, row)
+            _step(problem, ahead, behind, tables, shadow, space, slopes, nudge, row, modes)
         shadow.now[T] = row[ENDED]
     _coast(problem, t_end - shadow.now[T], slopes.y)
     shadow.now[T] = t_end

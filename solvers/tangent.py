@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +17,8 @@ from solvers.state import HEAD, TAPED, T, new_state, problem_of
 from solvers.system import Array, Parameter, System
 from solvers.tables import S
 
-_ROWS = 1024  # of the tape between two replays
+_ROWS = 256  # of the tape between two replays: some 25 contacts, within which no derivative overflows
+_LARGE = 1e100  # size at which the derivatives are scaled down
 _FIXED = [
     "k",
     "c",
@@ -52,6 +54,8 @@ class Tangent:
         self.laws = [problem._replace(parameters=parameters) for parameters in self.change.laws]
         engine.state = state._replace(tape=np.empty((_ROWS, HEAD + width + stops * S)))
         self.shadow = new_state(state.x[:size], stops)
+        self.log_scale = 0.0  # the derivatives are exp(log_scale) times what is kept
+        self.history: list[tuple[float, float]] = []  # (time, ln of their size)
 
     def start(self) -> None:
         """Before the first step."""
@@ -63,8 +67,15 @@ class Tangent:
         replay(
             *(engine.problem, *self.laws, engine.tables, self.shadow, engine.space, self.slopes),
             *(self.change.nudge, engine.state.tape, engine.state.count[TAPED], engine.state.now[T]),
+            self.blocks.k.size,
         )
         engine.state.count[TAPED] = 0
+        size = float(np.linalg.norm(self.slopes.y, 2))
+        self.history.append((float(engine.state.now[T]), self.log_scale + math.log(size) if size > 0.0 else -math.inf))
+        if not 1.0 / _LARGE < size < _LARGE and size > 0.0:
+            for array in (self.slopes.y, self.slopes.entry, self.slopes.shift):
+                array /= size
+            self.log_scale += math.log(size)
 
     def rate(self) -> Array:
         """(2n,) derivative of [q, q̇] by time at the time reached."""
@@ -75,7 +86,9 @@ class Tangent:
 
     def matrix(self) -> Array:
         """(2n, columns) derivatives of [q, q̇] at the time reached."""
-        y = self.slopes.y[:, self.places].copy()
+        if self.log_scale > 600.0:
+            raise OverflowError(f"the tangent grew to e^{self.log_scale:.0f}; shorten the run, or use solvers.lyapunov")
+        y = math.exp(self.log_scale) * self.slopes.y[:, self.places]
         y[2 * self.blocks.k.size :] += self.change.steady(self.engine.state.now[T])
         return self.blocks.T @ y.T
 

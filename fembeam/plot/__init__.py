@@ -1,5 +1,6 @@
 """Figures: one function per question, each returns a matplotlib figure. `response` holds those of one run."""
 
+from fembeam.plot.orbits import branch, orbit
 from fembeam.plot.response import (
     contacts,
     densities,
@@ -15,9 +16,11 @@ from fembeam.plot.response import (
 )
 
 __all__ = [
+    "branch",
     "contacts",
     "densities",
     "mode_shapes",
+    "orbit",
     "peaks",
     "places",
     "responses",

@@ -1,0 +1,136 @@
+"""Figures of periodic motion: response diagrams of branches, single orbits, brute-force bifurcation diagrams."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fembeam.plot.response import GREEN, GREY, ORANGE, RED, Vector, places, styled
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from fembeam.branch import Branch
+    from fembeam.model import Model
+    from fembeam.orbit import Orbit
+
+MARKS = {"fold": ("o", GREY), "flip": ("s", RED), "neimark-sacker": ("D", GREEN), "branch point": ("P", "black"),
+         "grazing": ("x", "black")}  # fmt: skip
+UNITS = {"base.omega": "ω / rad/s", "base.amplitude": "base amplitude / m"}
+
+
+@styled
+def branch(
+    branches: Branch | Sequence[Branch],
+    z: float | None = None,
+    cloud: tuple[Vector, Vector] | None = None,
+    axes: Axes | None = None,
+    labels: Sequence[str] | None = None,
+) -> Figure:
+    """Response diagram: largest |u| at z over a period against the parameter, dashed where unstable.
+
+    Parameters
+    ----------
+    branches : one or several along the same parameter.
+    z : m; None is the first stop.
+    cloud : (parameter, |u|) of runs to draw beneath, the check by brute force.
+    axes : to draw into; None makes a figure.
+    labels : of the branches; None tells their period.
+    """
+    several = [branches] if not isinstance(branches, Sequence) else list(branches)
+    model = several[0].family.model
+    place = observed(model) if z is None else z
+    axis = _axis() if axes is None else axes
+    if cloud is not None:
+        axis.plot(cloud[0], 1e3 * cloud[1], ",", color=GREY, alpha=0.6, label="simulated", rasterized=True)
+    for i, one in enumerate(several):
+        label = f"period {one.family.period}" if labels is None else labels[i]
+        _draw_branch(axis, one, place, f"C{i}", label)
+    name = several[0].family.name
+    axis.set_xlabel(UNITS.get(name, name))
+    axis.set_ylabel(f"max |u({place:.4g} m)| / mm")
+    _legend(axis, several)
+    figure: Any = axis.figure
+    return figure  # type: ignore[no-any-return]
+
+
+def observed(model: Model) -> float:
+    """The place to watch: the first stop, else the tip."""
+    stops = model.scene.stops
+    return stops[0].z if stops else next(iter(places(model.shapes).values()))
+
+
+def _axis() -> Axes:
+    """One pair of axes in a new figure."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(6.4, 3.8), layout="constrained").subplots()
+
+
+def peak(orbit: Orbit, z: float) -> float:
+    """Largest |u| at z over a period, m."""
+    lowest, highest = orbit.extremes(z)
+    return max(-lowest, highest)
+
+
+def _draw_branch(axis: Axes, one: Branch, z: float, color: str, label: str) -> None:
+    """Solid and dashed pieces of a branch, and its marks."""
+    parameter, stable = one.parameter, one.stable
+    peaks = 1e3 * np.array([peak(orbit, z) for orbit in one.orbits])
+    axis.plot(parameter, np.where(stable, peaks, np.nan), "-", color=color, label=label)
+    unstable = ~stable
+    unstable[:-1] |= unstable[1:]  # a dashed piece begins at the last stable orbit
+    unstable[1:] |= ~stable[:-1]
+    axis.plot(parameter, np.where(unstable, peaks, np.nan), "--", color=color, linewidth=0.8)
+    for orbit, height in zip(one.orbits, peaks, strict=True):
+        if orbit.mark:
+            marker, edge = MARKS[orbit.mark]
+            face = "white" if marker != "x" else edge
+            axis.plot(orbit.parameter, height, marker, color=edge, markerfacecolor=face, markersize=3.5, linewidth=0.8)
+
+
+def _legend(axis: Axes, several: list[Branch]) -> None:
+    """Branches, the dashes' meaning, the marks that occur."""
+    from matplotlib.lines import Line2D
+
+    handles, labels = axis.get_legend_handles_labels()
+    kinds = {orbit.mark for one in several for orbit in one.special}
+    if any(not np.all(one.stable) for one in several):
+        handles.append(Line2D([], [], color=GREY, linestyle="--", linewidth=0.8))
+        labels.append("unstable")
+    for kind in MARKS:
+        if kind in kinds:
+            marker, edge = MARKS[kind]
+            face = "white" if marker != "x" else edge
+            handles.append(
+                Line2D([], [], marker=marker, color=edge, markerfacecolor=face, markersize=3.5, linestyle="")
+            )
+            labels.append(kind)
+    axis.legend(handles, labels, fontsize=8)
+
+
+@styled
+def orbit(one: Orbit, z: float | None = None) -> Figure:
+    """One orbit at z: time history with its contacts shaded, and phase portrait."""
+    from matplotlib.figure import Figure
+
+    place = observed(one.model) if z is None else z
+    figure = Figure(figsize=(6.4, 2.8), layout="constrained")
+    left, right = figure.subplots(1, 2, width_ratios=[3, 2])
+    t, u, v = one.run.t, 1e3 * one.run.displacement(place), one.run.velocity(place)
+    left.plot(1e3 * t, u)
+    for begin, end in zip(one.contacts.t_in, one.contacts.t_out, strict=True):
+        left.axvspan(1e3 * begin, 1e3 * (end if np.isfinite(end) else t[-1]), color=ORANGE, alpha=0.4, linewidth=0.8)
+    left.set_xlabel("t / ms")
+    left.set_ylabel(f"u({place:.4g} m) / mm")
+    right.plot(u, v)
+    right.plot(u[:1], v[:1], "o", color=RED, markersize=3)
+    right.set_xlabel("u / mm")
+    right.set_ylabel("velocity / m/s")
+    kind = "stable" if one.stable else "unstable"
+    at = "" if np.isnan(one.parameter) else f" at {one.parameter:.6g}"
+    figure.suptitle(f"Period {one.period}, {len(one.contacts)} contacts, {kind}{at}", x=0.01, ha="left", fontsize=10)
+    return figure
