@@ -1,6 +1,6 @@
 """Figures: one function per question, each returns a matplotlib figure. `response` holds those of one run."""
 
-from fembeam.plot.orbits import branch, orbit
+from fembeam.plot.orbits import branch, orbit, peak
 from fembeam.plot.response import (
     contacts,
     densities,
@@ -21,6 +21,7 @@ __all__ = [
     "densities",
     "mode_shapes",
     "orbit",
+    "peak",
     "peaks",
     "places",
     "responses",

@@ -1,0 +1,105 @@
+"""Bifurcation diagrams by brute force: simulate, let it settle, look once per period of the load.
+
+Slow and blind to unstable motion, but independent of shooting and continuation: the check on a branch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+import solvers
+from fembeam.orbit import load_period
+from fembeam.parameters import changes_structure, path_of, with_value
+from fembeam.section import require
+
+if TYPE_CHECKING:
+    from fembeam.model import Model
+
+Vector = NDArray[np.float64]
+LOOKS = 128  # samples per period for the peaks
+
+
+@dataclass(frozen=True, eq=False)
+class Bifurcation:
+    """What settled motion does at each value of a parameter.
+
+    Attributes
+    ----------
+    parameter : (k,) values. strobes : (k, p, 2n) states at t = 0 of p successive periods: the Poincaré map.
+    peaks : (k, p) largest |u(z)| in each of these periods, m.
+    """
+
+    name: str
+    z: float
+    parameter: Vector
+    strobes: Vector
+    peaks: Vector
+
+    def cloud(self) -> tuple[Vector, Vector]:
+        """(parameter, peak) of every period, flat, as `fembeam.plot.branch` takes it."""
+        return np.repeat(self.parameter, self.peaks.shape[1]), self.peaks.ravel()
+
+
+def bifurcation(
+    model: Model,
+    parameter: str,
+    values: Sequence[float] | Vector,
+    z: float | None = None,
+    settle: int = 200,
+    keep: int = 24,
+    start: ArrayLike | None = None,
+    executor: Executor | None = None,
+) -> Bifurcation:
+    """Simulate a model at each value of a parameter and keep what it settles to.
+
+    Parameters
+    ----------
+    parameter : such as "omega"; see `fembeam.parameters`. values : (k,) where to simulate.
+    z : place whose displacement is watched, m; None is the first stop.
+    settle, keep : periods of the load left out and kept.
+    start : (2n,) for all of them; None is rest.
+    executor : any `concurrent.futures.Executor` to spread the values over.
+
+    Returns
+    -------
+    Bifurcation. Raises ValueError for bad input, solvers.SolverError when a run fails.
+    """
+    from fembeam.plot.orbits import observed
+    from fembeam.study.executors import spread
+
+    path = path_of(model.scene, parameter)
+    values = np.atleast_1d(np.asarray(values, dtype=float))
+    require(values.size > 0 and bool(np.all(np.isfinite(values))), "values must be finite numbers", values,
+            "bifurcation", "give a range such as np.linspace(60, 900, 200)")  # fmt: skip
+    for name, count in (("settle", settle), ("keep", keep)):
+        require(isinstance(count, int) and count > 0, f"{name} counts periods and must be above 0", count,
+                "bifurcation", "give a whole number")  # fmt: skip
+    place = observed(model) if z is None else z
+    state = model.rest() if start is None else np.asarray(start, dtype=float)
+    task = partial(_settled, model, path, place, settle, keep, state)
+    results = spread(task, list(values), executor, "bifurcation")
+    return Bifurcation(path, place, values, np.array([r[0] for r in results]), np.array([r[1] for r in results]))
+
+
+def _settled(
+    model: Model, path: str, z: float, settle: int, keep: int, start: Vector, value: float
+) -> tuple[Vector, Vector]:
+    """States and peaks of the periods kept."""
+    scene = with_value(model.scene, path, value)
+    if changes_structure(path):
+        model = scene.reduce(modes=list(model.modes))
+    system, once, n = replace(model, scene=scene).system, load_period(scene), len(model.omega)
+    method = solvers.Exponential(1e-8, ledger=False)
+    # settling needs no samples, but a restart would forget the entry rate of a contact under way
+    run = solvers.integrate(system, start[:n], start[n:], (settle + keep) * once, once / LOOKS, method)
+    first = settle * LOOKS
+    states = np.concatenate((run.q, run.q_dot), axis=1)[first :: LOOKS][:keep]
+    u = np.abs(run.q[first : first + keep * LOOKS] @ model.phi(z))
+    return states, u.reshape(keep, LOOKS).max(axis=1)
