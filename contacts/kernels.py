@@ -14,20 +14,22 @@ def power(n, delta, delta_dot, entry_rate, parameters, force):
     """F = K d^p (1 + a v/entry_rate) + c d^r v, parameters (K, p, a, c, r, clamp)."""
     K, p, a, c, r, clamp = carray(parameters, (6,))
     rate = a / entry_rate
-    for i in range(n):
-        d = delta[i]
-        if p == 1.5:  # the square root is several times faster than a general power
-            elastic = K * d * math.sqrt(d)
-        elif p == 1.0:
-            elastic = K * d
-        else:
-            elastic = K * d**p
-        total = elastic * (1.0 + rate * delta_dot[i])
-        if c != 0.0:
-            total += c * d**r * delta_dot[i]
-        if clamp != 0.0 and total < 0.0:
-            total = 0.0
-        force[i] = total
+    if p == 1.5:  # loops without a branch are vectorised; the square root is several times faster than a power
+        for i in range(n):
+            force[i] = K * delta[i] * math.sqrt(delta[i]) * (1.0 + rate * delta_dot[i])
+    elif p == 1.0:
+        for i in range(n):
+            force[i] = K * delta[i] * (1.0 + rate * delta_dot[i])
+    else:
+        for i in range(n):
+            force[i] = K * delta[i] ** p * (1.0 + rate * delta_dot[i])
+    if c != 0.0:
+        for i in range(n):
+            force[i] += c * delta[i] ** r * delta_dot[i]
+    if clamp != 0.0:
+        for i in range(n):
+            if force[i] < 0.0:
+                force[i] = 0.0
 
 
 @cfunc(SIGNATURE, cache=True, error_model="numpy")

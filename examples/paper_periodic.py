@@ -56,7 +56,9 @@ def main():
         tops = [max(fb.plot.peak(orbit, TIP) for orbit in branch.orbits) for branch in found]
         places = [branch.parameter[np.argmax(branch.extremes(TIP).max(axis=1))] for branch in found]
         for period, top, place, branch in zip(STARTS, tops, places, found, strict=True):
-            print(f"{modes} mode(s), period {period}: {1e3 * top:.2f} mm at {place:.1f} rad/s, dents at {dents(branch)}")
+            print(
+                f"{modes} mode(s), period {period}: {1e3 * top:.2f} mm at {place:.1f} rad/s, dents at {dents(branch)}"
+            )
         assert tops[0] < tops[1] < tops[2], "subharmonic resonances reach higher than the harmonic one"
         assert all(bool(len(dents(branch))) == (modes == 2) for branch in found[:2]), "dents belong to the second mode"
         fb.plot.branch(found, TIP, axes=axis)

@@ -15,9 +15,9 @@ import math
 
 import numpy as np
 
-from solvers.collocation import account_flight
 from solvers.flight import ORDER, add_signals, add_taylor, cell_of, energy_norms, level_within, taylor, turn
-from solvers.kernels import copy, dot, indentation, inlined, inner
+from solvers.kernels import copy, dot, indentation, inlined, inner, merged
+from solvers.ledger import account_flight
 from solvers.state import SAMPLED, STEPS, T, rate_tolerance, surface_tolerance
 
 _REFRESH = 8  # flight steps between two evaluations of the bound
@@ -68,10 +68,11 @@ def _first_root(problem, terms, s, x, longest, values):
         return 0.0
     end = longest
     if values[1] > 0.0 and _polynomial(values, 1, longest) < 0.0:  # δ has its maximum inside
-        end = _bisect(values, 1, -1.0, 0.0, longest)
+        end = _bisect(values, 1, -1.0, longest, -values[1] / values[2])
     if not _polynomial(values, 0, end) > 0.0:
         return -1.0
-    return _bisect(values, 0, 1.0, 0.0, end)
+    square = values[1] * values[1] - 2.0 * values[0] * values[2]
+    return _bisect(values, 0, 1.0, end, -2.0 * values[0] / (values[1] + math.sqrt(max(square, 0.0))))
 
 
 @inlined
@@ -84,9 +85,9 @@ def _polynomial(values, derivative, x):
 
 
 @inner
-def _bisect(values, derivative, sign, a, b):
-    """Newton with bisection as its guard for the sign change of a derivative in [a, b]."""
-    x = b
+def _bisect(values, derivative, sign, b, guess):
+    """Newton with bisection as its guard for the sign change of a derivative in [0, b]."""
+    a, x = 0.0, guess if 0.0 < guess < b else b
     for _ in range(60):
         f = sign * _polynomial(values, derivative, x)
         if f > 0.0:
@@ -98,8 +99,8 @@ def _bisect(values, derivative, sign, a, b):
         following = x - step
         if not a < following < b:
             following = 0.5 * (a + b)
-        if following == x or abs(following - x) <= 1e-17 * b:
-            break
+        if abs(following - x) <= 1e-16 * x:
+            return following
         x = following
     return x
 
@@ -116,7 +117,7 @@ def _energetic(problem, norms):
     return fastest
 
 
-@inlined
+@merged
 def fly(problem, tables, state, space, t_end, budget, out, dt, ledger):
     """Fly until a stop is reached (returns its index), the end (-1), or the budget is spent (-2).
 
@@ -164,7 +165,7 @@ def fly(problem, tables, state, space, t_end, budget, out, dt, ledger):
                 root = _first_root(problem, space.terms, s, state.x, h, space.values)
                 if root >= 0.0:
                     h, stop = root, s
-            add_taylor(space.terms, state.x, h, size)
+            add_taylor(space.terms, state.x, h, size, space.values, space.work[0])
         elif span == rest and abs(offset) < 1e-7 * dt_cell:
             h = rest
             turn(problem, tables.cell[0], tables.cell[1], state.x)

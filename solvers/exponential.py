@@ -18,29 +18,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from numba import njit, types
 
 from solvers.certify import fly
-from solvers.collocation import (
-    Space,
-    account,
-    arrive,
-    contact_time,
-    finish_step,
-    free_response,
-    inside,
-    leaves_piece,
-    peaks_so_far,
-    solve_forces,
-    step_error,
-)
+from solvers.collocation import arrive, contact_time, finish_step, leaves_piece, solve_forces, step_error
 from solvers.flight import energy_norms
-from solvers.forcing import Forcing, on_one_grid, tones_as_nodes
-from solvers.kernels import OPTIONS, PROBLEM, Problem, contact_forces, copy, dot, indentation, inlined, inner
+from solvers.forcing import Forcing, on_one_grid
+from solvers.handle import Packed, opener
+from solvers.kernels import OPTIONS, PROBLEM, contact_forces, copy, dot, indentation, inlined, inner, merged
+from solvers.ledger import account, inside
+from solvers.peaks import peaks_so_far
+from solvers.preparation import SPACE, TABLES, among_tones, prepared_for, without_resonance
 from solvers.regular import INDENTATION, ROOT, regular_step
+from solvers.response import Space, free_response
 from solvers.state import (
     AT_ONCE,
     CALLS,
@@ -65,42 +59,26 @@ from solvers.state import (
     State,
     T,
     begin_contacts,
-    new_state,
-    problem_of,
-    rate_rows,
+    begin_state,
     switch,
     switch_on_surface,
     tape,
     touching,
 )
 from solvers.system import Array, System
-from solvers.tables import S, Tables, build
+from solvers.tables import S, Tables
+from solvers.vector import combine
 
 _REAL = types.float64
-_VECTOR = types.Array(_REAL, 1, "C")
 _MATRIX = types.Array(_REAL, 2, "C")
-_INTEGERS = types.Array(types.int64, 1, "C")
-
-
-def _arrays(*dimensions):  # shapes of a named tuple's contiguous float arrays
-    return [types.Array(_REAL, d, "C") if d else _REAL for d in dimensions]
-
-
-TABLES = types.NamedTuple(
-    [
-        *_arrays(1, 3, 4, 2, 3, 2, 2, 2, 2, 0, 2, 1),
-        *_arrays(1, 3, 2, 2, 2, 3, 2, 6, 7, 5, 3, 2, 2, 2, 2, 4),
-    ],
-    Tables,
-)
-SPACE = types.NamedTuple([*_arrays(1, 2, 2, 1, 1, 1, 1, 2, 2, 1, 3, 2, 1, 2, 3, 2, 1), _INTEGERS, _MATRIX], Space)
-
 SCALE, DURATION, SHARE = range(
     3
 )  # places in `numbers`: reference speed, T_c, then per stop a first step's share of T_c
-LEVEL, FAMILY, FRESH, STOP, WANTED = range(5)  # places in `last`
+LEVEL, FAMILY, FRESH, STOP, WANTED, BEGUN = range(6)  # places in `last`
+_problem, _tables, _state, _space = opener(PROBLEM), opener(TABLES), opener(STATE), opener(SPACE)
 _GOAL = 0.3  # error aimed at, in units of the tolerance
 _MOST_TRIES = 8  # to meet an output time on the way to a landing
+_LAST = 0.09  # indentation, in units of the deepest, from which the last step is tried
 _ORDER = 15.0  # the error estimate falls like h^15
 
 
@@ -131,7 +109,7 @@ def _level(tables, h):
     return j + 1 if tables.step[j] > h and j < last else j
 
 
-@inlined
+@inner
 def _nearest_surface(problem, state):
     """(time, stop, direction) of the border of a piece that will be met first at the present rates."""
     size = 2 * problem.k.size
@@ -151,7 +129,7 @@ def _nearest_surface(problem, state):
     return near, stop, direction
 
 
-@inlined
+@inner
 def _land(problem, tables, state, space, numbers, stop, direction, near, rtol, t_end, out, dt, ledger):
     """Try to land on the border ahead by one regular step; whether it succeeded."""
     size, t = state.x.size, state.now[T]
@@ -160,7 +138,7 @@ def _land(problem, tables, state, space, numbers, stop, direction, near, rtol, t
     leaving = direction < 0 and state.piece[stop] == 1
     if tables.fastest * near > 1.5:
         return False
-    if leaving and delta > 0.09 * state.open[stop, PEAK_DELTA]:
+    if leaving and delta > _LAST * state.open[stop, PEAK_DELTA]:
         return False
     if not leaving and state.piece[stop] > 0 and abs(level - delta) > 0.2 * max(level, delta):
         return False
@@ -210,7 +188,7 @@ def _land(problem, tables, state, space, numbers, stop, direction, near, rtol, t
         length, tries = span * (1.0 - (math.sqrt(left) if variable == ROOT else left)), 0
 
 
-@inlined
+@inner
 def _predict(problem, tables, state, space, last, family, level):
     """First guess of the forces: the last step's polynomial, or the law on the free response."""
     for s in range(problem.gap.size):
@@ -222,14 +200,14 @@ def _predict(problem, tables, state, space, last, family, level):
             state.count[CALLS] += S
             continue
         shift = level - last[LEVEL] + 2
-        for i in range(S):
-            if 0 <= shift < tables.extend.shape[1]:
-                space.force[s, i] = dot(tables.extend[last[FAMILY], shift, i], space.previous[s], S)
-            else:
+        if 0 <= shift < tables.extend.shape[1]:
+            combine(tables.extend[last[FAMILY], shift], space.previous[s], S, None, space.force[s])
+        else:
+            for i in range(S):
                 space.force[s, i] = space.previous[s, S - 1]
 
 
-@inlined
+@merged
 def _try(problem, tables, state, space, numbers, last, family, level, rtol):
     """Attempt one contact step; error in units of the tolerance, inf when it must be shorter anyway."""
     h = tables.step[level]
@@ -269,10 +247,24 @@ def _record(problem, tables, state, space, family, level, t_end, out, dt, ledger
         state.count[SAMPLED] += 1
 
 
-@inlined
+@inner
+def _latest(state):
+    """The stop in contact that was entered last."""
+    stop = -1
+    for s in range(state.piece.size):
+        if state.piece[s] > 0 and (stop < 0 or state.open[s, T_IN] >= state.open[stop, T_IN]):
+            stop = s
+    return stop
+
+
+@merged
 def touch(problem, tables, state, space, numbers, last, t_end, rtol, log, out, dt, ledger):
     """One accepted step in contact: land if a border is near, else collocate; returns a status code."""
     near, stop, direction = _nearest_surface(problem, state)
+    if near <= 0.0 and switch_on_surface(problem, state, log, True):
+        if touching(state):
+            _begin(problem, tables, state, space, numbers, last, _latest(state))
+        return RUNNING
     if (
         stop >= 0
         and not last[FRESH]
@@ -337,7 +329,7 @@ def _tape_forces(problem, state, space, kind, ended, family, level):
     tape(state, kind, state.now[T], ended, ended - state.now[T], family, level, state.x)
 
 
-@inlined
+@inner
 def _adapt(tables, numbers, last, level, family, wanted, error):
     """Size of the next step from the error of this one."""
     longer = 2.0 / _ORDER * math.log2(_GOAL / max(error, 1e-30))  # in levels
@@ -351,28 +343,20 @@ def _adapt(tables, numbers, last, level, family, wanted, error):
     last[LEVEL], last[FAMILY], last[FRESH] = level, family, 0
 
 
-@inner
-def _latest(state):
-    """The stop in contact that was entered last."""
-    stop = -1
-    for s in range(state.piece.size):
-        if state.piece[s] > 0 and (stop < 0 or state.open[s, T_IN] >= state.open[stop, T_IN]):
-            stop = s
-    return stop
-
-
 @njit(
-    types.int64(
-        *[PROBLEM, TABLES, STATE, SPACE, _VECTOR, _INTEGERS, _REAL, types.int64, _REAL, _MATRIX, _MATRIX, _REAL],
-        types.boolean,
-    ),
+    types.int64(*[types.int64] * 4, _REAL, types.int64, _REAL, _MATRIX, _MATRIX, _REAL, types.boolean),
     **OPTIONS,
 )
-def advance(problem, tables, state, space, numbers, last, t_end, budget, rtol, log, out, dt, ledger):
+def advance(problem_at, tables_at, state_at, space_at, t_end, budget, rtol, log, out, dt, ledger):
     """Advance the state to ``t_end`` or for about ``budget`` steps; returns a status code."""
+    problem, tables, state, space = _problem(problem_at), _tables(tables_at), _state(state_at), _space(space_at)
+    numbers, last = space.numbers, space.last
+    if not last[BEGUN]:
+        last[BEGUN] = 1
+        begin_contacts(problem, state)
+        if touching(state):
+            _begin(problem, tables, state, space, numbers, last, _latest(state))
     begun = state.count[STEPS] + state.count[REJECTED]
-    if last[STOP] < 0 and touching(state):  # the run starts in contact
-        _begin(problem, tables, state, space, numbers, last, _latest(state))
     while state.count[STEPS] + state.count[REJECTED] - begun < budget:
         if state.now[T] >= t_end:
             return DONE
@@ -382,7 +366,8 @@ def advance(problem, tables, state, space, numbers, last, t_end, budget, rtol, l
             return RUNNING
         if state.count[AT_ONCE] > MOST_EVENTS_AT_ONCE:
             return CHATTER
-        if switch_on_surface(problem, state, log, True):
+        between = touching(state) and not last[FRESH]  # in a contact no border is met but by landing on it
+        if not between and switch_on_surface(problem, state, log, True):
             if touching(state):
                 _begin(problem, tables, state, space, numbers, last, _latest(state))
             continue
@@ -437,24 +422,38 @@ class Engine:
 
     def __init__(self, method: Exponential, system: System, z: Array, forcing: Forcing, duration: float) -> None:
         self.method, self.duration = method, duration
-        forcing = on_one_grid(_without_resonance(system, forcing, duration, method.rtol), duration)
-        prepared = _prepared(system, forcing)
-        self.tables, steady = prepared.tables, prepared.steady
-        self.problem = problem = prepared.problem._replace(table=forcing.table, table_start=forcing.table_start)
-        stops, loads, size = len(problem.gap), len(problem.load), 2 * len(problem.k)
-        self.back = prepared.back
-        self.state: State = new_state(_start(z, steady, forcing), stops)
-        shapes = [self.state.x.size, (7, size), (forcing.table_dt.size, 6), 7, size // 2, loads, stops]
-        shapes += [(stops, S), (stops, S), S, (stops, 2, S), (stops + loads, S), S, (stops, S), (stops, 3, S)]
-        shapes += [(stops * S, stops * S), stops * S, stops * S, (18, self.state.x.size + 2)]
-        types_of = ["i8" if name == "pivots" else "f8" for name in Space._fields]
-        self.space = Space._make(np.zeros(shape, kind) for shape, kind in zip(shapes, types_of, strict=True))
-        self.numbers = np.zeros(2 + stops)
-        self.last = np.full(5, -1)
+        forcing = on_one_grid(without_resonance(system, forcing, duration, method.rtol), duration)
+        prepared = prepared_for(system, forcing)
+        self.back, packed = prepared.back, prepared.problem
+        if forcing.table.size:
+            packed = Packed(packed.value._replace(table=forcing.table, table_start=forcing.table_start), PROBLEM)
+        self.packed, self.problem, self.prepared = packed, packed.value, prepared
+        block, self.words = prepared.layout.block()
+        self.state = State._make(prepared.layout.arrays(block, 0))
+        begin_state(self.state, prepared.rest + among_tones(z, len(forcing.tone_omega)))
+        words = self.words.__array_interface__["data"][0]
+        state, space = (words + start for start in prepared.layout.starts)
+        self.addresses = packed.address, prepared.tables.address, state, space
+        self.block = block
+
+    @property
+    def tables(self) -> Tables:
+        """Everything known per step size."""
+        return self.prepared.tables.value
+
+    @cached_property
+    def space(self) -> Space:
+        """The working space."""
+        return Space._make(self.prepared.layout.arrays(self.block, 1))
+
+    def record(self, tape: Array) -> None:
+        """Write what happens in contact to a tape."""
+        self.state = self.state._replace(tape=tape)
+        self.taped = Packed(self.state, STATE)
+        self.addresses = *self.addresses[:2], self.taped.address, self.addresses[3]
 
     def start(self) -> None:
-        """Put every stop on its piece."""
-        begin_contacts(self.problem, self.state)
+        """The compiled loop does so itself."""
 
     def keeps_ledger(self, sampled: bool) -> bool:
         """Whether input and damping of the energy ledger are known."""
@@ -463,136 +462,6 @@ class Engine:
     def march(self, budget: int, log: Array, out: Array, dt: float) -> int:
         """Go on for a stretch."""
         return advance(
-            *(self.problem, self.tables, self.state, self.space, self.numbers, self.last),
-            *(self.duration, budget, self.method.rtol, log, out, dt, self.keeps_ledger(len(out) > 0)),
+            *(*self.addresses, self.duration, budget, self.method.rtol),
+            *(log, out, dt, self.keeps_ledger(len(out) > 0)),
         )
-
-
-class _Prepared(NamedTuple):
-    """What does not change from run to run of one system."""
-
-    problem: Problem
-    tables: Tables
-    steady: Array
-    back: Array
-
-
-def _prepared(system: System, forcing: Forcing) -> _Prepared:
-    """Tables of a system, made once and kept on it, those of the last grid of its sampled signals only."""
-    dt_cell = float(forcing.table_dt[0]) if forcing.table_dt.size else 1.0
-    key = (dt_cell, tuple(forcing.tone_omega))
-    if system.kept.get("exponential", (None,))[0] != key:
-        if np.any(system.blocks.k < 0.0):
-            raise ValueError(
-                "K must be positive semi-definite for Exponential, its lowest ω² is "
-                f"{system.blocks.k.min():g} (buckled?); use DormandPrince"
-            )
-        plain = problem_of(system, forcing)
-        problem, steady = with_tones(plain, forcing)
-        laws = [contact.law for contact in system.contacts]
-        ledger = (_signal_rows(problem, forcing), problem.power, _loss_rows(plain) @ steady)
-        tables = build(problem, [law.exponent for law in laws], [law.jump for law in laws], dt_cell, ledger)
-        system.kept["exponential"] = (key, _Prepared(problem, tables, steady, system.blocks.T @ steady))
-    prepared: _Prepared = system.kept["exponential"][1]
-    return prepared
-
-
-def _without_resonance(system: System, forcing: Forcing, duration: float, rtol: float) -> Forcing:
-    """Tones without a useful steady response are sampled instead.
-
-    That is those on the frequency of a block hardly damped, and those whose steady response l/|k - Ω² + iΩc| is a
-    thousand times what the load can do within the duration, l duration²/2: their difference would lose its digits.
-    """
-    if "distances" not in system.kept:
-        tones = zip(forcing.tone_omega, forcing.tone_load, strict=True)
-        system.kept["distances"] = [_distance(system, omega, load) for omega, load in tones]
-    resonant = [
-        i
-        for i, (absolute, relative) in enumerate(system.kept["distances"])
-        if relative <= 1e-6 or absolute * duration**2 < 2e-3
-    ]
-    return tones_as_nodes(forcing, resonant, duration, rtol) if resonant else forcing
-
-
-def _distance(system: System, omega: float, load: int) -> tuple[float, float]:
-    """Smallest |k - Ω² + iΩc| of the blocks a load pushes, absolute and relative to max(k, Ω²)."""
-    blocks = system.blocks
-    distance = np.abs(blocks.k - omega**2 + 1j * omega * blocks.c)
-    vector = blocks.inverse[:, system.size :] @ np.linalg.solve(system.M, np.asarray(system.loads[load][0]))
-    distance = distance[np.hypot(*np.split(vector, 2)) > 0.0]
-    scale = np.maximum(blocks.k, omega**2)[np.hypot(*np.split(vector, 2)) > 0.0]
-    relative = np.divide(distance, scale, out=np.zeros_like(distance), where=scale > 0.0)
-    return float(distance.min(initial=np.inf)), float(relative.min(initial=np.inf))
-
-
-def _signal_rows(problem: Problem, forcing: Forcing) -> Array:
-    """Each load's tones as a row of the state: Re(a e^{iΩt}) = Re a · p + Im a/Ω · v."""
-    tones, N = len(forcing.tone_omega), len(problem.k)
-    rows = np.zeros((len(problem.load), 2 * N))
-    for i, (omega, amplitude, load) in enumerate(
-        zip(forcing.tone_omega, forcing.tone_amplitude, forcing.tone_load, strict=True)
-    ):
-        rows[load, N - tones + i] = amplitude.real
-        rows[load, 2 * N - tones + i] = amplitude.imag / omega if omega > 0.0 else 0.0
-    return rows
-
-
-def _loss_rows(problem: Problem) -> Array:
-    """Rows whose squares sum to the damping power: √c v, or a root of the coupled loss."""
-    n = len(problem.k)
-    if not problem.loss.size:
-        return np.hstack((np.zeros((n, n)), np.diag(np.sqrt(problem.c))))
-    values, vectors = np.linalg.eigh(0.5 * (problem.loss + problem.loss.T))
-    return np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
-
-
-def with_tones(problem: Problem, forcing: Forcing) -> tuple[Problem, Array]:
-    """The problem with one undamped block per tone, and the map (2n, 2N) from its state to the blocks' z.
-
-    The steady response to Re(a e^{iΩt}) is Re(Z e^{iΩt}) = Re Z · p + Im Z/Ω · v with p = cos Ωt, v = -Ω sin Ωt.
-    """
-    n, tones = len(problem.k), len(forcing.tone_omega)
-    steady = np.zeros((2 * n, 2 * (n + tones)))
-    steady[:n, :n] = steady[n:, n + tones : 2 * n + tones] = np.eye(n)
-    for i, (omega, amplitude, load) in enumerate(
-        zip(forcing.tone_omega, forcing.tone_amplitude, forcing.tone_load, strict=True)
-    ):
-        lp, lv = problem.load[load, :n] * amplitude, problem.load[load, n:] * amplitude
-        # (iΩ - A)⁻¹ of a block: [[iΩ + c, 1], [-k, iΩ]] / (k - Ω² + iΩc)
-        denominator = problem.k - omega**2 + 1j * omega * problem.c
-        denominator = np.where((lp == 0.0) & (lv == 0.0), 1.0, denominator)
-        response = np.concatenate(
-            [((1j * omega + problem.c) * lp + lv) / denominator, (-problem.k * lp + 1j * omega * lv) / denominator]
-        )
-        steady[:, n + i] = response.real
-        if omega > 0.0:
-            steady[:, 2 * n + tones + i] = response.imag / omega
-    none = np.zeros(0)
-    push = np.zeros((len(problem.gap), 2 * (n + tones)))
-    push[:, :n], push[:, n + tones : 2 * n + tones] = problem.push[:, :n], problem.push[:, n:]
-    sampled = np.zeros((len(problem.load), 2 * (n + tones)))
-    for load in forcing.table_load:
-        sampled[load, :n], sampled[load, n + tones : 2 * n + tones] = problem.load[load, :n], problem.load[load, n:]
-    k = np.concatenate((problem.k, forcing.tone_omega**2))
-    c = np.concatenate((problem.c, np.zeros(tones)))
-    return problem._replace(
-        k=k,
-        c=c,
-        loss=np.empty((0, 0)),
-        push=push,
-        read=problem.read @ steady,
-        read_rate=rate_rows(problem.read @ steady, k, c),
-        load=sampled,
-        power=problem.power @ steady,
-        tone_omega=none,
-        tone_amplitude=none.astype(complex),
-        tone_load=none.astype(np.int64),
-    ), steady
-
-
-def _start(z: Array, steady: Array, forcing: Forcing) -> Array:
-    """State with the tones' blocks at t = 0: p = 1, v = 0, the structure's less their steady response."""
-    n, tones = len(z) // 2, len(forcing.tone_omega)
-    pseudo = np.concatenate((np.zeros(n), np.ones(tones), np.zeros(n + tones)))
-    rest = z - steady @ pseudo
-    return pseudo + np.concatenate((rest[:n], np.zeros(tones), rest[n:], np.zeros(tones)))

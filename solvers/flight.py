@@ -10,7 +10,8 @@ import math
 
 import numpy as np
 
-from solvers.kernels import inlined, inner
+from solvers.kernels import copy, inlined, inner
+from solvers.vector import combine
 
 ORDER = 6
 
@@ -100,13 +101,13 @@ def taylor(problem, x, t, terms, six):
 
 
 @inner
-def add_taylor(terms, x, span, size):
-    """Taylor step of the given duration."""
-    for e in range(size):
-        value = terms[ORDER, e]
-        for i in range(ORDER - 1, -1, -1):
-            value = terms[i, e] + span / (i + 1.0) * value
-        x[e] = value
+def add_taylor(terms, x, span, size, weights, sums):
+    """Taylor step of the given duration; the last two arguments are working space."""
+    weights[0] = 1.0
+    for i in range(ORDER):
+        weights[i + 1] = weights[i] * span / (i + 1.0)
+    combine(terms, weights, ORDER + 1, None, sums)
+    copy(sums, x, size)
 
 
 @inlined

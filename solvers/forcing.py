@@ -83,9 +83,9 @@ def tones_as_nodes(forcing: Forcing, chosen: list[int], duration: float, rtol: f
 
 def on_one_grid(forcing: Forcing, duration: float) -> Forcing:
     """The same forcing with every node table on the finest table's grid; coarser quintics are evaluated there."""
-    dt = forcing.table_dt.min(initial=np.inf)
-    if np.all(forcing.table_dt == dt):
+    if not forcing.table_dt.size or np.ptp(forcing.table_dt) == 0.0:
         return forcing
+    dt = forcing.table_dt.min()
     cells = int(np.ceil(duration / dt * (1.0 - 1e-12)))
     tables = []
     for j, own in enumerate(forcing.table_dt):

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from solvers.forcing import hand_over
+from solvers.forcing import Forcing, hand_over
 from solvers.result import COLUMNS, ContactLog, Cost, Energy, Solution, SolverError, Status
-from solvers.state import CALLS, EVENTS, LOG_FULL, LOGGED, REJECTED, RUNNING, SAMPLED, STEPS, T, contact_row
+from solvers.state import CALLS, EVENTS, LOG_FULL, LOGGED, REJECTED, RUNNING, SAMPLED, STATUSES, STEPS, T, contact_row
 from solvers.system import Array, Parameter, System
 
 _BUDGET = 20_000  # steps between two looks at the world outside
@@ -92,7 +92,7 @@ def prepared_run(
     z = _start(system, q0, q_dot0)
     samples = _samples(duration, dt)
     _check_laws(system)
-    forcing = hand_over([signal for _, signal in system.loads], duration, min(max(method.rtol, 1e-12), 1e-6))
+    forcing = _forcing(system, duration, min(max(method.rtol, 1e-12), 1e-6))
     return _Run(system, method.engine(system, z, forcing, duration), dt, samples, tangent)
 
 
@@ -117,7 +117,7 @@ def _start(system: System, q0: ArrayLike, q_dot0: ArrayLike) -> Array:
         vector = np.array(value, dtype=float, ndmin=1)
         if vector.shape != (system.size,):
             raise ValueError(f"{name} must have shape ({system.size},), got {vector.shape}")
-        if not np.all(np.isfinite(vector)):
+        if not np.isfinite(vector).all():
             bad = int(np.argmin(np.isfinite(vector)))
             raise ValueError(f"{name} must be finite, got {vector[bad]} at coordinate {bad}")
         checked.append(vector)
@@ -151,6 +151,18 @@ def _check_laws(system: System) -> None:
     system.kept["laws are finite"] = True
 
 
+def _forcing(system: System, duration: float, rtol: float) -> Forcing:
+    """Arrays of all signals; those of tones are kept, as long as no signal can have changed."""
+    kept: Forcing | None = system.kept.get("forcing")
+    if kept is None:
+        kept = hand_over([signal for _, signal in system.loads], duration, rtol)
+        options = [getattr(type(signal), "__dataclass_params__", None) for _, signal in system.loads]
+        fixed = all(found is not None and found.frozen for found in options)
+        if fixed and not kept.table_dt.size:
+            system.kept["forcing"] = kept
+    return kept
+
+
 class _Run:
     """One run: a method's engine, its output, and the loop over stretches."""
 
@@ -164,8 +176,8 @@ class _Run:
         self.state = engine.state
         self.log = np.empty((max(256, 2 * len(system.contacts)), COLUMNS))
         self.out = np.empty((samples, self.state.x.size))
-        n = 2 * engine.problem.k.size
-        self.initial_energy = float(system.energy(*np.split(engine.back @ self.state.x[:n], 2)))
+        motion = engine.back @ self.state.x[: 2 * engine.problem.k.size]
+        self.initial_energy = float(system.energy(motion[: system.size], motion[system.size :]))
         if samples:
             self.out[0] = self.state.x
             self.state.count[SAMPLED] = 1
@@ -192,7 +204,7 @@ class _Run:
                     progress(self.time)
         except KeyboardInterrupt:
             return Status.INTERRUPTED
-        return list(Status)[code]
+        return STATUSES[code]
 
     def solution(self, status: Status, seconds: float) -> Solution:
         """Collect outputs, log and ledger."""
@@ -229,8 +241,8 @@ class _Run:
     def _contacts(self) -> ContactLog:
         """The log, contacts under way last."""
         rows = [self.log[: self.state.count[LOGGED]]]
-        for s in np.flatnonzero(self.state.piece > 0):
+        for s in self.state.piece.nonzero()[0]:
             row = np.empty(COLUMNS)
             contact_row(self.engine.problem, self.state, s, math.nan, math.nan, row)
             rows.append(row[None, :])
-        return ContactLog.of_rows(np.concatenate(rows))
+        return ContactLog.of_rows(np.concatenate(rows) if len(rows) > 1 else rows[0])

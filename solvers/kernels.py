@@ -25,6 +25,12 @@ inner = njit(**_INNER)
 inlined = njit(**_INNER, forceinline=True)
 """The same for what the innermost loops call, from few places: there even passing the arrays' descriptors costs more
 than the arithmetic. Everywhere else it would only cost compile time."""
+merged = njit(**_INNER, inline="always")
+"""The same for the long functions one kernel calls once each: compiled as a part of it."""
+reordered = njit(**_INNER, forceinline=True, fastmath={"reassoc", "contract"})
+"""The same for sums whose order does not matter, so that they can be vectorised."""
+maxima = njit(**_INNER, forceinline=True, fastmath={"nnan", "nsz"})
+"""The same for maxima of what is not NaN."""
 
 
 class Problem(NamedTuple):
@@ -101,7 +107,13 @@ def contact_forces(problem, stop, delta, delta_dot, entry_rate, force):
     """Forces of one stop at a batch of indentations; below the surface the law is continued from it."""
     for i in range(delta.size):
         delta[i] = max(delta[i], 0.0)
-    _call_force(problem.law[stop], delta.size, delta, delta_dot, entry_rate, problem.parameters[stop], (force,))
+    law_forces(problem, stop, delta.size, delta, delta_dot, entry_rate, force)
+
+
+@inlined
+def law_forces(problem, stop, n, delta, delta_dot, entry_rate, force):
+    """The law of one stop on the first n indentations, none of them below the surface."""
+    _call_force(problem.law[stop], n, delta, delta_dot, entry_rate, problem.parameters[stop], (force,))
 
 
 @inner
@@ -120,12 +132,21 @@ def copy(source, target, n):
         target[i] = source[i]
 
 
-@inlined
+@reordered
 def dot(a, b, n):
     """Sum of the first n products."""
     total = 0.0
     for i in range(n):
         total += a[i] * b[i]
+    return total
+
+
+@reordered
+def sizes(a, b, n):
+    """Sum of the sizes of the first n products."""
+    total = 0.0
+    for i in range(n):
+        total += abs(a[i] * b[i])
     return total
 
 

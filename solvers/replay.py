@@ -27,13 +27,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from solvers.collocation import arrive, factorise, free_response, inside, linearise, respond, substitute
+from solvers.collocation import arrive
 from solvers.dormand_prince import STAGES, A
 from solvers.flight import signal_derivatives, turn
 from solvers.kernels import contact_forces, contact_gradient, copy, dot, indentation, inlined, inner, kernel, rhs
+from solvers.ledger import inside
+from solvers.newton import factorise, linearise, substitute
 from solvers.regular import regular_step
+from solvers.response import free_response, respond
 from solvers.state import BEGAN, ENDED, EVENT, FIRST, HEAD, KIND, LANDING, PART, SECOND, SPAN, T
 from solvers.tables import S, propagate
+from solvers.vector import combine
 
 
 class Slopes(NamedTuple):
@@ -158,9 +162,10 @@ def _by_parameter(ahead, behind, shadow, space, nudge, slopes, s):
         slopes.by_parameter[s, i] = 0.0
     if nudge.step == 0.0:
         return
-    copy(space.delta[s], space.clipped, S)
-    contact_forces(ahead, s, space.clipped, space.rate[s], shadow.entry_rate[s], slopes.by_parameter[s])
-    contact_forces(behind, s, space.clipped, space.rate[s], shadow.entry_rate[s], space.trial)
+    delta, rate = space.motion[s, 0], space.motion[s, 1]
+    copy(delta, space.clipped, S)
+    contact_forces(ahead, s, space.clipped, rate, shadow.entry_rate[s], slopes.by_parameter[s])
+    contact_forces(behind, s, space.clipped, rate, shadow.entry_rate[s], space.trial)
     for i in range(S):
         slopes.by_parameter[s, i] = (slopes.by_parameter[s, i] - space.trial[i]) / (2.0 * nudge.step)
 
@@ -174,12 +179,11 @@ def _signal_slopes(problem, tables, space, slopes, family, level, t):
             signal_derivatives(problem, j, t + h * tables.times[family, i], space.six[j])
             slopes.signal[problem.table_load[j], i] = space.six[j, 1]
     for s in range(stops):
-        for d in range(2):
-            for i in range(S):
-                slopes.response[s, d, i] = 0.0
-                for load in problem.table_load:
-                    row = tables.forced[family, level, s, stops + load, d, i]
-                    slopes.response[s, d, i] += dot(row, slopes.signal[load], S)
+        response = slopes.response[s]
+        for i in range(S):
+            response[0, i], response[1, i] = 0.0, 0.0
+        for load in problem.table_load:
+            combine(tables.forced[family, level, s, stops + load], slopes.signal[load], S, response, response)
 
 
 @inlined
@@ -189,12 +193,13 @@ def _solve(problem, tables, shadow, space, slopes, nudge, family, level, column,
     for s in range(stops):
         if shadow.piece[s] == 0:
             continue
+        combine(tables.free[family, level, s], slopes.y[column], size, None, space.motion[s])
         for i in range(S):
             change = slopes.entry[column, s] * space.slope[s, 2, i]
             if _is_parameter(nudge, slopes, column):
                 change += slopes.by_parameter[s, i]
             for d in range(2):
-                value = dot(tables.free[family, level, s, d, i], slopes.y[column], size)
+                value = space.motion[s, d, i]
                 if shift != 0.0:
                     value += shift * slopes.response[s, d, i]
                 if _is_parameter(nudge, slopes, column):
@@ -251,7 +256,7 @@ def _step(problem, ahead, behind, tables, shadow, space, slopes, nudge, row, mod
         rhs(problem, t, shadow.x, shadow.piece, shadow.entry_rate, slopes.rate[0], slopes.batch)
         end = space.x_new
         if part < np.inf:
-            copy(shadow.x, end, end.size)
+            copy(shadow.x, end, shadow.x.size)
             inside(problem, tables, shadow, space, family, tables.step[level], part, end)
         else:
             arrive(problem, tables, shadow, space, family, level)
@@ -280,8 +285,8 @@ def _inside_piece(problem, shadow, s, x):
 
 @inlined
 def _stage_rates(problem, ahead, behind, shadow, space, slopes, nudge, w, factor, out):
-    """Variational equation at one stage of a landing; ``w`` is the state with its time, factor dt/d(variable)."""
-    n, size, t, batch = problem.k.size, 2 * problem.k.size, w[w.size - 2], slopes.batch
+    """Variational equation at one stage of a landing; ``w`` is the state with its time, factor dt along the step."""
+    n, size, t, batch = problem.k.size, 2 * problem.k.size, w[shadow.x.size], slopes.batch
     for c in range(slopes.y.shape[0]):
         y = slopes.trial[c]
         for b in range(n):
@@ -321,16 +326,13 @@ def _land(problem, ahead, behind, tables, shadow, space, slopes, nudge, row):
     regular_step(problem, tables, False, variable, stop, span, w, shadow.piece, shadow.entry_rate, space.work)
     trial = space.work[STAGES + 1]
     for i in range(STAGES + 1):
-        for e in range(w.size):
-            trial[e] = w[e]
-            for j in range(i):
-                trial[e] += span * A[i, j] * space.work[j, e]
+        combine(space.work, A[i], i, w, trial)
         for c in range(slopes.y.shape[0]):
             for e in range(size):
                 total = 0.0
                 for j in range(i):
                     total += A[i, j] * slopes.stages[j, c, e]
-                slopes.trial[c, e] = slopes.y[c, e] + span * total
+                slopes.trial[c, e] = slopes.y[c, e] + total
         if i < STAGES:
             factor = space.work[i, width]
             _stage_rates(problem, ahead, behind, shadow, space, slopes, nudge, trial, factor, slopes.stages[i])

@@ -66,7 +66,7 @@ class ContactLog:
     @classmethod
     def of_rows(cls, rows: Array) -> ContactLog:
         """From the kernels' table, one contact a row."""
-        columns: list[Any] = [np.array(column) for column in rows.T]
+        columns: list[Any] = list(rows.T.copy())
         columns[0], columns[-1] = columns[0].astype(int), columns[-1].astype(bool)
         return cls(*columns)
 

@@ -9,7 +9,7 @@ import numpy as np
 from numba import types
 
 from solvers.forcing import Forcing
-from solvers.kernels import Problem, dot, indentation, inlined, inner, kernel
+from solvers.kernels import Problem, dot, indentation, inlined, inner, kernel, sizes
 from solvers.result import Status
 from solvers.system import Array, System
 
@@ -17,9 +17,9 @@ _VECTOR = types.Array(types.float64, 1, "C")
 _MATRIX = types.Array(types.float64, 2, "C")
 _INTEGERS = types.Array(types.int64, 1, "C")
 
-_CODES = list(Status)
+STATUSES = list(Status)
 DONE, RUNNING, STEP_TOO_SMALL, DIVERGED, CHATTER, LOG_FULL, LAW_NOT_FINITE = (
-    _CODES.index(status)
+    STATUSES.index(status)
     for status in (
         *[Status.DONE, Status.RUNNING, Status.STEP_TOO_SMALL, Status.DIVERGED],
         *[Status.CHATTER, Status.LOG_FULL, Status.LAW_NOT_FINITE],
@@ -56,19 +56,13 @@ STATE = types.NamedTuple(
 @inner
 def surface_tolerance(problem, s, x):
     """Distance within which a stop counts as on a level: rounding of δ."""
-    total = abs(problem.gap[s])
-    for i in range(2 * problem.k.size):
-        total += abs(problem.read[s, i] * x[i])
-    return 1e-15 * total + 1e-20
+    return 1e-15 * (abs(problem.gap[s]) + sizes(problem.read[s], x, 2 * problem.k.size)) + 1e-20
 
 
 @inner
 def rate_tolerance(problem, s, x):
     """Indentation rate below which a stop counts as at rest: rounding of δ̇."""
-    total = 0.0
-    for i in range(2 * problem.k.size):
-        total += abs(problem.read_rate[s, i] * x[i])
-    return 1e-15 * total
+    return 1e-15 * sizes(problem.read_rate[s], x, 2 * problem.k.size)
 
 
 @inner
@@ -101,7 +95,7 @@ def begin_contacts(problem, state):
     for s in range(problem.gap.size):
         delta = indentation(problem, s, state.x)
         piece = 0
-        while delta > problem.levels[s, piece]:
+        while delta > problem.levels[s, piece] + surface_tolerance(problem, s, state.x):
             piece += 1
         state.piece[s] = piece
         if piece > 0:
@@ -170,19 +164,25 @@ def touching(state):
     return most > 0
 
 
+def state_shapes(width: int, stops: int) -> list[tuple[int, ...]]:
+    """Shapes of the arrays of `State`."""
+    return [(4,), (width,), (width,), (stops,), (stops,), (stops, 7), (8,), (0, 0)]
+
+
+def begin_state(state: State, z: Any) -> None:
+    """Make arrays of zeros the state of a run at t = 0 from block coordinates."""
+    state.now[1:] = np.inf, np.inf, -1.0
+    state.x[: len(z)] = z
+    state.entry_rate[:] = 1.0
+
+
 def new_state(z: Any, stops: int) -> State:
     """State of a run at t = 0 from block coordinates."""
-    x = np.concatenate((z, np.zeros(2 + 2 * stops)))
-    return State(
-        np.array([0.0, np.inf, np.inf, -1.0]),
-        x,
-        np.zeros_like(x),
-        np.zeros(stops, dtype=np.int64),
-        np.ones(stops),
-        np.zeros((stops, 7)),
-        np.zeros(8, dtype=np.int64),
-        np.empty((0, 0)),
-    )
+    kinds = [np.dtype(str(kind.dtype)) for kind in STATE.types]
+    shapes = state_shapes(len(z) + 2 + 2 * stops, stops)
+    state = State._make(np.zeros(shape, kind) for shape, kind in zip(shapes, kinds, strict=True))
+    begin_state(state, z)
+    return state
 
 
 def problem_of(system: System, forcing: Forcing) -> Problem:

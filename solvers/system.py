@@ -165,7 +165,7 @@ class System:
 
     def energy(self, q: Array, q_dot: Array) -> Array:
         """Stored energy ½ q'ᵀ M q' + ½ qᵀ K q in J, for (..., n) arrays."""
-        return 0.5 * (np.sum((q_dot @ self.M) * q_dot, axis=-1) + np.sum((q @ self.K) * q, axis=-1))
+        return 0.5 * ((q_dot @ self.M) * q_dot + (q @ self.K) * q).sum(axis=-1)
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solvers.kernels import Problem, inner, kernel
+from solvers.vector import padded
 
 S = 8  # nodes of a contact step: 6 is a little faster at 1e-6, 10 and 12 bring nothing
 TAYLOR_REACH = 0.02  # |λ| x up to which a Taylor step of order 6 is exact to rounding
@@ -50,17 +51,17 @@ class Tables(NamedTuple):
     nodes: Any  # (f, S) σ
     times: Any  # (f, S) σ^κ
     weights: Any  # (f, S): ∫F dt = h Σ weights F
-    spectrum: Any  # (f, 4, S): last four Jacobi coefficients of the force from its node values
+    summary: Any  # (f, S, 8): from node values, the last four Jacobi coefficients, both ends' values, both slopes
     legendre: Any  # (S, S): all Legendre coefficients from smooth nodes
-    free: Any  # (f, j, m, 2, S, 2N): δ and δ̇ at the nodes from the state
-    forced: Any  # (f, j, m, m + L, 2, S, S): the same from the forces and signals at the nodes
-    kick: Any  # (f, j, m + L, S, 2N): state change at the end
-    alias: Any  # (f, j, N): interpolation error of a block's oscillation on the nodes
+    free: Any  # (f, j, m, 2N, 2S): δ and δ̇ at the nodes from the state
+    forced: Any  # (f, j, m, m + L, S, 2S): the same from the forces and signals at the nodes
+    kick: Any  # (f, j, m + L, S, 2N padded): state change at the end
+    ripple: Any  # (f, j, m, 2N): error of the indentation between the nodes <= Σ ripple |z|
     signal_rows: Any  # (L, 2N): a load's tones from the state
     power_rows: Any  # (L, 2N): input power = signal × power row
     loss_rows: Any  # (r, 2N): damping power = Σ (row·z)²
     gauss: Any  # (2, 5) points and weights on (0, 1) for the energy ledger
-    extend: Any  # (f, 5, S, S): the force on the next smooth step, 2^{(i-2)/2} times shorter, by extrapolation
+    extend: Any  # (f, 5, S, S): the force on the next smooth step, 2^{(i-2)/2} times shorter, from that of the last
 
 
 @kernel
@@ -81,18 +82,18 @@ def propagate(k, c, x):
 
 
 @kernel
-def _lagrange(nodes, sigma, out):
-    """Lagrange polynomials of the nodes at σ."""
+def _lagrange(nodes, weights, sigma, out):
+    """Lagrange polynomials of the nodes at σ, each times its weight × Π (σ_j - σ_i)."""
     for j in range(nodes.size):
-        value = 1.0
+        value = weights[j]
         for i in range(nodes.size):
             if i != j:
-                value *= (sigma - nodes[i]) / (nodes[j] - nodes[i])
+                value *= sigma - nodes[i]
         out[j] = value
 
 
 @inner
-def _block_response(k, c, h, rate, power, exponent, nodes, gauss, out, basis):
+def _block_response(k, c, h, rate, power, exponent, nodes, weights, gauss, out, basis):
     """out[i, j] = (α, β) of ∫_0^{t_i} E(t_i - τ) w(σ) L_j(σ)/w(σ_j) dτ; i = S is the end of the step."""
     count = nodes.size
     for i in range(count + 1):
@@ -111,21 +112,21 @@ def _block_response(k, c, h, rate, power, exponent, nodes, gauss, out, basis):
             width = (b - a) / panels
             for g in range(gauss.shape[1]):
                 sigma = left + width * gauss[0, g]
-                t = h * sigma**power
-                measure = width * gauss[1, g] * h * power * sigma ** (power - 1.0)
+                t, measure = h * sigma, h * width * gauss[1, g]
+                if power == 2.0:
+                    t, measure = t * sigma, measure * 2.0 * sigma
+                if exponent > 0.0:
+                    measure *= sigma ** (2.0 * exponent)
                 alpha, beta = propagate(k, c, tb - t)
-                _lagrange(nodes, sigma, basis)
+                _lagrange(nodes, weights, sigma, basis)
                 for j in range(count):
-                    part = measure * basis[j]
-                    if exponent > 0.0:
-                        part *= (sigma / nodes[j]) ** (2.0 * exponent)
-                    out[i, j, 0] += alpha * part
-                    out[i, j, 1] += beta * part
+                    out[i, j, 0] += alpha * measure * basis[j]
+                    out[i, j, 1] += beta * measure * basis[j]
 
 
 @kernel
 def _fill_level(
-    problem, h, family, level, entering, power, exponent, nodes, gauss, inputs, free, forced, kick, work, basis
+    problem, h, family, level, entering, power, exponent, nodes, weights, gauss, inputs, free, forced, kick, work, basis
 ):
     """All tables of one family and contact level."""
     count, size, stops = nodes.size, problem.k.size, problem.gap.size
@@ -137,12 +138,12 @@ def _fill_level(
             for s in range(stops):
                 for d in range(2):
                     r = problem.read[s] if d == 0 else problem.read_rate[s]
-                    free[family, level, s, d, i, b] = r[b] * alpha - r[size + b] * k * beta
-                    free[family, level, s, d, i, size + b] = r[b] * beta + r[size + b] * (alpha - c * beta)
+                    free[family, level, s, b, d * count + i] = r[b] * alpha - r[size + b] * k * beta
+                    free[family, level, s, size + b, d * count + i] = r[b] * beta + r[size + b] * (alpha - c * beta)
         for weighted in range(2):
             if weighted == 1 and exponent == 0.0:
                 continue
-            _block_response(k, c, h, rate, power, exponent * weighted, nodes, gauss, work, basis)
+            _block_response(k, c, h, rate, power, exponent * weighted, nodes, weights[weighted], gauss, work, basis)
             for u in range(inputs.shape[0]):
                 if (u == entering and exponent > 0.0) != (weighted == 1):
                     continue
@@ -159,10 +160,8 @@ def _fill_level(
                             kick[family, level, u, j, size + b] = v
                             continue
                         for s in range(stops):
-                            forced[family, level, s, u, 0, i, j] += (
-                                problem.read[s, b] * p + problem.read[s, size + b] * v
-                            )
-                            forced[family, level, s, u, 1, i, j] += (
+                            forced[family, level, s, u, j, i] += problem.read[s, b] * p + problem.read[s, size + b] * v
+                            forced[family, level, s, u, j, count + i] += (
                                 problem.read_rate[s, b] * p + problem.read_rate[s, size + b] * v
                             )
 
@@ -207,12 +206,12 @@ def build(
         nodes=np.array([f.nodes for f in families]),
         times=np.array([f.nodes**f.power for f in families]),
         weights=np.array([f.weights for f in families]),
-        spectrum=np.ascontiguousarray([f.spectrum[-4:] for f in families]),
+        summary=np.ascontiguousarray([_summary(f) for f in families]),
         legendre=np.ascontiguousarray(families[0].spectrum),
         free=free,
         forced=forced,
         kick=kick,
-        alias=_aliasing(contact_h, omega, families),
+        ripple=_ripple(problem, contact_h, omega, families),
         signal_rows=ledger[0],
         power_rows=ledger[1],
         loss_rows=ledger[2],
@@ -261,19 +260,21 @@ def _family(power: float, exponent: float) -> _Family:
 def _responses(problem: Problem, h: Any, families: list[_Family], inputs: Any) -> tuple[Any, Any, Any]:
     """free, forced and kick of all families and contact levels."""
     stops, size, channels = len(problem.gap), len(problem.k), len(inputs)
-    free = np.zeros((len(families), h.size, stops, 2, S, 2 * size))
-    forced = np.zeros((len(families), h.size, stops, channels, 2, S, S))
-    kick = np.zeros((len(families), h.size, channels, S, 2 * size))
+    free = np.zeros((len(families), h.size, stops, 2 * size, 2 * S))
+    forced = np.zeros((len(families), h.size, stops, channels, S, 2 * S))
+    kick = np.zeros((len(families), h.size, channels, S, padded(2 * size)))
     gauss = _gauss(12)
     work, basis = np.zeros((S + 1, S, 2)), np.zeros(S)
     for f, family in enumerate(families):
         if f > 0 and family.exponent == 0.0:  # an analytic entry is a smooth step
             free[f], forced[f], kick[f] = free[0], forced[0], kick[0]
             continue
+        plain = _weights(family.nodes)
+        weights = np.array([plain, plain * family.nodes ** (-2.0 * family.exponent)])
         for level in range(h.size):
             _fill_level(
-                *(problem, h[level], f, level, f - 1, family.power, family.exponent, family.nodes, gauss, inputs),
-                *(free, forced, kick, work, basis),
+                *(problem, h[level], f, level, f - 1, family.power, family.exponent, family.nodes, weights),
+                *(gauss, inputs, free, forced, kick, work, basis),
             )
     return free, forced, kick
 
@@ -315,6 +316,36 @@ def _phi(Z: Any) -> list[Any]:
     return phi
 
 
+def _summary(family: _Family) -> Any:
+    """(S, 8): last four coefficients, values and slopes dF/dσ at start and end, from node values."""
+    rows = np.zeros((8, S))
+    rows[:4] = family.spectrum[-4:]
+    ends = _interpolation(family.nodes, np.array([0.0, 1.0]))
+    if family.exponent == 0.0:
+        rows[4:6], rows[6:8] = ends, ends @ _differentiation(family.nodes)
+    else:
+        rows[5] = ends[1] * family.nodes ** (-2.0 * family.exponent)
+    return rows.T
+
+
+def _differentiation(nodes: Any) -> Any:
+    """Slopes at the nodes of the polynomial through node values (Trefethen, Spectral Methods in MATLAB, Chapter 6)."""
+    apart, weights = nodes[:, None] - nodes + np.eye(len(nodes)), _weights(nodes)
+    out = weights / (weights[:, None] * apart)
+    np.fill_diagonal(out, 0.0)
+    np.fill_diagonal(out, -out.sum(axis=1))
+    return out
+
+
+def _ripple(problem: Problem, h: Any, omega: Any, families: list[_Family]) -> Any:
+    """Error of each stop's indentation between the nodes, per |p| and |v| of every block that oscillates."""
+    size = omega.size
+    alias = _aliasing(h, omega, families)[:, :, None, :]
+    alias = np.where((alias > 1e-13) & (omega > 0.0), alias, 0.0)
+    rows = np.abs(problem.read[:, :size]) / np.where(omega > 0.0, omega, 1.0) + np.abs(problem.read[:, size:])
+    return np.concatenate((alias * rows * omega, alias * rows), axis=3)
+
+
 def _aliasing(h: Any, omega: Any, families: list[_Family]) -> Any:
     """Largest error between nodes of the interpolant of e^{iωt}."""
     out = np.zeros((len(families), h.size, omega.size))
@@ -328,12 +359,17 @@ def _aliasing(h: Any, omega: Any, families: list[_Family]) -> Any:
     return np.minimum(out, 2.0)
 
 
+def _weights(nodes: Any) -> Any:
+    """1/Π (σ_j - σ_i) of the Lagrange polynomials."""
+    return 1.0 / (nodes[:, None] - nodes + np.eye(len(nodes))).prod(axis=1)
+
+
 def _interpolation(nodes: Any, points: Any) -> Any:
     """Lagrange matrix (points, nodes)."""
     out = np.empty((len(points), len(nodes)))
-    row = np.empty(len(nodes))
+    row, weights = np.empty(len(nodes)), _weights(nodes)
     for i, x in enumerate(points):
-        _lagrange(nodes, float(x), row)
+        _lagrange(nodes, weights, float(x), row)
         out[i] = row
     return out
 
@@ -347,4 +383,4 @@ def _extensions(family: _Family, smooth: _Family) -> Any:
         out[i] = _interpolation(family.nodes, sigma)
         if family.exponent:
             out[i] *= np.outer(sigma ** (2.0 * family.exponent), family.nodes ** (-2.0 * family.exponent))
-    return out
+    return out.transpose(0, 2, 1)

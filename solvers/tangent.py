@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from solvers.dormand_prince import STAGES
-from solvers.exponential import with_tones
 from solvers.forcing import Forcing, hand_over
 from solvers.kernels import Problem, rhs
+from solvers.preparation import with_tones
 from solvers.replay import Nudge, Slopes, begin, replay
 from solvers.state import HEAD, TAPED, T, new_state, problem_of
 from solvers.system import Array, Parameter, System
@@ -52,7 +52,7 @@ class Tangent:
         self.slopes.y[: 2 * n, self.places] = system.blocks.inverse.T
         self.slopes.y[2 * n :, self.places] = -self.change.steady(0.0)
         self.laws = [problem._replace(parameters=parameters) for parameters in self.change.laws]
-        engine.state = state._replace(tape=np.empty((_ROWS, HEAD + width + stops * S)))
+        engine.record(np.empty((_ROWS, HEAD + width + stops * S)))
         self.shadow = new_state(state.x[:size], stops)
         self.log_scale = 0.0  # the derivatives are exp(log_scale) times what is kept
         self.history: list[tuple[float, float]] = []  # (time, ln of their size)

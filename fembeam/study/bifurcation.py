@@ -100,6 +100,6 @@ def _settled(
     # settling needs no samples, but a restart would forget the entry rate of a contact under way
     run = solvers.integrate(system, start[:n], start[n:], (settle + keep) * once, once / LOOKS, method)
     first = settle * LOOKS
-    states = np.concatenate((run.q, run.q_dot), axis=1)[first :: LOOKS][:keep]
+    states = np.concatenate((run.q, run.q_dot), axis=1)[first::LOOKS][:keep]
     u = np.abs(run.q[first : first + keep * LOOKS] @ model.phi(z))
     return states, u.reshape(keep, LOOKS).max(axis=1)

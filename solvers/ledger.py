@@ -1,0 +1,103 @@
+"""Energy ledger and states inside a step, by quadrature of what the step has found."""
+
+from __future__ import annotations
+
+import math
+
+from solvers.flight import add_taylor, taylor
+from solvers.kernels import copy, dot, inner, table_value
+from solvers.response import sample_signals
+from solvers.state import T, touching
+from solvers.tables import S, propagate
+
+
+@inner
+def _between(nodes, exponent, values, sigma):
+    """Value at σ of σ^exponent × the polynomial through the node values."""
+    total = 0.0
+    for j in range(S):
+        term = values[j] * (sigma / nodes[j]) ** exponent if exponent > 0.0 else values[j]
+        for i in range(S):
+            if i != j:
+                term *= (sigma - nodes[i]) / (nodes[j] - nodes[i])
+        total += term
+    return total
+
+
+@inner
+def powers(problem, tables, t, x):
+    """Power of the loads and of the damping at time t, W."""
+    size, gain, loss = 2 * problem.k.size, 0.0, 0.0
+    for load in range(tables.power_rows.shape[0]):
+        gain += dot(tables.signal_rows[load], x, size) * dot(tables.power_rows[load], x, size)
+    for j in range(problem.table_dt.size):
+        gain += table_value(problem, j, t) * dot(tables.power_rows[problem.table_load[j]], x, size)
+    for r in range(tables.loss_rows.shape[0]):
+        loss += dot(tables.loss_rows[r], x, size) ** 2
+    return gain, loss
+
+
+@inner
+def inside(problem, tables, state, space, family, h, span, row):
+    """State at ``span`` after the start of a step of length h, by quadrature of its forces; ``row`` holds the start."""
+    stops, n = problem.gap.size, problem.k.size
+    entry = tables.times[family, 0] < tables.nodes[family, 0]  # t = h σ²
+    for b in range(n):
+        alpha, beta = propagate(problem.k[b], problem.c[b], span)
+        p, v = row[b], row[n + b]
+        row[b] = alpha * p + beta * v
+        row[n + b] = alpha * v - beta * (problem.k[b] * p + problem.c[b] * v)
+    if problem.table_dt.size == 0 and not touching(state):
+        return
+    end = math.sqrt(span / h) if entry else span / h
+    panels = 1 + int(tables.fastest * span / 4.0)
+    for g in range(panels * S):
+        sigma = end * (g // S + tables.nodes[0, g % S]) / panels
+        time = h * sigma * sigma if entry else h * sigma
+        measure = end * tables.weights[0, g % S] / panels * h * (2.0 * sigma if entry else 1.0)
+        for u in range(stops + problem.load.shape[0]):
+            if u < stops and state.piece[u] == 0:
+                continue
+            exponent = 2.0 * tables.exponent[u] if entry and u == family - 1 else 0.0
+            impulse = measure * _between(tables.nodes[family], exponent, space.force[u], sigma)
+            push = problem.push[u] if u < stops else problem.load[u - stops]
+            for b in range(n):
+                alpha, beta = propagate(problem.k[b], problem.c[b], span - time)
+                p, v = push[b] * impulse, push[n + b] * impulse
+                row[b] += alpha * p + beta * v
+                row[n + b] += alpha * v - beta * (problem.k[b] * p + problem.c[b] * v)
+            if u < stops:
+                row[2 * n + 2 + 2 * u] += impulse * _between(tables.nodes[family], 0.0, space.motion[u, 1], sigma)
+                row[2 * n + 3 + 2 * u] += impulse
+
+
+@inner
+def account(problem, tables, state, space, family, h, length, x, row):
+    """Add to the ledger of ``row`` what loads and damping do over ``length`` of a step of length h from ``x`` on."""
+    size, inner = 2 * problem.k.size, space.work[16]
+    for i in range(tables.gauss.shape[1]):
+        span = length * tables.gauss[0, i]
+        copy(x, inner, x.size)
+        inside(problem, tables, state, space, family, h, span, inner)
+        gain, loss = powers(problem, tables, state.now[T] + span, inner)
+        row[size] += length * tables.gauss[1, i] * gain
+        row[size + 1] += length * tables.gauss[1, i] * loss
+
+
+@inner
+def account_flight(problem, tables, state, space, h, x):
+    """The same for a whole flight step: on its Taylor polynomial where that reaches, else as above."""
+    if tables.fastest * h > 0.6:
+        if problem.table_dt.size:
+            sample_signals(problem, tables, space, 0, state.now[T], h)
+        account(problem, tables, state, space, 0, h, h, x, state.x)
+        return
+    size, inner = 2 * problem.k.size, space.work[16]
+    taylor(problem, x, state.now[T], space.terms, space.six)
+    for i in range(3):
+        span = h * (0.5 + 0.3872983346207417 * (i - 1))  # Gauss's three points, sqrt(3/5)/2 apart
+        add_taylor(space.terms, inner, span, size, space.values, space.work[0])
+        gain, loss = powers(problem, tables, state.now[T] + span, inner)
+        weight = h * (4.0 if i == 1 else 2.5) / 9.0
+        state.x[size] += weight * gain
+        state.x[size + 1] += weight * loss

@@ -1,0 +1,103 @@
+"""Newton's method for the forces of a contact step, where a stiff or strongly damped law defeats iteration."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solvers.kernels import contact_gradient, copy, inner
+from solvers.response import node_forces, respond
+from solvers.state import CALLS
+from solvers.tables import S
+
+MOST_ITERATIONS = 16
+
+
+@inner
+def linearise(problem, tables, state, space, family, level):
+    """J = 1 - ∂law/∂(δ, δ̇) ∂(δ, δ̇)/∂F of all nodes of all stops in contact, row by row; returns its size."""
+    stops, row = problem.gap.size, 0
+    for s in range(stops):
+        if state.piece[s] == 0:
+            continue
+        copy(space.motion[s, 0], space.clipped, S)
+        contact_gradient(
+            *(problem, s, space.clipped, space.motion[s, 1], state.entry_rate[s]),
+            *(space.slope[s, 0], space.slope[s, 1], space.slope[s, 2]),
+        )
+        state.count[CALLS] += S
+        for i in range(S):
+            column = 0
+            for u in range(stops):
+                if state.piece[u] == 0:
+                    continue
+                matrix = tables.forced[family, level, s, u]
+                for j in range(S):
+                    value = space.slope[s, 0, i] * matrix[j, i] + space.slope[s, 1, i] * matrix[j, S + i]
+                    space.jacobian[row + i, column + j] = (1.0 if s == u and i == j else 0.0) - value
+                column += S
+        row += S
+    return row
+
+
+@inner
+def factorise(matrix, pivots, n):
+    """LU factors with partial pivoting, in place (Golub, Van Loan, Matrix Computations, Section 3.4)."""
+    for k in range(n):
+        best = k
+        for i in range(k + 1, n):
+            if abs(matrix[i, k]) > abs(matrix[best, k]):
+                best = i
+        pivots[k] = best
+        for j in range(n):
+            matrix[k, j], matrix[best, j] = matrix[best, j], matrix[k, j]
+        for i in range(k + 1, n):
+            matrix[i, k] /= matrix[k, k]
+            for j in range(k + 1, n):
+                matrix[i, j] -= matrix[i, k] * matrix[k, j]
+
+
+@inner
+def substitute(matrix, pivots, n, x):
+    """Solve with the factors, in place."""
+    for k in range(n):
+        best = pivots[k]
+        x[k], x[best] = x[best], x[k]
+    for i in range(n):
+        for j in range(i):
+            x[i] -= matrix[i, j] * x[j]
+    for i in range(n - 1, -1, -1):
+        for j in range(i + 1, n):
+            x[i] -= matrix[i, j] * x[j]
+        x[i] /= matrix[i, i]
+
+
+@inner
+def newton(problem, tables, state, space, family, level, accuracy):
+    """Newton's method for the forces, where a stiff or strongly damped law defeats the plain iteration."""
+    stops = problem.gap.size
+    for _ in range(MOST_ITERATIONS):
+        row = 0
+        for s in range(stops):
+            if state.piece[s] == 0:
+                continue
+            respond(problem, tables, state, space, family, level, s)
+            node_forces(problem, state, space, s)
+            for i in range(S):
+                space.residual[row + i] = space.trial[i] - space.force[s, i]
+            row += S
+        n = linearise(problem, tables, state, space, family, level)
+        factorise(space.jacobian, space.pivots, n)
+        substitute(space.jacobian, space.pivots, n, space.residual)
+        change, largest, row = 0.0, 0.0, 0
+        for s in range(stops):
+            if state.piece[s] > 0:
+                for i in range(S):
+                    space.force[s, i] += space.residual[row + i]
+                    change = max(change, abs(space.residual[row + i]))
+                    largest = max(largest, abs(space.force[s, i]))
+                row += S
+        if not change < np.inf:
+            return False
+        if change <= accuracy or change <= 1e-14 * largest:
+            return True
+    return False

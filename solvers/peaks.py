@@ -1,0 +1,94 @@
+"""Largest indentation and force of a contact, from the node values of its steps."""
+
+from __future__ import annotations
+
+from solvers.kernels import contact_forces, dot, indentation, inner, maxima
+from solvers.state import PEAK_DELTA, PEAK_FORCE
+from solvers.tables import S
+
+
+@maxima
+def top(values):
+    """The largest of node values, or 0."""
+    best = 0.0
+    for i in range(S):
+        best = max(best, values[i])
+    return best
+
+
+@inner
+def _legendre(coefficients, x):
+    """Legendre sum at x in [-1, 1] by Clenshaw's recurrence."""
+    later, latest = 0.0, 0.0
+    for k in range(S - 1, 0, -1):
+        later, latest = (
+            coefficients[k] + (2.0 * k + 1.0) / (k + 1.0) * x * later - (k + 1.0) / (k + 2.0) * latest,
+            later,
+        )
+    return coefficients[0] + x * later - 0.5 * latest
+
+
+@inner
+def _summit(tables, values, best, coefficients):
+    """Maximum of the polynomial around its highest node, by successive parabolas."""
+    place = 0
+    for i in range(S):
+        if values[i] > values[place]:
+            place = i
+    for k in range(S):
+        coefficients[k] = dot(tables.legendre[k], values, S)
+    nodes = tables.nodes[0]
+    a = 2.0 * nodes[place - 1] - 1.0 if place > 0 else -1.0
+    c = 2.0 * nodes[place + 1] - 1.0 if place < S - 1 else 1.0
+    best = max(best, _legendre(coefficients, a), _legendre(coefficients, c))
+    b = 2.0 * nodes[place] - 1.0
+    fa, fb, fc = _legendre(coefficients, a), values[place], _legendre(coefficients, c)
+    for _ in range(5):
+        denominator = (b - a) * (fb - fc) - (b - c) * (fb - fa)
+        if denominator == 0.0:
+            break
+        x = b - 0.5 * ((b - a) ** 2 * (fb - fc) - (b - c) ** 2 * (fb - fa)) / denominator
+        if not a < x < c or x == b:
+            break
+        f = _legendre(coefficients, x)
+        best = max(best, f)
+        if x < b:
+            if f > fb:
+                c, fc, b, fb = b, fb, x, f
+            else:
+                a, fa = x, f
+        elif f > fb:
+            a, fa, b, fb = b, fb, x, f
+        else:
+            c, fc = x, f
+    return best
+
+
+@inner
+def peak(tables, family, values, summary, known, coefficients):
+    """Largest value of the polynomial through the node values, if it exceeds the known peak."""
+    highest = top(values)
+    best = max(known, highest, summary[4], summary[5])
+    if family > 0 or highest < 0.95 * known or (highest == values[0] and summary[6] <= 0.0):
+        return best
+    if highest == values[S - 1] and summary[7] >= 0.0:
+        return best
+    return _summit(tables, values, best, coefficients)
+
+
+@inner
+def peaks_so_far(problem, tables, state, space, family, share, x):
+    """Peaks of the contacts when the run ends at ``x``, within a step of which the ``share`` lies behind."""
+    for s in range(problem.gap.size):
+        if state.piece[s] == 0:
+            continue
+        space.clipped[0] = indentation(problem, s, x)
+        space.clipped[1] = dot(problem.read_rate[s], x, 2 * problem.k.size)
+        delta = space.clipped[0]
+        contact_forces(*(problem, s, space.clipped[0:1], space.clipped[1:2], state.entry_rate[s], space.trial[0:1]))
+        force = space.trial[0]
+        for i in range(S):
+            if tables.times[family, i] <= share:
+                delta, force = max(delta, space.motion[s, 0, i]), max(force, space.force[s, i])
+        state.open[s, PEAK_DELTA] = max(state.open[s, PEAK_DELTA], delta)
+        state.open[s, PEAK_FORCE] = max(state.open[s, PEAK_FORCE], force)
