@@ -63,7 +63,10 @@ def prepared_for(system: System, forcing: Forcing) -> Prepared:
         problem, steady = with_tones(plain, forcing)
         laws = [contact.law for contact in system.contacts]
         ledger = (_signal_rows(problem, forcing), problem.power, _loss_rows(plain) @ steady)
-        tables = build(problem, [law.exponent for law in laws], [law.jump for law in laws], dt_cell, ledger)
+        tables = build(
+            *(problem, len(forcing.tone_omega), [law.exponent for law in laws], [law.jump for law in laws]),
+            *(dt_cell, ledger),
+        )
         shapes = _shapes(len(problem.gap), len(problem.load), len(problem.k), len(forcing.table_dt))
         made = Prepared(
             *(Packed(problem, PROBLEM), Packed(tables, TABLES), steady, system.blocks.T @ steady),

@@ -16,6 +16,8 @@ to such a force, ∫ E(t_i - τ) F(τ) dτ, are computed by composite Gauss quad
 from __future__ import annotations
 
 import math
+from collections import OrderedDict
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -124,7 +126,7 @@ def _block_response(k, c, h, rate, power, exponent, nodes, weights, gauss, out, 
                     out[i, j, 1] += beta * measure * basis[j]
 
 
-@kernel
+@inner
 def _fill_level(
     problem, h, family, level, entering, power, exponent, nodes, weights, gauss, inputs, free, forced, kick, work, basis
 ):
@@ -140,8 +142,11 @@ def _fill_level(
                     r = problem.read[s] if d == 0 else problem.read_rate[s]
                     free[family, level, s, b, d * count + i] = r[b] * alpha - r[size + b] * k * beta
                     free[family, level, s, size + b, d * count + i] = r[b] * beta + r[size + b] * (alpha - c * beta)
+        pushed = 0.0
+        for u in range(inputs.shape[0]):
+            pushed += abs(inputs[u, b]) + abs(inputs[u, size + b])
         for weighted in range(2):
-            if weighted == 1 and exponent == 0.0:
+            if pushed == 0.0 or (weighted == 1 and exponent == 0.0):
                 continue
             _block_response(k, c, h, rate, power, exponent * weighted, nodes, weights[weighted], gauss, work, basis)
             for u in range(inputs.shape[0]):
@@ -166,30 +171,60 @@ def _fill_level(
                             )
 
 
+@kernel
+def _fill(problem, h, powers, exponents, nodes, weights, gauss, inputs, free, forced, kick, work, basis):
+    """All tables of the smooth family and of the entries with a broken exponent."""
+    for f in range(powers.size):
+        if f > 0 and exponents[f] == 0.0:
+            continue
+        for level in range(h.size):
+            _fill_level(
+                *(problem, h[level], f, level, f - 1, powers[f], exponents[f], nodes[f], weights[f]),
+                *(gauss, inputs, free, forced, kick, work, basis),
+            )
+
+
+@kernel
+def _fill_propagators(k, c, h, out):
+    """(len(h), 2, N): α, β of every block."""
+    for i in range(h.size):
+        for b in range(k.size):
+            out[i, 0, b], out[i, 1, b] = propagate(k[b], c[b], h[i])
+
+
+class _Blocks(NamedTuple):
+    """What is known of some of the blocks: the structure's own, or the tones'."""
+
+    propagator: Any
+    step_propagator: Any
+    free: Any
+    forced: Any
+    kick: Any
+    ripple: Any
+
+
+_KNOWN: OrderedDict[bytes, _Blocks] = OrderedDict()  # structures met lately: a tone, gap or stiffness more is cheap
+_MOST_KNOWN = 16
+
+
 def build(
-    problem: Problem, exponents: list[float], jumps: list[bool], dt_cell: float, ledger: tuple[Any, Any, Any]
+    problem: Problem,
+    tones: int,
+    exponents: list[float],
+    jumps: list[bool],
+    dt_cell: float,
+    ledger: tuple[Any, Any, Any],
 ) -> Tables:
-    """Tables of a problem whose tones are already among its blocks."""
-    stops, loads, size = len(problem.gap), len(problem.load), len(problem.k)
-    omega = np.sqrt(problem.k)
-    fastest = float(max((omega + problem.c).max(), 1e-3))
-    moving = np.concatenate((omega[omega > 0], problem.c[problem.c > 0]))
-    longest = 4.0 * math.pi / (moving.min() if moving.size else fastest)
-    levels = 2 + math.ceil(4.0 * math.log2(longest * fastest / TAYLOR_REACH))
-    h = longest * 2.0 ** (-0.25 * np.arange(levels))
-    first = int(np.searchsorted(-h, -_MOST_RADIANS / fastest))
-    bottom = math.ceil(4.0 * math.log2(longest / min(_CONTACT_REACH / fastest, _SHORT)))
-    contact_h = longest * 2.0 ** (-0.25 * np.arange(first, bottom + 2, 2))
-    families = [_family(1.0, 0.0)]
-    for p, jump in zip(exponents, jumps, strict=True):
-        entry = p if not jump and p % 1.0 else 0.0
-        families.append(_family(2.0 if entry else 1.0, entry))
-    inputs = np.ascontiguousarray(np.concatenate((problem.push, problem.load)).reshape(stops + loads, 2 * size))
-    free, forced, kick = _responses(problem, contact_h, families, inputs)
-    damping = problem.c
+    """Tables of a problem whose last blocks are ``tones``."""
+    size = len(problem.k)
+    omega, damping = np.sqrt(problem.k), problem.c
+    fastest = float(max((omega + damping).max(), 1e-3))
+    h, contact_h = _steps(omega, damping, tones)
+    families = _families(tuple(exponents), tuple(jumps))
+    blocks = _joined(*(_blocks(part, h, contact_h, families) for part in _parts(problem, tones)))
     return Tables(
         h=h,
-        propagator=_propagators(problem, h),
+        propagator=blocks.propagator,
         signal=_signals(problem, h),
         cell=_propagators(problem, np.array([dt_cell]))[0],
         cell_signal=_signals(problem, np.array([dt_cell]))[0],
@@ -202,24 +237,94 @@ def build(
         mobility=-problem.read_rate @ problem.push.T,
         exponent=np.array(exponents, dtype=float),
         step=contact_h,
-        step_propagator=_propagators(problem, contact_h),
-        nodes=np.array([f.nodes for f in families]),
-        times=np.array([f.nodes**f.power for f in families]),
-        weights=np.array([f.weights for f in families]),
-        summary=np.ascontiguousarray([_summary(f) for f in families]),
-        legendre=np.ascontiguousarray(families[0].spectrum),
-        free=free,
-        forced=forced,
-        kick=kick,
-        ripple=_ripple(problem, contact_h, omega, families),
+        step_propagator=blocks.step_propagator,
+        nodes=families.nodes,
+        times=families.times,
+        weights=families.weights,
+        summary=families.summary,
+        legendre=families.legendre,
+        free=blocks.free,
+        forced=blocks.forced,
+        kick=blocks.kick,
+        ripple=blocks.ripple,
         signal_rows=ledger[0],
         power_rows=ledger[1],
         loss_rows=ledger[2],
         gauss=_gauss(5),
-        extend=np.ascontiguousarray([_extensions(f, families[0]) for f in families]),
+        extend=families.extend,
     )
 
 
+def _steps(omega: Any, damping: Any, tones: int) -> tuple[Any, Any]:
+    """Flight and contact steps. They depend on the structure alone, but for tones faster than it."""
+    own = slice(0, omega.size - tones) if tones < omega.size else slice(None)
+    rates = (omega + damping)[own]
+    fastest = float(max(rates.max(), 1e-3))
+    fastest *= 2.0 ** max(0, math.ceil(math.log2(max((omega + damping).max(), 1e-3) / fastest)))
+    moving = np.concatenate((omega[own][omega[own] > 0], damping[own][damping[own] > 0]))
+    longest = 4.0 * math.pi / (moving.min() if moving.size else fastest)
+    levels = 2 + math.ceil(4.0 * math.log2(longest * fastest / TAYLOR_REACH))
+    h = longest * 2.0 ** (-0.25 * np.arange(levels))
+    first = int(np.searchsorted(-h, -_MOST_RADIANS / fastest))
+    bottom = math.ceil(4.0 * math.log2(longest / min(_CONTACT_REACH / fastest, _SHORT)))
+    return h, longest * 2.0 ** (-0.25 * np.arange(first, bottom + 2, 2))
+
+
+def _parts(problem: Problem, tones: int) -> list[Problem]:
+    """The problem of the structure's blocks and that of the tones', if there are any."""
+    size = len(problem.k)
+    chosen = [np.arange(size - tones), np.arange(size - tones, size)]
+    parts = []
+    for blocks in chosen[: 1 + (tones > 0)]:
+        both = np.concatenate((blocks, size + blocks))
+        rows = {name: np.ascontiguousarray(getattr(problem, name)[:, both]) for name in _ROWS}
+        parts.append(problem._replace(k=problem.k[blocks], c=problem.c[blocks], **rows))
+    return parts
+
+
+_ROWS = ("push", "read", "read_rate", "load")
+
+
+def _blocks(part: Problem, h: Any, contact_h: Any, families: _Families) -> _Blocks:
+    """Tables of some blocks; those met lately are kept."""
+    arrays = (part.k, part.c, *(getattr(part, name) for name in _ROWS), h, contact_h, *families[:3])
+    key = b"|".join(array.tobytes() for array in arrays)
+    if key not in _KNOWN:
+        inputs = np.ascontiguousarray(np.concatenate((part.push, part.load)).reshape(-1, 2 * len(part.k)))
+        _KNOWN[key] = _Blocks(
+            *(_propagators(part, h), _propagators(part, contact_h), *_responses(part, contact_h, families, inputs)),
+            _ripple(part, contact_h, np.sqrt(part.k), families),
+        )
+        while len(_KNOWN) > _MOST_KNOWN:
+            _KNOWN.popitem(last=False)
+    _KNOWN.move_to_end(key)
+    return _KNOWN[key]
+
+
+def _joined(structure: _Blocks, tones: _Blocks | None = None) -> _Blocks:
+    """Tables of both: numbers per block side by side, forces on the structure alone."""
+    if tones is None:
+        return structure
+    n, t = (part.propagator.shape[2] for part in (structure, tones))
+    kick = np.zeros((*structure.kick.shape[:-1], padded(2 * (n + t))))
+    kick[..., :n], kick[..., n + t : 2 * n + t] = structure.kick[..., :n], structure.kick[..., n : 2 * n]
+    return _Blocks(
+        np.concatenate((structure.propagator, tones.propagator), axis=2),
+        np.concatenate((structure.step_propagator, tones.step_propagator), axis=2),
+        _interleaved(structure.free, tones.free, 3),
+        structure.forced,
+        kick,
+        _interleaved(structure.ripple, tones.ripple, 3),
+    )
+
+
+def _interleaved(first: Any, second: Any, axis: int) -> Any:
+    """[p, p', v, v'] along an axis from [p, v] and [p', v']."""
+    (p, v), (p2, v2) = np.split(first, 2, axis), np.split(second, 2, axis)
+    return np.concatenate((p, p2, v, v2), axis)
+
+
+@lru_cache(maxsize=8)
 def _gauss(count: int) -> Any:
     """Gauss–Legendre points and weights on (0, 1): (2, count)."""
     x, w = np.polynomial.legendre.leggauss(count)
@@ -228,9 +333,9 @@ def _gauss(count: int) -> Any:
 
 def _propagators(problem: Problem, h: Any) -> Any:
     """(len(h), 2, N): α, β of every block."""
-    blocks = list(zip(problem.k, problem.c, strict=True))
-    both = np.array([[propagate(k, c, x) for k, c in blocks] for x in h])
-    return np.ascontiguousarray(both.transpose(0, 2, 1))
+    out = np.empty((len(h), 2, len(problem.k)))
+    _fill_propagators(problem.k, problem.c, h, out)
+    return out
 
 
 class _Family(NamedTuple):
@@ -257,25 +362,57 @@ def _family(power: float, exponent: float) -> _Family:
     return _Family(power, exponent, sigma, measure * scale, polynomials * w * scale / norm[:, None])
 
 
-def _responses(problem: Problem, h: Any, families: list[_Family], inputs: Any) -> tuple[Any, Any, Any]:
+_CHECKED = (np.arange(24) + 0.5) / 24  # places between the nodes where their interpolant is compared
+
+
+class _Families(NamedTuple):
+    """All kinds of contact steps of a problem: the smooth one, then one per stop to enter it."""
+
+    power: Any  # (f,)
+    exponent: Any
+    nodes: Any  # (f, S), as the rest in `Tables`
+    times: Any
+    weights: Any
+    summary: Any
+    legendre: Any
+    extend: Any
+    between: Any  # (f, 24, S) from the values at the nodes to those between them
+
+
+@lru_cache(maxsize=64)
+def _families(exponents: tuple[float, ...], jumps: tuple[bool, ...]) -> _Families:
+    """Kinds of steps for the stops' leading exponents."""
+    found = [_family(1.0, 0.0)]
+    for p, jump in zip(exponents, jumps, strict=True):
+        entry = p if not jump and p % 1.0 else 0.0
+        found.append(_family(2.0 if entry else 1.0, entry))
+    return _Families(
+        power=np.array([f.power for f in found]),
+        exponent=np.array([f.exponent for f in found]),
+        nodes=np.array([f.nodes for f in found]),
+        times=np.array([f.nodes**f.power for f in found]),
+        weights=np.array([f.weights for f in found]),
+        summary=np.ascontiguousarray([_summary(f) for f in found]),
+        legendre=np.ascontiguousarray(found[0].spectrum),
+        extend=np.ascontiguousarray([_extensions(f, found[0]) for f in found]),
+        between=np.array([_interpolation(f.nodes, _CHECKED) for f in found]),
+    )
+
+
+def _responses(problem: Problem, h: Any, families: _Families, inputs: Any) -> tuple[Any, Any, Any]:
     """free, forced and kick of all families and contact levels."""
-    stops, size, channels = len(problem.gap), len(problem.k), len(inputs)
-    free = np.zeros((len(families), h.size, stops, 2 * size, 2 * S))
-    forced = np.zeros((len(families), h.size, stops, channels, S, 2 * S))
-    kick = np.zeros((len(families), h.size, channels, S, padded(2 * size)))
-    gauss = _gauss(12)
-    work, basis = np.zeros((S + 1, S, 2)), np.zeros(S)
-    for f, family in enumerate(families):
-        if f > 0 and family.exponent == 0.0:  # an analytic entry is a smooth step
-            free[f], forced[f], kick[f] = free[0], forced[0], kick[0]
-            continue
-        plain = _weights(family.nodes)
-        weights = np.array([plain, plain * family.nodes ** (-2.0 * family.exponent)])
-        for level in range(h.size):
-            _fill_level(
-                *(problem, h[level], f, level, f - 1, family.power, family.exponent, family.nodes, weights),
-                *(gauss, inputs, free, forced, kick, work, basis),
-            )
+    stops, size, channels, count = len(problem.gap), len(problem.k), len(inputs), len(families.power)
+    free = np.zeros((count, h.size, stops, 2 * size, 2 * S))
+    forced = np.zeros((count, h.size, stops, channels, S, 2 * S))
+    kick = np.zeros((count, h.size, channels, S, padded(2 * size)))
+    plain = np.array([_weights(nodes) for nodes in families.nodes])
+    weights = np.stack((plain, plain * families.nodes ** (-2.0 * families.exponent[:, None])), axis=1)
+    _fill(
+        *(problem, h, families.power, families.exponent, families.nodes, weights, _gauss(12), inputs),
+        *(free, forced, kick, np.zeros((S + 1, S, 2)), np.zeros(S)),
+    )
+    for f in np.flatnonzero(families.exponent[1:] == 0.0) + 1:  # an analytic entry is a smooth step
+        free[f], forced[f], kick[f] = free[0], forced[0], kick[0]
     return free, forced, kick
 
 
@@ -337,7 +474,7 @@ def _differentiation(nodes: Any) -> Any:
     return out
 
 
-def _ripple(problem: Problem, h: Any, omega: Any, families: list[_Family]) -> Any:
+def _ripple(problem: Problem, h: Any, omega: Any, families: _Families) -> Any:
     """Error of each stop's indentation between the nodes, per |p| and |v| of every block that oscillates."""
     size = omega.size
     alias = _aliasing(h, omega, families)[:, :, None, :]
@@ -346,16 +483,13 @@ def _ripple(problem: Problem, h: Any, omega: Any, families: list[_Family]) -> An
     return np.concatenate((alias * rows * omega, alias * rows), axis=3)
 
 
-def _aliasing(h: Any, omega: Any, families: list[_Family]) -> Any:
-    """Largest error between nodes of the interpolant of e^{iωt}."""
-    out = np.zeros((len(families), h.size, omega.size))
-    check = (np.arange(24) + 0.5) / 24
-    for f, family in enumerate(families):
-        basis = _interpolation(family.nodes, check)
-        for level, x in enumerate(h):
-            phase = np.exp(1j * np.outer(family.nodes**family.power, omega * x))
-            exact = np.exp(1j * np.outer(check**family.power, omega * x))
-            out[f, level] = np.abs(basis @ phase - exact).max(axis=0)
+def _aliasing(h: Any, omega: Any, families: _Families) -> Any:
+    """Largest error between nodes of the interpolant of e^{iωt}, (f, j, N)."""
+    out = np.zeros((len(families.power), h.size, omega.size))
+    for f, power in enumerate(families.power):
+        phase = np.exp(1j * families.times[f][:, None] * (h[:, None, None] * omega))
+        exact = np.exp(1j * _CHECKED[:, None] ** power * (h[:, None, None] * omega))
+        out[f] = np.abs(families.between[f] @ phase - exact).max(axis=1)
     return np.minimum(out, 2.0)
 
 
