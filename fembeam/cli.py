@@ -114,20 +114,21 @@ def _modes(arguments: argparse.Namespace) -> int:
 
     file = scene_file.read(arguments.scene)
     wanted = dict(file.reduce)
-    if arguments.modes is not None or "modes" not in wanted:
-        wanted["modes"] = MODES_SHOWN if arguments.modes is None else arguments.modes
+    if arguments.modes is not None or not {"modes", "omega_max", "mass_share"} & set(wanted):
+        shown = MODES_SHOWN if arguments.modes is None else arguments.modes
+        wanted = {**wanted, "modes": shown, "omega_max": None, "mass_share": None}
     print(mode_table(_reduced(file, **wanted)))
     return 0
 
 
 def mode_table(model: Model) -> str:
     """Modes with frequency, damping, participation Γ, effective mass Γ² and its share of the moving mass."""
-    mass = moving_mass(model)
+    mass = model.moving_mass
     head = "mode", "rad/s", "Hz", "zeta", "participation", "effective mass", "% of moving mass"
     unit = "", "", "", "", "√kg", "kg", f"{mass:.6g} kg"
     rows = [
         (
-            f"{mode + 1}",
+            f"{mode + 1}" if number < len(model.omega) - model.static else "static",
             f"{w:.6f}",
             f"{w / (2 * math.pi):.6f}",
             f"{z:.4g}",
@@ -135,7 +136,9 @@ def mode_table(model: Model) -> str:
             f"{g**2:.6g}",
             f"{100 * g**2 / mass:.3f}",
         )
-        for mode, w, z, g in zip(model.modes, model.omega, model.zeta, model.participation, strict=True)
+        for number, (mode, w, z, g) in enumerate(
+            zip(model.modes, model.omega, model.zeta, model.participation, strict=True)
+        )
     ]
     share = 100 * float(model.effective_mass.sum()) / mass
     rows.append(("all", "", "", "", "", f"{model.effective_mass.sum():.6g}", f"{share:.3f}"))
@@ -144,14 +147,6 @@ def mode_table(model: Model) -> str:
         "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in (head, unit, *rows)
     ]
     return "\n".join(line.rstrip() for line in lines)
-
-
-def moving_mass(model: Model) -> float:
-    """Sum of the effective masses over all modes, b·M⁻¹ b in kg: what a base motion sets moving."""
-    from scipy.sparse.linalg import spsolve
-
-    b = model.matrices.base_load
-    return float(b @ spsolve(model.matrices.M.tocsc(), b).reshape(b.shape))
 
 
 def _say(message: str) -> None:
