@@ -1,0 +1,218 @@
+"""One model measured: independent values of a quantity, and what they cost.
+
+Three kinds of run give them:
+
+* transient: one run of a given duration, one value, no scatter;
+* random: one run per seed of the base noise, one value each;
+* periodic (no duration given): one long run under a harmonic base, settled, cut into groups of twelve drive periods:
+  an orbit of period 1, 2, 3, 4, 6 or 12 gives ten equal values, a chaotic response ten that scatter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import solvers
+from fembeam.excitation import Harmonic
+from fembeam.section import require, require_non_negative, require_positive
+from fembeam.study.quantities import Quantity, label
+
+if TYPE_CHECKING:
+    from fembeam.model import Model
+    from fembeam.run import Run
+    from fembeam.scene import Scene
+
+Vector = NDArray[np.float64]
+Start = Callable[["Model"], Any]
+
+SETTLING, GROUPS, GROUP = 240, 10, 12  # drive periods before, number of groups, periods in each
+SAMPLES = 128  # per drive period
+FEWEST_SEEDS = 3
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How every model of a study is run; `fb.study.mode_count` explains the fields."""
+
+    duration: float | None = None
+    dt: float | None = None
+    discard: float = 0.0
+    seeds: tuple[int, ...] = ()
+    start: Start | None = None
+    solver: Any = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "seeds", tuple(self.seeds))
+        if self.duration is not None:
+            require_positive("duration", self.duration, "study", "give s, or None for a periodic response")
+            require_non_negative("discard", self.discard, "study", "give s")
+            require(self.discard < self.duration, f"discard must be below the duration of {self.duration:g} s",
+                    self.discard, "study", "run longer")  # fmt: skip
+        if self.dt is not None:
+            require_positive("dt", self.dt, "study", "give the output sampling in s")
+        few = 0 < len(self.seeds) < FEWEST_SEEDS
+        require(not few, f"seeds must be at least {FEWEST_SEEDS}, for an uncertainty", len(self.seeds), "study",
+                "e.g. range(8)")  # fmt: skip
+
+    def check(self, scene: Scene, quantity: Quantity) -> None:
+        """Raise ValueError when the scene cannot be run like this."""
+        if self.duration is None:
+            drive_period(scene)
+            require(not self.seeds, "seeds need a duration", None, "study", "give duration in s")
+        else:
+            sampled = getattr(quantity, "sampled", True)
+            require(self.dt is not None or not sampled, f"{label(quantity)} needs samples", None, "study", "give dt")
+        if self.seeds:
+            require(hasattr(scene.base, "seed"), "seeds need a random base motion", scene.base, "study",
+                    "use BandNoise as base, or leave out seeds")  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """Values (k, …) of the quantity and what is worth knowing about the model that gave them.
+
+    `seconds`: integration, all values together; `preparation`: mesh and modes; `share`: least static share of a stop
+    or force; `periods`: of the highest frequency in the median contact.
+    """
+
+    values: Vector
+    coordinates: int
+    seconds: float
+    preparation: float
+    share: float
+    periods: float
+    highest: float
+
+    @property
+    def mean(self) -> Vector:
+        """Over the independent values."""
+        return np.asarray(self.values.mean(axis=0))
+
+
+@dataclass(frozen=True)
+class Case:
+    """One model to be measured: arguments of `Scene.reduce`, solver, plan, quantity."""
+
+    scene: Scene
+    reduce: tuple[tuple[str, Any], ...]
+    plan: Plan
+    quantity: Quantity
+    rtol: float | None = None  # of Exponential, instead of the plan's solver
+
+    def __repr__(self) -> str:
+        return ", ".join(f"{name}={value}" for name, value in self.reduce)
+
+
+def measure(case: Case) -> Measured:
+    """Reduce, run, evaluate; a module-level function, so that processes can be handed it."""
+    from time import perf_counter
+
+    begin = perf_counter()
+    model = case.scene.reduce(**dict(case.reduce))
+    solver = case.plan.solver if case.rtol is None else solvers.Exponential(case.rtol, ledger=False)
+    solver = solvers.Exponential(ledger=False) if solver is None else solver
+    _warm(model, solver)
+    prepared = perf_counter()
+    values, seconds, lasting = [], 0.0, []
+    for run in runs(model, case.plan, case.quantity, solver):
+        values.append(_value(case.quantity, run, case))
+        seconds += run.cost.seconds
+        lasting.append(run.contacts.t_out - run.contacts.t_in)
+    shapes = {np.shape(value) for value in values}
+    require(len(shapes) == 1, "quantity must return one shape", sorted(shapes), repr(case), "return a fixed number")
+    times = np.concatenate(lasting)
+    contact = float(np.median(times[np.isfinite(times)])) if np.any(np.isfinite(times)) else float("nan")
+    highest = float(model.omega.max())
+    return Measured(
+        np.array(values), len(model.omega), seconds, prepared - begin,
+        float(model.static_share.min(initial=1.0)), highest * contact / (2 * np.pi), highest,
+    )  # fmt: skip
+
+
+def runs(model: Model, plan: Plan, quantity: Quantity, solver: Any) -> list[Run]:
+    """The runs, or parts of a run, that give independent values; times count from the beginning of each."""
+    start = None if plan.start is None else plan.start(model)
+    if plan.duration is None:
+        return periodic(model, start, solver, getattr(quantity, "sampled", True))
+    models = [_seeded(model, seed) for seed in plan.seeds] if plan.seeds else [model]
+    whole = [each.simulate(plan.duration, plan.dt, start, solver) for each in models]
+    return [cut(run, plan.discard, plan.duration) for run in whole]
+
+
+def drive_period(scene: Scene) -> float:
+    """2π/ω of the one frequency that drives the scene; ValueError when it is not driven by one."""
+    signals = [signal for signal in (scene.base, *(force.signal for force in scene.forces)) if signal is not None]
+    omegas = {signal.omega if isinstance(signal, Harmonic) else 0.0 for signal in signals}
+    single = len(omegas) == 1 and min(omegas) > 0.0
+    require(single, "a study without duration needs harmonic motion of one frequency", signals, "study",
+            "give duration in s")  # fmt: skip
+    return float(2 * np.pi / omegas.pop())
+
+
+def periodic(model: Model, start: Any, solver: Any, sampled: bool) -> list[Run]:
+    """Groups of drive periods of the settled response to harmonic motion."""
+    period = drive_period(model.scene)
+    dt = period / SAMPLES if sampled else None
+    run = model.simulate((SETTLING + GROUPS * GROUP) * period, dt, start, solver)
+    borders = (SETTLING + GROUP * np.arange(GROUPS + 1)) * period
+    parts = [cut(run, begin, end) for begin, end in pairwise(borders)]
+    share = replace(run.cost, seconds=run.cost.seconds / GROUPS)
+    return [replace(part, cost=share) for part in parts]
+
+
+def cut(run: Run, begin: float, end: float) -> Run:
+    """The part of a run from begin to end (s), with times counted from begin; the last state only if it has no samples.
+
+    A contact belongs to the part in which it began.
+    """
+    log, half = run.contacts, 1e-9 * max(float(run.t[-1]), end)
+    mine = (log.t_in >= begin) & (log.t_in < end)
+    columns = {name: column[mine] for name, column in log.arrays().items()}
+    columns["t_in"], columns["t_out"] = columns["t_in"] - begin, columns["t_out"] - begin
+    if len(run.t) == 1:
+        kept, t = slice(0, 1), np.array([end - begin])
+    else:
+        kept = slice(int(np.searchsorted(run.t, begin - half)), int(np.searchsorted(run.t, end + half)))
+        t = run.t[kept] - begin
+    energy = {
+        f.name: getattr(run.energy, f.name)[kept] for f in fields(run.energy) if np.ndim(getattr(run.energy, f.name))
+    }
+    return replace(
+        run, t=t, q=run.q[kept], q_dot=run.q_dot[kept],
+        contacts=solvers.ContactLog(**columns), energy=replace(run.energy, **energy),
+    )  # fmt: skip
+
+
+def cases(
+    scene: Scene, counts: Sequence[Any], residual: Sequence[bool], plan: Plan, quantity: Quantity, rtol: float | None
+) -> list[Case]:
+    """A case per count and kind."""
+    return [
+        Case(scene, (("modes", count), ("residual", with_shapes)), plan, quantity, rtol)
+        for with_shapes in residual
+        for count in counts
+    ]
+
+
+def _seeded(model: Model, seed: int) -> Model:
+    """The model under another realisation."""
+    return replace(model, scene=replace(model.scene, base=replace(model.scene.base, seed=seed)))
+
+
+def _warm(model: Model, solver: Any) -> None:
+    """A moment of simulation: compiled code and tables are loaded before the clock starts."""
+    model.simulate(1e-3 / max(float(model.omega[0]), 1.0), solver=solver)
+
+
+def _value(quantity: Quantity, run: Run, case: Case) -> Any:
+    """The quantity of one run, checked."""
+    require(run.complete, "every run of a study must reach its end", run.status, repr(case), "run again")
+    value = np.asarray(quantity(run), dtype=float)
+    require(value.size > 0, "quantity must return a number or an array", value, repr(case), "check the function")
+    return value
