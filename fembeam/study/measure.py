@@ -10,9 +10,10 @@ Three kinds of run give them:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from itertools import pairwise
+from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -87,7 +88,6 @@ class Measured:
     preparation: float
     share: float
     periods: float
-    highest: float
 
     @property
     def mean(self) -> Vector:
@@ -97,42 +97,47 @@ class Measured:
 
 @dataclass(frozen=True)
 class Case:
-    """One model to be measured: arguments of `Scene.reduce`, solver, plan, quantity."""
+    """One model to be measured: arguments of `Scene.reduce`, plan, quantity, tolerances of `Exponential`.
+
+    Without tolerances the plan's solver is used, once.
+    """
 
     scene: Scene
     reduce: tuple[tuple[str, Any], ...]
     plan: Plan
     quantity: Quantity
-    rtol: float | None = None  # of Exponential, instead of the plan's solver
+    rtols: tuple[float, ...] = ()
 
     def __repr__(self) -> str:
         return ", ".join(f"{name}={value}" for name, value in self.reduce)
 
+    @property
+    def solvers(self) -> list[Any]:
+        """One per tolerance."""
+        chosen = solvers.Exponential(ledger=False) if self.plan.solver is None else self.plan.solver
+        return [solvers.Exponential(rtol, ledger=False) for rtol in self.rtols] or [chosen]
 
-def measure(case: Case) -> Measured:
-    """Reduce, run, evaluate; a module-level function, so that processes can be handed it."""
-    from time import perf_counter
 
+def measure(case: Case) -> list[Measured]:
+    """Reduce once, run and evaluate with every solver; a module-level function, so that processes can be handed it."""
     begin = perf_counter()
     model = case.scene.reduce(**dict(case.reduce))
-    solver = case.plan.solver if case.rtol is None else solvers.Exponential(case.rtol, ledger=False)
-    solver = solvers.Exponential(ledger=False) if solver is None else solver
-    _warm(model, solver)
-    prepared = perf_counter()
-    values, seconds, lasting = [], 0.0, []
-    for run in runs(model, case.plan, case.quantity, solver):
-        values.append(_value(case.quantity, run, case))
-        seconds += run.cost.seconds
-        lasting.append(run.contacts.t_out - run.contacts.t_in)
+    model.simulate(1e-3 / max(float(model.omega[0]), 1.0), solver=case.solvers[0])  # load compiled code, make tables
+    preparation = perf_counter() - begin
+    return [_measured(case, model, solver, preparation) for solver in case.solvers]
+
+
+def _measured(case: Case, model: Model, solver: Any, preparation: float) -> Measured:
+    """One model with one solver."""
+    parts = runs(model, case.plan, case.quantity, solver)
+    values = [_value(case.quantity, run, case) for run in parts]
     shapes = {np.shape(value) for value in values}
     require(len(shapes) == 1, "quantity must return one shape", sorted(shapes), repr(case), "return a fixed number")
-    times = np.concatenate(lasting)
+    times = np.concatenate([run.contacts.t_out - run.contacts.t_in for run in parts])
     contact = float(np.median(times[np.isfinite(times)])) if np.any(np.isfinite(times)) else float("nan")
-    highest = float(model.omega.max())
-    return Measured(
-        np.array(values), len(model.omega), seconds, prepared - begin,
-        float(model.static_share.min(initial=1.0)), highest * contact / (2 * np.pi), highest,
-    )  # fmt: skip
+    highest, share = float(model.omega.max()), float(model.static_share.min(initial=1.0))
+    seconds = sum(run.cost.seconds for run in parts)
+    return Measured(np.array(values), len(model.omega), seconds, preparation, share, highest * contact / (2 * np.pi))
 
 
 def runs(model: Model, plan: Plan, quantity: Quantity, solver: Any) -> list[Run]:
@@ -189,25 +194,9 @@ def cut(run: Run, begin: float, end: float) -> Run:
     )  # fmt: skip
 
 
-def cases(
-    scene: Scene, counts: Sequence[Any], residual: Sequence[bool], plan: Plan, quantity: Quantity, rtol: float | None
-) -> list[Case]:
-    """A case per count and kind."""
-    return [
-        Case(scene, (("modes", count), ("residual", with_shapes)), plan, quantity, rtol)
-        for with_shapes in residual
-        for count in counts
-    ]
-
-
 def _seeded(model: Model, seed: int) -> Model:
     """The model under another realisation."""
     return replace(model, scene=replace(model.scene, base=replace(model.scene.base, seed=seed)))
-
-
-def _warm(model: Model, solver: Any) -> None:
-    """A moment of simulation: compiled code and tables are loaded before the clock starts."""
-    model.simulate(1e-3 / max(float(model.omega[0]), 1.0), solver=solver)
 
 
 def _value(quantity: Quantity, run: Run, case: Case) -> Any:

@@ -200,7 +200,7 @@ def mode_count(
     arguments = [a for i, a in enumerate(arguments) if a not in arguments[:i]]
     items = [Case(scene, tuple(a.items()), plan, kept) for a in arguments]
     finest = arguments[-1] if reference is not None else {"modes": max(chosen), "residual": kinds[-1]}
-    measured = spread(measure, items, executor, f"modes for {label(kept)}")
+    measured = [each for (each,) in spread(measure, items, executor, f"modes for {label(kept)}")]
     return ModeCount(label(kept), rows_of(arguments, measured, measured[arguments.index(finest)]))
 
 
