@@ -8,7 +8,7 @@ in a scene without stops.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -186,8 +186,21 @@ def named(quantity: str | Quantity) -> Quantity:
 
 
 def label(quantity: Quantity) -> str:
-    """A name for tables and figures."""
-    return getattr(quantity, "__name__", None) or repr(quantity)
+    """A name for tables and figures.
+
+    Examples
+    --------
+    >>> label(PeakForce(stop=1))
+    'peak_force(stop=1)'
+    """
+    names = {kind: name for name, kind in QUANTITIES.items()}
+    name = names.get(type(quantity))  # type: ignore[call-overload]
+    if name is None:
+        return getattr(quantity, "__name__", None) or repr(quantity)
+    own = [(f.name, getattr(quantity, f.name)) for f in fields(quantity)]  # type: ignore[arg-type]
+    plain = QUANTITIES[name]()
+    changed = ", ".join(f"{key}={value}" for key, value in own if value != getattr(plain, key))
+    return f"{name}({changed})" if changed else name
 
 
 def signal(run: Run, stop: int = 0, z: float | None = None) -> tuple[Vector, Vector]:
