@@ -186,7 +186,7 @@ def mode_count(
     >>> study.row(2).error < study.row(1).error < 0.01
     True
     """
-    kept, chosen = named(quantity), _counts(counts)
+    kept, chosen = named(quantity), checked_counts(counts)
     plan = Plan(duration, dt, discard, tuple(seeds), start, solver)
     plan.check(scene, kept)
     kinds = (residual,) if residual is not None else (False, True) if scene.loaded_places else (False,)
@@ -195,7 +195,7 @@ def mode_count(
         elements = scene.matrices(modes=max(chosen)).elements
         arguments.append({"modes": "all", "elements": elements})
     elif reference is not None:
-        chosen = _counts([*chosen, reference])
+        chosen = checked_counts([*chosen, reference])
         arguments.append({"modes": reference, "residual": kinds[-1]})
     arguments = [a for i, a in enumerate(arguments) if a not in arguments[:i]]
     items = [Case(scene, tuple(a.items()), plan, kept) for a in arguments]
@@ -249,7 +249,7 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "\n".join(lines)
 
 
-def _counts(counts: Iterable[int]) -> list[int]:
+def checked_counts(counts: Iterable[int]) -> list[int]:
     """Checked counts, ascending, each once."""
     chosen = list(counts)
     require(len(chosen) > 0, "counts must hold a number of modes", chosen, "study", "e.g. [1, 2, 3, 5, 10]")

@@ -2,12 +2,13 @@
 
 The total error of a model with n modes at tolerance rtol is split and bounded by measurement:
 
-    |x(n, rtol) - x(∞, 0)| ≤ |x(n) - x(n_ref)| + |x(n, rtol) - x(n, rtol → 0)|
-                               reduction           integration
+    |x(n, rtol) - x(∞, 0)| ≤ |x(n) - x(n_ref)| + |x(n_ref) - x(∞)| + |x(n, rtol) - x(n, rtol → 0)|
+                               reduction                                  integration
 
-Counts climb a ladder 1, 2, 3, 4, 6, 8, … until one of them agrees with everything finer, up to at least twice its
-modes; then the gap below it is filled in, rtol is loosened as far as the rest of the tolerance allows, and the answer
-is checked against twice the modes and a hundredth of rtol.
+where the distance of the finest model n_ref from the next finest stands for its distance from all modes. Counts climb
+a ladder 1, 2, 3, 4, 6, 8, … until one of them agrees with everything finer, up to at least twice its modes; then the
+gap below it is filled in, rtol is loosened as far as the rest of the tolerance allows, and the answer is checked
+against twice the modes and a hundredth of rtol.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 import solvers
-from fembeam.section import require
+from fembeam.section import is_finite, require
 from fembeam.study.executors import spread
 from fembeam.study.measure import Case, Measured, Plan, Start, measure
 from fembeam.study.mode_count import difference, table
@@ -189,15 +190,26 @@ def smallest_model(
     >>> smallest_model(scene, "amplitude", tolerance=0.01).modes
     1
     """
-    require(0 < tolerance < 1, "tolerance must lie in (0, 1)", tolerance, "smallest_model", "e.g. 0.01")
-    whole = isinstance(most, (int, np.integer)) and not isinstance(most, bool)
-    require(whole and 1 <= most <= MOST, f"most must be a whole number, 1 to {MOST}", most, "smallest_model",
-            "e.g. 20")  # fmt: skip
+    check_goal(tolerance, most)
     plan, kept = Plan(duration, dt, discard, tuple(seeds), start), named(quantity)
     plan.check(scene, kept)
     kinds = (residual,) if residual is not None else (False, True) if scene.loaded_places else (False,)
     search = _Search(scene, kept, plan, float(tolerance), int(most), kinds, executor)
     return search.answer()
+
+
+def check_goal(tolerance: float, most: int) -> None:
+    """Raise ValueError unless the tolerance is a part and `most` a count that the ladder reaches."""
+    require(
+        is_finite(tolerance) and 0 < tolerance < 1,
+        "tolerance must lie in (0, 1)",
+        tolerance,
+        "smallest_model",
+        "e.g. 0.01",
+    )
+    whole = isinstance(most, (int, np.integer)) and not isinstance(most, bool)
+    require(whole and 1 <= most <= MOST, f"most must be a whole number, 1 to {MOST}", most, "smallest_model",
+            "e.g. 20")  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,9 +277,18 @@ class _Search:
             lines.append(Evidence(choice, each, *difference(each, finest), remark))
         return lines
 
+    def _gap(self) -> float:
+        """How far the finest model may be from all modes: its resolved distance from the next finest of its kind."""
+        reference = self._reference()
+        others = [c for c in self.seen if c.rtol == TIGHT and c.residual == reference.residual and c != reference]
+        if not others:
+            return float("inf")
+        error, uncertainty = difference(self.seen[max(others)], self.seen[reference])
+        return max(error - uncertainty, 0.0)
+
     def _candidate(self, rejected: set[Choice]) -> Choice | None:
         """The smallest model, at most half the finest, that agrees with all finer ones of its kind and the finest."""
-        limit, errors = REDUCTION_SHARE * self.tolerance, self._errors()
+        limit, errors = REDUCTION_SHARE * self.tolerance - self._gap(), self._errors()
         good: list[Evidence] = []
         for kind in self.kinds:
             mine = [line for line in errors if line.choice.residual == kind]
@@ -287,7 +308,7 @@ class _Search:
     def _settled(self, found: Choice) -> SmallestModel | None:
         """The answer with the loosest rtol for a candidate, None when integration or the final check refuse it."""
         reduction = next(line for line in self._errors() if line.choice == found)
-        left = self.tolerance - reduction.bound
+        left = self.tolerance - reduction.bound - self._gap()
         choices = [found._replace(rtol=rtol) for rtol in RTOLS]
         exact = self.seen[found]
         lines = [
@@ -295,7 +316,8 @@ class _Search:
             for choice, each in zip(choices, self._measured(choices), strict=True)
         ]
         for index, line in enumerate(lines):
-            if all(tighter.bound <= left for tighter in lines[index:]):
+            tighter_too = all(tighter.error - tighter.uncertainty <= left for tighter in lines[index:])
+            if line.bound <= left and tighter_too:
                 checked = self._checked(line.choice)
                 if checked <= self.tolerance:
                     return self._result(line, reduction, lines, checked)
@@ -309,7 +331,7 @@ class _Search:
 
     def _result(self, line: Evidence, reduction: Evidence, lines: list[Evidence], checked: float) -> SmallestModel:
         """The answer."""
-        choice, bounds = line.choice, (reduction.bound, line.bound)
+        choice, bounds = line.choice, (reduction.bound + self._gap(), line.bound)
         verdict = (
             f"{_words(choice)}, rtol = {choice.rtol:.0e}; error {sum(bounds):.2e} = {bounds[0]:.2e} reduction + "
             f"{bounds[1]:.2e} integration; {checked:.2e} off twice the modes at rtol/100"
