@@ -9,7 +9,7 @@ import numpy as np
 from scipy import sparse
 
 import reduction
-from fembeam.assembly import MOST_MODES, Matrices
+from fembeam.assembly import Matrices
 from fembeam.model import Model, Shapes
 from fembeam.section import require
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 DEFAULT_MODES = 2
 FIRST_TRY = 8  # modes, doubled until a frequency or share of mass is reached
+MOST_TRIED = 128  # modes; a few seconds
 
 
 def reduced(
@@ -89,8 +90,8 @@ def _check_static(scene: Scene, residual: bool, interface: bool) -> None:
 def _enough(scene: Scene, elements: int | None, omega_max: float | None, mass_share: float | None) -> int:
     """How many modes reach omega_max, or carry mass_share; meshes grow with the modes tried."""
     tried = FIRST_TRY // 2
-    while tried < MOST_MODES:
-        tried = min(2 * tried, MOST_MODES)
+    while tried < MOST_TRIED:
+        tried = min(2 * tried, MOST_TRIED)
         matrices = scene.matrices(elements, None if elements else tried)
         tried = min(tried, matrices.M.shape[0])
         basis = reduction.modal_basis(matrices.M, matrices.K, tried, root=matrices.root)
@@ -107,4 +108,4 @@ def _enough(scene: Scene, elements: int | None, omega_max: float | None, mass_sh
                     "Scene.reduce", "raise it")  # fmt: skip
             return count
     goal = f"omega_max = {omega_max:g}" if omega_max is not None else f"mass_share = {mass_share}"
-    raise ValueError(f"{goal} must be reached by {MOST_MODES} modes in Scene.reduce, got less; lower it")
+    raise ValueError(f"{goal} must be reached by {MOST_TRIED} modes in Scene.reduce, got less; lower it, or give modes")

@@ -262,7 +262,8 @@ class Scene:
         Raises
         ------
         ValueError : no modes, repeated or negative numbers, more than the mesh has; more than 300 of a mesh above 2000
-            dofs; two ways of choosing at once; static shapes without a stop or force.
+            dofs, or more than 128 for omega_max or mass_share; two ways of choosing at once; static shapes
+            without a stop or force.
         reduction.AccuracyError : stiffnesses too far apart, or a mesh too fine, for double precision.
         """
         from fembeam.reducing import reduced
