@@ -88,7 +88,8 @@ def test_every_quantity_has_a_value_and_a_name():
     run = SCENE.reduce(2).simulate(4.0, dt=1e-3)
     for name in QUANTITIES:
         value = np.asarray(named(name)(run))
-        assert np.all(np.isfinite(value)) and np.any(value != 0), name
+        assert np.all(np.isfinite(value)), name
+        assert np.any(value != 0), name
         assert label(named(name)) == name
     spectrum = fb.psd(run.indentation(), 1e-3, 1024)
     level = Psd((100.0, 300.0), 1)(run)[0] * 200.0
@@ -116,12 +117,14 @@ def test_linear_beam_converges_at_the_rate_of_its_modes():
 def test_paper_scene_needs_more_than_two_modes_for_its_peak():
     study = mode_count(SCENE, [1, 2, 3, 10, 20], "peak_force")
     errors = [study.row(n).error for n in (1, 2, 3, 10)]
-    assert errors[0] > 0.5 and errors[1] > 0.5  # one mode lacks the second's motion, two make too much of it
+    assert errors[0] > 0.5
+    assert errors[1] > 0.5
     assert 0.05 < errors[2] < 0.4
     assert errors[3] < 0.01
     assert all(row.measured.share == pytest.approx(1.0, abs=1e-9) for row in study.rows if row.residual)
     table = str(study)
-    assert "reference" in table and "static share" in table
+    assert "reference" in table
+    assert "static share" in table
     assert len(study.figure().axes) == 2
 
 
@@ -131,9 +134,10 @@ def test_fast_strike_on_a_stiff_stop():
     assert study.row(2, residual=True).error > 0.1
     assert study.row(12, residual=True).error < 0.01
     assert study.row(24, residual=True).reference
-    full = mode_count(STIFF, [12], "peak_force", duration=0.05, start=swing, reference="full")
-    assert full.row(None).reference and full.row(None).measured.coordinates > 300
-    assert full.row(12, residual=True).error < 0.01
+    full = mode_count(STIFF, [4], "peak_force", duration=0.05, start=swing, reference="full")
+    assert full.row(None).reference
+    assert full.row(None).measured.coordinates > 80
+    assert 0.05 < full.row(4, residual=True).error < 0.2
 
 
 def test_random_response_is_paired_and_knows_its_noise():
@@ -177,7 +181,7 @@ def growing(run):
         ((SCENE, [1.5], "amplitude"), "counts must be whole numbers above 0, got 1.5"),
         ((SCENE, [301], "amplitude"), "modes must be at most 300"),
         ((SCENE, [1], "amplitud"), "quantity must be one of amplitude, peak_force"),
-        ((SCENE, [1, 2], growing, 0.01, 1e-3), r"quantity must return one shape, \(2,\) for the reference, got"),
+        ((SCENE, [1, 2], growing, 0.01, 1e-3), r"quantity must return one shape, \(3,\) for the reference, got"),
         ((SCENE, [1], lambda run: [], 0.01, 1e-3), "quantity must return a number or an array"),
         ((SCENE, [1], "amplitude", 1.0), "amplitude needs samples"),
         ((SCENE, [1], "peak_force", -1.0), "duration must be finite and positive"),
@@ -211,8 +215,8 @@ TWO_STOPS = fb.Scene(
     forces=[fb.PointForce(0.13, fb.Harmonic(20.0, 300.0))],
 )
 CASES = {
-    "amplitude, periodic": (SCENE, Amplitude(z=0.13), 0.05, {}),
-    "contact time, periodic": (replace(SCENE, base=fb.Harmonic(1e-3, 120.0)), "contact_time", 0.1, {}),
+    "amplitude, periodic": (SCENE, Amplitude(z=0.13), 0.05, {"residual": False}),
+    "contact time, periodic": (replace(SCENE, base=fb.Harmonic(1e-3, 120.0)), "contact_time", 0.1, {"residual": True}),
     "amplitude, no stops": (FREE, Amplitude(z=0.2), 0.001, {}),
     "energy, two stops": (TWO_STOPS, "energy", 0.05, {"duration": 0.1, "dt": 1e-4}),
     "peak force, struck": (STIFF, "peak_force", 0.1, {"duration": 0.05, "start": swing}),
@@ -223,7 +227,8 @@ CASES = {
 def test_smallest_model_is_right_afterwards(name):
     scene, quantity, tolerance, how = CASES[name]
     found = smallest_model(scene, quantity, tolerance, **how)
-    assert found.met and found.reduction_error + found.integration_error <= tolerance
+    assert found.met
+    assert found.reduction_error + found.integration_error <= tolerance
     finer = scene.reduce(2 * found.modes, residual=found.residual)
     plan = measure.Plan(how.get("duration"), how.get("dt"), start=how.get("start"))
     value, reference = (
@@ -232,14 +237,17 @@ def test_smallest_model_is_right_afterwards(name):
     )
     assert abs(value / reference - 1) <= tolerance
     assert value == pytest.approx(float(found.value), rel=tolerance / 10)
-    assert "reduction" in str(found) and "integration" in str(found)
+    assert "reduction" in str(found)
+    assert "integration" in str(found)
 
 
 def test_smallest_model_says_when_modes_do_not_suffice():
     with pytest.raises(NotMetError, match=r"peak_force to 0\.01: NOT MET: modes converge too slowly.*up to 2") as error:
         smallest_model(STIFF, "peak_force", 0.01, duration=0.05, start=swing, most=2)
     evidence = error.value.evidence
-    assert evidence.model is None and not evidence.met and evidence.solver is None
+    assert evidence.model is None
+    assert not evidence.met
+    assert evidence.solver is None
     two = next(line for line in evidence.reduction if line.choice[:2] == (2, False))
     assert two.error > 0.1
     assert len(evidence.figure().axes) == 1
@@ -247,7 +255,7 @@ def test_smallest_model_says_when_modes_do_not_suffice():
 
 def test_smallest_model_says_when_scatter_hides_it():
     noise = replace(SCENE, base=fb.BandNoise(std=2.5e-4, band=(0.0, 1226.6)))
-    with pytest.raises(NotMetError, match="scatter hides it.*more seeds"):
+    with pytest.raises(NotMetError, match=r"scatter hides it.*more seeds"):
         smallest_model(noise, "mean_force", 1e-3, duration=3.0, seeds=range(3), most=1, residual=False)
 
 
@@ -303,7 +311,8 @@ def test_studies_of_a_file(tmp_path, capsys):
     path.write_text(FILE.replace("0.01\nmost = 2", "1e-9\nmost = 1"))
     assert main(["run", str(path), "--out", str(tmp_path / "out"), "--quiet"]) == 1
     said = capsys.readouterr()
-    assert "NOT MET" in said.err and "NOT MET" in said.out
+    assert "NOT MET" in said.err
+    assert "NOT MET" in said.out
 
 
 @pytest.mark.parametrize(
