@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -60,6 +60,7 @@ class Model:
     effective_mass : Γ² (n,) in kg; over all modes it sums to the moving mass.
     modes : (n,) numbers of the kept modes, 0 the lowest; static shapes come last and are numbered on.
     static : how many of the last ones are residual static shapes.
+    way : arguments of `Scene.reduce` that make it again, with mode numbers instead of criteria.
     static_share : part of the static compliance that the model keeps at every stop, then at every force; 1 is all.
     shapes : φ(z); call ``model.phi(z)``.
     """
@@ -70,6 +71,7 @@ class Model:
     modes: tuple[int, ...]
     shapes: Shapes
     static: int = 0
+    way: dict[str, Any] = field(default_factory=dict)
 
     @property
     def omega(self) -> Vector:
@@ -90,6 +92,10 @@ class Model:
     def effective_mass(self) -> Vector:
         """Γ² (n,) in kg."""
         return self.participation**2
+
+    def again(self, scene: Scene) -> Model:
+        """Another scene reduced in the same way: the same mode numbers, mesh size and kind of static shapes."""
+        return scene.reduce(**self.way)
 
     @cached_property
     def moving_mass(self) -> float:

@@ -43,15 +43,19 @@ def reduced(
     if interface:
         full = matrices.M, matrices.K, directions, len(chosen), matrices.root
         basis = reduction.craig_bampton(*full)
-        return _model(scene, matrices, basis, tuple(range(basis.count)), 0)
+        way: dict[str, Any] = {"modes": len(chosen), "elements": elements, "interface": True}
+        return _model(scene, matrices, basis, tuple(range(basis.count)), 0, way)
     basis = reduction.modal_basis(matrices.M, matrices.K, indices=chosen, root=matrices.root)
     if residual:
         basis = reduction.with_residual(basis, matrices.M, matrices.K, directions, matrices.root)
-    static = basis.count - len(chosen)
-    return _model(scene, matrices, basis, (*chosen, *range(chosen[-1] + 1, chosen[-1] + 1 + static)), static)
+    static, above = basis.count - len(chosen), chosen[-1] + 1
+    way = {"modes": chosen, "elements": elements, "residual": residual}
+    return _model(scene, matrices, basis, (*chosen, *range(above, above + static)), static, way)
 
 
-def _model(scene: Scene, matrices: Matrices, basis: reduction.Basis, numbers: tuple[int, ...], static: int) -> Model:
+def _model(
+    scene: Scene, matrices: Matrices, basis: reduction.Basis, numbers: tuple[int, ...], static: int, way: dict[str, Any]
+) -> Model:
     """The model of a basis, with the library's signs."""
     if scene.stops:
         direction: sparse.csr_matrix = matrices.interpolation(scene.stops[0].z)
@@ -60,7 +64,7 @@ def _model(scene: Scene, matrices: Matrices, basis: reduction.Basis, numbers: tu
     basis = reduction.oriented(basis, direction)
     values = np.zeros((matrices.dofs.size, basis.count))
     values[matrices.dofs.ravel() >= 0] = basis.vectors
-    return Model(scene, matrices, basis, numbers, Shapes(matrices.nodes, values), static)
+    return Model(scene, matrices, basis, numbers, Shapes(matrices.nodes, values), static, way)
 
 
 def _numbers(scene: Scene, modes: Any, elements: int | None, interface: bool) -> tuple[int, ...]:

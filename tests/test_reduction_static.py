@@ -211,6 +211,15 @@ def test_models_with_static_shapes():
     assert run.complete
 
 
+@pytest.mark.parametrize(
+    "how", [{"modes": [0, 2], "residual": True}, {"modes": 2, "interface": True}, {"omega_max": 1e3}]
+)
+def test_made_again(how):
+    model = struck().reduce(**how)
+    np.testing.assert_array_equal(model.again(model.scene).omega, model.omega)
+    assert len(model.again(struck(masses=[])).omega) == len(model.omega)
+
+
 def test_pseudo_modes_are_damped_as_higher_modes():
     ratios = struck(damping=[0.03, 0.02, 0.01]).reduce(1, residual=True).zeta
     np.testing.assert_allclose(ratios, [0.03, 0.02])

@@ -189,7 +189,7 @@ def growing(run):
         ((SCENE, [1], "peak_force", 1.0, None, 0.0, [1, 2, 3]), "seeds need a random base"),
         ((SCENE, [1], "peak_force", 1.0, None, 0.0, [1]), "seeds must be at least 3"),
         ((SCENE, [1], "peak_force", None, None, 0.0, [1, 2, 3]), "seeds need a duration"),
-        ((STIFF, [1], "peak_force"), "needs harmonic motion of one frequency"),
+        ((STIFF, [1], "peak_force"), "study without duration needs a periodic response: an orbit"),
         ((STIFF, [1], "peak_force", 0.01), "reference value must be finite and not zero"),
         ((FREE, [1], "contact_time", 0.01), "reference value must be finite and not zero"),
     ],
@@ -323,7 +323,7 @@ def test_studies_of_a_file(tmp_path, capsys):
         ('quantity = "amplitude"', 'quantity = "amplitud"', "did you mean 'amplitude'"),
         ("most = 2", "mots = 2", "unknown key 'mots'; did you mean 'most'"),
         ("most = 2", "duration = 1.0", r"\[smallest_model\]: amplitude needs samples"),
-        ("omega = 100", "omega = 0", r"\[mode_count\]: a study without duration needs harmonic"),
+        ("omega = 100", "omega = 0", r"\[mode_count\]: a study without duration needs a periodic response"),
     ],
 )
 def test_mistakes_in_a_file(tmp_path, old, new, message):

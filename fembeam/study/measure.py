@@ -4,7 +4,7 @@ Three kinds of run give them:
 
 * transient: one run of a given duration, one value, no scatter;
 * random: one run per seed of the base noise, one value each;
-* periodic (no duration given): one long run under a harmonic base, settled, cut into groups of twelve drive periods:
+* periodic (no duration given): one long run under periodic loads, settled, cut into groups of twelve drive periods:
   an orbit of period 1, 2, 3, 4, 6 or 12 gives ten equal values, a chaotic response ten that scatter.
 """
 
@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import solvers
-from fembeam.excitation import Harmonic
+from fembeam.orbit import load_period
 from fembeam.section import require, require_non_negative, require_positive
 from fembeam.study.quantities import Quantity, label
 
@@ -64,7 +64,12 @@ class Plan:
     def check(self, scene: Scene, quantity: Quantity) -> None:
         """Raise ValueError when the scene cannot be run like this."""
         if self.duration is None:
-            drive_period(scene)
+            try:
+                load_period(scene)
+            except ValueError as error:
+                raise ValueError(
+                    f"a study without duration needs a periodic response: {error}; or give duration"
+                ) from None
             require(not self.seeds, "seeds need a duration", None, "study", "give duration in s")
         else:
             sampled = getattr(quantity, "sampled", True)
@@ -150,19 +155,9 @@ def runs(model: Model, plan: Plan, quantity: Quantity, solver: Any) -> list[Run]
     return [cut(run, plan.discard, plan.duration) for run in whole]
 
 
-def drive_period(scene: Scene) -> float:
-    """2π/ω of the one frequency that drives the scene; ValueError when it is not driven by one."""
-    signals = [signal for signal in (scene.base, *(force.signal for force in scene.forces)) if signal is not None]
-    omegas = {signal.omega if isinstance(signal, Harmonic) else 0.0 for signal in signals}
-    single = len(omegas) == 1 and min(omegas) > 0.0
-    require(single, "a study without duration needs harmonic motion of one frequency", signals, "study",
-            "give duration in s")  # fmt: skip
-    return float(2 * np.pi / omegas.pop())
-
-
 def periodic(model: Model, start: Any, solver: Any, sampled: bool) -> list[Run]:
-    """Groups of drive periods of the settled response to harmonic motion."""
-    period = drive_period(model.scene)
+    """Groups of drive periods of the settled response; a simulation rather than shooting, as it may be chaotic."""
+    period = load_period(model.scene)
     dt = period / SAMPLES if sampled else None
     run = model.simulate((SETTLING + GROUPS * GROUP) * period, dt, start, solver)
     borders = (SETTLING + GROUP * np.arange(GROUPS + 1)) * period

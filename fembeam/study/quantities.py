@@ -36,8 +36,9 @@ class Amplitude:
 
     def __call__(self, run: Run) -> float:
         """Value of a run."""
-        x, x_dot = signal(run, self.stop, self.z)
-        lowest, highest = _extremes(x, x_dot, float(run.t[1] - run.t[0]))
+        from fembeam.orbit import extremes_of
+
+        lowest, highest = extremes_of(run.t, *signal(run, self.stop, self.z))
         return (highest - lowest) / 2
 
 
@@ -216,17 +217,3 @@ def signal(run: Run, stop: int = 0, z: float | None = None) -> tuple[Vector, Vec
 def _mean(values: Vector) -> float:
     """Mean, NaN of nothing without a warning."""
     return float(values.mean()) if len(values) else float("nan")
-
-
-def _extremes(x: Vector, x_dot: Vector, dt: float) -> tuple[float, float]:
-    """Smallest and largest value of the cubics through values and rates."""
-    a, b, m, n = x[:-1], x[1:], dt * x_dot[:-1], dt * x_dot[1:]
-    turning = np.flatnonzero((m > 0) != (n > 0))
-    a, b, m, n = a[turning], b[turning], m[turning], n[turning]
-    # p(s) = a + m s + c s² + d s³; one turn inside, where m + 2 c s + 3 d s² = 0
-    c, d = 3 * (b - a) - 2 * m - n, 2 * (a - b) + m + n
-    root = np.sqrt(np.maximum(c**2 - 3 * m * d, 0.0))
-    divisor = c + np.where(m > 0, -root, root)  # the root where p' goes from m to n, in the form without cancellation
-    s = np.clip(np.divide(-m, divisor, out=np.zeros_like(m), where=divisor != 0), 0, 1)
-    turns = a + s * (m + s * (c + s * d))
-    return float(min(x.min(), turns.min(initial=np.inf))), float(max(x.max(), turns.max(initial=-np.inf)))
