@@ -29,6 +29,7 @@ ERROR_CONSTANT = 1 / 1440  # relative error of omega of a cubic Hermite mesh: (b
 WAVE_STEP = (0.65 * FREQUENCY_TOLERANCE / ERROR_CONSTANT) ** 0.25  # beta h = 0.175, a third below the promise
 DEFAULT_MODES = 10
 MOST_MODES = 300  # 5400 elements, about a minute; a slender beam has lost its meaning long before
+MOST_DENSE = 2000  # free dofs of which all modes may be asked for, about ten seconds
 MOST_ELEMENTS = 10_000  # above it rounding of K hides the lowest frequencies
 SAME_PLACE = 1e-9  # of the length: features closer than this share a node
 SHORTEST = 1e-4  # of the length: rounding of K grows like (length/h)³, 2e-4 of the first omega² here
@@ -112,7 +113,8 @@ def assemble(scene: Scene, elements: int | None, modes: int | None, probes: Sequ
         size = matrices.M.shape[0]
         require(modes <= size, f"modes must be at most {size} (free dofs)", modes, "Scene.matrices",
                 "ask for fewer modes or more elements")  # fmt: skip
-        _check_modes(modes)
+        require(modes <= MOST_MODES or size <= MOST_DENSE, f"modes must be at most {MOST_MODES} of {size} free dofs",
+                modes, "Scene.matrices", f"or use a mesh of at most {MOST_DENSE} dofs")  # fmt: skip
     return matrices
 
 

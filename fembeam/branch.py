@@ -38,14 +38,14 @@ class Family:
         """The model at a value of the parameter."""
         scene = with_value(self.model.scene, self.name, parameter)
         if changes_structure(self.name):
-            return scene.reduce(modes=list(self.model.modes))
+            return self.model.again(scene)
         return replace(self.model, scene=scene)
 
     def __call__(self, parameter: float) -> tuple[solvers.System, float]:
         """The system and its period, s."""
         scene = with_value(self.model.scene, self.name, parameter)
         if changes_structure(self.name):
-            return scene.reduce(modes=list(self.model.modes)).system, self.period * load_period(scene)
+            return self.model.again(scene).system, self.period * load_period(scene)
         return self.model.system_of(scene), self.period * load_period(scene)
 
 

@@ -17,6 +17,7 @@ from fembeam import __version__  # nothing slow up here: Ctrl-C before `main` wo
 if TYPE_CHECKING:
     import argparse
     from collections.abc import Sequence
+    from pathlib import Path
 
     from fembeam.model import Model
     from fembeam.run import Run
@@ -51,7 +52,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"fembeam {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
-    run = commands.add_parser("run", help="simulate; write run.npz, summary.json and figures")
+    run = commands.add_parser("run", help="run the file's studies; write tables, figures and, for [simulate], run.npz")
     run.add_argument("scene", metavar="SCENE.toml", type=Path)
     run.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder for the results")
     run.add_argument("--quiet", action="store_true", help="no progress, no log")
@@ -70,19 +71,52 @@ def _run(arguments: argparse.Namespace) -> int:
 
     begin = time.perf_counter()
     file = scene_file.read(arguments.scene)
-    if "simulate" not in file.studies:
-        raise ValueError(f"{file.path}: needs a table [simulate] with duration and dt")
+    if not file.studies:
+        raise ValueError(f"{file.path}: needs a study, such as a table [simulate] with duration and dt")
     folder = report.prepared(arguments.out)
+    code = _simulation(file, folder, begin, arguments.quiet) if "simulate" in file.studies else 0
+    for name, study in file.studies.items():
+        if name != "simulate" and not code:
+            code = _study(file, name, study, folder, arguments.quiet)
+    return code
+
+
+def _simulation(file: SceneFile, folder: Path, begin: float, quiet: bool) -> int:
+    """The study [simulate]."""
+    from fembeam import report
+
     model = _reduced(file, **file.reduce)
-    if not arguments.quiet:
+    if not quiet:
         _say(f"{len(model.omega)} modes: " + ", ".join(f"{w:.6g}" for w in model.omega) + " rad/s")
-    run, code = _simulated(model, file.studies["simulate"], not arguments.quiet)
+    run, code = _simulated(model, file.studies["simulate"], not quiet)
     written = report.write(run, folder, file.studies["simulate"].discard, time.perf_counter() - begin)
     if code:
         _say(f"{run.status}; wrote what was computed to {folder}")
-    elif not arguments.quiet:
+    elif not quiet:
         spent = f"{run.cost.seconds:.3g} s of {time.perf_counter() - begin:.3g} s"
         _say(f"{len(run.contacts)} contacts in {run.t[-1]:g} s, integrated in {spent}")
+        _say(f"wrote {', '.join(path.name for path in written)} to {folder}")
+    return code
+
+
+def _study(file: SceneFile, name: str, study: Any, folder: Path, quiet: bool) -> int:
+    """Any other study: its table on stdout and in a text file, its figure; what is not met is told and written too."""
+    import solvers
+    from fembeam import report
+    from fembeam.study import NotMetError
+
+    code = 0
+    try:
+        result = study.run(file.scene)
+    except NotMetError as error:
+        result, code = error.evidence, FAILED
+        _say(f"error: {_one_line(error)}")
+    except solvers.SolverError as error:
+        _say(f"error: [{name}]: {_one_line(error)}")
+        return FAILED
+    print(result)
+    written = report.write_study(result, folder, name)
+    if not quiet:
         _say(f"wrote {', '.join(path.name for path in written)} to {folder}")
     return code
 
@@ -114,20 +148,21 @@ def _modes(arguments: argparse.Namespace) -> int:
 
     file = scene_file.read(arguments.scene)
     wanted = dict(file.reduce)
-    if arguments.modes is not None or "modes" not in wanted:
-        wanted["modes"] = MODES_SHOWN if arguments.modes is None else arguments.modes
+    if arguments.modes is not None or not {"modes", "omega_max", "mass_share"} & set(wanted):
+        shown = MODES_SHOWN if arguments.modes is None else arguments.modes
+        wanted = {**wanted, "modes": shown, "omega_max": None, "mass_share": None}
     print(mode_table(_reduced(file, **wanted)))
     return 0
 
 
 def mode_table(model: Model) -> str:
     """Modes with frequency, damping, participation Γ, effective mass Γ² and its share of the moving mass."""
-    mass = moving_mass(model)
+    mass = model.moving_mass
     head = "mode", "rad/s", "Hz", "zeta", "participation", "effective mass", "% of moving mass"
     unit = "", "", "", "", "√kg", "kg", f"{mass:.6g} kg"
     rows = [
         (
-            f"{mode + 1}",
+            f"{mode + 1}" if number < len(model.omega) - model.static else "static",
             f"{w:.6f}",
             f"{w / (2 * math.pi):.6f}",
             f"{z:.4g}",
@@ -135,7 +170,9 @@ def mode_table(model: Model) -> str:
             f"{g**2:.6g}",
             f"{100 * g**2 / mass:.3f}",
         )
-        for mode, w, z, g in zip(model.modes, model.omega, model.zeta, model.participation, strict=True)
+        for number, (mode, w, z, g) in enumerate(
+            zip(model.modes, model.omega, model.zeta, model.participation, strict=True)
+        )
     ]
     share = 100 * float(model.effective_mass.sum()) / mass
     rows.append(("all", "", "", "", "", f"{model.effective_mass.sum():.6g}", f"{share:.3f}"))
@@ -144,14 +181,6 @@ def mode_table(model: Model) -> str:
         "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in (head, unit, *rows)
     ]
     return "\n".join(line.rstrip() for line in lines)
-
-
-def moving_mass(model: Model) -> float:
-    """Sum of the effective masses over all modes, b·M⁻¹ b in kg: what a base motion sets moving."""
-    from scipy.sparse.linalg import spsolve
-
-    b = model.matrices.base_load
-    return float(b @ spsolve(model.matrices.M.tocsc(), b).reshape(b.shape))
 
 
 def _say(message: str) -> None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 import reduction
 import solvers
 from fembeam.beam import hermite_rows
-from fembeam.section import require
+from fembeam.section import require, require_positive
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -54,10 +54,14 @@ class Model:
 
     Attributes
     ----------
-    omega, zeta : (n,) rad/s and damping ratios (the modes' own; dashpots couple modes and come on top).
+    omega, zeta : (n,) rad/s and damping ratios (the modes' own; dashpots couple modes and come on top). A static
+        shape is a pseudo-mode of high frequency, damped as the next higher mode would be (Rayleigh: by its ω).
     participation : Γ (n,) = Φᵀ M r in √kg: the load of a base motion y is -Γ ÿ.
     effective_mass : Γ² (n,) in kg; over all modes it sums to the moving mass.
-    modes : numbers of the kept modes, 0 the lowest.
+    modes : (n,) numbers of the kept modes, 0 the lowest; static shapes come last and are numbered on.
+    static : how many of the last ones are residual static shapes.
+    way : arguments of `Scene.reduce` that make it again, with mode numbers instead of criteria.
+    static_share : part of the static compliance that the model keeps at every stop, then at every force; 1 is all.
     shapes : φ(z); call ``model.phi(z)``.
     """
 
@@ -66,6 +70,8 @@ class Model:
     basis: reduction.Basis
     modes: tuple[int, ...]
     shapes: Shapes
+    static: int = 0
+    way: dict[str, Any] = field(default_factory=dict)
 
     @property
     def omega(self) -> Vector:
@@ -86,6 +92,42 @@ class Model:
     def effective_mass(self) -> Vector:
         """Γ² (n,) in kg."""
         return self.participation**2
+
+    def again(self, scene: Scene) -> Model:
+        """Another scene reduced in the same way: the same mode numbers, mesh size and kind of static shapes."""
+        return scene.reduce(**self.way)
+
+    @cached_property
+    def moving_mass(self) -> float:
+        """Sum of the effective masses over all modes, b·M⁻¹ b in kg: what a base motion sets moving."""
+        return reduction.moved_mass(self.matrices.M, self.matrices.base_load)
+
+    @cached_property
+    def static_share(self) -> Vector:
+        """Σ (bᵀφ_i)²/ω_i² / bᵀK⁻¹b at every stop, then every force (m,)."""
+        rows, full = self.matrices.interpolation(self.scene.loaded_places), self.matrices
+        return reduction.static_share(self.basis, full.M, full.K, rows.T, full.root) if rows.shape[0] else np.zeros(0)
+
+    def strike(self, speed: float, stop: int = 0) -> solvers.ContactLog:
+        """Contacts with one stop when the model swings into it in its first mode, nothing else acting.
+
+        Tells what to expect before a study: contact time ``t_out - t_in`` of the first contact and peak force, and so
+        how many periods of the highest mode a contact lasts.
+
+        Parameters
+        ----------
+        speed : m/s at the stop on arrival, > 0.
+        stop : its number.
+        """
+        require_positive("speed", speed, "Model.strike", "give the speed of arrival in m/s")
+        require(0 <= stop < len(self.scene.stops), f"stop must be below {len(self.scene.stops)}", stop, "Model.strike",
+                "count from 0")  # fmt: skip
+        contact = self.system.contacts[stop]
+        start = np.zeros((2, len(self.omega)))
+        start[:, 0] = np.array([-contact.gap, -speed]) / contact.direction[0]
+        system = solvers.System(self.system.M, self.system.C, self.system.K, [contact])
+        slowest = max(float(self.omega[0]), 1.0)
+        return solvers.integrate(system, *start, np.pi / slowest).contacts
 
     def phi(self, z: ArrayLike, derivative: int = 0) -> Vector:
         """Mass-normalised mode shapes in 1/√kg: (n,) at one z, (k, n) at z (k,)."""
@@ -268,22 +310,3 @@ class Model:
         from fembeam.branch import resumed
 
         return resumed(self, path)
-
-
-def reduced(scene: Scene, modes: int | Sequence[int], elements: int | None) -> Model:
-    """The model of a scene; `Scene.reduce` explains the arguments."""
-    listed = None if isinstance(modes, (int, np.integer)) else [int(i) for i in modes]
-    highest = int(modes) if listed is None else 1 + max(listed, default=-1)  # type: ignore[arg-type]
-    require(highest > 0, "modes must be a count above 0 or a list of mode numbers", modes, "Scene.reduce",
-            "ask for modes=2, or modes=[0, 2]")  # fmt: skip
-    matrices = scene.matrices(elements, highest)
-    basis = reduction.modal_basis(matrices.M, matrices.K, highest if listed is None else None, listed, matrices.root)
-    if scene.stops:
-        direction = matrices.interpolation(scene.stops[0].z)
-    else:
-        direction = matrices.interpolation(matrices.nodes)
-    basis = reduction.oriented(basis, direction)
-    values = np.zeros((matrices.dofs.size, basis.count))
-    values[matrices.dofs.ravel() >= 0] = basis.vectors
-    chosen = tuple(range(highest)) if listed is None else tuple(sorted(listed))
-    return Model(scene, matrices, basis, chosen, Shapes(matrices.nodes, values))

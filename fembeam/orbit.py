@@ -84,7 +84,7 @@ class Orbit:
 
     def extremes(self, z: float) -> tuple[float, float]:
         """Lowest and highest displacement (m, relative to the frame) at z over the period."""
-        lowest, highest = _extremes(self.run.t, self.run.displacement(z), self.run.velocity(z))
+        lowest, highest = extremes_of(self.run.t, self.run.displacement(z), self.run.velocity(z))
         return lowest, highest
 
     def __repr__(self) -> str:
@@ -92,7 +92,7 @@ class Orbit:
         return f"<{kind} orbit of period {self.period} with {impacts} contacts, |μ| = {abs(self.multipliers[0]):.4g}>"
 
 
-def _extremes(t: Vector, u: Vector, v: Vector) -> tuple[float, float]:
+def extremes_of(t: Vector, u: Vector, v: Vector) -> tuple[float, float]:
     """Extremes of the cubics through values u and slopes v."""
     h, rise = np.diff(t), np.diff(u)
     a, b, c = v[:-1] * h, 3.0 * rise - (2.0 * v[:-1] + v[1:]) * h, -2.0 * rise + (v[:-1] + v[1:]) * h

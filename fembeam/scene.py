@@ -11,7 +11,7 @@ import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
@@ -234,13 +234,26 @@ class Scene:
         """
         return assemble(self, elements, modes, probes)
 
-    def reduce(self, modes: int | Sequence[int] = 2, elements: int | None = None) -> Model:
-        """The scene in its lowest `modes` modes, or in a list of them such as [0, 2, 5].
+    def reduce(
+        self,
+        modes: int | Sequence[int] | Literal["all"] | None = None,
+        elements: int | None = None,
+        omega_max: float | None = None,
+        mass_share: float | None = None,
+        residual: bool = False,
+        interface: bool = False,
+    ) -> Model:
+        """The scene in few coordinates: its lowest modes, with or without static shapes of stops and forces.
 
         Parameters
         ----------
-        modes : a count, or mode numbers from 0.
+        modes : a count, mode numbers from 0 such as [0, 2, 5], or "all" of a mesh of given `elements`; None: 2.
         elements : of the mesh; None: as few as make every kept frequency right to 1e-6.
+        omega_max : instead of `modes`: all of them up to this frequency, rad/s.
+        mass_share : instead of `modes`: as many as carry this share of the mass that a base motion moves, in (0, 1).
+        residual : add the residual static shape of every stop and force; the model is then exact for slow loads there.
+        interface : Craig–Bampton: static shapes of the stops and forces and `modes` modes with those places held; with
+            modes=0 Guyan's condensation.
 
         Returns
         -------
@@ -248,12 +261,19 @@ class Scene:
 
         Raises
         ------
-        ValueError : no modes, repeated or negative numbers, more than the mesh has or than 300.
+        ValueError : no modes, repeated or negative numbers, more than the mesh has; more than 300 of a mesh above 2000
+            dofs, or more than 128 for omega_max or mass_share; two ways of choosing at once; static shapes
+            without a stop or force.
         reduction.AccuracyError : stiffnesses too far apart, or a mesh too fine, for double precision.
         """
-        from fembeam.model import reduced
+        from fembeam.reducing import reduced
 
-        return reduced(self, modes, elements)
+        return reduced(self, modes, elements, omega_max, mass_share, residual, interface)
+
+    @property
+    def loaded_places(self) -> list[float]:
+        """Coordinates of stops, then forces."""
+        return [stop.z for stop in self.stops] + [force.z for force in self.forces]
 
     @property
     def places(self) -> list[float]:

@@ -1,7 +1,7 @@
 """Scene files: TOML tables in, a Scene and its studies out.
 
     [beam] [[supports]] [[masses]] [[springs]] [[dashpots]] [[stops]] [[forces]] [damping] [base]
-    [reduce] [simulate]
+    [reduce] [simulate] [mode_count] [smallest_model]
 
 The keys of a table are the arguments of the constructor behind it, read from its signature, so that nothing is
 declared twice: a constructor that gains an argument gains a key. Units are SI, names those of the library.
@@ -27,6 +27,8 @@ from fembeam.record import Record
 from fembeam.scene import FEATURES, Scene
 from fembeam.schema import Constructors, converted, fits, listed, nearest, parameters, required, shown, wanted
 from fembeam.section import Section, require_non_negative, require_positive
+from fembeam.study.quantities import QUANTITIES
+from fembeam.study.tables import ModeCountTable, SmallestModelTable
 
 Table = Mapping[str, Any]
 
@@ -95,7 +97,7 @@ SIGNALS: Constructors = {
     "record": Record.from_csv,
 }
 SOLVERS = {"exponential": "Exponential", "dormand_prince": "DormandPrince", "henon_rk2": "HenonRK2"}
-STUDIES: Constructors = {"simulate": Simulate}
+STUDIES: Constructors = {"simulate": Simulate, "mode_count": ModeCountTable, "smallest_model": SmallestModelTable}
 
 
 def read(path: str | Path) -> SceneFile:
@@ -164,6 +166,9 @@ class _Reader:
         studies = {
             name: self.build(study, tables[name], f"[{name}]") for name, study in STUDIES.items() if name in tables
         }
+        for name, study in studies.items():
+            if hasattr(study, "check"):
+                self.made(study.check, {"scene": scene}, f"[{name}]")
         return SceneFile(self.path, scene, reduce, studies)
 
     def check_form(self, name: str, value: Any) -> None:
@@ -257,6 +262,8 @@ class _Reader:
             return self.choose(LAWS, value, inner)
         if key == "signal":
             return self.choose(SIGNALS, value, inner)
+        if key == parameter.name == "quantity":
+            return self.choose(QUANTITIES, value if isinstance(value, dict) else {"kind": value}, inner)
         if key == "solver":
             offered = {name: method for name, method in SOLVERS.items() if method in solvers.__all__}
             methods = {name: getattr(solvers, method) for name, method in offered.items()}  # here: slow to import

@@ -80,7 +80,7 @@ def modal_basis(
     >>> modal_basis(np.eye(2), np.diag([4.0, 9.0]), count=1).omega
     array([2.])
     """
-    M, K = _checked(M, "M"), _checked(K, "K")
+    M, K = checked_matrix(M, "M"), checked_matrix(K, "K")
     if M.shape != K.shape:
         raise ValueError(f"M and K must have the same shape, got {M.shape} and {K.shape} in modal_basis; match them")
     wanted = _wanted(M.shape[0], count, indices)
@@ -155,6 +155,18 @@ def _with_root(M: sparse.csc_matrix, K: sparse.csc_matrix, R: sparse.csr_matrix,
     return Basis(vectors, np.where(omega <= rigid, 0.0, omega))
 
 
+def ritz(M: Matrix, K: Matrix, root: Matrix | None, vectors: Vector) -> tuple[Vector, Vector]:
+    """Frequencies and mass-normalised shapes of the pencil reduced to the span of the vectors, lowest first."""
+    unit = vectors / np.sqrt(np.sum(vectors * (M @ vectors), axis=0))
+    if root is None:
+        values, rotation = linalg.eigh(unit.T @ (K @ unit), unit.T @ (M @ unit))
+        omega, vectors, rigid = np.sqrt(np.maximum(values, 0.0)), unit @ rotation, RIGID
+    else:
+        omega, vectors = _ritz(M, sparse.csr_matrix(root), unit)
+        rigid = RIGID_WITH_ROOT
+    return np.where(omega <= rigid * _scale(M, K), 0.0, omega), vectors
+
+
 def _ritz(M: sparse.csc_matrix, R: sparse.csr_matrix, vectors: Vector) -> tuple[Vector, Vector]:
     """Best frequencies and shapes in the span of the vectors: singular values of R Φ, lowest first."""
     factor = linalg.cholesky(vectors.T @ (M @ vectors), lower=True)
@@ -202,7 +214,7 @@ def _wanted(size: int, count: int | None, indices: Sequence[int] | None) -> NDAr
     return np.sort(wanted)
 
 
-def _checked(A: Matrix, name: str) -> sparse.csc_matrix:
+def checked_matrix(A: Matrix, name: str) -> sparse.csc_matrix:
     """A as sparse float matrix, checked: square, finite, symmetric."""
     matrix = sparse.csc_matrix(A, dtype=float)
     if matrix.shape[0] != matrix.shape[1] or matrix.shape[0] == 0:

@@ -105,7 +105,7 @@ def test_bad_input_is_one_line_and_exit_code_two(tmp_path, capsys):
     assert "[reduce]: modes must be a count above 0" in refused(capsys, "modes", EXAMPLE, "--modes", "0")
     no_study = tmp_path / "no_study.toml"
     no_study.write_text(path.read_text().split("[reduce]")[0])
-    assert "needs a table [simulate]" in refused(capsys, "run", no_study, *out)
+    assert "needs a study, such as a table [simulate]" in refused(capsys, "run", no_study, *out)
     path = scene(tmp_path, ("std = 2.5e-4", "std = 1e300"))
     assert "out of range" in refused(capsys, "run", path, *out, "--quiet")
     (tmp_path / "file").write_text("")

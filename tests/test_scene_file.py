@@ -136,7 +136,11 @@ def test_solvers_by_name(tmp_path):
         ("E = 1.9e11", "E = -1.9e11", r"\[beam\] section: E must be finite and positive"),
         ("[0.0, 1226.6]", "[1226.6, 0.0]", r"\[base\]: BandNoise band must run from lo to hi"),
         ("[0.0, 1226.6]", "[1226.6]", r"\[base\]: band must be a list of 2 numbers"),
-        ("modes = 2", "modes = true", r"\[reduce\]: modes must be a whole number or a list of whole numbers, got true"),
+        (
+            "modes = 2",
+            "modes = true",
+            r"\[reduce\]: modes must be a whole number or a list of whole numbers or 'all', got true",
+        ),
         ("modes = 2", "mode = 2", r"\[reduce\]: unknown key 'mode'; did you mean 'modes'"),
         ("dt = 1e-3", "dt = 0", r"\[simulate\]: dt must be finite and positive"),
         ("discard = 5", "discard = 700", r"\[simulate\]: discard must be below the duration of 600 s"),

@@ -1,4 +1,7 @@
-"""Figures: one function per question, each returns a matplotlib figure. `response` holds those of one run."""
+"""Figures: one function per question, each returns a matplotlib figure.
+
+`response` holds those of one run, `study` those of studies.
+"""
 
 from fembeam.plot.orbits import branch, orbit, peak
 from fembeam.plot.response import (
@@ -14,11 +17,13 @@ from fembeam.plot.response import (
     styled,
     time_history,
 )
+from fembeam.plot.study import mode_count, smallest_model
 
 __all__ = [
     "branch",
     "contacts",
     "densities",
+    "mode_count",
     "mode_shapes",
     "orbit",
     "peak",
@@ -26,6 +31,7 @@ __all__ = [
     "places",
     "responses",
     "segment_for",
+    "smallest_model",
     "spectra_of",
     "spectrum",
     "styled",

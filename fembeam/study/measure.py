@@ -1,0 +1,202 @@
+"""One model measured: independent values of a quantity, and what they cost.
+
+Three kinds of run give them:
+
+* transient: one run of a given duration, one value, no scatter;
+* random: one run per seed of the base noise, one value each;
+* periodic (no duration given): one long run under periodic loads, settled, cut into groups of twelve drive periods:
+  an orbit of period 1, 2, 3, 4, 6 or 12 gives ten equal values, a chaotic response ten that scatter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+from itertools import pairwise
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import solvers
+from fembeam.orbit import load_period
+from fembeam.section import require, require_non_negative, require_positive
+from fembeam.study.quantities import Quantity, label
+
+if TYPE_CHECKING:
+    from fembeam.model import Model
+    from fembeam.run import Run
+    from fembeam.scene import Scene
+
+Vector = NDArray[np.float64]
+Start = Callable[["Model"], Any]
+
+SETTLING, GROUPS, GROUP = 240, 10, 12  # drive periods before, number of groups, periods in each
+SAMPLES = 128  # per drive period
+FEWEST_SEEDS = 3
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How every model of a study is run; `fb.study.mode_count` explains the fields."""
+
+    duration: float | None = None
+    dt: float | None = None
+    discard: float = 0.0
+    seeds: tuple[int, ...] = ()
+    start: Start | None = None
+    solver: Any = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "seeds", tuple(self.seeds))
+        if self.duration is not None:
+            require_positive("duration", self.duration, "study", "give s, or None for a periodic response")
+            require_non_negative("discard", self.discard, "study", "give s")
+            require(self.discard < self.duration, f"discard must be below the duration of {self.duration:g} s",
+                    self.discard, "study", "run longer")  # fmt: skip
+        if self.dt is not None:
+            require_positive("dt", self.dt, "study", "give the output sampling in s")
+        few = 0 < len(self.seeds) < FEWEST_SEEDS
+        require(not few, f"seeds must be at least {FEWEST_SEEDS}, for an uncertainty", len(self.seeds), "study",
+                "e.g. range(8)")  # fmt: skip
+
+    def check(self, scene: Scene, quantity: Quantity) -> None:
+        """Raise ValueError when the scene cannot be run like this."""
+        if self.duration is None:
+            try:
+                load_period(scene)
+            except ValueError as error:
+                raise ValueError(
+                    f"a study without duration needs a periodic response: {error}; or give duration"
+                ) from None
+            require(not self.seeds, "seeds need a duration", None, "study", "give duration in s")
+        else:
+            sampled = getattr(quantity, "sampled", True)
+            require(self.dt is not None or not sampled, f"{label(quantity)} needs samples", None, "study", "give dt")
+        if self.seeds:
+            require(hasattr(scene.base, "seed"), "seeds need a random base motion", scene.base, "study",
+                    "use BandNoise as base, or leave out seeds")  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """Values (k, …) of the quantity and what is worth knowing about the model that gave them.
+
+    `seconds`: integration, all values together; `preparation`: mesh and modes; `share`: least static share of a stop
+    or force; `periods`: of the highest frequency in the median contact.
+    """
+
+    values: Vector
+    coordinates: int
+    seconds: float
+    preparation: float
+    share: float
+    periods: float
+
+    @property
+    def mean(self) -> Vector:
+        """Over the independent values."""
+        return np.asarray(self.values.mean(axis=0))
+
+
+@dataclass(frozen=True)
+class Case:
+    """One model to be measured: arguments of `Scene.reduce`, plan, quantity, tolerances of `Exponential`.
+
+    Without tolerances the plan's solver is used, once.
+    """
+
+    scene: Scene
+    reduce: tuple[tuple[str, Any], ...]
+    plan: Plan
+    quantity: Quantity
+    rtols: tuple[float, ...] = ()
+
+    def __repr__(self) -> str:
+        return ", ".join(f"{name}={value}" for name, value in self.reduce)
+
+    @property
+    def solvers(self) -> list[Any]:
+        """One per tolerance."""
+        chosen = solvers.Exponential(ledger=False) if self.plan.solver is None else self.plan.solver
+        return [solvers.Exponential(rtol, ledger=False) for rtol in self.rtols] or [chosen]
+
+
+def measure(case: Case) -> list[Measured]:
+    """Reduce once, run and evaluate with every solver; a module-level function, so that processes can be handed it."""
+    begin = perf_counter()
+    model = case.scene.reduce(**dict(case.reduce))
+    model.simulate(1e-3 / max(float(model.omega[0]), 1.0), solver=case.solvers[0])  # load compiled code, make tables
+    preparation = perf_counter() - begin
+    return [_measured(case, model, solver, preparation) for solver in case.solvers]
+
+
+def _measured(case: Case, model: Model, solver: Any, preparation: float) -> Measured:
+    """One model with one solver."""
+    parts = runs(model, case.plan, case.quantity, solver)
+    values = [_value(case.quantity, run, case) for run in parts]
+    shapes = {np.shape(value) for value in values}
+    require(len(shapes) == 1, "quantity must return one shape", sorted(shapes), repr(case), "return a fixed number")
+    times = np.concatenate([run.contacts.t_out - run.contacts.t_in for run in parts])
+    contact = float(np.median(times[np.isfinite(times)])) if np.any(np.isfinite(times)) else float("nan")
+    highest, share = float(model.omega.max()), float(model.static_share.min(initial=1.0))
+    seconds = sum(run.cost.seconds for run in parts)
+    return Measured(np.array(values), len(model.omega), seconds, preparation, share, highest * contact / (2 * np.pi))
+
+
+def runs(model: Model, plan: Plan, quantity: Quantity, solver: Any) -> list[Run]:
+    """The runs, or parts of a run, that give independent values; times count from the beginning of each."""
+    start = None if plan.start is None else plan.start(model)
+    if plan.duration is None:
+        return periodic(model, start, solver, getattr(quantity, "sampled", True))
+    models = [_seeded(model, seed) for seed in plan.seeds] if plan.seeds else [model]
+    whole = [each.simulate(plan.duration, plan.dt, start, solver) for each in models]
+    return [cut(run, plan.discard, plan.duration) for run in whole]
+
+
+def periodic(model: Model, start: Any, solver: Any, sampled: bool) -> list[Run]:
+    """Groups of drive periods of the settled response; a simulation rather than shooting, as it may be chaotic."""
+    period = load_period(model.scene)
+    dt = period / SAMPLES if sampled else None
+    run = model.simulate((SETTLING + GROUPS * GROUP) * period, dt, start, solver)
+    borders = (SETTLING + GROUP * np.arange(GROUPS + 1)) * period
+    parts = [cut(run, begin, end) for begin, end in pairwise(borders)]
+    share = replace(run.cost, seconds=run.cost.seconds / GROUPS)
+    return [replace(part, cost=share) for part in parts]
+
+
+def cut(run: Run, begin: float, end: float) -> Run:
+    """The part of a run from begin to end (s), with times counted from begin; the last state only if it has no samples.
+
+    A contact belongs to the part in which it began.
+    """
+    log, half = run.contacts, 1e-9 * max(float(run.t[-1]), end)
+    mine = (log.t_in >= begin) & (log.t_in < end)
+    columns = {name: column[mine] for name, column in log.arrays().items()}
+    columns["t_in"], columns["t_out"] = columns["t_in"] - begin, columns["t_out"] - begin
+    if len(run.t) == 1:
+        kept, t = slice(0, 1), np.array([end - begin])
+    else:
+        kept = slice(int(np.searchsorted(run.t, begin - half)), int(np.searchsorted(run.t, end + half)))
+        t = run.t[kept] - begin
+    energy = {
+        f.name: getattr(run.energy, f.name)[kept] for f in fields(run.energy) if np.ndim(getattr(run.energy, f.name))
+    }
+    return replace(
+        run, t=t, q=run.q[kept], q_dot=run.q_dot[kept],
+        contacts=solvers.ContactLog(**columns), energy=replace(run.energy, **energy),
+    )  # fmt: skip
+
+
+def _seeded(model: Model, seed: int) -> Model:
+    """The model under another realisation."""
+    return replace(model, scene=replace(model.scene, base=replace(model.scene.base, seed=seed)))
+
+
+def _value(quantity: Quantity, run: Run, case: Case) -> Any:
+    """The quantity of one run, checked."""
+    require(run.complete, "every run of a study must reach its end", run.status, repr(case), "run again")
+    value = np.asarray(quantity(run), dtype=float)
+    require(value.size > 0, "quantity must return a number or an array", value, repr(case), "check the function")
+    return value

@@ -1,0 +1,259 @@
+"""How many modes a quantity needs: the convergence study.
+
+    error(n) = ‖mean(x_n - x_ref)‖ / ‖mean x_ref‖,        observed rate p: error ~ n^-p
+
+Random responses of all counts are driven by the same seeds, so that differences are paired: what the realisations
+have in common cancels. The uncertainty of an error is the 95 % half-width of the mean difference (Student's t); an
+error below it is noise and is marked so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fembeam.section import require
+from fembeam.study.executors import spread
+from fembeam.study.measure import Case, Measured, Plan, Start, measure
+from fembeam.study.quantities import Quantity, label, named
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from fembeam.scene import Scene
+
+Vector = NDArray[np.float64]
+HEAD = "modes", "static", "coordinates", "value", "error", "± (95 %)", "static share", "periods", "seconds", ""
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """One model of the study.
+
+    Attributes
+    ----------
+    modes, residual : what was asked for; modes is None for all modes of the mesh.
+    value : mean of the quantity, ‖·‖/√size of an array.
+    error, uncertainty : relative to the reference; NaN where the quantity is not defined (no contact, say).
+    reference : whether this is the reference itself.
+    measured : values, coordinates, seconds, static share, periods of the highest frequency in a contact.
+    """
+
+    modes: int | None
+    residual: bool
+    value: float
+    error: float
+    uncertainty: float
+    reference: bool
+    measured: Measured
+
+    @property
+    def resolved(self) -> bool:
+        """Whether the error stands out of its uncertainty."""
+        return not self.reference and self.error > self.uncertainty
+
+    @property
+    def bound(self) -> float:
+        """Error + uncertainty: not exceeded, with 97.5 %."""
+        return self.error + self.uncertainty
+
+    def cells(self) -> tuple[str, ...]:
+        """The row of the printed table."""
+        m = self.measured
+        remark = "reference" if self.reference else "" if self.resolved or not self.uncertainty else "within noise"
+        if not np.isfinite(self.error):
+            remark = "not defined"
+        return (
+            "all" if self.modes is None else str(self.modes), "yes" if self.residual else "no", str(m.coordinates),
+            f"{self.value:.6g}", "" if self.reference else f"{self.error:.2e}",
+            f"{self.uncertainty:.1e}" if self.uncertainty else "", f"{m.share:.6f}", f"{m.periods:.3g}",
+            f"{m.seconds:.3g}", remark,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class ModeCount:
+    """A convergence study; print it for the table.
+
+    Attributes
+    ----------
+    quantity : its name.
+    rows : one per count and kind, modes alone first; the reference is among them.
+    rate, rate_residual : observed p in error ~ n^-p, without and with static shapes; NaN when fewer than two errors
+        are resolved.
+    closest : error of the row next finest to the reference: the reference itself is hardly better than this.
+    """
+
+    quantity: str
+    rows: tuple[Row, ...]
+
+    @property
+    def rate(self) -> float:
+        """Observed rate of modes alone."""
+        return observed_rate([row for row in self.rows if not row.residual])
+
+    @property
+    def rate_residual(self) -> float:
+        """Observed rate with residual shapes."""
+        return observed_rate([row for row in self.rows if row.residual])
+
+    @property
+    def closest(self) -> float:
+        """Error of the finest row that is not the reference."""
+        others = [row for row in self.rows if not row.reference]
+        return max(others, key=lambda row: row.measured.coordinates).error if others else float("nan")
+
+    def row(self, modes: int | None, residual: bool = False) -> Row:
+        """One row; ValueError when it is not in the study."""
+        for row in self.rows:
+            if (row.modes, row.residual) == (modes, residual):
+                return row
+        raise ValueError(f"no row with {modes} modes, residual={residual}, in this study; rows are {self._names}")
+
+    def __str__(self) -> str:
+        rates = f"observed rate: {self.rate:.2f} modes alone, {self.rate_residual:.2f} with static shapes"
+        return "\n".join((self.quantity, table(HEAD, [row.cells() for row in self.rows]), rates))
+
+    def figure(self) -> Figure:
+        """Error and time against the number of coordinates."""
+        from fembeam import plot
+
+        return plot.mode_count(self)
+
+    @property
+    def _names(self) -> list[tuple[int | None, bool]]:
+        return [(row.modes, row.residual) for row in self.rows]
+
+
+def mode_count(
+    scene: Scene,
+    counts: Iterable[int],
+    quantity: str | Quantity,
+    duration: float | None = None,
+    dt: float | None = None,
+    discard: float = 0.0,
+    seeds: Sequence[int] = (),
+    residual: bool | None = None,
+    reference: int | Literal["full"] | None = None,
+    start: Start | None = None,
+    solver: Any = None,
+    executor: Executor | None = None,
+) -> ModeCount:
+    """How a quantity converges with the number of modes.
+
+    Parameters
+    ----------
+    scene : Scene.
+    counts : numbers of modes, each ≥ 1.
+    quantity : a name of `fembeam.study.quantities`, or a function of a run that gives a number or an array.
+    duration : s; None: the settled response to harmonic motion (360 drive periods, the last 120 in ten groups).
+    dt : output sampling in s; None keeps contact log and end only, enough for forces, contact times, impact rates.
+    discard : s at the beginning that the quantity does not see; the times it sees count from there.
+    seeds : of a random base motion, three or more; the same for all counts.
+    residual : with static shapes of stops and forces (True), without (False), both (None, if there are any).
+    reference : a count, or "full" for all modes of the finest count's mesh; None: the finest of the counts.
+    start : function of a model that gives its initial state, such as ``lambda m: m.state(velocity=…)``; None: rest.
+    solver : one of `solvers`; None: `Exponential(1e-8)` without energy ledger.
+    executor : any `concurrent.futures.Executor`; counts are spread over it.
+
+    Returns
+    -------
+    ModeCount : table, rates, figure.
+
+    Raises
+    ------
+    ValueError : no counts, counts below 1 or beyond the dofs, a quantity that changes its shape or is zero, NaN or
+        infinite for the reference, runs that cannot be made like this. SolverError when a run fails.
+
+    Notes
+    -----
+    Frequencies of every model are right to 1e-6 by its own mesh; smaller errors than that are not resolved. Long
+    chaotic transients do not converge as trajectories: use averages over seeds. Several attractors may coexist under
+    harmonic motion; two counts may settle on different ones.
+
+    Examples
+    --------
+    >>> from fembeam.study.quantities import PROBABILITIES
+    >>> from fembeam import Beam, Clamped, Harmonic, ModalDamping, Scene, Section
+    >>> steel = Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)
+    >>> scene = Scene(Beam(0.26, steel), [Clamped(0.0)], damping=ModalDamping(0.05), base=Harmonic(1e-3, 100.0))
+    >>> study = mode_count(scene, [1, 2, 4], "amplitude")
+    >>> study.row(2).error < study.row(1).error < 0.01
+    True
+    """
+    kept, chosen = named(quantity), checked_counts(counts)
+    plan = Plan(duration, dt, discard, tuple(seeds), start, solver)
+    plan.check(scene, kept)
+    kinds = (residual,) if residual is not None else (False, True) if scene.loaded_places else (False,)
+    arguments: list[dict[str, Any]] = [{"modes": n, "residual": kind} for kind in kinds for n in chosen]
+    if reference == "full":
+        elements = scene.matrices(modes=max(chosen)).elements
+        arguments.append({"modes": "all", "elements": elements})
+    elif reference is not None:
+        chosen = checked_counts([*chosen, reference])
+        arguments.append({"modes": reference, "residual": kinds[-1]})
+    arguments = [a for i, a in enumerate(arguments) if a not in arguments[:i]]
+    items = [Case(scene, tuple(a.items()), plan, kept) for a in arguments]
+    finest = arguments[-1] if reference is not None else {"modes": max(chosen), "residual": kinds[-1]}
+    measured = [each for (each,) in spread(measure, items, executor, f"modes for {label(kept)}")]
+    return ModeCount(label(kept), rows_of(arguments, measured, measured[arguments.index(finest)]))
+
+
+def rows_of(arguments: Sequence[dict[str, Any]], measured: Sequence[Measured], reference: Measured) -> tuple[Row, ...]:
+    """Rows with errors against the reference; all values must have its shape."""
+    scale = float(np.linalg.norm(reference.mean))
+    require(0 < scale < np.inf, "the reference value must be finite and not zero", reference.mean, "study",
+            "does anything happen in this run? is there contact?")  # fmt: skip
+    rows = []
+    for given, each in zip(arguments, measured, strict=True):
+        same = each.values.shape == reference.values.shape
+        require(same, f"quantity must return one shape, {reference.values.shape[1:]} for the reference",
+                each.values.shape[1:], f"study of {given}", "return a fixed number of values")  # fmt: skip
+        error, uncertainty = difference(each, reference)
+        modes = None if given["modes"] == "all" else given["modes"]
+        value = float(np.linalg.norm(each.mean) / np.sqrt(each.mean.size)) if each.mean.size > 1 else float(each.mean)
+        rows.append(Row(modes, bool(given.get("residual")), value, error, uncertainty, each is reference, each))
+    return tuple(rows)
+
+
+def difference(one: Measured, other: Measured) -> tuple[float, float]:
+    """Relative error of paired values against a reference, and its 95 % half-width; 0 of a single value."""
+    from scipy.stats import t
+
+    scale, apart = np.linalg.norm(other.mean), one.values - other.values
+    if len(apart) == 1:
+        return float(np.linalg.norm(apart) / scale), 0.0
+    scatter = np.std(apart, axis=0, ddof=1) * t.ppf(0.975, len(apart) - 1) / np.sqrt(len(apart))
+    return float(np.linalg.norm(apart.mean(axis=0)) / scale), float(np.linalg.norm(scatter) / scale)
+
+
+def observed_rate(rows: Sequence[Row]) -> float:
+    """Slope p of error ~ n^-p by least squares over the resolved errors of counts up to half the finest."""
+    finest = max((row.modes or 0 for row in rows), default=0)
+    used = [(row.modes, row.error) for row in rows if row.modes and row.resolved and 2 * row.modes <= finest]
+    if len(used) < 2:
+        return float("nan")
+    modes, errors = np.log(used).T
+    return -float(np.polyfit(modes, errors, 1)[0])
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Columns aligned to the right."""
+    widths = [max(len(row[i]) for row in (head, *rows)) for i in range(len(head))]
+    lines = ["  ".join(c.rjust(w) for c, w in zip(row, widths, strict=True)).rstrip() for row in (head, *rows)]
+    return "\n".join(lines)
+
+
+def checked_counts(counts: Iterable[int]) -> list[int]:
+    """Checked counts, ascending, each once."""
+    chosen = list(counts)
+    require(len(chosen) > 0, "counts must hold a number of modes", chosen, "study", "e.g. [1, 2, 3, 5, 10]")
+    for count in chosen:
+        whole = isinstance(count, (int, np.integer)) and not isinstance(count, bool)
+        require(whole and count > 0, "counts must be whole numbers above 0", count, "study", "e.g. [1, 2, 3]")
+    return sorted({int(count) for count in chosen})

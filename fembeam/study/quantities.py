@@ -1,0 +1,219 @@
+"""Named quantities of a run, shared by all studies: a number or an array of fixed shape each.
+
+A quantity is any function of a run. Those here say with `sampled` whether they need output samples; without, a run
+keeps its contact log only, which is the cheapest. The signal looked at is δ of a stop, or u at `z`, or u of the tip
+in a scene without stops.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fembeam.section import require
+
+if TYPE_CHECKING:
+    from fembeam.run import Run
+
+Vector = NDArray[np.float64]
+Quantity = Callable[["Run"], Any]
+
+PROBABILITIES = np.arange(1, 20) / 20
+
+
+@dataclass(frozen=True)
+class Amplitude:
+    """Half the range of δ (or u at `z`), m; extremes between samples by cubics."""
+
+    stop: int = 0
+    z: float | None = None
+    sampled: ClassVar[bool] = True
+
+    def __call__(self, run: Run) -> float:
+        """Value of a run."""
+        from fembeam.orbit import extremes_of
+
+        lowest, highest = extremes_of(run.t, *signal(run, self.stop, self.z))
+        return (highest - lowest) / 2
+
+
+@dataclass(frozen=True)
+class PeakForce:
+    """Largest contact force of one stop, N; 0 without contact."""
+
+    stop: int = 0
+    sampled: ClassVar[bool] = False
+
+    def __call__(self, run: Run) -> float:
+        """Value of a run."""
+        return float(run.contacts.peak_force[run.contacts.stop == self.stop].max(initial=0.0))
+
+
+@dataclass(frozen=True)
+class MeanForce:
+    """Mean of the peak forces of one stop's contacts, N; NaN without contact. Random response: far less scatter."""
+
+    stop: int = 0
+    sampled: ClassVar[bool] = False
+
+    def __call__(self, run: Run) -> float:
+        """Value of a run."""
+        return _mean(run.contacts.peak_force[run.contacts.stop == self.stop])
+
+
+@dataclass(frozen=True)
+class ContactTime:
+    """Mean duration of one stop's contacts that ended, s; NaN without contact."""
+
+    stop: int = 0
+    sampled: ClassVar[bool] = False
+
+    def __call__(self, run: Run) -> float:
+        """Value of a run."""
+        log = run.contacts
+        lasting = (log.t_out - log.t_in)[log.stop == self.stop]
+        return _mean(lasting[np.isfinite(lasting)])
+
+
+@dataclass(frozen=True)
+class ImpactRate:
+    """Contacts of one stop per second."""
+
+    stop: int = 0
+    sampled: ClassVar[bool] = False
+
+    def __call__(self, run: Run) -> float:
+        """Value of a run."""
+        return float(np.sum(run.contacts.stop == self.stop)) / float(run.t[-1])
+
+
+@dataclass(frozen=True)
+class Psd:
+    """Power spectral density of δ (or u at `z`), mean level in equal parts of a band, m² s/rad: (parts,).
+
+    `band` in rad/s; `parts` ≥ 1 of them; `dt` of the run must resolve the band.
+    """
+
+    band: tuple[float, float] = (1.0, 1200.0)
+    parts: int = 12
+    stop: int = 0
+    z: float | None = None
+    sampled: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        lo, hi = self.band
+        require(0 <= lo < hi, "band must be (lo, hi) in rad/s, 0 ≤ lo < hi", self.band, "Psd", "e.g. (1, 1200)")
+        require(self.parts >= 1, "parts must be at least 1", self.parts, "Psd", "e.g. 12")
+
+    def __call__(self, run: Run) -> Vector:
+        """Value of a run."""
+        from fembeam.statistics import psd
+
+        dt = float(run.t[1] - run.t[0])
+        fits = self.band[1] * dt < np.pi
+        require(fits, f"dt must be below {np.pi / self.band[1]:.3g} s for a band to {self.band[1]:g} rad/s", dt, "Psd",
+                "sample more often")  # fmt: skip
+        width = (self.band[1] - self.band[0]) / self.parts
+        segment = int(np.ceil(4 * 2 * np.pi / (width * dt)))  # four lines in each part
+        fewest = 8 * segment <= len(run.t)
+        require(fewest, f"the run must last {8 * segment * dt:.3g} s for parts of {width:g} rad/s", float(run.t[-1]),
+                "Psd", "run longer, or use fewer parts")  # fmt: skip
+        spectrum = psd(signal(run, self.stop, self.z)[0], dt, max(8, segment))
+        edges = np.linspace(*self.band, self.parts + 1)
+        return np.array([spectrum.variance_in(lo, hi) for lo, hi in pairwise(edges)]) / width
+
+
+@dataclass(frozen=True)
+class Density:
+    """The density of δ (or u at `z`) as its quantiles at 5, 10, … 95 %, m: (19,); needs no bins."""
+
+    stop: int = 0
+    z: float | None = None
+    sampled: ClassVar[bool] = True
+
+    def __call__(self, run: Run) -> Vector:
+        """Value of a run."""
+        return np.asarray(np.quantile(signal(run, self.stop, self.z)[0], PROBABILITIES))
+
+
+@dataclass(frozen=True)
+class MeanEnergy:
+    """Mean energy stored in the beam, ½ Σ (q̇² + ω² q²), J."""
+
+    sampled: ClassVar[bool] = True
+
+    def __call__(self, run: Run) -> float:
+        """Value of a run."""
+        assert run.model is not None
+        return float(np.mean(np.sum(run.q_dot**2 + (run.q * run.model.omega) ** 2, axis=1)) / 2)
+
+
+QUANTITIES: dict[str, Callable[..., Quantity]] = {
+    "amplitude": Amplitude,
+    "peak_force": PeakForce,
+    "mean_force": MeanForce,
+    "contact_time": ContactTime,
+    "impact_rate": ImpactRate,
+    "psd": Psd,
+    "density": Density,
+    "energy": MeanEnergy,
+}
+
+
+def named(quantity: str | Quantity) -> Quantity:
+    """The quantity of that name, or the function itself.
+
+    Raises
+    ------
+    ValueError : an unknown name; TypeError : neither a name nor a function.
+
+    Examples
+    --------
+    >>> named("peak_force")
+    PeakForce(stop=0)
+    """
+    if isinstance(quantity, str):
+        require(quantity in QUANTITIES, f"quantity must be one of {', '.join(QUANTITIES)}, or a function of a run",
+                quantity, "study", "choose one")  # fmt: skip
+        return QUANTITIES[quantity]()
+    if not callable(quantity) or isinstance(quantity, type):
+        raise TypeError(f"quantity must be a name or a function of a run, got {quantity!r}; e.g. 'peak_force'")
+    return quantity
+
+
+def label(quantity: Quantity) -> str:
+    """A name for tables and figures.
+
+    Examples
+    --------
+    >>> label(PeakForce(stop=1))
+    'peak_force(stop=1)'
+    """
+    names = {kind: name for name, kind in QUANTITIES.items()}
+    name = names.get(type(quantity))  # type: ignore[call-overload]
+    if name is None:
+        return getattr(quantity, "__name__", None) or repr(quantity)
+    own = [(f.name, getattr(quantity, f.name)) for f in fields(quantity)]  # type: ignore[arg-type]
+    plain = QUANTITIES[name]()
+    changed = ", ".join(f"{key}={value}" for key, value in own if value != getattr(plain, key))
+    return f"{name}({changed})" if changed else name
+
+
+def signal(run: Run, stop: int = 0, z: float | None = None) -> tuple[Vector, Vector]:
+    """δ and its rate at a stop, or u and u̇ at z, or at the tip of a scene without stops."""
+    require(len(run.t) > 1, "the run must have samples", len(run.t), "quantity", "give dt")
+    if z is None and len(run.stops):
+        place, push, _ = run.stops[stop]
+        return run.indentation(stop), -push * run.velocity(place)
+    place = float(run.shapes.nodes[-1]) if z is None else z
+    return run.displacement(place), run.velocity(place)
+
+
+def _mean(values: Vector) -> float:
+    """Mean, NaN of nothing without a warning."""
+    return float(values.mean()) if len(values) else float("nan")

@@ -1,0 +1,283 @@
+"""Bases that are right for slow loads at chosen places: residual shapes, Craig–Bampton, Guyan.
+
+A direction b (N,) is where a stop or a force acts; its static shape ψ solves K ψ = b, its static compliance is bᵀψ.
+Modes alone keep Σ (bᵀφ_i)²/ω_i² of it. What they miss has the shape
+
+    r = ψ - Σ φ_i (bᵀφ_i)/ω_i²,        Φᵀ M r = 0,   Φᵀ K r = 0,
+
+so that adding r restores the compliance and counts nothing twice. On rigid-body modes ψ is the elastic shape of b and
+the inertia forces that balance it (inertia relief).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy import linalg, sparse
+from scipy.sparse import linalg as sparse_linalg
+
+from reduction.basis import AccuracyError, Basis, Vector, oriented
+from reduction.modal import ORTHONORMALITY_TOLERANCE, Matrix, checked_matrix, modal_basis, ritz
+
+STATIC_TOLERANCE = 1e-10  # relative error of static compliance, given a root
+STATIC_WITHOUT_ROOT = 1e-7  # same; rounding of K alone, 4e-10 for 50 elements and growing like their fourth power
+COUPLING_TOLERANCE = 1e-9  # of φᵀ K r over the two frequencies
+NOTHING_LEFT = 1e-12  # share of the static compliance below which a residual shape is rounding
+DEPENDENT = 1e-9  # smallest pivot of directions, or singular value of residual shapes, that adds a shape
+BALANCED = 1e-6  # relative: strain energy and work of the loads agree, unless K is singular
+REFINEMENTS = 3  # of static solutions; on 5000 elements the third one changes nothing
+
+
+def with_residual(basis: Basis, M: Matrix, K: Matrix, directions: Matrix, root: Matrix | None = None) -> Basis:
+    """Modes with the residual static shape of every direction behind them.
+
+    Parameters
+    ----------
+    basis : n modes of (M, K), any choice of them, all rigid-body modes included.
+    M, K : (N, N) as for `modal_basis`.
+    directions : (N, m), dense or sparse, a column for each stop or force.
+    root : (k, N) with rootᵀ root = K, optional: full accuracy on fine meshes.
+
+    Returns
+    -------
+    Basis : the n modes as they were, then up to m pseudo-modes, by frequency. Directions that depend on others or
+        that the modes carry wholly (to 1e-12) add none.
+
+    Raises
+    ------
+    ValueError : directions that do not fit, or rigid-body modes left out of the basis.
+    AccuracyError : not orthonormal, coupled to the modes, or static compliance off by more than 1e-10 (1e-7 without
+        root).
+
+    Notes
+    -----
+    Exact for slow loads; a pseudo-mode's own frequency lies above those left out and means nothing by itself.
+
+    References
+    ----------
+    R.R. Craig, A.J. Kurdila, Fundamentals of Structural Dynamics, Wiley 2006, ch. 17 (residual attachment modes).
+
+    Examples
+    --------
+    >>> M, K = np.eye(3), np.diag([1.0, 4.0, 16.0])
+    >>> basis = with_residual(modal_basis(M, K, 1), M, K, [[1.0], [1.0], [1.0]])
+    >>> float(np.sum(basis.project([1.0, 1.0, 1.0]) ** 2 / basis.omega**2))  # 1 + 1/4 + 1/16
+    1.3125
+    """
+    M, K = checked_matrix(M, "M"), checked_matrix(K, "K")
+    B = _directions(directions, K.shape[0], "with_residual")
+    still = basis.vectors[:, basis.omega == 0.0]
+    shapes = static_shapes(M, K, B, still, root)
+    left = _orthogonal(shapes, basis.vectors, M)
+    kept = np.diag(_strain(K, root, left)) > NOTHING_LEFT * np.diag(_strain(K, root, shapes))
+    left = _independent(left[:, kept], M)
+    if not left.size:
+        return basis
+    omega, vectors = ritz(M, K, root, _orthogonal(left, basis.vectors, M))
+    extended = Basis(np.hstack((basis.vectors, vectors)), np.append(basis.omega, omega))
+    _check(extended, M, K, root, B, B.T @ shapes, "with_residual")
+    return extended
+
+
+def craig_bampton(M: Matrix, K: Matrix, directions: Matrix, count: int, root: Matrix | None = None) -> Basis:
+    """Static shapes of the interface plus the lowest `count` modes with the interface held (Craig–Bampton).
+
+        u = Ψ u_b + Φ_i q,      Ψ: unit displacement of one direction, the others held;   Φ_i: bᵀφ = 0 for all b
+
+    Parameters
+    ----------
+    M, K : (N, N) as for `modal_basis`.
+    directions : (N, m), dense or sparse: bᵀu are the interface displacements (of stops and forces).
+    count : modes with the interface held, ≥ 0; 0 is Guyan's condensation.
+    root : (k, N) with rootᵀ root = K, optional: full accuracy on fine meshes.
+
+    Returns
+    -------
+    Basis : m + count vectors with the reduced pencil diagonalised, lowest first. Dependent directions count once.
+
+    Raises
+    ------
+    ValueError : directions that do not fit; a structure that can still move freely with its interface held.
+    AccuracyError : not orthonormal, or static compliance of the interface off by more than 1e-10
+        (1e-7 without root).
+
+    Notes
+    -----
+    Exact for slow loads on the interface of a structure that is held. On one that floats such loads accelerate it,
+    and the inertia forces inside are met only by the modes: residual shapes are exact there.
+
+    References
+    ----------
+    R.R. Craig, M.C.C. Bampton, AIAA Journal 6 (1968) 1313. R.J. Guyan, AIAA Journal 3 (1965) 380.
+
+    Examples
+    --------
+    >>> K = np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+    >>> basis = craig_bampton(np.eye(3), K, [[0.0], [0.0], [1.0]], count=1)
+    >>> float(np.sum(basis.project([0.0, 0.0, 1.0]) ** 2 / basis.omega**2))  # three springs in series
+    3.0
+    """
+    M, K = checked_matrix(M, "M"), checked_matrix(K, "K")
+    B = _directions(directions, K.shape[0], "craig_bampton")
+    T, m = _interface_coordinates(B)
+    most = K.shape[0] - m
+    if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or not 0 <= count <= most:
+        raise ValueError(
+            f"count must be 0 to {most} (dofs inside), got {count!r} in craig_bampton; ask for fewer modes"
+        )
+    inside, interface = T[:, :most], T[:, most:]
+    vectors = _held(K, root, inside, interface)
+    if count:
+        R_i = None if root is None else sparse.csr_matrix(root) @ inside
+        held = modal_basis(inside.T @ M @ inside, inside.T @ K @ inside, int(count), root=R_i)
+        if held.omega[0] == 0.0:
+            raise ValueError("the structure must not move freely with its interface held, got a rigid-body mode in "
+                             "craig_bampton; use modes with residual shapes")  # fmt: skip
+        vectors = np.hstack((vectors, inside @ held.vectors))
+    basis = oriented(Basis(*ritz(M, K, root, vectors)[::-1]))
+    still = basis.vectors[:, basis.omega == 0.0]
+    exact = _compliance(basis, B) if still.size else B.T @ static_shapes(M, K, B, still, root)
+    _check(basis, M, K, root, B, exact, "craig_bampton")
+    return basis
+
+
+def guyan(M: Matrix, K: Matrix, directions: Matrix, root: Matrix | None = None) -> Basis:
+    """Static shapes of the given directions only: `craig_bampton` without modes (Guyan's condensation)."""
+    return craig_bampton(M, K, directions, 0, root)
+
+
+def static_share(basis: Basis, M: Matrix, K: Matrix, directions: Matrix, root: Matrix | None = None) -> Vector:
+    """Share (m,) of the static compliance of each direction that a basis keeps: Σ (bᵀφ_i)²/ω_i² / bᵀK⁻¹b.
+
+    Never above 1; for rigid-body modes (which must be in the basis) the elastic compliance is meant.
+
+    Examples
+    --------
+    >>> M, K = np.eye(2), np.diag([1.0, 4.0])
+    >>> static_share(modal_basis(M, K, 1), M, K, [[1.0], [1.0]])
+    array([0.8])
+    """
+    M, K = checked_matrix(M, "M"), checked_matrix(K, "K")
+    B = _directions(directions, K.shape[0], "static_share")
+    shapes = static_shapes(M, K, B, basis.vectors[:, basis.omega == 0.0], root)
+    return np.diag(_compliance(basis, B)) / np.sum(B * shapes, axis=0)
+
+
+def static_shapes(M: Matrix, K: Matrix, B: Vector, rigid: Vector, root: Matrix | None = None) -> Vector:
+    """Elastic shapes ψ (N, m) under unit loads B, balanced by inertia on the rigid-body modes (N, r).
+
+    K ψ = B - M R RᵀB,    RᵀM ψ = 0        (solved with its constraint, refined through the root)
+    """
+    r, inertia = rigid.shape[1], M @ rigid
+    bordered: Any = sparse.bmat([[K, inertia], [inertia.T, None]], format="csc") if r else sparse.csc_matrix(K)
+    try:
+        factors = sparse_linalg.splu(bordered)
+    except RuntimeError:
+        raise ValueError("K must not be singular, got rigid-body modes that are not in the basis; keep them") from None
+    load = B - inertia @ (rigid.T @ B)
+    shapes = np.zeros_like(B)
+    for _ in range(1 + REFINEMENTS):
+        missing = load - _force(K, root, shapes)
+        shapes = shapes + factors.solve(np.vstack((missing, np.zeros((r, B.shape[1])))))[: len(B)]
+        shapes = _orthogonal(shapes, rigid, M)
+    work = np.sum(load * shapes, axis=0)
+    if not np.all(np.abs(np.diag(_strain(K, root, shapes)) - work) <= BALANCED * work):
+        raise ValueError("K must not be singular, got rigid-body modes that are not in the basis; keep them")
+    return shapes
+
+
+def _directions(directions: Matrix, size: int, where: str) -> Vector:
+    """Checked columns (N, m)."""
+    B = np.array(directions.toarray() if sparse.issparse(directions) else directions, dtype=float)
+    if B.ndim != 2 or B.shape[0] != size or B.shape[1] == 0:
+        raise ValueError(f"directions must have shape ({size}, m), m > 0, got {B.shape} in {where}; give columns")
+    if not np.all(np.isfinite(B)) or not np.all(np.any(B != 0, axis=0)):
+        raise ValueError(f"directions must be finite and not zero in {where}; check where stops and forces act")
+    return B
+
+
+def _orthogonal(v: Vector, basis: Vector, M: Matrix) -> Vector:
+    """The part of v that is M-orthogonal to a basis; twice, for what rounding left the first time."""
+    for _ in range(2):
+        v = v - basis @ (basis.T @ (M @ v))
+    return v
+
+
+def _independent(v: Vector, M: Matrix) -> Vector:
+    """An M-orthonormal basis of the columns (N, m), dependent ones dropped."""
+    if not v.size:
+        return v
+    unit = v / np.sqrt(np.sum(v * (M @ v), axis=0))
+    values, turn = np.linalg.eigh(unit.T @ (M @ unit))
+    kept = values > DEPENDENT * values.max()
+    return (unit @ turn[:, kept]) / np.sqrt(values[kept])
+
+
+def _strain(K: Matrix, root: Matrix | None, u: Vector) -> Vector:
+    """UᵀKU, through the root if there is one: twice the strain energies, without the cancellation in K."""
+    if root is None:
+        return u.T @ (K @ u)
+    stretched = sparse.csr_matrix(root) @ u
+    return stretched.T @ stretched
+
+
+def _interface_coordinates(B: Vector) -> tuple[sparse.csc_matrix, int]:
+    """T (N, N) with u = T [inside dofs, Bᵀu], and the number m of independent directions."""
+    N = len(B)
+    unit = B / np.linalg.norm(B, axis=0)
+    _, triangle, columns = linalg.qr(unit, mode="economic", pivoting=True)
+    m = int(np.sum(np.abs(np.diag(triangle)) > DEPENDENT))
+    kept = B[:, np.sort(columns[:m])]
+    pivots = linalg.qr(kept.T, mode="r", pivoting=True)[1][:m]  # dofs that give way for Bᵀu
+    others = np.setdiff1d(np.arange(N), pivots)
+    inverse = np.linalg.inv(kept[pivots].T)
+    T = sparse.lil_matrix((N, N))
+    T[others, np.arange(N - m)] = 1.0
+    T[np.ix_(pivots, np.arange(N - m))] = -inverse @ kept[others].T
+    T[np.ix_(pivots, np.arange(N - m, N))] = inverse
+    return sparse.csc_matrix(T), m
+
+
+def _held(K: Matrix, root: Matrix | None, inside: sparse.csc_matrix, interface: sparse.csc_matrix) -> Vector:
+    """Static shapes (N, m) of unit interface displacements: no force inside, refined through the root."""
+    try:
+        factors = sparse_linalg.splu((inside.T @ K @ inside).tocsc())
+    except RuntimeError:
+        raise ValueError("the structure must not move freely with its interface held, got a singular stiffness in "
+                         "craig_bampton; use modes with residual shapes") from None  # fmt: skip
+    shapes = interface.toarray()
+    for _ in range(1 + REFINEMENTS):
+        shapes = shapes - inside @ factors.solve(inside.T @ _force(K, root, shapes))
+    return shapes
+
+
+def _force(K: Matrix, root: Matrix | None, u: Vector) -> Vector:
+    """K u, through the root if there is one."""
+    if root is None:
+        return np.asarray(K @ u)
+    R = sparse.csr_matrix(root)
+    return np.asarray(R.T @ (R @ u))
+
+
+def _compliance(basis: Basis, B: Vector) -> Vector:
+    """BᵀΦΩ⁻²ΦᵀB (m, m) of the elastic vectors."""
+    elastic = basis.omega > 0
+    scaled = basis.project(B)[elastic] / basis.omega[elastic, None]
+    return scaled.T @ scaled
+
+
+def _check(basis: Basis, M: Matrix, K: Matrix, root: Matrix | None, B: Vector, exact: Vector, where: str) -> None:
+    """Raise AccuracyError unless orthonormal, decoupled, and statically exact."""
+    strain, static = _strain(K, root, basis.vectors), STATIC_WITHOUT_ROOT if root is None else STATIC_TOLERANCE
+    coupling = COUPLING_TOLERANCE if root is not None else STATIC_WITHOUT_ROOT
+    size, stiff = np.sqrt(np.diag(exact)), np.where(basis.omega > 0, basis.omega, basis.omega.max())
+    errors = {
+        "orthonormal": (basis.project_matrix(M) - np.eye(basis.count), ORTHONORMALITY_TOLERANCE),
+        "free of shared stiffness": ((strain - np.diag(basis.omega**2)) / np.outer(stiff, stiff), coupling),
+        "statically exact": ((_compliance(basis, B) - exact) / np.outer(size, size), static),
+    }
+    for what, (error, tolerance) in errors.items():
+        worst = np.abs(error).max()
+        if not worst <= tolerance:
+            raise AccuracyError(f"the basis must be {what} to {tolerance}, got {worst:.3g} in {where}")

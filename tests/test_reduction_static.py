@@ -1,0 +1,317 @@
+"""Residual shapes, Craig–Bampton, Guyan, truncation by frequency and mass; models of scenes made with them."""
+
+import numpy as np
+import pytest
+
+import reduction
+import solvers
+from contacts import Hertz, KelvinVoigt
+from fembeam import reducing
+from fembeam.beam import Beam
+from fembeam.damping import ModalDamping, Rayleigh
+from fembeam.excitation import Harmonic
+from fembeam.scene import Clamped, LumpedMass, PointForce, Scene, Stop
+from fembeam.section import Section
+from reduction import interface
+
+UNIT = Section(E=1.0, rho=1.0, A=1.0, I=1.0)
+
+
+@pytest.fixture(scope="module")
+def cantilever():
+    return Scene(Beam(1.0, UNIT), [Clamped(0.0)]).matrices(elements=50)
+
+
+@pytest.fixture(scope="module")
+def tip(cantilever):
+    return cantilever.interpolation(1.0).T
+
+
+def everything(matrices):
+    return matrices.M, matrices.K
+
+
+# --- static compliance -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("count", "share"), [(1, 0.970688), (2, 0.995404), (3, 0.998556)])
+def test_static_tip_compliance(cantilever, tip, count, share):
+    M, K, R = cantilever.M, cantilever.K, cantilever.root
+    basis = reduction.modal_basis(M, K, count, root=R)
+    assert reduction.static_share(basis, M, K, tip, R)[0] == pytest.approx(share, abs=6e-7)
+    extended = reduction.with_residual(basis, M, K, tip, R)
+    assert extended.count == count + 1
+    assert np.sum(extended.project(tip)[:, 0] ** 2 / extended.omega**2) == pytest.approx(1 / 3, rel=1e-10)
+    np.testing.assert_array_equal(extended.vectors[:, :count], basis.vectors)
+
+
+def test_share_by_modes_is_their_formula(cantilever, tip):
+    # φ(1)² = 4, ω = β²: share of 1/3 is 12/β⁴
+    basis = reduction.modal_basis(cantilever.M, cantilever.K, 3, root=cantilever.root)
+    share = np.cumsum(12 / np.array([1.8751040687, 4.6940911330, 7.8547574382]) ** 4)
+    kept = [
+        reduction.static_share(reduction.Basis(basis.vectors[:, :n], basis.omega[:n]), *everything(cantilever), tip)[0]
+        for n in (1, 2, 3)
+    ]
+    np.testing.assert_allclose(kept, share, rtol=2e-7)
+
+
+@pytest.mark.parametrize("root", [True, False])
+@pytest.mark.parametrize("count", [0, 1, 4])
+def test_interface_bases_are_statically_exact(cantilever, count, root):
+    M, K, R = cantilever.M, cantilever.K, cantilever.root if root else None
+    z = np.array([1.0, 0.4, 0.4, 0.74])  # one twice
+    B = cantilever.interpolation(z).T
+    basis = reduction.craig_bampton(M, K, B, count, R)
+    assert basis.count == 3 + count
+    near, far = np.minimum.outer(z, z), np.maximum.outer(z, z)
+    kept = basis.project(B).T @ (basis.project(B) / basis.omega[:, None] ** 2)
+    np.testing.assert_allclose(kept, near**2 * (3 * far - near) / 6, rtol=1e-10 if root else 1e-7)
+    np.testing.assert_allclose(basis.project_matrix(M), np.eye(3 + count), atol=1e-9)
+    full = reduction.modal_basis(M, K, 2, root=R).omega
+    assert np.all(basis.omega[:2] >= full * (1 - 1e-9))  # Rayleigh–Ritz bounds from above
+
+
+def test_craig_bampton_with_all_modes_is_the_full_model():
+    full = Scene(Beam(1.0, UNIT), [Clamped(0.0)], [LumpedMass(0.8, 0.5, 0.01)]).matrices(elements=6)
+    size = full.M.shape[0]
+    basis = reduction.craig_bampton(full.M, full.K, full.interpolation(1.0).T, size - 1, full.root)
+    np.testing.assert_allclose(basis.omega, reduction.modal_basis(full.M, full.K, root=full.root).omega, rtol=1e-9)
+
+
+def test_guyan_is_craig_bampton_without_modes(cantilever, tip):
+    M, K, R = cantilever.M, cantilever.K, cantilever.root
+    guyan, none = reduction.guyan(M, K, tip, R), reduction.craig_bampton(M, K, tip, 0, R)
+    np.testing.assert_array_equal(guyan.vectors, none.vectors)
+    # one coordinate with the static shape (3 z² - z³)/2: ω² = 3/(33/140)
+    assert guyan.omega[0] == pytest.approx(np.sqrt(3 * 140 / 33), rel=1e-6)
+
+
+def test_free_body_gets_elastic_shapes():
+    # inertia relief at the end of a free beam: compliance 1/105 of L³/EI
+    with pytest.warns(UserWarning, match="rigid-body"):
+        full = Scene(Beam(1.0, UNIT)).matrices(modes=6)
+    B = full.interpolation([1.0, 0.3]).T
+    basis = reduction.modal_basis(full.M, full.K, 4, root=full.root)
+    extended = reduction.with_residual(basis, full.M, full.K, B, full.root)
+    elastic = extended.omega > 0
+    kept = np.sum(extended.project(B)[elastic, 0] ** 2 / extended.omega[elastic] ** 2)
+    assert kept == pytest.approx(1 / 105, rel=1e-7)
+    with pytest.raises(ValueError, match="rigid-body modes that are not in the basis"):
+        reduction.with_residual(reduction.Basis(basis.vectors[:, 2:], basis.omega[2:]), full.M, full.K, B, full.root)
+    with pytest.raises(ValueError, match="must not move freely with its interface held"):
+        reduction.craig_bampton(full.M, full.K, full.interpolation(1.0).T, 2, full.root)
+
+
+def test_nothing_is_counted_twice(cantilever):
+    M, K, R = cantilever.M, cantilever.K, cantilever.root
+    B = cantilever.interpolation([1.0, 0.5, 1.0]).T
+    basis = reduction.modal_basis(M, K, indices=[0, 3], root=R)
+    extended = reduction.with_residual(basis, M, K, B, R)
+    assert extended.count == 4  # two independent directions
+    strain = extended.project_matrix(K) / np.outer(extended.omega, extended.omega)
+    np.testing.assert_allclose(strain, np.eye(4), atol=1e-6)
+    np.testing.assert_allclose(reduction.static_share(extended, M, K, B, R), 1.0, rtol=1e-10)
+    assert extended.effective_mass(cantilever.base_load).sum() < reduction.moved_mass(M, cantilever.base_load)
+
+
+def test_complete_basis_has_no_residual():
+    full = Scene(Beam(1.0, UNIT), [Clamped(0.0)]).matrices(elements=4)
+    basis = reduction.modal_basis(full.M, full.K, root=full.root)
+    assert reduction.with_residual(basis, full.M, full.K, full.interpolation(1.0).T, full.root) is basis
+
+
+def test_wrong_shapes_are_noticed(cantilever, tip, monkeypatch):
+    M, K, R = cantilever.M, cantilever.K, cantilever.root
+    basis = reduction.modal_basis(M, K, 2, root=R)
+    exact = interface.static_shapes
+    monkeypatch.setattr(interface, "static_shapes", lambda *a: exact(*a) * (1 + 1e-8))
+    with pytest.raises(reduction.AccuracyError, match=r"must be statically exact to 1e-10, got 1e-08"):
+        reduction.with_residual(basis, M, K, tip, R)
+    monkeypatch.undo()
+    monkeypatch.setattr(interface, "_orthogonal", lambda v, basis, M: v)  # the static shape itself: counts modes twice
+    with pytest.raises(reduction.AccuracyError, match="must be orthonormal to 1e-09"):
+        reduction.with_residual(basis, M, K, tip, R)
+
+
+# --- truncation ------------------------------------------------------------------------------------------
+
+
+def test_effective_masses_of_a_cantilever(cantilever):
+    basis = reduction.modal_basis(cantilever.M, cantilever.K, 3, root=cantilever.root)
+    masses = basis.effective_mass(cantilever.base_load)
+    np.testing.assert_allclose(masses, [0.613076, 0.188300, 0.064732], atol=1e-6)
+
+
+def test_by_frequency_and_by_mass(cantilever):
+    M, K, R, load = cantilever.M, cantilever.K, cantilever.root, cantilever.base_load
+    omega = reduction.modal_basis(M, K, 20, root=R).omega
+    for count in (1, 9, 17):
+        np.testing.assert_allclose(reduction.fewest_modes(M, K, reduction.below(omega[count - 1] + 1.0), R).omega,
+                                   omega[:count], rtol=1e-9)  # fmt: skip
+    mass = reduction.moved_mass(M, load)
+    basis = reduction.fewest_modes(M, K, reduction.carrying(0.9, load, mass), R)
+    assert basis.effective_mass(load).sum() >= 0.9 * mass
+    assert basis.effective_mass(load)[:-1].sum() < 0.9 * mass
+    assert reduction.fewest_modes(M, K, reduction.carrying(1.0, load, mass), R).count <= M.shape[0]
+
+
+EYE = np.eye(3)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: reduction.with_residual(reduction.modal_basis(EYE, EYE, 1), EYE, EYE, np.ones(3)), "shape"),
+        (lambda: reduction.with_residual(reduction.modal_basis(EYE, EYE, 1), EYE, EYE, np.zeros((3, 1))), "not zero"),
+        (lambda: reduction.craig_bampton(EYE, EYE, np.ones((3, 1)), 3), "count must be 0 to 2"),
+        (lambda: reduction.craig_bampton(EYE, EYE, np.ones((3, 1)), True), "count must be 0 to 2"),
+        (lambda: reduction.craig_bampton(EYE, EYE, np.full((3, 1), np.nan), 1), "finite"),
+        (lambda: reduction.below(0.0), "omega_max must be positive"),
+        (lambda: reduction.carrying(1.5, EYE[0], 1.0), r"share must lie in \(0, 1\]"),
+        (lambda: reduction.fewest_modes(EYE, EYE, reduction.below(0.5)), "at least one mode"),
+    ],
+)
+def test_bad_input(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()
+
+
+# --- models of scenes ------------------------------------------------------------------------------------
+
+STEEL = Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)
+
+
+def struck(law=None, damping=0.01, **changes):
+    parts = {
+        "beam": Beam(0.2599, STEEL),
+        "supports": [Clamped(0.0)],
+        "masses": [LumpedMass(0.24445, 25.4e-3, inertia=3.0e-6)],
+        "stops": [Stop(0.24445, law or Hertz(2.1e8))],
+        "damping": ModalDamping(damping),
+        **changes,
+    }
+    return Scene(**parts)
+
+
+def test_models_with_static_shapes():
+    scene = struck(forces=[PointForce(0.1, Harmonic(1.0, 50.0))], base=Harmonic(1e-3, 195.0))
+    plain, residual, interface = scene.reduce(), scene.reduce(2, residual=True), scene.reduce(2, interface=True)
+    assert (len(plain.omega), len(residual.omega), len(interface.omega)) == (2, 4, 4)
+    assert (plain.static, residual.static, interface.static) == (0, 2, 0)
+    assert residual.modes == (0, 1, 2, 3)
+    assert np.all(plain.static_share < 1 - 1e-5)
+    for model in (residual, interface):
+        np.testing.assert_allclose(model.static_share, 1.0, rtol=1e-10)
+        assert plain.effective_mass.sum() < model.effective_mass.sum() < model.moving_mass
+    np.testing.assert_allclose(residual.omega[:2], plain.omega, rtol=1e-9)
+    assert np.all(residual.phi(0.24445) > 0)
+    # a slow force moves its own place as the full structure does
+    run = residual.simulate(np.pi / 50, start=None)
+    assert run.complete
+
+
+@pytest.mark.parametrize(
+    "how", [{"modes": [0, 2], "residual": True}, {"modes": 2, "interface": True}, {"omega_max": 1e3}]
+)
+def test_made_again(how):
+    model = struck().reduce(**how)
+    np.testing.assert_array_equal(model.again(model.scene).omega, model.omega)
+    assert len(model.again(struck(masses=[])).omega) == len(model.omega)
+
+
+def test_pseudo_modes_are_damped_as_higher_modes():
+    ratios = struck(damping=[0.03, 0.02, 0.01]).reduce(1, residual=True).zeta
+    np.testing.assert_allclose(ratios, [0.03, 0.02])
+    rayleigh = struck(damping=0.0, ).reduce(1, residual=True)  # fmt: skip
+    scene = struck()
+    model = Scene(**{**scene.__dict__, "damping": Rayleigh(2.0, 1e-5)}).reduce(1, residual=True)
+    np.testing.assert_allclose(2 * model.zeta * model.omega, 2.0 + 1e-5 * rayleigh.omega**2, rtol=1e-9)
+
+
+def test_by_frequency_mass_and_all():
+    scene = struck()
+    assert len(scene.reduce(omega_max=1e4).omega) == 5
+    model = scene.reduce(mass_share=0.95)
+    share = np.cumsum(model.effective_mass) / model.moving_mass
+    assert share[-1] >= 0.95 > share[-2]
+    full = scene.reduce("all", elements=10)
+    assert len(full.omega) == full.matrices.M.shape[0]
+    assert full.effective_mass.sum() == pytest.approx(full.moving_mass, rel=1e-9)
+
+
+def test_strike_foretells_contact_time():
+    # a heavy end mass behaves as a free mass: t_c v/δ_max = 2.943275, δ_max = (5 m v²/4K)^(2/5)
+    scene = struck(Hertz(1e9), damping=0.0, masses=[LumpedMass(0.24445, 50.0)])
+    log = scene.reduce(1).strike(0.1)
+    deepest = (5 * 50.0 * 0.1**2 / (4 * 1e9)) ** 0.4
+    assert log.t_out[0] - log.t_in[0] == pytest.approx(2.943275 * deepest / 0.1, rel=1e-3)
+    with pytest.raises(ValueError, match="speed must be finite and positive"):
+        scene.reduce(1).strike(0.0)
+    with pytest.raises(ValueError, match="stop must be below 1"):
+        scene.reduce(1).strike(1.0, stop=1)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"modes": 2, "omega_max": 100.0}, "choose modes in one way"),
+        ({"omega_max": 50.0}, "omega_max must reach the first frequency, 109"),
+        ({"mass_share": 0.0}, r"share must lie in \(0, 1\]"),
+        ({"mass_share": 0.9999999}, "mass_share = 0.9999999 must be reached by 16 modes"),
+        ({"modes": "all"}, "'all' with elements given"),
+        ({"modes": "many"}, "'all' with elements given"),
+        ({"modes": 0}, "modes must be a count above 0"),
+        ({"modes": [], "residual": True}, "modes must be a count above 0"),
+        ({"modes": [1], "interface": True}, "modes must be a count with interface=True"),
+        ({"residual": True, "interface": True}, "exclude each other"),
+        ({"modes": 50, "elements": 10}, r"modes must be at most 20 \(free dofs\), got 50"),
+    ],
+)
+def test_scene_reduce_rejects(arguments, message, monkeypatch):
+    monkeypatch.setattr(reducing, "MOST_TRIED", 16)
+    with pytest.raises(ValueError, match=message):
+        struck().reduce(**arguments)
+
+
+def test_static_shapes_need_a_place():
+    with pytest.raises(ValueError, match="static shapes need a stop or a force"):
+        Scene(Beam(0.26, STEEL), [Clamped(0.0)]).reduce(residual=True)
+
+
+# --- full against reduced --------------------------------------------------------------------------------
+
+
+def test_all_modes_are_the_full_matrices():
+    # independent: another method, on the matrices as assembled, without any modes
+    scene = struck(Hertz(1e8), stops=[Stop(0.24445, KelvinVoigt(1e5, 20.0))])
+    full, model = scene.matrices(elements=3), scene.reduce("all", elements=3)
+    w = full.interpolation(0.24445).toarray()[0]
+    system = solvers.System(full.M, full.C, full.K, [solvers.Contact(w, scene.stops[0].law)])
+    start = model.state(velocity=lambda z: -0.5 * (z / 0.2599) ** 2)
+    u, u_dot = (model.basis.expand(part) for part in np.split(start, 2))
+    direct = solvers.integrate(system, u, u_dot, 0.01, method=solvers.DormandPrince(1e-10))
+    run = model.simulate(0.01, start=start)
+    assert len(run.contacts) == len(direct.contacts) > 0
+    np.testing.assert_allclose(run.contacts.peak_force, direct.contacts.peak_force, rtol=1e-6)
+    np.testing.assert_allclose(model.basis.expand(run.q[-1]), direct.q[-1], atol=1e-6 * np.abs(direct.q[-1]).max())
+
+
+def test_full_model_against_a_reduced_one():
+    scene = struck()
+    full, few = scene.reduce("all", elements=60), scene.reduce(20, residual=True)
+    assert len(full.omega) == 120
+    forces = [
+        model.simulate(0.02, start=model.state(velocity=lambda z: -0.5 * (z / 0.2599) ** 2)).contacts.peak_force
+        for model in (full, few)
+    ]
+    np.testing.assert_allclose(*forces, rtol=1e-4)
+
+
+def test_interface_inside_an_element(cantilever):
+    # a direction that is no single dof
+    M, K, R = cantilever.M, cantilever.K, cantilever.root
+    B = cantilever.interpolation([0.731, 1.0]).T
+    basis = reduction.craig_bampton(M, K, B, 2, R)
+    assert basis.count == 4
+    np.testing.assert_allclose(reduction.static_share(basis, M, K, B, R), 1.0, rtol=1e-10)

@@ -1,0 +1,333 @@
+"""Studies: many runs spread over executors, quantities, mode counts, smallest models."""
+
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from dataclasses import replace
+from multiprocessing import get_context
+
+import numpy as np
+import pytest
+
+import fembeam as fb
+import solvers
+from contacts import Hertz, Hysteretic, KelvinVoigt
+from fembeam import scene_file
+from fembeam.cli import main
+from fembeam.study import NotMetError, measure, mode_count, smallest_model
+from fembeam.study.executors import spread
+from fembeam.study.mode_count import difference
+from fembeam.study.quantities import QUANTITIES, Amplitude, Psd, label, named
+
+STEEL = fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)
+SCENE = fb.Scene(
+    beam=fb.Beam(0.2599, STEEL),
+    supports=[fb.Clamped(0.0)],
+    masses=[fb.LumpedMass(0.24445, mass=25.4e-3, inertia=3.0e-6)],
+    stops=[fb.Stop(0.24445, law=Hysteretic.lankarani_nikravesh(2.1e8, restitution=0.5))],
+    damping=fb.ModalDamping([0.02, 0.01]),
+    base=fb.Harmonic(amplitude=1e-3, omega=195.0),
+)
+FREE = replace(SCENE, stops=[])
+STIFF = replace(SCENE, base=None, stops=[fb.Stop(0.24445, law=Hertz(1e10))])
+
+
+def swing(model):
+    """A fast strike in the shape of the static deflection."""
+    return model.state(velocity=lambda z: -2.0 * (z / 0.2599) ** 2)
+
+
+def shifted(x):
+    if x == 13:
+        raise ValueError("thirteen")
+    return x + 1
+
+
+@pytest.mark.parametrize("pool", [None, ThreadPoolExecutor, ProcessPoolExecutor])
+def test_spread_keeps_the_order(pool):
+    items = range(20, 9, -1)
+    options = {"mp_context": get_context("forkserver")} if pool is ProcessPoolExecutor else {}
+    executor = pool(2, **options) if pool else None
+    try:
+        assert spread(shifted, iter(range(5, -1, -1)), executor) == [6, 5, 4, 3, 2, 1]
+        with pytest.raises(ValueError, match="thirteen") as error:
+            spread(shifted, items, executor)
+        assert "item 7: 13" in error.value.__notes__
+    finally:
+        if executor:
+            executor.shutdown()
+
+
+# --- quantities and parts of runs ------------------------------------------------------------------------
+
+
+def test_amplitude_finds_extremes_between_samples():
+    # one undamped mode let go from rest: amplitude is what it was let go from
+    scene = replace(FREE, damping=fb.ModalDamping(0.0), base=None)
+    model = scene.reduce(1)
+    start = np.array([1e-3, 0.0])
+    run = model.simulate(0.5, dt=2 * np.pi / model.omega[0] / 32.3, start=start)
+    exact = 1e-3 * model.phi(0.2599)[0]
+    assert Amplitude(z=0.2599)(run) == pytest.approx(exact, rel=2e-6)
+    assert np.ptp(run.displacement(0.2599)) / 2 < exact * (1 - 1e-5)  # the samples alone miss it
+
+
+def test_parts_of_a_run_make_the_whole():
+    run = SCENE.reduce(2).simulate(1.0, dt=1e-3)
+    parts = [measure.cut(run, a, b) for a, b in ((0.0, 0.25), (0.25, 0.7), (0.7, 1.0))]
+    assert sum(len(part.contacts) for part in parts) == len(run.contacts)
+    assert [part.t[0] for part in parts] == pytest.approx([0, 0, 0], abs=1e-12)
+    assert parts[1].t[-1] == pytest.approx(0.45)
+    np.testing.assert_array_equal(parts[1].q, run.q[250:701])
+    np.testing.assert_array_equal(parts[2].energy.input, run.energy.input[700:])
+    np.testing.assert_allclose(parts[1].contacts.t_in + 0.25, run.contacts.t_in[len(parts[0].contacts) :][
+        : len(parts[1].contacts)])  # fmt: skip
+    rates = [QUANTITIES["impact_rate"]()(part) * part.t[-1] for part in parts]
+    assert sum(rates) == pytest.approx(len(run.contacts))
+
+
+def test_every_quantity_has_a_value_and_a_name():
+    run = SCENE.reduce(2).simulate(4.0, dt=1e-3)
+    for name in QUANTITIES:
+        value = np.asarray(named(name)(run))
+        assert np.all(np.isfinite(value)), name
+        assert np.any(value != 0), name
+        assert label(named(name)) == name
+    spectrum = fb.psd(run.indentation(), 1e-3, 1024)
+    level = Psd((100.0, 300.0), 1)(run)[0] * 200.0
+    assert level == pytest.approx(spectrum.variance_in(100.0, 300.0), rel=0.1)
+    mean = np.sum(run.energy.stored) / len(run.t)
+    assert QUANTITIES["energy"]()(run) == pytest.approx(mean, rel=1e-9)
+    assert label(Psd((1.0, 9.0))) == "psd(band=(1.0, 9.0))"
+    assert label(swing) == "swing"
+
+
+# --- mode_count ------------------------------------------------------------------------------------------
+
+
+def test_linear_beam_converges_at_the_rate_of_its_modes():
+    # tip of a beam shaken slowly: mode i adds Γ φ/ω² ~ i⁻¹ i⁻⁴
+    scene = fb.Scene(fb.Beam(1.0, STEEL), [fb.Clamped(0.0)], damping=fb.ModalDamping(0.1), base=fb.Harmonic(1.0, 1.0))
+    study = mode_count(scene, [1, 2, 3, 4, 6, 12], Amplitude(z=1.0))
+    # differences of neighbours alternate in sign, so the error is about half the first term left out
+    assert 4.0 < study.rate < 6.5
+    assert np.isnan(study.rate_residual)
+    assert study.row(12).reference
+    assert study.closest < 1e-4
+
+
+def test_paper_scene_needs_more_than_two_modes_for_its_peak():
+    study = mode_count(SCENE, [1, 2, 3, 10, 20], "peak_force")
+    errors = [study.row(n).error for n in (1, 2, 3, 10)]
+    assert errors[0] > 0.5
+    assert errors[1] > 0.5
+    assert 0.05 < errors[2] < 0.4
+    assert errors[3] < 0.01
+    assert all(row.measured.share == pytest.approx(1.0, abs=1e-9) for row in study.rows if row.residual)
+    table = str(study)
+    assert "reference" in table
+    assert "static share" in table
+    assert len(study.figure().axes) == 2
+
+
+def test_fast_strike_on_a_stiff_stop():
+    study = mode_count(STIFF, [1, 2, 12], "peak_force", duration=0.05, start=swing, reference=24)
+    assert study.row(2).error > 0.1
+    assert study.row(2, residual=True).error > 0.1
+    assert study.row(12, residual=True).error < 0.01
+    assert study.row(24, residual=True).reference
+    full = mode_count(STIFF, [4], "peak_force", duration=0.05, start=swing, reference="full")
+    assert full.row(None).reference
+    assert full.row(None).measured.coordinates > 80
+    assert 0.05 < full.row(4, residual=True).error < 0.2
+
+
+def test_random_response_is_paired_and_knows_its_noise():
+    noise = replace(SCENE, base=fb.BandNoise(std=2.5e-4, band=(0.0, 1226.6)))
+    study = mode_count(noise, [1, 2, 3], "impact_rate", duration=12.0, discard=2.0, seeds=range(5), residual=False)
+    assert study.row(1).resolved  # one mode lacks contacts
+    assert study.row(1).error > 2 * study.row(2).error
+    assert all(row.uncertainty > 0 for row in study.rows if not row.reference)
+    assert study.row(3).measured.values.shape == (5,)
+
+
+def test_half_width_of_paired_differences():
+    rng = np.random.default_rng(1)
+    common, covered = rng.normal(10.0, 3.0, (400, 8)), 0
+    for x in common:  # what realisations share cancels; the true relative difference is 1 % of the mean
+        one, other = (
+            measure.Measured(values, 1, 0.0, 0.0, 1.0, 1.0) for values in (x + 0.1 + rng.normal(0, 0.05, 8), x)
+        )
+        error, width = difference(one, other)
+        covered += abs(error - 0.1 / x.mean()) < width
+    assert 0.92 < covered / 400 < 0.98
+
+
+def test_executor_gives_the_same_study():
+    arguments = FREE, [1, 2], Amplitude(z=0.2599)
+    with ThreadPoolExecutor(2) as pool:
+        spread_out = mode_count(*arguments, executor=pool)
+    alone = mode_count(*arguments)
+    assert [row.error for row in spread_out.rows] == [row.error for row in alone.rows]
+
+
+def growing(run):
+    return np.ones(len(run.model.omega))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((SCENE, [], "amplitude"), "counts must hold a number of modes"),
+        ((SCENE, [0], "amplitude"), "counts must be whole numbers above 0, got 0"),
+        ((SCENE, [1.5], "amplitude"), "counts must be whole numbers above 0, got 1.5"),
+        ((SCENE, [301], "amplitude"), "modes must be at most 300"),
+        ((SCENE, [1], "amplitud"), "quantity must be one of amplitude, peak_force"),
+        ((SCENE, [1, 2], growing, 0.01, 1e-3), r"quantity must return one shape, \(3,\) for the reference, got"),
+        ((SCENE, [1], lambda run: [], 0.01, 1e-3), "quantity must return a number or an array"),
+        ((SCENE, [1], "amplitude", 1.0), "amplitude needs samples"),
+        ((SCENE, [1], "peak_force", -1.0), "duration must be finite and positive"),
+        ((SCENE, [1], "peak_force", 1.0, None, 1.0), "discard must be below the duration"),
+        ((SCENE, [1], "peak_force", 1.0, None, 0.0, [1, 2, 3]), "seeds need a random base"),
+        ((SCENE, [1], "peak_force", 1.0, None, 0.0, [1]), "seeds must be at least 3"),
+        ((SCENE, [1], "peak_force", None, None, 0.0, [1, 2, 3]), "seeds need a duration"),
+        ((STIFF, [1], "peak_force"), "study without duration needs a periodic response: an orbit"),
+        ((STIFF, [1], "peak_force", 0.01), "reference value must be finite and not zero"),
+        ((FREE, [1], "contact_time", 0.01), "reference value must be finite and not zero"),
+    ],
+)
+def test_mode_count_rejects(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        mode_count(*arguments)
+
+
+def test_quantity_of_the_wrong_kind():
+    with pytest.raises(TypeError, match="name or a function"):
+        mode_count(SCENE, [1], 3)
+
+
+# --- smallest_model --------------------------------------------------------------------------------------
+
+PLATE = fb.Section.rectangle(2.1e11, 7800.0, 0.02, 0.005)
+TWO_STOPS = fb.Scene(
+    beam=fb.Beam(0.5, PLATE),
+    supports=[fb.Pinned(0.0), fb.Pinned(0.5)],
+    stops=[fb.Stop(0.2, KelvinVoigt(1e5, 5.0), gap=1e-4), fb.Stop(0.35, Hertz(1e8), gap=2e-4, side="above")],
+    damping=fb.ModalDamping(0.02),
+    forces=[fb.PointForce(0.13, fb.Harmonic(20.0, 300.0))],
+)
+CASES = {
+    "amplitude, periodic": (SCENE, Amplitude(z=0.13), 0.05, {"residual": False}),
+    "contact time, periodic": (replace(SCENE, base=fb.Harmonic(1e-3, 120.0)), "contact_time", 0.1, {"residual": True}),
+    "amplitude, no stops": (FREE, Amplitude(z=0.2), 0.001, {}),
+    "energy, two stops": (TWO_STOPS, "energy", 0.05, {"duration": 0.1, "dt": 1e-4}),
+    "peak force, struck": (STIFF, "peak_force", 0.1, {"duration": 0.05, "start": swing}),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_smallest_model_is_right_afterwards(name):
+    scene, quantity, tolerance, how = CASES[name]
+    found = smallest_model(scene, quantity, tolerance, **how)
+    assert found.met
+    assert found.reduction_error + found.integration_error <= tolerance
+    finer = scene.reduce(2 * found.modes, residual=found.residual)
+    plan = measure.Plan(how.get("duration"), how.get("dt"), start=how.get("start"))
+    value, reference = (
+        np.mean([named(quantity)(run) for run in measure.runs(model, plan, named(quantity), solvers.Exponential(rtol))])
+        for model, rtol in ((found.model, found.rtol), (finer, found.rtol / 100))
+    )
+    assert abs(value / reference - 1) <= tolerance
+    assert value == pytest.approx(float(found.value), rel=tolerance / 10)
+    assert "reduction" in str(found)
+    assert "integration" in str(found)
+
+
+def test_smallest_model_says_when_modes_do_not_suffice():
+    with pytest.raises(NotMetError, match=r"peak_force to 0\.01: NOT MET: modes converge too slowly.*up to 2") as error:
+        smallest_model(STIFF, "peak_force", 0.01, duration=0.05, start=swing, most=2)
+    evidence = error.value.evidence
+    assert evidence.model is None
+    assert not evidence.met
+    assert evidence.solver is None
+    two = next(line for line in evidence.reduction if line.choice[:2] == (2, False))
+    assert two.error > 0.1
+    assert len(evidence.figure().axes) == 1
+
+
+def test_smallest_model_says_when_scatter_hides_it():
+    noise = replace(SCENE, base=fb.BandNoise(std=2.5e-4, band=(0.0, 1226.6)))
+    with pytest.raises(NotMetError, match=r"scatter hides it.*more seeds"):
+        smallest_model(noise, "mean_force", 1e-3, duration=3.0, seeds=range(3), most=1, residual=False)
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "most", "message"),
+    [
+        (0.0, 8, r"tolerance must lie in \(0, 1\), got 0.0"),
+        (-1.0, 8, "tolerance must lie"),
+        (float("nan"), 8, "tolerance must lie"),
+        (0.1, 0, "most must be a whole number, 1 to 64"),
+        (0.1, 100, "most must be a whole number, 1 to 64"),
+    ],
+)
+def test_smallest_model_rejects(tolerance, most, message):
+    with pytest.raises(ValueError, match=message):
+        smallest_model(SCENE, "amplitude", tolerance, most=most)
+
+
+# --- from a file -----------------------------------------------------------------------------------------
+
+FILE = """
+[beam]
+length = 0.2599
+section = { E = 1.9e11, rho = 8000, A = 58.3e-6, I = 18.5e-12 }
+[[supports]]
+kind = "clamped"
+z = 0
+[damping]
+zeta = 0.05
+[base]
+kind = "harmonic"
+amplitude = 1e-3
+omega = 100
+[mode_count]
+counts = [1, 2]
+quantity = { kind = "amplitude", z = 0.2 }
+[smallest_model]
+quantity = "amplitude"
+tolerance = 0.01
+most = 2
+"""
+
+
+def test_studies_of_a_file(tmp_path, capsys):
+    path = tmp_path / "scene.toml"
+    path.write_text(FILE)
+    assert main(["run", str(path), "--out", str(tmp_path / "out")]) == 0
+    written = {file.name for file in (tmp_path / "out").iterdir()}
+    assert written == {f"{study}.{kind}" for study in ("mode_count", "smallest_model") for kind in ("txt", "png")}
+    assert capsys.readouterr().out.strip() in "".join(
+        (tmp_path / "out" / f"{study}.txt").read_text() for study in ("mode_count", "smallest_model")
+    )
+    path.write_text(FILE.replace("0.01\nmost = 2", "1e-9\nmost = 1"))
+    assert main(["run", str(path), "--out", str(tmp_path / "out"), "--quiet"]) == 1
+    said = capsys.readouterr()
+    assert "NOT MET" in said.err
+    assert "NOT MET" in said.out
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("counts = [1, 2]", "counts = []", r"\[mode_count\]: counts must hold"),
+        ("tolerance = 0.01", "tolerance = 0", r"\[smallest_model\]: tolerance must lie"),
+        ('quantity = "amplitude"', 'quantity = "amplitud"', "did you mean 'amplitude'"),
+        ("most = 2", "mots = 2", "unknown key 'mots'; did you mean 'most'"),
+        ("most = 2", "duration = 1.0", r"\[smallest_model\]: amplitude needs samples"),
+        ("omega = 100", "omega = 0", r"\[mode_count\]: a study without duration needs a periodic response"),
+    ],
+)
+def test_mistakes_in_a_file(tmp_path, old, new, message):
+    path = tmp_path / "scene.toml"
+    path.write_text(FILE.replace(old, new))
+    with pytest.raises(scene_file.SceneFileError, match=message):
+        scene_file.read(path)
