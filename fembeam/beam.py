@@ -172,12 +172,13 @@ def bending_matrices(beam: Beam, nodes: Vector) -> tuple[sparse.csr_matrix, spar
     ----------
     T. Gustafsson, G.D. McBain, scikit-fem, J. Open Source Software 5 (2020) 2369: ElementLineHermite.
     """
-    K, M, join = element_matrices(beam, nodes)
+    K, M, dofs = element_matrices(beam, nodes)
+    join = joining(np.diff(nodes), dofs)
     return (join.T @ K @ join).tocsr(), (join.T @ M @ join).tocsr()
 
 
-def element_matrices(beam: Beam, nodes: Vector) -> tuple[sparse.csr_matrix, sparse.csr_matrix, sparse.csr_matrix]:
-    """Each element by itself: K and M (4e, 4e) on its (u, h u_z) at both ends, and the map (4e, 2m) from nodal dofs."""
+def element_matrices(beam: Beam, nodes: Vector) -> tuple[sparse.csr_matrix, sparse.csr_matrix, NDArray[np.int64]]:
+    """Each element by itself: K and M (4e, 4e) on its (u, h u_z) at both ends; numbers (2, 2e) of these dofs."""
     from skfem import Basis, BilinearForm, ElementLineHermite, MeshLine  # here: slow to import
     from skfem.helpers import d, dd
 
@@ -204,10 +205,10 @@ def element_matrices(beam: Beam, nodes: Vector) -> tuple[sparse.csr_matrix, spar
     }
     more = beam.axial_force != 0 or beam.foundation != 0
     K, M = ((stiffness if more else bending).assemble(basis, **w), inertia.assemble(basis, **w))
-    return K, M, _joining(h, basis.nodal_dofs)
+    return K, M, basis.nodal_dofs
 
 
-def _joining(h: Vector, nodal_dofs: NDArray[np.int64]) -> sparse.csr_matrix:
+def joining(h: Vector, nodal_dofs: NDArray[np.int64]) -> sparse.csr_matrix:
     """Sparse map from (u, u_z) per node to (u, h u_z) per element end; nodal_dofs (2, 2 elements)."""
     node = np.repeat(np.arange(len(h)), 2) + np.tile([0, 1], len(h))
     columns = np.concatenate([2 * node, 2 * node + 1])

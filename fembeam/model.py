@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
     from fembeam.assembly import Matrices
     from fembeam.branch import Branch
+    from fembeam.fields import SectionForces
     from fembeam.orbit import Attractor, Orbit
     from fembeam.run import Run
     from fembeam.scene import Scene
@@ -113,6 +114,13 @@ class Model:
     def phi(self, z: ArrayLike, derivative: int = 0, body: int = 0) -> Vector:
         """Mass-normalised mode shapes in 1/√kg of a beam (0 the scene's own): (n,) at one z, (k, n) at z (k,)."""
         return (self.shapes, *self.others)[body](z, derivative)
+
+    @cached_property
+    def section_forces(self) -> tuple[SectionForces, ...]:
+        """Bending moment and shear force per unit of each coordinate, on each beam."""
+        from fembeam.fields import section_forces
+
+        return tuple(section_forces(self, body) for body in range(len(self.matrices.beams)))
 
     @cached_property
     def touches(self) -> list[Touch]:

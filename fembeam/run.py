@@ -20,6 +20,7 @@ from fembeam.model import Shapes
 from fembeam.section import require
 
 if TYPE_CHECKING:
+    from fembeam.fields import Extremes
     from fembeam.model import Model
 
 Vector = NDArray[np.float64]
@@ -90,6 +91,72 @@ class Run:
     def velocity(self, z: ArrayLike, body: int = 0) -> Vector:
         """u̇(z, t) relative to the frame, m/s."""
         return self.q_dot @ (self.shapes, *self.others)[body](z).T
+
+    def slope(self, z: ArrayLike, body: int = 0) -> Vector:
+        """u_z(z, t), rad."""
+        return self._field("slope", z, body)
+
+    def moment(self, z: ArrayLike, body: int = 0) -> Vector:
+        """Bending moment EI u_zz, N m: positive where it stretches the lower fibre."""
+        return self._field("moment", z, body)
+
+    def shear(self, z: ArrayLike, body: int = 0) -> Vector:
+        """Shear force dM/dz, N; at a point load that of the side ahead."""
+        return self._field("shear", z, body)
+
+    def stress(self, z: ArrayLike, body: int = 0) -> Vector:
+        """Stress at the lower outer fibre, N/m²: M c/I + N/A. ValueError where a section has no `fibre`."""
+        return self._field("stress", z, body)
+
+    def extremes(self, quantity: str = "displacement", z: ArrayLike | None = None, body: int = 0) -> Extremes:
+        """Least and greatest values over the samples, place by place, with their times.
+
+        Parameters
+        ----------
+        quantity : "displacement", "slope", "moment", "shear" or "stress".
+        z : places (j,) in m; None: all nodes of the mesh.
+        """
+        from fembeam.fields import extremes
+
+        places = (self.shapes, *self.others)[body].nodes if z is None else np.atleast_1d(np.asarray(z, dtype=float))
+        return extremes(self.t, self.q, *self._rows(quantity, places, body))
+
+    def _field(self, quantity: str, z: ArrayLike, body: int) -> Vector:
+        """A field over time: (k,) at one z, (k, j) at z (j,)."""
+        places = np.asarray(z, dtype=float)
+        shapes, _, offset = self._rows(quantity, np.atleast_1d(places), body)
+        values = self.q @ shapes.T + offset
+        return values if places.ndim else values[:, 0]
+
+    def _rows(self, quantity: str, z: Vector, body: int) -> tuple[Vector, Vector, Vector]:
+        """What turns q into a field: shapes (j, n), the places themselves, a constant part (j,)."""
+        known = ("displacement", "slope", "moment", "shear", "stress")
+        require(quantity in known, f"quantity must be one of {', '.join(known)}", quantity, "Run", "choose one")
+        if quantity in known[:2]:
+            return (self.shapes, *self.others)[body](z, known.index(quantity)), z, np.zeros(len(z))
+        require(self.model is not None, f"the {quantity} needs the model of the run", "a run read from a file", "Run",
+                "simulate again, or use dataclasses.replace(run, model=model)")  # fmt: skip
+        assert self.model is not None
+        forces = self.model.section_forces[body]
+        rows = getattr(forces, quantity)(z)
+        if quantity != "stress":
+            return rows, z, np.zeros(len(z))
+        bare = ~np.isfinite(rows).all(axis=1)
+        require(not bare.any(), "every section must know its outer fibre", z[bare][:1].tolist(), "Run.stress",
+                "give Section(..., fibre=)")  # fmt: skip
+        return rows, z, forces.beam.axial_force / forces.beam.profile(z).A
+
+    def to_xdmf(self, path: str | os.PathLike[str], stride: int = 1) -> Path:
+        """Write every `stride`-th sample for ParaView: displacement, velocity, slope, moment, shear, stress."""
+        from fembeam.export import to_xdmf
+
+        return to_xdmf(self, path, stride)
+
+    def to_vtu(self, path: str | os.PathLike[str], sample: int = -1) -> Path:
+        """Write one sample for ParaView."""
+        from fembeam.export import to_vtu
+
+        return to_vtu(self, path, sample)
 
     def impactor_displacement(self, impactor: int = 0) -> Vector:
         """x(t) (k,) of an impactor from its place at the start, relative to the frame, m."""
