@@ -33,6 +33,7 @@ _ROOMS = {
     "excitation": "Harmonic Multisine",
     "noise": "BandNoise",
     "record": "Record",
+    "transient": "Pulse Step",
     "model": "Model",
     "orbit": "Attractor Orbit",
     "branch": "Branch",
@@ -60,12 +61,14 @@ __all__ = [
     "Pinned",
     "PointForce",
     "PointMoment",
+    "Pulse",
     "Rayleigh",
     "Record",
     "Run",
     "Scene",
     "Section",
     "Spring",
+    "Step",
     "Stop",
     "Taper",
     "load",
@@ -91,6 +94,7 @@ if TYPE_CHECKING:
     from fembeam.scene import Clamped, Dashpot, Guided, LumpedMass, Pinned, PointForce, PointMoment, Scene, Spring, Stop
     from fembeam.section import Section, Taper
     from fembeam.statistics import moments, pdf, psd
+    from fembeam.transient import Pulse, Step
 
 
 def _check_neighbours() -> None:

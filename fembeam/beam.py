@@ -110,6 +110,12 @@ class Beam:
 
         return beam_of(path, sections, **options)
 
+    def to_mesh(self, path: str | os.PathLike[str], elements: int = 100) -> dict[str, Section | Taper]:
+        """Write the beam as line elements (.msh, .inp, .vtu, .vtk); returns the `sections` to read it back with."""
+        from fembeam.mesh import to_mesh
+
+        return to_mesh(self, path, elements)
+
     @property
     def borders(self) -> tuple[float, ...]:
         """Coordinates of the span ends, 0 and length included."""
