@@ -7,6 +7,7 @@ of the scene, its `bodies`, then one dof for every impactor.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -160,6 +161,7 @@ def assemble(scene: Scene, elements: int | None, modes: int | None, probes: Sequ
 
 def _one_beam(scene: Scene, elements: int | None, modes: int | None, probes: Sequence[float]) -> Matrices:
     """Matrices of the scene's own beam."""
+    _check_buckling(scene)
     borders = borders_of(scene, probes)
     if elements is None:
         modes = DEFAULT_MODES if modes is None else int(modes)
@@ -221,6 +223,19 @@ def _resolving(scene: Scene, borders: Vector, modes: int) -> Vector:
     omega = reduction.modal_basis(coarse.M, coarse.K, modes, root=coarse.root).omega[-1]
     waves = np.diff(borders) * wavenumber(scene.beam, borders, float(omega))
     return divided(borders, np.maximum(1, np.ceil(waves / WAVE_STEP).astype(int)))
+
+
+def _check_buckling(scene: Scene) -> None:
+    """Raise ValueError when the beam has buckled under its axial force."""
+    if scene.beam.axial_force < 0:
+        straight = replace(scene.beam, axial_force=0.0)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)
+            relaxed = replace(scene, beam=straight, bodies=(), impactors=(), stops=())
+        nodes = spread(straight, borders_of(relaxed, ()), 2 * DEFAULT_MODES)
+        most = _buckling_load(_on_nodes(relaxed, nodes, None))
+        require(-scene.beam.axial_force < most, f"axial_force must stay above -{most:.6g} N, where the beam buckles",
+                scene.beam.axial_force, "Beam", "press less, or support it more")  # fmt: skip
 
 
 def _buckling_load(matrices: Matrices) -> float:
