@@ -67,7 +67,7 @@ class Model:
     omega, zeta : (n,) rad/s and damping ratios (the modes' own; dashpots couple modes and come on top).
     participation : Γ (n,) = Φᵀ M r in √kg: the load of a base motion y is -Γ ÿ.
     effective_mass : Γ² (n,) in kg; over all modes it sums to the moving mass.
-    modes : numbers of the kept modes, 0 the lowest; of each beam after the other.
+    modes : numbers (n,) of the kept modes, 0 the lowest; of each beam after the other, 0 for an impactor.
     shapes : φ(z) of the scene's own beam; call ``model.phi(z)``.
     others : the same for its `bodies`.
     """
@@ -105,6 +105,15 @@ class Model:
     def participation(self) -> Vector:
         """Γ (n,) in √kg."""
         return self.basis.participation(self.matrices.base_load)
+
+    @property
+    def names(self) -> list[str]:
+        """What to call each coordinate: "1" for the lowest mode, "1 of beam 1" of a further beam, "impactor 0"."""
+        impactors, beams = len(self.matrices.impactors), len(self.matrices.beams)
+        count = (len(self.omega) - impactors) // beams
+        of = [f" of beam {body}" if body else "" for body in range(beams) for _ in range(count)]
+        modes = [f"{mode + 1}{beam}" for mode, beam in zip(self.modes, of, strict=False)]
+        return modes + [f"impactor {i}" for i in range(impactors)]
 
     @property
     def effective_mass(self) -> Vector:
@@ -345,7 +354,7 @@ def reduced(scene: Scene, modes: int | Sequence[int], elements: int | None) -> M
     basis = _joined(bases, matrices)
     chosen = tuple(range(highest)) if listed is None else tuple(sorted(listed))
     own, *others = _shapes_of_each(matrices, basis)
-    return Model(scene, matrices, basis, chosen * len(bases), own, tuple(others))
+    return Model(scene, matrices, basis, chosen * len(bases) + (0,) * len(matrices.impactors), own, tuple(others))
 
 
 def _oriented(basis: reduction.Basis, beam: Matrices, z: float | None) -> reduction.Basis:

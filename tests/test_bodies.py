@@ -206,6 +206,8 @@ def test_numbers_of_contacts_follow_the_bodies(tmp_path):
     assert [touch.body for touch in model.touches] == [0, 0, 0, 1]
     assert model.phi(0.5)[0] > 0
     assert model.phi(0.3, body=1)[2] > 0
+    assert model.names == ["1", "2", "1 of beam 1", "2 of beam 1", "impactor 0"]
+    assert len(fb.plot.mode_shapes(model).axes[0].lines) >= 3
     run = model.simulate(0.02, 1e-3)
     again = fb.load(run.save(tmp_path / "run"))
     np.testing.assert_array_equal(again.displacement(0.3, body=1), run.displacement(0.3, body=1))

@@ -1,5 +1,6 @@
-"""Figures: one function per question, each returns a matplotlib figure. `response` holds those of one run."""
+"""Figures: one function per question, each returns a matplotlib figure. `response` and `animation` are of one run."""
 
+from fembeam.plot.animation import animate, frame
 from fembeam.plot.orbits import branch, orbit, peak
 from fembeam.plot.response import (
     contacts,
@@ -16,9 +17,11 @@ from fembeam.plot.response import (
 )
 
 __all__ = [
+    "animate",
     "branch",
     "contacts",
     "densities",
+    "frame",
     "mode_shapes",
     "orbit",
     "peak",
