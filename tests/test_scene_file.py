@@ -139,6 +139,7 @@ side = "above"
     )
 
 
+@pytest.mark.filterwarnings("ignore:.*rigid-body:UserWarning")
 def test_a_mesh_is_found_beside_the_scene(tmp_path):
     section = fb.Section.circle(2e11, 7800.0, 0.01)
     fb.Beam.of_spans([(0.2, section), (0.3, section)]).to_mesh(tmp_path / "rig.msh")
