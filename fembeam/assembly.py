@@ -118,14 +118,6 @@ class Matrices:
         place = size - len(self.impactors) + index
         return sparse.csr_matrix(([1.0], ([0], [place])), shape=(1, size))
 
-    @cached_property
-    def buckling_load(self) -> float:
-        """The compression (N, positive) at which the beam buckles, on top of its own axial force; inf: never.
-
-        Lowest P with (K - P G) φ = 0, G = ∫ u_z v_z dz on the free dofs. ValueError when it floats.
-        """
-        return _buckling_load(self)
-
     def frequency_error(self, omega: ArrayLike) -> Vector:
         """Relative error to expect in frequencies omega: max over elements of (β h)⁴/1440, β⁴ = ρA ω²/EI."""
         steps = np.diff(self.nodes) * slowness(self.beam, self.nodes)
@@ -228,30 +220,30 @@ def _resolving(scene: Scene, borders: Vector, modes: int) -> Vector:
 def _check_buckling(scene: Scene) -> None:
     """Raise ValueError when the beam has buckled under its axial force."""
     if scene.beam.axial_force < 0:
-        straight = replace(scene.beam, axial_force=0.0)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)
-            relaxed = replace(scene, beam=straight, bodies=(), impactors=(), stops=())
-        nodes = spread(straight, borders_of(relaxed, ()), 2 * DEFAULT_MODES)
-        most = _buckling_load(_on_nodes(relaxed, nodes, None))
-        require(-scene.beam.axial_force < most, f"axial_force must stay above -{most:.6g} N, where the beam buckles",
-                scene.beam.axial_force, "Beam", "press less, or support it more")  # fmt: skip
+        spare = buckling_load(scene, 2 * DEFAULT_MODES)
+        most = f"{spare - scene.beam.axial_force:.6g}"
+        require(spare > 0, f"axial_force must stay above -{most} N, where the beam buckles", scene.beam.axial_force,
+                "Beam", "press less, or support it more")  # fmt: skip
 
 
-def _buckling_load(matrices: Matrices) -> float:
-    """The largest ν of G φ = ν K φ is 1/P."""
+def buckling_load(scene: Scene, elements: int | None = None) -> float:
+    """Lowest P of (K - P G) φ = 0 for the own beam, less its compression; `Scene.buckling_load` explains it."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        beam = replace(scene.beam, axial_force=0.0)
+        relaxed = replace(scene, beam=beam, bodies=(), impactors=(), stops=())
+    held = relaxed.rigid_body_modes == 0
+    require(held, "supports and springs must hold the beam", f"{relaxed.rigid_body_modes} rigid-body modes",
+            "buckling_load", "add a support")  # fmt: skip
+    matrices = _one_beam(relaxed, elements, None, ())
     free = np.flatnonzero(matrices.dofs.ravel() >= 0)
     G = geometric_stiffness(matrices.nodes)[free][:, free]
-    K = matrices.beams[0].K
     if len(free) < DENSE:
-        try:
-            largest = linalg.eigh(G.toarray(), K.toarray(), eigvals_only=True)[-1]
-        except linalg.LinAlgError:
-            largest = np.nan
+        largest = linalg.eigh(G.toarray(), matrices.K.toarray(), eigvals_only=True)[-1]
     else:
-        largest = sparse_linalg.eigsh(G, 1, K, which="LA", return_eigenvectors=False, v0=np.ones(len(free)))[0]
-    require(bool(largest > 0), "K must be positive definite", float(largest), "buckling_load", "support the beam")
-    return float(1 / largest)
+        start = np.ones(len(free))
+        largest = sparse_linalg.eigsh(G, 1, matrices.K, which="LA", return_eigenvectors=False, v0=start)[0]
+    return float(1 / largest + scene.beam.axial_force)
 
 
 def _on_nodes(scene: Scene, nodes: Vector, modes: int | None) -> Matrices:

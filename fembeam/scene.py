@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 
-from fembeam.assembly import Matrices, assemble
+from fembeam.assembly import Matrices, assemble, buckling_load
 from fembeam.beam import Beam
 from fembeam.damping import ModalDamping, Rayleigh
 from fembeam.impactor import Impactor, check_law
@@ -263,7 +263,7 @@ class Scene:
 
         Parameters
         ----------
-        modes : a count, or mode numbers from 0.
+        modes : a count, or mode numbers from 0; of every beam. Impactors are kept as they are.
         elements : of the mesh; None: as few as make every kept frequency right to 1e-6.
 
         Returns
@@ -278,6 +278,13 @@ class Scene:
         from fembeam.model import reduced
 
         return reduced(self, modes, elements)
+
+    def buckling_load(self, elements: int | None = None) -> float:
+        """The compression (N, positive) at which the beam buckles, on top of its own axial force.
+
+        Lowest P of (K - P G) φ = 0 with G = ∫ u_z v_z dz. ValueError when supports and springs do not hold the beam.
+        """
+        return buckling_load(self, elements)
 
     @property
     def places(self) -> list[float]:
