@@ -1,4 +1,4 @@
-"""A hinged beam falls on a stop, bounces, and comes to rest: a rigid-body mode, gravity and contact.
+"""A hinged beam falls on a stop: a rigid-body mode, gravity and contact; then the same beam lying on it.
 
 θ'' = -3g/2L:  the end falls with 3g/2 and arrives after √(4h/3g) with √(3gh);  at rest the stop carries m g L/2z
 
@@ -30,7 +30,7 @@ end = height * length / z_stop  # of the beam, over its place on the stop
 first = model.simulate(duration=0.09, dt=1e-4, start=start)
 flight, arrival = math.sqrt(4 * end / (3 * g)), math.sqrt(3 * g * end) * z_stop / length
 log = first.contacts
-# gravity also bends the falling beam a little: in the rigid-body mode alone both would be exact
+# gravity also bends the falling beam a little: the rigid-body mode alone is exact
 assert abs(log.t_in[0] / flight - 1) < 1e-3, f"lands after {log.t_in[0]:.5f} s, rigid {flight:.5f} s"
 assert abs(log.speed_in[0] / arrival - 1) < 1e-2, f"lands with {log.speed_in[0]:.4f} m/s, rigid {arrival:.4f} m/s"
 
