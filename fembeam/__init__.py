@@ -25,13 +25,15 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 _ROOMS = {
-    "section": "Section",
+    "section": "Section Taper",
     "beam": "Beam",
-    "scene": "Clamped Dashpot Guided LumpedMass Pinned PointForce Scene Spring Stop",
+    "scene": "Clamped Dashpot Guided LumpedMass Pinned PointForce PointMoment Scene Spring Stop",
+    "impactor": "Impactor",
     "damping": "ModalDamping Rayleigh",
     "excitation": "Harmonic Multisine",
     "noise": "BandNoise",
     "record": "Record",
+    "transient": "Pulse Step",
     "model": "Model",
     "orbit": "Attractor Orbit",
     "branch": "Branch",
@@ -50,6 +52,7 @@ __all__ = [
     "Dashpot",
     "Guided",
     "Harmonic",
+    "Impactor",
     "LumpedMass",
     "ModalDamping",
     "Model",
@@ -57,13 +60,17 @@ __all__ = [
     "Orbit",
     "Pinned",
     "PointForce",
+    "PointMoment",
+    "Pulse",
     "Rayleigh",
     "Record",
     "Run",
     "Scene",
     "Section",
     "Spring",
+    "Step",
     "Stop",
+    "Taper",
     "load",
     "moments",
     "pdf",
@@ -78,14 +85,16 @@ if TYPE_CHECKING:
     from fembeam.branch import Branch
     from fembeam.damping import ModalDamping, Rayleigh
     from fembeam.excitation import Harmonic, Multisine
+    from fembeam.impactor import Impactor
     from fembeam.model import Model
     from fembeam.noise import BandNoise
     from fembeam.orbit import Attractor, Orbit
     from fembeam.record import Record
     from fembeam.run import Run, load
-    from fembeam.scene import Clamped, Dashpot, Guided, LumpedMass, Pinned, PointForce, Scene, Spring, Stop
-    from fembeam.section import Section
+    from fembeam.scene import Clamped, Dashpot, Guided, LumpedMass, Pinned, PointForce, PointMoment, Scene, Spring, Stop
+    from fembeam.section import Section, Taper
     from fembeam.statistics import moments, pdf, psd
+    from fembeam.transient import Pulse, Step
 
 
 def _check_neighbours() -> None:

@@ -1,38 +1,49 @@
-"""From a scene to M, C, K on the free dofs: where the nodes go, how many, and what sits on them.
+"""From a scene to M, C, K on the free dofs: the beam and what sits on it, then further bodies beside it.
 
 M = Σ beam + m (1, e)ᵀ(1, e) + J,  K = RᵀR = Σ beam + k + κ,  load of a base motion: -(M_all r) ÿ,
-r = 1 on every translation, supported ones included, 0 on slopes.
+r = 1 on every translation, supported ones included, 0 on slopes. Several bodies are blocks on the diagonal: the beam
+of the scene, its `bodies`, then one dof for every impactor.
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import sparse
+from scipy import linalg, sparse
+from scipy.sparse import linalg as sparse_linalg
 
 import reduction
-from fembeam.beam import Beam, bending_matrices, bending_root, hermite_rows
-from fembeam.section import require, require_finite
+from fembeam.beam import Beam, bending_matrices, bending_root, geometric_stiffness, hermite_rows
+from fembeam.nodes import (
+    ERROR_CONSTANT,
+    FREQUENCY_TOLERANCE,
+    WAVE_STEP,
+    borders_of,
+    divided,
+    on_beam,
+    slowness,
+    spread,
+    wavenumber,
+)
+from fembeam.section import require
 
 if TYPE_CHECKING:
+    from fembeam.impactor import Impactor
     from fembeam.scene import Scene
 
 Vector = NDArray[np.float64]
 
-FREQUENCY_TOLERANCE = 1e-6  # relative, promised for each mode asked for
-ERROR_CONSTANT = 1 / 1440  # relative error of omega of a cubic Hermite mesh: (beta h)^4/1440
-WAVE_STEP = (0.65 * FREQUENCY_TOLERANCE / ERROR_CONSTANT) ** 0.25  # beta h = 0.175, a third below the promise
 DEFAULT_MODES = 10
 MOST_MODES = 300  # 5400 elements, about a minute; a slender beam has lost its meaning long before
 MOST_DENSE = 2000  # free dofs of which all modes may be asked for, about ten seconds
 MOST_ELEMENTS = 10_000  # above it rounding of K hides the lowest frequencies
-SAME_PLACE = 1e-9  # of the length: features closer than this share a node
-SHORTEST = 1e-4  # of the length: rounding of K grows like (length/h)³, 2e-4 of the first omega² here
+DENSE = 200  # free dofs, below which the dense solver is quicker
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,19 +54,23 @@ class Matrices:
     ----------
     M, K : (N, N) sparse CSR, kg and N/m for displacements.
     C : (N, N) sparse CSR, N s/m: structural damping and dashpots, made when first read.
-    root : (k, N) sparse R with RᵀR = K; `reduction.modal_basis(M, K, root=root)` is accurate on fine meshes.
+    root : (k, N) sparse R with RᵀR = K; `reduction.modal_basis(M, K, root=root)` is accurate on fine meshes. None
+        under compression.
     dashpots : (N, N) sparse, the dashpots' part of C alone.
     influence : r (N,), 1 on translations, 0 on slopes.
     base_load : (M_all r) (N,) in kg, columns of the supported dofs included; the load is -base_load ÿ.
     nodes : (m,) coordinates in m.
     dofs : (m, 2) free dof of (u, u_z) at each node, -1 where supported.
     modes : number of modes the mesh was made for, None if the elements were given.
+    bodies : where there are several beams or impactors, the matrices of each beam by itself; else empty. `nodes` and
+        `dofs` are those of the scene's own beam.
+    impactors : of all bodies, one dof each, the last ones.
     """
 
     beam: Beam
     M: sparse.csr_matrix
     K: sparse.csr_matrix
-    root: sparse.csr_matrix
+    root: sparse.csr_matrix | None
     dashpots: sparse.csr_matrix
     damping: Any
     influence: Vector
@@ -63,10 +78,15 @@ class Matrices:
     nodes: Vector
     dofs: NDArray[np.int64]
     modes: int | None = None
+    bodies: tuple[Matrices, ...] = ()
+    impactors: tuple[Impactor, ...] = ()
 
     @cached_property
     def C(self) -> sparse.csr_matrix:
         """Structural damping + dashpots."""
+        if self.bodies:
+            strikers = sparse.diags([impactor.damping for impactor in self.impactors])
+            return sparse.block_diag([*(body.C for body in self.bodies), strikers], format="csr")
         return (self.damping.matrix(self.M, self.K, self.root) + self.dashpots).tocsr()
 
     @property
@@ -74,19 +94,40 @@ class Matrices:
         """Number of elements."""
         return len(self.nodes) - 1
 
-    def interpolation(self, z: ArrayLike, derivative: int = 0) -> sparse.csr_matrix:
-        """Rows (k, N): u, u_z or u_zz (derivative 0, 1, 2) at z (k,) by the elements' cubics.
+    @property
+    def beams(self) -> tuple[Matrices, ...]:
+        """The matrices of each beam by itself, this scene's own first."""
+        return self.bodies or (self,)
+
+    def interpolation(self, z: ArrayLike, derivative: int = 0, body: int = 0) -> sparse.csr_matrix:
+        """Rows (k, N): u, u_z or u_zz (derivative 0, 1, 2) of a body at z (k,) by the elements' cubics.
 
         Supported dofs count as 0; at a node the curvature is that of the element ahead. ValueError if a z is
         not on the beam.
         """
-        places = _on_beam(np.atleast_1d(np.asarray(z, dtype=float)), self.beam, "interpolation")
-        return hermite_rows(self.nodes, places, derivative)[:, np.flatnonzero(self.dofs.ravel() >= 0)]
+        own = self.beams[body]
+        places = on_beam(np.atleast_1d(np.asarray(z, dtype=float)), own.beam, "interpolation")
+        rows = hermite_rows(own.nodes, places, derivative)[:, np.flatnonzero(own.dofs.ravel() >= 0)]
+        before = sum(beam.M.shape[0] for beam in self.beams[:body])
+        after = self.M.shape[0] - before - rows.shape[1]
+        blank = [sparse.csr_matrix((len(places), count)) for count in (before, after)]
+        return sparse.hstack([blank[0], rows, blank[1]], format="csr") if before or after else rows
+
+    def striker(self, index: int) -> sparse.csr_matrix:
+        """Row (1, N): the displacement of an impactor."""
+        size = self.M.shape[0]
+        place = size - len(self.impactors) + index
+        return sparse.csr_matrix(([1.0], ([0], [place])), shape=(1, size))
 
     def frequency_error(self, omega: ArrayLike) -> Vector:
         """Relative error to expect in frequencies omega: max over elements of (β h)⁴/1440, β⁴ = ρA ω²/EI."""
-        steps = np.diff(self.nodes) * _slowness(self.beam, self.nodes)
+        steps = np.diff(self.nodes) * slowness(self.beam, self.nodes)
         return ERROR_CONSTANT * steps.max() ** 4 * np.asarray(omega, dtype=float) ** 2
+
+    @property
+    def rounding(self) -> float:
+        """Relative error of the lowest frequency from rounding: about eps n² with a root, eps n⁴ without."""
+        return float(np.finfo(float).eps * self.elements ** (2 if self.root is not None else 4))
 
     @property
     def accuracy(self) -> str:
@@ -103,12 +144,23 @@ class Matrices:
 def assemble(scene: Scene, elements: int | None, modes: int | None, probes: Sequence[float]) -> Matrices:
     """Matrices of the scene; `Scene.matrices` explains the arguments."""
     _check_counts(elements, modes)
-    borders = _borders(scene, probes)
+    own = _one_beam(scene, elements, modes, probes)
+    if not scene.bodies and not scene.impactors:
+        return own
+    touched = [[s.on[1] for s in scene.stops if s.on and s.on[0] == b + 1] for b in range(len(scene.bodies))]
+    others = [_one_beam(body, elements, modes, at) for body, at in zip(scene.bodies, touched, strict=True)]
+    return _joined((own, *others), tuple(i for body in (scene, *scene.bodies) for i in body.impactors))
+
+
+def _one_beam(scene: Scene, elements: int | None, modes: int | None, probes: Sequence[float]) -> Matrices:
+    """Matrices of the scene's own beam."""
+    _check_buckling(scene)
+    borders = borders_of(scene, probes)
     if elements is None:
         modes = DEFAULT_MODES if modes is None else int(modes)
         _check_modes(modes)
         return _on_nodes(scene, _resolving(scene, borders, modes), modes)
-    matrices = _on_nodes(scene, _spread(scene.beam, borders, elements), None)
+    matrices = _on_nodes(scene, spread(scene.beam, borders, elements), None)
     if modes is not None:
         size = matrices.M.shape[0]
         require(modes <= size, f"modes must be at most {size} (free dofs)", modes, "Scene.matrices",
@@ -116,6 +168,30 @@ def assemble(scene: Scene, elements: int | None, modes: int | None, probes: Sequ
         require(modes <= MOST_MODES or size <= MOST_DENSE, f"modes must be at most {MOST_MODES} of {size} free dofs",
                 modes, "Scene.matrices", f"or use a mesh of at most {MOST_DENSE} dofs")  # fmt: skip
     return matrices
+
+
+def _joined(beams: tuple[Matrices, ...], impactors: tuple[Impactor, ...]) -> Matrices:
+    """Several bodies as blocks of one problem, impactors last."""
+    own = beams[0]
+    mass = np.array([impactor.mass for impactor in impactors])
+    stiffness = np.array([impactor.stiffness for impactor in impactors])
+    damping = np.array([impactor.damping for impactor in impactors])
+
+    def stacked(blocks: Sequence[sparse.csr_matrix], last: Vector) -> sparse.csr_matrix:
+        return sparse.block_diag([*blocks, *([sparse.diags(last)] if len(last) else [])], format="csr")
+
+    roots = [beam.root for beam in beams if beam.root is not None]
+    return replace(
+        own,
+        M=stacked([beam.M for beam in beams], mass),
+        K=stacked([beam.K for beam in beams], stiffness),
+        root=stacked(roots, np.sqrt(stiffness)) if len(roots) == len(beams) else None,
+        dashpots=stacked([beam.dashpots for beam in beams], damping),
+        influence=np.concatenate([*(beam.influence for beam in beams), np.ones(len(mass))]),
+        base_load=np.concatenate([*(beam.base_load for beam in beams), mass]),
+        bodies=beams,
+        impactors=impactors,
+    )
 
 
 def _check_counts(elements: int | None, modes: int | None) -> None:
@@ -135,59 +211,41 @@ def _check_modes(modes: int) -> None:
             "keep the modes up to a few times the highest frequency of interest")  # fmt: skip
 
 
-def _borders(scene: Scene, probes: Sequence[float]) -> Vector:
-    """Coordinates that must be nodes, ascending, without repeats."""
-    for index, z in enumerate(probes):
-        require_finite(f"probes[{index}]", z, "Scene.matrices", "give coordinates in m")
-    asked = _on_beam(np.asarray(list(probes), dtype=float), scene.beam, "probes of Scene.matrices")
-    shortest = SHORTEST * scene.beam.length
-    needed = np.sort([*scene.beam.borders, *(support.z for support in scene.supports)])
-    nodes = needed[np.diff(needed, prepend=-np.inf) > SAME_PLACE * scene.beam.length]
-    gaps = np.diff(nodes)
-    rule = f"supports and span ends must be {shortest:.3g} m apart or at one place"
-    require(bool(np.all(gaps >= shortest)), rule, float(gaps.min()), "Scene", "move or merge them")
-    for z in [*scene.places, *asked]:
-        if np.min(np.abs(nodes - z)) >= shortest:  # nearer ones are interpolated inside their element
-            nodes = np.append(nodes, z)
-    return np.sort(nodes)
-
-
-def _on_beam(z: Vector, beam: Beam, where: str) -> Vector:
-    """The same z, checked."""
-    outside = ~((z >= 0) & (z <= beam.length))
-    require(not outside.any(), f"z must lie on the beam, 0 to {beam.length} m", z[outside].tolist(), where,
-            "keep to the beam")  # fmt: skip
-    return z
-
-
-def _slowness(beam: Beam, nodes: Vector) -> Vector:
-    """(ρA/EI)^(1/4) between neighbouring nodes: bending wavenumber over √omega."""
-    middle = 0.5 * (nodes[:-1] + nodes[1:])
-    return (beam.line_mass(middle) / beam.bending_stiffness(middle)) ** 0.25
-
-
-def _divided(borders: Vector, counts: NDArray[np.int64]) -> Vector:
-    """Nodes with counts[i] equal elements between borders i and i + 1."""
-    intervals = zip(borders[:-1], borders[1:], counts, strict=True)
-    pieces = [np.linspace(start, end, count, endpoint=False) for start, end, count in intervals]
-    return np.append(np.concatenate(pieces), borders[-1])
-
-
-def _spread(beam: Beam, borders: Vector, elements: int) -> Vector:
-    """Nodes with `elements` elements in all (at least one per interval), short where waves are short."""
-    waves = np.diff(borders) * _slowness(beam, borders)
-    counts = np.ones(len(waves), dtype=int)
-    for _ in range(elements - len(waves)):
-        counts[np.argmax(waves / counts)] += 1
-    return _divided(borders, counts)
-
-
 def _resolving(scene: Scene, borders: Vector, modes: int) -> Vector:
-    """Nodes with as few elements as keep β h below WAVE_STEP; omega is estimated on a coarse mesh."""
-    coarse = _on_nodes(scene, _spread(scene.beam, borders, 2 * modes + 4), None)
+    """Nodes with as few elements as keep κ h below WAVE_STEP; omega is estimated on a coarse mesh."""
+    coarse = _on_nodes(scene, spread(scene.beam, borders, 2 * modes + 4), None)
     omega = reduction.modal_basis(coarse.M, coarse.K, modes, root=coarse.root).omega[-1]
-    waves = np.diff(borders) * _slowness(scene.beam, borders) * np.sqrt(omega)
-    return _divided(borders, np.maximum(1, np.ceil(waves / WAVE_STEP).astype(int)))
+    waves = np.diff(borders) * wavenumber(scene.beam, borders, float(omega))
+    return divided(borders, np.maximum(1, np.ceil(waves / WAVE_STEP).astype(int)))
+
+
+def _check_buckling(scene: Scene) -> None:
+    """Raise ValueError when the beam has buckled under its axial force."""
+    if scene.beam.axial_force < 0:
+        spare = buckling_load(scene, 2 * DEFAULT_MODES)
+        most = f"{spare - scene.beam.axial_force:.6g}"
+        require(spare > 0, f"axial_force must stay above -{most} N, where the beam buckles", scene.beam.axial_force,
+                "Beam", "press less, or support it more")  # fmt: skip
+
+
+def buckling_load(scene: Scene, elements: int | None = None) -> float:
+    """Lowest P of (K - P G) φ = 0 for the own beam, less its compression; `Scene.buckling_load` explains it."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        beam = replace(scene.beam, axial_force=0.0)
+        relaxed = replace(scene, beam=beam, bodies=(), impactors=(), stops=())
+    held = relaxed.rigid_body_modes == 0
+    require(held, "supports and springs must hold the beam", f"{relaxed.rigid_body_modes} rigid-body modes",
+            "buckling_load", "add a support")  # fmt: skip
+    matrices = _one_beam(relaxed, elements, None, ())
+    free = np.flatnonzero(matrices.dofs.ravel() >= 0)
+    G = geometric_stiffness(matrices.nodes)[free][:, free]
+    if len(free) < DENSE:
+        largest = linalg.eigh(G.toarray(), matrices.K.toarray(), eigvals_only=True)[-1]
+    else:
+        start = np.ones(len(free))
+        largest = sparse_linalg.eigsh(G, 1, matrices.K, which="LA", return_eigenvectors=False, v0=start)[0]
+    return float(1 / largest + scene.beam.axial_force)
 
 
 def _on_nodes(scene: Scene, nodes: Vector, modes: int | None) -> Matrices:
@@ -204,11 +262,13 @@ def _on_nodes(scene: Scene, nodes: Vector, modes: int | None) -> Matrices:
     springs = _lumped(nodes, [(s.z, s.stiffness, s.rotational, 0.0) for s in scene.springs])
     dashpots = _lumped(nodes, [(d.z, d.damping, d.rotational, 0.0) for d in scene.dashpots])
     M_all, K_all, C_all = M + arms.T @ arms, K + springs.T @ springs, dashpots.T @ dashpots
-    root = sparse.vstack([bending_root(scene.beam, nodes), springs], format="csr")
+    root = bending_root(scene.beam, nodes)
+    if root is not None:
+        root = sparse.vstack([root, springs], format="csr")[:, free]
 
     r = np.tile([1.0, 0.0], len(nodes))
     M, K, C = (A.tocsr()[free][:, free] for A in (M_all, K_all, C_all))
-    return Matrices(scene.beam, M, K, root[:, free], C, scene.damping, r[free], (M_all @ r)[free], nodes, dofs, modes)
+    return Matrices(scene.beam, M, K, root, C, scene.damping, r[free], (M_all @ r)[free], nodes, dofs, modes)
 
 
 def _lumped(nodes: Vector, items: Sequence[tuple[float, float, float, float]]) -> sparse.csr_matrix:

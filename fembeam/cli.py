@@ -162,7 +162,7 @@ def mode_table(model: Model) -> str:
     unit = "", "", "", "", "√kg", "kg", f"{mass:.6g} kg"
     rows = [
         (
-            f"{mode + 1}" if number < len(model.omega) - model.static else "static",
+            name,
             f"{w:.6f}",
             f"{w / (2 * math.pi):.6f}",
             f"{z:.4g}",
@@ -170,9 +170,7 @@ def mode_table(model: Model) -> str:
             f"{g**2:.6g}",
             f"{100 * g**2 / mass:.3f}",
         )
-        for number, (mode, w, z, g) in enumerate(
-            zip(model.modes, model.omega, model.zeta, model.participation, strict=True)
-        )
+        for name, w, z, g in zip(model.names, model.omega, model.zeta, model.participation, strict=True)
     ]
     share = 100 * float(model.effective_mass.sum()) / mass
     rows.append(("all", "", "", "", "", f"{model.effective_mass.sum():.6g}", f"{share:.3f}"))

@@ -1,13 +1,17 @@
 """The reduced model: a scene seen through a few modes, ready to be simulated.
 
-q_i'' + 2 ζ_i ω_i q_i' + ω_i² q_i = -Γ_i ÿ + Σ φ_i(z_f) f + Σ_s w_si F_s,    u(z, t) = Σ φ_i(z) q_i(t)
+q_i'' + 2 ζ_i ω_i q_i' + ω_i² q_i = -Γ_i (ÿ + g) + Σ φ_i(z_f) f + Σ_s w_si F_s,    u(z, t) = Σ φ_i(z) q_i(t)
+
+Of several bodies each has its own coordinates: the modes of the scene's beam, those of its `bodies`, then √m x for
+every impactor.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 import reduction
 import solvers
 from fembeam.beam import hermite_rows
+from fembeam.bodies import Touch, loads, touches, weight
 from fembeam.section import require, require_positive
 
 if TYPE_CHECKING:
@@ -24,11 +29,13 @@ if TYPE_CHECKING:
 
     from fembeam.assembly import Matrices
     from fembeam.branch import Branch
+    from fembeam.fields import SectionForces
     from fembeam.orbit import Attractor, Orbit
     from fembeam.run import Run
     from fembeam.scene import Scene
 
 Vector = NDArray[np.float64]
+Field = Callable[[Vector], Any] | None  # of displacement in m or velocity in m/s, over z (k,)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +57,7 @@ class Shapes:
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A scene reduced to n modes; made by `Scene.reduce`.
+    """A scene reduced to n coordinates; made by `Scene.reduce`.
 
     Attributes
     ----------
@@ -58,11 +65,12 @@ class Model:
         shape is a pseudo-mode of high frequency, damped as the next higher mode would be (Rayleigh: by its ω).
     participation : Γ (n,) = Φᵀ M r in √kg: the load of a base motion y is -Γ ÿ.
     effective_mass : Γ² (n,) in kg; over all modes it sums to the moving mass.
-    modes : (n,) numbers of the kept modes, 0 the lowest; static shapes come last and are numbered on.
-    static : how many of the last ones are residual static shapes.
+    modes : numbers (n,) of the kept modes, 0 the lowest; of each beam after the other, a beam's static shapes last and
+        numbered on; 0 for an impactor.
+    shapes : φ(z) of the scene's own beam; call ``model.phi(z)``. others : the same for its `bodies`.
+    counts : of modes and of static shapes, (modes, static), of each beam.
     way : arguments of `Scene.reduce` that make it again, with mode numbers instead of criteria.
     static_share : part of the static compliance that the model keeps at every stop, then at every force; 1 is all.
-    shapes : φ(z); call ``model.phi(z)``.
     """
 
     scene: Scene
@@ -70,7 +78,8 @@ class Model:
     basis: reduction.Basis
     modes: tuple[int, ...]
     shapes: Shapes
-    static: int = 0
+    counts: tuple[tuple[int, int], ...]
+    others: tuple[Shapes, ...] = ()
     way: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -81,12 +90,31 @@ class Model:
     @cached_property
     def zeta(self) -> Vector:
         """Damping ratios (n,) of the structure without dashpots."""
-        return self.scene.damping.ratios(self.omega, self.modes)
+        return self._of_each_beam(lambda damping, omega, modes: damping.ratios(omega, modes), self.scene)
+
+    def _of_each_beam(self, ask: Callable[[Any, Vector, tuple[int, ...]], Vector], scene: Scene) -> Vector:
+        """An answer (n,) of each beam's damping for its own modes; 0 for impactors."""
+        answers, done = [], 0
+        for body, count in zip((scene, *scene.bodies), self.counts, strict=True):
+            mine = slice(done, done + sum(count))
+            answers.append(ask(body.damping, self.omega[mine], self.modes[mine]))
+            done += sum(count)
+        return np.concatenate([*answers, np.zeros(len(self.matrices.impactors))])
 
     @cached_property
     def participation(self) -> Vector:
         """Γ (n,) in √kg."""
         return self.basis.participation(self.matrices.base_load)
+
+    @property
+    def names(self) -> list[str]:
+        """What to call each coordinate: "1" for the lowest mode, "static", "1 of beam 1", "impactor 0"."""
+        names, done = [], 0
+        for body, (count, static) in enumerate(self.counts):
+            of = f" of beam {body}" if body else ""
+            names += [f"{mode + 1}{of}" for mode in self.modes[done : done + count]] + [f"static{of}"] * static
+            done += count + static
+        return names + [f"impactor {i}" for i in range(len(self.matrices.impactors))]
 
     @property
     def effective_mass(self) -> Vector:
@@ -101,6 +129,11 @@ class Model:
     def moving_mass(self) -> float:
         """Sum of the effective masses over all modes, b·M⁻¹ b in kg: what a base motion sets moving."""
         return reduction.moved_mass(self.matrices.M, self.matrices.base_load)
+
+    @property
+    def static(self) -> int:
+        """Number of residual static shapes."""
+        return sum(static for _, static in self.counts)
 
     @cached_property
     def static_share(self) -> Vector:
@@ -129,9 +162,27 @@ class Model:
         slowest = max(float(self.omega[0]), 1.0)
         return solvers.integrate(system, *start, np.pi / slowest).contacts
 
-    def phi(self, z: ArrayLike, derivative: int = 0) -> Vector:
-        """Mass-normalised mode shapes in 1/√kg: (n,) at one z, (k, n) at z (k,)."""
-        return self.shapes(z, derivative)
+    def phi(self, z: ArrayLike, derivative: int = 0, body: int = 0) -> Vector:
+        """Mass-normalised mode shapes in 1/√kg of a beam (0 the scene's own): (n,) at one z, (k, n) at z (k,)."""
+        return (self.shapes, *self.others)[body](z, derivative)
+
+    @cached_property
+    def section_forces(self) -> tuple[SectionForces, ...]:
+        """Bending moment and shear force per unit of each coordinate, on each beam."""
+        from fembeam.fields import section_forces
+
+        return tuple(section_forces(self, body) for body in range(len(self.matrices.beams)))
+
+    @cached_property
+    def touches(self) -> list[Touch]:
+        """The contacts in the order of the log: of each beam its stops, then its impactors."""
+        return touches(self.scene, self.matrices)
+
+    @cached_property
+    def directions(self) -> Vector:
+        """(m, n): w of every contact on the coordinates, δ = -w·q - gap."""
+        rows = [self.basis.project(touch.row.T)[:, 0] for touch in self.touches]
+        return np.array(rows).reshape(len(rows), len(self.omega))
 
     @cached_property
     def system(self) -> solvers.System:
@@ -141,58 +192,74 @@ class Model:
     def system_of(self, scene: Scene) -> solvers.System:
         """The problem of a scene that differs from the model's in loads, gaps and laws only."""
         n = len(self.omega)
-        C = np.diag(scene.damping.modal_coefficients(self.omega, self.modes))
+        C = np.diag(self._of_each_beam(lambda damping, omega, modes: damping.modal_coefficients(omega, modes), scene))
         C = C + self.basis.project_matrix(self.matrices.dashpots)
-        contacts = [solvers.Contact(stop.push * self.phi(stop.z), stop.law, stop.gap) for stop in scene.stops]
-        loads = [(self.phi(force.z), force.signal) for force in scene.forces]
+        same = self.touches if scene is self.scene else touches(scene, self.matrices)
+        pairs = zip(self.directions, same, strict=True)
+        contacts = [solvers.Contact(direction, touch.law, touch.gap) for direction, touch in pairs]
+        driven = [(self.basis.project(row.T)[:, 0], signal) for row, signal in loads(scene, self.matrices)]
         if scene.base is not None:
-            loads.append((-self.participation, scene.base.derivative(2)))
-        return solvers.System(np.eye(n), C, np.diag(self.omega**2), contacts, loads)
+            driven.append((-self.participation, scene.base.derivative(2)))
+        if scene.gravity != 0.0:
+            driven.append((-self.participation, weight(scene)))
+        return solvers.System(np.eye(n), C, np.diag(self.omega**2), contacts, driven)
 
     def rest(self) -> Vector:
-        """The start at rest: (2n,) zeros."""
-        return np.zeros(2 * len(self.omega))
+        """The start [q, q_dot] (2n,) of everything undeflected and at rest but the impactors, at their velocity."""
+        from fembeam import start
 
-    def state(
-        self,
-        displacement: Callable[[Vector], Any] | None = None,
-        velocity: Callable[[Vector], Any] | None = None,
-    ) -> Vector:
+        return start.rest(self)
+
+    def state(self, displacement: Field | Sequence[Field] = None, velocity: Field | Sequence[Field] = None) -> Vector:
         """The start [q, q_dot] (2n,) nearest, in the mass norm, to given fields u(z) in m and u̇(z) in m/s.
 
         Parameters
         ----------
-        displacement, velocity : functions of z (k,), relative to the frame; None is zero.
+        displacement, velocity : functions of z (k,), relative to the frame; None is zero. A list gives one for each
+            beam. Impactors start in their places with their velocities.
+
+        Warns
+        -----
+        UserWarning : the kept modes miss more than 1 % of a field; says how much. `Model.missed` gives the number.
+
+        Raises
+        ------
+        ValueError : a field is not finite; a free impactor would start inside the beam.
         """
-        return np.concatenate([self._coordinates(field) for field in (displacement, velocity)])
+        from fembeam import start
 
-    def _coordinates(self, field: Callable[[Vector], Any] | None) -> Vector:
-        """Q = Φᵀ M u of a field, its slopes from a cubic spline through the nodes."""
-        if field is None:
-            return np.zeros(len(self.omega))
-        from scipy.interpolate import CubicSpline
+        return start.state(self, displacement, velocity)
 
-        nodes = self.matrices.nodes
-        values = np.broadcast_to(np.asarray(field(nodes), dtype=float), nodes.shape)
-        bad = values[~np.isfinite(values)]
-        require(not bad.size, "the field must be finite on the beam", bad[:1], "Model.state", "check the function")
-        both = np.stack([values, CubicSpline(nodes, values)(nodes, 1)], axis=1)
-        return self.basis.project(self.matrices.M @ both[self.matrices.dofs >= 0])
+    def missed(self, field: Field | Sequence[Field]) -> float:
+        """The part of a field of displacement or velocity that the kept modes cannot represent: ‖u - Φq‖/‖u‖ in M."""
+        from fembeam import start
+
+        return start.missed(self, field)
+
+    def equilibrium(self, loads: Mapping[float, float] | None = None) -> Vector:
+        """The start at rest under gravity, preloads and given dead loads, contacts included.
+
+        Parameters
+        ----------
+        loads : {z in m: force in N, positive up} on the scene's own beam, for as long as it settles; signals of forces
+            and base do not act. Simulate from it to see what follows when the loads go (release from a pull).
+
+        Returns
+        -------
+        (2n,) : impactors with a velocity keep their place meanwhile, and have it.
+
+        Raises
+        ------
+        reduction.AccuracyError : nothing carries the loads, so that no equilibrium is found.
+        """
+        from fembeam import start
+
+        return start.equilibrium(self, loads or {})
 
     def lasting(self, duration: float) -> Model:
         """The same model with every signal good for ``duration``; noise without a period gets one."""
-        from dataclasses import replace
-
-        scene, base = self.scene, self.scene.base
-        if hasattr(base, "lasting"):
-            base = base.lasting(duration)
-        forces = [
-            replace(force, signal=force.signal.lasting(duration)) if hasattr(force.signal, "lasting") else force
-            for force in scene.forces
-        ]
-        if base is scene.base and all(a is b for a, b in zip(forces, scene.forces, strict=True)):
-            return self
-        return replace(self, scene=replace(scene, base=base, forces=forces))
+        scene = _lasting(self.scene, duration)
+        return self if scene is self.scene else replace(self, scene=scene)
 
     def simulate(
         self,
@@ -208,7 +275,7 @@ class Model:
         ----------
         duration : s.
         dt : output sampling in s; None keeps the final state and the contact log only.
-        start : (2n,) as made by `rest` or `state`; None is rest.
+        start : (2n,) as made by `rest`, `state` or `equilibrium`; None is rest.
         solver : one of the methods in `solvers`; None is the library's best.
         progress : show a bar (only on a terminal).
 
@@ -310,3 +377,26 @@ class Model:
         from fembeam.branch import resumed
 
         return resumed(self, path)
+
+
+def _lasting(scene: Scene, duration: float) -> Scene:
+    """The scene with signals good for the duration; itself where nothing changes."""
+
+    def kept(items: Sequence[Any], name: str) -> list[Any]:
+        signals = [getattr(item, name) for item in items]
+        longer = [signal.lasting(duration) if hasattr(signal, "lasting") else signal for signal in signals]
+        trio = zip(items, signals, longer, strict=True)
+        return [item if old is new else replace(item, **{name: new}) for item, old, new in trio]
+
+    base = scene.base.lasting(duration) if hasattr(scene.base, "lasting") else scene.base
+    new: dict[str, Any] = {
+        "forces": kept(scene.forces, "signal"),
+        "springs": kept(scene.springs, "foot"),
+        "bodies": [_lasting(body, duration) for body in scene.bodies],
+    }
+    pairs = [pair for name, items in new.items() for pair in zip(getattr(scene, name), items, strict=True)]
+    if base is scene.base and all(a is b for a, b in pairs):
+        return scene
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # what it says of the scene was said when it was made
+        return replace(scene, base=base, **new)

@@ -20,10 +20,11 @@ from fembeam.model import Shapes
 from fembeam.section import require
 
 if TYPE_CHECKING:
+    from fembeam.fields import Extremes
     from fembeam.model import Model
 
 Vector = NDArray[np.float64]
-FORMAT = 1
+FORMAT = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,15 +49,19 @@ class Run:
     status: str
     cost: solvers.Cost
     shapes: Shapes
-    stops: Vector  # (m, 3): z, push, gap
+    stops: Vector  # (m, 3): z, push, gap of every contact
+    directions: Vector  # (m, n): δ = -directions·q - gap
+    strikers: Vector  # (i,): masses of the impactors, whose coordinates √m x are the last ones
     scene: str
     model: Model | None = None
     stored_forces: Vector | None = None  # (m, k) of a run read from a file
+    others: tuple[Shapes, ...] = ()  # of the further beams
 
     @classmethod
     def of(cls, model: Model, solution: solvers.Solution) -> Run:
         """A model's solution with what it takes to read it."""
-        stops = np.array([(s.z, s.push, s.gap) for s in model.scene.stops], dtype=float).reshape(-1, 3)
+        stops = np.array([(touch.z, touch.push, touch.gap) for touch in model.touches], dtype=float).reshape(-1, 3)
+        strikers = np.array([impactor.mass for impactor in model.matrices.impactors], dtype=float)
         status = solution.status.value
         if not solution.status.good:
             status += f" (t = {solution.t[-1]:g} s)" if len(solution.t) else " (before the first sample)"
@@ -70,7 +75,8 @@ class Run:
                 status,
                 solution.cost,
             ),
-            *(model.shapes, stops, repr(model.scene), model),
+            *(model.shapes, stops, model.directions, strikers, repr(model.scene), model),
+            others=model.others,
         )
 
     @property
@@ -78,30 +84,109 @@ class Run:
         """Whether the run reached its end."""
         return self.status == solvers.Status.DONE.value
 
-    def displacement(self, z: ArrayLike) -> Vector:
-        """u(z, t) relative to the frame, m: (k,) at one z, (k, j) at z (j,)."""
-        return self.q @ self.shapes(z).T
+    def displacement(self, z: ArrayLike, body: int = 0) -> Vector:
+        """u(z, t) of a beam (0 the scene's own) relative to the frame, m: (k,) at one z, (k, j) at z (j,)."""
+        return self.q @ (self.shapes, *self.others)[body](z).T
 
-    def velocity(self, z: ArrayLike) -> Vector:
+    def velocity(self, z: ArrayLike, body: int = 0) -> Vector:
         """u̇(z, t) relative to the frame, m/s."""
-        return self.q_dot @ self.shapes(z).T
+        return self.q_dot @ (self.shapes, *self.others)[body](z).T
+
+    def slope(self, z: ArrayLike, body: int = 0) -> Vector:
+        """u_z(z, t), rad."""
+        return self._field("slope", z, body)
+
+    def moment(self, z: ArrayLike, body: int = 0) -> Vector:
+        """Bending moment EI u_zz, N m: positive where it stretches the lower fibre."""
+        return self._field("moment", z, body)
+
+    def shear(self, z: ArrayLike, body: int = 0) -> Vector:
+        """Shear force dM/dz, N; at a point load that of the side ahead."""
+        return self._field("shear", z, body)
+
+    def stress(self, z: ArrayLike, body: int = 0) -> Vector:
+        """Stress at the lower outer fibre, N/m²: M c/I + N/A. ValueError where a section has no `fibre`."""
+        return self._field("stress", z, body)
+
+    def extremes(self, quantity: str = "displacement", z: ArrayLike | None = None, body: int = 0) -> Extremes:
+        """Least and greatest values over the samples, place by place, with their times.
+
+        Parameters
+        ----------
+        quantity : "displacement", "slope", "moment", "shear" or "stress".
+        z : places (j,) in m; None: all nodes of the mesh.
+        """
+        from fembeam.fields import extremes
+
+        places = (self.shapes, *self.others)[body].nodes if z is None else np.atleast_1d(np.asarray(z, dtype=float))
+        return extremes(self.t, self.q, *self._rows(quantity, places, body))
+
+    def _field(self, quantity: str, z: ArrayLike, body: int) -> Vector:
+        """A field over time: (k,) at one z, (k, j) at z (j,)."""
+        places = np.asarray(z, dtype=float)
+        shapes, _, offset = self._rows(quantity, np.atleast_1d(places), body)
+        values = self.q @ shapes.T + offset
+        return values if places.ndim else values[:, 0]
+
+    def _rows(self, quantity: str, z: Vector, body: int) -> tuple[Vector, Vector, Vector]:
+        """What turns q into a field: shapes (j, n), the places themselves, a constant part (j,)."""
+        known = ("displacement", "slope", "moment", "shear", "stress")
+        require(quantity in known, f"quantity must be one of {', '.join(known)}", quantity, "Run", "choose one")
+        if quantity in known[:2]:
+            return (self.shapes, *self.others)[body](z, known.index(quantity)), z, np.zeros(len(z))
+        require(self.model is not None, f"the {quantity} needs the model of the run", "a run read from a file", "Run",
+                "simulate again, or use dataclasses.replace(run, model=model)")  # fmt: skip
+        assert self.model is not None
+        forces = self.model.section_forces[body]
+        rows = getattr(forces, quantity)(z)
+        if quantity != "stress":
+            return rows, z, np.zeros(len(z))
+        bare = ~np.isfinite(rows).all(axis=1)
+        require(not bare.any(), "every section must know its outer fibre", z[bare][:1].tolist(), "Run.stress",
+                "give Section(..., fibre=)")  # fmt: skip
+        return rows, z, forces.beam.axial_force / forces.beam.profile(z).A
+
+    def to_xdmf(self, path: str | os.PathLike[str], stride: int = 1) -> Path:
+        """Write every `stride`-th sample for ParaView: displacement, velocity, slope, moment, shear, stress."""
+        from fembeam.export import to_xdmf
+
+        return to_xdmf(self, path, stride)
+
+    def to_vtu(self, path: str | os.PathLike[str], sample: int = -1) -> Path:
+        """Write one sample for ParaView."""
+        from fembeam.export import to_vtu
+
+        return to_vtu(self, path, sample)
+
+    def impactor_displacement(self, impactor: int = 0) -> Vector:
+        """x(t) (k,) of an impactor from its place at the start, relative to the frame, m."""
+        return self._striker(self.q, impactor)
+
+    def impactor_velocity(self, impactor: int = 0) -> Vector:
+        """ẋ(t) (k,) of an impactor relative to the frame, m/s."""
+        return self._striker(self.q_dot, impactor)
+
+    def _striker(self, coordinates: Vector, impactor: int) -> Vector:
+        """One of the last columns, without its √m."""
+        count = len(self.strikers)
+        require(0 <= impactor < count, f"impactor must be below {count}, the number of impactors", impactor, "Run",
+                "count from 0")  # fmt: skip
+        return coordinates[:, coordinates.shape[1] - count + impactor] / np.sqrt(self.strikers[impactor])
 
     def indentation(self, stop: int = 0) -> Vector:
-        """δ(t) (k,) of a stop, m; negative while it is open."""
-        z, push, gap = self._stop(stop)
-        return -push * self.displacement(z) - gap
+        """δ(t) (k,) of a stop, m; negative while it is open. Contacts of impactors count on after the stops."""
+        return -self.q @ self.directions[self._stop(stop)] - self.stops[stop, 2]
 
     def force(self, stop: int = 0) -> Vector:
         """Contact force (k,) of a stop, N, from its law and the entry rate latched at the time."""
-        self._stop(stop)
-        return self._forces[stop]
+        return self._forces[self._stop(stop)]
 
-    def _stop(self, stop: int) -> Vector:
-        """One checked row of ``stops``."""
+    def _stop(self, stop: int) -> int:
+        """The number of a contact, checked."""
         count = len(self.stops)
         require(-count <= stop < count, f"stop must be below {count}, the number of stops", stop, "Run",
                 "count from 0")  # fmt: skip
-        return self.stops[stop]
+        return stop
 
     @cached_property
     def _forces(self) -> Vector:
@@ -109,12 +194,11 @@ class Run:
         if self.stored_forces is not None:
             return self.stored_forces
         assert self.model is not None
-        forces = [self._force_of(s, stop.law) for s, stop in enumerate(self.model.scene.stops)]
+        forces = [self._force_of(s, touch.law) for s, touch in enumerate(self.model.touches)]
         return np.array(forces).reshape(len(forces), len(self.t))
 
     def _force_of(self, stop: int, law: Any) -> Vector:
         """Force history of one stop."""
-        z, push, _ = self.stops[stop]
         mine = self.contacts.stop == stop
         entered, speed = self.contacts.t_in[mine], self.contacts.speed_in[mine]
         if not len(entered):
@@ -123,7 +207,7 @@ class Run:
         last = np.searchsorted(entered[order], self.t, side="right") - 1
         entry_rate = np.maximum(np.abs(speed[order])[np.maximum(last, 0)], law.entry_rate_floor)
         delta = np.where(last >= 0, self.indentation(stop), -1.0)
-        return np.asarray(law.force(delta, -push * self.velocity(z), entry_rate))
+        return np.asarray(law.force(delta, -self.q_dot @ self.directions[stop], entry_rate))
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write everything to one ``.npz`` file, whole or not at all; read it with `load`."""
@@ -136,7 +220,10 @@ class Run:
         }
         arrays = {
             **{"t": self.t, "q": self.q, "q_dot": self.q_dot, "force": self._forces},
-            **{"stops": self.stops, "nodes": self.shapes.nodes, "shapes": self.shapes.values},
+            **{"stops": self.stops, "directions": self.directions, "strikers": self.strikers},
+            **{"nodes": self.shapes.nodes, "shapes": self.shapes.values},
+            **{f"nodes_{i}": shapes.nodes for i, shapes in enumerate(self.others, 1)},
+            **{f"shapes_{i}": shapes.values for i, shapes in enumerate(self.others, 1)},
             **{f"contact_{name}": column for name, column in self.contacts.arrays().items()},
             **{f"energy_{f.name}": getattr(self.energy, f.name) for f in fields(self.energy)},
         }
@@ -169,6 +256,7 @@ def load(path: str | os.PathLike[str]) -> Run:
 
 def _of_arrays(about: dict[str, Any], arrays: dict[str, Any]) -> Run:
     """A run from the contents of its file."""
+    bodies = sum(name.split("_")[0] == "nodes" for name in arrays)
     return Run(
         *(arrays["t"], arrays["q"], arrays["q_dot"]),
         contacts=solvers.ContactLog(*(arrays[f"contact_{f.name}"] for f in fields(solvers.ContactLog))),
@@ -177,8 +265,11 @@ def _of_arrays(about: dict[str, Any], arrays: dict[str, Any]) -> Run:
         cost=solvers.Cost(**about["cost"]),
         shapes=Shapes(arrays["nodes"], arrays["shapes"]),
         stops=arrays["stops"],
+        directions=arrays["directions"],
+        strikers=arrays["strikers"],
         scene=about["scene"],
         stored_forces=arrays["force"],
+        others=tuple(Shapes(arrays[f"nodes_{i}"], arrays[f"shapes_{i}"]) for i in range(1, bodies)),
     )
 
 

@@ -1,4 +1,4 @@
-"""The scene: one beam, what holds it, what hangs on it, what it may hit, and what drives it.
+"""The scene: a beam, what holds it, what hangs on it, what it may hit, and what drives it; further bodies beside it.
 
 SI units; z along the beam, u its displacement relative to the frame, positive up. Everything is checked when
 it is made, before anything is computed: positions, signs, conflicts.
@@ -6,7 +6,6 @@ it is made, before anything is computed: positions, signs, conflicts.
 
 from __future__ import annotations
 
-import inspect
 import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -15,9 +14,10 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
-from fembeam.assembly import Matrices, assemble
+from fembeam.assembly import Matrices, assemble, buckling_load
 from fembeam.beam import Beam
 from fembeam.damping import ModalDamping, Rayleigh
+from fembeam.impactor import Impactor, check_law
 from fembeam.section import require, require_finite, require_non_negative
 
 if TYPE_CHECKING:
@@ -72,15 +72,21 @@ class LumpedMass:
 
 @dataclass(frozen=True)
 class Spring:
-    """A spring to the frame: force -k u (`stiffness`, N/m), moment -κ u_z (`rotational`, N m/rad); ≥ 0."""
+    """A spring to the frame: force -k (u - foot) (`stiffness`, N/m), moment -κ u_z (`rotational`, N m/rad); ≥ 0.
+
+    `foot` is a signal, the motion of its far end relative to the frame in m (a shaken support); None: at rest.
+    """
 
     z: float
     stiffness: float
     rotational: float = 0.0
+    foot: Any = None
 
     def __post_init__(self) -> None:
         require_non_negative("stiffness", self.stiffness, f"Spring at z = {self.z}", "give N/m")
         require_non_negative("rotational", self.rotational, f"Spring at z = {self.z}", "give N m/rad")
+        require(self.foot is None or callable(self.foot), "foot must be a signal or None", self.foot,
+                f"Spring at z = {self.z}", "give a motion such as Harmonic(amplitude, omega)")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -98,31 +104,26 @@ class Dashpot:
 
 @dataclass(frozen=True)
 class Stop:
-    """A one-sided stop on the frame: δ = -u - gap below the beam, δ = u - gap above it.
+    """A one-sided stop: δ = -u - gap below the beam, δ = u - gap above it.
 
-    `law` gives the repulsive force for δ > 0; `gap` in m, negative = preload.
+    `law` gives the repulsive force for δ > 0; `gap` in m, negative = preload. It sits on the frame, or `on` another
+    beam of the scene: `on=(body, z)`, body 1 the first of `Scene.bodies`; u is then the difference, u - u_body(z).
     """
 
     z: float
     law: Any
     gap: float = 0.0
     side: str = "below"
+    on: tuple[int, float] | None = None
 
     def __post_init__(self) -> None:
         where = f"Stop at z = {self.z}"
         require_finite("gap", self.gap, where, "give the clearance in m, negative for a preload")
         require(self.side in ("below", "above"), "side must be 'below' or 'above'", self.side, where, "choose one")
-        bare = inspect.isroutine(self.law) and not hasattr(self.law, "force")
-        require(
-            not bare,
-            "law must not be a bare function",
-            self.law,
-            where,
-            "decorate it with @law from contacts",
-        )
-        valid = callable(getattr(self.law, "force", None)) and not inspect.isclass(self.law)
-        require(valid, "law must offer force(delta, delta_dot, entry_rate)", self.law, where,
-                "give a law such as contacts.Hertz(stiffness)")  # fmt: skip
+        require(self.on is None or (isinstance(self.on, (tuple, list)) and len(self.on) == 2),
+                "on must be (body, z) or None", self.on, where,
+                "name a beam of bodies, 1 the first, and a place")  # fmt: skip
+        check_law(self.law, where)
 
     @property
     def push(self) -> float:
@@ -142,13 +143,26 @@ class PointForce:
                 "give a signal such as Harmonic(amplitude, omega)")  # fmt: skip
 
 
+@dataclass(frozen=True)
+class PointMoment:
+    """A moment on the beam at z: signal(t) in N m, positive where it turns u_z up."""
+
+    z: float
+    signal: Any
+
+    def __post_init__(self) -> None:
+        require(self.signal is not None, "signal must be given", self.signal, f"PointMoment at z = {self.z}",
+                "give a signal such as Harmonic(amplitude, omega)")  # fmt: skip
+
+
 FEATURES: dict[str, tuple[type, ...]] = {
     "supports": get_args(Support),
     "masses": (LumpedMass,),
     "springs": (Spring,),
     "dashpots": (Dashpot,),
     "stops": (Stop,),
-    "forces": (PointForce,),
+    "forces": (PointForce, PointMoment),
+    "impactors": (Impactor,),
 }
 
 
@@ -156,7 +170,7 @@ FEATURES: dict[str, tuple[type, ...]] = {
 class Scene:
     """A beam with supports, masses, springs, dashpots, stops, damping, base motion and forces.
 
-    M ü + C u̇ + K u = -M r ÿ + Σ b f(t) + Σ w F(δ, δ̇)
+    M ü + C u̇ + K u = -M r (ÿ + g) + Σ b f(t) + Σ w F(δ, δ̇)
 
     Parameters
     ----------
@@ -165,6 +179,10 @@ class Scene:
     masses, springs, dashpots, stops, forces : lists, any length; kept as tuples.
     damping : ModalDamping or Rayleigh, of the structure without dashpots.
     base : frame motion y(t), or None.
+    impactors : rigid masses beside the beam. Their contacts are numbered after those of the stops.
+    bodies : further beams, each a Scene of its own with its supports, stops, forces, damping; a `Stop` with `on` lets
+        the beam of this scene meet them. Their contacts are numbered after those of this scene.
+    gravity : g in m/s², pulls everything down; for all bodies.
 
     Raises
     ------
@@ -192,7 +210,10 @@ class Scene:
     stops: Sequence[Stop] = ()
     damping: ModalDamping | Rayleigh = ModalDamping(0.0)  # noqa: RUF009 (frozen)
     base: Any = None
-    forces: Sequence[PointForce] = ()
+    forces: Sequence[PointForce | PointMoment] = ()
+    impactors: Sequence[Impactor] = ()
+    bodies: Sequence[Scene] = ()
+    gravity: float = 0.0
 
     def __post_init__(self) -> None:
         if not isinstance(self.beam, Beam):
@@ -203,7 +224,10 @@ class Scene:
         if not callable(getattr(self.damping, "modal_coefficients", None)):
             raise TypeError(f"damping must be ModalDamping or Rayleigh, got {self.damping!r} in Scene; "
                             "write ModalDamping(0.01)")  # fmt: skip
+        require_finite("gravity", self.gravity, "Scene", "give m/s², 9.81 on the ground")
+        object.__setattr__(self, "bodies", _listed("bodies", self.bodies, (Scene,)))
         self._check_conflicts()
+        self._check_bodies()
         if count := self.rigid_body_modes:
             what = "1 rigid-body mode appears" if count == 1 else "2 rigid-body modes appear"
             advice = "supports and springs do not hold the beam, it may drift"
@@ -247,7 +271,8 @@ class Scene:
 
         Parameters
         ----------
-        modes : a count, mode numbers from 0 such as [0, 2, 5], or "all" of a mesh of given `elements`; None: 2.
+        modes : a count, mode numbers from 0 such as [0, 2, 5], or "all" of a mesh of given `elements`; None: 2. The
+            same of every beam; impactors are kept as they are.
         elements : of the mesh; None: as few as make every kept frequency right to 1e-6.
         omega_max : instead of `modes`: all of them up to this frequency, rad/s.
         mass_share : instead of `modes`: as many as carry this share of the mass that a base motion moves, in (0, 1).
@@ -275,6 +300,13 @@ class Scene:
         """Coordinates of stops, then forces."""
         return [stop.z for stop in self.stops] + [force.z for force in self.forces]
 
+    def buckling_load(self, elements: int | None = None) -> float:
+        """The compression (N, positive) at which the beam buckles, on top of its own axial force.
+
+        Lowest P of (K - P G) φ = 0 with G = ∫ u_z v_z dz. ValueError when supports and springs do not hold the beam.
+        """
+        return buckling_load(self, elements)
+
     @property
     def places(self) -> list[float]:
         """Coordinates of all features, in no order."""
@@ -282,11 +314,12 @@ class Scene:
 
     @property
     def rigid_body_modes(self) -> int:
-        """How many of the motions u = a + b z neither a support nor a spring resists: 0, 1 or 2."""
+        """How many of the motions u = a + b z nothing resists, of supports, springs, foundation, tension: 0, 1 or 2."""
         rows = [row for s in self.supports for row, fixed in zip(_rigid_rows(s.z), s.fixed, strict=True) if fixed]
         for spring in self.springs:
             translation, rotation = _rigid_rows(spring.z)
             rows += [translation] * (spring.stiffness > 0) + [rotation] * (spring.rotational > 0)
+        rows += [(1.0, 0.0), (0.0, 1.0)] * (self.beam.foundation > 0) + [(0.0, 1.0)] * (self.beam.axial_force != 0)
         scaled = np.array([*rows, (0.0, 0.0)]) / (1.0, self.beam.length)
         return 2 - int(np.linalg.matrix_rank(scaled, tol=1e-9))
 
@@ -299,11 +332,34 @@ class Scene:
                     feature.z, where, "move it, or lengthen the beam")  # fmt: skip
 
     def _check_conflicts(self) -> None:
-        """Raise ValueError if two supports share one place."""
+        """Raise ValueError if two supports share one place, or two stops one place, side and carrier."""
+        near = 1e-9 * self.beam.length
         ordered = sorted(self.supports, key=lambda support: support.z)
         for first, second in pairwise(ordered):
-            apart = second.z - first.z > 1e-9 * self.beam.length
+            apart = second.z - first.z > near
             require(apart, "supports must not share one place", (first, second), "Scene", "keep one")
+        for j, stop in enumerate(self.stops):
+            for i, other in enumerate(self.stops[:j]):
+                same = abs(stop.z - other.z) <= near and (stop.side, stop.on) == (other.side, other.on)
+                require(not same, f"stops must not share one place and side (z = {stop.z} m, {stop.side})", (i, j),
+                        "stops of Scene", "make them one stop with one law, such as PiecewiseLinear")  # fmt: skip
+
+    def _check_bodies(self) -> None:
+        """Raise ValueError for what a body cannot carry, and for stops on bodies or places that do not exist."""
+        for index, body in enumerate(self.bodies):
+            plain = body.base is None and body.gravity == 0 and not body.bodies
+            require(plain, "a body must not have base, gravity or bodies of its own", body,
+                    f"bodies[{index}] of Scene", "give them to the outer scene")  # fmt: skip
+        for index, stop in enumerate(self.stops):
+            if stop.on is None:
+                continue
+            number, z = stop.on
+            where = f"stops[{index}] of Scene"
+            known = isinstance(number, int) and 1 <= number <= len(self.bodies)
+            require(known, f"on must name a body, 1 to {len(self.bodies)}", number, where, "add the beam to bodies")
+            length = self.bodies[number - 1].beam.length
+            require_finite("z of on", z, where, "give the coordinate along that beam in m")
+            require(0 <= z <= length, f"z of on must lie on body {number}, 0 to {length} m", z, where, "move it")
 
 
 def _listed(name: str, value: Any, kinds: tuple[type, ...]) -> tuple[Any, ...]:

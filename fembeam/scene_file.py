@@ -1,6 +1,7 @@
 """Scene files: TOML tables in, a Scene and its studies out.
 
-    [beam] [[supports]] [[masses]] [[springs]] [[dashpots]] [[stops]] [[forces]] [damping] [base]
+    [beam] [[supports]] [[masses]] [[springs]] [[dashpots]] [[stops]] [[forces]] [[impactors]] [damping] [base]
+    gravity = 9.81
     [reduce] [simulate] [mode_count] [smallest_model]
 
 The keys of a table are the arguments of the constructor behind it, read from its signature, so that nothing is
@@ -26,9 +27,10 @@ from fembeam.noise import BandNoise
 from fembeam.record import Record
 from fembeam.scene import FEATURES, Scene
 from fembeam.schema import Constructors, converted, fits, listed, nearest, parameters, required, shown, wanted
-from fembeam.section import Section, require_non_negative, require_positive
+from fembeam.section import Section, Taper, require_non_negative, require_positive
 from fembeam.study.quantities import QUANTITIES
 from fembeam.study.tables import ModeCountTable, SmallestModelTable
+from fembeam.transient import Pulse, Step
 
 Table = Mapping[str, Any]
 
@@ -80,6 +82,7 @@ SHAPES: Constructors = {
     "rectangle": Section.rectangle,
     "circle": Section.circle,
     "tube": Section.tube,
+    "taper": Taper,
 }
 LAWS: Constructors = {
     "hertz": contacts.Hertz,
@@ -95,6 +98,8 @@ SIGNALS: Constructors = {
     "multisine": Multisine,
     "band_noise": BandNoise,
     "record": Record.from_csv,
+    "pulse": Pulse,
+    "step": Step,
 }
 SOLVERS = {"exponential": "Exponential", "dormand_prince": "DormandPrince", "henon_rk2": "HenonRK2"}
 STUDIES: Constructors = {"simulate": Simulate, "mode_count": ModeCountTable, "smallest_model": SmallestModelTable}
@@ -151,7 +156,7 @@ class _Reader:
 
     def scene_file(self, tables: Table) -> SceneFile:
         """The whole file."""
-        parts = inspect.signature(Scene).parameters
+        parts = [name for name in inspect.signature(Scene).parameters if name != "bodies"]  # one beam per file
         self.check_keys(tables, [*parts, "reduce", *STUDIES], "the file", "table")
         if "beam" not in tables:
             self.fail("the file", "needs a table [beam]")
@@ -172,7 +177,9 @@ class _Reader:
         return SceneFile(self.path, scene, reduce, studies)
 
     def check_form(self, name: str, value: Any) -> None:
-        """Features come as [[name]], everything else as [name]."""
+        """Features come as [[name]], gravity as a number, everything else as [name]."""
+        if name == "gravity":
+            return
         if name in FEATURES:
             if not (isinstance(value, list) and all(isinstance(entry, dict) for entry in value)):
                 self.fail(name, f"must be a list of tables; write [[{name}]]")
@@ -183,6 +190,8 @@ class _Reader:
         """One argument of Scene from its table or list of tables."""
         if name == "beam":
             return self.beam(value)
+        if name == "gravity":
+            return value
         if name == "damping":
             if "zeta" in value and {"alpha", "beta"} & set(value):
                 self.fail("[damping]", "give either zeta, or alpha and beta, not both")
@@ -196,20 +205,35 @@ class _Reader:
         for number, table in enumerate(value):
             where = f"[[{name}]] number {number + 1}"
             only = next(iter(kinds.values())) if len(kinds) == 1 else None
-            made.append(self.build(only, table, where) if only else self.choose(kinds, table, where))
+            usual = "point_force" if name == "forces" else ""
+            made.append(self.build(only, table, where) if only else self.choose(kinds, table, where, default=usual))
         return made
 
     def beam(self, table: Table) -> Beam:
-        """A beam of one section, or of `spans`."""
+        """A beam of one section, of `spans`, or of a `mesh`."""
+        common = ["foundation", "axial_force"]
+        options = {key: table[key] for key in common if key in table}
+        if "mesh" in table:
+            self.check_keys(table, ["mesh", "sections", "data", *common], "[beam]", "key")
+            sections, path = table.get("sections"), table["mesh"]
+            if not isinstance(sections, dict) or not isinstance(path, str):
+                self.fail("[beam]", "a mesh needs its path and a table sections = { name = { section }, … }")
+            found = {name: self.section(entry, f"[beam] sections {name}") for name, entry in sections.items()}
+            options |= {"data": table["data"]} if "data" in table else {}
+            return self.made(Beam.from_mesh, {"path": self.path.parent / path, "sections": found, **options}, "[beam]")
         if "spans" not in table:
-            return self.build(Beam, table, "[beam]")
-        self.check_keys(table, ["spans"], "[beam]", "key")
+            return self.build(_beam, table, "[beam]")
+        self.check_keys(table, ["spans", *common], "[beam]", "key")
         if not isinstance(table["spans"], list):
             self.fail("[beam]", "spans must be a list of tables with length and section")
         spans = [
             self.build(_span, entry, f"[beam] span {number}") for number, entry in enumerate(table["spans"], start=1)
         ]
-        return self.made(Beam.of_spans, {"spans": spans}, "[beam]")
+        return self.made(Beam.of_spans, {"spans": spans, **options}, "[beam]")
+
+    def section(self, table: Any, where: str) -> Section | Taper:
+        """A section by its shape."""
+        return self.choose(SHAPES, table, where, "shape", "general")
 
     def choose(self, kinds: Constructors, table: Any, where: str, key: str = "kind", default: str = "") -> Any:
         """Build the constructor that `kind` (or `shape`) names."""
@@ -256,11 +280,11 @@ class _Reader:
     def value(self, value: Any, key: str, parameter: inspect.Parameter, where: str) -> Any:
         """One value: a table for what has its own constructor, else checked by the annotation."""
         inner = f"{where} {key}"
-        if key == "section":
-            return self.choose(SHAPES, value, inner, "shape", "general")
+        if key == "section" or parameter.annotation is Section:
+            return self.section(value, inner)
         if key == "law":
             return self.choose(LAWS, value, inner)
-        if key == "signal":
+        if key in ("signal", "foot"):
             return self.choose(SIGNALS, value, inner)
         if key == parameter.name == "quantity":
             return self.choose(QUANTITIES, value if isinstance(value, dict) else {"kind": value}, inner)
@@ -288,6 +312,11 @@ class _Reader:
 def _span(length: float, section: Section) -> tuple[float, Section]:
     """One span of a beam."""
     return length, section
+
+
+def _beam(length: float, section: Section, foundation: float = 0.0, axial_force: float = 0.0) -> Beam:
+    """A beam of one section."""
+    return Beam(length, section, foundation=foundation, axial_force=axial_force)
 
 
 def _snake(name: str) -> str:

@@ -358,7 +358,7 @@ def test_archive_without_its_arrays_is_refused(tmp_path, about):
 
 def test_other_format_is_refused(run, tmp_path):
     np.savez(tmp_path / "new.npz", about='{"format": 99}')
-    with pytest.raises(ValueError, match=r"has format 99, this version reads 1"):
+    with pytest.raises(ValueError, match=r"has format 99, this version reads 2"):
         fb.load(tmp_path / "new.npz")
 
 

@@ -95,6 +95,65 @@ modes = [0, 2]
     assert float(scene.forces[0].signal(0.0)) == 3.0
 
 
+def test_impactors_tapers_foundations_and_once_only_signals(tmp_path):
+    scene = read(tmp_path, """
+gravity = 9.81
+[beam]
+length = 0.5
+foundation = 100
+axial_force = 20.0
+[beam.section]
+shape = "taper"
+start = { shape = "circle", E = 2e11, rho = 7800, diameter = 0.02 }
+end = { shape = "circle", E = 2e11, rho = 7800, diameter = 0.01 }
+[[supports]]
+kind = "clamped"
+z = 0
+[[springs]]
+z = 0.5
+stiffness = 100
+foot = { kind = "step", size = 1e-3, rise = 0.1 }
+[[forces]]
+z = 0.5
+signal = { kind = "pulse", peak = 10, length = 0.01 }
+[[forces]]
+kind = "point_moment"
+z = 0.5
+signal = { kind = "harmonic", amplitude = 1, omega = 0 }
+[[impactors]]
+z = 0.4
+mass = 0.1
+velocity = -1.0
+law = { kind = "hertz", stiffness = 1e9 }
+gap = 1e-3
+side = "above"
+""").scene  # fmt: skip
+    thick, thin = (fb.Section.circle(2e11, 7800, d) for d in (0.02, 0.01))
+    assert scene == fb.Scene(
+        fb.Beam(0.5, fb.Taper(thick, thin), foundation=100, axial_force=20.0),
+        [fb.Clamped(0.0)],
+        springs=[fb.Spring(0.5, 100, foot=fb.Step(1e-3, 0.1))],
+        forces=[fb.PointForce(0.5, fb.Pulse(10, 0.01)), fb.PointMoment(0.5, fb.Harmonic(1, 0))],
+        impactors=[fb.Impactor(0.4, 0.1, -1.0, Hertz(1e9), 1e-3, "above")],
+        gravity=9.81,
+    )
+
+
+@pytest.mark.filterwarnings("ignore:.*rigid-body:UserWarning")
+def test_a_mesh_is_found_beside_the_scene(tmp_path):
+    section = fb.Section.circle(2e11, 7800.0, 0.01)
+    fb.Beam.of_spans([(0.2, section), (0.3, section)]).to_mesh(tmp_path / "rig.msh")
+    shape = '{ shape = "circle", E = 2e11, rho = 7800, diameter = 0.01 }'
+    table = f'[beam]\nmesh = "rig.msh"\n[beam.sections]\nspan_1 = {shape}\n'
+    assert read(tmp_path, table + f"span_2 = {shape}\n").scene.beam.borders == (0.0, 0.2, 0.5)
+    with pytest.raises(SceneFileError, match=r"\[beam\]: every element must have one section"):
+        read(tmp_path, table)
+    with pytest.raises(SceneFileError, match="a mesh needs its path and a table sections"):
+        read(tmp_path, '[beam]\nmesh = "rig.msh"')
+    with pytest.raises(SceneFileError, match=r"unknown key 'lenght'"):
+        read(tmp_path, '[beam]\nmesh = "rig.msh"\nlenght = 1')
+
+
 def test_a_record_is_found_beside_the_scene(tmp_path):
     rows = [f"{0.01 * i},{i % 5}" for i in range(100)]
     (tmp_path / "motion.csv").write_text("\n".join(["t,a", *rows]))

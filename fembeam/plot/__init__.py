@@ -1,8 +1,9 @@
 """Figures: one function per question, each returns a matplotlib figure.
 
-`response` holds those of one run, `study` those of studies.
+`response` and `animation` hold those of one run, `orbits` those of periodic motion, `study` those of studies.
 """
 
+from fembeam.plot.animation import animate, frame
 from fembeam.plot.orbits import branch, orbit, peak
 from fembeam.plot.response import (
     contacts,
@@ -20,9 +21,11 @@ from fembeam.plot.response import (
 from fembeam.plot.study import mode_count, smallest_model
 
 __all__ = [
+    "animate",
     "branch",
     "contacts",
     "densities",
+    "frame",
     "mode_count",
     "mode_shapes",
     "orbit",

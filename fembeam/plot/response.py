@@ -191,8 +191,8 @@ def mode_shapes(model: Model) -> Figure:
     shapes = model.phi(z)
     scale = np.abs(shapes).max(axis=0)
     axis.axhline(0.0, color=GREY, linewidth=0.6)
-    for i in range(min(6, len(model.omega))):
-        label = f"mode {model.modes[i] + 1}: {model.omega[i]:.4g} rad/s, ζ = {model.zeta[i]:.3g}"
+    for i in np.flatnonzero(scale)[:6]:  # other bodies' modes do not move this beam
+        label = f"mode {model.names[i]}: {model.omega[i]:.4g} rad/s, ζ = {model.zeta[i]:.3g}"
         axis.plot(1e3 * z, shapes[:, i] / scale[i], label=label)
     _mark_features(axis, model)
     axis.set_xlabel("z / mm")

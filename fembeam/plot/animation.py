@@ -1,0 +1,225 @@
+"""Runs as moving pictures: beams, stops, impactors and contact forces, as GIF or MP4."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fembeam.bodies import heights
+from fembeam.plot.response import BLUE, GREY, ORANGE, RED, styled
+from fembeam.section import require
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from fembeam.run import Run
+
+Vector = NDArray[np.float64]
+
+MOST_FRAMES = 1000  # above it a GIF takes minutes and fills disks
+POINTS = 121  # along a beam
+STAY = 0.6  # of the height of the picture, the length of the arrow of the largest force
+
+
+def animate(
+    run: Run,
+    path: str | os.PathLike[str],
+    window: tuple[float, float] | None = None,
+    frames: int = 150,
+    fps: float = 25.0,
+) -> Path:
+    """Write a run as a moving picture: deflected beams, stops, impactors, an arrow for every contact force.
+
+    Parameters
+    ----------
+    run : with samples close enough to show the motion: at least `frames` of them in the window.
+    path : .gif, or .mp4 where the program ffmpeg is installed.
+    window : (from, to) in s; None: all of it.
+    frames : how many pictures, evenly spread over the window's samples; at most 1000.
+    fps : pictures per second. The title says how much slower than real time that is.
+
+    Returns
+    -------
+    The path.
+
+    Raises
+    ------
+    ValueError : another suffix, no ffmpeg, fewer than 2 samples in the window, a run that does not know its scene.
+    """
+    from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
+
+    target = Path(path)
+    known = target.suffix in (".gif", ".mp4")
+    require(known, "the suffix must be .gif or .mp4", target.suffix, "animate", "choose one")
+    able = target.suffix == ".gif" or FFMpegWriter.isAvailable()
+    require(able, "an .mp4 needs the program ffmpeg", "none", "animate", "install it, or write a .gif")
+    require(target.parent.is_dir(), "the folder must exist", str(target.parent), "animate", "make it first")
+    samples = _samples(run, window, frames)
+    stage = _Stage(run, samples, fps)
+    film = FuncAnimation(stage.figure, stage.show, frames=len(samples), init_func=lambda: [], blit=False)
+    writer = (PillowWriter if target.suffix == ".gif" else FFMpegWriter)(fps=fps)  # type: ignore[arg-type]
+    with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}.") as folder:
+        draft = os.path.join(folder, target.name)
+        film.save(draft, writer=writer, dpi=100)
+        os.replace(draft, target)
+    return target
+
+
+def frame(run: Run, t: float, window: tuple[float, float] | None = None) -> Figure:
+    """One picture of the moving picture, at the sample next to t (s)."""
+    samples = _samples(run, window, MOST_FRAMES)
+    stage = _Stage(run, samples, None)
+    stage.show(int(np.argmin(np.abs(run.t[samples] - t))))
+    return stage.figure
+
+
+def _samples(run: Run, window: tuple[float, float] | None, frames: int) -> NDArray[np.int64]:
+    """Numbers of the samples to show."""
+    require(run.model is not None, "the picture needs the model of the run", "a run read from a file", "animate",
+            "simulate again, or use dataclasses.replace(run, model=model)")  # fmt: skip
+    whole = isinstance(frames, (int, np.integer)) and 2 <= frames <= MOST_FRAMES
+    require(whole, f"frames must be 2 to {MOST_FRAMES}", frames, "animate", "give a count")
+    lo, hi = window or (float(run.t[0]), float(run.t[-1]))
+    inside = np.flatnonzero((run.t >= lo) & (run.t <= hi))
+    require(len(inside) >= 2, "the window must hold at least 2 samples", (lo, hi), "animate", "widen it, or lower dt")
+    return inside[np.unique(np.linspace(0, len(inside) - 1, frames).round().astype(int))]
+
+
+class _Stage:
+    """The figure and what moves in it."""
+
+    figure: Figure
+
+    def __init__(self, run: Run, samples: NDArray[np.int64], fps: float | None) -> None:
+        assert run.model is not None
+        self.run, self.samples, self.touches = run, samples, run.model.touches
+        self.beams, self.strikers = heights(run.model.scene)
+        self.forces = [run.force(i)[samples] for i in range(len(self.touches))]
+        self.largest = max([float(np.abs(force).max()) for force in self.forces], default=0.0)
+        self.lines = self._displaced()
+        step = float(np.median(np.diff(run.t[samples])))
+        self.speed = "" if fps is None else f", {1 / (step * fps):.3g} times slower than real"
+        self._build()
+
+    def _displaced(self) -> list[tuple[Vector, Vector]]:
+        """(z, height over the scene's beam (frames, z)) of every beam."""
+        lines = []
+        for shapes, height in zip((self.run.shapes, *self.run.others), self.beams, strict=True):
+            z = np.linspace(shapes.nodes[0], shapes.nodes[-1], POINTS)
+            lines.append((z, height + (self.run.q[self.samples] @ shapes(z).T)))
+        return lines
+
+    @styled
+    def _build(self) -> Figure:
+        """Axes, fixed things, and empty artists for what moves."""
+        from matplotlib.figure import Figure
+
+        self.figure = Figure(figsize=(7.0, 4.4), layout="constrained")
+        self.beam_axis, self.force_axis = self.figure.subplots(2, 1, height_ratios=[2.2, 1])
+        self.span = self._limits(self.beam_axis)
+        self.curves = [self.beam_axis.plot([], [], color=BLUE, linewidth=2.2)[0] for _ in self.lines]
+        self.balls = [
+            self.beam_axis.plot([], [], "o", color=GREY, markersize=10, transform=self._beside(side, 6.0))[0]
+            for side in self._sides()
+        ]
+        self.arrows = self.beam_axis.quiver(*np.zeros((4, max(1, len(self.touches)))), color=RED, angles="xy",
+                                            scale_units="xy", scale=1, width=0.007, pivot="tip", zorder=5)  # fmt: skip
+        self.title = self.beam_axis.set_title(" ")
+        self._fixed(self.beam_axis)
+        for i, force in enumerate(self.forces):
+            self.force_axis.plot(self.run.t[self.samples], force, color=f"C{i}", label=self._name(i))
+        self.cursor = self.force_axis.axvline(self.run.t[self.samples[0]], color=ORANGE)
+        self.force_axis.set_xlabel("time / s")
+        self.force_axis.set_ylabel("contact force / N")
+        self.force_axis.set_xlim(*self.run.t[self.samples[[0, -1]]])
+        if len(self.forces) > 1:
+            self.figure.legend(*self.force_axis.get_legend_handles_labels(), loc="outside lower center", ncols=4)
+        self.figure.draw_without_rendering()
+        self.figure.set_layout_engine("none")  # once is enough, and takes longer than a picture
+        return self.figure
+
+    def _name(self, number: int) -> str:
+        """A contact in words."""
+        kind, which = self.touches[number].on
+        place = f"z = {1e3 * self.touches[number].z:.4g} mm"
+        return f"{ {'frame': 'stop', 'body': 'beams', 'impactor': f'impactor {which}'}[kind] }, {place}"
+
+    def _limits(self, axis: Axes) -> float:
+        """Set the view, on the beams: an impactor may leave it; returns its height in mm."""
+        rows = [line for _, line in self.lines] + [np.array(self.strikers)] * bool(self.strikers)
+        stops = [-touch.push * touch.gap for touch in self.touches if touch.on[0] == "frame"]
+        low = 1e3 * min(*(float(row.min()) for row in rows), *stops, 0.0)
+        high = 1e3 * max(*(float(row.max()) for row in rows), *stops, 0.0)
+        spread = max(high - low, 1e-9)
+        axis.set_ylim(low - 0.25 * spread, high + 0.25 * spread)
+        length = max(float(z[-1]) for z, _ in self.lines)
+        axis.set_xlim(-30 * length, 1030 * length)
+        axis.set_xlabel("z / mm")
+        axis.set_ylabel("displacement / mm")
+        return 1.5 * spread
+
+    def _sides(self) -> list[float]:
+        """For every impactor +1 when it sits over its beam, -1 under it, 0 when it embraces it."""
+        pushes: list[list[float]] = [[] for _ in self.strikers]
+        for touch in self.touches:
+            if touch.on[0] == "impactor":
+                pushes[touch.on[1]].append(-touch.push)
+        return [sum(each) for each in pushes]
+
+    def _beside(self, side: float, points: float) -> Any:
+        """Data coordinates moved up by so many points times `side`, so that a marker touches and does not cover."""
+        from matplotlib.transforms import ScaledTranslation
+
+        return self.beam_axis.transData + ScaledTranslation(0, side * points / 72, self.figure.dpi_scale_trans)
+
+    def _ball(self, impactor: int) -> Vector:
+        """Height (frames,) of an impactor."""
+        return self.strikers[impactor] + self.run.impactor_displacement(impactor)[self.samples]
+
+    def _fixed(self, axis: Axes) -> None:
+        """Supports and stops on the frame."""
+        assert self.run.model is not None
+        scene = self.run.model.scene
+        for body, height in zip((scene, *scene.bodies), self.beams, strict=True):
+            for support in body.supports:
+                axis.plot(1e3 * support.z, 1e3 * height, "s", color="black", markersize=7, clip_on=False)
+        for touch in self.touches:
+            if touch.on[0] == "frame":
+                at = 1e3 * (self.beams[touch.body] - touch.push * touch.gap)
+                axis.plot(1e3 * touch.z, at, marker="^" if touch.push > 0 else "v", color="black", markersize=9,
+                          transform=self._beside(-touch.push, 6.0), clip_on=False, zorder=1)  # fmt: skip
+
+    def show(self, number: int) -> list[Artist]:
+        """Move everything to one frame."""
+        for curve, (z, line) in zip(self.curves, self.lines, strict=True):
+            curve.set_data(1e3 * z, 1e3 * line[number])
+        assert self.run.model is not None
+        places = [impactor.z for impactor in self.run.model.matrices.impactors]
+        for i, (ball, place) in enumerate(zip(self.balls, places, strict=True)):
+            ball.set_data([1e3 * place], [1e3 * self._ball(i)[number]])
+        self._point(number)
+        now = float(self.run.t[self.samples[number]])
+        self.cursor.set_xdata([now, now])
+        self.title.set_text(f"t = {now:.4f} s{self.speed}")
+        return [*self.curves, *self.balls, self.arrows, self.cursor]
+
+    def _point(self, number: int) -> None:
+        """An arrow for every contact force, ending at its place on the beam."""
+        if not self.touches:
+            return
+        ends, lengths = [], []
+        for touch, force in zip(self.touches, self.forces, strict=True):
+            along, line = self.lines[touch.body]
+            ends.append((1e3 * touch.z, 1e3 * float(np.interp(touch.z, along, line[number]))))
+            share = float(force[number]) / self.largest if self.largest > 0 else 0.0
+            lengths.append(touch.push * share * STAY * self.span if share else np.nan)
+        at: Any = np.array(ends)
+        self.arrows.set_offsets(at)
+        self.arrows.set_UVC(np.zeros(len(lengths)), np.array(lengths))

@@ -1,0 +1,76 @@
+"""Moving pictures: files that open, pictures that show the motion, what is refused."""
+
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import fembeam as fb
+from contacts import Hertz, Hysteretic
+
+STEEL = fb.Section.rectangle(2.1e11, 7850.0, 0.01, 0.01)
+
+
+@pytest.fixture(scope="module")
+def run():
+    other = fb.Scene(fb.Beam(0.3, STEEL), [fb.Clamped(0.0)])
+    stops = [fb.Stop(0.4, Hysteretic.achieving(1e8, 0.5), 1e-3), fb.Stop(0.3, Hertz(1e8), 2e-3, "above", on=(1, 0.3))]
+    scene = fb.Scene(fb.Beam(0.4, STEEL), [fb.Clamped(0.0)], stops=stops, bodies=[other],
+                     impactors=[fb.Impactor(0.25, 0.3, -1.0, Hertz(1e8), gap=4e-3)])  # fmt: skip
+    return scene.reduce(3).simulate(0.02, 2e-4)
+
+
+def test_gif_holds_the_frames(run, tmp_path):
+    from PIL import Image
+
+    path = fb.plot.animate(run, tmp_path / "run.gif", frames=6)
+    assert [entry.name for entry in tmp_path.iterdir()] == ["run.gif"]
+    with Image.open(path) as film:
+        assert film.n_frames == 6
+
+
+@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="no ffmpeg here")
+def test_mp4_where_it_can_be_made(run, tmp_path):
+    assert fb.plot.animate(run, tmp_path / "run.mp4", frames=4).stat().st_size > 1000
+
+
+def test_a_frame_shows_the_bodies_where_they_are(run):
+    i = int(np.argmax(run.force(2)))
+    figure = fb.plot.frame(run, run.t[i])
+    axis = figure.axes[0]
+    own, second = axis.lines[:2]
+    np.testing.assert_allclose(own.get_ydata(), 1e3 * run.displacement(own.get_xdata() / 1e3)[i], atol=1e-9)
+    np.testing.assert_allclose(second.get_ydata()[0], 2.0)
+    ball = next(line for line in axis.lines if line.get_marker() == "o")
+    assert ball.get_ydata()[0] == pytest.approx(1e3 * (4e-3 + run.impactor_displacement()[i]))
+    (arrows,) = axis.collections
+    assert arrows.V[2] < 0
+    assert arrows.Umask.tolist() == [run.force(0)[i] == 0, True, False]
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "message"),
+    [
+        ("run.avi", {}, "the suffix must be .gif or .mp4, got '.avi'"),
+        ("run.gif", {"frames": 1}, "frames must be 2 to 1000, got 1"),
+        ("run.gif", {"window": (5.0, 6.0)}, "the window must hold at least 2 samples"),
+        ("missing/run.gif", {}, "the folder must exist"),
+    ],
+)
+def test_refusals(run, tmp_path, name, options, message):
+    with pytest.raises(ValueError, match=message):
+        fb.plot.animate(run, tmp_path / name, **options)
+
+
+def test_a_run_without_its_model_cannot_be_drawn(run, tmp_path):
+    with pytest.raises(ValueError, match="needs the model of the run"):
+        fb.plot.animate(replace(run, model=None), tmp_path / "run.gif")
+
+
+def test_an_mp4_without_ffmpeg_is_refused(run, tmp_path, monkeypatch):
+    from matplotlib.animation import FFMpegWriter
+
+    monkeypatch.setattr(FFMpegWriter, "isAvailable", classmethod(lambda cls: False))
+    with pytest.raises(ValueError, match=r"an .mp4 needs the program ffmpeg"):
+        fb.plot.animate(run, tmp_path / "run.mp4")

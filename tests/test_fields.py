@@ -1,0 +1,188 @@
+"""Bending moment, shear force and stress along the beam; extremes; files for ParaView."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import fembeam as fb
+from contacts import Hertz
+
+SQUARE = fb.Section.rectangle(2.1e11, 7850.0, 0.01, 0.01)
+EI, L = SQUARE.bending_stiffness, 0.4
+CLAMPED = [fb.Clamped(0.0)]
+
+
+def mode(b, z, derivative):
+    """A clamped–free mode shape's derivatives, b = βL, up to a factor."""
+    x, sigma = b * z / L, (math.cosh(b) + math.cos(b)) / (math.sinh(b) + math.sin(b))
+    even = {0: (-1, -1), 2: (1, 1), 3: (1, -1)}[derivative]
+    if derivative == 3:
+        shape = np.sinh(x) - np.sin(x) - sigma * (np.cosh(x) + np.cos(x))
+    else:
+        shape = np.cosh(x) + even[0] * np.cos(x) - sigma * (np.sinh(x) + even[1] * np.sin(x))
+    return (b / L) ** derivative * shape
+
+
+def test_moment_and_shear_of_modes_are_as_good_as_their_frequencies():
+    model = fb.Scene(fb.Beam(L, SQUARE), CLAMPED).reduce(3)
+    z = np.linspace(0, 0.99 * L, 57)
+    for i, b in enumerate([1.875104068711961, 4.694091132974175, 7.854757438237613]):
+        scale = model.phi(L)[i] / mode(b, L, 0)
+        moment, shear = (EI * scale * mode(b, z, d) for d in (2, 3))
+        found = model.section_forces[0]
+        np.testing.assert_allclose(found.moment(z)[:, i], moment, atol=3e-6 * np.abs(moment).max())
+        at_nodes = found.nodes[5:40]
+        exact = EI * scale * mode(b, at_nodes, 3)
+        np.testing.assert_allclose(found.shear(at_nodes)[:, i], exact, atol=1e-7 * np.abs(shear).max())
+        np.testing.assert_allclose(found.shear(z)[:, i], shear, atol=5e-5 * np.abs(shear).max())
+
+
+def test_free_ends_carry_nothing():
+    with pytest.warns(UserWarning, match="2 rigid-body"):
+        model = fb.Scene(fb.Beam(L, SQUARE)).reduce(4)
+    forces = model.section_forces[0]
+    ends = np.array([0.0, L])
+    assert np.abs(forces.moment(ends)).max() < 1e-7 * np.abs(forces.moment(np.linspace(0, L, 9))).max()
+    assert np.abs(forces.shear(ends)).max() < 1e-7 * np.abs(forces.shear(np.linspace(0, L, 9))).max()
+    assert np.abs(forces.moment(np.linspace(0, L, 9))[:, :2]).max() < 1e-6
+
+
+@pytest.mark.parametrize("options", [{"axial_force": 400.0}, {"axial_force": -100.0}, {"foundation": 3e4}])
+def test_moment_is_the_curvature_and_shear_its_slope_whatever_acts(options):
+    model = fb.Scene(fb.Beam(L, SQUARE, **options), CLAMPED, [fb.LumpedMass(0.3, 0.2)]).reduce(2)
+    z = np.linspace(0.01, 0.29, 29)
+    forces, step = model.section_forces[0], 1e-4
+    curvature = (model.phi(z + step, 1) - model.phi(z - step, 1)) / (2 * step)
+    assert np.abs(forces.moment(z) - EI * curvature).max() < 3e-3 * np.abs(EI * curvature).max()
+    slope = (forces.moment(z + step) - forces.moment(z - step)) / (2 * step)
+    assert np.abs(forces.shear(z) - slope).max() < 1e-4 * np.abs(slope).max()
+
+
+def test_a_lumped_mass_makes_the_shear_jump_by_its_inertia():
+    mass = 0.2
+    model = fb.Scene(fb.Beam(L, SQUARE), CLAMPED, [fb.LumpedMass(0.3, mass)]).reduce(2)
+    before, after = model.section_forces[0].shear([0.3 - 1e-9, 0.3 + 1e-9])
+    np.testing.assert_allclose(after - before, mass * model.omega**2 * model.phi(0.3), rtol=1e-5)
+
+
+def test_static_moment_converges_with_modes():
+    error = []
+    for count in (4, 8, 16, 32):
+        model = fb.Scene(fb.Beam(L, SQUARE), CLAMPED).reduce(count)
+        run = model.simulate(1e-4, 1e-4, start=model.equilibrium({L: -10.0}))
+        z = np.linspace(0.0, L, 41)
+        error.append(np.abs(run.moment(z)[0] + 10.0 * (L - z)).max() / (10.0 * L))
+    assert np.all(np.diff(error) < 0)
+    assert error[-1] < 0.01
+
+
+def test_static_moment_line_is_exact_with_the_residual_shape():
+    scene = fb.Scene(fb.Beam(L, SQUARE), CLAMPED, stops=[fb.Stop(0.3, Hertz(1e7), gap=1.0)])
+    model = scene.reduce(2, residual=True)
+    run = model.simulate(1e-4, 1e-4, start=model.equilibrium({0.3: -10.0}))
+    z = np.linspace(0.0, 0.4, 33)
+    np.testing.assert_allclose(run.moment(z)[0], -10.0 * np.maximum(0.3 - z, 0.0), atol=1e-7)
+    np.testing.assert_allclose(run.shear(z + 1e-6 * (z < L))[0], 10.0 * (z < 0.2999), atol=1e-5)
+
+
+def test_stress_is_moment_over_section_modulus_plus_tension():
+    beam = fb.Beam(L, SQUARE, axial_force=500.0)
+    model = fb.Scene(beam, CLAMPED).reduce(3)
+    run = model.simulate(1e-4, 1e-4, start=model.equilibrium({L: -10.0}))
+    expected = run.moment(0.1) / (0.01**3 / 6) + 500.0 / 1e-4
+    np.testing.assert_allclose(run.stress(0.1), expected, rtol=1e-12)
+
+
+def test_stress_needs_the_outer_fibre_and_a_model(tmp_path):
+    bare = fb.Section(2.1e11, 7850.0, 1e-4, 1e-9)
+    run = fb.Scene(fb.Beam.of_spans([(0.2, SQUARE), (0.2, bare)]), CLAMPED).reduce(2).simulate(1e-4, 1e-4)
+    assert run.stress(0.1).shape == (2,)
+    with pytest.raises(ValueError, match=r"every section must know its outer fibre, got \[0.3\]"):
+        run.stress([0.1, 0.3])
+    loaded = fb.load(run.save(tmp_path / "run"))
+    assert loaded.slope(0.3).shape == (2,)
+    with pytest.raises(ValueError, match="the moment needs the model of the run"):
+        loaded.moment(0.1)
+    with pytest.raises(ValueError, match="quantity must be one of displacement, slope"):
+        run.extremes("strain")
+    with pytest.raises(ValueError, match="z must lie on the beam"):
+        run.moment(0.5)
+
+
+def test_extremes_say_where_and_when():
+    model = fb.Scene(fb.Beam(L, SQUARE), CLAMPED).reduce(1)
+    run = model.simulate(
+        2 * math.pi / model.omega[0], math.pi / model.omega[0] / 50, start=model.equilibrium({L: -5.0})
+    )
+    found = run.extremes("moment")
+    value, z, t = found.largest
+    assert z == 0.0
+    assert abs(value) == pytest.approx(abs(run.moment(0.0)[0]), rel=1e-9)
+    assert t in (
+        pytest.approx(0.0),
+        pytest.approx(math.pi / model.omega[0]),
+        pytest.approx(2 * math.pi / model.omega[0]),
+    )
+    u = run.displacement(found.z)
+    down = run.extremes()
+    np.testing.assert_allclose(down.lowest, u.min(axis=0), atol=1e-18)
+    np.testing.assert_allclose(down.highest, u.max(axis=0), atol=1e-18)
+    assert run.extremes("slope", [0.1, L]).highest.shape == (2,)
+
+
+# --- files --------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def collision():
+    other = fb.Scene(fb.Beam(0.3, SQUARE), CLAMPED)
+    scene = fb.Scene(fb.Beam(L, SQUARE), CLAMPED, bodies=[other], stops=[fb.Stop(0.3, Hertz(1e9), 1e-3, on=(1, 0.3))],
+                     impactors=[fb.Impactor(L, 0.1, -1.0, Hertz(1e9), gap=2e-3)])  # fmt: skip
+    return scene.reduce(3).simulate(0.01, 1e-3)
+
+
+def test_xdmf_opens_again_with_the_same_values(collision, tmp_path):
+    import meshio
+
+    run, path = collision, collision.to_xdmf(tmp_path / "run", stride=2)
+    assert path.suffix == ".xdmf"
+    assert [entry.name for entry in tmp_path.iterdir()] == [path.name]
+    own, second = (len(shapes.nodes) for shapes in (run.shapes, *run.others))
+    with meshio.xdmf.TimeSeriesReader(path) as reader:
+        points, (cells,) = reader.read_points_cells()
+        assert points[:own, 0].tolist() == run.shapes.nodes.tolist()
+        assert points[own : own + second, 1].tolist() == [-1e-3] * second
+        assert points[-1].tolist() == [L, 2e-3, 0.0]
+        assert len(cells.data) == own - 1 + second - 1 + 1
+        assert reader.num_steps == 6
+        for step in range(reader.num_steps):
+            t, data, _ = reader.read_data(step)
+            assert t == run.t[2 * step]
+            expected = run.displacement(run.shapes.nodes)[2 * step]
+            np.testing.assert_allclose(data["displacement"][:own, 1], expected, rtol=1e-13)
+            stress, moment = run.stress(run.shapes.nodes)[2 * step], run.moment(run.others[0].nodes, 1)[2 * step]
+            np.testing.assert_allclose(data["stress"][:own], stress, rtol=1e-10, atol=1e-9)
+            np.testing.assert_allclose(data["moment"][own:-1], moment, rtol=1e-10, atol=1e-12)
+            assert data["velocity"][-1, 1] == run.impactor_velocity()[2 * step]
+
+
+def test_vtu_holds_one_sample(collision, tmp_path):
+    import meshio
+
+    mesh = meshio.read(collision.to_vtu(tmp_path / "last.vtu"))
+    u = collision.displacement(collision.shapes.nodes)[-1]
+    np.testing.assert_allclose(mesh.point_data["displacement"][: len(u), 1], u, rtol=1e-13)
+
+
+def test_files_refuse(collision, tmp_path):
+    with pytest.raises(ValueError, match="the folder must exist"):
+        collision.to_xdmf(tmp_path / "missing" / "run")
+    with pytest.raises(ValueError, match="stride must be a whole number above 0, got 0"):
+        collision.to_xdmf(tmp_path / "run", stride=0)
+    with pytest.raises(ValueError, match="sample must be below 11"):
+        collision.to_vtu(tmp_path / "run", sample=11)
+    with pytest.raises(ValueError, match="need the model of the run"):
+        replace(collision, model=None).to_vtu(tmp_path / "run")
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,141 @@
+"""Beams from mesh files and back; what a file may not hold."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fembeam as fb
+
+meshio = pytest.importorskip("meshio")
+RIG = Path(__file__).parent / "data" / "rig.msh"  # made by gmsh 4.15: 27 lines, two physical lines, two points
+THICK, THIN = (fb.Section.circle(2.1e11, 7800.0, d) for d in (0.02, 0.01))
+SECTIONS = {"thick": THICK, "thin": THIN}
+
+
+def frequencies(beam):
+    return fb.Scene(beam, [fb.Clamped(0.0)]).reduce(5).omega
+
+
+def written(path, points, lines, **options):
+    points = np.column_stack([np.asarray(points, dtype=float).reshape(len(points), -1), np.zeros((len(points), 2))])[
+        :, :3
+    ]
+    cells = lines if isinstance(lines[0], tuple) else [("line", np.array(lines))]
+    meshio.Mesh(points, cells, **options).write(path)
+    return path
+
+
+def test_a_file_of_gmsh_is_read():
+    beam = fb.Beam.from_mesh(RIG, SECTIONS, foundation=2.0)
+    assert beam.borders == pytest.approx((0.0, 0.12, 0.2599), rel=1e-15)
+    assert [section for _, section in beam.spans] == [THICK, THIN]
+    assert beam.place("stop") == pytest.approx(0.24445, rel=1e-15)
+    assert beam.place("clamp") == 0.0
+    assert beam.foundation == 2.0
+    with pytest.raises(ValueError, match=r"name must be one of the beam's places \(clamp, stop\), got 'tip'"):
+        beam.place("tip")
+
+
+def test_gmsh_itself_writes_such_a_file(tmp_path):
+    gmsh = pytest.importorskip("gmsh")
+    gmsh.initialize(interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        points = [gmsh.model.geo.addPoint(0.1, y, 0.2, 0.05) for y in (0.0, 0.4, 1.0)]
+        lines = [gmsh.model.geo.addLine(points[i], points[i + 1]) for i in range(2)]
+        gmsh.model.geo.synchronize()
+        for line, name in zip(lines, SECTIONS, strict=True):
+            gmsh.model.addPhysicalGroup(1, [line], name=name)
+        gmsh.model.mesh.generate(1)
+        gmsh.write(str(tmp_path / "new.msh"))
+    finally:
+        gmsh.finalize()
+    beam = fb.Beam.from_mesh(tmp_path / "new.msh", SECTIONS)
+    expected = fb.Beam.of_spans([(0.4, THICK), (0.6, THIN)])
+    np.testing.assert_allclose(frequencies(beam), frequencies(expected), rtol=1e-12)
+
+
+@pytest.mark.parametrize("suffix", ["msh", "inp", "vtu", "vtk"])
+def test_round_trip_keeps_the_frequencies(tmp_path, suffix):
+    beam = fb.Beam.of_spans([(0.1, THICK), (0.3 / 7, fb.Taper(THICK, THIN)), (0.2, THIN), (0.1, THICK)])
+    sections = beam.to_mesh(tmp_path / f"beam.{suffix}", elements=57)
+    again = fb.Beam.from_mesh(tmp_path / f"beam.{suffix}", sections)
+    assert [section for _, section in again.spans] == [section for _, section in beam.spans]
+    np.testing.assert_allclose(frequencies(again), frequencies(beam), rtol=1e-12)
+
+
+@pytest.mark.parametrize("suffix", ["msh", "inp"])
+def test_places_survive_the_file(tmp_path, suffix):
+    beam = fb.Beam.from_mesh(RIG, SECTIONS)
+    again = fb.Beam.from_mesh(tmp_path / f"beam.{suffix}", beam.to_mesh(tmp_path / f"beam.{suffix}"))
+    assert dict(again.places) == pytest.approx(dict(beam.places), rel=1e-15)
+
+
+def test_one_section_for_all_and_a_slanting_axis(tmp_path):
+    t = np.array([0.0, 0.3, 0.7, 1.0])
+    path = written(tmp_path / "a.vtu", np.column_stack([3 * t, 4 * t, 0 * t])[:, :2], [[3, 2], [0, 1], [1, 2]])
+    assert fb.Beam.from_mesh(path, THIN).length == pytest.approx(5.0, rel=1e-14)
+
+
+def test_cell_data_by_name_and_by_number(tmp_path):
+    data = {"part": [np.array([4, 4, 7])], "noise": [np.array([1, 2, 3])]}
+    path = written(tmp_path / "a.vtu", [0.0, 1.0, 2.0, 3.0], [[0, 1], [1, 2], [2, 3]], cell_data=data)
+    beam = fb.Beam.from_mesh(path, {4: THICK, "7": THIN}, data="part")
+    assert beam.spans == ((2.0, THICK), (1.0, THIN))
+    with pytest.raises(ValueError, match="data must be one of part, noise, got 'parts'"):
+        fb.Beam.from_mesh(path, {4: THICK}, data="parts")
+
+
+# --- what is refused ----------------------------------------------------------------------------------------------
+
+
+def test_triangles_are_refused(tmp_path):
+    path = written(tmp_path / "a.vtu", [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], [("triangle", np.array([[0, 1, 2]]))])
+    with pytest.raises(ValueError, match=r"cells must be lines, got \{'triangle': 1\} in .*a.vtu"):
+        fb.Beam.from_mesh(path, THIN)
+
+
+@pytest.mark.parametrize(
+    ("points", "lines", "message"),
+    [
+        ([0.0, 1.0, 2.0, 3.0], [[0, 1], [2, 3]], r"connected end to end, got \(2.0, 0.0, 0.0\)"),
+        ([0.0, 1.0, 1.0, 2.0], [[0, 1], [2, 3]], r"connected end to end, got \(1.0, 0.0, 0.0\).*merge double nodes"),
+        ([0.0, 1.0, 2.0, 3.0], [[0, 1], [1, 2], [1, 3]], r"must not branch.*got \(1.0, 0.0, 0.0\)"),
+        ([0.0, 1.0, 2.0], [[0, 1], [1, 2], [0, 2]], "connected end to end"),
+        ([[0.0, 0.0], [1.0, 0.1], [2.0, 0.0]], [[0, 1], [1, 2]], r"one straight axis, got \(1.0, 0.1, 0.0\)"),
+        ([0.0, 0.0], [[0, 1]], "the lines must have a length"),
+        ([0.0, 1.0, 1.0, 2.0], [[0, 1], [1, 2], [2, 3]], "elements must have a length"),
+    ],
+)
+def test_lines_that_are_no_beam_are_refused(tmp_path, points, lines, message):
+    path = written(tmp_path / "a.vtu", points, lines)
+    with pytest.raises(ValueError, match=message):
+        fb.Beam.from_mesh(path, THIN)
+
+
+def test_missing_groups_are_named():
+    with pytest.raises(ValueError, match=r"groups of the file \(it has thick, thin\), got \['flange'\]"):
+        fb.Beam.from_mesh(RIG, {**SECTIONS, "flange": THIN})
+    with pytest.raises(ValueError, match=r"one section, got 'none for thin' in .*rig.msh at z = 0.12 m"):
+        fb.Beam.from_mesh(RIG, {"thick": THICK})
+    with pytest.raises(TypeError, match=r"section of span 1 must be a Section, got 3.0"):
+        fb.Beam.from_mesh(RIG, {"thick": THICK, "thin": 3.0})
+
+
+def test_files_that_are_no_meshes_are_refused(tmp_path):
+    with pytest.raises(FileNotFoundError, match="does not exist"):
+        fb.Beam.from_mesh(tmp_path / "none.msh", THIN)
+    (tmp_path / "bad.msh").write_text("not a mesh")
+    (tmp_path / "bad.xyz").write_text("not a mesh")
+    for name in ("bad.msh", "bad.xyz"):
+        with pytest.raises(ValueError, match="cannot be read as a mesh"):
+            fb.Beam.from_mesh(tmp_path / name, THIN)
+    with pytest.raises(ValueError, match=r"the suffix must be one of .msh, .inp, .vtu, .vtk, got '.stl'"):
+        fb.Beam(1.0, THIN).to_mesh(tmp_path / "a.stl")
+
+
+def test_far_too_fine_elements_are_noticed(tmp_path):
+    path = written(tmp_path / "a.vtu", [0.0, 0.5, 0.500001, 1.0], [[0, 1], [1, 2], [2, 3]])
+    with pytest.warns(UserWarning, match=r"far too fine: 1e-06 m at z = 0.5 m"):
+        fb.Beam.from_mesh(path, THIN)

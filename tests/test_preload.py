@@ -1,0 +1,207 @@
+"""Tapers, foundations, elastic supports and axial preload against exact frequency equations and buckling loads."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+import fembeam as fb
+from fembeam.beam import bending_matrices, bending_root
+
+UNIT = fb.Section(E=1.0, rho=1.0, A=1.0, I=1.0)
+CLAMPED = [fb.Clamped(0.0)]
+
+
+def omegas(scene, count, **mesh):
+    return scene.reduce(count, **mesh).omega
+
+
+def exact_near(omega, beam, root=None, tip_stiffness=0.0, tip_mass=0.0):
+    """The exact frequency near omega: the beam's ordinary differential equation, shot from z = 0 to its free end.
+
+    root None is a clamp, else (stiffness, rotational) of an elastic support.
+    """
+    starts = [(0, 0, 1, 0), (0, 0, 0, 1)] if root is None else [(1, 0, 0, -root[0]), (0, 1, root[1], beam.axial_force)]
+
+    def determinant(w):
+        def slopes(z, y):
+            u, theta, M, V = y
+            curvature = M / beam.bending_stiffness(z)
+            load = (beam.line_mass(z) * w**2 - beam.foundation) * u
+            return [theta, curvature, V, load + beam.axial_force * curvature]
+
+        columns = []
+        for y in starts:
+            for left, right in zip(beam.borders[:-1], beam.borders[1:], strict=True):
+                inside = (left, right - 1e-14)
+                y = solve_ivp(slopes, inside, y, "DOP853", rtol=1e-10, atol=1e-13).y[:, -1]
+            u, theta, M, V = y
+            columns.append((M, V - beam.axial_force * theta - (tip_stiffness - tip_mass * w**2) * u))
+        return np.linalg.det(columns)
+
+    return brentq(determinant, omega * (1 - 1e-5), omega * (1 + 1e-5), rtol=1e-9)
+
+
+def wedge(ratio, width_ratio=1.0):
+    start = fb.Section.rectangle(1.0, 12.0, 1.0, 1.0)
+    return fb.Taper(start, fb.Section.rectangle(1.0, 12.0, width_ratio, ratio))
+
+
+# --- tapers -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("taper", [wedge(0.5), wedge(0.2), wedge(0.1, 0.1), wedge(1.0, 0.3)])
+def test_tapered_cantilever_against_its_differential_equation(taper):
+    beam = fb.Beam(1.0, taper)
+    for omega in omegas(fb.Scene(beam, CLAMPED), 3):
+        assert exact_near(omega, beam) == pytest.approx(omega, rel=1e-6)
+
+
+def test_tapered_and_stepped_spans_with_a_tip_mass():
+    beam = fb.Beam.of_spans([(0.5, wedge(0.5)), (0.25, fb.Section.rectangle(1.0, 12.0, 1.0, 0.5)), (0.5, wedge(0.7))])
+    scene = fb.Scene(beam, CLAMPED, [fb.LumpedMass(beam.length, 3.0)])
+    for omega in omegas(scene, 3):
+        assert exact_near(omega, beam, tip_mass=3.0) == pytest.approx(omega, rel=1e-6)
+
+
+def test_a_taper_between_equal_sections_is_none():
+    plain, taper = (fb.Scene(fb.Beam(1.0, s), CLAMPED) for s in (UNIT, fb.Taper(UNIT, UNIT)))
+    np.testing.assert_allclose(omegas(taper, 4), omegas(plain, 4), rtol=1e-12)
+
+
+def test_taper_of_circles_is_a_cone():
+    cone = fb.Taper(fb.Section.circle(1.0, 1.0, 2.0), fb.Section.circle(1.0, 1.0, 1.0))
+    middle, circle = cone.profile(0.3), fb.Section.circle(1.0, 1.0, 1.7)
+    assert (float(middle.A), float(middle.I), float(middle.fibre)) == pytest.approx(
+        (circle.A, circle.I, 0.85), rel=1e-14
+    )
+
+
+def test_taper_refuses_two_materials():
+    with pytest.raises(ValueError, match="start and end must have the same E and rho"):
+        fb.Taper(UNIT, fb.Section(2.0, 1.0, 1.0, 1.0))
+    with pytest.raises(TypeError, match="end must be a Section"):
+        fb.Taper(UNIT, 3.0)
+
+
+@pytest.mark.parametrize("beam", [fb.Beam(1.0, wedge(0.2, 0.4), foundation=3.0, axial_force=2.0)])
+def test_root_squares_to_the_stiffness_whatever_the_beam(beam):
+    nodes = np.linspace(0, 1, 8) ** 1.5
+    K, R = bending_matrices(beam, nodes)[0], bending_root(beam, nodes)
+    assert abs(R.T @ R - K).max() < 1e-13 * abs(K).max()
+
+
+# --- elastic supports and foundations -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("k", [0.1, 1e3])
+def test_elastic_tip_support(k):
+    beam = fb.Beam(1.0, UNIT)
+    for omega in omegas(fb.Scene(beam, CLAMPED, springs=[fb.Spring(1.0, k)]), 3):
+        assert exact_near(omega, beam, tip_stiffness=k) == pytest.approx(omega, rel=1e-6)
+
+
+def test_elastic_clamp():
+    beam = fb.Beam(1.0, UNIT)
+    for omega in omegas(fb.Scene(beam, springs=[fb.Spring(0.0, 20.0, rotational=5.0)]), 3):
+        assert exact_near(omega, beam, root=(20.0, 5.0)) == pytest.approx(omega, rel=1e-6)
+
+
+@pytest.mark.parametrize("k", [0.5, 1e3, 1e6])
+def test_foundation_adds_to_every_squared_frequency(k):
+    bare = np.square([1.875104068711961, 4.694091132974175, 7.854757438237613])
+    found = omegas(fb.Scene(fb.Beam(1.0, UNIT, foundation=k), CLAMPED), 3)
+    np.testing.assert_allclose(found, np.sqrt(bare**2 + k), rtol=1e-6)
+
+
+def test_free_beam_on_a_foundation_heaves_and_pitches():
+    found = omegas(fb.Scene(fb.Beam(1.0, UNIT, foundation=9.0)), 3)  # no rigid-body modes to warn of
+    np.testing.assert_allclose(found, [3.0, 3.0, math.sqrt(4.730040744863**4 + 9.0)], rtol=1e-6)
+
+
+def test_moving_foot_of_a_spring_is_a_force():
+    signal = fb.Harmonic(1e-3, 5.0)
+    shaken = fb.Scene(fb.Beam(1.0, UNIT), CLAMPED, springs=[fb.Spring(0.7, 40.0, foot=signal)]).reduce(3)
+    pushed = fb.Scene(fb.Beam(1.0, UNIT), CLAMPED, springs=[fb.Spring(0.7, 40.0)],
+                      forces=[fb.PointForce(0.7, fb.Harmonic(0.04, 5.0))]).reduce(3)  # fmt: skip
+    a, b = (model.simulate(2.0, 0.1).q for model in (shaken, pushed))
+    np.testing.assert_allclose(a, b, atol=1e-12 * np.abs(b).max())
+
+
+# --- axial force --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("supports", "factor"),
+    [
+        (CLAMPED, math.pi**2 / 4),
+        ([fb.Pinned(0.0), fb.Pinned(1.0)], math.pi**2),
+        ([fb.Clamped(0.0), fb.Clamped(1.0)], 4 * math.pi**2),
+        ([fb.Clamped(0.0), fb.Pinned(1.0)], brentq(lambda x: math.tan(x) - x, 4.4, 4.6, xtol=1e-14) ** 2),
+    ],
+)
+def test_buckling_loads(supports, factor):
+    scene = fb.Scene(fb.Beam(1.0, UNIT), supports)
+    assert scene.buckling_load() == pytest.approx(factor, rel=1e-6)
+    assert scene.buckling_load(elements=150) == pytest.approx(factor, rel=1e-6)
+
+
+def test_buckling_counts_from_the_force_there_is():
+    scene = fb.Scene(fb.Beam(1.0, UNIT, axial_force=-1.0), CLAMPED)
+    assert scene.buckling_load() == pytest.approx(math.pi**2 / 4 - 1.0, rel=1e-6)
+
+
+@pytest.mark.filterwarnings("ignore:.*rigid-body:UserWarning")
+@pytest.mark.parametrize("elements", [None, 20, 300])
+@pytest.mark.parametrize(("supports", "count"), [([], 2), ([fb.Pinned(0.0)], 1), ([fb.Guided(0.0)], 1)])
+def test_a_floating_beam_has_no_buckling_load(supports, count, elements):
+    with pytest.raises(ValueError, match=rf"must hold the beam, got '{count} rigid-body modes' in buckling_load"):
+        fb.Scene(fb.Beam(1.0, UNIT), supports).buckling_load(elements)
+    with pytest.raises(ValueError, match=r"must hold the beam"):
+        fb.Scene(fb.Beam(1.0, UNIT, axial_force=-1e-3), supports).matrices(elements)
+
+
+@pytest.mark.parametrize("share", [-0.99, -0.5, 0.5, 50.0, 1e4])
+def test_pinned_beam_under_axial_force(share):
+    force = share * math.pi**2
+    scene = fb.Scene(fb.Beam(1.0, UNIT, axial_force=force), [fb.Pinned(0.0), fb.Pinned(1.0)])
+    n = np.arange(1, 4) * math.pi
+    np.testing.assert_allclose(omegas(scene, 3), np.sqrt(n**4 + force * n**2), rtol=1e-6)
+
+
+@pytest.mark.parametrize("force", [-2.0, -0.5, 3.0, 100.0])
+def test_cantilever_under_a_dead_axial_load(force):
+    beam = fb.Beam(1.0, UNIT, axial_force=force)
+    for omega in omegas(fb.Scene(beam, CLAMPED), 3):
+        assert exact_near(omega, beam) == pytest.approx(omega, rel=1e-6)
+
+
+def test_a_buckled_beam_is_refused():
+    with pytest.raises(
+        ValueError, match=r"axial_force must stay above -2.4674 N, where the beam buckles, got -2.5 in Beam"
+    ):
+        fb.Scene(fb.Beam(1.0, UNIT, axial_force=-2.5), CLAMPED).reduce(2)
+
+
+@pytest.mark.parametrize(
+    ("option", "value"), [("foundation", -1.0), ("foundation", math.nan), ("axial_force", math.inf)]
+)
+def test_bad_options(option, value):
+    with pytest.raises(ValueError, match=f"{option} must be finite"):
+        fb.Beam(1.0, UNIT, **{option: value})
+
+
+# --- elements as asked --------------------------------------------------------------------------------------------
+
+
+def test_elements_far_too_coarse_or_too_fine_are_noticed():
+    scene = fb.Scene(fb.Beam(1.0, UNIT), CLAMPED)
+    with pytest.warns(
+        UserWarning, match=r"elements are too coarse for the highest mode: its frequency is off by about"
+    ):
+        scene.reduce(6, elements=4)
+    pressed = fb.Scene(fb.Beam(1.0, UNIT, axial_force=-0.1), CLAMPED)
+    with pytest.warns(UserWarning, match=r"elements are too fine: rounding may change the lowest frequency"):
+        pressed.reduce(1, elements=400)

@@ -1,0 +1,111 @@
+"""Starts: fields and what the kept modes miss of them, static equilibrium with contact, release from a pull."""
+
+import math
+
+import numpy as np
+import pytest
+
+import fembeam as fb
+import reduction
+from contacts import Hertz, PiecewiseLinear
+
+STEEL = fb.Section.rectangle(2.1e11, 7850.0, 0.01, 0.01)
+EI, L = STEEL.bending_stiffness, 0.4
+CLAMPED = [fb.Clamped(0.0)]
+
+
+def tip_flexibility(model):
+    """What the kept modes have of L³/3EI."""
+    return float(np.sum(model.phi(L) ** 2 / model.omega**2))
+
+
+def test_rest_holds_the_velocities_of_impactors():
+    scene = fb.Scene(fb.Beam(L, STEEL), CLAMPED, impactors=[fb.Impactor(0.2, 4.0, -3.0, Hertz(1e9), 1e-3)])
+    model = scene.reduce(2)
+    assert model.rest().tolist() == [0, 0, 0, 0, 0, -6.0]
+    run = model.simulate(1e-4, 1e-4)
+    assert run.impactor_velocity()[0] == pytest.approx(-3.0)
+
+
+def test_what_the_modes_miss_is_reported():
+    scene = fb.Scene(fb.Beam(L, STEEL), CLAMPED)
+    model = scene.reduce(3)
+    higher = scene.reduce([5])
+    assert model.missed(lambda z: model.phi(z)[:, 1]) < 1e-6
+    assert model.missed(lambda z: higher.phi(z)[:, 0]) == pytest.approx(1.0, abs=1e-6)
+    half = model.missed(lambda z: model.phi(z)[:, 0] + higher.phi(z)[:, 0])
+    assert half == pytest.approx(math.sqrt(0.5), rel=1e-4)
+    with pytest.warns(UserWarning, match=r"70\.7% of the velocity \(mass norm\) in Model.state is not represented"):
+        model.state(velocity=lambda z: model.phi(z)[:, 0] + higher.phi(z)[:, 0])
+
+
+def test_fields_are_one_for_each_beam():
+    other = fb.Scene(fb.Beam(0.2, STEEL), CLAMPED)
+    model = fb.Scene(fb.Beam(L, STEEL), CLAMPED, bodies=[other]).reduce(2)
+    start = model.state([None, lambda z: 0.5 * model.phi(z, body=1)[:, 2]])
+    np.testing.assert_allclose(start[:4], [0, 0, 0.5, 0], atol=1e-6)
+    with pytest.raises(ValueError, match="fields must be 2, one for each beam, got 1"):
+        model.state([None])
+
+
+def test_static_tip_load():
+    model = fb.Scene(fb.Beam(L, STEEL), CLAMPED).reduce(5)
+    start = model.equilibrium({L: -10.0})
+    assert model.phi(L) @ start[:5] == pytest.approx(-10.0 * tip_flexibility(model), rel=1e-12)
+    assert np.all(start[5:] == 0)
+
+
+def test_release_from_a_pull_swings_as_far_back():
+    model = fb.Scene(fb.Beam(L, STEEL), CLAMPED).reduce(1)
+    run = model.simulate(2 * math.pi / model.omega[0], start=model.equilibrium({L: 5.0}))
+    assert run.displacement(L)[-1] == pytest.approx(5.0 * tip_flexibility(model), rel=1e-9)
+
+
+@pytest.mark.parametrize("law", [Hertz(1e7), PiecewiseLinear([1e3, 1e5], knots=[1e-3])])
+def test_beam_pressed_on_its_stop_stays_there(law):
+    scene = fb.Scene(fb.Beam(L, STEEL), CLAMPED, stops=[fb.Stop(L, law, gap=2e-3)], gravity=9.81)
+    model = scene.reduce(4)
+    start = model.equilibrium({0.3: -200.0})
+    delta = -model.phi(L) @ start[:4] - 2e-3
+    balance = -model.participation * 9.81 - 200.0 * model.phi(0.3) + model.phi(L) * float(law.force(delta, 0.0, 1.0))
+    assert delta > 0
+    np.testing.assert_allclose(model.omega**2 * start[:4], balance, rtol=1e-8)
+    held = fb.Scene(fb.Beam(L, STEEL), CLAMPED, stops=scene.stops, gravity=9.81,
+                    forces=[fb.PointForce(0.3, fb.Harmonic(-200.0, 0.0))]).reduce(4)  # fmt: skip
+    run = held.simulate(0.05, 1e-3, start=start)
+    np.testing.assert_allclose(run.displacement(L), run.displacement(L)[0], rtol=1e-7)
+
+
+def test_preload_alone_moves_the_beam():
+    k = 2e3
+    scene = fb.Scene(fb.Beam(L, STEEL), CLAMPED, stops=[fb.Stop(L, PiecewiseLinear([k]), gap=-1e-3)])
+    model = scene.reduce(3)
+    f = tip_flexibility(model)
+    assert model.phi(L) @ model.equilibrium()[:3] == pytest.approx(1e-3 * k * f / (1 + k * f), rel=1e-10)
+
+
+def test_resting_mass_finds_the_beam_it_lies_on():
+    K, m = 1e8, 2.0
+    scene = fb.Scene(fb.Beam(L, STEEL), CLAMPED, gravity=9.81,
+                     impactors=[fb.Impactor(L, m, 0.0, Hertz(K), gap=5e-3)])  # fmt: skip
+    model = scene.reduce(4)
+    start = model.equilibrium()
+    run = model.simulate(0.1, 1e-2, start=start)
+    assert run.indentation()[0] == pytest.approx((m * 9.81 / K) ** (2 / 3), rel=1e-9)
+    np.testing.assert_allclose(run.impactor_displacement(), run.impactor_displacement()[0], rtol=1e-7)
+
+
+def test_a_flying_mass_waits_while_the_beam_settles():
+    scene = fb.Scene(fb.Beam(L, STEEL), CLAMPED, gravity=9.81,
+                     impactors=[fb.Impactor(L, 2.0, -1.0, Hertz(1e8), gap=5e-3)])  # fmt: skip
+    model = scene.reduce(4)
+    start = model.equilibrium()
+    assert start[4] == 0.0
+    assert start[-1] == pytest.approx(-math.sqrt(2.0))
+    assert model.phi(L)[:4] @ start[:4] < 0
+
+
+@pytest.mark.filterwarnings("ignore:.*rigid-body:UserWarning")
+def test_a_falling_beam_has_no_equilibrium():
+    with pytest.raises(reduction.AccuracyError, match=r"no static equilibrium found.*does anything carry the loads"):
+        fb.Scene(fb.Beam(L, STEEL), gravity=9.81).reduce(3).equilibrium()
