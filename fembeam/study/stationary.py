@@ -159,6 +159,26 @@ def stationary(
     return sums.response(plan, settled, enough)
 
 
+def characteristics(model: Model, duration: float, dt: float, **options: Any) -> dict[str, Any]:
+    """Numbers and spectra of one `stationary` run as plain values: a quantity for `ensemble`.
+
+    Parameters
+    ----------
+    duration, dt, options : as for `stationary`.
+
+    Returns
+    -------
+    Those of `Response.numbers`, and "δ psd" and so on: densities per rad/s; "omega": their frequencies. What a contact
+    has on average is there when the model has stops, and NaN without a contact.
+    """
+    response = stationary(model, duration, dt, **options)
+    values: dict[str, Any] = {name: estimate.value for name, estimate in response.numbers().items()}
+    for name, signal in response.signals.items():
+        values[f"{name} psd"] = signal.psd.density
+        values["omega"] = signal.psd.omega
+    return values
+
+
 def watched_by_default(model: Model) -> dict[str, Watch]:
     """δ of every stop (the tip when there is none) and mid-beam, with rates."""
     count, at = len(model.scene.stops), places(model.shapes)
