@@ -20,6 +20,7 @@ from fembeam.statistics.densities import checked_samples
 
 FEWEST_BATCHES = 32
 AGREEMENT = 4.0  # standard errors between the halves
+PARTS = 16
 
 
 @dataclass(frozen=True)
@@ -81,7 +82,11 @@ def _truncation(z: NDArray[np.float64]) -> int:
 
 
 def _drift(z: NDArray[np.float64]) -> float:
-    """Difference of the halves' means in standard errors, each half's from eight parts: neighbours are correlated."""
-    first, second = (np.array([p.mean() for p in np.array_split(half, 8)]) for half in np.array_split(z, 2))
-    error = math.sqrt((first.var(ddof=1) + second.var(ddof=1)) / 8)
-    return abs(float(first.mean() - second.mean())) / error if error > 0.0 else 0.0
+    """Difference of the halves' means in standard errors.
+
+    Those come from the differences of neighbours among sixteen parts, which a trend hardly widens (von Neumann).
+    """
+    parts = np.array([part.mean() for part in np.array_split(z, PARTS)])
+    error = math.sqrt(2.0 / PARTS * float(np.mean(np.diff(parts) ** 2)))
+    difference = abs(float(parts[: PARTS // 2].mean() - parts[PARTS // 2 :].mean()))
+    return difference / error if error > 0.0 else 0.0
