@@ -31,6 +31,7 @@ _ROOMS = {
     "damping": "ModalDamping Rayleigh",
     "excitation": "Harmonic Multisine",
     "noise": "BandNoise",
+    "density": "RollOff",
     "record": "Record",
     "model": "Model",
     "orbit": "Attractor Orbit",
@@ -59,6 +60,7 @@ __all__ = [
     "PointForce",
     "Rayleigh",
     "Record",
+    "RollOff",
     "Run",
     "Scene",
     "Section",
@@ -77,6 +79,7 @@ if TYPE_CHECKING:
     from fembeam.beam import Beam
     from fembeam.branch import Branch
     from fembeam.damping import ModalDamping, Rayleigh
+    from fembeam.density import RollOff
     from fembeam.excitation import Harmonic, Multisine
     from fembeam.model import Model
     from fembeam.noise import BandNoise

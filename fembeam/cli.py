@@ -17,6 +17,7 @@ from fembeam import __version__  # nothing slow up here: Ctrl-C before `main` wo
 if TYPE_CHECKING:
     import argparse
     from collections.abc import Sequence
+    from pathlib import Path
 
     from fembeam.model import Model
     from fembeam.run import Run
@@ -51,7 +52,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"fembeam {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
-    run = commands.add_parser("run", help="simulate; write run.npz, summary.json and figures")
+    run = commands.add_parser("run", help="run the file's studies; write tables, figures and, for [simulate], run.npz")
     run.add_argument("scene", metavar="SCENE.toml", type=Path)
     run.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder for the results")
     run.add_argument("--quiet", action="store_true", help="no progress, no log")
@@ -70,17 +71,42 @@ def _run(arguments: argparse.Namespace) -> int:
 
     begin = time.perf_counter()
     file = scene_file.read(arguments.scene)
-    if "simulate" not in file.studies:
-        raise ValueError(f"{file.path}: needs a table [simulate] with duration and dt")
+    if not file.studies:
+        raise ValueError(f"{file.path}: needs a study, such as a table [simulate] with duration and dt")
     folder = report.prepared(arguments.out)
+    code = _simulation(file, folder, begin, arguments.quiet) if "simulate" in file.studies else 0
+    if "ensemble" in file.studies and not code:
+        code = _ensemble(file, folder, arguments.quiet)
+    return code
+
+
+def _ensemble(file: SceneFile, folder: Path, quiet: bool) -> int:
+    """The study [ensemble]: goes on where an interrupted one left its checkpoint in the folder."""
+    study, model = file.studies["ensemble"], _reduced(file, **file.reduce)
+    try:
+        result = study.run(model, folder, progress=not quiet)
+    except RuntimeError as error:
+        _say(f"error: [ensemble]: {_one_line(error)}")
+        return FAILED
+    print(result)
+    written = study.write(result, folder)
+    if not quiet:
+        _say(f"wrote {', '.join(path.name for path in written)} to {folder}")
+    return FAILED if result.failures else 0
+
+
+def _simulation(file: SceneFile, folder: Path, begin: float, quiet: bool) -> int:
+    """The study [simulate]."""
+    from fembeam import report
+
     model = _reduced(file, **file.reduce)
-    if not arguments.quiet:
+    if not quiet:
         _say(f"{len(model.omega)} modes: " + ", ".join(f"{w:.6g}" for w in model.omega) + " rad/s")
-    run, code = _simulated(model, file.studies["simulate"], not arguments.quiet)
+    run, code = _simulated(model, file.studies["simulate"], not quiet)
     written = report.write(run, folder, file.studies["simulate"].discard, time.perf_counter() - begin)
     if code:
         _say(f"{run.status}; wrote what was computed to {folder}")
-    elif not arguments.quiet:
+    elif not quiet:
         spent = f"{run.cost.seconds:.3g} s of {time.perf_counter() - begin:.3g} s"
         _say(f"{len(run.contacts)} contacts in {run.t[-1]:g} s, integrated in {spent}")
         _say(f"wrote {', '.join(path.name for path in written)} to {folder}")

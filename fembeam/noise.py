@@ -40,7 +40,7 @@ class BandNoise:
     period : float, optional
         Time in s after which the realisation repeats. Left out, it is 4096 * 2π/(hi - lo), that is 4096
         lines, and `lasting` may take a longer one. The attribute is always a number.
-    mean : float, keyword only
+    mean : float
         Constant added to y, 0 unless given; derivatives do not see it.
     psd, order : keyword only
         Density behind `of_psd`, and how many derivatives of y this signal is; use `of_psd` and `derivative`.
@@ -71,7 +71,7 @@ class BandNoise:
     band: tuple[float, float]
     seed: int | np.random.SeedSequence = 0
     period: float | None = None
-    mean: float = field(default=0.0, kw_only=True)
+    mean: float = 0.0
     psd: Psd | Table | None = field(default=None, kw_only=True)
     order: int = field(default=0, kw_only=True)
     # (std, period) where computed and not asked for: dataclasses.replace hands them back as if asked for

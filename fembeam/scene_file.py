@@ -1,7 +1,7 @@
 """Scene files: TOML tables in, a Scene and its studies out.
 
     [beam] [[supports]] [[masses]] [[springs]] [[dashpots]] [[stops]] [[forces]] [damping] [base]
-    [reduce] [simulate]
+    [reduce] [simulate] [ensemble]
 
 The keys of a table are the arguments of the constructor behind it, read from its signature, so that nothing is
 declared twice: a constructor that gains an argument gains a key. Units are SI, names those of the library.
@@ -27,6 +27,7 @@ from fembeam.record import Record
 from fembeam.scene import FEATURES, Scene
 from fembeam.schema import Constructors, converted, fits, listed, nearest, parameters, required, shown, wanted
 from fembeam.section import Section, require_non_negative, require_positive
+from fembeam.study.ensemble_table import EnsembleTable
 
 Table = Mapping[str, Any]
 
@@ -92,10 +93,12 @@ SIGNALS: Constructors = {
     "harmonic": Harmonic,
     "multisine": Multisine,
     "band_noise": BandNoise,
+    "noise_of_psd": BandNoise.of_psd,
+    "rolled_off_noise": BandNoise.rolled_off,
     "record": Record.from_csv,
 }
 SOLVERS = {"exponential": "Exponential", "dormand_prince": "DormandPrince", "henon_rk2": "HenonRK2"}
-STUDIES: Constructors = {"simulate": Simulate}
+STUDIES: Constructors = {"simulate": Simulate, "ensemble": EnsembleTable}
 
 
 def read(path: str | Path) -> SceneFile:

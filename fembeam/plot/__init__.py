@@ -1,6 +1,8 @@
 """Figures: one function per question, each returns a matplotlib figure. `response` holds those of one run."""
 
 from fembeam.plot.orbits import branch, orbit, peak
+from fembeam.plot.orbits import branch, orbit
+from fembeam.plot.random import random_densities, random_spectra
 from fembeam.plot.response import (
     contacts,
     densities,
@@ -24,6 +26,8 @@ __all__ = [
     "peak",
     "peaks",
     "places",
+    "random_densities",
+    "random_spectra",
     "responses",
     "segment_for",
     "spectra_of",

@@ -60,6 +60,13 @@ class Ensemble:
             raise KeyError(f"the quantity has no {name!r}; it has {', '.join(map(repr, self.values))}")
         return Estimate.of_mean(self.values[name])
 
+    def __str__(self) -> str:
+        """Means and standard errors of the named numbers, one a line."""
+        numbers = {name: self[name] for name, values in self.values.items() if values.ndim == 1}
+        width = max(map(len, numbers), default=0)
+        head = f"{len(self)} realisations" + (f", {len(self.failures)} failed" if self.failures else "")
+        return "\n".join([head, *(f"{name:{width}}  {found!r}" for name, found in numbers.items())])
+
     @property
     def mean(self) -> Estimate:
         """Mean of a quantity that is one number or array, with its standard error."""
