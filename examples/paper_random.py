@@ -5,8 +5,7 @@
 N. van de Wouw et al., Int. J. Non-Linear Mech. 38 (2003) 767, Sections 5 and 7. Damping, levels and the corner of
 the actuator are not in its text: they are our choice. Flat spectra come first, then those an actuator rolls off.
 
-    python examples/paper_random.py            15 000 s simulated, about a minute; writes paper_random_*.png
-    python examples/paper_random.py --quick    2 500 s
+    python examples/paper_random.py            15 000 s simulated, about a minute (--quick: 2 500 s); paper_random_*.png
 """
 
 import sys
@@ -25,8 +24,8 @@ broad, narrow = (0.0, 1226.6), {"harmonic": (144.5, 270.2), "1/2": (351.9, 477.5
 def response(base, modes=2):
     """Statistics of δ and mid-beam under a base motion."""
     scene = fb.Scene(
-        beam=fb.Beam(0.2599, fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)),
-        supports=[fb.Clamped(0.0)],
+        fb.Beam(0.2599, fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)),
+        [fb.Clamped(0.0)],
         masses=[fb.LumpedMass(z, mass=25.4e-3, inertia=3.0e-6)],
         stops=[fb.Stop(z, law=Hysteretic.lankarani_nikravesh(2.1e8, restitution=0.5))],
         damping=fb.ModalDamping([0.02, 0.01, 0.01][:modes]),
@@ -37,13 +36,11 @@ def response(base, modes=2):
 
 def surely(large, small, factor=1.0):
     """Whether large > factor * small by more than four standard errors."""
-    error = np.hypot(large.standard_error, factor * small.standard_error)
-    return large.value - factor * small.value > 4 * error
+    return large.value - factor * small.value > 4 * np.hypot(large.standard_error, factor * small.standard_error)
 
 
 flat = response(fb.BandNoise(2.5e-4, broad, seed=1))  # Figures 6-10
-tip, mid = flat["δ"], flat["mid-beam u"]
-peaks = fb.plot.peaks(tip.psd, 1000.0)
+tip, mid, peaks = flat["δ"], flat["mid-beam u"], fb.plot.peaks(flat["δ"].psd, 1000.0)
 resonance = float(peaks[np.argmin(abs(peaks - 195.0))])
 for expected in (195.0, 2 * resonance, 780.0):
     assert min(abs(peaks - expected)) < 16.0, f"no peak near {expected:.0f} rad/s in {peaks}"
@@ -64,8 +61,8 @@ filtered = fb.BandNoise.of_psd(fb.RollOff(1e-9, 300.0), narrow["harmonic"], seed
 weaker = fb.BandNoise.of_psd(fb.RollOff(1e-9, 300.0), narrow["1/2"], seed=4)  # Figures 21, 22: the same filter
 coloured = {n: response(filtered, n)["δ"] for n in (1, 2)}
 half = response(weaker)["δ"]
-for few, more in ((rolled[1], rolled[2]), (coloured[1], coloured[2])):
-    assert surely(more.power(750.0, 810.0), few.power(750.0, 810.0), 3.0), "the second mode does not stand out"
+for x in (rolled, coloured):
+    assert surely(x[2].power(750.0, 810.0), x[1].power(750.0, 810.0), 3.0), "the second mode does not stand out"
 assert surely(coloured[1].power(0.0, 300.0), coloured[2].power(0.0, 300.0), 1.3), "one mode will do at low frequencies"
 for lo, hi in ((0.0, 300.0), (300.0, 600.0), (600.0, 900.0), (900.0, 1200.0)):
     change = rolled[3].power(lo, hi).value / rolled[2].power(lo, hi).value - 1
@@ -79,7 +76,7 @@ if __name__ == "__main__":
     print(f"third mode: variance {rolled[3].variance.value / rolled[2].variance.value - 1:+.1%}; peaks {peaks.round()}")
     panels = {"flat broad band": {"δ": tip, "mid-beam": mid}, **{name: {"δ": x} for name, x in bands.items()}}
     fb.plot.random_spectra(panels, 1300.0, {"flat broad band": broad, **narrow}).savefig("paper_random_flat.png")
-    more = {"rolled-off broad band": rolled, "harmonic, rolled off": coloured, "1/2, rolled off": {2: half}}
-    named = {title: {f"modes: {n}": x for n, x in lines.items()} for title, lines in more.items()}
+    sheets = {"rolled-off broad band": rolled, "harmonic, rolled off": coloured, "1/2, rolled off": {2: half}}
+    named = {title: {f"modes: {n}": x for n, x in lines.items()} for title, lines in sheets.items()}
     fb.plot.random_spectra(named, 1300.0).savefig("paper_random_coloured.png")
     fb.plot.random_densities({"δ": tip, "mid-beam u": mid}).savefig("paper_random_densities.png")

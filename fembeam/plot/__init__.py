@@ -1,7 +1,6 @@
 """Figures: one function per question, each returns a matplotlib figure. `response` holds those of one run."""
 
 from fembeam.plot.orbits import branch, orbit, peak
-from fembeam.plot.orbits import branch, orbit
 from fembeam.plot.random import random_densities, random_spectra
 from fembeam.plot.response import (
     contacts,
