@@ -41,8 +41,7 @@ def surely(large, small, factor=1.0):
 
 flat = response(fb.BandNoise(2.5e-4, broad, seed=1))  # Figures 6-10
 tip, mid, peaks = flat["δ"], flat["mid-beam u"], fb.plot.peaks(flat["δ"].psd, 1000.0)
-resonance = float(peaks[np.argmin(abs(peaks - 195.0))])
-for expected in (195.0, 2 * resonance, 780.0):
+for expected in (195.0, 390.0, 780.0):
     assert min(abs(peaks - expected)) < 16.0, f"no peak near {expected:.0f} rad/s in {peaks}"
 assert surely(tip.power(0.0, 50.0), tip.power(75.0, 125.0), 1.5), "no energy gathers below 50 rad/s"
 assert tip.skewness.interval(0.9999)[1] < -0.7, f"δ is not strongly skewed: {tip.skewness}"
@@ -59,10 +58,8 @@ for n, (name, (lo, hi)) in enumerate(narrow.items(), start=1):
 rolled = {n: response(fb.BandNoise.rolled_off(2.5e-4, broad, 300.0, seed=3), n)["δ"] for n in (1, 2, 3)}  # 16, 17
 filtered = fb.BandNoise.of_psd(fb.RollOff(1e-9, 300.0), narrow["harmonic"], seed=4)  # Figures 18-20
 weaker = fb.BandNoise.of_psd(fb.RollOff(1e-9, 300.0), narrow["1/2"], seed=4)  # Figures 21, 22: the same filter
-coloured = {n: response(filtered, n)["δ"] for n in (1, 2)}
-half = response(weaker)["δ"]
-for x in (rolled, coloured):
-    assert surely(x[2].power(750.0, 810.0), x[1].power(750.0, 810.0), 3.0), "the second mode does not stand out"
+coloured, half = {n: response(filtered, n)["δ"] for n in (1, 2)}, response(weaker)["δ"]
+assert all(surely(x[2].power(750.0, 810.0), x[1].power(750.0, 810.0), 3.0) for x in (rolled, coloured)), "no mode 2"
 assert surely(coloured[1].power(0.0, 300.0), coloured[2].power(0.0, 300.0), 1.3), "one mode will do at low frequencies"
 for lo, hi in ((0.0, 300.0), (300.0, 600.0), (600.0, 900.0), (900.0, 1200.0)):
     change = rolled[3].power(lo, hi).value / rolled[2].power(lo, hi).value - 1
