@@ -32,6 +32,7 @@ _ROOMS = {
     "damping": "ModalDamping Rayleigh",
     "excitation": "Harmonic Multisine",
     "noise": "BandNoise",
+    "density": "RollOff",
     "record": "Record",
     "transient": "Pulse Step",
     "model": "Model",
@@ -64,6 +65,7 @@ __all__ = [
     "Pulse",
     "Rayleigh",
     "Record",
+    "RollOff",
     "Run",
     "Scene",
     "Section",
@@ -84,6 +86,7 @@ if TYPE_CHECKING:
     from fembeam.beam import Beam
     from fembeam.branch import Branch
     from fembeam.damping import ModalDamping, Rayleigh
+    from fembeam.density import RollOff
     from fembeam.excitation import Harmonic, Multisine
     from fembeam.impactor import Impactor
     from fembeam.model import Model

@@ -77,8 +77,24 @@ def _run(arguments: argparse.Namespace) -> int:
     code = _simulation(file, folder, begin, arguments.quiet) if "simulate" in file.studies else 0
     for name, study in file.studies.items():
         if name != "simulate" and not code:
-            code = _study(file, name, study, folder, arguments.quiet)
+            todo = _model_study if hasattr(study, "write") else _study
+            code = todo(file, name, study, folder, arguments.quiet)
     return code
+
+
+def _model_study(file: SceneFile, name: str, study: Any, folder: Path, quiet: bool) -> int:
+    """A study of the reduced model that writes its own files, and goes on where an interrupted one left them."""
+    model = _reduced(file, **file.reduce)
+    try:
+        result = study.run(model, folder, progress=not quiet)
+    except RuntimeError as error:
+        _say(f"error: [{name}]: {_one_line(error)}")
+        return FAILED
+    print(result)
+    written = study.write(result, folder)
+    if not quiet:
+        _say(f"wrote {', '.join(path.name for path in written)} to {folder}")
+    return FAILED if getattr(result, "failures", None) else 0
 
 
 def _simulation(file: SceneFile, folder: Path, begin: float, quiet: bool) -> int:

@@ -9,7 +9,6 @@ The lines are known, hence every derivative is exact: multiply by (i k Δω)^n.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -17,10 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fembeam.density import Psd, RollOff, Table, checked_table, evaluated
 from fembeam.lines import LineSpectrum, checked_band, checked_order, number
-
-Table = tuple[Sequence[float], Sequence[float]]
-Psd = Callable[[NDArray[np.float64]], ArrayLike]
 
 AUTOMATIC_LINES = 4096  # kurtosis 3 - 1.5/4096: Gaussian to far below any sampling error
 FEWEST_LINES = 8  # below this a sum of cosines is visibly not Gaussian (kurtosis under 2.8)
@@ -43,6 +40,8 @@ class BandNoise:
     period : float, optional
         Time in s after which the realisation repeats. Left out, it is 4096 * 2π/(hi - lo), that is 4096
         lines, and `lasting` may take a longer one. The attribute is always a number.
+    mean : float
+        Constant added to y, 0 unless given; derivatives do not see it.
     psd, order : keyword only
         Density behind `of_psd`, and how many derivatives of y this signal is; use `of_psd` and `derivative`.
 
@@ -72,6 +71,7 @@ class BandNoise:
     band: tuple[float, float]
     seed: int | np.random.SeedSequence = 0
     period: float | None = None
+    mean: float = 0.0
     psd: Psd | Table | None = field(default=None, kw_only=True)
     order: int = field(default=0, kw_only=True)
     # (std, period) where computed and not asked for: dataclasses.replace hands them back as if asked for
@@ -84,6 +84,7 @@ class BandNoise:
         automatic = AUTOMATIC_LINES * 2 * math.pi / (band[1] - band[0])
         period = automatic if free else number("BandNoise period (s)", self.period, above=0.0)
         self._set(band=band, period=period, seed=_checked_seed(self.seed), order=checked_order(self.order))
+        self._set(mean=number("BandNoise mean", self.mean))
         first, last = self._span
         if last - first + 1 < FEWEST_LINES:
             raise ValueError(
@@ -93,7 +94,7 @@ class BandNoise:
         if self.psd is None:
             std = number("BandNoise std", self.std, above=0.0)
         elif self.std is None or self.std == computed_std:
-            self._set(psd=self.psd if callable(self.psd) else _checked_table(self.psd, band))
+            self._set(psd=self.psd if callable(self.psd) else checked_table(self.psd, band))
             std = math.sqrt(self._spacing * float(np.sum(self._density(self.omega))))
             if std == 0:
                 raise ValueError(f"psd is zero on every line of the band {band} rad/s; check the units of omega")
@@ -108,6 +109,7 @@ class BandNoise:
         band: tuple[float, float],
         seed: int | np.random.SeedSequence = 0,
         period: float | None = None,
+        mean: float = 0.0,
     ) -> BandNoise:
         """Gaussian noise of any one-sided power spectral density S(ω) within a band.
 
@@ -118,7 +120,7 @@ class BandNoise:
         psd : callable or (omega, S)
             S per rad/s, >= 0: a function of an array of ω in rad/s, or a table of two sequences that
             covers the band, interpolated linearly.
-        band, seed, period
+        band, seed, period, mean
             As for `BandNoise`; the automatic period puts 4096 lines in the band.
 
         Raises
@@ -134,12 +136,49 @@ class BandNoise:
         """
         if psd is None:
             raise ValueError("psd must be a function of omega or a table (omega, S), got None")
-        return cls(None, band, seed, period, psd=psd)
+        return cls(None, band, seed, period, mean=mean, psd=psd)
+
+    @classmethod
+    def rolled_off(
+        cls,
+        std: float,
+        band: tuple[float, float],
+        corner: float,
+        seed: int | np.random.SeedSequence = 0,
+        period: float | None = None,
+    ) -> BandNoise:
+        """Flat noise in a band as an actuator passes it on that is a first-order low-pass filter.
+
+            S(ω) ∝ 1/(1 + (ω/corner)²) within the band,    ∫ S dω = std²
+
+        Parameters
+        ----------
+        std, band, seed, period
+            As for `BandNoise`; `std` is that of what leaves the filter.
+        corner : float
+            rad/s, > 0: where half of the power is left.
+
+        References
+        ----------
+        van de Wouw et al., Int. J. Non-Linear Mech. 38 (2003) 767, section 7: their hydraulic actuator.
+
+        Examples
+        --------
+        >>> noise = BandNoise.rolled_off(1e-3, (0.0, 1226.6), corner=300.0, seed=1)
+        >>> round(float(noise.psd_at(300.0) / noise.psd_at(0.0)), 12)
+        0.5
+        """
+        lo, hi = checked_band("BandNoise band", band)
+        shape = RollOff(1.0, number("BandNoise corner (rad/s)", corner, above=0.0))
+        level = number("BandNoise std", std, above=0.0) ** 2 / shape.power(lo, hi)
+        return cls.of_psd(RollOff(level, shape.corner), (lo, hi), seed, period)
 
     def __repr__(self) -> str:
-        head = f"BandNoise(std={self.std!r}" if self.psd is None else "BandNoise.of_psd(psd=…"
+        shape = repr(self.psd) if isinstance(self.psd, RollOff) else "…"
+        head = f"BandNoise(std={self.std!r}" if self.psd is None else f"BandNoise.of_psd(psd={shape}"
+        mean = f", mean={self.mean!r}" if self.mean else ""
         tail = f".derivative({self.order})" if self.order else ""
-        return f"{head}, band={self.band!r}, seed={self.seed!r}, period={self.period!r}){tail}"
+        return f"{head}, band={self.band!r}, seed={self.seed!r}, period={self.period!r}{mean}){tail}"
 
     def __getstate__(self) -> dict[str, Any]:
         """The fields without the lines: those come back from the seed, and a pickle stays small."""
@@ -168,11 +207,7 @@ class BandNoise:
             first, last = self._span
             assert self.std is not None
             return np.full(omega.shape, self.std**2 / (self._spacing * (last - first + 1)))
-        raw = self.psd(omega) if callable(self.psd) else np.interp(omega, *self.psd)
-        density = np.asarray(raw, dtype=np.float64)
-        if density.shape not in ((), omega.shape):
-            raise ValueError(f"psd must return one value per omega, got shape {density.shape} for {omega.shape}")
-        return _checked_density(omega, np.broadcast_to(density, omega.shape))
+        return evaluated(self.psd, omega)
 
     @cached_property
     def _lines(self) -> LineSpectrum:
@@ -195,6 +230,16 @@ class BandNoise:
         return self._lines.amplitude
 
     @property
+    def period_was_given(self) -> bool:
+        """Whether the period was asked for; otherwise `lasting` may take a longer one."""
+        return self._computed[1] is None
+
+    @property
+    def offset(self) -> float:
+        """Constant part of this signal: the mean of y, none of its derivatives."""
+        return 0.0 if self.order else self.mean
+
+    @property
     def rms(self) -> float:
         """Standard deviation over one period of this signal, y or the derivative it stands for."""
         return self._lines.rms
@@ -209,7 +254,7 @@ class BandNoise:
 
     def __call__(self, t: ArrayLike) -> Any:
         """Value at the instants t (s), of any shape, by summation; for long uniform grids see `series`."""
-        return self._lines.at(t)
+        return self._lines.at(t) + self.offset
 
     def series(self, dt: float | None = None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """One period (t, y) on a uniform grid by FFT.
@@ -225,7 +270,7 @@ class BandNoise:
         lines = self._lines
         widest = lines.period / (4 * lines.top) if dt is None else number("dt (s)", dt, above=0.0)
         n = next_fast_len(max(math.ceil(lines.period / widest - 1e-9), 2 * lines.top + 1), real=True)
-        return lines.period / n * np.arange(n), lines.grid(n)
+        return lines.period / n * np.arange(n), lines.grid(n) + self.offset
 
     def nodes(self, duration: float, rtol: float) -> tuple[float, NDArray[np.float64]]:
         """Hermite data of the signal on a uniform grid, with a proven interpolation error.
@@ -256,7 +301,9 @@ class BandNoise:
         Derivatives come from the lines; max|s^(6)| is bounded from an oversampled FFT, not estimated.
         """
         self._check_lasts(number("duration (s)", duration, least=0.0))
-        return self._lines.nodes(duration, rtol)
+        dt, values = self._lines.nodes(duration, rtol)
+        values[:, 0] += self.offset
+        return dt, values
 
     def derivative(self, order: int) -> BandNoise:
         """The signal d^order s/dt^order: the same lines times (i ω)^order."""
@@ -269,7 +316,7 @@ class BandNoise:
         with period = duration; a period that was asked for and is too short is an error.
         """
         duration = number("duration (s)", duration, least=0.0)
-        if self._computed[1] is not None and duration > self._computed[1]:
+        if not self.period_was_given and duration > (self.period or 0.0):
             return replace(self, period=duration)
         self._check_lasts(duration)
         return self
@@ -291,28 +338,3 @@ def _checked_seed(seed: Any) -> int | np.random.SeedSequence:
     if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
         raise ValueError(f"BandNoise seed must be an integer of at least 0 or a SeedSequence, got {seed!r}")
     return int(seed)
-
-
-def _checked_density(omega: NDArray[np.float64], density: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The density, or an error that names its first bad value."""
-    bad = ~(np.isfinite(density) & (density >= 0))
-    if bad.any():
-        i = int(np.argmax(bad))
-        raise ValueError(f"psd must be finite and at least 0, got {density[i]} at omega = {omega[i]:.6g} rad/s")
-    return density
-
-
-def _checked_table(psd: Any, band: tuple[float, float]) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """The table as tuples that nobody can change, or a clear error."""
-    try:
-        omega, density = (np.asarray(column, dtype=np.float64) for column in psd)
-    except (TypeError, ValueError):
-        raise ValueError(f"psd must be a function of omega or a table (omega, S), got {type(psd).__name__}") from None
-    if omega.ndim != 1 or omega.shape != density.shape or omega.size < 2:
-        raise ValueError(f"psd table needs two columns of equal length >= 2, got {omega.shape} and {density.shape}")
-    if not np.all(np.diff(omega) > 0):
-        raise ValueError("psd table must have strictly increasing omega; sort it")
-    if not (omega[0] <= band[0] and band[1] <= omega[-1]):
-        raise ValueError(f"psd table spans [{omega[0]:g}, {omega[-1]:g}] rad/s and must cover the band {band}")
-    _checked_density(omega, density)
-    return tuple(omega.tolist()), tuple(density.tolist())

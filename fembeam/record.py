@@ -43,6 +43,9 @@ class Record:
     kind : "displacement" or "acceleration"
         What `y` is. For an acceleration `derivative(2)` is the record itself, and the value is its double
         integral without straight line and constants, zero at both ends; slow drift stays unless lo > 0.
+    detrend : bool
+        Remove the least-squares straight line first: offset and drift of the sensor. An acceleration needs it
+        unless lo > 0: its offset is a load like gravity.
     order : int, keyword only
         How many derivatives of the motion this signal is; use `derivative`.
 
@@ -73,6 +76,7 @@ class Record:
     y: NDArray[np.float64]
     band: tuple[float, float] | None = None
     kind: Literal["displacement", "acceleration"] = "displacement"
+    detrend: bool = False
     order: int = field(default=0, kw_only=True)
     _spectrum: tuple[LineSpectrum, float, float] = field(init=False, repr=False)
 
@@ -93,6 +97,7 @@ class Record:
         scale: float = 1.0,
         band: tuple[float, float] | None = None,
         kind: Literal["displacement", "acceleration"] = "displacement",
+        detrend: bool = False,
     ) -> Record:
         """A record from a text file with columns separated by semicolon, tab, comma or blanks.
 
@@ -104,7 +109,7 @@ class Record:
             Columns of time (s) and motion, counted from 0.
         scale : float
             Factor on the motion, for example 1e-3 for mm.
-        band, kind
+        band, kind, detrend
             As for `Record`.
 
         Raises
@@ -115,7 +120,7 @@ class Record:
         rows = _read_rows(Path(path), columns)
         scaled = rows[:, 1] * number("scale", scale)
         try:
-            return cls(rows[:, 0], scaled, band=band, kind=kind)
+            return cls(rows[:, 0], scaled, band=band, kind=kind, detrend=detrend)
         except ValueError as error:
             raise ValueError(f"{path}: {error}") from None
 
@@ -134,6 +139,10 @@ class Record:
         from scipy.fft import dst
 
         y = _on_uniform_grid(self.t, self.y)
+        if self.detrend:
+            from scipy.signal import detrend
+
+            y = detrend(y)
         n = y.size - 1
         line = (float(y[0]), float(y[-1] - y[0]) / self.duration)
         sines = dst(y[1:-1] - (line[0] + line[1] * self.duration / n * np.arange(1, n)), type=1) / n

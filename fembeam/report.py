@@ -55,7 +55,7 @@ def write(run: Run, folder: str | Path, discard: float = 0.0, seconds: float | N
     """
     folder = Path(folder)
     written = [run.save(folder / "run.npz")]
-    written.append(_write_json(folder / "summary.json", summary(run, discard, seconds)))
+    written.append(write_json(folder / "summary.json", summary(run, discard, seconds)))
     written += [_write_figure(folder / f"{name}.png", draw()) for name, draw in figures(run, discard).items()]
     return written
 
@@ -165,7 +165,7 @@ def _energy(run: Run) -> dict[str, float]:
     return end
 
 
-def _write_json(target: Path, content: dict[str, Any]) -> Path:
+def write_json(target: Path, content: dict[str, Any]) -> Path:
     """Write JSON as the standard has it: null for what is not finite."""
     with written_whole(target) as file:
         file.write((json.dumps(_finite(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode())

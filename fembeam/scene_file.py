@@ -2,7 +2,7 @@
 
     [beam] [[supports]] [[masses]] [[springs]] [[dashpots]] [[stops]] [[forces]] [[impactors]] [damping] [base]
     gravity = 9.81
-    [reduce] [simulate] [mode_count] [smallest_model]
+    [reduce] [simulate] [mode_count] [smallest_model] [ensemble]
 
 The keys of a table are the arguments of the constructor behind it, read from its signature, so that nothing is
 declared twice: a constructor that gains an argument gains a key. Units are SI, names those of the library.
@@ -28,6 +28,7 @@ from fembeam.record import Record
 from fembeam.scene import FEATURES, Scene
 from fembeam.schema import Constructors, converted, fits, listed, nearest, parameters, required, shown, wanted
 from fembeam.section import Section, Taper, require_non_negative, require_positive
+from fembeam.study.ensemble_table import EnsembleTable
 from fembeam.study.quantities import QUANTITIES
 from fembeam.study.tables import ModeCountTable, SmallestModelTable
 from fembeam.transient import Pulse, Step
@@ -97,12 +98,19 @@ SIGNALS: Constructors = {
     "harmonic": Harmonic,
     "multisine": Multisine,
     "band_noise": BandNoise,
+    "noise_of_psd": BandNoise.of_psd,
+    "rolled_off_noise": BandNoise.rolled_off,
     "record": Record.from_csv,
     "pulse": Pulse,
     "step": Step,
 }
 SOLVERS = {"exponential": "Exponential", "dormand_prince": "DormandPrince", "henon_rk2": "HenonRK2"}
-STUDIES: Constructors = {"simulate": Simulate, "mode_count": ModeCountTable, "smallest_model": SmallestModelTable}
+STUDIES: Constructors = {
+    "simulate": Simulate,
+    "ensemble": EnsembleTable,
+    "mode_count": ModeCountTable,
+    "smallest_model": SmallestModelTable,
+}
 
 
 def read(path: str | Path) -> SceneFile:

@@ -15,6 +15,7 @@ import pytest
 import fembeam as fb
 import reduction
 from fembeam.cli import main
+from fembeam.scene_file import read
 
 EXAMPLE = Path(__file__).parent.parent / "examples" / "beam_stop.toml"
 FIGURES = ["time_history.png", "psd.png", "densities.png", "contacts.png", "modes.png"]
@@ -203,3 +204,63 @@ def test_ctrl_c_before_the_run_is_one_line(capsys, monkeypatch):
     monkeypatch.setattr("fembeam.scene_file.read", interrupted)
     assert main(["modes", str(EXAMPLE)]) == 130
     assert capsys.readouterr().err.count("\n") == 1
+
+
+ENSEMBLE = """
+[ensemble]
+realisations = 3
+duration = 16
+dt = 2e-3
+solver = { kind = "exponential", rtol = 1e-6, ledger = false }
+"""
+
+
+def ensemble_scene(tmp_path, *changes):
+    path = scene(tmp_path)
+    text = path.read_text(encoding="utf-8").split("[simulate]")[0] + ENSEMBLE
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_an_ensemble_is_written_and_goes_on(tmp_path, capsys):
+    path, out = ensemble_scene(tmp_path), tmp_path / "out"
+    assert main(["run", str(path), "--out", str(out), "--quiet"]) == 0
+    table = capsys.readouterr().out
+    assert table.startswith("3 realisations\n")
+    assert re.search(r"stop 0 rate +4\d\.\d+ ± \d", table)
+    assert sorted(p.name for p in out.iterdir()) == ["ensemble.json", "ensemble.npz", "ensemble.png"]
+    found = json.loads((out / "ensemble.json").read_text())
+    assert found["numbers"]["δ skewness"]["mean"] < -0.7
+    ensemble_scene(tmp_path, ("realisations = 3", "realisations = 4\nworkers = 2"))
+    assert main(["run", str(path), "--out", str(out), "--quiet"]) == 0
+    assert capsys.readouterr().out.startswith("4 realisations\n")
+    ensemble_scene(tmp_path, ("gap = 0.0", "gap = 1e-4"))
+    assert "belongs to another study: stops is" in refused(capsys, "run", path, "--out", out)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("realisations = 3", "realisations = 1"), "realisations must be at least 2, got 1"),
+        (("realisations = 3\n", ""), "the key 'realisations' is missing"),
+        (("dt = 2e-3", "dt = 0"), "dt"),
+        (("duration = 16", "durations = 16"), "did you mean 'duration'"),
+        (("std = 2.5e-4", "std = 2.5e-4\ncolour = 3"), "unknown key 'colour'"),
+    ],
+)
+def test_a_bad_ensemble(tmp_path, capsys, change, message):
+    assert message in refused(capsys, "run", ensemble_scene(tmp_path, change), "--out", tmp_path / "out")
+
+
+def test_noise_of_a_table_and_rolled_off_in_a_file(tmp_path):
+    kinds = {
+        "noise_of_psd": "psd = [[0.0, 1226.6], [1e-10, 1e-11]]",
+        "rolled_off_noise": "std = 2.5e-4\ncorner = 300.0",
+    }
+    for kind, keys in kinds.items():
+        path = ensemble_scene(tmp_path, ('"band_noise"', f'"{kind}"'), ("std = 2.5e-4", keys))
+        base = read(path).scene.base
+        assert base.psd_at(1226.6) < 0.2 * base.psd_at(0.0)

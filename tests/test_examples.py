@@ -15,7 +15,8 @@ FOLDER = Path(__file__).parent.parent / "examples"
 @pytest.mark.parametrize("path", sorted(FOLDER.glob("*.py")), ids=lambda path: path.name)
 def test_example(path, tmp_path):
     environment = {**os.environ, "MPLBACKEND": "Agg"}
-    command = [sys.executable, str(path)]
+    quick = ["--quick"] if "--quick" in path.read_text(encoding="utf-8") else []
+    command = [sys.executable, str(path), *quick]
     done = subprocess.run(
         command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300, check=False
     )

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import BPoly
 
+from fembeam.density import RollOff
 from fembeam.excitation import BandNoise, Harmonic, Multisine, Record
 from fembeam.statistics import moments
 
@@ -298,6 +299,38 @@ def test_of_psd_has_the_density_line_by_line():
     np.testing.assert_allclose(noise.psd_at([0.0, 300.0, 2000.0]), [1e-9, 5e-10, 0.0], rtol=1e-12)
 
 
+def test_an_actuator_rolls_off():
+    noise = BandNoise.rolled_off(2e-3, NARROW, corner=300.0, seed=1)
+    assert noise.std == pytest.approx(2e-3, rel=1e-3)
+    ratio = noise.psd_at(noise.omega[-1]) / noise.psd_at(noise.omega[0])
+    assert ratio == pytest.approx(roll_off(noise.omega[-1]) / roll_off(noise.omega[0]), rel=1e-12)
+    shape = RollOff(1e-9, 300.0)
+    assert np.array_equal(shape(noise.omega), roll_off(noise.omega))
+    grid = np.linspace(*BROAD, 100_001)
+    assert shape.power(*BROAD) == pytest.approx(np.trapezoid(roll_off(grid), grid), rel=1e-8)
+    assert repr(noise).startswith("BandNoise.of_psd(psd=RollOff(level=")
+
+
+@pytest.mark.parametrize("psd", [None, roll_off])
+def test_a_mean_is_added_and_has_no_derivative(psd):
+    if psd is None:
+        plain, moved = BandNoise(1e-3, NARROW, 4), BandNoise(1e-3, NARROW, 4, mean=-2.0)
+    else:
+        plain, moved = BandNoise.of_psd(psd, NARROW, 4), BandNoise.of_psd(psd, NARROW, 4, mean=-2.0)
+    t = np.linspace(0.0, 3.0, 50)
+    np.testing.assert_allclose(moved(t), plain(t) - 2.0, rtol=1e-12)
+    np.testing.assert_allclose(moved.series()[1].mean(), -2.0, rtol=1e-12)
+    np.testing.assert_allclose(
+        moved.nodes(1.0, 1e-8)[1] - plain.nodes(1.0, 1e-8)[1],
+        [[-2.0, 0.0, 0.0]] * len(plain.nodes(1.0, 1e-8)[1]),
+        atol=1e-12,
+    )
+    assert np.array_equal(moved.derivative(2)(t), plain.derivative(2)(t))
+    assert np.array_equal(moved.derivative(1).nodes(1.0, 1e-8)[1], plain.derivative(1).nodes(1.0, 1e-8)[1])
+    assert moved.rms == plain.rms
+    assert moved.lasting(1000.0).mean == -2.0
+
+
 def test_a_table_is_its_interpolant():
     table = np.linspace(0.0, 1300.0, 400)
     level = roll_off(table)
@@ -323,6 +356,9 @@ def test_a_constant_density_is_flat_noise():
         (lambda: BandNoise(0.0, BROAD), "std must be finite above 0, got 0.0"),
         (lambda: BandNoise(math.nan, BROAD), "std must be finite above 0, got nan"),
         (lambda: BandNoise(None, BROAD), "std must be a number, got None"),
+        (lambda: BandNoise(1.0, BROAD, mean=math.inf), "mean must be finite, got inf"),
+        (lambda: BandNoise.rolled_off(1.0, BROAD, 0.0), r"corner \(rad/s\) must be finite above 0, got 0.0"),
+        (lambda: BandNoise.rolled_off(math.nan, BROAD, 300.0), "std must be finite above 0, got nan"),
         (lambda: BandNoise(1.0, (5.0, 2.0)), r"band must run from lo to hi > lo in rad/s, got \(5, 2\)"),
         (lambda: BandNoise(1.0, (5.0, 5.0)), "band must run from lo to hi"),
         (lambda: BandNoise(1.0, (-5.0, 5.0)), r"band\[0\] must be finite of at least 0, got -5.0"),
@@ -463,6 +499,17 @@ def test_acceleration_record_is_its_own_second_derivative():
     inner = np.linspace(1.0, 4.0, 500)
     np.testing.assert_allclose(banded(inner), y(inner), atol=0.01e-3)
     assert Record(t, 0.5 + 0.1 * t, kind="acceleration")(2.0) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_an_acceleration_record_loses_the_offset_and_drift_of_its_sensor():
+    t = STEP * np.arange(SAMPLES)
+    y = Harmonic(1e-3, 50 * 2 * np.pi / t[-1])
+    raw = y.derivative(2)(t)
+    record = Record(t, raw + 0.5 - 0.02 * t, kind="acceleration", detrend=True)
+    straight = np.polynomial.polynomial.polyfit(t, raw, 1)  # what a straight line finds in the motion itself
+    expected = raw - straight[0] - straight[1] * t
+    np.testing.assert_allclose(record.derivative(2)(t), expected, atol=1e-9)
+    assert abs(Record(t, raw + 0.5, kind="acceleration").derivative(2)(t).mean() - 0.5) < 1e-3
 
 
 def test_record_leaves_the_arrays_alone():

@@ -7,7 +7,7 @@ import pytest
 
 import fembeam as fb
 from contacts import Hertz
-from fembeam import plot, report
+from fembeam import plot, report, statistics
 
 
 @pytest.fixture(scope="module")
@@ -85,3 +85,27 @@ def test_the_users_settings_are_left_alone(run):
 def test_segments_resolve_two_rad_per_second_on_long_runs():
     assert 2 * np.pi / (plot.segment_for(600_000, 1e-3) * 1e-3) <= 2.0
     assert plot.segment_for(800, 1e-3) == 100
+
+
+def test_random_figures_have_units_bands_and_confidence():
+    x = np.random.default_rng(1).standard_normal(4000)
+    signal = statistics.Signal(x, 1e-3, 256)
+    for part in np.split(x, 8):
+        signal.add(part)
+    branches = {"broad": {"period 1": (np.array([100.0, 200.0]), np.array([1e-3, 2e-3]))}}
+    panels = {"broad": {"δ": signal, "mid": signal.psd}, "narrow": {"δ": signal.psd}}
+    figure = plot.random_spectra(panels, 1000.0, {"narrow": (100.0, 200.0)}, branches)
+    assert len(figure.axes) == 4
+    for word in (
+        "PSD / m² s rad⁻¹",
+        "ω / rad s⁻¹",
+        "broad",
+        "narrow",
+        "period 1",
+        "largest |δ| of periodic motion / mm",
+    ):
+        assert word in texts(figure)
+    assert len(plot.random_spectra(panels, 1000.0).axes) == 2
+    figure = plot.random_densities({"δ": signal, "mid": signal})
+    for word in ("probability density / mm⁻¹", "δ / mm", "Gaussian", "skewness", " ± "):
+        assert word in texts(figure)

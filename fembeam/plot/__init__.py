@@ -5,6 +5,7 @@
 
 from fembeam.plot.animation import animate, frame
 from fembeam.plot.orbits import branch, orbit, peak
+from fembeam.plot.random import random_densities, random_spectra
 from fembeam.plot.response import (
     contacts,
     densities,
@@ -32,6 +33,8 @@ __all__ = [
     "peak",
     "peaks",
     "places",
+    "random_densities",
+    "random_spectra",
     "responses",
     "segment_for",
     "smallest_model",

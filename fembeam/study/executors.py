@@ -19,6 +19,7 @@ def spread(
     items: Iterable[Item],
     executor: Executor | None = None,
     progress: str | None = None,
+    seen: Callable[[int, Result], None] | None = None,
 ) -> list[Result]:
     """[function(item) for item in items], on an executor if one is given.
 
@@ -28,6 +29,7 @@ def spread(
     items : any iterable; it is read once.
     executor : any `concurrent.futures.Executor`, left open; None: here, one after the other.
     progress : label of a bar over the items, shown only on a terminal; None: no bar.
+    seen : called here with (index, result) as each result arrives, in any order: for checkpoints.
 
     Returns
     -------
@@ -47,17 +49,20 @@ def spread(
     from tqdm import tqdm
 
     work = list(items)
+    tell = seen or (lambda index, result: None)
     with tqdm(total=len(work), desc=progress, disable=None if progress else True) as bar:
         if executor is None:
             results = []
             for index, item in enumerate(work):
                 results.append(_named(function, index, item))
+                tell(index, results[-1])
                 bar.update()
             return results
         futures = [executor.submit(_named, function, index, item) for index, item in enumerate(work)]
+        places = {future: index for index, future in enumerate(futures)}
         try:
             for done in as_completed(futures):
-                done.result()
+                tell(places[done], done.result())
                 bar.update()
         except BaseException:
             for future in futures:

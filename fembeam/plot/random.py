@@ -1,0 +1,100 @@
+"""Figures of random response: spectra and densities with their confidence, many to a sheet."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fembeam.plot.response import BLUE, GREY, RED, _fit_levels, _sheet, styled
+from fembeam.statistics import Spectrum
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from fembeam.statistics import Signal
+
+Vector = NDArray[np.float64]
+SURE = 1.96  # standard errors on either side: 95 %
+FURTHEST = 5.0  # standard deviations shown of a density
+
+
+@styled
+def random_spectra(
+    panels: Mapping[str, Mapping[str, Spectrum | Signal]],
+    omega_max: float,
+    bands: Mapping[str, tuple[float, float]] | None = None,
+    branches: Mapping[str, Mapping[str, tuple[Vector, Vector]]] | None = None,
+) -> Figure:
+    """Power spectral densities, one panel each, with 95 % confidence shaded where it is known.
+
+    Parameters
+    ----------
+    panels : title -> label -> spectrum (m² per rad/s), or the signal it is of.
+    omega_max : rad/s, end of the axes.
+    bands : title -> excited band in rad/s, marked on top of its panel.
+    branches : title -> label -> (ω, largest δ in m) of periodic solutions, drawn beside the panel of that title.
+    """
+    columns = 2 if branches else 1
+    figure, axes = _sheet(None, len(panels), columns, (4.6 * columns + 2.4, 2.1 * len(panels) + 0.5), squeeze=False)
+    for row, (title, shown) in enumerate(panels.items()):
+        lines = {label: x if isinstance(x, Spectrum) else x.psd for label, x in shown.items()}
+        axis = axes[row * columns]
+        for i, (label, line) in enumerate(lines.items()):
+            _curve(axis, line, omega_max, label, f"C{i}")
+        _fit_levels(axis, list(lines.values()), omega_max)
+        if bands and title in bands:
+            axis.axvspan(*bands[title], ymin=0.96, color=GREY, alpha=0.6, linewidth=0)
+        axis.set(title=title, xlim=(0, omega_max), ylabel="PSD / m² s rad⁻¹")
+        if len(lines) > 1:
+            axis.legend(loc="upper right")
+        if branches:
+            _branches(axes[row * columns + 1], branches.get(title, {}), omega_max)
+    for axis in axes[-columns:]:
+        axis.set_xlabel("ω / rad s⁻¹")
+    return figure
+
+
+@styled
+def random_densities(signals: Mapping[str, Signal]) -> Figure:
+    """Probability densities with 95 % confidence against the Gaussian of the same mean and deviation."""
+    figure, axes = _sheet(None, 1, len(signals), (3.5 * len(signals), 3.1))
+    for axis, (name, signal) in zip(axes, signals.items(), strict=True):
+        density, mean, std = signal.pdf, 1e3 * float(signal.mean.value), 1e3 * float(signal.std.value)
+        x, p = 1e3 * density.x, 1e-3 * density.density
+        axis.plot(x, p, color=BLUE, label="simulated, 95 %")
+        if density.standard_error is not None:
+            _ribbon(axis, x, p, 1e-3 * density.standard_error, BLUE)
+        wide = mean + std * np.linspace(-FURTHEST, FURTHEST, 301)
+        normal = np.exp(-0.5 * ((wide - mean) / std) ** 2) / (std * np.sqrt(2 * np.pi))
+        axis.plot(wide, normal, color=RED, linestyle="--", label="Gaussian")
+        axis.set_title(f"{name}: skewness {signal.skewness!r}")
+        axis.set(xlabel=f"{name} / mm", xlim=(wide[0], wide[-1]), ylim=(0, None))
+    axes[0].set_ylabel("probability density / mm⁻¹")
+    axes[0].legend(loc="upper left")
+    return figure
+
+
+def _curve(axis: Axes, line: Spectrum, omega_max: float, label: str, colour: str) -> None:
+    """One spectrum without ω = 0, with its confidence."""
+    kept = (line.omega > 0) & (line.omega <= omega_max) & (line.density > 0)
+    axis.semilogy(line.omega[kept], line.density[kept], color=colour, label=label)
+    if line.standard_error is not None:
+        _ribbon(axis, line.omega[kept], line.density[kept], line.standard_error[kept], colour)
+
+
+def _ribbon(axis: Axes, x: Vector, y: Vector, error: Vector, colour: str) -> None:
+    """A shaded 95 % interval, above zero."""
+    axis.fill_between(x, np.maximum(y - SURE * error, 0.05 * y), y + SURE * error, color=colour, alpha=0.3, linewidth=0)
+
+
+def _branches(axis: Axes, curves: Mapping[str, tuple[Vector, Vector]], omega_max: float) -> None:
+    """Largest indentations of periodic solutions against the drive's frequency."""
+    for label, (omega, largest) in curves.items():
+        axis.plot(omega, 1e3 * np.asarray(largest), label=label)
+    axis.set(xlim=(0, omega_max), ylabel="largest |δ| of periodic motion / mm")
+    if curves:
+        axis.legend(loc="upper right")

@@ -1,0 +1,124 @@
+"""Estimates with standard errors from sums over batches of time.
+
+    θ = g(Σ_i r_i),    s.e.² = (n-1)/n Σ_i (θ_(i) - θ̄)²,    θ_(i) = g(Σ_{j≠i} r_j)        (jackknife)
+
+Whatever is a function of sums (means, variances, spectra, rates, ratios) is estimated by one rule. Batches must be much
+longer than the memory of the signal; then they are nearly independent whatever the signal does inside them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+MOST = 64  # batches kept; beyond it neighbours are merged, so that memory stays constant
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """A value with its standard error.
+
+    Attributes
+    ----------
+    value, standard_error : numbers, or arrays of one shape; the error is NaN with fewer than two batches.
+    batches : independent parts behind it.
+
+    Examples
+    --------
+    >>> Estimate.of_mean([1.0, 2.0, 3.0])
+    2 ± 0.577
+    """
+
+    value: Any
+    standard_error: Any
+    batches: int
+
+    @classmethod
+    def of_mean(cls, values: ArrayLike) -> Estimate:
+        """The mean of independent values (n, ...) over the first axis."""
+        samples = np.asarray(values, dtype=np.float64)
+        n = len(samples)
+        spread = samples.std(axis=0, ddof=1) / math.sqrt(n) if n > 1 else np.full(samples.shape[1:], math.nan)
+        return cls(samples.mean(axis=0)[()], spread[()], n)
+
+    @property
+    def relative(self) -> float:
+        """Largest standard error relative to the value; infinite while there is none."""
+        size, error = np.abs(self.value), np.asarray(self.standard_error)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = np.where(error == 0.0, 0.0, error / size)
+        return float(np.max(np.where(np.isnan(ratio), math.inf, ratio), initial=0.0))
+
+    def interval(self, confidence: float = 0.95) -> tuple[Any, Any]:
+        """Bounds of the confidence interval, by Student's t with batches - 1 degrees of freedom."""
+        if not 0.0 < confidence < 1.0:
+            raise ValueError(f"confidence must lie between 0 and 1, got {confidence!r}")
+        from scipy.special import stdtrit
+
+        reach = float(stdtrit(max(self.batches - 1, 1), 0.5 + confidence / 2)) * self.standard_error
+        return self.value - reach, self.value + reach
+
+    def __repr__(self) -> str:
+        if np.ndim(self.value):
+            return f"Estimate(shape {np.shape(self.value)}, {self.batches} batches)"
+        return f"{float(self.value):.6g} ± {float(self.standard_error):.3g}"
+
+
+class Batches:
+    """Rows of sums, one per batch, at most `MOST`: neighbours are merged when there are more.
+
+    Examples
+    --------
+    >>> batches = Batches(2)  # of n and Σx
+    >>> for x in (1.0, 2.0, 3.0):
+    ...     batches.add([1.0, x])
+    >>> batches.estimate(lambda sums: sums[1] / sums[0])
+    2 ± 0.577
+    """
+
+    def __init__(self, size: int) -> None:
+        self.rows = np.zeros((MOST, size))
+        self.full = 0  # rows that are complete
+        self.per_row = 1  # batches summed in a row
+        self.begun = 0  # batches in the row under way
+
+    def add(self, row: ArrayLike) -> None:
+        """Take in the sums of one more batch."""
+        self.rows[self.full] += row
+        self.begun += 1
+        if self.begun == self.per_row:
+            self.full, self.begun = self.full + 1, 0
+        if self.full == MOST:
+            self.rows[: MOST // 2] = self.rows[0::2] + self.rows[1::2]
+            self.rows[MOST // 2 :] = 0.0
+            self.full, self.per_row = MOST // 2, 2 * self.per_row
+
+    @property
+    def filled(self) -> NDArray[np.float64]:
+        """Rows with something in them, the one under way included."""
+        return self.rows[: self.full + (self.begun > 0)]
+
+    @property
+    def total(self) -> NDArray[np.float64]:
+        """Sums over everything."""
+        return self.filled.sum(axis=0)
+
+    def estimate(self, function: Callable[[NDArray[np.float64]], Any]) -> Estimate:
+        """A function of the sums with its jackknife standard error.
+
+        References
+        ----------
+        B. Efron, C. Stein, Annals of Statistics 9 (1981) 586.
+        """
+        total, n = self.total, len(self.filled)
+        value = function(total)
+        if n < 2:
+            return Estimate(value, np.full(np.shape(value), math.nan)[()], n)
+        without = np.array([function(total - row) for row in self.filled])
+        spread = np.sqrt((n - 1) / n * ((without - without.mean(axis=0)) ** 2).sum(axis=0))
+        return Estimate(value, spread[()], n)

@@ -1,0 +1,183 @@
+"""Statistics of a sampled signal that arrives in pieces: constant memory however long it lasts.
+
+row of a batch: [n, Σξ, Σξ², Σξ³, Σξ⁴, time, up-crossings | histogram | Welch's sums],        ξ = x - origin
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fembeam.statistics.batches import Batches, Estimate
+from fembeam.statistics.densities import Density
+from fembeam.statistics.spectra import Spectrum, Welch
+
+Vector = NDArray[np.float64]
+BINS = 240  # over twice the range of the first samples
+N, FIRST, TIME, CROSSINGS, PLAIN = 0, 1, 5, 6, 7  # places in a row; Σξ^k at FIRST + k - 1
+
+
+class Signal:
+    """Moments, density, spectrum and crossing rate of one signal, each with its standard error.
+
+    Parameters
+    ----------
+    first : samples (k,) that fix the origin and, unless given, the bins: twice their range, 240 bins.
+    dt : sampling step, s.
+    segment : samples of a Welch segment, at least 8.
+    level : the level whose up-crossings are counted.
+    bins : increasing edges of the histogram; what falls outside is counted in `outside`.
+
+    Examples
+    --------
+    >>> x = np.sin(0.1 * np.arange(20_000))
+    >>> signal = Signal(x, dt=0.1, segment=512)
+    >>> for part in np.split(x, 20):
+    ...     signal.add(part)
+    >>> round(float(signal.variance.value), 3), round(2 * math.pi * float(signal.crossing_rate.value), 2)
+    (0.5, 1.0)
+    """
+
+    def __init__(self, first: Vector, dt: float, segment: int, level: float = 0.0, bins: Vector | None = None) -> None:
+        self.dt, self.level, self.origin = dt, level, float(np.mean(first))
+        self.edges = _edges_around(first) if bins is None else np.asarray(bins, dtype=np.float64)
+        self.welch = Welch(segment, dt)
+        self._welch_at = PLAIN + self.edges.size + 1
+        self.batches = Batches(self._welch_at + self.welch.size)
+        self._last: tuple[float, float] | None = None
+        self.smallest, self.largest = math.inf, -math.inf
+
+    def cut(self) -> None:
+        """The next samples do not follow the last ones."""
+        self._last = None
+        self.welch.cut()
+
+    def add(self, x: Vector, rate: Vector | None = None) -> None:
+        """One batch of samples (k,), with their rates if known: then no crossing between samples is missed."""
+        if not np.isfinite(x).all():
+            raise ValueError(f"samples must be finite, got {x[~np.isfinite(x)][0]} in a batch of {x.size}")
+        row = np.zeros(self.batches.rows.shape[1])
+        centred = x - self.origin
+        power = np.ones_like(x)
+        for k in range(5):
+            row[N + k] = power.sum()
+            power *= centred
+        steps = np.concatenate(([] if self._last is None else [self._last[0]], x)) - self.level
+        slopes = None if rate is None else np.concatenate(([] if self._last is None else [self._last[1]], rate))
+        row[TIME], row[CROSSINGS] = self.dt * (steps.size - 1), up_crossings(steps, slopes, self.dt)
+        row[PLAIN : self._welch_at] = np.bincount(
+            np.searchsorted(self.edges, x, side="right"), minlength=self.edges.size + 1
+        )
+        row[self._welch_at :] = self.welch.sums(centred)
+        self.batches.add(row)
+        self._last = float(x[-1]), math.nan if rate is None else float(rate[-1])
+        self.smallest, self.largest = min(self.smallest, float(x.min())), max(self.largest, float(x.max()))
+
+    @property
+    def mean(self) -> Estimate:
+        """Mean."""
+        return self._of(lambda s: self.origin + s[FIRST] / s[N])
+
+    @property
+    def variance(self) -> Estimate:
+        """Mean square about the mean."""
+        return self._of(lambda s: _central(s)[0])
+
+    @property
+    def std(self) -> Estimate:
+        """Standard deviation."""
+        return self._of(lambda s: math.sqrt(_central(s)[0]))
+
+    @property
+    def skewness(self) -> Estimate:
+        """Third central moment over std³; 0 for a Gaussian."""
+        return self._of(lambda s: _standardised(s, 3))
+
+    @property
+    def kurtosis(self) -> Estimate:
+        """Fourth central moment over std⁴; 3 for a Gaussian."""
+        return self._of(lambda s: _standardised(s, 4))
+
+    @property
+    def crossing_rate(self) -> Estimate:
+        """Up-crossings of `level` per second."""
+        return self._of(lambda s: s[CROSSINGS] / s[TIME])
+
+    @property
+    def outside(self) -> float:
+        """Share of the samples outside the histogram."""
+        total = self.batches.total
+        return float((total[PLAIN] + total[self._welch_at - 1]) / total[N])
+
+    @property
+    def pdf(self) -> Density:
+        """Probability density; its integral is 1 - `outside`."""
+        width = np.diff(self.edges)
+        found = self._of(lambda s: s[PLAIN + 1 : self._welch_at - 1] / (s[N] * width))
+        return Density((self.edges[1:] + self.edges[:-1]) / 2, found.value, found.standard_error)
+
+    @property
+    def psd(self) -> Spectrum:
+        """One-sided power spectral density per rad/s; `.per_hz` converts."""
+        found = self._of(lambda s: self.welch.density(s[self._welch_at :], s[FIRST] / s[N]))
+        return Spectrum(self.welch.omega, found.value, int(self.batches.total[self._welch_at]), found.standard_error)
+
+    def power(self, lo: float, hi: float) -> Estimate:
+        """Part of the variance carried by lo <= ω <= hi (rad/s)."""
+        return self._of(
+            lambda s: Spectrum(
+                self.welch.omega, self.welch.density(s[self._welch_at :], s[FIRST] / s[N]), 0
+            ).variance_in(lo, hi)
+        )
+
+    def _of(self, function: Callable[[Vector], Any]) -> Estimate:
+        """An estimate; batches that hold no segment yet cannot be left out."""
+        return self.batches.estimate(function)
+
+
+def up_crossings(x: Vector, rate: Vector | None, dt: float) -> int:
+    """How often samples x (k,) go from below to above 0; with rates, by the cubic between two samples.
+
+    A pair of crossings between two samples on one side shows when the cubic's extremum lies on the other.
+    """
+    below, above = x[:-1] <= 0.0, x[1:] > 0.0
+    count = int(np.count_nonzero(below & above))
+    if rate is None:
+        return count
+    return count + _peeks(x, rate, dt) + _peeks(-x, -rate, dt)
+
+
+def _peeks(x: Vector, rate: Vector, dt: float) -> int:
+    """Steps from below to below whose cubic rises above 0."""
+    a, b, u, v = x[:-1], x[1:], rate[:-1] * dt, rate[1:] * dt
+    at = np.flatnonzero((a <= 0.0) & (b <= 0.0) & (u > 0.0) & (v < 0.0))
+    a, b, u, v = a[at], b[at], u[at], v[at]
+    c2, c3 = 3 * (b - a) - 2 * u - v, 2 * (a - b) + u + v  # a + uθ + c2 θ² + c3 θ³
+    # the maximum: 3 c3 θ² + 2 c2 θ + u = 0, in the form without cancellation
+    theta = u / (-c2 + np.sqrt(np.maximum(c2 * c2 - 3 * c3 * u, 0.0)))
+    return int(np.count_nonzero(a + theta * (u + theta * (c2 + theta * c3)) > 0.0))
+
+
+def _central(s: Vector) -> tuple[float, float, float]:
+    """Central moments of order 2, 3, 4 from sums of powers."""
+    m1, m2, m3, m4 = s[FIRST : FIRST + 4] / s[N]
+    second = m2 - m1**2
+    third = m3 - 3 * m1 * m2 + 2 * m1**3
+    return second, third, m4 - 4 * m1 * m3 + 6 * m1**2 * m2 - 3 * m1**4
+
+
+def _standardised(s: Vector, order: int) -> float:
+    """Central moment over the power of std; NaN for a constant."""
+    moments = _central(s)
+    return moments[order - 2] / moments[0] ** (order / 2) if moments[0] > 0.0 else math.nan
+
+
+def _edges_around(x: Vector) -> Vector:
+    """Equal bins over twice the range of the samples."""
+    lo, hi = float(x.min()), float(x.max())
+    half = (hi - lo) / 2 or abs(hi) or 1.0
+    return np.linspace(lo - half, hi + half, BINS + 1)

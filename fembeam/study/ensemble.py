@@ -1,0 +1,244 @@
+"""Many independent realisations of the noise: one value each, their mean and its standard error.
+
+The result depends on the seeds alone: not on the executor, the order of arrival, or interruptions.
+"""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fembeam.lines import number
+from fembeam.model import Model
+from fembeam.statistics.batches import Estimate
+from fembeam.study.checkpoint import Checkpoint, Values, identity
+from fembeam.study.executors import spread
+from fembeam.study.realisation import Seed, child, noises, realisation, seed_key
+
+FIRST_ROUND = 8  # realisations before `until` is asked for the first time
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A realisation that failed: its seed and why."""
+
+    seed: Seed
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class Ensemble:
+    """Values of a quantity over independent realisations.
+
+    Attributes
+    ----------
+    seeds : of the realisations that succeeded, in the order asked for.
+    values : name -> array (n, ...); a quantity that is one number or array has the name "".
+    failures : realisations that failed, with seed and reason.
+    enough : whether the standard error asked for by `until` was reached; None when none was.
+    """
+
+    seeds: tuple[Seed, ...]
+    values: dict[str, NDArray[Any]]
+    failures: tuple[Failure, ...] = ()
+    enough: bool | None = None
+
+    def __len__(self) -> int:
+        return len(self.seeds)
+
+    def __getitem__(self, name: str) -> Estimate:
+        """Mean of one named value over the realisations, with its standard error."""
+        if name not in self.values:
+            raise KeyError(f"the quantity has no {name!r}; it has {', '.join(map(repr, self.values))}")
+        return Estimate.of_mean(self.values[name])
+
+    def __str__(self) -> str:
+        """Means and standard errors of the named numbers, one a line."""
+        numbers = {name: self[name] for name, values in self.values.items() if values.ndim == 1}
+        width = max(map(len, numbers), default=0)
+        head = f"{len(self)} realisations" + (f", {len(self.failures)} failed" if self.failures else "")
+        return "\n".join([head, *(f"{name:{width}}  {found!r}" for name, found in numbers.items())])
+
+    @property
+    def mean(self) -> Estimate:
+        """Mean of a quantity that is one number or array, with its standard error."""
+        return self[""]
+
+
+def ensemble(
+    model: Model,
+    seeds: int | Sequence[Seed],
+    quantity: Callable[[Model], Any],
+    executor: Executor | None = None,
+    checkpoint: str | os.PathLike[str] | None = None,
+    *,
+    until: float | None = None,
+    progress: bool = False,
+) -> Ensemble:
+    """Evaluate a quantity for independent realisations of a model's noise.
+
+    Parameters
+    ----------
+    model : with at least one `BandNoise` among base motion and forces; noises of one seed stay one realisation.
+    seeds : how many, or the seeds themselves, none twice. A number spawns them from the noise's own seed
+        (`numpy.random.SeedSequence`), so that a longer ensemble contains a shorter one.
+    quantity : of the model under one realisation: a number, an array, or a mapping of names to these, such as
+        ``partial(fb.study.characteristics, duration=100.0, dt=1e-3)`` or
+        ``lambda model: model.simulate(50.0).contacts.peak_force.max()``.
+    executor : any `concurrent.futures.Executor`; processes need a quantity that can be pickled (no lambda).
+    checkpoint : file written whole after each realisation; when it exists, what it holds is not computed again.
+    until : stop when the relative standard error of every mean is below it; asked after 8, 16, 32, … realisations
+        in the order of the seeds, whatever the executor.
+    progress : show a bar (only on a terminal).
+
+    Returns
+    -------
+    Ensemble : what failed is in `failures`, and warned of; the rest survives.
+
+    Raises
+    ------
+    ValueError : no noise, a seed twice, a checkpoint of another study (with what differs), values of another shape.
+    RuntimeError : every realisation failed, or the executor is gone; finished realisations are in the checkpoint.
+
+    Examples
+    --------
+    >>> import fembeam as fb
+    >>> scene = fb.Scene(fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01)), [fb.Clamped(0.0)],
+    ...                  damping=fb.ModalDamping(0.05), base=fb.BandNoise(1e-5, (0.0, 400.0), seed=1))
+    >>> tip = lambda model: model.simulate(5.0, 1e-2).displacement(0.5).std()
+    >>> found = ensemble(scene.reduce(modes=1), 8, tip)
+    >>> len(found), found.mean.relative < 0.2
+    (8, True)
+    """
+    chosen = _seeds(model, seeds)
+    if until is not None and not 0.0 < number("until", until, above=0.0) < 1.0:
+        raise ValueError(f"until must be a relative standard error below 1, got {until!r}")
+    kept = Checkpoint(checkpoint, identity(model, quantity))
+    failed: dict[str, Failure] = {}
+    for count in _rounds(len(chosen), until):
+        missing = [seed for seed in chosen[:count] if seed_key(seed) not in {*kept.values, *failed}]
+        _compute(partial(_value, model, quantity), missing, kept, failed, executor, progress)
+        found = _collected(chosen[:count], kept, failed, until)
+        if found.enough:
+            break
+    if found.failures:
+        first = found.failures[0]
+        message = f"{len(found.failures)} of {count} realisations failed; seed {seed_key(first.seed)}: {first.reason}"
+        warnings.warn(message, UserWarning, stacklevel=2)
+    return found
+
+
+def _compute(
+    task: Callable[[Seed], Values | Failure],
+    seeds: list[Seed],
+    kept: Checkpoint,
+    failed: dict[str, Failure],
+    executor: Executor | None,
+    progress: bool,
+) -> None:
+    """Values of these seeds, into the checkpoint as they come."""
+
+    def seen(index: int, result: Values | Failure) -> None:
+        key = seed_key(seeds[index])
+        if isinstance(result, Failure):
+            failed[key] = result
+        else:
+            _check_alike(result, kept, key)
+            kept.add(key, result)
+
+    try:
+        spread(task, seeds, executor, "realisations" if progress else None, seen)
+    except (ValueError, OSError):
+        raise
+    except Exception as error:  # failures of a realisation do not come this way
+        where = "" if kept.path is None else f"; finished ones are in {kept.path}, call again to go on"
+        raise RuntimeError(
+            f"the executor failed with {len(kept.values)} realisations finished: {type(error).__name__}: {error}{where}"
+        ) from error
+
+
+def _value(model: Model, quantity: Callable[[Model], Any], seed: Seed) -> Values | Failure:
+    """The quantity of one realisation as arrays; what it raises becomes a `Failure`."""
+    try:
+        found = quantity(realisation(model, seed))
+        named = found if isinstance(found, Mapping) else {"": found}
+        values = {str(name): _array(name, value) for name, value in named.items()}
+    except Exception as error:
+        return Failure(seed, f"{type(error).__name__}: {error}")
+    return values
+
+
+def _array(name: str, value: Any) -> NDArray[Any]:
+    """A value as finite floats (complex numbers stay complex)."""
+    raw = np.asarray(value.value if isinstance(value, Estimate) else value)
+    label = f" {name!r}" if name else ""
+    if raw.dtype.kind not in "biufc":
+        raise TypeError(f"the quantity{label} must be a number or an array of numbers, got {type(value).__name__}")
+    array = raw.astype(np.complex128 if raw.dtype.kind == "c" else np.float64)
+    if not np.isfinite(array).all():
+        raise ValueError(f"the quantity{label} is {array[~np.isfinite(array)][0]}")
+    return array
+
+
+def _check_alike(values: Values, kept: Checkpoint, key: str) -> None:
+    """All realisations give the same names and shapes."""
+    first = next(iter(kept.values.values()), values)
+    mine, theirs = ({name: v.shape for name, v in one.items()} for one in (values, first))
+    if mine != theirs:
+        raise ValueError(f"the quantity must have one form; seed {key} gave {mine}, another one {theirs}")
+
+
+def _collected(seeds: Sequence[Seed], kept: Checkpoint, failed: dict[str, Failure], until: float | None) -> Ensemble:
+    """The ensemble in the order of the seeds."""
+    good = [seed for seed in seeds if seed_key(seed) in kept.values]
+    failures = tuple(failed[seed_key(seed)] for seed in seeds if seed_key(seed) in failed)
+    if not good:
+        raise RuntimeError(f"every realisation failed; seed {seed_key(failures[0].seed)}: {failures[0].reason}")
+    rows = [kept.values[seed_key(seed)] for seed in good]
+    values = {name: np.stack([row[name] for row in rows]) for name in rows[0]}
+    enough = None if until is None else all(Estimate.of_mean(v).relative <= until for v in values.values())
+    return Ensemble(tuple(good), values, failures, enough)
+
+
+def _rounds(count: int, until: float | None) -> list[int]:
+    """After how many realisations to look: at 8, 16, 32, … with `until`, and at the end."""
+    looks = [] if until is None else [FIRST_ROUND << i for i in range(40) if FIRST_ROUND << i < count]
+    return [*looks, count]
+
+
+def _seeds(model: Model, seeds: int | Sequence[Seed]) -> list[Seed]:
+    """The seeds of the realisations, checked."""
+    own = noises(model)
+    if not own:
+        raise ValueError("an ensemble needs a BandNoise as base motion or force; without it all realisations are equal")
+    if isinstance(seeds, (int, np.integer)) and not isinstance(seeds, bool):
+        if seeds < 1:
+            raise ValueError(f"seeds must be a number of at least 1 or a list of seeds, got {seeds}")
+        return [child(own[0], i) for i in range(int(seeds))]
+    if isinstance(seeds, (bool, str, np.random.SeedSequence)) or not hasattr(seeds, "__iter__"):
+        raise ValueError(f"seeds must be a number of at least 1 or a list of seeds, got {seeds!r}")
+    chosen = [_seed(seed) for seed in seeds]
+    first: dict[str, int] = {}
+    for i, seed in enumerate(chosen):
+        if seed_key(seed) in first:
+            raise ValueError(f"seeds must differ, got {seed_key(seed)} at {first[seed_key(seed)]} and at {i}")
+        first[seed_key(seed)] = i
+    if not chosen:
+        raise ValueError("seeds must not be empty")
+    return chosen
+
+
+def _seed(seed: Any) -> Seed:
+    """One seed, checked."""
+    whole = isinstance(seed, (int, np.integer)) and not isinstance(seed, bool) and seed >= 0
+    if not whole and not isinstance(seed, np.random.SeedSequence):
+        raise ValueError(f"a seed must be an integer of at least 0 or a SeedSequence, got {seed!r}")
+    return int(seed) if whole else seed

@@ -1,0 +1,289 @@
+"""A long run in constant memory: statistics of a stationary response with standard errors.
+
+The run is cut into stretches. Noise is renewed in each (an independent realisation from the state reached) and the
+lead-in, ten times the memory 1/min(ζω) of the linear structure, is left out; sums of tones go on where they were, from
+the last sample in free flight, so that no contact is cut. The statistics need no more memory than one stretch.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+import solvers
+from fembeam.lines import number
+from fembeam.model import Model
+from fembeam.plot.response import FINEST_RESOLUTION, places
+from fembeam.run import Run, bar
+from fembeam.statistics.batches import Estimate
+from fembeam.statistics.impacts import Impacts
+from fembeam.statistics.streaming import Signal
+from fembeam.statistics.transient import Settling, settling
+from fembeam.study.realisation import signals
+from fembeam.study.stretches import Stretch, Stretches
+
+Vector = NDArray[np.float64]
+Watch = Callable[[Run], Any]
+
+BATCHES = 8  # per stretch of 400 memory times, so that one batch is 50 of them
+FEWEST_STRETCHES = 4  # before `until` is asked: 32 batches
+TRIES = 4  # stretches dropped while the transient lasts
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """Statistics of a stationary response.
+
+    Attributes
+    ----------
+    signals : name -> `statistics.Signal`: mean, variance, std, skewness, kurtosis, crossing_rate, pdf, psd; also
+        ``response["δ"]``.
+    impacts : one `statistics.Impacts` per stop: rate, probability, mean(quantity).
+    duration : s the statistics use. discarded : s left out, lead-ins included.
+    settling : end of the transient; None when `discard` was given.
+    enough : whether the standard error asked for by `until` was reached; None when none was.
+    seconds : wall seconds of integration.
+    """
+
+    signals: dict[str, Signal]
+    impacts: list[Impacts]
+    duration: float
+    discarded: float
+    settling: Settling | None
+    enough: bool | None
+    seconds: float
+
+    def __getitem__(self, name: str) -> Signal:
+        if name not in self.signals:
+            raise KeyError(f"no signal {name!r} was watched; there are {', '.join(self.signals)}")
+        return self.signals[name]
+
+    def numbers(self) -> dict[str, Estimate]:
+        """Every number with its standard error, by names such as "δ std" and "stop 0 rate"."""
+        names = ("mean", "std", "skewness", "kurtosis", "crossing_rate")
+        found = {f"{key} {name}": getattr(s, name) for key, s in self.signals.items() for name in names}
+        for i, impacts in enumerate(self.impacts):
+            found |= {f"stop {i} {name}": getattr(impacts, name) for name in ("rate", "probability")}
+            found |= {f"stop {i} {name}": impacts.mean(name) for name in impacts.largest}
+        return found
+
+
+def stationary(
+    model: Model,
+    duration: float,
+    dt: float,
+    watch: Mapping[str, Watch] | None = None,
+    *,
+    until: float | None = None,
+    of: Callable[[Response], Any] | None = None,
+    discard: float | None = None,
+    segment: int | None = None,
+    bins: Mapping[str, ArrayLike] | None = None,
+    levels: Mapping[str, float] | None = None,
+    start: ArrayLike | None = None,
+    solver: Any = None,
+    progress: bool = False,
+) -> Response:
+    """Statistics of the stationary response of a model, over ``duration`` seconds in constant memory.
+
+    Parameters
+    ----------
+    duration : s the statistics use, transient and lead-ins not counted; the most when `until` is given.
+    dt : output sampling in s; ten samples to the shortest period that matters.
+    watch : name -> function of a `Run` that returns samples (k,), or (samples, rates): then crossings between two
+        samples are counted too. None: δ of every stop (the tip when there is none) and mid-beam.
+    until : stop when the relative standard error falls below it, in (0, 1).
+    of : function of the `Response` giving the `Estimate`, or several, that `until` is about; None: every variance.
+    discard : s to leave out at the start; None: until the transient has died out, at least ten memory times.
+    segment : samples of a Welch segment; None: 2 rad/s of resolution.
+    bins, levels : name -> edges of the histogram, level of the crossings (0 unless given).
+    start : (2n,) as for `Model.simulate`.
+    solver : None is ``solvers.Exponential(1e-8, ledger=False)``.
+    progress : show a bar (only on a terminal).
+
+    Raises
+    ------
+    ValueError for bad input; solvers.SolverError when the integration fails.
+
+    Warns
+    -----
+    UserWarning : the transient had not died out within the stretches that were dropped for it.
+
+    Notes
+    -----
+    Records and other signals that cannot be continued are run as one stretch. Standard errors are those of batches of
+    about 50 memory times; a response that switches between two regimes less often than that needs an `ensemble`.
+
+    Examples
+    --------
+    >>> import fembeam as fb
+    >>> scene = fb.Scene(fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01)), [fb.Clamped(0.0)],
+    ...                  damping=fb.ModalDamping(0.05), base=fb.BandNoise(1e-5, (0.0, 400.0), seed=1))
+    >>> found = stationary(scene.reduce(modes=1), duration=400.0, dt=2e-3)
+    >>> found["tip u"].std.relative < 0.02  # standard error over value
+    True
+    """
+    check(model, duration, dt, until, discard)
+    plan = Stretches.of(model, duration, dt, discard, start, solver or solvers.Exponential(1e-8, ledger=False))
+    watched = dict(watch) if watch else watched_by_default(model)
+    sums = _Sums(watched, dt, segment, dict(bins or {}), dict(levels or {}), len(model.scene.stops))
+    settled, enough = None, None if until is None else False
+    with bar(duration, progress) as report:
+        for piece in plan.pieces():
+            if settled is None and discard is None:
+                settled = _settled(watched, piece, plan)
+                if not settled.died_out and plan.dropped < TRIES and plan.repeats:
+                    plan.drop(piece)
+                    settled = None
+                    continue
+                piece = replace(piece, begin=max(piece.begin, settled.time))
+            plan.keep(piece, sums.add(piece))
+            response = sums.response(plan, settled, enough)
+            if report:
+                report(min(plan.kept, duration))
+            if until is not None and (not plan.repeats or plan.index >= FEWEST_STRETCHES):
+                enough = all(estimate.relative <= until for estimate in _asked(response, of))
+                if enough:
+                    break
+    if settled is not None and not settled.died_out:
+        warnings.warn(f"the transient has not died out: its halves differ by {settled.drift:.1f} standard errors; "
+                      "simulate longer, or give discard=", UserWarning, stacklevel=2)  # fmt: skip
+    return sums.response(plan, settled, enough)
+
+
+def characteristics(model: Model, duration: float, dt: float, **options: Any) -> dict[str, Any]:
+    """Numbers and spectra of one `stationary` run as plain values: a quantity for `ensemble`.
+
+    Parameters
+    ----------
+    duration, dt, options : as for `stationary`.
+
+    Returns
+    -------
+    Those of `Response.numbers`, and "δ psd" and so on: densities per rad/s; "omega": their frequencies. What a contact
+    has on average is there when the model has stops, and NaN without a contact.
+    """
+    response = stationary(model, duration, dt, **options)
+    values: dict[str, Any] = {name: estimate.value for name, estimate in response.numbers().items()}
+    for name, signal in response.signals.items():
+        values[f"{name} psd"] = signal.psd.density
+        values["omega"] = signal.psd.omega
+    return values
+
+
+def watched_by_default(model: Model) -> dict[str, Watch]:
+    """δ of every stop (the tip when there is none) and mid-beam, with rates."""
+    count, at = len(model.scene.stops), places(model.shapes)
+    names = ["δ"] if count == 1 else [f"δ {i}" for i in range(count)]
+    found: dict[str, Watch] = {name: partial(indentation, stop=i) for i, name in enumerate(names)}
+    if not count and "tip" in at:
+        found["tip u"] = partial(displacement, z=at["tip"])
+    found["mid-beam u"] = partial(displacement, z=at["mid-beam"])
+    return found
+
+
+def indentation(run: Run, stop: int) -> tuple[Vector, Vector]:
+    """δ of a stop and its rate."""
+    z, push, _ = run.stops[stop]
+    return run.indentation(stop), -push * run.velocity(z)
+
+
+def displacement(run: Run, z: float) -> tuple[Vector, Vector]:
+    """Displacement at z and its rate."""
+    return run.displacement(z), run.velocity(z)
+
+
+def _settled(watched: Mapping[str, Watch], piece: Stretch, plan: Stretches) -> Settling:
+    """End of the transient of the slowest signal."""
+    found = [settling(_samples(look(piece.run))[0][: piece.end + 1], plan.dt, plan.memory) for look in watched.values()]
+    return Settling(max(f.time for f in found), max(f.drift for f in found), all(f.died_out for f in found))
+
+
+def _samples(seen: Any) -> tuple[Vector, Vector | None]:
+    """Samples and rates from what a watch returned."""
+    if isinstance(seen, tuple):
+        return seen
+    return np.asarray(seen, dtype=np.float64), None
+
+
+@dataclass
+class _Sums:
+    """The statistics under way."""
+
+    watched: Mapping[str, Watch]
+    dt: float
+    segment: int | None
+    bins: dict[str, ArrayLike]
+    levels: dict[str, float]
+    stops: int
+    signals: dict[str, Signal] = field(default_factory=dict)
+    impacts: list[Impacts] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        for option, given in (("bins", self.bins), ("levels", self.levels)):
+            for name in given:
+                if name not in self.watched:
+                    raise ValueError(
+                        f"{option} names {name!r}, which is not watched; there are {', '.join(self.watched)}"
+                    )
+        self.impacts = [Impacts() for _ in range(self.stops)]
+
+    def add(self, piece: Stretch) -> float:
+        """Take in a stretch, batch by batch; returns its seconds."""
+        first = math.ceil(piece.begin / self.dt - 1e-9)
+        borders = np.linspace(first, piece.end, BATCHES + 1).round().astype(int)
+        for name, look in self.watched.items():
+            x, rate = _samples(look(piece.run))
+            if name not in self.signals:
+                self.signals[name] = self._signal(name, x[first : piece.end])
+            self.signals[name].cut()
+            for a, b in pairwise(borders):
+                self.signals[name].add(x[a:b], None if rate is None else rate[a:b])
+        for stop, impacts in enumerate(self.impacts):
+            for a, b in pairwise(borders):
+                impacts.add(piece.run.contacts, stop, a * self.dt, b * self.dt)
+        return self.dt * float(piece.end - first)
+
+    def _signal(self, name: str, x: Vector) -> Signal:
+        """Empty sums for a signal, arranged by its first samples."""
+        from scipy.fft import next_fast_len
+
+        segment = self.segment or next_fast_len(math.ceil(2 * math.pi / (FINEST_RESOLUTION * self.dt)), real=True)
+        segment = min(segment, max(8, x.size // 2))
+        bins = self.bins.get(name)
+        edges = None if bins is None else np.asarray(bins, dtype=np.float64)
+        return Signal(x, self.dt, segment, self.levels.get(name, 0.0), edges)
+
+    def response(self, plan: Stretches, settled: Settling | None, enough: bool | None) -> Response:
+        """The statistics so far."""
+        return Response(self.signals, self.impacts, plan.kept, plan.discarded, settled, enough, plan.seconds)
+
+
+def _asked(response: Response, of: Callable[[Response], Any] | None) -> list[Estimate]:
+    """The estimates that `until` is about."""
+    if of is None:
+        return [signal.variance for signal in response.signals.values()]
+    found = of(response)
+    return [found] if isinstance(found, Estimate) else list(found)
+
+
+def check(model: Model, duration: float, dt: float, until: float | None, discard: float | None) -> None:
+    """Bad input, before any computing."""
+    number("duration (s)", duration, above=0.0)
+    number("dt (s)", dt, above=0.0)
+    if not dt < duration / 64:
+        raise ValueError(f"dt must leave at least 64 samples of the duration of {duration:g} s, got {dt:g} s")
+    if until is not None and not 0.0 < number("until", until, above=0.0) < 1.0:
+        raise ValueError(f"until must be a relative standard error below 1, got {until!r}")
+    if discard is not None:
+        number("discard (s)", discard, least=0.0)
+    if not signals(model):
+        raise ValueError("a stationary response needs something that drives it; give the scene base= or forces=")

@@ -1,0 +1,271 @@
+"""Ensembles: the same bits whatever computes them, in whatever order, however often interrupted."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fembeam as fb
+from contacts import Hertz, Hysteretic
+from fembeam.study import characteristics, ensemble
+
+HERE = Path(__file__).parent
+CALLS = []
+
+
+def small_model(base=None, law=None, forces=()):
+    """One mode of a cantilever that meets a stop under noise."""
+    scene = fb.Scene(
+        beam=fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01)),
+        supports=[fb.Clamped(0.0)],
+        stops=[fb.Stop(0.5, law=law or Hysteretic.achieving(1e8, restitution=0.7))],
+        damping=fb.ModalDamping(0.05),
+        base=base or fb.BandNoise(1e-4, (0.0, 600.0), seed=3),
+        forces=forces,
+    )
+    return scene.reduce(modes=1)
+
+
+def peaks(model):
+    """A mapping of a number and an array."""
+    log = model.simulate(1.0).contacts
+    return {"peak": log.peak_force.max(), "entries": log.t_in[:3]}
+
+
+def slow_peaks(model):
+    """The same, slow enough to be killed in the middle; hangs after so many calls when told to."""
+    time.sleep(0.1)
+    CALLS.append(1)
+    if len(CALLS) > int(os.environ.get("HANG_AFTER", "1000")):
+        time.sleep(600.0)
+    return peaks(model)
+
+
+def fails_for_some(model):
+    """Fail for the seeds 1 and 4."""
+    if model.scene.base.seed.entropy in (1, 4):
+        raise ArithmeticError("no luck")
+    return float(model.scene.base(0.1))
+
+
+def base_at(model):
+    return float(model.scene.base(0.1))
+
+
+def counted(model, path):
+    """Note every call in a file."""
+    with open(path, "a") as file:
+        file.write("x")
+    return base_at(model)
+
+
+def same(a, b):
+    return a.values.keys() == b.values.keys() and all(np.array_equal(a.values[k], b.values[k]) for k in a.values)
+
+
+@pytest.fixture(scope="module")
+def alone():
+    return ensemble(small_model(), 12, slow_peaks)
+
+
+def test_realisations_are_independent_and_the_longer_contains_the_shorter(alone):
+    assert len(set(alone.values["peak"])) == 12
+    shorter = ensemble(small_model(), 3, peaks)
+    assert np.array_equal(shorter.values["entries"], alone.values["entries"][:3])
+    assert alone["peak"].value == alone.values["peak"].mean()
+    assert alone["peak"].standard_error == pytest.approx(alone.values["peak"].std(ddof=1) / np.sqrt(12))
+
+
+def test_threads_and_processes_give_the_same_bits(alone):
+    with ThreadPoolExecutor(3) as pool:
+        assert same(ensemble(small_model(), 12, peaks, pool), alone)
+    with ProcessPoolExecutor(2) as pool:
+        assert same(ensemble(small_model(), 12, slow_peaks, pool), alone)
+
+
+def test_the_order_of_the_seeds_is_that_of_the_values():
+    a, b = ensemble(small_model(), [5, 6, 7], base_at), ensemble(small_model(), [7, 5, 6], base_at)
+    assert np.array_equal(a.values[""][[2, 0, 1]], b.values[""])
+
+
+def test_noises_of_one_seed_stay_one_realisation():
+    def together(model):
+        y, f, g = model.scene.base, *(force.signal for force in model.scene.forces)
+        return [y(0.3) - f(0.3), y(0.3) - g(0.3)]
+
+    noise = fb.BandNoise(1e-4, (0.0, 600.0), seed=3)
+    other = replace(noise, seed=4)
+    found = ensemble(small_model(noise, forces=[fb.PointForce(0.5, noise), fb.PointForce(0.3, other)]), 3, together)
+    assert np.all(found.values[""][:, 0] == 0.0)
+    assert np.all(found.values[""][:, 1] != 0.0)
+
+
+def test_failures_are_told_with_their_seed_and_the_rest_survives():
+    with pytest.warns(UserWarning, match="2 of 6 realisations failed; seed 1: ArithmeticError: no luck"):
+        found = ensemble(small_model(), range(6), fails_for_some)
+    assert found.seeds == (0, 2, 3, 5)
+    assert [failure.seed for failure in found.failures] == [1, 4]
+    with pytest.raises(RuntimeError, match="every realisation failed; seed 4: ArithmeticError"):
+        ensemble(small_model(), [4], fails_for_some)
+
+
+def test_not_a_number_is_a_failure():
+    with pytest.raises(RuntimeError, match="the quantity 'x' is nan"):
+        ensemble(small_model(), 2, lambda model: {"x": np.nan})
+
+
+def test_resuming_computes_only_what_is_missing(tmp_path):
+    path, calls = tmp_path / "kept.npz", tmp_path / "calls"
+    quantity = partial(counted, path=str(calls))
+    ensemble(small_model(), 3, quantity, checkpoint=path)
+    found = ensemble(small_model(), 5, quantity, checkpoint=path)
+    assert calls.read_text() == 5 * "x"
+    assert same(found, ensemble(small_model(), 5, base_at))
+    assert [entry.name for entry in tmp_path.iterdir() if entry not in (path, calls)] == []
+
+
+def run_to_be_killed(path):
+    ensemble(small_model(), 12, slow_peaks, checkpoint=path)
+
+
+def test_killed_and_resumed_is_bit_identical(tmp_path, alone):
+    path = tmp_path / "kept.npz"
+    code = (
+        f"import sys; sys.path.insert(0, {str(HERE)!r}); import test_ensemble as t; t.run_to_be_killed({str(path)!r})"
+    )
+    victim = subprocess.Popen([sys.executable, "-c", code], env={**os.environ, "HANG_AFTER": "3"})
+    try:
+        finished = wait_for(lambda: path.exists() and len(np.load(path)["value peak"]) >= 3 and path)
+        assert finished
+        os.kill(victim.pid, signal.SIGKILL)
+    finally:
+        victim.kill()
+        victim.wait()
+    done = len(np.load(path)["value peak"])
+    assert done == 3
+    assert same(ensemble(small_model(), 12, slow_peaks, checkpoint=path), alone)
+
+
+def wait_for(condition, seconds=200.0):
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        if found := condition():
+            return found
+        time.sleep(0.02)
+    return None
+
+
+def test_two_dask_workers_one_killed(tmp_path, alone):
+    distributed = pytest.importorskip("distributed", reason="the extra 'cluster' is not installed")
+    path = tmp_path / "kept.npz"
+    options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None, "local_directory": str(tmp_path)}
+    with distributed.LocalCluster(**options) as cluster, distributed.Client(cluster) as client:
+        pids = list(client.run(os.getpid).values())
+        assert len(set(pids)) == 2
+        with ThreadPoolExecutor(1) as side:
+            result = side.submit(ensemble, small_model(), 12, slow_peaks, client.get_executor(), path)
+            assert wait_for(path.exists)
+            os.kill(pids[0], signal.SIGKILL)
+            assert same(result.result(300), alone)
+
+
+def test_a_broken_pool_is_told_and_resumed(tmp_path, alone, monkeypatch):
+    path = tmp_path / "kept.npz"
+    monkeypatch.setenv("HANG_AFTER", str(len(CALLS) + 3))  # workers are forked from here
+    with ProcessPoolExecutor(1) as pool:
+        pid = pool.submit(os.getpid).result()
+        with ThreadPoolExecutor(1) as side:
+            result = side.submit(ensemble, small_model(), 12, slow_peaks, pool, path)
+            assert wait_for(path.exists)
+            os.kill(pid, signal.SIGKILL)
+            with pytest.raises(RuntimeError, match=r"executor failed with \d+ realisations .*call again to go on"):
+                result.result(300)
+    monkeypatch.delenv("HANG_AFTER")
+    assert same(ensemble(small_model(), 12, slow_peaks, checkpoint=path), alone)
+
+
+def test_an_executor_that_is_gone():
+    pool = ThreadPoolExecutor(1)
+    pool.shutdown()
+    with pytest.raises(RuntimeError, match="the executor failed with 0 realisations finished"):
+        ensemble(small_model(), 2, base_at, pool)
+
+
+def test_until_stops_at_the_same_place_everywhere():
+    wanted = ensemble(small_model(), 64, base_at, until=0.9)
+    first = [n for n in (8, 16, 32, 64) if ensemble(small_model(), n, base_at).mean.relative <= 0.9]
+    assert wanted.enough
+    assert len(wanted) == first[0]
+    with ThreadPoolExecutor(4) as pool:
+        assert same(ensemble(small_model(), 64, base_at, pool, until=0.9), wanted)
+    assert ensemble(small_model(), 8, base_at, until=1e-9).enough is False
+
+
+def test_characteristics_are_a_quantity():
+    found = ensemble(small_model(), 2, partial(characteristics, duration=10.0, dt=2e-3))
+    assert found["δ psd"].value.shape == found.values["omega"].shape[1:]
+    assert found["stop 0 rate"].value > 1.0
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda: small_model(law=Hertz(1e8)), "stops is .* there and .*Hertz"),
+        (lambda: small_model(fb.BandNoise(2e-4, (0.0, 600.0))), "base is BandNoise.std=0.0001.* here"),
+        (lambda: small_model(fb.BandNoise.of_psd(lambda w: 1e-11 + 0 * w, (0.0, 600.0))), "base is"),
+        (lambda: replace(small_model(), modes=(1,)), r"modes is \(0,\) there and \(1,\) here"),
+    ],
+)
+def test_a_checkpoint_of_another_study_is_refused(tmp_path, change, message):
+    path = tmp_path / "kept.npz"
+    ensemble(small_model(), 1, base_at, checkpoint=path)
+    with pytest.raises(ValueError, match=f"belongs to another study: {message}"):
+        ensemble(change(), 1, base_at, checkpoint=path)
+    with pytest.raises(ValueError, match=r"quantity is test_ensemble\.base_at .* and test_ensemble\.peaks"):
+        ensemble(small_model(), 1, peaks, checkpoint=path)
+
+
+def test_a_damaged_checkpoint(tmp_path):
+    path = tmp_path / "kept.npz"
+    path.write_bytes(b"PK not really")
+    with pytest.raises(ValueError, match="not a checkpoint, or is damaged"):
+        ensemble(small_model(), 1, base_at, checkpoint=path)
+
+
+@pytest.mark.parametrize(
+    ("seeds", "message"),
+    [
+        ([1, 2, 1], "seeds must differ, got 1 at 0 and at 2"),
+        (0, "at least 1"),
+        ([], "must not be empty"),
+        ([-1], "a seed must be"),
+        ([1.5], "a seed must be"),
+        ("many", "a number of at least 1 or a list"),
+        (True, "a number of at least 1 or a list"),
+    ],
+)
+def test_bad_seeds(seeds, message):
+    with pytest.raises(ValueError, match=message):
+        ensemble(small_model(), seeds, base_at)
+
+
+def test_bad_input(tmp_path):
+    with pytest.raises(ValueError, match="needs a BandNoise"):
+        ensemble(small_model(fb.Harmonic(1e-3, 100.0)), 2, base_at)
+    with pytest.raises(ValueError, match="until must be"):
+        ensemble(small_model(), 2, base_at, until=0.0)
+    with pytest.raises(ValueError, match=r"folder .* does not exist"):
+        ensemble(small_model(), 2, base_at, checkpoint=tmp_path / "nowhere" / "kept.npz")
+    lengths = iter([2, 3])
+    with pytest.raises(ValueError, match=r"must have one form; .* gave .*\(3,\)"):
+        ensemble(small_model(), 2, lambda model: np.ones(next(lengths)))
+    with pytest.raises(RuntimeError, match="must be a number or an array of numbers, got str"):
+        ensemble(small_model(), 2, lambda model: "much")

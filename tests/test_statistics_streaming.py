@@ -1,0 +1,290 @@
+"""Statistics that arrive in pieces, against those of the whole; long runs against exact stationary densities."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import fembeam as fb
+import solvers
+from contacts import Hertz
+from fembeam.statistics import Batches, Estimate, Impacts, Signal, moments, psd, settling
+from fembeam.statistics.batches import MOST
+from fembeam.statistics.streaming import up_crossings
+from fembeam.study import stationary, stretches
+from fembeam.study.stretches import memory
+
+
+def coloured(seed, n=40_000):
+    """Skewed noise with memory."""
+    white = np.random.default_rng(seed).standard_normal(n + 200)
+    smooth = np.convolve(white, np.exp(-np.arange(200) / 20.0), "valid")[:n]
+    return smooth + 0.1 * smooth**2
+
+
+@pytest.mark.parametrize("segment", [255, 256])
+def test_pieces_give_the_statistics_of_the_whole(segment):
+    x, dt = coloured(1) + 7.0, 0.02
+    signal = Signal(x[:3000], dt, segment, level=7.0)
+    for part in np.split(x, [3000, 3001, 3100, 9000, 22_222, 30_000]):
+        signal.add(part)
+    whole, found = moments(x), [signal.mean, signal.std, signal.skewness, signal.kurtosis]
+    expected = [whole.mean, whole.std, whole.skewness, whole.kurtosis]
+    np.testing.assert_allclose([e.value for e in found], expected, rtol=1e-9)
+    spectrum = psd(x, dt, segment)
+    np.testing.assert_allclose(signal.psd.density, spectrum.density, rtol=1e-8, atol=1e-12)
+    np.testing.assert_allclose(signal.psd.omega, spectrum.omega)
+    assert signal.psd.n_segments == spectrum.n_segments
+    assert signal.crossing_rate.value == up_crossings(x - 7.0, None, dt) / (dt * (x.size - 1))
+    x_bins, density = signal.pdf
+    np.testing.assert_allclose(np.sum(density) * (x_bins[1] - x_bins[0]), 1 - signal.outside, rtol=1e-12)
+
+
+def test_a_cut_starts_a_new_segment_and_no_crossing():
+    signal = Signal(np.array([-1.0, 1.0]), 0.1, 8)
+    for part in (-np.ones(12), np.ones(12)):
+        signal.cut()
+        signal.add(part)
+    assert signal.crossing_rate.value == 0.0
+    assert signal.psd.n_segments == 4
+
+
+def test_the_spectrum_carries_the_variance():
+    found = []
+    for seed in range(12):
+        x = coloured(seed)
+        signal = Signal(x, 0.1, 1024)
+        for part in np.split(x, 20):
+            signal.add(part)
+        found.append(signal.psd.variance / signal.variance.value)
+        hz, density = signal.psd.per_hz
+        assert np.sum(density) * hz[1] == pytest.approx(signal.psd.variance)
+    error = np.std(found, ddof=1) / math.sqrt(len(found))
+    assert error < 0.01
+    assert abs(np.mean(found) - 1.0) < 4 * error
+
+
+def test_the_jackknife_is_the_standard_error_of_a_mean():
+    values = np.random.default_rng(2).standard_normal(40)
+    batches = Batches(2)
+    for value in values:
+        batches.add([1.0, value])
+    found = batches.estimate(lambda s: s[1] / s[0])
+    assert found.value == pytest.approx(values.mean())
+    assert found.standard_error == pytest.approx(values.std(ddof=1) / math.sqrt(40))
+
+
+def test_merging_keeps_the_sums_and_the_memory():
+    batches, values = Batches(1), np.random.default_rng(3).standard_normal(10_001)
+    for value in values:
+        batches.add([value])
+    assert batches.rows.shape == (MOST, 1)
+    assert MOST / 2 <= len(batches.filled) <= MOST
+    assert batches.total[0] == pytest.approx(values.sum())
+
+
+def test_intervals_cover_what_they_say():
+    hits = 0
+    for seed in range(300):
+        batches = Batches(3)
+        for x in np.random.default_rng(seed).standard_normal((12, 50)):
+            batches.add([x.size, x.sum(), (x**2).sum()])
+        lo, hi = batches.estimate(lambda s: s[2] / s[0] - (s[1] / s[0]) ** 2).interval(0.9)
+        hits += lo < 1.0 < hi
+    assert abs(hits / 300 - 0.9) < 4 * math.sqrt(0.09 / 300)
+
+
+def test_estimates_say_when_they_know_nothing():
+    assert math.isnan(Estimate.of_mean([1.0]).standard_error)
+    assert Estimate.of_mean([1.0]).relative == math.inf
+    with pytest.raises(ValueError, match="confidence must lie between 0 and 1, got 95"):
+        Estimate.of_mean([1.0, 2.0]).interval(95)
+
+
+def test_crossings_between_samples_show_in_the_rates():
+    t = 0.35 * np.arange(4000)  # a small fast wave on a slow one: many pairs between two samples
+    x, rate = np.sin(t) + 0.9 * np.sin(2.7 * t), np.cos(t) + 2.43 * np.cos(2.7 * t)
+    fine = np.arange(0.0, t[-1], 0.001)
+    true = up_crossings(np.sin(fine) + 0.9 * np.sin(2.7 * fine), None, 0.001)
+    assert up_crossings(x, None, 0.35) <= true - 10
+    assert abs(up_crossings(x, rate, 0.35) - true) <= 0.01 * true
+
+
+def test_impacts_by_batch_are_those_of_the_log():
+    t_in = np.array([0.5, 1.9, 2.5, 3.7])
+    lasting = np.array([0.2, 0.3, 0.1, np.nan])
+    force, zero = np.array([1.0, 4.0, 2.0, 9.0]), np.zeros(4)
+    log = solvers.ContactLog(zero.astype(int), t_in, t_in + lasting, force, zero, zero, force, zero, zero, zero > 1)
+    impacts = Impacts()
+    impacts.add(log, 0, 0.0, 2.0)
+    impacts.add(log, 0, 2.0, 4.0)
+    impacts.add(log, 1, 4.0, 4.5)
+    assert impacts.number == 4
+    assert impacts.rate.value == pytest.approx(4 / 4.5)
+    assert impacts.probability.value == pytest.approx((0.2 + 0.3 + 0.1 + 0.3) / 4.5)
+    assert impacts.mean("duration").value == pytest.approx(0.2)
+    assert impacts.std("peak_force").value == pytest.approx(np.std([1.0, 4.0, 2.0]))
+    assert impacts.largest["peak_force"] == 4.0
+    with pytest.raises(ValueError, match="no quantity 'speed'"):
+        impacts.mean("speed")
+
+
+def test_transients_are_found_and_their_absence_too():
+    t = 0.02 * np.arange(100_000)
+    calm = [settling(coloured(seed, t.size), 0.02, 1.0) for seed in range(10)]
+    assert all(found.died_out for found in calm)
+    assert np.median([found.time for found in calm]) < 0.2 * t[-1]
+    faded = settling(coloured(1, t.size) + 3.0 * np.exp(-t / 50.0), 0.02, 1.0)
+    assert faded.died_out
+    assert 50.0 < faded.time < 400.0
+    assert not settling(coloured(1, t.size) * t, 0.02, 1.0).died_out
+    assert not settling(coloured(1, t.size) + t / 100.0, 0.02, 1.0).died_out
+    with pytest.raises(ValueError, match="settling needs 32 batches of 100 s"):
+        settling(coloured(1, t.size), 0.02, 100.0)
+
+
+STEEL = fb.Section.circle(2.1e11, 7800.0, 0.01)
+QUICK = solvers.Exponential(1e-8, ledger=False)
+
+
+def cantilever(modes, damping=0.05, **features):
+    return fb.Scene(fb.Beam(0.5, STEEL), [fb.Clamped(0.0)], damping=fb.ModalDamping(damping), **features).reduce(modes)
+
+
+def within(found, exact, bias=0.0):
+    """Four standard errors, themselves below 1 %."""
+    assert found.relative < 0.01
+    assert abs(found.value - exact) < 4 * found.standard_error + abs(bias * exact)
+
+
+def test_linear_beam_under_band_limited_base_motion():
+    model = cantilever(2, base=fb.BandNoise(1e-4, (0.0, 1500.0), seed=7))
+    found = stationary(model, 1200.0, 1e-3, solver=QUICK)["tip u"]
+    w = np.linspace(0.0, 1500.0, 200_001)
+    terms = zip(model.phi(0.5) * model.participation, model.omega, model.zeta, strict=True)
+    H = sum(g * w**2 / (o**2 - w**2 + 2j * z * o * w) for g, o, z in terms)
+    S = 1e-8 / 1500.0 * abs(H) ** 2
+    variance, variance_of_rate = np.trapezoid(S, w), np.trapezoid(S * w**2, w)
+    within(found.variance, variance)
+    within(found.crossing_rate, math.sqrt(variance_of_rate / variance) / (2 * math.pi))
+    within(found.std, math.sqrt(variance))
+    assert abs(found.skewness.value) < 4 * found.skewness.standard_error
+    assert abs(found.kurtosis.value - 3.0) < 4 * found.kurtosis.standard_error
+    exact = np.interp(found.psd.omega, w, S)
+    peak = np.argmax(exact)
+    assert abs(found.psd.density[peak] - exact[peak]) < 5 * found.psd.standard_error[peak]
+
+
+@pytest.mark.parametrize("modes", [1, 2])
+def test_hertz_stop_under_wide_band_noise_has_the_exact_density(modes):
+    """One dashpot c and one noise force at the tip: white noise of S = 2cθ/π gives the density exp(-(T + V)/θ).
+
+    V = Σ ω²q²/2 + 2/5 K δ^2.5, so δ is Gaussian times exp(-2/5 K δ^2.5/θ), its rate Gaussian with variance θ Σφ². The
+    band ends at Ω: what lies beyond would carry the share 2c Σφ²/(πΩ) of the rate's variance, 0.4 % here with two
+    modes, which lowers the contact rate by 0.2 %; of the displacement's it is (ω/Ω)² times less.
+    """
+    theta, c, top, K = 1e-3, 2.0, 8000.0, 1e7
+    noise = fb.BandNoise(math.sqrt(2 * c * theta / math.pi * top), (0.0, top), seed=40 + modes)
+    model = cantilever(
+        modes,
+        damping=0.0,
+        dashpots=[fb.Dashpot(0.5, c)],
+        forces=[fb.PointForce(0.5, noise)],
+        stops=[fb.Stop(0.5, law=Hertz(K))],
+    )
+    found = stationary(model, 500.0, 2e-3, solver=QUICK)
+    phi = model.phi(0.5)
+    sigma, rate = math.sqrt(theta * np.sum(phi**2 / model.omega**2)), math.sqrt(theta * np.sum(phi**2))
+    delta = np.linspace(-9 * sigma, 9 * sigma, 200_001)
+    p = np.exp(-((delta / sigma) ** 2) / 2 - 0.4 * K * np.maximum(delta, 0.0) ** 2.5 / theta)
+    p /= np.trapezoid(p, delta)
+    mean = np.trapezoid(delta * p, delta)
+    bias = c * np.sum(phi**2) / (math.pi * top)
+    assert bias < 0.003
+    within(found["δ"].mean, mean)
+    spread = found["δ"].variance
+    assert spread.relative < 0.02
+    assert abs(spread.value - np.trapezoid((delta - mean) ** 2 * p, delta)) < 4 * spread.standard_error
+    within(found.impacts[0].probability, np.trapezoid(np.where(delta > 0.0, p, 0.0), delta), bias)
+    within(found.impacts[0].rate, np.interp(0.0, delta, p) * rate / math.sqrt(2 * math.pi), bias)
+
+
+def test_tones_go_on_through_the_stretches(monkeypatch):
+    model = cantilever(2, base=fb.Harmonic(2e-4, 160.0), stops=[fb.Stop(0.5, law=Hertz(1e8))])
+    whole = stationary(model, 8.0, 1e-3, discard=1.0)
+    monkeypatch.setattr(stretches, "STRETCH", 34.0)
+    parts = stationary(model, 8.0, 1e-3, discard=1.0)
+    assert whole["δ"].batches.per_row < parts["δ"].batches.full / 8
+    assert parts.impacts[0].number == whole.impacts[0].number > 100
+    assert parts["δ"].variance.value == pytest.approx(whole["δ"].variance.value, rel=1e-3)
+    assert parts.discarded == pytest.approx(1.0, abs=0.01)
+
+
+def test_it_stops_when_enough_is_known():
+    model = cantilever(1, base=fb.BandNoise(1e-4, (0.0, 600.0), seed=1))
+    found = stationary(model, 1e5, 2e-3, until=0.02)
+    assert found.enough
+    assert found["tip u"].variance.relative <= 0.02
+    assert found.duration < 2000.0
+    by_mean = stationary(model, 300.0, 2e-3, until=0.001, of=lambda r: r["tip u"].kurtosis)
+    assert by_mean.enough is False
+    assert by_mean.duration == pytest.approx(300.0)
+
+
+def test_the_same_seed_gives_the_same_bits_and_the_model_is_left_alone():
+    model = cantilever(1, base=fb.BandNoise(1e-4, (0.0, 600.0), seed=1))
+    a, b = (stationary(model, 60.0, 2e-3)["tip u"] for _ in range(2))
+    assert np.array_equal(a.batches.rows, b.batches.rows)
+    assert model.scene.base.seed == 1
+
+
+def test_a_record_is_one_stretch():
+    t = np.linspace(0.0, 60.0, 60_001)
+    record = fb.Record(t, 1e-5 * coloured(3, t.size), band=(5.0, 600.0))
+    found = stationary(cantilever(1, base=record), 60.0, 2e-3)
+    assert found.duration + found.discarded == pytest.approx(60.0)
+
+
+def test_a_transient_that_lasts_is_warned_of():
+    t = np.linspace(0.0, 60.0, 60_001)
+    growing = fb.Record(t, 1e-5 * (t / 10.0) ** 2 * np.sin(100.0 * t))
+    with pytest.warns(UserWarning, match="transient has not died out"):
+        found = stationary(cantilever(1, base=growing), 60.0, 2e-3)
+    assert not found.settling.died_out
+
+
+def test_memory_is_the_slowest_decay():
+    model = cantilever(2, base=fb.BandNoise(1e-4, (0.0, 600.0)))
+    assert memory(model) == pytest.approx(1.0 / (0.05 * model.omega[0]))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"duration": -1.0}, "duration"),
+        ({"dt": 0.0}, "dt"),
+        ({"dt": 1.0}, "64 samples"),
+        ({"until": 2.0}, "until must be"),
+        ({"discard": -1.0}, "discard"),
+        ({"duration": 1.0}, "duration must be at least 3.5"),
+        ({"bins": {"x": [0.0, 1.0]}}, "bins names 'x', which is not watched; there are tip u, mid-beam u"),
+        ({"levels": {"x": 0.0}}, "levels names 'x'"),
+    ],
+)
+def test_bad_input(arguments, message):
+    model = cantilever(1, base=fb.BandNoise(1e-4, (0.0, 600.0)))
+    with pytest.raises(ValueError, match=message):
+        stationary(model, **{"duration": 10.0, "dt": 2e-3, **arguments})
+
+
+def test_bad_models():
+    noise = fb.BandNoise(1e-4, (0.0, 600.0))
+    with pytest.raises(ValueError, match="something that drives it"):
+        stationary(cantilever(1), 10.0, 2e-3)
+    with pytest.raises(ValueError, match="needs damping in every mode"):
+        stationary(cantilever(1, damping=0.0, base=noise), 10.0, 2e-3)
+    with pytest.raises(ValueError, match="lengthen the period of the noise"):
+        stationary(cantilever(1, base=replace(noise, period=2.0)), 10.0, 2e-3)
+    with pytest.raises(KeyError, match="no signal 'tip' was watched; there are tip u, mid-beam u"):
+        stationary(cantilever(1, base=noise), 10.0, 2e-3)["tip"]
