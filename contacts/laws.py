@@ -31,6 +31,12 @@ from numpy.typing import NDArray
 from contacts.law import ENTRY_RATE_FLOOR, Law, check_restitution, number
 from contacts.restitution import achieved_restitution, damping_factor_for
 
+PUBLISHED = (
+    *("lankarani_nikravesh", "hunt_crossley", "herbert_mcwhannell", "lee_wang", "gonthier", "zhiying_qishao", "flores"),
+    *("hu_guo", "carvalho_martins", "zhang_sharf", "achieving"),
+)
+"""Constructors of `Hysteretic` from a nominal restitution."""
+
 
 @dataclass(frozen=True)
 class Hysteretic(Law):
