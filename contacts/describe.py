@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from contacts.custom import CustomLaw
-from contacts.law import Law, Sum
+from contacts.law import Law, Sum, parts_of
 from contacts.restitution import bounce, restitution
 
 
@@ -74,7 +74,8 @@ def _observed(law: Law, entry_rate: float, mass: float) -> list[str]:
         remarks = [f"pulls, for example {-force[worst]:.3g} N at {where}"]
     else:
         remarks = ["pulls nowhere within this bounce's δ and |δ̇| <= entry_rate"]
-    remarks.append("jumps when contact begins" if law.jump else f"begins like δ^{law.exponent:g}")
+    begins = min(part.exponent for part in parts_of(law))
+    remarks.append("jumps when contact begins" if law.jump else f"begins like δ^{begins:g}")
     return remarks
 
 

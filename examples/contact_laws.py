@@ -18,7 +18,7 @@ achieved = {name: [restitution(getattr(Hysteretic, name)(2.1e8, e), speed, mass)
 
 
 @law
-def rubber(delta, delta_dot, entry_rate, stiffness=3e5, hardening=6e12, damping=40.0):
+def rubber(delta, delta_dot, entry_rate, stiffness=3e5, hardening=6e12, damping=4e3):
     """F = stiffness δ + hardening δ³ + damping √δ δ̇: a bumper that hardens."""
     return stiffness * delta + hardening * delta**3 + damping * delta**0.5 * delta_dot
 

@@ -11,7 +11,6 @@ from contacts import PUBLISHED, Bounce, Hysteretic, Identified, KelvinVoigt, Law
 from fembeam.plot.response import BLUE, GREY, RED, Vector, styled
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 COLOURS = 6  # of the library's style
@@ -30,36 +29,51 @@ def loops(laws: Mapping[str, Law], entry_rate: float = 1.0, mass: float = 1.0) -
     -----
     The area of a loop is the energy lost, ½ m v² (1 - e²); the legend gives the achieved restitution e.
     """
-    figure, axis = _sheet((7.0, 4.2))
-    for number, (name, law) in enumerate(laws.items()):
-        thrown = bounce(law, entry_rate, mass)
-        delta, force = _traced(law, thrown, mass)
-        axis.plot(1e3 * delta, 1e-3 * force, _line(number), label=f"{name}: e = {thrown.restitution:.3f}")
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.0, 4.2), layout="constrained")
+    axis = figure.subplots()
+    thrown = {name: bounce(law, entry_rate, mass) for name, law in laws.items()}
+    scale, unit = _force_unit(max(float(one.force.max()) for one in thrown.values()))
+    for number, (name, one) in enumerate(thrown.items()):
+        delta, force = _traced(laws[name], one, mass)
+        axis.plot(1e3 * delta, scale * force, _line(number), label=f"{name}: e = {one.restitution:.3f}")
     axis.axhline(0.0, color=GREY, linewidth=0.6)
     axis.set_xlabel("indentation δ / mm")
-    axis.set_ylabel("contact force / kN")
+    axis.set_ylabel(f"contact force / {unit}")
     figure.legend(loc="outside right center")
-    figure.suptitle(f"A mass of {mass:g} kg at {entry_rate:g} m/s", x=0.01, ha="left", fontsize=10, fontweight="bold")
+    figure.suptitle(
+        f"Bounce of {mass:g} kg at {entry_rate:g} m/s, achieved restitution e",
+        x=0.01,
+        ha="left",
+        fontsize=10,
+        fontweight="bold",
+    )
     return figure
 
 
 @styled
 def restitutions() -> Figure:
     """Achieved against nominal restitution for every constructor that takes one: what the published formulas do."""
-    figure, axis = _sheet((7.0, 4.2))
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.0, 5.0), layout="constrained")
+    whole, near = figure.subplots(1, 2)
     nominal = np.linspace(0.02, 1.0, 99)
     makers = {name: getattr(Hysteretic, name) for name in PUBLISHED if name not in ("zhang_sharf", "achieving")}
-    exact = "achieving, zhang_sharf,\ntsuji, anagnostopoulos"
-    axis.plot([0, 1], [0, 1], color=GREY, linewidth=4, alpha=0.4, label=exact)
-    for number, (name, make) in enumerate(makers.items()):
-        axis.plot(nominal, [restitution(make(1e8, e)) for e in nominal], _line(number), label=name)
-    jankowski = [restitution(Viscoelastic.jankowski(1e8, e, mass=1.0)) for e in nominal]
-    axis.plot(nominal, jankowski, _line(len(makers)), label="jankowski")
+    lines = {name: [restitution(make(1e8, e)) for e in nominal] for name, make in makers.items()}
+    lines["jankowski"] = [restitution(Viscoelastic.jankowski(1e8, e, mass=1.0)) for e in nominal]
     clamped = [restitution(KelvinVoigt.anagnostopoulos(1e6, e, mass=1.0, clamp=True)) for e in nominal]
-    axis.plot(nominal, clamped, _line(len(makers) + 1), label="anagnostopoulos, tsuji,\nclamp=True")
-    axis.set(xlim=(0, 1), ylim=(0, 1), xlabel="nominal restitution", ylabel="achieved by a free mass")
-    axis.set_aspect("equal")
-    figure.legend(loc="outside right center")
+    lines["anagnostopoulos, tsuji with clamp=True"] = clamped
+    exact = "achieving, zhang_sharf, anagnostopoulos, tsuji"
+    whole.plot([0, 1], [0, 1], color=GREY, linewidth=4, alpha=0.4, label=exact)
+    near.axhline(0.0, color=GREY, linewidth=4, alpha=0.4)
+    for number, (name, achieved) in enumerate(lines.items()):
+        whole.plot(nominal, achieved, _line(number), label=name)
+        near.plot(nominal, np.array(achieved) - nominal, _line(number))
+    whole.set(xlim=(0, 1), ylim=(0, 1), xlabel="nominal restitution", ylabel="achieved by a free mass")
+    near.set(xlim=(0, 1), ylim=(-0.05, 0.1), xlabel="nominal restitution", ylabel="achieved - nominal")
+    figure.legend(loc="outside lower center", ncols=3)
     return figure
 
 
@@ -70,8 +84,7 @@ def identification(found: Identified) -> Figure:
 
     figure = Figure(figsize=(7.0, 4.8), layout="constrained")
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=[2, 1])
-    strongest = max(float(np.abs(one.force).max()) for one in found.collisions)
-    scale, unit = (1e-3, "kN") if strongest > 2e3 else (1.0, "N")
+    scale, unit = _force_unit(max(float(np.abs(one.force).max()) for one in found.collisions))
     for number, one in enumerate(found.collisions):
         delta, label = 1e3 * one.delta, {"label": "measured"} if number == 0 else {}
         above.plot(delta, scale * one.force, ".", color=BLUE, markersize=3, **label)
@@ -92,12 +105,9 @@ def identification(found: Identified) -> Figure:
     return figure
 
 
-def _sheet(size: tuple[float, float]) -> tuple[Figure, Axes]:
-    """A figure with one axis."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=size, layout="constrained")
-    return figure, figure.subplots()
+def _force_unit(strongest: float) -> tuple[float, str]:
+    """Factor and name of the unit that suits a force in N."""
+    return (1e-3, "kN") if strongest > 2e3 else (1.0, "N")
 
 
 def _line(number: int) -> str:
