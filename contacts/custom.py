@@ -213,13 +213,13 @@ def _check_jump(made: CustomLaw) -> None:
 
 
 def _leading_exponent(made: CustomLaw) -> float:
-    """Local exponent at rest near first touch, rounded to a quarter where it is one up to corrections."""
-    force = made.force([1e-12, 2e-12], 0.0, 1.0)
+    """Local exponent at rest near first touch; one that still changes is rounded to the nearest quarter."""
+    force = made.force([1e-12, 2e-12, 1e-8, 2e-8], 0.0, 1.0)
     if not np.all(force > 1e-290):
         return 1.0
-    found = math.log2(force[1] / force[0])
-    nearest = round(4.0 * found) / 4.0
-    return max(nearest if abs(found - nearest) < 0.02 else round(found, 4), 0.25)
+    near, far = np.log2(force[1::2] / force[::2])
+    settled = abs(near - far) < 1e-6
+    return max(round(float(near), 6) if settled else round(4.0 * float(near)) / 4.0, 0.25)
 
 
 def _check_derivative(made: CustomLaw) -> None:
@@ -308,4 +308,7 @@ def _line_of(error: Exception, function: Function) -> str:
         return str(first)
     named = [int(n) for n in re.findall(r"line (\d+)", str(error))]
     inside = [n for n in named if first < n < first + len(source)]
+    unknown = re.search(r"name '(\w+)' is not defined", str(error))
+    if unknown and not inside:  # the compiler names the word, not the line
+        inside = [first + i for i, text in enumerate(source) if re.search(rf"\b{unknown[1]}\b", text)][:1]
     return f"{inside[-1]}: {source[inside[-1] - first].strip()!r}" if inside else str(first)

@@ -111,7 +111,7 @@ class _Fit:
         for _ in range(4):
             before = self.theta
             _, a, _, d0, p = self.split(self.theta)
-            self.motions = [motion_of(one, d0 * self.depth, p, a) for one in self.measured]
+            self.motions = [motion_of(one, d0 * self.depth, p, a, fully=False) for one in self.measured]
             done = least_squares(
                 lambda x: np.concatenate([self.residual(x, i) for i in range(len(self.measured))]),
                 *(self.theta, lambda x: np.vstack([self.jacobian(x, i)[0] for i in range(len(self.measured))])),
@@ -120,6 +120,8 @@ class _Fit:
             self.theta = done.x
             if np.all(np.abs(self.theta - before) < 1e-8):
                 break
+        _, a, _, d0, p = self.split(self.theta)
+        self.motions = [motion_of(one, d0 * self.depth, p, a) for one in self.measured]
 
     def _parts(self, theta: Vector, i: int) -> tuple[Vector, Vector, Vector]:
         """(x, x^p, δ̇/δ̇⁻) of a collision in units."""
@@ -150,8 +152,8 @@ class _Fit:
         rate = self.motions[i].entry_rate
         return np.column_stack(columns), np.array([slope / self.depth, elastic * a / rate, -elastic * a * s / rate])
 
-    def covariance(self) -> tuple[NDArray[np.float64], float, float, int]:
-        """(covariance of θ, noise in units, correlation of neighbours, freedom of the collision least known)."""
+    def covariance(self) -> tuple[NDArray[np.float64], float, float, float, int]:
+        """(covariance of θ, noise, neighbours' correlation, what it inflates, freedom of the least known collision)."""
         indices = range(len(self.measured))
         residuals = [self.residual(self.theta, i) for i in indices]
         jacobians = [self.jacobian(self.theta, i) for i in indices]
@@ -172,7 +174,7 @@ class _Fit:
         normal = sum(J.T @ J for J, _ in jacobians)
         fewest = min(min(len(r), m.freedom) for r, m in zip(residuals, self.motions, strict=True))
         inverse = np.linalg.inv(normal + sum(self._feedback(i, *jacobians[i]) for i in indices))
-        return inverse @ middle @ inverse.T, math.sqrt(own.sum() / freedom), correlation, fewest
+        return inverse @ middle @ inverse.T, math.sqrt(own.sum() / freedom), correlation, inflation, fewest
 
     def _feedback(self, i: int, J: Vector, by_motion: Vector) -> NDArray[np.float64]:
         """(q, q) what the entry rate's dependence on θ adds to the normal matrix."""
@@ -181,7 +183,7 @@ class _Fit:
             rates = []
             for theta in (self.theta - step, self.theta + step):
                 _, a, _, d0, p = self.split(theta)
-                rates.append(motion_of(self.measured[i], d0 * self.depth, p, a).entry_rate)
+                rates.append(motion_of(self.measured[i], d0 * self.depth, p, a, fully=False).entry_rate)
             changes[j] = (rates[1] - rates[0]) / 2e-4
         return np.outer(J.T @ by_motion[2], changes)
 
@@ -205,10 +207,10 @@ class _Fit:
         """Everything in SI with intervals."""
         from scipy.stats import t as student
 
-        covariance, noise, correlation, freedom = self.covariance()
-        singles = [self.alone(i, 1.0) for i in range(len(self.measured))]
+        covariance, noise, correlation, inflation, freedom = self.covariance()
+        singles = [self.alone(i, inflation) for i in range(len(self.measured))]
         widening, remarks = self._disagreement(singles)
-        if correlation > 0.5:
+        if correlation > 0.5 and noise > _EXACT:
             remarks.append(
                 f"neighbouring residuals are correlated ({correlation:.2f}): the channel is filtered, or the stop does "
                 "not follow this law; see the residuals"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -44,11 +45,11 @@ class Motion:
         return np.einsum("ik,ikj->kj", weights, self.basis)
 
 
-def motion_of(samples: Samples, offset: float, exponent: float, damping_factor: float) -> Motion:
-    """The motion of a collision whose contact begins at delta = offset."""
+def motion_of(samples: Samples, offset: float, exponent: float, damping_factor: float, *, fully: bool = True) -> Motion:
+    """The motion of a collision whose contact begins at delta = offset; not fully: without the entry rate's basis."""
     about = offset, exponent, damping_factor
     if samples.time is not None:
-        return _smoothed(samples, *about)
+        return _smoothed(samples, *about, fully)
     assert samples.delta_dot is not None
     entry, error = _rate_at_surface(samples.delta, samples.delta_dot, *about, 1)
     leaving, _ = _rate_at_surface(samples.delta, samples.delta_dot, *about, -1)
@@ -97,30 +98,38 @@ def _swing(y: Vector, a: float) -> Vector:
     return np.interp(-y, energy / energy[-1] - 1.0, s)
 
 
-def _smoothed(samples: Samples, offset: float, exponent: float, damping_factor: float) -> Motion:
+def _smoothed(samples: Samples, offset: float, exponent: float, damping_factor: float, fully: bool) -> Motion:
     """δ(t) in contact as a polynomial, with its derivative."""
-    assert samples.time is not None
     first, last = _in_contact(samples.delta, offset)
+    A, B, found, covariance, freedom = _polynomial(samples, first, last)
+
+    def ends(coefficients: NDArray[Any], way: int) -> float:
+        return _rate_at_surface(A @ coefficients, B @ coefficients, offset, exponent, damping_factor, way)[0]
+
+    basis = np.zeros((3, len(samples.delta), len(found)))
+    basis[0, first:last], basis[1, first:last] = A, B
+    if fully:
+        steps = 1e-6 * float(samples.delta.max()) * np.eye(len(found))
+        basis[2] = [(ends(found + h, 1) - ends(found - h, 1)) / (2.0 * h.max()) for h in steps]
+    position, speed = np.minimum(samples.delta, offset), np.zeros(len(samples.delta))
+    position[first:last], speed[first:last] = A @ found, B @ found
+    return Motion(position, speed, ends(found, 1), ends(found, -1), covariance, freedom, basis)
+
+
+@lru_cache(maxsize=64)
+def _polynomial(
+    samples: Samples, first: int, last: int
+) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any], int]:
+    """(functions, their rates, coefficients, covariance of these, degrees of freedom) on a stretch of samples."""
+    assert samples.time is not None
     t, delta = samples.time[first:last], samples.delta[first:last]
     u, scale = 2.0 * (t - t[0]) / (t[-1] - t[0]) - 1.0, 2.0 / (t[-1] - t[0])
     degree = min(_akaike(u, delta) + _ROUGHER, len(t) - 3)
     A = legvander(u, degree)
     B = scale * np.column_stack([Legendre.basis(j).deriv()(u) for j in range(degree + 1)])
     found, *_ = np.linalg.lstsq(A, delta, rcond=None)
-    left = A @ found - delta
-    freedom = len(t) - degree - 1
-    covariance = float(left @ left) / freedom * np.linalg.pinv(A.T @ A)
-
-    def ends(coefficients: NDArray[Any], way: int) -> float:
-        return _rate_at_surface(A @ coefficients, B @ coefficients, offset, exponent, damping_factor, way)[0]
-
-    steps = 1e-6 * float(delta.max()) * np.eye(degree + 1)
-    by_entry = [(ends(found + h, 1) - ends(found - h, 1)) / (2.0 * h.max()) for h in steps]
-    basis = np.zeros((3, len(samples.delta), degree + 1))
-    basis[0, first:last], basis[1, first:last], basis[2] = A, B, by_entry
-    position, speed = np.minimum(samples.delta, offset), np.zeros(len(samples.delta))
-    position[first:last], speed[first:last] = A @ found, B @ found
-    return Motion(position, speed, ends(found, 1), ends(found, -1), covariance, freedom, basis)
+    left, freedom = A @ found - delta, len(t) - degree - 1
+    return A, B, found, float(left @ left) / freedom * np.linalg.pinv(A.T @ A), freedom
 
 
 def _in_contact(delta: Vector, offset: float) -> tuple[int, int]:
