@@ -54,8 +54,5 @@ for method in (solvers.Exponential(1e-8), solvers.DormandPrince(1e-10)):
     first = np.array(times["Hysteretic"])
     print(f"{type(method).__name__}: Hysteretic takes {1e6 * np.median(first):.0f} µs for 0.2 s")
     for name, taken in times.items():
-        cost = runs[name].cost
-        ratio = np.median(np.array(taken) / first)
-        print(
-            f"  {name:30} {ratio:5.2f} times as long, {len(runs[name].contacts)} contacts, {cost.law_calls} law calls"
-        )
+        ratio, run = np.median(np.array(taken) / first), runs[name]
+        print(f"  {name:30} {ratio:5.2f} times as long, {len(run.contacts)} contacts, {run.cost.law_calls} law calls")
