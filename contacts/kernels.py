@@ -46,7 +46,7 @@ def power_gradient(n, delta, delta_dot, entry_rate, parameters, by_delta, by_rat
         viscosity = 0.0 if approach != 0.0 and v <= 0.0 else c
         elastic, damping = K * d**p, viscosity * d**r
         by_delta[i] = K * p * d ** (p - 1.0) * (1.0 + rate * v)
-        if viscosity * r != 0.0:
+        if viscosity * r != 0.0 and d > 0.0:  # at the surface itself the slope is infinite
             by_delta[i] += viscosity * r * d ** (r - 1.0) * v
         by_rate[i] = elastic * rate + damping
         by_entry[i] = -elastic * rate * v / entry_rate
