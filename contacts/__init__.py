@@ -1,20 +1,41 @@
 """Contact laws: indentation, its rate and the entry rate in; force out.
 
-The force acts while ``delta > 0`` and is positive when it pushes the bodies apart.
+The force acts while ``delta > 0`` and is positive when it pushes the bodies apart. A law knows nothing but these three
+numbers. Laws with memory (Bouc–Wen, Jenkins, Iwan) are left out on purpose: their state must be integrated, landed on
+at yield and return, differentiated and saved along with the structure's, which every method here would have to carry
+for elements that act all the time and need none of what makes contacts hard.
 """
 
-from contacts.law import CustomLaw, Law, law
-from contacts.laws import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear
-from contacts.restitution import achieved_restitution, damping_factor_for
+from contacts.collisions import read_collisions
+from contacts.curves import PiecewiseLinear, Tabulated
+from contacts.custom import CustomLaw, law
+from contacts.identified import Estimate, Identified
+from contacts.identify import identify
+from contacts.law import Law, Sum, parallel
+from contacts.laws import PUBLISHED, Hertz, Hysteretic
+from contacts.restitution import Bounce, achieved_restitution, bounce, damping_factor_for, restitution
+from contacts.viscous import KelvinVoigt, Viscoelastic
 
 __all__ = [
+    "PUBLISHED",
+    "Bounce",
     "CustomLaw",
+    "Estimate",
     "Hertz",
     "Hysteretic",
+    "Identified",
     "KelvinVoigt",
     "Law",
     "PiecewiseLinear",
+    "Sum",
+    "Tabulated",
+    "Viscoelastic",
     "achieved_restitution",
+    "bounce",
     "damping_factor_for",
+    "identify",
     "law",
+    "parallel",
+    "read_collisions",
+    "restitution",
 ]

@@ -1,18 +1,21 @@
-"""Compiled forces of the built-in laws, cached on disk; see `contacts.law` for the C signature."""
+"""Compiled forces of the built-in laws and their derivatives, cached; see `contacts.law` for the C signature."""
 
 import math
 
+from llvmlite import ir
 from numba import carray, cfunc, types
+from numba.extending import intrinsic
 
 _REALS = types.CPointer(types.float64)
 SIGNATURE = types.void(types.int64, _REALS, _REALS, types.float64, _REALS, _REALS)
 GRADIENT = types.void(types.int64, _REALS, _REALS, types.float64, _REALS, _REALS, _REALS, _REALS)
+_OPTIONS = {"cache": True, "error_model": "numpy"}
 
 
-@cfunc(SIGNATURE, cache=True, error_model="numpy")
+@cfunc(SIGNATURE, **_OPTIONS)
 def power(n, delta, delta_dot, entry_rate, parameters, force):
-    """F = K d^p (1 + a v/entry_rate) + c d^r v, parameters (K, p, a, c, r, clamp)."""
-    K, p, a, c, r, clamp = carray(parameters, (6,))
+    """F = K d^p (1 + a v/entry_rate) + c d^r v, parameters (K, p, a, c, r, clamp, approach)."""
+    K, p, a, c, r, clamp, approach = carray(parameters, (7,))
     rate = a / entry_rate
     if p == 1.5:  # loops without a branch are vectorised; the square root is several times faster than a power
         for i in range(n):
@@ -25,49 +28,131 @@ def power(n, delta, delta_dot, entry_rate, parameters, force):
             force[i] = K * delta[i] ** p * (1.0 + rate * delta_dot[i])
     if c != 0.0:
         for i in range(n):
-            force[i] += c * delta[i] ** r * delta_dot[i]
+            if approach == 0.0 or delta_dot[i] > 0.0:
+                force[i] += c * delta[i] ** r * delta_dot[i]
     if clamp != 0.0:
         for i in range(n):
             if force[i] < 0.0:
                 force[i] = 0.0
 
 
-@cfunc(SIGNATURE, cache=True, error_model="numpy")
-def piecewise(n, delta, delta_dot, entry_rate, parameters, force):
-    """Polyline force with m slopes: parameters (m, knots[m], force at knots[m], slopes[m]); knots[0] = 0."""
-    m = int(parameters[0])
-    table = carray(parameters, (1 + 3 * m,))
-    for i in range(n):
-        j = m - 1
-        while j > 0 and delta[i] < table[1 + j]:
-            j -= 1
-        force[i] = table[1 + m + j] + table[1 + 2 * m + j] * (delta[i] - table[1 + j])
-
-
-@cfunc(GRADIENT, cache=True, error_model="numpy")
+@cfunc(GRADIENT, **_OPTIONS)
 def power_gradient(n, delta, delta_dot, entry_rate, parameters, by_delta, by_rate, by_entry):
     """Derivatives of `power` with respect to d, v and the entry rate."""
-    K, p, a, c, r, clamp = carray(parameters, (6,))
+    K, p, a, c, r, clamp, approach = carray(parameters, (7,))
     rate = a / entry_rate
     for i in range(n):
         d, v = delta[i], delta_dot[i]
-        elastic, damping = K * d**p, c * d**r
+        viscosity = 0.0 if approach != 0.0 and v <= 0.0 else c
+        elastic, damping = K * d**p, viscosity * d**r
         by_delta[i] = K * p * d ** (p - 1.0) * (1.0 + rate * v)
-        if c * r != 0.0:
-            by_delta[i] += c * r * d ** (r - 1.0) * v
+        if viscosity * r != 0.0 and d > 0.0:  # at the surface itself the slope is infinite
+            by_delta[i] += viscosity * r * d ** (r - 1.0) * v
         by_rate[i] = elastic * rate + damping
         by_entry[i] = -elastic * rate * v / entry_rate
         if clamp != 0.0 and elastic * (1.0 + rate * v) + damping * v < 0.0:
             by_delta[i], by_rate[i], by_entry[i] = 0.0, 0.0, 0.0
 
 
-@cfunc(GRADIENT, cache=True, error_model="numpy")
-def piecewise_gradient(n, delta, delta_dot, entry_rate, parameters, by_delta, by_rate, by_entry):
-    """Derivatives of `piecewise`: the slope."""
+@cfunc(SIGNATURE, **_OPTIONS)
+def piecewise(n, delta, delta_dot, entry_rate, parameters, force):
+    """Piecewise cubic with a dashpot per piece: parameters (m, 6 numbers per piece).
+
+    A piece is (knot, c0, c1, c2, c3, viscosity): F = c0 + x (c1 + x (c2 + x c3)) + viscosity v with x = d - knot.
+    """
     m = int(parameters[0])
-    table = carray(parameters, (1 + 3 * m,))
+    table = carray(parameters, (1 + 6 * m,))
     for i in range(n):
-        j = m - 1
-        while j > 0 and delta[i] < table[1 + j]:
-            j -= 1
-        by_delta[i], by_rate[i], by_entry[i] = table[1 + 2 * m + j], 0.0, 0.0
+        d, v = delta[i], delta_dot[i]
+        # on a knot, to rounding, the piece it comes from: the dashpot may jump there, and steps end on knots
+        seen = d * (1.0 + 1e-11) if v < 0.0 else d * (1.0 - 1e-11)
+        low, high = 0, m
+        while high - low > 1:
+            middle = (low + high) // 2
+            if seen < table[1 + 6 * middle]:
+                high = middle
+            else:
+                low = middle
+        j = 1 + 6 * low
+        x = d - table[j]
+        force[i] = table[j + 1] + x * (table[j + 2] + x * (table[j + 3] + x * table[j + 4])) + table[j + 5] * v
+
+
+@cfunc(GRADIENT, **_OPTIONS)
+def piecewise_gradient(n, delta, delta_dot, entry_rate, parameters, by_delta, by_rate, by_entry):
+    """Derivatives of `piecewise`."""
+    m = int(parameters[0])
+    table = carray(parameters, (1 + 6 * m,))
+    for i in range(n):
+        d = delta[i]
+        seen = d * (1.0 + 1e-11) if delta_dot[i] < 0.0 else d * (1.0 - 1e-11)
+        low, high = 0, m
+        while high - low > 1:
+            middle = (low + high) // 2
+            if seen < table[1 + 6 * middle]:
+                high = middle
+            else:
+                low = middle
+        j = 1 + 6 * low
+        x = d - table[j]
+        by_delta[i] = table[j + 2] + x * (2.0 * table[j + 3] + x * 3.0 * table[j + 4])
+        by_rate[i], by_entry[i] = table[j + 5], 0.0
+
+
+def _call(outputs):
+    """An intrinsic that calls a law at an address for one of its points; returns the outputs as a tuple."""
+
+    @intrinsic
+    def call(typingctx, address, point, delta, delta_dot, entry_rate, parameters, offset):
+        results = types.UniTuple(types.float64, outputs)
+        signature = results(types.int64, types.int64, _REALS, _REALS, types.float64, _REALS, types.int64)
+
+        def codegen(context, builder, sig, args):
+            from numba.core import cgutils
+
+            real, reals = ir.DoubleType(), ir.DoubleType().as_pointer()
+            declared = ir.FunctionType(ir.VoidType(), [ir.IntType(64), reals, reals, real, reals, *[reals] * outputs])
+            function = builder.inttoptr(args[0], declared.as_pointer())
+            out = [cgutils.alloca_once(builder, real) for _ in range(outputs)]
+            delta, delta_dot = (builder.gep(pointer, [args[1]]) for pointer in args[2:4])
+            parameters = builder.gep(args[5], [args[6]])
+            builder.call(function, [ir.Constant(ir.IntType(64), 1), delta, delta_dot, args[4], parameters, *out])
+            return context.make_tuple(builder, results, [builder.load(pointer) for pointer in out])
+
+        return signature, codegen
+
+    return call
+
+
+_force_at = _call(1)
+_gradient_at = _call(3)
+
+
+@cfunc(SIGNATURE, **_OPTIONS)
+def parallel(n, delta, delta_dot, entry_rate, parameters, force):
+    """Sum of laws by their addresses: parameters (count, then per law: address, gradient's, floor, size, its own)."""
+    for i in range(n):
+        force[i] = 0.0
+    at = 1
+    for _ in range(int(parameters[0])):
+        rate = max(entry_rate, parameters[at + 2])
+        for i in range(n):
+            force[i] += _force_at(int(parameters[at]), i, delta, delta_dot, rate, parameters, at + 4)[0]
+        at += 4 + int(parameters[at + 3])
+
+
+@cfunc(GRADIENT, **_OPTIONS)
+def parallel_gradient(n, delta, delta_dot, entry_rate, parameters, by_delta, by_rate, by_entry):
+    """Derivatives of `parallel`."""
+    for i in range(n):
+        by_delta[i], by_rate[i], by_entry[i] = 0.0, 0.0, 0.0
+    at = 1
+    for _ in range(int(parameters[0])):
+        rate, address = max(entry_rate, parameters[at + 2]), int(parameters[at + 1])
+        for i in range(n):
+            slopes = _gradient_at(address, i, delta, delta_dot, rate, parameters, at + 4)
+            by_delta[i] += slopes[0]
+            by_rate[i] += slopes[1]
+            if entry_rate > parameters[at + 2]:
+                by_entry[i] += slopes[2]
+        at += 4 + int(parameters[at + 3])

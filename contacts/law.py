@@ -1,4 +1,4 @@
-"""What a contact law is, and how to write one's own.
+"""What a contact law is.
 
 A law is a force ``F(delta, delta_dot, entry_rate; parameters)`` for ``delta > 0``. Integrators call it
 through the address of one compiled function with a declared C signature,
@@ -11,14 +11,13 @@ so a new law never recompiles an integrator, and a batch of ``n`` values costs o
 
 from __future__ import annotations
 
-import inspect
+import ctypes
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from functools import lru_cache
-from importlib import import_module
-from typing import Any
+from dataclasses import dataclass
+from functools import reduce
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,11 +25,11 @@ from numpy.typing import ArrayLike, NDArray
 ENTRY_RATE_FLOOR = 1e-3
 """Smallest entry rate a law is given by default, m/s: a/entry_rate is singular at grazing."""
 
-_ARGUMENTS = ("delta", "delta_dot", "entry_rate")
-
 
 class Law(ABC):
     """A contact law: everything an integrator needs to know about a stop's force.
+
+    Laws add: ``law_a + law_b`` acts in parallel.
 
     Attributes
     ----------
@@ -38,8 +37,15 @@ class Law(ABC):
     jump : whether the force jumps when contact begins, F(0+, v) != 0.
     exponent : leading exponent p of F ~ delta**p at first touch; integrators choose their variable by it.
     entry_rate_floor : entry rates below it (m/s) are raised to it before the law sees them.
+    equation, units, remarks : what `describe` says of it: the formula, units of the parameters, where it pulls, where
+        it is singular, how it is integrated.
     """
 
+    compiled: ClassVar[str] = ""  # its force in contacts.kernels; the derivatives are <compiled>_gradient
+    equation: ClassVar[str] = ""
+    units: ClassVar[dict[str, str]] = {}
+    remarks: tuple[str, ...] = ()
+    nominal: tuple[str, float] | None = None  # constructor and restitution a published formula was asked for
     knots: tuple[float, ...] = ()
     jump: bool = False
     exponent: float = 1.0
@@ -51,14 +57,18 @@ class Law(ABC):
         """The numbers handed to the compiled kernel."""
 
     @property
-    @abstractmethod
     def kernel(self) -> Any:
         """The compiled force (a numba ``cfunc``) with the module's C signature."""
+        from contacts import kernels
+
+        return getattr(kernels, self.compiled)
 
     @property
-    @abstractmethod
     def gradient(self) -> Any:
         """The compiled derivatives of the force, likewise."""
+        from contacts import kernels
+
+        return getattr(kernels, f"{self.compiled}_gradient")
 
     @property
     def address(self) -> int:
@@ -69,6 +79,12 @@ class Law(ABC):
     def gradient_address(self) -> int:
         """Address of the compiled derivatives."""
         return int(self.gradient.address)
+
+    def __add__(self, other: Law) -> Sum:
+        """Both laws at once."""
+        if not isinstance(other, Law):
+            return NotImplemented
+        return Sum((*parts_of(self), *parts_of(other)))
 
     def force(self, delta: ArrayLike, delta_dot: ArrayLike = 0.0, entry_rate: ArrayLike = 1.0) -> NDArray[np.float64]:
         """Contact force in N, zero where ``delta <= 0``.
@@ -88,197 +104,118 @@ class Law(ABC):
         rates, starts = np.unique(r.flat[touching], return_index=True)
         for rate, start, count in zip(rates, starts, np.diff(starts, append=len(touching)), strict=True):
             chosen = touching[start : start + count]
-            out.flat[chosen] = self._batch(d.flat[chosen], v.flat[chosen], float(rate))
+            out.flat[chosen] = self.batch(float(rate))(d.flat[chosen], v.flat[chosen])
         return out[()]
 
-    def _batch(self, delta: NDArray, delta_dot: NDArray, entry_rate: float) -> NDArray:
-        """Kernel call on contiguous arrays at one entry rate."""
-        import ctypes
-
+    def batch(self, entry_rate: float) -> Callable[[NDArray, NDArray], NDArray]:
+        """The force at one entry rate as a lean function of 1-D arrays ``delta >= 0`` and ``delta_dot``."""
         pointer = ctypes.POINTER(ctypes.c_double)
-        arrays = [np.ascontiguousarray(x, dtype=float) for x in (delta, delta_dot, self.parameters)]
-        force = np.empty(arrays[0].size)
-        d, v, p, f = (x.ctypes.data_as(pointer) for x in (*arrays, force))
-        self.kernel.ctypes(force.size, d, v, max(entry_rate, self.entry_rate_floor), p, f)
-        return force
+        call, parameters, rate = self.kernel.ctypes, self.parameters, max(entry_rate, self.entry_rate_floor)
+
+        def evaluate(delta: NDArray, delta_dot: NDArray) -> NDArray:
+            force = np.empty(len(delta))
+            arrays = [np.ascontiguousarray(x, dtype=float) for x in (delta, delta_dot, parameters)]
+            d, v, p, f = (x.ctypes.data_as(pointer) for x in (*arrays, force))
+            call(force.size, d, v, rate, p, f)
+            return force
+
+        return evaluate
+
+    def exact_restitution(self, entry_rate: float, mass: float) -> float | None:
+        """Restitution of a free mass where a closed relation gives it, else None; see `contacts.restitution`."""
+        return None
+
+    def describe(self, entry_rate: float = 1.0, mass: float = 1.0) -> str:
+        """Equation, parameters with units, nominal and achieved restitution, where it pulls and where it is singular.
+
+        Parameters
+        ----------
+        entry_rate : m/s, > 0, and mass : kg, > 0, of the free mass whose restitution is told.
+        """
+        from contacts.describe import describe
+
+        return describe(self, entry_rate, mass)
+
+
+@dataclass(frozen=True)
+class Sum(Law):
+    """Laws in parallel, ``F = F_1 + F_2 + ...``; written ``law_a + law_b``.
+
+    Each part keeps its own floor of the entry rate.
+
+    Examples
+    --------
+    >>> from contacts import Hertz, KelvinVoigt
+    >>> float((Hertz(1e9) + KelvinVoigt(1e6, 100.0)).force(1e-4, 0.5))
+    1150.0
+    """
+
+    parts: tuple[Law, ...]
+
+    compiled: ClassVar[str] = "parallel"
+    equation: ClassVar[str] = "F = sum of the laws below"
+
+    @property
+    def knots(self) -> tuple[float, ...]:  # type: ignore[override]
+        """The knots of all parts."""
+        return tuple(sorted({knot for part in self.parts for knot in part.knots}))
+
+    @property
+    def jump(self) -> bool:  # type: ignore[override]
+        """Whether any part jumps."""
+        return any(part.jump for part in self.parts)
+
+    @property
+    def exponent(self) -> float:  # type: ignore[override]
+        """The smallest; 1/2 where whole and half exponents mix, so that integrators expand in the root of time."""
+        exponents = [part.exponent for part in self.parts]
+        mixed = len({p % 1.0 for p in exponents}) > 1
+        return 0.5 if mixed and not self.jump else min(exponents)
+
+    @property
+    def entry_rate_floor(self) -> float:  # type: ignore[override]
+        """The smallest; the others are applied inside."""
+        return min(part.entry_rate_floor for part in self.parts)
+
+    @property
+    def parameters(self) -> NDArray[np.float64]:
+        """(count, then per part: address, address of its derivatives, floor, size, parameters)."""
+        numbers: list[NDArray] = [np.array([len(self.parts)], dtype=float)]
+        for part in self.parts:
+            own = part.parameters
+            head = [part.address, part.gradient_address, part.entry_rate_floor, own.size]
+            numbers += [np.array(head, dtype=float), own]  # addresses lie below 2**53: exact as floats
+        return np.concatenate(numbers)
+
+
+def parts_of(law: Law) -> tuple[Law, ...]:
+    """The laws that act in parallel in one law."""
+    return law.parts if isinstance(law, Sum) else (law,)
+
+
+def parallel(laws: list[Law]) -> Law:
+    """All laws at once, as ``laws[0] + laws[1] + ...``; for scene files."""
+    if not laws:
+        raise ValueError("laws must name at least one law")
+    return reduce(lambda a, b: a + b, laws)
 
 
 def number(owner: object, name: str, low: float = 0.0, *, strict: bool = False) -> None:
     """Check one finite parameter of a law against its lower bound."""
-    value = getattr(owner, name)
-    fine = isinstance(value, (int, float, np.number)) and math.isfinite(value)
+    check_number(getattr(owner, name), f"{name} of {type(owner).__name__}", low, strict=strict)
+
+
+def check_number(value: Any, what: str, low: float = 0.0, *, strict: bool = False) -> None:
+    """Check one finite number against its lower bound."""
+    fine = isinstance(value, (int, float, np.number)) and not isinstance(value, bool) and math.isfinite(value)
     if not fine or value < low or (strict and value == low):
         bound = f"{'>' if strict else '>='} {low:g}"
-        raise ValueError(f"{name} of {type(owner).__name__} must be finite and {bound}, got {value!r}")
+        raise ValueError(f"{what} must be finite and {bound}, got {value!r}")
 
 
-@dataclass(frozen=True)
-class CustomLaw(Law):
-    """A user's force function with its parameters bound; made by calling a function decorated with `law`."""
-
-    name: str
-    function: Callable[..., float] = field(repr=False)
-    values: tuple[tuple[str, float], ...]
-    knots: tuple[float, ...] = ()
-    jump: bool = False
-    exponent: float = 1.0
-    entry_rate_floor: float = ENTRY_RATE_FLOOR
-
-    @property
-    def parameters(self) -> NDArray[np.float64]:
-        """Bound values in the order of the function's signature."""
-        return np.array([value for _, value in self.values], dtype=float)
-
-    @property
-    def kernel(self) -> Any:
-        """The function compiled once per process."""
-        return _compiled(self.function, len(self.values))[0]
-
-    @property
-    def gradient(self) -> Any:
-        """Central differences of the function, compiled."""
-        return _compiled(self.function, len(self.values))[1]
-
-    def __reduce__(self) -> tuple:
-        """Pickle by the decorated function's name, so that laws travel to worker processes."""
-        return _rebind, (self.function.__module__, self.function.__qualname__, self.values)
-
-
-def _rebind(module: str, qualname: str, values: tuple[tuple[str, float], ...]) -> CustomLaw:
-    """Find the decorated function again and bind its parameters."""
-    found: Any = import_module(module)
-    for part in qualname.split("."):
-        found = getattr(found, part)
-    return found(**dict(values))
-
-
-def law(
-    function: Callable[..., float] | None = None,
-    *,
-    knots: tuple[float, ...] = (),
-    jump: bool = False,
-    exponent: float = 1.0,
-    entry_rate_floor: float = ENTRY_RATE_FLOOR,
-) -> Any:
-    """Turn a plain function into a contact law.
-
-    The function gives the force for ``delta > 0``. It is compiled by numba, once, and no integrator is
-    recompiled for it.
-
-    Parameters
-    ----------
-    function : ``f(delta, delta_dot, entry_rate, parameter, ...) -> force``; further arguments are the law's
-        parameters, bound by keyword; defaults are kept.
-    knots : indentations (m) where the force has a kink; integrators land on them.
-    jump : say True when the force is not zero at the instant of entry.
-    exponent : leading exponent of the force at first touch.
-    entry_rate_floor : smallest entry rate handed to the function, m/s.
-
-    Returns
-    -------
-    A maker: call it with the parameters to get a `CustomLaw`.
-
-    Raises
-    ------
-    TypeError for a signature that does not begin with ``delta, delta_dot, entry_rate``, and on binding for
-    missing or unknown parameters; ValueError on binding for a force that is not finite.
-
-    Examples
-    --------
-    >>> @law
-    ... def cubic(delta, delta_dot, entry_rate, stiffness):
-    ...     return stiffness * delta**3
-    >>> float(cubic(stiffness=1e9).force(2e-3))
-    8.0
-    """
-    if function is None:
-        return lambda f: law(f, knots=knots, jump=jump, exponent=exponent, entry_rate_floor=entry_rate_floor)
-    signature = inspect.signature(function)
-    names = tuple(signature.parameters)
-    if names[:3] != _ARGUMENTS:
-        raise TypeError(
-            f"law {function.__name__!r} must take ({', '.join(_ARGUMENTS)}, parameters...), got ({', '.join(names)})"
-        )
-    _check_knots(function.__name__, knots)
-    probe = inspect.Signature(list(signature.parameters.values())[3:])
-
-    def bind(**values: float) -> CustomLaw:
-        unknown = [name for name in values if name not in probe.parameters]
-        if unknown:
-            raise TypeError(
-                f"law {function.__name__!r}: unexpected {unknown[0]!r}; its parameters are {list(names[3:])}"
-            )
-        try:
-            bound = probe.bind(**values)
-        except TypeError as error:
-            raise TypeError(f"law {function.__name__!r}: {error}; its parameters are {list(names[3:])}") from None
-        bound.apply_defaults()
-        pairs = tuple((key, float(value)) for key, value in bound.arguments.items())
-        made = CustomLaw(function.__name__, function, pairs, tuple(map(float, knots)), jump, exponent, entry_rate_floor)
-        _check_force(made)
-        return made
-
-    bind.__name__, bind.__qualname__ = function.__name__, function.__qualname__
-    bind.__doc__, bind.__module__ = function.__doc__, function.__module__
-    return bind
-
-
-def _check_knots(name: str, knots: tuple[float, ...]) -> None:
-    """Knots ascend and are positive."""
-    values = np.asarray(knots, dtype=float)
-    if not (np.all(np.isfinite(values)) and np.all(np.diff(values, prepend=0.0) > 0.0)):
-        raise ValueError(f"knots of law {name!r} must be positive, finite and ascending, got {knots}")
-
-
-def _check_force(made: CustomLaw) -> None:
-    """Evaluate the law at rest, so that a NaN is met before any run."""
-    bad = [(key, value) for key, value in made.values if not math.isfinite(value)]
-    if bad:
-        raise ValueError(f"parameter {bad[0][0]} of law {made.name!r} must be finite, got {bad[0][1]}")
-    delta = np.array([1e-9, 1e-6, 1e-3])
-    with np.errstate(all="ignore"):
-        force = made.force(delta, 0.0, 1.0)
-    if not np.all(np.isfinite(force)):
-        where = delta[~np.isfinite(force)][0]
-        raise ValueError(
-            f"law {made.name!r} gives a force of {force[~np.isfinite(force)][0]} at delta = {where:g} m, "
-            f"delta_dot = 0 with {dict(made.values)}; a law must be finite for delta > 0"
-        )
-
-
-@lru_cache(maxsize=256)
-def _compiled(function: Callable[..., float], count: int) -> tuple[Any, Any]:
-    """Compile a scalar force into the batch kernels of the declared signatures."""
-    from numba import carray, cfunc, njit
-    from numba.core.errors import NumbaError
-    from numba.np.unsafe.ndarray import to_fixed_tuple
-
-    from contacts.kernels import GRADIENT, SIGNATURE
-
-    scalar = njit(error_model="numpy")(function)
-
-    def batch(n, delta, delta_dot, entry_rate, parameters, force):
-        values = to_fixed_tuple(carray(parameters, (count,)), count)
-        for i in range(n):
-            force[i] = scalar(delta[i], delta_dot[i], entry_rate, *values)
-
-    def differences(n, delta, delta_dot, entry_rate, parameters, by_delta, by_rate, by_entry):  # type: ignore[no-untyped-def]
-        values = to_fixed_tuple(carray(parameters, (count,)), count)
-        for i in range(n):
-            d, v, r = delta[i], delta_dot[i], entry_rate
-            h = 1e-5 * d + 1e-14  # relative to the cube root of rounding; below the surface the law is not asked
-            low = max(d - h, 0.0)
-            by_delta[i] = (scalar(d + h, v, r, *values) - scalar(low, v, r, *values)) / (d + h - low)
-            h = 1e-5 * max(abs(v), r)
-            by_rate[i] = (scalar(d, v + h, r, *values) - scalar(d, v - h, r, *values)) / (2.0 * h)
-            h = 1e-5 * r
-            by_entry[i] = (scalar(d, v, r + h, *values) - scalar(d, v, r - h, *values)) / (2.0 * h)
-
-    try:
-        return cfunc(SIGNATURE)(batch), cfunc(GRADIENT)(differences)
-    except NumbaError as error:
-        source = inspect.getsourcefile(function)
-        raise TypeError(
-            f"law {function.__name__!r} ({source}, line {function.__code__.co_firstlineno}) cannot be compiled; "
-            f"use plain arithmetic and the math module only. The compiler says: {error}"
-        ) from error
+def check_restitution(value: Any, who: str, low_open: bool, why: str = "") -> None:
+    """Check a nominal restitution against (0, 1] or [0, 1], and say why the range is what it is."""
+    fine = isinstance(value, (int, float, np.number)) and not isinstance(value, bool) and 0.0 <= value <= 1.0
+    if not fine or (low_open and value == 0.0):
+        span = "(0, 1]" if low_open else "[0, 1]"
+        raise ValueError(f"restitution of {who} must lie in {span}, got {value!r}{'; ' + why if why else ''}")

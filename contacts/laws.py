@@ -1,21 +1,41 @@
-"""The laws most stops need: Hertz, hysteretic Hertz, Kelvin–Voigt, piecewise linear.
+r"""Power laws: elastic Hertz, and Hertz with hysteresis by any of the published damping factors.
 
-The first three are members of one family, ``F = K d^p (1 + a v/entry_rate) + c d^r v`` with d = delta, v =
-delta_dot.
+The factor a of :math:`F = K δ^p (1 + a\,\dot δ/\dot δ^-)` is published as a formula of a nominal restitution e; what a
+free mass achieves is another value, the root r of a (1 + r) = ln[(1 + a)/(1 - a r)], whatever K, p, mass and speed:
+
+    nominal e                                         0.1     0.3     0.5     0.7     0.9
+    lankarani_nikravesh   3(1 - e²)/4                0.6653  0.6842  0.7252  0.7960  0.9132
+    hunt_crossley         3(1 - e)/2                 0.5158  0.5813  0.6630  0.7680  0.9090
+    herbert_mcwhannell    6(1 - e)/((2e - 1)² + 3)   0.4907  0.5200  0.5936  0.7227  0.9009
+    lee_wang              3(1 - e)/4                 0.6867  0.7390  0.7992  0.8693  0.9524
+    gonthier              (1 - e²)/e                 0.1010  0.3042  0.4877  0.6696  0.8764
+    zhiying_qishao        3(1 - e²)exp(2(1 - e))/4   0.2175  0.3267  0.4826  0.6796  0.8959
+    flores                8(1 - e)/(5e)              0.0694  0.2562  0.4704  0.6832  0.8939
+    hu_guo                3(1 - e)/(2e)              0.0741  0.2707  0.4877  0.6973  0.8999
+    carvalho_martins      3(1 - e)(11 - e)/(2 + 18e) 0.1289  0.3040  0.5002  0.7000  0.9000
+    zhang_sharf           the root itself            0.1000  0.3000  0.5000  0.7000  0.9000
+    achieving             the root itself            0.1000  0.3000  0.5000  0.7000  0.9000
+
+Near e = 1 the root is a = 3(1 - e)/2 + ..., near 0 it is 1/e: what misses the first is wrong for hard stops.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from contacts.law import ENTRY_RATE_FLOOR, Law, number
-from contacts.restitution import damping_factor_for
+from contacts.law import ENTRY_RATE_FLOOR, Law, check_restitution, number
+from contacts.restitution import achieved_restitution, damping_factor_for
+
+PUBLISHED = (
+    *("lankarani_nikravesh", "hunt_crossley", "herbert_mcwhannell", "lee_wang", "gonthier", "zhiying_qishao", "flores"),
+    *("hu_guo", "carvalho_martins", "zhang_sharf", "achieving"),
+)
+"""Constructors of `Hysteretic` from a nominal restitution."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +53,7 @@ class Hysteretic(Law):
     Notes
     -----
     On a free mass the achieved restitution r obeys a (1 + r) = ln[(1 + a)/(1 - a r)], whatever K, mass, speed
-    and p (with ``clamp=False``). The rate at entry must be latched by the integrator.
+    and p. The rate at entry must be latched by the integrator. A table of all constructors heads this module.
 
     References
     ----------
@@ -52,6 +72,11 @@ class Hysteretic(Law):
     exponent: float = 1.5
     clamp: bool = False
     entry_rate_floor: float = ENTRY_RATE_FLOOR
+    nominal: tuple[str, float] | None = field(default=None, init=False, compare=False, repr=False)
+
+    compiled: ClassVar[str] = "power"
+    equation: ClassVar[str] = "F = stiffness δ^p (1 + damping_factor δ̇/entry_rate), p = exponent"
+    units: ClassVar[dict[str, str]] = {"stiffness": "N/m^p", "entry_rate_floor": "m/s"}
 
     def __post_init__(self) -> None:
         number(self, "stiffness", strict=True)
@@ -61,34 +86,127 @@ class Hysteretic(Law):
 
     @classmethod
     def lankarani_nikravesh(cls, stiffness: float, restitution: float, **options: Any) -> Hysteretic:
-        """Published factor a = 3 (1 - e²)/4, for e near 1; what e = 0.5 achieves is 0.725, not 0.5."""
-        if not 0.0 <= restitution <= 1.0:
-            raise ValueError(f"restitution of lankarani_nikravesh must lie in [0, 1], got {restitution!r}")
-        return cls(stiffness, 0.75 * (1.0 - restitution**2), **options)
+        """Factor 3(1 - e²)/4, e in [0, 1], valid near 1: H.M. Lankarani, P.E. Nikravesh, J. Mech. Des. 112 (1990) 369.
+
+        Asked for e = 0.5 a free mass achieves 0.725.
+        """
+        return cls._of(stiffness, restitution, "lankarani_nikravesh", lambda e: 0.75 * (1.0 - e**2), options)
+
+    @classmethod
+    def hunt_crossley(cls, stiffness: float, restitution: float, **options: Any) -> Hysteretic:
+        """Factor 3(1 - e)/2, e in [0, 1], valid near 1: K.H. Hunt, F.R.E. Crossley, J. Appl. Mech. 42 (1975) 440."""
+        return cls._of(stiffness, restitution, "hunt_crossley", lambda e: 1.5 * (1.0 - e), options)
+
+    @classmethod
+    def herbert_mcwhannell(cls, stiffness: float, restitution: float, **options: Any) -> Hysteretic:
+        """Factor 6(1 - e)/((2e - 1)² + 3), e in [0, 1], valid near 1: R.G. Herbert, D.C. McWhannell, J. Eng. Ind. 99
+        (1977) 606.
+        """
+        return cls._of(
+            *(stiffness, restitution, "herbert_mcwhannell"),
+            *(lambda e: 6.0 * (1.0 - e) / ((2.0 * e - 1.0) ** 2 + 3.0), options),
+        )
+
+    @classmethod
+    def lee_wang(cls, stiffness: float, restitution: float, **options: Any) -> Hysteretic:
+        """Factor 3(1 - e)/4, e in [0, 1]: T.W. Lee, A.C. Wang, J. Mech. Transm. Autom. Des. 105 (1983) 534.
+
+        Half of what e near 1 needs: 1 - r is half of 1 - e there.
+        """
+        return cls._of(stiffness, restitution, "lee_wang", lambda e: 0.75 * (1.0 - e), options)
+
+    @classmethod
+    def gonthier(cls, stiffness: float, restitution: float, **options: Any) -> Hysteretic:
+        """Factor (1 - e²)/e, e in (0, 1]: Y. Gonthier et al., Multibody Syst. Dyn. 11 (2004) 209.
+
+        Solves the exact relation to leading order at small e; near e = 1 a third too much.
+        """
+        return cls._of(stiffness, restitution, "gonthier", lambda e: (1.0 - e**2) / e, options, True)
+
+    @classmethod
+    def zhiying_qishao(cls, stiffness: float, restitution: float, **options: Any) -> Hysteretic:
+        """Factor 3(1 - e²)e^{2(1-e)}/4, e in [0, 1], valid from about 0.3: Q. Zhiying, L. Qishao, J. Dyn. Control 4
+        (2006) 294.
+        """
+        return cls._of(
+            *(stiffness, restitution, "zhiying_qishao"),
+            *(lambda e: 0.75 * (1.0 - e**2) * math.exp(2.0 * (1.0 - e)), options),
+        )
+
+    @classmethod
+    def flores(cls, stiffness: float, restitution: float, **options: Any) -> Hysteretic:
+        """Factor 8(1 - e)/(5e), e in (0, 1], for all of it: P. Flores et al., Multibody Syst. Dyn. 25 (2011) 357."""
+        return cls._of(stiffness, restitution, "flores", lambda e: 1.6 * (1.0 - e) / e, options, True)
+
+    @classmethod
+    def hu_guo(cls, stiffness: float, restitution: float, **options: Any) -> Hysteretic:
+        """Factor 3(1 - e)/(2e), e in (0, 1], for all of it: S. Hu, X. Guo, Multibody Syst. Dyn. 35 (2015) 193."""
+        return cls._of(stiffness, restitution, "hu_guo", lambda e: 1.5 * (1.0 - e) / e, options, True)
+
+    @classmethod
+    def carvalho_martins(cls, stiffness: float, restitution: float, **options: Any) -> Hysteretic:
+        """Factor 3(1 - e)(11 - e)/(2(1 + 9e)), e in [0, 1], within 0.003 from e = 1/3 on: A.S. Carvalho, J.M. Martins,
+        Mech. Mach. Theory 139 (2019) 174.
+        """
+        return cls._of(
+            *(stiffness, restitution, "carvalho_martins"),
+            *(lambda e: 1.5 * (1.0 - e) * (11.0 - e) / (1.0 + 9.0 * e), options),
+        )
+
+    @classmethod
+    def zhang_sharf(cls, stiffness: float, restitution: float, **options: Any) -> Hysteretic:
+        """The relation solved for a by iteration, e in (0, 1]: Y. Zhang, I. Sharf, J. Appl. Mech. 76 (2009) 051002.
+
+        The same factor as `achieving`, under the name of those who proposed it.
+        """
+        return cls._of(stiffness, restitution, "zhang_sharf", damping_factor_for, options, True)
 
     @classmethod
     def achieving(cls, stiffness: float, restitution: float, **options: Any) -> Hysteretic:
         """The factor with which a free mass leaves at exactly ``restitution`` in (0, 1] times its entry speed."""
-        return cls(stiffness, damping_factor_for(restitution), **options)
+        return cls._of(stiffness, restitution, "achieving", damping_factor_for, options, True)
+
+    @classmethod
+    def _of(
+        cls,
+        stiffness: float,
+        restitution: float,
+        who: str,
+        factor: Any,
+        options: dict[str, Any],
+        low_open: bool = False,
+    ) -> Hysteretic:
+        """The law of one published factor, remembering what it was asked for."""
+        check_restitution(restitution, who, low_open, "its factor is infinite at 0")
+        law = cls(stiffness, factor(restitution), **options)
+        object.__setattr__(law, "nominal", (who, float(restitution)))
+        return law
 
     @property
     def parameters(self) -> NDArray[np.float64]:
-        """(K, p, a, c, r, clamp) of the power family."""
-        return np.array([self.stiffness, self.exponent, self.damping_factor, 0.0, 0.0, float(self.clamp)])
+        """(K, p, a, c, r, clamp, approach) of the power family."""
+        return np.array([self.stiffness, self.exponent, self.damping_factor, 0.0, 0.0, float(self.clamp), 0.0])
 
     @property
-    def kernel(self) -> Any:
-        """Compiled power family."""
-        from contacts.kernels import power
+    def remarks(self) -> tuple[str, ...]:  # type: ignore[override]
+        """What a user should know."""
+        a = self.damping_factor
+        if not a:
+            return ("never pulls; smooth",)
+        pulls = (
+            "clamp=True: force cut at zero where it would pull, at a kink that moves with the rate; lower order there"
+            if self.clamp
+            else f"pulls where δ̇ < -entry_rate/damping_factor = -{1.0 / a:.4g} entry_rate: never a free mass, but a "
+            "structure that throws the contact open; clamp=True forbids it"
+        )
+        return (
+            pulls,
+            f"singular at grazing (entry_rate → 0): entry rates below {self.entry_rate_floor:g} m/s count as that",
+        )
 
-        return power
-
-    @property
-    def gradient(self) -> Any:
-        """Its compiled derivatives."""
-        from contacts.kernels import power_gradient
-
-        return power_gradient
+    def exact_restitution(self, entry_rate: float, mass: float) -> float:
+        """By the relation; an entry below the floor sees the factor reduced by entry_rate/floor."""
+        return achieved_restitution(self.damping_factor * min(1.0, entry_rate / self.entry_rate_floor))
 
 
 @dataclass(frozen=True)
@@ -112,6 +230,11 @@ class Hertz(Law):
 
     stiffness: float
     exponent: float = 1.5
+
+    compiled: ClassVar[str] = "power"
+    equation: ClassVar[str] = "F = stiffness δ^p, p = exponent"
+    units: ClassVar[dict[str, str]] = {"stiffness": "N/m^p"}
+    remarks: ClassVar[tuple[str, ...]] = ("never pulls; smooth",)  # type: ignore[misc]
 
     def __post_init__(self) -> None:
         number(self, "stiffness", strict=True)
@@ -137,127 +260,9 @@ class Hertz(Law):
 
     @property
     def parameters(self) -> NDArray[np.float64]:
-        """(K, p, a, c, r, clamp) of the power family."""
-        return np.array([self.stiffness, self.exponent, 0.0, 0.0, 0.0, 0.0])
+        """(K, p, a, c, r, clamp, approach) of the power family."""
+        return np.array([self.stiffness, self.exponent, 0.0, 0.0, 0.0, 0.0, 0.0])
 
-    @property
-    def kernel(self) -> Any:
-        """Compiled power family."""
-        from contacts.kernels import power
-
-        return power
-
-    @property
-    def gradient(self) -> Any:
-        """Its compiled derivatives."""
-        from contacts.kernels import power_gradient
-
-        return power_gradient
-
-
-@dataclass(frozen=True)
-class KelvinVoigt(Law):
-    r"""Spring and dashpot, :math:`F = k δ + c \dot δ` while δ > 0: jumps at entry and may pull before exit.
-
-    Parameters
-    ----------
-    stiffness : k > 0, N/m.
-    damping : c >= 0, N s/m.
-    clamp : cut the force at zero, so that the stop never pulls.
-
-    Examples
-    --------
-    >>> float(KelvinVoigt(1e6, 100.0).force(1e-3, 0.5))
-    1050.0
-    """
-
-    stiffness: float
-    damping: float
-    clamp: bool = False
-
-    def __post_init__(self) -> None:
-        number(self, "stiffness", strict=True)
-        number(self, "damping")
-
-    @property
-    def jump(self) -> bool:  # type: ignore[override]
-        """The dashpot's force appears at once."""
-        return self.damping > 0.0
-
-    @property
-    def parameters(self) -> NDArray[np.float64]:
-        """(K, p, a, c, r, clamp) of the power family."""
-        return np.array([self.stiffness, 1.0, 0.0, self.damping, 0.0, float(self.clamp)])
-
-    @property
-    def kernel(self) -> Any:
-        """Compiled power family."""
-        from contacts.kernels import power
-
-        return power
-
-    @property
-    def gradient(self) -> Any:
-        """Its compiled derivatives."""
-        from contacts.kernels import power_gradient
-
-        return power_gradient
-
-
-@dataclass(frozen=True)
-class PiecewiseLinear(Law):
-    r"""Elastic polyline: slope ``slopes[j]`` between ``knots[j-1]`` and ``knots[j]``, from F(0) = 0.
-
-    Parameters
-    ----------
-    slopes : m >= 1 stiffnesses, N/m; the first positive; later ones may soften but the force stays >= 0.
-    knots : the m - 1 indentations (m) where the slope changes, ascending and positive.
-
-    Examples
-    --------
-    >>> fender = PiecewiseLinear([1e4, 1e6], knots=[1e-3])
-    >>> fender.force([5e-4, 2e-3])
-    array([   5., 1010.])
-    """
-
-    slopes: Sequence[float] | float
-    knots: tuple[float, ...] = ()
-
-    def __post_init__(self) -> None:
-        slopes = tuple(float(s) for s in np.atleast_1d(np.asarray(self.slopes, dtype=float)))
-        knots = tuple(float(k) for k in np.atleast_1d(np.asarray(self.knots, dtype=float)))
-        object.__setattr__(self, "slopes", slopes)
-        object.__setattr__(self, "knots", knots)
-        if not np.all(np.isfinite(slopes)) or slopes[0] <= 0.0:
-            raise ValueError(f"slopes of PiecewiseLinear must be finite, the first positive, got {slopes}")
-        if len(knots) != len(slopes) - 1:
-            raise ValueError(f"PiecewiseLinear with {len(slopes)} slopes needs {len(slopes) - 1} knots, got {knots}")
-        if not (np.all(np.isfinite(knots)) and np.all(np.diff(knots, prepend=0.0) > 0.0)):
-            raise ValueError(f"knots of PiecewiseLinear must be finite, positive and ascending, got {knots}")
-        if np.any(self._corner_forces() < 0.0) or (len(slopes) > 1 and slopes[-1] < 0.0):
-            raise ValueError(f"slopes {slopes} of PiecewiseLinear soften to a negative force")
-
-    def _corner_forces(self) -> NDArray[np.float64]:
-        """Force at (0, knots...)."""
-        rises = np.diff(self.knots, prepend=0.0) * np.asarray(self.slopes)[:-1]
-        return np.concatenate((np.zeros(1), np.cumsum(rises)))
-
-    @property
-    def parameters(self) -> NDArray[np.float64]:
-        """(m, knots[m], forces[m], slopes[m])."""
-        slopes = np.asarray(self.slopes)
-        return np.concatenate(([len(slopes)], [0.0], self.knots, self._corner_forces(), slopes))
-
-    @property
-    def kernel(self) -> Any:
-        """Compiled polyline."""
-        from contacts.kernels import piecewise
-
-        return piecewise
-
-    @property
-    def gradient(self) -> Any:
-        """Its compiled derivatives."""
-        from contacts.kernels import piecewise_gradient
-
-        return piecewise_gradient
+    def exact_restitution(self, entry_rate: float, mass: float) -> float:
+        """Elastic: 1."""
+        return 1.0

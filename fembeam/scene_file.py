@@ -89,10 +89,16 @@ LAWS: Constructors = {
     "hertz": contacts.Hertz,
     "hertz_of_spheres": contacts.Hertz.of_spheres,
     "hysteretic": contacts.Hysteretic,
-    "lankarani_nikravesh": contacts.Hysteretic.lankarani_nikravesh,
-    "achieving": contacts.Hysteretic.achieving,
+    **{name: getattr(contacts.Hysteretic, name) for name in contacts.PUBLISHED},
     "kelvin_voigt": contacts.KelvinVoigt,
+    "anagnostopoulos": contacts.KelvinVoigt.anagnostopoulos,
+    "viscoelastic": contacts.Viscoelastic,
+    "tsuji": contacts.Viscoelastic.tsuji,
+    "jankowski": contacts.Viscoelastic.jankowski,
     "piecewise_linear": contacts.PiecewiseLinear,
+    "tabulated": contacts.Tabulated,
+    "tabulated_file": contacts.Tabulated.from_csv,
+    "parallel": contacts.parallel,
 }
 SIGNALS: Constructors = {
     "harmonic": Harmonic,
@@ -292,6 +298,10 @@ class _Reader:
             return self.section(value, inner)
         if key == "law":
             return self.choose(LAWS, value, inner)
+        if key == "laws":
+            if not isinstance(value, list):
+                self.fail(inner, f"must be a list of laws, got {shown(value)}")
+            return [self.choose(LAWS, one, f"{inner} number {number}") for number, one in enumerate(value, start=1)]
         if key in ("signal", "foot"):
             return self.choose(SIGNALS, value, inner)
         if key == parameter.name == "quantity":

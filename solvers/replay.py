@@ -40,6 +40,9 @@ from solvers.tables import S, propagate
 from solvers.vector import combine
 
 
+_OFF = 1e-10  # relative distance from a knot at which a law is on one side of it for sure
+
+
 class Slopes(NamedTuple):
     """Derivatives carried along and working space; columns are the first index."""
 
@@ -137,7 +140,7 @@ def _cross(problem, shadow, slopes, nudge, s, direction):
     acceleration = dot(problem.read_rate[s], slopes.rate[0], size)
     if entering:
         shadow.entry_rate[s] = max(abs(rate), problem.floor[s])
-    below, above = np.nextafter(problem.levels[s, border], -1.0), np.nextafter(problem.levels[s, border], np.inf)
+    below, above = problem.levels[s, border] * (1.0 - _OFF), problem.levels[s, border] * (1.0 + _OFF) + 1e-300
     jump = _force(problem, shadow, s, above, rate, slopes.batch)
     if border > 0:
         jump -= _force(problem, shadow, s, below, rate, slopes.batch)
@@ -280,7 +283,7 @@ def _step(problem, ahead, behind, tables, shadow, space, slopes, nudge, row, mod
 def _inside_piece(problem, shadow, s, x):
     """Indentation, kept off the knots at which the slope of the law would be that of the next piece."""
     lower, upper = problem.levels[s, shadow.piece[s] - 1], problem.levels[s, shadow.piece[s]]
-    return min(max(indentation(problem, s, x), lower * (1.0 + 1e-12)), upper * (1.0 - 1e-12))
+    return min(max(indentation(problem, s, x), lower * (1.0 + _OFF)), upper * (1.0 - _OFF))
 
 
 @inlined

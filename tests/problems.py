@@ -10,11 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.integrate import solve_ivp
+from scipy.interpolate import PchipInterpolator
 from scipy.special import beta
 
 import fembeam as fb
 import solvers
-from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear
+from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, Sum, Tabulated, Viscoelastic
 
 PAPER_LAW = Hysteretic.lankarani_nikravesh(2.1e8, restitution=0.5)
 PAPER_OMEGA = 109.1299120547, 790.6100943811, 2303.729838331
@@ -182,6 +183,24 @@ def force_of(law) -> Callable:
             return max(force, 0.0) if law.clamp else force
 
         return kelvin_voigt
+    if isinstance(law, Viscoelastic):
+
+        def viscoelastic(d, v, r):
+            viscosity = 0.0 if law.approach_only and v <= 0.0 else law.damping * d ** (0.5 * (law.exponent - 1.0))
+            force = law.stiffness * d**law.exponent + viscosity * v
+            return max(force, 0.0) if law.clamp else force
+
+        return viscoelastic
+    if isinstance(law, Sum):
+        parts = [(force_of(part), part.entry_rate_floor) for part in law.parts]
+        return lambda d, v, r: sum(force(d, v, max(r, floor)) for force, floor in parts)
+    if isinstance(law, Tabulated):
+        curve = PchipInterpolator(law.indentation, law.measured)
+        top, steep = law.indentation[-1], float(curve.derivative()(law.indentation[-1]))
+        return lambda d, v, r: float(curve(min(d, top))) + steep * max(d - top, 0.0)
+    if isinstance(law, PiecewiseLinear) and any(law.damping):
+        elastic = force_of(PiecewiseLinear(law.slopes, law.knots))
+        return lambda d, v, r: elastic(d, v, r) + law.damping[np.searchsorted(law.knots, d)] * v
     if isinstance(law, PiecewiseLinear):
         knots = [0.0, *law.knots, math.inf]
         pieces = list(zip(law.slopes, knots[:-1], knots[1:], strict=True))

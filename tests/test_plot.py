@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fembeam as fb
-from contacts import Hertz
+from contacts import PUBLISHED, Hertz, Hysteretic, bounce, identify
 from fembeam import plot, report, statistics
 
 
@@ -109,3 +109,20 @@ def test_random_figures_have_units_bands_and_confidence():
     figure = plot.random_densities({"δ": signal, "mid": signal})
     for word in ("probability density / mm⁻¹", "δ / mm", "Gaussian", "skewness", " ± "):
         assert word in texts(figure)
+
+
+def test_figures_of_laws():
+    drawn = plot.loops({"hertz": Hertz(2e8), "damped": Hysteretic.hu_guo(2e8, 0.5)}, entry_rate=0.3, mass=0.02)
+    assert "damped: e = 0.488" in texts(drawn)
+    delta, force = drawn.axes[0].lines[0].get_data()
+    exact = 1e3 * (1.25 * 0.02 * 0.3**2 / 2e8) ** 0.4
+    assert delta.max() == pytest.approx(exact, rel=1e-4)
+    assert force.max() == pytest.approx(2e8 * (1e-3 * exact) ** 1.5, rel=1e-3)
+    catalogue = texts(plot.restitutions())
+    assert all(name in catalogue for name in PUBLISHED)
+    hit = bounce(Hysteretic(2e8, 0.5), 0.3, 0.02)
+    figure = plot.identification(identify(hit.delta, hit.delta_dot, hit.force))
+    assert "a = 0.5" in texts(figure)
+    for one in (drawn, figure):
+        one.canvas.draw()
+        assert all(axis.get_ylabel() for axis in one.axes)

@@ -6,7 +6,7 @@ import pytest
 
 import fembeam as fb
 import solvers
-from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear
+from contacts import PUBLISHED, Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, Tabulated, Viscoelastic
 from fembeam import scene_file
 from fembeam.scene_file import SceneFileError
 
@@ -52,9 +52,25 @@ def test_the_example_is_the_papers_scene(tmp_path):
          Hysteretic.achieving(1e9, 0.5, clamp=True)),
         ('kind = "kelvin_voigt", stiffness = 1e6, damping = 10', KelvinVoigt(1e6, 10.0)),
         ('kind = "piecewise_linear", slopes = [1e4, 1e6], knots = [1e-3]', PiecewiseLinear([1e4, 1e6], (1e-3,))),
+        ('kind = "piecewise_linear", slopes = [1e4, 1e6], knots = [1e-3], damping = [0, 5]',
+         PiecewiseLinear([1e4, 1e6], (1e-3,), [0, 5])),
+        ('kind = "anagnostopoulos", stiffness = 1e6, restitution = 0.5, mass = 2, clamp = true',
+         KelvinVoigt.anagnostopoulos(1e6, 0.5, 2.0, clamp=True)),
+        ('kind = "viscoelastic", stiffness = 1e6, damping = 10, approach_only = true',
+         Viscoelastic(1e6, 10.0, approach_only=True)),
+        ('kind = "tsuji", stiffness = 1e6, restitution = 0.5, mass = 2, exponent = 2',
+         Viscoelastic.tsuji(1e6, 0.5, 2.0, exponent=2.0)),
+        ('kind = "jankowski", stiffness = 1e6, restitution = 0.5, mass = 2', Viscoelastic.jankowski(1e6, 0.5, 2.0)),
+        ('kind = "tabulated", indentation = [1e-3, 2e-3], measured = [5, 20]', Tabulated([1e-3, 2e-3], [5.0, 20.0])),
+        ('kind = "tabulated_file", path = "curve.csv"', Tabulated([1e-3, 2e-3], [5.0, 20.0])),
+        ('kind = "parallel", laws = [{ kind = "hertz", stiffness = 1e9 }, { kind = "hertz", stiffness = 1 }]',
+         Hertz(1e9) + Hertz(1.0)),
+        *((f'kind = "{name}", stiffness = 1e9, restitution = 0.5', getattr(Hysteretic, name)(1e9, 0.5))
+          for name in PUBLISHED),
     ],
 )  # fmt: skip
 def test_laws(tmp_path, text, law):
+    (tmp_path / "curve.csv").write_text("delta,force\n1e-3,5\n2e-3,20\n")
     file = read(tmp_path, SIMPLE + f'[[stops]]\nz = 0.5\ngap = 1e-3\nside = "above"\nlaw = {{ {text} }}')
     assert file.scene.stops == (fb.Stop(0.5, law=law, gap=1e-3, side="above"),)
 

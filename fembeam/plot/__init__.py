@@ -1,9 +1,11 @@
 """Figures: one function per question, each returns a matplotlib figure.
 
-`response` and `animation` hold those of one run, `orbits` those of periodic motion, `study` those of studies.
+`response` and `animation` hold those of one run, `laws` those of contact laws, `orbits` those of periodic motion,
+`random` those of random motion, `study` those of studies.
 """
 
 from fembeam.plot.animation import animate, frame
+from fembeam.plot.laws import identification, loops, restitutions
 from fembeam.plot.orbits import branch, orbit, peak
 from fembeam.plot.random import random_densities, random_spectra
 from fembeam.plot.response import (
@@ -28,6 +30,8 @@ __all__ = [
     "densities",
     "frame",
     "mode_count",
+    "identification",
+    "loops",
     "mode_shapes",
     "orbit",
     "peak",
@@ -36,6 +40,7 @@ __all__ = [
     "random_densities",
     "random_spectra",
     "responses",
+    "restitutions",
     "segment_for",
     "smallest_model",
     "spectra_of",

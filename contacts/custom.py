@@ -1,0 +1,314 @@
+"""How to write one's own law: a plain function under ``@law``."""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import lru_cache
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contacts.law import ENTRY_RATE_FLOOR, Law
+
+Function = Callable[..., Any]
+_ARGUMENTS = ("delta", "delta_dot", "entry_rate")
+_PROBES = np.array([1e-9, 1e-6, 1e-3])
+"""Indentations (m) at which a law is tried out when its parameters are bound."""
+
+
+@dataclass(frozen=True)
+class CustomLaw(Law):
+    """A user's force function with its parameters bound; made by calling a function decorated with `law`."""
+
+    name: str
+    function: Function = field(repr=False)
+    values: tuple[tuple[str, float], ...]
+    knots: tuple[float, ...] = ()
+    jump: bool = False
+    exponent: float = 1.0
+    entry_rate_floor: float = ENTRY_RATE_FLOOR
+    derivative: Function | None = field(default=None, repr=False)
+
+    @property
+    def parameters(self) -> NDArray[np.float64]:
+        """Bound values in the order of the function's signature."""
+        return np.array([value for _, value in self.values], dtype=float)
+
+    @property
+    def kernel(self) -> Any:
+        """The function compiled once per process."""
+        return _compiled(self.function, self.derivative, len(self.values))[0]
+
+    @property
+    def gradient(self) -> Any:
+        """Its derivatives as given, else central differences, compiled."""
+        return _compiled(self.function, self.derivative, len(self.values))[1]
+
+    @property
+    def equation(self) -> str:  # type: ignore[override]
+        """First line of the function's docstring, or its call."""
+        doc = inspect.getdoc(self.function)
+        return doc.splitlines()[0] if doc else f"F = {self.name}{inspect.signature(self.function)}"
+
+    def __reduce__(self) -> tuple:
+        """Pickle by the decorated function's name, so that laws travel to worker processes."""
+        return _rebind, (self.function.__module__, self.function.__qualname__, self.values)
+
+
+def _rebind(module: str, qualname: str, values: tuple[tuple[str, float], ...]) -> CustomLaw:
+    """Find the decorated function again and bind its parameters."""
+    found: Any = import_module(module)
+    for part in qualname.split("."):
+        found = getattr(found, part)
+    return found(**dict(values))
+
+
+def law(
+    function: Function | None = None,
+    *,
+    knots: tuple[float, ...] = (),
+    jump: bool = False,
+    exponent: float | None = None,
+    entry_rate_floor: float = ENTRY_RATE_FLOOR,
+    derivative: Function | None = None,
+) -> Any:
+    """Turn a plain function into a contact law.
+
+    The function gives the force for ``delta > 0``. It is compiled by numba, once, and no integrator is
+    recompiled for it.
+
+    Parameters
+    ----------
+    function : ``f(delta, delta_dot, entry_rate, parameter, ...) -> force``; further arguments are the law's
+        parameters, bound by keyword; defaults are kept.
+    knots : indentations (m) where the force has a kink; integrators land on them.
+    jump : say True when the force is not zero at the instant of entry.
+    exponent : leading exponent of the force at first touch; None finds it when parameters are bound.
+    entry_rate_floor : smallest entry rate handed to the function, m/s.
+    derivative : function of the same arguments that returns (∂F/∂delta, ∂F/∂delta_dot, ∂F/∂entry_rate); None takes
+        central differences.
+
+    Returns
+    -------
+    A maker: call it with the parameters to get a `CustomLaw`.
+
+    Raises
+    ------
+    TypeError for a signature that does not begin with ``delta, delta_dot, entry_rate`` or has other than plain
+    arguments, for a function that cannot be compiled (with the line), and on binding for missing or unknown
+    parameters. ValueError on binding for a force that is NaN or negative at rest, that jumps at δ = 0 without
+    ``jump=True``, or whose derivative is not that of the force.
+
+    Examples
+    --------
+    >>> @law
+    ... def cubic(delta, delta_dot, entry_rate, stiffness):
+    ...     return stiffness * delta**3
+    >>> float(cubic(stiffness=1e9).force(2e-3))
+    8.0
+    """
+    if function is None:
+        return lambda f: law(
+            f, knots=knots, jump=jump, exponent=exponent, entry_rate_floor=entry_rate_floor, derivative=derivative
+        )
+    if not inspect.isfunction(function):
+        raise TypeError(f"@law decorates a plain function, got {function!r}")
+    who = function.__name__
+    names = _checked_names(function, f"law {who!r}")
+    if derivative is not None and _checked_names(derivative, f"derivative of law {who!r}") != names:
+        raise TypeError(f"derivative of law {who!r} must take the law's arguments, ({', '.join(names)})")
+    _check_knots(who, knots)
+    options = tuple(map(float, knots)), jump
+    probe = inspect.Signature(list(inspect.signature(function).parameters.values())[3:])
+
+    def bind(**values: float) -> CustomLaw:
+        pairs = _bound(who, probe, values)
+        made = CustomLaw(who, function, pairs, *options, exponent or 1.0, entry_rate_floor, derivative)
+        _check_force(made)
+        _check_jump(made)
+        if derivative is not None:
+            _check_derivative(made)
+        if exponent is None and not jump:
+            made = CustomLaw(who, function, pairs, *options, _leading_exponent(made), entry_rate_floor, derivative)
+        return made
+
+    bind.__name__, bind.__qualname__ = function.__name__, function.__qualname__
+    bind.__doc__, bind.__module__ = function.__doc__, function.__module__
+    bind.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+        [p.replace(kind=inspect.Parameter.KEYWORD_ONLY) for p in probe.parameters.values()]
+    )
+    return bind
+
+
+def _checked_names(function: Function, who: str) -> tuple[str, ...]:
+    """Argument names of a law's function, which must be plain and begin with the three of every law."""
+    parameters = inspect.signature(function).parameters
+    names = tuple(parameters)
+    if names[:3] != _ARGUMENTS:
+        raise TypeError(f"{who} must take ({', '.join(_ARGUMENTS)}, parameters...), got ({', '.join(names)})")
+    odd = [p for p in parameters.values() if p.kind is not p.POSITIONAL_OR_KEYWORD]
+    if odd:
+        raise TypeError(f"{who} must take plain arguments only, got {str(odd[0])!r}; name every parameter")
+    if parameters["entry_rate"].default is not inspect.Parameter.empty:
+        raise TypeError(f"{who}: delta, delta_dot and entry_rate are given by the integrator and have no default")
+    return names
+
+
+def _bound(who: str, probe: inspect.Signature, values: dict[str, Any]) -> tuple[tuple[str, float], ...]:
+    """Parameters of a law by name, defaults filled in, as finite numbers."""
+    names = list(probe.parameters)
+    unknown = [name for name in values if name not in probe.parameters]
+    if unknown:
+        raise TypeError(f"law {who!r}: unexpected {unknown[0]!r}; its parameters are {names}")
+    try:
+        bound = probe.bind(**values)
+    except TypeError as error:
+        raise TypeError(f"law {who!r}: {error}; its parameters are {names}") from None
+    bound.apply_defaults()
+    for key, value in bound.arguments.items():
+        if not isinstance(value, (int, float, np.number)) or isinstance(value, bool):
+            raise TypeError(f"parameter {key} of law {who!r} must be a number, got {value!r}")
+        if not math.isfinite(value):
+            raise ValueError(f"parameter {key} of law {who!r} must be finite, got {value}")
+    return tuple((key, float(value)) for key, value in bound.arguments.items())
+
+
+def _check_knots(name: str, knots: tuple[float, ...]) -> None:
+    """Knots ascend and are positive."""
+    values = np.asarray(knots, dtype=float)
+    if not (np.all(np.isfinite(values)) and np.all(np.diff(values, prepend=0.0) > 0.0)):
+        raise ValueError(f"knots of law {name!r} must be positive, finite and ascending, got {knots}")
+
+
+def _check_force(made: CustomLaw) -> None:
+    """Evaluate the law at rest, so that a NaN or a pull is met before any run."""
+    with np.errstate(all="ignore"):
+        force = made.force(_PROBES, 0.0, 1.0)
+    wrong = ~np.isfinite(force) | (force < 0.0)
+    if np.any(wrong):
+        where, value = _PROBES[wrong][0], force[wrong][0]
+        need = "must not pull at rest" if np.isfinite(value) else "must be finite for delta > 0"
+        raise ValueError(
+            f"law {made.name!r} gives a force of {value} at delta = {where:g} m, "
+            f"delta_dot = 0 with {dict(made.values)}; a law {need}"
+        )
+
+
+def _check_jump(made: CustomLaw) -> None:
+    """A force that does not tend to zero with delta must be declared."""
+    if made.jump:
+        return
+    for rate in (0.0, 1.0):
+        near, nearer = np.abs(made.force([1e-12, 1e-18], rate, 1.0))
+        if nearer > 0.5 * near and nearer > 1e-12 * np.abs(made.force(1e-3, rate, 1.0)):
+            raise ValueError(
+                f"law {made.name!r} jumps to {nearer:g} N at delta = 0+ with delta_dot = {rate:g} m/s; "
+                "declare it with @law(jump=True), so that integrators land on it"
+            )
+
+
+def _leading_exponent(made: CustomLaw) -> float:
+    """Local exponent at rest near first touch; one that still changes is rounded to the nearest quarter."""
+    force = made.force([1e-12, 2e-12, 1e-8, 2e-8], 0.0, 1.0)
+    if not np.all(force > 1e-290):
+        return 1.0
+    near, far = np.log2(force[1::2] / force[::2])
+    settled = abs(near - far) < 1e-6
+    return max(round(float(near), 6) if settled else round(4.0 * float(near)) / 4.0, 0.25)
+
+
+def _check_derivative(made: CustomLaw) -> None:
+    """Compare the given derivative with differences, away from knots."""
+    import ctypes
+
+    pointer = ctypes.POINTER(ctypes.c_double)
+    delta, delta_dot = np.array([1e-4, 3e-4]), np.array([0.3, -0.2])
+    kernels = (made.gradient, _compiled(made.function, None, len(made.values))[1])
+    found = np.empty((2, 3, 2))
+    for kernel, out in zip(kernels, found, strict=True):
+        arrays = [x.ctypes.data_as(pointer) for x in (delta, delta_dot, made.parameters)]
+        kernel.ctypes(2, *arrays[:2], 0.7, arrays[2], *(row.ctypes.data_as(pointer) for row in out))
+    for name, given, expected in zip(_ARGUMENTS, *found, strict=True):
+        scale = np.max(np.abs(expected)) + 1e-9 * np.max(np.abs(made.force(delta, delta_dot, 0.7)))
+        if not np.all(np.abs(given - expected) <= 1e-3 * scale):
+            raise ValueError(
+                f"derivative of law {made.name!r} by {name} is {given[0]:g} at delta = 1e-4 m, delta_dot = 0.3 m/s, "
+                f"entry_rate = 0.7 m/s, but differences of the force give {expected[0]:g}"
+            )
+
+
+@lru_cache(maxsize=256)
+def _compiled(function: Function, derivative: Function | None, count: int) -> tuple[Any, Any]:
+    """Compile a scalar force and its derivatives into the batch kernels of the declared signatures."""
+    from numba import carray, cfunc, njit
+    from numba.np.unsafe.ndarray import to_fixed_tuple
+
+    from contacts.kernels import GRADIENT, SIGNATURE
+
+    scalar = njit(error_model="numpy")(function)
+
+    def batch(n, delta, delta_dot, entry_rate, parameters, force):
+        values = to_fixed_tuple(carray(parameters, (count,)), count)
+        for i in range(n):
+            force[i] = scalar(delta[i], delta_dot[i], entry_rate, *values)
+
+    def differences(n, delta, delta_dot, entry_rate, parameters, by_delta, by_rate, by_entry):  # type: ignore[no-untyped-def]
+        values = to_fixed_tuple(carray(parameters, (count,)), count)
+        for i in range(n):
+            d, v, r = delta[i], delta_dot[i], entry_rate
+            h = 1e-5 * d + 1e-14  # relative to the cube root of rounding; below the surface the law is not asked
+            low = max(d - h, 0.0)
+            by_delta[i] = (scalar(d + h, v, r, *values) - scalar(low, v, r, *values)) / (d + h - low)
+            h = 1e-5 * max(abs(v), r)
+            by_rate[i] = (scalar(d, v + h, r, *values) - scalar(d, v - h, r, *values)) / (2.0 * h)
+            h = 1e-5 * r
+            by_entry[i] = (scalar(d, v, r + h, *values) - scalar(d, v, r - h, *values)) / (2.0 * h)
+
+    compiled = _or_say_where(lambda: cfunc(SIGNATURE)(batch), function, "law")
+    if derivative is None:
+        return compiled, _or_say_where(lambda: cfunc(GRADIENT)(differences), function, "law")
+    slopes = njit(error_model="numpy")(derivative)
+
+    def given(n, delta, delta_dot, entry_rate, parameters, by_delta, by_rate, by_entry):  # type: ignore[no-untyped-def]
+        values = to_fixed_tuple(carray(parameters, (count,)), count)
+        for i in range(n):
+            by_delta[i], by_rate[i], by_entry[i] = slopes(delta[i], delta_dot[i], entry_rate, *values)
+
+    return compiled, _or_say_where(lambda: cfunc(GRADIENT)(given), derivative, "derivative")
+
+
+def _or_say_where(compile_it: Callable[[], Any], function: Function, kind: str) -> Any:
+    """Compile, or say which line of the user's function cannot be."""
+    from numba.core.errors import NumbaError
+
+    try:
+        return compile_it()
+    except NumbaError as error:
+        file = inspect.getsourcefile(function)
+        line = _line_of(error, function)
+        raise TypeError(
+            f"{kind} {function.__name__!r} ({file}, line {line}) cannot be compiled; use plain arithmetic and the math "
+            f"module only, and return one number from every branch. The compiler says: {error}"
+        ) from error
+
+
+def _line_of(error: Exception, function: Function) -> str:
+    """Last line of the user's function that the compiler names, with its text; else the first."""
+    import re
+
+    first = function.__code__.co_firstlineno
+    try:
+        source = inspect.getsource(function).splitlines()
+    except OSError:
+        return str(first)
+    named = [int(n) for n in re.findall(r"line (\d+)", str(error))]
+    inside = [n for n in named if first < n < first + len(source)]
+    unknown = re.search(r"name '(\w+)' is not defined", str(error))
+    if unknown and not inside:  # the compiler names the word, not the line
+        inside = [first + i for i, text in enumerate(source) if re.search(rf"\b{unknown[1]}\b", text)][:1]
+    return f"{inside[-1]}: {source[inside[-1] - first].strip()!r}" if inside else str(first)

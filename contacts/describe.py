@@ -1,0 +1,86 @@
+"""What a law is, in words: equation, parameters, what it does to a free mass, where to be careful."""
+
+from __future__ import annotations
+
+import inspect
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+from contacts.custom import CustomLaw
+from contacts.law import Law, Sum, parts_of
+from contacts.restitution import bounce, restitution
+
+
+def describe(law: Law, entry_rate: float = 1.0, mass: float = 1.0) -> str:
+    """Text of `Law.describe`."""
+    lines = [f"{_name(law)}: {law.equation}"]
+    if isinstance(law, Sum):
+        lines += [f"  {_name(part)}: {part.equation}; {_values(part)}" for part in law.parts]
+    else:
+        lines.append(f"  parameters: {_values(law)}")
+    lines.append(f"  restitution: {_restitution(law, entry_rate, mass)}")
+    if law.nominal is not None:
+        lines.append(f"  {law.nominal[0]}: {_source(law)}")
+    remarks = law.remarks or _observed(law, entry_rate, mass)
+    lines += [f"  {remark}" for remark in remarks]
+    if law.knots:
+        shown = ", ".join(f"{knot:.4g}" for knot in law.knots[:6]) + (", …" if len(law.knots) > 6 else "")
+        lines.append(f"  kinks at δ = {shown} m")
+    return "\n".join(lines)
+
+
+def _name(law: Law) -> str:
+    """Class, or the user's function."""
+    return law.name if isinstance(law, CustomLaw) else type(law).__name__
+
+
+def _values(law: Law) -> str:
+    """Parameters with their units."""
+    if isinstance(law, CustomLaw):
+        return ", ".join(f"{name} = {value:.6g}" for name, value in law.values) or "none"
+    told = [(f.name, getattr(law, f.name)) for f in fields(law) if f.init]  # type: ignore[arg-type]
+    return ", ".join(f"{name} = {_shown(value)} {law.units.get(name, '')}".rstrip() for name, value in told)
+
+
+def _shown(value: Any) -> str:
+    """A number, a flag, or a short sequence."""
+    if isinstance(value, (bool, np.bool_)):
+        return str(value)
+    if isinstance(value, (tuple, list)):
+        return f"({', '.join(f'{x:.6g}' for x in value[:6])}{', …' if len(value) > 6 else ''})"
+    return f"{value:.6g}"
+
+
+def _restitution(law: Law, entry_rate: float, mass: float) -> str:
+    """Nominal and achieved."""
+    way = "by integration" if law.exact_restitution(entry_rate, mass) is None else "exactly"
+    achieved = f"a free mass of {mass:g} kg entering at {entry_rate:g} m/s achieves"
+    value = f"{restitution(law, entry_rate, mass):.6f} ({way})"
+    if law.nominal is None:
+        return f"{achieved} {value}"
+    return f"nominal {law.nominal[1]:g} by {law.nominal[0]}; {achieved} {value}"
+
+
+def _observed(law: Law, entry_rate: float, mass: float) -> list[str]:
+    """Where a law that says nothing of itself pulls and jumps, by trying it."""
+    deepest = bounce(law, entry_rate, mass).delta.max()
+    delta, delta_dot = np.meshgrid(deepest * np.linspace(0.02, 1.0, 50), entry_rate * np.linspace(-1.0, 1.0, 41))
+    force = law.force(delta, delta_dot, entry_rate)
+    worst = np.unravel_index(np.argmin(force), force.shape)
+    if force[worst] < 0.0:
+        where = f"δ = {delta[worst]:.3g} m, δ̇ = {delta_dot[worst]:.3g} m/s"
+        remarks = [f"pulls, for example {-force[worst]:.3g} N at {where}"]
+    else:
+        remarks = ["pulls nowhere within this bounce's δ and |δ̇| <= entry_rate"]
+    begins = min(part.exponent for part in parts_of(law))
+    remarks.append("jumps when contact begins" if law.jump else f"begins like δ^{begins:g}")
+    return remarks
+
+
+def _source(law: Law) -> str:
+    """Formula and source of the constructor: the first paragraph of its docstring, on one line."""
+    assert law.nominal is not None
+    doc = inspect.getdoc(getattr(type(law), law.nominal[0])) or ""
+    return " ".join(doc.split("\n\n", 1)[0].split())

@@ -1,0 +1,128 @@
+"""Figures of contact laws: loops of force against indentation, nominal against achieved restitution, a fit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from contacts import PUBLISHED, Bounce, Hysteretic, Identified, KelvinVoigt, Law, Viscoelastic, bounce, restitution
+from fembeam.plot.response import BLUE, GREY, RED, Vector, styled
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+COLOURS = 6  # of the library's style
+
+
+@styled
+def loops(laws: Mapping[str, Law], entry_rate: float = 1.0, mass: float = 1.0) -> Figure:
+    """Force against indentation while a free mass bounces off each law.
+
+    Parameters
+    ----------
+    laws : by the name to show.
+    entry_rate, mass : of the bounce, m/s and kg.
+
+    Notes
+    -----
+    The area of a loop is the energy lost, ½ m v² (1 - e²); the legend gives the achieved restitution e.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.0, 4.2), layout="constrained")
+    axis = figure.subplots()
+    thrown = {name: bounce(law, entry_rate, mass) for name, law in laws.items()}
+    scale, unit = _force_unit(max(float(one.force.max()) for one in thrown.values()))
+    for number, (name, one) in enumerate(thrown.items()):
+        delta, force = _traced(laws[name], one, mass)
+        axis.plot(1e3 * delta, scale * force, _line(number), label=f"{name}: e = {one.restitution:.3f}")
+    axis.axhline(0.0, color=GREY, linewidth=0.6)
+    axis.set_xlabel("indentation δ / mm")
+    axis.set_ylabel(f"contact force / {unit}")
+    figure.legend(loc="outside right center")
+    figure.suptitle(
+        f"Bounce of {mass:g} kg at {entry_rate:g} m/s, achieved restitution e",
+        x=0.01,
+        ha="left",
+        fontsize=10,
+        fontweight="bold",
+    )
+    return figure
+
+
+@styled
+def restitutions() -> Figure:
+    """Achieved against nominal restitution for every constructor that takes one: what the published formulas do.
+
+    `KelvinVoigt.anagnostopoulos` does as `Viscoelastic.tsuji`: exact, and on the same line with ``clamp=True``.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.0, 5.0), layout="constrained")
+    whole, near = figure.subplots(1, 2)
+    nominal = np.linspace(0.02, 1.0, 99)
+    makers = {name: getattr(Hysteretic, name) for name in PUBLISHED if name not in ("zhang_sharf", "achieving")}
+    lines = {name: [restitution(make(1e8, e)) for e in nominal] for name, make in makers.items()}
+    lines["jankowski"] = [restitution(Viscoelastic.jankowski(1e8, e, mass=1.0)) for e in nominal]
+    clamped = [restitution(KelvinVoigt.anagnostopoulos(1e6, e, mass=1.0, clamp=True)) for e in nominal]
+    lines["tsuji with clamp=True"] = clamped
+    exact = "achieving, zhang_sharf, tsuji"
+    whole.plot([0, 1], [0, 1], color=GREY, linewidth=4, alpha=0.4, label=exact)
+    near.axhline(0.0, color=GREY, linewidth=4, alpha=0.4)
+    for number, (name, achieved) in enumerate(lines.items()):
+        whole.plot(nominal, achieved, _line(number), label=name)
+        near.plot(nominal, np.array(achieved) - nominal, _line(number))
+    whole.set(xlim=(0, 1), ylim=(0, 1), xlabel="nominal restitution", ylabel="achieved by a free mass")
+    near.set(xlim=(0, 1), ylim=(-0.05, 0.1), xlabel="nominal restitution", ylabel="achieved - nominal")
+    figure.legend(loc="outside lower center", ncols=3)
+    return figure
+
+
+@styled
+def identification(found: Identified) -> Figure:
+    """Measured and fitted loops of every collision, and the residuals."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.0, 4.8), layout="constrained")
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=[2, 1])
+    scale, unit = _force_unit(max(float(np.abs(one.force).max()) for one in found.collisions))
+    for number, one in enumerate(found.collisions):
+        delta, label = 1e3 * one.delta, {"label": "measured"} if number == 0 else {}
+        above.plot(delta, scale * one.force, ".", color=BLUE, markersize=3, **label)
+        below.plot(delta, scale * (one.force - one.fitted), ".", color=BLUE, markersize=3)
+        order, label = np.flatnonzero(one.delta > 0.0), {"label": "fitted"} if number == 0 else {}
+        above.plot(delta[order], scale * one.fitted[order], color=RED, **label)
+    below.axhline(0.0, color=GREY, linewidth=0.6)
+    for sign in (-2.0, 2.0):
+        below.axhline(sign * scale * found.noise, color=GREY, linewidth=0.6, linestyle="--")
+    above.set_ylabel(f"contact force / {unit}")
+    above.legend(loc="upper left")
+    below.set_ylabel(f"residual / {unit}")
+    below.set_xlabel("indentation δ / mm, offsets taken off; dashed: two standard deviations of the noise")
+    p, a, r = found.exponent.value, found.damping_factor, found.restitution
+    title = f"K = {found.stiffness.value:.4g} N/m^{p:.3g}, a = {a.value:.3g} ({a.low:.3g} to {a.high:.3g}), "
+    title += f"restitution {r.value:.3g} ({r.low:.3g} to {r.high:.3g})"
+    figure.suptitle(title, x=0.01, ha="left", fontsize=10, fontweight="bold")
+    return figure
+
+
+def _force_unit(strongest: float) -> tuple[float, str]:
+    """Factor and name of the unit that suits a force in N."""
+    return (1e-3, "kN") if strongest > 2e3 else (1.0, "N")
+
+
+def _line(number: int) -> str:
+    """Dashes tell lines apart once the colours repeat."""
+    return f"C{number % COLOURS}" + ("-", "--", ":")[number // COLOURS % 3]
+
+
+def _traced(law: Law, thrown: Bounce, mass: float) -> tuple[Vector, Vector]:
+    """(δ, F) of a bounce, dense enough to look smooth, by cubics between its samples."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    t = np.linspace(0.0, thrown.t[-1], 600)
+    delta = CubicHermiteSpline(thrown.t, thrown.delta, thrown.delta_dot)(t)
+    delta_dot = CubicHermiteSpline(thrown.t, thrown.delta_dot, -thrown.force / mass)(t)
+    return delta, law.force(np.maximum(delta, 1e-300), delta_dot, thrown.delta_dot[0])
