@@ -94,7 +94,15 @@ SIGNALS: Constructors = {
     "band_noise": BandNoise,
     "record": Record.from_csv,
 }
-SOLVERS = {"exponential": "Exponential", "dormand_prince": "DormandPrince", "henon_rk2": "HenonRK2"}
+SOLVERS = {
+    "exponential": "Exponential",
+    "dormand_prince": "DormandPrince",
+    "henon_rk2": "HenonRK2",
+    "rk4": "RK4",
+    "central_difference": "CentralDifference",
+    "newmark": "Newmark",
+    "generalized_alpha": "GeneralizedAlpha",
+}
 STUDIES: Constructors = {"simulate": Simulate}
 
 

@@ -15,7 +15,7 @@ from solvers.events import LANDED, NONE, UNRESOLVED
 from solvers.forcing import Forcing
 from solvers.henon import hermite
 from solvers.kernels import kernel, rhs
-from solvers.march import EVENT, accept, explanation, find, gains, landing_tolerance, look, new_space
+from solvers.march import EVENT, accept, explanation, find, gains, landing_tolerance, look, negligible_energy, new_space
 from solvers.newmark import _MOST_SWEEPS, contact_force
 from solvers.result import Status
 from solvers.state import (
@@ -32,8 +32,6 @@ from solvers.state import (
 )
 from solvers.system import Array, System
 
-_LOOKS = 8  # steps between two looks at the energy
-
 
 class MatrixEngine:
     """One run of a method on matrices; offers what `solvers.march.Engine` does."""
@@ -48,13 +46,20 @@ class MatrixEngine:
         self.state: State = new_state(z, len(system.contacts))
         self.state.now[H_FLIGHT] = method.dt
         energy = float(system.energy(*np.split(z, 2)))
-        self.space = new_space(self.state, 4, energy)
+        self.space = new_space(self.state, 4, energy, 0.0)
         self.solvers: dict[Any, Any] = {}
         self.replies: dict[Any, Array] = {}  # acceleration per newton of a stop
         self.directions = np.array([c.direction for c in system.contacts]).reshape(len(system.contacts), system.size)
 
+    def _negligible(self) -> float:
+        """Energy that counts as rounding."""
+        vectors = self.problem.power[:, self.system.size :]
+        solve = self.solver("mass", lambda: self.M)
+        return negligible_energy(self.problem, np.array([v @ solve(v) for v in vectors]), self.method.dt)
+
     def start(self) -> None:
         """Put every stop on its piece and evaluate the first rate."""
+        self.space.watch[2] = self._negligible()
         begin_contacts(self.problem, self.state)
         self.refresh()
 
@@ -69,7 +74,7 @@ class MatrixEngine:
     def march(self, budget: int, log: Array, out: Array, dt: float) -> int:
         """Go on for a stretch; the loop of `solvers.march.march` for a constant step."""
         state, space, method, t_end = self.state, self.space, self.method, self.duration
-        for i in range(budget):
+        for _ in range(budget):
             code = look(self.problem, state, t_end, log, method.events)
             if code == EVENT:
                 self.refresh()
@@ -93,7 +98,7 @@ class MatrixEngine:
                 return int(code)
             if stop >= 0:
                 self.refresh()
-            if i % _LOOKS == 0 and self._gains():
+            if self._gains():
                 return GAINED
         return RUNNING
 

@@ -102,13 +102,17 @@ class HenonRK2(ConstantStep):
     dt_contact: float
     force_unstable: bool = False
 
-    events: ClassVar[int] = HENON
     rtol: ClassVar[float] = 1e-8
     work_rows: ClassVar[int] = 3
 
     def __post_init__(self) -> None:
         for name in ("dt_flight", "dt_contact"):
             require_step(name, getattr(self, name))
+
+    @property
+    def events(self) -> int:
+        """Hénon's step onto entries."""
+        return HENON
 
     @property
     def steps(self) -> tuple[float, float]:

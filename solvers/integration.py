@@ -79,7 +79,9 @@ def integrate(
         column = (ends[1] - ends[0]) / (2.0 * tangent.step)
         solution = replace(solution, tangent=np.column_stack((run.tangent.matrix(), column)))
     if check and status not in (Status.DONE, Status.INTERRUPTED):
-        raise SolverError(f"stopped at t = {run.time:.9g} s of {duration:g} s: {status.value}{run.explanation(status)}", solution)
+        raise SolverError(
+            f"stopped at t = {run.time:.9g} s of {duration:g} s: {status.value}{run.explanation(status)}", solution
+        )
     return solution
 
 

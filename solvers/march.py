@@ -84,7 +84,7 @@ class Space(NamedTuple):
     dense: Any
     work: Any
     coefficients: Any  # (2, 8)
-    watch: Any  # stored energy now and at the start, steps in a row that gained
+    watch: Any  # energy stored now and at the start, a negligible one, steps in a row that gained
 
 
 SPACE = types.NamedTuple([_VECTOR, _VECTOR, _MATRIX, _MATRIX, _MATRIX, _VECTOR], Space)
@@ -262,8 +262,8 @@ def gains(problem, state, space):
     for s in range(problem.gap.size):
         given += abs(state.x[ledger + 2 + 2 * s])
         excess += state.x[ledger + 2 + 2 * s]
-    space.watch[2] = space.watch[2] + 1.0 if excess > given else 0.0
-    return space.watch[2] >= _GAINS
+    space.watch[3] = space.watch[3] + 1.0 if excess > given + space.watch[2] else 0.0
+    return space.watch[3] >= _GAINS
 
 
 @inner
@@ -380,13 +380,22 @@ def march(
     return RUNNING
 
 
-def new_space(state: State, work_rows: int, energy: float, constants: tuple[float, ...] = ()) -> Space:
-    """Working arrays for a state; a method's constants stand in the last row of ``work``."""
+def new_space(state: State, work_rows: int, energy: float, least: float, constants: tuple[float, ...] = ()) -> Space:
+    """Working arrays for a state of some energy; a method's constants stand in the last row of ``work``."""
     size = state.x.size
     work = np.empty((work_rows, size))
     work[-1, : len(constants)] = constants
-    watch = np.array([energy, energy, 0.0])
+    watch = np.array([energy, energy, least, 0.0])
     return Space(np.empty(size), np.empty(size), np.zeros((7, size)), work, np.empty((2, 8)), watch)
+
+
+def negligible_energy(problem: Any, inverse_mass: Array, dt: float) -> float:
+    """What rounding in the loads may bring: 1e-10 of the energy ½ vᵀM⁻¹v (s dt)² of the largest in one step, J."""
+    largest = np.zeros(len(problem.load))
+    np.add.at(largest, problem.tone_load, np.abs(problem.tone_amplitude))
+    for j, load in enumerate(problem.table_load):
+        largest[load] += np.abs(problem.table[problem.table_start[j] : problem.table_start[j + 1], 0]).max()
+    return 0.5e-10 * dt**2 * float(np.sum(inverse_mass * largest**2))
 
 
 class Engine:
@@ -400,7 +409,9 @@ class Engine:
             self.problem.levels[:, 1:] = math.inf  # kinks are not looked for
         self.state: State = new_state(z, len(system.contacts))
         energy = float(system.energy(*np.split(self.back @ z, 2)))
-        self.space = new_space(self.state, method.work_rows, energy, method.constants)
+        dt = 0.0 if method.adaptive else max(method.steps)
+        least = negligible_energy(self.problem, np.sum(self.problem.load * self.problem.power, axis=1), dt)
+        self.space = new_space(self.state, method.work_rows, energy, least, method.constants)
         fastest = max([math.sqrt(abs(k)) for k in self.problem.k] + list(self.problem.c) + [1.0 / duration])
         self.state.now[[H_FLIGHT, H_CONTACT]] = 0.1 / fastest, 0.01 / fastest
         if not method.adaptive:
@@ -435,7 +446,7 @@ class Engine:
             return False
         size = 2 * self.problem.k.size
         self.space.watch[0] = self.system.energy(*np.split(self.back @ self.state.x[:size], 2))
-        self.space.watch[2] = _GAINS
+        self.space.watch[3] = _GAINS
         return bool(gains(self.problem, self.state, self.space))
 
     def explain(self, code: Status) -> str:

@@ -23,7 +23,6 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from solvers.events import IGNORED, LANDED
 from solvers.henon import hermite
 from solvers.kernels import add_loads, contact_forces, contact_gradient, copy, indentation, kernel, rhs
 from solvers.kernels import dot as product
@@ -123,24 +122,10 @@ def _accelerate(n, i, a, h, beta, gamma, x):
     x[n + i] += gamma * h * a
 
 
-@dataclass(frozen=True)
 class _Family(ConstantStep):
     """What the methods of this module share."""
 
-    dt: float
-
     work_rows: ClassVar[int] = 4
-    locate: ClassVar[bool]
-
-    @property
-    def steps(self) -> tuple[float, float]:
-        """One step for all."""
-        return self.dt, self.dt
-
-    @property
-    def events(self) -> int:
-        """What is done about events."""
-        return LANDED if self.locate else IGNORED
 
     @property
     def radius(self) -> Radius:
@@ -184,7 +169,8 @@ class CentralDifference(_Family):
     0.5
     """
 
-    locate: bool = True  # type: ignore[misc]
+    dt: float
+    locate: bool = True
     force_unstable: bool = False
 
     constants: ClassVar[tuple[float, ...]] = (0.0, 0.0, 0.0, 0.5)
@@ -214,9 +200,10 @@ class Newmark(_Family):
     inf
     """
 
+    dt: float
     beta: float = 0.25
     gamma: float = 0.5
-    locate: bool = True  # type: ignore[misc]
+    locate: bool = True
     force_unstable: bool = False
 
     def __post_init__(self) -> None:
@@ -253,8 +240,9 @@ class GeneralizedAlpha(_Family):
     inf
     """
 
+    dt: float
     rho_inf: float = 0.8
-    locate: bool = True  # type: ignore[misc]
+    locate: bool = True
     force_unstable: bool = False
 
     def __post_init__(self) -> None:

@@ -13,7 +13,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from solvers.events import IGNORED, LANDED
 from solvers.henon import hermite
 from solvers.kernels import kernel, rhs
 from solvers.stability import ConstantStep, Radius, taylor_radius
@@ -71,16 +70,6 @@ class RK4(ConstantStep):
 
     def __post_init__(self) -> None:
         require_step("dt", self.dt)
-
-    @property
-    def steps(self) -> tuple[float, float]:
-        """One step for all."""
-        return self.dt, self.dt
-
-    @property
-    def events(self) -> int:
-        """What is done about events."""
-        return LANDED if self.locate else IGNORED
 
     @property
     def radius(self) -> Radius:

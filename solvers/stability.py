@@ -1,8 +1,8 @@
 r"""How long a constant step may be: predicted, before a run begins.
 
 One step of a linear method multiplies the state of a mode p'' + c p' + k p = 0 by a matrix; the motion stays bounded
-where its spectral radius ρ(h) is not above 1. A run of duration T is refused where it would amplify a mode more than
-e-fold, ρ^{T/h} > e: the limit proper for T → ∞, and for a short run of an undamped mode a little more.
+where its spectral radius ρ(h) is not above 1. A run of duration T is refused where it would amplify a mode by more than
+a tenth, ln ρ · T/h > 0.1: the limit proper for T → ∞, and for a short run of an undamped mode a little more.
 
 In contact the law is replaced by its tangent at the expected indentation, k_t = ∂F/∂δ and c_t = ∂F/∂δ̇:
 
@@ -20,6 +20,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from solvers.events import IGNORED, LANDED
 from solvers.forcing import Forcing
 from solvers.system import Array, Contact, System, decouple
 
@@ -28,6 +29,7 @@ Radius = Callable[[float, float, float], float]
 
 EXPECTED_SPEED = 1.0  # m/s; a Hertz stop's frequency goes with its fifth root, so a guess serves
 _SLACK = 1e-10  # rounding of ρ
+_GROWTH = 0.1  # allowed logarithm of a mode's amplification in a run
 _SMALLEST, _LARGEST, _PER_DECADE = 1e-2, 1e2, 60  # range of hω searched; below it a method counts as never stable
 
 
@@ -75,14 +77,14 @@ def alpha_radius(alpha_m: float, alpha_f: float, beta: float, gamma: float) -> R
 
 
 def largest_step(radius: Radius, k: float, c: float, lasting: float = math.inf) -> float:
-    """Largest h up to which a mode is amplified less than e-fold within ``lasting`` seconds; 0 if there is none."""
+    """Largest h up to which a mode is not amplified by a tenth within ``lasting`` seconds; 0 if there is none."""
     fastest = max(math.sqrt(abs(k)), abs(c))
     if fastest == 0.0:
         return math.inf
 
     def stable(h: float) -> bool:
         growth = radius(h, k, c) - 1.0
-        return growth <= _SLACK or math.log1p(growth) * lasting / h <= 1.0
+        return growth <= _SLACK or math.log1p(growth) * max(lasting / h, 1.0) <= _GROWTH
 
     grid = np.geomspace(_SMALLEST, _LARGEST, round(_PER_DECADE * math.log10(_LARGEST / _SMALLEST)) + 1) / fastest
     first = next((i for i, h in enumerate(grid) if not stable(h)), None)
@@ -216,12 +218,19 @@ class ConstantStep:
     rtol: ClassVar[float] = 1e-10  # for sampling signals
     atol: ClassVar[float] = 0.0
     constants: ClassVar[tuple[float, ...]] = ()
+    dt: float
+    locate: bool
     force_unstable: bool
 
     @property
-    @abstractmethod
     def steps(self) -> tuple[float, float]:
         """Steps in flight and in contact, s."""
+        return self.dt, self.dt
+
+    @property
+    def events(self) -> int:
+        """What is done about events."""
+        return LANDED if self.locate else IGNORED
 
     @property
     @abstractmethod
@@ -239,7 +248,7 @@ class ConstantStep:
         ----------
         system : the problem.
         indentation : expected one in m, for the tangent of the contact laws; None takes that of a hit at 1 m/s.
-        duration : s; a short run may amplify a mode by e.
+        duration : s; a short run may amplify a mode by a tenth.
 
         Returns
         -------
