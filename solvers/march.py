@@ -88,7 +88,7 @@ class Space(NamedTuple):
 
 
 SPACE = types.NamedTuple([_VECTOR, _VECTOR, _MATRIX, _MATRIX, _MATRIX, _VECTOR], Space)
-_GAINS = 16  # steps in a row: one alone may be the ledger's, as in the first step of a load
+_GAINS = 8  # steps in a row: one alone may be the ledger's, as in the first step of a load
 
 
 @inner

@@ -174,7 +174,8 @@ class System:
 
     def energy(self, q: Array, q_dot: Array) -> Array:
         """Stored energy ½ q'ᵀ M q' + ½ qᵀ K q in J, for (..., n) arrays."""
-        return 0.5 * ((q_dot @ self.M) * q_dot + (q @ self.K) * q).sum(axis=-1)
+        with np.errstate(over="ignore", invalid="ignore"):  # of a run that diverged
+            return 0.5 * ((q_dot @ self.M) * q_dot + (q @ self.K) * q).sum(axis=-1)
 
 
 @dataclass(frozen=True, eq=False)
