@@ -1,6 +1,7 @@
 """Figures: one function per question, each returns a matplotlib figure. `response` holds those of one run."""
 
 from fembeam.plot.orbits import branch, orbit, peak
+from fembeam.plot.chart import failures, speed_accuracy, stability_map
 from fembeam.plot.response import (
     contacts,
     densities,
@@ -19,6 +20,7 @@ __all__ = [
     "branch",
     "contacts",
     "densities",
+    "failures",
     "mode_shapes",
     "orbit",
     "peak",
@@ -28,6 +30,8 @@ __all__ = [
     "segment_for",
     "spectra_of",
     "spectrum",
+    "speed_accuracy",
+    "stability_map",
     "styled",
     "time_history",
 ]

@@ -119,10 +119,14 @@ class SpeedAccuracy:
         ]
 
     def __str__(self) -> str:
-        lines = [f"{'method':18s} {'setting':>22s} {'modes':>5s} {'µs':>10s} {'error':>8s} {'total':>8s} {'law calls':>9s}"]
+        lines = [
+            f"{'method':18s} {'setting':>22s} {'modes':>5s} {'µs':>10s} {'error':>8s} {'total':>8s} {'law calls':>9s}"
+        ]
         for row in self.rows():
             head = f"{row['method']:18s} {row['setting']:>22s} {row['modes']:5d}"
-            numbers = f"{1e6 * row['seconds']:10.0f} {row['error']:8.1e} {row['total_error']:8.1e} {row['law_calls']:9.0f}"
+            numbers = (
+                f"{1e6 * row['seconds']:10.0f} {row['error']:8.1e} {row['total_error']:8.1e} {row['law_calls']:9.0f}"
+            )
             lines.append(f"{head} {row['failure'] or numbers}{' front' if row['front'] else ''}")
         lines += [f"{n} modes: reduction error {self.reduction[n]:.1e}, reference known to {self.floor[n]:.0e}"
                   for n in self.reduction]  # fmt: skip
@@ -250,7 +254,7 @@ class _Trial:
         kept = [] if self.failure else sorted(self.values)
         found = [self.values[i] for i in kept]
         return Point(
-            *(type(self.method).__name__, _setting(self.method), len(self.model.omega)),
+            *(method_name(self.method), _setting(self.method), len(self.model.omega)),
             np.array([self.seconds[i] for i in kept]),
             *(_distances(found, [truth[i] for i in kept], unit) for truth in (own, largest)),
             *(_median(np.array([getattr(c, name) for c in self.costs], float)) for name in ("law_calls", "steps")),
@@ -337,12 +341,19 @@ def _median(values: Vector) -> float:
     return float(np.median(values)) if len(values) else math.nan
 
 
+def method_name(method: Any) -> str:
+    """The class, and whether it ignores events."""
+    return type(method).__name__ + ("" if getattr(method, "locate", True) else ", events ignored")
+
+
 def _setting(method: Any) -> str:
     """What distinguishes a method from its default."""
     from dataclasses import MISSING, fields
 
     shown = []
     for f in fields(method):
+        if f.name in ("locate", "force_unstable", "ledger"):
+            continue
         value = getattr(method, f.name)
         if f.name in ("dt", "rtol") or f.default is MISSING or value != f.default:
             shown.append(f"{f.name}={value:g}" if isinstance(value, float) else f"{f.name}={value}")

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import solvers
 from fembeam.section import require
+from fembeam.study.speed_accuracy import method_name
 
 if TYPE_CHECKING:
     from fembeam.model import Model
@@ -107,7 +108,7 @@ def stability_map(
     cells = [[_cell(model, method, dt, duration, tolerance, start) for dt in steps] for model in models]
     limits = [_limits(model, method, steps, duration) for model in models]
     return StabilityMap(
-        *(type(method(float(steps[0]))).__name__, steps, axis, np.array(rows, dtype=float)),
+        *(method_name(method(float(steps[0]))), steps, axis, np.array(rows, dtype=float)),
         np.array([[int(verdict) for verdict, _ in line] for line in cells]),
         np.array([[error for _, error in line] for line in cells]),
         *(np.array([limit[i] for limit in limits]) for i in range(2)),
