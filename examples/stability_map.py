@@ -1,4 +1,4 @@
-"""Where Heun's method, RK4 and Newmark's trapezoidal rule fail on a beam that meets a stop, and where that was predicted.
+"""Where Heun's method, RK4 and Newmark's trapezoidal rule fail on a beam with a stop, and where that was predicted.
 
     q_i'' + 2 ζ_i ω_i q_i' + ω_i² q_i = -Γ_i y'' + φ_i(z_s) F,    δ = -u(z_s),    F = K δ^1.5 (1 + a δ'/δ'_entry)
 

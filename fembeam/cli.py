@@ -17,6 +17,7 @@ from fembeam import __version__  # nothing slow up here: Ctrl-C before `main` wo
 if TYPE_CHECKING:
     import argparse
     from collections.abc import Sequence
+    from pathlib import Path
 
     from fembeam.model import Model
     from fembeam.run import Run
@@ -51,7 +52,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"fembeam {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
-    run = commands.add_parser("run", help="simulate; write run.npz, summary.json and figures")
+    run = commands.add_parser("run", help="run the file's studies; write tables, figures and, for [simulate], run.npz")
     run.add_argument("scene", metavar="SCENE.toml", type=Path)
     run.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder for the results")
     run.add_argument("--quiet", action="store_true", help="no progress, no log")
@@ -70,21 +71,49 @@ def _run(arguments: argparse.Namespace) -> int:
 
     begin = time.perf_counter()
     file = scene_file.read(arguments.scene)
-    if "simulate" not in file.studies:
-        raise ValueError(f"{file.path}: needs a table [simulate] with duration and dt")
+    if not file.studies:
+        raise ValueError(f"{file.path}: needs a study, such as a table [simulate] with duration and dt")
     folder = report.prepared(arguments.out)
+    code = _simulation(file, folder, begin, arguments.quiet) if "simulate" in file.studies else 0
+    for name, study in file.studies.items():
+        if name != "simulate" and not code:
+            code = _study(file, name, study, folder, arguments.quiet)
+    return code
+
+
+def _simulation(file: SceneFile, folder: Path, begin: float, quiet: bool) -> int:
+    """The study [simulate]."""
+    from fembeam import report
+
     model = _reduced(file, **file.reduce)
-    if not arguments.quiet:
+    if not quiet:
         _say(f"{len(model.omega)} modes: " + ", ".join(f"{w:.6g}" for w in model.omega) + " rad/s")
-    run, code = _simulated(model, file.studies["simulate"], not arguments.quiet)
+    run, code = _simulated(model, file.studies["simulate"], not quiet)
     written = report.write(run, folder, file.studies["simulate"].discard, time.perf_counter() - begin)
     if code:
         _say(f"{run.status}; wrote what was computed to {folder}")
-    elif not arguments.quiet:
+    elif not quiet:
         spent = f"{run.cost.seconds:.3g} s of {time.perf_counter() - begin:.3g} s"
         _say(f"{len(run.contacts)} contacts in {run.t[-1]:g} s, integrated in {spent}")
         _say(f"wrote {', '.join(path.name for path in written)} to {folder}")
     return code
+
+
+def _study(file: SceneFile, name: str, study: Any, folder: Path, quiet: bool) -> int:
+    """Any other study: its table on stdout and in files, its figure."""
+    import solvers
+    from fembeam import report
+
+    try:
+        result = study.run(file.scene)
+    except solvers.SolverError as error:
+        _say(f"error: [{name}]: {_one_line(error)}")
+        return FAILED
+    print(result)
+    written = report.write_study(result, folder, name)
+    if not quiet:
+        _say(f"wrote {', '.join(path.name for path in written)} to {folder}")
+    return 0
 
 
 def _reduced(file: SceneFile, **arguments: Any) -> Model:

@@ -57,11 +57,27 @@ def write(run: Run, folder: str | Path, discard: float = 0.0, seconds: float | N
     written = [run.save(folder / "run.npz")]
     written.append(_write_json(folder / "summary.json", summary(run, discard, seconds)))
     for name, draw in figures(run, discard).items():
-        target = folder / f"{name}.png"
-        with written_whole(target) as file:
-            draw().savefig(file, format="png", dpi=150, metadata={"Software": None})  # same run, same bytes
-        written.append(target)
+        written.append(_write_figure(folder / f"{name}.png", draw()))
     return written
+
+
+def write_study(result: Any, folder: str | Path, name: str) -> list[Path]:
+    """Write a study's table as `name.txt` and, if it saves itself, `name.csv`, and its figure as `name.png`."""
+    target = Path(folder) / f"{name}.txt"
+    with written_whole(target) as file:
+        file.write(f"{result}\n".encode())
+    written = [target, _write_figure(Path(folder) / f"{name}.png", result.figure())]
+    if hasattr(result, "save"):
+        written.append(Path(folder) / f"{name}.csv")
+        result.save(written[-1])
+    return written
+
+
+def _write_figure(target: Path, figure: Figure) -> Path:
+    """One PNG; the same figure gives the same bytes."""
+    with written_whole(target) as file:
+        figure.savefig(file, format="png", dpi=150, metadata={"Software": None})
+    return target
 
 
 def figures(run: Run, discard: float = 0.0) -> dict[str, Callable[[], Figure]]:

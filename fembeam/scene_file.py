@@ -1,7 +1,7 @@
 """Scene files: TOML tables in, a Scene and its studies out.
 
     [beam] [[supports]] [[masses]] [[springs]] [[dashpots]] [[stops]] [[forces]] [damping] [base]
-    [reduce] [simulate]
+    [reduce] [simulate] [speed_accuracy]
 
 The keys of a table are the arguments of the constructor behind it, read from its signature, so that nothing is
 declared twice: a constructor that gains an argument gains a key. Units are SI, names those of the library.
@@ -27,6 +27,7 @@ from fembeam.record import Record
 from fembeam.scene import FEATURES, Scene
 from fembeam.schema import Constructors, converted, fits, listed, nearest, parameters, required, shown, wanted
 from fembeam.section import Section, require_non_negative, require_positive
+from fembeam.study.speed_accuracy import SpeedAccuracyTable
 
 Table = Mapping[str, Any]
 
@@ -103,7 +104,7 @@ SOLVERS = {
     "newmark": "Newmark",
     "generalized_alpha": "GeneralizedAlpha",
 }
-STUDIES: Constructors = {"simulate": Simulate}
+STUDIES: Constructors = {"simulate": Simulate, "speed_accuracy": SpeedAccuracyTable}
 
 
 def read(path: str | Path) -> SceneFile:

@@ -14,7 +14,7 @@ _NODES = np.array([0.0, 1 / 64, 1 / 32, 1 / 16, 1 / 8, 1 / 4, 3 / 8, 1 / 2, 5 / 
 UNRESOLVED = -1.0
 NONE = 2.0
 IGNORED, HENON, LANDED = range(3)
-"""What a method does about events: a stop's piece follows at the end of a step; Hénon's step onto an entry; all found."""
+"""What a method does about events: pieces follow at the end of a step; Hénon's step onto an entry; all landed on."""
 
 
 @inner

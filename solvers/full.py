@@ -109,7 +109,7 @@ class MatrixEngine:
         _interpolate(h, self.state, self.space)
 
     def _landed(self, h: float, theta: float, stop: int, level: float) -> float:
-        """Duration of the step that ends on the event, by Newton on the true step; minus the step to try where that fails."""
+        """Duration of the step that ends on the event, by Newton; where that fails, minus the step to try."""
         if theta == UNRESOLVED:
             return -h / 32.0
         if theta >= NONE:
@@ -242,7 +242,7 @@ def _contact_accelerations(engine: MatrixEngine, h: float, solve: Any, kept: flo
     n, state, x_new = engine.system.size, engine.state, engine.space.x_new
     problem, active = engine.problem, np.flatnonzero(state.piece)
     force, total = np.zeros(len(active)), np.zeros(n)
-    reply = [kept * engine.reply(h, s, solve) for s in active]
+    reply = [kept * engine.reply(h, int(s), solve) for s in active]
     for _ in range(_MOST_SWEEPS):
         before = force.copy()
         for i, s in enumerate(active):

@@ -239,7 +239,7 @@ def find(problem, state, space):
 
 @kernel
 def accept(problem, state, space, h, stop, direction, at_end, t_end, log, out, dt):
-    """Record a step that ends on an event of ``stop`` (-1: of none) and go on from its end; a status code or RUNNING."""
+    """Record a step that ends on an event of ``stop`` (-1: of none) and go on from its end; returns a status code."""
     if not np.isfinite(dot(space.x_new, space.x_new, space.x_new.size)):
         return LAW_NOT_FINITE if _law_fails(problem, state, space, h) else DIVERGED
     _sample(state, space, h, out, dt)
@@ -255,7 +255,7 @@ def accept(problem, state, space, h, stop, direction, at_end, t_end, log, out, d
 
 @kernel
 def gains(problem, state, space):
-    """Whether more energy is there, for some steps now, than the ledger accounts for in all; ``watch`` has the stored."""
+    """Whether for some steps there is more energy than the ledger accounts for in all; ``watch`` has the stored."""
     ledger = 2 * problem.k.size
     given = space.watch[1] + abs(state.x[ledger]) + state.x[ledger + 1]
     excess = space.watch[0] - space.watch[1] - state.x[ledger] + state.x[ledger + 1]
@@ -453,8 +453,8 @@ class Engine:
         """What grew, and the step to try."""
         if code not in (Status.GAINED, Status.DIVERGED) or self.method.adaptive:
             return ""
-        size = 2 * self.problem.k.size
-        return explanation(self.method, self.system, *np.split(self.back @ self.state.x[:size], 2), self.duration)
+        q, q_dot = np.split(self.back @ self.state.x[: 2 * self.problem.k.size], 2)
+        return explanation(self.method, self.system, q, q_dot, self.duration)
 
 
 def explanation(method: Any, system: System, q: Array, q_dot: Array, duration: float) -> str:

@@ -121,14 +121,14 @@ def limit(radius: Radius, system: System, indentation: float | None = None, last
 
 
 def oscillators(system: System) -> tuple[Array, Array]:
-    """k and c (j,) of the decoupled modes; of sparse matrices the fastest alone."""
+    """Stiffness k and damping c (j,) of the decoupled modes; of sparse matrices the fastest alone."""
     if system.sparse:
         return _fastest(system.M, system.C, system.K)
     return system.blocks.k, system.blocks.c
 
 
 def tangent_oscillators(system: System, indentation: float | None) -> tuple[Array, Array, float]:
-    """k and c of the modes with every stop's tangent at its expected indentation, and how long a contact lasts."""
+    """Stiffness k and damping c of the modes with every stop's tangent, and how long a contact lasts."""
     C, K, longest = system.C, system.K, 0.0
     for contact in system.contacts:
         stiffness, damping, mass = tangent(system, contact, indentation)
@@ -155,7 +155,7 @@ def tangent_oscillators(system: System, indentation: float | None) -> tuple[Arra
 
 
 def _fastest(M: Any, C: Any, K: Any) -> tuple[Array, Array]:
-    """k and c of the fastest mode of sparse matrices."""
+    """Stiffness k and damping c of the fastest mode of sparse matrices."""
     from scipy.sparse.linalg import eigsh
 
     if M.shape[0] < 3:  # too small for an iteration

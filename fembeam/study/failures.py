@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import contacts
-from solvers.stability import refuse
 from solvers import RK4, Contact, DormandPrince, Exponential, HenonRK2, Newmark, System, integrate
+from solvers.stability import refuse
 
 if TYPE_CHECKING:
     from fembeam.scene import Scene
@@ -86,7 +86,7 @@ def heun_with_more_modes(scene: Scene, modes: int) -> Failure:
 def jumped_contact() -> Failure:
     """A step longer than a contact passes through the stop."""
     law = contacts.Hysteretic.achieving(1e6, restitution=0.3)
-    system = System([[1.0]], [[0.0]], [[400.0]], [Contact([1.0], law, 0.049)])
+    system = System([[1.0]], [[0.0]], [[400.0]], [_stop([1.0], law, 0.049)])
     duration, start = 0.9, ([0.05], [0.0])
     times = np.linspace(0.0, duration, 1000)
     naive = integrate(system, *start, duration, 4.5e-2, _forced(RK4(4.5e-2, locate=False)), check=False)
@@ -112,7 +112,7 @@ def henon_at_grazing() -> Failure:
         before = entry - 5e-3
         found = before + _henon(omega, before, 1.0 - depth)
         naive.append(abs(found - entry) / 5e-3 if np.isfinite(found) else np.inf)
-        stop = Contact([1.0], contacts.Hertz(1.0), 1.0 - depth)
+        stop = _stop([1.0], contacts.Hertz(1.0), 1.0 - depth)
         log = integrate(System.modal([omega], 0.0, [stop]), [1.0], [0.0], np.pi / omega, method=BEST).contacts
         ours.append(abs(log.t_in[0] - entry) / 5e-3)
     shown = np.isfinite(naive)
@@ -127,6 +127,11 @@ def henon_at_grazing() -> Failure:
     )
 
 
+def _stop(direction: Any, law: Any, gap: float = 0.0) -> Contact:
+    """A contact."""
+    return Contact(np.array(direction), law, gap)
+
+
 def _henon(omega: float, t: float, gap: float) -> float:
     """Duration of one unguarded Hénon–Heun step of u = cos ωt onto δ = -u - gap = 0."""
     u, v = np.cos(omega * t), -omega * np.sin(omega * t)
@@ -138,7 +143,7 @@ def _henon(omega: float, t: float, gap: float) -> float:
 def two_entries_in_a_step() -> Failure:
     """A quick ripple dips twice into the stop within one step, whose ends see nothing."""
     omega, ripple = 10.0, 800.0
-    system = System.modal([omega, ripple], 0.0, [Contact([1.0, 1.0], contacts.Hertz(1e4), 1.0055)])
+    system = System.modal([omega, ripple], 0.0, [_stop([1.0, 1.0], contacts.Hertz(1e4), 1.0055)])
     bottom, dt = np.pi / omega, 4.05 * np.pi / ripple
     start, duration = ([1.0, 0.01], [0.0, 0.0]), bottom + dt
     naive = integrate(system, *start, duration, dt, _forced(Newmark(dt, locate=False)))
@@ -158,7 +163,7 @@ def two_entries_in_a_step() -> Failure:
 def chatter() -> Failure:
     """A ball that comes to rest in ever shorter bounces, all inside a few steps in the end."""
     law = contacts.Hysteretic.achieving(1e8, restitution=0.6)
-    system = System([[1.0]], [[0.0]], [[0.0]], [Contact([1.0], law)], [([-9.81], np.ones_like)])
+    system = System([[1.0]], [[0.0]], [[0.0]], [_stop([1.0], law)], [([-9.81], np.ones_like)])
     start, duration = ([0.05], [0.0]), 1.0
     naive = integrate(system, *start, duration, 1e-3, _forced(RK4(3e-3, locate=False)), check=False)
     best = integrate(system, *start, duration, 1e-3, Exponential(1e-10))
@@ -177,7 +182,7 @@ def chatter() -> Failure:
 
 def newmark_gains_energy() -> Failure:
     """The trapezoidal rule keeps the energy of a linear structure, but not through a stop."""
-    system = System.modal([10.0], 0.0, [Contact([1.0], contacts.PiecewiseLinear([1e7]))])
+    system = System.modal([10.0], 0.0, [_stop([1.0], contacts.PiecewiseLinear([1e7]))])
     start, duration, dt = ([1.0], [0.0]), 1.5, 1e-3
     naive = integrate(system, *start, duration, dt, _forced(Newmark(dt, locate=False)), check=False)
     best = integrate(system, *start, duration, dt, BEST)
@@ -224,7 +229,7 @@ def preloaded_contact() -> Failure:
     law, depth = contacts.Hertz(1e8), 1e-3
     w = np.array([1.0, 0.7])
     rest = w * float(law.force(depth, 0.0, 1.0)) / np.array([20.0, 150.0]) ** 2
-    system = System.modal([20.0, 150.0], 0.02, [Contact(w, law, float(-w @ rest - depth))])
+    system = System.modal([20.0, 150.0], 0.02, [_stop(w, law, float(-w @ rest - depth))])
     dt = 2.0 * HenonRK2(1.0, 1.0).stable_dt(system, depth).contact
     start, duration = (rest + 1e-6, np.zeros(2)), 3000 * dt
     naive = integrate(system, *start, duration, dt, _forced(HenonRK2(dt, dt)), check=False)
@@ -245,7 +250,7 @@ def singular_latch() -> Failure:
     """F = K δ^1.5 (1 + a δ̇/entry_rate) is singular where the entry rate goes to zero, as at grazing under load."""
     speeds = np.geomspace(1e-9, 1e-1, 25)
     law = contacts.Hysteretic(1e8, 0.5)
-    pressed = System([[1.0]], [[0.0]], [[0.0]], [Contact([1.0], law)], [([-1.0], np.ones_like)])
+    pressed = System([[1.0]], [[0.0]], [[0.0]], [_stop([1.0], law)], [([-1.0], np.ones_like)])
     peaks: dict[str, list[float]] = {"naive": [], "ours": []}
     for speed in speeds:
         for name, floor in (("naive", 1e-15), ("ours", law.entry_rate_floor)):

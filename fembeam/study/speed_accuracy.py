@@ -9,6 +9,7 @@ import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,13 +20,16 @@ from fembeam.run import Run, written_whole
 from fembeam.section import require, require_positive
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from fembeam.model import Model
+    from fembeam.scene import Scene
 
 Vector = NDArray[np.float64]
 PATIENCE = 10.0  # s one setting may take per model; slower ones run fewer starts and rounds, and say so
 
 
-class NoReferenceError(RuntimeError):
+class NoReferenceError(solvers.SolverError):
     """The reference methods do not agree, so no error can be stated."""
 
 
@@ -132,6 +136,12 @@ class SpeedAccuracy:
                   for n in self.reduction]  # fmt: skip
         return "\n".join(lines)
 
+    def figure(self) -> Figure:
+        """``fb.plot.speed_accuracy`` of it."""
+        from fembeam.plot.chart import speed_accuracy
+
+        return speed_accuracy(self)
+
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the table as CSV, whole or not at all."""
         from pathlib import Path
@@ -145,7 +155,7 @@ class SpeedAccuracy:
 
 
 def end_displacement(run: Run) -> Vector:
-    """u at the first stop, or at the far end, at the end of the run: the default quantity."""
+    """The displacement u at the first stop, or at the far end, at the end of the run: the default quantity."""
     return np.asarray(run.displacement(run.stops[0][0] if len(run.stops) else run.shapes.nodes[-1])[-1])
 
 
@@ -206,6 +216,44 @@ def speed_accuracy(
 
 
 @dataclass(frozen=True)
+class SpeedAccuracyTable:
+    """The table [speed_accuracy] of a scene file: `Exponential`, `DormandPrince` and RK4 on some mode counts.
+
+    Parameters
+    ----------
+    modes : mode counts. rtols : relative tolerances of the first two, in [1e-11, 1e-2]. steps : of `RK4`, s.
+    starts, duration, rounds : see `speed_accuracy`.
+    """
+
+    modes: Sequence[int] = (1, 2, 3)
+    rtols: Sequence[float] = (1e-4, 1e-6, 1e-8, 1e-10)
+    steps: Sequence[float] = (5e-5, 1e-5)
+    starts: int = 6
+    duration: float | None = None
+    rounds: int = 3
+
+    def __post_init__(self) -> None:
+        where = "speed_accuracy"
+        counts = bool(self.modes) and min(self.modes) >= 1
+        require(counts, "modes must be counts of at least 1", list(self.modes), where, "e.g. [1, 2, 5]")
+        valid = bool(self.rtols) and 1e-11 <= min(self.rtols) <= max(self.rtols) <= 1e-2
+        require(valid, "rtols must lie in [1e-11, 1e-2]", list(self.rtols), where, "e.g. [1e-4, 1e-8]")
+        require(self.starts >= 1, "starts must be at least 1", self.starts, where, "e.g. 6")
+        require(self.rounds >= 1, "rounds must be at least 1", self.rounds, where, "e.g. 3")
+        for step in self.steps:
+            require_positive("steps", step, where, "give s")
+        if self.duration is not None:
+            require_positive("duration", self.duration, where, "give s")
+
+    def run(self, scene: Scene) -> SpeedAccuracy:
+        """The study."""
+        methods: list[Any] = [solvers.Exponential(rtol) for rtol in self.rtols]
+        methods += [solvers.DormandPrince(rtol) for rtol in self.rtols] + [solvers.RK4(step) for step in self.steps]
+        models = [scene.reduce(modes=n) for n in sorted(set(self.modes))]
+        return speed_accuracy(models, methods, self.starts, self.duration, rounds=self.rounds, progress=True)
+
+
+@dataclass(frozen=True)
 class _Question:
     """What every run is asked for."""
 
@@ -253,11 +301,19 @@ class _Trial:
         """The result."""
         kept = [] if self.failure else sorted(self.values)
         found = [self.values[i] for i in kept]
+        law_calls, steps = (
+            _median(np.array([getattr(cost, name) for cost in self.costs], dtype=float))
+            for name in ("law_calls", "steps")
+        )
         return Point(
-            *(method_name(self.method), _setting(self.method), len(self.model.omega)),
+            method_name(self.method),
+            _setting(self.method),
+            len(self.model.omega),
             np.array([self.seconds[i] for i in kept]),
-            *(_distances(found, [truth[i] for i in kept], unit) for truth in (own, largest)),
-            *(_median(np.array([getattr(c, name) for c in self.costs], float)) for name in ("law_calls", "steps")),
+            _distances(found, [own[i] for i in kept], unit),
+            _distances(found, [largest[i] for i in kept], unit),
+            law_calls,
+            steps,
             self.failure,
         )
 
@@ -271,8 +327,8 @@ def _check(models: list[Model], methods: list[Any], rounds: int) -> None:
     for method in methods:
         if not hasattr(method, "engine") or isinstance(method, type):
             raise TypeError(f"methods must be given with their settings, such as solvers.RK4(1e-5), got {method!r}")
-    for small, large in zip(models, models[1:], strict=False):
-        nested = np.allclose(small.omega, large.omega[: len(small.omega)], rtol=1e-4)
+    for small, large in pairwise(models):
+        nested = bool(np.allclose(small.omega, large.omega[: len(small.omega)], rtol=1e-4))
         require(nested, "models must be nested: each with the first modes of the next", [len(m.omega) for m in models],
                 where, "reduce one scene to 1, 2, 5, ... modes")  # fmt: skip
 
@@ -280,7 +336,7 @@ def _check(models: list[Model], methods: list[Any], rounds: int) -> None:
 def _starts(model: Model, starts: Any, duration: float) -> Vector:
     """States (s, 2n) of the smallest model."""
     if isinstance(starts, (int, np.integer)):
-        require(starts >= 1, "starts must be at least 1", starts, "speed_accuracy", "e.g. 12")
+        require(bool(starts >= 1), "starts must be at least 1", starts, "speed_accuracy", "e.g. 12")
         spacing = duration * 0.618  # no multiple of a drive period
         run = model.simulate((starts + 3) * spacing, spacing, solver=solvers.Exponential(1e-8, ledger=False))
         return np.hstack((run.q, run.q_dot))[3 : 3 + starts]
@@ -305,7 +361,7 @@ def _references(models: list[Model], states: Vector, ask: _Question, agreement: 
         pairs[len(model.omega)] = [[ask.value(ask.run(model, state, m)) for state in states] for m in two]
     sizes = [np.linalg.norm(value) for value in pairs[len(models[-1].omega)][0]]
     unit = float(np.sqrt(np.mean(np.square(sizes)))) or 1.0
-    floor = {n: float(_distances(*pair, unit).max()) for n, pair in pairs.items()}
+    floor = {n: float(_distances(pair[0], pair[1], unit).max()) for n, pair in pairs.items()}
     for n, distance in floor.items():
         if not distance <= agreement:
             raise NoReferenceError(

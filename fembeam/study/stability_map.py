@@ -107,11 +107,16 @@ def stability_map(
     models, axis, rows = _models(scene, modes, stiffness)
     cells = [[_cell(model, method, dt, duration, tolerance, start) for dt in steps] for model in models]
     limits = [_limits(model, method, steps, duration) for model in models]
+    flight, contact = np.array(limits).T
     return StabilityMap(
-        *(method_name(method(float(steps[0]))), steps, axis, np.array(rows, dtype=float)),
+        method_name(method(float(steps[0]))),
+        steps,
+        axis,
+        np.array(rows, dtype=float),
         np.array([[int(verdict) for verdict, _ in line] for line in cells]),
         np.array([[error for _, error in line] for line in cells]),
-        *(np.array([limit[i] for limit in limits]) for i in range(2)),
+        flight,
+        contact,
         tolerance,
     )
 
