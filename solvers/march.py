@@ -458,11 +458,16 @@ class Engine:
 
 
 def explanation(method: Any, system: System, q: Array, q_dot: Array, duration: float) -> str:
-    """The coordinate that holds most kinetic energy, and the predicted limits."""
-    share = np.nan_to_num(np.abs(q_dot * (system.M @ q_dot)), nan=math.inf, posinf=math.inf)
-    worst = int(np.argmax(share))
+    """The coordinate that grew, and the predicted limits."""
+    modal = not system.sparse and not np.any(system.M - np.eye(system.size))
+    share = np.abs(q_dot * (system.M @ q_dot))
+    if modal:  # among the modes that a step amplifies, if any
+        k, c = np.diag(system.K), np.diag(system.C)
+        grows = [max(method.radius(h, *pair) for h in method.steps) > 1.0 + 1e-9 for pair in zip(k, c, strict=True)]
+        share = np.where(grows, share + k * q**2, 0.0) if any(grows) else share + k * q**2
+    worst = int(np.argmax(np.nan_to_num(share, nan=math.inf, posinf=math.inf)))
     where = f"coordinate {worst} of {system.size}"
-    if not system.sparse and not np.any(system.M - np.eye(system.size)):
+    if modal:
         where = f"mode {worst + 1} of {system.size} (ω = {math.sqrt(abs(system.K[worst, worst])):.6g} rad/s)"
     limit = method.stable_dt(system, duration=duration)
     step = min(min(limit.flight, method.steps[0]), min(limit.contact, method.steps[1]), min(method.steps))

@@ -33,7 +33,7 @@ def speed_accuracy(result: SpeedAccuracy) -> Figure:
     from matplotlib.figure import Figure
 
     sizes = sorted(result.reduction)
-    panels = 2 if len(sizes) > 1 else 1
+    panels = 2 if max(result.reduction.values()) > 0.0 else 1
     figure = Figure(figsize=(5.2 * panels + 2.1, 4.8), layout="constrained")
     axes = np.atleast_1d(figure.subplots(1, panels, sharey=True))
     methods = list(dict.fromkeys(point.method for point in result.points))
@@ -52,10 +52,10 @@ def speed_accuracy(result: SpeedAccuracy) -> Figure:
         ax.set(xscale="log", yscale="log")
         ax.invert_xaxis()
         ax.grid(alpha=0.25, lw=0.5)
-    axes[0].set(xlabel=f"error of integration: {result.quantity}, relative", ylabel="time of a run / ms")
+    axes[0].set(xlabel=f"error of integration: {result.quantity}", ylabel="time of a run / ms")
     axes[0].set_title(f"Integration alone; thick: the front of each model{_claim(result, methods)}")
     if panels == 2:
-        axes[1].set(xlabel=f"error against {sizes[-1]} modes: {result.quantity}, relative")
+        axes[1].set(xlabel=f"error against {sizes[-1]} modes: {result.quantity}")
         axes[1].set_title("Integration and reduction; dashed: exact solution with so few modes")
     _legends(figure, sizes, methods)
     return figure

@@ -212,7 +212,7 @@ def speed_accuracy(
     reduction = {n: _median(_distances(truths[n], truths[sizes[-1]], unit)) for n in sizes}
     points = [trial.point(truths[len(trial.model.omega)], truths[sizes[-1]], unit) for trial in trials]
     name = getattr(quantity, "__name__", None) or repr(quantity)
-    return SpeedAccuracy(points, unit, floor, reduction, name.replace("_", " "))
+    return SpeedAccuracy(points, unit, floor, reduction, name.replace("_", " ") + ", relative")
 
 
 @dataclass(frozen=True)
