@@ -3,8 +3,7 @@
     q_i'' + 2 ζ_i ω_i q_i' + ω_i² q_i = -Γ_i y'' + φ_i(z_s) F,    δ = -u(z_s),    F = K δ^1.5 (1 + a δ'/δ'_entry)
 
 The paper's scheme (Heun, contact with a fifth of the flight step) allows about (8ζ)^(1/3)/ω of the fastest mode, RK4
-2.83/ω. Newmark's trapezoidal rule has no limit on a linear structure, but where it ignores events it misses contacts
-and gains energy at the stop.
+2.83/ω. Newmark's trapezoidal rule is stable at every step here, but wrong, or misses contacts.
 
     python examples/stability_map.py        prints the maps and writes stability_map.png
 """
@@ -31,12 +30,8 @@ def heun(dt: float) -> solvers.HenonRK2:
     return solvers.HenonRK2(dt, dt / 5)
 
 
-def blind_newmark(dt: float) -> solvers.Newmark:
-    return solvers.Newmark(dt, locate=False)
-
-
 steps, unstable = np.geomspace(2e-5, 2e-3, 14), fb.study.Verdict.UNSTABLE
-maps = [fb.study.stability_map(scene, method, steps, duration=0.1) for method in (heun, solvers.RK4, blind_newmark)]
+maps = [fb.study.stability_map(scene, method, steps, duration=0.1) for method in (heun, solvers.RK4, solvers.Newmark)]
 stiffness = np.geomspace(1e6, 1e10, 5)
 maps.append(fb.study.stability_map(scene, solvers.RK4, steps, modes=2, stiffness=stiffness, duration=0.1))
 
@@ -47,7 +42,7 @@ for found in maps[:2]:
     five, ten = (line[steps > 1.5 * flight] for line, flight in zip(found.verdict[3:], found.flight[3:], strict=True))
     assert np.all(five == unstable), f"{found.method}: stable with 5 modes above the predicted limit"
     assert np.all(ten == unstable), f"{found.method}: stable with 10 modes above the predicted limit"
-assert np.all(np.isinf(maps[2].flight)), "Newmark's trapezoidal rule has no limit on a linear structure"
+assert not np.any(maps[2].verdict == unstable), "Newmark's trapezoidal rule became unstable"
 assert np.any(maps[2].verdict == fb.study.Verdict.MISSED), "no contact was missed"
 
 if __name__ == "__main__":

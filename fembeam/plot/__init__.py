@@ -1,7 +1,7 @@
 """Figures: one function per question, each returns a matplotlib figure. `response` holds those of one run."""
 
-from fembeam.plot.orbits import branch, orbit, peak
 from fembeam.plot.chart import failures, speed_accuracy, stability_map
+from fembeam.plot.orbits import branch, orbit, peak
 from fembeam.plot.response import (
     contacts,
     densities,

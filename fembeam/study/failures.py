@@ -12,15 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 import contacts
-from solvers import RK4, Contact, DormandPrince, Exponential, HenonRK2, Newmark, System, integrate
-from solvers.stability import refuse
+import solvers
+from solvers import Contact, System
 
 if TYPE_CHECKING:
     from fembeam.scene import Scene
 
 Vector = NDArray[np.float64]
 Curve = tuple[Vector, Vector]
-BEST = Exponential(1e-11, ledger=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,10 +63,10 @@ def gallery(scene: Scene) -> list[Failure]:
 def heun_with_more_modes(scene: Scene, modes: int) -> Failure:
     """Steps good for two modes blow up with more: Heun is limited by (8ζ)^⅓/ω of the fastest."""
     model, duration = scene.reduce(modes=modes), 0.1
-    dt = 0.5 * HenonRK2(1.0, 1.0).stable_dt(scene.reduce(modes=2).system).flight
-    method = HenonRK2(dt, dt / 4)
-    run = integrate(*_at_rest(model.system), duration, dt, _forced(method), check=False)
-    best = integrate(*_at_rest(model.system), duration, dt, BEST)
+    dt = 0.5 * solvers.HenonRK2(1.0, 1.0).stable_dt(scene.reduce(modes=2).system).flight
+    method = solvers.HenonRK2(dt, dt / 4)
+    run = solvers.integrate(*_at_rest(model.system), duration, dt, _forced(method), check=False)
+    best = solvers.integrate(*_at_rest(model.system), duration, dt, _best())
     tip = model.phi(scene.stops[0].z)
     shown = np.abs(run.q @ tip) < 0.02
     return Failure(
@@ -89,10 +88,10 @@ def jumped_contact() -> Failure:
     system = System([[1.0]], [[0.0]], [[400.0]], [_stop([1.0], law, 0.049)])
     duration, start = 0.9, ([0.05], [0.0])
     times = np.linspace(0.0, duration, 1000)
-    naive = integrate(system, *start, duration, 4.5e-2, _forced(RK4(4.5e-2, locate=False)), check=False)
-    best = integrate(system, *start, duration, times[1], BEST)
-    end = float(integrate(system, *start, duration, method=BEST).q[-1, 0])
-    refused = _refusal(system, RK4(4.5e-2), duration)
+    naive = solvers.integrate(system, *start, duration, 4.5e-2, _forced(solvers.RK4(4.5e-2, locate=False)), check=False)
+    best = solvers.integrate(system, *start, duration, times[1], _best())
+    end = float(solvers.integrate(system, *start, duration, method=_best()).q[-1, 0])
+    refused = _refusal(system, solvers.RK4(4.5e-2), duration)
     return Failure(
         "A step over a whole contact",
         *("time / ms", "displacement / mm"),
@@ -113,7 +112,9 @@ def henon_at_grazing() -> Failure:
         found = before + _henon(omega, before, 1.0 - depth)
         naive.append(abs(found - entry) / 5e-3 if np.isfinite(found) else np.inf)
         stop = _stop([1.0], contacts.Hertz(1.0), 1.0 - depth)
-        log = integrate(System.modal([omega], 0.0, [stop]), [1.0], [0.0], np.pi / omega, method=BEST).contacts
+        log = solvers.integrate(
+            System.modal([omega], 0.0, [stop]), [1.0], [0.0], np.pi / omega, method=_best()
+        ).contacts
         ours.append(abs(log.t_in[0] - entry) / 5e-3)
     shown = np.isfinite(naive)
     return Failure(
@@ -146,8 +147,8 @@ def two_entries_in_a_step() -> Failure:
     system = System.modal([omega, ripple], 0.0, [_stop([1.0, 1.0], contacts.Hertz(1e4), 1.0055)])
     bottom, dt = np.pi / omega, 4.05 * np.pi / ripple
     start, duration = ([1.0, 0.01], [0.0, 0.0]), bottom + dt
-    naive = integrate(system, *start, duration, dt, _forced(Newmark(dt, locate=False)))
-    best = integrate(system, *start, duration, 1e-5, BEST)
+    naive = solvers.integrate(system, *start, duration, dt, _forced(solvers.Newmark(dt, locate=False)))
+    best = solvers.integrate(system, *start, duration, 1e-5, _best())
     late = best.t > bottom - 2 * dt
     seen = naive.t > bottom - 2 * dt
     return Failure(
@@ -165,8 +166,8 @@ def chatter() -> Failure:
     law = contacts.Hysteretic.achieving(1e8, restitution=0.6)
     system = System([[1.0]], [[0.0]], [[0.0]], [_stop([1.0], law)], [([-9.81], np.ones_like)])
     start, duration = ([0.05], [0.0]), 1.0
-    naive = integrate(system, *start, duration, 1e-3, _forced(RK4(3e-3, locate=False)), check=False)
-    best = integrate(system, *start, duration, 1e-3, Exponential(1e-10))
+    naive = solvers.integrate(system, *start, duration, 1e-3, _forced(solvers.RK4(3e-3, locate=False)), check=False)
+    best = solvers.integrate(system, *start, duration, 1e-3, solvers.Exponential(1e-10))
     late = naive.t > 0.7
     highest = float(np.abs(naive.q[late, 0]).max(initial=0.0)) if late.any() else np.inf
     last = f"stopped at {naive.t[-1]:.2g} s" if not naive.status.good else f"still {1e3 * highest:.2g} mm high"
@@ -184,8 +185,8 @@ def newmark_gains_energy() -> Failure:
     """The trapezoidal rule keeps the energy of a linear structure, but not through a stop."""
     system = System.modal([10.0], 0.0, [_stop([1.0], contacts.PiecewiseLinear([1e7]))])
     start, duration, dt = ([1.0], [0.0]), 1.5, 1e-3
-    naive = integrate(system, *start, duration, dt, _forced(Newmark(dt, locate=False)), check=False)
-    best = integrate(system, *start, duration, dt, BEST)
+    naive = solvers.integrate(system, *start, duration, dt, _forced(solvers.Newmark(dt, locate=False)), check=False)
+    best = solvers.integrate(system, *start, duration, dt, _best())
     flight, swing = naive.q[:, 0] > 0.0, best.q[:, 0] > 0.0
     return Failure(
         "Newmark at an elastic stop",
@@ -205,11 +206,11 @@ def newmark_gains_energy() -> Failure:
 def aliased_high_modes(scene: Scene) -> Failure:
     """A step that does not resolve the tenth mode is stable by Newmark's rule, but the mode rings at a wrong pitch."""
     model, dt = scene.reduce(modes=10), 1e-4
-    first = integrate(*_at_rest(model.system), 0.1, method=BEST).contacts.t_in[0]
+    first = solvers.integrate(*_at_rest(model.system), 0.1, method=_best()).contacts.t_in[0]
     duration = float(first) + 2e-3
     shown = {}
-    for name, method in (("naive", Newmark(dt)), ("ours", BEST)):
-        run = integrate(*_at_rest(model.system), duration, 2e-6, method)
+    for name, method in (("naive", solvers.Newmark(dt)), ("ours", _best())):
+        run = solvers.integrate(*_at_rest(model.system), duration, 2e-6, method)
         kept = run.t > first - 2e-4
         shown[name] = run.t[kept], run.q_dot[kept, -1]
     naive, best = shown["naive"], shown["ours"]
@@ -230,10 +231,10 @@ def preloaded_contact() -> Failure:
     w = np.array([1.0, 0.7])
     rest = w * float(law.force(depth, 0.0, 1.0)) / np.array([20.0, 150.0]) ** 2
     system = System.modal([20.0, 150.0], 0.02, [_stop(w, law, float(-w @ rest - depth))])
-    dt = 2.0 * HenonRK2(1.0, 1.0).stable_dt(system, depth).contact
+    dt = 2.0 * solvers.HenonRK2(1.0, 1.0).stable_dt(system, depth).contact
     start, duration = (rest + 1e-6, np.zeros(2)), 3000 * dt
-    naive = integrate(system, *start, duration, dt, _forced(HenonRK2(dt, dt)), check=False)
-    best = integrate(system, *start, duration, dt, BEST)
+    naive = solvers.integrate(system, *start, duration, dt, _forced(solvers.HenonRK2(dt, dt)), check=False)
+    best = solvers.integrate(system, *start, duration, dt, _best())
     away, near = (1e6 * np.abs(run.q @ w - rest @ w) for run in (naive, best))
     return Failure(
         "Preloaded, permanent contact",
@@ -272,9 +273,17 @@ def _dashpot(law: Any, speed: float) -> float:
     return float(force[1] - force[0]) / 1e-3
 
 
+def _best() -> Any:
+    """The method that gives what is right."""
+    return solvers.Exponential(1e-11, ledger=False)
+
+
 def _disagreement(system: System, q: Any, q_dot: Any, duration: float) -> float:
     """Of the library's default method and the independent `DormandPrince`, at the end of a run."""
-    one, two = (integrate(system, q, q_dot, duration, method=method).q[-1] for method in (None, DormandPrince(1e-11)))
+    one, two = (
+        solvers.integrate(system, q, q_dot, duration, method=method).q[-1]
+        for method in (None, solvers.DormandPrince(1e-11))
+    )
     return float(np.abs(one - two).max() / np.abs(two).max())
 
 
@@ -292,6 +301,8 @@ def _forced(method: Any) -> Any:
 
 def _refusal(system: System, method: Any, duration: float) -> str:
     """What the library says to such a step, shortened; empty if nothing."""
+    from solvers.stability import refuse  # here: it loads numba
+
     try:
         refuse(method, system, duration)
     except ValueError as error:
