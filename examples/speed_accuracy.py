@@ -33,7 +33,7 @@ methods = [
     *(RK4(dt, locate=False) for dt in steps),
 ]
 models = [scene.reduce(modes=n) for n in (1, 2, 3, 5, 10)]
-found = fb.study.speed_accuracy(models, methods, starts=4, duration=6 * math.pi / omega, rounds=1)
+found = fb.study.speed_accuracy(models, methods, starts=4, duration=6 * math.pi / omega, rounds=5)
 
 assert max(found.floor.values()) < 1e-7, "the two references do not agree"
 assert not found.beaten("Exponential", better_than=1e-4), "another method is on the front below 1e-4"

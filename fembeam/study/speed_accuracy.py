@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from fembeam.scene import Scene
 
 Vector = NDArray[np.float64]
-PATIENCE = 10.0  # s one setting may take per model; slower ones run fewer starts and rounds, and say so
+PATIENCE, MORE_PATIENCE = 20.0, 0.2  # s one setting may take per model for its first round, and for further ones
 
 
 class NoReferenceError(solvers.SolverError):
@@ -186,7 +186,7 @@ def speed_accuracy(
     quantity : of a run: a trajectory's end (default), an orbit's amplitude, the impact rate, a spectrum.
     agreement : largest difference of the two references, relative to the quantity's size; for statistics on long
         horizons, where runs differ, as much as their scatter.
-    rounds : how often each run is timed; the fastest counts.
+    rounds : how often each run is timed; the fastest counts. Slow settings run fewer, very slow ones fewer starts.
     progress : show a bar (only on a terminal).
 
     Returns
@@ -382,7 +382,7 @@ def _measure(trials: list[_Trial], states: Vector, ask: _Question, rounds: int, 
     for turn in tqdm(range(rounds), disable=None if progress else True):
         for trial in trials:
             for start, state in enumerate(states):
-                patient = trial.spent * (turn * len(states) + start + 1) / max(turn * len(states) + start, 1) < PATIENCE
+                patient = trial.spent < (MORE_PATIENCE if turn else PATIENCE)
                 if not trial.failure and (patient or (not turn and not start)):
                     trial.measure(start, state, ask)
 
