@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from fembeam.study.speed_accuracy import Point, SpeedAccuracy
     from fembeam.study.stability_map import StabilityMap
 
-MARKERS = "osD^v<>PX*hpd8"
+MARKERS = "osD^v<>PX*hpd8H1234"
 _SMALLEST = 1e-16
 
 
