@@ -61,11 +61,15 @@ def write(run: Run, folder: str | Path, discard: float = 0.0, seconds: float | N
 
 
 def write_study(result: Any, folder: str | Path, name: str) -> list[Path]:
-    """Write a study's table as `name.txt` and its figure as `name.png`; OSError when the folder cannot be written."""
+    """Write a study's table as `name.txt` and, if it saves itself, `name.csv`, and its figure as `name.png`."""
     target = Path(folder) / f"{name}.txt"
     with written_whole(target) as file:
         file.write(f"{result}\n".encode())
-    return [target, _write_figure(Path(folder) / f"{name}.png", result.figure())]
+    written = [target, _write_figure(Path(folder) / f"{name}.png", result.figure())]
+    if hasattr(result, "save"):
+        written.append(Path(folder) / f"{name}.csv")
+        result.save(written[-1])
+    return written
 
 
 def _write_figure(target: Path, figure: Figure) -> Path:

@@ -3,6 +3,7 @@
     [beam] [[supports]] [[masses]] [[springs]] [[dashpots]] [[stops]] [[forces]] [[impactors]] [damping] [base]
     gravity = 9.81
     [reduce] [simulate] [mode_count] [smallest_model] [ensemble]
+    [speed_accuracy]
 
 The keys of a table are the arguments of the constructor behind it, read from its signature, so that nothing is
 declared twice: a constructor that gains an argument gains a key. Units are SI, names those of the library.
@@ -30,6 +31,7 @@ from fembeam.schema import Constructors, converted, fits, listed, nearest, param
 from fembeam.section import Section, Taper, require_non_negative, require_positive
 from fembeam.study.ensemble_table import EnsembleTable
 from fembeam.study.quantities import QUANTITIES
+from fembeam.study.speed_accuracy import SpeedAccuracyTable
 from fembeam.study.tables import ModeCountTable, SmallestModelTable
 from fembeam.transient import Pulse, Step
 
@@ -110,12 +112,21 @@ SIGNALS: Constructors = {
     "pulse": Pulse,
     "step": Step,
 }
-SOLVERS = {"exponential": "Exponential", "dormand_prince": "DormandPrince", "henon_rk2": "HenonRK2"}
+SOLVERS = {
+    "exponential": "Exponential",
+    "dormand_prince": "DormandPrince",
+    "henon_rk2": "HenonRK2",
+    "rk4": "RK4",
+    "central_difference": "CentralDifference",
+    "newmark": "Newmark",
+    "generalized_alpha": "GeneralizedAlpha",
+}
 STUDIES: Constructors = {
     "simulate": Simulate,
     "ensemble": EnsembleTable,
     "mode_count": ModeCountTable,
     "smallest_model": SmallestModelTable,
+    "speed_accuracy": SpeedAccuracyTable,
 }
 
 

@@ -15,6 +15,7 @@ from typing import Any, ClassVar
 import numpy as np
 from scipy.integrate import DOP853
 
+from solvers.events import LANDED
 from solvers.forcing import Forcing
 from solvers.kernels import copy, inner, kernel, rhs
 from solvers.system import Array, System
@@ -120,10 +121,9 @@ class DormandPrince:
     atol: float = 1e-14
 
     adaptive: ClassVar[bool] = True
-    locates_exit: ClassVar[bool] = True
+    events: ClassVar[int] = LANDED
     work_rows: ClassVar[int] = EXTENDED + 2
-    dt_flight: ClassVar[float] = math.inf
-    dt_contact: ClassVar[float] = math.inf
+    constants: ClassVar[tuple[float, ...]] = ()
 
     def __post_init__(self) -> None:
         if not 1e-14 <= self.rtol <= 1e-2:

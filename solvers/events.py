@@ -13,6 +13,8 @@ from solvers.state import surface_tolerance
 _NODES = np.array([0.0, 1 / 64, 1 / 32, 1 / 16, 1 / 8, 1 / 4, 3 / 8, 1 / 2, 5 / 8, 3 / 4, 7 / 8, 1.0])
 UNRESOLVED = -1.0
 NONE = 2.0
+IGNORED, HENON, LANDED = range(3)
+"""What a method does about events: pieces follow at the end of a step; Hénon's step onto an entry; all landed on."""
 
 
 @inner

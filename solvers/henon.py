@@ -20,9 +20,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from solvers.forcing import Forcing
+from solvers.events import HENON
 from solvers.kernels import dot, inner, kernel, rhs
-from solvers.system import Array, System
+from solvers.stability import ConstantStep, Radius, taylor_radius
+from solvers.system import require_step
 
 
 @inner
@@ -74,13 +75,14 @@ def land(problem, t, h, x, rate, piece, entry_rate, stop, level, x_new, work):
 
 
 @dataclass(frozen=True)
-class HenonRK2:
+class HenonRK2(ConstantStep):
     """Heun's second-order method with two constant steps and Hénon's landing: the paper's scheme.
 
     Parameters
     ----------
     dt_flight : step without contact, s.
     dt_contact : step while any stop is in contact, s.
+    force_unstable : run even where a step is predicted to be unstable.
 
     Notes
     -----
@@ -91,32 +93,38 @@ class HenonRK2:
 
     Examples
     --------
-    >>> HenonRK2(dt_flight=1e-5, dt_contact=1e-6).adaptive
-    False
+    >>> from solvers import System
+    >>> round(HenonRK2(dt_flight=1e-5, dt_contact=1e-6).stable_dt(System.modal([100.0], 0.001)).flight, 5)
+    0.002
     """
 
     dt_flight: float
     dt_contact: float
+    force_unstable: bool = False
 
-    adaptive: ClassVar[bool] = False
-    locates_exit: ClassVar[bool] = False
     rtol: ClassVar[float] = 1e-8
-    atol: ClassVar[float] = 0.0
     work_rows: ClassVar[int] = 3
 
     def __post_init__(self) -> None:
         for name in ("dt_flight", "dt_contact"):
-            value = getattr(self, name)
-            if not (0.0 < value < float("inf")):
-                raise ValueError(f"{name} must be positive and finite (s), got {value!r}")
+            require_step(name, getattr(self, name))
+
+    @property
+    def events(self) -> int:
+        """Hénon's step onto entries."""
+        return HENON
+
+    @property
+    def steps(self) -> tuple[float, float]:
+        """Flight and contact."""
+        return self.dt_flight, self.dt_contact
+
+    @property
+    def radius(self) -> Radius:
+        """|1 + z + z²/2|, z = hλ."""
+        return taylor_radius(2)
 
     @property
     def step(self) -> Any:
         """The compiled step."""
         return step
-
-    def engine(self, system: System, z: Array, forcing: Forcing, duration: float) -> Any:
-        """The method made ready for one run."""
-        from solvers.march import Engine  # here: the loop knows this module
-
-        return Engine(self, system, z, forcing, duration)

@@ -44,7 +44,8 @@ def integrate(
     q0, q_dot0 : (n,) initial coordinates and rates; not changed.
     duration : s, > 0.
     dt : output sampling, s; None keeps the final state and the contact log only.
-    method : `Exponential`, `DormandPrince` or `HenonRK2`; None takes ``Exponential(rtol=1e-8)``.
+    method : `Exponential`, `DormandPrince`, `HenonRK2`, `RK4`, `CentralDifference`, `Newmark` or `GeneralizedAlpha`;
+        None takes ``Exponential(rtol=1e-8)``.
     tangent : True adds the derivative of the final [q, q̇] with respect to [q0, q_dot0], (2n, 2n), to the solution; a
         `Parameter` adds one more column, with respect to that parameter at fixed duration. `Exponential` only.
     progress : called with the simulated time now and then.
@@ -78,7 +79,9 @@ def integrate(
         column = (ends[1] - ends[0]) / (2.0 * tangent.step)
         solution = replace(solution, tangent=np.column_stack((run.tangent.matrix(), column)))
     if check and status not in (Status.DONE, Status.INTERRUPTED):
-        raise SolverError(f"stopped at t = {run.time:.9g} s of {duration:g} s: {status.value}", solution)
+        raise SolverError(
+            f"stopped at t = {run.time:.9g} s of {duration:g} s: {status.value}{run.explanation(status)}", solution
+        )
     return solution
 
 
@@ -89,7 +92,7 @@ def prepared_run(
     if not hasattr(method, "engine") or isinstance(method, type):
         raise TypeError(f"method must be one of solvers, made with its settings, such as Exponential(), got {method!r}")
     _check_tangent(tangent, method)
-    z = _start(system, q0, q_dot0)
+    z = _start(system, q0, q_dot0, method)
     samples = _samples(duration, dt)
     _check_laws(system)
     forcing = _forcing(system, duration, min(max(method.rtol, 1e-12), 1e-6))
@@ -110,8 +113,8 @@ def _end(system: System, q0: ArrayLike, q_dot0: ArrayLike, duration: float, meth
     return np.concatenate((solution.q[-1], solution.q_dot[-1]))
 
 
-def _start(system: System, q0: ArrayLike, q_dot0: ArrayLike) -> Array:
-    """Checked start in block coordinates."""
+def _start(system: System, q0: ArrayLike, q_dot0: ArrayLike, method: Any) -> Array:
+    """Checked start in the coordinates a method steps in: decoupled blocks, or the system's own."""
     checked = []
     for name, value in (("q0", q0), ("q_dot0", q_dot0)):
         vector = np.array(value, dtype=float, ndmin=1)
@@ -121,6 +124,8 @@ def _start(system: System, q0: ArrayLike, q_dot0: ArrayLike) -> Array:
             bad = int(np.argmin(np.isfinite(vector)))
             raise ValueError(f"{name} must be finite, got {vector[bad]} at coordinate {bad}")
         checked.append(vector)
+    if hasattr(method, "takes_matrices") and method.takes_matrices(system):
+        return np.concatenate(checked)
     return system.blocks.to_blocks(*checked)
 
 
@@ -186,6 +191,10 @@ class _Run:
     def time(self) -> float:
         """Simulated time reached."""
         return float(self.state.now[T])
+
+    def explanation(self, status: Status) -> str:
+        """What the method can say about a failure."""
+        return self.engine.explain(status) if hasattr(self.engine, "explain") else ""
 
     def to_the_end(self, progress: Callable[[float], None] | None) -> Status:
         """Stretch after stretch until done, failed or interrupted."""

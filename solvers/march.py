@@ -11,17 +11,29 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit, types
 
-from solvers.events import NONE, UNRESOLVED, coefficients_of, entry_by_sign, first_event, polynomial
+from solvers.events import (
+    HENON,
+    IGNORED,
+    LANDED,
+    NONE,
+    UNRESOLVED,
+    coefficients_of,
+    entry_by_sign,
+    first_event,
+    polynomial,
+)
 from solvers.forcing import Forcing
 from solvers.henon import hermite
 from solvers.henon import land as henon_landing
-from solvers.kernels import OPTIONS, PROBLEM, contact_forces, copy, dot, indentation, inner, rhs
+from solvers.kernels import OPTIONS, PROBLEM, contact_forces, copy, dot, indentation, inner, kernel, rhs
+from solvers.result import Status
 from solvers.state import (
     AT_ONCE,
     CALLS,
     CHATTER,
     DIVERGED,
     DONE,
+    GAINED,
     H_CONTACT,
     H_FLIGHT,
     LAW_NOT_FINITE,
@@ -60,6 +72,7 @@ STEP = types.FunctionType(
     )
 )
 
+EVENT = -1  # beside the status codes
 _PEAK_NODES = np.linspace(0.0, 1.0, 9)
 
 
@@ -71,9 +84,11 @@ class Space(NamedTuple):
     dense: Any
     work: Any
     coefficients: Any  # (2, 8)
+    watch: Any  # energy stored now and at the start, a negligible one, steps in a row that gained
 
 
-SPACE = types.NamedTuple([_VECTOR, _VECTOR, _MATRIX, _MATRIX, _MATRIX], Space)
+SPACE = types.NamedTuple([_VECTOR, _VECTOR, _MATRIX, _MATRIX, _MATRIX, _VECTOR], Space)
+_GAINS = 8  # steps in a row: one alone may be the ledger's, as in the first step of a load
 
 
 @inner
@@ -146,11 +161,17 @@ def _sample(state, space, h, out, dt):
         state.count[SAMPLED] += 1
 
 
+@kernel
+def landing_tolerance(problem, state, stop):
+    """Distance from a level that counts as landed on it."""
+    return 4.0 * surface_tolerance(problem, stop, state.x)
+
+
 @inner
-def _land(step, problem, state, space, h, stop, level, rtol, atol):
+def _land(step, problem, state, space, h, longest, stop, level, rtol, atol):
     """Repeat the step with the duration that ends on ``level``: Newton on the true step; returns it, -1 if it fails."""
-    tolerance = 4.0 * surface_tolerance(problem, stop, state.x)
-    longest = 1.000001 * h
+    tolerance = landing_tolerance(problem, state, stop)
+    longest *= 1.000001
     for _ in range(12):
         _, calls = step(
             *(problem, state.now[T], h, state.x, state.rate, state.piece, state.entry_rate),
@@ -175,10 +196,92 @@ def _land(step, problem, state, space, h, stop, level, rtol, atol):
     return h if abs(distance) <= max(100.0, 1e14 * rtol) * tolerance else -1.0
 
 
+@inner
+def _switch_by_sign(problem, state, log):
+    """Put every stop on the piece its indentation lies in, one border at a time; returns whether any moved."""
+    switched = False
+    for s in range(problem.gap.size):
+        delta = indentation(problem, s, state.x)
+        if delta > problem.levels[s, state.piece[s]]:
+            switch(problem, state, s, 1, log)
+            switched = True
+        elif state.piece[s] > 0 and delta <= problem.levels[s, state.piece[s] - 1]:
+            switch(problem, state, s, -1, log)
+            switched = True
+    return switched
+
+
+@kernel
+def look(problem, state, t_end, log, events):
+    """Before a step: a status code if the run is over, EVENT if a stop switched, else RUNNING."""
+    if state.now[T] >= t_end:
+        return DONE
+    if state.count[LOGGED] + problem.gap.size > log.shape[0]:
+        return LOG_FULL
+    if state.count[AT_ONCE] > MOST_EVENTS_AT_ONCE:
+        return CHATTER
+    if events == IGNORED:
+        switched = _switch_by_sign(problem, state, log)
+    else:
+        switched = switch_on_surface(problem, state, log, events == LANDED)
+    return EVENT if switched else RUNNING
+
+
+@kernel
+def find(problem, state, space):
+    """(θ, stop, direction, level) of the first event of a step; θ as of `first_event`."""
+    theta, stop, direction = first_event(problem, state.x, space.dense, state.piece, space.coefficients)
+    level = 0.0
+    if 0.0 <= theta < NONE:
+        level = problem.levels[stop, state.piece[stop] - (1 if direction < 0 else 0)]
+    return theta, stop, direction, level
+
+
+@kernel
+def accept(problem, state, space, h, stop, direction, at_end, t_end, log, out, dt):
+    """Record a step that ends on an event of ``stop`` (-1: of none) and go on from its end; returns a status code."""
+    if not np.isfinite(dot(space.x_new, space.x_new, space.x_new.size)):
+        return LAW_NOT_FINITE if _law_fails(problem, state, space, h) else DIVERGED
+    _sample(state, space, h, out, dt)
+    _peaks(problem, state, space)
+    copy(space.x_new, state.x, state.x.size)
+    copy(space.rate_new, state.rate, state.x.size)
+    state.now[T] = t_end if at_end else state.now[T] + h
+    state.count[STEPS] += 1
+    if stop >= 0:
+        switch(problem, state, stop, direction, log)
+    return RUNNING
+
+
+@kernel
+def gains(problem, state, space):
+    """Whether for some steps there is more energy than the ledger accounts for in all; ``watch`` has the stored."""
+    ledger = 2 * problem.k.size
+    given = space.watch[1] + abs(state.x[ledger]) + state.x[ledger + 1]
+    excess = space.watch[0] - space.watch[1] - state.x[ledger] + state.x[ledger + 1]
+    for s in range(problem.gap.size):
+        given += abs(state.x[ledger + 2 + 2 * s])
+        excess += state.x[ledger + 2 + 2 * s]
+    space.watch[3] = space.watch[3] + 1.0 if excess > given + space.watch[2] else 0.0
+    return space.watch[3] >= _GAINS
+
+
+@inner
+def _gains(problem, state, space):
+    """The same on decoupled modes; damping that couples them has an energy of its own form, looked at outside."""
+    if problem.loss.shape[0] > 0:
+        return False
+    n, energy = problem.k.size, 0.0
+    for i in range(n):
+        energy += 0.5 * (state.x[n + i] ** 2 + problem.k[i] * state.x[i] ** 2)
+    space.watch[0] = energy
+    return gains(problem, state, space)
+
+
 @njit(
     types.int64(
         *[STEP, PROBLEM, STATE, SPACE, _REAL, types.int64, _REAL, _REAL],
-        *[_REAL, _REAL, types.boolean, types.boolean, _MATRIX, _MATRIX, _REAL],
+        *[_REAL, _REAL, types.boolean, types.int64, _MATRIX, _MATRIX, _REAL],
     ),
     **OPTIONS,
 )
@@ -194,25 +297,22 @@ def march(
     rtol,
     atol,
     adaptive,
-    locates,
+    events,
     log,
     out,
     dt,
 ):
     """Advance the state to ``t_end`` or for ``budget`` steps; returns a status code."""
-    now, count, stops = state.now, state.count, problem.gap.size
+    now, count = state.now, state.count
     not_finite, by_hand = False, False
     for _ in range(budget):
         # --- end of the run, and what can stop it early
-        if now[T] >= t_end:
-            return DONE
-        if count[LOGGED] + stops > log.shape[0]:
-            return LOG_FULL
-        if count[AT_ONCE] > MOST_EVENTS_AT_ONCE:
-            return CHATTER
-        if switch_on_surface(problem, state, log, locates):
+        code = look(problem, state, t_end, log, events)
+        if code == EVENT:
             count[CALLS] += rhs(problem, now[T], state.x, state.piece, state.entry_rate, state.rate, space.work[0])
             continue
+        if code != RUNNING:
+            return code
 
         # --- try a step
         phase = H_CONTACT if touching(state) else H_FLIGHT
@@ -231,22 +331,20 @@ def march(
             continue
 
         # --- events
-        stop, direction, landed = -1, 0, False
-        if locates:
-            theta, stop, direction = first_event(problem, state.x, space.dense, state.piece, space.coefficients)
+        stop, direction, tried = -1, 0, h
+        if events == LANDED:
+            theta, stop, direction, level = find(problem, state, space)
             if theta == UNRESOLVED:
                 now[phase] = h / 32.0
                 count[REJECTED] += 1
                 continue
             if theta < NONE:
-                level = problem.levels[stop, state.piece[stop] - (1 if direction < 0 else 0)]
-                tried = h
-                h, landed = _land(step, problem, state, space, theta * h, stop, level, rtol, atol), True
+                h = _land(step, problem, state, space, theta * h, tried, stop, level, rtol, atol)
                 if h < 0.0:  # the interpolant crosses, the step does not: look closer
                     now[phase] = 0.5 * tried
                     count[REJECTED] += 1
                     continue
-        elif phase == H_FLIGHT and not by_hand:  # the paper's scheme: an entry is landed on by Hénon's trick
+        elif events == HENON and phase == H_FLIGHT and not by_hand:  # the paper's scheme
             theta, stop = entry_by_sign(problem, state.x, space.x_new, state.piece)
             if theta < NONE:
                 duration = henon_landing(
@@ -257,7 +355,7 @@ def march(
                     now[H_FLIGHT], by_hand = dt_contact, True
                     count[REJECTED] += 1
                     continue
-                h, direction, landed = duration, 1, True
+                h, direction = duration, 1
                 count[CALLS] += rhs(
                     *(problem, now[T] + h, space.x_new, state.piece, state.entry_rate),
                     *(space.rate_new, space.work[0]),
@@ -265,48 +363,59 @@ def march(
                 hermite(h, state.x, state.rate, space.x_new, space.rate_new, space.dense)
 
         # --- accept, record
-        if not np.isfinite(dot(space.x_new, space.x_new, space.x_new.size)):
-            return LAW_NOT_FINITE if _law_fails(problem, state, space, h) else DIVERGED
-        _sample(state, space, h, out, dt)
-        _peaks(problem, state, space)
-        copy(space.x_new, state.x, state.x.size)
-        copy(space.rate_new, state.rate, state.x.size)
-        at_end = not landed and h >= t_end - now[T]
-        now[T] = t_end if at_end else now[T] + h
-        count[STEPS] += 1
-        if landed:
-            switch(problem, state, stop, direction, log)
+        at_end = stop < 0 and h == tried and h >= t_end - now[T]
+        code = accept(problem, state, space, h, stop, direction, at_end, t_end, log, out, dt)
+        if code != RUNNING:
+            return code
+        if stop >= 0:
             count[CALLS] += rhs(problem, now[T], state.x, state.piece, state.entry_rate, state.rate, space.work[0])
+        if _gains(problem, state, space):
+            return GAINED
 
         # --- adapt
-        if adaptive and not landed and not at_end:
+        if adaptive and stop < 0 and not at_end:
             now[phase] = h * (5.0 if error == 0.0 else min(5.0, 0.9 * error**-0.125))
         elif not adaptive:
-            now[H_FLIGHT], by_hand = dt_flight, False
+            now[H_FLIGHT], now[H_CONTACT], by_hand = dt_flight, dt_contact, False
     return RUNNING
 
 
-def new_space(state: State, work_rows: int) -> Space:
-    """Working arrays for a state."""
+def new_space(state: State, work_rows: int, energy: float, least: float, constants: tuple[float, ...] = ()) -> Space:
+    """Working arrays for a state of some energy; a method's constants stand in the last row of ``work``."""
     size = state.x.size
-    return Space(np.empty(size), np.empty(size), np.zeros((7, size)), np.empty((work_rows, size)), np.empty((2, 8)))
+    work = np.empty((work_rows, size))
+    work[-1, : len(constants)] = constants
+    watch = np.array([energy, energy, least, 0.0])
+    return Space(np.empty(size), np.empty(size), np.zeros((7, size)), work, np.empty((2, 8)), watch)
+
+
+def negligible_energy(problem: Any, inverse_mass: Array, dt: float) -> float:
+    """What rounding in the loads may bring: 1e-10 of the energy ½ vᵀM⁻¹v (s dt)² of the largest in one step, J."""
+    largest = np.zeros(len(problem.load))
+    np.add.at(largest, problem.tone_load, np.abs(problem.tone_amplitude))
+    for j, load in enumerate(problem.table_load):
+        largest[load] += np.abs(problem.table[problem.table_start[j] : problem.table_start[j + 1], 0]).max()
+    return 0.5e-10 * dt**2 * float(np.sum(inverse_mass * largest**2))
 
 
 class Engine:
     """One run of a stepping method: problem, state, and its share of the loop."""
 
     def __init__(self, method: Any, system: System, z: Array, forcing: Forcing, duration: float) -> None:
-        self.method, self.duration = method, duration
+        self.method, self.duration, self.system = method, duration, system
         self.problem = problem_of(system, forcing)
         self.back = system.blocks.T
-        if not method.locates_exit:
+        if method.events == HENON:
             self.problem.levels[:, 1:] = math.inf  # kinks are not looked for
         self.state: State = new_state(z, len(system.contacts))
-        self.space = new_space(self.state, method.work_rows)
+        energy = float(system.energy(*np.split(self.back @ z, 2)))
+        dt = 0.0 if method.adaptive else max(method.steps)
+        least = negligible_energy(self.problem, np.sum(self.problem.load * self.problem.power, axis=1), dt)
+        self.space = new_space(self.state, method.work_rows, energy, least, method.constants)
         fastest = max([math.sqrt(abs(k)) for k in self.problem.k] + list(self.problem.c) + [1.0 / duration])
         self.state.now[[H_FLIGHT, H_CONTACT]] = 0.1 / fastest, 0.01 / fastest
         if not method.adaptive:
-            self.state.now[[H_FLIGHT, H_CONTACT]] = method.dt_flight, method.dt_contact
+            self.state.now[[H_FLIGHT, H_CONTACT]] = method.steps
 
     def start(self) -> None:
         """Put every stop on its piece and evaluate the first rate."""
@@ -323,8 +432,44 @@ class Engine:
     def march(self, budget: int, log: Array, out: Array, dt: float) -> int:
         """Go on for a stretch."""
         method = self.method
-        return march(
+        dt_flight, dt_contact = (math.inf, math.inf) if method.adaptive else method.steps
+        code = march(
             *(method.step, self.problem, self.state, self.space, self.duration, budget),
-            *(method.dt_flight, method.dt_contact, method.rtol, method.atol),
-            *(method.adaptive, method.locates_exit, log, out, dt),
+            *(dt_flight, dt_contact, method.rtol, method.atol),
+            *(method.adaptive, method.events, log, out, dt),
         )
+        return GAINED if code in (DONE, RUNNING) and self._gained() else code
+
+    def _gained(self) -> bool:
+        """Whether a run with coupled damping holds more energy than it was ever given; see `gains`."""
+        if not self.problem.loss.size or self.method.adaptive:
+            return False
+        size = 2 * self.problem.k.size
+        self.space.watch[0] = self.system.energy(*np.split(self.back @ self.state.x[:size], 2))
+        self.space.watch[3] = _GAINS
+        return bool(gains(self.problem, self.state, self.space))
+
+    def explain(self, code: Status) -> str:
+        """What grew, and the step to try."""
+        if code not in (Status.GAINED, Status.DIVERGED) or self.method.adaptive:
+            return ""
+        q, q_dot = np.split(self.back @ self.state.x[: 2 * self.problem.k.size], 2)
+        return explanation(self.method, self.system, q, q_dot, self.duration)
+
+
+def explanation(method: Any, system: System, q: Array, q_dot: Array, duration: float) -> str:
+    """The coordinate that grew, and the predicted limits."""
+    modal = not system.sparse and not np.any(system.M - np.eye(system.size))
+    share = np.abs(q_dot * (system.M @ q_dot))
+    if modal:  # among the modes that a step amplifies, if any
+        k, c = np.diag(system.K), np.diag(system.C)
+        grows = [max(method.radius(h, *pair) for h in method.steps) > 1.0 + 1e-9 for pair in zip(k, c, strict=True)]
+        share = np.where(grows, share + k * q**2, 0.0) if any(grows) else share + k * q**2
+    worst = int(np.argmax(np.nan_to_num(share, nan=math.inf, posinf=math.inf)))
+    where = f"coordinate {worst} of {system.size}"
+    if modal:
+        where = f"mode {worst + 1} of {system.size} (ω = {math.sqrt(abs(system.K[worst, worst])):.6g} rad/s)"
+    limit = method.stable_dt(system, duration=duration)
+    step = min(min(limit.flight, method.steps[0]), min(limit.contact, method.steps[1]), min(method.steps))
+    grown = f"; it grew in {where}, steps {method.steps[0]:g} s in flight and {method.steps[1]:g} s in contact"
+    return f"{grown}, predicted limits {limit.flight:.3g} s and {limit.contact:.3g} s: try {0.5 * step:.2g} s"

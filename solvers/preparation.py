@@ -12,7 +12,7 @@ from solvers.handle import Layout, Packed
 from solvers.kernels import PROBLEM, Problem
 from solvers.response import Space
 from solvers.state import STATE, problem_of, rate_rows, state_shapes
-from solvers.system import Array, System
+from solvers.system import Array, System, dense
 from solvers.tables import S, Tables, build
 from solvers.vector import padded
 
@@ -109,7 +109,7 @@ def _distance(system: System, omega: float, load: int) -> tuple[float, float]:
     """Smallest |k - Ω² + iΩc| of the blocks a load pushes, absolute and relative to max(k, Ω²)."""
     blocks = system.blocks
     distance = np.abs(blocks.k - omega**2 + 1j * omega * blocks.c)
-    vector = blocks.inverse[:, system.size :] @ np.linalg.solve(system.M, np.asarray(system.loads[load][0]))
+    vector = blocks.inverse[:, system.size :] @ np.linalg.solve(dense(system.M), np.asarray(system.loads[load][0]))
     distance = distance[np.hypot(*np.split(vector, 2)) > 0.0]
     scale = np.maximum(blocks.k, omega**2)[np.hypot(*np.split(vector, 2)) > 0.0]
     relative = np.divide(distance, scale, out=np.zeros_like(distance), where=scale > 0.0)

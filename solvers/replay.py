@@ -39,7 +39,6 @@ from solvers.state import BEGAN, ENDED, EVENT, FIRST, HEAD, KIND, LANDING, PART,
 from solvers.tables import S, propagate
 from solvers.vector import combine
 
-
 _OFF = 1e-10  # relative distance from a knot at which a law is on one side of it for sure
 
 

@@ -11,18 +11,18 @@ from numba import types
 from solvers.forcing import Forcing
 from solvers.kernels import Problem, dot, indentation, inlined, inner, kernel, sizes
 from solvers.result import Status
-from solvers.system import Array, System
+from solvers.system import Array, System, dense
 
 _VECTOR = types.Array(types.float64, 1, "C")
 _MATRIX = types.Array(types.float64, 2, "C")
 _INTEGERS = types.Array(types.int64, 1, "C")
 
 STATUSES = list(Status)
-DONE, RUNNING, STEP_TOO_SMALL, DIVERGED, CHATTER, LOG_FULL, LAW_NOT_FINITE = (
+DONE, RUNNING, STEP_TOO_SMALL, DIVERGED, CHATTER, LOG_FULL, LAW_NOT_FINITE, GAINED = (
     STATUSES.index(status)
     for status in (
         *[Status.DONE, Status.RUNNING, Status.STEP_TOO_SMALL, Status.DIVERGED],
-        *[Status.CHATTER, Status.LOG_FULL, Status.LAW_NOT_FINITE],
+        *[Status.CHATTER, Status.LOG_FULL, Status.LAW_NOT_FINITE, Status.GAINED],
     )
 )
 T, H_FLIGHT, H_CONTACT, LAST_EVENT = range(4)  # places in State.now
@@ -186,13 +186,45 @@ def new_state(z: Any, stops: int) -> State:
 
 
 def problem_of(system: System, forcing: Forcing) -> Problem:
-    """Arrays the kernels read."""
-    blocks, contacts = system.blocks, system.contacts
-    n, m = system.size, len(contacts)
-    direction = np.array([c.direction for c in contacts]).reshape(m, n)
-    vectors = np.array([vector for vector, _ in system.loads]).reshape(len(system.loads), n)
-    inverse_mass = blocks.inverse[:, n:] @ np.linalg.inv(system.M)
-    read = -direction @ blocks.T[:n]
+    """Arrays the kernels read, in block coordinates."""
+    blocks, n = system.blocks, system.size
+    inverse_mass = blocks.inverse[:, n:] @ np.linalg.inv(dense(system.M))
+    direction, vectors = _directions(system), _vectors(system)
+    linear = {
+        **{"k": blocks.k, "c": blocks.c, "loss": np.ascontiguousarray(blocks.loss)},
+        "push": np.ascontiguousarray((inverse_mass @ direction.T).T),
+        "read": np.ascontiguousarray(-direction @ blocks.T[:n]),
+        "load": np.ascontiguousarray((inverse_mass @ vectors.T).T),
+        "power": np.ascontiguousarray(vectors @ blocks.T[n:]),
+    }
+    return _problem(system, forcing, linear)
+
+
+def matrix_problem_of(system: System, forcing: Forcing) -> Problem:
+    """The same in the system's own coordinates without M, C and K: pushes and loads are forces, and `rhs` their sum."""
+    zeros = np.zeros(system.size)
+    direction, vectors = _directions(system), _vectors(system)
+    linear = {
+        **{"k": zeros, "c": zeros, "loss": np.empty((0, 0))},
+        **{"push": np.hstack((0.0 * direction, direction)), "read": np.hstack((-direction, 0.0 * direction))},
+        **{"load": np.hstack((0.0 * vectors, vectors)), "power": np.hstack((0.0 * vectors, vectors))},
+    }
+    return _problem(system, forcing, linear)
+
+
+def _directions(system: System) -> Array:
+    """Directions of the stops (m, n)."""
+    return np.array([c.direction for c in system.contacts]).reshape(len(system.contacts), system.size)
+
+
+def _vectors(system: System) -> Array:
+    """Vectors of the loads (L, n)."""
+    return np.array([vector for vector, _ in system.loads]).reshape(len(system.loads), system.size)
+
+
+def _problem(system: System, forcing: Forcing, linear: dict[str, Array]) -> Problem:
+    """The linear part with the laws and the signals."""
+    contacts, m = system.contacts, len(system.contacts)
     parameters = [np.asarray(c.law.parameters, dtype=float) for c in contacts]
     width = max([p.size for p in parameters], default=1)
     most = max([len(c.law.knots) for c in contacts], default=0) + 1
@@ -200,20 +232,14 @@ def problem_of(system: System, forcing: Forcing) -> Problem:
     for i, contact in enumerate(contacts):
         levels[i, : len(contact.law.knots) + 1] = (0.0, *contact.law.knots)
     return Problem(
-        k=blocks.k,
-        c=blocks.c,
-        loss=np.ascontiguousarray(blocks.loss),
-        push=np.ascontiguousarray((inverse_mass @ direction.T).T),
-        read=np.ascontiguousarray(read),
-        read_rate=rate_rows(read, blocks.k, blocks.c),
+        **linear,
+        read_rate=rate_rows(linear["read"], linear["k"], linear["c"]),
         levels=levels,
         gap=np.array([c.gap for c in contacts], dtype=float),
         law=np.array([c.law.address for c in contacts], dtype=np.int64),
         gradient=np.array([c.law.gradient_address for c in contacts], dtype=np.int64),
         parameters=np.array([np.pad(p, (0, width - p.size)) for p in parameters]).reshape(m, width),
         floor=np.array([c.law.entry_rate_floor for c in contacts], dtype=float),
-        load=np.ascontiguousarray((inverse_mass @ vectors.T).T),
-        power=np.ascontiguousarray(vectors @ blocks.T[n:]),
         tone_omega=forcing.tone_omega,
         tone_amplitude=forcing.tone_amplitude,
         tone_load=forcing.tone_load,

@@ -92,7 +92,8 @@ class System:
 
     Parameters
     ----------
-    M, C, K : (n, n), dense or SciPy sparse; M symmetric positive definite, C and K symmetric.
+    M, C, K : (n, n), dense or SciPy sparse; M symmetric positive definite, C and K symmetric. Sparse ones stay sparse
+        for methods that step on matrices; other methods, and `blocks`, take n³ operations once.
     contacts : sequence of `Contact`.
     loads : sequence of ``(vector (n,), signal)``.
 
@@ -119,6 +120,9 @@ class System:
             object.__setattr__(self, name, _square(name, getattr(self, name)))
         if not self.M.shape == self.C.shape == self.K.shape:
             raise ValueError(f"M, C, K must have one shape, got {self.M.shape}, {self.C.shape}, {self.K.shape}")
+        if not all(hasattr(matrix, "toarray") for matrix in (self.M, self.C, self.K)):
+            for name in "MCK":
+                object.__setattr__(self, name, dense(getattr(self, name)))
         _check_mass(self.M)
         object.__setattr__(self, "contacts", tuple(self.contacts))
         object.__setattr__(self, "loads", tuple(self._load(i, pair) for i, pair in enumerate(self.loads)))
@@ -161,11 +165,17 @@ class System:
     @cached_property
     def blocks(self) -> Blocks:
         """The decoupled form."""
-        return decouple(self.M, self.C, self.K)
+        return decouple(dense(self.M), dense(self.C), dense(self.K))
+
+    @property
+    def sparse(self) -> bool:
+        """Whether the matrices were given sparse."""
+        return hasattr(self.M, "toarray")
 
     def energy(self, q: Array, q_dot: Array) -> Array:
         """Stored energy ½ q'ᵀ M q' + ½ qᵀ K q in J, for (..., n) arrays."""
-        return 0.5 * ((q_dot @ self.M) * q_dot + (q @ self.K) * q).sum(axis=-1)
+        with np.errstate(over="ignore", invalid="ignore"):  # of a run that diverged
+            return 0.5 * ((q_dot @ self.M) * q_dot + (q @ self.K) * q).sum(axis=-1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,30 +210,67 @@ class Parameter:
             raise ValueError(f"the systems of a Parameter differ in coordinates, contacts or loads: {sizes}")
 
 
-def _square(name: str, matrix: Any) -> Array:
-    """A dense, finite, symmetric copy of a matrix."""
-    dense = np.array(matrix.toarray() if hasattr(matrix, "toarray") else matrix, dtype=float, ndmin=2)
-    if dense.ndim != 2 or dense.shape[0] != dense.shape[1]:
-        raise ValueError(f"{name} must be square, got shape {dense.shape}")
-    if not np.all(np.isfinite(dense)):
-        row, column = np.argwhere(~np.isfinite(dense))[0]
-        raise ValueError(f"{name} must be finite, got {dense[row, column]} at row {row}, column {column}")
-    if np.abs(dense - dense.T).max() > 1e-9 * np.abs(dense).max():
-        raise ValueError(f"{name} must be symmetric; its largest asymmetry is {np.abs(dense - dense.T).max():g}")
-    dense.setflags(write=False)
-    return dense
+def require_step(name: str, value: float) -> None:
+    """ValueError for a step that is none."""
+    if not 0.0 < value < np.inf:
+        raise ValueError(f"{name} must be positive and finite (s), got {value!r}")
 
 
-def _check_mass(M: Array) -> None:
+def dense(matrix: Any) -> Array:
+    """A matrix as an array."""
+    array = matrix.toarray() if hasattr(matrix, "toarray") else matrix
+    array.setflags(write=False)
+    return array
+
+
+def _square(name: str, matrix: Any) -> Any:
+    """A finite, symmetric copy of a matrix: sparse by columns if it was sparse, else dense."""
+    if hasattr(matrix, "toarray"):
+        from scipy.sparse import csc_array
+
+        copied: Any = csc_array(matrix, dtype=float, copy=True)
+        values = copied.data
+    else:
+        copied = values = np.array(matrix, dtype=float, ndmin=2)
+    if copied.ndim != 2 or copied.shape[0] != copied.shape[1]:
+        raise ValueError(f"{name} must be square, got shape {copied.shape}")
+    if not np.all(np.isfinite(values)):
+        row, column = np.argwhere(~np.isfinite(dense(copied)))[0]
+        raise ValueError(f"{name} must be finite, got {copied[row, column]} at row {row}, column {column}")
+    asymmetry = abs(copied - copied.T).max()
+    if asymmetry > 1e-9 * abs(copied).max():
+        raise ValueError(f"{name} must be symmetric; its largest asymmetry is {asymmetry:g}")
+    values.setflags(write=False)
+    return copied
+
+
+def _check_mass(M: Any) -> None:
     """M is positive definite."""
+    if hasattr(M, "toarray"):
+        if _has_positive_pivots(M):
+            return
+        lowest = "not positive"
+    else:
+        try:
+            np.linalg.cholesky(M)
+            return
+        except np.linalg.LinAlgError:
+            lowest = f"{np.linalg.eigvalsh(M)[0]:g}"
+    raise ValueError(
+        f"M must be positive definite, its lowest eigenvalue is {lowest}; "
+        "give every coordinate a mass or condense the massless ones"
+    )
+
+
+def _has_positive_pivots(M: Any) -> bool:
+    """Whether a symmetric sparse matrix is positive definite: Gaussian elimination along its diagonal."""
+    from scipy.sparse.linalg import splu
+
     try:
-        np.linalg.cholesky(M)
-    except np.linalg.LinAlgError:
-        lowest = np.linalg.eigvalsh(M)[0]
-        raise ValueError(
-            f"M must be positive definite, its lowest eigenvalue is {lowest:g}; "
-            "give every coordinate a mass or condense the massless ones"
-        ) from None
+        factor = splu(M, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    except RuntimeError:  # singular
+        return False
+    return bool(np.all(factor.perm_r == factor.perm_c) and np.all(factor.U.diagonal() > 0.0))
 
 
 @dataclass(frozen=True, eq=False)

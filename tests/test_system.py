@@ -145,7 +145,17 @@ def test_modal_system_is_its_matrices():
 def test_sparse_matrices_are_taken():
     K = np.array([[2.0, -1.0], [-1.0, 2.0]])
     system = System(sparse.eye(2), sparse.csr_matrix((2, 2)), sparse.csc_array(K))
-    np.testing.assert_array_equal(system.K, K)
+    assert system.sparse
+    np.testing.assert_array_equal(system.K.toarray(), K)
+    np.testing.assert_allclose(system.blocks.k, [1.0, 3.0], rtol=1e-14)
+    assert not System(np.eye(2), sparse.csr_matrix((2, 2)), K).sparse
+
+
+def test_sparse_mass_must_be_positive_definite():
+    with pytest.raises(ValueError, match="positive definite"):
+        System(sparse.csc_array([[1.0, 2.0], [2.0, 1.0]]), sparse.csc_array((2, 2)), sparse.eye(2))
+    with pytest.raises(ValueError, match="positive definite"):
+        System(sparse.csc_array([[1.0, 0.0], [0.0, 0.0]]), sparse.csc_array((2, 2)), sparse.eye(2))
 
 
 def test_system_keeps_its_own_copies():

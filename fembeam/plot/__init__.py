@@ -1,10 +1,11 @@
 """Figures: one function per question, each returns a matplotlib figure.
 
 `response` and `animation` hold those of one run, `laws` those of contact laws, `orbits` those of periodic motion,
-`random` those of random motion, `study` those of studies.
+`random` those of random motion, `study` and `chart` those of studies.
 """
 
 from fembeam.plot.animation import animate, frame
+from fembeam.plot.chart import failures, speed_accuracy, stability_map
 from fembeam.plot.laws import identification, loops, restitutions
 from fembeam.plot.orbits import branch, orbit, peak
 from fembeam.plot.random import random_densities, random_spectra
@@ -28,6 +29,7 @@ __all__ = [
     "branch",
     "contacts",
     "densities",
+    "failures",
     "frame",
     "mode_count",
     "identification",
@@ -45,6 +47,8 @@ __all__ = [
     "smallest_model",
     "spectra_of",
     "spectrum",
+    "speed_accuracy",
+    "stability_map",
     "styled",
     "time_history",
 ]

@@ -1,11 +1,23 @@
 """Studies: questions asked of a scene or a model by many runs, each answered by a table and a figure."""
 
 from fembeam.study.ensemble import Ensemble, ensemble
+from fembeam.study.failures import Failure, gallery
 from fembeam.study.mode_count import ModeCount, mode_count
 from fembeam.study.smallest_model import NotMetError, SmallestModel, smallest_model
+from fembeam.study.speed_accuracy import NoReferenceError, Point, SpeedAccuracy, speed_accuracy
+from fembeam.study.stability_map import StabilityMap, Verdict, stability_map
 from fembeam.study.stationary import Response, characteristics, stationary
 
 __all__ = [
+    "Failure",
+    "NoReferenceError",
+    "Point",
+    "SpeedAccuracy",
+    "StabilityMap",
+    "Verdict",
+    "gallery",
+    "speed_accuracy",
+    "stability_map",
     "Ensemble",
     "ModeCount",
     "NotMetError",

@@ -1,6 +1,7 @@
 r"""Work against error on a beam that hits its stop.
 
-``python tests/bench/impact.py [--modes 2 10 30] [--starts 12] [--quick]`` prints one table per mode count. Every
+``python tests/bench/impact.py [--modes 2 10 30] [--starts 12] [--quick] [--chart FILE.png]`` prints one table per mode
+count, and draws all points, peers included, on one chart. Every
 method runs the same starts over ten periods; the error is that of the tip at the end against `reference`, in units of
 1 mm. All methods are timed by turns in one process, the fastest of several rounds counts for each start, and medians
 over the starts are printed. Ratios are taken at equal error, each method's time being interpolated in log-log between
@@ -18,6 +19,9 @@ from typing import Any
 import numpy as np
 import peers
 from reference import MODES, STARTS, Problem, problem
+
+import fembeam as fb
+import solvers
 
 PATIENCE = 15.0  # s that one setting may take for all its starts; slower ones run fewer starts and say so
 SHORT = 3.0  # the same with --quick
@@ -48,12 +52,18 @@ def methods(modes: int) -> dict[str, tuple[Any, list[dict[str, Any]]]]:
     heun = [(4e-6, 4e-6), (2e-6, 1e-6), (1e-6, 1e-6), (1e-6, 1e-7), (5e-7, 5e-7)]
     if modes >= 10:  # stable for about hω < (8ζ)^(1/3); the modes' phases, not the contacts, then set the step
         heun = [(1e-6, 1e-6), (1e-6, 2e-7), (5e-7, 5e-7), (3e-7, 3e-7), (1.5e-7, 1.5e-7)]
+    constant = [1e-5, 4e-6, 1e-6] if modes < 30 else [1e-6]
     return {
         "Exponential": (peers.exponential, rtols(1e-6, 1e-8, 1e-10)),
         "heyoka, in √δ": (peers.heyoka, tols(1e-6, 1e-7, 1e-8, 1e-10, 1e-12)),
         "heyoka, in t": (peers.heyoka, tols(1e-7, 1e-9, 1e-11, root=False)),
         "DOP853, numba": (peers.dormand_prince, rtols(1e-7, 1e-8, 1e-9, 1e-10, 1e-11)),
         "Heun + Hénon": (peers.henon, steps(*heun)),
+        **{
+            kind.__name__: (peers.constant_step, [{"kind": kind, "dt": dt} for dt in constant])
+            for kind in (solvers.RK4, solvers.CentralDifference, solvers.Newmark, solvers.GeneralizedAlpha)
+        },
+        "RK4, blind": (peers.constant_step, [{"kind": solvers.RK4, "dt": dt, "locate": False} for dt in constant]),
         "SciPy DOP853": (peers.scipy_ivp, rtols(*loose, method="DOP853", max_step=1e-3)),
         "SciPy LSODA": (peers.scipy_ivp, rtols(*loose, method="LSODA", max_step=1e-3)),
         "SciPy Radau": (peers.scipy_ivp, rtols(*few, method="Radau", max_step=1e-3)),
@@ -62,7 +72,7 @@ def methods(modes: int) -> dict[str, tuple[Any, list[dict[str, Any]]]]:
     }
 
 
-SHOWN = "rtol", "tol", "dt_flight", "dt_contact"
+SHOWN = "rtol", "tol", "dt", "dt_flight", "dt_contact"
 RATIOS = [
     ("heyoka", 1e-8),
     ("DOP853, numba", 1e-8),
@@ -185,13 +195,27 @@ def ratios(points: list[Point]) -> list[str]:
     return lines
 
 
+def chart(points: dict[int, list[Point]]) -> Any:
+    """The chart of `fb.study.speed_accuracy`, from points measured here."""
+    study = fb.study
+    drawn = [
+        study.Point(p.method, "", n, *(np.array(list(v.values())) for v in (p.seconds, p.errors, p.errors)), 0.0, 0.0)
+        for n, measured in points.items()
+        for p in measured
+        if p.errors
+    ]
+    nothing = dict.fromkeys(points, 0.0)
+    return fb.plot.speed_accuracy(study.SpeedAccuracy(drawn, 1e-3, nothing, nothing, "tip after ten periods / 1 mm"))
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--modes", type=int, nargs="+", default=list(MODES), choices=MODES)
     parser.add_argument("--starts", type=int, default=STARTS)
     parser.add_argument("--quick", action="store_true", help="fewer rounds, and slow settings on few starts")
-    given = parser.parse_args()
+    parser.add_argument("--chart", metavar="FILE.png", help="draw all points")
+    given, drawn = parser.parse_args(), {}
     patience, rounds = (SHORT, 3) if given.quick else (PATIENCE, ROUNDS)
     for modes in given.modes:
         of = problem(modes)
@@ -205,6 +229,9 @@ def main() -> None:
         print(*(point.line() for point in points), sep="\n")
         print("Exponential is faster, at equal median error, than")
         print(*ratios(points), sep="\n", flush=True)
+        drawn[modes] = points
+    if given.chart:
+        chart(drawn).savefig(given.chart, dpi=100)
 
 
 if __name__ == "__main__":

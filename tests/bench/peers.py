@@ -54,6 +54,12 @@ def henon(problem: Problem, setting: Setting) -> Run:
     return _own(problem, solvers.HenonRK2(**setting))
 
 
+def constant_step(problem: Problem, setting: Setting) -> Run:
+    """RK4, central differences, Newmark or generalised α; settings kind (the class), dt, locate."""
+    setting = dict(setting)
+    return _own(problem, setting.pop("kind")(**setting))
+
+
 # --- heyoka ----------------------------------------------------------------------------------------------------------
 
 

@@ -1,0 +1,184 @@
+"""Charts of methods: speed against accuracy, where they are stable, and how they fail."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fembeam.plot.response import BLUE, RED, styled
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from fembeam.study.failures import Failure
+    from fembeam.study.speed_accuracy import Point, SpeedAccuracy
+    from fembeam.study.stability_map import StabilityMap
+
+MARKERS = "osD^v<>PX*hpd8H1234"
+_SMALLEST = 1e-16
+
+
+@styled
+def speed_accuracy(result: SpeedAccuracy) -> Figure:
+    """Error against time: of integration on the left, with the error of too few modes on the right.
+
+    Modes are colours, methods markers; medians over the starts with quartiles; a line joins the settings of a method,
+    a thick one the front of each model. On the right a finer step below a dashed line (the exact model with so few
+    modes) is wasted.
+    """
+    from matplotlib.figure import Figure
+
+    sizes = sorted(result.reduction)
+    panels = 2 if max(result.reduction.values()) > 0.0 else 1
+    figure = Figure(figsize=(5.2 * panels + 2.1, 4.8), layout="constrained")
+    axes = np.atleast_1d(figure.subplots(1, panels, sharey=True))
+    methods = list(dict.fromkeys(point.method for point in result.points))
+    for ax, name in zip(axes, ("errors", "totals"), strict=False):
+        for n, colour in zip(sizes, _colours(len(sizes)), strict=True):
+            for method, marker in zip(methods, MARKERS * 3, strict=False):
+                mine = [p for p in result.points if p.modes == n and p.method == method and p.seconds.size]
+                _draw(ax, mine, name, colour, marker)
+            if name == "errors":
+                front = result.front(n)
+                ax.plot(
+                    [_known(p.error) for p in front], [1e3 * p.time for p in front], color=colour, lw=3.0, alpha=0.35
+                )
+            elif result.reduction[n] > 0.0:
+                ax.axvline(result.reduction[n], color=colour, ls="--", lw=0.8)
+        ax.set(xscale="log", yscale="log")
+        ax.invert_xaxis()
+        ax.grid(alpha=0.25, lw=0.5)
+    axes[0].set(xlabel=f"error of integration: {result.quantity}", ylabel="time of a run / ms")
+    axes[0].set_title(f"Integration alone; thick: the front of each model{_claim(result, methods)}")
+    if panels == 2:
+        axes[1].set(xlabel=f"error against {sizes[-1]} modes: {result.quantity}")
+        axes[1].set_title("Integration and reduction; dashed: exact solution with so few modes")
+    _legends(figure, sizes, methods)
+    return figure
+
+
+def _claim(result: SpeedAccuracy, methods: Sequence[str], better_than: float = 1e-4) -> str:
+    """Whether the main method is the front, or who is not."""
+    if "Exponential" not in methods or len(methods) < 2:
+        return ""
+    others = sorted({f"{p.method} with {p.modes} modes" for p in result.beaten("Exponential", better_than)})
+    claim = f"below {better_than:g} Exponential is the front"
+    return f"\n{claim}{', but for ' + ', '.join(others) if others else ' everywhere'}"
+
+
+def _draw(ax: Axes, points: Sequence[Point], name: str, colour: object, marker: str) -> None:
+    """One method's settings on one model."""
+    if not points:
+        return
+    values = [getattr(p, name) for p in points]
+    x = np.array([_known(float(np.median(v))) for v in values])
+    low, high = (np.array([_known(float(np.quantile(v, q))) for v in values]) for q in (0.25, 0.75))
+    y = np.array([1e3 * p.time for p in points])
+    ax.errorbar(x, y, xerr=[x - low, high - x], color=colour, lw=0.7, elinewidth=0.5, marker=marker, ms=4.5)
+
+
+def _known(value: float) -> float:
+    """A logarithm needs it."""
+    return max(value, _SMALLEST)
+
+
+def _colours(count: int) -> list:
+    """Light for few modes, dark for many."""
+    from matplotlib import colormaps
+
+    return [colormaps["viridis_r"](0.15 + 0.8 * i / max(count - 1, 1)) for i in range(count)]
+
+
+def _legends(figure: Figure, sizes: Sequence[int], methods: Sequence[str]) -> None:
+    """Markers for methods, colours for modes, beside the axes."""
+    from matplotlib.lines import Line2D
+
+    entries = [Line2D([], [], color=c, lw=3, label=f"{n} mode{'s' if n > 1 else ''}")
+               for n, c in zip(sizes, _colours(len(sizes)), strict=True)]  # fmt: skip
+    entries += [
+        Line2D([], [], color="black", marker=k, lw=0, ms=5, label=m) for m, k in zip(methods, MARKERS * 3, strict=False)
+    ]
+    figure.legend(handles=entries, loc="outside right upper")
+
+
+@styled
+def stability_map(*maps: StabilityMap) -> Figure:
+    """Verdicts over step and modes (or stiffness), one panel per map, predicted limits drawn over them."""
+    from matplotlib.colors import ListedColormap
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    from fembeam.study.stability_map import Verdict
+
+    colours = {
+        Verdict.ACCURATE: "#8fd0b5",
+        Verdict.WRONG: "#f6d58a",
+        Verdict.MISSED: "#b7c9e8",
+        Verdict.UNSTABLE: "#eba07a",
+    }
+    columns = min(len(maps), 2)
+    rows = -(-len(maps) // columns)
+    figure = Figure(figsize=(4.6 * columns + 0.2, 3.0 * rows + 0.7), layout="constrained")
+    axes = figure.subplots(rows, columns, squeeze=False).ravel()
+    for ax in axes[len(maps) :]:
+        ax.set_axis_off()
+    for ax, found in zip(axes, maps, strict=False):
+        places = np.arange(len(found.rows) + 1) - 0.5
+        ax.pcolormesh(_edges(found.steps), places, found.verdict, cmap=ListedColormap(list(colours.values())),
+                      vmin=-0.5, vmax=3.5, edgecolors="white", lw=0.4)  # fmt: skip
+        for limit, style in ((found.flight, "-"), (found.contact, ":")):
+            kept = np.where(np.isfinite(limit) & (limit > 0.0), limit, np.nan)
+            ax.step(np.append(kept, kept[-1]), places, color="black", ls=style, lw=1.6, where="pre")
+            ax.vlines(kept, places[:-1], places[1:], color="black", ls=style, lw=1.6)
+        ax.set(xscale="log", xlabel="step / s", yticks=range(len(found.rows)), title=found.method)
+        ax.set_xlim(_edges(found.steps)[[0, -1]])
+        ax.set_yticklabels([f"{row:g}" for row in found.rows])
+        ax.set_ylabel({"modes": "number of modes", "stiffness": "contact stiffness / SI"}[found.axis])
+    entries: list = [Patch(color=colour, label=verdict.words) for verdict, colour in colours.items()]
+    entries += [
+        Line2D([], [], color="black", ls=s, label=f"predicted limit {w}")
+        for s, w in (("-", "in flight"), (":", "in contact"))
+    ]
+    figure.legend(handles=entries, loc="outside lower center", ncols=3)
+    return figure
+
+
+def _edges(steps: np.ndarray) -> np.ndarray:
+    """Borders of the cells of a logarithmic axis."""
+    if len(steps) < 2:
+        return np.array([steps[0] / 1.5, steps[0] * 1.5])
+    middle = np.sqrt(steps[1:] * steps[:-1])
+    return np.concatenate(([steps[0] ** 2 / middle[0]], middle, [steps[-1] ** 2 / middle[-1]]))
+
+
+@styled
+def failures(cases: Sequence[Failure]) -> Figure:
+    """A gallery: each case with what the naive method gives (red) and what this library gives or says (blue)."""
+    from matplotlib.figure import Figure
+
+    rows = -(-len(cases) // 2)
+    figure = Figure(figsize=(9.6, 2.75 * rows), layout="constrained")
+    axes = figure.subplots(rows, 2, squeeze=False).ravel()
+    for ax, case in zip(axes, cases, strict=False):
+        few = len(case.naive[0]) < 40
+        ax.plot(*case.ours, color=BLUE, lw=1.3)
+        ax.plot(*case.naive, color=RED, lw=0.9, marker="o" if few else "", ms=3)
+        if case.scale != "linear":
+            ax.set_yscale("log")
+        if case.scale == "loglog":
+            ax.set_xscale("log")
+        ax.set(xlabel=case.x_label, ylabel=case.y_label)
+        ax.set_title(case.title, fontweight="bold", pad=27)
+        for line, (colour, words) in enumerate(zip((RED, BLUE), case.said, strict=True)):
+            ax.text(0.0, 1.15 - 0.1 * line, words, color=colour, fontsize=7.5, va="top", transform=ax.transAxes)
+    for ax in axes[len(cases) :]:
+        ax.set_axis_off()
+    return figure
+
+
+__all__ = ["failures", "speed_accuracy", "stability_map"]

@@ -1,0 +1,171 @@
+"""Where a method of constant step fails: one run per cell of a grid (step × modes, or step × contact stiffness)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from enum import IntEnum
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+import solvers
+from fembeam.section import require
+from fembeam.study.speed_accuracy import method_name
+
+if TYPE_CHECKING:
+    from fembeam.model import Model
+    from fembeam.scene import Scene
+
+Vector = NDArray[np.float64]
+SAMPLES = 400  # per run, for the error
+
+
+class Verdict(IntEnum):
+    """What became of a run."""
+
+    ACCURATE = 0
+    WRONG = 1
+    MISSED = 2
+    UNSTABLE = 3
+
+    @property
+    def words(self) -> str:
+        """For legends and tables."""
+        return ["stable and accurate", "stable and wrong", "missed contacts", "unstable"][self]
+
+
+@dataclass(frozen=True, eq=False)
+class StabilityMap:
+    """A grid of verdicts.
+
+    Attributes
+    ----------
+    method : its name. steps : (k,) s. axis : "modes" or "stiffness". rows : (r,) mode counts or N/m^p.
+    verdict : (r, k) of `Verdict`. error : (r, k) largest error of δ over the run, relative to its range.
+    flight, contact : (r,) s, predicted limits. tolerance : of the error.
+    """
+
+    method: str
+    steps: Vector
+    axis: str
+    rows: Vector
+    verdict: NDArray[np.int64]
+    error: Vector
+    flight: Vector
+    contact: Vector
+    tolerance: float
+
+    def __str__(self) -> str:
+        letters = ".wMU"
+        lines = [f"{self.axis:>10s}  " + " ".join(f"{dt:7.1e}" for dt in self.steps) + "   predicted"]
+        for row, line, flight, contact in zip(self.rows, self.verdict, self.flight, self.contact, strict=True):
+            cells = " ".join(f"{letters[v]:^7s}" for v in line)
+            lines.append(f"{row:10g}  {cells}   {min(flight, contact):.1e}")
+        return "\n".join([*lines, ". accurate, w wrong, M missed contacts, U unstable"])
+
+
+def stability_map(
+    scene: Scene,
+    method: Callable[[float], Any],
+    steps: ArrayLike,
+    modes: int | Sequence[int] = (1, 2, 3, 5, 10),
+    stiffness: Sequence[float] | None = None,
+    duration: float = 0.1,
+    tolerance: float = 0.01,
+    start: Callable[[Model], Any] | None = None,
+) -> StabilityMap:
+    """Run a method over a grid of steps and mode counts, or steps and contact stiffnesses.
+
+    Every run is forced to start, and compared with ``Exponential(1e-11)`` on the same model.
+
+    Parameters
+    ----------
+    scene : with at least one stop.
+    method : step -> method, such as `solvers.RK4` or ``lambda dt: solvers.HenonRK2(dt, dt / 4)``.
+    steps : (k,) s.
+    modes : mode counts, one row each; with ``stiffness`` a single one.
+    stiffness : stiffnesses for the laws of all stops, one row each.
+    duration : s; some ten impacts at most, as later trajectories of any two settings differ.
+    tolerance : largest error of an accurate run, relative to the range of δ at the first stop.
+    start : model -> (2n,); None is rest.
+
+    Returns
+    -------
+    StabilityMap. Draw it with ``fb.plot.stability_map``.
+
+    Raises
+    ------
+    ValueError for bad input, before computing.
+    """
+    steps = np.atleast_1d(np.asarray(steps, dtype=float))
+    where = "stability_map"
+    require(bool(np.all(np.isfinite(steps) & (steps > 0.0))), "steps must be positive (s)", steps.tolist(), where, "")
+    require(len(scene.stops) > 0, "the scene must have a stop", len(scene.stops), where, "add one")
+    require(0.0 < tolerance < 1.0, "tolerance must lie in (0, 1)", tolerance, where, "e.g. 0.01")
+    models, axis, rows = _models(scene, modes, stiffness)
+    cells = [[_cell(model, method, dt, duration, tolerance, start) for dt in steps] for model in models]
+    limits = [_limits(model, method, steps, duration) for model in models]
+    flight, contact = np.array(limits).T
+    return StabilityMap(
+        method_name(method(float(steps[0]))),
+        steps,
+        axis,
+        np.array(rows, dtype=float),
+        np.array([[int(verdict) for verdict, _ in line] for line in cells]),
+        np.array([[error for _, error in line] for line in cells]),
+        flight,
+        contact,
+        tolerance,
+    )
+
+
+def _models(scene: Scene, modes: int | Sequence[int], stiffness: Sequence[float] | None) -> tuple[list, str, list]:
+    """One model per row."""
+    if stiffness is None:
+        counts = [int(n) for n in np.atleast_1d(np.asarray(modes))]
+        return [scene.reduce(modes=n) for n in counts], "modes", counts
+    require(isinstance(modes, (int, np.integer)), "modes must be one count when stiffness is given", modes,
+            "stability_map", "e.g. modes=2")  # fmt: skip
+    for stop in scene.stops:
+        require(hasattr(stop.law, "stiffness"), "every law must have a stiffness", stop.law, "stability_map",
+                "vary modes instead")  # fmt: skip
+    models = []
+    for value in stiffness:
+        stops = [replace(stop, law=replace(stop.law, stiffness=float(value))) for stop in scene.stops]
+        models.append(replace(scene, stops=stops).reduce(modes=int(modes)))  # type: ignore[arg-type]
+    return models, "stiffness", list(stiffness)
+
+
+def _limits(model: Model, method: Callable[[float], Any], steps: Vector, duration: float) -> tuple[float, float]:
+    """Predicted limits as values of the map's step: a method with a second step scales it along."""
+    made = method(float(steps[0]))
+    limit = made.stable_dt(model.system, duration=duration)
+    flight, contact = (float(steps[0]) / step for step in made.steps)
+    return limit.flight * flight, limit.contact * contact
+
+
+def _cell(model: Model, method: Any, dt: float, duration: float, tolerance: float, start: Any) -> tuple[Verdict, float]:
+    """One run judged."""
+    forced = replace(method(float(dt)), force_unstable=True)
+    begin = None if start is None else start(model)
+    best = _truth(model, duration, begin)
+    try:
+        run = model.simulate(duration, duration / SAMPLES, begin, forced)
+    except solvers.SolverError:
+        return Verdict.UNSTABLE, np.inf
+    delta, wanted = run.indentation(), best.indentation()
+    error = float(np.abs(delta - wanted).max() / np.ptp(wanted))
+    if error <= tolerance:
+        return Verdict.ACCURATE, error
+    return Verdict.MISSED if len(run.contacts) < len(best.contacts) else Verdict.WRONG, error
+
+
+def _truth(model: Model, duration: float, start: Any) -> Any:
+    """The reference, once per model."""
+    key = "truth of a stability map", duration, None if start is None else tuple(np.asarray(start))
+    if key not in model.system.kept:
+        best = solvers.Exponential(1e-11, ledger=False)
+        model.system.kept[key] = model.simulate(duration, duration / SAMPLES, start, best)
+    return model.system.kept[key]

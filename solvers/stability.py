@@ -1,0 +1,297 @@
+r"""How long a constant step may be: predicted, before a run begins.
+
+One step of a linear method multiplies the state of a mode p'' + c p' + k p = 0 by a matrix; the motion stays bounded
+where its spectral radius ρ(h) is not above 1. A run of duration T is refused where it would amplify a mode by more than
+a tenth, ln ρ · T/h > 0.1: the limit proper for T → ∞, and for a short run of an undamped mode a little more.
+
+In contact the law is replaced by its tangent at the expected indentation, k_t = ∂F/∂δ and c_t = ∂F/∂δ̇:
+
+.. math:: K_c = K + k_t\, w w^T,\qquad C_c = C + c_t\, w w^T
+
+and the same question asked of the modes of (M, C_c, K_c).
+"""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Callable
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from solvers.events import IGNORED, LANDED
+from solvers.forcing import Forcing
+from solvers.system import Array, Contact, System, decouple
+
+Radius = Callable[[float, float, float], float]
+"""ρ(h, k, c): factor by which one step of size h multiplies a mode p'' + c p' + k p = 0."""
+
+EXPECTED_SPEED = 1.0  # m/s; a Hertz stop's frequency goes with its fifth root, so a guess serves
+_SLACK = 1e-10  # rounding of ρ
+_GROWTH = 0.1  # allowed logarithm of a mode's amplification in a run
+_SMALLEST, _LARGEST, _PER_DECADE = 1e-2, 1e2, 60  # range of hω searched; below it a method counts as never stable
+
+
+class Limit(NamedTuple):
+    """Largest stable steps in s, in flight and with the stops in contact; the mode (0 the lowest) that sets each."""
+
+    flight: float
+    contact: float
+    mode: int
+    contact_mode: int
+
+
+# --- spectral radii --------------------------------------------------------------------------------------------------
+
+
+def taylor_radius(order: int) -> Radius:
+    """ρ of an explicit Runge–Kutta method with as many stages as its order: |Σ (hλ)^j/j!| over both eigenvalues λ."""
+    coefficients = [1.0 / math.factorial(j) for j in range(order, -1, -1)]
+
+    def radius(h: float, k: float, c: float) -> float:
+        root = np.sqrt(complex(0.25 * c * c - k))
+        return float(np.abs(np.polyval(coefficients, h * (-0.5 * c + np.array([root, -root])))).max())
+
+    return radius
+
+
+def alpha_radius(alpha_m: float, alpha_f: float, beta: float, gamma: float) -> Radius:
+    """ρ of the generalised-α family, see `solvers.newmark`, from its matrix on (p, h p', h² p'')."""
+
+    def radius(h: float, k: float, c: float) -> float:
+        x, y, kept = h * h * k, h * c, 1.0 - alpha_f
+        predicted = np.array([[1.0, 1.0, 0.5 - beta], [0.0, 1.0, 1.0 - gamma]])
+        effective = (1.0 - alpha_m) + kept * (y * gamma + x * beta)
+        old = np.array([-alpha_f * x, -alpha_f * y, -alpha_m])
+        a = (old - kept * (x * predicted[0] + y * predicted[1])) / effective
+        step = np.array([predicted[0] + beta * a, predicted[1] + gamma * a, a])
+        if alpha_m == 0.0 and alpha_f == 0.0:  # the equation holds at every step: p'' is no unknown of its own
+            step = step[:2, :2] - np.outer(step[:2, 2], [x, y])
+        return float(np.abs(np.linalg.eigvals(step)).max())
+
+    return radius
+
+
+# --- limits ----------------------------------------------------------------------------------------------------------
+
+
+def largest_step(radius: Radius, k: float, c: float, lasting: float = math.inf) -> float:
+    """Largest h up to which a mode is not amplified by a tenth within ``lasting`` seconds; 0 if there is none."""
+    fastest = max(math.sqrt(abs(k)), abs(c))
+    if fastest == 0.0:
+        return math.inf
+
+    def stable(h: float) -> bool:
+        growth = radius(h, k, c) - 1.0
+        return growth <= _SLACK or math.log1p(growth) * max(lasting / h, 1.0) <= _GROWTH
+
+    grid = np.geomspace(_SMALLEST, _LARGEST, round(_PER_DECADE * math.log10(_LARGEST / _SMALLEST)) + 1) / fastest
+    first = next((i for i, h in enumerate(grid) if not stable(h)), None)
+    if first is None:
+        return math.inf
+    if first == 0:
+        return 0.0 if lasting == math.inf else _below(stable, float(grid[0]))
+    low, high = float(grid[first - 1]), float(grid[first])
+    while high - low > 1e-9 * high:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if stable(middle) else (low, middle)
+    return low
+
+
+def _below(stable: Callable[[float], bool], h: float) -> float:
+    """A stable step below the range searched, by halving."""
+    for _ in range(40):
+        h *= 0.5
+        if stable(h):
+            return h
+    return 0.0
+
+
+def limit(radius: Radius, system: System, indentation: float | None = None, lasting: float = math.inf) -> Limit:
+    """Predicted limits of a method; see `ConstantStep.stable_dt`."""
+    flight = [largest_step(radius, k, c, lasting) for k, c in zip(*oscillators(system), strict=True)]
+    if not system.contacts:
+        return Limit(min(flight), math.inf, int(np.argmin(flight)), -1)
+    k, c, half_period = tangent_oscillators(system, indentation)
+    if any(contact.gap < 0.0 for contact in system.contacts) or lasting == math.inf:
+        half_period = lasting  # a preloaded contact may last for ever
+    contact = [largest_step(radius, *pair, min(lasting, half_period)) for pair in zip(k, c, strict=True)]
+    return Limit(min(flight), min(contact), int(np.argmin(flight)), int(np.argmin(contact)))
+
+
+def oscillators(system: System) -> tuple[Array, Array]:
+    """Stiffness k and damping c (j,) of the decoupled modes; of sparse matrices the fastest alone."""
+    if system.sparse:
+        return _fastest(system.M, system.C, system.K)
+    return system.blocks.k, system.blocks.c
+
+
+def tangent_oscillators(system: System, indentation: float | None) -> tuple[Array, Array, float]:
+    """Stiffness k and damping c of the modes with every stop's tangent, and how long a contact lasts."""
+    C, K, longest = system.C, system.K, 0.0
+    for contact in system.contacts:
+        stiffness, damping, mass = tangent(system, contact, indentation)
+        if system.sparse:
+            from scipy.sparse import csc_array
+
+            column = csc_array(contact.direction[:, None])
+            outer: Any = column @ column.T
+        else:
+            outer = np.outer(contact.direction, contact.direction)
+        C, K = C + damping * outer, K + stiffness * outer
+        if stiffness > 0.0:
+            longest = max(longest, math.pi * math.sqrt(mass / stiffness))
+    if system.sparse:
+        return *_fastest(system.M, C, K), longest
+    try:
+        blocks = decouple(system.M, C, K)
+        return blocks.k, blocks.c, longest
+    except ValueError:  # damped modes that cannot be separated: by their share of the damping
+        from scipy.linalg import eigh
+
+        k, phi = eigh(K, system.M)
+        return k, np.sum(phi * (C @ phi), axis=0), longest
+
+
+def _fastest(M: Any, C: Any, K: Any) -> tuple[Array, Array]:
+    """Stiffness k and damping c of the fastest mode of sparse matrices."""
+    from scipy.sparse.linalg import eigsh
+
+    if M.shape[0] < 3:  # too small for an iteration
+        blocks = decouple(M.toarray(), C.toarray(), K.toarray())
+        return blocks.k, blocks.c
+    k, phi = eigsh(K, 1, M, which="LM", v0=np.ones(M.shape[0]) + np.arange(M.shape[0]) % 3)
+    return k, np.sum(phi * (C @ phi), axis=0)
+
+
+def tangent(system: System, contact: Contact, indentation: float | None) -> tuple[float, float, float]:
+    """∂F/∂δ, ∂F/∂δ̇ of a stop at its expected indentation, and the mass 1/(wᵀM⁻¹w) it feels."""
+    mass = 1.0 / float(contact.direction @ _solve(system.M, contact.direction))
+    if indentation is None:
+        delta, speed = max(_depth(contact.law, mass, EXPECTED_SPEED), -contact.gap), EXPECTED_SPEED
+    else:
+        delta, speed = indentation, math.sqrt(2.0 * max(_work(contact.law, indentation), 0.0) / mass)
+    speed = max(speed, contact.law.entry_rate_floor)
+    around = delta * np.array([1.0 - 1e-6, 1.0 + 1e-6])
+    by_delta = np.diff(contact.law.force(around, 0.0, speed))[0] / (around[1] - around[0])
+    by_rate = np.diff(contact.law.force(np.full(2, delta), speed * np.array([-1e-6, 1e-6]), speed))[0] / (2e-6 * speed)
+    if not np.isfinite(by_delta + by_rate):
+        return 0.0, 0.0, mass
+    return float(by_delta), float(by_rate), mass
+
+
+def _solve(M: Any, vector: Array) -> Array:
+    """M⁻¹ times a vector."""
+    if hasattr(M, "toarray"):
+        from scipy.sparse.linalg import spsolve
+
+        return np.asarray(spsolve(M, vector)).reshape(vector.shape)
+    return np.linalg.solve(M, vector)
+
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
+
+
+def _work(law: Any, delta: float) -> float:
+    """∫F dδ up to an indentation, slowly."""
+    return 0.5 * delta * float(_WEIGHTS @ law.force(0.5 * delta * (1.0 + _NODES), 0.0, 1.0))
+
+
+def _depth(law: Any, mass: float, speed: float) -> float:
+    """Indentation at which a stop has taken the energy of a mass."""
+    low, high = -15.0, 3.0  # powers of ten, m
+    while high - low > 1e-6:
+        middle = 0.5 * (low + high)
+        enough = _work(law, 10.0**middle) >= 0.5 * mass * speed**2
+        low, high = (low, middle) if enough else (middle, high)
+    return float(10.0**low)
+
+
+# --- what all methods of constant step share -------------------------------------------------------------------------
+
+
+class ConstantStep:
+    """A method of constant step: checked before it starts, watched while it runs."""
+
+    adaptive: ClassVar[bool] = False
+    rtol: ClassVar[float] = 1e-10  # for sampling signals
+    atol: ClassVar[float] = 0.0
+    constants: ClassVar[tuple[float, ...]] = ()
+    dt: float
+    locate: bool
+    force_unstable: bool
+
+    @property
+    def steps(self) -> tuple[float, float]:
+        """Steps in flight and in contact, s."""
+        return self.dt, self.dt
+
+    @property
+    def events(self) -> int:
+        """What is done about events."""
+        return LANDED if self.locate else IGNORED
+
+    @property
+    @abstractmethod
+    def radius(self) -> Radius:
+        """Spectral radius of a step."""
+
+    def takes_matrices(self, system: System) -> bool:
+        """Whether a run steps on the matrices themselves rather than on decoupled modes."""
+        return False
+
+    def stable_dt(self, system: System, indentation: float | None = None, duration: float = math.inf) -> Limit:
+        """Predicted limits of the step.
+
+        Parameters
+        ----------
+        system : the problem.
+        indentation : expected one in m, for the tangent of the contact laws; None takes that of a hit at 1 m/s.
+        duration : s; a short run may amplify a mode by a tenth.
+
+        Returns
+        -------
+        Limit : the named tuple (flight, contact, mode, contact_mode) in s; 0 where no step is stable, inf where every
+            one is.
+
+        Notes
+        -----
+        Exact for modes; in contact as good as a frozen tangent is. Of sparse matrices only the fastest mode is asked.
+        """
+        return limit(self.radius, system, indentation, duration)
+
+    def engine(self, system: System, z: Array, forcing: Forcing, duration: float) -> Any:
+        """The method made ready for one run; ValueError for a step that is predicted to be unstable."""
+        if not self.force_unstable:
+            refuse(self, system, duration)
+        if self.takes_matrices(system):
+            from solvers.full import MatrixEngine
+
+            return MatrixEngine(self, system, z, forcing, duration)
+        from solvers.march import Engine  # here: the loop knows the methods' modules
+
+        return Engine(self, system, z, forcing, duration)
+
+
+def refuse(method: ConstantStep, system: System, duration: float) -> None:
+    """ValueError for a step above its limit; looked at once per system."""
+    key = "limit", type(method), method.constants, duration
+    if key not in system.kept:
+        system.kept[key] = method.stable_dt(system, duration=duration)
+    found = system.kept[key]
+    for where, step, longest, mode in (
+        ("in flight", method.steps[0], found.flight, found.mode),
+        ("in contact, hit at 1 m/s", method.steps[1], found.contact, found.contact_mode),
+    ):
+        if not step <= longest:
+            advice = f"take a step below {longest:.3g} s" if longest > 0.0 else "no step is stable: take another method"
+            raise ValueError(
+                f"{method!r} is unstable {where}: mode {_name(system, mode)} allows {longest:.3g} s, got {step:g} s; "
+                f"{advice}, or run it all the same with force_unstable=True"
+            )
+
+
+def _name(system: System, mode: int) -> str:
+    """A mode for a message, counted from 1."""
+    return "of the highest frequency" if system.sparse else f"{mode + 1} of {system.size}"

@@ -1,0 +1,284 @@
+"""Methods of constant step: order on smooth motion and through contact, closed answers, modes against matrices."""
+
+import math
+
+import numpy as np
+import pytest
+from problems import HertzBounce, bilinear, coupled_dashpot, linear_stop, paper_scene, reference, two_sided_scene
+from scipy import sparse
+
+import fembeam as fb
+import solvers
+from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear
+from solvers import RK4, CentralDifference, Contact, DormandPrince, GeneralizedAlpha, Newmark, System, integrate
+
+METHODS = [RK4, CentralDifference, Newmark, GeneralizedAlpha]
+ORDER = {RK4: 4.0, CentralDifference: 2.0, Newmark: 2.0, GeneralizedAlpha: 2.0}
+LINEAR = PiecewiseLinear([1e4])
+HYSTERETIC = Hysteretic.lankarani_nikravesh(1e6, restitution=0.5)
+methods = pytest.mark.parametrize("method", METHODS, ids=lambda method: method.__name__)
+
+
+def as_sparse(system):
+    return System(*(sparse.csc_array(A) for A in (system.M, system.C, system.K)), system.contacts, system.loads)
+
+
+def slope(steps, errors):
+    return np.polyfit(np.log(steps), np.log(errors), 1)[0]
+
+
+# --- order -----------------------------------------------------------------------------------------------------------
+
+
+@methods
+def test_order_on_smooth_motion(method):
+    system = System.modal([3.0, 11.0], [0.05, 0.02], loads=[([1.0, -2.0], fb.Harmonic(4.0, 2.0))])
+    exact = integrate(system, [1.0, 0.2], [0.0, 1.0], 3.0, method=DormandPrince(1e-13)).q[-1]
+    steps = 0.02 / 2.0 ** np.arange(4)
+    errors = [
+        np.abs(integrate(system, [1.0, 0.2], [0.0, 1.0], 3.0, method=method(h)).q[-1] - exact).max() for h in steps
+    ]
+    assert abs(slope(steps, errors) - ORDER[method]) < 0.15
+    assert errors[-1] < (1e-7 if method is RK4 else 1e-3)
+
+
+@pytest.mark.parametrize("gamma", [0.6, 1.0])
+def test_newmark_with_numerical_damping_has_order_one(gamma):
+    system, steps = System.modal([3.0], 0.0), 0.004 / 2.0 ** np.arange(3)
+    errors = [
+        abs(integrate(system, [1.0], [0.0], 2.0, method=Newmark(h, 0.5 * gamma, gamma)).q[-1, 0] - math.cos(6.0))
+        for h in steps
+    ]
+    assert abs(slope(steps, errors) - 1.0) < 0.15
+
+
+def test_trapezoidal_rule_has_its_known_period():
+    # cos θ = (1 - x²/4)/(1 + x²/4) a step, x = hω, and no damping
+    x, steps = 0.3, 1000
+    run = integrate(System.modal([3.0], 0.0), [1.0], [0.0], 0.1 * steps, method=Newmark(0.1))
+    assert run.q[-1, 0] == pytest.approx(math.cos(steps * math.acos((1 - x * x / 4) / (1 + x * x / 4))), abs=1e-9)
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.5, 1.0])
+def test_generalised_alpha_damps_high_modes_as_asked(rho):
+    assert GeneralizedAlpha(1.0, rho).radius(1e5, 1.0, 0.0) == pytest.approx(rho, abs=1e-3)
+
+
+def contact_errors(law, method, locate, starts=(0.03, 0.04, 0.05, 0.06, 0.07, 0.08, 0.09)):
+    """Median errors over the starts, each with two or three contacts, at five steps."""
+    system = System.modal([5.0, 40.0], 0.02, [Contact([1.0, 0.6], law)])
+    end = 0.9
+    exact = [integrate(system, [a, 0.0], [-1.0, 0.3], end, method=DormandPrince(1e-13, 1e-18)).q[-1] for a in starts]
+    steps = 1e-3 / 2.0 ** np.arange(5)
+    errors = [
+        np.median(
+            [
+                abs(integrate(system, [a, 0.0], [-1.0, 0.3], end, method=method(h, locate=locate)).q[-1] - x)[0]
+                for a, x in zip(starts, exact, strict=True)
+            ]
+        )
+        for h in steps
+    ]
+    return steps, np.array(errors)
+
+
+@methods
+@pytest.mark.parametrize("law", [LINEAR, KelvinVoigt(1e4, 10.0)], ids=["linear", "force jumps"])
+def test_located_events_keep_the_order_where_the_law_is_smooth_between_them(method, law):
+    assert abs(slope(*contact_errors(law, method, True)) - ORDER[method]) < 0.25
+
+
+@methods
+@pytest.mark.parametrize("law", [Hertz(1e6), HYSTERETIC], ids=["hertz", "hysteretic"])
+def test_hertz_force_begins_with_an_infinite_curvature_and_limits_the_order(method, law):
+    # the first step of a contact integrates t^1.5 to h^2.5, so even RK4 has no more than 2.5
+    expected = min(ORDER[method], 2.5)
+    assert abs(slope(*contact_errors(law, method, True)) - expected) < 0.4
+
+
+@methods
+@pytest.mark.parametrize(
+    ("law", "lowest", "highest"),
+    [(LINEAR, 1.6, 2.4), (Hertz(1e6), 2.0, 3.0), (HYSTERETIC, 0.8, 1.7), (KelvinVoigt(1e4, 10.0), 0.8, 1.7)],
+    ids=["linear: 2", "hertz: 2.5", "late latch: 1", "force jumps: 1"],
+)
+def test_ignored_events_cost_order(method, law, lowest, highest):
+    # a contact noticed up to h late loses an impulse of h², h^2.5 or, where the force jumps, h; a late entry rate h
+    steps, errors = contact_errors(law, method, False)
+    assert lowest < slope(steps, errors) < highest
+    if method is RK4:
+        assert errors[-1] > 50.0 * contact_errors(law, method, True)[1][-1]
+
+
+# --- closed answers --------------------------------------------------------------------------------------------------
+
+
+@methods
+def test_linear_stop_has_its_published_numbers(method):
+    h = 1e-4
+    accuracy = 3e-8 if method is RK4 else 3e-5
+    log = integrate(linear_stop(), [0.0], [-1.0], 0.04, method=method(h)).contacts
+    assert log.peak_force[0] == pytest.approx(9950.371902, rel=accuracy)
+    assert log.t_out[0] - log.t_in[0] == pytest.approx(0.03126001527, rel=accuracy)
+    assert log.impulse[0] == pytest.approx(198.0198020, rel=30 * accuracy)
+
+
+@methods
+def test_hertz_bounce_has_its_closed_answers(method):
+    law, mass, speed = Hertz(1e6), 2.0, 0.5
+    answer = HertzBounce(law.stiffness, mass, speed)
+    system = System([[mass]], [[0.0]], [[0.0]], [Contact([1.0], law)])
+    log = integrate(system, [0.0], [-speed], 2.0 * answer.duration, method=method(answer.duration / 400)).contacts
+    assert log.peak_indentation[0] == pytest.approx(answer.peak_indentation, rel=2e-4)
+    assert log.t_out[0] == pytest.approx(answer.duration, rel=2e-4)
+    assert log.speed_out[0] == pytest.approx(speed, rel=1e-3)
+
+
+@methods
+def test_bilinear_oscillator_has_its_period(method):
+    one, two = 3.0, 15.0
+    period = math.pi / one + math.pi / two
+    end = integrate(bilinear(one, two), [1.0], [0.0], 3.0 * period, method=method(period / 2000))
+    assert end.q[-1, 0] == pytest.approx(1.0, abs=1e-4)
+
+
+@methods
+def test_paper_scene_agrees_with_the_main_method(method):
+    model, duration = paper_scene().reduce(modes=2), 0.06
+    best = model.simulate(duration)
+    run = model.simulate(duration, solver=method(2e-6))
+    assert len(run.contacts) == len(best.contacts) >= 2
+    np.testing.assert_allclose(run.contacts.t_in, best.contacts.t_in, atol=1e-6)
+    assert abs(run.displacement(0.24445)[-1] - best.displacement(0.24445)[-1]) < 1e-7
+
+
+@methods
+def test_stops_on_both_sides_agree_with_the_reference(method):
+    system = two_sided_scene(mid_gap=1e-4).reduce(modes=3).system
+    start = np.zeros(3), np.array([0.02, -0.05, 0.0])
+    found = integrate(system, *start, 0.02, method=method(5e-7))
+    wanted = reference(system, *start, 0.02)
+    assert len(found.contacts) == len(wanted.contacts) >= 3
+    np.testing.assert_allclose(found.q[-1], wanted.q[-1], atol=3e-4 * np.abs(wanted.q[-1]).max())
+
+
+def test_two_equal_stops_at_one_place_act_as_one_of_twice_the_stiffness():
+    def run(contacts):
+        return integrate(System.modal([5.0, 40.0], 0.02, contacts), [0.0, 0.0], [-1.0, 0.3], 0.5, method=Newmark(1e-3))
+
+    one, two = run([Contact([1.0, 0.6], Hertz(2e6))]), run([Contact([1.0, 0.6], Hertz(1e6))] * 2)
+    np.testing.assert_allclose(two.q, one.q, rtol=1e-9)
+
+
+# --- modes and matrices ----------------------------------------------------------------------------------------------
+
+
+@methods
+@pytest.mark.parametrize("locate", [True, False])
+def test_sparse_matrices_give_the_run_of_the_modes(method, locate):
+    K = 1e4 * np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+    M = np.diag([1.0, 2.0, 0.5])
+    contacts = [Contact([0.0, 0.0, 1.0], HYSTERETIC, 1e-3), Contact([0.0, -1.0, 0.0], LINEAR, 2e-3)]
+    system = System(M, 0.4 * M + 1e-4 * K, K, contacts, [([1.0, 0.0, -1.0], fb.Harmonic(30.0, 50.0))])
+    ends = [
+        integrate(s, np.zeros(3), [0.3, 0.0, -0.5], 0.2, 1e-2, method(2e-4, locate=locate))
+        for s in (system, as_sparse(system))
+    ]
+    assert len(ends[0].contacts) >= 4
+    np.testing.assert_allclose(ends[1].q, ends[0].q, atol=1e-9 * np.abs(ends[0].q).max())
+    np.testing.assert_allclose(ends[1].energy.residual, ends[0].energy.residual, atol=1e-9)
+    assert ends[0].cost.steps == ends[1].cost.steps
+
+
+@methods
+def test_damping_that_couples_the_modes(method):
+    start, contacts = (np.zeros(3), [0.0, 0.0, -0.3]), [Contact([0.0, 0.0, 1.0], Hertz(1e7))]
+    system = coupled_dashpot(contacts)
+    found, wanted = integrate(system, *start, 0.1, method=method(2e-5)), reference(system, *start, 0.1)
+    assert len(found.contacts) == len(wanted.contacts) >= 2
+    np.testing.assert_allclose(found.q[-1], wanted.q[-1], atol=2e-4 * np.abs(wanted.q[-1]).max())
+
+
+def beam_matrices(mass, elements=60):
+    """The paper's beam unreduced, over a hysteretic stop, struck by its own motion."""
+    scene = paper_scene()
+    matrices = scene.matrices(elements)
+    M = solvers.lumped(matrices.M, matrices.influence) if mass == "lumped" else matrices.M
+    direction = matrices.interpolation(0.24445).toarray()[0]
+    stop = Contact(direction, scene.stops[0].law)
+    system = System(M, 2.0 * M, matrices.K, [stop], [(-matrices.base_load, scene.base.derivative(2))])
+    return system, direction
+
+
+def test_unreduced_beam_runs_on_sparse_matrices_and_agrees_with_many_modes():
+    system, tip = beam_matrices("consistent")
+    start = np.zeros(system.size), np.zeros(system.size)
+    full = integrate(system, *start, 0.04, method=GeneralizedAlpha(2e-5, 0.8))
+    modal = integrate(System(system.M.toarray(), system.C.toarray(), system.K.toarray(), system.contacts, system.loads),
+                      *start, 0.04, method=GeneralizedAlpha(2e-5, 0.8))  # fmt: skip
+    assert len(full.contacts) == len(modal.contacts) >= 1
+    assert tip @ full.q[-1] == pytest.approx(tip @ modal.q[-1], rel=1e-5)
+    few = paper_scene(zeta=2.0 / (2.0 * np.array([109.13, 790.6, 2303.7]))).reduce(modes=3).simulate(0.04)
+    assert tip @ full.q[-1] == pytest.approx(few.displacement(0.24445)[-1], rel=2e-2)
+
+
+def test_lumped_mass_keeps_the_total_and_its_frequencies_converge():
+    matrices = paper_scene().matrices(40)
+    lumped, r = solvers.lumped(matrices.M, matrices.influence), matrices.influence
+    assert lumped.count_nonzero() == lumped.shape[0]
+    assert r @ (lumped @ r) == pytest.approx(r @ (matrices.M @ r), rel=1e-12)
+    errors = []
+    for elements in (20, 40):
+        system, _ = beam_matrices("lumped", elements)
+        errors.append(abs(math.sqrt(system.blocks.k[1]) - 790.6101))
+    assert errors[1] < 0.5
+    assert errors[1] < 0.35 * errors[0]
+
+
+@pytest.mark.parametrize("mass", ["lumped", "consistent"])
+def test_central_differences_on_the_unreduced_beam(mass):
+    system, tip = beam_matrices(mass, 12)
+    start = np.zeros(system.size), np.zeros(system.size)
+    dt = 0.9 * min(CentralDifference(1.0).stable_dt(system)[:2])
+    explicit = integrate(system, *start, 0.02, method=CentralDifference(dt))
+    fine = integrate(system, *start, 0.02, method=GeneralizedAlpha(2e-6, 1.0))
+    assert tip @ explicit.q[-1] == pytest.approx(tip @ fine.q[-1], rel=2e-3)
+
+
+# --- ledger, input ---------------------------------------------------------------------------------------------------
+
+
+@methods
+def test_ledger_closes_with_the_step(method):
+    model = paper_scene().reduce(modes=2)
+    worst = [np.abs(model.simulate(0.06, 1e-3, solver=method(h)).energy.residual).max() / 1e-3 for h in (1e-5, 2.5e-6)]
+    assert worst[1] < 0.2 * worst[0]
+
+
+@methods
+def test_samples_and_repeated_runs_agree(method):
+    model = paper_scene().reduce(modes=2)
+    first, second = (model.simulate(0.05, 1e-3, solver=method(1e-5)) for _ in range(2))
+    np.testing.assert_array_equal(first.q, second.q)
+    assert np.abs(first.q[-1] - model.simulate(0.05, solver=method(1e-5)).q[-1]).max() < 1e-15
+
+
+@methods
+@pytest.mark.parametrize("bad", [0.0, -1e-3, math.nan, math.inf])
+def test_steps_must_be_positive(method, bad):
+    with pytest.raises(ValueError, match="dt must be positive and finite"):
+        method(bad)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Newmark(1e-3, beta=-0.1), "beta must be >= 0"),
+        (lambda: Newmark(1e-3, gamma=0.4), "gamma must be >= 1/2"),
+        (lambda: Newmark(1e-3, gamma=math.nan), "gamma must be"),
+        (lambda: GeneralizedAlpha(1e-3, rho_inf=1.1), "rho_inf must lie in"),
+    ],
+)
+def test_parameters_out_of_range_are_refused(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()

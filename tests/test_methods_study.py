@@ -1,0 +1,230 @@
+"""Studies of methods: speed against accuracy, maps of stability, the gallery of failures; their figures."""
+
+import csv
+import re
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+from problems import TIP, paper_scene
+
+import fembeam as fb
+from contacts import PiecewiseLinear
+from fembeam.cli import main
+from fembeam.study import NoReferenceError, Verdict, gallery, speed_accuracy, stability_map
+from fembeam.study.speed_accuracy import Point, SpeedAccuracy
+from solvers import RK4, CentralDifference, DormandPrince, Exponential, HenonRK2, Newmark
+
+METHODS = [Exponential(1e-4), Exponential(1e-8), DormandPrince(1e-8), RK4(4e-5), RK4(1e-5), HenonRK2(1.0, 1.0)]
+
+
+# --- speed against accuracy ------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def found():
+    models = [paper_scene().reduce(modes=n) for n in (3, 1)]
+    return speed_accuracy(models, METHODS, starts=3, duration=0.05, rounds=1)
+
+
+def test_errors_fall_with_the_setting_and_reduction_errors_with_modes(found):
+    by = {(p.method, p.setting, p.modes): p for p in found.points}
+    for modes in (1, 3):
+        assert by["Exponential", "rtol=1e-08", modes].error < 1e-7
+        assert by["RK4", "dt=1e-05", modes].error < 0.5 * by["RK4", "dt=4e-05", modes].error
+        assert by["DormandPrince", "rtol=1e-08", modes].law_calls > 100
+    assert found.reduction[3] == 0.0
+    assert found.reduction[1] > 1e-3
+    fine = by["Exponential", "rtol=1e-08", 1]
+    assert fine.total == pytest.approx(found.reduction[1], rel=1e-3)  # a finer step is wasted on one mode
+    assert all(len(p.errors) == 3 for p in found.points if not p.failure)
+
+
+def test_a_refused_method_is_listed_with_its_reason(found):
+    refused = [p for p in found.points if p.method == "HenonRK2"]
+    assert len(refused) == 2
+    assert all("unstable in flight" in p.failure and not p.errors.size and np.isnan(p.time) for p in refused)
+    assert "unstable in flight" in str(found)
+
+
+def test_errors_are_those_of_plain_runs(found):
+    models = {n: paper_scene().reduce(modes=n) for n in (1, 3)}
+    start = np.array([1e-4, -0.02])
+    one = speed_accuracy(models[1], [RK4(1e-5)], starts=start, duration=0.03, rounds=1)
+    runs = [models[1].simulate(0.03, start=start, solver=solver) for solver in (RK4(1e-5), Exponential(1e-12))]
+    ends = [run.displacement(TIP)[-1] for run in runs]
+    assert one.points[0].error == pytest.approx(abs(ends[0] - ends[1]) / abs(ends[1]), rel=1e-3)
+
+
+def test_references_that_disagree_are_refused():
+    model = paper_scene().reduce(modes=2)
+    with pytest.raises(NoReferenceError, match=r"2 modes .* differ by .* run shorter, or ask for a statistic"):
+        speed_accuracy(model, [Exponential()], starts=1, duration=0.1, agreement=1e-18, rounds=1)
+
+
+def test_statistics_on_a_long_horizon():
+    def impact_rate(run):
+        return len(run.contacts) / run.t[-1]
+
+    model = paper_scene().reduce(modes=2)
+    options = {"starts": 2, "duration": 3.0, "quantity": impact_rate, "agreement": 0.1, "rounds": 1}
+    result = speed_accuracy(model, [Exponential(1e-6), HenonRK2(1e-4, 2e-5)], **options)
+    assert result.quantity == "impact rate, relative"
+    assert result.unit > 10.0
+    assert all(p.error < 0.15 for p in result.points)
+
+
+def test_the_front_is_what_no_point_beats():
+    def point(method, seconds, error, modes=2):
+        return Point(method, "", modes, np.array([seconds]), np.array([error]), np.array([error]), 1.0, 1.0)
+
+    points = [
+        point("a", 1.0, 1e-3),
+        point("b", 2.0, 1e-5),
+        point("a", 3.0, 1e-4),
+        point("b", 1.5, 1e-2),
+        point("a", 9.0, 1e-9, 5),
+    ]
+    result = SpeedAccuracy(points, 1.0, {2: 0.0, 5: 0.0}, {2: 0.1, 5: 0.0})
+    assert result.front(2) == points[:2]
+    assert result.beaten("a") == [points[1]]
+    assert result.beaten("b", better_than=1e-2) == [points[0], points[4]]
+    assert not result.beaten("b", better_than=1e-10)
+
+
+def test_table_and_figure(found, tmp_path):
+    found.save(tmp_path / "table.csv")
+    with open(tmp_path / "table.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == len(found.points)
+    assert float(rows[0]["error"]) == found.points[0].error
+    figure = fb.plot.speed_accuracy(found)
+    assert len(figure.axes) == 2
+    figure.savefig(tmp_path / "chart.png")
+
+
+def test_command_line(tmp_path, capsys):
+    text = (Path(__file__).parent.parent / "examples" / "beam_stop.toml").read_text().split("[simulate]")[0]
+    base = '[base]\nkind = "harmonic"\namplitude = 1e-3\nomega = 195.0\n\n'
+    text = re.sub(r"(?ms)^\[base\].*?(?=^\[)", base, text)
+    scene = tmp_path / "scene.toml"
+    scene.write_text(text + "[speed_accuracy]\nmodes = [1, 2]\nrtols = [1e-6]\nsteps = [5e-5]\nstarts = 2\n"
+                     "duration = 0.03\nrounds = 1\n")  # fmt: skip
+    assert main(["run", str(scene), "--out", str(tmp_path / "out"), "--quiet"]) == 0
+    assert "RK4" in capsys.readouterr().out
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {f"speed_accuracy.{k}" for k in ("csv", "png", "txt")}
+    scene.write_text(text + "[speed_accuracy]\nrtols = [1e-20]\n")
+    assert main(["run", str(scene), "--out", str(tmp_path / "out")]) == 2
+    assert "[speed_accuracy]: rtols must lie in" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"starts": 0}, "starts must be at least 1"),
+        ({"starts": np.zeros((2, 3))}, "starts must have 4 columns"),
+        ({"rounds": 0}, "rounds must be at least 1"),
+        ({"duration": -1.0}, "duration must be finite and positive"),
+        ({"methods": []}, "methods must hold one"),
+    ],
+)
+def test_bad_input_is_refused(change, message):
+    given = {"model": paper_scene().reduce(modes=2), "methods": [Exponential()], **change}
+    with pytest.raises(ValueError, match=message):
+        speed_accuracy(**given)
+
+
+def test_models_must_be_nested_and_methods_be_methods():
+    scene = paper_scene()
+    with pytest.raises(ValueError, match="nested"):
+        speed_accuracy([scene.reduce(modes=[1]), scene.reduce(modes=2)], [Exponential()])
+    with pytest.raises(TypeError, match="methods must be given with their settings"):
+        speed_accuracy(scene.reduce(modes=2), [Exponential])
+
+
+# --- maps ------------------------------------------------------------------------------------------------------------
+
+
+def test_map_over_modes_agrees_with_the_predicted_limits(tmp_path):
+    steps = np.array([1e-5, 5e-5, 1e-4, 2e-4, 8e-4])
+    found = stability_map(paper_scene(), RK4, steps, modes=(2, 10), duration=0.05)
+    assert found.verdict.shape == found.error.shape == (2, 5)
+    for line, flight, contact in zip(found.verdict, found.flight, found.contact, strict=True):
+        assert not np.any(line[steps < 0.9 * min(flight, contact)] == Verdict.UNSTABLE)
+    assert np.all(found.verdict[1, steps > 1.1 * found.flight[1]] == Verdict.UNSTABLE)
+    assert found.verdict[0, 0] == found.verdict[1, 0] == Verdict.ACCURATE
+    assert found.error[0, 0] < found.tolerance
+    assert "predicted" in str(found)
+    fb.plot.stability_map(found).savefig(tmp_path / "map.png")
+
+
+def test_map_over_stiffness_sees_missed_contacts():
+    found = stability_map(
+        paper_scene(), partial(Newmark, locate=False), [2e-6, 1.5e-3], modes=1, stiffness=[1e7, 1e9], duration=0.1
+    )
+    assert found.axis == "stiffness"
+    assert found.method == "Newmark, events ignored"
+    assert np.all(found.verdict[:, 0] <= Verdict.WRONG)
+    assert np.all(found.verdict[:, 1] >= Verdict.WRONG)
+    assert np.all(np.isinf(found.flight))
+
+
+def test_map_scales_the_limit_of_the_second_step():
+    found = stability_map(paper_scene(), lambda dt: HenonRK2(dt, dt / 10), [1e-5], modes=(1,), duration=0.02)
+    plain = stability_map(paper_scene(), lambda dt: HenonRK2(dt, dt), [1e-5], modes=(1,), duration=0.02)
+    assert found.contact[0] == pytest.approx(10 * plain.contact[0])
+    assert found.flight[0] == pytest.approx(plain.flight[0])
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"steps": [0.0]}, "steps must be positive"),
+        ({"steps": [np.nan]}, "steps must be positive"),
+        ({"tolerance": 2.0}, "tolerance must lie in"),
+        ({"stiffness": [1e8]}, "modes must be one count"),
+        ({"stiffness": [1e8], "modes": 1, "scene": paper_scene(law=PiecewiseLinear([1e5]))}, "must have a stiffness"),
+        ({"scene": fb.Scene(fb.Beam(1.0, fb.Section(1e11, 1e3, 1e-4, 1e-9)), [fb.Clamped(0.0)])}, "must have a stop"),
+    ],
+)
+def test_bad_maps_are_refused(change, message):
+    given = {"scene": paper_scene(), "method": CentralDifference, "steps": [1e-5], **change}
+    with pytest.raises(ValueError, match=message):
+        stability_map(**given)
+
+
+# --- the gallery -----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def cases():
+    return {case.title: case for case in gallery(paper_scene())}
+
+
+@pytest.mark.parametrize(
+    ("title", "naive", "says"),
+    [
+        ("Heun, steps for 2 modes, with 3", np.inf, ("stopped at", "mode 3 of 3 allows")),
+        ("Heun, steps for 2 modes, with 10", np.inf, ("stopped at", "mode 10 of 10 allows")),
+        ("A step over a whole contact", 0.1, ("0 contacts", "3 contacts; refuses")),
+        ("Hénon's step at grazing", 0.2, ("no entry", "lands")),
+        ("Two entries in one step", 0.5, ("0 contacts", "2 contacts")),
+        ("Chatter", 1.0, ("stopped", "at rest after")),
+        ("Newmark at an elastic stop", 1.0, ("times its energy", "keeps it")),
+        ("Aliased high modes in contact", 0.5, ("stable, but", "checks each mode")),
+        ("Preloaded, permanent contact", 10.0, ("times too far", "one contact")),
+        ("Latched damping at grazing", 1e5, ("without bound", "floored")),
+    ],
+)
+def test_naive_methods_fail_and_ours_does_not(cases, title, naive, says):
+    case = cases[title]
+    assert case.naive_error >= naive
+    assert case.our_error < 1e-3
+    assert all(part in said for part, said in zip(says, case.said, strict=True))
+
+
+def test_gallery_is_drawn(cases, tmp_path):
+    figure = fb.plot.failures(list(cases.values()))
+    assert sum(ax.axison for ax in figure.axes) == len(cases)
+    figure.savefig(tmp_path / "gallery.png")
