@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import brentq, root
 
 from contacts import PiecewiseLinear
 from solvers import Contact, System
@@ -101,15 +101,18 @@ class Bilinear:
         """State after a run from rest."""
         return self.march(np.zeros(2), periods * self.period)[0]
 
-    def special(self, mu, x, low, high, periods=1):
-        """Ω in [low, high] where the multiplier is ``mu`` = ±1: det(Φ - μ) = 1 - μ tr Φ + det Φ is zero."""
+    def special(self, mu, x, periods=1):
+        """(Ω, state) nearby where the multiplier is ``mu`` = ±1: det(Φ - μ) = 1 - μ tr Φ + det Φ is zero."""
 
-        def distance(omega):
-            nonlocal x
-            x, product, _ = replace(self, omega=omega).orbit(x, periods)
-            return 1.0 - mu * np.trace(product) + np.linalg.det(product)
+        def distance(unknowns):
+            problem = replace(self, omega=unknowns[2])
+            end, product, _ = problem.march(unknowns[:2], periods * problem.period)
+            return np.append(end - unknowns[:2], 1.0 - mu * np.trace(product) + np.linalg.det(product))
 
-        return brentq(distance, low, high, xtol=1e-14, rtol=1e-14)
+        found = root(distance, np.append(x, self.omega), tol=1e-14)
+        if not np.abs(found.fun).max() < 1e-12:
+            raise ArithmeticError(f"no special point: {found.message}")
+        return found.x[2], found.x[:2]
 
     def linear_amplitude(self):
         """Of the motion that does not touch the stop."""
