@@ -12,7 +12,12 @@ from scipy.special import ellipj, ellipk
 from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, law
 from solvers import Contact, DormandPrince, Exponential, HenonRK2, OrbitError, System, integrate, orbit
 
-OMEGA, ZETA, PHI, GAMMA = np.array([109.13, 790.6]), np.array([0.02, 0.01]), np.array([6.2, -1.9]), np.array([0.16, 0.02])
+OMEGA, ZETA, PHI, GAMMA = (
+    np.array([109.13, 790.6]),
+    np.array([0.02, 0.01]),
+    np.array([6.2, -1.9]),
+    np.array([0.16, 0.02]),
+)
 ELASTIC = PiecewiseLinear([1e5, 4e5], knots=[2e-5])
 HYSTERETIC = Hysteretic(2.1e8, damping_factor=0.5625)
 STABLE = Bilinear(1.3, zeta=0.1)
@@ -58,7 +63,9 @@ def differenced(system, x, duration, step=3e-5):
 # --- long runs, residuals, derivatives ----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("law", [HYSTERETIC, Hertz(2.1e8), KelvinVoigt(2e5, 30.0), ELASTIC], ids=lambda law: type(law).__name__)
+@pytest.mark.parametrize(
+    "law", [HYSTERETIC, Hertz(2.1e8), KelvinVoigt(2e5, 30.0), ELASTIC], ids=lambda law: type(law).__name__
+)
 def test_stable_orbit_is_what_a_long_run_settles_to(law):
     system, period = beam(law, phase=0.01), 2.0 * math.pi / 195.0
     found = orbit(system, period)
@@ -271,7 +278,9 @@ def test_three_duffing_orbits_against_harmonic_balance():
     balance, omega = Duffing(), 1.4
     lags = np.linspace(3.0, 0.5, 40)
     points = balance.walk(lags)
-    crossings = [i for i, (a, b) in enumerate(zip(points, points[1:], strict=False)) if (a[1] - omega) * (b[1] - omega) < 0]
+    crossings = [
+        i for i, (a, b) in enumerate(zip(points, points[1:], strict=False)) if (a[1] - omega) * (b[1] - omega) < 0
+    ]
     verdicts = []
     for i in crossings:
         state = balance.state(points[i][0], points[i][1])
