@@ -121,7 +121,7 @@ class Bilinear:
 
 @dataclass(frozen=True)
 class Duffing:
-    r"""q'' + 2ζ q' + q + β q³ = f cos Ωt by harmonic balance: coefficients u of 1, cos jΩt, sin jΩt, j up to ``harmonics``.
+    r"""q'' + 2ζ q' + q + β q³ = f cos Ωt by harmonic balance: coefficients u of 1, cos jΩt, sin jΩt.
 
     The cube is taken at enough samples that nothing is aliased.
     """

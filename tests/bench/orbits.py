@@ -5,7 +5,7 @@ r"""Periodic response of one oscillator over a one-sided elastic stop: this libr
 ``python tests/bench/orbits.py`` follows the response once through its resonance with `solvers.branch`, solves for the
 same Ω by harmonic balance (mousai's ``hb_time``, each point started from the one before), and prints for both: points
 per second, and the largest error of q(t) over all times and frequencies, relative to the largest |q|. The closed answer
-is `tests/oscillators.py`: matrix exponentials per piece. A branch gives monodromy matrices too, harmonic balance does not.
+is `tests/oscillators.py`: matrix exponentials per piece. A branch gives monodromy matrices too.
 mousai is of the extra ``bench``; without it only this library is shown.
 """
 
