@@ -6,7 +6,7 @@ import csv
 import io
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import solvers
 from fembeam.orbit import Orbit, checked_period, load_period, orbit
-from fembeam.parameters import changes_structure, path_of, value_of, with_value
+from fembeam.parameters import changes_structure, path_of, replaced, value_of
 from fembeam.run import written_whole
 from fembeam.section import require
 from solvers.continuation import restored
@@ -33,20 +33,25 @@ class Family:
     model: Model
     name: str
     period: int
+    kept: dict[float, tuple[solvers.System, float]] = field(default_factory=dict, repr=False)
 
     def at(self, parameter: float) -> Model:
         """The model at a value of the parameter."""
-        scene = with_value(self.model.scene, self.name, parameter)
-        if changes_structure(self.name):
-            return self.model.again(scene)
-        return replace(self.model, scene=scene)
+        scene = replaced(self.model.scene, self.name, parameter)
+        return self.model.again(scene) if changes_structure(self.name) else replace(self.model, scene=scene)
 
     def __call__(self, parameter: float) -> tuple[solvers.System, float]:
-        """The system and its period, s."""
-        scene = with_value(self.model.scene, self.name, parameter)
-        if changes_structure(self.name):
-            return self.model.again(scene).system, self.period * load_period(scene)
-        return self.model.system_of(scene), self.period * load_period(scene)
+        """The system and its period, s; the latest are kept, because Newton's method asks for them again."""
+        if parameter not in self.kept:
+            scene = replaced(self.model.scene, self.name, parameter)
+            if changes_structure(self.name):
+                system = self.model.again(scene).system
+            else:
+                system = self.model.system_like(scene)
+            while len(self.kept) >= 8:
+                self.kept.pop(next(iter(self.kept)))
+            self.kept[parameter] = system, self.period * load_period(scene)
+        return self.kept[parameter]
 
 
 @dataclass(frozen=True, eq=False)

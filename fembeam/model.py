@@ -197,12 +197,29 @@ class Model:
         same = self.touches if scene is self.scene else touches(scene, self.matrices)
         pairs = zip(self.directions, same, strict=True)
         contacts = [solvers.Contact(direction, touch.law, touch.gap) for direction, touch in pairs]
-        driven = [(self.basis.project(row.T)[:, 0], signal) for row, signal in loads(scene, self.matrices)]
-        if scene.base is not None:
-            driven.append((-self.participation, scene.base.derivative(2)))
-        if scene.gravity != 0.0:
-            driven.append((-self.participation, weight(scene)))
-        return solvers.System(np.eye(n), C, np.diag(self.omega**2), contacts, driven)
+        rows = [(self.basis.project(row.T)[:, 0], signal) for row, signal in loads(scene, self.matrices)]
+        return solvers.System(np.eye(n), C, np.diag(self.omega**2), contacts, [*rows, *self._frame_loads(scene)])
+
+    def _frame_loads(self, scene: Scene) -> list[tuple[Vector, Any]]:
+        """Loads of base motion and gravity."""
+        moved = [] if scene.base is None else [(-self.participation, scene.base.derivative(2))]
+        return moved + ([] if scene.gravity == 0.0 else [(-self.participation, weight(scene))])
+
+    def system_like(self, scene: Scene) -> solvers.System:
+        """The same as `system_of`, quicker where only base motion, gaps and laws of the scene's own stops differ."""
+        own, count = self.system, len(self.scene.stops)
+        parts = zip(scene.stops, self.scene.stops, strict=True)
+        if any((new.z, new.side, new.on) != (old.z, old.side, old.on) for new, old in parts) or any(
+            getattr(scene, name) != getattr(self.scene, name) for name in ("forces", "springs", "bodies", "impactors")
+        ):
+            return self.system_of(scene)
+        contacts = [
+            contact if new is old else solvers.Contact(contact.direction, new.law, new.gap)
+            for contact, new, old in zip(own.contacts, scene.stops, self.scene.stops, strict=False)
+        ]
+        frame = self._frame_loads(scene)
+        kept = own.loads[: len(own.loads) - len(frame)]
+        return own.like([*contacts, *own.contacts[count:]], [*kept, *frame])
 
     def rest(self) -> Vector:
         """The start [q, q_dot] (2n,) of everything undeflected and at rest but the impactors, at their velocity."""

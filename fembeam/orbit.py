@@ -108,7 +108,11 @@ def extremes_of(t: Vector, u: Vector, v: Vector) -> tuple[float, float]:
 
 def load_period(scene: Scene) -> float:
     """Period of all loads together, s; an error where there is none."""
-    signals = ([] if scene.base is None else [scene.base]) + [force.signal for force in scene.forces]
+    return common_period(([] if scene.base is None else [scene.base]) + [force.signal for force in scene.forces])
+
+
+def common_period(signals: list[Any]) -> float:
+    """Period of some signals together, s."""
     others = [signal for signal in signals if not hasattr(signal, "tones")]
     require(not others, "an orbit needs periodic loads", others, "the scene", "use Harmonic or Multisine")
     omega = np.concatenate([np.asarray(signal.tones()[0], dtype=float) for signal in signals] or [np.zeros(0)])

@@ -63,7 +63,12 @@ def value_of(scene: Scene, name: str) -> float:
 
 def with_value(scene: Scene, name: str, value: float) -> Scene:
     """The same scene with another value of one parameter; the scene's own checks apply."""
-    return _replaced(scene, re.findall(r"\w+", path_of(scene, name)), value)
+    return replaced(scene, path_of(scene, name), value)
+
+
+def replaced(item: Any, path: str, value: float) -> Any:
+    """A copy of a scene, or of a part of one, with the number at the end of a full path replaced."""
+    return _replaced(item, re.findall(r"\w+", path), value)
 
 
 def _replaced(item: Any, path: list[str], value: float) -> Any:

@@ -35,12 +35,13 @@ from solvers.shooting import (
     Problem,
     at_zero,
     checked,
+    checked_start,
     delayed,
     flown,
     latches,
     newton,
     orbit_of,
-    quiet_times,
+    quiet_begins,
     start_chain,
     weights,
 )
@@ -50,6 +51,7 @@ MOST_ORBITS = 2000
 _SMALLEST = 1e-6  # arclength step at which a branch counts as lost
 _FEW, _MANY = 3, 6  # Newton iterations that ask for longer and shorter steps
 _SHARPEST = 0.8  # cosine of the largest turn between two orbits
+_ROUNDING = 1e-9  # of the test functions: what is at a special point all along is marked nowhere
 _MARGIN = 0.1  # of the longest quiet time that must lie on both sides of a shot's begin
 
 
@@ -120,9 +122,25 @@ def _point(problem: Problem, chain: Chain, error: float, iterations: int, metric
     return Point(orbit, problem, chain, tangent, metric)
 
 
-def _moved(point: Point, h: float) -> Point:
+def _ahead(point: Point, h: float, before: tuple[Point, float] | None) -> Array:
+    """Guess of the unknowns an arclength ahead: along the tangent, or on the cubic through the point before too."""
+    if before is None or before[0].problem is not point.problem:
+        return point.unknowns + h * point.tangent
+    last, way = before
+    s = 1.0 + h / way
+    a, b, c, d = (
+        (1.0 + 2.0 * s) * (1.0 - s) ** 2,
+        s * (1.0 - s) ** 2 * way,
+        s * s * (3.0 - 2.0 * s),
+        s * s * (s - 1.0) * way,
+    )
+    guess: Array = a * last.unknowns + b * last.tangent + c * point.unknowns + d * point.tangent
+    return guess
+
+
+def _moved(point: Point, h: float, before: tuple[Point, float] | None = None) -> Point:
     """The point at an arclength from another one; raises OrbitError."""
-    guess = point.unknowns + h * point.tangent
+    guess = _ahead(point, h, before)
     x = guess[:-1].reshape(point.chain.x.shape)
     chain, error, iterations = newton(point.problem, x, guess[-1], Border(point.metric, point.tangent))
     return _point(point.problem, chain, error, iterations, point.metric, point.tangent)
@@ -132,6 +150,7 @@ def _between(a: Point, b: Point, h: float) -> list[Orbit]:
     """Marked orbits at the special points between two points h apart, in their order."""
     before, after = indicators(a.orbit, a.tangent), indicators(b.orbit, b.tangent)
     names = [name for name in before if before[name] * after[name] < 0.0]
+    names = [name for name in names if min(abs(before[name]), abs(after[name])) > _ROUNDING]
     if "fold" in names and "branch point" in names:
         names.remove("branch point")
     found = [_root(a, h, name, before[name], after[name]) for name in names]
@@ -188,6 +207,7 @@ class _Arm:
     orbits: list[Orbit] = field(default_factory=list)
     status: BranchStatus = BranchStatus.RUNNING
     step: float = 0.0
+    before: tuple[Point, float] | None = None  # the point before and the way from it
 
     def __post_init__(self) -> None:
         self.first, self.step = self.point, self.step or 0.2 * self.largest
@@ -201,7 +221,11 @@ class _Arm:
                 self.status = BranchStatus.LOST
                 return
             following = self._next()
-        self.orbits += [*_between(self.point, following, self.step), following.orbit]
+        a = self.point
+        way = float(a.tangent @ a.metric @ (following.unknowns - a.unknowns))
+        special = _between(a, following, way)
+        self.orbits += [*special, following.orbit]
+        self.before = (a, way) if not special and way > 0.0 else None  # no cubic across a kink
         if self.status is BranchStatus.RUNNING:
             self._finish_or_go_on(following)
 
@@ -212,18 +236,18 @@ class _Arm:
         ahead = a.chain.parameter + h * pace
         try:
             if self.span[0] <= ahead <= self.span[1]:
-                b = _moved(a, h)
+                b = _moved(a, h, self.before)
             else:
                 edge = self.span[0] if ahead < self.span[0] else self.span[1]
                 h = (edge - a.chain.parameter) / pace
                 b = _at(a, h, edge)
         except (OrbitError, np.linalg.LinAlgError):
-            self.step *= 0.4
+            self.step, self.before = 0.4 * self.step, None
             return None
         strayed = b.unknowns - a.unknowns - h * a.tangent
         turned = a.tangent @ a.metric @ b.tangent < _SHARPEST
         if (turned and h > 30.0 * _SMALLEST) or math.sqrt(strayed @ a.metric @ strayed) > 0.5 * h or _is_cut(b):
-            self.step *= 0.5
+            self.step, self.before = 0.5 * self.step, None
             return None
         if h < self.step:
             self.status, self.step = BranchStatus.END, h
@@ -266,11 +290,13 @@ def _with_quiet_begin(point: Point) -> Point:
     orbit, m = point.orbit, len(point.problem.fractions)
     log, period = orbit.contacts, orbit.period
     offsets = [(f - point.problem.fractions[0]) * period for f in point.problem.fractions]
-    room = [min(np.abs(np.concatenate((log.t_in, log.t_out, log.t_out - period)) - t), default=period) for t in offsets]
-    quiet = quiet_times(orbit.system, log, period)
-    if len(quiet) < m or min(room) > _MARGIN * period / (1 + len(log)):
+    mine = np.isin(log.stop, [s for s, contact in enumerate(orbit.system.contacts) if latches(contact)])
+    times = np.concatenate((log.t_in[mine], log.t_out[mine], log.t_out[mine] - period))
+    if min(np.abs(times - t).min(initial=period) for t in offsets) > _MARGIN * period / (1 + len(log)):
         return point
-    begins = sorted(quiet[:m])
+    begins = quiet_begins(orbit.system, log, period, m, False)
+    if len(begins) < m:
+        return point
     later = delayed(orbit.system, orbit.phase)
     x = np.array([flown(later, orbit.state, t, orbit.method) for t in begins])
     fractions = [(orbit.phase + t) / period for t in begins]
@@ -320,7 +346,8 @@ class Branch:
     @property
     def status(self) -> tuple[BranchStatus, ...]:
         """How each direction ended."""
-        return tuple(arm.status for arm in self.arms)
+        closed = self.arms[0].status is BranchStatus.CLOSED  # then there is but one direction
+        return tuple(arm.status for arm in self.arms[: 1 if closed else None])
 
     @property
     def special(self) -> list[Orbit]:
@@ -330,6 +357,8 @@ class Branch:
     def __iter__(self) -> Iterator[Orbit]:
         """Known orbits, then new ones, one direction after the other."""
         for number, arm in enumerate(self.arms):
+            if self.arms[0].status is BranchStatus.CLOSED and number:
+                return
             i = min(number, 1)  # both arms begin with the same orbit
             while True:
                 while i < len(arm.orbits):
@@ -381,7 +410,7 @@ def branch(
     start: Orbit | ArrayLike,
     at: float | None = None,
     *,
-    step: float = 0.02,
+    step: float = 0.04,
     shots: int = 1,
     method: Any = None,
 ) -> Branch:
@@ -417,13 +446,15 @@ def branch(
         raise ValueError(f"span must be two finite values, ascending, got {span!r}")
     if not 0.0 < step <= 1.0:
         raise ValueError(f"step must lie in (0, 1], got {step!r}")
-    known = isinstance(start, Orbit)
-    parameter = at if at is not None else start.parameter if known else low  # type: ignore[union-attr]
+    own = start.parameter if isinstance(start, Orbit) else math.nan
+    if at is None and isinstance(start, Orbit) and math.isnan(own):
+        raise ValueError("the orbit to start from knows no parameter; give at=")
+    parameter = at if at is not None else low if math.isnan(own) else own
     if not low <= parameter <= high:
-        raise ValueError(f"the start must lie in the span {span}, got {parameter!r}")
+        raise ValueError(f"the start must lie in the span {span}, got {parameter!r}; give at=")
     system, period = make_system(parameter)
     method = checked(system, period, method, shots)
-    first = at_zero(start) if isinstance(start, Orbit) else np.asarray(start, dtype=float)
+    first = at_zero(start) if isinstance(start, Orbit) else checked_start(system, start)
     problem, x = start_chain(system, period, first, method, shots)
     problem = replace(problem, make=make_system, step=1e-6 * (high - low))
     chain, error, iterations = newton(problem, x, parameter)

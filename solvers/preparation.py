@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
@@ -137,6 +137,15 @@ def _loss_rows(problem: Problem) -> Array:
     return np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
 
 
+def steady_response(k: Array, c: Array, load: Any, omega: float) -> Any:
+    """(2n,) complex amplitude Z of the blocks' response Re(Z e^{iΩt}) to the state rate Re(load e^{iΩt})."""
+    lp, lv = np.split(load, 2)
+    # (iΩ - A)⁻¹ of a block: [[iΩ + c, 1], [-k, iΩ]] / (k - Ω² + iΩc)
+    denominator = k - omega**2 + 1j * omega * c
+    denominator = np.where((lp == 0.0) & (lv == 0.0), 1.0, denominator)
+    return np.concatenate(((1j * omega + c) * lp + lv, -k * lp + 1j * omega * lv)) / np.tile(denominator, 2)
+
+
 def with_tones(problem: Problem, forcing: Forcing) -> tuple[Problem, Array]:
     """The problem with one undamped block per tone, and the map (2n, 2N) from its state to the blocks' z.
 
@@ -148,13 +157,7 @@ def with_tones(problem: Problem, forcing: Forcing) -> tuple[Problem, Array]:
     for i, (omega, amplitude, load) in enumerate(
         zip(forcing.tone_omega, forcing.tone_amplitude, forcing.tone_load, strict=True)
     ):
-        lp, lv = problem.load[load, :n] * amplitude, problem.load[load, n:] * amplitude
-        # (iΩ - A)⁻¹ of a block: [[iΩ + c, 1], [-k, iΩ]] / (k - Ω² + iΩc)
-        denominator = problem.k - omega**2 + 1j * omega * problem.c
-        denominator = np.where((lp == 0.0) & (lv == 0.0), 1.0, denominator)
-        response = np.concatenate(
-            [((1j * omega + problem.c) * lp + lv) / denominator, (-problem.k * lp + 1j * omega * lv) / denominator]
-        )
+        response = steady_response(problem.k, problem.c, problem.load[load] * amplitude, omega)
         steady[:, n + i] = response.real
         if omega > 0.0:
             steady[:, 2 * n + tones + i] = response.imag / omega

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from enum import Enum
 from typing import Any
 
@@ -72,10 +72,26 @@ class ContactLog:
         return cls(*columns)
 
     @classmethod
-    def joined(cls, logs: Sequence[ContactLog], begins: Sequence[float]) -> ContactLog:
-        """One log of several runs, each of whose times counts from its own begin."""
-        moved = [replace(log, t_in=log.t_in + t, t_out=log.t_out + t) for log, t in zip(logs, begins, strict=True)]
-        return cls(*(np.concatenate([getattr(log, f.name) for log in moved]) for f in fields(cls)))
+    def of_period(cls, logs: Sequence[ContactLog], begins: Sequence[float], period: float) -> ContactLog:
+        """One log of the runs that make up a period, each of whose times counts from its own begin.
+
+        A contact cut by the end of a run is made whole again with its rest in the next run (of the next period).
+        """
+        rows = [np.array(list(log.arrays().values()), dtype=float).T for log in logs]
+        for i, begin in enumerate(begins):
+            for row in rows[i][np.isnan(rows[i][:, 2])]:
+                rest = rows[(i + 1) % len(rows)]
+                later = begins[i + 1] if i + 1 < len(rows) else begins[0] + period
+                found = np.flatnonzero((rest[:, 0] == row[0]) & (rest[:, 1] == 0.0) & ~np.isnan(rest[:, 2]))
+                if found.size:
+                    _make_whole(row, rest[found[0]], later - begin)
+                    rows[i][(rows[i][:, 0] == row[0]) & np.isnan(rows[i][:, 2])] = row
+                    rows[(i + 1) % len(rows)] = np.delete(rest, found[0], axis=0)
+        moved = [
+            part + np.array([0.0, begin, begin] + [0.0] * (COLUMNS - 3))
+            for part, begin in zip(rows, begins, strict=True)
+        ]
+        return cls.of_rows(np.concatenate(moved))
 
     def arrays(self) -> dict[str, Any]:
         """All columns by name."""
@@ -83,6 +99,13 @@ class ContactLog:
 
 
 COLUMNS = len(fields(ContactLog))
+
+
+def _make_whole(row: Array, rest: Array, later: float) -> None:
+    """Add to a log row the rest of its contact, whose times count from ``later``."""
+    row[2], row[4] = later + rest[2], rest[4]
+    row[5:7] = np.maximum(row[5:7], rest[5:7])
+    row[7:9] += rest[7:9]
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ open: `Orbit.phase` is the time within the period to which `Orbit.state` belongs
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -106,7 +106,7 @@ def delayed(system: System, delay: float) -> System:
     """The system as it is ``delay`` seconds later: all its loads move on."""
     if delay == 0.0 or not system.loads:
         return system
-    return replace(system, loads=[(vector, _Delayed(signal, delay)) for vector, signal in system.loads])
+    return system.like(loads=[(vector, _Delayed(signal, delay)) for vector, signal in system.loads])
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,14 +207,15 @@ def newton(problem: Problem, x: Array, parameter: float, border: Border | None =
     With a border the parameter is an unknown too. Raises OrbitError.
     """
     unknowns = guess = np.append(x.ravel(), parameter)
-    chain, error = _fire(problem, unknowns)
+    measure = _Measure(problem)
+    chain, error = _fire(problem, unknowns, measure)
     history = [error]
     for iteration in range(_MOST_ITERATIONS):
         if error <= TOLERANCE:
             return chain, error, iteration
         step = _step(chain, unknowns - guess, border)
         for halving in range(_MOST_HALVINGS):
-            trial, trial_error = _fire(problem, unknowns + 0.5**halving * step)
+            trial, trial_error = _fire(problem, unknowns + 0.5**halving * step, measure)
             if trial_error < error:
                 break
         else:
@@ -224,22 +225,40 @@ def newton(problem: Problem, x: Array, parameter: float, border: Border | None =
     if error <= TOLERANCE:
         return chain, error, len(history) - 1
     raise OrbitError(
-        f"no periodic orbit near the start: {len(history)} iterations of Newton's method with {len(x)} shot(s) reduced "
-        f"the residual from {history[0]:.3g} to {error:.3g} of the motion's size"
+        f"{len(history)} iterations of Newton's method reduced the residual from {history[0]:.3g} to {error:.3g} of "
+        "the motion's size"
     )
 
 
-def _fire(problem: Problem, unknowns: Array) -> tuple[Any, float]:
+class _Measure:
+    """Size of a residual relative to the motion's.
+
+    What counts as the motion's size lies between 1e-4 and 1e3 of the first guess's, so that neither running off to
+    infinity nor vanishing passes for convergence or its failure.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem, self.first = problem, 0.0
+
+    def __call__(self, chain: Chain) -> float:
+        """Relative residual."""
+        W = weights(*self.problem.make(chain.parameter))
+        size, ends, residual = (
+            float(np.linalg.norm(part @ W.T, axis=1).max())
+            for part in (chain.x, chain.x + np.roll(chain.residual, 1, axis=0), chain.residual)
+        )
+        self.first = self.first or max(size, ends)
+        return residual / max(min(size, 1e3 * self.first), 1e-4 * self.first, 1e-300)
+
+
+def _fire(problem: Problem, unknowns: Array, measure: _Measure) -> tuple[Any, float]:
     """The chain at given unknowns and its relative residual, inf where it cannot be integrated."""
-    x = unknowns[:-1].reshape(len(problem.fractions), -1)
     try:
-        chain = problem.evaluate(x, float(unknowns[-1]))
+        chain = problem.evaluate(unknowns[:-1].reshape(len(problem.fractions), -1), float(unknowns[-1]))
+        error = measure(chain)
     except (SolverError, ValueError, ArithmeticError):
         return None, math.inf
-    W = weights(*problem.make(float(unknowns[-1])))
-    size = np.linalg.norm(x @ W.T, axis=1).max()
-    error = np.linalg.norm(chain.residual @ W.T, axis=1).max() / max(size, 1e-300)
-    return chain, float(error) if np.isfinite(error) else math.inf
+    return chain, error if math.isfinite(error) else math.inf
 
 
 def _step(chain: Chain | None, moved: Array, border: Border | None) -> Array:
@@ -290,16 +309,38 @@ def orbit(
     (True, True)
     """
     method = checked(system, period, method, shots)
-    x = settled(system, period, method) if start is None else _checked_start(system, start)
+    x = settled(system, period, method) if start is None else checked_start(system, start)
     tried: list[str] = []
     for count in [shots] if shots else range(1, _MOST_SHOTS + 1):
         try:
             problem, guess = start_chain(system, period, x, method, count)
             chain, residual, iterations = newton(problem, guess, 0.0)
-            return judged(orbit_of(problem, chain, residual, iterations))
+            _check_isolated(chain, weights(system, period))
+            return judged(_from_zero(orbit_of(problem, chain, residual, iterations)))
         except OrbitError as error:
-            tried.append(str(error))
-    raise OrbitError("; ".join(dict.fromkeys(tried)))
+            tried.append(f"{count} shot(s): {error}")
+    raise OrbitError("no orbit found near the start; tried " + "; ".join(tried))
+
+
+def _from_zero(orbit: Orbit) -> Orbit:
+    """The orbit seen from t = 0 if no stop that latches is closed then."""
+    x = at_zero(orbit)
+    if orbit.phase == 0.0 or _closed(orbit.system, x, [c for c in orbit.system.contacts if latches(c)]):
+        return orbit
+    problem = Problem(_Constant(orbit.system, orbit.period), orbit.method)
+    try:
+        chain, residual, iterations = newton(problem, x[None, :], 0.0)
+    except OrbitError:
+        return orbit
+    return orbit_of(problem, chain, residual, orbit.iterations + iterations)
+
+
+def _check_isolated(chain: Chain, W: Array) -> None:
+    """An orbit whose neighbours are orbits too, or that only rounding holds, is none."""
+    away = W @ (chain.monodromy() - np.eye(len(W))) @ np.linalg.inv(W)
+    values = np.linalg.svd(away, compute_uv=False)
+    if values[-1] <= 1e-12 * max(values[0], 1.0):
+        raise OrbitError("the orbit is not isolated: the linearised return map has the eigenvalue 1 to rounding")
 
 
 def checked(system: System, period: float, method: Any, shots: int | None) -> Any:
@@ -324,7 +365,7 @@ def checked(system: System, period: float, method: Any, shots: int | None) -> An
     return method
 
 
-def _checked_start(system: System, start: ArrayLike) -> Array:
+def checked_start(system: System, start: ArrayLike) -> Array:
     """A start of the right shape."""
     x = np.array(start, dtype=float)
     if x.shape != (2 * system.size,) or not np.all(np.isfinite(x)):
@@ -346,38 +387,51 @@ def latches(contact: Contact) -> bool:
     return bool(np.any(contact.law.force(delta, rate, 0.1) != contact.law.force(delta, rate, 0.2)))
 
 
-def quiet_times(system: System, contacts: ContactLog, period: float) -> list[float]:
-    """Middles of the intervals of one period in which every stop is open, the longest first.
-
-    If there is none, laws without memory may be in contact.
-    """
+def quiet_intervals(system: System, contacts: ContactLog, period: float) -> list[tuple[float, float]]:
+    """Intervals of one period in which every stop is open; if there are none, every one that latches its entry rate."""
+    ends = np.where(np.isnan(contacts.t_out), period, contacts.t_out)
     for stops in (range(len(system.contacts)), [s for s, c in enumerate(system.contacts) if latches(c)]):
         mine = np.isin(contacts.stop, list(stops))
-        ends = np.where(np.isnan(contacts.t_out), period, contacts.t_out)
         quiet, end = [], 0.0
         for begin, left in [*sorted(zip(contacts.t_in[mine], ends[mine], strict=True)), (period, period)]:
             if begin > end:
-                quiet.append((begin - end, 0.5 * (begin + end)))
+                quiet.append((float(end), float(begin)))
             end = max(end, left)
         if quiet:
-            return [float(middle) for _, middle in sorted(quiet, reverse=True)]
+            return quiet
     return []
 
 
+def quiet_begins(system: System, contacts: ContactLog, period: float, count: int, zero: bool) -> list[float]:
+    """Times for the begins of ``count`` shots: zero if that will do, then the middles of the longest quiet intervals.
+
+    Fewer when there is no quiet time at all.
+    """
+    quiet = quiet_intervals(system, contacts, period)
+    begins = [0.0] if zero else []
+    while quiet and len(begins) < count:
+        a, b = quiet.pop(max(range(len(quiet)), key=lambda i: quiet[i][1] - quiet[i][0]))
+        begins.append(0.5 * (a + b))
+        quiet += [(a, begins[-1]), (begins[-1], b)]
+    return sorted(begins)
+
+
+def _closed(system: System, x: Array, contacts: Sequence[Contact]) -> bool:
+    """Whether any of these contacts is closed in a state."""
+    return any(contact.direction @ x[: system.size] + contact.gap < 0.0 for contact in contacts)
+
+
 def start_chain(system: System, period: float, x: Array, method: Any, count: int) -> tuple[Problem, Array]:
-    """Shots that begin in quiet times (the first at zero if that is one), and a guess of their states."""
+    """Shots that begin in quiet times, and a guess of their states from a run over one period."""
     n = system.size
     first = integrate(system, x[:n], x[n:], period, method=method)
-    quiet = quiet_times(system, first.contacts, period)
-    if not quiet:
+    begins = quiet_begins(system, first.contacts, period, count, not _closed(system, x, system.contacts))
+    if not begins and not _closed(system, x, [c for c in system.contacts if latches(c)]):
+        begins = [0.0]
+    if len(begins) < count:
         raise OrbitError("at no time of the period are all stops open whose law latches the entry rate")
-    closed = any(c.direction @ x[:n] + c.gap < 0.0 for c in system.contacts)
-    begins = sorted(([] if closed else [0.0]) + quiet[: count - (not closed)])[:count]
-    if not closed and count > 1 and len(begins) < count:  # few contacts: cut evenly
-        begins = [i * period / count for i in range(count)]
     states = [x if t == 0.0 else flown(system, x, t, method) for t in begins]
-    make = _Constant(system, period)
-    return Problem(make, method, tuple(t / period for t in begins)), np.array(states)
+    return Problem(_Constant(system, period), method, tuple(t / period for t in begins)), np.array(states)
 
 
 def at_zero(orbit: Orbit) -> Array:
@@ -414,7 +468,7 @@ def orbit_of(problem: Problem, chain: Chain, residual: float, iterations: int, *
     begins = [fraction * period - phase for fraction in problem.fractions]
     return Orbit(
         *(chain.x[0].copy(), period, phase, chain.monodromy(), residual, iterations),
-        *(ContactLog.joined(logs, begins), system, problem.method),
+        *(ContactLog.of_period(logs, begins, period), system, problem.method),
         **more,
     )
 

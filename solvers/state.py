@@ -225,8 +225,6 @@ def _vectors(system: System) -> Array:
 def _problem(system: System, forcing: Forcing, linear: dict[str, Array]) -> Problem:
     """The linear part with the laws and the signals."""
     contacts, m = system.contacts, len(system.contacts)
-    parameters = [np.asarray(c.law.parameters, dtype=float) for c in contacts]
-    width = max([p.size for p in parameters], default=1)
     most = max([len(c.law.knots) for c in contacts], default=0) + 1
     levels = np.full((m, most + 1), math.inf)
     for i, contact in enumerate(contacts):
@@ -238,7 +236,7 @@ def _problem(system: System, forcing: Forcing, linear: dict[str, Array]) -> Prob
         gap=np.array([c.gap for c in contacts], dtype=float),
         law=np.array([c.law.address for c in contacts], dtype=np.int64),
         gradient=np.array([c.law.gradient_address for c in contacts], dtype=np.int64),
-        parameters=np.array([np.pad(p, (0, width - p.size)) for p in parameters]).reshape(m, width),
+        parameters=law_parameters(system),
         floor=np.array([c.law.entry_rate_floor for c in contacts], dtype=float),
         tone_omega=forcing.tone_omega,
         tone_amplitude=forcing.tone_amplitude,
@@ -248,6 +246,15 @@ def _problem(system: System, forcing: Forcing, linear: dict[str, Array]) -> Prob
         table_start=forcing.table_start,
         table_load=forcing.table_load,
     )
+
+
+def law_parameters(system: System) -> Array:
+    """Parameters of the laws (m, P), padded by zeros."""
+    parameters = [np.asarray(c.law.parameters, dtype=float) for c in system.contacts]
+    table = np.zeros((len(parameters), max([p.size for p in parameters], default=1)))
+    for row, own in zip(table, parameters, strict=True):
+        row[: own.size] = own
+    return table
 
 
 def rate_rows(read: Array, k: Array, c: Array) -> Array:

@@ -124,11 +124,29 @@ class System:
             for name in "MCK":
                 object.__setattr__(self, name, dense(getattr(self, name)))
         _check_mass(self.M)
+        self._check_contacts_and_loads()
+
+    def _check_contacts_and_loads(self) -> None:
+        """Contacts and loads fit the matrices."""
         object.__setattr__(self, "contacts", tuple(self.contacts))
         object.__setattr__(self, "loads", tuple(self._load(i, pair) for i, pair in enumerate(self.loads)))
         for i, contact in enumerate(self.contacts):
             if contact.direction.size != self.size:
                 raise ValueError(f"contact {i} has a direction of {contact.direction.size}, the system {self.size}")
+
+    def like(
+        self,
+        contacts: Sequence[Contact] | None = None,
+        loads: Sequence[tuple[ArrayLike, Signal]] | None = None,
+    ) -> System:
+        """The same structure with other contacts or loads; its matrices are neither checked nor decoupled again."""
+        other = object.__new__(System)
+        other.__dict__.update(self.__dict__, blocks=self.blocks, kept={})
+        for name, value in (("contacts", contacts), ("loads", loads)):
+            if value is not None:
+                object.__setattr__(other, name, value)
+        other._check_contacts_and_loads()
+        return other
 
     def _load(self, i: int, pair: tuple[ArrayLike, Signal]) -> tuple[Array, Signal]:
         """One checked load."""

@@ -4,34 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from solvers.dormand_prince import STAGES
-from solvers.forcing import Forcing, hand_over
 from solvers.kernels import Problem, rhs
-from solvers.preparation import with_tones
+from solvers.preparation import steady_response
 from solvers.replay import Nudge, Slopes, begin, replay
-from solvers.state import HEAD, TAPED, T, new_state, problem_of
+from solvers.state import HEAD, TAPED, T, law_parameters, new_state
 from solvers.system import Array, Parameter, System
 from solvers.tables import S
 
 _ROWS = 256  # of the tape between two replays: some 25 contacts, within which no derivative overflows
 _LARGE = 1e100  # size at which the derivatives are scaled down
-_FIXED = [
-    "k",
-    "c",
-    "loss",
-    "push",
-    "read",
-    "levels",
-    "load",
-    "power",
-    "law",
-    "floor",
-]  # what no exact parameter changes
-_FIXED += ["tone_load", "table", "table_dt", "table_load"]
 
 
 class Tangent:
@@ -118,29 +104,64 @@ class _Change:
     @classmethod
     def of(cls, system: System, parameter: Parameter, engine: Any) -> _Change | None:
         """The change between two systems; None if they differ in more than tones, gaps and laws' parameters."""
-        systems = system, parameter.behind, parameter.ahead
-        forcings = [_forcing(s, engine.duration) for s in systems]
-        problems = here, behind, ahead = [problem_of(s, f) for s, f in zip(systems, forcings, strict=True)]
-        same = all(np.array_equal(getattr(here, name), getattr(p, name)) for p in (behind, ahead) for name in _FIXED)
-        if not same or len(engine.problem.k) != system.size + len(here.tone_omega):  # fewer: a tone is sampled
+        sides = parameter.behind, parameter.ahead
+        tones = _tones(system, *sides)
+        if tones is None or not all(_same_structure(system, side) for side in sides):
             return None
-        middle, first, last = (_steady(p, f) for p, f in zip(problems, forcings, strict=True))
+        if len(engine.problem.k) != system.size + len(tones.omega):  # a tone is sampled, for resonance
+            return None
         width = 2.0 * parameter.step
-        a, b = (last - first) / width, 1j * ((ahead.tone_omega - behind.tone_omega) / width)[:, None] * middle
-        rows = np.stack((here.read, here.read_rate), axis=1)  # (m, 2, 2n)
+        n, size = system.size, engine.problem.k.size
+        own = np.r_[0:n, size : size + n]
+        rows = np.stack([engine.problem.read[:, own], engine.problem.read_rate[:, own]], axis=1)  # (m, 2, 2n)
+        a, b = tones.change / width, 1j * (tones.turn / width)[:, None] * tones.response
         parts = [part for z in (a, b) for part in (z.real, z.imag)]
         steady = np.stack([np.einsum("sdi,ki->ksd", rows, part) for part in parts], axis=-1)
-        nudge = Nudge(parameter.step, here.tone_omega, np.ascontiguousarray(steady), (ahead.gap - behind.gap) / width)
-        return cls(nudge, [ahead.parameters, behind.parameters], a, b)
+        gaps = [np.array([contact.gap for contact in side.contacts]) for side in sides]
+        nudge = Nudge(parameter.step, tones.omega, np.ascontiguousarray(steady), (gaps[1] - gaps[0]) / width)
+        return cls(nudge, [law_parameters(side) for side in reversed(sides)], a, b)
 
 
-def _forcing(system: System, duration: float) -> Forcing:
-    """The tones; sampled signals only need to be there."""
-    return hand_over([signal for _, signal in system.loads], duration, 1e-6)
+class _Tones(NamedTuple):
+    """Tones of three systems: frequency and response of the first, their changes from the second to the third."""
+
+    omega: Array  # (K,)
+    response: Any  # (K, 2n) complex
+    turn: Array  # (K,)
+    change: Any  # (K, 2n) complex
 
 
-def _steady(problem: Problem, forcing: Forcing) -> Any:
-    """(K, 2n) complex amplitudes of the steady response to each tone."""
-    n, tones = len(problem.k), len(forcing.tone_omega)
-    rows = with_tones(problem, forcing)[1].T
-    return rows[n : n + tones] + 1j * forcing.tone_omega[:, None] * rows[2 * n + tones :]
+def _tones(here: System, behind: System, ahead: System) -> _Tones | None:
+    """The tones; None when sampled signals differ."""
+    found = []
+    inverse: Any = here.blocks.inverse[:, here.size :]
+    for (vector, signal), *others in zip(here.loads, behind.loads, ahead.loads, strict=True):
+        signals: list[Any] = [signal, *(other for _, other in others)]
+        if not all(hasattr(one, "tones") for one in signals):
+            if any(one is not signal for one in signals):
+                return None
+            continue
+        load = inverse @ np.linalg.solve(here.M, np.asarray(vector))
+        for pairs in zip(*(zip(*one.tones(), strict=True) for one in signals), strict=True):
+            k, c = here.blocks.k, here.blocks.c
+            first, second, third = (steady_response(k, c, load * amplitude, omega) for omega, amplitude in pairs)
+            found.append((pairs[0][0], first, pairs[2][0] - pairs[1][0], third - second))
+    n2 = 2 * here.size
+    omega, response, turn, change = zip(*found, strict=True) if found else ((), (), (), ())
+    return _Tones(
+        *(np.array(omega, dtype=float), np.array(response, dtype=complex).reshape(-1, n2)),
+        *(np.array(turn, dtype=float), np.array(change, dtype=complex).reshape(-1, n2)),
+    )
+
+
+def _same_structure(one: System, other: System) -> bool:
+    """Whether two systems differ in signals, gaps and laws' parameters only."""
+    if one.size != other.size or len(one.contacts) != len(other.contacts):
+        return False
+    pairs = [(one.M, other.M), (one.C, other.C), (one.K, other.K)]
+    pairs += [(a.direction, b.direction) for a, b in zip(one.contacts, other.contacts, strict=True)]
+    pairs += [(a, b) for (a, _), (b, _) in zip(one.loads, other.loads, strict=True)]
+    laws = [(a.law, b.law) for a, b in zip(one.contacts, other.contacts, strict=True)]
+    return all(a is b or np.array_equal(a, b) for a, b in pairs) and all(
+        a is b or (a.address, a.knots, a.entry_rate_floor) == (b.address, b.knots, b.entry_rate_floor) for a, b in laws
+    )

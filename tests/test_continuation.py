@@ -279,7 +279,6 @@ def test_orbits_at_rest_begin_a_branch_over_the_amplitude():
         ({"shots": 0}, "shots must be a whole number"),
         pytest.param(
             *({"start": [1.0, 2.0, 3.0]}, "start must be 2 finite numbers"),
-            marks=pytest.mark.xfail(strict=True, reason="the message speaks of q_dot0"),
         ),
         ({"make_system": over(DAMPED, periods=0)}, "period must be positive"),
         ({"make_system": over(DAMPED, periods=1.5)}, "does not have the period"),
@@ -292,11 +291,10 @@ def test_bad_input(arguments, message):
 
 def test_no_orbit_near_the_start():
     problem = Bilinear(0.7, stiffness=1e3, zeta=0.01)
-    with pytest.raises(OrbitError, match=r"iterations of Newton's method with 1 shot"):
+    with pytest.raises(OrbitError, match=r"iterations of Newton's method reduced"):
         branch(over(problem, periods=10), (0.6, 0.8), [-0.3, 5.0], at=0.7)
 
 
-@pytest.mark.xfail(strict=True, reason="the message speaks of nan")
 def test_an_orbit_without_parameter_needs_one():
     found = orbit(*over(DAMPED)(1.1))
     with pytest.raises(ValueError, match="at"):
