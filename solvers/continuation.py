@@ -48,9 +48,10 @@ from solvers.shooting import (
 from solvers.system import Array, System
 
 MOST_ORBITS = 2000
-_SMALLEST = 1e-6  # arclength step at which a branch counts as lost
+_SMALLEST = 3e-7  # arclength step at which a branch counts as lost
 _FEW, _MANY = 3, 6  # Newton iterations that ask for longer and shorter steps
 _SHARPEST = 0.8  # cosine of the largest turn between two orbits
+_KINK = 3e-6  # arclength step below which a turn counts as a kink of the branch
 _ROUNDING = 1e-9  # of the test functions: what is at a special point all along is marked nowhere
 _MARGIN = 0.1  # of the longest quiet time that must lie on both sides of a shot's begin
 
@@ -61,6 +62,7 @@ class BranchStatus(Enum):
     RUNNING = "not finished yet"
     END = "reached the end of the span"
     CLOSED = "closed: came back to its first orbit"
+    RETURNED = "came back to an orbit it had passed: it turned round or went over to another branch"
     LOST = "lost: no orbit was found however small the step"
     LIMIT = f"stopped after {MOST_ORBITS} orbits"
 
@@ -181,20 +183,38 @@ def _indicator(a: Point, s: float, name: str) -> float:
 
 
 def _grazing(a: Point, b: Point, h: float) -> tuple[float, Orbit] | None:
-    """(arclength, orbit) where the number of contacts changes, by bisection."""
-    low, high, orbit = 0.0, h, b.orbit
-    count = len(a.orbit.contacts)
-    while high - low > 1e-9 * h:
-        middle = 0.5 * (low + high)
+    """(arclength, orbit) where the number of contacts changes: where the shallowest one's indentation goes to zero."""
+    few, many = sorted((len(a.orbit.contacts), len(b.orbit.contacts)))
+    sign = 1.0 if len(b.orbit.contacts) == many else -1.0  # towards more contacts
+    bare, touched = (0.0, h) if sign > 0.0 else (h, 0.0)  # the two ends of what is left of the way
+    known = [(touched, _shallowest(b.orbit if sign > 0.0 else a.orbit))]
+    orbit = b.orbit if sign > 0.0 else a.orbit
+    for _ in range(60):
+        if abs(touched - bare) <= 1e-9 * h:
+            return touched, replace(orbit, mark="grazing")
+        place = 0.5 * (bare + touched)
+        if len(known) > 1 and known[-1][1] != known[-2][1]:
+            (s0, f0), (s1, f1) = known[-2:]
+            root = s1 - f1 * (s1 - s0) / (f1 - f0)
+            if abs(root - touched) <= 1e-9 * h:
+                return touched, replace(orbit, mark="grazing")
+            if min(bare, touched) < root < max(bare, touched):
+                place = root + 0.01 * (touched - root)
         try:
-            trial = _moved(a, middle).orbit
+            trial = _moved(a, place).orbit
         except OrbitError:
             return None
-        if len(trial.contacts) == count:
-            low = middle
+        if len(trial.contacts) <= few:
+            bare = place
         else:
-            high, orbit = middle, trial
-    return high, replace(orbit, mark="grazing")
+            touched, orbit = place, trial
+            known.append((place, _shallowest(trial)))
+    return touched, replace(orbit, mark="grazing")
+
+
+def _shallowest(orbit: Orbit) -> float:
+    """Smallest peak indentation of an orbit's contacts."""
+    return float(orbit.contacts.peak_indentation.min())
 
 
 @dataclass(eq=False)
@@ -208,10 +228,12 @@ class _Arm:
     status: BranchStatus = BranchStatus.RUNNING
     step: float = 0.0
     before: tuple[Point, float] | None = None  # the point before and the way from it
+    passed: list[Point] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.first, self.step = self.point, self.step or 0.2 * self.largest
         self.orbits = [self.point.orbit]
+        self.passed = [self.point]
 
     def extend(self) -> None:
         """Find the next orbit and the special points before it, or an end of the branch."""
@@ -223,7 +245,7 @@ class _Arm:
             following = self._next()
         a = self.point
         way = float(a.tangent @ a.metric @ (following.unknowns - a.unknowns))
-        special = _between(a, following, way)
+        special = _between(a, following, way) if way > 0.0 else []  # less only where it turned at a kink
         self.orbits += [*special, following.orbit]
         self.before = (a, way) if not special and way > 0.0 else None  # no cubic across a kink
         if self.status is BranchStatus.RUNNING:
@@ -244,9 +266,10 @@ class _Arm:
         except (OrbitError, np.linalg.LinAlgError):
             self.step, self.before = 0.4 * self.step, None
             return None
-        strayed = b.unknowns - a.unknowns - h * a.tangent
-        turned = a.tangent @ a.metric @ b.tangent < _SHARPEST
-        if (turned and h > 30.0 * _SMALLEST) or math.sqrt(strayed @ a.metric @ strayed) > 0.5 * h or _is_cut(b):
+        off = b.unknowns - a.unknowns - h * a.tangent
+        strayed = math.sqrt(off @ a.metric @ off) / h
+        sharp = strayed > 0.5 or a.tangent @ a.metric @ b.tangent < _SHARPEST
+        if (sharp and h > _KINK) or strayed > 20.0 or _is_cut(b):  # a branch has kinks where contacts graze
             self.step, self.before = 0.5 * self.step, None
             return None
         if h < self.step:
@@ -254,14 +277,12 @@ class _Arm:
         return b
 
     def _finish_or_go_on(self, point: Point) -> None:
-        """Recognise the first orbit and the limit; else choose the next step."""
-        way = point.unknowns - self.first.unknowns if point.metric.shape == self.first.metric.shape else None
-        if way is not None and len(self.orbits) > 10 and point.problem.fractions == self.first.problem.fractions:
-            near = math.sqrt(way @ point.metric @ way) < self.step
-            if near and point.tangent @ point.metric @ self.first.tangent > 0.5:
-                self.status = BranchStatus.CLOSED
-                self.orbits.append(self.first.orbit)
-                return
+        """Recognise orbits passed before and the limit; else choose the next step."""
+        met = self._met(point)
+        if met is not None:
+            self.status = BranchStatus.CLOSED if met == 0 else BranchStatus.RETURNED
+            self.orbits += [self.first.orbit] if met == 0 else []
+            return
         if len(self.orbits) >= MOST_ORBITS:
             self.status = BranchStatus.LIMIT
             return
@@ -269,6 +290,26 @@ class _Arm:
         self.step *= 1.5 if iterations <= _FEW else 0.6 if iterations >= _MANY else 1.0
         self.step = min(self.step, self.largest)
         self.point = _with_quiet_begin(point)
+
+    def _met(self, point: Point) -> int | None:
+        """Number of an orbit passed before that lies on the way just gone; 0 is the first.
+
+        On the way back, that is turned round, it must lie very near: the sides of a narrow fold are close too.
+        """
+        a = self.point
+        way = point.unknowns - a.unknowns
+        length = float(way @ point.metric @ way)
+        self.passed.append(point)
+        for number, known in enumerate(self.passed[:-4]):
+            if not known.problem.fractions == point.problem.fractions == a.problem.fractions:
+                continue
+            share = float((known.unknowns - a.unknowns) @ point.metric @ way) / length
+            off = known.unknowns - a.unknowns - share * way
+            aligned = float(known.tangent @ point.metric @ point.tangent)
+            near = 1e-2 * length if aligned > 0.95 else min(1e-4 * length, 1e-8)
+            if 0.0 < share <= 1.0 and abs(aligned) > 0.5 and off @ point.metric @ off < near:
+                return number
+        return None
 
 
 def _at(a: Point, h: float, parameter: float) -> Point:

@@ -90,7 +90,8 @@ class Packed:
             )
             if not fits:
                 raise TypeError(f"{name} must be a contiguous {expected}, got {item.dtype} with shape {item.shape}")
-            words += _descriptor(item.shape, item.ctypes.data)
+            data = item.__array_interface__["data"][0]
+            words += [*_META, item.size, 8, data, *item.shape, *item.strides]
         self.value, self.words = value, np.array(words, dtype=np.int64)
         self.address = self.words.ctypes.data
 
