@@ -148,6 +148,13 @@ class Branch:
         with written_whole(Path(path)) as file:
             file.write(text.getvalue().encode())
 
+    def __str__(self) -> str:
+        """Special orbits and how each direction ended."""
+        rows = [f"{one.mark:>15}  {self.family.name} = {one.parameter:.9g}" for one in self.found.special]
+        stable = int(np.sum(self.stable))
+        head = f"{len(rows)} special among {len(self.parameter)} orbits of period {self.family.period}, {stable} stable"
+        return "\n".join([head, *rows, self.status])
+
     def save(self, path: str | Path) -> None:
         """Write all that is known as .npz, enough to go on from; written whole or not at all."""
         arms = []

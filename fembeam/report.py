@@ -56,7 +56,7 @@ def write(run: Run, folder: str | Path, discard: float = 0.0, seconds: float | N
     folder = Path(folder)
     written = [run.save(folder / "run.npz")]
     written.append(write_json(folder / "summary.json", summary(run, discard, seconds)))
-    written += [_write_figure(folder / f"{name}.png", draw()) for name, draw in figures(run, discard).items()]
+    written += [write_figure(folder / f"{name}.png", draw()) for name, draw in figures(run, discard).items()]
     return written
 
 
@@ -65,14 +65,14 @@ def write_study(result: Any, folder: str | Path, name: str) -> list[Path]:
     target = Path(folder) / f"{name}.txt"
     with written_whole(target) as file:
         file.write(f"{result}\n".encode())
-    written = [target, _write_figure(Path(folder) / f"{name}.png", result.figure())]
+    written = [target, write_figure(Path(folder) / f"{name}.png", result.figure())]
     if hasattr(result, "save"):
         written.append(Path(folder) / f"{name}.csv")
         result.save(written[-1])
     return written
 
 
-def _write_figure(target: Path, figure: Figure) -> Path:
+def write_figure(target: Path, figure: Figure) -> Path:
     """One PNG; the same figure gives the same bytes."""
     with written_whole(target) as file:
         figure.savefig(file, format="png", dpi=150, metadata={"Software": None})

@@ -2,7 +2,7 @@
 
     [beam] [[supports]] [[masses]] [[springs]] [[dashpots]] [[stops]] [[forces]] [[impactors]] [damping] [base]
     gravity = 9.81
-    [reduce] [simulate] [mode_count] [smallest_model] [ensemble]
+    [reduce] [simulate] [branch] [mode_count] [smallest_model] [ensemble]
     [speed_accuracy]
 
 The keys of a table are the arguments of the constructor behind it, read from its signature, so that nothing is
@@ -29,6 +29,7 @@ from fembeam.record import Record
 from fembeam.scene import FEATURES, Scene
 from fembeam.schema import Constructors, converted, fits, listed, nearest, parameters, required, shown, wanted
 from fembeam.section import Section, Taper, require_non_negative, require_positive
+from fembeam.study.branch_table import BranchTable
 from fembeam.study.ensemble_table import EnsembleTable
 from fembeam.study.quantities import QUANTITIES
 from fembeam.study.speed_accuracy import SpeedAccuracyTable
@@ -123,6 +124,7 @@ SOLVERS = {
 }
 STUDIES: Constructors = {
     "simulate": Simulate,
+    "branch": BranchTable,
     "ensemble": EnsembleTable,
     "mode_count": ModeCountTable,
     "smallest_model": SmallestModelTable,

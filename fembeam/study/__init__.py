@@ -1,5 +1,6 @@
 """Studies: questions asked of a scene or a model by many runs, each answered by a table and a figure."""
 
+from fembeam.study.bifurcation import Bifurcation, bifurcation
 from fembeam.study.ensemble import Ensemble, ensemble
 from fembeam.study.failures import Failure, gallery
 from fembeam.study.mode_count import ModeCount, mode_count
@@ -9,6 +10,8 @@ from fembeam.study.stability_map import StabilityMap, Verdict, stability_map
 from fembeam.study.stationary import Response, characteristics, stationary
 
 __all__ = [
+    "Bifurcation",
+    "bifurcation",
     "Failure",
     "NoReferenceError",
     "Point",

@@ -1,0 +1,108 @@
+"""Orbits, attractors and branches of a model; the parameters of a scene by name; the table [branch]."""
+
+import math
+
+import numpy as np
+import pytest
+from problems import TIP, paper_scene
+
+import fembeam as fb
+import solvers
+from fembeam import cli, parameters, scene_file
+from fembeam.orbit import common_period, extremes_of
+
+
+@pytest.fixture(scope="module")
+def model():
+    return paper_scene().reduce(1)
+
+
+def test_orbit_is_what_a_long_run_settles_to(model):
+    orbit = model.orbit()
+    once = 2.0 * math.pi / 195.0
+    end = model.simulate(400 * once, solver=solvers.Exponential(1e-11))
+    np.testing.assert_allclose(orbit.state, np.concatenate((end.q[-1], end.q_dot[-1])), atol=1e-9)
+    assert orbit.stable
+    run = model.simulate(once, once / 2000, start=orbit.state)
+    u = run.displacement(TIP)
+    assert orbit.extremes(TIP) == pytest.approx((u.min(), u.max()), rel=1e-4)
+    assert orbit.contacts.peak_indentation.max() == pytest.approx(-orbit.extremes(TIP)[0], rel=1e-4)
+
+
+def test_subharmonics_from_nothing_and_their_names(model):
+    found = model.attractors(430.0, starts=3)
+    assert [a.name for a in found] == ["period 2 with 1 impacts"]
+    driven = paper_scene(fb.Harmonic(1e-3, 430.0)).reduce(1)
+    half = driven.orbit(period=2)
+    assert half.period == 2
+    assert half.stable
+    with pytest.raises(solvers.OrbitError, match="Newton's method went to one of period 1"):
+        model.orbit(period=2, start=model.orbit())
+
+
+def test_branch_marks_the_flip_and_its_copy_from_a_file_is_the_same(model, tmp_path):
+    branch = model.branch("omega", (270.0, 300.0), at=280.0, step=0.2).run()
+    flips = [orbit for orbit in branch.special if orbit.mark == "flip"]
+    assert [round(orbit.parameter, 2) for orbit in flips] == [287.1]
+    assert flips[0].multipliers[0].real == pytest.approx(-1.0, abs=1e-6)
+    assert branch.status == "reached the end of the span; reached the end of the span"
+    branch.save(tmp_path / "b.npz")
+    again = model.resume(tmp_path / "b.npz")
+    np.testing.assert_array_equal(again.parameter, branch.parameter)
+    with pytest.raises(ValueError, match="belongs to another scene"):
+        paper_scene(fb.Harmonic(2e-3, 195.0)).reduce(1).resume(tmp_path / "b.npz")
+    branch.to_csv(tmp_path / "b.csv")
+    assert len((tmp_path / "b.csv").read_text().splitlines()) == 1 + len(branch.orbits)
+    assert fb.plot.branch(branch).axes[0].get_xlabel() == "ω / rad/s"
+    assert "contacts" in fb.plot.orbit(flips[0])._suptitle.get_text()
+
+
+def test_brute_force_agrees_with_the_branch(model):
+    found = fb.study.bifurcation(model, "omega", [200.0, 215.0], settle=150, keep=4)
+    branch = model.branch("omega", (200.0, 215.0), at=200.0, step=0.5).run()
+    peaks = [max(-low, high) for low, high in (branch.orbits[0].extremes(TIP), branch.orbits[-1].extremes(TIP))]
+    np.testing.assert_allclose(found.peaks, np.repeat([[peaks[0]], [peaks[1]]], 4, axis=1), rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("gap", 1e-4), ("stiffness", 1e8), ("masses[0].mass", 0.02), ("zeta[0]", 0.03)]
+)
+def test_any_number_of_a_scene_can_be_varied(model, name, value):
+    path = parameters.path_of(model.scene, name)
+    scene = parameters.with_value(model.scene, name, value)
+    assert parameters.value_of(scene, path) == value
+    assert model.branch(name, (0.9 * value, 1.1 * value), at=value).orbits[0].parameter == value
+
+
+def test_extremes_of_a_sampled_sine_and_common_periods():
+    t = np.linspace(0.0, 2.0, 41)
+    assert extremes_of(t, np.sin(9 * t), 9 * np.cos(9 * t)) == pytest.approx((-1.0, 1.0), abs=2e-4)
+    tones = [fb.Multisine([1.0, 1.0], [2.0, 3.0]), fb.Harmonic(1.0, 0.0)]
+    assert common_period(tones) == pytest.approx(2.0 * math.pi)
+
+
+def test_bad_input(model):
+    with pytest.raises(ValueError, match=r"no such parameter; the scene has beam.length, .*base.omega"):
+        model.branch("omga", (1.0, 2.0))
+    with pytest.raises(ValueError, match="span must be two values, ascending"):
+        model.branch("omega", (2.0, 1.0))
+    for period in (0, 1.5):
+        with pytest.raises(ValueError, match="period counts periods of the load"):
+            model.orbit(period=period)
+    with pytest.raises(ValueError, match="an orbit needs periodic loads"):
+        paper_scene(fb.BandNoise(1e-4, (0.0, 100.0), seed=1)).reduce(1).orbit()
+    with pytest.raises(ValueError, match="no common period"):
+        paper_scene(fb.Multisine([1e-4, 1e-4], [2.0, 2.0 * math.pi])).reduce(1).orbit()
+
+
+def test_the_table_branch(tmp_path, capsys):
+    text = (scene_file.Path(__file__).parent.parent / "examples" / "beam_stop.toml").read_text()
+    head = text[: text.index("[base]")]
+    file = tmp_path / "scene.toml"
+    file.write_text(
+        head + '[base]\nkind = "harmonic"\namplitude = 1e-3\nomega = 195.0\n[reduce]\nmodes = 1\n'
+        "[branch]\nspan = [190.0, 200.0]\nstep = 0.5\n"
+    )
+    assert cli.main(["run", str(file), "--out", str(tmp_path / "out"), "--quiet"]) == 0
+    assert "reached the end of the span" in capsys.readouterr().out
+    assert {path.name for path in (tmp_path / "out").iterdir()} >= {"branch.npz", "branch.csv", "branch.png"}
