@@ -45,7 +45,7 @@ def branch(
     place = observed(model) if z is None else z
     axis = _axis() if axes is None else axes
     if cloud is not None:
-        axis.plot(cloud[0], 1e3 * cloud[1], ",", color=GREY, alpha=0.6, label="simulated", rasterized=True)
+        axis.plot(cloud[0], 1e3 * cloud[1], ".", color=GREY, markersize=2.0, label="simulated", rasterized=True)
     for i, one in enumerate(several):
         label = f"period {one.family.period}" if labels is None else labels[i]
         _draw_branch(axis, one, place, f"C{i}", label)
