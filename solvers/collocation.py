@@ -19,7 +19,7 @@ import math
 
 import numpy as np
 
-from solvers.kernels import contact_forces, copy, dot, indentation, inner, reordered, sizes
+from solvers.kernels import contact_forces, copy, dot, indentation, inlined, inner, reordered, sizes
 from solvers.newton import MOST_ITERATIONS, newton
 from solvers.peaks import peak, top
 from solvers.response import node_forces, respond
@@ -83,15 +83,40 @@ def step_error(problem, tables, state, space, family, level):
             if state.piece[u] == 0:
                 continue
             largest, deepest = top(space.force[u]), top(space.motion[u, 0])
-            c = space.summary[u, 0]
-            before, last = max(abs(c[0]), abs(c[1])), max(abs(c[2]), abs(c[3]))
-            if last <= 1e-14 * largest:
+            beyond = _beyond(space.summary[u, 0], largest, S // 2)
+            if beyond == 0.0:
                 continue
-            decay = min(last / before, 1.0) if before > 0.0 else 1.0
-            beyond = last * max(decay ** (S // 2), min(last / largest, 1.0))
             ripple = sizes(tables.ripple[family, level, u], state.x, 2 * n)
             stiffness = tables.exponent[u] * largest / max(deepest, 1e-300)
             error += abs(tables.mobility[s, u]) * h * (beyond + 0.1 * stiffness * ripple)
+        worst = max(worst, error)
+    return max(worst, _signal_error(problem, tables, space, family, h)) if problem.table_dt.size else worst
+
+
+@inlined
+def _beyond(coefficients, largest, power):
+    """Size of what a polynomial leaves out, from its last four coefficients."""
+    before = max(abs(coefficients[0]), abs(coefficients[1]))
+    last = max(abs(coefficients[2]), abs(coefficients[3]))
+    if last <= 1e-14 * largest:
+        return 0.0
+    decay = min(last / before, 1.0) if before > 0.0 else 1.0
+    return last * max(decay**power, min(last / largest, 1.0))
+
+
+@inner
+def _signal_error(problem, tables, space, family, h):
+    """The same for the sampled signals, which an entry step integrates at half the order."""
+    power, worst = S // 2 if family == 0 else 1, 0.0
+    for s in range(problem.gap.size):
+        error = 0.0
+        for j in range(problem.table_dt.size):
+            load = problem.table_load[j]
+            values, largest = space.force[problem.gap.size + load], 0.0
+            for i in range(S):
+                largest = max(largest, abs(values[i]))
+            combine(tables.tail[family], values, S, None, space.trial)
+            error += abs(tables.direct[s, load]) * h * _beyond(space.trial, largest, power)
         worst = max(worst, error)
     return worst
 

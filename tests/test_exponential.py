@@ -377,3 +377,26 @@ def test_several_resonant_tones_of_one_load():
     ours, theirs = (integrate(system, [0.0], [0.0], 0.4, 0.1, m) for m in (Exponential(1e-10), RK))
     assert len(ours.contacts) == len(theirs.contacts) > 0
     np.testing.assert_allclose(ours.q, theirs.q, atol=1e-9 * np.abs(theirs.q).max())
+
+
+@pytest.mark.parametrize("stiffness", [1e-2, 1e2, 1e4, 1e6, 1e8])
+def test_contacts_longer_than_the_cells_of_a_wide_band_load(stiffness):
+    """A soft stop's contact spans hundreds of cells; the steps follow the load."""
+    load = [([1.8], fb.BandNoise(5.5, (0.0, 8000.0), seed=11, period=4.0))]
+    system = System.modal([182.4], [0.2], [Contact([1.8], Hertz(stiffness))], load)
+    theirs = at_rest(system, 0.2, DormandPrince(1e-12))
+    for rtol in (1e-6, 1e-8, 1e-10):
+        ours = at_rest(system, 0.2, Exponential(rtol))
+        assert ours.contacts.stop.tolist() == theirs.contacts.stop.tolist()
+        assert final_difference(ours, theirs) < rtol + 1e-10, rtol
+
+
+def test_start_at_rest_on_the_stop_is_no_contact_whatever_the_rounding():
+    """The load pulls away at once; data moved by a rounding must not log a contact of no duration."""
+    system, rng = paper(10), np.random.default_rng(0)
+    for _ in range(40):
+        direction, k = (
+            x * (1.0 + 4e-14 * rng.standard_normal(10)) for x in (system.contacts[0].direction, np.diag(system.K))
+        )
+        moved = System(system.M, system.C, np.diag(k), [Contact(direction, PAPER_LAW)], system.loads)
+        assert at_rest(moved, 0.03, Exponential(1e-6)).contacts.t_in.min(initial=1.0) > 1e-3
