@@ -69,7 +69,7 @@ def solve_forces(problem, tables, state, space, family, level, accuracy):
 
 
 @inner
-def step_error(problem, tables, state, space, family, level):
+def step_error(problem, tables, state, space, family, level, fresh):
     """Error of the indentation rate, m/s, that the forces' unresolved part makes; the largest over the stops."""
     stops, n = problem.gap.size, problem.k.size
     h = tables.step[level]
@@ -84,6 +84,8 @@ def step_error(problem, tables, state, space, family, level):
                 continue
             largest, deepest = top(space.force[u]), top(space.motion[u, 0])
             beyond = _beyond(space.summary[u, 0], largest, S // 2)
+            if family == 0:
+                beyond += 0.01 * _hidden_kink(problem, state, space, u, largest, fresh)
             if beyond == 0.0:
                 continue
             ripple = sizes(tables.ripple[family, level, u], state.x, 2 * n)
@@ -91,6 +93,23 @@ def step_error(problem, tables, state, space, family, level):
             error += abs(tables.mobility[s, u]) * h * (beyond + 0.1 * stiffness * ripple)
         worst = max(worst, error)
     return max(worst, _signal_error(problem, tables, space, family, h)) if problem.table_dt.size else worst
+
+
+@inner
+def _hidden_kink(problem, state, space, u, largest, fresh):
+    """Force, in N, by which law and polynomial differ at an end of a smooth step, if no coefficient explains it.
+
+    The law then bends between that end and the next node, a fiftieth of the step at most: clamp=True does.
+    """
+    size, delta, rate = 2 * problem.k.size, space.clipped[0:2], space.trial[0:2]
+    delta[0], rate[0] = indentation(problem, u, space.x_new), dot(problem.read_rate[u], space.x_new, size)
+    delta[1], rate[1] = indentation(problem, u, state.x), dot(problem.read_rate[u], state.x, size)
+    contact_forces(problem, u, delta, rate, state.entry_rate[u], space.trial[2:4])
+    c = space.summary[u, 0]
+    apart = abs(space.trial[2] - c[5])
+    if not fresh:  # one that begins on a knot may begin with a jump
+        apart = max(apart, abs(space.trial[3] - c[4]))
+    return apart if apart > 2.0 * max(abs(c[2]), abs(c[3])) + 1e-12 * largest else 0.0
 
 
 @inlined

@@ -224,7 +224,7 @@ def _try(problem, tables, state, space, numbers, last, family, level, rtol):
     arrive(problem, tables, state, space, family, level)
     if leaves_piece(problem, tables, state, space, family, level):
         return 1.0 if bottom else np.inf
-    error = step_error(problem, tables, state, space, family, level) / tolerance
+    error = step_error(problem, tables, state, space, family, level, last[FRESH]) / tolerance
     return min(error, 1.0) if bottom else error
 
 
@@ -378,7 +378,7 @@ def advance(problem_at, tables_at, state_at, space_at, t_end, budget, rtol, log,
             continue
         stop = fly(problem, tables, state, space, t_end, budget, out, dt, ledger)
         if stop >= 0:
-            switch(problem, state, stop, 1, log)
+            switch(problem, state, stop, np.int64(1), log)  # a literal would be compiled for itself
             _begin(problem, tables, state, space, numbers, last, stop)
     return RUNNING
 
