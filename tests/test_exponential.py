@@ -462,3 +462,16 @@ def test_agreement_with_the_readable_reference_in_regularised_time(n, law):
     np.testing.assert_allclose(ours.contacts.t_in, entries, atol=1e-12, rtol=0)
     np.testing.assert_allclose(ours.q[-1], q, atol=1e-10 * np.abs(q).max(), rtol=0)
     np.testing.assert_allclose(ours.q_dot[-1], q_dot, atol=1e-9 * np.abs(q_dot).max(), rtol=0)
+
+
+@pytest.mark.parametrize("name", ["hysteretic", "elastic"])
+@pytest.mark.parametrize("n", [2, 10, 30])
+def test_error_follows_the_tolerance(monkeypatch, n, name):
+    """Slope of log error over log rtol about 1, and the error below the tolerance."""
+    monkeypatch.syspath_prepend(str(Path(__file__).parent / "bench"))
+    from tolerance import STOPS, errors, slope
+
+    rtols = (1e-4, 1e-6, 1e-8)
+    found = errors(STOPS[name], n, rtols, starts=6)
+    assert 0.7 < slope(rtols, found) < 1.4
+    assert (found < np.array(rtols)).all()
