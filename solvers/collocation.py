@@ -10,7 +10,9 @@ singular start; the last one, onto δ = 0, is one Runge–Kutta step in √δ (s
 
 Step control: with A₁ >= A₂ the sizes of the last two and the two before of the force's S Jacobi coefficients, the force
 beyond the polynomial is taken as A₁ max((A₁/A₂)^{S/2}, A₁/F_max), and what it does to the indentation rate is
-compared with rtol × a reference speed. Fast modes whose oscillation the nodes cannot follow are charged for it.
+compared with rtol × a reference speed. Fast modes whose oscillation the nodes cannot follow are charged for it, and so
+is the tail of the sampled signals, whose cells may be shorter than the step. A kink of the law between an end of the
+step and the nearest node leaves no trace in the coefficients; there law and polynomial are compared.
 """
 
 from __future__ import annotations
