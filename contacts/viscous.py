@@ -20,10 +20,7 @@ from numpy.typing import NDArray
 from contacts.law import Law, check_number, check_restitution, number
 
 PULLS = "pulls at the end of every rebound, where the dashpot outweighs the spring; clamp=True forbids it"
-CLAMPED = (
-    "clamp=True: the kink where the force is cut moves with the rate; integrated at lower order around it, "
-    "and the exponential method may not see it: errors of 1e-5 of the exit speed have been met at tolerance 1e-11"
-)
+CLAMPED = "clamp=True: the kink where the force is cut moves with the rate; integrated at lower order around it"
 
 
 def damping_ratio_for(restitution: float) -> float:

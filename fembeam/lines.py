@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 HERMITE_CONSTANT = 46080.0  # |error| <= h^6/46080 max|s^(6)| for the quintic Hermite interpolant: 6! * 2^6
 OVERSAMPLING = 8  # grid points per period of the top line when the peak is bounded
+_CHUNK = 4096
 FINEST_RTOL = 1e-13  # finer is below the rounding of the FFT
 
 
@@ -144,8 +145,9 @@ class LineSpectrum:
         n = next_fast_len(max(math.ceil(self.period / widest), 2 * self.top + 1), real=True)
         dt = self.period / n
         values = np.empty((math.ceil(duration / dt) + 1, 3))
-        for order in range(3):
-            wave = self.derivative(order).grid(n)
-            values[:n, order] = wave[: len(values)]
-            values[n:, order] = wave[: max(0, len(values) - n)]  # the last node may close the period
+        waves = [self.derivative(order).grid(n) for order in range(3)]
+        for i in range(0, min(n, len(values)), _CHUNK):  # interleaved piece by piece, within the cache
+            for order, wave in enumerate(waves):
+                values[i : i + _CHUNK, order][: n - i] = wave[i : min(i + _CHUNK, len(values))]
+        values[n:] = values[: max(0, len(values) - n)]  # the last node may close the period
         return dt, values

@@ -62,8 +62,10 @@ def _first_root(problem, terms, s, x, longest, values):
     for i in range(ORDER + 1):
         values[i] = dot(problem.read[s], terms[i], 2 * problem.k.size)
     values[0] -= problem.gap[s]
-    if abs(values[0]) <= surface_tolerance(problem, s, x) and abs(values[1]) <= rate_tolerance(problem, s, x):
-        values[0], values[1] = 0.0, 0.0  # at rest on the surface: the acceleration decides
+    if abs(values[0]) <= surface_tolerance(problem, s, x):
+        values[0] = 0.0
+        if abs(values[1]) <= rate_tolerance(problem, s, x):
+            values[1] = 0.0  # at rest on the surface: the acceleration decides
     if values[0] >= 0.0 and (values[1] > 0.0 or (values[1] == 0.0 and values[2] > 0.0)):
         return 0.0
     end = longest

@@ -10,7 +10,9 @@ singular start; the last one, onto δ = 0, is one Runge–Kutta step in √δ (s
 
 Step control: with A₁ >= A₂ the sizes of the last two and the two before of the force's S Jacobi coefficients, the force
 beyond the polynomial is taken as A₁ max((A₁/A₂)^{S/2}, A₁/F_max), and what it does to the indentation rate is
-compared with rtol × a reference speed. Fast modes whose oscillation the nodes cannot follow are charged for it.
+compared with rtol × a reference speed. Fast modes whose oscillation the nodes cannot follow are charged for it, and so
+is the tail of the sampled signals, whose cells may be shorter than the step. A kink of the law between an end of the
+step and the nearest node leaves no trace in the coefficients; there law and polynomial are compared.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ import math
 
 import numpy as np
 
-from solvers.kernels import contact_forces, copy, dot, indentation, inner, reordered, sizes
+from solvers.kernels import contact_forces, copy, dot, indentation, inlined, inner, reordered, sizes
 from solvers.newton import MOST_ITERATIONS, newton
 from solvers.peaks import peak, top
 from solvers.response import node_forces, respond
@@ -69,7 +71,7 @@ def solve_forces(problem, tables, state, space, family, level, accuracy):
 
 
 @inner
-def step_error(problem, tables, state, space, family, level):
+def step_error(problem, tables, state, space, family, level, fresh):
     """Error of the indentation rate, m/s, that the forces' unresolved part makes; the largest over the stops."""
     stops, n = problem.gap.size, problem.k.size
     h = tables.step[level]
@@ -83,15 +85,59 @@ def step_error(problem, tables, state, space, family, level):
             if state.piece[u] == 0:
                 continue
             largest, deepest = top(space.force[u]), top(space.motion[u, 0])
-            c = space.summary[u, 0]
-            before, last = max(abs(c[0]), abs(c[1])), max(abs(c[2]), abs(c[3]))
-            if last <= 1e-14 * largest:
+            beyond = _beyond(space.summary[u, 0], largest, S // 2)
+            if family == 0:
+                beyond += 0.01 * _hidden_kink(problem, state, space, u, largest, fresh)
+            if beyond == 0.0:
                 continue
-            decay = min(last / before, 1.0) if before > 0.0 else 1.0
-            beyond = last * max(decay ** (S // 2), min(last / largest, 1.0))
             ripple = sizes(tables.ripple[family, level, u], state.x, 2 * n)
             stiffness = tables.exponent[u] * largest / max(deepest, 1e-300)
             error += abs(tables.mobility[s, u]) * h * (beyond + 0.1 * stiffness * ripple)
+        worst = max(worst, error)
+    return max(worst, _signal_error(problem, tables, space, family, h)) if problem.table_dt.size else worst
+
+
+@inner
+def _hidden_kink(problem, state, space, u, largest, fresh):
+    """Force, in N, by which law and polynomial differ at an end of a smooth step, if no coefficient explains it.
+
+    The law then bends between that end and the next node, a fiftieth of the step at most: clamp=True does.
+    """
+    size, delta, rate = 2 * problem.k.size, space.clipped[0:2], space.trial[0:2]
+    delta[0], rate[0] = indentation(problem, u, space.x_new), dot(problem.read_rate[u], space.x_new, size)
+    delta[1], rate[1] = indentation(problem, u, state.x), dot(problem.read_rate[u], state.x, size)
+    contact_forces(problem, u, delta, rate, state.entry_rate[u], space.trial[2:4])
+    c = space.summary[u, 0]
+    apart = abs(space.trial[2] - c[5])
+    if not fresh:  # one that begins on a knot may begin with a jump
+        apart = max(apart, abs(space.trial[3] - c[4]))
+    return apart if apart > 2.0 * max(abs(c[2]), abs(c[3])) + 1e-12 * largest else 0.0
+
+
+@inlined
+def _beyond(coefficients, largest, power):
+    """Size of what a polynomial leaves out, from its last four coefficients."""
+    before = max(abs(coefficients[0]), abs(coefficients[1]))
+    last = max(abs(coefficients[2]), abs(coefficients[3]))
+    if last <= 1e-14 * largest:
+        return 0.0
+    decay = min(last / before, 1.0) if before > 0.0 else 1.0
+    return last * max(decay**power, min(last / largest, 1.0))
+
+
+@inner
+def _signal_error(problem, tables, space, family, h):
+    """The same for the sampled signals, which an entry step integrates at half the order."""
+    power, worst = S // 2 if family == 0 else 1, 0.0
+    for s in range(problem.gap.size):
+        error = 0.0
+        for j in range(problem.table_dt.size):
+            load = problem.table_load[j]
+            values, largest = space.force[problem.gap.size + load], 0.0
+            for i in range(S):
+                largest = max(largest, abs(values[i]))
+            combine(tables.tail[family], values, S, None, space.trial)
+            error += abs(tables.direct[s, load]) * h * _beyond(space.trial, largest, power)
         worst = max(worst, error)
     return worst
 

@@ -10,7 +10,8 @@ Limitations
 * In flight no contact of the model is missed, however short. While one stop is in contact the others are watched at 8
   nodes per step only: a second contact shorter than the distance of two nodes can be missed.
 * Touching is no contact: a stop counts as entered where δ becomes positive. An entry at rest counts when δ̈ > 0.
-* A law that bends (clamp=True, a table) between its declared knots is integrated with smaller steps, at lower order.
+* A law that bends (clamp=True, a table) between its declared knots is integrated with smaller steps, at lower order; so
+  is the beginning and end of one that rises like δ^r, r < 1, in a viscous part (Tsuji). The tolerance is kept.
 * K must be positive semi-definite (no buckled modes).
 """
 
@@ -224,7 +225,7 @@ def _try(problem, tables, state, space, numbers, last, family, level, rtol):
     arrive(problem, tables, state, space, family, level)
     if leaves_piece(problem, tables, state, space, family, level):
         return 1.0 if bottom else np.inf
-    error = step_error(problem, tables, state, space, family, level) / tolerance
+    error = step_error(problem, tables, state, space, family, level, last[FRESH]) / tolerance
     return min(error, 1.0) if bottom else error
 
 
@@ -378,7 +379,7 @@ def advance(problem_at, tables_at, state_at, space_at, t_end, budget, rtol, log,
             continue
         stop = fly(problem, tables, state, space, t_end, budget, out, dt, ledger)
         if stop >= 0:
-            switch(problem, state, stop, 1, log)
+            switch(problem, state, stop, np.int64(1), log)  # a literal would be compiled for itself
             _begin(problem, tables, state, space, numbers, last, stop)
     return RUNNING
 

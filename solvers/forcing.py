@@ -102,10 +102,15 @@ def on_one_grid(forcing: Forcing, duration: float) -> Forcing:
 
 def _quintic(rows: Array, dt: float, t: Array) -> Array:
     """s, s', s'' of a node table's quintics at times t."""
-    from scipy.interpolate import BPoly
-
-    spline = BPoly.from_derivatives(np.arange(len(rows)) * dt, rows)
-    return np.stack([spline(t), spline(t, 1), spline(t, 2)], axis=1)
+    cell = np.clip((t / dt).astype(np.int64), 0, len(rows) - 2)
+    x = t / dt - cell
+    (a0, a1, a2), (b0, b1, b2) = ((rows[i] * (1.0, dt, 0.5 * dt**2)).T for i in (cell, cell + 1))
+    e0, e1, e2 = b0 - a0 - a1 - a2, b1 - a1 - 2.0 * a2, b2 - a2
+    c3, c4, c5 = 10.0 * e0 - 4.0 * e1 + e2, -15.0 * e0 + 7.0 * e1 - 2.0 * e2, 6.0 * e0 - 3.0 * e1 + e2
+    value = a0 + x * (a1 + x * (a2 + x * (c3 + x * (c4 + x * c5))))
+    slope = a1 + x * (2.0 * a2 + x * (3.0 * c3 + x * (4.0 * c4 + x * 5.0 * c5)))
+    bend = 2.0 * a2 + x * (6.0 * c3 + x * (12.0 * c4 + x * 20.0 * c5))
+    return np.stack([value, slope / dt, bend / dt**2], axis=1)
 
 
 def _check_nodes(rows: Array, dt: float, duration: float, load: int) -> None:

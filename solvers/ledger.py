@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from solvers.flight import add_taylor, taylor
 from solvers.kernels import copy, dot, inner, table_value
 from solvers.response import sample_signals
@@ -89,8 +91,8 @@ def account_flight(problem, tables, state, space, h, x):
     """The same for a whole flight step: on its Taylor polynomial where that reaches, else as above."""
     if tables.fastest * h > 0.6:
         if problem.table_dt.size:
-            sample_signals(problem, tables, space, 0, state.now[T], h)
-        account(problem, tables, state, space, 0, h, h, x, state.x)
+            sample_signals(problem, tables, space, np.int64(0), state.now[T], h)  # literals would compile it twice
+        account(problem, tables, state, space, np.int64(0), h, h, x, state.x)
         return
     size, inner = 2 * problem.k.size, space.work[16]
     taylor(problem, x, state.now[T], space.terms, space.six)

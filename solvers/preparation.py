@@ -29,7 +29,7 @@ def _arrays(*dimensions):  # shapes of a named tuple's contiguous float arrays
 TABLES = types.NamedTuple(
     [
         *_arrays(1, 3, 4, 2, 3, 2, 2, 2, 2, 0, 2, 1),
-        *_arrays(1, 3, 2, 2, 2, 3, 2, 5, 6, 5, 4, 2, 2, 2, 2, 4),
+        *_arrays(1, 3, 2, 2, 2, 3, 3, 2, 5, 6, 5, 4, 2, 2, 2, 2, 4),
     ],
     Tables,
 )

@@ -29,7 +29,7 @@ T, H_FLIGHT, H_CONTACT, LAST_EVENT = range(4)  # places in State.now
 STEPS, REJECTED, CALLS, EVENTS, LOGGED, SAMPLED, AT_ONCE, TAPED = range(8)  # places in State.count
 T_IN, SPEED_IN, PEAK_DELTA, PEAK_FORCE, WORK_IN, IMPULSE_IN, FLOORED = range(7)  # columns of State.open
 MOST_EVENTS_AT_ONCE = 100
-STEP, PART, LANDING, EVENT = range(4)  # kinds of tape rows
+STEP, PART, LANDING, EVENT = 0.0, 1.0, 2.0, 3.0  # kinds of tape rows
 KIND, BEGAN, ENDED, SPAN, FIRST, SECOND, HEAD = range(7)  # columns of the tape: two whole numbers that the kind
 # explains, then the state a row begins with and the forces at the nodes of a step
 
@@ -61,8 +61,8 @@ def surface_tolerance(problem, s, x):
 
 @inner
 def rate_tolerance(problem, s, x):
-    """Indentation rate below which a stop counts as at rest: rounding of δ̇."""
-    return 1e-15 * sizes(problem.read_rate[s], x, 2 * problem.k.size)
+    """Indentation rate below which a stop counts as at rest: rounding of δ̇, coupled blocks amplify it."""
+    return 1e-13 * sizes(problem.read_rate[s], x, 2 * problem.k.size)
 
 
 @inner
@@ -146,11 +146,13 @@ def switch_on_surface(problem, state, log, locates):
         delta_dot = dot(problem.read_rate[s], state.x, 2 * problem.k.size)
         tolerance = surface_tolerance(problem, s, state.x) if locates else 0.0
         still = rate_tolerance(problem, s, state.x)
+        direction = 0
         if delta >= problem.levels[s, state.piece[s]] - tolerance and delta_dot > still:
-            switch(problem, state, s, 1, log)
-            switched = True
+            direction = 1
         elif state.piece[s] > 0 and delta <= problem.levels[s, state.piece[s] - 1] + tolerance and delta_dot < -still:
-            switch(problem, state, s, -1, log)
+            direction = -1
+        if direction != 0:
+            switch(problem, state, s, direction, log)
             switched = True
     return switched
 

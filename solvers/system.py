@@ -193,7 +193,8 @@ class System:
     def energy(self, q: Array, q_dot: Array) -> Array:
         """Stored energy ½ q'ᵀ M q' + ½ qᵀ K q in J, for (..., n) arrays."""
         with np.errstate(over="ignore", invalid="ignore"):  # of a run that diverged
-            return 0.5 * ((q_dot @ self.M) * q_dot + (q @ self.K) * q).sum(axis=-1)
+            twice = (np.einsum("...i,...i", x @ matrix, x) for x, matrix in ((q_dot, self.M), (q, self.K)))
+            return 0.5 * sum(twice)
 
 
 @dataclass(frozen=True, eq=False)

@@ -54,6 +54,7 @@ class Tables(NamedTuple):
     times: Any  # (f, S) σ^κ
     weights: Any  # (f, S): ∫F dt = h Σ weights F
     summary: Any  # (f, S, 8): from node values, the last four Jacobi coefficients, both ends' values, both slopes
+    tail: Any  # (f, S, 8): from node values of a signal, the last four Legendre coefficients in σ
     legendre: Any  # (S, S): all Legendre coefficients from smooth nodes
     free: Any  # (f, j, m, 2N, 2S): δ and δ̇ at the nodes from the state
     forced: Any  # (f, j, m, m + L, S, 2S): the same from the forces and signals at the nodes
@@ -242,6 +243,7 @@ def build(
         times=families.times,
         weights=families.weights,
         summary=families.summary,
+        tail=families.tail,
         legendre=families.legendre,
         free=blocks.free,
         forced=blocks.forced,
@@ -374,6 +376,7 @@ class _Families(NamedTuple):
     times: Any
     weights: Any
     summary: Any
+    tail: Any
     legendre: Any
     extend: Any
     between: Any  # (f, 24, S) from the values at the nodes to those between them
@@ -393,6 +396,7 @@ def _families(exponents: tuple[float, ...], jumps: tuple[bool, ...]) -> _Familie
         times=np.array([f.nodes**f.power for f in found]),
         weights=np.array([f.weights for f in found]),
         summary=np.ascontiguousarray([_summary(f) for f in found]),
+        tail=np.ascontiguousarray([_tail(f.nodes) for f in found]),
         legendre=np.ascontiguousarray(found[0].spectrum),
         extend=np.ascontiguousarray([_extensions(f, found[0]) for f in found]),
         between=np.array([_interpolation(f.nodes, _CHECKED) for f in found]),
@@ -463,6 +467,13 @@ def _summary(family: _Family) -> Any:
     else:
         rows[5] = ends[1] * family.nodes ** (-2.0 * family.exponent)
     return rows.T
+
+
+def _tail(nodes: Any) -> Any:
+    """(S, 8): last four Legendre coefficients of the polynomial through node values."""
+    out = np.zeros((S, 8))
+    out[:, :4] = np.linalg.inv(np.polynomial.legendre.legvander(2.0 * nodes - 1.0, S - 1))[-4:].T
+    return out
 
 
 def _differentiation(nodes: Any) -> Any:

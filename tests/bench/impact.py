@@ -64,6 +64,7 @@ def methods(modes: int) -> dict[str, tuple[Any, list[dict[str, Any]]]]:
             for kind in (solvers.RK4, solvers.CentralDifference, solvers.Newmark, solvers.GeneralizedAlpha)
         },
         "RK4, blind": (peers.constant_step, [{"kind": solvers.RK4, "dt": dt, "locate": False} for dt in constant]),
+        "DOP853 in √δ": (peers.regularised, rtols(1e-7, 1e-9)),
         "SciPy DOP853": (peers.scipy_ivp, rtols(*loose, method="DOP853", max_step=1e-3)),
         "SciPy LSODA": (peers.scipy_ivp, rtols(*loose, method="LSODA", max_step=1e-3)),
         "SciPy Radau": (peers.scipy_ivp, rtols(*few, method="Radau", max_step=1e-3)),

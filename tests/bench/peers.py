@@ -12,7 +12,9 @@ downward) by their own event location. The entry rate δ̇⁻ is latched, not be
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -58,6 +60,18 @@ def constant_step(problem: Problem, setting: Setting) -> Run:
     """RK4, central differences, Newmark or generalised α; settings kind (the class), dt, locate."""
     setting = dict(setting)
     return _own(problem, setting.pop("kind")(**setting))
+
+
+def regularised(problem: Problem, setting: Setting) -> Run:
+    """The readable reference of the tests, plain Python: exact flight, SciPy's DOP853 in √δ; setting rtol."""
+    sys.path.insert(0, str(Path(__file__).parents[1]))
+    from regularised import regularised as solve
+
+    n = problem.n
+    return lambda start: (
+        problem.phi @ solve(problem.system, start[:n], start[n:], DURATION, **setting)[0],
+        None,
+    )
 
 
 # --- heyoka ----------------------------------------------------------------------------------------------------------

@@ -1,0 +1,151 @@
+"""Vector sums and handles against numpy and the tuples they stand for."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from numba import njit, types
+
+from solvers.handle import Layout, Packed, opener
+from solvers.vector import combine, padded
+
+OPTIONS = {"error_model": "numpy", "_nrt": False}
+
+
+@njit(**OPTIONS)
+def onto(rows, weights, count, start, result):
+    combine(rows, weights, count, start, result)
+
+
+@njit(**OPTIONS)
+def from_zero(rows, weights, count, result):
+    combine(rows, weights, count, None, result)
+
+
+@pytest.mark.parametrize("size", [1, 7, 8, 9, 16, 33])
+def test_padded_is_the_next_multiple_of_eight(size):
+    assert padded(size) % 8 == 0
+    assert 0 <= padded(size) - size < 8
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 5, 12])
+@pytest.mark.parametrize("width", [8, 16, 24])
+def test_combine_is_the_weighted_sum_of_the_first_rows(count, width):
+    rng = np.random.default_rng(count + width)
+    rows, weights, start = rng.standard_normal((12, width)), rng.standard_normal(12), rng.standard_normal(width)
+    result = np.full(width, np.nan)
+    from_zero(rows, weights, count, result)
+    np.testing.assert_allclose(result, weights[:count] @ rows[:count], atol=1e-14)
+    onto(rows, weights, count, start, result)
+    np.testing.assert_allclose(result, start + weights[:count] @ rows[:count], atol=1e-14)
+
+
+@pytest.mark.parametrize("size", [1, 6, 8, 11])
+def test_combine_of_padded_rows_leaves_their_padding_zero(size):
+    rng = np.random.default_rng(size)
+    rows = np.zeros((5, padded(size)))
+    rows[:, :size] = rng.standard_normal((5, size))
+    weights, result = rng.standard_normal(5), np.full(padded(size), np.nan)
+    from_zero(rows, weights, 5, result)
+    np.testing.assert_allclose(result[:size], weights @ rows[:, :size], atol=1e-14)
+    assert not result[size:].any()
+
+
+def test_combine_may_add_to_its_own_start():
+    rows, weights, result = np.ones((3, 8)), np.array([1.0, 2.0, 3.0]), np.arange(8.0)
+    onto(rows, weights, 3, result, result)
+    np.testing.assert_array_equal(result, np.arange(8.0) + 6.0)
+
+
+class Things(NamedTuple):
+    """What a handle points to."""
+
+    vector: np.ndarray
+    number: float
+    cube: np.ndarray
+    count: np.ndarray
+
+
+KIND = types.NamedTuple(
+    [types.float64[::1], types.float64, types.Array(types.float64, 3, "C"), types.int64[::1]], Things
+)
+_open = opener(KIND)
+
+
+@njit(**OPTIONS)
+def look(address, out):
+    """Sums, shapes and single entries seen through the handle; writes one entry back."""
+    things = _open(address)
+    out[0], out[1], out[2] = things.vector.sum(), things.number, things.cube[1, 2, 3]
+    out[3], out[4], out[5] = things.cube.shape[0], things.cube.shape[2], things.count[1]
+    out[6] = things.cube[1].sum()
+    things.vector[0] = -1.0
+
+
+def things():
+    """One of each kind."""
+    rng = np.random.default_rng(1)
+    return Things(rng.standard_normal(5), 0.25, rng.standard_normal((2, 3, 4)), np.array([3, 7, 11]))
+
+
+def seen(address):
+    out = np.empty(7)
+    look(address, out)
+    return out
+
+
+def expected(of):
+    return [of.vector.sum(), of.number, of.cube[1, 2, 3], 2, 4, of.count[1], of.cube[1].sum()]
+
+
+def test_attributes_of_a_handle_are_those_of_the_tuple():
+    one = things()
+    wanted = expected(one)
+    np.testing.assert_allclose(seen(Packed(one, KIND).address), wanted, rtol=1e-14)
+    assert one.vector[0] == -1.0
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("vector", np.zeros(3, dtype=np.float32)),
+        ("vector", np.zeros((2, 2))),
+        ("cube", np.zeros((2, 3, 8))[:, :, ::2]),
+        ("count", np.zeros(3)),
+    ],
+)
+def test_what_does_not_fit_the_declared_kind_is_refused_by_name(name, value):
+    with pytest.raises(TypeError, match=f"{name} must be a contiguous"):
+        Packed(things()._replace(**{name: value}), KIND)
+
+
+class Pair(NamedTuple):
+    """Arrays that live in one block."""
+
+    values: np.ndarray
+    marks: np.ndarray
+
+
+PAIR = types.NamedTuple([types.Array(types.float64, 2, "C"), types.int64[::1]], Pair)
+_open_pair = opener(PAIR)
+
+
+@njit(**OPTIONS)
+def write(address):
+    pair = _open_pair(address)
+    for i in range(pair.values.shape[0]):
+        for j in range(pair.values.shape[1]):
+            pair.values[i, j] = 10 * i + j
+    pair.marks[0] = pair.values.shape[1]
+
+
+def test_tuples_of_a_layout_share_one_block_and_do_not_overlap():
+    layout = Layout([PAIR, PAIR], [[(2, 3), (1,)], [(4, 1), (2,)]])
+    block, words = layout.block()
+    start = words.ctypes.data
+    for at in layout.starts:
+        write(start + at)
+    first, second = (Pair._make(layout.arrays(block, i)) for i in range(2))
+    np.testing.assert_array_equal(first.values, [[0, 1, 2], [10, 11, 12]])
+    np.testing.assert_array_equal(second.values[:, 0], [0, 10, 20, 30])
+    assert (first.marks[0], second.marks[0], second.marks[1]) == (3, 1, 0)
