@@ -142,7 +142,7 @@ def _reduced(file: SceneFile, **arguments: Any) -> Model:
     try:
         return file.scene.reduce(**arguments)
     except (ValueError, TypeError, RuntimeError) as error:  # RuntimeError: modes that cannot be computed
-        raise ValueError(f"{file.path}: [reduce]: {error}") from error
+        raise ValueError(f"{file.source.place('[reduce]', str(error))}: {error}") from error
 
 
 def _simulated(model: Model, study: Any, progress: bool) -> tuple[Run, int]:

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import json
 import math
-import platform
 import tempfile
 from collections.abc import Callable
 from dataclasses import asdict
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fembeam import plot
-from fembeam.run import Run, written_whole
+from fembeam.run import Run, versions, written_whole
 from fembeam.statistics import moments
 
 if TYPE_CHECKING:
@@ -114,17 +112,6 @@ def summary(run: Run, discard: float = 0.0, seconds: float | None = None) -> dic
         "units": "SI: m, s, N, J, rad/s",
         "versions": versions(),
     }
-
-
-def versions() -> dict[str, str]:
-    """Versions of Python and of what computes."""
-    found = {"python": platform.python_version()}
-    for package in ("fembeam", "numpy", "scipy", "numba", "scikit-fem", "matplotlib"):
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            found[package] = "not installed as a package"
-    return found
 
 
 def _moments(run: Run, discard: float) -> dict[str, dict[str, float]]:

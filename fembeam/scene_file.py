@@ -13,9 +13,8 @@ from __future__ import annotations
 
 import inspect
 import re
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -29,6 +28,7 @@ from fembeam.record import Record
 from fembeam.scene import FEATURES, Scene
 from fembeam.schema import Constructors, converted, fits, listed, nearest, parameters, required, shown, wanted
 from fembeam.section import Section, Taper, require_non_negative, require_positive
+from fembeam.source import Source
 from fembeam.study.ensemble_table import EnsembleTable
 from fembeam.study.quantities import QUANTITIES
 from fembeam.study.speed_accuracy import SpeedAccuracyTable
@@ -72,12 +72,17 @@ class Simulate:
 
 @dataclass(frozen=True)
 class SceneFile:
-    """What a scene file says: the scene, the arguments of `Scene.reduce`, and the study tables by name."""
+    """What a scene file says: the scene, the arguments of `Scene.reduce`, the study tables by name; and its text."""
 
-    path: Path
+    source: Source
     scene: Scene
     reduce: dict[str, Any] = field(default_factory=dict)
     studies: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self.source.path
 
 
 SHAPES: Constructors = {
@@ -130,12 +135,13 @@ STUDIES: Constructors = {
 }
 
 
-def read(path: str | Path) -> SceneFile:
+def read(path: str | Path, overrides: Sequence[str] = ()) -> SceneFile:
     """Read and check a scene file; nothing is computed.
 
     Parameters
     ----------
-    path : a TOML file; paths inside it are relative to its folder.
+    path : a TOML file, paths inside it being relative to its folder; or a saved run that was made from one.
+    overrides : such as "simulate.duration=10", "stops[0].law.stiffness=1e9".
 
     Returns
     -------
@@ -161,23 +167,52 @@ def read(path: str | Path) -> SceneFile:
     >>> read(path).scene.supports
     (Clamped(z=0.0),)
     """
-    path = Path(path)
+    return built(replace(source := _source(Path(path)), overrides=(*source.overrides, *overrides)))
+
+
+def _source(path: Path) -> Source:
+    """The text of a scene file or of the one a run was made from."""
+    if path.suffix == ".npz":
+        from fembeam.run import load
+
+        try:
+            source = load(path).source
+        except (OSError, ValueError) as error:
+            raise SceneFileError(f"{path}: cannot be read: {error}") from None
+        if source is None:
+            raise SceneFileError(f"{path}: holds no scene file; this run was made in Python, so repeat it there")
+        return source
     try:
-        tables = tomllib.loads(path.read_bytes().decode("utf-8"))
+        return Source(path, path.read_bytes().decode("utf-8"))
     except OSError as error:
         raise SceneFileError(f"{path}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:
         raise SceneFileError(f"{path}: is not a text file in UTF-8") from None
-    except (ValueError, RecursionError) as error:
-        raise SceneFileError(f"{path}: is not valid TOML: {error}") from None
-    return _Reader(path).scene_file(tables)
+
+
+def built(source: Source) -> SceneFile:
+    """What a text says; the files that it names are taken from it where it carries them, and carried from then on."""
+    with source.unpacked() as places:
+        reader = _Reader(source, places)
+        try:
+            tables = source.tables()
+        except ValueError as error:
+            raise SceneFileError(str(error)) from None
+        file = reader.scene_file(tables)
+        carried = {name: place.read_bytes() for name, place in places.items()}
+        return replace(file, source=replace(source, files=carried))
 
 
 @dataclass(frozen=True)
 class _Reader:
-    """Turns tables into objects; knows the file for messages and relative paths."""
+    """Turns tables into objects; knows the text for messages, and where the files lie that it names."""
 
-    path: Path
+    source: Source
+    places: dict[str, Path]
+
+    def file(self, name: str) -> Path:
+        """A file that the scene names."""
+        return self.places.setdefault(name, self.source.path.parent / name)
 
     def scene_file(self, tables: Table) -> SceneFile:
         """The whole file."""
@@ -199,7 +234,7 @@ class _Reader:
         for name, study in studies.items():
             if hasattr(study, "check"):
                 self.made(study.check, {"scene": scene}, f"[{name}]")
-        return SceneFile(self.path, scene, reduce, studies)
+        return SceneFile(self.source, scene, reduce, studies)
 
     def check_form(self, name: str, value: Any) -> None:
         """Features come as [[name]], gravity as a number, everything else as [name]."""
@@ -245,7 +280,7 @@ class _Reader:
                 self.fail("[beam]", "a mesh needs its path and a table sections = { name = { section }, … }")
             found = {name: self.section(entry, f"[beam] sections {name}") for name, entry in sections.items()}
             options |= {"data": table["data"]} if "data" in table else {}
-            return self.made(Beam.from_mesh, {"path": self.path.parent / path, "sections": found, **options}, "[beam]")
+            return self.made(Beam.from_mesh, {"path": self.file(path), "sections": found, **options}, "[beam]")
         if "spans" not in table:
             return self.build(_beam, table, "[beam]")
         self.check_keys(table, ["spans", *common], "[beam]", "key")
@@ -324,7 +359,7 @@ class _Reader:
         if not fits(value, parameter.annotation):
             self.fail(where, f"{key} must be {wanted(parameter.annotation)}, got {shown(value)}")
         if key == "path":
-            return self.path.parent / value
+            return self.file(value)
         return converted(value, parameter.annotation)
 
     def check_keys(self, table: Table, valid: Sequence[str], where: str, what: str) -> None:
@@ -335,7 +370,7 @@ class _Reader:
 
     def fail(self, where: str, message: str, cause: Exception | None = None) -> NoReturn:
         """Raise with file and table in front."""
-        raise SceneFileError(f"{self.path}: {where}: {message}") from cause
+        raise SceneFileError(f"{self.source.place(where, message)}: {message}") from cause
 
 
 def _span(length: float, section: Section) -> tuple[float, Section]:
