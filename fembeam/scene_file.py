@@ -18,22 +18,16 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NoReturn
 
-import contacts
-import solvers
 from fembeam.beam import Beam
 from fembeam.damping import ModalDamping, Rayleigh
-from fembeam.excitation import Harmonic, Multisine
-from fembeam.noise import BandNoise
-from fembeam.record import Record
+from fembeam.kinds import SECTION, SIGNAL, Nested, nested
 from fembeam.scene import FEATURES, Scene
 from fembeam.schema import Constructors, converted, fits, listed, nearest, parameters, required, shown, wanted
 from fembeam.section import Section, Taper, require_non_negative, require_positive
 from fembeam.source import Source
 from fembeam.study.ensemble_table import EnsembleTable
-from fembeam.study.quantities import QUANTITIES
 from fembeam.study.speed_accuracy import SpeedAccuracyTable
 from fembeam.study.tables import ModeCountTable, SmallestModelTable
-from fembeam.transient import Pulse, Step
 
 Table = Mapping[str, Any]
 
@@ -85,47 +79,6 @@ class SceneFile:
         return self.source.path
 
 
-SHAPES: Constructors = {
-    "general": Section,
-    "rectangle": Section.rectangle,
-    "circle": Section.circle,
-    "tube": Section.tube,
-    "taper": Taper,
-}
-LAWS: Constructors = {
-    "hertz": contacts.Hertz,
-    "hertz_of_spheres": contacts.Hertz.of_spheres,
-    "hysteretic": contacts.Hysteretic,
-    **{name: getattr(contacts.Hysteretic, name) for name in contacts.PUBLISHED},
-    "kelvin_voigt": contacts.KelvinVoigt,
-    "anagnostopoulos": contacts.KelvinVoigt.anagnostopoulos,
-    "viscoelastic": contacts.Viscoelastic,
-    "tsuji": contacts.Viscoelastic.tsuji,
-    "jankowski": contacts.Viscoelastic.jankowski,
-    "piecewise_linear": contacts.PiecewiseLinear,
-    "tabulated": contacts.Tabulated,
-    "tabulated_file": contacts.Tabulated.from_csv,
-    "parallel": contacts.parallel,
-}
-SIGNALS: Constructors = {
-    "harmonic": Harmonic,
-    "multisine": Multisine,
-    "band_noise": BandNoise,
-    "noise_of_psd": BandNoise.of_psd,
-    "rolled_off_noise": BandNoise.rolled_off,
-    "record": Record.from_csv,
-    "pulse": Pulse,
-    "step": Step,
-}
-SOLVERS = {
-    "exponential": "Exponential",
-    "dormand_prince": "DormandPrince",
-    "henon_rk2": "HenonRK2",
-    "rk4": "RK4",
-    "central_difference": "CentralDifference",
-    "newmark": "Newmark",
-    "generalized_alpha": "GeneralizedAlpha",
-}
 STUDIES: Constructors = {
     "simulate": Simulate,
     "ensemble": EnsembleTable,
@@ -259,8 +212,8 @@ class _Reader:
                 return self.build(Rayleigh, value, "[damping]")
             return self.build(ModalDamping, value, "[damping]", "alpha", "beta")
         if name == "base":
-            return self.choose(SIGNALS, value, "[base]")
-        kinds = {_snake(kind.__name__): kind for kind in FEATURES[name]}
+            return self.chosen(SIGNAL, value, "[base]")
+        kinds = {snake(kind.__name__): kind for kind in FEATURES[name]}
         made = []
         for number, table in enumerate(value):
             where = f"[[{name}]] number {number + 1}"
@@ -282,7 +235,7 @@ class _Reader:
             options |= {"data": table["data"]} if "data" in table else {}
             return self.made(Beam.from_mesh, {"path": self.file(path), "sections": found, **options}, "[beam]")
         if "spans" not in table:
-            return self.build(_beam, table, "[beam]")
+            return self.build(beam_of_section, table, "[beam]")
         self.check_keys(table, ["spans", *common], "[beam]", "key")
         if not isinstance(table["spans"], list):
             self.fail("[beam]", "spans must be a list of tables with length and section")
@@ -293,7 +246,7 @@ class _Reader:
 
     def section(self, table: Any, where: str) -> Section | Taper:
         """A section by its shape."""
-        return self.choose(SHAPES, table, where, "shape", "general")
+        return self.chosen(SECTION, table, where)
 
     def choose(self, kinds: Constructors, table: Any, where: str, key: str = "kind", default: str = "") -> Any:
         """Build the constructor that `kind` (or `shape`) names."""
@@ -340,27 +293,22 @@ class _Reader:
     def value(self, value: Any, key: str, parameter: inspect.Parameter, where: str) -> Any:
         """One value: a table for what has its own constructor, else checked by the annotation."""
         inner = f"{where} {key}"
-        if key == "section" or parameter.annotation is Section:
-            return self.section(value, inner)
-        if key == "law":
-            return self.choose(LAWS, value, inner)
-        if key == "laws":
-            if not isinstance(value, list):
-                self.fail(inner, f"must be a list of laws, got {shown(value)}")
-            return [self.choose(LAWS, one, f"{inner} number {number}") for number, one in enumerate(value, start=1)]
-        if key in ("signal", "foot"):
-            return self.choose(SIGNALS, value, inner)
-        if key == parameter.name == "quantity":
-            return self.choose(QUANTITIES, value if isinstance(value, dict) else {"kind": value}, inner)
-        if key == "solver":
-            offered = {name: method for name, method in SOLVERS.items() if method in solvers.__all__}
-            methods = {name: getattr(solvers, method) for name, method in offered.items()}  # here: slow to import
-            return self.choose(methods, value, inner)
+        if kind := nested(key, parameter):
+            if kind.listed and not isinstance(value, list):
+                self.fail(inner, f"must be a list of {key}, got {shown(value)}")
+            if kind.listed:
+                return [self.chosen(kind, one, f"{inner} number {i}") for i, one in enumerate(value, start=1)]
+            return self.chosen(kind, value, inner)
         if not fits(value, parameter.annotation):
             self.fail(where, f"{key} must be {wanted(parameter.annotation)}, got {shown(value)}")
         if key == "path":
             return self.file(value)
         return converted(value, parameter.annotation)
+
+    def chosen(self, kind: Nested, value: Any, where: str) -> Any:
+        """One thing of a kind; where plain text will do it is the name."""
+        table = {kind.key: value} if kind.by_name and not isinstance(value, dict) else value
+        return self.choose(kind.constructors(), table, where, kind.key, kind.default)
 
     def check_keys(self, table: Table, valid: Sequence[str], where: str, what: str) -> None:
         """Every key is a valid one; the nearest one is named otherwise."""
@@ -378,11 +326,11 @@ def _span(length: float, section: Section) -> tuple[float, Section]:
     return length, section
 
 
-def _beam(length: float, section: Section, foundation: float = 0.0, axial_force: float = 0.0) -> Beam:
+def beam_of_section(length: float, section: Section, foundation: float = 0.0, axial_force: float = 0.0) -> Beam:
     """A beam of one section."""
     return Beam(length, section, foundation=foundation, axial_force=axial_force)
 
 
-def _snake(name: str) -> str:
+def snake(name: str) -> str:
     """LumpedMass -> lumped_mass."""
     return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
