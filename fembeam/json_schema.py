@@ -14,8 +14,8 @@ from typing import Any, Literal, Union, get_args, get_origin
 from fembeam.damping import ModalDamping, Rayleigh
 from fembeam.kinds import SECTION, SIGNAL, Nested, nested
 from fembeam.scene import FEATURES, Scene
-from fembeam.schema import entry_type, parameters, required
 from fembeam.scene_file import STUDIES, beam_of_section, snake
+from fembeam.schema import entry_type, parameters, required
 
 Schema = dict[str, Any]
 SIMPLE = {float: "number", int: "integer", bool: "boolean", str: "string", Path: "string"}

@@ -185,6 +185,12 @@ class Run:
 
         return to_vtu(self, path, sample)
 
+    def to_csv(self, folder: str | os.PathLike[str], stride: int = 1) -> list[Path]:
+        """Write every `stride`-th sample at the usual places as `histories.csv`, and the log as `contacts.csv`."""
+        from fembeam.csv_files import write
+
+        return write(self, Path(folder), stride)
+
     def impactor_displacement(self, impactor: int = 0) -> Vector:
         """x(t) (k,) of an impactor from its place at the start, relative to the frame, m."""
         return self._striker(self.q, impactor)
@@ -340,13 +346,20 @@ def written_whole(target: Path) -> Iterator[Any]:
 
 
 @contextmanager
-def bar(duration: float, wanted: bool) -> Iterator[Callable[[float], None] | None]:
-    """A progress bar over simulated seconds, silent when not on a terminal."""
+def bar(duration: float, wanted: bool) -> Iterator[Callable[[float], None]]:
+    """A progress bar over simulated seconds, silent when not on a terminal; the moment at which signals are heard."""
+    from fembeam import interrupts
+
     if not wanted:
-        yield None
+        yield lambda _: interrupts.check()
         return
     from tqdm import tqdm
 
     shape = "{percentage:3.0f}%|{bar}| {n:.4g}/{total:.4g} s simulated [{elapsed}<{remaining}]"
     with tqdm(total=duration, disable=None, bar_format=shape) as shown:
-        yield lambda t: shown.update(t - shown.n)
+
+        def report(t: float) -> None:
+            shown.update(t - shown.n)
+            interrupts.check()
+
+        yield report

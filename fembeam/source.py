@@ -1,5 +1,4 @@
-"""The text behind a scene: parsed with overrides, found line by line, carried along by runs so that they can be repeated.
-"""
+"""The text behind a scene: parsed with overrides, searched by line, carried by runs that can so be repeated."""
 
 from __future__ import annotations
 
@@ -18,7 +17,7 @@ HEADER = re.compile(r"^\s*\[\[?\s*([\w.\"' -]+?)\s*\]")
 
 @dataclass(frozen=True)
 class Source:
-    """A scene file as it was given.
+    r"""A scene file as it was given.
 
     Parameters
     ----------
@@ -29,7 +28,7 @@ class Source:
 
     Examples
     --------
-    >>> Source(Path("a.toml"), "[simulate]\\ndt = 1e-3", ("simulate.dt=1e-4", "simulate.duration=2")).tables()
+    >>> Source(Path("a.toml"), "[simulate]\ndt = 1e-3", ("simulate.dt=1e-4", "simulate.duration=2")).tables()
     {'simulate': {'dt': 0.0001, 'duration': 2}}
     """
 
@@ -50,11 +49,11 @@ class Source:
         return tables
 
     def place(self, where: str, message: str = "") -> str:
-        """`path:line: where`, as editors like it; the line is that of the table, or of the key the message names.
+        r"""`path:line: where`, as editors like it; the line is that of the table, or of the key the message names.
 
         Examples
         --------
-        >>> Source(Path("a.toml"), "[[masses]]\\nz = 1\\nmas = 2").place("[[masses]] number 1", "unknown key 'mas'")
+        >>> Source(Path("a.toml"), "[[masses]]\nz = 1\nmas = 2").place("[[masses]] number 1", "unknown key 'mas'")
         'a.toml:3: [[masses]] number 1'
         """
         line = _line(self.text.splitlines(), where, message)
