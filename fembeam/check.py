@@ -128,9 +128,10 @@ def _touched(model: Model, log: solvers.ContactLog | None, stop: int) -> Touched
         hit = model.strike(speed, stop)
     except (ValueError, ArithmeticError, solvers.SolverError):
         return None
-    time = float(hit.t_out[0] - hit.t_in[0]) if len(hit) else math.nan
-    if not math.isfinite(time):
+    if not len(hit):
         return None
+    time = float(hit.t_out[0] - hit.t_in[0])
+    time = time if math.isfinite(time) else math.inf  # longer than the strike was watched
     periods = time * _fastest(model) / (2 * math.pi)
     return Touched(stop, len(speeds), speed, time, float(hit.peak_force[0]), periods)
 

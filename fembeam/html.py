@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from fembeam.source import Source
 
 STYLE = """
-body { font: 16px/1.5 system-ui, sans-serif; color: #222; background: #fff; max-width: 60rem; margin: auto; padding: 1rem }
+body { font: 16px/1.5 system-ui, sans-serif; color: #222; background: #fff; max-width: 60rem; margin: auto;
+  padding: 1rem }
 h1 { font-size: 1.5rem; margin: 0 } h2 { font-size: 1.15rem; margin: 2rem 0 .5rem; border-bottom: 1px solid #ccc }
 .wide { overflow-x: auto } table { border-collapse: collapse; font-variant-numeric: tabular-nums }
 th, td { text-align: right; padding: .15rem .6rem; border-bottom: 1px solid #eee; white-space: nowrap }
@@ -120,7 +121,7 @@ def _simulation(found: dict[str, Any]) -> Iterator[str]:
         rows = [[words, found["energy"][name]] for name, words in names.items()]
         residual = found["energy"]["residual_over_input"]
         yield "<h2>Energy</h2>" + table(["", "J"], rows)
-        yield f'<p class="note">Missing in this balance, an estimate of the error made: {residual:.1e} of the input.</p>'
+        yield f'<p class="note">Missing in this balance, an estimate of the error: {residual:.1e} of the input.</p>'
 
 
 def _contact(row: dict[str, Any]) -> list[Any]:

@@ -178,7 +178,7 @@ class _Reader:
         built = {name: self.part(name, tables[name]) for name in parts if name in tables}
         try:
             scene = Scene(**built)
-        except (ValueError, TypeError) as error:
+        except (ValueError, TypeError, ArithmeticError) as error:
             self.fail("the scene", str(error), error)
         reduce = self.arguments(Scene.reduce, tables.get("reduce", {}), "[reduce]")
         studies = {
@@ -270,8 +270,8 @@ class _Reader:
             raise
         except OSError as error:
             self.fail(where, f"{error.filename}: {error.strerror}", error)
-        except (ValueError, TypeError) as error:
-            self.fail(where, str(error), error)
+        except (ValueError, TypeError, ArithmeticError, MemoryError) as error:
+            self.fail(where, str(error) or type(error).__name__, error)
 
     def arguments(
         self, constructor: Callable[..., Any], table: Any, where: str, *also: str, chosen_by: str = ""
