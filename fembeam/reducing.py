@@ -21,6 +21,7 @@ DEFAULT_MODES = 2
 COARSE = 0.01  # estimated relative error of the highest kept frequency, above which elements as asked get a warning
 FINE = 1e-6  # estimated rounding of the lowest frequency, likewise
 FIRST_TRY = 8  # modes, doubled until a frequency or share of mass is reached
+MOST_DOFS = 20_000  # of the finest mesh
 MOST_TRIED = 128  # modes; a few seconds
 
 
@@ -127,6 +128,7 @@ def _numbers(scene: Scene, modes: Any, elements: int | None, interface: bool) ->
                 modes, "Scene.reduce", "say how many elements the mesh shall have")  # fmt: skip
         return tuple(range(scene.matrices(elements).M.shape[0]))
     whole = isinstance(modes, (int, np.integer)) and not isinstance(modes, bool)
+    require(not whole or modes <= MOST_DOFS, f"modes must be at most {MOST_DOFS}", modes, "Scene.reduce", "take fewer")
     listed = list(range(int(modes))) if whole else [int(i) for i in modes]
     enough = len(listed) > 0 or (interface and whole and modes == 0)
     require(enough, "modes must be a count above 0 or a list of mode numbers", modes, "Scene.reduce",

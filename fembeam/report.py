@@ -4,23 +4,26 @@ from __future__ import annotations
 
 import json
 import math
-import platform
 import tempfile
-from collections.abc import Callable
-from dataclasses import asdict
-from importlib.metadata import PackageNotFoundError, version
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, fields, is_dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fembeam import plot
-from fembeam.run import Run, written_whole
+from fembeam.run import Run, versions, written_whole
 from fembeam.statistics import moments
+from fembeam.statistics.batches import Batches, Estimate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+MOST_BATCHES, FEWEST_BATCHES = 32, 4  # of a history, for standard errors
+MEMORIES = 10.0  # time constants of the structure that a batch lasts at least
 FEWEST_SAMPLES = 64  # below this neither a spectrum nor a density says anything
 
 
@@ -35,7 +38,7 @@ def prepared(folder: str | Path) -> Path:
         raise ValueError(f"output folder {folder} is not writable: {error.strerror}; choose another") from error
 
 
-def write(run: Run, folder: str | Path, discard: float = 0.0, seconds: float | None = None) -> list[Path]:
+def write(run: Run, folder: str | Path, discard: float = 0.0, found: dict[str, Any] | None = None) -> list[Path]:
     """Write a run with its summary and figures.
 
     Parameters
@@ -43,7 +46,7 @@ def write(run: Run, folder: str | Path, discard: float = 0.0, seconds: float | N
     run : complete or partial.
     folder : must exist.
     discard : s at the beginning that statistics leave out.
-    seconds : wall time to report; None: that of the integration.
+    found : its `summary`, if made already.
 
     Returns
     -------
@@ -55,17 +58,18 @@ def write(run: Run, folder: str | Path, discard: float = 0.0, seconds: float | N
     """
     folder = Path(folder)
     written = [run.save(folder / "run.npz")]
-    written.append(write_json(folder / "summary.json", summary(run, discard, seconds)))
+    written.append(write_json(folder / "summary.json", summary(run, discard) if found is None else found))
     written += [write_figure(folder / f"{name}.png", draw()) for name, draw in figures(run, discard).items()]
     return written
 
 
 def write_study(result: Any, folder: str | Path, name: str) -> list[Path]:
-    """Write a study's table as `name.txt` and, if it saves itself, `name.csv`, and its figure as `name.png`."""
+    """Write a study's table as `name.txt`, `name.json` and, if it saves itself, `name.csv`; its figure as PNG."""
     target = Path(folder) / f"{name}.txt"
     with written_whole(target) as file:
         file.write(f"{result}\n".encode())
-    written = [target, write_figure(Path(folder) / f"{name}.png", result.figure())]
+    written = [target, write_json(Path(folder) / f"{name}.json", plain(result))]
+    written += [write_figure(Path(folder) / f"{name}.png", result.figure())]
     if hasattr(result, "save"):
         written.append(Path(folder) / f"{name}.csv")
         result.save(written[-1])
@@ -107,24 +111,15 @@ def summary(run: Run, discard: float = 0.0, seconds: float | None = None) -> dic
         "omega": None if model is None else model.omega.tolist(),
         "zeta": None if model is None else model.zeta.tolist(),
         "moments": _moments(run, discard),
+        "confidence": _confidence(run, discard),
         "contacts": _contacts(run, discard),
         "energy": _energy(run),
         "cost": asdict(run.cost),
+        "dt": float(run.t[1] - run.t[0]) if len(run.t) > 1 else None,
         "scene": run.scene,
         "units": "SI: m, s, N, J, rad/s",
         "versions": versions(),
     }
-
-
-def versions() -> dict[str, str]:
-    """Versions of Python and of what computes."""
-    found = {"python": platform.python_version()}
-    for package in ("fembeam", "numpy", "scipy", "numba", "scikit-fem", "matplotlib"):
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            found[package] = "not installed as a package"
-    return found
 
 
 def _moments(run: Run, discard: float) -> dict[str, dict[str, float]]:
@@ -135,18 +130,56 @@ def _moments(run: Run, discard: float) -> dict[str, dict[str, float]]:
     signals = {f"displacement, {name}": run.displacement(z)[kept] for name, z in plot.places(run.shapes).items()}
     signals |= {f"indentation, stop {i}": run.indentation(i)[kept] for i in range(len(run.stops))}
     extremes = {name: {"min": float(x.min()), "max": float(x.max())} for name, x in signals.items()}
-    return {name: asdict(moments(x)) | extremes[name] for name, x in signals.items()}
+    error = partial(_error_of_std, parts=batches(run, discard))
+    return {name: asdict(moments(x)) | {"std_error": error(x)} | extremes[name] for name, x in signals.items()}
+
+
+def batches(run: Run, discard: float) -> int:
+    """How many nearly independent parts the samples make, at most `MOST_BATCHES`; 0 when too few or not known."""
+    if run.model is None or len(run.t) < 2:
+        return 0
+    decay = (run.model.zeta * run.model.omega).min()
+    count = min(MOST_BATCHES, int(max(float(run.t[-1]) - discard, 0.0) * decay / MEMORIES))
+    return count if count >= FEWEST_BATCHES else 0
+
+
+def _error_of_std(x: NDArray[np.float64], parts: int) -> float | None:
+    """Jackknife standard error of the standard deviation over that many batches."""
+    if not parts:
+        return None
+    found = Batches(3)
+    for part in np.array_split(x - x.mean(), parts):
+        found.add([len(part), part.sum(), part @ part])
+    return float(found.estimate(lambda s: math.sqrt(max(s[2] / s[0] - (s[1] / s[0]) ** 2, 0.0))).standard_error)
+
+
+def _error_of_rate(entries: NDArray[np.float64], begin: float, end: float, parts: int) -> float | None:
+    """Standard error of the number of contacts per second over that many batches."""
+    if not parts:
+        return None
+    counts = np.histogram(entries, parts, (begin, end))[0] * parts / (end - begin)
+    return float(Estimate.of_mean(counts).standard_error)
+
+
+def _confidence(run: Run, discard: float) -> str:
+    """What the standard errors rest on."""
+    parts = batches(run, discard)
+    if not parts:
+        return "No standard errors: too short for independent parts, or the structure has no damping."
+    span = (float(run.t[-1]) - discard) / parts
+    return f"Standard errors (s.e.) come from {parts} parts of {span:.3g} s each; 95 % lies within two of them."
 
 
 def _contacts(run: Run, discard: float) -> list[dict[str, Any]]:
     """Number, rate, means and maxima of every stop's contacts that ended."""
     log = run.contacts
     span = max(float(run.t[-1]) - discard, 0.0) if len(run.t) else 0.0
-    rows = []
+    rows, parts = [], batches(run, discard)
     for stop in range(len(run.stops)):
         kept = (log.stop == stop) & (log.t_in >= discard) & np.isfinite(log.t_out)
         row: dict[str, Any] = {"stop": stop, "z": float(run.stops[stop, 0]), "number": int(kept.sum())}
         row["rate"] = row["number"] / span if span > 0 else None
+        row["rate_error"] = _error_of_rate(log.t_in[kept], discard, discard + span, parts)
         columns = {"duration": log.t_out - log.t_in, "peak_force": log.peak_force, "entry_speed": log.speed_in}
         if row["number"]:
             for name, values in columns.items():
@@ -169,10 +202,61 @@ def _energy(run: Run) -> dict[str, float]:
     return end
 
 
+def text(found: dict[str, Any]) -> str:
+    """The tables of a summary: moments and extremes of signals, contacts of stops."""
+    head = ("", "mean/m", "std/m", "skewness", "kurtosis", "min/m", "max/m")
+    moments = [[name, *(row[key.partition("/")[0]] for key in head[1:])] for name, row in found["moments"].items()]
+    tables = [aligned(head, moments)] if moments else []
+    columns = {"mean time/s": "duration", "mean peak force/N": "peak_force", "mean entry speed/(m/s)": "entry_speed"}
+    rows = [
+        [f"stop {row['stop']}", row["number"], row["rate"], *(row.get(c, {}).get("mean") for c in columns.values())]
+        for row in found["contacts"]
+    ]
+    return "\n\n".join(tables + ([aligned(("", "contacts", "per second", *columns), rows)] if rows else []))
+
+
+def aligned(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
+    """A table with columns flush right, the first one left."""
+    cells = [list(head), *([_cell(value) for value in row] for row in rows)]
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    lines = [[row[0].ljust(widths[0]), *map(str.rjust, row[1:], widths[1:])] for row in cells]
+    return "\n".join("  ".join(line).rstrip() for line in lines)
+
+
+def _cell(value: Any) -> str:
+    """A value of a table."""
+    return "" if value is None else f"{value:.5g}" if isinstance(value, float) else str(value)
+
+
+def plain(result: Any) -> Any:
+    """What a study found, without its models, runs and functions, as JSON has it."""
+    if is_dataclass(result) and not isinstance(result, type):
+        named = {f.name: getattr(result, f.name) for f in fields(result) if f.init}
+        return {name: plain(value) for name, value in named.items() if _telling(value)}
+    if isinstance(result, dict):
+        return {str(key): plain(value) for key, value in result.items() if _telling(value)}
+    if isinstance(result, (list, tuple)):
+        return [plain(value) for value in result if _telling(value)]
+    return result.tolist() if isinstance(result, (np.ndarray, np.generic)) else result
+
+
+def _telling(value: Any) -> bool:
+    """Whether a value belongs into a table of results."""
+    from fembeam.model import Model
+
+    known = (str, int, float, list, tuple, dict, np.ndarray, np.generic, type(None))
+    return isinstance(value, known) or (is_dataclass(value) and not isinstance(value, (Run, Model)))
+
+
+def json_text(content: Any) -> str:
+    """JSON as the standard has it: null for what is not finite."""
+    return json.dumps(_finite(content), indent=2, ensure_ascii=False, allow_nan=False)
+
+
 def write_json(target: Path, content: dict[str, Any]) -> Path:
-    """Write JSON as the standard has it: null for what is not finite."""
+    """Write JSON."""
     with written_whole(target) as file:
-        file.write((json.dumps(_finite(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode())
+        file.write((json_text(content) + "\n").encode())
     return target
 
 
@@ -180,6 +264,6 @@ def _finite(value: Any) -> Any:
     """The same with None for NaN and infinities."""
     if isinstance(value, dict):
         return {key: _finite(entry) for key, entry in value.items()}
-    if isinstance(value, list):
+    if isinstance(value, (list, tuple)):
         return [_finite(entry) for entry in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import os
+import platform
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from functools import cached_property
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,13 +20,27 @@ from numpy.typing import ArrayLike, NDArray
 import solvers
 from fembeam.model import Shapes
 from fembeam.section import require
+from fembeam.source import Source
 
 if TYPE_CHECKING:
     from fembeam.fields import Extremes
     from fembeam.model import Model
+    from fembeam.scene_file import SceneFile
 
 Vector = NDArray[np.float64]
 FORMAT = 2
+UNITS = {
+    "t, contact_t_in, contact_t_out": "s",
+    "q": "m √kg",
+    "q_dot": "m √kg/s",
+    "force, contact_peak_force": "N",
+    "contact_speed_in, contact_speed_out": "m/s",
+    "contact_peak_indentation, nodes, stops[:, 0], stops[:, 2]": "m",
+    "contact_impulse": "N s",
+    "contact_energy_loss, energy_*": "J",
+    "shapes, directions": "1/√kg",
+    "strikers": "kg",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +72,17 @@ class Run:
     model: Model | None = None
     stored_forces: Vector | None = None  # (m, k) of a run read from a file
     others: tuple[Shapes, ...] = ()  # of the further beams
+    source: Source | None = None  # of a run made from a scene file
+    versions: dict[str, str] = field(default_factory=dict)  # that made a run read from a file
+
+    @property
+    def scene_file(self) -> SceneFile:
+        """The scene, reduction and studies this run was made from; ValueError for a run made in Python."""
+        from fembeam.scene_file import built
+
+        if self.source is None:
+            raise ValueError("this run was made in Python, not from a scene file; its scene is the text run.scene")
+        return built(self.source)
 
     @classmethod
     def of(cls, model: Model, solution: solvers.Solution) -> Run:
@@ -158,6 +185,12 @@ class Run:
 
         return to_vtu(self, path, sample)
 
+    def to_csv(self, folder: str | os.PathLike[str], stride: int = 1) -> list[Path]:
+        """Write every `stride`-th sample at the usual places as `histories.csv`, and the log as `contacts.csv`."""
+        from fembeam.csv_files import write
+
+        return write(self, Path(folder), stride)
+
     def impactor_displacement(self, impactor: int = 0) -> Vector:
         """x(t) (k,) of an impactor from its place at the start, relative to the frame, m."""
         return self._striker(self.q, impactor)
@@ -216,8 +249,13 @@ class Run:
             "status": self.status,
             "scene": self.scene,
             "cost": {f.name: getattr(self.cost, f.name) for f in fields(self.cost)},
-            "units": "SI: s, m, kg, N, J, rad",
+            "units": UNITS,
+            "versions": versions(),
         }
+        if self.source is not None:
+            about["scene_file"] = {"name": self.source.path.name, "text": self.source.text,
+                                   "overrides": self.source.overrides, "files": list(self.source.files)}  # fmt: skip
+        carried = self.source.files.values() if self.source else ()
         arrays = {
             **{"t": self.t, "q": self.q, "q_dot": self.q_dot, "force": self._forces},
             **{"stops": self.stops, "directions": self.directions, "strikers": self.strikers},
@@ -226,6 +264,7 @@ class Run:
             **{f"shapes_{i}": shapes.values for i, shapes in enumerate(self.others, 1)},
             **{f"contact_{name}": column for name, column in self.contacts.arrays().items()},
             **{f"energy_{f.name}": getattr(self.energy, f.name) for f in fields(self.energy)},
+            **{f"file_{i}": np.frombuffer(content, dtype=np.uint8) for i, content in enumerate(carried)},
         }
         target = Path(path)
         target = target if target.suffix == ".npz" else target.with_name(target.name + ".npz")
@@ -247,15 +286,19 @@ def load(path: str | os.PathLike[str]) -> Run:
             arrays = {name: data[name] for name in data.files if name != "about"}
         if about["format"] != FORMAT:
             raise ValueError(f"it has format {about['format']}, this version reads {FORMAT}")
-        return _of_arrays(about, arrays)
+        return _of_arrays(about, arrays, Path(path))
     except FileNotFoundError:
         raise
     except Exception as error:
         raise ValueError(f"{path} is not a saved run, or is damaged: {error}") from error
 
 
-def _of_arrays(about: dict[str, Any], arrays: dict[str, Any]) -> Run:
+def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run:
     """A run from the contents of its file."""
+    source = None
+    if given := about.get("scene_file"):
+        files = {name: arrays[f"file_{i}"].tobytes() for i, name in enumerate(given["files"])}
+        source = Source(path.with_name(given["name"]), given["text"], tuple(given["overrides"]), files)
     bodies = sum(name.split("_")[0] == "nodes" for name in arrays)
     return Run(
         *(arrays["t"], arrays["q"], arrays["q_dot"]),
@@ -270,7 +313,20 @@ def _of_arrays(about: dict[str, Any], arrays: dict[str, Any]) -> Run:
         scene=about["scene"],
         stored_forces=arrays["force"],
         others=tuple(Shapes(arrays[f"nodes_{i}"], arrays[f"shapes_{i}"]) for i in range(1, bodies)),
+        source=source,
+        versions=about.get("versions", {}),
     )
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python and of what computes."""
+    found = {"python": platform.python_version()}
+    for package in ("fembeam", "numpy", "scipy", "numba", "scikit-fem", "matplotlib"):
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "not installed as a package"
+    return found
 
 
 @contextmanager
@@ -290,13 +346,20 @@ def written_whole(target: Path) -> Iterator[Any]:
 
 
 @contextmanager
-def bar(duration: float, wanted: bool) -> Iterator[Callable[[float], None] | None]:
-    """A progress bar over simulated seconds, silent when not on a terminal."""
+def bar(duration: float, wanted: bool) -> Iterator[Callable[[float], None]]:
+    """A progress bar over simulated seconds, silent when not on a terminal; the moment at which signals are heard."""
+    from fembeam import interrupts
+
     if not wanted:
-        yield None
+        yield lambda _: interrupts.check()
         return
     from tqdm import tqdm
 
     shape = "{percentage:3.0f}%|{bar}| {n:.4g}/{total:.4g} s simulated [{elapsed}<{remaining}]"
     with tqdm(total=duration, disable=None, bar_format=shape) as shown:
-        yield lambda t: shown.update(t - shown.n)
+
+        def report(t: float) -> None:
+            shown.update(t - shown.n)
+            interrupts.check()
+
+        yield report

@@ -13,28 +13,22 @@ from __future__ import annotations
 
 import inspect
 import re
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NoReturn
 
-import contacts
-import solvers
 from fembeam.beam import Beam
 from fembeam.damping import ModalDamping, Rayleigh
-from fembeam.excitation import Harmonic, Multisine
-from fembeam.noise import BandNoise
-from fembeam.record import Record
+from fembeam.kinds import SECTION, SIGNAL, Nested, nested
 from fembeam.scene import FEATURES, Scene
 from fembeam.schema import Constructors, converted, fits, listed, nearest, parameters, required, shown, wanted
 from fembeam.section import Section, Taper, require_non_negative, require_positive
+from fembeam.source import Source
 from fembeam.study.branch_table import BranchTable
 from fembeam.study.ensemble_table import EnsembleTable
-from fembeam.study.quantities import QUANTITIES
 from fembeam.study.speed_accuracy import SpeedAccuracyTable
 from fembeam.study.tables import ModeCountTable, SmallestModelTable
-from fembeam.transient import Pulse, Step
 
 Table = Mapping[str, Any]
 
@@ -73,55 +67,19 @@ class Simulate:
 
 @dataclass(frozen=True)
 class SceneFile:
-    """What a scene file says: the scene, the arguments of `Scene.reduce`, and the study tables by name."""
+    """What a scene file says: the scene, the arguments of `Scene.reduce`, the study tables by name; and its text."""
 
-    path: Path
+    source: Source
     scene: Scene
     reduce: dict[str, Any] = field(default_factory=dict)
     studies: dict[str, Any] = field(default_factory=dict)
 
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self.source.path
 
-SHAPES: Constructors = {
-    "general": Section,
-    "rectangle": Section.rectangle,
-    "circle": Section.circle,
-    "tube": Section.tube,
-    "taper": Taper,
-}
-LAWS: Constructors = {
-    "hertz": contacts.Hertz,
-    "hertz_of_spheres": contacts.Hertz.of_spheres,
-    "hysteretic": contacts.Hysteretic,
-    **{name: getattr(contacts.Hysteretic, name) for name in contacts.PUBLISHED},
-    "kelvin_voigt": contacts.KelvinVoigt,
-    "anagnostopoulos": contacts.KelvinVoigt.anagnostopoulos,
-    "viscoelastic": contacts.Viscoelastic,
-    "tsuji": contacts.Viscoelastic.tsuji,
-    "jankowski": contacts.Viscoelastic.jankowski,
-    "piecewise_linear": contacts.PiecewiseLinear,
-    "tabulated": contacts.Tabulated,
-    "tabulated_file": contacts.Tabulated.from_csv,
-    "parallel": contacts.parallel,
-}
-SIGNALS: Constructors = {
-    "harmonic": Harmonic,
-    "multisine": Multisine,
-    "band_noise": BandNoise,
-    "noise_of_psd": BandNoise.of_psd,
-    "rolled_off_noise": BandNoise.rolled_off,
-    "record": Record.from_csv,
-    "pulse": Pulse,
-    "step": Step,
-}
-SOLVERS = {
-    "exponential": "Exponential",
-    "dormand_prince": "DormandPrince",
-    "henon_rk2": "HenonRK2",
-    "rk4": "RK4",
-    "central_difference": "CentralDifference",
-    "newmark": "Newmark",
-    "generalized_alpha": "GeneralizedAlpha",
-}
+
 STUDIES: Constructors = {
     "simulate": Simulate,
     "branch": BranchTable,
@@ -132,12 +90,13 @@ STUDIES: Constructors = {
 }
 
 
-def read(path: str | Path) -> SceneFile:
+def read(path: str | Path, overrides: Sequence[str] = ()) -> SceneFile:
     """Read and check a scene file; nothing is computed.
 
     Parameters
     ----------
-    path : a TOML file; paths inside it are relative to its folder.
+    path : a TOML file, paths inside it being relative to its folder; or a saved run that was made from one.
+    overrides : such as "simulate.duration=10", "stops[0].law.stiffness=1e9".
 
     Returns
     -------
@@ -163,23 +122,52 @@ def read(path: str | Path) -> SceneFile:
     >>> read(path).scene.supports
     (Clamped(z=0.0),)
     """
-    path = Path(path)
+    return built(replace(source := _source(Path(path)), overrides=(*source.overrides, *overrides)))
+
+
+def _source(path: Path) -> Source:
+    """The text of a scene file or of the one a run was made from."""
+    if path.suffix == ".npz":
+        from fembeam.run import load
+
+        try:
+            source = load(path).source
+        except (OSError, ValueError) as error:
+            raise SceneFileError(f"{path}: cannot be read: {error}") from None
+        if source is None:
+            raise SceneFileError(f"{path}: holds no scene file; this run was made in Python, so repeat it there")
+        return source
     try:
-        tables = tomllib.loads(path.read_bytes().decode("utf-8"))
+        return Source(path, path.read_bytes().decode("utf-8"))
     except OSError as error:
         raise SceneFileError(f"{path}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:
         raise SceneFileError(f"{path}: is not a text file in UTF-8") from None
-    except (ValueError, RecursionError) as error:
-        raise SceneFileError(f"{path}: is not valid TOML: {error}") from None
-    return _Reader(path).scene_file(tables)
+
+
+def built(source: Source) -> SceneFile:
+    """What a text says; the files that it names are taken from it where it carries them, and carried from then on."""
+    with source.unpacked() as places:
+        reader = _Reader(source, places)
+        try:
+            tables = source.tables()
+        except ValueError as error:
+            raise SceneFileError(str(error)) from None
+        file = reader.scene_file(tables)
+        carried = {name: place.read_bytes() for name, place in places.items()}
+        return replace(file, source=replace(source, files=carried))
 
 
 @dataclass(frozen=True)
 class _Reader:
-    """Turns tables into objects; knows the file for messages and relative paths."""
+    """Turns tables into objects; knows the text for messages, and where the files lie that it names."""
 
-    path: Path
+    source: Source
+    places: dict[str, Path]
+
+    def file(self, name: str) -> Path:
+        """A file that the scene names."""
+        return self.places.setdefault(name, self.source.path.parent / name)
 
     def scene_file(self, tables: Table) -> SceneFile:
         """The whole file."""
@@ -192,7 +180,7 @@ class _Reader:
         built = {name: self.part(name, tables[name]) for name in parts if name in tables}
         try:
             scene = Scene(**built)
-        except (ValueError, TypeError) as error:
+        except (ValueError, TypeError, ArithmeticError) as error:
             self.fail("the scene", str(error), error)
         reduce = self.arguments(Scene.reduce, tables.get("reduce", {}), "[reduce]")
         studies = {
@@ -201,7 +189,7 @@ class _Reader:
         for name, study in studies.items():
             if hasattr(study, "check"):
                 self.made(study.check, {"scene": scene}, f"[{name}]")
-        return SceneFile(self.path, scene, reduce, studies)
+        return SceneFile(self.source, scene, reduce, studies)
 
     def check_form(self, name: str, value: Any) -> None:
         """Features come as [[name]], gravity as a number, everything else as [name]."""
@@ -226,8 +214,8 @@ class _Reader:
                 return self.build(Rayleigh, value, "[damping]")
             return self.build(ModalDamping, value, "[damping]", "alpha", "beta")
         if name == "base":
-            return self.choose(SIGNALS, value, "[base]")
-        kinds = {_snake(kind.__name__): kind for kind in FEATURES[name]}
+            return self.chosen(SIGNAL, value, "[base]")
+        kinds = {snake(kind.__name__): kind for kind in FEATURES[name]}
         made = []
         for number, table in enumerate(value):
             where = f"[[{name}]] number {number + 1}"
@@ -247,9 +235,9 @@ class _Reader:
                 self.fail("[beam]", "a mesh needs its path and a table sections = { name = { section }, … }")
             found = {name: self.section(entry, f"[beam] sections {name}") for name, entry in sections.items()}
             options |= {"data": table["data"]} if "data" in table else {}
-            return self.made(Beam.from_mesh, {"path": self.path.parent / path, "sections": found, **options}, "[beam]")
+            return self.made(Beam.from_mesh, {"path": self.file(path), "sections": found, **options}, "[beam]")
         if "spans" not in table:
-            return self.build(_beam, table, "[beam]")
+            return self.build(beam_of_section, table, "[beam]")
         self.check_keys(table, ["spans", *common], "[beam]", "key")
         if not isinstance(table["spans"], list):
             self.fail("[beam]", "spans must be a list of tables with length and section")
@@ -260,7 +248,7 @@ class _Reader:
 
     def section(self, table: Any, where: str) -> Section | Taper:
         """A section by its shape."""
-        return self.choose(SHAPES, table, where, "shape", "general")
+        return self.chosen(SECTION, table, where)
 
     def choose(self, kinds: Constructors, table: Any, where: str, key: str = "kind", default: str = "") -> Any:
         """Build the constructor that `kind` (or `shape`) names."""
@@ -284,8 +272,8 @@ class _Reader:
             raise
         except OSError as error:
             self.fail(where, f"{error.filename}: {error.strerror}", error)
-        except (ValueError, TypeError) as error:
-            self.fail(where, str(error), error)
+        except (ValueError, TypeError, ArithmeticError, MemoryError) as error:
+            self.fail(where, str(error) or type(error).__name__, error)
 
     def arguments(
         self, constructor: Callable[..., Any], table: Any, where: str, *also: str, chosen_by: str = ""
@@ -307,27 +295,22 @@ class _Reader:
     def value(self, value: Any, key: str, parameter: inspect.Parameter, where: str) -> Any:
         """One value: a table for what has its own constructor, else checked by the annotation."""
         inner = f"{where} {key}"
-        if key == "section" or parameter.annotation is Section:
-            return self.section(value, inner)
-        if key == "law":
-            return self.choose(LAWS, value, inner)
-        if key == "laws":
-            if not isinstance(value, list):
-                self.fail(inner, f"must be a list of laws, got {shown(value)}")
-            return [self.choose(LAWS, one, f"{inner} number {number}") for number, one in enumerate(value, start=1)]
-        if key in ("signal", "foot"):
-            return self.choose(SIGNALS, value, inner)
-        if key == parameter.name == "quantity":
-            return self.choose(QUANTITIES, value if isinstance(value, dict) else {"kind": value}, inner)
-        if key == "solver":
-            offered = {name: method for name, method in SOLVERS.items() if method in solvers.__all__}
-            methods = {name: getattr(solvers, method) for name, method in offered.items()}  # here: slow to import
-            return self.choose(methods, value, inner)
+        if kind := nested(key, parameter):
+            if kind.listed and not isinstance(value, list):
+                self.fail(inner, f"must be a list of {key}, got {shown(value)}")
+            if kind.listed:
+                return [self.chosen(kind, one, f"{inner} number {i}") for i, one in enumerate(value, start=1)]
+            return self.chosen(kind, value, inner)
         if not fits(value, parameter.annotation):
             self.fail(where, f"{key} must be {wanted(parameter.annotation)}, got {shown(value)}")
         if key == "path":
-            return self.path.parent / value
+            return self.file(value)
         return converted(value, parameter.annotation)
+
+    def chosen(self, kind: Nested, value: Any, where: str) -> Any:
+        """One thing of a kind; where plain text will do it is the name."""
+        table = {kind.key: value} if kind.by_name and not isinstance(value, dict) else value
+        return self.choose(kind.constructors(), table, where, kind.key, kind.default)
 
     def check_keys(self, table: Table, valid: Sequence[str], where: str, what: str) -> None:
         """Every key is a valid one; the nearest one is named otherwise."""
@@ -337,7 +320,7 @@ class _Reader:
 
     def fail(self, where: str, message: str, cause: Exception | None = None) -> NoReturn:
         """Raise with file and table in front."""
-        raise SceneFileError(f"{self.path}: {where}: {message}") from cause
+        raise SceneFileError(f"{self.source.place(where, message)}: {message}") from cause
 
 
 def _span(length: float, section: Section) -> tuple[float, Section]:
@@ -345,11 +328,11 @@ def _span(length: float, section: Section) -> tuple[float, Section]:
     return length, section
 
 
-def _beam(length: float, section: Section, foundation: float = 0.0, axial_force: float = 0.0) -> Beam:
+def beam_of_section(length: float, section: Section, foundation: float = 0.0, axial_force: float = 0.0) -> Beam:
     """A beam of one section."""
     return Beam(length, section, foundation=foundation, axial_force=axial_force)
 
 
-def _snake(name: str) -> str:
+def snake(name: str) -> str:
     """LumpedMass -> lumped_mass."""
     return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()

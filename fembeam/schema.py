@@ -49,14 +49,14 @@ def fits(value: Any, hint: Any) -> bool:
         return isinstance(value, hint)
     if hint is Path:
         return isinstance(value, str)
-    entry = _entry(hint)
+    entry = entry_type(hint)
     if entry is None or not isinstance(value, list):
         return False
     fixed = origin is tuple and Ellipsis not in inner
     return all(fits(item, entry) for item in value) and (not fixed or len(value) == len(inner))
 
 
-def _entry(hint: Any) -> Any:
+def entry_type(hint: Any) -> Any:
     """Type of the entries of an annotated sequence; None when it is none."""
     origin = get_origin(hint)
     if origin is np.ndarray:
@@ -81,7 +81,7 @@ def _words(hint: Any) -> list[str]:
         return [repr(option) for option in inner]
     if hint in words:
         return [words[hint]]
-    entry = _entry(hint)
+    entry = entry_type(hint)
     if entry is None:
         return []
     count = f"{len(inner)} " if origin is tuple and Ellipsis not in inner else ""

@@ -213,7 +213,8 @@ class _Run:
                     progress(self.time)
         except KeyboardInterrupt:
             return Status.INTERRUPTED
-        return STATUSES[code]
+        finite = np.isfinite(self.state.x).all()  # loads of 1e300 overflow where no method looks
+        return STATUSES[code] if finite or STATUSES[code] is not Status.DONE else Status.DIVERGED
 
     def solution(self, status: Status, seconds: float) -> Solution:
         """Collect outputs, log and ledger."""

@@ -19,7 +19,9 @@ class Status(Enum):
     RUNNING = "not finished yet"
     INTERRUPTED = "interrupted: partial result up to the time reached"
     STEP_TOO_SMALL = "the step fell below the resolution of time; the problem may be singular there: loosen rtol"
-    DIVERGED = "the state is not finite any more; the method is unstable at this step: use a smaller one"
+    DIVERGED = (
+        "the state is not finite any more; the method is unstable at this step, or loads overflow: use smaller ones"
+    )
     CHATTER = "more events than progress in time; a contact chatters: add damping, or change its law"
     LOG_FULL = "the contact log is full"
     LAW_NOT_FINITE = "a contact law gave a force that is not finite"

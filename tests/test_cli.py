@@ -6,7 +6,9 @@ import re
 import signal
 import subprocess
 import sys
+import tomllib
 from functools import partial
+from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +16,12 @@ import pytest
 
 import fembeam as fb
 import reduction
+from fembeam import kinds
 from fembeam.cli import main
-from fembeam.scene_file import read
+from fembeam.doubts import doubts
+from fembeam.scene_file import built, read
+from fembeam.source import Source
+from fembeam.template import TEMPLATE
 
 EXAMPLE = Path(__file__).parent.parent / "examples" / "beam_stop.toml"
 FIGURES = ["time_history.png", "psd.png", "densities.png", "contacts.png", "modes.png"]
@@ -43,8 +49,10 @@ def refused(capsys, *arguments):
 def test_run_writes_run_summary_and_figures(tmp_path, capsys):
     out = tmp_path / "results" / "new"
     assert main(["run", str(scene(tmp_path)), "--out", str(out), "--quiet"]) == 0
-    assert capsys.readouterr() == ("", "")
-    assert sorted(p.name for p in out.iterdir()) == sorted(["run.npz", "summary.json", *FIGURES])
+    said = capsys.readouterr()
+    assert said.err == ""
+    assert re.search(r"^stop 0 +\d+ ", said.out, re.MULTILINE)
+    assert sorted(p.name for p in out.iterdir()) == sorted(["run.npz", "summary.json", "report.html", *FIGURES])
     for name in FIGURES:
         assert (out / name).read_bytes().startswith(b"\x89PNG")
         assert (out / name).stat().st_size < 200_000
@@ -165,27 +173,32 @@ RUN_THAT_TELLS = """
 import sys, fembeam.run
 from contextlib import contextmanager
 from fembeam.cli import main
+from fembeam.doubts import doubts
+
+plain = fembeam.run.bar
 
 @contextmanager
 def bar(duration, wanted):
-    yield lambda t: print("at", t, file=sys.stderr, flush=True)
+    with plain(duration, wanted) as report:
+        yield lambda t: (print("at", t, file=sys.stderr, flush=True), report(t))
 
 fembeam.run.bar = bar
 sys.exit(main(sys.argv[1:]))
 """
 
 
-@pytest.mark.skipif(os.name != "posix", reason="sends SIGINT to another process")
-def test_ctrl_c_leaves_what_was_computed(tmp_path):
+@pytest.mark.skipif(os.name != "posix", reason="sends signals to another process")
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_leaves_what_was_computed(tmp_path, number, code):
     out = tmp_path / "out"
     command = [sys.executable, "-c", RUN_THAT_TELLS, "run", str(scene(tmp_path, duration="600")), "--out", str(out)]
     heard = partial(signal.signal, signal.SIGINT, signal.default_int_handler)  # background jobs ignore it
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, preexec_fn=heard) as process:
         while not process.stderr.readline().startswith("at"):
             assert process.poll() is None
-        process.send_signal(signal.SIGINT)
+        process.send_signal(number)
         said = process.communicate(timeout=120)[1]
-    assert process.returncode == 130, said
+    assert process.returncode == code, said
     assert "interrupted: partial result" in said
     assert "Traceback" not in said
     summary, run = json.loads((out / "summary.json").read_text()), fb.load(out / "run.npz")
@@ -198,7 +211,7 @@ def test_ctrl_c_leaves_what_was_computed(tmp_path):
 
 
 def test_ctrl_c_before_the_run_is_one_line(capsys, monkeypatch):
-    def interrupted(path):
+    def interrupted(*_):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("fembeam.scene_file.read", interrupted)
@@ -231,7 +244,7 @@ def test_an_ensemble_is_written_and_goes_on(tmp_path, capsys):
     table = capsys.readouterr().out
     assert table.startswith("3 realisations\n")
     assert re.search(r"stop 0 rate +4\d\.\d+ ± \d", table)
-    assert sorted(p.name for p in out.iterdir()) == ["ensemble.json", "ensemble.npz", "ensemble.png"]
+    assert sorted(p.name for p in out.iterdir()) == ["ensemble.json", "ensemble.npz", "ensemble.png", "report.html"]
     found = json.loads((out / "ensemble.json").read_text())
     assert found["numbers"]["δ skewness"]["mean"] < -0.7
     ensemble_scene(tmp_path, ("realisations = 3", "realisations = 4\nworkers = 2"))
@@ -253,6 +266,205 @@ def test_an_ensemble_is_written_and_goes_on(tmp_path, capsys):
 )
 def test_a_bad_ensemble(tmp_path, capsys, change, message):
     assert message in refused(capsys, "run", ensemble_scene(tmp_path, change), "--out", tmp_path / "out")
+
+
+def printed(capsys, *arguments):
+    """What a command prints that succeeds."""
+    assert main([str(a) for a in arguments]) == 0
+    return capsys.readouterr().out
+
+
+def test_the_new_scene_is_checked_and_runs(tmp_path, capsys):
+    path, out = tmp_path / "new.toml", tmp_path / "out"
+    printed(capsys, "new", path)
+    assert "File exists" in refused(capsys, "new", path)
+    found = json.loads(printed(capsys, "check", path, "--json"))
+    assert [row["omega"] for row in found["modes"]] == pytest.approx([106.945812, 813.508628, 2384.149653], rel=1e-6)
+    stop = found["stops"][0]
+    strike = read(path).scene.reduce(modes=3).strike(stop["speed"])
+    assert stop["time"] == pytest.approx(float(strike.t_out[0] - strike.t_in[0]))
+    assert found["memory"] == pytest.approx(1 / (0.02 * 106.945812), rel=1e-6)
+    assert len(found["warnings"]) == 1
+    assert "excite modes above the 3 kept" in found["warnings"][0]
+    found = json.loads(printed(capsys, "run", path, "--out", out, "--json", "--quiet", "--set", "simulate.duration=3"))
+    assert found["simulate"]["simulated_seconds"] == 3.0
+    assert found["simulate"] | {"warnings": []} == json.loads((out / "summary.json").read_text())
+
+
+@pytest.mark.parametrize("number", range(5))
+def test_every_example_in_the_new_scene_is_right(tmp_path, number):
+    blocks = re.findall(r"^# \[(?:.|\n)*?(?=\n\n|\n*\Z)", TEMPLATE, re.MULTILINE)
+    assert len(blocks) == 5
+    text = TEMPLATE.replace(blocks[number], re.sub(r"^# ", "", blocks[number], flags=re.MULTILINE))
+    path = tmp_path / "scene.toml"
+    path.write_text(text.format(name="scene.toml"), encoding="utf-8")
+    read(path).scene.reduce(modes=3)
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("beam.section.E=1.9e5", "looks like N/mm²"),
+        ("beam.section.rho=8", "looks like g/cm³"),
+        ("beam.section.rho=8e4", "heavier than osmium"),
+        ("beam.section.E=1.9e13", "stiffer than diamond"),
+        ("beam.section.A=58.3", "is one of them in mm²"),
+        ("damping.zeta=[2.0]", "looks like per cent"),
+        ("masses[0].mass=25.4e3", "is it in grams"),
+        ("stops[0].gap=10.0", "is it in mm"),
+        ("base.std=25", "is it in mm"),
+        ("base.band=[0, 1e5]", "loads reach 100000 rad/s"),
+        ("base={kind = 'harmonic', amplitude = 1e-3, omega = 17.37}", "looks like Hz"),
+        ("simulate.dt=0.1", "spectra are folded"),
+        ("simulate.discard=0.0", "keeps the transient"),
+    ],
+)
+def test_doubtful_numbers(override, message):
+    def said(*overrides):
+        file = read(EXAMPLE, overrides)
+        return doubts(file, file.scene.reduce(**file.reduce))
+
+    assert not any(message in one for one in said())
+    assert any(message in one for one in said(override))
+
+
+def test_a_stop_that_is_too_soft(capsys):
+    found = json.loads(printed(capsys, "check", EXAMPLE, "--json", "--set", "stops[0].law.stiffness=1"))
+    assert any("so soft that a contact lasts half the lowest period" in one for one in found["warnings"])
+
+
+def test_a_run_repeats_from_its_file_alone(tmp_path, capsys):
+    (tmp_path / "in").mkdir()
+    t = np.arange(0.0, 3.0, 0.01)
+    np.savetxt(tmp_path / "in" / "y.csv", np.column_stack((t, 1e-3 * np.sin(20 * t))), delimiter=",")
+    base = '[base]\nkind = "record"\npath = "y.csv"\nband = [10, 200]\n[reduce]'
+    head, _, tail = scene(tmp_path / "in", duration="2").read_text().partition("[base]")
+    path = tmp_path / "in" / "scene.toml"
+    path.write_text(head + base + tail.partition("[reduce]")[2])
+    options = "--set", "simulate.duration=1.5"
+    printed(capsys, "run", path, "--out", tmp_path / "a", "--quiet", *options)
+    for used in (path, tmp_path / "in" / "y.csv"):
+        used.unlink()
+    printed(capsys, "run", tmp_path / "a" / "run.npz", "--out", tmp_path / "b", "--quiet")
+    first, second = (fb.load(tmp_path / name / "run.npz") for name in "ab")
+    assert np.array_equal(first.q, second.q)
+    assert first.t[-1] == pytest.approx(1.5)
+    assert second.scene_file.reduce == {"modes": 2}
+    assert first.versions["numpy"] == np.__version__
+    assert re.search(r"^(\d+) of \1 numbers are equal", printed(capsys, "compare", tmp_path / "a", tmp_path / "b"))
+    other = printed(
+        capsys, "run", tmp_path / "a" / "run.npz", "--out", tmp_path / "c", "--set", "stops[0].gap=1e-3", "--json"
+    )
+    assert other
+    rows = json.loads(printed(capsys, "compare", tmp_path / "a", tmp_path / "c", "--json"))
+    unlike = next(row for row in rows if row["name"] == "summary contacts 0 number")
+    assert unlike["difference"] == (unlike["b"] - unlike["a"]) / unlike["a"] != 0
+    printed(capsys, "compare", tmp_path / "a", tmp_path / "c", "--out", tmp_path / "figures")
+    assert (tmp_path / "figures" / "compare.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_what_cannot_be_compared_or_repeated(tmp_path, capsys):
+    assert "holds no results" in refused(capsys, "compare", tmp_path, tmp_path)
+    (tmp_path / "summary.json").write_text("{")
+    assert "is damaged" in refused(capsys, "compare", tmp_path, tmp_path)
+    fb.Scene(read(EXAMPLE).scene.beam, [fb.Clamped(0.0)]).reduce(2).simulate(0.1, 0.01).save(tmp_path / "python.npz")
+    assert "holds no scene file" in refused(capsys, "run", tmp_path / "python.npz", "--out", tmp_path)
+    (tmp_path / "cut.npz").write_bytes((tmp_path / "python.npz").read_bytes()[:500])
+    assert "damaged" in refused(capsys, "modes", tmp_path / "cut.npz")
+    with pytest.raises(ValueError, match="made in Python"):
+        _ = fb.load(tmp_path / "python.npz").scene_file
+
+
+def test_a_run_as_csv(tmp_path, capsys):
+    printed(capsys, "run", scene(tmp_path), "--out", tmp_path, "--quiet")
+    printed(capsys, "export", tmp_path / "run.npz", "--out", tmp_path / "csv", "--stride", "10")
+    run = fb.load(tmp_path / "run.npz")
+    head = (tmp_path / "csv" / "histories.csv").read_text().splitlines()[0].split(",")
+    rows = np.loadtxt(tmp_path / "csv" / "histories.csv", delimiter=",", skiprows=1)
+    assert rows[:, head.index("force 0 [N]")] == pytest.approx(run.force()[::10], rel=1e-11)
+    assert rows[:, head.index("displacement tip [m]")] == pytest.approx(run.displacement(0.2599)[::10], rel=1e-11)
+    log = np.loadtxt(tmp_path / "csv" / "contacts.csv", delimiter=",", skiprows=1)
+    assert log[:, 1] == pytest.approx(run.contacts.t_in, rel=1e-11)
+
+
+class Page(HTMLParser):
+    """Checks that what is opened is closed, and remembers it."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.tags, self.sources = [], [], []
+        self.feed(text)
+        assert not self.open
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append(tag)
+        self.sources += [value for name, value in attributes if name in ("src", "href")]
+        if tag not in ("meta", "img", "br"):
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+def test_the_report_is_one_page_that_needs_nothing_else(tmp_path, capsys):
+    path = scene(tmp_path, ("a Teflon half-sphere", "<b>a Teflon</i> & half-sphere"))
+    printed(capsys, "run", path, "--out", tmp_path / "out", "--quiet", "--set", "simulate.discard=2.5")
+    text = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    page = Page(text)
+    assert page.tags.count("img") == len(FIGURES)
+    assert all(source.startswith("data:image/png;base64,") for source in page.sources)
+    assert 'name="viewport"' in text
+    assert "&lt;b&gt;a Teflon&lt;/i&gt; &amp;" in text
+    assert "# --set simulate.discard=2.5" in text
+    assert "of the input" in text
+
+
+def test_the_schema_knows_what_the_reader_knows(capsys):
+    schema = json.loads(printed(capsys, "schema"))
+    valid = re.search(r"valid: (.*)\)", refused_text(EXAMPLE.read_text(encoding="utf-8") + "\n[nothing]\n"))[1]
+    assert sorted(schema["properties"]) == sorted(valid.split(", "))
+    laws = next(d["anyOf"] for name, d in schema["$defs"].items() if name == "kind such as hertz")
+    assert [law["properties"]["kind"]["const"] for law in laws] == list(kinds.LAWS)
+    masses = schema["properties"]["masses"]["items"]
+    assert masses["required"] == ["z", "mass"]
+    assert masses["properties"]["mass"] == {"type": "number"}
+    assert check_against(schema, tomllib.loads(EXAMPLE.read_text(encoding="utf-8")), schema) is None
+    assert check_against(schema, tomllib.loads(TEMPLATE.format(name="x")), schema) is None
+    for old, new in (("mass =", "mas ="), ('"clamped"', '"clampd"'), ("= 600", '= "600"'), ("length =", "# ")):
+        changed = tomllib.loads(EXAMPLE.read_text(encoding="utf-8").replace(old, new))
+        assert check_against(schema, changed, schema), new
+
+
+def refused_text(text):
+    """The message about a file that is wrong."""
+    with pytest.raises(ValueError) as caught:
+        built(Source(Path("scene.toml"), text))
+    return str(caught.value)
+
+
+def check_against(schema, value, whole):
+    """A small validator of the parts of JSON Schema that are used; the first fault in words, or None."""
+    if "$ref" in schema:
+        schema = whole["$defs"][schema["$ref"].removeprefix("#/$defs/").replace("%20", " ")]
+    if "anyOf" in schema:
+        faults = [check_against(option, value, whole) for option in schema["anyOf"]]
+        return None if None in faults else f"{value}: {faults}"
+    if value not in schema.get("enum", [value]) or schema.get("const", value) != value:
+        return f"{value} is not {schema}"
+    types = {"number": (int, float), "integer": int, "string": str, "boolean": bool, "array": list, "object": dict}
+    if "type" in schema and not isinstance(value, types[schema["type"]]):
+        return f"{value} is no {schema['type']}"
+    if isinstance(value, list):
+        return next((fault for entry in value if (fault := check_against(schema["items"], entry, whole))), None)
+    if not isinstance(value, dict):
+        return None
+    if missing := set(schema["required"]) - set(value):
+        return f"{missing} missing"
+    pairs = ((key, schema["properties"].get(key)) for key in value)
+    return next(
+        (f"{k}: {fault}" for k, s in pairs if (fault := "unknown" if s is None else check_against(s, value[k], whole))),
+        None,
+    )
 
 
 def test_noise_of_a_table_and_rolled_off_in_a_file(tmp_path):

@@ -233,6 +233,53 @@ def test_mistakes_are_named(tmp_path, old, new, message):
     assert "scene.toml" in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "line"),
+    [
+        ("mass = 25.4e-3", "mas = 25.4e-3", "mas ="),
+        ("mass = 25.4e-3", "mass = 'a'", "mass ="),
+        ("stiffness = 2.1e8", "stiffness = -1", "law ="),
+        ("modes = 2", "mode = 2", "mode ="),
+        ("duration = 600", "duration = -1", "duration ="),
+        ("[damping]", "[dampning]", "[dampning]"),
+        ("z = 0.24445\nmass", "z = 0.3\nmass", "z = 0.3"),
+        ("modes = 2", "modes = 2 2", "modes ="),
+    ],
+)
+def test_mistakes_are_found_by_their_line(tmp_path, old, new, line):
+    text = EXAMPLE.replace(old, new, 1)
+    number = next(i for i, found in enumerate(text.splitlines(), start=1) if found.startswith(line))
+    with pytest.raises(SceneFileError, match=rf"scene\.toml:{number}: "):
+        read(tmp_path, text)
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("simulate", "write table.key=value"),
+        ("=3", "write table.key=value"),
+        ("stops[1].gap=0", r"stops has 1 entries"),
+        ("gravity.x.y=0", r"unknown|gravity"),
+        ("beam.length.x=0", r"beam.length is no table"),
+        ("simulate.durtion=1", "did you mean 'duration'"),
+        ("simulate.dt=[", "dt must be a number"),
+    ],
+)
+def test_bad_overrides(tmp_path, override, message):
+    (tmp_path / "scene.toml").write_text(EXAMPLE, encoding="utf-8")
+    with pytest.raises(SceneFileError, match=message):
+        scene_file.read(tmp_path / "scene.toml", [override])
+
+
+def test_overrides(tmp_path):
+    (tmp_path / "scene.toml").write_text(EXAMPLE, encoding="utf-8")
+    overrides = ["stops[0].law.stiffness=1e9", "stops.0.side = above", "reduce.modes=[0, 2]", "gravity=9.81"]
+    file = scene_file.read(tmp_path / "scene.toml", overrides)
+    assert file.scene.stops[0] == fb.Stop(0.24445, Hysteretic.lankarani_nikravesh(1e9, 0.5), side="above")
+    assert file.reduce == {"modes": [0, 2]}
+    assert file.scene.gravity == 9.81
+
+
 def test_files_that_are_none(tmp_path):
     with pytest.raises(SceneFileError, match="cannot be read"):
         scene_file.read(tmp_path / "nothing.toml")

@@ -147,8 +147,7 @@ def stationary(
                 piece = replace(piece, begin=max(piece.begin, settled.time))
             plan.keep(piece, sums.add(piece))
             response = sums.response(plan, settled, enough)
-            if report:
-                report(min(plan.kept, duration))
+            report(min(plan.kept, duration))
             if until is not None and (not plan.repeats or plan.index >= FEWEST_STRETCHES):
                 enough = all(estimate.relative <= until for estimate in _asked(response, of))
                 if enough:

@@ -1,0 +1,58 @@
+"""Ctrl-C and SIGTERM for the command line: they stop at once, or wait while results are made."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+_state: dict[str, Any] = {"heard": 0, "waits": False}
+
+
+@contextmanager
+def listening() -> Iterator[None]:
+    """SIGINT and SIGTERM raise KeyboardInterrupt; outside the main thread nothing changes."""
+    _state.update(heard=0, waits=False)
+    before = {}
+    try:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            if signal.getsignal(number) is not signal.SIG_IGN:  # as nohup and background jobs want it
+                before[number] = signal.signal(number, _hear)
+    except ValueError:  # not the main thread
+        pass
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _hear(number: int, _: Any) -> None:
+    """Note the first signal while it can wait, stop at any other."""
+    first, _state["heard"] = not _state["heard"], number
+    if not (_state["waits"] and first):
+        raise KeyboardInterrupt
+    os.write(2, b"\nfembeam: stopping as soon as what was computed can be kept; once more stops at once\n")
+
+
+@contextmanager
+def deferred() -> Iterator[None]:
+    """The first signal waits until `check` is called, so that nothing computed is lost; a second one does not."""
+    _state["waits"] = True
+    try:
+        yield
+    finally:
+        _state["waits"] = False
+
+
+def check() -> None:
+    """Stop here if a signal came."""
+    if heard():
+        raise KeyboardInterrupt
+
+
+def heard() -> int:
+    """Number of the signal that came, 0 for none."""
+    return int(_state["heard"])

@@ -1,0 +1,95 @@
+"""What a table of a scene file can choose from by its `kind` (sections: `shape`), and which keys hold such tables."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import contacts
+import solvers
+from fembeam.excitation import Harmonic, Multisine
+from fembeam.noise import BandNoise
+from fembeam.record import Record
+from fembeam.schema import Constructors
+from fembeam.section import Section, Taper
+from fembeam.study.quantities import QUANTITIES
+from fembeam.transient import Pulse, Step
+
+SHAPES: Constructors = {
+    "general": Section,
+    "rectangle": Section.rectangle,
+    "circle": Section.circle,
+    "tube": Section.tube,
+    "taper": Taper,
+}
+LAWS: Constructors = {
+    "hertz": contacts.Hertz,
+    "hertz_of_spheres": contacts.Hertz.of_spheres,
+    "hysteretic": contacts.Hysteretic,
+    **{name: getattr(contacts.Hysteretic, name) for name in contacts.PUBLISHED},
+    "kelvin_voigt": contacts.KelvinVoigt,
+    "anagnostopoulos": contacts.KelvinVoigt.anagnostopoulos,
+    "viscoelastic": contacts.Viscoelastic,
+    "tsuji": contacts.Viscoelastic.tsuji,
+    "jankowski": contacts.Viscoelastic.jankowski,
+    "piecewise_linear": contacts.PiecewiseLinear,
+    "tabulated": contacts.Tabulated,
+    "tabulated_file": contacts.Tabulated.from_csv,
+    "parallel": contacts.parallel,
+}
+SIGNALS: Constructors = {
+    "harmonic": Harmonic,
+    "multisine": Multisine,
+    "band_noise": BandNoise,
+    "noise_of_psd": BandNoise.of_psd,
+    "rolled_off_noise": BandNoise.rolled_off,
+    "record": Record.from_csv,
+    "pulse": Pulse,
+    "step": Step,
+}
+SOLVERS = {
+    "exponential": "Exponential",
+    "dormand_prince": "DormandPrince",
+    "henon_rk2": "HenonRK2",
+    "rk4": "RK4",
+    "central_difference": "CentralDifference",
+    "newmark": "Newmark",
+    "generalized_alpha": "GeneralizedAlpha",
+}
+
+
+@dataclass(frozen=True)
+class Nested:
+    """A table inside a table: what it can be, the key that says which, the one taken when it does not."""
+
+    constructors: Callable[[], Constructors]
+    key: str = "kind"
+    default: str = ""
+    listed: bool = False  # several of them
+    by_name: bool = False  # plain text is the name
+
+
+def _methods() -> Constructors:
+    """Methods by name; made when asked for, as they are slow to import."""
+    return {name: getattr(solvers, method) for name, method in SOLVERS.items() if method in solvers.__all__}
+
+
+SECTION = Nested(lambda: SHAPES, "shape", "general")
+SIGNAL = Nested(lambda: SIGNALS)
+KEYS = {
+    "section": SECTION,
+    "law": Nested(lambda: LAWS),
+    "laws": Nested(lambda: LAWS, listed=True),
+    "signal": SIGNAL,
+    "foot": SIGNAL,
+    "solver": Nested(_methods),
+    "quantity": Nested(lambda: QUANTITIES, by_name=True),
+}
+
+
+def nested(key: str, parameter: inspect.Parameter) -> Nested | None:
+    """The kind of table a key holds; None for plain values."""
+    if parameter.annotation is Section:
+        return SECTION
+    return KEYS.get(key) if key == parameter.name else None  # an argument `kind` is given as `quantity` too

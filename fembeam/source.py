@@ -1,0 +1,130 @@
+"""The text behind a scene: parsed with overrides, searched by line, carried by runs that can so be repeated."""
+
+from __future__ import annotations
+
+import re
+import tempfile
+import tomllib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+HEADER = re.compile(r"^\s*\[\[?\s*([\w.\"' -]+?)\s*\]")
+
+
+@dataclass(frozen=True)
+class Source:
+    r"""A scene file as it was given.
+
+    Parameters
+    ----------
+    path : of the file; what it names is relative to its folder.
+    text : TOML.
+    overrides : "table.key=value", applied in turn.
+    files : contents of the files that it names, by the name in the text.
+
+    Examples
+    --------
+    >>> Source(Path("a.toml"), "[simulate]\ndt = 1e-3", ("simulate.dt=1e-4", "simulate.duration=2")).tables()
+    {'simulate': {'dt': 0.0001, 'duration': 2}}
+    """
+
+    path: Path
+    text: str
+    overrides: tuple[str, ...] = ()
+    files: Mapping[str, bytes] = field(default_factory=dict)
+
+    def tables(self) -> dict[str, Any]:
+        """The parsed file with its overrides; ValueError says what is wrong, and in which line."""
+        try:
+            tables = tomllib.loads(self.text)
+        except (ValueError, RecursionError) as error:
+            found = re.search(r"at line (\d+)", str(error))
+            raise ValueError(f"{self.path}{':' + found[1] if found else ''}: is not valid TOML: {error}") from None
+        for override in self.overrides:
+            _override(tables, override)
+        return tables
+
+    def place(self, where: str, message: str = "") -> str:
+        r"""`path:line: where`, as editors like it; the line is that of the table, or of the key the message names.
+
+        Examples
+        --------
+        >>> Source(Path("a.toml"), "[[masses]]\nz = 1\nmas = 2").place("[[masses]] number 1", "unknown key 'mas'")
+        'a.toml:3: [[masses]] number 1'
+        """
+        line = _line(self.text.splitlines(), where, message)
+        return f"{self.path}:{line}: {where}" if line else f"{self.path}: {where}"
+
+    @contextmanager
+    def unpacked(self) -> Iterator[dict[str, Path]]:
+        """Where the files that it names lie: those it carries, for a while."""
+        with tempfile.TemporaryDirectory(prefix="fembeam-") as folder:
+            places = {name: Path(folder, f"{i}-{Path(name).name}") for i, name in enumerate(self.files)}
+            for name, place in places.items():
+                place.write_bytes(self.files[name])
+            yield places
+
+
+def _override(tables: dict[str, Any], text: str) -> None:
+    """Set one value, such as `stops[0].law.stiffness=1e9` or `stops.0.gap = 1e-3`; missing tables are made."""
+    key, equals, value = text.partition("=")
+    path = re.findall(r"[^.\[\]\s]+", key)
+    if not (equals and path):
+        raise ValueError(f"--set {text}: write table.key=value, such as simulate.duration=10 or stops[0].gap=1e-3")
+    try:
+        new = tomllib.loads(f"x = {value}")["x"]
+    except (ValueError, RecursionError):
+        new = value.strip()  # text needs no quotes here
+    item: Any = tables
+    for i, (name, after) in enumerate(pairwise([*path, ""])):
+        if isinstance(item, list):
+            if not (name.isdecimal() and int(name) < len(item)):
+                raise ValueError(f"--set {text}: {'.'.join(path[:i])} has {len(item)} entries, counted from 0")
+            name = int(name)  # type: ignore[assignment]
+        elif not isinstance(item, dict):
+            raise ValueError(f"--set {text}: {'.'.join(path[:i])} is no table")
+        if not after:
+            item[name] = new
+        elif isinstance(item, list):
+            item = item[name]  # type: ignore[call-overload]
+        else:
+            item = item.setdefault(name, {})
+
+
+def _line(lines: list[str], where: str, message: str) -> int:
+    """Number of the line that is meant, 0 when unknown."""
+    named = re.match(r"\[\[?(\w+)\]\]?(?: number (\d+))?(.*)", where)
+    inside = re.search(r"(\w+)\[(\d+)\]", message)
+    if not named and inside:  # the scene says masses[0]
+        found = _table(lines, inside[1], int(inside[2]) + 1)
+    else:
+        found = _table(lines, named[1], int(named[2] or 1)) if named else range(len(lines))
+    if not found:
+        return 0
+    line = found.start
+    for word in re.findall(r"\w+", named[3]) if named else []:
+        line = _key(lines, word, range(line, found.stop), line)
+    hits = (_key(lines, word, range(line, found.stop), -1) for word in re.findall(r"\w+", message)[:4])
+    return 1 + next((hit for hit in hits if hit >= 0), line if named or inside else -1)
+
+
+def _table(lines: list[str], name: str, number: int) -> range:
+    """Lines of the number-th table of a name, its sub-tables included."""
+    heads = [(i, m[1].strip("\"'")) for i, line in enumerate(lines) if (m := HEADER.match(line))]
+    begins = [i for i, head in heads if head == name] or [i for i, head in heads if head.startswith(f"{name}.")]
+    if number > len(begins):
+        line = _key(lines, name, range(len(lines)), -1)
+        return range(line, line + 1) if line >= 0 else range(0)
+    begin = begins[number - 1]
+    ends = [i for i, head in heads if i > begin and not head.startswith(f"{name}.")] + begins[number:]
+    return range(begin, min(ends, default=len(lines)))
+
+
+def _key(lines: list[str], word: str, among: range, otherwise: int) -> int:
+    """The first of some lines that sets a key or opens the table of that name."""
+    sets = re.compile(rf"(?:^|[{{,\s\"'])(?<!\w){re.escape(word)}[\"']?\s*=|^\s*\[+(?:.*\.)?{re.escape(word)}\s*\]")
+    return next((i for i in among if sets.search(lines[i].split("#")[0])), otherwise)
