@@ -17,7 +17,7 @@ the steady response to the tones, known in closed form at any time, so that W ob
 indentations; laws contribute ∂F/∂parameter. See Leine, Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical
 Systems, 2004, Chapter 7, for saltation.
 
-At an entry of exactly zero rate the derivative does not exist; dt* is taken as zero there.
+At an entry of zero rate (to rounding) the derivative does not exist; dt* is taken as zero there.
 """
 
 from __future__ import annotations
@@ -35,7 +35,21 @@ from solvers.ledger import inside
 from solvers.newton import factorise, linearise, substitute
 from solvers.regular import regular_step
 from solvers.response import free_response, respond
-from solvers.state import BEGAN, ENDED, EVENT, FIRST, HEAD, KIND, LANDING, PART, SECOND, SPAN, T
+from solvers.state import (
+    BEGAN,
+    ENDED,
+    EVENT,
+    FIRST,
+    HEAD,
+    KIND,
+    LANDING,
+    PART,
+    SECOND,
+    SPAN,
+    T,
+    begin_contacts,
+    rate_tolerance,
+)
 from solvers.tables import S, propagate
 from solvers.vector import combine
 
@@ -115,13 +129,10 @@ def _force(problem, shadow, s, delta, delta_dot, batch):
 @kernel
 def begin(problem, shadow, slopes, nudge):
     """Put the stops on their pieces as the run does at its start, and latch the derivative of their rates."""
+    begin_contacts(problem, shadow)
     for s in range(problem.gap.size):
-        delta = indentation(problem, s, shadow.x)
-        while delta > problem.levels[s, shadow.piece[s]]:
-            shadow.piece[s] += 1
         if shadow.piece[s] > 0:
             rate = dot(problem.read_rate[s], shadow.x, 2 * problem.k.size)
-            shadow.entry_rate[s] = max(abs(rate), problem.floor[s])
             for c in range(slopes.y.shape[0]):
                 change = _change(problem, nudge, slopes, c, s, 1, 0.0)
                 slopes.entry[c, s] = 0.0 if abs(rate) < problem.floor[s] else np.sign(rate) * change
@@ -137,6 +148,7 @@ def _cross(problem, shadow, slopes, nudge, s, direction):
     border = piece if direction > 0 else piece - 1
     rhs(problem, t, shadow.x, shadow.piece, shadow.entry_rate, slopes.rate[0], slopes.batch)
     acceleration = dot(problem.read_rate[s], slopes.rate[0], size)
+    still = rate_tolerance(problem, s, shadow.x)
     if entering:
         shadow.entry_rate[s] = max(abs(rate), problem.floor[s])
     below, above = problem.levels[s, border] * (1.0 - _OFF), problem.levels[s, border] * (1.0 + _OFF) + 1e-300
@@ -146,7 +158,7 @@ def _cross(problem, shadow, slopes, nudge, s, direction):
     jump *= direction
     for c in range(slopes.y.shape[0]):
         moved = _change(problem, nudge, slopes, c, s, 0, t)
-        shift = -moved / rate if rate != 0.0 else 0.0
+        shift = -moved / rate if abs(rate) > still else 0.0
         if entering:
             floored = abs(rate) < problem.floor[s]
             change = _change(problem, nudge, slopes, c, s, 1, t) + acceleration * shift

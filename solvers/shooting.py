@@ -31,6 +31,7 @@ TOLERANCE = 1e-10  # of the residual, in units of the orbit's size
 _MOST_ITERATIONS = 25
 _MOST_HALVINGS = 6
 _MOST_SHOTS = 6
+_MOST_SETTLINGS = 4  # starts taken from a run from rest, a hundred periods apart
 _NEAR_ONE = 0.01  # | |μ| - 1 | below which a verdict on stability is doubtful
 
 
@@ -309,7 +310,21 @@ def orbit(
     (True, True)
     """
     method = checked(system, period, method, shots)
-    x = settled(system, period, method) if start is None else checked_start(system, start)
+    if start is not None:
+        return _near(system, period, checked_start(system, start), method, shots)
+    x = settled(system, period, method)
+    for attempt in range(_MOST_SETTLINGS):
+        try:
+            return _near(system, period, x, method, shots)
+        except OrbitError:
+            if attempt == _MOST_SETTLINGS - 1:
+                raise
+        x = flown(system, x, 100.0 * period, replace(method, rtol=max(method.rtol, 1e-8)))
+    raise AssertionError("not reached")
+
+
+def _near(system: System, period: float, x: Array, method: Any, shots: int | None) -> Orbit:
+    """The orbit near a state, with as few shots as will do."""
     tried: list[str] = []
     for count in [shots] if shots else range(1, _MOST_SHOTS + 1):
         try:

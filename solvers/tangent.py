@@ -12,6 +12,7 @@ from solvers.dormand_prince import STAGES
 from solvers.kernels import Problem, rhs
 from solvers.preparation import steady_response
 from solvers.replay import Nudge, Slopes, begin, replay
+from solvers.result import SolverError
 from solvers.state import HEAD, TAPED, T, law_parameters, new_state
 from solvers.system import Array, Parameter, System
 from solvers.tables import S
@@ -56,6 +57,8 @@ class Tangent:
             self.blocks.k.size,
         )
         engine.state.count[TAPED] = 0
+        if not np.all(np.isfinite(self.slopes.y)):
+            raise SolverError(f"the tangent is not finite any more at t = {engine.state.now[T]:g} s: a contact grazes")
         size = float(np.linalg.norm(self.slopes.y, 2))
         self.history.append((float(engine.state.now[T]), self.log_scale + math.log(size) if size > 0.0 else -math.inf))
         if not 1.0 / _LARGE < size < _LARGE and size > 0.0:

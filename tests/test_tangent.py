@@ -187,6 +187,12 @@ def test_the_run_is_the_same_and_long_runs_replay_in_pieces():
     assert followed.cost.steps > 1024  # more than one tape
 
 
+def test_a_start_at_rest_on_the_stop_has_a_finite_tangent():
+    # the entry at t = 0 has no rate, so that its time has no derivative; what follows has
+    tangent = integrate(beam(2), np.zeros(2), np.zeros(2), 0.3, tangent=True).tangent
+    assert np.all(np.isfinite(tangent))
+
+
 def test_bad_input():
     system = beam(1)
     with pytest.raises(ValueError, match="tangent is not offered by DormandPrince; use Exponential"):
