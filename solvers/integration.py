@@ -91,7 +91,7 @@ def prepared_run(
     """A run ready to start, everything checked."""
     if not hasattr(method, "engine") or isinstance(method, type):
         raise TypeError(f"method must be one of solvers, made with its settings, such as Exponential(), got {method!r}")
-    _check_tangent(tangent, method)
+    _check_tangent(tangent, method, system)
     z = _start(system, q0, q_dot0, method)
     samples = _samples(duration, dt)
     _check_laws(system)
@@ -99,12 +99,27 @@ def prepared_run(
     return _Run(system, method.engine(system, z, forcing, duration), dt, samples, tangent)
 
 
-def _check_tangent(tangent: Any, method: Any) -> None:
-    """A tangent is asked for in one of its forms, of a method that has one."""
+def _check_tangent(tangent: Any, method: Any, system: System) -> None:
+    """A tangent is asked for in one of its forms, of a method that has one, for laws that have one."""
     if not isinstance(tangent, bool | Parameter):
         raise TypeError(f"tangent must be True, False or a solvers.Parameter, got {tangent!r}")
     if tangent and not getattr(method, "has_tangent", False):
         raise ValueError(f"tangent is not offered by {type(method).__name__}; use Exponential")
+    if tangent:
+        check_slopes(system)
+
+
+def check_slopes(system: System) -> None:
+    """No law has an infinite slope at its surface, F ~ δ^r with r < 1 but for a declared jump."""
+    if system.kept.get("slopes are finite"):
+        return
+    delta = np.array([1e-12, 1e-10])
+    for i, contact in enumerate(system.contacts):
+        viscous = contact.law.force(delta, 1.0, 1.0) - contact.law.force(delta, 0.0, 1.0)
+        if not contact.law.jump and 0.0 < abs(viscous[1]) < 50.0 * abs(viscous[0]):
+            trouble = f"its slope is infinite at the surface: {contact.law!r}"
+            raise ValueError(f"tangent is not offered for the law of contact {i}: {trouble}")
+    system.kept["slopes are finite"] = True
 
 
 def _end(system: System, q0: ArrayLike, q_dot0: ArrayLike, duration: float, method: Any) -> Array:

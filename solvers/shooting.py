@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from solvers.exponential import Exponential
-from solvers.integration import integrate
+from solvers.integration import check_slopes, integrate
 from solvers.result import ContactLog, Solution, SolverError
 from solvers.system import Array, Contact, Parameter, System
 
@@ -367,6 +367,7 @@ def checked(system: System, period: float, method: Any, shots: int | None) -> An
     method = Exponential(1e-11) if method is None else method
     if not getattr(method, "has_tangent", False):
         raise ValueError(f"method must offer tangents, such as Exponential(), got {method!r}")
+    check_slopes(system)
     for load, (_, signal) in enumerate(system.loads):
         if not hasattr(signal, "tones"):
             probe = period * np.linspace(0.0, 1.0, 17)

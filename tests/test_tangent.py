@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, law
+from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, Viscoelastic, law
 from solvers import Contact, DormandPrince, Exponential, Parameter, System, integrate
 
 OMEGA, ZETA = np.array([109.13, 790.6, 2303.7, 4700.0, 7800.0]), np.array([0.02, 0.01, 0.01, 0.01, 0.01])
@@ -71,6 +71,13 @@ def test_against_differences_of_runs(name, modes):
     system, (q, q_dot) = beam(modes, LAWS[name]), start(modes, seed=3)
     solution = integrate(system, q, q_dot, 0.06, method=Exponential(1e-11), tangent=True)
     assert len(solution.contacts) >= 2
+    expected = differences(system, q, q_dot, 0.06)
+    np.testing.assert_allclose(solution.tangent, expected, rtol=0, atol=1e-7 * np.abs(expected).max())
+
+
+def test_damping_that_jumps_at_a_knot():
+    system, (q, q_dot) = beam(2, PiecewiseLinear([1e5, 2e6], [2e-5], damping=[30.0, 250.0])), start(2, seed=3)
+    solution = integrate(system, q, q_dot, 0.06, method=Exponential(1e-11), tangent=True)
     expected = differences(system, q, q_dot, 0.06)
     np.testing.assert_allclose(solution.tangent, expected, rtol=0, atol=1e-7 * np.abs(expected).max())
 
@@ -199,6 +206,8 @@ def test_bad_input():
         integrate(system, [0.0], [0.0], 1.0, method=DormandPrince(), tangent=True)
     with pytest.raises(TypeError, match=r"tangent must be True, False or a solvers\.Parameter"):
         integrate(system, [0.0], [0.0], 1.0, tangent="omega")
+    with pytest.raises(ValueError, match="tangent is not offered for the law of contact 0: its slope is infinite"):
+        integrate(beam(1, Viscoelastic.tsuji(2e7, 0.6, 0.3)), [0.0], [0.0], 1.0, tangent=True)
     with pytest.raises(ValueError, match="differ in coordinates"):
         Parameter(beam(1), beam(2), 1.0)
     with pytest.raises(ValueError, match="step"):
