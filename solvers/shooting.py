@@ -313,14 +313,12 @@ def orbit(
     if start is not None:
         return _near(system, period, checked_start(system, start), method, shots)
     x = settled(system, period, method)
-    for attempt in range(_MOST_SETTLINGS):
+    for _ in range(_MOST_SETTLINGS - 1):
         try:
             return _near(system, period, x, method, shots)
         except OrbitError:
-            if attempt == _MOST_SETTLINGS - 1:
-                raise
-        x = flown(system, x, 100.0 * period, replace(method, rtol=max(method.rtol, 1e-8)))
-    raise AssertionError("not reached")
+            x = flown(system, x, 100.0 * period, replace(method, rtol=max(method.rtol, 1e-8)))
+    return _near(system, period, x, method, shots)
 
 
 def _near(system: System, period: float, x: Array, method: Any, shots: int | None) -> Orbit:
