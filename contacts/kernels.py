@@ -3,7 +3,7 @@
 import math
 
 from llvmlite import ir
-from numba import carray, cfunc, types
+from numba import carray, cfunc, njit, types
 from numba.extending import intrinsic
 
 _REALS = types.CPointer(types.float64)
@@ -54,6 +54,21 @@ def power_gradient(n, delta, delta_dot, entry_rate, parameters, by_delta, by_rat
             by_delta[i], by_rate[i], by_entry[i] = 0.0, 0.0, 0.0
 
 
+@njit(**_OPTIONS)
+def _piece(table, m, d, v):
+    """Place in the table of the piece that holds d, by bisection."""
+    # on a knot, to rounding, the piece it comes from: the dashpot may jump there, and steps end on knots
+    seen = d * (1.0 + 1e-11) if v < 0.0 else d * (1.0 - 1e-11)
+    low, high = 0, m
+    while high - low > 1:
+        middle = (low + high) // 2
+        if seen < table[1 + 6 * middle]:
+            high = middle
+        else:
+            low = middle
+    return 1 + 6 * low
+
+
 @cfunc(SIGNATURE, **_OPTIONS)
 def piecewise(n, delta, delta_dot, entry_rate, parameters, force):
     """Piecewise cubic with a dashpot per piece: parameters (m, 6 numbers per piece).
@@ -64,16 +79,7 @@ def piecewise(n, delta, delta_dot, entry_rate, parameters, force):
     table = carray(parameters, (1 + 6 * m,))
     for i in range(n):
         d, v = delta[i], delta_dot[i]
-        # on a knot, to rounding, the piece it comes from: the dashpot may jump there, and steps end on knots
-        seen = d * (1.0 + 1e-11) if v < 0.0 else d * (1.0 - 1e-11)
-        low, high = 0, m
-        while high - low > 1:
-            middle = (low + high) // 2
-            if seen < table[1 + 6 * middle]:
-                high = middle
-            else:
-                low = middle
-        j = 1 + 6 * low
+        j = _piece(table, m, d, v)
         x = d - table[j]
         force[i] = table[j + 1] + x * (table[j + 2] + x * (table[j + 3] + x * table[j + 4])) + table[j + 5] * v
 
@@ -85,15 +91,7 @@ def piecewise_gradient(n, delta, delta_dot, entry_rate, parameters, by_delta, by
     table = carray(parameters, (1 + 6 * m,))
     for i in range(n):
         d = delta[i]
-        seen = d * (1.0 + 1e-11) if delta_dot[i] < 0.0 else d * (1.0 - 1e-11)
-        low, high = 0, m
-        while high - low > 1:
-            middle = (low + high) // 2
-            if seen < table[1 + 6 * middle]:
-                high = middle
-            else:
-                low = middle
-        j = 1 + 6 * low
+        j = _piece(table, m, d, delta_dot[i])
         x = d - table[j]
         by_delta[i] = table[j + 2] + x * (2.0 * table[j + 3] + x * 3.0 * table[j + 4])
         by_rate[i], by_entry[i] = table[j + 5], 0.0
