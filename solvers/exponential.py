@@ -429,10 +429,9 @@ class Engine:
         if forcing.table.size:
             packed = Packed(packed.value._replace(table=forcing.table, table_start=forcing.table_start), PROBLEM)
         self.packed, self.problem, self.prepared = packed, packed.value, prepared
-        block, self.words = prepared.layout.block()
+        block, words = prepared.layout.block()
         self.state = State._make(prepared.layout.arrays(block, 0))
         begin_state(self.state, prepared.rest + among_tones(z, len(forcing.tone_omega)))
-        words = self.words.__array_interface__["data"][0]
         state, space = (words + start for start in prepared.layout.starts)
         self.addresses = packed.address, prepared.tables.address, state, space
         self.block = block

@@ -10,6 +10,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,8 +19,9 @@ from numpy.typing import ArrayLike
 from solvers.forcing import Forcing, hand_over
 from solvers.result import COLUMNS, ContactLog, Cost, Energy, Solution, SolverError, Status
 from solvers.state import CALLS, EVENTS, LOG_FULL, LOGGED, REJECTED, RUNNING, SAMPLED, STATUSES, STEPS, T, contact_row
-from solvers.system import Array, Parameter, System
+from solvers.system import ABOUT_LAWS, Array, Parameter, System
 
+LAWS, SLOPES = ABOUT_LAWS
 _BUDGET = 20_000  # steps between two looks at the world outside
 _MOST_SAMPLES = 500_000_000
 
@@ -111,7 +113,7 @@ def _check_tangent(tangent: Any, method: Any, system: System) -> None:
 
 def check_slopes(system: System) -> None:
     """No law has an infinite slope at its surface, F ~ δ^r with r < 1 but for a declared jump."""
-    if system.kept.get("slopes are finite"):
+    if system.kept.get(SLOPES):
         return
     delta = np.array([1e-12, 1e-10])
     for i, contact in enumerate(system.contacts):
@@ -119,7 +121,7 @@ def check_slopes(system: System) -> None:
         if not contact.law.jump and 0.0 < abs(viscous[1]) < 50.0 * abs(viscous[0]):
             trouble = f"its slope is infinite at the surface: {contact.law!r}"
             raise ValueError(f"tangent is not offered for the law of contact {i}: {trouble}")
-    system.kept["slopes are finite"] = True
+    system.kept[SLOPES] = True
 
 
 def _end(system: System, q0: ArrayLike, q_dot0: ArrayLike, duration: float, method: Any) -> Array:
@@ -130,18 +132,18 @@ def _end(system: System, q0: ArrayLike, q_dot0: ArrayLike, duration: float, meth
 
 def _start(system: System, q0: ArrayLike, q_dot0: ArrayLike, method: Any) -> Array:
     """Checked start in the coordinates a method steps in: decoupled blocks, or the system's own."""
-    checked = []
-    for name, value in (("q0", q0), ("q_dot0", q_dot0)):
-        vector = np.array(value, dtype=float, ndmin=1)
+    vectors = [np.array(value, dtype=float, ndmin=1) for value in (q0, q_dot0)]
+    for name, vector in zip(("q0", "q_dot0"), vectors, strict=True):
         if vector.shape != (system.size,):
             raise ValueError(f"{name} must have shape ({system.size},), got {vector.shape}")
-        if not np.isfinite(vector).all():
-            bad = int(np.argmin(np.isfinite(vector)))
-            raise ValueError(f"{name} must be finite, got {vector[bad]} at coordinate {bad}")
-        checked.append(vector)
+    start = np.concatenate(vectors)
+    finite = np.isfinite(start)
+    if not finite.all():
+        which, bad = divmod(int(np.argmin(finite)), system.size)
+        raise ValueError(f"{('q0', 'q_dot0')[which]} must be finite, got {vectors[which][bad]} at coordinate {bad}")
     if hasattr(method, "takes_matrices") and method.takes_matrices(system):
-        return np.concatenate(checked)
-    return system.blocks.to_blocks(*checked)
+        return start
+    return system.blocks.inverse @ start
 
 
 def _samples(duration: float, dt: float | None) -> int:
@@ -160,7 +162,7 @@ def _samples(duration: float, dt: float | None) -> int:
 
 def _check_laws(system: System) -> None:
     """Every law is finite at rest, so that a NaN is met before the run; looked at once per system."""
-    if system.kept.get("laws are finite"):
+    if system.kept.get(LAWS):
         return
     delta = np.array([1e-12, 1e-6, 1e-3])
     for i, contact in enumerate(system.contacts):
@@ -168,7 +170,7 @@ def _check_laws(system: System) -> None:
         if not np.all(np.isfinite(force)):
             where = delta[~np.isfinite(force)][0]
             raise ValueError(f"the law of contact {i} is not finite at delta = {where:g} m: {contact.law!r}")
-    system.kept["laws are finite"] = True
+    system.kept[LAWS] = True
 
 
 def _forcing(system: System, duration: float, rtol: float) -> Forcing:
@@ -196,8 +198,7 @@ class _Run:
         self.state = engine.state
         self.log = np.empty((max(256, 2 * len(system.contacts)), COLUMNS))
         self.out = np.empty((samples, self.state.x.size))
-        motion = engine.back @ self.state.x[: 2 * engine.problem.k.size]
-        self.initial_energy = float(system.energy(motion[: system.size], motion[system.size :]))
+        self.begin = self.state.x[: 2 * engine.problem.k.size].copy()
         if samples:
             self.out[0] = self.state.x
             self.state.count[SAMPLED] = 1
@@ -233,24 +234,21 @@ class _Run:
 
     def solution(self, status: Status, seconds: float) -> Solution:
         """Collect outputs, log and ledger."""
-        size = 2 * self.engine.problem.k.size
+        size, n = self.begin.size, self.system.size
         if self.dt is None:
             x, t = self.state.x[None, :].copy(), np.array([self.time])
         else:
             x = self.out[: self._sampled(status)]
             t = np.arange(len(x)) * self.dt
         motion = x[:, :size] @ self.engine.back.T
-        q, q_dot = motion[:, : self.system.size], motion[:, self.system.size :]
-        ledger = x[:, size:].copy()
+        powers = x[:, size:].copy()
         if not self.engine.keeps_ledger(self.dt is not None):
-            ledger[:, :2] = math.nan
-        energy = Energy(
-            *(ledger[:, 0], ledger[:, 1], ledger[:, 2::2].sum(axis=1)),
-            *(self.system.energy(q, q_dot), self.initial_energy),
-        )
+            powers[:, :2] = math.nan
+        ledger = partial(Energy.of_run, self.system.M, self.system.K, powers, motion, self.engine.back @ self.begin)
         count = self.state.count
-        cost = Cost(int(count[STEPS]), int(count[REJECTED]), int(count[CALLS]), int(count[EVENTS]), seconds)
-        solution = Solution(t, q, q_dot, self._contacts(), energy, status, cost)
+        steps, rejected, calls, events = count[[STEPS, REJECTED, CALLS, EVENTS]].tolist()
+        cost = Cost(steps, rejected, calls, events, seconds)
+        solution = Solution(t, motion[:, :n], motion[:, n:], self._contacts(), ledger, status, cost)
         if self.tangent is None or status is not Status.DONE:
             return solution
         return replace(solution, tangent=self.tangent.matrix(), rate=self.tangent.rate())

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,7 +14,7 @@ from solvers.handle import Layout, Packed
 from solvers.kernels import PROBLEM, Problem
 from solvers.response import Space
 from solvers.state import STATE, problem_of, rate_rows, state_shapes
-from solvers.system import Array, System, dense
+from solvers.system import Array, System
 from solvers.tables import S, Tables, build
 from solvers.vector import padded
 
@@ -67,25 +69,26 @@ def prepared_for(system: System, forcing: Forcing) -> Prepared:
             *(problem, len(forcing.tone_omega), [law.exponent for law in laws], [law.jump for law in laws]),
             *(dt_cell, ledger),
         )
-        shapes = _shapes(len(problem.gap), len(problem.load), len(problem.k), len(forcing.table_dt))
+        layout = _layout(len(problem.gap), len(problem.load), len(problem.k), len(forcing.table_dt))
         made = Prepared(
             *(Packed(problem, PROBLEM), Packed(tables, TABLES), steady, system.blocks.T @ steady),
-            *(Layout([STATE, SPACE], shapes), _rest(steady, len(forcing.tone_omega))),
+            *(layout, _rest(steady, len(forcing.tone_omega))),
         )
         system.kept["exponential"] = (key, made)
     prepared: Prepared = system.kept["exponential"][1]
     return prepared
 
 
-def _shapes(stops: int, loads: int, blocks: int, signals: int) -> list[list[tuple[int, ...]]]:
-    """Shapes of the arrays of `State` and `Space`."""
+@lru_cache(maxsize=64)
+def _layout(stops: int, loads: int, blocks: int, signals: int) -> Layout:
+    """Places of the arrays of `State` and `Space`."""
     size, width = 2 * blocks, 2 * blocks + 2 + 2 * stops
     space = [
         *((padded(width),), (7, padded(size)), (signals, 6), (7,), (blocks,), (loads,), (stops,)),
         *((stops, 2, S), (S,), (stops, 2, S), (stops + loads, S), (S,), (stops, 2, 8), (stops, S), (stops, 3, S)),
         *((stops * S, stops * S), (stops * S,), (stops * S,), (18, padded(width + 2)), (2 + stops,), (6,)),
     ]
-    return [state_shapes(width, stops), space]
+    return Layout([STATE, SPACE], [state_shapes(width, stops), space])
 
 
 def without_resonance(system: System, forcing: Forcing, duration: float, rtol: float) -> Forcing:
@@ -107,13 +110,14 @@ def without_resonance(system: System, forcing: Forcing, duration: float, rtol: f
 
 def _distance(system: System, omega: float, load: int) -> tuple[float, float]:
     """Smallest |k - Ω² + iΩc| of the blocks a load pushes, absolute and relative to max(k, Ω²)."""
-    blocks = system.blocks
-    distance = np.abs(blocks.k - omega**2 + 1j * omega * blocks.c)
-    vector = blocks.inverse[:, system.size :] @ np.linalg.solve(dense(system.M), np.asarray(system.loads[load][0]))
-    distance = distance[np.hypot(*np.split(vector, 2)) > 0.0]
-    scale = np.maximum(blocks.k, omega**2)[np.hypot(*np.split(vector, 2)) > 0.0]
-    relative = np.divide(distance, scale, out=np.zeros_like(distance), where=scale > 0.0)
-    return float(distance.min(initial=np.inf)), float(relative.min(initial=np.inf))
+    vector, blocks = system.push @ np.asarray(system.loads[load][0]), system.blocks
+    pushed = (vector[: system.size] != 0.0) | (vector[system.size :] != 0.0)
+    if not pushed.any():
+        return math.inf, math.inf
+    k, c = blocks.k[pushed], blocks.c[pushed]
+    distance = np.abs(k - omega**2 + 1j * omega * c)
+    scale = np.maximum(k, max(omega**2, 1e-300))
+    return float(distance.min()), float((distance / scale).min())
 
 
 def _signal_rows(problem: Problem, forcing: Forcing) -> Array:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, fields
 from enum import Enum
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from solvers.system import Array
+from solvers.system import Array, stored_energy
 
 
 class Status(Enum):
@@ -69,7 +70,7 @@ class ContactLog:
     @classmethod
     def of_rows(cls, rows: Array) -> ContactLog:
         """From the kernels' table, one contact a row."""
-        columns: list[Any] = list(rows.T.copy())
+        columns: list[Any] = [*rows.T.copy()]
         columns[0], columns[-1] = columns[0].astype(int), columns[-1].astype(bool)
         return cls(*columns)
 
@@ -124,6 +125,12 @@ class Energy:
     stored: Array
     initial: float
 
+    @classmethod
+    def of_run(cls, M: Any, K: Any, powers: Array, motion: Array, begin: Array) -> Energy:
+        """From the integrated powers (k, 2 + 2m) and the motion [q, q̇] (k, 2n), which began at (2n,)."""
+        stored, initial = (stored_energy(M, K, *np.split(x, 2, axis=-1)) for x in (motion, begin))
+        return cls(powers[:, 0], powers[:, 1], powers[:, 2::2].sum(axis=1), stored, float(initial))
+
     @property
     def residual(self) -> Array:
         """What the ledger does not account for."""
@@ -153,8 +160,13 @@ class Solution:
     q: Array
     q_dot: Array
     contacts: ContactLog
-    energy: Energy
+    ledger: Callable[[], Energy] = field(repr=False)
     status: Status
     cost: Cost
     tangent: Array | None = None
     rate: Array | None = None
+
+    @cached_property
+    def energy(self) -> Energy:
+        """The energy ledger, made when first looked at."""
+        return self.ledger()

@@ -11,7 +11,7 @@ from numba import types
 from solvers.forcing import Forcing
 from solvers.kernels import Problem, dot, indentation, inlined, inner, kernel, sizes
 from solvers.result import Status
-from solvers.system import Array, System, dense
+from solvers.system import Array, System
 
 _VECTOR = types.Array(types.float64, 1, "C")
 _MATRIX = types.Array(types.float64, 2, "C")
@@ -190,13 +190,12 @@ def new_state(z: Any, stops: int) -> State:
 def problem_of(system: System, forcing: Forcing) -> Problem:
     """Arrays the kernels read, in block coordinates."""
     blocks, n = system.blocks, system.size
-    inverse_mass = blocks.inverse[:, n:] @ np.linalg.inv(dense(system.M))
     direction, vectors = _directions(system), _vectors(system)
     linear = {
         **{"k": blocks.k, "c": blocks.c, "loss": np.ascontiguousarray(blocks.loss)},
-        "push": np.ascontiguousarray((inverse_mass @ direction.T).T),
+        "push": np.ascontiguousarray(direction @ system.push.T),
         "read": np.ascontiguousarray(-direction @ blocks.T[:n]),
-        "load": np.ascontiguousarray((inverse_mass @ vectors.T).T),
+        "load": np.ascontiguousarray(vectors @ system.push.T),
         "power": np.ascontiguousarray(vectors @ blocks.T[n:]),
     }
     return _problem(system, forcing, linear)

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
+ABOUT_LAWS = "laws are finite", "slopes are finite"  # what is kept of a system's laws once it was looked at
 
 
 class Law(Protocol):
@@ -141,7 +142,8 @@ class System:
     ) -> System:
         """The same structure with other contacts or loads; its matrices are neither checked nor decoupled again."""
         other = object.__new__(System)
-        other.__dict__.update(self.__dict__, blocks=self.blocks, kept={})
+        known = {} if contacts is not None else {name: self.kept[name] for name in ABOUT_LAWS if name in self.kept}
+        other.__dict__.update(self.__dict__, blocks=self.blocks, push=self.push, kept=known)
         for name, value in (("contacts", contacts), ("loads", loads)):
             if value is not None:
                 object.__setattr__(other, name, value)
@@ -185,6 +187,11 @@ class System:
         """The decoupled form."""
         return decouple(dense(self.M), dense(self.C), dense(self.K))
 
+    @cached_property
+    def push(self) -> Array:
+        """(2n, n) rate of the blocks' state per unit force on every coordinate."""
+        return self.blocks.inverse[:, self.size :] @ np.linalg.inv(dense(self.M))
+
     @property
     def sparse(self) -> bool:
         """Whether the matrices were given sparse."""
@@ -192,9 +199,13 @@ class System:
 
     def energy(self, q: Array, q_dot: Array) -> Array:
         """Stored energy ½ q'ᵀ M q' + ½ qᵀ K q in J, for (..., n) arrays."""
-        with np.errstate(over="ignore", invalid="ignore"):  # of a run that diverged
-            twice = (np.einsum("...i,...i", x @ matrix, x) for x, matrix in ((q_dot, self.M), (q, self.K)))
-            return 0.5 * sum(twice)
+        return stored_energy(self.M, self.K, q, q_dot)
+
+
+def stored_energy(M: Any, K: Any, q: Array, q_dot: Array) -> Array:
+    """½ q'ᵀ M q' + ½ qᵀ K q of (..., n) arrays; inf of a run that diverged."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return 0.5 * sum(np.einsum("...i,...i", x @ matrix, x) for x, matrix in ((q_dot, M), (q, K)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -304,16 +315,6 @@ class Blocks:
     T: Array
     inverse: Array
     loss: Array
-
-    def to_blocks(self, q: Array, q_dot: Array) -> Array:
-        """Block coordinates of a state."""
-        return self.inverse @ np.concatenate((q, q_dot))
-
-    def from_blocks(self, z: Array) -> tuple[Array, Array]:
-        """(q, q_dot) of block coordinates (..., 2n)."""
-        x = z @ self.T.T
-        n = self.k.size
-        return x[..., :n], x[..., n:]
 
 
 def decouple(M: Array, C: Array, K: Array) -> Blocks:

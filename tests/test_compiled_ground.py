@@ -141,8 +141,7 @@ def write(address):
 
 def test_tuples_of_a_layout_share_one_block_and_do_not_overlap():
     layout = Layout([PAIR, PAIR], [[(2, 3), (1,)], [(4, 1), (2,)]])
-    block, words = layout.block()
-    start = words.ctypes.data
+    block, start = layout.block()
     for at in layout.starts:
         write(start + at)
     first, second = (Pair._make(layout.arrays(block, i)) for i in range(2))
