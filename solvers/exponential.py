@@ -9,7 +9,8 @@ Limitations
 -----------
 * In flight no contact of the model is missed, however short. While one stop is in contact the others are watched at 8
   nodes per step only: a second contact shorter than the distance of two nodes can be missed.
-* Touching is no contact: a stop counts as entered where δ becomes positive. An entry at rest counts when δ̈ > 0.
+* Touching is no contact: a stop counts as entered where δ becomes positive. An entry at rest counts when δ̈ > 0; one
+  at rest that another stop's force brings about is noticed a shortest step (1e-9 s) late.
 * A law that bends (clamp=True, a table) between its declared knots is integrated with smaller steps, at lower order; so
   is the beginning and end of one that rises like δ^r, r < 1, in a viscous part (Tsuji). The tolerance is kept.
 * K must be positive semi-definite (no buckled modes).

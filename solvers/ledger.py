@@ -12,6 +12,8 @@ from solvers.response import sample_signals
 from solvers.state import T, touching
 from solvers.tables import S, propagate
 
+_SHORT = 0.15  # radians of the fastest block up to which order 6 and three points are right to 1e-10
+
 
 @inner
 def _between(nodes, exponent, values, sigma):
@@ -89,7 +91,7 @@ def account(problem, tables, state, space, family, h, length, x, row):
 @inner
 def account_flight(problem, tables, state, space, h, x):
     """The same for a whole flight step: on its Taylor polynomial where that reaches, else as above."""
-    if tables.fastest * h > 0.6:
+    if tables.fastest * h > _SHORT:
         if problem.table_dt.size:
             sample_signals(problem, tables, space, np.int64(0), state.now[T], h)  # literals would compile it twice
         account(problem, tables, state, space, np.int64(0), h, h, x, state.x)

@@ -29,8 +29,8 @@ def _legendre(coefficients, x):
 
 
 @inner
-def _summit(tables, values, best, coefficients):
-    """Maximum of the polynomial around its highest node, by successive parabolas."""
+def _summit(tables, values, ends, best, coefficients):
+    """Maximum of the polynomial around its highest node, by successive parabolas; ``ends`` are its end values."""
     place = 0
     for i in range(S):
         if values[i] > values[place]:
@@ -38,17 +38,15 @@ def _summit(tables, values, best, coefficients):
     for k in range(S):
         coefficients[k] = dot(tables.legendre[k], values, S)
     nodes = tables.nodes[0]
-    a = 2.0 * nodes[place - 1] - 1.0 if place > 0 else -1.0
-    c = 2.0 * nodes[place + 1] - 1.0 if place < S - 1 else 1.0
-    best = max(best, _legendre(coefficients, a), _legendre(coefficients, c))
-    b = 2.0 * nodes[place] - 1.0
-    fa, fb, fc = _legendre(coefficients, a), values[place], _legendre(coefficients, c)
+    a, fa = (2.0 * nodes[place - 1] - 1.0, values[place - 1]) if place > 0 else (-1.0, ends[0])
+    c, fc = (2.0 * nodes[place + 1] - 1.0, values[place + 1]) if place < S - 1 else (1.0, ends[1])
+    b, fb = 2.0 * nodes[place] - 1.0, values[place]
     for _ in range(5):
         denominator = (b - a) * (fb - fc) - (b - c) * (fb - fa)
         if denominator == 0.0:
             break
         x = b - 0.5 * ((b - a) ** 2 * (fb - fc) - (b - c) ** 2 * (fb - fa)) / denominator
-        if not a < x < c or x == b:
+        if not a < x < c or abs(x - b) < 1e-8:
             break
         f = _legendre(coefficients, x)
         best = max(best, f)
@@ -73,7 +71,7 @@ def peak(tables, family, values, summary, known, coefficients):
         return best
     if highest == values[S - 1] and summary[7] >= 0.0:
         return best
-    return _summit(tables, values, best, coefficients)
+    return _summit(tables, values, summary[4:6], best, coefficients)
 
 
 @inner

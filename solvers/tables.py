@@ -63,7 +63,7 @@ class Tables(NamedTuple):
     signal_rows: Any  # (L, 2N): a load's tones from the state
     power_rows: Any  # (L, 2N): input power = signal × power row
     loss_rows: Any  # (r, 2N): damping power = Σ (row·z)²
-    gauss: Any  # (2, 5) points and weights on (0, 1) for the energy ledger
+    gauss: Any  # (2, 8) points and weights on (0, 1) for the energy ledger
     extend: Any  # (f, 5, S, S): the force on the next smooth step, 2^{(i-2)/2} times shorter, from that of the last
 
 
@@ -252,7 +252,7 @@ def build(
         signal_rows=ledger[0],
         power_rows=ledger[1],
         loss_rows=ledger[2],
-        gauss=_gauss(5),
+        gauss=_gauss(8),
         extend=families.extend,
     )
 

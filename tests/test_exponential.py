@@ -321,7 +321,17 @@ def test_ledger_closes(base):
     system = scene.reduce(2).system
     run = at_rest(system, 4 * PERIOD, Exponential(1e-9), PERIOD / 50)
     assert len(run.contacts) >= 3
-    assert np.abs(run.energy.residual).max() < 1e-6 * np.abs(run.energy.input).max()
+    assert np.abs(run.energy.residual).max() < 1e-8 * np.abs(run.energy.input).max()
+
+
+@pytest.mark.parametrize("dt", [1e-2, 1e-3])
+def test_ledger_closes_as_well_as_the_motion(dt):
+    """A slow block under a fast tone, whose work nearly cancels over the steps."""
+    system = System.modal([11.2], 0.01, [Contact([1.0], Hertz(1e6))], [([1.0], fb.Harmonic(1.0, 168.0))])
+    for rtol in (1e-6, 1e-8, 1e-10):
+        run = integrate(system, [0.0], [0.0], 2.0, dt, Exponential(rtol))
+        assert len(run.contacts) >= 40
+        assert np.abs(run.energy.residual).max() < max(rtol, 2e-9) * np.abs(run.energy.input).max()
 
 
 # --- random scenes ------------------------------------------------------------------------------------------------
@@ -445,7 +455,7 @@ def test_stops_on_both_sides_and_at_mid_beam(n):
     assert set(ours.contacts.stop.tolist()) == {0, 1, 2}
     same_log(ours, theirs, 1e-8)
     np.testing.assert_allclose(ours.q, theirs.q, atol=1e-8 * np.abs(theirs.q).max(), rtol=0)
-    assert np.abs(ours.energy.residual).max() < 1e-5 * ours.energy.stored.max()
+    assert np.abs(ours.energy.residual).max() < 1e-7 * ours.energy.stored.max()
     image = integrate(mirrored, rest, rest, duration, duration / 50, Exponential(1e-11))
     assert image.contacts.stop.tolist() == ours.contacts.stop.tolist()
     np.testing.assert_allclose(image.q, -ours.q, atol=1e-11 * np.abs(ours.q).max(), rtol=0)
