@@ -111,7 +111,7 @@ def test_random_figures_have_units_bands_and_confidence():
         "narrow",
         "period 2",
         "unstable",
-        "max |u(0.25 m)| / mm",
+        "max |u| at the stop / mm",
     ):
         assert word in texts(figure)
     assert len(plot.random_spectra(panels, 1000.0).axes) == 2

@@ -54,10 +54,7 @@ def random_spectra(
         if len(lines) > 1:
             axis.legend(loc="upper right")
         if branches:
-            beside = axes[row * columns + 1]
-            if branches.get(title):
-                branch(branches[title], axes=beside)
-            beside.set(title="periodic motion", xlim=(0, omega_max), xlabel="")
+            _beside(axes[row * columns + 1], branches.get(title), omega_max)
     for axis in axes[-columns:]:
         axis.set_xlabel("ω / rad s⁻¹")
     return figure
@@ -94,3 +91,10 @@ def _curve(axis: Axes, line: Spectrum, omega_max: float, label: str, colour: str
 def _ribbon(axis: Axes, x: Vector, y: Vector, error: Vector, colour: str) -> None:
     """A shaded 95 % interval, above zero."""
     axis.fill_between(x, np.maximum(y - SURE * error, 0.05 * y), y + SURE * error, color=colour, alpha=0.3, linewidth=0)
+
+
+def _beside(axis: Axes, several: Sequence[Branch] | None, omega_max: float) -> None:
+    """Periodic motion that explains a spectrum, on the same frequencies."""
+    if several:
+        branch(several, axes=axis)
+    axis.set(title="periodic motion", xlim=(0, omega_max), ylim=(0, None), xlabel="", ylabel="max |u| at the stop / mm")
