@@ -41,6 +41,17 @@ def test_pieces_give_the_statistics_of_the_whole(segment):
     np.testing.assert_allclose(np.sum(density) * (x_bins[1] - x_bins[0]), 1 - signal.outside, rtol=1e-12)
 
 
+def test_equal_bins_count_as_searched_ones():
+    x = np.concatenate((coloured(2), [-1e9, 1e9]))
+    first = x[:3000]
+    equal = Signal(first, 0.1, 64)
+    searched = Signal(first, 0.1, 64, bins=equal.edges)
+    for signal in (equal, searched):
+        signal.add(x)
+    assert np.array_equal(equal.pdf.density, searched.pdf.density)
+    assert equal.outside == searched.outside > 0.0
+
+
 def test_a_cut_starts_a_new_segment_and_no_crossing():
     signal = Signal(np.array([-1.0, 1.0]), 0.1, 8)
     for part in (-np.ones(12), np.ones(12)):
