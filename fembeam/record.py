@@ -169,14 +169,14 @@ class Record:
     def nodes(self, duration: float, rtol: float) -> tuple[float, NDArray[np.float64]]:
         """Hermite data of the signal on a uniform grid, with a proven interpolation error.
 
-            |error| <= dt^6/46080 max|s^(6)| <= rtol rms(s - straight line)
+            rms(error) <= dt^6/√13! rms(s^(6)) <= rtol rms(s - straight line)
 
         Parameters
         ----------
         duration : float
             The grid covers [0, duration], in s; at most the length of the record.
         rtol : float
-            Error of the quintic Hermite interpolant relative to the rms, in [1e-13, 1).
+            Rms error of the quintic Hermite interpolant relative to that of the record, in [1e-13, 1).
 
         Returns
         -------

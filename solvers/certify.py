@@ -15,7 +15,19 @@ import math
 
 import numpy as np
 
-from solvers.flight import ORDER, add_signals, add_taylor, cell_of, energy_norms, level_within, taylor, turn
+from solvers.flight import (
+    LONG_REACH,
+    ORDER,
+    add_signals,
+    add_taylor,
+    cell_of,
+    energy_norms,
+    go_on,
+    go_through,
+    level_within,
+    taylor,
+    turn,
+)
 from solvers.kernels import copy, dot, indentation, inlined, inner, merged
 from solvers.ledger import account_flight
 from solvers.state import SAMPLED, STEPS, T, rate_tolerance, surface_tolerance
@@ -119,11 +131,29 @@ def _energetic(problem, norms):
     return fastest
 
 
+@inlined
+def _target(tables, t, due, dt, t_end, ledger):
+    """Where a step must end: at an output time unless that is near enough to be evaluated from the step's start."""
+    if ledger or tables.fastest * (due - t) > LONG_REACH:
+        return min(due, t_end)
+    return t_end if tables.fastest * dt <= LONG_REACH else min(due + dt, t_end)
+
+
+@inner
+def _sample(problem, state, space, t, out, dt):
+    """Outputs before the end of the step that began at t with the state in ``space.x_new``."""
+    while state.count[SAMPLED] < out.shape[0] and state.count[SAMPLED] * dt < state.now[T]:
+        due = state.count[SAMPLED] * dt
+        go_on(problem, space.x_new, t, due - t, space.terms[0], space.six)
+        copy(space.x_new, out[state.count[SAMPLED]], state.x.size)
+        state.count[SAMPLED], t = state.count[SAMPLED] + 1, due
+
+
 @merged
 def fly(problem, tables, state, space, t_end, budget, out, dt, ledger):
     """Fly until a stop is reached (returns its index), the end (-1), or the budget is spent (-2).
 
-    Steps end on the output times too: flight is exact, so that this costs nothing but the steps.
+    With an energy ledger steps end on the output times too; else these are evaluated from the start of a step.
     """
     stops, size, now = problem.gap.size, 2 * problem.k.size, state.now
     shortest = tables.h[tables.h.size - 1]
@@ -137,8 +167,9 @@ def fly(problem, tables, state, space, t_end, budget, out, dt, ledger):
             return -1
 
         # --- how far the output, the end and the signals' cell allow
-        target = min(t_end, state.count[SAMPLED] * dt) if state.count[SAMPLED] < out.shape[0] else t_end
-        span, rest, offset = target - now[T], np.inf, 0.0
+        due = state.count[SAMPLED] * dt if state.count[SAMPLED] < out.shape[0] else np.inf
+        target = _target(tables, now[T], due, dt, t_end, ledger)
+        begin, span, rest, offset, cell = now[T], target - now[T], np.inf, 0.0, 0
         if sampled:
             cell, offset = cell_of(problem, now[T])
             rest = max(dt_cell - offset, 1e-9 * dt_cell)
@@ -151,6 +182,7 @@ def fly(problem, tables, state, space, t_end, budget, out, dt, ledger):
         span = min(span, rest)
         if ledger:
             span = min(span, 3.0 / _energetic(problem, space.norms))
+        if ledger or due <= begin + span:
             copy(state.x, space.x_new, state.x.size)
 
         # --- how far no stop can be reached
@@ -170,8 +202,10 @@ def fly(problem, tables, state, space, t_end, budget, out, dt, ledger):
             add_taylor(space.terms, state.x, h, size, space.values, space.work[0])
         elif span == rest and abs(offset) < 1e-7 * dt_cell:
             h = rest
-            turn(problem, tables.cell[0], tables.cell[1], state.x)
-            add_signals(problem, tables.cell_signal, state.x, now[T], space.six)
+            go_through(problem, tables, state.x, cell)
+        elif sampled and tables.fastest * span <= LONG_REACH:
+            h = span
+            go_on(problem, state.x, now[T], h, space.terms[0], space.six)
         else:
             level = level_within(tables, span)
             h = tables.h[level]
@@ -182,6 +216,8 @@ def fly(problem, tables, state, space, t_end, budget, out, dt, ledger):
             account_flight(problem, tables, state, space, h, space.x_new)
         now[T] = target if now[T] + h >= target else now[T] + h
         state.count[STEPS] += 1
+        if due < now[T]:
+            _sample(problem, state, space, begin, out, dt)
         if stop >= 0:
             return stop
     return -2

@@ -14,6 +14,8 @@ from solvers.kernels import copy, inlined, inner
 from solvers.vector import combine
 
 ORDER = 6
+_LONG = 14  # terms of a series that is exact to rounding up to |λ| x = LONG_REACH: 0.6^14/14! = 9e-15
+LONG_REACH = 0.6
 
 
 @inlined
@@ -34,22 +36,27 @@ def cell_of(problem, t):
     return cell, t - cell * dt
 
 
-@inner
-def signal_derivatives(problem, j, t, out):
-    """s, s', ..., s⁽⁵⁾ of node table j at time t."""
+@inlined
+def _quintic(problem, j, cell):
+    """Coefficients of node table j on a cell, in powers of the part of the cell."""
     dt = problem.table_dt[j]
-    cell, offset = cell_of(problem, t)
     row = problem.table_start[j] + cell
     a, b = problem.table[row], problem.table[row + 1]
     s1, s2 = a[1] * dt, 0.5 * a[2] * dt * dt
     e0 = b[0] - a[0] - s1 - s2
     e1 = b[1] * dt - s1 - 2.0 * s2
     e2 = 0.5 * b[2] * dt * dt - s2
-    c3 = 10.0 * e0 - 4.0 * e1 + e2
-    c4 = -15.0 * e0 + 7.0 * e1 - 2.0 * e2
-    c5 = 6.0 * e0 - 3.0 * e1 + e2
+    return a[0], s1, s2, 10.0 * e0 - 4.0 * e1 + e2, -15.0 * e0 + 7.0 * e1 - 2.0 * e2, 6.0 * e0 - 3.0 * e1 + e2
+
+
+@inner
+def signal_derivatives(problem, j, t, out):
+    """s, s', ..., s⁽⁵⁾ of node table j at time t."""
+    dt = problem.table_dt[j]
+    cell, offset = cell_of(problem, t)
+    s0, s1, s2, c3, c4, c5 = _quintic(problem, j, cell)
     x, r = offset / dt, 1.0 / dt
-    out[0] = a[0] + x * (s1 + x * (s2 + x * (c3 + x * (c4 + x * c5))))
+    out[0] = s0 + x * (s1 + x * (s2 + x * (c3 + x * (c4 + x * c5))))
     out[1] = r * (s1 + x * (2.0 * s2 + x * (3.0 * c3 + x * (4.0 * c4 + x * 5.0 * c5))))
     r *= 1.0 / dt
     out[2] = r * (2.0 * s2 + x * (6.0 * c3 + x * (12.0 * c4 + x * 20.0 * c5)))
@@ -83,6 +90,27 @@ def add_signals(problem, response, x, t, six):
 
 
 @inner
+def go_through(problem, tables, x, cell):
+    """Move the state through a whole cell of the sampled signals."""
+    size = 2 * problem.k.size
+    turn(problem, tables.cell[0], tables.cell[1], x)
+    for j in range(problem.table_dt.size):
+        r = 1.0 / problem.table_dt[j]
+        s0, s1, s2, c3, c4, c5 = _quintic(problem, j, cell)
+        s1, s2, c3, c4, c5 = r * s1, 2.0 * r**2 * s2, 6.0 * r**3 * c3, 24.0 * r**4 * c4, 120.0 * r**5 * c5
+        rows = tables.cell_signal[problem.table_load[j]]
+        for e in range(size):
+            x[e] += (
+                s0 * rows[0, e]
+                + s1 * rows[1, e]
+                + s2 * rows[2, e]
+                + c3 * rows[3, e]
+                + c4 * rows[4, e]
+                + c5 * rows[5, e]
+            )
+
+
+@inner
 def taylor(problem, x, t, terms, six):
     """Rows y, y', ..., y⁽⁶⁾ at time t in flight: y⁽ⁱ⁺¹⁾ = A y⁽ⁱ⁾ + load s⁽ⁱ⁾."""
     n = problem.k.size
@@ -108,6 +136,27 @@ def add_taylor(terms, x, span, size, weights, sums):
         weights[i + 1] = weights[i] * span / (i + 1.0)
     combine(terms, weights, ORDER + 1, None, sums)
     copy(sums, x, size)
+
+
+@inner
+def go_on(problem, x, t, span, term, six):
+    """Move the state x of a flight by ``span`` <= LONG_REACH/|λ|max within a cell: the series, y⁽ⁱ⁺¹⁾ from y⁽ⁱ⁾."""
+    n, weight = problem.k.size, 1.0
+    copy(x, term, 2 * n)
+    for j in range(problem.table_dt.size):
+        signal_derivatives(problem, j, t, six[j])
+    for i in range(_LONG - 1):
+        for b in range(n):
+            p, v = term[b], term[n + b]
+            term[b], term[n + b] = v, -problem.k[b] * p - problem.c[b] * v
+        if i < six.shape[1]:
+            for j in range(problem.table_dt.size):
+                load = problem.load[problem.table_load[j]]
+                for e in range(2 * n):
+                    term[e] += six[j, i] * load[e]
+        weight *= span / (i + 1.0)
+        for e in range(2 * n):
+            x[e] += weight * term[e]
 
 
 @inlined

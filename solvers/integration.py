@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from solvers.forcing import Forcing, hand_over
 from solvers.result import COLUMNS, ContactLog, Cost, Energy, Solution, SolverError, Status
 from solvers.state import CALLS, EVENTS, LOG_FULL, LOGGED, REJECTED, RUNNING, SAMPLED, STATUSES, STEPS, T, contact_row
-from solvers.system import ABOUT_LAWS, Array, Parameter, System
+from solvers.system import ABOUT_LAWS, Array, Parameter, System, times
 
 LAWS, SLOPES = ABOUT_LAWS
 _BUDGET = 20_000  # steps between two looks at the world outside
@@ -240,7 +240,7 @@ class _Run:
         else:
             x = self.out[: self._sampled(status)]
             t = np.arange(len(x)) * self.dt
-        motion = x[:, :size] @ self.engine.back.T
+        motion = times(x[:, :size], self.engine.back.T)
         powers = x[:, size:].copy()
         if not self.engine.keeps_ledger(self.dt is not None):
             powers[:, :2] = math.nan

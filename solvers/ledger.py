@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from solvers.flight import add_taylor, taylor
-from solvers.kernels import copy, dot, inner, table_value
+from solvers.kernels import copy, dot, inlined, inner, table_value
 from solvers.response import sample_signals
 from solvers.state import T, touching
 from solvers.tables import S, propagate
@@ -16,15 +16,34 @@ _SHORT = 0.15  # radians of the fastest block up to which order 6 and three poin
 
 
 @inner
-def _between(nodes, exponent, values, sigma):
-    """Value at σ of σ^exponent × the polynomial through the node values."""
-    total = 0.0
+def _scales(nodes, exponent, plain, weighted):
+    """1/Π (σ_j - σ_i), and the same over σ_j^exponent."""
     for j in range(S):
-        term = values[j] * (sigma / nodes[j]) ** exponent if exponent > 0.0 else values[j]
+        product = 1.0
         for i in range(S):
             if i != j:
-                term *= (sigma - nodes[i]) / (nodes[j] - nodes[i])
-        total += term
+                product *= nodes[j] - nodes[i]
+        plain[j] = 1.0 / product
+        weighted[j] = plain[j] / nodes[j] ** exponent if exponent > 0.0 else plain[j]
+
+
+@inner
+def _products(nodes, sigma, out):
+    """Π (σ - σ_i) without i = j, for every j."""
+    for j in range(S):
+        product = 1.0
+        for i in range(S):
+            if i != j:
+                product *= sigma - nodes[i]
+        out[j] = product
+
+
+@inlined
+def _between(products, scales, values):
+    """Value of the polynomial through the node values."""
+    total = 0.0
+    for j in range(S):
+        total += products[j] * scales[j] * values[j]
     return total
 
 
@@ -53,17 +72,23 @@ def inside(problem, tables, state, space, family, h, span, row):
         row[n + b] = alpha * v - beta * (problem.k[b] * p + problem.c[b] * v)
     if problem.table_dt.size == 0 and not touching(state):
         return
+    exponent = 2.0 * tables.exponent[family - 1] if entry else 0.0  # of the force of the stop entered
+    nodes, plain, weighted, products = tables.nodes[family], space.work[0], space.work[1], space.work[2]
+    _scales(nodes, exponent, plain, weighted)
     end = math.sqrt(span / h) if entry else span / h
     panels = 1 + int(tables.fastest * span / 4.0)
     for g in range(panels * S):
         sigma = end * (g // S + tables.nodes[0, g % S]) / panels
         time = h * sigma * sigma if entry else h * sigma
         measure = end * tables.weights[0, g % S] / panels * h * (2.0 * sigma if entry else 1.0)
+        _products(nodes, sigma, products)
         for u in range(stops + problem.load.shape[0]):
             if u < stops and state.piece[u] == 0:
                 continue
-            exponent = 2.0 * tables.exponent[u] if entry and u == family - 1 else 0.0
-            impulse = measure * _between(tables.nodes[family], exponent, space.force[u], sigma)
+            if entry and u == family - 1:
+                impulse = measure * sigma**exponent * _between(products, weighted, space.force[u])
+            else:
+                impulse = measure * _between(products, plain, space.force[u])
             push = problem.push[u] if u < stops else problem.load[u - stops]
             for b in range(n):
                 alpha, beta = propagate(problem.k[b], problem.c[b], span - time)
@@ -71,7 +96,7 @@ def inside(problem, tables, state, space, family, h, span, row):
                 row[b] += alpha * p + beta * v
                 row[n + b] += alpha * v - beta * (problem.k[b] * p + problem.c[b] * v)
             if u < stops:
-                row[2 * n + 2 + 2 * u] += impulse * _between(tables.nodes[family], 0.0, space.motion[u, 1], sigma)
+                row[2 * n + 2 + 2 * u] += impulse * _between(products, plain, space.motion[u, 1])
                 row[2 * n + 3 + 2 * u] += impulse
 
 

@@ -22,6 +22,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+_ONE_THREAD = 200_000  # multiplications below which BLAS stays on one thread
 Array = NDArray[np.float64]
 ABOUT_LAWS = "laws are finite", "slopes are finite"  # what is kept of a system's laws once it was looked at
 
@@ -205,7 +206,7 @@ class System:
 def stored_energy(M: Any, K: Any, q: Array, q_dot: Array) -> Array:
     """½ q'ᵀ M q' + ½ qᵀ K q of (..., n) arrays; inf of a run that diverged."""
     with np.errstate(over="ignore", invalid="ignore"):
-        return 0.5 * sum(np.einsum("...i,...i", x @ matrix, x) for x, matrix in ((q_dot, M), (q, K)))
+        return 0.5 * sum(np.einsum("...i,...i", times(x, matrix), x) for x, matrix in ((q_dot, M), (q, K)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,6 +245,17 @@ def require_step(name: str, value: float) -> None:
     """ValueError for a step that is none."""
     if not 0.0 < value < np.inf:
         raise ValueError(f"{name} must be positive and finite (s), got {value!r}")
+
+
+def times(rows: Array, matrix: Any) -> Array:
+    """Rows (..., n) times a matrix (n, m), many of them in pieces too small for BLAS to spread over threads.
+
+    Threads gain nothing on such thin arrays, and where other work fills the cores one waits for the other.
+    """
+    piece = max(1, _ONE_THREAD // max(1, math.prod(matrix.shape)))
+    if rows.ndim != 2 or len(rows) <= piece:
+        return rows @ matrix
+    return np.concatenate([rows[i : i + piece] @ matrix for i in range(0, len(rows), piece)])
 
 
 def dense(matrix: Any) -> Array:

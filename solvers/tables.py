@@ -421,18 +421,30 @@ def _responses(problem: Problem, h: Any, families: _Families, inputs: Any) -> tu
 
 
 def _signals(problem: Problem, h: Any) -> Any:
-    """State change (len(h), L, 6, 2N) by loads t^k/k!, k = 0..5: φ-functions by Taylor series and doubling."""
-    loads, size = len(problem.load), len(problem.k)
-    out = np.zeros((len(h), loads, 6, 2 * size))
+    """State change (len(h), L, 6, 2N) by loads t^k/k!, k = 0..5; those asked for lately are kept."""
     if not np.any(problem.load):
-        return out
+        return np.zeros((len(h), len(problem.load), 6, 2 * len(problem.k)))
+    return _polynomial_responses(*(array.tobytes() for array in (problem.k, problem.c, problem.load, h)))
+
+
+@lru_cache(maxsize=16)
+def _polynomial_responses(stiffnesses: bytes, dampings: bytes, load: bytes, steps: bytes) -> Any:
+    """The same from the arrays' bytes: φ-functions by Taylor series and doubling."""
+    h, stiffness, damping = (np.frombuffer(part) for part in (steps, stiffnesses, dampings))
+    size = len(stiffness)
+    rows = np.frombuffer(load).reshape(-1, 2, size)
+    loads = len(rows)
+    out = np.zeros((len(h), loads, 6, 2 * size))
     A = np.zeros((size, 2, 2))
-    A[:, 0, 1], A[:, 1, 0], A[:, 1, 1] = 1.0, -problem.k, -problem.c
-    vectors = problem.load.reshape(loads, 2, size).transpose(0, 2, 1)  # (L, N, 2)
+    speed = np.where(stiffness > 0.0, np.sqrt(stiffness), 1.0)  # unit of rates: fewer halvings, less rounding in φ
+    A[:, 0, 1], A[:, 1, 0], A[:, 1, 1] = speed, -stiffness / speed, -damping
+    vectors = np.stack((rows[:, 0], rows[:, 1] / speed), axis=2)  # (L, N, 2)
     phi = _phi(h[:, None, None, None] * A)
     for k in range(6):
         change = np.einsum("hnab,lnb->hlan", phi[k + 1], vectors) * (h ** (k + 1))[:, None, None, None]
         out[:, :, k] = change.reshape(len(h), loads, 2 * size)
+    out[..., size:] *= speed
+    out.setflags(write=False)
     return out
 
 

@@ -1,6 +1,7 @@
 """Ensembles: the same bits whatever computes them, in whatever order, however often interrupted."""
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -175,6 +176,24 @@ def test_two_dask_workers_one_killed(tmp_path, alone):
             assert wait_for(path.exists)
             os.kill(pids[0], signal.SIGKILL)
             assert same(result.result(300), alone)
+
+
+def test_mpi_gives_the_same_bits(tmp_path, alone):
+    pytest.importorskip("mpi4py.futures", reason="mpi4py is not installed")
+    mpiexec = shutil.which("mpiexec", path=f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
+    if mpiexec is None:
+        pytest.skip("no mpiexec")
+    path, script = tmp_path / "kept.npz", tmp_path / "by_mpi.py"
+    script.write_text(
+        "import mpi4py.futures, test_ensemble as t\n"
+        "with mpi4py.futures.MPIPoolExecutor() as pool:\n"
+        f"    t.ensemble(t.small_model(), 12, t.slow_peaks, pool, {str(path)!r})\n"
+    )
+    command = [mpiexec, "-n", "3", sys.executable, "-m", "mpi4py.futures", str(script)]
+    places = os.pathsep.join([str(HERE), os.environ.get("PYTHONPATH", "")])
+    subprocess.run(command, env={**os.environ, "PYTHONPATH": places}, check=True, timeout=300)
+    assert len(np.load(path)["value peak"]) == 12
+    assert same(ensemble(small_model(), 12, slow_peaks, checkpoint=path), alone)
 
 
 def test_a_broken_pool_is_told_and_resumed(tmp_path, alone, monkeypatch):

@@ -215,6 +215,46 @@ def test_samples_do_not_change_the_run():
         assert final_difference(sampled, plain) < 1e-9  # flight steps differ, so rounding does
 
 
+def noisy(seed, n=2):
+    """The paper's beam under its broad-band noise."""
+    noise = fb.BandNoise(2.5e-4, (0.0, 1226.6), seed=seed)
+    return paper_scene(noise, (0.02,) + (0.01,) * (n - 1)).reduce(n).lasting(10.0).system
+
+
+@pytest.mark.parametrize("dt", [4.9e-4, 1e-4, 1e-5])
+def test_samples_within_flight_steps_change_no_bit(dt):
+    plain, sampled = (at_rest(noisy(3), 0.1, Exponential(1e-8, ledger=False), step) for step in (None, dt))
+    assert len(plain.contacts) >= 3
+    for name in COLUMNS:
+        assert np.array_equal(getattr(sampled.contacts, name), getattr(plain.contacts, name)), name
+
+
+@pytest.mark.parametrize("fastest", [500.0, 3e4])
+@pytest.mark.parametrize("dt", [3.1e-3, 7e-4, 1.3e-5])
+def test_samples_of_a_flight_under_noise_are_the_states_of_runs_that_end_there(fastest, dt):
+    noise = fb.BandNoise(1.0, (0.0, 1226.6), seed=1)
+    system = System.modal([109.1, fastest], 0.01, [], [([1.0, -2.0], noise)])
+    whole = integrate(system, [0.1, 0.0], [0.0, 1.0], 100 * dt, dt, Exponential(1e-8, ledger=False))
+    for k in (1, 2, 57, 99):
+        ended = integrate(system, [0.1, 0.0], [0.0, 1.0], k * dt, method=Exponential(1e-8))
+        np.testing.assert_allclose(whole.q[k], ended.q[0], rtol=0, atol=1e-11 * np.abs(whole.q).max())
+        np.testing.assert_allclose(whole.q_dot[k], ended.q_dot[0], rtol=0, atol=1e-11 * np.abs(whole.q_dot).max())
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_indentation_under_noise_is_within_rtol(seed):
+    """The table of the noise and the contacts together, through three contacts."""
+    system, duration, dt = noisy(seed), 0.15, 1e-3
+    theirs = at_rest(system, duration, DormandPrince(1e-12), dt)
+    entered = np.sort(theirs.contacts.t_in)
+    early = theirs.t < (entered[3] if len(entered) > 3 else duration)
+    row = system.contacts[0].direction
+    for rtol in (1e-4, 1e-6):
+        ours = at_rest(system, duration, Exponential(rtol, ledger=False), dt)
+        error = np.abs((ours.q - theirs.q) @ row)[early].max()
+        assert error < 0.5 * rtol * np.abs(theirs.q @ row).max()
+
+
 def test_peak_of_a_contact_under_way_is_that_reached_so_far():
     run = integrate(free_mass(Hertz(1e6)), [0.0], [-0.3], 1e-4, method=Exponential(1e-10))
     assert run.contacts.peak_indentation[0] == pytest.approx(-run.q[0, 0], rel=1e-9)

@@ -1,6 +1,7 @@
 """Figures: what they show, without a display."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -92,7 +93,14 @@ def test_random_figures_have_units_bands_and_confidence():
     signal = statistics.Signal(x, 1e-3, 256)
     for part in np.split(x, 8):
         signal.add(part)
-    branches = {"broad": {"period 1": (np.array([100.0, 200.0]), np.array([1e-3, 2e-3]))}}
+    orbits = [SimpleNamespace(extremes=lambda z: (-2e-3, 1e-3), mark=None) for _ in range(3)]
+    model = SimpleNamespace(scene=SimpleNamespace(stops=[SimpleNamespace(z=0.25)]))
+    one = SimpleNamespace(
+        family=SimpleNamespace(model=model, period=2, name="base.omega"),
+        **{"parameter": np.array([100.0, 150.0, 200.0]), "stable": np.array([True, False, True])},
+        **{"orbits": orbits, "special": []},
+    )
+    branches = {"broad": [one]}
     panels = {"broad": {"δ": signal, "mid": signal.psd}, "narrow": {"δ": signal.psd}}
     figure = plot.random_spectra(panels, 1000.0, {"narrow": (100.0, 200.0)}, branches)
     assert len(figure.axes) == 4
@@ -101,8 +109,9 @@ def test_random_figures_have_units_bands_and_confidence():
         "ω / rad s⁻¹",
         "broad",
         "narrow",
-        "period 1",
-        "largest |δ| of periodic motion / mm",
+        "period 2",
+        "unstable",
+        "max |u| at the stop / mm",
     ):
         assert word in texts(figure)
     assert len(plot.random_spectra(panels, 1000.0).axes) == 2

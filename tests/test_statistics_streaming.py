@@ -41,6 +41,18 @@ def test_pieces_give_the_statistics_of_the_whole(segment):
     np.testing.assert_allclose(np.sum(density) * (x_bins[1] - x_bins[0]), 1 - signal.outside, rtol=1e-12)
 
 
+def test_equal_bins_count_as_searched_ones():
+    x = np.concatenate((coloured(2), [-1e9, 1e9]))
+    first = x[:3000]
+    equal = Signal(first, 0.1, 64)
+    searched = Signal(first, 0.1, 64, bins=equal.edges)
+    for signal in (equal, searched):
+        signal.add(x)
+    moved = np.abs(equal.pdf.density - searched.pdf.density).sum() * np.diff(equal.edges)[0] * x.size
+    assert moved < 4.5  # the smallest and the largest of the first samples lie on edges
+    assert equal.outside == searched.outside > 0.0
+
+
 def test_a_cut_starts_a_new_segment_and_no_crossing():
     signal = Signal(np.array([-1.0, 1.0]), 0.1, 8)
     for part in (-np.ones(12), np.ones(12)):
@@ -193,7 +205,7 @@ def test_hertz_stop_under_wide_band_noise_has_the_exact_density(modes):
         forces=[fb.PointForce(0.5, noise)],
         stops=[fb.Stop(0.5, law=Hertz(K))],
     )
-    found = stationary(model, 500.0, 2e-3, solver=QUICK)
+    found = stationary(model, 1000.0, 2e-3, solver=QUICK)
     phi = model.phi(0.5)
     sigma, rate = math.sqrt(theta * np.sum(phi**2 / model.omega**2)), math.sqrt(theta * np.sum(phi**2))
     delta = np.linspace(-9 * sigma, 9 * sigma, 200_001)
@@ -203,9 +215,7 @@ def test_hertz_stop_under_wide_band_noise_has_the_exact_density(modes):
     bias = c * np.sum(phi**2) / (math.pi * top)
     assert bias < 0.003
     within(found["δ"].mean, mean)
-    spread = found["δ"].variance
-    assert spread.relative < 0.02
-    assert abs(spread.value - np.trapezoid((delta - mean) ** 2 * p, delta)) < 4 * spread.standard_error
+    within(found["δ"].variance, np.trapezoid((delta - mean) ** 2 * p, delta))
     within(found.impacts[0].probability, np.trapezoid(np.where(delta > 0.0, p, 0.0), delta), bias)
     within(found.impacts[0].rate, np.interp(0.0, delta, p) * rate / math.sqrt(2 * math.pi), bias)
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fembeam.plot.orbits import branch
 from fembeam.plot.response import BLUE, GREY, RED, _fit_levels, _sheet, styled
 from fembeam.statistics import Spectrum
 
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from fembeam.branch import Branch
     from fembeam.statistics import Signal
 
 Vector = NDArray[np.float64]
@@ -27,7 +29,7 @@ def random_spectra(
     panels: Mapping[str, Mapping[str, Spectrum | Signal]],
     omega_max: float,
     bands: Mapping[str, tuple[float, float]] | None = None,
-    branches: Mapping[str, Mapping[str, tuple[Vector, Vector]]] | None = None,
+    branches: Mapping[str, Sequence[Branch]] | None = None,
 ) -> Figure:
     """Power spectral densities, one panel each, with 95 % confidence shaded where it is known.
 
@@ -36,7 +38,7 @@ def random_spectra(
     panels : title -> label -> spectrum (m² per rad/s), or the signal it is of.
     omega_max : rad/s, end of the axes.
     bands : title -> excited band in rad/s, marked on top of its panel.
-    branches : title -> label -> (ω, largest δ in m) of periodic solutions, drawn beside the panel of that title.
+    branches : title -> branches of periodic motion along ω, drawn beside the panel of that title.
     """
     columns = 2 if branches else 1
     figure, axes = _sheet(None, len(panels), columns, (4.6 * columns + 2.4, 2.1 * len(panels) + 0.5), squeeze=False)
@@ -52,7 +54,7 @@ def random_spectra(
         if len(lines) > 1:
             axis.legend(loc="upper right")
         if branches:
-            _branches(axes[row * columns + 1], branches.get(title, {}), omega_max)
+            _beside(axes[row * columns + 1], branches.get(title), omega_max)
     for axis in axes[-columns:]:
         axis.set_xlabel("ω / rad s⁻¹")
     return figure
@@ -91,10 +93,8 @@ def _ribbon(axis: Axes, x: Vector, y: Vector, error: Vector, colour: str) -> Non
     axis.fill_between(x, np.maximum(y - SURE * error, 0.05 * y), y + SURE * error, color=colour, alpha=0.3, linewidth=0)
 
 
-def _branches(axis: Axes, curves: Mapping[str, tuple[Vector, Vector]], omega_max: float) -> None:
-    """Largest indentations of periodic solutions against the drive's frequency."""
-    for label, (omega, largest) in curves.items():
-        axis.plot(omega, 1e3 * np.asarray(largest), label=label)
-    axis.set(xlim=(0, omega_max), ylabel="largest |δ| of periodic motion / mm")
-    if curves:
-        axis.legend(loc="upper right")
+def _beside(axis: Axes, several: Sequence[Branch] | None, omega_max: float) -> None:
+    """Periodic motion that explains a spectrum, on the same frequencies."""
+    if several:
+        branch(several, axes=axis)
+    axis.set(title="periodic motion", xlim=(0, omega_max), ylim=(0, None), xlabel="", ylabel="max |u| at the stop / mm")

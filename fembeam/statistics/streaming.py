@@ -45,6 +45,7 @@ class Signal:
     def __init__(self, first: Vector, dt: float, segment: int, level: float = 0.0, bins: Vector | None = None) -> None:
         self.dt, self.level, self.origin = dt, level, float(np.mean(first))
         self.edges = _edges_around(first) if bins is None else np.asarray(bins, dtype=np.float64)
+        self._equal = bins is None  # by multiplication, several times quicker than by search
         self.welch = Welch(segment, dt)
         self._welch_at = PLAIN + self.edges.size + 1
         self.batches = Batches(self._welch_at + self.welch.size)
@@ -69,13 +70,18 @@ class Signal:
         steps = np.concatenate(([] if self._last is None else [self._last[0]], x)) - self.level
         slopes = None if rate is None else np.concatenate(([] if self._last is None else [self._last[1]], rate))
         row[TIME], row[CROSSINGS] = self.dt * (steps.size - 1), up_crossings(steps, slopes, self.dt)
-        row[PLAIN : self._welch_at] = np.bincount(
-            np.searchsorted(self.edges, x, side="right"), minlength=self.edges.size + 1
-        )
+        row[PLAIN : self._welch_at] = np.bincount(self._bin_of(x), minlength=self.edges.size + 1)
         row[self._welch_at :] = self.welch.sums(centred)
         self.batches.add(row)
         self._last = float(x[-1]), math.nan if rate is None else float(rate[-1])
         self.smallest, self.largest = min(self.smallest, float(x.min())), max(self.largest, float(x.max()))
+
+    def _bin_of(self, x: Vector) -> NDArray[np.int64]:
+        """Number of the bin of each sample: 0 below the first edge, the number of edges above the last one."""
+        if not self._equal:
+            return np.searchsorted(self.edges, x, side="right")
+        number = (x - self.edges[0]) * ((self.edges.size - 1) / (self.edges[-1] - self.edges[0])) + 1.0
+        return np.clip(number, 0.5, self.edges.size + 0.5).astype(np.int64)
 
     @property
     def mean(self) -> Estimate:

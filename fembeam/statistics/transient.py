@@ -77,8 +77,9 @@ def settling(x: ArrayLike, dt: float, memory: float) -> Settling:
 
 def _truncation(z: NDArray[np.float64]) -> int:
     """Batches to leave out, at most half of them."""
-    cuts = range(len(z) // 2 + 1)
-    return int(np.argmin([z[d:].var() / (len(z) - d) for d in cuts]))
+    left = len(z) - np.arange(len(z) // 2 + 1)
+    first, second = (np.cumsum((z - z.mean())[::-1] ** k)[::-1][: left.size] / left for k in (1, 2))
+    return int(np.argmin((second - first**2) / left))
 
 
 def _drift(z: NDArray[np.float64]) -> float:
