@@ -281,7 +281,7 @@ class Model:
     def simulate(
         self,
         duration: float,
-        dt: float | None = None,
+        dt: float | ArrayLike | None = None,
         start: ArrayLike | None = None,
         solver: Any = None,
         progress: bool = False,
@@ -291,7 +291,8 @@ class Model:
         Parameters
         ----------
         duration : s.
-        dt : output sampling in s; None keeps the final state and the contact log only.
+        dt : output sampling in s, or the output times themselves, increasing; None keeps the final state and the
+            contact log only.
         start : (2n,) as made by `rest`, `state` or `equilibrium`; None is rest.
         solver : one of the methods in `solvers`; None is the library's best.
         progress : show a bar (only on a terminal).

@@ -132,25 +132,28 @@ def _energetic(problem, norms):
 
 
 @inlined
-def _target(tables, t, due, dt, t_end, ledger):
+def _target(tables, t, first, second, t_end, ledger):
     """Where a step must end: at an output time unless that is near enough to be evaluated from the step's start."""
-    if ledger or tables.fastest * (due - t) > LONG_REACH:
-        return min(due, t_end)
-    return t_end if tables.fastest * dt <= LONG_REACH else min(due + dt, t_end)
+    if ledger or tables.fastest * (first - t) > LONG_REACH:
+        return min(first, t_end)
+    return t_end if tables.fastest * (second - first) <= LONG_REACH else min(second, t_end)
 
 
 @inner
-def _sample(problem, state, space, t, out, dt):
+def _sample(problem, tables, state, space, t, out, due):
     """Outputs before the end of the step that began at t with the state in ``space.x_new``."""
-    while state.count[SAMPLED] < out.shape[0] and state.count[SAMPLED] * dt < state.now[T]:
-        due = state.count[SAMPLED] * dt
-        go_on(problem, space.x_new, t, due - t, space.terms[0], space.six)
+    while due[state.count[SAMPLED]] < state.now[T]:
+        wanted = due[state.count[SAMPLED]]
+        parts = max(1, int(np.ceil(tables.fastest * (wanted - t) / LONG_REACH)))
+        for i in range(parts):
+            span = (wanted - t) / parts
+            go_on(problem, space.x_new, t + i * span, span, space.terms[0], space.six)
         copy(space.x_new, out[state.count[SAMPLED]], state.x.size)
-        state.count[SAMPLED], t = state.count[SAMPLED] + 1, due
+        state.count[SAMPLED], t = state.count[SAMPLED] + 1, wanted
 
 
 @merged
-def fly(problem, tables, state, space, t_end, budget, out, dt, ledger):
+def fly(problem, tables, state, space, t_end, budget, out, due, ledger):
     """Fly until a stop is reached (returns its index), the end (-1), or the budget is spent (-2).
 
     With an energy ledger steps end on the output times too; else these are evaluated from the start of a step.
@@ -160,15 +163,16 @@ def fly(problem, tables, state, space, t_end, budget, out, dt, ledger):
     sampled = problem.table_dt.size > 0
     dt_cell = problem.table_dt[0] if sampled else np.inf
     for count in range(budget):
-        if state.count[SAMPLED] < out.shape[0] and state.count[SAMPLED] * dt <= now[T]:
+        if due[state.count[SAMPLED]] <= now[T]:
             copy(state.x, out[state.count[SAMPLED]], state.x.size)
             state.count[SAMPLED] += 1
         if now[T] >= t_end:
             return -1
 
         # --- how far the output, the end and the signals' cell allow
-        due = state.count[SAMPLED] * dt if state.count[SAMPLED] < out.shape[0] else np.inf
-        target = _target(tables, now[T], due, dt, t_end, ledger)
+        first = due[state.count[SAMPLED]]
+        second = due[min(state.count[SAMPLED] + 1, out.shape[0])]
+        target = _target(tables, now[T], first, second, t_end, ledger)
         begin, span, rest, offset, cell = now[T], target - now[T], np.inf, 0.0, 0
         if sampled:
             cell, offset = cell_of(problem, now[T])
@@ -182,7 +186,7 @@ def fly(problem, tables, state, space, t_end, budget, out, dt, ledger):
         span = min(span, rest)
         if ledger:
             span = min(span, 3.0 / _energetic(problem, space.norms))
-        if ledger or due <= begin + span:
+        if ledger or first <= begin + span:
             copy(state.x, space.x_new, state.x.size)
 
         # --- how far no stop can be reached
@@ -216,8 +220,8 @@ def fly(problem, tables, state, space, t_end, budget, out, dt, ledger):
             account_flight(problem, tables, state, space, h, space.x_new)
         now[T] = target if now[T] + h >= target else now[T] + h
         state.count[STEPS] += 1
-        if due < now[T]:
-            _sample(problem, state, space, begin, out, dt)
+        if first < now[T]:
+            _sample(problem, tables, state, space, begin, out, due)
         if stop >= 0:
             return stop
     return -2

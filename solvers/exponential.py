@@ -72,6 +72,7 @@ from solvers.tables import S, Tables
 from solvers.vector import combine
 
 _REAL = types.float64
+_VECTOR = types.Array(_REAL, 1, "C")
 _MATRIX = types.Array(_REAL, 2, "C")
 SCALE, DURATION, SHARE = range(
     3
@@ -132,7 +133,7 @@ def _nearest_surface(problem, state):
 
 
 @inner
-def _land(problem, tables, state, space, numbers, stop, direction, near, rtol, t_end, out, dt, ledger):
+def _land(problem, tables, state, space, numbers, stop, direction, near, rtol, t_end, out, due, ledger):
     """Try to land on the border ahead by one regular step; whether it succeeded."""
     size, t = state.x.size, state.now[T]
     delta = indentation(problem, stop, state.x)
@@ -172,7 +173,7 @@ def _land(problem, tables, state, space, numbers, stop, direction, near, rtol, t
             if abs(late) > 1e-15 * landed and abs(pace) < np.inf and tries < _MOST_TRIES:
                 length -= late * pace
                 continue
-            if state.count[SAMPLED] < out.shape[0] and time == state.count[SAMPLED] * dt:
+            if time == due[state.count[SAMPLED]]:
                 copy(x, out[state.count[SAMPLED]], size)
                 state.count[SAMPLED] += 1
             if time == t_end:
@@ -181,7 +182,7 @@ def _land(problem, tables, state, space, numbers, stop, direction, near, rtol, t
                 copy(x, state.x, size)
                 state.now[T] = t_end
                 return True
-        time = min(state.count[SAMPLED] * dt, t_end) if state.count[SAMPLED] < out.shape[0] else t_end
+        time = min(due[state.count[SAMPLED]], t_end)
         if time > landed:
             if state.tape.shape[0]:
                 tape(state, LANDING, t, landed, span, variable, stop, w)
@@ -231,20 +232,20 @@ def _try(problem, tables, state, space, numbers, last, family, level, rtol):
 
 
 @inner
-def _record(problem, tables, state, space, family, level, t_end, out, dt, ledger):
+def _record(problem, tables, state, space, family, level, t_end, out, due, ledger):
     """Samples inside the converged step, and the state at the end of the run if that lies inside."""
     t, h = state.now[T], tables.step[level]
     while True:
-        due = state.count[SAMPLED] < out.shape[0] and state.count[SAMPLED] * dt <= min(t + h, t_end)
-        if not due and t + h < t_end:
+        sampled = due[state.count[SAMPLED]] <= min(t + h, t_end)
+        if not sampled and t + h < t_end:
             return
-        span = state.count[SAMPLED] * dt - t if due else t_end - t
-        row = out[state.count[SAMPLED]] if due else space.work[17]
+        span = due[state.count[SAMPLED]] - t if sampled else t_end - t
+        row = out[state.count[SAMPLED]] if sampled else space.work[17]
         copy(state.x, row, state.x.size)
         inside(problem, tables, state, space, family, h, span, row)
         if ledger:
             account(problem, tables, state, space, family, h, span, state.x, row)
-        if not due:
+        if not sampled:
             return
         state.count[SAMPLED] += 1
 
@@ -260,7 +261,7 @@ def _latest(state):
 
 
 @merged
-def touch(problem, tables, state, space, numbers, last, t_end, rtol, log, out, dt, ledger):
+def touch(problem, tables, state, space, numbers, last, t_end, rtol, log, out, due, ledger):
     """One accepted step in contact: land if a border is near, else collocate; returns a status code."""
     near, stop, direction = _nearest_surface(problem, state)
     if near <= 0.0 and switch_on_surface(problem, state, log, True):
@@ -270,7 +271,7 @@ def touch(problem, tables, state, space, numbers, last, t_end, rtol, log, out, d
     if (
         stop >= 0
         and not last[FRESH]
-        and _land(problem, tables, state, space, numbers, stop, direction, near, rtol, t_end, out, dt, ledger)
+        and _land(problem, tables, state, space, numbers, stop, direction, near, rtol, t_end, out, due, ledger)
     ):
         state.count[STEPS] += 1
         if state.now[T] < t_end:
@@ -299,8 +300,8 @@ def touch(problem, tables, state, space, numbers, last, t_end, rtol, log, out, d
         state.count[REJECTED] += 1
     end = state.now[T] + tables.step[level]
     ends = end >= t_end
-    if ends or dt * state.count[SAMPLED] <= end:
-        _record(problem, tables, state, space, family, level, t_end, out, dt, ledger)
+    if ends or due[state.count[SAMPLED]] <= end:
+        _record(problem, tables, state, space, family, level, t_end, out, due, ledger)
     if ends:
         share = (t_end - state.now[T]) / tables.step[level]
         peaks_so_far(problem, tables, state, space, family, share, space.work[17])
@@ -346,11 +347,14 @@ def _adapt(tables, numbers, last, level, family, wanted, error):
 
 
 @njit(
-    types.int64(*[types.int64] * 4, _REAL, types.int64, _REAL, _MATRIX, _MATRIX, _REAL, types.boolean),
+    types.int64(*[types.int64] * 4, _REAL, types.int64, _REAL, _MATRIX, _MATRIX, _VECTOR, types.boolean),
     **OPTIONS,
 )
-def advance(problem_at, tables_at, state_at, space_at, t_end, budget, rtol, log, out, dt, ledger):
-    """Advance the state to ``t_end`` or for about ``budget`` steps; returns a status code."""
+def advance(problem_at, tables_at, state_at, space_at, t_end, budget, rtol, log, out, due, ledger):
+    """Advance the state to ``t_end`` or for about ``budget`` steps; returns a status code.
+
+    ``out`` gets the states at the times ``due``, the last of which is infinite.
+    """
     problem, tables, state, space = _problem(problem_at), _tables(tables_at), _state(state_at), _space(space_at)
     numbers, last = space.numbers, space.last
     if not last[BEGUN]:
@@ -374,11 +378,11 @@ def advance(problem_at, tables_at, state_at, space_at, t_end, budget, rtol, log,
                 _begin(problem, tables, state, space, numbers, last, _latest(state))
             continue
         if touching(state):
-            code = touch(problem, tables, state, space, numbers, last, t_end, rtol, log, out, dt, ledger)
+            code = touch(problem, tables, state, space, numbers, last, t_end, rtol, log, out, due, ledger)
             if code != RUNNING:
                 return code
             continue
-        stop = fly(problem, tables, state, space, t_end, budget, out, dt, ledger)
+        stop = fly(problem, tables, state, space, t_end, budget, out, due, ledger)
         if stop >= 0:
             switch(problem, state, stop, np.int64(1), log)  # a literal would be compiled for itself
             _begin(problem, tables, state, space, numbers, last, stop)
@@ -460,9 +464,9 @@ class Engine:
         """Whether input and damping of the energy ledger are known."""
         return self.method.ledger and sampled
 
-    def march(self, budget: int, log: Array, out: Array, dt: float) -> int:
+    def march(self, budget: int, log: Array, out: Array, due: Array) -> int:
         """Go on for a stretch."""
         return advance(
             *(*self.addresses, self.duration, budget, self.method.rtol),
-            *(log, out, dt, self.keeps_ledger(len(out) > 0)),
+            *(log, out, due, self.keeps_ledger(len(out) > 0)),
         )

@@ -71,7 +71,7 @@ class MatrixEngine:
         """The ledger is integrated along, always."""
         return True
 
-    def march(self, budget: int, log: Array, out: Array, dt: float) -> int:
+    def march(self, budget: int, log: Array, out: Array, due: Array) -> int:
         """Go on for a stretch; the loop of `solvers.march.march` for a constant step."""
         state, space, method, t_end = self.state, self.space, self.method, self.duration
         for _ in range(budget):
@@ -93,7 +93,7 @@ class MatrixEngine:
                     state.count[REJECTED] += 1
                     continue
             at_end = stop < 0 and h == tried and h >= t_end - state.now[T]
-            code = accept(self.problem, state, space, h, stop, direction, at_end, t_end, log, out, dt)
+            code = accept(self.problem, state, space, h, stop, direction, at_end, t_end, log, out, due)
             if code != RUNNING:
                 return int(code)
             if stop >= 0:

@@ -24,6 +24,7 @@ from solvers.system import ABOUT_LAWS, Array, Parameter, System, times
 LAWS, SLOPES = ABOUT_LAWS
 _BUDGET = 20_000  # steps between two looks at the world outside
 _MOST_SAMPLES = 500_000_000
+_NEVER = np.array([math.inf])  # no output is due
 
 
 def integrate(
@@ -31,7 +32,7 @@ def integrate(
     q0: ArrayLike,
     q_dot0: ArrayLike,
     duration: float,
-    dt: float | None = None,
+    dt: float | ArrayLike | None = None,
     method: Any = None,
     tangent: bool | Parameter = False,
     *,
@@ -45,7 +46,8 @@ def integrate(
     system : the problem.
     q0, q_dot0 : (n,) initial coordinates and rates; not changed.
     duration : s, > 0.
-    dt : output sampling, s; None keeps the final state and the contact log only.
+    dt : output sampling, s, or the output times themselves, increasing, within [0, duration]: a contact can so be
+        looked at as closely as one likes. None keeps the final state and the contact log only.
     method : `Exponential`, `DormandPrince`, `HenonRK2`, `RK4`, `CentralDifference`, `Newmark` or `GeneralizedAlpha`;
         None takes ``Exponential(rtol=1e-8)``.
     tangent : True adds the derivative of the final [q, q̇] with respect to [q0, q_dot0], (2n, 2n), to the solution; a
@@ -88,17 +90,17 @@ def integrate(
 
 
 def prepared_run(
-    system: System, q0: ArrayLike, q_dot0: ArrayLike, duration: float, dt: float | None, method: Any, tangent: Any
+    system: System, q0: ArrayLike, q_dot0: ArrayLike, duration: float, dt: Any, method: Any, tangent: Any
 ) -> _Run:
     """A run ready to start, everything checked."""
     if not hasattr(method, "engine") or isinstance(method, type):
         raise TypeError(f"method must be one of solvers, made with its settings, such as Exponential(), got {method!r}")
     _check_tangent(tangent, method, system)
     z = _start(system, q0, q_dot0, method)
-    samples = _samples(duration, dt)
+    times = _times(duration, dt)
     _check_laws(system)
     forcing = _forcing(system, duration, min(max(method.rtol, 1e-12), 1e-6))
-    return _Run(system, method.engine(system, z, forcing, duration), dt, samples, tangent)
+    return _Run(system, method.engine(system, z, forcing, duration), times, tangent)
 
 
 def _check_tangent(tangent: Any, method: Any, system: System) -> None:
@@ -146,18 +148,30 @@ def _start(system: System, q0: ArrayLike, q_dot0: ArrayLike, method: Any) -> Arr
     return system.blocks.inverse @ start
 
 
-def _samples(duration: float, dt: float | None) -> int:
-    """Number of output samples, both ends included."""
+def _times(duration: float, dt: Any) -> Array | None:
+    """Output times of a sampling, or those given; None for none."""
     if not 0.0 < duration < math.inf:
         raise ValueError(f"duration must be positive and finite (s), got {duration!r}")
     if dt is None:
-        return 0
+        return None
+    if np.ndim(dt) > 0:
+        return _given_times(duration, dt)
     if not 0.0 < dt < math.inf:
         raise ValueError(f"dt must be positive and finite (s), got {dt!r}")
     count = math.floor(duration / dt * (1.0 + 1e-12)) + 1
     if count > _MOST_SAMPLES:
         raise ValueError(f"dt = {dt:g} s over {duration:g} s asks for {count} samples; choose a larger dt")
-    return count
+    return np.arange(count) * dt
+
+
+def _given_times(duration: float, given: ArrayLike) -> Array:
+    """Checked output times."""
+    times = np.array(given, dtype=float)
+    if times.ndim != 1 or not np.isfinite(times).all() or np.any(np.diff(times) <= 0.0):
+        raise ValueError(f"dt as output times must be one increasing row of finite numbers (s), got {given!r}")
+    if times.size and not (times[0] >= 0.0 and times[-1] <= duration * (1.0 + 1e-12)):
+        raise ValueError(f"output times must lie in [0, {duration:g}] s, got {times[0]:g} to {times[-1]:g} s")
+    return times
 
 
 def _check_laws(system: System) -> None:
@@ -188,8 +202,9 @@ def _forcing(system: System, duration: float, rtol: float) -> Forcing:
 class _Run:
     """One run: a method's engine, its output, and the loop over stretches."""
 
-    def __init__(self, system: System, engine: Any, dt: float | None, samples: int, tangent: Any) -> None:
-        self.system, self.engine, self.dt = system, engine, dt
+    def __init__(self, system: System, engine: Any, times: Array | None, tangent: Any) -> None:
+        self.system, self.engine, self.times = system, engine, times
+        self.due = _NEVER if times is None else np.append(np.minimum(times, engine.duration), math.inf)
         self.tangent: Any = None
         if tangent:
             from solvers.tangent import Tangent
@@ -197,9 +212,9 @@ class _Run:
             self.tangent = Tangent(system, engine, tangent if isinstance(tangent, Parameter) else None)
         self.state = engine.state
         self.log = np.empty((max(256, 2 * len(system.contacts)), COLUMNS))
-        self.out = np.empty((samples, self.state.x.size))
+        self.out = np.empty((len(self.due) - 1, self.state.x.size))
         self.begin = self.state.x[: 2 * engine.problem.k.size].copy()
-        if samples:
+        if self.due[0] == 0.0:
             self.out[0] = self.state.x
             self.state.count[SAMPLED] = 1
 
@@ -222,7 +237,7 @@ class _Run:
             while code in (RUNNING, LOG_FULL):
                 if code == LOG_FULL:
                     self.log = np.concatenate((self.log, np.empty_like(self.log)))
-                code = self.engine.march(_BUDGET, self.log, self.out, self.dt or math.inf)
+                code = self.engine.march(_BUDGET, self.log, self.out, self.due)
                 if self.tangent:
                     self.tangent.follow()
                 if progress:
@@ -235,14 +250,14 @@ class _Run:
     def solution(self, status: Status, seconds: float) -> Solution:
         """Collect outputs, log and ledger."""
         size, n = self.begin.size, self.system.size
-        if self.dt is None:
+        if self.times is None:
             x, t = self.state.x[None, :].copy(), np.array([self.time])
         else:
             x = self.out[: self._sampled(status)]
-            t = np.arange(len(x)) * self.dt
+            t = self.times[: len(x)]
         motion = times(x[:, :size], self.engine.back.T)
         powers = x[:, size:].copy()
-        if not self.engine.keeps_ledger(self.dt is not None):
+        if not self.engine.keeps_ledger(self.times is not None):
             powers[:, :2] = math.nan
         ledger = partial(Energy.of_run, self.system.M, self.system.K, powers, motion, self.engine.back @ self.begin)
         count = self.state.count

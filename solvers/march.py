@@ -147,11 +147,11 @@ def _law_fails(problem, state, space, h):
 
 
 @inner
-def _sample(state, space, h, out, dt):
+def _sample(state, space, h, out, due):
     """Write the output samples that lie within the step."""
     t = state.now[T]
-    while state.count[SAMPLED] < out.shape[0] and state.count[SAMPLED] * dt <= t + h:
-        theta = min(max((state.count[SAMPLED] * dt - t) / h, 0.0), 1.0) if h > 0.0 else 0.0
+    while due[state.count[SAMPLED]] <= t + h:
+        theta = min(max((due[state.count[SAMPLED]] - t) / h, 0.0), 1.0) if h > 0.0 else 0.0
         row, u = out[state.count[SAMPLED]], 1.0 - theta
         for i in range(state.x.size):
             value = 0.0
@@ -238,11 +238,11 @@ def find(problem, state, space):
 
 
 @kernel
-def accept(problem, state, space, h, stop, direction, at_end, t_end, log, out, dt):
+def accept(problem, state, space, h, stop, direction, at_end, t_end, log, out, due):
     """Record a step that ends on an event of ``stop`` (-1: of none) and go on from its end; returns a status code."""
     if not np.isfinite(dot(space.x_new, space.x_new, space.x_new.size)):
         return LAW_NOT_FINITE if _law_fails(problem, state, space, h) else DIVERGED
-    _sample(state, space, h, out, dt)
+    _sample(state, space, h, out, due)
     _peaks(problem, state, space)
     copy(space.x_new, state.x, state.x.size)
     copy(space.rate_new, state.rate, state.x.size)
@@ -281,7 +281,7 @@ def _gains(problem, state, space):
 @njit(
     types.int64(
         *[STEP, PROBLEM, STATE, SPACE, _REAL, types.int64, _REAL, _REAL],
-        *[_REAL, _REAL, types.boolean, types.int64, _MATRIX, _MATRIX, _REAL],
+        *[_REAL, _REAL, types.boolean, types.int64, _MATRIX, _MATRIX, _VECTOR],
     ),
     **OPTIONS,
 )
@@ -300,7 +300,7 @@ def march(
     events,
     log,
     out,
-    dt,
+    due,
 ):
     """Advance the state to ``t_end`` or for ``budget`` steps; returns a status code."""
     now, count = state.now, state.count
@@ -364,7 +364,7 @@ def march(
 
         # --- accept, record
         at_end = stop < 0 and h == tried and h >= t_end - now[T]
-        code = accept(problem, state, space, h, stop, direction, at_end, t_end, log, out, dt)
+        code = accept(problem, state, space, h, stop, direction, at_end, t_end, log, out, due)
         if code != RUNNING:
             return code
         if stop >= 0:
@@ -429,14 +429,14 @@ class Engine:
         """The ledger is integrated along, always."""
         return True
 
-    def march(self, budget: int, log: Array, out: Array, dt: float) -> int:
+    def march(self, budget: int, log: Array, out: Array, due: Array) -> int:
         """Go on for a stretch."""
         method = self.method
         dt_flight, dt_contact = (math.inf, math.inf) if method.adaptive else method.steps
         code = march(
             *(method.step, self.problem, self.state, self.space, self.duration, budget),
             *(dt_flight, dt_contact, method.rtol, method.atol),
-            *(method.adaptive, method.events, log, out, dt),
+            *(method.adaptive, method.events, log, out, due),
         )
         return GAINED if code in (DONE, RUNNING) and self._gained() else code
 

@@ -174,6 +174,21 @@ def test_sampling_interval_that_does_not_divide_the_duration():
     assert longer.t.tolist() == [0.0]
 
 
+@pytest.mark.parametrize(
+    "method", [solvers.Exponential(1e-10), solvers.Exponential(1e-10, ledger=False), DormandPrince(1e-12), FINE]
+)
+def test_output_times_may_crowd_in_one_contact(paper, method):
+    """Dense values inside a contact equal runs that end there."""
+    log = integrate(paper, STARTS[1][:2], STARTS[1][2:], 0.06).contacts
+    inside = np.linspace(log.t_in[1] - 1e-5, log.t_out[1] + 1e-5, 40)
+    times = np.sort(np.concatenate((inside, [0.0, 1e-9, 0.0123, 0.0597, 0.06])))
+    run = integrate(paper, STARTS[1][:2], STARTS[1][2:], 0.06, times, method)
+    np.testing.assert_array_equal(run.t, times)
+    for i in range(1, times.size, 4):
+        direct = integrate(paper, STARTS[1][:2], STARTS[1][2:], times[i], method=solvers.Exponential(1e-11))
+        assert np.all(np.abs(direct.q[-1] - run.q[i]) < 1e-8 * np.abs(run.q).max(axis=0))
+
+
 def test_cost_counts_the_work():
     solution = integrate(linear_stop(), [0.01], [0.0], 1.0, method=HenonRK2(1e-3, 1e-4))
     assert solution.cost.steps >= 1000
@@ -491,6 +506,11 @@ def test_run_without_anything_to_do_stays_at_rest():
         (([0.0], [0.0], 1.0, 0.0), "dt must be positive and finite"),
         (([0.0], [0.0], 1.0, -1e-3), "dt must be positive and finite"),
         (([0.0], [0.0], 1.0, math.nan), "dt must be positive and finite"),
+        (([0.0], [0.0], 1.0, [0.1, 0.1]), "dt as output times must be one increasing row"),
+        (([0.0], [0.0], 1.0, [[0.1, 0.2]]), "dt as output times must be one increasing row"),
+        (([0.0], [0.0], 1.0, [0.1, math.nan]), "dt as output times must be one increasing row"),
+        (([0.0], [0.0], 1.0, [-0.1, 0.2]), r"output times must lie in \[0, 1\] s, got -0.1 to 0.2 s"),
+        (([0.0], [0.0], 1.0, [0.1, 1.2]), r"output times must lie in \[0, 1\] s, got 0.1 to 1.2 s"),
         (([0.0], [0.0], 1.0, 1e-12), "asks for 1[0-9]{12} samples; choose a larger dt"),
     ],
 )
