@@ -1,8 +1,7 @@
-r"""What a law really does to a free mass: its restitution.
+"""What a law really does to a free mass: its restitution.
 
-For ``F = K d^p (1 + a v/entry_rate)`` a relation gives it. With
-:math:`s = \dot δ/\dot δ^-` the motion obeys :math:`s\,ds/(1 + a s) = -K δ^p dδ/(m (\dot δ^-)^2)`; the elastic
-term gives nothing over a closed loop, so from s = 1 to s = -r
+For F = K δ^p (1 + a δ̇/δ̇⁻) a relation gives it. With s = δ̇/δ̇⁻ the motion obeys s ds/(1 + a s) = -K δ^p dδ/(m δ̇⁻²);
+the elastic term gives nothing over a closed loop, so from s = 1 to s = -r
 
     a (1 + r) = ln[(1 + a)/(1 - a r)],
 

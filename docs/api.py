@@ -16,7 +16,7 @@ import pdoc
 
 HOME = Path(__file__).resolve().parent
 PACKAGES = ["contacts", "reduction", "solvers", "fembeam", "fembeam.statistics", "fembeam.study.quantities"]
-PRIVATE = ["!contacts.identify", "!contacts.law", "!contacts.restitution", "!solvers.lyapunov"]  # named like functions
+PRIVATE = [r"!(contacts|solvers)\..+", r"!fembeam\.study\.(?!quantities).+"]  # modules named like their functions
 LISTED = {"Parameters", "Returns", "Raises", "Attributes", "Yields"}
 ARRAY = re.compile(r"numpy\.ndarray\[tuple\[typing\.Any, \.\.\.\], numpy\.dtype\[numpy\.(\w+)\]\]")
 plain = inspect.formatannotation
@@ -32,10 +32,18 @@ def readable(text: str, *_: object) -> str:
 
 
 def listed(body: str) -> str:
-    """Items `name : meaning`, continued by indented lines."""
-    items = re.split(r"\n(?=\S)", inspect.cleandoc(body))
-    lines = [" ".join(line.strip() for line in item.splitlines()) for item in items]
-    return "\n".join("- " + re.sub(r"^(.+?) : ", r"**\1**: ", line) for line in lines)
+    """Items `name : meaning`, continued by indented lines; short ones may share a line."""
+    items = [item(each) for each in re.split(r"\n(?=\S)", body.strip())]
+    items = [each for line in items for each in re.split(r"(?<=[.;]) (?=\w[\w, .]*? : )", line)]
+    return "\n".join("- " + re.sub(r"^(.+?) : ", r"**\1**: ", each) for each in items)
+
+
+def item(text: str) -> str:
+    """One item on one line, whether its meaning begins on the first line or on the second."""
+    head, *tail = (line.strip() for line in text.splitlines())
+    apart = bool(tail) and tail[0][:1].isupper() and head[-1] not in ".,;:"
+    joint = " : " if tail and head.isidentifier() else "; " if apart else " "
+    return joint.join([head, " ".join(tail)]) if tail else head
 
 
 def blocks(body: str) -> str:
@@ -51,14 +59,18 @@ def blocks(body: str) -> str:
 
 def short(annotation: object, *rest: object) -> str:
     """A type as a reader would write it."""
-    return ARRAY.sub("Array", plain(annotation, *rest)).replace("typing.", "")
+    text = ARRAY.sub("Array", plain(annotation, *rest)).replace("typing.", "")
+    if "_SupportsArray" in text:  # what numpy's ArrayLike expands to
+        return "ArrayLike | None" if "NoneType" in text else "ArrayLike"
+    return text
 
 
 def build(folder: Path) -> None:
     """Write the pages into a folder."""
     warnings.simplefilter("error")
     pdoc.docstrings.convert, inspect.formatannotation, pdoc.doc.formatannotation = readable, short, short
-    pdoc.render.configure(docformat="markdown", show_source=False, footer_text="SI units, angular frequencies in rad/s")
+    look = {"template_directory": HOME / "templates", "footer_text": "SI units, angular frequencies in rad/s"}
+    pdoc.render.configure(docformat="markdown", show_source=False, **look)
     pdoc.pdoc(*PACKAGES, *PRIVATE, output_directory=folder)
 
 

@@ -43,4 +43,6 @@ for k, (found, formula, free) in results.items():
 
 if __name__ == "__main__":
     for k, (found, formula, free) in results.items():
-        print(f"k = {k:9g} N/m: {found:.4f} rad/s, formula {formula:.4f}, {found / free:.3f} times that of the beam alone")
+        print(
+            f"k = {k:9g} N/m: {found:.4f} rad/s, formula {formula:.4f}, {found / free:.3f} times that of the beam alone"
+        )

@@ -1,8 +1,8 @@
 """A cantilever: natural frequencies from finite elements, against the roots of its characteristic equation.
 
-    ω_n = (β_n L)² √(EI/ρA L⁴),    cos βL cosh βL = -1
+ω_n = (β_n L)² √(EI/ρA L⁴),    cos βL cosh βL = -1
 
-    python examples/cantilever.py        prints both, and the errors of coarse meshes
+python examples/cantilever.py        prints both, and the errors of coarse meshes
 """
 
 import math

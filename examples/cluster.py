@@ -1,7 +1,7 @@
 """The same ensemble on a Dask cluster: any executor will do, and the numbers are the same bits as here.
 
-A cluster of two processes is started on this machine; for a real one, give `Client` the address of its scheduler. Workers
-import the quantity, so it lives in a module that they have, not in a script. Needs the extra `cluster`.
+A cluster of two processes is started on this machine; for a real one, give `Client` the address of its scheduler.
+Workers import the quantity, so it lives in a module that they have, not in a script. Needs the extra `cluster`.
 
     python examples/cluster.py        prints mean ± standard error of both, or says that `distributed` is missing
 """

@@ -2,8 +2,8 @@
 
     contact time 2L/c,  impulse 2 m v,  c = √(E/ρ):    a wave runs to the free end and back, then the rod leaves
 
-B. de Saint-Venant, J. Math. Pures Appl. 12 (1867) 237. Any M, C, K will do: here bar elements with lumped masses, C = 0,
-in free flight a rigid-body motion; the wall is a stiff linear stop at the first node.
+B. de Saint-Venant, J. Math. Pures Appl. 12 (1867) 237. Any M, C, K will do: here bar elements with lumped masses and
+C = 0, which in free flight move as a rigid body; the wall is a stiff linear stop at the first node.
 
     python examples/matrices.py        prints contact time and impulse, of the matrices and of the theory
 """

@@ -1,9 +1,10 @@
-"""One periodic orbit and its Floquet multipliers: does a small disturbance die out?
+"""One periodic orbit and its Floquet multipliers, which tell whether a small disturbance dies out.
 
     μ_1 μ_2 … μ_2n = exp(-2 T Σ ζ_i ω_i)
 
 An elastic stop neither adds nor takes volume in phase space, so the product of all multipliers is that of the modal
-damping alone (Liouville), however hard the beam strikes. The largest decides: an orbit can lose volume and be unstable.
+damping alone (Liouville), however hard the beam strikes. The largest decides: an orbit can lose volume and yet be
+unstable.
 
     python examples/orbit.py        prints the orbit and writes orbit.png
 """

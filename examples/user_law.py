@@ -32,6 +32,7 @@ model = scene.reduce(modes=1)
 start = np.array([0.0, -speed / phi])
 contact = model.simulate(duration=0.02, start=start).contacts
 
+
 def kinetic(delta: float) -> float:
     """Energy left in motion at an indentation, J."""
     return ((speed / phi) ** 2 - (omega * delta / phi) ** 2) / 2 - stiffness * delta**4 / 4
@@ -45,4 +46,6 @@ assert abs(contact.speed_out[0] / speed - 1) < 1e-7, "a law without damping give
 if __name__ == "__main__":
     print(scene.stops[0].law.describe())
     print(f"deepest at {1e6 * contact.peak_indentation[0]:.6f} µm, from energy {1e6 * expected:.6f} µm")
-    print(f"peak force {contact.peak_force[0]:.3f} N in a contact of {1e3 * (contact.t_out[0] - contact.t_in[0]):.3f} ms")
+    print(
+        f"peak force {contact.peak_force[0]:.3f} N in a contact of {1e3 * (contact.t_out[0] - contact.t_in[0]):.3f} ms"
+    )
