@@ -136,6 +136,21 @@ def bounce(law: Law, entry_rate: float = 1.0, mass: float = 1.0) -> Bounce:
     law : any contact law.
     entry_rate : m/s, > 0.
     mass : kg, > 0.
+
+    Returns
+    -------
+    Bounce : t, delta, delta_dot, force from entry to exit, and the restitution.
+
+    Raises
+    ------
+    ValueError : an entry rate or a mass that is not positive.
+
+    Examples
+    --------
+    >>> from contacts import Hertz
+    >>> thrown = bounce(Hertz(2.1e8), entry_rate=0.3, mass=0.03)
+    >>> round(thrown.restitution, 9), thrown.left
+    (1.0, True)
     """
     _check_throw(entry_rate, mass)
     force = law.batch(entry_rate)
