@@ -19,9 +19,9 @@ from contacts.law import Law
 
 @dataclass(frozen=True)
 class PiecewiseLinear(Law):
-    r"""Polyline from F(0) = 0 with slope ``slopes[j]`` before ``knots[j]``, and a dashpot per branch.
+    """Polyline from F(0) = 0 with slope ``slopes[j]`` before ``knots[j]``, and a dashpot per branch.
 
-    :math:`F = F_j + k_j (δ - δ_j) + c_j \dot δ` for δ_j < δ <= δ_{j+1}.
+        F = F_j + k_j (δ - δ_j) + c_j δ̇    for δ_j < δ <= δ_j+1
 
     Parameters
     ----------

@@ -194,7 +194,14 @@ def parts_of(law: Law) -> tuple[Law, ...]:
 
 
 def parallel(laws: list[Law]) -> Law:
-    """All laws at once, as ``laws[0] + laws[1] + ...``; for scene files."""
+    """All laws at once, as ``laws[0] + laws[1] + ...``; for scene files.
+
+    Examples
+    --------
+    >>> from contacts import Hertz, KelvinVoigt
+    >>> float(parallel([Hertz(1e9), KelvinVoigt(1e6, 0.0)]).force(1e-4))
+    1100.0
+    """
     if not laws:
         raise ValueError("laws must name at least one law")
     return reduce(lambda a, b: a + b, laws)

@@ -1,7 +1,7 @@
-r"""Power laws: elastic Hertz, and Hertz with hysteresis by any of the published damping factors.
+"""Power laws: elastic Hertz, and Hertz with hysteresis by any of the published damping factors.
 
-The factor a of :math:`F = K δ^p (1 + a\,\dot δ/\dot δ^-)` is published as a formula of a nominal restitution e; what a
-free mass achieves is another value, the root r of a (1 + r) = ln[(1 + a)/(1 - a r)], whatever K, p, mass and speed:
+The factor a of F = K δ^p (1 + a δ̇/δ̇⁻) is published as a formula of a nominal restitution e; what a free mass achieves
+is another value, the root r of a (1 + r) = ln[(1 + a)/(1 - a r)], whatever K, p, mass and speed:
 
     nominal e                                         0.1     0.3     0.5     0.7     0.9
     lankarani_nikravesh   3(1 - e²)/4                0.6653  0.6842  0.7252  0.7960  0.9132
@@ -40,7 +40,7 @@ PUBLISHED = (
 
 @dataclass(frozen=True)
 class Hysteretic(Law):
-    r"""Power law with hysteresis, :math:`F = K δ^p (1 + a\,\dot δ/\dot δ^-)`.
+    """Power law with hysteresis, F = K δ^p (1 + a δ̇/δ̇⁻).
 
     Parameters
     ----------
@@ -53,7 +53,8 @@ class Hysteretic(Law):
     Notes
     -----
     On a free mass the achieved restitution r obeys a (1 + r) = ln[(1 + a)/(1 - a r)], whatever K, mass, speed
-    and p. The rate at entry must be latched by the integrator. A table of all constructors heads this module.
+    and p. The rate at entry must be latched by the integrator. ``python examples/contact_laws.py`` prints what all
+    constructors achieve.
 
     References
     ----------
@@ -211,7 +212,7 @@ class Hysteretic(Law):
 
 @dataclass(frozen=True)
 class Hertz(Law):
-    r"""Elastic power law :math:`F = K δ^p`, Hertz's for p = 1.5.
+    """Elastic power law F = K δ^p, Hertz's for p = 1.5.
 
     Parameters
     ----------

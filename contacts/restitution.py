@@ -1,8 +1,7 @@
-r"""What a law really does to a free mass: its restitution.
+"""What a law really does to a free mass: its restitution.
 
-For ``F = K d^p (1 + a v/entry_rate)`` a relation gives it. With
-:math:`s = \dot δ/\dot δ^-` the motion obeys :math:`s\,ds/(1 + a s) = -K δ^p dδ/(m (\dot δ^-)^2)`; the elastic
-term gives nothing over a closed loop, so from s = 1 to s = -r
+For F = K δ^p (1 + a δ̇/δ̇⁻) a relation gives it. With s = δ̇/δ̇⁻ the motion obeys s ds/(1 + a s) = -K δ^p dδ/(m δ̇⁻²);
+the elastic term gives nothing over a closed loop, so from s = 1 to s = -r
 
     a (1 + r) = ln[(1 + a)/(1 - a r)],
 
@@ -137,6 +136,21 @@ def bounce(law: Law, entry_rate: float = 1.0, mass: float = 1.0) -> Bounce:
     law : any contact law.
     entry_rate : m/s, > 0.
     mass : kg, > 0.
+
+    Returns
+    -------
+    Bounce : t, delta, delta_dot, force from entry to exit, and the restitution.
+
+    Raises
+    ------
+    ValueError : an entry rate or a mass that is not positive.
+
+    Examples
+    --------
+    >>> from contacts import Hertz
+    >>> thrown = bounce(Hertz(2.1e8), entry_rate=0.3, mass=0.03)
+    >>> round(thrown.restitution, 9), thrown.left
+    (1.0, True)
     """
     _check_throw(entry_rate, mass)
     force = law.batch(entry_rate)

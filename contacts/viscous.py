@@ -1,7 +1,7 @@
-r"""Springs with a dashpot beside them: Kelvin–Voigt, and the Hertzian ones of Tsuji and Jankowski.
+"""Springs with a dashpot beside them: Kelvin–Voigt, and the Hertzian ones of Tsuji and Jankowski.
 
-All are :math:`F = K δ^p + c\,δ^{(p-1)/2}\,\dot δ`. With :math:`w = δ^{(p+1)/2}\sqrt{2K/((p+1)m)}` a free mass obeys
-:math:`v\,dv/dw = -w - 2βv`, a linear oscillator of damping ratio
+All are F = K δ^p + c δ^((p-1)/2) δ̇. With w = δ^((p+1)/2) √(2K/((p+1) m)) a free mass obeys v dv/dw = -w - 2βv, a linear
+oscillator of damping ratio
 
     β = c / √(2 (p+1) K m),
 
@@ -45,7 +45,7 @@ def rebound(ratio: float, *, clamp: bool = False, approach: bool = False) -> flo
 
 @dataclass(frozen=True)
 class KelvinVoigt(Law):
-    r"""Spring and dashpot, :math:`F = k δ + c \dot δ` while δ > 0: jumps at entry and may pull before exit.
+    """Spring and dashpot, F = k δ + c δ̇ while δ > 0: jumps at entry and may pull before exit.
 
     Parameters
     ----------
@@ -110,19 +110,20 @@ class KelvinVoigt(Law):
 
 @dataclass(frozen=True)
 class Viscoelastic(Law):
-    r"""Power law with a dashpot that stiffens alike, :math:`F = K δ^p + c\,δ^{(p-1)/2}\,\dot δ`: no jump at entry.
+    """Power law with a dashpot that stiffens alike, F = K δ^p + c δ^((p-1)/2) δ̇: no jump at entry.
 
     Parameters
     ----------
     stiffness : K > 0, N/m^p.
-    damping : c >= 0, N s/m^{(p+1)/2}.
+    damping : c >= 0, N s/m^((p+1)/2).
     exponent : p > 1; 1.5 for spheres (`KelvinVoigt` is p = 1).
     clamp : cut the force at zero, so that the stop never pulls.
     approach_only : damp only while δ̇ > 0.
 
     Notes
     -----
-    The restitution of a free mass is exact, and independent of its speed; see the module.
+    The restitution of a free mass is exact, and independent of its speed: in √(2K/((p+1) m)) δ^((p+1)/2) the mass is
+    a linear oscillator of damping ratio c/√(2 (p+1) K m).
 
     Examples
     --------

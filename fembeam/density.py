@@ -21,6 +21,11 @@ class RollOff:
     ----------
     level : density at ω = 0, units² per rad/s.
     corner : rad/s, where half of the power is left.
+
+    Examples
+    --------
+    >>> float(RollOff(1e-9, corner=300.0)(300.0))
+    5e-10
     """
 
     level: float

@@ -279,6 +279,17 @@ def load(path: str | os.PathLike[str]) -> Run:
     Raises
     ------
     FileNotFoundError; ValueError when the file is not a run of this library, or is damaged.
+
+    Examples
+    --------
+    >>> import fembeam as fb
+    >>> import tempfile
+    >>> scene = fb.Scene(fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01)), [fb.Clamped(0.0)],
+    ...                  damping=fb.ModalDamping(0.01), base=fb.Harmonic(1e-3, 100.0))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     again = load(scene.reduce(modes=1).simulate(0.1, 0.01).save(f"{folder}/run"))
+    >>> again.status, len(again.t)
+    ('finished', 11)
     """
     try:
         with np.load(path, allow_pickle=False) as data:

@@ -108,6 +108,13 @@ class Stop:
 
     `law` gives the repulsive force for δ > 0; `gap` in m, negative = preload. It sits on the frame, or `on` another
     beam of the scene: `on=(body, z)`, body 1 the first of `Scene.bodies`; u is then the difference, u - u_body(z).
+
+    Examples
+    --------
+    >>> from contacts import Hertz
+    >>> both = [Stop(0.2, Hertz(1e9), gap=1e-3, side=side) for side in ("below", "above")]
+    >>> [stop.side for stop in both]
+    ['below', 'above']
     """
 
     z: float

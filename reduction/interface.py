@@ -143,7 +143,15 @@ def craig_bampton(M: Matrix, K: Matrix, directions: Matrix, count: int, root: Ma
 
 
 def guyan(M: Matrix, K: Matrix, directions: Matrix, root: Matrix | None = None) -> Basis:
-    """Static shapes of the given directions only: `craig_bampton` without modes (Guyan's condensation)."""
+    """Static shapes of the given directions only: `craig_bampton` without modes.
+
+    R.J. Guyan, AIAA J. 3 (1965) 380; arguments as for `craig_bampton`.
+
+    Examples
+    --------
+    >>> guyan(np.eye(2), np.diag([1.0, 4.0]), np.array([[1.0], [0.0]])).count
+    1
+    """
     return craig_bampton(M, K, directions, 0, root)
 
 

@@ -56,7 +56,13 @@ def first(basis: Basis, count: int) -> Basis:
 
 
 def below(omega_max: float) -> Enough:
-    """Criterion: all modes with ω ≤ omega_max (rad/s)."""
+    """Criterion: all modes with ω ≤ omega_max (rad/s, > 0).
+
+    Examples
+    --------
+    >>> fewest_modes(np.eye(3), np.diag([1.0, 4.0, 9.0]), below(1.5)).count
+    1
+    """
     if not 0 < omega_max < np.inf:
         raise ValueError(f"omega_max must be positive and finite (rad/s), got {omega_max!r} in below; give a frequency")
 
@@ -67,7 +73,20 @@ def below(omega_max: float) -> Enough:
 
 
 def carrying(share: float, load: ArrayLike, mass: float) -> Enough:
-    """Criterion: Σ Γ_i² ≥ share · mass, the effective masses along a load (N,) = M r; `moved_mass(M, load)` is all."""
+    """Criterion: Σ Γ_i² ≥ share · mass, the effective masses along a load.
+
+    Parameters
+    ----------
+    share : in (0, 1].
+    load : (N,) = M r, kg, for a motion r of the frame.
+    mass : kg; all of it is `moved_mass(M, load)`.
+
+    Examples
+    --------
+    >>> M, K, load = np.diag([3.0, 1.0]), np.diag([3.0, 4.0]), np.array([3.0, 1.0])
+    >>> fewest_modes(M, K, carrying(0.7, load, moved_mass(M, load))).count
+    1
+    """
     if not 0 < share <= 1:
         raise ValueError(f"share must lie in (0, 1], got {share!r} in carrying; give a part such as 0.95")
 
@@ -79,5 +98,11 @@ def carrying(share: float, load: ArrayLike, mass: float) -> Enough:
 
 
 def moved_mass(M: Matrix, load: Vector) -> float:
-    """Sum of the effective masses over all modes, bᵀM⁻¹b in kg, for a load b (N,) = M r."""
+    """Sum of the effective masses over all modes, bᵀM⁻¹b in kg, for a load b (N,) = M r.
+
+    Examples
+    --------
+    >>> moved_mass(np.diag([3.0, 1.0]), np.array([3.0, 1.0]))
+    4.0
+    """
     return float(load @ sparse_linalg.splu(checked_matrix(M, "M")).solve(np.asarray(load, dtype=float)))

@@ -68,6 +68,12 @@ class Contact:
     direction : (n,), the way the stop pushes.
     law : a contact law, such as those of the package `contacts`.
     gap : clearance in m; negative for a preload.
+
+    Examples
+    --------
+    >>> from contacts import Hertz
+    >>> Contact([0.0, 1.0], Hertz(1e9), gap=1e-3).gap
+    0.001
     """
 
     direction: Array

@@ -70,6 +70,16 @@ def bifurcation(
     Returns
     -------
     Bifurcation. Raises ValueError for bad input, solvers.SolverError when a run fails.
+
+    Examples
+    --------
+    >>> import fembeam as fb
+    >>> from contacts import Hertz
+    >>> steel = fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)
+    >>> scene = fb.Scene(fb.Beam(0.26, steel), [fb.Clamped(0.0)], stops=[fb.Stop(0.26, Hertz(1e8))],
+    ...                  damping=fb.ModalDamping(0.05), base=fb.Harmonic(1e-3, 150.0))
+    >>> bifurcation(scene.reduce(modes=1), "omega", [150.0, 160.0], settle=20, keep=4).peaks.shape
+    (2, 4)
     """
     from fembeam.plot.orbits import observed
     from fembeam.study.executors import spread

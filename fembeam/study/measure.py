@@ -25,12 +25,13 @@ from fembeam.section import require, require_non_negative, require_positive
 from fembeam.study.quantities import Quantity, label
 
 if TYPE_CHECKING:
+    import fembeam
     from fembeam.model import Model
     from fembeam.run import Run
     from fembeam.scene import Scene
 
 Vector = NDArray[np.float64]
-Start = Callable[["Model"], Any]
+Start = Callable[["fembeam.Model"], Any]
 
 SETTLING, GROUPS, GROUP = 240, 10, 12  # drive periods before, number of groups, periods in each
 SAMPLES = 128  # per drive period

@@ -18,10 +18,11 @@ from numpy.typing import NDArray
 from fembeam.section import require
 
 if TYPE_CHECKING:
+    import fembeam
     from fembeam.run import Run
 
 Vector = NDArray[np.float64]
-Quantity = Callable[["Run"], Any]
+Quantity = Callable[["fembeam.Run"], Any]
 
 PROBABILITIES = np.arange(1, 20) / 20
 

@@ -98,6 +98,18 @@ def stability_map(
     Raises
     ------
     ValueError for bad input, before computing.
+
+    Examples
+    --------
+    >>> import fembeam as fb
+    >>> import solvers
+    >>> from contacts import Hertz
+    >>> steel = fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)
+    >>> scene = fb.Scene(fb.Beam(0.26, steel), [fb.Clamped(0.0)], stops=[fb.Stop(0.26, Hertz(1e8))],
+    ...                  damping=fb.ModalDamping(0.02), base=fb.Harmonic(1e-3, 100.0))
+    >>> found = stability_map(scene, solvers.RK4, [1e-5, 1e-2], modes=[1, 2], duration=0.05)
+    >>> (found.verdict[:, 1] == Verdict.UNSTABLE).tolist()
+    [False, True]
     """
     steps = np.atleast_1d(np.asarray(steps, dtype=float))
     where = "stability_map"

@@ -169,6 +169,15 @@ def characteristics(model: Model, duration: float, dt: float, **options: Any) ->
     -------
     Those of `Response.numbers`, and "δ psd" and so on: densities per rad/s; "omega": their frequencies. What a contact
     has on average is there when the model has stops, and NaN without a contact.
+
+    Examples
+    --------
+    >>> import fembeam as fb
+    >>> scene = fb.Scene(fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01)), [fb.Clamped(0.0)],
+    ...                  damping=fb.ModalDamping(0.05), base=fb.BandNoise(1e-5, (0.0, 400.0), seed=1))
+    >>> found = characteristics(scene.reduce(modes=1), duration=30.0, dt=5e-3)
+    >>> [name for name in found if name.endswith("psd")]
+    ['tip u psd', 'mid-beam u psd']
     """
     response = stationary(model, duration, dt, **options)
     values: dict[str, Any] = {name: estimate.value for name, estimate in response.numbers().items()}
