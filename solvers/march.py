@@ -90,7 +90,7 @@ class Space(NamedTuple):
 
 SPACE = types.NamedTuple([_VECTOR, _VECTOR, _MATRIX, _MATRIX, _MATRIX, _VECTOR], Space)
 _GAINS = 8  # steps in a row: one alone may be the ledger's, as in the first step of a load
-_FAR = 1e3  # times the energy given: no fault of the ledger
+_FAR, _GAINS_FAR = 1e3, 3  # times the energy given, and then steps in a row
 
 
 @inner
@@ -257,7 +257,7 @@ def accept(problem, state, space, h, stop, direction, at_end, t_end, log, out, d
 
 @kernel
 def gains(problem, state, space):
-    """Whether for some steps, or at once by far, there is twice the energy that was ever there or came in."""
+    """Whether for some steps there is twice the energy that was ever there or came in, or far more for a few."""
     ledger = 2 * problem.k.size
     space.watch[4] = max(space.watch[4], state.x[ledger])
     given = space.watch[1] + space.watch[4]
@@ -265,7 +265,8 @@ def gains(problem, state, space):
         given += min(max(-state.x[ledger + 2 + 2 * s], 0.0), space.watch[5 + s])
     more = space.watch[0] > 2.0 * given + space.watch[2]
     space.watch[3] = space.watch[3] + 1.0 if more else 0.0
-    return space.watch[3] >= _GAINS or space.watch[0] > _FAR * (given + space.watch[2])
+    far = space.watch[0] > _FAR * (given + space.watch[2])
+    return space.watch[3] >= _GAINS or (far and space.watch[3] >= _GAINS_FAR)
 
 
 @inner

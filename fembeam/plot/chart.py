@@ -172,9 +172,10 @@ def failures(cases: Sequence[Failure]) -> Figure:
         if case.scale == "loglog":
             ax.set_xscale("log")
         ax.set(xlabel=case.x_label, ylabel=case.y_label)
-        ax.set_title(case.title, fontweight="bold", pad=27)
-        for line, (colour, words) in enumerate(zip((RED, BLUE), case.said, strict=True)):
-            ax.text(0.0, 1.15 - 0.1 * line, words, color=colour, fontsize=7.5, va="top", transform=ax.transAxes)
+        ax.set_title(case.title, fontweight="bold", pad=29)
+        for height, colour, words in zip((25, 14), (RED, BLUE), case.said, strict=True):
+            ax.annotate(words, (0.0, 1.0), (0, height), "axes fraction", "offset points", color=colour, fontsize=7.5,
+                        va="top")  # fmt: skip
     for ax in axes[len(cases) :]:
         ax.set_axis_off()
     return figure
