@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from fembeam.study.failures import Failure
-    from fembeam.study.speed_accuracy import Point, SpeedAccuracy
+    from fembeam.study.points import Point, SpeedAccuracy
     from fembeam.study.stability_map import StabilityMap
 
 MARKERS = "osD^v<>PX*hpd8H1234"
@@ -52,21 +52,13 @@ def speed_accuracy(result: SpeedAccuracy) -> Figure:
         ax.invert_xaxis()
         ax.grid(alpha=0.25, lw=0.5)
     axes[0].set(xlabel=f"error of integration: {result.quantity}", ylabel="time of a run / ms")
-    axes[0].set_title(f"Integration alone; thick: the front of each model{_claim(result, methods)}")
+    claim = result.claim()
+    axes[0].set_title("Integration alone; thick: the front of each model" + (f"\n{claim}" if claim else ""))
     if panels == 2:
         axes[1].set(xlabel=f"error against {sizes[-1]} modes: {result.quantity}")
         axes[1].set_title("Integration and reduction; dashed: exact solution with so few modes")
     _legends(figure, sizes, methods)
     return figure
-
-
-def _claim(result: SpeedAccuracy, methods: Sequence[str], better_than: float = 1e-4) -> str:
-    """Whether the main method is the front, or who is not."""
-    if "Exponential" not in methods or len(methods) < 2:
-        return ""
-    others = sorted({f"{p.method} with {p.modes} modes" for p in result.beaten("Exponential", better_than)})
-    claim = f"below {better_than:g} Exponential is the front"
-    return f"\n{claim}{', but for ' + ', '.join(others) if others else ' everywhere'}"
 
 
 def _draw(ax: Axes, points: Sequence[Point], name: str, colour: object, marker: str, floor: float) -> None:
