@@ -79,10 +79,11 @@ class SpeedAccuracy:
     quantity: str = "displacement at the end"
 
     def front(self, modes: int) -> list[Point]:
-        """Points no other beats in both median time and error, the coarsest first."""
+        """Points no other beats in both median time and error, the coarsest first; errors below the floor are alike."""
         best: list[Point] = []
+        floor = self.floor.get(modes, 0.0)
         for point in sorted((p for p in self.points if p.modes == modes and p.seconds.size), key=lambda p: p.time):
-            if not best or point.error < best[-1].error:
+            if not best or max(point.error, floor) < max(best[-1].error, floor):
                 best.append(point)
         return best
 
@@ -98,7 +99,8 @@ class SpeedAccuracy:
     def claim(self, method: str = "Exponential", better_than: float = 1e-4) -> str:
         """Whether a method is the front below an error, or who is not; "" where there is nothing to compare with."""
         methods = {point.method for point in self.points}
-        if method not in methods or len(methods) < 2:
+        reached = any(point.error < better_than for point in self.points)
+        if method not in methods or len(methods) < 2 or not reached:
             return ""
         others = sorted({f"{p.method} with {p.modes} modes" for p in self.beaten(method, better_than)})
         claim = f"below {better_than:g} {method} is the front"

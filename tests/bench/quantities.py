@@ -3,7 +3,7 @@
 ``python tests/bench/quantities.py [--chart FILE.png]``, about two minutes. The paper's scene with two modes. The
 trajectory is the tip after three drive periods; the orbit is the amplitude of δ to which a run near a stable orbit has
 settled after thirty periods, with the method's own steps; the statistics are contacts per second and the spectrum of δ
-over 60 s of noise. There the two references, exact as each is, differ by the scatter of a chaotic response (dashed):
+over 20 s of noise. There the two references, exact as each is, differ by the scatter of a chaotic response (dashed):
 no method can be told from another below it, and the loosest tolerance serves.
 """
 
@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -35,25 +36,20 @@ def settled_amplitude(run: Any) -> float:
     return Amplitude()(cut(run, run.t[-1] - 2.0 * PERIOD, run.t[-1]))
 
 
-def studies() -> dict[str, fb.study.SpeedAccuracy]:
-    """{title: study}."""
+def studies() -> Iterator[tuple[str, fb.study.SpeedAccuracy]]:
+    """(title, study), one after the other."""
     model = scene().reduce(modes=2)
     noisy = replace(scene(), base=fb.BandNoise(2.5e-4, (0.0, 1226.6), seed=1)).reduce(modes=2)
     orbit = model.orbit(period=1)
     if not orbit.stable:
         raise SystemExit(f"no stable orbit: {orbit}")
     near = orbit.state * 1.02
-    ask, long = fb.study.speed_accuracy, {"starts": 2, "duration": 60.0, "rounds": 1}
-    return {
-        "trajectory: tip after three periods": ask(model, METHODS, 4, 3.0 * PERIOD, rounds=3),
-        "orbit: amplitude of δ it settles to": ask(
-            model, METHODS, near, 30.0 * PERIOD, PERIOD / 60.0, settled_amplitude, rounds=2
-        ),
-        "statistics: contacts per second": ask(noisy, METHODS, quantity=ImpactRate(), agreement=0.1, **long),
-        "statistics: spectrum of δ to 1200 rad/s": ask(
-            noisy, METHODS, dt=1e-3, quantity=Psd(parts=6), agreement=0.6, **long
-        ),
-    }
+    ask, long = fb.study.speed_accuracy, {"starts": 2, "duration": 20.0, "rounds": 1}
+    yield "trajectory: tip after three periods", ask(model, METHODS, 4, 3.0 * PERIOD, rounds=3)
+    settle = near, 30.0 * PERIOD, PERIOD / 60.0, settled_amplitude
+    yield "orbit: amplitude of δ it settles to", ask(model, METHODS, *settle, rounds=2)
+    yield "statistics: contacts per second", ask(noisy, METHODS, quantity=ImpactRate(), agreement=0.3, **long)
+    yield "statistics: spectrum of δ", ask(noisy, METHODS, dt=1e-3, quantity=Psd(parts=6), agreement=1.0, **long)
 
 
 def chart(found: dict[str, fb.study.SpeedAccuracy]) -> Any:
@@ -84,8 +80,9 @@ def main() -> None:
     """Measure, print, draw."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--chart", metavar="FILE.png")
-    given, found = parser.parse_args(), studies()
-    for title, study in found.items():
+    given, found = parser.parse_args(), {}
+    for title, study in studies():
+        found[title] = study
         print(f"\n{title}\n{study}", flush=True)
     if given.chart:
         chart(found).savefig(given.chart, dpi=100)
