@@ -57,20 +57,13 @@ def chart(found: dict[str, fb.study.SpeedAccuracy]) -> Any:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9.0, 7.0), layout="constrained")
-    for ax, (title, study) in zip(figure.subplots(2, 2).ravel(), found.items(), strict=True):
-        floor = max(study.floor.values())
+    for ax, (title, study) in zip(figure.subplots(2, 2, sharex=True).ravel(), found.items(), strict=True):
         for method, marker in zip(dict.fromkeys(p.method for p in study.points), "osD^v", strict=True):
             mine = [p for p in study.points if p.method == method and p.seconds.size]
-            ax.loglog(
-                [max(p.error, floor, 1e-14) for p in mine],
-                [1e3 * p.time for p in mine],
-                f"{marker}-",
-                ms=4,
-                label=method,
-            )
-        ax.axvline(max(floor, 1e-14), color="grey", ls="--", lw=0.9)
-        ax.invert_xaxis()
-        ax.set(title=title, xlabel="relative error", ylabel="time of a run / ms")
+            errors = [max(p.error, 1e-14) for p in mine]
+            ax.loglog(errors, [1e3 * p.time for p in mine], f"{marker}-", ms=4, label=method)
+        ax.axvline(max(study.floor.values()), color="grey", ls="--", lw=0.9)
+        ax.set(title=title, xlabel="relative error", ylabel="time of a run / ms", xlim=(1.0, 1e-12))
         ax.grid(alpha=0.25, lw=0.5)
     figure.axes[0].legend()
     return figure
