@@ -85,7 +85,7 @@ class Space(NamedTuple):
     dense: Any
     work: Any
     coefficients: Any  # (2, 8)
-    watch: Any  # see `new_space`
+    watch: Any  # see `watched`
 
 
 SPACE = types.NamedTuple([_VECTOR, _VECTOR, _MATRIX, _MATRIX, _MATRIX, _VECTOR], Space)
