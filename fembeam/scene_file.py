@@ -27,8 +27,7 @@ from fembeam.section import Section, Taper, require_non_negative, require_positi
 from fembeam.source import Source
 from fembeam.study.branch_table import BranchTable
 from fembeam.study.ensemble_table import EnsembleTable
-from fembeam.study.speed_accuracy import SpeedAccuracyTable
-from fembeam.study.tables import ModeCountTable, SmallestModelTable
+from fembeam.study.tables import ModeCountTable, SmallestModelTable, SpeedAccuracyTable
 
 Table = Mapping[str, Any]
 

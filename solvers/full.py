@@ -15,7 +15,18 @@ from solvers.events import LANDED, NONE, UNRESOLVED
 from solvers.forcing import Forcing
 from solvers.henon import hermite
 from solvers.kernels import kernel, rhs
-from solvers.march import EVENT, accept, explanation, find, gains, landing_tolerance, look, negligible_energy, new_space
+from solvers.march import (
+    EVENT,
+    accept,
+    explanation,
+    find,
+    gains,
+    landing_tolerance,
+    look,
+    negligible_energy,
+    new_space,
+    watched,
+)
 from solvers.newmark import _MOST_SWEEPS, contact_force
 from solvers.result import Status
 from solvers.state import (
@@ -45,8 +56,7 @@ class MatrixEngine:
         self.back = eye_array(2 * system.size, format="csc")
         self.state: State = new_state(z, len(system.contacts))
         self.state.now[H_FLIGHT] = method.dt
-        energy = float(system.energy(*np.split(z, 2)))
-        self.space = new_space(self.state, 4, energy, 0.0)
+        self.space = new_space(self.state, 4, watched(system, z, 0.0))
         self.solvers: dict[Any, Any] = {}
         self.replies: dict[Any, Array] = {}  # acceleration per newton of a stop
         self.directions = np.array([c.direction for c in system.contacts]).reshape(len(system.contacts), system.size)

@@ -27,6 +27,7 @@ from solvers.henon import hermite
 from solvers.henon import land as henon_landing
 from solvers.kernels import OPTIONS, PROBLEM, contact_forces, copy, dot, indentation, inner, kernel, rhs
 from solvers.result import Status
+from solvers.stability import contact_time, takes, work_of
 from solvers.state import (
     AT_ONCE,
     CALLS,
@@ -84,11 +85,12 @@ class Space(NamedTuple):
     dense: Any
     work: Any
     coefficients: Any  # (2, 8)
-    watch: Any  # energy stored now and at the start, a negligible one, steps in a row that gained
+    watch: Any  # see `watched`
 
 
 SPACE = types.NamedTuple([_VECTOR, _VECTOR, _MATRIX, _MATRIX, _MATRIX, _VECTOR], Space)
 _GAINS = 8  # steps in a row: one alone may be the ledger's, as in the first step of a load
+_FAR, _GAINS_FAR = 1e3, 3  # times the energy given, and then steps in a row
 
 
 @inner
@@ -255,15 +257,16 @@ def accept(problem, state, space, h, stop, direction, at_end, t_end, log, out, d
 
 @kernel
 def gains(problem, state, space):
-    """Whether for some steps there is more energy than the ledger accounts for in all; ``watch`` has the stored."""
+    """Whether for some steps there is twice the energy that was ever there or came in, or far more for a few."""
     ledger = 2 * problem.k.size
-    given = space.watch[1] + abs(state.x[ledger]) + state.x[ledger + 1]
-    excess = space.watch[0] - space.watch[1] - state.x[ledger] + state.x[ledger + 1]
-    for s in range(problem.gap.size):
-        given += abs(state.x[ledger + 2 + 2 * s])
-        excess += state.x[ledger + 2 + 2 * s]
-    space.watch[3] = space.watch[3] + 1.0 if excess > given + space.watch[2] else 0.0
-    return space.watch[3] >= _GAINS
+    space.watch[4] = max(space.watch[4], state.x[ledger])
+    given = space.watch[1] + space.watch[4]
+    for s in range(problem.gap.size):  # a stop gives at most what it held
+        given += min(max(-state.x[ledger + 2 + 2 * s], 0.0), space.watch[5 + s])
+    more = space.watch[0] > 2.0 * given + space.watch[2]
+    space.watch[3] = space.watch[3] + 1.0 if more else 0.0
+    far = space.watch[0] > _FAR * (given + space.watch[2])
+    return space.watch[3] >= _GAINS or (far and space.watch[3] >= _GAINS_FAR)
 
 
 @inner
@@ -380,13 +383,25 @@ def march(
     return RUNNING
 
 
-def new_space(state: State, work_rows: int, energy: float, least: float, constants: tuple[float, ...] = ()) -> Space:
-    """Working arrays for a state of some energy; a method's constants stand in the last row of ``work``."""
+def new_space(state: State, work_rows: int, watch: Array, constants: tuple[float, ...] = ()) -> Space:
+    """Working arrays; a method's constants stand in the last row of ``work``."""
     size = state.x.size
     work = np.empty((work_rows, size))
     work[-1, : len(constants)] = constants
-    watch = np.array([energy, energy, least, 0.0])
     return Space(np.empty(size), np.empty(size), np.zeros((7, size)), work, np.empty((2, 8)), watch)
+
+
+def watched(system: System, motion: Array, least: float) -> Array:
+    """What `gains` looks at, J: stored now, at the start, negligible; steps that gained; most input, held by stops."""
+    q, q_dot = np.split(motion, 2)
+    stored = abs(float(system.energy(q, q_dot)))
+    if "laws take" not in system.kept:
+        system.kept["laws take"] = [takes(contact.law) for contact in system.contacts]
+    held = [
+        work_of(contact.law, -float(contact.direction @ q) - contact.gap) if fair else math.inf
+        for contact, fair in zip(system.contacts, system.kept["laws take"], strict=True)
+    ]
+    return np.array([stored, stored, least, 0.0, 0.0, *held])
 
 
 def negligible_energy(problem: Any, inverse_mass: Array, dt: float) -> float:
@@ -408,10 +423,9 @@ class Engine:
         if method.events == HENON:
             self.problem.levels[:, 1:] = math.inf  # kinks are not looked for
         self.state: State = new_state(z, len(system.contacts))
-        energy = float(system.energy(*np.split(self.back @ z, 2)))
         dt = 0.0 if method.adaptive else max(method.steps)
         least = negligible_energy(self.problem, np.sum(self.problem.load * self.problem.power, axis=1), dt)
-        self.space = new_space(self.state, method.work_rows, energy, least, method.constants)
+        self.space = new_space(self.state, method.work_rows, watched(system, self.back @ z, least), method.constants)
         fastest = max([math.sqrt(abs(k)) for k in self.problem.k] + list(self.problem.c) + [1.0 / duration])
         self.state.now[[H_FLIGHT, H_CONTACT]] = 0.1 / fastest, 0.01 / fastest
         if not method.adaptive:
@@ -470,6 +484,6 @@ def explanation(method: Any, system: System, q: Array, q_dot: Array, duration: f
     if modal:
         where = f"mode {worst + 1} of {system.size} (ω = {math.sqrt(abs(system.K[worst, worst])):.6g} rad/s)"
     limit = method.stable_dt(system, duration=duration)
-    step = min(min(limit.flight, method.steps[0]), min(limit.contact, method.steps[1]), min(method.steps))
+    step = min(limit.flight, limit.contact, *method.steps, 0.1 * contact_time(system))
     grown = f"; it grew in {where}, steps {method.steps[0]:g} s in flight and {method.steps[1]:g} s in contact"
     return f"{grown}, predicted limits {limit.flight:.3g} s and {limit.contact:.3g} s: try {0.5 * step:.2g} s"

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from solvers.henon import hermite
-from solvers.kernels import add_loads, contact_forces, contact_gradient, copy, indentation, kernel, rhs
+from solvers.kernels import add_loads, contact_forces, contact_gradient, copy, indentation, inner, kernel, rhs
 from solvers.kernels import dot as product
 from solvers.stability import ConstantStep, Radius, alpha_radius
 from solvers.system import Array, System, require_step
@@ -55,30 +55,18 @@ def contact_force(problem, s, entry_rate, delta, delta_dot, by_force, rate_by_fo
 
 
 @kernel
-def step(problem, t, h, x, rate, piece, entry_rate, x_new, rate_new, dense, work, rtol, atol):
-    """One step on decoupled modes; the last row of ``work`` holds (α_m, α_f, β, γ).
+def _accelerate(n, i, a, h, beta, gamma, x):
+    """Add the share of an acceleration to the end of the step."""
+    x[i] += beta * h * h * a
+    x[n + i] += gamma * h * a
 
-    Returns (error estimate 0, law calls). ``dense`` gets the cubic Hermite interpolant.
-    """
-    n, stops = problem.k.size, problem.gap.size
-    alpha_m, alpha_f, beta, gamma = work[3][0], work[3][1], work[3][2], work[3][3]
+
+@inner
+def _touch(problem, h, piece, entry_rate, x_new, rate_new, work):
+    """Add what the stops in contact do to the end of a step, by turns until their forces agree; law calls."""
+    n, stops, active, calls = problem.k.size, problem.gap.size, 0, 0
     force, effective, batch = work[0], work[1], work[2]
-    kept, calls = 1.0 - alpha_f, 0
-    if alpha_f != 0.0:
-        calls += rhs(problem, t, x, piece, entry_rate, dense[0], batch)
-    for i in range(n):  # predict
-        x_new[i] = x[i] + h * x[n + i] + h * h * (0.5 - beta) * rate[n + i]
-        x_new[n + i] = x[n + i] + h * (1.0 - gamma) * rate[n + i]
-        rate_new[i] = rate_new[n + i] = 0.0
-        effective[i] = (1.0 - alpha_m) + kept * (gamma * h * problem.c[i] + beta * h * h * problem.k[i])
-    add_loads(problem, t + h, x_new, rate_new)
-    for i in range(n):  # without contact
-        a = kept * (rate_new[n + i] - problem.c[i] * x_new[n + i] - problem.k[i] * x_new[i]) - alpha_m * rate[n + i]
-        if alpha_f != 0.0:
-            a += alpha_f * dense[0, n + i]
-        _accelerate(n, i, a / effective[i], h, beta, gamma, x_new)
-        rate_new[n + i] = a / effective[i]
-    active = 0
+    kept, beta, gamma = 1.0 - work[3][1], work[3][2], work[3][3]
     for s in range(stops):
         active += 1 if piece[s] > 0 else 0
         force[s] = 0.0
@@ -104,22 +92,42 @@ def step(problem, t, h, x, rate, piece, entry_rate, x_new, rate_new, dense, work
             force[s] = F
         if active == 1 or change <= 1e-12 * largest:
             break
+    return calls
+
+
+@kernel
+def step(problem, t, h, x, rate, piece, entry_rate, x_new, rate_new, dense, work, rtol, atol):
+    """One step on decoupled modes; the last row of ``work`` holds (α_m, α_f, β, γ).
+
+    Returns (error estimate 0, law calls). ``dense`` gets the cubic Hermite interpolant.
+    """
+    n = problem.k.size
+    alpha_m, alpha_f, beta, gamma = work[3][0], work[3][1], work[3][2], work[3][3]
+    effective, kept, calls = work[1], 1.0 - alpha_f, 0
+    if alpha_f != 0.0:
+        calls += rhs(problem, t, x, piece, entry_rate, dense[0], work[2])
+    for i in range(n):  # predict
+        x_new[i] = x[i] + h * x[n + i] + h * h * (0.5 - beta) * rate[n + i]
+        x_new[n + i] = x[n + i] + h * (1.0 - gamma) * rate[n + i]
+        rate_new[i] = rate_new[n + i] = 0.0
+        effective[i] = (1.0 - alpha_m) + kept * (gamma * h * problem.c[i] + beta * h * h * problem.k[i])
+    add_loads(problem, t + h, x_new, rate_new)
+    for i in range(n):  # without contact
+        a = kept * (rate_new[n + i] - problem.c[i] * x_new[n + i] - problem.k[i] * x_new[i]) - alpha_m * rate[n + i]
+        if alpha_f != 0.0:
+            a += alpha_f * dense[0, n + i]
+        _accelerate(n, i, a / effective[i], h, beta, gamma, x_new)
+        rate_new[n + i] = a / effective[i]
+    calls += _touch(problem, h, piece, entry_rate, x_new, rate_new, work)
     copy(rate_new[n : 2 * n], effective, n)
     copy(x[2 * n :], x_new[2 * n :], x.size - 2 * n)
-    calls += rhs(problem, t + h, x_new, piece, entry_rate, rate_new, batch)
+    calls += rhs(problem, t + h, x_new, piece, entry_rate, rate_new, work[2])
     if alpha_m != 0.0 or alpha_f != 0.0:
         copy(effective, rate_new[n : 2 * n], n)
     for i in range(2 * n, x.size):  # the ledger by the trapezoidal rule
         x_new[i] = x[i] + 0.5 * h * (rate[i] + rate_new[i])
     hermite(h, x, rate, x_new, rate_new, dense)
     return 0.0, calls
-
-
-@kernel
-def _accelerate(n, i, a, h, beta, gamma, x):
-    """Add the share of an acceleration to the end of the step."""
-    x[i] += beta * h * h * a
-    x[n + i] += gamma * h * a
 
 
 class _Family(ConstantStep):
@@ -160,8 +168,9 @@ class CentralDifference(_Family):
 
     Notes
     -----
-    Stable for hω < 2, whatever the damping; order 2. With the consistent mass matrix every step solves with M + ½hC,
-    factorised once; with a diagonal M (`lumped`) and C it only divides.
+    Stable for hω < 2, whatever the damping. Order 2, through contact too, with events located; without 2 at a smooth
+    stop, 1 for laws that jump or that latch the entry rate. With the consistent mass matrix every step solves with
+    M + ½hC, factorised once; with a diagonal M (`lumped`) and C it only divides.
 
     Examples
     --------
@@ -192,7 +201,8 @@ class Newmark(_Family):
     Notes
     -----
     Stable for every step if 2β >= γ; else for hω < (γ/2 - β)^{-1/2}, more with damping if γ > ½. Order 2 for γ = ½,
-    else 1. The trapezoidal rule conserves the energy of the linear part, not that of a contact: it may gain.
+    else 1; so through contact with events located, without them 1 for laws that jump or that latch the entry rate. The
+    trapezoidal rule conserves the energy of the linear part, not that of a contact: it may gain.
 
     Examples
     --------
@@ -231,8 +241,9 @@ class GeneralizedAlpha(_Family):
 
     Notes
     -----
-    α_m = (2ρ-1)/(ρ+1), α_f = ρ/(ρ+1), β = ¼(1-α_m+α_f)², γ = ½-α_m+α_f: order 2, stable for every step. After an event
-    the acceleration is that of the equation of motion.
+    α_m = (2ρ-1)/(ρ+1), α_f = ρ/(ρ+1), β = ¼(1-α_m+α_f)², γ = ½-α_m+α_f: order 2, stable for every step; through
+    contact as `Newmark`. After an event the acceleration is that of the equation of motion. The first steps overshoot
+    in modes with hω above about 10.
 
     Examples
     --------

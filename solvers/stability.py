@@ -165,13 +165,21 @@ def _fastest(M: Any, C: Any, K: Any) -> tuple[Array, Array]:
     return k, np.sum(phi * (C @ phi), axis=0)
 
 
+def contact_time(system: System) -> float:
+    """Half a period on the stiffest stop's tangent, hit at 1 m/s; inf without stops."""
+    found = [tangent(system, contact, None) for contact in system.contacts]
+    return min(
+        (math.pi * math.sqrt(mass / stiffness) for stiffness, _, mass in found if stiffness > 0.0), default=math.inf
+    )
+
+
 def tangent(system: System, contact: Contact, indentation: float | None) -> tuple[float, float, float]:
     """∂F/∂δ, ∂F/∂δ̇ of a stop at its expected indentation, and the mass 1/(wᵀM⁻¹w) it feels."""
     mass = 1.0 / float(contact.direction @ _solve(system.M, contact.direction))
     if indentation is None:
         delta, speed = max(_depth(contact.law, mass, EXPECTED_SPEED), -contact.gap), EXPECTED_SPEED
     else:
-        delta, speed = indentation, math.sqrt(2.0 * max(_work(contact.law, indentation), 0.0) / mass)
+        delta, speed = indentation, math.sqrt(2.0 * max(work_of(contact.law, indentation), 0.0) / mass)
     speed = max(speed, contact.law.entry_rate_floor)
     around = delta * np.array([1.0 - 1e-6, 1.0 + 1e-6])
     by_delta = np.diff(contact.law.force(around, 0.0, speed))[0] / (around[1] - around[0])
@@ -193,9 +201,19 @@ def _solve(M: Any, vector: Array) -> Array:
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 
 
-def _work(law: Any, delta: float) -> float:
-    """∫F dδ up to an indentation, slowly."""
-    return 0.5 * delta * float(_WEIGHTS @ law.force(0.5 * delta * (1.0 + _NODES), 0.0, 1.0))
+def work_of(law: Any, delta: float) -> float:
+    """∫F dδ up to an indentation, slowly; 0 in flight."""
+    return 0.0 if delta <= 0.0 else 0.5 * delta * float(_WEIGHTS @ law.force(0.5 * delta * (1.0 + _NODES), 0.0, 1.0))
+
+
+def takes(law: Any) -> bool:
+    """Whether a law never gives more energy than it took: it pushes at rest, and its damping is against the motion."""
+    deepest = 2.0 * _depth(law, 1.0, EXPECTED_SPEED)
+    delta, rate = np.meshgrid(deepest * np.geomspace(1e-6, 1.0, 13), np.linspace(-2.0, 2.0, 9))
+    slow = law.force(delta, 0.0, EXPECTED_SPEED)
+    with np.errstate(all="ignore"):  # what overflows is not known to take
+        damping = law.force(delta, rate, EXPECTED_SPEED) - slow
+        return bool(np.all(slow >= 0.0) and np.all(damping * rate >= -1e-12 * slow))
 
 
 def _depth(law: Any, mass: float, speed: float) -> float:
@@ -203,7 +221,7 @@ def _depth(law: Any, mass: float, speed: float) -> float:
     low, high = -15.0, 3.0  # powers of ten, m
     while high - low > 1e-6:
         middle = 0.5 * (low + high)
-        enough = _work(law, 10.0**middle) >= 0.5 * mass * speed**2
+        enough = work_of(law, 10.0**middle) >= 0.5 * mass * speed**2
         low, high = (low, middle) if enough else (middle, high)
     return float(10.0**low)
 
@@ -262,9 +280,10 @@ class ConstantStep:
         return limit(self.radius, system, indentation, duration)
 
     def engine(self, system: System, z: Array, forcing: Forcing, duration: float) -> Any:
-        """The method made ready for one run; ValueError for a step that is predicted to be unstable."""
+        """The method made ready for one run; ValueError for a step that is predicted to be unstable or blind."""
         if not self.force_unstable:
             refuse(self, system, duration)
+            refuse_blind(self, forcing)
         if self.takes_matrices(system):
             from solvers.full import MatrixEngine
 
@@ -290,6 +309,23 @@ def refuse(method: ConstantStep, system: System, duration: float) -> None:
                 f"{method!r} is unstable {where}: mode {_name(system, mode)} allows {longest:.3g} s, got {step:g} s; "
                 f"{advice}, or run it all the same with force_unstable=True"
             )
+
+
+def refuse_blind(method: ConstantStep, forcing: Forcing) -> None:
+    """ValueError for a step that samples a load less than twice in its period, and so takes it for a slower one."""
+    seen = forcing.tone_omega[forcing.tone_amplitude != 0.0]
+    fastest = max([0.0, *seen, *(_mean_frequency(rows) for rows in np.split(forcing.table, forcing.table_start[1:-1]))])
+    if max(method.steps) * fastest > math.pi:
+        raise ValueError(
+            f"{method!r} samples a load of {fastest:.4g} rad/s less than twice in its period; take a step below "
+            f"{math.pi / fastest:.3g} s, or run it all the same with force_unstable=True"
+        )
+
+
+def _mean_frequency(rows: Array) -> float:
+    """Root mean square frequency of a node table [s, s', s''], rad/s."""
+    size = float(np.linalg.norm(rows[:, 1])) if len(rows) else 0.0
+    return float(np.linalg.norm(rows[:, 2])) / size if size > 0.0 else 0.0
 
 
 def _name(system: System, mode: int) -> str:

@@ -2,6 +2,7 @@
 
 import csv
 import re
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -13,7 +14,9 @@ import fembeam as fb
 from contacts import PiecewiseLinear
 from fembeam.cli import main
 from fembeam.study import NoReferenceError, Verdict, gallery, speed_accuracy, stability_map
-from fembeam.study.speed_accuracy import Point, SpeedAccuracy
+from fembeam.study.measure import cut
+from fembeam.study.points import Point, SpeedAccuracy
+from fembeam.study.quantities import Amplitude, Psd
 from solvers import RK4, CentralDifference, DormandPrince, Exponential, HenonRK2, Newmark
 
 METHODS = [Exponential(1e-4), Exponential(1e-8), DormandPrince(1e-8), RK4(4e-5), RK4(1e-5), HenonRK2(1.0, 1.0)]
@@ -75,6 +78,33 @@ def test_statistics_on_a_long_horizon():
     assert all(p.error < 0.15 for p in result.points)
 
 
+def test_the_orbit_a_method_settles_to():
+    model, period = paper_scene().reduce(modes=2), 2.0 * np.pi / 195.0
+
+    def settled(run):
+        return Amplitude()(cut(run, run.t[-1] - period, run.t[-1]))
+
+    near = model.orbit().state * 1.01
+    solvers = [Exponential(1e-6, ledger=False), RK4(1e-4), RK4(5e-5)]
+    result = speed_accuracy(model, solvers, near, 15 * period, period / 60, settled, rounds=1)
+    best, coarse, fine = (point.error for point in result.points)
+    assert best < 1e-7
+    assert 3.0 * fine < coarse < 1e-2  # its own orbit, not that of the start
+    assert result.claim() == "below 0.0001 Exponential is the front everywhere"
+
+
+def test_the_spectrum_of_a_long_response_is_known_to_its_scatter():
+    noisy = replace(paper_scene(), base=fb.BandNoise(2.5e-4, (0.0, 1226.6), seed=1)).reduce(modes=2)
+    options = {"starts": 2, "duration": 10.0, "dt": 1e-3, "quantity": Psd(parts=2), "rounds": 1}
+    result = speed_accuracy(noisy, [Exponential(1e-4, ledger=False), HenonRK2(1e-4, 2e-5)], **options, agreement=1.0)
+    assert 1e-3 < result.floor[2] < 0.6  # chaos: two exact methods differ by what a realisation scatters
+    assert all(point.error < 3.0 * result.floor[2] for point in result.points)
+    assert result.claim() == ""
+    assert len(result.front(2)) <= 2
+    with pytest.raises(NoReferenceError, match="ask for a statistic and allow its scatter"):
+        speed_accuracy(noisy, [Exponential(1e-4)], **options)
+
+
 def test_the_front_is_what_no_point_beats():
     def point(method, seconds, error, modes=2):
         return Point(method, "", modes, np.array([seconds]), np.array([error]), np.array([error]), 1.0, 1.0)
@@ -91,6 +121,8 @@ def test_the_front_is_what_no_point_beats():
     assert result.beaten("a") == [points[1]]
     assert result.beaten("b", better_than=1e-2) == [points[0], points[4]]
     assert not result.beaten("b", better_than=1e-10)
+    assert result.claim("b") == "below 0.0001 b is the front, but for a with 5 modes"
+    assert SpeedAccuracy(points, 1.0, {2: 1e-3}, {2: 0.1}).front(2) == points[:1]  # what is below the floor is alike
 
 
 def test_table_and_figure(found, tmp_path):

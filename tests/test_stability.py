@@ -8,9 +8,11 @@ import pytest
 from problems import coupled_dashpot, paper_scene
 from scipy import sparse
 
+import fembeam as fb
 import solvers
-from contacts import Hertz, Hysteretic, PiecewiseLinear
+from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, law
 from solvers import RK4, CentralDifference, Contact, GeneralizedAlpha, HenonRK2, Newmark, Status, System, integrate
+from solvers.stability import work_of
 
 
 def heun(dt, **options):
@@ -239,12 +241,96 @@ def test_blow_up_in_contact_is_stopped():
     assert not run.status.good or np.abs(run.q[-1] - rest).max() < 1.0
 
 
+def test_a_stop_that_gives_more_than_it_took_is_noticed():
+    # stable by Newmark's rule, but a contact of one step returns a hundred times the energy it took
+    system = System.modal([10.0], 0.0, [Contact([1.0], PiecewiseLinear([1e7]))])
+    with pytest.raises(solvers.SolverError, match=r"more energy.*try ") as caught:
+        integrate(system, [1.0], [0.0], 3.0, method=Newmark(1e-3, locate=False))
+    assert caught.value.solution.status is Status.GAINED
+    advised = float(str(caught.value).rsplit("try ", 1)[1].split()[0])
+    run = integrate(system, [1.0], [0.0], 3.0, 0.1, method=Newmark(advised, locate=False))
+    assert run.energy.stored.max() < 1.5 * run.energy.initial
+
+
+def test_a_run_that_ends_while_it_blows_up_is_noticed():
+    dt = 0.2
+    run = integrate(System.modal([100.0], 0.0), [1.0], [0.0], 6 * dt, method=heun(dt, force_unstable=True), check=False)
+    assert run.status is Status.GAINED
+
+
+def test_laws_that_give_energy_on_purpose_are_let():
+    @law
+    def driving(delta, delta_dot, entry_rate, stiffness=1e4, push=0.1):
+        return stiffness * delta - push * stiffness * delta * delta_dot
+
+    system = System.modal([10.0], 0.0, [Contact([1.0], driving())])
+    run = integrate(system, [0.1], [0.0], 4.0, 0.1, RK4(1e-4, force_unstable=True))
+    assert run.energy.stored.max() > 2.5 * run.energy.initial
+
+
+def test_what_a_preload_holds_may_come_out():
+    system = System.modal([1.0], 0.0, [Contact([1.0], Hertz(1e6), -0.01)])
+    run = integrate(system, [0.0], [0.0], 1.0, 1e-3, RK4(1e-5))
+    assert run.energy.stored.max() == pytest.approx(1e6 * 0.01**2.5 / 2.5, rel=1e-3)
+
+
+@pytest.mark.parametrize("method", [RK4, CentralDifference, Newmark, GeneralizedAlpha, heun])
+def test_a_step_blind_to_its_load_is_refused(method):
+    fast = System.modal([0.1], 0.1, loads=[([1.0], fb.Harmonic(1.0, 400.0))])
+    with pytest.raises(ValueError, match=r"samples a load of 400 rad/s less than twice .* take a step below 0.00785 s"):
+        integrate(fast, [0.0], [0.0], 1.0, method=method(0.01))
+    forced = integrate(fast, [0.0], [0.0], 1.0, method=method(0.01, force_unstable=True), check=False)
+    assert forced.cost.steps > 2
+    rough = System.modal([0.1], 0.1, loads=[([1.0], fb.BandNoise(1.0, (300.0, 500.0), seed=1))])
+    with pytest.raises(ValueError, match="samples a load of"):
+        integrate(rough, [0.0], [0.0], 1.0, method=method(0.01))
+
+
+def tried(seed):
+    """A random system, start, method and step: (arguments of `integrate`, step)."""
+    random = np.random.default_rng(seed)
+    n = int(random.integers(1, 4))
+    omega = np.sort(10.0 ** random.uniform(0.5, 3.5, n))
+    stiffness = 10.0 ** random.uniform(3, 9)
+    laws = Hertz(stiffness), Hysteretic(stiffness, 0.5625), KelvinVoigt(stiffness, 10.0), PiecewiseLinear([stiffness])
+    stops = [
+        Contact(random.uniform(-1, 1, n), laws[random.integers(4)], random.choice([-1e-4, 0.0, 1e-3]))
+        for _ in range(random.integers(0, 3))
+    ]
+    loads = [(random.uniform(-10, 10, n), fb.Harmonic(1.0, 10.0 ** random.uniform(0, 3)))] * int(random.random() < 0.5)
+    h = 10.0 ** random.uniform(-2, 1.3) / omega[-1]
+    locate = {"locate": bool(random.random() < 0.5)}
+    kinds = [heun, *(partial(kind, **locate) for kind in (RK4, CentralDifference, Newmark, linear_acceleration))]
+    method = kinds[random.integers(5)](h, force_unstable=bool(random.random() < 0.5))
+    start = 10.0 ** random.uniform(-4, -1) * random.normal(size=n), random.normal(size=n)
+    return System.modal(omega, 0.01, stops, loads), *start, min(500 * h, 40.0 / omega[0]), method, h
+
+
+def test_nothing_that_is_done_holds_energy_from_nowhere():
+    """Random runs are refused, stopped, or end with no more than twice the energy that was there or came in."""
+    count = {"refused": 0, "stopped": 0, "done": 0}
+    for seed in range(80):
+        system, q0, q_dot0, duration, method, h = tried(seed)
+        try:
+            run = integrate(system, q0, q_dot0, duration, max(h, duration / 300), method, check=False)
+        except ValueError:
+            count["refused"] += 1
+            continue
+        count["done" if run.status.good else "stopped"] += 1
+        assert run.status in (Status.DONE, Status.GAINED, Status.DIVERGED), seed
+        if run.status.good:
+            held = sum(work_of(c.law, -c.direction @ q0 - c.gap) for c in system.contacts)
+            given = run.energy.initial + held + run.energy.input.max(initial=0.0)
+            assert run.energy.stored[-9:].min() < 3.0 * given, seed
+    assert min(count.values()) >= 5, count
+
+
 @pytest.mark.parametrize("method", [heun, RK4, CentralDifference, Newmark, GeneralizedAlpha])
 def test_good_runs_are_not_stopped(method):
     # loads that begin at zero, rest, a stop that gives energy back, a light start
-    law = Hysteretic.lankarani_nikravesh(1e6, 0.5)
+    hysteretic = Hysteretic.lankarani_nikravesh(1e6, 0.5)
     system = System.modal(
-        [20.0, 150.0], 0.02, [Contact([1.0, 0.7], law, 1e-4)], [([1.0, -1.0], lambda t: np.sin(9 * t) ** 3)]
+        [20.0, 150.0], 0.02, [Contact([1.0, 0.7], hysteretic, 1e-4)], [([1.0, -1.0], lambda t: np.sin(9 * t) ** 3)]
     )
     for start in (0.0, 1e-12):
         assert integrate(system, [start, 0.0], [0.0, 0.0], 2.0, method=method(1e-4)).status.good

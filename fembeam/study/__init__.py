@@ -4,8 +4,9 @@ from fembeam.study.bifurcation import Bifurcation, bifurcation
 from fembeam.study.ensemble import Ensemble, ensemble
 from fembeam.study.failures import Failure, gallery
 from fembeam.study.mode_count import ModeCount, mode_count
+from fembeam.study.points import Point, SpeedAccuracy
 from fembeam.study.smallest_model import NotMetError, SmallestModel, smallest_model
-from fembeam.study.speed_accuracy import NoReferenceError, Point, SpeedAccuracy, speed_accuracy
+from fembeam.study.speed_accuracy import NoReferenceError, speed_accuracy
 from fembeam.study.stability_map import StabilityMap, Verdict, stability_map
 from fembeam.study.stationary import Response, characteristics, stationary
 

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
-import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -16,14 +13,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import solvers
-from fembeam.run import Run, written_whole
+from fembeam.run import Run
 from fembeam.section import require, require_positive
+from fembeam.study.points import Point, SpeedAccuracy, median
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from fembeam.model import Model
-    from fembeam.scene import Scene
 
 Vector = NDArray[np.float64]
 PATIENCE, MORE_PATIENCE = 20.0, 0.2  # s one setting may take per model for its first round, and for further ones
@@ -31,127 +26,6 @@ PATIENCE, MORE_PATIENCE = 20.0, 0.2  # s one setting may take per model for its 
 
 class NoReferenceError(solvers.SolverError):
     """The reference methods do not agree, so no error can be stated."""
-
-
-@dataclass(frozen=True, eq=False)
-class Point:
-    """One method at one setting on one model, over several starts.
-
-    Attributes
-    ----------
-    method, setting : names. modes : number of coordinates of the model.
-    seconds : (s,) fastest of the rounds for each start. errors : (s,) of integration, against the model's own
-        reference. totals : (s,) against the reference of the largest model: integration and reduction together.
-    law_calls, steps : median over the starts. failure : why there are no numbers, else "".
-    """
-
-    method: str
-    setting: str
-    modes: int
-    seconds: Vector
-    errors: Vector
-    totals: Vector
-    law_calls: float
-    steps: float
-    failure: str = ""
-
-    @property
-    def time(self) -> float:
-        """Median over the starts, s."""
-        return _median(self.seconds)
-
-    @property
-    def error(self) -> float:
-        """Median over the starts."""
-        return _median(self.errors)
-
-    @property
-    def total(self) -> float:
-        """Median over the starts."""
-        return _median(self.totals)
-
-    def spread(self, values: Vector) -> tuple[float, float]:
-        """Quartiles of ``seconds``, ``errors`` or ``totals``."""
-        return (math.nan, math.nan) if not len(values) else tuple(np.quantile(values, [0.25, 0.75]))  # type: ignore[return-value]
-
-
-@dataclass(frozen=True, eq=False)
-class SpeedAccuracy:
-    """The answer of `speed_accuracy`.
-
-    Attributes
-    ----------
-    points : all of them. unit : what an error of 1 is, in the quantity's unit. floor : {modes: disagreement of the two
-        references}; errors below it are not known. reduction : {modes: error of the exact model against the largest}.
-    """
-
-    points: list[Point]
-    unit: float
-    floor: dict[int, float]
-    reduction: dict[int, float]
-    quantity: str = "displacement at the end"
-
-    def front(self, modes: int) -> list[Point]:
-        """Points no other beats in both median time and error, the coarsest first."""
-        best: list[Point] = []
-        for point in sorted((p for p in self.points if p.modes == modes and p.seconds.size), key=lambda p: p.time):
-            if not best or point.error < best[-1].error:
-                best.append(point)
-        return best
-
-    def beaten(self, method: str, better_than: float = 1e-4) -> list[Point]:
-        """Points of the fronts that are more accurate than so and are not of this method: where it is not the front."""
-        return [
-            point
-            for modes in self.reduction
-            for point in self.front(modes)
-            if point.error < better_than and point.method != method
-        ]
-
-    def rows(self) -> list[dict[str, Any]]:
-        """One dictionary per point."""
-        fronts = {id(point) for modes in self.reduction for point in self.front(modes)}
-        return [
-            {
-                **{"method": p.method, "setting": p.setting, "modes": p.modes, "starts": len(p.errors)},
-                **{"seconds": p.time, "seconds_q1": p.spread(p.seconds)[0], "seconds_q3": p.spread(p.seconds)[1]},
-                **{"error": p.error, "error_q1": p.spread(p.errors)[0], "error_q3": p.spread(p.errors)[1]},
-                **{"total_error": p.total, "law_calls": p.law_calls, "steps": p.steps},
-                **{"front": id(p) in fronts, "failure": p.failure},
-            }
-            for p in self.points
-        ]
-
-    def __str__(self) -> str:
-        lines = [
-            f"{'method':18s} {'setting':>22s} {'modes':>5s} {'µs':>10s} {'error':>8s} {'total':>8s} {'law calls':>9s}"
-        ]
-        for row in self.rows():
-            head = f"{row['method']:18s} {row['setting']:>22s} {row['modes']:5d}"
-            numbers = (
-                f"{1e6 * row['seconds']:10.0f} {row['error']:8.1e} {row['total_error']:8.1e} {row['law_calls']:9.0f}"
-            )
-            lines.append(f"{head} {row['failure'] or numbers}{' front' if row['front'] else ''}")
-        lines += [f"{n} modes: reduction error {self.reduction[n]:.1e}, reference known to {self.floor[n]:.0e}"
-                  for n in self.reduction]  # fmt: skip
-        return "\n".join(lines)
-
-    def figure(self) -> Figure:
-        """``fb.plot.speed_accuracy`` of it."""
-        from fembeam.plot.chart import speed_accuracy
-
-        return speed_accuracy(self)
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the table as CSV, whole or not at all."""
-        from pathlib import Path
-
-        text, rows = io.StringIO(), self.rows()
-        writer = csv.DictWriter(text, list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
-        with written_whole(Path(path)) as file:
-            file.write(text.getvalue().encode())
 
 
 def end_displacement(run: Run) -> Vector:
@@ -209,48 +83,10 @@ def speed_accuracy(
     trials = [_Trial(each, method) for each in models for method in methods]
     _measure(trials, states, ask, rounds, progress)
     sizes = [len(each.omega) for each in models]
-    reduction = {n: _median(_distances(truths[n], truths[sizes[-1]], unit)) for n in sizes}
+    reduction = {n: median(_distances(truths[n], truths[sizes[-1]], unit)) for n in sizes}
     points = [trial.point(truths[len(trial.model.omega)], truths[sizes[-1]], unit) for trial in trials]
     name = getattr(quantity, "__name__", None) or repr(quantity)
     return SpeedAccuracy(points, unit, floor, reduction, name.replace("_", " ") + ", relative")
-
-
-@dataclass(frozen=True)
-class SpeedAccuracyTable:
-    """The table [speed_accuracy] of a scene file: `Exponential`, `DormandPrince` and RK4 on some mode counts.
-
-    Parameters
-    ----------
-    modes : mode counts. rtols : relative tolerances of the first two, in [1e-11, 1e-2]. steps : of `RK4`, s.
-    starts, duration, rounds : see `speed_accuracy`.
-    """
-
-    modes: Sequence[int] = (1, 2, 3)
-    rtols: Sequence[float] = (1e-4, 1e-6, 1e-8, 1e-10)
-    steps: Sequence[float] = (5e-5, 1e-5)
-    starts: int = 6
-    duration: float | None = None
-    rounds: int = 3
-
-    def __post_init__(self) -> None:
-        where = "speed_accuracy"
-        counts = bool(self.modes) and min(self.modes) >= 1
-        require(counts, "modes must be counts of at least 1", list(self.modes), where, "e.g. [1, 2, 5]")
-        valid = bool(self.rtols) and 1e-11 <= min(self.rtols) <= max(self.rtols) <= 1e-2
-        require(valid, "rtols must lie in [1e-11, 1e-2]", list(self.rtols), where, "e.g. [1e-4, 1e-8]")
-        require(self.starts >= 1, "starts must be at least 1", self.starts, where, "e.g. 6")
-        require(self.rounds >= 1, "rounds must be at least 1", self.rounds, where, "e.g. 3")
-        for step in self.steps:
-            require_positive("steps", step, where, "give s")
-        if self.duration is not None:
-            require_positive("duration", self.duration, where, "give s")
-
-    def run(self, scene: Scene) -> SpeedAccuracy:
-        """The study."""
-        methods: list[Any] = [solvers.Exponential(rtol) for rtol in self.rtols]
-        methods += [solvers.DormandPrince(rtol) for rtol in self.rtols] + [solvers.RK4(step) for step in self.steps]
-        models = [scene.reduce(modes=n) for n in sorted(set(self.modes))]
-        return speed_accuracy(models, methods, self.starts, self.duration, rounds=self.rounds, progress=True)
 
 
 @dataclass(frozen=True)
@@ -302,7 +138,7 @@ class _Trial:
         kept = [] if self.failure else sorted(self.values)
         found = [self.values[i] for i in kept]
         law_calls, steps = (
-            _median(np.array([getattr(cost, name) for cost in self.costs], dtype=float))
+            median(np.array([getattr(cost, name) for cost in self.costs], dtype=float))
             for name in ("law_calls", "steps")
         )
         return Point(
@@ -390,11 +226,6 @@ def _measure(trials: list[_Trial], states: Vector, ask: _Question, rounds: int, 
 def _distances(found: list[Vector], wanted: list[Vector], unit: float) -> Vector:
     """Errors in units of the quantity's size."""
     return np.array([np.linalg.norm(a - b) / unit for a, b in zip(found, wanted, strict=True)])
-
-
-def _median(values: Vector) -> float:
-    """NaN of nothing."""
-    return float(np.median(values)) if len(values) else math.nan
 
 
 def method_name(method: Any) -> str:

@@ -6,11 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
-from fembeam.section import require
+import solvers
+from fembeam.section import require, require_positive
 from fembeam.study.measure import Plan
 from fembeam.study.mode_count import ModeCount, checked_counts, mode_count
+from fembeam.study.points import SpeedAccuracy
 from fembeam.study.quantities import named
 from fembeam.study.smallest_model import MOST, SmallestModel, check_goal, smallest_model
+from fembeam.study.speed_accuracy import speed_accuracy
 
 if TYPE_CHECKING:
     from fembeam.scene import Scene
@@ -76,3 +79,41 @@ class SmallestModelTable:
         """The study; NotMetError when there is no such model."""
         runs = self.duration, self.dt, self.discard, seeds_of(self.seeds)
         return smallest_model(scene, self.quantity, self.tolerance, *runs, self.residual, self.most)
+
+
+@dataclass(frozen=True)
+class SpeedAccuracyTable:
+    """The table [speed_accuracy] of a scene file: `Exponential`, `DormandPrince` and RK4 on some mode counts.
+
+    Parameters
+    ----------
+    modes : mode counts. rtols : relative tolerances of the first two, in [1e-11, 1e-2]. steps : of `RK4`, s.
+    starts, duration, rounds : see `speed_accuracy`.
+    """
+
+    modes: Sequence[int] = (1, 2, 3)
+    rtols: Sequence[float] = (1e-4, 1e-6, 1e-8, 1e-10)
+    steps: Sequence[float] = (5e-5, 1e-5)
+    starts: int = 6
+    duration: float | None = None
+    rounds: int = 3
+
+    def __post_init__(self) -> None:
+        where = "speed_accuracy"
+        counts = bool(self.modes) and min(self.modes) >= 1
+        require(counts, "modes must be counts of at least 1", list(self.modes), where, "e.g. [1, 2, 5]")
+        valid = bool(self.rtols) and 1e-11 <= min(self.rtols) <= max(self.rtols) <= 1e-2
+        require(valid, "rtols must lie in [1e-11, 1e-2]", list(self.rtols), where, "e.g. [1e-4, 1e-8]")
+        require(self.starts >= 1, "starts must be at least 1", self.starts, where, "e.g. 6")
+        require(self.rounds >= 1, "rounds must be at least 1", self.rounds, where, "e.g. 3")
+        for step in self.steps:
+            require_positive("steps", step, where, "give s")
+        if self.duration is not None:
+            require_positive("duration", self.duration, where, "give s")
+
+    def run(self, scene: Scene) -> SpeedAccuracy:
+        """The study."""
+        methods: list[Any] = [solvers.Exponential(rtol) for rtol in self.rtols]
+        methods += [solvers.DormandPrince(rtol) for rtol in self.rtols] + [solvers.RK4(step) for step in self.steps]
+        models = [scene.reduce(modes=n) for n in sorted(set(self.modes))]
+        return speed_accuracy(models, methods, self.starts, self.duration, rounds=self.rounds, progress=True)
