@@ -229,7 +229,16 @@ def too_large(delta, delta_dot, entry_rate, stiffness):
     return stiffness * delta * (np.exp(1e9 * delta) if 2e-6 < delta < 5e-5 else 1.0)
 
 
-@pytest.mark.parametrize("bad", [not_a_number, too_large])
+@law
+def raises(delta, delta_dot, entry_rate, stiffness):
+    """An exception in the same layer."""
+    if 2e-6 < delta < 5e-5:
+        raise ValueError("deeper than expected")
+    return stiffness * delta
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # what `raises` says
+@pytest.mark.parametrize("bad", [not_a_number, too_large, raises])
 @pytest.mark.parametrize("method", [solvers.Exponential(1e-8), solvers.DormandPrince(1e-8), solvers.RK4(1e-5)])
 def test_a_law_that_is_not_finite_stops_the_run(bad, method):
     scene = scaled(1.0)
