@@ -35,7 +35,7 @@ from fembeam.template import TEMPLATE
 
 HOME = Path(__file__).resolve().parent.parent.parent
 sys.path.insert(0, str(HOME / "tests" / "bench"))
-ENOUGH, PATIENCE = 3.0, 30.0  # s after which a run is interrupted as Ctrl-C does, and after which it has hung
+ENOUGH, PATIENCE = 3.0, 30.0  # s of processor time, then Ctrl-C; after so many it has hung
 PERIODS = 5.0  # of the lowest mode that are simulated
 NUMBERS = [
     "0",
@@ -171,6 +171,7 @@ def commanded(text: str) -> str:
         scene, out = Path(folder, "scene.toml"), Path(folder, "out")
         scene.write_text(text, encoding="utf-8", newline="")
         for command in (["check", str(scene)], ["run", str(scene), "--out", str(out), "--quiet"]):
+            start_alarm()
             with redirect_stdout(StringIO()), redirect_stderr(StringIO()) as said:
                 codes.append(cli.main(command))
             lines = [line for line in said.getvalue().splitlines() if line]
@@ -211,9 +212,15 @@ def one_sentence(error: Exception, kind: str) -> str:
     return kind
 
 
+def start_alarm() -> None:
+    """Ctrl-C after a while, and the end after a long one."""
+    signal.signal(signal.SIGPROF, too_long)
+    signal.setitimer(signal.ITIMER_PROF, ENOUGH, PATIENCE - ENOUGH)
+
+
 def too_long(*_: Any) -> None:
     """The first alarm is Ctrl-C, the second one the end."""
-    signal.signal(signal.SIGALRM, hung)
+    signal.signal(signal.SIGPROF, hung)
     interrupted.append(True)
     signal.raise_signal(signal.SIGINT)
 
@@ -226,8 +233,7 @@ def hung(*_: Any) -> None:
 def tried(text: str, judge: Callable[[str], str] = verdict) -> tuple[str, str]:
     """(verdict, traceback)."""
     interrupted.clear()
-    signal.signal(signal.SIGALRM, too_long)
-    signal.setitimer(signal.ITIMER_REAL, ENOUGH, PATIENCE - ENOUGH)
+    start_alarm()
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -241,7 +247,7 @@ def tried(text: str, judge: Callable[[str], str] = verdict) -> tuple[str, str]:
             return "interrupted before the run", ""
         return f"FAILED: {type(error).__name__}", traceback.format_exc()
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.setitimer(signal.ITIMER_PROF, 0)
 
 
 def main(count: int = 10_000, first: int = 0, commands: int = 0) -> int:
