@@ -156,15 +156,15 @@ def main():
             for options in ({}, {"n": 3, "stops": 2, "gap": 1e-3}, {"sampled": True}, {"gap": -1e-3}):
                 begin = np.zeros(options.get("n", 2))
                 one = system(SOFT, **options)
-                tried(solvers.integrate, one, begin, begin + 0.1, 0.06, 1e-2, method)
-                tried(solvers.integrate, one, begin, begin + 0.1, 0.03, None, method)
+                tried(solvers.integrate, one, begin, begin + 0.1, 0.02, 1e-2, method)
+                tried(solvers.integrate, one, begin, begin + 0.1, 0.01, None, method)
         for law in LAWS:
             one, begin = system(law), np.zeros(2)
             for method in METHODS[:2]:
-                tried(solvers.integrate, one, begin, begin + 0.1, 0.06, None, method, tangent=method is METHODS[0])
+                tried(solvers.integrate, one, begin, begin + 0.1, 0.02, None, method, tangent=method is METHODS[0])
         for options in ({"n": 3, "stops": 2, "gap": 1e-3}, {"gap": -1e-3}, {"sampled": True}):
             begin = np.zeros(options.get("n", 2))
-            tried(solvers.integrate, system(SOFT, **options), begin, begin + 0.1, 0.06, None, tangent=True)
+            tried(solvers.integrate, system(SOFT, **options), begin, begin + 0.1, 0.02, None, tangent=True)
 
 
 if __name__ == "__main__":
