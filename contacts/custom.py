@@ -244,7 +244,7 @@ def _check_derivative(made: CustomLaw) -> None:
 
 @lru_cache(maxsize=256)
 def _compiled(function: Function, derivative: Function | None, count: int) -> tuple[Any, Any]:
-    """Compile a scalar force and its derivatives into the batch kernels of the declared signatures."""
+    """Compile a scalar force and its derivatives into the batch kernels; what raises gives NaN, which stops a run."""
     from numba import carray, cfunc, njit
     from numba.np.unsafe.ndarray import to_fixed_tuple
 
@@ -255,10 +255,14 @@ def _compiled(function: Function, derivative: Function | None, count: int) -> tu
     def batch(n, delta, delta_dot, entry_rate, parameters, force):
         values = to_fixed_tuple(carray(parameters, (count,)), count)
         for i in range(n):
+            force[i] = math.nan  # stays where the function raises: that leaves this loop, and is printed
+        for i in range(n):
             force[i] = scalar(delta[i], delta_dot[i], entry_rate, *values)
 
     def differences(n, delta, delta_dot, entry_rate, parameters, by_delta, by_rate, by_entry):  # type: ignore[no-untyped-def]
         values = to_fixed_tuple(carray(parameters, (count,)), count)
+        for i in range(n):
+            by_delta[i] = by_rate[i] = by_entry[i] = math.nan
         for i in range(n):
             d, v, r = delta[i], delta_dot[i], entry_rate
             h = 1e-5 * d + 1e-14  # relative to the cube root of rounding; below the surface the law is not asked
@@ -276,6 +280,8 @@ def _compiled(function: Function, derivative: Function | None, count: int) -> tu
 
     def given(n, delta, delta_dot, entry_rate, parameters, by_delta, by_rate, by_entry):  # type: ignore[no-untyped-def]
         values = to_fixed_tuple(carray(parameters, (count,)), count)
+        for i in range(n):
+            by_delta[i] = by_rate[i] = by_entry[i] = math.nan
         for i in range(n):
             by_delta[i], by_rate[i], by_entry[i] = slopes(delta[i], delta_dot[i], entry_rate, *values)
 

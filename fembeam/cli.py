@@ -1,31 +1,24 @@
 """The command line: `fembeam new`, `check`, `modes`, `run`, `compare`, `export`, `schema`.
 
-Tables (with --json: JSON) go to stdout, everything else to stderr. Exit codes: 0 done, 1 a computation failed or its
-results could not be written (what was computed is written where possible), 2 bad input, 130 interrupted and 143
-terminated (what was computed is written and marked as partial).
+Tables (with --json: JSON) go to stdout, everything else to stderr; exit codes are those of `fembeam.messages`.
 """
 
 from __future__ import annotations
 
 import sys
-import time
 import warnings
 from typing import TYPE_CHECKING, Any
 
 from fembeam import __version__  # nothing slow up here: Ctrl-C before `main` would print a traceback
+from fembeam.messages import BAD_INPUT, EXIT_CODES, FAILED, interrupted, one_line, say, show_warning, warned
 
 if TYPE_CHECKING:
     import argparse
     from collections.abc import Sequence
-    from pathlib import Path
 
-    from fembeam.model import Model
-    from fembeam.run import Run
     from fembeam.scene_file import SceneFile
 
-FAILED, BAD_INPUT, INTERRUPTED, TERMINATED = 1, 2, 130, 143
 MODES_SHOWN = 10
-_warned: list[str] = []  # by this command
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -33,22 +26,38 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         from fembeam import interrupts
 
-        _warned.clear()
+        warned.clear()
         with interrupts.listening():
             arguments = _parser().parse_args(argv)
             with warnings.catch_warnings():
                 warnings.simplefilter("default", UserWarning)
-                warnings.showwarning = _show_warning
-                return int(arguments.command(arguments))
+                warnings.showwarning = show_warning
+                code = int(arguments.command(arguments))
+                sys.stdout.flush()
+                return code
     except BrokenPipeError:  # the reader of a table has seen enough
         sys.stdout = None  # type: ignore[assignment]
         return FAILED
-    except (ValueError, TypeError, OSError, ArithmeticError, MemoryError) as error:
-        _say(f"error: {_one_line(error)}")
-        return BAD_INPUT
     except KeyboardInterrupt:
-        _say("interrupted; files that were written are whole")
-        return _interrupted()
+        say("interrupted; files that were written are whole")
+        return interrupted()
+    except Exception as error:
+        return _failed(error)
+
+
+def _failed(error: Exception) -> int:
+    """Say what is wrong; a traceback is for faults of this library only."""
+    from fembeam import interrupts
+
+    if interrupts.heard():  # a compiler that is stopped in the middle raises what it likes
+        say("interrupted; files that were written are whole")
+        return interrupted()
+    if isinstance(error, OSError) and error.filename is None:  # a full disk behind stdout
+        sys.stdout = None  # type: ignore[assignment]
+    elif not isinstance(error, (ValueError, TypeError, OSError, ArithmeticError, MemoryError, RuntimeError)):
+        raise error
+    say(f"error: {one_line(error)}")
+    return FAILED if isinstance(error, RuntimeError) or sys.stdout is None else BAD_INPUT
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -56,7 +65,12 @@ def _parser() -> argparse.ArgumentParser:
     import argparse
     from pathlib import Path
 
-    parser = argparse.ArgumentParser(prog="fembeam", description="Beams that meet stops: simulate a scene file.")
+    parser = argparse.ArgumentParser(
+        prog="fembeam",
+        description="Beams that meet stops: simulate a scene file. Tables go to stdout, messages to stderr.",
+        epilog=EXIT_CODES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     parser.add_argument("--version", action="version", version=f"fembeam {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
@@ -80,6 +94,8 @@ def _parser() -> argparse.ArgumentParser:
         "run", _run, "run the file's studies; write tables, figures, report.html and, for [simulate], run.npz"
     )
     run.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder for the results")
+    run.add_argument("--resume", action="store_true", help="go on in DIR: keep the studies that are finished for this "
+                     "scene, go on with [ensemble] and [branch]; without it all is computed anew")  # fmt: skip
     run.add_argument("--quiet", action="store_true", help="no progress, no log")
     compare = command("compare", _compare, "compare the results in two folders", scene=False)
     compare.add_argument("folders", metavar="DIR", type=Path, nargs=2)
@@ -99,7 +115,7 @@ def _new(arguments: argparse.Namespace) -> int:
 
     with arguments.path.open("x", encoding="utf-8") as file:  # x: what exists is kept
         file.write(TEMPLATE.format(name=arguments.path.name))
-    _say(f"wrote {arguments.path}; next: fembeam check {arguments.path}")
+    say(f"wrote {arguments.path}; next: fembeam check {arguments.path}")
     return 0
 
 
@@ -114,24 +130,26 @@ def _schema(_: argparse.Namespace) -> int:
 def _check(arguments: argparse.Namespace) -> int:
     """The command `check`."""
     from fembeam.check import check
+    from fembeam.cli_run import reduced
 
     file = _read(arguments)
-    found = check(file, _reduced(file, **_wanted(file, arguments.modes)))
+    found = check(file, reduced(file, **_wanted(file, arguments.modes)))
     for doubt in found.warnings:
-        _show_warning(doubt)
-    _print(found.plain() | {"warnings": _warned} if arguments.json else found, arguments.json)
+        show_warning(doubt)
+    _print(found.plain() | {"warnings": warned} if arguments.json else found, arguments.json)
     return 0
 
 
 def _modes(arguments: argparse.Namespace) -> int:
     """The command `modes`."""
+    from fembeam.cli_run import reduced
     from fembeam.modes_table import mode_rows, mode_table
 
     file = _read(arguments)
     wanted = dict(file.reduce)
     if arguments.modes is None and not {"modes", "omega_max", "mass_share"} & set(wanted):
         wanted["modes"] = MODES_SHOWN
-    model = _reduced(file, **(wanted if arguments.modes is None else _wanted(file, arguments.modes)))
+    model = reduced(file, **(wanted if arguments.modes is None else _wanted(file, arguments.modes)))
     _print(mode_rows(model) if arguments.json else mode_table(model), arguments.json)
     return 0
 
@@ -144,7 +162,7 @@ def _compare(arguments: argparse.Namespace) -> int:
     _print(compare.plain(found) if arguments.json else compare.table(found, *arguments.folders), arguments.json)
     if arguments.out:
         written = compare.write_figures(arguments.folders[0], arguments.folders[1], arguments.out)
-        _say(f"wrote {', '.join(p.name for p in written) or 'no figure: only one folder has a run'} to {arguments.out}")
+        say(f"wrote {', '.join(p.name for p in written) or 'no figure: only one folder has a run'} to {arguments.out}")
     return 0
 
 
@@ -155,103 +173,17 @@ def _export(arguments: argparse.Namespace) -> int:
 
     run = load(arguments.run)
     written = run.to_csv(report.prepared(arguments.out), arguments.stride)
-    _say(f"wrote {', '.join(path.name for path in written)} to {arguments.out}")
+    say(f"wrote {', '.join(path.name for path in written)} to {arguments.out}")
     return 0
 
 
 def _run(arguments: argparse.Namespace) -> int:
     """The command `run`."""
-    from fembeam import html, report
+    from fembeam import cli_run, report
 
     file = _read(arguments)
-    if not file.studies:
-        raise ValueError(f"{file.path}: needs a study, such as a table [simulate] with duration and dt")
-    folder, code, found = report.prepared(arguments.out), 0, {}
-    for name in sorted(file.studies, key="simulate".__ne__):  # the cheapest one first
-        if not code:
-            code, found[name] = _studied(file, name, folder, arguments)
-    try:
-        html.write_page(folder, file.source, _warned)
-    except OSError as error:
-        code = code or _unwritten(error)
-    if arguments.json:
-        _print(found, True)
-    return code
-
-
-def _studied(file: SceneFile, name: str, folder: Path, arguments: argparse.Namespace) -> tuple[int, Any]:
-    """One study: exit code, and what it found as JSON has it."""
-    import solvers
-    from fembeam import report
-    from fembeam.study import NotMetError
-
-    study, quiet = file.studies[name], arguments.quiet
-    try:
-        if name == "simulate":
-            return _simulation(file, folder, arguments)
-        if hasattr(study, "write"):  # goes on where an interrupted one left its files
-            result = study.run(_reduced(file, **file.reduce), folder, progress=not quiet)
-        else:
-            result = study.run(file.scene)
-        code = FAILED if getattr(result, "failures", None) else 0
-    except NotMetError as error:
-        result, code = error.evidence, FAILED
-        _say(f"error: {_one_line(error)}")
-    except (solvers.SolverError, RuntimeError) as error:
-        _say(f"error: [{name}]: {_one_line(error)}")
-        return FAILED, None
-    if not arguments.json:
-        print(result)
-    try:
-        written = study.write(result, folder) if hasattr(study, "write") else report.write_study(result, folder, name)
-    except OSError as error:
-        return _unwritten(error), report.plain(result)
-    if not quiet:
-        _say(f"wrote {', '.join(path.name for path in written)} to {folder}")
-    return code, report.plain(result)
-
-
-def _simulation(file: SceneFile, folder: Path, arguments: argparse.Namespace) -> tuple[int, Any]:
-    """The study [simulate]."""
-    from fembeam import interrupts, report
-
-    begin, study, quiet = time.perf_counter(), file.studies["simulate"], arguments.quiet
-    model = _reduced(file, **file.reduce)
-    if not quiet:
-        _say(f"{len(model.omega)} modes: " + ", ".join(f"{w:.6g}" for w in model.omega) + " rad/s")
-    with interrupts.deferred():
-        run, code = _simulated(file, model, not quiet)
-        found = report.summary(run, study.discard, time.perf_counter() - begin)
-        if not arguments.json:
-            print(report.text(found))
-        try:
-            written = report.write(run, folder, study.discard, {**found, "warnings": list(_warned)})
-        except OSError as error:
-            return _unwritten(error), found
-    if code:
-        _say(f"{run.status}; wrote what was computed to {folder}")
-    elif not quiet:
-        spent = f"{run.cost.seconds:.3g} s of {time.perf_counter() - begin:.3g} s"
-        _say(f"{len(run.contacts)} contacts in {run.t[-1]:g} s, integrated in {spent}")
-        _say(f"wrote {', '.join(path.name for path in written)} to {folder}")
-    return code, found
-
-
-def _simulated(file: SceneFile, model: Model, progress: bool) -> tuple[Run, int]:
-    """The run and the exit code: a failed or interrupted one is partial."""
-    from dataclasses import replace
-
-    import solvers
-    from fembeam.run import Run
-
-    study = file.studies["simulate"]
-    try:
-        run = model.simulate(study.duration, study.dt, solver=study.solver, progress=progress)
-        code = 0 if run.complete else _interrupted()
-    except solvers.SolverError as error:
-        _say(f"error: {_one_line(error)}")
-        run, code = Run.of(model.lasting(study.duration), error.solution), FAILED
-    return replace(run, source=file.source), code
+    job = cli_run.Job(file, report.prepared(arguments.out), arguments.resume, arguments.quiet, arguments.json)
+    return cli_run.run(job)
 
 
 def _read(arguments: argparse.Namespace) -> SceneFile:
@@ -268,50 +200,11 @@ def _wanted(file: SceneFile, modes: int | None) -> dict[str, Any]:
     )
 
 
-def _reduced(file: SceneFile, **arguments: Any) -> Model:
-    """The reduced model; what is wrong is said with the file."""
-    try:
-        return file.scene.reduce(**arguments)
-    except (ValueError, TypeError, RuntimeError) as error:  # RuntimeError: modes that cannot be computed
-        raise ValueError(f"{file.source.place('[reduce]', str(error))}: {error}") from error
-
-
-def _unwritten(error: OSError) -> int:
-    """Say that results could not be written."""
-    _say(f"error: results cannot be written: {_one_line(error)}; files that were written are whole")
-    return FAILED
-
-
-def _interrupted() -> int:
-    """The exit code shells expect after a signal."""
-    import signal
-
-    from fembeam import interrupts
-
-    return TERMINATED if interrupts.heard() == signal.SIGTERM else INTERRUPTED
-
-
 def _print(found: Any, as_json: bool) -> None:
     """On stdout."""
     from fembeam.report import json_text
 
     print(json_text(found) if as_json else found)
-
-
-def _say(message: str) -> None:
-    """One line on stderr."""
-    print(f"fembeam: {message}", file=sys.stderr)
-
-
-def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    """A warning as one line."""
-    _warned.append(_one_line(message))
-    _say(f"warning: {_warned[-1]}")
-
-
-def _one_line(message: object) -> str:
-    """A message without line breaks."""
-    return " ".join(str(message).split())
 
 
 if __name__ == "__main__":

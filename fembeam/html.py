@@ -20,28 +20,49 @@ if TYPE_CHECKING:
 STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; color: #222; background: #fff; max-width: 60rem; margin: auto;
   padding: 1rem }
+h1, h2, p, li { overflow-wrap: anywhere }
 h1 { font-size: 1.5rem; margin: 0 } h2 { font-size: 1.15rem; margin: 2rem 0 .5rem; border-bottom: 1px solid #ccc }
 .wide { overflow-x: auto } table { border-collapse: collapse; font-variant-numeric: tabular-nums }
-th, td { text-align: right; padding: .15rem .6rem; border-bottom: 1px solid #eee; white-space: nowrap }
+td { white-space: nowrap } th { vertical-align: bottom }
+th, td { text-align: right; padding: .15rem .6rem; border-bottom: 1px solid #eee }
 th:first-child, td:first-child { text-align: left; padding-left: 0 } th { font-weight: 600 }
 img { max-width: 100%; height: auto } figure { margin: 1rem 0 } figcaption { color: #555; font-size: .9rem }
 pre { overflow-x: auto; background: #f6f6f6; padding: .75rem; font-size: .85rem; line-height: 1.4 }
+@media (max-width: 40rem) { body { padding: .75rem } figure img { max-width: none; width: 38rem }
+  table { font-size: .85rem } th, td { padding: .15rem .4rem } }
 .good { color: #00664a } .bad { color: #a83c00; font-weight: 600 } .note { color: #555; font-size: .9rem }
 """
+CONTACT_ROWS = (
+    ("at z / m", "z"),
+    ("number", "number"),
+    ("per second", "rate"),
+    ("± s.e.", "rate_error"),
+    ("mean time / s", "duration", "mean"),
+    ("mean peak / N", "peak_force", "mean"),
+    ("largest peak / N", "peak_force", "max"),
+    ("mean entry / m s⁻¹", "entry_speed", "mean"),
+)
 ORDER = ("time_history", "psd", "densities", "contacts", "modes")
 
 
-def write_page(folder: str | Path, source: Source | None = None, warnings: Sequence[str] = ()) -> Path:
+def write_page(
+    folder: str | Path,
+    source: Source | None = None,
+    warnings: Sequence[str] = (),
+    files: Sequence[Path] | None = None,
+) -> Path:
     """Write `report.html` from the tables and figures in a result folder.
 
     Parameters
     ----------
     folder : as `fembeam run` leaves it.
     source : the scene file. warnings : said while computing.
+    files : to show; None: all in the folder.
     """
     folder = Path(folder)
+    files = sorted(folder.iterdir()) if files is None else sorted(files)
     title = source.path.stem.replace("_", " ") if source else folder.resolve().name
-    body = "\n".join([f"<h1>{escape(title)}</h1>", *_sections(folder, source, warnings)])
+    body = "\n".join([f"<h1>{escape(title)}</h1>", *_sections(files, source, warnings)])
     with written_whole(folder / "report.html") as file:
         file.write(page(title, body).encode())
     return folder / "report.html"
@@ -56,28 +77,26 @@ def page(title: str, body: str) -> str:
     )
 
 
-def _sections(folder: Path, source: Source | None, warnings: Sequence[str]) -> Iterator[str]:
+def _sections(files: Sequence[Path], source: Source | None, warnings: Sequence[str]) -> Iterator[str]:
     """The page from top to bottom."""
-    found = _json(folder / "summary.json")
+    found = next((_json(path) for path in files if path.name == "summary.json"), {})
     if found:
         yield _status(found)
     if warnings:
         yield "<h2>Warnings</h2><ul>" + "".join(f'<li class="bad">{escape(said)}</li>' for said in warnings) + "</ul>"
     if found:
         yield from _simulation(found)
-    for path in sorted(folder.glob("*.txt")):
-        yield f"<h2>{escape(_words(path.stem))}</h2><pre>{escape(path.read_text(encoding='utf-8'))}</pre>"
-    ensemble = _json(folder / "ensemble.json")
-    if ensemble:
-        rows = [[name, e["mean"], e["standard_error"]] for name, e in ensemble["numbers"].items()]
-        yield f"<h2>Ensemble of {ensemble['realisations']} realisations</h2>" + table(["", "mean", "± s.e."], rows)
-    yield from _figures(folder)
+    for path in files:
+        if path.suffix == ".txt":
+            yield f"<h2>{escape(_words(path.stem))}</h2><pre>{escape(path.read_text(encoding='utf-8'))}</pre>"
+    yield from _figures(files)
     yield from _settings(found, source)
 
 
 def _json(path: Path) -> dict[str, Any]:
-    """A JSON file; {} when there is none."""
-    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    """A JSON file."""
+    found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return found
 
 
 def _status(found: dict[str, Any]) -> str:
@@ -97,25 +116,14 @@ def _simulation(found: dict[str, Any]) -> Iterator[str]:
         ]
         yield "<h2>Model</h2>" + table(["coordinate", "ω / rad s⁻¹", "Hz", "ζ"], rows)
     if found["moments"]:
-        keys = ("mean", "std", "std_error", "skewness", "kurtosis", "min", "max")
-        head = ["", "mean / m", "std / m", "± s.e.", "skewness", "kurtosis", "min / m", "max / m"]
-        yield "<h2>Response</h2>" + table(
-            head, [[name, *(row.get(k) for k in keys)] for name, row in found["moments"].items()]
-        )
+        names = {"mean": "mean / m", "std": "std / m", "std_error": "± s.e.", "skewness": "skewness",
+                 "kurtosis": "kurtosis", "min": "min / m", "max": "max / m"}  # fmt: skip
+        rows = [[words, *(row.get(key) for row in found["moments"].values())] for key, words in names.items()]
+        yield "<h2>Response</h2>" + table(["", *found["moments"]], rows)
         yield f'<p class="note">{escape(found["confidence"])}</p>'
     if found["contacts"]:
-        head = [
-            "stop",
-            "at z / m",
-            "number",
-            "per second",
-            "± s.e.",
-            "mean time / s",
-            "mean peak / N",
-            "largest peak / N",
-            "mean entry / m s⁻¹",
-        ]
-        yield "<h2>Contacts</h2>" + table(head, [_contact(row) for row in found["contacts"]])
+        rows = [[words, *(_of_stop(row, *keys) for row in found["contacts"])] for words, *keys in CONTACT_ROWS]
+        yield "<h2>Contacts</h2>" + table(["", *(f"stop {row['stop']}" for row in found["contacts"])], rows)
     if found["energy"]:
         names = {"input": "put in", "damping": "lost in damping", "contact": "lost in contacts", "stored": "stored"}
         rows = [[words, found["energy"][name]] for name, words in names.items()]
@@ -124,31 +132,21 @@ def _simulation(found: dict[str, Any]) -> Iterator[str]:
         yield f'<p class="note">Missing in this balance, an estimate of the error: {residual:.1e} of the input.</p>'
 
 
-def _contact(row: dict[str, Any]) -> list[Any]:
-    """One stop."""
-    mean = {name: row.get(name, {}).get("mean") for name in ("duration", "peak_force", "entry_speed")}
-    largest = row.get("peak_force", {}).get("max")
-    return [
-        row["stop"],
-        row["z"],
-        row["number"],
-        row["rate"],
-        row.get("rate_error"),
-        mean["duration"],
-        mean["peak_force"],
-        largest,
-        mean["entry_speed"],
-    ]
+def _of_stop(row: dict[str, Any], key: str, part: str = "") -> Any:
+    """One number of a stop."""
+    return row.get(key, {}).get(part) if part else row.get(key)
 
 
-def _figures(folder: Path) -> Iterator[str]:
-    """All figures of the folder, embedded."""
-    paths = sorted(folder.glob("*.png"), key=lambda p: (ORDER.index(p.stem) if p.stem in ORDER else len(ORDER), p.stem))
+def _figures(files: Sequence[Path]) -> Iterator[str]:
+    """All figures, embedded."""
+    figures = [path for path in files if path.suffix == ".png"]
+    paths = sorted(figures, key=lambda p: (ORDER.index(p.stem) if p.stem in ORDER else len(ORDER), p.stem))
     if paths:
         yield "<h2>Figures</h2>"
     for path in paths:
         data, name = base64.b64encode(path.read_bytes()).decode(), escape(_words(path.stem))
-        yield f'<figure><img src="data:image/png;base64,{data}" alt="{name}"><figcaption>{name}</figcaption></figure>'
+        image = f'<div class="wide"><img src="data:image/png;base64,{data}" alt="{name}"></div>'
+        yield f"<figure>{image}<figcaption>{name}</figcaption></figure>"
 
 
 def _settings(found: dict[str, Any], source: Source | None) -> Iterator[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -15,7 +16,18 @@ _state: dict[str, Any] = {"heard": 0, "waits": False}
 def listening() -> Iterator[None]:
     """SIGINT and SIGTERM raise KeyboardInterrupt; outside the main thread nothing changes."""
     _state.update(heard=0, waits=False)
-    before = {}
+    before, hook = {}, sys.unraisablehook
+
+    def swallowed(said: Any) -> None:
+        """Ctrl-C within a callback of the interpreter or a library is dropped there: send it once more."""
+        if said.exc_type is KeyboardInterrupt:
+            from threading import Timer
+
+            Timer(0.05, signal.raise_signal, [heard() or signal.SIGINT]).start()
+        else:
+            hook(said)
+
+    sys.unraisablehook = swallowed
     try:
         for number in (signal.SIGINT, signal.SIGTERM):
             if signal.getsignal(number) is not signal.SIG_IGN:  # as nohup and background jobs want it
@@ -25,6 +37,7 @@ def listening() -> Iterator[None]:
     try:
         yield
     finally:
+        sys.unraisablehook = hook
         for number, handler in before.items():
             signal.signal(number, handler)
 

@@ -64,16 +64,20 @@ def write(run: Run, folder: str | Path, discard: float = 0.0, found: dict[str, A
 
 
 def write_study(result: Any, folder: str | Path, name: str) -> list[Path]:
-    """Write a study's table as `name.txt`, `name.json` and, if it saves itself, `name.csv`; its figure as PNG."""
-    target = Path(folder) / f"{name}.txt"
-    with written_whole(target) as file:
-        file.write(f"{result}\n".encode())
-    written = [target, write_json(Path(folder) / f"{name}.json", plain(result))]
+    """Write a study's numbers as `name.json` and, if it saves itself, `name.csv`; its figure as PNG."""
+    written = [write_json(Path(folder) / f"{name}.json", plain(result))]
     written += [write_figure(Path(folder) / f"{name}.png", result.figure())]
     if hasattr(result, "save"):
         written.append(Path(folder) / f"{name}.csv")
         result.save(written[-1])
     return written
+
+
+def write_text(target: Path, text: str) -> Path:
+    """A table as text."""
+    with written_whole(target) as file:
+        file.write(f"{text}\n".encode())
+    return target
 
 
 def write_figure(target: Path, figure: Figure) -> Path:

@@ -2,7 +2,7 @@
 
     [beam] [[supports]] [[masses]] [[springs]] [[dashpots]] [[stops]] [[forces]] [[impactors]] [damping] [base]
     gravity = 9.81
-    [reduce] [simulate] [branch] [mode_count] [smallest_model] [ensemble]
+    [reduce] [simulate] [orbit] [branch] [mode_count] [smallest_model] [ensemble]
     [speed_accuracy]
 
 The keys of a table are the arguments of the constructor behind it, read from its signature, so that nothing is
@@ -27,6 +27,7 @@ from fembeam.section import Section, Taper, require_non_negative, require_positi
 from fembeam.source import Source
 from fembeam.study.branch_table import BranchTable
 from fembeam.study.ensemble_table import EnsembleTable
+from fembeam.study.orbit_table import OrbitTable
 from fembeam.study.tables import ModeCountTable, SmallestModelTable, SpeedAccuracyTable
 
 Table = Mapping[str, Any]
@@ -81,6 +82,7 @@ class SceneFile:
 
 STUDIES: Constructors = {
     "simulate": Simulate,
+    "orbit": OrbitTable,
     "branch": BranchTable,
     "ensemble": EnsembleTable,
     "mode_count": ModeCountTable,

@@ -13,9 +13,11 @@ from types import NoneType, UnionType
 from typing import Any, Literal, Union, get_args, get_origin
 
 import numpy as np
+from numpy.typing import NDArray
 
 Constructors = Mapping[str, Callable[..., Any]]
 
+ARRAYS = np.ndarray, get_origin(NDArray[np.float64])  # from numpy 2.5 on, Python 3.12, an alias is not its meaning
 UNSEEN = {"Model": Any}  # names in annotations that exist only for type checkers
 ALIASES = {"kind": "quantity"}  # an argument `kind` would hide behind the key that chooses the constructor
 
@@ -59,7 +61,7 @@ def fits(value: Any, hint: Any) -> bool:
 def entry_type(hint: Any) -> Any:
     """Type of the entries of an annotated sequence; None when it is none."""
     origin = get_origin(hint)
-    if origin is np.ndarray:
+    if origin in ARRAYS:
         return float
     if origin in (list, tuple, Sequence) and get_args(hint):
         return get_args(hint)[0]

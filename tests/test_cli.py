@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -16,7 +17,7 @@ import pytest
 
 import fembeam as fb
 import reduction
-from fembeam import kinds
+from fembeam import html, kinds
 from fembeam.cli import main
 from fembeam.doubts import doubts
 from fembeam.scene_file import built, read
@@ -52,7 +53,8 @@ def test_run_writes_run_summary_and_figures(tmp_path, capsys):
     said = capsys.readouterr()
     assert said.err == ""
     assert re.search(r"^stop 0 +\d+ ", said.out, re.MULTILINE)
-    assert sorted(p.name for p in out.iterdir()) == sorted(["run.npz", "summary.json", "report.html", *FIGURES])
+    named = ["run.npz", "summary.json", "report.html", "studies.json"]
+    assert sorted(p.name for p in out.iterdir()) == sorted([*named, *FIGURES])
     for name in FIGURES:
         assert (out / name).read_bytes().startswith(b"\x89PNG")
         assert (out / name).stat().st_size < 200_000
@@ -244,14 +246,18 @@ def test_an_ensemble_is_written_and_goes_on(tmp_path, capsys):
     table = capsys.readouterr().out
     assert table.startswith("3 realisations\n")
     assert re.search(r"stop 0 rate +4\d\.\d+ ± \d", table)
-    assert sorted(p.name for p in out.iterdir()) == ["ensemble.json", "ensemble.npz", "ensemble.png", "report.html"]
+    named = ["ensemble.json", "ensemble.npz", "ensemble.png", "ensemble.txt", "report.html", "studies.json"]
+    assert sorted(p.name for p in out.iterdir()) == named
     found = json.loads((out / "ensemble.json").read_text())
     assert found["numbers"]["δ skewness"]["mean"] < -0.7
     ensemble_scene(tmp_path, ("realisations = 3", "realisations = 4\nworkers = 2"))
-    assert main(["run", str(path), "--out", str(out), "--quiet"]) == 0
-    assert capsys.readouterr().out.startswith("4 realisations\n")
+    assert "--resume to go on with them" in refused(capsys, "run", path, "--out", out)
+    assert printed(capsys, "run", path, "--out", out, "--quiet", "--resume").startswith("4 realisations\n")
+    before = (out / "ensemble.npz").stat().st_mtime_ns
+    assert printed(capsys, "run", path, "--out", out, "--quiet", "--resume").startswith("4 realisations\n")
+    assert (out / "ensemble.npz").stat().st_mtime_ns == before
     ensemble_scene(tmp_path, ("gap = 0.0", "gap = 1e-4"))
-    assert "belongs to another study: stops is" in refused(capsys, "run", path, "--out", out)
+    assert "belongs to another study: stops is" in refused(capsys, "run", path, "--out", out, "--resume")
 
 
 @pytest.mark.parametrize(
@@ -272,6 +278,98 @@ def printed(capsys, *arguments):
     """What a command prints that succeeds."""
     assert main([str(a) for a in arguments]) == 0
     return capsys.readouterr().out
+
+
+STUDIES = """
+[orbit]
+[branch]
+span = [194.0, 196.0]
+step = 0.5
+[mode_count]
+counts = [1, 2]
+quantity = "peak_force"
+duration = 0.2
+"""
+
+
+def shaken(tmp_path, studies=STUDIES):
+    """A scene under harmonic motion with several studies."""
+    path = scene(tmp_path)
+    text = re.sub(r"\[base\](?:.|\n)*?(?=\n\[)", '[base]\nkind = "harmonic"\namplitude = 1e-3\nomega = 195.0\n',
+                  path.read_text(encoding="utf-8"))  # fmt: skip
+    path.write_text(text + studies, encoding="utf-8")
+    return path
+
+
+def test_every_study_is_run_and_kept(tmp_path, capsys):
+    path, out = shaken(tmp_path), tmp_path / "out"
+    found = json.loads(printed(capsys, "run", path, "--out", out, "--quiet", "--json"))
+    assert list(found) == ["simulate", "orbit", "branch", "mode_count"]
+    assert found["orbit"]["stable"]
+    omega = [row["base.omega"] for row in found["branch"]["orbits"]]
+    assert (omega[0], omega[-1]) == pytest.approx((194.0, 196.0))
+    text = (out / "report.html").read_text(encoding="utf-8")
+    Page(text)
+    assert all(f"<h2>{title}</h2>" in text for title in ("Orbit", "Branch", "Mode count", "Contacts"))
+    written = {p: p.stat().st_mtime_ns for p in out.iterdir() if p.name != "report.html"}
+    assert main(["run", str(path), "--out", str(out), "--resume", "--json"]) == 0
+    said = capsys.readouterr()
+    assert said.err.count("is done already; its results are kept") == 4
+    assert json.loads(said.out) == found | {"simulate": json.loads((out / "summary.json").read_text())}
+    assert {p: p.stat().st_mtime_ns for p in written} == written
+    assert (out / "report.html").read_text(encoding="utf-8") == text
+    again = "run", path, "--out", out, "--resume", "--quiet"
+    printed(capsys, *again, "--set", "mode_count.counts=[1, 3]")
+    changed = [p.name for p in written if p.stat().st_mtime_ns != written[p]]
+    assert sorted(changed) == ["mode_count.json", "mode_count.png", "mode_count.txt", "studies.json"]
+    other = "--set", "mode_count.counts=[1, 3]", "--set", "branch.span=[150.0, 200.0]"
+    assert "belongs to another branch" in said_on_failure(capsys, 2, *again, *other)
+    (out / "studies.json").write_text("{")
+    assert "studies.json is damaged" in said_on_failure(capsys, 2, *again)
+
+
+def said_on_failure(capsys, code, *arguments):
+    """What a command says on stderr that exits with that code."""
+    assert main([str(a) for a in arguments]) == code
+    return capsys.readouterr().err
+
+
+def test_a_study_that_fails_does_not_stop_the_others(tmp_path, capsys):
+    path, out = scene(tmp_path), tmp_path / "out"
+    path.write_text(path.read_text(encoding="utf-8") + '[orbit]\n[mode_count]\ncounts = [1]\nquantity = "peak_force"\n'
+                    "duration = 0.1\nseeds = 3\n", encoding="utf-8")  # fmt: skip
+    said = said_on_failure(capsys, 2, "run", path, "--out", out, "--quiet")
+    line = path.read_text(encoding="utf-8").splitlines().index("[orbit]") + 1
+    assert f"scene.toml:{line}: [orbit]: an orbit needs periodic loads" in said
+    text = (out / "report.html").read_text(encoding="utf-8")
+    assert "Mode count" in text
+    assert "Contacts" in text
+    assert "Orbit" not in text
+    assert set(json.loads((out / "studies.json").read_text())) == {"simulate", "mode_count"}
+
+
+def test_a_report_shows_one_scene_only(tmp_path, capsys):
+    out = tmp_path / "out"
+    printed(capsys, "run", shaken(tmp_path, "[orbit]\n"), "--out", out, "--quiet")
+    printed(capsys, "run", scene(tmp_path), "--out", out, "--quiet")
+    assert (out / "orbit.png").exists()
+    assert "Orbit" not in (out / "report.html").read_text(encoding="utf-8")
+
+
+def test_help_tells_exit_codes(capsys):
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    said = capsys.readouterr().out
+    assert all(re.search(rf"\b{code}\b", said) for code in (0, 1, 2, 130, 143))
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a device that is always full")
+def test_a_full_stdout_is_an_error():
+    with open("/dev/full", "w") as full:
+        done = subprocess.run([sys.executable, "-m", "fembeam.cli", "modes", str(EXAMPLE)], stdout=full,
+                              stderr=subprocess.PIPE, text=True, check=False)  # fmt: skip
+    assert done.returncode == 1
+    assert re.fullmatch(r"fembeam: error: .*No space left.*\n", done.stderr)
 
 
 def test_the_new_scene_is_checked_and_runs(tmp_path, capsys):
@@ -417,6 +515,48 @@ def test_the_report_is_one_page_that_needs_nothing_else(tmp_path, capsys):
     assert "&lt;b&gt;a Teflon&lt;/i&gt; &amp;" in text
     assert "# --set simulate.discard=2.5" in text
     assert "of the input" in text
+
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+FLAGS = ("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync",
+         "--disable-background-networking", "--disable-component-update", "--dump-dom")  # fmt: skip
+LOOK = """<script>
+const wide = [...document.body.children].filter(e => e.getBoundingClientRect().right > innerWidth).length
+const broken = [...document.images].filter(e => !e.naturalWidth).length
+const asked = performance.getEntriesByType("resource").filter(e => !e.name.startsWith("data:")).length
+document.title = [innerWidth, document.documentElement.scrollWidth, wide, broken, asked].join(" ")
+</script>"""
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="needs chromium")
+@pytest.mark.parametrize("width", [390, 1200])
+def test_the_report_fits_the_screen_of_a_browser(tmp_path, report_page, width):
+    text = report_page.read_text(encoding="utf-8")
+    # in a frame, because a window cannot be as narrow as a phone
+    (tmp_path / "page.html").write_text(text.replace("</body>", f"{LOOK}</body>"), encoding="utf-8")
+    frame = f'<body style="margin:0"><iframe src="page.html" width="{width}" height="3000" style="border:0"></iframe>'
+    tell = "<script>onload = () => { document.title = frames[0].document.title }</script>"
+    (tmp_path / "frame.html").write_text(f"<!DOCTYPE html><title></title>{frame}{tell}", encoding="utf-8")
+    command = [CHROMIUM, *FLAGS, "--allow-file-access-from-files", f"--user-data-dir={tmp_path / 'profile'}",
+               (tmp_path / "frame.html").as_uri()]  # fmt: skip
+    seen = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True).stdout
+    inner, scrolled, wide, broken, asked = map(int, re.search(r"<title>([\d ]+)</title>", seen)[1].split())
+    assert inner == width
+    assert scrolled <= width
+    assert (wide, broken, asked) == (0, 0, 0)
+
+
+@pytest.fixture(scope="module")
+def report_page(tmp_path_factory):
+    """A report with long names, a warning, tables of two stops, an ensemble's text."""
+    folder = tmp_path_factory.mktemp("report")
+    path = folder / "a_scene_with_a_rather_long_name_that_needs_more_than_one_line_on_a_phone.toml"
+    text = EXAMPLE.read_text(encoding="utf-8").replace("duration = 600", "duration = 2").replace("discard = 5", "")
+    stop = '[[stops]]\nz = 0.2\ngap = 1e-3\nside = "above"\nlaw = { kind = "hertz", stiffness = 1e8 }\n'
+    path.write_text(text + stop, encoding="utf-8")
+    assert main(["run", str(path), "--out", str(folder / "out"), "--quiet"]) == 0
+    (folder / "out" / "ensemble.txt").write_text(f"{'x' * 200}\n", encoding="utf-8")
+    return html.write_page(folder / "out", read(path).source, ["E" * 100 + " looks like N/mm²"])
 
 
 def test_the_schema_knows_what_the_reader_knows(capsys):

@@ -148,7 +148,7 @@ def fuzz():
     return module
 
 
-@pytest.mark.skipif(not hasattr(__import__("signal"), "SIGALRM"), reason="uses an alarm to notice a hang")
+@pytest.mark.skipif(not hasattr(__import__("signal"), "SIGPROF"), reason="uses an alarm to notice a hang")
 def test_mutated_scene_files_are_refused_or_run():
     bench = fuzz()
     texts = bench.seeds()
@@ -229,7 +229,16 @@ def too_large(delta, delta_dot, entry_rate, stiffness):
     return stiffness * delta * (np.exp(1e9 * delta) if 2e-6 < delta < 5e-5 else 1.0)
 
 
-@pytest.mark.parametrize("bad", [not_a_number, too_large])
+@law
+def raises(delta, delta_dot, entry_rate, stiffness):
+    """An exception in the same layer."""
+    if 2e-6 < delta < 5e-5:
+        raise ValueError("deeper than expected")
+    return stiffness * delta
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # what `raises` says
+@pytest.mark.parametrize("bad", [not_a_number, too_large, raises])
 @pytest.mark.parametrize("method", [solvers.Exponential(1e-8), solvers.DormandPrince(1e-8), solvers.RK4(1e-5)])
 def test_a_law_that_is_not_finite_stops_the_run(bad, method):
     scene = scaled(1.0)

@@ -38,10 +38,16 @@ class BranchTable:
         require(self.period >= 1, "period must be at least 1", self.period, "[branch]", "2 is a 1/2 subharmonic")
 
     def run(self, model: Model, folder: Path, progress: bool = False) -> Branch:
-        """The branch; goes on where an interrupted one left ``branch.npz`` in the folder."""
+        """The branch; goes on where an interrupted one left ``branch.npz`` in the folder.
+
+        Raises
+        ------
+        ValueError : that branch belongs to another table, scene or number of modes.
+        """
         kept = Path(folder) / "branch.npz"
         if kept.exists():
             branch = model.resume(kept)
+            self._check(branch, model, kept)
         else:
             branch = model.branch(self.parameter, self.span, self.period, at=self.at, step=self.step)
         try:
@@ -50,16 +56,27 @@ class BranchTable:
             branch.save(kept)
             raise
 
+    def _check(self, branch: Branch, model: Model, path: Path) -> None:
+        """A saved branch answers this table."""
+        from fembeam.parameters import path_of
+
+        arm = branch.found.arms[0]
+        theirs = branch.family.name, branch.family.period, *map(float, arm.span), arm.largest
+        mine = path_of(model.scene, self.parameter), self.period, *map(float, self.span), self.step
+        require(theirs == mine, f"{path} belongs to another branch", theirs, "[branch]",
+                f"parameter, period, span, step are {mine} here; choose another folder or delete it")  # fmt: skip
+
     def write(self, result: Branch, folder: Path) -> list[Path]:
-        """``branch.npz``, ``branch.csv`` and ``branch.png``."""
+        """``branch.npz``, ``branch.json``, ``branch.csv`` and ``branch.png``."""
         from fembeam import plot
-        from fembeam.report import write_figure
+        from fembeam.report import plain, write_figure, write_json
 
         folder = Path(folder)
         result.save(folder / "branch.npz")
         result.to_csv(folder / "branch.csv")
         return [
             folder / "branch.npz",
+            write_json(folder / "branch.json", {"orbits": plain(result.table()), "status": result.status}),
             folder / "branch.csv",
             write_figure(folder / "branch.png", plot.branch(result)),
         ]

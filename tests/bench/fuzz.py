@@ -1,10 +1,12 @@
 """Mutated scene files: each is refused in one sentence or runs; nothing else may happen.
 
-    python tests/bench/fuzz.py [count] [first seed] [verbose]
+    python tests/bench/fuzz.py [count] [first seed] [commands]
 
 A file is the example or the annotated template, with every optional table, after one to four mutations: numbers made
 extreme, values of other types, keys misspelt, lines lost, doubled, swapped, characters changed, the file cut. What can
 be read is reduced and simulated for a short time. A traceback is a failure, and so is taking longer than `PATIENCE`.
+With the third argument 1, `fembeam check` and `fembeam run` are given the file instead: slower, but the whole way to
+tables, figures and report.
 """
 
 from __future__ import annotations
@@ -12,22 +14,28 @@ from __future__ import annotations
 import re
 import signal
 import sys
+import tempfile
 import time
 import traceback
 import warnings
 from collections import Counter
+from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import solvers
+from fembeam import cli
 from fembeam.scene_file import SceneFile, SceneFileError, built
 from fembeam.source import Source
 from fembeam.template import TEMPLATE
 
 HOME = Path(__file__).resolve().parent.parent.parent
-ENOUGH, PATIENCE = 3.0, 30.0  # s after which a run is interrupted as Ctrl-C does, and after which it has hung
+sys.path.insert(0, str(HOME / "tests" / "bench"))
+ENOUGH, PATIENCE = 3.0, 30.0  # s of processor time, then Ctrl-C; after so many it has hung
 PERIODS = 5.0  # of the lowest mode that are simulated
 NUMBERS = [
     "0",
@@ -85,6 +93,8 @@ realisations = 3
 duration = 16
 dt = 2e-3
 """
+
+interrupted: list[bool] = []  # whether the present file was
 
 
 class HangError(BaseException):
@@ -152,6 +162,28 @@ def verdict(text: str) -> str:
         return one_sentence(error, "refused")
 
 
+def commanded(text: str) -> str:
+    """What `fembeam check` and `fembeam run` make of a file: their exit codes."""
+    from faults import broken
+
+    codes = []
+    with tempfile.TemporaryDirectory() as folder:
+        scene, out = Path(folder, "scene.toml"), Path(folder, "out")
+        scene.write_text(text, encoding="utf-8", newline="")
+        for command in (["check", str(scene)], ["run", str(scene), "--out", str(out), "--quiet"]):
+            start_alarm()
+            with redirect_stdout(StringIO()), redirect_stderr(StringIO()) as said:
+                codes.append(cli.main(command))
+            lines = [line for line in said.getvalue().splitlines() if line]
+            odd = [line for line in lines if not line.startswith("fembeam: ")]
+            if odd or codes[-1] not in (0, 1, 2, 130) or (codes[-1] and not lines):
+                raise AssertionError(f"{command[0]} exits with {codes[-1]} and says {odd or lines}")
+        faults = broken(out, killed=False)
+        if faults:
+            raise AssertionError(f"files are broken: {faults}")
+    return f"check {codes[0]}, run {codes[1]}"
+
+
 def ran(file: SceneFile) -> str:
     """A file that can be read, reduced and run for a short time."""
     try:
@@ -180,10 +212,17 @@ def one_sentence(error: Exception, kind: str) -> str:
     return kind
 
 
+def start_alarm() -> None:
+    """Ctrl-C after a while, and the end after a long one."""
+    signal.signal(signal.SIGPROF, too_long)
+    signal.setitimer(signal.ITIMER_PROF, ENOUGH, PATIENCE - ENOUGH)
+
+
 def too_long(*_: Any) -> None:
     """The first alarm is Ctrl-C, the second one the end."""
-    signal.signal(signal.SIGALRM, hung)
-    raise KeyboardInterrupt
+    signal.signal(signal.SIGPROF, hung)
+    interrupted.append(True)
+    signal.raise_signal(signal.SIGINT)
 
 
 def hung(*_: Any) -> None:
@@ -191,33 +230,38 @@ def hung(*_: Any) -> None:
     raise HangError
 
 
-def tried(text: str) -> tuple[str, str]:
+def tried(text: str, judge: Callable[[str], str] = verdict) -> tuple[str, str]:
     """(verdict, traceback)."""
-    signal.signal(signal.SIGALRM, too_long)
-    signal.setitimer(signal.ITIMER_REAL, ENOUGH, PATIENCE - ENOUGH)
+    interrupted.clear()
+    start_alarm()
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            return verdict(text), ""
+            return judge(text), ""
     except KeyboardInterrupt:
         return "interrupted before the run", ""
     except HangError:
         return "TOOK TOO LONG", traceback.format_exc()
     except Exception as error:
+        if interrupted:  # a compiler that Ctrl-C stops in the middle raises what it likes
+            return "interrupted before the run", ""
         return f"FAILED: {type(error).__name__}", traceback.format_exc()
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.setitimer(signal.ITIMER_PROF, 0)
 
 
-def main(count: int = 10_000, first: int = 0, verbose: int = 1) -> int:
+def main(count: int = 10_000, first: int = 0, commands: int = 0) -> int:
     """Try that many; exit code 1 when one failed."""
+    judge = commanded if commands else verdict
     texts, found, slowest = seeds(), Counter(), (0.0, 0)
+    for text in texts:  # compiles, without an alarm
+        judge(text)
     for seed in range(first, first + count):
         text, begin = mutated(np.random.default_rng(seed), texts), time.perf_counter()
-        what, trace = tried(text)
+        what, trace = tried(text, judge)
         slowest = max(slowest, (time.perf_counter() - begin, seed))
         found[what] += 1
-        if trace and verbose:
+        if trace:
             print(f"seed {seed}: {what}\n" + "\n".join(trace.splitlines()[-7:]), flush=True)
     print(f"{count} files: " + ", ".join(f"{n} {what}" for what, n in found.most_common()))
     print(f"slowest: {slowest[0]:.1f} s (seed {slowest[1]})")
