@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from solvers.chain import Chain, Problem, delayed
 from solvers.correction import newton
 from solvers.periodic import Orbit, OrbitError, at_zero, flown, orbit_of
-from solvers.point import Point, cubic, is_straight, metric_of, moved, point_of
+from solvers.point import Point, corrected, cubic, is_straight, metric_of, moved, point_of
 from solvers.quiet import quiet_begins, with_memory
 from solvers.shooting import checked, checked_start, start_chain
 from solvers.special import between
@@ -28,7 +28,7 @@ from solvers.system import Array, System
 
 MOST_ORBITS = 2000
 _SMALLEST = 3e-7  # arclength step at which a branch counts as lost
-_GOOD = 0.02, 0.1  # distance of a good guess from the branch, in units of the step: on a cubic, on the tangent
+_GOOD = 0.06, 0.1  # distance of a good guess from the branch, in units of the step: on a cubic, on the tangent
 _MANY = 6  # Newton iterations that ask for shorter steps
 _SHARPEST = 0.8  # cosine of the largest turn between two orbits
 _KINK = 3e-6  # arclength step below which a turn counts as a kink of the branch
@@ -96,13 +96,14 @@ class Arm:
         strayed = math.sqrt(max(off @ a.metric @ off - way**2, 0.0))
         sharp = aligned < _SHARPEST or strayed > 0.5 * way
         if (sharp and h > _KINK) or strayed > _FARTHEST * h or _is_cut(b):  # a branch has kinks where contacts graze
-            return self._shorter(0.3 if aligned < 0.0 else 0.5)
+            return self._shorter(0.2 if len(a.orbit.contacts) != len(b.orbit.contacts) else 0.5)
         if b.chain.parameter in self.span:
             self.status = BranchStatus.END
             return b
         good = _GOOD[self.before is None] * h / max(math.sqrt(miss @ a.metric @ miss), 1e-9 * h)
         longer = min(good if self.before is None else good ** (1.0 / 3.0), 3.0)
-        self.step = min(max(longer, 0.5) if b.orbit.iterations < _MANY else 0.5, self.largest / h) * h
+        largest = self.largest * max(1.0, b.size)
+        self.step = min(h * (max(longer, 0.5) if b.orbit.iterations < _MANY else 0.5), largest)
         return b
 
     def _ahead(self) -> Array:
@@ -115,10 +116,14 @@ class Arm:
         return cubic(last, a, way, way + self.step)
 
     def _is_straight(self, guess: Array) -> bool:
-        """Whether to hold the parameter fixed: it moves on, and about as far as the tangent says."""
+        """Whether to hold the parameter fixed: no fold is near, by the points known and the guess."""
         a = self.point
-        known = [a] if self.before is None else [a, self.before[0]]
-        return is_straight(*known) and 0.5 < (guess[-1] - a.chain.parameter) / (self.step * a.tangent[-1]) < 2.0
+        if self.before is None:
+            return abs(a.share) > 0.2
+        last, way = self.before
+        ahead = a.share + (a.share - last.share) * self.step / way
+        moved_on = (guess[-1] - a.chain.parameter) * a.tangent[-1] > 0.0
+        return moved_on and is_straight(last.share, a.share, ahead)
 
     def _inside(self, unknowns: Array) -> bool:
         """Whether the parameter lies in the span."""
@@ -134,8 +139,8 @@ class Arm:
         return moved(a, guess, True)
 
     def _shorter(self, factor: float) -> None:
-        """Try again nearer, along the tangent."""
-        self.step, self.before = factor * self.step, None
+        """Try again nearer."""
+        self.step = factor * self.step
 
     def _finish_or_go_on(self, point: Point) -> None:
         """Recognise orbits passed before and the limit."""
@@ -149,10 +154,7 @@ class Arm:
             self.point = _with_quiet_begin(point)
 
     def _met(self, point: Point) -> int | None:
-        """Number of an orbit passed before that lies on the way just gone; 0 is the first.
-
-        On the way back, that is turned round, it must lie very near: the sides of a narrow fold are close too.
-        """
+        """Number of an orbit passed before that lies on the way just gone; 0 is the first."""
         a = self.point
         self.passed.append(point)
         if point.problem.fractions != a.problem.fractions:
@@ -166,10 +168,24 @@ class Arm:
         share = off @ (point.metric @ way) / length
         off -= np.outer(share, way)
         aligned = np.array([self.passed[i].tangent for i in known]) @ (point.metric @ point.tangent)
-        near = np.where(aligned > 0.95, 1e-2 * length, min(1e-4 * length, 1e-8))
         distance = np.einsum("ki,ij,kj->k", off, point.metric, off)
-        met = (share > 0.0) & (share <= 1.0) & (np.abs(aligned) > 0.5) & (distance < near)
-        return known[int(met.argmax())] if met.any() else None
+        near = (share > 0.0) & (share <= 1.0) & (np.abs(aligned) > 0.5) & (distance < 1e-2 * length)
+        return next((known[k] for k in np.flatnonzero(near) if _is_passed(self.passed[known[k]], a, point)), None)
+
+
+def _is_passed(known: Point, a: Point, b: Point) -> bool:
+    """Whether an orbit lies on the branch between two points, which others near it do not."""
+    way = float(a.tangent @ a.metric @ (b.unknowns - a.unknowns))
+    share = (known.chain.parameter - a.chain.parameter) / (b.chain.parameter - a.chain.parameter)
+    if not (way > 0.0 and 0.0 <= share <= 1.0):
+        return False
+    guess = np.append(cubic(a, b, way, share * way)[:-1], known.chain.parameter)
+    try:
+        chain, *_ = corrected(a, guess, True)
+    except (OrbitError, np.linalg.LinAlgError):
+        return False
+    off = np.append(chain.x.ravel(), chain.parameter) - known.unknowns
+    return bool(off @ a.metric @ off < 1e-12)
 
 
 def _is_cut(point: Point) -> bool:

@@ -17,7 +17,7 @@ from solvers.correction import Border, newton, weights
 from solvers.periodic import Orbit, orbit_of
 from solvers.system import Array
 
-_STEEP = 0.2  # parameter's share of the tangent below which the parameter is not what is held fixed
+_STEEP = 0.02  # parameter's share of the tangent below which the parameter is not what is held fixed
 _MOST = 9  # iterations of Newton's method on the way
 
 
@@ -40,6 +40,12 @@ class Point:
     def share(self) -> float:
         """Part of the tangent's length that is the parameter's, signed; zero at a fold."""
         return float(self.tangent[-1] * math.sqrt(self.metric[-1, -1]))
+
+    @property
+    def size(self) -> float:
+        """The orbit's size in units of the first one's."""
+        y = np.append(self.chain.x.ravel(), 0.0)
+        return math.sqrt(y @ self.metric @ y)
 
 
 def metric_of(problem: Problem, parameter: float, x: Array, width: float) -> Array:
@@ -93,7 +99,7 @@ def moved(a: Point, guess: Array, straight: bool) -> Point:
     return point_of(a.problem, *corrected(a, guess, straight, True), a.metric, a.tangent)
 
 
-def is_straight(*points: Point) -> bool:
-    """Whether the parameter moves steadily in one direction over these points."""
-    shares = [point.share for point in points]
-    return min(shares) > _STEEP or max(shares) < -_STEEP
+def is_straight(*shares: float) -> bool:
+    """Whether the parameter's shares of some tangents tell that no fold is near."""
+    least, most = min(np.abs(shares)), max(np.abs(shares))
+    return bool(least > max(_STEEP, 0.3 * most) and abs(np.sign(shares).sum()) == len(shares))

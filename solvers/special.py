@@ -71,7 +71,7 @@ class Stretch:
     trials: dict[float, tuple[Chain, Orbit]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.straight = is_straight(self.a, self.b)
+        self.straight = is_straight(self.a.share, self.b.share)
         none = np.zeros_like(self.a.tangent)
         self.known = [(0.0, none), (self.way, none)]
 
