@@ -32,6 +32,7 @@ _GOOD = 0.06, 0.1  # distance of a good guess from the branch, in units of the s
 _MANY = 6  # Newton iterations that ask for shorter steps
 _SHARPEST = 0.8  # cosine of the largest turn between two orbits
 _KINK = 3e-6  # arclength step below which a turn counts as a kink of the branch
+_NEAR_KINK = 1e-4  # arclength step below which a fold may hide behind a kink
 _FARTHEST = 20.0  # distance of an orbit from the one before, in steps, beyond which it belongs to another branch
 _MARGIN = 0.1  # of the longest quiet time that must lie on both sides of a shot's begin
 
@@ -76,8 +77,11 @@ class Arm:
         a = self.point
         way = float(a.tangent @ a.metric @ (following.unknowns - a.unknowns))
         special = between(a, following, way) if way > 0.0 else []  # less only where it turned at a kink
-        self.orbits += [*special, following.orbit]
         kink = way <= 0.0 or any(orbit.mark == "grazing" for orbit in special)
+        if way > _KINK and not kink and len(a.orbit.contacts) != len(following.orbit.contacts):
+            self.status, self.step = BranchStatus.RUNNING, 0.2 * way  # without a grazing it is on another branch
+            return
+        self.orbits += [*special, following.orbit]
         self.before = None if kink else (a, way)  # no cubic across it
         if self.status is BranchStatus.RUNNING:
             self._finish_or_go_on(following)
@@ -87,7 +91,7 @@ class Arm:
         a, h = self.point, self.step
         guess = self._ahead()
         try:
-            b = moved(a, guess, self._is_straight(guess)) if self._inside(guess) else self._at_edge(guess)
+            b = self._near(guess) if self._inside(guess) else self._at_edge(guess)
             b = b if self._inside(b.unknowns) else self._at_edge(b.unknowns)
         except (OrbitError, np.linalg.LinAlgError):
             return self._shorter(0.3)
@@ -103,7 +107,8 @@ class Arm:
         good = _GOOD[self.before is None] * h / max(math.sqrt(miss @ a.metric @ miss), 1e-9 * h)
         longer = min(good if self.before is None else good ** (1.0 / 3.0), 3.0)
         largest = self.largest * max(1.0, b.size)
-        self.step = min(h * (max(longer, 0.5) if b.orbit.iterations < _MANY else 0.5), largest)
+        shortest = 0.5 if h > _KINK else 1.0
+        self.step = min(h * (max(longer, shortest) if b.orbit.iterations < _MANY else shortest), largest)
         return b
 
     def _ahead(self) -> Array:
@@ -114,6 +119,16 @@ class Arm:
             return a.unknowns + self.step * a.tangent
         last, way = self.before
         return cubic(last, a, way, way + self.step)
+
+    def _near(self, guess: Array) -> Point:
+        """The point near a guess, in the cheaper way if that will do."""
+        straight = self._is_straight(guess)
+        try:
+            return moved(self.point, guess, straight)
+        except OrbitError:
+            if self.step > _NEAR_KINK or not straight:
+                raise
+            return moved(self.point, guess, False)
 
     def _is_straight(self, guess: Array) -> bool:
         """Whether to hold the parameter fixed: no fold is near, by the points known and the guess."""

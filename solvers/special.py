@@ -14,7 +14,7 @@ that jumps over the unit circle at a grazing has no flip of its own: only the gr
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any
@@ -29,7 +29,7 @@ from solvers.system import Array
 _ROUNDING = 1e-9  # of the test functions: what is at a special point all along is marked nowhere
 _SHARP = 1e-10  # of the parameter, or of the way between the points: how sharply a point is located
 _AT = 1e-4  # distance from the unit circle of the multiplier at what passes for a special point
-_MOST_TRIALS = 40
+_MOST_TRIALS = 25
 _MOST_GRAZINGS = 4  # looked for between two points
 
 
@@ -159,26 +159,28 @@ def _grazings(stretch: Stretch) -> Iterator[tuple[float, Orbit]]:
 
 
 def _grazing(stretch: Stretch, begin: float, first: Orbit) -> tuple[float, Orbit, float, Orbit] | None:
-    """Where the number of contacts changes first after a place: (arclength, orbit that touches, place behind, orbit).
+    """Where the number of contacts changes first after a place: arclength, marked orbit, place behind it, orbit there.
 
-    There the indentation of the shallowest contact goes to zero.
+    There the shallowest contact's indentation goes to zero, or the flight between two contacts that become one.
     """
     last, behind = stretch.b.orbit, stretch.way
     more = len(last.contacts) > len(first.contacts)  # whether contacts are added on the way
-    near, near_orbit, known = begin, first, [(behind, _shallowest(last)) if more else (begin, _shallowest(first))]
+    distance = _distance(last, first) if more else _distance(first, last)
+    near, near_orbit = begin, first
+    known = [(behind, distance(last)) if more else (begin, distance(first))]  # on the side with more contacts
     sharp = stretch.sharpness()
     for _ in range(_MOST_TRIALS):
-        if abs(behind - near) <= sharp:
-            break
         touched, bare = (behind, near) if more else (near, behind)
         place = 0.5 * (touched + bare)
+        root = touched + 2.0 * sharp
         if len(known) > 1 and known[-1][1] != known[-2][1]:
             (s0, f0), (s1, f1) = known[-2:]
             root = s1 - f1 * (s1 - s0) / (f1 - f0)
-            if abs(root - touched) <= sharp:
-                break
             if min(bare, touched) < root < max(bare, touched):
                 place = root + 0.01 * (touched - root)
+        if abs(behind - near) <= sharp or abs(root - touched) <= sharp:
+            at, touching = (behind, last) if more else (near, near_orbit)
+            return at, replace(touching, mark="grazing"), behind, last
         try:
             orbit = stretch.at(place)[1]
         except OrbitError:
@@ -189,11 +191,27 @@ def _grazing(stretch: Stretch, begin: float, first: Orbit) -> tuple[float, Orbit
         else:
             behind, last = place, orbit
         if same != more:
-            known.append((place, _shallowest(orbit)))
-    touched_at, touching = (behind, last) if more else (near, near_orbit)
-    return touched_at, replace(touching, mark="grazing"), behind, last
+            known.append((place, distance(orbit)))
+    return None
+
+
+def _distance(more: Orbit, less: Orbit) -> Callable[[Orbit], float]:
+    """What goes to zero where an orbit loses a contact another has."""
+    a, b = more.contacts, less.contacts
+    apart = (a.t_in[:, None] > b.t_out) | (a.t_out[:, None] < b.t_in) | (a.stop[:, None] != b.stop)
+    return _shallowest if np.any(np.all(apart, axis=1)) else _shortest_flight
 
 
 def _shallowest(orbit: Orbit) -> float:
     """Smallest peak indentation of an orbit's contacts."""
     return float(orbit.contacts.peak_indentation.min(initial=np.inf))
+
+
+def _shortest_flight(orbit: Orbit) -> float:
+    """Square of the shortest time between two contacts of one stop: it vanishes like a root."""
+    log, shortest = orbit.contacts, orbit.period
+    for stop in np.unique(log.stop):
+        mine = log.stop == stop
+        begins, ends = np.sort(log.t_in[mine]), np.sort(log.t_out[mine])
+        shortest = min(shortest, float((np.append(begins[1:], begins[0] + orbit.period) - ends).min()))
+    return shortest**2
