@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from solvers.birth import Scaled, birth
 from solvers.chain import Chain, Problem, delayed
 from solvers.correction import newton
 from solvers.periodic import Orbit, OrbitError, at_zero, flown, orbit_of
@@ -44,6 +45,7 @@ class BranchStatus(Enum):
     END = "reached the end of the span"
     CLOSED = "closed: came back to its first orbit"
     RETURNED = "came back to an orbit it had passed: it turned round or went over to another branch"
+    BORN = "reached its birth at a flip of the branch of half the period"
     LOST = "lost: no orbit was found however small the step"
     LIMIT = f"stopped after {MOST_ORBITS} orbits"
 
@@ -81,6 +83,12 @@ class Arm:
         if way > _KINK and not kink and len(a.orbit.contacts) != len(following.orbit.contacts):
             self.status, self.step = BranchStatus.RUNNING, 0.2 * way  # without a grazing it is on another branch
             return
+        for place, fold in enumerate(special):
+            born = birth(a, following, fold) if fold.mark == "fold" else None
+            if born is not None:
+                self.status = BranchStatus.BORN
+                self.orbits += [*special[:place], born]
+                return
         self.orbits += [*special, following.orbit]
         self.before = None if kink else (a, way)  # no cubic across it
         if self.status is BranchStatus.RUNNING:
@@ -307,7 +315,7 @@ class Branch:
         arm = self.arms[0]
         old = arm.first.problem
         fraction = flip.phase / flip.period
-        problem = Problem(_Twice(old.make), old.method, (0.5 * fraction, 0.5 * fraction + 0.5), old.step)
+        problem = Problem(Scaled(old.make, 2.0), old.method, (0.5 * fraction, 0.5 * fraction + 0.5), old.step)
         values, vectors = np.linalg.eig(flip.monodromy)
         v = vectors[:, np.argmin(np.abs(values + 1.0))].real
         x = np.array([flip.state, flip.state])
@@ -317,17 +325,6 @@ class Branch:
         chain = problem.evaluate(x, flip.parameter)
         orbit = orbit_of(problem, chain, flip.residual, 0, parameter=flip.parameter, mark="flip")
         return Branch([Arm(Point(orbit, problem, chain, tangent, metric), arm.span, arm.largest)])
-
-
-@dataclass(frozen=True)
-class _Twice:
-    """A family seen over two of its periods."""
-
-    make: Callable[[float], tuple[System, float]]
-
-    def __call__(self, parameter: float) -> tuple[System, float]:
-        system, period = self.make(parameter)
-        return system, 2.0 * period
 
 
 def branch(

@@ -121,17 +121,25 @@ def checked(system: System, period: float, method: Any, shots: int | None) -> An
     if not getattr(method, "has_tangent", False):
         raise ValueError(f"method must offer tangents, such as Exponential(), got {method!r}")
     check_slopes(system)
+    if trouble := misfit(system, period):
+        raise ValueError(trouble)
+    return method
+
+
+def misfit(system: System, period: float) -> str:
+    """Which load does not have a period, in words; empty when all have it."""
     for load, (_, signal) in enumerate(system.loads):
+        trouble = f"load {load} does not have the period {period:g} s"
         if not hasattr(signal, "tones"):
             probe = period * np.linspace(0.0, 1.0, 17)
             first, second = np.asarray(signal(probe)), np.asarray(signal(probe + period))
             if np.abs(first - second).max() > 1e-9 * np.abs(first).max():
-                raise ValueError(f"load {load} does not have the period {period:g} s")
+                return trouble
             continue
         cycles = np.asarray(signal.tones()[0]) * period / (2.0 * math.pi)
         if np.abs(cycles - np.round(cycles)).max(initial=0.0) > 1e-9 * max(cycles.max(initial=0.0), 1.0):
-            raise ValueError(f"load {load} does not have the period {period:g} s: it makes {cycles} cycles in it")
-    return method
+            return f"{trouble}: it makes {cycles} cycles in it"
+    return ""
 
 
 def checked_start(system: System, start: ArrayLike) -> Array:
