@@ -79,9 +79,9 @@ class Arm:
         a = self.point
         way = float(a.tangent @ a.metric @ (following.unknowns - a.unknowns))
         special = between(a, following, way) if way > 0.0 else []  # less only where it turned at a kink
-        kink = way <= 0.0 or any(orbit.mark == "grazing" for orbit in special)
-        if way > _KINK and not kink and len(a.orbit.contacts) != len(following.orbit.contacts):
-            self.status, self.step = BranchStatus.RUNNING, 0.2 * way  # without a grazing it is on another branch
+        marks = [orbit.mark for orbit in special]
+        if way > _KINK and _jumped(a, following, marks):
+            self.status, self.step = BranchStatus.RUNNING, 0.2 * way
             return
         for place, fold in enumerate(special):
             born = birth(a, following, fold) if fold.mark == "fold" else None
@@ -90,7 +90,7 @@ class Arm:
                 self.orbits += [*special[:place], born]
                 return
         self.orbits += [*special, following.orbit]
-        self.before = None if kink else (a, way)  # no cubic across it
+        self.before = None if way <= 0.0 or "grazing" in marks else (a, way)  # no cubic across a kink
         if self.status is BranchStatus.RUNNING:
             self._finish_or_go_on(following)
 
@@ -194,6 +194,12 @@ class Arm:
         distance = np.einsum("ki,ij,kj->k", off, point.metric, off)
         near = (share > 0.0) & (share <= 1.0) & (np.abs(aligned) > 0.5) & (distance < 1e-2 * length)
         return next((known[k] for k in np.flatnonzero(near) if _is_passed(self.passed[known[k]], a, point)), None)
+
+
+def _jumped(a: Point, b: Point, marks: list[str]) -> bool:
+    """Whether b lies on another branch: between them the parameter turns without a fold, or contacts come unseen."""
+    turned, changed = a.share * b.share < 0.0, len(a.orbit.contacts) != len(b.orbit.contacts)
+    return "grazing" not in marks and (changed or (turned and "fold" not in marks))
 
 
 def _is_passed(known: Point, a: Point, b: Point) -> bool:
