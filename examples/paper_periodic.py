@@ -20,7 +20,7 @@ from contacts import Hysteretic
 
 TIP = 0.24445
 STARTS = {1: 215.0, 2: 430.0, 3: 650.0}  # rad/s where each branch is looked for, by its period
-SPANS = {1: (150.0, 900.0), 2: (370.0, 900.0), 3: (600.0, 900.0)}
+SPANS = dict.fromkeys(STARTS, (60.0, 900.0))
 if "--wide" in sys.argv:
     SPANS = dict.fromkeys(STARTS, (60.0, 900.0))
 if "--quick" in sys.argv:
