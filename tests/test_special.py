@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from oscillators import Bilinear, Tone
 
+import solvers.arm
 import solvers.chain
-import solvers.continuation
 from contacts import Hertz, Hysteretic, PiecewiseLinear, law
 from solvers import Contact, OrbitError, System, branch
 from solvers.continuation import BranchStatus
@@ -114,7 +114,7 @@ def test_random_systems_always_end_with_a_status(seed, monkeypatch):
         return evaluate(*arguments)
 
     monkeypatch.setattr(solvers.chain.Problem, "evaluate", counted)
-    monkeypatch.setattr(solvers.continuation, "MOST_ORBITS", 40)
+    monkeypatch.setattr(solvers.arm, "MOST_ORBITS", 40)
     try:
         found = branch(make, span, np.zeros(2 * modes), step=0.3).run()
     except OrbitError as error:
