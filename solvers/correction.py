@@ -19,6 +19,7 @@ from solvers.system import Array, System
 TOLERANCE = 1e-10  # of the residual, in units of the orbit's size
 _NEARLY = 1e-5  # relative residual after which the next step is expected to be the last
 _MOST_HALVINGS = 6
+_DEEPEST = 1e3  # energy of a stop in units of the motion's: a period spent deeper takes as long as thousands elsewhere
 
 
 def weights(system: System, period: float) -> Array:
@@ -93,7 +94,7 @@ class _Measure:
     """
 
     def __init__(self, problem: Problem) -> None:
-        self.problem, self.first = problem, 0.0
+        self.problem, self.first, self.stored = problem, 0.0, 0.0
 
     def __call__(self, chain: Chain) -> float:
         """Relative residual."""
@@ -103,14 +104,31 @@ class _Measure:
             float(np.linalg.norm(part @ self.W.T, axis=1).max())
             for part in (chain.x, chain.x + np.roll(chain.residual, 1, axis=0), chain.residual)
         )
-        self.first = self.first or max(size, ends)
+        if not self.first:
+            self.first, self.stored = max(size, ends), self._held(chain.x, chain.parameter)
         return residual / max(min(size, 1e3 * self.first), 1e-4 * self.first, 1e-300)
+
+    def too_deep(self, x: Array, parameter: float) -> bool:
+        """Whether a guess has left the motion for the inside of a stop."""
+        return self.first > 0.0 and self._held(x, parameter) > _DEEPEST * (self.first**2 + self.stored)
+
+    def _held(self, x: Array, parameter: float) -> float:
+        """Largest force times indentation of the stops."""
+        system, _ = self.problem.make(parameter)
+        most = 0.0
+        for contact in system.contacts:
+            delta = float((-x[:, : system.size] @ contact.direction).max()) - contact.gap
+            most = max(most, abs(float(contact.law.force(delta, 0.0, 1.0))) * delta if delta > 0.0 else 0.0)
+        return most
 
 
 def _fire(problem: Problem, unknowns: Array, measure: _Measure, slope: bool) -> tuple[Any, float]:
     """The chain at given unknowns and its relative residual, inf where it cannot be integrated."""
+    x, parameter = unknowns[:-1].reshape(len(problem.fractions), -1), float(unknowns[-1])
     try:
-        chain = problem.evaluate(unknowns[:-1].reshape(len(problem.fractions), -1), float(unknowns[-1]), slope)
+        if measure.too_deep(x, parameter):
+            return None, math.inf
+        chain = problem.evaluate(x, parameter, slope)
         error = measure(chain)
     except (SolverError, ValueError, ArithmeticError):
         return None, math.inf
