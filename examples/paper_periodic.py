@@ -21,9 +21,8 @@ import fembeam as fb
 from contacts import Hysteretic
 
 TIP = 0.24445
-STARTS = {1: 215.0, 2: 430.0, 3: 650.0}  # rad/s where each branch is looked for, by its period
+STARTS, MOST = {1: 215.0, 2: 430.0, 3: 650.0}, 750  # rad/s where a branch is looked for, by its period; its orbits
 SPANS = dict.fromkeys(STARTS, (60.0, 900.0))
-MOST = 750  # orbits of a branch
 if "--quick" in sys.argv:
     SPANS = {1: (190.0, 240.0), 2: (385.0, 470.0), 3: (610.0, 690.0)}
 TOPS = {1: (150.0, 330.0), 2: (370.0, 560.0), 3: (600.0, 740.0)}  # rad/s around each resonance
@@ -43,8 +42,8 @@ def branches(model):
     found, seconds = [], 0.0
     for period, omega in STARTS.items():
         start = next(a.orbit for a in model.attractors(omega, starts=6) if a.period == period)
-        begin = time.perf_counter()
         found.append(model.branch("omega", SPANS[period], period, start, at=omega))
+        begin = time.perf_counter()
         deque(islice(found[-1], MOST), maxlen=0)
         seconds += time.perf_counter() - begin
     return found, seconds
