@@ -167,7 +167,12 @@ class Arm:
         self.passed.append(point)
         if point.problem.fractions != a.problem.fractions:
             return None
-        known = [i for i, p in enumerate(self.passed[:-4]) if p.problem.fractions == a.problem.fractions]
+        low, high = sorted((a.chain.parameter, point.chain.parameter))
+        known = [
+            i
+            for i, p in enumerate(self.passed[:-4])
+            if low <= p.chain.parameter <= high and p.problem.fractions == a.problem.fractions
+        ]
         if not known:
             return None
         way = point.unknowns - a.unknowns
