@@ -18,7 +18,7 @@ from fembeam.orbit import Orbit, checked_period, load_period, orbit
 from fembeam.parameters import changes_structure, path_of, replaced, value_of
 from fembeam.run import written_whole
 from fembeam.section import require
-from solvers.continuation import restored
+from solvers.restored import restored
 
 if TYPE_CHECKING:
     from fembeam.model import Model

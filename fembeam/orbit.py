@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import solvers
 from fembeam.section import require
-from solvers import shooting
+from solvers import chain, periodic, shooting
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -131,7 +131,7 @@ def orbit(model: Model, period: int, start: ArrayLike | Orbit | None, shots: int
     if start is None:
         return _from_nothing(model, count, once, shots)
     if isinstance(start, Orbit):
-        start = shooting.at_zero(start.found)
+        start = periodic.at_zero(start.found)
     found = Orbit(model, solvers.orbit(model.system, count * once, start, shots=shots), count)
     _check_smallest(found, once)
     return found
@@ -151,8 +151,8 @@ def _check_smallest(orbit: Orbit, once: float) -> None:
     for shorter in range(1, orbit.period):
         if orbit.period % shorter:
             continue
-        later = shooting.delayed(orbit.model.system, orbit.found.phase)
-        end = shooting.flown(later, orbit.state, shorter * once, orbit.found.method)
+        later = chain.delayed(orbit.model.system, orbit.found.phase)
+        end = periodic.flown(later, orbit.state, shorter * once, orbit.found.method)
         scale = np.concatenate(
             (np.repeat(np.abs(orbit.state[:n]).max(), n), np.repeat(np.abs(orbit.state[n:]).max(), n))
         )
@@ -263,9 +263,9 @@ def _same(a: Orbit | None, b: Orbit | None, once: float) -> bool:
         return a is b
     if a.period != b.period or len(a.contacts) != len(b.contacts):
         return False
-    x, y = shooting.at_zero(a.found), shooting.at_zero(b.found)
+    x, y = periodic.at_zero(a.found), periodic.at_zero(b.found)
     for _ in range(a.period):
         if np.linalg.norm(x - y) <= 1e-5 * np.linalg.norm(x):
             return True
-        y = shooting.flown(b.model.system, y, once, b.found.method)
+        y = periodic.flown(b.model.system, y, once, b.found.method)
     return False

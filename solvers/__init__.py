@@ -23,8 +23,8 @@ _LATER = {
     "lumped": "newmark",
     "lyapunov": "lyapunov",
     "orbit": "shooting",
-    "Orbit": "shooting",
-    "OrbitError": "shooting",
+    "Orbit": "periodic",
+    "OrbitError": "periodic",
     "branch": "continuation",
     "Branch": "continuation",
 }

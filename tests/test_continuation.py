@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from oscillators import Bilinear, Duffing, Tone
 
-import solvers.continuation
+import solvers.arm
 from contacts import law
 from solvers import Contact, Exponential, OrbitError, System, branch, integrate, orbit
 from solvers.continuation import BranchStatus
@@ -246,7 +246,7 @@ def test_a_problem_that_ends_within_the_span_is_lost():
 
 
 def test_a_resonance_without_damping_never_ends_the_program(monkeypatch):
-    monkeypatch.setattr(solvers.continuation, "MOST_ORBITS", 25)
+    monkeypatch.setattr(solvers.arm, "MOST_ORBITS", 25)
     problem = Bilinear(0.6, zeta=0.0, gap=1e9)
     found = branch(over(problem), (0.6, 1.5), problem.steady(False, 0.0), step=0.2).run()
     assert found.status[0] in (BranchStatus.LIMIT, BranchStatus.LOST)

@@ -1,0 +1,207 @@
+"""One direction of a branch: how long a step to take, what to refuse, where it ends."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from enum import Enum
+
+import numpy as np
+
+from solvers.birth import birth
+from solvers.later import is_cut, with_quiet_begin
+from solvers.periodic import Orbit, OrbitError
+from solvers.point import Point, corrected, cubic, is_straight, moved
+from solvers.special import between
+from solvers.system import Array
+
+MOST_ORBITS = 2000
+_SMALLEST = 3e-7  # arclength step at which a branch counts as lost
+_GOOD = 0.06, 0.1  # distance of a good guess from the branch, in units of the step: on a cubic, on the tangent
+_MANY = 6  # Newton iterations that ask for shorter steps
+_SHARPEST = 0.8  # cosine of the largest turn between two orbits
+_KINK = 3e-6  # arclength step below which a turn counts as a kink of the branch
+_NEAR_KINK = 1e-4  # arclength step below which a fold may hide behind a kink
+_FARTHEST = 20.0  # distance of an orbit from the one before, in steps, beyond which it belongs to another branch
+
+
+class BranchStatus(Enum):
+    """How a branch ended, as a sentence."""
+
+    RUNNING = "not finished yet"
+    END = "reached the end of the span"
+    CLOSED = "closed: came back to its first orbit"
+    RETURNED = "came back to an orbit it had passed: it turned round or went over to another branch"
+    BORN = "reached its birth at a flip of the branch of half the period"
+    LOST = "lost: no orbit was found however small the step"
+    LIMIT = f"stopped after {MOST_ORBITS} orbits"
+
+
+@dataclass(eq=False)
+class Arm:
+    """One direction of a branch, walked as far as it has been asked for."""
+
+    point: Point
+    span: tuple[float, float]
+    largest: float
+    orbits: list[Orbit] = field(default_factory=list)
+    status: BranchStatus = BranchStatus.RUNNING
+    step: float = 0.0
+    before: tuple[Point, float] | None = None  # the point before and the way from it
+    passed: list[Point] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.first, self.step = self.point, self.step or 0.2 * self.largest
+        self.orbits = [self.point.orbit]
+        self.passed = [self.point]
+
+    def extend(self) -> None:
+        """Find the next orbit and the special points before it, or an end of the branch."""
+        following = None
+        while following is None:
+            if self.step < _SMALLEST:
+                self.status = BranchStatus.LOST
+                return
+            following = self._next()
+        a = self.point
+        way = float(a.tangent @ a.metric @ (following.unknowns - a.unknowns))
+        special = between(a, following, way) if way > 0.0 else []  # less only where it turned at a kink
+        marks = [orbit.mark for orbit in special]
+        if way > _KINK and _jumped(a, following, marks):
+            self.status, self.step = BranchStatus.RUNNING, 0.2 * way
+            return
+        for place, fold in enumerate(special):
+            born = birth(a, following, fold) if fold.mark == "fold" else None
+            if born is not None:
+                self.status = BranchStatus.BORN
+                self.orbits += [*special[:place], born]
+                return
+        self.orbits += [*special, following.orbit]
+        self.before = None if way <= 0.0 or "grazing" in marks else (a, way)  # no cubic across a kink
+        if self.status is BranchStatus.RUNNING:
+            self._finish_or_go_on(following)
+
+    def _next(self) -> Point | None:
+        """The point a step ahead, the one at the end of the span if that is nearer, or None after a shorter step."""
+        a, h = self.point, self.step
+        guess = self._ahead()
+        try:
+            b = self._near(guess) if self._inside(guess) else self._at_edge(guess)
+            b = b if self._inside(b.unknowns) else self._at_edge(b.unknowns)
+        except (OrbitError, np.linalg.LinAlgError):
+            self.step *= 0.3
+            return None
+        off, miss = b.unknowns - a.unknowns, b.unknowns - guess
+        way, aligned = float(a.tangent @ a.metric @ off), float(a.tangent @ a.metric @ b.tangent)
+        strayed = math.sqrt(max(float(off @ a.metric @ off) - way**2, 0.0))
+        sharp = aligned < _SHARPEST or strayed > 0.5 * way
+        if (sharp and h > _KINK) or strayed > _FARTHEST * h or is_cut(b):  # a branch has kinks where contacts graze
+            self.step *= 0.2 if len(a.orbit.contacts) != len(b.orbit.contacts) else 0.5
+            return None
+        if b.chain.parameter in self.span:
+            self.status = BranchStatus.END
+            return b
+        good = _GOOD[self.before is None] * h / max(math.sqrt(miss @ a.metric @ miss), 1e-9 * h)
+        longer = min(good if self.before is None else good ** (1.0 / 3.0), 3.0)
+        largest = self.largest * max(1.0, b.size)
+        shortest = 0.5 if h > _KINK else 1.0
+        self.step = min(h * (max(longer, shortest) if b.orbit.iterations < _MANY else shortest), largest)
+        return b
+
+    def _ahead(self) -> Array:
+        """Guess of the unknowns a step ahead: along the tangent, or on the cubic through the point before too."""
+        a = self.point
+        if self.before is None or self.before[0].problem is not a.problem:
+            self.before = None
+            return a.unknowns + self.step * a.tangent
+        last, way = self.before
+        return cubic(last, a, way, way + self.step)
+
+    def _near(self, guess: Array) -> Point:
+        """The point near a guess, in the cheaper way if that will do."""
+        straight = self._is_straight(guess)
+        try:
+            return moved(self.point, guess, straight)
+        except OrbitError:
+            if self.step > _NEAR_KINK or not straight:
+                raise
+            return moved(self.point, guess, False)
+
+    def _is_straight(self, guess: Array) -> bool:
+        """Whether to hold the parameter fixed: no fold is near, by the points known and the guess."""
+        a = self.point
+        if self.before is None:
+            return abs(a.share) > 0.2
+        last, way = self.before
+        ahead = a.share + (a.share - last.share) * self.step / way
+        moved_on = (guess[-1] - a.chain.parameter) * a.tangent[-1] > 0.0
+        return moved_on and is_straight(last.share, a.share, ahead)
+
+    def _inside(self, unknowns: Array) -> bool:
+        """Whether the parameter lies in the span."""
+        return bool(self.span[0] <= unknowns[-1] <= self.span[1])
+
+    def _at_edge(self, beyond: Array) -> Point:
+        """The point at the end of the span on the way to a place beyond it."""
+        a = self.point
+        edge = self.span[0] if beyond[-1] < self.span[0] else self.span[1]
+        share = (edge - a.chain.parameter) / (beyond[-1] - a.chain.parameter)
+        guess = a.unknowns + share * (beyond - a.unknowns)
+        guess[-1] = edge
+        return moved(a, guess, True)
+
+    def _finish_or_go_on(self, point: Point) -> None:
+        """Recognise orbits passed before and the limit."""
+        met = self._met(point)
+        if met is not None:
+            self.status = BranchStatus.CLOSED if met == 0 else BranchStatus.RETURNED
+            self.orbits += [self.first.orbit] if met == 0 else []
+        elif len(self.orbits) >= MOST_ORBITS:
+            self.status = BranchStatus.LIMIT
+        else:
+            self.point = with_quiet_begin(point)
+
+    def _met(self, point: Point) -> int | None:
+        """Number of an orbit passed before that lies on the way just gone; 0 is the first."""
+        a = self.point
+        self.passed.append(point)
+        if point.problem.fractions != a.problem.fractions:
+            return None
+        low, high = sorted((a.chain.parameter, point.chain.parameter))
+        known = [
+            i
+            for i, p in enumerate(self.passed[:-4])
+            if low <= p.chain.parameter <= high and p.problem.fractions == a.problem.fractions
+        ]
+        if not known:
+            return None
+        way = point.unknowns - a.unknowns
+        length = float(way @ point.metric @ way)
+        off = np.array([self.passed[i].unknowns for i in known]) - a.unknowns
+        share = off @ (point.metric @ way) / length
+        off -= np.outer(share, way)
+        aligned = np.array([self.passed[i].tangent for i in known]) @ (point.metric @ point.tangent)
+        distance = np.einsum("ki,ij,kj->k", off, point.metric, off)
+        near = (share > 0.0) & (share <= 1.0) & (np.abs(aligned) > 0.5) & (distance < 1e-2 * length)
+        return next((known[k] for k in np.flatnonzero(near) if _is_passed(self.passed[known[k]], a, point)), None)
+
+
+def _jumped(a: Point, b: Point, marks: list[str]) -> bool:
+    """Whether b lies on another branch: between them the parameter turns without a fold, or contacts come unseen."""
+    turned, changed = a.share * b.share < 0.0, len(a.orbit.contacts) != len(b.orbit.contacts)
+    return "grazing" not in marks and (changed or (turned and "fold" not in marks))
+
+
+def _is_passed(known: Point, a: Point, b: Point) -> bool:
+    """Whether an orbit lies on the branch between two points, which others near it do not."""
+    way = float(a.tangent @ a.metric @ (b.unknowns - a.unknowns))
+    share = (known.chain.parameter - a.chain.parameter) / (b.chain.parameter - a.chain.parameter)
+    if not (way > 0.0 and 0.0 <= share <= 1.0):
+        return False
+    guess = np.append(cubic(a, b, way, share * way)[:-1], known.chain.parameter)
+    try:
+        chain, *_ = corrected(a, guess, True)
+    except (OrbitError, np.linalg.LinAlgError):
+        return False
+    off = np.append(chain.x.ravel(), chain.parameter) - known.unknowns
+    return bool(off @ a.metric @ off < 1e-12)

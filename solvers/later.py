@@ -1,0 +1,67 @@
+"""Shots of a branch that begin later, because a contact with memory has come near one of their begins."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from solvers.chain import Chain, delayed
+from solvers.correction import newton
+from solvers.periodic import OrbitError, flown
+from solvers.point import Point, point_of
+from solvers.quiet import quiet_begins, with_memory
+from solvers.system import Array, System
+
+_MARGIN = 0.1  # of the longest quiet time that must lie on both sides of a shot's begin
+
+
+def is_cut(point: Point) -> bool:
+    """Whether a contact with memory is under way where a shot begins."""
+    system, log = point.orbit.system, [solution.contacts for solution in point.chain.solutions]
+    return any(
+        np.any(np.isin(one.stop, with_memory(system)) & ((one.t_in == 0.0) | np.isnan(one.t_out))) for one in log
+    )
+
+
+def with_quiet_begin(point: Point) -> Point:
+    """The same point, its shots begun later where a contact has come near one of their begins."""
+    orbit, m = point.orbit, len(point.problem.fractions)
+    log, period = orbit.contacts, orbit.period
+    offsets = [(f - point.problem.fractions[0]) * period for f in point.problem.fractions]
+    mine = np.isin(log.stop, with_memory(orbit.system))
+    times = np.concatenate((log.t_in[mine], log.t_out[mine], log.t_out[mine] - period))
+    if min(np.abs(times - t).min(initial=period) for t in offsets) > _MARGIN * period / (1 + len(log)):
+        return point
+    begins = quiet_begins(orbit.system, log, period, m, False)
+    if len(begins) < m:
+        return point
+    later = delayed(orbit.system, orbit.phase)
+    x = np.array([flown(later, orbit.state, t, orbit.method) for t in begins])
+    fractions = [(orbit.phase + t) / period for t in begins]
+    turns = math.floor(fractions[0])
+    problem = replace(point.problem, fractions=tuple(f - turns for f in fractions))
+    try:
+        chain, error, iterations = newton(problem, x, point.chain.parameter, slope=True)
+    except OrbitError:
+        return point
+    return point_of(problem, chain, error, iterations, point.metric, _carried(point, chain, begins))
+
+
+def _carried(point: Point, chain: Chain, begins: list[float]) -> Array:
+    """The tangent seen from later begins."""
+    shift, n2 = begins[0], chain.x.shape[1]
+    there = replace(point.problem, fractions=(point.problem.fractions[0],))
+    make = there.make
+
+    def shortened(parameter: float) -> tuple[System, float]:
+        system, period = make(parameter)
+        return delayed(system, there.fractions[0] * period), shift / point.orbit.period * period
+
+    carried = replace(there, make=shortened, fractions=(0.0,)).evaluate(point.chain.x[:1], chain.parameter)
+    first = carried.tangents[0] @ point.tangent[:n2] + carried.by_parameter[0] * point.tangent[-1]
+    states = [first]
+    for tangent, column in zip(chain.tangents[:-1], chain.by_parameter[:-1], strict=True):
+        states.append(tangent @ states[-1] + column * point.tangent[-1])
+    return np.append(np.concatenate(states), point.tangent[-1])

@@ -1,0 +1,124 @@
+"""A periodic motion: its state, contacts, Floquet multipliers, and what speaks against the verdict on its stability."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from solvers.chain import Chain, Problem, delayed
+from solvers.exponential import Exponential
+from solvers.integration import integrate
+from solvers.result import ContactLog, Solution, SolverError
+from solvers.system import Array, System
+
+_NEAR_ONE = 0.01  # | |μ| - 1 | below which a verdict on stability is doubtful
+
+
+class OrbitError(SolverError):
+    """No orbit was found; the message says what was tried, ``solution`` is the last attempt."""
+
+
+@dataclass(frozen=True, eq=False)
+class Orbit:
+    """A periodic motion.
+
+    Attributes
+    ----------
+    state : (2n,) [q, q̇] at time ``phase`` within the period.
+    period : s. phase : s, 0 unless a stop whose law latches its entry rate is closed then.
+    monodromy : (2n, 2n) derivative of the state one period later. multipliers : its eigenvalues, largest first.
+    residual : size of Φ(x) - x relative to the orbit's. iterations : of Newton's method.
+    contacts : log of one period, times counted from ``phase``.
+    doubt : why the verdict on stability may be wrong; empty when nothing speaks against it.
+    parameter : value of the branch's parameter, NaN outside a branch.
+    mark : "fold", "flip", "neimark-sacker", "branch point" or "grazing" at special points of a branch, else empty.
+    """
+
+    state: Array
+    period: float
+    phase: float
+    monodromy: Array
+    residual: float
+    iterations: int
+    contacts: ContactLog
+    system: System
+    method: Any
+    doubt: str = ""
+    parameter: float = math.nan
+    mark: str = ""
+
+    @property
+    def multipliers(self) -> Any:
+        """Floquet multipliers (2n,), largest first."""
+        values = np.linalg.eigvals(self.monodromy)
+        return values[np.argsort(-np.abs(values), kind="stable")]
+
+    @property
+    def stable(self) -> bool:
+        """Whether every multiplier lies within the unit circle."""
+        return bool(np.abs(self.multipliers[0]) < 1.0)
+
+    def samples(self, count: int = 400) -> Solution:
+        """One period from ``phase`` on at ``count`` + 1 times, times counted from ``phase``."""
+        n, x = self.system.size, self.state
+        later = delayed(self.system, self.phase)
+        method = replace(self.method, ledger=False) if isinstance(self.method, Exponential) else self.method
+        return integrate(later, x[:n], x[n:], self.period, self.period / count, method)
+
+
+def at_zero(orbit: Orbit) -> Array:
+    """State of an orbit at t = 0."""
+    if orbit.phase == 0.0:
+        return orbit.state
+    return flown(delayed(orbit.system, orbit.phase), orbit.state, orbit.period - orbit.phase, orbit.method)
+
+
+def flown(system: System, x: Array, duration: float, method: Any) -> Array:
+    """State after a duration."""
+    n = system.size
+    end = integrate(system, x[:n], x[n:], duration, method=method)
+    state: Array = np.concatenate((end.q[-1], end.q_dot[-1]))
+    return state
+
+
+def orbit_of(problem: Problem, chain: Chain, residual: float, iterations: int, **more: Any) -> Orbit:
+    """The orbit a solved chain describes."""
+    system, period = problem.make(chain.parameter)
+    phase = problem.fractions[0] * period
+    logs = [solution.contacts for solution in chain.solutions]
+    begins = [fraction * period - phase for fraction in problem.fractions]
+    return Orbit(
+        *(chain.x[0].copy(), period, phase, chain.monodromy(), residual, iterations),
+        *(ContactLog.of_period(logs, begins, period), system, problem.method),
+        **more,
+    )
+
+
+def judged(orbit: Orbit) -> Orbit:
+    """The orbit with what speaks against its verdict on stability, after a look at a tighter tolerance."""
+    n, x = orbit.system.size, orbit.state
+    tight = replace(orbit.method, rtol=max(0.03 * orbit.method.rtol, 1e-12))
+    later = delayed(orbit.system, orbit.phase)
+    again: Any = integrate(later, x[:n], x[n:], orbit.period, method=tight, tangent=True).tangent
+    doubts = list(_doubts(orbit))
+    largest, second = (np.abs(np.linalg.eigvals(matrix)).max() for matrix in (orbit.monodromy, again))
+    if (largest < 1.0) != (second < 1.0):
+        doubts.append(f"a tighter tolerance gives |μ| = {second:.6g} instead of {largest:.6g}")
+    return replace(orbit, doubt="; ".join(doubts))
+
+
+def _doubts(orbit: Orbit) -> Iterator[str]:
+    """What speaks against the verdict at first sight."""
+    largest = abs(orbit.multipliers[0])
+    if abs(largest - 1.0) < _NEAR_ONE:
+        yield f"|μ| = {largest:.6g} is within {_NEAR_ONE:g} of one"
+    log = orbit.contacts
+    if len(log) and log.speed_in.min() < 0.01 * log.speed_in.max():
+        slowest = log.speed_in.argmin()
+        yield f"the contact at {log.t_in[slowest]:.6g} s grazes: it is entered at {log.speed_in[slowest]:.3g} m/s"
+    elif np.any(log.floored):
+        yield "an entry rate lies below its law's floor"

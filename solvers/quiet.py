@@ -1,0 +1,59 @@
+"""When a shot may begin: while every stop whose law latches its entry rate is open."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from solvers.result import ContactLog
+from solvers.system import Array, Contact, System
+
+
+def latches(contact: Contact) -> bool:
+    """Whether a law's force depends on the rate at which the contact was entered."""
+    delta, rate = np.array([1e-6, 1e-4, 1e-2]), 0.1
+    return bool(np.any(contact.law.force(delta, rate, 0.1) != contact.law.force(delta, rate, 0.2)))
+
+
+def with_memory(system: System) -> list[int]:
+    """The stops whose law latches."""
+    known: list[int] | None = system.kept.get("stops with memory")
+    if known is None:
+        known = system.kept["stops with memory"] = [s for s, c in enumerate(system.contacts) if latches(c)]
+    return known
+
+
+def quiet_intervals(system: System, contacts: ContactLog, period: float) -> list[tuple[float, float]]:
+    """Intervals of one period in which every stop is open; if there are none, every one that latches its entry rate."""
+    ends = np.where(np.isnan(contacts.t_out), period, contacts.t_out)
+    for stops in (range(len(system.contacts)), with_memory(system)):
+        mine = np.isin(contacts.stop, list(stops))
+        quiet, end = [], 0.0
+        for begin, left in [*sorted(zip(contacts.t_in[mine], ends[mine], strict=True)), (period, period)]:
+            if begin > end:
+                quiet.append((float(end), float(begin)))
+            end = max(end, left)
+        if quiet:
+            return quiet
+    return []
+
+
+def quiet_begins(system: System, contacts: ContactLog, period: float, count: int, zero: bool) -> list[float]:
+    """Times for the begins of ``count`` shots: zero if that will do, then the middles of the longest quiet intervals.
+
+    Fewer when there is no quiet time at all.
+    """
+    quiet = quiet_intervals(system, contacts, period)
+    begins = [0.0] if zero else []
+    while quiet and len(begins) < count:
+        a, b = quiet.pop(max(range(len(quiet)), key=lambda i: quiet[i][1] - quiet[i][0]))
+        begins.append(0.5 * (a + b))
+        quiet += [(a, begins[-1]), (begins[-1], b)]
+    return sorted(begins)
+
+
+def closed(system: System, x: Array, stops: Sequence[int]) -> bool:
+    """Whether any of these stops is closed in a state."""
+    contacts = [system.contacts[s] for s in stops]
+    return any(contact.direction @ x[: system.size] + contact.gap < 0.0 for contact in contacts)

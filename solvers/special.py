@@ -1,0 +1,217 @@
+r"""Special points of a branch between two of its points.
+
+A special point is a sign change of its test function along the arclength. With the Floquet multipliers μ:
+
+    fold             parameter's share of the tangent
+    flip             Π (μ_i + 1) / (1 + |μ_i|)                          (period doubling)
+    neimark-sacker   Π_{i<j} (μ_i μ_j - 1) / (1 + |μ_i μ_j|), at a complex pair
+    branch point     Π (μ_i - 1) / (1 + |μ_i|), where there is no fold
+    grazing          number of contacts within the period changes
+
+All but the last are continuous along the branch, so that Brent's method finds their zeros in a few orbits. A multiplier
+that jumps over the unit circle at a grazing has no flip of its own: only the grazing is reported.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from solvers.chain import Chain
+from solvers.periodic import Orbit, OrbitError, orbit_of
+from solvers.point import Point, corrected, cubic, is_straight, tangent_of
+from solvers.system import Array
+
+_ROUNDING = 1e-9  # of the test functions: what is at a special point all along is marked nowhere
+_SHARP = 1e-10  # of the parameter, or of the way between the points: how sharply a point is located
+_AT = 1e-4  # distance from the unit circle of the multiplier at what passes for a special point
+_MOST_TRIALS = 25
+_MOST_GRAZINGS = 4  # looked for between two points
+
+
+def indicators(orbit: Orbit, tangent: Array) -> dict[str, float]:
+    """Test functions of an orbit; each changes its sign at a special point of its name."""
+    mu = orbit.multipliers
+    pairs = np.outer(mu, mu)[np.triu_indices(len(mu), 1)]
+    return {
+        "fold": float(tangent[-1]),
+        "flip": _product(mu, 1.0),
+        "neimark-sacker": _product(pairs, -1.0),
+        "branch point": _product(mu, -1.0),
+    }
+
+
+def _product(values: Any, shift: float) -> float:
+    """Π (value + shift) / (1 + |value|), of values that are real or come in conjugate pairs."""
+    return float(np.prod((values + shift) / (1.0 + np.abs(values))).real)
+
+
+def _is_at(orbit: Orbit, name: str) -> bool:
+    """Whether a multiplier is where a special point has it."""
+    mu = orbit.multipliers
+    if name == "neimark-sacker":
+        turning = np.abs(mu.imag) > 1e-6 * np.abs(mu)
+        return bool(np.any(np.abs(np.abs(mu[turning]) - 1.0) < _AT))
+    return bool(np.abs(mu - (-1.0 if name == "flip" else 1.0)).min() < _AT)
+
+
+@dataclass(eq=False)
+class Stretch:
+    """The way between two neighbouring points of a branch; every orbit found on it makes the next guess better."""
+
+    a: Point
+    b: Point
+    way: float
+    straight: bool = field(init=False)
+    known: list[tuple[float, Array]] = field(init=False)  # (arclength, distance of the branch from the cubic)
+    trials: dict[float, tuple[Chain, Orbit]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.straight = is_straight(self.a.share, self.b.share)
+        none = np.zeros_like(self.a.tangent)
+        self.known = [(0.0, none), (self.way, none)]
+
+    def at(self, s: float) -> tuple[Chain, Orbit]:
+        """The branch at an arclength from a; raises OrbitError."""
+        if s not in self.trials:
+            guess = cubic(self.a, self.b, self.way, s)
+            places, off = [place for place, _ in self.known], np.array([distance for _, distance in self.known])
+            guess += [np.interp(s, places, column) for column in off.T]
+            chain, error, iterations = corrected(self.a, guess, self.straight, not self.straight)
+            found = np.append(chain.x.ravel(), chain.parameter)
+            self.known = sorted(
+                [*self.known, (s, found - cubic(self.a, self.b, self.way, s))], key=lambda pair: pair[0]
+            )
+            orbit = orbit_of(self.a.problem, chain, error, iterations, parameter=chain.parameter)
+            self.trials[s] = chain, orbit
+        return self.trials[s]
+
+    def indicators(self, s: float) -> dict[str, float]:
+        """Test functions at an arclength from a."""
+        for place, point in ((0.0, self.a), (self.way, self.b)):
+            if s == place:
+                return indicators(point.orbit, point.tangent)
+        chain, orbit = self.at(s)
+        a = self.a
+        return indicators(orbit, a.tangent if self.straight else tangent_of(chain, a.metric, a.tangent))
+
+    def sharpness(self) -> float:
+        """Arclength to which a special point is to be located."""
+        pace = abs(self.b.chain.parameter - self.a.chain.parameter) / self.way
+        fine = abs(self.a.chain.parameter) / pace if self.straight else self.way
+        return _SHARP * min(fine, self.way)
+
+
+def between(a: Point, b: Point, way: float) -> list[Orbit]:
+    """Marked orbits at the special points between two points ``way`` apart, in their order."""
+    stretch = Stretch(a, b, way)
+    found = list(_grazings(stretch))
+    places = [0.0, *sorted(place for place, _ in found), way]
+    for begin, end in pairwise(places):
+        found += _roots(stretch, begin, end)
+    return [orbit for _, orbit in sorted(found, key=lambda pair: pair[0])]
+
+
+def _roots(stretch: Stretch, begin: float, end: float) -> Iterator[tuple[float, Orbit]]:
+    """(arclength, orbit) of all zeros of test functions that the signs at both ends tell of."""
+    before, after = stretch.indicators(begin), stretch.indicators(end)
+    names = [name for name in before if before[name] * after[name] < 0.0]
+    names = [name for name in names if min(abs(before[name]), abs(after[name])) > _ROUNDING]
+    if "fold" in names and "branch point" in names:
+        names.remove("branch point")
+    for name in names:
+        pair = _root(stretch, begin, end, name)
+        if pair is not None:
+            yield pair
+
+
+def _root(stretch: Stretch, begin: float, end: float, name: str) -> tuple[float, Orbit] | None:
+    """(arclength, orbit) where a test function is zero; None where it only jumps."""
+    from scipy.optimize import brentq
+
+    sharp = stretch.sharpness()
+    try:
+        place, _ = brentq(
+            *(lambda s: stretch.indicators(s)[name], begin, end),
+            **{"xtol": sharp, "maxiter": _MOST_TRIALS, "full_output": True, "disp": False},
+        )
+        orbit = stretch.at(place)[1]
+    except (OrbitError, np.linalg.LinAlgError):
+        return None
+    return (place, replace(orbit, mark=name)) if _is_at(orbit, name) else None
+
+
+def _grazings(stretch: Stretch) -> Iterator[tuple[float, Orbit]]:
+    """(arclength, orbit) of the points at which the number of contacts changes."""
+    begin, first = 0.0, stretch.a.orbit
+    for _ in range(_MOST_GRAZINGS):
+        if len(first.contacts) == len(stretch.b.orbit.contacts):
+            return
+        found = _grazing(stretch, begin, first)
+        if found is None:
+            return
+        place, touched, begin, first = found
+        yield place, touched
+
+
+def _grazing(stretch: Stretch, begin: float, first: Orbit) -> tuple[float, Orbit, float, Orbit] | None:
+    """Where the number of contacts changes first after a place: arclength, marked orbit, place behind it, orbit there.
+
+    There the shallowest contact's indentation goes to zero, or the flight between two contacts that become one.
+    """
+    last, behind = stretch.b.orbit, stretch.way
+    more = len(last.contacts) > len(first.contacts)  # whether contacts are added on the way
+    distance = _distance(last, first) if more else _distance(first, last)
+    near, near_orbit = begin, first
+    known = [(behind, distance(last)) if more else (begin, distance(first))]  # on the side with more contacts
+    sharp = stretch.sharpness()
+    for _ in range(_MOST_TRIALS):
+        touched, bare = (behind, near) if more else (near, behind)
+        place = 0.5 * (touched + bare)
+        root = touched + 2.0 * sharp
+        if len(known) > 1 and known[-1][1] != known[-2][1]:
+            (s0, f0), (s1, f1) = known[-2:]
+            root = s1 - f1 * (s1 - s0) / (f1 - f0)
+            if min(bare, touched) < root < max(bare, touched):
+                place = root + 0.01 * (touched - root)
+        if abs(behind - near) <= sharp or abs(root - touched) <= sharp:
+            at, touching = (behind, last) if more else (near, near_orbit)
+            return at, replace(touching, mark="grazing"), behind, last
+        try:
+            orbit = stretch.at(place)[1]
+        except OrbitError:
+            return None
+        same = len(orbit.contacts) == len(first.contacts)
+        if same:
+            near, near_orbit = place, orbit
+        else:
+            behind, last = place, orbit
+        if same != more:
+            known.append((place, distance(orbit)))
+    return None
+
+
+def _distance(more: Orbit, less: Orbit) -> Callable[[Orbit], float]:
+    """What goes to zero where an orbit loses a contact another has."""
+    a, b = more.contacts, less.contacts
+    apart = (a.t_in[:, None] > b.t_out) | (a.t_out[:, None] < b.t_in) | (a.stop[:, None] != b.stop)
+    return _shallowest if np.any(np.all(apart, axis=1)) else _shortest_flight
+
+
+def _shallowest(orbit: Orbit) -> float:
+    """Smallest peak indentation of an orbit's contacts."""
+    return float(orbit.contacts.peak_indentation.min(initial=np.inf))
+
+
+def _shortest_flight(orbit: Orbit) -> float:
+    """Square of the shortest time between two contacts of one stop: it vanishes like a root."""
+    log, shortest = orbit.contacts, orbit.period
+    for stop in np.unique(log.stop):
+        mine = log.stop == stop
+        begins, ends = np.sort(log.t_in[mine]), np.sort(log.t_out[mine])
+        shortest = min(shortest, float((np.append(begins[1:], begins[0] + orbit.period) - ends).min()))
+    return shortest**2

@@ -1,0 +1,126 @@
+"""Special points a branch passes and the ways it may end: torus bifurcation, birth, random systems."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from oscillators import Bilinear, Tone
+
+import solvers.arm
+import solvers.chain
+from contacts import Hertz, Hysteretic, PiecewiseLinear, law
+from solvers import Contact, OrbitError, System, branch
+from solvers.continuation import BranchStatus
+
+
+@law(jump=True)
+def hardening(delta, delta_dot, entry_rate, stiffness, damping):
+    return stiffness * (delta + delta**3) + damping * delta_dot
+
+
+def over(problem, name="omega", periods=1):
+    """A family over one of the oscillator's numbers."""
+
+    def make(value):
+        changed = replace(problem, **{name: value})
+        return changed.system(), periods * changed.period
+
+    return make
+
+
+def marked(found, mark):
+    return [orbit for orbit in found.special if orbit.mark == mark]
+
+
+@law(jump=True)
+def dashpot(delta, delta_dot, entry_rate, damping):
+    return damping * delta_dot
+
+
+def driven(stops, omega):
+    """q'' + 0.1 q' + q = cos ωt + what the stops do; with the period."""
+    return System.modal([1.0], 0.05, stops, [([1.0], Tone(1.0, omega))]), 2.0 * math.pi / omega
+
+
+def test_torus_bifurcation_where_an_oscillator_with_impacts_loses_its_damping():
+    """Liouville: the product of the multipliers is exp(-(0.1 + c) T); the stop that is struck is elastic."""
+    stop, start = Contact([1.0], PiecewiseLinear([4.0]), gap=0.3), Bilinear(1.4, zeta=0.05, gap=0.3).settled()
+
+    def make(c):
+        return driven([stop, Contact([1.0], dashpot(damping=c), gap=-50.0)], 1.4)
+
+    found = branch(make, (-0.15, 0.0), start, at=0.0, step=0.3).run()
+    (torus,) = found.special
+    assert torus.mark == "neimark-sacker"
+    assert torus.parameter == pytest.approx(-0.1, abs=1e-9)
+    assert np.sum(torus.contacts.stop == 0) == 1
+    assert np.abs(torus.multipliers) == pytest.approx([1.0, 1.0], abs=1e-8)
+    assert abs(torus.multipliers[0].imag) > 0.05
+    assert all(orbit.stable == (orbit.parameter > -0.1) for orbit in found.orbits if not orbit.mark)
+
+
+def test_torus_bifurcation_where_a_nonlinear_stop_drives_as_much_as_the_mass_is_damped():
+    """Always in contact: the product of the multipliers is exp(-(0.1 + c) T), whatever the stop's stiffness does."""
+
+    def make(c):
+        return driven([Contact([1.0], hardening(stiffness=2.0, damping=c), gap=-3.0)], 1.7)
+
+    found = branch(make, (-0.15, 0.0), [2.0, 0.0], at=0.0, step=0.3).run()
+    assert [orbit.mark for orbit in found.special] == ["neimark-sacker"]
+    assert found.special[0].parameter == pytest.approx(-0.1, abs=1e-9)
+
+
+def test_subharmonic_branch_ends_at_its_birth():
+    """Followed back from where it is settled, the doubled branch stops at the flip it was born at."""
+    problem = Bilinear(0.88, zeta=0.05)  # doubles its period between 0.83 and 0.93 rad/s
+    found = branch(over(problem, periods=2), (0.86, 1.0), problem.settled(), at=0.88, step=0.3).run()
+    assert found.status == (BranchStatus.BORN, BranchStatus.END)
+    born = found.orbits[-1]
+    assert born.mark == "flip"
+    there = replace(problem, omega=born.parameter)
+    exact, _ = there.special(-1.0, there.settled())
+    assert born.parameter == pytest.approx(exact, abs=1e-8)
+    assert born.period == 2.0 * there.period
+    assert max(orbit.parameter for orbit in found.orbits) == born.parameter
+    assert abs(born.multipliers[0] - 1.0) < 1e-6
+
+
+def random_family(rng):
+    """(family over the drive's frequency, its span) of one or two masses with a stop."""
+    modes, frequencies = int(rng.integers(1, 3)), np.array([1.0, 2.0 + 3.0 * rng.random()])
+    direction = rng.normal(size=modes)
+    laws = [PiecewiseLinear([10.0 ** rng.uniform(0, 3)]), Hertz(10.0 ** rng.uniform(1, 5)),
+            Hysteretic.lankarani_nikravesh(10.0 ** rng.uniform(1, 5), restitution=rng.uniform(0.2, 1.0))]  # fmt: skip
+    stop = Contact(direction, laws[rng.integers(3)], gap=rng.uniform(-0.5, 1.0))
+    zeta, amplitude, periods = 10.0 ** rng.uniform(-2.5, -0.5), rng.uniform(0.1, 2.0), int(rng.integers(1, 3))
+
+    def make(omega):
+        load = np.ones(modes), Tone(amplitude, omega)
+        return System.modal(frequencies[:modes], zeta, [stop], [load]), periods * 2.0 * math.pi / omega
+
+    low = rng.uniform(0.3, 2.0)
+    return make, (low, low * rng.uniform(1.1, 3.0)), modes
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_random_systems_always_end_with_a_status(seed, monkeypatch):
+    rng = np.random.default_rng(seed)
+    make, span, modes = random_family(rng)
+    count, evaluate = [0], solvers.chain.Problem.evaluate
+
+    def counted(*arguments):
+        count[0] += 1
+        return evaluate(*arguments)
+
+    monkeypatch.setattr(solvers.chain.Problem, "evaluate", counted)
+    monkeypatch.setattr(solvers.arm, "MOST_ORBITS", 40)
+    try:
+        found = branch(make, span, np.zeros(2 * modes), step=0.3).run()
+    except OrbitError as error:
+        assert "residual" in str(error) or "open" in str(error)  # noqa: PT017
+        return
+    assert all(status is not BranchStatus.RUNNING for status in found.status)
+    assert count[0] < 100 * len(found.status) + 40 * len(found.orbits)
+    assert all(orbit.residual <= 1e-10 for orbit in found.orbits)
+    assert all(span[0] <= orbit.parameter <= span[1] for orbit in found.orbits)
