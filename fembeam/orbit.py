@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 import solvers
 from fembeam.section import require
 from solvers import chain, periodic, shooting
+from solvers.result import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -88,8 +89,8 @@ class Orbit:
         return lowest, highest
 
     def __repr__(self) -> str:
-        impacts, kind = len(self.contacts), "stable" if self.stable else "unstable"
-        return f"<{kind} orbit of period {self.period} with {impacts} contacts, |μ| = {abs(self.multipliers[0]):.4g}>"
+        contacts, kind = counted(len(self.contacts), "contact"), "stable" if self.stable else "unstable"
+        return f"<{kind} orbit of period {self.period} with {contacts}, |μ| = {abs(self.multipliers[0]):.4g}>"
 
 
 def extremes_of(t: Vector, u: Vector, v: Vector) -> tuple[float, float]:

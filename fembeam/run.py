@@ -21,6 +21,7 @@ import solvers
 from fembeam.model import Shapes
 from fembeam.section import require
 from fembeam.source import Source
+from solvers.result import counted
 
 if TYPE_CHECKING:
     from fembeam.fields import Extremes
@@ -74,6 +75,10 @@ class Run:
     others: tuple[Shapes, ...] = ()  # of the further beams
     source: Source | None = None  # of a run made from a scene file
     versions: dict[str, str] = field(default_factory=dict)  # that made a run read from a file
+
+    def __repr__(self) -> str:
+        reached = f"to t = {self.t[-1]:g} s" if len(self.t) else "without samples"
+        return f"<run {reached}, {counted(len(self.contacts), 'contact')}: {self.status}>"
 
     @property
     def scene_file(self) -> SceneFile:

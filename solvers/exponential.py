@@ -13,7 +13,7 @@ Limitations
   at rest that another stop's force brings about is noticed a shortest step (1e-9 s) late.
 * A law that bends (clamp=True, a table) between its declared knots is integrated with smaller steps, at lower order; so
   is the beginning and end of one that rises like δ^r, r < 1, in a viscous part (Tsuji). The tolerance is kept.
-* K must be positive semi-definite (no buckled modes).
+* K and C must be positive semi-definite (no buckled modes, no negative damping; a contact law may drive).
 """
 
 from __future__ import annotations

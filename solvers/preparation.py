@@ -56,11 +56,7 @@ def prepared_for(system: System, forcing: Forcing) -> Prepared:
     dt_cell = float(forcing.table_dt[0]) if forcing.table_dt.size else 1.0
     key = (dt_cell, tuple(forcing.tone_omega))
     if system.kept.get("exponential", (None,))[0] != key:
-        if np.any(system.blocks.k < 0.0):
-            raise ValueError(
-                "K must be positive semi-definite for Exponential, its lowest ω² is "
-                f"{system.blocks.k.min():g} (buckled?); use DormandPrince"
-            )
+        _check_passive(system)
         plain = problem_of(system, forcing)
         problem, steady = with_tones(plain, forcing)
         laws = [contact.law for contact in system.contacts]
@@ -77,6 +73,20 @@ def prepared_for(system: System, forcing: Forcing) -> Prepared:
         system.kept["exponential"] = (key, made)
     prepared: Prepared = system.kept["exponential"][1]
     return prepared
+
+
+def _check_passive(system: System) -> None:
+    """No block gains energy by itself: what proves that no contact is missed rests on that."""
+    k, c = system.blocks.k, system.blocks.c
+    if np.any(k < 0.0):
+        raise ValueError(
+            f"K must be positive semi-definite for Exponential, its lowest ω² is {k.min():g} (buckled?); "
+            "use DormandPrince"
+        )
+    if c.min() < -1e-12 * (np.sqrt(k).max() + np.abs(c).max()):
+        raise ValueError(
+            f"C must not drive the motion for Exponential, its lowest 2ζω is {c.min():g}; use DormandPrince, or a law"
+        )
 
 
 @lru_cache(maxsize=64)
@@ -136,7 +146,7 @@ def _loss_rows(problem: Problem) -> Array:
     """Rows whose squares sum to the damping power: √c v, or a root of the coupled loss."""
     n = len(problem.k)
     if not problem.loss.size:
-        return np.hstack((np.zeros((n, n)), np.diag(np.sqrt(problem.c))))
+        return np.hstack((np.zeros((n, n)), np.diag(np.sqrt(np.maximum(problem.c, 0.0)))))
     values, vectors = np.linalg.eigh(0.5 * (problem.loss + problem.loss.T))
     return np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
 

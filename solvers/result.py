@@ -13,6 +13,11 @@ import numpy as np
 from solvers.system import Array, stored_energy
 
 
+def counted(count: int, noun: str) -> str:
+    """A number with its noun."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
 class Status(Enum):
     """How a run ended, as the sentence shown to the user. The order is the compiled kernels' code."""
 
@@ -66,6 +71,10 @@ class ContactLog:
 
     def __len__(self) -> int:
         return len(self.stop)
+
+    def __repr__(self) -> str:
+        open_ones = int(np.isnan(self.t_out).sum())
+        return f"<{counted(len(self), 'contact')}, {open_ones} of them not ended>"
 
     @classmethod
     def of_rows(cls, rows: Array) -> ContactLog:
@@ -131,6 +140,9 @@ class Energy:
         stored, initial = (stored_energy(M, K, *np.split(x, 2, axis=-1)) for x in (motion, begin))
         return cls(powers[:, 0], powers[:, 1], powers[:, 2::2].sum(axis=1), stored, float(initial))
 
+    def __repr__(self) -> str:
+        return f"<energy ledger of {counted(len(self.stored), 'sample')}>"
+
     @property
     def residual(self) -> Array:
         """What the ledger does not account for."""
@@ -165,6 +177,10 @@ class Solution:
     cost: Cost
     tangent: Array | None = None
     rate: Array | None = None
+
+    def __repr__(self) -> str:
+        reached = f"to t = {self.t[-1]:g} s" if len(self.t) else "without samples"
+        return f"<solution {reached}, {counted(len(self.contacts), 'contact')}: {self.status.value}>"
 
     @cached_property
     def energy(self) -> Energy:

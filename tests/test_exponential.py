@@ -412,6 +412,13 @@ def test_buckled_structure_is_refused():
         integrate(system, [1.0], [0.0], 1.0, method=Exponential())
 
 
+def test_matrix_that_drives_the_motion_is_refused_but_not_its_rounding():
+    with pytest.raises(ValueError, match=r"C must not drive the motion for Exponential, its lowest 2ζω is -0\.1"):
+        integrate(System([[1.0]], [[-0.1]], [[1.0]]), [1.0], [0.0], 1.0)
+    end = integrate(System(np.eye(2), np.diag([-1e-18, 0.1]), np.diag([0.0, 1.0])), [1.0, 1.0], [0.0, 0.0], 1.0)
+    assert end.q[0, 0] == pytest.approx(1.0, abs=1e-15)
+
+
 def test_samples_of_the_reference_at_small_atol():
     system = free_mass(PAPER_LAW, loads=WEIGHT)
     ours = integrate(system, [0.01], [-0.3], 0.25, 0.025, Exponential(1e-10))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fembeam.plot.response import GREEN, GREY, ORANGE, RED, Vector, places, styled
+from solvers.result import counted
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -132,5 +133,7 @@ def orbit(one: Orbit, z: float | None = None) -> Figure:
     right.set_ylabel("velocity / m/s")
     kind = "stable" if one.stable else "unstable"
     at = "" if np.isnan(one.parameter) else f" at {one.parameter:.6g}"
-    figure.suptitle(f"Period {one.period}, {len(one.contacts)} contacts, {kind}{at}", x=0.01, ha="left", fontsize=10)
+    figure.suptitle(
+        f"Period {one.period}, {counted(len(one.contacts), 'contact')}, {kind}{at}", x=0.01, ha="left", fontsize=10
+    )
     return figure

@@ -281,13 +281,17 @@ def _draw_forces(axis: Axes, run: Run, lo: float, hi: float) -> None:
     if len(lasting) and np.median(lasting) < 10 * _dt(run):
         for stop in np.unique(log.stop[inside]):
             mine = inside & (log.stop == stop)
-            axis.vlines(log.t_in[mine], 0.0, log.peak_force[mine], color=f"C{stop}", linewidth=1.2)
+            axis.vlines(
+                log.t_in[mine], 0.0, log.peak_force[mine], color=f"C{stop}", linewidth=1.2, label=f"stop {stop}"
+            )
         axis.set_ylabel("peak contact force / N")
     else:
         kept = (run.t >= lo) & (run.t <= hi)
         for stop in range(len(run.stops)):
-            axis.plot(run.t[kept], run.force(stop)[kept], color=f"C{stop}")
+            axis.plot(run.t[kept], run.force(stop)[kept], color=f"C{stop}", label=f"stop {stop}")
         axis.set_ylabel("contact force / N")
+    if len(run.stops) > 1:
+        axis.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=len(run.stops), borderaxespad=0.0)
     axis.set_ylim(bottom=min(0.0, axis.get_ylim()[0]))
 
 
