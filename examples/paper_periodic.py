@@ -58,8 +58,7 @@ def summits(branch, period):
     return branch.parameter[found], heights[found]
 
 
-figure = Figure(figsize=(6.8, 6.4), layout="constrained")
-total = 0.0
+figure, total = Figure(figsize=(6.8, 6.4), layout="constrained"), 0.0
 for modes, axis in zip((1, 2), figure.subplots(2, 1, sharex=True, sharey=True), strict=True):
     model = scene.reduce(modes=modes)
     found, seconds = branches(model)

@@ -19,9 +19,8 @@ from numpy.typing import ArrayLike
 from solvers.forcing import Forcing, hand_over
 from solvers.result import COLUMNS, ContactLog, Cost, Energy, Solution, SolverError, Status
 from solvers.state import CALLS, EVENTS, LOG_FULL, LOGGED, REJECTED, RUNNING, SAMPLED, STATUSES, STEPS, T, contact_row
-from solvers.system import ABOUT_LAWS, Array, Parameter, System, times
+from solvers.system import Array, Parameter, System, product
 
-LAWS, SLOPES = ABOUT_LAWS
 _BUDGET = 20_000  # steps between two looks at the world outside
 _MOST_SAMPLES = 500_000_000
 _NEVER = np.array([math.inf])  # no output is due
@@ -115,7 +114,7 @@ def _check_tangent(tangent: Any, method: Any, system: System) -> None:
 
 def check_slopes(system: System) -> None:
     """No law has an infinite slope at its surface, F ~ δ^r with r < 1 but for a declared jump."""
-    if system.kept.get(SLOPES):
+    if system.about_laws.get("finite slopes"):
         return
     delta = np.array([1e-12, 1e-10])
     for i, contact in enumerate(system.contacts):
@@ -123,7 +122,7 @@ def check_slopes(system: System) -> None:
         if not contact.law.jump and 0.0 < abs(viscous[1]) < 50.0 * abs(viscous[0]):
             trouble = f"its slope is infinite at the surface: {contact.law!r}"
             raise ValueError(f"tangent is not offered for the law of contact {i}: {trouble}")
-    system.kept[SLOPES] = True
+    system.about_laws["finite slopes"] = True
 
 
 def _end(system: System, q0: ArrayLike, q_dot0: ArrayLike, duration: float, method: Any) -> Array:
@@ -176,7 +175,7 @@ def _given_times(duration: float, given: ArrayLike) -> Array:
 
 def _check_laws(system: System) -> None:
     """Every law is finite at rest, so that a NaN is met before the run; looked at once per system."""
-    if system.kept.get(LAWS):
+    if system.about_laws.get("finite"):
         return
     delta = np.array([1e-12, 1e-6, 1e-3])
     for i, contact in enumerate(system.contacts):
@@ -184,7 +183,7 @@ def _check_laws(system: System) -> None:
         if not np.all(np.isfinite(force)):
             where = delta[~np.isfinite(force)][0]
             raise ValueError(f"the law of contact {i} is not finite at delta = {where:g} m: {contact.law!r}")
-    system.kept[LAWS] = True
+    system.about_laws["finite"] = True
 
 
 def _forcing(system: System, duration: float, rtol: float) -> Forcing:
@@ -255,7 +254,7 @@ class _Run:
         else:
             x = self.out[: self._sampled(status)]
             t = self.times[: len(x)]
-        motion = times(x[:, :size], self.engine.back.T)
+        motion = product(x[:, :size], self.engine.back.T)
         powers = x[:, size:].copy()
         if not self.engine.keeps_ledger(self.times is not None):
             powers[:, :2] = math.nan

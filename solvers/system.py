@@ -24,7 +24,6 @@ from numpy.typing import ArrayLike, NDArray
 
 _ONE_THREAD = 200_000  # multiplications below which BLAS stays on one thread
 Array = NDArray[np.float64]
-ABOUT_LAWS = "laws are finite", "slopes are finite"  # what is kept of a system's laws once it was looked at
 
 
 class Law(Protocol):
@@ -149,13 +148,21 @@ class System:
     ) -> System:
         """The same structure with other contacts or loads; its matrices are neither checked nor decoupled again."""
         other = object.__new__(System)
-        known = {} if contacts is not None else {name: self.kept[name] for name in ABOUT_LAWS if name in self.kept}
+        laws = [[contact.law for contact in listed] for listed in (self.contacts, contacts or self.contacts)]
+        same = len(laws[0]) == len(laws[1]) and all(a is b for a, b in zip(*laws, strict=True))
+        known = {"laws": self.about_laws} if same else {}
         other.__dict__.update(self.__dict__, blocks=self.blocks, push=self.push, kept=known)
         for name, value in (("contacts", contacts), ("loads", loads)):
             if value is not None:
                 object.__setattr__(other, name, value)
         other._check_contacts_and_loads()
         return other
+
+    @property
+    def about_laws(self) -> dict[str, bool]:
+        """What was found of the laws so far; systems made by `like` share it as long as they have the same laws."""
+        known: dict[str, bool] = self.kept.setdefault("laws", {})
+        return known
 
     def _load(self, i: int, pair: tuple[ArrayLike, Signal]) -> tuple[Array, Signal]:
         """One checked load."""
@@ -212,7 +219,7 @@ class System:
 def stored_energy(M: Any, K: Any, q: Array, q_dot: Array) -> Array:
     """½ q'ᵀ M q' + ½ qᵀ K q of (..., n) arrays; inf of a run that diverged."""
     with np.errstate(over="ignore", invalid="ignore"):
-        return 0.5 * sum(np.einsum("...i,...i", times(x, matrix), x) for x, matrix in ((q_dot, M), (q, K)))
+        return 0.5 * sum(np.einsum("...i,...i", product(x, matrix), x) for x, matrix in ((q_dot, M), (q, K)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -253,7 +260,7 @@ def require_step(name: str, value: float) -> None:
         raise ValueError(f"{name} must be positive and finite (s), got {value!r}")
 
 
-def times(rows: Array, matrix: Any) -> Array:
+def product(rows: Array, matrix: Any) -> Array:
     """Rows (..., n) times a matrix (n, m), many of them in pieces too small for BLAS to spread over threads.
 
     Threads gain nothing on such thin arrays, and where other work fills the cores one waits for the other.
