@@ -7,6 +7,7 @@ part alone will do where no other path ends so; ``omega`` and ``amplitude`` mean
 from __future__ import annotations
 
 import re
+from copy import copy
 from dataclasses import fields, is_dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -79,7 +80,12 @@ def _replaced(item: Any, path: list[str], value: float) -> Any:
         changed = list(item)
         changed[int(path[0])] = _replaced(item[int(path[0])], path[1:], value)
         return type(item)(changed)
-    return replace(item, **{path[0]: _replaced(getattr(item, path[0]), path[1:], value)})
+    changed = _replaced(getattr(item, path[0]), path[1:], value)
+    if path[0] != "base":
+        return replace(item, **{path[0]: changed})
+    moved = copy(item)  # no check of a scene asks for the base motion, which has checked itself
+    object.__setattr__(moved, "base", changed)
+    return moved
 
 
 def changes_structure(path: str) -> bool:

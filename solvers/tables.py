@@ -365,6 +365,7 @@ def _family(power: float, exponent: float) -> _Family:
 
 
 _CHECKED = (np.arange(24) + 0.5) / 24  # places between the nodes where their interpolant is compared
+_PHASES = np.geomspace(1e-2, 1e4, 600)  # ω h
 
 
 class _Families(NamedTuple):
@@ -379,7 +380,7 @@ class _Families(NamedTuple):
     tail: Any
     legendre: Any
     extend: Any
-    between: Any  # (f, 24, S) from the values at the nodes to those between them
+    alias: Any  # (f, P) largest error between the nodes of the interpolant of e^{iωt}, at `_PHASES`
 
 
 @lru_cache(maxsize=64)
@@ -399,7 +400,7 @@ def _families(exponents: tuple[float, ...], jumps: tuple[bool, ...]) -> _Familie
         tail=np.ascontiguousarray([_tail(f.nodes) for f in found]),
         legendre=np.ascontiguousarray(found[0].spectrum),
         extend=np.ascontiguousarray([_extensions(f, found[0]) for f in found]),
-        between=np.array([_interpolation(f.nodes, _CHECKED) for f in found]),
+        alias=np.array([_alias(f) for f in found]),
     )
 
 
@@ -500,20 +501,18 @@ def _differentiation(nodes: Any) -> Any:
 def _ripple(problem: Problem, h: Any, omega: Any, families: _Families) -> Any:
     """Error of each stop's indentation between the nodes, per |p| and |v| of every block that oscillates."""
     size = omega.size
-    alias = _aliasing(h, omega, families)[:, :, None, :]
-    alias = np.where((alias > 1e-13) & (omega > 0.0), alias, 0.0)
+    phases = h[:, None] * omega
+    alias = np.array([np.interp(phases, _PHASES, row, left=0.0) for row in families.alias])[:, :, None, :]
+    alias = np.where(alias > 1e-13, alias, 0.0)
     rows = np.abs(problem.read[:, :size]) / np.where(omega > 0.0, omega, 1.0) + np.abs(problem.read[:, size:])
     return np.concatenate((alias * rows * omega, alias * rows), axis=3)
 
 
-def _aliasing(h: Any, omega: Any, families: _Families) -> Any:
-    """Largest error between nodes of the interpolant of e^{iωt}, (f, j, N)."""
-    out = np.zeros((len(families.power), h.size, omega.size))
-    for f, power in enumerate(families.power):
-        phase = np.exp(1j * families.times[f][:, None] * (h[:, None, None] * omega))
-        exact = np.exp(1j * _CHECKED[:, None] ** power * (h[:, None, None] * omega))
-        out[f] = np.abs(families.between[f] @ phase - exact).max(axis=1)
-    return np.minimum(out, 2.0)
+def _alias(family: _Family) -> Any:
+    """(P,) largest error between a family's nodes of the interpolant of e^{iωt}."""
+    waves = np.exp(1j * np.outer(family.nodes**family.power, _PHASES))
+    exact = np.exp(1j * np.outer(_CHECKED**family.power, _PHASES))
+    return np.minimum(np.abs(_interpolation(family.nodes, _CHECKED) @ waves - exact).max(axis=0), 2.0)
 
 
 def _weights(nodes: Any) -> Any:

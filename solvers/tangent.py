@@ -59,7 +59,7 @@ class Tangent:
         engine.state.count[TAPED] = 0
         if not np.all(np.isfinite(self.slopes.y)):
             raise SolverError(f"the tangent is not finite any more at t = {engine.state.now[T]:g} s: a contact grazes")
-        size = float(np.linalg.norm(self.slopes.y, 2))
+        size = math.sqrt(np.vdot(self.slopes.y, self.slopes.y))
         self.history.append((float(engine.state.now[T]), self.log_scale + math.log(size) if size > 0.0 else -math.inf))
         if not 1.0 / _LARGE < size < _LARGE and size > 0.0:
             for array in (self.slopes.y, self.slopes.entry, self.slopes.shift):
