@@ -54,7 +54,7 @@ def test_branch_marks_the_flip_and_its_copy_from_a_file_is_the_same(model, tmp_p
     branch.to_csv(tmp_path / "b.csv")
     assert len((tmp_path / "b.csv").read_text().splitlines()) == 1 + len(branch.orbits)
     assert fb.plot.branch(branch).axes[0].get_xlabel() == "ω / rad/s"
-    assert "contacts" in fb.plot.orbit(flips[0])._suptitle.get_text()
+    assert "1 contact, unstable" in fb.plot.orbit(flips[0])._suptitle.get_text()
 
 
 def test_brute_force_agrees_with_the_branch(model):
