@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
+from textwrap import shorten
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 SAME = 1e-6  # relative distance below which two states are one
+STARTS = 12  # settled where shooting from rest finds nothing
+LONGEST_REASON = 120  # characters of why shooting failed; the rest is in the error this one came from
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,18 +168,20 @@ def _check_smallest(orbit: Orbit, once: float) -> None:
 
 def _from_nothing(model: Model, count: int, once: float, shots: int | None) -> Orbit:
     """What a run from rest settles to, else the first of many attractors with that period."""
-    tried = []
     try:
         start = shooting.settled(model.system, count * once, solvers.Exponential(1e-8))
         return orbit(model, count, start, shots)
     except solvers.OrbitError as error:
-        tried.append(f"from rest: {error}")
-    found = attractors(model, starts=12)
+        refused = error
+    found = attractors(model, starts=STARTS)
     for attractor in found:
         if attractor.orbit is not None and attractor.period == count:
             return attractor.orbit
-    tried.append("12 other starts settled to " + (", ".join(sorted({a.name for a in found})) or "nothing"))
-    raise solvers.OrbitError("; ".join(tried))
+    names = ", ".join(sorted({a.name for a in found}))
+    raise solvers.OrbitError(
+        f"{STARTS} starts settled to {names}, none to period {count}; shooting after a run from rest: "
+        + shorten(str(refused), LONGEST_REASON, placeholder=" …")
+    ) from refused
 
 
 @dataclass(frozen=True, eq=False)

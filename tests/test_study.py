@@ -12,7 +12,7 @@ import solvers
 from contacts import Hertz, Hysteretic, KelvinVoigt
 from fembeam import scene_file
 from fembeam.cli import main
-from fembeam.study import NotMetError, measure, mode_count, smallest_model
+from fembeam.study import ModeCount, NotMetError, measure, mode_count, smallest_model
 from fembeam.study.executors import spread
 from fembeam.study.mode_count import difference
 from fembeam.study.quantities import QUANTITIES, Amplitude, Psd, label, named
@@ -167,6 +167,39 @@ def test_executor_gives_the_same_study():
         spread_out = mode_count(*arguments, executor=pool)
     alone = mode_count(*arguments)
     assert [row.error for row in spread_out.rows] == [row.error for row in alone.rows]
+
+
+def test_mode_count_doubts_a_chaotic_transient():
+    chaotic = replace(SCENE, base=fb.Harmonic(1e-3, 300.0))
+    with pytest.warns(UserWarning, match=r"3 of 3 errors may be chance, not modes: peak_force .* changes by 4\..e-02"):
+        study = mode_count(chaotic, [2, 5], "peak_force", duration=1.0)
+    assert str(study).endswith(f"IN DOUBT: {study.doubt}")
+    loose, tight = (
+        chaotic.reduce(5, residual=True).simulate(1.0, solver=solvers.Exponential(rtol)).contacts.peak_force.max()
+        for rtol in (1e-7, 1e-8)
+    )
+    assert study.sensitivity == pytest.approx(abs(loose / tight - 1), rel=1e-6)
+
+
+@pytest.mark.filterwarnings("error")
+def test_mode_count_does_not_doubt_what_settles():
+    arguments = SCENE, [1, 2, 5], "peak_force"
+    study = mode_count(*arguments, duration=0.25)
+    assert 0.0 < study.sensitivity < 1e-6
+    assert study.doubt == ""
+    assert "IN DOUBT" not in str(study)
+    assert mode_count(*arguments, duration=0.25, solver=solvers.RK4(2e-5)).sensitivity is None  # its step is fixed
+    assert mode_count(*arguments).sensitivity is None  # groups of periods scatter
+
+
+@pytest.mark.parametrize(("changed", "words"), [(np.inf, "2 of 2"), (2e-3, "1 of 2"), (2e-5, ""), (1e-6, "")])
+def test_doubt_counts_errors_within_ten_times_the_sensitivity(changed, words):
+    study = mode_count(FREE, [1, 2, 3], "amplitude", duration=0.05, dt=5e-4)
+    errors = [1e-1, 1e-2]
+    rows = tuple(replace(row, error=e) for row, e in zip(study.rows, [*errors, 0.0], strict=True))
+    found = ModeCount("q", rows, changed)
+    assert words in found.doubt
+    assert bool(words) == bool(found.doubt)
 
 
 def growing(run):

@@ -41,6 +41,7 @@ STYLE = {
 }
 FINEST_RESOLUTION = 2.0  # rad/s per line of a spectrum; finer only makes it noisier
 MOST_DOTS = 4000
+LABEL_WIDTH = 0.05  # of the axis, taken up by a frequency of four digits
 
 
 def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
@@ -328,11 +329,14 @@ def peaks(line: Spectrum, omega_max: float = np.inf, count: int = 10) -> Vector:
 
 
 def _mark_peaks(axis: Axes, line: Spectrum, top: float) -> None:
-    """Write the frequency over every prominent peak."""
+    """Write the frequency over every prominent peak, of close ones over the highest only."""
     omega, density = _drawable(line, top)
-    for peak in peaks(line, top):
-        near = np.abs(omega - peak) < 15
-        _note(axis, f"{peak:.0f}", (peak, density[near].max()), (0, 4), BLUE)
+    heights = {float(peak): density[np.abs(omega - peak) < 15].max() for peak in peaks(line, top)}
+    labelled: list[float] = []
+    for peak in sorted(heights, key=lambda at: -heights[at]):
+        if all(abs(peak - other) >= LABEL_WIDTH * top for other in labelled):
+            labelled.append(peak)
+            _note(axis, f"{peak:.0f}", (peak, heights[peak]), (0, 4), BLUE)
 
 
 def _mark_frequencies(axes: tuple[Axes, ...], run: Run, top: float) -> None:
@@ -368,10 +372,12 @@ def _restitutions(axis: Axes, speed_in: Vector, speed_out: Vector) -> None:
     moving = np.flatnonzero(speed_in > 0)
     picked = moving[:: max(1, -(-len(moving) // MOST_DOTS))]
     restitution = speed_out[picked] / speed_in[picked]
-    axis.semilogx(speed_in[picked], restitution, ".", markersize=2, alpha=0.4, color=GREEN)
+    low, high = 0.8 * np.quantile(speed_in[picked], 0.005), 1.2 * speed_in[picked].max()
+    axis.plot(speed_in[picked], restitution, ".", markersize=2, alpha=0.4, color=GREEN)
     axis.axhline(float(np.median(restitution)), color=RED, linestyle="--")
     axis.set_title(f"median {np.median(restitution):.3f} of the {len(picked)} shown (dashed)")
-    axis.set_xlim(0.8 * np.quantile(speed_in[picked], 0.005), 1.2 * speed_in[picked].max())
+    axis.set_xscale("log" if high > 10 * low else "linear")  # ticks within a decade of a logarithmic axis overlap
+    axis.set_xlim(low, high)
     axis.set_ylim(0, max(1.05, 1.1 * float(np.quantile(restitution, 0.98))))
     axis.set_xlabel("entry speed / m s⁻¹")
     axis.set_ylabel("exit / entry speed")

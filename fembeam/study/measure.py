@@ -103,25 +103,16 @@ class Measured:
 
 @dataclass(frozen=True)
 class Case:
-    """One model to be measured: arguments of `Scene.reduce`, plan, quantity, tolerances of `Exponential`.
-
-    Without tolerances the plan's solver is used, once.
-    """
+    """One model to be measured: arguments of `Scene.reduce`, plan, quantity, and the solvers to run it with."""
 
     scene: Scene
     reduce: tuple[tuple[str, Any], ...]
     plan: Plan
     quantity: Quantity
-    rtols: tuple[float, ...] = ()
+    solvers: tuple[Any, ...]
 
     def __repr__(self) -> str:
         return ", ".join(f"{name}={value}" for name, value in self.reduce)
-
-    @property
-    def solvers(self) -> list[Any]:
-        """One per tolerance."""
-        chosen = solvers.Exponential(ledger=False) if self.plan.solver is None else self.plan.solver
-        return [solvers.Exponential(rtol, ledger=False) for rtol in self.rtols] or [chosen]
 
 
 def measure(case: Case) -> list[Measured]:

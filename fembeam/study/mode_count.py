@@ -5,18 +5,23 @@
 Random responses of all counts are driven by the same seeds, so that differences are paired: what the realisations
 have in common cancels. The uncertainty of an error is the 95 % half-width of the mean difference (Student's t); an
 error below it is noise and is marked so.
+
+A single transient has no scatter. There the reference is run a second time at ten times the tolerance: errors not well
+above the change this makes may be chance, as in a chaotic motion, and the study says so.
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+import solvers
 from fembeam.section import require
 from fembeam.study.executors import spread
 from fembeam.study.measure import Case, Measured, Plan, Start, measure
@@ -28,6 +33,10 @@ if TYPE_CHECKING:
     from fembeam.scene import Scene
 
 Vector = NDArray[np.float64]
+LOOSER = 10.0  # times the tolerance, in the second run of the reference
+LOOSEST = 1e-2  # the largest tolerance that methods take
+NEGLIGIBLE = 1e-5  # relative change by it that only a sensitive motion exceeds: others, some 1e-7
+MARGIN = 10.0  # one change is one draw of chance, and another may be larger
 HEAD = "modes", "static", "coordinates", "value", "error", "± (95 %)", "static share", "periods", "seconds", ""
 
 
@@ -87,10 +96,14 @@ class ModeCount:
     rate, rate_residual : observed p in error ~ n^-p, without and with static shapes; NaN when fewer than two errors
         are resolved.
     closest : error of the row next finest to the reference: the reference itself is hardly better than this.
+    sensitivity : relative change of the reference at ten times the tolerance; None where scatter tells (several
+        realisations, or a periodic response), or the solver's step is fixed.
+    doubt : a sentence where errors are below ten times the sensitivity, else "".
     """
 
     quantity: str
     rows: tuple[Row, ...]
+    sensitivity: float | None = None
 
     @property
     def rate(self) -> float:
@@ -108,6 +121,21 @@ class ModeCount:
         others = [row for row in self.rows if not row.reference]
         return max(others, key=lambda row: row.measured.coordinates).error if others else float("nan")
 
+    @property
+    def doubt(self) -> str:
+        """Which errors are chance; "" when all stand."""
+        if self.sensitivity is None or self.sensitivity <= NEGLIGIBLE:
+            return ""
+        errors = [row.error for row in self.rows if not row.reference and np.isfinite(row.error)]
+        hidden = sum(not error > MARGIN * self.sensitivity for error in errors)
+        if not hidden:
+            return ""
+        return (
+            f"{hidden} of {len(errors)} errors may be chance, not modes: {self.quantity} of the reference changes by "
+            f"{self.sensitivity:.1e} at {LOOSER:g} times the tolerance (chaos?); use an average over seeds, or a shorter "
+            "run"
+        )
+
     def row(self, modes: int | None, residual: bool = False) -> Row:
         """One row; ValueError when it is not in the study."""
         for row in self.rows:
@@ -117,7 +145,8 @@ class ModeCount:
 
     def __str__(self) -> str:
         rates = f"observed rate: {self.rate:.2f} modes alone, {self.rate_residual:.2f} with static shapes"
-        return "\n".join((self.quantity, table(HEAD, [row.cells() for row in self.rows]), rates))
+        doubt = [f"IN DOUBT: {self.doubt}"] if self.doubt else []
+        return "\n".join((self.quantity, table(HEAD, [row.cells() for row in self.rows]), rates, *doubt))
 
     def figure(self) -> Figure:
         """Error and time against the number of coordinates."""
@@ -170,6 +199,10 @@ def mode_count(
     ValueError : no counts, counts below 1 or beyond the dofs, a quantity that changes its shape or is zero, NaN or
         infinite for the reference, runs that cannot be made like this. SolverError when a run fails.
 
+    Warns
+    -----
+    UserWarning : the quantity of a single transient depends on the tolerance more than on the modes, as in chaos.
+
     Notes
     -----
     Frequencies of every model are right to 1e-6 by its own mesh; smaller errors than that are not resolved. Long
@@ -198,10 +231,32 @@ def mode_count(
         chosen = checked_counts([*chosen, reference])
         arguments.append({"modes": reference, "residual": kinds[-1]})
     arguments = [a for i, a in enumerate(arguments) if a not in arguments[:i]]
-    items = [Case(scene, tuple(a.items()), plan, kept) for a in arguments]
     finest = arguments[-1] if reference is not None else {"modes": max(chosen), "residual": kinds[-1]}
-    measured = [each for (each,) in spread(measure, items, executor, f"modes for {label(kept)}")]
-    return ModeCount(label(kept), rows_of(arguments, measured, measured[arguments.index(finest)]))
+    method = solvers.Exponential(ledger=False) if solver is None else solver
+    items = [
+        Case(scene, tuple(a.items()), plan, kept, (method, *(_looser(method, plan) if a == finest else ())))
+        for a in arguments
+    ]
+    found = spread(measure, items, executor, f"modes for {label(kept)}")
+    exact, *loose = found[arguments.index(finest)]
+    rows = rows_of(arguments, [first for first, *_ in found], exact)
+    study = ModeCount(label(kept), rows, _change(loose[0], exact) if loose else None)
+    if study.doubt:
+        warnings.warn(study.doubt, UserWarning, stacklevel=2)
+    return study
+
+
+def _looser(method: Any, plan: Plan) -> tuple[Any, ...]:
+    """The method at ten times the tolerance, for a single transient; nothing where scatter tells as much."""
+    if plan.seeds or plan.duration is None or not getattr(method, "adaptive", False):
+        return ()
+    return (replace(method, rtol=min(LOOSER * method.rtol, LOOSEST)),)
+
+
+def _change(one: Measured, other: Measured) -> float:
+    """Relative distance of two values; infinite when they cannot be compared."""
+    error = difference(one, other)[0] if one.values.shape == other.values.shape else np.inf
+    return error if np.isfinite(error) else np.inf
 
 
 def rows_of(arguments: Sequence[dict[str, Any]], measured: Sequence[Measured], reference: Measured) -> tuple[Row, ...]:

@@ -246,9 +246,10 @@ class _Search:
         models = dict.fromkeys(choice[:2] for choice in new)  # one reduction serves all tolerances
         groups = [[choice for choice in new if choice[:2] == model] for model in models]
         items = [
-            Case(self.scene, (("modes", n), ("residual", kind)), self.plan, self.quantity, tuple(c.rtol for c in group))
+            Case(self.scene, (("modes", n), ("residual", kind)), self.plan, self.quantity,
+                 tuple(solvers.Exponential(choice.rtol, ledger=False) for choice in group))
             for (n, kind), group in zip(models, groups, strict=True)
-        ]
+        ]  # fmt: skip
         if items:
             found = spread(measure, items, self.executor, f"smallest model for {label(self.quantity)}")
             for group, measured in zip(groups, found, strict=True):
