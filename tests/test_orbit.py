@@ -36,7 +36,8 @@ def test_subharmonics_from_nothing_and_their_names(model):
     half = driven.orbit(period=2)
     assert half.period == 2
     assert half.stable
-    with pytest.raises(solvers.OrbitError, match="^12 starts settled to period 2 with 1 impacts, none to period 1; ") as error:
+    told = r"^12 starts settled to period 2 with 1 impacts, none to period 1; "
+    with pytest.raises(solvers.OrbitError, match=told) as error:
         driven.orbit()
     assert len(str(error.value)) < 250
     assert "3 shot(s)" in str(error.value.__cause__)

@@ -53,6 +53,34 @@ def test_peaks_of_two_tones():
     assert found == pytest.approx([200.0, 780.0], abs=3.0)
 
 
+def apart(labels):
+    """Whether no two of the drawn texts overlap."""
+    boxes = [label.get_window_extent() for label in labels if label.get_visible() and label.get_text()]
+    assert len(boxes) > 1
+    return not any(one.overlaps(other) for i, one in enumerate(boxes) for other in boxes[:i])
+
+
+def test_labels_of_a_periodic_motion_do_not_overlap(run):
+    scene = dataclasses.replace(run.model.scene, base=fb.Harmonic(1e-3, 60.0))
+    driven = scene.reduce(6).simulate(6.0, 1e-3)
+    figure = plot.spectrum(driven, discard=1.0, omega_max=2500.0)
+    figure.draw_without_rendering()
+    assert apart(figure.axes[0].texts)
+    figure = plot.spectrum(dataclasses.replace(driven, t=driven.t / 10), omega_max=2e4)  # all six frequencies in view
+    figure.draw_without_rendering()
+    assert apart(figure.axes[1].texts)
+
+
+@pytest.mark.parametrize("highest", [1.0, 1.7, 5.0, 300.0])
+def test_ticks_of_entry_speeds_do_not_overlap(run, highest):
+    speeds = np.geomspace(1.0, highest, len(run.contacts))
+    log = dataclasses.replace(run.contacts, speed_in=speeds, speed_out=0.7 * speeds)
+    axis = (figure := plot.contacts(dataclasses.replace(run, contacts=log))).axes[3]
+    figure.draw_without_rendering()
+    low, high = axis.get_xlim()
+    assert apart([tick for tick in axis.get_xticklabels(which="both") if low <= tick.get_position()[0] <= high])
+
+
 def test_a_partial_run_says_so(run):
     partial = dataclasses.replace(run, status="interrupted: partial result")
     assert "PARTIAL RESULT: interrupted" in texts(plot.densities(partial))

@@ -340,10 +340,14 @@ def _mark_peaks(axis: Axes, line: Spectrum, top: float) -> None:
 
 
 def _mark_frequencies(axes: tuple[Axes, ...], run: Run, top: float) -> None:
-    """Dotted lines at the natural frequencies."""
+    """Dotted lines at the natural frequencies, named where there is room."""
+    free = 0.0  # of labels, from here on
     for i, omega in enumerate([] if run.model is None else run.model.omega[run.model.omega < top]):
         for axis in axes:
             axis.axvline(omega, color=GREY, linestyle=":", linewidth=0.8, zorder=0)
+        if omega < free:
+            continue
+        free = omega + 3 * LABEL_WIDTH * top
         _note(axes[-1], rf"$\omega_{{{i + 1}}}$ = {omega:.0f}", (omega, 0.03), (3, 0), GREY, ("data", "axes fraction"))
 
 

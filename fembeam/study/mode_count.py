@@ -15,11 +15,10 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterable, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 import solvers
 from fembeam.section import require
@@ -32,7 +31,6 @@ if TYPE_CHECKING:
 
     from fembeam.scene import Scene
 
-Vector = NDArray[np.float64]
 LOOSER = 10.0  # times the tolerance, in the second run of the reference
 LOOSEST = 1e-2  # the largest tolerance that methods take
 NEGLIGIBLE = 1e-5  # relative change by it that only a sensitive motion exceeds: others, some 1e-7
@@ -131,9 +129,9 @@ class ModeCount:
         if not hidden:
             return ""
         return (
-            f"{hidden} of {len(errors)} errors may be chance, not modes: {self.quantity} of the reference changes by "
-            f"{self.sensitivity:.1e} at {LOOSER:g} times the tolerance (chaos?); use an average over seeds, or a shorter "
-            "run"
+            f"{hidden} of {len(errors)} errors may be chance, not modes: at {LOOSER:g} times the tolerance "
+            f"{self.quantity} of the reference changes by {self.sensitivity:.1e} (chaos?); use an average over seeds, or "
+            "a shorter run"
         )
 
     def row(self, modes: int | None, residual: bool = False) -> Row:
@@ -248,7 +246,8 @@ def mode_count(
 
 def _looser(method: Any, plan: Plan) -> tuple[Any, ...]:
     """The method at ten times the tolerance, for a single transient; nothing where scatter tells as much."""
-    if plan.seeds or plan.duration is None or not getattr(method, "adaptive", False):
+    adjustable = is_dataclass(method) and any(f.name == "rtol" for f in fields(method))
+    if plan.seeds or plan.duration is None or not adjustable:
         return ()
     return (replace(method, rtol=min(LOOSER * method.rtol, LOOSEST)),)
 
