@@ -205,7 +205,9 @@ class Attractor:
     @property
     def name(self) -> str:
         """Period and number of impacts in words."""
-        return "not periodic" if self.orbit is None else f"period {self.period} with {self.impacts} impacts"
+        if self.orbit is None:
+            return "not periodic"
+        return f"period {self.period} with {counted(len(self.orbit.contacts), 'impact')}"
 
 
 def attractors(

@@ -215,6 +215,10 @@ class Run:
         """δ(t) (k,) of a stop, m; negative while it is open. Contacts of impactors count on after the stops."""
         return -self.q @ self.directions[self._stop(stop)] - self.stops[stop, 2]
 
+    def indentation_rate(self, stop: int = 0) -> Vector:
+        """δ̇(t) (k,) of a stop, m/s: of both bodies where the stop moves."""
+        return -self.q_dot @ self.directions[self._stop(stop)]
+
     def force(self, stop: int = 0) -> Vector:
         """Contact force (k,) of a stop, N, from its law and the entry rate latched at the time."""
         return self._forces[self._stop(stop)]

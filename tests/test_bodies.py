@@ -9,6 +9,8 @@ from scipy.integrate import solve_ivp
 import fembeam as fb
 import solvers
 from contacts import Hertz, Hysteretic, PiecewiseLinear
+from fembeam.study import quantities
+from fembeam.study.stationary import indentation
 
 STEEL = fb.Section.rectangle(2.1e11, 7850.0, 0.01, 0.01)
 HERTZ = Hertz(5e9)
@@ -213,6 +215,22 @@ def test_numbers_of_contacts_follow_the_bodies(tmp_path):
     np.testing.assert_array_equal(again.displacement(0.3, body=1), run.displacement(0.3, body=1))
     np.testing.assert_array_equal(again.impactor_velocity(), run.impactor_velocity())
     np.testing.assert_array_equal(again.indentation(3), run.indentation(3))
+
+
+def test_indentation_rate_of_a_stop_between_two_beams_is_that_of_both():
+    other = fb.Scene(fb.Beam(0.5, STEEL), [fb.Clamped(0.0)], damping=fb.ModalDamping(0.02))
+    stop = fb.Stop(0.5, HERTZ, gap=1e-4, on=(1, 0.5))
+    scene = fb.Scene(
+        fb.Beam(0.5, STEEL), [fb.Clamped(0.0)], stops=[stop], bodies=[other], base=fb.Harmonic(1e-3, 150.0)
+    )
+    model = scene.reduce(2)
+    run = model.simulate(0.1, 1e-5, start=model.state(velocity=lambda z: -2.0 * z**2))
+    assert len(run.contacts)
+    delta, rate = quantities.signal(run)
+    difference = np.gradient(delta, run.t)[1:-1]
+    away = np.abs(rate[1:-1] - difference)
+    assert np.median(away) < 1e-4 * np.abs(difference).max()  # at impacts the difference is smeared
+    np.testing.assert_array_equal(rate, indentation(run, 0)[1])
 
 
 # --- free flight --------------------------------------------------------------------------------------------------

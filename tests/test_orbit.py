@@ -31,12 +31,12 @@ def test_orbit_is_what_a_long_run_settles_to(model):
 
 def test_subharmonics_from_nothing_and_their_names(model):
     found = model.attractors(430.0, starts=3)
-    assert [a.name for a in found] == ["period 2 with 1 impacts"]
+    assert [a.name for a in found] == ["period 2 with 1 impact"]
     driven = paper_scene(fb.Harmonic(1e-3, 430.0)).reduce(1)
     half = driven.orbit(period=2)
     assert half.period == 2
     assert half.stable
-    told = r"^12 starts settled to period 2 with 1 impacts, none to period 1; "
+    told = r"^12 starts settled to period 2 with 1 impact, none to period 1; "
     with pytest.raises(solvers.OrbitError, match=told) as error:
         driven.orbit()
     assert len(str(error.value)) < 250

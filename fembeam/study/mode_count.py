@@ -130,8 +130,8 @@ class ModeCount:
             return ""
         return (
             f"{hidden} of {len(errors)} errors may be chance, not modes: at {LOOSER:g} times the tolerance "
-            f"{self.quantity} of the reference changes by {self.sensitivity:.1e} (chaos?); use an average over seeds, or "
-            "a shorter run"
+            f"{self.quantity} of the reference changes by {self.sensitivity:.1e} (chaos?); "
+            "use an average over seeds, or a shorter run"
         )
 
     def row(self, modes: int | None, residual: bool = False) -> Row:

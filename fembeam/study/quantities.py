@@ -209,8 +209,7 @@ def signal(run: Run, stop: int = 0, z: float | None = None) -> tuple[Vector, Vec
     """δ and its rate at a stop, or u and u̇ at z, or at the tip of a scene without stops."""
     require(len(run.t) > 1, "the run must have samples", len(run.t), "quantity", "give dt")
     if z is None and len(run.stops):
-        place, push, _ = run.stops[stop]
-        return run.indentation(stop), -push * run.velocity(place)
+        return run.indentation(stop), run.indentation_rate(stop)
     place = float(run.shapes.nodes[-1]) if z is None else z
     return run.displacement(place), run.velocity(place)
 

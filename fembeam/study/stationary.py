@@ -200,8 +200,7 @@ def watched_by_default(model: Model) -> dict[str, Watch]:
 
 def indentation(run: Run, stop: int) -> tuple[Vector, Vector]:
     """δ of a stop and its rate."""
-    z, push, _ = run.stops[stop]
-    return run.indentation(stop), -push * run.velocity(z)
+    return run.indentation(stop), run.indentation_rate(stop)
 
 
 def displacement(run: Run, z: float) -> tuple[Vector, Vector]:
