@@ -26,7 +26,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Clamped:
-    """u = 0 and u_z = 0 at z (m)."""
+    """u = 0 and u_z = 0 at z (m).
+
+    Examples
+    --------
+    >>> Clamped(0.0).fixed  # displacement, slope
+    (True, True)
+    """
 
     z: float
     fixed = (True, True)
@@ -34,7 +40,13 @@ class Clamped:
 
 @dataclass(frozen=True)
 class Pinned:
-    """u = 0 at z (m), free to turn."""
+    """u = 0 at z (m), free to turn.
+
+    Examples
+    --------
+    >>> Pinned(0.5).fixed  # displacement, slope
+    (True, False)
+    """
 
     z: float
     fixed = (True, False)
@@ -42,7 +54,13 @@ class Pinned:
 
 @dataclass(frozen=True)
 class Guided:
-    """u_z = 0 at z (m), free to move."""
+    """u_z = 0 at z (m), free to move.
+
+    Examples
+    --------
+    >>> Guided(0.5).fixed  # displacement, slope
+    (False, True)
+    """
 
     z: float
     fixed = (False, True)
@@ -56,7 +74,13 @@ class LumpedMass:
     """A rigid body fixed to the beam at z: T = ½ m (u̇ + e u̇_z)² + ½ J u̇_z².
 
     `mass` m in kg, `inertia` J about its own centre in kg m², both ≥ 0; `offset` e in m: the centre sits
-    ahead of z by e on a rigid arm, which may reach beyond the beam's end.
+    ahead of z by e on a rigid arm, which may reach beyond the beam's end. ValueError for a negative mass or inertia.
+
+    Examples
+    --------
+    >>> cube = LumpedMass(0.5, mass=0.1, inertia=0.1 * 0.02**2 / 6)  # edge 2 cm
+    >>> round(cube.inertia, 9)
+    6.667e-06
     """
 
     z: float
@@ -75,6 +99,14 @@ class Spring:
     """A spring to the frame: force -k (u - foot) (`stiffness`, N/m), moment -κ u_z (`rotational`, N m/rad); ≥ 0.
 
     `foot` is a signal, the motion of its far end relative to the frame in m (a shaken support); None: at rest.
+    ValueError for a negative stiffness.
+
+    Examples
+    --------
+    >>> from fembeam import Harmonic
+    >>> shaken = Spring(0.3, stiffness=1e4, foot=Harmonic(amplitude=1e-3, omega=50.0))
+    >>> shaken.stiffness * float(shaken.foot(0.0))  # N, on the beam held at u = 0
+    10.0
     """
 
     z: float
@@ -91,7 +123,15 @@ class Spring:
 
 @dataclass(frozen=True)
 class Dashpot:
-    """A dashpot to the frame: force -c u̇ (`damping`, N s/m), moment -γ u̇_z (`rotational`, N m s); ≥ 0."""
+    """A dashpot to the frame: force -c u̇ (`damping`, N s/m), moment -γ u̇_z (`rotational`, N m s); ≥ 0.
+
+    ValueError for a negative one.
+
+    Examples
+    --------
+    >>> Dashpot(0.3, damping=2.0)
+    Dashpot(z=0.3, damping=2.0, rotational=0.0)
+    """
 
     z: float
     damping: float
@@ -108,6 +148,7 @@ class Stop:
 
     `law` gives the repulsive force for δ > 0; `gap` in m, negative = preload. It sits on the frame, or `on` another
     beam of the scene: `on=(body, z)`, body 1 the first of `Scene.bodies`; u is then the difference, u - u_body(z).
+    ValueError for a side that is neither "below" nor "above", or a gap that is not finite.
 
     Examples
     --------
@@ -140,7 +181,14 @@ class Stop:
 
 @dataclass(frozen=True)
 class PointForce:
-    """A force on the beam at z: signal(t) in N, positive up."""
+    """A force on the beam at z: signal(t) in N, positive up.
+
+    Examples
+    --------
+    >>> from fembeam import Pulse
+    >>> round(float(PointForce(0.2, Pulse(peak=100.0, length=1e-3)).signal(5e-4)), 9)
+    100.0
+    """
 
     z: float
     signal: Any
@@ -152,7 +200,14 @@ class PointForce:
 
 @dataclass(frozen=True)
 class PointMoment:
-    """A moment on the beam at z: signal(t) in N m, positive where it turns u_z up."""
+    """A moment on the beam at z: signal(t) in N m, positive where it turns u_z up.
+
+    Examples
+    --------
+    >>> from fembeam import Step
+    >>> float(PointMoment(0.2, Step(size=1.5, rise=0.1)).signal(1.0))
+    1.5
+    """
 
     z: float
     signal: Any

@@ -73,7 +73,19 @@ def animate(
 
 
 def frame(run: Run, t: float, window: tuple[float, float] | None = None) -> Figure:
-    """One picture of the moving picture, at the sample next to t (s)."""
+    """One picture of the moving picture, at the sample next to t (s).
+
+    Examples
+    --------
+    >>> import fembeam as fb
+    >>> from contacts import Hertz
+    >>> beam = fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01))
+    >>> stops, drive, damping = [fb.Stop(0.5, Hertz(1e9))], fb.Harmonic(1e-3, 150.0), fb.ModalDamping(0.05)
+    >>> model = fb.Scene(beam, [fb.Clamped(0.0)], stops=stops, base=drive, damping=damping).reduce(modes=2)
+    >>> figure = frame(model.simulate(duration=0.2, dt=1e-3), t=0.1)
+    >>> figure.axes[0].get_xlabel()
+    'z / mm'
+    """
     samples = _samples(run, window, MOST_FRAMES)
     stage = _Stage(run, samples, None)
     stage.show(int(np.argmin(np.abs(run.t[samples] - t))))

@@ -149,7 +149,14 @@ def _edges(steps: np.ndarray) -> np.ndarray:
 
 @styled
 def failures(cases: Sequence[Failure]) -> Figure:
-    """A gallery: each case with what the naive method gives (red) and what this library gives or says (blue)."""
+    """A gallery: each case with what the naive method gives (red) and what this library gives or says (blue).
+
+    Examples
+    --------
+    >>> from fembeam.study.failures import jumped_contact
+    >>> failures([jumped_contact()]).axes[0].get_ylabel()
+    'displacement / mm'
+    """
     from matplotlib.figure import Figure
 
     rows = -(-len(cases) // 2)

@@ -28,6 +28,12 @@ def loops(laws: Mapping[str, Law], entry_rate: float = 1.0, mass: float = 1.0) -
     Notes
     -----
     The area of a loop is the energy lost, ½ m v² (1 - e²); the legend gives the achieved restitution e.
+
+    Examples
+    --------
+    >>> figure = loops({"Flores": Hysteretic.flores(1e8, restitution=0.5)})
+    >>> figure.axes[0].get_ylabel()
+    'contact force / N'
     """
     from matplotlib.figure import Figure
 

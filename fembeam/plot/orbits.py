@@ -115,7 +115,18 @@ def _legend(axis: Axes, several: list[Branch]) -> None:
 
 @styled
 def orbit(one: Orbit, z: float | None = None) -> Figure:
-    """One orbit at z: time history with its contacts shaded, and phase portrait."""
+    """One orbit at z (m; None: the first stop): time history with its contacts shaded, and phase portrait.
+
+    Examples
+    --------
+    >>> import fembeam as fb
+    >>> from contacts import Hertz
+    >>> beam = fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01))
+    >>> stops, drive, damping = [fb.Stop(0.5, Hertz(1e9))], fb.Harmonic(1e-3, 150.0), fb.ModalDamping(0.05)
+    >>> model = fb.Scene(beam, [fb.Clamped(0.0)], stops=stops, base=drive, damping=damping).reduce(modes=2)
+    >>> [axis.get_xlabel() for axis in orbit(model.orbit()).axes]
+    ['t / ms', 'u / mm']
+    """
     from matplotlib.figure import Figure
 
     place = observed(one.model) if z is None else z

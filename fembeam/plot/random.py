@@ -62,7 +62,22 @@ def random_spectra(
 
 @styled
 def random_densities(signals: Mapping[str, Signal]) -> Figure:
-    """Probability densities with 95 % confidence against the Gaussian of the same mean and deviation."""
+    """Probability densities with 95 % confidence against the Gaussian of the same mean and deviation.
+
+    Parameters
+    ----------
+    signals : name -> signal, m, such as those of `fembeam.study.stationary`.
+
+    Examples
+    --------
+    >>> import fembeam as fb
+    >>> beam = fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01))
+    >>> noise, damping = fb.BandNoise(1e-5, (0.0, 400.0), seed=1), fb.ModalDamping(0.05)
+    >>> model = fb.Scene(beam, [fb.Clamped(0.0)], damping=damping, base=noise).reduce(modes=1)
+    >>> found = fb.study.stationary(model, duration=400.0, dt=2e-3)
+    >>> random_densities({"tip": found["tip u"]}).axes[0].get_xlabel()
+    'tip / mm'
+    """
     figure, axes = _sheet(None, 1, len(signals), (3.5 * len(signals), 3.1))
     for axis, (name, signal) in zip(axes, signals.items(), strict=True):
         density, mean, std = signal.pdf, 1e3 * float(signal.mean.value), 1e3 * float(signal.std.value)

@@ -2,6 +2,23 @@
 
 Displacements are shown in mm, times in s, spectra one-sided and per rad/s. A run that did not finish says so
 in the title and, in red, at the foot of every figure.
+
+Examples
+--------
+>>> import fembeam as fb
+>>> from contacts import Hertz
+>>> beam = fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01))
+>>> stops, drive = [fb.Stop(0.5, Hertz(1e9))], fb.Harmonic(1e-3, 150.0)
+>>> model = fb.Scene(beam, [fb.Clamped(0.0)], stops=stops, base=drive, damping=fb.ModalDamping(0.05)).reduce(modes=2)
+>>> run = model.simulate(duration=1.0, dt=1e-3)
+>>> [axis.get_ylabel() for axis in time_history(run).axes]
+['displacement / mm', 'peak contact force / N']
+>>> [axis.get_ylabel() for axis in spectrum(run, discard=0.2).axes]
+['PSD / m² s rad⁻¹', 'PSD / m² s rad⁻¹']
+>>> [axis.get_xlabel() for axis in densities(run, discard=0.2).axes]
+['δ / mm', 'mid-beam u / mm']
+>>> contacts(run).axes[3].get_xlabel(), mode_shapes(model).axes[0].get_xlabel()
+('entry speed / m s⁻¹', 'z / mm')
 """
 
 from __future__ import annotations

@@ -45,7 +45,16 @@ class Failure:
 
 
 def gallery(scene: Scene) -> list[Failure]:
-    """All cases; ``scene`` is the beam of those with many modes, with one Hertz-like stop at its gap of zero."""
+    """All cases; ``scene`` is the beam of those with many modes, with one Hertz-like stop at its gap of zero.
+
+    Draw them with ``fb.plot.failures``; each case is a function of its own too.
+
+    Examples
+    --------
+    >>> case = jumped_contact()
+    >>> print(case.title, case.our_error < 1e-6 < case.naive_error)
+    A step over a whole contact True
+    """
     return [
         heun_with_more_modes(scene, 3),
         heun_with_more_modes(scene, 10),

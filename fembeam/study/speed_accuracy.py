@@ -70,6 +70,19 @@ def speed_accuracy(
     Raises
     ------
     NoReferenceError when the references differ by more than ``agreement``. ValueError for bad input, before computing.
+
+    Examples
+    --------
+    >>> import fembeam as fb
+    >>> from contacts import KelvinVoigt
+    >>> steel = fb.Section(E=2.1e11, rho=7800.0, A=1e-4, I=1e-9)
+    >>> stop = fb.Stop(0.5, KelvinVoigt(1e5, 5.0), gap=1e-4)
+    >>> scene = fb.Scene(fb.Beam(0.5, steel), [fb.Clamped(0.0)], stops=[stop], base=fb.Harmonic(1e-3, 150.0))
+    >>> methods = [solvers.Exponential(1e-4), solvers.Exponential(1e-8)]
+    >>> found = speed_accuracy(scene.reduce(modes=1), methods, starts=2, duration=0.05, rounds=1)
+    >>> loose, tight = found.points
+    >>> tight.error < 1e-7 and tight.error < loose.error < 1e-3
+    True
     """
     from fembeam.model import Model
 
