@@ -113,7 +113,8 @@ def stability_map(
     """
     steps = np.atleast_1d(np.asarray(steps, dtype=float))
     where = "stability_map"
-    require(bool(np.all(np.isfinite(steps) & (steps > 0.0))), "steps must be positive (s)", steps.tolist(), where, "")
+    require(bool(np.all(np.isfinite(steps) & (steps > 0.0))), "steps must be positive (s)", steps.tolist(), where,
+            "e.g. [1e-5, 1e-4]")  # fmt: skip
     require(len(scene.stops) > 0, "the scene must have a stop", len(scene.stops), where, "add one")
     require(0.0 < tolerance < 1.0, "tolerance must lie in (0, 1)", tolerance, where, "e.g. 0.01")
     models, axis, rows = _models(scene, modes, stiffness)
