@@ -81,6 +81,11 @@ def test_ticks_of_entry_speeds_do_not_overlap(run, highest):
     assert apart([tick for tick in axis.get_xticklabels(which="both") if low <= tick.get_position()[0] <= high])
 
 
+def test_contacts_that_all_began_at_rest(run):
+    log = dataclasses.replace(run.contacts, speed_in=np.zeros(len(run.contacts)))
+    assert "no contact began with a speed" in texts(plot.contacts(dataclasses.replace(run, contacts=log)))
+
+
 def test_a_partial_run_says_so(run):
     partial = dataclasses.replace(run, status="interrupted: partial result")
     assert "PARTIAL RESULT: interrupted" in texts(plot.densities(partial))

@@ -391,6 +391,10 @@ def _histogram(axis: Axes, values: Vector, label: str) -> None:
 def _restitutions(axis: Axes, speed_in: Vector, speed_out: Vector) -> None:
     """Restitution against entry speed, at most MOST_DOTS evenly picked contacts."""
     moving = np.flatnonzero(speed_in > 0)
+    if not len(moving):  # all began at rest on the stop
+        axis.set_title("no contact began with a speed")
+        axis.set_axis_off()
+        return
     picked = moving[:: max(1, -(-len(moving) // MOST_DOTS))]
     restitution = speed_out[picked] / speed_in[picked]
     low, high = 0.8 * np.quantile(speed_in[picked], 0.005), 1.2 * speed_in[picked].max()
