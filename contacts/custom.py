@@ -23,7 +23,7 @@ _PROBES = np.array([1e-9, 1e-6, 1e-3])
 
 @dataclass(frozen=True)
 class CustomLaw(Law):
-    """A user's force function with its parameters bound; made by calling a function decorated with `law`."""
+    """A user's force function with its parameters bound; made by calling a function decorated with `law`; see there."""
 
     name: str
     function: Function = field(repr=False)
