@@ -1,4 +1,4 @@
-r"""How signals reach the compiled integrators.
+"""How signals reach the compiled integrators.
 
 A signal is any callable t -> value that broadcasts. It is handed over as exactly one of
 

@@ -31,7 +31,7 @@ def lyapunov(
     discard: float = 0.0,
     method: Any = None,
 ) -> Exponent:
-    r"""Mean rate at which the largest singular value of the tangent grows, λ = lim ln‖∂x(t)/∂x(0)‖ / t.
+    """Mean rate at which the largest singular value of the tangent grows, λ = lim ln‖∂x(t)/∂x(0)‖ / t.
 
     Positive for chaotic motion; ln|μ|/T on a periodic orbit of period T and largest multiplier μ.
 
@@ -44,8 +44,12 @@ def lyapunov(
     -------
     Exponent : value and standard error; the error means nothing when fewer than some 200 contacts were made.
 
-    Source
+    Raises
     ------
+    ValueError for bad input before computing; SolverError when the run fails.
+
+    References
+    ----------
     Benettin, Galgani, Giorgilli, Strelcyn, Meccanica 15 (1980) 9; the derivative of an event's time enters the tangent.
 
     Examples

@@ -11,21 +11,17 @@ from numba import types
 
 from solvers.forcing import Forcing, tones_as_nodes
 from solvers.handle import Layout, Packed
-from solvers.kernels import PROBLEM, Problem
+from solvers.kernels import INTEGERS, MATRIX, PROBLEM, REAL, VECTOR, Problem
 from solvers.response import Space
 from solvers.state import STATE, problem_of, rate_rows, state_shapes
 from solvers.system import Array, System
 from solvers.tables import S, Tables, build
 from solvers.vector import padded
 
-_REAL = types.float64
-_VECTOR = types.Array(_REAL, 1, "C")
-_MATRIX = types.Array(_REAL, 2, "C")
-_INTEGERS = types.Array(types.int64, 1, "C")
 
-
-def _arrays(*dimensions):  # shapes of a named tuple's contiguous float arrays
-    return [types.Array(_REAL, d, "C") if d else _REAL for d in dimensions]
+def _arrays(*dimensions: int) -> list[Any]:
+    """Types of contiguous float arrays with so many dimensions; a plain number for none."""
+    return [types.Array(REAL, d, "C") if d else REAL for d in dimensions]
 
 
 TABLES = types.NamedTuple(
@@ -36,7 +32,7 @@ TABLES = types.NamedTuple(
     Tables,
 )
 SPACE = types.NamedTuple(
-    [*_arrays(1, 2, 2, 1, 1, 1, 1, 3, 1, 3, 2, 1, 3, 2, 3, 2, 1), _INTEGERS, _MATRIX, _VECTOR, _INTEGERS], Space
+    [*_arrays(1, 2, 2, 1, 1, 1, 1, 3, 1, 3, 2, 1, 3, 2, 3, 2, 1), INTEGERS, MATRIX, VECTOR, INTEGERS], Space
 )
 
 
@@ -45,8 +41,7 @@ class Prepared(NamedTuple):
 
     problem: Packed
     tables: Packed
-    steady: Array
-    back: Array
+    back: Array  # (2n, 2N): [q, q̇] from the state of all blocks
     layout: Layout  # of State and Space
     rest: Array  # state of the tones' blocks at t = 0, the structure's less their steady response
 
@@ -67,7 +62,7 @@ def prepared_for(system: System, forcing: Forcing) -> Prepared:
         )
         layout = _layout(len(problem.gap), len(problem.load), len(problem.k), len(forcing.table_dt))
         made = Prepared(
-            *(Packed(problem, PROBLEM), Packed(tables, TABLES), steady, system.blocks.T @ steady),
+            *(Packed(problem, PROBLEM), Packed(tables, TABLES), system.blocks.T @ steady),
             *(layout, _rest(steady, len(forcing.tone_omega))),
         )
         system.kept["exponential"] = (key, made)

@@ -165,7 +165,7 @@ def _fastest(M: Any, C: Any, K: Any) -> tuple[Array, Array]:
     return k, np.sum(phi * (C @ phi), axis=0)
 
 
-def contact_time(system: System) -> float:
+def shortest_contact(system: System) -> float:
     """Half a period on the stiffest stop's tangent, hit at 1 m/s; inf without stops."""
     found = [tangent(system, contact, None) for contact in system.contacts]
     return min(
