@@ -76,7 +76,7 @@ def damping_factor_for(restitution: float) -> float:
     return brentq(lambda a: achieved_restitution(a) - r, 0.0, 1.0 / r, xtol=1e-15, rtol=8.9e-16)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Bounce:
     """A free mass thrown onto a stop: samples from entry to exit, made by `bounce`.
 

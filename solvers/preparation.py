@@ -49,7 +49,7 @@ class Prepared(NamedTuple):
 def prepared_for(system: System, forcing: Forcing) -> Prepared:
     """Tables of a system, made once and kept on it, those of the last grid of its sampled signals only."""
     dt_cell = float(forcing.table_dt[0]) if forcing.table_dt.size else 1.0
-    key = (dt_cell, tuple(forcing.tone_omega))
+    key = dt_cell, *(part.tobytes() for part in (forcing.tone_omega, forcing.tone_amplitude, forcing.tone_load))
     if system.kept.get("exponential", (None,))[0] != key:
         _check_passive(system)
         plain = problem_of(system, forcing)
@@ -102,12 +102,13 @@ def without_resonance(system: System, forcing: Forcing, duration: float, rtol: f
     That is those on the frequency of a block hardly damped, and those whose steady response l/|k - Ω² + iΩc| is a
     thousand times what the load can do within the duration, l duration²/2: their difference would lose its digits.
     """
-    if "distances" not in system.kept:
+    key = forcing.tone_omega.tobytes(), forcing.tone_load.tobytes()
+    if system.kept.get("distances", (None,))[0] != key:
         tones = zip(forcing.tone_omega, forcing.tone_load, strict=True)
-        system.kept["distances"] = [_distance(system, omega, load) for omega, load in tones]
+        system.kept["distances"] = key, [_distance(system, omega, load) for omega, load in tones]
     resonant = [
         i
-        for i, (absolute, relative) in enumerate(system.kept["distances"])
+        for i, (absolute, relative) in enumerate(system.kept["distances"][1])
         if relative <= 1e-6 or absolute * duration**2 < 2e-3
     ]
     return tones_as_nodes(forcing, resonant, duration, rtol) if resonant else forcing

@@ -14,7 +14,7 @@ and the same question asked of the modes of (M, C_c, K_c).
 from __future__ import annotations
 
 import math
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple
 
@@ -229,7 +229,7 @@ def _depth(law: Any, mass: float, speed: float) -> float:
 # --- what all methods of constant step share -------------------------------------------------------------------------
 
 
-class ConstantStep:
+class ConstantStep(ABC):
     """A method of constant step: checked before it starts, watched while it runs."""
 
     adaptive: ClassVar[bool] = False

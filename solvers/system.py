@@ -58,7 +58,7 @@ Signal = Callable[[Any], Any]
 """A function t -> value that broadcasts; may offer ``tones()`` or ``nodes(duration, rtol)``, see `solvers.forcing`."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Contact:
     """One stop: ``delta = -direction @ q - gap``; it pushes with ``+direction * force`` while ``delta > 0``.
 
