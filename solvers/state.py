@@ -235,13 +235,7 @@ def _problem(system: System, forcing: Forcing, linear: dict[str, Array]) -> Prob
         gradient=np.array([c.law.gradient_address for c in contacts], dtype=np.int64),
         parameters=law_parameters(system),
         floor=np.array([c.law.entry_rate_floor for c in contacts], dtype=float),
-        tone_omega=forcing.tone_omega,
-        tone_amplitude=forcing.tone_amplitude,
-        tone_load=forcing.tone_load,
-        table=forcing.table,
-        table_dt=forcing.table_dt,
-        table_start=forcing.table_start,
-        table_load=forcing.table_load,
+        **vars(forcing),
     )
 
 
