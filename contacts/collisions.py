@@ -72,6 +72,23 @@ def read_collisions(path: str | Path) -> dict[str, list[Vector]]:
 
     Columns ``delta`` (m), ``force`` (N) and ``time`` (s) or ``delta_dot`` (m/s), named in the first line, in any order;
     a column ``collision`` tells the collisions apart, otherwise they are found in the record.
+
+    Returns
+    -------
+    Lists of (k,) arrays by column; ``delta_dot`` is left out where there is a ``time``.
+
+    Raises
+    ------
+    ValueError for a missing column and for an entry that is no number, with its line.
+
+    Examples
+    --------
+    >>> import os, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder, "stop.csv")
+    ...     _ = path.write_text("time,delta,force" + os.linesep + "0,0,0" + os.linesep + "1e-4,2e-5,18.8")
+    ...     read_collisions(path)["force"]
+    [array([ 0. , 18.8])]
     """
     columns = read_columns(path, ("delta", "force"), ("time", "delta_dot", "collision"))
     if "time" in columns:

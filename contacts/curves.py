@@ -1,4 +1,4 @@
-r"""Laws given by a curve: piecewise linear, and a table of measured forces.
+"""Laws given by a curve: piecewise linear, and a table of measured forces.
 
 A clearance belongs to the stop (its ``gap``), and so does a preload (a negative ``gap``: the stop is compressed at
 rest). A stop acts on one side; what moves between two sides has two stops, one below and one above, each with its law.
@@ -102,12 +102,18 @@ def _numbers(values: Sequence[float] | float, name: str) -> tuple[float, ...]:
 
 @dataclass(frozen=True)
 class Tabulated(Law):
-    r"""Elastic force through measured points, by the monotone cubics of Fritsch and Carlson.
+    """Elastic force through measured points, by the monotone cubics of Fritsch and Carlson.
+
+        F = F_j + x (c_1j + x (c_2j + x c_3j)),  x = δ - δ_j    for δ_j < δ <= δ_j+1
 
     Parameters
     ----------
-    indentation : m, ascending, >= 0; the point (0, 0) is added where it is missing.
-    measured : N at each, not falling, >= 0. Beyond the last point the force goes on with its last slope.
+    indentation : (k,) m, ascending, >= 0; the point (0, 0) is added where it is missing.
+    measured : (k,) N, not falling, >= 0. Beyond the last point the force goes on with its last slope.
+
+    Raises
+    ------
+    ValueError for points that do not fit together, fall, or do not begin at (0, 0).
 
     Notes
     -----

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contacts.law import ENTRY_RATE_FLOOR, Law
+from contacts.law import ENTRY_RATE_FLOOR, Law, check_number
 
 Function = Callable[..., Any]
 _ARGUMENTS = ("delta", "delta_dot", "entry_rate")
@@ -23,7 +23,7 @@ _PROBES = np.array([1e-9, 1e-6, 1e-3])
 
 @dataclass(frozen=True)
 class CustomLaw(Law):
-    """A user's force function with its parameters bound; made by calling a function decorated with `law`."""
+    """A user's force function with its parameters bound; made by calling a function decorated with `law`; see there."""
 
     name: str
     function: Function = field(repr=False)
@@ -101,8 +101,8 @@ def law(
     ------
     TypeError for a signature that does not begin with ``delta, delta_dot, entry_rate`` or has other than plain
     arguments, for a function that cannot be compiled (with the line), and on binding for missing or unknown
-    parameters. ValueError on binding for a force that is NaN or negative at rest, that jumps at δ = 0 without
-    ``jump=True``, or whose derivative is not that of the force.
+    parameters. ValueError for knots, an exponent or a floor out of range, and on binding for a force that is NaN or
+    negative at rest, that jumps at δ = 0 without ``jump=True``, or whose derivative is not that of the force.
 
     Examples
     --------
@@ -123,6 +123,9 @@ def law(
     if derivative is not None and _checked_names(derivative, f"derivative of law {who!r}") != names:
         raise TypeError(f"derivative of law {who!r} must take the law's arguments, ({', '.join(names)})")
     _check_knots(who, knots)
+    check_number(entry_rate_floor, f"entry_rate_floor of law {who!r}")
+    if exponent is not None:
+        check_number(exponent, f"exponent of law {who!r}", strict=True)
     options = tuple(map(float, knots)), jump
     probe = inspect.Signature(list(inspect.signature(function).parameters.values())[3:])
 

@@ -10,7 +10,14 @@ from contacts.laws import Hysteretic
 
 @dataclass(frozen=True)
 class Estimate:
-    """A value with the ends of its confidence interval; equal ends: it was given."""
+    """A value with the ends of its confidence interval; equal ends: it was given.
+
+    Examples
+    --------
+    >>> found = Estimate(0.56, 0.55, 0.57)
+    >>> print(found, 0.5625 in found)
+    0.56 [0.55, 0.57] True
+    """
 
     value: float
     low: float
@@ -48,7 +55,7 @@ class Collision:
 
 @dataclass(frozen=True, eq=False)
 class Identified:
-    """What `identify` finds.
+    """What `identify` finds; see there for an example.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-r"""A law from measured collisions, by least squares over all of them.
+"""A law from measured collisions, by least squares over all of them.
 
     F = F₀ + K x^p (1 + a δ̇/δ̇⁻),  x = δ - δ₀
 
@@ -232,7 +232,7 @@ class _Fit:
         fixed = around(0.0, 0.0)
         for remark in remarks:
             warnings.warn(remark, stacklevel=3)
-        peak, loop = self._published(p, F0, d0)
+        peak, loop = self._published(p, F0)
         return Identified(
             stiffness=Estimate(kappa * factor, kappa * factor / spread, kappa * factor * spread),
             exponent=around(p, errors[-1]) if self.exponent is None else around(p, 0.0),
@@ -270,7 +270,7 @@ class _Fit:
                 )
         return widening, remarks
 
-    def _published(self, p: float, F0: float, d0: float) -> tuple[float, float]:
+    def _published(self, p: float, F0: float) -> tuple[float, float]:
         """K from the forces near the largest indentation, a from the loops' area: Eqs (4) and (5)."""
         top, loops, measure = np.zeros(2), 0.0, 0.0
         for i, one in enumerate(self.measured):

@@ -143,6 +143,10 @@ class Sum(Law):
 
     Each part keeps its own floor of the entry rate.
 
+    Parameters
+    ----------
+    parts : the laws F_1, F_2, ...
+
     Examples
     --------
     >>> from contacts import Hertz, KelvinVoigt
@@ -194,7 +198,7 @@ def parts_of(law: Law) -> tuple[Law, ...]:
 
 
 def parallel(laws: list[Law]) -> Law:
-    """All laws at once, as ``laws[0] + laws[1] + ...``; for scene files.
+    """All laws at once, as ``laws[0] + laws[1] + ...``; for scene files. ValueError for an empty list.
 
     Examples
     --------

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 def achieved_restitution(damping_factor: float) -> float:
     """Restitution r a free mass achieves with the damping factor a >= 0.
 
-    Solves ``a (1 + r) = ln[(1 + a)/(1 - a r)]`` for r in (0, 1]; r tends to 1/a for large a.
+    Solves ``a (1 + r) = ln[(1 + a)/(1 - a r)]`` for r in (0, 1]; r tends to 1/a for large a. ValueError for a factor
+    that is negative or not finite.
 
     Examples
     --------
@@ -46,14 +47,16 @@ def achieved_restitution(damping_factor: float) -> float:
 
 
 def _h(x: float) -> float:
-    """X - ln(1 + x), by its series where the difference would cancel."""
+    """The function h(x) = x - ln(1 + x), by its series where the difference would cancel."""
     if abs(x) > 0.1:
         return x - math.log1p(x)
     return sum((-x) ** k / k for k in range(17, 1, -1))
 
 
 def damping_factor_for(restitution: float) -> float:
-    """Damping factor with which a free mass achieves ``restitution`` in (0, 1] exactly.
+    """Damping factor a >= 0 with which a free mass achieves ``restitution`` r in (0, 1] exactly.
+
+    Solves ``a (1 + r) = ln[(1 + a)/(1 - a r)]`` for a. ValueError for a restitution outside that range.
 
     Examples
     --------
@@ -73,9 +76,9 @@ def damping_factor_for(restitution: float) -> float:
     return brentq(lambda a: achieved_restitution(a) - r, 0.0, 1.0 / r, xtol=1e-15, rtol=8.9e-16)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Bounce:
-    """A free mass thrown onto a stop: samples from entry to exit.
+    """A free mass thrown onto a stop: samples from entry to exit, made by `bounce`.
 
     Attributes
     ----------
@@ -143,7 +146,7 @@ def bounce(law: Law, entry_rate: float = 1.0, mass: float = 1.0) -> Bounce:
 
     Raises
     ------
-    ValueError : an entry rate or a mass that is not positive.
+    ValueError for an entry rate or a mass that is not positive; RuntimeError for a law that never stops the mass.
 
     Examples
     --------

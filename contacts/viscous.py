@@ -141,7 +141,7 @@ class Viscoelastic(Law):
 
     compiled: ClassVar[str] = "power"
     equation: ClassVar[str] = "F = stiffness δ^p + damping δ^((p-1)/2) δ̇, p = exponent"
-    units: ClassVar[dict[str, str]] = {"stiffness": "N/m^p", "damping": "N s/m^((p+1)/2)", "exponent": ""}
+    units: ClassVar[dict[str, str]] = {"stiffness": "N/m^p", "damping": "N s/m^((p+1)/2)"}
 
     def __post_init__(self) -> None:
         number(self, "stiffness", strict=True)

@@ -90,8 +90,7 @@ def oriented(basis: Basis, direction: ArrayLike | sparse.spmatrix | None = None)
 
     Parameters
     ----------
-    basis : Basis
-        Any.
+    basis : its signs may be any.
     direction : (N,) or (k, N)
         A row, or rows of which the one with the largest |row · φ| decides, the last one in a tie within 1e-6.
         Rows of displacement from the support to the free end thus make each mode positive where it moves

@@ -65,7 +65,7 @@ def with_residual(basis: Basis, M: Matrix, K: Matrix, directions: Matrix, root: 
     >>> float(np.sum(basis.project([1.0, 1.0, 1.0]) ** 2 / basis.omega**2))  # 1 + 1/4 + 1/16
     1.3125
     """
-    M, K = checked_matrix(M, "M"), checked_matrix(K, "K")
+    M, K = checked_matrix(M, "M", "with_residual"), checked_matrix(K, "K", "with_residual")
     B = _directions(directions, K.shape[0], "with_residual")
     still = basis.vectors[:, basis.omega == 0.0]
     shapes = static_shapes(M, K, B, still, root)
@@ -118,7 +118,7 @@ def craig_bampton(M: Matrix, K: Matrix, directions: Matrix, count: int, root: Ma
     >>> float(np.sum(basis.project([0.0, 0.0, 1.0]) ** 2 / basis.omega**2))  # three springs in series
     3.0
     """
-    M, K = checked_matrix(M, "M"), checked_matrix(K, "K")
+    M, K = checked_matrix(M, "M", "craig_bampton"), checked_matrix(K, "K", "craig_bampton")
     B = _directions(directions, K.shape[0], "craig_bampton")
     T, m = _interface_coordinates(B)
     most = K.shape[0] - m
@@ -158,7 +158,8 @@ def guyan(M: Matrix, K: Matrix, directions: Matrix, root: Matrix | None = None) 
 def static_share(basis: Basis, M: Matrix, K: Matrix, directions: Matrix, root: Matrix | None = None) -> Vector:
     """Share (m,) of the static compliance of each direction that a basis keeps: Σ (bᵀφ_i)²/ω_i² / bᵀK⁻¹b.
 
-    Never above 1; for rigid-body modes (which must be in the basis) the elastic compliance is meant.
+    Never above 1; for rigid-body modes (which must be in the basis) the elastic compliance is meant. Arguments and
+    errors as for `with_residual`.
 
     Examples
     --------
@@ -166,7 +167,7 @@ def static_share(basis: Basis, M: Matrix, K: Matrix, directions: Matrix, root: M
     >>> static_share(modal_basis(M, K, 1), M, K, [[1.0], [1.0]])
     array([0.8])
     """
-    M, K = checked_matrix(M, "M"), checked_matrix(K, "K")
+    M, K = checked_matrix(M, "M", "static_share"), checked_matrix(K, "K", "static_share")
     B = _directions(directions, K.shape[0], "static_share")
     shapes = static_shapes(M, K, B, basis.vectors[:, basis.omega == 0.0], root)
     return np.diag(_compliance(basis, B)) / np.sum(B * shapes, axis=0)
@@ -223,7 +224,7 @@ def _independent(v: Vector, M: Matrix) -> Vector:
 
 
 def _strain(K: Matrix, root: Matrix | None, u: Vector) -> Vector:
-    """UᵀKU, through the root if there is one: twice the strain energies, without the cancellation in K."""
+    """Products uᵀKu, through the root if there is one: twice the strain energies, without the cancellation in K."""
     if root is None:
         return u.T @ (K @ u)
     stretched = sparse.csr_matrix(root) @ u

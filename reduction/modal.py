@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from scipy import linalg, sparse
 from scipy.sparse import linalg as sparse_linalg
 
-from reduction.basis import AccuracyError, Basis, oriented
+from reduction.basis import AccuracyError, Basis, Vector, oriented
 
-Vector = NDArray[np.float64]
 Matrix: TypeAlias = Any  # dense or sparse
 
 DENSE_LIMIT = 60  # free dofs; dense stays faster up to 300, by 1 ms, but loses low modes beside stiff springs
@@ -26,11 +25,11 @@ RESIDUAL_TOLERANCE = 1e-9  # of the largest terms in K φ - ω² M φ
 SYMMETRY_TOLERANCE = 1e-9
 SHIFT = 1e-12  # of the median of K_ii/M_ii: above rounding of K, not far above the lowest elastic ω²
 RIGID = 1e-7  # of max √(K_ii/M_ii): rounding of K, a few √eps, hides lower frequencies
+RIGID_WITH_ROOT = 1e-12  # same, when R is given: rounding stays below 4e-14 up to 2000 elements
 FINE = 1000  # free dofs, above which more vectors than wanted are corrected
 GUARDS = 6  # so many further: two vectors alone do not settle on 5000 elements, eight do
 SETTLED = 1e-9  # relative change of the frequencies by the last correction; one is enough up to 1000 elements
 MOST_CORRECTIONS = 10
-RIGID_WITH_ROOT = 1e-12  # same, when R is given: rounding stays below 4e-14 up to 2000 elements
 
 
 def modal_basis(
@@ -80,7 +79,7 @@ def modal_basis(
     >>> modal_basis(np.eye(2), np.diag([4.0, 9.0]), count=1).omega
     array([2.])
     """
-    M, K = checked_matrix(M, "M"), checked_matrix(K, "K")
+    M, K = checked_matrix(M, "M", "modal_basis"), checked_matrix(K, "K", "modal_basis")
     if M.shape != K.shape:
         raise ValueError(f"M and K must have the same shape, got {M.shape} and {K.shape} in modal_basis; match them")
     wanted = _wanted(M.shape[0], count, indices)
@@ -214,16 +213,16 @@ def _wanted(size: int, count: int | None, indices: Sequence[int] | None) -> NDAr
     return np.sort(wanted)
 
 
-def checked_matrix(A: Matrix, name: str) -> sparse.csc_matrix:
-    """A as sparse float matrix, checked: square, finite, symmetric."""
+def checked_matrix(A: Matrix, name: str, where: str) -> sparse.csc_matrix:
+    """A as sparse float matrix, checked: square, finite, symmetric; ``where`` is the caller, for the message."""
     matrix = sparse.csc_matrix(A, dtype=float)
     if matrix.shape[0] != matrix.shape[1] or matrix.shape[0] == 0:
-        raise ValueError(f"{name} must be square, got shape {matrix.shape} in modal_basis; give (N, N)")
+        raise ValueError(f"{name} must be square, got shape {matrix.shape} in {where}; give (N, N)")
     if not np.all(np.isfinite(matrix.data)):
-        raise ValueError(f"{name} must be finite, got NaN or infinite entries in modal_basis; check the assembly")
+        raise ValueError(f"{name} must be finite, got NaN or infinite entries in {where}; check the assembly")
     difference = abs(matrix - matrix.T).max()
     if difference > SYMMETRY_TOLERANCE * abs(matrix).max():
-        raise ValueError(f"{name} must be symmetric, got a difference of {difference:.3g} in modal_basis; "
+        raise ValueError(f"{name} must be symmetric, got a difference of {difference:.3g} in {where}; "
                          "use (A + Aᵀ)/2 if that is what you mean")  # fmt: skip
     return matrix
 

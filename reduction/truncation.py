@@ -27,18 +27,18 @@ def fewest_modes(M: Matrix, K: Matrix, enough: Enough, root: Matrix | None = Non
 
     Returns
     -------
-    Basis : at least one mode.
+    Basis : at least one mode; all of them when the criterion cannot tell even then.
 
     Raises
     ------
-    ValueError : the criterion is not met by all modes together, or by none.
+    ValueError : the criterion asks for no mode.
 
     Examples
     --------
     >>> fewest_modes(np.eye(4), np.diag([1.0, 4.0, 9.0, 16.0]), below(2.5)).omega
     array([1., 2.])
     """
-    size, tried, count = checked_matrix(K, "K").shape[0], 0, None
+    size, tried, count = checked_matrix(K, "K", "fewest_modes").shape[0], 0, None
     while count is None:
         tried = min(size, max(FIRST_TRY, 2 * tried))
         basis = modal_basis(M, K, tried, root=root)
@@ -105,4 +105,4 @@ def moved_mass(M: Matrix, load: Vector) -> float:
     >>> moved_mass(np.diag([3.0, 1.0]), np.array([3.0, 1.0]))
     4.0
     """
-    return float(load @ sparse_linalg.splu(checked_matrix(M, "M")).solve(np.asarray(load, dtype=float)))
+    return float(load @ sparse_linalg.splu(checked_matrix(M, "M", "moved_mass")).solve(np.asarray(load, dtype=float)))

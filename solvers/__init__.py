@@ -21,7 +21,7 @@ _LATER = {
     "Newmark": "newmark",
     "GeneralizedAlpha": "newmark",
     "lumped": "newmark",
-    "lyapunov": "lyapunov",
+    "lyapunov": "growth",
     "orbit": "shooting",
     "Orbit": "periodic",
     "OrbitError": "periodic",

@@ -1,4 +1,4 @@
-r"""Flight without contact, evaluated exactly, and steps that provably miss no contact.
+"""Flight without contact, evaluated exactly, and steps that provably miss no contact.
 
 With ε_b = √(v_b² + k_b p_b²), which no damped block increases, M = Σ weight_b ε_b bounds |δ̈| from now on. A stop at
 distance g = -δ that opens at the rate v = -δ̇ cannot be reached before

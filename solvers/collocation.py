@@ -1,4 +1,4 @@
-r"""Contact: propagate the linear structure exactly, collocate the force alone.
+"""Contact: propagate the linear structure exactly, collocate the force alone.
 
 On a step of length h the unknowns are the forces at S nodes of every stop in contact, whatever the number of modes:
 
@@ -198,7 +198,7 @@ def finish_step(problem, tables, state, space, family, level):
 
 
 @inner
-def contact_time(problem, tables, state, space, s, speed):
+def contact_time(problem, tables, space, s, speed):
     """Duration a free impact at this speed would have, from the law's energy: T = 3.2 δ_m/v."""
     speed = max(speed, 1e-12)
     mobility = max(tables.mobility[s, s], 1e-300)

@@ -1,4 +1,4 @@
-r"""Branches of periodic orbits by pseudo-arclength continuation.
+"""Branches of periodic orbits by pseudo-arclength continuation.
 
 From each point a guess a step ahead, on the tangent or on the cubic through the point before too; Newton's method back
 to the branch (Keller, Numerical solution of bifurcation and nonlinear eigenvalue problems, 1977); then a step as long
@@ -28,7 +28,7 @@ from solvers.system import System
 
 @dataclass(eq=False)
 class Branch:
-    """Orbits along a parameter, computed as they are asked for: iterate over it, or call `run`.
+    """Orbits along a parameter, computed as they are asked for: iterate over it, or call `run`; made by `branch`.
 
     Interrupt an iteration and start another: it gives what is known, then goes on from there.
     """

@@ -1,4 +1,4 @@
-r"""Newton's method on a chain of shots, for orbits at a given parameter or at right angles to a branch.
+"""Newton's method on a chain of shots, for orbits at a given parameter or at right angles to a branch.
 
 r_i = Φ_i(x_i) - x_{i+1},   i = 0 ... m - 1,   x_m = x_0
 """

@@ -35,8 +35,8 @@ def coefficients_of(row, offset, x, dense, out):
 
 
 @inner
-def _maximum(coefficients, level, sign, a, b):
-    """Golden-section place of the largest sign·(δ - level) on [a, b]."""
+def _maximum(coefficients, sign, a, b):
+    """Golden-section place of the largest sign·δ on [a, b]."""
     ratio = 0.6180339887498949
     c, d = b - ratio * (b - a), a + ratio * (b - a)
     for _ in range(40):
@@ -77,7 +77,7 @@ def crossing(coefficients, rates, level, sign, tolerance):
             return _root(coefficients, level, sign, _NODES[i - 1], _NODES[i])
         rises = sign * polynomial(rates, _NODES[i]) > 0.0
         if rising and not rises:
-            top = _maximum(coefficients, level, sign, _NODES[i - 1], _NODES[i])
+            top = _maximum(coefficients, sign, _NODES[i - 1], _NODES[i])
             if sign * (polynomial(coefficients, top) - level) > tolerance:
                 return _root(coefficients, level, sign, _NODES[i - 1], top)
         last, rising = value, rises

@@ -1,4 +1,4 @@
-r"""The main method: exact flight, collocated contact, every event landed on.
+"""The main method: exact flight, collocated contact, every event landed on.
 
 A tone Re(a e^{iΩt}) of a load is subtracted as its steady response, which then is one more undamped block with
 k = Ω², c = 0 that no force pushes; so flight under tones is an autonomous linear system and exact in one
@@ -31,7 +31,20 @@ from solvers.collocation import arrive, contact_time, finish_step, leaves_piece,
 from solvers.flight import energy_norms
 from solvers.forcing import Forcing, on_one_grid
 from solvers.handle import Packed, opener
-from solvers.kernels import OPTIONS, PROBLEM, contact_forces, copy, dot, indentation, inlined, inner, merged
+from solvers.kernels import (
+    MATRIX,
+    OPTIONS,
+    PROBLEM,
+    REAL,
+    VECTOR,
+    contact_forces,
+    copy,
+    dot,
+    indentation,
+    inlined,
+    inner,
+    merged,
+)
 from solvers.ledger import account, inside
 from solvers.peaks import peaks_so_far
 from solvers.preparation import SPACE, TABLES, among_tones, prepared_for, without_resonance
@@ -71,12 +84,8 @@ from solvers.system import Array, System
 from solvers.tables import S, Tables
 from solvers.vector import combine
 
-_REAL = types.float64
-_VECTOR = types.Array(_REAL, 1, "C")
-_MATRIX = types.Array(_REAL, 2, "C")
-SCALE, DURATION, SHARE = range(
-    3
-)  # places in `numbers`: reference speed, T_c, then per stop a first step's share of T_c
+# places in `numbers`: reference speed, T_c, then per stop a first step's share of T_c
+SCALE, DURATION, SHARE = range(3)
 LEVEL, FAMILY, FRESH, STOP, WANTED, BEGUN = range(6)  # places in `last`
 _problem, _tables, _state, _space = opener(PROBLEM), opener(TABLES), opener(STATE), opener(SPACE)
 _GOAL = 0.3  # error aimed at, in units of the tolerance
@@ -95,7 +104,7 @@ def _begin(problem, tables, state, space, numbers, last, stop):
     numbers[SCALE] = max(speed, 0.1 * possible, 0.1 * problem.floor[stop])
     delta = indentation(problem, stop, state.x)
     entering = state.piece[stop] == 1 and delta < 1e-9 * max(state.open[stop, PEAK_DELTA], 1e-6)
-    duration = contact_time(problem, tables, state, space, stop, max(speed, 1e-3 * numbers[SCALE]))
+    duration = contact_time(problem, tables, space, stop, max(speed, 1e-3 * numbers[SCALE]))
     if numbers[SHARE + stop] == 0.0:
         numbers[SHARE + stop] = min(0.1, 4.0 / (tables.fastest * duration))
     last[FAMILY] = 1 + stop if entering else 0
@@ -192,7 +201,7 @@ def _land(problem, tables, state, space, numbers, stop, direction, near, rtol, t
 
 
 @inner
-def _predict(problem, tables, state, space, last, family, level):
+def _predict(problem, tables, state, space, last, level):
     """First guess of the forces: the last step's polynomial, or the law on the free response."""
     for s in range(problem.gap.size):
         if state.piece[s] == 0:
@@ -216,7 +225,7 @@ def _try(problem, tables, state, space, numbers, last, family, level, rtol):
     h = tables.step[level]
     bottom = level == tables.step.size - 1
     free_response(problem, tables, state, space, family, level)
-    _predict(problem, tables, state, space, last, family, level)
+    _predict(problem, tables, state, space, last, level)
     mobility = 1e-300
     for s in range(problem.gap.size):
         if state.piece[s] > 0:
@@ -347,7 +356,7 @@ def _adapt(tables, numbers, last, level, family, wanted, error):
 
 
 @njit(
-    types.int64(*[types.int64] * 4, _REAL, types.int64, _REAL, _MATRIX, _MATRIX, _VECTOR, types.boolean),
+    types.int64(*[types.int64] * 4, REAL, types.int64, REAL, MATRIX, MATRIX, VECTOR, types.boolean),
     **OPTIONS,
 )
 def advance(problem_at, tables_at, state_at, space_at, t_end, budget, rtol, log, out, due, ledger):

@@ -1,4 +1,4 @@
-r"""Exact flight: propagators of the blocks, polynomial signals, Taylor steps.
+"""Exact flight: propagators of the blocks, polynomial signals, Taylor steps.
 
 A flight step multiplies every block by its tabulated propagator α I + β A and adds the response to the quintics
 of the sampled signals; what is shorter than the shortest table entry is a Taylor step of order 6, exact to rounding.

@@ -1,11 +1,12 @@
-r"""How signals reach the compiled integrators.
+"""How signals reach the compiled integrators.
 
 A signal is any callable t -> value that broadcasts. It is handed over as exactly one of
 
 * *tones*: ``signal.tones() -> (omega (k,), amplitude (k,) complex)``, value Re Σ a e^{iωt}, exact;
 * *nodes*: ``signal.nodes(duration, rtol) -> (dt, (N, 3))``, rows [s, s', s''] at t = 0, dt, ...; between them the
   quintic through both ends' values, slopes and curvatures, within ``rtol`` times the signal's size;
-* nothing of either: sampled here by a quintic spline, refined until its midpoints agree.
+* nothing of either: sampled here by a quintic spline, refined until it agrees between its nodes. It begins with 64
+  cells: what is shorter than duration/64, such as a pulse, may hide between them and needs ``nodes``.
 """
 
 from __future__ import annotations
@@ -123,7 +124,7 @@ def _check_nodes(rows: Array, dt: float, duration: float, load: int) -> None:
 
 
 def _sample(signal: Signal, duration: float, rtol: float, load: int) -> tuple[float, Array]:
-    """Nodes of a plain callable: double a quintic spline's grid until its midpoints agree to ``rtol``."""
+    """Nodes of a plain callable: double a quintic spline's grid until it agrees to ``rtol`` between its nodes."""
     from scipy.interpolate import make_interp_spline
 
     cells = 64

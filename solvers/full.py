@@ -1,4 +1,4 @@
-r"""Stepping on the matrices themselves: sparse, of any size, with any damping. The loop is Python, the solves SciPy's.
+"""Stepping on the matrices themselves: sparse, of any size, with any damping. The loop is Python, the solves SciPy's.
 
 The state is x = [q, q̇, ledger]; events, log and samples are those of `solvers.march`. The step is constant, so an
 implicit method factorises its matrix once, and a few times more where it lands on an event.
@@ -27,7 +27,7 @@ from solvers.march import (
     new_space,
     watched,
 )
-from solvers.newmark import _MOST_SWEEPS, contact_force
+from solvers.newmark import MOST_SWEEPS, contact_force
 from solvers.result import Status
 from solvers.state import (
     CALLS,
@@ -38,6 +38,7 @@ from solvers.state import (
     State,
     T,
     begin_contacts,
+    directions_of,
     matrix_problem_of,
     new_state,
 )
@@ -59,7 +60,7 @@ class MatrixEngine:
         self.space = new_space(self.state, 4, watched(system, z, 0.0))
         self.solvers: dict[Any, Any] = {}
         self.replies: dict[Any, Array] = {}  # acceleration per newton of a stop
-        self.directions = np.array([c.direction for c in system.contacts]).reshape(len(system.contacts), system.size)
+        self.directions = directions_of(system)
 
     def _negligible(self) -> float:
         """Energy that counts as rounding."""
@@ -253,7 +254,7 @@ def _contact_accelerations(engine: MatrixEngine, h: float, solve: Any, kept: flo
     problem, active = engine.problem, np.flatnonzero(state.piece)
     force, total = np.zeros(len(active)), np.zeros(n)
     reply = [kept * engine.reply(h, int(s), solve) for s in active]
-    for _ in range(_MOST_SWEEPS):
+    for _ in range(MOST_SWEEPS):
         before = force.copy()
         for i, s in enumerate(active):
             w = engine.directions[s]

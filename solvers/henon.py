@@ -1,4 +1,4 @@
-r"""The paper's scheme: Heun's method with two constant steps, and Hénon's step onto the stop.
+"""The paper's scheme: Heun's method with two constant steps, and Hénon's step onto the stop.
 
 Heun, x' = f(x, t):  k₁ = f(x, t),  k₂ = f(x + h k₁, t + h),  x₊ = x + h (k₁ + k₂)/2.
 

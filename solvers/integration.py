@@ -38,7 +38,7 @@ def integrate(
     progress: Callable[[float], None] | None = None,
     check: bool = True,
 ) -> Solution:
-    """Integrate a system from (q0, q_dot0) at t = 0 over ``duration``.
+    """Integrate M q̈ + C q̇ + K q = Σ v_l s_l(t) + Σ w_s F_s from (q0, q_dot0) at t = 0 over ``duration``.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def integrate(
 
     Raises
     ------
-    ValueError for bad input, before computing; SolverError (with ``.solution``) when the method fails.
+    ValueError and TypeError for bad input, before computing; SolverError (with ``.solution``) when the method fails.
 
     Examples
     --------

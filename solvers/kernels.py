@@ -1,4 +1,4 @@
-r"""Compiled ground floor of the stepping methods: problem data, law calls, signals, right-hand side.
+"""Compiled ground floor of the stepping methods: problem data, law calls, signals, right-hand side.
 
 The state a stepping method integrates is x = [p (n), v (n), ledger (2 + 2m)]:
 
@@ -50,23 +50,24 @@ class Problem(NamedTuple):
     floor: Any  # (m,) smallest entry rates
     load: Any  # (L, 2n) state rate per unit of signal l
     power: Any  # (L, 2n) input power = signal × power·z
-    tone_omega: Any
-    tone_amplitude: Any
-    tone_load: Any
-    table: Any
-    table_dt: Any
-    table_start: Any
-    table_load: Any
+    tone_omega: Any  # (K,) rad/s
+    tone_amplitude: Any  # (K,) complex
+    tone_load: Any  # (K,) the load each drives
+    table: Any  # (rows, 3) [s, s', s''] at the nodes of all sampled signals
+    table_dt: Any  # (J,)
+    table_start: Any  # (J + 1,) first row of each, and the end
+    table_load: Any  # (J,) the load each drives
 
 
-_VECTOR = types.Array(types.float64, 1, "C")
-_MATRIX = types.Array(types.float64, 2, "C")
-_INTEGERS = types.Array(types.int64, 1, "C")
+REAL = types.float64
+VECTOR = types.Array(REAL, 1, "C")
+MATRIX = types.Array(REAL, 2, "C")
+INTEGERS = types.Array(types.int64, 1, "C")
 _COMPLEX = types.Array(types.complex128, 1, "C")
 PROBLEM = types.NamedTuple(
     [
-        *[_VECTOR, _VECTOR, _MATRIX, _MATRIX, _MATRIX, _MATRIX, _MATRIX, _VECTOR, _INTEGERS, _INTEGERS],
-        *[_MATRIX, _VECTOR, _MATRIX, _MATRIX, _VECTOR, _COMPLEX, _INTEGERS, _MATRIX, _VECTOR, _INTEGERS, _INTEGERS],
+        *[VECTOR, VECTOR, MATRIX, MATRIX, MATRIX, MATRIX, MATRIX, VECTOR, INTEGERS, INTEGERS],
+        *[MATRIX, VECTOR, MATRIX, MATRIX, VECTOR, _COMPLEX, INTEGERS, MATRIX, VECTOR, INTEGERS, INTEGERS],
     ],
     Problem,
 )

@@ -25,9 +25,23 @@ from solvers.events import (
 from solvers.forcing import Forcing
 from solvers.henon import hermite
 from solvers.henon import land as henon_landing
-from solvers.kernels import OPTIONS, PROBLEM, contact_forces, copy, dot, indentation, inner, kernel, rhs
+from solvers.kernels import (
+    INTEGERS,
+    MATRIX,
+    OPTIONS,
+    PROBLEM,
+    REAL,
+    VECTOR,
+    contact_forces,
+    copy,
+    dot,
+    indentation,
+    inner,
+    kernel,
+    rhs,
+)
 from solvers.result import Status
-from solvers.stability import contact_time, takes, work_of
+from solvers.stability import shortest_contact, takes, work_of
 from solvers.state import (
     AT_ONCE,
     CALLS,
@@ -61,15 +75,10 @@ from solvers.state import (
 )
 from solvers.system import Array, System
 
-_VECTOR = types.Array(types.float64, 1, "C")
-_MATRIX = types.Array(types.float64, 2, "C")
-_INTEGERS = types.Array(types.int64, 1, "C")
-_REAL = types.float64
-
 STEP = types.FunctionType(
-    types.Tuple([_REAL, types.int64])(
-        *[PROBLEM, _REAL, _REAL, _VECTOR, _VECTOR, _INTEGERS, _VECTOR],
-        *[_VECTOR, _VECTOR, _MATRIX, _MATRIX, _REAL, _REAL],
+    types.Tuple([REAL, types.int64])(
+        *[PROBLEM, REAL, REAL, VECTOR, VECTOR, INTEGERS, VECTOR],
+        *[VECTOR, VECTOR, MATRIX, MATRIX, REAL, REAL],
     )
 )
 
@@ -80,15 +89,15 @@ _PEAK_NODES = np.linspace(0.0, 1.0, 9)
 class Space(NamedTuple):
     """Working arrays of the loop."""
 
-    x_new: Any
-    rate_new: Any
-    dense: Any
-    work: Any
+    x_new: Any  # (x.size,) end of the step
+    rate_new: Any  # (x.size,)
+    dense: Any  # (7, x.size) rows r of the interpolant, see `solvers.events`
+    work: Any  # (rows, x.size) of the method
     coefficients: Any  # (2, 8)
     watch: Any  # see `watched`
 
 
-SPACE = types.NamedTuple([_VECTOR, _VECTOR, _MATRIX, _MATRIX, _MATRIX, _VECTOR], Space)
+SPACE = types.NamedTuple([VECTOR, VECTOR, MATRIX, MATRIX, MATRIX, VECTOR], Space)
 _GAINS = 8  # steps in a row: one alone may be the ledger's, as in the first step of a load
 _FAR, _GAINS_FAR = 1e3, 3  # times the energy given, and then steps in a row
 
@@ -175,16 +184,9 @@ def _land(step, problem, state, space, h, longest, stop, level, rtol, atol):
     tolerance = landing_tolerance(problem, state, stop)
     longest *= 1.000001
     for _ in range(12):
-        _, calls = step(
+        _, calls = step(  # with so loose a tolerance that there is an interpolant, whatever the error
             *(problem, state.now[T], h, state.x, state.rate, state.piece, state.entry_rate),
-            *(
-                space.x_new,
-                space.rate_new,
-                space.dense,
-                space.work,
-                1e300,
-                atol,
-            ),  # for its interpolant, whatever the error
+            *(space.x_new, space.rate_new, space.dense, space.work, 1e300, atol),
         )
         state.count[CALLS] += calls
         distance = indentation(problem, stop, space.x_new) - level
@@ -283,8 +285,8 @@ def _gains(problem, state, space):
 
 @njit(
     types.int64(
-        *[STEP, PROBLEM, STATE, SPACE, _REAL, types.int64, _REAL, _REAL],
-        *[_REAL, _REAL, types.boolean, types.int64, _MATRIX, _MATRIX, _VECTOR],
+        *[STEP, PROBLEM, STATE, SPACE, REAL, types.int64, REAL, REAL],
+        *[REAL, REAL, types.boolean, types.int64, MATRIX, MATRIX, VECTOR],
     ),
     **OPTIONS,
 )
@@ -484,6 +486,6 @@ def explanation(method: Any, system: System, q: Array, q_dot: Array, duration: f
     if modal:
         where = f"mode {worst + 1} of {system.size} (ω = {math.sqrt(abs(system.K[worst, worst])):.6g} rad/s)"
     limit = method.stable_dt(system, duration=duration)
-    step = min(limit.flight, limit.contact, *method.steps, 0.1 * contact_time(system))
+    step = min(limit.flight, limit.contact, *method.steps, 0.1 * shortest_contact(system))
     grown = f"; it grew in {where}, steps {method.steps[0]:g} s in flight and {method.steps[1]:g} s in contact"
     return f"{grown}, predicted limits {limit.flight:.3g} s and {limit.contact:.3g} s: try {0.5 * step:.2g} s"

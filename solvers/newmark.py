@@ -29,7 +29,7 @@ from solvers.kernels import dot as product
 from solvers.stability import ConstantStep, Radius, alpha_radius
 from solvers.system import Array, System, require_step
 
-_MOST_SWEEPS = 60
+MOST_SWEEPS = 60
 
 
 @kernel
@@ -39,7 +39,7 @@ def contact_force(problem, s, entry_rate, delta, delta_dot, by_force, rate_by_fo
     NaN where Newton finds nothing. ``batch`` is working space of six numbers.
     """
     F, calls = force, 0
-    for _ in range(_MOST_SWEEPS):
+    for _ in range(MOST_SWEEPS):
         batch[0] = delta - by_force * (F - force)
         batch[1] = delta_dot - rate_by_force * (F - force)
         inside = batch[0] > 0.0
@@ -70,7 +70,7 @@ def _touch(problem, h, piece, entry_rate, x_new, rate_new, work):
     for s in range(stops):
         active += 1 if piece[s] > 0 else 0
         force[s] = 0.0
-    for _ in range(_MOST_SWEEPS if active else 0):
+    for _ in range(MOST_SWEEPS if active else 0):
         largest, change = 0.0, 0.0
         for s in range(stops):
             if piece[s] == 0:
@@ -159,7 +159,7 @@ class _Family(ConstantStep):
 
 @dataclass(frozen=True)
 class CentralDifference(_Family):
-    r"""Central differences in their one-step form (velocity Verlet): β = 0, γ = ½, damping taken at the end.
+    """Central differences in their one-step form (velocity Verlet): β = 0, γ = ½, damping taken at the end.
 
     Parameters
     ----------
@@ -190,7 +190,7 @@ class CentralDifference(_Family):
 
 @dataclass(frozen=True)
 class Newmark(_Family):
-    r"""Newmark's method.
+    """Newmark's method.
 
     Parameters
     ----------
@@ -231,7 +231,7 @@ class Newmark(_Family):
 
 @dataclass(frozen=True)
 class GeneralizedAlpha(_Family):
-    r"""The generalised-α method of Chung and Hulbert.
+    """The generalised-α method of Chung and Hulbert.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ class OrbitError(SolverError):
 
 @dataclass(frozen=True, eq=False)
 class Orbit:
-    """A periodic motion.
+    """A periodic motion, found by `solvers.orbit` or on a branch.
 
     Attributes
     ----------
@@ -33,9 +33,17 @@ class Orbit:
     monodromy : (2n, 2n) derivative of the state one period later. multipliers : its eigenvalues, largest first.
     residual : size of Φ(x) - x relative to the orbit's. iterations : of Newton's method.
     contacts : log of one period, times counted from ``phase``.
+    system, method : of what, and how it was integrated.
     doubt : why the verdict on stability may be wrong; empty when nothing speaks against it.
     parameter : value of the branch's parameter, NaN outside a branch.
     mark : "fold", "flip", "neimark-sacker", "branch point" or "grazing" at special points of a branch, else empty.
+
+    Examples
+    --------
+    >>> from solvers import orbit
+    >>> still = orbit(System.modal(omega=[2.0], zeta=[0.1]), period=3.0)
+    >>> bool(np.allclose(abs(still.multipliers), np.exp(-0.2 * 3.0)))  # e^{-ζωT}
+    True
     """
 
     state: Array

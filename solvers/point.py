@@ -1,4 +1,4 @@
-r"""Points of a branch and the way from one to the next.
+"""Points of a branch and the way from one to the next.
 
 The unknowns y = [states of the shots, parameter] move along the branch's unit tangent t; lengths are measured with
 states relative to the first orbit's size and the parameter relative to the span. Newton's method returns to the branch

@@ -11,21 +11,17 @@ from numba import types
 
 from solvers.forcing import Forcing, tones_as_nodes
 from solvers.handle import Layout, Packed
-from solvers.kernels import PROBLEM, Problem
+from solvers.kernels import INTEGERS, MATRIX, PROBLEM, REAL, VECTOR, Problem
 from solvers.response import Space
 from solvers.state import STATE, problem_of, rate_rows, state_shapes
 from solvers.system import Array, System
 from solvers.tables import S, Tables, build
 from solvers.vector import padded
 
-_REAL = types.float64
-_VECTOR = types.Array(_REAL, 1, "C")
-_MATRIX = types.Array(_REAL, 2, "C")
-_INTEGERS = types.Array(types.int64, 1, "C")
 
-
-def _arrays(*dimensions):  # shapes of a named tuple's contiguous float arrays
-    return [types.Array(_REAL, d, "C") if d else _REAL for d in dimensions]
+def _arrays(*dimensions: int) -> list[Any]:
+    """Types of contiguous float arrays with so many dimensions; a plain number for none."""
+    return [types.Array(REAL, d, "C") if d else REAL for d in dimensions]
 
 
 TABLES = types.NamedTuple(
@@ -36,7 +32,7 @@ TABLES = types.NamedTuple(
     Tables,
 )
 SPACE = types.NamedTuple(
-    [*_arrays(1, 2, 2, 1, 1, 1, 1, 3, 1, 3, 2, 1, 3, 2, 3, 2, 1), _INTEGERS, _MATRIX, _VECTOR, _INTEGERS], Space
+    [*_arrays(1, 2, 2, 1, 1, 1, 1, 3, 1, 3, 2, 1, 3, 2, 3, 2, 1), INTEGERS, MATRIX, VECTOR, INTEGERS], Space
 )
 
 
@@ -45,8 +41,7 @@ class Prepared(NamedTuple):
 
     problem: Packed
     tables: Packed
-    steady: Array
-    back: Array
+    back: Array  # (2n, 2N): [q, q̇] from the state of all blocks
     layout: Layout  # of State and Space
     rest: Array  # state of the tones' blocks at t = 0, the structure's less their steady response
 
@@ -54,7 +49,7 @@ class Prepared(NamedTuple):
 def prepared_for(system: System, forcing: Forcing) -> Prepared:
     """Tables of a system, made once and kept on it, those of the last grid of its sampled signals only."""
     dt_cell = float(forcing.table_dt[0]) if forcing.table_dt.size else 1.0
-    key = (dt_cell, tuple(forcing.tone_omega))
+    key = dt_cell, *(part.tobytes() for part in (forcing.tone_omega, forcing.tone_amplitude, forcing.tone_load))
     if system.kept.get("exponential", (None,))[0] != key:
         _check_passive(system)
         plain = problem_of(system, forcing)
@@ -67,7 +62,7 @@ def prepared_for(system: System, forcing: Forcing) -> Prepared:
         )
         layout = _layout(len(problem.gap), len(problem.load), len(problem.k), len(forcing.table_dt))
         made = Prepared(
-            *(Packed(problem, PROBLEM), Packed(tables, TABLES), steady, system.blocks.T @ steady),
+            *(Packed(problem, PROBLEM), Packed(tables, TABLES), system.blocks.T @ steady),
             *(layout, _rest(steady, len(forcing.tone_omega))),
         )
         system.kept["exponential"] = (key, made)
@@ -107,12 +102,13 @@ def without_resonance(system: System, forcing: Forcing, duration: float, rtol: f
     That is those on the frequency of a block hardly damped, and those whose steady response l/|k - Ω² + iΩc| is a
     thousand times what the load can do within the duration, l duration²/2: their difference would lose its digits.
     """
-    if "distances" not in system.kept:
+    key = forcing.tone_omega.tobytes(), forcing.tone_load.tobytes()
+    if system.kept.get("distances", (None,))[0] != key:
         tones = zip(forcing.tone_omega, forcing.tone_load, strict=True)
-        system.kept["distances"] = [_distance(system, omega, load) for omega, load in tones]
+        system.kept["distances"] = key, [_distance(system, omega, load) for omega, load in tones]
     resonant = [
         i
-        for i, (absolute, relative) in enumerate(system.kept["distances"])
+        for i, (absolute, relative) in enumerate(system.kept["distances"][1])
         if relative <= 1e-6 or absolute * duration**2 < 2e-3
     ]
     return tones_as_nodes(forcing, resonant, duration, rtol) if resonant else forcing

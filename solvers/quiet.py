@@ -12,8 +12,8 @@ from solvers.system import Array, Contact, System
 
 def latches(contact: Contact) -> bool:
     """Whether a law's force depends on the rate at which the contact was entered."""
-    delta, rate = np.array([1e-6, 1e-4, 1e-2]), 0.1
-    return bool(np.any(contact.law.force(delta, rate, 0.1) != contact.law.force(delta, rate, 0.2)))
+    delta, rate = np.array([1e-6, 1e-4, 1e-2]), max(0.1, contact.law.entry_rate_floor)
+    return bool(np.any(contact.law.force(delta, rate, rate) != contact.law.force(delta, rate, 2.0 * rate)))
 
 
 def with_memory(system: System) -> list[int]:

@@ -1,4 +1,4 @@
-r"""Runge–Kutta steps in a variable in which a contact is smooth: DOP853 with t as one of the unknowns.
+"""Runge–Kutta steps in a variable in which a contact is smooth: DOP853 with t as one of the unknowns.
 
     INDENTATION   dt = dδ/δ̇         lands exactly on a kink, or on another stop's surface
     ROOT          dt = 2u du/δ̇      u = √δ: lands exactly on δ = 0, where δ^{3/2} is singular in t

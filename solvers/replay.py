@@ -1,4 +1,4 @@
-r"""Derivative of a run of `solvers.exponential`, carried over what its tape tells.
+"""Derivative of a run of `solvers.exponential`, carried over what its tape tells.
 
 Every accepted contact step is linearised as it was taken. With Y the derivative of the state at fixed time,
 
@@ -298,7 +298,7 @@ def _inside_piece(problem, shadow, s, x):
 
 
 @inlined
-def _stage_rates(problem, ahead, behind, shadow, space, slopes, nudge, w, factor, out):
+def _stage_rates(problem, ahead, behind, shadow, slopes, nudge, w, factor, out):
     """Variational equation at one stage of a landing; ``w`` is the state with its time, factor dt along the step."""
     n, size, t, batch = problem.k.size, 2 * problem.k.size, w[shadow.x.size], slopes.batch
     for c in range(slopes.y.shape[0]):
@@ -349,7 +349,7 @@ def _land(problem, ahead, behind, tables, shadow, space, slopes, nudge, row):
                 slopes.trial[c, e] = slopes.y[c, e] + total
         if i < STAGES:
             factor = space.work[i, width]
-            _stage_rates(problem, ahead, behind, shadow, space, slopes, nudge, trial, factor, slopes.stages[i])
+            _stage_rates(problem, ahead, behind, shadow, slopes, nudge, trial, factor, slopes.stages[i])
     for c in range(slopes.y.shape[0]):
         copy(slopes.trial[c], slopes.y[c], size)
 

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from solvers.arm import Arm, BranchStatus
 from solvers.chain import Problem
-from solvers.continuation import Arm, Branch, BranchStatus
+from solvers.continuation import Branch
 from solvers.correction import newton
 from solvers.point import Point, metric_of, point_of
 from solvers.shooting import checked

@@ -19,7 +19,13 @@ def counted(count: int, noun: str) -> str:
 
 
 class Status(Enum):
-    """How a run ended, as the sentence shown to the user. The order is the compiled kernels' code."""
+    """How a run ended, as the sentence shown to the user. The order is the compiled kernels' code.
+
+    Examples
+    --------
+    >>> Status.DONE.value, Status.DONE.good, Status.INTERRUPTED.good
+    ('finished', True, False)
+    """
 
     DONE = "finished"
     RUNNING = "not finished yet"
@@ -151,7 +157,7 @@ class Energy:
 
 @dataclass(frozen=True)
 class Cost:
-    """Work of a run: accepted steps, rejected ones, law calls (values), events, wall seconds."""
+    """Work of a run: accepted steps, rejected ones, law values asked for, switches of stops, wall seconds."""
 
     steps: int
     rejections: int
@@ -162,10 +168,28 @@ class Cost:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """A run: t (k,), q and q_dot (k, n), contact log, energy ledger, status, cost.
+    """A run.
 
-    With a tangent asked for: ``tangent`` (2n, 2n or 2n + 1), derivative of the final [q, q̇], and ``rate`` (2n,), its
-    derivative by time.
+    Attributes
+    ----------
+    t : (k,) s. q, q_dot : (k, n) coordinates and rates then; without output samples k = 1, the end.
+    contacts : log. energy : ledger, made when first looked at, by calling ``ledger``.
+    status : how it ended. cost : what it took.
+    tangent : (2n, 2n or 2n + 1) derivative of the final [q, q̇], and rate : (2n,) its derivative by time; None unless
+        asked for.
+
+    Examples
+    --------
+    >>> from contacts import Hertz
+    >>> from solvers import Contact, System, integrate
+    >>> ball = System(M=[[2.0]], C=[[0.0]], K=[[0.0]], contacts=[Contact([1.0], Hertz(1e6))])
+    >>> run = integrate(ball, [1e-3], [-0.5], duration=0.1, dt=1e-3)
+    >>> run
+    <solution to t = 0.1 s, 1 contact: finished>
+    >>> float(run.contacts.speed_in[0]), float(run.contacts.impulse[0])
+    (0.500000, 2.00000)
+    >>> bool(abs(run.energy.residual).max() < 1e-6)
+    True
     """
 
     t: Array

@@ -1,4 +1,4 @@
-r"""Periodic orbits by shooting with the exact tangent of a run.
+"""Periodic orbits by shooting with the exact tangent of a run.
 
 An orbit of period T solves Φ(x) = x, where Φ carries the state over one period. Newton's method on the chain
 
@@ -40,7 +40,7 @@ def orbit(
     method: Any = None,
     shots: int | None = None,
 ) -> Orbit:
-    """Find the periodic motion of a system near a start.
+    """Find the periodic motion Φ(x) = x of a system near a start; Φ carries the state over one period.
 
     Parameters
     ----------

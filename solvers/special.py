@@ -1,4 +1,4 @@
-r"""Special points of a branch between two of its points.
+"""Special points of a branch between two of its points.
 
 A special point is a sign change of its test function along the arclength. With the Floquet multipliers μ:
 

@@ -14,7 +14,7 @@ and the same question asked of the modes of (M, C_c, K_c).
 from __future__ import annotations
 
 import math
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple
 
@@ -165,7 +165,7 @@ def _fastest(M: Any, C: Any, K: Any) -> tuple[Array, Array]:
     return k, np.sum(phi * (C @ phi), axis=0)
 
 
-def contact_time(system: System) -> float:
+def shortest_contact(system: System) -> float:
     """Half a period on the stiffest stop's tangent, hit at 1 m/s; inf without stops."""
     found = [tangent(system, contact, None) for contact in system.contacts]
     return min(
@@ -229,7 +229,7 @@ def _depth(law: Any, mass: float, speed: float) -> float:
 # --- what all methods of constant step share -------------------------------------------------------------------------
 
 
-class ConstantStep:
+class ConstantStep(ABC):
     """A method of constant step: checked before it starts, watched while it runs."""
 
     adaptive: ClassVar[bool] = False

@@ -9,13 +9,9 @@ import numpy as np
 from numba import types
 
 from solvers.forcing import Forcing
-from solvers.kernels import Problem, dot, indentation, inlined, inner, kernel, sizes
+from solvers.kernels import INTEGERS, MATRIX, VECTOR, Problem, dot, indentation, inlined, inner, kernel, sizes
 from solvers.result import Status
 from solvers.system import Array, System
-
-_VECTOR = types.Array(types.float64, 1, "C")
-_MATRIX = types.Array(types.float64, 2, "C")
-_INTEGERS = types.Array(types.int64, 1, "C")
 
 STATUSES = list(Status)
 DONE, RUNNING, STEP_TOO_SMALL, DIVERGED, CHATTER, LOG_FULL, LAW_NOT_FINITE, GAINED = (
@@ -37,18 +33,18 @@ KIND, BEGAN, ENDED, SPAN, FIRST, SECOND, HEAD = range(7)  # columns of the tape:
 class State(NamedTuple):
     """Everything a run changes; it can be continued from here."""
 
-    now: Any  # time, flight step, contact step, time of the last event
-    x: Any
-    rate: Any
+    now: Any  # (4,) time, flight step, contact step, time of the last event
+    x: Any  # (2n + 2 + 2m,) of the blocks, then the ledger, see `solvers.kernels`
+    rate: Any  # of x
     piece: Any  # (m,) 0 in flight, j > 0 between levels j-1 and j
     entry_rate: Any  # (m,) latched
     open: Any  # (m, 7) of the contacts under way
-    count: Any
+    count: Any  # (8,) steps, rejected ones, law calls, ..., as named above
     tape: Any  # (rows, HEAD + x.size + forces) what happened in contact, for the tangent; no rows, no tape
 
 
 STATE = types.NamedTuple(
-    [_VECTOR, _VECTOR, _VECTOR, _INTEGERS, _VECTOR, _MATRIX, _INTEGERS, _MATRIX],
+    [VECTOR, VECTOR, VECTOR, INTEGERS, VECTOR, MATRIX, INTEGERS, MATRIX],
     State,
 )
 
@@ -190,7 +186,7 @@ def new_state(z: Any, stops: int) -> State:
 def problem_of(system: System, forcing: Forcing) -> Problem:
     """Arrays the kernels read, in block coordinates."""
     blocks, n = system.blocks, system.size
-    direction, vectors = _directions(system), _vectors(system)
+    direction, vectors = directions_of(system), _vectors(system)
     linear = {
         **{"k": blocks.k, "c": blocks.c, "loss": np.ascontiguousarray(blocks.loss)},
         "push": np.ascontiguousarray(direction @ system.push.T),
@@ -204,7 +200,7 @@ def problem_of(system: System, forcing: Forcing) -> Problem:
 def matrix_problem_of(system: System, forcing: Forcing) -> Problem:
     """The same in the system's own coordinates without M, C and K: pushes and loads are forces, and `rhs` their sum."""
     zeros = np.zeros(system.size)
-    direction, vectors = _directions(system), _vectors(system)
+    direction, vectors = directions_of(system), _vectors(system)
     linear = {
         **{"k": zeros, "c": zeros, "loss": np.empty((0, 0))},
         **{"push": np.hstack((0.0 * direction, direction)), "read": np.hstack((-direction, 0.0 * direction))},
@@ -213,7 +209,7 @@ def matrix_problem_of(system: System, forcing: Forcing) -> Problem:
     return _problem(system, forcing, linear)
 
 
-def _directions(system: System) -> Array:
+def directions_of(system: System) -> Array:
     """Directions of the stops (m, n)."""
     return np.array([c.direction for c in system.contacts]).reshape(len(system.contacts), system.size)
 
@@ -239,13 +235,7 @@ def _problem(system: System, forcing: Forcing, linear: dict[str, Array]) -> Prob
         gradient=np.array([c.law.gradient_address for c in contacts], dtype=np.int64),
         parameters=law_parameters(system),
         floor=np.array([c.law.entry_rate_floor for c in contacts], dtype=float),
-        tone_omega=forcing.tone_omega,
-        tone_amplitude=forcing.tone_amplitude,
-        tone_load=forcing.tone_load,
-        table=forcing.table,
-        table_dt=forcing.table_dt,
-        table_start=forcing.table_start,
-        table_load=forcing.table_load,
+        **vars(forcing),
     )
 
 

@@ -58,7 +58,7 @@ Signal = Callable[[Any], Any]
 """A function t -> value that broadcasts; may offer ``tones()`` or ``nodes(duration, rtol)``, see `solvers.forcing`."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Contact:
     """One stop: ``delta = -direction @ q - gap``; it pushes with ``+direction * force`` while ``delta > 0``.
 
@@ -95,7 +95,7 @@ class Contact:
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """Matrices, contacts and loads of one problem; see the module for the equation.
+    """Matrices, contacts and loads of one problem, M q̈ + C q̇ + K q = Σ v_l s_l(t) + Σ w_s F_s(δ_s, δ̇_s).
 
     Parameters
     ----------
@@ -187,7 +187,14 @@ class System:
         contacts: Sequence[Contact] = (),
         loads: Sequence[tuple[ArrayLike, Signal]] = (),
     ) -> System:
-        """Mass-normalised modes: M = I, C = diag(2 ζ ω), K = diag(ω²); one ζ serves all modes."""
+        """Mass-normalised modes: M = I, C = diag(2 ζ ω), K = diag(ω²); one ζ serves all modes.
+
+        Parameters
+        ----------
+        omega : (n,) rad/s, >= 0; 0 for a rigid-body mode.
+        zeta : one number or (n,), >= 0.
+        contacts, loads : as for `System`, in modal coordinates.
+        """
         omega = np.atleast_1d(np.asarray(omega, dtype=float))
         zeta = np.broadcast_to(np.asarray(zeta, dtype=float), omega.shape)
         if not (np.all(np.isfinite(omega)) and np.all(omega >= 0.0)):

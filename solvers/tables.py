@@ -1,4 +1,4 @@
-r"""Everything the exponential integrator knows before it starts: propagators and force responses per step size.
+"""Everything the exponential integrator knows before it starts: propagators and force responses per step size.
 
 A block p'' + c p' + k p = 0 moves by E(x) = exp(A x) = α I + β A with A = [[0, 1], [-k, -c]], A² = -k I - c A, so two
 numbers (α, β) are a propagator and products stay of this form. Flight steps are h_l = h_0 2^{-l/4}; contact steps
@@ -28,9 +28,9 @@ from solvers.vector import padded
 S = 8  # nodes of a contact step: 6 is a little faster at 1e-6, 10 and 12 bring nothing
 TAYLOR_REACH = 0.02  # |λ| x up to which a Taylor step of order 6 is exact to rounding
 _PANEL = 6.0  # radians of the fastest oscillation per quadrature panel of 12 points
-_CONTACT_REACH = 1e-6  # smallest contact step in units of 1/|λ|, and not above
+_MOST_RADIANS = 2000.0  # largest contact step in units of 1/|λ|
+_CONTACT_REACH = 1e-6  # smallest one in the same units, and not above
 _SHORT = 1e-9  # s: a stop may be far stiffer than the structure
-_MOST_RADIANS = 2000.0  # largest contact step in the same units
 
 
 class Tables(NamedTuple):

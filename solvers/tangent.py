@@ -59,7 +59,7 @@ class Tangent:
         engine.state.count[TAPED] = 0
         if not np.all(np.isfinite(self.slopes.y)):
             raise SolverError(f"the tangent is not finite any more at t = {engine.state.now[T]:g} s: a contact grazes")
-        size = math.sqrt(np.vdot(self.slopes.y, self.slopes.y))
+        size = _size(self.slopes.y)
         self.history.append((float(engine.state.now[T]), self.log_scale + math.log(size) if size > 0.0 else -math.inf))
         if not 1.0 / _LARGE < size < _LARGE and size > 0.0:
             for array in (self.slopes.y, self.slopes.entry, self.slopes.shift):
@@ -80,6 +80,12 @@ class Tangent:
         y = math.exp(self.log_scale) * self.slopes.y[:, self.places]
         y[2 * self.blocks.k.size :] += self.change.steady(self.engine.state.now[T])
         return self.blocks.T @ y.T
+
+
+def _size(y: Array) -> float:
+    """Frobenius norm; in units of the largest entry, whose square may lie beyond the range of numbers."""
+    largest = float(np.abs(y).max())
+    return largest * math.sqrt(np.vdot(y / largest, y / largest)) if largest > 0.0 else 0.0
 
 
 @dataclass(frozen=True, eq=False)

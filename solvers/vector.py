@@ -67,7 +67,7 @@ def _columns(typingctx, rows, stride, first, weights, count, start, result):
 
 @inlined
 def combine(rows, weights, count, start, result):
-    """Result = start + Σ_{e < count} weights[e] rows[e]; start may be result, or None for zero."""
+    """Sum rows: result = start + Σ_{e < count} weights[e] rows[e]; start may be result, or None for zero."""
     width = rows.shape[-1]
     for first in range(0, width, WIDTH):
         _columns(rows, width, first, weights, count, start, result)

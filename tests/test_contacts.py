@@ -471,6 +471,22 @@ def test_entry_rate_floor_must_be_positive(bad):
 
 
 @pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"entry_rate_floor": math.nan}, r"entry_rate_floor of law 'linear' must be finite and >= 0, got nan"),
+        ({"entry_rate_floor": -1.0}, r"entry_rate_floor of law 'linear' must be finite and >= 0, got -1"),
+        ({"exponent": 0}, r"exponent of law 'linear' must be finite and > 0, got 0"),
+    ],
+)
+def test_options_of_a_law_are_checked(options, message):
+    def linear(delta, delta_dot, entry_rate, stiffness):
+        return stiffness * delta
+
+    with pytest.raises(ValueError, match=message):
+        law(**options)(linear)
+
+
+@pytest.mark.parametrize(
     ("slopes", "knots", "message"),
     [
         ([1e5, 2e5], (), "2 slopes needs 1 knots"),

@@ -532,3 +532,23 @@ def test_error_follows_the_tolerance(monkeypatch, n, name):
     found = errors(STOPS[name], n, rtols, starts=6)
     assert 0.7 < slope(rtols, found) < 1.4
     assert (found < np.array(rtols)).all()
+
+
+def test_a_signal_that_changes_is_seen():
+    class Wave:
+        omega, amplitude = 2.0, 1.0
+
+        def tones(self):
+            return np.array([self.omega]), np.array([self.amplitude + 0j])
+
+        def __call__(self, t):
+            return self.amplitude * np.cos(self.omega * np.asarray(t))
+
+    wave = Wave()
+    system = System.modal([1.0], 0.1, loads=[([1.0], wave)])
+    before = integrate(system, [0.0], [0.0], 3.0).q[-1, 0]
+    wave.amplitude = 2.0
+    assert integrate(system, [0.0], [0.0], 3.0).q[-1, 0] == pytest.approx(2.0 * before)
+    wave.omega = 1.0
+    fresh = System.modal([1.0], 0.1, loads=[([1.0], wave)])
+    assert integrate(system, [0.0], [0.0], 3.0).q[-1, 0] == integrate(fresh, [0.0], [0.0], 3.0).q[-1, 0]

@@ -61,6 +61,12 @@ def test_every_public_name_exists():
     assert done.returncode == 0, done.stderr
 
 
+def test_no_module_takes_the_place_of_a_name_made_later():
+    import solvers
+
+    assert not {path.stem for path in (HOME / "solvers").glob("*.py")} & set(solvers.__all__)
+
+
 @pytest.mark.parametrize("name", ["contacts", "reduction", "solvers"])
 def test_a_shadowed_package_is_named(tmp_path, name):
     (tmp_path / f"{name}.py").write_text("")

@@ -12,6 +12,7 @@ from scipy.special import ellipj, ellipk
 
 from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, law
 from solvers import Contact, DormandPrince, Exponential, HenonRK2, OrbitError, System, integrate, orbit
+from solvers.quiet import latches
 
 OMEGA, ZETA, PHI, GAMMA = (
     np.array([109.13, 790.6]),
@@ -360,3 +361,11 @@ def test_hysteretic_stop_that_never_opens():
     system = System.modal([1.0], 0.1, [stop], [([1.0], Tone(0.01, 1.0))])
     with pytest.raises(OrbitError, match="all stops open"):
         orbit(system, 2.0 * math.pi)
+
+
+@pytest.mark.parametrize(
+    ("stop", "latched"),
+    [(HYSTERETIC, True), (replace(HYSTERETIC, entry_rate_floor=0.5), True), (Hertz(2.1e8), False)],
+)
+def test_a_law_that_latches_is_known_whatever_its_floor(stop, latched):
+    assert latches(Contact([1.0], stop)) is latched

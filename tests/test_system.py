@@ -247,3 +247,10 @@ def test_contacts_and_loads_must_fit():
 def test_unknown_names_of_the_package_are_named_with_the_known_ones():
     with pytest.raises(AttributeError, match=r"no attribute 'Exponentail'; it offers \[.*'DormandPrince'"):
         _ = solvers.Exponentail
+
+
+def test_contacts_compare_without_a_fault():
+    one = Contact([1.0, 0.0], LAW)
+    assert one == one
+    assert one in {one}
+    assert one != Contact([0.0, 1.0], LAW)

@@ -5,7 +5,7 @@ import pytest
 from scipy.linalg import expm
 
 from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, Viscoelastic, law
-from solvers import Contact, DormandPrince, Exponential, Parameter, System, integrate
+from solvers import Contact, DormandPrince, Exponential, Parameter, SolverError, System, integrate, lyapunov
 
 OMEGA, ZETA = np.array([109.13, 790.6, 2303.7, 4700.0, 7800.0]), np.array([0.02, 0.01, 0.01, 0.01, 0.01])
 PHI, GAMMA = np.array([6.2, -1.9, 3.0, -2.5, 2.2]), np.array([0.16, 0.02, 0.01, 0.01, 0.005])
@@ -212,3 +212,10 @@ def test_bad_input():
         Parameter(beam(1), beam(2), 1.0)
     with pytest.raises(ValueError, match="step"):
         Parameter(beam(1), beam(1), 0.0)
+
+
+def test_exponent_of_a_motion_whose_tangent_nearly_vanishes():
+    free = System.modal(omega=[10.0], zeta=[0.1])
+    assert lyapunov(free, [1.0], [0.0], duration=600.0).value == pytest.approx(-1.0, rel=0.01)  # e^-600 squared is 0
+    with pytest.raises(SolverError, match="the tangent vanished"):
+        lyapunov(free, [1.0], [0.0], duration=2000.0)

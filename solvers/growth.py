@@ -31,7 +31,7 @@ def lyapunov(
     discard: float = 0.0,
     method: Any = None,
 ) -> Exponent:
-    r"""Mean rate at which the largest singular value of the tangent grows, λ = lim ln‖∂x(t)/∂x(0)‖ / t.
+    """Mean rate at which the tangent grows, λ = lim ln‖∂x(t)/∂x(0)‖ / t.
 
     Positive for chaotic motion; ln|μ|/T on a periodic orbit of period T and largest multiplier μ.
 
@@ -44,8 +44,12 @@ def lyapunov(
     -------
     Exponent : value and standard error; the error means nothing when fewer than some 200 contacts were made.
 
-    Source
+    Raises
     ------
+    ValueError for bad input before computing; SolverError when the run fails.
+
+    References
+    ----------
     Benettin, Galgani, Giorgilli, Strelcyn, Meccanica 15 (1980) 9; the derivative of an event's time enters the tangent.
 
     Examples
@@ -61,6 +65,8 @@ def lyapunov(
     if status is not Status.DONE:
         raise SolverError(f"stopped at t = {run.time:.9g} s of {duration:g} s: {status.value}")
     t, growth = np.array([(0.0, 0.0), *run.tangent.history]).T
+    if not np.all(np.isfinite(growth)):
+        raise SolverError("the tangent vanished: neighbouring motions meet below the range of numbers; shorten the run")
     borders = np.linspace(discard, duration, _BATCHES + 1)
     rates = np.diff(np.interp(borders, t, growth)) / np.diff(borders)
     return Exponent(float(rates.mean()), float(rates.std(ddof=1) / math.sqrt(_BATCHES)))
