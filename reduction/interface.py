@@ -18,7 +18,7 @@ from scipy import linalg, sparse
 from scipy.sparse import linalg as sparse_linalg
 
 from reduction.basis import AccuracyError, Basis, Vector, oriented
-from reduction.modal import ORTHONORMALITY_TOLERANCE, Matrix, checked_matrix, modal_basis, ritz
+from reduction.modal import ORTHONORMALITY_TOLERANCE, Matrix, checked_pair, modal_basis, ritz
 
 STATIC_TOLERANCE = 1e-10  # relative error of static compliance, given a root
 STATIC_WITHOUT_ROOT = 1e-7  # same; rounding of K alone, 4e-10 for 50 elements and growing like their fourth power
@@ -65,7 +65,7 @@ def with_residual(basis: Basis, M: Matrix, K: Matrix, directions: Matrix, root: 
     >>> float(np.sum(basis.project([1.0, 1.0, 1.0]) ** 2 / basis.omega**2))  # 1 + 1/4 + 1/16
     1.3125
     """
-    M, K = checked_matrix(M, "M", "with_residual"), checked_matrix(K, "K", "with_residual")
+    M, K = checked_pair(M, K, "with_residual")
     B = _directions(directions, K.shape[0], "with_residual")
     still = basis.vectors[:, basis.omega == 0.0]
     shapes = static_shapes(M, K, B, still, root)
@@ -118,7 +118,7 @@ def craig_bampton(M: Matrix, K: Matrix, directions: Matrix, count: int, root: Ma
     >>> float(np.sum(basis.project([0.0, 0.0, 1.0]) ** 2 / basis.omega**2))  # three springs in series
     3.0
     """
-    M, K = checked_matrix(M, "M", "craig_bampton"), checked_matrix(K, "K", "craig_bampton")
+    M, K = checked_pair(M, K, "craig_bampton")
     B = _directions(directions, K.shape[0], "craig_bampton")
     T, m = _interface_coordinates(B)
     most = K.shape[0] - m
@@ -167,7 +167,7 @@ def static_share(basis: Basis, M: Matrix, K: Matrix, directions: Matrix, root: M
     >>> static_share(modal_basis(M, K, 1), M, K, [[1.0], [1.0]])
     array([0.8])
     """
-    M, K = checked_matrix(M, "M", "static_share"), checked_matrix(K, "K", "static_share")
+    M, K = checked_pair(M, K, "static_share")
     B = _directions(directions, K.shape[0], "static_share")
     shapes = static_shapes(M, K, B, basis.vectors[:, basis.omega == 0.0], root)
     return np.diag(_compliance(basis, B)) / np.sum(B * shapes, axis=0)

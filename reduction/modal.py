@@ -79,9 +79,7 @@ def modal_basis(
     >>> modal_basis(np.eye(2), np.diag([4.0, 9.0]), count=1).omega
     array([2.])
     """
-    M, K = checked_matrix(M, "M", "modal_basis"), checked_matrix(K, "K", "modal_basis")
-    if M.shape != K.shape:
-        raise ValueError(f"M and K must have the same shape, got {M.shape} and {K.shape} in modal_basis; match them")
+    M, K = checked_pair(M, K, "modal_basis")
     wanted = _wanted(M.shape[0], count, indices)
     _check_mass(M)
     highest = int(wanted[-1]) + 1
@@ -225,6 +223,16 @@ def checked_matrix(A: Matrix, name: str, where: str) -> sparse.csc_matrix:
         raise ValueError(f"{name} must be symmetric, got a difference of {difference:.3g} in {where}; "
                          "use (A + Aᵀ)/2 if that is what you mean")  # fmt: skip
     return matrix
+
+
+def checked_pair(M: Matrix, K: Matrix, where: str) -> tuple[sparse.csc_matrix, sparse.csc_matrix]:
+    """Both checked, and of one size."""
+    mass, stiffness = checked_matrix(M, "M", where), checked_matrix(K, "K", where)
+    if mass.shape != stiffness.shape:
+        raise ValueError(
+            f"M and K must have the same shape, got {mass.shape} and {stiffness.shape} in {where}; match them"
+        )
+    return mass, stiffness
 
 
 def _check_mass(M: sparse.csc_matrix) -> None:

@@ -89,6 +89,8 @@ def carrying(share: float, load: ArrayLike, mass: float) -> Enough:
     """
     if not 0 < share <= 1:
         raise ValueError(f"share must lie in (0, 1], got {share!r} in carrying; give a part such as 0.95")
+    if not 0.0 < mass < np.inf:
+        raise ValueError(f"mass must be positive and finite (kg), got {mass!r} in carrying; use moved_mass(M, load)")
 
     def count(basis: Basis) -> int | None:
         met = np.cumsum(basis.effective_mass(load)) >= share * mass * (1 - MASS_ROUNDING)

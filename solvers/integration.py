@@ -119,7 +119,7 @@ def check_slopes(system: System) -> None:
     delta = np.array([1e-12, 1e-10])
     for i, contact in enumerate(system.contacts):
         viscous = contact.law.force(delta, 1.0, 1.0) - contact.law.force(delta, 0.0, 1.0)
-        if not contact.law.jump and 0.0 < abs(viscous[1]) < 50.0 * abs(viscous[0]):
+        if not contact.law.jump and 0.0 < abs(viscous[1]) < 95.0 * abs(viscous[0]):
             trouble = f"its slope is infinite at the surface: {contact.law!r}"
             raise ValueError(f"tangent is not offered for the law of contact {i}: {trouble}")
     system.about_laws["finite slopes"] = True

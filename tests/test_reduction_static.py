@@ -169,6 +169,8 @@ EYE = np.eye(3)
         (lambda: reduction.craig_bampton(EYE, EYE, np.full((3, 1), np.nan), 1), "finite"),
         (lambda: reduction.below(0.0), "omega_max must be positive"),
         (lambda: reduction.carrying(1.5, EYE[0], 1.0), r"share must lie in \(0, 1\]"),
+        (lambda: reduction.carrying(0.5, EYE[0], np.nan), "mass must be positive and finite"),
+        (lambda: reduction.craig_bampton(np.eye(2), EYE, EYE[:, :1], 1), "M and K must have the same shape"),
         (lambda: reduction.fewest_modes(EYE, EYE, reduction.below(0.5)), "at least one mode"),
     ],
 )

@@ -208,6 +208,8 @@ def test_bad_input():
         integrate(system, [0.0], [0.0], 1.0, tangent="omega")
     with pytest.raises(ValueError, match="tangent is not offered for the law of contact 0: its slope is infinite"):
         integrate(beam(1, Viscoelastic.tsuji(2e7, 0.6, 0.3)), [0.0], [0.0], 1.0, tangent=True)
+    with pytest.raises(ValueError, match="its slope is infinite"):
+        integrate(beam(1, Viscoelastic(1e8, 1e3, exponent=2.8)), [0.0], [0.0], 1.0, tangent=True)
     with pytest.raises(ValueError, match="differ in coordinates"):
         Parameter(beam(1), beam(2), 1.0)
     with pytest.raises(ValueError, match="step"):
