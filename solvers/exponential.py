@@ -142,6 +142,28 @@ def _nearest_surface(problem, state):
 
 
 @inner
+def _state_on_the_way(problem, tables, state, space, variable, stop, span, landed, time, ledger):
+    """State at a time before the landing, into ``space.work[15]``; the length of its step, or inf when not found."""
+    w, x, size, tries = space.work[17], space.work[15], state.x.size, 0
+    t = w[size]
+    left = (landed - time) / (landed - t) if landed > t else 0.0
+    length = span * (1.0 - (math.sqrt(left) if variable == ROOT else left))
+    while True:
+        _, calls = regular_step(
+            *(problem, tables, ledger, variable, stop, length, w),
+            *(state.piece, state.entry_rate, space.work),
+        )
+        state.count[CALLS] += calls
+        late, tries = x[size] - time, tries + 1
+        pace = dot(problem.read_rate[stop], x, 2 * problem.k.size)  # d(variable)/dt
+        if variable == ROOT:
+            pace /= 2.0 * x[size + 1]
+        if not abs(late) > 1e-15 * landed or not abs(pace) < np.inf or tries == _MOST_TRIES:
+            return length if abs(late) <= 1e-6 * (landed - t) + 1e-15 * landed else np.inf
+        length -= late * pace
+
+
+@inner
 def _land(problem, tables, state, space, numbers, stop, direction, near, rtol, t_end, out, due, ledger):
     """Try to land on the border ahead by one regular step; whether it succeeded."""
     size, t = state.x.size, state.now[T]
@@ -154,50 +176,41 @@ def _land(problem, tables, state, space, numbers, stop, direction, near, rtol, t
         return False
     if not leaving and state.piece[stop] > 0 and abs(level - delta) > 0.2 * max(level, delta):
         return False
-    w = space.work[17]
+    w, x = space.work[17], space.work[15]
     copy(state.x, w, size)
     w[size], w[size + 1] = t, math.sqrt(max(delta, 0.0))
     broken = tables.exponent[stop] % 1.0 != 0.0
     variable = ROOT if leaving and broken else INDENTATION
     span = -w[size + 1] if variable == ROOT else level - delta
-    landed, length, time, tries = np.inf, span, np.inf, 0
-    while True:  # first the landing itself, then the samples (and the end of the run) that lie on the way
-        error, calls = regular_step(
-            *(problem, tables, ledger, variable, stop, length, w),
-            *(state.piece, state.entry_rate, space.work),
-        )
-        state.count[CALLS] += calls
-        x = space.work[15]
-        if landed == np.inf:
-            landed = x[size]
-            if not (error <= rtol * numbers[SCALE] and t <= landed <= t + 4.0 * near):
-                return False
-            copy(x, state.x, size)
-            state.now[T] = landed
-        else:
-            late, tries = x[size] - time, tries + 1
-            pace = dot(problem.read_rate[stop], x, 2 * problem.k.size)  # d(variable)/dt
-            if variable == ROOT:
-                pace /= 2.0 * x[size + 1]
-            if abs(late) > 1e-15 * landed and abs(pace) < np.inf and tries < _MOST_TRIES:
-                length -= late * pace
-                continue
-            if time == due[state.count[SAMPLED]]:
-                copy(x, out[state.count[SAMPLED]], size)
-                state.count[SAMPLED] += 1
-            if time == t_end:
-                if state.tape.shape[0]:
-                    tape(state, LANDING, t, t_end, length, variable, stop, w)
-                copy(x, state.x, size)
-                state.now[T] = t_end
-                return True
+    error, calls = regular_step(
+        *(problem, tables, ledger, variable, stop, span, w),
+        *(state.piece, state.entry_rate, space.work),
+    )
+    state.count[CALLS] += calls
+    landed = x[size]
+    arrives = direction * dot(problem.read_rate[stop], x, 2 * problem.k.size) >= 0.0  # it has not turned back
+    if not (error <= rtol * numbers[SCALE] and arrives and t <= landed <= t + 4.0 * near):
+        return False
+    copy(x, state.x, size)
+    while True:  # the samples, and the end of the run, that lie on the way
         time = min(due[state.count[SAMPLED]], t_end)
         if time > landed:
-            if state.tape.shape[0]:
-                tape(state, LANDING, t, landed, span, variable, stop, w)
-            return True
-        left = (landed - time) / (landed - t) if landed > t else 0.0
-        length, tries = span * (1.0 - (math.sqrt(left) if variable == ROOT else left)), 0
+            break
+        length = _state_on_the_way(problem, tables, state, space, variable, stop, span, landed, time, ledger)
+        if length == np.inf:
+            copy(w, state.x, size)
+            return False
+        if time == due[state.count[SAMPLED]]:
+            copy(x, out[state.count[SAMPLED]], size)
+            state.count[SAMPLED] += 1
+        if time == t_end:
+            copy(x, state.x, size)
+            landed, span = t_end, length
+            break
+    if state.tape.shape[0]:
+        tape(state, LANDING, t, landed, span, variable, stop, w)
+    state.now[T] = landed
+    return True
 
 
 @inner

@@ -17,6 +17,8 @@ from solvers.henon import hermite
 from solvers.kernels import kernel, rhs
 from solvers.march import (
     EVENT,
+    LEAST,
+    NOW,
     accept,
     explanation,
     find,
@@ -70,7 +72,7 @@ class MatrixEngine:
 
     def start(self) -> None:
         """Put every stop on its piece and evaluate the first rate."""
-        self.space.watch[2] = self._negligible()
+        self.space.watch[LEAST] = self._negligible()
         begin_contacts(self.problem, self.state)
         self.refresh()
 
@@ -142,7 +144,7 @@ class MatrixEngine:
     def _gains(self) -> bool:
         """Whether energy comes from nowhere."""
         q, q_dot = np.split(self.state.x[: 2 * self.system.size], 2)
-        self.space.watch[0] = self.system.energy(q, q_dot)
+        self.space.watch[NOW] = self.system.energy(q, q_dot)
         return bool(gains(self.problem, self.state, self.space))
 
     def explain(self, code: Status) -> str:

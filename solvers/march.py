@@ -98,6 +98,7 @@ class Space(NamedTuple):
 
 
 SPACE = types.NamedTuple([VECTOR, VECTOR, MATRIX, MATRIX, MATRIX, VECTOR], Space)
+NOW, BEGAN, LEAST, IN_A_ROW, MOST_INPUT, HELD = range(6)  # places in `Space.watch`, see `watched`
 _GAINS = 8  # steps in a row: one alone may be the ledger's, as in the first step of a load
 _FAR, _GAINS_FAR = 1e3, 3  # times the energy given, and then steps in a row
 
@@ -261,14 +262,15 @@ def accept(problem, state, space, h, stop, direction, at_end, t_end, log, out, d
 def gains(problem, state, space):
     """Whether for some steps there is twice the energy that was ever there or came in, or far more for a few."""
     ledger = 2 * problem.k.size
-    space.watch[4] = max(space.watch[4], state.x[ledger])
-    given = space.watch[1] + space.watch[4]
+    watch = space.watch
+    watch[MOST_INPUT] = max(watch[MOST_INPUT], state.x[ledger])
+    given = watch[BEGAN] + watch[MOST_INPUT]
     for s in range(problem.gap.size):  # a stop gives at most what it held
-        given += min(max(-state.x[ledger + 2 + 2 * s], 0.0), space.watch[5 + s])
-    more = space.watch[0] > 2.0 * given + space.watch[2]
-    space.watch[3] = space.watch[3] + 1.0 if more else 0.0
-    far = space.watch[0] > _FAR * (given + space.watch[2])
-    return space.watch[3] >= _GAINS or (far and space.watch[3] >= _GAINS_FAR)
+        given += min(max(-state.x[ledger + 2 + 2 * s], 0.0), watch[HELD + s])
+    more = watch[NOW] > 2.0 * given + watch[LEAST]
+    watch[IN_A_ROW] = watch[IN_A_ROW] + 1.0 if more else 0.0
+    far = watch[NOW] > _FAR * (given + watch[LEAST])
+    return watch[IN_A_ROW] >= _GAINS or (far and watch[IN_A_ROW] >= _GAINS_FAR)
 
 
 @inner
@@ -279,7 +281,7 @@ def _gains(problem, state, space):
     n, energy = problem.k.size, 0.0
     for i in range(n):
         energy += 0.5 * (state.x[n + i] ** 2 + problem.k[i] * state.x[i] ** 2)
-    space.watch[0] = energy
+    space.watch[NOW] = energy
     return gains(problem, state, space)
 
 
@@ -397,11 +399,12 @@ def watched(system: System, motion: Array, least: float) -> Array:
     """What `gains` looks at, J: stored now, at the start, negligible; steps that gained; most input, held by stops."""
     q, q_dot = np.split(motion, 2)
     stored = abs(float(system.energy(q, q_dot)))
-    if "laws take" not in system.kept:
-        system.kept["laws take"] = [takes(contact.law) for contact in system.contacts]
+    known = system.about_laws
+    if "take" not in known:
+        known["take"] = [takes(contact.law) for contact in system.contacts]
     held = [
         work_of(contact.law, -float(contact.direction @ q) - contact.gap) if fair else math.inf
-        for contact, fair in zip(system.contacts, system.kept["laws take"], strict=True)
+        for contact, fair in zip(system.contacts, known["take"], strict=True)
     ]
     return np.array([stored, stored, least, 0.0, 0.0, *held])
 
@@ -461,8 +464,8 @@ class Engine:
         if not self.problem.loss.size or self.method.adaptive:
             return False
         size = 2 * self.problem.k.size
-        self.space.watch[0] = self.system.energy(*np.split(self.back @ self.state.x[:size], 2))
-        self.space.watch[3] = _GAINS
+        self.space.watch[NOW] = self.system.energy(*np.split(self.back @ self.state.x[:size], 2))
+        self.space.watch[IN_A_ROW] = _GAINS
         return bool(gains(self.problem, self.state, self.space))
 
     def explain(self, code: Status) -> str:

@@ -159,9 +159,9 @@ class System:
         return other
 
     @property
-    def about_laws(self) -> dict[str, bool]:
+    def about_laws(self) -> dict[str, Any]:
         """What was found of the laws so far; systems made by `like` share it as long as they have the same laws."""
-        known: dict[str, bool] = self.kept.setdefault("laws", {})
+        known: dict[str, Any] = self.kept.setdefault("laws", {})
         return known
 
     def _load(self, i: int, pair: tuple[ArrayLike, Signal]) -> tuple[Array, Signal]:

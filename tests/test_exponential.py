@@ -552,3 +552,12 @@ def test_a_signal_that_changes_is_seen():
     wave.omega = 1.0
     fresh = System.modal([1.0], 0.1, loads=[([1.0], wave)])
     assert integrate(system, [0.0], [0.0], 3.0).q[-1, 0] == integrate(fresh, [0.0], [0.0], 3.0).q[-1, 0]
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_samples_on_the_way_to_a_landing_are_finite_at_the_loosest_tolerance(seed):
+    """A landing whose step turned back on its way is none, and no sample may be taken from it."""
+    model = paper_scene(base=fb.BandNoise(2.5e-4, (0.0, 1226.6), seed=seed)).reduce(2)
+    run = model.simulate(20.0, 1e-3, solver=Exponential(1e-2, ledger=False))
+    assert np.all(np.isfinite(run.q))
+    assert np.all(run.contacts.speed_out[~np.isnan(run.contacts.t_out)] >= 0.0)

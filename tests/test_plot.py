@@ -168,3 +168,12 @@ def test_figures_of_laws():
     for one in (drawn, figure):
         one.canvas.draw()
         assert all(axis.get_ylabel() for axis in one.axes)
+
+
+@pytest.mark.parametrize(
+    "draw",
+    [lambda: fb.plot.branch([]), lambda: fb.plot.loops({}), lambda: fb.plot.failures([]), fb.plot.stability_map],
+)
+def test_figures_of_nothing_are_refused(draw):
+    with pytest.raises(ValueError, match=r"nothing to draw, got .* in plot\.\w+; give "):
+        draw()

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fembeam.plot.response import BLUE, RED, styled
+from fembeam.section import require
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -106,6 +107,7 @@ def stability_map(*maps: StabilityMap) -> Figure:
 
     from fembeam.study.stability_map import Verdict
 
+    require(bool(maps), "nothing to draw", maps, "plot.stability_map", "give one map or more of fb.study.stability_map")
     colours = {
         Verdict.ACCURATE: "#8fd0b5",
         Verdict.WRONG: "#f6d58a",
@@ -159,6 +161,7 @@ def failures(cases: Sequence[Failure]) -> Figure:
     """
     from matplotlib.figure import Figure
 
+    require(bool(cases), "nothing to draw", cases, "plot.failures", "give fb.study.gallery()")
     rows = -(-len(cases) // 2)
     figure = Figure(figsize=(9.6, 2.75 * rows), layout="constrained")
     axes = figure.subplots(rows, 2, squeeze=False).ravel()

@@ -9,6 +9,7 @@ import numpy as np
 
 from contacts import PUBLISHED, Bounce, Hysteretic, Identified, KelvinVoigt, Law, Viscoelastic, bounce, restitution
 from fembeam.plot.response import BLUE, GREY, RED, Vector, styled
+from fembeam.section import require
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -37,6 +38,7 @@ def loops(laws: Mapping[str, Law], entry_rate: float = 1.0, mass: float = 1.0) -
     """
     from matplotlib.figure import Figure
 
+    require(bool(laws), "nothing to draw", laws, "plot.loops", "give laws by name, {name: law}")
     figure = Figure(figsize=(7.0, 4.2), layout="constrained")
     axis = figure.subplots()
     thrown = {name: bounce(law, entry_rate, mass) for name, law in laws.items()}

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fembeam.plot.response import GREEN, GREY, ORANGE, RED, Vector, places, styled
+from fembeam.section import require
 from solvers.result import counted
 
 if TYPE_CHECKING:
@@ -42,6 +43,7 @@ def branch(
     labels : of the branches; None tells their period.
     """
     several = [branches] if not isinstance(branches, Sequence) else list(branches)
+    require(bool(several), "nothing to draw", branches, "plot.branch", "give one branch or more")
     model = several[0].family.model
     place = observed(model) if z is None else z
     axis = _axis() if axes is None else axes
