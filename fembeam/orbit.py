@@ -122,6 +122,8 @@ def common_period(signals: list[Any]) -> float:
     omega = np.concatenate([np.asarray(signal.tones()[0], dtype=float) for signal in signals] or [np.zeros(0)])
     omega = omega[omega > 0.0]
     require(omega.size > 0, "an orbit needs a load with a period", signals, "the scene", "add base=Harmonic(...)")
+    if omega.size == 1:
+        return 2.0 * math.pi / float(omega[0])
     ratios = [Fraction(w / omega.min()).limit_denominator(1000) for w in omega]
     off = max(abs(float(r) * omega.min() / w - 1.0) for r, w in zip(ratios, omega, strict=True))
     require(off < 1e-9, "the tones have no common period", omega.tolist(), "the scene", "make their ratios rational")

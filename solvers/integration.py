@@ -262,10 +262,9 @@ class _Run:
         count = self.state.count
         steps, rejected, calls, events = count[[STEPS, REJECTED, CALLS, EVENTS]].tolist()
         cost = Cost(steps, rejected, calls, events, seconds)
-        solution = Solution(t, motion[:, :n], motion[:, n:], self._contacts(), ledger, status, cost)
-        if self.tangent is None or status is not Status.DONE:
-            return solution
-        return replace(solution, tangent=self.tangent.matrix(), rate=self.tangent.rate())
+        known = self.tangent is not None and status is Status.DONE
+        more = {"tangent": self.tangent.matrix(), "rate": self.tangent.rate()} if known else {}
+        return Solution(t, motion[:, :n], motion[:, n:], self._contacts(), ledger, status, cost, **more)
 
     def _sampled(self, status: Status) -> int:
         """Samples written; the last one may lie a rounding beyond the end."""

@@ -147,13 +147,12 @@ def _loss_rows(problem: Problem) -> Array:
     return np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
 
 
-def steady_response(k: Array, c: Array, load: Any, omega: float) -> Any:
-    """(2n,) complex amplitude Z of the blocks' response Re(Z e^{iΩt}) to the state rate Re(load e^{iΩt})."""
-    lp, lv = np.split(load, 2)
+def steady_response(k: Array, c: Array, load: Any, omega: Any) -> Any:
+    """(..., 2n) complex amplitude Z of the blocks' response Re(Z e^{iΩt}) to the state rate Re(load e^{iΩt})."""
+    lp, lv, turn = load[..., : k.size], load[..., k.size :], 1j * omega
     # (iΩ - A)⁻¹ of a block: [[iΩ + c, 1], [-k, iΩ]] / (k - Ω² + iΩc)
-    denominator = k - omega**2 + 1j * omega * c
-    denominator = np.where((lp == 0.0) & (lv == 0.0), 1.0, denominator)
-    return np.concatenate(((1j * omega + c) * lp + lv, -k * lp + 1j * omega * lv)) / np.tile(denominator, 2)
+    inverse = 1.0 / np.where((lp == 0.0) & (lv == 0.0), 1.0, k - omega**2 + turn * c)
+    return np.concatenate((((turn + c) * lp + lv) * inverse, (turn * lv - k * lp) * inverse), axis=-1)
 
 
 def with_tones(problem: Problem, forcing: Forcing) -> tuple[Problem, Array]:
@@ -199,6 +198,12 @@ def _rest(steady: Array, tones: int) -> Array:
     pseudo = np.zeros(steady.shape[1])
     pseudo[len(pseudo) // 2 - tones : len(pseudo) // 2] = 1.0
     return pseudo - among_tones(steady @ pseudo, tones)
+
+
+def places_among_tones(n: int, tones: int) -> Any:
+    """(2n,) where the blocks' own coordinates stand among those of the tones' blocks."""
+    own = np.arange(n)
+    return np.concatenate((own, own + (n + tones)))
 
 
 def among_tones(z: Array, tones: int) -> Array:

@@ -129,11 +129,27 @@ def _block_response(k, c, h, rate, power, exponent, nodes, weights, gauss, out, 
 
 @inner
 def _fill_level(
-    problem, h, family, level, entering, power, exponent, nodes, weights, gauss, inputs, free, forced, kick, work, basis
+    problem,
+    blocks,
+    h,
+    family,
+    level,
+    entering,
+    power,
+    exponent,
+    nodes,
+    weights,
+    gauss,
+    inputs,
+    free,
+    forced,
+    kick,
+    work,
+    basis,
 ):
-    """All tables of one family and contact level."""
+    """All tables of one family and contact level, for the blocks from the first to before the last."""
     count, size, stops = nodes.size, problem.k.size, problem.gap.size
-    for b in range(size):
+    for b in range(blocks[0], blocks[1]):
         k, c = problem.k[b], problem.c[b]
         rate = math.sqrt(k) + c
         for i in range(count):
@@ -173,35 +189,35 @@ def _fill_level(
 
 
 @kernel
-def _fill(problem, h, powers, exponents, nodes, weights, gauss, inputs, free, forced, kick, work, basis):
-    """All tables of the smooth family and of the entries with a broken exponent."""
+def _fill(problem, blocks, h, powers, exponents, nodes, weights, gauss, inputs, free, forced, kick, work, basis):
+    """All tables of the smooth family and of the entries with a broken exponent, for some of the blocks."""
     for f in range(powers.size):
         if f > 0 and exponents[f] == 0.0:
             continue
         for level in range(h.size):
             _fill_level(
-                *(problem, h[level], f, level, f - 1, powers[f], exponents[f], nodes[f], weights[f]),
+                *(problem, blocks, h[level], f, level, f - 1, powers[f], exponents[f], nodes[f], weights[f]),
                 *(gauss, inputs, free, forced, kick, work, basis),
             )
 
 
 @kernel
-def _fill_propagators(k, c, h, out):
-    """(len(h), 2, N): α, β of every block."""
+def _fill_propagators(k, c, blocks, h, out):
+    """(len(h), 2, N): α, β of the blocks from the first to before the last."""
     for i in range(h.size):
-        for b in range(k.size):
+        for b in range(blocks[0], blocks[1]):
             out[i, 0, b], out[i, 1, b] = propagate(k[b], c[b], h[i])
 
 
 class _Blocks(NamedTuple):
-    """What is known of some of the blocks: the structure's own, or the tones'."""
+    """The part of the tables that takes long, block by block; no contact force reaches the tones' blocks."""
 
     propagator: Any
     step_propagator: Any
     free: Any
-    forced: Any
-    kick: Any
     ripple: Any
+    forced: Any  # this and the next are those of the structure alone
+    kick: Any
 
 
 _KNOWN: OrderedDict[bytes, _Blocks] = OrderedDict()  # structures met lately: a tone, gap or stiffness more is cheap
@@ -222,12 +238,12 @@ def build(
     fastest = float(max((omega + damping).max(), 1e-3))
     h, contact_h = _steps(omega, damping, tones)
     families = _families(tuple(exponents), tuple(jumps))
-    blocks = _joined(*(_blocks(part, h, contact_h, families) for part in _parts(problem, tones)))
+    blocks = _blocks(problem, tones, h, contact_h, families)
     return Tables(
         h=h,
         propagator=blocks.propagator,
         signal=_signals(problem, h),
-        cell=_propagators(problem, np.array([dt_cell]))[0],
+        cell=_cell(problem, dt_cell),
         cell_signal=_signals(problem, np.array([dt_cell]))[0],
         weight=np.abs(problem.read[:, :size]) * (omega + damping)
         + np.abs(problem.read[:, size:]) * (problem.k + damping * (omega + damping)),
@@ -272,58 +288,53 @@ def _steps(omega: Any, damping: Any, tones: int) -> tuple[Any, Any]:
     return h, longest * 2.0 ** (-0.25 * np.arange(first, bottom + 2, 2))
 
 
-def _parts(problem: Problem, tones: int) -> list[Problem]:
-    """The problem of the structure's blocks and that of the tones', if there are any."""
+def _blocks(problem: Problem, tones: int, h: Any, contact_h: Any, families: _Families) -> _Blocks:
+    """Tables of all blocks; those of a structure met lately are kept, and only the tones' filled in anew."""
     size = len(problem.k)
-    chosen = [np.arange(size - tones), np.arange(size - tones, size)]
-    parts = []
-    for blocks in chosen[: 1 + (tones > 0)]:
-        both = np.concatenate((blocks, size + blocks))
-        rows = {name: np.ascontiguousarray(getattr(problem, name)[:, both]) for name in _ROWS}
-        parts.append(problem._replace(k=problem.k[blocks], c=problem.c[blocks], **rows))
-    return parts
-
-
-_ROWS = ("push", "read", "read_rate", "load")
-
-
-def _blocks(part: Problem, h: Any, contact_h: Any, families: _Families) -> _Blocks:
-    """Tables of some blocks; those met lately are kept."""
-    arrays = (part.k, part.c, *(getattr(part, name) for name in _ROWS), h, contact_h, *families[:3])
-    key = b"|".join(array.tobytes() for array in arrays)
+    own = size - tones
+    rows = (row.reshape(-1, 2, size)[:, :, :own] for row in (problem.push, problem.read, problem.load))
+    arrays = (problem.k[:own], problem.c[:own], *rows, h, contact_h, *families[:3])
+    key = b"|".join((b"%d" % tones, *(array.tobytes() for array in arrays)))
     if key not in _KNOWN:
-        inputs = np.ascontiguousarray(np.concatenate((part.push, part.load)).reshape(-1, 2 * len(part.k)))
-        _KNOWN[key] = _Blocks(
-            *(_propagators(part, h), _propagators(part, contact_h), *_responses(part, contact_h, families, inputs)),
-            _ripple(part, contact_h, np.sqrt(part.k), families),
-        )
+        _KNOWN[key] = _filled(_empty(problem, h, contact_h, families), problem, (0, own), h, contact_h, families)
         while len(_KNOWN) > _MOST_KNOWN:
             _KNOWN.popitem(last=False)
     _KNOWN.move_to_end(key)
-    return _KNOWN[key]
+    known = _KNOWN[key]
+    if not tones:
+        return known
+    copied = known._replace(**{name: getattr(known, name).copy() for name in _Blocks._fields[:4]})
+    return _filled(copied, problem, (own, size), h, contact_h, families)
 
 
-def _joined(structure: _Blocks, tones: _Blocks | None = None) -> _Blocks:
-    """Tables of both: numbers per block side by side, forces on the structure alone."""
-    if tones is None:
-        return structure
-    n, t = (part.propagator.shape[2] for part in (structure, tones))
-    kick = np.zeros((*structure.kick.shape[:-1], padded(2 * (n + t))))
-    kick[..., :n], kick[..., n + t : 2 * n + t] = structure.kick[..., :n], structure.kick[..., n : 2 * n]
+def _empty(problem: Problem, h: Any, contact_h: Any, families: _Families) -> _Blocks:
+    """Zeros for the tables of all blocks."""
+    stops, size, kinds, levels = len(problem.gap), len(problem.k), len(families.power), len(contact_h)
+    inputs = stops + len(problem.load)
     return _Blocks(
-        np.concatenate((structure.propagator, tones.propagator), axis=2),
-        np.concatenate((structure.step_propagator, tones.step_propagator), axis=2),
-        _interleaved(structure.free, tones.free, 3),
-        structure.forced,
-        kick,
-        _interleaved(structure.ripple, tones.ripple, 3),
+        *(np.zeros((len(h), 2, size)), np.zeros((levels, 2, size))),
+        *(np.zeros((kinds, levels, stops, 2 * size, 2 * S)), np.zeros((kinds, levels, stops, 2 * size))),
+        np.zeros((kinds, levels, stops, inputs, S, 2 * S)),
+        np.zeros((kinds, levels, inputs, S, padded(2 * size))),
     )
 
 
-def _interleaved(first: Any, second: Any, axis: int) -> Any:
-    """[p, p', v, v'] along an axis from [p, v] and [p', v']."""
-    (p, v), (p2, v2) = np.split(first, 2, axis), np.split(second, 2, axis)
-    return np.concatenate((p, p2, v, v2), axis)
+def _filled(
+    tables: _Blocks, problem: Problem, blocks: tuple[int, int], h: Any, contact_h: Any, families: _Families
+) -> _Blocks:
+    """The tables, filled for the blocks from the first to before the last."""
+    _fill_propagators(problem.k, problem.c, blocks, h, tables.propagator)
+    _fill_propagators(problem.k, problem.c, blocks, contact_h, tables.step_propagator)
+    inputs = np.ascontiguousarray(np.concatenate((problem.push, problem.load)).reshape(-1, 2 * len(problem.k)))
+    _fill(
+        *(problem, blocks, contact_h, families.power, families.exponent, families.nodes, families.lagrange),
+        *(_gauss(12), inputs, tables.free, tables.forced, tables.kick, np.zeros((S + 1, S, 2)), np.zeros(S)),
+    )
+    _fill_ripple(tables.ripple, problem, slice(*blocks), contact_h, families)
+    for f in np.flatnonzero(families.exponent[1:] == 0.0) + 1:  # an analytic entry is a smooth step
+        for array in (tables.free, *tables[4:])[: None if blocks[0] == 0 else 1]:
+            array[f] = array[0]
+    return tables
 
 
 @lru_cache(maxsize=8)
@@ -333,11 +344,11 @@ def _gauss(count: int) -> Any:
     return np.array([0.5 * (1.0 + x), 0.5 * w])
 
 
-def _propagators(problem: Problem, h: Any) -> Any:
-    """(len(h), 2, N): α, β of every block."""
-    out = np.empty((len(h), 2, len(problem.k)))
-    _fill_propagators(problem.k, problem.c, h, out)
-    return out
+def _cell(problem: Problem, dt: float) -> Any:
+    """(2, N): α, β of every block over a cell of the sampled signals."""
+    out = np.empty((1, 2, len(problem.k)))
+    _fill_propagators(problem.k, problem.c, (0, len(problem.k)), np.array([dt]), out)
+    return out[0]
 
 
 class _Family(NamedTuple):
@@ -380,6 +391,7 @@ class _Families(NamedTuple):
     tail: Any
     legendre: Any
     extend: Any
+    lagrange: Any  # (f, 2, S) weights of the Lagrange polynomials, plain and divided by the force's weight
     alias: Any  # (f, P) largest error between the nodes of the interpolant of e^{iωt}, at `_PHASES`
 
 
@@ -400,25 +412,9 @@ def _families(exponents: tuple[float, ...], jumps: tuple[bool, ...]) -> _Familie
         tail=np.ascontiguousarray([_tail(f.nodes) for f in found]),
         legendre=np.ascontiguousarray(found[0].spectrum),
         extend=np.ascontiguousarray([_extensions(f, found[0]) for f in found]),
+        lagrange=np.array([_weights(f.nodes) * [np.ones(S), f.nodes ** (-2.0 * f.exponent)] for f in found]),
         alias=np.array([_alias(f) for f in found]),
     )
-
-
-def _responses(problem: Problem, h: Any, families: _Families, inputs: Any) -> tuple[Any, Any, Any]:
-    """free, forced and kick of all families and contact levels."""
-    stops, size, channels, count = len(problem.gap), len(problem.k), len(inputs), len(families.power)
-    free = np.zeros((count, h.size, stops, 2 * size, 2 * S))
-    forced = np.zeros((count, h.size, stops, channels, S, 2 * S))
-    kick = np.zeros((count, h.size, channels, S, padded(2 * size)))
-    plain = np.array([_weights(nodes) for nodes in families.nodes])
-    weights = np.stack((plain, plain * families.nodes ** (-2.0 * families.exponent[:, None])), axis=1)
-    _fill(
-        *(problem, h, families.power, families.exponent, families.nodes, weights, _gauss(12), inputs),
-        *(free, forced, kick, np.zeros((S + 1, S, 2)), np.zeros(S)),
-    )
-    for f in np.flatnonzero(families.exponent[1:] == 0.0) + 1:  # an analytic entry is a smooth step
-        free[f], forced[f], kick[f] = free[0], forced[0], kick[0]
-    return free, forced, kick
 
 
 def _signals(problem: Problem, h: Any) -> Any:
@@ -498,14 +494,17 @@ def _differentiation(nodes: Any) -> Any:
     return out
 
 
-def _ripple(problem: Problem, h: Any, omega: Any, families: _Families) -> Any:
+def _fill_ripple(out: Any, problem: Problem, blocks: slice, h: Any, families: _Families) -> None:
     """Error of each stop's indentation between the nodes, per |p| and |v| of every block that oscillates."""
-    size = omega.size
+    size = len(problem.k)
+    omega = np.sqrt(problem.k[blocks])
     phases = h[:, None] * omega
     alias = np.array([np.interp(phases, _PHASES, row, left=0.0) for row in families.alias])[:, :, None, :]
     alias = np.where(alias > 1e-13, alias, 0.0)
-    rows = np.abs(problem.read[:, :size]) / np.where(omega > 0.0, omega, 1.0) + np.abs(problem.read[:, size:])
-    return np.concatenate((alias * rows * omega, alias * rows), axis=3)
+    p, v = (np.abs(half[:, blocks]) for half in (problem.read[:, :size], problem.read[:, size:]))
+    rows = p / np.where(omega > 0.0, omega, 1.0) + v
+    both = out.reshape(*out.shape[:3], 2, size)
+    both[..., 0, blocks], both[..., 1, blocks] = alias * rows * omega, alias * rows
 
 
 def _alias(family: _Family) -> Any:

@@ -10,7 +10,7 @@ import numpy as np
 
 from solvers.dormand_prince import STAGES
 from solvers.kernels import Problem, rhs
-from solvers.preparation import steady_response
+from solvers.preparation import places_among_tones, steady_response
 from solvers.replay import Nudge, Slopes, begin, replay
 from solvers.result import SolverError
 from solvers.state import HEAD, TAPED, T, law_parameters, new_state
@@ -35,7 +35,7 @@ class Tangent:
         shapes: list[Any] = [(columns, width), (columns, stops), (columns, stops), (stops + loads, S), (loads, S)]
         shapes += [(stops, 2, S), (stops, S), (2, width), (STAGES, columns, width), (columns, width), 8]
         self.slopes = Slopes(*(np.zeros(shape) for shape in shapes))
-        self.places = np.r_[0:n, size // 2 : size // 2 + n]  # of the structure among the blocks
+        self.places = places_among_tones(n, size // 2 - n)
         self.slopes.y[: 2 * n, self.places] = system.blocks.inverse.T
         self.slopes.y[2 * n :, self.places] = -self.change.steady(0.0)
         self.laws = [problem._replace(parameters=parameters) for parameters in self.change.laws]
@@ -120,8 +120,7 @@ class _Change:
         if len(engine.problem.k) != system.size + len(tones.omega):  # a tone is sampled, for resonance
             return None
         width = 2.0 * parameter.step
-        n, size = system.size, engine.problem.k.size
-        own = np.r_[0:n, size : size + n]
+        own = places_among_tones(system.size, len(tones.omega))
         rows = np.stack([engine.problem.read[:, own], engine.problem.read_rate[:, own]], axis=1)  # (m, 2, 2n)
         a, b = tones.change / width, 1j * (tones.turn / width)[:, None] * tones.response
         parts = [part for z in (a, b) for part in (z.real, z.imag)]
@@ -143,24 +142,21 @@ class _Tones(NamedTuple):
 def _tones(here: System, behind: System, ahead: System) -> _Tones | None:
     """The tones; None when sampled signals differ."""
     found = []
-    inverse: Any = here.blocks.inverse[:, here.size :]
+    k, c = here.blocks.k, here.blocks.c
     for (vector, signal), *others in zip(here.loads, behind.loads, ahead.loads, strict=True):
         signals: list[Any] = [signal, *(other for _, other in others)]
         if not all(hasattr(one, "tones") for one in signals):
             if any(one is not signal for one in signals):
                 return None
             continue
-        load = inverse @ np.linalg.solve(here.M, np.asarray(vector))
-        for pairs in zip(*(zip(*one.tones(), strict=True) for one in signals), strict=True):
-            k, c = here.blocks.k, here.blocks.c
-            first, second, third = (steady_response(k, c, load * amplitude, omega) for omega, amplitude in pairs)
-            found.append((pairs[0][0], first, pairs[2][0] - pairs[1][0], third - second))
+        push = here.push @ np.asarray(vector)
+        tones = [one.tones() for one in signals]
+        omega, amplitude = (np.stack([tone[i] for tone in tones], axis=-1)[..., None] for i in (0, 1))
+        response = steady_response(k, c, push * amplitude, omega)  # (tones, systems, 2n)
+        found.append((omega[:, 0, 0], response[:, 0], np.diff(omega[:, 1:, 0])[:, 0], response[:, 2] - response[:, 1]))
     n2 = 2 * here.size
-    omega, response, turn, change = zip(*found, strict=True) if found else ((), (), (), ())
-    return _Tones(
-        *(np.array(omega, dtype=float), np.array(response, dtype=complex).reshape(-1, n2)),
-        *(np.array(turn, dtype=float), np.array(change, dtype=complex).reshape(-1, n2)),
-    )
+    none = np.zeros(0), np.zeros((0, n2), dtype=complex)
+    return _Tones(*(np.concatenate(parts) for parts in zip((*none, *none), *found, strict=True)))
 
 
 def _same_structure(one: System, other: System) -> bool:
