@@ -51,7 +51,9 @@ def prepared_for(system: System, forcing: Forcing) -> Prepared:
     dt_cell = float(forcing.table_dt[0]) if forcing.table_dt.size else 1.0
     key = dt_cell, *(part.tobytes() for part in (forcing.tone_omega, forcing.tone_amplitude, forcing.tone_load))
     if system.kept.get("exponential", (None,))[0] != key:
-        _check_passive(system)
+        if "passive" not in system.about_structure:
+            _check_passive(system)
+            system.about_structure["passive"] = True
         plain = problem_of(system, forcing)
         problem, steady = with_tones(plain, forcing)
         laws = [contact.law for contact in system.contacts]

@@ -18,9 +18,10 @@ def latches(contact: Contact) -> bool:
 
 def with_memory(system: System) -> list[int]:
     """The stops whose law latches."""
-    known: list[int] | None = system.kept.get("stops with memory")
-    if known is None:
-        known = system.kept["stops with memory"] = [s for s, c in enumerate(system.contacts) if latches(c)]
+    about = system.about_laws
+    if "with memory" not in about:
+        about["with memory"] = [s for s, contact in enumerate(system.contacts) if latches(contact)]
+    known: list[int] = about["with memory"]
     return known
 
 

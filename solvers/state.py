@@ -185,6 +185,14 @@ def new_state(z: Any, stops: int) -> State:
 
 def problem_of(system: System, forcing: Forcing) -> Problem:
     """Arrays the kernels read, in block coordinates."""
+    about = system.about_structure
+    if "linear" not in about:
+        about["linear"] = _linear_part(system)
+    return _problem(system, forcing, about["linear"])
+
+
+def _linear_part(system: System) -> dict[str, Array]:
+    """Arrays of the structure, the stops' directions and the loads' vectors."""
     blocks, n = system.blocks, system.size
     direction, vectors = directions_of(system), _vectors(system)
     linear = {
@@ -194,7 +202,7 @@ def problem_of(system: System, forcing: Forcing) -> Problem:
         "load": np.ascontiguousarray(vectors @ system.push.T),
         "power": np.ascontiguousarray(vectors @ blocks.T[n:]),
     }
-    return _problem(system, forcing, linear)
+    return {**linear, "read_rate": rate_rows(linear["read"], blocks.k, blocks.c)}
 
 
 def matrix_problem_of(system: System, forcing: Forcing) -> Problem:
@@ -204,6 +212,7 @@ def matrix_problem_of(system: System, forcing: Forcing) -> Problem:
     linear = {
         **{"k": zeros, "c": zeros, "loss": np.empty((0, 0))},
         **{"push": np.hstack((0.0 * direction, direction)), "read": np.hstack((-direction, 0.0 * direction))},
+        "read_rate": np.hstack((0.0 * direction, -direction)),
         **{"load": np.hstack((0.0 * vectors, vectors)), "power": np.hstack((0.0 * vectors, vectors))},
     }
     return _problem(system, forcing, linear)
@@ -228,7 +237,6 @@ def _problem(system: System, forcing: Forcing, linear: dict[str, Array]) -> Prob
         levels[i, : len(contact.law.knots) + 1] = (0.0, *contact.law.knots)
     return Problem(
         **linear,
-        read_rate=rate_rows(linear["read"], linear["k"], linear["c"]),
         levels=levels,
         gap=np.array([c.gap for c in contacts], dtype=float),
         law=np.array([c.law.address for c in contacts], dtype=np.int64),

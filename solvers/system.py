@@ -148,15 +148,29 @@ class System:
     ) -> System:
         """The same structure with other contacts or loads; its matrices are neither checked nor decoupled again."""
         other = object.__new__(System)
-        laws = [[contact.law for contact in listed] for listed in (self.contacts, contacts or self.contacts)]
-        same = len(laws[0]) == len(laws[1]) and all(a is b for a, b in zip(*laws, strict=True))
-        known = {"laws": self.about_laws} if same else {}
-        other.__dict__.update(self.__dict__, blocks=self.blocks, push=self.push, kept=known)
+        other.__dict__.update(self.__dict__, blocks=self.blocks, push=self.push, kept={})
         for name, value in (("contacts", contacts), ("loads", loads)):
             if value is not None:
                 object.__setattr__(other, name, value)
         other._check_contacts_and_loads()
+        if len(self.contacts) == len(other.contacts):
+            pairs = list(zip(self.contacts, other.contacts, strict=True))
+            if all(a.law is b.law for a, b in pairs):
+                other.kept["laws"] = self.about_laws
+            if self._vectors_are_those_of(other):
+                other.kept["structure"] = self.about_structure
         return other
+
+    def _vectors_are_those_of(self, other: System) -> bool:
+        """Whether contacts and loads act along the same vectors."""
+        vectors = [[*(c.direction for c in s.contacts), *(vector for vector, _ in s.loads)] for s in (self, other)]
+        return len(self.loads) == len(other.loads) and all(map(np.array_equal, *vectors))
+
+    @property
+    def about_structure(self) -> dict[str, Any]:
+        """What was found of matrices, directions and loads' vectors; shared like `about_laws`."""
+        known: dict[str, Any] = self.kept.setdefault("structure", {})
+        return known
 
     @property
     def about_laws(self) -> dict[str, Any]:

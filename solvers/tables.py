@@ -209,6 +209,29 @@ def _fill_propagators(k, c, blocks, h, out):
             out[i, 0, b], out[i, 1, b] = propagate(k[b], c[b], h[i])
 
 
+@kernel
+def _fill_ripple(problem, blocks, h, phases, alias, out):
+    """Error of each stop's indentation between the nodes, per |p| and |v| of every block that oscillates.
+
+    The phases ω h of the aliasing errors are a geometric sequence.
+    """
+    size, last = problem.k.size, phases.size - 1
+    density = last / math.log(phases[last] / phases[0])
+    for b in range(blocks[0], blocks[1]):
+        omega = math.sqrt(problem.k[b])
+        for level in range(h.size):
+            phase = h[level] * omega
+            if phase < phases[0]:
+                break  # the steps become ever shorter
+            i = min(int(density * math.log(phase / phases[0])), last - 1)
+            way = min((phase - phases[i]) / (phases[i + 1] - phases[i]), 1.0)
+            for f in range(alias.shape[0]):
+                error = (1.0 - way) * alias[f, i] + way * alias[f, i + 1]
+                for s in range(problem.gap.size if error > 1e-13 else 0):
+                    row = abs(problem.read[s, b]) / omega + abs(problem.read[s, size + b])
+                    out[f, level, s, b], out[f, level, s, size + b] = error * row * omega, error * row
+
+
 class _Blocks(NamedTuple):
     """The part of the tables that takes long, block by block; no contact force reaches the tones' blocks."""
 
@@ -276,10 +299,17 @@ def build(
 def _steps(omega: Any, damping: Any, tones: int) -> tuple[Any, Any]:
     """Flight and contact steps. They depend on the structure alone, but for tones faster than it."""
     own = slice(0, omega.size - tones) if tones < omega.size else slice(None)
-    rates = (omega + damping)[own]
-    fastest = float(max(rates.max(), 1e-3))
-    fastest *= 2.0 ** max(0, math.ceil(math.log2(max((omega + damping).max(), 1e-3) / fastest)))
-    moving = np.concatenate((omega[own][omega[own] > 0], damping[own][damping[own] > 0]))
+    ratio = max((omega + damping).max(), 1e-3) / max((omega + damping)[own].max(), 1e-3)
+    return _steps_of(omega[own].tobytes(), damping[own].tobytes(), math.ceil(math.log2(max(ratio, 1.0))))
+
+
+@lru_cache(maxsize=64)
+def _steps_of(omegas: bytes, dampings: bytes, doublings: int) -> tuple[Any, Any]:
+    """Steps for a structure's frequencies and dampings, and for tones so many times twice as fast."""
+    omega, damping = np.frombuffer(omegas), np.frombuffer(dampings)
+    fastest = max(float((omega + damping).max()), 1e-3)
+    moving = np.concatenate((omega[omega > 0], damping[damping > 0]))
+    fastest *= 2.0**doublings
     longest = 4.0 * math.pi / (moving.min() if moving.size else fastest)
     levels = 2 + math.ceil(4.0 * math.log2(longest * fastest / TAYLOR_REACH))
     h = longest * 2.0 ** (-0.25 * np.arange(levels))
@@ -330,7 +360,7 @@ def _filled(
         *(problem, blocks, contact_h, families.power, families.exponent, families.nodes, families.lagrange),
         *(_gauss(12), inputs, tables.free, tables.forced, tables.kick, np.zeros((S + 1, S, 2)), np.zeros(S)),
     )
-    _fill_ripple(tables.ripple, problem, slice(*blocks), contact_h, families)
+    _fill_ripple(problem, blocks, contact_h, _PHASES, families.alias, tables.ripple)
     for f in np.flatnonzero(families.exponent[1:] == 0.0) + 1:  # an analytic entry is a smooth step
         for array in (tables.free, *tables[4:])[: None if blocks[0] == 0 else 1]:
             array[f] = array[0]
@@ -492,19 +522,6 @@ def _differentiation(nodes: Any) -> Any:
     np.fill_diagonal(out, 0.0)
     np.fill_diagonal(out, -out.sum(axis=1))
     return out
-
-
-def _fill_ripple(out: Any, problem: Problem, blocks: slice, h: Any, families: _Families) -> None:
-    """Error of each stop's indentation between the nodes, per |p| and |v| of every block that oscillates."""
-    size = len(problem.k)
-    omega = np.sqrt(problem.k[blocks])
-    phases = h[:, None] * omega
-    alias = np.array([np.interp(phases, _PHASES, row, left=0.0) for row in families.alias])[:, :, None, :]
-    alias = np.where(alias > 1e-13, alias, 0.0)
-    p, v = (np.abs(half[:, blocks]) for half in (problem.read[:, :size], problem.read[:, size:]))
-    rows = p / np.where(omega > 0.0, omega, 1.0) + v
-    both = out.reshape(*out.shape[:3], 2, size)
-    both[..., 0, blocks], both[..., 1, blocks] = alias * rows * omega, alias * rows
 
 
 def _alias(family: _Family) -> Any:

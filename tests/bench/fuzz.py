@@ -254,6 +254,7 @@ def main(count: int = 10_000, first: int = 0, commands: int = 0) -> int:
     """Try that many; exit code 1 when one failed."""
     judge = commanded if commands else verdict
     texts, found, slowest = seeds(), Counter(), (0.0, 0)
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
     for text in texts:  # compiles, without an alarm
         judge(text)
     for seed in range(first, first + count):
