@@ -156,6 +156,11 @@ class Sum(Law):
 
     parts: tuple[Law, ...]
 
+    def __post_init__(self) -> None:
+        wrong = [part for part in self.parts if not isinstance(part, Law)]
+        if wrong or not self.parts:
+            raise ValueError(f"parts of Sum must be contact laws, at least one, got {wrong[0] if wrong else ()!r}")
+
     compiled: ClassVar[str] = "parallel"
     equation: ClassVar[str] = "F = sum of the laws below"
 
@@ -222,6 +227,13 @@ def check_number(value: Any, what: str, low: float = 0.0, *, strict: bool = Fals
     if not fine or value < low or (strict and value == low):
         bound = f"{'>' if strict else '>='} {low:g}"
         raise ValueError(f"{what} must be finite and {bound}, got {value!r}")
+
+
+def switch(owner: object, name: str) -> None:
+    """Check one parameter of a law that is either on or off."""
+    value = getattr(owner, name)
+    if not isinstance(value, (bool, np.bool_)):
+        raise ValueError(f"{name} of {type(owner).__name__} must be True or False, got {value!r}")
 
 
 def check_restitution(value: Any, who: str, low_open: bool, why: str = "") -> None:

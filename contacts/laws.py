@@ -28,7 +28,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from contacts.law import ENTRY_RATE_FLOOR, Law, check_restitution, number
+from contacts.law import ENTRY_RATE_FLOOR, Law, check_restitution, number, switch
 from contacts.restitution import achieved_restitution, damping_factor_for
 
 PUBLISHED = (
@@ -84,6 +84,7 @@ class Hysteretic(Law):
         number(self, "damping_factor")
         number(self, "exponent", 1.0)
         number(self, "entry_rate_floor", strict=True)
+        switch(self, "clamp")
 
     @classmethod
     def lankarani_nikravesh(cls, stiffness: float, restitution: float, **options: Any) -> Hysteretic:

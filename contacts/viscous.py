@@ -17,7 +17,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from contacts.law import Law, check_number, check_restitution, number
+from contacts.law import Law, check_number, check_restitution, number, switch
 
 PULLS = "pulls at the end of every rebound, where the dashpot outweighs the spring; clamp=True forbids it"
 CLAMPED = "clamp=True: the kink where the force is cut moves with the rate; integrated at lower order around it"
@@ -71,6 +71,7 @@ class KelvinVoigt(Law):
     def __post_init__(self) -> None:
         number(self, "stiffness", strict=True)
         number(self, "damping")
+        switch(self, "clamp")
 
     @classmethod
     def anagnostopoulos(cls, stiffness: float, restitution: float, mass: float, **options: Any) -> KelvinVoigt:
@@ -147,6 +148,8 @@ class Viscoelastic(Law):
         number(self, "stiffness", strict=True)
         number(self, "damping")
         number(self, "exponent", 1.0, strict=True)
+        switch(self, "clamp")
+        switch(self, "approach_only")
 
     @classmethod
     def tsuji(cls, stiffness: float, restitution: float, mass: float, **options: Any) -> Viscoelastic:

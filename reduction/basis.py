@@ -30,7 +30,7 @@ class Basis:
 
     Raises
     ------
-    ValueError : shapes that do not match.
+    ValueError : shapes that do not match, numbers that are not finite.
 
     Examples
     --------
@@ -52,6 +52,8 @@ class Basis:
                 "give one frequency per column"
             )
         for name, value in (("vectors", vectors), ("omega", omega)):
+            if not np.isfinite(value).all():
+                raise ValueError(f"{name} of a Basis must be finite, got {value[~np.isfinite(value)][0]}")
             value.flags.writeable = False
             object.__setattr__(self, name, value)
 

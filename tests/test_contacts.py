@@ -182,6 +182,9 @@ def test_laws_add():
     np.testing.assert_allclose(both.force(*points), sum(x.force(*points) for x in (a, b, c)), rtol=1e-15)
     with pytest.raises(TypeError, match="unsupported operand"):
         a + 1.0
+    for wrong in ((), (a, 1.0)):
+        with pytest.raises(ValueError, match="parts of Sum must be contact laws, at least one, got"):
+            Sum(wrong)
     assert (Hertz(1.0) + Hertz(1.0, 2.5)).exponent == 1.5
     assert (Hertz(1.0) + Hertz(1.0, 1.0)).exponent == 0.5  # both powers are then polynomials of the root of time
 
@@ -446,6 +449,16 @@ def test_the_line_that_cannot_be_compiled_is_named():
 def test_stiffness_must_be_positive(make, bad):
     with pytest.raises(ValueError, match=r"stiffness of .* must be finite and > 0, got"):
         make(bad)
+
+
+@pytest.mark.parametrize("bad", [math.nan, 2, "yes", None])
+@pytest.mark.parametrize(
+    "make", [lambda on: Hysteretic(1e8, 0.1, clamp=on), lambda on: KelvinVoigt(1e5, 1.0, clamp=on)]
+)
+def test_clamp_is_on_or_off(make, bad):
+    with pytest.raises(ValueError, match=r"clamp of \w+ must be True or False, got"):
+        make(bad)
+    assert make(np.True_).clamp
 
 
 @pytest.mark.parametrize("bad", [-1e-9, math.nan, math.inf, "much"])

@@ -177,3 +177,5 @@ def test_modal_basis_rejects(arguments, message):
 def test_basis_rejects_shapes():
     with pytest.raises(ValueError, match=r"vectors \(N, n\) and omega \(n,\) must match"):
         reduction.Basis(np.eye(3), np.ones(2))
+    with pytest.raises(ValueError, match="omega of a Basis must be finite, got nan"):
+        reduction.Basis(np.eye(2), np.array([1.0, np.nan]))
