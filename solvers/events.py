@@ -11,6 +11,7 @@ from solvers.state import surface_tolerance
 
 # finer near 0, where a contact just left may come back
 _NODES = np.array([0.0, 1 / 64, 1 / 32, 1 / 16, 1 / 8, 1 / 4, 3 / 8, 1 / 2, 5 / 8, 3 / 4, 7 / 8, 1.0])
+GOLDEN = 0.6180339887498949
 UNRESOLVED = -1.0
 NONE = 2.0
 IGNORED, HENON, LANDED = range(3)
@@ -37,14 +38,12 @@ def coefficients_of(row, offset, x, dense, out):
 @inner
 def _maximum(coefficients, sign, a, b):
     """Golden-section place of the largest sign·δ on [a, b]."""
-    ratio = 0.6180339887498949
-    c, d = b - ratio * (b - a), a + ratio * (b - a)
     for _ in range(40):
+        c, d = b - GOLDEN * (b - a), a + GOLDEN * (b - a)
         if sign * polynomial(coefficients, c) > sign * polynomial(coefficients, d):
             b = d
         else:
             a = c
-        c, d = b - ratio * (b - a), a + ratio * (b - a)
     return 0.5 * (a + b)
 
 

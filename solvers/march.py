@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit, types
 
 from solvers.events import (
+    GOLDEN,
     HENON,
     IGNORED,
     LANDED,
@@ -119,18 +120,25 @@ def _peaks(problem, state, space):
                 if value > best:
                     best, place = value, i
             if best > 0.9 * state.open[s, column]:
-                a = _PEAK_NODES[max(place - 1, 0)]
-                b = _PEAK_NODES[min(place + 1, _PEAK_NODES.size - 1)]
-                for _ in range(36):  # golden section
-                    c, d = b - 0.6180339887498949 * (b - a), a + 0.6180339887498949 * (b - a)
-                    at_c = _peak_value(problem, state, s, column, delta_of, rate_of, c, space.work[0])
-                    at_d = _peak_value(problem, state, s, column, delta_of, rate_of, d, space.work[0])
-                    if at_c > at_d:
-                        b = d
-                    else:
-                        a = c
-                    best = max(best, at_c, at_d)
+                best = max(best, _highest(problem, state, s, column, delta_of, rate_of, place, space.work[0]))
                 state.open[s, column] = max(state.open[s, column], best)
+
+
+@inner
+def _highest(problem, state, s, column, delta_of, rate_of, place, batch):
+    """Largest value around a node of the step, by golden section."""
+    a, b = _PEAK_NODES[max(place - 1, 0)], _PEAK_NODES[min(place + 1, _PEAK_NODES.size - 1)]
+    best = -np.inf
+    for _ in range(36):
+        c, d = b - GOLDEN * (b - a), a + GOLDEN * (b - a)
+        at_c = _peak_value(problem, state, s, column, delta_of, rate_of, c, batch)
+        at_d = _peak_value(problem, state, s, column, delta_of, rate_of, d, batch)
+        if at_c > at_d:
+            b = d
+        else:
+            a = c
+        best = max(best, at_c, at_d)
+    return best
 
 
 @inner
