@@ -231,8 +231,6 @@ class _Run:
         code = RUNNING
         try:
             self.engine.start()
-            if self.tangent:
-                self.tangent.start()
             while code in (RUNNING, LOG_FULL):
                 if code == LOG_FULL:
                     self.log = np.concatenate((self.log, np.empty_like(self.log)))

@@ -26,13 +26,30 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba import njit, types
 
 from solvers.collocation import arrive
 from solvers.dormand_prince import STAGES, A
 from solvers.flight import signal_derivatives, turn
-from solvers.kernels import contact_forces, contact_gradient, copy, dot, indentation, inlined, inner, kernel, rhs
+from solvers.handle import opener
+from solvers.kernels import (
+    MATRIX,
+    OPTIONS,
+    PROBLEM,
+    REAL,
+    VECTOR,
+    contact_forces,
+    contact_gradient,
+    copy,
+    dot,
+    indentation,
+    inlined,
+    inner,
+    rhs,
+)
 from solvers.ledger import inside
 from solvers.newton import factorise, linearise, substitute
+from solvers.preparation import SPACE, TABLES
 from solvers.regular import regular_step
 from solvers.response import free_response, respond
 from solvers.state import (
@@ -46,6 +63,8 @@ from solvers.state import (
     PART,
     SECOND,
     SPAN,
+    STATE,
+    TAPED,
     T,
     begin_contacts,
     rate_tolerance,
@@ -66,7 +85,7 @@ class Slopes(NamedTuple):
     signal: Any  # (L, S) slopes of the sampled signals there
     response: Any  # (m, 2, S) of δ and δ̇ to these slopes
     by_parameter: Any  # (m, S) ∂F/∂parameter there
-    rate: Any  # (2, x.size) of the state at both ends of a step
+    rate: Any  # (2, x.size) of the state at both ends of a step; at last the first is that at the time reached
     stages: Any  # (STAGES, columns, x.size) of a landing
     trial: Any  # (columns, x.size)
     batch: Any  # (8,)
@@ -76,9 +95,17 @@ class Nudge(NamedTuple):
     """What a parameter changes per unit, besides the state; none when ``step`` is zero."""
 
     step: float  # half the distance of the two systems it was taken from
+    law_step: float  # the same; zero where their laws are the same
     omega: Any  # (K,) tones
     steady: Any  # (K, m, 2, 4): (Re a, Im a, Re b, Im b) of δ and δ̇ = Re (a + t b) e^{iωt}
     gap: Any  # (m,)
+
+
+_CUBE = types.Array(REAL, 3, "C")
+SLOPES = types.NamedTuple([*[MATRIX] * 5, _CUBE, MATRIX, MATRIX, _CUBE, MATRIX, VECTOR], Slopes)
+NUDGE = types.NamedTuple([REAL, REAL, VECTOR, types.Array(REAL, 4, "C"), VECTOR], Nudge)
+_problem, _tables, _state, _space = opener(PROBLEM), opener(TABLES), opener(STATE), opener(SPACE)
+_slopes, _nudge = opener(SLOPES), opener(NUDGE)
 
 
 @inlined
@@ -126,8 +153,8 @@ def _force(problem, shadow, s, delta, delta_dot, batch):
     return batch[2]
 
 
-@kernel
-def begin(problem, shadow, slopes, nudge):
+@inner
+def _begin(problem, shadow, slopes, nudge):
     """Put the stops on their pieces as the run does at its start, and latch the derivative of their rates."""
     begin_contacts(problem, shadow)
     for s in range(problem.gap.size):
@@ -174,14 +201,14 @@ def _by_parameter(ahead, behind, shadow, space, nudge, slopes, s):
     """∂F/∂parameter at the nodes of a stop, from the law at both parameters."""
     for i in range(S):
         slopes.by_parameter[s, i] = 0.0
-    if nudge.step == 0.0:
+    if nudge.law_step == 0.0:
         return
     delta, rate = space.motion[s, 0], space.motion[s, 1]
     copy(delta, space.clipped, S)
     contact_forces(ahead, s, space.clipped, rate, shadow.entry_rate[s], slopes.by_parameter[s])
     contact_forces(behind, s, space.clipped, rate, shadow.entry_rate[s], space.trial)
     for i in range(S):
-        slopes.by_parameter[s, i] = (slopes.by_parameter[s, i] - space.trial[i]) / (2.0 * nudge.step)
+        slopes.by_parameter[s, i] = (slopes.by_parameter[s, i] - space.trial[i]) / (2.0 * nudge.law_step)
 
 
 @inlined
@@ -312,7 +339,7 @@ def _stage_rates(problem, ahead, behind, shadow, slopes, nudge, w, factor, out):
         batch[0], batch[1] = _inside_piece(problem, shadow, s, w), dot(problem.read_rate[s], w, size)
         rate = shadow.entry_rate[s]
         contact_gradient(problem, s, batch[0:1], batch[1:2], rate, batch[2:3], batch[3:4], batch[4:5])
-        if nudge.step > 0.0:
+        if nudge.law_step > 0.0:
             contact_forces(ahead, s, batch[0:1], batch[1:2], rate, batch[5:6])
             contact_forces(behind, s, batch[0:1], batch[1:2], rate, batch[6:7])
         for c in range(slopes.y.shape[0]):
@@ -323,8 +350,8 @@ def _stage_rates(problem, ahead, behind, shadow, slopes, nudge, w, factor, out):
                 if _is_parameter(nudge, slopes, c):
                     value += _explicit(nudge, s, d, t)
                 change += batch[2 + d] * value
-            if _is_parameter(nudge, slopes, c):
-                change += (batch[5] - batch[6]) / (2.0 * nudge.step)
+            if nudge.law_step > 0.0 and _is_parameter(nudge, slopes, c):
+                change += (batch[5] - batch[6]) / (2.0 * nudge.law_step)
             for e in range(size):
                 out[c, e] += factor * problem.push[s, e] * change
 
@@ -354,11 +381,22 @@ def _land(problem, ahead, behind, tables, shadow, space, slopes, nudge, row):
         copy(slopes.trial[c], slopes.y[c], size)
 
 
-@kernel
-def replay(problem, ahead, behind, tables, shadow, space, slopes, nudge, tape, rows, t_end, modes):
-    """Carry the derivatives over what the tape tells, up to ``t_end``; blocks beyond the ``modes`` are tones."""
-    for r in range(rows):
-        row = tape[r]
+@njit(types.void(*[types.int64] * 10, types.boolean), **OPTIONS)
+def replay(
+    problem_at, ahead_at, behind_at, tables_at, state_at, space_at, shadow_at, slopes_at, nudge_at, modes, begins
+):
+    """Carry the derivatives over what a run has taped, up to the time it has reached, and let it tape anew.
+
+    ``ahead`` and ``behind`` are the problems whose laws have the parameter's other values, ``shadow`` the state as it
+    was; blocks beyond the ``modes`` are tones.
+    """
+    problem, ahead, behind, tables = _problem(problem_at), _problem(ahead_at), _problem(behind_at), _tables(tables_at)
+    state, space, shadow = _state(state_at), _space(space_at), _state(shadow_at)
+    slopes, nudge = _slopes(slopes_at), _nudge(nudge_at)
+    if begins:
+        _begin(problem, shadow, slopes, nudge)
+    for r in range(state.count[TAPED]):
+        row = state.tape[r]
         _coast(problem, row[BEGAN] - shadow.now[T], slopes.y)
         shadow.now[T] = row[BEGAN]
         copy(row[HEAD:], shadow.x, shadow.x.size)
@@ -369,5 +407,7 @@ def replay(problem, ahead, behind, tables, shadow, space, slopes, nudge, tape, r
         else:
             _step(problem, ahead, behind, tables, shadow, space, slopes, nudge, row, modes)
         shadow.now[T] = row[ENDED]
-    _coast(problem, t_end - shadow.now[T], slopes.y)
-    shadow.now[T] = t_end
+    state.count[TAPED] = 0
+    _coast(problem, state.now[T] - shadow.now[T], slopes.y)
+    shadow.now[T] = state.now[T]
+    rhs(problem, state.now[T], state.x, state.piece, state.entry_rate, slopes.rate[0], slopes.batch)

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from solvers.dormand_prince import STAGES
-from solvers.kernels import Problem, rhs
+from solvers.handle import Layout, Packed
+from solvers.kernels import PROBLEM, Problem
 from solvers.preparation import places_among_tones, steady_response
-from solvers.replay import Nudge, Slopes, begin, replay
+from solvers.replay import NUDGE, SLOPES, Nudge, Slopes, replay
 from solvers.result import SolverError
-from solvers.state import HEAD, TAPED, T, law_parameters, new_state
+from solvers.state import HEAD, STATE, State, T, begin_state, law_parameters, state_shapes
 from solvers.system import Array, Parameter, System
 from solvers.tables import S
 
@@ -32,31 +34,29 @@ class Tangent:
         change = _Change.of(system, parameter, engine) if parameter else None
         self.exact = change is not None
         self.change, columns = change or _Change.none(problem, n), 2 * n + self.exact
-        shapes: list[Any] = [(columns, width), (columns, stops), (columns, stops), (stops + loads, S), (loads, S)]
-        shapes += [(stops, 2, S), (stops, S), (2, width), (STAGES, columns, width), (columns, width), 8]
-        self.slopes = Slopes(*(np.zeros(shape) for shape in shapes))
+        layout = _layout(stops, loads, width, columns)
+        self.block, words = layout.block()
+        self.slopes = Slopes._make(layout.arrays(self.block, 0))
+        begin_state(State._make(layout.arrays(self.block, 1)), state.x[:size])
         self.places = places_among_tones(n, size // 2 - n)
         self.slopes.y[: 2 * n, self.places] = system.blocks.inverse.T
         self.slopes.y[2 * n :, self.places] = -self.change.steady(0.0)
-        self.laws = [problem._replace(parameters=parameters) for parameters in self.change.laws]
         engine.record(np.empty((_ROWS, HEAD + width + stops * S)))
-        self.shadow = new_state(state.x[:size], stops)
+        self.packed = [
+            *(engine.packed if same is problem else Packed(same, PROBLEM) for same in self.change.problems),
+            Packed(self.change.nudge, NUDGE),
+        ]
+        slopes, shadow = (words + start for start in layout.starts)
+        ahead, behind, nudge = (packed.address for packed in self.packed)
+        problem_at, *others = engine.addresses
+        self.addresses = problem_at, ahead, behind, *others, shadow, slopes, nudge, system.size
         self.log_scale = 0.0  # the derivatives are exp(log_scale) times what is kept
         self.history: list[tuple[float, float]] = []  # (time, ln of their size)
-
-    def start(self) -> None:
-        """Before the first step."""
-        begin(self.engine.problem, self.shadow, self.slopes, self.change.nudge)
 
     def follow(self) -> None:
         """Replay what the engine has taped, and let it tape anew."""
         engine = self.engine
-        replay(
-            *(engine.problem, *self.laws, engine.tables, self.shadow, engine.space, self.slopes),
-            *(self.change.nudge, engine.state.tape, engine.state.count[TAPED], engine.state.now[T]),
-            self.blocks.k.size,
-        )
-        engine.state.count[TAPED] = 0
+        replay(*self.addresses, not self.history)
         if not np.all(np.isfinite(self.slopes.y)):
             raise SolverError(f"the tangent is not finite any more at t = {engine.state.now[T]:g} s: a contact grazes")
         size = _size(self.slopes.y)
@@ -68,10 +68,7 @@ class Tangent:
 
     def rate(self) -> Array:
         """(2n,) derivative of [q, q̇] by time at the time reached."""
-        problem, state = self.engine.problem, self.engine.state
-        rate = np.zeros_like(state.x)
-        rhs(problem, state.now[T], state.x, state.piece, state.entry_rate, rate, np.zeros(3))
-        return self.engine.back @ rate[: 2 * len(problem.k)]
+        return self.engine.back @ self.slopes.rate[0, : 2 * len(self.engine.problem.k)]
 
     def matrix(self) -> Array:
         """(2n, columns) derivatives of [q, q̇] at the time reached."""
@@ -82,6 +79,14 @@ class Tangent:
         return self.blocks.T @ y.T
 
 
+@lru_cache(maxsize=64)
+def _layout(stops: int, loads: int, width: int, columns: int) -> Layout:
+    """Places of the arrays of `Slopes` and of the shadow's `State`."""
+    slopes = [(columns, width), (columns, stops), (columns, stops), (stops + loads, S), (loads, S), (stops, 2, S)]
+    slopes += [(stops, S), (2, width), (STAGES, columns, width), (columns, width), (8,)]
+    return Layout([SLOPES, STATE], [slopes, state_shapes(width, stops)])
+
+
 def _size(y: Array) -> float:
     """Frobenius norm; in units of the largest entry, whose square may lie beyond the range of numbers."""
     largest = float(np.abs(y).max())
@@ -90,10 +95,10 @@ def _size(y: Array) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Change:
-    """What a parameter changes: the nudge, the laws' parameters ahead and behind, the steady response per tone."""
+    """What a parameter changes: the nudge, the problems with laws ahead and behind, the steady response per tone."""
 
     nudge: Nudge
-    laws: list[Array]
+    problems: list[Problem]
     a: Any  # (K, 2n) complex: the steady response changes by Re (a + t b) e^{iωt}
     b: Any
 
@@ -106,9 +111,9 @@ class _Change:
     def none(cls, problem: Problem, n: int) -> _Change:
         """No parameter."""
         stops = len(problem.gap)
-        nudge = Nudge(0.0, np.zeros(0), np.zeros((0, stops, 2, 4)), np.zeros(stops))
+        nudge = Nudge(0.0, 0.0, np.zeros(0), np.zeros((0, stops, 2, 4)), np.zeros(stops))
         none = np.zeros((0, 2 * n), dtype=complex)
-        return cls(nudge, [problem.parameters] * 2, none, none)
+        return cls(nudge, [problem] * 2, none, none)
 
     @classmethod
     def of(cls, system: System, parameter: Parameter, engine: Any) -> _Change | None:
@@ -126,8 +131,11 @@ class _Change:
         parts = [part for z in (a, b) for part in (z.real, z.imag)]
         steady = np.stack([np.einsum("sdi,ki->ksd", rows, part) for part in parts], axis=-1)
         gaps = [np.array([contact.gap for contact in side.contacts]) for side in sides]
-        nudge = Nudge(parameter.step, tones.omega, np.ascontiguousarray(steady), (gaps[1] - gaps[0]) / width)
-        return cls(nudge, [law_parameters(side) for side in reversed(sides)], a, b)
+        behind, ahead = (law_parameters(side) for side in sides)
+        law_step = 0.0 if np.array_equal(behind, ahead) else parameter.step
+        problems = [engine.problem._replace(parameters=own) if law_step else engine.problem for own in (ahead, behind)]
+        shift = (gaps[1] - gaps[0]) / width
+        return cls(Nudge(parameter.step, law_step, tones.omega, np.ascontiguousarray(steady), shift), problems, a, b)
 
 
 class _Tones(NamedTuple):
