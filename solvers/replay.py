@@ -364,7 +364,8 @@ def _land(problem, ahead, behind, tables, shadow, space, slopes, nudge, row):
     copy(shadow.x, w, width)
     w[width], w[width + 1] = row[BEGAN], math.sqrt(max(indentation(problem, stop, shadow.x), 0.0))
     span = row[SPAN]
-    regular_step(problem, tables, False, variable, stop, span, w, shadow.piece, shadow.entry_rate, space.work)
+    ledger = np.bool_(0)  # a literal would be compiled for itself
+    regular_step(problem, tables, ledger, variable, stop, span, w, shadow.piece, shadow.entry_rate, space.work)
     trial = space.work[STAGES + 1]
     for i in range(STAGES + 1):
         combine(space.work, A[i], i, w, trial)
