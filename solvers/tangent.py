@@ -128,14 +128,15 @@ class _Change:
         own = places_among_tones(system.size, len(tones.omega))
         rows = np.stack([engine.problem.read[:, own], engine.problem.read_rate[:, own]], axis=1)  # (m, 2, 2n)
         a, b = tones.change / width, 1j * (tones.turn / width)[:, None] * tones.response
-        parts = [part for z in (a, b) for part in (z.real, z.imag)]
-        steady = np.stack([np.einsum("sdi,ki->ksd", rows, part) for part in parts], axis=-1)
+        parts = np.array([a.real, a.imag, b.real, b.imag])
+        steady = (rows @ parts.reshape(-1, own.size).T).reshape(-1, 2, 4, len(a)).transpose(3, 0, 1, 2)
         gaps = [np.array([contact.gap for contact in side.contacts]) for side in sides]
-        behind, ahead = (law_parameters(side) for side in sides)
-        law_step = 0.0 if np.array_equal(behind, ahead) else parameter.step
-        problems = [engine.problem._replace(parameters=own) if law_step else engine.problem for own in (ahead, behind)]
         shift = (gaps[1] - gaps[0]) / width
-        return cls(Nudge(parameter.step, law_step, tones.omega, np.ascontiguousarray(steady), shift), problems, a, b)
+        nudge = Nudge(parameter.step, parameter.step, tones.omega, np.ascontiguousarray(steady), shift)
+        if all(one.law is other.law for one, other in zip(*(side.contacts for side in sides), strict=True)):
+            return cls(nudge._replace(law_step=0.0), [engine.problem] * 2, a, b)
+        problems = [engine.problem._replace(parameters=law_parameters(side)) for side in reversed(sides)]
+        return cls(nudge, problems, a, b)
 
 
 class _Tones(NamedTuple):
