@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 Field = Callable[[Vector], Any] | None  # of displacement in m or velocity in m/s, over z (k,)
+UNDRIVEN = ("zeta", "participation", "moving_mass", "section_forces", "touches", "directions")  # whatever drives
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,6 +222,17 @@ class Model:
         kept = own.loads[: len(own.loads) - len(frame)]
         return own.like([*contacts, *own.contacts[count:]], [*kept, *frame])
 
+    def under(self, scene: Scene) -> Model:
+        """The same model of a scene that differs in its signals only; what does not depend on them is kept."""
+        other = replace(self, scene=scene)
+        kept = {name: self.__dict__[name] for name in UNDRIVEN if name in self.__dict__}
+        other.__dict__.update(kept, system=self.system_like(scene))
+        return other
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields without the system: it holds addresses of this process, and is soon made again."""
+        return {name: value for name, value in self.__dict__.items() if name != "system"}
+
     def rest(self) -> Vector:
         """The start [q, q_dot] (2n,) of everything undeflected and at rest but the impactors, at their velocity."""
         from fembeam import start
@@ -276,7 +288,7 @@ class Model:
     def lasting(self, duration: float) -> Model:
         """The same model with every signal good for ``duration``; noise without a period gets one."""
         scene = _lasting(self.scene, duration)
-        return self if scene is self.scene else replace(self, scene=scene)
+        return self if scene is self.scene else self.under(scene)
 
     def simulate(
         self,

@@ -53,11 +53,18 @@ def hand_over(signals: list[Signal], duration: float, rtol: float) -> Forcing:
         np.array([t[0] for t in tones], dtype=float),
         np.array([t[1] for t in tones], dtype=complex),
         np.array([t[2] for t in tones], dtype=np.int64),
-        np.ascontiguousarray(np.concatenate([rows for _, rows, _ in tables] or [np.empty((0, 3))])),
+        _joined([rows for _, rows, _ in tables]),
         np.array([dt for dt, _, _ in tables], dtype=float),
         starts.astype(np.int64),
         np.array([load for _, _, load in tables], dtype=np.int64),
     )
+
+
+def _joined(tables: list[Array]) -> Array:
+    """All node tables in one array; a single one, which is long, is not copied."""
+    if len(tables) == 1:
+        return np.ascontiguousarray(tables[0], dtype=float)
+    return np.ascontiguousarray(np.concatenate(tables or [np.empty((0, 3))]))
 
 
 def tones_as_nodes(forcing: Forcing, chosen: list[int], duration: float, rtol: float) -> Forcing:

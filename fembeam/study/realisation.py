@@ -47,7 +47,7 @@ def with_signals(model: Model, change: Callable[[Any], Any]) -> Model:
     scene = model.scene
     base = None if scene.base is None else change(scene.base)
     forces = [replace(force, signal=change(force.signal)) for force in scene.forces]
-    return replace(model, scene=replace(scene, base=base, forces=forces))
+    return model.under(replace(scene, base=base, forces=forces))
 
 
 def renewed(model: Model, seed_of: Callable[[int, Seed], Seed]) -> Model:
