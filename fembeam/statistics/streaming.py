@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from fembeam.statistics.batches import Batches, Estimate
 from fembeam.statistics.densities import Density
@@ -132,13 +132,16 @@ class Signal:
         found = self._of(lambda s: self.welch.density(s[self._welch_at :], s[FIRST] / s[N]))
         return Spectrum(self.welch.omega, found.value, int(self.batches.total[self._welch_at]), found.standard_error)
 
-    def power(self, lo: float, hi: float) -> Estimate:
-        """Part of the variance carried by lo <= ω <= hi (rad/s)."""
-        return self._of(
-            lambda s: Spectrum(
-                self.welch.omega, self.welch.density(s[self._welch_at :], s[FIRST] / s[N]), 0
-            ).variance_in(lo, hi)
-        )
+    def power(self, lo: ArrayLike, hi: ArrayLike) -> Estimate:
+        """Part of the variance carried by lo <= ω <= hi (rad/s): of one band, or of several (k,)."""
+        lows, highs = np.broadcast_arrays(lo, hi)
+
+        def parts(s: Vector) -> Any:
+            spectrum = Spectrum(self.welch.omega, self.welch.density(s[self._welch_at :], s[FIRST] / s[N]), 0)
+            found = [spectrum.variance_in(*band) for band in zip(lows.flat, highs.flat, strict=True)]
+            return np.reshape(found, lows.shape)[()]
+
+        return self._of(parts)
 
     def _of(self, function: Callable[[Vector], Any]) -> Estimate:
         """An estimate; batches that hold no segment yet cannot be left out."""
