@@ -9,7 +9,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
-from functools import cached_property
+from functools import cached_property, partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -53,7 +53,7 @@ class Run:
     t, q, q_dot : (k,) s, (k, n) and (k, n) modal coordinates and rates.
     contacts : log of contacts: stop, t_in, t_out, speed_in, speed_out, peak_indentation, peak_force, impulse,
         energy_loss, floored (arrays).
-    energy : ledger at t: input, damping, contact, stored, residual in J.
+    energy : ledger at t: input, damping, contact, stored, residual in J; made when first looked at, by ``ledger``.
     status : how it ended, a sentence.
     cost : steps, rejections, law_calls, events, seconds.
     """
@@ -62,7 +62,7 @@ class Run:
     q: Vector
     q_dot: Vector
     contacts: solvers.ContactLog
-    energy: solvers.Energy
+    ledger: Callable[[], solvers.Energy] = field(repr=False)
     status: str
     cost: solvers.Cost
     shapes: Shapes
@@ -79,6 +79,11 @@ class Run:
     def __repr__(self) -> str:
         reached = f"to t = {self.t[-1]:g} s" if len(self.t) else "without samples"
         return f"<run {reached}, {counted(len(self.contacts), 'contact')}: {self.status}>"
+
+    @cached_property
+    def energy(self) -> solvers.Energy:
+        """The energy ledger."""
+        return self.ledger()
 
     @property
     def scene_file(self) -> SceneFile:
@@ -103,7 +108,7 @@ class Run:
                 solution.q,
                 solution.q_dot,
                 solution.contacts,
-                solution.energy,
+                solution.ledger,
                 status,
                 solution.cost,
             ),
@@ -323,7 +328,7 @@ def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run
     return Run(
         *(arrays["t"], arrays["q"], arrays["q_dot"]),
         contacts=solvers.ContactLog(*(arrays[f"contact_{f.name}"] for f in fields(solvers.ContactLog))),
-        energy=solvers.Energy(*(arrays[f"energy_{f.name}"] for f in fields(solvers.Energy))),
+        ledger=partial(solvers.Energy, *(arrays[f"energy_{f.name}"] for f in fields(solvers.Energy))),
         status=about["status"],
         cost=solvers.Cost(**about["cost"]),
         shapes=Shapes(arrays["nodes"], arrays["shapes"]),

@@ -153,18 +153,19 @@ def up_crossings(x: Vector, rate: Vector | None, dt: float) -> int:
 
     A pair of crossings between two samples on one side shows when the cubic's extremum lies on the other.
     """
-    below, above = x[:-1] <= 0.0, x[1:] > 0.0
-    count = int(np.count_nonzero(below & above))
+    below = x <= 0.0
+    count = int(np.count_nonzero(below[:-1] & (x[1:] > 0.0)))
     if rate is None:
         return count
-    return count + _peeks(x, rate, dt) + _peeks(-x, -rate, dt)
+    rising, falling, above = rate > 0.0, rate < 0.0, x >= 0.0
+    peaks = np.flatnonzero(below[:-1] & below[1:] & rising[:-1] & falling[1:])
+    troughs = np.flatnonzero(above[:-1] & above[1:] & falling[:-1] & rising[1:])
+    ends = [(x[at], x[at + 1], rate[at] * dt, rate[at + 1] * dt) for at in (peaks, troughs)]
+    return count + _peeks(*ends[0]) + _peeks(*(-values for values in ends[1]))
 
 
-def _peeks(x: Vector, rate: Vector, dt: float) -> int:
-    """Steps from below to below whose cubic rises above 0."""
-    a, b, u, v = x[:-1], x[1:], rate[:-1] * dt, rate[1:] * dt
-    at = np.flatnonzero((a <= 0.0) & (b <= 0.0) & (u > 0.0) & (v < 0.0))
-    a, b, u, v = a[at], b[at], u[at], v[at]
+def _peeks(a: Vector, b: Vector, u: Vector, v: Vector) -> int:
+    """How many cubics from a <= 0 to b <= 0, with slopes u > 0 and v < 0 per step, rise above 0."""
     c2, c3 = 3 * (b - a) - 2 * u - v, 2 * (a - b) + u + v  # a + uθ + c2 θ² + c3 θ³
     # the maximum: 3 c3 θ² + 2 c2 θ + u = 0, in the form without cancellation
     theta = u / (-c2 + np.sqrt(np.maximum(c2 * c2 - 3 * c3 * u, 0.0)))

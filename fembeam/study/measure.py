@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from itertools import pairwise
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -172,18 +173,21 @@ def cut(run: Run, begin: float, end: float) -> Run:
     else:
         kept = slice(int(np.searchsorted(run.t, begin - half)), int(np.searchsorted(run.t, end + half)))
         t = run.t[kept] - begin
-    energy = {
-        f.name: getattr(run.energy, f.name)[kept] for f in fields(run.energy) if np.ndim(getattr(run.energy, f.name))
-    }
     return replace(
         run, t=t, q=run.q[kept], q_dot=run.q_dot[kept],
-        contacts=solvers.ContactLog(**columns), energy=replace(run.energy, **energy),
+        contacts=solvers.ContactLog(**columns), ledger=partial(_ledger_of, run, kept),
     )  # fmt: skip
+
+
+def _ledger_of(run: Run, kept: slice) -> solvers.Energy:
+    """The energy ledger of some of a run's samples."""
+    columns = {f.name: getattr(run.energy, f.name) for f in fields(run.energy)}
+    return replace(run.energy, **{name: column[kept] for name, column in columns.items() if np.ndim(column)})
 
 
 def _seeded(model: Model, seed: int) -> Model:
     """The model under another realisation."""
-    return replace(model, scene=replace(model.scene, base=replace(model.scene.base, seed=seed)))
+    return model.under(replace(model.scene, base=replace(model.scene.base, seed=seed)))
 
 
 def _value(quantity: Quantity, run: Run, case: Case) -> Any:

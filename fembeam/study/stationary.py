@@ -138,14 +138,15 @@ def stationary(
     settled, enough = None, None if until is None else False
     with bar(duration, progress) as report:
         for piece in plan.pieces():
+            seen = {name: _samples(look(piece.run)) for name, look in watched.items()}
             if settled is None and discard is None:
-                settled = _settled(watched, piece, plan)
+                settled = _settled([x for x, _ in seen.values()], piece, plan)
                 if not settled.died_out and plan.dropped < TRIES and plan.repeats:
                     plan.drop(piece)
                     settled = None
                     continue
                 piece = replace(piece, begin=max(piece.begin, settled.time))
-            plan.keep(piece, sums.add(piece))
+            plan.keep(piece, sums.add(piece, seen))
             response = sums.response(plan, settled, enough)
             report(min(plan.kept, duration))
             if until is not None and (not plan.repeats or plan.index >= FEWEST_STRETCHES):
@@ -208,9 +209,9 @@ def displacement(run: Run, z: float) -> tuple[Vector, Vector]:
     return run.displacement(z), run.velocity(z)
 
 
-def _settled(watched: Mapping[str, Watch], piece: Stretch, plan: Stretches) -> Settling:
+def _settled(signals: list[Vector], piece: Stretch, plan: Stretches) -> Settling:
     """End of the transient of the slowest signal."""
-    found = [settling(_samples(look(piece.run))[0][: piece.end + 1], plan.dt, plan.memory) for look in watched.values()]
+    found = [settling(x[: piece.end + 1], plan.dt, plan.memory) for x in signals]
     return Settling(max(f.time for f in found), max(f.drift for f in found), all(f.died_out for f in found))
 
 
@@ -243,12 +244,11 @@ class _Sums:
                     )
         self.impacts = [Impacts() for _ in range(self.stops)]
 
-    def add(self, piece: Stretch) -> float:
+    def add(self, piece: Stretch, seen: Mapping[str, tuple[Vector, Vector | None]]) -> float:
         """Take in a stretch, batch by batch; returns its seconds."""
         first = math.ceil(piece.begin / self.dt - 1e-9)
         borders = np.linspace(first, piece.end, BATCHES + 1).round().astype(int)
-        for name, look in self.watched.items():
-            x, rate = _samples(look(piece.run))
+        for name, (x, rate) in seen.items():
             if name not in self.signals:
                 self.signals[name] = self._signal(name, x[first : piece.end])
             self.signals[name].cut()
