@@ -1,6 +1,8 @@
 """Ensembles: the same bits whatever computes them, in whatever order, however often interrupted."""
 
+import multiprocessing
 import os
+import platform
 import shutil
 import signal
 import subprocess
@@ -15,6 +17,7 @@ import numpy as np
 import pytest
 
 import fembeam as fb
+import solvers
 from contacts import Hertz, Hysteretic
 from fembeam.study import characteristics, ensemble
 
@@ -61,6 +64,10 @@ def base_at(model):
     return float(model.scene.base(0.1))
 
 
+def displaced(model, run):
+    return replace(run, model=model).displacement(0.5)
+
+
 def counted(model, path):
     """Note every call in a file."""
     with open(path, "a") as file:
@@ -90,6 +97,41 @@ def test_threads_and_processes_give_the_same_bits(alone):
         assert same(ensemble(small_model(), 12, peaks, pool), alone)
     with ProcessPoolExecutor(2) as pool:
         assert same(ensemble(small_model(), 12, slow_peaks, pool), alone)
+
+
+def test_a_model_that_was_run_can_be_sent_to_another_process():
+    model = small_model(base=fb.Harmonic(1e-4, 200.0))
+    here = model.simulate(0.5)
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+        assert np.array_equal(pool.submit(model.simulate, 0.5).result().q, here.q)
+        assert np.array_equal(pool.submit(displaced, model, here).result(), here.displacement(0.5))
+
+
+def test_other_signals_leave_the_rest_of_a_model_as_it_is():
+    model = small_model(forces=[fb.PointForce(0.3, fb.BandNoise(1.0, (0.0, 300.0), seed=2))])
+    for base, forces in (
+        (fb.BandNoise(2e-4, (0.0, 500.0), seed=8), model.scene.forces),
+        (None, [fb.PointForce(0.3, fb.Harmonic(2.0, 50.0))]),
+        (fb.Harmonic(1e-4, 200.0), []),
+    ):
+        scene = replace(model.scene, base=base, forces=forces)
+        quick, anew = (other.simulate(0.4, 0.01) for other in (model.under(scene), replace(model, scene=scene)))
+        assert np.array_equal(quick.q, anew.q)
+        assert np.array_equal(quick.contacts.t_in, anew.contacts.t_in)
+    assert model.under(model.scene).touches is model.touches
+
+
+def test_realisations_take_no_fresh_memory():
+    resource = pytest.importorskip("resource")
+    if not platform.libc_ver()[0].startswith("glibc"):
+        pytest.skip("this is about glibc's allocator")
+    model, method = small_model(), solvers.Exponential(1e-6, ledger=False)
+    fresh = []
+    for _ in range(3):
+        before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+        model.simulate(100.0, 2e-3, solver=method)
+        fresh.append(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
+    assert min(fresh) < 100 < fresh[0]  # pages of 4 kB; the node table alone has 500
 
 
 def test_the_order_of_the_seeds_is_that_of_the_values():

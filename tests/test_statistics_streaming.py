@@ -107,6 +107,61 @@ def test_intervals_cover_what_they_say():
     assert abs(hits / 300 - 0.9) < 4 * math.sqrt(0.09 / 300)
 
 
+def test_what_estimates_have_in_common_is_no_scatter():
+    rng = np.random.default_rng(4)
+    a = rng.gamma(20.0, size=200)
+    b = 3.0 * a * (1.0 + 0.01 * rng.standard_normal(200))
+    ratio = Estimate.joint(np.divide, Estimate.of_mean(b), Estimate.of_mean(a))
+    assert ratio.value == b.mean() / a.mean()
+    by_hand = np.std(b - ratio.value * a, ddof=1) / math.sqrt(200) / a.mean()  # linearised
+    assert ratio.standard_error == pytest.approx(by_hand, rel=0.02)
+    apart = ratio.value * math.hypot(Estimate.of_mean(a).relative, Estimate.of_mean(b).relative)
+    assert ratio.standard_error < 0.1 * apart
+
+
+def test_joint_intervals_cover_what_they_say():
+    hits = 0
+    for seed in range(300):
+        a, own = np.random.default_rng(seed).standard_normal((2, 16)) + 5.0
+        ratio = Estimate.joint(np.divide, Estimate.of_mean(2.0 * a + own), Estimate.of_mean(a))
+        lo, hi = ratio.interval(0.9)
+        hits += lo < 3.0 < hi
+    assert abs(hits / 300 - 0.9) < 4 * math.sqrt(0.09 / 300)
+
+
+def test_joint_estimates_need_the_same_parts():
+    two, three, one = (Estimate.of_mean(np.arange(1.0, n + 1.0)) for n in (2, 3, 1))
+    for pair in ((two, three), (one, one), (two, Estimate(1.0, 0.1, 2))):
+        with pytest.raises(ValueError, match=r"estimates must have the same parts, at least 2, got \["):
+            Estimate.joint(np.divide, *pair)
+
+
+def test_powers_of_several_bands_are_those_of_each():
+    x = np.random.default_rng(5).standard_normal(8000)
+    signal = Signal(x, 0.1, 256)
+    for part in np.split(x, 8):
+        signal.add(part)
+    both = signal.power([0.0, 5.0], [5.0, np.inf])
+    for i, band in enumerate([(0.0, 5.0), (5.0, np.inf)]):
+        assert both.value[i] == signal.power(*band).value
+        assert both.standard_error[i] == pytest.approx(signal.power(*band).standard_error, rel=1e-12)
+    whole = Estimate.joint(np.sum, both)
+    assert whole.value == pytest.approx(signal.power(0.0, np.inf).value, rel=1e-12)
+    assert whole.standard_error == pytest.approx(signal.power(0.0, np.inf).standard_error, rel=1e-9)
+
+
+def test_crossings_with_rates_are_those_of_the_cubics():
+    rng = np.random.default_rng(6)
+    x, rate = np.round(rng.standard_normal(1000)), 30.0 * rng.standard_normal(1000)  # zeros among them
+    a, b, u, v = x[:-1], x[1:], 0.1 * rate[:-1], 0.1 * rate[1:]
+    part = np.linspace(0.0, 1.0, 2001)[:-1, None]
+    cubics = a + part * (u + part * (3 * (b - a) - 2 * u - v + part * (2 * (a - b) + u + v)))
+    peak = (a <= 0) & (b <= 0) & (u > 0) & (v < 0) & (cubics.max(axis=0) > 0)
+    trough = (a > 0) & (b > 0) & (u < 0) & (v > 0) & (cubics.min(axis=0) < 0)
+    true = np.count_nonzero(peak | trough | ((a <= 0) & (b > 0)))
+    assert abs(up_crossings(x, rate, 0.1) - true) <= 2  # peaks lower than the fine grid shows
+
+
 def test_estimates_say_when_they_know_nothing():
     assert math.isnan(Estimate.of_mean([1.0]).standard_error)
     assert Estimate.of_mean([1.0]).relative == math.inf

@@ -153,11 +153,11 @@ def up_crossings(x: Vector, rate: Vector | None, dt: float) -> int:
 
     A pair of crossings between two samples on one side shows when the cubic's extremum lies on the other.
     """
-    below = x <= 0.0
-    count = int(np.count_nonzero(below[:-1] & (x[1:] > 0.0)))
+    below, above = x <= 0.0, x > 0.0
+    count = int(np.count_nonzero(below[:-1] & above[1:]))
     if rate is None:
         return count
-    rising, falling, above = rate > 0.0, rate < 0.0, x >= 0.0
+    rising, falling = rate > 0.0, rate < 0.0
     peaks = np.flatnonzero(below[:-1] & below[1:] & rising[:-1] & falling[1:])
     troughs = np.flatnonzero(above[:-1] & above[1:] & falling[:-1] & rising[1:])
     ends = [(x[at], x[at + 1], rate[at] * dt, rate[at + 1] * dt) for at in (peaks, troughs)]

@@ -37,14 +37,21 @@ def paper_model():
     return scene.reduce(modes=2)
 
 
+def timed(work):
+    """Seconds of processor and of wall time that a piece of work takes its worker."""
+    begin = time.thread_time(), time.perf_counter()
+    work()
+    return {"processor": time.thread_time() - begin[0], "wall": time.perf_counter() - begin[1]}
+
+
 def contacts_of(model, seconds):
-    """A quantity of the contact log alone: the cheapest run."""
-    return float(model.simulate(seconds, solver=METHOD).contacts.peak_force.mean())
+    """A quantity of the contact log alone, the cheapest run, and what it takes."""
+    return timed(lambda: model.simulate(seconds, solver=METHOD).contacts.peak_force.mean())
 
 
-def spin(count):
-    """Work that needs nothing but a processor: what two processes can gain here and now."""
-    return sum(i & 3 for i in range(count))
+def spin(model):
+    """Work that needs nothing but a processor, and what it takes: what two processes can gain here and now."""
+    return timed(lambda: sum(i & 3 for i in range(2_000_000)))
 
 
 def best(call, repeats=5):
@@ -102,26 +109,45 @@ def single():
 
 
 def scaling(rounds):
-    """Two workers against one of the same kind, interleaved; and two processes that only count."""
-    model, quantity = paper_model(), partial(contacts_of, seconds=200.0)
+    """Two workers against one, all cases round by round, and where what is lost of twice the speed goes.
+
+        times one = 2 * (processor time alone / beside another) * (share of a core) * (time at work),    two over one
+
+    Only the last is the library's, the second where other work fills the cores too: of threads with two, the wait
+    for the GIL is in it.
+    """
+    model = paper_model()
+    contacts = partial(contacts_of, seconds=200.0)
     cases = {
-        "two counting processes": (ProcessPoolExecutor, lambda pool: list(pool.map(spin, [2_000_000] * 16))),
-        "two processes": (ProcessPoolExecutor, partial(ensemble, model, 16, quantity)),
-        "two threads": (ThreadPoolExecutor, partial(ensemble, model, 16, quantity)),
+        "two counting processes": (ProcessPoolExecutor, spin),
+        "two processes": (ProcessPoolExecutor, contacts),
+        "two threads": (ThreadPoolExecutor, contacts),
     }
-    for name, (kind, call) in cases.items():
-        with kind(1) as one, kind(2) as two:
-            times = {pool: [] for pool in (one, two)}
-            for _ in range(rounds + 1):  # the first starts workers and loads kernels
-                for pool in (one, two):
-                    begin = time.perf_counter()
-                    call(pool)
-                    times[pool].append(time.perf_counter() - begin)
-        ratios = sorted(a / b for a, b in zip(times[one][1:], times[two][1:], strict=True))
+    rows = {name: [] for name in cases}
+    for turn in range(rounds + 1):  # the first loads kernels
+        for name, (kind, quantity) in cases.items():
+            pair = [_round(kind(workers), workers, model, quantity) for workers in (1, 2)]
+            if turn:
+                rows[name].append(pair)
+    for name, pairs in rows.items():
+        one, two = np.median(pairs, axis=0)
+        ratio = np.array([first[0] / second[0] for first, second in pairs])
         print(
-            f"{name}: {ratios[len(ratios) // 2]:.2f} times one (median of {rounds}, best {ratios[-1]:.2f}), "
-            f"shortest over shortest {min(times[one][1:]) / min(times[two][1:]):.2f}, load {os.getloadavg()[0]:.1f}"
+            f"{name}: {np.median(ratio):.2f} times one (median of {rounds}, best {ratio.max():.2f}); a realisation "
+            f"{1e3 * one[1]:.0f} ms of processor alone, {1e3 * two[1]:.0f} beside another; share of a core "
+            f"{one[2]:.0%}, {two[2]:.0%}; at work {one[3]:.1%}, {two[3]:.1%}; load {os.getloadavg()[0]:.1f}"
         )
+
+
+def _round(pool, workers, model, quantity, count=16):
+    """Wall time; per realisation, processor time, its share of the wall time; time at work of the workers."""
+    with pool:
+        ensemble(model, 2 * workers, quantity, pool)  # starts workers
+        begin = time.perf_counter()
+        spent = ensemble(model, count, quantity, pool).values
+        wall = time.perf_counter() - begin
+    processor, work = spent["processor"].sum(), spent["wall"].sum()
+    return wall, processor / count, processor / work, work / (workers * wall)
 
 
 def memory(seconds):
