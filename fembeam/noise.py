@@ -303,7 +303,8 @@ class BandNoise:
         """
         self._check_lasts(number("duration (s)", duration, least=0.0))
         dt, values = self._lines.nodes(duration, rtol)
-        values[:, 0] += self.offset
+        if self.offset:
+            values[:, 0] += self.offset
         return dt, values
 
     def derivative(self, order: int) -> BandNoise:
