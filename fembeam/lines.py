@@ -137,16 +137,12 @@ class LineSpectrum:
         Lines are raised beforehand by what the interpolant takes off them, (ω_k h)^6/100800: what is left of the error
         lies beyond the grid's own frequency, where no structure follows.
         """
-        from scipy.fft import irfft, next_fast_len
+        from scipy.fft import irfft
 
-        _keep_freed_memory()
         if not FINEST_RTOL <= rtol < 1:
             raise ValueError(f"rtol must lie in [{FINEST_RTOL:g}, 1), got {rtol!r}")
-        sixth = self.derivative(6).rms
-        widest = (HERMITE_RMS * rtol * self.rms / sixth) ** (1 / 6) if sixth > 0 else self.period
-        fewest, needed = 2 * self.top + 1, self.period / widest
-        combs = max(1, int(needed / fewest))
-        n = next_fast_len(max(math.ceil(needed / combs), fewest), real=True)
+        _keep_freed_memory()
+        combs, n = self._combs(rtol)
         dt = self.period / (combs * n)
         count = math.ceil(duration / dt) + 1
         wanted = math.ceil(count / combs)
@@ -164,6 +160,16 @@ class LineSpectrum:
         nodes = values.reshape(-1, 3)[:count]
         nodes[combs * n :] = nodes[: max(0, count - combs * n)]  # the last node may close the period
         return dt, nodes
+
+    def _combs(self, rtol: float) -> tuple[int, int]:
+        """How many combs of how many nodes the period takes: each holds the highest line, together they keep rtol."""
+        from scipy.fft import next_fast_len
+
+        sixth = self.derivative(6).rms
+        widest = (HERMITE_RMS * rtol * self.rms / sixth) ** (1 / 6) if sixth > 0 else self.period
+        fewest, needed = 2 * self.top + 1, self.period / widest
+        combs = max(1, int(needed / fewest))
+        return combs, next_fast_len(max(math.ceil(needed / combs), fewest), real=True)
 
 
 def _interleave(rows: NDArray[np.float64], columns: NDArray[np.float64]) -> None:
