@@ -172,6 +172,10 @@ class System:
         known: dict[str, Any] = self.kept.setdefault("structure", {})
         return known
 
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy or another process gets: all but what methods have prepared, which holds addresses of memory."""
+        return {**self.__dict__, "kept": {}}
+
     @property
     def about_laws(self) -> dict[str, Any]:
         """What was found of the laws so far; systems made by `like` share it as long as they have the same laws."""

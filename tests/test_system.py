@@ -1,6 +1,8 @@
 """The hand-over: matrices, contacts and loads are checked, copied, and decoupled without loss."""
 
+import copy
 import math
+import pickle
 
 import numpy as np
 import pytest
@@ -254,3 +256,12 @@ def test_contacts_compare_without_a_fault():
     assert one == one
     assert one in {one}
     assert one != Contact([0.0, 1.0], LAW)
+
+
+def test_copies_of_a_used_system_know_no_address_of_it():
+    system = System.modal([50.0], [0.01], [Contact([1.0], LAW)])
+    here = solvers.integrate(system, [0.0], [-1.0], 0.1)
+    assert system.kept
+    for other in (copy.copy(system), copy.deepcopy(system), pickle.loads(pickle.dumps(system))):
+        assert not other.kept
+        np.testing.assert_array_equal(solvers.integrate(other, [0.0], [-1.0], 0.1).q, here.q)
