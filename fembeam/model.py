@@ -229,10 +229,6 @@ class Model:
         other.__dict__.update(kept, system=self.system_like(scene))
         return other
 
-    def __getstate__(self) -> dict[str, Any]:
-        """The fields without the system: it holds addresses of this process, and is soon made again."""
-        return {name: value for name, value in self.__dict__.items() if name != "system"}
-
     def rest(self) -> Vector:
         """The start [q, q_dot] (2n,) of everything undeflected and at rest but the impactors, at their velocity."""
         from fembeam import start
