@@ -89,10 +89,10 @@ def at_address(address, n, delta, delta_dot, entry_rate, parameters, results):
 
 
 def columns(rows, stride, first, weights, total, start, result):
-    """The weighted sum of eight columns."""
+    """The weighted sum of eight columns; tables and results of more dimensions are rows of numbers here."""
     here = slice(first, first + 8)
     sums = weights[:total] @ rows.reshape(-1, stride)[:total, here]
-    result[here] = sums + (0.0 if start is None else start[here])
+    result.reshape(-1)[here] = sums + (0.0 if start is None else start.reshape(-1)[here])
 
 
 handle.opener = opener
