@@ -168,7 +168,7 @@ def in_pieces():
 
 def stopped():
     """Runs that cannot go on, and those whose step is too long."""
-    many = PiecewiseLinear([1.0] * 121, [1e-22 * i for i in range(1, 121)])
+    many = PiecewiseLinear([1.0] * 121, [1e-23 * i for i in range(1, 121)])
     for method in (MAIN, REFERENCE, *STEPPING):
         for one_law in (many, brittle(stiffness=1e2, depth=1.1e-3)):
             tried(System.modal([40.0], 0.0, [Contact([1.0], one_law)]), 0.05, method=method, check=False)
