@@ -19,6 +19,7 @@ from solvers import (
     GeneralizedAlpha,
     HenonRK2,
     Newmark,
+    Status,
     System,
     integrate,
 )
@@ -321,3 +322,40 @@ def test_steps_must_be_positive(method, bad):
 def test_parameters_out_of_range_are_refused(make, message):
     with pytest.raises(ValueError, match=message):
         make()
+
+
+# --- where a step does not find its event ----------------------------------------------------------------------------
+
+
+def test_the_papers_scheme_walks_in_where_its_landing_divides_by_zero():
+    # at rest a nanometre off the stop, pressed towards it: indentation cannot be the variable
+    system = System.modal([40.0], 0.02, [Contact([1.0], Hertz(1e6), gap=1e-9)], [([-1.0], fb.Harmonic(1.0, 0.0))])
+    run, exact = (integrate(system, [0.0], [0.0], 0.02, method=m) for m in (HenonRK2(1e-4, 1e-5), Exponential(1e-10)))
+    assert run.cost.rejections == 1
+    assert run.cost.steps > 200  # the small step throughout
+    np.testing.assert_allclose(run.contacts.peak_force, exact.contacts.peak_force, rtol=1e-4)
+    np.testing.assert_allclose(run.q, exact.q, rtol=1e-3)
+
+
+@pytest.mark.parametrize("depth", [1e-6, 1e-9, 1e-12, -1e-9])
+def test_matrices_see_the_grazes_that_modes_see(depth):
+    # a swing of 0.01 m that passes its stop by a share of that
+    model = System.modal([10.0], 0.0, [Contact([1.0], PiecewiseLinear([1e6]), gap=0.01 * (1.0 - depth))])
+    modes, matrices = (integrate(one, [0.0], [-0.1], 0.3, method=RK4(1e-4)) for one in (model, as_sparse(model)))
+    assert len(modes.contacts) == len(matrices.contacts) == (depth > 0.0)
+    assert matrices.cost.rejections == modes.cost.rejections == (0 < depth < 1e-11)
+    np.testing.assert_allclose(
+        matrices.contacts.peak_indentation, modes.contacts.peak_indentation, rtol=1e-6, atol=1e-16
+    )
+    np.testing.assert_allclose(matrices.q, modes.q, rtol=1e-10)
+
+
+@pytest.mark.parametrize("method", [Exponential(1e-8), DormandPrince(1e-8), RK4(1e-4)], ids=lambda m: type(m).__name__)
+def test_more_switches_at_one_instant_than_a_law_can_mean_stop_the_run(method):
+    crowded = PiecewiseLinear([1.0] * 121, [1e-23 * i for i in range(1, 121)])
+    run = integrate(
+        System.modal([40.0], 0.0, [Contact([1.0], crowded)]), [0.0], [-0.1], 0.05, method=method, check=False
+    )
+    assert run.status is Status.CHATTER
+    assert run.t[-1] == 0.0
+    assert run.cost.events > 100

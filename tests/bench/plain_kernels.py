@@ -1,0 +1,121 @@
+"""Kernels run as plain Python: import this before the packages, with NUMBA_DISABLE_JIT=1.
+
+Compiled code reaches laws and arrays by their addresses; here both are found again in a table and in memory.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import sys
+from itertools import count
+from pathlib import Path
+from types import SimpleNamespace
+
+import numba
+import numba.np.unsafe.ndarray as ndarray
+import numpy as np
+
+if not numba.config.DISABLE_JIT:
+    sys.exit("set NUMBA_DISABLE_JIT=1")
+HOME = Path(__file__).resolve().parent.parent.parent
+sys.path.insert(0, str(HOME))
+KNOWN, NUMBERS = {}, count(1)
+ROOM = 4096  # numbers behind a pointer that may be looked at
+
+
+def cfunc(*_, **__):
+    """A Python function with an address of its own."""
+
+    def made(function):
+        address = next(NUMBERS)
+        KNOWN[address] = function
+
+        def called(n, *arguments):
+            return function(n, *(a if isinstance(a, float) else np.ctypeslib.as_array(a, (ROOM,)) for a in arguments))
+
+        return SimpleNamespace(address=address, ctypes=called)
+
+    return made
+
+
+numba.cfunc = cfunc
+numba.carray = lambda array, shape: array[: shape[0]]
+ndarray.to_fixed_tuple = lambda array, n: tuple(array[:n])
+
+import contacts.kernels as laws  # noqa: E402
+import solvers.handle as handle  # noqa: E402
+import solvers.kernels as ground  # noqa: E402
+
+
+def opener(kind):
+    """The named tuple at an address."""
+
+    def opened(address):
+        values, place = [], address
+        for expected in kind.types:
+            if not hasattr(expected, "ndim"):
+                values.append(ctypes.c_double.from_address(place).value)
+                place += 8
+                continue
+            words = (ctypes.c_int64 * (5 + expected.ndim)).from_address(place)
+            kind_of_number, shape = np.dtype(str(expected.dtype)), tuple(words[5:])
+            if words[2]:
+                block = (ctypes.c_char * (words[2] * kind_of_number.itemsize)).from_address(words[4])
+                values.append(np.frombuffer(block, dtype=kind_of_number).reshape(shape))
+            else:
+                values.append(np.zeros(shape, dtype=kind_of_number))
+            place += 8 * (5 + 2 * expected.ndim)
+        return kind.instance_class._make(values)
+
+    return opened
+
+
+def force_at(address, point, delta, delta_dot, entry_rate, parameters, offset):
+    """A law for one of its points."""
+    out = np.zeros(1)
+    KNOWN[address](1, delta[point : point + 1], delta_dot[point : point + 1], entry_rate, parameters[offset:], out)
+    return tuple(out)
+
+
+def gradient_at(address, point, delta, delta_dot, entry_rate, parameters, offset):
+    """Its derivatives."""
+    out = np.zeros((3, 1))
+    KNOWN[address](1, delta[point : point + 1], delta_dot[point : point + 1], entry_rate, parameters[offset:], *out)
+    return tuple(out[:, 0])
+
+
+def at_address(address, n, delta, delta_dot, entry_rate, parameters, results):
+    """A law for all its points."""
+    KNOWN[int(address)](n, delta, delta_dot, entry_rate, parameters, *results)
+
+
+def remembered(function):
+    """Responses of blocks met before, in this system or another: nearly all the time goes there."""
+    known = {}
+
+    def respond(k, c, h, rate, power, exponent, nodes, weights, gauss, out, basis):
+        key = k, c, h, power, exponent  # the nodes follow from the last two
+        if key not in known:
+            function(k, c, h, rate, power, exponent, nodes, weights, gauss, out, basis)
+            known[key] = out.copy()
+        out[:] = known[key]
+
+    return respond
+
+
+def columns(rows, stride, first, weights, total, start, result):
+    """The weighted sum of eight columns; tables and results of more dimensions are rows of numbers here."""
+    here = slice(first, first + 8)
+    sums = weights[:total] @ rows.reshape(-1, stride)[:total, here]
+    result.reshape(-1)[here] = sums + (0.0 if start is None else start.reshape(-1)[here])
+
+
+handle.opener = opener
+laws._force_at, laws._gradient_at = force_at, gradient_at
+ground._call_force = ground._call_gradient = at_address
+
+import solvers.tables as tables  # noqa: E402
+import solvers.vector as vector  # noqa: E402
+
+tables._block_response = remembered(tables._block_response)
+vector._columns = columns
