@@ -10,6 +10,7 @@ import numpy as np
 
 from solvers.birth import birth
 from solvers.later import is_cut, with_quiet_begin
+from solvers.merging import across
 from solvers.periodic import Orbit, OrbitError
 from solvers.point import Point, corrected, cubic, is_straight, moved
 from solvers.special import between
@@ -22,6 +23,7 @@ _MANY = 6  # Newton iterations that ask for shorter steps
 _SHARPEST = 0.8  # cosine of the largest turn between two orbits
 _KINK = 3e-6  # arclength step below which a turn counts as a kink of the branch
 _NEAR_KINK = 1e-4  # arclength step below which a fold may hide behind a kink
+_BEHIND = 0.02  # first step behind a jump, in units of the largest
 _FARTHEST = 20.0  # distance of an orbit from the one before, in steps, beyond which it belongs to another branch
 
 
@@ -60,8 +62,7 @@ class Arm:
         following = None
         while following is None:
             if self.step < _SMALLEST:
-                self.status = BranchStatus.LOST
-                return
+                return self._go_across()
             following = self._next()
         a = self.point
         way = float(a.tangent @ a.metric @ (following.unknowns - a.unknowns))
@@ -80,6 +81,17 @@ class Arm:
         self.before = None if way <= 0.0 or "grazing" in marks else (a, way)  # no cubic across a kink
         if self.status is BranchStatus.RUNNING:
             self._finish_or_go_on(following)
+
+    def _go_across(self) -> None:
+        """Go on behind a jump of the return map where two contacts merge; without one the branch is lost."""
+        found = across(self.point)
+        if found is None:
+            self.status = BranchStatus.LOST
+            return
+        end, begin = found
+        self.orbits += [end, begin.orbit]
+        self.point, self.before, self.step = begin, None, _BEHIND * self.largest
+        self.passed.append(begin)
 
     def _next(self) -> Point | None:
         """The point a step ahead, the one at the end of the span if that is nearer, or None after a shorter step."""
