@@ -9,12 +9,13 @@ from enum import Enum
 import numpy as np
 
 from solvers.birth import birth
+from solvers.kinks import ERRORS, Kink, before, behind, kinks_near, marked, met
 from solvers.later import is_cut, with_quiet_begin
-from solvers.merging import across
 from solvers.periodic import Orbit, OrbitError
 from solvers.point import Point, corrected, cubic, is_straight, moved
 from solvers.special import between
 from solvers.system import Array
+from solvers.touch import Touch, signature, unknowns_at
 
 MOST_ORBITS = 2000
 _SMALLEST = 3e-7  # arclength step at which a branch counts as lost
@@ -23,7 +24,10 @@ _MANY = 6  # Newton iterations that ask for shorter steps
 _SHARPEST = 0.8  # cosine of the largest turn between two orbits
 _KINK = 3e-6  # arclength step below which a turn counts as a kink of the branch
 _NEAR_KINK = 1e-4  # arclength step below which a fold may hide behind a kink
-_BEHIND = 0.02  # first step behind a jump, in units of the largest
+_NEAR = 1e-4  # arclength from where a branch is lost within which a kink may be why
+_AGAIN = 0.03  # part of a step after whose failure kinks are looked for again
+_MOST_KINKS = 3  # tried at a time
+_BEHIND = 0.003  # first step behind a kink, in units of the largest
 _FARTHEST = 20.0  # distance of an orbit from the one before, in steps, beyond which it belongs to another branch
 
 
@@ -50,6 +54,7 @@ class Arm:
     status: BranchStatus = BranchStatus.RUNNING
     step: float = 0.0
     before: tuple[Point, float] | None = None  # the point before and the way from it
+    tried: float = math.inf  # step after whose failure kinks were looked for
     passed: list[Point] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -59,39 +64,72 @@ class Arm:
 
     def extend(self) -> None:
         """Find the next orbit and the special points before it, or an end of the branch."""
-        following = None
+        following, self.tried = None, math.inf
         while following is None:
-            if self.step < _SMALLEST:
-                return self._go_across()
-            following = self._next()
+            h = self.step
+            following = self._next() if h >= _SMALLEST else None
+            if following is None and (self.step < _SMALLEST or h < _AGAIN * self.tried):
+                kink, self.tried = self._kink_ahead(h), h
+                if kink is not None and (kink[-1] is None or self._taken(kink[-1])):
+                    return self._cross(*kink)
+                if self.step < _SMALLEST and self.status is BranchStatus.RUNNING:
+                    self.status = BranchStatus.LOST
+                if kink is not None or self.status is not BranchStatus.RUNNING:
+                    return None
+        if self._taken(following) and self.status is BranchStatus.RUNNING:
+            self._finish_or_go_on(following)
+        return None
+
+    def _taken(self, following: Point) -> bool:
+        """Whether the next orbit is good; then it and the special points before it are kept, or a birth among them."""
         a = self.point
         way = float(a.tangent @ a.metric @ (following.unknowns - a.unknowns))
         special = between(a, following, way) if way > 0.0 else []  # less only where it turned at a kink
         marks = [orbit.mark for orbit in special]
         if way > _KINK and _jumped(a, following, marks):
             self.status, self.step = BranchStatus.RUNNING, 0.2 * way
-            return
+            return False
         for place, fold in enumerate(special):
             born = birth(a, following, fold) if fold.mark == "fold" else None
             if born is not None:
                 self.status = BranchStatus.BORN
                 self.orbits += [*special[:place], born]
-                return
+                return False
         self.orbits += [*special, following.orbit]
         self.before = None if way <= 0.0 or "grazing" in marks else (a, way)  # no cubic across a kink
-        if self.status is BranchStatus.RUNNING:
-            self._finish_or_go_on(following)
+        return True
 
-    def _go_across(self) -> None:
-        """Go on behind a jump of the return map where two contacts merge; without one the branch is lost."""
-        found = across(self.point)
-        if found is None:
+    def _kink_ahead(self, reach: float) -> tuple[Kink, Touch, Point | None] | None:
+        """A kink within reach, its exact place and the last point before it, None if that is where the arm is."""
+        a, reach = self.point, max(1.5 * reach, _NEAR if self.step < _SMALLEST else 0.0)
+        for kink in kinks_near(a.orbit)[:_MOST_KINKS]:
+            try:
+                touch = met(a, kink)
+                off = unknowns_at(a, touch) - a.unknowns
+                way, whole = float(a.tangent @ a.metric @ off), math.sqrt(off @ a.metric @ off)
+                if not -_KINK < way < reach or whole > 2.0 * abs(way) + _KINK:
+                    continue
+                last = before(a, kink, touch)
+            except ERRORS:
+                continue
+            if a.tangent @ a.metric @ last.tangent > 0.0:
+                return kink, touch, last if way > _SMALLEST else None
+        return None
+
+    def _cross(self, kink: Kink, touch: Touch, last: Point | None) -> None:
+        """Go on behind a kink."""
+        self.point = a = last or self.point
+        try:
+            point = behind(a, kink, touch)
+            found = marked(a, point, kink, touch)
+        except ERRORS:
             self.status = BranchStatus.LOST
             return
-        end, begin = found
-        self.orbits += [end, begin.orbit]
-        self.point, self.before, self.step = begin, None, _BEHIND * self.largest
-        self.passed.append(begin)
+        self.orbits[len(self.orbits) - (last is not None) :] = found
+        self.passed += [a, point]
+        self.point, self.before, self.step = with_quiet_begin(point), None, _BEHIND * self.largest
+        if len(self.orbits) >= MOST_ORBITS:
+            self.status = BranchStatus.LIMIT
 
     def _next(self) -> Point | None:
         """The point a step ahead, the one at the end of the span if that is nearer, or None after a shorter step."""
@@ -107,7 +145,8 @@ class Arm:
         way, aligned = float(a.tangent @ a.metric @ off), float(a.tangent @ a.metric @ b.tangent)
         strayed = math.sqrt(max(float(off @ a.metric @ off) - way**2, 0.0))
         sharp = aligned < _SHARPEST or strayed > 0.5 * way
-        if (sharp and h > _KINK) or strayed > _FARTHEST * h or is_cut(b):  # a branch has kinks where contacts graze
+        back = way <= 0.0
+        if back or (sharp and h > _KINK) or strayed > _FARTHEST * h or is_cut(b):  # a branch has kinks where contacts graze
             self.step *= 0.2 if len(a.orbit.contacts) != len(b.orbit.contacts) else 0.5
             return None
         if b.chain.parameter in self.span:
