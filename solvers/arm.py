@@ -18,11 +18,11 @@ from solvers.system import Array
 from solvers.touch import Touch, signature, unknowns_at
 
 MOST_ORBITS = 2000
-_SMALLEST = 3e-7  # arclength step at which a branch counts as lost
+_SMALLEST = 1e-8  # arclength step at which a branch counts as lost
 _GOOD = 0.06, 0.1  # distance of a good guess from the branch, in units of the step: on a cubic, on the tangent
 _MANY = 6  # Newton iterations that ask for shorter steps
 _SHARPEST = 0.8  # cosine of the largest turn between two orbits
-_KINK = 3e-6  # arclength step below which a turn counts as a kink of the branch
+_THERE = 3e-6  # arclength within which a kink may lie behind
 _NEAR_KINK = 1e-4  # arclength step below which a fold may hide behind a kink
 _NEAR = 1e-4  # arclength from where a branch is lost within which a kink may be why
 _AGAIN = 0.03  # part of a step after whose failure kinks are looked for again
@@ -84,9 +84,9 @@ class Arm:
         """Whether the next orbit is good; then it and the special points before it are kept, or a birth among them."""
         a = self.point
         way = float(a.tangent @ a.metric @ (following.unknowns - a.unknowns))
-        special = between(a, following, way) if way > 0.0 else []  # less only where it turned at a kink
+        special = between(a, following, way)
         marks = [orbit.mark for orbit in special]
-        if way > _KINK and _jumped(a, following, marks):
+        if _jumped(a, following, marks):
             self.status, self.step = BranchStatus.RUNNING, 0.2 * way
             return False
         for place, fold in enumerate(special):
@@ -96,7 +96,7 @@ class Arm:
                 self.orbits += [*special[:place], born]
                 return False
         self.orbits += [*special, following.orbit]
-        self.before = None if way <= 0.0 or "grazing" in marks else (a, way)  # no cubic across a kink
+        self.before = None if "grazing" in marks else (a, way)  # no cubic across a kink
         return True
 
     def _kink_ahead(self, reach: float) -> tuple[Kink, Touch, Point | None] | None:
@@ -107,7 +107,7 @@ class Arm:
                 touch = met(a, kink)
                 off = unknowns_at(a, touch) - a.unknowns
                 way, whole = float(a.tangent @ a.metric @ off), math.sqrt(off @ a.metric @ off)
-                if not -_KINK < way < reach or whole > 2.0 * abs(way) + _KINK:
+                if not -_THERE < way < reach or whole > 2.0 * abs(way) + _THERE:
                     continue
                 last = before(a, kink, touch)
             except ERRORS:
@@ -145,8 +145,7 @@ class Arm:
         way, aligned = float(a.tangent @ a.metric @ off), float(a.tangent @ a.metric @ b.tangent)
         strayed = math.sqrt(max(float(off @ a.metric @ off) - way**2, 0.0))
         sharp = aligned < _SHARPEST or strayed > 0.5 * way
-        back = way <= 0.0
-        if back or (sharp and h > _KINK) or strayed > _FARTHEST * h or is_cut(b):  # a branch has kinks where contacts graze
+        if sharp or is_cut(b):
             self.step *= 0.2 if len(a.orbit.contacts) != len(b.orbit.contacts) else 0.5
             return None
         if b.chain.parameter in self.span:
@@ -155,8 +154,7 @@ class Arm:
         good = _GOOD[self.before is None] * h / max(math.sqrt(miss @ a.metric @ miss), 1e-9 * h)
         longer = min(good if self.before is None else good ** (1.0 / 3.0), 3.0)
         largest = self.largest * max(1.0, b.size)
-        shortest = 0.5 if h > _KINK else 1.0
-        self.step = min(h * (max(longer, shortest) if b.orbit.iterations < _MANY else shortest), largest)
+        self.step = min(h * (max(longer, 0.5) if b.orbit.iterations < _MANY else 0.5), largest)
         return b
 
     def _ahead(self) -> Array:
