@@ -25,6 +25,7 @@ _SHARPEST = 0.8  # cosine of the largest turn between two orbits
 _THERE = 3e-6  # arclength within which a kink may lie behind
 _NEAR_KINK = 1e-4  # arclength step below which a fold may hide behind a kink
 _NEAR = 1e-4  # arclength from where a branch is lost within which a kink may be why
+_AROUND = 3.0  # arclength, in units of a failed step, within which a kink is looked for
 _AGAIN = 0.03  # part of a step after whose failure kinks are looked for again
 _MOST_KINKS = 3  # tried at a time
 _BEHIND = 0.003  # first step behind a kink, in units of the largest
@@ -104,7 +105,7 @@ class Arm:
         a, reach = self.point, max(1.5 * reach, _NEAR if self.step < _SMALLEST else 0.0)
         for kink in kinks_near(a.orbit)[:_MOST_KINKS]:
             try:
-                touch = met(a, kink)
+                touch = met(a, kink, _AROUND * reach)
                 off = unknowns_at(a, touch) - a.unknowns
                 way, whole = float(a.tangent @ a.metric @ off), math.sqrt(off @ a.metric @ off)
                 if not -_THERE < way < reach or whole > 2.0 * abs(way) + _THERE:

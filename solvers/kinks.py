@@ -100,14 +100,15 @@ def _after(log: ContactLog, mine: Array, i: int, period: float) -> list[float]:
     return [float(0.5 * (log.t_out[mine[i]] + begins[i + 1]))] if slower else []
 
 
-def met(point: Point, kink: Kink) -> Touch:
-    """The kink near a point, exactly; raises one of ERRORS."""
+def met(point: Point, kink: Kink, within: float) -> Touch:
+    """The kink within an arclength of a point, exactly; raises one of ERRORS."""
     orbit = point.orbit
     log, floor = orbit.contacts, orbit.system.contacts[kink.stop].law.entry_rate_floor
     if kink.kind != "merging" or kink.sign > 0:
-        return first_touch(point, kink.stop, kink.times, floor if kink.kind == "floor" else 0.0, floor)
+        return first_touch(point, kink.stop, kink.times, floor if kink.kind == "floor" else 0.0, floor, within)
     entered = (log.stop == kink.stop) & (log.t_in < kink.times[0]) & (log.t_out > kink.times[0])
-    return led(point, first_touch(point, kink.stop, kink.times, 0.0, float(log.speed_in[entered][0])), None)
+    touch = first_touch(point, kink.stop, kink.times, 0.0, float(log.speed_in[entered][0]), within)
+    return led(point, touch, None)
 
 
 def before(point: Point, kink: Kink, touch: Touch) -> Point:

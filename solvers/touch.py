@@ -86,23 +86,31 @@ class Touch:
         return log.speed_in[mine], log.peak_indentation[mine]
 
 
-def first_touch(point: Point, stop: int, times: Sequence[float], speed: float, floor: float) -> Touch:
+def first_touch(
+    point: Point, stop: int, times: Sequence[float], speed: float, floor: float, within: float
+) -> Touch:
     """The touch near a point, whose orbit nearly meets the surface at the first of some times, counted from its phase.
 
-    Shots begin at the others too. Raises OrbitError.
+    Shots begin at the others too; ``within`` is an arclength. Raises OrbitError.
     """
     orbit = point.orbit
     later = delayed(orbit.system, orbit.phase)
     states = [orbit.state, *(flown(later, orbit.state, t, orbit.method) for t in times)]
     rest = tuple((orbit.phase + t) / orbit.period for t in (0.0, *times))
     guess = np.concatenate((*states, [point.chain.parameter, rest[1]]))
-    return solved(point, stop, rest, guess, speed, floor)
+    return solved(point, stop, rest, guess, speed, floor, within)
 
 
 def solved(
-    point: Point, stop: int, fractions: tuple[float, ...], unknowns: Array, speed: float, floor: float
+    point: Point,
+    stop: int,
+    fractions: tuple[float, ...],
+    unknowns: Array,
+    speed: float,
+    floor: float,
+    within: float = math.inf,
 ) -> Touch:
-    """The touch near a guess, by Newton's method; raises OrbitError."""
+    """The touch near a guess, by Newton's method, no step of which is longer than ``within``; raises OrbitError."""
     problem, size = point.problem, len(point.orbit.state)
     for _ in range(_MOST):
         fractions = (fractions[0], float(unknowns[-1]), *fractions[2:])
@@ -112,8 +120,10 @@ def solved(
         chain = _Meeting(problem.make, problem.method, fractions, problem.step, stop, floor).evaluate(x, parameter)
         system, period = problem.make(parameter)
         step = np.linalg.solve(*_linear(chain, system.contacts[stop], period, speed))
-        unknowns = unknowns + step
-        if length(point, step) < _CLOSE:
+        unknowns, way = unknowns + step, length(point, step)
+        if not way < within:
+            break
+        if way < _CLOSE:
             return Touch(stop, speed, floor, (fractions[0], float(unknowns[-1]), *fractions[2:]), unknowns, chain)
     raise OrbitError(f"no orbit that meets stop {stop} at {speed:g} m/s was found in {_MOST} iterations")
 
