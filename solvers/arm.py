@@ -238,8 +238,20 @@ class Arm:
 
 def _jumped(a: Point, b: Point, marks: list[str]) -> bool:
     """Whether b lies on another branch: between them the parameter turns without a fold, or contacts come unseen."""
-    turned, changed = a.share * b.share < 0.0, len(a.orbit.contacts) != len(b.orbit.contacts)
-    return "grazing" not in marks and (changed or (turned and "fold" not in marks))
+    turned = a.share * b.share < 0.0 and "fold" not in marks
+    return "grazing" not in marks and (turned or not _same_contacts(a.orbit, b.orbit))
+
+
+def _same_contacts(a: Orbit, b: Orbit) -> bool:
+    """Whether each contact of an orbit has one of another near it: none nearer to the next."""
+    if len(a.contacts) != len(b.contacts):
+        return False
+    for stop in np.unique(a.contacts.stop):
+        first, second = (np.sort(o.contacts.t_in[o.contacts.stop == stop]) / o.period for o in (a, b))
+        spacing = np.diff(first, append=first[0] + 1.0)
+        if len(first) != len(second) or np.any(np.abs(first - second) > 0.5 * np.minimum(spacing, np.roll(spacing, 1))):
+            return False
+    return True
 
 
 def _is_passed(known: Point, a: Point, b: Point) -> bool:

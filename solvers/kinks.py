@@ -119,10 +119,11 @@ def before(point: Point, kink: Kink, touch: Touch) -> Point:
 
 def behind(point: Point, kink: Kink, touch: Touch) -> Point:
     """The first point of the branch on the other side, its tangent on the way; raises one of ERRORS."""
-    if kink.kind == "merging":
-        floor = point.orbit.system.contacts[kink.stop].law.entry_rate_floor
-        touch = led(point, touch, None if kink.sign > 0 else floor)
     contacts, floored = signature(point.orbit)
+    if kink.kind == "merging":  # other contacts too change by the jump, and may pass the floor
+        floor = point.orbit.system.contacts[kink.stop].law.entry_rate_floor
+        far = led(point, touch, None if kink.sign > 0 else floor)
+        return beside(point, far, kink.sign, (contacts + kink.change[0], None))
     return beside(point, touch, kink.sign, (contacts + kink.change[0], floored + kink.change[1]))
 
 

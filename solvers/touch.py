@@ -167,10 +167,10 @@ def signature(orbit: Orbit) -> tuple[int, int]:
     return len(log), int(np.sum(log.floored[np.isin(log.stop, with_memory(orbit.system))]))
 
 
-def beside(point: Point, touch: Touch, sign: float, wanted: tuple[int, int]) -> Point:
+def beside(point: Point, touch: Touch, sign: float, wanted: tuple[int, int | None]) -> Point:
     """An orbit of a signature very near a touch, where the indentation at t*, or its rate at entry, is more or less.
 
-    Its tangent points away from the touch. Raises OrbitError.
+    Its tangent points away from the touch; None leaves a part of the signature open. Raises OrbitError.
     """
     problem, size = point.problem, len(point.orbit.state)
     by_state, by_parameter, aside = _indicator(point, touch)
@@ -187,7 +187,8 @@ def beside(point: Point, touch: Touch, sign: float, wanted: tuple[int, int]) -> 
             found = moved(launch, ends + s * tangent, abs(launch.share) > _STEEP)
         except OrbitError:
             continue
-        if signature(found.orbit) == wanted:
+        contacts, floored = signature(found.orbit)
+        if wanted in ((contacts, floored), (contacts, None)):
             return found
     raise OrbitError("no orbit was found beside the touch")
 
