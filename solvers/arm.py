@@ -15,7 +15,7 @@ from solvers.periodic import Orbit, OrbitError
 from solvers.point import Point, corrected, cubic, is_straight, moved
 from solvers.special import between
 from solvers.system import Array
-from solvers.touch import Touch, signature, unknowns_at
+from solvers.touch import Touch, unknowns_at
 
 MOST_ORBITS = 2000
 _SMALLEST = 1e-8  # arclength step at which a branch counts as lost
@@ -126,10 +126,13 @@ class Arm:
         except ERRORS:
             self.status = BranchStatus.LOST
             return
-        self.orbits[len(self.orbits) - (last is not None) :] = found
+        inside = self._inside(point.unknowns)  # a jump may lead out of the span
+        self.orbits[len(self.orbits) - (last is not None) :] = found if inside else found[:-1]
         self.passed += [a, point]
         self.point, self.before, self.step = with_quiet_begin(point), None, _BEHIND * self.largest
-        if len(self.orbits) >= MOST_ORBITS:
+        if not inside:
+            self.status = BranchStatus.END
+        elif len(self.orbits) >= MOST_ORBITS:
             self.status = BranchStatus.LIMIT
 
     def _next(self) -> Point | None:

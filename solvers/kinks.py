@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -23,7 +24,6 @@ from solvers.periodic import Orbit
 from solvers.point import Point
 from solvers.quiet import with_memory
 from solvers.result import ContactLog, SolverError
-from solvers.system import Array
 from solvers.touch import Touch, beside, first_touch, orbit_at, signature
 
 _SLOW = 4.0  # entry rate, in units of the floor, below which a contact may be about to pass it
@@ -84,16 +84,19 @@ def _touches(orbit: Orbit, stop: int) -> Iterator[tuple[float, Kink]]:
         yield -delta[k] / scale, Kink("grazing", stop, (float(times[k]),), 1, (1, int(memory)))
     for k in inner[(rising < 0.0) & (falling >= 0.0) & (delta[inner] > 0.0) & (delta[inner] < scale) & memory]:
         i = int(np.searchsorted(log.t_in[mine], times[k])) - 1
-        yield delta[k] / scale, Kink("merging", stop, (float(times[k]), *_after(log, mine, i, orbit.period)), -1, (1, 1))
+        yield (
+            delta[k] / scale,
+            Kink("merging", stop, (float(times[k]), *_after(log, mine, i, orbit.period)), -1, (1, 1)),
+        )
 
 
-def _in_order(log: ContactLog, stop: int) -> Array:
+def _in_order(log: ContactLog, stop: int) -> Any:
     """Indices of a stop's contacts in the order of time."""
     mine = np.flatnonzero(log.stop == stop)
     return mine[np.argsort(log.t_in[mine])]
 
 
-def _after(log: ContactLog, mine: Array, i: int, period: float) -> list[float]:
+def _after(log: ContactLog, mine: Any, i: int, period: float) -> list[float]:
     """The middle of the flight after a stop's i-th contact if slower ones follow, which another floor would reach."""
     begins = np.append(log.t_in[mine], period)
     slower = np.any(log.speed_in[mine[i + 1 :]] < log.speed_in[mine[max(i - 1, 0)]])
@@ -128,7 +131,7 @@ def behind(point: Point, kink: Kink, touch: Touch) -> Point:
 
 
 def marked(last: Point, first: Point, kink: Kink, touch: Touch) -> list[Orbit]:
-    """The orbits at a kink, with what is to be told of it; a corner at the floor where the parameter turns is a fold."""
+    """The orbits at a kink with what is to be told of it: a corner at the floor is a fold where the parameter turns."""
     if kink.kind == "grazing":
         return [orbit_at(last, touch, mark="grazing"), first.orbit]
     if kink.kind == "merging":

@@ -29,7 +29,7 @@ def led(point: Point, touch: Touch, floor: float | None) -> Touch:
     known, factor = [touch], _FACTORS[1]
     for _ in range(_MOST_STEPS):
         last = known[-1]
-        ratio = (floor or float(last.before[0][-1])) / last.floor
+        ratio = (floor or last.rate_before) / last.floor
         if abs(ratio - 1.0) < _SAME:
             return last
         following = last.floor * min(max(ratio, 1.0 / factor), factor)

@@ -9,7 +9,8 @@ A special point is a sign change of its test function along the arclength. With 
     grazing          number of contacts within the period changes
 
 All but the last are continuous along the branch, so that Brent's method finds their zeros in a few orbits. A multiplier
-that jumps over the unit circle at a grazing has no flip of its own: only the grazing is reported.
+that jumps over the unit circle at a grazing has no flip of its own: only the grazing is reported. Kinks that stop
+Newton's method are met before, by `solvers.kinks`.
 """
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ _OFF = 1e-8, 1e-7, 1e-6, 1e-5  # arclengths beside it at which an orbit is tried
 _STEEP = 0.2  # parameter's share of the tangent above which the parameter is held fixed
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class _Raised:
     """A law with another floor of the entry rate."""
 
@@ -56,7 +56,7 @@ class _Meeting(Problem):
         system, duration = shots[1]
         contacts = list(system.contacts)
         if not known and self.floor != contacts[self.stop].law.entry_rate_floor:
-            law = _Raised(contacts[self.stop].law, self.floor)
+            law: Any = _Raised(contacts[self.stop].law, self.floor)
             contacts[self.stop] = replace(contacts[self.stop], law=law)
             shots[1] = system.like(contacts=contacts), duration
         return shots
@@ -79,16 +79,14 @@ class Touch:
         return float(self.unknowns[-2])
 
     @property
-    def before(self) -> tuple[Array, Array]:
-        """Entry rates and peaks of the stop's contacts on the way to the meeting."""
+    def rate_before(self) -> float:
+        """At which the stop's last contact before the meeting was entered; a dip of rounding's size is none."""
         log = self.chain.solutions[0].contacts
         mine = (log.stop == self.stop) & (log.peak_indentation > 1e-4 * log.peak_indentation.max(initial=0.0))
-        return log.speed_in[mine], log.peak_indentation[mine]
+        return float(log.speed_in[mine][-1])
 
 
-def first_touch(
-    point: Point, stop: int, times: Sequence[float], speed: float, floor: float, within: float
-) -> Touch:
+def first_touch(point: Point, stop: int, times: Sequence[float], speed: float, floor: float, within: float) -> Touch:
     """The touch near a point, whose orbit nearly meets the surface at the first of some times, counted from its phase.
 
     Shots begin at the others too; ``within`` is an arclength. Raises OrbitError.
@@ -119,7 +117,7 @@ def solved(
             break
         chain = _Meeting(problem.make, problem.method, fractions, problem.step, stop, floor).evaluate(x, parameter)
         system, period = problem.make(parameter)
-        step = np.linalg.solve(*_linear(chain, system.contacts[stop], period, speed))
+        step: Array = np.linalg.solve(*_linear(chain, system.contacts[stop], period, speed)).astype(float)
         unknowns, way = unknowns + step, length(point, step)
         if not way < within:
             break
@@ -131,7 +129,7 @@ def solved(
 def _linear(chain: Chain, contact: Contact, period: float, speed: float) -> tuple[Array, Array]:
     """Matrix and right side of Newton's step."""
     m, size = chain.residual.shape
-    n, rate = size // 2, chain.solutions[0].rate * period  # of the state at the meeting, per period
+    n, rate = size // 2, _rate(chain) * period  # of the state at the meeting, per period
     later = np.zeros((m, size))
     later[0], later[1] = rate, -chain.tangents[1] @ rate
     rows = np.zeros((2, m * size + 2))
@@ -139,6 +137,13 @@ def _linear(chain: Chain, contact: Contact, period: float, speed: float) -> tupl
     matrix = np.vstack((np.column_stack((chain.jacobian(), chain.by_parameter.ravel(), later.ravel())), rows))
     delta, delta_dot = -chain.x[1, :n] @ contact.direction - contact.gap, -chain.x[1, n:] @ contact.direction
     return matrix, -np.concatenate((chain.residual.ravel(), [delta, delta_dot - speed]))
+
+
+def _rate(chain: Chain) -> Array:
+    """Of the state where the first shot ends, per second."""
+    rate = chain.solutions[0].rate
+    assert rate is not None
+    return rate
 
 
 def length(point: Point, step: Array) -> float:
@@ -195,12 +200,12 @@ def beside(point: Point, touch: Touch, sign: float, wanted: tuple[int, int | Non
 
 def _indicator(point: Point, touch: Touch) -> tuple[Array, float, float]:
     """What changes its sign at a touch: derivatives by the first state and the parameter; how far aside to look."""
-    first, w = touch.chain.solutions[0], -point.orbit.system.contacts[touch.stop].direction
+    rate, w = _rate(touch.chain), -point.orbit.system.contacts[touch.stop].direction
     n = len(w)
     columns = np.column_stack((touch.chain.tangents[0], touch.chain.by_parameter[0]))
     row, aside = w @ columns[:n], _ASIDE[0] * float(point.orbit.contacts.peak_indentation.max(initial=0.0))
     if touch.speed:
-        row, aside = w @ columns[n:] - (w @ first.rate[n:]) / touch.speed * row, _ASIDE[1] * touch.speed
+        row, aside = w @ columns[n:] - (w @ rate[n:]) / touch.speed * row, _ASIDE[1] * touch.speed
     return row[:-1], float(row[-1]), aside or _ASIDE[0] * float(np.abs(w @ touch.chain.x[0, :n]))
 
 
