@@ -21,7 +21,8 @@ import fembeam as fb
 from contacts import Hysteretic
 
 TIP = 0.24445
-STARTS, MOST = {1: 215.0, 2: 430.0, 3: 650.0}, 750  # rad/s where a branch is looked for, by its period; its orbits
+STARTS = {1: 215.0, 2: 430.0, 3: 650.0}  # rad/s where a branch is looked for, by its period
+MOST = {1: 750, 2: 1500, 3: 1500}  # orbits of a branch
 SPANS = dict.fromkeys(STARTS, (60.0, 900.0))
 if "--quick" in sys.argv:
     SPANS = {1: (190.0, 240.0), 2: (385.0, 470.0), 3: (610.0, 690.0)}
@@ -44,7 +45,7 @@ def branches(model):
         start = next(a.orbit for a in model.attractors(omega, starts=6) if a.period == period)
         found.append(model.branch("omega", SPANS[period], period, start, at=omega))
         begin = time.perf_counter()
-        deque(islice(found[-1], MOST), maxlen=0)
+        deque(islice(found[-1], MOST[period]), maxlen=0)
         seconds += time.perf_counter() - begin
     return found, seconds
 
@@ -67,6 +68,7 @@ for modes, axis in zip((1, 2), figure.subplots(2, 1, sharex=True, sharey=True), 
     for period, (omega, height) in zip(STARTS, tops, strict=True):
         print(f"{modes} mode(s), period {period}: summits {np.round(height, 2)} mm at {np.round(omega, 1)} rad/s")
     print("; ".join(f"period {one.family.period}: {len(one.found.orbits)} orbits, {one.status}" for one in found))
+    assert not any("lost" in one.status for one in found), "every branch is followed to an end of its own"
     assert tops[0][1].max() < tops[1][1].max() < tops[2][1].max(), "subharmonic resonances reach higher"
     assert [len(height) for _, height in tops[:2]] == [modes, modes], "only the second mode dents the tops"
     values = np.linspace(60.0, 900.0, 6 if "--quick" in sys.argv else 85)

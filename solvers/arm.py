@@ -261,7 +261,8 @@ def _is_passed(known: Point, a: Point, b: Point) -> bool:
     """Whether an orbit lies on the branch between two points, which others near it do not."""
     way = float(a.tangent @ a.metric @ (b.unknowns - a.unknowns))
     share = (known.chain.parameter - a.chain.parameter) / (b.chain.parameter - a.chain.parameter)
-    if not (way > 0.0 and 0.0 <= share <= 1.0):
+    alike = _same_contacts(known.orbit, a.orbit) or _same_contacts(known.orbit, b.orbit)
+    if not (alike and way > 0.0 and 0.0 <= share <= 1.0):
         return False
     guess = np.append(cubic(a, b, way, share * way)[:-1], known.chain.parameter)
     try:

@@ -62,31 +62,31 @@ def _is_at(orbit: Orbit, name: str) -> bool:
 
 @dataclass(eq=False)
 class Stretch:
-    """The way between two neighbouring points of a branch; every orbit found on it makes the next guess better."""
+    """The way between two neighbouring points of a branch; every orbit found on it makes the next guess better.
+
+    What the cubic c(s) through both with their tangents lacks of the branch is s² (way - s)² times a smooth function.
+    """
 
     a: Point
     b: Point
     way: float
     straight: bool = field(init=False)
-    known: list[tuple[float, Array]] = field(init=False)  # (arclength, distance of the branch from the cubic)
+    known: list[tuple[float, Array]] = field(default_factory=list)  # (arclength, what the cubic lacks of the branch)
     trials: dict[float, tuple[Chain, Orbit]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.straight = is_straight(self.a.share, self.b.share)
-        none = np.zeros_like(self.a.tangent)
-        self.known = [(0.0, none), (self.way, none)]
 
     def at(self, s: float) -> tuple[Chain, Orbit]:
         """The branch at an arclength from a; raises OrbitError."""
         if s not in self.trials:
-            guess = cubic(self.a, self.b, self.way, s)
-            places, off = [place for place, _ in self.known], np.array([distance for _, distance in self.known])
-            guess += [np.interp(s, places, column) for column in off.T]
+            guess, bend = cubic(self.a, self.b, self.way, s), (s * (self.way - s)) ** 2
+            if self.known:
+                places, off = [place for place, _ in self.known], np.array([rest for _, rest in self.known])
+                guess += bend * np.array([np.interp(s, places, column) for column in off.T])
             chain, error, iterations = corrected(self.a, guess, self.straight, not self.straight)
-            found = np.append(chain.x.ravel(), chain.parameter)
-            self.known = sorted(
-                [*self.known, (s, found - cubic(self.a, self.b, self.way, s))], key=lambda pair: pair[0]
-            )
+            rest = np.append(chain.x.ravel(), chain.parameter) - cubic(self.a, self.b, self.way, s)
+            self.known = sorted([*self.known, (s, rest / bend)], key=lambda pair: pair[0])
             orbit = orbit_of(self.a.problem, chain, error, iterations, parameter=chain.parameter)
             self.trials[s] = chain, orbit
         return self.trials[s]
