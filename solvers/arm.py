@@ -29,7 +29,6 @@ _AROUND = 3.0  # arclength, in units of a failed step, within which a kink is lo
 _AGAIN = 0.03  # part of a step after whose failure kinks are looked for again
 _MOST_KINKS = 3  # tried at a time
 _BEHIND = 0.003  # first step behind a kink, in units of the largest
-_FARTHEST = 20.0  # distance of an orbit from the one before, in steps, beyond which it belongs to another branch
 
 
 class BranchStatus(Enum):
@@ -85,7 +84,7 @@ class Arm:
         """Whether the next orbit is good; then it and the special points before it are kept, or a birth among them."""
         a = self.point
         way = float(a.tangent @ a.metric @ (following.unknowns - a.unknowns))
-        special = between(a, following, way)
+        special = between(a, following, way, self.before)
         marks = [orbit.mark for orbit in special]
         if _jumped(a, following, marks):
             self.status, self.step = BranchStatus.RUNNING, 0.2 * way

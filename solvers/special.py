@@ -107,11 +107,14 @@ class Stretch:
         return _SHARP * min(fine, self.way)
 
 
-def between(a: Point, b: Point, way: float) -> list[Orbit]:
-    """Marked orbits at the special points between two points ``way`` apart, in their order."""
+def between(a: Point, b: Point, way: float, before: tuple[Point, float] | None = None) -> list[Orbit]:
+    """Marked orbits at the special points between two points ``way`` apart, in their order.
+
+    ``before`` is the point before a and the way from it: the three together may tell of two special points on the way.
+    """
     stretch = Stretch(a, b, way)
     found = list(_grazings(stretch))
-    places = [0.0, *sorted(place for place, _ in found), way]
+    places = [0.0, *sorted(place for place, _ in found or _dips(stretch, before)), way]
     for begin, end in pairwise(places):
         found += _roots(stretch, begin, end)
     return [orbit for _, orbit in sorted(found, key=lambda pair: pair[0])]
@@ -128,6 +131,22 @@ def _roots(stretch: Stretch, begin: float, end: float) -> Iterator[tuple[float, 
         pair = _root(stretch, begin, end, name)
         if pair is not None:
             yield pair
+
+
+def _dips(stretch: Stretch, before: tuple[Point, float] | None) -> Iterator[tuple[float, Orbit]]:
+    """(arclength, orbit) where a test function of one sign at both ends has the other, by a parabola through three."""
+    if before is None:
+        return
+    first = indicators(before[0].orbit, before[0].tangent)
+    begin, end = stretch.indicators(0.0), stretch.indicators(stretch.way)
+    for name in ("flip", "neimark-sacker"):
+        curve = np.polyfit([-before[1], 0.0, stretch.way], [first[name], begin[name], end[name]], 2)
+        place = -0.5 * curve[1] / curve[0] if curve[0] else 0.0
+        if begin[name] * end[name] > 0.0 > begin[name] * np.polyval(curve, place) and 0.0 < place < stretch.way:
+            try:
+                yield float(place), stretch.at(float(place))[1]
+            except OrbitError:
+                continue
 
 
 def _root(stretch: Stretch, begin: float, end: float, name: str) -> tuple[float, Orbit] | None:

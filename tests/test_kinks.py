@@ -10,6 +10,7 @@ from contacts import Hysteretic, PiecewiseLinear
 from solvers import Contact, DormandPrince, OrbitError, System, branch, integrate, orbit
 from solvers.continuation import BranchStatus
 from solvers.kinks import kinks_near
+from solvers.special import between
 
 LATCHED = Hysteretic(2.1e8, 0.5625, entry_rate_floor=5e-3)
 TWO = 328.9, [1.58306e-4, -0.0933967169]  # rad/s, an orbit of two contacts over two periods of the drive
@@ -137,3 +138,20 @@ def test_a_law_without_memory_has_no_merging():
     system, period = family(PiecewiseLinear([1e6]))(300.0)
     found = orbit(system, period)
     assert {kink.kind for kink in kinks_near(found)} <= {"grazing"}
+
+
+def test_two_flips_between_two_orbits_are_seen_by_the_one_before():
+    """With one mode the harmonic branch is unstable between 79.46 and 90.19 rad/s."""
+    found = branch(family(Hysteretic(2.1e8, 0.5625), 1), (77.0, 103.0), [3.305e-4, 0.01542], at=103.0).run()
+    flips = [one.parameter for one in marks(found, "flip")]
+    assert flips == pytest.approx([90.186248, 79.463069], abs=1e-5)
+    points = found.arms[0].passed
+    last, a = [point for point in points if point.chain.parameter > flips[0] + 0.5][-2:]
+    b = next(point for point in points if point.chain.parameter < flips[1])
+
+    def way(p, q):
+        return float(p.tangent @ p.metric @ (q.unknowns - p.unknowns))
+
+    assert not between(a, b, way(a, b))
+    seen = between(a, b, way(a, b), (last, way(last, a)))
+    assert [one.parameter for one in seen] == pytest.approx(flips, rel=1e-9)
