@@ -2,8 +2,8 @@
 
 Reproduces Figs 4 and 5 of van de Wouw et al., Int. J. Non-Linear Mech. 38 (2003) 767: the subharmonic resonances reach
 higher than the harmonic one, and the second mode dents the tops of the harmonic and the 1/2 subharmonic peak.
-Brute-force simulations (grey) are the independent check. Below 150 rad/s the harmonic branch of two modes folds and
-doubles hundreds of times; there it is followed for a while only. With --quick the branches span the resonances only.
+Brute-force simulations (grey) are the independent check. The harmonic branch of two modes folds and doubles hundreds of
+times below 150 rad/s, where it is left. With --quick the branches span the resonances only.
 
     python examples/paper_periodic.py [FIGURE.png] [--quick]
 """
@@ -21,8 +21,7 @@ import fembeam as fb
 from contacts import Hysteretic
 
 TIP = 0.24445
-STARTS = {1: 215.0, 2: 430.0, 3: 650.0}  # rad/s where a branch is looked for, by its period
-MOST = {1: 750, 2: 1500, 3: 1500}  # orbits of a branch
+STARTS, MOST = {1: 215.0, 2: 430.0, 3: 650.0}, {1: 750, 2: 1500, 3: 1500}  # by period: rad/s to look at, orbits
 SPANS = dict.fromkeys(STARTS, (60.0, 900.0))
 if "--quick" in sys.argv:
     SPANS = {1: (190.0, 240.0), 2: (385.0, 470.0), 3: (610.0, 690.0)}
