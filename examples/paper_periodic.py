@@ -67,14 +67,13 @@ for modes, axis in zip((1, 2), figure.subplots(2, 1, sharex=True, sharey=True), 
     for period, (omega, height) in zip(STARTS, tops, strict=True):
         print(f"{modes} mode(s), period {period}: summits {np.round(height, 2)} mm at {np.round(omega, 1)} rad/s")
     print("; ".join(f"period {one.family.period}: {len(one.found.orbits)} orbits, {one.status}" for one in found))
-    assert not any("lost" in one.status for one in found), "every branch is followed to an end of its own"
+    assert not any("lost" in one.status for one in found), "branches go on to an end of their own"
     assert tops[0][1].max() < tops[1][1].max() < tops[2][1].max(), "subharmonic resonances reach higher"
     assert [len(height) for _, height in tops[:2]] == [modes, modes], "only the second mode dents the tops"
     values = np.linspace(60.0, 900.0, 6 if "--quick" in sys.argv else 85)
     cloud = fb.study.bifurcation(model, "omega", values, settle=120, keep=6).cloud()
     fb.plot.branch(found, TIP, cloud, axis)
-    axis.set_title(f"{modes} mode{'s' * (modes > 1)}")
-    axis.set_ylim(0.0, 60.0)
+    axis.set(title=f"{modes} mode{'s' * (modes > 1)}", ylim=(0.0, 60.0))
 print(f"all branches in {total:.1f} s")
 for path in [name for name in sys.argv[1:] if name.endswith(".png")]:
     figure.savefig(path, dpi=150)
