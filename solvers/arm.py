@@ -15,7 +15,7 @@ from solvers.periodic import Orbit, OrbitError
 from solvers.point import Point, corrected, cubic, is_straight, moved
 from solvers.special import between
 from solvers.system import Array
-from solvers.touch import Touch, unknowns_at
+from solvers.touch import Touch, signature, unknowns_at
 
 MOST_ORBITS = 2000
 _SMALLEST = 1e-8  # arclength step at which a branch counts as lost
@@ -28,6 +28,8 @@ _NEAR = 1e-4  # arclength from where a branch is lost within which a kink may be
 _AROUND = 3.0  # arclength, in units of a failed step, within which a kink is looked for
 _AGAIN = 0.03  # part of a step after whose failure kinks are looked for again
 _MOST_KINKS = 3  # tried at a time
+_LAST = 3e-7  # arclength step below which any turn counts as a kink
+_FARTHEST = 20.0  # distance of an orbit from the one before, in steps, beyond which it belongs to another branch
 _BEHIND = 0.003  # first step behind a kink, in units of the largest
 
 
@@ -86,7 +88,7 @@ class Arm:
         way = float(a.tangent @ a.metric @ (following.unknowns - a.unknowns))
         special = between(a, following, way, self.before)
         marks = [orbit.mark for orbit in special]
-        if _jumped(a, following, marks):
+        if way > _THERE and _jumped(a, following, marks):
             self.status, self.step = BranchStatus.RUNNING, 0.2 * way
             return False
         for place, fold in enumerate(special):
@@ -148,7 +150,9 @@ class Arm:
         way, aligned = float(a.tangent @ a.metric @ off), float(a.tangent @ a.metric @ b.tangent)
         strayed = math.sqrt(max(float(off @ a.metric @ off) - way**2, 0.0))
         sharp = aligned < _SHARPEST or strayed > 0.5 * way
-        if sharp or is_cut(b):
+        across = signature(a.orbit) != signature(b.orbit)
+        hops = h < (_THERE if across else _LAST) and way > 0.0 and strayed < _FARTHEST * h
+        if (sharp and not hops) or is_cut(b):  # a kink that was not met is hopped over
             self.step *= 0.2 if len(a.orbit.contacts) != len(b.orbit.contacts) else 0.5
             return None
         if b.chain.parameter in self.span:

@@ -86,7 +86,8 @@ class Stretch:
                 guess += bend * np.array([np.interp(s, places, column) for column in off.T])
             chain, error, iterations = corrected(self.a, guess, self.straight, not self.straight)
             rest = np.append(chain.x.ravel(), chain.parameter) - cubic(self.a, self.b, self.way, s)
-            self.known = sorted([*self.known, (s, rest / bend)], key=lambda pair: pair[0])
+            if bend > 0.0:
+                self.known = sorted([*self.known, (s, rest / bend)], key=lambda pair: pair[0])
             orbit = orbit_of(self.a.problem, chain, error, iterations, parameter=chain.parameter)
             self.trials[s] = chain, orbit
         return self.trials[s]
