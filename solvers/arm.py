@@ -9,13 +9,13 @@ from enum import Enum
 import numpy as np
 
 from solvers.birth import birth
-from solvers.kinks import ERRORS, Kink, before, behind, kinks_near, marked, met
+from solvers.kinks import ERRORS, before, behind, kinks_near, marked, met
 from solvers.later import is_cut, with_quiet_begin
 from solvers.periodic import Orbit, OrbitError
 from solvers.point import Point, corrected, cubic, is_straight, moved
 from solvers.special import between
 from solvers.system import Array
-from solvers.touch import Touch, signature, unknowns_at
+from solvers.touch import signature, unknowns_at
 
 MOST_ORBITS = 2000
 _SMALLEST = 1e-8  # arclength step at which a branch counts as lost
@@ -72,7 +72,7 @@ class Arm:
             following = self._next() if h >= _SMALLEST else None
             if following is None and (self.step < _SMALLEST or h < _AGAIN * self.tried):
                 kink, self.tried = self._kink_ahead(h), h
-                if kink is not None and (kink[-1] is None or self._taken(kink[-1])):
+                if kink is not None and (kink[0] is None or self._taken(kink[0])):
                     return self._cross(*kink)
                 if self.step < _SMALLEST and self.status is BranchStatus.RUNNING:
                     self.status = BranchStatus.LOST
@@ -101,8 +101,8 @@ class Arm:
         self.before = None if "grazing" in marks else (a, way)  # no cubic across a kink
         return True
 
-    def _kink_ahead(self, reach: float) -> tuple[Kink, Touch, Point | None] | None:
-        """A kink within reach, its exact place and the last point before it, None if that is where the arm is."""
+    def _kink_ahead(self, reach: float) -> tuple[Point | None, Point, list[Orbit]] | None:
+        """Last point before a kink within reach, None if the arm is there; the first one behind it; orbits to keep."""
         a, reach = self.point, max(1.5 * reach, _NEAR if self.step < _SMALLEST else 0.0)
         for kink in kinks_near(a.orbit)[:_MOST_KINKS]:
             try:
@@ -112,21 +112,17 @@ class Arm:
                 if not -_THERE < way < reach or whole > 2.0 * abs(way) + _THERE:
                     continue
                 last = before(a, kink, touch)
+                if a.tangent @ a.metric @ last.tangent > 0.0:
+                    last = last if way > _SMALLEST else a
+                    point = behind(last, kink, touch)
+                    return (None if last is a else last), point, marked(last, point, kink, touch)
             except ERRORS:
                 continue
-            if a.tangent @ a.metric @ last.tangent > 0.0:
-                return kink, touch, last if way > _SMALLEST else None
         return None
 
-    def _cross(self, kink: Kink, touch: Touch, last: Point | None) -> None:
+    def _cross(self, last: Point | None, point: Point, found: list[Orbit]) -> None:
         """Go on behind a kink."""
-        self.point = a = last or self.point
-        try:
-            point = behind(a, kink, touch)
-            found = marked(a, point, kink, touch)
-        except ERRORS:
-            self.status = BranchStatus.LOST
-            return
+        a = last or self.point
         inside = self._inside(point.unknowns)  # a jump may lead out of the span
         self.orbits[len(self.orbits) - (last is not None) :] = found if inside else found[:-1]
         self.passed += [a, point]
