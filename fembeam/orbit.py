@@ -75,7 +75,9 @@ class Orbit:
 
     @property
     def mark(self) -> str:
-        """What is special about it on a branch: "fold", "flip", "neimark-sacker", "branch point", "grazing", or ""."""
+        """What is special about it on a branch: "fold", "flip", "neimark-sacker", "branch point", "grazing", "merging";
+        else "".
+        """
         return self.found.mark
 
     @cached_property

@@ -9,20 +9,28 @@ from enum import Enum
 import numpy as np
 
 from solvers.birth import birth
+from solvers.kinks import ERRORS, before, behind, kinks_near, marked, met
 from solvers.later import is_cut, with_quiet_begin
 from solvers.periodic import Orbit, OrbitError
 from solvers.point import Point, corrected, cubic, is_straight, moved
 from solvers.special import between
 from solvers.system import Array
+from solvers.touch import signature, unknowns_at
 
 MOST_ORBITS = 2000
-_SMALLEST = 3e-7  # arclength step at which a branch counts as lost
+_SMALLEST = 1e-8  # arclength step at which a branch counts as lost
 _GOOD = 0.06, 0.1  # distance of a good guess from the branch, in units of the step: on a cubic, on the tangent
 _MANY = 6  # Newton iterations that ask for shorter steps
 _SHARPEST = 0.8  # cosine of the largest turn between two orbits
-_KINK = 3e-6  # arclength step below which a turn counts as a kink of the branch
+_THERE = 3e-6  # arclength within which a kink may lie behind
 _NEAR_KINK = 1e-4  # arclength step below which a fold may hide behind a kink
+_NEAR = 1e-4  # arclength from where a branch is lost within which a kink may be why
+_AROUND = 3.0  # arclength, in units of a failed step, within which a kink is looked for
+_AGAIN = 0.03  # part of a step after whose failure kinks are looked for again
+_MOST_KINKS = 3  # tried at a time
+_LAST = 3e-7  # arclength step below which any turn counts as a kink
 _FARTHEST = 20.0  # distance of an orbit from the one before, in steps, beyond which it belongs to another branch
+_BEHIND = 0.003  # first step behind a kink, in units of the largest
 
 
 class BranchStatus(Enum):
@@ -48,6 +56,7 @@ class Arm:
     status: BranchStatus = BranchStatus.RUNNING
     step: float = 0.0
     before: tuple[Point, float] | None = None  # the point before and the way from it
+    tried: float = math.inf  # step after whose failure kinks were looked for
     passed: list[Point] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -57,29 +66,71 @@ class Arm:
 
     def extend(self) -> None:
         """Find the next orbit and the special points before it, or an end of the branch."""
-        following = None
+        following, self.tried = None, math.inf
         while following is None:
-            if self.step < _SMALLEST:
-                self.status = BranchStatus.LOST
-                return
-            following = self._next()
+            h = self.step
+            following = self._next() if h >= _SMALLEST else None
+            if following is None and (self.step < _SMALLEST or h < _AGAIN * self.tried):
+                kink, self.tried = self._kink_ahead(h), h
+                if kink is not None and (kink[0] is None or self._taken(kink[0])):
+                    return self._cross(*kink)
+                if self.step < _SMALLEST and self.status is BranchStatus.RUNNING:
+                    self.status = BranchStatus.LOST
+                if kink is not None or self.status is not BranchStatus.RUNNING:
+                    return None
+        if self._taken(following) and self.status is BranchStatus.RUNNING:
+            self._finish_or_go_on(following)
+        return None
+
+    def _taken(self, following: Point) -> bool:
+        """Whether the next orbit is good; then it and the special points before it are kept, or a birth among them."""
         a = self.point
         way = float(a.tangent @ a.metric @ (following.unknowns - a.unknowns))
-        special = between(a, following, way) if way > 0.0 else []  # less only where it turned at a kink
+        special = between(a, following, way, self.before)
         marks = [orbit.mark for orbit in special]
-        if way > _KINK and _jumped(a, following, marks):
+        if way > _THERE and _jumped(a, following, marks):
             self.status, self.step = BranchStatus.RUNNING, 0.2 * way
-            return
+            return False
         for place, fold in enumerate(special):
             born = birth(a, following, fold) if fold.mark == "fold" else None
             if born is not None:
                 self.status = BranchStatus.BORN
                 self.orbits += [*special[:place], born]
-                return
+                return False
         self.orbits += [*special, following.orbit]
-        self.before = None if way <= 0.0 or "grazing" in marks else (a, way)  # no cubic across a kink
-        if self.status is BranchStatus.RUNNING:
-            self._finish_or_go_on(following)
+        self.before = None if "grazing" in marks else (a, way)  # no cubic across a kink
+        return True
+
+    def _kink_ahead(self, reach: float) -> tuple[Point | None, Point, list[Orbit]] | None:
+        """Last point before a kink within reach, None if the arm is there; the first one behind it; orbits to keep."""
+        a, reach = self.point, max(1.5 * reach, _NEAR if self.step < _SMALLEST else 0.0)
+        for kink in kinks_near(a.orbit)[:_MOST_KINKS]:
+            try:
+                touch = met(a, kink, _AROUND * reach)
+                off = unknowns_at(a, touch) - a.unknowns
+                way, whole = float(a.tangent @ a.metric @ off), math.sqrt(off @ a.metric @ off)
+                if not -_THERE < way < reach or whole > 2.0 * abs(way) + _THERE:
+                    continue
+                last = before(a, kink, touch)
+                if a.tangent @ a.metric @ last.tangent > 0.0:
+                    last = last if way > _SMALLEST else a
+                    point = behind(last, kink, touch)
+                    return (None if last is a else last), point, marked(last, point, kink, touch)
+            except ERRORS:
+                continue
+        return None
+
+    def _cross(self, last: Point | None, point: Point, found: list[Orbit]) -> None:
+        """Go on behind a kink."""
+        a = last or self.point
+        inside = self._inside(point.unknowns)  # a jump may lead out of the span
+        self.orbits[len(self.orbits) - (last is not None) :] = found if inside else found[:-1]
+        self.passed += [a, point]
+        self.point, self.before, self.step = with_quiet_begin(point), None, _BEHIND * self.largest
+        if not inside:
+            self.status = BranchStatus.END
+        elif len(self.orbits) >= MOST_ORBITS:
+            self.status = BranchStatus.LIMIT
 
     def _next(self) -> Point | None:
         """The point a step ahead, the one at the end of the span if that is nearer, or None after a shorter step."""
@@ -95,7 +146,9 @@ class Arm:
         way, aligned = float(a.tangent @ a.metric @ off), float(a.tangent @ a.metric @ b.tangent)
         strayed = math.sqrt(max(float(off @ a.metric @ off) - way**2, 0.0))
         sharp = aligned < _SHARPEST or strayed > 0.5 * way
-        if (sharp and h > _KINK) or strayed > _FARTHEST * h or is_cut(b):  # a branch has kinks where contacts graze
+        across = signature(a.orbit) != signature(b.orbit)
+        hops = h < (_THERE if across else _LAST) and way > 0.0 and strayed < _FARTHEST * h
+        if (sharp and not hops) or is_cut(b):  # a kink that was not met is hopped over
             self.step *= 0.2 if len(a.orbit.contacts) != len(b.orbit.contacts) else 0.5
             return None
         if b.chain.parameter in self.span:
@@ -104,8 +157,7 @@ class Arm:
         good = _GOOD[self.before is None] * h / max(math.sqrt(miss @ a.metric @ miss), 1e-9 * h)
         longer = min(good if self.before is None else good ** (1.0 / 3.0), 3.0)
         largest = self.largest * max(1.0, b.size)
-        shortest = 0.5 if h > _KINK else 1.0
-        self.step = min(h * (max(longer, shortest) if b.orbit.iterations < _MANY else shortest), largest)
+        self.step = min(h * (max(longer, 0.5) if b.orbit.iterations < _MANY else 0.5), largest)
         return b
 
     def _ahead(self) -> Array:
@@ -188,15 +240,28 @@ class Arm:
 
 def _jumped(a: Point, b: Point, marks: list[str]) -> bool:
     """Whether b lies on another branch: between them the parameter turns without a fold, or contacts come unseen."""
-    turned, changed = a.share * b.share < 0.0, len(a.orbit.contacts) != len(b.orbit.contacts)
-    return "grazing" not in marks and (changed or (turned and "fold" not in marks))
+    turned = a.share * b.share < 0.0 and "fold" not in marks
+    return "grazing" not in marks and (turned or not _same_contacts(a.orbit, b.orbit))
+
+
+def _same_contacts(a: Orbit, b: Orbit) -> bool:
+    """Whether each contact of an orbit has one of another near it: none nearer to the next."""
+    if len(a.contacts) != len(b.contacts):
+        return False
+    for stop in np.unique(a.contacts.stop):
+        first, second = (np.sort(o.contacts.t_in[o.contacts.stop == stop]) / o.period for o in (a, b))
+        spacing = np.diff(first, append=first[0] + 1.0)
+        if len(first) != len(second) or np.any(np.abs(first - second) > 0.5 * np.minimum(spacing, np.roll(spacing, 1))):
+            return False
+    return True
 
 
 def _is_passed(known: Point, a: Point, b: Point) -> bool:
     """Whether an orbit lies on the branch between two points, which others near it do not."""
     way = float(a.tangent @ a.metric @ (b.unknowns - a.unknowns))
     share = (known.chain.parameter - a.chain.parameter) / (b.chain.parameter - a.chain.parameter)
-    if not (way > 0.0 and 0.0 <= share <= 1.0):
+    alike = _same_contacts(known.orbit, a.orbit) or _same_contacts(known.orbit, b.orbit)
+    if not (alike and way > 0.0 and 0.0 <= share <= 1.0):
         return False
     guess = np.append(cubic(a, b, way, share * way)[:-1], known.chain.parameter)
     try:

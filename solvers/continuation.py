@@ -2,8 +2,9 @@
 
 From each point a guess a step ahead, on the tangent or on the cubic through the point before too; Newton's method back
 to the branch (Keller, Numerical solution of bifurcation and nonlinear eigenvalue problems, 1977); then a step as long
-as the guess was good. A branch may fold back, and has kinks where contacts graze. `solvers.arm` controls the steps,
-`solvers.point` takes one, `solvers.special` locates the special points it passed.
+as the guess was good. A branch may fold back, has kinks where contacts graze, and jumps where two contacts become one.
+`solvers.arm` controls the steps, `solvers.point` takes one, `solvers.special` locates the special points it passed,
+`solvers.kinks` leads across kinks and jumps.
 """
 
 from __future__ import annotations

@@ -36,7 +36,8 @@ class Orbit:
     system, method : of what, and how it was integrated.
     doubt : why the verdict on stability may be wrong; empty when nothing speaks against it.
     parameter : value of the branch's parameter, NaN outside a branch.
-    mark : "fold", "flip", "neimark-sacker", "branch point" or "grazing" at special points of a branch, else empty.
+    mark : "fold", "flip", "neimark-sacker", "branch point", "grazing" or "merging" at special points of a branch, else
+        empty. Two orbits marked "merging" follow each other where a branch jumps because two contacts become one.
 
     Examples
     --------

@@ -9,7 +9,8 @@ A special point is a sign change of its test function along the arclength. With 
     grazing          number of contacts within the period changes
 
 All but the last are continuous along the branch, so that Brent's method finds their zeros in a few orbits. A multiplier
-that jumps over the unit circle at a grazing has no flip of its own: only the grazing is reported.
+that jumps over the unit circle at a grazing has no flip of its own: only the grazing is reported. Kinks that stop
+Newton's method are met before, by `solvers.kinks`.
 """
 
 from __future__ import annotations
@@ -61,31 +62,32 @@ def _is_at(orbit: Orbit, name: str) -> bool:
 
 @dataclass(eq=False)
 class Stretch:
-    """The way between two neighbouring points of a branch; every orbit found on it makes the next guess better."""
+    """The way between two neighbouring points of a branch; every orbit found on it makes the next guess better.
+
+    What the cubic c(s) through both with their tangents lacks of the branch is s² (way - s)² times a smooth function.
+    """
 
     a: Point
     b: Point
     way: float
     straight: bool = field(init=False)
-    known: list[tuple[float, Array]] = field(init=False)  # (arclength, distance of the branch from the cubic)
+    known: list[tuple[float, Array]] = field(default_factory=list)  # (arclength, what the cubic lacks of the branch)
     trials: dict[float, tuple[Chain, Orbit]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.straight = is_straight(self.a.share, self.b.share)
-        none = np.zeros_like(self.a.tangent)
-        self.known = [(0.0, none), (self.way, none)]
 
     def at(self, s: float) -> tuple[Chain, Orbit]:
         """The branch at an arclength from a; raises OrbitError."""
         if s not in self.trials:
-            guess = cubic(self.a, self.b, self.way, s)
-            places, off = [place for place, _ in self.known], np.array([distance for _, distance in self.known])
-            guess += [np.interp(s, places, column) for column in off.T]
+            guess, bend = cubic(self.a, self.b, self.way, s), (s * (self.way - s)) ** 2
+            if self.known:
+                places, off = [place for place, _ in self.known], np.array([rest for _, rest in self.known])
+                guess += bend * np.array([np.interp(s, places, column) for column in off.T])
             chain, error, iterations = corrected(self.a, guess, self.straight, not self.straight)
-            found = np.append(chain.x.ravel(), chain.parameter)
-            self.known = sorted(
-                [*self.known, (s, found - cubic(self.a, self.b, self.way, s))], key=lambda pair: pair[0]
-            )
+            rest = np.append(chain.x.ravel(), chain.parameter) - cubic(self.a, self.b, self.way, s)
+            if bend > 0.0:
+                self.known = sorted([*self.known, (s, rest / bend)], key=lambda pair: pair[0])
             orbit = orbit_of(self.a.problem, chain, error, iterations, parameter=chain.parameter)
             self.trials[s] = chain, orbit
         return self.trials[s]
@@ -106,11 +108,14 @@ class Stretch:
         return _SHARP * min(fine, self.way)
 
 
-def between(a: Point, b: Point, way: float) -> list[Orbit]:
-    """Marked orbits at the special points between two points ``way`` apart, in their order."""
+def between(a: Point, b: Point, way: float, before: tuple[Point, float] | None = None) -> list[Orbit]:
+    """Marked orbits at the special points between two points ``way`` apart, in their order.
+
+    ``before`` is the point before a and the way from it: the three together may tell of two special points on the way.
+    """
     stretch = Stretch(a, b, way)
     found = list(_grazings(stretch))
-    places = [0.0, *sorted(place for place, _ in found), way]
+    places = [0.0, *sorted(place for place, _ in found or _dips(stretch, before)), way]
     for begin, end in pairwise(places):
         found += _roots(stretch, begin, end)
     return [orbit for _, orbit in sorted(found, key=lambda pair: pair[0])]
@@ -127,6 +132,22 @@ def _roots(stretch: Stretch, begin: float, end: float) -> Iterator[tuple[float, 
         pair = _root(stretch, begin, end, name)
         if pair is not None:
             yield pair
+
+
+def _dips(stretch: Stretch, before: tuple[Point, float] | None) -> Iterator[tuple[float, Orbit]]:
+    """(arclength, orbit) where a test function of one sign at both ends has the other, by a parabola through three."""
+    if before is None:
+        return
+    first = indicators(before[0].orbit, before[0].tangent)
+    begin, end = stretch.indicators(0.0), stretch.indicators(stretch.way)
+    for name in ("flip", "neimark-sacker"):
+        curve = np.polyfit([-before[1], 0.0, stretch.way], [first[name], begin[name], end[name]], 2)
+        place = -0.5 * curve[1] / curve[0] if curve[0] else 0.0
+        if begin[name] * end[name] > 0.0 > begin[name] * np.polyval(curve, place) and 0.0 < place < stretch.way:
+            try:
+                yield float(place), stretch.at(float(place))[1]
+            except OrbitError:
+                continue
 
 
 def _root(stretch: Stretch, begin: float, end: float, name: str) -> tuple[float, Orbit] | None:

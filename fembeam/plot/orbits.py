@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from fembeam.orbit import Orbit
 
 MARKS = {"fold": ("o", GREY), "flip": ("s", RED), "neimark-sacker": ("D", GREEN), "branch point": ("P", "black"),
-         "grazing": ("x", "black")}  # fmt: skip
+         "grazing": ("x", "black"), "merging": ("^", ORANGE)}  # fmt: skip
 UNITS = {"base.omega": "ω / rad/s", "base.amplitude": "base amplitude / m"}
 
 
@@ -83,11 +83,14 @@ def _draw_branch(axis: Axes, one: Branch, z: float, color: str, label: str) -> N
     """Solid and dashed pieces of a branch, and its marks."""
     parameter, stable = one.parameter, one.stable
     peaks = 1e3 * np.array([peak(orbit, z) for orbit in one.orbits])
-    axis.plot(parameter, np.where(stable, peaks, np.nan), "-", color=color, label=label)
     unstable = ~stable
     unstable[:-1] |= unstable[1:]  # a dashed piece begins at the last stable orbit
     unstable[1:] |= ~stable[:-1]
-    axis.plot(parameter, np.where(unstable, peaks, np.nan), "--", color=color, linewidth=0.8)
+    merging = np.array([orbit.mark == "merging" for orbit in one.orbits])
+    jumps = 1 + np.flatnonzero(merging[:-1] & merging[1:])
+    for chosen, style in ((stable, {"linestyle": "-", "label": label}), (unstable, {"linestyle": "--", "lw": 0.8})):
+        heights = np.insert(np.where(chosen, peaks, np.nan), jumps, np.nan)
+        axis.plot(np.insert(parameter, jumps, np.nan), heights, color=color, **style)
     for orbit, height in zip(one.orbits, peaks, strict=True):
         if orbit.mark:
             marker, edge = MARKS[orbit.mark]
