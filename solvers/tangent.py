@@ -129,7 +129,7 @@ class _Change:
         rows = np.stack([engine.problem.read[:, own], engine.problem.read_rate[:, own]], axis=1)  # (m, 2, 2n)
         a, b = tones.change / width, 1j * (tones.turn / width)[:, None] * tones.response
         parts = np.array([a.real, a.imag, b.real, b.imag])
-        steady = (rows @ parts.reshape(-1, own.size).T).reshape(-1, 2, 4, len(a)).transpose(3, 0, 1, 2)
+        steady = (rows @ parts.reshape(-1, own.size).T).reshape(len(rows), 2, 4, len(a)).transpose(3, 0, 1, 2)
         gaps = [np.array([contact.gap for contact in side.contacts]) for side in sides]
         shift = (gaps[1] - gaps[0]) / width
         nudge = Nudge(parameter.step, parameter.step, tones.omega, np.ascontiguousarray(steady), shift)
