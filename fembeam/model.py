@@ -220,7 +220,8 @@ class Model:
         ]
         frame = self._frame_loads(scene)
         kept = own.loads[: len(own.loads) - len(frame)]
-        return own.like([*contacts, *own.contacts[count:]], [*kept, *frame])
+        moved = [(vector, signal) for (vector, _), (_, signal) in zip(own.loads[len(kept) :], frame, strict=True)]
+        return own.like([*contacts, *own.contacts[count:]], [*kept, *moved])
 
     def under(self, scene: Scene) -> Model:
         """The same model of a scene that differs in its signals only; what does not depend on them is kept."""

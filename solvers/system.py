@@ -133,10 +133,10 @@ class System:
         _check_mass(self.M)
         self._check_contacts_and_loads()
 
-    def _check_contacts_and_loads(self) -> None:
-        """Contacts and loads fit the matrices."""
+    def _check_contacts_and_loads(self, known: Sequence[Any] = ()) -> None:
+        """Contacts and loads fit the matrices; of the loads with known vectors only the signals are looked at."""
         object.__setattr__(self, "contacts", tuple(self.contacts))
-        object.__setattr__(self, "loads", tuple(self._load(i, pair) for i, pair in enumerate(self.loads)))
+        object.__setattr__(self, "loads", tuple(self._load(i, pair, known) for i, pair in enumerate(self.loads)))
         for i, contact in enumerate(self.contacts):
             if contact.direction.size != self.size:
                 raise ValueError(f"contact {i} has a direction of {contact.direction.size}, the system {self.size}")
@@ -149,10 +149,11 @@ class System:
         """The same structure with other contacts or loads; its matrices are neither checked nor decoupled again."""
         other = object.__new__(System)
         other.__dict__.update(self.__dict__, blocks=self.blocks, push=self.push, kept={})
+        known = [vector for vector, _ in self.loads]
         for name, value in (("contacts", contacts), ("loads", loads)):
             if value is not None:
                 object.__setattr__(other, name, value)
-        other._check_contacts_and_loads()
+        other._check_contacts_and_loads(known)
         if len(self.contacts) == len(other.contacts):
             pairs = list(zip(self.contacts, other.contacts, strict=True))
             if all(a.law is b.law for a, b in pairs):
@@ -164,7 +165,8 @@ class System:
     def _vectors_are_those_of(self, other: System) -> bool:
         """Whether contacts and loads act along the same vectors."""
         vectors = [[*(c.direction for c in s.contacts), *(vector for vector, _ in s.loads)] for s in (self, other)]
-        return len(self.loads) == len(other.loads) and all(map(np.array_equal, *vectors))
+        same = (a is b or np.array_equal(a, b) for a, b in zip(*vectors, strict=False))
+        return len(self.loads) == len(other.loads) and all(same)
 
     @property
     def about_structure(self) -> dict[str, Any]:
@@ -182,12 +184,15 @@ class System:
         known: dict[str, Any] = self.kept.setdefault("laws", {})
         return known
 
-    def _load(self, i: int, pair: tuple[ArrayLike, Signal]) -> tuple[Array, Signal]:
+    def _load(self, i: int, pair: tuple[ArrayLike, Signal], known: Sequence[Any]) -> tuple[Array, Signal]:
         """One checked load."""
-        vector, signal = pair
-        vector = np.array(vector, dtype=float, ndmin=1)
-        if vector.shape != (self.size,) or not np.all(np.isfinite(vector)):
-            raise ValueError(f"load {i} needs a finite vector of {self.size}, got {vector!r}")
+        given, signal = pair
+        vector: Any = next((vector for vector in known if vector is given), None)
+        if vector is None:
+            vector = np.array(given, dtype=float, ndmin=1)
+            vector.setflags(write=False)
+            if vector.shape != (self.size,) or not np.all(np.isfinite(vector)):
+                raise ValueError(f"load {i} needs a finite vector of {self.size}, got {vector!r}")
         if not callable(signal):
             raise TypeError(f"load {i} needs a signal t -> value, got {signal!r}")
         return vector, signal
