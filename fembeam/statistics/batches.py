@@ -69,7 +69,7 @@ class Estimate:
         --------
         >>> a, b = Estimate.of_mean([1.0, 2.0, 4.0]), Estimate.of_mean([2.0, 4.0, 8.1])
         >>> Estimate.joint(np.divide, b, a), round(float(b.value / a.value), 4)  # twice as much, part by part
-        (2.01429 ± 0.00908, 2.0143)
+        (2.01429 ± 0.0124, 2.0143)
         """
         parts = {estimate.batches if estimate.without is not None else 0 for estimate in estimates}
         if len(parts) != 1 or min(parts) < 2:
