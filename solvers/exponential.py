@@ -24,7 +24,7 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
 from solvers.certify import fly
 from solvers.collocation import arrive, contact_time, finish_step, leaves_piece, solve_forces, step_error
@@ -33,13 +33,13 @@ from solvers.forcing import Forcing, on_one_grid
 from solvers.handle import Packed, opener
 from solvers.kernels import (
     MATRIX,
-    OPTIONS,
     PROBLEM,
     REAL,
     VECTOR,
     contact_forces,
     copy,
     dot,
+    entry,
     indentation,
     inlined,
     inner,
@@ -368,10 +368,7 @@ def _adapt(tables, numbers, last, level, family, wanted, error):
     last[LEVEL], last[FAMILY], last[FRESH] = level, family, 0
 
 
-@njit(
-    types.int64(*[types.int64] * 4, REAL, types.int64, REAL, MATRIX, MATRIX, VECTOR, types.boolean),
-    **OPTIONS,
-)
+@entry(types.int64(*[types.int64] * 4, REAL, types.int64, REAL, MATRIX, MATRIX, VECTOR, types.boolean))
 def advance(problem_at, tables_at, state_at, space_at, t_end, budget, rtol, log, out, due, ledger):
     """Advance the state to ``t_end`` or for about ``budget`` steps; returns a status code.
 

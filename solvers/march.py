@@ -9,7 +9,7 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
 from solvers.events import (
     GOLDEN,
@@ -29,13 +29,13 @@ from solvers.henon import land as henon_landing
 from solvers.kernels import (
     INTEGERS,
     MATRIX,
-    OPTIONS,
     PROBLEM,
     REAL,
     VECTOR,
     contact_forces,
     copy,
     dot,
+    entry,
     indentation,
     inner,
     kernel,
@@ -293,12 +293,11 @@ def _gains(problem, state, space):
     return gains(problem, state, space)
 
 
-@njit(
+@entry(
     types.int64(
         *[STEP, PROBLEM, STATE, SPACE, REAL, types.int64, REAL, REAL],
         *[REAL, REAL, types.boolean, types.int64, MATRIX, MATRIX, VECTOR],
-    ),
-    **OPTIONS,
+    )
 )
 def march(
     step,

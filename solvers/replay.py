@@ -26,7 +26,7 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
 from solvers.collocation import arrive
 from solvers.dormand_prince import STAGES, A
@@ -34,7 +34,6 @@ from solvers.flight import signal_derivatives, turn
 from solvers.handle import opener
 from solvers.kernels import (
     MATRIX,
-    OPTIONS,
     PROBLEM,
     REAL,
     VECTOR,
@@ -42,6 +41,7 @@ from solvers.kernels import (
     contact_gradient,
     copy,
     dot,
+    entry,
     indentation,
     inlined,
     inner,
@@ -382,7 +382,7 @@ def _land(problem, ahead, behind, tables, shadow, space, slopes, nudge, row):
         copy(slopes.trial[c], slopes.y[c], size)
 
 
-@njit(types.void(*[types.int64] * 10, types.boolean), **OPTIONS)
+@entry(types.void(*[types.int64] * 10, types.boolean))
 def replay(
     problem_at, ahead_at, behind_at, tables_at, state_at, space_at, shadow_at, slopes_at, nudge_at, modes, begins
 ):
