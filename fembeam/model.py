@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 Field = Callable[[Vector], Any] | None  # of displacement in m or velocity in m/s, over z (k,)
+SEEN = ("forces", "springs", "bodies", "impactors")  # parts of a scene besides stops that a system is made of
 UNDRIVEN = ("zeta", "participation", "moving_mass", "section_forces", "touches", "directions")  # whatever drives
 
 
@@ -208,17 +209,18 @@ class Model:
 
     def system_like(self, scene: Scene) -> solvers.System:
         """The same as `system_of`, quicker where only base motion, gaps and laws of the scene's own stops differ."""
-        own, count = self.system, len(self.scene.stops)
+        own, count, frame = self.system, len(self.scene.stops), self._frame_loads(scene)
         parts = zip(scene.stops, self.scene.stops, strict=True)
-        if any((new.z, new.side, new.on) != (old.z, old.side, old.on) for new, old in parts) or any(
-            getattr(scene, name) != getattr(self.scene, name) for name in ("forces", "springs", "bodies", "impactors")
+        if (
+            any((new.z, new.side, new.on) != (old.z, old.side, old.on) for new, old in parts)
+            or any(getattr(scene, name) != getattr(self.scene, name) for name in SEEN)
+            or (scene.base is None, scene.gravity == 0.0) != (self.scene.base is None, self.scene.gravity == 0.0)
         ):
             return self.system_of(scene)
         contacts = [
             contact if new is old else solvers.Contact(contact.direction, new.law, new.gap)
             for contact, new, old in zip(own.contacts, scene.stops, self.scene.stops, strict=False)
         ]
-        frame = self._frame_loads(scene)
         kept = own.loads[: len(own.loads) - len(frame)]
         moved = [(vector, signal) for (vector, _), (_, signal) in zip(own.loads[len(kept) :], frame, strict=True)]
         return own.like([*contacts, *own.contacts[count:]], [*kept, *moved])

@@ -20,7 +20,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -49,7 +48,7 @@ from solvers.ledger import account, inside
 from solvers.peaks import peaks_so_far
 from solvers.preparation import SPACE, TABLES, among_tones, prepared_for, without_resonance
 from solvers.regular import INDENTATION, ROOT, regular_step
-from solvers.response import Space, free_response
+from solvers.response import free_response
 from solvers.state import (
     AT_ONCE,
     CALLS,
@@ -81,7 +80,7 @@ from solvers.state import (
     touching,
 )
 from solvers.system import Array, System
-from solvers.tables import S, Tables
+from solvers.tables import S
 from solvers.vector import combine
 
 # places in `numbers`: reference speed, T_c, then per stop a first step's share of T_c
@@ -459,16 +458,6 @@ class Engine:
         state, space = (words + start for start in prepared.layout.starts)
         self.addresses = packed.address, prepared.tables.address, state, space
         self.block = block
-
-    @property
-    def tables(self) -> Tables:
-        """Everything known per step size."""
-        return self.prepared.tables.value
-
-    @cached_property
-    def space(self) -> Space:
-        """The working space."""
-        return Space._make(self.prepared.layout.arrays(self.block, 1))
 
     def record(self, tape: Array) -> None:
         """Write what happens in contact to a tape."""

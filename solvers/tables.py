@@ -128,64 +128,62 @@ def _block_response(k, c, h, rate, power, exponent, nodes, weights, gauss, out, 
 
 
 @inner
-def _fill_level(
-    problem,
-    blocks,
-    h,
-    family,
-    level,
-    entering,
-    power,
-    exponent,
-    nodes,
-    weights,
-    gauss,
-    inputs,
-    free,
-    forced,
-    kick,
-    work,
-    basis,
-):
-    """All tables of one family and contact level, for the blocks from the first to before the last."""
-    count, size, stops = nodes.size, problem.k.size, problem.gap.size
-    for b in range(blocks[0], blocks[1]):
-        k, c = problem.k[b], problem.c[b]
-        rate = math.sqrt(k) + c
-        for i in range(count):
-            alpha, beta = propagate(k, c, h * nodes[i] ** power)
-            for s in range(stops):
-                for d in range(2):
-                    r = problem.read[s] if d == 0 else problem.read_rate[s]
-                    free[family, level, s, b, d * count + i] = r[b] * alpha - r[size + b] * k * beta
-                    free[family, level, s, size + b, d * count + i] = r[b] * beta + r[size + b] * (alpha - c * beta)
-        pushed = 0.0
-        for u in range(inputs.shape[0]):
-            pushed += abs(inputs[u, b]) + abs(inputs[u, size + b])
-        for weighted in range(2):
-            if pushed == 0.0 or (weighted == 1 and exponent == 0.0):
+def _fill_free(problem, b, h, family, level, power, nodes, free):
+    """What one block's state does at the nodes of one family and contact level."""
+    count, size = nodes.size, problem.k.size
+    k, c = problem.k[b], problem.c[b]
+    for i in range(count):
+        alpha, beta = propagate(k, c, h * nodes[i] ** power)
+        for s in range(problem.gap.size):
+            for d in range(2):
+                r = problem.read[s] if d == 0 else problem.read_rate[s]
+                free[family, level, s, b, d * count + i] = r[b] * alpha - r[size + b] * k * beta
+                free[family, level, s, size + b, d * count + i] = r[b] * beta + r[size + b] * (alpha - c * beta)
+
+
+@inner
+def _fill_forced(problem, b, family, level, u, pushed, nodes, work, forced, kick):
+    """What one input does through one block, from the block's response in ``work``; ``pushed`` is its (p, v) part."""
+    count, size = nodes.size, problem.k.size
+    k, c = problem.k[b], problem.c[b]
+    for j in range(count):
+        for i in range(count + 1):
+            alpha, beta = work[i, j, 0], work[i, j, 1]
+            p = alpha * pushed[0] + beta * pushed[1]
+            v = -k * beta * pushed[0] + (alpha - c * beta) * pushed[1]
+            if i == count:
+                kick[family, level, u, j, b] = p
+                kick[family, level, u, j, size + b] = v
                 continue
-            _block_response(k, c, h, rate, power, exponent * weighted, nodes, weights[weighted], gauss, work, basis)
-            for u in range(inputs.shape[0]):
-                if (u == entering and exponent > 0.0) != (weighted == 1):
-                    continue
-                bp, bv = inputs[u, b], inputs[u, size + b]
-                if bp == 0.0 and bv == 0.0:
-                    continue
-                for j in range(count):
-                    for i in range(count + 1):
-                        alpha, beta = work[i, j, 0], work[i, j, 1]
-                        p = alpha * bp + beta * bv
-                        v = -k * beta * bp + (alpha - c * beta) * bv
-                        if i == count:
-                            kick[family, level, u, j, b] = p
-                            kick[family, level, u, j, size + b] = v
-                            continue
-                        for s in range(stops):
-                            forced[family, level, s, u, j, i] += problem.read[s, b] * p + problem.read[s, size + b] * v
-                            forced[family, level, s, u, j, count + i] += (
-                                problem.read_rate[s, b] * p + problem.read_rate[s, size + b] * v
-                            )
+            for s in range(problem.gap.size):
+                forced[family, level, s, u, j, i] += problem.read[s, b] * p + problem.read[s, size + b] * v
+                forced[family, level, s, u, j, count + i] += (
+                    problem.read_rate[s, b] * p + problem.read_rate[s, size + b] * v
+                )
+
+
+@inner
+def _fill_block(
+    problem, b, h, family, level, power, exponent, nodes, weights, gauss, inputs, forced, kick, work, basis
+):
+    """What inputs do through one block: the stop that enters pushes with a broken exponent, the others without."""
+    size = problem.k.size
+    rate = math.sqrt(problem.k[b]) + problem.c[b]
+    reached = 0.0
+    for u in range(inputs.shape[0]):
+        reached += abs(inputs[u, b]) + abs(inputs[u, size + b])
+    for weighted in range(2):
+        if reached == 0.0 or (weighted == 1 and exponent == 0.0):
+            continue
+        _block_response(
+            *(problem.k[b], problem.c[b], h, rate, power, exponent * weighted),
+            *(nodes, weights[weighted], gauss, work, basis),
+        )
+        for u in range(inputs.shape[0]):
+            pushed = inputs[u, b], inputs[u, size + b]
+            enters = u == family - 1 and exponent > 0.0
+            if enters == (weighted == 1) and (pushed[0] != 0.0 or pushed[1] != 0.0):
+                _fill_forced(problem, b, family, level, u, pushed, nodes, work, forced, kick)
 
 
 @kernel
@@ -195,10 +193,12 @@ def _fill(problem, blocks, h, powers, exponents, nodes, weights, gauss, inputs, 
         if f > 0 and exponents[f] == 0.0:
             continue
         for level in range(h.size):
-            _fill_level(
-                *(problem, blocks, h[level], f, level, f - 1, powers[f], exponents[f], nodes[f], weights[f]),
-                *(gauss, inputs, free, forced, kick, work, basis),
-            )
+            for b in range(blocks[0], blocks[1]):
+                _fill_free(problem, b, h[level], f, level, powers[f], nodes[f], free)
+                _fill_block(
+                    *(problem, b, h[level], f, level, powers[f], exponents[f], nodes[f], weights[f]),
+                    *(gauss, inputs, forced, kick, work, basis),
+                )
 
 
 @kernel
@@ -239,9 +239,11 @@ class _Blocks(NamedTuple):
     step_propagator: Any
     free: Any
     ripple: Any
-    forced: Any  # this and the next are those of the structure alone
+    forced: Any
     kick: Any
 
+
+_OF_TONES = ("propagator", "step_propagator", "free", "ripple")  # the tables that tones have a part in
 
 _KNOWN: OrderedDict[bytes, _Blocks] = OrderedDict()  # structures met lately: a tone, gap or stiffness more is cheap
 _MOST_KNOWN = 16
@@ -333,7 +335,7 @@ def _blocks(problem: Problem, tones: int, h: Any, contact_h: Any, families: _Fam
     known = _KNOWN[key]
     if not tones:
         return known
-    copied = known._replace(**{name: getattr(known, name).copy() for name in _Blocks._fields[:4]})
+    copied = known._replace(**{name: getattr(known, name).copy() for name in _OF_TONES})
     return _filled(copied, problem, (own, size), h, contact_h, families)
 
 
@@ -362,8 +364,9 @@ def _filled(
     )
     _fill_ripple(problem, blocks, contact_h, _PHASES, families.alias, tables.ripple)
     for f in np.flatnonzero(families.exponent[1:] == 0.0) + 1:  # an analytic entry is a smooth step
-        for array in (tables.free, *tables[4:])[: None if blocks[0] == 0 else 1]:
-            array[f] = array[0]
+        tables.free[f] = tables.free[0]
+        if blocks[0] == 0:
+            tables.forced[f], tables.kick[f] = tables.forced[0], tables.kick[0]
     return tables
 
 

@@ -121,6 +121,14 @@ def test_other_signals_leave_the_rest_of_a_model_as_it_is():
     assert model.under(model.scene).touches is model.touches
 
 
+def test_a_model_under_loads_that_come_or_go_is_that_made_anew():
+    model = small_model(base=fb.Harmonic(1e-4, 200.0))
+    for change in ({"base": None}, {"gravity": 9.81}, {"base": None, "gravity": 9.81}):
+        scene = replace(model.scene, **change)
+        under, anew = (other.simulate(0.1, 0.01) for other in (model.under(scene), replace(model, scene=scene)))
+        np.testing.assert_array_equal(under.q, anew.q)
+
+
 def test_realisations_take_no_fresh_memory():
     resource = pytest.importorskip("resource")
     if not platform.libc_ver()[0].startswith("glibc"):
