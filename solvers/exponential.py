@@ -29,7 +29,7 @@ from solvers.certify import fly
 from solvers.collocation import arrive, contact_time, finish_step, leaves_piece, solve_forces, step_error
 from solvers.flight import energy_norms
 from solvers.forcing import Forcing, on_one_grid
-from solvers.handle import Packed, opener
+from solvers.handle import Cast, Packed, opener
 from solvers.kernels import (
     MATRIX,
     PROBLEM,
@@ -448,7 +448,8 @@ class Engine:
         self.method, self.duration = method, duration
         forcing = on_one_grid(without_resonance(system, forcing, duration, method.rtol), duration)
         prepared = prepared_for(system, forcing)
-        self.back, packed = prepared.back, prepared.problem
+        self.back = prepared.back
+        packed: Cast | Packed = prepared.problem
         if forcing.table.size:
             packed = Packed(packed.value._replace(table=forcing.table, table_start=forcing.table_start), PROBLEM)
         self.packed, self.problem, self.prepared = packed, packed.value, prepared
@@ -462,8 +463,7 @@ class Engine:
     def record(self, tape: Array) -> None:
         """Write what happens in contact to a tape."""
         self.state = self.state._replace(tape=tape)
-        self.taped = Packed(self.state, STATE)
-        self.addresses = *self.addresses[:2], self.taped.address, self.addresses[3]
+        self.prepared.layout.exchange(self.block, 0, State._fields.index("tape"), tape)
 
     def start(self) -> None:
         """The compiled loop does so itself."""

@@ -10,7 +10,9 @@ from __future__ import annotations
 import ctypes
 import math
 import struct
-from typing import Any
+from collections.abc import Sequence
+from itertools import chain
+from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import ir
@@ -99,20 +101,62 @@ def address_of(array: Any) -> int:
     return ctypes.addressof(ctypes.c_char.from_buffer(array))
 
 
+def _described(value: Any, kind: types.NamedTuple) -> list[list[int]]:
+    """Of every field the words that describe it: an array's descriptor, or the number itself."""
+    found = []
+    for name, item, (expected, ndim, dtype) in zip(value._fields, value, _expected(kind), strict=True):
+        if dtype is None:
+            found.append([struct.unpack("q", struct.pack("d", item))[0]])
+            continue
+        if item.ndim != ndim or item.dtype != dtype or not item.flags.c_contiguous:
+            raise TypeError(f"{name} must be a contiguous {expected}, got {item.dtype} with shape {item.shape}")
+        found.append([*_META, item.size, 8, address_of(item), *item.shape, *item.strides])
+    return found
+
+
 class Packed:
     """A named tuple with the address of its arrays' descriptors."""
 
     def __init__(self, value: Any, kind: types.NamedTuple) -> None:
-        words: list[int] = []
-        for name, item, (expected, ndim, dtype) in zip(value._fields, value, _expected(kind), strict=True):
-            if dtype is None:
-                words.append(struct.unpack("q", struct.pack("d", item))[0])
-                continue
-            if item.ndim != ndim or item.dtype != dtype or not item.flags.c_contiguous:
-                raise TypeError(f"{name} must be a contiguous {expected}, got {item.dtype} with shape {item.shape}")
-            words += [*_META, item.size, 8, address_of(item), *item.shape, *item.strides]
-        self.value, self.words = value, np.array(words, dtype=np.int64)
-        self.address = address_of(self.words)
+        self.value, self.block = value, np.array([*chain(*_described(value, kind))], dtype=np.int64)
+        self.address = address_of(self.block)
+
+
+class Cast(NamedTuple):
+    """What a `Mould` makes: a packed named tuple."""
+
+    value: Any
+    block: Any  # its own arrays, then the descriptors
+    address: int
+
+
+class Mould:
+    """A named tuple to be packed again and again: the arrays named are every cast's own, all casts share the others."""
+
+    def __init__(self, value: Any, kind: types.NamedTuple, own: Sequence[str]) -> None:
+        self.value, described = value, _described(value, kind)
+        begins = np.cumsum([0] + [len(words) for words in described])
+        self.begins = dict(zip(value._fields, begins.tolist(), strict=False))
+        arrays = [getattr(value, name) for name in own]
+        ends = np.cumsum([array.size for array in arrays])
+        self.slices = [
+            (name, slice(end - array.size, end), array.shape)
+            for name, array, end in zip(own, arrays, ends.tolist(), strict=True)
+        ]
+        self.size, self.own = int(ends[-1]), np.array([self.begins[name] + 4 for name in own])
+        self.offsets = 8 * (ends - [array.size for array in arrays])
+        words = np.array([*chain(*described)], dtype=np.int64)
+        self.block = np.concatenate([*(array.ravel() for array in arrays), words.view(float)])
+
+    def cast(self, **numbers: float) -> Cast:
+        """A new one, to write into its own arrays, with some plain numbers of its own."""
+        block = self.block.copy()
+        address = address_of(block)
+        block[self.size :].view(np.int64)[self.own] = address + self.offsets
+        for name, number in numbers.items():
+            block[self.size + self.begins[name]] = number
+        arrays = {name: block[place].reshape(shape) for name, place, shape in self.slices}
+        return Cast(self.value._replace(**arrays, **numbers), block, address + 8 * self.size)
 
 
 def _descriptor(shape: tuple[int, ...], data: int) -> list[int]:
@@ -129,11 +173,14 @@ class Layout:
         data: list[int] = []
         self.starts: list[int] = []
         self.slices: list[list[tuple[slice, str, tuple[int, ...]]]] = []
+        self.descriptors: list[list[int]] = []  # where they begin
         self.size = 0
         for kind, of_kind in zip(kinds, shapes, strict=True):
             self.starts.append(8 * len(words))
             self.slices.append([])
+            self.descriptors.append([])
             for array, shape in zip(kind.types, of_kind, strict=True):
+                self.descriptors[-1].append(len(words))
                 data.append(len(words) + 4)
                 words += _descriptor(shape, 8 * self.size)
                 end = self.size + math.prod(shape)
@@ -152,8 +199,16 @@ class Layout:
 
     def arrays(self, block: Any, i: int) -> list[Any]:
         """The arrays of the i-th tuple."""
-        parts = ((block[place], kind, shape) for place, kind, shape in self.slices[i])
-        return [
-            (part if kind == "float64" else part.view(kind)) if len(shape) == 1 else part.view(kind).reshape(shape)
-            for part, kind, shape in parts
-        ]
+        return [self.array(block, i, j) for j in range(len(self.slices[i]))]
+
+    def array(self, block: Any, i: int, j: int) -> Any:
+        """The j-th array of the i-th tuple."""
+        place, kind, shape = self.slices[i][j]
+        part = block[place] if kind == "float64" else block[place].view(kind)
+        return part if len(shape) == 1 else part.reshape(shape)
+
+    def exchange(self, block: Any, i: int, j: int, array: Any) -> None:
+        """Let the j-th array of the i-th tuple be another one, of the same kind, which somebody must keep alive."""
+        words = _descriptor(array.shape, address_of(array))
+        begin = self.size + self.descriptors[i][j]
+        block[begin : begin + len(words)].view(np.int64)[:] = words

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -60,11 +61,13 @@ class Orbit:
     parameter: float = math.nan
     mark: str = ""
 
-    @property
+    @cached_property
     def multipliers(self) -> Any:
         """Floquet multipliers (2n,), largest first."""
         values = np.linalg.eigvals(self.monodromy)
-        return values[np.argsort(-np.abs(values), kind="stable")]
+        values = values[np.argsort(-np.abs(values), kind="stable")]
+        values.setflags(write=False)
+        return values
 
     @property
     def stable(self) -> bool:

@@ -8,7 +8,8 @@ at a fixed parameter, which asks for one system only, or, near folds, at right a
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -30,8 +31,9 @@ class Point:
     chain: Chain
     tangent: Array
     metric: Array
+    tests: dict[str, float] = field(default_factory=dict, init=False, repr=False)  # test functions, once asked for
 
-    @property
+    @cached_property
     def unknowns(self) -> Array:
         """[states, parameter]."""
         return np.append(self.chain.x.ravel(), self.chain.parameter)

@@ -10,12 +10,12 @@ import numpy as np
 from numba import types
 
 from solvers.forcing import Forcing, tones_as_nodes
-from solvers.handle import Layout, Packed
+from solvers.handle import Cast, Layout, Mould
 from solvers.kernels import INTEGERS, MATRIX, PROBLEM, REAL, VECTOR, Problem
 from solvers.response import Space
-from solvers.state import STATE, problem_of, rate_rows, state_shapes
+from solvers.state import STATE, problem_of, state_shapes
 from solvers.system import Array, System
-from solvers.tables import S, Tables, build
+from solvers.tables import OF_TONES, S, Tables, build, doublings, fill_tones
 from solvers.vector import padded
 
 
@@ -39,8 +39,8 @@ SPACE = types.NamedTuple(
 class Prepared(NamedTuple):
     """What does not change from run to run of one system."""
 
-    problem: Packed
-    tables: Packed
+    problem: Cast
+    tables: Cast
     back: Array  # (2n, 2N): [q, q̇] from the state of all blocks
     layout: Layout  # of State and Space
     rest: Array  # state of the tones' blocks at t = 0, the structure's less their steady response
@@ -51,25 +51,90 @@ def prepared_for(system: System, forcing: Forcing) -> Prepared:
     dt_cell = float(forcing.table_dt[0]) if forcing.table_dt.size else 1.0
     key = dt_cell, *(part.tobytes() for part in (forcing.tone_omega, forcing.tone_amplitude, forcing.tone_load))
     if system.kept.get("exponential", (None,))[0] != key:
-        if "passive" not in system.about_structure:
-            _check_passive(system)
-            system.about_structure["passive"] = True
-        plain = problem_of(system, forcing)
-        problem, steady = with_tones(plain, forcing)
-        laws = [contact.law for contact in system.contacts]
-        ledger = (_signal_rows(problem, forcing), problem.power, _loss_rows(plain) @ steady)
-        tables = build(
-            *(problem, len(forcing.tone_omega), [law.exponent for law in laws], [law.jump for law in laws]),
-            *(dt_cell, ledger),
-        )
-        layout = _layout(len(problem.gap), len(problem.load), len(problem.k), len(forcing.table_dt))
-        made = Prepared(
-            *(Packed(problem, PROBLEM), Packed(tables, TABLES), system.blocks.T @ steady),
-            *(layout, _rest(steady, len(forcing.tone_omega))),
-        )
-        system.kept["exponential"] = (key, made)
+        gaps = [contact.gap for contact in system.contacts]
+        system.kept["exponential"] = key, _skeleton_for(system, forcing, dt_cell).with_tones(forcing, gaps)
     prepared: Prepared = system.kept["exponential"][1]
     return prepared
+
+
+def _skeleton_for(system: System, forcing: Forcing, dt_cell: float) -> _Skeleton:
+    """What systems have in common that differ in tones and gaps only; without sampled signals it is kept for them."""
+    about, laws = system.about_structure, system.about_laws
+    if "passive" not in about:
+        _check_passive(system)
+        about["passive"] = True
+    if forcing.table_dt.size:
+        return _Skeleton(system, forcing, dt_cell)
+    key = forcing.tone_load.tobytes(), doublings(_speeds(system), forcing.tone_omega)
+    known = about.get("skeleton", (None, None))
+    if known[0] != key or known[1] is not laws:
+        known = about["skeleton"] = key, laws, _Skeleton(system, forcing, dt_cell)
+    skeleton: _Skeleton = known[2]
+    return skeleton
+
+
+def _speeds(system: System) -> Array:
+    """Bounds of the blocks' |λ|."""
+    speeds: Array = np.sqrt(system.blocks.k) + system.blocks.c
+    return speeds
+
+
+class _Skeleton:
+    """The problem and its tables with room for tones, each of which becomes one more undamped block.
+
+    The steady response to Re(a e^{iΩt}) is Re(Z e^{iΩt}) = Re Z · p + Im Z/Ω · v with p = cos Ωt, v = -Ω sin Ωt.
+    """
+
+    def __init__(self, system: System, forcing: Forcing, dt_cell: float) -> None:
+        self.plain, self.tones = problem_of(system, forcing), len(forcing.tone_omega)
+        laws = [contact.law for contact in system.contacts]
+        self.kinds = [law.exponent for law in laws], [law.jump for law in laws]
+        problem = _widened(self.plain, forcing)
+        loss = _loss_rows(self.plain)
+        read_by = self.plain.read, self.plain.power, loss, system.blocks.T
+        self.rows, ends = np.concatenate(read_by), np.cumsum([len(rows) for rows in read_by]).tolist()
+        self.places = [slice(end - len(rows), end) for rows, end in zip(read_by, ends, strict=True)]
+        self.back, self.fastest = among_tones(system.blocks.T, self.tones), max(float(_speeds(system).max()), 1e-3)
+        ledger = np.zeros_like(problem.load), problem.power, among_tones(loss, self.tones)
+        tables = build(problem, self.tones, *self.kinds, dt_cell, ledger)
+        self.layout = _layout(len(problem.gap), len(problem.load), len(problem.k), len(forcing.table_dt))
+        self.problem = Mould(problem, PROBLEM, ("gap", "k", "read", "read_rate", "power"))
+        self.tables = Mould(tables, TABLES, OF_TONES)
+
+    def with_tones(self, forcing: Forcing, gaps: list[float]) -> Prepared:
+        """The same with the columns of given tones, and with given gaps."""
+        omega, amplitude, n = forcing.tone_omega, forcing.tone_amplitude, len(self.plain.k)
+        load = self.plain.load[forcing.tone_load] * amplitude[:, None]
+        response = steady_response(self.plain.k, self.plain.c, load, omega[:, None])
+        turn = 1.0 / np.where(omega > 0.0, omega, np.inf)
+        steady = np.concatenate((response.real, response.imag * turn[:, None])).T  # (2n, 2 tones)
+        columns = (self.rows @ steady).reshape(len(self.rows), 2, self.tones)
+        problem, tables, back = self.problem.cast(), self._tables(forcing, turn), self.back.copy()
+        read_by = problem.value.read, problem.value.power, tables.value.loss_rows, back
+        for rows, place in zip(read_by, self.places, strict=True):
+            _of_tones(rows, n)[:] = columns[place]
+        problem.value.gap[:], problem.value.k[n:] = gaps, omega**2
+        p, v = columns[self.places[0]].transpose(1, 0, 2)
+        rate = _of_tones(problem.value.read_rate, n)
+        rate[:, 0], rate[:, 1] = -v * problem.value.k[n:], p
+        tables.value.power_rows[:] = problem.value.power
+        fill_tones(tables.value, problem.value, self.tones, *self.kinds)
+        rest = among_tones(-response.real.sum(axis=0), self.tones)
+        rest[n : n + self.tones] = 1.0
+        return Prepared(problem, tables, back, self.layout, rest)
+
+    def _tables(self, forcing: Forcing, turn: Array) -> Cast:
+        """Tables that know the signals made of tones, Re(a e^{iΩt}) = Re a · p + Im a/Ω · v; ``turn`` is 1/Ω."""
+        tables = self.tables.cast(fastest=max(self.fastest, float(forcing.tone_omega.max(initial=0.0))))
+        rows, load, each = tables.value.signal_rows, forcing.tone_load, np.arange(self.tones)
+        rows[load, each - self.tones + rows.shape[1] // 2] = forcing.tone_amplitude.real
+        rows[load, each - self.tones] = forcing.tone_amplitude.imag * turn
+        return tables
+
+
+def _of_tones(rows: Array, n: int) -> Array:
+    """(k, 2, tones) columns of the blocks behind the first n."""
+    return rows.reshape(len(rows), 2, rows.shape[1] // 2)[:, :, n:]
 
 
 def _check_passive(system: System) -> None:
@@ -128,18 +193,6 @@ def _distance(system: System, omega: float, load: int) -> tuple[float, float]:
     return float(distance.min()), float((distance / scale).min())
 
 
-def _signal_rows(problem: Problem, forcing: Forcing) -> Array:
-    """Each load's tones as a row of the state: Re(a e^{iΩt}) = Re a · p + Im a/Ω · v."""
-    tones, N = len(forcing.tone_omega), len(problem.k)
-    rows = np.zeros((len(problem.load), 2 * N))
-    for i, (omega, amplitude, load) in enumerate(
-        zip(forcing.tone_omega, forcing.tone_amplitude, forcing.tone_load, strict=True)
-    ):
-        rows[load, N - tones + i] = amplitude.real
-        rows[load, 2 * N - tones + i] = amplitude.imag / omega if omega > 0.0 else 0.0
-    return rows
-
-
 def _loss_rows(problem: Problem) -> Array:
     """Rows whose squares sum to the damping power: √c v, or a root of the coupled loss."""
     n = len(problem.k)
@@ -157,49 +210,22 @@ def steady_response(k: Array, c: Array, load: Any, omega: Any) -> Any:
     return np.concatenate((((turn + c) * lp + lv) * inverse, (turn * lv - k * lp) * inverse), axis=-1)
 
 
-def with_tones(problem: Problem, forcing: Forcing) -> tuple[Problem, Array]:
-    """The problem with one undamped block per tone, and the map (2n, 2N) from its state to the blocks' z.
-
-    The steady response to Re(a e^{iΩt}) is Re(Z e^{iΩt}) = Re Z · p + Im Z/Ω · v with p = cos Ωt, v = -Ω sin Ωt.
-    """
-    n, tones = len(problem.k), len(forcing.tone_omega)
-    steady = np.zeros((2 * n, 2 * (n + tones)))
-    steady[:n, :n] = steady[n:, n + tones : 2 * n + tones] = np.eye(n)
-    for i, (omega, amplitude, load) in enumerate(
-        zip(forcing.tone_omega, forcing.tone_amplitude, forcing.tone_load, strict=True)
-    ):
-        response = steady_response(problem.k, problem.c, problem.load[load] * amplitude, omega)
-        steady[:, n + i] = response.real
-        if omega > 0.0:
-            steady[:, 2 * n + tones + i] = response.imag / omega
-    none = np.zeros(0)
-    push = np.zeros((len(problem.gap), 2 * (n + tones)))
-    push[:, :n], push[:, n + tones : 2 * n + tones] = problem.push[:, :n], problem.push[:, n:]
-    sampled = np.zeros((len(problem.load), 2 * (n + tones)))
-    for load in forcing.table_load:
-        sampled[load, :n], sampled[load, n + tones : 2 * n + tones] = problem.load[load, :n], problem.load[load, n:]
-    k = np.concatenate((problem.k, forcing.tone_omega**2))
-    c = np.concatenate((problem.c, np.zeros(tones)))
+def _widened(problem: Problem, forcing: Forcing) -> Problem:
+    """The problem with one block per tone, which nothing reads yet; tones are no load of it any more."""
+    tones, none = len(forcing.tone_omega), np.zeros(0)
+    sampled = np.zeros_like(problem.load)
+    sampled[forcing.table_load] = problem.load[forcing.table_load]
+    rows = {name: among_tones(getattr(problem, name), tones) for name in ("push", "read", "read_rate", "power")}
     return problem._replace(
-        k=k,
-        c=c,
+        k=np.concatenate((problem.k, forcing.tone_omega**2)),
+        c=np.concatenate((problem.c, np.zeros(tones))),
         loss=np.empty((0, 0)),
-        push=push,
-        read=problem.read @ steady,
-        read_rate=rate_rows(problem.read @ steady, k, c),
-        load=sampled,
-        power=problem.power @ steady,
+        load=among_tones(sampled, tones),
         tone_omega=none,
         tone_amplitude=none.astype(complex),
         tone_load=none.astype(np.int64),
-    ), steady
-
-
-def _rest(steady: Array, tones: int) -> Array:
-    """State at t = 0 of a structure at rest: the tones' blocks have p = 1, v = 0, the others less their response."""
-    pseudo = np.zeros(steady.shape[1])
-    pseudo[len(pseudo) // 2 - tones : len(pseudo) // 2] = 1.0
-    return pseudo - among_tones(steady @ pseudo, tones)
+        **rows,
+    )
 
 
 def places_among_tones(n: int, tones: int) -> Any:
@@ -208,7 +234,9 @@ def places_among_tones(n: int, tones: int) -> Any:
     return np.concatenate((own, own + (n + tones)))
 
 
-def among_tones(z: Array, tones: int) -> Array:
-    """Block coordinates with zeros for the tones' blocks."""
-    n = len(z) // 2
-    return np.concatenate((z[:n], np.zeros(tones), z[n:], np.zeros(tones)))
+def among_tones(rows: Array, tones: int) -> Array:
+    """Block coordinates (..., 2n) with zeros for the tones' blocks."""
+    n = rows.shape[-1] // 2
+    out = np.zeros((*rows.shape[:-1], 2, n + tones))
+    out[..., :n] = rows.reshape(*rows.shape[:-1], 2, n)
+    return out.reshape(*rows.shape[:-1], 2 * (n + tones))

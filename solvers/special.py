@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from itertools import pairwise
 from typing import Any
 
@@ -37,18 +38,31 @@ _MOST_GRAZINGS = 4  # looked for between two points
 def indicators(orbit: Orbit, tangent: Array) -> dict[str, float]:
     """Test functions of an orbit; each changes its sign at a special point of its name."""
     mu = orbit.multipliers
-    pairs = np.outer(mu, mu)[np.triu_indices(len(mu), 1)]
+    first, second = _pairs(len(mu))
     return {
         "fold": float(tangent[-1]),
         "flip": _product(mu, 1.0),
-        "neimark-sacker": _product(pairs, -1.0),
+        "neimark-sacker": _product(mu[first] * mu[second], -1.0),
         "branch point": _product(mu, -1.0),
     }
 
 
+@lru_cache(maxsize=16)
+def _pairs(count: int) -> Any:
+    """Numbers (2, pairs) of all pairs of multipliers."""
+    return np.triu_indices(count, 1)
+
+
+def indicators_at(point: Point) -> dict[str, float]:
+    """Test functions of a point, which is asked on both of its sides; kept there."""
+    if not point.tests:
+        point.tests.update(indicators(point.orbit, point.tangent))
+    return point.tests
+
+
 def _product(values: Any, shift: float) -> float:
     """Π (value + shift) / (1 + |value|), of values that are real or come in conjugate pairs."""
-    return float(np.prod((values + shift) / (1.0 + np.abs(values))).real)
+    return float(((values + shift) / (1.0 + np.abs(values))).prod().real)
 
 
 def _is_at(orbit: Orbit, name: str) -> bool:
@@ -96,7 +110,7 @@ class Stretch:
         """Test functions at an arclength from a."""
         for place, point in ((0.0, self.a), (self.way, self.b)):
             if s == place:
-                return indicators(point.orbit, point.tangent)
+                return indicators_at(point)
         chain, orbit = self.at(s)
         a = self.a
         return indicators(orbit, a.tangent if self.straight else tangent_of(chain, a.metric, a.tangent))
@@ -138,14 +152,16 @@ def _dips(stretch: Stretch, before: tuple[Point, float] | None) -> Iterator[tupl
     """(arclength, orbit) where a test function of one sign at both ends has the other, by a parabola through three."""
     if before is None:
         return
-    first = indicators(before[0].orbit, before[0].tangent)
-    begin, end = stretch.indicators(0.0), stretch.indicators(stretch.way)
+    first, begin, end = (indicators_at(point) for point in (before[0], stretch.a, stretch.b))
     for name in ("flip", "neimark-sacker"):
-        curve = np.polyfit([-before[1], 0.0, stretch.way], [first[name], begin[name], end[name]], 2)
-        place = -0.5 * curve[1] / curve[0] if curve[0] else 0.0
-        if begin[name] * end[name] > 0.0 > begin[name] * np.polyval(curve, place) and 0.0 < place < stretch.way:
+        f = begin[name]
+        back, ahead = (f - first[name]) / before[1], (end[name] - f) / stretch.way  # slopes on both sides
+        bend = (ahead - back) / (before[1] + stretch.way)
+        slope = ahead - bend * stretch.way
+        place = -0.5 * slope / bend if bend else 0.0
+        if f * end[name] > 0.0 > f * (f + 0.5 * slope * place) and 0.0 < place < stretch.way:
             try:
-                yield float(place), stretch.at(float(place))[1]
+                yield place, stretch.at(place)[1]
             except OrbitError:
                 continue
 

@@ -243,7 +243,11 @@ class _Blocks(NamedTuple):
     kick: Any
 
 
-_OF_TONES = ("propagator", "step_propagator", "free", "ripple")  # the tables that tones have a part in
+# the tables that tones have a part in
+OF_TONES = (
+    *("propagator", "step_propagator", "free", "ripple", "weight", "reach"),
+    *("signal_rows", "power_rows", "loss_rows"),
+)
 
 _KNOWN: OrderedDict[bytes, _Blocks] = OrderedDict()  # structures met lately: a tone, gap or stiffness more is cheap
 _MOST_KNOWN = 16
@@ -257,7 +261,7 @@ def build(
     dt_cell: float,
     ledger: tuple[Any, Any, Any],
 ) -> Tables:
-    """Tables of a problem whose last blocks are ``tones``."""
+    """Tables of a problem whose last blocks are ``tones``, but for their columns, which `fill_tones` fills."""
     size = len(problem.k)
     omega, damping = np.sqrt(problem.k), problem.c
     fastest = float(max((omega + damping).max(), 1e-3))
@@ -298,11 +302,29 @@ def build(
     )
 
 
+def fill_tones(tables: Tables, problem: Problem, tones: int, exponents: list[float], jumps: list[bool]) -> None:
+    """Fill the columns of a problem's last blocks, its ``tones``, into tables `build` has made."""
+    if not tones:
+        return
+    size = len(problem.k)
+    own, k = size - tones, problem.k[size - tones :]
+    p, v, omega = np.abs(problem.read[:, own:size]), np.abs(problem.read[:, size + own :]), np.sqrt(k)
+    tables.weight[:, own:], tables.reach[:, own:] = p * omega + v * k, p + v * omega
+    blocks = _Blocks(*(getattr(tables, name) for name in _Blocks._fields))
+    _filled(blocks, problem, (own, size), tables.h, tables.step, _families(tuple(exponents), tuple(jumps)))
+
+
+def doublings(speeds: Any, tones: Any) -> int:
+    """How many times twice as fast as a structure's blocks the fastest tone is, rounded up; 0 for a slower one."""
+    ratio = float(tones.max(initial=0.0)) / max(float(speeds.max()), 1e-3)
+    return math.ceil(math.log2(max(ratio, 1.0)))
+
+
 def _steps(omega: Any, damping: Any, tones: int) -> tuple[Any, Any]:
     """Flight and contact steps. They depend on the structure alone, but for tones faster than it."""
-    own = slice(0, omega.size - tones) if tones < omega.size else slice(None)
-    ratio = max((omega + damping).max(), 1e-3) / max((omega + damping)[own].max(), 1e-3)
-    return _steps_of(omega[own].tobytes(), damping[own].tobytes(), math.ceil(math.log2(max(ratio, 1.0))))
+    own = omega.size - tones
+    times = doublings((omega + damping)[:own], omega[own:])
+    return _steps_of(omega[:own].tobytes(), damping[:own].tobytes(), times)
 
 
 @lru_cache(maxsize=64)
@@ -321,7 +343,7 @@ def _steps_of(omegas: bytes, dampings: bytes, doublings: int) -> tuple[Any, Any]
 
 
 def _blocks(problem: Problem, tones: int, h: Any, contact_h: Any, families: _Families) -> _Blocks:
-    """Tables of all blocks; those of a structure met lately are kept, and only the tones' filled in anew."""
+    """Tables of all blocks, zero for the tones; those of a structure met lately are kept."""
     size = len(problem.k)
     own = size - tones
     rows = (row.reshape(-1, 2, size)[:, :, :own] for row in (problem.push, problem.read, problem.load))
@@ -332,11 +354,7 @@ def _blocks(problem: Problem, tones: int, h: Any, contact_h: Any, families: _Fam
         while len(_KNOWN) > _MOST_KNOWN:
             _KNOWN.popitem(last=False)
     _KNOWN.move_to_end(key)
-    known = _KNOWN[key]
-    if not tones:
-        return known
-    copied = known._replace(**{name: getattr(known, name).copy() for name in _OF_TONES})
-    return _filled(copied, problem, (own, size), h, contact_h, families)
+    return _KNOWN[key]
 
 
 def _empty(problem: Problem, h: Any, contact_h: Any, families: _Families) -> _Blocks:

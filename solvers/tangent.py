@@ -20,6 +20,7 @@ from solvers.system import Array, Parameter, System
 from solvers.tables import S
 
 _ROWS = 256  # of the tape between two replays: some 25 contacts, within which no derivative overflows
+_CARRIED = [Slopes._fields.index(name) for name in ("y", "entry", "shift", "rate")]
 _LARGE = 1e100  # size at which the derivatives are scaled down
 
 
@@ -36,11 +37,11 @@ class Tangent:
         self.change, columns = change or _Change.none(problem, n), 2 * n + self.exact
         layout = _layout(stops, loads, width, columns)
         self.block, words = layout.block()
-        self.slopes = Slopes._make(layout.arrays(self.block, 0))
+        self.y, self.entry, self.shift, self.end_rate = (layout.array(self.block, 0, i) for i in _CARRIED)
         begin_state(State._make(layout.arrays(self.block, 1)), state.x[:size])
         self.places = places_among_tones(n, size // 2 - n)
-        self.slopes.y[: 2 * n, self.places] = system.blocks.inverse.T
-        self.slopes.y[2 * n :, self.places] = -self.change.steady(0.0)
+        self.y[: 2 * n, self.places] = system.blocks.inverse.T
+        self.y[2 * n :, self.places] = -self.change.steady(0.0)
         engine.record(np.empty((_ROWS, HEAD + width + stops * S)))
         self.packed = [
             *(engine.packed if same is problem else Packed(same, PROBLEM) for same in self.change.problems),
@@ -57,24 +58,24 @@ class Tangent:
         """Replay what the engine has taped, and let it tape anew."""
         engine = self.engine
         replay(*self.addresses, not self.history)
-        if not np.all(np.isfinite(self.slopes.y)):
+        if not np.all(np.isfinite(self.y)):
             raise SolverError(f"the tangent is not finite any more at t = {engine.state.now[T]:g} s: a contact grazes")
-        size = _size(self.slopes.y)
+        size = _size(self.y)
         self.history.append((float(engine.state.now[T]), self.log_scale + math.log(size) if size > 0.0 else -math.inf))
         if not 1.0 / _LARGE < size < _LARGE and size > 0.0:
-            for array in (self.slopes.y, self.slopes.entry, self.slopes.shift):
+            for array in (self.y, self.entry, self.shift):
                 array /= size
             self.log_scale += math.log(size)
 
     def rate(self) -> Array:
         """(2n,) derivative of [q, q̇] by time at the time reached."""
-        return self.engine.back @ self.slopes.rate[0, : 2 * len(self.engine.problem.k)]
+        return self.engine.back @ self.end_rate[0, : 2 * len(self.engine.problem.k)]
 
     def matrix(self) -> Array:
         """(2n, columns) derivatives of [q, q̇] at the time reached."""
         if self.log_scale > 600.0:
             raise OverflowError(f"the tangent grew to e^{self.log_scale:.0f}; shorten the run, or use solvers.lyapunov")
-        y = math.exp(self.log_scale) * self.slopes.y[:, self.places]
+        y = math.exp(self.log_scale) * self.y[:, self.places]
         y[2 * self.blocks.k.size :] += self.change.steady(self.engine.state.now[T])
         return self.blocks.T @ y.T
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numba import njit, types
 
-from solvers.handle import Layout, Packed, opener
+from solvers.handle import Layout, Mould, Packed, opener
 from solvers.vector import combine, padded
 
 OPTIONS = {"error_model": "numpy", "_nrt": False}
@@ -119,6 +119,20 @@ def test_what_does_not_fit_the_declared_kind_is_refused_by_name(name, value):
         Packed(things()._replace(**{name: value}), KIND)
 
 
+def test_casts_of_a_mould_own_what_they_were_told_to_and_share_the_rest():
+    one = things()
+    mould = Mould(one, KIND, ["vector", "cube"])
+    first, second = mould.cast(), mould.cast(number=8.0)
+    first.value.vector[:] = 5.0
+    assert (first.value.number, second.value.number, one.number) == (0.25, 8.0, 0.25)
+    assert first.value.count is second.value.count is one.count
+    for cast in (first, second):
+        wanted = expected(cast.value)
+        np.testing.assert_allclose(seen(cast.address), wanted, rtol=1e-14)
+    np.testing.assert_array_equal(second.value.vector[1:], one.vector[1:])
+    assert one.vector[0] != -1.0
+
+
 class Pair(NamedTuple):
     """Arrays that live in one block."""
 
@@ -148,3 +162,7 @@ def test_tuples_of_a_layout_share_one_block_and_do_not_overlap():
     np.testing.assert_array_equal(first.values, [[0, 1, 2], [10, 11, 12]])
     np.testing.assert_array_equal(second.values[:, 0], [0, 10, 20, 30])
     assert (first.marks[0], second.marks[0], second.marks[1]) == (3, 1, 0)
+    longer = np.zeros((5, 2))
+    layout.exchange(block, 1, 0, longer)
+    write(start + layout.starts[1])
+    np.testing.assert_array_equal(longer[:, 1], [1, 11, 21, 31, 41])

@@ -11,6 +11,8 @@ from regularised import regularised
 import fembeam as fb
 from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, Viscoelastic, law
 from solvers import Contact, DormandPrince, Exponential, Status, System, integrate
+from solvers.forcing import hand_over
+from solvers.preparation import prepared_for
 
 RK = DormandPrince(rtol=1e-13, atol=1e-16)
 PERIOD = 2 * math.pi / 195.0
@@ -561,3 +563,42 @@ def test_samples_on_the_way_to_a_landing_are_finite_at_the_loosest_tolerance(see
     run = model.simulate(20.0, 1e-3, solver=Exponential(1e-2, ledger=False))
     assert np.all(np.isfinite(run.q))
     assert np.all(run.contacts.speed_out[~np.isnan(run.contacts.t_out)] >= 0.0)
+
+
+def tones(omega, scale=1.0):
+    """Loads along three vectors of two coordinates: two harmonics and a constant."""
+    signals = [fb.Harmonic(amplitude=scale, omega=omega), fb.Harmonic(amplitude=2e-3, omega=77.0, phase=0.4)]
+    vectors = [[1.0, 0.3], [0.0, -2.0], [0.5, 0.5]]
+    return list(zip(vectors, [*signals, fb.Harmonic(amplitude=0.2 * scale, omega=0.0)], strict=True))
+
+
+@pytest.mark.parametrize(("omega", "scale"), [(250.0, 3.0), (21_000.0, 0.1)], ids=["slow", "faster than the structure"])
+def test_tables_of_other_tones_and_gaps_are_those_of_a_new_system(omega, scale):
+    stops = [([0.4, 1.1], Hertz(1e8)), ([-0.2, 0.7], Hysteretic(1e7, 1.0))]
+    contacts = [Contact(direction, law, 1e-3) for direction, law in stops]
+    first = System.modal([100.0, 900.0], [0.01, 0.3], contacts, tones(120.0))
+    prepared_for(first, hand_over([signal for _, signal in first.loads], 1.0, 1e-8))
+    moved = [Contact(contact.direction, contact.law, gap) for contact, gap in zip(contacts, (2e-3, 0.0), strict=True)]
+    loads = [(own, signal) for (own, _), (_, signal) in zip(first.loads, tones(omega, scale), strict=True)]
+    other = first.like(moved, loads)
+    new = System.modal([100.0, 900.0], [0.01, 0.3], moved, tones(omega, scale))
+    forcing = hand_over([signal for _, signal in loads], 1.0, 1e-8)
+    made, wanted = prepared_for(other, forcing), prepared_for(new, forcing)
+    np.testing.assert_array_equal(made.back, wanted.back)
+    np.testing.assert_array_equal(made.rest, wanted.rest)
+    for part in ("problem", "tables"):
+        found, expected = getattr(made, part).value, getattr(wanted, part).value
+        for name in {*found._fields} - {"cell"}:  # a cell of sampled signals, of which there are none
+            np.testing.assert_array_equal(getattr(found, name), getattr(expected, name), err_msg=name)
+
+
+def test_systems_with_other_tones_leave_each_others_tables_alone():
+    def end(system):
+        return integrate(system, [0.0, 0.0], [0.0, 0.0], 0.5, method=Exponential()).q[-1]
+
+    stop = [Contact([1.0, 0.5], Hertz(1e8), 1e-4)]
+    first = System.modal([100.0, 900.0], [0.01, 0.3], stop, tones(120.0, 30.0))
+    before = end(first)
+    loads = [(own, signal) for (own, _), (_, signal) in zip(first.loads, tones(333.0, 5.0), strict=True)]
+    assert not np.array_equal(end(first.like(loads=loads)), before)
+    np.testing.assert_array_equal(end(first), before)
