@@ -11,6 +11,7 @@ Units are SI (m, s, rad/s). Every signal is called with t of any shape; `derivat
 
 from __future__ import annotations
 
+import cmath
 import math
 from dataclasses import dataclass, replace
 from typing import Any
@@ -67,7 +68,7 @@ class Harmonic:
 
     def tones(self) -> Tones:
         """(omega, complex amplitude), each of shape (1,): y(t) = Re Σ amplitude exp(i omega t)."""
-        return np.array([self.omega]), np.array([self.amplitude * np.exp(1j * self.phase)])
+        return np.array([self.omega]), np.array([cmath.rect(self.amplitude, self.phase)])
 
     def derivative(self, order: int) -> Harmonic:
         """The signal d^order y/dt^order."""

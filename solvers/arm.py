@@ -58,11 +58,12 @@ class Arm:
     before: tuple[Point, float] | None = None  # the point before and the way from it
     tried: float = math.inf  # step after whose failure kinks were looked for
     passed: list[Point] = field(default_factory=list)
+    values: list[float] = field(default_factory=list)  # of the parameter there
 
     def __post_init__(self) -> None:
         self.first, self.step = self.point, self.step or 0.2 * self.largest
         self.orbits = [self.point.orbit]
-        self.passed = [self.point]
+        self._pass(self.point)
 
     def extend(self) -> None:
         """Find the next orbit and the special points before it, or an end of the branch."""
@@ -125,7 +126,8 @@ class Arm:
         a = last or self.point
         inside = self._inside(point.unknowns)  # a jump may lead out of the span
         self.orbits[len(self.orbits) - (last is not None) :] = found if inside else found[:-1]
-        self.passed += [a, point]
+        self._pass(a)
+        self._pass(point)
         self.point, self.before, self.step = with_quiet_begin(point), None, _BEHIND * self.largest
         if not inside:
             self.status = BranchStatus.END
@@ -202,6 +204,11 @@ class Arm:
         guess[-1] = edge
         return moved(a, guess, True)
 
+    def _pass(self, point: Point) -> None:
+        """Remember a point."""
+        self.passed.append(point)
+        self.values.append(point.chain.parameter)
+
     def _finish_or_go_on(self, point: Point) -> None:
         """Recognise orbits passed before and the limit."""
         met = self._met(point)
@@ -216,15 +223,12 @@ class Arm:
     def _met(self, point: Point) -> int | None:
         """Number of an orbit passed before that lies on the way just gone; 0 is the first."""
         a = self.point
-        self.passed.append(point)
+        self._pass(point)
         if point.problem.fractions != a.problem.fractions:
             return None
         low, high = sorted((a.chain.parameter, point.chain.parameter))
-        known = [
-            i
-            for i, p in enumerate(self.passed[:-4])
-            if low <= p.chain.parameter <= high and p.problem.fractions == a.problem.fractions
-        ]
+        among = [i for i, value in enumerate(self.values[:-4]) if low <= value <= high]
+        known = [i for i in among if self.passed[i].problem.fractions == a.problem.fractions]
         if not known:
             return None
         way = point.unknowns - a.unknowns

@@ -100,10 +100,10 @@ class _Measure:
         """Relative residual."""
         if not self.first:
             self.W = weights(*self.problem.make(chain.parameter))
-        size, ends, residual = (
-            float(np.linalg.norm(part @ self.W.T, axis=1).max())
-            for part in (chain.x, chain.x + np.roll(chain.residual, 1, axis=0), chain.residual)
-        )
+        turned = np.concatenate((chain.residual[-1:], chain.residual[:-1]))
+        parts = np.concatenate((chain.x, chain.x + turned, chain.residual)) @ self.W.T
+        squares = np.einsum("ij,ij->i", parts, parts).reshape(3, -1).max(axis=1)
+        size, ends, residual = np.sqrt(squares).tolist()
         if not self.first:
             self.first, self.stored = max(size, ends), self._held(chain.x, chain.parameter)
         return residual / max(min(size, 1e3 * self.first), 1e-4 * self.first, 1e-300)

@@ -12,6 +12,7 @@ from solvers.correction import newton
 from solvers.periodic import OrbitError, flown
 from solvers.point import Point, point_of
 from solvers.quiet import quiet_begins, with_memory
+from solvers.result import ContactLog
 from solvers.system import Array, System
 
 _MARGIN = 0.1  # of the longest quiet time that must lie on both sides of a shot's begin
@@ -19,10 +20,15 @@ _MARGIN = 0.1  # of the longest quiet time that must lie on both sides of a shot
 
 def is_cut(point: Point) -> bool:
     """Whether a contact with memory is under way where a shot begins."""
-    system, log = point.orbit.system, [solution.contacts for solution in point.chain.solutions]
-    return any(
-        np.any(np.isin(one.stop, with_memory(system)) & ((one.t_in == 0.0) | np.isnan(one.t_out))) for one in log
-    )
+    logs = [solution.contacts for solution in point.chain.solutions]
+    return any(np.any(_latched(point, one) & ((one.t_in == 0.0) | np.isnan(one.t_out))) for one in logs)
+
+
+def _latched(point: Point, log: ContactLog) -> Array:
+    """Which contacts of a log are with a stop whose law has memory."""
+    memory = np.zeros(len(point.orbit.system.contacts), dtype=bool)
+    memory[with_memory(point.orbit.system)] = True
+    return memory[log.stop]
 
 
 def with_quiet_begin(point: Point) -> Point:
@@ -30,7 +36,7 @@ def with_quiet_begin(point: Point) -> Point:
     orbit, m = point.orbit, len(point.problem.fractions)
     log, period = orbit.contacts, orbit.period
     offsets = [(f - point.problem.fractions[0]) * period for f in point.problem.fractions]
-    mine = np.isin(log.stop, with_memory(orbit.system))
+    mine = _latched(point, log)
     times = np.concatenate((log.t_in[mine], log.t_out[mine], log.t_out[mine] - period))
     if min(np.abs(times - t).min(initial=period) for t in offsets) > _MARGIN * period / (1 + len(log)):
         return point

@@ -149,14 +149,12 @@ class System:
         """The same structure with other contacts or loads; its matrices are neither checked nor decoupled again."""
         other = object.__new__(System)
         other.__dict__.update(self.__dict__, blocks=self.blocks, push=self.push, kept={})
-        known = [vector for vector, _ in self.loads]
         for name, value in (("contacts", contacts), ("loads", loads)):
             if value is not None:
-                object.__setattr__(other, name, value)
-        other._check_contacts_and_loads(known)
+                other.__dict__[name] = value
+        other._check_contacts_and_loads([vector for vector, _ in self.loads])
         if len(self.contacts) == len(other.contacts):
-            pairs = list(zip(self.contacts, other.contacts, strict=True))
-            if all(a.law is b.law for a, b in pairs):
+            if all(a.law is b.law for a, b in zip(self.contacts, other.contacts, strict=True)):
                 other.kept["laws"] = self.about_laws
             if self._vectors_are_those_of(other):
                 other.kept["structure"] = self.about_structure
@@ -164,9 +162,13 @@ class System:
 
     def _vectors_are_those_of(self, other: System) -> bool:
         """Whether contacts and loads act along the same vectors."""
-        vectors = [[*(c.direction for c in s.contacts), *(vector for vector, _ in s.loads)] for s in (self, other)]
-        same = (a is b or np.array_equal(a, b) for a, b in zip(*vectors, strict=False))
-        return len(self.loads) == len(other.loads) and all(same)
+        if len(self.loads) != len(other.loads):
+            return False
+        pairs: list[tuple[Any, Any]] = [
+            (a.direction, b.direction) for a, b in zip(self.contacts, other.contacts, strict=True)
+        ]
+        pairs += [(a, b) for (a, _), (b, _) in zip(self.loads, other.loads, strict=True)]
+        return all(a is b or np.array_equal(a, b) for a, b in pairs)
 
     @property
     def about_structure(self) -> dict[str, Any]:
