@@ -150,7 +150,7 @@ class Arm:
         sharp = aligned < _SHARPEST or strayed > 0.5 * way
         across = signature(a.orbit) != signature(b.orbit)
         hops = h < (_THERE if across else _LAST) and way > 0.0 and strayed < _FARTHEST * h
-        if (sharp and not hops) or is_cut(b):  # a kink that was not met is hopped over
+        if (sharp and not hops) or is_cut(b.chain, b.orbit.system):  # a kink that was not met is hopped over
             self.step *= 0.2 if len(a.orbit.contacts) != len(b.orbit.contacts) else 0.5
             return None
         if b.chain.parameter in self.span:

@@ -23,7 +23,7 @@ from solvers.chain import Problem
 from solvers.correction import newton
 from solvers.periodic import Orbit, at_zero, orbit_of
 from solvers.point import Point, metric_of, point_of
-from solvers.shooting import checked, checked_start, start_chain
+from solvers.shooting import checked, checked_start, solved_chain
 from solvers.system import System
 
 
@@ -144,9 +144,9 @@ def branch(
     system, period = make_system(parameter)
     method = checked(system, period, method, shots)
     first = at_zero(start) if isinstance(start, Orbit) else checked_start(system, start)
-    problem, x = start_chain(system, period, first, method, shots)
+    problem, chain, *_ = solved_chain(system, period, first, method, shots)
     problem = replace(problem, make=make_system, step=1e-6 * (high - low))
-    chain, error, iterations = newton(problem, x, parameter, slope=True)
+    chain, error, iterations = newton(problem, chain.x, parameter, slope=True)
     metric = metric_of(problem, parameter, chain.x, high - low)
     ahead = np.zeros(len(metric))
     ahead[-1] = 1.0

@@ -18,16 +18,16 @@ from solvers.system import Array, System
 _MARGIN = 0.1  # of the longest quiet time that must lie on both sides of a shot's begin
 
 
-def is_cut(point: Point) -> bool:
+def is_cut(chain: Chain, system: System) -> bool:
     """Whether a contact with memory is under way where a shot begins."""
-    logs = [solution.contacts for solution in point.chain.solutions]
-    return any(np.any(_latched(point, one) & ((one.t_in == 0.0) | np.isnan(one.t_out))) for one in logs)
+    logs = [solution.contacts for solution in chain.solutions]
+    return any(np.any(_latched(system, one) & ((one.t_in == 0.0) | np.isnan(one.t_out))) for one in logs)
 
 
-def _latched(point: Point, log: ContactLog) -> Array:
+def _latched(system: System, log: ContactLog) -> Array:
     """Which contacts of a log are with a stop whose law has memory."""
-    memory = np.zeros(len(point.orbit.system.contacts), dtype=bool)
-    memory[with_memory(point.orbit.system)] = True
+    memory = np.zeros(len(system.contacts), dtype=bool)
+    memory[with_memory(system)] = True
     return memory[log.stop]
 
 
@@ -36,7 +36,7 @@ def with_quiet_begin(point: Point) -> Point:
     orbit, m = point.orbit, len(point.problem.fractions)
     log, period = orbit.contacts, orbit.period
     offsets = [(f - point.problem.fractions[0]) * period for f in point.problem.fractions]
-    mine = _latched(point, log)
+    mine = _latched(orbit.system, log)
     times = np.concatenate((log.t_in[mine], log.t_out[mine], log.t_out[mine] - period))
     if min(np.abs(times - t).min(initial=period) for t in offsets) > _MARGIN * period / (1 + len(log)):
         return point

@@ -31,7 +31,9 @@ def quiet_intervals(system: System, contacts: ContactLog, period: float) -> list
     for stops in (range(len(system.contacts)), with_memory(system)):
         mine = np.isin(contacts.stop, list(stops))
         quiet, end = [], 0.0
-        for begin, left in [*sorted(zip(contacts.t_in[mine], ends[mine], strict=True)), (period, period)]:
+        found = list(zip(contacts.t_in[mine], ends[mine], strict=True))
+        found += [(0.0, left - period) for _, left in found if left > period]  # what goes on in the next period
+        for begin, left in [*sorted(found), (period, period)]:
             if begin > end:
                 quiet.append((float(end), float(begin)))
             end = max(end, left)

@@ -25,11 +25,13 @@ from solvers.chain import Chain, Problem
 from solvers.correction import newton, weights
 from solvers.exponential import Exponential
 from solvers.integration import check_slopes, integrate
+from solvers.later import is_cut
 from solvers.periodic import Orbit, OrbitError, at_zero, flown, judged, orbit_of
 from solvers.quiet import closed, quiet_begins, with_memory
 from solvers.system import Array, System
 
 _MOST_SHOTS = 6
+_MOST_BEGINS = 4  # times that the begins of shots are chosen anew
 _MOST_SETTLINGS = 4  # starts taken from a run from rest, a hundred periods apart
 
 
@@ -81,8 +83,7 @@ def _near(system: System, period: float, x: Array, method: Any, shots: int | Non
     tried: list[str] = []
     for count in [shots] if shots else range(1, _MOST_SHOTS + 1):
         try:
-            problem, guess = start_chain(system, period, x, method, count)
-            chain, residual, iterations = newton(problem, guess, 0.0)
+            problem, chain, residual, iterations = solved_chain(system, period, x, method, count)
             _check_isolated(chain, weights(system, period))
             return judged(_from_zero(orbit_of(problem, chain, residual, iterations)))
         except OrbitError as error:
@@ -158,7 +159,22 @@ def settled(system: System, period: float, method: Any, longest: int = 400) -> A
     return flown(system, np.zeros(2 * system.size), count * period, replace(method, rtol=max(method.rtol, 1e-8)))
 
 
-def start_chain(system: System, period: float, x: Array, method: Any, count: int) -> tuple[Problem, Array]:
+def solved_chain(system: System, period: float, x: Array, method: Any, count: int) -> tuple[Problem, Chain, float, int]:
+    """The chain of an orbit near a state, with its relative residual and the iterations.
+
+    The orbit's contacts may lie elsewhere than the guess's: where one with memory is under way at the begin of a shot,
+    which knows nothing of its entry rate, the shots begin anew in quiet times.
+    """
+    for _ in range(_MOST_BEGINS):
+        problem, guess = _start_chain(system, period, x, method, count)
+        chain, residual, iterations = newton(problem, guess, 0.0)
+        if not is_cut(chain, system):
+            return problem, chain, residual, iterations
+        x = at_zero(orbit_of(problem, chain, residual, iterations))
+    raise OrbitError("wherever shots begin, a contact of the orbit whose law latches the entry rate is under way")
+
+
+def _start_chain(system: System, period: float, x: Array, method: Any, count: int) -> tuple[Problem, Array]:
     """Shots that begin in quiet times, and a guess of their states from a run over one period."""
     n = system.size
     first = integrate(system, x[:n], x[n:], period, method=method)

@@ -6,13 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from oscillators import Bilinear, Duffing, Tone
+from oscillators import Bilinear, Duffing, Tone, random_family
 from problems import reference
 from scipy.special import ellipj, ellipk
 
 from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, law
 from solvers import Contact, DormandPrince, Exponential, HenonRK2, OrbitError, System, integrate, orbit
-from solvers.quiet import latches
+from solvers.chain import delayed
+from solvers.quiet import latches, quiet_intervals
+from solvers.result import ContactLog
 
 OMEGA, ZETA, PHI, GAMMA = (
     np.array([109.13, 790.6]),
@@ -369,3 +371,22 @@ def test_hysteretic_stop_that_never_opens():
 )
 def test_a_law_that_latches_is_known_whatever_its_floor(stop, latched):
     assert latches(Contact([1.0], stop)) is latched
+
+
+@pytest.mark.parametrize("seed", [170, 229])
+def test_an_orbit_whose_contacts_lie_elsewhere_than_the_start_says_is_an_orbit_for_ever(seed):
+    """From rest no stop is closed at t = 0, on the orbit one with memory is."""
+    make, (low, _), modes = random_family(np.random.default_rng(seed))
+    system, period = make(low)
+    found = orbit(system, period, np.zeros(2 * modes))
+    assert not np.any(found.contacts.t_out > found.period)
+    later, x = delayed(system, found.phase), found.state
+    run = integrate(later, x[:modes], x[modes:], 4 * period, dt=period, method=found.method)
+    np.testing.assert_allclose(np.hstack((run.q, run.q_dot)), np.tile(x, (5, 1)), atol=1e-9 * np.abs(x).max())
+
+
+def test_quiet_times_leave_out_what_goes_on_in_the_next_period():
+    system = System.modal([1.0], [0.1], [Contact([1.0], HYSTERETIC)])
+    rows = np.zeros((2, 10))
+    rows[:, 1:3] = [(2.0, 3.0), (8.0, 11.0)]
+    assert quiet_intervals(system, ContactLog.of_rows(rows), 10.0) == [(1.0, 2.0), (3.0, 8.0)]

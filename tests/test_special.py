@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from oscillators import Bilinear, Tone
+from oscillators import Bilinear, Tone, random_family
 
 import solvers.arm
 import solvers.chain
-from contacts import Hertz, Hysteretic, PiecewiseLinear, law
+from contacts import PiecewiseLinear, law
 from solvers import Contact, OrbitError, System, branch
 from solvers.continuation import BranchStatus
 
@@ -84,23 +84,6 @@ def test_subharmonic_branch_ends_at_its_birth():
     assert born.period == 2.0 * there.period
     assert max(orbit.parameter for orbit in found.orbits) == born.parameter
     assert abs(born.multipliers[0] - 1.0) < 1e-6
-
-
-def random_family(rng):
-    """(family over the drive's frequency, its span) of one or two masses with a stop."""
-    modes, frequencies = int(rng.integers(1, 3)), np.array([1.0, 2.0 + 3.0 * rng.random()])
-    direction = rng.normal(size=modes)
-    laws = [PiecewiseLinear([10.0 ** rng.uniform(0, 3)]), Hertz(10.0 ** rng.uniform(1, 5)),
-            Hysteretic.lankarani_nikravesh(10.0 ** rng.uniform(1, 5), restitution=rng.uniform(0.2, 1.0))]  # fmt: skip
-    stop = Contact(direction, laws[rng.integers(3)], gap=rng.uniform(-0.5, 1.0))
-    zeta, amplitude, periods = 10.0 ** rng.uniform(-2.5, -0.5), rng.uniform(0.1, 2.0), int(rng.integers(1, 3))
-
-    def make(omega):
-        load = np.ones(modes), Tone(amplitude, omega)
-        return System.modal(frequencies[:modes], zeta, [stop], [load]), periods * 2.0 * math.pi / omega
-
-    low = rng.uniform(0.3, 2.0)
-    return make, (low, low * rng.uniform(1.1, 3.0)), modes
 
 
 @pytest.mark.parametrize("seed", range(12))
