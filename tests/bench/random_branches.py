@@ -3,7 +3,7 @@
     python tests/bench/random_branches.py [count] [first seed] [most orbits per direction]
 
 Prints how the directions ended, the special points on the way, the work per orbit, and every direction that was lost.
-Every orbit must satisfy its residual within the span, whatever happens.
+Every orbit must satisfy its residual within the span, and come back after a second period too, whatever happens.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from __future__ import annotations
 import sys
 from collections import Counter
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -19,8 +20,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from oscillators import random_family
 
 import solvers.arm
-from solvers import OrbitError, branch
-from solvers.chain import Problem
+from solvers import OrbitError, branch, integrate
+from solvers.chain import Problem, delayed
 from solvers.continuation import BranchStatus
 
 
@@ -37,6 +38,15 @@ class Counted:
         return self.evaluate(*arguments)
 
 
+def drift(one: Any) -> float:
+    """How far an orbit is from its begin after two periods, of its size and in units of what its multipliers make."""
+    later, x = delayed(one.system, one.phase), one.state
+    n, largest = one.system.size, max(1.0, abs(one.multipliers[0]))
+    end = integrate(later, x[:n], x[n:], 2.0 * one.period, method=one.method)
+    off = np.abs(np.concatenate((end.q[-1], end.q_dot[-1])) - x).max()
+    return float(off / (np.abs(x).max() * largest**2))
+
+
 def main(count: int = 100, first: int = 0, most: int = 60) -> None:
     """Follow the branches."""
     solvers.arm.MOST_ORBITS = most
@@ -51,6 +61,9 @@ def main(count: int = 100, first: int = 0, most: int = 60) -> None:
         orbits += len(found.orbits)
         marks.update(orbit.mark for orbit in found.special)
         assert all(one.residual <= 1e-10 and span[0] <= one.parameter <= span[1] for one in found.orbits), seed
+        for one in found.orbits[:: max(1, len(found.orbits) // 10)]:
+            if (off := drift(one)) > 1e-6:
+                print(f"seed {seed}: no orbit at {one.parameter:.9g} {one.mark}, off by {off:.1e} after two periods")
         for arm in found.arms:
             ends[arm.status.name] += 1
             if arm.status is BranchStatus.LOST:
