@@ -58,14 +58,13 @@ def prepared_for(system: System, forcing: Forcing) -> Prepared:
 
 
 def _skeleton_for(system: System, forcing: Forcing, dt_cell: float) -> _Skeleton:
-    """What systems have in common that differ in tones and gaps only; without sampled signals it is kept for them."""
+    """What systems have in common that differ in tones, sampled values and gaps only; the latest is kept for them."""
     about, laws = system.about_structure, system.about_laws
     if "passive" not in about:
         _check_passive(system)
         about["passive"] = True
-    if forcing.table_dt.size:
-        return _Skeleton(system, forcing, dt_cell)
-    key = forcing.tone_load.tobytes(), doublings(_speeds(system), forcing.tone_omega)
+    places = (part.tobytes() for part in (forcing.tone_load, forcing.table_dt, forcing.table_load))
+    key = *places, doublings(_speeds(system), forcing.tone_omega)
     known = about.get("skeleton", (None, None))
     if known[0] != key or known[1] is not laws:
         known = about["skeleton"] = key, laws, _Skeleton(system, forcing, dt_cell)
@@ -211,7 +210,7 @@ def steady_response(k: Array, c: Array, load: Any, omega: Any) -> Any:
 
 
 def _widened(problem: Problem, forcing: Forcing) -> Problem:
-    """The problem with one block per tone, which nothing reads yet; tones are no load of it any more."""
+    """The problem with one block per tone, which nothing reads yet; tones are no load any more, tables empty."""
     tones, none = len(forcing.tone_omega), np.zeros(0)
     sampled = np.zeros_like(problem.load)
     sampled[forcing.table_load] = problem.load[forcing.table_load]
@@ -224,6 +223,8 @@ def _widened(problem: Problem, forcing: Forcing) -> Problem:
         tone_omega=none,
         tone_amplitude=none.astype(complex),
         tone_load=none.astype(np.int64),
+        table=np.empty((0, 3)),
+        table_start=np.zeros_like(forcing.table_start),
         **rows,
     )
 

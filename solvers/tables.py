@@ -246,7 +246,7 @@ class _Blocks(NamedTuple):
 # the tables that tones have a part in
 OF_TONES = (
     *("propagator", "step_propagator", "free", "ripple", "weight", "reach"),
-    *("signal_rows", "power_rows", "loss_rows"),
+    *("signal_rows", "power_rows", "loss_rows", "cell"),
 )
 
 _KNOWN: OrderedDict[bytes, _Blocks] = OrderedDict()  # structures met lately: a tone, gap or stiffness more is cheap
@@ -310,6 +310,8 @@ def fill_tones(tables: Tables, problem: Problem, tones: int, exponents: list[flo
     own, k = size - tones, problem.k[size - tones :]
     p, v, omega = np.abs(problem.read[:, own:size]), np.abs(problem.read[:, size + own :]), np.sqrt(k)
     tables.weight[:, own:], tables.reach[:, own:] = p * omega + v * k, p + v * omega
+    if problem.table_dt.size:
+        _fill_propagators(problem.k, problem.c, (own, size), problem.table_dt[:1], tables.cell[None])
     blocks = _Blocks(*(getattr(tables, name) for name in _Blocks._fields))
     _filled(blocks, problem, (own, size), tables.h, tables.step, _families(tuple(exponents), tuple(jumps)))
 

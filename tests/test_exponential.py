@@ -566,29 +566,35 @@ def test_samples_on_the_way_to_a_landing_are_finite_at_the_loosest_tolerance(see
 
 
 def tones(omega, scale=1.0):
-    """Loads along three vectors of two coordinates: two harmonics and a constant."""
+    """Loads along vectors of two coordinates: two harmonics, a constant, and a signal that is sampled."""
     signals = [fb.Harmonic(amplitude=scale, omega=omega), fb.Harmonic(amplitude=2e-3, omega=77.0, phase=0.4)]
-    vectors = [[1.0, 0.3], [0.0, -2.0], [0.5, 0.5]]
-    return list(zip(vectors, [*signals, fb.Harmonic(amplitude=0.2 * scale, omega=0.0)], strict=True))
+    signals += [fb.Harmonic(amplitude=0.2 * scale, omega=0.0), lambda t: scale / (1.0 + t)]
+    return list(zip([[1.0, 0.3], [0.0, -2.0], [0.5, 0.5], [-0.3, 0.1]], signals, strict=True))
 
 
 @pytest.mark.parametrize(("omega", "scale"), [(250.0, 3.0), (21_000.0, 0.1)], ids=["slow", "faster than the structure"])
-def test_tables_of_other_tones_and_gaps_are_those_of_a_new_system(omega, scale):
+@pytest.mark.parametrize("sampled", [False, True])
+def test_tables_of_other_tones_and_gaps_are_those_of_a_new_system(omega, scale, sampled):
+    def loads(*drawn):
+        return tones(*drawn)[: None if sampled else 3]
+
     stops = [([0.4, 1.1], Hertz(1e8)), ([-0.2, 0.7], Hysteretic(1e7, 1.0))]
     contacts = [Contact(direction, law, 1e-3) for direction, law in stops]
-    first = System.modal([100.0, 900.0], [0.01, 0.3], contacts, tones(120.0))
+    first = System.modal([100.0, 900.0], [0.01, 0.3], contacts, loads(120.0))
     prepared_for(first, hand_over([signal for _, signal in first.loads], 1.0, 1e-8))
     moved = [Contact(contact.direction, contact.law, gap) for contact, gap in zip(contacts, (2e-3, 0.0), strict=True)]
-    loads = [(own, signal) for (own, _), (_, signal) in zip(first.loads, tones(omega, scale), strict=True)]
-    other = first.like(moved, loads)
-    new = System.modal([100.0, 900.0], [0.01, 0.3], moved, tones(omega, scale))
-    forcing = hand_over([signal for _, signal in loads], 1.0, 1e-8)
+    changed = [(own, signal) for (own, _), (_, signal) in zip(first.loads, loads(omega, scale), strict=True)]
+    other = first.like(moved, changed)
+    new = System.modal([100.0, 900.0], [0.01, 0.3], moved, loads(omega, scale))
+    forcing = hand_over([signal for _, signal in changed], 1.0, 1e-8)
+    before = first.about_structure["skeleton"]
     made, wanted = prepared_for(other, forcing), prepared_for(new, forcing)
+    assert (other.about_structure["skeleton"] is before) == (omega < 900.0)
     np.testing.assert_array_equal(made.back, wanted.back)
     np.testing.assert_array_equal(made.rest, wanted.rest)
     for part in ("problem", "tables"):
         found, expected = getattr(made, part).value, getattr(wanted, part).value
-        for name in {*found._fields} - {"cell"}:  # a cell of sampled signals, of which there are none
+        for name in {*found._fields} - ({"cell"} if not sampled else set()):  # of sampled signals
             np.testing.assert_array_equal(getattr(found, name), getattr(expected, name), err_msg=name)
 
 
