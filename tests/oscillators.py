@@ -209,18 +209,25 @@ class Duffing:
         return np.array([u[0] + a @ c + b @ s, omega * (j * b) @ c - omega * (j * a) @ s])
 
 
-def random_family(rng):
-    """(family over the drive's frequency, its span) of one or two masses with a stop."""
+def random_family(rng, over="omega"):
+    """(family over the drive's omega or amplitude or the gap, its span, modes) of one or two masses with a stop."""
     modes, frequencies = int(rng.integers(1, 3)), np.array([1.0, 2.0 + 3.0 * rng.random()])
     direction = rng.normal(size=modes)
     laws = [PiecewiseLinear([10.0 ** rng.uniform(0, 3)]), Hertz(10.0 ** rng.uniform(1, 5)),
             Hysteretic.lankarani_nikravesh(10.0 ** rng.uniform(1, 5), restitution=rng.uniform(0.2, 1.0))]  # fmt: skip
-    stop = Contact(direction, laws[rng.integers(3)], gap=rng.uniform(-0.5, 1.0))
+    law, gap = laws[rng.integers(3)], rng.uniform(-0.5, 1.0)
     zeta, amplitude, periods = 10.0 ** rng.uniform(-2.5, -0.5), rng.uniform(0.1, 2.0), int(rng.integers(1, 3))
-
-    def make(omega):
-        load = np.ones(modes), Tone(amplitude, omega)
-        return System.modal(frequencies[:modes], zeta, [stop], [load]), periods * 2.0 * math.pi / omega
-
     low = rng.uniform(0.3, 2.0)
-    return make, (low, low * rng.uniform(1.1, 3.0)), modes
+    spans = {
+        "omega": (low, low * rng.uniform(1.1, 3.0)),
+        "amplitude": (amplitude, 3.0 * amplitude),
+        "gap": (gap, gap + 0.5),
+    }
+
+    def make(value):
+        now = {"omega": low, "amplitude": amplitude, "gap": gap, over: value}
+        load = np.ones(modes), Tone(now["amplitude"], now["omega"])
+        stop = Contact(direction, law, gap=now["gap"])
+        return System.modal(frequencies[:modes], zeta, [stop], [load]), periods * 2.0 * math.pi / now["omega"]
+
+    return make, spans[over], modes

@@ -1,6 +1,6 @@
-"""Branches of random systems, one or two modes with a stop of three laws, followed over the drive's frequency.
+"""Branches of random systems, one or two modes with a stop of three laws, over omega, amplitude or gap.
 
-    python tests/bench/random_branches.py [count] [first seed] [most orbits per direction]
+    python tests/bench/random_branches.py [count] [first seed] [omega | amplitude | gap] [most orbits per direction]
 
 Prints how the directions ended, the special points on the way, the work per orbit, and every direction that was lost.
 Every orbit must satisfy its residual within the span, and come back after a second period too, whatever happens.
@@ -47,12 +47,12 @@ def drift(one: Any) -> float:
     return float(off / (np.abs(x).max() * largest**2))
 
 
-def main(count: int = 100, first: int = 0, most: int = 60) -> None:
+def main(count: str = "100", first: str = "0", over: str = "omega", most: str = "60") -> None:
     """Follow the branches."""
-    solvers.arm.MOST_ORBITS = most
+    solvers.arm.MOST_ORBITS = int(most)
     ends, marks, work, orbits = Counter(), Counter(), Counted(), 0
-    for seed in range(first, first + count):
-        make, span, modes = random_family(np.random.default_rng(seed))
+    for seed in range(int(first), int(first) + int(count)):
+        make, span, modes = random_family(np.random.default_rng(seed), over)
         try:
             found = branch(make, span, np.zeros(2 * modes), step=0.3).run()
         except OrbitError:
@@ -76,4 +76,4 @@ def main(count: int = 100, first: int = 0, most: int = 60) -> None:
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))
+    main(*sys.argv[1:])
