@@ -21,30 +21,20 @@ import math
 
 import numpy as np
 
-from solvers.kernels import contact_forces, copy, dot, indentation, inlined, inner, reordered, sizes
+from solvers.kernels import contact_forces, copy, dot, indentation, inlined, inner, sizes
 from solvers.newton import MOST_ITERATIONS, newton
 from solvers.peaks import peak, top
 from solvers.response import node_forces, respond
 from solvers.state import PEAK_DELTA, PEAK_FORCE, T
 from solvers.tables import S
-from solvers.vector import combine
-
-
-@reordered
-def distance(a, b):
-    """Square of the distance of two sets of node values."""
-    square = 0.0
-    for i in range(S):
-        square += (a[i] - b[i]) * (a[i] - b[i])
-    return square
+from solvers.vector import combine, renew
 
 
 @inner
 def solve_forces(problem, tables, state, space, family, level, accuracy):
     """Fixed point of the forces to ``accuracy`` in N; whether it was found."""
     stops = problem.gap.size
-    before = np.inf
-    ratio = 0.3
+    before = 0.0
     for iteration in range(MOST_ITERATIONS):
         change, largest = 0.0, 0.0
         for s in range(stops):
@@ -54,17 +44,17 @@ def solve_forces(problem, tables, state, space, family, level, accuracy):
             if state.piece[s] == 0:
                 continue
             node_forces(problem, state, space, s)
-            change += distance(space.trial, space.force[s])
-            largest += dot(space.trial, space.trial, S)
-            copy(space.trial, space.force[s], S)
+            moved, size = renew(space.force[s], space.trial)
+            change, largest = change + moved, largest + size
         if not change < np.inf:
             return False
-        change, largest = math.sqrt(change), math.sqrt(largest)
-        if iteration > 0:
-            ratio = min(change / before, 0.9)
-        if change * ratio <= (1.0 - ratio) * accuracy or change <= 1e-15 * largest:
+        settled, change = change <= 1e-30 * largest, math.sqrt(change)
+        if iteration == 0:
+            before = change / 0.3  # as iterations usually go
+        # changes that shrink by r = change/before, taken as 0.9 at most, add up to change r/(1 - r) from here on
+        if settled or change * change <= accuracy * max(before - change, change / 9.0):
             return True
-        if iteration > 2 and ratio > 0.6:
+        if iteration > 2 and change > 0.6 * before:
             break
         before = change
     return newton(problem, tables, state, space, family, level, accuracy)

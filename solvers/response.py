@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 from solvers.kernels import inlined, inner, law_forces, table_value
 from solvers.state import CALLS, T
 from solvers.tables import S
-from solvers.vector import combine
+from solvers.vector import above_zero, combine
 
 
 class Space(NamedTuple):
@@ -75,7 +75,6 @@ def respond(problem, tables, state, space, family, level, s):
 @inlined
 def node_forces(problem, state, space, s):
     """The law of stop s at the nodes, into ``space.trial``."""
-    for i in range(S):
-        space.clipped[i] = max(space.motion[s, 0, i], 0.0)
+    above_zero(space.motion[s, 0], space.clipped)
     law_forces(problem, s, S, space.clipped, space.motion[s, 1], state.entry_rate[s], space.trial)
     state.count[CALLS] += S

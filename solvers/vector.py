@@ -65,6 +65,55 @@ def _columns(typingctx, rows, stride, first, weights, count, start, result):
     return types.void(rows, types.intp, types.intp, weights, types.intp, start, result), codegen
 
 
+def _eight(context, builder, kind, value):
+    """Where the first eight numbers of an array are, and the numbers."""
+    vector = ir.VectorType(ir.DoubleType(), WIDTH)
+    place = builder.bitcast(context.make_array(kind)(context, builder, value).data, vector.as_pointer())
+    return place, builder.load(place, align=8)
+
+
+def _sum(builder, vector):
+    """Sum of eight numbers, by halves."""
+    nothing = ir.Constant(vector.type, ir.Undefined)
+    for half in (4, 2, 1):
+        kind = ir.VectorType(ir.IntType(32), half)
+        low, high = (ir.Constant(kind, [*range(begin, begin + half)]) for begin in (0, half))
+        halves = [builder.shuffle_vector(vector, nothing, places) for places in (low, high)]
+        vector = builder.fadd(*halves)
+        nothing = ir.Constant(vector.type, ir.Undefined)
+    return builder.extract_element(vector, ir.IntType(32)(0))
+
+
+@intrinsic
+def renew(typingctx, old, new):
+    """Eight numbers take new values: the squares of their change and of their new size, summed."""
+
+    def codegen(context, builder, signature, arguments):
+        kinds = zip(signature.args, arguments, strict=True)
+        (place, before), (_, after) = (_eight(context, builder, *pair) for pair in kinds)
+        builder.store(after, place, align=8)
+        change = builder.fsub(after, before)
+        sums = [_sum(builder, builder.fmul(vector, vector)) for vector in (change, after)]
+        return context.make_tuple(builder, signature.return_type, sums)
+
+    return types.UniTuple(types.float64, 2)(old, new), codegen
+
+
+@intrinsic
+def above_zero(typingctx, source, result):
+    """Eight numbers, the negative ones raised to zero; NaN stays."""
+
+    def codegen(context, builder, signature, arguments):
+        kinds = zip(signature.args, arguments, strict=True)
+        (_, given), (place, _) = (_eight(context, builder, *pair) for pair in kinds)
+        zero = ir.Constant(given.type, [0.0] * WIDTH)
+        raised = builder.select(builder.fcmp_ordered("<", given, zero), zero, given)
+        builder.store(raised, place, align=8)
+        return context.get_dummy_value()
+
+    return types.void(source, result), codegen
+
+
 @inlined
 def combine(rows, weights, count, start, result):
     """Sum rows: result = start + Σ_{e < count} weights[e] rows[e]; start may be result, or None for zero."""

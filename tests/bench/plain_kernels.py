@@ -110,6 +110,18 @@ def columns(rows, stride, first, weights, total, start, result):
     result.reshape(-1)[here] = sums + (0.0 if start is None else start.reshape(-1)[here])
 
 
+def renew(old, new):
+    """Squares of the change and of the new size, summed; the old takes the new values."""
+    change = new[:8] - old[:8]
+    old[:8] = new[:8]
+    return float(change @ change), float(new[:8] @ new[:8])
+
+
+def above_zero(source, result):
+    """The negative numbers raised to zero."""
+    result[:8] = np.maximum(source[:8], 0.0)
+
+
 handle.opener = opener
 laws._force_at, laws._gradient_at = force_at, gradient_at
 ground._call_force = ground._call_gradient = at_address
@@ -118,4 +130,4 @@ import solvers.tables as tables  # noqa: E402
 import solvers.vector as vector  # noqa: E402
 
 tables._block_response = remembered(tables._block_response)
-vector._columns = columns
+vector._columns, vector.renew, vector.above_zero = columns, renew, above_zero
