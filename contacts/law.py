@@ -80,6 +80,15 @@ class Law(ABC):
         """Address of the compiled derivatives."""
         return int(self.gradient.address)
 
+    @property
+    def inlined(self) -> tuple[float, float, float, float] | None:
+        """(K, p, a, c) if F = K δ^p (1 + a δ̇/δ̇⁻) + c δ̇ with p 1 or 3/2: integrators then need not call the kernel."""
+        if self.compiled != "power":
+            return None
+        K, p, a, c, r, clamp, approach = self.parameters.tolist()
+        plain = p in (1.0, 1.5) and not clamp and not approach and (c == 0.0 or r == 0.0)
+        return (K, p, a, c) if plain else None
+
     def __add__(self, other: Law) -> Sum:
         """Both laws at once."""
         if not isinstance(other, Law):

@@ -21,13 +21,35 @@ import math
 
 import numpy as np
 
-from solvers.kernels import contact_forces, copy, dot, indentation, inlined, inner, sizes
+from solvers.kernels import (
+    DAMPING,
+    EXPONENT,
+    FACTOR,
+    STIFFNESS,
+    contact_forces,
+    copy,
+    dot,
+    indentation,
+    inlined,
+    inner,
+    sizes,
+)
 from solvers.newton import MOST_ITERATIONS, newton
 from solvers.peaks import peak, top
 from solvers.response import node_forces, respond
-from solvers.state import PEAK_DELTA, PEAK_FORCE, T
+from solvers.state import CALLS, PEAK_DELTA, PEAK_FORCE, T
 from solvers.tables import S
-from solvers.vector import combine, renew
+from solvers.vector import combine, renew, sweep
+
+
+@inlined
+def _alone(problem, state):
+    """The stop in contact if there is but one and its law is inlined, else -1."""
+    alone, count = -1, 0
+    for s in range(problem.gap.size):
+        if state.piece[s] > 0:
+            alone, count = s, count + 1
+    return alone if count == 1 and problem.inlined[alone, EXPONENT] > 0.0 else -1
 
 
 @inner
@@ -35,12 +57,22 @@ def solve_forces(problem, tables, state, space, family, level, accuracy):
     """Fixed point of the forces to ``accuracy`` in N; whether it was found."""
     stops = problem.gap.size
     before = 0.0
+    alone = _alone(problem, state)
+    law = problem.inlined[max(alone, 0)]
+    stiffness, rooted, damping = law[STIFFNESS], law[EXPONENT] == 1.5, law[DAMPING]
+    factor = law[FACTOR] / state.entry_rate[max(alone, 0)]
     for iteration in range(MOST_ITERATIONS):
         change, largest = 0.0, 0.0
-        for s in range(stops):
+        if alone >= 0:
+            change, largest = sweep(
+                *(tables.forced[family, level, alone, alone], space.free[alone], space.force[alone]),
+                *(space.motion[alone], stiffness, rooted, factor, damping),
+            )
+            state.count[CALLS] += S
+        for s in range(stops if alone < 0 else 0):
             if state.piece[s] > 0:
                 respond(problem, tables, state, space, family, level, s)
-        for s in range(stops):
+        for s in range(stops if alone < 0 else 0):
             if state.piece[s] == 0:
                 continue
             node_forces(problem, state, space, s)

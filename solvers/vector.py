@@ -37,13 +37,9 @@ def _columns(typingctx, rows, stride, first, weights, count, start, result):
             return builder.bitcast(builder.gep(base, [offset]), vector.as_pointer())
 
         def add(total, e):
-            weight = builder.insert_element(
-                ir.Constant(vector, ir.Undefined), builder.load(builder.gep(weights, [e])), ir.IntType(32)(0)
-            )
-            zeros = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
-            spread = builder.shuffle_vector(weight, ir.Constant(vector, ir.Undefined), zeros)
+            weight = _spread(builder, builder.load(builder.gep(weights, [e])), vector)
             row = builder.load(place(rows, builder.add(builder.mul(e, stride), first)), align=8)
-            product = builder.fmul(row, spread, flags=("contract",))
+            product = builder.fmul(row, weight, flags=("contract",))
             builder.store(builder.fadd(builder.load(total), product, flags=("contract",)), total)
 
         one = count.type(1)
@@ -99,6 +95,66 @@ def renew(typingctx, old, new):
     return types.UniTuple(types.float64, 2)(old, new), codegen
 
 
+def _spread(builder, number, kind):
+    """A number in all places of a vector."""
+    first = builder.insert_element(ir.Constant(kind, ir.Undefined), number, ir.IntType(32)(0))
+    zeros = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
+    return builder.shuffle_vector(first, ir.Constant(kind, ir.Undefined), zeros)
+
+
+def _raised(builder, given):
+    """Eight numbers, the negative ones raised to zero; NaN stays."""
+    zero = ir.Constant(given.type, [0.0] * WIDTH)
+    return builder.select(builder.fcmp_ordered("<", given, zero), zero, given)
+
+
+@intrinsic
+def sweep(typingctx, rows, free, force, motion, stiffness, rooted, damping, viscosity):
+    """One iteration for the forces at eight nodes, all in registers: squares of their change and size, summed.
+
+    Indentations and rates at the nodes are free + Σ_e force[e] rows[e], kept in ``motion``; the new forces are
+    K d (1 + a d') + c d' with d no less than zero, or with d √d for d if ``rooted``.
+    """
+
+    def codegen(context, builder, signature, arguments):
+        arrays = list(zip(signature.args, arguments, strict=True))[:4]
+        (row, _), (start, _), (place, old), (moved, _) = (_eight(context, builder, *pair) for pair in arrays)
+        vector = old.type
+
+        def at(base, i):
+            return builder.gep(base, [ir.IntType(64)(i)])
+
+        def response(d):
+            sums = [builder.load(at(start, d), align=8)] + [ir.Constant(vector, [0.0] * WIDTH)] * 3
+            for e in range(WIDTH):
+                lane = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [e] * WIDTH)
+                weight = builder.shuffle_vector(old, ir.Constant(vector, ir.Undefined), lane)
+                product = builder.fmul(builder.load(at(row, 2 * e + d), align=8), weight, flags=("contract",))
+                sums[e % 4] = builder.fadd(sums[e % 4], product, flags=("contract",))
+            total = builder.fadd(builder.fadd(sums[0], sums[1]), builder.fadd(sums[2], sums[3]))
+            builder.store(total, at(moved, d), align=8)
+            return total
+
+        delta, rate = response(0), response(1)
+        K, a, c = (_spread(builder, arguments[i], vector) for i in (4, 6, 7))
+        deep = cgutils.alloca_once_value(builder, _raised(builder, delta))
+        with builder.if_then(context.is_true(builder, signature.args[5], arguments[5])):
+            d = builder.load(deep)
+            root = ir.FunctionType(vector, [vector])
+            root = cgutils.get_or_insert_function(builder.module, root, f"llvm.sqrt.v{WIDTH}f64")
+            builder.store(builder.fmul(d, builder.call(root, [d])), deep)
+        one = ir.Constant(vector, [1.0] * WIDTH)
+        elastic = builder.fmul(builder.fmul(K, builder.load(deep)), builder.fadd(one, builder.fmul(a, rate)))
+        new = builder.fadd(elastic, builder.fmul(c, rate))
+        builder.store(new, place, align=8)
+        sums = [_sum(builder, builder.fmul(v, v)) for v in (builder.fsub(new, old), new)]
+        return context.make_tuple(builder, signature.return_type, sums)
+
+    number = types.float64
+    signature = types.UniTuple(number, 2)(rows, free, force, motion, number, rooted, number, number)
+    return signature, codegen
+
+
 @intrinsic
 def above_zero(typingctx, source, result):
     """Eight numbers, the negative ones raised to zero; NaN stays."""
@@ -106,9 +162,7 @@ def above_zero(typingctx, source, result):
     def codegen(context, builder, signature, arguments):
         kinds = zip(signature.args, arguments, strict=True)
         (_, given), (place, _) = (_eight(context, builder, *pair) for pair in kinds)
-        zero = ir.Constant(given.type, [0.0] * WIDTH)
-        raised = builder.select(builder.fcmp_ordered("<", given, zero), zero, given)
-        builder.store(raised, place, align=8)
+        builder.store(_raised(builder, given), place, align=8)
         return context.get_dummy_value()
 
     return types.void(source, result), codegen

@@ -117,6 +117,12 @@ def renew(old, new):
     return float(change @ change), float(new[:8] @ new[:8])
 
 
+def power_force(delta, delta_dot, stiffness, rooted, damping, viscosity, result):
+    """Eight forces of a power law."""
+    d, v = np.maximum(delta[:8], 0.0), delta_dot[:8]
+    result[:8] = stiffness * (d * np.sqrt(d) if rooted else d) * (1.0 + damping * v) + viscosity * v
+
+
 def above_zero(source, result):
     """The negative numbers raised to zero."""
     result[:8] = np.maximum(source[:8], 0.0)
@@ -130,4 +136,5 @@ import solvers.tables as tables  # noqa: E402
 import solvers.vector as vector  # noqa: E402
 
 tables._block_response = remembered(tables._block_response)
-vector._columns, vector.renew, vector.above_zero = columns, renew, above_zero
+vector._columns, vector.renew = columns, renew
+vector.power_force, vector.above_zero = power_force, above_zero
