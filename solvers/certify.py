@@ -69,10 +69,15 @@ def _safe(g, v, bound):
 
 
 @inner
-def _first_root(problem, terms, s, x, longest, values):
-    """First time in [0, longest] at which δ becomes positive on the Taylor polynomial; -1 if it does not."""
+def _first_root(problem, terms, s, x, longest, values, slopes):
+    """First time in [0, longest] at which δ becomes positive on the Taylor polynomial; -1 if it does not.
+
+    ``values`` and ``slopes`` are working space for the coefficients of the polynomial and of its derivative.
+    """
+    factorial = 1.0
     for i in range(ORDER + 1):
-        values[i] = dot(problem.read[s], terms[i], 2 * problem.k.size)
+        values[i] = dot(problem.read[s], terms[i], 2 * problem.k.size) / factorial
+        factorial *= i + 1.0
     values[0] -= problem.gap[s]
     if abs(values[0]) <= surface_tolerance(problem, s, x):
         values[0] = 0.0
@@ -81,39 +86,44 @@ def _first_root(problem, terms, s, x, longest, values):
     if values[0] >= 0.0 and (values[1] > 0.0 or (values[1] == 0.0 and values[2] > 0.0)):
         return 0.0
     end = longest
-    if values[1] > 0.0 and _polynomial(values, 1, longest) < 0.0:  # δ has its maximum inside
-        end = _bisect(values, 1, -1.0, longest, -values[1] / values[2])
-    if not _polynomial(values, 0, end) > 0.0:
+    if values[1] > 0.0 and _horner(values, longest)[1] < 0.0:  # δ has its maximum inside
+        for i in range(ORDER):
+            slopes[i] = (i + 1.0) * values[i + 1]
+        slopes[ORDER] = 0.0
+        end = _bisect(slopes, -1.0, longest, -0.5 * values[1] / values[2])
+    if not _horner(values, end)[0] > 0.0:
         return -1.0
-    square = values[1] * values[1] - 2.0 * values[0] * values[2]
-    return _bisect(values, 0, 1.0, end, -2.0 * values[0] / (values[1] + math.sqrt(max(square, 0.0))))
+    square = values[1] * values[1] - 4.0 * values[0] * values[2]
+    return _bisect(values, 1.0, end, -2.0 * values[0] / (values[1] + math.sqrt(max(square, 0.0))))
 
 
 @inlined
-def _polynomial(values, derivative, x):
-    """Taylor polynomial of a derivative at x."""
-    total = values[ORDER]
-    for i in range(ORDER - 1, derivative - 1, -1):
-        total = values[i] + x / (i + 1.0 - derivative) * total
-    return total
+def _horner(coefficients, x):
+    """Value and slope of a polynomial at x."""
+    value, slope = coefficients[ORDER], 0.0
+    for i in range(ORDER - 1, -1, -1):
+        slope = slope * x + value
+        value = value * x + coefficients[i]
+    return value, slope
 
 
 @inner
-def _bisect(values, derivative, sign, b, guess):
-    """Newton with bisection as its guard for the sign change of a derivative in [0, b]."""
+def _bisect(coefficients, sign, b, guess):
+    """Newton with bisection as its guard for the sign change of a polynomial in [0, b], to rounding.
+
+    Its steps double the digits: what a step of 1e-11 leaves is rounding.
+    """
     a, x = 0.0, guess if 0.0 < guess < b else b
     for _ in range(60):
-        f = sign * _polynomial(values, derivative, x)
-        if f > 0.0:
+        f, slope = _horner(coefficients, x)
+        if sign * f > 0.0:
             b = x
         else:
             a = x
-        slope = sign * _polynomial(values, derivative + 1, x)
-        step = f / slope if slope != 0.0 else np.inf
-        following = x - step
+        following = x - (f / slope if slope != 0.0 else np.inf)
         if not a < following < b:
             following = 0.5 * (a + b)
-        if abs(following - x) <= 1e-16 * x:
+        if abs(following - x) <= 1e-11 * x:
             return following
         x = following
     return x
@@ -200,7 +210,7 @@ def fly(problem, tables, state, space, t_end, budget, out, due, ledger):
             taylor(problem, state.x, now[T], space.terms, space.six)
             h = min(shortest, target - now[T], rest)
             for s in range(stops):
-                root = _first_root(problem, space.terms, s, state.x, h, space.values)
+                root = _first_root(problem, space.terms, s, state.x, h, space.values, space.trial)
                 if root >= 0.0:
                     h, stop = root, s
             add_taylor(space.terms, state.x, h, size, space.values, space.work[0])

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from solvers.kernels import contact_forces, dot, indentation, inner, maxima
+from solvers.kernels import contact_forces, dot, indentation, inlined, inner, maxima
 from solvers.state import PEAK_DELTA, PEAK_FORCE
 from solvers.tables import S
+from solvers.vector import combine
 
 
 @maxima
@@ -16,16 +17,13 @@ def top(values):
     return best
 
 
-@inner
-def _legendre(coefficients, x):
-    """Legendre sum at x in [-1, 1] by Clenshaw's recurrence."""
-    later, latest = 0.0, 0.0
-    for k in range(S - 1, 0, -1):
-        later, latest = (
-            coefficients[k] + (2.0 * k + 1.0) / (k + 1.0) * x * later - (k + 1.0) / (k + 2.0) * latest,
-            later,
-        )
-    return coefficients[0] + x * later - 0.5 * latest
+@inlined
+def _horner(coefficients, x):
+    """Value of a polynomial at x."""
+    value = coefficients[S - 1]
+    for k in range(S - 2, -1, -1):
+        value = value * x + coefficients[k]
+    return value
 
 
 @inner
@@ -35,8 +33,7 @@ def _summit(tables, values, ends, best, coefficients):
     for i in range(S):
         if values[i] > values[place]:
             place = i
-    for k in range(S):
-        coefficients[k] = dot(tables.legendre[k], values, S)
+    combine(tables.monomials, values, S, None, coefficients)
     nodes = tables.nodes[0]
     a, fa = (2.0 * nodes[place - 1] - 1.0, values[place - 1]) if place > 0 else (-1.0, ends[0])
     c, fc = (2.0 * nodes[place + 1] - 1.0, values[place + 1]) if place < S - 1 else (1.0, ends[1])
@@ -48,7 +45,7 @@ def _summit(tables, values, ends, best, coefficients):
         x = b - 0.5 * ((b - a) ** 2 * (fb - fc) - (b - c) ** 2 * (fb - fa)) / denominator
         if not a < x < c or abs(x - b) < 1e-8:
             break
-        f = _legendre(coefficients, x)
+        f = _horner(coefficients, x)
         best = max(best, f)
         if x < b:
             if f > fb:

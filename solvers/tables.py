@@ -55,7 +55,7 @@ class Tables(NamedTuple):
     weights: Any  # (f, S): ∫F dt = h Σ weights F
     summary: Any  # (f, S, 8): from node values, the last four Jacobi coefficients, both ends' values, both slopes
     tail: Any  # (f, S, 8): from node values of a signal, the last four Legendre coefficients in σ
-    legendre: Any  # (S, S): all Legendre coefficients from smooth nodes
+    monomials: Any  # (S, S): from values at smooth nodes, the coefficients of the powers of 2σ - 1
     free: Any  # (f, j, m, 2N, 2S): δ and δ̇ at the nodes from the state
     forced: Any  # (f, j, m, m + L, S, 2S): the same from the forces and signals at the nodes
     kick: Any  # (f, j, m + L, S, 2N padded): state change at the end
@@ -289,7 +289,7 @@ def build(
         weights=families.weights,
         summary=families.summary,
         tail=families.tail,
-        legendre=families.legendre,
+        monomials=families.monomials,
         free=blocks.free,
         forced=blocks.forced,
         kick=blocks.kick,
@@ -442,7 +442,7 @@ class _Families(NamedTuple):
     weights: Any
     summary: Any
     tail: Any
-    legendre: Any
+    monomials: Any
     extend: Any
     lagrange: Any  # (f, 2, S) weights of the Lagrange polynomials, plain and divided by the force's weight
     alias: Any  # (f, P) largest error between the nodes of the interpolant of e^{iωt}, at `_PHASES`
@@ -463,7 +463,7 @@ def _families(exponents: tuple[float, ...], jumps: tuple[bool, ...]) -> _Familie
         weights=np.array([f.weights for f in found]),
         summary=np.ascontiguousarray([_summary(f) for f in found]),
         tail=np.ascontiguousarray([_tail(f.nodes) for f in found]),
-        legendre=np.ascontiguousarray(found[0].spectrum),
+        monomials=np.ascontiguousarray(np.linalg.inv(np.vander(2.0 * found[0].nodes - 1.0, increasing=True)).T),
         extend=np.ascontiguousarray([_extensions(f, found[0]) for f in found]),
         lagrange=np.array([_weights(f.nodes) * [np.ones(S), f.nodes ** (-2.0 * f.exponent)] for f in found]),
         alias=np.array([_alias(f) for f in found]),
