@@ -6,7 +6,8 @@ through the address of one compiled function with a declared C signature,
     void kernel(int64 n, double *delta, double *delta_dot, double entry_rate, double *parameters, double *force)
     void gradient(..., double *parameters, double *by_delta, double *by_rate, double *by_entry_rate)
 
-so a new law never recompiles an integrator, and a batch of ``n`` values costs one call.
+so a new law never recompiles an integrator, and a batch of ``n`` values costs one call. The main integrator has power
+laws of exponent 1 and 3/2 inlined: `Law.inlined` decides.
 """
 
 from __future__ import annotations

@@ -46,7 +46,7 @@ from solvers.kernels import (
 )
 from solvers.ledger import account, inside
 from solvers.peaks import peaks_so_far
-from solvers.preparation import SPACE, TABLES, among_tones, prepared_for, without_resonance
+from solvers.preparation import SPACE, TABLES, prepared_for, without_resonance
 from solvers.regular import INDENTATION, ROOT, regular_step
 from solvers.response import free_response
 from solvers.state import (
@@ -455,7 +455,8 @@ class Engine:
         self.packed, self.problem, self.prepared = packed, packed.value, prepared
         block, words = prepared.layout.block()
         self.state = State._make(prepared.layout.arrays(block, 0))
-        begin_state(self.state, prepared.rest + among_tones(z, len(forcing.tone_omega)))
+        begin_state(self.state, prepared.rest)
+        self.state.x[prepared.places] += z
         state, space = (words + start for start in prepared.layout.starts)
         self.addresses = packed.address, prepared.tables.address, state, space
         self.block = block

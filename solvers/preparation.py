@@ -44,6 +44,7 @@ class Prepared(NamedTuple):
     back: Array  # (2n, 2N): [q, q̇] from the state of all blocks
     layout: Layout  # of State and Space
     rest: Array  # state of the tones' blocks at t = 0, the structure's less their steady response
+    places: Any  # (2n,) where the structure's blocks stand in that state
 
 
 def prepared_for(system: System, forcing: Forcing) -> Prepared:
@@ -120,7 +121,7 @@ class _Skeleton:
         fill_tones(tables.value, problem.value, self.tones, *self.kinds)
         rest = among_tones(-response.real.sum(axis=0), self.tones)
         rest[n : n + self.tones] = 1.0
-        return Prepared(problem, tables, back, self.layout, rest)
+        return Prepared(problem, tables, back, self.layout, rest, places_among_tones(n, self.tones))
 
     def _tables(self, forcing: Forcing, turn: Array) -> Cast:
         """Tables that know the signals made of tones, Re(a e^{iΩt}) = Re a · p + Im a/Ω · v; ``turn`` is 1/Ω."""
@@ -229,6 +230,7 @@ def _widened(problem: Problem, forcing: Forcing) -> Problem:
     )
 
 
+@lru_cache(maxsize=64)
 def places_among_tones(n: int, tones: int) -> Any:
     """(2n,) where the blocks' own coordinates stand among those of the tones' blocks."""
     own = np.arange(n)

@@ -1,7 +1,8 @@
-"""Weighted sums of table rows in vector registers, eight columns at a time.
+"""Weighted sums of table rows, and iterations for the forces at eight nodes, in vector registers.
 
 The compiler cannot know that a result does not overlap the table it is computed from, and therefore neither vectorises
-these sums nor keeps them in registers by itself. Rows, start and result hold a multiple of `WIDTH` numbers.
+these sums nor keeps them in registers by itself. Rows, start and result hold a multiple of `WIDTH` numbers. What is
+said of eight numbers is meant for the `tables.S` nodes of a contact step.
 """
 
 from __future__ import annotations

@@ -569,3 +569,24 @@ def test_laws_for_a_mass_refuse(make):
             make(1e6, 0.5, bad)
         with pytest.raises(ValueError, match=r"stiffness of \w+ must be finite and > 0"):
             make(bad, 0.5, 1.0)
+
+
+@pytest.mark.parametrize(
+    "of",
+    [Hertz(3e8), Hysteretic(2e8, 0.7), Hysteretic(5e4, 0.3, exponent=1.0), KelvinVoigt(1e5, 30.0)],
+)
+def test_the_formula_of_inlined_laws_is_their_kernel(of):
+    K, p, a, c = of.inlined
+    d, v, rate = np.linspace(0.0, 1e-3, 7)[1:], np.linspace(-0.6, 0.5, 6)[:, None], 0.4
+    np.testing.assert_allclose(of.force(d, v, rate), K * d**p * (1.0 + a * v / rate) + c * v, rtol=1e-13)
+
+
+@pytest.mark.parametrize(
+    "of",
+    [
+        *(Hysteretic(2e8, 0.7, clamp=True), Hysteretic(2e8, 0.7, exponent=2.0), KelvinVoigt(1e5, 30.0, clamp=True)),
+        *(Viscoelastic(1e8, 3e3), PiecewiseLinear([1e5]), Hertz(1e8) + Hertz(1e8)),
+    ],
+)
+def test_other_laws_are_not_inlined(of):
+    assert of.inlined is None

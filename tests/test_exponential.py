@@ -608,3 +608,26 @@ def test_systems_with_other_tones_leave_each_others_tables_alone():
     loads = [(own, signal) for (own, _), (_, signal) in zip(first.loads, tones(333.0, 5.0), strict=True)]
     assert not np.array_equal(end(first.like(loads=loads)), before)
     np.testing.assert_array_equal(end(first), before)
+
+
+class Called(Hysteretic):
+    """The same law, but never inlined."""
+
+    inlined = None
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.5])
+@pytest.mark.parametrize("stops", [1, 2])
+def test_inlined_laws_and_called_ones_give_the_same_motion(exponent, stops):
+    def end(kind):
+        law = kind(10.0 ** (3.0 + 3.0 * exponent), 0.4, exponent=exponent)
+        sides = [Contact([side, 0.5], law, 1e-4) for side in (1.0, -1.0)[:stops]]
+        system = System.modal([100.0, 900.0], [0.01, 0.3], sides, tones(120.0, 30.0)[:2])
+        return integrate(system, [0.0, 0.0], [0.3, 0.0], 0.5, method=Exponential(1e-10))
+
+    inlined, called = end(Hysteretic), end(Called)
+    assert len(inlined.contacts) == len(called.contacts) > 5
+    assert inlined.cost.steps == called.cost.steps
+    scale = abs(inlined.contacts.peak_force).max()
+    np.testing.assert_allclose(inlined.q, called.q, atol=1e-10 * abs(called.q).max())
+    np.testing.assert_allclose(inlined.contacts.peak_force, called.contacts.peak_force, atol=1e-9 * scale)

@@ -117,10 +117,11 @@ def renew(old, new):
     return float(change @ change), float(new[:8] @ new[:8])
 
 
-def power_force(delta, delta_dot, stiffness, rooted, damping, viscosity, result):
-    """Eight forces of a power law."""
-    d, v = np.maximum(delta[:8], 0.0), delta_dot[:8]
-    result[:8] = stiffness * (d * np.sqrt(d) if rooted else d) * (1.0 + damping * v) + viscosity * v
+def sweep(rows, free, force, motion, stiffness, rooted, damping, viscosity):
+    """One iteration for the forces of a power law."""
+    motion[:] = free + (force @ rows).reshape(2, -1)
+    d, v = np.maximum(motion[0], 0.0), motion[1]
+    return renew(force, stiffness * (d * np.sqrt(d) if rooted else d) * (1.0 + damping * v) + viscosity * v)
 
 
 def above_zero(source, result):
@@ -137,4 +138,4 @@ import solvers.vector as vector  # noqa: E402
 
 tables._block_response = remembered(tables._block_response)
 vector._columns, vector.renew = columns, renew
-vector.power_force, vector.above_zero = power_force, above_zero
+vector.sweep, vector.above_zero = sweep, above_zero
