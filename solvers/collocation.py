@@ -52,32 +52,37 @@ def _alone(problem, state):
     return alone if count == 1 and problem.inlined[alone, EXPONENT] > 0.0 else -1
 
 
+@inlined
+def _iterate(problem, tables, state, space, family, level):
+    """One iteration for the forces of all stops in contact: squares of their change and size, summed."""
+    change, largest = 0.0, 0.0
+    for s in range(problem.gap.size):
+        if state.piece[s] > 0:
+            respond(problem, tables, state, space, family, level, s)
+    for s in range(problem.gap.size):
+        if state.piece[s] > 0:
+            node_forces(problem, state, space, s)
+            moved, size = renew(space.force[s], space.trial)
+            change, largest = change + moved, largest + size
+    return change, largest
+
+
 @inner
 def solve_forces(problem, tables, state, space, family, level, accuracy):
     """Fixed point of the forces to ``accuracy`` in N; whether it was found."""
-    stops = problem.gap.size
-    before = 0.0
-    alone = _alone(problem, state)
+    before, alone = 0.0, _alone(problem, state)
     law = problem.inlined[max(alone, 0)]
     stiffness, rooted, damping = law[STIFFNESS], law[EXPONENT] == 1.5, law[DAMPING]
     factor = law[FACTOR] / state.entry_rate[max(alone, 0)]
     for iteration in range(MOST_ITERATIONS):
-        change, largest = 0.0, 0.0
         if alone >= 0:
             change, largest = sweep(
                 *(tables.forced[family, level, alone, alone], space.free[alone], space.force[alone]),
                 *(space.motion[alone], stiffness, rooted, factor, damping),
             )
             state.count[CALLS] += S
-        for s in range(stops if alone < 0 else 0):
-            if state.piece[s] > 0:
-                respond(problem, tables, state, space, family, level, s)
-        for s in range(stops if alone < 0 else 0):
-            if state.piece[s] == 0:
-                continue
-            node_forces(problem, state, space, s)
-            moved, size = renew(space.force[s], space.trial)
-            change, largest = change + moved, largest + size
+        else:
+            change, largest = _iterate(problem, tables, state, space, family, level)
         if not change < np.inf:
             return False
         settled, change = change <= 1e-30 * largest, math.sqrt(change)
