@@ -21,35 +21,23 @@ import math
 
 import numpy as np
 
-from solvers.kernels import (
-    DAMPING,
-    EXPONENT,
-    FACTOR,
-    STIFFNESS,
-    contact_forces,
-    copy,
-    dot,
-    indentation,
-    inlined,
-    inner,
-    sizes,
-)
+from solvers.kernels import contact_forces, copy, dot, indentation, inlined, inner, sizes
 from solvers.newton import MOST_ITERATIONS, newton
 from solvers.peaks import peak, top
 from solvers.response import node_forces, respond
 from solvers.state import CALLS, PEAK_DELTA, PEAK_FORCE, T
-from solvers.tables import S
+from solvers.tables import DAMPING, EXPONENT, FACTOR, STIFFNESS, S
 from solvers.vector import combine, renew, sweep
 
 
 @inlined
-def _alone(problem, state):
+def _alone(tables, state):
     """The stop in contact if there is but one and its law is inlined, else -1."""
     alone, count = -1, 0
-    for s in range(problem.gap.size):
+    for s in range(state.piece.size):
         if state.piece[s] > 0:
             alone, count = s, count + 1
-    return alone if count == 1 and problem.inlined[alone, EXPONENT] > 0.0 else -1
+    return alone if count == 1 and tables.inlined[alone, EXPONENT] > 0.0 else -1
 
 
 @inlined
@@ -70,8 +58,8 @@ def _iterate(problem, tables, state, space, family, level):
 @inner
 def solve_forces(problem, tables, state, space, family, level, accuracy):
     """Fixed point of the forces to ``accuracy`` in N; whether it was found."""
-    before, alone = 0.0, _alone(problem, state)
-    law = problem.inlined[max(alone, 0)]
+    before, alone = 0.0, _alone(tables, state)
+    law = tables.inlined[max(alone, 0)]
     stiffness, rooted, damping = law[STIFFNESS], law[EXPONENT] == 1.5, law[DAMPING]
     factor = law[FACTOR] / state.entry_rate[max(alone, 0)]
     for iteration in range(MOST_ITERATIONS):

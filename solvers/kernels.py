@@ -68,7 +68,6 @@ class Problem(NamedTuple):
     law: Any  # (m,) addresses of the compiled forces
     gradient: Any  # (m,) addresses of their derivatives
     parameters: Any  # (m, P) their parameters
-    inlined: Any  # (m, 4) (K, p, a, c) of a force K δ^p (1 + a δ̇/δ̇⁻) + c δ̇; p = 0 for the laws to be called
     floor: Any  # (m,) smallest entry rates
     load: Any  # (L, 2n) state rate per unit of signal l
     power: Any  # (L, 2n) input power = signal × power·z
@@ -81,7 +80,6 @@ class Problem(NamedTuple):
     table_load: Any  # (J,) the load each drives
 
 
-STIFFNESS, EXPONENT, FACTOR, DAMPING = range(4)  # of an inlined law
 REAL = types.float64
 VECTOR = types.Array(REAL, 1, "C")
 MATRIX = types.Array(REAL, 2, "C")
@@ -90,7 +88,7 @@ _COMPLEX = types.Array(types.complex128, 1, "C")
 PROBLEM = types.NamedTuple(
     [
         *[VECTOR, VECTOR, MATRIX, MATRIX, MATRIX, MATRIX, MATRIX, VECTOR, INTEGERS, INTEGERS],
-        *[MATRIX, MATRIX, VECTOR, MATRIX, MATRIX, VECTOR, _COMPLEX, INTEGERS, MATRIX, VECTOR, INTEGERS, INTEGERS],
+        *[MATRIX, VECTOR, MATRIX, MATRIX, VECTOR, _COMPLEX, INTEGERS, MATRIX, VECTOR, INTEGERS, INTEGERS],
     ],
     Problem,
 )

@@ -26,7 +26,7 @@ def _arrays(*dimensions: int) -> list[Any]:
 
 TABLES = types.NamedTuple(
     [
-        *_arrays(1, 3, 4, 2, 3, 2, 2, 2, 2, 0, 2, 1),
+        *_arrays(1, 3, 4, 2, 3, 2, 2, 2, 2, 0, 2, 1, 2),
         *_arrays(1, 3, 2, 2, 2, 3, 3, 2, 5, 6, 5, 4, 2, 2, 2, 2, 4),
     ],
     Tables,
@@ -96,7 +96,8 @@ class _Skeleton:
         self.places = [slice(end - len(rows), end) for rows, end in zip(read_by, ends, strict=True)]
         self.back, self.fastest = among_tones(system.blocks.T, self.tones), max(float(_speeds(system).max()), 1e-3)
         ledger = np.zeros_like(problem.load), problem.power, among_tones(loss, self.tones)
-        tables = build(problem, self.tones, *self.kinds, dt_cell, ledger)
+        inlined = np.array([getattr(law, "inlined", None) or (0.0,) * 4 for law in laws]).reshape(-1, 4)
+        tables = build(problem, self.tones, *self.kinds, inlined, dt_cell, ledger)
         self.layout = _layout(len(problem.gap), len(problem.load), len(problem.k), len(forcing.table_dt))
         self.problem = Mould(problem, PROBLEM, ("gap", "k", "read", "read_rate", "power"))
         self.tables = Mould(tables, TABLES, OF_TONES)

@@ -241,21 +241,19 @@ def _problem(system: System, forcing: Forcing, linear: dict[str, Array]) -> Prob
         gap=np.array([c.gap for c in contacts], dtype=float),
         law=np.array([c.law.address for c in contacts], dtype=np.int64),
         gradient=np.array([c.law.gradient_address for c in contacts], dtype=np.int64),
-        **law_numbers(system),
+        parameters=law_parameters(system),
         floor=np.array([c.law.entry_rate_floor for c in contacts], dtype=float),
         **vars(forcing),
     )
 
 
-def law_numbers(system: System) -> dict[str, Array]:
-    """Parameters of the laws (m, P), padded by zeros, and the four of those that are inlined, else zeros."""
+def law_parameters(system: System) -> Array:
+    """Parameters of the laws (m, P), padded by zeros."""
     parameters = [np.asarray(c.law.parameters, dtype=float) for c in system.contacts]
     table = np.zeros((len(parameters), max([p.size for p in parameters], default=1)))
-    inlined = np.zeros((len(parameters), 4))
-    for i, (own, contact) in enumerate(zip(parameters, system.contacts, strict=True)):
-        table[i, : own.size] = own
-        inlined[i] = getattr(contact.law, "inlined", None) or 0.0
-    return {"parameters": table, "inlined": inlined}
+    for row, own in zip(table, parameters, strict=True):
+        row[: own.size] = own
+    return table
 
 
 def rate_rows(read: Array, k: Array, c: Array) -> Array:

@@ -25,6 +25,7 @@ import numpy as np
 from solvers.kernels import Problem, inner, kernel
 from solvers.vector import padded
 
+STIFFNESS, EXPONENT, FACTOR, DAMPING = range(4)  # of an inlined law
 S = 8  # nodes of a contact step: 6 is a little faster at 1e-6, 10 and 12 bring nothing
 TAYLOR_REACH = 0.02  # |λ| x up to which a Taylor step of order 6 is exact to rounding
 _PANEL = 6.0  # radians of the fastest oscillation per quadrature panel of 12 points
@@ -48,6 +49,7 @@ class Tables(NamedTuple):
     fastest: float  # |λ|max
     mobility: Any  # (m, m): δ̈ of stop s per newton at stop u, positive where the force opens the contact
     exponent: Any  # (m,) leading exponents p
+    inlined: Any  # (m, 4) (K, p, a, c) of a force K δ^p (1 + a δ̇/δ̇⁻) + c δ̇; p = 0 for the laws to be called
     step: Any  # (j,) contact steps
     step_propagator: Any  # (j, 2, N)
     nodes: Any  # (f, S) σ
@@ -258,6 +260,7 @@ def build(
     tones: int,
     exponents: list[float],
     jumps: list[bool],
+    inlined: Any,
     dt_cell: float,
     ledger: tuple[Any, Any, Any],
 ) -> Tables:
@@ -282,6 +285,7 @@ def build(
         fastest=fastest,
         mobility=-problem.read_rate @ problem.push.T,
         exponent=np.array(exponents, dtype=float),
+        inlined=inlined,
         step=contact_h,
         step_propagator=blocks.step_propagator,
         nodes=families.nodes,

@@ -15,7 +15,7 @@ from solvers.kernels import PROBLEM, Problem
 from solvers.preparation import places_among_tones, steady_response
 from solvers.replay import NUDGE, SLOPES, Nudge, Slopes, replay
 from solvers.result import SolverError
-from solvers.state import HEAD, STATE, State, T, begin_state, law_numbers, state_shapes
+from solvers.state import HEAD, STATE, State, T, begin_state, law_parameters, state_shapes
 from solvers.system import Array, Parameter, System
 from solvers.tables import S
 
@@ -136,7 +136,7 @@ class _Change:
         nudge = Nudge(parameter.step, parameter.step, tones.omega, np.ascontiguousarray(steady), shift)
         if all(one.law is other.law for one, other in zip(*(side.contacts for side in sides), strict=True)):
             return cls(nudge._replace(law_step=0.0), [engine.problem] * 2, a, b)
-        problems = [engine.problem._replace(**law_numbers(side)) for side in reversed(sides)]
+        problems = [engine.problem._replace(parameters=law_parameters(side)) for side in reversed(sides)]
         return cls(nudge, problems, a, b)
 
 
