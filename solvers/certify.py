@@ -111,7 +111,7 @@ def _horner(coefficients, x):
 def _bisect(coefficients, sign, b, guess):
     """Newton with bisection as its guard for the sign change of a polynomial in [0, b], to rounding.
 
-    Its steps double the digits: what a step of 1e-11 leaves is rounding.
+    Its steps double the digits: what a step of 1e-11 leaves is rounding. A double root is known to 1e-8 at best.
     """
     a, x = 0.0, guess if 0.0 < guess < b else b
     for _ in range(60):

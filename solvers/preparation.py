@@ -86,12 +86,12 @@ class _Skeleton:
     """
 
     def __init__(self, system: System, forcing: Forcing, dt_cell: float) -> None:
-        self.plain, self.tones = problem_of(system, forcing), len(forcing.tone_omega)
+        plain, self.tones = problem_of(system, forcing), len(forcing.tone_omega)
+        self.k, self.c, self.load = plain.k, plain.c, plain.load  # not the whole, which holds the sampled signals
         laws = [contact.law for contact in system.contacts]
         self.kinds = [law.exponent for law in laws], [law.jump for law in laws]
-        problem = _widened(self.plain, forcing)
-        loss = _loss_rows(self.plain)
-        read_by = self.plain.read, self.plain.power, loss, system.blocks.T
+        problem, loss = _widened(plain, forcing), _loss_rows(plain)
+        read_by = plain.read, plain.power, loss, system.blocks.T
         self.rows, ends = np.concatenate(read_by), np.cumsum([len(rows) for rows in read_by]).tolist()
         self.places = [slice(end - len(rows), end) for rows, end in zip(read_by, ends, strict=True)]
         self.back, self.fastest = among_tones(system.blocks.T, self.tones), max(float(_speeds(system).max()), 1e-3)
@@ -104,9 +104,9 @@ class _Skeleton:
 
     def with_tones(self, forcing: Forcing, gaps: list[float]) -> Prepared:
         """The same with the columns of given tones, and with given gaps."""
-        omega, amplitude, n = forcing.tone_omega, forcing.tone_amplitude, len(self.plain.k)
-        load = self.plain.load[forcing.tone_load] * amplitude[:, None]
-        response = steady_response(self.plain.k, self.plain.c, load, omega[:, None])
+        omega, amplitude, n = forcing.tone_omega, forcing.tone_amplitude, len(self.k)
+        load = self.load[forcing.tone_load] * amplitude[:, None]
+        response = steady_response(self.k, self.c, load, omega[:, None])
         turn = 1.0 / np.where(omega > 0.0, omega, np.inf)
         steady = np.concatenate((response.real, response.imag * turn[:, None])).T  # (2n, 2 tones)
         columns = (self.rows @ steady).reshape(len(self.rows), 2, self.tones)

@@ -1,6 +1,8 @@
 """The exponential method: agreement with the Runge–Kutta reference, corners, random scenes, cost, bad input."""
 
+import gc
 import math
+import weakref
 from pathlib import Path
 
 import numpy as np
@@ -631,3 +633,14 @@ def test_inlined_laws_and_called_ones_give_the_same_motion(exponent, stops):
     scale = abs(inlined.contacts.peak_force).max()
     np.testing.assert_allclose(inlined.q, called.q, atol=1e-10 * abs(called.q).max())
     np.testing.assert_allclose(inlined.contacts.peak_force, called.contacts.peak_force, atol=1e-9 * scale)
+
+
+def test_what_systems_share_does_not_hold_on_to_sampled_signals():
+    system = System.modal([100.0, 900.0], [0.01, 0.3], [Contact([1.0, 0.5], Hertz(1e8), 1e-4)], tones(120.0))
+    forcing = hand_over([signal for _, signal in system.loads], 1.0, 1e-8)
+    prepared_for(system, forcing)
+    table, problem = weakref.ref(forcing.table), system.kept["exponential"][1].problem.value
+    assert problem.table.size == 0
+    del forcing, problem
+    gc.collect()
+    assert table() is None
