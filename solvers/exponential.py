@@ -28,7 +28,7 @@ from numba import types
 from solvers.certify import fly
 from solvers.collocation import arrive, contact_time, finish_step, leaves_piece, solve_forces, step_error
 from solvers.flight import energy_norms
-from solvers.forcing import Forcing, on_one_grid
+from solvers.forcing import Forcing
 from solvers.handle import Cast, Packed, opener
 from solvers.kernels import (
     MATRIX,
@@ -46,7 +46,7 @@ from solvers.kernels import (
 )
 from solvers.ledger import account, inside
 from solvers.peaks import peaks_so_far
-from solvers.preparation import SPACE, TABLES, prepared_for, without_resonance
+from solvers.preparation import SPACE, TABLES, ready_for
 from solvers.regular import INDENTATION, ROOT, regular_step
 from solvers.response import free_response
 from solvers.state import (
@@ -73,7 +73,6 @@ from solvers.state import (
     State,
     T,
     begin_contacts,
-    begin_state,
     switch,
     switch_on_surface,
     tape,
@@ -446,25 +445,29 @@ class Engine:
 
     def __init__(self, method: Exponential, system: System, z: Array, forcing: Forcing, duration: float) -> None:
         self.method, self.duration = method, duration
-        forcing = on_one_grid(without_resonance(system, forcing, duration, method.rtol), duration)
-        prepared = prepared_for(system, forcing)
+        forcing, prepared = ready_for(system, forcing, duration, method.rtol)
         self.back = prepared.back
         packed: Cast | Packed = prepared.problem
         if forcing.table.size:
             packed = Packed(packed.value._replace(table=forcing.table, table_start=forcing.table_start), PROBLEM)
         self.packed, self.problem, self.prepared = packed, packed.value, prepared
-        block, words = prepared.layout.block()
-        self.state = State._make(prepared.layout.arrays(block, 0))
-        begin_state(self.state, prepared.rest)
-        self.state.x[prepared.places] += z
-        state, space = (words + start for start in prepared.layout.starts)
-        self.addresses = packed.address, prepared.tables.address, state, space
-        self.block = block
+        self.workspace = prepared.workspace()
+        self.workspace.begin(z)
+        self.addresses = packed.address, prepared.tables.address, *self.workspace.addresses
+
+    @property
+    def state(self) -> State:
+        """The state reached."""
+        return self.workspace.state
 
     def record(self, tape: Array) -> None:
         """Write what happens in contact to a tape."""
-        self.state = self.state._replace(tape=tape)
-        self.prepared.layout.exchange(self.block, 0, State._fields.index("tape"), tape)
+        self.workspace.record(tape)
+
+    def release(self) -> None:
+        """Leave the workspace to another run; nothing may look at this one's state any more."""
+        if not self.workspace.state.tape.size:
+            self.prepared.spare.append(self.workspace)
 
     def start(self) -> None:
         """The compiled loop does so itself."""

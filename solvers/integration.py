@@ -85,6 +85,7 @@ def integrate(
         raise SolverError(
             f"stopped at t = {run.time:.9g} s of {duration:g} s: {status.value}{run.explanation(status)}", solution
         )
+    run.release()
     return solution
 
 
@@ -133,18 +134,21 @@ def _end(system: System, q0: ArrayLike, q_dot0: ArrayLike, duration: float, meth
 
 def _start(system: System, q0: ArrayLike, q_dot0: ArrayLike, method: Any) -> Array:
     """Checked start in the coordinates a method steps in: decoupled blocks, or the system's own."""
-    vectors = [np.array(value, dtype=float, ndmin=1) for value in (q0, q_dot0)]
-    for name, vector in zip(("q0", "q_dot0"), vectors, strict=True):
-        if vector.shape != (system.size,):
-            raise ValueError(f"{name} must have shape ({system.size},), got {vector.shape}")
-    start = np.concatenate(vectors)
-    finite = np.isfinite(start)
-    if not finite.all():
-        which, bad = divmod(int(np.argmin(finite)), system.size)
-        raise ValueError(f"{('q0', 'q_dot0')[which]} must be finite, got {vectors[which][bad]} at coordinate {bad}")
+    n = system.size
+    start = np.empty(2 * n)
+    for name, vector, place in (("q0", q0, start[:n]), ("q_dot0", q_dot0, start[n:])):
+        if np.shape(vector) != (n,) and (np.ndim(vector) or n != 1):
+            raise ValueError(f"{name} must have shape ({n},), got {np.shape(vector)}")
+        place[:] = vector
+    if not math.isfinite(start.dot(start)):  # or large: squares overflow
+        finite = np.isfinite(start)
+        if not finite.all():
+            which, bad = divmod(int(np.argmin(finite)), n)
+            name = ("q0", "q_dot0")[which]
+            raise ValueError(f"{name} must be finite, got {start[which * n + bad]} at coordinate {bad}")
     if hasattr(method, "takes_matrices") and method.takes_matrices(system):
         return start
-    return system.blocks.inverse @ start
+    return system.blocks.inverse.dot(start)
 
 
 def _times(duration: float, dt: Any) -> Array | None:
@@ -241,28 +245,33 @@ class _Run:
                     progress(self.time)
         except KeyboardInterrupt:
             return Status.INTERRUPTED
-        finite = np.isfinite(self.state.x).all()  # loads of 1e300 overflow where no method looks
+        x = self.state.x
+        finite = math.isfinite(x.dot(x)) or np.isfinite(x).all()  # loads of 1e300 overflow where no method looks
         return STATUSES[code] if finite or STATUSES[code] is not Status.DONE else Status.DIVERGED
 
     def solution(self, status: Status, seconds: float) -> Solution:
         """Collect outputs, log and ledger."""
         size, n = self.begin.size, self.system.size
+        back = self.engine.back
         if self.times is None:
-            x, t = self.state.x[None, :].copy(), np.array([self.time])
+            x, t = self.state.x[None, :], np.array([self.time])
+            motion = back.dot(x[0, :size]).reshape(1, -1)
         else:
             x = self.out[: self._sampled(status)]
-            t = self.times[: len(x)]
-        motion = product(x[:, :size], self.engine.back.T)
-        powers = x[:, size:].copy()
-        if not self.engine.keeps_ledger(self.times is not None):
-            powers[:, :2] = math.nan
-        ledger = partial(Energy.of_run, self.system.M, self.system.K, powers, motion, self.engine.back @ self.begin)
-        count = self.state.count
-        steps, rejected, calls, events = count[[STEPS, REJECTED, CALLS, EVENTS]].tolist()
-        cost = Cost(steps, rejected, calls, events, seconds)
+            t, motion = self.times[: len(x)], product(x[:, :size], back.T)
+        powers, complete = x[:, size:].copy(), self.engine.keeps_ledger(self.times is not None)
+        ledger = partial(_energy, self.system, powers, complete, motion, back, self.begin)
+        log = partial(ContactLog.of_rows, self._rows())
+        count = self.state.count.tolist()
+        cost = Cost(count[STEPS], count[REJECTED], count[CALLS], count[EVENTS], seconds)
         known = self.tangent is not None and status is Status.DONE
         more = {"tangent": self.tangent.matrix(), "rate": self.tangent.rate()} if known else {}
-        return Solution(t, motion[:, :n], motion[:, n:], self._contacts(), ledger, status, cost, **more)
+        return Solution(t, motion[:, :n], motion[:, n:], log, ledger, status, cost, **more)
+
+    def release(self) -> None:
+        """Leave to other runs what this one wrote to."""
+        if hasattr(self.engine, "release"):
+            self.engine.release()
 
     def _sampled(self, status: Status) -> int:
         """Samples written; the last one may lie a rounding beyond the end."""
@@ -272,11 +281,20 @@ class _Run:
             return len(self.out)
         return written
 
-    def _contacts(self) -> ContactLog:
+    def _rows(self) -> Array:
         """The log, contacts under way last."""
-        rows = [self.log[: self.state.count[LOGGED]]]
-        for s in self.state.piece.nonzero()[0]:
-            row = np.empty(COLUMNS)
+        logged = self.log[: self.state.count[LOGGED]].copy()
+        under_way = [s for s, piece in enumerate(self.state.piece.tolist()) if piece > 0]
+        if not under_way:
+            return logged
+        rows = np.empty((len(under_way), COLUMNS))
+        for s, row in zip(under_way, rows, strict=True):
             contact_row(self.engine.problem, self.state, s, math.nan, math.nan, row)
-            rows.append(row[None, :])
-        return ContactLog.of_rows(np.concatenate(rows) if len(rows) > 1 else rows[0])
+        return np.concatenate((logged, rows))
+
+
+def _energy(system: System, powers: Array, complete: bool, motion: Array, back: Array, begin: Array) -> Energy:
+    """The ledger of a run; its input and damping are NaN where it kept none."""
+    if not complete:
+        powers = np.hstack((np.full((len(powers), 2), math.nan), powers[:, 2:]))
+    return Energy.of_run(system.M, system.K, powers, motion, back @ begin)

@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from solvers.forcing import Forcing, tones_as_nodes
+from solvers.forcing import Forcing, on_one_grid, tones_as_nodes
 from solvers.handle import Cast, Layout, Mould
 from solvers.kernels import INTEGERS, MATRIX, PROBLEM, REAL, VECTOR, Problem
 from solvers.response import Space
-from solvers.state import STATE, problem_of, state_shapes
+from solvers.state import STATE, State, begin_state, problem_of, state_shapes
 from solvers.system import Array, System
 from solvers.tables import OF_TONES, S, Tables, build, doublings, fill_tones
 from solvers.vector import padded
@@ -36,6 +36,30 @@ SPACE = types.NamedTuple(
 )
 
 
+class Workspace:
+    """What one run writes to: a block of memory, its arrays, and where compiled code finds their descriptors."""
+
+    def __init__(self, layout: Layout, rest: Array, blocks: int, tones: int) -> None:
+        self.layout = layout
+        self.block, words = layout.block()
+        self.numbers = self.block[: layout.size]
+        self.addresses = [words + start for start in layout.starts]
+        self.state = State._make(layout.arrays(self.block, 0))
+        begin_state(self.state, rest)
+        self.rest = self.numbers.copy()
+        self.own = self.state.x[: 2 * (blocks + tones)].reshape(2, -1)[:, :blocks]
+
+    def begin(self, z: Array) -> None:
+        """The state of a run at t = 0 from the coordinates of the structure's own blocks."""
+        self.numbers[:] = self.rest
+        self.own += z.reshape(2, -1)
+
+    def record(self, tape: Array) -> None:
+        """Let another array be the tape."""
+        self.state = self.state._replace(tape=tape)
+        self.layout.exchange(self.block, 0, State._fields.index("tape"), tape)
+
+
 class Prepared(NamedTuple):
     """What does not change from run to run of one system."""
 
@@ -44,7 +68,27 @@ class Prepared(NamedTuple):
     back: Array  # (2n, 2N): [q, q̇] from the state of all blocks
     layout: Layout  # of State and Space
     rest: Array  # state of the tones' blocks at t = 0, the structure's less their steady response
-    places: Any  # (2n,) where the structure's blocks stand in that state
+    tones: int
+    spare: list[Workspace]  # of runs that are over
+
+    def workspace(self) -> Workspace:
+        """One that no other run uses; making its arrays takes as long as many steps."""
+        try:
+            return self.spare.pop()
+        except IndexError:
+            return Workspace(self.layout, self.rest, self.back.shape[0] // 2, self.tones)
+
+
+def ready_for(system: System, forcing: Forcing, duration: float, rtol: float) -> tuple[Forcing, Prepared]:
+    """The forcing as the method takes it, and the tables; what a run just like the last one needs is at hand."""
+    last = system.kept.get("run")
+    if last and last[0] is forcing and last[1] == (duration, rtol):
+        return forcing, last[2]
+    taken = on_one_grid(without_resonance(system, forcing, duration, rtol), duration)
+    prepared = prepared_for(system, taken)
+    if taken is forcing and not forcing.table.size:
+        system.kept["run"] = forcing, (duration, rtol), prepared
+    return taken, prepared
 
 
 def prepared_for(system: System, forcing: Forcing) -> Prepared:
@@ -122,7 +166,7 @@ class _Skeleton:
         fill_tones(tables.value, problem.value, self.tones, *self.kinds)
         rest = among_tones(-response.real.sum(axis=0), self.tones)
         rest[n : n + self.tones] = 1.0
-        return Prepared(problem, tables, back, self.layout, rest, places_among_tones(n, self.tones))
+        return Prepared(problem, tables, back, self.layout, rest, self.tones, [])
 
     def _tables(self, forcing: Forcing, turn: Array) -> Cast:
         """Tables that know the signals made of tones, Re(a e^{iΩt}) = Re a · p + Im a/Ω · v; ``turn`` is 1/Ω."""

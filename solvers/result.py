@@ -173,7 +173,7 @@ class Solution:
     Attributes
     ----------
     t : (k,) s. q, q_dot : (k, n) coordinates and rates then; without output samples k = 1, the end.
-    contacts : log. energy : ledger, made when first looked at, by calling ``ledger``.
+    contacts : log, and energy : ledger, made when first looked at, by calling ``log`` and ``ledger``.
     status : how it ended. cost : what it took.
     tangent : (2n, 2n or 2n + 1) derivative of the final [q, q̇], and rate : (2n,) its derivative by time; None unless
         asked for.
@@ -195,7 +195,7 @@ class Solution:
     t: Array
     q: Array
     q_dot: Array
-    contacts: ContactLog
+    log: Callable[[], ContactLog] = field(repr=False)
     ledger: Callable[[], Energy] = field(repr=False)
     status: Status
     cost: Cost
@@ -207,6 +207,11 @@ class Solution:
         return f"<solution {reached}, {counted(len(self.contacts), 'contact')}: {self.status.value}>"
 
     @cached_property
+    def contacts(self) -> ContactLog:
+        """The contact log."""
+        return self.log()
+
+    @cached_property
     def energy(self) -> Energy:
-        """The energy ledger, made when first looked at."""
+        """The energy ledger."""
         return self.ledger()
