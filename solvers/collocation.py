@@ -101,7 +101,7 @@ def step_error(problem, tables, state, space, family, level, fresh):
                 continue
             largest, deepest = top(space.force[u]), top(space.motion[u, 0])
             beyond = _beyond(space.summary[u, 0], largest, S // 2)
-            if family == 0:
+            if family == 0 and tables.inlined[u, EXPONENT] == 0.0:
                 beyond += 0.01 * _hidden_kink(problem, state, space, u, largest, fresh)
             if beyond == 0.0:
                 continue

@@ -7,6 +7,8 @@ from solvers.state import PEAK_DELTA, PEAK_FORCE
 from solvers.tables import S
 from solvers.vector import combine
 
+_MOST = 6  # steps to a summit
+
 
 @maxima
 def top(values):
@@ -18,44 +20,43 @@ def top(values):
 
 
 @inlined
-def _horner(coefficients, x):
-    """Value of a polynomial at x."""
-    value = coefficients[S - 1]
+def _local(coefficients, x):
+    """Value, slope and half the curvature of a polynomial at x."""
+    value, slope, curvature = coefficients[S - 1], 0.0, 0.0
     for k in range(S - 2, -1, -1):
+        curvature = curvature * x + slope
+        slope = slope * x + value
         value = value * x + coefficients[k]
-    return value
+    return value, slope, curvature
 
 
 @inner
-def _summit(tables, values, ends, best, coefficients):
-    """Maximum of the polynomial around its highest node, by successive parabolas; ``ends`` are its end values."""
+def _summit(tables, values, ends, coefficients):
+    """Maximum of the polynomial around its highest node; ``ends`` are its values at -1 and 1.
+
+    From the summit of the parabola through that node and its neighbours Newton's method for the slope goes on; the
+    local parabola's summit is off by the third power of its last step.
+    """
     place = 0
     for i in range(S):
         if values[i] > values[place]:
             place = i
     combine(tables.monomials, values, S, None, coefficients)
-    nodes = tables.nodes[0]
-    a, fa = (2.0 * nodes[place - 1] - 1.0, values[place - 1]) if place > 0 else (-1.0, ends[0])
-    c, fc = (2.0 * nodes[place + 1] - 1.0, values[place + 1]) if place < S - 1 else (1.0, ends[1])
-    b, fb = 2.0 * nodes[place] - 1.0, values[place]
-    for _ in range(5):
-        denominator = (b - a) * (fb - fc) - (b - c) * (fb - fa)
-        if denominator == 0.0:
+    nodes, b = tables.nodes[0], 2.0 * tables.nodes[0, place] - 1.0
+    low, left = (2.0 * nodes[place - 1] - 1.0, values[place - 1]) if place > 0 else (-1.0, ends[0])
+    high, right = (2.0 * nodes[place + 1] - 1.0, values[place + 1]) if place < S - 1 else (1.0, ends[1])
+    rise, fall = (b - low) * (values[place] - right), (high - b) * (values[place] - left)
+    x = b if rise + fall == 0.0 else b - 0.5 * ((b - low) * rise - (high - b) * fall) / (rise + fall)
+    best = values[place]
+    for _ in range(_MOST):
+        value, slope, curvature = _local(coefficients, x)
+        best = max(best, value)
+        if not curvature < 0.0:
             break
-        x = b - 0.5 * ((b - a) ** 2 * (fb - fc) - (b - c) ** 2 * (fb - fa)) / denominator
-        if not a < x < c or abs(x - b) < 1e-8:
-            break
-        f = _horner(coefficients, x)
-        best = max(best, f)
-        if x < b:
-            if f > fb:
-                c, fc, b, fb = b, fb, x, f
-            else:
-                a, fa = x, f
-        elif f > fb:
-            a, fa, b, fb = b, fb, x, f
-        else:
-            c, fc = x, f
+        step = -0.5 * slope / curvature
+        if abs(step) < 1e-5:
+            return max(best, value + 0.5 * slope * step)
+        x = min(max(x + step, low), high)
     return best
 
 
@@ -68,7 +69,7 @@ def peak(tables, family, values, summary, known, coefficients):
         return best
     if highest == values[S - 1] and summary[7] >= 0.0:
         return best
-    return _summit(tables, values, summary[4:6], best, coefficients)
+    return max(best, _summit(tables, values, summary[4:6], coefficients))
 
 
 @inner
