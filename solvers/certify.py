@@ -18,6 +18,7 @@ import numpy as np
 from solvers.flight import (
     LONG_REACH,
     ORDER,
+    acceleration_bound,
     add_signals,
     add_taylor,
     cell_of,
@@ -25,8 +26,10 @@ from solvers.flight import (
     go_on,
     go_through,
     level_within,
+    look,
     taylor,
     turn,
+    turn_apart,
 )
 from solvers.kernels import copy, dot, indentation, inlined, inner, merged
 from solvers.ledger import account_flight
@@ -162,6 +165,32 @@ def _sample(problem, tables, state, space, t, out, due):
         state.count[SAMPLED], t = state.count[SAMPLED] + 1, wanted
 
 
+@inner
+def _glide(problem, tables, state, space, most, budget):
+    """Tabulated steps without signals or output until a stop is near, or the time left, ``most``, or the budget spent.
+
+    Positions and rates of the blocks stand apart meanwhile, in eights. Returns (time flown, steps, safe time).
+    """
+    n, x, flown, count = problem.k.size, space.apart, 0.0, 0
+    for b in range(n):
+        x[0, b], x[1, b] = state.x[b], state.x[n + b]
+    while True:
+        span = most - flown
+        for s in range(problem.gap.size):
+            if count % _REFRESH == 0:
+                space.m[s] = acceleration_bound(tables, s, x)
+            delta, rate = look(tables, s, x)
+            span = min(span, _safe(problem.gap[s] - delta, -rate, space.m[s]))
+        if span < tables.h[tables.h.size - 1] or count >= budget:
+            break
+        level = level_within(tables, span)
+        turn_apart(tables, level, x)
+        flown, count = flown + tables.h[level], count + 1
+    for b in range(n):
+        state.x[b], state.x[n + b] = x[0, b], x[1, b]
+    return flown, count, span
+
+
 @merged
 def fly(problem, tables, state, space, t_end, budget, out, due, ledger):
     """Fly until a stop is reached (returns its index), the end (-1), or the budget is spent (-2).
@@ -189,7 +218,8 @@ def fly(problem, tables, state, space, t_end, budget, out, due, ledger):
             rest = max(dt_cell - offset, 1e-9 * dt_cell)
             for j in range(problem.table_dt.size):
                 space.bounds[j] = _signal_bound(problem, j, cell)
-        if sampled or count % _REFRESH == 0:
+        alone = first == np.inf and not sampled and not ledger
+        if not alone and (sampled or count % _REFRESH == 0):
             energy_norms(problem, state.x, space.norms)
             for s in range(stops):
                 space.m[s] = _acceleration_bound(problem, tables, s, space.norms, space.bounds, rest)
@@ -200,7 +230,13 @@ def fly(problem, tables, state, space, t_end, budget, out, due, ledger):
             copy(state.x, space.x_new, state.x.size)
 
         # --- how far no stop can be reached
-        for s in range(stops):
+        if alone:
+            flown, steps, span = _glide(problem, tables, state, space, span, budget)
+            now[T] += flown
+            state.count[STEPS] += steps
+            if steps >= budget:
+                return -2
+        for s in range(0 if alone else stops):
             g, v = -indentation(problem, s, state.x), -dot(problem.read_rate[s], state.x, size)
             span = min(span, _safe(g, v, space.m[s]))
 

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
+from solvers.eight import WIDTH, bits, eight, put, root, spread, total
 from solvers.kernels import copy, inlined, inner
 from solvers.vector import combine
 
 ORDER = 6
+_CURVED = int(0.345 * 2**50)  # by which a logarithm that is linear between powers of two can be wrong, times four
 _LONG = 14  # terms of a series that is exact to rounding up to |λ| x = LONG_REACH: 0.6^14/14! = 9e-15
 LONG_REACH = 0.6
 
@@ -21,7 +21,8 @@ LONG_REACH = 0.6
 @inlined
 def level_within(tables, span):
     """Index of the longest tabulated step not above ``span``, which is at least the shortest one."""
-    level = min(max(int(np.ceil(4.0 * math.log2(tables.h[0] / span))), 0), tables.h.size - 1)
+    level = ((bits(tables.h[0]) - bits(span) - _CURVED) >> 50) + 1  # never too high: 2^50 are a quarter octave
+    level = min(max(level, 0), tables.h.size - 1)
     while tables.h[level] > span and level < tables.h.size - 1:
         level += 1
     return level
@@ -157,6 +158,37 @@ def go_on(problem, x, t, span, term, six):
         weight *= span / (i + 1.0)
         for e in range(2 * n):
             x[e] += weight * term[e]
+
+
+@inlined
+def turn_apart(tables, level, x):
+    """A tabulated step of the blocks' p and v, eight blocks at once."""
+    alpha, beta = tables.propagator[level, 0], tables.propagator[level, 1]
+    for i in range(0, x.shape[1], WIDTH):
+        p, v, a, b = eight(x[0], i), eight(x[1], i), eight(alpha, i), eight(beta, i)
+        put(x[0], i, a * p + b * v)
+        put(x[1], i, a * v - b * (eight(tables.apart[0], i) * p + eight(tables.apart[1], i) * v))
+
+
+@inlined
+def look(tables, s, x):
+    """δ + gap and δ̇ of a stop from the blocks' p and v."""
+    rows, delta, rate = tables.look[s], spread(0.0), spread(0.0)
+    for i in range(0, x.shape[1], WIDTH):
+        p, v = eight(x[0], i), eight(x[1], i)
+        delta += eight(rows[0], i) * p + eight(rows[1], i) * v
+        rate += eight(rows[2], i) * p + eight(rows[3], i) * v
+    return total(delta), total(rate)
+
+
+@inlined
+def acceleration_bound(tables, s, x):
+    """M: bound of |δ̈| of a stop from now on, without signals, from the blocks' p and v."""
+    bound = spread(0.0)
+    for i in range(0, x.shape[1], WIDTH):
+        p, v = eight(x[0], i), eight(x[1], i)
+        bound += eight(tables.weight[s], i) * root(v * v + eight(tables.apart[0], i) * p * p)
+    return total(bound)
 
 
 @inlined

@@ -26,13 +26,13 @@ def _arrays(*dimensions: int) -> list[Any]:
 
 TABLES = types.NamedTuple(
     [
-        *_arrays(1, 3, 4, 2, 3, 2, 2, 2, 2, 0, 2, 1, 2),
+        *_arrays(1, 3, 4, 2, 3, 2, 3, 2, 2, 2, 2, 0, 2, 1, 2),
         *_arrays(1, 3, 2, 2, 2, 3, 3, 2, 5, 6, 5, 4, 2, 2, 2, 2, 4),
     ],
     Tables,
 )
 SPACE = types.NamedTuple(
-    [*_arrays(1, 2, 2, 1, 1, 1, 1, 3, 1, 3, 2, 1, 3, 2, 3, 2, 1), INTEGERS, MATRIX, VECTOR, INTEGERS], Space
+    [*_arrays(1, 2, 2, 1, 1, 1, 1, 2, 3, 1, 3, 2, 1, 3, 2, 3, 2, 1), INTEGERS, MATRIX, VECTOR, INTEGERS], Space
 )
 
 
@@ -202,6 +202,7 @@ def _layout(stops: int, loads: int, blocks: int, signals: int) -> Layout:
     size, width = 2 * blocks, 2 * blocks + 2 + 2 * stops
     space = [
         *((padded(width),), (7, padded(size)), (signals, 6), (7,), (blocks,), (loads,), (stops,)),
+        (2, padded(blocks)),
         *((stops, 2, S), (S,), (stops, 2, S), (stops + loads, S), (S,), (stops, 2, 8), (stops, S), (stops, 3, S)),
         *((stops * S, stops * S), (stops * S,), (stops * S,), (18, padded(width + 2)), (2 + stops,), (6,)),
     ]

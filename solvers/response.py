@@ -20,6 +20,7 @@ class Space(NamedTuple):
     norms: Any  # (N,)
     bounds: Any  # (L,)
     m: Any  # (m,)
+    apart: Any  # (2, N padded) p and v of the blocks
     motion: Any  # (m, 2, S) indentations and their rates at the nodes
     clipped: Any  # (S,)
     free: Any  # (m, 2, S)

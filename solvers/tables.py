@@ -38,11 +38,13 @@ class Tables(NamedTuple):
     """Numbers per step size; l counts flight steps, j contact steps."""
 
     h: Any  # (l,)
-    propagator: Any  # (l, 2, N): α, β of every block
+    propagator: Any  # (l, 2, N padded): α, β of every block
     signal: Any  # (l, L, 6, 2N): state change by a signal t^k/k!
     cell: Any  # (2, N) propagator of a whole cell of the sampled signals
     cell_signal: Any  # (L, 6, 2N)
-    weight: Any  # (m, N): |δ̈| <= Σ weight × energy norm
+    apart: Any  # (2, N padded): k, c
+    look: Any  # (m, 4, N padded): the first two rows give δ + gap from p and v, the others δ̇
+    weight: Any  # (m, N padded): |δ̈| <= Σ weight × energy norm
     reach: Any  # (m, N): |δ̇| <= Σ reach × energy norm
     direct: Any  # (m, L): δ̈ per unit of a signal
     load_norm: Any  # (L, N): energy norm of a load per block
@@ -247,7 +249,7 @@ class _Blocks(NamedTuple):
 
 # the tables that tones have a part in
 OF_TONES = (
-    *("propagator", "step_propagator", "free", "ripple", "weight", "reach"),
+    *("propagator", "step_propagator", "free", "ripple", "apart", "look", "weight", "reach"),
     *("signal_rows", "power_rows", "loss_rows", "cell"),
 )
 
@@ -277,8 +279,12 @@ def build(
         signal=_signals(problem, h),
         cell=_cell(problem, dt_cell),
         cell_signal=_signals(problem, np.array([dt_cell]))[0],
-        weight=np.abs(problem.read[:, :size]) * (omega + damping)
-        + np.abs(problem.read[:, size:]) * (problem.k + damping * (omega + damping)),
+        apart=_in_eights(np.array([problem.k, problem.c])),
+        look=_in_eights(np.concatenate((problem.read, problem.read_rate), axis=1).reshape(-1, 4, size)),
+        weight=_in_eights(
+            np.abs(problem.read[:, :size]) * (omega + damping)
+            + np.abs(problem.read[:, size:]) * (problem.k + damping * (omega + damping))
+        ),
         reach=np.abs(problem.read[:, :size]) + np.abs(problem.read[:, size:]) * (omega + damping),
         direct=problem.read_rate @ problem.load.T,
         load_norm=np.sqrt(problem.load[:, size:] ** 2 + problem.k * problem.load[:, :size] ** 2),
@@ -313,7 +319,10 @@ def fill_tones(tables: Tables, problem: Problem, tones: int, exponents: list[flo
     size = len(problem.k)
     own, k = size - tones, problem.k[size - tones :]
     p, v, omega = np.abs(problem.read[:, own:size]), np.abs(problem.read[:, size + own :]), np.sqrt(k)
-    tables.weight[:, own:], tables.reach[:, own:] = p * omega + v * k, p + v * omega
+    tables.weight[:, own:size], tables.reach[:, own:] = p * omega + v * k, p + v * omega
+    tables.apart[0, own:size] = k
+    for i, rows in enumerate((problem.read, problem.read_rate)):
+        tables.look[:, 2 * i : 2 * i + 2, own:size] = rows.reshape(-1, 2, size)[:, :, own:]
     if problem.table_dt.size:
         _fill_propagators(problem.k, problem.c, (own, size), problem.table_dt[:1], tables.cell[None])
     blocks = _Blocks(*(getattr(tables, name) for name in _Blocks._fields))
@@ -368,7 +377,7 @@ def _empty(problem: Problem, h: Any, contact_h: Any, families: _Families) -> _Bl
     stops, size, kinds, levels = len(problem.gap), len(problem.k), len(families.power), len(contact_h)
     inputs = stops + len(problem.load)
     return _Blocks(
-        *(np.zeros((len(h), 2, size)), np.zeros((levels, 2, size))),
+        *(np.zeros((len(h), 2, padded(size))), np.zeros((levels, 2, size))),
         *(np.zeros((kinds, levels, stops, 2 * size, 2 * S)), np.zeros((kinds, levels, stops, 2 * size))),
         np.zeros((kinds, levels, stops, inputs, S, 2 * S)),
         np.zeros((kinds, levels, inputs, S, padded(2 * size))),
@@ -392,6 +401,13 @@ def _filled(
         if blocks[0] == 0:
             tables.forced[f], tables.kick[f] = tables.forced[0], tables.kick[0]
     return tables
+
+
+def _in_eights(rows: Any) -> Any:
+    """Rows with zeros up to a multiple of eight."""
+    out = np.zeros((*rows.shape[:-1], padded(rows.shape[-1])))
+    out[..., : rows.shape[-1]] = rows
+    return out
 
 
 @lru_cache(maxsize=8)

@@ -1,0 +1,143 @@
+"""Eight numbers as one value of compiled code, with + - * and √.
+
+The compiler makes vectors of a loop only where it can prove that arrays do not overlap, and then leaves a rest to be
+done one by one.
+"""
+
+from __future__ import annotations
+
+import operator
+from typing import ClassVar
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
+from numba.extending import intrinsic, lower_builtin, models, register_model
+
+WIDTH = 8
+VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
+
+
+class Eight(types.Type):
+    """Type of eight numbers."""
+
+    def __init__(self) -> None:
+        super().__init__(name="Eight")
+
+
+EIGHT = Eight()
+
+
+@register_model(Eight)
+class _Model(models.PrimitiveModel):
+    """One vector register, or as many as the machine needs."""
+
+    def __init__(self, manager, kind):
+        super().__init__(manager, kind, VECTOR)
+
+
+def _operator(function, instruction):
+    """Let compiled code know an operator between eights; products may be fused into sums."""
+
+    @infer_global(function)
+    class _Typing(ConcreteTemplate):
+        cases: ClassVar = [signature(EIGHT, EIGHT, EIGHT)]
+
+    @lower_builtin(function, EIGHT, EIGHT)
+    def lowered(context, builder, signature, arguments):
+        return getattr(builder, instruction)(*arguments, flags=("contract",))
+
+
+_operator(operator.add, "fadd")
+_operator(operator.iadd, "fadd")
+_operator(operator.sub, "fsub")
+_operator(operator.mul, "fmul")
+
+
+def place(context, builder, kind, array, offset=None):
+    """Where eight numbers of an array begin, as a vector's address."""
+    data = context.make_array(kind)(context, builder, array).data
+    return builder.bitcast(data if offset is None else builder.gep(data, [offset]), VECTOR.as_pointer())
+
+
+@intrinsic
+def bits(typingctx, number):
+    """A number's bits as an integer: its logarithm to base 2 times 2^52, linear between powers of two."""
+
+    def codegen(context, builder, signature, arguments):
+        return builder.bitcast(arguments[0], ir.IntType(64))
+
+    return types.int64(types.float64), codegen
+
+
+@intrinsic
+def eight(typingctx, array, first):
+    """The eight numbers of an array from ``first`` on."""
+
+    def codegen(context, builder, signature, arguments):
+        return builder.load(place(context, builder, signature.args[0], *arguments), align=8)
+
+    return EIGHT(array, types.intp), codegen
+
+
+@intrinsic
+def put(typingctx, array, first, numbers):
+    """Write eight numbers into an array."""
+
+    def codegen(context, builder, signature, arguments):
+        array, first, numbers = arguments
+        builder.store(numbers, place(context, builder, signature.args[0], array, first), align=8)
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp, EIGHT), codegen
+
+
+@intrinsic
+def spread(typingctx, number):
+    """Eight times the same number."""
+
+    def codegen(context, builder, signature, arguments):
+        return spread_out(builder, arguments[0])
+
+    return EIGHT(types.float64), codegen
+
+
+@intrinsic
+def root(typingctx, numbers):
+    """Square roots."""
+
+    def codegen(context, builder, signature, arguments):
+        kind = ir.FunctionType(VECTOR, [VECTOR])
+        return builder.call(cgutils.get_or_insert_function(builder.module, kind, f"llvm.sqrt.v{WIDTH}f64"), arguments)
+
+    return EIGHT(EIGHT), codegen
+
+
+@intrinsic
+def total(typingctx, numbers):
+    """Sum of eight numbers."""
+
+    def codegen(context, builder, signature, arguments):
+        return summed(builder, arguments[0])
+
+    return types.float64(EIGHT), codegen
+
+
+def spread_out(builder, number):
+    """A number in all places of a vector."""
+    nothing = ir.Constant(VECTOR, ir.Undefined)
+    first = builder.insert_element(nothing, number, ir.IntType(32)(0))
+    return builder.shuffle_vector(first, nothing, ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH))
+
+
+def summed(builder, vector):
+    """Sum of the numbers of a vector, by halves."""
+    nothing = ir.Constant(vector.type, ir.Undefined)
+    for half in (4, 2, 1):
+        kind = ir.VectorType(ir.IntType(32), half)
+        low, high = (ir.Constant(kind, [*range(begin, begin + half)]) for begin in (0, half))
+        halves = [builder.shuffle_vector(vector, nothing, places) for places in (low, high)]
+        vector = builder.fadd(*halves)
+        nothing = ir.Constant(vector.type, ir.Undefined)
+    return builder.extract_element(vector, ir.IntType(32)(0))
