@@ -115,6 +115,17 @@ def root(typingctx, numbers):
 
 
 @intrinsic
+def raised(typingctx, numbers):
+    """The negative ones raised to zero; NaN stays."""
+
+    def codegen(context, builder, signature, arguments):
+        zero = ir.Constant(VECTOR, [0.0] * WIDTH)
+        return builder.select(builder.fcmp_ordered("<", arguments[0], zero), zero, arguments[0])
+
+    return EIGHT(EIGHT), codegen
+
+
+@intrinsic
 def total(typingctx, numbers):
     """Sum of eight numbers."""
 

@@ -12,9 +12,8 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
+from solvers.eight import WIDTH, eight, put, raised, root, spread, spread_out, total
 from solvers.kernels import inlined
-
-WIDTH = 8
 
 
 def padded(size: int) -> int:
@@ -38,7 +37,7 @@ def _columns(typingctx, rows, stride, first, weights, count, start, result):
             return builder.bitcast(builder.gep(base, [offset]), vector.as_pointer())
 
         def add(total, e):
-            weight = _spread(builder, builder.load(builder.gep(weights, [e])), vector)
+            weight = spread_out(builder, builder.load(builder.gep(weights, [e])))
             row = builder.load(place(rows, builder.add(builder.mul(e, stride), first)), align=8)
             product = builder.fmul(row, weight, flags=("contract",))
             builder.store(builder.fadd(builder.load(total), product, flags=("contract",)), total)
@@ -62,111 +61,46 @@ def _columns(typingctx, rows, stride, first, weights, count, start, result):
     return types.void(rows, types.intp, types.intp, weights, types.intp, start, result), codegen
 
 
-def _eight(context, builder, kind, value):
-    """Where the first eight numbers of an array are, and the numbers."""
-    vector = ir.VectorType(ir.DoubleType(), WIDTH)
-    place = builder.bitcast(context.make_array(kind)(context, builder, value).data, vector.as_pointer())
-    return place, builder.load(place, align=8)
-
-
-def _sum(builder, vector):
-    """Sum of eight numbers, by halves."""
-    nothing = ir.Constant(vector.type, ir.Undefined)
-    for half in (4, 2, 1):
-        kind = ir.VectorType(ir.IntType(32), half)
-        low, high = (ir.Constant(kind, [*range(begin, begin + half)]) for begin in (0, half))
-        halves = [builder.shuffle_vector(vector, nothing, places) for places in (low, high)]
-        vector = builder.fadd(*halves)
-        nothing = ir.Constant(vector.type, ir.Undefined)
-    return builder.extract_element(vector, ir.IntType(32)(0))
-
-
-@intrinsic
-def renew(typingctx, old, new):
+@inlined
+def renew(old, new):
     """Eight numbers take new values: the squares of their change and of their new size, summed."""
-
-    def codegen(context, builder, signature, arguments):
-        kinds = zip(signature.args, arguments, strict=True)
-        (place, before), (_, after) = (_eight(context, builder, *pair) for pair in kinds)
-        builder.store(after, place, align=8)
-        change = builder.fsub(after, before)
-        sums = [_sum(builder, builder.fmul(vector, vector)) for vector in (change, after)]
-        return context.make_tuple(builder, signature.return_type, sums)
-
-    return types.UniTuple(types.float64, 2)(old, new), codegen
+    after = eight(new, 0)
+    change = after - eight(old, 0)
+    put(old, 0, after)
+    return total(change * change), total(after * after)
 
 
-def _spread(builder, number, kind):
-    """A number in all places of a vector."""
-    first = builder.insert_element(ir.Constant(kind, ir.Undefined), number, ir.IntType(32)(0))
-    zeros = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
-    return builder.shuffle_vector(first, ir.Constant(kind, ir.Undefined), zeros)
-
-
-def _raised(builder, given):
-    """Eight numbers, the negative ones raised to zero; NaN stays."""
-    zero = ir.Constant(given.type, [0.0] * WIDTH)
-    return builder.select(builder.fcmp_ordered("<", given, zero), zero, given)
-
-
-@intrinsic
-def sweep(typingctx, rows, free, force, motion, stiffness, rooted, damping, viscosity):
+@inlined
+def sweep(rows, free, force, motion, stiffness, rooted, damping, viscosity):
     """One iteration for the forces at eight nodes, all in registers: squares of their change and size, summed.
 
     Indentations and rates at the nodes are free + Σ_e force[e] rows[e], kept in ``motion``; the new forces are
     K d (1 + a d') + c d' with d no less than zero, or with d √d for d if ``rooted``.
     """
-
-    def codegen(context, builder, signature, arguments):
-        arrays = list(zip(signature.args, arguments, strict=True))[:4]
-        (row, _), (start, _), (place, old), (moved, _) = (_eight(context, builder, *pair) for pair in arrays)
-        vector = old.type
-
-        def at(base, i):
-            return builder.gep(base, [ir.IntType(64)(i)])
-
-        def response(d):
-            sums = [builder.load(at(start, d), align=8)] + [ir.Constant(vector, [0.0] * WIDTH)] * 3
-            for e in range(WIDTH):
-                lane = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [e] * WIDTH)
-                weight = builder.shuffle_vector(old, ir.Constant(vector, ir.Undefined), lane)
-                product = builder.fmul(builder.load(at(row, 2 * e + d), align=8), weight, flags=("contract",))
-                sums[e % 4] = builder.fadd(sums[e % 4], product, flags=("contract",))
-            total = builder.fadd(builder.fadd(sums[0], sums[1]), builder.fadd(sums[2], sums[3]))
-            builder.store(total, at(moved, d), align=8)
-            return total
-
-        delta, rate = response(0), response(1)
-        K, a, c = (_spread(builder, arguments[i], vector) for i in (4, 6, 7))
-        deep = cgutils.alloca_once_value(builder, _raised(builder, delta))
-        with builder.if_then(context.is_true(builder, signature.args[5], arguments[5])):
-            d = builder.load(deep)
-            root = ir.FunctionType(vector, [vector])
-            root = cgutils.get_or_insert_function(builder.module, root, f"llvm.sqrt.v{WIDTH}f64")
-            builder.store(builder.fmul(d, builder.call(root, [d])), deep)
-        one = ir.Constant(vector, [1.0] * WIDTH)
-        elastic = builder.fmul(builder.fmul(K, builder.load(deep)), builder.fadd(one, builder.fmul(a, rate)))
-        new = builder.fadd(elastic, builder.fmul(c, rate))
-        builder.store(new, place, align=8)
-        sums = [_sum(builder, builder.fmul(v, v)) for v in (builder.fsub(new, old), new)]
-        return context.make_tuple(builder, signature.return_type, sums)
-
-    number = types.float64
-    signature = types.UniTuple(number, 2)(rows, free, force, motion, number, rooted, number, number)
-    return signature, codegen
+    old, delta, rate = eight(force, 0), eight(free[0], 0), eight(free[1], 0)
+    more, faster = spread(0.0), spread(0.0)  # each sum waits for its own last term only
+    for e in range(0, WIDTH, 2):
+        one, two = spread(force[e]), spread(force[e + 1])
+        delta += one * eight(rows[e], 0)
+        rate += one * eight(rows[e], WIDTH)
+        more += two * eight(rows[e + 1], 0)
+        faster += two * eight(rows[e + 1], WIDTH)
+    delta, rate = delta + more, rate + faster
+    put(motion[0], 0, delta)
+    put(motion[1], 0, rate)
+    deep = raised(delta)
+    if rooted:
+        deep = deep * root(deep)
+    new = spread(stiffness) * deep * (spread(1.0) + spread(damping) * rate) + spread(viscosity) * rate
+    put(force, 0, new)
+    change = new - old
+    return total(change * change), total(new * new)
 
 
-@intrinsic
-def above_zero(typingctx, source, result):
+@inlined
+def above_zero(source, result):
     """Eight numbers, the negative ones raised to zero; NaN stays."""
-
-    def codegen(context, builder, signature, arguments):
-        kinds = zip(signature.args, arguments, strict=True)
-        (_, given), (place, _) = (_eight(context, builder, *pair) for pair in kinds)
-        builder.store(_raised(builder, given), place, align=8)
-        return context.get_dummy_value()
-
-    return types.void(source, result), codegen
+    put(result, 0, raised(eight(source, 0)))
 
 
 @inlined

@@ -110,32 +110,24 @@ def columns(rows, stride, first, weights, total, start, result):
     result.reshape(-1)[here] = sums + (0.0 if start is None else start.reshape(-1)[here])
 
 
-def renew(old, new):
-    """Squares of the change and of the new size, summed; the old takes the new values."""
-    change = new[:8] - old[:8]
-    old[:8] = new[:8]
-    return float(change @ change), float(new[:8] @ new[:8])
-
-
-def sweep(rows, free, force, motion, stiffness, rooted, damping, viscosity):
-    """One iteration for the forces of a power law."""
-    motion[:] = free + (force @ rows).reshape(2, -1)
-    d, v = np.maximum(motion[0], 0.0), motion[1]
-    return renew(force, stiffness * (d * np.sqrt(d) if rooted else d) * (1.0 + damping * v) + viscosity * v)
-
-
-def above_zero(source, result):
-    """The negative numbers raised to zero."""
-    result[:8] = np.maximum(source[:8], 0.0)
+def put(array, first, numbers):
+    """Write eight numbers."""
+    array[first : first + 8] = numbers
 
 
 handle.opener = opener
 laws._force_at, laws._gradient_at = force_at, gradient_at
 ground._call_force = ground._call_gradient = at_address
 
+import solvers.eight as eight  # noqa: E402
+
+eight.eight, eight.put = lambda array, first: array[first : first + 8].copy(), put
+eight.spread, eight.total = lambda number: np.full(8, number), lambda numbers: float(np.sum(numbers))
+eight.root, eight.raised = np.sqrt, lambda numbers: np.maximum(numbers, 0.0)
+eight.bits = lambda number: int(np.float64(number).view(np.int64))
+
 import solvers.tables as tables  # noqa: E402
 import solvers.vector as vector  # noqa: E402
 
 tables._block_response = remembered(tables._block_response)
-vector._columns, vector.renew = columns, renew
-vector.sweep, vector.above_zero = sweep, above_zero
+vector._columns = columns
