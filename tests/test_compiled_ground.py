@@ -1,4 +1,4 @@
-"""Vector sums and handles against numpy and the tuples they stand for."""
+"""Eights, vector sums and handles against numpy and the tuples they stand for."""
 
 from typing import NamedTuple
 
@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from numba import njit, types
 
+from solvers.eight import bits, eight, put, raised, root, spread, total
+from solvers.flight import level_within
 from solvers.handle import Layout, Mould, Packed, opener
 from solvers.vector import combine, padded
 
@@ -166,3 +168,59 @@ def test_tuples_of_a_layout_share_one_block_and_do_not_overlap():
     layout.exchange(block, 1, 0, longer)
     write(start + layout.starts[1])
     np.testing.assert_array_equal(longer[:, 1], [1, 11, 21, 31, 41])
+
+
+@njit(**OPTIONS)
+def in_eights(x, y, out):
+    for i in range(0, x.size, 8):
+        a, b = eight(x, i), eight(y, i)
+        more = a * b - spread(0.5)
+        more += root(raised(a))
+        put(out, i, more)
+    return total(eight(out, 8))
+
+
+@njit(**OPTIONS)
+def bits_of(number):
+    return bits(number)
+
+
+class Lengths(NamedTuple):
+    h: np.ndarray
+
+
+@njit(**OPTIONS)
+def level_of(tables, span):
+    return level_within(tables, span)
+
+
+def test_eights_calculate_like_numbers():
+    rng = np.random.default_rng(1)
+    x, y, out = rng.standard_normal(16), rng.standard_normal(16), np.full(20, np.nan)
+    expected = x * y - 0.5 + np.sqrt(np.maximum(x, 0.0))
+    assert in_eights(x, y, out) == pytest.approx(expected[8:].sum(), rel=1e-14)
+    np.testing.assert_allclose(out[:16], expected, rtol=1e-15, atol=1e-15)
+    assert np.isnan(out[16:]).all()
+
+
+def test_not_a_number_is_not_raised_to_zero():
+    x, out = np.zeros(16), np.zeros(16)
+    x[3] = np.nan
+    in_eights(x, x, out)
+    assert np.flatnonzero(np.isnan(out)).tolist() == [3]
+
+
+def test_bits_are_a_logarithm_to_a_twelfth():
+    x = np.geomspace(1e-12, 1e12, 999)
+    logarithms = np.array([bits_of(value) - bits_of(1.0) for value in x]) / 2.0**52
+    assert np.all(np.diff(logarithms) > 0.0)
+    assert 0.0860 < np.ptp(np.log2(x) - logarithms) < 0.0862
+
+
+def test_level_is_the_longest_tabulated_step_within_the_span():
+    h = 3.7 * 2.0 ** (-0.25 * np.arange(60))
+    spans = np.exp(np.random.default_rng(2).uniform(np.log(h[-1]), np.log(2.0 * h[0]), 4000))
+    spans = np.concatenate((spans, h, np.nextafter(h[:-1], 0.0), np.nextafter(h, 9.0), [np.inf]))
+    found = np.array([level_of(Lengths(h), span) for span in spans])
+    assert np.all(h[found] <= spans)
+    assert np.all((found == 0) | (h[found - 1] > spans))

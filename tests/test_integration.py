@@ -1,6 +1,7 @@
 """The main loop and its two methods: order, agreement, outputs, ledger, signals, ends, refusals."""
 
 import math
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -34,6 +35,12 @@ def paper():
 def distance(one, other):
     """Largest difference of q, relative to the largest q."""
     return np.abs(one.q - other.q).max() / np.abs(other.q).max()
+
+
+def same(one, other):
+    """Whether two runs have the same bits."""
+    logs = zip(one.contacts.arrays().values(), other.contacts.arrays().values(), strict=True)
+    return np.array_equal(one.q, other.q) and all(np.array_equal(a, b, equal_nan=True) for a, b in logs)
 
 
 # --- convergence and agreement ------------------------------------------------------------------------------------
@@ -120,6 +127,41 @@ def test_repeated_runs_have_the_same_bits(paper):
             assert np.array_equal(getattr(one, name), getattr(other, name))
         for name, column in one.contacts.arrays().items():
             assert np.array_equal(column, other.contacts.arrays()[name], equal_nan=True)
+
+
+@pytest.mark.parametrize("dt", [None, 1e-3])
+def test_runs_do_not_disturb_what_earlier_ones_returned(dt):
+    used, fresh = paper_scene().reduce(2).system, paper_scene().reduce(2).system
+    kept = [integrate(used, start[:2], start[2:], 2.7 * PERIOD, dt) for start in STARTS]
+    for run, start in zip(kept, STARTS, strict=True):  # logs and ledgers are made only now
+        again = integrate(fresh, start[:2], start[2:], 2.7 * PERIOD, dt)
+        assert same(run, again)
+        np.testing.assert_array_equal(run.energy.stored, again.energy.stored)
+        np.testing.assert_array_equal(run.energy.initial, again.energy.initial)
+
+
+def test_run_started_from_the_progress_of_another_is_apart():
+    system = paper_scene().reduce(2).system
+    alone = integrate(system, STARTS[1][:2], STARTS[1][2:], 9.0)
+    inner = []
+
+    def progress(_):
+        inner.append(integrate(system, STARTS[2][:2], STARTS[2][2:], 0.3))
+
+    assert same(integrate(system, STARTS[1][:2], STARTS[1][2:], 9.0, progress=progress), alone)
+    assert len(inner) > 1
+    assert all(same(run, inner[0]) for run in inner)
+
+
+def test_threads_share_a_system():
+    system, starts = paper_scene().reduce(2).system, np.repeat(STARTS, 8, axis=0)
+
+    def run(start):
+        return integrate(system, start[:2], start[2:], 40 * PERIOD)
+
+    one_by_one = [run(start) for start in starts]
+    with ThreadPoolExecutor(4) as pool:
+        assert all(same(a, b) for a, b in zip(pool.map(run, starts), one_by_one, strict=True))
 
 
 def test_arguments_are_left_alone(paper):
