@@ -218,27 +218,26 @@ def fly(problem, tables, state, space, t_end, budget, out, due, ledger):
             rest = max(dt_cell - offset, 1e-9 * dt_cell)
             for j in range(problem.table_dt.size):
                 space.bounds[j] = _signal_bound(problem, j, cell)
-        alone = first == np.inf and not sampled and not ledger
-        if not alone and (sampled or count % _REFRESH == 0):
-            energy_norms(problem, state.x, space.norms)
-            for s in range(stops):
-                space.m[s] = _acceleration_bound(problem, tables, s, space.norms, space.bounds, rest)
-        span = min(span, rest)
-        if ledger:
-            span = min(span, 3.0 / _energetic(problem, space.norms))
-        if ledger or first <= begin + span:
-            copy(state.x, space.x_new, state.x.size)
-
         # --- how far no stop can be reached
-        if alone:
+        if first == np.inf and not sampled and not ledger:  # nothing else happens on the way
             flown, steps, span = _glide(problem, tables, state, space, span, budget)
             now[T] += flown
             state.count[STEPS] += steps
             if steps >= budget:
                 return -2
-        for s in range(0 if alone else stops):
-            g, v = -indentation(problem, s, state.x), -dot(problem.read_rate[s], state.x, size)
-            span = min(span, _safe(g, v, space.m[s]))
+        else:
+            if sampled or count % _REFRESH == 0:
+                energy_norms(problem, state.x, space.norms)
+                for s in range(stops):
+                    space.m[s] = _acceleration_bound(problem, tables, s, space.norms, space.bounds, rest)
+            span = min(span, rest)
+            if ledger:
+                span = min(span, 3.0 / _energetic(problem, space.norms))
+            if ledger or first <= begin + span:
+                copy(state.x, space.x_new, state.x.size)
+            for s in range(stops):
+                g, v = -indentation(problem, s, state.x), -dot(problem.read_rate[s], state.x, size)
+                span = min(span, _safe(g, v, space.m[s]))
 
         # --- go: a Taylor step that looks for roots, a whole cell, or a tabulated step
         stop = -1

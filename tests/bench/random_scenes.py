@@ -5,6 +5,7 @@
 A scene has 1 to 6 modes (rigid ones, overdamped ones, dashpots that couple them), 1 to 3 stops on either side with
 gap or preload, laws of every kind, loads of every kind. What a difference is worth is told by the scene itself: the
 reference is run again from slightly moved starts, and the errors are taken in units of rtol × that amplification.
+What is run with samples is run without, too, which flies in other steps.
 Scenes whose contacts change in number already under such a move are ill-conditioned: counted, not compared.
 """
 
@@ -157,8 +158,8 @@ def shortened(scene: Scene, seed: int) -> Scene:
     return scene
 
 
-def run(scene: Scene, method: Any, move: Any = 0.0) -> Any:
-    """One run, with the start moved by ``move``."""
+def run(scene: Scene, method: Any, move: Any = 0.0, sampled: bool = True) -> Any:
+    """One run, with the start moved by ``move``; its end only unless ``sampled``."""
     n = scene.system.size
     move = np.broadcast_to(move, 2 * n)
     left = iter(range(PATIENCE))
@@ -169,7 +170,7 @@ def run(scene: Scene, method: Any, move: Any = 0.0) -> Any:
 
     return integrate(
         *(scene.system, scene.q0 + move[:n], scene.q_dot0 + move[n:], scene.duration),
-        *(scene.duration / SAMPLES, method),
+        *(scene.duration / SAMPLES if sampled else None, method),
         progress=progress,
     )
 
@@ -180,10 +181,16 @@ def difference(a: Any, b: Any) -> float:
     return float(max(q, np.abs(a.q_dot - b.q_dot).max() / max(np.abs(b.q_dot).max(), 1e-300)))
 
 
-def stops_hit(solution: Any) -> list[int]:
+def ends_apart(a: Any, b: Any) -> float:
+    """The same between the ends of a run with samples and one without."""
+    q = np.abs(a.q[-1] - b.q[-1]).max() / max(np.abs(a.q).max(), 1e-300)
+    return float(max(q, np.abs(a.q_dot[-1] - b.q_dot[-1]).max() / max(np.abs(a.q_dot).max(), 1e-300)))
+
+
+def stops_hit(solution: Any, theirs: Any) -> list[int]:
     """Stop of every contact but those that are rounding: a start at rest on the surface may count or not."""
     log = solution.contacts
-    deep = ~log.floored | (log.peak_indentation > 1e-9 * np.abs(solution.q).max())
+    deep = ~log.floored | (log.peak_indentation > 1e-9 * np.abs(theirs.q).max())
     return sorted(log.stop[deep].tolist())
 
 
@@ -196,7 +203,7 @@ def judge(seed: int, rtol: float = 1e-8) -> tuple[Scene, Verdict]:
     except (TooStiffError, SolverError):
         theirs = None
     try:
-        ours = run(scene, Exponential(rtol))
+        ours, end = (run(scene, Exponential(rtol), sampled=sampled) for sampled in (True, False))
     except (RuntimeError, RuntimeWarning, ValueError) as error:
         return scene, Verdict(f"{type(error).__name__}: {error}")
     if theirs is None:
@@ -214,9 +221,9 @@ def judge(seed: int, rtol: float = 1e-8) -> tuple[Scene, Verdict]:
             steady = False
             break
         amplification = max(amplification, difference(moved, theirs) / MOVE)
-        steady &= stops_hit(moved) == stops_hit(theirs)
-    same = stops_hit(ours) == stops_hit(theirs)
-    error = difference(ours, theirs) / (rtol * amplification)
+        steady &= stops_hit(moved, theirs) == stops_hit(theirs, theirs)
+    same = stops_hit(ours, theirs) == stops_hit(end, theirs) == stops_hit(theirs, theirs)
+    error = max(difference(ours, theirs), ends_apart(ours, end)) / (rtol * amplification)
     verdict = Verdict("fine", len(theirs.contacts), error, amplification)
     if not steady or amplification > 1e4:
         verdict.kind = "ill-conditioned"
