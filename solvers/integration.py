@@ -23,7 +23,7 @@ from solvers.system import Array, Parameter, System, product
 
 _BUDGET = 20_000  # steps between two looks at the world outside
 _MOST_SAMPLES = 500_000_000
-_NEVER = np.array([math.inf])  # no output is due
+_NEVER, _NOWHERE = np.array([math.inf]), np.empty((0, 0))  # no output is due
 
 
 def integrate(
@@ -105,6 +105,8 @@ def prepared_run(
 
 def _check_tangent(tangent: Any, method: Any, system: System) -> None:
     """A tangent is asked for in one of its forms, of a method that has one, for laws that have one."""
+    if tangent is False:
+        return
     if not isinstance(tangent, bool | Parameter):
         raise TypeError(f"tangent must be True, False or a solvers.Parameter, got {tangent!r}")
     if tangent and not getattr(method, "has_tangent", False):
@@ -207,17 +209,19 @@ class _Run:
 
     def __init__(self, system: System, engine: Any, times: Array | None, tangent: Any) -> None:
         self.system, self.engine, self.times = system, engine, times
-        self.due = _NEVER if times is None else np.append(np.minimum(times, engine.duration), math.inf)
+        self.due, self.out, self.state = _NEVER, _NOWHERE, engine.state
+        if times is not None:
+            self.due = np.append(np.minimum(times, engine.duration), math.inf)
+            self.out = np.empty((len(times), self.state.x.size))
         self.tangent: Any = None
         if tangent:
             from solvers.tangent import Tangent
 
             self.tangent = Tangent(system, engine, tangent if isinstance(tangent, Parameter) else None)
-        self.state = engine.state
+            self.state = engine.state  # with a tape
         self.log = np.empty((max(256, 2 * len(system.contacts)), COLUMNS))
-        self.out = np.empty((len(self.due) - 1, self.state.x.size))
         self.begin = self.state.x[: 2 * engine.problem.k.size].copy()
-        if self.due[0] == 0.0:
+        if times is not None and self.due[0] == 0.0:
             self.out[0] = self.state.x
             self.state.count[SAMPLED] = 1
 
@@ -254,12 +258,13 @@ class _Run:
         size, n = self.begin.size, self.system.size
         back = self.engine.back
         if self.times is None:
-            x, t = self.state.x[None, :], np.array([self.time])
+            x, t = self.state.x.copy()[None, :], self.state.now[T : T + 1].copy()
             motion = back.dot(x[0, :size]).reshape(1, -1)
         else:
             x = self.out[: self._sampled(status)]
             t, motion = self.times[: len(x)], product(x[:, :size], back.T)
-        powers, complete = x[:, size:].copy(), self.engine.keeps_ledger(self.times is not None)
+        powers = x[:, size:] if self.times is None else x[:, size:].copy()  # so that all the samples can be let go
+        complete = self.engine.keeps_ledger(self.times is not None)
         ledger = partial(_energy, self.system, powers, complete, motion, back, self.begin)
         log = partial(ContactLog.of_rows, self._rows())
         count = self.state.count.tolist()
