@@ -21,6 +21,7 @@ import math
 
 import numpy as np
 
+from solvers.eight import eight, total
 from solvers.kernels import contact_forces, copy, dot, indentation, inlined, inner, sizes
 from solvers.newton import MOST_ITERATIONS, newton
 from solvers.peaks import peak, top
@@ -201,10 +202,9 @@ def finish_step(problem, tables, state, space, family, level):
     copy(space.x_new, state.x, size)
     for s in range(stops):
         if state.piece[s] > 0:
-            for i in range(S):
-                space.trial[i] = tables.weights[family, i] * space.force[s, i]
-            state.x[size + 2 + 2 * s] += h * dot(space.trial, space.motion[s, 1], S)
-            state.x[size + 3 + 2 * s] += h * dot(tables.weights[family], space.force[s], S)
+            impulses = eight(tables.weights[family], 0) * eight(space.force[s], 0)
+            state.x[size + 2 + 2 * s] += h * total(impulses * eight(space.motion[s, 1], 0))
+            state.x[size + 3 + 2 * s] += h * total(impulses)
             combine(tables.summary[family], space.motion[s, 0], S, None, space.summary[s, 1])
             for column, values, d in ((PEAK_FORCE, space.force[s], 0), (PEAK_DELTA, space.motion[s, 0], 1)):
                 known = state.open[s, column]

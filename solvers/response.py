@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from solvers.eight import put, spread
 from solvers.kernels import inlined, inner, law_forces, table_value
 from solvers.state import CALLS, T
 from solvers.tables import S
@@ -55,8 +56,8 @@ def free_response(problem, tables, state, space, family, level):
         sample_signals(problem, tables, space, family, state.now[T], tables.step[level])
     for s in range(stops):
         free = space.free[s]
-        for i in range(S):
-            free[0, i], free[1, i] = -problem.gap[s], 0.0
+        put(free[0], 0, spread(-problem.gap[s]))
+        put(free[1], 0, spread(0.0))
         combine(tables.free[family, level, s], state.x, size, free, free)
         for j in range(problem.table_dt.size):
             u = stops + problem.table_load[j]
