@@ -22,12 +22,13 @@ import math
 import numpy as np
 
 from solvers.eight import eight, total
+from solvers.families import S
 from solvers.kernels import contact_forces, copy, dot, indentation, inlined, inner, sizes
 from solvers.newton import MOST_ITERATIONS, newton
 from solvers.peaks import peak, top
 from solvers.response import node_forces, respond
 from solvers.state import CALLS, PEAK_DELTA, PEAK_FORCE, T
-from solvers.tables import DAMPING, EXPONENT, FACTOR, STIFFNESS, S
+from solvers.tables import DAMPING, EXPONENT, FACTOR, STIFFNESS
 from solvers.vector import combine, renew, sweep
 
 

@@ -27,6 +27,7 @@ from numba import types
 
 from solvers.certify import fly
 from solvers.collocation import arrive, contact_time, finish_step, leaves_piece, solve_forces, step_error
+from solvers.families import S
 from solvers.flight import energy_norms
 from solvers.forcing import Forcing
 from solvers.handle import Cast, Packed, opener
@@ -79,7 +80,6 @@ from solvers.state import (
     touching,
 )
 from solvers.system import Array, System
-from solvers.tables import S
 from solvers.vector import combine
 
 # places in `numbers`: reference speed, T_c, then per stop a first step's share of T_c

@@ -6,11 +6,12 @@ import math
 
 import numpy as np
 
+from solvers.families import S
 from solvers.flight import add_taylor, taylor
 from solvers.kernels import copy, dot, inlined, inner, table_value
 from solvers.response import sample_signals
 from solvers.state import T, touching
-from solvers.tables import S, propagate
+from solvers.tables import propagate
 
 _SHORT = 0.15  # radians of the fastest block up to which order 6 and three points are right to 1e-10
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from solvers.families import S
 from solvers.kernels import contact_gradient, copy, inner
 from solvers.response import node_forces, respond
 from solvers.state import CALLS
-from solvers.tables import S
 
 MOST_ITERATIONS = 16
 

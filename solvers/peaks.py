@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from solvers.families import S
 from solvers.kernels import contact_forces, dot, indentation, inlined, inner, maxima
 from solvers.state import PEAK_DELTA, PEAK_FORCE
-from solvers.tables import S
 from solvers.vector import combine
 
 _MOST = 6  # steps to a summit

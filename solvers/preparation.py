@@ -9,13 +9,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
+from solvers.families import S
 from solvers.forcing import Forcing, on_one_grid, tones_as_nodes
 from solvers.handle import Cast, Layout, Mould
 from solvers.kernels import INTEGERS, MATRIX, PROBLEM, REAL, VECTOR, Problem
 from solvers.response import Space
 from solvers.state import STATE, State, begin_state, problem_of, state_shapes
 from solvers.system import Array, System
-from solvers.tables import OF_TONES, S, Tables, build, doublings, fill_tones
+from solvers.tables import OF_TONES, Tables, build, doublings, fill_tones
 from solvers.vector import padded
 
 

@@ -30,6 +30,7 @@ from numba import types
 
 from solvers.collocation import arrive
 from solvers.dormand_prince import STAGES, A
+from solvers.families import S
 from solvers.flight import signal_derivatives, turn
 from solvers.handle import opener
 from solvers.kernels import (
@@ -69,7 +70,7 @@ from solvers.state import (
     begin_contacts,
     rate_tolerance,
 )
-from solvers.tables import S, propagate
+from solvers.tables import propagate
 from solvers.vector import combine
 
 _OFF = 1e-10  # relative distance from a knot at which a law is on one side of it for sure

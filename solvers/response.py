@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from solvers.eight import put, spread
+from solvers.families import S
 from solvers.kernels import inlined, inner, law_forces, table_value
 from solvers.state import CALLS, T
-from solvers.tables import S
 from solvers.vector import above_zero, combine
 
 

@@ -4,13 +4,8 @@ A block p'' + c p' + k p = 0 moves by E(x) = exp(A x) = α I + β A with A = [[0
 numbers (α, β) are a propagator and products stay of this form. Flight steps are h_l = h_0 2^{-l/4}; contact steps
 are every second of them.
 
-On a contact step a force is known by its values F_j at S nodes σ_j of (0, 1), t = h σ^κ:
-
-    F(t) = w(σ) Σ_j L_j(σ) F_j / w(σ_j),
-
-*smooth*: κ = 1, w = 1, Gauss–Legendre nodes; *entry*: κ = 2, w = σ^{2p}, Gauss–Jacobi nodes for the weight σ^{2p+1},
-because a power law of exponent p entered at t = 0 is F = t^p × (a smooth function of √t). Responses of a block
-to such a force, ∫ E(t_i - τ) F(τ) dτ, are computed by composite Gauss quadrature fine enough for the fastest block.
+On a contact step a force is known by its values at a few nodes, see `solvers.families`. Responses of a block to such a
+force, ∫ E(t_i - τ) F(τ) dτ, are computed by composite Gauss quadrature fine enough for the fastest block.
 """
 
 from __future__ import annotations
@@ -22,11 +17,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from solvers.families import PHASES, Families, S, families_of, gauss, lagrange
 from solvers.kernels import Problem, inner, kernel
+from solvers.polynomials import signal_responses
 from solvers.vector import padded
 
 STIFFNESS, EXPONENT, FACTOR, DAMPING = range(4)  # of an inlined law
-S = 8  # nodes of a contact step: 6 is a little faster at 1e-6, 10 and 12 bring nothing
 TAYLOR_REACH = 0.02  # |λ| x up to which a Taylor step of order 6 is exact to rounding
 _PANEL = 6.0  # radians of the fastest oscillation per quadrature panel of 12 points
 _MOST_RADIANS = 2000.0  # largest contact step in units of 1/|λ|
@@ -88,17 +84,6 @@ def propagate(k, c, x):
     return decay - slow * beta, beta
 
 
-@kernel
-def _lagrange(nodes, weights, sigma, out):
-    """Lagrange polynomials of the nodes at σ, each times its weight × Π (σ_j - σ_i)."""
-    for j in range(nodes.size):
-        value = weights[j]
-        for i in range(nodes.size):
-            if i != j:
-                value *= sigma - nodes[i]
-        out[j] = value
-
-
 @inner
 def _block_response(k, c, h, rate, power, exponent, nodes, weights, gauss, out, basis):
     """out[i, j] = (α, β) of ∫_0^{t_i} E(t_i - τ) w(σ) L_j(σ)/w(σ_j) dτ; i = S is the end of the step."""
@@ -125,7 +110,7 @@ def _block_response(k, c, h, rate, power, exponent, nodes, weights, gauss, out, 
                 if exponent > 0.0:
                     measure *= sigma ** (2.0 * exponent)
                 alpha, beta = propagate(k, c, tb - t)
-                _lagrange(nodes, weights, sigma, basis)
+                lagrange(nodes, weights, sigma, basis)
                 for j in range(count):
                     out[i, j, 0] += alpha * measure * basis[j]
                     out[i, j, 1] += beta * measure * basis[j]
@@ -271,14 +256,14 @@ def build(
     omega, damping = np.sqrt(problem.k), problem.c
     fastest = float(max((omega + damping).max(), 1e-3))
     h, contact_h = _steps(omega, damping, tones)
-    families = _families(tuple(exponents), tuple(jumps))
+    families = families_of(tuple(exponents), tuple(jumps))
     blocks = _blocks(problem, tones, h, contact_h, families)
     return Tables(
         h=h,
         propagator=blocks.propagator,
-        signal=_signals(problem, h),
+        signal=signal_responses(problem, h),
         cell=_cell(problem, dt_cell),
-        cell_signal=_signals(problem, np.array([dt_cell]))[0],
+        cell_signal=signal_responses(problem, np.array([dt_cell]))[0],
         apart=_in_eights(np.array([problem.k, problem.c])),
         look=_in_eights(np.concatenate((problem.read, problem.read_rate), axis=1).reshape(-1, 4, size)),
         weight=_in_eights(
@@ -307,7 +292,7 @@ def build(
         signal_rows=ledger[0],
         power_rows=ledger[1],
         loss_rows=ledger[2],
-        gauss=_gauss(8),
+        gauss=gauss(8),
         extend=families.extend,
     )
 
@@ -326,7 +311,7 @@ def fill_tones(tables: Tables, problem: Problem, tones: int, exponents: list[flo
     if problem.table_dt.size:
         _fill_propagators(problem.k, problem.c, (own, size), problem.table_dt[:1], tables.cell[None])
     blocks = _Blocks(*(getattr(tables, name) for name in _Blocks._fields))
-    _filled(blocks, problem, (own, size), tables.h, tables.step, _families(tuple(exponents), tuple(jumps)))
+    _filled(blocks, problem, (own, size), tables.h, tables.step, families_of(tuple(exponents), tuple(jumps)))
 
 
 def doublings(speeds: Any, tones: Any) -> int:
@@ -357,7 +342,7 @@ def _steps_of(omegas: bytes, dampings: bytes, doublings: int) -> tuple[Any, Any]
     return h, longest * 2.0 ** (-0.25 * np.arange(first, bottom + 2, 2))
 
 
-def _blocks(problem: Problem, tones: int, h: Any, contact_h: Any, families: _Families) -> _Blocks:
+def _blocks(problem: Problem, tones: int, h: Any, contact_h: Any, families: Families) -> _Blocks:
     """Tables of all blocks, zero for the tones; those of a structure met lately are kept."""
     size = len(problem.k)
     own = size - tones
@@ -372,7 +357,7 @@ def _blocks(problem: Problem, tones: int, h: Any, contact_h: Any, families: _Fam
     return _KNOWN[key]
 
 
-def _empty(problem: Problem, h: Any, contact_h: Any, families: _Families) -> _Blocks:
+def _empty(problem: Problem, h: Any, contact_h: Any, families: Families) -> _Blocks:
     """Zeros for the tables of all blocks."""
     stops, size, kinds, levels = len(problem.gap), len(problem.k), len(families.power), len(contact_h)
     inputs = stops + len(problem.load)
@@ -385,7 +370,7 @@ def _empty(problem: Problem, h: Any, contact_h: Any, families: _Families) -> _Bl
 
 
 def _filled(
-    tables: _Blocks, problem: Problem, blocks: tuple[int, int], h: Any, contact_h: Any, families: _Families
+    tables: _Blocks, problem: Problem, blocks: tuple[int, int], h: Any, contact_h: Any, families: Families
 ) -> _Blocks:
     """The tables, filled for the blocks from the first to before the last."""
     _fill_propagators(problem.k, problem.c, blocks, h, tables.propagator)
@@ -393,9 +378,9 @@ def _filled(
     inputs = np.ascontiguousarray(np.concatenate((problem.push, problem.load)).reshape(-1, 2 * len(problem.k)))
     _fill(
         *(problem, blocks, contact_h, families.power, families.exponent, families.nodes, families.lagrange),
-        *(_gauss(12), inputs, tables.free, tables.forced, tables.kick, np.zeros((S + 1, S, 2)), np.zeros(S)),
+        *(gauss(12), inputs, tables.free, tables.forced, tables.kick, np.zeros((S + 1, S, 2)), np.zeros(S)),
     )
-    _fill_ripple(problem, blocks, contact_h, _PHASES, families.alias, tables.ripple)
+    _fill_ripple(problem, blocks, contact_h, PHASES, families.alias, tables.ripple)
     for f in np.flatnonzero(families.exponent[1:] == 0.0) + 1:  # an analytic entry is a smooth step
         tables.free[f] = tables.free[0]
         if blocks[0] == 0:
@@ -410,192 +395,8 @@ def _in_eights(rows: Any) -> Any:
     return out
 
 
-@lru_cache(maxsize=8)
-def _gauss(count: int) -> Any:
-    """Gauss–Legendre points and weights on (0, 1): (2, count)."""
-    x, w = np.polynomial.legendre.leggauss(count)
-    return np.array([0.5 * (1.0 + x), 0.5 * w])
-
-
 def _cell(problem: Problem, dt: float) -> Any:
     """(2, N): α, β of every block over a cell of the sampled signals."""
     out = np.empty((1, 2, len(problem.k)))
     _fill_propagators(problem.k, problem.c, (0, len(problem.k)), np.array([dt]), out)
     return out[0]
-
-
-class _Family(NamedTuple):
-    """Nodes of a kind of contact step, t = h σ^power, F = σ^{2 exponent} × polynomial."""
-
-    power: float
-    exponent: float
-    nodes: Any
-    weights: Any
-    spectrum: Any
-
-
-def _family(power: float, exponent: float) -> _Family:
-    """Gauss–Jacobi nodes on (0, 1) for the weight of ∫F dt, and the coefficients they give."""
-    from scipy.special import eval_jacobi, roots_jacobi
-
-    beta = 2.0 * exponent + power - 1.0
-    x, w = roots_jacobi(S, 0.0, beta)
-    sigma = 0.5 * (1.0 + x)
-    measure = power * w / 2.0 ** (beta + 1.0)
-    polynomials = np.array([eval_jacobi(k, 0.0, beta, x) for k in range(S)])
-    norm = (polynomials**2 * w).sum(axis=1)
-    scale = sigma ** (-2.0 * exponent)
-    return _Family(power, exponent, sigma, measure * scale, polynomials * w * scale / norm[:, None])
-
-
-_CHECKED = (np.arange(24) + 0.5) / 24  # places between the nodes where their interpolant is compared
-_PHASES = np.geomspace(1e-2, 1e4, 600)  # ω h
-
-
-class _Families(NamedTuple):
-    """All kinds of contact steps of a problem: the smooth one, then one per stop to enter it."""
-
-    power: Any  # (f,)
-    exponent: Any
-    nodes: Any  # (f, S), as the rest in `Tables`
-    times: Any
-    weights: Any
-    summary: Any
-    tail: Any
-    monomials: Any
-    extend: Any
-    lagrange: Any  # (f, 2, S) weights of the Lagrange polynomials, plain and divided by the force's weight
-    alias: Any  # (f, P) largest error between the nodes of the interpolant of e^{iωt}, at `_PHASES`
-
-
-@lru_cache(maxsize=64)
-def _families(exponents: tuple[float, ...], jumps: tuple[bool, ...]) -> _Families:
-    """Kinds of steps for the stops' leading exponents."""
-    found = [_family(1.0, 0.0)]
-    for p, jump in zip(exponents, jumps, strict=True):
-        entry = p if not jump and p % 1.0 else 0.0
-        found.append(_family(2.0 if entry else 1.0, entry))
-    return _Families(
-        power=np.array([f.power for f in found]),
-        exponent=np.array([f.exponent for f in found]),
-        nodes=np.array([f.nodes for f in found]),
-        times=np.array([f.nodes**f.power for f in found]),
-        weights=np.array([f.weights for f in found]),
-        summary=np.ascontiguousarray([_summary(f) for f in found]),
-        tail=np.ascontiguousarray([_tail(f.nodes) for f in found]),
-        monomials=np.ascontiguousarray(np.linalg.inv(np.vander(2.0 * found[0].nodes - 1.0, increasing=True)).T),
-        extend=np.ascontiguousarray([_extensions(f, found[0]) for f in found]),
-        lagrange=np.array([_weights(f.nodes) * [np.ones(S), f.nodes ** (-2.0 * f.exponent)] for f in found]),
-        alias=np.array([_alias(f) for f in found]),
-    )
-
-
-def _signals(problem: Problem, h: Any) -> Any:
-    """State change (len(h), L, 6, 2N) by loads t^k/k!, k = 0..5; those asked for lately are kept."""
-    if not np.any(problem.load):
-        return np.zeros((len(h), len(problem.load), 6, 2 * len(problem.k)))
-    return _polynomial_responses(*(array.tobytes() for array in (problem.k, problem.c, problem.load, h)))
-
-
-@lru_cache(maxsize=16)
-def _polynomial_responses(stiffnesses: bytes, dampings: bytes, load: bytes, steps: bytes) -> Any:
-    """The same from the arrays' bytes: φ-functions by Taylor series and doubling."""
-    h, stiffness, damping = (np.frombuffer(part) for part in (steps, stiffnesses, dampings))
-    size = len(stiffness)
-    rows = np.frombuffer(load).reshape(-1, 2, size)
-    loads = len(rows)
-    out = np.zeros((len(h), loads, 6, 2 * size))
-    A = np.zeros((size, 2, 2))
-    speed = np.where(stiffness > 0.0, np.sqrt(stiffness), 1.0)  # unit of rates: fewer halvings, less rounding in φ
-    A[:, 0, 1], A[:, 1, 0], A[:, 1, 1] = speed, -stiffness / speed, -damping
-    vectors = np.stack((rows[:, 0], rows[:, 1] / speed), axis=2)  # (L, N, 2)
-    phi = _phi(h[:, None, None, None] * A)
-    for k in range(6):
-        change = np.einsum("hnab,lnb->hlan", phi[k + 1], vectors) * (h ** (k + 1))[:, None, None, None]
-        out[:, :, k] = change.reshape(len(h), loads, 2 * size)
-    out[..., size:] *= speed
-    out.setflags(write=False)
-    return out
-
-
-def _phi(Z: Any) -> list[Any]:
-    """φ_0(Z) ... φ_6(Z) of a stack of 2x2 matrices, φ_k(Z) = Σ_i Z^i/(i + k)!."""
-    halvings = max(0, math.ceil(math.log2(max(np.abs(Z).sum(axis=-1).max(), 1e-300))) + 1)
-    small = Z / 2.0**halvings
-    phi = []
-    for k in range(7):
-        term = np.broadcast_to(np.eye(2), Z.shape) / math.factorial(k)
-        total = term.copy()
-        for i in range(1, 20):
-            term = term @ small / (i + k)
-            total = total + term
-        phi.append(total)
-    for _ in range(halvings):
-        doubled = [phi[0] @ phi[0]]
-        for k in range(1, 7):
-            rest = sum(phi[j] / math.factorial(k - j) for j in range(1, k + 1))
-            doubled.append((phi[0] @ phi[k] + rest) / 2.0**k)
-        phi = doubled
-    return phi
-
-
-def _summary(family: _Family) -> Any:
-    """(S, 8): last four coefficients, values and slopes dF/dσ at start and end, from node values."""
-    rows = np.zeros((8, S))
-    rows[:4] = family.spectrum[-4:]
-    ends = _interpolation(family.nodes, np.array([0.0, 1.0]))
-    if family.exponent == 0.0:
-        rows[4:6], rows[6:8] = ends, ends @ _differentiation(family.nodes)
-    else:
-        rows[5] = ends[1] * family.nodes ** (-2.0 * family.exponent)
-    return rows.T
-
-
-def _tail(nodes: Any) -> Any:
-    """(S, 8): last four Legendre coefficients of the polynomial through node values."""
-    out = np.zeros((S, 8))
-    out[:, :4] = np.linalg.inv(np.polynomial.legendre.legvander(2.0 * nodes - 1.0, S - 1))[-4:].T
-    return out
-
-
-def _differentiation(nodes: Any) -> Any:
-    """Slopes at the nodes of the polynomial through node values (Trefethen, Spectral Methods in MATLAB, Chapter 6)."""
-    apart, weights = nodes[:, None] - nodes + np.eye(len(nodes)), _weights(nodes)
-    out = weights / (weights[:, None] * apart)
-    np.fill_diagonal(out, 0.0)
-    np.fill_diagonal(out, -out.sum(axis=1))
-    return out
-
-
-def _alias(family: _Family) -> Any:
-    """(P,) largest error between a family's nodes of the interpolant of e^{iωt}."""
-    waves = np.exp(1j * np.outer(family.nodes**family.power, _PHASES))
-    exact = np.exp(1j * np.outer(_CHECKED**family.power, _PHASES))
-    return np.minimum(np.abs(_interpolation(family.nodes, _CHECKED) @ waves - exact).max(axis=0), 2.0)
-
-
-def _weights(nodes: Any) -> Any:
-    """1/Π (σ_j - σ_i) of the Lagrange polynomials."""
-    return 1.0 / (nodes[:, None] - nodes + np.eye(len(nodes))).prod(axis=1)
-
-
-def _interpolation(nodes: Any, points: Any) -> Any:
-    """Lagrange matrix (points, nodes)."""
-    out = np.empty((len(points), len(nodes)))
-    row, weights = np.empty(len(nodes)), _weights(nodes)
-    for i, x in enumerate(points):
-        _lagrange(nodes, weights, float(x), row)
-        out[i] = row
-    return out
-
-
-def _extensions(family: _Family, smooth: _Family) -> Any:
-    """Extrapolation of a step's force to the nodes of the next smooth step, 2^{-(i-2)/2} times as long."""
-    out = np.empty((5, S, S))
-    for i in range(5):
-        times = 1.0 + 2.0 ** (-0.5 * (i - 2)) * smooth.nodes
-        sigma = times ** (1.0 / family.power)
-        out[i] = _interpolation(family.nodes, sigma)
-        if family.exponent:
-            out[i] *= np.outer(sigma ** (2.0 * family.exponent), family.nodes ** (-2.0 * family.exponent))
-    return out.transpose(0, 2, 1)

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solvers.dormand_prince import STAGES
+from solvers.families import S
 from solvers.handle import Layout, Packed
 from solvers.kernels import PROBLEM, Problem
 from solvers.preparation import places_among_tones, steady_response
@@ -17,7 +18,6 @@ from solvers.replay import NUDGE, SLOPES, Nudge, Slopes, replay
 from solvers.result import SolverError
 from solvers.state import HEAD, STATE, State, T, begin_state, law_parameters, state_shapes
 from solvers.system import Array, Parameter, System
-from solvers.tables import S
 
 _ROWS = 256  # of the tape between two replays: some 25 contacts, within which no derivative overflows
 _CARRIED = [Slopes._fields.index(name) for name in ("y", "entry", "shift", "rate")]

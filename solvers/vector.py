@@ -2,7 +2,7 @@
 
 The compiler cannot know that a result does not overlap the table it is computed from, and therefore neither vectorises
 these sums nor keeps them in registers by itself. Rows, start and result hold a multiple of `WIDTH` numbers. What is
-said of eight numbers is meant for the `tables.S` nodes of a contact step.
+said of eight numbers is meant for the `families.S` nodes of a contact step.
 """
 
 from __future__ import annotations

@@ -1,0 +1,164 @@
+"""Kinds of contact steps: their nodes, the weights of their forces, what is told from node values.
+
+A force is known by its values F_j at S nodes σ_j of (0, 1), t = h σ^κ:
+
+    F(t) = w(σ) Σ_j L_j(σ) F_j / w(σ_j),
+
+*smooth*: κ = 1, w = 1, Gauss–Legendre nodes; *entry*: κ = 2, w = σ^{2p}, Gauss–Jacobi nodes for the weight σ^{2p+1},
+because a power law of exponent p entered at t = 0 is F = t^p × (a smooth function of √t).
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from solvers.kernels import kernel
+
+S = 8  # nodes of a contact step: 6 is a little faster at 1e-6, 10 and 12 bring nothing
+_CHECKED = (np.arange(24) + 0.5) / 24  # places between the nodes where their interpolant is compared
+PHASES = np.geomspace(1e-2, 1e4, 600)  # ω h
+
+
+@kernel
+def lagrange(nodes, weights, sigma, out):
+    """Lagrange polynomials of the nodes at σ, each times its weight × Π (σ_j - σ_i)."""
+    for j in range(nodes.size):
+        value = weights[j]
+        for i in range(nodes.size):
+            if i != j:
+                value *= sigma - nodes[i]
+        out[j] = value
+
+
+@lru_cache(maxsize=8)
+def gauss(count: int) -> Any:
+    """Gauss–Legendre points and weights on (0, 1): (2, count)."""
+    x, w = np.polynomial.legendre.leggauss(count)
+    return np.array([0.5 * (1.0 + x), 0.5 * w])
+
+
+class _Family(NamedTuple):
+    """Nodes of a kind of contact step, t = h σ^power, F = σ^{2 exponent} × polynomial."""
+
+    power: float
+    exponent: float
+    nodes: Any
+    weights: Any
+    spectrum: Any
+
+
+def _family(power: float, exponent: float) -> _Family:
+    """Gauss–Jacobi nodes on (0, 1) for the weight of ∫F dt, and the coefficients they give."""
+    from scipy.special import eval_jacobi, roots_jacobi
+
+    beta = 2.0 * exponent + power - 1.0
+    x, w = roots_jacobi(S, 0.0, beta)
+    sigma = 0.5 * (1.0 + x)
+    measure = power * w / 2.0 ** (beta + 1.0)
+    polynomials = np.array([eval_jacobi(k, 0.0, beta, x) for k in range(S)])
+    norm = (polynomials**2 * w).sum(axis=1)
+    scale = sigma ** (-2.0 * exponent)
+    return _Family(power, exponent, sigma, measure * scale, polynomials * w * scale / norm[:, None])
+
+
+class Families(NamedTuple):
+    """All kinds of contact steps of a problem: the smooth one, then one per stop to enter it."""
+
+    power: Any  # (f,)
+    exponent: Any
+    nodes: Any  # (f, S), as the rest in `Tables`
+    times: Any
+    weights: Any
+    summary: Any
+    tail: Any
+    monomials: Any
+    extend: Any
+    lagrange: Any  # (f, 2, S) weights of the Lagrange polynomials, plain and divided by the force's weight
+    alias: Any  # (f, P) largest error between the nodes of the interpolant of e^{iωt}, at `PHASES`
+
+
+@lru_cache(maxsize=64)
+def families_of(exponents: tuple[float, ...], jumps: tuple[bool, ...]) -> Families:
+    """Kinds of steps for the stops' leading exponents."""
+    found = [_family(1.0, 0.0)]
+    for p, jump in zip(exponents, jumps, strict=True):
+        entry = p if not jump and p % 1.0 else 0.0
+        found.append(_family(2.0 if entry else 1.0, entry))
+    return Families(
+        power=np.array([f.power for f in found]),
+        exponent=np.array([f.exponent for f in found]),
+        nodes=np.array([f.nodes for f in found]),
+        times=np.array([f.nodes**f.power for f in found]),
+        weights=np.array([f.weights for f in found]),
+        summary=np.ascontiguousarray([_summary(f) for f in found]),
+        tail=np.ascontiguousarray([_tail(f.nodes) for f in found]),
+        monomials=np.ascontiguousarray(np.linalg.inv(np.vander(2.0 * found[0].nodes - 1.0, increasing=True)).T),
+        extend=np.ascontiguousarray([_extensions(f, found[0]) for f in found]),
+        lagrange=np.array([_weights(f.nodes) * [np.ones(S), f.nodes ** (-2.0 * f.exponent)] for f in found]),
+        alias=np.array([_alias(f) for f in found]),
+    )
+
+
+def _summary(family: _Family) -> Any:
+    """(S, 8): last four coefficients, values and slopes dF/dσ at start and end, from node values."""
+    rows = np.zeros((8, S))
+    rows[:4] = family.spectrum[-4:]
+    ends = _interpolation(family.nodes, np.array([0.0, 1.0]))
+    if family.exponent == 0.0:
+        rows[4:6], rows[6:8] = ends, ends @ _differentiation(family.nodes)
+    else:
+        rows[5] = ends[1] * family.nodes ** (-2.0 * family.exponent)
+    return rows.T
+
+
+def _tail(nodes: Any) -> Any:
+    """(S, 8): last four Legendre coefficients of the polynomial through node values."""
+    out = np.zeros((S, 8))
+    out[:, :4] = np.linalg.inv(np.polynomial.legendre.legvander(2.0 * nodes - 1.0, S - 1))[-4:].T
+    return out
+
+
+def _differentiation(nodes: Any) -> Any:
+    """Slopes at the nodes of the polynomial through node values (Trefethen, Spectral Methods in MATLAB, Chapter 6)."""
+    apart, weights = nodes[:, None] - nodes + np.eye(len(nodes)), _weights(nodes)
+    out = weights / (weights[:, None] * apart)
+    np.fill_diagonal(out, 0.0)
+    np.fill_diagonal(out, -out.sum(axis=1))
+    return out
+
+
+def _alias(family: _Family) -> Any:
+    """(P,) largest error between a family's nodes of the interpolant of e^{iωt}."""
+    waves = np.exp(1j * np.outer(family.nodes**family.power, PHASES))
+    exact = np.exp(1j * np.outer(_CHECKED**family.power, PHASES))
+    return np.minimum(np.abs(_interpolation(family.nodes, _CHECKED) @ waves - exact).max(axis=0), 2.0)
+
+
+def _weights(nodes: Any) -> Any:
+    """1/Π (σ_j - σ_i) of the Lagrange polynomials."""
+    return 1.0 / (nodes[:, None] - nodes + np.eye(len(nodes))).prod(axis=1)
+
+
+def _interpolation(nodes: Any, points: Any) -> Any:
+    """Lagrange matrix (points, nodes)."""
+    out = np.empty((len(points), len(nodes)))
+    row, weights = np.empty(len(nodes)), _weights(nodes)
+    for i, x in enumerate(points):
+        lagrange(nodes, weights, float(x), row)
+        out[i] = row
+    return out
+
+
+def _extensions(family: _Family, smooth: _Family) -> Any:
+    """Extrapolation of a step's force to the nodes of the next smooth step, 2^{-(i-2)/2} times as long."""
+    out = np.empty((5, S, S))
+    for i in range(5):
+        times = 1.0 + 2.0 ** (-0.5 * (i - 2)) * smooth.nodes
+        sigma = times ** (1.0 / family.power)
+        out[i] = _interpolation(family.nodes, sigma)
+        if family.exponent:
+            out[i] *= np.outer(sigma ** (2.0 * family.exponent), family.nodes ** (-2.0 * family.exponent))
+    return out.transpose(0, 2, 1)
