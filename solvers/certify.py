@@ -18,9 +18,9 @@ import numpy as np
 from solvers.flight import (
     LONG_REACH,
     ORDER,
-    acceleration_bound,
     add_signals,
     add_taylor,
+    bound_apart,
     cell_of,
     energy_norms,
     go_on,
@@ -178,7 +178,7 @@ def _glide(problem, tables, state, space, most, budget):
         span = most - flown
         for s in range(problem.gap.size):
             if count % _REFRESH == 0:
-                space.m[s] = acceleration_bound(tables, s, x)
+                space.m[s] = bound_apart(tables, s, x)
             delta, rate = look(tables, s, x)
             span = min(span, _safe(problem.gap[s] - delta, -rate, space.m[s]))
         if span < tables.h[tables.h.size - 1] or count >= budget:

@@ -182,7 +182,7 @@ def look(tables, s, x):
 
 
 @inlined
-def acceleration_bound(tables, s, x):
+def bound_apart(tables, s, x):
     """M: bound of |δ̈| of a stop from now on, without signals, from the blocks' p and v."""
     bound = spread(0.0)
     for i in range(0, x.shape[1], WIDTH):

@@ -47,6 +47,7 @@ def _summit(tables, values, ends, coefficients):
     high, right = (2.0 * nodes[place + 1] - 1.0, values[place + 1]) if place < S - 1 else (1.0, ends[1])
     rise, fall = (b - low) * (values[place] - right), (high - b) * (values[place] - left)
     x = b if rise + fall == 0.0 else b - 0.5 * ((b - low) * rise - (high - b) * fall) / (rise + fall)
+    x = min(max(x, low), high)
     best = values[place]
     for _ in range(_MOST):
         value, slope, curvature = _local(coefficients, x)

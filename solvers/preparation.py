@@ -40,7 +40,7 @@ SPACE = types.NamedTuple(
 class Workspace:
     """What one run writes to: a block of memory, its arrays, and where compiled code finds their descriptors."""
 
-    def __init__(self, layout: Layout, rest: Array, blocks: int, tones: int) -> None:
+    def __init__(self, layout: Layout, rest: Array, blocks: int) -> None:
         self.layout = layout
         self.block, words = layout.block()
         self.numbers = self.block[: layout.size]
@@ -48,7 +48,7 @@ class Workspace:
         self.state = State._make(layout.arrays(self.block, 0))
         begin_state(self.state, rest)
         self.rest = self.numbers.copy()
-        self.own = self.state.x[: 2 * (blocks + tones)].reshape(2, -1)[:, :blocks]
+        self.own = self.state.x[: rest.size].reshape(2, -1)[:, :blocks]
 
     def begin(self, z: Array) -> None:
         """The state of a run at t = 0 from the coordinates of the structure's own blocks."""
@@ -69,7 +69,6 @@ class Prepared(NamedTuple):
     back: Array  # (2n, 2N): [q, q̇] from the state of all blocks
     layout: Layout  # of State and Space
     rest: Array  # state of the tones' blocks at t = 0, the structure's less their steady response
-    tones: int
     spare: list[Workspace]  # of runs that are over
 
     def workspace(self) -> Workspace:
@@ -77,7 +76,7 @@ class Prepared(NamedTuple):
         try:
             return self.spare.pop()
         except IndexError:
-            return Workspace(self.layout, self.rest, self.back.shape[0] // 2, self.tones)
+            return Workspace(self.layout, self.rest, self.back.shape[0] // 2)
 
 
 def ready_for(system: System, forcing: Forcing, duration: float, rtol: float) -> tuple[Forcing, Prepared]:
@@ -167,7 +166,7 @@ class _Skeleton:
         fill_tones(tables.value, problem.value, self.tones, *self.kinds)
         rest = among_tones(-response.real.sum(axis=0), self.tones)
         rest[n : n + self.tones] = 1.0
-        return Prepared(problem, tables, back, self.layout, rest, self.tones, [])
+        return Prepared(problem, tables, back, self.layout, rest, [])
 
     def _tables(self, forcing: Forcing, turn: Array) -> Cast:
         """Tables that know the signals made of tones, Re(a e^{iΩt}) = Re a · p + Im a/Ω · v; ``turn`` is 1/Ω."""

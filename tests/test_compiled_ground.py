@@ -7,8 +7,10 @@ import pytest
 from numba import njit, types
 
 from solvers.eight import bits, eight, put, raised, root, spread, total
+from solvers.families import families_of
 from solvers.flight import level_within
 from solvers.handle import Layout, Mould, Packed, opener
+from solvers.peaks import _summit
 from solvers.vector import combine, padded
 
 OPTIONS = {"error_model": "numpy", "_nrt": False}
@@ -224,3 +226,28 @@ def test_level_is_the_longest_tabulated_step_within_the_span():
     found = np.array([level_of(Lengths(h), span) for span in spans])
     assert np.all(h[found] <= spans)
     assert np.all((found == 0) | (h[found - 1] > spans))
+
+
+class Nodes(NamedTuple):
+    monomials: np.ndarray
+    nodes: np.ndarray
+
+
+@njit(**OPTIONS)
+def summit_of(tables, values, ends, coefficients):
+    return _summit(tables, values, ends, coefficients)
+
+
+def test_summit_is_the_polynomials_maximum_around_its_highest_node():
+    families, rng, fine = families_of((1.5,), (False,)), np.random.default_rng(3), np.linspace(-1.0, 1.0, 20_001)
+    x = 2.0 * families.nodes[0] - 1.0
+    for _ in range(400):
+        polynomial = np.polynomial.Polynomial(rng.standard_normal(8) * rng.uniform(0.1, 1.0) ** np.arange(8))
+        values, ends = polynomial(x), polynomial(np.array([-1.0, 1.0]))
+        place = int(values.argmax())
+        low, high = np.concatenate(([-1.0], x, [1.0]))[[place, place + 2]]
+        inside = polynomial(fine[(fine >= low) & (fine <= high)])
+        found = summit_of(Nodes(families.monomials, families.nodes), values, ends, np.empty(8))
+        assert values[place] <= found <= inside.max() + 1e-6
+        if max(ends) < values[place]:  # else the maximum is an end, which `peak` looks at itself
+            assert found == pytest.approx(inside.max(), abs=1e-7)
