@@ -16,7 +16,7 @@ from numba.core.typing.templates import ConcreteTemplate, infer_global, signatur
 from numba.extending import intrinsic, lower_builtin, models, register_model
 
 WIDTH = 8
-VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
+_VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
 
 
 class Eight(types.Type):
@@ -34,7 +34,7 @@ class _Model(models.PrimitiveModel):
     """One vector register, or as many as the machine needs."""
 
     def __init__(self, manager, kind):
-        super().__init__(manager, kind, VECTOR)
+        super().__init__(manager, kind, _VECTOR)
 
 
 def _operator(function, instruction):
@@ -55,10 +55,15 @@ _operator(operator.sub, "fsub")
 _operator(operator.mul, "fmul")
 
 
-def place(context, builder, kind, array, offset=None):
+def _place(context, builder, kind, array, offset=None):
     """Where eight numbers of an array begin, as a vector's address."""
     data = context.make_array(kind)(context, builder, array).data
-    return builder.bitcast(data if offset is None else builder.gep(data, [offset]), VECTOR.as_pointer())
+    return builder.bitcast(data if offset is None else builder.gep(data, [offset]), _VECTOR.as_pointer())
+
+
+def _places(places):
+    """Which numbers of a vector another one takes."""
+    return ir.Constant(ir.VectorType(ir.IntType(32), len(places)), list(places))
 
 
 @intrinsic
@@ -73,10 +78,10 @@ def bits(typingctx, number):
 
 @intrinsic
 def eight(typingctx, array, first):
-    """The eight numbers of an array from ``first`` on."""
+    """The eight numbers of an array from ``first`` on; rows of an array with more dimensions follow each other."""
 
     def codegen(context, builder, signature, arguments):
-        return builder.load(place(context, builder, signature.args[0], *arguments), align=8)
+        return builder.load(_place(context, builder, signature.args[0], *arguments), align=8)
 
     return EIGHT(array, types.intp), codegen
 
@@ -87,7 +92,7 @@ def put(typingctx, array, first, numbers):
 
     def codegen(context, builder, signature, arguments):
         array, first, numbers = arguments
-        builder.store(numbers, place(context, builder, signature.args[0], array, first), align=8)
+        builder.store(numbers, _place(context, builder, signature.args[0], array, first), align=8)
         return context.get_dummy_value()
 
     return types.void(array, types.intp, EIGHT), codegen
@@ -98,7 +103,9 @@ def spread(typingctx, number):
     """Eight times the same number."""
 
     def codegen(context, builder, signature, arguments):
-        return spread_out(builder, arguments[0])
+        nothing = ir.Constant(_VECTOR, ir.Undefined)
+        first = builder.insert_element(nothing, arguments[0], ir.IntType(32)(0))
+        return builder.shuffle_vector(first, nothing, _places([0] * WIDTH))
 
     return EIGHT(types.float64), codegen
 
@@ -108,7 +115,7 @@ def root(typingctx, numbers):
     """Square roots."""
 
     def codegen(context, builder, signature, arguments):
-        kind = ir.FunctionType(VECTOR, [VECTOR])
+        kind = ir.FunctionType(_VECTOR, [_VECTOR])
         return builder.call(cgutils.get_or_insert_function(builder.module, kind, f"llvm.sqrt.v{WIDTH}f64"), arguments)
 
     return EIGHT(EIGHT), codegen
@@ -119,7 +126,7 @@ def raised(typingctx, numbers):
     """The negative ones raised to zero; NaN stays."""
 
     def codegen(context, builder, signature, arguments):
-        zero = ir.Constant(VECTOR, [0.0] * WIDTH)
+        zero = ir.Constant(_VECTOR, [0.0] * WIDTH)
         return builder.select(builder.fcmp_ordered("<", arguments[0], zero), zero, arguments[0])
 
     return EIGHT(EIGHT), codegen
@@ -127,28 +134,17 @@ def raised(typingctx, numbers):
 
 @intrinsic
 def total(typingctx, numbers):
-    """Sum of eight numbers."""
+    """Sum of eight numbers, by halves."""
 
     def codegen(context, builder, signature, arguments):
-        return summed(builder, arguments[0])
+        vector = arguments[0]
+        for half in (4, 2, 1):
+            nothing = ir.Constant(vector.type, ir.Undefined)
+            low, high = (
+                builder.shuffle_vector(vector, nothing, _places(places))
+                for places in (range(half), range(half, 2 * half))
+            )
+            vector = builder.fadd(low, high)
+        return builder.extract_element(vector, ir.IntType(32)(0))
 
     return types.float64(EIGHT), codegen
-
-
-def spread_out(builder, number):
-    """A number in all places of a vector."""
-    nothing = ir.Constant(VECTOR, ir.Undefined)
-    first = builder.insert_element(nothing, number, ir.IntType(32)(0))
-    return builder.shuffle_vector(first, nothing, ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH))
-
-
-def summed(builder, vector):
-    """Sum of the numbers of a vector, by halves."""
-    nothing = ir.Constant(vector.type, ir.Undefined)
-    for half in (4, 2, 1):
-        kind = ir.VectorType(ir.IntType(32), half)
-        low, high = (ir.Constant(kind, [*range(begin, begin + half)]) for begin in (0, half))
-        halves = [builder.shuffle_vector(vector, nothing, places) for places in (low, high)]
-        vector = builder.fadd(*halves)
-        nothing = ir.Constant(vector.type, ir.Undefined)
-    return builder.extract_element(vector, ir.IntType(32)(0))

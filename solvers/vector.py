@@ -7,58 +7,13 @@ said of eight numbers is meant for the `families.S` nodes of a contact step.
 
 from __future__ import annotations
 
-from llvmlite import ir
-from numba import types
-from numba.core import cgutils
-from numba.extending import intrinsic
-
-from solvers.eight import WIDTH, eight, put, raised, root, spread, spread_out, total
+from solvers.eight import WIDTH, eight, put, raised, root, spread, total
 from solvers.kernels import inlined
 
 
 def padded(size: int) -> int:
     """The next multiple of `WIDTH`."""
     return -(-size // WIDTH) * WIDTH
-
-
-@intrinsic
-def _columns(typingctx, rows, stride, first, weights, count, start, result):
-    """result[f:f+8] = start[f:f+8] + Σ_{e < count} weights[e] rows[e, f:f+8] with f = first; start may be None."""
-
-    def codegen(context, builder, signature, arguments):
-        vector = ir.VectorType(ir.DoubleType(), WIDTH)
-        data = [
-            context.make_array(kind)(context, builder, value).data if isinstance(kind, types.Array) else value
-            for kind, value in zip(signature.args, arguments, strict=True)
-        ]
-        rows, stride, first, weights, count, start, result = data
-
-        def place(base, offset):
-            return builder.bitcast(builder.gep(base, [offset]), vector.as_pointer())
-
-        def add(total, e):
-            weight = spread_out(builder, builder.load(builder.gep(weights, [e])))
-            row = builder.load(place(rows, builder.add(builder.mul(e, stride), first)), align=8)
-            product = builder.fmul(row, weight, flags=("contract",))
-            builder.store(builder.fadd(builder.load(total), product, flags=("contract",)), total)
-
-        one = count.type(1)
-        zero = ir.Constant(vector, [0.0] * WIDTH)
-        nothing = isinstance(signature.args[5], types.NoneType)
-        even, odd = (cgutils.alloca_once(builder, vector) for _ in range(2))  # each waits for its own last sum only
-        builder.store(zero if nothing else builder.load(place(start, first), align=8), even)
-        builder.store(zero, odd)
-        with cgutils.for_range(builder, builder.lshr(count, one)) as loop:
-            e = builder.shl(loop.index, one)
-            add(even, e)
-            add(odd, builder.add(e, one))
-        with builder.if_then(builder.trunc(count, ir.IntType(1))):
-            add(even, builder.sub(count, one))
-        total = builder.fadd(builder.load(even), builder.load(odd))
-        builder.store(total, place(result, first), align=8)
-        return context.get_dummy_value()
-
-    return types.void(rows, types.intp, types.intp, weights, types.intp, start, result), codegen
 
 
 @inlined
@@ -108,4 +63,11 @@ def combine(rows, weights, count, start, result):
     """Sum rows: result = start + Σ_{e < count} weights[e] rows[e]; start may be result, or None for zero."""
     width = rows.shape[-1]
     for first in range(0, width, WIDTH):
-        _columns(rows, width, first, weights, count, start, result)
+        even = spread(0.0) if start is None else eight(start, first)
+        odd = spread(0.0)  # each waits for its own last sum only
+        for e in range(0, count - 1, 2):
+            even += spread(weights[e]) * eight(rows, e * width + first)
+            odd += spread(weights[e + 1]) * eight(rows, (e + 1) * width + first)
+        if count % 2:
+            even += spread(weights[count - 1]) * eight(rows, (count - 1) * width + first)
+        put(result, first, even + odd)

@@ -191,9 +191,8 @@ class Lengths(NamedTuple):
     h: np.ndarray
 
 
-@njit(**OPTIONS)
-def level_of(tables, span):
-    return level_within(tables, span)
+# compiled anew: the library's own caches must not know a type that only this file has
+level_of = njit(**OPTIONS)(level_within.py_func)
 
 
 def test_eights_calculate_like_numbers():
@@ -233,9 +232,7 @@ class Nodes(NamedTuple):
     nodes: np.ndarray
 
 
-@njit(**OPTIONS)
-def summit_of(tables, values, ends, coefficients):
-    return _summit(tables, values, ends, coefficients)
+summit_of = njit(**OPTIONS)(_summit.py_func)
 
 
 def test_summit_is_the_polynomials_maximum_around_its_highest_node():

@@ -103,16 +103,9 @@ def remembered(function):
     return respond
 
 
-def columns(rows, stride, first, weights, total, start, result):
-    """The weighted sum of eight columns; tables and results of more dimensions are rows of numbers here."""
-    here = slice(first, first + 8)
-    sums = weights[:total] @ rows.reshape(-1, stride)[:total, here]
-    result.reshape(-1)[here] = sums + (0.0 if start is None else start.reshape(-1)[here])
-
-
 def put(array, first, numbers):
     """Write eight numbers."""
-    array[first : first + 8] = numbers
+    array.reshape(-1)[first : first + 8] = numbers
 
 
 handle.opener = opener
@@ -121,13 +114,11 @@ ground._call_force = ground._call_gradient = at_address
 
 import solvers.eight as eight  # noqa: E402
 
-eight.eight, eight.put = lambda array, first: array[first : first + 8].copy(), put
+eight.eight, eight.put = lambda array, first: array.reshape(-1)[first : first + 8].copy(), put
 eight.spread, eight.total = lambda number: np.full(8, number), lambda numbers: float(np.sum(numbers))
 eight.root, eight.raised = np.sqrt, lambda numbers: np.maximum(numbers, 0.0)
 eight.bits = lambda number: int(np.float64(number).view(np.int64))
 
 import solvers.tables as tables  # noqa: E402
-import solvers.vector as vector  # noqa: E402
 
 tables._block_response = remembered(tables._block_response)
-vector._columns = columns
