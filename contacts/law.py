@@ -16,7 +16,7 @@ import ctypes
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from typing import Any, ClassVar
 
@@ -37,6 +37,8 @@ class Law(ABC):
     knots : indentations (m, ascending, > 0) where the force or its slope has a kink.
     jump : whether the force jumps when contact begins, F(0+, v) != 0.
     exponent : leading exponent p of F ~ delta**p at first touch; integrators choose their variable by it.
+    bend : where else the force has a kink: "rate" at delta_dot = 0, "force" where it is cut at zero (`uncut` is then the
+        law without the cut), None nowhere.
     entry_rate_floor : entry rates below it (m/s) are raised to it before the law sees them.
     equation, units, remarks : what `describe` says of it: the formula, units of the parameters, where it pulls, where
         it is singular, how it is integrated.
@@ -51,6 +53,16 @@ class Law(ABC):
     jump: bool = False
     exponent: float = 1.0
     entry_rate_floor: float = ENTRY_RATE_FLOOR
+
+    @property
+    def bend(self) -> str | None:
+        """A law with a switch `clamp` is cut at zero."""
+        return "force" if getattr(self, "clamp", False) else None
+
+    @property
+    def uncut(self) -> Law:
+        """The law without its cut at zero."""
+        return replace(self, clamp=False) if self.bend == "force" else self  # type: ignore[type-var]
 
     @property
     @abstractmethod
@@ -190,6 +202,12 @@ class Sum(Law):
         exponents = [part.exponent for part in self.parts]
         mixed = len({p % 1.0 for p in exponents}) > 1
         return 0.5 if mixed and not self.jump else min(exponents)
+
+    @property
+    def bend(self) -> str | None:
+        """That of the parts if they have but one at the same place: a cut part's is not at a zero of the sum."""
+        bends = {part.bend for part in self.parts}
+        return "rate" if bends <= {"rate", None} and "rate" in bends else None
 
     @property
     def entry_rate_floor(self) -> float:  # type: ignore[override]

@@ -204,6 +204,11 @@ class Viscoelastic(Law):
             return "never pulls", singular, "has a kink where δ̇ = 0; integrated at lower order around it"
         return CLAMPED if self.clamp else PULLS, singular
 
+    @property
+    def bend(self) -> str | None:
+        """Damping on approach only ends where δ̇ = 0; such a law never pulls."""
+        return ("rate" if self.damping else None) if self.approach_only else super().bend
+
     def exact_restitution(self, entry_rate: float, mass: float) -> float:
         """By the equivalent linear oscillator; see the module."""
         ratio = self.damping / math.sqrt(2.0 * (self.exponent + 1.0) * self.stiffness * mass)

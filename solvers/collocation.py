@@ -6,13 +6,14 @@ On a step of length h the unknowns are the forces at S nodes of every stop in co
 
 iterated from the extrapolated polynomial of the step before. The state at the end is E(h) y + Σ kick F. The first
 step of a power law with a broken exponent uses t = h s² and F = s^{2p} g(s), which restores full order at the
-singular start; the last one, onto δ = 0, is one Runge–Kutta step in √δ (see `solvers.regular`).
+singular start; the last one, onto δ = 0, is one Runge–Kutta step in √δ (see `solvers.landing`).
 
 Step control: with A₁ >= A₂ the sizes of the last two and the two before of the force's S Jacobi coefficients, the force
-beyond the polynomial is taken as A₁ max((A₁/A₂)^{S/2}, A₁/F_max), and what it does to the indentation rate is
-compared with rtol × a reference speed. Fast modes whose oscillation the nodes cannot follow are charged for it, and so
-is the tail of the sampled signals, whose cells may be shorter than the step. A kink of the law between an end of the
-step and the nearest node leaves no trace in the coefficients; there law and polynomial are compared.
+beyond the polynomial is taken as A₁ max((A₁/A₂)^{S/2}, A₁/F_max), and what it does to the indentation rate of every
+stop, open or closed, is compared with rtol × a reference speed of that stop. Fast modes whose oscillation the nodes
+cannot follow are charged for it, and so is the tail of the sampled signals, whose cells may be shorter than the step. A
+kink of the law between an end of the step and the nearest node leaves no trace in the coefficients; there law and
+polynomial are compared.
 """
 
 from __future__ import annotations
@@ -25,9 +26,9 @@ from solvers.eight import eight, total
 from solvers.families import S
 from solvers.kernels import contact_forces, copy, dot, indentation, inlined, inner, sizes
 from solvers.newton import MOST_ITERATIONS, newton
-from solvers.peaks import peak, top
+from solvers.peaks import step_peaks
 from solvers.response import node_forces, respond
-from solvers.state import CALLS, PEAK_DELTA, PEAK_FORCE, T
+from solvers.state import CALLS, T
 from solvers.tables import DAMPING, EXPONENT, FACTOR, STIFFNESS
 from solvers.vector import combine, renew, sweep
 
@@ -44,7 +45,7 @@ def _alone(tables, state):
 
 @inlined
 def _iterate(problem, tables, state, space, family, level):
-    """One iteration for the forces of all stops in contact: squares of their change and size, summed."""
+    """One iteration for the forces of all stops in contact: squares of their change and size, in units of accuracy."""
     change, largest = 0.0, 0.0
     for s in range(problem.gap.size):
         if state.piece[s] > 0:
@@ -53,15 +54,28 @@ def _iterate(problem, tables, state, space, family, level):
         if state.piece[s] > 0:
             node_forces(problem, state, space, s)
             moved, size = renew(space.force[s], space.trial)
-            change, largest = change + moved, largest + size
+            unit = 1.0 / space.accuracy[s] ** 2
+            change, largest = change + moved * unit, largest + size * unit
     return change, largest
 
 
 @inner
-def solve_forces(problem, tables, state, space, family, level, accuracy):
-    """Fixed point of the forces to ``accuracy`` in N; whether it was found."""
+def _set_accuracy(problem, tables, state, space, h, rtol):
+    """Change of each stop's force, N, that moves no indentation rate by more than a twentieth of its tolerance."""
+    for u in range(problem.gap.size):
+        if state.piece[u] > 0:
+            most = 1e-300
+            for s in range(problem.gap.size):
+                most = max(most, abs(tables.mobility[s, u]) / space.scale[s])
+            space.accuracy[u] = 0.05 * rtol / (h * most)
+
+
+@inner
+def solve_forces(problem, tables, state, space, family, level, rtol):
+    """Fixed point of the forces; whether it was found."""
+    _set_accuracy(problem, tables, state, space, tables.step[level], rtol)
     before, alone = 0.0, _alone(tables, state)
-    law = tables.inlined[max(alone, 0)]
+    law, unit = tables.inlined[max(alone, 0)], 1.0 / space.accuracy[max(alone, 0)] ** 2
     stiffness, rooted, damping = law[STIFFNESS], law[EXPONENT] == 1.5, law[DAMPING]
     factor = law[FACTOR] / state.entry_rate[max(alone, 0)]
     for iteration in range(MOST_ITERATIONS):
@@ -70,6 +84,7 @@ def solve_forces(problem, tables, state, space, family, level, accuracy):
                 *(tables.forced[family, level, alone, alone], space.free[alone], space.force[alone]),
                 *(space.motion[alone], stiffness, rooted, factor, damping),
             )
+            change, largest = change * unit, largest * unit
             state.count[CALLS] += S
         else:
             change, largest = _iterate(problem, tables, state, space, family, level)
@@ -79,39 +94,58 @@ def solve_forces(problem, tables, state, space, family, level, accuracy):
         if iteration == 0:
             before = change / 0.3  # as iterations usually go
         # changes that shrink by r = change/before, taken as 0.9 at most, add up to change r/(1 - r) from here on
-        if settled or change * change <= accuracy * max(before - change, change / 9.0):
+        if settled or change * change <= max(before - change, change / 9.0):
             return True
         if iteration > 2 and change > 0.6 * before:
             break
         before = change
-    return newton(problem, tables, state, space, family, level, accuracy)
+    return newton(problem, tables, state, space, family, level)
+
+
+@inlined
+def _top(values):
+    """The largest of node values, or 0."""
+    best = 0.0
+    for i in range(S):
+        best = max(best, values[i])
+    return best
 
 
 @inner
-def step_error(problem, tables, state, space, family, level, fresh):
-    """Error of the indentation rate, m/s, that the forces' unresolved part makes; the largest over the stops."""
-    stops, n = problem.gap.size, problem.k.size
-    h = tables.step[level]
+def step_error(problem, tables, state, space, family, level, fresh, rtol):
+    """Error of the indentation rates by the forces' unresolved part, in units of each stop's tolerance; the largest.
+
+    On an entry step the force of the stop that enters is integrated by Gauss's rule, those of the others are not.
+    """
+    n, stops, h = problem.k.size, problem.gap.size, tables.step[level]
     for u in range(stops):
-        if state.piece[u] > 0:
-            combine(tables.summary[family], space.force[u], S, None, space.summary[u, 0])
+        space.beyond[u] = 0.0
+        if state.piece[u] == 0:
+            continue
+        gauss = family == 0 or u == family - 1
+        combine(tables.summary[family], space.force[u], S, None, space.summary[u, 0])
+        largest, deepest = _top(space.force[u]), _top(space.motion[u, 0])
+        if gauss:
+            beyond = _beyond(space.summary[u, 0], largest, S // 2)
+        else:
+            combine(tables.tail[family], space.force[u], S, None, space.trial)
+            beyond = _beyond(space.trial, largest, 1)
+        if family == 0 and tables.inlined[u, EXPONENT] == 0.0:
+            beyond += 0.01 * _hidden_kink(problem, state, space, u, largest, fresh)
+        if beyond == 0.0:
+            continue
+        ripple = sizes(tables.ripple[family, level, u], state.x, 2 * n)
+        stiffness = tables.exponent[u] * largest / max(deepest, 1e-300)
+        space.beyond[u] = h * (beyond + 0.1 * stiffness * ripple)
     worst = 0.0
     for s in range(stops):
-        error = 0.0
+        error = _signal_error(problem, tables, space, family, h, s) if problem.table_dt.size else 0.0
         for u in range(stops):
-            if state.piece[u] == 0:
-                continue
-            largest, deepest = top(space.force[u]), top(space.motion[u, 0])
-            beyond = _beyond(space.summary[u, 0], largest, S // 2)
-            if family == 0 and tables.inlined[u, EXPONENT] == 0.0:
-                beyond += 0.01 * _hidden_kink(problem, state, space, u, largest, fresh)
-            if beyond == 0.0:
-                continue
-            ripple = sizes(tables.ripple[family, level, u], state.x, 2 * n)
-            stiffness = tables.exponent[u] * largest / max(deepest, 1e-300)
-            error += abs(tables.mobility[s, u]) * h * (beyond + 0.1 * stiffness * ripple)
-        worst = max(worst, error)
-    return max(worst, _signal_error(problem, tables, space, family, h)) if problem.table_dt.size else worst
+            error = max(error, 0.0) + abs(tables.mobility[s, u]) * space.beyond[u]
+        error /= rtol * space.scale[s]
+        if not error <= worst:
+            worst = error
+    return worst
 
 
 @inner
@@ -143,20 +177,17 @@ def _beyond(coefficients, largest, power):
 
 
 @inner
-def _signal_error(problem, tables, space, family, h):
-    """The same for the sampled signals, which an entry step integrates at half the order."""
-    power, worst = S // 2 if family == 0 else 1, 0.0
-    for s in range(problem.gap.size):
-        error = 0.0
-        for j in range(problem.table_dt.size):
-            load = problem.table_load[j]
-            values, largest = space.force[problem.gap.size + load], 0.0
-            for i in range(S):
-                largest = max(largest, abs(values[i]))
-            combine(tables.tail[family], values, S, None, space.trial)
-            error += abs(tables.direct[s, load]) * h * _beyond(space.trial, largest, power)
-        worst = max(worst, error)
-    return worst
+def _signal_error(problem, tables, space, family, h, s):
+    """The same of one stop for the sampled signals, which an entry step integrates at half the order."""
+    power, error = S // 2 if family == 0 else 1, 0.0
+    for j in range(problem.table_dt.size):
+        load = problem.table_load[j]
+        values, largest = space.force[problem.gap.size + load], 0.0
+        for i in range(S):
+            largest = max(largest, abs(values[i]))
+        combine(tables.tail[family], values, S, None, space.trial)
+        error += abs(tables.direct[s, load]) * h * _beyond(space.trial, largest, power)
+    return error
 
 
 @inner
@@ -179,23 +210,6 @@ def arrive(problem, tables, state, space, family, level):
 
 
 @inner
-def leaves_piece(problem, tables, state, space, family, level):
-    """Whether any stop crosses a border of its piece at a node or the end of the step."""
-    for s in range(problem.gap.size):
-        piece = state.piece[s]
-        if piece == 0:
-            respond(problem, tables, state, space, family, level, s)
-        upper = problem.levels[s, piece]
-        lower = problem.levels[s, piece - 1] if piece > 0 else -np.inf
-        if not lower <= indentation(problem, s, space.x_new) <= upper:
-            return True
-        for i in range(S):
-            if not lower <= space.motion[s, 0, i] <= upper:
-                return True
-    return False
-
-
-@inner
 def finish_step(problem, tables, state, space, family, level):
     """Move the state to the end of the step; ledger and peaks of the contacts."""
     stops, size = problem.gap.size, 2 * problem.k.size
@@ -203,13 +217,11 @@ def finish_step(problem, tables, state, space, family, level):
     copy(space.x_new, state.x, size)
     for s in range(stops):
         if state.piece[s] > 0:
-            impulses = eight(tables.weights[family], 0) * eight(space.force[s], 0)
+            weights = tables.weights[family] if family == 0 or s == family - 1 else tables.plain[family]
+            impulses = eight(weights, 0) * eight(space.force[s], 0)
             state.x[size + 2 + 2 * s] += h * total(impulses * eight(space.motion[s, 1], 0))
             state.x[size + 3 + 2 * s] += h * total(impulses)
-            combine(tables.summary[family], space.motion[s, 0], S, None, space.summary[s, 1])
-            for column, values, d in ((PEAK_FORCE, space.force[s], 0), (PEAK_DELTA, space.motion[s, 0], 1)):
-                known = state.open[s, column]
-                state.open[s, column] = peak(tables, family, values, space.summary[s, d], known, space.trial)
+            step_peaks(problem, tables, state, space, family, h, s, 1.0)
     state.now[T] += h
 
 

@@ -20,6 +20,8 @@ from solvers.kernels import kernel
 S = 8  # nodes of a contact step: 6 is a little faster at 1e-6, 10 and 12 bring nothing
 _CHECKED = (np.arange(24) + 0.5) / 24  # places between the nodes where their interpolant is compared
 PHASES = np.geomspace(1e-2, 1e4, 600)  # ω h
+LOCAL = -np.cos(np.pi * np.arange(S) / (S - 1))  # points of an interval, its ends among them, where a summit is sought
+MONOMIALS = np.ascontiguousarray(np.linalg.inv(np.vander(LOCAL, increasing=True)).T)
 
 
 @kernel
@@ -72,9 +74,11 @@ class Families(NamedTuple):
     nodes: Any  # (f, S), as the rest in `Tables`
     times: Any
     weights: Any
+    plain: Any
     summary: Any
     tail: Any
-    monomials: Any
+    zoom: Any
+    places: Any
     extend: Any
     lagrange: Any  # (f, 2, S) weights of the Lagrange polynomials, plain and divided by the force's weight
     alias: Any  # (f, P) largest error between the nodes of the interpolant of e^{iωt}, at `PHASES`
@@ -93,9 +97,11 @@ def families_of(exponents: tuple[float, ...], jumps: tuple[bool, ...]) -> Famili
         nodes=np.array([f.nodes for f in found]),
         times=np.array([f.nodes**f.power for f in found]),
         weights=np.array([f.weights for f in found]),
+        plain=np.array([_plain_weights(f) for f in found]),
         summary=np.ascontiguousarray([_summary(f) for f in found]),
         tail=np.ascontiguousarray([_tail(f.nodes) for f in found]),
-        monomials=np.ascontiguousarray(np.linalg.inv(np.vander(2.0 * found[0].nodes - 1.0, increasing=True)).T),
+        zoom=np.ascontiguousarray([[_zoom(f, *bracket) for bracket in _brackets(f)] for f in found]),
+        places=np.array([_brackets(f) for f in found]),
         extend=np.ascontiguousarray([_extensions(f, found[0]) for f in found]),
         lagrange=np.array([_weights(f.nodes) * [np.ones(S), f.nodes ** (-2.0 * f.exponent)] for f in found]),
         alias=np.array([_alias(f) for f in found]),
@@ -106,11 +112,39 @@ def _summary(family: _Family) -> Any:
     """(S, 8): last four coefficients, values and slopes dF/dσ at start and end, from node values."""
     rows = np.zeros((8, S))
     rows[:4] = family.spectrum[-4:]
-    ends = _interpolation(family.nodes, np.array([0.0, 1.0]))
-    if family.exponent == 0.0:
-        rows[4:6], rows[6:8] = ends, ends @ _differentiation(family.nodes)
-    else:
-        rows[5] = ends[1] * family.nodes ** (-2.0 * family.exponent)
+    rows[4:6] = _interpolation(family.nodes, np.array([0.0, 1.0]))
+    rows[6:8] = rows[4:6] @ _differentiation(family.nodes)
+    if family.exponent:
+        rows[4], rows[5] = 0.0, rows[5] * family.nodes ** (-2.0 * family.exponent)
+    return rows.T
+
+
+def _plain_weights(family: _Family) -> Any:
+    """(S,) Σ weights × values = ∫ (polynomial through the values) dt/h, without the force's weight σ^{2 exponent}."""
+    points, weights = gauss(12)
+    return (weights * family.power * points ** (family.power - 1.0)) @ _interpolation(family.nodes, points)
+
+
+def _brackets(family: _Family) -> Any:
+    """(S, 2) beginning and end of the interval between the neighbours of every node."""
+    begin = 0.0 if family.power == 1.0 else 0.5 * family.nodes[0]  # an entry has no node near its begin
+    ends = np.concatenate(([begin], family.nodes, [1.0]))
+    return np.column_stack((ends[:-2], ends[2:]))
+
+
+def _zoom(family: _Family, begin: float, end: float) -> Any:
+    """(2S, 2S): δ and h δ̇ at the points `LOCAL` of [begin, end] from those at the nodes, by Hermite interpolation."""
+    x, y = family.nodes, begin + 0.5 * (LOCAL + 1.0) * (end - begin)
+    basis, turn = _interpolation(x, y), _differentiation(x)
+    slopes, own = basis @ turn, np.diag(turn)
+    apart = y[:, None] - x
+    by_value, by_slope = (1.0 - 2.0 * own * apart) * basis**2, apart * basis**2
+    rates = [
+        -2.0 * own * basis**2 + 2.0 * (1.0 - 2.0 * own * apart) * basis * slopes,
+        basis**2 + 2.0 * apart * basis * slopes,
+    ]
+    pace_x, pace_y = (family.power * place ** (family.power - 1.0) for place in (x, y))  # dt/(h dσ)
+    rows = np.block([[by_value, by_slope * pace_x], [rates[0] / pace_y[:, None], rates[1] * pace_x / pace_y[:, None]]])
     return rows.T
 
 

@@ -120,8 +120,8 @@ def _c_function(outputs):
     return call
 
 
-_call_force = _c_function(1)
-_call_gradient = _c_function(3)
+call_force = _c_function(1)
+call_gradient = _c_function(3)
 
 
 @inlined
@@ -135,7 +135,7 @@ def contact_forces(problem, stop, delta, delta_dot, entry_rate, force):
 @inlined
 def law_forces(problem, stop, n, delta, delta_dot, entry_rate, force):
     """The law of one stop on the first n indentations, none of them below the surface."""
-    _call_force(problem.law[stop], n, delta, delta_dot, entry_rate, problem.parameters[stop], (force,))
+    call_force(problem.law[stop], n, delta, delta_dot, entry_rate, problem.parameters[stop], (force,))
 
 
 @inner
@@ -144,7 +144,7 @@ def contact_gradient(problem, stop, delta, delta_dot, entry_rate, by_delta, by_r
     for i in range(delta.size):
         delta[i] = max(delta[i], 0.0)
     results = (by_delta, by_rate, by_entry)
-    _call_gradient(problem.gradient[stop], delta.size, delta, delta_dot, entry_rate, problem.parameters[stop], results)
+    call_gradient(problem.gradient[stop], delta.size, delta, delta_dot, entry_rate, problem.parameters[stop], results)
 
 
 @inlined

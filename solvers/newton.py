@@ -72,7 +72,7 @@ def substitute(matrix, pivots, n, x):
 
 
 @inner
-def newton(problem, tables, state, space, family, level, accuracy):
+def newton(problem, tables, state, space, family, level):
     """Newton's method for the forces, where a stiff or strongly damped law defeats the plain iteration."""
     stops = problem.gap.size
     for _ in range(MOST_ITERATIONS):
@@ -88,16 +88,19 @@ def newton(problem, tables, state, space, family, level, accuracy):
         n = linearise(problem, tables, state, space, family, level)
         factorise(space.jacobian, space.pivots, n)
         substitute(space.jacobian, space.pivots, n, space.residual)
-        change, largest, row = 0.0, 0.0, 0
+        found, row = True, 0
         for s in range(stops):
-            if state.piece[s] > 0:
-                for i in range(S):
-                    space.force[s, i] += space.residual[row + i]
-                    change = max(change, abs(space.residual[row + i]))
-                    largest = max(largest, abs(space.force[s, i]))
-                row += S
-        if not change < np.inf:
-            return False
-        if change <= accuracy or change <= 1e-14 * largest:
+            if state.piece[s] == 0:
+                continue
+            change, largest = 0.0, 0.0
+            for i in range(S):
+                space.force[s, i] += space.residual[row + i]
+                change += abs(space.residual[row + i])
+                largest = max(largest, abs(space.force[s, i]))
+            if not change < np.inf:
+                return False
+            found &= change <= max(space.accuracy[s], 1e-14 * largest)
+            row += S
+        if found:
             return True
     return False

@@ -1,22 +1,18 @@
-"""Largest indentation and force of a contact, from the node values of its steps."""
+"""Largest indentation and force of a contact: maxima of what each step knows of them, not of its nodes.
+
+Around the highest node of a step, between its neighbours, δ and δ̇ at eight points follow from δ and δ̇ at all nodes by
+Hermite's polynomial of degree 15, and the forces there from the law. The maximum of the polynomial through these points
+differs from that of the motion by less than the motion does from the exact one.
+"""
 
 from __future__ import annotations
 
-from solvers.families import S
-from solvers.kernels import contact_forces, dot, indentation, inlined, inner, maxima
+from solvers.families import LOCAL, MONOMIALS, S
+from solvers.kernels import contact_forces, copy, dot, indentation, inlined, inner
 from solvers.state import PEAK_DELTA, PEAK_FORCE
 from solvers.vector import combine
 
 _MOST = 6  # steps to a summit
-
-
-@maxima
-def top(values):
-    """The largest of node values, or 0."""
-    best = 0.0
-    for i in range(S):
-        best = max(best, values[i])
-    return best
 
 
 @inlined
@@ -30,25 +26,35 @@ def _local(coefficients, x):
     return value, slope, curvature
 
 
-@inner
-def _summit(tables, values, ends, coefficients):
-    """Maximum of the polynomial around its highest node; ``ends`` are its values at -1 and 1.
+@inlined
+def _guess(values, place):
+    """Summit of the parabola through a point of `LOCAL` and its neighbours, and the neighbours; an end stays."""
+    if place == 0 or place == S - 1:
+        return LOCAL[place], LOCAL[max(place - 1, 0)], LOCAL[min(place + 1, S - 1)]
+    low, b, high = LOCAL[place - 1], LOCAL[place], LOCAL[place + 1]
+    rise, fall = (b - low) * (values[place] - values[place + 1]), (high - b) * (values[place] - values[place - 1])
+    x = b if rise + fall == 0.0 else b - 0.5 * ((b - low) * rise - (high - b) * fall) / (rise + fall)
+    return min(max(x, low), high), low, high
 
-    From the summit of the parabola through that node and its neighbours Newton's method for the slope goes on; the
+
+@inner
+def summit(values, limit, coefficients):
+    """Maximum on [-1, limit] of the polynomial through the values at `LOCAL`, around the highest of these.
+
+    From the summit of the parabola through that point and its neighbours Newton's method for the slope goes on; the
     local parabola's summit is off by the third power of its last step.
     """
     place = 0
     for i in range(S):
-        if values[i] > values[place]:
+        if values[i] > values[place] and LOCAL[i] <= limit:
             place = i
-    combine(tables.monomials, values, S, None, coefficients)
-    nodes, b = tables.nodes[0], 2.0 * tables.nodes[0, place] - 1.0
-    low, left = (2.0 * nodes[place - 1] - 1.0, values[place - 1]) if place > 0 else (-1.0, ends[0])
-    high, right = (2.0 * nodes[place + 1] - 1.0, values[place + 1]) if place < S - 1 else (1.0, ends[1])
-    rise, fall = (b - low) * (values[place] - right), (high - b) * (values[place] - left)
-    x = b if rise + fall == 0.0 else b - 0.5 * ((b - low) * rise - (high - b) * fall) / (rise + fall)
-    x = min(max(x, low), high)
+    combine(MONOMIALS, values, S, None, coefficients)
     best = values[place]
+    if limit < 1.0:
+        best = max(best, _local(coefficients, limit)[0])
+    x, low, high = _guess(values, place)
+    high = min(high, limit)
+    x = min(x, high)
     for _ in range(_MOST):
         value, slope, curvature = _local(coefficients, x)
         best = max(best, value)
@@ -61,31 +67,63 @@ def _summit(tables, values, ends, coefficients):
     return best
 
 
-@inner
-def peak(tables, family, values, summary, known, coefficients):
-    """Largest value of the polynomial through the node values, if it exceeds the known peak."""
-    highest = top(values)
-    best = max(known, highest, summary[4], summary[5])
-    if family > 0 or highest < 0.95 * known or (highest == values[0] and summary[6] <= 0.0):
-        return best
-    if highest == values[S - 1] and summary[7] >= 0.0:
-        return best
-    return max(best, _summit(tables, values, summary[4:6], coefficients))
+@inlined
+def _highest(tables, values, family, limit):
+    """Place of the largest node value up to σ = limit, or -1."""
+    place = -1
+    for i in range(S):
+        if tables.nodes[family, i] <= limit and (place < 0 or values[i] > values[place]):
+            place = i
+    return place
 
 
 @inner
-def peaks_so_far(problem, tables, state, space, family, share, x):
-    """Peaks of the contacts when the run ends at ``x``, within a step of which the ``share`` lies behind."""
+def _around(problem, tables, state, space, family, h, s, place):
+    """Indentations, rates and forces of stop s around a node, into ``space.around``."""
+    around, motion, known = space.around, space.motion[s], space.around[3]
+    copy(motion[0], known, S)
+    for i in range(S):
+        known[S + i] = h * motion[1, i]
+    combine(tables.zoom[family, place], known, 2 * S, None, around[0])
+    for i in range(S):
+        around[1, i] = around[0, S + i] / h
+    contact_forces(problem, s, around[0, :S], around[1, :S], state.entry_rate[s], around[2, :S])
+
+
+@inner
+def step_peaks(problem, tables, state, space, family, h, s, limit):
+    """Raise the peaks of stop s by a converged step of length h, up to its place σ = limit."""
+    combine(tables.summary[family], space.motion[s, 0], S, None, space.summary[s, 1])
+    seen = -1
+    for column, values, d in ((PEAK_FORCE, space.force[s], 0), (PEAK_DELTA, space.motion[s, 0], 1)):
+        known, slopes = state.open[s, column], space.summary[s, d]
+        place = _highest(tables, values, family, limit)
+        if place >= 0:
+            state.open[s, column] = max(known, values[place])
+        if limit >= 1.0:
+            if values[place] < 0.95 * known or (place == S - 1 and slopes[7] >= 0.0):
+                continue  # lower, or still rising at the end, where the next step begins
+            if place == 0 and slopes[6] <= 0.0 and known >= slopes[4]:
+                continue  # falling from its begin
+        place = max(place, 0)
+        if seen != place:
+            _around(problem, tables, state, space, family, h, s, place)
+            seen = place
+        begin, end = tables.places[family, place]
+        within = min(2.0 * (limit - begin) / (end - begin) - 1.0, 1.0)
+        if within > -1.0:
+            best = summit(space.around[2] if d == 0 else space.around[0], within, space.trial)
+            state.open[s, column] = max(state.open[s, column], best)
+
+
+@inner
+def state_peaks(problem, state, space, x):
+    """Raise the peaks of all stops in contact by their indentations and forces in the state x."""
+    batch = space.trial
     for s in range(problem.gap.size):
-        if state.piece[s] == 0:
-            continue
-        space.clipped[0] = indentation(problem, s, x)
-        space.clipped[1] = dot(problem.read_rate[s], x, 2 * problem.k.size)
-        delta = space.clipped[0]
-        contact_forces(*(problem, s, space.clipped[0:1], space.clipped[1:2], state.entry_rate[s], space.trial[0:1]))
-        force = space.trial[0]
-        for i in range(S):
-            if tables.times[family, i] <= share:
-                delta, force = max(delta, space.motion[s, 0, i]), max(force, space.force[s, i])
-        state.open[s, PEAK_DELTA] = max(state.open[s, PEAK_DELTA], delta)
-        state.open[s, PEAK_FORCE] = max(state.open[s, PEAK_FORCE], force)
+        if state.piece[s] > 0:
+            batch[0] = indentation(problem, s, x)
+            batch[1] = dot(problem.read_rate[s], x, 2 * problem.k.size)
+            state.open[s, PEAK_DELTA] = max(state.open[s, PEAK_DELTA], batch[0])
+            contact_forces(problem, s, batch[0:1], batch[1:2], state.entry_rate[s], batch[2:3])
+            state.open[s, PEAK_FORCE] = max(state.open[s, PEAK_FORCE], batch[2])

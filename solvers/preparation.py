@@ -16,7 +16,7 @@ from solvers.kernels import INTEGERS, MATRIX, PROBLEM, REAL, VECTOR, Problem
 from solvers.response import Space
 from solvers.state import STATE, State, begin_state, problem_of, state_shapes
 from solvers.system import Array, System
-from solvers.tables import OF_TONES, Tables, build, doublings, fill_tones
+from solvers.tables import OF_TONES, Tables, build, doublings, fill_tones, known_of
 from solvers.vector import padded
 
 
@@ -28,12 +28,17 @@ def _arrays(*dimensions: int) -> list[Any]:
 TABLES = types.NamedTuple(
     [
         *_arrays(1, 3, 4, 2, 3, 2, 3, 2, 2, 2, 2, 0, 2, 1, 2),
-        *_arrays(1, 3, 2, 2, 2, 3, 3, 2, 5, 6, 5, 4, 2, 2, 2, 2, 4),
+        *_arrays(1, 3, 2, 2, 2, 2, 3, 3, 4, 3, 5, 6, 5, 4, 2, 2, 2, 2, 4),
+        *(VECTOR, INTEGERS, INTEGERS, MATRIX),
     ],
     Tables,
 )
 SPACE = types.NamedTuple(
-    [*_arrays(1, 2, 2, 1, 1, 1, 1, 2, 3, 1, 3, 2, 1, 3, 2, 3, 2, 1), INTEGERS, MATRIX, VECTOR, INTEGERS], Space
+    [
+        *(*_arrays(1, 2, 2, 1, 1, 1, 1, 2, 3, 1, 3, 2, 1, 3, 2, 3, 2, 1), INTEGERS, MATRIX),
+        *(*_arrays(1, 1, 1, 1, 2, 1, 1, 1, 1), INTEGERS),
+    ],
+    Space,
 )
 
 
@@ -140,8 +145,7 @@ class _Skeleton:
         self.places = [slice(end - len(rows), end) for rows, end in zip(read_by, ends, strict=True)]
         self.back, self.fastest = among_tones(system.blocks.T, self.tones), max(float(_speeds(system).max()), 1e-3)
         ledger = np.zeros_like(problem.load), problem.power, among_tones(loss, self.tones)
-        inlined = np.array([getattr(law, "inlined", None) or (0.0,) * 4 for law in laws]).reshape(-1, 4)
-        tables = build(problem, self.tones, *self.kinds, inlined, dt_cell, ledger)
+        tables = build(problem, self.tones, *self.kinds, known_of(laws), dt_cell, ledger)
         self.layout = _layout(len(problem.gap), len(problem.load), len(problem.k), len(forcing.table_dt))
         self.problem = Mould(problem, PROBLEM, ("gap", "k", "read", "read_rate", "power"))
         self.tables = Mould(tables, TABLES, OF_TONES)
@@ -204,7 +208,8 @@ def _layout(stops: int, loads: int, blocks: int, signals: int) -> Layout:
         *((padded(width),), (7, padded(size)), (signals, 6), (7,), (blocks,), (loads,), (stops,)),
         (2, padded(blocks)),
         *((stops, 2, S), (S,), (stops, 2, S), (stops + loads, S), (S,), (stops, 2, 8), (stops, S), (stops, 3, S)),
-        *((stops * S, stops * S), (stops * S,), (stops * S,), (18, padded(width + 2)), (2 + stops,), (6,)),
+        *((stops * S, stops * S), (stops * S,), (stops * S,), (18, padded(width + 2))),
+        *((stops,), (stops,), (stops,), (stops,), (4, 2 * S), (stops,), (S + 2,), (1,), (1,), (6,)),
     ]
     return Layout([STATE, SPACE], [state_shapes(width, stops), space])
 

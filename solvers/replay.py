@@ -48,10 +48,10 @@ from solvers.kernels import (
     inner,
     rhs,
 )
+from solvers.landing import regular_step
 from solvers.ledger import inside
 from solvers.newton import factorise, linearise, substitute
 from solvers.preparation import SPACE, TABLES
-from solvers.regular import regular_step
 from solvers.response import free_response, respond
 from solvers.state import (
     BEGAN,

@@ -34,8 +34,16 @@ class Space(NamedTuple):
     residual: Any  # (m S,)
     pivots: Any  # (m S,)
     work: Any  # (18, x.size + 2 padded) of the Runge–Kutta steps
-    numbers: Any  # (2 + m,) see `solvers.exponential`
-    last: Any  # (6,)
+    scale: Any  # (m,) m/s: a step's error in an indentation rate is measured in rtol × scale
+    share: Any  # (m,) of the duration of a contact of each stop that its first step may take; 0: not known yet
+    accuracy: Any  # (m,) N: change of a force within which it counts as found
+    beyond: Any  # (m,) N s: impulse that a step's polynomials leave out
+    around: Any  # (4, 2S) see `solvers.peaks`
+    side: Any  # (m,) sign of the side of its bend on which each stop is
+    sides: Any  # (S + 2,) see `solvers.watch`
+    reach: Any  # (1,) radians of the fastest block that a landing may take
+    duration: Any  # (1,) s, that of the contact begun last, if it were free
+    last: Any  # (6,) see `solvers.contact_step`
 
 
 @inner

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from numba import types
 from solvers.forcing import Forcing
 from solvers.kernels import INTEGERS, MATRIX, VECTOR, Problem, dot, indentation, inlined, inner, kernel, sizes
 from solvers.result import Status
-from solvers.system import Array, System
+from solvers.system import Array, Law, System
 
 STATUSES = list(Status)
 DONE, RUNNING, STEP_TOO_SMALL, DIVERGED, CHATTER, LOG_FULL, LAW_NOT_FINITE, GAINED = (
@@ -249,7 +250,12 @@ def _problem(system: System, forcing: Forcing, linear: dict[str, Array]) -> Prob
 
 def law_parameters(system: System) -> Array:
     """Parameters of the laws (m, P), padded by zeros."""
-    parameters = [np.asarray(c.law.parameters, dtype=float) for c in system.contacts]
+    return parameters_of([contact.law for contact in system.contacts])
+
+
+def parameters_of(laws: Sequence[Law]) -> Array:
+    """Parameters of laws (m, P), padded by zeros."""
+    parameters = [np.asarray(law.parameters, dtype=float) for law in laws]
     table = np.zeros((len(parameters), max([p.size for p in parameters], default=1)))
     for row, own in zip(table, parameters, strict=True):
         row[: own.size] = own

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections import OrderedDict
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -20,6 +21,7 @@ import numpy as np
 from solvers.families import PHASES, Families, S, families_of, gauss, lagrange
 from solvers.kernels import Problem, inner, kernel
 from solvers.polynomials import signal_responses
+from solvers.state import parameters_of
 from solvers.vector import padded
 
 STIFFNESS, EXPONENT, FACTOR, DAMPING = range(4)  # of an inlined law
@@ -53,9 +55,11 @@ class Tables(NamedTuple):
     nodes: Any  # (f, S) σ
     times: Any  # (f, S) σ^κ
     weights: Any  # (f, S): ∫F dt = h Σ weights F
+    plain: Any  # (f, S): the same of a force without the weight σ^{2p}
     summary: Any  # (f, S, 8): from node values, the last four Jacobi coefficients, both ends' values, both slopes
     tail: Any  # (f, S, 8): from node values of a signal, the last four Legendre coefficients in σ
-    monomials: Any  # (S, S): from values at smooth nodes, the coefficients of the powers of 2σ - 1
+    zoom: Any  # (f, S, 2S, 2S): δ and h δ̇ at points around a node from those at all nodes
+    places: Any  # (f, S, 2): the interval of σ these points span
     free: Any  # (f, j, m, 2N, 2S): δ and δ̇ at the nodes from the state
     forced: Any  # (f, j, m, m + L, S, 2S): the same from the forces and signals at the nodes
     kick: Any  # (f, j, m + L, S, 2N padded): state change at the end
@@ -65,6 +69,33 @@ class Tables(NamedTuple):
     loss_rows: Any  # (r, 2N): damping power = Σ (row·z)²
     gauss: Any  # (2, 8) points and weights on (0, 1) for the energy ledger
     extend: Any  # (f, 5, S, S): the force on the next smooth step, 2^{(i-2)/2} times shorter, from that of the last
+    bend: Any  # (m,) kind of the law's bend, see `solvers.watch`
+    uncut: Any  # (m,) addresses of the laws without their cut at F = 0, and of their derivatives
+    uncut_gradient: Any
+    uncut_parameters: Any  # (m, P)
+
+
+class Known(NamedTuple):
+    """What the tables hold of the laws."""
+
+    inlined: Any
+    bend: Any
+    uncut: Any
+    uncut_gradient: Any
+    uncut_parameters: Any
+
+
+def known_of(laws: Sequence[Any]) -> Known:
+    """The same of given laws; see `solvers.system.Law`."""
+    bends = [getattr(law, "bend", None) for law in laws]
+    uncut = [law.uncut if bend == "force" else law for law, bend in zip(laws, bends, strict=True)]
+    return Known(
+        np.array([getattr(law, "inlined", None) or (0.0,) * 4 for law in laws]).reshape(-1, 4),
+        np.array([(None, "rate", "force").index(bend) for bend in bends], dtype=float),
+        np.array([law.address for law in uncut], dtype=np.int64),
+        np.array([law.gradient_address for law in uncut], dtype=np.int64),
+        parameters_of(uncut),
+    )
 
 
 @kernel
@@ -247,7 +278,7 @@ def build(
     tones: int,
     exponents: list[float],
     jumps: list[bool],
-    inlined: Any,
+    laws: Known,
     dt_cell: float,
     ledger: tuple[Any, Any, Any],
 ) -> Tables:
@@ -276,15 +307,17 @@ def build(
         fastest=fastest,
         mobility=-problem.read_rate @ problem.push.T,
         exponent=np.array(exponents, dtype=float),
-        inlined=inlined,
+        **laws._asdict(),
         step=contact_h,
         step_propagator=blocks.step_propagator,
         nodes=families.nodes,
         times=families.times,
         weights=families.weights,
+        plain=families.plain,
         summary=families.summary,
         tail=families.tail,
-        monomials=families.monomials,
+        zoom=families.zoom,
+        places=families.places,
         free=blocks.free,
         forced=blocks.forced,
         kick=blocks.kick,
