@@ -90,7 +90,7 @@ def solve_forces(problem, tables, state, space, family, level, rtol):
             change, largest = _iterate(problem, tables, state, space, family, level)
         if not change < np.inf:
             return False
-        settled, change = change <= 1e-30 * largest, math.sqrt(change)
+        settled, change = change <= 1e-27 * largest, math.sqrt(change)
         if iteration == 0:
             before = change / 0.3  # as iterations usually go
         # changes that shrink by r = change/before, taken as 0.9 at most, add up to change r/(1 - r) from here on
@@ -108,6 +108,15 @@ def _top(values):
     best = 0.0
     for i in range(S):
         best = max(best, values[i])
+    return best
+
+
+@inlined
+def _fastest(rates):
+    """Largest size of node values."""
+    best = 0.0
+    for i in range(S):
+        best = max(best, abs(rates[i]))
     return best
 
 
@@ -142,7 +151,7 @@ def step_error(problem, tables, state, space, family, level, fresh, rtol):
         error = _signal_error(problem, tables, space, family, h, s) if problem.table_dt.size else 0.0
         for u in range(stops):
             error = max(error, 0.0) + abs(tables.mobility[s, u]) * space.beyond[u]
-        error /= rtol * space.scale[s]
+        error /= rtol * max(space.scale[s], _fastest(space.motion[s, 1]))
         if not error <= worst:
             worst = error
     return worst

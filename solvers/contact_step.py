@@ -13,7 +13,7 @@ import numpy as np
 from solvers.collocation import arrive, contact_time, finish_step, solve_forces, step_error
 from solvers.families import S
 from solvers.flight import energy_norms
-from solvers.kernels import contact_forces, copy, dot, indentation, inlined, inner, merged
+from solvers.kernels import contact_forces, copy, dot, indentation, inlined, inner, merged, rhs
 from solvers.landing import land, land_on_bend
 from solvers.ledger import account, inside
 from solvers.peaks import state_peaks, step_peaks
@@ -31,6 +31,7 @@ from solvers.state import (
     T_IN,
     TAPED,
     T,
+    rate_tolerance,
     surface_tolerance,
     switch,
     switch_on_surface,
@@ -44,7 +45,7 @@ LEVEL, FAMILY, FRESH, STOP, WANTED, BEGUN = range(6)  # places in Space.last
 ENTRY, PIECE = 1, 2  # values of FRESH: the first step of a contact, or of a piece of its law; 0 for others
 _GOAL = 0.3  # error aimed at, in units of the tolerance
 _ORDER = 15.0  # the error estimate falls like h^15
-_LEAST = 1e-250  # m/s, of a reference speed
+_LEAST = 1e-60  # m/s, of a reference speed
 
 
 @inner
@@ -90,6 +91,23 @@ def _entry_nodes(problem, tables, state, stop, level):
             if indentation(problem, s, state.x) <= while_ago * rate + 4.0 * surface_tolerance(problem, s, state.x):
                 found = 1 + s
     return found
+
+
+@inner
+def _pressed(problem, state, log):
+    """Switch every open stop at rest on its surface that the forces of others press; whether any did."""
+    switched = False
+    for s in range(problem.gap.size):
+        if state.piece[s] > 0 or abs(indentation(problem, s, state.x)) > surface_tolerance(problem, s, state.x):
+            continue
+        if abs(dot(problem.read_rate[s], state.x, 2 * problem.k.size)) > rate_tolerance(problem, s, state.x):
+            continue
+        batch = state.open[s, :3]  # of a contact not begun yet
+        rhs(problem, state.now[T], state.x, state.piece, state.entry_rate, state.rate, batch)
+        if dot(problem.read_rate[s], state.rate, 2 * problem.k.size) > 0.0:
+            switch(problem, state, s, np.int64(1), log)
+            switched = True
+    return switched
 
 
 @inlined
@@ -214,6 +232,9 @@ def touch(problem, tables, state, space, t_end, rtol, log, out, due, ledger):
     if near <= 0.0 and switch_on_surface(problem, state, log, True):
         if touching(state):
             begin(problem, tables, state, space, latest(state))
+        return RUNNING
+    if last[FRESH] == ENTRY and _pressed(problem, state, log):
+        begin(problem, tables, state, space, latest(state))
         return RUNNING
     if stop >= 0:
         stop, direction = _land_first(

@@ -20,7 +20,7 @@ from solvers.dormand_prince import E5, STAGES, A
 from solvers.kernels import contact_forces, copy, dot, indentation, inlined, inner, table_value
 from solvers.ledger import powers
 from solvers.peaks import state_peaks
-from solvers.state import CALLS, LANDING, PEAK_DELTA, PEAK_FORCE, SAMPLED, T, surface_tolerance, tape
+from solvers.state import CALLS, LANDING, PEAK_DELTA, PEAK_FORCE, SAMPLED, T, rate_tolerance, surface_tolerance, tape
 from solvers.vector import combine
 from solvers.watch import FREE, on_the_way, side_at
 
@@ -182,7 +182,8 @@ def land(problem, tables, state, space, stop, direction, near, rtol, t_end, out,
     delta, furthest = indentation(problem, stop, state.x), space.reach[0] / tables.fastest
     level = problem.levels[stop, state.piece[stop] - (1 if direction < 0 else 0)]
     leaving = direction < 0 and state.piece[stop] == 1
-    if near > furthest:
+    rate = dot(problem.read_rate[stop], state.x, 2 * problem.k.size)
+    if near > furthest or abs(rate) <= rate_tolerance(problem, stop, state.x):
         return -1
     if leaving and delta > _LAST * state.open[stop, PEAK_DELTA]:
         return -1
@@ -195,7 +196,8 @@ def land(problem, tables, state, space, stop, direction, near, rtol, t_end, out,
     span = -w[size + 1] if variable == ROOT else level - delta
     _step(problem, tables, state, space, variable, stop, span, ledger)
     landed = x[size]
-    if not (t <= landed <= t + min(4.0 * near, furthest) + surface_time(problem, state, stop)):
+    width = surface_tolerance(problem, stop, state.x) / abs(rate)  # a distance may be that much rounding
+    if not t <= landed <= t + min(4.0 * near, furthest) + width:
         return -1
     if not (
         _error(problem, space, rtol) <= 1.0
@@ -207,13 +209,6 @@ def land(problem, tables, state, space, stop, direction, near, rtol, t_end, out,
         return max(other, -1)
     done = _accept(problem, tables, state, space, variable, stop, span, t_end, out, due, ledger)
     return stop if done else -1
-
-
-@inlined
-def surface_time(problem, state, stop):
-    """Time in which a stop crosses the width of its surface: what a landing may differ from a distance in rounding."""
-    rate = abs(dot(problem.read_rate[stop], state.x, 2 * problem.k.size))
-    return surface_tolerance(problem, stop, state.x) / rate if rate > 0.0 else 0.0
 
 
 @inner

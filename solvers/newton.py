@@ -99,7 +99,7 @@ def newton(problem, tables, state, space, family, level):
                 largest = max(largest, abs(space.force[s, i]))
             if not change < np.inf:
                 return False
-            found &= change <= max(space.accuracy[s], 1e-14 * largest)
+            found &= change <= max(space.accuracy[s], 3e-14 * largest)
             row += S
         if found:
             return True

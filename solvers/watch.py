@@ -174,7 +174,7 @@ def on_the_way(problem, tables, state, space, stop, w, x):
 
 @inlined
 def _force_turns(work, column, width, known):
-    """Whether a force, the impulse's rate over that of time, is largest at an inner stage of a landing, above ``known``."""
+    """Whether a force is largest at an inner stage of a landing, and above ``known``."""
     last = STAGES - 1 if work[STAGES - 1, width] != 0.0 else STAGES - 2
     highest, ends = known, max(work[0, column] / work[0, width], work[last, column] / work[last, width])
     for i in range(1, last):
