@@ -6,7 +6,7 @@ Inside a step the indentation is the polynomial of the method's dense output,
 
 import numpy as np
 
-from solvers.kernels import dot, indentation, inner
+from solvers.kernels import dot, indentation, inner, kernel
 from solvers.state import surface_tolerance
 
 # finer near 0, where a contact just left may come back
@@ -14,6 +14,8 @@ _NODES = np.array([0.0, 1 / 64, 1 / 32, 1 / 16, 1 / 8, 1 / 4, 3 / 8, 1 / 2, 5 / 
 GOLDEN = 0.6180339887498949
 UNRESOLVED = -1.0
 NONE = 2.0
+MOST_LANDINGS = 60
+"""Steps tried to land: where the level is only just reached Newton halves its distance, so does bisection."""
 IGNORED, HENON, LANDED = range(3)
 """What a method does about events: pieces follow at the end of a step; Hénon's step onto an entry; all landed on."""
 
@@ -81,6 +83,20 @@ def crossing(coefficients, rates, level, sign, tolerance):
                 return _root(coefficients, level, sign, _NODES[i - 1], top)
         last, rising = value, rises
     return NONE
+
+
+@kernel
+def nearer(h, distance, rate, before, beyond, longest):
+    """Duration to try after h has ended ``distance`` beyond a level, at ``rate``; -1 where none is known to land.
+
+    By Newton, or by halving where that leaves (before, beyond). ``beyond`` is a duration that ends beyond the level,
+    or ``longest`` where none is known: then there may be no landing.
+    """
+    guess = h - distance / rate
+    if before < guess < beyond:
+        return guess
+    middle = 0.5 * (before + beyond)
+    return middle if beyond < longest and before < middle < beyond else -1.0
 
 
 @inner

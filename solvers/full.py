@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from solvers.events import LANDED, NONE, UNRESOLVED
+from solvers.events import LANDED, MOST_LANDINGS, NONE, UNRESOLVED, nearer
 from solvers.forcing import Forcing
 from solvers.henon import hermite
 from solvers.kernels import kernel, rhs
@@ -100,7 +100,7 @@ class MatrixEngine:
             stop, direction = -1, 0
             if method.events == LANDED:
                 theta, stop, direction, level = find(self.problem, state, space)
-                h = self._landed(h, theta, stop, level)
+                h = self._landed(h, theta, stop, direction, level)
                 if h < 0.0:  # look closer
                     state.now[H_FLIGHT] = -h
                     state.count[REJECTED] += 1
@@ -121,25 +121,27 @@ class MatrixEngine:
             self.method.matrix_step(self, h)
         _interpolate(h, self.state, self.space)
 
-    def _landed(self, h: float, theta: float, stop: int, level: float) -> float:
-        """Duration of the step that ends on the event, by Newton; where that fails, minus the step to try."""
+    def _landed(self, longest: float, theta: float, stop: int, direction: int, level: float) -> float:
+        """Duration of the step that ends on the event; where none does, minus the step to try."""
         if theta == UNRESOLVED:
-            return -h / 32.0
+            return -longest / 32.0
         if theta >= NONE:
-            return h
-        tolerance, longest = landing_tolerance(self.problem, self.state, stop), 1.000001 * h
-        half, h = 0.5 * h, theta * h
-        for _ in range(12):
+            return longest
+        tolerance = landing_tolerance(self.problem, self.state, stop)
+        h, before, beyond = theta * longest, 0.0, longest
+        for _ in range(MOST_LANDINGS):
             self.attempt(h)
             x = self.space.x_new[: 2 * self.system.size]
-            distance = self.problem.read[stop] @ x - self.problem.gap[stop] - level
+            distance = direction * (self.problem.read[stop] @ x - self.problem.gap[stop] - level)
             if abs(distance) <= tolerance:
                 return h
-            corrected = h - distance / (self.problem.read_rate[stop] @ x)
-            if not 0.0 < corrected <= longest or corrected == h:
-                break
+            before, beyond = (h, beyond) if distance < 0.0 else (before, h)
+            rate = direction * (self.problem.read_rate[stop] @ x)
+            corrected = nearer(h, distance, rate, before, beyond, longest)
+            if not corrected > 0.0:
+                return h if abs(distance) <= 100.0 * tolerance else -0.5 * longest
             h = corrected
-        return h if abs(distance) <= 1e4 * tolerance else -half
+        return -0.5 * longest
 
     def _gains(self) -> bool:
         """Whether energy comes from nowhere."""

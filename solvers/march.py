@@ -16,11 +16,13 @@ from solvers.events import (
     HENON,
     IGNORED,
     LANDED,
+    MOST_LANDINGS,
     NONE,
     UNRESOLVED,
     coefficients_of,
     entry_by_sign,
     first_event,
+    nearer,
     polynomial,
 )
 from solvers.forcing import Forcing
@@ -188,25 +190,26 @@ def landing_tolerance(problem, state, stop):
 
 
 @inner
-def _land(step, problem, state, space, h, longest, stop, level, rtol, atol):
-    """Repeat the step with the duration that ends on ``level``: Newton on the true step; returns it, -1 if it fails."""
+def _land(step, problem, state, space, h, longest, stop, direction, level, rtol, atol):
+    """Repeat the step with the duration that ends on ``level``; returns it, -1 if none up to ``longest`` does."""
     tolerance = landing_tolerance(problem, state, stop)
-    longest *= 1.000001
-    for _ in range(12):
+    before, beyond = 0.0, longest
+    for _ in range(MOST_LANDINGS):
         _, calls = step(  # with so loose a tolerance that there is an interpolant, whatever the error
             *(problem, state.now[T], h, state.x, state.rate, state.piece, state.entry_rate),
             *(space.x_new, space.rate_new, space.dense, space.work, 1e300, atol),
         )
         state.count[CALLS] += calls
-        distance = indentation(problem, stop, space.x_new) - level
+        distance = direction * (indentation(problem, stop, space.x_new) - level)
         if abs(distance) <= tolerance:
             return h
-        corrected = h - distance / dot(problem.read_rate[stop], space.x_new, 2 * problem.k.size)
-        if not 0.0 < corrected <= longest or corrected == h:
-            break
+        before, beyond = (h, beyond) if distance < 0.0 else (before, h)
+        slope = direction * dot(problem.read_rate[stop], space.x_new, 2 * problem.k.size)
+        corrected = nearer(h, distance, slope, before, beyond, longest)
+        if not corrected > 0.0:  # a graze, off the surface by rounding or in need of a closer look
+            return h if abs(distance) <= 100.0 * tolerance else -1.0
         h = corrected
-    # a graze: Newton ends off the surface, but by less than the step's own error
-    return h if abs(distance) <= max(100.0, 1e14 * rtol) * tolerance else -1.0
+    return -1.0
 
 
 @inner
@@ -353,7 +356,7 @@ def march(
                 count[REJECTED] += 1
                 continue
             if theta < NONE:
-                h = _land(step, problem, state, space, theta * h, tried, stop, level, rtol, atol)
+                h = _land(step, problem, state, space, theta * h, tried, stop, direction, level, rtol, atol)
                 if h < 0.0:  # the interpolant crosses, the step does not: look closer
                     now[phase] = 0.5 * tried
                     count[REJECTED] += 1

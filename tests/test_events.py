@@ -184,6 +184,22 @@ def test_grazing_within_the_tolerance_ends_no_run(rtol):
     assert {run.status for run in runs} == {Status.DONE}
 
 
+GRAZES = np.geomspace(1e-15, 1e-9, 13)
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-8, 1e-10])
+def test_grazes_shift_no_time(rtol):
+    # where the surface is only just reached the state must be that of the time it is given: the rest is a cosine
+    apart = []
+    for depth in GRAZES:
+        system = System.modal([10.0], 0.0, [Contact([1.0], Hertz(1.0), 1.0 - depth)])
+        for phase in PHASES:
+            start = [math.cos(phase)], [-10 * math.sin(phase)]
+            run = integrate(system, *start, 0.1 * (3.7 - phase), method=DormandPrince(rtol))
+            apart.append(abs(run.q_dot[-1, 0] / 10 + math.sin(3.7)))
+    assert max(apart) < 5.0 * rtol
+
+
 # --- several stops ------------------------------------------------------------------------------------------------
 
 
