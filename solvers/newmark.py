@@ -23,6 +23,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from solvers.critical import newmark_oscillator
 from solvers.henon import hermite
 from solvers.kernels import add_loads, contact_forces, contact_gradient, copy, indentation, inner, kernel, rhs
 from solvers.kernels import dot as product
@@ -148,6 +149,11 @@ class _Family(ConstantStep):
     def takes_matrices(self, system: System) -> bool:
         """Sparse matrices, and damping that couples the modes, are stepped on as they are."""
         return system.sparse or system.blocks.loss.size > 0
+
+    def critical(self, M: Any, C: Any, K: Any) -> tuple[Array, Array]:
+        """A contact couples the modes even where they are stepped one by one."""
+        _, _, beta, gamma = self.constants
+        return newmark_oscillator(beta, gamma, M, C, K)
 
     @property
     def matrix_step(self) -> Any:

@@ -20,9 +20,10 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from solvers.critical import eigen_oscillators
 from solvers.events import IGNORED, LANDED
 from solvers.forcing import Forcing
-from solvers.system import Array, Contact, System, decouple
+from solvers.system import Array, Contact, System
 
 Radius = Callable[[float, float, float], float]
 """ρ(h, k, c): factor by which one step of size h multiplies a mode p'' + c p' + k p = 0."""
@@ -34,7 +35,10 @@ _SMALLEST, _LARGEST, _PER_DECADE = 1e-2, 1e2, 60  # range of hω searched; below
 
 
 class Limit(NamedTuple):
-    """Largest stable steps in s, in flight and with the stops in contact; the mode (0 the lowest) that sets each."""
+    """Largest stable steps in s, in flight and with the stops in contact; the mode (0 the lowest) that sets each.
+
+    A mode is -1 where one vector stands for all, as on sparse matrices.
+    """
 
     flight: float
     contact: float
@@ -108,27 +112,26 @@ def _below(stable: Callable[[float], bool], h: float) -> float:
     return 0.0
 
 
-def limit(radius: Radius, system: System, indentation: float | None = None, lasting: float = math.inf) -> Limit:
+def limit(method: ConstantStep, system: System, indentation: float | None, lasting: float) -> Limit:
     """Predicted limits of a method; see `ConstantStep.stable_dt`."""
-    flight = [largest_step(radius, k, c, lasting) for k, c in zip(*oscillators(system), strict=True)]
+    flight, mode = _shortest(method, system, *method.oscillators(system), lasting)
     if not system.contacts:
-        return Limit(min(flight), math.inf, int(np.argmin(flight)), -1)
-    k, c, half_period = tangent_oscillators(system, indentation)
+        return Limit(flight, math.inf, mode, -1)
+    C, K, half_period = with_tangents(system, indentation)
     if any(contact.gap < 0.0 for contact in system.contacts) or lasting == math.inf:
         half_period = lasting  # a preloaded contact may last for ever
-    contact = [largest_step(radius, *pair, min(lasting, half_period)) for pair in zip(k, c, strict=True)]
-    return Limit(min(flight), min(contact), int(np.argmin(flight)), int(np.argmin(contact)))
+    contact, contact_mode = _shortest(method, system, *method.critical(system.M, C, K), min(lasting, half_period))
+    return Limit(flight, contact, mode, contact_mode)
 
 
-def oscillators(system: System) -> tuple[Array, Array]:
-    """Stiffness k and damping c (j,) of the decoupled modes; of sparse matrices the fastest alone."""
-    if system.sparse:
-        return _fastest(system.M, system.C, system.K)
-    return system.blocks.k, system.blocks.c
+def _shortest(method: ConstantStep, system: System, k: Array, c: Array, lasting: float) -> tuple[float, int]:
+    """Smallest of the oscillators' limits, and whose it is; -1 where they are not the modes."""
+    steps = [largest_step(method.radius, *pair, lasting) for pair in zip(k, c, strict=True)]
+    return min(steps), int(np.argmin(steps)) if len(steps) == system.size else -1
 
 
-def tangent_oscillators(system: System, indentation: float | None) -> tuple[Array, Array, float]:
-    """Stiffness k and damping c of the modes with every stop's tangent, and how long a contact lasts."""
+def with_tangents(system: System, indentation: float | None) -> tuple[Any, Any, float]:
+    """C and K with every stop's tangent, and how long a contact lasts."""
     C, K, longest = system.C, system.K, 0.0
     for contact in system.contacts:
         stiffness, damping, mass = tangent(system, contact, indentation)
@@ -142,27 +145,7 @@ def tangent_oscillators(system: System, indentation: float | None) -> tuple[Arra
         C, K = C + damping * outer, K + stiffness * outer
         if stiffness > 0.0:
             longest = max(longest, math.pi * math.sqrt(mass / stiffness))
-    if system.sparse:
-        return *_fastest(system.M, C, K), longest
-    try:
-        blocks = decouple(system.M, C, K)
-        return blocks.k, blocks.c, longest
-    except ValueError:  # damped modes that cannot be separated: by their share of the damping
-        from scipy.linalg import eigh
-
-        k, phi = eigh(K, system.M)
-        return k, np.sum(phi * (C @ phi), axis=0), longest
-
-
-def _fastest(M: Any, C: Any, K: Any) -> tuple[Array, Array]:
-    """Stiffness k and damping c of the fastest mode of sparse matrices."""
-    from scipy.sparse.linalg import eigsh
-
-    if M.shape[0] < 3:  # too small for an iteration
-        blocks = decouple(M.toarray(), C.toarray(), K.toarray())
-        return blocks.k, blocks.c
-    k, phi = eigsh(K, 1, M, which="LM", v0=np.ones(M.shape[0]) + np.arange(M.shape[0]) % 3)
-    return k, np.sum(phi * (C @ phi), axis=0)
+    return C, K, longest
 
 
 def shortest_contact(system: System) -> float:
@@ -275,9 +258,20 @@ class ConstantStep(ABC):
 
         Notes
         -----
-        Exact for modes; in contact as good as a frozen tangent is. Of sparse matrices only the fastest mode is asked.
+        Exact, dashpots that couple the modes included; in contact as good as a frozen tangent is. Of large sparse
+        matrices only the largest, the most damped and the fastest eigenvalues are asked.
         """
-        return limit(self.radius, system, indentation, duration)
+        return limit(self, system, indentation, duration)
+
+    def critical(self, M: Any, C: Any, K: Any) -> tuple[Array, Array]:
+        """Stiffness k and damping c (j,) of the oscillators that decide on matrices."""
+        return eigen_oscillators(M, C, K)
+
+    def oscillators(self, system: System) -> tuple[Array, Array]:
+        """The same of a system in flight: its decoupled modes, or what decides on its matrices."""
+        if system.sparse or self.takes_matrices(system):
+            return self.critical(system.M, system.C, system.K)
+        return system.blocks.k, system.blocks.c
 
     def engine(self, system: System, z: Array, forcing: Forcing, duration: float) -> Any:
         """The method made ready for one run; ValueError for a step that is predicted to be unstable or blind."""
@@ -330,4 +324,4 @@ def _mean_frequency(rows: Array) -> float:
 
 def _name(system: System, mode: int) -> str:
     """A mode for a message, counted from 1."""
-    return "of the highest frequency" if system.sparse else f"{mode + 1} of {system.size}"
+    return "of the highest frequency" if system.sparse or mode < 0 else f"{mode + 1} of {system.size}"

@@ -114,6 +114,89 @@ def test_coupled_damping_has_limits_too():
     assert found == pytest.approx(central, rel=0.1)
 
 
+def chain(seed):
+    """Masses in a row with springs and with dashpots anywhere, up to several times critical: (M, C, K)."""
+    random = np.random.default_rng(seed)
+    n = int(random.integers(3, 21))
+
+    def between(values):
+        return np.diag(values) + np.diag(np.append(values[1:], 0.0)) - np.diag(values[1:], 1) - np.diag(values[1:], -1)
+
+    M, K = np.diag(random.uniform(0.5, 2.0, n)), between(10.0 ** random.uniform(3.0, 5.0, n))
+    ground = np.where(random.random(n) < 0.2, 10.0 ** random.uniform(0.0, 3.5, n), 0.0)
+    dashpots = np.where(random.random(n) < 0.4, 10.0 ** random.uniform(0.0, 3.5, n), 0.0)
+    return M, np.diag(ground) + between(dashpots) + 1e-5 * K, K
+
+
+def damped_beam(elements, damping):
+    """A beam with a dashpot at its stop."""
+    model = paper_scene().matrices(elements)
+    w = model.interpolation(0.24445).toarray()[0]
+    M, K = model.M.toarray(), model.K.toarray()
+    return M, damping * np.outer(w, w) + 1e-7 * K, K
+
+
+def one_step(method, M, C, K):
+    """The matrix by which a step of the made method multiplies [q, q']."""
+    n, h = M.shape[0], method.steps[0]
+    if isinstance(method, (RK4, HenonRK2)):
+        A = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]])
+        order = 4 if isinstance(method, RK4) else 2
+        return sum(np.linalg.matrix_power(h * A, j) / math.factorial(j) for j in range(order + 1))
+    beta, gamma = method.constants[2:]
+    old = np.linalg.solve(M, np.hstack((-K, -C)))
+    q = np.hstack((np.eye(n), h * np.eye(n))) + h * h * (0.5 - beta) * old
+    v = np.hstack((np.zeros((n, n)), np.eye(n))) + h * (1.0 - gamma) * old
+    new = np.linalg.solve(M + gamma * h * C + beta * h * h * K, -C @ v - K @ q)
+    return np.vstack((q + beta * h * h * new, v + gamma * h * new))
+
+
+def exact_limit(method, M, C, K, around):
+    """Smallest step whose matrix has an eigenvalue above 1, by bisection between half and twice a guess."""
+    low, high = 0.5 * around, 2.0 * around
+    for _ in range(10):
+        middle = math.sqrt(low * high)
+        grown = np.abs(np.linalg.eigvals(one_step(method(middle), M, C, K))).max() > 1.0 + 1e-7
+        low, high = (low, middle) if grown else (middle, high)
+    return low
+
+
+DASHPOTS = [
+    *(partial(chain, seed) for seed in range(10)),
+    partial(damped_beam, 12, 3.0),
+    partial(damped_beam, 31, 300.0),
+]
+strongly_damped = partial(Newmark, beta=0.2, gamma=0.7)
+
+
+@pytest.mark.parametrize("matrices", DASHPOTS)
+@pytest.mark.parametrize("method", [heun, RK4, CentralDifference, linear_acceleration, strongly_damped])
+def test_limits_with_dashpots_are_those_of_the_matrix_of_one_step(method, matrices):
+    M, C, K = matrices()
+    forms = [System(M, C, K)] if method is heun else [System(M, C, K), as_sparse(System(M, C, K))]
+    for system in forms:
+        predicted = method(1.0).stable_dt(system).flight
+        assert predicted == pytest.approx(exact_limit(method, M, C, K, predicted), rel=0.05)
+
+
+def test_the_matrix_of_one_step_is_that_of_a_run():
+    M, C, K = chain(3)
+    for made in (RK4(1e-3), CentralDifference(1e-3), strongly_damped(1e-3)):
+        for system in (System(M, C, K), as_sparse(System(M, C, K))):
+            run = integrate(system, np.ones(len(M)), np.zeros(len(M)), 1e-3, method=made)
+            expected = one_step(made, M, C, K) @ np.append(np.ones(len(M)), np.zeros(len(M)))
+            np.testing.assert_allclose(np.append(run.q[-1], run.q_dot[-1]), expected, rtol=1e-9, atol=1e-10)
+
+
+@pytest.mark.parametrize("method", [RK4, CentralDifference, linear_acceleration, strongly_damped])
+def test_limits_in_contact_with_a_dashpot_are_those_of_the_matrix_of_one_step(method):
+    omega, w, law = np.array([20.0, 150.0, 400.0]), np.array([1.0, 0.7, -0.4]), KelvinVoigt(5e4, 300.0)
+    system = System.modal(omega, 0.02, [Contact(w, law)])
+    predicted = method(1.0).stable_dt(system).contact
+    M, C, K = system.M, system.C + 300.0 * np.outer(w, w), system.K + 5e4 * np.outer(w, w)
+    assert predicted == pytest.approx(exact_limit(method, M, C, K, predicted), rel=0.01)
+
+
 # --- in contact ------------------------------------------------------------------------------------------------------
 
 
