@@ -16,6 +16,7 @@ import numpy as np
 import solvers
 from fembeam.doubts import doubts
 from fembeam.modes_table import mode_rows, mode_table
+from fembeam.signals import signals_of
 
 if TYPE_CHECKING:
     from fembeam.model import Model
@@ -172,10 +173,9 @@ def _suggested_modes(file: SceneFile, shortest: float) -> dict[str, int]:
 
 def highest_driven(scene: Any) -> float:
     """Highest frequency in the loads, rad/s; 0 without loads, inf when they have none."""
-    signals = [*([scene.base] if scene.base is not None else []), *(force.signal for force in scene.forces)]
     tops = []
-    for signal in signals:
-        if hasattr(signal, "band"):
+    for signal in signals_of(scene).values():
+        if getattr(signal, "band", None) is not None:
             tops.append(float(np.max(signal.band)))
         elif hasattr(signal, "omega"):
             tops.append(float(np.max(signal.omega)))
