@@ -45,14 +45,14 @@ def _listed(scene: Scene) -> Iterator[tuple[str, Any]]:
 
 
 def with_signals(scene: Scene, change: Callable[[Any], Any]) -> Scene:
-    """The scene with every signal changed; parts whose signal stays, and a scene of such parts, are kept as they are."""
+    """The scene with every signal changed; parts whose signals stay, and a scene of such parts, are kept."""
 
     def changed(part: Any, key: str) -> Any:
         old = getattr(part, key)
         new = None if old is None else change(old)
         return part if new is old else replace(part, **{key: new})
 
-    parts = {name: [changed(part, key) for part in getattr(scene, name)] for name, key in PLACES.items()}
+    parts: dict[str, Any] = {n: [changed(part, key) for part in getattr(scene, n)] for n, key in PLACES.items()}
     parts["bodies"] = [with_signals(body, change) for body in scene.bodies]
     base = None if scene.base is None else change(scene.base)
     pairs = [pair for name, new in parts.items() for pair in zip(getattr(scene, name), new, strict=True)]

@@ -127,7 +127,7 @@ def test_bad_input_is_one_line_and_exit_code_two(tmp_path, capsys):
 def test_a_record_shorter_than_the_run(tmp_path, capsys):
     (tmp_path / "y.csv").write_text("\n".join(f"{0.01 * i},{1e-6 * (i % 7)}" for i in range(100)))
     head, _, tail = scene(tmp_path).read_text().partition("[base]")
-    base = '[base]\nkind = "record"\npath = "y.csv"\nband = [10, 200]\n[reduce]'
+    base = '[base]\nkind = "record"\npath = "y.csv"\nquantity = "displacement"\nband = [10, 200]\n[reduce]'
     path = tmp_path / "record.toml"
     path.write_text(head + base + tail.partition("[reduce]")[2])
     assert "shorter than the duration" in refused(capsys, "run", path, "--out", tmp_path / "out", "--quiet")
@@ -155,7 +155,11 @@ def test_a_failing_method_leaves_what_it_computed(tmp_path, capsys):
 def test_a_record_that_is_unsorted_or_not_finite(tmp_path, capsys):
     head, _, tail = scene(tmp_path).read_text().partition("[base]")
     path = tmp_path / "record.toml"
-    path.write_text(head + '[base]\nkind = "record"\npath = "y.csv"\n[reduce]' + tail.partition("[reduce]")[2])
+    path.write_text(
+        head
+        + '[base]\nkind = "record"\npath = "y.csv"\nquantity = "displacement"\n[reduce]'
+        + tail.partition("[reduce]")[2]
+    )
     for bad, message in (("0.05,0", "must increase strictly"), ("0.5,nan", "must be finite, got nan in row 50")):
         rows = [f"{0.01 * i},{1e-6 * (i % 7)}" for i in range(100)]
         rows[50] = bad
@@ -435,7 +439,7 @@ def test_a_run_repeats_from_its_file_alone(tmp_path, capsys):
     (tmp_path / "in").mkdir()
     t = np.arange(0.0, 3.0, 0.01)
     np.savetxt(tmp_path / "in" / "y.csv", np.column_stack((t, 1e-3 * np.sin(20 * t))), delimiter=",")
-    base = '[base]\nkind = "record"\npath = "y.csv"\nband = [10, 200]\n[reduce]'
+    base = '[base]\nkind = "record"\npath = "y.csv"\nquantity = "displacement"\nband = [10, 200]\n[reduce]'
     head, _, tail = scene(tmp_path / "in", duration="2").read_text().partition("[base]")
     path = tmp_path / "in" / "scene.toml"
     path.write_text(head + base + tail.partition("[reduce]")[2])
