@@ -92,7 +92,8 @@ def check(file: SceneFile, model: Model) -> Check:
     log = _trial(model)
     touched = [one for stop in range(len(model.scene.stops)) if (one := _touched(model, log, stop))]
     shortest = min((one.time for one in touched), default=math.inf)
-    steps = {"output step dt, 20 in the shortest period kept": 2 * math.pi / (20 * _fastest(model))}
+    moving = bool(np.any(model.omega > 0))  # rigid-body modes alone have no period
+    steps = {"output step dt, 20 in the shortest period kept": 2 * math.pi / (20 * _fastest(model))} if moving else {}
     if shortest < math.inf:
         steps["output step dt to see the force, 20 in a contact"] = shortest / 20
     steps |= _limits(model)
@@ -191,7 +192,7 @@ def _limits(model: Model) -> dict[str, float]:
         limit = method.stable_dt(model.system)
         name = type(method).__name__
         steps = {"flight": limit.flight, **({"contact": limit.contact} if model.scene.stops else {})}
-        found |= {f"step of {name} in {where}, at most": step for where, step in steps.items() if math.isfinite(step)}
+        found |= {f"step of {name} in {where}, at most": step for where, step in steps.items() if 0 < step < math.inf}
     return found
 
 
