@@ -16,6 +16,7 @@ import numpy as np
 import solvers
 from fembeam.doubts import doubts
 from fembeam.modes_table import mode_rows, mode_table
+from fembeam.signals import signals_of
 
 if TYPE_CHECKING:
     from fembeam.model import Model
@@ -91,7 +92,8 @@ def check(file: SceneFile, model: Model) -> Check:
     log = _trial(model)
     touched = [one for stop in range(len(model.scene.stops)) if (one := _touched(model, log, stop))]
     shortest = min((one.time for one in touched), default=math.inf)
-    steps = {"output step dt, 20 in the shortest period kept": 2 * math.pi / (20 * _fastest(model))}
+    moving = bool(np.any(model.omega > 0))  # rigid-body modes alone have no period
+    steps = {"output step dt, 20 in the shortest period kept": 2 * math.pi / (20 * _fastest(model))} if moving else {}
     if shortest < math.inf:
         steps["output step dt to see the force, 20 in a contact"] = shortest / 20
     steps |= _limits(model)
@@ -172,10 +174,9 @@ def _suggested_modes(file: SceneFile, shortest: float) -> dict[str, int]:
 
 def highest_driven(scene: Any) -> float:
     """Highest frequency in the loads, rad/s; 0 without loads, inf when they have none."""
-    signals = [*([scene.base] if scene.base is not None else []), *(force.signal for force in scene.forces)]
     tops = []
-    for signal in signals:
-        if hasattr(signal, "band"):
+    for signal in signals_of(scene).values():
+        if getattr(signal, "band", None) is not None:
             tops.append(float(np.max(signal.band)))
         elif hasattr(signal, "omega"):
             tops.append(float(np.max(signal.omega)))
@@ -191,7 +192,7 @@ def _limits(model: Model) -> dict[str, float]:
         limit = method.stable_dt(model.system)
         name = type(method).__name__
         steps = {"flight": limit.flight, **({"contact": limit.contact} if model.scene.stops else {})}
-        found |= {f"step of {name} in {where}, at most": step for where, step in steps.items() if math.isfinite(step)}
+        found |= {f"step of {name} in {where}, at most": step for where, step in steps.items() if 0 < step < math.inf}
     return found
 
 

@@ -10,7 +10,17 @@ import warnings
 from typing import TYPE_CHECKING, Any
 
 from fembeam import __version__  # nothing slow up here: Ctrl-C before `main` would print a traceback
-from fembeam.messages import BAD_INPUT, EXIT_CODES, FAILED, interrupted, one_line, say, show_warning, warned
+from fembeam.messages import (
+    BAD_INPUT,
+    EXIT_CODES,
+    FAILED,
+    interrupted,
+    one_line,
+    say,
+    show_warning,
+    warned,
+    write_anywhere,
+)
 
 if TYPE_CHECKING:
     import argparse
@@ -27,6 +37,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         from fembeam import interrupts
 
         warned.clear()
+        write_anywhere()
         with interrupts.listening():
             arguments = _parser().parse_args(argv)
             with warnings.catch_warnings():
@@ -202,9 +213,12 @@ def _wanted(file: SceneFile, modes: int | None) -> dict[str, Any]:
 
 def _print(found: Any, as_json: bool) -> None:
     """On stdout."""
-    from fembeam.report import json_text
+    from fembeam.report import print_json
 
-    print(json_text(found) if as_json else found)
+    if as_json:
+        print_json(found)
+    else:
+        print(found)
 
 
 if __name__ == "__main__":

@@ -68,7 +68,7 @@ def run(job: Job) -> int:
     if files:
         code = _report(job, files) or code
     if job.json:
-        print(report.json_text(found))
+        report.print_json(found)
     return code or (interrupted() if interrupts.heard() else 0)
 
 

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fembeam.signals import signals_of
+
 if TYPE_CHECKING:
     from fembeam.beam import Beam
     from fembeam.model import Model
@@ -76,9 +78,10 @@ def of_loads(scene: Scene, model: Model) -> list[str]:
     from fembeam.check import highest_driven
 
     found = []
-    size = getattr(scene.base, "std", getattr(scene.base, "amplitude", 0.0))
-    if not callable(size) and np.max(np.abs(size)) > scene.beam.length:
-        found.append(f"the base moves by {np.max(np.abs(size)):g} m, more than the beam is long: is it in mm?")
+    for path, signal in signals_of(scene).items():
+        size = getattr(signal, "std", getattr(signal, "amplitude", 0.0))
+        if path.endswith(("base", "foot")) and not callable(size) and np.max(np.abs(size)) > scene.beam.length:
+            found.append(f"{path} moves by {np.max(np.abs(size)):g} m, more than the beam is long: is it in mm?")
     top = highest_driven(scene)
     if 0 < top < math.inf:
         near = model.omega[np.abs(2 * math.pi * top / np.maximum(model.omega, 1e-300) - 1) < 0.02]
@@ -103,7 +106,7 @@ def of_study(file: SceneFile, model: Model) -> list[str]:
                      f"take {math.pi / (2 * fastest):.1g} s or less")  # fmt: skip
     decay = model.zeta * model.omega
     slowest = float(decay[decay > 0].min()) if np.any(decay > 0) else math.inf
-    if study.discard < 3 / slowest < 0.5 * study.duration and file.scene.base is not None:
+    if study.discard < 3 / slowest < 0.5 * study.duration and signals_of(file.scene):
         found.append(
             f"discard = {study.discard:g} s keeps the transient in statistics: it lasts about {3 / slowest:.2g} s"
         )

@@ -5,14 +5,17 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, get_origin
 
 import contacts
 import solvers
 from fembeam.excitation import Harmonic, Multisine
 from fembeam.noise import BandNoise
-from fembeam.record import Record
+from fembeam.record import Interpolation, Quantity, Record
 from fembeam.schema import Constructors
 from fembeam.section import Section, Taper
+from fembeam.signals import PLACES
 from fembeam.study.quantities import QUANTITIES
 from fembeam.transient import Pulse, Step
 
@@ -38,13 +41,29 @@ LAWS: Constructors = {
     "tabulated_file": contacts.Tabulated.from_csv,
     "parallel": contacts.parallel,
 }
+
+
+def record(
+    path: Path,
+    quantity: Quantity,
+    columns: tuple[int, int] = (0, 1),
+    scale: float = 1.0,
+    band: tuple[float, float] | None = None,
+    detrend: bool = False,
+    interpolation: Interpolation = "spectral",
+    padding: float = 0.0,
+) -> Record:
+    """`Record.from_csv` for a scene file, which has to say what was measured."""
+    return Record.from_csv(path, columns, scale, band, quantity, detrend, interpolation, padding)
+
+
 SIGNALS: Constructors = {
     "harmonic": Harmonic,
     "multisine": Multisine,
     "band_noise": BandNoise,
     "noise_of_psd": BandNoise.of_psd,
     "rolled_off_noise": BandNoise.rolled_off,
-    "record": Record.from_csv,
+    "record": record,
     "pulse": Pulse,
     "step": Step,
 }
@@ -81,8 +100,7 @@ KEYS = {
     "section": SECTION,
     "law": Nested(lambda: LAWS),
     "laws": Nested(lambda: LAWS, listed=True),
-    "signal": SIGNAL,
-    "foot": SIGNAL,
+    **{key: SIGNAL for key in PLACES.values()},
     "solver": Nested(_methods),
     "quantity": Nested(lambda: QUANTITIES, by_name=True),
 }
@@ -92,4 +110,4 @@ def nested(key: str, parameter: inspect.Parameter) -> Nested | None:
     """The kind of table a key holds; None for plain values."""
     if parameter.annotation is Section:
         return SECTION
-    return KEYS.get(key) if key == parameter.name else None  # an argument `kind` is given as `quantity` too
+    return None if get_origin(parameter.annotation) is Literal else KEYS.get(key)  # the quantity of a record is a word

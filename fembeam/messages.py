@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import sys
 from typing import Any
 
@@ -12,7 +13,23 @@ exit codes:
   1    a computation failed, or results could not be written; what was computed is written where possible
   2    bad input, nothing was computed for it
   130  interrupted (Ctrl-C), 143 terminated; what was computed is written and marked as partial"""
+PLAIN = {"ω": "omega", "ζ": "zeta", "δ": "delta", "Δ": "Delta", "π": "pi", "Γ": "Gamma", "φ": "phi", "σ": "sigma",
+         "μ": "mu", "µ": "u", "²": "2", "³": "3", "√": "sqrt ", "±": "+-", "–": "-", "…": "..."}  # fmt: skip
 warned: list[str] = []  # by this command
+
+
+def write_anywhere() -> None:
+    """Let stdout and stderr take what their encoding does not know: Greek letters by name, other characters as ?."""
+    codecs.register_error("fembeam", _plainly)
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="fembeam")
+
+
+def _plainly(error: UnicodeError) -> tuple[str, int]:
+    """What stands for characters that cannot be encoded, and where to go on."""
+    assert isinstance(error, UnicodeEncodeError)
+    return "".join(PLAIN.get(c, "?") for c in error.object[error.start : error.end]), error.end
 
 
 def say(message: str) -> None:

@@ -9,7 +9,6 @@ every impactor.
 from __future__ import annotations
 
 import dataclasses
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -23,6 +22,7 @@ import solvers
 from fembeam.beam import hermite_rows
 from fembeam.bodies import Touch, loads, touches, weight
 from fembeam.section import require, require_positive
+from fembeam.signals import with_signals
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -286,7 +286,7 @@ class Model:
 
     def lasting(self, duration: float) -> Model:
         """The same model with every signal good for ``duration``; noise without a period gets one."""
-        scene = _lasting(self.scene, duration)
+        scene = with_signals(self.scene, lambda s: s.lasting(duration) if hasattr(s, "lasting") else s)
         return self if scene is self.scene else self.under(scene)
 
     def simulate(
@@ -406,26 +406,3 @@ class Model:
         from fembeam.branch import resumed
 
         return resumed(self, path)
-
-
-def _lasting(scene: Scene, duration: float) -> Scene:
-    """The scene with signals good for the duration; itself where nothing changes."""
-
-    def kept(items: Sequence[Any], name: str) -> list[Any]:
-        signals = [getattr(item, name) for item in items]
-        longer = [signal.lasting(duration) if hasattr(signal, "lasting") else signal for signal in signals]
-        trio = zip(items, signals, longer, strict=True)
-        return [item if old is new else replace(item, **{name: new}) for item, old, new in trio]
-
-    base = scene.base.lasting(duration) if hasattr(scene.base, "lasting") else scene.base
-    new: dict[str, Any] = {
-        "forces": kept(scene.forces, "signal"),
-        "springs": kept(scene.springs, "foot"),
-        "bodies": [_lasting(body, duration) for body in scene.bodies],
-    }
-    pairs = [pair for name, items in new.items() for pair in zip(getattr(scene, name), items, strict=True)]
-    if base is scene.base and all(a is b for a, b in pairs):
-        return scene
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # what it says of the scene was said when it was made
-        return replace(scene, base=base, **new)

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import solvers
 from fembeam.section import require
+from fembeam.signals import signals_of
 from solvers import chain, periodic, shooting
 from solvers.result import counted
 
@@ -114,7 +115,7 @@ def extremes_of(t: Vector, u: Vector, v: Vector) -> tuple[float, float]:
 
 def load_period(scene: Scene) -> float:
     """Period of all loads together, s; an error where there is none."""
-    return common_period(([] if scene.base is None else [scene.base]) + [force.signal for force in scene.forces])
+    return common_period(list(signals_of(scene).values()))
 
 
 def common_period(signals: list[Any]) -> float:

@@ -1,7 +1,8 @@
 """The scalars of a scene by name: read them, and make the same scene with another value.
 
 A name is a path such as ``base.omega``, ``stops[0].gap``, ``stops[0].law.stiffness`` or ``masses[1].mass``. Its last
-part alone will do where no other path ends so; ``omega`` and ``amplitude`` mean the base motion's first.
+part alone will do where no other path ends so; ``omega`` and ``amplitude`` mean the base motion's first, and every name
+the scene's own part before that of a body, ``bodies[0].stops[0].gap``.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from dataclasses import fields, is_dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from fembeam.section import require
+from fembeam.signals import is_of_signal
 
 if TYPE_CHECKING:
     from fembeam.scene import Scene
@@ -19,14 +21,16 @@ if TYPE_CHECKING:
 LISTS = ("masses", "springs", "dashpots", "stops", "forces")
 
 
-def scalars(scene: Scene) -> dict[str, float]:
-    """All numbers of a scene that can be varied, by path."""
+def scalars(scene: Scene, within: str = "") -> dict[str, float]:
+    """All numbers of a scene and of its bodies that can be varied, by path; `within` stands before each."""
     found: dict[str, float] = {}
     for part in fields(scene):
         value = getattr(scene, part.name)
         items = [(f"{part.name}[{i}]", item) for i, item in enumerate(value)] if part.name in LISTS else []
         for path, item in items or [(part.name, value)]:
-            found.update(_numbers(path, item))
+            found.update(_numbers(f"{within}{path}", item))
+    for i, body in enumerate(scene.bodies):
+        found.update(scalars(body, f"{within}bodies[{i}]."))
     return found
 
 
@@ -51,7 +55,8 @@ def path_of(scene: Scene, name: str) -> str:
     if name in known:
         return name
     ends = [path for path in known if path.endswith(f".{name}")]
-    first = [path for path in ends if path.startswith("base.")] or ends
+    own = [path for path in ends if not path.startswith("bodies")]
+    first = [path for path in ends if path.startswith("base.")] or own or ends
     require(bool(ends), f"no such parameter; the scene has {', '.join(known)}", name, "parameter", "use one of these")
     require(len(first) == 1, f"ambiguous parameter: {', '.join(ends)}", name, "parameter", "give the whole path")
     return first[0]
@@ -89,5 +94,6 @@ def _replaced(item: Any, path: list[str], value: float) -> Any:
 
 
 def changes_structure(path: str) -> bool:
-    """Whether a parameter changes the mode shapes or frequencies: anything but loads, gaps and laws."""
-    return not path.startswith(("base", "forces", "stops")) or path.endswith(".z")
+    """Whether a parameter changes the mode shapes or frequencies: anything but signals, gaps and laws."""
+    part = re.sub(r"^(bodies\[\d+\]\.)+", "", path)
+    return not (is_of_signal(path) or part.startswith("stops")) or path.endswith(".z")

@@ -4,26 +4,32 @@
 
 The straight line joins the first and the last sample; what is left vanishes at both ends, so its odd
 extension is continuous with its rate, and the sine series passes through every sample. Derivatives are taken
-line by line.
+line by line. Or the samples are joined by straight lines, see `fembeam.polyline`.
 """
 
 from __future__ import annotations
 
 import math
-import re
-from dataclasses import dataclass, field, replace
+from dataclasses import InitVar, dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fembeam.lines import LineSpectrum, checked_band, checked_order, frozen, number
+from fembeam.lines import LineSpectrum, checked_band, checked_order, number
+from fembeam.polyline import Polyline
+from fembeam.samples import checked_samples, initial_curvature, is_uniform, on_uniform_grid, padded, read_rows
 
-FEWEST_SAMPLES = 8
-UNIFORM = 1e-4  # samples this close to a uniform grid, in steps, count as uniform
+Quantity = Literal["displacement", "acceleration", "force"]
+Interpolation = Literal["spectral", "linear"]
 EDGE = 0.25  # the band fades out over this part of lo below it and of hi above it
-LARGEST_GAP = 10.0  # a hole longer than this many median steps is not interpolated
+MOVING = 0.3  # y''(0) above this part of the rms of y'' is told
+
+
+class _Known(str):
+    """What `Record.kind` says: `dataclasses.replace` hands it back, as if it had been asked for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,24 +42,37 @@ class Record:
         Times in s, strictly increasing, uniform or not, n >= 8. The signal counts time from the first sample:
         the attribute `t` starts at 0.
     y : array, shape (n,)
-        Motion in m, or m/s² for kind="acceleration".
+        What `quantity` says: motion in m, acceleration in m/s², or force in N.
     band : (lo, hi), optional
         Keep only the lines in this band (rad/s), fading out from lo to 0.75 lo and from hi to 1.25 hi. With
         lo > 0 the straight line (drift, mean) goes as well.
-    kind : "displacement" or "acceleration"
+    quantity : "displacement", "acceleration" or "force"
         What `y` is. For an acceleration `derivative(2)` is the record itself, and the value is its double
-        integral without straight line and constants, zero at both ends; slow drift stays unless lo > 0.
+        integral without straight line and constants, zero at both ends; slow drift stays unless lo > 0. A force
+        (or moment) is no motion: it has no derivatives. A scene file must say it.
     detrend : bool
         Remove the least-squares straight line first: offset and drift of the sensor. An acceleration needs it
         unless lo > 0: its offset is a load like gravity.
+    interpolation : "spectral" or "linear"
+        Linear joins the samples by straight lines, as earthquake engineering does: of an acceleration, force or
+        the foot of a spring on a uniform grid without `band`. A displacement has no y'' then.
+    padding : float
+        Zeros behind the record, in s, so that a run may last longer; >= 0.
     order : int, keyword only
         How many derivatives of the motion this signal is; use `derivative`.
+    kind : keyword only
+        Another name of `quantity`.
 
     Raises
     ------
     ValueError
         Unequal lengths, fewer than 8 rows, times that do not increase, values that are not finite, a gap of
         more than 10 median steps (naming the first bad row, counted from 0), a band without lines.
+
+    Warns
+    -----
+    UserWarning : padding makes the record jump to zero. A `Scene` warns of a displacement as base motion whose
+        y'' does not begin near zero.
 
     Notes
     -----
@@ -75,19 +94,48 @@ class Record:
     t: NDArray[np.float64]
     y: NDArray[np.float64]
     band: tuple[float, float] | None = None
-    kind: Literal["displacement", "acceleration"] = "displacement"
+    quantity: Quantity = "displacement"
     detrend: bool = False
+    interpolation: Interpolation = "spectral"
+    padding: float = 0.0
     order: int = field(default=0, kw_only=True)
-    _spectrum: tuple[LineSpectrum, float, float] = field(init=False, repr=False)
+    kind: InitVar[Quantity | None] = field(default=None, kw_only=True)
+    _spectrum: tuple[LineSpectrum | Polyline, float, float] = field(init=False, repr=False)
 
-    def __post_init__(self) -> None:
-        if self.kind not in ("displacement", "acceleration"):
-            raise ValueError(f"Record kind must be 'displacement' or 'acceleration', got {self.kind!r}")
-        t, y = _checked_samples(self.t, self.y)
+    def __post_init__(self, kind: Quantity | None) -> None:
+        t, y = checked_samples(self.t, self.y)
         band = None if self.band is None else checked_band("Record band", self.band)
-        for name, value in (("t", t), ("y", y), ("band", band), ("order", checked_order(self.order))):
+        padding = number("Record padding (s)", self.padding, least=0.0)
+        quantity = self.quantity if kind is None or isinstance(kind, _Known) else kind
+        for name, value in (("t", t), ("y", y), ("band", band), ("order", checked_order(self.order)),
+                            ("quantity", quantity), ("kind", _Known(quantity)), ("padding", padding)):  # fmt: skip
             object.__setattr__(self, name, value)
+        self._check_choices()
         object.__setattr__(self, "_spectrum", self._transformed())
+
+    def _check_choices(self) -> None:
+        """Words that are none, and what does not go together."""
+        for name, choices in (("quantity", get_args(Quantity)), ("interpolation", get_args(Interpolation))):
+            if getattr(self, name) not in choices:
+                said = " or ".join(map(repr, choices))
+                raise ValueError(f"Record {name} must be {said}, got {getattr(self, name)!r}")
+        if self.order and self.quantity == "force":
+            raise ValueError("Record of a force has no derivatives, got quantity='force' as a motion; give "
+                             "quantity='displacement' or 'acceleration'")  # fmt: skip
+        if self.interpolation == "spectral":
+            return
+        if self._power > 0:
+            raise ValueError("Record y'' of a displacement joined by straight lines does not exist; give an "
+                             "acceleration (quantity='acceleration'), or leave out interpolation='linear'")  # fmt: skip
+        if self.band is not None or not is_uniform(self.t):
+            got = "a band" if self.band is not None else "times off a uniform grid"
+            raise ValueError(f"Record with interpolation='linear' takes uniform samples as they are, got {got}; "
+                             "filter and resample them before, or leave out interpolation")  # fmt: skip
+
+    @property
+    def _power(self) -> int:
+        """How many derivatives of the samples this signal is; below 0 integrals."""
+        return self.order - (2 if self.quantity == "acceleration" else 0)
 
     @classmethod
     def from_csv(
@@ -96,8 +144,12 @@ class Record:
         columns: tuple[int, int] = (0, 1),
         scale: float = 1.0,
         band: tuple[float, float] | None = None,
-        kind: Literal["displacement", "acceleration"] = "displacement",
+        quantity: Quantity = "displacement",
         detrend: bool = False,
+        interpolation: Interpolation = "spectral",
+        padding: float = 0.0,
+        *,
+        kind: Quantity | None = None,
     ) -> Record:
         """A record from a text file with columns separated by semicolon, tab, comma or blanks.
 
@@ -109,7 +161,7 @@ class Record:
             Columns of time (s) and motion, counted from 0.
         scale : float
             Factor on the motion, for example 1e-3 for mm.
-        band, kind, detrend
+        band, quantity, detrend, interpolation, padding, kind
             As for `Record`.
 
         Raises
@@ -117,37 +169,48 @@ class Record:
         ValueError
             No numeric row, or a row that is not numeric after the first one (with its line number).
         """
-        rows = _read_rows(Path(path), columns)
+        rows = read_rows(Path(path), columns)
         scaled = rows[:, 1] * number("scale", scale)
         try:
-            return cls(rows[:, 0], scaled, band=band, kind=kind, detrend=detrend)
+            return cls(rows[:, 0], scaled, band, quantity, detrend, interpolation, padding, kind=kind)
         except ValueError as error:
             raise ValueError(f"{path}: {error}") from None
 
     def __repr__(self) -> str:
         tail = f".derivative({self.order})" if self.order else ""
         head = f"Record({self.t.size} samples over {self.duration:.6g} s"
-        return f"{head}, band={self.band}, kind={self.kind!r}){tail}"
+        more = ", interpolation='linear'" if self.interpolation == "linear" else ""
+        more += f", padding={self.padding:g}" if self.padding else ""
+        return f"{head}, band={self.band}, quantity={self.quantity!r}{more}){tail}"
 
     @property
     def duration(self) -> float:
-        """Length of the record in s."""
-        return float(self.t[-1])
+        """Length of the record in s, padding included."""
+        h, y = self._samples
+        return h * (y.size - 1)
 
-    def _transformed(self) -> tuple[LineSpectrum, float, float]:
-        """Sine lines of this signal and its straight line c_0 + c_1 t."""
-        from scipy.fft import dst
-
-        y = _on_uniform_grid(self.t, self.y)
+    @cached_property
+    def _samples(self) -> tuple[float, NDArray[np.float64]]:
+        """Step and samples on a uniform grid, without straight line if asked for, padded."""
+        y = on_uniform_grid(self.t, self.y)
         if self.detrend:
             from scipy.signal import detrend
 
             y = detrend(y)
+        h = float(self.t[-1]) / (y.size - 1)
+        return h, padded(y, math.ceil(self.padding / h - 1e-9))
+
+    def _transformed(self) -> tuple[LineSpectrum | Polyline, float, float]:
+        """Sine lines of this signal and its straight line c_0 + c_1 t; or the polyline, and no other line."""
+        from scipy.fft import dst
+
+        (h, y), power = self._samples, self._power
+        if self.interpolation == "linear":
+            return Polyline(h, y, -power), 0.0, 0.0
         n = y.size - 1
         line = (float(y[0]), float(y[-1] - y[0]) / self.duration)
-        sines = dst(y[1:-1] - (line[0] + line[1] * self.duration / n * np.arange(1, n)), type=1) / n
+        sines = dst(y[1:-1] - (line[0] + line[1] * h * np.arange(1, n)), type=1) / n
         lines = LineSpectrum(math.pi / self.duration, 1, -1j * sines)
-        power = self.order - (2 if self.kind == "acceleration" else 0)
         if self.band is not None:
             lines = _within(lines, self.band)
         if self.band is not None and self.band[0] > 0:
@@ -176,7 +239,8 @@ class Record:
         duration : float
             The grid covers [0, duration], in s; at most the length of the record.
         rtol : float
-            Rms error of the quintic Hermite interpolant relative to that of the record, in [1e-13, 1).
+            Rms error of the quintic Hermite interpolant relative to that of the record, in [1e-13, 1). Linear: of
+            its spectrum, see `fembeam.polyline`.
 
         Returns
         -------
@@ -206,52 +270,23 @@ class Record:
         if number("duration (s)", duration, least=0.0) > self.duration * (1 + 1e-9):
             raise ValueError(
                 f"Record is {self.duration:.6g} s long and shorter than the duration of {duration:.6g} s; "
-                f"shorten the run or bring a longer record"
+                f"shorten the run, bring a longer record, or give padding (s of zeros behind it)"
             )
         return self
 
-
-def _checked_samples(t: ArrayLike, y: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Read-only times from 0 and values, or an error that names the first bad row."""
-    try:
-        times, values = np.asarray(t, dtype=np.float64), np.asarray(y, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ValueError("Record t and y must be arrays of numbers") from None
-    if times.ndim != 1 or times.shape != values.shape or times.size < FEWEST_SAMPLES:
-        need = f"Record needs t and y of one length of at least {FEWEST_SAMPLES}"
-        raise ValueError(f"{need}, got shapes {times.shape} and {values.shape}")
-    for name, column in (("t", times), ("y", values)):
-        if not np.isfinite(column).all():
-            i = int(np.argmin(np.isfinite(column)))
-            raise ValueError(f"Record {name} must be finite, got {column[i]} in row {i} (t = {times[i]:g} s)")
-    _check_steps(times)
-    return frozen(times - times[0]), frozen(values)
-
-
-def _check_steps(t: NDArray[np.float64]) -> None:
-    """Times must increase, and leave no hole that interpolation would have to invent."""
-    steps = np.diff(t)
-    if not np.all(steps > 0):
-        i = int(np.argmin(steps > 0)) + 1
-        raise ValueError(f"Record t must increase strictly, got {t[i]:g} s after {t[i - 1]:g} s in row {i}; sort it")
-    median = float(np.median(steps))
-    if steps.max() > LARGEST_GAP * median:
-        i = int(np.argmax(steps > LARGEST_GAP * median)) + 1
-        raise ValueError(
-            f"Record has a gap of {steps[i - 1]:g} s before row {i}, more than {LARGEST_GAP:g} median "
-            f"steps of {median:g} s; use the longer part, or fill the gap"
-        )
-
-
-def _on_uniform_grid(t: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The samples on a uniform grid from the first to the last time."""
-    step = t[-1] / (t.size - 1)
-    if np.abs(t - step * np.arange(t.size)).max() <= UNIFORM * step:
-        return y
-    from scipy.interpolate import make_interp_spline
-
-    n = math.ceil(t[-1] / min(step, float(np.median(np.diff(t)))))
-    return make_interp_spline(t, y, k=5)(np.linspace(0.0, t[-1], n + 1))
+    @cached_property
+    def doubt(self) -> str:
+        """What a scene says of the record as its base motion, "" where there is nothing to say."""
+        if self.quantity != "displacement" or self.order or not isinstance(self._spectrum[0], LineSpectrum):
+            return ""
+        h, y = self._samples
+        rms = self._spectrum[0].derivative(2).rms
+        start = initial_curvature(y, h, math.pi / h if self.band is None else self.band[1])
+        if not abs(start) > MOVING * rms:
+            return ""
+        return (f"Record begins with y'' = {start:.3g} m/s² (rms {rms:.3g}), but y'' of a displacement record is zero "
+                "at its ends: its first samples load the structure wrongly; begin where it is at rest, fade it in, or "
+                "give the acceleration")  # fmt: skip
 
 
 def _within(lines: LineSpectrum, band: tuple[float, float]) -> LineSpectrum:
@@ -268,30 +303,3 @@ def _within(lines: LineSpectrum, band: tuple[float, float]) -> LineSpectrum:
     weight = np.cos(np.pi / 2 * np.minimum(outside / EDGE, 1.0)) ** 2
     kept = np.flatnonzero(outside < EDGE)
     return LineSpectrum(lines.spacing, int(kept[0]) + 1, (weight * lines.amplitude)[kept])
-
-
-def _cells(text: str) -> list[str]:
-    """The cells of one line; a semicolon or tab wins over a comma, a comma over blanks."""
-    mark = next((mark for mark in (";", "\t", ",") if mark in text), None)
-    return text.split(mark) if mark else re.split(r"\s+", text)
-
-
-def _read_rows(path: Path, columns: tuple[int, int]) -> NDArray[np.float64]:
-    """The two columns of a text file, header skipped, shape (n, 2)."""
-    if len(columns) != 2 or not all(isinstance(column, int) for column in columns):
-        raise ValueError(f"columns must be two whole numbers (time, motion), got {columns!r}")
-    rows: list[tuple[float, float]] = []
-    with path.open(encoding="utf-8-sig", errors="replace") as file:
-        for line_number, line in enumerate(file, start=1):
-            text = line.strip()
-            if not text or text.startswith("#"):
-                continue
-            try:
-                cells = _cells(text)
-                rows.append((float(cells[columns[0]]), float(cells[columns[1]])))
-            except (ValueError, IndexError):
-                if rows:
-                    raise ValueError(f"{path}, line {line_number}: no numbers in columns {columns}: {text!r}") from None
-    if not rows:
-        raise ValueError(f"{path} has no row with numbers in columns {columns}; give columns=(time, motion)")
-    return np.array(rows)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, fields, is_dataclass
@@ -252,9 +253,14 @@ def _telling(value: Any) -> bool:
     return isinstance(value, known) or (is_dataclass(value) and not isinstance(value, (Run, Model)))
 
 
-def json_text(content: Any) -> str:
-    """JSON as the standard has it: null for what is not finite."""
-    return json.dumps(_finite(content), indent=2, ensure_ascii=False, allow_nan=False)
+def json_text(content: Any, escaped: bool = False) -> str:
+    """JSON as the standard has it: null for what is not finite; `escaped`: in ASCII."""
+    return json.dumps(_finite(content), indent=2, ensure_ascii=escaped, allow_nan=False)
+
+
+def print_json(content: Any) -> None:
+    """On stdout, in ASCII unless its encoding is a Unicode one."""
+    print(json_text(content, escaped="utf" not in (getattr(sys.stdout, "encoding", None) or "").lower()))
 
 
 def write_json(target: Path, content: dict[str, Any]) -> Path:

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import solvers
+from fembeam import saved_arrays
 from fembeam.model import Shapes
 from fembeam.section import require
 from fembeam.source import Source
@@ -292,7 +293,8 @@ def load(path: str | os.PathLike[str]) -> Run:
 
     Raises
     ------
-    FileNotFoundError; ValueError when the file is not a run of this library, or is damaged.
+    FileNotFoundError; ValueError when the file is not a run of this library, is damaged, or its arrays contradict each
+    other.
 
     Examples
     --------
@@ -320,10 +322,12 @@ def load(path: str | os.PathLike[str]) -> Run:
 
 def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run:
     """A run from the contents of its file."""
+    saved_arrays.check({name: array for name, array in arrays.items() if not name.startswith("file_")})
     source = None
     if given := about.get("scene_file"):
         files = {name: arrays[f"file_{i}"].tobytes() for i, name in enumerate(given["files"])}
-        source = Source(path.with_name(given["name"]), given["text"], tuple(given["overrides"]), files)
+        name = Path(given["name"]).name
+        source = Source(path.with_name(name), given["text"], tuple(given["overrides"]), files, of_run=True)
     bodies = sum(name.split("_")[0] == "nodes" for name in arrays)
     return Run(
         *(arrays["t"], arrays["q"], arrays["q_dot"]),

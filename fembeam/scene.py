@@ -12,11 +12,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
-import numpy as np
-
 from fembeam.assembly import Matrices, assemble, buckling_load
 from fembeam.beam import Beam
 from fembeam.damping import ModalDamping, Rayleigh
+from fembeam.drift import drifting, rigid_body_modes
 from fembeam.impactor import Impactor, check_law
 from fembeam.section import require, require_finite, require_non_negative
 
@@ -194,8 +193,8 @@ class PointForce:
     signal: Any
 
     def __post_init__(self) -> None:
-        require(self.signal is not None, "signal must be given", self.signal, f"PointForce at z = {self.z}",
-                "give a signal such as Harmonic(amplitude, omega)")  # fmt: skip
+        require(callable(self.signal), "signal must be a function of t", self.signal, f"PointForce at z = {self.z}",
+                "give a signal such as Harmonic(amplitude, omega); Harmonic(size, 0.0) is a constant")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -213,8 +212,8 @@ class PointMoment:
     signal: Any
 
     def __post_init__(self) -> None:
-        require(self.signal is not None, "signal must be given", self.signal, f"PointMoment at z = {self.z}",
-                "give a signal such as Harmonic(amplitude, omega)")  # fmt: skip
+        require(callable(self.signal), "signal must be a function of t", self.signal, f"PointMoment at z = {self.z}",
+                "give a signal such as Harmonic(amplitude, omega); Harmonic(size, 0.0) is a constant")  # fmt: skip
 
 
 FEATURES: dict[str, tuple[type, ...]] = {
@@ -240,7 +239,7 @@ class Scene:
     supports : of Clamped, Pinned, Guided; at most one per place. None at all is allowed (free body).
     masses, springs, dashpots, stops, forces : lists, any length; kept as tuples.
     damping : ModalDamping or Rayleigh, of the structure without dashpots.
-    base : frame motion y(t), or None.
+    base : frame motion y(t) that knows its derivatives, `derivative(order)`, or None.
     impactors : rigid masses beside the beam. Their contacts are numbered after those of the stops.
     bodies : further beams, each a Scene of its own with its supports, stops, forces, damping; a `Stop` with `on` lets
         the beam of this scene meet them. Their contacts are numbered after those of this scene.
@@ -249,11 +248,13 @@ class Scene:
     Raises
     ------
     ValueError : anything outside the beam, not finite, or in conflict; the message names it.
-    TypeError : something of the wrong kind in a list.
+    TypeError : something of the wrong kind in a list, a base motion without derivatives.
 
     Warns
     -----
-    UserWarning : the supports and springs leave rigid-body modes; says how many.
+    UserWarning : the supports and springs of a beam leave rigid-body modes (says how many), and loads may carry it
+        away: they act, and no stops on both sides, or below it under gravity, hold it. A free beam without loads, a
+        hinged one that lies on a stop are meant so. Also what a `Record` as base motion says of itself.
 
     Examples
     --------
@@ -288,12 +289,11 @@ class Scene:
                             "write ModalDamping(0.01)")  # fmt: skip
         require_finite("gravity", self.gravity, "Scene", "give m/s², 9.81 on the ground")
         object.__setattr__(self, "bodies", _listed("bodies", self.bodies, (Scene,)))
+        self._check_base()
         self._check_conflicts()
         self._check_bodies()
-        if count := self.rigid_body_modes:
-            what = "1 rigid-body mode appears" if count == 1 else "2 rigid-body modes appear"
-            advice = "supports and springs do not hold the beam, it may drift"
-            warnings.warn(f"{what} in Scene: {advice}", UserWarning, stacklevel=3)
+        for said in [*drifting(self), *([doubt] if (doubt := getattr(self.base, "doubt", "")) else [])]:
+            warnings.warn(said, UserWarning, stacklevel=3)
 
     def matrices(self, elements: int | None = None, modes: int | None = None, probes: Sequence[float] = ()) -> Matrices:
         """Sparse M, C, K on the free dofs of a Hermite mesh with a node on every feature and probe.
@@ -377,13 +377,7 @@ class Scene:
     @property
     def rigid_body_modes(self) -> int:
         """How many of the motions u = a + b z nothing resists, of supports, springs, foundation, tension: 0, 1 or 2."""
-        rows = [row for s in self.supports for row, fixed in zip(_rigid_rows(s.z), s.fixed, strict=True) if fixed]
-        for spring in self.springs:
-            translation, rotation = _rigid_rows(spring.z)
-            rows += [translation] * (spring.stiffness > 0) + [rotation] * (spring.rotational > 0)
-        rows += [(1.0, 0.0), (0.0, 1.0)] * (self.beam.foundation > 0) + [(0.0, 1.0)] * (self.beam.axial_force != 0)
-        scaled = np.array([*rows, (0.0, 0.0)]) / (1.0, self.beam.length)
-        return 2 - int(np.linalg.matrix_rank(scaled, tol=1e-9))
+        return rigid_body_modes(self)
 
     def _check_places(self, name: str) -> None:
         """Raise ValueError unless every feature of one list sits on the beam."""
@@ -392,6 +386,17 @@ class Scene:
             require_finite("z", feature.z, where, "give the coordinate along the beam in m")
             require(0 <= feature.z <= self.beam.length, f"z must lie on the beam, 0 to {self.beam.length} m",
                     feature.z, where, "move it, or lengthen the beam")  # fmt: skip
+
+    def _check_base(self) -> None:
+        """Raise TypeError for a base motion without derivatives, ValueError where its second one does not exist."""
+        if self.base is None:
+            return
+        missing = [name for name in ("__call__", "derivative") if not callable(getattr(self.base, name, None))]
+        if missing or isinstance(self.base, type):
+            raise TypeError(f"base must be a motion y(t) that knows its derivatives, got {self.base!r} without "
+                            f"{' and '.join(missing) or 'values'} in Scene; use Harmonic, Multisine, BandNoise, "
+                            "Record, Pulse, Step, or an object with __call__(t) and derivative(order)")  # fmt: skip
+        self.base.derivative(2)
 
     def _check_conflicts(self) -> None:
         """Raise ValueError if two supports share one place, or two stops one place, side and carrier."""
@@ -434,8 +439,3 @@ def _listed(name: str, value: Any, kinds: tuple[type, ...]) -> tuple[Any, ...]:
         if not isinstance(entry, kinds):
             raise TypeError(f"{name}[{index}] must be a {names}, got {entry!r} in Scene; move it to its own list")
     return entries
-
-
-def _rigid_rows(z: float) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Rows u and u_z at z of the rigid motions (1, z)."""
-    return (1.0, z), (0.0, 1.0)

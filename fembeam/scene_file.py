@@ -123,7 +123,7 @@ def read(path: str | Path, overrides: Sequence[str] = ()) -> SceneFile:
     >>> read(path).scene.supports
     (Clamped(z=0.0),)
     """
-    return built(replace(source := _source(Path(path)), overrides=(*source.overrides, *overrides)))
+    return built(replace(source := _source(Path(path)), overrides=(*source.overrides, *overrides)), overrides)
 
 
 def _source(path: Path) -> Source:
@@ -146,10 +146,13 @@ def _source(path: Path) -> Source:
         raise SceneFileError(f"{path}: is not a text file in UTF-8") from None
 
 
-def built(source: Source) -> SceneFile:
-    """What a text says; the files that it names are taken from it where it carries them, and carried from then on."""
+def built(source: Source, asked: Sequence[str] = ()) -> SceneFile:
+    """What a text says; the files that it names are taken from it where it carries them, and carried from then on.
+
+    `asked`: those of its overrides that are asked for now, and are not the text's own.
+    """
     with source.unpacked() as places:
-        reader = _Reader(source, places)
+        reader = _Reader(source, places, [override.partition("=")[2] for override in asked])
         try:
             tables = source.tables()
         except ValueError as error:
@@ -165,10 +168,19 @@ class _Reader:
 
     source: Source
     places: dict[str, Path]
+    asked: Sequence[str] = ()
 
-    def file(self, name: str) -> Path:
-        """A file that the scene names."""
-        return self.places.setdefault(name, self.source.path.parent / name)
+    def file(self, name: str, where: str) -> Path:
+        """A file that the scene names: an ordinary one, and within the folder if a saved run names it."""
+        folder = self.source.path.parent
+        place = self.places.get(name, folder / name)
+        within = place.resolve().is_relative_to(folder.resolve()) or any(name in value for value in self.asked)
+        if self.source.of_run and name not in self.places and not within:
+            self.fail(where, f"names {name}, which this run does not carry and which lies outside its folder; copy it "
+                      "there, or name it by --set")  # fmt: skip
+        if place.exists() and not place.is_file():
+            self.fail(where, f"{name} is no ordinary file (a folder, pipe or device); give a file with the data")
+        return self.places.setdefault(name, place)
 
     def scene_file(self, tables: Table) -> SceneFile:
         """The whole file."""
@@ -236,7 +248,9 @@ class _Reader:
                 self.fail("[beam]", "a mesh needs its path and a table sections = { name = { section }, … }")
             found = {name: self.section(entry, f"[beam] sections {name}") for name, entry in sections.items()}
             options |= {"data": table["data"]} if "data" in table else {}
-            return self.made(Beam.from_mesh, {"path": self.file(path), "sections": found, **options}, "[beam]")
+            return self.made(
+                Beam.from_mesh, {"path": self.file(path, "[beam]"), "sections": found, **options}, "[beam]"
+            )
         if "spans" not in table:
             return self.build(beam_of_section, table, "[beam]")
         self.check_keys(table, ["spans", *common], "[beam]", "key")
@@ -286,7 +300,8 @@ class _Reader:
         self.check_keys(table, [chosen_by, *keys, *also] if chosen_by else [*keys, *also], where, "key")
         for key, parameter in keys.items():
             if key not in table and parameter.default is inspect.Parameter.empty:
-                self.fail(where, f"the key {key!r} is missing; it needs {listed(required(keys))}")
+                kind = f" ({words})" if (words := wanted(parameter.annotation)) else ""
+                self.fail(where, f"the key {key!r} is missing{kind}; it needs {listed(required(keys))}")
         return {
             parameter.name: self.value(table[key], key, parameter, where)
             for key, parameter in keys.items()
@@ -305,7 +320,7 @@ class _Reader:
         if not fits(value, parameter.annotation):
             self.fail(where, f"{key} must be {wanted(parameter.annotation)}, got {shown(value)}")
         if key == "path":
-            return self.file(value)
+            return self.file(value, where)
         return converted(value, parameter.annotation)
 
     def chosen(self, kind: Nested, value: Any, where: str) -> Any:

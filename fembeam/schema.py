@@ -19,7 +19,6 @@ Constructors = Mapping[str, Callable[..., Any]]
 
 ARRAYS = np.ndarray, get_origin(NDArray[np.float64])  # from numpy 2.5 on, Python 3.12, an alias is not its meaning
 UNSEEN = {"Model": Any}  # names in annotations that exist only for type checkers
-ALIASES = {"kind": "quantity"}  # an argument `kind` would hide behind the key that chooses the constructor
 
 
 def parameters(constructor: Callable[..., Any]) -> dict[str, inspect.Parameter]:
@@ -29,7 +28,7 @@ def parameters(constructor: Callable[..., Any]) -> dict[str, inspect.Parameter]:
     if any(p.kind is p.VAR_KEYWORD for p in signature.values()):
         options = inspect.signature(constructor.__self__, eval_str=True).parameters.values()  # type: ignore[attr-defined]
         plain += [p for p in options if p.default is not p.empty]
-    return {ALIASES.get(p.name, p.name): p for p in plain if p.name != "self"}
+    return {p.name: p for p in plain if p.name != "self"}
 
 
 def required(parameters: Mapping[str, inspect.Parameter]) -> list[str]:

@@ -25,6 +25,7 @@ class Source:
     text : TOML.
     overrides : "table.key=value", applied in turn.
     files : contents of the files that it names, by the name in the text.
+    of_run : whether it comes from a saved run, which reads no file outside its folder unless asked for.
 
     Examples
     --------
@@ -36,6 +37,7 @@ class Source:
     text: str
     overrides: tuple[str, ...] = ()
     files: Mapping[str, bytes] = field(default_factory=dict)
+    of_run: bool = False
 
     def tables(self) -> dict[str, Any]:
         """The parsed file with its overrides; ValueError says what is wrong, and in which line."""

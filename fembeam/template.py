@@ -47,7 +47,8 @@ law = {{ kind = "achieving", stiffness = 2e8, restitution = 0.7 }}
 zeta = [0.02, 0.01]         # ratios of the modes, the last for all higher ones; or alpha and beta of Rayleigh
 
 [base]                      # motion of the frame; leave out for none
-kind = "harmonic"           # or multisine, band_noise (std, band, seed), record (path of a CSV file), pulse, step
+kind = "harmonic"           # or multisine, band_noise (std, band, seed), pulse, step, or
+                            # record (path of a CSV file, quantity = "displacement" or "acceleration")
 amplitude = 1e-3            # m
 omega = 195.0               # rad/s
 

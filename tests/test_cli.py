@@ -127,7 +127,7 @@ def test_bad_input_is_one_line_and_exit_code_two(tmp_path, capsys):
 def test_a_record_shorter_than_the_run(tmp_path, capsys):
     (tmp_path / "y.csv").write_text("\n".join(f"{0.01 * i},{1e-6 * (i % 7)}" for i in range(100)))
     head, _, tail = scene(tmp_path).read_text().partition("[base]")
-    base = '[base]\nkind = "record"\npath = "y.csv"\nband = [10, 200]\n[reduce]'
+    base = '[base]\nkind = "record"\npath = "y.csv"\nquantity = "acceleration"\nband = [10, 200]\n[reduce]'
     path = tmp_path / "record.toml"
     path.write_text(head + base + tail.partition("[reduce]")[2])
     assert "shorter than the duration" in refused(capsys, "run", path, "--out", tmp_path / "out", "--quiet")
@@ -155,7 +155,11 @@ def test_a_failing_method_leaves_what_it_computed(tmp_path, capsys):
 def test_a_record_that_is_unsorted_or_not_finite(tmp_path, capsys):
     head, _, tail = scene(tmp_path).read_text().partition("[base]")
     path = tmp_path / "record.toml"
-    path.write_text(head + '[base]\nkind = "record"\npath = "y.csv"\n[reduce]' + tail.partition("[reduce]")[2])
+    path.write_text(
+        head
+        + '[base]\nkind = "record"\npath = "y.csv"\nquantity = "displacement"\n[reduce]'
+        + tail.partition("[reduce]")[2]
+    )
     for bad, message in (("0.05,0", "must increase strictly"), ("0.5,nan", "must be finite, got nan in row 50")):
         rows = [f"{0.01 * i},{1e-6 * (i % 7)}" for i in range(100)]
         rows[50] = bad
@@ -435,7 +439,7 @@ def test_a_run_repeats_from_its_file_alone(tmp_path, capsys):
     (tmp_path / "in").mkdir()
     t = np.arange(0.0, 3.0, 0.01)
     np.savetxt(tmp_path / "in" / "y.csv", np.column_stack((t, 1e-3 * np.sin(20 * t))), delimiter=",")
-    base = '[base]\nkind = "record"\npath = "y.csv"\nband = [10, 200]\n[reduce]'
+    base = '[base]\nkind = "record"\npath = "y.csv"\nquantity = "displacement"\nband = [10, 200]\n[reduce]'
     head, _, tail = scene(tmp_path / "in", duration="2").read_text().partition("[base]")
     path = tmp_path / "in" / "scene.toml"
     path.write_text(head + base + tail.partition("[reduce]")[2])
@@ -459,6 +463,50 @@ def test_a_run_repeats_from_its_file_alone(tmp_path, capsys):
     assert unlike["difference"] == (unlike["b"] - unlike["a"]) / unlike["a"] != 0
     printed(capsys, "compare", tmp_path / "a", tmp_path / "c", "--out", tmp_path / "figures")
     assert (tmp_path / "figures" / "compare.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_run_reads_no_file_outside_its_folder_unless_asked(tmp_path, capsys):
+    def named(path, *overrides):
+        text = head + f'[base]\nkind = "record"\npath = "{path}"\nquantity = "displacement"\n' + rest
+        np.savez(
+            kept / "run.npz", **arrays, about=json.dumps({**about, "scene_file": {**about["scene_file"], "text": text}})
+        )
+        return read(kept / "run.npz", overrides).scene.base.duration
+
+    kept = tmp_path / "kept"
+    kept.mkdir()
+    printed(capsys, "run", scene(tmp_path, duration="0.1"), "--out", kept, "--quiet", "--set", "simulate.discard=0")
+    with np.load(kept / "run.npz") as data:
+        about = json.loads(str(data["about"]))
+        arrays = {name: data[name] for name in data.files if name != "about"}
+    head, _, tail = about["scene_file"]["text"].partition("[base]")
+    rest = tail[tail.index("[reduce]") :]
+    for folder, count in ((tmp_path, 20), (kept, 30)):
+        (folder / "y.csv").write_text("\n".join(f"{0.01 * i},0" for i in range(count)))
+    (kept / "link.csv").symlink_to(tmp_path / "y.csv")
+    for path in (tmp_path / "y.csv", "../y.csv", "link.csv"):
+        with pytest.raises(ValueError, match=r"\[base\]: names .*y.csv|names link.csv, which this run does not carry"):
+            named(path)
+    assert named("y.csv") == pytest.approx(0.29)
+    assert named("y.csv", f'base.path="{tmp_path / "y.csv"}"') == pytest.approx(0.19)
+    assert named(tmp_path / "y.csv", "base.path=y.csv") == pytest.approx(0.29)
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "cp437", "utf-8"])
+def test_any_terminal_can_show_what_is_said(encoding):
+    def said(*arguments):
+        command = [sys.executable, "-m", "fembeam.cli", *map(str, arguments)]
+        found = subprocess.run(
+            command, env={**os.environ, "PYTHONIOENCODING": encoding}, capture_output=True, check=True
+        )
+        return found.stdout.decode(encoding), found.stderr.decode(encoding)
+
+    plain = said("check", EXAMPLE, "--set", "base.band=[0, 1e5]")
+    assert ("1/min(zetaomega)" if encoding == "ascii" else "memory of the structure") in plain[0]
+    assert "?" not in plain[0] + plain[1]
+    assert "loads reach 100000 rad/s" in plain[1]
+    assert json.loads(said("check", EXAMPLE, "--json")[0])["modes"]
+    assert "usage" in said("--help")[0]
 
 
 def test_what_cannot_be_compared_or_repeated(tmp_path, capsys):

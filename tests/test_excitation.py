@@ -549,7 +549,7 @@ def test_csv_columns(tmp_path):
     path.write_text("\n".join(f"x,{k * k},{0.1 * k}" for k in range(20)))
     record = Record.from_csv(path, columns=(2, 1), band=(0.0, 20.0), kind="acceleration")
     assert record.y[3] == 9.0
-    assert record.kind == "acceleration"
+    assert record.quantity == record.kind == "acceleration"
     assert record.band == (0.0, 20.0)
 
 
@@ -608,7 +608,7 @@ def times(**changed):
             lambda: Record(times(), np.ones(10), band=(900.0, 950.0)),
             r"band .* holds no line: the record resolves 3.49",
         ),
-        (lambda: Record(times(), np.ones(10), kind="jerk"), "'displacement' or 'acceleration', got 'jerk'"),
+        (lambda: Record(times(), np.ones(10), kind="jerk"), "'acceleration' or 'force', got 'jerk'"),
         (
             lambda: Record(times(), np.ones(10)).lasting(1.0),
             "Record is 0.9 s long and shorter than the duration of 1 s",

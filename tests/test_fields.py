@@ -40,8 +40,7 @@ def test_moment_and_shear_of_modes_are_as_good_as_their_frequencies():
 
 
 def test_free_ends_carry_nothing():
-    with pytest.warns(UserWarning, match="2 rigid-body"):
-        model = fb.Scene(fb.Beam(L, SQUARE)).reduce(4)
+    model = fb.Scene(fb.Beam(L, SQUARE)).reduce(4)
     forces = model.section_forces[0]
     ends = np.array([0.0, L])
     assert np.abs(forces.moment(ends)).max() < 1e-7 * np.abs(forces.moment(np.linspace(0, L, 9))).max()

@@ -344,6 +344,39 @@ def test_damaged_file_is_refused(run, tmp_path, damage):
         fb.load(path)
 
 
+@pytest.mark.parametrize(
+    ("name", "change", "message"),
+    [
+        ("t", lambda t: t[:-1], r"t must have shape \(\d+,\), it has"),
+        ("t", lambda t: t[::-1], "t must be finite and increase"),
+        ("t", lambda t: np.where(t == t[5], np.nan, t), "t must be finite and increase"),
+        ("t", lambda t: t.astype(str), "t must hold numbers"),
+        ("q", lambda q: q[:, :1], "q_dot must have shape"),
+        ("q", lambda q: q[:, 0], "q must have two dimensions"),
+        ("q_dot", lambda q: q.T, "q_dot must have shape"),
+        ("force", lambda f: f[:, 1:], "force must have shape"),
+        ("stops", lambda s: np.vstack([s, s]), "force must have shape"),
+        ("stops", lambda s: s * np.nan, "stops must be finite"),
+        ("directions", lambda w: w[:, :1], "directions must have shape"),
+        ("strikers", lambda m: np.ones(9), "strikers must have shape"),
+        ("nodes", lambda z: z[1:], "shapes must have shape"),
+        ("nodes", lambda z: z[::-1], "nodes must be finite and increase"),
+        ("contact_stop", lambda s: s + 1, "contact_stop must hold numbers of stops, 0 to 0"),
+        ("contact_stop", lambda s: s + 0.5, "contact_stop must hold numbers of stops"),
+        ("contact_t_out", lambda t: t - 1.0, "contact_t_out must not be before"),
+        ("contact_impulse", lambda p: p[1:], "contact_impulse must have shape"),
+        ("energy_input", lambda e: e[1:], "energy_input must have shape"),
+        ("energy_initial", lambda e: np.ones(3), r"energy_initial must have shape \(\)"),
+    ],
+)
+def test_arrays_that_contradict_each_other_are_refused(run, tmp_path, name, change, message):
+    with np.load(run.save(tmp_path / "run.npz")) as data:
+        arrays = {key: data[key] for key in data.files}
+    np.savez(tmp_path / "run.npz", **{**arrays, name: change(arrays[name])})
+    with pytest.raises(ValueError, match=f"its arrays contradict each other: {message}"):
+        fb.load(tmp_path / "run.npz")
+
+
 def test_archive_of_something_else_is_refused(tmp_path):
     np.savez(tmp_path / "other.npz", x=np.arange(3))
     with pytest.raises(ValueError, match=r"other.npz is not a saved run"):

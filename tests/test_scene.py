@@ -9,8 +9,10 @@ import pytest
 from scipy import linalg
 
 import reduction
+from contacts import Hertz
 from fembeam.beam import Beam
 from fembeam.damping import ModalDamping, Rayleigh
+from fembeam.excitation import Harmonic
 from fembeam.scene import (
     Clamped,
     Dashpot,
@@ -68,7 +70,7 @@ def test_nodes_on_every_feature_and_probe():
         [Spring(0.456, 1.0)],
         [Dashpot(0.511, 1.0)],
         [Stop(0.789, Linear())],
-        forces=[PointForce(0.832, object())],
+        forces=[PointForce(0.832, np.sin)],
     )
     for matrices in (scene.matrices(modes=3, probes=[0.6543]), scene.matrices(elements=20, probes=[0.6543])):
         for z in (0.0, 0.31, 0.123, 0.456, 0.511, 0.789, 0.832, 0.6543, 0.97, 1.0):
@@ -214,8 +216,7 @@ def test_dashpots_come_on_top():
 
 
 def test_rigid_body_modes_are_not_damped_by_modal_ratios():
-    with pytest.warns(UserWarning, match="2 rigid-body modes appear in Scene"):
-        scene = Scene(BEAM, damping=ModalDamping(0.1))
+    scene = Scene(BEAM, damping=ModalDamping(0.1))
     matrices = scene.matrices(elements=4)
     assert np.abs(matrices.C @ matrices.influence).max() < 1e-9 * abs(matrices.C).max()
 
@@ -252,7 +253,7 @@ def test_rayleigh_rejects():
         ("springs", lambda z: Spring(z, 1.0)),
         ("dashpots", lambda z: Dashpot(z, 1.0)),
         ("stops", lambda z: Stop(z, Linear())),
-        ("forces", lambda z: PointForce(z, object())),
+        ("forces", lambda z: PointForce(z, np.sin)),
     ],
 )
 def test_features_must_sit_on_the_beam(name, feature):
@@ -282,7 +283,8 @@ def test_features_must_sit_on_the_beam(name, feature):
         (lambda: Stop(0.5, lambda d, v, e: d), "law must not be a bare function, .*decorate it with @law"),
         (lambda: Stop(0.5, 3.0), "law must offer force"),
         (lambda: Stop(0.5, Linear), "law must offer force"),
-        (lambda: PointForce(0.5, None), "signal must be given"),
+        (lambda: PointForce(0.5, None), "signal must be a function of t, got None"),
+        (lambda: PointForce(0.5, 3.0), "signal must be a function of t, got 3.0 .* a constant"),
     ],
 )
 def test_features_reject(make, message):
@@ -325,9 +327,47 @@ def test_rigid_body_modes_are_announced():
     ]
     for supports, springs, count in cases:
         with pytest.warns(UserWarning, match=f"{count} rigid-body") if count else _silent():
-            scene = Scene(BEAM, supports, springs=springs)
+            scene = Scene(BEAM, supports, springs=springs, base=Harmonic(1e-3, 50.0))
         assert scene.rigid_body_modes == count
         assert np.sum(basis_of(scene, 4)[1].omega == 0.0) == count
+
+
+def test_scenes_that_are_meant_to_move_freely_are_not_warned_of():
+    below, above = (Stop(0.5, Hertz(1e8), gap=1e-3, side=side) for side in ("below", "above"))
+    y, free = Harmonic(1e-3, 50.0), Scene(BEAM)
+    meant = [
+        {},  # thrown or struck
+        {"supports": [Pinned(0.0)], "stops": [below], "gravity": 9.81},  # lies on its stop
+        {"stops": [below, above], "base": y},
+        {"supports": [Clamped(0.0)], "bodies": [free], "stops": [below]},
+        {"bodies": [free], "stops": [Stop(0.5, Hertz(1e8), side=side, on=(1, 0.5)) for side in ("below", "above")]},
+    ]
+    for parts in meant:
+        with _silent():
+            Scene(BEAM, **parts)
+    on_body = Stop(0.5, Hertz(1e8), side="above", on=(1, 0.5))
+    with _silent():  # a body that gravity lays on the beam
+        Scene(BEAM, [Clamped(0.0)], stops=[on_body], bodies=[free], gravity=9.81)
+    drifting = [
+        ({"stops": [below], "base": y}, "2 rigid-body modes appear in Scene"),
+        ({"stops": [above], "supports": [Pinned(0.0)], "gravity": 9.81}, "1 rigid-body mode appears in Scene"),
+        ({"supports": [Clamped(0.0)], "bodies": [free], "stops": [below], "gravity": 9.81}, r"in bodies\[0\] of Scene"),
+        ({"forces": [PointForce(0.5, y)]}, "its loads may carry it away"),
+    ]
+    for parts, message in drifting:
+        with pytest.warns(UserWarning, match=message):
+            Scene(BEAM, **parts)
+
+
+def test_a_base_without_derivatives_is_refused_in_words():
+    with pytest.raises(
+        TypeError, match=r"base must be a motion .* got <function .* without derivative in Scene; use Har"
+    ):
+        Scene(BEAM, [Clamped(0.0)], base=lambda t: 1e-3 * np.sin(t))
+    with pytest.raises(TypeError, match=r"got 0\.001 without __call__ and derivative"):
+        Scene(BEAM, [Clamped(0.0)], base=1e-3)
+    with pytest.raises(TypeError, match=r"got <class .*Harmonic'> without values"):
+        Scene(BEAM, [Clamped(0.0)], base=Harmonic)
 
 
 def _silent():
@@ -379,8 +419,7 @@ def test_lists_become_tuples_and_stay_the_callers():
 
 
 def test_independent_formulation_of_the_free_beam():
-    with pytest.warns(UserWarning, match="2 rigid-body"):
-        scene = Scene(BEAM)
+    scene = Scene(BEAM)
     matrices, basis = basis_of(scene, 6, elements=12)
     reference = linalg.eigh(matrices.K.toarray(), matrices.M.toarray(), eigvals_only=True)
     np.testing.assert_allclose(basis.omega[2:] ** 2, reference[2:6], rtol=1e-8)

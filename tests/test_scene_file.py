@@ -176,7 +176,7 @@ def test_a_record_is_found_beside_the_scene(tmp_path):
     text = '[base]\nkind = "record"\npath = "motion.csv"\nquantity = "acceleration"\nscale = 1e-3'
     base = read(tmp_path, SIMPLE + text).scene.base
     assert isinstance(base, fb.Record)
-    assert base.kind == "acceleration"
+    assert base.quantity == "acceleration"
     assert base.y.max() == pytest.approx(4e-3)
 
 
@@ -289,4 +289,7 @@ def test_files_that_are_none(tmp_path):
     with pytest.raises(SceneFileError, match=r"needs a table \[beam\]"):
         read(tmp_path, "")
     with pytest.raises(SceneFileError, match=r"nothing\.csv"):
+        read(tmp_path, SIMPLE + '[base]\nkind = "record"\npath = "nothing.csv"\nquantity = "displacement"')
+    missing = r"the key 'quantity' is missing \('displacement' or 'acceleration' or 'force'\); it needs path, quantity"
+    with pytest.raises(SceneFileError, match=missing):
         read(tmp_path, SIMPLE + '[base]\nkind = "record"\npath = "nothing.csv"')

@@ -221,7 +221,7 @@ def growing(run):
         ((SCENE, [1], "amplitude", 1.0), "amplitude needs samples"),
         ((SCENE, [1], "peak_force", -1.0), "duration must be finite and positive"),
         ((SCENE, [1], "peak_force", 1.0, None, 1.0), "discard must be below the duration"),
-        ((SCENE, [1], "peak_force", 1.0, None, 0.0, [1, 2, 3]), "seeds need a random base"),
+        ((SCENE, [1], "peak_force", 1.0, None, 0.0, [1, 2, 3]), "seeds need noise"),
         ((SCENE, [1], "peak_force", 1.0, None, 0.0, [1]), "seeds must be at least 3"),
         ((SCENE, [1], "peak_force", None, None, 0.0, [1, 2, 3]), "seeds need a duration"),
         ((STIFF, [1], "peak_force"), "study without duration needs a periodic response: an orbit"),

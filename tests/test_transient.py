@@ -74,7 +74,7 @@ def test_a_moment_bends_the_beam():
         (lambda: fb.Pulse(1.0, 0.0), r"Pulse length \(s\) must be finite above 0"),
         (lambda: fb.Step(1.0, 0.1, at=-1.0), r"Step at \(s\) must be finite of at least 0"),
         (lambda: fb.Pulse(1.0, 1e-9).nodes(1e3, 1e-8), "simulate a shorter time or use a longer signal"),
-        (lambda: fb.PointMoment(0.1, None), "signal must be given, got None in PointMoment at z = 0.1"),
+        (lambda: fb.PointMoment(0.1, None), "signal must be a function of t, got None in PointMoment at z = 0.1"),
     ],
 )
 def test_bad_signals(make, message):

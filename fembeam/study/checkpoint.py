@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from fembeam.excitation import BandNoise
 from fembeam.model import Model
 from fembeam.run import written_whole
-from fembeam.study.realisation import signals
+from fembeam.signals import signals_of
+from fembeam.study.realisation import seed_key
 
 FORMAT = 1
 Values = dict[str, NDArray[Any]]
@@ -80,11 +81,14 @@ def identity(model: Model, quantity: Callable[..., Any]) -> dict[str, str]:
 
     Noise is told by its density, not by its seed; the quantity by its name, arguments and code.
     """
-    scene = model.scene
-    about = {f.name: repr(getattr(scene, f.name)) for f in fields(scene) if f.name not in ("base", "forces")}
-    about["base"] = repr(None) if scene.base is None else _signal(scene.base)
-    about["forces"] = repr([(force.z, _signal(force.signal)) for force in scene.forces])
-    about |= {"modes": repr(model.modes), "frequencies": _digest(model.omega), "noises": str(len(signals(model)))}
+    scene, signals = model.scene, signals_of(model.scene)
+    about = {f.name: repr(getattr(scene, f.name)) for f in fields(scene)}
+    for path, signal in signals.items():
+        about = {name: text.replace(repr(signal), path) for name, text in about.items()}
+    about |= {path: _signal(signal) for path, signal in signals.items()}
+    about |= {"modes": repr(model.modes), "frequencies": _digest(model.omega)}
+    seeds = [seed_key(signal.seed) for signal in signals.values() if hasattr(signal, "seed")]
+    about["noises"] = repr([seeds.index(seed) for seed in seeds])  # which of them are one realisation
     return about | {"quantity": _function(quantity)}
 
 

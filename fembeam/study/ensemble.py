@@ -87,7 +87,7 @@ def ensemble(
 
     Parameters
     ----------
-    model : with at least one `BandNoise` among base motion and forces; noises of one seed stay one realisation.
+    model : with at least one `BandNoise` among base motion, forces and feet; noises of one seed stay one realisation.
     seeds : how many, or the seeds themselves, none twice. A number spawns them from the noise's own seed
         (`numpy.random.SeedSequence`), so that a longer ensemble contains a shorter one.
     quantity : of the model under one realisation: a number, an array, or a mapping of names to these, such as
@@ -218,7 +218,9 @@ def _seeds(model: Model, seeds: int | Sequence[Seed]) -> list[Seed]:
     """The seeds of the realisations, checked."""
     own = noises(model)
     if not own:
-        raise ValueError("an ensemble needs a BandNoise as base motion or force; without it all realisations are equal")
+        raise ValueError(
+            "an ensemble needs a BandNoise as base motion, force or foot; without it all realisations are equal"
+        )
     if isinstance(seeds, (int, np.integer)) and not isinstance(seeds, bool):
         if seeds < 1:
             raise ValueError(f"seeds must be a number of at least 1 or a list of seeds, got {seeds}")

@@ -3,7 +3,7 @@
 Three kinds of run give them:
 
 * transient: one run of a given duration, one value, no scatter;
-* random: one run per seed of the base noise, one value each;
+* random: one run per seed of the noise, one value each;
 * periodic (no duration given): one long run under periodic loads, settled, cut into groups of twelve drive periods:
   an orbit of period 1, 2, 3, 4, 6 or 12 gives ten equal values, a chaotic response ten that scatter.
 """
@@ -23,7 +23,9 @@ from numpy.typing import NDArray
 import solvers
 from fembeam.orbit import load_period
 from fembeam.section import require, require_non_negative, require_positive
+from fembeam.signals import signals_of
 from fembeam.study.quantities import Quantity, label
+from fembeam.study.realisation import child, renewed
 
 if TYPE_CHECKING:
     import fembeam
@@ -77,8 +79,9 @@ class Plan:
             sampled = getattr(quantity, "sampled", True)
             require(self.dt is not None or not sampled, f"{label(quantity)} needs samples", None, "study", "give dt")
         if self.seeds:
-            require(hasattr(scene.base, "seed"), "seeds need a random base motion", scene.base, "study",
-                    "use BandNoise as base, or leave out seeds")  # fmt: skip
+            signals = signals_of(scene)
+            require(any(hasattr(signal, "seed") for signal in signals.values()), "seeds need noise", signals, "study",
+                    "use BandNoise as base, force or foot, or leave out seeds")  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,8 +189,8 @@ def _ledger_of(run: Run, kept: slice) -> solvers.Energy:
 
 
 def _seeded(model: Model, seed: int) -> Model:
-    """The model under another realisation."""
-    return model.under(replace(model.scene, base=replace(model.scene.base, seed=seed)))
+    """The model under another realisation of all its noise; the first one, often the only one, has the seed itself."""
+    return renewed(model, lambda j, _: child(seed, j) if j else seed)
 
 
 def _value(quantity: Quantity, run: Run, case: Case) -> Any:

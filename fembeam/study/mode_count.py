@@ -181,7 +181,7 @@ def mode_count(
     duration : s; None: the settled response to harmonic motion (360 drive periods, the last 120 in ten groups).
     dt : output sampling in s; None keeps contact log and end only, enough for forces, contact times, impact rates.
     discard : s at the beginning that the quantity does not see; the times it sees count from there.
-    seeds : of a random base motion, three or more; the same for all counts.
+    seeds : of the noise, three or more; the same for all counts.
     residual : with static shapes of stops and forces (True), without (False), both (None, if there are any).
     reference : a count, or "full" for all modes of the finest count's mesh; None: the finest of the counts.
     start : function of a model that gives its initial state, such as ``lambda m: m.state(velocity=…)``; None: rest.

@@ -8,23 +8,18 @@ from typing import Any
 
 import numpy as np
 
-from fembeam.excitation import BandNoise, Multisine
+from fembeam.excitation import Multisine
 from fembeam.model import Model
+from fembeam.signals import signals_of, with_signals
 
 Seed = int | np.random.SeedSequence
-
-
-def signals(model: Model) -> list[Any]:
-    """Base motion and forces of a model's scene."""
-    scene = model.scene
-    return ([] if scene.base is None else [scene.base]) + [force.signal for force in scene.forces]
 
 
 def noises(model: Model) -> list[Seed]:
     """Seeds of the noise in a model, each once: signals of one seed are one realisation and stay so."""
     found: dict[Any, Seed] = {}
-    for signal in signals(model):
-        if isinstance(signal, BandNoise):
+    for signal in signals_of(model.scene).values():
+        if hasattr(signal, "seed"):
             found.setdefault(seed_key(signal.seed), signal.seed)
     return list(found.values())
 
@@ -42,24 +37,16 @@ def child(seed: Seed, index: int) -> np.random.SeedSequence:
     return np.random.SeedSequence(parent.entropy, spawn_key=(*parent.spawn_key, index))
 
 
-def with_signals(model: Model, change: Callable[[Any], Any]) -> Model:
-    """The model with every signal changed."""
-    scene = model.scene
-    base = None if scene.base is None else change(scene.base)
-    forces = [replace(force, signal=change(force.signal)) for force in scene.forces]
-    return model.under(replace(scene, base=base, forces=forces))
-
-
 def renewed(model: Model, seed_of: Callable[[int, Seed], Seed]) -> Model:
     """The model with the seed of its noise number j replaced by seed_of(j, seed)."""
     places = {seed_key(seed): j for j, seed in enumerate(noises(model))}
 
     def change(signal: Any) -> Any:
-        if not isinstance(signal, BandNoise):
+        if not hasattr(signal, "seed"):
             return signal
         return replace(signal, seed=seed_of(places[seed_key(signal.seed)], signal.seed))
 
-    return with_signals(model, change)
+    return model.under(with_signals(model.scene, change))
 
 
 def realisation(model: Model, seed: Seed) -> Model:

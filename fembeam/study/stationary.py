@@ -23,11 +23,11 @@ from fembeam.lines import number
 from fembeam.model import Model
 from fembeam.plot.response import FINEST_RESOLUTION, places
 from fembeam.run import Run, bar
+from fembeam.signals import signals_of
 from fembeam.statistics.batches import Estimate
 from fembeam.statistics.impacts import Impacts
 from fembeam.statistics.streaming import Signal
 from fembeam.statistics.transient import Settling, settling
-from fembeam.study.realisation import signals
 from fembeam.study.stretches import Stretch, Stretches
 
 Vector = NDArray[np.float64]
@@ -292,5 +292,7 @@ def check(model: Model, duration: float, dt: float, until: float | None, discard
         raise ValueError(f"until must be a relative standard error below 1, got {until!r}")
     if discard is not None:
         number("discard (s)", discard, least=0.0)
-    if not signals(model):
-        raise ValueError("a stationary response needs something that drives it; give the scene base= or forces=")
+    if not signals_of(model.scene):
+        raise ValueError(
+            "a stationary response needs something that drives it; give the scene base=, forces= or a spring foot="
+        )

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from fembeam.excitation import BandNoise
 from fembeam.model import Model
 from fembeam.run import Run
+from fembeam.signals import signals_of, with_signals
 from fembeam.statistics.transient import FEWEST_BATCHES
-from fembeam.study.realisation import child, noises, renewed, shifted, signals, with_signals
+from fembeam.study.realisation import child, noises, renewed, shifted
 
 Vector = NDArray[np.float64]
 
@@ -69,7 +70,7 @@ class Stretches:
     @classmethod
     def of(cls, model: Model, duration: float, dt: float, discard: float | None, start: Any, solver: Any) -> Stretches:
         """The plan for a model."""
-        forgets, found = memory(model), signals(model)
+        forgets, found = memory(model), list(signals_of(model.scene).values())
         repeats = all(isinstance(s, BandNoise) or hasattr(s, "tones") for s in found)
         longest = min([STRETCH * forgets, MOST_SAMPLES * dt - LEAD_IN * forgets] if repeats else [math.inf])
         if repeats:
@@ -106,8 +107,8 @@ class Stretches:
         """One stretch from the state reached."""
         i = self.index + self.dropped
         model = renewed(self.model, lambda _, seed: child(seed, i)) if self.repeats else self.model
-        model = with_signals(model, lambda signal: shifted(signal, self.time))
-        run = model.simulate(duration, self.dt, self.state, self.solver)
+        scene = with_signals(model.scene, lambda signal: shifted(signal, self.time))
+        run = model.under(scene).simulate(duration, self.dt, self.state, self.solver)
         if not run.complete:
             raise KeyboardInterrupt
         self.seconds += run.cost.seconds

@@ -1,0 +1,63 @@
+"""Whether the arrays of a saved run belong together; a file that was cut, edited or mixed up is refused in words.
+
+k samples, n coordinates, m contacts, b nodes of a beam, c entries of the log:
+t (k,), q, q_dot (k, n), force (m, k), stops (m, 3), directions (m, n), strikers (i,), nodes (b,), shapes (2b, n),
+contact_* (c,), energy_* (k,) but energy_initial.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+Shape = tuple[int, ...]
+
+
+def check(arrays: Mapping[str, Any]) -> None:
+    """Raise ValueError unless shapes, times and numbers of stops agree; names the array."""
+    for name, array in arrays.items():
+        _need(array.dtype.kind in "biuf", f"{name} must hold numbers, it has type {array.dtype}")
+    _need(arrays["q"].ndim == 2, f"q must have two dimensions, it has shape {arrays['q'].shape}")
+    for name, shape in expected(arrays).items():
+        _need(arrays[name].shape == shape, f"{name} must have shape {shape}, it has {arrays[name].shape}")
+    for name in ("t", *(name for name in arrays if name.split("_")[0] == "nodes")):
+        steps = np.diff(arrays[name])
+        _need(np.isfinite(arrays[name]).all() and np.all(steps > 0), f"{name} must be finite and increase")
+    for name in ("shapes", "stops", "directions", "strikers"):
+        _need(np.isfinite(arrays[name]).all(), f"{name} must be finite")
+    _need(np.all(arrays["strikers"] > 0), "strikers must be positive masses")
+    _check_log(arrays)
+
+
+def expected(arrays: Mapping[str, Any]) -> dict[str, Shape]:
+    """{name: shape} that follow from q, stops, the nodes and the entries of the log."""
+    (k, n), m, entries = arrays["q"].shape, len(arrays["stops"]), arrays["contact_stop"].size
+    shapes: dict[str, Shape] = {"t": (k,), "q_dot": (k, n), "force": (m, k), "stops": (m, 3), "directions": (m, n)}
+    shapes["strikers"] = (min(arrays["strikers"].size, n),)
+    shapes |= {name: (entries,) for name in arrays if name.startswith("contact_")}
+    shapes |= {name: () if name == "energy_initial" else (k,) for name in arrays if name.startswith("energy_")}
+    for name in arrays:
+        if name.split("_")[0] == "nodes":
+            b = arrays[name].size
+            shapes |= {name: (b,), name.replace("nodes", "shapes"): (2 * b, n)}
+    return shapes
+
+
+def _check_log(arrays: Mapping[str, Any]) -> None:
+    """Contacts are with stops that exist and end after they began; a contact under way has no end."""
+    stop, t_in, t_out = (arrays[f"contact_{name}"] for name in ("stop", "t_in", "t_out"))
+    m = len(arrays["stops"])
+    known = stop.dtype.kind in "iu" and np.all((stop >= 0) & (stop < m))
+    _need(known, f"contact_stop must hold numbers of stops, 0 to {m - 1}")
+    ended = ~np.isnan(t_out)
+    _need(
+        np.isfinite(t_in).all() and np.all(t_out[ended] >= t_in[ended]), "contact_t_out must not be before contact_t_in"
+    )
+
+
+def _need(valid: Any, rule: str) -> None:
+    """Raise ValueError unless valid."""
+    if not valid:
+        raise ValueError(f"its arrays contradict each other: {rule}")
