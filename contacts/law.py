@@ -37,8 +37,9 @@ class Law(ABC):
     knots : indentations (m, ascending, > 0) where the force or its slope has a kink.
     jump : whether the force jumps when contact begins, F(0+, v) != 0.
     exponent : leading exponent p of F ~ delta**p at first touch; integrators choose their variable by it.
-    bend : where else the force has a kink: "rate" at delta_dot = 0, "force" where it is cut at zero (`uncut` is then the
-        law without the cut), None nowhere.
+    powers : exponents of all terms at first touch, 0 for one that jumps.
+    bend : where else the force has a kink: "rate" at delta_dot = 0, "force" where it is cut at zero (`uncut` is then
+        the law without the cut), None nowhere.
     entry_rate_floor : entry rates below it (m/s) are raised to it before the law sees them.
     equation, units, remarks : what `describe` says of it: the formula, units of the parameters, where it pulls, where
         it is singular, how it is integrated.
@@ -53,6 +54,11 @@ class Law(ABC):
     jump: bool = False
     exponent: float = 1.0
     entry_rate_floor: float = ENTRY_RATE_FLOOR
+
+    @property
+    def powers(self) -> tuple[float, ...]:
+        """The leading exponent, and 0 if the force jumps."""
+        return (0.0, self.exponent) if self.jump else (self.exponent,)
 
     @property
     def bend(self) -> str | None:
@@ -198,10 +204,13 @@ class Sum(Law):
 
     @property
     def exponent(self) -> float:  # type: ignore[override]
-        """The smallest; 1/2 where whole and half exponents mix, so that integrators expand in the root of time."""
-        exponents = [part.exponent for part in self.parts]
-        mixed = len({p % 1.0 for p in exponents}) > 1
-        return 0.5 if mixed and not self.jump else min(exponents)
+        """The smallest."""
+        return min(part.exponent for part in self.parts)
+
+    @property
+    def powers(self) -> tuple[float, ...]:
+        """Those of all parts."""
+        return tuple(sorted({power for part in self.parts for power in part.powers}))
 
     @property
     def bend(self) -> str | None:

@@ -205,6 +205,12 @@ class Viscoelastic(Law):
         return CLAMPED if self.clamp else PULLS, singular
 
     @property
+    def powers(self) -> tuple[float, ...]:
+        """Of the spring, and of the dashpot."""
+        p = self.exponent
+        return (0.5 * (p - 1.0), p) if self.damping else (p,)
+
+    @property
     def bend(self) -> str | None:
         """Damping on approach only ends where δ̇ = 0; such a law never pulls."""
         return ("rate" if self.damping else None) if self.approach_only else super().bend

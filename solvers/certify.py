@@ -133,13 +133,13 @@ def _bisect(coefficients, sign, b, guess):
 
 
 @inner
-def _energetic(problem, norms):
-    """Fastest block that carries more than 1e-10 of the energy, rad/s."""
-    total, fastest = 0.0, 1e-3
-    for b in range(problem.k.size):
+def _energetic(problem, tables, norms):
+    """Fastest block that carries more than 1e-12 of the energy, or tone, rad/s."""
+    total, fastest, own = 0.0, 1e-3, int(tables.own)
+    for b in range(own):
         total += norms[b] ** 2
     for b in range(problem.k.size):
-        if norms[b] ** 2 > 1e-10 * total:
+        if b >= own or norms[b] ** 2 > 1e-12 * total:
             fastest = max(fastest, math.sqrt(problem.k[b]) + problem.c[b])
     return fastest
 
@@ -232,7 +232,7 @@ def fly(problem, tables, state, space, t_end, budget, out, due, ledger):
                     space.m[s] = _acceleration_bound(problem, tables, s, space.norms, space.bounds, rest)
             span = min(span, rest)
             if ledger:
-                span = min(span, 3.0 / _energetic(problem, space.norms))
+                span = min(span, 3.0 / _energetic(problem, tables, space.norms))
             if ledger or first <= begin + span:
                 copy(state.x, space.x_new, state.x.size)
             for s in range(stops):

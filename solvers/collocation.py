@@ -5,8 +5,8 @@ On a step of length h the unknowns are the forces at S nodes of every stop in co
     δ(t_i) = free response + Σ_u Σ_j C_ij F_uj,   the same for δ̇,   F_sj ← law_s(δ(t_j), δ̇(t_j))
 
 iterated from the extrapolated polynomial of the step before. The state at the end is E(h) y + Σ kick F. The first
-step of a power law with a broken exponent uses t = h s² and F = s^{2p} g(s), which restores full order at the
-singular start; the last one, onto δ = 0, is one Runge–Kutta step in √δ (see `solvers.landing`).
+step of a law with broken powers of δ uses t = h σ^κ and F = σ^λ g(σ), which restores full order at the singular start
+(see `solvers.families`); the last one, onto δ = 0, is one Runge–Kutta step in δ^{1/κ} (see `solvers.landing`).
 
 Step control: with A₁ >= A₂ the sizes of the last two and the two before of the force's S Jacobi coefficients, the force
 beyond the polynomial is taken as A₁ max((A₁/A₂)^{S/2}, A₁/F_max), and what it does to the indentation rate of every
@@ -93,8 +93,8 @@ def solve_forces(problem, tables, state, space, family, level, rtol):
         settled, change = change <= 1e-27 * largest, math.sqrt(change)
         if iteration == 0:
             before = change / 0.3  # as iterations usually go
-        # changes that shrink by r = change/before, taken as 0.9 at most, add up to change r/(1 - r) from here on
-        if settled or change * change <= max(before - change, change / 9.0):
+        # changes that shrink by r = change/before, taken as 0.1 at least, 0.9 at most, add up to change r/(1 - r) more
+        if settled or (change <= 9.0 and change * change <= max(before - change, change / 9.0)):
             return True
         if iteration > 2 and change > 0.6 * before:
             break

@@ -86,7 +86,7 @@ def _entry_nodes(problem, tables, state, stop, level):
     """Kind of the next step: an entry if a force of broken exponent has just begun, that of ``stop`` before others."""
     found, while_ago = 0, 1e-6 * tables.step[level]
     for s in range(state.piece.size):
-        if state.piece[s] == 1 and tables.times[1 + s, 0] < tables.nodes[1 + s, 0] and (found == 0 or s == stop):
+        if state.piece[s] == 1 and tables.power[1 + s] > 1.0 and (found == 0 or s == stop):
             rate = dot(problem.read_rate[s], state.x, 2 * problem.k.size)
             if indentation(problem, s, state.x) <= while_ago * rate + 4.0 * surface_tolerance(problem, s, state.x):
                 found = 1 + s
@@ -176,7 +176,7 @@ def _try(problem, tables, state, space, family, level, rtol):
     arrive(problem, tables, state, space, family, level)
     if leaves_piece(problem, tables, state, space, family, level):
         return 1.0 if bottom else np.inf, first, bent
-    first, bent = bend_ahead(problem, tables, state, space, family, level)
+    first, bent = bend_ahead(problem, tables, state, space, family, level, rtol)
     if bent >= 0:
         return 1.0 if bottom else np.inf, first, bent
     error = step_error(problem, tables, state, space, family, level, space.last[FRESH] > 0, rtol)
@@ -295,7 +295,7 @@ def touch(problem, tables, state, space, t_end, rtol, log, out, due, ledger):
 def _end_inside(problem, tables, state, space, family, level, t_end):
     """End the run within the step found, at the state `_record` has left in ``space.work[17]``."""
     x, share = space.work[17], (t_end - state.now[T]) / tables.step[level]
-    place = math.sqrt(share) if tables.times[family, 0] < tables.nodes[family, 0] else share
+    place = share ** (1.0 / tables.power[family])
     for s in range(problem.gap.size):
         if state.piece[s] > 0:
             step_peaks(problem, tables, state, space, family, tables.step[level], s, min(place, 1.0))

@@ -4,8 +4,9 @@ A force is known by its values F_j at S nodes σ_j of (0, 1), t = h σ^κ:
 
     F(t) = w(σ) Σ_j L_j(σ) F_j / w(σ_j),
 
-*smooth*: κ = 1, w = 1, Gauss–Legendre nodes; *entry*: κ = 2, w = σ^{2p}, Gauss–Jacobi nodes for the weight σ^{2p+1},
-because a power law of exponent p entered at t = 0 is F = t^p × (a smooth function of √t).
+*smooth*: κ = 1, w = 1, Gauss–Legendre nodes; *entry*: w = σ^λ, Gauss–Jacobi nodes for the weight σ^{λ+κ-1}. A force
+whose terms begin like δ^p, p one of some powers, is at t = 0 a series in t^{1/κ} if all κp are whole numbers, and begins
+with t^{λ/κ}, λ/κ the smallest p: κ = 2, λ = 3 for Hertz's law, κ = 4, λ = 1 for that of Tsuji.
 """
 
 from __future__ import annotations
@@ -43,34 +44,34 @@ def gauss(count: int) -> Any:
 
 
 class _Family(NamedTuple):
-    """Nodes of a kind of contact step, t = h σ^power, F = σ^{2 exponent} × polynomial."""
+    """Nodes of a kind of contact step, t = h σ^power, F = σ^lead × polynomial."""
 
     power: float
-    exponent: float
+    lead: float
     nodes: Any
     weights: Any
     spectrum: Any
 
 
-def _family(power: float, exponent: float) -> _Family:
+def _family(power: float, lead: float) -> _Family:
     """Gauss–Jacobi nodes on (0, 1) for the weight of ∫F dt, and the coefficients they give."""
     from scipy.special import eval_jacobi, roots_jacobi
 
-    beta = 2.0 * exponent + power - 1.0
+    beta = lead + power - 1.0
     x, w = roots_jacobi(S, 0.0, beta)
     sigma = 0.5 * (1.0 + x)
     measure = power * w / 2.0 ** (beta + 1.0)
     polynomials = np.array([eval_jacobi(k, 0.0, beta, x) for k in range(S)])
     norm = (polynomials**2 * w).sum(axis=1)
-    scale = sigma ** (-2.0 * exponent)
-    return _Family(power, exponent, sigma, measure * scale, polynomials * w * scale / norm[:, None])
+    scale = sigma ** (-lead)
+    return _Family(power, lead, sigma, measure * scale, polynomials * w * scale / norm[:, None])
 
 
 class Families(NamedTuple):
     """All kinds of contact steps of a problem: the smooth one, then one per stop to enter it."""
 
     power: Any  # (f,)
-    exponent: Any
+    lead: Any
     nodes: Any  # (f, S), as the rest in `Tables`
     times: Any
     weights: Any
@@ -84,16 +85,22 @@ class Families(NamedTuple):
     alias: Any  # (f, P) largest error between the nodes of the interpolant of e^{iωt}, at `PHASES`
 
 
+def series_of(law: Any) -> tuple[float, float]:
+    """(κ, λ) of a law's force at entry; see the module."""
+    powers = getattr(law, "powers", None) or ((0.0, law.exponent) if law.jump else (law.exponent,))
+    for power in (1.0, 2.0, 4.0):
+        if all(abs(power * p - round(power * p)) < 1e-9 for p in powers):
+            return power, power * min(powers) if power > 1.0 else 0.0
+    return 2.0, 2.0 * min(powers)
+
+
 @lru_cache(maxsize=64)
-def families_of(exponents: tuple[float, ...], jumps: tuple[bool, ...]) -> Families:
-    """Kinds of steps for the stops' leading exponents."""
-    found = [_family(1.0, 0.0)]
-    for p, jump in zip(exponents, jumps, strict=True):
-        entry = p if not jump and p % 1.0 else 0.0
-        found.append(_family(2.0 if entry else 1.0, entry))
+def families_of(series: tuple[tuple[float, float], ...]) -> Families:
+    """Kinds of steps for the stops' (κ, λ)."""
+    found = [_family(*kind) for kind in ((1.0, 0.0), *series)]
     return Families(
         power=np.array([f.power for f in found]),
-        exponent=np.array([f.exponent for f in found]),
+        lead=np.array([f.lead for f in found]),
         nodes=np.array([f.nodes for f in found]),
         times=np.array([f.nodes**f.power for f in found]),
         weights=np.array([f.weights for f in found]),
@@ -103,7 +110,7 @@ def families_of(exponents: tuple[float, ...], jumps: tuple[bool, ...]) -> Famili
         zoom=np.ascontiguousarray([[_zoom(f, *bracket) for bracket in _brackets(f)] for f in found]),
         places=np.array([_brackets(f) for f in found]),
         extend=np.ascontiguousarray([_extensions(f, found[0]) for f in found]),
-        lagrange=np.array([_weights(f.nodes) * [np.ones(S), f.nodes ** (-2.0 * f.exponent)] for f in found]),
+        lagrange=np.array([_weights(f.nodes) * [np.ones(S), f.nodes ** (-f.lead)] for f in found]),
         alias=np.array([_alias(f) for f in found]),
     )
 
@@ -114,13 +121,13 @@ def _summary(family: _Family) -> Any:
     rows[:4] = family.spectrum[-4:]
     rows[4:6] = _interpolation(family.nodes, np.array([0.0, 1.0]))
     rows[6:8] = rows[4:6] @ _differentiation(family.nodes)
-    if family.exponent:
-        rows[4], rows[5] = 0.0, rows[5] * family.nodes ** (-2.0 * family.exponent)
+    if family.lead:
+        rows[4], rows[5] = 0.0, rows[5] * family.nodes ** (-family.lead)
     return rows.T
 
 
 def _plain_weights(family: _Family) -> Any:
-    """(S,) Σ weights × values = ∫ (polynomial through the values) dt/h, without the force's weight σ^{2 exponent}."""
+    """(S,) Σ weights × values = ∫ (polynomial through the values) dt/h, without the force's weight σ^λ."""
     points, weights = gauss(12)
     return (weights * family.power * points ** (family.power - 1.0)) @ _interpolation(family.nodes, points)
 
@@ -193,6 +200,6 @@ def _extensions(family: _Family, smooth: _Family) -> Any:
         times = 1.0 + 2.0 ** (-0.5 * (i - 2)) * smooth.nodes
         sigma = times ** (1.0 / family.power)
         out[i] = _interpolation(family.nodes, sigma)
-        if family.exponent:
-            out[i] *= np.outer(sigma ** (2.0 * family.exponent), family.nodes ** (-2.0 * family.exponent))
+        if family.lead:
+            out[i] *= np.outer(sigma**family.lead, family.nodes ** (-family.lead))
     return out.transpose(0, 2, 1)

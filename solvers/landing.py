@@ -1,7 +1,7 @@
 """Landing on a border: one Runge–Kutta step in a variable in which the contact is smooth, DOP853 with t an unknown.
 
     INDENTATION   dt = dδ/δ̇         lands exactly on a kink, or on another stop's surface
-    ROOT          dt = 2u du/δ̇      u = √δ: lands exactly on δ = 0, where δ^{3/2} is singular in t
+    ROOT          dt = κ u^{κ-1} du/δ̇, u = δ^{1/κ}, κ as at entry: lands exactly on δ = 0, where δ^{3/2} is singular
     TIME          dt                lands on a bend by the secant rule; the force is continuous there
 
 The unknowns are [p, v, ledger, t, u]. Every block moves by less than `_reach` radians, within which the step is exact
@@ -11,8 +11,6 @@ error, where DOP853's own mixed estimate falls below it.
 """
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 
@@ -63,7 +61,8 @@ def _rate(problem, tables, ledger, variable, stop, span, w, piece, entry_rate, o
     if variable == INDENTATION:
         factor = span / delta_dot
     elif variable == ROOT:
-        factor = span * 2.0 * w[t + 1] / delta_dot
+        kappa = tables.power[1 + stop]
+        factor = span * kappa * w[t + 1] ** (kappa - 1.0) / delta_dot
     for e in range(t):
         out[e] *= factor
     out[t] = factor
@@ -113,24 +112,25 @@ def _length_to(problem, tables, state, space, variable, stop, span, landed, time
     w, x, size, tries = space.work[17], space.work[15], state.x.size, 0
     t = w[size]
     left = (landed - time) / (landed - t) if landed > t else 0.0
-    length = span * (1.0 - (math.sqrt(left) if variable == ROOT else left))
+    kappa = tables.power[1 + stop]
+    length = span * (1.0 - (left ** (1.0 / kappa) if variable == ROOT else left))
     while True:
         _step(problem, tables, state, space, variable, stop, length, ledger)
         late, tries = x[size] - time, tries + 1
         pace = 1.0 if variable == TIME else dot(problem.read_rate[stop], x, 2 * problem.k.size)  # d(variable)/dt
         if variable == ROOT:
-            pace /= 2.0 * x[size + 1]
+            pace /= kappa * x[size + 1] ** (kappa - 1.0)
         if not abs(late) > 1e-15 * landed or not abs(pace) < np.inf or tries == _MOST_TRIES:
             return length if abs(late) <= 1e-6 * (landed - t) + 1e-15 * landed else np.inf
         length -= late * pace
 
 
 @inner
-def _start(problem, state, space, stop):
-    """The state as a landing of ``stop`` begins it, with t and √δ, into ``space.work[17]``."""
-    w, size = space.work[17], state.x.size
+def start_landing(problem, tables, state, space, stop):
+    """The state as a landing of ``stop`` begins it, with t and δ^{1/κ}, into ``space.work[17]``."""
+    w, size, delta = space.work[17], state.x.size, max(indentation(problem, stop, state.x), 0.0)
     copy(state.x, w, size)
-    w[size], w[size + 1] = state.now[T], math.sqrt(max(indentation(problem, stop, state.x), 0.0))
+    w[size], w[size + 1] = state.now[T], delta ** (1.0 / tables.power[1 + stop])
 
 
 @inner
@@ -189,10 +189,9 @@ def land(problem, tables, state, space, stop, direction, near, rtol, t_end, out,
         return -1
     if not leaving and state.piece[stop] > 0 and abs(level - delta) > 0.2 * max(level, delta):
         return -1
-    _start(problem, state, space, stop)
+    start_landing(problem, tables, state, space, stop)
     w, x = space.work[17], space.work[15]
-    broken = tables.exponent[stop] % 1.0 != 0.0
-    variable = ROOT if leaving and broken else INDENTATION
+    variable = ROOT if leaving and tables.power[1 + stop] > 1.0 else INDENTATION
     span = -w[size + 1] if variable == ROOT else level - delta
     _step(problem, tables, state, space, variable, stop, span, ledger)
     landed = x[size]
@@ -217,7 +216,7 @@ def land_on_bend(problem, tables, state, space, stop, near, rtol, t_end, out, du
     furthest, largest = space.reach[0] / tables.fastest, space.sides[space.sides.size - 1]
     if not 0.0 < near <= furthest:
         return False
-    _start(problem, state, space, stop)
+    start_landing(problem, tables, state, space, stop)
     w, x, batch = space.work[17], space.work[15], space.trial
     before, apart, span = 0.0, side_at(problem, tables, state, stop, w, batch), near
     for _ in range(_MOST_TRIES):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from solvers.families import S
@@ -65,7 +63,7 @@ def powers(problem, tables, t, x):
 def inside(problem, tables, state, space, family, h, span, row):
     """State at ``span`` after the start of a step of length h, by quadrature of its forces; ``row`` holds the start."""
     stops, n = problem.gap.size, problem.k.size
-    entry = tables.times[family, 0] < tables.nodes[family, 0]  # t = h σ²
+    power, lead = tables.power[family], tables.lead[family]  # t = h σ^power
     for b in range(n):
         alpha, beta = propagate(problem.k[b], problem.c[b], span)
         p, v = row[b], row[n + b]
@@ -73,21 +71,20 @@ def inside(problem, tables, state, space, family, h, span, row):
         row[n + b] = alpha * v - beta * (problem.k[b] * p + problem.c[b] * v)
     if problem.table_dt.size == 0 and not touching(state):
         return
-    exponent = 2.0 * tables.exponent[family - 1] if entry else 0.0  # of the force of the stop entered
     nodes, plain, weighted, products = tables.nodes[family], space.work[0], space.work[1], space.work[2]
-    _scales(nodes, exponent, plain, weighted)
-    end = math.sqrt(span / h) if entry else span / h
+    _scales(nodes, lead, plain, weighted)
+    end = (span / h) ** (1.0 / power)
     panels = 1 + int(tables.fastest * span / 4.0)
     for g in range(panels * S):
         sigma = end * (g // S + tables.nodes[0, g % S]) / panels
-        time = h * sigma * sigma if entry else h * sigma
-        measure = end * tables.weights[0, g % S] / panels * h * (2.0 * sigma if entry else 1.0)
+        time = h * sigma**power
+        measure = end * tables.weights[0, g % S] / panels * h * power * sigma ** (power - 1.0)
         _products(nodes, sigma, products)
         for u in range(stops + problem.load.shape[0]):
             if u < stops and state.piece[u] == 0:
                 continue
-            if entry and u == family - 1:
-                impulse = measure * sigma**exponent * _between(products, weighted, space.force[u])
+            if lead > 0.0 and u == family - 1:
+                impulse = measure * sigma**lead * _between(products, weighted, space.force[u])
             else:
                 impulse = measure * _between(products, plain, space.force[u])
             push = problem.push[u] if u < stops else problem.load[u - stops]

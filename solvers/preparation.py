@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from solvers.families import S
+from solvers.families import S, series_of
 from solvers.forcing import Forcing, on_one_grid, tones_as_nodes
 from solvers.handle import Cast, Layout, Mould
 from solvers.kernels import INTEGERS, MATRIX, PROBLEM, REAL, VECTOR, Problem
@@ -27,8 +27,8 @@ def _arrays(*dimensions: int) -> list[Any]:
 
 TABLES = types.NamedTuple(
     [
-        *_arrays(1, 3, 4, 2, 3, 2, 3, 2, 2, 2, 2, 0, 2, 1, 2),
-        *_arrays(1, 3, 2, 2, 2, 2, 3, 3, 4, 3, 5, 6, 5, 4, 2, 2, 2, 2, 4),
+        *_arrays(1, 3, 4, 2, 3, 2, 3, 2, 2, 2, 2, 0, 0, 2, 1, 2),
+        *_arrays(1, 3, 1, 1, 2, 2, 2, 2, 3, 3, 4, 3, 5, 6, 5, 4, 2, 2, 2, 2, 4),
         *(VECTOR, INTEGERS, INTEGERS, MATRIX),
     ],
     Tables,
@@ -138,14 +138,14 @@ class _Skeleton:
         plain, self.tones = problem_of(system, forcing), len(forcing.tone_omega)
         self.k, self.c, self.load = plain.k, plain.c, plain.load  # not the whole, which holds the sampled signals
         laws = [contact.law for contact in system.contacts]
-        self.kinds = [law.exponent for law in laws], [law.jump for law in laws]
+        self.series = tuple(series_of(law) for law in laws)
         problem, loss = _widened(plain, forcing), _loss_rows(plain)
         read_by = plain.read, plain.power, loss, system.blocks.T
         self.rows, ends = np.concatenate(read_by), np.cumsum([len(rows) for rows in read_by]).tolist()
         self.places = [slice(end - len(rows), end) for rows, end in zip(read_by, ends, strict=True)]
         self.back, self.fastest = among_tones(system.blocks.T, self.tones), max(float(_speeds(system).max()), 1e-3)
         ledger = np.zeros_like(problem.load), problem.power, among_tones(loss, self.tones)
-        tables = build(problem, self.tones, *self.kinds, known_of(laws), dt_cell, ledger)
+        tables = build(problem, self.tones, self.series, known_of(laws), dt_cell, ledger)
         self.layout = _layout(len(problem.gap), len(problem.load), len(problem.k), len(forcing.table_dt))
         self.problem = Mould(problem, PROBLEM, ("gap", "k", "read", "read_rate", "power"))
         self.tables = Mould(tables, TABLES, OF_TONES)
@@ -167,7 +167,7 @@ class _Skeleton:
         rate = _of_tones(problem.value.read_rate, n)
         rate[:, 0], rate[:, 1] = -v * problem.value.k[n:], p
         tables.value.power_rows[:] = problem.value.power
-        fill_tones(tables.value, problem.value, self.tones, *self.kinds)
+        fill_tones(tables.value, problem.value, self.tones, self.series)
         rest = among_tones(-response.real.sum(axis=0), self.tones)
         rest[n : n + self.tones] = 1.0
         return Prepared(problem, tables, back, self.layout, rest, [])

@@ -22,7 +22,6 @@ At an entry of zero rate (to rounding) the derivative does not exist; dt* is tak
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -48,7 +47,7 @@ from solvers.kernels import (
     inner,
     rhs,
 )
-from solvers.landing import regular_step
+from solvers.landing import regular_step, start_landing
 from solvers.ledger import inside
 from solvers.newton import factorise, linearise, substitute
 from solvers.preparation import SPACE, TABLES
@@ -292,7 +291,7 @@ def _step(problem, ahead, behind, tables, shadow, space, slopes, nudge, row, mod
             respond(problem, tables, shadow, space, family, level, s)
             _by_parameter(ahead, behind, shadow, space, nudge, slopes, s)
     factorise(space.jacobian, space.pivots, linearise(problem, tables, shadow, space, family, level))
-    moving = tables.times[family, 0] < tables.nodes[family, 0]
+    moving = tables.power[family] > 1.0
     part = row[SPAN] if row[KIND] == PART else np.inf
     if moving:
         rhs(problem, t, shadow.x, shadow.piece, shadow.entry_rate, slopes.rate[0], slopes.batch)
@@ -361,10 +360,8 @@ def _stage_rates(problem, ahead, behind, shadow, slopes, nudge, w, factor, out):
 def _land(problem, ahead, behind, tables, shadow, space, slopes, nudge, row):
     """A landing: the variational equation on the Runge–Kutta step's own stages."""
     variable, stop, size = int(row[FIRST]), int(row[SECOND]), 2 * problem.k.size
-    w, width = space.work[17], shadow.x.size
-    copy(shadow.x, w, width)
-    w[width], w[width + 1] = row[BEGAN], math.sqrt(max(indentation(problem, stop, shadow.x), 0.0))
-    span = row[SPAN]
+    w, width, span = space.work[17], shadow.x.size, row[SPAN]
+    start_landing(problem, tables, shadow, space, stop)
     ledger = np.bool_(0)  # a literal would be compiled for itself
     regular_step(problem, tables, ledger, variable, stop, span, w, shadow.piece, shadow.entry_rate, space.work)
     trial = space.work[STAGES + 1]

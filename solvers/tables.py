@@ -47,15 +47,18 @@ class Tables(NamedTuple):
     direct: Any  # (m, L): δ̈ per unit of a signal
     load_norm: Any  # (L, N): energy norm of a load per block
     fastest: float  # |λ|max
+    own: float  # number of the structure's own blocks; those behind are tones
     mobility: Any  # (m, m): δ̈ of stop s per newton at stop u, positive where the force opens the contact
     exponent: Any  # (m,) leading exponents p
     inlined: Any  # (m, 4) (K, p, a, c) of a force K δ^p (1 + a δ̇/δ̇⁻) + c δ̇; p = 0 for the laws to be called
     step: Any  # (j,) contact steps
     step_propagator: Any  # (j, 2, N)
+    power: Any  # (f,) κ
+    lead: Any  # (f,) λ
     nodes: Any  # (f, S) σ
     times: Any  # (f, S) σ^κ
     weights: Any  # (f, S): ∫F dt = h Σ weights F
-    plain: Any  # (f, S): the same of a force without the weight σ^{2p}
+    plain: Any  # (f, S): the same of a force without the weight σ^λ
     summary: Any  # (f, S, 8): from node values, the last four Jacobi coefficients, both ends' values, both slopes
     tail: Any  # (f, S, 8): from node values of a signal, the last four Legendre coefficients in σ
     zoom: Any  # (f, S, 2S, 2S): δ and h δ̇ at points around a node from those at all nodes
@@ -78,6 +81,7 @@ class Tables(NamedTuple):
 class Known(NamedTuple):
     """What the tables hold of the laws."""
 
+    exponent: Any
     inlined: Any
     bend: Any
     uncut: Any
@@ -90,6 +94,7 @@ def known_of(laws: Sequence[Any]) -> Known:
     bends = [getattr(law, "bend", None) for law in laws]
     uncut = [law.uncut if bend == "force" else law for law, bend in zip(laws, bends, strict=True)]
     return Known(
+        np.array([law.exponent for law in laws], dtype=float),
         np.array([getattr(law, "inlined", None) or (0.0,) * 4 for law in laws]).reshape(-1, 4),
         np.array([(None, "rate", "force").index(bend) for bend in bends], dtype=float),
         np.array([law.address for law in uncut], dtype=np.int64),
@@ -116,7 +121,7 @@ def propagate(k, c, x):
 
 
 @inner
-def _block_response(k, c, h, rate, power, exponent, nodes, weights, gauss, out, basis):
+def _block_response(k, c, h, rate, power, lead, nodes, weights, gauss, out, basis):
     """out[i, j] = (α, β) of ∫_0^{t_i} E(t_i - τ) w(σ) L_j(σ)/w(σ_j) dτ; i = S is the end of the step."""
     count = nodes.size
     for i in range(count + 1):
@@ -136,10 +141,11 @@ def _block_response(k, c, h, rate, power, exponent, nodes, weights, gauss, out, 
             for g in range(gauss.shape[1]):
                 sigma = left + width * gauss[0, g]
                 t, measure = h * sigma, h * width * gauss[1, g]
-                if power == 2.0:
-                    t, measure = t * sigma, measure * 2.0 * sigma
-                if exponent > 0.0:
-                    measure *= sigma ** (2.0 * exponent)
+                if power > 1.0:
+                    pace = sigma ** (power - 1.0)
+                    t, measure = t * pace, measure * power * pace
+                if lead > 0.0:
+                    measure *= sigma**lead
                 alpha, beta = propagate(k, c, tb - t)
                 lagrange(nodes, weights, sigma, basis)
                 for j in range(count):
@@ -183,40 +189,38 @@ def _fill_forced(problem, b, family, level, u, pushed, nodes, work, forced, kick
 
 
 @inner
-def _fill_block(
-    problem, b, h, family, level, power, exponent, nodes, weights, gauss, inputs, forced, kick, work, basis
-):
-    """What inputs do through one block: the stop that enters pushes with a broken exponent, the others without."""
+def _fill_block(problem, b, h, family, level, power, lead, nodes, weights, gauss, inputs, forced, kick, work, basis):
+    """What inputs do through one block: the force of the stop that enters has the weight σ^lead."""
     size = problem.k.size
     rate = math.sqrt(problem.k[b]) + problem.c[b]
     reached = 0.0
     for u in range(inputs.shape[0]):
         reached += abs(inputs[u, b]) + abs(inputs[u, size + b])
     for weighted in range(2):
-        if reached == 0.0 or (weighted == 1 and exponent == 0.0):
+        if reached == 0.0 or (weighted == 1 and lead == 0.0):
             continue
         _block_response(
-            *(problem.k[b], problem.c[b], h, rate, power, exponent * weighted),
+            *(problem.k[b], problem.c[b], h, rate, power, lead * weighted),
             *(nodes, weights[weighted], gauss, work, basis),
         )
         for u in range(inputs.shape[0]):
             pushed = inputs[u, b], inputs[u, size + b]
-            enters = u == family - 1 and exponent > 0.0
+            enters = u == family - 1 and lead > 0.0
             if enters == (weighted == 1) and (pushed[0] != 0.0 or pushed[1] != 0.0):
                 _fill_forced(problem, b, family, level, u, pushed, nodes, work, forced, kick)
 
 
 @kernel
-def _fill(problem, blocks, h, powers, exponents, nodes, weights, gauss, inputs, free, forced, kick, work, basis):
-    """All tables of the smooth family and of the entries with a broken exponent, for some of the blocks."""
+def _fill(problem, blocks, h, powers, leads, nodes, weights, gauss, inputs, free, forced, kick, work, basis):
+    """All tables of the smooth family and of the entries that are not smooth, for some of the blocks."""
     for f in range(powers.size):
-        if f > 0 and exponents[f] == 0.0:
+        if f > 0 and powers[f] == 1.0:
             continue
         for level in range(h.size):
             for b in range(blocks[0], blocks[1]):
                 _fill_free(problem, b, h[level], f, level, powers[f], nodes[f], free)
                 _fill_block(
-                    *(problem, b, h[level], f, level, powers[f], exponents[f], nodes[f], weights[f]),
+                    *(problem, b, h[level], f, level, powers[f], leads[f], nodes[f], weights[f]),
                     *(gauss, inputs, forced, kick, work, basis),
                 )
 
@@ -276,8 +280,7 @@ _MOST_KNOWN = 16
 def build(
     problem: Problem,
     tones: int,
-    exponents: list[float],
-    jumps: list[bool],
+    series: tuple[tuple[float, float], ...],
     laws: Known,
     dt_cell: float,
     ledger: tuple[Any, Any, Any],
@@ -287,7 +290,7 @@ def build(
     omega, damping = np.sqrt(problem.k), problem.c
     fastest = float(max((omega + damping).max(), 1e-3))
     h, contact_h = _steps(omega, damping, tones)
-    families = families_of(tuple(exponents), tuple(jumps))
+    families = families_of(series)
     blocks = _blocks(problem, tones, h, contact_h, families)
     return Tables(
         h=h,
@@ -305,11 +308,13 @@ def build(
         direct=problem.read_rate @ problem.load.T,
         load_norm=np.sqrt(problem.load[:, size:] ** 2 + problem.k * problem.load[:, :size] ** 2),
         fastest=fastest,
+        own=float(size - tones),
         mobility=-problem.read_rate @ problem.push.T,
-        exponent=np.array(exponents, dtype=float),
         **laws._asdict(),
         step=contact_h,
         step_propagator=blocks.step_propagator,
+        power=families.power,
+        lead=families.lead,
         nodes=families.nodes,
         times=families.times,
         weights=families.weights,
@@ -330,7 +335,7 @@ def build(
     )
 
 
-def fill_tones(tables: Tables, problem: Problem, tones: int, exponents: list[float], jumps: list[bool]) -> None:
+def fill_tones(tables: Tables, problem: Problem, tones: int, series: tuple[tuple[float, float], ...]) -> None:
     """Fill the columns of a problem's last blocks, its ``tones``, into tables `build` has made."""
     if not tones:
         return
@@ -344,7 +349,7 @@ def fill_tones(tables: Tables, problem: Problem, tones: int, exponents: list[flo
     if problem.table_dt.size:
         _fill_propagators(problem.k, problem.c, (own, size), problem.table_dt[:1], tables.cell[None])
     blocks = _Blocks(*(getattr(tables, name) for name in _Blocks._fields))
-    _filled(blocks, problem, (own, size), tables.h, tables.step, families_of(tuple(exponents), tuple(jumps)))
+    _filled(blocks, problem, (own, size), tables.h, tables.step, families_of(series))
 
 
 def doublings(speeds: Any, tones: Any) -> int:
@@ -410,11 +415,11 @@ def _filled(
     _fill_propagators(problem.k, problem.c, blocks, contact_h, tables.step_propagator)
     inputs = np.ascontiguousarray(np.concatenate((problem.push, problem.load)).reshape(-1, 2 * len(problem.k)))
     _fill(
-        *(problem, blocks, contact_h, families.power, families.exponent, families.nodes, families.lagrange),
+        *(problem, blocks, contact_h, families.power, families.lead, families.nodes, families.lagrange),
         *(gauss(12), inputs, tables.free, tables.forced, tables.kick, np.zeros((S + 1, S, 2)), np.zeros(S)),
     )
     _fill_ripple(problem, blocks, contact_h, PHASES, families.alias, tables.ripple)
-    for f in np.flatnonzero(families.exponent[1:] == 0.0) + 1:  # an analytic entry is a smooth step
+    for f in np.flatnonzero(families.power[1:] == 1.0) + 1:  # an analytic entry is a smooth step
         tables.free[f] = tables.free[0]
         if blocks[0] == 0:
             tables.forced[f], tables.kick[f] = tables.forced[0], tables.kick[0]

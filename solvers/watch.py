@@ -108,10 +108,11 @@ def choose_sides(problem, tables, state, space):
 
 
 @inner
-def bend_ahead(problem, tables, state, space, family, level):
+def bend_ahead(problem, tables, state, space, family, level, rtol):
     """(time after the begin of the step, stop) of the first bend on it; no stop is -1.
 
-    A stop that begins on its bend takes the side of the first node.
+    A stop that begins on its bend takes the side of the first node; one that moves, or whose force is, within the
+    tolerance bends without harm.
     """
     first, stop, h = np.inf, -1, tables.step[level]
     for s in range(problem.gap.size):
@@ -124,6 +125,9 @@ def bend_ahead(problem, tables, state, space, family, level):
         largest = abs(begin)
         for i in range(S + 1):
             largest = max(largest, abs(values[i]))
+        harmless = 0.01 * rtol * space.scale[s] if tables.bend[s] == RATE else space.accuracy[s]
+        if largest <= harmless:
+            continue
         if abs(begin) <= _ON * largest and space.side[s] * values[0] < -_SAME * largest:
             space.side[s] = -space.side[s]
         before, t = begin, 0.0

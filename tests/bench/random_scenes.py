@@ -120,7 +120,7 @@ def differences(a: dict[str, Any], b: dict[str, Any], measure: dict[str, Any], p
 def imbalance(solution: Any) -> float:
     """Energy a run does not account for, in units of all the energy it handled."""
     e = solution.energy
-    handled = e.initial + np.abs(e.input).max() + np.abs(e.stored).max() + np.abs(e.contact).max()
+    handled = e.initial + np.abs(e.input).max() + np.abs(e.stored).max() + np.abs(solution.contacts.energy_loss).sum()
     return float(np.abs(e.residual).max() / max(handled, 1e-300))
 
 
