@@ -119,13 +119,17 @@ def level_of(tables, h):
 
 
 @inner
-def _nearest_surface(problem, state):
-    """(time, stop, direction) of the border of a piece that will be met first at the present rates."""
+def _nearest_surface(problem, state, space):
+    """(time, stop, direction) of the border of a piece that will be met first at the present rates.
+
+    These may be faster than those at entry: the reference speeds follow.
+    """
     size = 2 * problem.k.size
     near, stop, direction = np.inf, -1, 0
     for s in range(problem.gap.size):
         delta = indentation(problem, s, state.x)
         rate = dot(problem.read_rate[s], state.x, size)
+        space.scale[s] = max(space.scale[s], abs(rate))
         piece = state.piece[s]
         if rate < 0.0 and piece > 0:
             time, way = (delta - problem.levels[s, piece - 1]) / -rate, -1
@@ -165,10 +169,6 @@ def _try(problem, tables, state, space, family, level, rtol):
     With inf comes the time of a bend that is in its way and the stop, else inf and -1.
     """
     bottom, first, bent = level == tables.step.size - 1, np.inf, -1
-    for s in range(problem.gap.size):
-        if state.piece[s] > 0:  # a stop the loads lean on moves faster than it was entered
-            rate = abs(dot(problem.read_rate[s], state.x, 2 * problem.k.size))
-            space.scale[s] = max(space.scale[s], rate)
     free_response(problem, tables, state, space, family, level)
     _predict(problem, tables, state, space, level)
     if not solve_forces(problem, tables, state, space, family, level, rtol):
@@ -228,7 +228,7 @@ def _land_first(problem, tables, state, space, stop, direction, near, rtol, t_en
 def touch(problem, tables, state, space, t_end, rtol, log, out, due, ledger):
     """One accepted step in contact: land if a border is near, else collocate; returns a status code."""
     last, bottom = space.last, tables.step.size - 1
-    near, stop, direction = _nearest_surface(problem, state)
+    near, stop, direction = _nearest_surface(problem, state, space)
     if near <= 0.0 and switch_on_surface(problem, state, log, True):
         if touching(state):
             begin(problem, tables, state, space, latest(state))

@@ -147,16 +147,16 @@ def bend_ahead(problem, tables, state, space, family, level, rtol):
 def on_the_way(problem, tables, state, space, stop, w, x):
     """What happens besides the landing of ``stop`` between the states w and x, which end in their times.
 
-    FREE, TURNED, or another stop that has crossed a border of its piece.
+    FREE, TURNED, or another stop that has crossed a border of its piece. A peak must lie in another kind of step.
     """
     size, width = 2 * problem.k.size, state.x.size
     d = x[width] - w[width]
     long = d > 4.0 * tables.step[tables.step.size - 1]
     for s in range(problem.gap.size):
         piece = state.piece[s]
+        slope_a, slope_b = dot(problem.read_rate[s], w, size), dot(problem.read_rate[s], x, size)
         if s != stop:
             a, b = indentation(problem, s, w), indentation(problem, s, x)
-            slope_a, slope_b = dot(problem.read_rate[s], w, size), dot(problem.read_rate[s], x, size)
             tolerance = surface_tolerance(problem, s, x)
             upper = problem.levels[s, piece] + tolerance
             lower = problem.levels[s, piece - 1] - tolerance if piece > 0 else -np.inf
@@ -164,10 +164,10 @@ def on_the_way(problem, tables, state, space, stop, w, x):
                 return s
             if long and _passes(d, a, slope_a, b, slope_b, lower, upper):
                 return TURNED
-            if long and piece > 0 and slope_a > 0.0 > slope_b:
-                return TURNED
         if not long or piece == 0:
             continue
+        if slope_a > 0.0 > slope_b and (s != stop or tables.bend[s] != RATE):
+            return TURNED
         bends = s != stop and tables.bend[s] > 0.0
         if bends and space.side[s] * side_at(problem, tables, state, s, x, space.trial) < 0.0:
             return TURNED
