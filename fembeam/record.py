@@ -284,9 +284,9 @@ class Record:
         start = initial_curvature(y, h, math.pi / h if self.band is None else self.band[1])
         if not abs(start) > MOVING * rms:
             return ""
-        return (f"Record begins with y'' = {start:.3g} m/s² (rms {rms:.3g}), but y'' of a displacement record is zero "
-                "at its ends: its first samples load the structure wrongly; begin where it is at rest, fade it in, or "
-                "give the acceleration")  # fmt: skip
+        return (f"Record begins with y'' near {start:.2g} m/s² (rms {rms:.3g}), but y'' of a displacement record is "
+                "zero at its ends: its first samples load the structure wrongly; begin where it is at rest, fade it "
+                "in, or give the acceleration")  # fmt: skip
 
 
 def _within(lines: LineSpectrum, band: tuple[float, float]) -> LineSpectrum:
