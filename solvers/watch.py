@@ -24,6 +24,7 @@ from solvers.vector import above_zero
 RATE, FORCE = 1.0, 2.0  # kinds of bends in Tables.bend; 0 for a law that has none
 FREE, TURNED = -1, -2  # of a landing: nothing else happens on the way, or something does that wants shorter steps
 _ON = 1e-9  # value, in units of the largest of the step, at which a stop counts as on its bend
+_TOGETHER = 1e-6  # part of its way by which a stop may be carried over its bend when another lands
 _SAME = 1e-11  # the same for the sign of a node
 
 
@@ -111,7 +112,7 @@ def choose_sides(problem, tables, state, space):
 def bend_ahead(problem, tables, state, space, family, level, rtol):
     """(time after the begin of the step, stop) of the first bend on it; no stop is -1.
 
-    A stop that begins on its bend takes the side of the first node; one that moves, or whose force is, within the
+    A stop that begins on its bend, or was carried over it, takes the side of the first node; one that moves, or whose force is, within the
     tolerance bends without harm.
     """
     first, stop, h = np.inf, -1, tables.step[level]
@@ -128,7 +129,7 @@ def bend_ahead(problem, tables, state, space, family, level, rtol):
         harmless = 0.01 * rtol * space.scale[s] if tables.bend[s] == RATE else space.accuracy[s]
         if largest <= harmless:
             continue
-        if abs(begin) <= _ON * largest and space.side[s] * values[0] < -_SAME * largest:
+        if space.side[s] * begin <= _ON * largest and space.side[s] * values[0] < -_SAME * largest:
             space.side[s] = -space.side[s]
         before, t = begin, 0.0
         for i in range(S + 1):
@@ -168,9 +169,10 @@ def on_the_way(problem, tables, state, space, stop, w, x):
             continue
         if slope_a > 0.0 > slope_b and (s != stop or tables.bend[s] != RATE):
             return TURNED
-        bends = s != stop and tables.bend[s] > 0.0
-        if bends and space.side[s] * side_at(problem, tables, state, s, x, space.trial) < 0.0:
-            return TURNED
+        if s != stop and tables.bend[s] > 0.0:
+            before = space.side[s] * side_at(problem, tables, state, s, w, space.trial)
+            if space.side[s] * side_at(problem, tables, state, s, x, space.trial) < -_TOGETHER * abs(before):
+                return TURNED
         if _force_turns(space.work, size + 3 + 2 * s, width, state.open[s, PEAK_FORCE]):
             return TURNED
     return FREE
