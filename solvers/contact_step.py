@@ -176,7 +176,7 @@ def _try(problem, tables, state, space, family, level, rtol):
     arrive(problem, tables, state, space, family, level)
     if leaves_piece(problem, tables, state, space, family, level):
         return 1.0 if bottom else np.inf, first, bent
-    first, bent = bend_ahead(problem, tables, state, space, family, level, rtol)
+    first, bent = bend_ahead(problem, tables, state, space, family, level, space.last[FRESH] > 0, rtol)
     if bent >= 0:
         return 1.0 if bottom else np.inf, first, bent
     error = step_error(problem, tables, state, space, family, level, space.last[FRESH] > 0, rtol)

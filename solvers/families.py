@@ -5,8 +5,8 @@ A force is known by its values F_j at S nodes σ_j of (0, 1), t = h σ^κ:
     F(t) = w(σ) Σ_j L_j(σ) F_j / w(σ_j),
 
 *smooth*: κ = 1, w = 1, Gauss–Legendre nodes; *entry*: w = σ^λ, Gauss–Jacobi nodes for the weight σ^{λ+κ-1}. A force
-whose terms begin like δ^p, p one of some powers, is at t = 0 a series in t^{1/κ} if all κp are whole numbers, and begins
-with t^{λ/κ}, λ/κ the smallest p: κ = 2, λ = 3 for Hertz's law, κ = 4, λ = 1 for that of Tsuji.
+whose terms begin like δ^p, p one of some powers, is at t = 0 a series in t^{1/κ} if all κp are whole numbers, and
+begins with t^{λ/κ}, λ/κ the smallest p: κ = 2, λ = 3 for Hertz's law, κ = 4, λ = 1 for that of Tsuji.
 """
 
 from __future__ import annotations

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from solvers.balance import unbalanced
 from solvers.forcing import Forcing, hand_over
 from solvers.result import COLUMNS, ContactLog, Cost, Energy, Solution, SolverError, Status
 from solvers.state import CALLS, EVENTS, LOG_FULL, LOGGED, REJECTED, RUNNING, SAMPLED, STATUSES, STEPS, T, contact_row
@@ -23,6 +24,7 @@ from solvers.system import Array, Parameter, System, product
 
 _BUDGET = 20_000  # steps between two looks at the world outside
 _MOST_SAMPLES = 500_000_000
+_DEPTH, _FORCE = (list(ContactLog.__dataclass_fields__).index(name) for name in ("peak_indentation", "peak_force"))
 _NEVER, _NOWHERE = np.array([math.inf]), np.empty((0, 0))  # no output is due
 
 
@@ -77,6 +79,7 @@ def integrate(
     begin = time.perf_counter()
     status = run.to_the_end(progress)
     solution = run.solution(status, time.perf_counter() - begin)
+    status = solution.status
     if isinstance(tangent, Parameter) and status is Status.DONE and not run.tangent.exact:
         ends = [_end(s, q0, q_dot0, duration, method) for s in (tangent.behind, tangent.ahead)]
         column = (ends[1] - ends[0]) / (2.0 * tangent.step)
@@ -266,12 +269,24 @@ class _Run:
         powers = x[:, size:] if self.times is None else x[:, size:].copy()  # so that all the samples can be let go
         complete = self.engine.keeps_ledger(self.times is not None)
         ledger = partial(_energy, self.system, powers, complete, motion, back, self.begin)
-        log = partial(ContactLog.of_rows, self._rows())
+        rows = self._rows()
+        log = partial(ContactLog.of_rows, rows)
+        if status is Status.DONE and not self._balances(powers, complete, motion, rows):
+            status = Status.UNBALANCED
         count = self.state.count.tolist()
         cost = Cost(count[STEPS], count[REJECTED], count[CALLS], count[EVENTS], seconds)
         known = self.tangent is not None and status is Status.DONE
         more = {"tangent": self.tangent.matrix(), "rate": self.tangent.rate()} if known else {}
         return Solution(t, motion[:, :n], motion[:, n:], log, ledger, status, cost, **more)
+
+    def _balances(self, powers: Array, complete: bool, motion: Array, rows: Array) -> bool:
+        """Whether the energy does, by the ledger if there is one; methods that do not say are looked at as they go."""
+        if not hasattr(self.engine, "gains"):
+            return True
+        if not complete or not len(motion):
+            return not self.engine.gains()
+        exchanged, begin = rows[:, _DEPTH] * rows[:, _FORCE], self.engine.back @ self.begin
+        return not unbalanced(self.system, powers, motion, begin, exchanged, self.engine.method.rtol)
 
     def release(self) -> None:
         """Leave to other runs what this one wrote to."""

@@ -36,7 +36,7 @@ TABLES = types.NamedTuple(
 SPACE = types.NamedTuple(
     [
         *(*_arrays(1, 2, 2, 1, 1, 1, 1, 2, 3, 1, 3, 2, 1, 3, 2, 3, 2, 1), INTEGERS, MATRIX),
-        *(*_arrays(1, 1, 1, 1, 2, 1, 1, 1, 1), INTEGERS),
+        *(*_arrays(1, 1, 1, 1, 2, 1, 1, 1, 1, 1), INTEGERS),
     ],
     Space,
 )
@@ -51,6 +51,7 @@ class Workspace:
         self.numbers = self.block[: layout.size]
         self.addresses = [words + start for start in layout.starts]
         self.state = State._make(layout.arrays(self.block, 0))
+        self.energy = layout.array(self.block, 1, Space._fields.index("energy"))
         begin_state(self.state, rest)
         self.rest = self.numbers.copy()
         self.own = self.state.x[: rest.size].reshape(2, -1)[:, :blocks]
@@ -209,7 +210,7 @@ def _layout(stops: int, loads: int, blocks: int, signals: int) -> Layout:
         (2, padded(blocks)),
         *((stops, 2, S), (S,), (stops, 2, S), (stops + loads, S), (S,), (stops, 2, 8), (stops, S), (stops, 3, S)),
         *((stops * S, stops * S), (stops * S,), (stops * S,), (18, padded(width + 2))),
-        *((stops,), (stops,), (stops,), (stops,), (4, 2 * S), (stops,), (S + 2,), (1,), (1,), (6,)),
+        *((stops,), (stops,), (stops,), (stops,), (4, 2 * S), (stops,), (S + 2,), (1,), (1,), (3,), (6,)),
     ]
     return Layout([STATE, SPACE], [state_shapes(width, stops), space])
 

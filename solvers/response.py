@@ -43,6 +43,7 @@ class Space(NamedTuple):
     sides: Any  # (S + 2,) see `solvers.watch`
     reach: Any  # (1,) radians of the fastest block that a landing may take
     duration: Any  # (1,) s, that of the contact begun last, if it were free
+    energy: Any  # (3,) see `solvers.balance`
     last: Any  # (6,) see `solvers.contact_step`
 
 

@@ -37,6 +37,7 @@ class Status(Enum):
     CHATTER = "more events than progress in time; a contact chatters: add damping, or change its law"
     LOG_FULL = "the contact log is full"
     LAW_NOT_FINITE = "a contact law gave a force that is not finite"
+    UNBALANCED = "the energy does not balance: the result is wrong; use a smaller rtol, or DormandPrince"
     GAINED = "the motion holds more energy than it was ever given: the method is unstable here"
 
     @property

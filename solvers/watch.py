@@ -109,11 +109,11 @@ def choose_sides(problem, tables, state, space):
 
 
 @inner
-def bend_ahead(problem, tables, state, space, family, level, rtol):
+def bend_ahead(problem, tables, state, space, family, level, fresh, rtol):
     """(time after the begin of the step, stop) of the first bend on it; no stop is -1.
 
-    A stop that begins on its bend, or was carried over it, takes the side of the first node; one that moves, or whose force is, within the
-    tolerance bends without harm.
+    A stop that begins on its bend (``fresh``), or was carried over it, takes the side of the first node; one whose rate, or force,
+    stays within the tolerance bends without harm.
     """
     first, stop, h = np.inf, -1, tables.step[level]
     for s in range(problem.gap.size):
@@ -129,7 +129,8 @@ def bend_ahead(problem, tables, state, space, family, level, rtol):
         harmless = 0.01 * rtol * space.scale[s] if tables.bend[s] == RATE else space.accuracy[s]
         if largest <= harmless:
             continue
-        if space.side[s] * begin <= _ON * largest and space.side[s] * values[0] < -_SAME * largest:
+        on = space.side[s] * begin < 0.0 or (fresh and abs(begin) <= _ON * largest)
+        if on and space.side[s] * values[0] < -_SAME * largest:
             space.side[s] = -space.side[s]
         before, t = begin, 0.0
         for i in range(S + 1):

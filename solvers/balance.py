@@ -1,0 +1,77 @@
+"""Whether a finished run's energy balances: with the ledger at its samples, without one by a bound that costs nothing.
+
+The energy handled is what there was at first, came in, was lost to damping or is stored, and for every contact its peak
+force times its peak indentation. With ledger a run is refused whose residual exceeds (`MULTIPLE` rtol + `ROUNDING`)
+times that energy.
+
+Without, the motion less the steady response to tones is looked at: its energy E at the end is at most that at the begin
+plus what the contacts gave,
+
+    E <= E₀ + Σ_s (2 max|δ̇_s of the steady response| |∫F_s dt| - ∫F_s δ̇_s dt) =: E_c,
+
+and sampled loads v_l s_l(t) raise √(2E) by at most Σ_l |v_l|_{M⁻¹} ∫|s_l| dt. A run is refused whose energy is more
+than `FACTOR` times what this allows: a run that only loses too much passes.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from solvers.kernels import inner
+from solvers.result import Energy
+from solvers.system import Array, System, dense
+
+MULTIPLE, ROUNDING = 100.0, 1e-9
+FACTOR = 4.0
+_SAMPLES = 64  # of the ledger that are looked at, the last one among them
+FIRST, LAST, ALLOWED = range(3)  # places in Space.energy
+
+
+@inner
+def own_energy(problem, tables, x):
+    """Energy of the motion less the steady response to tones."""
+    n, energy = problem.k.size, 0.0
+    for b in range(int(tables.own)):
+        energy += 0.5 * (x[n + b] * x[n + b] + problem.k[b] * x[b] * x[b])
+    return energy
+
+
+@inner
+def note_energy(problem, tables, state, space):
+    """At the end of a run: its energy, and what it may be without sampled loads."""
+    n = problem.k.size
+    allowed = space.energy[FIRST]
+    for s in range(problem.gap.size):
+        steady = 0.0
+        for b in range(int(tables.own), n):
+            steady += np.hypot(problem.read_rate[s, b], problem.read_rate[s, n + b] * np.sqrt(problem.k[b]))
+        work, impulse = state.x[2 * n + 2 + 2 * s], state.x[2 * n + 3 + 2 * s]
+        allowed += 2.0 * steady * abs(impulse) - work
+    space.energy[LAST], space.energy[ALLOWED] = own_energy(problem, tables, state.x), max(allowed, 0.0)
+
+
+def too_much(system: System, energy: Any, sampled: Any, duration: float) -> bool:
+    """Whether a run without ledger ends with more energy than it can have been given; ``sampled`` are its loads."""
+    if system.blocks.loss.size or not energy[LAST] > FACTOR * energy[ALLOWED]:
+        return False
+    speed = np.sqrt(2.0 * energy[ALLOWED])
+    for j, load in enumerate(sampled.table_load):
+        rows = sampled.table[sampled.table_start[j] : sampled.table_start[j + 1], 0]
+        vector = np.asarray(system.loads[load][0])
+        size = np.sqrt(vector @ np.linalg.solve(dense(system.M), vector))
+        speed += size * np.abs(rows).mean() * duration
+    return bool(energy[LAST] > FACTOR * 0.5 * speed**2)
+
+
+def unbalanced(system: System, powers: Array, motion: Array, begin: Array, contacts: Array, rtol: float) -> bool:
+    """Whether the ledger of a run (rows of powers and motion at its samples) does not balance.
+
+    ``contacts`` (k,) : peak force times peak indentation of every contact.
+    """
+    rows = np.unique(np.linspace(0, len(powers) - 1, _SAMPLES).astype(int))
+    ledger = Energy.of_run(system.M, system.K, powers[rows], motion[rows], begin)
+    parts = ledger.initial, *(np.abs(part).max() for part in (ledger.stored, ledger.input, ledger.damping))
+    handled = sum(parts) + np.abs(contacts).sum()
+    return not np.abs(ledger.residual).max() <= (MULTIPLE * rtol + ROUNDING) * handled
