@@ -191,25 +191,31 @@ def landing_tolerance(problem, state, stop):
 
 @inner
 def _land(step, problem, state, space, h, longest, stop, direction, level, rtol, atol):
-    """Repeat the step with the duration that ends on ``level``; returns it, -1 if none up to ``longest`` does."""
+    """Repeat the step with the duration that ends on ``level``; returns it, else minus the step to try instead."""
     tolerance = landing_tolerance(problem, state, stop)
     before, beyond = 0.0, longest
     for _ in range(MOST_LANDINGS):
-        _, calls = step(  # with so loose a tolerance that there is an interpolant, whatever the error
+        error, calls = step(
             *(problem, state.now[T], h, state.x, state.rate, state.piece, state.entry_rate),
-            *(space.x_new, space.rate_new, space.dense, space.work, 1e300, atol),
+            *(space.x_new, space.rate_new, space.dense, space.work, rtol, atol),
         )
         state.count[CALLS] += calls
         distance = direction * (indentation(problem, stop, space.x_new) - level)
         if abs(distance) <= tolerance:
-            return h
+            return _if_accurate(h, error)
         before, beyond = (h, beyond) if distance < 0.0 else (before, h)
         slope = direction * dot(problem.read_rate[stop], space.x_new, 2 * problem.k.size)
         corrected = nearer(h, distance, slope, before, beyond, longest)
         if not corrected > 0.0:  # a graze, off the surface by rounding or in need of a closer look
-            return h if abs(distance) <= 100.0 * tolerance else -1.0
+            return _if_accurate(h, error) if abs(distance) <= 100.0 * tolerance else -0.5 * longest
         h = corrected
-    return -1.0
+    return -0.5 * longest
+
+
+@inner
+def _if_accurate(h, error):
+    """A landing of duration h, or minus the step to try: where a law bends a shorter step may be the worse one."""
+    return h if error <= 1.0 else -max(0.2, 0.9 * error**-0.125) * h if np.isfinite(error) else -0.2 * h
 
 
 @inner
@@ -357,8 +363,8 @@ def march(
                 continue
             if theta < NONE:
                 h = _land(step, problem, state, space, theta * h, tried, stop, direction, level, rtol, atol)
-                if h < 0.0:  # the interpolant crosses, the step does not: look closer
-                    now[phase] = 0.5 * tried
+                if h < 0.0:  # the interpolant crosses, the step does not, or not to the tolerance: look closer
+                    now[phase] = -h
                     count[REJECTED] += 1
                     continue
         elif events == HENON and phase == H_FLIGHT and not by_hand:  # the paper's scheme
