@@ -425,13 +425,26 @@ def watched(system: System, motion: Array, least: float) -> Array:
     return np.array([stored, stored, least, 0.0, 0.0, *held])
 
 
-def negligible_energy(problem: Any, inverse_mass: Array, dt: float) -> float:
-    """What rounding in the loads may bring: 1e-10 of the energy ½ vᵀM⁻¹v (s dt)² of the largest in one step, J."""
+def largest_loads(problem: Any) -> Array:
+    """Bound of every load's signal (L,)."""
     largest = np.zeros(len(problem.load))
     np.add.at(largest, problem.tone_load, np.abs(problem.tone_amplitude))
     for j, load in enumerate(problem.table_load):
         largest[load] += np.abs(problem.table[problem.table_start[j] : problem.table_start[j + 1], 0]).max()
-    return 0.5e-10 * dt**2 * float(np.sum(inverse_mass * largest**2))
+    return largest
+
+
+def absolute_tolerance(method: Any, problem: Any, z: Array, fastest: float) -> float:
+    """The method's own, or less where start and loads are so small that it would stand above rtol times the motion."""
+    p, v = np.abs(z).reshape(2, -1).max(axis=1)
+    push = np.abs(problem.load).max(axis=1, initial=0.0) @ largest_loads(problem) / fastest
+    size = max(p, v / fastest, push / fastest)
+    return float(min(method.atol, method.rtol * size) if size > 0.0 else method.atol)
+
+
+def negligible_energy(problem: Any, inverse_mass: Array, dt: float) -> float:
+    """What rounding in the loads may bring: 1e-10 of the energy ½ vᵀM⁻¹v (s dt)² of the largest in one step, J."""
+    return 0.5e-10 * dt**2 * float(np.sum(inverse_mass * largest_loads(problem) ** 2))
 
 
 class Engine:
@@ -449,6 +462,7 @@ class Engine:
         self.space = new_space(self.state, method.work_rows, watched(system, self.back @ z, least), method.constants)
         fastest = max([math.sqrt(abs(k)) for k in self.problem.k] + list(self.problem.c) + [1.0 / duration])
         self.state.now[[H_FLIGHT, H_CONTACT]] = 0.1 / fastest, 0.01 / fastest
+        self.atol = absolute_tolerance(method, self.problem, z, fastest)
         if not method.adaptive:
             self.state.now[[H_FLIGHT, H_CONTACT]] = method.steps
 
@@ -470,7 +484,7 @@ class Engine:
         dt_flight, dt_contact = (math.inf, math.inf) if method.adaptive else method.steps
         code = march(
             *(method.step, self.problem, self.state, self.space, self.duration, budget),
-            *(dt_flight, dt_contact, method.rtol, method.atol),
+            *(dt_flight, dt_contact, method.rtol, self.atol),
             *(method.adaptive, method.events, log, out, due),
         )
         return GAINED if code in (DONE, RUNNING) and self._gained() else code

@@ -170,7 +170,7 @@ def judge(seed: int) -> tuple[str, str, dict[float, dict[str, float]]]:
         clear = rows[:, 5] > shallow * rtol
         if not clear.all():
             log = log[log[:, 5] > shallow * rtol]
-        there, unit = rows[clear], rtol * scale[clear] + ROUNDING * largest
+        there, unit = rows[clear], np.maximum(rtol * scale[clear] + ROUNDING * largest, 1e-300)
         found = {"motion": float((np.abs(end - exact) / size).max()) / (rtol * gain)}
         if same and log.shape != there.shape:
             verdict = f"{len(log)} contacts at rtol {rtol:g}, exactly {len(there)}"
