@@ -44,7 +44,7 @@ from solvers.kernels import (
     rhs,
 )
 from solvers.result import Status
-from solvers.stability import shortest_contact, takes, work_of
+from solvers.stability import kinks_of, shortest_contact, takes, work_of
 from solvers.state import (
     AT_ONCE,
     CALLS,
@@ -87,6 +87,8 @@ STEP = types.FunctionType(
 
 EVENT = -1  # beside the status codes
 _PEAK_NODES = np.linspace(0.0, 1.0, 9)
+_KINK_NODES = np.array([0.0, 1 / 16, 1 / 4, 1 / 2, 3 / 4, 7 / 8, 31 / 32, 127 / 128, 511 / 512, 1.0])
+_AT_AN_END = 1e-6  # share of a step: a kink as near to an end as that is landed on
 
 
 class Space(NamedTuple):
@@ -98,9 +100,10 @@ class Space(NamedTuple):
     work: Any  # (rows, x.size) of the method
     coefficients: Any  # (2, 8)
     watch: Any  # see `watched`
+    kinks: Any  # (m,) where laws bend inside a piece, see `solvers.stability.kinks_of`; looked at under error control
 
 
-SPACE = types.NamedTuple([VECTOR, VECTOR, MATRIX, MATRIX, MATRIX, VECTOR], Space)
+SPACE = types.NamedTuple([VECTOR, VECTOR, MATRIX, MATRIX, MATRIX, VECTOR, INTEGERS], Space)
 NOW, BEGAN, LEAST, IN_A_ROW, MOST_INPUT, HELD = range(6)  # places in `Space.watch`, see `watched`
 _GAINS = 8  # steps in a row: one alone may be the ledger's, as in the first step of a load
 _FAR, _GAINS_FAR = 1e3, 3  # times the energy given, and then steps in a row
@@ -152,6 +155,43 @@ def _peak_value(problem, state, s, column, delta_of, rate_of, theta, batch):
     batch[1] = polynomial(rate_of, theta)
     contact_forces(problem, s, batch[0:1], batch[1:2], state.entry_rate[s], batch[2:3])
     return batch[2]
+
+
+@inner
+def _kink(problem, state, space):
+    """θ of the first place inside the step where a clamped force begins or ends, or a damper of approach; else NONE."""
+    first, batch = NONE, space.work[0]
+    for s in range(problem.gap.size):
+        if state.piece[s] == 0 or space.kinks[s] == 0:
+            continue
+        coefficients_of(problem.read[s], problem.gap[s], state.x, space.dense, space.coefficients[0])
+        coefficients_of(problem.read_rate[s], 0.0, state.x, space.dense, space.coefficients[1])
+        lowest = landing_tolerance(problem, state, s)
+        for i in range(1, _KINK_NODES.size):
+            a, b = _KINK_NODES[i - 1], _KINK_NODES[i]
+            before = _side(problem, state, space, s, a, lowest, batch)
+            if before == _side(problem, state, space, s, b, lowest, batch):
+                continue
+            for _ in range(50):
+                middle = 0.5 * (a + b)
+                same = _side(problem, state, space, s, middle, lowest, batch) == before
+                a, b = (middle, b) if same else (a, middle)
+            if b > _AT_AN_END and b < 1.0 - _AT_AN_END:
+                first = min(first, b)
+                break
+    return first
+
+
+@inner
+def _side(problem, state, space, s, theta, lowest, batch):
+    """On which side of its kinks a law is at θ of the step; beyond the surface on that of the surface."""
+    delta, rate = polynomial(space.coefficients[0], theta), polynomial(space.coefficients[1], theta)
+    side = 2 if space.kinks[s] & 2 and rate > 0.0 else 0
+    if space.kinks[s] & 1 and delta > lowest:
+        batch[0], batch[1] = delta, rate
+        contact_forces(problem, s, batch[0:1], batch[1:2], state.entry_rate[s], batch[2:3])
+        side += 1 if batch[2] == 0.0 else 0
+    return side
 
 
 @inner
@@ -385,6 +425,14 @@ def march(
                 )
                 hermite(h, state.x, state.rate, space.x_new, space.rate_new, space.dense)
 
+        # --- a law that bends within its piece: end there, the error of a step across it is not what is estimated
+        if adaptive and phase == H_CONTACT:
+            theta = _kink(problem, state, space)
+            if theta < NONE:
+                now[phase] = theta * h
+                count[REJECTED] += 1
+                continue
+
         # --- accept, record
         at_end = stop < 0 and h == tried and h >= t_end - now[T]
         code = accept(problem, state, space, h, stop, direction, at_end, t_end, log, out, due)
@@ -403,12 +451,20 @@ def march(
     return RUNNING
 
 
-def new_space(state: State, work_rows: int, watch: Array, constants: tuple[float, ...] = ()) -> Space:
+def new_space(state: State, work_rows: int, watch: Array, constants: tuple[float, ...] = (), kinks: Any = ()) -> Space:
     """Working arrays; a method's constants stand in the last row of ``work``."""
     size = state.x.size
     work = np.empty((work_rows, size))
     work[-1, : len(constants)] = constants
-    return Space(np.empty(size), np.empty(size), np.zeros((7, size)), work, np.empty((2, 8)), watch)
+    return Space(
+        np.empty(size),
+        np.empty(size),
+        np.zeros((7, size)),
+        work,
+        np.empty((2, 8)),
+        watch,
+        np.array(kinks, dtype=np.int64),
+    )
 
 
 def watched(system: System, motion: Array, least: float) -> Array:
@@ -459,7 +515,8 @@ class Engine:
         self.state: State = new_state(z, len(system.contacts))
         dt = 0.0 if method.adaptive else max(method.steps)
         least = negligible_energy(self.problem, np.sum(self.problem.load * self.problem.power, axis=1), dt)
-        self.space = new_space(self.state, method.work_rows, watched(system, self.back @ z, least), method.constants)
+        watch = watched(system, self.back @ z, least)
+        self.space = new_space(self.state, method.work_rows, watch, method.constants, kinks_of(system))
         fastest = max([math.sqrt(abs(k)) for k in self.problem.k] + list(self.problem.c) + [1.0 / duration])
         self.state.now[[H_FLIGHT, H_CONTACT]] = 0.1 / fastest, 0.01 / fastest
         self.atol = absolute_tolerance(method, self.problem, z, fastest)
