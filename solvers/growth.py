@@ -61,12 +61,14 @@ def lyapunov(
     if not 0.0 <= discard < duration:
         raise ValueError(f"discard must lie in [0, duration), got {discard!r} of {duration!r} s")
     run = prepared_run(system, q0, q_dot0, duration, None, Exponential() if method is None else method, True)
-    status = run.to_the_end(None)
-    if status is not Status.DONE:
-        raise SolverError(f"stopped at t = {run.time:.9g} s of {duration:g} s: {status.value}")
+    borders = np.linspace(discard, duration, _BATCHES + 1)
+    for border in borders[borders > 0.0]:  # the tangent's size is known where a stretch ends: at each border, too
+        run.engine.duration = float(border)
+        status = run.to_the_end(None)
+        if status is not Status.DONE:
+            raise SolverError(f"stopped at t = {run.time:.9g} s of {duration:g} s: {status.value}")
     t, growth = np.array([(0.0, 0.0), *run.tangent.history]).T
     if not np.all(np.isfinite(growth)):
         raise SolverError("the tangent vanished: neighbouring motions meet below the range of numbers; shorten the run")
-    borders = np.linspace(discard, duration, _BATCHES + 1)
     rates = np.diff(np.interp(borders, t, growth)) / np.diff(borders)
     return Exponent(float(rates.mean()), float(rates.std(ddof=1) / math.sqrt(_BATCHES)))

@@ -44,7 +44,7 @@ from solvers.kernels import (
     rhs,
 )
 from solvers.result import Status
-from solvers.stability import shortest_contact, takes, work_of
+from solvers.stability import kinks_of, shortest_contact, takes, work_of
 from solvers.state import (
     AT_ONCE,
     CALLS,
@@ -87,6 +87,8 @@ STEP = types.FunctionType(
 
 EVENT = -1  # beside the status codes
 _PEAK_NODES = np.linspace(0.0, 1.0, 9)
+_KINK_NODES = np.array([0.0, 1 / 16, 1 / 4, 1 / 2, 3 / 4, 7 / 8, 31 / 32, 127 / 128, 511 / 512, 1.0])
+_AT_AN_END = 1e-6  # share of a step: a kink as near to an end as that is landed on
 
 
 class Space(NamedTuple):
@@ -98,9 +100,10 @@ class Space(NamedTuple):
     work: Any  # (rows, x.size) of the method
     coefficients: Any  # (2, 8)
     watch: Any  # see `watched`
+    kinks: Any  # (m,) where laws bend inside a piece, see `solvers.stability.kinks_of`; looked at under error control
 
 
-SPACE = types.NamedTuple([VECTOR, VECTOR, MATRIX, MATRIX, MATRIX, VECTOR], Space)
+SPACE = types.NamedTuple([VECTOR, VECTOR, MATRIX, MATRIX, MATRIX, VECTOR, INTEGERS], Space)
 NOW, BEGAN, LEAST, IN_A_ROW, MOST_INPUT, HELD = range(6)  # places in `Space.watch`, see `watched`
 _GAINS = 8  # steps in a row: one alone may be the ledger's, as in the first step of a load
 _FAR, _GAINS_FAR = 1e3, 3  # times the energy given, and then steps in a row
@@ -155,6 +158,43 @@ def _peak_value(problem, state, s, column, delta_of, rate_of, theta, batch):
 
 
 @inner
+def _kink(problem, state, space):
+    """θ of the first place inside the step where a clamped force begins or ends, or a damper of approach; else NONE."""
+    first, batch = NONE, space.work[0]
+    for s in range(problem.gap.size):
+        if state.piece[s] == 0 or space.kinks[s] == 0:
+            continue
+        coefficients_of(problem.read[s], problem.gap[s], state.x, space.dense, space.coefficients[0])
+        coefficients_of(problem.read_rate[s], 0.0, state.x, space.dense, space.coefficients[1])
+        lowest = landing_tolerance(problem, state, s)
+        for i in range(1, _KINK_NODES.size):
+            a, b = _KINK_NODES[i - 1], _KINK_NODES[i]
+            before = _side(problem, state, space, s, a, lowest, batch)
+            if before == _side(problem, state, space, s, b, lowest, batch):
+                continue
+            for _ in range(50):
+                middle = 0.5 * (a + b)
+                same = _side(problem, state, space, s, middle, lowest, batch) == before
+                a, b = (middle, b) if same else (a, middle)
+            if b > _AT_AN_END and b < 1.0 - _AT_AN_END:
+                first = min(first, b)
+                break
+    return first
+
+
+@inner
+def _side(problem, state, space, s, theta, lowest, batch):
+    """On which side of its kinks a law is at θ of the step; beyond the surface on that of the surface."""
+    delta, rate = polynomial(space.coefficients[0], theta), polynomial(space.coefficients[1], theta)
+    side = 2 if space.kinks[s] & 2 and rate > 0.0 else 0
+    if space.kinks[s] & 1 and delta > lowest:
+        batch[0], batch[1] = delta, rate
+        contact_forces(problem, s, batch[0:1], batch[1:2], state.entry_rate[s], batch[2:3])
+        side += 1 if batch[2] == 0.0 else 0
+    return side
+
+
+@inner
 def _law_fails(problem, state, space, h):
     """Whether a law is not finite where an Euler step would take its stop."""
     batch = space.work[0]
@@ -191,25 +231,31 @@ def landing_tolerance(problem, state, stop):
 
 @inner
 def _land(step, problem, state, space, h, longest, stop, direction, level, rtol, atol):
-    """Repeat the step with the duration that ends on ``level``; returns it, -1 if none up to ``longest`` does."""
+    """Repeat the step with the duration that ends on ``level``; returns it, else minus the step to try instead."""
     tolerance = landing_tolerance(problem, state, stop)
     before, beyond = 0.0, longest
     for _ in range(MOST_LANDINGS):
-        _, calls = step(  # with so loose a tolerance that there is an interpolant, whatever the error
+        error, calls = step(
             *(problem, state.now[T], h, state.x, state.rate, state.piece, state.entry_rate),
-            *(space.x_new, space.rate_new, space.dense, space.work, 1e300, atol),
+            *(space.x_new, space.rate_new, space.dense, space.work, rtol, atol),
         )
         state.count[CALLS] += calls
         distance = direction * (indentation(problem, stop, space.x_new) - level)
         if abs(distance) <= tolerance:
-            return h
+            return _if_accurate(h, error)
         before, beyond = (h, beyond) if distance < 0.0 else (before, h)
         slope = direction * dot(problem.read_rate[stop], space.x_new, 2 * problem.k.size)
         corrected = nearer(h, distance, slope, before, beyond, longest)
         if not corrected > 0.0:  # a graze, off the surface by rounding or in need of a closer look
-            return h if abs(distance) <= 100.0 * tolerance else -1.0
+            return _if_accurate(h, error) if abs(distance) <= 100.0 * tolerance else -0.5 * longest
         h = corrected
-    return -1.0
+    return -0.5 * longest
+
+
+@inner
+def _if_accurate(h, error):
+    """A landing of duration h, or minus the step to try: where a law bends a shorter step may be the worse one."""
+    return h if error <= 1.0 else -max(0.2, 0.9 * error**-0.125) * h if np.isfinite(error) else -0.2 * h
 
 
 @inner
@@ -357,8 +403,8 @@ def march(
                 continue
             if theta < NONE:
                 h = _land(step, problem, state, space, theta * h, tried, stop, direction, level, rtol, atol)
-                if h < 0.0:  # the interpolant crosses, the step does not: look closer
-                    now[phase] = 0.5 * tried
+                if h < 0.0:  # the interpolant crosses, the step does not, or not to the tolerance: look closer
+                    now[phase] = -h
                     count[REJECTED] += 1
                     continue
         elif events == HENON and phase == H_FLIGHT and not by_hand:  # the paper's scheme
@@ -379,6 +425,14 @@ def march(
                 )
                 hermite(h, state.x, state.rate, space.x_new, space.rate_new, space.dense)
 
+        # --- a law that bends within its piece: end there, the error of a step across it is not what is estimated
+        if adaptive and phase == H_CONTACT:
+            theta = _kink(problem, state, space)
+            if theta < NONE:
+                now[phase] = theta * h
+                count[REJECTED] += 1
+                continue
+
         # --- accept, record
         at_end = stop < 0 and h == tried and h >= t_end - now[T]
         code = accept(problem, state, space, h, stop, direction, at_end, t_end, log, out, due)
@@ -397,12 +451,20 @@ def march(
     return RUNNING
 
 
-def new_space(state: State, work_rows: int, watch: Array, constants: tuple[float, ...] = ()) -> Space:
+def new_space(state: State, work_rows: int, watch: Array, constants: tuple[float, ...] = (), kinks: Any = ()) -> Space:
     """Working arrays; a method's constants stand in the last row of ``work``."""
     size = state.x.size
     work = np.empty((work_rows, size))
     work[-1, : len(constants)] = constants
-    return Space(np.empty(size), np.empty(size), np.zeros((7, size)), work, np.empty((2, 8)), watch)
+    return Space(
+        np.empty(size),
+        np.empty(size),
+        np.zeros((7, size)),
+        work,
+        np.empty((2, 8)),
+        watch,
+        np.array(kinks, dtype=np.int64),
+    )
 
 
 def watched(system: System, motion: Array, least: float) -> Array:
@@ -419,13 +481,26 @@ def watched(system: System, motion: Array, least: float) -> Array:
     return np.array([stored, stored, least, 0.0, 0.0, *held])
 
 
-def negligible_energy(problem: Any, inverse_mass: Array, dt: float) -> float:
-    """What rounding in the loads may bring: 1e-10 of the energy ½ vᵀM⁻¹v (s dt)² of the largest in one step, J."""
+def largest_loads(problem: Any) -> Array:
+    """Bound of every load's signal (L,)."""
     largest = np.zeros(len(problem.load))
     np.add.at(largest, problem.tone_load, np.abs(problem.tone_amplitude))
     for j, load in enumerate(problem.table_load):
         largest[load] += np.abs(problem.table[problem.table_start[j] : problem.table_start[j + 1], 0]).max()
-    return 0.5e-10 * dt**2 * float(np.sum(inverse_mass * largest**2))
+    return largest
+
+
+def absolute_tolerance(method: Any, problem: Any, z: Array, fastest: float) -> float:
+    """The method's own, or less where start and loads are so small that it would stand above rtol times the motion."""
+    p, v = np.abs(z).reshape(2, -1).max(axis=1)
+    push = np.abs(problem.load).max(axis=1, initial=0.0) @ largest_loads(problem) / fastest
+    size = max(p, v / fastest, push / fastest)
+    return float(min(method.atol, method.rtol * size) if size > 0.0 else method.atol)
+
+
+def negligible_energy(problem: Any, inverse_mass: Array, dt: float) -> float:
+    """What rounding in the loads may bring: 1e-10 of the energy ½ vᵀM⁻¹v (s dt)² of the largest in one step, J."""
+    return 0.5e-10 * dt**2 * float(np.sum(inverse_mass * largest_loads(problem) ** 2))
 
 
 class Engine:
@@ -440,9 +515,11 @@ class Engine:
         self.state: State = new_state(z, len(system.contacts))
         dt = 0.0 if method.adaptive else max(method.steps)
         least = negligible_energy(self.problem, np.sum(self.problem.load * self.problem.power, axis=1), dt)
-        self.space = new_space(self.state, method.work_rows, watched(system, self.back @ z, least), method.constants)
+        watch = watched(system, self.back @ z, least)
+        self.space = new_space(self.state, method.work_rows, watch, method.constants, kinks_of(system))
         fastest = max([math.sqrt(abs(k)) for k in self.problem.k] + list(self.problem.c) + [1.0 / duration])
         self.state.now[[H_FLIGHT, H_CONTACT]] = 0.1 / fastest, 0.01 / fastest
+        self.atol = absolute_tolerance(method, self.problem, z, fastest)
         if not method.adaptive:
             self.state.now[[H_FLIGHT, H_CONTACT]] = method.steps
 
@@ -464,7 +541,7 @@ class Engine:
         dt_flight, dt_contact = (math.inf, math.inf) if method.adaptive else method.steps
         code = march(
             *(method.step, self.problem, self.state, self.space, self.duration, budget),
-            *(dt_flight, dt_contact, method.rtol, method.atol),
+            *(dt_flight, dt_contact, method.rtol, self.atol),
             *(method.adaptive, method.events, log, out, due),
         )
         return GAINED if code in (DONE, RUNNING) and self._gained() else code

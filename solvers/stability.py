@@ -199,6 +199,25 @@ def takes(law: Any) -> bool:
         return bool(np.all(slow >= 0.0) and np.all(damping * rate >= -1e-12 * slow))
 
 
+def kinks_of(system: System) -> list[int]:
+    """Per stop: 1 where the law is cut at zero while δ > 0, plus 2 where it bends at δ̇ = 0; found once per system."""
+    known = system.about_laws
+    if "kinks" not in known:
+        known["kinks"] = [_kinks(contact.law) for contact in system.contacts]
+    found: list[int] = known["kinks"]
+    return found
+
+
+def _kinks(law: Any) -> int:
+    """The same of a law, by trying it out."""
+    delta = 2.0 * _depth(law, 1.0, EXPECTED_SPEED) * np.geomspace(1e-6, 1.0, 13)
+    with np.errstate(all="ignore"):
+        cut = any(np.any(law.force(delta, rate, EXPECTED_SPEED) == 0.0) for rate in (-1e3, -1.0, 1.0))
+        leaving, rest, entering = (law.force(delta, rate, EXPECTED_SPEED) for rate in (-1e-4, 0.0, 1e-4))
+        bent = np.abs(leaving - 2.0 * rest + entering) > 1e-2 * np.abs(entering - leaving) + 1e-13 * np.abs(rest)
+    return int(cut) + 2 * int(np.any(bent))
+
+
 def _depth(law: Any, mass: float, speed: float) -> float:
     """Indentation at which a stop has taken the energy of a mass."""
     low, high = -15.0, 3.0  # powers of ten, m

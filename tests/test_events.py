@@ -20,7 +20,7 @@ from scipy.optimize import brentq
 
 import fembeam as fb
 from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, achieved_restitution
-from solvers import Contact, DormandPrince, HenonRK2, Status, System, integrate
+from solvers import Contact, DormandPrince, HenonRK2, SolverError, Status, System, integrate
 
 FINE = DormandPrince(rtol=1e-13)
 PERIOD = 2 * math.pi / 195.0
@@ -198,6 +198,19 @@ def test_grazes_shift_no_time(rtol):
             run = integrate(system, *start, 0.1 * (3.7 - phase), method=DormandPrince(rtol))
             apart.append(abs(run.q_dot[-1, 0] / 10 + math.sin(3.7)))
     assert max(apart) < 5.0 * rtol
+
+
+@pytest.mark.parametrize("law", [lambda size: PiecewiseLinear([1e4]), lambda size: Hertz(1e4 / math.sqrt(size))])
+def test_amplitudes_of_any_size_are_right_or_refused(law):
+    def run(size):
+        system = System.modal([10.0], 0.01, [Contact([1.0], law(size), 0.5 * size)])
+        return integrate(system, [size], [0.0], 1.0, 0.01, DormandPrince(1e-8)).q / size
+
+    for size in (1e-15, 1e-12, 1e-9, 1e9, 1e75):
+        np.testing.assert_allclose(run(size), run(1.0), atol=1e-6)
+    for size in (1e100, 1e150):
+        with pytest.raises(SolverError, match="not finite any more"):
+            run(size)
 
 
 # --- several stops ------------------------------------------------------------------------------------------------
