@@ -37,8 +37,10 @@ class Orbit:
     system, method : of what, and how it was integrated.
     doubt : why the verdict on stability may be wrong; empty when nothing speaks against it.
     parameter : value of the branch's parameter, NaN outside a branch.
-    mark : "fold", "flip", "neimark-sacker", "branch point", "grazing" or "merging" at special points of a branch, else
-        empty. Two orbits marked "merging" follow each other where a branch jumps because two contacts become one.
+    mark : "fold", "flip", "neimark-sacker", "branch point", "grazing", "floor" or "merging" at special points of a
+        branch, else empty. Two orbits marked "merging" follow each other where a branch jumps because two contacts
+        become one. At a "grazing" or "floor" (an entry rate meets its law's floor) multipliers jump, and the branch may
+        turn back with a corner.
 
     Examples
     --------

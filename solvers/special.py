@@ -7,10 +7,11 @@ A special point is a sign change of its test function along the arclength. With 
     neimark-sacker   Π_{i<j} (μ_i μ_j - 1) / (1 + |μ_i μ_j|), at a complex pair
     branch point     Π (μ_i - 1) / (1 + |μ_i|), where there is no fold
     grazing          number of contacts within the period changes
+    floor            a contact's entry rate less its law's floor, below which the law does not see it
 
-All but the last are continuous along the branch, so that Brent's method finds their zeros in a few orbits. A multiplier
-that jumps over the unit circle at a grazing has no flip of its own: only the grazing is reported. Kinks that stop
-Newton's method are met before, by `solvers.kinks`.
+All but the grazings are continuous along the branch, so that Brent's method finds their zeros in a few orbits. A
+multiplier that jumps over the unit circle at a grazing or a floor has no flip of its own: only the kink is reported.
+Kinks that stop Newton's method are met before, by `solvers.kinks`.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ import numpy as np
 from solvers.chain import Chain
 from solvers.periodic import Orbit, OrbitError, orbit_of
 from solvers.point import Point, corrected, cubic, is_straight, tangent_of
+from solvers.quiet import with_memory
 from solvers.system import Array
 
 _ROUNDING = 1e-9  # of the test functions: what is at a special point all along is marked nowhere
@@ -106,6 +108,10 @@ class Stretch:
             self.trials[s] = chain, orbit
         return self.trials[s]
 
+    def orbit(self, s: float) -> Orbit:
+        """The orbit at an arclength from a; raises OrbitError."""
+        return self.a.orbit if s == 0.0 else self.b.orbit if s == self.way else self.at(s)[1]
+
     def indicators(self, s: float) -> dict[str, float]:
         """Test functions at an arclength from a."""
         for place, point in ((0.0, self.a), (self.way, self.b)):
@@ -128,7 +134,7 @@ def between(a: Point, b: Point, way: float, before: tuple[Point, float] | None =
     ``before`` is the point before a and the way from it: the three together may tell of two special points on the way.
     """
     stretch = Stretch(a, b, way)
-    found = list(_grazings(stretch))
+    found = list(_kinks(stretch))
     places = [0.0, *sorted(place for place, _ in found or _dips(stretch, before)), way]
     for begin, end in pairwise(places):
         found += _roots(stretch, begin, end)
@@ -168,35 +174,65 @@ def _dips(stretch: Stretch, before: tuple[Point, float] | None) -> Iterator[tupl
 
 def _root(stretch: Stretch, begin: float, end: float, name: str) -> tuple[float, Orbit] | None:
     """(arclength, orbit) where a test function is zero; None where it only jumps."""
+    pair = _zero(stretch, begin, end, lambda s: stretch.indicators(s)[name])
+    return (pair[0], replace(pair[1], mark=name)) if pair is not None and _is_at(pair[1], name) else None
+
+
+def _zero(stretch: Stretch, begin: float, end: float, value: Callable[[float], float]) -> tuple[float, Orbit] | None:
+    """(arclength, orbit) where a function of the arclength changes its sign; None where no orbit is found."""
     from scipy.optimize import brentq
 
-    sharp = stretch.sharpness()
     try:
         place, _ = brentq(
-            *(lambda s: stretch.indicators(s)[name], begin, end),
-            **{"xtol": sharp, "maxiter": _MOST_TRIALS, "full_output": True, "disp": False},
+            *(value, begin, end),
+            **{"xtol": stretch.sharpness(), "maxiter": _MOST_TRIALS, "full_output": True, "disp": False},
         )
-        orbit = stretch.at(place)[1]
-    except (OrbitError, np.linalg.LinAlgError):
+        return place, stretch.orbit(place)
+    except (OrbitError, np.linalg.LinAlgError, IndexError):
         return None
-    return (place, replace(orbit, mark=name)) if _is_at(orbit, name) else None
 
 
-def _grazings(stretch: Stretch) -> Iterator[tuple[float, Orbit]]:
-    """(arclength, orbit) of the points at which the number of contacts changes."""
+def _kinks(stretch: Stretch) -> Iterator[tuple[float, Orbit]]:
+    """(arclength, orbit) where the number of contacts changes, and where an entry rate passes its law's floor."""
     begin, first = 0.0, stretch.a.orbit
     for _ in range(_MOST_GRAZINGS):
         if len(first.contacts) == len(stretch.b.orbit.contacts):
-            return
+            break
         found = _grazing(stretch, begin, first)
         if found is None:
             return
-        place, touched, begin, first = found
+        near, place, touched, behind, last = found
+        yield from _floors(stretch, begin, near)
         yield place, touched
+        begin, first = behind, last
+    yield from _floors(stretch, begin, stretch.way)
 
 
-def _grazing(stretch: Stretch, begin: float, first: Orbit) -> tuple[float, Orbit, float, Orbit] | None:
-    """Where the number of contacts changes first after a place: arclength, marked orbit, place behind it, orbit there.
+def _floors(stretch: Stretch, begin: float, end: float) -> Iterator[tuple[float, Orbit]]:
+    """(arclength, orbit) where an entry rate passes its law's floor, between two places of as many contacts."""
+    first, last = (_over_floor(stretch.orbit(s)) for s in (begin, end))
+    for number in np.flatnonzero(first * last < 0.0) if len(first) == len(last) else ():
+
+        def over(s: float, number: int = int(number)) -> float:
+            return float(_over_floor(stretch.orbit(s))[number])
+
+        pair = _zero(stretch, begin, end, over)
+        if pair is not None and np.abs(_over_floor(pair[1])).min(initial=1.0) < _AT:  # else it only jumped
+            yield pair[0], replace(pair[1], mark="floor")
+
+
+def _over_floor(orbit: Orbit) -> Array:
+    """Entry rate less the floor, in units of it, of every contact in the order of stops and time; 1 where none acts."""
+    log, over = orbit.contacts, np.ones(len(orbit.contacts))
+    for stop in with_memory(orbit.system):
+        mine, floor = log.stop == stop, orbit.system.contacts[stop].law.entry_rate_floor
+        over[mine] = log.speed_in[mine] / floor - 1.0 if floor else 1.0
+    ordered: Array = over[np.lexsort((log.t_in, log.stop))]
+    return ordered
+
+
+def _grazing(stretch: Stretch, begin: float, first: Orbit) -> tuple[float, float, Orbit, float, Orbit] | None:
+    """Where the number of contacts changes first after a place: place before, place, orbit, place and orbit behind.
 
     There the shallowest contact's indentation goes to zero, or the flight between two contacts that become one.
     """
@@ -217,7 +253,7 @@ def _grazing(stretch: Stretch, begin: float, first: Orbit) -> tuple[float, Orbit
                 place = root + 0.01 * (touched - root)
         if abs(behind - near) <= sharp or abs(root - touched) <= sharp:
             at, touching = (behind, last) if more else (near, near_orbit)
-            return at, replace(touching, mark="grazing"), behind, last
+            return near, at, replace(touching, mark="grazing"), behind, last
         try:
             orbit = stretch.at(place)[1]
         except OrbitError:
