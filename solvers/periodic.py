@@ -30,7 +30,8 @@ class Orbit:
     Attributes
     ----------
     state : (2n,) [q, q̇] at time ``phase`` within the period.
-    period : s. phase : s, 0 unless a stop whose law latches its entry rate is closed then.
+    period : s. phase : s, 0 unless a stop whose law latches its entry rate is closed then; on a branch also where a
+        contact with such a law, or with one whose force jumps, comes near t = 0.
     monodromy : (2n, 2n) derivative of the state one period later. multipliers : its eigenvalues, largest first.
     residual : size of Φ(x) - x relative to the orbit's. iterations : of Newton's method.
     contacts : log of one period, times counted from ``phase``.

@@ -9,9 +9,10 @@ from oscillators import Bilinear, Tone, random_family
 
 import solvers.arm
 import solvers.chain
-from contacts import PiecewiseLinear, law
+from contacts import KelvinVoigt, PiecewiseLinear, law
 from solvers import Contact, OrbitError, System, branch
 from solvers.continuation import BranchStatus
+from solvers.periodic import flown
 
 
 @law(jump=True)
@@ -107,3 +108,27 @@ def test_random_systems_always_end_with_a_status(seed, monkeypatch):
     assert count[0] < 100 * len(found.status) + 40 * len(found.orbits)
     assert all(orbit.residual <= 1e-10 for orbit in found.orbits)
     assert all(span[0] <= orbit.parameter <= span[1] for orbit in found.orbits)
+
+
+def ball(phase):
+    """A ball on a vibrating plate over its amplitude: q'' = A cos(t + phase) - 1 + what a Kelvin–Voigt stop does."""
+    zero, stop = np.zeros((1, 1)), Contact([1.0], KelvinVoigt(1000.0, 5.0))
+
+    def make(amplitude):
+        loads = [([1.0], Tone(amplitude * np.exp(1j * phase), 1.0)), ([-1.0], Tone(1.0, 0.0))]
+        return System(np.eye(1), zero, zero, [stop], loads), 2.0 * math.pi
+
+    return make
+
+
+@pytest.mark.parametrize(("number", "later"), [(0, 0.0), (2, 0.02), (3, 0.04), (4, 0.1)])
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_a_force_that_jumps_may_begin_at_any_time_of_the_period(number, later):
+    """Fold and flip at 1.169860 and 1.172158 whichever phase is t = 0, contacts sliding over it on the way."""
+    first = solvers.orbit(*ball(0.0)(1.3))
+    t = (float(first.contacts.t_in[number]) + later * first.period) % first.period
+    start = flown(first.system, first.state, t, first.method)
+    found = branch(ball(t), (0.8, 1.3), start, at=1.3, step=0.1).run()
+    assert found.status == (BranchStatus.END,)
+    assert [one.mark for one in found.special] == ["fold", "flip"]
+    assert [one.parameter for one in found.special] == pytest.approx([1.169860, 1.172158], abs=1e-6)
