@@ -45,11 +45,15 @@ def with_quiet_begin(point: Point) -> Point:
     offsets = [(f - point.problem.fractions[0]) * period for f in point.problem.fractions]
     mine = _restless(orbit.system, log)
     ends = np.concatenate((log.t_in[mine], log.t_out[mine]))
-    times = np.concatenate((ends, ends - period))
-    if min(np.abs(times - t).min(initial=period) for t in offsets) > _MARGIN * period / (1 + len(log)):
+    times = np.concatenate((ends - period, ends, ends + period))
+
+    def away(begins: list[float]) -> float:
+        return min(float(np.abs(times - t).min(initial=period)) for t in begins)
+
+    if away(offsets) > _MARGIN * period / (1 + len(log)):
         return point
     begins = quiet_begins(orbit.system, log, period, m, False)
-    if len(begins) < m:
+    if len(begins) < m or not away(begins) > away(offsets):
         return point
     later = delayed(orbit.system, orbit.phase)
     x = np.array([flown(later, orbit.state, t, orbit.method) for t in begins])
