@@ -34,6 +34,7 @@ _ROUNDING = 1e-9  # of the test functions: what is at a special point all along 
 _SHARP = 1e-10  # of the parameter, or of the way between the points: how sharply a point is located
 _AT = 1e-4  # distance from the unit circle of the multiplier at what passes for a special point
 _MOST_TRIALS = 25
+_NUDGES = 0.0, 1e-7, -1e-7, 1e-6, -1e-6  # of the way: at some guesses rounding keeps the residual over its tolerance
 _MOST_GRAZINGS = 4  # looked for between two points
 
 
@@ -182,13 +183,24 @@ def _zero(stretch: Stretch, begin: float, end: float, value: Callable[[float], f
     """(arclength, orbit) where a function of the arclength changes its sign; None where no orbit is found."""
     from scipy.optimize import brentq
 
+    found: dict[float, tuple[float, Orbit]] = {}
+
+    def nearby(s: float) -> float:
+        for place in (s + share * (end - begin) for share in _NUDGES):
+            try:
+                found[s] = place, stretch.orbit(place)
+                return value(place)
+            except OrbitError:
+                continue
+        raise OrbitError("no orbit was found near a guess between two orbits")
+
     try:
         place, _ = brentq(
-            *(value, begin, end),
+            *(nearby, begin, end),
             **{"xtol": stretch.sharpness(), "maxiter": _MOST_TRIALS, "full_output": True, "disp": False},
         )
-        return place, stretch.orbit(place)
-    except (OrbitError, np.linalg.LinAlgError, IndexError):
+        return found[place]
+    except (OrbitError, np.linalg.LinAlgError, IndexError, KeyError):
         return None
 
 

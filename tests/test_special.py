@@ -5,14 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from oscillators import Bilinear, Tone, random_family
+from oscillators import Bilinear, Tone, random_family, random_stops_family
 
 import solvers.arm
 import solvers.chain
 from contacts import KelvinVoigt, PiecewiseLinear, law
-from solvers import Contact, OrbitError, System, branch
+from solvers import Contact, DormandPrince, OrbitError, System, branch
+from solvers.chain import delayed
 from solvers.continuation import BranchStatus
 from solvers.periodic import flown
+from solvers.special import Stretch
 
 
 @law(jump=True)
@@ -87,6 +89,26 @@ def test_subharmonic_branch_ends_at_its_birth():
     assert abs(born.multipliers[0] - 1.0) < 1e-6
 
 
+def test_a_guess_at_which_no_orbit_is_found_is_left_aside(monkeypatch):
+    """Rounding may keep Newton's method above its tolerance at one guess: every other one is made to fail."""
+    at, asked = Stretch.at, []
+
+    def failing(stretch, s):
+        if s not in stretch.trials and asked.count(s) == 0:
+            asked.append(s)
+            if len(asked) % 2:
+                raise OrbitError("rounding")
+        return at(stretch, s)
+
+    monkeypatch.setattr(Stretch, "at", failing)
+    problem = Bilinear(0.96, zeta=0.05)
+    found = branch(over(problem), (0.9, 0.96), problem.settled(), at=0.96, step=0.3).run()
+    (flip,) = found.special
+    exact, _ = replace(problem, omega=flip.parameter).special(-1.0, flip.state)
+    assert flip.parameter == pytest.approx(exact, abs=1e-6)
+    assert len(asked) > 2
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_random_systems_always_end_with_a_status(seed, monkeypatch):
     rng = np.random.default_rng(seed)
@@ -108,6 +130,23 @@ def test_random_systems_always_end_with_a_status(seed, monkeypatch):
     assert count[0] < 100 * len(found.status) + 40 * len(found.orbits)
     assert all(orbit.residual <= 1e-10 for orbit in found.orbits)
     assert all(span[0] <= orbit.parameter <= span[1] for orbit in found.orbits)
+
+
+@pytest.mark.parametrize(("stops", "seed"), [(2, 0), (2, 1), (2, 3), (3, 0), (3, 2)])
+def test_orbits_of_several_stops_close_for_another_integrator(stops, seed, monkeypatch):
+    """After two periods the motion has come back, of its size and in units of what its multipliers make."""
+    make, span, modes = random_stops_family(np.random.default_rng(seed), "amplitude", stops)
+    monkeypatch.setattr(solvers.arm, "MOST_ORBITS", 12)
+    try:
+        found = branch(make, span, np.zeros(2 * modes), step=0.3).run()
+    except OrbitError as error:
+        assert "residual" in str(error) or "open" in str(error)  # noqa: PT017
+        return
+    assert all(status is not BranchStatus.LOST for status in found.status)
+    for one in found.orbits[::4]:
+        later, x = delayed(one.system, one.phase), one.state
+        end = flown(later, x, 2.0 * one.period, DormandPrince(1e-10))
+        assert np.abs(end - x).max() < 1e-6 * np.abs(x).max() * max(1.0, abs(one.multipliers[0])) ** 2
 
 
 def ball(phase):
