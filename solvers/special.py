@@ -34,6 +34,7 @@ _ROUNDING = 1e-9  # of the test functions: what is at a special point all along 
 _SHARP = 1e-10  # of the parameter, or of the way between the points: how sharply a point is located
 _AT = 1e-4  # distance from the unit circle of the multiplier at what passes for a special point
 _MOST_TRIALS = 25
+_MOST_TOUCHES = 60  # more than halving alone takes: with rounding left in an indentation, no secant is of use
 _NUDGES = 0.0, 1e-7, -1e-7, 1e-6, -1e-6  # of the way: at some guesses rounding keeps the residual over its tolerance
 _MOST_GRAZINGS = 4  # looked for between two points
 
@@ -113,6 +114,15 @@ class Stretch:
         """The orbit at an arclength from a; raises OrbitError."""
         return self.a.orbit if s == 0.0 else self.b.orbit if s == self.way else self.at(s)[1]
 
+    def near(self, s: float, width: float) -> tuple[float, Orbit]:
+        """(arclength, orbit) at s, or hardly aside if none is found there; raises OrbitError."""
+        for place in (s + share * width for share in _NUDGES):
+            try:
+                return place, self.orbit(place)
+            except OrbitError:
+                continue
+        raise OrbitError("no orbit was found near a guess between two orbits")
+
     def indicators(self, s: float) -> dict[str, float]:
         """Test functions at an arclength from a."""
         for place, point in ((0.0, self.a), (self.way, self.b)):
@@ -186,13 +196,8 @@ def _zero(stretch: Stretch, begin: float, end: float, value: Callable[[float], f
     found: dict[float, tuple[float, Orbit]] = {}
 
     def nearby(s: float) -> float:
-        for place in (s + share * (end - begin) for share in _NUDGES):
-            try:
-                found[s] = place, stretch.orbit(place)
-                return value(place)
-            except OrbitError:
-                continue
-        raise OrbitError("no orbit was found near a guess between two orbits")
+        found[s] = stretch.near(s, end - begin)
+        return value(found[s][0])
 
     try:
         place, _ = brentq(
@@ -254,7 +259,7 @@ def _grazing(stretch: Stretch, begin: float, first: Orbit) -> tuple[float, float
     near, near_orbit = begin, first
     known = [(behind, distance(last)) if more else (begin, distance(first))]  # on the side with more contacts
     sharp = stretch.sharpness()
-    for _ in range(_MOST_TRIALS):
+    for _ in range(_MOST_TOUCHES):
         touched, bare = (behind, near) if more else (near, behind)
         place = 0.5 * (touched + bare)
         root = touched + 2.0 * sharp
@@ -267,7 +272,7 @@ def _grazing(stretch: Stretch, begin: float, first: Orbit) -> tuple[float, float
             at, touching = (behind, last) if more else (near, near_orbit)
             return near, at, replace(touching, mark="grazing"), behind, last
         try:
-            orbit = stretch.at(place)[1]
+            place, orbit = stretch.near(place, behind - near)
         except OrbitError:
             return None
         same = len(orbit.contacts) == len(first.contacts)

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from oscillators import Bilinear, Tone, random_family, random_stops_family
 
 import solvers.arm
 import solvers.chain
-from contacts import KelvinVoigt, PiecewiseLinear, law
+from contacts import Hertz, KelvinVoigt, PiecewiseLinear, law
 from solvers import Contact, DormandPrince, OrbitError, System, branch
 from solvers.chain import delayed
 from solvers.continuation import BranchStatus
@@ -107,6 +108,24 @@ def test_a_guess_at_which_no_orbit_is_found_is_left_aside(monkeypatch):
     exact, _ = replace(problem, omega=flip.parameter).special(-1.0, flip.state)
     assert flip.parameter == pytest.approx(exact, abs=1e-6)
     assert len(asked) > 2
+
+
+def test_a_graze_is_marked_however_shallow_the_contacts_beside_it():
+    """Over two periods of the drive two contacts graze at once, where the linear motion just reaches the stop."""
+    zeta, gap, omega, w = 0.5 * 0.14455829, 0.7000786761877948, 1.5801527935859612, 1.39034535
+
+    def make(amplitude):
+        stop = Contact([w], Hertz(75940.61027782668), gap=gap)
+        load = [1.0], Tone(amplitude, omega)
+        return System.modal([1.0], zeta, [stop], [load]), 4.0 * math.pi / omega
+
+    found = branch(make, (0.46858947328201006, 1.40576841984603), np.zeros(2), step=0.3).run()
+    touching = abs(1.0 - omega**2 + 2j * zeta * omega) * gap / w
+    grazings = [one.parameter for one in marked(found, "grazing")]
+    assert grazings
+    assert grazings == pytest.approx([touching] * len(grazings), rel=1e-9)
+    for a, b in pairwise(found.orbits):
+        assert len(a.contacts) == len(b.contacts) or a.mark or b.mark
 
 
 @pytest.mark.parametrize("seed", range(12))
