@@ -34,6 +34,7 @@ _ROUNDING = 1e-9  # of the test functions: what is at a special point all along 
 _SHARP = 1e-10  # of the parameter, or of the way between the points: how sharply a point is located
 _AT = 1e-4  # distance from the unit circle of the multiplier at what passes for a special point
 _MOST_TRIALS = 25
+_SAME = 1e-6  # relative difference of states that are the same
 _MOST_TOUCHES = 60  # more than halving alone takes: with rounding left in an indentation, no secant is of use
 _NUDGES = 0.0, 1e-7, -1e-7, 1e-6, -1e-6  # of the way: at some guesses rounding keeps the residual over its tolerance
 _MOST_GRAZINGS = 4  # looked for between two points
@@ -269,6 +270,8 @@ def _grazing(stretch: Stretch, begin: float, first: Orbit) -> tuple[float, float
             if min(bare, touched) < root < max(bare, touched):
                 place = root + 0.01 * (touched - root)
         if abs(behind - near) <= sharp or abs(root - touched) <= sharp:
+            if abs(behind - near) <= sharp and _parted(near_orbit, last):
+                return None
             at, touching = (behind, last) if more else (near, near_orbit)
             return near, at, replace(touching, mark="grazing"), behind, last
         try:
@@ -283,6 +286,11 @@ def _grazing(stretch: Stretch, begin: float, first: Orbit) -> tuple[float, float
         if same != more:
             known.append((place, distance(orbit)))
     return None
+
+
+def _parted(a: Orbit, b: Orbit) -> bool:
+    """Whether orbits at one place of the branch are two: it jumps there, as where contacts with memory merge."""
+    return bool(np.abs(a.state - b.state).max() > _SAME * np.abs(a.state).max())
 
 
 def _distance(more: Orbit, less: Orbit) -> Callable[[Orbit], float]:
