@@ -91,12 +91,18 @@ def watched(scene: Scene, body: int) -> float | None:
     return places[0] if places else None
 
 
-def loaded(scene: Scene, body: int) -> list[float]:
-    """Where a beam is loaded at a point: its stops, its forces, then what else strikes it."""
+def loaded(scene: Scene, body: int) -> list[tuple[float, int]]:
+    """Where a point load acts on a beam: (z, 0) for forces, (z, 1) for moments, of stops, loads, dashpots, strikers."""
+    from fembeam.scene import PointMoment
+
     part = (scene, *scene.bodies)[body]
-    places = [stop.z for stop in part.stops] + [force.z for force in part.forces]
-    places += [impactor.z for impactor in part.impactors]
-    return places + [stop.on[1] for stop in scene.stops if stop.on is not None and stop.on[0] == body]
+    places = [(stop.z, 0) for stop in part.stops]
+    places += [(force.z, int(isinstance(force, PointMoment))) for force in part.forces]
+    places += [(spring.z, 0) for spring in part.springs if spring.foot is not None]
+    places += [(dashpot.z, 0) for dashpot in part.dashpots if dashpot.damping]
+    places += [(dashpot.z, 1) for dashpot in part.dashpots if dashpot.rotational]
+    places += [(impactor.z, 0) for impactor in part.impactors]
+    return places + [(stop.on[1], 0) for stop in scene.stops if stop.on is not None and stop.on[0] == body]
 
 
 def heights(scene: Scene) -> tuple[list[float], list[float]]:

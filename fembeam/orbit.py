@@ -76,8 +76,8 @@ class Orbit:
 
     @property
     def mark(self) -> str:
-        """What is special about it on a branch: "fold", "flip", "neimark-sacker", "branch point", "grazing", "merging";
-        else "".
+        """What is special about it on a branch: "fold", "flip", "neimark-sacker", "branch point", "grazing", "floor",
+        "merging"; else "".
         """
         return self.found.mark
 

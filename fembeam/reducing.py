@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy import sparse
 
 import reduction
 from fembeam.assembly import Matrices
@@ -62,15 +63,20 @@ def reduced(
 
 
 def _of_beam(
-    beam: Matrices, places: list[float], chosen: tuple[int, ...], residual: bool, interface: bool
+    beam: Matrices, places: list[tuple[float, int]], chosen: tuple[int, ...], residual: bool, interface: bool
 ) -> reduction.Basis:
     """The basis of one beam by itself, static shapes where it is loaded included."""
     if interface:
-        return reduction.craig_bampton(beam.M, beam.K, beam.interpolation(places).T, len(chosen), beam.root)
+        return reduction.craig_bampton(beam.M, beam.K, _rows(beam, places).T, len(chosen), beam.root)
     basis = reduction.modal_basis(beam.M, beam.K, indices=chosen, root=beam.root)
     if residual and places:
-        basis = reduction.with_residual(basis, beam.M, beam.K, beam.interpolation(places).T, beam.root)
+        basis = reduction.with_residual(basis, beam.M, beam.K, _rows(beam, places).T, beam.root)
     return basis
+
+
+def _rows(beam: Matrices, places: list[tuple[float, int]]) -> sparse.csr_matrix:
+    """Rows of u or u_z at (z, derivative)."""
+    return sparse.vstack([beam.interpolation(z, derivative) for z, derivative in places], format="csr")
 
 
 def _continued(chosen: tuple[int, ...], count: int) -> tuple[int, ...]:
@@ -141,8 +147,8 @@ def _numbers(scene: Scene, modes: Any, elements: int | None, interface: bool) ->
 def _check_static(scene: Scene, residual: bool, interface: bool) -> None:
     """Raise ValueError when static shapes are asked for twice, or have no place to be loaded at."""
     require(not (residual and interface), "residual and interface exclude each other", True, "Scene.reduce",
-            "keep one: either makes the model exact for slow loads at stops and forces")  # fmt: skip
-    require(not (residual or interface) or bool(loaded(scene, 0)), "static shapes need a stop or a force", 0,
+            "keep one: either makes the model exact for slow loads at its places")  # fmt: skip
+    require(not (residual or interface) or bool(loaded(scene, 0)), "static shapes need a stop, a force or a dashpot", 0,
             "Scene.reduce", "leave out residual and interface")  # fmt: skip
 
 

@@ -338,8 +338,9 @@ class Scene:
         elements : of the mesh; None: as few as make every kept frequency right to 1e-6.
         omega_max : instead of `modes`: all of them up to this frequency, rad/s.
         mass_share : instead of `modes`: as many as carry this share of the mass that a base motion moves, in (0, 1).
-        residual : add the residual static shape of every stop and force; the model is then exact for slow loads there.
-        interface : Craig–Bampton: static shapes of the stops and forces and `modes` modes with those places held; with
+        residual : add the residual static shape of every stop, force, moment, moving foot and dashpot (its rotation,
+            too); the model is then exact for slow loads there.
+        interface : Craig–Bampton: static shapes of the same places and `modes` modes with them held; with
             modes=0 Guyan's condensation.
 
         Returns
@@ -350,7 +351,7 @@ class Scene:
         ------
         ValueError : no modes, repeated or negative numbers, more than the mesh has; more than 300 of a mesh above 2000
             dofs, or more than 128 for omega_max or mass_share; two ways of choosing at once; static shapes
-            without a stop or force.
+            without a stop, force or dashpot.
         reduction.AccuracyError : stiffnesses too far apart, or a mesh too fine, for double precision.
         """
         from fembeam.reducing import reduced

@@ -65,7 +65,7 @@ omega = 195.0               # rad/s
 # side = "above"
 
 [reduce]
-modes = 3                   # or omega_max, mass_share; residual = true adds the static shape of every stop and force
+modes = 3                   # or omega_max, mass_share; residual = true adds static shapes of stops, forces, dashpots
 
 [simulate]                  # one table per study; a file may have several
 duration = 10.0

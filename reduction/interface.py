@@ -22,9 +22,10 @@ from reduction.modal import ORTHONORMALITY_TOLERANCE, Matrix, checked_pair, moda
 
 STATIC_TOLERANCE = 1e-10  # relative error of static compliance, given a root
 STATIC_WITHOUT_ROOT = 1e-7  # same; rounding of K alone, 4e-10 for 50 elements and growing like their fourth power
-COUPLING_TOLERANCE = 1e-9  # of φᵀ K r over the two frequencies
-NOTHING_LEFT = 1e-12  # share of the static compliance below which a residual shape is rounding
-DEPENDENT = 1e-9  # smallest pivot of directions, or singular value of residual shapes, that adds a shape
+COUPLING_TOLERANCE = 2e-8  # of φᵀ K r over the two frequencies: rounding, eps (length/h)², of elements of 1e-4
+NOTHING_LEFT = 1e-12  # share of the static compliance below which a shape is rounding and adds none
+NOTHING_WITHOUT_ROOT = 1e-8  # same
+DEPENDENT = 1e-9  # smallest pivot of directions that counts
 BALANCED = 1e-6  # relative: strain energy and work of the loads agree, unless K is singular
 REFINEMENTS = 3  # of static solutions; on 5000 elements the third one changes nothing
 
@@ -42,7 +43,7 @@ def with_residual(basis: Basis, M: Matrix, K: Matrix, directions: Matrix, root: 
     Returns
     -------
     Basis : the n modes as they were, then up to m pseudo-modes, by frequency. Directions that depend on others or
-        that the modes carry wholly (to 1e-12) add none.
+        that the modes carry wholly (to 1e-12 of the static compliance, 1e-8 without root) add none.
 
     Raises
     ------
@@ -70,12 +71,13 @@ def with_residual(basis: Basis, M: Matrix, K: Matrix, directions: Matrix, root: 
     still = basis.vectors[:, basis.omega == 0.0]
     shapes = static_shapes(M, K, B, still, root)
     left = _orthogonal(shapes, basis.vectors, M)
-    kept = np.diag(_strain(K, root, left)) > NOTHING_LEFT * np.diag(_strain(K, root, shapes))
-    left = _independent(left[:, kept], M)
-    if not left.size:
+    turned = _recombined(B, _strain(K, root, left), np.diag(_strain(K, root, shapes)), root)
+    if not turned.size:
         return basis
-    omega, vectors = ritz(M, K, root, _orthogonal(left, basis.vectors, M))
-    extended = Basis(np.hstack((basis.vectors, vectors)), np.append(basis.omega, omega))
+    left = static_shapes(M, K, turned, still, root)
+    for _ in range(2):  # the second time for what rounding left where shapes differ little in mass
+        omega, left = ritz(M, K, root, _orthogonal(left, basis.vectors, M))
+    extended = Basis(np.hstack((basis.vectors, left)), np.append(basis.omega, omega))
     _check(extended, M, K, root, B, B.T @ shapes, "with_residual")
     return extended
 
@@ -120,7 +122,7 @@ def craig_bampton(M: Matrix, K: Matrix, directions: Matrix, count: int, root: Ma
     """
     M, K = checked_pair(M, K, "craig_bampton")
     B = _directions(directions, K.shape[0], "craig_bampton")
-    T, m = _interface_coordinates(B)
+    T, m = _interface_coordinates(_apart(M, K, B, root))
     most = K.shape[0] - m
     if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or not 0 <= count <= most:
         raise ValueError(
@@ -135,7 +137,9 @@ def craig_bampton(M: Matrix, K: Matrix, directions: Matrix, count: int, root: Ma
             raise ValueError("the structure must not move freely with its interface held, got a rigid-body mode in "
                              "craig_bampton; use modes with residual shapes")  # fmt: skip
         vectors = np.hstack((vectors, inside @ held.vectors))
-    basis = oriented(Basis(*ritz(M, K, root, vectors)[::-1]))
+    for _ in range(2):  # likewise
+        omega, vectors = ritz(M, K, root, vectors)
+    basis = oriented(Basis(vectors, omega))
     still = basis.vectors[:, basis.omega == 0.0]
     exact = _compliance(basis, B) if still.size else B.T @ static_shapes(M, K, B, still, root)
     _check(basis, M, K, root, B, exact, "craig_bampton")
@@ -213,14 +217,35 @@ def _orthogonal(v: Vector, basis: Vector, M: Matrix) -> Vector:
     return v
 
 
-def _independent(v: Vector, M: Matrix) -> Vector:
-    """An M-orthonormal basis of the columns (N, m), dependent ones dropped."""
-    if not v.size:
-        return v
-    unit = v / np.sqrt(np.sum(v * (M @ v), axis=0))
-    values, turn = np.linalg.eigh(unit.T @ (M @ unit))
-    kept = values > DEPENDENT * values.max()
-    return (unit @ turn[:, kept]) / np.sqrt(values[kept])
+def _recombined(B: Vector, compliance: Vector, size: Vector, root: Matrix | None) -> Vector:
+    """Combinations of the directions (N, m) whose shapes are far from dependent; those without a share are dropped.
+
+    Two directions side by side become their sum and their difference, a moment. Solved anew, its shape is as accurate
+    as any; as the difference of two shapes it would lose the digits that they share.
+    """
+    unit = 1 / np.sqrt(size)
+    share, turn = np.linalg.eigh(unit[:, None] * compliance * unit)
+    kept = share > (NOTHING_WITHOUT_ROOT if root is None else NOTHING_LEFT)
+    return (B * unit) @ turn[:, kept] / np.sqrt(share[kept])
+
+
+def _apart(M: Matrix, K: Matrix, B: Vector, root: Matrix | None) -> Vector:
+    """Combinations of the directions (N, m) that are far from dependent, by their shapes and their rigid-body parts."""
+    rigid = _rigid_modes(M, K, root)
+    compliance = _strain(K, root, static_shapes(M, K, B, rigid, root))
+    carried = rigid.T @ B
+    moved, bent = np.abs(carried).max(initial=0.0), np.sqrt(np.abs(compliance).max())
+    both = compliance + carried.T @ carried * ((bent / moved) ** 2 if moved else 0.0)
+    return _recombined(B, both, np.diag(both), root)
+
+
+def _rigid_modes(M: Matrix, K: Matrix, root: Matrix | None) -> Vector:
+    """All rigid-body modes (N, r)."""
+    count, basis = 1, modal_basis(M, K, 1, root=root)
+    while basis.omega[-1] == 0.0 and count < K.shape[0]:
+        count = min(2 * count + 1, K.shape[0])
+        basis = modal_basis(M, K, count, root=root)
+    return basis.vectors[:, basis.omega == 0.0]
 
 
 def _strain(K: Matrix, root: Matrix | None, u: Vector) -> Vector:

@@ -24,11 +24,15 @@ ORTHONORMALITY_TOLERANCE = 1e-9
 RESIDUAL_TOLERANCE = 1e-9  # of the largest terms in K φ - ω² M φ
 SYMMETRY_TOLERANCE = 1e-9
 SHIFT = 1e-12  # of the median of K_ii/M_ii: above rounding of K, not far above the lowest elastic ω²
+MOST_RAISED = 8  # times by ten
+ELASTIC = 1e3  # of that shift, above which ω² is not that of a rigid-body mode
 RIGID = 1e-7  # of max √(K_ii/M_ii): rounding of K, a few √eps, hides lower frequencies
 RIGID_WITH_ROOT = 1e-12  # same, when R is given: rounding stays below 4e-14 up to 2000 elements
 FINE = 1000  # free dofs, above which more vectors than wanted are corrected
 GUARDS = 6  # so many further: two vectors alone do not settle on 5000 elements, eight do
-SETTLED = 1e-9  # relative change of the frequencies by the last correction; one is enough up to 1000 elements
+SETTLED = 1e-9  # relative change of the frequencies by the last correction
+SHAPED = 1e-11  # same, of the shapes' curvature
+STALLED = 0.25  # of the correction before: the shapes' rounding, about eps (length/h)², is reached
 MOST_CORRECTIONS = 10
 
 
@@ -97,15 +101,37 @@ def _solve(M: sparse.csc_matrix, K: sparse.csc_matrix, count: int) -> tuple[Vect
     """The lowest `count` pairs (ω², φ), dense when the problem is small or most modes are wanted."""
     size = M.shape[0]
     if 2 * count <= size <= DENSE_LIMIT:  # the inverse problem keeps low modes clean beside stiff springs
-        shift = _shift(M, K)
-        inverse, vectors = linalg.eigh(M.toarray(), (K + shift * M).toarray(), subset_by_index=(size - count, size - 1))
-        return 1 / inverse[::-1] - shift, vectors[:, ::-1] / np.sqrt(inverse[::-1])
+        shift = _regular(M, K)
+        omega_squared, vectors = _inverse(M, K, shift, count)
+        elastic = omega_squared > ELASTIC * shift
+        if elastic.any() and not elastic.all():  # rounding there is eps/shift: too much for the highest modes
+            return _inverse(M, K, float(omega_squared[elastic][0]), count)
+        return omega_squared, vectors
     if size <= DENSE_LIMIT or 4 * count > size:
         return linalg.eigh(K.toarray(), M.toarray(), subset_by_index=(0, count - 1))
     start = np.random.default_rng(0).standard_normal(size)  # fixed: the same basis every time
     pairs = sparse_linalg.eigsh(K, count, M, sigma=-_shift(M, K), which="LM", v0=start)
     order = np.argsort(pairs[0])
     return pairs[0][order], pairs[1][:, order]
+
+
+def _inverse(M: sparse.csc_matrix, K: sparse.csc_matrix, shift: float, count: int) -> tuple[Vector, Vector]:
+    """The lowest `count` pairs (ω², φ) as the largest of M φ = (K + shift M) φ / (ω² + shift), dense."""
+    size = M.shape[0]
+    inverse, vectors = linalg.eigh(M.toarray(), (K + shift * M).toarray(), subset_by_index=(size - count, size - 1))
+    return 1 / inverse[::-1] - shift, vectors[:, ::-1] / np.sqrt(inverse[::-1])
+
+
+def _regular(M: sparse.csc_matrix, K: sparse.csc_matrix) -> float:
+    """σ that makes K + σ M positive definite beyond rounding, which short elements raise."""
+    shift = _shift(M, K)
+    for _ in range(MOST_RAISED):
+        try:
+            linalg.cholesky((K + shift * M).toarray(), overwrite_a=True)
+            break
+        except np.linalg.LinAlgError:
+            shift *= 10.0
+    return shift
 
 
 def _shift(M: sparse.csc_matrix, K: sparse.csc_matrix) -> float:
@@ -138,18 +164,24 @@ def _with_root(M: sparse.csc_matrix, K: sparse.csc_matrix, R: sparse.csr_matrix,
     solve: Callable[[Vector], Vector] = sparse_linalg.splu((K + _shift(M, K) * M).tocsc()).solve
     rigid = RIGID_WITH_ROOT * _scale(M, K)
     omega, vectors = _ritz(M, R, vectors)
-    change, corrections = np.inf, 0
-    while not change <= SETTLED:
+    change, turn, before, corrections = np.inf, np.inf, np.inf, 0
+    while not (change <= SETTLED and (turn <= SHAPED or turn > STALLED * before)):
         if corrections == MOST_CORRECTIONS:
             raise AccuracyError(
                 f"frequencies must settle to {SETTLED}, got a change of {change:.3g} in modal_basis; "
                 "use fewer elements or less extreme stiffnesses"
             )
-        residual = R.T @ (R @ vectors) - (M @ vectors) * omega**2
-        before, (omega, vectors) = omega, _ritz(M, R, vectors - solve(residual))
-        change = float(np.max(np.where(omega > rigid, np.abs(omega - before) / np.maximum(omega, rigid), 0.0)))
+        step, old = solve(R.T @ (R @ vectors) - (M @ vectors) * omega**2), omega
+        before, turn = turn, _largest(np.linalg.norm(R @ step, axis=0), omega, rigid)
+        omega, vectors = _ritz(M, R, vectors - step)
+        change = _largest(np.abs(omega - old), omega, rigid)
         corrections += 1
     return Basis(vectors, np.where(omega <= rigid, 0.0, omega))
+
+
+def _largest(part: Vector, omega: Vector, rigid: float) -> float:
+    """The largest part of an elastic mode's frequency."""
+    return float(np.max(np.where(omega > rigid, part / np.maximum(omega, rigid), 0.0)))
 
 
 def ritz(M: Matrix, K: Matrix, root: Matrix | None, vectors: Vector) -> tuple[Vector, Vector]:

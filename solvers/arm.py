@@ -99,7 +99,7 @@ class Arm:
                 self.orbits += [*special[:place], born]
                 return False
         self.orbits += [*special, following.orbit]
-        self.before = None if "grazing" in marks else (a, way)  # no cubic across a kink
+        self.before = None if {"grazing", "floor"} & {*marks} else (a, way)  # no cubic across a kink
         return True
 
     def _kink_ahead(self, reach: float) -> tuple[Point | None, Point, list[Orbit]] | None:
@@ -244,7 +244,7 @@ class Arm:
 
 def _jumped(a: Point, b: Point, marks: list[str]) -> bool:
     """Whether b lies on another branch: between them the parameter turns without a fold, or contacts come unseen."""
-    turned = a.share * b.share < 0.0 and "fold" not in marks
+    turned = a.share * b.share < 0.0 and not {"fold", "floor"} & {*marks}
     return "grazing" not in marks and (turned or not _same_contacts(a.orbit, b.orbit))
 
 

@@ -21,6 +21,7 @@ from solvers.arm import Arm, BranchStatus
 from solvers.birth import Scaled
 from solvers.chain import Problem
 from solvers.correction import newton
+from solvers.later import with_quiet_begin
 from solvers.periodic import Orbit, at_zero, orbit_of
 from solvers.point import Point, metric_of, point_of
 from solvers.shooting import checked, checked_start, solved_chain
@@ -150,7 +151,7 @@ def branch(
     metric = metric_of(problem, parameter, chain.x, high - low)
     ahead = np.zeros(len(metric))
     ahead[-1] = 1.0
-    point = point_of(problem, chain, error, iterations, metric, ahead)
+    point = with_quiet_begin(point_of(problem, chain, error, iterations, metric, ahead))
     back = replace(point, tangent=-point.tangent)
     return Branch(
         [Arm(p, (low, high), step) for p, room in ((point, parameter < high), (back, parameter > low)) if room]

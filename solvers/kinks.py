@@ -131,9 +131,9 @@ def behind(point: Point, kink: Kink, touch: Touch) -> Point:
 
 
 def marked(last: Point, first: Point, kink: Kink, touch: Touch) -> list[Orbit]:
-    """The orbits at a kink with what is to be told of it: a corner at the floor is a fold where the parameter turns."""
+    """The orbits at a kink with what is to be told of it."""
     if kink.kind == "grazing":
         return [orbit_at(last, touch, mark="grazing"), first.orbit]
     if kink.kind == "merging":
         return [replace(orbit, mark="merging") for orbit in (last.orbit, first.orbit)]
-    return [replace(last.orbit, mark="fold" if last.share * first.share < 0.0 else ""), first.orbit]
+    return [replace(last.orbit, mark="floor"), first.orbit]

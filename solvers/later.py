@@ -1,9 +1,14 @@
-"""Shots of a branch that begin later, because a contact with memory has come near one of their begins."""
+"""Shots of a branch that begin later, because a contact has come near one of their begins.
+
+One with memory must not be under way there. One whose force jumps must not begin or end there: the state at a fixed
+time has a corner where the jump passes it, so that no step of Newton's method, however short, leads across.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -21,14 +26,16 @@ _MARGIN = 0.1  # of the longest quiet time that must lie on both sides of a shot
 def is_cut(chain: Chain, system: System) -> bool:
     """Whether a contact with memory is under way where a shot begins."""
     logs = [solution.contacts for solution in chain.solutions]
-    return any(np.any(_latched(system, one) & ((one.t_in == 0.0) | np.isnan(one.t_out))) for one in logs)
+    latched = [np.isin(one.stop, with_memory(system)) for one in logs]
+    return any(
+        np.any(mine & ((one.t_in == 0.0) | np.isnan(one.t_out))) for mine, one in zip(latched, logs, strict=True)
+    )
 
 
-def _latched(system: System, log: ContactLog) -> Array:
-    """Which contacts of a log are with a stop whose law has memory."""
-    memory = np.zeros(len(system.contacts), dtype=bool)
-    memory[with_memory(system)] = True
-    return memory[log.stop]
+def _restless(system: System, log: ContactLog) -> Any:
+    """Which contacts of a log are with a stop whose law has memory, or whose force jumps."""
+    jumping = [stop for stop, contact in enumerate(system.contacts) if contact.law.jump]
+    return np.isin(log.stop, [*with_memory(system), *jumping])
 
 
 def with_quiet_begin(point: Point) -> Point:
@@ -36,12 +43,17 @@ def with_quiet_begin(point: Point) -> Point:
     orbit, m = point.orbit, len(point.problem.fractions)
     log, period = orbit.contacts, orbit.period
     offsets = [(f - point.problem.fractions[0]) * period for f in point.problem.fractions]
-    mine = _latched(orbit.system, log)
-    times = np.concatenate((log.t_in[mine], log.t_out[mine], log.t_out[mine] - period))
-    if min(np.abs(times - t).min(initial=period) for t in offsets) > _MARGIN * period / (1 + len(log)):
+    mine = _restless(orbit.system, log)
+    ends = np.concatenate((log.t_in[mine], log.t_out[mine]))
+    times = np.concatenate((ends - period, ends, ends + period))
+
+    def away(begins: list[float]) -> float:
+        return min(float(np.abs(times - t).min(initial=period)) for t in begins)
+
+    if away(offsets) > _MARGIN * period / (1 + len(log)):
         return point
     begins = quiet_begins(orbit.system, log, period, m, False)
-    if len(begins) < m:
+    if len(begins) < m or not away(begins) > away(offsets):
         return point
     later = delayed(orbit.system, orbit.phase)
     x = np.array([flown(later, orbit.state, t, orbit.method) for t in begins])

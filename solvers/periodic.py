@@ -30,15 +30,18 @@ class Orbit:
     Attributes
     ----------
     state : (2n,) [q, q̇] at time ``phase`` within the period.
-    period : s. phase : s, 0 unless a stop whose law latches its entry rate is closed then.
+    period : s. phase : s, 0 unless a stop whose law latches its entry rate is closed then; on a branch also where a
+        contact with such a law, or with one whose force jumps, comes near t = 0.
     monodromy : (2n, 2n) derivative of the state one period later. multipliers : its eigenvalues, largest first.
     residual : size of Φ(x) - x relative to the orbit's. iterations : of Newton's method.
     contacts : log of one period, times counted from ``phase``.
     system, method : of what, and how it was integrated.
     doubt : why the verdict on stability may be wrong; empty when nothing speaks against it.
     parameter : value of the branch's parameter, NaN outside a branch.
-    mark : "fold", "flip", "neimark-sacker", "branch point", "grazing" or "merging" at special points of a branch, else
-        empty. Two orbits marked "merging" follow each other where a branch jumps because two contacts become one.
+    mark : "fold", "flip", "neimark-sacker", "branch point", "grazing", "floor" or "merging" at special points of a
+        branch, else empty. Two orbits marked "merging" follow each other where a branch jumps because two contacts
+        become one. At a "grazing" or "floor" (an entry rate meets its law's floor) multipliers jump, and the branch may
+        turn back with a corner.
 
     Examples
     --------

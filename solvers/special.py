@@ -7,10 +7,11 @@ A special point is a sign change of its test function along the arclength. With 
     neimark-sacker   Π_{i<j} (μ_i μ_j - 1) / (1 + |μ_i μ_j|), at a complex pair
     branch point     Π (μ_i - 1) / (1 + |μ_i|), where there is no fold
     grazing          number of contacts within the period changes
+    floor            a contact's entry rate less its law's floor, below which the law does not see it
 
-All but the last are continuous along the branch, so that Brent's method finds their zeros in a few orbits. A multiplier
-that jumps over the unit circle at a grazing has no flip of its own: only the grazing is reported. Kinks that stop
-Newton's method are met before, by `solvers.kinks`.
+All but the grazings are continuous along the branch, so that Brent's method finds their zeros in a few orbits. A
+multiplier that jumps over the unit circle at a grazing or a floor has no flip of its own: only the kink is reported.
+Kinks that stop Newton's method are met before, by `solvers.kinks`.
 """
 
 from __future__ import annotations
@@ -26,12 +27,16 @@ import numpy as np
 from solvers.chain import Chain
 from solvers.periodic import Orbit, OrbitError, orbit_of
 from solvers.point import Point, corrected, cubic, is_straight, tangent_of
+from solvers.quiet import with_memory
 from solvers.system import Array
 
 _ROUNDING = 1e-9  # of the test functions: what is at a special point all along is marked nowhere
 _SHARP = 1e-10  # of the parameter, or of the way between the points: how sharply a point is located
 _AT = 1e-4  # distance from the unit circle of the multiplier at what passes for a special point
 _MOST_TRIALS = 25
+_SAME = 1e-6  # relative difference of states that are the same
+_MOST_TOUCHES = 60  # more than halving alone takes: with rounding left in an indentation, no secant is of use
+_NUDGES = 0.0, 1e-7, -1e-7, 1e-6, -1e-6  # of the way: at some guesses rounding keeps the residual over its tolerance
 _MOST_GRAZINGS = 4  # looked for between two points
 
 
@@ -106,6 +111,19 @@ class Stretch:
             self.trials[s] = chain, orbit
         return self.trials[s]
 
+    def orbit(self, s: float) -> Orbit:
+        """The orbit at an arclength from a; raises OrbitError."""
+        return self.a.orbit if s == 0.0 else self.b.orbit if s == self.way else self.at(s)[1]
+
+    def near(self, s: float, width: float) -> tuple[float, Orbit]:
+        """(arclength, orbit) at s, or hardly aside if none is found there; raises OrbitError."""
+        for place in (s + share * width for share in _NUDGES):
+            try:
+                return place, self.orbit(place)
+            except OrbitError:
+                continue
+        raise OrbitError("no orbit was found near a guess between two orbits")
+
     def indicators(self, s: float) -> dict[str, float]:
         """Test functions at an arclength from a."""
         for place, point in ((0.0, self.a), (self.way, self.b)):
@@ -128,7 +146,7 @@ def between(a: Point, b: Point, way: float, before: tuple[Point, float] | None =
     ``before`` is the point before a and the way from it: the three together may tell of two special points on the way.
     """
     stretch = Stretch(a, b, way)
-    found = list(_grazings(stretch))
+    found = list(_kinks(stretch))
     places = [0.0, *sorted(place for place, _ in found or _dips(stretch, before)), way]
     for begin, end in pairwise(places):
         found += _roots(stretch, begin, end)
@@ -168,35 +186,71 @@ def _dips(stretch: Stretch, before: tuple[Point, float] | None) -> Iterator[tupl
 
 def _root(stretch: Stretch, begin: float, end: float, name: str) -> tuple[float, Orbit] | None:
     """(arclength, orbit) where a test function is zero; None where it only jumps."""
+    pair = _zero(stretch, begin, end, lambda s: stretch.indicators(s)[name])
+    return (pair[0], replace(pair[1], mark=name)) if pair is not None and _is_at(pair[1], name) else None
+
+
+def _zero(stretch: Stretch, begin: float, end: float, value: Callable[[float], float]) -> tuple[float, Orbit] | None:
+    """(arclength, orbit) where a function of the arclength changes its sign; None where no orbit is found."""
     from scipy.optimize import brentq
 
-    sharp = stretch.sharpness()
+    found: dict[float, tuple[float, Orbit]] = {}
+
+    def nearby(s: float) -> float:
+        found[s] = stretch.near(s, end - begin)
+        return value(found[s][0])
+
     try:
         place, _ = brentq(
-            *(lambda s: stretch.indicators(s)[name], begin, end),
-            **{"xtol": sharp, "maxiter": _MOST_TRIALS, "full_output": True, "disp": False},
+            *(nearby, begin, end),
+            **{"xtol": stretch.sharpness(), "maxiter": _MOST_TRIALS, "full_output": True, "disp": False},
         )
-        orbit = stretch.at(place)[1]
-    except (OrbitError, np.linalg.LinAlgError):
+        return found[place]
+    except (OrbitError, np.linalg.LinAlgError, IndexError, KeyError):
         return None
-    return (place, replace(orbit, mark=name)) if _is_at(orbit, name) else None
 
 
-def _grazings(stretch: Stretch) -> Iterator[tuple[float, Orbit]]:
-    """(arclength, orbit) of the points at which the number of contacts changes."""
+def _kinks(stretch: Stretch) -> Iterator[tuple[float, Orbit]]:
+    """(arclength, orbit) where the number of contacts changes, and where an entry rate passes its law's floor."""
     begin, first = 0.0, stretch.a.orbit
     for _ in range(_MOST_GRAZINGS):
         if len(first.contacts) == len(stretch.b.orbit.contacts):
-            return
+            break
         found = _grazing(stretch, begin, first)
         if found is None:
             return
-        place, touched, begin, first = found
+        near, place, touched, behind, last = found
+        yield from _floors(stretch, begin, near)
         yield place, touched
+        begin, first = behind, last
+    yield from _floors(stretch, begin, stretch.way)
 
 
-def _grazing(stretch: Stretch, begin: float, first: Orbit) -> tuple[float, Orbit, float, Orbit] | None:
-    """Where the number of contacts changes first after a place: arclength, marked orbit, place behind it, orbit there.
+def _floors(stretch: Stretch, begin: float, end: float) -> Iterator[tuple[float, Orbit]]:
+    """(arclength, orbit) where an entry rate passes its law's floor, between two places of as many contacts."""
+    first, last = (_over_floor(stretch.orbit(s)) for s in (begin, end))
+    for number in np.flatnonzero(first * last < 0.0) if len(first) == len(last) else ():
+
+        def over(s: float, number: int = int(number)) -> float:
+            return float(_over_floor(stretch.orbit(s))[number])
+
+        pair = _zero(stretch, begin, end, over)
+        if pair is not None and np.abs(_over_floor(pair[1])).min(initial=1.0) < _AT:  # else it only jumped
+            yield pair[0], replace(pair[1], mark="floor")
+
+
+def _over_floor(orbit: Orbit) -> Array:
+    """Entry rate less the floor, in units of it, of every contact in the order of stops and time; 1 where none acts."""
+    log, over = orbit.contacts, np.ones(len(orbit.contacts))
+    for stop in with_memory(orbit.system):
+        mine, floor = log.stop == stop, orbit.system.contacts[stop].law.entry_rate_floor
+        over[mine] = log.speed_in[mine] / floor - 1.0 if floor else 1.0
+    ordered: Array = over[np.lexsort((log.t_in, log.stop))]
+    return ordered
+
+
+def _grazing(stretch: Stretch, begin: float, first: Orbit) -> tuple[float, float, Orbit, float, Orbit] | None:
+    """Where the number of contacts changes first after a place: place before, place, orbit, place and orbit behind.
 
     There the shallowest contact's indentation goes to zero, or the flight between two contacts that become one.
     """
@@ -206,7 +260,7 @@ def _grazing(stretch: Stretch, begin: float, first: Orbit) -> tuple[float, Orbit
     near, near_orbit = begin, first
     known = [(behind, distance(last)) if more else (begin, distance(first))]  # on the side with more contacts
     sharp = stretch.sharpness()
-    for _ in range(_MOST_TRIALS):
+    for _ in range(_MOST_TOUCHES):
         touched, bare = (behind, near) if more else (near, behind)
         place = 0.5 * (touched + bare)
         root = touched + 2.0 * sharp
@@ -216,10 +270,12 @@ def _grazing(stretch: Stretch, begin: float, first: Orbit) -> tuple[float, Orbit
             if min(bare, touched) < root < max(bare, touched):
                 place = root + 0.01 * (touched - root)
         if abs(behind - near) <= sharp or abs(root - touched) <= sharp:
+            if abs(behind - near) <= sharp and _parted(near_orbit, last):
+                return None
             at, touching = (behind, last) if more else (near, near_orbit)
-            return at, replace(touching, mark="grazing"), behind, last
+            return near, at, replace(touching, mark="grazing"), behind, last
         try:
-            orbit = stretch.at(place)[1]
+            place, orbit = stretch.near(place, behind - near)
         except OrbitError:
             return None
         same = len(orbit.contacts) == len(first.contacts)
@@ -230,6 +286,11 @@ def _grazing(stretch: Stretch, begin: float, first: Orbit) -> tuple[float, Orbit
         if same != more:
             known.append((place, distance(orbit)))
     return None
+
+
+def _parted(a: Orbit, b: Orbit) -> bool:
+    """Whether orbits at one place of the branch are two: it jumps there, as where contacts with memory merge."""
+    return bool(np.abs(a.state - b.state).max() > _SAME * np.abs(a.state).max())
 
 
 def _distance(more: Orbit, less: Orbit) -> Callable[[Orbit], float]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import brentq, root
 
-from contacts import Hertz, Hysteretic, PiecewiseLinear
+from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear
 from solvers import Contact, System
 
 
@@ -209,25 +209,54 @@ class Duffing:
         return np.array([u[0] + a @ c + b @ s, omega * (j * b) @ c - omega * (j * a) @ s])
 
 
+def random_law(rng):
+    """One of three laws."""
+    laws = [PiecewiseLinear([10.0 ** rng.uniform(0, 3)]), Hertz(10.0 ** rng.uniform(1, 5)),
+            Hysteretic.lankarani_nikravesh(10.0 ** rng.uniform(1, 5), restitution=rng.uniform(0.2, 1.0))]  # fmt: skip
+    return laws[rng.integers(3)]
+
+
 def random_family(rng, over="omega"):
     """(family over the drive's omega or amplitude or the gap, its span, modes) of one or two masses with a stop."""
     modes, frequencies = int(rng.integers(1, 3)), np.array([1.0, 2.0 + 3.0 * rng.random()])
     direction = rng.normal(size=modes)
-    laws = [PiecewiseLinear([10.0 ** rng.uniform(0, 3)]), Hertz(10.0 ** rng.uniform(1, 5)),
-            Hysteretic.lankarani_nikravesh(10.0 ** rng.uniform(1, 5), restitution=rng.uniform(0.2, 1.0))]  # fmt: skip
-    law, gap = laws[rng.integers(3)], rng.uniform(-0.5, 1.0)
+    law, gap = random_law(rng), rng.uniform(-0.5, 1.0)
+    return _driven(rng, over, frequencies[:modes], [direction], [law], [gap])
+
+
+def random_stops_family(rng, over="omega", stops=2):
+    """The same of two or three masses with several stops: on any coordinates, on one each (hardly) coupled, in pairs.
+
+    On one coordinate each the masses do not see each other, or couple by 1e-6 to 1e-2; a pair is symmetric.
+    """
+    kind, modes = rng.choice(["any", "apart", "weak", "pair"]), max(stops, 2)
+    frequencies = np.concatenate(([1.0], rng.uniform(1.2, 5.0, modes - 1)))
+    directions, gaps = list(rng.normal(size=(stops, modes))), list(rng.uniform(-0.3, 1.0, stops))
+    if kind in ("apart", "weak"):
+        coupling = 10.0 ** rng.uniform(-6, -2) if kind == "weak" else 0.0
+        directions = list(np.eye(stops, modes) + coupling * rng.normal(size=(stops, modes)))
+    dashpot = KelvinVoigt(10.0 ** rng.uniform(0, 3), 10.0 ** rng.uniform(-2, 0))
+    laws = [dashpot if rng.random() < 0.25 else random_law(rng) for _ in range(stops)]
+    if kind == "pair":
+        directions[1], laws[1], gaps[:2] = -directions[0], laws[0], [abs(gaps[0])] * 2
+    return _driven(rng, over, frequencies, directions, laws, gaps)
+
+
+def _driven(rng, over, frequencies, directions, laws, gaps):
+    """(family, span, modes) of masses that one drive pushes against stops; over the gap all gaps move."""
     zeta, amplitude, periods = 10.0 ** rng.uniform(-2.5, -0.5), rng.uniform(0.1, 2.0), int(rng.integers(1, 3))
-    low = rng.uniform(0.3, 2.0)
+    low, modes = rng.uniform(0.3, 2.0), len(frequencies)
     spans = {
         "omega": (low, low * rng.uniform(1.1, 3.0)),
         "amplitude": (amplitude, 3.0 * amplitude),
-        "gap": (gap, gap + 0.5),
+        "gap": (gaps[0], gaps[0] + 0.5),
     }
 
     def make(value):
-        now = {"omega": low, "amplitude": amplitude, "gap": gap, over: value}
+        now = {"omega": low, "amplitude": amplitude, "gap": gaps[0], over: value}
         load = np.ones(modes), Tone(now["amplitude"], now["omega"])
-        stop = Contact(direction, law, gap=now["gap"])
-        return System.modal(frequencies[:modes], zeta, [stop], [load]), periods * 2.0 * math.pi / now["omega"]
+        moved = [gap + (now["gap"] - gaps[0]) for gap in gaps]
+        contacts = [Contact(w, law, gap=gap) for w, law, gap in zip(directions, laws, moved, strict=True)]
+        return System.modal(frequencies, zeta, contacts, [load]), periods * 2.0 * math.pi / now["omega"]
 
     return make, spans[over], modes

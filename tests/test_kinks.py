@@ -4,13 +4,14 @@ import math
 
 import numpy as np
 import pytest
-from oscillators import Tone
+from oscillators import Tone, random_family
 
 from contacts import Hysteretic, PiecewiseLinear
 from solvers import Contact, DormandPrince, OrbitError, System, branch, integrate, orbit
 from solvers.continuation import BranchStatus
 from solvers.kinks import kinks_near
 from solvers.special import between
+from solvers.touch import signature
 
 LATCHED = Hysteretic(2.1e8, 0.5625, entry_rate_floor=5e-3)
 TWO = 328.9, [1.58306e-4, -0.0933967169]  # rad/s, an orbit of two contacts over two periods of the drive
@@ -115,14 +116,15 @@ def test_contacts_that_take_each_others_place_are_not_taken_for_the_same(merged)
     """Between 327.55 and 327.9 rad/s two contacts merge and another begins: before and after there are two."""
     found = [one for one in merged.special if one.parameter < 328.0]
     kinds = [one.mark for one in sorted(found, key=lambda one: merged.orbits.index(one))]
-    assert kinds == ["flip", "grazing", "merging", "merging", "flip"]
+    assert [kind for kind in kinds if kind != "floor"] == ["flip", "grazing", "merging", "merging", "flip"]
 
 
 def test_a_corner_at_the_floor_turns_the_branch():
     law = Hysteretic(2.1e8, 0.5625)
     found = branch(family(law), (327.4, 327.6), FIVE[1], at=FIVE[0]).run()
-    (corner,) = marks(found, "fold")
-    assert np.abs(corner.multipliers - 1.0).min() > 0.1  # no smooth fold
+    (corner,) = marks(found, "floor")
+    assert not marks(found, "fold")
+    assert np.abs(corner.multipliers - 1.0).min() > 0.1
     assert corner.contacts.speed_in.min() == pytest.approx(law.entry_rate_floor, rel=1e-3)
     assert max(one.parameter for one in found.orbits) == pytest.approx(corner.parameter, rel=1e-10)
     place = found.orbits.index(corner)
@@ -155,3 +157,18 @@ def test_two_flips_between_two_orbits_are_seen_by_the_one_before():
     assert not between(a, b, way(a, b))
     seen = between(a, b, way(a, b), (last, way(last, a)))
     assert [one.parameter for one in seen] == pytest.approx(flips, rel=1e-9)
+
+
+def test_the_floor_is_marked_where_it_is_met():
+    """Stability and the floored contacts change at marked orbits only; at one floor |mu| falls from 3.1 to 0."""
+    make, _, _ = random_family(np.random.default_rng(13), "amplitude")
+    found = branch(make, (1.44, 1.51), np.zeros(4), step=0.3).run()
+    assert [one.mark for one in found.special] == ["grazing", "floor", "fold", "floor", "merging", "merging"]
+    for one in marks(found, "floor"):
+        assert one.contacts.speed_in.min() == pytest.approx(1e-3, rel=1e-4)
+    for a, b in zip(found.orbits, found.orbits[1:], strict=False):
+        assert (signature(a), a.stable) == (signature(b), b.stable) or a.mark or b.mark
+    corner = found.orbits.index(marks(found, "floor")[1])
+    before, after = found.orbits[corner - 1], found.orbits[corner + 1]
+    assert abs(before.multipliers[0]) > 1.1
+    assert abs(after.multipliers[0]) < 0.01

@@ -2,16 +2,20 @@
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
-from oscillators import Bilinear, Tone, random_family
+from oscillators import Bilinear, Tone, random_family, random_stops_family
 
 import solvers.arm
 import solvers.chain
-from contacts import PiecewiseLinear, law
-from solvers import Contact, OrbitError, System, branch
+from contacts import Hertz, KelvinVoigt, PiecewiseLinear, law
+from solvers import Contact, DormandPrince, OrbitError, System, branch
+from solvers.chain import delayed
 from solvers.continuation import BranchStatus
+from solvers.periodic import flown
+from solvers.special import Stretch
 
 
 @law(jump=True)
@@ -86,6 +90,44 @@ def test_subharmonic_branch_ends_at_its_birth():
     assert abs(born.multipliers[0] - 1.0) < 1e-6
 
 
+def test_a_guess_at_which_no_orbit_is_found_is_left_aside(monkeypatch):
+    """Rounding may keep Newton's method above its tolerance at one guess: every other one is made to fail."""
+    at, asked = Stretch.at, []
+
+    def failing(stretch, s):
+        if s not in stretch.trials and asked.count(s) == 0:
+            asked.append(s)
+            if len(asked) % 2:
+                raise OrbitError("rounding")
+        return at(stretch, s)
+
+    monkeypatch.setattr(Stretch, "at", failing)
+    problem = Bilinear(0.96, zeta=0.05)
+    found = branch(over(problem), (0.9, 0.96), problem.settled(), at=0.96, step=0.3).run()
+    (flip,) = found.special
+    exact, _ = replace(problem, omega=flip.parameter).special(-1.0, flip.state)
+    assert flip.parameter == pytest.approx(exact, abs=1e-6)
+    assert len(asked) > 2
+
+
+def test_a_graze_is_marked_however_shallow_the_contacts_beside_it():
+    """Over two periods of the drive two contacts graze at once, where the linear motion just reaches the stop."""
+    zeta, gap, omega, w = 0.5 * 0.14455829, 0.7000786761877948, 1.5801527935859612, 1.39034535
+
+    def make(amplitude):
+        stop = Contact([w], Hertz(75940.61027782668), gap=gap)
+        load = [1.0], Tone(amplitude, omega)
+        return System.modal([1.0], zeta, [stop], [load]), 4.0 * math.pi / omega
+
+    found = branch(make, (0.46858947328201006, 1.40576841984603), np.zeros(2), step=0.3).run()
+    touching = abs(1.0 - omega**2 + 2j * zeta * omega) * gap / w
+    grazings = [one.parameter for one in marked(found, "grazing")]
+    assert grazings
+    assert grazings == pytest.approx([touching] * len(grazings), rel=1e-9)
+    for a, b in pairwise(found.orbits):
+        assert len(a.contacts) == len(b.contacts) or a.mark or b.mark
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_random_systems_always_end_with_a_status(seed, monkeypatch):
     rng = np.random.default_rng(seed)
@@ -107,3 +149,44 @@ def test_random_systems_always_end_with_a_status(seed, monkeypatch):
     assert count[0] < 100 * len(found.status) + 40 * len(found.orbits)
     assert all(orbit.residual <= 1e-10 for orbit in found.orbits)
     assert all(span[0] <= orbit.parameter <= span[1] for orbit in found.orbits)
+
+
+@pytest.mark.parametrize(("stops", "seed"), [(2, 0), (2, 1), (2, 3), (3, 0), (3, 2)])
+def test_orbits_of_several_stops_close_for_another_integrator(stops, seed, monkeypatch):
+    """After two periods the motion has come back, of its size and in units of what its multipliers make."""
+    make, span, modes = random_stops_family(np.random.default_rng(seed), "amplitude", stops)
+    monkeypatch.setattr(solvers.arm, "MOST_ORBITS", 12)
+    try:
+        found = branch(make, span, np.zeros(2 * modes), step=0.3).run()
+    except OrbitError as error:
+        assert "residual" in str(error) or "open" in str(error)  # noqa: PT017
+        return
+    assert all(status is not BranchStatus.LOST for status in found.status)
+    for one in found.orbits[::4]:
+        later, x = delayed(one.system, one.phase), one.state
+        end = flown(later, x, 2.0 * one.period, DormandPrince(1e-10))
+        assert np.abs(end - x).max() < 1e-6 * np.abs(x).max() * max(1.0, abs(one.multipliers[0])) ** 2
+
+
+def ball(phase):
+    """A ball on a vibrating plate over its amplitude: q'' = A cos(t + phase) - 1 + what a Kelvin–Voigt stop does."""
+    zero, stop = np.zeros((1, 1)), Contact([1.0], KelvinVoigt(1000.0, 5.0))
+
+    def make(amplitude):
+        loads = [([1.0], Tone(amplitude * np.exp(1j * phase), 1.0)), ([-1.0], Tone(1.0, 0.0))]
+        return System(np.eye(1), zero, zero, [stop], loads), 2.0 * math.pi
+
+    return make
+
+
+@pytest.mark.parametrize(("number", "later"), [(0, 0.0), (2, 0.02), (3, 0.04), (4, 0.1)])
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_a_force_that_jumps_may_begin_at_any_time_of_the_period(number, later):
+    """Fold and flip at 1.169860 and 1.172158 whichever phase is t = 0, contacts sliding over it on the way."""
+    first = solvers.orbit(*ball(0.0)(1.3))
+    t = (float(first.contacts.t_in[number]) + later * first.period) % first.period
+    start = flown(first.system, first.state, t, first.method)
+    found = branch(ball(t), (0.8, 1.3), start, at=1.3, step=0.1).run()
+    assert found.status == (BranchStatus.END,)
+    assert [one.mark for one in found.special] == ["fold", "flip"]
+    assert [one.parameter for one in found.special] == pytest.approx([1.169860, 1.172158], abs=1e-6)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from fembeam.orbit import Orbit
 
 MARKS = {"fold": ("o", GREY), "flip": ("s", RED), "neimark-sacker": ("D", GREEN), "branch point": ("P", "black"),
-         "grazing": ("x", "black"), "merging": ("^", ORANGE)}  # fmt: skip
+         "grazing": ("x", "black"), "floor": ("+", "black"), "merging": ("^", ORANGE)}  # fmt: skip
 UNITS = {"base.omega": "ω / rad/s", "base.amplitude": "base amplitude / m"}
 
 

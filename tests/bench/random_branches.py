@@ -1,15 +1,17 @@
-"""Branches of random systems, one or two modes with a stop of three laws, over omega, amplitude or gap.
+"""Branches of random systems with one stop, two or three, over omega, amplitude or gap.
 
-    python tests/bench/random_branches.py [count] [first seed] [omega | amplitude | gap] [most orbits per direction]
+    python tests/bench/random_branches.py [count] [first seed] [omega | amplitude | gap] [most orbits] [stops]
 
-Prints how the directions ended, the special points on the way, the work per orbit, and every direction that was lost.
-Every orbit must satisfy its residual within the span, and come back after a second period too, whatever happens.
+Prints how the directions ended, the special points on the way, the work per orbit, every direction that was lost, and
+every change of stability or of the contacts that no mark tells of. Every orbit must satisfy its residual within the
+span, and some of each branch must come back after a second period, by their own method and by `DormandPrince`.
 """
 
 from __future__ import annotations
 
 import sys
 from collections import Counter
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +19,15 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from oscillators import random_family
+from oscillators import random_family, random_stops_family
 
 import solvers.arm
-from solvers import OrbitError, branch, integrate
+from solvers import Branch, DormandPrince, Orbit, OrbitError, branch, integrate
 from solvers.chain import Problem, delayed
 from solvers.continuation import BranchStatus
+from solvers.touch import signature
+
+CHECKED = 5  # orbits of a branch that are integrated again
 
 
 class Counted:
@@ -38,21 +43,49 @@ class Counted:
         return self.evaluate(*arguments)
 
 
-def drift(one: Any) -> float:
+def drift(one: Orbit, method: Any) -> float:
     """How far an orbit is from its begin after two periods, of its size and in units of what its multipliers make."""
     later, x = delayed(one.system, one.phase), one.state
     n, largest = one.system.size, max(1.0, abs(one.multipliers[0]))
-    end = integrate(later, x[:n], x[n:], 2.0 * one.period, method=one.method)
+    end = integrate(later, x[:n], x[n:], 2.0 * one.period, method=method)
     off = np.abs(np.concatenate((end.q[-1], end.q_dot[-1])) - x).max()
     return float(off / (np.abs(x).max() * largest**2))
 
 
-def main(count: str = "100", first: str = "0", over: str = "omega", most: str = "60") -> None:
+def check_orbits(seed: int, found: Branch, ends: Counter[str]) -> None:
+    """Integrate some of a branch's orbits again and tell which do not close."""
+    for one in found.orbits[:: max(1, len(found.orbits) // CHECKED)]:
+        for name, method in (("own", one.method), ("DormandPrince", DormandPrince(1e-10))):
+            ends[f"closed by {name}"] += 1
+            if not (off := drift(one, method)) <= 1e-6:
+                ends[f"open by {name}"] += 1
+                print(f"seed {seed}: {name}: no orbit at {one.parameter:.9g} {one.mark}, off by {off:.1e}")
+
+
+def check_marks(seed: int, found: Branch, ends: Counter[str]) -> None:
+    """Tell what changes between two orbits without a mark."""
+    for arm in found.arms:
+        for a, b in pairwise(arm.orbits):
+            for what, before, after in (("contacts", *map(signature, (a, b))), ("stability", a.stable, b.stable)):
+                if before != after and not (a.mark or b.mark):
+                    ends[f"unmarked {what}"] += 1
+                    print(f"seed {seed}: {what} {before} to {after}, {a.parameter:.9g} to {b.parameter:.9g}")
+    for one in found.special:
+        if one.mark == "fold" and np.abs(one.multipliers - 1.0).min() > 1e-3:
+            ends["fold without a multiplier near one"] += 1
+
+
+def main(count: str = "100", first: str = "0", over: str = "omega", most: str = "60", stops: str = "1") -> None:
     """Follow the branches."""
     solvers.arm.MOST_ORBITS = int(most)
-    ends, marks, work, orbits = Counter(), Counter(), Counted(), 0
+    ends: Counter[str] = Counter()
+    marks: Counter[str] = Counter()
+    checks: Counter[str] = Counter()
+    work, orbits = Counted(), 0
     for seed in range(int(first), int(first) + int(count)):
-        make, span, modes = random_family(np.random.default_rng(seed), over)
+        rng = np.random.default_rng(seed)
+        family = random_family(rng, over) if stops == "1" else random_stops_family(rng, over, int(stops))
+        make, span, modes = family
         try:
             found = branch(make, span, np.zeros(2 * modes), step=0.3).run()
         except OrbitError:
@@ -61,18 +94,19 @@ def main(count: str = "100", first: str = "0", over: str = "omega", most: str = 
         orbits += len(found.orbits)
         marks.update(orbit.mark for orbit in found.special)
         assert all(one.residual <= 1e-10 and span[0] <= one.parameter <= span[1] for one in found.orbits), seed
-        for one in found.orbits[:: max(1, len(found.orbits) // 10)]:
-            if (off := drift(one)) > 1e-6:
-                print(f"seed {seed}: no orbit at {one.parameter:.9g} {one.mark}, off by {off:.1e} after two periods")
+        check_orbits(seed, found, checks)
+        check_marks(seed, found, checks)
         for arm in found.arms:
             ends[arm.status.name] += 1
             if arm.status is BranchStatus.LOST:
                 last = arm.orbits[-1]
-                law, gap = last.system.contacts[0].law, last.system.contacts[0].gap
-                print(f"seed {seed}: lost at {last.parameter:.9g}, {len(arm.orbits)} orbits, {law!r}, gap {gap:g}, "
+                laws = [(contact.law, round(contact.gap, 6)) for contact in last.system.contacts]
+                print(f"seed {seed}: lost at {last.parameter:.9g}, {len(arm.orbits)} orbits, {laws}, "
                       f"entered at {last.contacts.speed_in} m/s, |mu| {np.abs(last.multipliers)}")  # fmt: skip
-    print(f"{count} systems: directions ended {dict(ends)}; special points {dict(marks)}")
-    print(f"{orbits} orbits, {work.count / max(orbits, 1):.2f} evaluations each")
+    print(
+        f"{count} systems of {stops} stop(s) over {over}: directions ended {dict(ends)}; special points {dict(marks)}"
+    )
+    print(f"{dict(checks)}; {orbits} orbits, {work.count / max(orbits, 1):.2f} evaluations each")
 
 
 if __name__ == "__main__":
