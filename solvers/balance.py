@@ -15,6 +15,7 @@ than `FACTOR` times what this allows: a run that only loses too much passes.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -54,15 +55,16 @@ def note_energy(problem, tables, state, space):
 
 def too_much(system: System, energy: Any, sampled: Any, duration: float) -> bool:
     """Whether a run without ledger ends with more energy than it can have been given; ``sampled`` are its loads."""
-    if system.blocks.loss.size or not energy[LAST] > FACTOR * energy[ALLOWED]:
+    _, last, allowed = energy.tolist()
+    if not last > FACTOR * allowed or system.blocks.loss.size:
         return False
-    speed = np.sqrt(2.0 * energy[ALLOWED])
+    speed = math.sqrt(2.0 * allowed)
     for j, load in enumerate(sampled.table_load):
         rows = sampled.table[sampled.table_start[j] : sampled.table_start[j + 1], 0]
         vector = np.asarray(system.loads[load][0])
         size = np.sqrt(vector @ np.linalg.solve(dense(system.M), vector))
         speed += size * np.abs(rows).mean() * duration
-    return bool(energy[LAST] > FACTOR * 0.5 * speed**2)
+    return bool(last > FACTOR * 0.5 * speed**2)
 
 
 def unbalanced(system: System, powers: Array, motion: Array, begin: Array, contacts: Array, rtol: float) -> bool:

@@ -93,8 +93,8 @@ def solve_forces(problem, tables, state, space, family, level, rtol):
         settled, change = change <= 1e-27 * largest, math.sqrt(change)
         if iteration == 0:
             before = change / 0.3  # as iterations usually go
-        # changes that shrink by r = change/before, taken as 0.1 at least, 0.9 at most, add up to change r/(1 - r) more
-        if settled or (change <= 9.0 and change * change <= max(before - change, change / 9.0)):
+        # changes that shrink by r = change/before, taken as 1/20 at least, 0.9 at most, add up to change r/(1 - r) more
+        if settled or (change <= 20.0 and change * change <= max(before - change, change / 9.0)):
             return True
         if iteration > 2 and change > 0.6 * before:
             break

@@ -203,7 +203,7 @@ def land(problem, tables, state, space, stop, direction, near, rtol, t_end, out,
         and direction * dot(problem.read_rate[stop], x, 2 * problem.k.size) >= 0.0  # it has not turned back
     ):
         return -1
-    other = on_the_way(problem, tables, state, space, stop, w, x)
+    other = on_the_way(problem, tables, state, space, stop, False, w, x)
     if other != FREE:
         return max(other, -1)
     done = _accept(problem, tables, state, space, variable, stop, span, t_end, out, due, ledger)
@@ -230,7 +230,7 @@ def land_on_bend(problem, tables, state, space, stop, near, rtol, t_end, out, du
         before, apart, span = span, value, following
     if not (abs(value) <= 1e-6 * largest and _error(problem, space, rtol) <= 1.0):
         return False
-    if on_the_way(problem, tables, state, space, stop, w, x) != FREE:
+    if on_the_way(problem, tables, state, space, stop, True, w, x) != FREE:
         return False
     lower, upper = problem.levels[stop, state.piece[stop] - 1], problem.levels[stop, state.piece[stop]]
     if not lower < indentation(problem, stop, x) < upper:

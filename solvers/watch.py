@@ -52,33 +52,59 @@ def _passes(d, a, slope_a, b, slope_b, lower, upper):
     return False
 
 
+@inlined
+def _turns(rates, begin, end, up, down):
+    """Whether the rate changes its sign upwards or downwards, as asked, between two points of a step."""
+    before, found = begin, False
+    for i in range(S + 1):
+        after = rates[i] if i < S else end
+        found |= (up and before < 0.0 < after) or (down and before > 0.0 > after)
+        before = after
+    return found
+
+
+@inner
+def _passes_between(problem, tables, state, space, family, h, s, lower, upper):
+    """Whether δ leaves [lower, upper] between two points of the step or at one."""
+    size = 2 * problem.k.size
+    t, delta, rate = 0.0, indentation(problem, s, state.x), dot(problem.read_rate[s], state.x, size)
+    for i in range(S + 1):
+        if i < S:
+            after, delta_new, rate_new = h * tables.times[family, i], space.motion[s, 0, i], space.motion[s, 1, i]
+        else:
+            after, delta_new = h, indentation(problem, s, space.x_new)
+            rate_new = dot(problem.read_rate[s], space.x_new, size)
+        if _passes(after - t, delta, rate, delta_new, rate_new, lower, upper):
+            return True
+        t, delta, rate = after, delta_new, rate_new
+    return False
+
+
 @inner
 def leaves_piece(problem, tables, state, space, family, level):
     """Whether any stop may cross a border of its piece on the step."""
-    size, h = 2 * problem.k.size, tables.step[level]
+    size = 2 * problem.k.size
     for s in range(problem.gap.size):
-        piece = state.piece[s]
-        tolerance = 8.0 * surface_tolerance(problem, s, state.x)
-        upper, lower = problem.levels[s, piece] + tolerance, -np.inf
+        piece, ripple = state.piece[s], 0.0
+        upper, lower = problem.levels[s, piece], -np.inf
         if piece == 0:
             respond(problem, tables, state, space, family, level, s)
-            highest = space.motion[s, 0, 0]
-            for i in range(1, S):
-                highest = max(highest, space.motion[s, 0, i])
-            if highest + sizes(tables.ripple[family, level, s], state.x, size) > upper:
-                return True
+            ripple = sizes(tables.ripple[family, level, s], state.x, size)
         else:
-            lower = problem.levels[s, piece - 1] - tolerance
-        t, delta, rate = 0.0, indentation(problem, s, state.x), dot(problem.read_rate[s], state.x, size)
-        for i in range(S + 1):
-            if i < S:
-                after, delta_new, rate_new = h * tables.times[family, i], space.motion[s, 0, i], space.motion[s, 1, i]
-            else:
-                after, delta_new = h, indentation(problem, s, space.x_new)
-                rate_new = dot(problem.read_rate[s], space.x_new, size)
-            if _passes(after - t, delta, rate, delta_new, rate_new, lower, upper):
-                return True
-            t, delta, rate = after, delta_new, rate_new
+            lower = problem.levels[s, piece - 1]
+        lowest = highest = indentation(problem, s, space.x_new)
+        for i in range(S):
+            lowest, highest = min(lowest, space.motion[s, 0, i]), max(highest, space.motion[s, 0, i])
+        begin, end = dot(problem.read_rate[s], state.x, size), dot(problem.read_rate[s], space.x_new, size)
+        turns = _turns(space.motion[s, 1], begin, end, piece > 0, upper < np.inf)
+        if not turns and lower <= lowest and highest + ripple <= upper:
+            continue
+        tolerance = 8.0 * surface_tolerance(problem, s, state.x)
+        if not (lower - tolerance <= lowest and highest + ripple <= upper + tolerance):
+            return True
+        h = tables.step[level]
+        if _passes_between(problem, tables, state, space, family, h, s, lower - tolerance, upper + tolerance):
+            return True
     return False
 
 
@@ -146,8 +172,8 @@ def bend_ahead(problem, tables, state, space, family, level, fresh, rtol):
 
 
 @inner
-def on_the_way(problem, tables, state, space, stop, w, x):
-    """What happens besides the landing of ``stop`` between the states w and x, which end in their times.
+def on_the_way(problem, tables, state, space, stop, bends, w, x):
+    """What happens besides the landing of ``stop``, on a bend or not, between the states w and x, which end in times.
 
     FREE, TURNED, or another stop that has crossed a border of its piece. A peak must lie in another kind of step.
     """
@@ -155,8 +181,9 @@ def on_the_way(problem, tables, state, space, stop, w, x):
     d = x[width] - w[width]
     long = d > 4.0 * tables.step[tables.step.size - 1]
     for s in range(problem.gap.size):
-        piece = state.piece[s]
-        slope_a, slope_b = dot(problem.read_rate[s], w, size), dot(problem.read_rate[s], x, size)
+        piece, slope_a, slope_b = state.piece[s], 0.0, 0.0
+        if s != stop or bends:
+            slope_a, slope_b = dot(problem.read_rate[s], w, size), dot(problem.read_rate[s], x, size)
         if s != stop:
             a, b = indentation(problem, s, w), indentation(problem, s, x)
             tolerance = surface_tolerance(problem, s, x)
@@ -182,8 +209,9 @@ def on_the_way(problem, tables, state, space, stop, w, x):
 @inlined
 def _force_turns(work, column, width, known):
     """Whether a force is largest at an inner stage of a landing, and above ``known``."""
-    last = STAGES - 1 if work[STAGES - 1, width] != 0.0 else STAGES - 2
-    highest, ends = known, max(work[0, column] / work[0, width], work[last, column] / work[last, width])
+    last, highest = STAGES - 1 if work[STAGES - 1, width] != 0.0 else STAGES - 2, known
     for i in range(1, last):
-        highest = max(highest, work[i, column] / work[i, width])
+        if work[i, column] / work[i, width] > highest:
+            highest = work[i, column] / work[i, width]
+    ends = max(work[0, column] / work[0, width], work[last, column] / work[last, width])
     return highest > known and highest > ends * (1.0 + 1e-12)
