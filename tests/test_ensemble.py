@@ -22,7 +22,6 @@ from contacts import Hertz, Hysteretic
 from fembeam.study import characteristics, ensemble
 
 HERE = Path(__file__).parent
-CALLS = []
 
 
 def small_model(base=None, law=None, forces=()):
@@ -47,10 +46,15 @@ def peaks(model):
 def slow_peaks(model):
     """The same, slow enough to be killed in the middle; hangs after so many calls when told to."""
     time.sleep(0.1)
-    CALLS.append(1)
-    if len(CALLS) > int(os.environ.get("HANG_AFTER", "1000")):
+    os.environ["CALLS"] = str(calls() + 1)  # no variable of this module: it would belong to the checkpoint
+    if calls() > int(os.environ.get("HANG_AFTER", "1000")):
         time.sleep(600.0)
     return peaks(model)
+
+
+def calls():
+    """Calls of `slow_peaks` in this process and those it came from."""
+    return int(os.environ.get("CALLS", "0"))
 
 
 def fails_for_some(model):
@@ -194,7 +198,7 @@ def test_killed_and_resumed_is_bit_identical(tmp_path, alone):
     code = (
         f"import sys; sys.path.insert(0, {str(HERE)!r}); import test_ensemble as t; t.run_to_be_killed({str(path)!r})"
     )
-    victim = subprocess.Popen([sys.executable, "-c", code], env={**os.environ, "HANG_AFTER": "3"})
+    victim = subprocess.Popen([sys.executable, "-c", code], env={**os.environ, "CALLS": "0", "HANG_AFTER": "3"})
     try:
         finished = wait_for(lambda: path.exists() and len(np.load(path)["value peak"]) >= 3 and path)
         assert finished
@@ -250,7 +254,7 @@ def test_mpi_gives_the_same_bits(tmp_path, alone):
 
 def test_a_broken_pool_is_told_and_resumed(tmp_path, alone, monkeypatch):
     path = tmp_path / "kept.npz"
-    monkeypatch.setenv("HANG_AFTER", str(len(CALLS) + 3))  # workers are forked from here
+    monkeypatch.setenv("HANG_AFTER", str(calls() + 3))  # workers are forked from here
     with ProcessPoolExecutor(1) as pool:
         pid = pool.submit(os.getpid).result()
         with ThreadPoolExecutor(1) as side:

@@ -4,9 +4,9 @@ The run is cut into stretches. Noise is renewed in each (an independent realisat
 lead-in, five times the memory 1/min(ζω) of the linear structure, is left out; sums of tones go on where they were, from
 the last sample in free flight, so that no contact is cut. The statistics need no more memory than one stretch.
 
-A standard error tells how results scatter from one seed to another. Noise here is a sum of lines of fixed power, so that
-parts of one realisation say little about it: over a period of the noise the variance of a linear response is the same
-for every seed, while that of its parts scatters. Under noise a batch is therefore a whole stretch; under tones and
+A standard error tells how results scatter from one seed to another. Noise here is a sum of lines of fixed power, so
+that parts of one realisation say little about it: over a period of the noise the variance of a linear response is the
+same for every seed, while that of its parts scatters. Under noise a batch is therefore a whole stretch; under tones and
 records, which have one realisation only, a stretch holds eight.
 """
 
@@ -166,8 +166,9 @@ def stationary(
         warnings.warn(f"the transient has not died out: its halves differ by {settled.drift:.1f} standard errors; "
                       "simulate longer, or give discard=", UserWarning, stacklevel=2)  # fmt: skip
     if plan.index * plan.batches < 2:
-        warnings.warn(f"{plan.kept:.4g} s hold one realisation of the noise, which tells no standard error; simulate "
-                      f"{2 * max(SHORTEST * plan.memory, dt * (segment + 2)):.3g} s", UserWarning, stacklevel=2)  # fmt: skip
+        least = 2 * max(SHORTEST * plan.memory, dt * (segment + 2))
+        warnings.warn(f"{plan.kept:.4g} s hold one realisation of the noise, which tells no standard error; "
+                      f"simulate at least {least:.3g} s", UserWarning, stacklevel=2)  # fmt: skip
     return sums.response(plan, settled, enough)
 
 

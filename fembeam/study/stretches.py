@@ -24,7 +24,9 @@ BATCHES = 8  # of such a stretch, so that one is 50 memory times; noise has one 
 REALISATIONS = 16  # of noise in a run, at least, unless they would be shorter than
 SHORTEST = 8.0  # memory times
 LONGEST = 100.0  # memory times, and eight segments of the spectrum: the lead-in costs at most 5 %
-RENEWAL = 5.0  # memory times left out after noise was renewed: the state is stationary already, and e^-5 of it is foreign
+RENEWAL = (
+    5.0  # memory times left out after noise was renewed: the state is stationary already, and e^-5 of it is foreign
+)
 MOST_SAMPLES = 2_000_000  # of a stretch
 
 
@@ -170,7 +172,7 @@ def _longest(found: list[Any], forgets: float, dt: float) -> float:
 
 
 def _realisation(duration: float, forgets: float, segment: float, dt: float) -> float:
-    """Seconds of a realisation, so that the run holds a whole number of them: sixteen at least where that is possible."""
+    """Seconds of a realisation, so that the run holds a whole number of them, sixteen at least where possible."""
     count = min(REALISATIONS, int(duration / max(SHORTEST * forgets, segment)))
     count = max(count, math.ceil(duration / max(LONGEST * forgets, 8.0 * segment)), 1)
     return math.ceil(duration / count / dt - 1e-9) * dt
