@@ -3,6 +3,7 @@
 import enum
 import functools
 import importlib
+import os
 import subprocess
 import sys
 import threading
@@ -236,10 +237,10 @@ print(fingerprint(functools.partial(f, c=C())))
 def test_digests_are_those_of_other_processes():
     found = {
         subprocess.run(
-            [sys.executable, "-c", SCRIPT], env={**__import__("os").environ, "PYTHONHASHSEED": seed}, check=True,
+            [sys.executable, "-c", SCRIPT], env={**os.environ, "PYTHONHASHSEED": seed}, check=True,
             capture_output=True, text=True,
         ).stdout
-        for seed in ("1", "2", "3")
+        for seed in ("1", "2")
     }  # fmt: skip
     assert len(found) == 1
 

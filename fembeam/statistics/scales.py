@@ -49,7 +49,8 @@ def _of_kurtosis(kurtosis: Any) -> Any:
 
 def _kurtosis(value: Any) -> Any:
     """Inverse of `_of_kurtosis`; from 0 on every large kurtosis is possible."""
-    return np.where(np.asarray(value) < 0.0, 1.0 + 1.0 / np.sqrt(np.maximum(-np.asarray(value), 0.0)), np.inf)
+    with np.errstate(divide="ignore"):
+        return 1.0 + 1.0 / np.sqrt(np.maximum(-np.asarray(value), 0.0))
 
 
 LINEAR = Scale(_same, _same)

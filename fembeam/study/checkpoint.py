@@ -96,7 +96,8 @@ def identity(model: Model, quantity: Callable[..., Any]) -> dict[str, str]:
 
 def _told(value: Any, name: str) -> str:
     """A part of a scene, to be read and to be compared."""
-    return f"{re.sub(' at 0x[0-9a-f]+', '', repr(value))} #{fingerprint(value, name)}"
+    readable = re.sub(" at 0x[0-9a-f]+", "", repr(value)).replace(" #", " ")
+    return f"{readable} #{fingerprint(value, name)}"
 
 
 def _name(quantity: Any) -> str:
@@ -108,14 +109,15 @@ def _name(quantity: Any) -> str:
 
 def _deciding(text: str | None) -> str | None:
     """The digest at the end of a text, else the text."""
-    return None if text is None else text.rpartition(" #")[2]
+    return None if text is None else text.partition(" #")[2] or text
 
 
 def _difference(name: str, theirs: str | None, ours: str | None) -> str:
     """What differs, in words."""
-    if theirs and ours and theirs.rpartition(" #")[0] == ours.rpartition(" #")[0] != "":
-        return f"{name}, {_short(ours)}, has other code or reads other values than there"
-    return f"{name} is {_short(theirs)} there and {_short(ours)} here"
+    readable = [None if text is None else text.partition(" #")[0] for text in (theirs, ours)]
+    if readable[0] == readable[1]:
+        return f"{name} {_short(readable[1])} has other code, or reads other values, than there"
+    return f"{name} is {_short(readable[0])} there and {_short(readable[1])} here"
 
 
 def _short(text: str | None) -> str:

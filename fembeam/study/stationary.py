@@ -33,7 +33,7 @@ from fembeam.statistics.impacts import Impacts
 from fembeam.statistics.streaming import Signal
 from fembeam.statistics.transient import Settling, settling
 from fembeam.study.realisation import signals
-from fembeam.study.stretches import SHORTEST, Stretch, Stretches
+from fembeam.study.stretches import Stretch, Stretches
 
 Vector = NDArray[np.float64]
 Watch = Callable[[Run], Any]
@@ -120,7 +120,7 @@ def stationary(
     Warns
     -----
     UserWarning : the transient had not died out within the stretches that were dropped for it; or the run is too short
-        for two realisations of the noise, eight memory times and a segment of the spectrum each: no standard errors.
+        for two realisations of the noise, eight memory times and 1.5 segments of the spectrum each: no standard errors.
 
     Notes
     -----
@@ -166,9 +166,8 @@ def stationary(
         warnings.warn(f"the transient has not died out: its halves differ by {settled.drift:.1f} standard errors; "
                       "simulate longer, or give discard=", UserWarning, stacklevel=2)  # fmt: skip
     if plan.index * plan.batches < 2:
-        least = 2 * max(SHORTEST * plan.memory, dt * (segment + 2))
         warnings.warn(f"{plan.kept:.4g} s hold one realisation of the noise, which tells no standard error; "
-                      f"simulate at least {least:.3g} s", UserWarning, stacklevel=2)  # fmt: skip
+                      f"simulate at least {2 * plan.shortest:.3g} s", UserWarning, stacklevel=2)  # fmt: skip
     return sums.response(plan, settled, enough)
 
 
@@ -274,7 +273,7 @@ class _Sums:
 
     def _signal(self, name: str, x: Vector, batches: int) -> Signal:
         """Empty sums for a signal, arranged by its first samples."""
-        segment = min(self.segment, max(8, (x.size if batches == 1 else x.size // 2) - 1))
+        segment = min(self.segment, max(8, x.size // 2 if batches > 1 else x.size - 1))
         bins = self.bins.get(name)
         edges = None if bins is None else np.asarray(bins, dtype=np.float64)
         return Signal(x, self.dt, segment, self.levels.get(name, 0.0), edges)

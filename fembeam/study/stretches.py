@@ -74,6 +74,7 @@ class Stretches:
     first_lead: float
     longest: float
     batches: int  # of a stretch
+    shortest: float  # s of a realisation
     index: int = 0
     dropped: int = 0
     kept: float = 0.0
@@ -85,13 +86,15 @@ class Stretches:
     def of(
         cls, model: Model, duration: float, dt: float, discard: float | None, start: Any, solver: Any, segment: int
     ) -> Stretches:
-        """The plan for a model; a stretch holds a segment of the spectrum (samples), if possible."""
+        """The plan for a model; a realisation holds two half-overlapping segments (samples) of the spectrum."""
         forgets, found = memory(model), signals(model)
         repeats = all(isinstance(s, BandNoise) or hasattr(s, "tones") for s in found)
         random = bool(noises(model))
         longest = _longest(found, forgets, dt) if repeats else math.inf
+        shortest = max(SHORTEST * forgets, (1.5 * segment + 2.0) * dt)
         if repeats and random:
-            longest = min(longest, _realisation(duration, forgets, (segment + 2) * dt, dt))
+            most = max(LONGEST * forgets, 8.0 * segment * dt)
+            longest = min(longest, _realisation(duration, shortest, most, dt))
         least = LEAD_IN * forgets * (not repeats) + FEWEST_BATCHES * forgets
         if discard is None and duration < least:
             raise ValueError(
@@ -102,7 +105,7 @@ class Stretches:
         lead = LEAD_IN * forgets + short if discard is None else discard
         state = model.rest() if start is None else np.array(start, dtype=float)
         batches = 1 if repeats and random else BATCHES
-        return cls(model, duration, dt, state, solver, forgets, repeats, random, lead, longest, batches)
+        return cls(model, duration, dt, state, solver, forgets, repeats, random, lead, longest, batches, shortest)
 
     def pieces(self) -> Iterator[Stretch]:
         """Stretch after stretch until the duration is reached."""
@@ -171,8 +174,7 @@ def _longest(found: list[Any], forgets: float, dt: float) -> float:
     return longest
 
 
-def _realisation(duration: float, forgets: float, segment: float, dt: float) -> float:
+def _realisation(duration: float, shortest: float, most: float, dt: float) -> float:
     """Seconds of a realisation, so that the run holds a whole number of them, sixteen at least where possible."""
-    count = min(REALISATIONS, int(duration / max(SHORTEST * forgets, segment)))
-    count = max(count, math.ceil(duration / max(LONGEST * forgets, 8.0 * segment)), 1)
+    count = max(min(REALISATIONS, int(duration / shortest)), math.ceil(duration / most), 1)
     return math.ceil(duration / count / dt - 1e-9) * dt
