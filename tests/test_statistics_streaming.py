@@ -358,7 +358,16 @@ def test_a_batch_is_a_realisation_of_its_own():
         assert np.ptp(rows[:, 0]) <= 1  # samples
         assert signal.psd.n_segments >= 2 * batches
         lo, hi = signal.psd.interval()
-        assert np.all((lo <= signal.psd.density) & (signal.psd.density <= hi))
+        assert np.all((lo > 0.0) & (lo < hi))
+
+
+def test_a_slow_start_leaves_the_number_of_batches_as_it_is():
+    model = cantilever(1, base=fb.BandNoise(1e-4, (0.0, 1500.0)))
+    calm = stationary(model, 80.0, 2e-3, solver=QUICK)
+    slow = stationary(model, 80.0, 2e-3, solver=QUICK, start=[100.0, 0.0])
+    assert slow.settling.time > calm.settling.time
+    assert slow["tip u"].variance.batches == calm["tip u"].variance.batches == 16
+    assert slow.duration == pytest.approx(80.0, abs=0.1)
 
 
 def test_a_run_too_short_for_errors_says_so():

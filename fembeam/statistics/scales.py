@@ -4,7 +4,7 @@ A transform g is such a scale when g' is proportional to 1/(standard error as a 
 
     level S (variance, density)    error ∝ S             g = ln S
     skewness s                     error ∝ 1 + s²        g = arctan s
-    kurtosis k >= 1                error ∝ (k - 1)³      g = -1/(k - 1)²
+    kurtosis k >= 1                error ∝ (k - 1)⁴      g = -1/(k - 1)³
 
 Without it a low estimate comes with a low error, and the truth lies above the interval several times as often as below.
 The first is exact for means of squares; the others are fits to linear and impacting responses under noise.
@@ -43,14 +43,14 @@ def _tangent(angle: Any) -> Any:
 
 
 def _of_kurtosis(kurtosis: Any) -> Any:
-    """-1/(k - 1)²."""
-    return -1.0 / np.square(np.asarray(kurtosis, dtype=np.float64) - 1.0)
+    """-1/(k - 1)³."""
+    return -1.0 / (np.asarray(kurtosis, dtype=np.float64) - 1.0) ** 3
 
 
 def _kurtosis(value: Any) -> Any:
     """Inverse of `_of_kurtosis`; from 0 on every large kurtosis is possible."""
     with np.errstate(divide="ignore"):
-        return 1.0 + 1.0 / np.sqrt(np.maximum(-np.asarray(value), 0.0))
+        return 1.0 + 1.0 / np.cbrt(np.maximum(-np.asarray(value), 0.0))
 
 
 LINEAR = Scale(_same, _same)

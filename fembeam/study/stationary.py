@@ -154,6 +154,9 @@ def stationary(
                     plan.drop(piece)
                     settled = None
                     continue
+                if plan.batches == 1 and settled.time > piece.begin:  # batches are whole realisations
+                    plan.drop(piece)
+                    continue
                 piece = replace(piece, begin=max(piece.begin, settled.time))
             plan.keep(piece, sums.add(piece, seen, plan.batches))
             response = sums.response(plan, settled, enough)
