@@ -168,7 +168,8 @@ def _accept(problem, tables, state, space, variable, stop, span, t_end, out, due
     if state.tape.shape[0]:
         tape(state, LANDING, t, landed, span, variable, stop, w)
     state.now[T] = landed
-    state_peaks(problem, state, space, state.x)
+    if variable == TIME or landed == t_end:
+        state_peaks(problem, state, space, state.x)
     return True
 
 

@@ -138,8 +138,8 @@ def choose_sides(problem, tables, state, space):
 def bend_ahead(problem, tables, state, space, family, level, fresh, rtol):
     """(time after the begin of the step, stop) of the first bend on it; no stop is -1.
 
-    A stop that begins on its bend (``fresh``), or was carried over it, takes the side of the first node; one whose rate, or force,
-    stays within the tolerance bends without harm.
+    A stop that begins on its bend (``fresh``), or was carried over it, takes the side of the first node; one whose
+    rate, or force, stays within the tolerance bends without harm.
     """
     first, stop, h = np.inf, -1, tables.step[level]
     for s in range(problem.gap.size):
@@ -209,6 +209,8 @@ def on_the_way(problem, tables, state, space, stop, bends, w, x):
 @inlined
 def _force_turns(work, column, width, known):
     """Whether a force is largest at an inner stage of a landing, and above ``known``."""
+    if work[0, column] / work[0, width] < 0.5 * known:  # such steps are short for every contact
+        return False
     last, highest = STAGES - 1 if work[STAGES - 1, width] != 0.0 else STAGES - 2, known
     for i in range(1, last):
         if work[i, column] / work[i, width] > highest:

@@ -7,6 +7,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import replace
@@ -18,19 +19,18 @@ import pytest
 
 import fembeam as fb
 import solvers
-from contacts import Hertz, Hysteretic
+from contacts import Hertz, Hysteretic, law
 from fembeam.study import characteristics, ensemble
 
 HERE = Path(__file__).parent
-CALLS = []
 
 
-def small_model(base=None, law=None, forces=()):
+def small_model(base=None, stop=None, forces=()):
     """One mode of a cantilever that meets a stop under noise."""
     scene = fb.Scene(
         beam=fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01)),
         supports=[fb.Clamped(0.0)],
-        stops=[fb.Stop(0.5, law=law or Hysteretic.achieving(1e8, restitution=0.7))],
+        stops=[fb.Stop(0.5, law=stop or Hysteretic.achieving(1e8, restitution=0.7))],
         damping=fb.ModalDamping(0.05),
         base=base or fb.BandNoise(1e-4, (0.0, 600.0), seed=3),
         forces=forces,
@@ -47,10 +47,15 @@ def peaks(model):
 def slow_peaks(model):
     """The same, slow enough to be killed in the middle; hangs after so many calls when told to."""
     time.sleep(0.1)
-    CALLS.append(1)
-    if len(CALLS) > int(os.environ.get("HANG_AFTER", "1000")):
+    os.environ["CALLS"] = str(calls() + 1)  # no variable of this module: it would belong to the checkpoint
+    if calls() > int(os.environ.get("HANG_AFTER", "1000")):
         time.sleep(600.0)
     return peaks(model)
+
+
+def calls():
+    """Calls of `slow_peaks` in this process and those it came from."""
+    return int(os.environ.get("CALLS", "0"))
 
 
 def fails_for_some(model):
@@ -194,7 +199,7 @@ def test_killed_and_resumed_is_bit_identical(tmp_path, alone):
     code = (
         f"import sys; sys.path.insert(0, {str(HERE)!r}); import test_ensemble as t; t.run_to_be_killed({str(path)!r})"
     )
-    victim = subprocess.Popen([sys.executable, "-c", code], env={**os.environ, "HANG_AFTER": "3"})
+    victim = subprocess.Popen([sys.executable, "-c", code], env={**os.environ, "CALLS": "0", "HANG_AFTER": "3"})
     try:
         finished = wait_for(lambda: path.exists() and len(np.load(path)["value peak"]) >= 3 and path)
         assert finished
@@ -250,7 +255,7 @@ def test_mpi_gives_the_same_bits(tmp_path, alone):
 
 def test_a_broken_pool_is_told_and_resumed(tmp_path, alone, monkeypatch):
     path = tmp_path / "kept.npz"
-    monkeypatch.setenv("HANG_AFTER", str(len(CALLS) + 3))  # workers are forked from here
+    monkeypatch.setenv("HANG_AFTER", str(calls() + 3))  # workers are forked from here
     with ProcessPoolExecutor(1) as pool:
         pid = pool.submit(os.getpid).result()
         with ThreadPoolExecutor(1) as side:
@@ -289,7 +294,7 @@ def test_characteristics_are_a_quantity():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda: small_model(law=Hertz(1e8)), "stops is .* there and .*Hertz"),
+        (lambda: small_model(stop=Hertz(1e8)), "stops is .* there and .*Hertz"),
         (lambda: small_model(fb.BandNoise(2e-4, (0.0, 600.0))), "base is BandNoise.std=0.0001.* here"),
         (lambda: small_model(fb.BandNoise.of_psd(lambda w: 1e-11 + 0 * w, (0.0, 600.0))), "base is"),
         (lambda: replace(small_model(), modes=(1,)), r"modes is \(0,\) there and \(1,\) here"),
@@ -302,6 +307,69 @@ def test_a_checkpoint_of_another_study_is_refused(tmp_path, change, message):
         ensemble(change(), 1, base_at, checkpoint=path)
     with pytest.raises(ValueError, match=r"quantity is test_ensemble\.base_at .* and test_ensemble\.peaks"):
         ensemble(small_model(), 1, peaks, checkpoint=path)
+
+
+def edited(text, name="quantity", **names):
+    """The function of that name in a piece of code."""
+    space = {"__name__": "study", **names}
+    exec(text, space)
+    return space[name]
+
+
+LAW = "def stop(delta, delta_dot, entry_rate):\n    return {} * delta**1.5"
+GLOBAL = "def quantity(model): return scale * float(model.scene.base(0.1))"
+CLOSURE = "def of(scale): return lambda model: scale * float(model.scene.base(0.1))"
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "what"),
+    [
+        (lambda: (edited(GLOBAL, scale=1.0), None), lambda: (edited(GLOBAL, scale=2.0), None), "quantity study.*"),
+        (lambda: (edited(CLOSURE, "of")(1.0), None), lambda: (edited(CLOSURE, "of")(2.0), None), "quantity study.*"),
+        (
+            lambda: (base_at, law(edited(LAW.format(1e8), "stop"))()),
+            lambda: (base_at, law(edited(LAW.format(2e8), "stop"))()),
+            "stops .*",
+        ),
+    ],
+)
+def test_a_checkpoint_knows_the_code_it_belongs_to(tmp_path, one, other, what):
+    path = tmp_path / "kept.npz"
+    for _ in range(2):
+        quantity, contact = one()
+        ensemble(small_model(stop=contact), 1, quantity, checkpoint=path)
+    quantity, contact = other()
+    with pytest.raises(ValueError, match=f"belongs to another study: {what} has other code, or reads other values"):
+        ensemble(small_model(stop=contact), 1, quantity, checkpoint=path)
+
+
+def test_a_checkpoint_knows_which_noises_are_one(tmp_path):
+    def with_force(base, force):
+        noise = fb.BandNoise(1e-4, (0.0, 600.0), seed=base)
+        return small_model(noise, forces=[fb.PointForce(0.5, replace(noise, seed=force))])
+
+    path = tmp_path / "kept.npz"
+    ensemble(with_force(3, 3), 1, base_at, checkpoint=path)
+    ensemble(with_force(5, 5), [9], base_at, checkpoint=path)  # their seeds are those of the values
+    with pytest.raises(ValueError, match="belongs to another study: forces is"):
+        ensemble(with_force(3, 4), 1, base_at, checkpoint=path)
+
+
+def test_a_checkpoint_of_another_version(tmp_path, monkeypatch):
+    path = tmp_path / "kept.npz"
+    ensemble(small_model(), 1, base_at, checkpoint=path)
+    monkeypatch.setattr(fb, "__version__", "0.0")
+    with pytest.raises(ValueError, match=r"fembeam is .* there and 0\.0 here"):
+        ensemble(small_model(), 1, base_at, checkpoint=path)
+
+
+def test_a_quantity_that_cannot_be_told_from_another_has_no_checkpoint(tmp_path):
+    lock = threading.Lock()
+    ensemble(small_model(), 1, lambda model: float(lock.locked()))
+    with pytest.raises(
+        ValueError, match=r"the quantity → lock is a _thread.lock, which cannot be told from another one"
+    ):
+        ensemble(small_model(), 1, lambda model: float(lock.locked()), checkpoint=tmp_path / "kept.npz")
 
 
 def test_a_damaged_checkpoint(tmp_path):

@@ -2,8 +2,10 @@
 
     θ = g(Σ_i r_i),    s.e.² = (n-1)/n Σ_i (θ_(i) - θ̄)²,    θ_(i) = g(Σ_{j≠i} r_j)        (jackknife)
 
-Whatever is a function of sums (means, variances, spectra, rates, ratios) is estimated by one rule. Batches must be much
-longer than the memory of the signal; then they are nearly independent whatever the signal does inside them.
+Whatever is a function of sums (means, variances, spectra, rates, ratios) is estimated by one rule. Batches must be
+independent: parts of one record must be much longer than the memory of the signal. Parts of one realisation of a sum of
+lines are not, however long: over its period the power of every line is fixed, whatever its phase. There each batch
+needs a realisation of its own.
 """
 
 from __future__ import annotations
@@ -15,6 +17,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from fembeam.statistics.scales import LINEAR, Scale
 
 MOST = 64  # batches kept; beyond it neighbours are merged, so that memory stays constant
 
@@ -28,6 +32,7 @@ class Estimate:
     value, standard_error : numbers, or arrays of one shape; the error is NaN with fewer than two batches.
     batches : independent parts behind it.
     without : (batches, ...) values with one part left out each; None when they were not kept.
+    scale : on which the estimate scatters like a Gaussian; `interval` is symmetric there.
 
     Examples
     --------
@@ -39,6 +44,7 @@ class Estimate:
     standard_error: Any
     batches: int
     without: Any = field(default=None, repr=False)
+    scale: Scale = field(default=LINEAR, repr=False)
 
     @classmethod
     def of_mean(cls, values: ArrayLike) -> Estimate:
@@ -97,13 +103,43 @@ class Estimate:
         return bool(self.value - factor * other.value > errors * error)
 
     def interval(self, confidence: float = 0.95) -> tuple[Any, Any]:
-        """Bounds of the confidence interval, by Student's t with batches - 1 degrees of freedom."""
+        """Bounds of the confidence interval, by Student's t with batches - 1 degrees of freedom.
+
+            g(θ) - b ± t s,    b = (n-1) (mean g(θ_(i)) - g(θ)),    s: jackknife standard error of g(θ)
+
+        Parameters
+        ----------
+        confidence : in (0, 1).
+
+        Notes
+        -----
+        g is the `scale` of the estimate and b its bias by the jackknife, so the bounds need not lie alike about the
+        value. Where some g(θ_(i)) is not finite, and where they were not kept, g(θ) = θ and b = 0. NaN with fewer than
+        two batches.
+
+        References
+        ----------
+        M.H. Quenouille, Biometrika 43 (1956) 353 (bias).
+        """
         if not 0.0 < confidence < 1.0:
             raise ValueError(f"confidence must lie between 0 and 1, got {confidence!r}")
         from scipy.special import stdtrit
 
-        reach = float(stdtrit(max(self.batches - 1, 1), 0.5 + confidence / 2)) * self.standard_error
-        return self.value - reach, self.value + reach
+        reach = float(stdtrit(max(self.batches - 1, 1), 0.5 + confidence / 2))
+        plain = self.value - reach * self.standard_error, self.value + reach * self.standard_error
+        if self.without is None:
+            return plain
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            centre, error = self._scaled()
+            bounds = [self.scale.back(centre + sign * reach * error) for sign in (-1.0, 1.0)]
+        lo, hi = (np.where(np.isfinite(error), b, p)[()] for b, p in zip(bounds, plain, strict=True))
+        return lo, hi
+
+    def _scaled(self) -> tuple[Any, Any]:
+        """The estimate on its scale, its bias taken off, and its standard error there."""
+        parts = self.scale.forth(self.without)
+        found = _jackknife(self.scale.forth(self.value), parts)
+        return self.batches * found.value - (self.batches - 1) * parts.mean(axis=0), found.standard_error
 
     def __repr__(self) -> str:
         if np.ndim(self.value):
@@ -150,8 +186,8 @@ class Batches:
         """Sums over everything."""
         return self.filled.sum(axis=0)
 
-    def estimate(self, function: Callable[[NDArray[np.float64]], Any]) -> Estimate:
-        """A function of the sums with its jackknife standard error.
+    def estimate(self, function: Callable[[NDArray[np.float64]], Any], scale: Scale = LINEAR) -> Estimate:
+        """A function of the sums with its jackknife standard error, and the scale its intervals are made on.
 
         References
         ----------
@@ -161,11 +197,11 @@ class Batches:
         value = function(total)
         if n < 2:
             return Estimate(value, np.full(np.shape(value), math.nan)[()], n)
-        return _jackknife(value, np.array([function(total - row) for row in self.filled]))
+        return _jackknife(value, np.array([function(total - row) for row in self.filled]), scale)
 
 
-def _jackknife(value: Any, without: NDArray[np.float64]) -> Estimate:
+def _jackknife(value: Any, without: NDArray[np.float64], scale: Scale = LINEAR) -> Estimate:
     """A value with the standard error that follows from those with one part left out."""
     n = len(without)
     spread = np.sqrt((n - 1) / n * ((without - without.mean(axis=0)) ** 2).sum(axis=0))
-    return Estimate(value, spread[()], n, without)
+    return Estimate(value, spread[()], n, without, scale)

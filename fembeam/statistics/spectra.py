@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fembeam.lines import number
+from fembeam.statistics.batches import Estimate
 from fembeam.statistics.densities import checked_samples
 
 DEFAULT_SEGMENTS = 32  # with half overlap about 63 segments: the standard error of a level is near 13 %
@@ -33,12 +34,15 @@ class Spectrum:
         Segments that were averaged; the relative standard error of a level is about 1/√n_segments.
     standard_error : array, shape (n,), optional
         Of the density, where it was estimated from batches of a long run.
+    estimate : Estimate, optional
+        The density with what its intervals are made from.
     """
 
     omega: NDArray[np.float64]
     density: NDArray[np.float64]
     n_segments: int
     standard_error: NDArray[np.float64] | None = None
+    estimate: Estimate | None = None
 
     def __iter__(self) -> Iterator[NDArray[np.float64]]:
         return iter((self.omega, self.density))
@@ -47,6 +51,12 @@ class Spectrum:
     def per_hz(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """(frequency in Hz, density per Hz)."""
         return self.omega / (2 * math.pi), self.density * (2 * math.pi)
+
+    def interval(self, confidence: float = 0.95) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Bounds (n,), (n,) of the density's confidence interval at each frequency; see `Estimate.interval`."""
+        if self.estimate is None:
+            raise ValueError("this spectrum has no scatter to tell an interval from; take one of `stationary`")
+        return self.estimate.interval(confidence)
 
     @property
     def variance(self) -> float:

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fembeam.statistics.batches import Batches, Estimate
 from fembeam.statistics.densities import Density
+from fembeam.statistics.scales import KURTOSIS, LEVEL, LINEAR, SKEWNESS, Scale
 from fembeam.statistics.spectra import Spectrum, Welch
 
 Vector = NDArray[np.float64]
@@ -91,22 +92,22 @@ class Signal:
     @property
     def variance(self) -> Estimate:
         """Mean square about the mean."""
-        return self._of(lambda s: _central(s)[0])
+        return self._of(lambda s: _central(s)[0], LEVEL)
 
     @property
     def std(self) -> Estimate:
         """Standard deviation."""
-        return self._of(lambda s: math.sqrt(_central(s)[0]))
+        return self._of(lambda s: math.sqrt(_central(s)[0]), LEVEL)
 
     @property
     def skewness(self) -> Estimate:
         """Third central moment over std³; 0 for a Gaussian."""
-        return self._of(lambda s: _standardised(s, 3))
+        return self._of(lambda s: _standardised(s, 3), SKEWNESS)
 
     @property
     def kurtosis(self) -> Estimate:
         """Fourth central moment over std⁴; 3 for a Gaussian."""
-        return self._of(lambda s: _standardised(s, 4))
+        return self._of(lambda s: _standardised(s, 4), KURTOSIS)
 
     @property
     def crossing_rate(self) -> Estimate:
@@ -129,8 +130,9 @@ class Signal:
     @property
     def psd(self) -> Spectrum:
         """One-sided power spectral density per rad/s; `.per_hz` converts."""
-        found = self._of(lambda s: self.welch.density(s[self._welch_at :], s[FIRST] / s[N]))
-        return Spectrum(self.welch.omega, found.value, int(self.batches.total[self._welch_at]), found.standard_error)
+        found = self._of(lambda s: self.welch.density(s[self._welch_at :], s[FIRST] / s[N]), LEVEL)
+        count = int(self.batches.total[self._welch_at])
+        return Spectrum(self.welch.omega, found.value, count, found.standard_error, found)
 
     def power(self, lo: ArrayLike, hi: ArrayLike) -> Estimate:
         """Part of the variance carried by lo <= ω <= hi (rad/s): of one band, or of several (k,)."""
@@ -141,11 +143,11 @@ class Signal:
             found = [spectrum.variance_in(*band) for band in zip(lows.flat, highs.flat, strict=True)]
             return np.reshape(found, lows.shape)[()]
 
-        return self._of(parts)
+        return self._of(parts, LEVEL)
 
-    def _of(self, function: Callable[[Vector], Any]) -> Estimate:
-        """An estimate; batches that hold no segment yet cannot be left out."""
-        return self.batches.estimate(function)
+    def _of(self, function: Callable[[Vector], Any], scale: Scale = LINEAR) -> Estimate:
+        """An estimate from the batches."""
+        return self.batches.estimate(function, scale)
 
 
 def up_crossings(x: Vector, rate: Vector | None, dt: float) -> int:

@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
-from types import CodeType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fembeam.excitation import BandNoise
 from fembeam.model import Model
 from fembeam.run import written_whole
-from fembeam.signals import signals_of
-from fembeam.study.realisation import seed_key
+from fembeam.study.fingerprint import fingerprint
+from fembeam.study.realisation import renewed
 
-FORMAT = 1
+FORMAT = 2
 Values = dict[str, NDArray[Any]]
 
 
@@ -31,7 +29,8 @@ class Checkpoint:
     Parameters
     ----------
     path : the file; None keeps nothing. One that exists is read.
-    about : what the values belong to, name -> text. A file about something else is refused.
+    about : what the values belong to, name -> text; where it ends in "#" and a digest, this decides. A file about
+        something else is refused.
     """
 
     def __init__(self, path: str | os.PathLike[str] | None, about: Mapping[str, str]) -> None:
@@ -70,66 +69,55 @@ class Checkpoint:
     def _compare(self, path: Path, theirs: Mapping[str, str]) -> None:
         """Refuse values of something else, saying what differs."""
         names = sorted({*theirs, *self.about})
-        differing = [name for name in names if theirs.get(name) != self.about.get(name)]
+        differing = [name for name in names if _deciding(theirs.get(name)) != _deciding(self.about.get(name))]
         if differing:
-            pairs = [f"{n} is {_short(theirs.get(n))} there and {_short(self.about.get(n))} here" for n in differing]
+            pairs = [_difference(name, theirs.get(name), self.about.get(name)) for name in differing]
             raise ValueError(f"checkpoint {path} belongs to another study: {'; '.join(pairs)}; give another path")
 
 
 def identity(model: Model, quantity: Callable[..., Any]) -> dict[str, str]:
     """What an ensemble's values depend on besides the seed, as texts that can be compared.
 
-    Noise is told by its density, not by its seed; the quantity by its name, arguments and code.
+    That is all the scene and the quantity consist of: numbers, and of functions (a law's, a signal's, the quantity)
+    code, constants, defaults, closure and the globals read; and fembeam's version. Which noises are one realisation
+    counts, their seeds do not.
+
+    Raises
+    ------
+    ValueError : something the quantity or the scene reads cannot be told from another of its kind.
     """
-    scene, signals = model.scene, signals_of(model.scene)
-    about = {f.name: repr(getattr(scene, f.name)) for f in fields(scene)}
-    for path, signal in signals.items():
-        about = {name: text.replace(repr(signal), path) for name, text in about.items()}
-    about |= {path: _signal(signal) for path, signal in signals.items()}
-    about |= {"modes": repr(model.modes), "frequencies": _digest(model.omega)}
-    seeds = [seed_key(signal.seed) for signal in signals.values() if hasattr(signal, "seed")]
-    about["noises"] = repr([seeds.index(seed) for seed in seeds])  # which of them are one realisation
-    return about | {"quantity": _function(quantity)}
+    from fembeam import __version__
+
+    scene = renewed(model, lambda j, _: j).scene
+    about = {f.name: _told(getattr(scene, f.name), f.name) for f in fields(scene)}
+    about |= {"modes": repr(model.modes), "frequencies": fingerprint(model.omega), "fembeam": __version__}
+    return about | {"quantity": f"{_name(quantity)} #{fingerprint(quantity, 'the quantity')}"}
 
 
-def _signal(signal: Any) -> str:
-    """A signal without its realisation."""
-    if isinstance(signal, BandNoise):
-        grid = np.linspace(*signal.band, 257)
-        period = signal.period if signal.period_was_given else None
-        about = f"std={signal.std!r}, mean={signal.mean!r}, band={signal.band}, period={period}, order={signal.order}"
-        return f"BandNoise({about}, density {_digest(signal.psd_at(grid))})"
-    if hasattr(signal, "y"):
-        return f"{signal!r} {_digest(signal.y)}"
-    return repr(signal)
+def _told(value: Any, name: str) -> str:
+    """A part of a scene, to be read and to be compared."""
+    readable = re.sub(" at 0x[0-9a-f]+", "", repr(value)).replace(" #", " ")
+    return f"{readable} #{fingerprint(value, name)}"
 
 
-def _function(function: Any) -> str:
-    """A callable by its name, arguments and code, stable from process to process."""
-    if isinstance(function, partial):
-        inner = [_function(function.func), *map(_argument, function.args)]
-        return ", ".join(inner + [f"{k}={_argument(v)}" for k, v in sorted(function.keywords.items())])
-    name = f"{getattr(function, '__module__', '')}.{getattr(function, '__qualname__', type(function).__qualname__)}"
-    code = getattr(function, "__code__", None)
-    return name if code is None else f"{name} {_code(code)}"
+def _name(quantity: Any) -> str:
+    """A callable by its name."""
+    if isinstance(quantity, partial):
+        return _name(quantity.func)
+    return f"{getattr(quantity, '__module__', '')}.{getattr(quantity, '__qualname__', type(quantity).__qualname__)}"
 
 
-def _argument(value: Any) -> str:
-    """An argument of a partial."""
-    if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{key}: {_argument(entry)}" for key, entry in value.items()) + "}"
-    return _function(value) if callable(value) else repr(value)
+def _deciding(text: str | None) -> str | None:
+    """The digest at the end of a text, else the text."""
+    return None if text is None else text.partition(" #")[2] or text
 
 
-def _code(code: CodeType) -> str:
-    """Digest of byte code and constants."""
-    inner = [_code(c) if isinstance(c, CodeType) else repr(c) for c in code.co_consts]
-    return hashlib.sha256(code.co_code + repr((inner, code.co_names)).encode()).hexdigest()[:12]
-
-
-def _digest(values: Any) -> str:
-    """Digest of numbers."""
-    return hashlib.sha256(np.ascontiguousarray(values, dtype=np.float64).tobytes()).hexdigest()[:12]
+def _difference(name: str, theirs: str | None, ours: str | None) -> str:
+    """What differs, in words."""
+    readable = [None if text is None else text.partition(" #")[0] for text in (theirs, ours)]
+    if readable[0] == readable[1]:
+        return f"{name} {_short(readable[1])} has other code, or reads other values, than there"
+    return f"{name} is {_short(readable[0])} there and {_short(readable[1])} here"
 
 
 def _short(text: str | None) -> str:

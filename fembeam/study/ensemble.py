@@ -94,7 +94,9 @@ def ensemble(
         ``partial(fb.study.characteristics, duration=100.0, dt=1e-3)`` or
         ``lambda model: model.simulate(50.0).contacts.peak_force.max()``.
     executor : any `concurrent.futures.Executor`; processes need a quantity that can be pickled (no lambda).
-    checkpoint : file written whole after each realisation; when it exists, what it holds is not computed again.
+    checkpoint : file written whole after each realisation; when it exists, what it holds is not computed again. It is
+        refused when scene, modes, fembeam's version, or the code of the quantity, of a law or of anything they read
+        (functions, closures, globals, arguments) has changed. Files and the environment that these read are not seen.
     until : stop when the relative standard error of every mean is below it; asked after 8, 16, 32, … realisations
         in the order of the seeds, whatever the executor.
     progress : show a bar (only on a terminal).
@@ -105,7 +107,8 @@ def ensemble(
 
     Raises
     ------
-    ValueError : no noise, a seed twice, a checkpoint of another study (with what differs), values of another shape.
+    ValueError : no noise, a seed twice, a checkpoint of another study (with what differs), a quantity that reads
+        what cannot be told apart (an open file, a lock) with a checkpoint, values of another shape.
     RuntimeError : every realisation failed, or the executor is gone; finished realisations are in the checkpoint.
 
     Examples
@@ -121,7 +124,7 @@ def ensemble(
     chosen = _seeds(model, seeds)
     if until is not None and not 0.0 < number("until", until, above=0.0) < 1.0:
         raise ValueError(f"until must be a relative standard error below 1, got {until!r}")
-    kept = Checkpoint(checkpoint, identity(model, quantity))
+    kept = Checkpoint(checkpoint, {} if checkpoint is None else identity(model, quantity))
     failed: dict[str, Failure] = {}
     for count in _rounds(len(chosen), until):
         missing = [seed for seed in chosen[:count] if seed_key(seed) not in {*kept.values, *failed}]

@@ -1,8 +1,13 @@
 """A long run in constant memory: statistics of a stationary response with standard errors.
 
 The run is cut into stretches. Noise is renewed in each (an independent realisation from the state reached) and the
-lead-in, ten times the memory 1/min(ζω) of the linear structure, is left out; sums of tones go on where they were, from
+lead-in, five times the memory 1/min(ζω) of the linear structure, is left out; sums of tones go on where they were, from
 the last sample in free flight, so that no contact is cut. The statistics need no more memory than one stretch.
+
+A standard error tells how results scatter from one seed to another. Noise here is a sum of lines of fixed power, so
+that parts of one realisation say little about it: over a period of the noise the variance of a linear response is the
+same for every seed, while that of its parts scatters. Under noise a batch is therefore a whole stretch; under tones and
+records, which have one realisation only, a stretch holds eight.
 """
 
 from __future__ import annotations
@@ -33,8 +38,7 @@ from fembeam.study.stretches import Stretch, Stretches
 Vector = NDArray[np.float64]
 Watch = Callable[[Run], Any]
 
-BATCHES = 8  # per stretch of 400 memory times, so that one batch is 50 of them
-FEWEST_STRETCHES = 4  # before `until` is asked: 32 batches
+FEWEST_BATCHES = 16  # before `until` is asked
 TRIES = 4  # stretches dropped while the transient lasts
 
 
@@ -115,12 +119,15 @@ def stationary(
 
     Warns
     -----
-    UserWarning : the transient had not died out within the stretches that were dropped for it.
+    UserWarning : the transient had not died out within the stretches that were dropped for it; or the run is too short
+        for two realisations of the noise, eight memory times and 1.5 segments of the spectrum each: no standard errors.
 
     Notes
     -----
-    Records and other signals that cannot be continued are run as one stretch. Standard errors are those of batches of
-    about 50 memory times; a response that switches between two regimes less often than that needs an `ensemble`.
+    Standard errors are those between realisations of the noise: at least 16 in a run, of 8 to 100 memory times each;
+    fewer where the duration allows no more. Intervals of 95 % hold 93 to 97 % from two realisations on. Records and
+    other signals that cannot be continued are run as one stretch of eight batches, a sum of tones in batches of about
+    50 memory times. A response that switches between two regimes less often than that needs an `ensemble`.
 
     Examples
     --------
@@ -132,7 +139,9 @@ def stationary(
     True
     """
     check(model, duration, dt, until, discard)
-    plan = Stretches.of(model, duration, dt, discard, start, solver or solvers.Exponential(1e-8, ledger=False))
+    segment = segment or default_segment(dt)
+    solver = solver or solvers.Exponential(1e-8, ledger=False)
+    plan = Stretches.of(model, duration, dt, discard, start, solver, segment)
     watched = dict(watch) if watch else watched_by_default(model)
     sums = _Sums(watched, dt, segment, dict(bins or {}), dict(levels or {}), len(model.scene.stops))
     settled, enough = None, None if until is None else False
@@ -145,17 +154,23 @@ def stationary(
                     plan.drop(piece)
                     settled = None
                     continue
+                if plan.batches == 1 and settled.time > piece.begin:  # batches are whole realisations
+                    plan.drop(piece)
+                    continue
                 piece = replace(piece, begin=max(piece.begin, settled.time))
-            plan.keep(piece, sums.add(piece, seen))
+            plan.keep(piece, sums.add(piece, seen, plan.batches))
             response = sums.response(plan, settled, enough)
             report(min(plan.kept, duration))
-            if until is not None and (not plan.repeats or plan.index >= FEWEST_STRETCHES):
+            if until is not None and (not plan.repeats or plan.index * plan.batches >= FEWEST_BATCHES):
                 enough = all(estimate.relative <= until for estimate in _asked(response, of))
                 if enough:
                     break
     if settled is not None and not settled.died_out:
         warnings.warn(f"the transient has not died out: its halves differ by {settled.drift:.1f} standard errors; "
                       "simulate longer, or give discard=", UserWarning, stacklevel=2)  # fmt: skip
+    if plan.index * plan.batches < 2:
+        warnings.warn(f"{plan.kept:.4g} s hold one realisation of the noise, which tells no standard error; "
+                      f"simulate at least {2 * plan.shortest:.3g} s", UserWarning, stacklevel=2)  # fmt: skip
     return sums.response(plan, settled, enough)
 
 
@@ -228,7 +243,7 @@ class _Sums:
 
     watched: Mapping[str, Watch]
     dt: float
-    segment: int | None
+    segment: int
     bins: dict[str, ArrayLike]
     levels: dict[str, float]
     stops: int
@@ -244,13 +259,13 @@ class _Sums:
                     )
         self.impacts = [Impacts() for _ in range(self.stops)]
 
-    def add(self, piece: Stretch, seen: Mapping[str, tuple[Vector, Vector | None]]) -> float:
+    def add(self, piece: Stretch, seen: Mapping[str, tuple[Vector, Vector | None]], batches: int) -> float:
         """Take in a stretch, batch by batch; returns its seconds."""
         first = math.ceil(piece.begin / self.dt - 1e-9)
-        borders = np.linspace(first, piece.end, BATCHES + 1).round().astype(int)
+        borders = np.linspace(first, piece.end, batches + 1).round().astype(int)
         for name, (x, rate) in seen.items():
             if name not in self.signals:
-                self.signals[name] = self._signal(name, x[first : piece.end])
+                self.signals[name] = self._signal(name, x[first : piece.end], batches)
             self.signals[name].cut()
             for a, b in pairwise(borders):
                 self.signals[name].add(x[a:b], None if rate is None else rate[a:b])
@@ -259,12 +274,9 @@ class _Sums:
                 impacts.add(piece.run.contacts, stop, a * self.dt, b * self.dt)
         return self.dt * float(piece.end - first)
 
-    def _signal(self, name: str, x: Vector) -> Signal:
+    def _signal(self, name: str, x: Vector, batches: int) -> Signal:
         """Empty sums for a signal, arranged by its first samples."""
-        from scipy.fft import next_fast_len
-
-        segment = self.segment or next_fast_len(math.ceil(2 * math.pi / (FINEST_RESOLUTION * self.dt)), real=True)
-        segment = min(segment, max(8, x.size // 2))
+        segment = min(self.segment, max(8, x.size // 2 if batches > 1 else x.size - 1))
         bins = self.bins.get(name)
         edges = None if bins is None else np.asarray(bins, dtype=np.float64)
         return Signal(x, self.dt, segment, self.levels.get(name, 0.0), edges)
@@ -272,6 +284,13 @@ class _Sums:
     def response(self, plan: Stretches, settled: Settling | None, enough: bool | None) -> Response:
         """The statistics so far."""
         return Response(self.signals, self.impacts, plan.kept, plan.discarded, settled, enough, plan.seconds)
+
+
+def default_segment(dt: float) -> int:
+    """Samples of a Welch segment that resolves 2 rad/s."""
+    from scipy.fft import next_fast_len
+
+    return int(next_fast_len(math.ceil(2 * math.pi / (FINEST_RESOLUTION * dt)), real=True))
 
 
 def _asked(response: Response, of: Callable[[Response], Any] | None) -> list[Estimate]:

@@ -1,0 +1,103 @@
+"""How often the 95 % intervals of `stationary` hold the truth.
+
+    python tests/bench/interval_coverage.py [seeds] [seconds ...] [--only broad|narrow|linear|tuned]
+
+The beam of examples/beam_stop.py, each seed one run of 30 s and one of 300 s (65 and 650 memory times):
+
+    broad    stop, noise in [0, 1226.6] rad/s             narrow   stop, noise in [144.5, 270.2] rad/s
+    linear   no stop, the broad band                      tuned    no stop, a band of 30 rad/s about the first frequency
+
+The truth is one run of 40 000 s with noise of its own; its error, at most a tenth of that of 300 s, costs half a per
+cent of the share. With 400 seeds the share itself is known to 1.1 %.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+import warnings
+from dataclasses import replace
+
+import numpy as np
+
+import fembeam as fb
+import solvers
+from contacts import Hysteretic
+from fembeam.study import stationary
+
+Z_STOP, DT, LONG = 0.24445, 2e-3, 4e4
+QUICK = solvers.Exponential(1e-5, ledger=False)
+CASES = {
+    "broad": ((0.0, 1226.6), True),
+    "narrow": ((144.5, 270.2), True),
+    "linear": ((0.0, 1226.6), False),
+    "tuned": ((95.0, 125.0), False),
+}
+LEVELS = (50.0, 109.0, 195.0, 390.0)  # rad/s
+
+
+def model(case: str, seed: int):
+    """The paper's beam with two modes."""
+    band, stop = CASES[case]
+    law = Hysteretic.lankarani_nikravesh(2.1e8, restitution=0.5)
+    return fb.Scene(
+        beam=fb.Beam(0.2599, fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)),
+        supports=[fb.Clamped(0.0)],
+        masses=[fb.LumpedMass(Z_STOP, mass=25.4e-3, inertia=3.0e-6)],
+        stops=[fb.Stop(Z_STOP, law=law)] if stop else [],
+        damping=fb.ModalDamping([0.02, 0.01]),
+        base=fb.BandNoise(std=2.5e-4, band=band, seed=seed),
+    ).reduce(modes=2)
+
+
+def intervals(response) -> dict[str, tuple[float, float, float]]:
+    """Statistic -> value and bounds."""
+    signal = next(iter(response.signals.values()))
+    names = ("mean", "variance", "skewness", "kurtosis", "crossing_rate")
+    found = {name: getattr(signal, name) for name in names} | {"power 150-250": signal.power(150.0, 250.0)}
+    for impacts in response.impacts:
+        found |= {f"contact {name}": getattr(impacts, name) for name in ("rate", "probability")}
+        found["contact peak_force"] = impacts.mean("peak_force")
+    rows = {name: (float(e.value), *map(float, e.interval())) for name, e in found.items()}
+    lo, hi = signal.psd.interval()
+    for omega in LEVELS:
+        i = int(np.argmin(np.abs(signal.psd.omega - omega)))
+        rows[f"psd {omega:g}"] = float(signal.psd.density[i]), float(lo[i]), float(hi[i])
+    return rows
+
+
+def coverage(case: str, seconds: float, seeds: int, truth: dict[str, tuple[float, float, float]]) -> None:
+    """Print the share of intervals that hold the truth, and those below and above it."""
+    beam, rows, begin = model(case, 0), [], time.perf_counter()
+    for seed in range(seeds):
+        noise = replace(beam.scene.base, seed=1000 + seed)
+        rows.append(intervals(stationary(beam.under(replace(beam.scene, base=noise)), seconds, DT, solver=QUICK)))
+    print(f"{case}, {seconds:g} s, {seeds} seeds, {time.perf_counter() - begin:.0f} s of computing", flush=True)
+    for name, (true, *_) in truth.items():
+        value, lo, hi = np.array([row[name] for row in rows]).T
+        below, above = np.mean(hi < true), np.mean(lo > true)
+        held = np.mean((lo <= true) & (true <= hi))
+        spread = value.std(ddof=1)
+        print(
+            f"  {name:20} holds {100 * held:5.1f} %, below {100 * below:4.1f} %, above {100 * above:4.1f} %, "
+            f"scatter {spread / abs(true):.2g}, bias {(value.mean() - true) / spread:+.2f} of it",
+            flush=True,
+        )
+
+
+def main() -> None:
+    """Run the cases."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("seeds", nargs="?", type=int, default=400)
+    parser.add_argument("seconds", nargs="*", type=float, default=[30.0, 300.0])
+    parser.add_argument("--only", choices=CASES)
+    options = parser.parse_args()
+    warnings.simplefilter("error", UserWarning)
+    for case in [options.only] if options.only else CASES:
+        truth = intervals(stationary(model(case, 7), LONG, DT, solver=QUICK))
+        for seconds in options.seconds:
+            coverage(case, seconds, options.seeds, truth)
+
+
+if __name__ == "__main__":
+    main()
