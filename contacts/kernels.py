@@ -3,16 +3,37 @@
 import math
 
 from llvmlite import ir
-from numba import carray, cfunc, njit, types
+from numba import carray, cfunc, config, njit, types
 from numba.extending import intrinsic
 
 _REALS = types.CPointer(types.float64)
 SIGNATURE = types.void(types.int64, _REALS, _REALS, types.float64, _REALS, _REALS)
 GRADIENT = types.void(types.int64, _REALS, _REALS, types.float64, _REALS, _REALS, _REALS, _REALS)
-_OPTIONS = {"cache": True, "error_model": "numpy"}
+
+if config.DISABLE_JIT:
+    raise RuntimeError("NUMBA_DISABLE_JIT is set, but contact laws run as machine code only: unset it")
 
 
-@cfunc(SIGNATURE, **_OPTIONS)
+def _compiled(decorator, *signature):
+    """The decorator with our options; machine code is kept where numba finds a folder it may write to.
+
+    It looks whether this file has changed: that is enough, since all that these functions call is in it.
+    """
+
+    def compiled(function):
+        try:
+            return decorator(*signature, error_model="numpy", cache=True)(function)
+        except RuntimeError:  # no folder: then each process compiles for a second
+            return decorator(*signature, error_model="numpy")(function)
+
+    return compiled
+
+
+_force = _compiled(cfunc, SIGNATURE)
+_gradient = _compiled(cfunc, GRADIENT)
+
+
+@_force
 def power(n, delta, delta_dot, entry_rate, parameters, force):
     """F = K d^p (1 + a v/entry_rate) + c d^r v, parameters (K, p, a, c, r, clamp, approach)."""
     K, p, a, c, r, clamp, approach = carray(parameters, (7,))
@@ -36,7 +57,7 @@ def power(n, delta, delta_dot, entry_rate, parameters, force):
                 force[i] = 0.0
 
 
-@cfunc(GRADIENT, **_OPTIONS)
+@_gradient
 def power_gradient(n, delta, delta_dot, entry_rate, parameters, by_delta, by_rate, by_entry):
     """Derivatives of `power` with respect to d, v and the entry rate."""
     K, p, a, c, r, clamp, approach = carray(parameters, (7,))
@@ -54,7 +75,7 @@ def power_gradient(n, delta, delta_dot, entry_rate, parameters, by_delta, by_rat
             by_delta[i], by_rate[i], by_entry[i] = 0.0, 0.0, 0.0
 
 
-@njit(**_OPTIONS)
+@_compiled(njit)
 def _piece(table, m, d, v):
     """Place in the table of the piece that holds d, by bisection."""
     # on a knot, to rounding, the piece it comes from: the dashpot may jump there, and steps end on knots
@@ -69,7 +90,7 @@ def _piece(table, m, d, v):
     return 1 + 6 * low
 
 
-@cfunc(SIGNATURE, **_OPTIONS)
+@_force
 def piecewise(n, delta, delta_dot, entry_rate, parameters, force):
     """Piecewise cubic with a dashpot per piece: parameters (m, 6 numbers per piece).
 
@@ -84,7 +105,7 @@ def piecewise(n, delta, delta_dot, entry_rate, parameters, force):
         force[i] = table[j + 1] + x * (table[j + 2] + x * (table[j + 3] + x * table[j + 4])) + table[j + 5] * v
 
 
-@cfunc(GRADIENT, **_OPTIONS)
+@_gradient
 def piecewise_gradient(n, delta, delta_dot, entry_rate, parameters, by_delta, by_rate, by_entry):
     """Derivatives of `piecewise`."""
     m = int(parameters[0])
@@ -126,7 +147,7 @@ _force_at = _call(1)
 _gradient_at = _call(3)
 
 
-@cfunc(SIGNATURE, **_OPTIONS)
+@_force
 def parallel(n, delta, delta_dot, entry_rate, parameters, force):
     """Sum of laws by their addresses: parameters (count, then per law: address, gradient's, floor, size, its own)."""
     for i in range(n):
@@ -139,7 +160,7 @@ def parallel(n, delta, delta_dot, entry_rate, parameters, force):
         at += 4 + int(parameters[at + 3])
 
 
-@cfunc(GRADIENT, **_OPTIONS)
+@_gradient
 def parallel_gradient(n, delta, delta_dot, entry_rate, parameters, by_delta, by_rate, by_entry):
     """Derivatives of `parallel`."""
     for i in range(n):

@@ -10,28 +10,45 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import ir
-from numba import njit, types
+from numba import config, njit, types
 from numba.extending import intrinsic
 
-OPTIONS: Any = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": False}
-kernel = njit(**OPTIONS)
+from solvers.cache import kept
+
+if config.DISABLE_JIT:
+    raise RuntimeError("NUMBA_DISABLE_JIT is set, but time integration runs as machine code only: unset it")
+
+
+def _compiled(function: Any, *signature: Any, **options: Any) -> Any:
+    """A function compiled by numba, its machine code kept in the folder of these sources."""
+    with kept(function) as keep:
+        return njit(*signature, cache=keep, **options)(function)
+
+
+def _decorator(**options: Any) -> Callable[[Any], Any]:
+    return partial(_compiled, **options)
+
+
+_OPTIONS: Any = {"nogil": True, "error_model": "numpy", "_nrt": False}
+kernel = _decorator(**_OPTIONS)
 """Decorator of the compiled functions Python calls. They allocate nothing, so reference counting is switched off:
 passing twenty arrays down a call would otherwise cost ten times the arithmetic of a two-mode step."""
-_INNER: Any = {**OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-inner = njit(**_INNER)
+_INNER: Any = {**_OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+inner = _decorator(**_INNER)
 """The same for functions only kernels call: no wrappers, which would take most of their compile time."""
-inlined = njit(**_INNER, forceinline=True)
+inlined = _decorator(**_INNER, forceinline=True)
 """The same for what the innermost loops call, from few places: there even passing the arrays' descriptors costs more
 than the arithmetic. Everywhere else it would only cost compile time."""
-merged = njit(**_INNER, inline="always")
+merged = _decorator(**_INNER, inline="always")
 """The same for the long functions one kernel calls once each: compiled as a part of it."""
-reordered = njit(**_INNER, forceinline=True, fastmath={"reassoc", "contract"})
+reordered = _decorator(**_INNER, forceinline=True, fastmath={"reassoc", "contract"})
 """The same for sums whose order does not matter, so that they can be vectorised."""
-maxima = njit(**_INNER, forceinline=True, fastmath={"nnan", "nsz"})
+maxima = _decorator(**_INNER, forceinline=True, fastmath={"nnan", "nsz"})
 """The same for maxima of what is not NaN."""
 
 
@@ -46,7 +63,7 @@ def entry(signature: Any) -> Callable[[Any], Any]:
         collects = gc.isenabled()
         gc.disable()
         try:
-            return njit(signature, **OPTIONS)(function)
+            return _compiled(function, signature, **_OPTIONS)
         finally:
             if collects:
                 gc.enable()

@@ -1,6 +1,6 @@
 """Every method on small systems with the kernels run as plain Python, so that coverage sees their lines (2 min).
 
-    NUMBA_DISABLE_JIT=1 coverage run -a tests/bench/interpreted.py
+    coverage run -a tests/bench/interpreted.py
 
 Fails where the main method and `DormandPrince` end apart, and where a run stops that should not; all else about results
 is what the tests are for.

@@ -1,0 +1,136 @@
+"""Machine code is that of the sources, wherever it can be kept: a small package, changed on disk."""
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import contacts.kernels as laws
+import solvers.cache as cache
+
+CALL = "import solvers.outer as o; print(o.outer(1.0), sum(o.outer.stats.cache_hits.values()))"
+INNER = "from solvers.kernels import inner\n@inner\ndef times(x): return {} * x\n"
+OUTER = "from solvers.inner import times\nfrom solvers.kernels import kernel\n@kernel\ndef outer(x): return times(x)\n"
+
+
+@pytest.fixture
+def package(tmp_path):
+    """A package with our decorators and two functions in two files, one calling the other."""
+    home = tmp_path / "solvers"
+    home.mkdir()
+    (home / "__init__.py").touch()
+    for name in ("cache.py", "kernels.py"):
+        shutil.copy(cache.HOME / name, home)
+    (home / "inner.py").write_text(INNER.format(2.0))
+    (home / "outer.py").write_text(OUTER)
+    return home
+
+
+def ran(code, folder, **environment):
+    """What a process of its own says, and its warnings."""
+    ours = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_CACHE")}
+    variables = {**ours, "PYTHONPATH": str(folder), **environment}
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=folder, env=variables, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout.split(), done.stderr
+
+
+def test_a_changed_inner_function_is_compiled_anew_and_the_old_one_found_again(package):
+    assert ran(CALL, package.parent) == (["2.0", "0"], "")
+    (package / "inner.py").write_text(INNER.format(3.0))
+    assert ran(CALL, package.parent)[0] == ["3.0", "0"]
+    (package / "inner.py").write_text(INNER.format(2.0))
+    assert ran(CALL, package.parent)[0] == ["2.0", "1"]
+
+
+def test_what_changes_while_a_process_runs_is_not_kept(package):
+    change = f"import solvers.kernels as k; open({str(package / 'inner.py')!r}, 'w').write({INNER.format(30.0)!r}); "
+    assert ran(change + CALL, package.parent)[0] == ["30.0", "0"]
+    (package / "inner.py").write_text(INNER.format(2.0))
+    assert ran(CALL, package.parent)[0] == ["2.0", "0"]
+
+
+def test_the_users_own_functions_keep_their_folder(package):
+    (package.parent / "own.py").write_text("import numba\n@numba.njit(cache=True)\ndef own(x):\n    return x\n")
+    ran("import solvers.kernels, own; own.own(1.0)", package.parent)
+    assert list((package.parent / "__pycache__").glob("own.*.nbi"))
+
+
+def test_a_folder_that_the_user_names_is_taken(package, tmp_path):
+    ran(CALL, package.parent, NUMBA_CACHE_DIR=str(tmp_path / "named"))
+    assert ran(CALL, package.parent, NUMBA_CACHE_DIR=str(tmp_path / "named")) == (["2.0", "1"], "")
+    assert not list((package / "__pycache__").glob("fembeam*"))
+
+
+def closed(package, tmp_path):
+    """An environment without a place to write in but a temporary folder; files where folders should be stop anyone."""
+    shutil.rmtree(package / "__pycache__", ignore_errors=True)
+    (package / "__pycache__").touch()
+    (tmp_path / "file").touch()
+    (tmp_path / "temporary").mkdir()
+    nowhere = str(tmp_path / "file" / "home")
+    names = ("HOME", "XDG_CACHE_HOME", "LOCALAPPDATA")
+    return {**dict.fromkeys(names, nowhere), "TMPDIR": str(tmp_path / "temporary")}
+
+
+def test_a_read_only_installation_without_a_home_keeps_code_in_a_temporary_folder(package, tmp_path):
+    environment = closed(package, tmp_path)
+    for hits in ("0", "1"):
+        said, warned = ran(CALL, package.parent, **environment)
+        assert said == ["2.0", hits]
+        assert warned.count("\n") == warned.count("set NUMBA_CACHE_DIR") == 1
+
+
+@pytest.mark.skipif(os.name != "posix", reason="permissions")
+def test_a_temporary_folder_that_others_can_write_to_is_not_used(package, tmp_path):
+    environment = closed(package, tmp_path)
+    others = tmp_path / "temporary" / f"{cache.PREFIX}of-{os.getuid()}"
+    others.mkdir()
+    others.chmod(0o777)
+    said, warned = ran(CALL, package.parent, **environment)
+    assert said == ["2.0", "0"]
+    assert "every start compiles" in warned
+    assert not list(others.iterdir())
+
+
+def test_laws_are_compiled_where_nothing_can_be_written(package, tmp_path):
+    environment = closed(package, tmp_path)
+    shutil.copy(laws.__file__, package / "laws.py")
+    assert ran("import solvers.laws as k; print(k.power.address > 0)", package.parent, **environment)[0] == ["True"]
+
+
+@pytest.mark.parametrize("module", ["contacts.kernels", "solvers.kernels"])
+def test_without_machine_code_one_sentence_is_said(module):
+    code = f"try:\n    import {module}\nexcept RuntimeError as error:\n    print(error)"
+    said, warned = ran(code, cache.HOME.parent, NUMBA_DISABLE_JIT="1")
+    assert (said[:2], said[-2:], warned) == (["NUMBA_DISABLE_JIT", "is"], ["unset", "it"], "")
+
+
+def test_only_old_folders_beyond_the_last_few_are_removed(tmp_path):
+    now = time.time()
+    folders = [tmp_path / f"{cache.PREFIX}{i:0{cache.DIGITS}x}" for i in range(cache.KEPT + 4)]
+    bystander = tmp_path / f"{cache.PREFIX}results"
+    for i, folder in enumerate([*folders, bystander]):
+        folder.mkdir()
+        os.utime(folder, (now, now - i * cache.UNUSED / (cache.KEPT + 2)))
+    cache._remove_unused(tmp_path, folders[-1])
+    assert sorted(tmp_path.iterdir()) == sorted([*folders[: cache.KEPT + 2], folders[-1], bystander])
+
+
+def test_a_digest_changes_with_every_source(tmp_path, monkeypatch):
+    monkeypatch.setattr(cache, "HOME", tmp_path)
+    (tmp_path / "a.py").write_text("1")
+    (tmp_path / "b.py").write_text("")
+    found = [cache._digest(list(cache._stamps()))]
+    (tmp_path / "a.py").write_text("")
+    (tmp_path / "b.py").write_text("1")
+    found.append(cache._digest(list(cache._stamps())))
+    Path(tmp_path / "b.py").rename(tmp_path / "c.py")
+    found.append(cache._digest(list(cache._stamps())))
+    assert len(set(found)) == 3
