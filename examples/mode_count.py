@@ -25,9 +25,10 @@ spectrum = Psd(band=(1.0, 1200.0), parts=12)
 runs = {"duration": 22.0, "dt": 1e-3, "discard": 2.0, "seeds": range(6)}
 study = fb.study.mode_count(scene, [1, 2, 3, 5], spectrum, **runs)
 
+# ten sets of seeds gave errors of 0.459 ± 0.014, 0.22 ± 0.03, 0.035 ± 0.016 and a bound of 0.086 ± 0.013
 one, two, three = (study.row(n) for n in (1, 2, 3))
 assert one.error > 0.3, f"one mode misses much of the spectrum, error {one.error:.2f}"
-assert 0.1 < two.error < one.error, f"two are closer, error {two.error:.2f}"
+assert 0.05 < two.error < one.error, f"two are closer, error {two.error:.2f}"
 assert three.error - three.uncertainty < 0.06, f"three change little, error {three.error:.2f}"
 assert study.row(2, residual=True).bound < 0.25, "two modes and the static shape of the stop do as well as three"
 

@@ -26,23 +26,24 @@ scene = fb.Scene(
     damping=fb.ModalDamping([0.02, 0.01]),
     base=fb.Harmonic(amplitude=1e-3, omega=215.0),
 )
-slower = replace(scene, base=fb.Harmonic(amplitude=1e-3, omega=150.0))
+slower = replace(scene, base=fb.Harmonic(amplitude=1e-3, omega=180.0))
 
 
-def studied(scene: fb.Scene) -> tuple[fb.Orbit, float, float]:
+def studied(scene: fb.Scene, near: fb.Orbit | None = None) -> tuple[fb.Orbit, float, float]:
     """The orbit of the load's period, the product of its multipliers and what damping alone says."""
     model = scene.reduce(modes=2)
-    orbit = model.orbit(period=1)
+    orbit = model.orbit(period=1, start=near)
     period = 2 * math.pi / scene.base.omega
     return orbit, float(np.prod(orbit.multipliers).real), math.exp(-2 * period * model.zeta @ model.omega)
 
 
-results = [studied(scene), studied(slower)]
+results = [studied(scene)]
+results.append(studied(slower, results[0][0]))  # motion from rest is chaotic there and need not come near
 
 for orbit, product, volume in results:
     assert abs(product / volume - 1) < 1e-9, f"product of the multipliers {product}, from damping {volume}"
     assert orbit.stable == (max(abs(orbit.multipliers)) < 1)
-assert [orbit.stable for orbit, *_ in results] == [True, False], "215 rad/s is stable, 150 rad/s is not"
+assert [orbit.stable for orbit, *_ in results] == [True, False], "215 rad/s is stable, 180 rad/s is not"
 
 if __name__ == "__main__":
     for orbit, product, volume in results:

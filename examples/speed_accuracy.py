@@ -6,9 +6,11 @@ Errors of the tip after three drive periods, median over some starts, against a 
 Expected: `Exponential` is the front of every model below an error of 1e-4; with few modes a finer step is wasted.
 
     python examples/speed_accuracy.py        prints the table, writes speed_accuracy.csv and speed_accuracy.png
+                                             (--quick: fewer models and rounds)
 """
 
 import math
+import sys
 
 import fembeam as fb
 from contacts import Hysteretic
@@ -32,8 +34,9 @@ methods = [
     *(method(dt) for method in (RK4, CentralDifference, Newmark, GeneralizedAlpha) for dt in steps),
     *(RK4(dt, locate=False) for dt in steps),
 ]
-models = [scene.reduce(modes=n) for n in (1, 2, 3, 5, 10)]
-found = fb.study.speed_accuracy(models, methods, starts=4, duration=6 * math.pi / omega, rounds=5)
+quick = "--quick" in sys.argv
+models = [scene.reduce(modes=n) for n in ((1, 2, 5) if quick else (1, 2, 3, 5, 10))]
+found = fb.study.speed_accuracy(models, methods, starts=4, duration=6 * math.pi / omega, rounds=2 if quick else 5)
 
 assert max(found.floor.values()) < 1e-7, "the two references do not agree"
 assert not found.beaten("Exponential", better_than=1e-4), "another method is on the front below 1e-4"

@@ -266,9 +266,10 @@ def cantilever(modes, damping=0.05, **features):
 
 
 def within(found, exact, bias=0.0):
-    """Four standard errors, themselves below 1 %."""
+    """An interval that holds with 99.999 %, so that up to ten hold together with 99.99 %; the error is below 1 %."""
     assert found.relative < 0.01
-    assert abs(found.value - exact) < 4 * found.standard_error + abs(bias * exact)
+    lo, hi = found.interval(0.99999)
+    assert lo - abs(bias * exact) < exact < hi + abs(bias * exact)
 
 
 def test_linear_beam_under_band_limited_base_motion():
@@ -289,6 +290,7 @@ def test_linear_beam_under_band_limited_base_motion():
     assert abs(found.psd.density[peak] - exact[peak]) < 5 * found.psd.standard_error[peak]
 
 
+@pytest.mark.chaotic
 @pytest.mark.parametrize("modes", [1, 2])
 def test_hertz_stop_under_wide_band_noise_has_the_exact_density(modes):
     """One dashpot c and one noise force at the tip: white noise of S = 2cθ/π gives the density exp(-(T + V)/θ).

@@ -140,7 +140,12 @@ def test_fast_strike_on_a_stiff_stop():
     assert 0.05 < full.row(4, residual=True).error < 0.2
 
 
+@pytest.mark.chaotic
 def test_random_response_is_paired_and_knows_its_noise():
+    """Bounds are six standard deviations away.
+
+    Fifteen sets of seeds gave errors of 0.216 ± 0.007 and 0.042 ± 0.010, and half-widths of 0.03 ± 0.01 for one mode.
+    """
     noise = replace(SCENE, base=fb.BandNoise(std=2.5e-4, band=(0.0, 1226.6)))
     study = mode_count(noise, [1, 2, 3], "impact_rate", duration=12.0, discard=2.0, seeds=range(5), residual=False)
     assert study.row(1).resolved  # one mode lacks contacts
@@ -169,18 +174,30 @@ def test_executor_gives_the_same_study():
     assert [row.error for row in spread_out.rows] == [row.error for row in alone.rows]
 
 
+def largest_forces(run):
+    """Of eight fifths of a second, once nothing is known of the start any more."""
+    log, begins = run.contacts, 1.2 + 0.2 * np.arange(8)
+    return [log.peak_force[(log.t_in >= t) & (log.t_in < t + 0.2)].max(initial=0.0) for t in begins]
+
+
+largest_forces.sampled = False
+
+
+@pytest.mark.chaotic
 def test_mode_count_doubts_a_chaotic_transient():
+    """Errors and sensitivity are distances of realisations in eight numbers each.
+
+    Squares of their ratios follow F with 8 and 8 degrees of freedom: 1 in 5e6 is beyond the factor ten of a doubt.
+    """
     chaotic = replace(SCENE, base=fb.Harmonic(1e-3, 300.0))
-    with pytest.warns(
-        UserWarning, match=r"3 of 3 errors may be chance, not modes: .* peak_force .* changes by 4\..e-02"
-    ):
-        study = mode_count(chaotic, [2, 5], "peak_force", duration=1.0)
+    with pytest.warns(UserWarning, match=r"3 of 3 errors may be chance, not modes: .* largest_forces .* changes by"):
+        study = mode_count(chaotic, [2, 5], largest_forces, duration=2.8)
     assert str(study).endswith(f"IN DOUBT: {study.doubt}")
     loose, tight = (
-        chaotic.reduce(5, residual=True).simulate(1.0, solver=solvers.Exponential(rtol)).contacts.peak_force.max()
+        np.array(largest_forces(chaotic.reduce(5, residual=True).simulate(2.8, solver=solvers.Exponential(rtol))))
         for rtol in (1e-7, 1e-8)
     )
-    assert study.sensitivity == pytest.approx(abs(loose / tight - 1), rel=1e-6)
+    assert study.sensitivity == pytest.approx(np.linalg.norm(loose - tight) / np.linalg.norm(tight), rel=1e-6)
 
 
 @pytest.mark.filterwarnings("error")

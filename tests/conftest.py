@@ -1,0 +1,22 @@
+"""Tests run in parallel: one worker per processor, machine code compiled before they start."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+KERNELS = ["solvers.exponential", "contacts.kernels, solvers.replay, solvers.march"]  # take equally long to compile
+
+
+def pytest_xdist_auto_num_workers(config):
+    """None for a single file: they would take longer to start than most files take to run."""
+    return 0 if len(config.args) == 1 and Path(config.args[0].split("::")[0]).is_file() else None
+
+
+def pytest_sessionstart(session):
+    """Compile what takes long, each kernel once, where otherwise every worker would compile it."""
+    if hasattr(session.config, "workerinput") or not session.config.getoption("numprocesses", None):
+        return
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the processors are taken
+    for process in [subprocess.Popen([sys.executable, "-c", f"import {modules}"]) for modules in KERNELS]:
+        process.wait()
