@@ -67,7 +67,7 @@ def _set_accuracy(problem, tables, state, space, h, rtol):
             most = 1e-300
             for s in range(problem.gap.size):
                 most = max(most, abs(tables.mobility[s, u]) / space.scale[s])
-            space.accuracy[u] = 0.05 * rtol / (h * most)
+            space.accuracy[u], space.viscous[u] = 0.05 * rtol / (h * most), 0.0
 
 
 @inner
@@ -145,7 +145,8 @@ def step_error(problem, tables, state, space, family, level, fresh, rtol):
             continue
         ripple = sizes(tables.ripple[family, level, u], state.x, 2 * n)
         stiffness = tables.exponent[u] * largest / max(deepest, 1e-300)
-        space.beyond[u] = h * (beyond + 0.1 * stiffness * ripple)
+        span = h / max(1.0, h * tables.mobility[u, u] * space.viscous[u])  # a strong dashpot damps such errors
+        space.beyond[u] = span * (beyond + 0.1 * stiffness * ripple)
     worst = 0.0
     for s in range(stops):
         error = _signal_error(problem, tables, space, family, h, s) if problem.table_dt.size else 0.0

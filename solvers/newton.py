@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from solvers.families import S
-from solvers.kernels import contact_gradient, copy, inner
+from solvers.kernels import contact_gradient, copy, inlined, inner
 from solvers.response import node_forces, respond
-from solvers.state import CALLS
+from solvers.state import CALLS, rate_tolerance
 
 MOST_ITERATIONS = 16
 
@@ -71,6 +71,16 @@ def substitute(matrix, pivots, n, x):
         x[i] /= matrix[i, i]
 
 
+@inlined
+def _note_viscosity(state, space):
+    """Largest slopes of the forces by their rates, into ``space.viscous``."""
+    for s in range(state.piece.size):
+        if state.piece[s] > 0:
+            space.viscous[s] = 0.0
+            for i in range(S):
+                space.viscous[s] = max(space.viscous[s], abs(space.slope[s, 1, i]))
+
+
 @inner
 def newton(problem, tables, state, space, family, level):
     """Newton's method for the forces, where a stiff or strongly damped law defeats the plain iteration."""
@@ -89,6 +99,7 @@ def newton(problem, tables, state, space, family, level):
         factorise(space.jacobian, space.pivots, n)
         substitute(space.jacobian, space.pivots, n, space.residual)
         found, row = True, 0
+        _note_viscosity(state, space)
         for s in range(stops):
             if state.piece[s] == 0:
                 continue
@@ -99,7 +110,8 @@ def newton(problem, tables, state, space, family, level):
                 largest = max(largest, abs(space.force[s, i]))
             if not change < np.inf:
                 return False
-            found &= change <= max(space.accuracy[s], 3e-14 * largest)
+            noise = max(3e-14 * largest, 0.1 * space.viscous[s] * rate_tolerance(problem, s, state.x))
+            found &= change <= max(space.accuracy[s], noise)
             row += S
         if found:
             return True

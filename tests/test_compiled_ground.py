@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from numba import njit, types
 
+from contacts import Hertz, KelvinVoigt, Viscoelastic
 from solvers.eight import bits, eight, put, raised, root, spread, total
-from solvers.families import families_of
+from solvers.families import LOCAL, families_of, series_of
 from solvers.flight import level_within
 from solvers.handle import Layout, Mould, Packed, opener
-from solvers.peaks import _summit
+from solvers.peaks import summit
 from solvers.vector import combine, padded
 
 OPTIONS = {"error_model": "numpy", "_nrt": False}
@@ -227,24 +228,49 @@ def test_level_is_the_longest_tabulated_step_within_the_span():
     assert np.all((found == 0) | (h[found - 1] > spans))
 
 
-class Nodes(NamedTuple):
-    monomials: np.ndarray
-    nodes: np.ndarray
+summit_of = njit(**OPTIONS)(summit.py_func)
 
 
-summit_of = njit(**OPTIONS)(_summit.py_func)
-
-
-def test_summit_is_the_polynomials_maximum_around_its_highest_node():
-    families, rng, fine = families_of((1.5,), (False,)), np.random.default_rng(3), np.linspace(-1.0, 1.0, 20_001)
-    x = 2.0 * families.nodes[0] - 1.0
+def test_summit_is_the_polynomials_maximum_around_its_highest_point():
+    rng, fine = np.random.default_rng(3), np.linspace(-1.0, 1.0, 20_001)
     for _ in range(400):
         polynomial = np.polynomial.Polynomial(rng.standard_normal(8) * rng.uniform(0.1, 1.0) ** np.arange(8))
-        values, ends = polynomial(x), polynomial(np.array([-1.0, 1.0]))
-        place = int(values.argmax())
-        low, high = np.concatenate(([-1.0], x, [1.0]))[[place, place + 2]]
+        values, limit = polynomial(LOCAL), float(rng.choice([1.0, rng.uniform(-0.9, 1.0)]))
+        seen = limit >= LOCAL
+        place = int(np.where(seen, values, -np.inf).argmax())
+        low, high = LOCAL[max(place - 1, 0)], min(LOCAL[min(place + 1, 7)], limit)
         inside = polynomial(fine[(fine >= low) & (fine <= high)])
-        found = summit_of(Nodes(families.monomials, families.nodes), values, ends, np.empty(8))
-        assert values[place] <= found <= inside.max() + 1e-6
-        if max(ends) < values[place]:  # else the maximum is an end, which `peak` looks at itself
-            assert found == pytest.approx(inside.max(), abs=1e-7)
+        found = summit_of(values, limit, np.empty(8))
+        assert max(values[place], polynomial(limit)) <= found + 1e-12
+        assert found <= polynomial(np.append(fine[fine <= limit], limit)).max() + 1e-6
+        if 0 < place < 7 and inside.argmax() not in (0, inside.size - 1):
+            assert found >= inside.max() - 1e-7
+
+
+def test_steps_are_interpolated_around_every_node():
+    """δ and h δ̇ of a motion that eight nodes resolve, between the neighbours of each node."""
+    motion = np.array([lambda t: np.sin(3.0 * t + 0.2), lambda t: 3.0 * np.cos(3.0 * t + 0.2)])
+    families, h = families_of(((2.0, 3.0), (4.0, 1.0))), 0.7
+    for f, error in ((0, 1e-12), (1, 5e-5)):
+        t = h * families.nodes[f] ** families.power[f]
+        for zoom, (begin, end) in zip(families.zoom[f], families.places[f], strict=True):
+            at = h * (begin + 0.5 * (LOCAL + 1.0) * (end - begin)) ** families.power[f]
+            found = np.concatenate((motion[0](t), h * motion[1](t))) @ zoom
+            np.testing.assert_allclose(found, np.concatenate((motion[0](at), h * motion[1](at))), atol=error)
+
+
+@pytest.mark.parametrize(
+    ("made", "series"),
+    [
+        (Hertz(1.0), (2.0, 3.0)),
+        (Hertz(1.0, 2.0), (1.0, 0.0)),
+        (KelvinVoigt(1.0, 1.0), (1.0, 0.0)),
+        (Hertz(1.0) + KelvinVoigt(1.0, 1.0), (2.0, 0.0)),
+        (Hertz(1.0) + Hertz(1.0, 1.0), (2.0, 2.0)),
+        (Viscoelastic.tsuji(1.0, 0.5, 1.0), (4.0, 1.0)),
+        (Viscoelastic(1.0, 1.0, 2.0), (2.0, 1.0)),
+        (Hertz(1.0, 1.2), (2.0, 2.4)),
+    ],
+)
+def test_force_at_entry_is_a_series_in_the_root_of_time_its_powers_need(made, series):
+    assert series_of(made) == pytest.approx(series)

@@ -186,7 +186,10 @@ def test_laws_add():
         with pytest.raises(ValueError, match="parts of Sum must be contact laws, at least one, got"):
             Sum(wrong)
     assert (Hertz(1.0) + Hertz(1.0, 2.5)).exponent == 1.5
-    assert (Hertz(1.0) + Hertz(1.0, 1.0)).exponent == 0.5  # both powers are then polynomials of the root of time
+    assert (Hertz(1.0) + Hertz(1.0, 1.0)).exponent == 1.0
+    assert (Hertz(1.0) + Hertz(1.0, 1.0)).powers == (1.0, 1.5)
+    assert (Hertz(1.0) + KelvinVoigt(1.0, 1.0)).powers == (0.0, 1.0, 1.5)
+    assert Viscoelastic.tsuji(1.0, 0.5, 1.0).powers == (0.25, 1.5)
 
 
 def test_a_user_law_adds_to_a_built_in():
