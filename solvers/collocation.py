@@ -61,19 +61,29 @@ def _iterate(problem, tables, state, space, family, level):
 
 @inner
 def _set_accuracy(problem, tables, state, space, h, rtol):
-    """Change of each stop's force, N, that moves no indentation rate by more than a twentieth of its tolerance."""
+    """Change of each stop's force, N, that moves no indentation rate by more than a twentieth of its tolerance.
+
+    Returns whether a dashpot is so strong that iterations will diverge, by its slope where Newton used it last.
+    """
+    stiff = False
     for u in range(problem.gap.size):
         if state.piece[u] > 0:
             most = 1e-300
             for s in range(problem.gap.size):
                 most = max(most, abs(tables.mobility[s, u]) / space.scale[s])
-            space.accuracy[u], space.viscous[u] = 0.05 * rtol / (h * most), 0.0
+            space.accuracy[u] = 0.05 * rtol / (h * most)
+            stiff |= h * tables.mobility[u, u] * space.viscous[u] > 1.0
+            copy(space.force[u], space.guess[u], S)
+    for u in range(problem.gap.size if not stiff else 0):
+        space.viscous[u] = 0.0
+    return stiff
 
 
 @inner
 def solve_forces(problem, tables, state, space, family, level, rtol):
     """Fixed point of the forces; whether it was found."""
-    _set_accuracy(problem, tables, state, space, tables.step[level], rtol)
+    if _set_accuracy(problem, tables, state, space, tables.step[level], rtol):
+        return newton(problem, tables, state, space, family, level)
     before, alone = 0.0, _alone(tables, state)
     law, unit = tables.inlined[max(alone, 0)], 1.0 / space.accuracy[max(alone, 0)] ** 2
     stiffness, rooted, damping = law[STIFFNESS], law[EXPONENT] == 1.5, law[DAMPING]
@@ -89,7 +99,7 @@ def solve_forces(problem, tables, state, space, family, level, rtol):
         else:
             change, largest = _iterate(problem, tables, state, space, family, level)
         if not change < np.inf:
-            return False
+            break
         settled, change = change <= 1e-27 * largest, math.sqrt(change)
         if iteration == 0:
             before = change / 0.3  # as iterations usually go
@@ -99,6 +109,8 @@ def solve_forces(problem, tables, state, space, family, level, rtol):
         if iteration > 2 and change > 0.6 * before:
             break
         before = change
+    for u in range(problem.gap.size):
+        copy(space.guess[u], space.force[u], S)
     return newton(problem, tables, state, space, family, level)
 
 

@@ -36,7 +36,7 @@ TABLES = types.NamedTuple(
 SPACE = types.NamedTuple(
     [
         *(*_arrays(1, 2, 2, 1, 1, 1, 1, 2, 3, 1, 3, 2, 1, 3, 2, 3, 2, 1), INTEGERS, MATRIX),
-        *(*_arrays(1, 1, 1, 1, 1, 2, 1, 1, 1, 1, 1), INTEGERS),
+        *(*_arrays(1, 1, 1, 1, 2, 1, 2, 1, 1, 1, 1, 1), INTEGERS),
     ],
     Space,
 )
@@ -210,7 +210,21 @@ def _layout(stops: int, loads: int, blocks: int, signals: int) -> Layout:
         (2, padded(blocks)),
         *((stops, 2, S), (S,), (stops, 2, S), (stops + loads, S), (S,), (stops, 2, 8), (stops, S), (stops, 3, S)),
         *((stops * S, stops * S), (stops * S,), (stops * S,), (18, padded(width + 2))),
-        *((stops,), (stops,), (stops,), (stops,), (stops,), (4, 2 * S), (stops,), (S + 2,), (1,), (1,), (3,), (6,)),
+        *(
+            (stops,),
+            (stops,),
+            (stops,),
+            (stops,),
+            (stops, S),
+            (stops,),
+            (4, 2 * S),
+            (stops,),
+            (S + 2,),
+            (1,),
+            (1,),
+            (3,),
+            (6,),
+        ),
     ]
     return Layout([STATE, SPACE], [state_shapes(width, stops), space])
 

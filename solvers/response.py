@@ -38,6 +38,7 @@ class Space(NamedTuple):
     share: Any  # (m,) of the duration of a contact of each stop that its first step may take; 0: not known yet
     accuracy: Any  # (m,) N: change of a force within which it counts as found
     beyond: Any  # (m,) N s: impulse that a step's polynomials leave out
+    guess: Any  # (m, S) forces the iterations begin with
     viscous: Any  # (m,) N s/m: slope of a force by its rate, where Newton's method has found it; else 0
     around: Any  # (4, 2S) see `solvers.peaks`
     side: Any  # (m,) sign of the side of its bend on which each stop is
