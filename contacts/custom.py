@@ -248,24 +248,17 @@ def _check_derivative(made: CustomLaw) -> None:
 @lru_cache(maxsize=256)
 def _compiled(function: Function, derivative: Function | None, count: int) -> tuple[Any, Any]:
     """Compile a scalar force and its derivatives into the batch kernels; what raises gives NaN, which stops a run."""
-    from numba import carray, cfunc, njit
-    from numba.np.unsafe.ndarray import to_fixed_tuple
+    from numba import cfunc, njit
 
     from contacts.kernels import GRADIENT, SIGNATURE
 
     scalar = njit(error_model="numpy")(function)
 
-    def batch(n, delta, delta_dot, entry_rate, parameters, force):
-        values = to_fixed_tuple(carray(parameters, (count,)), count)
-        for i in range(n):
-            force[i] = math.nan  # stays where the function raises: that leaves this loop, and is printed
+    def forces(n, delta, delta_dot, entry_rate, values, force):
         for i in range(n):
             force[i] = scalar(delta[i], delta_dot[i], entry_rate, *values)
 
-    def differences(n, delta, delta_dot, entry_rate, parameters, by_delta, by_rate, by_entry):  # type: ignore[no-untyped-def]
-        values = to_fixed_tuple(carray(parameters, (count,)), count)
-        for i in range(n):
-            by_delta[i] = by_rate[i] = by_entry[i] = math.nan
+    def differences(n, delta, delta_dot, entry_rate, values, by_delta, by_rate, by_entry):  # type: ignore[no-untyped-def]
         for i in range(n):
             d, v, r = delta[i], delta_dot[i], entry_rate
             h = 1e-5 * d + 1e-14  # relative to the cube root of rounding; below the surface the law is not asked
@@ -276,19 +269,52 @@ def _compiled(function: Function, derivative: Function | None, count: int) -> tu
             h = 1e-5 * r
             by_entry[i] = (scalar(d, v, r + h, *values) - scalar(d, v, r - h, *values)) / (2.0 * h)
 
-    compiled = _or_say_where(lambda: cfunc(SIGNATURE)(batch), function, "law")
-    if derivative is None:
-        return compiled, _or_say_where(lambda: cfunc(GRADIENT)(differences), function, "law")
-    slopes = njit(error_model="numpy")(derivative)
+    slopes, source = differences, function
+    if derivative is not None:
+        given, source = njit(error_model="numpy")(derivative), derivative
 
-    def given(n, delta, delta_dot, entry_rate, parameters, by_delta, by_rate, by_entry):  # type: ignore[no-untyped-def]
+        def slopes(n, delta, delta_dot, entry_rate, values, by_delta, by_rate, by_entry):  # type: ignore[no-untyped-def]
+            for i in range(n):
+                by_delta[i], by_rate[i], by_entry[i] = given(delta[i], delta_dot[i], entry_rate, *values)
+
+    forces, slopes = njit(error_model="numpy")(forces), njit(error_model="numpy")(slopes)
+    compiled = _or_say_where(lambda: cfunc(SIGNATURE)(_batch(forces, count)), function, "law")
+    kind = "law" if derivative is None else "derivative"
+    return compiled, _or_say_where(lambda: cfunc(GRADIENT)(_gradient_batch(slopes, count)), source, kind)
+
+
+def _batch(forces: Any, count: int) -> Function:
+    """The batch kernel of a law; forces from where it raises are NaN."""
+    from numba import carray
+    from numba.np.unsafe.ndarray import to_fixed_tuple
+
+    def batch(n, delta, delta_dot, entry_rate, parameters, force):
+        for i in range(n):
+            force[i] = math.nan
         values = to_fixed_tuple(carray(parameters, (count,)), count)
+        try:
+            forces(n, delta, delta_dot, entry_rate, values, force)
+        except Exception:
+            return
+
+    return batch
+
+
+def _gradient_batch(slopes: Any, count: int) -> Function:
+    """The batch kernel of a law's derivatives, likewise."""
+    from numba import carray
+    from numba.np.unsafe.ndarray import to_fixed_tuple
+
+    def batch(n, delta, delta_dot, entry_rate, parameters, by_delta, by_rate, by_entry):  # type: ignore[no-untyped-def]
         for i in range(n):
             by_delta[i] = by_rate[i] = by_entry[i] = math.nan
-        for i in range(n):
-            by_delta[i], by_rate[i], by_entry[i] = slopes(delta[i], delta_dot[i], entry_rate, *values)
+        values = to_fixed_tuple(carray(parameters, (count,)), count)
+        try:
+            slopes(n, delta, delta_dot, entry_rate, values, by_delta, by_rate, by_entry)
+        except Exception:
+            return
 
-    return compiled, _or_say_where(lambda: cfunc(GRADIENT)(given), derivative, "derivative")
+    return batch
 
 
 def _or_say_where(compile_it: Callable[[], Any], function: Function, kind: str) -> Any:

@@ -21,6 +21,7 @@ from solvers.response import free_response
 from solvers.state import (
     CALLS,
     HEAD,
+    LAW_NOT_FINITE,
     PART,
     REJECTED,
     RUNNING,
@@ -263,7 +264,7 @@ def touch(problem, tables, state, space, t_end, rtol, log, out, due, ledger):
             last[FRESH], last[FAMILY], last[WANTED] = PIECE, 0, max(level, wanted)
             return RUNNING
         if level == bottom:
-            return STEP_TOO_SMALL
+            return LAW_NOT_FINITE if _law_fails(state, space) else STEP_TOO_SMALL
         state.count[REJECTED] += 1
         if bent >= 0:  # go near it, then end a step on it
             level = max(level + 1, level_of(tables, 0.9 * first))
@@ -289,6 +290,16 @@ def touch(problem, tables, state, space, t_end, rtol, log, out, due, ledger):
     _adapt(tables, space, level, family, wanted, error)
     state.count[STEPS] += 1
     return RUNNING
+
+
+@inner
+def _law_fails(state, space):
+    """Whether a law gave a force that is not finite."""
+    for s in range(state.piece.size):
+        for i in range(S):
+            if state.piece[s] > 0 and not abs(space.force[s, i]) < np.inf:
+                return True
+    return False
 
 
 @inner

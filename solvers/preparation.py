@@ -210,11 +210,8 @@ def _layout(stops: int, loads: int, blocks: int, signals: int) -> Layout:
         (2, padded(blocks)),
         *((stops, 2, S), (S,), (stops, 2, S), (stops + loads, S), (S,), (stops, 2, 8), (stops, S), (stops, 3, S)),
         *((stops * S, stops * S), (stops * S,), (stops * S,), (18, padded(width + 2))),
+        *([(stops,)] * 4),
         *(
-            (stops,),
-            (stops,),
-            (stops,),
-            (stops,),
             (stops, S),
             (stops,),
             (4, 2 * S),

@@ -120,10 +120,11 @@ class _Change:
     def of(cls, system: System, parameter: Parameter, engine: Any) -> _Change | None:
         """The change between two systems; None if they differ in more than tones, gaps and laws' parameters."""
         sides = parameter.behind, parameter.ahead
+        count = sum(len(signal.tones()[0]) for _, signal in system.loads if hasattr(signal, "tones"))
+        if len(engine.problem.k) != system.size + count:  # a tone is sampled, for resonance: it has no steady response
+            return None
         tones = _tones(system, *sides)
         if tones is None or not all(_same_structure(system, side) for side in sides):
-            return None
-        if len(engine.problem.k) != system.size + len(tones.omega):  # a tone is sampled, for resonance
             return None
         width = 2.0 * parameter.step
         own = places_among_tones(system.size, len(tones.omega))

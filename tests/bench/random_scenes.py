@@ -4,8 +4,8 @@
 
 A scene is a structure with one to four stops, oscillators that influence each other little or not at all, or a
 symmetric pair of stops; with laws and loads of every kind, starts in contact, ends in contact, and a tolerance from
-1e-3 to 1e-11. Compared are the motion at samples and, of every contact, times, rates, peaks, impulse and loss; runs with
-and without samples, which fly in other steps, and the energy balance.
+1e-3 to 1e-11. Compared are the motion at samples and, of every contact, times, rates, peaks, impulse and loss; runs
+with and without samples, which fly in other steps, and the energy balance.
 
 What a difference is worth is told by the scene itself: the reference is run again from slightly moved starts, and every
 number's error is taken in units of rtol × its own amplification. Scenes whose contacts change in number already under
@@ -127,7 +127,7 @@ def imbalance(solution: Any) -> float:
 def judge(seed: int) -> tuple[str, Verdict]:
     """Draw, run and compare."""
     scene, rtol = draw(seed)
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), np.errstate(over="ignore"):
         warnings.simplefilter("error", RuntimeWarning)
         return f"seed {seed}: {scene.words}", compared(scene, rtol, seed)
 
