@@ -103,7 +103,7 @@ def step_peaks(problem, tables, state, space, family, h, s, limit):
         if limit >= 1.0:
             if values[place] < 0.95 * known or (place == S - 1 and slopes[7] >= 0.0):
                 continue  # lower, or still rising at the end, where the next step begins
-            if place == 0 and slopes[6] <= 0.0 and known >= slopes[4]:
+            if family == 0 and place == 0 and slopes[6] <= 0.0 and known >= slopes[4]:
                 continue  # falling from its begin
         place = max(place, 0)
         if seen != place:

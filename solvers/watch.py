@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from solvers.dormand_prince import STAGES
+from solvers.dormand_prince import STAGES, C
 from solvers.families import S
 from solvers.kernels import call_force, copy, dot, indentation, inlined, inner, sizes
 from solvers.response import respond
@@ -208,7 +208,7 @@ def on_the_way(problem, tables, state, space, stop, bends, w, x):
 
 @inlined
 def _force_turns(work, column, width, known):
-    """Whether a force is largest at an inner stage of a landing, and above ``known``."""
+    """Whether a force, the impulse's rate over that of time, has a maximum above ``known`` inside a landing."""
     if work[0, column] / work[0, width] < 0.5 * known:  # such steps are short for every contact
         return False
     last, highest = STAGES - 1 if work[STAGES - 1, width] != 0.0 else STAGES - 2, known
@@ -216,4 +216,15 @@ def _force_turns(work, column, width, known):
         if work[i, column] / work[i, width] > highest:
             highest = work[i, column] / work[i, width]
     ends = max(work[0, column] / work[0, width], work[last, column] / work[last, width])
-    return highest > known and highest > ends * (1.0 + 1e-12)
+    if max(highest, ends) <= known:
+        return False
+    return highest > ends or _turns_at(work, column, width, 0, 1, 2) or _turns_at(work, column, width, 8, 10, last)
+
+
+@inlined
+def _turns_at(work, column, width, i, j, k):
+    """Whether the parabola through a force at three stages has its maximum between them."""
+    a, b, c = work[i, column] / work[i, width], work[j, column] / work[j, width], work[k, column] / work[k, width]
+    rise, fall = (b - a) / (C[j] - C[i]), (c - b) / (C[k] - C[j])
+    bend = (fall - rise) / (C[k] - C[i])
+    return bend < 0.0 and rise - bend * (C[j] - C[i]) > 0.0 > fall + bend * (C[k] - C[j])
