@@ -368,6 +368,7 @@ def march(
     """Advance the state to ``t_end`` or for ``budget`` steps; returns a status code."""
     now, count = state.now, state.count
     not_finite, by_hand = False, False
+    nearest = 0.0  # what is nearer to a kink than this is on it: there rounding switches the law to and fro
     for _ in range(budget):
         # --- end of the run, and what can stop it early
         code = look(problem, state, t_end, log, events)
@@ -379,6 +380,7 @@ def march(
 
         # --- try a step
         phase = H_CONTACT if touching(state) else H_FLIGHT
+        nearest = nearest if phase == H_CONTACT else 0.0
         h = min(now[phase], dt_contact if phase == H_CONTACT else dt_flight, t_end - now[T])
         if h < 4e-15 * now[T] and h < t_end - now[T]:
             return LAW_NOT_FINITE if not_finite else STEP_TOO_SMALL
@@ -428,8 +430,8 @@ def march(
         # --- a law that bends within its piece: end there, the error of a step across it is not what is estimated
         if adaptive and phase == H_CONTACT:
             theta = _kink(problem, state, space)
-            if theta < NONE:
-                now[phase] = theta * h
+            if theta < NONE and theta * h > nearest:
+                now[phase], nearest = theta * h, max(nearest, _AT_AN_END * theta * h)
                 count[REJECTED] += 1
                 continue
 
