@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from oscillators import random_family, random_stops_family
 
 import solvers.arm
-from solvers import Branch, DormandPrince, Orbit, OrbitError, branch, integrate
+from solvers import Branch, DormandPrince, Orbit, OrbitError, branch, integrate, orbit
 from solvers.chain import Problem, delayed
 from solvers.continuation import BranchStatus
 from solvers.touch import signature
@@ -75,6 +75,14 @@ def check_marks(seed: int, found: Branch, ends: Counter[str]) -> None:
             ends["fold without a multiplier near one"] += 1
 
 
+def followed(make: Any, span: tuple[float, float], modes: int) -> Branch:
+    """The branch of the orbit near rest at the low end of the span, or of what a run from rest settles to."""
+    try:
+        return branch(make, span, np.zeros(2 * modes), step=0.3).run()
+    except OrbitError:
+        return branch(make, span, orbit(*make(span[0])), at=span[0], step=0.3).run()
+
+
 def main(count: str = "100", first: str = "0", over: str = "omega", most: str = "60", stops: str = "1") -> None:
     """Follow the branches."""
     solvers.arm.MOST_ORBITS = int(most)
@@ -85,14 +93,14 @@ def main(count: str = "100", first: str = "0", over: str = "omega", most: str = 
     for seed in range(int(first), int(first) + int(count)):
         rng = np.random.default_rng(seed)
         family = random_family(rng, over) if stops == "1" else random_stops_family(rng, over, int(stops))
-        make, span, modes = family
         try:
-            found = branch(make, span, np.zeros(2 * modes), step=0.3).run()
+            found = followed(*family)
         except OrbitError:
             ends["no orbit to start from"] += 1
             continue
         orbits += len(found.orbits)
-        marks.update(orbit.mark for orbit in found.special)
+        marks.update(one.mark for one in found.special)
+        span = family[1]
         assert all(one.residual <= 1e-10 and span[0] <= one.parameter <= span[1] for one in found.orbits), seed
         check_orbits(seed, found, checks)
         check_marks(seed, found, checks)
