@@ -32,7 +32,7 @@ from solvers.flight import (
     turn_apart,
 )
 from solvers.kernels import copy, dot, indentation, inlined, inner, merged
-from solvers.ledger import account_flight
+from solvers.ledger import account_flight, energetic
 from solvers.state import SAMPLED, STEPS, T, rate_tolerance, surface_tolerance
 
 _REFRESH = 8  # flight steps between two evaluations of the bound
@@ -132,18 +132,6 @@ def _bisect(coefficients, sign, b, guess):
     return x
 
 
-@inner
-def _energetic(problem, tables, norms):
-    """Fastest block that carries more than 1e-12 of the energy, or tone, rad/s."""
-    total, fastest, own = 0.0, 1e-3, int(tables.own)
-    for b in range(own):
-        total += norms[b] ** 2
-    for b in range(problem.k.size):
-        if b >= own or norms[b] ** 2 > 1e-12 * total:
-            fastest = max(fastest, math.sqrt(problem.k[b]) + problem.c[b])
-    return fastest
-
-
 @inlined
 def _target(tables, t, first, second, t_end, ledger):
     """Where a step must end: at an output time unless that is near enough to be evaluated from the step's start."""
@@ -232,7 +220,7 @@ def fly(problem, tables, state, space, t_end, budget, out, due, ledger):
                     space.m[s] = _acceleration_bound(problem, tables, s, space.norms, space.bounds, rest)
             span = min(span, rest)
             if ledger:
-                span = min(span, 3.0 / _energetic(problem, tables, space.norms))
+                span = min(span, 3.0 / energetic(problem, tables, space.norms))
             if ledger or first <= begin + span:
                 copy(state.x, space.x_new, state.x.size)
             for s in range(stops):
