@@ -24,6 +24,8 @@ from solvers.watch import FREE, on_the_way, side_at
 
 INDENTATION, ROOT, TIME = range(3)
 _MOST_TRIES = 8  # to meet an output time on the way to a landing, or a bend
+_PART = 0.1  # of the embedded difference that counts as the error
+_PART_OF_FOURTH = 1e-3  # with u = δ^{1/4}: terms t² = u⁸ are exact in the step, and all of the difference
 _LAST = 0.09  # indentation, in units of the deepest, from which the last step is tried
 
 
@@ -83,15 +85,18 @@ def regular_step(problem, tables, ledger, variable, stop, span, w, piece, entry_
 
 
 @inner
-def _error(problem, space, rtol):
-    """Error of the step just taken in the indentation rates, in units of each stop's tolerance; the largest."""
+def _error(problem, space, part, rtol):
+    """Error of the step just taken in the indentation rates, in units of each stop's tolerance; the largest.
+
+    It is a ``part`` of the embedded difference.
+    """
     difference, worst = space.work[STAGES + 1], 0.0
     combine(space.work, E5, STAGES, None, difference)
     for s in range(problem.gap.size):
         error = 0.0
         for e in range(2 * problem.k.size):
             error += abs(problem.read_rate[s, e] * difference[e])
-        error *= 0.1 / (rtol * space.scale[s])
+        error *= part / (rtol * space.scale[s])
         if not error <= worst:
             worst = error
     return worst
@@ -195,12 +200,12 @@ def land(problem, tables, state, space, stop, direction, near, rtol, t_end, out,
     variable = ROOT if leaving and tables.power[1 + stop] > 1.0 else INDENTATION
     span = -w[size + 1] if variable == ROOT else level - delta
     _step(problem, tables, state, space, variable, stop, span, ledger)
-    landed = x[size]
+    landed, part = x[size], _PART_OF_FOURTH if variable == ROOT and tables.power[1 + stop] == 4.0 else _PART
     width = surface_tolerance(problem, stop, state.x) / abs(rate)  # a distance may be that much rounding
     if not t <= landed <= t + min(4.0 * near, furthest) + width:
         return -1
     if not (
-        _error(problem, space, rtol) <= 1.0
+        _error(problem, space, part, rtol) <= 1.0
         and direction * dot(problem.read_rate[stop], x, 2 * problem.k.size) >= 0.0  # it has not turned back
     ):
         return -1
@@ -229,7 +234,7 @@ def land_on_bend(problem, tables, state, space, stop, near, rtol, t_end, out, du
         if not 0.0 < following <= furthest or following == span:
             return False
         before, apart, span = span, value, following
-    if not (abs(value) <= 1e-6 * largest and _error(problem, space, rtol) <= 1.0):
+    if not (abs(value) <= 1e-6 * largest and _error(problem, space, _PART, rtol) <= 1.0):
         return False
     if on_the_way(problem, tables, state, space, stop, True, w, x) != FREE:
         return False

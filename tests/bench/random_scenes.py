@@ -97,9 +97,8 @@ def numbers_of(solution: Any, size: float, duration: float) -> dict[str, Any]:
     fast = np.maximum(log.speed_in[i], depth / length)
     scale = {"t_in": length, "t_out": length, "speed_in": fast, "speed_out": fast, "peak_indentation": depth}
     scale |= {"peak_force": force, "impulse": force * length, "energy_loss": force * depth}
-    return {"q": solution.q, "q_dot": solution.q_dot, "stop": log.stop[i], "scale": scale} | {
-        name: getattr(log, name)[i] for name in NUMBERS
-    }
+    rates = {"q": solution.q, "q_dot": solution.q_dot, "fast": (depth / length).max(initial=0.0)}
+    return rates | {"stop": log.stop[i], "scale": scale} | {name: getattr(log, name)[i] for name in NUMBERS}
 
 
 def differences(a: dict[str, Any], b: dict[str, Any], measure: dict[str, Any], parts: int) -> dict[str, Any]:
@@ -110,6 +109,8 @@ def differences(a: dict[str, Any], b: dict[str, Any], measure: dict[str, Any], p
         apart, size = (
             np.abs(x).reshape(len(x), parts, -1).max(axis=(0, 2)) for x in (a[name][-m:] - b[name], measure[name])
         )
+        if name == "q_dot" and parts == 1:  # between the samples, of what is at rest there
+            size = np.maximum(size, measure["fast"])
         found[name] = apart / np.maximum(size, 1e-300)
     for name in NUMBERS:
         apart = np.abs(a[name] - b[name]) / measure["scale"][name]
