@@ -196,7 +196,7 @@ class Hysteretic(Law):
         if not a:
             return ("never pulls; smooth",)
         pulls = (
-            "clamp=True: force cut at zero where it would pull, at a kink that moves with the rate; lower order there"
+            "clamp=True: force cut at zero where it would pull, at a kink that moves with the rate"
             if self.clamp
             else f"pulls where δ̇ < -entry_rate/damping_factor = -{1.0 / a:.4g} entry_rate: never a free mass, but a "
             "structure that throws the contact open; clamp=True forbids it"

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from contacts.law import Law, check_number, check_restitution, number, switch
 
 PULLS = "pulls at the end of every rebound, where the dashpot outweighs the spring; clamp=True forbids it"
-CLAMPED = "clamp=True: the kink where the force is cut moves with the rate; integrated at lower order around it"
+CLAMPED = "clamp=True: the kink where the force is cut moves with the rate"
 
 
 def damping_ratio_for(restitution: float) -> float:
@@ -199,9 +199,9 @@ class Viscoelastic(Law):
         """What a user should know."""
         if not self.damping:
             return ("never pulls; smooth",)
-        singular = "at δ = 0 its slope is infinite, so that integrators work at lower order at entry and exit"
+        singular = "at δ = 0 its slope is infinite: most methods work at lower order at entry and exit"
         if self.approach_only:
-            return "never pulls", singular, "has a kink where δ̇ = 0; integrated at lower order around it"
+            return "never pulls", singular, "has a kink where δ̇ = 0"
         return CLAMPED if self.clamp else PULLS, singular
 
     @property

@@ -78,8 +78,8 @@ def _highest(tables, values, family, limit):
 
 
 @inner
-def _around(problem, tables, state, space, family, h, s, place):
-    """Indentations, rates and forces of stop s around a node, into ``space.around``."""
+def _motion_around(tables, space, family, h, s, place):
+    """Indentations and rates of stop s around a node, into ``space.around``."""
     around, motion, known = space.around, space.motion[s], space.around[3]
     copy(motion[0], known, S)
     for i in range(S):
@@ -87,7 +87,14 @@ def _around(problem, tables, state, space, family, h, s, place):
     combine(tables.zoom[family, place], known, 2 * S, None, around[0])
     for i in range(S):
         around[1, i] = around[0, S + i] / h
-    contact_forces(problem, s, around[0, :S], around[1, :S], state.entry_rate[s], around[2, :S])
+
+
+@inner
+def deepest(tables, space, family, h, s):
+    """Largest indentation of stop s around its highest node of a step."""
+    place = _highest(tables, space.motion[s, 0], family, 1.0)
+    _motion_around(tables, space, family, h, s, place)
+    return summit(space.around[0], 1.0, space.trial)
 
 
 @inner
@@ -107,8 +114,9 @@ def step_peaks(problem, tables, state, space, family, h, s, limit):
                 continue  # falling from its begin
         place = max(place, 0)
         if seen != place:
-            _around(problem, tables, state, space, family, h, s, place)
-            seen = place
+            _motion_around(tables, space, family, h, s, place)
+            around, seen = space.around, place
+            contact_forces(problem, s, around[0, :S], around[1, :S], state.entry_rate[s], around[2, :S])
         begin, end = tables.places[family, place]
         within = min(2.0 * (limit - begin) / (end - begin) - 1.0, 1.0)
         if within > -1.0:

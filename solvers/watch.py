@@ -1,7 +1,7 @@
 """What may end a step in contact: borders of the pieces of all stops, open ones included, and bends of their laws.
 
-Between two points of a step δ is taken as the cubic through both values and rates; an open stop keeps a distance of
-the ripple too, which fast modes may have between the nodes.
+Between two points of a step δ is taken as the cubic through both values and rates, around the highest node of an open
+stop as in `solvers.peaks`; such a stop keeps a distance of the ripple too, which fast modes may have between the nodes.
 
 A bend is where the law of a stop in contact has a kink that is not at a given indentation: δ̇ = 0 for one that damps on
 approach only, F = 0 for one cut where it would pull. Its side is the sign of δ̇, or of the force before it is cut. No
@@ -17,6 +17,7 @@ import numpy as np
 from solvers.dormand_prince import STAGES, C
 from solvers.families import S
 from solvers.kernels import call_force, copy, dot, indentation, inlined, inner, sizes
+from solvers.peaks import deepest
 from solvers.response import respond
 from solvers.state import PEAK_FORCE, T_IN, T, surface_tolerance
 from solvers.vector import above_zero
@@ -103,6 +104,8 @@ def leaves_piece(problem, tables, state, space, family, level):
         if not (lower - tolerance <= lowest and highest + ripple <= upper + tolerance):
             return True
         h = tables.step[level]
+        if piece == 0 and deepest(tables, space, family, h, s) > upper + tolerance:
+            return True
         if _passes_between(problem, tables, state, space, family, h, s, lower - tolerance, upper + tolerance):
             return True
     return False
