@@ -15,17 +15,17 @@ from __future__ import annotations
 import numpy as np
 
 from solvers.dormand_prince import E5, STAGES, A
-from solvers.kernels import contact_forces, copy, dot, indentation, inlined, inner, table_value
+from solvers.kernels import call_force, copy, dot, indentation, inlined, inner, law_forces, table_value
 from solvers.ledger import powers
 from solvers.peaks import state_peaks
 from solvers.state import CALLS, LANDING, PEAK_DELTA, PEAK_FORCE, SAMPLED, T, rate_tolerance, surface_tolerance, tape
 from solvers.vector import combine
-from solvers.watch import FREE, on_the_way, side_at
+from solvers.watch import FORCE, FREE, on_the_way, side_at
 
 INDENTATION, ROOT, TIME = range(3)
 _MOST_TRIES = 8  # to meet an output time on the way to a landing, or a bend
 _PART = 0.1  # of the embedded difference that counts as the error
-_PART_OF_FOURTH = 1e-3  # with u = δ^{1/4}: terms t² = u⁸ are exact in the step, and all of the difference
+_PART_OF_FOURTH = 1e-2  # with u = δ^{1/4}: terms t² = u⁸ are exact in the step, and all of the difference
 _LAST = 0.09  # indentation, in units of the deepest, from which the last step is tried
 
 
@@ -35,7 +35,18 @@ def reach(rtol: float) -> float:
 
 
 @inlined
-def _rate(problem, tables, ledger, variable, stop, span, w, piece, entry_rate, out, batch):
+def _force(problem, tables, s, delta, delta_dot, side, entry_rate, batch):
+    """Force of stop s; a law that is cut at zero goes on beyond it on the side on which the step began."""
+    batch[0], batch[1], batch[2] = max(delta, 0.0), delta_dot, 0.0
+    if tables.bend[s] != FORCE:
+        law_forces(problem, s, 1, batch[0:1], batch[1:2], entry_rate, batch[2:3])
+    elif side > 0.0:
+        call_force(tables.uncut[s], 1, batch[0:1], batch[1:2], entry_rate, tables.uncut_parameters[s], (batch[2:3],))
+    return batch[2]
+
+
+@inlined
+def _rate(problem, tables, ledger, variable, stop, span, w, piece, entry_rate, side, out, batch):
     """Derivative of the unknowns with respect to the chosen variable, times its span; ``w`` ends in (t, u)."""
     n, calls = problem.k.size, 0
     size, t = 2 * n, 2 * n + 2 + 2 * problem.gap.size
@@ -48,16 +59,14 @@ def _rate(problem, tables, ledger, variable, stop, span, w, piece, entry_rate, o
             out[e] += load[e] * value
     out[size], out[size + 1] = powers(problem, tables, w[t], w) if ledger else (0.0, 0.0)
     for s in range(problem.gap.size):
-        batch[2] = 0.0
-        batch[1] = dot(problem.read_rate[s], w, size)
+        force, rate = 0.0, dot(problem.read_rate[s], w, size)
         if piece[s] > 0:
-            batch[0] = indentation(problem, s, w)
-            contact_forces(problem, s, batch[0:1], batch[1:2], entry_rate[s], batch[2:3])
+            force = _force(problem, tables, s, indentation(problem, s, w), rate, side[s], entry_rate[s], batch)
             calls += 1
             for e in range(size):
-                out[e] += problem.push[s, e] * batch[2]
-        out[size + 2 + 2 * s] = batch[2] * batch[1]
-        out[size + 3 + 2 * s] = batch[2]
+                out[e] += problem.push[s, e] * force
+        out[size + 2 + 2 * s] = force * rate
+        out[size + 3 + 2 * s] = force
     delta_dot = dot(problem.read_rate[stop], w, size)
     factor = span
     if variable == INDENTATION:
@@ -73,13 +82,13 @@ def _rate(problem, tables, ledger, variable, stop, span, w, piece, entry_rate, o
 
 
 @inner
-def regular_step(problem, tables, ledger, variable, stop, span, w, piece, entry_rate, work):
+def regular_step(problem, tables, ledger, variable, stop, span, w, piece, entry_rate, side, work):
     """One DOP853 step of the chosen variable from ``w`` into ``work[15]``, its stages into ``work``; law calls."""
     calls = 0
     batch, trial = work[STAGES + 2], work[STAGES + 3]
     for i in range(STAGES):
         combine(work, A[i], i, w, trial)
-        calls += _rate(problem, tables, ledger, variable, stop, span, trial, piece, entry_rate, work[i], batch)
+        calls += _rate(problem, tables, ledger, variable, stop, span, trial, piece, entry_rate, side, work[i], batch)
     combine(work, A[STAGES], STAGES, w, trial)
     return calls
 
@@ -107,7 +116,7 @@ def _step(problem, tables, state, space, variable, stop, span, ledger):
     """A step from ``space.work[17]``."""
     state.count[CALLS] += regular_step(
         *(problem, tables, ledger, variable, stop, span, space.work[17]),
-        *(state.piece, state.entry_rate, space.work),
+        *(state.piece, state.entry_rate, space.side, space.work),
     )
 
 

@@ -37,6 +37,7 @@ from solvers.kernels import (
     PROBLEM,
     REAL,
     VECTOR,
+    call_gradient,
     contact_forces,
     contact_gradient,
     copy,
@@ -71,6 +72,7 @@ from solvers.state import (
 )
 from solvers.tables import propagate
 from solvers.vector import combine
+from solvers.watch import FORCE, side_at
 
 _OFF = 1e-10  # relative distance from a knot at which a law is on one side of it for sure
 
@@ -324,8 +326,30 @@ def _inside_piece(problem, shadow, s, x):
     return min(max(indentation(problem, s, x), lower * (1.0 + _OFF)), upper * (1.0 - _OFF))
 
 
+@inner
+def _note_sides(problem, tables, shadow, space):
+    """Into ``space.beyond`` whether each law that is cut at zero pushes as a landing begins."""
+    for s in range(problem.gap.size):
+        if shadow.piece[s] > 0 and tables.bend[s] == FORCE:
+            space.beyond[s] = side_at(problem, tables, shadow, s, shadow.x, space.trial)
+
+
 @inlined
-def _stage_rates(problem, ahead, behind, shadow, slopes, nudge, w, factor, out):
+def _gradient(problem, tables, shadow, space, s, batch):
+    """Derivatives of a law at one stage of a landing, on the side of its bend on which that began."""
+    d, v, rate = batch[0:1], batch[1:2], shadow.entry_rate[s]
+    if tables.bend[s] != FORCE:
+        contact_gradient(problem, s, d, v, rate, batch[2:3], batch[3:4], batch[4:5])
+    elif space.beyond[s] > 0.0:
+        batch[0] = max(batch[0], 0.0)
+        results = batch[2:3], batch[3:4], batch[4:5]
+        call_gradient(tables.uncut_gradient[s], 1, d, v, rate, tables.uncut_parameters[s], results)
+    else:
+        batch[2], batch[3], batch[4] = 0.0, 0.0, 0.0
+
+
+@inlined
+def _stage_rates(problem, ahead, behind, tables, shadow, space, slopes, nudge, w, factor, out):
     """Variational equation at one stage of a landing; ``w`` is the state with its time, factor dt along the step."""
     n, size, t, batch = problem.k.size, 2 * problem.k.size, w[shadow.x.size], slopes.batch
     for c in range(slopes.y.shape[0]):
@@ -338,7 +362,7 @@ def _stage_rates(problem, ahead, behind, shadow, slopes, nudge, w, factor, out):
             continue
         batch[0], batch[1] = _inside_piece(problem, shadow, s, w), dot(problem.read_rate[s], w, size)
         rate = shadow.entry_rate[s]
-        contact_gradient(problem, s, batch[0:1], batch[1:2], rate, batch[2:3], batch[3:4], batch[4:5])
+        _gradient(problem, tables, shadow, space, s, batch)
         if nudge.law_step > 0.0:
             contact_forces(ahead, s, batch[0:1], batch[1:2], rate, batch[5:6])
             contact_forces(behind, s, batch[0:1], batch[1:2], rate, batch[6:7])
@@ -362,8 +386,12 @@ def _land(problem, ahead, behind, tables, shadow, space, slopes, nudge, row):
     variable, stop, size = int(row[FIRST]), int(row[SECOND]), 2 * problem.k.size
     w, width, span = space.work[17], shadow.x.size, row[SPAN]
     start_landing(problem, tables, shadow, space, stop)
+    _note_sides(problem, tables, shadow, space)
     ledger = np.bool_(0)  # a literal would be compiled for itself
-    regular_step(problem, tables, ledger, variable, stop, span, w, shadow.piece, shadow.entry_rate, space.work)
+    regular_step(
+        *(problem, tables, ledger, variable, stop, span, w, shadow.piece, shadow.entry_rate),
+        *(space.beyond, space.work),
+    )
     trial = space.work[STAGES + 1]
     for i in range(STAGES + 1):
         combine(space.work, A[i], i, w, trial)
@@ -375,7 +403,7 @@ def _land(problem, ahead, behind, tables, shadow, space, slopes, nudge, row):
                 slopes.trial[c, e] = slopes.y[c, e] + total
         if i < STAGES:
             factor = space.work[i, width]
-            _stage_rates(problem, ahead, behind, shadow, slopes, nudge, trial, factor, slopes.stages[i])
+            _stage_rates(problem, ahead, behind, tables, shadow, space, slopes, nudge, trial, factor, slopes.stages[i])
     for c in range(slopes.y.shape[0]):
         copy(slopes.trial[c], slopes.y[c], size)
 

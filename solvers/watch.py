@@ -204,6 +204,8 @@ def on_the_way(problem, tables, state, space, stop, bends, w, x):
             before = space.side[s] * side_at(problem, tables, state, s, w, space.trial)
             if space.side[s] * side_at(problem, tables, state, s, x, space.trial) < -_TOGETHER * abs(before):
                 return TURNED
+        if not bends and tables.bend[s] == FORCE and _pulls_inside(space.work, size + 3 + 2 * s, width):
+            return TURNED
         if _force_turns(space.work, size + 3 + 2 * s, width, state.open[s, PEAK_FORCE]):
             return TURNED
     return FREE
@@ -222,6 +224,15 @@ def _force_turns(work, column, width, known):
     if max(highest, ends) <= known:
         return False
     return highest > ends or _turns_at(work, column, width, 0, 1, 2) or _turns_at(work, column, width, 8, 10, last)
+
+
+@inlined
+def _pulls_inside(work, column, width):
+    """Whether a law would pull at an inner stage of a landing."""
+    pulls = False
+    for i in range(1, STAGES - 1):
+        pulls |= work[i, column] / work[i, width] < 0.0
+    return pulls
 
 
 @inlined

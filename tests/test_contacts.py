@@ -246,7 +246,7 @@ def test_table_from_a_file(tmp_path):
     [
         (Hysteretic.lankarani_nikravesh(2.1e8, 0.5),
          "stiffness = 2.1e+08 N/m^p|nominal 0.5|0.725241 (exactly)|J. Mech. Des. 112|pulls where|singular"),
-        (KelvinVoigt(1e6, 300.0, clamp=True), "damping = 300 N s/m|0.649895|lower order|jumps"),
+        (KelvinVoigt(1e6, 300.0, clamp=True), "damping = 300 N s/m|0.649895|moves with the rate|jumps"),
         (Viscoelastic.jankowski(2.1e8, 0.5, 1.0), "approach|0.494588|never pulls|kink where δ̇ = 0"),
         (PiecewiseLinear([1e5, 2e6], [1e-3], [0.0, 100.0]), "(by integration)|kinks at δ = 0.001 m"),
         (Hertz(1e8) + KelvinVoigt(1e5, 50.0), "Hertz: F = |KelvinVoigt: F = |pulls, for example|jumps"),

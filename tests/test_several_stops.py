@@ -208,6 +208,26 @@ def test_errors_of_laws_that_bend_fall_with_the_tolerance(name, start):
         assert np.abs(ours.q_dot - theirs.q_dot).max() < (100.0 * rtol + 1e-11) * np.abs(theirs.q_dot).max(), rtol
 
 
+@pytest.mark.parametrize("made", [BENDING["Kelvin-Voigt cut"], Hysteretic(2e8, 1.2, clamp=True)])
+def test_tangent_through_a_cut_force_is_that_of_differences(made):
+    """Two modes thrown off their stop, so that both laws are cut on the way out."""
+    row = np.array([0.9, -0.5])
+    load = (np.array([1.0, 0.2]), fb.Harmonic(-4e3, 300.0))
+    system = System.modal([60.0, 400.0], 0.02, [Contact(row, made, 1e-4)], [load])
+    start = np.array([0.0, 0.0, -1.0, 0.3])
+
+    def end(x):
+        solution = integrate(system, x[:2], x[2:], 0.02, method=Exponential(1e-12))
+        return np.concatenate((solution.q[-1], solution.q_dot[-1]))
+
+    found = integrate(system, start[:2], start[2:], 0.02, method=Exponential(1e-10), tangent=True)
+    assert len(found.contacts) >= 1
+    steps = 1e-6 * np.array([1e-2, 1e-2, 1.0, 1.0])
+    differences = np.array([(end(start + h) - end(start - h)) / (2.0 * h.sum()) for h in np.diag(steps)]).T
+    scale = np.abs(differences).max(axis=0)
+    assert np.all(np.abs(found.tangent - differences) < 1e-5 * scale)
+
+
 # --- runs that do not balance -------------------------------------------------------------------------------------
 
 
