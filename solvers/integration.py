@@ -253,7 +253,8 @@ class _Run:
         except KeyboardInterrupt:
             return Status.INTERRUPTED
         x = self.state.x
-        finite = math.isfinite(x.dot(x)) or np.isfinite(x).all()  # loads of 1e300 overflow where no method looks
+        with np.errstate(over="ignore", invalid="ignore"):  # loads of 1e300 overflow where no method looks
+            finite = math.isfinite(x.dot(x)) or np.isfinite(x).all()
         return STATUSES[code] if finite or STATUSES[code] is not Status.DONE else Status.DIVERGED
 
     def solution(self, status: Status, seconds: float) -> Solution:

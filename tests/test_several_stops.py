@@ -262,3 +262,19 @@ def test_random_scenes(monkeypatch):
     allowed = "fine", "ill-conditioned", "the reference failed"
     assert {seed: kind for seed, kind in kinds.items() if kind not in allowed} == {}
     assert list(kinds.values()).count("fine") > 30
+
+
+@pytest.mark.parametrize("size", [1e-15, 1e-9, 1e75, 1e150])
+def test_motions_of_any_size_are_those_of_size_one(size):
+    """A linear stop without gap: everything scales."""
+
+    def run(a):
+        system = System.modal(
+            *([100.0, 400.0], 0.01, [Contact([1.0, 0.5], PiecewiseLinear([1e6]))]),
+            [([1.0, 1.0], fb.Harmonic(10.0 * a, 150.0))],
+        )
+        return integrate(system, [0.0, 0.0], [0.1 * a, 0.02 * a], 0.2, 0.001, Exponential(1e-8))
+
+    one, other = run(1.0), run(size)
+    assert len(one.contacts) == len(other.contacts) > 3
+    assert np.abs(other.q / size - one.q).max() < 1e-6 * np.abs(one.q).max()
