@@ -24,7 +24,7 @@ from solvers.kernels import inner
 from solvers.result import Energy
 from solvers.system import Array, System, dense
 
-MULTIPLE, ROUNDING = 100.0, 1e-9
+MULTIPLE, ROUNDING = 20.0, 1e-9
 FACTOR = 4.0
 _SAMPLES = 64  # of the ledger that are looked at, the last one among them
 FIRST, LAST, ALLOWED = range(3)  # places in Space.energy

@@ -113,7 +113,7 @@ class Exponential:
     Notes
     -----
     Cost is nearly independent of rtol and grows linearly with the number of modes. See the module for its limits. A run
-    with a ledger that leaves more than (100 rtol + 1e-9) of the energy handled unaccounted for is refused, one without
+    with a ledger that leaves more than (20 rtol + 1e-9) of the energy handled unaccounted for is refused, one without
     if it ends with four times the energy it can have been given, see `solvers.balance`.
 
     Examples
