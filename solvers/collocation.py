@@ -236,7 +236,6 @@ def finish_step(problem, tables, state, space, family, level):
     """Move the state to the end of the step; ledger and peaks of the contacts."""
     stops, size = problem.gap.size, 2 * problem.k.size
     h = tables.step[level]
-    copy(space.x_new, state.x, size)
     for s in range(stops):
         if state.piece[s] > 0:
             weights = tables.weights[family] if family == 0 or s == family - 1 else tables.plain[family]
@@ -244,6 +243,7 @@ def finish_step(problem, tables, state, space, family, level):
             state.x[size + 2 + 2 * s] += h * total(impulses * eight(space.motion[s, 1], 0))
             state.x[size + 3 + 2 * s] += h * total(impulses)
             step_peaks(problem, tables, state, space, family, h, s, 1.0)
+    copy(space.x_new, state.x, size)
     state.now[T] += h
 
 

@@ -1,7 +1,7 @@
 """Largest indentation and force of a contact: maxima of what each step knows of them, not of its nodes.
 
-Around the highest node of a step, between its neighbours, δ and δ̇ at eight points follow from δ and δ̇ at all nodes by
-Hermite's polynomial of degree 15, and the forces there from the law. The maximum of the polynomial through these points
+Around the highest node of a step, between its neighbours, δ and δ̇ at eight points follow from δ and δ̇ at all nodes and
+at the begin of the step by Hermite's polynomial of degree 17, and the forces there from the law. The maximum of the polynomial through these points
 differs from that of the motion by less than the motion does from the exact one.
 """
 
@@ -78,28 +78,30 @@ def _highest(tables, values, family, limit):
 
 
 @inner
-def _motion_around(tables, space, family, h, s, place):
-    """Indentations and rates of stop s around a node, into ``space.around``."""
+def _motion_around(problem, tables, state, space, family, h, s, place):
+    """Indentations and rates of stop s around a node of the step that begins at the state, into ``space.around``."""
     around, motion, known = space.around, space.motion[s], space.around[3]
     copy(motion[0], known, S)
     for i in range(S):
         known[S + i] = h * motion[1, i]
-    combine(tables.zoom[family, place], known, 2 * S, None, around[0])
+    known[2 * S] = indentation(problem, s, state.x)
+    known[2 * S + 1] = h * dot(problem.read_rate[s], state.x, 2 * problem.k.size)
+    combine(tables.zoom[family, place], known, 2 * S + 2, None, around[0])
     for i in range(S):
         around[1, i] = around[0, S + i] / h
 
 
 @inner
-def deepest(tables, space, family, h, s):
+def deepest(problem, tables, state, space, family, h, s):
     """Largest indentation of stop s around its highest node of a step."""
     place = _highest(tables, space.motion[s, 0], family, 1.0)
-    _motion_around(tables, space, family, h, s, place)
+    _motion_around(problem, tables, state, space, family, h, s, place)
     return summit(space.around[0], 1.0, space.trial)
 
 
 @inner
 def step_peaks(problem, tables, state, space, family, h, s, limit):
-    """Raise the peaks of stop s by a converged step of length h, up to its place σ = limit."""
+    """Raise the peaks of stop s by a converged step of length h, up to its place σ = limit; the state is that at its begin."""
     combine(tables.summary[family], space.motion[s, 0], S, None, space.summary[s, 1])
     seen = -1
     for column, values, d in ((PEAK_FORCE, space.force[s], 0), (PEAK_DELTA, space.motion[s, 0], 1)):
@@ -114,7 +116,7 @@ def step_peaks(problem, tables, state, space, family, h, s, limit):
                 continue  # falling from its begin
         place = max(place, 0)
         if seen != place:
-            _motion_around(tables, space, family, h, s, place)
+            _motion_around(problem, tables, state, space, family, h, s, place)
             around, seen = space.around, place
             contact_forces(problem, s, around[0, :S], around[1, :S], state.entry_rate[s], around[2, :S])
         begin, end = tables.places[family, place]

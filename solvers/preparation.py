@@ -214,7 +214,7 @@ def _layout(stops: int, loads: int, blocks: int, signals: int) -> Layout:
         *(
             (stops, S),
             (stops,),
-            (4, 2 * S),
+            (4, 3 * S),
             (stops,),
             (S + 2,),
             (1,),

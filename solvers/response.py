@@ -40,7 +40,7 @@ class Space(NamedTuple):
     beyond: Any  # (m,) N s: impulse that a step's polynomials leave out
     guess: Any  # (m, S) forces the iterations begin with
     viscous: Any  # (m,) N s/m: slope of a force by its rate, where Newton's method has found it; else 0
-    around: Any  # (4, 2S) see `solvers.peaks`
+    around: Any  # (4, 3S) see `solvers.peaks`
     side: Any  # (m,) sign of the side of its bend on which each stop is
     sides: Any  # (S + 2,) see `solvers.watch`
     reach: Any  # (1,) radians of the fastest block that a landing may take

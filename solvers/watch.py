@@ -104,7 +104,7 @@ def leaves_piece(problem, tables, state, space, family, level):
         if not (lower - tolerance <= lowest and highest + ripple <= upper + tolerance):
             return True
         h = tables.step[level]
-        if piece == 0 and deepest(tables, space, family, h, s) > upper + tolerance:
+        if piece == 0 and deepest(problem, tables, state, space, family, h, s) > upper + tolerance:
             return True
         if _passes_between(problem, tables, state, space, family, h, s, lower - tolerance, upper + tolerance):
             return True
