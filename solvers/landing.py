@@ -112,6 +112,19 @@ def _error(problem, space, part, rtol):
 
 
 @inner
+def _goes_ahead(space, size):
+    """Whether time passes forward in every stage of the step just taken.
+
+    If it does not, the stop turns back before the border, the step passes a pole of 1/δ̇, and its embedded difference
+    tells nothing.
+    """
+    for i in range(STAGES):
+        if not space.work[i, size] >= 0.0:
+            return False
+    return True
+
+
+@inner
 def _step(problem, tables, state, space, variable, stop, span, ledger):
     """A step from ``space.work[17]``."""
     state.count[CALLS] += regular_step(
@@ -214,7 +227,8 @@ def land(problem, tables, state, space, stop, direction, near, rtol, t_end, out,
     if not t <= landed <= t + min(4.0 * near, furthest) + width:
         return -1
     if not (
-        _error(problem, space, part, rtol) <= 1.0
+        _goes_ahead(space, size)
+        and _error(problem, space, part, rtol) <= 1.0
         and direction * dot(problem.read_rate[stop], x, 2 * problem.k.size) >= 0.0  # it has not turned back
     ):
         return -1

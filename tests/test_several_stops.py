@@ -278,3 +278,15 @@ def test_motions_of_any_size_are_those_of_size_one(size):
     one, other = run(1.0), run(size)
     assert len(one.contacts) == len(other.contacts) > 3
     assert np.abs(other.q / size - one.q).max() < 1e-6 * np.abs(one.q).max()
+
+
+def test_a_stop_beyond_the_turning_point_is_not_landed_on():
+    """One stiff linear stop, a second 1 to 30 times as deep as the first lets the mass come: 600 gaps."""
+    stiffness, start, speed = 1.4e10, 7.84e-6, 2.0
+    deepest = math.hypot(start, speed / math.sqrt(stiffness))
+    for ratio in np.geomspace(1.0001, 30.0, 600):
+        contacts = [Contact([1.0], Hertz(stiffness, 1.0), 0.0), Contact([1.0], Hertz(1e9), ratio * deepest)]
+        system = System.modal([0.0], 0.0, contacts)
+        contacts = integrate(system, [-start], [-speed], 2e-5, method=Exponential(1e-3)).contacts
+        assert list(contacts.stop) == [0]
+        assert contacts.peak_indentation[0] == pytest.approx(deepest, rel=1e-3)
