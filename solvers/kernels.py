@@ -48,8 +48,6 @@ merged = _decorator(**_INNER, inline="always")
 """The same for the long functions one kernel calls once each: compiled as a part of it."""
 reordered = _decorator(**_INNER, forceinline=True, fastmath={"reassoc", "contract"})
 """The same for sums whose order does not matter, so that they can be vectorised."""
-maxima = _decorator(**_INNER, forceinline=True, fastmath={"nnan", "nsz"})
-"""The same for maxima of what is not NaN."""
 
 
 def entry(signature: Any) -> Callable[[Any], Any]:

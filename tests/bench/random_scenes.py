@@ -98,7 +98,10 @@ def numbers_of(solution: Any, size: float, duration: float) -> dict[str, Any]:
     scale = {"t_in": length, "t_out": length, "speed_in": fast, "speed_out": fast, "peak_indentation": depth}
     scale |= {"peak_force": force, "impulse": force * length, "energy_loss": force * depth}
     rates = {"q": solution.q, "q_dot": solution.q_dot, "fast": (depth / length).max(initial=0.0)}
-    return rates | {"stop": log.stop[i], "scale": scale} | {name: getattr(log, name)[i] for name in NUMBERS}
+    found = rates | {"stop": log.stop[i], "scale": scale} | {name: getattr(log, name)[i] for name in NUMBERS}
+    begun = (found["t_in"] < 1e-9 * length) & (found["speed_in"] < 1e-4 * fast)
+    found["speed_in"][begun] = 0.0  # of a start at rest on a surface: entered at once, or within its rounding
+    return found
 
 
 def differences(a: dict[str, Any], b: dict[str, Any], measure: dict[str, Any], parts: int) -> dict[str, Any]:
@@ -119,9 +122,10 @@ def differences(a: dict[str, Any], b: dict[str, Any], measure: dict[str, Any], p
 
 
 def imbalance(solution: Any) -> float:
-    """Energy a run does not account for, in units of all the energy it handled."""
-    e = solution.energy
-    handled = e.initial + np.abs(e.input).max() + np.abs(e.stored).max() + np.abs(solution.contacts.energy_loss).sum()
+    """Energy a run does not account for, in units of all the energy it handled, that within its stops included."""
+    e, log = solution.energy, solution.contacts
+    handled = e.initial + np.abs(e.input).max() + np.abs(e.stored).max() + np.abs(log.energy_loss).sum()
+    handled += np.abs(log.peak_force * log.peak_indentation).max(initial=0.0)
     return float(np.abs(e.residual).max() / max(handled, 1e-300))
 
 
