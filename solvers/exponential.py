@@ -25,7 +25,7 @@ from typing import ClassVar
 import numpy as np
 from numba import types
 
-from solvers.balance import FIRST, note_energy, own_energy, too_much
+from solvers.balance import FIRST, note_energy, own_energy, too_much, unknown
 from solvers.certify import fly
 from solvers.contact_step import BEGUN, FRESH, begin, latest, touch
 from solvers.forcing import Forcing
@@ -171,9 +171,10 @@ class Engine:
         """Whether input and damping of the energy ledger are known."""
         return self.method.ledger and sampled
 
-    def gains(self) -> bool:
+    def gains(self, exchanged: Array) -> bool:
         """Whether the finished run holds more energy than it can have been given."""
-        return too_much(self.system, self.workspace.energy, self.problem, self.duration)
+        slack = unknown(self.workspace.energy[FIRST], exchanged, self.method.rtol)
+        return too_much(self.system, self.workspace.energy, self.problem, self.duration, slack)
 
     def march(self, budget: int, log: Array, out: Array, due: Array) -> int:
         """Go on for a stretch."""

@@ -284,9 +284,10 @@ class _Run:
         """Whether the energy does, by the ledger if there is one; methods that do not say are looked at as they go."""
         if not hasattr(self.engine, "gains"):
             return True
+        exchanged = rows[:, _DEPTH] * rows[:, _FORCE]
         if not complete or not len(motion):
-            return not self.engine.gains()
-        exchanged, begin = rows[:, _DEPTH] * rows[:, _FORCE], self.engine.back @ self.begin
+            return not self.engine.gains(exchanged)
+        begin = self.engine.back @ self.begin
         return not unbalanced(self.system, powers, motion, begin, exchanged, self.engine.method.rtol)
 
     def release(self) -> None:

@@ -118,10 +118,10 @@ def _goes_ahead(space, size):
     If it does not, the stop turns back before the border, the step passes a pole of 1/δ̇, and its embedded difference
     tells nothing. On δ = 0, where the last stages of `ROOT` end, dt/du = 0 but for rounding.
     """
+    ahead = True
     for i in range(STAGES):
-        if not space.work[i, size] >= -1e-9 * space.work[0, size]:
-            return False
-    return True
+        ahead &= space.work[i, size] >= -1e-9 * space.work[0, size]
+    return ahead
 
 
 @inner

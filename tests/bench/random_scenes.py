@@ -91,13 +91,17 @@ def significant(solution: Any, size: float) -> Any:
 def numbers_of(solution: Any, size: float, duration: float) -> dict[str, Any]:
     """Everything to compare, each number of a contact in units of that contact."""
     log, i = solution.contacts, significant(solution, size)
-    depth, force = log.peak_indentation[i], np.maximum(np.abs(log.peak_force[i]), 1e-300)
+    depth, force = log.peak_indentation[i], np.abs(log.peak_force[i])
     end = np.where(np.isnan(log.t_out[i]), duration, log.t_out[i])
     length = np.maximum(end - log.t_in[i], 1e-300)
     fast = np.maximum(log.speed_in[i], depth / length)
     scale = {"t_in": length, "t_out": length, "speed_in": fast, "speed_out": fast, "peak_indentation": depth}
     scale |= {"peak_force": force, "impulse": force * length, "energy_loss": force * depth}
-    rates = {"q": solution.q, "q_dot": solution.q_dot, "fast": (depth / length).max(initial=0.0)}
+    force = np.maximum(force, 1e-12 * force.max(initial=0.0) + 1e-300)  # one that was cut all the time has none
+    part = np.array([int(stop) for stop in log.stop[i]], dtype=int)
+    between = np.zeros(part.max(initial=0) + 1)  # rates of each stop, met between the samples too
+    np.maximum.at(between, part, np.maximum(fast, np.nan_to_num(np.abs(log.speed_out[i]))))
+    rates = {"q": solution.q, "q_dot": solution.q_dot, "fast": between, "work": (force * depth).max(initial=0.0)}
     found = rates | {"stop": log.stop[i], "scale": scale} | {name: getattr(log, name)[i] for name in NUMBERS}
     begun = (found["t_in"] < 1e-9 * length) & (found["speed_in"] < 1e-4 * fast)
     found["speed_in"][begun] = 0.0  # of a start at rest on a surface: entered at once, or within its rounding
@@ -112,8 +116,9 @@ def differences(a: dict[str, Any], b: dict[str, Any], measure: dict[str, Any], p
         apart, size = (
             np.abs(x).reshape(len(x), parts, -1).max(axis=(0, 2)) for x in (a[name][-m:] - b[name], measure[name])
         )
-        if name == "q_dot" and parts == 1:  # between the samples, of what is at rest there
-            size = np.maximum(size, measure["fast"])
+        if name == "q_dot":  # of what is at rest at the samples
+            fast = np.resize(measure["fast"].max(initial=0.0), parts) if parts == 1 else measure["fast"]
+            size[: len(fast)] = np.maximum(size[: len(fast)], fast)
         found[name] = apart / np.maximum(size, 1e-300)
     for name in NUMBERS:
         apart = np.abs(a[name] - b[name]) / measure["scale"][name]
@@ -194,6 +199,10 @@ def amplified(scene: Scene, exact: dict[str, Any], size: float, move: float, see
             if not np.all(np.isfinite(apart)):  # a contact that ended does so no more
                 return None
             amplification[name] = np.maximum(amplification.get(name, 1.0), apart / move)
+    mobility = np.array([c.direction @ np.linalg.solve(scene.system.M, c.direction) for c in scene.system.contacts])
+    shares = exact["work"] * mobility[exact["stop"]] / np.maximum(exact["scale"]["speed_in"], 1e-300) ** 2
+    for name in ("speed_in", "speed_out", "energy_loss"):  # what is left of energies that cancel
+        amplification[name] = np.maximum(amplification[name], shares)
     if max(float(np.max(a, initial=0.0)) for a in (amplification["q"], amplification["q_dot"])) > 1e4:
         return None
     return amplification
