@@ -209,7 +209,7 @@ def kinks_of(system: System) -> list[int]:
 
 
 def _kinks(law: Any) -> int:
-    """The same of a law, by trying it out: a user's law need not declare its bends, and a check should not trust one."""
+    """The same of a law, by trying it out: a user's law need not declare its bends."""
     delta = 2.0 * _depth(law, 1.0, EXPECTED_SPEED) * np.geomspace(1e-6, 1.0, 13)
     with np.errstate(all="ignore"):
         cut = any(np.any(law.force(delta, rate, EXPECTED_SPEED) == 0.0) for rate in (-1e3, -1.0, 1.0))

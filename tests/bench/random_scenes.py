@@ -88,16 +88,28 @@ def significant(solution: Any, size: float) -> Any:
     return real[np.lexsort((log.t_in[real], log.stop[real]))]
 
 
-def numbers_of(solution: Any, size: float, duration: float) -> dict[str, Any]:
+def first_forces(scene: Scene) -> Any:
+    """Size of every stop's force at the start: one that is left fast may pull much harder than it ever pushes."""
+    rows = np.array([c.direction for c in scene.system.contacts])
+    delta = -rows @ scene.q0 - [c.gap for c in scene.system.contacts]
+    rate = -rows @ scene.q_dot0
+    laws = [c.law for c in scene.system.contacts]
+    begun = np.maximum(np.abs(rate), [made.entry_rate_floor for made in laws])
+    found = [made.force(d, v, v0) for made, d, v, v0 in zip(laws, delta, rate, begun, strict=True)]
+    return np.abs(np.array(found, dtype=float))
+
+
+def numbers_of(solution: Any, scene: Scene, size: float, duration: float) -> dict[str, Any]:
     """Everything to compare, each number of a contact in units of that contact."""
     log, i = solution.contacts, significant(solution, size)
     depth, force = log.peak_indentation[i], np.abs(log.peak_force[i])
+    force = np.where(log.t_in[i] == 0.0, np.maximum(force, first_forces(scene)[log.stop[i]]), force)
+    force = np.maximum(force, 1e-12 * force.max(initial=0.0) + 1e-300)  # one that was cut all the time has none
     end = np.where(np.isnan(log.t_out[i]), duration, log.t_out[i])
     length = np.maximum(end - log.t_in[i], 1e-300)
     fast = np.maximum(log.speed_in[i], depth / length)
     scale = {"t_in": length, "t_out": length, "speed_in": fast, "speed_out": fast, "peak_indentation": depth}
     scale |= {"peak_force": force, "impulse": force * length, "energy_loss": force * depth}
-    force = np.maximum(force, 1e-12 * force.max(initial=0.0) + 1e-300)  # one that was cut all the time has none
     part = np.array([int(stop) for stop in log.stop[i]], dtype=int)
     between = np.zeros(part.max(initial=0) + 1)  # rates of each stop, met between the samples too
     np.maximum.at(between, part, np.maximum(fast, np.nan_to_num(np.abs(log.speed_out[i]))))
@@ -159,11 +171,11 @@ def compared(scene: Scene, rtol: float, seed: int) -> Verdict:
     if not (np.all(np.isfinite(ours.q)) and np.all(np.isfinite(ours.q_dot))):
         return Verdict("not finite")
     size, move = np.abs(theirs.q).max(), max(1e-7, 3.0 * rtol)
-    exact = numbers_of(theirs, size, scene.duration)
+    exact = numbers_of(theirs, scene, size, scene.duration)
     amplification = amplified(scene, exact, size, move, seed)
     if amplification is None:
         return Verdict("ill-conditioned")
-    found = [numbers_of(solution, size, scene.duration) for solution in (ours, end)]
+    found = [numbers_of(solution, scene, size, scene.duration) for solution in (ours, end)]
     if any(list(a["stop"]) != list(exact["stop"]) for a in found):
         return Verdict(f"contacts of stops {[a['stop'].tolist() for a in (*found, exact)]}", len(exact["stop"]))
     exact_end = {**exact, "q": exact["q"][-1:], "q_dot": exact["q_dot"][-1:]}
@@ -192,7 +204,7 @@ def amplified(scene: Scene, exact: dict[str, Any], size: float, move: float, see
             moved = run(scene, DormandPrince(max(1e-12, 1e-3 * move)), move * sizes * rng.choice([-1.0, 1.0], 2 * n))
         except (TooStiffError, SolverError):
             return None
-        other = numbers_of(moved, size, scene.duration)
+        other = numbers_of(moved, scene, size, scene.duration)
         if list(other["stop"]) != list(exact["stop"]):
             return None
         for name, apart in differences(other, exact, exact, scene.parts).items():
