@@ -79,7 +79,7 @@ def _highest(tables, values, family, limit):
 
 @inner
 def _motion_around(problem, tables, state, space, family, h, s, place):
-    """Indentations and rates of stop s around a node of the step from ``state.x`` to ``space.x_new``, into ``space.around``."""
+    """Indentations and rates of stop s around a node of the step from state.x to space.x_new, into ``space.around``."""
     around, motion, known, size = space.around, space.motion[s], space.around[3], 2 * problem.k.size
     copy(motion[0], known, S)
     for i in range(S):
