@@ -143,7 +143,7 @@ def _zoom(family: _Family, begin: float, end: float) -> Any:
     """(2S + 4, 2S): δ and h δ̇ at the points `LOCAL` of [begin, end] from those at nodes, end and begin of the step.
 
     δ is Hermite's polynomial in σ, its rate the slope over dt/dσ. Where that vanishes, beside the begin of an entry
-    step, the rate is δ̇(0) + σ^κ × the polynomial through (δ̇ - δ̇(0))/σ^κ at nodes and end.
+    step, the rate is δ̇(0) + σ^κ × the polynomial through (δ̇ - δ̇(0))/σ^κ at the nodes.
     """
     x, y = np.array([*family.nodes, 1.0, 0.0]), begin + 0.5 * (LOCAL + 1.0) * (end - begin)
     basis, turn = _interpolation(x, y), _differentiation(x)
@@ -152,8 +152,8 @@ def _zoom(family: _Family, begin: float, end: float) -> Any:
     by_value, by_slope = (1.0 - 2.0 * own * apart) * basis**2, apart * basis**2
     pace_x, pace_y = (family.power * place ** (family.power - 1.0) for place in (x, y))  # dt/(h dσ)
     if begin == 0.0 and family.power > 1.0:
-        shares = _interpolation(x[:-1], y) * np.divide.outer(y, x[:-1]) ** family.power
-        rates = [np.zeros_like(basis), np.column_stack((shares, 1.0 - shares.sum(axis=1)))]
+        shares = _interpolation(family.nodes, y) * np.divide.outer(y, family.nodes) ** family.power
+        rates = [np.zeros_like(basis), np.column_stack((shares, np.zeros(S), 1.0 - shares.sum(axis=1)))]
     else:
         rates = [
             (-2.0 * own * basis**2 + 2.0 * (1.0 - 2.0 * own * apart) * basis * slopes) / pace_y[:, None],
