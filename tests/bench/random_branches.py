@@ -106,10 +106,10 @@ def main(count: str = "100", first: str = "0", over: str = "omega", most: str = 
         check_marks(seed, found, checks)
         for arm in found.arms:
             ends[arm.status.name] += 1
-            if arm.status is BranchStatus.LOST:
+            if arm.status in (BranchStatus.LOST, BranchStatus.JUMP):
                 last = arm.orbits[-1]
                 laws = [(contact.law, round(contact.gap, 6)) for contact in last.system.contacts]
-                print(f"seed {seed}: lost at {last.parameter:.9g}, {len(arm.orbits)} orbits, {laws}, "
+                print(f"seed {seed}: {arm.status.name} at {last.parameter:.9g}, {len(arm.orbits)} orbits, {laws}, "
                       f"entered at {last.contacts.speed_in} m/s, |mu| {np.abs(last.multipliers)}")  # fmt: skip
     print(
         f"{count} systems of {stops} stop(s) over {over}: directions ended {dict(ends)}; special points {dict(marks)}"
