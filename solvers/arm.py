@@ -13,7 +13,7 @@ from solvers.kinks import ERRORS, Kink, before, behind, kinks_near, marked, met
 from solvers.later import is_cut, with_quiet_begin
 from solvers.periodic import Orbit, OrbitError
 from solvers.point import Point, corrected, cubic, is_straight, moved
-from solvers.special import between
+from solvers.special import ROUNDING, between, indicators_at
 from solvers.system import Array
 from solvers.touch import Touch, signature, unknowns_at
 
@@ -257,9 +257,12 @@ class Arm:
 
 
 def _jumped(a: Point, b: Point, marks: list[str]) -> bool:
-    """Whether b lies on another branch: between them the parameter turns without a fold, or contacts come unseen."""
+    """Whether b lies on another branch: the parameter turns, a multiplier passes one, or contacts come, all unseen."""
     turned = a.share * b.share < 0.0 and not {"fold", "floor"} & {*marks}
-    return "grazing" not in marks and (turned or not _same_contacts(a.orbit, b.orbit))
+    first, second = (indicators_at(point)["branch point"] for point in (a, b))
+    passed = first * second < 0.0 and min(abs(first), abs(second)) > ROUNDING
+    passed = passed and not {"fold", "floor", "branch point"} & {*marks}
+    return "grazing" not in marks and (turned or passed or not _same_contacts(a.orbit, b.orbit))
 
 
 def _same_contacts(a: Orbit, b: Orbit) -> bool:
