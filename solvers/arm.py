@@ -9,13 +9,13 @@ from enum import Enum
 import numpy as np
 
 from solvers.birth import birth
-from solvers.kinks import ERRORS, before, behind, kinks_near, marked, met
+from solvers.kinks import ERRORS, Kink, before, behind, kinks_near, marked, met
 from solvers.later import is_cut, with_quiet_begin
 from solvers.periodic import Orbit, OrbitError
 from solvers.point import Point, corrected, cubic, is_straight, moved
-from solvers.special import between
+from solvers.special import ROUNDING, between, indicators_at
 from solvers.system import Array
-from solvers.touch import signature, unknowns_at
+from solvers.touch import Touch, signature, unknowns_at
 
 MOST_ORBITS = 2000
 _SMALLEST = 1e-8  # arclength step at which a branch counts as lost
@@ -27,7 +27,7 @@ _NEAR_KINK = 1e-4  # arclength step below which a fold may hide behind a kink
 _NEAR = 1e-4  # arclength from where a branch is lost within which a kink may be why
 _AROUND = 3.0  # arclength, in units of a failed step, within which a kink is looked for
 _AGAIN = 0.03  # part of a step after whose failure kinks are looked for again
-_MOST_KINKS = 3  # tried at a time
+_MOST_KINKS = 6  # tried at a time
 _LAST = 3e-7  # arclength step below which any turn counts as a kink
 _FARTHEST = 20.0  # distance of an orbit from the one before, in steps, beyond which it belongs to another branch
 _BEHIND = 0.003  # first step behind a kink, in units of the largest
@@ -41,7 +41,8 @@ class BranchStatus(Enum):
     CLOSED = "closed: came back to its first orbit"
     RETURNED = "came back to an orbit it had passed: it turned round or went over to another branch"
     BORN = "reached its birth at a flip of the branch of half the period"
-    LOST = "lost: no orbit was found however small the step"
+    JUMP = "ended where two contacts of a stop become one, or one two: no orbits were found that lead over the jump"
+    LOST = "lost: no orbit was found however small the step; where multipliers are large, more shots may help"
     LIMIT = f"stopped after {MOST_ORBITS} orbits"
 
 
@@ -57,6 +58,7 @@ class Arm:
     step: float = 0.0
     before: tuple[Point, float] | None = None  # the point before and the way from it
     tried: float = math.inf  # step after whose failure kinks were looked for
+    at_jump: bool = False  # whether the kinks found then hold one that it leads to, and no way over it
     passed: list[Point] = field(default_factory=list)
     values: list[float] = field(default_factory=list)  # of the parameter there
 
@@ -76,7 +78,7 @@ class Arm:
                 if kink is not None and (kink[0] is None or self._taken(kink[0])):
                     return self._cross(*kink)
                 if self.step < _SMALLEST and self.status is BranchStatus.RUNNING:
-                    self.status = BranchStatus.LOST
+                    self.status = BranchStatus.JUMP if self.at_jump else BranchStatus.LOST
                 if kink is not None or self.status is not BranchStatus.RUNNING:
                     return None
         if self._taken(following) and self.status is BranchStatus.RUNNING:
@@ -105,21 +107,33 @@ class Arm:
     def _kink_ahead(self, reach: float) -> tuple[Point | None, Point, list[Orbit]] | None:
         """Last point before a kink within reach, None if the arm is there; the first one behind it; orbits to keep."""
         a, reach = self.point, max(1.5 * reach, _NEAR if self.step < _SMALLEST else 0.0)
+        self.at_jump = False
         for kink in kinks_near(a.orbit)[:_MOST_KINKS]:
             try:
                 touch = met(a, kink, _AROUND * reach)
-                off = unknowns_at(a, touch) - a.unknowns
-                way, whole = float(a.tangent @ a.metric @ off), math.sqrt(off @ a.metric @ off)
-                if not -_THERE < way < reach or whole > 2.0 * abs(way) + _THERE:
-                    continue
-                last = before(a, kink, touch)
-                if a.tangent @ a.metric @ last.tangent > 0.0:
-                    last = last if way > _SMALLEST else a
+                last = self._last_before(kink, touch, reach)
+                if last is not None:
+                    self.at_jump = self.at_jump or kink.kind == "merging"
                     point = behind(last, kink, touch)
                     return (None if last is a else last), point, marked(last, point, kink, touch)
             except ERRORS:
                 continue
         return None
+
+    def _last_before(self, kink: Kink, touch: Touch, reach: float) -> Point | None:
+        """The last point before a kink if it lies on the way within reach; raises one of ERRORS."""
+        a = self.point
+        off = unknowns_at(a, touch) - a.unknowns
+        way, whole = float(a.tangent @ a.metric @ off), math.sqrt(off @ a.metric @ off)
+        if not -_THERE < way < reach or whole > 2.0 * abs(way) + _THERE:
+            return None
+        try:
+            last = before(a, kink, touch)
+        except ERRORS:
+            return a if 0.0 < way <= _LAST else None  # a itself is near enough
+        if not a.tangent @ a.metric @ last.tangent > 0.0:
+            return None
+        return last if way > _SMALLEST else a
 
     def _cross(self, last: Point | None, point: Point, found: list[Orbit]) -> None:
         """Go on behind a kink."""
@@ -243,9 +257,12 @@ class Arm:
 
 
 def _jumped(a: Point, b: Point, marks: list[str]) -> bool:
-    """Whether b lies on another branch: between them the parameter turns without a fold, or contacts come unseen."""
+    """Whether b lies on another branch: the parameter turns, a multiplier passes one, or contacts come, all unseen."""
     turned = a.share * b.share < 0.0 and not {"fold", "floor"} & {*marks}
-    return "grazing" not in marks and (turned or not _same_contacts(a.orbit, b.orbit))
+    first, second = (indicators_at(point)["branch point"] for point in (a, b))
+    passed = first * second < 0.0 and min(abs(first), abs(second)) > ROUNDING
+    passed = passed and not {"fold", "floor", "branch point"} & {*marks}
+    return "grazing" not in marks and (turned or passed or not _same_contacts(a.orbit, b.orbit))
 
 
 def _same_contacts(a: Orbit, b: Orbit) -> bool:

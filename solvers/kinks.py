@@ -11,7 +11,7 @@ the other side.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -22,25 +22,40 @@ from solvers.integration import integrate
 from solvers.merging import led
 from solvers.periodic import Orbit
 from solvers.point import Point
-from solvers.quiet import with_memory
+from solvers.quiet import quiet_intervals, with_memory
 from solvers.result import ContactLog, SolverError
 from solvers.touch import Touch, beside, first_touch, orbit_at, signature
 
 _SLOW = 4.0  # entry rate, in units of the floor, below which a contact may be about to pass it
 _SHALLOW = 0.1  # indentation, or distance, in units of the deepest peak that may be about to vanish
+_AS_NEAR = 1e-3  # relative difference of the distances of kinks that may come at once, and its square of the scale
 _SAMPLES = 600  # of a period
 ERRORS = SolverError, np.linalg.LinAlgError, ValueError, ArithmeticError, IndexError
 
 
 @dataclass(frozen=True)
 class Kink:
-    """What may happen to an orbit near: what kind, at which stop and times, and which way the indicator goes."""
+    """What may happen to an orbit near: what kind, when and at which stop, and which way the indicator goes."""
 
     kind: str
-    stop: int
-    times: tuple[float, ...]  # from the orbit's phase: of the meeting, and in a quiet time if one is wanted
+    begins: tuple[tuple[float, int | None], ...]  # (time from the orbit's phase, stop) of meetings; None: a quiet time
     sign: int  # of the indicator behind it: indentation at the meeting, or its rate less the floor
     change: tuple[int, int]  # of the signature
+
+    @property
+    def sort(self) -> tuple[str, int, tuple[int, int]]:
+        """What is the same of kinks that come at once."""
+        return self.kind, self.sign, self.change
+
+    @property
+    def first(self) -> tuple[float, int]:
+        """(time, stop) of the first meeting."""
+        return next((time, stop) for time, stop in self.begins if stop is not None)
+
+
+def _kink(kind: str, stop: int, times: Sequence[float], sign: int, change: tuple[int, int]) -> Kink:
+    """The kink of one meeting, at the first of some times; the others are quiet."""
+    return Kink(kind, ((times[0], stop), *((time, None) for time in times[1:])), sign, change)
 
 
 def kinks_near(orbit: Orbit) -> list[Kink]:
@@ -49,7 +64,23 @@ def kinks_near(orbit: Orbit) -> list[Kink]:
     for stop in range(len(orbit.system.contacts)):
         found += _slow_contacts(orbit, stop)
         found += _touches(orbit, stop)
-    return [kink for _, kink in sorted(found, key=lambda pair: pair[0])]
+    found.sort(key=lambda pair: pair[0])
+    return list(_with_joint(found))
+
+
+def _with_joint(found: Sequence[tuple[float, Kink]]) -> Iterator[Kink]:
+    """The kinks; before several of one sort that are as near, as of an orbit that repeats itself, all at once."""
+    rest = list(found)
+    while rest:
+        nearest, first = rest[0]
+        like = [near <= nearest + _AS_NEAR * (nearest + _AS_NEAR) and kink.sort == first.sort for near, kink in rest]
+        mine = [kink for (_, kink), alike in zip(rest, like, strict=True) if alike]
+        if len(mine) > 1:
+            begins = tuple(sorted({begin for kink in mine for begin in kink.begins}, key=lambda begin: begin[0]))
+            change = len(mine) * first.change[0], len(mine) * first.change[1]
+            yield replace(first, begins=begins, change=change)
+        yield from mine
+        rest = [pair for pair, alike in zip(rest, like, strict=True) if not alike]
 
 
 def _slow_contacts(orbit: Orbit, stop: int) -> Iterator[tuple[float, Kink]]:
@@ -60,13 +91,13 @@ def _slow_contacts(orbit: Orbit, stop: int) -> Iterator[tuple[float, Kink]]:
         begin, end, speed = float(log.t_in[j]), float(log.t_out[j]), float(log.speed_in[j])
         if memory and speed < _SLOW * floor:
             sign = 1 if speed < floor else -1
-            yield abs(speed / floor - 1.0), Kink("floor", stop, (begin,), sign, (0, -sign))
+            yield abs(speed / floor - 1.0), _kink("floor", stop, (begin,), sign, (0, -sign))
         if memory and speed < floor and i and begin - log.t_out[mine[i - 1]] < end - begin:
-            times = float(log.t_out[mine[i - 1]]), *_after(log, mine, i, orbit.period)
-            yield speed / floor, Kink("merging", stop, times, 1, (-1, -1))
+            times = float(log.t_out[mine[i - 1]]), *_after(orbit, mine, i)
+            yield speed / floor, _kink("merging", stop, times, 1, (-1, -1))
         elif speed < floor if memory else log.peak_indentation[j] < _SHALLOW * log.peak_indentation.max():
             share = speed / floor if memory else log.peak_indentation[j] / log.peak_indentation.max()
-            yield share, Kink("grazing", stop, (0.5 * (begin + end),), -1, (-1, -int(memory)))
+            yield share, _kink("grazing", stop, (0.5 * (begin + end),), -1, (-1, -int(memory)))
 
 
 def _touches(orbit: Orbit, stop: int) -> Iterator[tuple[float, Kink]]:
@@ -80,13 +111,16 @@ def _touches(orbit: Orbit, stop: int) -> Iterator[tuple[float, Kink]]:
     scale = _SHALLOW * max(float(log.peak_indentation.max(initial=0.0)), 1e-3 * float(np.abs(delta).max()))
     inner = np.arange(1, _SAMPLES)
     rising, falling = delta[inner] - delta[inner - 1], delta[inner + 1] - delta[inner]
+    apart = np.where(rising != falling, rising - falling, 1.0)
+    at = times.copy()
+    at[inner] += 0.5 * times[1] * (rising + falling) / apart  # summit of the parabola through three, where one is
     for k in inner[(rising > 0.0) & (falling <= 0.0) & (delta[inner] < 0.0) & (delta[inner] > -scale)]:
-        yield -delta[k] / scale, Kink("grazing", stop, (float(times[k]),), 1, (1, int(memory)))
+        yield -delta[k] / scale, _kink("grazing", stop, (float(at[k]),), 1, (1, int(memory)))
     for k in inner[(rising < 0.0) & (falling >= 0.0) & (delta[inner] > 0.0) & (delta[inner] < scale) & memory]:
         i = int(np.searchsorted(log.t_in[mine], times[k])) - 1
         yield (
             delta[k] / scale,
-            Kink("merging", stop, (float(times[k]), *_after(log, mine, i, orbit.period)), -1, (1, 1)),
+            _kink("merging", stop, (float(at[k]), *_after(orbit, mine, i)), -1, (1, 1)),
         )
 
 
@@ -96,21 +130,26 @@ def _in_order(log: ContactLog, stop: int) -> Any:
     return mine[np.argsort(log.t_in[mine])]
 
 
-def _after(log: ContactLog, mine: Any, i: int, period: float) -> list[float]:
-    """The middle of the flight after a stop's i-th contact if slower ones follow, which another floor would reach."""
-    begins = np.append(log.t_in[mine], period)
-    slower = np.any(log.speed_in[mine[i + 1 :]] < log.speed_in[mine[max(i - 1, 0)]])
-    return [float(0.5 * (log.t_out[mine[i]] + begins[i + 1]))] if slower else []
+def _after(orbit: Orbit, mine: Any, i: int) -> list[float]:
+    """A quiet time after a stop's i-th contact, if slower ones follow, which another floor would reach."""
+    log, rest = orbit.contacts, mine[i + 1 :]
+    slower = rest[log.speed_in[rest] < log.speed_in[mine[max(i - 1, 0)]]]
+    if not len(slower):
+        return []
+    low, high = log.t_out[mine[i]], log.t_in[slower[0]]
+    open_times = [(max(a, low), min(b, high)) for a, b in quiet_intervals(orbit.system, log, orbit.period)]
+    a, b = max(open_times, key=lambda times: times[1] - times[0], default=(low, low))
+    return [float(0.5 * (a + b))] if a < b else []
 
 
 def met(point: Point, kink: Kink, within: float) -> Touch:
     """The kink within an arclength of a point, exactly; raises one of ERRORS."""
-    orbit = point.orbit
-    log, floor = orbit.contacts, orbit.system.contacts[kink.stop].law.entry_rate_floor
+    orbit, (time, stop) = point.orbit, kink.first
+    log, floor = orbit.contacts, orbit.system.contacts[stop].law.entry_rate_floor
     if kink.kind != "merging" or kink.sign > 0:
-        return first_touch(point, kink.stop, kink.times, floor if kink.kind == "floor" else 0.0, floor, within)
-    entered = (log.stop == kink.stop) & (log.t_in < kink.times[0]) & (log.t_out > kink.times[0])
-    touch = first_touch(point, kink.stop, kink.times, 0.0, float(log.speed_in[entered][0]), within)
+        return first_touch(point, kink.begins, floor if kink.kind == "floor" else 0.0, floor, within)
+    entered = (log.stop == stop) & (log.t_in < time) & (log.t_out > time)
+    touch = first_touch(point, kink.begins, 0.0, float(log.speed_in[entered][0]), within)
     return led(point, touch, None)
 
 
@@ -124,7 +163,7 @@ def behind(point: Point, kink: Kink, touch: Touch) -> Point:
     """The first point of the branch on the other side, its tangent on the way; raises one of ERRORS."""
     contacts, floored = signature(point.orbit)
     if kink.kind == "merging":  # other contacts too change by the jump, and may pass the floor
-        floor = point.orbit.system.contacts[kink.stop].law.entry_rate_floor
+        floor = point.orbit.system.contacts[kink.first[1]].law.entry_rate_floor
         far = led(point, touch, None if kink.sign > 0 else floor)
         return beside(point, far, kink.sign, (contacts + kink.change[0], None))
     return beside(point, touch, kink.sign, (contacts + kink.change[0], floored + kink.change[1]))

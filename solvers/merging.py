@@ -35,7 +35,7 @@ def led(point: Point, touch: Touch, floor: float | None) -> Touch:
         following = last.floor * min(max(ratio, 1.0 / factor), factor)
         try:
             guess = _ahead(known[-3:], following)
-            known.append(solved(point, last.stop, last.fractions, guess, 0.0, following))
+            known.append(solved(point, last.stops, last.fractions, guess, 0.0, following))
             factor = min(factor**1.5, _FACTORS[2])
         except (SolverError, np.linalg.LinAlgError, ValueError, ArithmeticError):
             factor = math.sqrt(factor)

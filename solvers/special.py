@@ -30,7 +30,7 @@ from solvers.point import Point, corrected, cubic, is_straight, tangent_of
 from solvers.quiet import with_memory
 from solvers.system import Array
 
-_ROUNDING = 1e-9  # of the test functions: what is at a special point all along is marked nowhere
+ROUNDING = 1e-9  # of the test functions: what is at a special point all along is marked nowhere
 _SHARP = 1e-10  # of the parameter, or of the way between the points: how sharply a point is located
 _AT = 1e-4  # distance from the unit circle of the multiplier at what passes for a special point
 _MOST_TRIALS = 25
@@ -157,7 +157,7 @@ def _roots(stretch: Stretch, begin: float, end: float) -> Iterator[tuple[float, 
     """(arclength, orbit) of all zeros of test functions that the signs at both ends tell of."""
     before, after = stretch.indicators(begin), stretch.indicators(end)
     names = [name for name in before if before[name] * after[name] < 0.0]
-    names = [name for name in names if min(abs(before[name]), abs(after[name])) > _ROUNDING]
+    names = [name for name in names if min(abs(before[name]), abs(after[name])) > ROUNDING]
     if "fold" in names and "branch point" in names:
         names.remove("branch point")
     for name in names:

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from oscillators import Tone, random_family
+from oscillators import Tone, random_family, random_stops_family
 
 from contacts import Hysteretic, PiecewiseLinear
 from solvers import Contact, DormandPrince, OrbitError, System, branch, integrate, orbit
@@ -172,3 +172,26 @@ def test_the_floor_is_marked_where_it_is_met():
     before, after = found.orbits[corner - 1], found.orbits[corner + 1]
     assert abs(before.multipliers[0]) > 1.1
     assert abs(after.multipliers[0]) < 0.01
+
+
+def test_a_merging_is_met_over_the_gap():
+    """The surface moves with the parameter; this branch was lost where its jump leads out of the span."""
+    make, span, _ = random_stops_family(np.random.default_rng(125), "gap", 3)
+    found = branch(make, span, orbit(*make(span[0])), at=span[0], step=0.3).run()
+    assert found.status == (BranchStatus.END,)
+    assert [one.mark for one in found.special] == ["merging"]
+
+
+def test_two_mergings_at_once_are_crossed(merged):
+    """Over twice the period every contact of an orbit comes twice, and both merge at the same parameter."""
+    found = branch(family(LATCHED, 4), (TWO[0], 330.5), TWO[1], at=TWO[0], shots=2).run()
+    once, twice = marks(merged, "merging")[2:], marks(found, "merging")
+    assert found.status == (BranchStatus.END,)
+    assert [2 * len(one.contacts) for one in once] == [len(one.contacts) for one in twice]
+    assert [one.parameter for one in twice] == pytest.approx([one.parameter for one in once], rel=1e-7)
+
+
+def test_a_jump_without_a_way_over_is_said():
+    make, span, _ = random_stops_family(np.random.default_rng(124), "gap", 2)
+    found = branch(make, span, orbit(*make(span[0])), at=span[0], step=0.3).run()
+    assert found.status == (BranchStatus.JUMP,)
