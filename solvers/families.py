@@ -20,7 +20,7 @@ from solvers.kernels import kernel
 
 S = 8  # nodes of a contact step: 6 is a little faster at 1e-6, 10 and 12 bring nothing
 _CHECKED = (np.arange(24) + 0.5) / 24  # places between the nodes where their interpolant is compared
-_NODES_FIRST = [*range(S), *range(S + 2, 2 * S + 2), S, 2 * S + 2, S + 1, 2 * S + 3]
+_NODES_FIRST = [*range(S), *range(S + 1, 2 * S + 1), S, 2 * S + 1]
 PHASES = np.geomspace(1e-2, 1e4, 600)  # ω h
 LOCAL = -np.cos(np.pi * np.arange(S) / (S - 1))  # points of an interval, its ends among them, where a summit is sought
 MONOMIALS = np.ascontiguousarray(np.linalg.inv(np.vander(LOCAL, increasing=True)).T)
@@ -140,12 +140,12 @@ def _brackets(family: _Family) -> Any:
 
 
 def _zoom(family: _Family, begin: float, end: float) -> Any:
-    """(2S + 4, 2S): δ and h δ̇ at the points `LOCAL` of [begin, end] from those at nodes, end and begin of the step.
+    """(2S + 2, 2S): δ and h δ̇ at the points `LOCAL` of [begin, end] from those at the nodes and at the step's begin.
 
     δ is Hermite's polynomial in σ, its rate the slope over dt/dσ. Where that vanishes, beside the begin of an entry
     step, the rate is δ̇(0) + σ^κ × the polynomial through (δ̇ - δ̇(0))/σ^κ at the nodes.
     """
-    x, y = np.array([*family.nodes, 1.0, 0.0]), begin + 0.5 * (LOCAL + 1.0) * (end - begin)
+    x, y = np.append(family.nodes, 0.0), begin + 0.5 * (LOCAL + 1.0) * (end - begin)
     basis, turn = _interpolation(x, y), _differentiation(x)
     slopes, own = basis @ turn, np.diag(turn)
     apart = y[:, None] - x
@@ -153,7 +153,7 @@ def _zoom(family: _Family, begin: float, end: float) -> Any:
     pace_x, pace_y = (family.power * place ** (family.power - 1.0) for place in (x, y))  # dt/(h dσ)
     if begin == 0.0 and family.power > 1.0:
         shares = _interpolation(family.nodes, y) * np.divide.outer(y, family.nodes) ** family.power
-        rates = [np.zeros_like(basis), np.column_stack((shares, np.zeros(S), 1.0 - shares.sum(axis=1)))]
+        rates = [np.zeros_like(basis), np.column_stack((shares, 1.0 - shares.sum(axis=1)))]
     else:
         rates = [
             (-2.0 * own * basis**2 + 2.0 * (1.0 - 2.0 * own * apart) * basis * slopes) / pace_y[:, None],

@@ -1,7 +1,7 @@
 """Largest indentation and force of a contact: maxima of what each step knows of them, not of its nodes.
 
 Around the highest node of a step, between its neighbours, δ and δ̇ at eight points follow from δ and δ̇ at all nodes and
-at both ends of the step by Hermite's polynomial of degree 19, and the forces there from the law. The maximum of the
+at the begin of the step by Hermite's polynomial of degree 17, and the forces there from the law. The maximum of the
 polynomial through these points differs from that of the motion by less than the motion does from the exact one.
 """
 
@@ -79,16 +79,14 @@ def _highest(tables, values, family, limit):
 
 @inner
 def _motion_around(problem, tables, state, space, family, h, s, place):
-    """Indentations and rates of stop s around a node of the step from state.x to space.x_new, into ``space.around``."""
-    around, motion, known, size = space.around, space.motion[s], space.around[3], 2 * problem.k.size
+    """Indentations and rates of stop s around a node of the step that begins at the state, into ``space.around``."""
+    around, motion, known = space.around, space.motion[s], space.around[3]
     copy(motion[0], known, S)
     for i in range(S):
         known[S + i] = h * motion[1, i]
-    known[2 * S] = indentation(problem, s, space.x_new)
-    known[2 * S + 1] = h * dot(problem.read_rate[s], space.x_new, size)
-    known[2 * S + 2] = indentation(problem, s, state.x)
-    known[2 * S + 3] = h * dot(problem.read_rate[s], state.x, size)
-    combine(tables.zoom[family, place], known, 2 * S + 4, None, around[0])
+    known[2 * S] = indentation(problem, s, state.x)
+    known[2 * S + 1] = h * dot(problem.read_rate[s], state.x, 2 * problem.k.size)
+    combine(tables.zoom[family, place], known, 2 * S + 2, None, around[0])
     for i in range(S):
         around[1, i] = around[0, S + i] / h
 

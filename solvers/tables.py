@@ -61,7 +61,7 @@ class Tables(NamedTuple):
     plain: Any  # (f, S): the same of a force without the weight σ^λ
     summary: Any  # (f, S, 8): from node values, the last four Jacobi coefficients, both ends' values, both slopes
     tail: Any  # (f, S, 8): from node values of a signal, the last four Legendre coefficients in σ
-    zoom: Any  # (f, S, 2S + 4, 2S): δ and h δ̇ at points around a node from those at all nodes and both ends
+    zoom: Any  # (f, S, 2S + 2, 2S): δ and h δ̇ at points around a node from those at all nodes and at the begin
     places: Any  # (f, S, 2): the interval of σ these points span
     free: Any  # (f, j, m, 2N, 2S): δ and δ̇ at the nodes from the state
     forced: Any  # (f, j, m, m + L, S, 2S): the same from the forces and signals at the nodes
