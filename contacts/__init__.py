@@ -6,13 +6,11 @@ at yield and return, differentiated and saved along with the structure's, which 
 for elements that act all the time and need none of what makes contacts hard.
 """
 
-from contacts.collisions import read_collisions
 from contacts.curves import PiecewiseLinear, Tabulated
 from contacts.custom import CustomLaw, law
-from contacts.identified import Estimate, Identified
-from contacts.identify import identify
+from contacts.identification import Estimate, Identified, identify, read_collisions
 from contacts.law import Law, Sum, parallel
-from contacts.laws import PUBLISHED, Hertz, Hysteretic
+from contacts.power_laws import PUBLISHED, Hertz, Hysteretic
 from contacts.restitution import Bounce, achieved_restitution, bounce, damping_factor_for, restitution
 from contacts.viscous import KelvinVoigt, Viscoelastic
 

@@ -176,7 +176,7 @@ class Tabulated(Law):
     @classmethod
     def from_csv(cls, path: str | Path) -> Tabulated:
         """A table from a text file with columns ``delta`` (m) and ``force`` (N), named in its first line."""
-        from contacts.collisions import read_columns
+        from contacts.columns import read_columns
 
         columns = read_columns(path, ("delta", "force"))
         return cls(tuple(columns["delta"]), tuple(columns["force"]))

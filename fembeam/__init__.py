@@ -25,20 +25,10 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 _ROOMS = {
-    "section": "Section Taper",
-    "beam": "Beam",
-    "scene": "Clamped Dashpot Guided LumpedMass Pinned PointForce PointMoment Scene Spring Stop",
-    "impactor": "Impactor",
-    "damping": "ModalDamping Rayleigh",
-    "excitation": "Harmonic Multisine",
-    "noise": "BandNoise",
-    "density": "RollOff",
-    "record": "Record",
-    "transient": "Pulse Step",
-    "model": "Model",
-    "orbit": "Attractor Orbit",
-    "branch": "Branch",
-    "run": "Run load",
+    "beams": "Section Taper Beam ModalDamping Rayleigh",
+    "scene": "Clamped Dashpot Guided LumpedMass Pinned PointForce PointMoment Scene Spring Stop Impactor",
+    "excitation": "Harmonic Multisine BandNoise RollOff Record Pulse Step",
+    "model": "Model Attractor Orbit Branch Run load",
     "statistics": "moments pdf psd",
 }
 _HOME = {name: room for room, names in _ROOMS.items() for name in names.split()}
@@ -46,8 +36,8 @@ _MODULES = ["plot", "study"]
 
 __all__ = [
     "Attractor",
-    "Beam",
     "BandNoise",
+    "Beam",
     "Branch",
     "Clamped",
     "Dashpot",
@@ -83,21 +73,23 @@ __all__ = [
 
 if TYPE_CHECKING:
     from fembeam import plot, study
-    from fembeam.beam import Beam
-    from fembeam.branch import Branch
-    from fembeam.damping import ModalDamping, Rayleigh
-    from fembeam.density import RollOff
-    from fembeam.excitation import Harmonic, Multisine
-    from fembeam.impactor import Impactor
-    from fembeam.model import Model
-    from fembeam.noise import BandNoise
-    from fembeam.orbit import Attractor, Orbit
-    from fembeam.record import Record
-    from fembeam.run import Run, load
-    from fembeam.scene import Clamped, Dashpot, Guided, LumpedMass, Pinned, PointForce, PointMoment, Scene, Spring, Stop
-    from fembeam.section import Section, Taper
+    from fembeam.beams import Beam, ModalDamping, Rayleigh, Section, Taper
+    from fembeam.excitation import BandNoise, Harmonic, Multisine, Pulse, Record, RollOff, Step
+    from fembeam.model import Attractor, Branch, Model, Orbit, Run, load
+    from fembeam.scene import (
+        Clamped,
+        Dashpot,
+        Guided,
+        Impactor,
+        LumpedMass,
+        Pinned,
+        PointForce,
+        PointMoment,
+        Scene,
+        Spring,
+        Stop,
+    )
     from fembeam.statistics import moments, pdf, psd
-    from fembeam.transient import Pulse, Step
 
 
 def _check_neighbours() -> None:

@@ -8,28 +8,28 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
-from solvers.result import ContactLog, Cost, Energy, Solution, SolverError, Status
-from solvers.system import Contact, Parameter, System
+from solvers.problem import Contact, ContactLog, Cost, Energy, Parameter, Solution, SolverError, Status, System
 
 _LATER = {
     "integrate": "integration",
-    "HenonRK2": "henon",
-    "DormandPrince": "dormand_prince",
-    "Exponential": "exponential",
-    "RK4": "runge_kutta",
-    "CentralDifference": "newmark",
-    "Newmark": "newmark",
-    "GeneralizedAlpha": "newmark",
-    "lumped": "newmark",
-    "lyapunov": "growth",
-    "orbit": "shooting",
-    "Orbit": "periodic",
-    "OrbitError": "periodic",
-    "branch": "continuation",
-    "Branch": "continuation",
+    "HenonRK2": "stepping.henon",
+    "DormandPrince": "stepping.dormand_prince",
+    "Exponential": "exponential.method",
+    "RK4": "stepping.runge_kutta",
+    "CentralDifference": "stepping.newmark",
+    "Newmark": "stepping.newmark",
+    "GeneralizedAlpha": "stepping.newmark",
+    "lumped": "stepping.newmark",
+    "lyapunov": "orbits.exponents",
+    "orbit": "orbits.shooting",
+    "Orbit": "orbits.periodic_orbit",
+    "OrbitError": "orbits.periodic_orbit",
+    "branch": "branches.continuation",
+    "Branch": "branches.continuation",
 }
 
 __all__ = [
+    "RK4",
     "Branch",
     "CentralDifference",
     "Contact",
@@ -44,7 +44,6 @@ __all__ = [
     "Orbit",
     "OrbitError",
     "Parameter",
-    "RK4",
     "Solution",
     "SolverError",
     "Status",

@@ -16,14 +16,38 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from solvers.balance import unbalanced
-from solvers.forcing import Forcing, hand_over
-from solvers.result import COLUMNS, ContactLog, Cost, Energy, Solution, SolverError, Status
-from solvers.state import CALLS, EVENTS, LOG_FULL, LOGGED, REJECTED, RUNNING, SAMPLED, STATUSES, STEPS, T, contact_row
-from solvers.system import Array, Parameter, System, product
+from solvers.compiled.state import (
+    CALLS,
+    EVENTS,
+    LOG_FULL,
+    LOGGED,
+    REJECTED,
+    RUNNING,
+    SAMPLED,
+    STATUSES,
+    STEPS,
+    T,
+    contact_row,
+)
+from solvers.exponential.energy_guard import unbalanced
+from solvers.problem import (
+    COLUMNS,
+    Array,
+    ContactLog,
+    Cost,
+    Energy,
+    Forcing,
+    Parameter,
+    Solution,
+    SolverError,
+    Status,
+    System,
+    hand_over,
+    product,
+)
+from solvers.problem.run_arguments import _check_laws, _check_tangent, _start, _times
 
 _BUDGET = 20_000  # steps between two looks at the world outside
-_MOST_SAMPLES = 500_000_000
 _DEPTH, _FORCE = (list(ContactLog.__dataclass_fields__).index(name) for name in ("peak_indentation", "peak_force"))
 _NEVER, _NOWHERE = np.array([math.inf]), np.empty((0, 0))  # no output is due
 
@@ -72,7 +96,7 @@ def integrate(
     True
     """
     if method is None:
-        from solvers.exponential import Exponential
+        from solvers.exponential.method import Exponential
 
         method = Exponential()
     run = prepared_run(system, q0, q_dot0, duration, dt, method, tangent)
@@ -106,95 +130,6 @@ def prepared_run(
     return _Run(system, method.engine(system, z, forcing, duration), times, tangent)
 
 
-def _check_tangent(tangent: Any, method: Any, system: System) -> None:
-    """A tangent is asked for in one of its forms, of a method that has one, for laws that have one."""
-    if tangent is False:
-        return
-    if not isinstance(tangent, bool | Parameter):
-        raise TypeError(f"tangent must be True, False or a solvers.Parameter, got {tangent!r}")
-    if tangent and not getattr(method, "has_tangent", False):
-        raise ValueError(f"tangent is not offered by {type(method).__name__}; use Exponential")
-    if tangent:
-        check_slopes(system)
-
-
-def check_slopes(system: System) -> None:
-    """No law has an infinite slope at its surface, F ~ δ^r with r < 1 but for a declared jump."""
-    if system.about_laws.get("finite slopes"):
-        return
-    delta = np.array([1e-12, 1e-10])
-    for i, contact in enumerate(system.contacts):
-        viscous = contact.law.force(delta, 1.0, 1.0) - contact.law.force(delta, 0.0, 1.0)
-        if not contact.law.jump and 0.0 < abs(viscous[1]) < 95.0 * abs(viscous[0]):
-            trouble = f"its slope is infinite at the surface: {contact.law!r}"
-            raise ValueError(f"tangent is not offered for the law of contact {i}: {trouble}")
-    system.about_laws["finite slopes"] = True
-
-
-def _end(system: System, q0: ArrayLike, q_dot0: ArrayLike, duration: float, method: Any) -> Array:
-    """Final [q, q̇] of a plain run."""
-    solution = integrate(system, q0, q_dot0, duration, method=method)
-    return np.concatenate((solution.q[-1], solution.q_dot[-1]))
-
-
-def _start(system: System, q0: ArrayLike, q_dot0: ArrayLike, method: Any) -> Array:
-    """Checked start in the coordinates a method steps in: decoupled blocks, or the system's own."""
-    n = system.size
-    start = np.empty(2 * n)
-    for name, vector, place in (("q0", q0, start[:n]), ("q_dot0", q_dot0, start[n:])):
-        if np.shape(vector) != (n,) and (np.ndim(vector) or n != 1):
-            raise ValueError(f"{name} must have shape ({n},), got {np.shape(vector)}")
-        place[:] = vector
-    if not math.isfinite(start.dot(start)):  # or large: squares overflow
-        finite = np.isfinite(start)
-        if not finite.all():
-            which, bad = divmod(int(np.argmin(finite)), n)
-            name = ("q0", "q_dot0")[which]
-            raise ValueError(f"{name} must be finite, got {start[which * n + bad]} at coordinate {bad}")
-    if hasattr(method, "takes_matrices") and method.takes_matrices(system):
-        return start
-    return system.blocks.inverse.dot(start)
-
-
-def _times(duration: float, dt: Any) -> Array | None:
-    """Output times of a sampling, or those given; None for none."""
-    if not 0.0 < duration < math.inf:
-        raise ValueError(f"duration must be positive and finite (s), got {duration!r}")
-    if dt is None:
-        return None
-    if np.ndim(dt) > 0:
-        return _given_times(duration, dt)
-    if not 0.0 < dt < math.inf:
-        raise ValueError(f"dt must be positive and finite (s), got {dt!r}")
-    count = math.floor(duration / dt * (1.0 + 1e-12)) + 1
-    if count > _MOST_SAMPLES:
-        raise ValueError(f"dt = {dt:g} s over {duration:g} s asks for {count} samples; choose a larger dt")
-    return np.arange(count) * dt
-
-
-def _given_times(duration: float, given: ArrayLike) -> Array:
-    """Checked output times."""
-    times = np.array(given, dtype=float)
-    if times.ndim != 1 or not np.isfinite(times).all() or np.any(np.diff(times) <= 0.0):
-        raise ValueError(f"dt as output times must be one increasing row of finite numbers (s), got {given!r}")
-    if times.size and not (times[0] >= 0.0 and times[-1] <= duration * (1.0 + 1e-12)):
-        raise ValueError(f"output times must lie in [0, {duration:g}] s, got {times[0]:g} to {times[-1]:g} s")
-    return times
-
-
-def _check_laws(system: System) -> None:
-    """Every law is finite at rest, so that a NaN is met before the run; looked at once per system."""
-    if system.about_laws.get("finite"):
-        return
-    delta = np.array([1e-12, 1e-6, 1e-3])
-    for i, contact in enumerate(system.contacts):
-        force = contact.law.force(delta, 0.0, 1.0)
-        if not np.all(np.isfinite(force)):
-            where = delta[~np.isfinite(force)][0]
-            raise ValueError(f"the law of contact {i} is not finite at delta = {where:g} m: {contact.law!r}")
-    system.about_laws["finite"] = True
-
-
 def _forcing(system: System, duration: float, rtol: float) -> Forcing:
     """Arrays of all signals; those of tones are kept, as long as no signal can have changed."""
     kept: Forcing | None = system.kept.get("forcing")
@@ -218,7 +153,7 @@ class _Run:
             self.out = np.empty((len(times), self.state.x.size))
         self.tangent: Any = None
         if tangent:
-            from solvers.tangent import Tangent
+            from solvers.exponential.tangent import Tangent
 
             self.tangent = Tangent(system, engine, tangent if isinstance(tangent, Parameter) else None)
             self.state = engine.state  # with a tape
@@ -320,3 +255,9 @@ def _energy(system: System, powers: Array, complete: bool, motion: Array, back: 
     if not complete:
         powers = np.hstack((np.full((len(powers), 2), math.nan), powers[:, 2:]))
     return Energy.of_run(system.M, system.K, powers, motion, back @ begin)
+
+
+def _end(system: System, q0: ArrayLike, q_dot0: ArrayLike, duration: float, method: Any) -> Array:
+    """Final [q, q̇] of a plain run."""
+    solution = integrate(system, q0, q_dot0, duration, method=method)
+    return np.concatenate((solution.q[-1], solution.q_dot[-1]))

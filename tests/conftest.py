@@ -5,7 +5,10 @@ import subprocess
 import sys
 from pathlib import Path
 
-KERNELS = ["solvers.exponential", "contacts.kernels, solvers.replay, solvers.march"]  # take equally long to compile
+KERNELS = [
+    "solvers.exponential.method",
+    "contacts.kernels, solvers.exponential.linearised, solvers.stepping.loop",
+]  # take equally long to compile
 
 
 def pytest_xdist_auto_num_workers(config):

@@ -8,9 +8,8 @@ import pytest
 from scipy.optimize import brentq
 
 import reduction
-from fembeam.beam import Beam, bending_matrices, bending_root, hermite_rows
+from fembeam.beams import Beam, Section, bending_matrices, bending_root, hermite_rows
 from fembeam.scene import Clamped, Guided, LumpedMass, Pinned, Scene
-from fembeam.section import Section
 
 UNIT = Section(E=1.0, rho=1.0, A=1.0, I=1.0)
 CLAMPED_FREE = [1.8751040687, 4.6940911330, 7.8547574382]

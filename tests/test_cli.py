@@ -17,12 +17,11 @@ import pytest
 
 import fembeam as fb
 import reduction
-from fembeam import html, kinds
 from fembeam.cli import main
-from fembeam.doubts import doubts
-from fembeam.scene_file import built, read
-from fembeam.source import Source
-from fembeam.template import TEMPLATE
+from fembeam.cli.unit_checks import doubts
+from fembeam.results import html_page as html
+from fembeam.scene import Source
+from fembeam.scene_file import TEMPLATE, built, kinds, read
 
 EXAMPLE = Path(__file__).parent.parent / "examples" / "beam_stop.toml"
 FIGURES = ["time_history.png", "psd.png", "densities.png", "contacts.png", "modes.png"]
@@ -176,19 +175,18 @@ def test_modes_that_cannot_be_computed_are_bad_input(capsys, monkeypatch):
 
 
 RUN_THAT_TELLS = """
-import sys, fembeam.run
+import sys, fembeam.support as support
 from contextlib import contextmanager
 from fembeam.cli import main
-from fembeam.doubts import doubts
 
-plain = fembeam.run.bar
+plain = support.bar
 
 @contextmanager
 def bar(duration, wanted):
     with plain(duration, wanted) as report:
         yield lambda t: (print("at", t, file=sys.stderr, flush=True), report(t))
 
-fembeam.run.bar = bar
+support.bar = bar
 sys.exit(main(sys.argv[1:]))
 """
 

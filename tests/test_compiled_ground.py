@@ -7,12 +7,12 @@ import pytest
 from numba import njit, types
 
 from contacts import Hertz, KelvinVoigt, Viscoelastic
-from solvers.eight import bits, eight, put, raised, root, spread, total
-from solvers.families import LOCAL, families_of, series_of
-from solvers.flight import level_within
-from solvers.handle import Layout, Mould, Packed, opener
-from solvers.peaks import summit
-from solvers.vector import combine, padded
+from solvers.compiled.handles import Layout, Mould, Packed, opener
+from solvers.compiled.simd import bits, eight, put, raised, root, spread, total
+from solvers.compiled.sums import combine, padded
+from solvers.exponential.contact.nodes import LOCAL, families_of, series_of
+from solvers.exponential.contact.peaks import summit
+from solvers.exponential.flight import level_within
 
 OPTIONS = {"error_model": "numpy", "_nrt": False}
 

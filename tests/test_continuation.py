@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from oscillators import Bilinear, Duffing, Tone
 
-import solvers.arm
+import solvers.branches.walk
 from contacts import law
 from solvers import Contact, Exponential, OrbitError, System, branch, integrate, orbit
-from solvers.continuation import BranchStatus
+from solvers.branches.continuation import BranchStatus
 
 DAMPED = Bilinear(1.1, zeta=0.05)  # doubles its period between 0.83 and 0.93 rad/s
 GAPPED = Bilinear(0.8, zeta=0.05, gap=2.0)
@@ -246,7 +246,7 @@ def test_a_problem_that_ends_within_the_span_is_lost():
 
 
 def test_a_resonance_without_damping_never_ends_the_program(monkeypatch):
-    monkeypatch.setattr(solvers.arm, "MOST_ORBITS", 25)
+    monkeypatch.setattr(solvers.branches.walk, "MOST_ORBITS", 25)
     problem = Bilinear(0.6, zeta=0.0, gap=1e9)
     found = branch(over(problem), (0.6, 1.5), problem.steady(False, 0.0), step=0.2).run()
     assert found.status[0] in (BranchStatus.LIMIT, BranchStatus.LOST)

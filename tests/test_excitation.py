@@ -8,8 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import BPoly
 
-from fembeam.density import RollOff
-from fembeam.excitation import BandNoise, Harmonic, Multisine, Record
+from fembeam.excitation import BandNoise, Harmonic, Multisine, Record, RollOff
 from fembeam.statistics import moments
 
 BROAD = (0.0, 1226.6)

@@ -13,8 +13,8 @@ from regularised import regularised
 import fembeam as fb
 from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, Viscoelastic, law
 from solvers import Contact, DormandPrince, Exponential, Status, System, integrate
-from solvers.forcing import hand_over
-from solvers.preparation import prepared_for
+from solvers.exponential.preparation import prepared_for
+from solvers.problem import hand_over
 
 RK = DormandPrince(rtol=1e-13, atol=1e-16)
 PERIOD = 2 * math.pi / 195.0

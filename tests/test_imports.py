@@ -5,6 +5,7 @@ import importlib.util
 import os
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -37,6 +38,60 @@ def test_arrows(path):
     package = path.relative_to(HOME).parts[0]
     foreign = set(imported(path)) - set(sys.stdlib_module_names) - {package}
     assert foreign <= MAY[package]
+
+
+DOORS = {("fembeam.scene", "fembeam.model"), ("fembeam.model", "fembeam.scene_file")}  # methods that open what is above
+
+
+def room_of(module):
+    """The folder of a module, without the folders within a room."""
+    parts = module.split(".")
+    room = parts[:2] if (HOME / Path(*parts[:2])).is_dir() else parts[:1]
+    return ".".join(room)
+
+
+def modules_read(path):
+    """Full names of our modules that a file imports, wherever in it but for type checking."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    typing = {
+        child
+        for node in ast.walk(tree)
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+        for child in ast.walk(node)
+    }
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import) and node not in typing:
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node not in typing:
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def arrows():
+    """Rooms, and those each reads; the four packages' own `__init__` only hand names on."""
+    found = {}
+    for path in FILES:
+        parts = path.relative_to(HOME).with_suffix("").parts
+        if len(parts) == 2 and parts[1] == "__init__":
+            continue
+        mine = room_of(".".join(parts))
+        read = {room_of(name) for name in modules_read(path) if name.split(".")[0] in OURS}
+        found.setdefault(mine, set()).update(room for room in read - {mine} if (mine, room) not in DOORS)
+    return found
+
+
+def test_rooms_have_no_circle():
+    left = arrows()
+    while free := [room for room, read in left.items() if not read & left.keys()]:
+        for room in free:
+            del left[room]
+    assert not left
+
+
+def test_folders_and_files_stay_small():
+    folders = Counter(path.parent for path in FILES if path.name != "__init__.py")
+    assert max(folders.values()) <= 15
+    long = {str(path.relative_to(HOME)) for path in FILES if path.read_text(encoding="utf-8").count("\n") > 450}
+    assert not long
 
 
 def python(code, cwd=None, **environment):

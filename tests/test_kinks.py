@@ -8,10 +8,10 @@ from oscillators import Tone, random_family, random_stops_family
 
 from contacts import Hysteretic, PiecewiseLinear
 from solvers import Contact, DormandPrince, OrbitError, System, branch, integrate, orbit
-from solvers.continuation import BranchStatus
-from solvers.kinks import kinks_near
-from solvers.special import between
-from solvers.touch import signature
+from solvers.branches.bifurcations import between
+from solvers.branches.continuation import BranchStatus
+from solvers.branches.grazing import signature
+from solvers.branches.nonsmooth import kinks_near
 
 LATCHED = Hysteretic(2.1e8, 0.5625, entry_rate_floor=5e-3)
 TWO = 328.9, [1.58306e-4, -0.0933967169]  # rad/s, an orbit of two contacts over two periods of the drive

@@ -15,8 +15,8 @@ from contacts import PiecewiseLinear
 from fembeam.cli import main
 from fembeam.study import NoReferenceError, Verdict, gallery, speed_accuracy, stability_map
 from fembeam.study.measure import cut
-from fembeam.study.points import Point, SpeedAccuracy
 from fembeam.study.quantities import Amplitude, Psd
+from fembeam.study.speed_accuracy_result import Point, SpeedAccuracy
 from solvers import RK4, CentralDifference, DormandPrince, Exponential, HenonRK2, Newmark
 
 METHODS = [Exponential(1e-4), Exponential(1e-8), DormandPrince(1e-8), RK4(4e-5), RK4(1e-5), HenonRK2(1.0, 1.0)]

@@ -12,7 +12,7 @@ from problems import PAPER_OMEGA, TIP, paper_scene, two_sided_scene
 import fembeam as fb
 import solvers
 from contacts import Hertz, Hysteretic, KelvinVoigt
-from fembeam.run import written_whole
+from fembeam.support import written_whole
 
 PERIOD = 2 * math.pi / 195.0
 
@@ -253,7 +253,7 @@ def interrupted(model, monkeypatch):
     def fake_bar(duration, wanted):
         yield report
 
-    monkeypatch.setattr("fembeam.run.bar", fake_bar)
+    monkeypatch.setattr("fembeam.support.bar", fake_bar)
     return model.simulate(1000.0, 1e-3, solver=solvers.HenonRK2(2e-5, 2e-6))
 
 

@@ -1,6 +1,7 @@
 """Orbits, attractors and branches of a model; the parameters of a scene by name; the table [branch]."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,8 +9,10 @@ from problems import TIP, paper_scene
 
 import fembeam as fb
 import solvers
-from fembeam import cli, parameters, scene_file
-from fembeam.orbit import common_period, extremes_of
+from fembeam.cli import commands as cli
+from fembeam.model import extremes_of
+from fembeam.model.orbit import common_period
+from fembeam.scene import parameters
 
 
 @pytest.fixture(scope="module")
@@ -101,7 +104,7 @@ def test_bad_input(model):
 
 
 def test_the_table_branch(tmp_path, capsys):
-    text = (scene_file.Path(__file__).parent.parent / "examples" / "beam_stop.toml").read_text()
+    text = (Path(__file__).parent.parent / "examples" / "beam_stop.toml").read_text()
     head = text[: text.index("[base]")]
     file = tmp_path / "scene.toml"
     file.write_text(

@@ -8,7 +8,8 @@ import pytest
 
 import fembeam as fb
 from contacts import PUBLISHED, Hertz, Hysteretic, bounce, identify
-from fembeam import plot, report, statistics
+from fembeam import plot, statistics
+from fembeam.results import files as report
 
 
 @pytest.fixture(scope="module")

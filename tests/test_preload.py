@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import fembeam as fb
-from fembeam.beam import bending_matrices, bending_root
+from fembeam.beams import bending_matrices, bending_root
 
 UNIT = fb.Section(E=1.0, rho=1.0, A=1.0, I=1.0)
 CLAMPED = [fb.Clamped(0.0)]

@@ -12,7 +12,7 @@ import pytest
 import fembeam as fb
 import solvers
 from fembeam.cli import main
-from fembeam.polyline import Polyline
+from fembeam.excitation.polyline import Polyline
 from fembeam.scene_file import SceneFileError, read
 
 STEEL = fb.Section.circle(2.1e11, 7800.0, 0.01)

@@ -5,9 +5,8 @@ import pytest
 from scipy import sparse
 
 import reduction
-from fembeam.beam import Beam
+from fembeam.beams import Beam, Section
 from fembeam.scene import Clamped, LumpedMass, Scene
-from fembeam.section import Section
 from reduction import modal
 
 UNIT = Section(E=1.0, rho=1.0, A=1.0, I=1.0)

@@ -6,12 +6,10 @@ import pytest
 import reduction
 import solvers
 from contacts import Hertz, KelvinVoigt
-from fembeam import reducing
-from fembeam.beam import Beam
-from fembeam.damping import ModalDamping, Rayleigh
+from fembeam.beams import Beam, ModalDamping, Rayleigh, Section
 from fembeam.excitation import Harmonic
+from fembeam.model import reduce as reducing
 from fembeam.scene import Clamped, LumpedMass, PointForce, Scene, Stop
-from fembeam.section import Section
 from reduction import interface
 
 UNIT = Section(E=1.0, rho=1.0, A=1.0, I=1.0)

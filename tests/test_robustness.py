@@ -16,9 +16,9 @@ import fembeam as fb
 import solvers
 from contacts import Hertz, Hysteretic, KelvinVoigt, law
 from fembeam.cli import main
-from fembeam.run import written_whole
+from fembeam.scene import Source
 from fembeam.scene_file import built
-from fembeam.source import Source
+from fembeam.support import written_whole
 
 HOME = Path(__file__).parent.parent
 EXAMPLE = HOME / "examples" / "beam_stop.toml"

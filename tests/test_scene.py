@@ -10,21 +10,9 @@ from scipy import linalg
 
 import reduction
 from contacts import Hertz
-from fembeam.beam import Beam
-from fembeam.damping import ModalDamping, Rayleigh
+from fembeam.beams import Beam, ModalDamping, Rayleigh, Section
 from fembeam.excitation import Harmonic
-from fembeam.scene import (
-    Clamped,
-    Dashpot,
-    Guided,
-    LumpedMass,
-    Pinned,
-    PointForce,
-    Scene,
-    Spring,
-    Stop,
-)
-from fembeam.section import Section
+from fembeam.scene import Clamped, Dashpot, Guided, LumpedMass, Pinned, PointForce, Scene, Spring, Stop
 
 STEEL = Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)
 UNIT = Section(E=1.0, rho=1.0, A=1.0, I=1.0)
@@ -426,5 +414,5 @@ def test_independent_formulation_of_the_free_beam():
 
 
 def test_import_is_light():
-    code = "import sys, fembeam.scene; print({'skfem', 'matplotlib', 'numba'} & set(sys.modules))"
+    code = "import sys, fembeam.scene.scene; print({'skfem', 'matplotlib', 'numba'} & set(sys.modules))"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout == "set()\n"

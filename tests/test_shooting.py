@@ -12,9 +12,9 @@ from scipy.special import ellipj, ellipk
 
 from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, law
 from solvers import Contact, DormandPrince, Exponential, HenonRK2, OrbitError, System, integrate, orbit
-from solvers.chain import delayed
-from solvers.quiet import latches, quiet_intervals
-from solvers.result import ContactLog
+from solvers.orbits import delayed
+from solvers.orbits.open_times import latches, quiet_intervals
+from solvers.problem import ContactLog
 
 OMEGA, ZETA, PHI, GAMMA = (
     np.array([109.13, 790.6]),

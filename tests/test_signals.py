@@ -7,18 +7,17 @@ import pytest
 
 import fembeam as fb
 from contacts import Hertz
-from fembeam.check import highest_driven
-from fembeam.doubts import doubts
-from fembeam.orbit import load_period
-from fembeam.parameters import changes_structure, path_of, with_value
-from fembeam.scene import FEATURES, Scene
+from fembeam.cli.check import highest_driven
+from fembeam.cli.unit_checks import doubts
+from fembeam.model import load_period
+from fembeam.scene import FEATURES, Scene, changes_structure, path_of, signals_of, with_signals, with_value
+from fembeam.scene.signals import is_of_signal
 from fembeam.scene_file import read
-from fembeam.signals import is_of_signal, signals_of, with_signals
 from fembeam.study import ensemble
-from fembeam.study.checkpoint import identity
+from fembeam.study.execution.checkpoint import identity
 from fembeam.study.measure import Plan, runs
-from fembeam.study.realisation import realisation
-from fembeam.study.stretches import Stretches
+from fembeam.study.realisations import realisation
+from fembeam.study.segments import Stretches
 
 BEAM = fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01))
 PLAIN = {"float", "str", "str | None", "tuple[int, float] | None"}  # annotations of what is no signal

@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 from oscillators import Bilinear, Tone, random_family, random_stops_family
 
-import solvers.arm
-import solvers.chain
+import solvers.branches.walk
+import solvers.orbits.shots
 from contacts import Hertz, KelvinVoigt, PiecewiseLinear, law
 from solvers import Contact, DormandPrince, OrbitError, System, branch
-from solvers.chain import delayed
-from solvers.continuation import BranchStatus
-from solvers.periodic import flown
-from solvers.special import Stretch
+from solvers.branches.bifurcations import Stretch
+from solvers.branches.continuation import BranchStatus
+from solvers.orbits import delayed, flown
 
 
 @law(jump=True)
@@ -132,14 +131,14 @@ def test_a_graze_is_marked_however_shallow_the_contacts_beside_it():
 def test_random_systems_always_end_with_a_status(seed, monkeypatch):
     rng = np.random.default_rng(seed)
     make, span, modes = random_family(rng)
-    count, evaluate = [0], solvers.chain.Problem.evaluate
+    count, evaluate = [0], solvers.orbits.shots.Problem.evaluate
 
     def counted(*arguments):
         count[0] += 1
         return evaluate(*arguments)
 
-    monkeypatch.setattr(solvers.chain.Problem, "evaluate", counted)
-    monkeypatch.setattr(solvers.arm, "MOST_ORBITS", 40)
+    monkeypatch.setattr(solvers.orbits.shots.Problem, "evaluate", counted)
+    monkeypatch.setattr(solvers.branches.walk, "MOST_ORBITS", 40)
     try:
         found = branch(make, span, np.zeros(2 * modes), step=0.3).run()
     except OrbitError as error:
@@ -155,7 +154,7 @@ def test_random_systems_always_end_with_a_status(seed, monkeypatch):
 def test_orbits_of_several_stops_close_for_another_integrator(stops, seed, monkeypatch):
     """After two periods the motion has come back, of its size and in units of what its multipliers make."""
     make, span, modes = random_stops_family(np.random.default_rng(seed), "amplitude", stops)
-    monkeypatch.setattr(solvers.arm, "MOST_ORBITS", 12)
+    monkeypatch.setattr(solvers.branches.walk, "MOST_ORBITS", 12)
     try:
         found = branch(make, span, np.zeros(2 * modes), step=0.3).run()
     except OrbitError as error:

@@ -12,7 +12,7 @@ import fembeam as fb
 import solvers
 from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, law
 from solvers import RK4, CentralDifference, Contact, GeneralizedAlpha, HenonRK2, Newmark, Status, System, integrate
-from solvers.stability import work_of
+from solvers.stepping.stability import work_of
 
 
 def heun(dt, **options):

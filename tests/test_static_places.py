@@ -6,11 +6,9 @@ from scipy import linalg
 
 import reduction
 from contacts import Hertz
-from fembeam.beam import Beam
-from fembeam.damping import ModalDamping, Rayleigh
+from fembeam.beams import Beam, ModalDamping, Rayleigh, Section
 from fembeam.excitation import Harmonic
 from fembeam.scene import Clamped, Dashpot, Guided, Pinned, PointForce, PointMoment, Scene, Spring, Stop
-from fembeam.section import Section
 
 UNIT = Section(E=1.0, rho=1.0, A=1.0, I=1.0)
 FLAT = Section.rectangle(2.1e11, 7850.0, 0.02, 0.005)

@@ -13,8 +13,9 @@ from fembeam.statistics import Batches, Estimate, Impacts, Signal, moments, psd,
 from fembeam.statistics.batches import MOST
 from fembeam.statistics.scales import KURTOSIS, LEVEL, LINEAR, SKEWNESS
 from fembeam.statistics.streaming import up_crossings
-from fembeam.study import stationary, stretches
-from fembeam.study.stretches import memory
+from fembeam.study import segments as stretches
+from fembeam.study import stationary
+from fembeam.study.segments import memory
 
 
 def coloured(seed, n=40_000):

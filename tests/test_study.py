@@ -13,7 +13,7 @@ from contacts import Hertz, Hysteretic, KelvinVoigt
 from fembeam import scene_file
 from fembeam.cli import main
 from fembeam.study import ModeCount, NotMetError, measure, mode_count, smallest_model
-from fembeam.study.executors import spread
+from fembeam.study.execution.executors import spread
 from fembeam.study.mode_count import difference
 from fembeam.study.quantities import QUANTITIES, Amplitude, Psd, label, named
 

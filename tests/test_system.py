@@ -14,7 +14,7 @@ from scipy.linalg import expm
 import solvers
 from contacts import Hertz
 from solvers import Contact, System
-from solvers.system import decouple
+from solvers.problem import decouple
 
 LAW = Hertz(1e8)
 

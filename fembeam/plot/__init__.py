@@ -4,9 +4,11 @@
 `random` those of random motion, `study` and `chart` those of studies.
 """
 
+from fembeam.model import places
 from fembeam.plot.animation import animate, frame
-from fembeam.plot.chart import failures, speed_accuracy, stability_map
 from fembeam.plot.laws import identification, loops, restitutions
+from fembeam.plot.methods import failures, speed_accuracy, stability_map
+from fembeam.plot.mode_count import mode_count, smallest_model
 from fembeam.plot.orbits import branch, orbit, peak
 from fembeam.plot.random import random_densities, random_spectra
 from fembeam.plot.response import (
@@ -14,7 +16,6 @@ from fembeam.plot.response import (
     densities,
     mode_shapes,
     peaks,
-    places,
     responses,
     segment_for,
     spectra_of,
@@ -22,7 +23,6 @@ from fembeam.plot.response import (
     styled,
     time_history,
 )
-from fembeam.plot.study import mode_count, smallest_model
 
 __all__ = [
     "animate",
@@ -31,9 +31,9 @@ __all__ = [
     "densities",
     "failures",
     "frame",
-    "mode_count",
     "identification",
     "loops",
+    "mode_count",
     "mode_shapes",
     "orbit",
     "peak",

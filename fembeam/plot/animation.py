@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fembeam.bodies import heights
 from fembeam.plot.response import BLUE, GREY, ORANGE, RED, styled
-from fembeam.section import require
+from fembeam.scene import heights
+from fembeam.support import require
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from fembeam.run import Run
+    from fembeam.model import Run
 
 Vector = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from contacts import PUBLISHED, Bounce, Hysteretic, Identified, KelvinVoigt, Law, Viscoelastic, bounce, restitution
 from fembeam.plot.response import BLUE, GREY, RED, Vector, styled
-from fembeam.section import require
+from fembeam.support import require
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

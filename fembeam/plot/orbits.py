@@ -7,17 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fembeam.plot.response import GREEN, GREY, ORANGE, RED, Vector, places, styled
-from fembeam.section import require
-from solvers.result import counted
+from fembeam.model import observed
+from fembeam.plot.response import GREEN, GREY, ORANGE, RED, Vector, styled
+from fembeam.support import require
+from solvers.problem import counted
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from fembeam.branch import Branch
-    from fembeam.model import Model
-    from fembeam.orbit import Orbit
+    from fembeam.model import Branch, Orbit
 
 MARKS = {"fold": ("o", GREY), "flip": ("s", RED), "neimark-sacker": ("D", GREEN), "branch point": ("P", "black"),
          "grazing": ("x", "black"), "floor": ("+", "black"), "merging": ("^", ORANGE)}  # fmt: skip
@@ -58,12 +57,6 @@ def branch(
     _legend(axis, several)
     figure: Any = axis.figure
     return figure  # type: ignore[no-any-return]
-
-
-def observed(model: Model) -> float:
-    """The place to watch: the first stop, else the tip."""
-    stops = model.scene.stops
-    return stops[0].z if stops else next(iter(places(model.shapes).values()))
 
 
 def _axis() -> Axes:

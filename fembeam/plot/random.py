@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from fembeam.branch import Branch
+    from fembeam.model import Branch
     from fembeam.statistics import Signal
 
 Vector = NDArray[np.float64]

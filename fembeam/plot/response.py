@@ -30,14 +30,15 @@ from typing import TYPE_CHECKING, Any, ParamSpec
 import numpy as np
 from numpy.typing import NDArray
 
+from fembeam.model import places
 from fembeam.statistics import moments, pdf, psd
+from fembeam.statistics.spectra import FINEST_RESOLUTION
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from fembeam.model import Model, Shapes
-    from fembeam.run import Run
+    from fembeam.model import Model, Run
     from fembeam.statistics import Spectrum
 
 Vector = NDArray[np.float64]
@@ -56,7 +57,6 @@ STYLE = {
     "legend.frameon": False,
     "figure.dpi": 120,
 }
-FINEST_RESOLUTION = 2.0  # rad/s per line of a spectrum; finer only makes it noisier
 MOST_DOTS = 4000
 LABEL_WIDTH = 0.05  # of the axis, taken up by a frequency of four digits
 
@@ -72,15 +72,6 @@ def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
             return draw(*args, **kwargs)
 
     return inside
-
-
-def places(shapes: Shapes) -> dict[str, float]:
-    """Coordinates worth watching, those that move: "tip" (a free end, the far one first) and "mid-beam"."""
-    start, end = float(shapes.nodes[0]), float(shapes.nodes[-1])
-    mid = (start + end) / 2
-    size = {z: float(np.abs(shapes(z)).max()) for z in (end, start, mid)}
-    moving = [z for z in (end, start) if size[z] > 1e-9 * max(size.values())]
-    return {**({"tip": moving[0]} if moving else {}), "mid-beam": mid}
 
 
 def segment_for(samples: int, dt: float) -> int:

@@ -6,9 +6,9 @@ variance = ∫_0^∞ S(ω) dω,        S one-sided, per rad/s;        S_hz(f) = 
 from fembeam.statistics.batches import Batches, Estimate
 from fembeam.statistics.densities import Density, Moments, moments, pdf
 from fembeam.statistics.impacts import Impacts
+from fembeam.statistics.initial_transient import settling
 from fembeam.statistics.spectra import Spectrum, psd
 from fembeam.statistics.streaming import Signal
-from fembeam.statistics.transient import settling
 
 __all__ = [
     "Batches",

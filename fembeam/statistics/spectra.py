@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fembeam.lines import number
 from fembeam.statistics.batches import Estimate
 from fembeam.statistics.densities import checked_samples
+from fembeam.support import number
 
 DEFAULT_SEGMENTS = 32  # with half overlap about 63 segments: the standard error of a level is near 13 %
 SHORTEST_DEFAULT = 256  # samples per segment that a short signal still gets
@@ -189,3 +189,6 @@ class Welch:
     def omega(self) -> NDArray[np.float64]:
         """Frequencies of the density, rad/s."""
         return 2 * math.pi / (self.segment * self.dt) * np.arange(self.size - 4, dtype=np.float64)
+
+
+FINEST_RESOLUTION = 2.0  # rad/s per line of a spectrum; finer only makes it noisier

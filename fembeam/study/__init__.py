@@ -2,34 +2,35 @@
 
 from fembeam.study.bifurcation import Bifurcation, bifurcation
 from fembeam.study.ensemble import Ensemble, ensemble
-from fembeam.study.failures import Failure, gallery
+from fembeam.study.failure_gallery import Failure, gallery
 from fembeam.study.mode_count import ModeCount, mode_count
-from fembeam.study.points import Point, SpeedAccuracy
-from fembeam.study.smallest_model import NotMetError, SmallestModel, smallest_model
+from fembeam.study.smallest_model import smallest_model
+from fembeam.study.smallest_model_result import NotMetError, SmallestModel
 from fembeam.study.speed_accuracy import NoReferenceError, speed_accuracy
+from fembeam.study.speed_accuracy_result import Point, SpeedAccuracy
 from fembeam.study.stability_map import StabilityMap, Verdict, stability_map
 from fembeam.study.stationary import Response, characteristics, stationary
 
 __all__ = [
     "Bifurcation",
-    "bifurcation",
+    "Ensemble",
     "Failure",
+    "ModeCount",
     "NoReferenceError",
+    "NotMetError",
     "Point",
+    "Response",
+    "SmallestModel",
     "SpeedAccuracy",
     "StabilityMap",
     "Verdict",
-    "gallery",
-    "speed_accuracy",
-    "stability_map",
-    "Ensemble",
-    "ModeCount",
-    "NotMetError",
-    "Response",
-    "SmallestModel",
+    "bifurcation",
     "characteristics",
     "ensemble",
+    "gallery",
     "mode_count",
     "smallest_model",
+    "speed_accuracy",
+    "stability_map",
     "stationary",
 ]

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import solvers
-from fembeam.orbit import load_period
-from fembeam.parameters import changes_structure, path_of, with_value
-from fembeam.section import require
+from fembeam.model import load_period
+from fembeam.scene import changes_structure, path_of, with_value
+from fembeam.support import require
 
 if TYPE_CHECKING:
     from fembeam.model import Model
@@ -61,7 +61,7 @@ def bifurcation(
 
     Parameters
     ----------
-    parameter : such as "omega"; see `fembeam.parameters`. values : (k,) where to simulate.
+    parameter : such as "omega"; see `fembeam.scene.parameters`. values : (k,) where to simulate.
     z : place whose displacement is watched, m; None is the first stop.
     settle, keep : periods of the load left out and kept.
     start : (2n,) for all of them; None is rest.
@@ -81,8 +81,8 @@ def bifurcation(
     >>> bifurcation(scene.reduce(modes=1), "omega", [150.0, 160.0], settle=20, keep=4).peaks.shape
     (2, 4)
     """
-    from fembeam.plot.orbits import observed
-    from fembeam.study.executors import spread
+    from fembeam.model import observed
+    from fembeam.study.execution.executors import spread
 
     path = path_of(model.scene, parameter)
     values = np.atleast_1d(np.asarray(values, dtype=float))

@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fembeam.lines import number
 from fembeam.model import Model
 from fembeam.statistics.batches import Estimate
-from fembeam.study.checkpoint import Checkpoint, Values, identity
-from fembeam.study.executors import spread
-from fembeam.study.realisation import Seed, child, noises, realisation, seed_key
+from fembeam.study.execution.checkpoint import Checkpoint, Values, identity
+from fembeam.study.execution.executors import spread
+from fembeam.study.realisations import Seed, child, noises, realisation, seed_key
+from fembeam.support import number
 
 FIRST_ROUND = 8  # realisations before `until` is asked for the first time
 

@@ -21,16 +21,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 import solvers
-from fembeam.orbit import load_period
-from fembeam.section import require, require_non_negative, require_positive
-from fembeam.signals import signals_of
+from fembeam.model import load_period
+from fembeam.scene import signals_of
 from fembeam.study.quantities import Quantity, label
-from fembeam.study.realisation import child, renewed
+from fembeam.study.realisations import child, renewed
+from fembeam.support import require, require_non_negative, require_positive
 
 if TYPE_CHECKING:
     import fembeam
-    from fembeam.model import Model
-    from fembeam.run import Run
+    from fembeam.model import Model, Run
     from fembeam.scene import Scene
 
 Vector = NDArray[np.float64]

@@ -21,10 +21,10 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 import solvers
-from fembeam.section import require
-from fembeam.study.executors import spread
+from fembeam.study.execution.executors import spread
 from fembeam.study.measure import Case, Measured, Plan, Start, measure
 from fembeam.study.quantities import Quantity, label, named
+from fembeam.support import require
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -177,7 +177,7 @@ def mode_count(
     ----------
     scene : Scene.
     counts : numbers of modes, each ≥ 1.
-    quantity : a name of `fembeam.study.quantities`, or a function of a run that gives a number or an array.
+    quantity : a name of `quantities`, or a function of a run that gives a number or an array.
     duration : s; None: the settled response to harmonic motion (360 drive periods, the last 120 in ten groups).
     dt : output sampling in s; None keeps contact log and end only, enough for forces, contact times, impact rates.
     discard : s at the beginning that the quantity does not see; the times it sees count from there.

@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fembeam.section import require
+from fembeam.support import require
 
 if TYPE_CHECKING:
     import fembeam
-    from fembeam.run import Run
+    from fembeam.model import Run
 
 Vector = NDArray[np.float64]
 Quantity = Callable[["fembeam.Run"], Any]
@@ -37,7 +37,7 @@ class Amplitude:
 
     def __call__(self, run: Run) -> float:
         """Value of a run."""
-        from fembeam.orbit import extremes_of
+        from fembeam.model import extremes_of
 
         lowest, highest = extremes_of(run.t, *signal(run, self.stop, self.z))
         return (highest - lowest) / 2

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import solvers
-from fembeam.run import Run
-from fembeam.section import require, require_positive
-from fembeam.study.points import Point, SpeedAccuracy, median
+from fembeam.model import Run
+from fembeam.study.speed_accuracy_result import Point, SpeedAccuracy, median
+from fembeam.support import require, require_positive
 
 if TYPE_CHECKING:
     from fembeam.model import Model

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import solvers
-from fembeam.section import require
 from fembeam.study.speed_accuracy import method_name
+from fembeam.support import require
 
 if TYPE_CHECKING:
     from fembeam.model import Model
@@ -47,6 +47,7 @@ class StabilityMap:
     flight, contact : (r,) s, predicted limits. tolerance : of the error.
     """
 
+    VERDICTS: ClassVar[type[Verdict]] = Verdict
     method: str
     steps: Vector
     axis: str

@@ -24,16 +24,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import solvers
-from fembeam.lines import number
-from fembeam.model import Model
-from fembeam.plot.response import FINEST_RESOLUTION, places
-from fembeam.run import Run, bar
-from fembeam.signals import signals_of
+from fembeam.model import Model, Run, places
+from fembeam.scene import signals_of
 from fembeam.statistics.batches import Estimate
 from fembeam.statistics.impacts import Impacts
+from fembeam.statistics.initial_transient import Settling, settling
+from fembeam.statistics.spectra import FINEST_RESOLUTION
 from fembeam.statistics.streaming import Signal
-from fembeam.statistics.transient import Settling, settling
-from fembeam.study.stretches import Stretch, Stretches
+from fembeam.study.segments import Stretch, Stretches
+from fembeam.support import bar, number
 
 Vector = NDArray[np.float64]
 Watch = Callable[[Run], Any]

@@ -28,10 +28,9 @@ from typing import Any
 import numpy as np
 
 import solvers
-from fembeam import cli
-from fembeam.scene_file import SceneFile, SceneFileError, built
-from fembeam.source import Source
-from fembeam.template import TEMPLATE
+from fembeam.cli import commands as cli
+from fembeam.scene import Source
+from fembeam.scene_file import TEMPLATE, SceneFile, SceneFileError, built
 
 HOME = Path(__file__).resolve().parent.parent.parent
 sys.path.insert(0, str(HOME / "tests" / "bench"))

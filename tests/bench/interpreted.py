@@ -18,7 +18,7 @@ import solvers.integration as integration
 from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, Tabulated, Viscoelastic, law
 from fembeam import BandNoise, Harmonic
 from solvers import Contact, System
-from solvers.result import COLUMNS
+from solvers.problem import COLUMNS
 
 
 @law

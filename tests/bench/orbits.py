@@ -25,7 +25,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from oscillators import Bilinear
 
 import solvers
-from solvers.chain import delayed
+from solvers.orbits import delayed
 
 PROBLEM = Bilinear(omega=0.8, stiffness=4.0, zeta=0.1, gap=0.2)
 SPAN, STEP = (0.8, 2.0), 0.1

@@ -46,8 +46,8 @@ numba.carray = lambda array, shape: array[: shape[0]]
 ndarray.to_fixed_tuple = lambda array, n: tuple(array[:n])
 
 import contacts.kernels as laws  # noqa: E402
-import solvers.handle as handle  # noqa: E402
-import solvers.kernels as ground  # noqa: E402
+import solvers.compiled.handles as handle  # noqa: E402
+import solvers.compiled.kernels as ground  # noqa: E402
 
 
 def opener(kind):
@@ -115,13 +115,13 @@ handle.opener = opener
 laws._force_at, laws._gradient_at = force_at, gradient_at
 ground.call_force = ground.call_gradient = at_address
 
-import solvers.eight as eight  # noqa: E402
+import solvers.compiled.simd as eight  # noqa: E402
 
 eight.eight, eight.put = lambda array, first: array.reshape(-1)[first : first + 8].copy(), put
 eight.spread, eight.total = lambda number: np.full(8, number), lambda numbers: float(np.sum(numbers))
 eight.root, eight.raised = np.sqrt, lambda numbers: np.maximum(numbers, 0.0)
 eight.bits = lambda number: int(np.float64(number).view(np.int64))
 
-import solvers.tables as tables  # noqa: E402
+import solvers.exponential.tables as tables  # noqa: E402
 
 tables._block_response = remembered(tables._block_response)

@@ -23,13 +23,11 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from oscillators import random_family, random_stops_family
 
-import solvers.arm
+import solvers.branches.walk
 from solvers import Branch, DormandPrince, Orbit, OrbitError, branch, integrate, orbit
-from solvers.chain import Problem, delayed
-from solvers.continuation import BranchStatus
-from solvers.periodic import flown
-from solvers.quiet import quiet_begins
-from solvers.touch import signature
+from solvers.branches.continuation import BranchStatus
+from solvers.branches.grazing import signature
+from solvers.orbits import Problem, delayed, flown, quiet_begins
 
 CHECKED = 5  # orbits of a branch that are integrated again
 
@@ -113,7 +111,7 @@ def followed(make: Any, span: tuple[float, float], modes: int) -> Branch:
 
 def main(count: str = "100", first: str = "0", over: str = "omega", most: str = "60", stops: str = "1") -> None:
     """Follow the branches."""
-    solvers.arm.MOST_ORBITS = int(most)
+    solvers.branches.walk.MOST_ORBITS = int(most)
     ends: Counter[str] = Counter()
     marks: Counter[str] = Counter()
     checks: Counter[str] = Counter()

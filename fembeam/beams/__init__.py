@@ -1,0 +1,52 @@
+"""A beam by itself: sections, Euler–Bernoulli elements, damping, where a mesh needs nodes, mesh files.
+
+Imports: `support`. Begin with `beam`.
+"""
+
+from fembeam.beams.beam import (
+    Beam,
+    bending_matrices,
+    bending_root,
+    element_matrices,
+    geometric_stiffness,
+    hermite_rows,
+    joining,
+)
+from fembeam.beams.damping import ModalDamping, Rayleigh
+from fembeam.beams.mesh import (
+    ERROR_CONSTANT,
+    FREQUENCY_TOLERANCE,
+    SAME_PLACE,
+    SHORTEST,
+    WAVE_STEP,
+    divided,
+    on_beam,
+    slowness,
+    spread,
+    wavenumber,
+)
+from fembeam.beams.section import Section, Taper
+
+__all__ = [
+    "ERROR_CONSTANT",
+    "FREQUENCY_TOLERANCE",
+    "SAME_PLACE",
+    "SHORTEST",
+    "WAVE_STEP",
+    "Beam",
+    "ModalDamping",
+    "Rayleigh",
+    "Section",
+    "Taper",
+    "bending_matrices",
+    "bending_root",
+    "divided",
+    "element_matrices",
+    "geometric_stiffness",
+    "hermite_rows",
+    "joining",
+    "on_beam",
+    "slowness",
+    "spread",
+    "wavenumber",
+]

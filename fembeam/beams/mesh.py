@@ -1,0 +1,65 @@
+"""Where the nodes go: on every feature, and as dense as the bending waves of the highest mode kept ask for.
+
+Relative error of ω on cubic Hermite elements of length h: (κ h)⁴/1440, with the wavenumber κ of
+EI κ⁴ - |N| κ² = max(ρA ω², k), which also covers the boundary layers of tension and foundation.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fembeam.beams.beam import Beam
+from fembeam.support import require
+
+if TYPE_CHECKING:
+    pass
+
+Vector = NDArray[np.float64]
+
+FREQUENCY_TOLERANCE = 1e-6  # relative, promised for each mode asked for
+ERROR_CONSTANT = 1 / 1440  # relative error of omega of a cubic Hermite mesh: (beta h)^4/1440
+WAVE_STEP = (0.65 * FREQUENCY_TOLERANCE / ERROR_CONSTANT) ** 0.25  # beta h = 0.175, a third below the promise
+SAME_PLACE = 1e-9  # of the length: features closer than this share a node
+SHORTEST = 1e-4  # of the length: rounding of K grows like (length/h)³, 2e-4 of the first omega² here
+INSIDE = np.array([1e-9, 0.5, 1 - 1e-9])  # where a tapered interval is looked at
+
+
+def on_beam(z: Vector, beam: Beam, where: str) -> Vector:
+    """The same z, checked."""
+    outside = ~((z >= 0) & (z <= beam.length))
+    require(not outside.any(), f"z must lie on the beam, 0 to {beam.length} m", z[outside].tolist(), where,
+            "keep to the beam")  # fmt: skip
+    return z
+
+
+def slowness(beam: Beam, nodes: Vector) -> Vector:
+    """(ρA/EI)^(1/4), the largest between neighbouring nodes: bending wavenumber over √omega."""
+    return wavenumber(Beam(beam.length, beam.section, beam.spans), nodes, 1.0)
+
+
+def wavenumber(beam: Beam, nodes: Vector, omega: float) -> Vector:
+    """κ in 1/m, the largest between neighbouring nodes."""
+    profile = beam.profile(nodes[:-1, None] + np.diff(nodes)[:, None] * INSIDE)
+    EI = profile.E * profile.I
+    half = abs(beam.axial_force) / (2 * EI)
+    squared = half + np.sqrt(half**2 + np.maximum(profile.rho * profile.A * omega**2, beam.foundation) / EI)
+    return np.sqrt(squared).max(axis=1)
+
+
+def divided(borders: Vector, counts: NDArray[np.int64]) -> Vector:
+    """Nodes with counts[i] equal elements between borders i and i + 1."""
+    intervals = zip(borders[:-1], borders[1:], counts, strict=True)
+    pieces = [np.linspace(start, end, count, endpoint=False) for start, end, count in intervals]
+    return np.append(np.concatenate(pieces), borders[-1])
+
+
+def spread(beam: Beam, borders: Vector, elements: int) -> Vector:
+    """Nodes with `elements` elements in all (at least one per interval), short where waves are short."""
+    waves = np.diff(borders) * slowness(beam, borders)
+    counts = np.ones(len(waves), dtype=int)
+    for _ in range(elements - len(waves)):
+        counts[np.argmax(waves / counts)] += 1
+    return divided(borders, counts)

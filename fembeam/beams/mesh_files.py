@@ -1,0 +1,267 @@
+"""Beams from and to mesh files: line elements along a straight axis, through meshio.
+
+What is taken from a file is where sections begin and end, and the places that node sets name. The elements themselves
+are made anew, as few as the modes need, so that a file's element size changes nothing.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import warnings
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from itertools import groupby, pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fembeam.beams.beam import Beam
+from fembeam.beams.mesh import SHORTEST, divided
+from fembeam.beams.section import Section, Taper
+from fembeam.support import require
+
+Vector = NDArray[np.float64]
+Names = list[set[str]]
+
+LINES = ("line", "line3", "line4")  # of higher ones the ends are used
+WRITERS: dict[str, dict[str, Any]] = {  # suffixes, and what meshio needs to know
+    ".msh": {"file_format": "gmsh22", "binary": False},
+    ".inp": {},
+    ".vtu": {},
+    ".vtk": {},
+}
+STRAIGHT = 1e-6  # of the length: farther from the axis is a bend
+
+
+def beam_of(
+    path: str | os.PathLike[str],
+    sections: Section | Taper | Mapping[Any, Section | Taper],
+    data: str | None = None,
+    foundation: float = 0.0,
+    axial_force: float = 0.0,
+) -> Beam:
+    """The beam in a file; `Beam.from_mesh` explains it."""
+    where = f"{path}"
+    mesh = _read(path)
+    lines, names = _lines(mesh, data, where)
+    z = _along(np.asarray(mesh.points, dtype=float), lines, where)
+    chain, order = _chained(z, lines, mesh.points, where)
+    chosen = _chosen(sections, [names[i] for i in order], chain, where)
+    _warn_of_size(chain, where)
+    spans, index = [], 0
+    table = {"": sections} if isinstance(sections, (Section, Taper)) else {str(k): s for k, s in sections.items()}
+    for name, group in groupby(chosen):
+        after = index + len(list(group))
+        spans.append((float(chain[after] - chain[index]), table[name]))
+        index = after
+    beam = Beam.of_spans(spans, foundation, axial_force)
+    places = [(name, float(np.clip(z[node] - chain[0], 0.0, beam.length))) for name, node in _named_nodes(mesh)]
+    return Beam(beam.length, beam.section, beam.spans, foundation, axial_force, tuple(sorted(places)))
+
+
+def _read(path: str | os.PathLike[str]) -> Any:
+    """The file, or a ValueError that says why not."""
+    import meshio
+
+    if not Path(path).is_file():
+        raise FileNotFoundError(f"{path} does not exist")
+    try:
+        return meshio.read(path)
+    except (Exception, SystemExit) as error:  # meshio raises many kinds, and exits for unknown suffixes
+        raise ValueError(f"{path} cannot be read as a mesh: {error or 'unknown format'}") from error
+
+
+def _lines(mesh: Any, data: str | None, where: str) -> tuple[NDArray[np.int64], Names]:
+    """Ends (e, 2) of all line elements and the names each goes by."""
+    others = Counter({block.type: len(block.data) for block in mesh.cells if block.type not in (*LINES, "vertex")})
+    require(not others, "cells must be lines", dict(others), where, "mesh the axis of the beam only")
+    blocks = [i for i, block in enumerate(mesh.cells) if block.type in LINES and len(block.data)]
+    require(bool(blocks), "the mesh must hold lines", [b.type for b in mesh.cells], where, "mesh the beam's axis")
+    lines = np.concatenate([np.asarray(mesh.cells[i].data)[:, :2] for i in blocks]).astype(np.int64)
+    names = [name for i in blocks for name in _names(mesh, i, data, where)]
+    return lines, names
+
+
+def _names(mesh: Any, block: int, data: str | None, where: str) -> Names:
+    """Names of every cell of a block: its sets, else its number in the cell data."""
+    found: Names = [set() for _ in mesh.cells[block].data]
+    if data is None:
+        for name, cells in mesh.cell_sets.items():
+            if not name.startswith("gmsh:") and cells[block] is not None:
+                for cell in np.asarray(cells[block], dtype=np.int64):
+                    found[cell].add(name)
+        if any(found):
+            return found
+        data = _numbering(mesh)
+    if data is not None:
+        require(data in mesh.cell_data, f"data must be one of {', '.join(mesh.cell_data) or 'none'}", data, where,
+                "name a cell data array of the file")  # fmt: skip
+        numbers = np.asarray(mesh.cell_data[data][block])
+        known = {int(tag): name for name, (tag, dimension) in mesh.field_data.items() if dimension == 1}
+        for cell, number in enumerate(numbers):
+            whole = int(number) if float(number).is_integer() else number
+            found[cell] |= {str(whole)} | ({known[whole]} if whole in known else set())
+    return found
+
+
+def _numbering(mesh: Any) -> str | None:
+    """The cell data that numbers the sections: gmsh's, or the only array of whole numbers."""
+    if "gmsh:physical" in mesh.cell_data:
+        return "gmsh:physical"
+    whole = [name for name, blocks in mesh.cell_data.items()
+             if all(np.asarray(b).ndim == 1 and np.all(np.mod(b, 1) == 0) for b in blocks)]  # fmt: skip
+    own = [name for name in whole if not name.startswith("gmsh:")]
+    return own[0] if len(own) == 1 else None
+
+
+def _along(points: Vector, lines: NDArray[np.int64], where: str) -> Vector:
+    """Coordinates (p,) of all points along the axis of the lines."""
+    points = points.reshape(len(points), -1)
+    used = points[np.unique(lines)]
+    size = np.ptp(used, axis=0)
+    main = int(np.argmax(size))
+    first, last = used[np.argmin(used[:, main])], used[np.argmax(used[:, main])]
+    length = float(np.linalg.norm(last - first))
+    require(length > 0, "the lines must have a length", length, where, "check the coordinates")
+    axis = (last - first) / length
+    z = (points - first) @ axis
+    off = np.linalg.norm(points - first - z[:, None] * axis, axis=1)
+    bent = np.unique(lines)[off[np.unique(lines)] > STRAIGHT * length]
+    require(not bent.size, "the lines must lie on one straight axis", _shown(points[bent[:1]]), where,
+            "a node is off it there; this library bends straight beams only")  # fmt: skip
+    return z
+
+
+def _chained(z: Vector, lines: NDArray[np.int64], points: Vector, where: str) -> tuple[Vector, NDArray[np.int64]]:
+    """Coordinates (e + 1,) of the chain of elements from end to end, and the order of the elements in it."""
+    ends = np.sort(z[lines], axis=1)
+    order = np.argsort(ends.mean(axis=1))
+    nodes, counts = np.unique(lines, return_counts=True)
+    many = nodes[counts > 2]
+    require(not many.size, "lines must not branch: at most two meet in a node", _shown(points[many[:1]]), where,
+            "remove the branch, or elements that lie on each other")  # fmt: skip
+    for before, after in pairwise(order):
+        shared = len(set(lines[before]) & set(lines[after])) == 1
+        joined = shared and ends[before, 1] <= ends[after, 0] + 1e-12 * np.ptp(z)
+        at = points[lines[after][np.argmin(z[lines[after]])]]
+        require(joined, "lines must be connected end to end", _shown([at]), where,
+                "a part begins there that does not share a node with the one before; merge double nodes")  # fmt: skip
+    chain = np.append(ends[order, 0], ends[order[-1], 1])
+    thin = np.flatnonzero(np.diff(chain) <= 0)
+    require(not thin.size, "elements must have a length", float(chain[thin[0]]) if thin.size else 0.0, where,
+            "remove the element there")  # fmt: skip
+    return chain, order
+
+
+def _shown(points: Any) -> tuple[float, ...] | None:
+    """One point for a message."""
+    return tuple(float(f"{x:.6g}") for x in points[0]) if len(points) else None
+
+
+def _chosen(sections: Any, names: Names, chain: Vector, where: str) -> list[str]:
+    """The one name of every element that has a section."""
+    if isinstance(sections, (Section, Taper)):
+        return [""] * len(names)
+    wanted = {str(key) for key in sections}
+    there = set().union(*names)
+    missing = sorted(wanted - there)
+    listed = ", ".join(sorted(there)) or "none"
+    require(not missing, f"sections must name groups of the file (it has {listed})", missing, where, "rename them")
+    chosen = []
+    for i, found in enumerate(names):
+        mine = sorted(found & wanted)
+        place = f"{where} at z = {chain[i]:.6g} m"
+        has = ", ".join(sorted(found)) or "no group"
+        require(len(mine) == 1, "every element must have one section", mine or f"none for {has}", place,
+                f"give a section for one of its groups; the file has {listed}")  # fmt: skip
+        chosen.append(mine[0])
+    return chosen
+
+
+def _warn_of_size(chain: Vector, where: str) -> None:
+    """Warn of elements so short that sections cannot change from one to the next."""
+    lengths, total = np.diff(chain), chain[-1] - chain[0]
+    if lengths.min() < SHORTEST * total:
+        place = chain[int(np.argmin(lengths))] - chain[0]
+        size = f"{lengths.min():.3g} m at z = {place:.6g} m"
+        warnings.warn(f"elements of {where} are far too fine: {size}, below "
+                      f"{SHORTEST:g} of the length; a section that changes there is refused",
+                      UserWarning, stacklevel=4)  # fmt: skip
+
+
+def _named_nodes(mesh: Any) -> Iterator[tuple[str, int]]:
+    """(name, node) of every point set and every group of vertices."""
+    for name, nodes in mesh.point_sets.items():
+        yield from ((name, int(node)) for node in np.asarray(nodes).ravel())
+    tags = mesh.cell_data.get("gmsh:physical")
+    known = {int(tag): name for name, (tag, dimension) in mesh.field_data.items() if dimension == 0}
+    for i, block in enumerate(mesh.cells):
+        if block.type == "vertex" and tags is not None:
+            pairs = zip(np.asarray(tags[i]), block.data[:, 0], strict=True)
+            yield from ((known[int(tag)], int(node)) for tag, node in pairs if int(tag) in known)
+
+
+def to_mesh(beam: Beam, path: str | os.PathLike[str], elements: int = 100) -> dict[str, Section | Taper]:
+    """Write a beam as line elements: .msh, .inp (with groups for spans and places), .vtu, .vtk (spans only).
+
+    Parameters
+    ----------
+    path : its suffix is the format; cell data `section` number the spans from 1 where a format has no groups.
+    elements : about how many.
+
+    Returns
+    -------
+    The `sections` with which `Beam.from_mesh` reads it back.
+    """
+    target = Path(path)
+    where, borders = "to_mesh", np.array(beam.borders)
+    known = target.suffix in WRITERS
+    require(known, f"the suffix must be one of {', '.join(WRITERS)}", target.suffix, where, "choose one")
+    counts = np.maximum(1, np.round(elements * np.diff(borders) / beam.length)).astype(int)
+    z = np.unique(np.concatenate([divided(borders, counts), [place for _, place in beam.places]]))
+    group = 1 + np.searchsorted(borders[1:-1], (z[:-1] + z[1:]) / 2)
+    grouped = target.suffix in (".msh", ".inp")
+    keys = [f"span_{i}" if grouped else f"{i}" for i in range(1, len(beam.spans) + 1)]
+    mesh = (_gmsh if target.suffix == ".msh" else _plain)(beam, z, group, keys, target.suffix == ".inp")
+    with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}.") as folder:
+        draft = os.path.join(folder, target.name)
+        mesh.write(draft, **WRITERS[target.suffix])
+        os.replace(draft, target)
+    return {key: section for key, (_, section) in zip(keys, beam.spans, strict=True)}
+
+
+def _on_axis(z: Vector) -> tuple[Vector, NDArray[np.int64]]:
+    """Points (p, 3) and lines (p - 1, 2)."""
+    count = np.arange(len(z) - 1)
+    return np.column_stack([z, np.zeros((len(z), 2))]), np.column_stack([count, count + 1])
+
+
+def _plain(beam: Beam, z: Vector, group: NDArray[np.int64], keys: list[str], sets: bool) -> Any:
+    """Spans as cell data, or as sets of elements beside sets of nodes."""
+    import meshio
+
+    points, lines = _on_axis(z)
+    if not sets:
+        return meshio.Mesh(points, [("line", lines)], cell_data={"section": [group]})
+    spans = {key: [np.flatnonzero(group == i)] for i, key in enumerate(keys, 1)}
+    places = {name: np.searchsorted(z, [at for other, at in beam.places if other == name]) for name, _ in beam.places}
+    return meshio.Mesh(points, [("line", lines)], cell_sets=spans, point_sets=places)
+
+
+def _gmsh(beam: Beam, z: Vector, group: NDArray[np.int64], keys: list[str], _: bool) -> Any:
+    """Spans and places as physical groups."""
+    import meshio
+
+    points, lines = _on_axis(z)
+    labels = list(dict.fromkeys(name for name, _ in beam.places))
+    fields = {key: np.array([i, 1]) for i, key in enumerate(keys, 1)}
+    fields |= {name: np.array([i, 0]) for i, name in enumerate(labels, 1)}
+    cells: list[tuple[str, Any]] = [("line", lines)]
+    tags = [group]
+    if labels:
+        cells.append(("vertex", np.searchsorted(z, [at for _, at in beam.places])[:, None]))
+        tags.append(np.array([1 + labels.index(name) for name, _ in beam.places]))
+    return meshio.Mesh(points, cells, cell_data={"gmsh:physical": tags, "gmsh:geometrical": tags}, field_data=fields)

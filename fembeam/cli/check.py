@@ -1,0 +1,206 @@
+"""What a scene is before it is run: modes, contacts to expect, steps and modes to take, and what looks wrong.
+
+Contacts are those of a short trial and of one strike at its usual speed. A contact of length T excites what lies below
+3π/T, where the spectrum of a half-sine pulse first vanishes: modes above it hardly know of it.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import solvers
+from fembeam.cli.modes import mode_rows, mode_table
+from fembeam.cli.unit_checks import doubts
+from fembeam.scene import signals_of
+
+if TYPE_CHECKING:
+    from fembeam.model import Model
+    from fembeam.scene_file import SceneFile
+
+PERIODS = 20.0  # of the lowest mode that the trial lasts
+MOST_PERIODS = 3000.0  # of the highest mode that it may take
+NOMINAL_SPEED = 0.1  # m/s, where the trial tells none
+MOST_MODES = 40  # looked at when asking how many a contact excites
+
+
+@dataclass(frozen=True)
+class Touched:
+    """What to expect of one stop.
+
+    Attributes
+    ----------
+    contacts : in the trial. speed : m/s, the trial's median, else nominal. time : s that such a contact lasts.
+    peak_force : N. periods : contact time over the shortest period kept.
+    """
+
+    stop: int
+    contacts: int
+    speed: float
+    time: float
+    peak_force: float
+    periods: float
+
+
+@dataclass(frozen=True)
+class Check:
+    """What was found; print it."""
+
+    model: Model
+    touched: list[Touched]
+    steps: dict[str, float]
+    modes: dict[str, int]
+    memory: float
+    warnings: list[str]
+
+    def __str__(self) -> str:
+        lines = [mode_table(self.model)]
+        lines.append(f"\nmemory of the structure 1/min(ζω): {self.memory:.3g} s")
+        for one in self.touched:
+            seen = f"{one.contacts} contacts in a short trial" if one.contacts else "no contact in a trial"
+            lines.append(
+                f"stop {one.stop}: {seen}; at {one.speed:.3g} m/s a contact lasts {one.time:.3g} s "
+                f"({one.periods:.2g} periods of the highest mode kept), peak force {one.peak_force:.3g} N"
+            )
+        lines += [f"suggested {what}: {count}" for what, count in self.modes.items()]
+        lines += [f"suggested {what}: {step:.2g} s" for what, step in self.steps.items()]
+        return "\n".join(lines)
+
+    def plain(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "modes": mode_rows(self.model),
+            "memory": self.memory,
+            "stops": [asdict(one) for one in self.touched],
+            "suggested_modes": self.modes,
+            "suggested_steps": self.steps,
+            "warnings": self.warnings,
+        }
+
+
+def check(file: SceneFile, model: Model) -> Check:
+    """Look at a scene; costs about what a simulation of some twenty periods does.
+
+    Parameters
+    ----------
+    file : what was read. model : its reduced model.
+    """
+    log = _trial(model)
+    touched = [one for stop in range(len(model.scene.stops)) if (one := _touched(model, log, stop))]
+    shortest = min((one.time for one in touched), default=math.inf)
+    moving = bool(np.any(model.omega > 0))  # rigid-body modes alone have no period
+    steps = {"output step dt, 20 in the shortest period kept": 2 * math.pi / (20 * _fastest(model))} if moving else {}
+    if shortest < math.inf:
+        steps["output step dt to see the force, 20 in a contact"] = shortest / 20
+    steps |= _limits(model)
+    found = [*doubts(file, model), *_of_trial(model, touched)]
+    return Check(model, touched, steps, _suggested_modes(file, shortest), _memory(model), found)
+
+
+def _fastest(model: Model) -> float:
+    """Highest frequency kept, rad/s."""
+    return max(float(model.omega.max()), 1e-9)
+
+
+def _trial(model: Model) -> solvers.ContactLog | None:
+    """Contacts of the first periods from rest; None when they cannot be computed."""
+    moving = model.omega[model.omega > 1e-6 * _fastest(model)]
+    if not len(moving):
+        return None
+    duration = 2 * math.pi * min(PERIODS / float(moving.min()), MOST_PERIODS / _fastest(model))
+    try:
+        return model.simulate(duration, solver=solvers.Exponential(1e-6, ledger=False)).contacts
+    except (ValueError, solvers.SolverError) as error:
+        warnings.warn(f"a trial of {duration:.3g} s fails: {error}", UserWarning, stacklevel=2)
+        return None
+
+
+def _touched(model: Model, log: solvers.ContactLog | None, stop: int) -> Touched | None:
+    """One stop struck at its usual speed; None when the first mode does not move there."""
+    speeds = np.abs(log.speed_in[log.stop == stop]) if log is not None else np.zeros(0)
+    speeds = speeds[speeds > 0]
+    speed = float(np.median(speeds)) if len(speeds) else NOMINAL_SPEED
+    if abs(model.directions[stop, 0]) < 1e-9 * np.abs(model.directions[stop]).max():
+        return None
+    try:
+        hit = model.strike(speed, stop)
+    except (ValueError, ArithmeticError, solvers.SolverError):
+        return None
+    if not len(hit):
+        return None
+    time = float(hit.t_out[0] - hit.t_in[0])
+    time = time if math.isfinite(time) else math.inf  # longer than the strike was watched
+    periods = time * _fastest(model) / (2 * math.pi)
+    return Touched(stop, len(speeds), speed, time, float(hit.peak_force[0]), periods)
+
+
+def _of_trial(model: Model, touched: list[Touched]) -> list[str]:
+    """What contacts make doubtful."""
+    found = []
+    for one in touched:
+        slowest = 2 * math.pi / max(float(model.omega.min()), 1e-12)
+        if one.time > 0.5 * slowest:
+            found.append(f"stop {one.stop} is so soft that a contact lasts half the lowest period or more: "
+                         "is its stiffness in N/m (Hertz: N/m^1.5)?")  # fmt: skip
+        if one.periods > 3:
+            continue
+        if one.time * _fastest(model) < 3 * math.pi:
+            found.append(f"contacts with stop {one.stop} excite modes above the {len(model.omega)} kept: forces and "
+                         "contact times are this model's only; see suggested modes, or ask [mode_count]")  # fmt: skip
+    return found
+
+
+def _suggested_modes(file: SceneFile, shortest: float) -> dict[str, int]:
+    """Numbers of modes for what drives the beam and for its contacts."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        try:
+            omega = file.scene.reduce(modes=MOST_MODES).omega
+        except (ValueError, RuntimeError):
+            return {}
+    wanted = {}
+    top = highest_driven(file.scene)
+    if 0 < top < math.inf:
+        wanted["modes for the motion, up to 1.5 times the highest frequency that drives it"] = 1.5 * top
+    if shortest < math.inf:
+        wanted["modes for contact forces, up to 3π over the contact time"] = 3 * math.pi / shortest
+    counts = {name: max(1, int(np.count_nonzero(omega <= w))) for name, w in wanted.items()}
+    return {name if n < MOST_MODES else f"{name} (at least)": n for name, n in counts.items()}
+
+
+def highest_driven(scene: Any) -> float:
+    """Highest frequency in the loads, rad/s; 0 without loads, inf when they have none."""
+    tops = []
+    for signal in signals_of(scene).values():
+        if getattr(signal, "band", None) is not None:
+            tops.append(float(np.max(signal.band)))
+        elif hasattr(signal, "omega"):
+            tops.append(float(np.max(signal.omega)))
+        else:
+            tops.append(math.inf)
+    return max(tops, default=0.0)
+
+
+def _limits(model: Model) -> dict[str, float]:
+    """Largest stable steps of methods with constant steps."""
+    found: dict[str, float] = {}
+    for method in (solvers.RK4(1e-6), solvers.HenonRK2(1e-6, 1e-6)):
+        limit = method.stable_dt(model.system)
+        name = type(method).__name__
+        steps = {"flight": limit.flight, **({"contact": limit.contact} if model.scene.stops else {})}
+        found |= {f"step of {name} in {where}, at most": step for where, step in steps.items() if 0 < step < math.inf}
+    return found
+
+
+def _memory(model: Model) -> float:
+    """Time constant of the slowest decay, s; infinite without damping."""
+    from fembeam.study.segments import memory
+
+    try:
+        return memory(model)
+    except ValueError:
+        return math.inf

@@ -1,0 +1,226 @@
+"""The command line: `fembeam new`, `check`, `modes`, `run`, `compare`, `export`, `schema`.
+
+Tables (with --json: JSON) go to stdout, everything else to stderr; exit codes are those of `messages`.
+"""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from typing import TYPE_CHECKING, Any
+
+from fembeam import __version__  # nothing slow up here: Ctrl-C before `main` would print a traceback
+from fembeam.cli.messages import (
+    BAD_INPUT,
+    EXIT_CODES,
+    FAILED,
+    interrupted,
+    one_line,
+    say,
+    show_warning,
+    warned,
+    write_anywhere,
+)
+
+if TYPE_CHECKING:
+    import argparse
+    from collections.abc import Sequence
+
+    from fembeam.scene_file import SceneFile
+
+MODES_SHOWN = 10
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command; returns the exit code."""
+    try:
+        from fembeam.support import interrupts
+
+        warned.clear()
+        write_anywhere()
+        with interrupts.listening():
+            arguments = _parser().parse_args(argv)
+            with warnings.catch_warnings():
+                warnings.simplefilter("default", UserWarning)
+                warnings.showwarning = show_warning
+                code = int(arguments.command(arguments))
+                sys.stdout.flush()
+                return code
+    except BrokenPipeError:  # the reader of a table has seen enough
+        sys.stdout = None  # type: ignore[assignment]
+        return FAILED
+    except KeyboardInterrupt:
+        say("interrupted; files that were written are whole")
+        return interrupted()
+    except Exception as error:
+        return _failed(error)
+
+
+def _failed(error: Exception) -> int:
+    """Say what is wrong; a traceback is for faults of this library only."""
+    from fembeam.support import interrupts
+
+    if interrupts.heard():  # a compiler that is stopped in the middle raises what it likes
+        say("interrupted; files that were written are whole")
+        return interrupted()
+    if isinstance(error, OSError) and error.filename is None:  # a full disk behind stdout
+        sys.stdout = None  # type: ignore[assignment]
+    elif not isinstance(error, (ValueError, TypeError, OSError, ArithmeticError, MemoryError, RuntimeError)):
+        raise error
+    say(f"error: {one_line(error)}")
+    return FAILED if isinstance(error, RuntimeError) or sys.stdout is None else BAD_INPUT
+
+
+def _parser() -> argparse.ArgumentParser:
+    """Commands and options."""
+    import argparse
+    from pathlib import Path
+
+    parser = argparse.ArgumentParser(
+        prog="fembeam",
+        description="Beams that meet stops: simulate a scene file. Tables go to stdout, messages to stderr.",
+        epilog=EXIT_CODES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"fembeam {__version__}")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    def command(name: str, does: Any, about: str, scene: bool = True) -> argparse.ArgumentParser:
+        made = commands.add_parser(name, help=about, description=about)
+        made.set_defaults(command=does)
+        if scene:
+            made.add_argument("scene", metavar="SCENE", type=Path, help="scene file, or a run.npz that came from one")
+            made.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], help="change one value, "
+                              "such as simulate.duration=10 or stops[0].gap=1e-3; may be repeated")  # fmt: skip
+            made.add_argument("--json", action="store_true", help="print JSON instead of tables")
+        return made
+
+    new = command("new", _new, "write an annotated scene file to begin with", scene=False)
+    new.add_argument("path", metavar="SCENE", type=Path)
+    look = command("check", _check, "tell what a scene is: modes, contacts to expect, steps to take, doubtful units")
+    modes = command("modes", _modes, "print natural frequencies, damping, participation")
+    for each in (look, modes):
+        each.add_argument("--modes", metavar="N", type=int, help=f"how many; default: [reduce], else {MODES_SHOWN}")
+    run = command(
+        "run", _run, "run the file's studies; write tables, figures, report.html and, for [simulate], run.npz"
+    )
+    run.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder for the results")
+    run.add_argument("--resume", action="store_true", help="go on in DIR: keep the studies that are finished for this "
+                     "scene, go on with [ensemble] and [branch]; without it all is computed anew")  # fmt: skip
+    run.add_argument("--quiet", action="store_true", help="no progress, no log")
+    compare = command("compare", _compare, "compare the results in two folders", scene=False)
+    compare.add_argument("folders", metavar="DIR", type=Path, nargs=2)
+    compare.add_argument("--out", metavar="DIR", type=Path, help="folder for overlaid figures")
+    compare.add_argument("--json", action="store_true", help="print JSON instead of a table")
+    export = command("export", _export, "write a saved run as CSV: histories and contacts", scene=False)
+    export.add_argument("run", metavar="RUN.npz", type=Path)
+    export.add_argument("--out", metavar="DIR", type=Path, required=True)
+    export.add_argument("--stride", metavar="N", type=int, default=1, help="keep every N-th sample")
+    command("schema", _schema, "print the JSON Schema of scene files", scene=False)
+    return parser
+
+
+def _new(arguments: argparse.Namespace) -> int:
+    """The command `new`."""
+    from fembeam.scene_file import TEMPLATE
+
+    with arguments.path.open("x", encoding="utf-8") as file:  # x: what exists is kept
+        file.write(TEMPLATE.format(name=arguments.path.name))
+    say(f"wrote {arguments.path}; next: fembeam check {arguments.path}")
+    return 0
+
+
+def _schema(_: argparse.Namespace) -> int:
+    """The command `schema`."""
+    from fembeam.scene_file import json_schema
+
+    _print(json_schema(), True)
+    return 0
+
+
+def _check(arguments: argparse.Namespace) -> int:
+    """The command `check`."""
+    from fembeam.cli.check import check
+    from fembeam.cli.run import reduced
+
+    file = _read(arguments)
+    found = check(file, reduced(file, **_wanted(file, arguments.modes)))
+    for doubt in found.warnings:
+        show_warning(doubt)
+    _print(found.plain() | {"warnings": warned} if arguments.json else found, arguments.json)
+    return 0
+
+
+def _modes(arguments: argparse.Namespace) -> int:
+    """The command `modes`."""
+    from fembeam.cli.modes import mode_rows, mode_table
+    from fembeam.cli.run import reduced
+
+    file = _read(arguments)
+    wanted = dict(file.reduce)
+    if arguments.modes is None and not {"modes", "omega_max", "mass_share"} & set(wanted):
+        wanted["modes"] = MODES_SHOWN
+    model = reduced(file, **(wanted if arguments.modes is None else _wanted(file, arguments.modes)))
+    _print(mode_rows(model) if arguments.json else mode_table(model), arguments.json)
+    return 0
+
+
+def _compare(arguments: argparse.Namespace) -> int:
+    """The command `compare`."""
+    from fembeam.results import compare
+
+    found = compare.compare(*arguments.folders)
+    _print(compare.plain(found) if arguments.json else compare.table(found, *arguments.folders), arguments.json)
+    if arguments.out:
+        written = compare.write_figures(arguments.folders[0], arguments.folders[1], arguments.out)
+        say(f"wrote {', '.join(p.name for p in written) or 'no figure: only one folder has a run'} to {arguments.out}")
+    return 0
+
+
+def _export(arguments: argparse.Namespace) -> int:
+    """The command `export`."""
+    from fembeam.model import load
+    from fembeam.results import files as report
+
+    run = load(arguments.run)
+    written = run.to_csv(report.prepared(arguments.out), arguments.stride)
+    say(f"wrote {', '.join(path.name for path in written)} to {arguments.out}")
+    return 0
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    """The command `run`."""
+    from fembeam.cli import run as cli_run
+    from fembeam.results import files as report
+
+    file = _read(arguments)
+    job = cli_run.Job(file, report.prepared(arguments.out), arguments.resume, arguments.quiet, arguments.json)
+    return cli_run.run(job)
+
+
+def _read(arguments: argparse.Namespace) -> SceneFile:
+    """The scene file with its overrides."""
+    from fembeam import scene_file
+
+    return scene_file.read(arguments.scene, arguments.set)
+
+
+def _wanted(file: SceneFile, modes: int | None) -> dict[str, Any]:
+    """The arguments of [reduce], with another number of modes if one is given."""
+    return (
+        dict(file.reduce) if modes is None else {**file.reduce, "modes": modes, "omega_max": None, "mass_share": None}
+    )
+
+
+def _print(found: Any, as_json: bool) -> None:
+    """On stdout."""
+    from fembeam.results.files import print_json
+
+    if as_json:
+        print_json(found)
+    else:
+        print(found)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,244 @@
+"""The command `fembeam run`: every study of a scene file into a result folder, one after the other.
+
+A study that fails does not keep the others from being done; a signal does. What is computed is written before it is
+printed, and the record of the folder says what is finished, so that `--resume` goes on from there.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fembeam.cli.messages import BAD_INPUT, FAILED, interrupted, one_line, say, warned
+from fembeam.results import files as report
+from fembeam.results import folder as folders
+from fembeam.support import interrupts
+
+if TYPE_CHECKING:
+    from fembeam.model import Model, Run
+    from fembeam.scene_file import SceneFile
+
+
+@dataclass(frozen=True)
+class Job:
+    """What to do: the scene, where to, and how."""
+
+    file: SceneFile
+    folder: Path
+    resume: bool = False
+    quiet: bool = False
+    json: bool = False
+
+
+@dataclass
+class Outcome:
+    """What became of a study: exit code, what it found as JSON has it and as text, its files, whether to go on."""
+
+    code: int = 0
+    found: Any = None
+    text: str = ""
+    files: list[Path] = field(default_factory=list)
+    last: bool = False
+
+
+def run(job: Job) -> int:
+    """All studies and the report; returns the exit code.
+
+    Raises
+    ------
+    ValueError : no study in the file, or dear results in the folder that would be lost.
+    """
+    studies = sorted(job.file.studies, key="simulate".__ne__)  # the cheapest one first
+    if not studies:
+        raise ValueError(f"{job.file.path}: needs a study, such as a table [simulate] with duration and dt")
+    if not job.resume:
+        _refuse_to_lose(job, studies)
+    code, found, files = 0, {}, []
+    for name in studies:
+        outcome = _studied(job, name)
+        if outcome.text and not job.json:
+            print(outcome.text)
+        code, found[name] = code or outcome.code, outcome.found
+        files += outcome.files
+        if outcome.last:
+            break
+    if files:
+        code = _report(job, files) or code
+    if job.json:
+        report.print_json(found)
+    return code or (interrupted() if interrupts.heard() else 0)
+
+
+def _refuse_to_lose(job: Job, studies: list[str]) -> None:
+    """Checkpoints hold hours of work: they are gone on with, or removed by their owner."""
+    for name in studies:
+        path = job.folder / f"{name}.npz"
+        if hasattr(job.file.studies[name], "write") and path.exists():
+            raise ValueError(f"{path} holds results of [{name}]: add --resume to go on with them, delete it to begin "
+                             "anew, or choose another folder")  # fmt: skip
+
+
+def _report(job: Job, files: list[Path]) -> int:
+    """Write the page."""
+    from fembeam.results import html_page as html
+
+    try:
+        with interrupts.deferred():
+            html.write_page(job.folder, job.file.source, _warnings(job, files), files)
+    except OSError as error:
+        return _unwritten(error).code
+    return 0
+
+
+def _warnings(job: Job, files: list[Path]) -> list[str]:
+    """What this command warned of, and the simulation that was kept."""
+    summary = job.folder / "summary.json"
+    before = json.loads(summary.read_text(encoding="utf-8")).get("warnings", []) if summary in files else []
+    return list(dict.fromkeys([*before, *warned]))
+
+
+def _studied(job: Job, name: str) -> Outcome:
+    """One study, kept or computed, its end recorded."""
+    scene = folders.digest(job.file, name)
+    if job.resume and (files := folders.kept(job.folder, name, scene)):
+        if not job.quiet:
+            say(f"[{name}] is done already; its results are kept")
+        return _known(job, name, files)
+    try:
+        folders.record(job.folder, name, scene, [])
+        outcome = _simulation(job) if name == "simulate" else _computed(job, name)
+        with interrupts.deferred():
+            folders.record(job.folder, name, scene, [] if outcome.code else outcome.files)
+    except OSError as error:
+        return _unwritten(error)
+    except KeyboardInterrupt:
+        say(f"interrupted in [{name}]; files that were written are whole" + _goes_on(job, name))
+        return Outcome(interrupted(), last=True)
+    if interrupts.heard():
+        outcome.code, outcome.last = outcome.code or interrupted(), True
+    return outcome
+
+
+def _goes_on(job: Job, name: str) -> str:
+    """How to go on."""
+    return f"; --resume goes on from {name}.npz" if (job.folder / f"{name}.npz").exists() else ""
+
+
+def _known(job: Job, name: str, files: list[Path]) -> Outcome:
+    """What a finished study left."""
+    known = {path.name: path for path in files}
+    found = json.loads(known["summary.json" if name == "simulate" else f"{name}.json"].read_text(encoding="utf-8"))
+    text = report.text(found) if name == "simulate" else known[f"{name}.txt"].read_text(encoding="utf-8").rstrip()
+    return Outcome(0, found, text, files)
+
+
+def _computed(job: Job, name: str) -> Outcome:
+    """A study other than [simulate]."""
+    import solvers
+    from fembeam.study import NotMetError
+
+    study, code = job.file.studies[name], 0
+    try:
+        if hasattr(study, "write"):  # goes on where an interrupted one left its files
+            result = study.run(reduced(job.file, **job.file.reduce), job.folder, progress=not job.quiet)
+        else:
+            result = study.run(job.file.scene)
+        code = FAILED if getattr(result, "failures", None) else 0
+    except NotMetError as error:
+        result, code = error.evidence, FAILED
+        say(f"error: {one_line(error)}")
+    except (solvers.SolverError, RuntimeError) as error:
+        if interrupts.heard():  # a compiler that is stopped in the middle raises what it likes
+            raise KeyboardInterrupt from error
+        say(f"error: [{name}]: {one_line(error)}")
+        return Outcome(FAILED)
+    except (ValueError, TypeError, ArithmeticError, MemoryError) as error:
+        say(f"error: {_placed(job.file, f'[{name}]', error)}")
+        return Outcome(BAD_INPUT)
+    outcome = Outcome(code, None if hasattr(study, "write") else report.plain(result), str(result))
+    try:
+        with interrupts.deferred():
+            outcome.files = [report.write_text(job.folder / f"{name}.txt", outcome.text)]
+            if hasattr(study, "write"):
+                outcome.files += study.write(result, job.folder)
+            else:
+                outcome.files += report.write_study(result, job.folder, name)
+            outcome.found = json.loads((job.folder / f"{name}.json").read_text(encoding="utf-8"))
+    except OSError as error:
+        outcome.code, outcome.last = _unwritten(error).code, True
+    _wrote(job, outcome.files)
+    return outcome
+
+
+def _simulation(job: Job) -> Outcome:
+    """The study [simulate]."""
+    begin, study = time.perf_counter(), job.file.studies["simulate"]
+    model = reduced(job.file, **job.file.reduce)
+    if not job.quiet:
+        say(f"{len(model.omega)} modes: " + ", ".join(f"{w:.6g}" for w in model.omega) + " rad/s")
+    with interrupts.deferred():
+        try:
+            done, code = _simulated(job.file, model, not job.quiet)
+        except (ValueError, TypeError, ArithmeticError, MemoryError) as error:
+            say(f"error: {_placed(job.file, '[simulate]', error)}")
+            return Outcome(BAD_INPUT)
+        found = report.summary(done, study.discard, time.perf_counter() - begin)
+        outcome = Outcome(code, found, report.text(found))
+        try:
+            outcome.files = report.write(done, job.folder, study.discard, {**found, "warnings": list(warned)})
+        except OSError as error:
+            outcome.code, outcome.last = _unwritten(error).code, True
+            return outcome
+    if code:
+        say(f"{done.status}; wrote what was computed to {job.folder}")
+    elif not job.quiet:
+        spent = f"{done.cost.seconds:.3g} s of {time.perf_counter() - begin:.3g} s"
+        say(f"{len(done.contacts)} contacts in {done.t[-1]:g} s, integrated in {spent}")
+        _wrote(job, outcome.files)
+    return outcome
+
+
+def _simulated(file: SceneFile, model: Model, progress: bool) -> tuple[Run, int]:
+    """The run and the exit code: a failed or interrupted one is partial."""
+    from dataclasses import replace
+
+    import solvers
+    from fembeam.model import Run
+
+    study = file.studies["simulate"]
+    try:
+        run = model.simulate(study.duration, study.dt, solver=study.solver, progress=progress)
+        code = 0 if run.complete else interrupted()
+    except solvers.SolverError as error:
+        say(f"error: {one_line(error)}")
+        run, code = Run.of(model.lasting(study.duration), error.solution), FAILED
+    return replace(run, source=file.source), code
+
+
+def reduced(file: SceneFile, **arguments: Any) -> Model:
+    """The reduced model; what is wrong is said with the file."""
+    try:
+        return file.scene.reduce(**arguments)
+    except (ValueError, TypeError, RuntimeError) as error:  # RuntimeError: modes that cannot be computed
+        raise ValueError(_placed(file, "[reduce]", error)) from error
+
+
+def _placed(file: SceneFile, where: str, error: Exception) -> str:
+    """An error with its line in the file, unless it says so already."""
+    said = one_line(error)
+    return said if said.startswith(str(file.path)) else f"{file.source.place(where, said)}: {said}"
+
+
+def _wrote(job: Job, files: list[Path]) -> None:
+    """Say which files there are now."""
+    if files and not job.quiet:
+        say(f"wrote {', '.join(path.name for path in files)} to {job.folder}")
+
+
+def _unwritten(error: OSError) -> Outcome:
+    """Say that results could not be written; there is no use in going on."""
+    say(f"error: results cannot be written: {one_line(error)}; files that were written are whole")
+    return Outcome(FAILED, last=True)

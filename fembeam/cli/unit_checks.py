@@ -1,0 +1,113 @@
+"""Numbers of a scene that look like another unit: a modulus in N/mm², hertz for rad/s, grams for kilograms."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fembeam.scene import signals_of
+
+if TYPE_CHECKING:
+    from fembeam.beams import Beam
+    from fembeam.model import Model
+    from fembeam.scene import Scene
+    from fembeam.scene_file import SceneFile
+
+
+def doubts(file: SceneFile, model: Model) -> list[str]:
+    """What to look at twice, sentences."""
+    scene = file.scene
+    return [*of_beam(scene.beam), *of_features(scene), *of_loads(scene, model), *of_study(file, model)]
+
+
+def of_beam(beam: Beam) -> list[str]:
+    """Modulus, density, section and length.
+
+    Examples
+    --------
+    >>> from fembeam import Beam, Section
+    >>> of_beam(Beam(0.3, Section.circle(E=2.1e5, rho=7800, diameter=0.01)))
+    ['E = 210000 N/m² looks like N/mm²: steel has 2.1e11 N/m²']
+    """
+    found = []
+    middles = (np.array(beam.borders[:-1]) + np.array(beam.borders[1:])) / 2
+    profile = beam.profile(middles)
+    A, I = np.asarray(profile.A), np.asarray(profile.I)
+    E, rho = np.asarray(profile.E), np.asarray(profile.rho)
+    if E.min() < 1e6:
+        found.append(f"E = {E.min():.6g} N/m² looks like N/mm²: steel has 2.1e11 N/m²")
+    if E.max() > 2e12:
+        found.append(f"E = {E.max():.6g} N/m² is stiffer than diamond (1.2e12 N/m²)")
+    if rho.min() < 12:
+        found.append(f"rho = {rho.min():.6g} kg/m³ looks like g/cm³ or t/mm³: steel has 7800 kg/m³")
+    if rho.max() > 30_000:
+        found.append(f"rho = {rho.max():.6g} kg/m³ is heavier than osmium (22 600 kg/m³)")
+    shape = I / A**2
+    if shape.min() < 1e-5 or shape.max() > 1e3:
+        worst = shape.min() if shape.min() < 1e-5 else shape.max()
+        found.append(f"I/A² = {worst:.2g}, where a square has 0.08: is one of them in mm² or mm⁴?")
+    slenderness = beam.length / math.sqrt(float((I / A).max()))
+    if slenderness < 35:  # ten times the height of a rectangle
+        found.append(f"the beam is {slenderness / math.sqrt(12):.2g} times as long as high: shear is not modelled")
+    if beam.length >= 1000:
+        found.append(f"length = {beam.length:g} m looks like mm")
+    return found
+
+
+def of_features(scene: Scene) -> list[str]:
+    """Masses, gaps and damping."""
+    found = []
+    z = np.linspace(0, scene.beam.length, 101)
+    weight = float(np.mean(scene.beam.line_mass(z)) * scene.beam.length)
+    for i, mass in enumerate(scene.masses):
+        if mass.mass > 1000 * weight:
+            found.append(f"masses[{i}] = {mass.mass:g} kg is {mass.mass / weight:.2g} times the beam: is it in grams?")
+    for i, stop in enumerate(scene.stops):
+        if abs(stop.gap) > 0.2 * scene.beam.length:
+            found.append(f"stops[{i}]: a gap of {stop.gap:g} m on a beam of {scene.beam.length:g} m: is it in mm?")
+    ratios = np.atleast_1d(np.asarray(getattr(scene.damping, "zeta", 0.0), dtype=float))
+    if ratios.max() >= 0.5:
+        found.append(f"zeta = {ratios.max():g} looks like per cent: 1 is critical damping")
+    return found
+
+
+def of_loads(scene: Scene, model: Model) -> list[str]:
+    """Amplitudes and frequencies of what drives the scene."""
+    from fembeam.cli.check import highest_driven
+
+    found = []
+    for path, signal in signals_of(scene).items():
+        size = getattr(signal, "std", getattr(signal, "amplitude", 0.0))
+        if path.endswith(("base", "foot")) and not callable(size) and np.max(np.abs(size)) > scene.beam.length:
+            found.append(f"{path} moves by {np.max(np.abs(size)):g} m, more than the beam is long: is it in mm?")
+    top = highest_driven(scene)
+    if 0 < top < math.inf:
+        near = model.omega[np.abs(2 * math.pi * top / np.maximum(model.omega, 1e-300) - 1) < 0.02]
+        if len(near):
+            found.append(
+                f"omega = {top:g} rad/s looks like Hz: a mode has {near[0]:.6g} rad/s, {near[0] / 2 / math.pi:.4g} Hz"
+            )
+        if top > 1.05 * float(model.omega.max()):
+            found.append(f"loads reach {top:g} rad/s, the highest mode kept has {model.omega.max():.6g} rad/s")
+    return found
+
+
+def of_study(file: SceneFile, model: Model) -> list[str]:
+    """Sampling and length of [simulate]."""
+    study: Any = file.studies.get("simulate")
+    if study is None:
+        return []
+    found = []
+    fastest = float(model.omega.max())
+    if study.dt * fastest > math.pi:
+        found.append(f"dt = {study.dt:g} s samples the highest mode kept less than twice a period, spectra are folded: "
+                     f"take {math.pi / (2 * fastest):.1g} s or less")  # fmt: skip
+    decay = model.zeta * model.omega
+    slowest = float(decay[decay > 0].min()) if np.any(decay > 0) else math.inf
+    if study.discard < 3 / slowest < 0.5 * study.duration and signals_of(file.scene):
+        found.append(
+            f"discard = {study.discard:g} s keeps the transient in statistics: it lasts about {3 / slowest:.2g} s"
+        )
+    return found

@@ -1,0 +1,172 @@
+"""Periodic signals as equally spaced lines, shared by noise and measured records, and the checks signals share.
+
+    s(t) = Re Σ_j a_j exp(i (first + j) Δω t)
+
+The lines are known, hence every derivative is exact: multiply by (i k Δω)^n.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fembeam.support import number
+
+HERMITE_CONSTANT = 46080.0  # |error| <= h^6/46080 max|s^(6)| for the quintic Hermite interpolant: 6! * 2^6
+HERMITE_RMS = math.sqrt(math.factorial(13))  # rms of the error <= h^6/√13! rms of s^(6): see `LineSpectrum.nodes`
+HERMITE_MEAN = 100800.0  # mean of (x(1-x))³/720 over a cell is 1/100800: what the interpolant takes off a line
+_CHUNK = 2048
+FINEST_RTOL = 1e-13  # finer is below the rounding of the FFT
+
+
+def checked_band(name: str, band: Any) -> tuple[float, float]:
+    """The band as two floats 0 <= lo < hi, or a clear error."""
+    try:
+        lo, hi = band
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} must be a pair (lo, hi) in rad/s, got {band!r}") from None
+    lo, hi = number(f"{name}[0]", lo, least=0.0), number(f"{name}[1]", hi, least=0.0)
+    if not lo < hi:
+        raise ValueError(f"{name} must run from lo to hi > lo in rad/s, got ({lo:g}, {hi:g}); swap or widen it")
+    return lo, hi
+
+
+def checked_order(order: Any) -> int:
+    """The number of derivatives as an int >= 0, or a clear error."""
+    if isinstance(order, bool) or not isinstance(order, (int, np.integer)) or order < 0:
+        raise ValueError(f"order of the derivative must be an integer of at least 0, got {order!r}")
+    return int(order)
+
+
+@dataclass(frozen=True, eq=False)
+class LineSpectrum:
+    """A periodic signal s(t) = Re Σ_j amplitude_j exp(i (first + j) spacing t).
+
+    Parameters
+    ----------
+    spacing : float
+        Δω in rad/s; the signal repeats after 2π/Δω.
+    first : int
+        Number k >= 1 of the first line.
+    amplitude : complex array, shape (n,)
+        Complex amplitudes of the lines first, first + 1, …
+    """
+
+    spacing: float
+    first: int
+    amplitude: NDArray[np.complex128]
+
+    @property
+    def omega(self) -> NDArray[np.float64]:
+        """Angular frequencies of the lines in rad/s, shape (n,)."""
+        return self.spacing * (self.first + np.arange(self.amplitude.size, dtype=np.float64))
+
+    @property
+    def top(self) -> int:
+        """Number of the highest line."""
+        return self.first + self.amplitude.size - 1
+
+    @property
+    def period(self) -> float:
+        """Seconds after which the signal repeats."""
+        return 2 * math.pi / self.spacing
+
+    @property
+    def rms(self) -> float:
+        """Root mean square over one period, exact by Parseval."""
+        return math.sqrt(0.5 * float(np.sum(self.amplitude.real**2 + self.amplitude.imag**2)))
+
+    def derivative(self, order: int) -> LineSpectrum:
+        """d^order s/dt^order; a negative order integrates, without constants."""
+        unit = (1, 1j, -1, -1j)[order % 4]  # i^order without rounding
+        return replace(self, amplitude=unit * self.omega**order * self.amplitude)
+
+    def grid(self, n: int) -> NDArray[np.float64]:
+        """One period at n > 2 top equally spaced instants from t = 0, by FFT."""
+        from scipy.fft import irfft
+
+        half = np.zeros(n // 2 + 1, dtype=np.complex128)
+        half[self.first : self.top + 1] = self.amplitude / 2
+        return irfft(half, n, norm="forward")
+
+    def at(self, t: ArrayLike) -> Any:
+        """The sum at any instants; exp(i k Δω t) is split in k = a + b, which leaves a matrix product."""
+        times = np.asarray(t, dtype=np.float64)
+        width = math.ceil(math.sqrt(self.amplitude.size))
+        rows = math.ceil(self.amplitude.size / width)
+        table = np.zeros(rows * width, dtype=np.complex128)
+        table[: self.amplitude.size] = self.amplitude
+        low = 1j * self.spacing * np.arange(width)
+        high = 1j * self.spacing * (self.first + width * np.arange(rows))
+        flat, result = times.ravel(), np.empty(times.size)
+        chunk = max(1, 2**19 // width)  # some tens of MB at a time
+        for i in range(0, times.size, chunk):
+            part = flat[i : i + chunk, None]
+            inner = np.exp(low * part) @ table.reshape(rows, width).T
+            result[i : i + chunk] = np.einsum("ij,ij->i", np.exp(high * part), inner).real
+        return result.reshape(times.shape)[()]
+
+    def nodes(self, duration: float, rtol: float) -> tuple[float, NDArray[np.float64]]:
+        """Rows [s, s', s''] so dense that quintic Hermite interpolation errs by at most rtol in rms over the period.
+
+            rms(error)² = ½ Σ |a_k|² ∫|e_k|² dx,    |e_k(x)| <= (ω_k h)^6 (x(1-x))³/720,    ∫(x(1-x))⁶ dx = 6!²/13!
+
+        Errors of different lines are orthogonal, because no two of them look alike on a grid of n > 2 top points.
+        Lines are raised beforehand by what the interpolant takes off them, (ω_k h)^6/100800: what is left of the error
+        lies beyond the grid's own frequency, where no structure follows.
+        """
+        from scipy.fft import irfft
+
+        if not FINEST_RTOL <= rtol < 1:
+            raise ValueError(f"rtol must lie in [{FINEST_RTOL:g}, 1), got {rtol!r}")
+        _keep_freed_memory()
+        combs, n = self._combs(rtol)
+        dt = self.period / (combs * n)
+        count = math.ceil(duration / dt) + 1
+        wanted = math.ceil(count / combs)
+        values = np.empty((wanted, combs, 3))
+        # comb j holds the nodes j, j + combs, …: short transforms, of all three rows at once, that stay in the cache
+        half = np.zeros((3, n // 2 + 1), dtype=np.complex128)
+        rows, rate = half[:, self.first : self.top + 1], 1j * self.omega
+        np.multiply(self.amplitude, 0.5 + 0.5 / HERMITE_MEAN * (self.omega * dt) ** 6, out=rows[0])
+        np.multiply(rate, rows[0], out=rows[1])
+        np.multiply(rate, rows[1], out=rows[2])
+        turn = np.exp(dt * rate)
+        for comb in range(combs):
+            _interleave(irfft(half, n, norm="forward"), values[:, comb])
+            rows *= turn
+        nodes = values.reshape(-1, 3)[:count]
+        nodes[combs * n :] = nodes[: max(0, count - combs * n)]  # the last node may close the period
+        return dt, nodes
+
+    def _combs(self, rtol: float) -> tuple[int, int]:
+        """How many combs of how many nodes the period takes: each holds the highest line, together they keep rtol."""
+        from scipy.fft import next_fast_len
+
+        sixth = self.derivative(6).rms
+        widest = (HERMITE_RMS * rtol * self.rms / sixth) ** (1 / 6) if sixth > 0 else self.period
+        fewest, needed = 2 * self.top + 1, self.period / widest
+        combs = max(1, int(needed / fewest))
+        return combs, next_fast_len(max(math.ceil(needed / combs), fewest), real=True)
+
+
+def _interleave(rows: NDArray[np.float64], columns: NDArray[np.float64]) -> None:
+    """Write as much of rows (3, n) into columns (m, 3) as fits, piece by piece, within the cache."""
+    n = min(rows.shape[1], len(columns))
+    for i in range(0, n, _CHUNK):
+        columns[i : min(i + _CHUNK, n)] = rows[:, i : min(i + _CHUNK, n)].T
+
+
+@cache
+def _keep_freed_memory() -> None:
+    """Have arrays below 32 MB use again what was freed, where the C library is glibc.
+
+    It hands what is freed back to the system beyond a threshold, twice the largest block freed so far (mallopt(3)). For
+    the tables and samples of every realisation fresh pages would come and go, which takes as long as the transforms.
+    """
+    np.empty(2**22 - 2**12)  # never written to: it takes no memory

@@ -1,0 +1,207 @@
+"""Orbits of a model along one scalar of its scene; saved whole, and gone on with from a file."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+import solvers
+from fembeam.model.orbit import Orbit, checked_period, load_period, orbit
+from fembeam.scene import changes_structure, path_of, replaced, value_of
+from fembeam.support import require, written_whole
+from solvers.branches import restored
+
+if TYPE_CHECKING:
+    from fembeam.model.model import Model
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """A model whose scene has one number varied: parameter -> (system, period), as `solvers.branch` wants it."""
+
+    model: Model
+    name: str
+    period: int
+    kept: dict[float, tuple[solvers.System, float]] = field(default_factory=dict, repr=False)
+
+    def at(self, parameter: float) -> Model:
+        """The model at a value of the parameter."""
+        scene = replaced(self.model.scene, self.name, parameter)
+        return self.model.again(scene) if changes_structure(self.name) else replace(self.model, scene=scene)
+
+    def __call__(self, parameter: float) -> tuple[solvers.System, float]:
+        """The system and its period, s; the latest are kept, because Newton's method asks for them again."""
+        if parameter not in self.kept:
+            scene = replaced(self.model.scene, self.name, parameter)
+            if changes_structure(self.name):
+                system = self.model.again(scene).system
+            else:
+                system = self.model.system_like(scene)
+            while len(self.kept) >= 8:
+                self.kept.pop(next(iter(self.kept)))
+            self.kept[parameter] = system, self.period * load_period(scene)
+        return self.kept[parameter]
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """Orbits along a parameter, computed as they are asked for; iterate over it, or call `run`.
+
+    Attributes
+    ----------
+    family : the model and its varied parameter. found : the `solvers.Branch`.
+    """
+
+    family: Family
+    found: solvers.Branch
+
+    def _orbit(self, one: solvers.Orbit) -> Orbit:
+        """One of the orbits, with the model it belongs to; made once."""
+        known = self.found.kept
+        if id(one) not in known:
+            known[id(one)] = Orbit(self.family.at(one.parameter), one, self.family.period)
+        return known[id(one)]  # type: ignore[no-any-return]
+
+    def __iter__(self) -> Iterator[Orbit]:
+        """Known orbits, then new ones."""
+        return (self._orbit(one) for one in self.found)
+
+    def run(self, progress: bool = False) -> Branch:
+        """Compute all of it; after Ctrl-C what was found is kept, and another call goes on."""
+        from tqdm import tqdm
+
+        with tqdm(self.found, unit=" orbits", disable=None if progress else True) as bar:
+            for one in bar:
+                bar.set_postfix_str(f"{self.family.name} = {one.parameter:.6g}", refresh=False)
+        return self
+
+    @property
+    def orbits(self) -> list[Orbit]:
+        """What is known so far, from one end of the branch to the other."""
+        return [self._orbit(one) for one in self.found.orbits]
+
+    @property
+    def special(self) -> list[Orbit]:
+        """Folds, flips, Neimark–Sacker, branch and grazing points."""
+        return [one for one in self.orbits if one.mark]
+
+    @property
+    def status(self) -> str:
+        """How each direction ended, in words."""
+        return "; ".join(status.value for status in self.found.status)
+
+    @property
+    def parameter(self) -> Vector:
+        """(k,) values along the branch."""
+        return np.array([one.parameter for one in self.found.orbits])
+
+    @property
+    def stable(self) -> Any:
+        """(k,) whether each orbit is stable."""
+        return np.array([one.stable for one in self.found.orbits])
+
+    def extremes(self, z: float) -> Vector:
+        """(k, 2) lowest and highest displacement at z, m."""
+        return np.array([one.extremes(z) for one in self.orbits])
+
+    def doubled(self, flip: Orbit) -> Branch:
+        """The branch of twice the period that is born at a flip of this one."""
+        family = replace(self.family, period=2 * self.family.period)
+        return Branch(family, self.found.doubled(flip.found))
+
+    def table(self) -> list[dict[str, Any]]:
+        """One row per orbit: parameter, period, stability, largest multiplier, impacts, peaks, residual, mark."""
+        rows = []
+        for one in self.found.orbits:
+            log, largest = one.contacts, one.multipliers[0]
+            rows.append({
+                self.family.name: one.parameter,
+                "period": self.family.period,
+                "stable": one.stable,
+                "largest multiplier": abs(largest),
+                "its angle": float(np.angle(largest)),
+                "impacts": len(log),
+                "peak indentation": float(log.peak_indentation.max(initial=0.0)),
+                "peak force": float(log.peak_force.max(initial=0.0)),
+                "residual": one.residual,
+                "mark": one.mark,
+            })  # fmt: skip
+        return rows
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write the table; the file is written whole or not at all."""
+        rows, text = self.table(), io.StringIO()
+        writer = csv.DictWriter(text, fieldnames=list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+        with written_whole(Path(path)) as file:
+            file.write(text.getvalue().encode())
+
+    def __str__(self) -> str:
+        """Special orbits and how each direction ended."""
+        rows = [f"{one.mark:>15}  {self.family.name} = {one.parameter:.9g}" for one in self.found.special]
+        stable = int(np.sum(self.stable))
+        head = f"{len(rows)} special among {len(self.parameter)} orbits of period {self.family.period}, {stable} stable"
+        return "\n".join([head, *rows, self.status])
+
+    def save(self, path: str | Path) -> None:
+        """Write all that is known as .npz, enough to go on from; written whole or not at all."""
+        arms = []
+        for arm in self.found.arms:
+            arms.append([
+                {"parameter": one.parameter, "state": one.state.tolist(), "phase": one.phase, "mark": one.mark,
+                 "residual": one.residual, "iterations": one.iterations}
+                for one in arm.orbits
+            ])  # fmt: skip
+        record = {
+            **{"name": self.family.name, "period": self.family.period, "scene": repr(self.family.model.scene)},
+            **{"modes": list(self.family.model.modes), "span": self.found.arms[0].span},
+            **{"step": self.found.arms[0].largest, "status": [s.name for s in self.found.status], "arms": arms},
+        }
+        with written_whole(Path(path)) as file:
+            np.savez_compressed(file, branch=np.array(json.dumps(record)))
+
+
+def follow(
+    model: Model,
+    parameter: str,
+    span: tuple[float, float],
+    period: int,
+    start: ArrayLike | Orbit | None,
+    at: float | None,
+    options: dict[str, Any],
+) -> Branch:
+    """See `Model.branch`."""
+    family = Family(model, path_of(model.scene, parameter), checked_period(period))
+    low, high = (float(value) for value in span)
+    require(low < high, "span must be two values, ascending", span, "Model.branch", "give (lowest, highest)")
+    if at is None:
+        present = start.parameter if isinstance(start, Orbit) else np.nan
+        at = value_of(model.scene, family.name) if np.isnan(present) else present
+        at = at if low <= at <= high else low
+    first = start if isinstance(start, Orbit) else orbit(family.at(at), family.period, start, None)
+    return Branch(family, solvers.branch(family, (low, high), first.found, at=at, **options))
+
+
+def resumed(model: Model, path: str | Path) -> Branch:
+    """A saved branch of this model, ready to be gone on with."""
+    with np.load(path, allow_pickle=False) as file:
+        require(
+            "branch" in file, f"{path} holds no branch", sorted(file), "Model.resume", "give what Branch.save wrote"
+        )
+        record = json.loads(str(file["branch"]))
+    same = record["scene"] == repr(model.scene) and tuple(record["modes"]) == tuple(model.modes)
+    require(same, f"{path} belongs to another scene or other modes", record["modes"], "Model.resume",
+            f"use the model of {record['scene']}")  # fmt: skip
+    family = Family(model, record["name"], record["period"])
+    return Branch(family, restored(family, tuple(record["span"]), record["arms"], record["status"], record["step"]))

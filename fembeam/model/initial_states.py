@@ -1,0 +1,153 @@
+"""Starts of a motion: at rest, from given fields, from static equilibrium with contact.
+
+q = Φᵀ M u,    K q = f + Σ w_s F_s(-w_s·q - gap_s)
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+import reduction
+from fembeam.support import require, require_finite
+
+if TYPE_CHECKING:
+    from fembeam.model.model import Field, Model
+    from fembeam.scene import Matrices
+
+Vector = NDArray[np.float64]
+
+MISSED = 0.01  # of a field in the mass norm; more gets a warning
+SETTLED = 1e-12  # of the forces at work: an equilibrium
+MOST_STEPS = 2000
+
+
+def rest(model: Model) -> Vector:
+    """[q, q_dot] (2n,): zero but for the impactors' velocities."""
+    start = np.zeros(2 * len(model.omega))
+    if strikers := model.matrices.impactors:
+        start[-len(strikers) :] = [np.sqrt(impactor.mass) * impactor.velocity for impactor in strikers]
+    return start
+
+
+def state(model: Model, displacement: Field | Sequence[Field], velocity: Field | Sequence[Field]) -> Vector:
+    """Start from fields; `Model.state` explains it."""
+    start, n = rest(model), len(model.omega)
+    for name, field, part in (("displacement", displacement, slice(0, n)), ("velocity", velocity, slice(n, 2 * n))):
+        full = _nodal(model, field)
+        start[part] += model.basis.project(model.matrices.M @ full)
+        lost = _missed(model, full)
+        if lost > MISSED:
+            warnings.warn(f"{lost:.1%} of the {name} (mass norm) in Model.state is not represented by the kept modes; "
+                          "keep more modes", UserWarning, stacklevel=3)  # fmt: skip
+    _check_strikers(model, start[:n])
+    return start
+
+
+def missed(model: Model, field: Field | Sequence[Field]) -> float:
+    """‖u - Φq‖/‖u‖ in the mass norm."""
+    return _missed(model, _nodal(model, field))
+
+
+def _missed(model: Model, full: Vector) -> float:
+    """The same of nodal values."""
+    M = model.matrices.M
+    size = float(full @ (M @ full))
+    left = full - model.basis.expand(model.basis.project(M @ full))
+    return float(np.sqrt(max(left @ (M @ left), 0.0) / size)) if size > 0 else 0.0
+
+
+def _nodal(model: Model, field: Field | Sequence[Field]) -> Vector:
+    """Values (N,) on all free dofs; impactors 0."""
+    beams = model.matrices.beams
+    fields = list(field) if isinstance(field, Sequence) else [field, *[None] * (len(beams) - 1)]
+    require(len(fields) == len(beams), f"fields must be {len(beams)}, one for each beam", len(fields), "Model.state",
+            "give None for a beam at rest")  # fmt: skip
+    parts = [_on_nodes(beam, one) for beam, one in zip(beams, fields, strict=True)]
+    return np.concatenate([*parts, np.zeros(len(model.matrices.impactors))])
+
+
+def _on_nodes(beam: Matrices, field: Field) -> Vector:
+    """A field's values and slopes, those of a cubic spline through the nodes, on a beam's free dofs."""
+    if field is None:
+        return np.zeros(beam.M.shape[0])
+    from scipy.interpolate import CubicSpline
+
+    values = np.broadcast_to(np.asarray(field(beam.nodes), dtype=float), beam.nodes.shape)
+    bad = values[~np.isfinite(values)]
+    require(not bad.size, "the field must be finite on the beam", bad[:1], "Model.state", "check the function")
+    both = np.stack([values, CubicSpline(beam.nodes, values)(beam.nodes, 1)], axis=1)
+    return both[beam.dofs >= 0]
+
+
+def _check_strikers(model: Model, q: Vector) -> None:
+    """Raise ValueError when a field puts a free impactor inside the beam."""
+    for touch, direction in zip(model.touches, model.directions, strict=True):
+        kind, number = touch.on
+        if kind == "impactor" and model.matrices.impactors[number].stiffness == 0:
+            delta = float(-direction @ q - touch.gap)
+            scale = float(np.abs(direction) @ np.abs(q)) + touch.gap
+            require(delta <= 1e-9 * scale, f"impactor {number} (z = {touch.z} m) must start outside the beam: δ ≤ 0",
+                    delta, "Model.state", "widen its gap")  # fmt: skip
+
+
+def equilibrium(model: Model, loads: Mapping[float, float]) -> Vector:
+    """Start from static equilibrium; `Model.equilibrium` explains it."""
+    start, n = rest(model), len(model.omega)
+    load = -model.participation * model.scene.gravity
+    for z, force in loads.items():
+        require_finite(f"force at z = {z} m", force, "Model.equilibrium", "give N, positive up")
+        load = load + force * model.phi(z)
+    free = np.ones(n, dtype=bool)
+    free[n - len(model.matrices.impactors) :] = start[2 * n - len(model.matrices.impactors) :] == 0.0
+    q = np.zeros(n)
+    q[free] = _settled(model, load, free)
+    start[:n] = q
+    return start
+
+
+def _settled(model: Model, load: Vector, free: NDArray[np.bool_]) -> Vector:
+    """Solve r(q) = f + Σ w F - ω² q = 0 by Newton steps damped like time: (1/τ + J) Δq = r.
+
+    τ doubles while it goes well; the damping carries a body that nothing holds yet to the contact that will.
+    """
+    K, f, W = model.omega[free] ** 2, load[free], model.directions[:, free]
+    gaps = np.array([touch.gap for touch in model.touches])
+    laws = [touch.law for touch in model.touches]
+    q = np.zeros(len(f))
+    forces, slopes = _pushed(laws, -W @ q - gaps)
+    residual = f + forces @ W - K * q
+    tau = 1e-3 / max(K.max(initial=0.0), 1e-6)
+    for _ in range(MOST_STEPS):
+        scale = np.abs(f).max(initial=0.0) + np.abs(forces[:, None] * W).max(initial=0.0) + np.abs(K * q).max(initial=0)
+        if np.abs(residual).max(initial=0.0) <= SETTLED * scale:
+            return q
+        J = np.diag(1 / tau + K) + (W.T * slopes) @ W
+        trial = q + np.linalg.solve(J, residual)
+        trial_forces, trial_slopes = _pushed(laws, -W @ trial - gaps)
+        after = f + trial_forces @ W - K * trial
+        if np.linalg.norm(after) <= (1 + 1e-12) * np.linalg.norm(residual):
+            q, forces, slopes, residual, tau = trial, trial_forces, trial_slopes, after, min(2 * tau, 1e300)
+        elif not tau > 1e-30:
+            break
+        else:
+            tau /= 4
+    raise reduction.AccuracyError(
+        f"no static equilibrium found, forces out of balance by {np.abs(residual).max():.3g} (modal) in "
+        "Model.equilibrium; does anything carry the loads?"
+    )
+
+
+def _pushed(laws: list, delta: Vector) -> tuple[Vector, Vector]:
+    """Static forces (m,) and their slopes ∂F/∂δ (m,), the slopes by differences."""
+    force, slope = np.zeros(len(laws)), np.zeros(len(laws))
+    for i, (law, d) in enumerate(zip(laws, delta, strict=True)):
+        if d > 0:
+            step = 1e-6 * d
+            low, force[i], high = (float(f) for f in law.force(np.array([d - step, d, d + step]), 0.0, 1.0))
+            slope[i] = max((high - low) / (2 * step), 0.0)
+    return force, slope

@@ -1,0 +1,390 @@
+"""The reduced model: a scene seen through a few modes, ready to be simulated.
+
+q_i'' + 2 ζ_i ω_i q_i' + ω_i² q_i = -Γ_i (ÿ + g) + Σ φ_i(z_f) f + Σ_s w_si F_s,    u(z, t) = Σ φ_i(z) q_i(t)
+
+Of several bodies each has its own coordinates: the modes of the scene's beam, those of its `bodies`, then √m x for
+every impactor.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+import reduction
+import solvers
+from fembeam.model.shapes import Shapes, Vector
+from fembeam.scene import loads, touches, weight, with_signals
+from fembeam.scene.contact_rows import Touch
+from fembeam.support import require, require_positive
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from fembeam.model.branch import Branch
+    from fembeam.model.orbit import Attractor, Orbit
+    from fembeam.model.run import Run
+    from fembeam.model.section_forces import SectionForces
+    from fembeam.scene import Matrices, Scene
+
+Field = Callable[[Vector], Any] | None  # of displacement in m or velocity in m/s, over z (k,)
+SEEN = ("forces", "springs", "bodies", "impactors")  # parts of a scene besides stops that a system is made of
+UNDRIVEN = ("zeta", "participation", "moving_mass", "section_forces", "touches", "directions")  # whatever drives
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A scene reduced to n coordinates; made by `Scene.reduce`.
+
+    Attributes
+    ----------
+    omega, zeta : (n,) rad/s and damping ratios (the modes' own; dashpots couple modes and come on top). A static
+        shape is a pseudo-mode of high frequency, damped as the next higher mode would be (Rayleigh: by its ω).
+    participation : Γ (n,) = Φᵀ M r in √kg: the load of a base motion y is -Γ ÿ.
+    effective_mass : Γ² (n,) in kg; over all modes it sums to the moving mass.
+    modes : numbers (n,) of the kept modes, 0 the lowest; of each beam after the other, a beam's static shapes last and
+        numbered on; 0 for an impactor.
+    shapes : φ(z) of the scene's own beam; call ``model.phi(z)``. others : the same for its `bodies`.
+    counts : of modes and of static shapes, (modes, static), of each beam.
+    way : arguments of `Scene.reduce` that make it again, with mode numbers instead of criteria.
+    static_share : part of the static compliance that the model keeps at every stop, then at every force; 1 is all.
+    """
+
+    scene: Scene
+    matrices: Matrices
+    basis: reduction.Basis
+    modes: tuple[int, ...]
+    shapes: Shapes
+    counts: tuple[tuple[int, int], ...]
+    others: tuple[Shapes, ...] = ()
+    way: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def omega(self) -> Vector:
+        """Natural frequencies (n,), rad/s."""
+        return self.basis.omega
+
+    @cached_property
+    def zeta(self) -> Vector:
+        """Damping ratios (n,) of the structure without dashpots."""
+        return self._of_each_beam(lambda damping, omega, modes: damping.ratios(omega, modes), self.scene)
+
+    def _of_each_beam(self, ask: Callable[[Any, Vector, tuple[int, ...]], Vector], scene: Scene) -> Vector:
+        """An answer (n,) of each beam's damping for its own modes; 0 for impactors."""
+        answers, done = [], 0
+        for body, count in zip((scene, *scene.bodies), self.counts, strict=True):
+            mine = slice(done, done + sum(count))
+            answers.append(ask(body.damping, self.omega[mine], self.modes[mine]))
+            done += sum(count)
+        return np.concatenate([*answers, np.zeros(len(self.matrices.impactors))])
+
+    @cached_property
+    def participation(self) -> Vector:
+        """Γ (n,) in √kg."""
+        return self.basis.participation(self.matrices.base_load)
+
+    @property
+    def names(self) -> list[str]:
+        """What to call each coordinate: "1" for the lowest mode, "static", "1 of beam 1", "impactor 0"."""
+        names, done = [], 0
+        for body, (count, static) in enumerate(self.counts):
+            of = f" of beam {body}" if body else ""
+            names += [f"{mode + 1}{of}" for mode in self.modes[done : done + count]] + [f"static{of}"] * static
+            done += count + static
+        return names + [f"impactor {i}" for i in range(len(self.matrices.impactors))]
+
+    @property
+    def effective_mass(self) -> Vector:
+        """Γ² (n,) in kg."""
+        return self.participation**2
+
+    def again(self, scene: Scene) -> Model:
+        """Another scene reduced in the same way: the same mode numbers, mesh size and kind of static shapes."""
+        return scene.reduce(**self.way)
+
+    @cached_property
+    def moving_mass(self) -> float:
+        """Sum of the effective masses over all modes, b·M⁻¹ b in kg: what a base motion sets moving."""
+        return reduction.moved_mass(self.matrices.M, self.matrices.base_load)
+
+    @property
+    def static(self) -> int:
+        """Number of residual static shapes."""
+        return sum(static for _, static in self.counts)
+
+    @cached_property
+    def static_share(self) -> Vector:
+        """Σ (bᵀφ_i)²/ω_i² / bᵀK⁻¹b at every stop, then every force (m,)."""
+        rows, full = self.matrices.interpolation(self.scene.loaded_places), self.matrices
+        return reduction.static_share(self.basis, full.M, full.K, rows.T, full.root) if rows.shape[0] else np.zeros(0)
+
+    def strike(self, speed: float, stop: int = 0) -> solvers.ContactLog:
+        """Contacts with one stop when the model swings into it in its first mode, nothing else acting.
+
+        Tells what to expect before a study: contact time ``t_out - t_in`` of the first contact and peak force, and so
+        how many periods of the highest mode a contact lasts.
+
+        Parameters
+        ----------
+        speed : m/s at the stop on arrival, > 0.
+        stop : its number.
+        """
+        require_positive("speed", speed, "Model.strike", "give the speed of arrival in m/s")
+        require(0 <= stop < len(self.scene.stops), f"stop must be below {len(self.scene.stops)}", stop, "Model.strike",
+                "count from 0")  # fmt: skip
+        contact = self.system.contacts[stop]
+        start = np.zeros((2, len(self.omega)))
+        start[:, 0] = np.array([-contact.gap, -speed]) / contact.direction[0]
+        system = solvers.System(self.system.M, self.system.C, self.system.K, [contact])
+        slowest = max(float(self.omega[0]), 1.0)
+        return solvers.integrate(system, *start, np.pi / slowest).contacts
+
+    def phi(self, z: ArrayLike, derivative: int = 0, body: int = 0) -> Vector:
+        """Mass-normalised mode shapes in 1/√kg of a beam (0 the scene's own): (n,) at one z, (k, n) at z (k,)."""
+        return (self.shapes, *self.others)[body](z, derivative)
+
+    @cached_property
+    def section_forces(self) -> tuple[SectionForces, ...]:
+        """Bending moment and shear force per unit of each coordinate, on each beam."""
+        from fembeam.model.section_forces import section_forces
+
+        return tuple(section_forces(self, body) for body in range(len(self.matrices.beams)))
+
+    @cached_property
+    def touches(self) -> list[Touch]:
+        """The contacts in the order of the log: of each beam its stops, then its impactors."""
+        return touches(self.scene, self.matrices)
+
+    @cached_property
+    def directions(self) -> Vector:
+        """(m, n): w of every contact on the coordinates, δ = -w·q - gap."""
+        rows = [self.basis.project(touch.row.T)[:, 0] for touch in self.touches]
+        return np.array(rows).reshape(len(rows), len(self.omega))
+
+    @cached_property
+    def system(self) -> solvers.System:
+        """The matrix-level problem: M = I, C, K = diag(ω²), contacts, loads."""
+        return self.system_of(self.scene)
+
+    def system_of(self, scene: Scene) -> solvers.System:
+        """The problem of a scene that differs from the model's in loads, gaps and laws only."""
+        n = len(self.omega)
+        C = np.diag(self._of_each_beam(lambda damping, omega, modes: damping.modal_coefficients(omega, modes), scene))
+        C = C + self.basis.project_matrix(self.matrices.dashpots)
+        same = self.touches if scene is self.scene else touches(scene, self.matrices)
+        pairs = zip(self.directions, same, strict=True)
+        contacts = [solvers.Contact(direction, touch.law, touch.gap) for direction, touch in pairs]
+        rows = [(self.basis.project(row.T)[:, 0], signal) for row, signal in loads(scene, self.matrices)]
+        return solvers.System(np.eye(n), C, np.diag(self.omega**2), contacts, [*rows, *self._frame_loads(scene)])
+
+    def _frame_loads(self, scene: Scene) -> list[tuple[Vector, Any]]:
+        """Loads of base motion and gravity."""
+        moved = [] if scene.base is None else [(-self.participation, scene.base.derivative(2))]
+        return moved + ([] if scene.gravity == 0.0 else [(-self.participation, weight(scene))])
+
+    def system_like(self, scene: Scene) -> solvers.System:
+        """The same as `system_of`, quicker where only base motion, gaps and laws of the scene's own stops differ."""
+        own, count, frame = self.system, len(self.scene.stops), self._frame_loads(scene)
+        parts = zip(scene.stops, self.scene.stops, strict=True)
+        if (
+            any((new.z, new.side, new.on) != (old.z, old.side, old.on) for new, old in parts)
+            or any(getattr(scene, name) != getattr(self.scene, name) for name in SEEN)
+            or (scene.base is None, scene.gravity == 0.0) != (self.scene.base is None, self.scene.gravity == 0.0)
+        ):
+            return self.system_of(scene)
+        contacts = [
+            contact if new is old else solvers.Contact(contact.direction, new.law, new.gap)
+            for contact, new, old in zip(own.contacts, scene.stops, self.scene.stops, strict=False)
+        ]
+        kept = own.loads[: len(own.loads) - len(frame)]
+        moved = [(vector, signal) for (vector, _), (_, signal) in zip(own.loads[len(kept) :], frame, strict=True)]
+        return own.like([*contacts, *own.contacts[count:]], [*kept, *moved])
+
+    def under(self, scene: Scene) -> Model:
+        """The same model of a scene that differs in its signals only; what does not depend on them is kept."""
+        other = replace(self, scene=scene)
+        kept = {name: self.__dict__[name] for name in UNDRIVEN if name in self.__dict__}
+        other.__dict__.update(kept, system=self.system_like(scene))
+        return other
+
+    def rest(self) -> Vector:
+        """The start [q, q_dot] (2n,) of everything undeflected and at rest but the impactors, at their velocity."""
+        from fembeam.model import initial_states
+
+        return initial_states.rest(self)
+
+    def state(self, displacement: Field | Sequence[Field] = None, velocity: Field | Sequence[Field] = None) -> Vector:
+        """The start [q, q_dot] (2n,) nearest, in the mass norm, to given fields u(z) in m and u̇(z) in m/s.
+
+        Parameters
+        ----------
+        displacement, velocity : functions of z (k,), relative to the frame; None is zero. A list gives one for each
+            beam. Impactors start in their places with their velocities.
+
+        Warns
+        -----
+        UserWarning : the kept modes miss more than 1 % of a field; says how much. `Model.missed` gives the number.
+
+        Raises
+        ------
+        ValueError : a field is not finite; a free impactor would start inside the beam.
+        """
+        from fembeam.model import initial_states
+
+        return initial_states.state(self, displacement, velocity)
+
+    def missed(self, field: Field | Sequence[Field]) -> float:
+        """The part of a field of displacement or velocity that the kept modes cannot represent: ‖u - Φq‖/‖u‖ in M."""
+        from fembeam.model import initial_states
+
+        return initial_states.missed(self, field)
+
+    def equilibrium(self, loads: Mapping[float, float] | None = None) -> Vector:
+        """The start at rest under gravity, preloads and given dead loads, contacts included.
+
+        Parameters
+        ----------
+        loads : {z in m: force in N, positive up} on the scene's own beam, for as long as it settles; signals of forces
+            and base do not act. Simulate from it to see what follows when the loads go (release from a pull).
+
+        Returns
+        -------
+        (2n,) : impactors with a velocity keep their place meanwhile, and have it.
+
+        Raises
+        ------
+        reduction.AccuracyError : nothing carries the loads, so that no equilibrium is found.
+        """
+        from fembeam.model import initial_states
+
+        return initial_states.equilibrium(self, loads or {})
+
+    def lasting(self, duration: float) -> Model:
+        """The same model with every signal good for ``duration``; noise without a period gets one."""
+        scene = with_signals(self.scene, lambda s: s.lasting(duration) if hasattr(s, "lasting") else s)
+        return self if scene is self.scene else self.under(scene)
+
+    def simulate(
+        self,
+        duration: float,
+        dt: float | ArrayLike | None = None,
+        start: ArrayLike | None = None,
+        solver: Any = None,
+        progress: bool = False,
+    ) -> Run:
+        """Integrate the model from t = 0.
+
+        Parameters
+        ----------
+        duration : s.
+        dt : output sampling in s, or the output times themselves, increasing; None keeps the final state and the
+            contact log only.
+        start : (2n,) as made by `rest`, `state` or `equilibrium`; None is rest.
+        solver : one of the methods in `solvers`; None is the library's best.
+        progress : show a bar (only on a terminal).
+
+        Returns
+        -------
+        Run : after Ctrl-C partial, and its status says so.
+
+        Raises
+        ------
+        ValueError for bad input before computing; solvers.SolverError when the method fails.
+        """
+        from fembeam.model.run import Run
+        from fembeam.support import bar
+
+        start = self.rest() if start is None else np.asarray(start, dtype=float)
+        n = len(self.omega)
+        require(start.shape == (2 * n,), f"start must have shape ({2 * n},), [q, q_dot]", start.shape,
+                "Model.simulate", "use model.state(displacement, velocity)")  # fmt: skip
+        lasting = self.lasting(duration) if 0.0 < duration < np.inf else self
+        with bar(duration, progress) as report:
+            solution = solvers.integrate(lasting.system, start[:n], start[n:], duration, dt, solver, progress=report)
+        return Run.of(lasting, solution)
+
+    def orbit(self, period: int = 1, start: ArrayLike | Orbit | None = None, shots: int | None = None) -> Orbit:
+        """Find a periodic motion by shooting.
+
+        Parameters
+        ----------
+        period : in periods of the load; 2 is a 1/2 subharmonic.
+        start : (2n,) state at t = 0 or an orbit near it; None tries what a run from rest settles to, then other starts.
+        shots : per period; None takes as many as it needs.
+
+        Returns
+        -------
+        Orbit : state, multipliers, stable, contacts, extremes(z), run.
+
+        Raises
+        ------
+        ValueError for a period below 1 or loads without a period; solvers.OrbitError with what was tried.
+        """
+        from fembeam.model.orbit import orbit
+
+        return orbit(self, period, start, shots)
+
+    def attractors(
+        self, omega: float | None = None, starts: int | Sequence[ArrayLike] = 12, longest: int = 8, seed: int = 0
+    ) -> list[Attractor]:
+        """Settle many starts and name what they come to, the most frequent first.
+
+        Parameters
+        ----------
+        omega : rad/s of the load; None leaves the scene as it is.
+        starts : how many (rest and random states of the size of the motion from rest), or a list of states (2n,).
+        longest : periods above this many of the load's count as "not periodic".
+        seed : of the random states.
+
+        Returns
+        -------
+        list of Attractor : orbit (None when not periodic), period, impacts, count, state, name.
+        """
+        from fembeam.model.orbit import attractors
+        from fembeam.scene import with_value
+
+        model = self if omega is None else dataclasses.replace(self, scene=with_value(self.scene, "omega", omega))
+        return attractors(model, starts, longest, seed)
+
+    def branch(
+        self,
+        parameter: str = "omega",
+        span: tuple[float, float] = (0.0, 0.0),
+        period: int = 1,
+        start: ArrayLike | Orbit | None = None,
+        at: float | None = None,
+        **options: Any,
+    ) -> Branch:
+        """Follow an orbit along one number of the scene, in both directions.
+
+        Parameters
+        ----------
+        parameter : such as "omega", "amplitude", "gap", "stops[0].law.stiffness"; see `fembeam.scene.parameters`.
+        span : (lowest, highest) value.
+        period : in periods of the load.
+        start : as for `orbit`. at : the parameter's value there; None: the scene's, if it lies in the span.
+        options : step (largest, in units of the span), shots, method; see `solvers.branch`.
+
+        Returns
+        -------
+        Branch : computes as it is iterated over; ``run()`` computes all. Orbits carry a ``mark`` where special.
+
+        Raises
+        ------
+        ValueError : unknown parameter (lists the valid ones), empty span. solvers.OrbitError : no orbit at the start.
+        """
+        from fembeam.model.branch import follow
+
+        return follow(self, parameter, span, period, start, at, options)
+
+    def resume(self, path: str | Path) -> Branch:
+        """A branch that `Branch.save` wrote, ready to be gone on with; refused if it belongs to another scene."""
+        from fembeam.model.branch import resumed
+
+        return resumed(self, path)

@@ -1,0 +1,286 @@
+"""Periodic motions of a model: found by shooting, or all that a set of starts settles to.
+
+The load's own period is that of its tones, 2π/ω for one of them; an orbit of period k repeats after k of these, so
+k = 2 is a 1/2 subharmonic.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import cached_property
+from textwrap import shorten
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+import solvers
+from fembeam.scene import signals_of
+from fembeam.support import require
+from solvers.orbits import periodic_orbit as periodic
+from solvers.orbits import shooting
+from solvers.orbits import shots as chain
+from solvers.problem import counted
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from fembeam.model.model import Model
+    from fembeam.model.run import Run
+    from fembeam.scene import Scene
+
+Vector = NDArray[np.float64]
+SAME = 1e-6  # relative distance below which two states are one
+STARTS = 12  # settled where shooting from rest finds nothing
+LONGEST_REASON = 120  # characters of why shooting failed; the rest is in the error this one came from
+
+
+@dataclass(frozen=True, eq=False)
+class Orbit:
+    """A periodic motion of a model.
+
+    Attributes
+    ----------
+    model : whose motion it is. found : the `solvers.Orbit` with all that shooting knows.
+    period : in periods of the load.
+    """
+
+    model: Model
+    found: solvers.Orbit
+    period: int
+
+    @property
+    def state(self) -> Vector:
+        """(2n,) [q, q̇] at time ``found.phase``."""
+        return self.found.state
+
+    @property
+    def multipliers(self) -> Any:
+        """Floquet multipliers (2n,), largest first."""
+        return self.found.multipliers
+
+    @property
+    def stable(self) -> bool:
+        """Whether small disturbances die out."""
+        return self.found.stable
+
+    @property
+    def contacts(self) -> solvers.ContactLog:
+        """Contacts of one period."""
+        return self.found.contacts
+
+    @property
+    def parameter(self) -> float:
+        """The varied parameter's value on a branch, else NaN."""
+        return self.found.parameter
+
+    @property
+    def mark(self) -> str:
+        """What is special about it on a branch: "fold", "flip", "neimark-sacker", "branch point", "grazing", "floor",
+        "merging"; else "".
+        """
+        return self.found.mark
+
+    @cached_property
+    def run(self) -> Run:
+        """One period as a run, finely sampled; its times count from ``found.phase``."""
+        from fembeam.model.run import Run
+
+        cycles = self.found.period * max(float(self.model.omega.max()), 1.0 / self.found.period) / (2.0 * math.pi)
+        return Run.of(self.model, self.found.samples(max(400, math.ceil(24.0 * cycles))))
+
+    def extremes(self, z: float) -> tuple[float, float]:
+        """Lowest and highest displacement (m, relative to the frame) at z over the period."""
+        lowest, highest = extremes_of(self.run.t, self.run.displacement(z), self.run.velocity(z))
+        return lowest, highest
+
+    def __repr__(self) -> str:
+        contacts, kind = counted(len(self.contacts), "contact"), "stable" if self.stable else "unstable"
+        return f"<{kind} orbit of period {self.period} with {contacts}, |μ| = {abs(self.multipliers[0]):.4g}>"
+
+
+def extremes_of(t: Vector, u: Vector, v: Vector) -> tuple[float, float]:
+    """Extremes of the cubics through values u and slopes v."""
+    h, rise = np.diff(t), np.diff(u)
+    a, b, c = v[:-1] * h, 3.0 * rise - (2.0 * v[:-1] + v[1:]) * h, -2.0 * rise + (v[:-1] + v[1:]) * h
+    found = [u]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        root = np.sqrt(b * b - 3.0 * a * c)
+        for s in (-a / (b + root), -a / (b - root)):
+            inside = (s > 0.0) & (s < 1.0)
+            found.append((u[:-1] + s * (a + s * (b + s * c)))[inside])
+    values = np.concatenate(found)
+    return float(values.min()), float(values.max())
+
+
+def load_period(scene: Scene) -> float:
+    """Period of all loads together, s; an error where there is none."""
+    return common_period(list(signals_of(scene).values()))
+
+
+def common_period(signals: list[Any]) -> float:
+    """Period of some signals together, s."""
+    others = [signal for signal in signals if not hasattr(signal, "tones")]
+    require(not others, "an orbit needs periodic loads", others, "the scene", "use Harmonic or Multisine")
+    omega = np.concatenate([np.asarray(signal.tones()[0], dtype=float) for signal in signals] or [np.zeros(0)])
+    omega = omega[omega > 0.0]
+    require(omega.size > 0, "an orbit needs a load with a period", signals, "the scene", "add base=Harmonic(...)")
+    if omega.size == 1:
+        return 2.0 * math.pi / float(omega[0])
+    ratios = [Fraction(w / omega.min()).limit_denominator(1000) for w in omega]
+    off = max(abs(float(r) * omega.min() / w - 1.0) for r, w in zip(ratios, omega, strict=True))
+    require(off < 1e-9, "the tones have no common period", omega.tolist(), "the scene", "make their ratios rational")
+    common = Fraction(math.gcd(*(r.numerator for r in ratios)), math.lcm(*(r.denominator for r in ratios)))
+    return 2.0 * math.pi / (omega.min() * float(common))
+
+
+def orbit(model: Model, period: int, start: ArrayLike | Orbit | None, shots: int | None) -> Orbit:
+    """See `Model.orbit`."""
+    count, once = checked_period(period), load_period(model.scene)
+    if start is None:
+        return _from_nothing(model, count, once, shots)
+    if isinstance(start, Orbit):
+        start = periodic.at_zero(start.found)
+    found = Orbit(model, solvers.orbit(model.system, count * once, start, shots=shots), count)
+    _check_smallest(found, once)
+    return found
+
+
+def checked_period(period: int) -> int:
+    """A whole number of load periods."""
+    whole = isinstance(period, (int, np.integer)) and not isinstance(period, bool)
+    require(whole and period >= 1, "period counts periods of the load and must be a whole number above 0", period,
+            "orbit", "period=2 is a 1/2 subharmonic")  # fmt: skip
+    return int(period)
+
+
+def _check_smallest(orbit: Orbit, once: float) -> None:
+    """An orbit of period k must not repeat sooner."""
+    n = len(orbit.model.omega)
+    for shorter in range(1, orbit.period):
+        if orbit.period % shorter:
+            continue
+        later = chain.delayed(orbit.model.system, orbit.found.phase)
+        end = periodic.flown(later, orbit.state, shorter * once, orbit.found.method)
+        scale = np.concatenate(
+            (np.repeat(np.abs(orbit.state[:n]).max(), n), np.repeat(np.abs(orbit.state[n:]).max(), n))
+        )
+        if np.all(np.abs(end - orbit.state) <= SAME * scale + 1e-300):
+            raise solvers.OrbitError(
+                f"no orbit of period {orbit.period} near the start: Newton's method went to one of period {shorter}"
+            )
+
+
+def _from_nothing(model: Model, count: int, once: float, shots: int | None) -> Orbit:
+    """What a run from rest settles to, else the first of many attractors with that period."""
+    try:
+        start = shooting.settled(model.system, count * once, solvers.Exponential(1e-8))
+        return orbit(model, count, start, shots)
+    except solvers.OrbitError as error:
+        refused = error
+    found = attractors(model, starts=STARTS)
+    for attractor in found:
+        if attractor.orbit is not None and attractor.period == count:
+            return attractor.orbit
+    names = ", ".join(sorted({a.name for a in found}))
+    raise solvers.OrbitError(
+        f"{STARTS} starts settled to {names}, none to period {count}; shooting after a run from rest: "
+        + shorten(str(refused), LONGEST_REASON, placeholder=" …")
+    ) from refused
+
+
+@dataclass(frozen=True, eq=False)
+class Attractor:
+    """Where starts settle: an orbit, or None for motion that does not repeat; how many did; the last start that did."""
+
+    orbit: Orbit | None
+    count: int
+    state: Vector
+
+    @property
+    def period(self) -> int | None:
+        """In periods of the load; None when the motion does not repeat."""
+        return None if self.orbit is None else self.orbit.period
+
+    @property
+    def impacts(self) -> int | None:
+        """Contacts per period."""
+        return None if self.orbit is None else len(self.orbit.contacts)
+
+    @property
+    def name(self) -> str:
+        """Period and number of impacts in words."""
+        if self.orbit is None:
+            return "not periodic"
+        return f"period {self.period} with {counted(len(self.orbit.contacts), 'impact')}"
+
+
+def attractors(
+    model: Model, starts: int | Sequence[ArrayLike] = 12, longest: int = 8, seed: int = 0
+) -> list[Attractor]:
+    """See `Model.attractors`."""
+    once = load_period(model.scene)
+    method = solvers.Exponential(1e-8, ledger=False)
+    found: list[Attractor] = []
+    for start in _starts(model, once, starts, seed):
+        state, orbit = _settle(model, once, start, longest, method)
+        for i, known in enumerate(found):
+            if _same(known.orbit, orbit, once):
+                found[i] = replace(known, count=known.count + 1)
+                break
+        else:
+            found.append(Attractor(orbit, 1, state))
+    return sorted(found, key=lambda a: -a.count)
+
+
+def _starts(model: Model, once: float, starts: int | Sequence[ArrayLike], seed: int) -> list[Vector]:
+    """Rest and random states of the size the motion from rest has, or the given ones, checked."""
+    n = len(model.omega)
+    if not isinstance(starts, (int, np.integer)):
+        states = [np.asarray(state, dtype=float) for state in starts]
+        for state in states:
+            require(state.shape == (2 * n,), f"each start must have shape ({2 * n},)", state.shape, "attractors",
+                    "use model.state(displacement, velocity)")  # fmt: skip
+        return states
+    require(starts >= 1, "starts must be a count above 0 or a list of states", starts, "attractors", "ask for 12")
+    method = solvers.Exponential(1e-6, ledger=False)
+    run = solvers.integrate(model.system, np.zeros(n), np.zeros(n), 20.0 * once, once / 16.0, method)
+    size = np.concatenate((np.abs(run.q).max(axis=0), np.abs(run.q_dot).max(axis=0)))
+    rng = np.random.default_rng(seed)
+    return [np.zeros(2 * n), *(2.0 * size * rng.normal(size=2 * n) for _ in range(starts - 1))]
+
+
+def _settle(model: Model, once: float, start: Vector, longest: int, method: Any) -> tuple[Vector, Orbit | None]:
+    """Last state of a long run (at a multiple of the load's period), and the orbit it has come to."""
+    n = len(model.omega)
+    x = start
+    for _ in range(3):
+        slowest = float((0.5 * model.system.blocks.c)[model.system.blocks.c > 0.0].min(initial=math.inf))
+        count = min(max(math.ceil(7.0 / (slowest * once)), 40), 400) + 4 * longest
+        run = solvers.integrate(model.system, x[:n], x[n:], count * once, once, method)
+        strobes = np.concatenate((run.q, run.q_dot), axis=1)[-3 * longest :]
+        x = strobes[-1]
+        size = np.abs(strobes).max(axis=0)
+        for k in range(1, longest + 1):
+            if np.all(np.abs(strobes[k:] - strobes[:-k]) <= 1e-3 * size):
+                try:
+                    return x, Orbit(model, solvers.orbit(model.system, k * once, x), k)
+                except solvers.OrbitError:
+                    break
+    return x, None
+
+
+def _same(a: Orbit | None, b: Orbit | None, once: float) -> bool:
+    """Whether two attractors are one: the same orbit, begun in any of its periods."""
+    if a is None or b is None:
+        return a is b
+    if a.period != b.period or len(a.contacts) != len(b.contacts):
+        return False
+    x, y = periodic.at_zero(a.found), periodic.at_zero(b.found)
+    for _ in range(a.period):
+        if np.linalg.norm(x - y) <= 1e-5 * np.linalg.norm(x):
+            return True
+        y = periodic.flown(b.model.system, y, once, b.found.method)
+    return False

@@ -1,0 +1,182 @@
+"""From a scene to a reduced model: which modes, which static shapes, on which mesh; every beam by itself."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy import sparse
+
+import reduction
+from fembeam.model.model import Model
+from fembeam.model.shapes import Shapes
+from fembeam.scene import Matrices, loaded, watched
+from fembeam.support import require
+
+if TYPE_CHECKING:
+    from fembeam.scene import Scene
+
+DEFAULT_MODES = 2
+COARSE = 0.01  # estimated relative error of the highest kept frequency, above which elements as asked get a warning
+FINE = 1e-6  # estimated rounding of the lowest frequency, likewise
+FIRST_TRY = 8  # modes, doubled until a frequency or share of mass is reached
+MOST_DOFS = 20_000  # of the finest mesh
+MOST_TRIED = 128  # modes; a few seconds
+
+
+def reduced(
+    scene: Scene,
+    modes: int | Sequence[int] | str | None,
+    elements: int | None,
+    omega_max: float | None,
+    mass_share: float | None,
+    residual: bool,
+    interface: bool,
+) -> Model:
+    """The model of a scene; `Scene.reduce` explains the arguments."""
+    ways = {"modes": modes, "omega_max": omega_max, "mass_share": mass_share}
+    given = [name for name, way in ways.items() if way is not None]
+    require(len(given) < 2, "choose modes in one way", given, "Scene.reduce", "keep one of them")
+    _check_static(scene, residual, interface)
+    if omega_max is not None or mass_share is not None:
+        modes = _enough(scene, elements, omega_max, mass_share)
+    chosen = _numbers(scene, DEFAULT_MODES if modes is None else modes, elements, interface)
+    matrices = scene.matrices(elements, max(chosen, default=0) + 1)
+    bases = [
+        _oriented(_of_beam(beam, loaded(scene, body), chosen, residual, interface), beam, watched(scene, body))
+        for body, beam in enumerate(matrices.beams)
+    ]
+    if elements is not None and not isinstance(modes, str):
+        _warn_of_the_mesh(matrices, max(basis.omega[min(len(chosen), basis.count) - 1] for basis in bases))
+    way: dict[str, Any] = {"modes": chosen, "elements": elements, "residual": residual}
+    if interface:
+        way = {"modes": len(chosen), "elements": elements, "interface": True}
+    kept = [basis.count if interface else len(chosen) for basis in bases]
+    counts = tuple((count, basis.count - count) for count, basis in zip(kept, bases, strict=True))
+    numbers = [tuple(range(basis.count)) if interface else _continued(chosen, basis.count) for basis in bases]
+    basis = _joined(bases, matrices)
+    own, *others = _shapes_of_each(matrices, basis)
+    modes_of_all = sum(numbers, ()) + (0,) * len(matrices.impactors)
+    return Model(scene, matrices, basis, modes_of_all, own, counts, tuple(others), way)
+
+
+def _of_beam(
+    beam: Matrices, places: list[tuple[float, int]], chosen: tuple[int, ...], residual: bool, interface: bool
+) -> reduction.Basis:
+    """The basis of one beam by itself, static shapes where it is loaded included."""
+    if interface:
+        return reduction.craig_bampton(beam.M, beam.K, _rows(beam, places).T, len(chosen), beam.root)
+    basis = reduction.modal_basis(beam.M, beam.K, indices=chosen, root=beam.root)
+    if residual and places:
+        basis = reduction.with_residual(basis, beam.M, beam.K, _rows(beam, places).T, beam.root)
+    return basis
+
+
+def _rows(beam: Matrices, places: list[tuple[float, int]]) -> sparse.csr_matrix:
+    """Rows of u or u_z at (z, derivative)."""
+    return sparse.vstack([beam.interpolation(z, derivative) for z, derivative in places], format="csr")
+
+
+def _continued(chosen: tuple[int, ...], count: int) -> tuple[int, ...]:
+    """Mode numbers, static shapes numbered on."""
+    return (*chosen, *range(chosen[-1] + 1, chosen[-1] + 1 + count - len(chosen)))
+
+
+def _oriented(basis: reduction.Basis, beam: Matrices, z: float | None) -> reduction.Basis:
+    """Positive at z, or where each mode moves most."""
+    return reduction.oriented(basis, beam.interpolation(beam.nodes if z is None else z))
+
+
+def _joined(bases: list[reduction.Basis], matrices: Matrices) -> reduction.Basis:
+    """The bases of the beams as blocks, with x = q/√m for every impactor."""
+    if not matrices.bodies:
+        return bases[0]
+    from scipy.linalg import block_diag
+
+    mass = np.array([impactor.mass for impactor in matrices.impactors])
+    stiffness = np.array([impactor.stiffness for impactor in matrices.impactors])
+    vectors = block_diag(*(basis.vectors for basis in bases), np.diag(1 / np.sqrt(mass)))
+    return reduction.Basis(vectors, np.concatenate([*(basis.omega for basis in bases), np.sqrt(stiffness / mass)]))
+
+
+def _shapes_of_each(matrices: Matrices, basis: reduction.Basis) -> list[Shapes]:
+    """The shapes of each beam on all coordinates: zero on those of other bodies."""
+    shapes, done = [], 0
+    for beam in matrices.beams:
+        values = np.zeros((beam.dofs.size, basis.count))
+        size = beam.M.shape[0]
+        values[beam.dofs.ravel() >= 0] = basis.vectors[done : done + size]
+        shapes.append(Shapes(beam.nodes, values))
+        done += size
+    return shapes
+
+
+def _warn_of_the_mesh(matrices: Matrices, omega: float) -> None:
+    """Warn when elements given by number are far too coarse, or so fine that rounding shows."""
+    coarse = max(float(beam.frequency_error(omega)) for beam in matrices.beams)
+    rounding = max(beam.rounding for beam in matrices.beams)
+    troubles = [
+        (coarse > COARSE, f"too coarse for the highest mode: its frequency is off by about {coarse:.1%}"),
+        (rounding > FINE, f"too fine: rounding may change the lowest frequency by {rounding:.1g} of it"),
+    ]
+    for found, trouble in troubles:
+        if found:
+            advice = "leave them out: as few as the modes need are made"
+            warnings.warn(f"elements are {trouble}; {advice}", UserWarning, stacklevel=4)
+
+
+def _numbers(scene: Scene, modes: Any, elements: int | None, interface: bool) -> tuple[int, ...]:
+    """Mode numbers, ascending; the basis checks them."""
+    if isinstance(modes, str):
+        require(modes == "all" and elements is not None, "modes must be a count, a list, or 'all' with elements given",
+                modes, "Scene.reduce", "say how many elements the mesh shall have")  # fmt: skip
+        return tuple(range(scene.matrices(elements).M.shape[0]))
+    whole = isinstance(modes, (int, np.integer)) and not isinstance(modes, bool)
+    require(not whole or modes <= MOST_DOFS, f"modes must be at most {MOST_DOFS}", modes, "Scene.reduce", "take fewer")
+    listed = list(range(int(modes))) if whole else [int(i) for i in modes]
+    enough = len(listed) > 0 or (interface and whole and modes == 0)
+    require(enough, "modes must be a count above 0 or a list of mode numbers", modes, "Scene.reduce",
+            "ask for modes=2, or modes=[0, 2]")  # fmt: skip
+    require(not interface or whole, "modes must be a count with interface=True", modes, "Scene.reduce",
+            "ask for modes=2")  # fmt: skip
+    return tuple(sorted(listed))
+
+
+def _check_static(scene: Scene, residual: bool, interface: bool) -> None:
+    """Raise ValueError when static shapes are asked for twice, or have no place to be loaded at."""
+    require(not (residual and interface), "residual and interface exclude each other", True, "Scene.reduce",
+            "keep one: either makes the model exact for slow loads at its places")  # fmt: skip
+    require(not (residual or interface) or bool(loaded(scene, 0)), "static shapes need a stop, a force or a dashpot", 0,
+            "Scene.reduce", "leave out residual and interface")  # fmt: skip
+
+
+def _enough(scene: Scene, elements: int | None, omega_max: float | None, mass_share: float | None) -> int:
+    """How many modes of every beam reach omega_max, or carry mass_share; meshes grow with the modes tried."""
+    tried = FIRST_TRY // 2
+    while tried < MOST_TRIED:
+        tried = min(2 * tried, MOST_TRIED)
+        matrices = scene.matrices(elements, None if elements else tried)
+        counts = [_enough_of(beam, tried, omega_max, mass_share) for beam in matrices.beams]
+        if None not in counts:
+            return max(count for count in counts if count is not None)
+    goal = f"omega_max = {omega_max:g}" if omega_max is not None else f"mass_share = {mass_share}"
+    raise ValueError(f"{goal} must be reached by {MOST_TRIED} modes in Scene.reduce, got less; lower it, or give modes")
+
+
+def _enough_of(beam: Matrices, tried: int, omega_max: float | None, mass_share: float | None) -> int | None:
+    """How many of a beam's modes are enough; None if those tried are not."""
+    tried = min(tried, beam.M.shape[0])
+    basis = reduction.modal_basis(beam.M, beam.K, tried, root=beam.root)
+    if omega_max is not None:
+        enough = reduction.below(omega_max)
+    else:
+        mass = reduction.moved_mass(beam.M, beam.base_load)
+        enough = reduction.carrying(float(mass_share or 0.0), beam.base_load, mass)
+    count = enough(basis)
+    if count is None and tried == beam.M.shape[0]:
+        return tried
+    require(count is None or count > 0, f"omega_max must reach the first frequency, {basis.omega[0]:.6g} rad/s",
+            omega_max, "Scene.reduce", "raise it")  # fmt: skip
+    return count

@@ -1,0 +1,283 @@
+"""What a simulation gives: histories at any place, forces, contact log, energy ledger; saved whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+import solvers
+from fembeam.model.shapes import Shapes
+from fembeam.scene import Source
+from fembeam.support import require, versions, written_whole
+from solvers.problem import counted
+
+if TYPE_CHECKING:
+    from fembeam.model.model import Model
+    from fembeam.model.section_forces import Extremes
+    from fembeam.scene_file import SceneFile
+
+Vector = NDArray[np.float64]
+FORMAT = 2
+UNITS = {
+    "t, contact_t_in, contact_t_out": "s",
+    "q": "m √kg",
+    "q_dot": "m √kg/s",
+    "force, contact_peak_force": "N",
+    "contact_speed_in, contact_speed_out": "m/s",
+    "contact_peak_indentation, nodes, stops[:, 0], stops[:, 2]": "m",
+    "contact_impulse": "N s",
+    "contact_energy_loss, energy_*": "J",
+    "shapes, directions": "1/√kg",
+    "strikers": "kg",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A simulated motion of a reduced model.
+
+    Attributes
+    ----------
+    t, q, q_dot : (k,) s, (k, n) and (k, n) modal coordinates and rates.
+    contacts : log of contacts: stop, t_in, t_out, speed_in, speed_out, peak_indentation, peak_force, impulse,
+        energy_loss, floored (arrays).
+    energy : ledger at t: input, damping, contact, stored, residual in J; made when first looked at, by ``ledger``.
+    status : how it ended, a sentence.
+    cost : steps, rejections, law_calls, events, seconds.
+    """
+
+    t: Vector
+    q: Vector
+    q_dot: Vector
+    contacts: solvers.ContactLog
+    ledger: Callable[[], solvers.Energy] = field(repr=False)
+    status: str
+    cost: solvers.Cost
+    shapes: Shapes
+    stops: Vector  # (m, 3): z, push, gap of every contact
+    directions: Vector  # (m, n): δ = -directions·q - gap
+    strikers: Vector  # (i,): masses of the impactors, whose coordinates √m x are the last ones
+    scene: str
+    model: Model | None = None
+    stored_forces: Vector | None = None  # (m, k) of a run read from a file
+    others: tuple[Shapes, ...] = ()  # of the further beams
+    source: Source | None = None  # of a run made from a scene file
+    versions: dict[str, str] = field(default_factory=dict)  # that made a run read from a file
+
+    def __repr__(self) -> str:
+        reached = f"to t = {self.t[-1]:g} s" if len(self.t) else "without samples"
+        return f"<run {reached}, {counted(len(self.contacts), 'contact')}: {self.status}>"
+
+    @cached_property
+    def energy(self) -> solvers.Energy:
+        """The energy ledger."""
+        return self.ledger()
+
+    @property
+    def scene_file(self) -> SceneFile:
+        """The scene, reduction and studies this run was made from; ValueError for a run made in Python."""
+        from fembeam.scene_file import built
+
+        if self.source is None:
+            raise ValueError("this run was made in Python, not from a scene file; its scene is the text run.scene")
+        return built(self.source)
+
+    @classmethod
+    def of(cls, model: Model, solution: solvers.Solution) -> Run:
+        """A model's solution with what it takes to read it."""
+        stops = np.array([(touch.z, touch.push, touch.gap) for touch in model.touches], dtype=float).reshape(-1, 3)
+        strikers = np.array([impactor.mass for impactor in model.matrices.impactors], dtype=float)
+        status = solution.status.value
+        if not solution.status.good:
+            status += f" (t = {solution.t[-1]:g} s)" if len(solution.t) else " (before the first sample)"
+        return cls(
+            *(
+                solution.t,
+                solution.q,
+                solution.q_dot,
+                solution.contacts,
+                solution.ledger,
+                status,
+                solution.cost,
+            ),
+            *(model.shapes, stops, model.directions, strikers, repr(model.scene), model),
+            others=model.others,
+        )
+
+    @property
+    def complete(self) -> bool:
+        """Whether the run reached its end."""
+        return self.status == solvers.Status.DONE.value
+
+    def displacement(self, z: ArrayLike, body: int = 0) -> Vector:
+        """u(z, t) of a beam (0 the scene's own) relative to the frame, m: (k,) at one z, (k, j) at z (j,)."""
+        return self.q @ (self.shapes, *self.others)[body](z).T
+
+    def velocity(self, z: ArrayLike, body: int = 0) -> Vector:
+        """u̇(z, t) relative to the frame, m/s."""
+        return self.q_dot @ (self.shapes, *self.others)[body](z).T
+
+    def slope(self, z: ArrayLike, body: int = 0) -> Vector:
+        """u_z(z, t), rad."""
+        return self._field("slope", z, body)
+
+    def moment(self, z: ArrayLike, body: int = 0) -> Vector:
+        """Bending moment EI u_zz, N m: positive where it stretches the lower fibre."""
+        return self._field("moment", z, body)
+
+    def shear(self, z: ArrayLike, body: int = 0) -> Vector:
+        """Shear force dM/dz, N; at a point load that of the side ahead."""
+        return self._field("shear", z, body)
+
+    def stress(self, z: ArrayLike, body: int = 0) -> Vector:
+        """Stress at the lower outer fibre, N/m²: M c/I + N/A. ValueError where a section has no `fibre`."""
+        return self._field("stress", z, body)
+
+    def extremes(self, quantity: str = "displacement", z: ArrayLike | None = None, body: int = 0) -> Extremes:
+        """Least and greatest values over the samples, place by place, with their times.
+
+        Parameters
+        ----------
+        quantity : "displacement", "slope", "moment", "shear" or "stress".
+        z : places (j,) in m; None: all nodes of the mesh.
+        """
+        from fembeam.model.section_forces import extremes
+
+        places = (self.shapes, *self.others)[body].nodes if z is None else np.atleast_1d(np.asarray(z, dtype=float))
+        return extremes(self.t, self.q, *self._rows(quantity, places, body))
+
+    def _field(self, quantity: str, z: ArrayLike, body: int) -> Vector:
+        """A field over time: (k,) at one z, (k, j) at z (j,)."""
+        places = np.asarray(z, dtype=float)
+        shapes, _, offset = self._rows(quantity, np.atleast_1d(places), body)
+        values = self.q @ shapes.T + offset
+        return values if places.ndim else values[:, 0]
+
+    def _rows(self, quantity: str, z: Vector, body: int) -> tuple[Vector, Vector, Vector]:
+        """What turns q into a field: shapes (j, n), the places themselves, a constant part (j,)."""
+        known = ("displacement", "slope", "moment", "shear", "stress")
+        require(quantity in known, f"quantity must be one of {', '.join(known)}", quantity, "Run", "choose one")
+        if quantity in known[:2]:
+            return (self.shapes, *self.others)[body](z, known.index(quantity)), z, np.zeros(len(z))
+        require(self.model is not None, f"the {quantity} needs the model of the run", "a run read from a file", "Run",
+                "simulate again, or use dataclasses.replace(run, model=model)")  # fmt: skip
+        assert self.model is not None
+        forces = self.model.section_forces[body]
+        rows = getattr(forces, quantity)(z)
+        if quantity != "stress":
+            return rows, z, np.zeros(len(z))
+        bare = ~np.isfinite(rows).all(axis=1)
+        require(not bare.any(), "every section must know its outer fibre", z[bare][:1].tolist(), "Run.stress",
+                "give Section(..., fibre=)")  # fmt: skip
+        return rows, z, forces.beam.axial_force / forces.beam.profile(z).A
+
+    def to_xdmf(self, path: str | os.PathLike[str], stride: int = 1) -> Path:
+        """Write every `stride`-th sample for ParaView: displacement, velocity, slope, moment, shear, stress."""
+        from fembeam.model.run_paraview import to_xdmf
+
+        return to_xdmf(self, path, stride)
+
+    def to_vtu(self, path: str | os.PathLike[str], sample: int = -1) -> Path:
+        """Write one sample for ParaView."""
+        from fembeam.model.run_paraview import to_vtu
+
+        return to_vtu(self, path, sample)
+
+    def to_csv(self, folder: str | os.PathLike[str], stride: int = 1) -> list[Path]:
+        """Write every `stride`-th sample at the usual places as `histories.csv`, and the log as `contacts.csv`."""
+        from fembeam.model.run_csv import write
+
+        return write(self, Path(folder), stride)
+
+    def impactor_displacement(self, impactor: int = 0) -> Vector:
+        """x(t) (k,) of an impactor from its place at the start, relative to the frame, m."""
+        return self._striker(self.q, impactor)
+
+    def impactor_velocity(self, impactor: int = 0) -> Vector:
+        """ẋ(t) (k,) of an impactor relative to the frame, m/s."""
+        return self._striker(self.q_dot, impactor)
+
+    def _striker(self, coordinates: Vector, impactor: int) -> Vector:
+        """One of the last columns, without its √m."""
+        count = len(self.strikers)
+        require(0 <= impactor < count, f"impactor must be below {count}, the number of impactors", impactor, "Run",
+                "count from 0")  # fmt: skip
+        return coordinates[:, coordinates.shape[1] - count + impactor] / np.sqrt(self.strikers[impactor])
+
+    def indentation(self, stop: int = 0) -> Vector:
+        """δ(t) (k,) of a stop, m; negative while it is open. Contacts of impactors count on after the stops."""
+        return -self.q @ self.directions[self._stop(stop)] - self.stops[stop, 2]
+
+    def indentation_rate(self, stop: int = 0) -> Vector:
+        """δ̇(t) (k,) of a stop, m/s: of both bodies where the stop moves."""
+        return -self.q_dot @ self.directions[self._stop(stop)]
+
+    def force(self, stop: int = 0) -> Vector:
+        """Contact force (k,) of a stop, N, from its law and the entry rate latched at the time."""
+        return self._forces[self._stop(stop)]
+
+    def _stop(self, stop: int) -> int:
+        """The number of a contact, checked."""
+        count = len(self.stops)
+        require(-count <= stop < count, f"stop must be below {count}, the number of stops", stop, "Run",
+                "count from 0")  # fmt: skip
+        return stop
+
+    @cached_property
+    def _forces(self) -> Vector:
+        """Forces (m, k)."""
+        if self.stored_forces is not None:
+            return self.stored_forces
+        assert self.model is not None
+        forces = [self._force_of(s, touch.law) for s, touch in enumerate(self.model.touches)]
+        return np.array(forces).reshape(len(forces), len(self.t))
+
+    def _force_of(self, stop: int, law: Any) -> Vector:
+        """Force history of one stop."""
+        mine = self.contacts.stop == stop
+        entered, speed = self.contacts.t_in[mine], self.contacts.speed_in[mine]
+        if not len(entered):
+            return np.zeros(len(self.t))
+        order = np.argsort(entered)
+        last = np.searchsorted(entered[order], self.t, side="right") - 1
+        entry_rate = np.maximum(np.abs(speed[order])[np.maximum(last, 0)], law.entry_rate_floor)
+        delta = np.where(last >= 0, self.indentation(stop), -1.0)
+        return np.asarray(law.force(delta, -self.q_dot @ self.directions[stop], entry_rate))
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write everything to one ``.npz`` file, whole or not at all; read it with `load`."""
+        about = {
+            "format": FORMAT,
+            "status": self.status,
+            "scene": self.scene,
+            "cost": {f.name: getattr(self.cost, f.name) for f in fields(self.cost)},
+            "units": UNITS,
+            "versions": versions(),
+        }
+        if self.source is not None:
+            about["scene_file"] = {"name": self.source.path.name, "text": self.source.text,
+                                   "overrides": self.source.overrides, "files": list(self.source.files)}  # fmt: skip
+        carried = self.source.files.values() if self.source else ()
+        arrays = {
+            **{"t": self.t, "q": self.q, "q_dot": self.q_dot, "force": self._forces},
+            **{"stops": self.stops, "directions": self.directions, "strikers": self.strikers},
+            **{"nodes": self.shapes.nodes, "shapes": self.shapes.values},
+            **{f"nodes_{i}": shapes.nodes for i, shapes in enumerate(self.others, 1)},
+            **{f"shapes_{i}": shapes.values for i, shapes in enumerate(self.others, 1)},
+            **{f"contact_{name}": column for name, column in self.contacts.arrays().items()},
+            **{f"energy_{f.name}": getattr(self.energy, f.name) for f in fields(self.energy)},
+            **{f"file_{i}": np.frombuffer(content, dtype=np.uint8) for i, content in enumerate(carried)},
+        }
+        target = Path(path)
+        target = target if target.suffix == ".npz" else target.with_name(target.name + ".npz")
+        with written_whole(target) as file:
+            np.savez(file, about=json.dumps(about), **arrays)  # type: ignore[arg-type]
+        return target

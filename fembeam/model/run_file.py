@@ -1,0 +1,77 @@
+"""A run read from a file."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import fields
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import solvers
+from fembeam.model import saved_arrays
+from fembeam.model.model import Shapes
+from fembeam.model.run import FORMAT, Run
+from fembeam.scene import Source
+
+
+def load(path: str | os.PathLike[str]) -> Run:
+    """Read a run written by `Run.save`.
+
+    Raises
+    ------
+    FileNotFoundError; ValueError when the file is not a run of this library, is damaged, or its arrays contradict each
+    other.
+
+    Examples
+    --------
+    >>> import fembeam as fb
+    >>> import tempfile
+    >>> scene = fb.Scene(fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01)), [fb.Clamped(0.0)],
+    ...                  damping=fb.ModalDamping(0.01), base=fb.Harmonic(1e-3, 100.0))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     again = load(scene.reduce(modes=1).simulate(0.1, 0.01).save(f"{folder}/run"))
+    >>> again.status, len(again.t)
+    ('finished', 11)
+    """
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            about = json.loads(str(data["about"]))
+            arrays = {name: data[name] for name in data.files if name != "about"}
+        if about["format"] != FORMAT:
+            raise ValueError(f"it has format {about['format']}, this version reads {FORMAT}")
+        return _of_arrays(about, arrays, Path(path))
+    except FileNotFoundError:
+        raise
+    except Exception as error:
+        raise ValueError(f"{path} is not a saved run, or is damaged: {error}") from error
+
+
+def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run:
+    """A run from the contents of its file."""
+    saved_arrays.check({name: array for name, array in arrays.items() if not name.startswith("file_")})
+    source = None
+    if given := about.get("scene_file"):
+        files = {name: arrays[f"file_{i}"].tobytes() for i, name in enumerate(given["files"])}
+        name = Path(given["name"]).name
+        source = Source(path.with_name(name), given["text"], tuple(given["overrides"]), files, of_run=True)
+    bodies = sum(name.split("_")[0] == "nodes" for name in arrays)
+    return Run(
+        *(arrays["t"], arrays["q"], arrays["q_dot"]),
+        contacts=solvers.ContactLog(*(arrays[f"contact_{f.name}"] for f in fields(solvers.ContactLog))),
+        ledger=partial(solvers.Energy, *(arrays[f"energy_{f.name}"] for f in fields(solvers.Energy))),
+        status=about["status"],
+        cost=solvers.Cost(**about["cost"]),
+        shapes=Shapes(arrays["nodes"], arrays["shapes"]),
+        stops=arrays["stops"],
+        directions=arrays["directions"],
+        strikers=arrays["strikers"],
+        scene=about["scene"],
+        stored_forces=arrays["force"],
+        others=tuple(Shapes(arrays[f"nodes_{i}"], arrays[f"shapes_{i}"]) for i in range(1, bodies)),
+        source=source,
+        versions=about.get("versions", {}),
+    )

@@ -1,0 +1,26 @@
+"""Places worth watching on a beam."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from fembeam.model.model import Model
+    from fembeam.model.shapes import Shapes
+
+
+def places(shapes: Shapes) -> dict[str, float]:
+    """Coordinates worth watching, those that move: "tip" (a free end, the far one first) and "mid-beam"."""
+    start, end = float(shapes.nodes[0]), float(shapes.nodes[-1])
+    mid = (start + end) / 2
+    size = {z: float(np.abs(shapes(z)).max()) for z in (end, start, mid)}
+    moving = [z for z in (end, start) if size[z] > 1e-9 * max(size.values())]
+    return {**({"tip": moving[0]} if moving else {}), "mid-beam": mid}
+
+
+def observed(model: Model) -> float:
+    """The place to watch: the first stop, else the tip."""
+    stops = model.scene.stops
+    return stops[0].z if stops else next(iter(places(model.shapes).values()))

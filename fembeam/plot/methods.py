@@ -1,0 +1,179 @@
+"""Charts of methods: speed against accuracy, where they are stable, and how they fail."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fembeam.plot.response import BLUE, RED, styled
+from fembeam.support import require
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from fembeam.study.failure_gallery import Failure
+    from fembeam.study.speed_accuracy_result import Point, SpeedAccuracy
+    from fembeam.study.stability_map import StabilityMap
+
+MARKERS = "osD^v<>PX*hpd8H1234"
+_SMALLEST = 1e-16
+
+
+@styled
+def speed_accuracy(result: SpeedAccuracy) -> Figure:
+    """Error against time: of integration on the left, with the error of too few modes on the right.
+
+    Modes are colours, methods markers; medians over the starts with quartiles; a line joins the settings of a method,
+    a thick one the front of each model. On the right a finer step below a dashed line (the exact model with so few
+    modes) is wasted. What lies below the disagreement of the references is drawn there: it is not known.
+    """
+    from matplotlib.figure import Figure
+
+    sizes = sorted(result.reduction)
+    panels = 2 if max(result.reduction.values()) > 0.0 else 1
+    figure = Figure(figsize=(5.2 * panels + 2.1, 4.8), layout="constrained")
+    axes = np.atleast_1d(figure.subplots(1, panels, sharey=True))
+    methods = list(dict.fromkeys(point.method for point in result.points))
+    for ax, name in zip(axes, ("errors", "totals"), strict=False):
+        for n, colour in zip(sizes, _colours(len(sizes)), strict=True):
+            for method, marker in zip(methods, MARKERS * 3, strict=False):
+                mine = [p for p in result.points if p.modes == n and p.method == method and p.seconds.size]
+                _draw(ax, mine, name, colour, marker, result.floor.get(n, 0.0))
+            if name == "errors":
+                front = result.front(n)
+                errors = [_known(p.error, result.floor.get(n, 0.0)) for p in front]
+                ax.plot(errors, [1e3 * p.time for p in front], color=colour, lw=3.0, alpha=0.35)
+            elif result.reduction[n] > 0.0:
+                ax.axvline(result.reduction[n], color=colour, ls="--", lw=0.8)
+        ax.set(xscale="log", yscale="log")
+        ax.invert_xaxis()
+        ax.grid(alpha=0.25, lw=0.5)
+    axes[0].set(xlabel=f"error of integration: {result.quantity}", ylabel="time of a run / ms")
+    claim = result.claim()
+    axes[0].set_title("Integration alone; thick: the front of each model" + (f"\n{claim}" if claim else ""))
+    if panels == 2:
+        axes[1].set(xlabel=f"error against {sizes[-1]} modes: {result.quantity}")
+        axes[1].set_title("Integration and reduction; dashed: exact solution with so few modes")
+    _legends(figure, sizes, methods)
+    return figure
+
+
+def _draw(ax: Axes, points: Sequence[Point], name: str, colour: object, marker: str, floor: float) -> None:
+    """One method's settings on one model."""
+    if not points:
+        return
+    values = [getattr(p, name) for p in points]
+    x = np.array([_known(float(np.median(v)), floor) for v in values])
+    low, high = (np.array([_known(float(np.quantile(v, q)), floor) for v in values]) for q in (0.25, 0.75))
+    y = np.array([1e3 * p.time for p in points])
+    ax.errorbar(x, y, xerr=[x - low, high - x], color=colour, lw=0.7, elinewidth=0.5, marker=marker, ms=4.5)
+
+
+def _known(value: float, floor: float) -> float:
+    """What can be told from the reference, and has a logarithm."""
+    return max(value, floor, _SMALLEST)
+
+
+def _colours(count: int) -> list:
+    """Light for few modes, dark for many."""
+    from matplotlib import colormaps
+
+    return [colormaps["viridis_r"](0.15 + 0.8 * i / max(count - 1, 1)) for i in range(count)]
+
+
+def _legends(figure: Figure, sizes: Sequence[int], methods: Sequence[str]) -> None:
+    """Markers for methods, colours for modes, beside the axes."""
+    from matplotlib.lines import Line2D
+
+    entries = [Line2D([], [], color=c, lw=3, label=f"{n} mode{'s' if n > 1 else ''}")
+               for n, c in zip(sizes, _colours(len(sizes)), strict=True)]  # fmt: skip
+    entries += [
+        Line2D([], [], color="black", marker=k, lw=0, ms=5, label=m) for m, k in zip(methods, MARKERS * 3, strict=False)
+    ]
+    figure.legend(handles=entries, loc="outside right upper")
+
+
+@styled
+def stability_map(*maps: StabilityMap) -> Figure:
+    """Verdicts over step and modes (or stiffness), one panel per map, predicted limits drawn over them."""
+    from matplotlib.colors import ListedColormap
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    require(bool(maps), "nothing to draw", maps, "plot.stability_map", "give one map or more of fb.study.stability_map")
+    colours = dict(zip(maps[0].VERDICTS, ("#8fd0b5", "#f6d58a", "#b7c9e8", "#eba07a"), strict=True))
+    columns = min(len(maps), 2)
+    rows = -(-len(maps) // columns)
+    figure = Figure(figsize=(4.6 * columns + 0.2, 3.0 * rows + 0.7), layout="constrained")
+    axes = figure.subplots(rows, columns, squeeze=False).ravel()
+    for ax in axes[len(maps) :]:
+        ax.set_axis_off()
+    for ax, found in zip(axes, maps, strict=False):
+        places = np.arange(len(found.rows) + 1) - 0.5
+        ax.pcolormesh(_edges(found.steps), places, found.verdict, cmap=ListedColormap(list(colours.values())),
+                      vmin=-0.5, vmax=3.5, edgecolors="white", lw=0.4)  # fmt: skip
+        for limit, style in ((found.flight, "-"), (found.contact, ":")):
+            kept = np.where(np.isfinite(limit) & (limit > 0.0), limit, np.nan)
+            ax.step(np.append(kept, kept[-1]), places, color="black", ls=style, lw=1.6, where="pre")
+            ax.vlines(kept, places[:-1], places[1:], color="black", ls=style, lw=1.6)
+        ax.set(xscale="log", xlabel="step / s", yticks=range(len(found.rows)), title=found.method)
+        ax.set_xlim(_edges(found.steps)[[0, -1]])
+        ax.set_yticklabels([f"{row:g}" for row in found.rows])
+        ax.set_ylabel({"modes": "number of modes", "stiffness": "contact stiffness / SI"}[found.axis])
+    entries: list = [Patch(color=colour, label=verdict.words) for verdict, colour in colours.items()]
+    entries += [
+        Line2D([], [], color="black", ls=s, label=f"predicted limit {w}")
+        for s, w in (("-", "in flight"), (":", "in contact"))
+    ]
+    figure.legend(handles=entries, loc="outside lower center", ncols=3)
+    return figure
+
+
+def _edges(steps: np.ndarray) -> np.ndarray:
+    """Borders of the cells of a logarithmic axis."""
+    if len(steps) < 2:
+        return np.array([steps[0] / 1.5, steps[0] * 1.5])
+    middle = np.sqrt(steps[1:] * steps[:-1])
+    return np.concatenate(([steps[0] ** 2 / middle[0]], middle, [steps[-1] ** 2 / middle[-1]]))
+
+
+@styled
+def failures(cases: Sequence[Failure]) -> Figure:
+    """A gallery: each case with what the naive method gives (red) and what this library gives or says (blue).
+
+    Examples
+    --------
+    >>> from fembeam.study.failure_gallery import jumped_contact
+    >>> failures([jumped_contact()]).axes[0].get_ylabel()
+    'displacement / mm'
+    """
+    from matplotlib.figure import Figure
+
+    require(bool(cases), "nothing to draw", cases, "plot.failures", "give fb.study.gallery()")
+    rows = -(-len(cases) // 2)
+    figure = Figure(figsize=(9.6, 2.75 * rows), layout="constrained")
+    axes = figure.subplots(rows, 2, squeeze=False).ravel()
+    for ax, case in zip(axes, cases, strict=False):
+        few = len(case.naive[0]) < 40
+        ax.plot(*case.ours, color=BLUE, lw=1.3)
+        ax.plot(*case.naive, color=RED, lw=0.9, marker="o" if few else "", ms=3)
+        if case.scale != "linear":
+            ax.set_yscale("log")
+        if case.scale == "loglog":
+            ax.set_xscale("log")
+        ax.set(xlabel=case.x_label, ylabel=case.y_label)
+        ax.set_title(case.title, fontweight="bold", pad=29)
+        for height, colour, words in zip((25, 14), (RED, BLUE), case.said, strict=True):
+            ax.annotate(words, (0.0, 1.0), (0, height), "axes fraction", "offset points", color=colour, fontsize=7.5,
+                        va="top")  # fmt: skip
+    for ax in axes[len(cases) :]:
+        ax.set_axis_off()
+    return figure
+
+
+__all__ = ["failures", "speed_accuracy", "stability_map"]

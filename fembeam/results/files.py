@@ -1,0 +1,267 @@
+"""What a simulation leaves in a folder: `run.npz`, `summary.json`, and figures as PNG; each written whole."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+import tempfile
+from collections.abc import Callable
+from dataclasses import asdict, fields, is_dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fembeam import plot
+from fembeam.model import Run
+from fembeam.statistics import moments
+from fembeam.statistics.batches import Batches, Estimate
+from fembeam.support import aligned, versions, written_whole
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MOST_BATCHES, FEWEST_BATCHES = 32, 4  # of a history, for standard errors
+MEMORIES = 10.0  # time constants of the structure that a batch lasts at least
+FEWEST_SAMPLES = 64  # below this neither a spectrum nor a density says anything
+
+
+def prepared(folder: str | Path) -> Path:
+    """The folder, made if need be, and proved writable; ValueError when it is not."""
+    folder = Path(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return folder
+    except OSError as error:
+        raise ValueError(f"output folder {folder} is not writable: {error.strerror}; choose another") from error
+
+
+def write(run: Run, folder: str | Path, discard: float = 0.0, found: dict[str, Any] | None = None) -> list[Path]:
+    """Write a run with its summary and figures.
+
+    Parameters
+    ----------
+    run : complete or partial.
+    folder : must exist.
+    discard : s at the beginning that statistics leave out.
+    found : its `summary`, if made already.
+
+    Returns
+    -------
+    The files written, `run.npz` first.
+
+    Raises
+    ------
+    OSError : the folder cannot be written.
+    """
+    folder = Path(folder)
+    written = [run.save(folder / "run.npz")]
+    written.append(write_json(folder / "summary.json", summary(run, discard) if found is None else found))
+    written += [write_figure(folder / f"{name}.png", draw()) for name, draw in figures(run, discard).items()]
+    return written
+
+
+def write_study(result: Any, folder: str | Path, name: str) -> list[Path]:
+    """Write a study's numbers as `name.json` and, if it saves itself, `name.csv`; its figure as PNG."""
+    written = [write_json(Path(folder) / f"{name}.json", plain(result))]
+    written += [write_figure(Path(folder) / f"{name}.png", result.figure())]
+    if hasattr(result, "save"):
+        written.append(Path(folder) / f"{name}.csv")
+        result.save(written[-1])
+    return written
+
+
+def write_text(target: Path, text: str) -> Path:
+    """A table as text."""
+    with written_whole(target) as file:
+        file.write(f"{text}\n".encode())
+    return target
+
+
+def write_figure(target: Path, figure: Figure) -> Path:
+    """One PNG; the same figure gives the same bytes."""
+    with written_whole(target) as file:
+        figure.savefig(file, format="png", dpi=150, metadata={"Software": None})
+    return target
+
+
+def figures(run: Run, discard: float = 0.0) -> dict[str, Callable[[], Figure]]:
+    """The figures this run has enough data for, by name; call one to draw it."""
+    log, kept = run.contacts, int(np.count_nonzero(run.t >= discard))
+    drawn: dict[str, Callable[[], Figure]] = {}
+    if len(run.t) > 1:
+        drawn["time_history"] = lambda: plot.time_history(run)
+    if kept >= FEWEST_SAMPLES and all(np.ptp(x) > 0 for x in plot.responses(run, discard).values()):
+        drawn["psd"] = lambda: plot.spectrum(run, discard)
+        drawn["densities"] = lambda: plot.densities(run, discard)
+    if np.any(np.isfinite(log.t_out) & (log.t_in >= discard)):
+        drawn["contacts"] = lambda: plot.contacts(run, discard)
+    if (model := run.model) is not None:
+        drawn["modes"] = lambda: plot.mode_shapes(model)
+    return drawn
+
+
+def summary(run: Run, discard: float = 0.0, seconds: float | None = None) -> dict[str, Any]:
+    """What a run says in numbers: modes, moments, contacts, energy, cost, status, versions."""
+    model = run.model
+    return {
+        "status": run.status,
+        "complete": run.complete,
+        "simulated_seconds": float(run.t[-1]) if len(run.t) else 0.0,
+        "discarded_seconds": discard,
+        "wall_seconds": run.cost.seconds if seconds is None else seconds,
+        "omega": None if model is None else model.omega.tolist(),
+        "zeta": None if model is None else model.zeta.tolist(),
+        "moments": _moments(run, discard),
+        "confidence": _confidence(run, discard),
+        "contacts": _contacts(run, discard),
+        "energy": _energy(run),
+        "cost": asdict(run.cost),
+        "dt": float(run.t[1] - run.t[0]) if len(run.t) > 1 else None,
+        "scene": run.scene,
+        "units": "SI: m, s, N, J, rad/s",
+        "versions": versions(),
+    }
+
+
+def _moments(run: Run, discard: float) -> dict[str, dict[str, float]]:
+    """Moments of the displacements at the usual places and of every stop's indentation, m."""
+    kept = run.t >= discard
+    if np.count_nonzero(kept) < 2:
+        return {}
+    signals = {f"displacement, {name}": run.displacement(z)[kept] for name, z in plot.places(run.shapes).items()}
+    signals |= {f"indentation, stop {i}": run.indentation(i)[kept] for i in range(len(run.stops))}
+    extremes = {name: {"min": float(x.min()), "max": float(x.max())} for name, x in signals.items()}
+    error = partial(_error_of_std, parts=batches(run, discard))
+    return {name: asdict(moments(x)) | {"std_error": error(x)} | extremes[name] for name, x in signals.items()}
+
+
+def batches(run: Run, discard: float) -> int:
+    """How many nearly independent parts the samples make, at most `MOST_BATCHES`; 0 when too few or not known."""
+    if run.model is None or len(run.t) < 2:
+        return 0
+    decay = (run.model.zeta * run.model.omega).min()
+    count = min(MOST_BATCHES, int(max(float(run.t[-1]) - discard, 0.0) * decay / MEMORIES))
+    return count if count >= FEWEST_BATCHES else 0
+
+
+def _error_of_std(x: NDArray[np.float64], parts: int) -> float | None:
+    """Jackknife standard error of the standard deviation over that many batches."""
+    if not parts:
+        return None
+    found = Batches(3)
+    for part in np.array_split(x - x.mean(), parts):
+        found.add([len(part), part.sum(), part @ part])
+    return float(found.estimate(lambda s: math.sqrt(max(s[2] / s[0] - (s[1] / s[0]) ** 2, 0.0))).standard_error)
+
+
+def _error_of_rate(entries: NDArray[np.float64], begin: float, end: float, parts: int) -> float | None:
+    """Standard error of the number of contacts per second over that many batches."""
+    if not parts:
+        return None
+    counts = np.histogram(entries, parts, (begin, end))[0] * parts / (end - begin)
+    return float(Estimate.of_mean(counts).standard_error)
+
+
+def _confidence(run: Run, discard: float) -> str:
+    """What the standard errors rest on."""
+    parts = batches(run, discard)
+    if not parts:
+        return "No standard errors: too short for independent parts, or the structure has no damping."
+    span = (float(run.t[-1]) - discard) / parts
+    return f"Standard errors (s.e.) come from {parts} parts of {span:.3g} s each; 95 % lies within two of them."
+
+
+def _contacts(run: Run, discard: float) -> list[dict[str, Any]]:
+    """Number, rate, means and maxima of every stop's contacts that ended."""
+    log = run.contacts
+    span = max(float(run.t[-1]) - discard, 0.0) if len(run.t) else 0.0
+    rows, parts = [], batches(run, discard)
+    for stop in range(len(run.stops)):
+        kept = (log.stop == stop) & (log.t_in >= discard) & np.isfinite(log.t_out)
+        row: dict[str, Any] = {"stop": stop, "z": float(run.stops[stop, 0]), "number": int(kept.sum())}
+        row["rate"] = row["number"] / span if span > 0 else None
+        row["rate_error"] = _error_of_rate(log.t_in[kept], discard, discard + span, parts)
+        columns = {"duration": log.t_out - log.t_in, "peak_force": log.peak_force, "entry_speed": log.speed_in}
+        if row["number"]:
+            for name, values in columns.items():
+                row[name] = {"mean": float(values[kept].mean()), "max": float(values[kept].max())}
+            row["energy_loss"] = float(log.energy_loss[kept].sum())
+            row["floored"] = int(log.floored[kept].sum())
+        rows.append(row)
+    return rows
+
+
+def _energy(run: Run) -> dict[str, float]:
+    """The ledger at the end, J, and its residual relative to what went in."""
+    if not len(run.t):
+        return {}
+    ledger = run.energy
+    names = ("input", "damping", "contact", "stored", "residual")
+    end = {name: float(getattr(ledger, name)[-1]) for name in names}
+    scale = max(abs(end["input"]), abs(float(ledger.initial)))
+    end["residual_over_input"] = abs(end["residual"]) / scale if scale > 0 else 0.0
+    return end
+
+
+def text(found: dict[str, Any]) -> str:
+    """The tables of a summary: moments and extremes of signals, contacts of stops."""
+    head = ("", "mean/m", "std/m", "skewness", "kurtosis", "min/m", "max/m")
+    moments = [[name, *(row[key.partition("/")[0]] for key in head[1:])] for name, row in found["moments"].items()]
+    tables = [aligned(head, moments)] if moments else []
+    columns = {"mean time/s": "duration", "mean peak force/N": "peak_force", "mean entry speed/(m/s)": "entry_speed"}
+    rows = [
+        [f"stop {row['stop']}", row["number"], row["rate"], *(row.get(c, {}).get("mean") for c in columns.values())]
+        for row in found["contacts"]
+    ]
+    return "\n\n".join(tables + ([aligned(("", "contacts", "per second", *columns), rows)] if rows else []))
+
+
+def plain(result: Any) -> Any:
+    """What a study found, without its models, runs and functions, as JSON has it."""
+    if is_dataclass(result) and not isinstance(result, type):
+        named = {f.name: getattr(result, f.name) for f in fields(result) if f.init}
+        return {name: plain(value) for name, value in named.items() if _telling(value)}
+    if isinstance(result, dict):
+        return {str(key): plain(value) for key, value in result.items() if _telling(value)}
+    if isinstance(result, (list, tuple)):
+        return [plain(value) for value in result if _telling(value)]
+    return result.tolist() if isinstance(result, (np.ndarray, np.generic)) else result
+
+
+def _telling(value: Any) -> bool:
+    """Whether a value belongs into a table of results."""
+    from fembeam.model import Model
+
+    known = (str, int, float, list, tuple, dict, np.ndarray, np.generic, type(None))
+    return isinstance(value, known) or (is_dataclass(value) and not isinstance(value, (Run, Model)))
+
+
+def json_text(content: Any, escaped: bool = False) -> str:
+    """JSON as the standard has it: null for what is not finite; `escaped`: in ASCII."""
+    return json.dumps(_finite(content), indent=2, ensure_ascii=escaped, allow_nan=False)
+
+
+def print_json(content: Any) -> None:
+    """On stdout, in ASCII unless its encoding is a Unicode one."""
+    print(json_text(content, escaped="utf" not in (getattr(sys.stdout, "encoding", None) or "").lower()))
+
+
+def write_json(target: Path, content: dict[str, Any]) -> Path:
+    """Write JSON."""
+    with written_whole(target) as file:
+        file.write((json_text(content) + "\n").encode())
+    return target
+
+
+def _finite(value: Any) -> Any:
+    """The same with None for NaN and infinities."""
+    if isinstance(value, dict):
+        return {key: _finite(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(entry) for entry in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

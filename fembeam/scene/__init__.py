@@ -1,0 +1,45 @@
+"""What there is: supports, masses, springs, stops, impactors, loads; full matrices, contact rows, all signals.
+
+Imports: `beams`, `excitation`, `support`, `reduction`; `Scene.reduce` opens the door to `fembeam.model`. Begin with
+`scene`, then `assembly`.
+"""
+
+from fembeam.scene.assembly import Matrices
+from fembeam.scene.contact_rows import heights, loaded, loads, touches, watched, weight
+from fembeam.scene.impactor import Impactor
+from fembeam.scene.parameters import changes_structure, path_of, replaced, value_of, with_value
+from fembeam.scene.parts import Clamped, Dashpot, Guided, LumpedMass, Pinned, PointForce, PointMoment, Spring, Stop
+from fembeam.scene.scene import FEATURES, Scene
+from fembeam.scene.signals import PLACES, signals_of, with_signals
+from fembeam.scene.source import Source
+
+__all__ = [
+    "FEATURES",
+    "PLACES",
+    "Clamped",
+    "Dashpot",
+    "Guided",
+    "Impactor",
+    "LumpedMass",
+    "Matrices",
+    "Pinned",
+    "PointForce",
+    "PointMoment",
+    "Scene",
+    "Source",
+    "Spring",
+    "Stop",
+    "changes_structure",
+    "heights",
+    "loaded",
+    "loads",
+    "path_of",
+    "replaced",
+    "signals_of",
+    "touches",
+    "value_of",
+    "watched",
+    "weight",
+    "with_signals",
+    "with_value",
+]

@@ -1,0 +1,301 @@
+"""From a scene to M, C, K on the free dofs: the beam and what sits on it, then further bodies beside it.
+
+M = Σ beam + m (1, e)ᵀ(1, e) + J,  K = RᵀR = Σ beam + k + κ,  load of a base motion: -(M_all r) ÿ,
+r = 1 on every translation, supported ones included, 0 on slopes. Several bodies are blocks on the diagonal: the beam
+of the scene, its `bodies`, then one dof for every impactor.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import linalg, sparse
+from scipy.sparse import linalg as sparse_linalg
+
+import reduction
+from fembeam.beams import (
+    ERROR_CONSTANT,
+    FREQUENCY_TOLERANCE,
+    SAME_PLACE,
+    SHORTEST,
+    WAVE_STEP,
+    Beam,
+    bending_matrices,
+    bending_root,
+    divided,
+    geometric_stiffness,
+    hermite_rows,
+    on_beam,
+    slowness,
+    spread,
+    wavenumber,
+)
+from fembeam.support import require, require_finite
+
+if TYPE_CHECKING:
+    from fembeam.scene.impactor import Impactor
+    from fembeam.scene.scene import Scene
+
+Vector = NDArray[np.float64]
+
+DEFAULT_MODES = 10
+MOST_MODES = 300  # 5400 elements, about a minute; a slender beam has lost its meaning long before
+MOST_DENSE = 2000  # free dofs of which all modes may be asked for, about ten seconds
+MOST_ELEMENTS = 10_000  # above it rounding of K hides the lowest frequencies
+DENSE = 200  # free dofs, below which the dense solver is quicker
+
+
+@dataclass(frozen=True, eq=False)
+class Matrices:
+    """Full matrices of a scene on its N free dofs: M ü + C u̇ + K u = -base_load ÿ + ….
+
+    Attributes
+    ----------
+    M, K : (N, N) sparse CSR, kg and N/m for displacements.
+    C : (N, N) sparse CSR, N s/m: structural damping and dashpots, made when first read.
+    root : (k, N) sparse R with RᵀR = K; `reduction.modal_basis(M, K, root=root)` is accurate on fine meshes. None
+        under compression.
+    dashpots : (N, N) sparse, the dashpots' part of C alone.
+    influence : r (N,), 1 on translations, 0 on slopes.
+    base_load : (M_all r) (N,) in kg, columns of the supported dofs included; the load is -base_load ÿ.
+    nodes : (m,) coordinates in m.
+    dofs : (m, 2) free dof of (u, u_z) at each node, -1 where supported.
+    modes : number of modes the mesh was made for, None if the elements were given.
+    bodies : where there are several beams or impactors, the matrices of each beam by itself; else empty. `nodes` and
+        `dofs` are those of the scene's own beam.
+    impactors : of all bodies, one dof each, the last ones.
+    """
+
+    beam: Beam
+    M: sparse.csr_matrix
+    K: sparse.csr_matrix
+    root: sparse.csr_matrix | None
+    dashpots: sparse.csr_matrix
+    damping: Any
+    influence: Vector
+    base_load: Vector
+    nodes: Vector
+    dofs: NDArray[np.int64]
+    modes: int | None = None
+    bodies: tuple[Matrices, ...] = ()
+    impactors: tuple[Impactor, ...] = ()
+
+    @cached_property
+    def C(self) -> sparse.csr_matrix:
+        """Structural damping + dashpots."""
+        if self.bodies:
+            strikers = sparse.diags([impactor.damping for impactor in self.impactors])
+            return sparse.block_diag([*(body.C for body in self.bodies), strikers], format="csr")
+        return (self.damping.matrix(self.M, self.K, self.root) + self.dashpots).tocsr()
+
+    @property
+    def elements(self) -> int:
+        """Number of elements."""
+        return len(self.nodes) - 1
+
+    @property
+    def beams(self) -> tuple[Matrices, ...]:
+        """The matrices of each beam by itself, this scene's own first."""
+        return self.bodies or (self,)
+
+    def interpolation(self, z: ArrayLike, derivative: int = 0, body: int = 0) -> sparse.csr_matrix:
+        """Rows (k, N): u, u_z or u_zz (derivative 0, 1, 2) of a body at z (k,) by the elements' cubics.
+
+        Supported dofs count as 0; at a node the curvature is that of the element ahead. ValueError if a z is
+        not on the beam.
+        """
+        own = self.beams[body]
+        places = on_beam(np.atleast_1d(np.asarray(z, dtype=float)), own.beam, "interpolation")
+        rows = hermite_rows(own.nodes, places, derivative)[:, np.flatnonzero(own.dofs.ravel() >= 0)]
+        before = sum(beam.M.shape[0] for beam in self.beams[:body])
+        after = self.M.shape[0] - before - rows.shape[1]
+        blank = [sparse.csr_matrix((len(places), count)) for count in (before, after)]
+        return sparse.hstack([blank[0], rows, blank[1]], format="csr") if before or after else rows
+
+    def striker(self, index: int) -> sparse.csr_matrix:
+        """Row (1, N): the displacement of an impactor."""
+        size = self.M.shape[0]
+        place = size - len(self.impactors) + index
+        return sparse.csr_matrix(([1.0], ([0], [place])), shape=(1, size))
+
+    def frequency_error(self, omega: ArrayLike) -> Vector:
+        """Relative error to expect in frequencies omega: max over elements of (β h)⁴/1440, β⁴ = ρA ω²/EI."""
+        steps = np.diff(self.nodes) * slowness(self.beam, self.nodes)
+        return ERROR_CONSTANT * steps.max() ** 4 * np.asarray(omega, dtype=float) ** 2
+
+    @property
+    def rounding(self) -> float:
+        """Relative error of the lowest frequency from rounding: about eps n² with a root, eps n⁴ without."""
+        return float(np.finfo(float).eps * self.elements ** (2 if self.root is not None else 4))
+
+    @property
+    def accuracy(self) -> str:
+        """What the mesh promises, in a sentence."""
+        size = f"{self.elements} elements, {self.M.shape[0]} free dofs"
+        if self.modes is None:
+            return f"{size}: elements as asked, frequency_error(omega) estimates the error"
+        return f"{size}: the lowest {self.modes} frequencies are right to {FREQUENCY_TOLERANCE:g} relative"
+
+    def __str__(self) -> str:
+        return f"Matrices: {self.accuracy}"
+
+
+def assemble(scene: Scene, elements: int | None, modes: int | None, probes: Sequence[float]) -> Matrices:
+    """Matrices of the scene; `Scene.matrices` explains the arguments."""
+    _check_counts(elements, modes)
+    own = _one_beam(scene, elements, modes, probes)
+    if not scene.bodies and not scene.impactors:
+        return own
+    touched = [[s.on[1] for s in scene.stops if s.on and s.on[0] == b + 1] for b in range(len(scene.bodies))]
+    others = [_one_beam(body, elements, modes, at) for body, at in zip(scene.bodies, touched, strict=True)]
+    return _joined((own, *others), tuple(i for body in (scene, *scene.bodies) for i in body.impactors))
+
+
+def _one_beam(scene: Scene, elements: int | None, modes: int | None, probes: Sequence[float]) -> Matrices:
+    """Matrices of the scene's own beam."""
+    _check_buckling(scene)
+    borders = borders_of(scene, probes)
+    if elements is None:
+        modes = DEFAULT_MODES if modes is None else int(modes)
+        _check_modes(modes)
+        return _on_nodes(scene, _resolving(scene, borders, modes), modes)
+    matrices = _on_nodes(scene, spread(scene.beam, borders, elements), None)
+    if modes is not None:
+        size = matrices.M.shape[0]
+        require(modes <= size, f"modes must be at most {size} (free dofs)", modes, "Scene.matrices",
+                "ask for fewer modes or more elements")  # fmt: skip
+        require(modes <= MOST_MODES or size <= MOST_DENSE, f"modes must be at most {MOST_MODES} of {size} free dofs",
+                modes, "Scene.matrices", f"or use a mesh of at most {MOST_DENSE} dofs")  # fmt: skip
+    return matrices
+
+
+def _joined(beams: tuple[Matrices, ...], impactors: tuple[Impactor, ...]) -> Matrices:
+    """Several bodies as blocks of one problem, impactors last."""
+    own = beams[0]
+    mass = np.array([impactor.mass for impactor in impactors])
+    stiffness = np.array([impactor.stiffness for impactor in impactors])
+    damping = np.array([impactor.damping for impactor in impactors])
+
+    def stacked(blocks: Sequence[sparse.csr_matrix], last: Vector) -> sparse.csr_matrix:
+        return sparse.block_diag([*blocks, *([sparse.diags(last)] if len(last) else [])], format="csr")
+
+    roots = [beam.root for beam in beams if beam.root is not None]
+    return replace(
+        own,
+        M=stacked([beam.M for beam in beams], mass),
+        K=stacked([beam.K for beam in beams], stiffness),
+        root=stacked(roots, np.sqrt(stiffness)) if len(roots) == len(beams) else None,
+        dashpots=stacked([beam.dashpots for beam in beams], damping),
+        influence=np.concatenate([*(beam.influence for beam in beams), np.ones(len(mass))]),
+        base_load=np.concatenate([*(beam.base_load for beam in beams), mass]),
+        bodies=beams,
+        impactors=impactors,
+    )
+
+
+def _check_counts(elements: int | None, modes: int | None) -> None:
+    """Raise ValueError unless both are counts, and the elements few enough to be right."""
+    for name, number in (("elements", elements), ("modes", modes)):
+        whole = isinstance(number, (int, np.integer)) and not isinstance(number, bool)
+        require(number is None or (whole and number > 0), f"{name} must be a whole number above 0", number,
+                "Scene.matrices", "give a count, or None")  # fmt: skip
+    few = elements is None or elements <= MOST_ELEMENTS
+    require(few, f"elements must be at most {MOST_ELEMENTS}, where rounding takes over", elements, "Scene.matrices",
+            "leave them out: as few as the modes need are made")  # fmt: skip
+
+
+def _check_modes(modes: int) -> None:
+    """Raise ValueError for more modes than are computed within a minute or so."""
+    require(modes <= MOST_MODES, f"modes must be at most {MOST_MODES}", modes, "Scene.matrices",
+            "keep the modes up to a few times the highest frequency of interest")  # fmt: skip
+
+
+def _resolving(scene: Scene, borders: Vector, modes: int) -> Vector:
+    """Nodes with as few elements as keep κ h below WAVE_STEP; omega is estimated on a coarse mesh."""
+    coarse = _on_nodes(scene, spread(scene.beam, borders, 2 * modes + 4), None)
+    omega = reduction.modal_basis(coarse.M, coarse.K, modes, root=coarse.root).omega[-1]
+    waves = np.diff(borders) * wavenumber(scene.beam, borders, float(omega))
+    return divided(borders, np.maximum(1, np.ceil(waves / WAVE_STEP).astype(int)))
+
+
+def _check_buckling(scene: Scene) -> None:
+    """Raise ValueError when the beam has buckled under its axial force."""
+    if scene.beam.axial_force < 0:
+        spare = buckling_load(scene, 2 * DEFAULT_MODES)
+        most = f"{spare - scene.beam.axial_force:.6g}"
+        require(spare > 0, f"axial_force must stay above -{most} N, where the beam buckles", scene.beam.axial_force,
+                "Beam", "press less, or support it more")  # fmt: skip
+
+
+def buckling_load(scene: Scene, elements: int | None = None) -> float:
+    """Lowest P of (K - P G) φ = 0 for the own beam, less its compression; `Scene.buckling_load` explains it."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        beam = replace(scene.beam, axial_force=0.0)
+        relaxed = replace(scene, beam=beam, bodies=(), impactors=(), stops=())
+    held = relaxed.rigid_body_modes == 0
+    require(held, "supports and springs must hold the beam", f"{relaxed.rigid_body_modes} rigid-body modes",
+            "buckling_load", "add a support")  # fmt: skip
+    matrices = _one_beam(relaxed, elements, None, ())
+    free = np.flatnonzero(matrices.dofs.ravel() >= 0)
+    G = geometric_stiffness(matrices.nodes)[free][:, free]
+    if len(free) < DENSE:
+        largest = linalg.eigh(G.toarray(), matrices.K.toarray(), eigvals_only=True)[-1]
+    else:
+        start = np.ones(len(free))
+        largest = sparse_linalg.eigsh(G, 1, matrices.K, which="LA", return_eigenvectors=False, v0=start)[0]
+    return float(1 / largest + scene.beam.axial_force)
+
+
+def _on_nodes(scene: Scene, nodes: Vector, modes: int | None) -> Matrices:
+    """The assembly itself."""
+    fixed = np.zeros((len(nodes), 2), dtype=bool)
+    for support in scene.supports:
+        fixed[np.argmin(np.abs(nodes - support.z))] |= support.fixed
+    free = np.flatnonzero(~fixed.ravel())
+    dofs = np.full(fixed.shape, -1)
+    dofs.ravel()[free] = np.arange(len(free))
+
+    K, M = bending_matrices(scene.beam, nodes)
+    arms = _lumped(nodes, [(m.z, m.mass, m.inertia, m.offset) for m in scene.masses])
+    springs = _lumped(nodes, [(s.z, s.stiffness, s.rotational, 0.0) for s in scene.springs])
+    dashpots = _lumped(nodes, [(d.z, d.damping, d.rotational, 0.0) for d in scene.dashpots])
+    M_all, K_all, C_all = M + arms.T @ arms, K + springs.T @ springs, dashpots.T @ dashpots
+    root = bending_root(scene.beam, nodes)
+    if root is not None:
+        root = sparse.vstack([root, springs], format="csr")[:, free]
+
+    r = np.tile([1.0, 0.0], len(nodes))
+    M, K, C = (A.tocsr()[free][:, free] for A in (M_all, K_all, C_all))
+    return Matrices(scene.beam, M, K, root, C, scene.damping, r[free], (M_all @ r)[free], nodes, dofs, modes)
+
+
+def _lumped(nodes: Vector, items: Sequence[tuple[float, float, float, float]]) -> sparse.csr_matrix:
+    """Rows √a (u + e u_z) and √b u_z for items (z, a, b, e): their square is the quadratic form."""
+    z, a, b, e = np.array(items, dtype=float).reshape(-1, 4).T
+    u, slope = hermite_rows(nodes, z, 0), hermite_rows(nodes, z, 1)
+    arm = sparse.diags(np.sqrt(a)) @ (u + sparse.diags(e) @ slope)
+    return sparse.vstack([arm, sparse.diags(np.sqrt(b)) @ slope], format="csr")
+
+
+def borders_of(scene: Scene, probes: Sequence[float]) -> Vector:
+    """Coordinates that must be nodes, ascending, without repeats."""
+    for index, z in enumerate(probes):
+        require_finite(f"probes[{index}]", z, "Scene.matrices", "give coordinates in m")
+    asked = on_beam(np.asarray(list(probes), dtype=float), scene.beam, "probes of Scene.matrices")
+    shortest = SHORTEST * scene.beam.length
+    needed = np.sort([*scene.beam.borders, *(support.z for support in scene.supports)])
+    nodes = needed[np.diff(needed, prepend=-np.inf) > SAME_PLACE * scene.beam.length]
+    gaps = np.diff(nodes)
+    rule = f"supports and span ends must be {shortest:.3g} m apart or at one place"
+    require(bool(np.all(gaps >= shortest)), rule, float(gaps.min()), "Scene", "move or merge them")
+    for z in [*scene.places, *asked]:
+        if np.min(np.abs(nodes - z)) >= shortest:  # nearer ones are interpolated inside their element
+            nodes = np.append(nodes, z)
+    return np.sort(nodes)

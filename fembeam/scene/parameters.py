@@ -1,0 +1,99 @@
+"""The scalars of a scene by name: read them, and make the same scene with another value.
+
+A name is a path such as ``base.omega``, ``stops[0].gap``, ``stops[0].law.stiffness`` or ``masses[1].mass``. Its last
+part alone will do where no other path ends so; ``omega`` and ``amplitude`` mean the base motion's first, and every name
+the scene's own part before that of a body, ``bodies[0].stops[0].gap``.
+"""
+
+from __future__ import annotations
+
+import re
+from copy import copy
+from dataclasses import fields, is_dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from fembeam.scene.signals import is_of_signal
+from fembeam.support import require
+
+if TYPE_CHECKING:
+    from fembeam.scene.scene import Scene
+
+LISTS = ("masses", "springs", "dashpots", "stops", "forces")
+
+
+def scalars(scene: Scene, within: str = "") -> dict[str, float]:
+    """All numbers of a scene and of its bodies that can be varied, by path; `within` stands before each."""
+    found: dict[str, float] = {}
+    for part in fields(scene):
+        value = getattr(scene, part.name)
+        items = [(f"{part.name}[{i}]", item) for i, item in enumerate(value)] if part.name in LISTS else []
+        for path, item in items or [(part.name, value)]:
+            found.update(_numbers(f"{within}{path}", item))
+    for i, body in enumerate(scene.bodies):
+        found.update(scalars(body, f"{within}bodies[{i}]."))
+    return found
+
+
+def _numbers(path: str, item: Any) -> dict[str, float]:
+    """Numbers of one part, and of the parts it has."""
+    if isinstance(item, float):
+        return {path: item}
+    if isinstance(item, tuple) and all(isinstance(entry, float) for entry in item):
+        return {f"{path}[{i}]": entry for i, entry in enumerate(item)}
+    if not is_dataclass(item):
+        return {}
+    found: dict[str, float] = {}
+    for part in fields(item):
+        if part.init and part.repr:
+            found.update(_numbers(f"{path}.{part.name}", getattr(item, part.name)))
+    return found
+
+
+def path_of(scene: Scene, name: str) -> str:
+    """The full path a name means; an unknown or ambiguous one is an error that lists what there is."""
+    known = scalars(scene)
+    if name in known:
+        return name
+    ends = [path for path in known if path.endswith(f".{name}")]
+    own = [path for path in ends if not path.startswith("bodies")]
+    first = [path for path in ends if path.startswith("base.")] or own or ends
+    require(bool(ends), f"no such parameter; the scene has {', '.join(known)}", name, "parameter", "use one of these")
+    require(len(first) == 1, f"ambiguous parameter: {', '.join(ends)}", name, "parameter", "give the whole path")
+    return first[0]
+
+
+def value_of(scene: Scene, name: str) -> float:
+    """Present value of a parameter."""
+    return scalars(scene)[path_of(scene, name)]
+
+
+def with_value(scene: Scene, name: str, value: float) -> Scene:
+    """The same scene with another value of one parameter; the scene's own checks apply."""
+    return replaced(scene, path_of(scene, name), value)
+
+
+def replaced(item: Any, path: str, value: float) -> Any:
+    """A copy of a scene, or of a part of one, with the number at the end of a full path replaced."""
+    return _replaced(item, re.findall(r"\w+", path), value)
+
+
+def _replaced(item: Any, path: list[str], value: float) -> Any:
+    """A copy with the number at the end of a path replaced."""
+    if not path:
+        return value
+    if path[0].isdigit():
+        changed = list(item)
+        changed[int(path[0])] = _replaced(item[int(path[0])], path[1:], value)
+        return type(item)(changed)
+    changed = _replaced(getattr(item, path[0]), path[1:], value)
+    if path[0] != "base":
+        return replace(item, **{path[0]: changed})
+    moved = copy(item)  # no check of a scene asks for the base motion, which has checked itself
+    object.__setattr__(moved, "base", changed)
+    return moved
+
+
+def changes_structure(path: str) -> bool:
+    """Whether a parameter changes the mode shapes or frequencies: anything but signals, gaps and laws."""
+    part = re.sub(r"^(bodies\[\d+\]\.)+", "", path)
+    return not (is_of_signal(path) or part.startswith("stops")) or path.endswith(".z")

@@ -1,0 +1,202 @@
+"""What stands on a beam: supports, masses, springs, dashpots, stops, forces and moments."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from fembeam.scene.impactor import check_law
+from fembeam.support import require, require_finite, require_non_negative
+
+
+@dataclass(frozen=True)
+class Clamped:
+    """u = 0 and u_z = 0 at z (m).
+
+    Examples
+    --------
+    >>> Clamped(0.0).fixed  # displacement, slope
+    (True, True)
+    """
+
+    z: float
+    fixed = (True, True)
+
+
+@dataclass(frozen=True)
+class Pinned:
+    """u = 0 at z (m), free to turn.
+
+    Examples
+    --------
+    >>> Pinned(0.5).fixed  # displacement, slope
+    (True, False)
+    """
+
+    z: float
+    fixed = (True, False)
+
+
+@dataclass(frozen=True)
+class Guided:
+    """u_z = 0 at z (m), free to move.
+
+    Examples
+    --------
+    >>> Guided(0.5).fixed  # displacement, slope
+    (False, True)
+    """
+
+    z: float
+    fixed = (False, True)
+
+
+Support = Clamped | Pinned | Guided
+
+
+@dataclass(frozen=True)
+class LumpedMass:
+    """A rigid body fixed to the beam at z: T = ½ m (u̇ + e u̇_z)² + ½ J u̇_z².
+
+    `mass` m in kg, `inertia` J about its own centre in kg m², both ≥ 0; `offset` e in m: the centre sits
+    ahead of z by e on a rigid arm, which may reach beyond the beam's end. ValueError for a negative mass or inertia.
+
+    Examples
+    --------
+    >>> cube = LumpedMass(0.5, mass=0.1, inertia=0.1 * 0.02**2 / 6)  # edge 2 cm
+    >>> round(cube.inertia, 9)
+    6.667e-06
+    """
+
+    z: float
+    mass: float
+    inertia: float = 0.0
+    offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_non_negative("mass", self.mass, f"LumpedMass at z = {self.z}", "give kg")
+        require_non_negative("inertia", self.inertia, f"LumpedMass at z = {self.z}", "give kg m²")
+        require_finite("offset", self.offset, f"LumpedMass at z = {self.z}", "give m")
+
+
+@dataclass(frozen=True)
+class Spring:
+    """A spring to the frame: force -k (u - foot) (`stiffness`, N/m), moment -κ u_z (`rotational`, N m/rad); ≥ 0.
+
+    `foot` is a signal, the motion of its far end relative to the frame in m (a shaken support); None: at rest.
+    ValueError for a negative stiffness.
+
+    Examples
+    --------
+    >>> from fembeam import Harmonic
+    >>> shaken = Spring(0.3, stiffness=1e4, foot=Harmonic(amplitude=1e-3, omega=50.0))
+    >>> shaken.stiffness * float(shaken.foot(0.0))  # N, on the beam held at u = 0
+    10.0
+    """
+
+    z: float
+    stiffness: float
+    rotational: float = 0.0
+    foot: Any = None
+
+    def __post_init__(self) -> None:
+        require_non_negative("stiffness", self.stiffness, f"Spring at z = {self.z}", "give N/m")
+        require_non_negative("rotational", self.rotational, f"Spring at z = {self.z}", "give N m/rad")
+        require(self.foot is None or callable(self.foot), "foot must be a signal or None", self.foot,
+                f"Spring at z = {self.z}", "give a motion such as Harmonic(amplitude, omega)")  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Dashpot:
+    """A dashpot to the frame: force -c u̇ (`damping`, N s/m), moment -γ u̇_z (`rotational`, N m s); ≥ 0.
+
+    ValueError for a negative one.
+
+    Examples
+    --------
+    >>> Dashpot(0.3, damping=2.0)
+    Dashpot(z=0.3, damping=2.0, rotational=0.0)
+    """
+
+    z: float
+    damping: float
+    rotational: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_non_negative("damping", self.damping, f"Dashpot at z = {self.z}", "give N s/m")
+        require_non_negative("rotational", self.rotational, f"Dashpot at z = {self.z}", "give N m s/rad")
+
+
+@dataclass(frozen=True)
+class Stop:
+    """A one-sided stop: δ = -u - gap below the beam, δ = u - gap above it.
+
+    `law` gives the repulsive force for δ > 0; `gap` in m, negative = preload. It sits on the frame, or `on` another
+    beam of the scene: `on=(body, z)`, body 1 the first of `Scene.bodies`; u is then the difference, u - u_body(z).
+    ValueError for a side that is neither "below" nor "above", or a gap that is not finite.
+
+    Examples
+    --------
+    >>> from contacts import Hertz
+    >>> both = [Stop(0.2, Hertz(1e9), gap=1e-3, side=side) for side in ("below", "above")]
+    >>> [stop.side for stop in both]
+    ['below', 'above']
+    """
+
+    z: float
+    law: Any
+    gap: float = 0.0
+    side: str = "below"
+    on: tuple[int, float] | None = None
+
+    def __post_init__(self) -> None:
+        where = f"Stop at z = {self.z}"
+        require_finite("gap", self.gap, where, "give the clearance in m, negative for a preload")
+        require(self.side in ("below", "above"), "side must be 'below' or 'above'", self.side, where, "choose one")
+        require(self.on is None or (isinstance(self.on, (tuple, list)) and len(self.on) == 2),
+                "on must be (body, z) or None", self.on, where,
+                "name a beam of bodies, 1 the first, and a place")  # fmt: skip
+        check_law(self.law, where)
+
+    @property
+    def push(self) -> float:
+        """Direction in which the stop pushes the beam: +1 (up) from below, -1 from above."""
+        return 1.0 if self.side == "below" else -1.0
+
+
+@dataclass(frozen=True)
+class PointForce:
+    """A force on the beam at z: signal(t) in N, positive up.
+
+    Examples
+    --------
+    >>> from fembeam import Pulse
+    >>> round(float(PointForce(0.2, Pulse(peak=100.0, length=1e-3)).signal(5e-4)), 9)
+    100.0
+    """
+
+    z: float
+    signal: Any
+
+    def __post_init__(self) -> None:
+        require(callable(self.signal), "signal must be a function of t", self.signal, f"PointForce at z = {self.z}",
+                "give a signal such as Harmonic(amplitude, omega); Harmonic(size, 0.0) is a constant")  # fmt: skip
+
+
+@dataclass(frozen=True)
+class PointMoment:
+    """A moment on the beam at z: signal(t) in N m, positive where it turns u_z up.
+
+    Examples
+    --------
+    >>> from fembeam import Step
+    >>> float(PointMoment(0.2, Step(size=1.5, rise=0.1)).signal(1.0))
+    1.5
+    """
+
+    z: float
+    signal: Any
+
+    def __post_init__(self) -> None:
+        require(callable(self.signal), "signal must be a function of t", self.signal, f"PointMoment at z = {self.z}",
+                "give a signal such as Harmonic(amplitude, omega); Harmonic(size, 0.0) is a constant")  # fmt: skip

@@ -1,0 +1,49 @@
+"""Rigid-body motions u = a + b z of a scene's beams, and which beams their loads may carry away by them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fembeam.scene.signals import signals_of
+
+if TYPE_CHECKING:
+    from fembeam.scene.scene import Scene
+
+
+def rigid_body_modes(scene: Scene) -> int:
+    """How many of the motions u = a + b z nothing resists, of supports, springs, foundation, tension: 0, 1 or 2."""
+    rows = [row for s in scene.supports for row, fixed in zip(_rigid_rows(s.z), s.fixed, strict=True) if fixed]
+    for spring in scene.springs:
+        translation, rotation = _rigid_rows(spring.z)
+        rows += [translation] * (spring.stiffness > 0) + [rotation] * (spring.rotational > 0)
+    rows += [(1.0, 0.0), (0.0, 1.0)] * (scene.beam.foundation > 0) + [(0.0, 1.0)] * (scene.beam.axial_force != 0)
+    scaled = np.array([*rows, (0.0, 0.0)]) / (1.0, scene.beam.length)
+    return 2 - int(np.linalg.matrix_rank(scaled, tol=1e-9))
+
+
+def drifting(scene: Scene) -> list[str]:
+    """What to warn of: beams with rigid-body modes that are loaded and that no stops hold."""
+    found = []
+    for index, beam in enumerate((scene, *scene.bodies)):
+        own = [path for path in signals_of(beam) if not path.startswith("bodies")]
+        loaded = bool(own) or scene.base is not None or scene.gravity != 0.0
+        if loaded and not _held(scene, index) and (count := rigid_body_modes(beam)):
+            what = "1 rigid-body mode appears" if count == 1 else f"{count} rigid-body modes appear"
+            where = f"bodies[{index - 1}] of Scene" if index else "Scene"
+            found.append(f"{what} in {where}: supports and springs do not hold the beam, its loads may carry it away")
+    return found
+
+
+def _held(scene: Scene, index: int) -> bool:
+    """Whether stops push a beam (0 the scene's own) from both sides, or against gravity."""
+    beam = scene.bodies[index - 1] if index else scene
+    pushes = {stop.push for stop in beam.stops}
+    pushes |= {-stop.push for stop in scene.stops if stop.on is not None and stop.on[0] == index}
+    return len(pushes) == 2 or (scene.gravity != 0.0 and np.sign(scene.gravity) in pushes)
+
+
+def _rigid_rows(z: float) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Rows u and u_z at z of the rigid motions (1, z)."""
+    return (1.0, z), (0.0, 1.0)

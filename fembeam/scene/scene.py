@@ -1,0 +1,257 @@
+"""The scene: a beam, what holds it, what hangs on it, what it may hit, and what drives it; further bodies beside it.
+
+SI units; z along the beam, u its displacement relative to the frame, positive up. Everything is checked when
+it is made, before anything is computed: positions, signs, conflicts.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+from fembeam.beams import Beam, ModalDamping, Rayleigh
+from fembeam.scene.assembly import Matrices, assemble, buckling_load
+from fembeam.scene.impactor import Impactor
+from fembeam.scene.parts import (
+    Dashpot,
+    LumpedMass,
+    PointForce,
+    PointMoment,
+    Spring,
+    Stop,
+    Support,
+)
+from fembeam.scene.rigid_motions import drifting, rigid_body_modes
+from fembeam.support import require, require_finite
+
+if TYPE_CHECKING:
+    from fembeam.model import Model
+
+
+FEATURES: dict[str, tuple[type, ...]] = {
+    "supports": get_args(Support),
+    "masses": (LumpedMass,),
+    "springs": (Spring,),
+    "dashpots": (Dashpot,),
+    "stops": (Stop,),
+    "forces": (PointForce, PointMoment),
+    "impactors": (Impactor,),
+}
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A beam with supports, masses, springs, dashpots, stops, damping, base motion and forces.
+
+    M ü + C u̇ + K u = -M r (ÿ + g) + Σ b f(t) + Σ w F(δ, δ̇)
+
+    Parameters
+    ----------
+    beam : Beam.
+    supports : of Clamped, Pinned, Guided; at most one per place. None at all is allowed (free body).
+    masses, springs, dashpots, stops, forces : lists, any length; kept as tuples.
+    damping : ModalDamping or Rayleigh, of the structure without dashpots.
+    base : frame motion y(t) that knows its derivatives, `derivative(order)`, or None.
+    impactors : rigid masses beside the beam. Their contacts are numbered after those of the stops.
+    bodies : further beams, each a Scene of its own with its supports, stops, forces, damping; a `Stop` with `on` lets
+        the beam of this scene meet them. Their contacts are numbered after those of this scene.
+    gravity : g in m/s², pulls everything down; for all bodies.
+
+    Raises
+    ------
+    ValueError : anything outside the beam, not finite, or in conflict; the message names it.
+    TypeError : something of the wrong kind in a list, a base motion without derivatives.
+
+    Warns
+    -----
+    UserWarning : the supports and springs of a beam leave rigid-body modes (says how many), and loads may carry it
+        away: they act, and no stops on both sides, or below it under gravity, hold it. A free beam without loads, a
+        hinged one that lies on a stop are meant so. Also what a `Record` as base motion says of itself.
+
+    Examples
+    --------
+    >>> from fembeam import Clamped, LumpedMass, Section
+    >>> steel = Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)
+    >>> scene = Scene(Beam(0.2599, steel), [Clamped(0.0)], [LumpedMass(0.24445, 25.4e-3, inertia=3.0e-6)])
+    >>> scene.matrices(modes=3).elements
+    44
+    """
+
+    beam: Beam
+    supports: Sequence[Support] = ()
+    masses: Sequence[LumpedMass] = ()
+    springs: Sequence[Spring] = ()
+    dashpots: Sequence[Dashpot] = ()
+    stops: Sequence[Stop] = ()
+    damping: ModalDamping | Rayleigh = ModalDamping(0.0)  # noqa: RUF009 (frozen)
+    base: Any = None
+    forces: Sequence[PointForce | PointMoment] = ()
+    impactors: Sequence[Impactor] = ()
+    bodies: Sequence[Scene] = ()
+    gravity: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.beam, Beam):
+            raise TypeError(f"beam must be a Beam, got {self.beam!r} in Scene; make one: Beam(length, section)")
+        for name, kinds in FEATURES.items():
+            object.__setattr__(self, name, _listed(name, getattr(self, name), kinds))
+            self._check_places(name)
+        if not callable(getattr(self.damping, "modal_coefficients", None)):
+            raise TypeError(f"damping must be ModalDamping or Rayleigh, got {self.damping!r} in Scene; "
+                            "write ModalDamping(0.01)")  # fmt: skip
+        require_finite("gravity", self.gravity, "Scene", "give m/s², 9.81 on the ground")
+        object.__setattr__(self, "bodies", _listed("bodies", self.bodies, (Scene,)))
+        self._check_base()
+        self._check_conflicts()
+        self._check_bodies()
+        for said in [*drifting(self), *([doubt] if (doubt := getattr(self.base, "doubt", "")) else [])]:
+            warnings.warn(said, UserWarning, stacklevel=3)
+
+    def matrices(self, elements: int | None = None, modes: int | None = None, probes: Sequence[float] = ()) -> Matrices:
+        """Sparse M, C, K on the free dofs of a Hermite mesh with a node on every feature and probe.
+
+        Parameters
+        ----------
+        elements :
+            Number of elements (more if the features need them); None: as few as make each of the lowest
+            `modes` frequencies right to 1e-6 relative, by the local wavelength: (β h)⁴/1440 ≤ 0.65e-6.
+        modes :
+            How many modes will be kept; None: 10. With `elements` it is only checked against the dofs.
+        probes :
+            Further coordinates that shall be nodes. (A feature or probe closer than 1e-4 of the length to
+            another one is interpolated inside its element instead, for rounding.)
+
+        Returns
+        -------
+        Matrices : its `accuracy` says what the mesh promises.
+
+        Raises
+        ------
+        ValueError : elements or modes not a positive integer, more modes than dofs, more than 300 modes or 10 000
+            elements, a probe outside the beam.
+        """
+        return assemble(self, elements, modes, probes)
+
+    def reduce(
+        self,
+        modes: int | Sequence[int] | Literal["all"] | None = None,
+        elements: int | None = None,
+        omega_max: float | None = None,
+        mass_share: float | None = None,
+        residual: bool = False,
+        interface: bool = False,
+    ) -> Model:
+        """The scene in few coordinates: its lowest modes, with or without static shapes of stops and forces.
+
+        Parameters
+        ----------
+        modes : a count, mode numbers from 0 such as [0, 2, 5], or "all" of a mesh of given `elements`; None: 2. The
+            same of every beam; impactors are kept as they are.
+        elements : of the mesh; None: as few as make every kept frequency right to 1e-6.
+        omega_max : instead of `modes`: all of them up to this frequency, rad/s.
+        mass_share : instead of `modes`: as many as carry this share of the mass that a base motion moves, in (0, 1).
+        residual : add the residual static shape of every stop, force, moment, moving foot and dashpot (its rotation,
+            too); the model is then exact for slow loads there.
+        interface : Craig–Bampton: static shapes of the same places and `modes` modes with them held; with
+            modes=0 Guyan's condensation.
+
+        Returns
+        -------
+        Model : mass-normalised modes, positive at the first stop (else where they move most).
+
+        Raises
+        ------
+        ValueError : no modes, repeated or negative numbers, more than the mesh has; more than 300 of a mesh above 2000
+            dofs, or more than 128 for omega_max or mass_share; two ways of choosing at once; static shapes
+            without a stop, force or dashpot.
+        reduction.AccuracyError : stiffnesses too far apart, or a mesh too fine, for double precision.
+        """
+        from fembeam.model.reduce import reduced
+
+        return reduced(self, modes, elements, omega_max, mass_share, residual, interface)
+
+    @property
+    def loaded_places(self) -> list[float]:
+        """Coordinates of stops, then forces."""
+        return [stop.z for stop in self.stops] + [force.z for force in self.forces]
+
+    def buckling_load(self, elements: int | None = None) -> float:
+        """The compression (N, positive) at which the beam buckles, on top of its own axial force.
+
+        Lowest P of (K - P G) φ = 0 with G = ∫ u_z v_z dz. ValueError when supports and springs do not hold the beam.
+        """
+        return buckling_load(self, elements)
+
+    @property
+    def places(self) -> list[float]:
+        """Coordinates of all features, in no order."""
+        return [feature.z for name in FEATURES for feature in getattr(self, name)]
+
+    @property
+    def rigid_body_modes(self) -> int:
+        """How many of the motions u = a + b z nothing resists, of supports, springs, foundation, tension: 0, 1 or 2."""
+        return rigid_body_modes(self)
+
+    def _check_places(self, name: str) -> None:
+        """Raise ValueError unless every feature of one list sits on the beam."""
+        for index, feature in enumerate(getattr(self, name)):
+            where = f"{name}[{index}] ({type(feature).__name__}) of Scene"
+            require_finite("z", feature.z, where, "give the coordinate along the beam in m")
+            require(0 <= feature.z <= self.beam.length, f"z must lie on the beam, 0 to {self.beam.length} m",
+                    feature.z, where, "move it, or lengthen the beam")  # fmt: skip
+
+    def _check_base(self) -> None:
+        """Raise TypeError for a base motion without derivatives, ValueError where its second one does not exist."""
+        if self.base is None:
+            return
+        missing = [name for name in ("__call__", "derivative") if not callable(getattr(self.base, name, None))]
+        if missing or isinstance(self.base, type):
+            raise TypeError(f"base must be a motion y(t) that knows its derivatives, got {self.base!r} without "
+                            f"{' and '.join(missing) or 'values'} in Scene; use Harmonic, Multisine, BandNoise, "
+                            "Record, Pulse, Step, or an object with __call__(t) and derivative(order)")  # fmt: skip
+        self.base.derivative(2)
+
+    def _check_conflicts(self) -> None:
+        """Raise ValueError if two supports share one place, or two stops one place, side and carrier."""
+        near = 1e-9 * self.beam.length
+        ordered = sorted(self.supports, key=lambda support: support.z)
+        for first, second in pairwise(ordered):
+            apart = second.z - first.z > near
+            require(apart, "supports must not share one place", (first, second), "Scene", "keep one")
+        for j, stop in enumerate(self.stops):
+            for i, other in enumerate(self.stops[:j]):
+                same = abs(stop.z - other.z) <= near and (stop.side, stop.on) == (other.side, other.on)
+                require(not same, f"stops must not share one place and side (z = {stop.z} m, {stop.side})", (i, j),
+                        "stops of Scene", "make them one stop with one law, such as PiecewiseLinear")  # fmt: skip
+
+    def _check_bodies(self) -> None:
+        """Raise ValueError for what a body cannot carry, and for stops on bodies or places that do not exist."""
+        for index, body in enumerate(self.bodies):
+            plain = body.base is None and body.gravity == 0 and not body.bodies
+            require(plain, "a body must not have base, gravity or bodies of its own", body,
+                    f"bodies[{index}] of Scene", "give them to the outer scene")  # fmt: skip
+        for index, stop in enumerate(self.stops):
+            if stop.on is None:
+                continue
+            number, z = stop.on
+            where = f"stops[{index}] of Scene"
+            known = isinstance(number, int) and 1 <= number <= len(self.bodies)
+            require(known, f"on must name a body, 1 to {len(self.bodies)}", number, where, "add the beam to bodies")
+            length = self.bodies[number - 1].beam.length
+            require_finite("z of on", z, where, "give the coordinate along that beam in m")
+            require(0 <= z <= length, f"z of on must lie on body {number}, 0 to {length} m", z, where, "move it")
+
+
+def _listed(name: str, value: Any, kinds: tuple[type, ...]) -> tuple[Any, ...]:
+    """The list as a tuple, each entry of one of the kinds."""
+    names = " or ".join(kind.__name__ for kind in kinds)
+    if not isinstance(value, Iterable) or isinstance(value, (str, dict)):
+        raise TypeError(f"{name} must be a list of {names}, got {value!r} in Scene; put it in brackets")
+    entries = tuple(value)
+    for index, entry in enumerate(entries):
+        if not isinstance(entry, kinds):
+            raise TypeError(f"{name}[{index}] must be a {names}, got {entry!r} in Scene; move it to its own list")
+    return entries

@@ -1,0 +1,110 @@
+"""What a table of a scene file can choose from by its `kind` (sections: `shape`), and which keys hold such tables."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, get_origin
+
+import contacts
+import solvers
+from fembeam.beams import Section, Taper
+from fembeam.excitation import BandNoise, Harmonic, Interpolation, Multisine, Pulse, Quantity, Record, Step
+from fembeam.scene import PLACES
+from fembeam.scene_file.keys import Constructors
+from fembeam.study.quantities import QUANTITIES
+
+SHAPES: Constructors = {
+    "general": Section,
+    "rectangle": Section.rectangle,
+    "circle": Section.circle,
+    "tube": Section.tube,
+    "taper": Taper,
+}
+LAWS: Constructors = {
+    "hertz": contacts.Hertz,
+    "hertz_of_spheres": contacts.Hertz.of_spheres,
+    "hysteretic": contacts.Hysteretic,
+    **{name: getattr(contacts.Hysteretic, name) for name in contacts.PUBLISHED},
+    "kelvin_voigt": contacts.KelvinVoigt,
+    "anagnostopoulos": contacts.KelvinVoigt.anagnostopoulos,
+    "viscoelastic": contacts.Viscoelastic,
+    "tsuji": contacts.Viscoelastic.tsuji,
+    "jankowski": contacts.Viscoelastic.jankowski,
+    "piecewise_linear": contacts.PiecewiseLinear,
+    "tabulated": contacts.Tabulated,
+    "tabulated_file": contacts.Tabulated.from_csv,
+    "parallel": contacts.parallel,
+}
+
+
+def record(
+    path: Path,
+    quantity: Quantity,
+    columns: tuple[int, int] = (0, 1),
+    scale: float = 1.0,
+    band: tuple[float, float] | None = None,
+    detrend: bool = False,
+    interpolation: Interpolation = "spectral",
+    padding: float = 0.0,
+) -> Record:
+    """`Record.from_csv` for a scene file, which has to say what was measured."""
+    return Record.from_csv(path, columns, scale, band, quantity, detrend, interpolation, padding)
+
+
+SIGNALS: Constructors = {
+    "harmonic": Harmonic,
+    "multisine": Multisine,
+    "band_noise": BandNoise,
+    "noise_of_psd": BandNoise.of_psd,
+    "rolled_off_noise": BandNoise.rolled_off,
+    "record": record,
+    "pulse": Pulse,
+    "step": Step,
+}
+SOLVERS = {
+    "exponential": "Exponential",
+    "dormand_prince": "DormandPrince",
+    "henon_rk2": "HenonRK2",
+    "rk4": "RK4",
+    "central_difference": "CentralDifference",
+    "newmark": "Newmark",
+    "generalized_alpha": "GeneralizedAlpha",
+}
+
+
+@dataclass(frozen=True)
+class Nested:
+    """A table inside a table: what it can be, the key that says which, the one taken when it does not."""
+
+    constructors: Callable[[], Constructors]
+    key: str = "kind"
+    default: str = ""
+    listed: bool = False  # several of them
+    by_name: bool = False  # plain text is the name
+
+
+def _methods() -> Constructors:
+    """Methods by name; made when asked for, as they are slow to import."""
+    return {name: getattr(solvers, method) for name, method in SOLVERS.items() if method in solvers.__all__}
+
+
+SECTION = Nested(lambda: SHAPES, "shape", "general")
+SIGNAL = Nested(lambda: SIGNALS)
+KEYS = {
+    "section": SECTION,
+    "law": Nested(lambda: LAWS),
+    "laws": Nested(lambda: LAWS, listed=True),
+    **{key: SIGNAL for key in PLACES.values()},
+    "solver": Nested(_methods),
+    "quantity": Nested(lambda: QUANTITIES, by_name=True),
+}
+
+
+def nested(key: str, parameter: inspect.Parameter) -> Nested | None:
+    """The kind of table a key holds; None for plain values."""
+    if parameter.annotation is Section:
+        return SECTION
+    return None if get_origin(parameter.annotation) is Literal else KEYS.get(key)  # the quantity of a record is a word

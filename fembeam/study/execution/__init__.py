@@ -1,0 +1,1 @@
+"""How many runs are done: in which processes, kept where, and told apart by what they compute."""

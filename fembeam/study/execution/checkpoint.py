@@ -1,0 +1,127 @@
+"""Finished realisations in one file that is written whole, so that a study goes on where it was interrupted."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fembeam.model import Model
+from fembeam.study.execution.fingerprint import fingerprint
+from fembeam.study.realisations import renewed
+from fembeam.support import written_whole
+
+FORMAT = 2
+Values = dict[str, NDArray[Any]]
+
+
+class Checkpoint:
+    """Values by seed, kept in memory and, with a path, in a file.
+
+    Parameters
+    ----------
+    path : the file; None keeps nothing. One that exists is read.
+    about : what the values belong to, name -> text; where it ends in "#" and a digest, this decides. A file about
+        something else is refused.
+    """
+
+    def __init__(self, path: str | os.PathLike[str] | None, about: Mapping[str, str]) -> None:
+        self.path, self.about = None if path is None else Path(path), dict(about)
+        self.values: dict[str, Values] = {}
+        if self.path is not None and self.path.exists():
+            self.values = self._read(self.path)
+        elif self.path is not None and not self.path.parent.is_dir():
+            raise ValueError(f"checkpoint: the folder {self.path.parent} does not exist; make it first")
+
+    def add(self, key: str, values: Values) -> None:
+        """Keep the values of one more seed."""
+        self.values[key] = values
+        if self.path is None:
+            return
+        about = {"format": FORMAT, "about": self.about, "seeds": list(self.values)}
+        stacked = {f"value {name}": np.stack([v[name] for v in self.values.values()]) for name in values}
+        with written_whole(self.path) as file:
+            np.savez(file, header=json.dumps(about), **stacked)  # type: ignore[arg-type]
+
+    def _read(self, path: Path) -> dict[str, Values]:
+        """The values in a file, after it has been checked."""
+        try:
+            with np.load(path, allow_pickle=False) as data:
+                header = json.loads(str(data["header"]))
+                columns = {name.removeprefix("value "): data[name] for name in data.files if name != "header"}
+            seeds = {key: {name: c[i] for name, c in columns.items()} for i, key in enumerate(header["seeds"])}
+            known = header["format"], header["about"]
+        except Exception as error:
+            raise ValueError(f"{path} is not a checkpoint, or is damaged: {error}; delete it to begin anew") from error
+        if known[0] != FORMAT:
+            raise ValueError(f"checkpoint {path} has format {known[0]}, this version reads {FORMAT}; delete it")
+        self._compare(path, known[1])
+        return seeds
+
+    def _compare(self, path: Path, theirs: Mapping[str, str]) -> None:
+        """Refuse values of something else, saying what differs."""
+        names = sorted({*theirs, *self.about})
+        differing = [name for name in names if _deciding(theirs.get(name)) != _deciding(self.about.get(name))]
+        if differing:
+            pairs = [_difference(name, theirs.get(name), self.about.get(name)) for name in differing]
+            raise ValueError(f"checkpoint {path} belongs to another study: {'; '.join(pairs)}; give another path")
+
+
+def identity(model: Model, quantity: Callable[..., Any]) -> dict[str, str]:
+    """What an ensemble's values depend on besides the seed, as texts that can be compared.
+
+    That is all the scene and the quantity consist of: numbers, and of functions (a law's, a signal's, the quantity)
+    code, constants, defaults, closure and the globals read; and fembeam's version. Which noises are one realisation
+    counts, their seeds do not.
+
+    Raises
+    ------
+    ValueError : something the quantity or the scene reads cannot be told from another of its kind.
+    """
+    from fembeam import __version__
+
+    scene = renewed(model, lambda j, _: j).scene
+    about = {f.name: _told(getattr(scene, f.name), f.name) for f in fields(scene)}
+    about |= {"modes": repr(model.modes), "frequencies": fingerprint(model.omega), "fembeam": __version__}
+    return about | {"quantity": f"{_name(quantity)} #{fingerprint(quantity, 'the quantity')}"}
+
+
+def _told(value: Any, name: str) -> str:
+    """A part of a scene, to be read and to be compared."""
+    readable = re.sub(" at 0x[0-9a-f]+", "", repr(value)).replace(" #", " ")
+    return f"{readable} #{fingerprint(value, name)}"
+
+
+def _name(quantity: Any) -> str:
+    """A callable by its name."""
+    if isinstance(quantity, partial):
+        return _name(quantity.func)
+    return f"{getattr(quantity, '__module__', '')}.{getattr(quantity, '__qualname__', type(quantity).__qualname__)}"
+
+
+def _deciding(text: str | None) -> str | None:
+    """The digest at the end of a text, else the text."""
+    return None if text is None else text.partition(" #")[2] or text
+
+
+def _difference(name: str, theirs: str | None, ours: str | None) -> str:
+    """What differs, in words."""
+    readable = [None if text is None else text.partition(" #")[0] for text in (theirs, ours)]
+    if readable[0] == readable[1]:
+        return f"{name} {_short(readable[1])} has other code, or reads other values, than there"
+    return f"{name} is {_short(readable[0])} there and {_short(readable[1])} here"
+
+
+def _short(text: str | None) -> str:
+    """A text shortened for a message."""
+    if text is None:
+        return "not there"
+    return text if len(text) <= 160 else f"{text[:80]}…{text[-78:]}"

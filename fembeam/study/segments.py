@@ -1,0 +1,180 @@
+"""A long run cut into stretches: from where, how long, under which signals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fembeam.excitation import BandNoise
+from fembeam.model import Model, Run
+from fembeam.scene import signals_of, with_signals
+from fembeam.statistics.initial_transient import FEWEST_BATCHES
+from fembeam.study.realisations import child, noises, renewed, shifted
+
+Vector = NDArray[np.float64]
+
+LEAD_IN = 10.0  # memory times: what came before has fallen to e^-10
+STRETCH = 400.0  # memory times of a stretch under tones
+BATCHES = 8  # of such a stretch, so that one is 50 memory times; noise has one realisation to a batch
+REALISATIONS = 16  # of noise in a run, at least, unless they would be shorter than
+SHORTEST = 8.0  # memory times
+LONGEST = 100.0  # memory times, and eight segments of the spectrum: the lead-in costs at most 5 %
+RENEWAL = (
+    5.0  # memory times left out after noise was renewed: the state is stationary already, and e^-5 of it is foreign
+)
+MOST_SAMPLES = 2_000_000  # of a stretch
+
+
+def memory(model: Model) -> float:
+    """Time constant 1/min(ζω) of the slowest decay of the linear structure, s.
+
+    The eigenvalues are those of the state (Ωr, r'), r undamped modal coordinates: its matrix holds frequencies, not
+    their squares, and so rounding (relative to the highest) stays below every decay that matters.
+    """
+    from scipy.linalg import eigh
+
+    system = model.system
+    square, shapes = eigh(system.K, system.M)
+    omega, damping = np.diag(np.sqrt(np.abs(square))), shapes.T @ system.C @ shapes
+    A = np.block([[np.zeros_like(omega), omega], [-omega * np.sign(square), -damping]])
+    decay = -np.linalg.eigvals(A).real
+    if not decay.min() > 10.0 * len(A) * np.finfo(float).eps * np.abs(A).max():
+        raise ValueError(
+            f"a stationary response needs damping in every mode; the slowest decays at {decay.min():.3g} 1/s"
+        )
+    return 1.0 / float(decay.min())
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """One stretch: its run and what of it counts, from `begin` on."""
+
+    run: Run
+    begin: float
+    end: int  # index of the last sample that counts
+
+
+@dataclass
+class Stretches:
+    """Where the long run stands."""
+
+    model: Model
+    duration: float
+    dt: float
+    state: Vector
+    solver: Any
+    memory: float
+    repeats: bool  # more than one stretch is possible
+    random: bool
+    first_lead: float
+    longest: float
+    batches: int  # of a stretch
+    shortest: float  # s of a realisation
+    index: int = 0
+    dropped: int = 0
+    kept: float = 0.0
+    discarded: float = 0.0
+    time: float = 0.0
+    seconds: float = 0.0
+
+    @classmethod
+    def of(
+        cls, model: Model, duration: float, dt: float, discard: float | None, start: Any, solver: Any, segment: int
+    ) -> Stretches:
+        """The plan for a model; a realisation holds two half-overlapping segments (samples) of the spectrum."""
+        forgets, found = memory(model), list(signals_of(model.scene).values())
+        repeats = all(isinstance(s, BandNoise) or hasattr(s, "tones") for s in found)
+        random = bool(noises(model))
+        longest = _longest(found, forgets, dt) if repeats else math.inf
+        shortest = max(SHORTEST * forgets, (1.5 * segment + 2.0) * dt)
+        if repeats and random:
+            most = max(LONGEST * forgets, 8.0 * segment * dt)
+            longest = min(longest, _realisation(duration, shortest, most, dt))
+        least = LEAD_IN * forgets * (not repeats) + FEWEST_BATCHES * forgets
+        if discard is None and duration < least:
+            raise ValueError(
+                f"duration must be at least {least:.4g} s, {least / forgets:.0f} times the memory of the structure, to "
+                f"see whether the transient has died out, got {duration:g} s; simulate longer, or give discard="
+            )
+        short = max(0.0, FEWEST_BATCHES * forgets - longest)  # of what the transient is looked for in
+        lead = LEAD_IN * forgets + short if discard is None else discard
+        state = model.rest() if start is None else np.array(start, dtype=float)
+        batches = 1 if repeats and random else BATCHES
+        return cls(model, duration, dt, state, solver, forgets, repeats, random, lead, longest, batches, shortest)
+
+    def pieces(self) -> Iterator[Stretch]:
+        """Stretch after stretch until the duration is reached."""
+        if not self.repeats:
+            run = self._run(self.duration)
+            yield Stretch(run, self.first_lead, self._border(run))
+            return
+        while self.kept < self.duration - 0.5 * self.dt:
+            lead = self.first_lead if self.index == 0 else RENEWAL * self.memory * self.random
+            wanted = min(self.longest, self.duration - self.kept)
+            run = self._run(math.ceil((lead + wanted) / self.dt - 1e-9) * self.dt)
+            yield Stretch(run, lead, self._border(run))
+
+    def _run(self, duration: float) -> Run:
+        """One stretch from the state reached."""
+        i = self.index + self.dropped
+        model = renewed(self.model, lambda _, seed: child(seed, i)) if self.repeats else self.model
+        scene = with_signals(model.scene, lambda signal: shifted(signal, self.time))
+        run = model.under(scene).simulate(duration, self.dt, self.state, self.solver)
+        if not run.complete:
+            raise KeyboardInterrupt
+        self.seconds += run.cost.seconds
+        return run
+
+    def _border(self, run: Run) -> int:
+        """The last sample that counts: the end under noise, else the last one outside every contact."""
+        last, log = len(run.t) - 1, run.contacts
+        if self.random:
+            return last
+        order = np.argsort(log.t_in)
+        t_in, t_out = log.t_in[order], np.where(np.isnan(log.t_out), np.inf, log.t_out)[order]
+        for i in range(last, last // 2, -1):
+            before = t_in < run.t[i]
+            if not np.any(t_out[before][-64:] > run.t[i]):
+                return i
+        return last
+
+    def drop(self, piece: Stretch) -> None:
+        """Leave the whole stretch to the transient."""
+        self.dropped += 1
+        self._go_on(piece)
+        self.discarded += self.dt * piece.end
+
+    def keep(self, piece: Stretch, kept: float) -> None:
+        """Count what the statistics took."""
+        self.index += 1
+        self.kept += kept
+        self._go_on(piece)
+        self.discarded += self.dt * piece.end - kept
+
+    def _go_on(self, piece: Stretch) -> None:
+        """Continue from the border of a stretch."""
+        self.state = np.concatenate((piece.run.q[piece.end], piece.run.q_dot[piece.end]))
+        self.time += self.dt * piece.end
+
+
+def _longest(found: list[Any], forgets: float, dt: float) -> float:
+    """Seconds of a stretch at most, under signals that can be continued."""
+    asked = [s.period or math.inf for s in found if isinstance(s, BandNoise) and s.period_was_given]
+    longest = min(STRETCH * forgets, *(s - LEAD_IN * forgets for s in (MOST_SAMPLES * dt, *asked)))
+    if not longest > FEWEST_BATCHES * forgets:
+        raise ValueError(
+            f"a stretch needs {(LEAD_IN + FEWEST_BATCHES) * forgets:.4g} s of its own noise and at most "
+            f"{MOST_SAMPLES} samples; lengthen the period of the noise, or dt = {dt:g} s"
+        )
+    return longest
+
+
+def _realisation(duration: float, shortest: float, most: float, dt: float) -> float:
+    """Seconds of a realisation, so that the run holds a whole number of them, sixteen at least where possible."""
+    count = max(min(REALISATIONS, int(duration / shortest)), math.ceil(duration / most), 1)
+    return math.ceil(duration / count / dt - 1e-9) * dt

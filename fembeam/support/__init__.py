@@ -1,0 +1,32 @@
+"""What every room needs and none owns: checks of arguments, whole files, progress, signals of the system.
+
+Imports nothing of ours.
+"""
+
+from fembeam.support.checks import (
+    frozen,
+    is_finite,
+    number,
+    require,
+    require_finite,
+    require_non_negative,
+    require_positive,
+)
+from fembeam.support.files import written_whole
+from fembeam.support.progress import bar
+from fembeam.support.text_tables import aligned
+from fembeam.support.versions import versions
+
+__all__ = [
+    "aligned",
+    "bar",
+    "frozen",
+    "is_finite",
+    "number",
+    "require",
+    "require_finite",
+    "require_non_negative",
+    "require_positive",
+    "versions",
+    "written_whole",
+]

@@ -1,0 +1,58 @@
+"""Checks of arguments: what is wrong, the value, where, what to do."""
+
+from __future__ import annotations
+
+import math
+from numbers import Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+
+def is_finite(value: object) -> bool:
+    """Whether value is a real, finite number (booleans are not numbers here)."""
+    return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def require(valid: bool, rule: str, got: object, where: str, advice: str) -> None:
+    """Raise ValueError as `what, got, where; do` unless valid."""
+    if not valid:
+        shown = got if is_finite(got) or isinstance(got, float) else repr(got)
+        raise ValueError(f"{rule}, got {shown} in {where}; {advice}")
+
+
+def require_finite(name: str, value: object, where: str, advice: str) -> None:
+    """Raise ValueError unless value is a finite number."""
+    require(is_finite(value), f"{name} must be finite", value, where, advice)
+
+
+def require_positive(name: str, value: object, where: str, advice: str) -> None:
+    """Raise ValueError unless value is finite and > 0."""
+    valid = is_finite(value) and value > 0  # type: ignore[operator]
+    require(valid, f"{name} must be finite and positive", value, where, advice)
+
+
+def require_non_negative(name: str, value: object, where: str, advice: str) -> None:
+    """Raise ValueError unless value is finite and >= 0."""
+    valid = is_finite(value) and value >= 0  # type: ignore[operator]
+    require(valid, f"{name} must be finite and not negative", value, where, advice)
+
+
+def number(name: str, value: Any, above: float = -math.inf, least: float = -math.inf) -> float:
+    """The value as a finite float above one bound and not below another, or a clear error."""
+    try:
+        result = float(value)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} must be a number, got {value!r}") from None
+    if not (math.isfinite(result) and result > above and result >= least):
+        bound = f" above {above:g}" if above > -math.inf else f" of at least {least:g}"
+        raise ValueError(f"{name} must be finite{bound if max(above, least) > -math.inf else ''}, got {value!r}")
+    return result
+
+
+def frozen(values: ArrayLike, dtype: type = np.float64) -> NDArray[Any]:
+    """A read-only copy, so that neither side can change the other's numbers."""
+    result: NDArray[Any] = np.array(values, dtype=dtype)
+    result.flags.writeable = False
+    return result

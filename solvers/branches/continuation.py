@@ -1,0 +1,155 @@
+"""Branches of periodic orbits by pseudo-arclength continuation.
+
+From each point a guess a step ahead, on the tangent or on the cubic through the point before too; Newton's method back
+to the branch (Keller, Numerical solution of bifurcation and nonlinear eigenvalue problems, 1977); then a step as long
+as the guess was good. A branch may fold back, has kinks where contacts graze, and jumps where two contacts become one.
+`walk` controls the steps, `point` takes one, `bifurcations` locates the special points it passed,
+`nonsmooth` leads across kinks and jumps.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from solvers.branches.point import Point, metric_of, point_of
+from solvers.branches.reshooting import with_quiet_begin
+from solvers.branches.subharmonic_end import Scaled
+from solvers.branches.walk import Arm, BranchStatus
+from solvers.orbits import Orbit, Problem, at_zero, checked, checked_start, newton, orbit_of, solved_chain
+from solvers.problem import System
+
+
+@dataclass(eq=False)
+class Branch:
+    """Orbits along a parameter, computed as they are asked for: iterate over it, or call `run`; made by `branch`.
+
+    Interrupt an iteration and start another: it gives what is known, then goes on from there.
+    """
+
+    arms: list[Arm]
+    kept: dict[int, Any] = field(default_factory=dict)  # for the user of the branch
+
+    @property
+    def orbits(self) -> list[Orbit]:
+        """What is known so far, from one end of the branch to the other; special ones carry a ``mark``."""
+        behind = self.arms[1].orbits[:0:-1] if len(self.arms) > 1 else []
+        return behind + self.arms[0].orbits
+
+    @property
+    def status(self) -> tuple[BranchStatus, ...]:
+        """How each direction ended."""
+        closed = self.arms[0].status is BranchStatus.CLOSED  # then there is but one direction
+        return tuple(arm.status for arm in self.arms[: 1 if closed else None])
+
+    @property
+    def special(self) -> list[Orbit]:
+        """The marked orbits."""
+        return [orbit for orbit in self.orbits if orbit.mark]
+
+    def __iter__(self) -> Iterator[Orbit]:
+        """Known orbits, then new ones, one direction after the other."""
+        for number, arm in enumerate(self.arms):
+            if self.arms[0].status is BranchStatus.CLOSED and number:
+                return
+            i = min(number, 1)  # both arms begin with the same orbit
+            while True:
+                while i < len(arm.orbits):
+                    yield arm.orbits[i]
+                    i += 1
+                if arm.status is not BranchStatus.RUNNING:
+                    break
+                arm.extend()
+
+    def run(self) -> Branch:
+        """Compute all of it."""
+        for _ in self:
+            pass
+        return self
+
+    def doubled(self, flip: Orbit) -> Branch:
+        """The branch of twice the period that is born at a flip of this one."""
+        if flip.mark != "flip":
+            raise ValueError(f"a branch doubles at an orbit marked 'flip', got one marked {flip.mark!r}")
+        arm = self.arms[0]
+        old = arm.first.problem
+        fraction = flip.phase / flip.period
+        problem = Problem(Scaled(old.make, 2.0), old.method, (0.5 * fraction, 0.5 * fraction + 0.5), old.step)
+        values, vectors = np.linalg.eig(flip.monodromy)
+        v = vectors[:, np.argmin(np.abs(values + 1.0))].real
+        x = np.array([flip.state, flip.state])
+        metric = metric_of(problem, flip.parameter, x, arm.span[1] - arm.span[0])
+        tangent = np.concatenate((v, -v, [0.0]))
+        tangent /= math.sqrt(tangent @ metric @ tangent)
+        chain = problem.evaluate(x, flip.parameter)
+        orbit = orbit_of(problem, chain, flip.residual, 0, parameter=flip.parameter, mark="flip")
+        return Branch([Arm(Point(orbit, problem, chain, tangent, metric), arm.span, arm.largest)])
+
+
+def branch(
+    make_system: Callable[[float], tuple[System, float]],
+    span: tuple[float, float],
+    start: Orbit | ArrayLike,
+    at: float | None = None,
+    *,
+    step: float = 0.04,
+    shots: int = 1,
+    method: Any = None,
+) -> Branch:
+    """Follow a periodic orbit along a parameter, in both directions.
+
+    Parameters
+    ----------
+    make_system : parameter -> (system, period in s); the systems must agree in size, contacts and loads.
+    span : (lowest, highest) value of the parameter.
+    start : an orbit, or a state [q, q̇] at t = 0 near one.
+    at : the parameter there; None: the orbit's own, else ``span[0]``.
+    step : largest step along the branch, in units of the span and the first orbit's size.
+    shots : per period.
+    method : an `Exponential`; None takes one with rtol 1e-11.
+
+    Returns
+    -------
+    Branch : nothing but its first orbit is computed before it is iterated over.
+
+    Raises
+    ------
+    ValueError for bad input; OrbitError when there is no orbit near the start.
+
+    Examples
+    --------
+    >>> def free(omega):
+    ...     return System.modal([1.0], [0.1]), 2.0 * np.pi / omega
+    >>> branch(free, (0.5, 2.0), start=[0.0, 0.0], step=0.5).run().status
+    (<BranchStatus.END: 'reached the end of the span'>,)
+    """
+    low, high = (float(value) for value in span)
+    if not -math.inf < low < high < math.inf:
+        raise ValueError(f"span must be two finite values, ascending, got {span!r}")
+    if not 0.0 < step <= 1.0:
+        raise ValueError(f"step must lie in (0, 1], got {step!r}")
+    own = start.parameter if isinstance(start, Orbit) else math.nan
+    if at is None and isinstance(start, Orbit) and math.isnan(own):
+        raise ValueError("the orbit to start from knows no parameter; give at=")
+    parameter = at if at is not None else low if math.isnan(own) else own
+    if not low <= parameter <= high:
+        raise ValueError(f"the start must lie in the span {span}, got {parameter!r}; give at=")
+    system, period = make_system(parameter)
+    method = checked(system, period, method, shots)
+    first = at_zero(start) if isinstance(start, Orbit) else checked_start(system, start)
+    problem, chain, *_ = solved_chain(system, period, first, method, shots)
+    problem = replace(problem, make=make_system, step=1e-6 * (high - low))
+    chain, error, iterations = newton(problem, chain.x, parameter, slope=True)
+    metric = metric_of(problem, parameter, chain.x, high - low)
+    ahead = np.zeros(len(metric))
+    ahead[-1] = 1.0
+    point = with_quiet_begin(point_of(problem, chain, error, iterations, metric, ahead))
+    back = replace(point, tangent=-point.tangent)
+    return Branch(
+        [Arm(p, (low, high), step) for p, room in ((point, parameter < high), (back, parameter > low)) if room]
+    )

@@ -1,0 +1,273 @@
+"""Orbits that meet a stop's surface at a given rate: grazing ones, and those that enter at their law's floor.
+
+Shots from a quiet time to the meeting at t*, and on from there, solve
+
+    Φ_0(x_0) = x_1,   Φ_1(x_1) = x_2,   ...,   δ(x_1) = 0,   δ̇(x_1) = v
+
+for the shots' states, the parameter and t*. What a branch's return map does beside such an orbit is smooth on either
+side, if not across. An orbit that repeats itself within its period, or is symmetric, meets surfaces at several times
+at once: then every meeting adds its time and its two conditions, of which only two are independent, and the equations
+are solved in the sense of least squares.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from solvers.branches.point import Point, moved, tangent_of
+from solvers.orbits import Chain, Orbit, OrbitError, Problem, delayed, flown, newton, orbit_of, with_memory
+from solvers.problem import Array, System
+
+_MOST = 8  # iterations of Newton's method
+_CLOSE = 1e-7  # arclength of its last step
+_AT_ONCE = 1e-7  # what least squares may leave of the equations, in units of the states: more, and not all are met
+_ASIDE = 1e-6, 1e-2  # how far beside the branch's direction is seen, in units of the peak indentation and of the rate
+_OFF = 1e-8, 1e-7, 1e-6, 1e-5  # arclengths beside it at which an orbit is tried
+_STEEP = 0.2  # parameter's share of the tangent above which the parameter is held fixed
+
+
+@dataclass(eq=False)
+class _Raised:
+    """A law with another floor of the entry rate."""
+
+    law: Any
+    entry_rate_floor: float
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.law, name)
+
+
+@dataclass(frozen=True, eq=False)
+class _Meeting(Problem):
+    """Shots of which some begin on the surface of a stop, with an entry rate of at least ``floor``."""
+
+    stops: tuple[int | None, ...] = ()  # of every shot, None where it does not begin on a surface
+    floor: float = 0.0
+
+    def shots(self, parameter: float) -> list[tuple[System, float]]:
+        """(system from the shot's begin on, duration) of every shot."""
+        known = parameter in self.kept
+        shots = super().shots(parameter)
+        for i, stop in enumerate(() if known else self.stops):
+            if stop is not None:
+                shots[i] = self._raised(shots[i][0], stop), shots[i][1]
+        return shots
+
+    def _raised(self, system: System, stop: int) -> System:
+        """The system with another floor at a stop."""
+        contacts = list(system.contacts)
+        if self.floor == contacts[stop].law.entry_rate_floor:
+            return system
+        law: Any = _Raised(contacts[stop].law, self.floor)
+        contacts[stop] = replace(contacts[stop], law=law)
+        return system.like(contacts=contacts)
+
+
+@dataclass(frozen=True, eq=False)
+class Touch:
+    """An orbit that meets stops' surfaces at a rate, and goes on with an entry rate of at least ``floor``."""
+
+    stops: tuple[int | None, ...]  # on whose surfaces the shots begin
+    speed: float
+    floor: float
+    fractions: tuple[float, ...]  # of the period, at the shots' begins
+    unknowns: Array  # [states of the shots, parameter, fractions of the meetings]
+    chain: Chain
+
+    @property
+    def places(self) -> list[int]:
+        """Numbers of the shots that begin on a surface."""
+        return _places(self.stops)
+
+    @property
+    def parameter(self) -> float:
+        """Where on the branch."""
+        return float(self.unknowns[-1 - len(self.places)])
+
+    @property
+    def rate_before(self) -> float:
+        """At which the stop's last contact before the meeting was entered; a dip of rounding's size is none."""
+        first = self.places[0]
+        log = self.chain.solutions[first - 1].contacts
+        mine = (log.stop == self.stops[first]) & (log.peak_indentation > 1e-4 * log.peak_indentation.max(initial=0.0))
+        return float(log.speed_in[mine][-1])
+
+
+def _places(stops: Sequence[int | None]) -> list[int]:
+    """Numbers of the shots that begin on a surface."""
+    return [i for i, stop in enumerate(stops) if stop is not None]
+
+
+def first_touch(
+    point: Point, begins: Sequence[tuple[float, int | None]], speed: float, floor: float, within: float
+) -> Touch:
+    """The touch near a point, whose orbit nearly meets surfaces at some times, counted from its phase.
+
+    ``begins`` are the later shots' (time, stop met or None) in their order; ``within`` is an arclength. Raises
+    OrbitError.
+    """
+    orbit = point.orbit
+    later = delayed(orbit.system, orbit.phase)
+    times, stops = [t for t, _ in begins], (None, *(stop for _, stop in begins))
+    states = [orbit.state, *(flown(later, orbit.state, t, orbit.method) for t in times)]
+    rest = tuple((orbit.phase + t) / orbit.period for t in (0.0, *times))
+    guess = np.concatenate((*states, [point.chain.parameter], [rest[i] for i in _places(stops)]))
+    return solved(point, stops, rest, guess, speed, floor, within)
+
+
+def solved(
+    point: Point,
+    stops: tuple[int | None, ...],
+    fractions: tuple[float, ...],
+    unknowns: Array,
+    speed: float,
+    floor: float,
+    within: float = math.inf,
+) -> Touch:
+    """The touch near a guess, by Newton's method, no step of which is longer than ``within``; raises OrbitError."""
+    problem, size = point.problem, len(point.orbit.state)
+    for _ in range(_MOST):
+        fractions = _with_meetings(fractions, stops, unknowns)
+        states, parameter = np.split(unknowns, [len(stops) * size])[0], float(unknowns[len(stops) * size])
+        if not np.all(np.diff((*fractions, fractions[0] + 1.0)) > 0.0):
+            break
+        meeting = _Meeting(problem.make, problem.method, fractions, problem.step, stops, floor)
+        chain = meeting.evaluate(states.reshape(len(stops), size), parameter)
+        matrix, right = _linear(meeting, chain, speed)
+        step: Array = np.linalg.lstsq(matrix, right, rcond=None)[0].astype(float)
+        unknowns, way = unknowns + step, _length(point, step[:size], step[len(stops) * size])
+        at_once = np.abs(matrix @ step - right).max() < _AT_ONCE * np.abs(states).max()
+        if not way < within:
+            break
+        if way < _CLOSE and at_once:
+            return Touch(stops, speed, floor, _with_meetings(fractions, stops, unknowns), unknowns, chain)
+    met = ", ".join(str(stop) for stop in stops if stop is not None)
+    raise OrbitError(f"no orbit that meets stop {met} at {speed:g} m/s was found in {_MOST} iterations")
+
+
+def _with_meetings(fractions: tuple[float, ...], stops: Sequence[int | None], unknowns: Array) -> tuple[float, ...]:
+    """The fractions of the period at the shots' begins, those of the meetings from the unknowns."""
+    places, changed = _places(stops), list(fractions)
+    for place, fraction in zip(places, unknowns[-len(places) :].tolist(), strict=True):
+        changed[place] = fraction
+    return tuple(changed)
+
+
+def _linear(problem: _Meeting, chain: Chain, speed: float) -> tuple[Array, Array]:
+    """Matrix and right side of Newton's step."""
+    (m, size), places = chain.residual.shape, _places(problem.stops)
+    system, period = problem.make(chain.parameter)
+    later, rows, misses = np.zeros((len(places), m, size)), np.zeros((len(places), 2, m * size + 1 + len(places))), []
+    for k, place in enumerate(places):
+        rate, stop = _rate(chain, place) * period, problem.stops[place] or 0  # of the state there, per period
+        later[k, place - 1] += rate
+        later[k, place] -= chain.tangents[place] @ rate
+        begin, w, middle = place * size, system.contacts[stop].direction, place * size + size // 2
+        rows[k, 0, begin:middle] = rows[k, 1, middle : begin + size] = -w
+        rows[k, 0, m * size] = -_gap_slope(problem, chain.parameter, stop)
+        q, q_dot = np.split(chain.x[place], 2)
+        misses += [-q @ w - system.contacts[stop].gap, -q_dot @ w - speed]
+    changes = later.reshape(len(places), -1).T
+    matrix = np.vstack((np.column_stack((chain.jacobian(), chain.by_parameter.ravel(), changes)), *rows))
+    return matrix, -np.concatenate((chain.residual.ravel(), misses))
+
+
+def _gap_slope(problem: Problem, parameter: float, stop: int) -> float:
+    """Derivative of a stop's gap by the parameter."""
+    behind, ahead = (problem.make(parameter + s * problem.step)[0].contacts[stop].gap for s in (-1.0, 1.0))
+    return (ahead - behind) / (2.0 * problem.step)
+
+
+def _rate(chain: Chain, place: int) -> Array:
+    """Of the state at the end of the shot before a place, per second."""
+    rate = chain.solutions[place - 1].rate
+    assert rate is not None
+    return rate
+
+
+def _length(point: Point, state: Array, parameter: float) -> float:
+    """Arclength of a step, by that of the first state and the parameter."""
+    size, G = len(state), point.metric
+    return math.sqrt(len(point.chain.x) * state @ G[:size, :size] @ state + G[-1, -1] * parameter**2)
+
+
+def unknowns_at(point: Point, touch: Touch) -> Array:
+    """A touch as unknowns of the branch: states of its shots, flown with the touch's own floor, and the parameter."""
+    problem, known = point.problem, touch.unknowns[: touch.chain.x.size].reshape(touch.chain.x.shape)
+    meeting = _Meeting(problem.make, problem.method, touch.fractions, problem.step, touch.stops, touch.floor)
+    shots, period = meeting.shots(touch.parameter), problem.make(touch.parameter)[1]
+    x = [known[0]]
+    for fraction in problem.fractions[1:]:
+        i = max(i for i, begin in enumerate(touch.fractions) if begin < fraction)
+        x.append(flown(shots[i][0], known[i], (fraction - touch.fractions[i]) * period, problem.method))
+    return np.append(np.concatenate(x), touch.parameter)
+
+
+def orbit_at(point: Point, touch: Touch, **more: Any) -> Orbit:
+    """A touch as an orbit of the branch; raises OrbitError."""
+    y, problem = unknowns_at(point, touch), point.problem
+    chain, error, iterations = newton(problem, y[:-1].reshape(point.chain.x.shape), touch.parameter)
+    return orbit_of(problem, chain, error, iterations, parameter=touch.parameter, **more)
+
+
+def signature(orbit: Orbit) -> tuple[int, int]:
+    """Numbers of contacts, and of those entered below their law's floor; they stay the same between kinks."""
+    log = orbit.contacts
+    return len(log), int(np.sum(log.floored[np.isin(log.stop, with_memory(orbit.system))]))
+
+
+def beside(point: Point, touch: Touch, sign: float, wanted: tuple[int, int | None]) -> Point:
+    """An orbit of a signature very near a touch, where the indentation at t*, or its rate at entry, is more or less.
+
+    Its tangent points away from the touch; None leaves a part of the signature open. Raises OrbitError.
+    """
+    problem, size = point.problem, len(point.orbit.state)
+    by_state, by_parameter, aside = _indicators(point, touch)
+    towards = np.linalg.solve(point.metric[:size, :size], by_state.T)
+    ends = unknowns_at(point, touch)
+    off = towards @ np.linalg.solve(by_state @ towards, np.full(len(by_state), sign * aside))
+    x = _shots(problem, ends[:size] + off, touch.parameter)
+    along = np.zeros(len(point.metric))
+    along[-1] = 1.0
+    tangent = tangent_of(problem.evaluate(x, touch.parameter), point.metric, along)
+    tangent *= sign * np.sign(by_state[0] @ tangent[:size] + by_parameter[0] * tangent[-1])
+    launch = replace(point, tangent=tangent)
+    for s in _OFF:
+        try:
+            found = moved(launch, ends + s * tangent, abs(launch.share) > _STEEP)
+        except OrbitError:
+            continue
+        contacts, floored = signature(found.orbit)
+        if wanted in ((contacts, floored), (contacts, None)):
+            return found
+    raise OrbitError("no orbit was found beside the touch")
+
+
+def _indicators(point: Point, touch: Touch) -> tuple[Array, Array, float]:
+    """What changes its sign at a touch: derivatives by the first state and the parameter; how far aside to look."""
+    rows, aside = [], _ASIDE[0] * float(point.orbit.contacts.peak_indentation.max(initial=0.0))
+    chain, n = touch.chain, point.orbit.system.size
+    columns = np.eye(2 * n, 2 * n + 1)
+    for place in range(1, len(touch.stops)):
+        columns = chain.tangents[place - 1] @ columns
+        columns[:, -1] += chain.by_parameter[place - 1]
+        stop = touch.stops[place]
+        if stop is not None:
+            w, rate = -point.orbit.system.contacts[stop].direction, _rate(chain, place)
+            row = w @ columns[:n]
+            row[-1] -= _gap_slope(point.problem, touch.parameter, stop)
+            rows.append(w @ columns[n:] - (w @ rate[n:]) / touch.speed * row if touch.speed else row)
+    aside = _ASIDE[1] * touch.speed or aside or _ASIDE[0] * float(np.abs(chain.x[0, :n]).max())
+    return np.array(rows)[:, :-1], np.array(rows)[:, -1], aside
+
+
+def _shots(problem: Problem, x: Array, parameter: float) -> Array:
+    """States of all shots (m, 2n) of the motion from the first one."""
+    (system, _), period = problem.shots(parameter)[0], problem.make(parameter)[1]
+    begins = [(fraction - problem.fractions[0]) * period for fraction in problem.fractions]
+    return np.array([x, *(flown(system, x, t, problem.method) for t in begins[1:])])

@@ -1,0 +1,105 @@
+"""Points of a branch and the way from one to the next.
+
+The unknowns y = [states of the shots, parameter] move along the branch's unit tangent t; lengths are measured with
+states relative to the first orbit's size and the parameter relative to the span. Newton's method returns to the branch
+at a fixed parameter, which asks for one system only, or, near folds, at right angles to the tangent.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from solvers.orbits import Border, Chain, Orbit, Problem, newton, orbit_of, weights
+from solvers.problem import Array
+
+_STEEP = 0.02  # parameter's share of the tangent below which the parameter is not what is held fixed
+_MOST = 9  # iterations of Newton's method on the way
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """An orbit on the branch with what it takes to go on from it."""
+
+    orbit: Orbit
+    problem: Problem
+    chain: Chain
+    tangent: Array
+    metric: Array
+    tests: dict[str, float] = field(default_factory=dict, init=False, repr=False)  # test functions, once asked for
+
+    @cached_property
+    def unknowns(self) -> Array:
+        """[states, parameter]."""
+        return np.append(self.chain.x.ravel(), self.chain.parameter)
+
+    @property
+    def share(self) -> float:
+        """Part of the tangent's length that is the parameter's, signed; zero at a fold."""
+        return float(self.tangent[-1] * math.sqrt(self.metric[-1, -1]))
+
+    @property
+    def size(self) -> float:
+        """The orbit's size in units of the first one's."""
+        y = np.append(self.chain.x.ravel(), 0.0)
+        return math.sqrt(y @ self.metric @ y)
+
+
+def metric_of(problem: Problem, parameter: float, x: Array, width: float) -> Array:
+    """Matrix of the arclength over [states, parameter]."""
+    W = weights(*problem.make(parameter))
+    size = float(np.linalg.norm(x @ W.T, axis=1).max()) or 1.0  # an orbit at rest has none
+    m, n2 = x.shape
+    metric: Array = np.zeros((m * n2 + 1, m * n2 + 1))
+    metric[:-1, :-1] = np.kron(np.eye(m), W.T @ W / (m * size**2))
+    metric[-1, -1] = 1.0 / width**2
+    return metric
+
+
+def tangent_of(chain: Chain, metric: Array, along: Array) -> Array:
+    """Unit tangent of the branch that points along a given direction."""
+    size = chain.residual.size
+    matrix = np.block([[chain.jacobian(), chain.by_parameter.reshape(-1, 1)], [(metric @ along)[None, :]]])
+    right = np.zeros(size + 1)
+    right[-1] = 1.0
+    tangent = np.linalg.solve(matrix, right)
+    unit: Array = tangent / math.sqrt(tangent @ metric @ tangent)
+    return unit
+
+
+def point_of(problem: Problem, chain: Chain, error: float, iterations: int, metric: Array, along: Array) -> Point:
+    """The point of a solved chain."""
+    tangent = tangent_of(chain, metric, along)
+    orbit = orbit_of(problem, chain, error, iterations, parameter=chain.parameter)
+    return Point(orbit, problem, chain, tangent, metric)
+
+
+def cubic(a: Point, b: Point, way: float, s: float) -> Array:
+    """Unknowns at arclength s from a, on the cubic through two points ``way`` apart and their tangents."""
+    r = s / way
+    whole = (1.0 + 2.0 * r) * (1.0 - r) ** 2 * a.unknowns + r * r * (3.0 - 2.0 * r) * b.unknowns
+    slopes: Array = way * (r * (1.0 - r) ** 2 * a.tangent + r * r * (r - 1.0) * b.tangent)
+    return whole + slopes
+
+
+def corrected(a: Point, guess: Array, straight: bool, slope: bool = False) -> tuple[Chain, float, int]:
+    """The branch near a guess: where the parameter is the guess's if ``straight``, else at right angles to a's tangent.
+
+    Raises OrbitError.
+    """
+    border = None if straight else Border(a.metric, a.tangent)
+    return newton(a.problem, guess[:-1].reshape(a.chain.x.shape), float(guess[-1]), border, slope, _MOST)
+
+
+def moved(a: Point, guess: Array, straight: bool) -> Point:
+    """The point of the branch near a guess; raises OrbitError."""
+    return point_of(a.problem, *corrected(a, guess, straight, True), a.metric, a.tangent)
+
+
+def is_straight(*shares: float) -> bool:
+    """Whether the parameter's shares of some tangents tell that no fold is near."""
+    least, most = min(np.abs(shares)), max(np.abs(shares))
+    return bool(least > max(_STEEP, 0.3 * most) and abs(np.sign(shares).sum()) == len(shares))

@@ -1,0 +1,72 @@
+"""Shots of a branch that begin later, because a contact has come near one of their begins.
+
+One with memory must not be under way there. One whose force jumps must not begin or end there: the state at a fixed
+time has a corner where the jump passes it, so that no step of Newton's method, however short, leads across.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from solvers.branches.point import Point, point_of
+from solvers.orbits import Chain, OrbitError, delayed, flown, newton, quiet_begins, with_memory
+from solvers.problem import Array, ContactLog, System
+
+_MARGIN = 0.1  # of the longest quiet time that must lie on both sides of a shot's begin
+
+
+def _restless(system: System, log: ContactLog) -> Any:
+    """Which contacts of a log are with a stop whose law has memory, or whose force jumps."""
+    jumping = [stop for stop, contact in enumerate(system.contacts) if contact.law.jump]
+    return np.isin(log.stop, [*with_memory(system), *jumping])
+
+
+def with_quiet_begin(point: Point) -> Point:
+    """The same point, its shots begun later where a contact has come near one of their begins."""
+    orbit, m = point.orbit, len(point.problem.fractions)
+    log, period = orbit.contacts, orbit.period
+    offsets = [(f - point.problem.fractions[0]) * period for f in point.problem.fractions]
+    mine = _restless(orbit.system, log)
+    ends = np.concatenate((log.t_in[mine], log.t_out[mine]))
+    times = np.concatenate((ends - period, ends, ends + period))
+
+    def away(begins: list[float]) -> float:
+        return min(float(np.abs(times - t).min(initial=period)) for t in begins)
+
+    if away(offsets) > _MARGIN * period / (1 + len(log)):
+        return point
+    begins = quiet_begins(orbit.system, log, period, m, False)
+    if len(begins) < m or not away(begins) > away(offsets):
+        return point
+    later = delayed(orbit.system, orbit.phase)
+    x = np.array([flown(later, orbit.state, t, orbit.method) for t in begins])
+    fractions = [(orbit.phase + t) / period for t in begins]
+    turns = math.floor(fractions[0])
+    problem = replace(point.problem, fractions=tuple(f - turns for f in fractions))
+    try:
+        chain, error, iterations = newton(problem, x, point.chain.parameter, slope=True)
+    except OrbitError:
+        return point
+    return point_of(problem, chain, error, iterations, point.metric, _carried(point, chain, begins))
+
+
+def _carried(point: Point, chain: Chain, begins: list[float]) -> Array:
+    """The tangent seen from later begins."""
+    shift, n2 = begins[0], chain.x.shape[1]
+    there = replace(point.problem, fractions=(point.problem.fractions[0],))
+    make = there.make
+
+    def shortened(parameter: float) -> tuple[System, float]:
+        system, period = make(parameter)
+        return delayed(system, there.fractions[0] * period), shift / point.orbit.period * period
+
+    carried = replace(there, make=shortened, fractions=(0.0,)).evaluate(point.chain.x[:1], chain.parameter)
+    first = carried.tangents[0] @ point.tangent[:n2] + carried.by_parameter[0] * point.tangent[-1]
+    states = [first]
+    for tangent, column in zip(chain.tangents[:-1], chain.by_parameter[:-1], strict=True):
+        states.append(tangent @ states[-1] + column * point.tangent[-1])
+    return np.append(np.concatenate(states), point.tangent[-1])

@@ -1,0 +1,60 @@
+"""A branch made again from records of its orbits, to go on with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from solvers.branches.continuation import Branch
+from solvers.branches.point import Point, metric_of, point_of
+from solvers.branches.walk import Arm, BranchStatus
+from solvers.orbits import Problem, checked, newton
+from solvers.problem import System
+
+
+def restored(
+    make_system: Callable[[float], tuple[System, float]],
+    span: tuple[float, float],
+    arms: list[list[dict[str, Any]]],
+    status: list[str],
+    step: float,
+    method: Any = None,
+) -> Branch:
+    """A branch from records (parameter, state, phase, mark, iterations) of its orbits per direction, to go on with."""
+    return Branch(
+        [
+            _restored_arm(make_system, span, records, BranchStatus[name], step, method)
+            for records, name in zip(arms, status, strict=True)
+        ]
+    )
+
+
+def _restored_arm(
+    make: Any, span: tuple[float, float], records: list[dict[str, Any]], status: BranchStatus, step: float, method: Any
+) -> Arm:
+    """One direction; orbits are integrated once more, their states are not changed."""
+    points: list[Point] = []
+    system, period = make(records[0]["parameter"])
+    method, width = checked(system, period, method, 1), span[1] - span[0]
+    for record in records:
+        _, period = make(record["parameter"])
+        x = np.array([record["state"]])
+        problem = Problem(make, method, (record["phase"] / period,), 1e-6 * width)
+        chain, error, _ = newton(problem, x, record["parameter"], slope=True)
+        metric = points[0].metric if points else metric_of(problem, record["parameter"], x, width)
+        moved = np.append(x.ravel(), record["parameter"])
+        if points:
+            moved = moved - points[-1].unknowns
+            moved[:-1] *= problem.fractions == points[-1].problem.fractions
+        point = point_of(problem, chain, error, record["iterations"], metric, moved)
+        points.append(replace(point, orbit=replace(point.orbit, mark=record["mark"])))
+    first = points[0]
+    if len(points) > 1:  # the first tangent points to the second orbit
+        ahead = first.tangent @ first.metric @ (points[1].unknowns - first.unknowns)
+        first = replace(first, tangent=first.tangent * np.sign(ahead))
+    arm = Arm(first, span, step)
+    arm.point, arm.orbits, arm.status = points[-1], [point.orbit for point in points], status
+    return arm

@@ -1,0 +1,71 @@
+"""Where a branch is born at a flip of one of half its period; followed beyond, it would return as its own copy.
+
+Along a branch of period T the distance d(x) = Φ_{T/2}(x) - x of half a period vanishes and turns round at its birth,
+where the branch also folds. The birth itself is located on the branch of half the period, as its flip.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from solvers.branches.bifurcations import indicators
+from solvers.branches.point import Point
+from solvers.orbits import Orbit, OrbitError, delayed, flown, misfit, newton, orbit_of
+from solvers.problem import Array, System
+
+_SHARP = 1e-10  # of the parameter
+
+
+@dataclass(frozen=True)
+class Scaled:
+    """A family seen over a multiple of its periods."""
+
+    make: Callable[[float], tuple[System, float]]
+    factor: float
+
+    def __call__(self, parameter: float) -> tuple[System, float]:
+        """The member at a parameter."""
+        system, period = self.make(parameter)
+        return system, self.factor * period
+
+
+def birth(a: Point, b: Point, fold: Orbit) -> Orbit | None:
+    """The flip of half the period that a fold between two points of a branch is; None if it is a plain fold."""
+    if misfit(fold.system, 0.5 * fold.period) or a.problem.fractions != b.problem.fractions:
+        return None
+    before, after = (_half_apart(point.orbit) for point in (a, b))
+    if before @ a.metric[: len(before), : len(before)] @ after >= 0.0:
+        return None
+    try:
+        return _flip(a, fold)
+    except (OrbitError, np.linalg.LinAlgError, ArithmeticError, RuntimeError):
+        return None
+
+
+def _half_apart(orbit: Orbit) -> Array:
+    """d(x) of an orbit."""
+    return flown(delayed(orbit.system, orbit.phase), orbit.state, 0.5 * orbit.period, orbit.method) - orbit.state
+
+
+def _flip(a: Point, fold: Orbit) -> Orbit | None:
+    """The flip near a fold of twice the period, as an orbit of twice the period."""
+    from scipy.optimize import newton as secant
+
+    begin = a.problem.fractions[0]
+    half = replace(a.problem, make=Scaled(a.problem.make, 0.5), fractions=(2.0 * begin % 1.0,))
+    x = (fold.state + 0.5 * _half_apart(fold))[None, :]
+
+    def indicator(parameter: float) -> float:
+        chain, error, iterations = newton(half, x, parameter)
+        return indicators(orbit_of(half, chain, error, iterations), a.tangent)["flip"]
+
+    step = 0.01 * (a.chain.parameter - fold.parameter) or 1e-6 * a.chain.parameter
+    place = float(secant(indicator, fold.parameter, x1=fold.parameter + step, tol=_SHARP * abs(fold.parameter)))
+    if not abs(place - fold.parameter) <= 1e-3 * abs(a.chain.parameter - fold.parameter) + 1e-6 * abs(fold.parameter):
+        return None
+    chain, error, iterations = newton(half, x, place)
+    whole = replace(a.problem, fractions=(begin,))
+    return orbit_of(whole, whole.evaluate(chain.x, place), error, iterations, parameter=place, mark="flip")

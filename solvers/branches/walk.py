@@ -1,0 +1,293 @@
+"""One direction of a branch: how long a step to take, what to refuse, where it ends."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from enum import Enum
+
+import numpy as np
+
+from solvers.branches.bifurcations import ROUNDING, between, indicators_at
+from solvers.branches.grazing import Touch, signature, unknowns_at
+from solvers.branches.nonsmooth import ERRORS, Kink, before, behind, kinks_near, marked, met
+from solvers.branches.point import Point, corrected, cubic, is_straight, moved
+from solvers.branches.reshooting import with_quiet_begin
+from solvers.branches.subharmonic_end import birth
+from solvers.orbits import Orbit, OrbitError, is_cut
+from solvers.problem import Array
+
+MOST_ORBITS = 2000
+_SMALLEST = 1e-8  # arclength step at which a branch counts as lost
+_GOOD = 0.06, 0.1  # distance of a good guess from the branch, in units of the step: on a cubic, on the tangent
+_MANY = 6  # Newton iterations that ask for shorter steps
+_SHARPEST = 0.8  # cosine of the largest turn between two orbits
+_THERE = 3e-6  # arclength within which a kink may lie behind
+_NEAR_KINK = 1e-4  # arclength step below which a fold may hide behind a kink
+_NEAR = 1e-4  # arclength from where a branch is lost within which a kink may be why
+_AROUND = 3.0  # arclength, in units of a failed step, within which a kink is looked for
+_AGAIN = 0.03  # part of a step after whose failure kinks are looked for again
+_MOST_KINKS = 6  # tried at a time
+_LAST = 3e-7  # arclength step below which any turn counts as a kink
+_FARTHEST = 20.0  # distance of an orbit from the one before, in steps, beyond which it belongs to another branch
+_BEHIND = 0.003  # first step behind a kink, in units of the largest
+
+
+class BranchStatus(Enum):
+    """How a branch ended, as a sentence."""
+
+    RUNNING = "not finished yet"
+    END = "reached the end of the span"
+    CLOSED = "closed: came back to its first orbit"
+    RETURNED = "came back to an orbit it had passed: it turned round or went over to another branch"
+    BORN = "reached its birth at a flip of the branch of half the period"
+    JUMP = "ended where two contacts of a stop become one, or one two: no orbits were found that lead over the jump"
+    LOST = "lost: no orbit was found however small the step; where multipliers are large, more shots may help"
+    LIMIT = f"stopped after {MOST_ORBITS} orbits"
+
+
+@dataclass(eq=False)
+class Arm:
+    """One direction of a branch, walked as far as it has been asked for."""
+
+    point: Point
+    span: tuple[float, float]
+    largest: float
+    orbits: list[Orbit] = field(default_factory=list)
+    status: BranchStatus = BranchStatus.RUNNING
+    step: float = 0.0
+    before: tuple[Point, float] | None = None  # the point before and the way from it
+    tried: float = math.inf  # step after whose failure kinks were looked for
+    at_jump: bool = False  # whether the kinks found then hold one that it leads to, and no way over it
+    passed: list[Point] = field(default_factory=list)
+    values: list[float] = field(default_factory=list)  # of the parameter there
+
+    def __post_init__(self) -> None:
+        self.first, self.step = self.point, self.step or 0.2 * self.largest
+        self.orbits = [self.point.orbit]
+        self._pass(self.point)
+
+    def extend(self) -> None:
+        """Find the next orbit and the special points before it, or an end of the branch."""
+        following, self.tried = None, math.inf
+        while following is None:
+            h = self.step
+            following = self._next() if h >= _SMALLEST else None
+            if following is None and (self.step < _SMALLEST or h < _AGAIN * self.tried):
+                kink, self.tried = self._kink_ahead(h), h
+                if kink is not None and (kink[0] is None or self._taken(kink[0])):
+                    return self._cross(*kink)
+                if self.step < _SMALLEST and self.status is BranchStatus.RUNNING:
+                    self.status = BranchStatus.JUMP if self.at_jump else BranchStatus.LOST
+                if kink is not None or self.status is not BranchStatus.RUNNING:
+                    return None
+        if self._taken(following) and self.status is BranchStatus.RUNNING:
+            self._finish_or_go_on(following)
+        return None
+
+    def _taken(self, following: Point) -> bool:
+        """Whether the next orbit is good; then it and the special points before it are kept, or a birth among them."""
+        a = self.point
+        way = float(a.tangent @ a.metric @ (following.unknowns - a.unknowns))
+        special = between(a, following, way, self.before)
+        marks = [orbit.mark for orbit in special]
+        if way > _THERE and _jumped(a, following, marks):
+            self.status, self.step = BranchStatus.RUNNING, 0.2 * way
+            return False
+        for place, fold in enumerate(special):
+            born = birth(a, following, fold) if fold.mark == "fold" else None
+            if born is not None:
+                self.status = BranchStatus.BORN
+                self.orbits += [*special[:place], born]
+                return False
+        self.orbits += [*special, following.orbit]
+        self.before = None if {"grazing", "floor"} & {*marks} else (a, way)  # no cubic across a kink
+        return True
+
+    def _kink_ahead(self, reach: float) -> tuple[Point | None, Point, list[Orbit]] | None:
+        """Last point before a kink within reach, None if the arm is there; the first one behind it; orbits to keep."""
+        a, reach = self.point, max(1.5 * reach, _NEAR if self.step < _SMALLEST else 0.0)
+        self.at_jump = False
+        for kink in kinks_near(a.orbit)[:_MOST_KINKS]:
+            try:
+                touch = met(a, kink, _AROUND * reach)
+                last = self._last_before(kink, touch, reach)
+                if last is not None:
+                    self.at_jump = self.at_jump or kink.kind == "merging"
+                    point = behind(last, kink, touch)
+                    return (None if last is a else last), point, marked(last, point, kink, touch)
+            except ERRORS:
+                continue
+        return None
+
+    def _last_before(self, kink: Kink, touch: Touch, reach: float) -> Point | None:
+        """The last point before a kink if it lies on the way within reach; raises one of ERRORS."""
+        a = self.point
+        off = unknowns_at(a, touch) - a.unknowns
+        way, whole = float(a.tangent @ a.metric @ off), math.sqrt(off @ a.metric @ off)
+        if not -_THERE < way < reach or whole > 2.0 * abs(way) + _THERE:
+            return None
+        try:
+            last = before(a, kink, touch)
+        except ERRORS:
+            return a if 0.0 < way <= _LAST else None  # a itself is near enough
+        if not a.tangent @ a.metric @ last.tangent > 0.0:
+            return None
+        return last if way > _SMALLEST else a
+
+    def _cross(self, last: Point | None, point: Point, found: list[Orbit]) -> None:
+        """Go on behind a kink."""
+        a = last or self.point
+        inside = self._inside(point.unknowns)  # a jump may lead out of the span
+        self.orbits[len(self.orbits) - (last is not None) :] = found if inside else found[:-1]
+        self._pass(a)
+        self._pass(point)
+        self.point, self.before, self.step = with_quiet_begin(point), None, _BEHIND * self.largest
+        if not inside:
+            self.status = BranchStatus.END
+        elif len(self.orbits) >= MOST_ORBITS:
+            self.status = BranchStatus.LIMIT
+
+    def _next(self) -> Point | None:
+        """The point a step ahead, the one at the end of the span if that is nearer, or None after a shorter step."""
+        a, h = self.point, self.step
+        guess = self._ahead()
+        try:
+            b = self._near(guess) if self._inside(guess) else self._at_edge(guess)
+            b = b if self._inside(b.unknowns) else self._at_edge(b.unknowns)
+        except (OrbitError, np.linalg.LinAlgError):
+            self.step *= 0.3
+            return None
+        off, miss = b.unknowns - a.unknowns, b.unknowns - guess
+        way, aligned = float(a.tangent @ a.metric @ off), float(a.tangent @ a.metric @ b.tangent)
+        strayed = math.sqrt(max(float(off @ a.metric @ off) - way**2, 0.0))
+        sharp = aligned < _SHARPEST or strayed > 0.5 * way
+        across = signature(a.orbit) != signature(b.orbit)
+        hops = h < (_THERE if across else _LAST) and way > 0.0 and strayed < _FARTHEST * h
+        if (sharp and not hops) or is_cut(b.chain, b.orbit.system):  # a kink that was not met is hopped over
+            self.step *= 0.2 if len(a.orbit.contacts) != len(b.orbit.contacts) else 0.5
+            return None
+        if b.chain.parameter in self.span:
+            self.status = BranchStatus.END
+            return b
+        good = _GOOD[self.before is None] * h / max(math.sqrt(miss @ a.metric @ miss), 1e-9 * h)
+        longer = min(good if self.before is None else good ** (1.0 / 3.0), 3.0)
+        largest = self.largest * max(1.0, b.size)
+        self.step = min(h * (max(longer, 0.5) if b.orbit.iterations < _MANY else 0.5), largest)
+        return b
+
+    def _ahead(self) -> Array:
+        """Guess of the unknowns a step ahead: along the tangent, or on the cubic through the point before too."""
+        a = self.point
+        if self.before is None or self.before[0].problem is not a.problem:
+            self.before = None
+            return a.unknowns + self.step * a.tangent
+        last, way = self.before
+        return cubic(last, a, way, way + self.step)
+
+    def _near(self, guess: Array) -> Point:
+        """The point near a guess, in the cheaper way if that will do."""
+        straight = self._is_straight(guess)
+        try:
+            return moved(self.point, guess, straight)
+        except OrbitError:
+            if self.step > _NEAR_KINK or not straight:
+                raise
+            return moved(self.point, guess, False)
+
+    def _is_straight(self, guess: Array) -> bool:
+        """Whether to hold the parameter fixed: no fold is near, by the points known and the guess."""
+        a = self.point
+        if self.before is None:
+            return abs(a.share) > 0.2
+        last, way = self.before
+        ahead = a.share + (a.share - last.share) * self.step / way
+        moved_on = (guess[-1] - a.chain.parameter) * a.tangent[-1] > 0.0
+        return moved_on and is_straight(last.share, a.share, ahead)
+
+    def _inside(self, unknowns: Array) -> bool:
+        """Whether the parameter lies in the span."""
+        return bool(self.span[0] <= unknowns[-1] <= self.span[1])
+
+    def _at_edge(self, beyond: Array) -> Point:
+        """The point at the end of the span on the way to a place beyond it."""
+        a = self.point
+        edge = self.span[0] if beyond[-1] < self.span[0] else self.span[1]
+        share = (edge - a.chain.parameter) / (beyond[-1] - a.chain.parameter)
+        guess = a.unknowns + share * (beyond - a.unknowns)
+        guess[-1] = edge
+        return moved(a, guess, True)
+
+    def _pass(self, point: Point) -> None:
+        """Remember a point."""
+        self.passed.append(point)
+        self.values.append(point.chain.parameter)
+
+    def _finish_or_go_on(self, point: Point) -> None:
+        """Recognise orbits passed before and the limit."""
+        met = self._met(point)
+        if met is not None:
+            self.status = BranchStatus.CLOSED if met == 0 else BranchStatus.RETURNED
+            self.orbits += [self.first.orbit] if met == 0 else []
+        elif len(self.orbits) >= MOST_ORBITS:
+            self.status = BranchStatus.LIMIT
+        else:
+            self.point = with_quiet_begin(point)
+
+    def _met(self, point: Point) -> int | None:
+        """Number of an orbit passed before that lies on the way just gone; 0 is the first."""
+        a = self.point
+        self._pass(point)
+        if point.problem.fractions != a.problem.fractions:
+            return None
+        low, high = sorted((a.chain.parameter, point.chain.parameter))
+        among = [i for i, value in enumerate(self.values[:-4]) if low <= value <= high]
+        known = [i for i in among if self.passed[i].problem.fractions == a.problem.fractions]
+        if not known:
+            return None
+        way = point.unknowns - a.unknowns
+        length = float(way @ point.metric @ way)
+        off = np.array([self.passed[i].unknowns for i in known]) - a.unknowns
+        share = off @ (point.metric @ way) / length
+        off -= np.outer(share, way)
+        aligned = np.array([self.passed[i].tangent for i in known]) @ (point.metric @ point.tangent)
+        distance = np.einsum("ki,ij,kj->k", off, point.metric, off)
+        near = (share > 0.0) & (share <= 1.0) & (np.abs(aligned) > 0.5) & (distance < 1e-2 * length)
+        return next((known[k] for k in np.flatnonzero(near) if _is_passed(self.passed[known[k]], a, point)), None)
+
+
+def _jumped(a: Point, b: Point, marks: list[str]) -> bool:
+    """Whether b lies on another branch: the parameter turns, a multiplier passes one, or contacts come, all unseen."""
+    turned = a.share * b.share < 0.0 and not {"fold", "floor"} & {*marks}
+    first, second = (indicators_at(point)["branch point"] for point in (a, b))
+    passed = first * second < 0.0 and min(abs(first), abs(second)) > ROUNDING
+    passed = passed and not {"fold", "floor", "branch point"} & {*marks}
+    return "grazing" not in marks and (turned or passed or not _same_contacts(a.orbit, b.orbit))
+
+
+def _same_contacts(a: Orbit, b: Orbit) -> bool:
+    """Whether each contact of an orbit has one of another near it: none nearer to the next."""
+    if len(a.contacts) != len(b.contacts):
+        return False
+    for stop in np.unique(a.contacts.stop):
+        first, second = (np.sort(o.contacts.t_in[o.contacts.stop == stop]) / o.period for o in (a, b))
+        spacing = np.diff(first, append=first[0] + 1.0)
+        if len(first) != len(second) or np.any(np.abs(first - second) > 0.5 * np.minimum(spacing, np.roll(spacing, 1))):
+            return False
+    return True
+
+
+def _is_passed(known: Point, a: Point, b: Point) -> bool:
+    """Whether an orbit lies on the branch between two points, which others near it do not."""
+    way = float(a.tangent @ a.metric @ (b.unknowns - a.unknowns))
+    share = (known.chain.parameter - a.chain.parameter) / (b.chain.parameter - a.chain.parameter)
+    alike = _same_contacts(known.orbit, a.orbit) or _same_contacts(known.orbit, b.orbit)
+    if not (alike and way > 0.0 and 0.0 <= share <= 1.0):
+        return False
+    guess = np.append(cubic(a, b, way, share * way)[:-1], known.chain.parameter)
+    try:
+        chain, *_ = corrected(a, guess, True)
+    except (OrbitError, np.linalg.LinAlgError):
+        return False
+    off = np.append(chain.x.ravel(), chain.parameter) - known.unknowns
+    return bool(off @ a.metric @ off < 1e-12)

@@ -1,0 +1,152 @@
+"""Where machine code is kept between processes: a folder named by a digest of all that it is compiled from.
+
+numba takes a kernel from its cache as long as the kernel's own file is unchanged; functions it calls from other files
+may be new all the same. With a folder for each state of the sources no old machine code can be found.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import sys
+import tempfile
+import threading
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import llvmlite
+import numba
+import numpy as np
+from numba import config
+
+HOME = Path(__file__).parent.parent
+PREFIX = "fembeam-kernels-"
+KEPT = 4  # folders of other sources, versions or interpreters that stay: whoever changes between them compiles once
+DIGITS = 16  # of a digest
+UNUSED = 24 * 3600.0  # s without a start after which one beyond these is removed; until then a process may need it
+_LOCK = threading.RLock()  # numba's setting belongs to the process
+
+
+def _stamps() -> dict[str, tuple[int, int]]:
+    """Time of change and size of every source file."""
+    return {str(path): _stamp(str(path)) for path in sorted(HOME.rglob("*.py"))}
+
+
+def _stamp(path: str) -> tuple[int, int]:
+    try:
+        found = os.stat(path)
+    except FileNotFoundError:  # removed meanwhile: changed
+        return 0, 0
+    return found.st_mtime_ns, found.st_size
+
+
+def _digest(paths: list[str]) -> str:
+    """Of sources and versions; the processor is numba's own key."""
+    versions = (sys.version, numba.__version__, llvmlite.__version__, np.__version__)
+    found = hashlib.sha256(repr(versions).encode())
+    for path in paths:
+        with open(path, "rb") as file:
+            content = file.read()
+        found.update(f"{os.path.relpath(path, HOME)} {len(content)} ".encode() + content)
+    return found.hexdigest()[:DIGITS]
+
+
+def _lasting() -> Iterator[Path]:
+    """Places that outlive the process, the best first."""
+    if config.CACHE_DIR:
+        yield Path(config.CACHE_DIR)
+    yield HOME / "__pycache__"
+    users = os.environ.get("LOCALAPPDATA" if os.name == "nt" else "XDG_CACHE_HOME")
+    with suppress(RuntimeError):  # no home
+        yield Path(users) if users else Path.home() / ".cache"
+
+
+def _opened(place: Path, name: str) -> bool:
+    """Make the folder if need be, and see whether it can be written to; a new one takes the place of old ones."""
+    folder = place / name
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+        with suppress(FileExistsError):
+            folder.mkdir()
+            _remove_unused(place, folder)
+        tempfile.TemporaryFile(dir=folder).close()
+        os.utime(folder)
+    except OSError:
+        return False
+    return True
+
+
+def _remove_unused(place: Path, folder: Path) -> None:
+    """Remove what nobody has started with for a day, but for the last few; no process is likely to be left of it."""
+    last_used = {}
+    for other in place.glob(PREFIX + "[0-9a-f]" * DIGITS):  # nothing but what was made here
+        with suppress(OSError):  # removed by another process just now
+            last_used[other] = other.stat().st_mtime
+    last_used.pop(folder, None)
+    for other in sorted(last_used, key=last_used.__getitem__, reverse=True)[KEPT:]:
+        if time.time() - last_used[other] > UNUSED:
+            shutil.rmtree(other, ignore_errors=True)
+
+
+def _temporary() -> Path:
+    """A folder in the system's temporary one that only this user can write to: what is loaded from it is run."""
+    user = getattr(os, "getuid", int)()
+    place = Path(tempfile.gettempdir(), f"{PREFIX}of-{user}")
+    place.mkdir(mode=0o700, exist_ok=True)
+    found = place.lstat()
+    if os.name == "posix" and (found.st_uid != user or found.st_mode & 0o022):
+        raise PermissionError(f"{place} can be written by others")
+    return place
+
+
+def _warn(what: str) -> None:
+    """One line: there is no caller whose line would tell more."""
+    warnings.warn_explicit(f"{what}; set NUMBA_CACHE_DIR to a folder that lasts", UserWarning, str(HOME), 0)
+
+
+def _folder(name: str) -> Path | None:
+    """The folder for these sources, or None where nothing can be written; without a lasting one a warning is given."""
+    for place in _lasting():
+        if _opened(place, name):
+            return place / name
+    with suppress(OSError):
+        place = _temporary()
+        if _opened(place, name):
+            _warn(f"machine code is kept in {place}: neither {HOME / '__pycache__'} nor a user's cache can be written")
+            return place / name
+    _warn("every start compiles for half a minute: there is no folder that machine code can be written to")
+    return None
+
+
+_STAMPS = _stamps()
+FOLDER = _folder(PREFIX + _digest(list(_STAMPS)))
+
+
+def _is_current(function: Callable[..., Any]) -> bool:
+    """Whether the digest is that of a function's sources.
+
+    It is not where a file was changed since: what is defined from then on may call what is in it.
+    """
+    global FOLDER
+    path = function.__code__.co_filename
+    if path in _STAMPS and _STAMPS[path] != _stamp(path):
+        FOLDER = None
+    return FOLDER is not None and path in _STAMPS
+
+
+@contextmanager
+def kept(function: Callable[..., Any]) -> Iterator[bool]:
+    """Whether to keep a function's machine code; numba does so in our folder meanwhile, that of others stays theirs."""
+    with _LOCK:
+        before, keep = config.CACHE_DIR, _is_current(function)
+        if keep:
+            config.CACHE_DIR = str(FOLDER)
+        try:
+            yield keep
+        finally:
+            config.CACHE_DIR = before

@@ -1,0 +1,274 @@
+"""Compiled ground floor of the stepping methods: problem data, law calls, signals, right-hand side.
+
+The state a stepping method integrates is x = [p (n), v (n), ledger (2 + 2m)]:
+
+    p' = v + b^p·F,   v' = -k p - c v + b^v·F + l·s(t),   δ_s = r_s·[p, v] - g_s
+    ledger: input power, damping power, then per stop force × indentation rate and force.
+"""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from llvmlite import ir
+from numba import config, njit, types
+from numba.extending import intrinsic
+
+from solvers.compiled.cache import kept
+
+if config.DISABLE_JIT:
+    raise RuntimeError("NUMBA_DISABLE_JIT is set, but time integration runs as machine code only: unset it")
+
+
+def _compiled(function: Any, *signature: Any, **options: Any) -> Any:
+    """A function compiled by numba, its machine code kept in the folder of these sources."""
+    with kept(function) as keep:
+        return njit(*signature, cache=keep, **options)(function)
+
+
+def _decorator(**options: Any) -> Callable[[Any], Any]:
+    return partial(_compiled, **options)
+
+
+_OPTIONS: Any = {"nogil": True, "error_model": "numpy", "_nrt": False}
+kernel = _decorator(**_OPTIONS)
+"""Decorator of the compiled functions Python calls. They allocate nothing, so reference counting is switched off:
+passing twenty arrays down a call would otherwise cost ten times the arithmetic of a two-mode step."""
+_INNER: Any = {**_OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+inner = _decorator(**_INNER)
+"""The same for functions only kernels call: no wrappers, which would take most of their compile time."""
+inlined = _decorator(**_INNER, forceinline=True)
+"""The same for what the innermost loops call, from few places: there even passing the arrays' descriptors costs more
+than the arithmetic. Everywhere else it would only cost compile time."""
+merged = _decorator(**_INNER, inline="always")
+"""The same for the long functions one kernel calls once each: compiled as a part of it."""
+reordered = _decorator(**_INNER, forceinline=True, fastmath={"reassoc", "contract"})
+"""The same for sums whose order does not matter, so that they can be vectorised."""
+
+
+def entry(signature: Any) -> Callable[[Any], Any]:
+    """Decorator of a kernel that is compiled, or loaded, when its module is imported.
+
+    Meanwhile the garbage collector rests: the compiler keeps most of what it makes, and looking through that again and
+    again takes a sixth of the time.
+    """
+
+    def compiled(function: Any) -> Any:
+        collects = gc.isenabled()
+        gc.disable()
+        try:
+            return _compiled(function, signature, **_OPTIONS)
+        finally:
+            if collects:
+                gc.enable()
+
+    return compiled
+
+
+class Problem(NamedTuple):
+    """Everything a kernel reads and never writes."""
+
+    k: Any  # (n,) block stiffness
+    c: Any  # (n,) block damping
+    loss: Any  # (2n, 2n) damping power zᵀ loss z, or (0, 0): then Σ c v²
+    push: Any  # (m, 2n) state rate per newton of stop s
+    read: Any  # (m, 2n) indentation = read·z - gap
+    read_rate: Any  # (m, 2n) indentation rate = read_rate·z
+    levels: Any  # (m, J) ascending indentations where a stop changes piece: 0, knots, then inf
+    gap: Any  # (m,)
+    law: Any  # (m,) addresses of the compiled forces
+    gradient: Any  # (m,) addresses of their derivatives
+    parameters: Any  # (m, P) their parameters
+    floor: Any  # (m,) smallest entry rates
+    load: Any  # (L, 2n) state rate per unit of signal l
+    power: Any  # (L, 2n) input power = signal × power·z
+    tone_omega: Any  # (K,) rad/s
+    tone_amplitude: Any  # (K,) complex
+    tone_load: Any  # (K,) the load each drives
+    table: Any  # (rows, 3) [s, s', s''] at the nodes of all sampled signals
+    table_dt: Any  # (J,)
+    table_start: Any  # (J + 1,) first row of each, and the end
+    table_load: Any  # (J,) the load each drives
+
+
+REAL = types.float64
+VECTOR = types.Array(REAL, 1, "C")
+MATRIX = types.Array(REAL, 2, "C")
+INTEGERS = types.Array(types.int64, 1, "C")
+_COMPLEX = types.Array(types.complex128, 1, "C")
+PROBLEM = types.NamedTuple(
+    [
+        *[VECTOR, VECTOR, MATRIX, MATRIX, MATRIX, MATRIX, MATRIX, VECTOR, INTEGERS, INTEGERS],
+        *[MATRIX, VECTOR, MATRIX, MATRIX, VECTOR, _COMPLEX, INTEGERS, MATRIX, VECTOR, INTEGERS, INTEGERS],
+    ],
+    Problem,
+)
+
+
+def _c_function(outputs):
+    """An intrinsic that calls a law's C function at an address, passing arrays by their data pointers."""
+
+    @intrinsic
+    def call(typingctx, address, n, delta, delta_dot, entry_rate, parameters, results):
+        signature = types.void(types.int64, types.int64, delta, delta_dot, types.float64, parameters, results)
+
+        def codegen(context, builder, sig, args):
+            def data(kind, value):
+                return context.make_array(kind)(context, builder, value).data
+
+            tuple_type = sig.args[6]
+            arrays = [builder.extract_value(args[6], i) for i in range(outputs)]
+            out = [data(tuple_type[i], array) for i, array in enumerate(arrays)]
+            real, reals = ir.DoubleType(), ir.DoubleType().as_pointer()
+            declared = ir.FunctionType(ir.VoidType(), [ir.IntType(64), reals, reals, real, reals, *[reals] * outputs])
+            function = builder.inttoptr(args[0], declared.as_pointer())
+            known = [data(sig.args[i], args[i]) for i in (2, 3, 5)]
+            builder.call(function, [args[1], known[0], known[1], args[4], known[2], *out])
+            return context.get_dummy_value()
+
+        return signature, codegen
+
+    return call
+
+
+call_force = _c_function(1)
+call_gradient = _c_function(3)
+
+
+@inlined
+def contact_forces(problem, stop, delta, delta_dot, entry_rate, force):
+    """Forces of one stop at a batch of indentations; below the surface the law is continued from it."""
+    for i in range(delta.size):
+        delta[i] = max(delta[i], 0.0)
+    law_forces(problem, stop, delta.size, delta, delta_dot, entry_rate, force)
+
+
+@inlined
+def law_forces(problem, stop, n, delta, delta_dot, entry_rate, force):
+    """The law of one stop on the first n indentations, none of them below the surface."""
+    call_force(problem.law[stop], n, delta, delta_dot, entry_rate, problem.parameters[stop], (force,))
+
+
+@inner
+def contact_gradient(problem, stop, delta, delta_dot, entry_rate, by_delta, by_rate, by_entry):
+    """Derivatives of the forces, likewise."""
+    for i in range(delta.size):
+        delta[i] = max(delta[i], 0.0)
+    results = (by_delta, by_rate, by_entry)
+    call_gradient(problem.gradient[stop], delta.size, delta, delta_dot, entry_rate, problem.parameters[stop], results)
+
+
+@inlined
+def copy(source, target, n):
+    """First n entries; a slice assignment would allocate."""
+    for i in range(n):
+        target[i] = source[i]
+
+
+@reordered
+def dot(a, b, n):
+    """Sum of the first n products."""
+    total = 0.0
+    for i in range(n):
+        total += a[i] * b[i]
+    return total
+
+
+@reordered
+def sizes(a, b, n):
+    """Sum of the sizes of the first n products."""
+    total = 0.0
+    for i in range(n):
+        total += abs(a[i] * b[i])
+    return total
+
+
+@inner
+def table_value(problem, j, t):
+    """Quintic Hermite value of node table j at time t."""
+    dt, start = problem.table_dt[j], problem.table_start[j]
+    cell = min(max(int(t / dt), 0), problem.table_start[j + 1] - start - 2)
+    x = t / dt - cell
+    a, b = problem.table[start + cell], problem.table[start + cell + 1]
+    s0, s1 = a[1] * dt, a[2] * dt * dt * 0.5
+    e0 = b[0] - a[0] - s0 - s1
+    e1 = b[1] * dt - s0 - 2.0 * s1
+    e2 = b[2] * dt * dt * 0.5 - s1
+    c3 = 10.0 * e0 - 4.0 * e1 + e2
+    c4 = -15.0 * e0 + 7.0 * e1 - 2.0 * e2
+    c5 = 6.0 * e0 - 3.0 * e1 + e2
+    return a[0] + x * (s0 + x * (s1 + x * (c3 + x * (c4 + x * c5))))
+
+
+@inner
+def add_loads(problem, t, x, rate):
+    """Add all loads at time t to the state's rate and their power to the ledger."""
+    size = 2 * problem.k.size
+    for i in range(problem.tone_omega.size):
+        angle = problem.tone_omega[i] * t
+        a = problem.tone_amplitude[i]
+        value = a.real * np.cos(angle) - a.imag * np.sin(angle)
+        _add_load(problem, problem.tone_load[i], value, size, x, rate)
+    for j in range(problem.table_dt.size):
+        _add_load(problem, problem.table_load[j], table_value(problem, j, t), size, x, rate)
+
+
+@inner
+def _add_load(problem, load, value, size, x, rate):
+    """One signal's share."""
+    for i in range(size):
+        rate[i] += problem.load[load, i] * value
+    rate[size] += value * dot(problem.power[load], x, size)
+
+
+@inlined
+def _damping_power(problem, x):
+    """Power the linear damping takes."""
+    n, power = problem.k.size, 0.0
+    if problem.loss.shape[0] == 0:
+        for i in range(n):
+            power += problem.c[i] * x[n + i] ** 2
+        return power
+    for i in range(2 * n):
+        power += x[i] * dot(problem.loss[i], x, 2 * n)
+    return power
+
+
+@kernel
+def rhs(problem, t, x, piece, entry_rate, rate, batch):
+    """State rate with the stops' pieces frozen (piece > 0: in contact); returns the number of law calls.
+
+    ``batch`` is working space of three numbers.
+    """
+    n, calls = problem.k.size, 0
+    size = 2 * n
+    for i in range(n):
+        rate[i] = x[n + i]
+        rate[n + i] = -problem.k[i] * x[i] - problem.c[i] * x[n + i]
+    rate[size] = 0.0
+    rate[size + 1] = _damping_power(problem, x)
+    add_loads(problem, t, x, rate)
+    for s in range(problem.gap.size):
+        rate[size + 2 + 2 * s] = 0.0
+        rate[size + 3 + 2 * s] = 0.0
+        if piece[s] > 0:
+            delta_dot = dot(problem.read_rate[s], x, size)
+            batch[0] = indentation(problem, s, x)
+            batch[1] = delta_dot
+            contact_forces(problem, s, batch[0:1], batch[1:2], entry_rate[s], batch[2:3])
+            calls += 1
+            for i in range(size):
+                rate[i] += problem.push[s, i] * batch[2]
+            rate[size + 2 + 2 * s] = batch[2] * delta_dot
+            rate[size + 3 + 2 * s] = batch[2]
+    return calls
+
+
+@inlined
+def indentation(problem, s, x):
+    """Indentation of stop s."""
+    return dot(problem.read[s], x, 2 * problem.k.size) - problem.gap[s]

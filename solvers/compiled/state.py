@@ -1,0 +1,266 @@
+"""The state of a run, and what happens to it when a stop switches: pieces, latched rates, contact log."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import types
+
+from solvers.compiled.kernels import INTEGERS, MATRIX, VECTOR, Problem, dot, indentation, inlined, inner, kernel, sizes
+from solvers.problem import Array, Forcing, Law, Status, System
+
+STATUSES = list(Status)
+DONE, RUNNING, STEP_TOO_SMALL, DIVERGED, CHATTER, LOG_FULL, LAW_NOT_FINITE, GAINED = (
+    STATUSES.index(status)
+    for status in (
+        *[Status.DONE, Status.RUNNING, Status.STEP_TOO_SMALL, Status.DIVERGED],
+        *[Status.CHATTER, Status.LOG_FULL, Status.LAW_NOT_FINITE, Status.GAINED],
+    )
+)
+T, H_FLIGHT, H_CONTACT, LAST_EVENT = range(4)  # places in State.now
+STEPS, REJECTED, CALLS, EVENTS, LOGGED, SAMPLED, AT_ONCE, TAPED = range(8)  # places in State.count
+T_IN, SPEED_IN, PEAK_DELTA, PEAK_FORCE, WORK_IN, IMPULSE_IN, FLOORED = range(7)  # columns of State.open
+MOST_EVENTS_AT_ONCE = 100
+STEP, PART, LANDING, EVENT = 0.0, 1.0, 2.0, 3.0  # kinds of tape rows
+KIND, BEGAN, ENDED, SPAN, FIRST, SECOND, HEAD = range(7)  # columns of the tape: two whole numbers that the kind
+# explains, then the state a row begins with and the forces at the nodes of a step
+
+
+class State(NamedTuple):
+    """Everything a run changes; it can be continued from here."""
+
+    now: Any  # (4,) time, flight step, contact step, time of the last event
+    x: Any  # (2n + 2 + 2m,) of the blocks, then the ledger, see `kernels`
+    rate: Any  # of x
+    piece: Any  # (m,) 0 in flight, j > 0 between levels j-1 and j
+    entry_rate: Any  # (m,) latched
+    open: Any  # (m, 7) of the contacts under way
+    count: Any  # (8,) steps, rejected ones, law calls, ..., as named above
+    tape: Any  # (rows, HEAD + x.size + forces) what happened in contact, for the tangent; no rows, no tape
+
+
+STATE = types.NamedTuple(
+    [VECTOR, VECTOR, VECTOR, INTEGERS, VECTOR, MATRIX, INTEGERS, MATRIX],
+    State,
+)
+
+
+@inner
+def surface_tolerance(problem, s, x):
+    """Distance within which a stop counts as on a level: rounding of δ."""
+    return 1e-15 * (abs(problem.gap[s]) + sizes(problem.read[s], x, 2 * problem.k.size)) + 1e-20
+
+
+@inner
+def rate_tolerance(problem, s, x):
+    """Indentation rate below which a stop counts as at rest: rounding of δ̇, coupled blocks amplify it."""
+    return 1e-13 * sizes(problem.read_rate[s], x, 2 * problem.k.size)
+
+
+@inner
+def tape(state, kind, began, ended, span, first, second, x):
+    """Write a row of the tape: what happened from ``began`` at x to ``ended``."""
+    row = state.tape[state.count[TAPED]]
+    row[KIND], row[BEGAN], row[ENDED], row[SPAN], row[FIRST], row[SECOND] = kind, began, ended, span, first, second
+    for e in range(state.x.size):
+        row[HEAD + e] = x[e]
+    state.count[TAPED] += 1
+
+
+@inner
+def _open(problem, state, s, t, delta_dot):
+    """Latch the entry rate and begin a row of the contact log."""
+    ledger = 2 * problem.k.size + 2 + 2 * s
+    state.entry_rate[s] = max(abs(delta_dot), problem.floor[s])
+    state.open[s, T_IN] = t
+    state.open[s, SPEED_IN] = abs(delta_dot)
+    state.open[s, PEAK_DELTA] = 0.0
+    state.open[s, PEAK_FORCE] = 0.0
+    state.open[s, WORK_IN] = state.x[ledger]
+    state.open[s, IMPULSE_IN] = state.x[ledger + 1]
+    state.open[s, FLOORED] = 1.0 if abs(delta_dot) < problem.floor[s] else 0.0
+
+
+@kernel
+def begin_contacts(problem, state):
+    """Put every stop on its piece at the start of a run and open the contacts under way."""
+    for s in range(problem.gap.size):
+        delta = indentation(problem, s, state.x)
+        piece = 0
+        while delta > problem.levels[s, piece] + surface_tolerance(problem, s, state.x):
+            piece += 1
+        state.piece[s] = piece
+        if piece > 0:
+            _open(problem, state, s, state.now[T], dot(problem.read_rate[s], state.x, 2 * problem.k.size))
+            state.open[s, PEAK_DELTA] = delta
+
+
+@kernel
+def contact_row(problem, state, s, t_out, speed_out, row):
+    """Write the log row of the contact under way at stop s."""
+    ledger = 2 * problem.k.size + 2 + 2 * s
+    row[0] = s
+    row[1] = state.open[s, T_IN]
+    row[2] = t_out
+    row[3] = state.open[s, SPEED_IN]
+    row[4] = speed_out
+    row[5] = state.open[s, PEAK_DELTA]
+    row[6] = state.open[s, PEAK_FORCE]
+    row[7] = state.x[ledger + 1] - state.open[s, IMPULSE_IN]
+    row[8] = state.x[ledger] - state.open[s, WORK_IN]
+    row[9] = state.open[s, FLOORED]
+
+
+@inner
+def switch(problem, state, s, direction, log):
+    """Move stop s one piece up or down; open or close its contact."""
+    t = state.now[T]
+    delta_dot = dot(problem.read_rate[s], state.x, 2 * problem.k.size)
+    if state.tape.shape[0]:
+        tape(state, EVENT, t, t, 0.0, s, direction, state.x)
+    if direction > 0 and state.piece[s] == 0:
+        _open(problem, state, s, t, delta_dot)
+    if direction < 0 and state.piece[s] == 1:
+        contact_row(problem, state, s, t, -delta_dot, log[state.count[LOGGED]])
+        state.count[LOGGED] += 1
+    state.piece[s] += direction
+    state.count[EVENTS] += 1
+    state.count[AT_ONCE] = state.count[AT_ONCE] + 1 if t == state.now[LAST_EVENT] else 0
+    state.now[LAST_EVENT] = t
+
+
+@inlined
+def switch_on_surface(problem, state, log, locates):
+    """Switch every stop that sits on a border of its piece and moves out of it; returns whether any did."""
+    switched = False
+    for s in range(problem.gap.size):
+        delta = indentation(problem, s, state.x)
+        delta_dot = dot(problem.read_rate[s], state.x, 2 * problem.k.size)
+        tolerance = surface_tolerance(problem, s, state.x) if locates else 0.0
+        still = rate_tolerance(problem, s, state.x)
+        direction = 0
+        if delta >= problem.levels[s, state.piece[s]] - tolerance and delta_dot > still:
+            direction = 1
+        elif state.piece[s] > 0 and delta <= problem.levels[s, state.piece[s] - 1] + tolerance and delta_dot < -still:
+            direction = -1
+        if direction != 0:
+            switch(problem, state, s, direction, log)
+            switched = True
+    return switched
+
+
+@inlined
+def touching(state):
+    """Whether any stop is in contact."""
+    most = 0
+    for piece in state.piece:
+        most = max(most, piece)
+    return most > 0
+
+
+def state_shapes(width: int, stops: int) -> list[tuple[int, ...]]:
+    """Shapes of the arrays of `State`."""
+    return [(4,), (width,), (width,), (stops,), (stops,), (stops, 7), (8,), (0, 0)]
+
+
+def begin_state(state: State, z: Any) -> None:
+    """Make arrays of zeros the state of a run at t = 0 from block coordinates."""
+    state.now[1:] = np.inf, np.inf, -1.0
+    state.x[: len(z)] = z
+    state.entry_rate[:] = 1.0
+
+
+def new_state(z: Any, stops: int) -> State:
+    """State of a run at t = 0 from block coordinates."""
+    kinds = [np.dtype(str(kind.dtype)) for kind in STATE.types]
+    shapes = state_shapes(len(z) + 2 + 2 * stops, stops)
+    state = State._make(np.zeros(shape, kind) for shape, kind in zip(shapes, kinds, strict=True))
+    begin_state(state, z)
+    return state
+
+
+def problem_of(system: System, forcing: Forcing) -> Problem:
+    """Arrays the kernels read, in block coordinates."""
+    about = system.about_structure
+    if "linear" not in about:
+        about["linear"] = _linear_part(system)
+    return _problem(system, forcing, about["linear"])
+
+
+def _linear_part(system: System) -> dict[str, Array]:
+    """Arrays of the structure, the stops' directions and the loads' vectors."""
+    blocks, n = system.blocks, system.size
+    direction, vectors = directions_of(system), _vectors(system)
+    linear = {
+        **{"k": blocks.k, "c": blocks.c, "loss": np.ascontiguousarray(blocks.loss)},
+        "push": np.ascontiguousarray(direction @ system.push.T),
+        "read": np.ascontiguousarray(-direction @ blocks.T[:n]),
+        "load": np.ascontiguousarray(vectors @ system.push.T),
+        "power": np.ascontiguousarray(vectors @ blocks.T[n:]),
+    }
+    return {**linear, "read_rate": rate_rows(linear["read"], blocks.k, blocks.c)}
+
+
+def matrix_problem_of(system: System, forcing: Forcing) -> Problem:
+    """The same in the system's own coordinates without M, C and K: pushes and loads are forces, and `rhs` their sum."""
+    zeros = np.zeros(system.size)
+    direction, vectors = directions_of(system), _vectors(system)
+    linear = {
+        **{"k": zeros, "c": zeros, "loss": np.empty((0, 0))},
+        **{"push": np.hstack((0.0 * direction, direction)), "read": np.hstack((-direction, 0.0 * direction))},
+        "read_rate": np.hstack((0.0 * direction, -direction)),
+        **{"load": np.hstack((0.0 * vectors, vectors)), "power": np.hstack((0.0 * vectors, vectors))},
+    }
+    return _problem(system, forcing, linear)
+
+
+def directions_of(system: System) -> Array:
+    """Directions of the stops (m, n)."""
+    return np.array([c.direction for c in system.contacts]).reshape(len(system.contacts), system.size)
+
+
+def _vectors(system: System) -> Array:
+    """Vectors of the loads (L, n)."""
+    return np.array([vector for vector, _ in system.loads]).reshape(len(system.loads), system.size)
+
+
+def _problem(system: System, forcing: Forcing, linear: dict[str, Array]) -> Problem:
+    """The linear part with the laws and the signals."""
+    contacts, m = system.contacts, len(system.contacts)
+    most = max([len(c.law.knots) for c in contacts], default=0) + 1
+    levels = np.full((m, most + 1), math.inf)
+    for i, contact in enumerate(contacts):
+        levels[i, : len(contact.law.knots) + 1] = (0.0, *contact.law.knots)
+    return Problem(
+        **linear,
+        levels=levels,
+        gap=np.array([c.gap for c in contacts], dtype=float),
+        law=np.array([c.law.address for c in contacts], dtype=np.int64),
+        gradient=np.array([c.law.gradient_address for c in contacts], dtype=np.int64),
+        parameters=law_parameters(system),
+        floor=np.array([c.law.entry_rate_floor for c in contacts], dtype=float),
+        **vars(forcing),
+    )
+
+
+def law_parameters(system: System) -> Array:
+    """Parameters of the laws (m, P), padded by zeros."""
+    return parameters_of([contact.law for contact in system.contacts])
+
+
+def parameters_of(laws: Sequence[Law]) -> Array:
+    """Parameters of laws (m, P), padded by zeros."""
+    parameters = [np.asarray(law.parameters, dtype=float) for law in laws]
+    table = np.zeros((len(parameters), max([p.size for p in parameters], default=1)))
+    for row, own in zip(table, parameters, strict=True):
+        row[: own.size] = own
+    return table
+
+
+def rate_rows(read: Array, k: Array, c: Array) -> Array:
+    """Rows of δ̇ from rows of δ: r A with A = [[0, 1], [-k, -c]] per block."""
+    p, v = read[:, : k.size], read[:, k.size :]
+    return np.ascontiguousarray(np.concatenate((-v * k, p - v * c), axis=1))

@@ -1,0 +1,20 @@
+"""The main method: exact flight between contacts, forces by collocation within them, exact derivatives.
+
+`method` is the loop, `preparation` and `tables` make its numbers, `flight` and `safe_steps` move free of contact, the
+folder `contact` holds one step in contact; `energy` books work, `energy_guard` refuses runs that do not balance,
+`linearised` and `tangent` differentiate a run. Imports: `compiled`, `problem`. Its files load machine code when
+imported; begin with `method`.
+"""
+
+from typing import Any
+
+__all__ = ["Exponential"]
+
+
+def __getattr__(name: str) -> Any:
+    """The method, loaded with its machine code when it is asked for."""
+    if name != "Exponential":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from solvers.exponential.method import Exponential
+
+    return Exponential

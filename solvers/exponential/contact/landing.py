@@ -1,0 +1,277 @@
+"""Landing on a border: one Runge–Kutta step in a variable in which the contact is smooth, DOP853 with t an unknown.
+
+    INDENTATION   dt = dδ/δ̇         lands exactly on a kink, or on another stop's surface
+    ROOT          dt = κ u^{κ-1} du/δ̇, u = δ^{1/κ}, κ as at entry: lands exactly on δ = 0, where δ^{3/2} is singular
+    TIME          dt                lands on a bend by the secant rule; the force is continuous there
+
+The unknowns are [p, v, ledger, t, u]. Every block moves by less than `_reach` radians, within which the step is exact
+to the tolerance whatever the stops see of it; what the forces add is estimated by a tenth of the embedded fifth-order
+difference, for every stop in units of its own tolerance: in these variables that stays a few times above the true
+error, where DOP853's own mixed estimate falls below it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solvers.compiled.dop853_tableau import E5, STAGES, A
+from solvers.compiled.kernels import call_force, copy, dot, indentation, inlined, inner, law_forces, table_value
+from solvers.compiled.state import (
+    CALLS,
+    LANDING,
+    PEAK_DELTA,
+    PEAK_FORCE,
+    SAMPLED,
+    T,
+    rate_tolerance,
+    surface_tolerance,
+    tape,
+)
+from solvers.compiled.sums import combine
+from solvers.exponential.contact.crossings import FORCE, FREE, on_the_way, side_at
+from solvers.exponential.contact.peaks import state_peaks
+from solvers.exponential.energy import powers
+
+INDENTATION, ROOT, TIME = range(3)
+_MOST_TRIES = 8  # to meet an output time on the way to a landing, or a bend
+_PART = 0.1  # of the embedded difference that counts as the error
+_PART_OF_FOURTH = 1e-2  # with u = δ^{1/4}: terms t² = u⁸ are exact in the step, and all of the difference
+_LAST = 0.09  # indentation, in units of the deepest, from which the last step is tried
+
+
+def reach(rtol: float) -> float:
+    """Radians of the fastest block within which DOP853 is exact to a tenth of rtol: its error is 7e-8 θ⁹."""
+    return min((0.1 * rtol / 7e-8) ** (1.0 / 9.0), 1.5)
+
+
+@inlined
+def _force(problem, tables, s, delta, delta_dot, side, entry_rate, batch):
+    """Force of stop s; a law that is cut at zero goes on beyond it on the side on which the step began."""
+    batch[0], batch[1], batch[2] = max(delta, 0.0), delta_dot, 0.0
+    if tables.bend[s] != FORCE:
+        law_forces(problem, s, 1, batch[0:1], batch[1:2], entry_rate, batch[2:3])
+    elif side > 0.0:
+        call_force(tables.uncut[s], 1, batch[0:1], batch[1:2], entry_rate, tables.uncut_parameters[s], (batch[2:3],))
+    return batch[2]
+
+
+@inlined
+def _rate(problem, tables, ledger, variable, stop, span, w, piece, entry_rate, side, out, batch):
+    """Derivative of the unknowns with respect to the chosen variable, times its span; ``w`` ends in (t, u)."""
+    n, calls = problem.k.size, 0
+    size, t = 2 * n, 2 * n + 2 + 2 * problem.gap.size
+    for b in range(n):
+        out[b] = w[n + b]
+        out[n + b] = -problem.k[b] * w[b] - problem.c[b] * w[n + b]
+    for j in range(problem.table_dt.size):
+        value, load = table_value(problem, j, w[t]), problem.load[problem.table_load[j]]
+        for e in range(size):
+            out[e] += load[e] * value
+    out[size], out[size + 1] = powers(problem, tables, w[t], w) if ledger else (0.0, 0.0)
+    for s in range(problem.gap.size):
+        force, rate = 0.0, dot(problem.read_rate[s], w, size)
+        if piece[s] > 0:
+            force = _force(problem, tables, s, indentation(problem, s, w), rate, side[s], entry_rate[s], batch)
+            calls += 1
+            for e in range(size):
+                out[e] += problem.push[s, e] * force
+        out[size + 2 + 2 * s] = force * rate
+        out[size + 3 + 2 * s] = force
+    delta_dot = dot(problem.read_rate[stop], w, size)
+    factor = span
+    if variable == INDENTATION:
+        factor = span / delta_dot
+    elif variable == ROOT:
+        kappa = tables.power[1 + stop]
+        factor = span * kappa * w[t + 1] ** (kappa - 1.0) / delta_dot
+    for e in range(t):
+        out[e] *= factor
+    out[t] = factor
+    out[t + 1] = span if variable == ROOT else 0.0
+    return calls
+
+
+@inner
+def regular_step(problem, tables, ledger, variable, stop, span, w, piece, entry_rate, side, work):
+    """One DOP853 step of the chosen variable from ``w`` into ``work[15]``, its stages into ``work``; law calls."""
+    calls = 0
+    batch, trial = work[STAGES + 2], work[STAGES + 3]
+    for i in range(STAGES):
+        combine(work, A[i], i, w, trial)
+        calls += _rate(problem, tables, ledger, variable, stop, span, trial, piece, entry_rate, side, work[i], batch)
+    combine(work, A[STAGES], STAGES, w, trial)
+    return calls
+
+
+@inner
+def _error(problem, space, part, rtol):
+    """Error of the step just taken in the indentation rates, in units of each stop's tolerance; the largest.
+
+    It is a ``part`` of the embedded difference.
+    """
+    difference, worst = space.work[STAGES + 1], 0.0
+    combine(space.work, E5, STAGES, None, difference)
+    for s in range(problem.gap.size):
+        error = 0.0
+        for e in range(2 * problem.k.size):
+            error += abs(problem.read_rate[s, e] * difference[e])
+        error *= part / (rtol * space.scale[s])
+        if not error <= worst:
+            worst = error
+    return worst
+
+
+@inner
+def _goes_ahead(space, size):
+    """Whether time passes forward in every stage of the step just taken.
+
+    If it does not, the stop turns back before the border, the step passes a pole of 1/δ̇, and its embedded difference
+    tells nothing. On δ = 0, where the last stages of `ROOT` end, dt/du = 0 but for rounding.
+    """
+    ahead = True
+    for i in range(STAGES):
+        ahead &= space.work[i, size] >= -1e-9 * space.work[0, size]
+    return ahead
+
+
+@inner
+def _step(problem, tables, state, space, variable, stop, span, ledger):
+    """A step from ``space.work[17]``."""
+    state.count[CALLS] += regular_step(
+        *(problem, tables, ledger, variable, stop, span, space.work[17]),
+        *(state.piece, state.entry_rate, space.side, space.work),
+    )
+
+
+@inner
+def _length_to(problem, tables, state, space, variable, stop, span, landed, time, ledger):
+    """Length of the step whose end, in ``space.work[15]``, is at a time before the landing; inf when not found."""
+    w, x, size, tries = space.work[17], space.work[15], state.x.size, 0
+    t = w[size]
+    left = (landed - time) / (landed - t) if landed > t else 0.0
+    kappa = tables.power[1 + stop]
+    length = span * (1.0 - (left ** (1.0 / kappa) if variable == ROOT else left))
+    while True:
+        _step(problem, tables, state, space, variable, stop, length, ledger)
+        late, tries = x[size] - time, tries + 1
+        pace = 1.0 if variable == TIME else dot(problem.read_rate[stop], x, 2 * problem.k.size)  # d(variable)/dt
+        if variable == ROOT:
+            pace /= kappa * x[size + 1] ** (kappa - 1.0)
+        if not abs(late) > 1e-15 * landed or not abs(pace) < np.inf or tries == _MOST_TRIES:
+            return length if abs(late) <= 1e-6 * (landed - t) + 1e-15 * landed else np.inf
+        length -= late * pace
+
+
+@inner
+def start_landing(problem, tables, state, space, stop):
+    """The state as a landing of ``stop`` begins it, with t and δ^{1/κ}, into ``space.work[17]``."""
+    w, size, delta = space.work[17], state.x.size, max(indentation(problem, stop, state.x), 0.0)
+    copy(state.x, w, size)
+    w[size], w[size + 1] = state.now[T], delta ** (1.0 / tables.power[1 + stop])
+
+
+@inner
+def _begin_peaks(state, space):
+    """Peaks by the state a landing begins with, whose forces its first stage has found."""
+    work, size = space.work, state.x.size
+    for s in range(state.piece.size):
+        if state.piece[s] > 0:
+            column = size - 2 * state.piece.size + 2 * s + 1
+            state.open[s, PEAK_FORCE] = max(state.open[s, PEAK_FORCE], work[0, column] / work[0, size])
+
+
+@inner
+def _accept(problem, tables, state, space, variable, stop, span, t_end, out, due, ledger):
+    """Move the state to the end of the landing in ``space.work[15]``, or to that of the run; samples on the way."""
+    w, x, size = space.work[17], space.work[15], state.x.size
+    landed, t = x[size], state.now[T]
+    _begin_peaks(state, space)
+    copy(x, state.x, size)
+    while True:
+        time = min(due[state.count[SAMPLED]], t_end)
+        if time > landed:
+            break
+        length = _length_to(problem, tables, state, space, variable, stop, span, landed, time, ledger)
+        if length == np.inf:
+            copy(w, state.x, size)
+            return False
+        if time == due[state.count[SAMPLED]]:
+            copy(x, out[state.count[SAMPLED]], size)
+            state.count[SAMPLED] += 1
+        if time == t_end:
+            copy(x, state.x, size)
+            landed, span = t_end, length
+            break
+    if state.tape.shape[0]:
+        tape(state, LANDING, t, landed, span, variable, stop, w)
+    state.now[T] = landed
+    if variable == TIME or landed == t_end:
+        state_peaks(problem, state, space, state.x)
+    return True
+
+
+@inner
+def land(problem, tables, state, space, stop, direction, near, rtol, t_end, out, due, ledger):
+    """Try to land on a border of ``stop``, about ``near`` s ahead.
+
+    Returns ``stop`` if it succeeded, another stop whose border is crossed before, or -1.
+    """
+    size, t = state.x.size, state.now[T]
+    delta, furthest = indentation(problem, stop, state.x), space.reach[0] / tables.fastest
+    level = problem.levels[stop, state.piece[stop] - (1 if direction < 0 else 0)]
+    leaving = direction < 0 and state.piece[stop] == 1
+    rate = dot(problem.read_rate[stop], state.x, 2 * problem.k.size)
+    if near > furthest or abs(rate) <= rate_tolerance(problem, stop, state.x):
+        return -1
+    if leaving and delta > _LAST * state.open[stop, PEAK_DELTA]:
+        return -1
+    if not leaving and state.piece[stop] > 0 and abs(level - delta) > 0.2 * max(level, delta):
+        return -1
+    start_landing(problem, tables, state, space, stop)
+    w, x = space.work[17], space.work[15]
+    variable = ROOT if leaving and tables.power[1 + stop] > 1.0 else INDENTATION
+    span = -w[size + 1] if variable == ROOT else level - delta
+    _step(problem, tables, state, space, variable, stop, span, ledger)
+    landed, part = x[size], _PART_OF_FOURTH if variable == ROOT and tables.power[1 + stop] == 4.0 else _PART
+    width = surface_tolerance(problem, stop, state.x) / abs(rate)  # a distance may be that much rounding
+    if not t <= landed <= t + min(4.0 * near, furthest) + width:
+        return -1
+    if not (
+        _goes_ahead(space, size)
+        and _error(problem, space, part, rtol) <= 1.0
+        and direction * dot(problem.read_rate[stop], x, 2 * problem.k.size) >= 0.0  # it has not turned back
+    ):
+        return -1
+    other = on_the_way(problem, tables, state, space, stop, False, w, x)
+    if other != FREE:
+        return max(other, -1)
+    done = _accept(problem, tables, state, space, variable, stop, span, t_end, out, due, ledger)
+    return stop if done else -1
+
+
+@inner
+def land_on_bend(problem, tables, state, space, stop, near, rtol, t_end, out, due, ledger):
+    """Try to land on the bend of ``stop`` about ``near`` s ahead; whether it succeeded."""
+    furthest, largest = space.reach[0] / tables.fastest, space.sides[space.sides.size - 1]
+    if not 0.0 < near <= furthest:
+        return False
+    start_landing(problem, tables, state, space, stop)
+    w, x, batch = space.work[17], space.work[15], space.trial
+    before, apart, span = 0.0, side_at(problem, tables, state, stop, w, batch), near
+    for _ in range(_MOST_TRIES):
+        _step(problem, tables, state, space, TIME, stop, span, ledger)
+        value = side_at(problem, tables, state, stop, x, batch)
+        if abs(value) <= 1e-10 * largest:
+            break
+        following = span - value * (span - before) / (value - apart)
+        if not 0.0 < following <= furthest or following == span:
+            return False
+        before, apart, span = span, value, following
+    if not (abs(value) <= 1e-6 * largest and _error(problem, space, _PART, rtol) <= 1.0):
+        return False
+    if on_the_way(problem, tables, state, space, stop, True, w, x) != FREE:
+        return False
+    lower, upper = problem.levels[stop, state.piece[stop] - 1], problem.levels[stop, state.piece[stop]]
+    if not lower < indentation(problem, stop, x) < upper:
+        return False
+    return _accept(problem, tables, state, space, TIME, stop, span, t_end, out, due, ledger)

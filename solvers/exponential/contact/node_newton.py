@@ -1,0 +1,118 @@
+"""Newton's method for the forces of a contact step, where a stiff or strongly damped law defeats iteration."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solvers.compiled.kernels import contact_gradient, copy, inlined, inner
+from solvers.compiled.state import CALLS, rate_tolerance
+from solvers.exponential.contact.node_response import node_forces, respond
+from solvers.exponential.contact.nodes import S
+
+MOST_ITERATIONS = 16
+
+
+@inner
+def linearise(problem, tables, state, space, family, level):
+    """J = 1 - ∂law/∂(δ, δ̇) ∂(δ, δ̇)/∂F of all nodes of all stops in contact, row by row; returns its size."""
+    stops, row = problem.gap.size, 0
+    for s in range(stops):
+        if state.piece[s] == 0:
+            continue
+        copy(space.motion[s, 0], space.clipped, S)
+        contact_gradient(
+            *(problem, s, space.clipped, space.motion[s, 1], state.entry_rate[s]),
+            *(space.slope[s, 0], space.slope[s, 1], space.slope[s, 2]),
+        )
+        state.count[CALLS] += S
+        for i in range(S):
+            column = 0
+            for u in range(stops):
+                if state.piece[u] == 0:
+                    continue
+                matrix = tables.forced[family, level, s, u]
+                for j in range(S):
+                    value = space.slope[s, 0, i] * matrix[j, i] + space.slope[s, 1, i] * matrix[j, S + i]
+                    space.jacobian[row + i, column + j] = (1.0 if s == u and i == j else 0.0) - value
+                column += S
+        row += S
+    return row
+
+
+@inner
+def factorise(matrix, pivots, n):
+    """LU factors with partial pivoting, in place (Golub, Van Loan, Matrix Computations, Section 3.4)."""
+    for k in range(n):
+        best = k
+        for i in range(k + 1, n):
+            if abs(matrix[i, k]) > abs(matrix[best, k]):
+                best = i
+        pivots[k] = best
+        for j in range(n):
+            matrix[k, j], matrix[best, j] = matrix[best, j], matrix[k, j]
+        for i in range(k + 1, n):
+            matrix[i, k] /= matrix[k, k]
+            for j in range(k + 1, n):
+                matrix[i, j] -= matrix[i, k] * matrix[k, j]
+
+
+@inner
+def substitute(matrix, pivots, n, x):
+    """Solve with the factors, in place."""
+    for k in range(n):
+        best = pivots[k]
+        x[k], x[best] = x[best], x[k]
+    for i in range(n):
+        for j in range(i):
+            x[i] -= matrix[i, j] * x[j]
+    for i in range(n - 1, -1, -1):
+        for j in range(i + 1, n):
+            x[i] -= matrix[i, j] * x[j]
+        x[i] /= matrix[i, i]
+
+
+@inlined
+def _note_viscosity(state, space):
+    """Largest slopes of the forces by their rates, into ``space.viscous``."""
+    for s in range(state.piece.size):
+        if state.piece[s] > 0:
+            space.viscous[s] = 0.0
+            for i in range(S):
+                space.viscous[s] = max(space.viscous[s], abs(space.slope[s, 1, i]))
+
+
+@inner
+def newton(problem, tables, state, space, family, level):
+    """Newton's method for the forces, where a stiff or strongly damped law defeats the plain iteration."""
+    stops = problem.gap.size
+    for _ in range(MOST_ITERATIONS):
+        row = 0
+        for s in range(stops):
+            if state.piece[s] == 0:
+                continue
+            respond(problem, tables, state, space, family, level, s)
+            node_forces(problem, state, space, s)
+            for i in range(S):
+                space.residual[row + i] = space.trial[i] - space.force[s, i]
+            row += S
+        n = linearise(problem, tables, state, space, family, level)
+        factorise(space.jacobian, space.pivots, n)
+        substitute(space.jacobian, space.pivots, n, space.residual)
+        found, row = True, 0
+        _note_viscosity(state, space)
+        for s in range(stops):
+            if state.piece[s] == 0:
+                continue
+            change, largest = 0.0, 0.0
+            for i in range(S):
+                space.force[s, i] += space.residual[row + i]
+                change += abs(space.residual[row + i])
+                largest = max(largest, abs(space.force[s, i]))
+            if not change < np.inf:
+                return False
+            noise = max(3e-14 * largest, 0.1 * space.viscous[s] * rate_tolerance(problem, s, state.x))
+            found &= change <= max(space.accuracy[s], noise)
+            row += S
+        if found:
+            return True
+    return False

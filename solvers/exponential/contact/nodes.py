@@ -1,0 +1,212 @@
+"""Kinds of contact steps: their nodes, the weights of their forces, what is told from node values.
+
+A force is known by its values F_j at S nodes σ_j of (0, 1), t = h σ^κ:
+
+    F(t) = w(σ) Σ_j L_j(σ) F_j / w(σ_j),
+
+*smooth*: κ = 1, w = 1, Gauss–Legendre nodes; *entry*: w = σ^λ, Gauss–Jacobi nodes for the weight σ^{λ+κ-1}. A force
+whose terms begin like δ^p, p one of some powers, is at t = 0 a series in t^{1/κ} if all κp are whole numbers, and
+begins with t^{λ/κ}, λ/κ the smallest p: κ = 2, λ = 3 for Hertz's law, κ = 4, λ = 1 for that of Tsuji.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from solvers.compiled.kernels import kernel
+
+S = 8  # nodes of a contact step: 6 is a little faster at 1e-6, 10 and 12 bring nothing
+_CHECKED = (np.arange(24) + 0.5) / 24  # places between the nodes where their interpolant is compared
+_NODES_FIRST = [*range(S), *range(S + 1, 2 * S + 1), S, 2 * S + 1]
+PHASES = np.geomspace(1e-2, 1e4, 600)  # ω h
+LOCAL = -np.cos(np.pi * np.arange(S) / (S - 1))  # points of an interval, its ends among them, where a summit is sought
+MONOMIALS = np.ascontiguousarray(np.linalg.inv(np.vander(LOCAL, increasing=True)).T)
+
+
+@kernel
+def lagrange(nodes, weights, sigma, out):
+    """Lagrange polynomials of the nodes at σ, each times its weight × Π (σ_j - σ_i)."""
+    for j in range(nodes.size):
+        value = weights[j]
+        for i in range(nodes.size):
+            if i != j:
+                value *= sigma - nodes[i]
+        out[j] = value
+
+
+@lru_cache(maxsize=8)
+def gauss(count: int) -> Any:
+    """Gauss–Legendre points and weights on (0, 1): (2, count)."""
+    x, w = np.polynomial.legendre.leggauss(count)
+    return np.array([0.5 * (1.0 + x), 0.5 * w])
+
+
+class _Family(NamedTuple):
+    """Nodes of a kind of contact step, t = h σ^power, F = σ^lead × polynomial."""
+
+    power: float
+    lead: float
+    nodes: Any
+    weights: Any
+    spectrum: Any
+
+
+def _family(power: float, lead: float) -> _Family:
+    """Gauss–Jacobi nodes on (0, 1) for the weight of ∫F dt, and the coefficients they give."""
+    from scipy.special import eval_jacobi, roots_jacobi
+
+    beta = lead + power - 1.0
+    x, w = roots_jacobi(S, 0.0, beta)
+    sigma = 0.5 * (1.0 + x)
+    measure = power * w / 2.0 ** (beta + 1.0)
+    polynomials = np.array([eval_jacobi(k, 0.0, beta, x) for k in range(S)])
+    norm = (polynomials**2 * w).sum(axis=1)
+    scale = sigma ** (-lead)
+    return _Family(power, lead, sigma, measure * scale, polynomials * w * scale / norm[:, None])
+
+
+class Families(NamedTuple):
+    """All kinds of contact steps of a problem: the smooth one, then one per stop to enter it."""
+
+    power: Any  # (f,)
+    lead: Any
+    nodes: Any  # (f, S), as the rest in `Tables`
+    times: Any
+    weights: Any
+    plain: Any
+    summary: Any
+    tail: Any
+    zoom: Any
+    places: Any
+    extend: Any
+    lagrange: Any  # (f, 2, S) weights of the Lagrange polynomials, plain and divided by the force's weight
+    alias: Any  # (f, P) largest error between the nodes of the interpolant of e^{iωt}, at `PHASES`
+
+
+def series_of(law: Any) -> tuple[float, float]:
+    """(κ, λ) of a law's force at entry; see the module."""
+    powers = getattr(law, "powers", None) or ((0.0, law.exponent) if law.jump else (law.exponent,))
+    for power in (1.0, 2.0, 4.0):
+        if all(abs(power * p - round(power * p)) < 1e-9 for p in powers):
+            return power, power * min(powers) if power > 1.0 else 0.0
+    return 2.0, 2.0 * min(powers)
+
+
+@lru_cache(maxsize=64)
+def families_of(series: tuple[tuple[float, float], ...]) -> Families:
+    """Kinds of steps for the stops' (κ, λ)."""
+    found = [_family(*kind) for kind in ((1.0, 0.0), *series)]
+    return Families(
+        power=np.array([f.power for f in found]),
+        lead=np.array([f.lead for f in found]),
+        nodes=np.array([f.nodes for f in found]),
+        times=np.array([f.nodes**f.power for f in found]),
+        weights=np.array([f.weights for f in found]),
+        plain=np.array([_plain_weights(f) for f in found]),
+        summary=np.ascontiguousarray([_summary(f) for f in found]),
+        tail=np.ascontiguousarray([_tail(f.nodes) for f in found]),
+        zoom=np.ascontiguousarray([[_zoom(f, *bracket) for bracket in _brackets(f)] for f in found]),
+        places=np.array([_brackets(f) for f in found]),
+        extend=np.ascontiguousarray([_extensions(f, found[0]) for f in found]),
+        lagrange=np.array([_weights(f.nodes) * [np.ones(S), f.nodes ** (-f.lead)] for f in found]),
+        alias=np.array([_alias(f) for f in found]),
+    )
+
+
+def _summary(family: _Family) -> Any:
+    """(S, 8): last four coefficients, values and slopes dF/dσ at start and end, from node values."""
+    rows = np.zeros((8, S))
+    rows[:4] = family.spectrum[-4:]
+    rows[4:6] = _interpolation(family.nodes, np.array([0.0, 1.0]))
+    rows[6:8] = rows[4:6] @ _differentiation(family.nodes)
+    if family.lead:
+        rows[4], rows[5] = 0.0, rows[5] * family.nodes ** (-family.lead)
+    return rows.T
+
+
+def _plain_weights(family: _Family) -> Any:
+    """(S,) Σ weights × values = ∫ (polynomial through the values) dt/h, without the force's weight σ^λ."""
+    points, weights = gauss(12)
+    return (weights * family.power * points ** (family.power - 1.0)) @ _interpolation(family.nodes, points)
+
+
+def _brackets(family: _Family) -> Any:
+    """(S, 2) beginning and end of the interval between the neighbours of every node."""
+    ends = np.concatenate(([0.0], family.nodes, [1.0]))
+    return np.column_stack((ends[:-2], ends[2:]))
+
+
+def _zoom(family: _Family, begin: float, end: float) -> Any:
+    """(2S + 2, 2S): δ and h δ̇ at the points `LOCAL` of [begin, end] from those at the nodes and at the step's begin.
+
+    δ is Hermite's polynomial in σ, its rate the slope over dt/dσ. Where that vanishes, beside the begin of an entry
+    step, the rate is δ̇(0) + σ^κ × the polynomial through (δ̇ - δ̇(0))/σ^κ at the nodes.
+    """
+    x, y = np.append(family.nodes, 0.0), begin + 0.5 * (LOCAL + 1.0) * (end - begin)
+    basis, turn = _interpolation(x, y), _differentiation(x)
+    slopes, own = basis @ turn, np.diag(turn)
+    apart = y[:, None] - x
+    by_value, by_slope = (1.0 - 2.0 * own * apart) * basis**2, apart * basis**2
+    pace_x, pace_y = (family.power * place ** (family.power - 1.0) for place in (x, y))  # dt/(h dσ)
+    if begin == 0.0 and family.power > 1.0:
+        shares = _interpolation(family.nodes, y) * np.divide.outer(y, family.nodes) ** family.power
+        rates = [np.zeros_like(basis), np.column_stack((shares, 1.0 - shares.sum(axis=1)))]
+    else:
+        rates = [
+            (-2.0 * own * basis**2 + 2.0 * (1.0 - 2.0 * own * apart) * basis * slopes) / pace_y[:, None],
+            (basis**2 + 2.0 * apart * basis * slopes) * pace_x / pace_y[:, None],
+        ]
+    return np.block([[by_value, by_slope * pace_x], rates]).T[_NODES_FIRST]
+
+
+def _tail(nodes: Any) -> Any:
+    """(S, 8): last four Legendre coefficients of the polynomial through node values."""
+    out = np.zeros((S, 8))
+    out[:, :4] = np.linalg.inv(np.polynomial.legendre.legvander(2.0 * nodes - 1.0, S - 1))[-4:].T
+    return out
+
+
+def _differentiation(nodes: Any) -> Any:
+    """Slopes at the nodes of the polynomial through node values (Trefethen, Spectral Methods in MATLAB, Chapter 6)."""
+    apart, weights = nodes[:, None] - nodes + np.eye(len(nodes)), _weights(nodes)
+    out = weights / (weights[:, None] * apart)
+    np.fill_diagonal(out, 0.0)
+    np.fill_diagonal(out, -out.sum(axis=1))
+    return out
+
+
+def _alias(family: _Family) -> Any:
+    """(P,) largest error between a family's nodes of the interpolant of e^{iωt}."""
+    waves = np.exp(1j * np.outer(family.nodes**family.power, PHASES))
+    exact = np.exp(1j * np.outer(_CHECKED**family.power, PHASES))
+    return np.minimum(np.abs(_interpolation(family.nodes, _CHECKED) @ waves - exact).max(axis=0), 2.0)
+
+
+def _weights(nodes: Any) -> Any:
+    """1/Π (σ_j - σ_i) of the Lagrange polynomials."""
+    return 1.0 / (nodes[:, None] - nodes + np.eye(len(nodes))).prod(axis=1)
+
+
+def _interpolation(nodes: Any, points: Any) -> Any:
+    """Lagrange matrix (points, nodes)."""
+    out = np.empty((len(points), len(nodes)))
+    row, weights = np.empty(len(nodes)), _weights(nodes)
+    for i, x in enumerate(points):
+        lagrange(nodes, weights, float(x), row)
+        out[i] = row
+    return out
+
+
+def _extensions(family: _Family, smooth: _Family) -> Any:
+    """Extrapolation of a step's force to the nodes of the next smooth step, 2^{-(i-2)/2} times as long."""
+    out = np.empty((5, S, S))
+    for i in range(5):
+        times = 1.0 + 2.0 ** (-0.5 * (i - 2)) * smooth.nodes
+        sigma = times ** (1.0 / family.power)
+        out[i] = _interpolation(family.nodes, sigma)
+        if family.lead:
+            out[i] *= np.outer(sigma**family.lead, family.nodes ** (-family.lead))
+    return out.transpose(0, 2, 1)

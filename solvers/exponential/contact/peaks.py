@@ -1,0 +1,139 @@
+"""Largest indentation and force of a contact: maxima of what each step knows of them, not of its nodes.
+
+Around the highest node of a step, between its neighbours, δ and δ̇ at eight points follow from δ and δ̇ at all nodes and
+at the begin of the step by Hermite's polynomial of degree 17, and the forces there from the law. The maximum of the
+polynomial through these points differs from that of the motion by less than the motion does from the exact one.
+"""
+
+from __future__ import annotations
+
+from solvers.compiled.kernels import contact_forces, copy, dot, indentation, inlined, inner
+from solvers.compiled.state import PEAK_DELTA, PEAK_FORCE
+from solvers.compiled.sums import combine
+from solvers.exponential.contact.nodes import LOCAL, MONOMIALS, S
+
+_MOST = 6  # steps to a summit
+
+
+@inlined
+def _local(coefficients, x):
+    """Value, slope and half the curvature of a polynomial at x."""
+    value, slope, curvature = coefficients[S - 1], 0.0, 0.0
+    for k in range(S - 2, -1, -1):
+        curvature = curvature * x + slope
+        slope = slope * x + value
+        value = value * x + coefficients[k]
+    return value, slope, curvature
+
+
+@inlined
+def _guess(values, place):
+    """Summit of the parabola through a point of `LOCAL` and its neighbours, and the neighbours; an end stays."""
+    if place == 0 or place == S - 1:
+        return LOCAL[place], LOCAL[max(place - 1, 0)], LOCAL[min(place + 1, S - 1)]
+    low, b, high = LOCAL[place - 1], LOCAL[place], LOCAL[place + 1]
+    rise, fall = (b - low) * (values[place] - values[place + 1]), (high - b) * (values[place] - values[place - 1])
+    x = b if rise + fall == 0.0 else b - 0.5 * ((b - low) * rise - (high - b) * fall) / (rise + fall)
+    return min(max(x, low), high), low, high
+
+
+@inner
+def summit(values, limit, coefficients):
+    """Maximum on [-1, limit] of the polynomial through the values at `LOCAL`, around the highest of these.
+
+    From the summit of the parabola through that point and its neighbours Newton's method for the slope goes on; the
+    local parabola's summit is off by the third power of its last step.
+    """
+    place = 0
+    for i in range(S):
+        if values[i] > values[place] and LOCAL[i] <= limit:
+            place = i
+    combine(MONOMIALS, values, S, None, coefficients)
+    best = values[place]
+    if limit < 1.0:
+        best = max(best, _local(coefficients, limit)[0])
+    x, low, high = _guess(values, place)
+    high = min(high, limit)
+    x = min(x, high)
+    for _ in range(_MOST):
+        value, slope, curvature = _local(coefficients, x)
+        best = max(best, value)
+        if not curvature < 0.0:
+            break
+        step = -0.5 * slope / curvature
+        if abs(step) < 1e-5:
+            return max(best, value + 0.5 * slope * step)
+        x = min(max(x + step, low), high)
+    return best
+
+
+@inlined
+def _highest(tables, values, family, limit):
+    """Place of the largest node value up to σ = limit, or -1."""
+    place = -1
+    for i in range(S):
+        if tables.nodes[family, i] <= limit and (place < 0 or values[i] > values[place]):
+            place = i
+    return place
+
+
+@inner
+def _motion_around(problem, tables, state, space, family, h, s, place):
+    """Indentations and rates of stop s around a node of the step that begins at the state, into ``space.around``."""
+    around, motion, known = space.around, space.motion[s], space.around[3]
+    copy(motion[0], known, S)
+    for i in range(S):
+        known[S + i] = h * motion[1, i]
+    known[2 * S] = indentation(problem, s, state.x)
+    known[2 * S + 1] = h * dot(problem.read_rate[s], state.x, 2 * problem.k.size)
+    combine(tables.zoom[family, place], known, 2 * S + 2, None, around[0])
+    for i in range(S):
+        around[1, i] = around[0, S + i] / h
+
+
+@inner
+def deepest(problem, tables, state, space, family, h, s):
+    """Largest indentation of stop s around its highest node of a step."""
+    place = _highest(tables, space.motion[s, 0], family, 1.0)
+    _motion_around(problem, tables, state, space, family, h, s, place)
+    return summit(space.around[0], 1.0, space.trial)
+
+
+@inner
+def step_peaks(problem, tables, state, space, family, h, s, limit):
+    """Raise the peaks of stop s by a converged step of length h, up to σ = limit, from ``state.x`` on."""
+    combine(tables.summary[family], space.motion[s, 0], S, None, space.summary[s, 1])
+    seen = -1
+    for column, values, d in ((PEAK_FORCE, space.force[s], 0), (PEAK_DELTA, space.motion[s, 0], 1)):
+        known, slopes = state.open[s, column], space.summary[s, d]
+        place = _highest(tables, values, family, limit)
+        if place >= 0:
+            state.open[s, column] = max(known, values[place])
+        if limit >= 1.0:
+            if values[place] < 0.95 * known or (place == S - 1 and slopes[7] >= 0.0):
+                continue  # lower, or still rising at the end, where the next step begins
+            if family == 0 and place == 0 and slopes[6] <= 0.0 and known >= slopes[4]:
+                continue  # falling from its begin
+        place = max(place, 0)
+        if seen != place:
+            _motion_around(problem, tables, state, space, family, h, s, place)
+            around, seen = space.around, place
+            contact_forces(problem, s, around[0, :S], around[1, :S], state.entry_rate[s], around[2, :S])
+        begin, end = tables.places[family, place]
+        within = min(2.0 * (limit - begin) / (end - begin) - 1.0, 1.0)
+        if within > -1.0:
+            best = summit(space.around[2] if d == 0 else space.around[0], within, space.trial)
+            state.open[s, column] = max(state.open[s, column], best)
+
+
+@inner
+def state_peaks(problem, state, space, x):
+    """Raise the peaks of all stops in contact by their indentations and forces in the state x."""
+    batch = space.trial
+    for s in range(problem.gap.size):
+        if state.piece[s] > 0:
+            batch[0] = indentation(problem, s, x)
+            batch[1] = dot(problem.read_rate[s], x, 2 * problem.k.size)
+            state.open[s, PEAK_DELTA] = max(state.open[s, PEAK_DELTA], batch[0])
+            contact_forces(problem, s, batch[0:1], batch[1:2], state.entry_rate[s], batch[2:3])
+            state.open[s, PEAK_FORCE] = max(state.open[s, PEAK_FORCE], batch[2])

@@ -1,0 +1,199 @@
+"""Exact flight: propagators of the blocks, polynomial signals, Taylor steps.
+
+A flight step multiplies every block by its tabulated propagator α I + β A and adds the response to the quintics
+of the sampled signals; what is shorter than the shortest table entry is a Taylor step of order 6, exact to rounding.
+"""
+
+from __future__ import annotations
+
+import math
+
+from solvers.compiled.kernels import copy, inlined, inner
+from solvers.compiled.simd import WIDTH, bits, eight, put, root, spread, total
+from solvers.compiled.sums import combine
+
+ORDER = 6
+_CURVED = int(0.345 * 2**50)  # by which a logarithm that is linear between powers of two can be wrong, times four
+_LONG = 14  # terms of a series that is exact to rounding up to |λ| x = LONG_REACH: 0.6^14/14! = 9e-15
+LONG_REACH = 0.6
+
+
+@inlined
+def level_within(tables, span):
+    """Index of the longest tabulated step not above ``span``, which is at least the shortest one."""
+    level = ((bits(tables.h[0]) - bits(span) - _CURVED) >> 50) + 1  # never too high: 2^50 are a quarter octave
+    level = min(max(level, 0), tables.h.size - 1)
+    while tables.h[level] > span and level < tables.h.size - 1:
+        level += 1
+    return level
+
+
+@inner
+def cell_of(problem, t):
+    """(cell, offset) of the sampled signals' common grid."""
+    dt = problem.table_dt[0]
+    last = problem.table_start[1] - problem.table_start[0] - 2
+    cell = min(max(int(t / dt + 1e-9), 0), last)
+    return cell, t - cell * dt
+
+
+@inlined
+def _quintic(problem, j, cell):
+    """Coefficients of node table j on a cell, in powers of the part of the cell."""
+    dt = problem.table_dt[j]
+    row = problem.table_start[j] + cell
+    a, b = problem.table[row], problem.table[row + 1]
+    s1, s2 = a[1] * dt, 0.5 * a[2] * dt * dt
+    e0 = b[0] - a[0] - s1 - s2
+    e1 = b[1] * dt - s1 - 2.0 * s2
+    e2 = 0.5 * b[2] * dt * dt - s2
+    return a[0], s1, s2, 10.0 * e0 - 4.0 * e1 + e2, -15.0 * e0 + 7.0 * e1 - 2.0 * e2, 6.0 * e0 - 3.0 * e1 + e2
+
+
+@inner
+def signal_derivatives(problem, j, t, out):
+    """s, s', ..., s⁽⁵⁾ of node table j at time t."""
+    dt = problem.table_dt[j]
+    cell, offset = cell_of(problem, t)
+    s0, s1, s2, c3, c4, c5 = _quintic(problem, j, cell)
+    x, r = offset / dt, 1.0 / dt
+    out[0] = s0 + x * (s1 + x * (s2 + x * (c3 + x * (c4 + x * c5))))
+    out[1] = r * (s1 + x * (2.0 * s2 + x * (3.0 * c3 + x * (4.0 * c4 + x * 5.0 * c5))))
+    r *= 1.0 / dt
+    out[2] = r * (2.0 * s2 + x * (6.0 * c3 + x * (12.0 * c4 + x * 20.0 * c5)))
+    r *= 1.0 / dt
+    out[3] = r * (6.0 * c3 + x * (24.0 * c4 + x * 60.0 * c5))
+    r *= 1.0 / dt
+    out[4] = r * (24.0 * c4 + x * 120.0 * c5)
+    out[5] = r / dt * 120.0 * c5
+
+
+@inlined
+def turn(problem, alpha, beta, x):
+    """Multiply every block by its propagator α I + β A."""
+    n = problem.k.size
+    for b in range(n):
+        p, v = x[b], x[n + b]
+        x[b] = alpha[b] * p + beta[b] * v
+        x[n + b] = alpha[b] * v - beta[b] * (problem.k[b] * p + problem.c[b] * v)
+
+
+@inner
+def add_signals(problem, response, x, t, six):
+    """Add the response to the polynomial signals of the step that began at t."""
+    size = 2 * problem.k.size
+    for j in range(problem.table_dt.size):
+        signal_derivatives(problem, j, t, six[j])
+        rows = response[problem.table_load[j]]
+        for i in range(6):
+            for e in range(size):
+                x[e] += six[j, i] * rows[i, e]
+
+
+@inner
+def go_through(problem, tables, x, cell):
+    """Move the state through a whole cell of the sampled signals."""
+    size = 2 * problem.k.size
+    turn(problem, tables.cell[0], tables.cell[1], x)
+    for j in range(problem.table_dt.size):
+        r = 1.0 / problem.table_dt[j]
+        s0, s1, s2, c3, c4, c5 = _quintic(problem, j, cell)
+        s1, s2, c3, c4, c5 = r * s1, 2.0 * r**2 * s2, 6.0 * r**3 * c3, 24.0 * r**4 * c4, 120.0 * r**5 * c5
+        rows = tables.cell_signal[problem.table_load[j]]
+        for e in range(size):
+            x[e] += (
+                s0 * rows[0, e]
+                + s1 * rows[1, e]
+                + s2 * rows[2, e]
+                + c3 * rows[3, e]
+                + c4 * rows[4, e]
+                + c5 * rows[5, e]
+            )
+
+
+@inner
+def taylor(problem, x, t, terms, six):
+    """Rows y, y', ..., y⁽⁶⁾ at time t in flight: y⁽ⁱ⁺¹⁾ = A y⁽ⁱ⁾ + load s⁽ⁱ⁾."""
+    n = problem.k.size
+    for e in range(2 * n):
+        terms[0, e] = x[e]
+    for j in range(problem.table_dt.size):
+        signal_derivatives(problem, j, t, six[j])
+    for i in range(ORDER):
+        for b in range(n):
+            terms[i + 1, b] = terms[i, n + b]
+            terms[i + 1, n + b] = -problem.k[b] * terms[i, b] - problem.c[b] * terms[i, n + b]
+        for j in range(problem.table_dt.size):
+            load = problem.load[problem.table_load[j]]
+            for e in range(2 * n):
+                terms[i + 1, e] += six[j, i] * load[e]
+
+
+@inner
+def add_taylor(terms, x, span, size, weights, sums):
+    """Taylor step of the given duration; the last two arguments are working space."""
+    weights[0] = 1.0
+    for i in range(ORDER):
+        weights[i + 1] = weights[i] * span / (i + 1.0)
+    combine(terms, weights, ORDER + 1, None, sums)
+    copy(sums, x, size)
+
+
+@inner
+def go_on(problem, x, t, span, term, six):
+    """Move the state x of a flight by ``span`` <= LONG_REACH/|λ|max within a cell: the series, y⁽ⁱ⁺¹⁾ from y⁽ⁱ⁾."""
+    n, weight = problem.k.size, 1.0
+    copy(x, term, 2 * n)
+    for j in range(problem.table_dt.size):
+        signal_derivatives(problem, j, t, six[j])
+    for i in range(_LONG - 1):
+        for b in range(n):
+            p, v = term[b], term[n + b]
+            term[b], term[n + b] = v, -problem.k[b] * p - problem.c[b] * v
+        if i < six.shape[1]:
+            for j in range(problem.table_dt.size):
+                load = problem.load[problem.table_load[j]]
+                for e in range(2 * n):
+                    term[e] += six[j, i] * load[e]
+        weight *= span / (i + 1.0)
+        for e in range(2 * n):
+            x[e] += weight * term[e]
+
+
+@inlined
+def turn_apart(tables, level, x):
+    """A tabulated step of the blocks' p and v, eight blocks at once."""
+    alpha, beta = tables.propagator[level, 0], tables.propagator[level, 1]
+    for i in range(0, x.shape[1], WIDTH):
+        p, v, a, b = eight(x[0], i), eight(x[1], i), eight(alpha, i), eight(beta, i)
+        put(x[0], i, a * p + b * v)
+        put(x[1], i, a * v - b * (eight(tables.apart[0], i) * p + eight(tables.apart[1], i) * v))
+
+
+@inlined
+def look(tables, s, x):
+    """δ + gap and δ̇ of a stop from the blocks' p and v."""
+    rows, delta, rate = tables.look[s], spread(0.0), spread(0.0)
+    for i in range(0, x.shape[1], WIDTH):
+        p, v = eight(x[0], i), eight(x[1], i)
+        delta += eight(rows[0], i) * p + eight(rows[1], i) * v
+        rate += eight(rows[2], i) * p + eight(rows[3], i) * v
+    return total(delta), total(rate)
+
+
+@inlined
+def bound_apart(tables, s, x):
+    """M: bound of |δ̈| of a stop from now on, without signals, from the blocks' p and v."""
+    bound = spread(0.0)
+    for i in range(0, x.shape[1], WIDTH):
+        p, v = eight(x[0], i), eight(x[1], i)
+        bound += eight(tables.weight[s], i) * root(v * v + eight(tables.apart[0], i) * p * p)
+    return total(bound)
+
+
+@inlined
+def energy_norms(problem, x, out):
+    """ε_b = √(v² + k p²) of every block."""
+    n = problem.k.size
+    for b in range(n):
+        out[b] = math.sqrt(x[n + b] * x[n + b] + problem.k[b] * x[b] * x[b])

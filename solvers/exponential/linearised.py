@@ -1,0 +1,440 @@
+"""Derivative of a run of `method`, carried over what its tape tells.
+
+Every accepted contact step is linearised as it was taken. With Y the derivative of the state at fixed time,
+
+    flight   Y ← E(t) Y                                            (exact)
+    entry    dt* = -dδ/δ̇,  d(entry rate) = dδ̇ + δ̈ dt*              (latched until the exit)
+    jump     Y ← Y - b ΔF dt*                                      (saltation: the law's force jumps by ΔF)
+    step     (1 - D C) dF = D (free response of Y) + ∂F/∂(entry rate) d(entry rate),   Y ← E(h) Y + kick dF
+    landing  the variational equation, on the stages of the Runge–Kutta step
+
+The first step of a power law with a broken exponent knows the force as t^p times a smooth function of √t, where t
+counts from the entry. Its derivative at fixed time is singular there, so that step is linearised in a frame which moves
+with the entry, Y + f dt*, f the state's rate, and brought back at its end.
+
+A parameter adds a column. Where it changes only loads' tones, gaps and laws, Y_p = W + P(t) with P the derivative of
+the steady response to the tones, known in closed form at any time, so that W obeys the equations above with P among the
+indentations; laws contribute ∂F/∂parameter. See Leine, Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical
+Systems, 2004, Chapter 7, for saltation.
+
+At an entry of zero rate (to rounding) the derivative does not exist; dt* is taken as zero there.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import types
+
+from solvers.compiled.dop853_tableau import STAGES, A
+from solvers.compiled.handles import opener
+from solvers.compiled.kernels import (
+    MATRIX,
+    PROBLEM,
+    REAL,
+    VECTOR,
+    call_gradient,
+    contact_forces,
+    contact_gradient,
+    copy,
+    dot,
+    entry,
+    indentation,
+    inlined,
+    inner,
+    rhs,
+)
+from solvers.compiled.state import (
+    BEGAN,
+    ENDED,
+    EVENT,
+    FIRST,
+    HEAD,
+    KIND,
+    LANDING,
+    PART,
+    SECOND,
+    SPAN,
+    STATE,
+    TAPED,
+    T,
+    begin_contacts,
+    rate_tolerance,
+)
+from solvers.compiled.sums import combine
+from solvers.exponential.contact.collocation import arrive
+from solvers.exponential.contact.crossings import FORCE, side_at
+from solvers.exponential.contact.landing import regular_step, start_landing
+from solvers.exponential.contact.node_newton import factorise, linearise, substitute
+from solvers.exponential.contact.node_response import free_response, respond
+from solvers.exponential.contact.nodes import S
+from solvers.exponential.energy import inside
+from solvers.exponential.flight import signal_derivatives, turn
+from solvers.exponential.preparation import SPACE, TABLES
+from solvers.exponential.tables import propagate
+
+_OFF = 1e-10  # relative distance from a knot at which a law is on one side of it for sure
+
+
+class Slopes(NamedTuple):
+    """Derivatives carried along and working space; columns are the first index."""
+
+    y: Any  # (columns, x.size) of the state at fixed time
+    entry: Any  # (columns, m) of the latched entry rates
+    shift: Any  # (columns, m) of the entry times
+    force: Any  # (m + L, S) of one column: forces, then signals, at the nodes of a step
+    signal: Any  # (L, S) slopes of the sampled signals there
+    response: Any  # (m, 2, S) of δ and δ̇ to these slopes
+    by_parameter: Any  # (m, S) ∂F/∂parameter there
+    rate: Any  # (2, x.size) of the state at both ends of a step; at last the first is that at the time reached
+    stages: Any  # (STAGES, columns, x.size) of a landing
+    trial: Any  # (columns, x.size)
+    batch: Any  # (8,)
+
+
+class Nudge(NamedTuple):
+    """What a parameter changes per unit, besides the state; none when ``step`` is zero."""
+
+    step: float  # half the distance of the two systems it was taken from
+    law_step: float  # the same; zero where their laws are the same
+    omega: Any  # (K,) tones
+    steady: Any  # (K, m, 2, 4): (Re a, Im a, Re b, Im b) of δ and δ̇ = Re (a + t b) e^{iωt}
+    gap: Any  # (m,)
+
+
+_CUBE = types.Array(REAL, 3, "C")
+SLOPES = types.NamedTuple([*[MATRIX] * 5, _CUBE, MATRIX, MATRIX, _CUBE, MATRIX, VECTOR], Slopes)
+NUDGE = types.NamedTuple([REAL, REAL, VECTOR, types.Array(REAL, 4, "C"), VECTOR], Nudge)
+_problem, _tables, _state, _space = opener(PROBLEM), opener(TABLES), opener(STATE), opener(SPACE)
+_slopes, _nudge = opener(SLOPES), opener(NUDGE)
+
+
+@inlined
+def _explicit(nudge, s, d, t):
+    """Change of δ (d = 0) or δ̇ that the parameter makes by itself at time t."""
+    total = -nudge.gap[s] if d == 0 else 0.0
+    for j in range(nudge.omega.size):
+        a = nudge.steady[j, s, d]
+        angle = nudge.omega[j] * t
+        total += (a[0] + t * a[2]) * np.cos(angle) - (a[1] + t * a[3]) * np.sin(angle)
+    return total
+
+
+@inlined
+def _change(problem, nudge, slopes, column, s, d, t):
+    """Change of δ or δ̇ of a stop at fixed time."""
+    row = problem.read[s] if d == 0 else problem.read_rate[s]
+    value = dot(row, slopes.y[column], 2 * problem.k.size)
+    return value + _explicit(nudge, s, d, t) if _is_parameter(nudge, slopes, column) else value
+
+
+@inlined
+def _is_parameter(nudge, slopes, column):
+    """Whether a column is the parameter's."""
+    return nudge.step > 0.0 and column == slopes.y.shape[0] - 1
+
+
+@inner
+def _coast(problem, duration, y):
+    """Flight."""
+    n = problem.k.size
+    for b in range(n):
+        alpha, beta = propagate(problem.k[b], problem.c[b], duration)
+        for c in range(y.shape[0]):
+            p, v = y[c, b], y[c, n + b]
+            y[c, b] = alpha * p + beta * v
+            y[c, n + b] = alpha * v - beta * (problem.k[b] * p + problem.c[b] * v)
+
+
+@inner
+def _force(problem, shadow, s, delta, delta_dot, batch):
+    """Force of one stop."""
+    batch[0], batch[1] = delta, delta_dot
+    contact_forces(problem, s, batch[0:1], batch[1:2], shadow.entry_rate[s], batch[2:3])
+    return batch[2]
+
+
+@inner
+def _begin(problem, shadow, slopes, nudge):
+    """Put the stops on their pieces as the run does at its start, and latch the derivative of their rates."""
+    begin_contacts(problem, shadow)
+    for s in range(problem.gap.size):
+        if shadow.piece[s] > 0:
+            rate = dot(problem.read_rate[s], shadow.x, 2 * problem.k.size)
+            for c in range(slopes.y.shape[0]):
+                change = _change(problem, nudge, slopes, c, s, 1, 0.0)
+                slopes.entry[c, s] = 0.0 if abs(rate) < problem.floor[s] else np.sign(rate) * change
+
+
+@inner
+def _cross(problem, shadow, slopes, nudge, s, direction):
+    """A stop passes a border of its piece."""
+    size, t = 2 * problem.k.size, shadow.now[T]
+    rate = dot(problem.read_rate[s], shadow.x, size)
+    piece = shadow.piece[s]
+    entering = piece == 0
+    border = piece if direction > 0 else piece - 1
+    rhs(problem, t, shadow.x, shadow.piece, shadow.entry_rate, slopes.rate[0], slopes.batch)
+    acceleration = dot(problem.read_rate[s], slopes.rate[0], size)
+    still = rate_tolerance(problem, s, shadow.x)
+    if entering:
+        shadow.entry_rate[s] = max(abs(rate), problem.floor[s])
+    below, above = problem.levels[s, border] * (1.0 - _OFF), problem.levels[s, border] * (1.0 + _OFF) + 1e-300
+    jump = _force(problem, shadow, s, above, rate, slopes.batch)
+    if border > 0:
+        jump -= _force(problem, shadow, s, below, rate, slopes.batch)
+    jump *= direction
+    for c in range(slopes.y.shape[0]):
+        moved = _change(problem, nudge, slopes, c, s, 0, t)
+        shift = -moved / rate if abs(rate) > still else 0.0
+        if entering:
+            floored = abs(rate) < problem.floor[s]
+            change = _change(problem, nudge, slopes, c, s, 1, t) + acceleration * shift
+            slopes.shift[c, s] = shift
+            slopes.entry[c, s] = 0.0 if floored else change
+        for e in range(size):
+            slopes.y[c, e] -= problem.push[s, e] * jump * shift
+    shadow.piece[s] += direction
+
+
+@inlined
+def _by_parameter(ahead, behind, shadow, space, nudge, slopes, s):
+    """∂F/∂parameter at the nodes of a stop, from the law at both parameters."""
+    for i in range(S):
+        slopes.by_parameter[s, i] = 0.0
+    if nudge.law_step == 0.0:
+        return
+    delta, rate = space.motion[s, 0], space.motion[s, 1]
+    copy(delta, space.clipped, S)
+    contact_forces(ahead, s, space.clipped, rate, shadow.entry_rate[s], slopes.by_parameter[s])
+    contact_forces(behind, s, space.clipped, rate, shadow.entry_rate[s], space.trial)
+    for i in range(S):
+        slopes.by_parameter[s, i] = (slopes.by_parameter[s, i] - space.trial[i]) / (2.0 * nudge.law_step)
+
+
+@inlined
+def _signal_slopes(problem, tables, space, slopes, family, level, t):
+    """Slopes of the sampled signals at the nodes, and the response to them."""
+    stops, h = problem.gap.size, tables.step[level]
+    for j in range(problem.table_dt.size):
+        for i in range(S):
+            signal_derivatives(problem, j, t + h * tables.times[family, i], space.six[j])
+            slopes.signal[problem.table_load[j], i] = space.six[j, 1]
+    for s in range(stops):
+        response = slopes.response[s]
+        for i in range(S):
+            response[0, i], response[1, i] = 0.0, 0.0
+        for load in problem.table_load:
+            combine(tables.forced[family, level, s, stops + load], slopes.signal[load], S, response, response)
+
+
+@inlined
+def _solve(problem, tables, shadow, space, slopes, nudge, family, level, column, shift):
+    """Changes of all forces (and, in a moving frame, signals) at the nodes, one column."""
+    row, size, stops = 0, 2 * problem.k.size, problem.gap.size
+    for s in range(stops):
+        if shadow.piece[s] == 0:
+            continue
+        combine(tables.free[family, level, s], slopes.y[column], size, None, space.motion[s])
+        for i in range(S):
+            change = slopes.entry[column, s] * space.slope[s, 2, i]
+            if _is_parameter(nudge, slopes, column):
+                change += slopes.by_parameter[s, i]
+            for d in range(2):
+                value = space.motion[s, d, i]
+                if shift != 0.0:
+                    value += shift * slopes.response[s, d, i]
+                if _is_parameter(nudge, slopes, column):
+                    value += _explicit(nudge, s, d, shadow.now[T] + tables.step[level] * tables.times[family, i])
+                change += space.slope[s, d, i] * value
+            space.residual[row + i] = change
+        row += S
+    substitute(space.jacobian, space.pivots, row, space.residual)
+    row = 0
+    for s in range(stops):
+        if shadow.piece[s] > 0:
+            copy(space.residual[row : row + S], slopes.force[s], S)
+            row += S
+    for load in problem.table_load:
+        for i in range(S):
+            slopes.force[stops + load, i] = shift * slopes.signal[load, i]
+
+
+@inlined
+def _move(problem, tables, shadow, space, slopes, family, level, y, part):
+    """Take one column to the end of the step, or to the ``part`` of it that lies within the run."""
+    size, stops = 2 * problem.k.size, problem.gap.size
+    if part < np.inf:
+        for u in range(space.force.shape[0]):
+            copy(slopes.force[u], space.force[u], S)
+        inside(problem, tables, shadow, space, family, tables.step[level], part, y)
+        return
+    turn(problem, tables.step_propagator[level, 0], tables.step_propagator[level, 1], y)
+    for u in range(space.force.shape[0]):
+        if u < stops and shadow.piece[u] == 0:
+            continue
+        for j in range(S):
+            kick = tables.kick[family, level, u, j]
+            for e in range(size):
+                y[e] += kick[e] * slopes.force[u, j]
+
+
+@inner
+def _step(problem, ahead, behind, tables, shadow, space, slopes, nudge, row, modes):
+    """A collocated step, linearised as it was taken."""
+    family, level, t = int(row[FIRST]), int(row[SECOND]), row[BEGAN]
+    size, stops = 2 * problem.k.size, problem.gap.size
+    free_response(problem, tables, shadow, space, family, level)
+    for s in range(stops):
+        copy(row[HEAD + shadow.x.size + s * S : HEAD + shadow.x.size + (s + 1) * S], space.force[s], S)
+    for s in range(stops):
+        if shadow.piece[s] > 0:
+            respond(problem, tables, shadow, space, family, level, s)
+            _by_parameter(ahead, behind, shadow, space, nudge, slopes, s)
+    factorise(space.jacobian, space.pivots, linearise(problem, tables, shadow, space, family, level))
+    moving = tables.power[family] > 1.0
+    part = row[SPAN] if row[KIND] == PART else np.inf
+    if moving:
+        rhs(problem, t, shadow.x, shadow.piece, shadow.entry_rate, slopes.rate[0], slopes.batch)
+        end = space.x_new
+        if part < np.inf:
+            copy(shadow.x, end, shadow.x.size)
+            inside(problem, tables, shadow, space, family, tables.step[level], part, end)
+        else:
+            arrive(problem, tables, shadow, space, family, level)
+        rhs(problem, row[ENDED], end, shadow.piece, shadow.entry_rate, slopes.rate[1], slopes.batch)
+        _signal_slopes(problem, tables, space, slopes, family, level, t)
+    for c in range(slopes.y.shape[0]):
+        y = slopes.y[c]
+        shift = slopes.shift[c, family - 1] if moving else 0.0
+        for e in range(size if moving else 0):
+            y[e] += slopes.rate[0, e] * shift
+        _solve(problem, tables, shadow, space, slopes, nudge, family, level, c, shift)
+        _move(problem, tables, shadow, space, slopes, family, level, y, part)
+        if moving:
+            for e in range(size):
+                y[e] -= slopes.rate[1, e] * shift
+            for b in range(modes, problem.k.size):  # tones do not change; their rounding would outlive the rest
+                y[b], y[problem.k.size + b] = 0.0, 0.0
+
+
+@inner
+def _inside_piece(problem, shadow, s, x):
+    """Indentation, kept off the knots at which the slope of the law would be that of the next piece."""
+    lower, upper = problem.levels[s, shadow.piece[s] - 1], problem.levels[s, shadow.piece[s]]
+    return min(max(indentation(problem, s, x), lower * (1.0 + _OFF)), upper * (1.0 - _OFF))
+
+
+@inner
+def _note_sides(problem, tables, shadow, space):
+    """Into ``space.beyond`` whether each law that is cut at zero pushes as a landing begins."""
+    for s in range(problem.gap.size):
+        if shadow.piece[s] > 0 and tables.bend[s] == FORCE:
+            space.beyond[s] = side_at(problem, tables, shadow, s, shadow.x, space.trial)
+
+
+@inlined
+def _gradient(problem, tables, shadow, space, s, batch):
+    """Derivatives of a law at one stage of a landing, on the side of its bend on which that began."""
+    d, v, rate = batch[0:1], batch[1:2], shadow.entry_rate[s]
+    if tables.bend[s] != FORCE:
+        contact_gradient(problem, s, d, v, rate, batch[2:3], batch[3:4], batch[4:5])
+    elif space.beyond[s] > 0.0:
+        batch[0] = max(batch[0], 0.0)
+        results = batch[2:3], batch[3:4], batch[4:5]
+        call_gradient(tables.uncut_gradient[s], 1, d, v, rate, tables.uncut_parameters[s], results)
+    else:
+        batch[2], batch[3], batch[4] = 0.0, 0.0, 0.0
+
+
+@inlined
+def _stage_rates(problem, ahead, behind, tables, shadow, space, slopes, nudge, w, factor, out):
+    """Variational equation at one stage of a landing; ``w`` is the state with its time, factor dt along the step."""
+    n, size, t, batch = problem.k.size, 2 * problem.k.size, w[shadow.x.size], slopes.batch
+    for c in range(slopes.y.shape[0]):
+        y = slopes.trial[c]
+        for b in range(n):
+            out[c, b] = factor * y[n + b]
+            out[c, n + b] = factor * (-problem.k[b] * y[b] - problem.c[b] * y[n + b])
+    for s in range(problem.gap.size):
+        if shadow.piece[s] == 0:
+            continue
+        batch[0], batch[1] = _inside_piece(problem, shadow, s, w), dot(problem.read_rate[s], w, size)
+        rate = shadow.entry_rate[s]
+        _gradient(problem, tables, shadow, space, s, batch)
+        if nudge.law_step > 0.0:
+            contact_forces(ahead, s, batch[0:1], batch[1:2], rate, batch[5:6])
+            contact_forces(behind, s, batch[0:1], batch[1:2], rate, batch[6:7])
+        for c in range(slopes.y.shape[0]):
+            y = slopes.trial[c]
+            change = batch[4] * slopes.entry[c, s]
+            for d in range(2):
+                value = dot(problem.read[s] if d == 0 else problem.read_rate[s], y, size)
+                if _is_parameter(nudge, slopes, c):
+                    value += _explicit(nudge, s, d, t)
+                change += batch[2 + d] * value
+            if nudge.law_step > 0.0 and _is_parameter(nudge, slopes, c):
+                change += (batch[5] - batch[6]) / (2.0 * nudge.law_step)
+            for e in range(size):
+                out[c, e] += factor * problem.push[s, e] * change
+
+
+@inner
+def _land(problem, ahead, behind, tables, shadow, space, slopes, nudge, row):
+    """A landing: the variational equation on the Runge–Kutta step's own stages."""
+    variable, stop, size = int(row[FIRST]), int(row[SECOND]), 2 * problem.k.size
+    w, width, span = space.work[17], shadow.x.size, row[SPAN]
+    start_landing(problem, tables, shadow, space, stop)
+    _note_sides(problem, tables, shadow, space)
+    ledger = np.bool_(0)  # a literal would be compiled for itself
+    regular_step(
+        *(problem, tables, ledger, variable, stop, span, w, shadow.piece, shadow.entry_rate),
+        *(space.beyond, space.work),
+    )
+    trial = space.work[STAGES + 1]
+    for i in range(STAGES + 1):
+        combine(space.work, A[i], i, w, trial)
+        for c in range(slopes.y.shape[0]):
+            for e in range(size):
+                total = 0.0
+                for j in range(i):
+                    total += A[i, j] * slopes.stages[j, c, e]
+                slopes.trial[c, e] = slopes.y[c, e] + total
+        if i < STAGES:
+            factor = space.work[i, width]
+            _stage_rates(problem, ahead, behind, tables, shadow, space, slopes, nudge, trial, factor, slopes.stages[i])
+    for c in range(slopes.y.shape[0]):
+        copy(slopes.trial[c], slopes.y[c], size)
+
+
+@entry(types.void(*[types.int64] * 10, types.boolean))
+def replay(
+    problem_at, ahead_at, behind_at, tables_at, state_at, space_at, shadow_at, slopes_at, nudge_at, modes, begins
+):
+    """Carry the derivatives over what a run has taped, up to the time it has reached, and let it tape anew.
+
+    ``ahead`` and ``behind`` are the problems whose laws have the parameter's other values, ``shadow`` the state as it
+    was; blocks beyond the ``modes`` are tones.
+    """
+    problem, ahead, behind, tables = _problem(problem_at), _problem(ahead_at), _problem(behind_at), _tables(tables_at)
+    state, space, shadow = _state(state_at), _space(space_at), _state(shadow_at)
+    slopes, nudge = _slopes(slopes_at), _nudge(nudge_at)
+    if begins:
+        _begin(problem, shadow, slopes, nudge)
+    for r in range(state.count[TAPED]):
+        row = state.tape[r]
+        _coast(problem, row[BEGAN] - shadow.now[T], slopes.y)
+        shadow.now[T] = row[BEGAN]
+        copy(row[HEAD:], shadow.x, shadow.x.size)
+        if row[KIND] == EVENT:
+            _cross(problem, shadow, slopes, nudge, int(row[FIRST]), int(row[SECOND]))
+        elif row[KIND] == LANDING:
+            _land(problem, ahead, behind, tables, shadow, space, slopes, nudge, row)
+        else:
+            _step(problem, ahead, behind, tables, shadow, space, slopes, nudge, row, modes)
+        shadow.now[T] = row[ENDED]
+    state.count[TAPED] = 0
+    _coast(problem, state.now[T] - shadow.now[T], slopes.y)
+    shadow.now[T] = state.now[T]
+    rhs(problem, state.now[T], state.x, state.piece, state.entry_rate, slopes.rate[0], slopes.batch)

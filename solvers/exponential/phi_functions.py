@@ -1,0 +1,60 @@
+"""What loads that are polynomials of time do to the blocks: φ-functions of their matrices."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from solvers.compiled.kernels import Problem
+
+
+def signal_responses(problem: Problem, h: Any) -> Any:
+    """State change (len(h), L, 6, 2N) by loads t^k/k!, k = 0..5; those asked for lately are kept."""
+    if not np.any(problem.load):
+        return np.zeros((len(h), len(problem.load), 6, 2 * len(problem.k)))
+    return _polynomial_responses(*(array.tobytes() for array in (problem.k, problem.c, problem.load, h)))
+
+
+@lru_cache(maxsize=16)
+def _polynomial_responses(stiffnesses: bytes, dampings: bytes, load: bytes, steps: bytes) -> Any:
+    """The same from the arrays' bytes: φ-functions by Taylor series and doubling."""
+    h, stiffness, damping = (np.frombuffer(part) for part in (steps, stiffnesses, dampings))
+    size = len(stiffness)
+    rows = np.frombuffer(load).reshape(-1, 2, size)
+    loads = len(rows)
+    out = np.zeros((len(h), loads, 6, 2 * size))
+    A = np.zeros((size, 2, 2))
+    speed = np.where(stiffness > 0.0, np.sqrt(stiffness), 1.0)  # unit of rates: fewer halvings, less rounding in φ
+    A[:, 0, 1], A[:, 1, 0], A[:, 1, 1] = speed, -stiffness / speed, -damping
+    vectors = np.stack((rows[:, 0], rows[:, 1] / speed), axis=2)  # (L, N, 2)
+    phi = _phi(h[:, None, None, None] * A)
+    for k in range(6):
+        change = np.einsum("hnab,lnb->hlan", phi[k + 1], vectors) * (h ** (k + 1))[:, None, None, None]
+        out[:, :, k] = change.reshape(len(h), loads, 2 * size)
+    out[..., size:] *= speed
+    out.setflags(write=False)
+    return out
+
+
+def _phi(Z: Any) -> list[Any]:
+    """φ_0(Z) ... φ_6(Z) of a stack of 2x2 matrices, φ_k(Z) = Σ_i Z^i/(i + k)!."""
+    halvings = max(0, math.ceil(math.log2(max(np.abs(Z).sum(axis=-1).max(), 1e-300))) + 1)
+    small = Z / 2.0**halvings
+    phi = []
+    for k in range(7):
+        term = np.broadcast_to(np.eye(2), Z.shape) / math.factorial(k)
+        total = term.copy()
+        for i in range(1, 20):
+            term = term @ small / (i + k)
+            total = total + term
+        phi.append(total)
+    for _ in range(halvings):
+        doubled = [phi[0] @ phi[0]]
+        for k in range(1, 7):
+            rest = sum(phi[j] / math.factorial(k - j) for j in range(1, k + 1))
+            doubled.append((phi[0] @ phi[k] + rest) / 2.0**k)
+        phi = doubled
+    return phi

@@ -1,0 +1,307 @@
+"""What the exponential method prepares once per system: tones among the blocks, tables, layout of the working space."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import types
+
+from solvers.compiled.handles import Cast, Layout, Mould
+from solvers.compiled.kernels import INTEGERS, MATRIX, PROBLEM, REAL, VECTOR, Problem
+from solvers.compiled.state import STATE, State, begin_state, problem_of, state_shapes
+from solvers.compiled.sums import padded
+from solvers.exponential.contact.node_response import Space
+from solvers.exponential.contact.nodes import S, series_of
+from solvers.exponential.tables import OF_TONES, Tables, build, doublings, fill_tones, known_of
+from solvers.problem import Array, Forcing, System, on_one_grid, tones_as_nodes
+
+
+def _arrays(*dimensions: int) -> list[Any]:
+    """Types of contiguous float arrays with so many dimensions; a plain number for none."""
+    return [types.Array(REAL, d, "C") if d else REAL for d in dimensions]
+
+
+TABLES = types.NamedTuple(
+    [
+        *_arrays(1, 3, 4, 2, 3, 2, 3, 2, 2, 2, 2, 0, 0, 2, 1, 2),
+        *_arrays(1, 3, 1, 1, 2, 2, 2, 2, 3, 3, 4, 3, 5, 6, 5, 4, 2, 2, 2, 2, 4),
+        *(VECTOR, INTEGERS, INTEGERS, MATRIX),
+    ],
+    Tables,
+)
+SPACE = types.NamedTuple(
+    [
+        *(*_arrays(1, 2, 2, 1, 1, 1, 1, 2, 3, 1, 3, 2, 1, 3, 2, 3, 2, 1), INTEGERS, MATRIX),
+        *(*_arrays(1, 1, 1, 1, 2, 1, 2, 1, 1, 1, 1, 1), INTEGERS),
+    ],
+    Space,
+)
+
+
+class Workspace:
+    """What one run writes to: a block of memory, its arrays, and where compiled code finds their descriptors."""
+
+    def __init__(self, layout: Layout, rest: Array, blocks: int) -> None:
+        self.layout = layout
+        self.block, words = layout.block()
+        self.numbers = self.block[: layout.size]
+        self.addresses = [words + start for start in layout.starts]
+        self.state = State._make(layout.arrays(self.block, 0))
+        self.energy = layout.array(self.block, 1, Space._fields.index("energy"))
+        begin_state(self.state, rest)
+        self.rest = self.numbers.copy()
+        self.own = self.state.x[: rest.size].reshape(2, -1)[:, :blocks]
+
+    def begin(self, z: Array) -> None:
+        """The state of a run at t = 0 from the coordinates of the structure's own blocks."""
+        self.numbers[:] = self.rest
+        self.own += z.reshape(2, -1)
+
+    def record(self, tape: Array) -> None:
+        """Let another array be the tape."""
+        self.state = self.state._replace(tape=tape)
+        self.layout.exchange(self.block, 0, State._fields.index("tape"), tape)
+
+
+class Prepared(NamedTuple):
+    """What does not change from run to run of one system."""
+
+    problem: Cast
+    tables: Cast
+    back: Array  # (2n, 2N): [q, q̇] from the state of all blocks
+    layout: Layout  # of State and Space
+    rest: Array  # state of the tones' blocks at t = 0, the structure's less their steady response
+    spare: list[Workspace]  # of runs that are over
+
+    def workspace(self) -> Workspace:
+        """One that no other run uses; making its arrays takes as long as many steps."""
+        try:
+            return self.spare.pop()
+        except IndexError:
+            return Workspace(self.layout, self.rest, self.back.shape[0] // 2)
+
+
+def ready_for(system: System, forcing: Forcing, duration: float, rtol: float) -> tuple[Forcing, Prepared]:
+    """The forcing as the method takes it, and the tables; what a run just like the last one needs is at hand."""
+    last = system.kept.get("run")
+    if last and last[0] is forcing and last[1] == (duration, rtol):
+        return forcing, last[2]
+    taken = on_one_grid(without_resonance(system, forcing, duration, rtol), duration)
+    prepared = prepared_for(system, taken)
+    if taken is forcing and not forcing.table.size:
+        system.kept["run"] = forcing, (duration, rtol), prepared
+    return taken, prepared
+
+
+def prepared_for(system: System, forcing: Forcing) -> Prepared:
+    """Tables of a system, made once and kept on it, those of the last grid of its sampled signals only."""
+    dt_cell = float(forcing.table_dt[0]) if forcing.table_dt.size else 1.0
+    key = dt_cell, *(part.tobytes() for part in (forcing.tone_omega, forcing.tone_amplitude, forcing.tone_load))
+    if system.kept.get("exponential", (None,))[0] != key:
+        gaps = [contact.gap for contact in system.contacts]
+        system.kept["exponential"] = key, _skeleton_for(system, forcing, dt_cell).with_tones(forcing, gaps)
+    prepared: Prepared = system.kept["exponential"][1]
+    return prepared
+
+
+def _skeleton_for(system: System, forcing: Forcing, dt_cell: float) -> _Skeleton:
+    """What systems have in common that differ in tones, sampled values and gaps only; the latest is kept for them."""
+    about, laws = system.about_structure, system.about_laws
+    if "passive" not in about:
+        _check_passive(system)
+        about["passive"] = True
+    places = (part.tobytes() for part in (forcing.tone_load, forcing.table_dt, forcing.table_load))
+    key = *places, doublings(_speeds(system), forcing.tone_omega)
+    known = about.get("skeleton", (None, None))
+    if known[0] != key or known[1] is not laws:
+        known = about["skeleton"] = key, laws, _Skeleton(system, forcing, dt_cell)
+    skeleton: _Skeleton = known[2]
+    return skeleton
+
+
+def _speeds(system: System) -> Array:
+    """Bounds of the blocks' |λ|."""
+    speeds: Array = np.sqrt(system.blocks.k) + system.blocks.c
+    return speeds
+
+
+class _Skeleton:
+    """The problem and its tables with room for tones, each of which becomes one more undamped block.
+
+    The steady response to Re(a e^{iΩt}) is Re(Z e^{iΩt}) = Re Z · p + Im Z/Ω · v with p = cos Ωt, v = -Ω sin Ωt.
+    """
+
+    def __init__(self, system: System, forcing: Forcing, dt_cell: float) -> None:
+        plain, self.tones = problem_of(system, forcing), len(forcing.tone_omega)
+        self.k, self.c, self.load = plain.k, plain.c, plain.load  # not the whole, which holds the sampled signals
+        laws = [contact.law for contact in system.contacts]
+        self.series = tuple(series_of(law) for law in laws)
+        problem, loss = _widened(plain, forcing), _loss_rows(plain)
+        read_by = plain.read, plain.power, loss, system.blocks.T
+        self.rows, ends = np.concatenate(read_by), np.cumsum([len(rows) for rows in read_by]).tolist()
+        self.places = [slice(end - len(rows), end) for rows, end in zip(read_by, ends, strict=True)]
+        self.back, self.fastest = among_tones(system.blocks.T, self.tones), max(float(_speeds(system).max()), 1e-3)
+        ledger = np.zeros_like(problem.load), problem.power, among_tones(loss, self.tones)
+        tables = build(problem, self.tones, self.series, known_of(laws), dt_cell, ledger)
+        self.layout = _layout(len(problem.gap), len(problem.load), len(problem.k), len(forcing.table_dt))
+        self.problem = Mould(problem, PROBLEM, ("gap", "k", "read", "read_rate", "power"))
+        self.tables = Mould(tables, TABLES, OF_TONES)
+
+    def with_tones(self, forcing: Forcing, gaps: list[float]) -> Prepared:
+        """The same with the columns of given tones, and with given gaps."""
+        omega, amplitude, n = forcing.tone_omega, forcing.tone_amplitude, len(self.k)
+        load = self.load[forcing.tone_load] * amplitude[:, None]
+        response = steady_response(self.k, self.c, load, omega[:, None])
+        turn = 1.0 / np.where(omega > 0.0, omega, np.inf)
+        steady = np.concatenate((response.real, response.imag * turn[:, None])).T  # (2n, 2 tones)
+        columns = (self.rows @ steady).reshape(len(self.rows), 2, self.tones)
+        problem, tables, back = self.problem.cast(), self._tables(forcing, turn), self.back.copy()
+        read_by = problem.value.read, problem.value.power, tables.value.loss_rows, back
+        for rows, place in zip(read_by, self.places, strict=True):
+            _of_tones(rows, n)[:] = columns[place]
+        problem.value.gap[:], problem.value.k[n:] = gaps, omega**2
+        p, v = columns[self.places[0]].transpose(1, 0, 2)
+        rate = _of_tones(problem.value.read_rate, n)
+        rate[:, 0], rate[:, 1] = -v * problem.value.k[n:], p
+        tables.value.power_rows[:] = problem.value.power
+        fill_tones(tables.value, problem.value, self.tones, self.series)
+        rest = among_tones(-response.real.sum(axis=0), self.tones)
+        rest[n : n + self.tones] = 1.0
+        return Prepared(problem, tables, back, self.layout, rest, [])
+
+    def _tables(self, forcing: Forcing, turn: Array) -> Cast:
+        """Tables that know the signals made of tones, Re(a e^{iΩt}) = Re a · p + Im a/Ω · v; ``turn`` is 1/Ω."""
+        tables = self.tables.cast(fastest=max(self.fastest, float(forcing.tone_omega.max(initial=0.0))))
+        rows, load, each = tables.value.signal_rows, forcing.tone_load, np.arange(self.tones)
+        rows[load, each - self.tones + rows.shape[1] // 2] = forcing.tone_amplitude.real
+        rows[load, each - self.tones] = forcing.tone_amplitude.imag * turn
+        return tables
+
+
+def _of_tones(rows: Array, n: int) -> Array:
+    """(k, 2, tones) columns of the blocks behind the first n."""
+    return rows.reshape(len(rows), 2, rows.shape[1] // 2)[:, :, n:]
+
+
+def _check_passive(system: System) -> None:
+    """No block gains energy by itself: what proves that no contact is missed rests on that."""
+    k, c = system.blocks.k, system.blocks.c
+    if np.any(k < 0.0):
+        raise ValueError(
+            f"K must be positive semi-definite for Exponential, its lowest ω² is {k.min():g} (buckled?); "
+            "use DormandPrince"
+        )
+    if c.min() < -1e-12 * (np.sqrt(k).max() + np.abs(c).max()):
+        raise ValueError(
+            f"C must not drive the motion for Exponential, its lowest 2ζω is {c.min():g}; use DormandPrince, or a law"
+        )
+
+
+@lru_cache(maxsize=64)
+def _layout(stops: int, loads: int, blocks: int, signals: int) -> Layout:
+    """Places of the arrays of `State` and `Space`."""
+    size, width = 2 * blocks, 2 * blocks + 2 + 2 * stops
+    space = [
+        *((padded(width),), (7, padded(size)), (signals, 6), (7,), (blocks,), (loads,), (stops,)),
+        (2, padded(blocks)),
+        *((stops, 2, S), (S,), (stops, 2, S), (stops + loads, S), (S,), (stops, 2, 8), (stops, S), (stops, 3, S)),
+        *((stops * S, stops * S), (stops * S,), (stops * S,), (18, padded(width + 2))),
+        *([(stops,)] * 4),
+        *(
+            (stops, S),
+            (stops,),
+            (4, 3 * S),
+            (stops,),
+            (S + 2,),
+            (1,),
+            (1,),
+            (3,),
+            (6,),
+        ),
+    ]
+    return Layout([STATE, SPACE], [state_shapes(width, stops), space])
+
+
+def without_resonance(system: System, forcing: Forcing, duration: float, rtol: float) -> Forcing:
+    """Tones without a useful steady response are sampled instead.
+
+    That is those on the frequency of a block hardly damped, and those whose steady response l/|k - Ω² + iΩc| is a
+    thousand times what the load can do within the duration, l duration²/2: their difference would lose its digits.
+    """
+    key = forcing.tone_omega.tobytes(), forcing.tone_load.tobytes()
+    if system.kept.get("distances", (None,))[0] != key:
+        tones = zip(forcing.tone_omega, forcing.tone_load, strict=True)
+        system.kept["distances"] = key, [_distance(system, omega, load) for omega, load in tones]
+    resonant = [
+        i
+        for i, (absolute, relative) in enumerate(system.kept["distances"][1])
+        if relative <= 1e-6 or absolute * duration**2 < 2e-3
+    ]
+    return tones_as_nodes(forcing, resonant, duration, rtol) if resonant else forcing
+
+
+def _distance(system: System, omega: float, load: int) -> tuple[float, float]:
+    """Smallest |k - Ω² + iΩc| of the blocks a load pushes, absolute and relative to max(k, Ω²)."""
+    vector, blocks = system.push @ np.asarray(system.loads[load][0]), system.blocks
+    pushed = (vector[: system.size] != 0.0) | (vector[system.size :] != 0.0)
+    if not pushed.any():
+        return math.inf, math.inf
+    k, c = blocks.k[pushed], blocks.c[pushed]
+    distance = np.abs(k - omega**2 + 1j * omega * c)
+    scale = np.maximum(k, max(omega**2, 1e-300))
+    return float(distance.min()), float((distance / scale).min())
+
+
+def _loss_rows(problem: Problem) -> Array:
+    """Rows whose squares sum to the damping power: √c v, or a root of the coupled loss."""
+    n = len(problem.k)
+    if not problem.loss.size:
+        return np.hstack((np.zeros((n, n)), np.diag(np.sqrt(np.maximum(problem.c, 0.0)))))
+    values, vectors = np.linalg.eigh(0.5 * (problem.loss + problem.loss.T))
+    return np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
+
+
+def steady_response(k: Array, c: Array, load: Any, omega: Any) -> Any:
+    """(..., 2n) complex amplitude Z of the blocks' response Re(Z e^{iΩt}) to the state rate Re(load e^{iΩt})."""
+    lp, lv, turn = load[..., : k.size], load[..., k.size :], 1j * omega
+    # (iΩ - A)⁻¹ of a block: [[iΩ + c, 1], [-k, iΩ]] / (k - Ω² + iΩc)
+    inverse = 1.0 / np.where((lp == 0.0) & (lv == 0.0), 1.0, k - omega**2 + turn * c)
+    return np.concatenate((((turn + c) * lp + lv) * inverse, (turn * lv - k * lp) * inverse), axis=-1)
+
+
+def _widened(problem: Problem, forcing: Forcing) -> Problem:
+    """The problem with one block per tone, which nothing reads yet; tones are no load any more, tables empty."""
+    tones, none = len(forcing.tone_omega), np.zeros(0)
+    sampled = np.zeros_like(problem.load)
+    sampled[forcing.table_load] = problem.load[forcing.table_load]
+    rows = {name: among_tones(getattr(problem, name), tones) for name in ("push", "read", "read_rate", "power")}
+    return problem._replace(
+        k=np.concatenate((problem.k, forcing.tone_omega**2)),
+        c=np.concatenate((problem.c, np.zeros(tones))),
+        loss=np.empty((0, 0)),
+        load=among_tones(sampled, tones),
+        tone_omega=none,
+        tone_amplitude=none.astype(complex),
+        tone_load=none.astype(np.int64),
+        table=np.empty((0, 3)),
+        table_start=np.zeros_like(forcing.table_start),
+        **rows,
+    )
+
+
+@lru_cache(maxsize=64)
+def places_among_tones(n: int, tones: int) -> Any:
+    """(2n,) where the blocks' own coordinates stand among those of the tones' blocks."""
+    own = np.arange(n)
+    return np.concatenate((own, own + (n + tones)))
+
+
+def among_tones(rows: Array, tones: int) -> Array:
+    """Block coordinates (..., 2n) with zeros for the tones' blocks."""
+    n = rows.shape[-1] // 2
+    out = np.zeros((*rows.shape[:-1], 2, n + tones))
+    out[..., :n] = rows.reshape(*rows.shape[:-1], 2, n)
+    return out.reshape(*rows.shape[:-1], 2 * (n + tones))

@@ -1,0 +1,260 @@
+"""Flight without contact, evaluated exactly, and steps that provably miss no contact.
+
+With ε_b = √(v_b² + k_b p_b²), which no damped block increases, M = Σ weight_b ε_b bounds |δ̈| from now on. A stop at
+distance g = -δ that opens at the rate v = -δ̇ cannot be reached before
+
+    τ = (v + √(v² + 2 M g))/M,
+
+so steps of at most τ are safe. Close to a contact τ tends to the root from below; within reach of a Taylor
+polynomial of order 6 the root is found on that polynomial, which is exact to rounding there.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from solvers.compiled.kernels import copy, dot, indentation, inlined, inner, merged
+from solvers.compiled.state import SAMPLED, STEPS, T, rate_tolerance, surface_tolerance
+from solvers.exponential.energy import account_flight, energetic
+from solvers.exponential.flight import (
+    LONG_REACH,
+    ORDER,
+    add_signals,
+    add_taylor,
+    bound_apart,
+    cell_of,
+    energy_norms,
+    go_on,
+    go_through,
+    level_within,
+    look,
+    taylor,
+    turn,
+    turn_apart,
+)
+
+_REFRESH = 8  # flight steps between two evaluations of the bound
+
+
+@inner
+def _signal_bound(problem, j, cell):
+    """Bound of |s| on a cell: the largest Bézier coefficient of the quintic."""
+    dt = problem.table_dt[j]
+    row = problem.table_start[j] + cell
+    a, b = problem.table[row], problem.table[row + 1]
+    da, db = 0.2 * dt * a[1], 0.2 * dt * b[1]
+    bound = max(abs(a[0]), abs(b[0]), abs(a[0] + da), abs(b[0] - db))
+    bound = max(bound, abs(a[0] + 2.0 * da + 0.05 * dt * dt * a[2]))
+    return max(bound, abs(b[0] - 2.0 * db + 0.05 * dt * dt * b[2]))
+
+
+@inlined
+def _acceleration_bound(problem, tables, s, norms, signal_bounds, horizon):
+    """M: bound of |δ̈| of stop s over the horizon, signals included."""
+    n = problem.k.size
+    total = dot(tables.weight[s], norms, n)
+    for j in range(problem.table_dt.size):
+        load = problem.table_load[j]
+        growth = dot(tables.weight[s], tables.load_norm[load], n)
+        total += signal_bounds[j] * (horizon * growth + abs(tables.direct[s, load]))
+    return total
+
+
+@inlined
+def _safe(g, v, bound):
+    """Time before which a stop at distance g, opening at v, cannot be reached."""
+    if bound <= 0.0:
+        return g / -v if v < 0.0 else np.inf
+    root = math.sqrt(v * v + 2.0 * bound * max(g, 0.0))
+    return (v + root) / bound if v >= 0.0 else 2.0 * max(g, 0.0) / (root - v)
+
+
+@inner
+def _first_root(problem, terms, s, x, longest, values, slopes):
+    """First time in [0, longest] at which δ becomes positive on the Taylor polynomial; -1 if it does not.
+
+    ``values`` and ``slopes`` are working space for the coefficients of the polynomial and of its derivative.
+    """
+    factorial = 1.0
+    for i in range(ORDER + 1):
+        values[i] = dot(problem.read[s], terms[i], 2 * problem.k.size) / factorial
+        factorial *= i + 1.0
+    values[0] -= problem.gap[s]
+    if abs(values[0]) <= surface_tolerance(problem, s, x):
+        values[0] = 0.0
+        if abs(values[1]) <= rate_tolerance(problem, s, x):
+            values[1] = 0.0  # at rest on the surface: the acceleration decides
+    if values[0] >= 0.0 and (values[1] > 0.0 or (values[1] == 0.0 and values[2] > 0.0)):
+        return 0.0
+    end = longest
+    if values[1] > 0.0 and _horner(values, longest)[1] < 0.0:  # δ has its maximum inside
+        for i in range(ORDER):
+            slopes[i] = (i + 1.0) * values[i + 1]
+        slopes[ORDER] = 0.0
+        end = _bisect(slopes, -1.0, longest, -0.5 * values[1] / values[2])
+    if not _horner(values, end)[0] > 0.0:
+        return -1.0
+    square = values[1] * values[1] - 4.0 * values[0] * values[2]
+    return _bisect(values, 1.0, end, -2.0 * values[0] / (values[1] + math.sqrt(max(square, 0.0))))
+
+
+@inlined
+def _horner(coefficients, x):
+    """Value and slope of a polynomial at x."""
+    value, slope = coefficients[ORDER], 0.0
+    for i in range(ORDER - 1, -1, -1):
+        slope = slope * x + value
+        value = value * x + coefficients[i]
+    return value, slope
+
+
+@inner
+def _bisect(coefficients, sign, b, guess):
+    """Newton with bisection as its guard for the sign change of a polynomial in [0, b], to rounding.
+
+    Its steps double the digits: what a step of 1e-11 leaves is rounding. A double root is known to 1e-8 at best.
+    """
+    a, x = 0.0, guess if 0.0 < guess < b else b
+    for _ in range(60):
+        f, slope = _horner(coefficients, x)
+        if sign * f > 0.0:
+            b = x
+        else:
+            a = x
+        following = x - (f / slope if slope != 0.0 else np.inf)
+        if not a < following < b:
+            following = 0.5 * (a + b)
+        if abs(following - x) <= 1e-11 * x:
+            return following
+        x = following
+    return x
+
+
+@inlined
+def _target(tables, t, first, second, t_end, ledger):
+    """Where a step must end: at an output time unless that is near enough to be evaluated from the step's start."""
+    if ledger or tables.fastest * (first - t) > LONG_REACH:
+        return min(first, t_end)
+    return t_end if tables.fastest * (second - first) <= LONG_REACH else min(second, t_end)
+
+
+@inner
+def _sample(problem, tables, state, space, t, out, due):
+    """Outputs before the end of the step that began at t with the state in ``space.x_new``."""
+    while due[state.count[SAMPLED]] < state.now[T]:
+        wanted = due[state.count[SAMPLED]]
+        parts = max(1, int(np.ceil(tables.fastest * (wanted - t) / LONG_REACH)))
+        for i in range(parts):
+            span = (wanted - t) / parts
+            go_on(problem, space.x_new, t + i * span, span, space.terms[0], space.six)
+        copy(space.x_new, out[state.count[SAMPLED]], state.x.size)
+        state.count[SAMPLED], t = state.count[SAMPLED] + 1, wanted
+
+
+@inner
+def _glide(problem, tables, state, space, most, budget):
+    """Tabulated steps without signals or output until a stop is near, or the time left, ``most``, or the budget spent.
+
+    Positions and rates of the blocks stand apart meanwhile, in eights. Returns (time flown, steps, safe time).
+    """
+    n, x, flown, count = problem.k.size, space.apart, 0.0, 0
+    for b in range(n):
+        x[0, b], x[1, b] = state.x[b], state.x[n + b]
+    while True:
+        span = most - flown
+        for s in range(problem.gap.size):
+            if count % _REFRESH == 0:
+                space.m[s] = bound_apart(tables, s, x)
+            delta, rate = look(tables, s, x)
+            span = min(span, _safe(problem.gap[s] - delta, -rate, space.m[s]))
+        if span < tables.h[tables.h.size - 1] or count >= budget:
+            break
+        level = level_within(tables, span)
+        turn_apart(tables, level, x)
+        flown, count = flown + tables.h[level], count + 1
+    for b in range(n):
+        state.x[b], state.x[n + b] = x[0, b], x[1, b]
+    return flown, count, span
+
+
+@merged
+def fly(problem, tables, state, space, t_end, budget, out, due, ledger):
+    """Fly until a stop is reached (returns its index), the end (-1), or the budget is spent (-2).
+
+    With an energy ledger steps end on the output times too; else these are evaluated from the start of a step.
+    """
+    stops, size, now = problem.gap.size, 2 * problem.k.size, state.now
+    shortest = tables.h[tables.h.size - 1]
+    sampled = problem.table_dt.size > 0
+    dt_cell = problem.table_dt[0] if sampled else np.inf
+    for count in range(budget):
+        if due[state.count[SAMPLED]] <= now[T]:
+            copy(state.x, out[state.count[SAMPLED]], state.x.size)
+            state.count[SAMPLED] += 1
+        if now[T] >= t_end:
+            return -1
+
+        # --- how far the output, the end and the signals' cell allow
+        first = due[state.count[SAMPLED]]
+        second = due[min(state.count[SAMPLED] + 1, out.shape[0])]
+        target = _target(tables, now[T], first, second, t_end, ledger)
+        begin, span, rest, offset, cell = now[T], target - now[T], np.inf, 0.0, 0
+        if sampled:
+            cell, offset = cell_of(problem, now[T])
+            rest = max(dt_cell - offset, 1e-9 * dt_cell)
+            for j in range(problem.table_dt.size):
+                space.bounds[j] = _signal_bound(problem, j, cell)
+        # --- how far no stop can be reached
+        if first == np.inf and not sampled and not ledger:  # nothing else happens on the way
+            flown, steps, span = _glide(problem, tables, state, space, span, budget)
+            now[T] += flown
+            state.count[STEPS] += steps
+            if steps >= budget:
+                return -2
+        else:
+            if sampled or count % _REFRESH == 0:
+                energy_norms(problem, state.x, space.norms)
+                for s in range(stops):
+                    space.m[s] = _acceleration_bound(problem, tables, s, space.norms, space.bounds, rest)
+            span = min(span, rest)
+            if ledger:
+                span = min(span, 3.0 / energetic(problem, tables, space.norms))
+            if ledger or first <= begin + span:
+                copy(state.x, space.x_new, state.x.size)
+            for s in range(stops):
+                g, v = -indentation(problem, s, state.x), -dot(problem.read_rate[s], state.x, size)
+                span = min(span, _safe(g, v, space.m[s]))
+
+        # --- go: a Taylor step that looks for roots, a whole cell, or a tabulated step
+        stop = -1
+        if span < shortest:
+            taylor(problem, state.x, now[T], space.terms, space.six)
+            h = min(shortest, target - now[T], rest)
+            for s in range(stops):
+                root = _first_root(problem, space.terms, s, state.x, h, space.values, space.trial)
+                if root >= 0.0:
+                    h, stop = root, s
+            add_taylor(space.terms, state.x, h, size, space.values, space.work[0])
+        elif span == rest and abs(offset) < 1e-7 * dt_cell:
+            h = rest
+            go_through(problem, tables, state.x, cell)
+        elif sampled and tables.fastest * span <= LONG_REACH:
+            h = span
+            go_on(problem, state.x, now[T], h, space.terms[0], space.six)
+        else:
+            level = level_within(tables, span)
+            h = tables.h[level]
+            turn(problem, tables.propagator[level, 0], tables.propagator[level, 1], state.x)
+            if sampled:
+                add_signals(problem, tables.signal[level], state.x, now[T], space.six)
+        if ledger:
+            account_flight(problem, tables, state, space, h, space.x_new)
+        now[T] = target if now[T] + h >= target else now[T] + h
+        state.count[STEPS] += 1
+        if first < now[T]:
+            _sample(problem, tables, state, space, begin, out, due)
+        if stop >= 0:
+            return stop
+    return -2

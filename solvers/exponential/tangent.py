@@ -1,0 +1,182 @@
+"""Derivative of a whole run with respect to its start and to a parameter; `linearised` has the mathematics."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from solvers.compiled.dop853_tableau import STAGES
+from solvers.compiled.handles import Layout, Packed
+from solvers.compiled.kernels import PROBLEM, Problem
+from solvers.compiled.state import HEAD, STATE, State, T, begin_state, law_parameters, state_shapes
+from solvers.exponential.contact.nodes import S
+from solvers.exponential.linearised import NUDGE, SLOPES, Nudge, Slopes, replay
+from solvers.exponential.preparation import places_among_tones, steady_response
+from solvers.problem import Array, Parameter, SolverError, System
+
+_ROWS = 256  # of the tape between two replays: some 25 contacts, within which no derivative overflows
+_CARRIED = [Slopes._fields.index(name) for name in ("y", "entry", "shift", "rate")]
+_LARGE = 1e100  # size at which the derivatives are scaled down
+
+
+class Tangent:
+    """Derivatives of one run of an engine, carried along as its tape grows."""
+
+    def __init__(self, system: System, engine: Any, parameter: Parameter | None) -> None:
+        self.engine, self.blocks = engine, system.blocks
+        problem, state = engine.problem, engine.state
+        stops, loads, size = len(problem.gap), len(problem.load), 2 * len(problem.k)
+        width, n = state.x.size, system.size
+        change = _Change.of(system, parameter, engine) if parameter else None
+        self.exact = change is not None
+        self.change, columns = change or _Change.none(problem, n), 2 * n + self.exact
+        layout = _layout(stops, loads, width, columns)
+        self.block, words = layout.block()
+        self.y, self.entry, self.shift, self.end_rate = (layout.array(self.block, 0, i) for i in _CARRIED)
+        begin_state(State._make(layout.arrays(self.block, 1)), state.x[:size])
+        self.places = places_among_tones(n, size // 2 - n)
+        self.y[: 2 * n, self.places] = system.blocks.inverse.T
+        self.y[2 * n :, self.places] = -self.change.steady(0.0)
+        engine.record(np.empty((_ROWS, HEAD + width + stops * S)))
+        self.packed = [
+            *(engine.packed if same is problem else Packed(same, PROBLEM) for same in self.change.problems),
+            Packed(self.change.nudge, NUDGE),
+        ]
+        slopes, shadow = (words + start for start in layout.starts)
+        ahead, behind, nudge = (packed.address for packed in self.packed)
+        problem_at, *others = engine.addresses
+        self.addresses = problem_at, ahead, behind, *others, shadow, slopes, nudge, system.size
+        self.log_scale = 0.0  # the derivatives are exp(log_scale) times what is kept
+        self.history: list[tuple[float, float]] = []  # (time, ln of their size)
+
+    def follow(self) -> None:
+        """Replay what the engine has taped, and let it tape anew."""
+        engine = self.engine
+        replay(*self.addresses, not self.history)
+        if not np.all(np.isfinite(self.y)):
+            raise SolverError(f"the tangent is not finite any more at t = {engine.state.now[T]:g} s: a contact grazes")
+        size = _size(self.y)
+        self.history.append((float(engine.state.now[T]), self.log_scale + math.log(size) if size > 0.0 else -math.inf))
+        if not 1.0 / _LARGE < size < _LARGE and size > 0.0:
+            for array in (self.y, self.entry, self.shift):
+                array /= size
+            self.log_scale += math.log(size)
+
+    def rate(self) -> Array:
+        """(2n,) derivative of [q, q̇] by time at the time reached."""
+        return self.engine.back @ self.end_rate[0, : 2 * len(self.engine.problem.k)]
+
+    def matrix(self) -> Array:
+        """(2n, columns) derivatives of [q, q̇] at the time reached."""
+        if self.log_scale > 600.0:
+            raise OverflowError(f"the tangent grew to e^{self.log_scale:.0f}; shorten the run, or use solvers.lyapunov")
+        y = math.exp(self.log_scale) * self.y[:, self.places]
+        y[2 * self.blocks.k.size :] += self.change.steady(self.engine.state.now[T])
+        return self.blocks.T @ y.T
+
+
+@lru_cache(maxsize=64)
+def _layout(stops: int, loads: int, width: int, columns: int) -> Layout:
+    """Places of the arrays of `Slopes` and of the shadow's `State`."""
+    slopes = [(columns, width), (columns, stops), (columns, stops), (stops + loads, S), (loads, S), (stops, 2, S)]
+    slopes += [(stops, S), (2, width), (STAGES, columns, width), (columns, width), (8,)]
+    return Layout([SLOPES, STATE], [slopes, state_shapes(width, stops)])
+
+
+def _size(y: Array) -> float:
+    """Frobenius norm; in units of the largest entry, whose square may lie beyond the range of numbers."""
+    largest = float(np.abs(y).max())
+    return largest * math.sqrt(np.vdot(y / largest, y / largest)) if largest > 0.0 else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Change:
+    """What a parameter changes: the nudge, the problems with laws ahead and behind, the steady response per tone."""
+
+    nudge: Nudge
+    problems: list[Problem]
+    a: Any  # (K, 2n) complex: the steady response changes by Re (a + t b) e^{iωt}
+    b: Any
+
+    def steady(self, t: float) -> Array:
+        """Change of the steady response at time t, in block coordinates."""
+        waves = (self.a + t * self.b) * np.exp(1j * self.nudge.omega * t)[:, None]
+        return waves.sum(axis=0).real
+
+    @classmethod
+    def none(cls, problem: Problem, n: int) -> _Change:
+        """No parameter."""
+        stops = len(problem.gap)
+        nudge = Nudge(0.0, 0.0, np.zeros(0), np.zeros((0, stops, 2, 4)), np.zeros(stops))
+        none = np.zeros((0, 2 * n), dtype=complex)
+        return cls(nudge, [problem] * 2, none, none)
+
+    @classmethod
+    def of(cls, system: System, parameter: Parameter, engine: Any) -> _Change | None:
+        """The change between two systems; None if they differ in more than tones, gaps and laws' parameters."""
+        sides = parameter.behind, parameter.ahead
+        count = sum(len(signal.tones()[0]) for _, signal in system.loads if hasattr(signal, "tones"))
+        if len(engine.problem.k) != system.size + count:  # a tone is sampled, for resonance: it has no steady response
+            return None
+        tones = _tones(system, *sides)
+        if tones is None or not all(_same_structure(system, side) for side in sides):
+            return None
+        width = 2.0 * parameter.step
+        own = places_among_tones(system.size, len(tones.omega))
+        rows = np.stack([engine.problem.read[:, own], engine.problem.read_rate[:, own]], axis=1)  # (m, 2, 2n)
+        a, b = tones.change / width, 1j * (tones.turn / width)[:, None] * tones.response
+        parts = np.array([a.real, a.imag, b.real, b.imag])
+        steady = (rows @ parts.reshape(-1, own.size).T).reshape(len(rows), 2, 4, len(a)).transpose(3, 0, 1, 2)
+        gaps = [np.array([contact.gap for contact in side.contacts]) for side in sides]
+        shift = (gaps[1] - gaps[0]) / width
+        nudge = Nudge(parameter.step, parameter.step, tones.omega, np.ascontiguousarray(steady), shift)
+        if all(one.law is other.law for one, other in zip(*(side.contacts for side in sides), strict=True)):
+            return cls(nudge._replace(law_step=0.0), [engine.problem] * 2, a, b)
+        problems = [engine.problem._replace(parameters=law_parameters(side)) for side in reversed(sides)]
+        return cls(nudge, problems, a, b)
+
+
+class _Tones(NamedTuple):
+    """Tones of three systems: frequency and response of the first, their changes from the second to the third."""
+
+    omega: Array  # (K,)
+    response: Any  # (K, 2n) complex
+    turn: Array  # (K,)
+    change: Any  # (K, 2n) complex
+
+
+def _tones(here: System, behind: System, ahead: System) -> _Tones | None:
+    """The tones; None when sampled signals differ."""
+    found = []
+    k, c = here.blocks.k, here.blocks.c
+    for (vector, signal), *others in zip(here.loads, behind.loads, ahead.loads, strict=True):
+        signals: list[Any] = [signal, *(other for _, other in others)]
+        if not all(hasattr(one, "tones") for one in signals):
+            if any(one is not signal for one in signals):
+                return None
+            continue
+        push = here.push @ np.asarray(vector)
+        tones = [one.tones() for one in signals]
+        omega, amplitude = (np.stack([tone[i] for tone in tones], axis=-1)[..., None] for i in (0, 1))
+        response = steady_response(k, c, push * amplitude, omega)  # (tones, systems, 2n)
+        found.append((omega[:, 0, 0], response[:, 0], np.diff(omega[:, 1:, 0])[:, 0], response[:, 2] - response[:, 1]))
+    n2 = 2 * here.size
+    none = np.zeros(0), np.zeros((0, n2), dtype=complex)
+    return _Tones(*(np.concatenate(parts) for parts in zip((*none, *none), *found, strict=True)))
+
+
+def _same_structure(one: System, other: System) -> bool:
+    """Whether two systems differ in signals, gaps and laws' parameters only."""
+    if one.size != other.size or len(one.contacts) != len(other.contacts):
+        return False
+    pairs = [(one.M, other.M), (one.C, other.C), (one.K, other.K)]
+    pairs += [(a.direction, b.direction) for a, b in zip(one.contacts, other.contacts, strict=True)]
+    pairs += [(a, b) for (a, _), (b, _) in zip(one.loads, other.loads, strict=True)]
+    laws = [(a.law, b.law) for a, b in zip(one.contacts, other.contacts, strict=True)]
+    return all(a is b or np.array_equal(a, b) for a, b in pairs) and all(
+        a is b or (a.address, a.knots, a.entry_rate_floor) == (b.address, b.knots, b.entry_rate_floor) for a, b in laws
+    )

@@ -1,0 +1,150 @@
+"""Newton's method on a chain of shots, for orbits at a given parameter or at right angles to a branch.
+
+r_i = Φ_i(x_i) - x_{i+1},   i = 0 ... m - 1,   x_m = x_0
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from solvers.orbits.periodic_orbit import OrbitError
+from solvers.orbits.shots import Chain, Problem
+from solvers.problem import Array, SolverError, System
+
+TOLERANCE = 1e-10  # of the residual, in units of the orbit's size
+_NEARLY = 1e-5  # relative residual after which the next step is expected to be the last
+_MOST_HALVINGS = 6
+_DEEPEST = 1e3  # energy of a stop in units of the motion's: a period spent deeper takes as long as thousands elsewhere
+
+
+def weights(system: System, period: float) -> Array:
+    """(2n, 2n) matrix whose product with a state has the square root of an energy per mode as entries.
+
+    Positions count with √(k + (2π/T)²), so that floating coordinates have a size too.
+    """
+    blocks = system.blocks
+    scale = np.sqrt(blocks.k + (2.0 * math.pi / period) ** 2)
+    matrix: Array = np.concatenate((scale, np.ones_like(scale)))[:, None] * blocks.inverse
+    return matrix
+
+
+@dataclass(frozen=True, eq=False)
+class Border:
+    """The arclength condition: scaled by ``metric``, unknowns move only at right angles to ``tangent`` from the guess.
+
+    Both are over [states (m 2n), parameter].
+    """
+
+    metric: Array
+    tangent: Array
+
+    def row(self) -> Array:
+        """The condition's derivative."""
+        return self.metric @ self.tangent
+
+
+def newton(
+    problem: Problem,
+    x: Array,
+    parameter: float,
+    border: Border | None = None,
+    slope: bool = False,
+    most: int = 25,
+) -> tuple[Chain, float, int]:
+    """Solve the chain from a first guess (m, 2n); returns it with its relative residual and the iterations.
+
+    With a border the parameter is an unknown too. ``slope`` asks for the derivatives by the parameter of what is
+    returned; ``most`` is the number of iterations allowed. Raises OrbitError.
+    """
+    unknowns = guess = np.append(x.ravel(), parameter)
+    measure = _Measure(problem)
+    chain, error = _fire(problem, unknowns, measure, border is not None)
+    history = [error]
+    while not error <= TOLERANCE and len(history) <= most:
+        step = _step(chain, unknowns - guess, border)
+        for halving in range(_MOST_HALVINGS if most > 10 else 2):
+            wanted = border is not None or (slope and error < _NEARLY)
+            trial, trial_error = _fire(problem, unknowns + 0.5**halving * step, measure, wanted)
+            if trial_error < error:
+                break
+        else:
+            break
+        unknowns, chain, error = unknowns + 0.5**halving * step, trial, trial_error
+        history.append(error)
+    if error <= TOLERANCE and slope and not chain.has_slope:
+        chain, error = _fire(problem, unknowns, measure, True)
+    if not error <= TOLERANCE:
+        raise OrbitError(
+            f"{len(history)} iterations of Newton's method reduced the residual from {history[0]:.3g} to {error:.3g} "
+            "of the motion's size"
+        )
+    return chain, error, len(history) - 1
+
+
+class _Measure:
+    """Size of a residual relative to the motion's.
+
+    What counts as the motion's size lies between 1e-4 and 1e3 of the first guess's, so that neither running off to
+    infinity nor vanishing passes for convergence or its failure.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem, self.first, self.stored = problem, 0.0, 0.0
+
+    def __call__(self, chain: Chain) -> float:
+        """Relative residual."""
+        if not self.first:
+            self.W = weights(*self.problem.make(chain.parameter))
+        turned = np.concatenate((chain.residual[-1:], chain.residual[:-1]))
+        parts = np.concatenate((chain.x, chain.x + turned, chain.residual)) @ self.W.T
+        squares = np.einsum("ij,ij->i", parts, parts).reshape(3, -1).max(axis=1)
+        size, ends, residual = np.sqrt(squares).tolist()
+        if not self.first:
+            self.first, self.stored = max(size, ends), self._held(chain.x, chain.parameter)
+        return residual / max(min(size, 1e3 * self.first), 1e-4 * self.first, 1e-300)
+
+    def too_deep(self, x: Array, parameter: float) -> bool:
+        """Whether a guess has left the motion for the inside of a stop."""
+        return self.first > 0.0 and self._held(x, parameter) > _DEEPEST * (self.first**2 + self.stored)
+
+    def _held(self, x: Array, parameter: float) -> float:
+        """Largest force times indentation of the stops."""
+        system, _ = self.problem.make(parameter)
+        most = 0.0
+        for contact in system.contacts:
+            delta = float((-x[:, : system.size] @ contact.direction).max()) - contact.gap
+            most = max(most, abs(float(contact.law.force(delta, 0.0, 1.0))) * delta if delta > 0.0 else 0.0)
+        return most
+
+
+def _fire(problem: Problem, unknowns: Array, measure: _Measure, slope: bool) -> tuple[Any, float]:
+    """The chain at given unknowns and its relative residual, inf where it cannot be integrated."""
+    x, parameter = unknowns[:-1].reshape(len(problem.fractions), -1), float(unknowns[-1])
+    try:
+        if measure.too_deep(x, parameter):
+            return None, math.inf
+        chain = problem.evaluate(x, parameter, slope)
+        error = measure(chain)
+    except (SolverError, ValueError, ArithmeticError):
+        return None, math.inf
+    return chain, error if math.isfinite(error) else math.inf
+
+
+def _step(chain: Chain | None, moved: Array, border: Border | None) -> Array:
+    """Newton's step of all unknowns."""
+    if chain is None:
+        raise OrbitError("the motion from the start cannot be integrated over one period")
+    matrix: Any = chain.jacobian()
+    right = -chain.residual.ravel()
+    try:
+        if border is None:
+            return np.append(np.linalg.solve(matrix, right), 0.0)
+        row = border.row()
+        matrix = np.block([[matrix, chain.by_parameter.reshape(-1, 1)], [row[None, :]]])
+        return np.linalg.solve(matrix, np.append(right, -row @ moved))
+    except np.linalg.LinAlgError:
+        raise OrbitError("the orbit is not isolated: the linearised return map has the eigenvalue 1") from None

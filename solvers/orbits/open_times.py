@@ -1,0 +1,71 @@
+"""When a shot may begin: while every stop whose law latches its entry rate is open."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from solvers.orbits.shots import Chain
+from solvers.problem import Array, Contact, ContactLog, System
+
+
+def latches(contact: Contact) -> bool:
+    """Whether a law's force depends on the rate at which the contact was entered."""
+    delta, rate = np.array([1e-6, 1e-4, 1e-2]), max(0.1, contact.law.entry_rate_floor)
+    return bool(np.any(contact.law.force(delta, rate, rate) != contact.law.force(delta, rate, 2.0 * rate)))
+
+
+def with_memory(system: System) -> list[int]:
+    """The stops whose law latches."""
+    about = system.about_laws
+    if "with memory" not in about:
+        about["with memory"] = [s for s, contact in enumerate(system.contacts) if latches(contact)]
+    known: list[int] = about["with memory"]
+    return known
+
+
+def quiet_intervals(system: System, contacts: ContactLog, period: float) -> list[tuple[float, float]]:
+    """Intervals of one period in which every stop is open; if there are none, every one that latches its entry rate."""
+    ends = np.where(np.isnan(contacts.t_out), period, contacts.t_out)
+    for stops in (range(len(system.contacts)), with_memory(system)):
+        mine = np.isin(contacts.stop, list(stops))
+        quiet, end = [], 0.0
+        found = list(zip(contacts.t_in[mine], ends[mine], strict=True))
+        found += [(0.0, left - period) for _, left in found if left > period]  # what goes on in the next period
+        for begin, left in [*sorted(found), (period, period)]:
+            if begin > end:
+                quiet.append((float(end), float(begin)))
+            end = max(end, left)
+        if quiet:
+            return quiet
+    return []
+
+
+def quiet_begins(system: System, contacts: ContactLog, period: float, count: int, zero: bool) -> list[float]:
+    """Times for the begins of ``count`` shots: zero if that will do, then the middles of the longest quiet intervals.
+
+    Fewer when there is no quiet time at all.
+    """
+    quiet = quiet_intervals(system, contacts, period)
+    begins = [0.0] if zero else []
+    while quiet and len(begins) < count:
+        a, b = quiet.pop(max(range(len(quiet)), key=lambda i: quiet[i][1] - quiet[i][0]))
+        begins.append(0.5 * (a + b))
+        quiet += [(a, begins[-1]), (begins[-1], b)]
+    return sorted(begins)
+
+
+def closed(system: System, x: Array, stops: Sequence[int]) -> bool:
+    """Whether any of these stops is closed in a state."""
+    contacts = [system.contacts[s] for s in stops]
+    return any(contact.direction @ x[: system.size] + contact.gap < 0.0 for contact in contacts)
+
+
+def is_cut(chain: Chain, system: System) -> bool:
+    """Whether a contact with memory is under way where a shot begins."""
+    logs = [solution.contacts for solution in chain.solutions]
+    latched = [np.isin(one.stop, with_memory(system)) for one in logs]
+    return any(
+        np.any(mine & ((one.t_in == 0.0) | np.isnan(one.t_out))) for mine, one in zip(latched, logs, strict=True)
+    )

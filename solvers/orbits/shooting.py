@@ -1,0 +1,198 @@
+"""Periodic orbits by shooting with the exact tangent of a run.
+
+An orbit of period T solves Φ(x) = x, where Φ carries the state over one period. Newton's method on the chain
+
+    r_i = Φ_i(x_i) - x_{i+1},   i = 0 ... m - 1,   x_m = x_0,
+
+of m shots (one, or several where errors grow too fast within a period) converges quadratically, because
+`solvers.exponential.tangent` differentiates the shots exactly. Floquet multipliers are the eigenvalues of the monodromy
+matrix, the product of the shots' tangents.
+
+A law that latches its entry rate remembers the past while in contact, so a shot may begin only while every such stop is
+open: `Orbit.phase` is the time within the period to which `Orbit.state` belongs, zero wherever that is possible.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from solvers.exponential.method import Exponential
+from solvers.integration import integrate
+from solvers.orbits.newton import newton, weights
+from solvers.orbits.open_times import closed, is_cut, quiet_begins, with_memory
+from solvers.orbits.periodic_orbit import Orbit, OrbitError, at_zero, flown, judged, orbit_of
+from solvers.orbits.shots import Chain, Problem
+from solvers.problem import Array, System
+from solvers.problem.run_arguments import check_slopes
+
+_MOST_SHOTS = 6
+_MOST_BEGINS = 4  # times that the begins of shots are chosen anew
+_MOST_SETTLINGS = 4  # starts taken from a run from rest, a hundred periods apart
+
+
+def orbit(
+    system: System,
+    period: float,
+    start: ArrayLike | None = None,
+    method: Any = None,
+    shots: int | None = None,
+) -> Orbit:
+    """Find the periodic motion Φ(x) = x of a system near a start; Φ carries the state over one period.
+
+    Parameters
+    ----------
+    system : its loads must have the ``period``.
+    period : s, > 0; a multiple of the loads' period for subharmonics.
+    start : (2n,) [q, q̇] at t = 0; None: what a run from rest has settled to.
+    method : an `Exponential`; None takes one with rtol 1e-11.
+    shots : per period; None: one, then more if one fails.
+
+    Returns
+    -------
+    Orbit, with a verdict on its stability checked at a tighter tolerance.
+
+    Raises
+    ------
+    ValueError for bad input before computing; OrbitError when no orbit is found near the start, with what was tried.
+
+    Examples
+    --------
+    >>> found = orbit(System.modal(omega=[2.0], zeta=[0.1]), period=3.0)
+    >>> bool(np.all(found.state == 0.0)), found.stable
+    (True, True)
+    """
+    method = checked(system, period, method, shots)
+    if start is not None:
+        return _near(system, period, checked_start(system, start), method, shots)
+    x = settled(system, period, method)
+    for _ in range(_MOST_SETTLINGS - 1):
+        try:
+            return _near(system, period, x, method, shots)
+        except OrbitError:
+            x = flown(system, x, 100.0 * period, replace(method, rtol=max(method.rtol, 1e-8)))
+    return _near(system, period, x, method, shots)
+
+
+def _near(system: System, period: float, x: Array, method: Any, shots: int | None) -> Orbit:
+    """The orbit near a state, with as few shots as will do."""
+    tried: list[str] = []
+    for count in [shots] if shots else range(1, _MOST_SHOTS + 1):
+        try:
+            problem, chain, residual, iterations = solved_chain(system, period, x, method, count)
+            _check_isolated(chain, weights(system, period))
+            return judged(_from_zero(orbit_of(problem, chain, residual, iterations)))
+        except OrbitError as error:
+            tried.append(f"{count} shot(s): {error}")
+    raise OrbitError("no orbit found near the start; tried " + "; ".join(tried))
+
+
+def _from_zero(orbit: Orbit) -> Orbit:
+    """The orbit seen from t = 0 if no stop that latches is closed then."""
+    x = at_zero(orbit)
+    if orbit.phase == 0.0 or closed(orbit.system, x, with_memory(orbit.system)):
+        return orbit
+    problem = Problem(_Constant(orbit.system, orbit.period), orbit.method)
+    try:
+        chain, residual, iterations = newton(problem, x[None, :], 0.0)
+    except OrbitError:
+        return orbit
+    return orbit_of(problem, chain, residual, orbit.iterations + iterations)
+
+
+def _check_isolated(chain: Chain, W: Array) -> None:
+    """An orbit whose neighbours are orbits too, or that only rounding holds, is none."""
+    away = W @ (chain.monodromy() - np.eye(len(W))) @ np.linalg.inv(W)
+    values = np.linalg.svd(away, compute_uv=False)
+    if values[-1] <= 1e-12 * max(values[0], 1.0):
+        raise OrbitError("the orbit is not isolated: the linearised return map has the eigenvalue 1 to rounding")
+
+
+def checked(system: System, period: float, method: Any, shots: int | None) -> Any:
+    """The method, after a look at everything else."""
+    if not 0.0 < period < math.inf:
+        raise ValueError(f"period must be positive and finite (s), got {period!r}")
+    if shots is not None and not (isinstance(shots, int) and 1 <= shots <= 100):
+        raise ValueError(f"shots must be a whole number from 1 to 100, got {shots!r}")
+    method = Exponential(1e-11) if method is None else method
+    if not getattr(method, "has_tangent", False):
+        raise ValueError(f"method must offer tangents, such as Exponential(), got {method!r}")
+    check_slopes(system)
+    if trouble := misfit(system, period):
+        raise ValueError(trouble)
+    return method
+
+
+def misfit(system: System, period: float) -> str:
+    """Which load does not have a period, in words; empty when all have it."""
+    for load, (_, signal) in enumerate(system.loads):
+        trouble = f"load {load} does not have the period {period:g} s"
+        if not hasattr(signal, "tones"):
+            probe = period * np.linspace(0.0, 1.0, 17)
+            first, second = np.asarray(signal(probe)), np.asarray(signal(probe + period))
+            if np.abs(first - second).max() > 1e-9 * np.abs(first).max():
+                return trouble
+            continue
+        cycles = np.asarray(signal.tones()[0]) * period / (2.0 * math.pi)
+        if np.abs(cycles - np.round(cycles)).max(initial=0.0) > 1e-9 * max(cycles.max(initial=0.0), 1.0):
+            return f"{trouble}: it makes {cycles} cycles in it"
+    return ""
+
+
+def checked_start(system: System, start: ArrayLike) -> Array:
+    """A start of the right shape."""
+    x = np.array(start, dtype=float)
+    if x.shape != (2 * system.size,) or not np.all(np.isfinite(x)):
+        raise ValueError(f"start must be {2 * system.size} finite numbers [q, q_dot], got {start!r}")
+    return x
+
+
+def settled(system: System, period: float, method: Any, longest: int = 400) -> Array:
+    """State to which a run from rest has settled: until the slowest block has decayed, at most ``longest`` periods."""
+    blocks = system.blocks
+    slowest = float((0.5 * blocks.c)[blocks.c > 0.0].min(initial=math.inf))
+    count = min(max(1, math.ceil(7.0 / (slowest * period))), longest)
+    return flown(system, np.zeros(2 * system.size), count * period, replace(method, rtol=max(method.rtol, 1e-8)))
+
+
+def solved_chain(system: System, period: float, x: Array, method: Any, count: int) -> tuple[Problem, Chain, float, int]:
+    """The chain of an orbit near a state, with its relative residual and the iterations.
+
+    The orbit's contacts may lie elsewhere than the guess's: where one with memory is under way at the begin of a shot,
+    which knows nothing of its entry rate, the shots begin anew in quiet times.
+    """
+    for _ in range(_MOST_BEGINS):
+        problem, guess = _start_chain(system, period, x, method, count)
+        chain, residual, iterations = newton(problem, guess, 0.0)
+        if not is_cut(chain, system):
+            return problem, chain, residual, iterations
+        x = at_zero(orbit_of(problem, chain, residual, iterations))
+    raise OrbitError("wherever shots begin, a contact of the orbit whose law latches the entry rate is under way")
+
+
+def _start_chain(system: System, period: float, x: Array, method: Any, count: int) -> tuple[Problem, Array]:
+    """Shots that begin in quiet times, and a guess of their states from a run over one period."""
+    n = system.size
+    first = integrate(system, x[:n], x[n:], period, method=method)
+    begins = quiet_begins(system, first.contacts, period, count, not closed(system, x, range(len(system.contacts))))
+    if not begins and not closed(system, x, with_memory(system)):
+        begins = [0.0]
+    if len(begins) < count:
+        raise OrbitError("at no time of the period are all stops open whose law latches the entry rate")
+    states = [x if t == 0.0 else flown(system, x, t, method) for t in begins]
+    return Problem(_Constant(system, period), method, tuple(t / period for t in begins)), np.array(states)
+
+
+@dataclass(frozen=True)
+class _Constant:
+    """A family of one member."""
+
+    system: System
+    period: float
+
+    def __call__(self, parameter: float) -> tuple[System, float]:
+        return self.system, self.period

@@ -1,0 +1,37 @@
+"""What is to be solved, and what comes out; nothing compiled is imported here.
+
+M q'' + C q' + K q = Σ v_l s_l(t) + Σ w_c F_c(-w_c·q - gap_c, ...)
+
+`system` holds matrices, contacts and loads and decouples them into blocks, `signals` samples loads for compiled code,
+`result` is the solution with its log of contacts and its energies. Imports: numpy, scipy. Begin with `system.System`.
+"""
+
+from solvers.problem.decoupling import decouple
+from solvers.problem.matrices import Array, dense, product
+from solvers.problem.result import COLUMNS, ContactLog, Cost, Energy, Solution, SolverError, Status, counted
+from solvers.problem.signals import Forcing, hand_over, on_one_grid, tones_as_nodes
+from solvers.problem.system import Contact, Law, Parameter, System, require_step
+
+__all__ = [
+    "COLUMNS",
+    "Array",
+    "Contact",
+    "ContactLog",
+    "Cost",
+    "Energy",
+    "Forcing",
+    "Law",
+    "Parameter",
+    "Solution",
+    "SolverError",
+    "Status",
+    "System",
+    "counted",
+    "decouple",
+    "dense",
+    "hand_over",
+    "on_one_grid",
+    "product",
+    "require_step",
+    "tones_as_nodes",
+]

@@ -1,0 +1,80 @@
+"""Dense and sparse matrices alike: products, checks."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+_ONE_THREAD = 200_000  # multiplications below which BLAS stays on one thread
+Array = NDArray[np.float64]
+
+
+def product(rows: Array, matrix: Any) -> Array:
+    """Rows (..., n) times a matrix (n, m), many of them in pieces too small for BLAS to spread over threads.
+
+    Threads gain nothing on such thin arrays, and where other work fills the cores one waits for the other.
+    """
+    piece = max(1, _ONE_THREAD // max(1, math.prod(matrix.shape)))
+    if rows.ndim != 2 or len(rows) <= piece:
+        return rows @ matrix
+    return np.concatenate([rows[i : i + piece] @ matrix for i in range(0, len(rows), piece)])
+
+
+def dense(matrix: Any) -> Array:
+    """A matrix as an array."""
+    array = matrix.toarray() if hasattr(matrix, "toarray") else matrix
+    array.setflags(write=False)
+    return array
+
+
+def _square(name: str, matrix: Any) -> Any:
+    """A finite, symmetric copy of a matrix: sparse by columns if it was sparse, else dense."""
+    if hasattr(matrix, "toarray"):
+        from scipy.sparse import csc_array
+
+        copied: Any = csc_array(matrix, dtype=float, copy=True)
+        values = copied.data
+    else:
+        copied = values = np.array(matrix, dtype=float, ndmin=2)
+    if copied.ndim != 2 or copied.shape[0] != copied.shape[1]:
+        raise ValueError(f"{name} must be square, got shape {copied.shape}")
+    if not np.all(np.isfinite(values)):
+        row, column = np.argwhere(~np.isfinite(dense(copied)))[0]
+        raise ValueError(f"{name} must be finite, got {copied[row, column]} at row {row}, column {column}")
+    asymmetry = abs(copied - copied.T).max()
+    if asymmetry > 1e-9 * abs(copied).max():
+        raise ValueError(f"{name} must be symmetric; its largest asymmetry is {asymmetry:g}")
+    values.setflags(write=False)
+    return copied
+
+
+def _check_mass(M: Any) -> None:
+    """M is positive definite."""
+    if hasattr(M, "toarray"):
+        if _has_positive_pivots(M):
+            return
+        lowest = "not positive"
+    else:
+        try:
+            np.linalg.cholesky(M)
+            return
+        except np.linalg.LinAlgError:
+            lowest = f"{np.linalg.eigvalsh(M)[0]:g}"
+    raise ValueError(
+        f"M must be positive definite, its lowest eigenvalue is {lowest}; "
+        "give every coordinate a mass or condense the massless ones"
+    )
+
+
+def _has_positive_pivots(M: Any) -> bool:
+    """Whether a symmetric sparse matrix is positive definite: Gaussian elimination along its diagonal."""
+    from scipy.sparse.linalg import splu
+
+    try:
+        factor = splu(M, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    except RuntimeError:  # singular
+        return False
+    return bool(np.all(factor.perm_r == factor.perm_c) and np.all(factor.U.diagonal() > 0.0))

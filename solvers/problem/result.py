@@ -1,0 +1,219 @@
+"""What a run returns: states, contact log, energy ledger, status, cost."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, fields
+from enum import Enum
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from solvers.problem.matrices import Array
+from solvers.problem.system import stored_energy
+
+
+def counted(count: int, noun: str) -> str:
+    """A number with its noun."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+class Status(Enum):
+    """How a run ended, as the sentence shown to the user. The order is the compiled kernels' code.
+
+    Examples
+    --------
+    >>> Status.DONE.value, Status.DONE.good, Status.INTERRUPTED.good
+    ('finished', True, False)
+    """
+
+    DONE = "finished"
+    RUNNING = "not finished yet"
+    INTERRUPTED = "interrupted: partial result up to the time reached"
+    STEP_TOO_SMALL = "the step fell below the resolution of time; the problem may be singular there: loosen rtol"
+    DIVERGED = (
+        "the state is not finite any more; the method is unstable at this step, or loads overflow: use smaller ones"
+    )
+    CHATTER = "more events than progress in time; a contact chatters: add damping, or change its law"
+    LOG_FULL = "the contact log is full"
+    LAW_NOT_FINITE = "a contact law gave a force that is not finite"
+    UNBALANCED = "the energy does not balance: the result is wrong; use a smaller rtol, or DormandPrince"
+    GAINED = "the motion holds more energy than it was ever given: the method is unstable here"
+
+    @property
+    def good(self) -> bool:
+        """Whether the result is what was asked for."""
+        return self is Status.DONE
+
+
+class SolverError(RuntimeError):
+    """A run that failed; ``solution`` holds what was computed before."""
+
+    def __init__(self, message: str, solution: Any = None) -> None:
+        super().__init__(message)
+        self.solution = solution
+
+
+@dataclass(frozen=True, eq=False)
+class ContactLog:
+    """Contacts in order of their end, one array entry each; a contact still open at the end has t_out = NaN.
+
+    Attributes
+    ----------
+    stop : index of the stop. t_in, t_out : s. speed_in, speed_out : m/s, both positive.
+    peak_indentation : m. peak_force : N. impulse : N s. energy_loss : J taken out of the beam.
+    floored : whether the entry speed was below the law's floor (also for a contact that began at t = 0).
+    """
+
+    stop: Any
+    t_in: Array
+    t_out: Array
+    speed_in: Array
+    speed_out: Array
+    peak_indentation: Array
+    peak_force: Array
+    impulse: Array
+    energy_loss: Array
+    floored: Any
+
+    def __len__(self) -> int:
+        return len(self.stop)
+
+    def __repr__(self) -> str:
+        open_ones = int(np.isnan(self.t_out).sum())
+        return f"<{counted(len(self), 'contact')}, {open_ones} of them not ended>"
+
+    @classmethod
+    def of_rows(cls, rows: Array) -> ContactLog:
+        """From the kernels' table, one contact a row."""
+        columns: list[Any] = [*rows.T.copy()]
+        columns[0], columns[-1] = columns[0].astype(int), columns[-1].astype(bool)
+        return cls(*columns)
+
+    @classmethod
+    def of_period(cls, logs: Sequence[ContactLog], begins: Sequence[float], period: float) -> ContactLog:
+        """One log of the runs that make up a period, each of whose times counts from its own begin.
+
+        A contact cut by the end of a run is made whole again with its rest in the next run (of the next period).
+        """
+        rows = [np.array(list(log.arrays().values()), dtype=float).T for log in logs]
+        for i, begin in enumerate(begins):
+            for row in rows[i][np.isnan(rows[i][:, 2])]:
+                rest = rows[(i + 1) % len(rows)]
+                later = begins[i + 1] if i + 1 < len(rows) else begins[0] + period
+                found = np.flatnonzero((rest[:, 0] == row[0]) & (rest[:, 1] == 0.0) & ~np.isnan(rest[:, 2]))
+                if found.size:
+                    _make_whole(row, rest[found[0]], later - begin)
+                    rows[i][(rows[i][:, 0] == row[0]) & np.isnan(rows[i][:, 2])] = row
+                    rows[(i + 1) % len(rows)] = np.delete(rest, found[0], axis=0)
+        moved = [
+            part + np.array([0.0, begin, begin] + [0.0] * (COLUMNS - 3))
+            for part, begin in zip(rows, begins, strict=True)
+        ]
+        return cls.of_rows(np.concatenate(moved))
+
+    def arrays(self) -> dict[str, Any]:
+        """All columns by name."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
+
+COLUMNS = len(fields(ContactLog))
+
+
+def _make_whole(row: Array, rest: Array, later: float) -> None:
+    """Add to a log row the rest of its contact, whose times count from ``later``."""
+    row[2], row[4] = later + rest[2], rest[4]
+    row[5:7] = np.maximum(row[5:7], rest[5:7])
+    row[7:9] += rest[7:9]
+
+
+@dataclass(frozen=True, eq=False)
+class Energy:
+    """Ledger at the output times, J: stored - initial = input - damping - contact + residual.
+
+    ``input`` is the work of all loads, ``damping`` what C took, ``contact`` the work done on the stops (in a contact
+    it contains what the stop will give back), ``residual`` the error.
+    """
+
+    input: Array
+    damping: Array
+    contact: Array
+    stored: Array
+    initial: float
+
+    @classmethod
+    def of_run(cls, M: Any, K: Any, powers: Array, motion: Array, begin: Array) -> Energy:
+        """From the integrated powers (k, 2 + 2m) and the motion [q, q̇] (k, 2n), which began at (2n,)."""
+        stored, initial = (stored_energy(M, K, *np.split(x, 2, axis=-1)) for x in (motion, begin))
+        return cls(powers[:, 0], powers[:, 1], powers[:, 2::2].sum(axis=1), stored, float(initial))
+
+    def __repr__(self) -> str:
+        return f"<energy ledger of {counted(len(self.stored), 'sample')}>"
+
+    @property
+    def residual(self) -> Array:
+        """What the ledger does not account for."""
+        return self.stored - self.initial - self.input + self.damping + self.contact
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Work of a run: accepted steps, rejected ones, law values asked for, switches of stops, wall seconds."""
+
+    steps: int
+    rejections: int
+    law_calls: int
+    events: int
+    seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A run.
+
+    Attributes
+    ----------
+    t : (k,) s. q, q_dot : (k, n) coordinates and rates then; without output samples k = 1, the end.
+    contacts : log, and energy : ledger, made when first looked at, by calling ``log`` and ``ledger``.
+    status : how it ended. cost : what it took.
+    tangent : (2n, 2n or 2n + 1) derivative of the final [q, q̇], and rate : (2n,) its derivative by time; None unless
+        asked for.
+
+    Examples
+    --------
+    >>> from contacts import Hertz
+    >>> from solvers import Contact, System, integrate
+    >>> ball = System(M=[[2.0]], C=[[0.0]], K=[[0.0]], contacts=[Contact([1.0], Hertz(1e6))])
+    >>> run = integrate(ball, [1e-3], [-0.5], duration=0.1, dt=1e-3)
+    >>> run
+    <solution to t = 0.1 s, 1 contact: finished>
+    >>> float(run.contacts.speed_in[0]), float(run.contacts.impulse[0])
+    (0.500000, 2.00000)
+    >>> bool(abs(run.energy.residual).max() < 1e-6)
+    True
+    """
+
+    t: Array
+    q: Array
+    q_dot: Array
+    log: Callable[[], ContactLog] = field(repr=False)
+    ledger: Callable[[], Energy] = field(repr=False)
+    status: Status
+    cost: Cost
+    tangent: Array | None = None
+    rate: Array | None = None
+
+    def __repr__(self) -> str:
+        reached = f"to t = {self.t[-1]:g} s" if len(self.t) else "without samples"
+        return f"<solution {reached}, {counted(len(self.contacts), 'contact')}: {self.status.value}>"
+
+    @cached_property
+    def contacts(self) -> ContactLog:
+        """The contact log."""
+        return self.log()
+
+    @cached_property
+    def energy(self) -> Energy:
+        """The energy ledger."""
+        return self.ledger()

@@ -1,0 +1,96 @@
+"""Arguments of a run: start, duration, output times, parameter of a tangent."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from solvers.problem import Array, Parameter, System
+
+_MOST_SAMPLES = 500_000_000
+
+
+def _check_tangent(tangent: Any, method: Any, system: System) -> None:
+    """A tangent is asked for in one of its forms, of a method that has one, for laws that have one."""
+    if tangent is False:
+        return
+    if not isinstance(tangent, bool | Parameter):
+        raise TypeError(f"tangent must be True, False or a solvers.Parameter, got {tangent!r}")
+    if tangent and not getattr(method, "has_tangent", False):
+        raise ValueError(f"tangent is not offered by {type(method).__name__}; use Exponential")
+    if tangent:
+        check_slopes(system)
+
+
+def check_slopes(system: System) -> None:
+    """No law has an infinite slope at its surface, F ~ δ^r with r < 1 but for a declared jump."""
+    if system.about_laws.get("finite slopes"):
+        return
+    delta = np.array([1e-12, 1e-10])
+    for i, contact in enumerate(system.contacts):
+        viscous = contact.law.force(delta, 1.0, 1.0) - contact.law.force(delta, 0.0, 1.0)
+        if not contact.law.jump and 0.0 < abs(viscous[1]) < 95.0 * abs(viscous[0]):
+            trouble = f"its slope is infinite at the surface: {contact.law!r}"
+            raise ValueError(f"tangent is not offered for the law of contact {i}: {trouble}")
+    system.about_laws["finite slopes"] = True
+
+
+def _start(system: System, q0: ArrayLike, q_dot0: ArrayLike, method: Any) -> Array:
+    """Checked start in the coordinates a method steps in: decoupled blocks, or the system's own."""
+    n = system.size
+    start = np.empty(2 * n)
+    for name, vector, place in (("q0", q0, start[:n]), ("q_dot0", q_dot0, start[n:])):
+        if np.shape(vector) != (n,) and (np.ndim(vector) or n != 1):
+            raise ValueError(f"{name} must have shape ({n},), got {np.shape(vector)}")
+        place[:] = vector
+    if not math.isfinite(start.dot(start)):  # or large: squares overflow
+        finite = np.isfinite(start)
+        if not finite.all():
+            which, bad = divmod(int(np.argmin(finite)), n)
+            name = ("q0", "q_dot0")[which]
+            raise ValueError(f"{name} must be finite, got {start[which * n + bad]} at coordinate {bad}")
+    if hasattr(method, "takes_matrices") and method.takes_matrices(system):
+        return start
+    return system.blocks.inverse.dot(start)
+
+
+def _times(duration: float, dt: Any) -> Array | None:
+    """Output times of a sampling, or those given; None for none."""
+    if not 0.0 < duration < math.inf:
+        raise ValueError(f"duration must be positive and finite (s), got {duration!r}")
+    if dt is None:
+        return None
+    if np.ndim(dt) > 0:
+        return _given_times(duration, dt)
+    if not 0.0 < dt < math.inf:
+        raise ValueError(f"dt must be positive and finite (s), got {dt!r}")
+    count = math.floor(duration / dt * (1.0 + 1e-12)) + 1
+    if count > _MOST_SAMPLES:
+        raise ValueError(f"dt = {dt:g} s over {duration:g} s asks for {count} samples; choose a larger dt")
+    return np.arange(count) * dt
+
+
+def _given_times(duration: float, given: ArrayLike) -> Array:
+    """Checked output times."""
+    times = np.array(given, dtype=float)
+    if times.ndim != 1 or not np.isfinite(times).all() or np.any(np.diff(times) <= 0.0):
+        raise ValueError(f"dt as output times must be one increasing row of finite numbers (s), got {given!r}")
+    if times.size and not (times[0] >= 0.0 and times[-1] <= duration * (1.0 + 1e-12)):
+        raise ValueError(f"output times must lie in [0, {duration:g}] s, got {times[0]:g} to {times[-1]:g} s")
+    return times
+
+
+def _check_laws(system: System) -> None:
+    """Every law is finite at rest, so that a NaN is met before the run; looked at once per system."""
+    if system.about_laws.get("finite"):
+        return
+    delta = np.array([1e-12, 1e-6, 1e-3])
+    for i, contact in enumerate(system.contacts):
+        force = contact.law.force(delta, 0.0, 1.0)
+        if not np.all(np.isfinite(force)):
+            where = delta[~np.isfinite(force)][0]
+            raise ValueError(f"the law of contact {i} is not finite at delta = {where:g} m: {contact.law!r}")
+    system.about_laws["finite"] = True

@@ -1,0 +1,156 @@
+"""How signals reach the compiled integrators.
+
+A signal is any callable t -> value that broadcasts. It is handed over as exactly one of
+
+* *tones*: ``signal.tones() -> (omega (k,), amplitude (k,) complex)``, value Re Σ a e^{iωt}, exact;
+* *nodes*: ``signal.nodes(duration, rtol) -> (dt, (N, 3))``, rows [s, s', s''] at t = 0, dt, ...; between them the
+  quintic through both ends' values, slopes and curvatures, within ``rtol`` times the signal's size, in the mean
+  square at least;
+* nothing of either: sampled here by a quintic spline, refined until it agrees between its nodes. It begins with 64
+  cells: what is shorter than duration/64, such as a pulse, may hide between them and needs ``nodes``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from solvers.problem.matrices import Array
+from solvers.problem.system import Signal
+
+_MOST_NODES = 20_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Forcing:
+    """All signals of a system as arrays: tones (K,) and node tables (sum N, 3), each with the load it drives."""
+
+    tone_omega: Array
+    tone_amplitude: Any
+    tone_load: Any
+    table: Array
+    table_dt: Array
+    table_start: Any
+    table_load: Any
+
+
+def hand_over(signals: list[Signal], duration: float, rtol: float) -> Forcing:
+    """Arrays of all signals on [0, duration]."""
+    tones: list[tuple] = []
+    tables: list[tuple[float, Array, int]] = []
+    for load, signal in enumerate(signals):
+        if hasattr(signal, "tones"):
+            omega, amplitude = signal.tones()
+            tones += [(float(w), complex(a), load) for w, a in zip(omega, amplitude, strict=True)]
+        else:
+            provider = getattr(signal, "nodes", None)
+            dt, rows = provider(duration, rtol) if provider else _sample(signal, duration, rtol, load)
+            _check_nodes(rows, dt, duration, load)
+            tables.append((dt, rows, load))
+    starts = np.cumsum([0] + [len(rows) for _, rows, _ in tables])
+    return Forcing(
+        np.array([t[0] for t in tones], dtype=float),
+        np.array([t[1] for t in tones], dtype=complex),
+        np.array([t[2] for t in tones], dtype=np.int64),
+        _joined([rows for _, rows, _ in tables]),
+        np.array([dt for dt, _, _ in tables], dtype=float),
+        starts.astype(np.int64),
+        np.array([load for _, _, load in tables], dtype=np.int64),
+    )
+
+
+def _joined(tables: list[Array]) -> Array:
+    """All node tables in one array; a single one, which is long, is not copied."""
+    if len(tables) == 1:
+        return np.ascontiguousarray(tables[0], dtype=float)
+    return np.ascontiguousarray(np.concatenate(tables or [np.empty((0, 3))]))
+
+
+def tones_as_nodes(forcing: Forcing, chosen: list[int], duration: float, rtol: float) -> Forcing:
+    """The same forcing with some tones as node tables: quintics within ``rtol`` of them, |error| <= (ω dt)⁶/46080."""
+    tables, loads = [forcing.table], sorted(set(forcing.tone_load[chosen].tolist()))
+    for load in loads:  # one table per load, as for any signal
+        mine = [i for i in chosen if forcing.tone_load[i] == load]
+        omega = forcing.tone_omega[mine]
+        longest = (4608.0 * rtol) ** (1.0 / 6.0) / omega.max() if omega.max() > 0.0 else duration
+        t = np.linspace(0.0, duration, max(1, int(np.ceil(duration / longest))) + 1)
+        waves = forcing.tone_amplitude[mine] * np.exp(1j * np.outer(t, omega))
+        tables.append(np.stack([(waves * (1j * omega) ** k).sum(axis=1).real for k in range(3)], axis=1))
+    kept = np.setdiff1d(np.arange(len(forcing.tone_omega)), chosen)
+    sizes = [len(table) for table in tables[1:]]
+    return Forcing(
+        forcing.tone_omega[kept],
+        forcing.tone_amplitude[kept],
+        forcing.tone_load[kept],
+        np.ascontiguousarray(np.concatenate(tables)),
+        np.concatenate((forcing.table_dt, [duration / (size - 1) for size in sizes])),
+        np.concatenate((forcing.table_start, forcing.table_start[-1] + np.cumsum(sizes, dtype=np.int64))),
+        np.concatenate((forcing.table_load, np.array(loads, dtype=np.int64))),
+    )
+
+
+def on_one_grid(forcing: Forcing, duration: float) -> Forcing:
+    """The same forcing with every node table on the finest table's grid; coarser quintics are evaluated there."""
+    if not forcing.table_dt.size or np.ptp(forcing.table_dt) == 0.0:
+        return forcing
+    dt = forcing.table_dt.min()
+    cells = int(np.ceil(duration / dt * (1.0 - 1e-12)))
+    tables = []
+    for j, own in enumerate(forcing.table_dt):
+        rows = forcing.table[forcing.table_start[j] : forcing.table_start[j + 1]]
+        tables.append(rows[: cells + 1] if own == dt else _quintic(rows, own, np.arange(cells + 1) * dt))
+    starts = np.cumsum([0] + [len(table) for table in tables]).astype(np.int64)
+    return replace(
+        forcing,
+        table=np.ascontiguousarray(np.concatenate(tables)),
+        table_dt=np.full(len(tables), dt),
+        table_start=starts,
+    )
+
+
+def _quintic(rows: Array, dt: float, t: Array) -> Array:
+    """s, s', s'' of a node table's quintics at times t; SciPy's BPoly takes 50 times as long, cell by cell."""
+    cell = np.clip((t / dt).astype(np.int64), 0, len(rows) - 2)
+    x = t / dt - cell
+    (a0, a1, a2), (b0, b1, b2) = ((rows[i] * (1.0, dt, 0.5 * dt**2)).T for i in (cell, cell + 1))
+    e0, e1, e2 = b0 - a0 - a1 - a2, b1 - a1 - 2.0 * a2, b2 - a2
+    c3, c4, c5 = 10.0 * e0 - 4.0 * e1 + e2, -15.0 * e0 + 7.0 * e1 - 2.0 * e2, 6.0 * e0 - 3.0 * e1 + e2
+    value = a0 + x * (a1 + x * (a2 + x * (c3 + x * (c4 + x * c5))))
+    slope = a1 + x * (2.0 * a2 + x * (3.0 * c3 + x * (4.0 * c4 + x * 5.0 * c5)))
+    bend = 2.0 * a2 + x * (6.0 * c3 + x * (12.0 * c4 + x * 20.0 * c5))
+    return np.stack([value, slope / dt, bend / dt**2], axis=1)
+
+
+def _check_nodes(rows: Array, dt: float, duration: float, load: int) -> None:
+    """A node table is finite and covers the run."""
+    if not np.all(np.isfinite(rows)):
+        bad = int(np.argwhere(~np.isfinite(rows))[0, 0])
+        raise ValueError(f"the signal of load {load} is not finite at t = {bad * dt:g} s")
+    if (len(rows) - 1) * dt < duration * (1.0 - 1e-12):
+        raise ValueError(f"the signal of load {load} ends at {(len(rows) - 1) * dt:g} s, the run at {duration:g} s")
+
+
+def _sample(signal: Signal, duration: float, rtol: float, load: int) -> tuple[float, Array]:
+    """Nodes of a plain callable: double a quintic spline's grid until it agrees to ``rtol`` between its nodes."""
+    from scipy.interpolate import make_interp_spline
+
+    cells = 64
+    while cells <= _MOST_NODES:
+        t = np.linspace(0.0, duration, cells + 1)
+        values = np.asarray(signal(t), dtype=float)
+        if values.shape != t.shape:
+            raise ValueError(f"the signal of load {load} must broadcast: {t.shape} times gave {values.shape} values")
+        if not np.all(np.isfinite(values)):
+            raise ValueError(f"the signal of load {load} is {values[~np.isfinite(values)][0]} on [0, {duration:g}] s")
+        spline = make_interp_spline(t, values, k=5)
+        # thirds rather than midpoints, so that no period of the signal hides between the samples
+        between = t[:-1] + duration / cells * np.where(np.arange(cells) % 2, 1 / 3, 0.58)
+        error = np.abs(spline(between) - signal(between)).max()
+        if error <= rtol * np.abs(values).max():
+            return duration / cells, np.stack([values, spline(t, 1), spline(t, 2)], axis=1)
+        cells *= 2
+    raise ValueError(
+        f"the signal of load {load} is too rough to sample to {rtol:g}; give it tones() or nodes(), or loosen rtol"
+    )

@@ -1,0 +1,292 @@
+r"""The mechanical problem an integrator is handed, and its decoupled form.
+
+.. math:: M \ddot q + C \dot q + K q = \sum_l v_l s_l(t) + \sum_s w_s F_s(δ_s, \dot δ_s),\qquad δ_s = -w_s^T q - g_s
+
+Every method here integrates the same decoupled form: n blocks (p_j, v_j) with
+
+    p_j' = v_j + ...,   v_j' = -k_j p_j - c_j v_j + ...,   z = [p, v],   [q, q'] = T z.
+
+With proportional damping p is the modal coordinate and T = diag(Φ, Φ). Otherwise each complex pair (or pair
+of real eigenvalues) of the state matrix gives one block, and loads and contacts push p as well as v.
+Runge–Kutta and exact propagation commute with this change of coordinates, so nothing is lost by it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from solvers.problem.decoupling import Blocks, decouple
+from solvers.problem.matrices import Array, _check_mass, _square, dense, product
+
+
+class Law(Protocol):
+    """What a contact law must offer.
+
+    The C signature of ``address`` is
+    ``void (int64 n, double *delta, double *delta_dot, double entry_rate, double *parameters, double *force)``.
+    """
+
+    knots: tuple[float, ...]
+    jump: bool
+    exponent: float
+    entry_rate_floor: float
+
+    @property
+    def address(self) -> int:
+        """Address of the compiled force."""
+
+    @property
+    def gradient_address(self) -> int:
+        """Address of its derivatives: the same arguments, then arrays for ∂F/∂δ, ∂F/∂δ̇ and ∂F/∂entry_rate."""
+
+    @property
+    def parameters(self) -> Array:
+        """Numbers for the compiled force."""
+
+    def force(self, delta: ArrayLike, delta_dot: ArrayLike, entry_rate: ArrayLike) -> Array:
+        """Force on arrays."""
+
+
+Signal = Callable[[Any], Any]
+"""A function t -> value that broadcasts; may offer ``tones()`` or ``nodes(duration, rtol)``, see `signals`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """One stop: ``delta = -direction @ q - gap``; it pushes with ``+direction * force`` while ``delta > 0``.
+
+    Parameters
+    ----------
+    direction : (n,), the way the stop pushes.
+    law : a contact law, such as those of the package `contacts`.
+    gap : clearance in m; negative for a preload.
+
+    Examples
+    --------
+    >>> from contacts import Hertz
+    >>> Contact([0.0, 1.0], Hertz(1e9), gap=1e-3).gap
+    0.001
+    """
+
+    direction: Array
+    law: Law
+    gap: float = 0.0
+
+    def __post_init__(self) -> None:
+        direction = np.array(self.direction, dtype=float, ndmin=1)
+        if direction.ndim != 1 or not np.all(np.isfinite(direction)):
+            raise ValueError(f"direction of a Contact must be a finite vector, got {self.direction!r}")
+        if not np.isfinite(self.gap):
+            raise ValueError(f"gap must be finite, got {self.gap!r}; use no Contact at all for a stop out of reach")
+        if not hasattr(self.law, "entry_rate_floor") or isinstance(self.law, type):
+            hint = "decorate the function with @law and call it" if callable(self.law) else "use one of contacts"
+            raise TypeError(f"law of a Contact must be a contact law, got {self.law!r}; {hint}")
+        direction.setflags(write=False)
+        object.__setattr__(self, "direction", direction)
+        object.__setattr__(self, "gap", float(self.gap))
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """Matrices, contacts and loads of one problem, M q̈ + C q̇ + K q = Σ v_l s_l(t) + Σ w_s F_s(δ_s, δ̇_s).
+
+    Parameters
+    ----------
+    M, C, K : (n, n), dense or SciPy sparse; M symmetric positive definite, C and K symmetric. Sparse ones stay sparse
+        for methods that step on matrices; other methods, and `blocks`, take n³ operations once.
+    contacts : sequence of `Contact`.
+    loads : sequence of ``(vector (n,), signal)``.
+
+    Raises
+    ------
+    ValueError for shapes that do not fit, entries that are not finite, or M not positive definite.
+
+    Examples
+    --------
+    >>> mass = System(M=[[2.0]], C=[[0.0]], K=[[0.0]])
+    >>> mass.size
+    1
+    """
+
+    M: Any
+    C: Any
+    K: Any
+    contacts: Sequence[Contact] = ()
+    loads: Sequence[tuple[ArrayLike, Signal]] = ()
+    kept: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)  # what methods prepare once
+
+    def __post_init__(self) -> None:
+        for name in "MCK":
+            object.__setattr__(self, name, _square(name, getattr(self, name)))
+        if not self.M.shape == self.C.shape == self.K.shape:
+            raise ValueError(f"M, C, K must have one shape, got {self.M.shape}, {self.C.shape}, {self.K.shape}")
+        if not all(hasattr(matrix, "toarray") for matrix in (self.M, self.C, self.K)):
+            for name in "MCK":
+                object.__setattr__(self, name, dense(getattr(self, name)))
+        _check_mass(self.M)
+        self._check_contacts_and_loads()
+
+    def _check_contacts_and_loads(self, known: Sequence[Any] = ()) -> None:
+        """Contacts and loads fit the matrices; of the loads with known vectors only the signals are looked at."""
+        object.__setattr__(self, "contacts", tuple(self.contacts))
+        object.__setattr__(self, "loads", tuple(self._load(i, pair, known) for i, pair in enumerate(self.loads)))
+        for i, contact in enumerate(self.contacts):
+            if contact.direction.size != self.size:
+                raise ValueError(f"contact {i} has a direction of {contact.direction.size}, the system {self.size}")
+
+    def like(
+        self,
+        contacts: Sequence[Contact] | None = None,
+        loads: Sequence[tuple[ArrayLike, Signal]] | None = None,
+    ) -> System:
+        """The same structure with other contacts or loads; its matrices are neither checked nor decoupled again."""
+        other = object.__new__(System)
+        other.__dict__.update(self.__dict__, blocks=self.blocks, push=self.push, kept={})
+        for name, value in (("contacts", contacts), ("loads", loads)):
+            if value is not None:
+                other.__dict__[name] = value
+        other._check_contacts_and_loads([vector for vector, _ in self.loads])
+        if len(self.contacts) == len(other.contacts):
+            if all(a.law is b.law for a, b in zip(self.contacts, other.contacts, strict=True)):
+                other.kept["laws"] = self.about_laws
+            if self._vectors_are_those_of(other):
+                other.kept["structure"] = self.about_structure
+        return other
+
+    def _vectors_are_those_of(self, other: System) -> bool:
+        """Whether contacts and loads act along the same vectors."""
+        if len(self.loads) != len(other.loads):
+            return False
+        pairs: list[tuple[Any, Any]] = [
+            (a.direction, b.direction) for a, b in zip(self.contacts, other.contacts, strict=True)
+        ]
+        pairs += [(a, b) for (a, _), (b, _) in zip(self.loads, other.loads, strict=True)]
+        return all(a is b or np.array_equal(a, b) for a, b in pairs)
+
+    @property
+    def about_structure(self) -> dict[str, Any]:
+        """What was found of matrices, directions and loads' vectors; shared like `about_laws`."""
+        known: dict[str, Any] = self.kept.setdefault("structure", {})
+        return known
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy or another process gets: all but what methods have prepared, which holds addresses of memory."""
+        return {**self.__dict__, "kept": {}}
+
+    @property
+    def about_laws(self) -> dict[str, Any]:
+        """What was found of the laws so far; systems made by `like` share it as long as they have the same laws."""
+        known: dict[str, Any] = self.kept.setdefault("laws", {})
+        return known
+
+    def _load(self, i: int, pair: tuple[ArrayLike, Signal], known: Sequence[Any]) -> tuple[Array, Signal]:
+        """One checked load."""
+        given, signal = pair
+        vector: Any = next((vector for vector in known if vector is given), None)
+        if vector is None:
+            vector = np.array(given, dtype=float, ndmin=1)
+            vector.setflags(write=False)
+            if vector.shape != (self.size,) or not np.all(np.isfinite(vector)):
+                raise ValueError(f"load {i} needs a finite vector of {self.size}, got {vector!r}")
+        if not callable(signal):
+            raise TypeError(f"load {i} needs a signal t -> value, got {signal!r}")
+        return vector, signal
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates n."""
+        return int(self.M.shape[0])
+
+    @classmethod
+    def modal(
+        cls,
+        omega: ArrayLike,
+        zeta: ArrayLike,
+        contacts: Sequence[Contact] = (),
+        loads: Sequence[tuple[ArrayLike, Signal]] = (),
+    ) -> System:
+        """Mass-normalised modes: M = I, C = diag(2 ζ ω), K = diag(ω²); one ζ serves all modes.
+
+        Parameters
+        ----------
+        omega : (n,) rad/s, >= 0; 0 for a rigid-body mode.
+        zeta : one number or (n,), >= 0.
+        contacts, loads : as for `System`, in modal coordinates.
+        """
+        omega = np.atleast_1d(np.asarray(omega, dtype=float))
+        zeta = np.broadcast_to(np.asarray(zeta, dtype=float), omega.shape)
+        if not (np.all(np.isfinite(omega)) and np.all(omega >= 0.0)):
+            raise ValueError(f"omega must be finite and >= 0 (rad/s), got {omega}")
+        if not (np.all(np.isfinite(zeta)) and np.all(zeta >= 0.0)):
+            raise ValueError(f"zeta must be finite and >= 0, got {zeta}")
+        return cls(np.eye(omega.size), np.diag(2.0 * zeta * omega), np.diag(omega**2), contacts, loads)
+
+    @cached_property
+    def blocks(self) -> Blocks:
+        """The decoupled form."""
+        return decouple(dense(self.M), dense(self.C), dense(self.K))
+
+    @cached_property
+    def push(self) -> Array:
+        """(2n, n) rate of the blocks' state per unit force on every coordinate."""
+        return self.blocks.inverse[:, self.size :] @ np.linalg.inv(dense(self.M))
+
+    @property
+    def sparse(self) -> bool:
+        """Whether the matrices were given sparse."""
+        return hasattr(self.M, "toarray")
+
+    def energy(self, q: Array, q_dot: Array) -> Array:
+        """Stored energy ½ q'ᵀ M q' + ½ qᵀ K q in J, for (..., n) arrays."""
+        return stored_energy(self.M, self.K, q, q_dot)
+
+
+def stored_energy(M: Any, K: Any, q: Array, q_dot: Array) -> Array:
+    """½ q'ᵀ M q' + ½ qᵀ K q of (..., n) arrays; inf of a run that diverged."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return 0.5 * sum(np.einsum("...i,...i", product(x, matrix), x) for x, matrix in ((q_dot, M), (q, K)))
+
+
+@dataclass(frozen=True, eq=False)
+class Parameter:
+    """A scalar of the problem, given by the systems at its value less and plus ``step``.
+
+    The derivative d[q, q̇]/d(parameter) at fixed start and fixed duration. Where the systems differ in loads' tones,
+    gaps and laws' parameters only, these data are differenced and the motion's derivative is exact; where anything
+    else differs (matrices, directions, knots, sampled signals), it is the central difference of two runs.
+
+    Parameters
+    ----------
+    behind, ahead : systems of one size, with the same number of contacts and loads.
+    step : half the difference of the parameter, > 0.
+
+    Examples
+    --------
+    >>> soft, stiff = (System.modal(omega=[w], zeta=[0.0]) for w in (1.99, 2.01))
+    >>> Parameter(soft, stiff, step=0.01).step
+    0.01
+    """
+
+    behind: System
+    ahead: System
+    step: float
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.step < math.inf:
+            raise ValueError(f"step of a Parameter must be positive and finite, got {self.step!r}")
+        sizes = [(s.size, len(s.contacts), len(s.loads)) for s in (self.behind, self.ahead)]
+        if sizes[0] != sizes[1]:
+            raise ValueError(f"the systems of a Parameter differ in coordinates, contacts or loads: {sizes}")
+
+
+def require_step(name: str, value: float) -> None:
+    """ValueError for a step that is none."""
+    if not 0.0 < value < np.inf:
+        raise ValueError(f"{name} must be positive and finite (s), got {value!r}")

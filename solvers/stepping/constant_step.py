@@ -1,0 +1,129 @@
+"""What all methods of constant step share: checked before they start, watched while they run."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from typing import Any, ClassVar
+
+import numpy as np
+
+from solvers.problem import Array, Forcing, System
+from solvers.stepping.critical_step import eigen_oscillators
+from solvers.stepping.events import IGNORED, LANDED
+from solvers.stepping.stability import Limit, Radius, limit
+
+
+class ConstantStep(ABC):
+    """A method of constant step: checked before it starts, watched while it runs."""
+
+    adaptive: ClassVar[bool] = False
+    rtol: ClassVar[float] = 1e-10  # for sampling signals
+    atol: ClassVar[float] = 0.0
+    constants: ClassVar[tuple[float, ...]] = ()
+    dt: float
+    locate: bool
+    force_unstable: bool
+
+    @property
+    def steps(self) -> tuple[float, float]:
+        """Steps in flight and in contact, s."""
+        return self.dt, self.dt
+
+    @property
+    def events(self) -> int:
+        """What is done about events."""
+        return LANDED if self.locate else IGNORED
+
+    @property
+    @abstractmethod
+    def radius(self) -> Radius:
+        """Spectral radius of a step."""
+
+    def takes_matrices(self, system: System) -> bool:
+        """Whether a run steps on the matrices themselves rather than on decoupled modes."""
+        return False
+
+    def stable_dt(self, system: System, indentation: float | None = None, duration: float = math.inf) -> Limit:
+        """Predicted limits of the step.
+
+        Parameters
+        ----------
+        system : the problem.
+        indentation : expected one in m, for the tangent of the contact laws; None takes that of a hit at 1 m/s.
+        duration : s; a short run may amplify a mode by a tenth.
+
+        Returns
+        -------
+        Limit : the named tuple (flight, contact, mode, contact_mode) in s; 0 where no step is stable, inf where every
+            one is.
+
+        Notes
+        -----
+        Exact, dashpots that couple the modes included; in contact as good as a frozen tangent is. Of large sparse
+        matrices only the largest, the most damped and the fastest eigenvalues are asked.
+        """
+        return limit(self, system, indentation, duration)
+
+    def critical(self, M: Any, C: Any, K: Any) -> tuple[Array, Array]:
+        """Stiffness k and damping c (j,) of the oscillators that decide on matrices."""
+        return eigen_oscillators(M, C, K)
+
+    def oscillators(self, system: System) -> tuple[Array, Array]:
+        """The same of a system in flight: its decoupled modes, or what decides on its matrices."""
+        if system.sparse or self.takes_matrices(system):
+            return self.critical(system.M, system.C, system.K)
+        return system.blocks.k, system.blocks.c
+
+    def engine(self, system: System, z: Array, forcing: Forcing, duration: float) -> Any:
+        """The method made ready for one run; ValueError for a step that is predicted to be unstable or blind."""
+        if not self.force_unstable:
+            refuse(self, system, duration)
+            refuse_blind(self, forcing)
+        if self.takes_matrices(system):
+            from solvers.stepping.sparse import MatrixEngine
+
+            return MatrixEngine(self, system, z, forcing, duration)
+        from solvers.stepping.loop import Engine  # here: the loop knows the methods' modules
+
+        return Engine(self, system, z, forcing, duration)
+
+
+def refuse(method: ConstantStep, system: System, duration: float) -> None:
+    """ValueError for a step above its limit; looked at once per system."""
+    key = "limit", type(method), method.constants, duration
+    if key not in system.kept:
+        system.kept[key] = method.stable_dt(system, duration=duration)
+    found = system.kept[key]
+    for where, step, longest, mode in (
+        ("in flight", method.steps[0], found.flight, found.mode),
+        ("in contact, hit at 1 m/s", method.steps[1], found.contact, found.contact_mode),
+    ):
+        if not step <= longest:
+            advice = f"take a step below {longest:.3g} s" if longest > 0.0 else "no step is stable: take another method"
+            raise ValueError(
+                f"{method!r} is unstable {where}: mode {_name(system, mode)} allows {longest:.3g} s, got {step:g} s; "
+                f"{advice}, or run it all the same with force_unstable=True"
+            )
+
+
+def refuse_blind(method: ConstantStep, forcing: Forcing) -> None:
+    """ValueError for a step that samples a load less than twice in its period, and so takes it for a slower one."""
+    seen = forcing.tone_omega[forcing.tone_amplitude != 0.0]
+    fastest = max([0.0, *seen, *(_mean_frequency(rows) for rows in np.split(forcing.table, forcing.table_start[1:-1]))])
+    if max(method.steps) * fastest > math.pi:
+        raise ValueError(
+            f"{method!r} samples a load of {fastest:.4g} rad/s less than twice in its period; take a step below "
+            f"{math.pi / fastest:.3g} s, or run it all the same with force_unstable=True"
+        )
+
+
+def _mean_frequency(rows: Array) -> float:
+    """Root mean square frequency of a node table [s, s', s''], rad/s."""
+    size = float(np.linalg.norm(rows[:, 1])) if len(rows) else 0.0
+    return float(np.linalg.norm(rows[:, 2])) / size if size > 0.0 else 0.0
+
+
+def _name(system: System, mode: int) -> str:
+    """A mode for a message, counted from 1."""
+    return "of the highest frequency" if system.sparse or mode < 0 else f"{mode + 1} of {system.size}"

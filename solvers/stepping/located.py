@@ -1,0 +1,254 @@
+"""Events of a step, located on its dense output: borders crossed, peaks, bends of laws, samples."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solvers.compiled.kernels import contact_forces, copy, dot, indentation, inner, kernel
+from solvers.compiled.state import (
+    AT_ONCE,
+    CALLS,
+    CHATTER,
+    DIVERGED,
+    DONE,
+    LAW_NOT_FINITE,
+    LOG_FULL,
+    LOGGED,
+    MOST_EVENTS_AT_ONCE,
+    PEAK_DELTA,
+    PEAK_FORCE,
+    RUNNING,
+    SAMPLED,
+    STEPS,
+    T,
+    surface_tolerance,
+    switch,
+    switch_on_surface,
+)
+from solvers.stepping.events import (
+    GOLDEN,
+    IGNORED,
+    LANDED,
+    MOST_LANDINGS,
+    NONE,
+    coefficients_of,
+    first_event,
+    nearer,
+    polynomial,
+)
+
+EVENT = -1  # beside the status codes
+
+_PEAK_NODES = np.linspace(0.0, 1.0, 9)
+
+
+_KINK_NODES = np.array([0.0, 1 / 16, 1 / 4, 1 / 2, 3 / 4, 7 / 8, 31 / 32, 127 / 128, 511 / 512, 1.0])
+
+
+_AT_AN_END = 1e-6  # share of a step: a kink as near to an end as that is landed on
+
+
+@inner
+def _peaks(problem, state, space):
+    """Largest indentation and force of the step just accepted, for every stop in contact."""
+    delta_of, rate_of = space.coefficients[0], space.coefficients[1]
+    for s in range(problem.gap.size):
+        if state.piece[s] == 0:
+            continue
+        coefficients_of(problem.read[s], problem.gap[s], state.x, space.dense, delta_of)
+        coefficients_of(problem.read_rate[s], 0.0, state.x, space.dense, rate_of)
+        for column in (PEAK_DELTA, PEAK_FORCE):
+            best, place = -np.inf, 0
+            for i in range(_PEAK_NODES.size):
+                value = _peak_value(problem, state, s, column, delta_of, rate_of, _PEAK_NODES[i], space.work[0])
+                if value > best:
+                    best, place = value, i
+            if best > 0.9 * state.open[s, column]:
+                best = max(best, _highest(problem, state, s, column, delta_of, rate_of, place, space.work[0]))
+                state.open[s, column] = max(state.open[s, column], best)
+
+
+@inner
+def _highest(problem, state, s, column, delta_of, rate_of, place, batch):
+    """Largest value around a node of the step, by golden section."""
+    a, b = _PEAK_NODES[max(place - 1, 0)], _PEAK_NODES[min(place + 1, _PEAK_NODES.size - 1)]
+    best = -np.inf
+    for _ in range(36):
+        c, d = b - GOLDEN * (b - a), a + GOLDEN * (b - a)
+        at_c = _peak_value(problem, state, s, column, delta_of, rate_of, c, batch)
+        at_d = _peak_value(problem, state, s, column, delta_of, rate_of, d, batch)
+        if at_c > at_d:
+            b = d
+        else:
+            a = c
+        best = max(best, at_c, at_d)
+    return best
+
+
+@inner
+def _peak_value(problem, state, s, column, delta_of, rate_of, theta, batch):
+    """Indentation or force at θ of the step."""
+    batch[0] = polynomial(delta_of, theta)
+    if column == PEAK_DELTA:
+        return batch[0]
+    batch[1] = polynomial(rate_of, theta)
+    contact_forces(problem, s, batch[0:1], batch[1:2], state.entry_rate[s], batch[2:3])
+    return batch[2]
+
+
+@inner
+def _kink(problem, state, space):
+    """θ of the first place inside the step where a clamped force begins or ends, or a damper of approach; else NONE."""
+    first, batch = NONE, space.work[0]
+    for s in range(problem.gap.size):
+        if state.piece[s] == 0 or space.kinks[s] == 0:
+            continue
+        coefficients_of(problem.read[s], problem.gap[s], state.x, space.dense, space.coefficients[0])
+        coefficients_of(problem.read_rate[s], 0.0, state.x, space.dense, space.coefficients[1])
+        lowest = landing_tolerance(problem, state, s)
+        for i in range(1, _KINK_NODES.size):
+            a, b = _KINK_NODES[i - 1], _KINK_NODES[i]
+            before = _side(problem, state, space, s, a, lowest, batch)
+            if before == _side(problem, state, space, s, b, lowest, batch):
+                continue
+            for _ in range(50):
+                middle = 0.5 * (a + b)
+                same = _side(problem, state, space, s, middle, lowest, batch) == before
+                a, b = (middle, b) if same else (a, middle)
+            if b > _AT_AN_END and b < 1.0 - _AT_AN_END:
+                first = min(first, b)
+                break
+    return first
+
+
+@inner
+def _side(problem, state, space, s, theta, lowest, batch):
+    """On which side of its kinks a law is at θ of the step; beyond the surface on that of the surface."""
+    delta, rate = polynomial(space.coefficients[0], theta), polynomial(space.coefficients[1], theta)
+    side = 2 if space.kinks[s] & 2 and rate > 0.0 else 0
+    if space.kinks[s] & 1 and delta > lowest:
+        batch[0], batch[1] = delta, rate
+        contact_forces(problem, s, batch[0:1], batch[1:2], state.entry_rate[s], batch[2:3])
+        side += 1 if batch[2] == 0.0 else 0
+    return side
+
+
+@inner
+def _sample(state, space, h, out, due):
+    """Write the output samples that lie within the step."""
+    t = state.now[T]
+    while due[state.count[SAMPLED]] <= t + h:
+        theta = min(max((due[state.count[SAMPLED]] - t) / h, 0.0), 1.0) if h > 0.0 else 0.0
+        row, u = out[state.count[SAMPLED]], 1.0 - theta
+        for i in range(state.x.size):
+            value = 0.0
+            for j in range(6, -1, -1):
+                value = space.dense[j, i] + (u if j % 2 == 0 else theta) * value
+            row[i] = state.x[i] + theta * value
+        state.count[SAMPLED] += 1
+
+
+@kernel
+def landing_tolerance(problem, state, stop):
+    """Distance from a level that counts as landed on it."""
+    return 4.0 * surface_tolerance(problem, stop, state.x)
+
+
+@inner
+def _land(step, problem, state, space, h, longest, stop, direction, level, rtol, atol):
+    """Repeat the step with the duration that ends on ``level``; returns it, else minus the step to try instead."""
+    tolerance = landing_tolerance(problem, state, stop)
+    before, beyond = 0.0, longest
+    for _ in range(MOST_LANDINGS):
+        error, calls = step(
+            *(problem, state.now[T], h, state.x, state.rate, state.piece, state.entry_rate),
+            *(space.x_new, space.rate_new, space.dense, space.work, rtol, atol),
+        )
+        state.count[CALLS] += calls
+        distance = direction * (indentation(problem, stop, space.x_new) - level)
+        if abs(distance) <= tolerance:
+            return _if_accurate(h, error)
+        before, beyond = (h, beyond) if distance < 0.0 else (before, h)
+        slope = direction * dot(problem.read_rate[stop], space.x_new, 2 * problem.k.size)
+        corrected = nearer(h, distance, slope, before, beyond, longest)
+        if not corrected > 0.0:  # a graze, off the surface by rounding or in need of a closer look
+            return _if_accurate(h, error) if abs(distance) <= 100.0 * tolerance else -0.5 * longest
+        h = corrected
+    return -0.5 * longest
+
+
+@inner
+def _if_accurate(h, error):
+    """A landing of duration h, or minus the step to try: where a law bends a shorter step may be the worse one."""
+    return h if error <= 1.0 else -max(0.2, 0.9 * error**-0.125) * h if np.isfinite(error) else -0.2 * h
+
+
+@inner
+def _switch_by_sign(problem, state, log):
+    """Put every stop on the piece its indentation lies in, one border at a time; returns whether any moved."""
+    switched = False
+    for s in range(problem.gap.size):
+        delta = indentation(problem, s, state.x)
+        if delta > problem.levels[s, state.piece[s]]:
+            switch(problem, state, s, 1, log)
+            switched = True
+        elif state.piece[s] > 0 and delta <= problem.levels[s, state.piece[s] - 1]:
+            switch(problem, state, s, -1, log)
+            switched = True
+    return switched
+
+
+@kernel
+def look(problem, state, t_end, log, events):
+    """Before a step: a status code if the run is over, EVENT if a stop switched, else RUNNING."""
+    if state.now[T] >= t_end:
+        return DONE
+    if state.count[LOGGED] + problem.gap.size > log.shape[0]:
+        return LOG_FULL
+    if state.count[AT_ONCE] > MOST_EVENTS_AT_ONCE:
+        return CHATTER
+    if events == IGNORED:
+        switched = _switch_by_sign(problem, state, log)
+    else:
+        switched = switch_on_surface(problem, state, log, events == LANDED)
+    return EVENT if switched else RUNNING
+
+
+@kernel
+def find(problem, state, space):
+    """(θ, stop, direction, level) of the first event of a step; θ as of `first_event`."""
+    theta, stop, direction = first_event(problem, state.x, space.dense, state.piece, space.coefficients)
+    level = 0.0
+    if 0.0 <= theta < NONE:
+        level = problem.levels[stop, state.piece[stop] - (1 if direction < 0 else 0)]
+    return theta, stop, direction, level
+
+
+@kernel
+def accept(problem, state, space, h, stop, direction, at_end, t_end, log, out, due):
+    """Record a step that ends on an event of ``stop`` (-1: of none) and go on from its end; returns a status code."""
+    if not np.isfinite(dot(space.x_new, space.x_new, space.x_new.size)):
+        return LAW_NOT_FINITE if _law_fails(problem, state, space, h) else DIVERGED
+    _sample(state, space, h, out, due)
+    _peaks(problem, state, space)
+    copy(space.x_new, state.x, state.x.size)
+    copy(space.rate_new, state.rate, state.x.size)
+    state.now[T] = t_end if at_end else state.now[T] + h
+    state.count[STEPS] += 1
+    if stop >= 0:
+        switch(problem, state, stop, direction, log)
+    return RUNNING
+
+
+@inner
+def _law_fails(problem, state, space, h):
+    """Whether a law is not finite where an Euler step would take its stop."""
+    batch = space.work[0]
+    for s in range(problem.gap.size):
+        batch[0] = indentation(problem, s, state.x) + h * dot(problem.read[s], state.rate, 2 * problem.k.size)
+        batch[1] = dot(problem.read_rate[s], state.x, 2 * problem.k.size)
+        if state.piece[s] > 0 and np.isfinite(batch[0]):
+            contact_forces(problem, s, batch[0:1], batch[1:2], state.entry_rate[s], batch[2:3])
+            if not np.isfinite(batch[2]):
+                return True
+    return False

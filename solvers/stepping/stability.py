@@ -1,0 +1,230 @@
+r"""How long a constant step may be: predicted, before a run begins.
+
+One step of a linear method multiplies the state of a mode p'' + c p' + k p = 0 by a matrix; the motion stays bounded
+where its spectral radius ρ(h) is not above 1. A run of duration T is refused where it would amplify a mode by more than
+a tenth, ln ρ · T/h > 0.1: the limit proper for T → ∞, and for a short run of an undamped mode a little more.
+
+In contact the law is replaced by its tangent at the expected indentation, k_t = ∂F/∂δ and c_t = ∂F/∂δ̇:
+
+.. math:: K_c = K + k_t\, w w^T,\qquad C_c = C + c_t\, w w^T
+
+and the same question asked of the modes of (M, C_c, K_c).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from solvers.problem import Array, Contact, System
+
+if TYPE_CHECKING:
+    from solvers.stepping.constant_step import ConstantStep
+
+Radius = Callable[[float, float, float], float]
+"""ρ(h, k, c): factor by which one step of size h multiplies a mode p'' + c p' + k p = 0."""
+
+EXPECTED_SPEED = 1.0  # m/s; a Hertz stop's frequency goes with its fifth root, so a guess serves
+_SLACK = 1e-10  # rounding of ρ
+_GROWTH = 0.1  # allowed logarithm of a mode's amplification in a run
+_SMALLEST, _LARGEST, _PER_DECADE = 1e-2, 1e2, 60  # range of hω searched; below it a method counts as never stable
+
+
+class Limit(NamedTuple):
+    """Largest stable steps in s, in flight and with the stops in contact; the mode (0 the lowest) that sets each.
+
+    A mode is -1 where one vector stands for all, as on sparse matrices.
+    """
+
+    flight: float
+    contact: float
+    mode: int
+    contact_mode: int
+
+
+# --- spectral radii --------------------------------------------------------------------------------------------------
+
+
+def taylor_radius(order: int) -> Radius:
+    """ρ of an explicit Runge–Kutta method with as many stages as its order: |Σ (hλ)^j/j!| over both eigenvalues λ."""
+    coefficients = [1.0 / math.factorial(j) for j in range(order, -1, -1)]
+
+    def radius(h: float, k: float, c: float) -> float:
+        root = np.sqrt(complex(0.25 * c * c - k))
+        return float(np.abs(np.polyval(coefficients, h * (-0.5 * c + np.array([root, -root])))).max())
+
+    return radius
+
+
+def alpha_radius(alpha_m: float, alpha_f: float, beta: float, gamma: float) -> Radius:
+    """ρ of the generalised-α family, see `newmark`, from its matrix on (p, h p', h² p'')."""
+
+    def radius(h: float, k: float, c: float) -> float:
+        x, y, kept = h * h * k, h * c, 1.0 - alpha_f
+        predicted = np.array([[1.0, 1.0, 0.5 - beta], [0.0, 1.0, 1.0 - gamma]])
+        effective = (1.0 - alpha_m) + kept * (y * gamma + x * beta)
+        old = np.array([-alpha_f * x, -alpha_f * y, -alpha_m])
+        a = (old - kept * (x * predicted[0] + y * predicted[1])) / effective
+        step = np.array([predicted[0] + beta * a, predicted[1] + gamma * a, a])
+        if alpha_m == 0.0 and alpha_f == 0.0:  # the equation holds at every step: p'' is no unknown of its own
+            step = step[:2, :2] - np.outer(step[:2, 2], [x, y])
+        return float(np.abs(np.linalg.eigvals(step)).max())
+
+    return radius
+
+
+# --- limits ----------------------------------------------------------------------------------------------------------
+
+
+def largest_step(radius: Radius, k: float, c: float, lasting: float = math.inf) -> float:
+    """Largest h up to which a mode is not amplified by a tenth within ``lasting`` seconds; 0 if there is none."""
+    fastest = max(math.sqrt(abs(k)), abs(c))
+    if fastest == 0.0:
+        return math.inf
+
+    def stable(h: float) -> bool:
+        growth = radius(h, k, c) - 1.0
+        return growth <= _SLACK or math.log1p(growth) * max(lasting / h, 1.0) <= _GROWTH
+
+    grid = np.geomspace(_SMALLEST, _LARGEST, round(_PER_DECADE * math.log10(_LARGEST / _SMALLEST)) + 1) / fastest
+    first = next((i for i, h in enumerate(grid) if not stable(h)), None)
+    if first is None:
+        return math.inf
+    if first == 0:
+        return 0.0 if lasting == math.inf else _below(stable, float(grid[0]))
+    low, high = float(grid[first - 1]), float(grid[first])
+    while high - low > 1e-9 * high:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if stable(middle) else (low, middle)
+    return low
+
+
+def _below(stable: Callable[[float], bool], h: float) -> float:
+    """A stable step below the range searched, by halving."""
+    for _ in range(40):
+        h *= 0.5
+        if stable(h):
+            return h
+    return 0.0
+
+
+def limit(method: ConstantStep, system: System, indentation: float | None, lasting: float) -> Limit:
+    """Predicted limits of a method; see `ConstantStep.stable_dt`."""
+    flight, mode = _shortest(method, system, *method.oscillators(system), lasting)
+    if not system.contacts:
+        return Limit(flight, math.inf, mode, -1)
+    C, K, half_period = with_tangents(system, indentation)
+    if any(contact.gap < 0.0 for contact in system.contacts) or lasting == math.inf:
+        half_period = lasting  # a preloaded contact may last for ever
+    contact, contact_mode = _shortest(method, system, *method.critical(system.M, C, K), min(lasting, half_period))
+    return Limit(flight, contact, mode, contact_mode)
+
+
+def _shortest(method: ConstantStep, system: System, k: Array, c: Array, lasting: float) -> tuple[float, int]:
+    """Smallest of the oscillators' limits, and whose it is; -1 where they are not the modes."""
+    steps = [largest_step(method.radius, *pair, lasting) for pair in zip(k, c, strict=True)]
+    return min(steps), int(np.argmin(steps)) if len(steps) == system.size else -1
+
+
+def with_tangents(system: System, indentation: float | None) -> tuple[Any, Any, float]:
+    """C and K with every stop's tangent, and how long a contact lasts."""
+    C, K, longest = system.C, system.K, 0.0
+    for contact in system.contacts:
+        stiffness, damping, mass = tangent(system, contact, indentation)
+        if system.sparse:
+            from scipy.sparse import csc_array
+
+            column = csc_array(contact.direction[:, None])
+            outer: Any = column @ column.T
+        else:
+            outer = np.outer(contact.direction, contact.direction)
+        C, K = C + damping * outer, K + stiffness * outer
+        if stiffness > 0.0:
+            longest = max(longest, math.pi * math.sqrt(mass / stiffness))
+    return C, K, longest
+
+
+def shortest_contact(system: System) -> float:
+    """Half a period on the stiffest stop's tangent, hit at 1 m/s; inf without stops."""
+    found = [tangent(system, contact, None) for contact in system.contacts]
+    return min(
+        (math.pi * math.sqrt(mass / stiffness) for stiffness, _, mass in found if stiffness > 0.0), default=math.inf
+    )
+
+
+def tangent(system: System, contact: Contact, indentation: float | None) -> tuple[float, float, float]:
+    """∂F/∂δ, ∂F/∂δ̇ of a stop at its expected indentation, and the mass 1/(wᵀM⁻¹w) it feels."""
+    mass = 1.0 / float(contact.direction @ _solve(system.M, contact.direction))
+    if indentation is None:
+        delta, speed = max(_depth(contact.law, mass, EXPECTED_SPEED), -contact.gap), EXPECTED_SPEED
+    else:
+        delta, speed = indentation, math.sqrt(2.0 * max(work_of(contact.law, indentation), 0.0) / mass)
+    speed = max(speed, contact.law.entry_rate_floor)
+    around = delta * np.array([1.0 - 1e-6, 1.0 + 1e-6])
+    by_delta = np.diff(contact.law.force(around, 0.0, speed))[0] / (around[1] - around[0])
+    by_rate = np.diff(contact.law.force(np.full(2, delta), speed * np.array([-1e-6, 1e-6]), speed))[0] / (2e-6 * speed)
+    if not np.isfinite(by_delta + by_rate):
+        return 0.0, 0.0, mass
+    return float(by_delta), float(by_rate), mass
+
+
+def _solve(M: Any, vector: Array) -> Array:
+    """M⁻¹ times a vector."""
+    if hasattr(M, "toarray"):
+        from scipy.sparse.linalg import spsolve
+
+        return np.asarray(spsolve(M, vector)).reshape(vector.shape)
+    return np.linalg.solve(M, vector)
+
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
+
+
+def work_of(law: Any, delta: float) -> float:
+    """∫F dδ up to an indentation, slowly; 0 in flight."""
+    return 0.0 if delta <= 0.0 else 0.5 * delta * float(_WEIGHTS @ law.force(0.5 * delta * (1.0 + _NODES), 0.0, 1.0))
+
+
+def takes(law: Any) -> bool:
+    """Whether a law never gives more energy than it took: it pushes at rest, and its damping is against the motion."""
+    deepest = 2.0 * _depth(law, 1.0, EXPECTED_SPEED)
+    delta, rate = np.meshgrid(deepest * np.geomspace(1e-6, 1.0, 13), np.linspace(-2.0, 2.0, 9))
+    slow = law.force(delta, 0.0, EXPECTED_SPEED)
+    with np.errstate(all="ignore"):  # what overflows is not known to take
+        damping = law.force(delta, rate, EXPECTED_SPEED) - slow
+        return bool(np.all(slow >= 0.0) and np.all(damping * rate >= -1e-12 * slow))
+
+
+def kinks_of(system: System) -> list[int]:
+    """Per stop: 1 where the law is cut at zero while δ > 0, plus 2 where it bends at δ̇ = 0; found once per system."""
+    known = system.about_laws
+    if "kinks" not in known:
+        known["kinks"] = [_kinks(contact.law) for contact in system.contacts]
+    found: list[int] = known["kinks"]
+    return found
+
+
+def _kinks(law: Any) -> int:
+    """The same of a law, by trying it out: a user's law need not declare its bends."""
+    delta = 2.0 * _depth(law, 1.0, EXPECTED_SPEED) * np.geomspace(1e-6, 1.0, 13)
+    with np.errstate(all="ignore"):
+        cut = any(np.any(law.force(delta, rate, EXPECTED_SPEED) == 0.0) for rate in (-1e3, -1.0, 1.0))
+        leaving, rest, entering = (law.force(delta, rate, EXPECTED_SPEED) for rate in (-1e-4, 0.0, 1e-4))
+        bent = np.abs(leaving - 2.0 * rest + entering) > 1e-2 * np.abs(entering - leaving) + 1e-13 * np.abs(rest)
+    return int(cut) + 2 * int(np.any(bent))
+
+
+def _depth(law: Any, mass: float, speed: float) -> float:
+    """Indentation at which a stop has taken the energy of a mass."""
+    low, high = -15.0, 3.0  # powers of ten, m
+    while high - low > 1e-6:
+        middle = 0.5 * (low + high)
+        enough = work_of(law, 10.0**middle) >= 0.5 * mass * speed**2
+        low, high = (low, middle) if enough else (middle, high)
+    return float(10.0**low)
+
+
+# --- what all methods of constant step share -------------------------------------------------------------------------
