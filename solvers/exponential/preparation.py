@@ -35,7 +35,7 @@ TABLES = types.NamedTuple(
 SPACE = types.NamedTuple(
     [
         *(*_arrays(1, 2, 2, 1, 1, 1, 1, 2, 3, 1, 3, 2, 1, 3, 2, 3, 2, 1), INTEGERS, MATRIX),
-        *(*_arrays(1, 1, 1, 1, 2, 1, 2, 1, 1, 1, 1, 1), INTEGERS),
+        *(*_arrays(1, 1, 1, 1, 2, 1, 2, 1, 1, 1, 1, 1, 1), INTEGERS),
     ],
     Space,
 )
@@ -214,6 +214,7 @@ def _layout(stops: int, loads: int, blocks: int, signals: int) -> Layout:
             (stops, S),
             (stops,),
             (4, 3 * S),
+            (stops,),
             (stops,),
             (S + 2,),
             (1,),

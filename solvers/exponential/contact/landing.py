@@ -258,13 +258,17 @@ def land_on_bend(problem, tables, state, space, stop, near, rtol, t_end, out, du
     start_landing(problem, tables, state, space, stop)
     w, x, batch = space.work[17], space.work[15], space.trial
     before, apart, span = 0.0, side_at(problem, tables, state, stop, w, batch), near
+    if abs(apart) <= 1e-6 * largest:  # it begins on the bend, which is no second point for the next one
+        before = 0.9 * near
+        _step(problem, tables, state, space, TIME, stop, before, ledger)
+        apart = side_at(problem, tables, state, stop, x, batch)
     for _ in range(_MOST_TRIES):
         _step(problem, tables, state, space, TIME, stop, span, ledger)
         value = side_at(problem, tables, state, stop, x, batch)
         if abs(value) <= 1e-10 * largest:
             break
         following = span - value * (span - before) / (value - apart)
-        if not 0.0 < following <= furthest or following == span:
+        if not 0.1 * near < following <= furthest or following == span:
             return False
         before, apart, span = span, value, following
     if not (abs(value) <= 1e-6 * largest and _error(problem, space, _PART, rtol) <= 1.0):

@@ -42,6 +42,7 @@ class Space(NamedTuple):
     viscous: Any  # (m,) N s/m: slope of a force by its rate, where Newton's method has found it; else 0
     around: Any  # (4, 3S) see `peaks`
     side: Any  # (m,) sign of the side of its bend on which each stop is
+    side_at_begin: Any  # (m,) the same at the begin of the step that is tried
     sides: Any  # (S + 2,) see `crossings`
     reach: Any  # (1,) radians of the fastest block that a landing may take
     duration: Any  # (1,) s, that of the contact begun last, if it were free

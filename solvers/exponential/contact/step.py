@@ -254,6 +254,7 @@ def touch(problem, tables, state, space, t_end, rtol, log, out, due, ledger):
         longest = min(longest, t_end - state.now[T] + problem.table_dt[0])
     wanted = last[WANTED]
     level = level_of(tables, longest) if longest < tables.step[wanted] else wanted
+    copy(space.side, space.side_at_begin, space.side.size)
     while True:
         error, first, bent = _try(problem, tables, state, space, family, level, rtol)
         if error <= 1.0:
@@ -265,6 +266,7 @@ def touch(problem, tables, state, space, t_end, rtol, log, out, due, ledger):
             return RUNNING
         if level == bottom:
             return LAW_NOT_FINITE if _law_fails(state, space) else STEP_TOO_SMALL
+        copy(space.side_at_begin, space.side, space.side.size)
         state.count[REJECTED] += 1
         if bent >= 0:  # go near it, then end a step on it
             level = max(level + 1, level_of(tables, 0.9 * first))
