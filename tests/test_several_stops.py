@@ -297,14 +297,12 @@ def test_a_stop_beyond_the_turning_point_is_not_landed_on():
 def test_a_mass_pressed_between_two_stops_that_bend_together_goes_on(omega, restitution):
     """δ̇ of both changes its sign at the same times, slowly, hundreds of times smaller than the first rates."""
 
-    def too_long(_):
-        raise AssertionError("20 000 steps and not at the end")
-
+    calls = iter(range(10))  # one each 20 000 steps
     laws = [Viscoelastic.jankowski(stiffness, restitution, 1.0) for stiffness in (3e7, 5e7)]
     contacts = [Contact([1.0], laws[0], -9e-4), Contact([-1.0], laws[1], -4.5e-3)]
     system = System.modal([3.9], 1e-3, contacts, [([1.0], fb.Harmonic(0.3, omega))])
     found, exact = (
-        integrate(system, [0.0], [1.0], 3.0, method=method, progress=too_long)
+        integrate(system, [0.0], [1.0], 3.0, method=method, progress=lambda _: next(calls))
         for method in (Exponential(1e-6), Exponential(1e-9))
     )
     assert found.cost.steps < 1000
