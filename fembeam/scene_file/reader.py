@@ -17,41 +17,8 @@ from pathlib import Path
 from typing import Any
 
 from fembeam.scene import Scene, Source
-from fembeam.scene_file.branch_table import BranchTable
-from fembeam.scene_file.ensemble_table import EnsembleTable
-from fembeam.scene_file.keys import Constructors
-from fembeam.scene_file.orbit_table import OrbitTable
-from fembeam.scene_file.study_tables import ModeCountTable, SmallestModelTable, SpeedAccuracyTable
+from fembeam.scene_file.study_tables import STUDIES
 from fembeam.scene_file.tables import SceneFileError, TableReader
-from fembeam.support import require_non_negative, require_positive
-
-
-@dataclass(frozen=True)
-class Simulate:
-    """The table [simulate]: integrate from rest.
-
-    Parameters
-    ----------
-    duration : s, > 0.
-    dt : output sampling in s, > 0.
-    solver : a method of `solvers`; None is the library's best. In a file { kind = "…", … }.
-    discard : s at the beginning that statistics leave out, 0 to below the duration.
-    """
-
-    duration: float
-    dt: float
-    solver: Any = None
-    discard: float = 0.0
-
-    def __post_init__(self) -> None:
-        require_positive("duration", self.duration, "simulate", "give s")
-        require_positive("dt", self.dt, "simulate", "give the output sampling in s")
-        require_non_negative("discard", self.discard, "simulate", "give s")
-        for name in ("dt", "discard"):
-            if not getattr(self, name) < self.duration:
-                raise ValueError(
-                    f"{name} must be below the duration of {self.duration:g} s, got {getattr(self, name):g}"
-                )
 
 
 @dataclass(frozen=True)
@@ -67,17 +34,6 @@ class SceneFile:
     def path(self) -> Path:
         """The file."""
         return self.source.path
-
-
-STUDIES: Constructors = {
-    "simulate": Simulate,
-    "orbit": OrbitTable,
-    "branch": BranchTable,
-    "ensemble": EnsembleTable,
-    "mode_count": ModeCountTable,
-    "smallest_model": SmallestModelTable,
-    "speed_accuracy": SpeedAccuracyTable,
-}
 
 
 def read(path: str | Path, overrides: Sequence[str] = ()) -> SceneFile:
