@@ -10,6 +10,7 @@ from contacts.curves import PiecewiseLinear, Tabulated
 from contacts.custom import CustomLaw, law
 from contacts.identification import Estimate, Identified, identify, read_collisions
 from contacts.law import Law, Sum, parallel
+from contacts.polynomial import Polynomial
 from contacts.power_laws import PUBLISHED, Hertz, Hysteretic
 from contacts.restitution import Bounce, achieved_restitution, bounce, damping_factor_for, restitution
 from contacts.viscous import KelvinVoigt, Viscoelastic
@@ -25,6 +26,7 @@ __all__ = [
     "KelvinVoigt",
     "Law",
     "PiecewiseLinear",
+    "Polynomial",
     "Sum",
     "Tabulated",
     "Viscoelastic",

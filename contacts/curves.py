@@ -41,6 +41,7 @@ class PiecewiseLinear(Law):
     damping: Sequence[float] | float = 0.0
 
     compiled: ClassVar[str] = "piecewise"
+    kinds: ClassVar[dict[str, str]] = {"piecewise_linear": ""}
     equation: ClassVar[str] = "F = F_j + slopes[j] (δ - knots[j-1]) + damping[j] δ̇ between two knots"
     units: ClassVar[dict[str, str]] = {"slopes": "N/m", "knots": "m", "damping": "N s/m"}
 
@@ -135,6 +136,7 @@ class Tabulated(Law):
     measured: Sequence[float]
 
     compiled: ClassVar[str] = "piecewise"
+    kinds: ClassVar[dict[str, str]] = {"tabulated": "", "tabulated_file": "from_csv"}
     equation: ClassVar[str] = "F = monotone piecewise cubic through (indentation, measured), straight beyond the last"
     units: ClassVar[dict[str, str]] = {"indentation": "m", "measured": "N"}
     remarks: ClassVar[tuple[str, ...]] = (  # type: ignore[misc]

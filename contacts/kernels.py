@@ -76,6 +76,16 @@ def power_gradient(n, delta, delta_dot, entry_rate, parameters, by_delta, by_rat
 
 
 @_compiled(njit)
+def _horner(coefficients, first, count, x):
+    """Value and slope at x of the polynomial with ``count`` coefficients from ``first`` on, the constant first."""
+    value, slope = coefficients[first + count - 1], 0.0
+    for i in range(count - 2, -1, -1):
+        slope = slope * x + value
+        value = value * x + coefficients[first + i]
+    return value, slope
+
+
+@_compiled(njit)
 def _piece(table, m, d, v):
     """Place in the table of the piece that holds d, by bisection."""
     # on a knot, to rounding, the piece it comes from: the dashpot may jump there, and steps end on knots
@@ -101,8 +111,7 @@ def piecewise(n, delta, delta_dot, entry_rate, parameters, force):
     for i in range(n):
         d, v = delta[i], delta_dot[i]
         j = _piece(table, m, d, v)
-        x = d - table[j]
-        force[i] = table[j + 1] + x * (table[j + 2] + x * (table[j + 3] + x * table[j + 4])) + table[j + 5] * v
+        force[i] = _horner(table, j + 1, 4, d - table[j])[0] + table[j + 5] * v
 
 
 @_gradient
@@ -113,9 +122,27 @@ def piecewise_gradient(n, delta, delta_dot, entry_rate, parameters, by_delta, by
     for i in range(n):
         d = delta[i]
         j = _piece(table, m, d, delta_dot[i])
-        x = d - table[j]
-        by_delta[i] = table[j + 2] + x * (2.0 * table[j + 3] + x * 3.0 * table[j + 4])
+        by_delta[i] = _horner(table, j + 1, 4, d - table[j])[1]
         by_rate[i], by_entry[i] = table[j + 5], 0.0
+
+
+@_force
+def polynomial(n, delta, delta_dot, entry_rate, parameters, force):
+    """F = d (c_1 + c_2 d + ... + c_k d^(k-1)), parameters (k, c_1, ..., c_k)."""
+    k = int(parameters[0])
+    coefficients = carray(parameters, (1 + k,))
+    for i in range(n):
+        force[i] = delta[i] * _horner(coefficients, 1, k, delta[i])[0]
+
+
+@_gradient
+def polynomial_gradient(n, delta, delta_dot, entry_rate, parameters, by_delta, by_rate, by_entry):
+    """Derivatives of `polynomial`."""
+    k = int(parameters[0])
+    coefficients = carray(parameters, (1 + k,))
+    for i in range(n):
+        value, slope = _horner(coefficients, 1, k, delta[i])
+        by_delta[i], by_rate[i], by_entry[i] = value + delta[i] * slope, 0.0, 0.0
 
 
 def _call(outputs):

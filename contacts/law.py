@@ -41,11 +41,13 @@ class Law(ABC):
     bend : where else the force has a kink: "rate" at delta_dot = 0, "force" where it is cut at zero (`uncut` is then
         the law without the cut), None nowhere.
     entry_rate_floor : entry rates below it (m/s) are raised to it before the law sees them.
+    kinds : names by which scene files choose it, each with the constructor it stands for, "" being the class.
     equation, units, remarks : what `describe` says of it: the formula, units of the parameters, where it pulls, where
         it is singular, how it is integrated.
     """
 
     compiled: ClassVar[str] = ""  # its force in contacts.kernels; the derivatives are <compiled>_gradient
+    kinds: ClassVar[dict[str, str]] = {}
     equation: ClassVar[str] = ""
     units: ClassVar[dict[str, str]] = {}
     remarks: tuple[str, ...] = ()

@@ -38,6 +38,13 @@ PUBLISHED = (
 """Constructors of `Hysteretic` from a nominal restitution."""
 
 
+def power_parameters(
+    K: float, p: float, a: float = 0.0, c: float = 0.0, r: float = 0.0, clamp: bool = False, approach: bool = False
+) -> NDArray[np.float64]:
+    """Parameters of F = K δ^p (1 + a δ̇/δ̇⁻) + c δ^r δ̇, cut at zero (clamp), c only for δ̇ > 0 (approach)."""
+    return np.array([K, p, a, c, r, float(clamp), float(approach)])
+
+
 @dataclass(frozen=True)
 class Hysteretic(Law):
     """Power law with hysteresis, F = K δ^p (1 + a δ̇/δ̇⁻).
@@ -76,6 +83,7 @@ class Hysteretic(Law):
     nominal: tuple[str, float] | None = field(default=None, init=False, compare=False, repr=False)
 
     compiled: ClassVar[str] = "power"
+    kinds: ClassVar[dict[str, str]] = {"hysteretic": "", **{name: name for name in PUBLISHED}}
     equation: ClassVar[str] = "F = stiffness δ^p (1 + damping_factor δ̇/entry_rate), p = exponent"
     units: ClassVar[dict[str, str]] = {"stiffness": "N/m^p", "entry_rate_floor": "m/s"}
 
@@ -186,8 +194,8 @@ class Hysteretic(Law):
 
     @property
     def parameters(self) -> NDArray[np.float64]:
-        """(K, p, a, c, r, clamp, approach) of the power family."""
-        return np.array([self.stiffness, self.exponent, self.damping_factor, 0.0, 0.0, float(self.clamp), 0.0])
+        """Those of the power family."""
+        return power_parameters(self.stiffness, self.exponent, a=self.damping_factor, clamp=self.clamp)
 
     @property
     def remarks(self) -> tuple[str, ...]:  # type: ignore[override]
@@ -234,6 +242,7 @@ class Hertz(Law):
     exponent: float = 1.5
 
     compiled: ClassVar[str] = "power"
+    kinds: ClassVar[dict[str, str]] = {"hertz": "", "hertz_of_spheres": "of_spheres"}
     equation: ClassVar[str] = "F = stiffness δ^p, p = exponent"
     units: ClassVar[dict[str, str]] = {"stiffness": "N/m^p"}
     remarks: ClassVar[tuple[str, ...]] = ("never pulls; smooth",)  # type: ignore[misc]
@@ -262,8 +271,8 @@ class Hertz(Law):
 
     @property
     def parameters(self) -> NDArray[np.float64]:
-        """(K, p, a, c, r, clamp, approach) of the power family."""
-        return np.array([self.stiffness, self.exponent, 0.0, 0.0, 0.0, 0.0, 0.0])
+        """Those of the power family."""
+        return power_parameters(self.stiffness, self.exponent)
 
     def exact_restitution(self, entry_rate: float, mass: float) -> float:
         """Elastic: 1."""

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contacts.law import Law, check_number, check_restitution, number, switch
+from contacts.power_laws import power_parameters
 
 PULLS = "pulls at the end of every rebound, where the dashpot outweighs the spring; clamp=True forbids it"
 CLAMPED = "clamp=True: the kink where the force is cut moves with the rate"
@@ -65,6 +66,7 @@ class KelvinVoigt(Law):
     nominal: tuple[str, float] | None = field(default=None, init=False, compare=False, repr=False)
 
     compiled: ClassVar[str] = "power"
+    kinds: ClassVar[dict[str, str]] = {"kelvin_voigt": "", "anagnostopoulos": "anagnostopoulos"}
     equation: ClassVar[str] = "F = stiffness δ + damping δ̇"
     units: ClassVar[dict[str, str]] = {"stiffness": "N/m", "damping": "N s/m"}
 
@@ -94,8 +96,8 @@ class KelvinVoigt(Law):
 
     @property
     def parameters(self) -> NDArray[np.float64]:
-        """(K, p, a, c, r, clamp, approach) of the power family."""
-        return np.array([self.stiffness, 1.0, 0.0, self.damping, 0.0, float(self.clamp), 0.0])
+        """Those of the power family."""
+        return power_parameters(self.stiffness, 1.0, c=self.damping, clamp=self.clamp)
 
     @property
     def remarks(self) -> tuple[str, ...]:  # type: ignore[override]
@@ -141,6 +143,7 @@ class Viscoelastic(Law):
     nominal: tuple[str, float] | None = field(default=None, init=False, compare=False, repr=False)
 
     compiled: ClassVar[str] = "power"
+    kinds: ClassVar[dict[str, str]] = {"viscoelastic": "", "tsuji": "tsuji", "jankowski": "jankowski"}
     equation: ClassVar[str] = "F = stiffness δ^p + damping δ^((p-1)/2) δ̇, p = exponent"
     units: ClassVar[dict[str, str]] = {"stiffness": "N/m^p", "damping": "N s/m^((p+1)/2)"}
 
@@ -189,10 +192,9 @@ class Viscoelastic(Law):
 
     @property
     def parameters(self) -> NDArray[np.float64]:
-        """(K, p, a, c, r, clamp, approach) of the power family."""
-        p = self.exponent
-        flags = float(self.clamp), float(self.approach_only)
-        return np.array([self.stiffness, p, 0.0, self.damping, 0.5 * (p - 1.0), *flags])
+        """Those of the power family."""
+        r = 0.5 * (self.exponent - 1.0)
+        return power_parameters(self.stiffness, self.exponent, 0.0, self.damping, r, self.clamp, self.approach_only)
 
     @property
     def remarks(self) -> tuple[str, ...]:  # type: ignore[override]

@@ -15,11 +15,14 @@ from contacts import (
     KelvinVoigt,
     Law,
     PiecewiseLinear,
+    Polynomial,
     Sum,
     Tabulated,
     Viscoelastic,
+    bounce,
     law,
     parallel,
+    restitution,
 )
 
 LAWS = [
@@ -38,6 +41,8 @@ LAWS = [
     Viscoelastic(1e7, 3000.0, exponent=2.5, clamp=True),
     Viscoelastic(1e7, 3000.0, approach_only=True),
     Tabulated([1e-3, 2e-3, 3.5e-3], [10.0, 10.0, 80.0]),
+    Polynomial([1e5]),
+    Polynomial([1e5, -3e7, 2e10]),
     Hysteretic(1e7, 2.0, entry_rate_floor=0.5) + KelvinVoigt(1e5, 30.0) + Hysteretic(1e8, 0.3, 2.0),
 ]
 
@@ -218,6 +223,43 @@ def test_published_factors(name, factor):
     assert one.damping_factor == pytest.approx(factor, rel=1e-14)
     assert one.nominal == (name, 0.3)
     assert one == Hysteretic(1e8, one.damping_factor, 2.0)
+
+
+def test_a_linear_polynomial_bounces_for_half_a_period():
+    stiffness, mass = 2e5, 0.05
+    thrown = bounce(Polynomial([stiffness]), 0.7, mass)
+    assert thrown.t[-1] == pytest.approx(math.pi * math.sqrt(mass / stiffness), rel=1e-10)
+    assert thrown.restitution == pytest.approx(1.0, rel=1e-10)
+
+
+def test_a_polynomial_is_its_formula():
+    coefficients, delta = [1e5, -3e7, 0.0, 2e12], np.linspace(1e-6, 4e-3, 50)
+    formula = np.polynomial.Polynomial([0.0, *coefficients])(delta)
+    np.testing.assert_allclose(Polynomial(coefficients).force(delta, 1.0), formula, rtol=1e-14)
+
+
+@pytest.mark.parametrize("coefficients", [(1e5, 2e8, 3e11), (0.0, 4e8), (1e5, -3e7, 2e10)])
+def test_a_polynomial_stores_what_a_mass_brings(coefficients):
+    one, mass, speed = Polynomial(coefficients), 0.05, 0.7
+    thrown = bounce(one, speed, mass)
+    deepest = thrown.delta.max()
+    stored = sum(c * deepest ** (j + 1) / (j + 1) for j, c in enumerate(coefficients, start=1))
+    assert stored == pytest.approx(0.5 * mass * speed**2, rel=1e-6)  # sampled near, not at, the deepest point
+    assert thrown.restitution == pytest.approx(1.0, rel=1e-9)
+    assert restitution(one, speed, mass) == pytest.approx(1.0, rel=1e-9)
+
+
+def test_a_polynomial_tells_its_terms_and_where_it_pulls():
+    assert Polynomial([0.0, 4e8, 0.0, 1.0]).powers == (2.0, 4.0)
+    assert Polynomial([0.0, 4e8]).exponent == 2.0
+    assert "never pulls" in Polynomial([1e5, -3e7, 2e10]).describe()
+    assert "force zero at δ = 0.001, 0.002 m" in Polynomial([2.0, -3e3, 1e6]).describe(1e-4, 1e-3)
+
+
+@pytest.mark.parametrize("bad", [[], [0.0], [-1.0, 2.0], [1.0, math.nan], "steep", [[1.0], [2.0]]])
+def test_polynomial_refuses(bad):
+    with pytest.raises(ValueError, match="coefficients of Polynomial"):
+        Polynomial(bad)
 
 
 def test_table_is_monotone_and_goes_on_straight():

@@ -11,7 +11,7 @@ from problems import PAPER_LAW, free_mass, paper_scene, two_sided_scene
 from regularised import regularised
 
 import fembeam as fb
-from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, Viscoelastic, law
+from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, Polynomial, Viscoelastic, law
 from solvers import Contact, DormandPrince, Exponential, Status, System, integrate
 from solvers.exponential.preparation import prepared_for
 from solvers.problem import hand_over
@@ -35,6 +35,7 @@ SMOOTH = {
     "Hysteretic": PAPER_LAW,
     "Hysteretic 1": Hysteretic(2e5, 0.5, 1.0),
     "Kelvin-Voigt": KelvinVoigt(1e6, 30.0),
+    "Polynomial": Polynomial([2e5, 0.0, 3e10]),
     "own": softening(stiffness=2.1e8),
 }
 BENT = {

@@ -13,8 +13,8 @@ import numpy as np
 
 import solvers
 from fembeam.model import saved_arrays
-from fembeam.model.model import Shapes
 from fembeam.model.run import FORMAT, Run
+from fembeam.model.shapes import Shapes
 from fembeam.scene import Source
 
 

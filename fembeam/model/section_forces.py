@@ -22,7 +22,7 @@ from scipy import sparse
 from fembeam.beams import Beam, element_matrices, joining, on_beam
 
 if TYPE_CHECKING:
-    from fembeam.model.model import Model
+    from fembeam.model.equations import ModalEquations
     from fembeam.scene import Matrices
 
 Vector = NDArray[np.float64]
@@ -71,7 +71,7 @@ class SectionForces:
         return element, ((z - self.nodes[element]) / h)[:, None], h[:, None]
 
 
-def section_forces(model: Model, body: int = 0) -> SectionForces:
+def section_forces(model: ModalEquations, body: int = 0) -> SectionForces:
     """The section forces of every coordinate of a model on one of its beams."""
     beam = model.matrices.beams[body]
     first = sum(before.M.shape[0] for before in model.matrices.beams[:body])

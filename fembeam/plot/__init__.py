@@ -1,28 +1,21 @@
 """Figures: one function per question, each returns a matplotlib figure.
 
-`response` and `animation` hold those of one run, `laws` those of contact laws, `orbits` those of periodic motion,
-`random` those of random motion, `study` and `chart` those of studies.
+`response`, `spectra`, `contact_histograms` and `animation` hold those of one run, `laws` those of contact laws,
+`orbits` those of periodic motion, `random` those of random motion, `mode_count` and `methods` those of studies; `style`
+is what all share. Imports: `statistics`, `model` and the rooms below. Begin with `response`.
 """
 
 from fembeam.model import places
 from fembeam.plot.animation import animate, frame
+from fembeam.plot.contact_histograms import contacts
 from fembeam.plot.laws import identification, loops, restitutions
 from fembeam.plot.methods import failures, speed_accuracy, stability_map
 from fembeam.plot.mode_count import mode_count, smallest_model
 from fembeam.plot.orbits import branch, orbit, peak
 from fembeam.plot.random import random_densities, random_spectra
-from fembeam.plot.response import (
-    contacts,
-    densities,
-    mode_shapes,
-    peaks,
-    responses,
-    segment_for,
-    spectra_of,
-    spectrum,
-    styled,
-    time_history,
-)
+from fembeam.plot.response import densities, mode_shapes, responses, time_history
+from fembeam.plot.spectra import peaks, segment_for, spectra_of, spectrum
+from fembeam.plot.style import styled
 
 __all__ = [
     "animate",

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fembeam.plot.response import BLUE, GREY, ORANGE, RED, styled
+from fembeam.plot.style import BLUE, GREY, ORANGE, RED, styled
 from fembeam.scene import heights
 from fembeam.support import require
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from contacts import PUBLISHED, Bounce, Hysteretic, Identified, KelvinVoigt, Law, Viscoelastic, bounce, restitution
-from fembeam.plot.response import BLUE, GREY, RED, Vector, styled
+from fembeam.plot.style import BLUE, GREY, RED, Vector, styled
 from fembeam.support import require
 
 if TYPE_CHECKING:

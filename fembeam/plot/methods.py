@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fembeam.plot.response import BLUE, RED, styled
+from fembeam.plot.style import BLUE, RED, styled
 from fembeam.support import require
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fembeam.plot.response import BLUE, GREY, ORANGE, RED, _sheet, _titled, styled
+from fembeam.plot.style import BLUE, GREY, ORANGE, RED, sheet, styled, titled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,7 +36,7 @@ def mode_count(study: ModeCount) -> Figure:
     >>> [axis.get_ylabel() for axis in figure.axes]
     ['relative error', 'integration / s']
     """
-    figure, (left, right) = _sheet(None, 1, 2, (8.0, 3.6))
+    figure, (left, right) = sheet(None, 1, 2, (8.0, 3.6))
     for kind, colour, mark, name in KINDS:
         rows = [row for row in study.rows if row.residual == kind and np.isfinite(row.error)]
         _errors(left, [row for row in rows if not row.reference], colour, mark, name)
@@ -51,14 +51,14 @@ def mode_count(study: ModeCount) -> Figure:
     right.set_ylim(bottom=0.0)
     right.set_ylabel("integration / s")
     right.set_title("time of all runs of a model")
-    return _titled(figure, None, f"Convergence of {study.quantity} with modes")
+    return titled(figure, None, f"Convergence of {study.quantity} with modes")
 
 
 @styled
 def smallest_model(result: SmallestModel) -> Figure:
     """Reduction errors over coordinates and, once reached, integration errors over rtol; tolerance and answer."""
     reached = bool(result.integration)
-    figure, axes = _sheet(None, 1, 1 + reached, (8.0 if reached else 4.4, 3.6))
+    figure, axes = sheet(None, 1, 1 + reached, (8.0 if reached else 4.4, 3.6))
     _reduction(axes[0], result)
     if reached:
         _integration(axes[1], result)
@@ -68,7 +68,7 @@ def smallest_model(result: SmallestModel) -> Figure:
         axis.set_ylabel("relative error")
     axes[0].legend()
     state = "Smallest model" if result.met else "NOT MET: smallest model"
-    return _titled(figure, None, f"{state} for {result.quantity}")
+    return titled(figure, None, f"{state} for {result.quantity}")
 
 
 def _reduction(axis: Axes, result: SmallestModel) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fembeam.model import observed
-from fembeam.plot.response import GREEN, GREY, ORANGE, RED, Vector, styled
+from fembeam.plot.style import GREEN, GREY, ORANGE, RED, Vector, styled
 from fembeam.support import require
 from solvers.problem import counted
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fembeam.plot.orbits import branch
-from fembeam.plot.response import BLUE, GREY, RED, _fit_levels, _sheet, styled
+from fembeam.plot.style import BLUE, GREY, RED, fit_levels, sheet, styled
 from fembeam.statistics import Spectrum
 
 if TYPE_CHECKING:
@@ -41,13 +41,13 @@ def random_spectra(
     branches : title -> branches of periodic motion along ω, drawn beside the panel of that title.
     """
     columns = 2 if branches else 1
-    figure, axes = _sheet(None, len(panels), columns, (4.6 * columns + 2.4, 2.1 * len(panels) + 0.5), squeeze=False)
+    figure, axes = sheet(None, len(panels), columns, (4.6 * columns + 2.4, 2.1 * len(panels) + 0.5), squeeze=False)
     for row, (title, shown) in enumerate(panels.items()):
         lines = {label: x if isinstance(x, Spectrum) else x.psd for label, x in shown.items()}
         axis = axes[row * columns]
         for i, (label, line) in enumerate(lines.items()):
             _curve(axis, line, omega_max, label, f"C{i}")
-        _fit_levels(axis, list(lines.values()), omega_max)
+        fit_levels(axis, list(lines.values()), omega_max)
         if bands and title in bands:
             axis.axvspan(*bands[title], ymin=0.96, color=GREY, alpha=0.6, linewidth=0)
         axis.set(title=title, xlim=(0, omega_max), ylabel="PSD / m² s rad⁻¹")
@@ -78,7 +78,7 @@ def random_densities(signals: Mapping[str, Signal]) -> Figure:
     >>> random_densities({"tip": found["tip u"]}).axes[0].get_xlabel()
     'tip / mm'
     """
-    figure, axes = _sheet(None, 1, len(signals), (3.5 * len(signals), 3.1))
+    figure, axes = sheet(None, 1, len(signals), (3.5 * len(signals), 3.1))
     for axis, (name, signal) in zip(axes, signals.items(), strict=True):
         density, mean, std = signal.pdf, 1e3 * float(signal.mean.value), 1e3 * float(signal.std.value)
         x, p = 1e3 * density.x, 1e-3 * density.density

@@ -15,7 +15,8 @@ from fembeam.beams import ModalDamping, Rayleigh
 from fembeam.scene import FEATURES, Scene
 from fembeam.scene_file.keys import entry_type, parameters, required
 from fembeam.scene_file.kinds import SECTION, SIGNAL, Nested, nested
-from fembeam.scene_file.reader import STUDIES, beam_of_section, snake
+from fembeam.scene_file.study_tables import STUDIES
+from fembeam.scene_file.tables import beam_of_section, snake
 
 Schema = dict[str, Any]
 SIMPLE = {float: "number", int: "integer", bool: "boolean", str: "string", Path: "string"}

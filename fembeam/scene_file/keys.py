@@ -6,7 +6,7 @@ The values of TOML are few (whole numbers, numbers, true and false, text, lists)
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from types import NoneType, UnionType
@@ -18,7 +18,13 @@ from numpy.typing import NDArray
 Constructors = Mapping[str, Callable[..., Any]]
 
 ARRAYS = np.ndarray, get_origin(NDArray[np.float64])  # from numpy 2.5 on, Python 3.12, an alias is not its meaning
-UNSEEN = {"Model": Any}  # names in annotations that exist only for type checkers
+UNSEEN = {
+    "Model": Any,
+    "Scene": Any,
+    "Executor": Any,
+    "Sequence": Sequence,
+    "Iterable": Iterable,
+}  # names in annotations that exist only for type checkers
 
 
 def parameters(constructor: Callable[..., Any]) -> dict[str, inspect.Parameter]:
@@ -62,7 +68,7 @@ def entry_type(hint: Any) -> Any:
     origin = get_origin(hint)
     if origin in ARRAYS:
         return float
-    if origin in (list, tuple, Sequence) and get_args(hint):
+    if origin in (list, tuple, Sequence, Iterable) and get_args(hint):
         return get_args(hint)[0]
     return None
 

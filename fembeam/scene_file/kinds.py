@@ -6,7 +6,7 @@ import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, get_origin
+from typing import Any, Literal, get_origin
 
 import contacts
 import solvers
@@ -23,21 +23,17 @@ SHAPES: Constructors = {
     "tube": Section.tube,
     "taper": Taper,
 }
-LAWS: Constructors = {
-    "hertz": contacts.Hertz,
-    "hertz_of_spheres": contacts.Hertz.of_spheres,
-    "hysteretic": contacts.Hysteretic,
-    **{name: getattr(contacts.Hysteretic, name) for name in contacts.PUBLISHED},
-    "kelvin_voigt": contacts.KelvinVoigt,
-    "anagnostopoulos": contacts.KelvinVoigt.anagnostopoulos,
-    "viscoelastic": contacts.Viscoelastic,
-    "tsuji": contacts.Viscoelastic.tsuji,
-    "jankowski": contacts.Viscoelastic.jankowski,
-    "piecewise_linear": contacts.PiecewiseLinear,
-    "tabulated": contacts.Tabulated,
-    "tabulated_file": contacts.Tabulated.from_csv,
-    "parallel": contacts.parallel,
-}
+
+
+def _laws() -> dict[str, Callable[..., Any]]:
+    """The laws of `contacts` by the names they state themselves, and several in parallel."""
+    public = [getattr(contacts, name) for name in contacts.__all__]
+    classes = [law for law in public if isinstance(law, type) and issubclass(law, contacts.Law)]
+    named = {kind: getattr(law, maker) if maker else law for law in classes for kind, maker in law.kinds.items()}
+    return {**named, "parallel": contacts.parallel}
+
+
+LAWS: Constructors = _laws()
 
 
 def record(

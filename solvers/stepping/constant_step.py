@@ -84,7 +84,7 @@ class ConstantStep(ABC):
             from solvers.stepping.sparse import MatrixEngine
 
             return MatrixEngine(self, system, z, forcing, duration)
-        from solvers.stepping.loop import Engine  # here: the loop knows the methods' modules
+        from solvers.stepping.engine import Engine  # here: the loop knows the methods' modules
 
         return Engine(self, system, z, forcing, duration)
 

@@ -128,6 +128,6 @@ class DormandPrince:
 
     def engine(self, system: System, z: Array, forcing: Forcing, duration: float) -> Any:
         """The method made ready for one run."""
-        from solvers.stepping.loop import Engine  # here: the loop knows this module
+        from solvers.stepping.engine import Engine  # here: the loop knows this module
 
         return Engine(self, system, z, forcing, duration)

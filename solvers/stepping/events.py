@@ -11,7 +11,7 @@ from solvers.compiled.state import surface_tolerance
 
 # finer near 0, where a contact just left may come back
 _NODES = np.array([0.0, 1 / 64, 1 / 32, 1 / 16, 1 / 8, 1 / 4, 3 / 8, 1 / 2, 5 / 8, 3 / 4, 7 / 8, 1.0])
-GOLDEN = 0.6180339887498949
+_GOLDEN = 0.6180339887498949
 UNRESOLVED = -1.0
 NONE = 2.0
 MOST_LANDINGS = 60
@@ -38,15 +38,25 @@ def coefficients_of(row, offset, x, dense, out):
 
 
 @inner
-def _maximum(coefficients, sign, a, b):
-    """Golden-section place of the largest sign·δ on [a, b]."""
+def golden_section(value, known, a, b):
+    """Place of the largest ``value(known, θ)`` on [a, b], and the largest value met."""
+    best = -np.inf
     for _ in range(40):
-        c, d = b - GOLDEN * (b - a), a + GOLDEN * (b - a)
-        if sign * polynomial(coefficients, c) > sign * polynomial(coefficients, d):
+        c, d = b - _GOLDEN * (b - a), a + _GOLDEN * (b - a)
+        at_c, at_d = value(known, c), value(known, d)
+        if at_c > at_d:
             b = d
         else:
             a = c
-    return 0.5 * (a + b)
+        best = max(best, at_c, at_d)
+    return 0.5 * (a + b), best
+
+
+@inner
+def _signed(known, theta):
+    """sign·δ at θ."""
+    coefficients, sign = known
+    return sign * polynomial(coefficients, theta)
 
 
 @inner
@@ -78,7 +88,7 @@ def crossing(coefficients, rates, level, sign, tolerance):
             return _root(coefficients, level, sign, _NODES[i - 1], _NODES[i])
         rises = sign * polynomial(rates, _NODES[i]) > 0.0
         if rising and not rises:
-            top = _maximum(coefficients, sign, _NODES[i - 1], _NODES[i])
+            top = golden_section(_signed, (coefficients, sign), _NODES[i - 1], _NODES[i])[0]
             if sign * (polynomial(coefficients, top) - level) > tolerance:
                 return _root(coefficients, level, sign, _NODES[i - 1], top)
         last, rising = value, rises

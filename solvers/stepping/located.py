@@ -26,13 +26,13 @@ from solvers.compiled.state import (
     switch_on_surface,
 )
 from solvers.stepping.events import (
-    GOLDEN,
     IGNORED,
     LANDED,
     MOST_LANDINGS,
     NONE,
     coefficients_of,
     first_event,
+    golden_section,
     nearer,
     polynomial,
 )
@@ -58,36 +58,22 @@ def _peaks(problem, state, space):
         coefficients_of(problem.read[s], problem.gap[s], state.x, space.dense, delta_of)
         coefficients_of(problem.read_rate[s], 0.0, state.x, space.dense, rate_of)
         for column in (PEAK_DELTA, PEAK_FORCE):
+            known = (problem, state, s, column, delta_of, rate_of, space.work[0])
             best, place = -np.inf, 0
             for i in range(_PEAK_NODES.size):
-                value = _peak_value(problem, state, s, column, delta_of, rate_of, _PEAK_NODES[i], space.work[0])
+                value = _peak_value(known, _PEAK_NODES[i])
                 if value > best:
                     best, place = value, i
             if best > 0.9 * state.open[s, column]:
-                best = max(best, _highest(problem, state, s, column, delta_of, rate_of, place, space.work[0]))
+                a, b = _PEAK_NODES[max(place - 1, 0)], _PEAK_NODES[min(place + 1, _PEAK_NODES.size - 1)]
+                best = max(best, golden_section(_peak_value, known, a, b)[1])
                 state.open[s, column] = max(state.open[s, column], best)
 
 
 @inner
-def _highest(problem, state, s, column, delta_of, rate_of, place, batch):
-    """Largest value around a node of the step, by golden section."""
-    a, b = _PEAK_NODES[max(place - 1, 0)], _PEAK_NODES[min(place + 1, _PEAK_NODES.size - 1)]
-    best = -np.inf
-    for _ in range(36):
-        c, d = b - GOLDEN * (b - a), a + GOLDEN * (b - a)
-        at_c = _peak_value(problem, state, s, column, delta_of, rate_of, c, batch)
-        at_d = _peak_value(problem, state, s, column, delta_of, rate_of, d, batch)
-        if at_c > at_d:
-            b = d
-        else:
-            a = c
-        best = max(best, at_c, at_d)
-    return best
-
-
-@inner
-def _peak_value(problem, state, s, column, delta_of, rate_of, theta, batch):
+def _peak_value(known, theta):
     """Indentation or force at θ of the step."""
+    problem, state, s, column, delta_of, rate_of, batch = known
     batch[0] = polynomial(delta_of, theta)
     if column == PEAK_DELTA:
         return batch[0]

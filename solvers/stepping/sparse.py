@@ -26,15 +26,17 @@ from solvers.compiled.state import (
     new_state,
 )
 from solvers.problem import Array, Forcing, Status, System
+from solvers.stepping.energy_gain import LEAST, NOW, gains, negligible_energy, watched
+from solvers.stepping.engine import explanation
 from solvers.stepping.events import LANDED, MOST_LANDINGS, NONE, UNRESOLVED, nearer
 from solvers.stepping.henon import hermite
 from solvers.stepping.located import EVENT, accept, find, landing_tolerance, look
-from solvers.stepping.loop import LEAST, NOW, explanation, gains, negligible_energy, new_space, watched
+from solvers.stepping.loop import new_space
 from solvers.stepping.newmark import MOST_SWEEPS, contact_force
 
 
 class MatrixEngine:
-    """One run of a method on matrices; offers what `loop.Engine` does."""
+    """One run of a method on matrices; offers what `engine.Engine` does."""
 
     def __init__(self, method: Any, system: System, z: Array, forcing: Forcing, duration: float) -> None:
         from scipy.sparse import csc_array, eye_array

@@ -1,0 +1,156 @@
+"""The equations of a reduced model: frequencies, damping, shapes, contacts and loads on its coordinates.
+
+q_i'' + 2 ζ_i ω_i q_i' + ω_i² q_i = -Γ_i (ÿ + g) + Σ φ_i(z_f) f + Σ_s w_si F_s,    u(z, t) = Σ φ_i(z) q_i(t)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+import reduction
+import solvers
+from fembeam.model.shapes import Shapes, Vector
+from fembeam.scene import loads, touches, weight
+from fembeam.scene.contact_rows import Touch
+
+if TYPE_CHECKING:
+    from fembeam.model.section_forces import SectionForces
+    from fembeam.scene import Matrices, Scene
+
+SEEN = ("forces", "springs", "bodies", "impactors")  # parts of a scene besides stops that a system is made of
+
+
+@dataclass(frozen=True, eq=False)
+class ModalEquations:
+    """A scene on n coordinates, as matrices, contacts and loads; `Model` describes the attributes."""
+
+    scene: Scene
+    matrices: Matrices
+    basis: reduction.Basis
+    modes: tuple[int, ...]
+    shapes: Shapes
+    counts: tuple[tuple[int, int], ...]
+    others: tuple[Shapes, ...] = ()
+    way: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def omega(self) -> Vector:
+        """Natural frequencies (n,), rad/s."""
+        return self.basis.omega
+
+    @cached_property
+    def zeta(self) -> Vector:
+        """Damping ratios (n,) of the structure without dashpots."""
+        return self._of_each_beam(lambda damping, omega, modes: damping.ratios(omega, modes), self.scene)
+
+    def _of_each_beam(self, ask: Callable[[Any, Vector, tuple[int, ...]], Vector], scene: Scene) -> Vector:
+        """An answer (n,) of each beam's damping for its own modes; 0 for impactors."""
+        answers, done = [], 0
+        for body, count in zip((scene, *scene.bodies), self.counts, strict=True):
+            mine = slice(done, done + sum(count))
+            answers.append(ask(body.damping, self.omega[mine], self.modes[mine]))
+            done += sum(count)
+        return np.concatenate([*answers, np.zeros(len(self.matrices.impactors))])
+
+    @cached_property
+    def participation(self) -> Vector:
+        """Γ (n,) in √kg."""
+        return self.basis.participation(self.matrices.base_load)
+
+    @property
+    def names(self) -> list[str]:
+        """What to call each coordinate: "1" for the lowest mode, "static", "1 of beam 1", "impactor 0"."""
+        names, done = [], 0
+        for body, (count, static) in enumerate(self.counts):
+            of = f" of beam {body}" if body else ""
+            names += [f"{mode + 1}{of}" for mode in self.modes[done : done + count]] + [f"static{of}"] * static
+            done += count + static
+        return names + [f"impactor {i}" for i in range(len(self.matrices.impactors))]
+
+    @property
+    def effective_mass(self) -> Vector:
+        """Γ² (n,) in kg."""
+        return self.participation**2
+
+    @cached_property
+    def moving_mass(self) -> float:
+        """Sum of the effective masses over all modes, b·M⁻¹ b in kg: what a base motion sets moving."""
+        return reduction.moved_mass(self.matrices.M, self.matrices.base_load)
+
+    @property
+    def static(self) -> int:
+        """Number of residual static shapes."""
+        return sum(static for _, static in self.counts)
+
+    @cached_property
+    def static_share(self) -> Vector:
+        """Σ (bᵀφ_i)²/ω_i² / bᵀK⁻¹b at every stop, then every force (m,)."""
+        rows, full = self.matrices.interpolation(self.scene.loaded_places), self.matrices
+        return reduction.static_share(self.basis, full.M, full.K, rows.T, full.root) if rows.shape[0] else np.zeros(0)
+
+    def phi(self, z: ArrayLike, derivative: int = 0, body: int = 0) -> Vector:
+        """Mass-normalised mode shapes in 1/√kg of a beam (0 the scene's own): (n,) at one z, (k, n) at z (k,)."""
+        return (self.shapes, *self.others)[body](z, derivative)
+
+    @cached_property
+    def section_forces(self) -> tuple[SectionForces, ...]:
+        """Bending moment and shear force per unit of each coordinate, on each beam."""
+        from fembeam.model.section_forces import section_forces
+
+        return tuple(section_forces(self, body) for body in range(len(self.matrices.beams)))
+
+    @cached_property
+    def touches(self) -> list[Touch]:
+        """The contacts in the order of the log: of each beam its stops, then its impactors."""
+        return touches(self.scene, self.matrices)
+
+    @cached_property
+    def directions(self) -> Vector:
+        """(m, n): w of every contact on the coordinates, δ = -w·q - gap."""
+        rows = [self.basis.project(touch.row.T)[:, 0] for touch in self.touches]
+        return np.array(rows).reshape(len(rows), len(self.omega))
+
+    @cached_property
+    def system(self) -> solvers.System:
+        """The matrix-level problem: M = I, C, K = diag(ω²), contacts, loads."""
+        return self.system_of(self.scene)
+
+    def system_of(self, scene: Scene) -> solvers.System:
+        """The problem of a scene that differs from the model's in loads, gaps and laws only."""
+        n = len(self.omega)
+        C = np.diag(self._of_each_beam(lambda damping, omega, modes: damping.modal_coefficients(omega, modes), scene))
+        C = C + self.basis.project_matrix(self.matrices.dashpots)
+        same = self.touches if scene is self.scene else touches(scene, self.matrices)
+        pairs = zip(self.directions, same, strict=True)
+        contacts = [solvers.Contact(direction, touch.law, touch.gap) for direction, touch in pairs]
+        rows = [(self.basis.project(row.T)[:, 0], signal) for row, signal in loads(scene, self.matrices)]
+        return solvers.System(np.eye(n), C, np.diag(self.omega**2), contacts, [*rows, *self._frame_loads(scene)])
+
+    def _frame_loads(self, scene: Scene) -> list[tuple[Vector, Any]]:
+        """Loads of base motion and gravity."""
+        moved = [] if scene.base is None else [(-self.participation, scene.base.derivative(2))]
+        return moved + ([] if scene.gravity == 0.0 else [(-self.participation, weight(scene))])
+
+    def system_like(self, scene: Scene) -> solvers.System:
+        """The same as `system_of`, quicker where only base motion, gaps and laws of the scene's own stops differ."""
+        own, count, frame = self.system, len(self.scene.stops), self._frame_loads(scene)
+        parts = zip(scene.stops, self.scene.stops, strict=True)
+        if (
+            any((new.z, new.side, new.on) != (old.z, old.side, old.on) for new, old in parts)
+            or any(getattr(scene, name) != getattr(self.scene, name) for name in SEEN)
+            or (scene.base is None, scene.gravity == 0.0) != (self.scene.base is None, self.scene.gravity == 0.0)
+        ):
+            return self.system_of(scene)
+        contacts = [
+            contact if new is old else solvers.Contact(contact.direction, new.law, new.gap)
+            for contact, new, old in zip(own.contacts, scene.stops, self.scene.stops, strict=False)
+        ]
+        kept = own.loads[: len(own.loads) - len(frame)]
+        moved = [(vector, signal) for (vector, _), (_, signal) in zip(own.loads[len(kept) :], frame, strict=True)]
+        return own.like([*contacts, *own.contacts[count:]], [*kept, *moved])

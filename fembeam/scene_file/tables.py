@@ -1,0 +1,213 @@
+"""Tables of a scene file as objects: keys checked against constructors, what these refuse said with the table."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NoReturn
+
+from fembeam.beams import Beam, ModalDamping, Rayleigh, Section, Taper
+from fembeam.scene import FEATURES, Scene, Source
+from fembeam.scene_file.keys import Constructors, converted, fits, listed, nearest, parameters, required, shown, wanted
+from fembeam.scene_file.kinds import SECTION, SIGNAL, Nested, nested
+
+Table = Mapping[str, Any]
+
+
+class SceneFileError(ValueError):
+    """A scene file that cannot be read; the message names file, table, key, and what would be valid."""
+
+
+@dataclass(frozen=True)
+class TableReader:
+    """Turns tables into objects; knows the text for messages, and where the files lie that it names."""
+
+    source: Source
+    places: dict[str, Path]
+    asked: Sequence[str] = ()
+
+    def file(self, name: str, where: str) -> Path:
+        """A file that the scene names: an ordinary one, and within the folder if a saved run names it."""
+        folder = self.source.path.parent
+        place = self.places.get(name, folder / name)
+        within = place.resolve().is_relative_to(folder.resolve()) or any(name in value for value in self.asked)
+        if self.source.of_run and name not in self.places and not within:
+            self.fail(where, f"names {name}, which this run does not carry and which lies outside its folder; copy it "
+                      "there, or name it by --set")  # fmt: skip
+        if place.exists() and not place.is_file():
+            self.fail(where, f"{name} is no ordinary file (a folder, pipe or device); give a file with the data")
+        return self.places.setdefault(name, place)
+
+    def contents(self, tables: Table, known: Constructors) -> tuple[Scene, dict[str, Any], dict[str, Any]]:
+        """The scene, the arguments of `Scene.reduce`, and the study tables among those known."""
+        parts = [name for name in inspect.signature(Scene).parameters if name != "bodies"]  # one beam per file
+        self.check_keys(tables, [*parts, "reduce", *known], "the file", "table")
+        if "beam" not in tables:
+            self.fail("the file", "needs a table [beam]")
+        for name in tables:
+            self.check_form(name, tables[name])
+        built = {name: self.part(name, tables[name]) for name in parts if name in tables}
+        try:
+            scene = Scene(**built)
+        except (ValueError, TypeError, ArithmeticError) as error:
+            self.fail("the scene", str(error), error)
+        reduce = self.arguments(Scene.reduce, tables.get("reduce", {}), "[reduce]")
+        studies = {
+            name: self.build(study, tables[name], f"[{name}]") for name, study in known.items() if name in tables
+        }
+        for name, study in studies.items():
+            if hasattr(study, "check"):
+                self.made(study.check, {"scene": scene}, f"[{name}]")
+        return scene, reduce, studies
+
+    def check_form(self, name: str, value: Any) -> None:
+        """Features come as [[name]], gravity as a number, everything else as [name]."""
+        if name == "gravity":
+            return
+        if name in FEATURES:
+            if not (isinstance(value, list) and all(isinstance(entry, dict) for entry in value)):
+                self.fail(name, f"must be a list of tables; write [[{name}]]")
+        elif not isinstance(value, dict):
+            self.fail(name, f"must be a table; write [{name}]" + (", once" if isinstance(value, list) else ""))
+
+    def part(self, name: str, value: Any) -> Any:
+        """One argument of Scene from its table or list of tables."""
+        if name == "beam":
+            return self.beam(value)
+        if name == "gravity":
+            return value
+        if name == "damping":
+            if "zeta" in value and {"alpha", "beta"} & set(value):
+                self.fail("[damping]", "give either zeta, or alpha and beta, not both")
+            if {"alpha", "beta"} & set(value):
+                return self.build(Rayleigh, value, "[damping]")
+            return self.build(ModalDamping, value, "[damping]", "alpha", "beta")
+        if name == "base":
+            return self.chosen(SIGNAL, value, "[base]")
+        kinds = {snake(kind.__name__): kind for kind in FEATURES[name]}
+        made = []
+        for number, table in enumerate(value):
+            where = f"[[{name}]] number {number + 1}"
+            only = next(iter(kinds.values())) if len(kinds) == 1 else None
+            usual = "point_force" if name == "forces" else ""
+            made.append(self.build(only, table, where) if only else self.choose(kinds, table, where, default=usual))
+        return made
+
+    def beam(self, table: Table) -> Beam:
+        """A beam of one section, of `spans`, or of a `mesh`."""
+        common = ["foundation", "axial_force"]
+        options = {key: table[key] for key in common if key in table}
+        if "mesh" in table:
+            self.check_keys(table, ["mesh", "sections", "data", *common], "[beam]", "key")
+            sections, path = table.get("sections"), table["mesh"]
+            if not isinstance(sections, dict) or not isinstance(path, str):
+                self.fail("[beam]", "a mesh needs its path and a table sections = { name = { section }, … }")
+            found = {name: self.section(entry, f"[beam] sections {name}") for name, entry in sections.items()}
+            options |= {"data": table["data"]} if "data" in table else {}
+            return self.made(
+                Beam.from_mesh, {"path": self.file(path, "[beam]"), "sections": found, **options}, "[beam]"
+            )
+        if "spans" not in table:
+            return self.build(beam_of_section, table, "[beam]")
+        self.check_keys(table, ["spans", *common], "[beam]", "key")
+        if not isinstance(table["spans"], list):
+            self.fail("[beam]", "spans must be a list of tables with length and section")
+        spans = [
+            self.build(_span, entry, f"[beam] span {number}") for number, entry in enumerate(table["spans"], start=1)
+        ]
+        return self.made(Beam.of_spans, {"spans": spans, **options}, "[beam]")
+
+    def section(self, table: Any, where: str) -> Section | Taper:
+        """A section by its shape."""
+        return self.chosen(SECTION, table, where)
+
+    def choose(self, kinds: Constructors, table: Any, where: str, key: str = "kind", default: str = "") -> Any:
+        """Build the constructor that `kind` (or `shape`) names."""
+        if not isinstance(table, dict):
+            self.fail(where, f"must be a table {{ {key} = …, … }}, got {table!r}")
+        name = table.get(key, default)
+        if name not in list(kinds):  # a list: what a file gives need not be hashable
+            got = f"got {name!r}{nearest(name, kinds)}" if key in table else "it is missing"
+            self.fail(where, f"{key} must be one of {listed(kinds)}; {got}")
+        return self.build(kinds[name], {k: v for k, v in table.items() if k != key}, where, chosen_by=key)
+
+    def build(self, constructor: Callable[..., Any], table: Any, where: str, *also: str, chosen_by: str = "") -> Any:
+        """Call the constructor with a table's values."""
+        return self.made(constructor, self.arguments(constructor, table, where, *also, chosen_by=chosen_by), where)
+
+    def made(self, constructor: Callable[..., Any], arguments: Table, where: str) -> Any:
+        """Call a constructor; what it refuses is said with the table."""
+        try:
+            return constructor(**arguments)
+        except SceneFileError:
+            raise
+        except OSError as error:
+            self.fail(where, f"{error.filename}: {error.strerror}", error)
+        except (ValueError, TypeError, ArithmeticError, MemoryError) as error:
+            self.fail(where, str(error) or type(error).__name__, error)
+
+    def arguments(
+        self, constructor: Callable[..., Any], table: Any, where: str, *also: str, chosen_by: str = ""
+    ) -> dict[str, Any]:
+        """The values of a table, checked against the constructor's signature."""
+        if not isinstance(table, dict):
+            self.fail(where, f"must be a table, got {table!r}")
+        keys = parameters(constructor)
+        self.check_keys(table, [chosen_by, *keys, *also] if chosen_by else [*keys, *also], where, "key")
+        for key, parameter in keys.items():
+            if key not in table and parameter.default is inspect.Parameter.empty:
+                kind = f" ({words})" if (words := wanted(parameter.annotation)) else ""
+                self.fail(where, f"the key {key!r} is missing{kind}; it needs {listed(required(keys))}")
+        return {
+            parameter.name: self.value(table[key], key, parameter, where)
+            for key, parameter in keys.items()
+            if key in table
+        }
+
+    def value(self, value: Any, key: str, parameter: inspect.Parameter, where: str) -> Any:
+        """One value: a table for what has its own constructor, else checked by the annotation."""
+        inner = f"{where} {key}"
+        if kind := nested(key, parameter):
+            if kind.listed and not isinstance(value, list):
+                self.fail(inner, f"must be a list of {key}, got {shown(value)}")
+            if kind.listed:
+                return [self.chosen(kind, one, f"{inner} number {i}") for i, one in enumerate(value, start=1)]
+            return self.chosen(kind, value, inner)
+        if not fits(value, parameter.annotation):
+            self.fail(where, f"{key} must be {wanted(parameter.annotation)}, got {shown(value)}")
+        if key == "path":
+            return self.file(value, where)
+        return converted(value, parameter.annotation)
+
+    def chosen(self, kind: Nested, value: Any, where: str) -> Any:
+        """One thing of a kind; where plain text will do it is the name."""
+        table = {kind.key: value} if kind.by_name and not isinstance(value, dict) else value
+        return self.choose(kind.constructors(), table, where, kind.key, kind.default)
+
+    def check_keys(self, table: Table, valid: Sequence[str], where: str, what: str) -> None:
+        """Every key is a valid one; the nearest one is named otherwise."""
+        for key in table:
+            if key not in valid:
+                self.fail(where, f"unknown {what} {key!r}{nearest(key, valid)} (valid: {listed(valid)})")
+
+    def fail(self, where: str, message: str, cause: Exception | None = None) -> NoReturn:
+        """Raise with file and table in front."""
+        raise SceneFileError(f"{self.source.place(where, message)}: {message}") from cause
+
+
+def _span(length: float, section: Section) -> tuple[float, Section]:
+    """One span of a beam."""
+    return length, section
+
+
+def beam_of_section(length: float, section: Section, foundation: float = 0.0, axial_force: float = 0.0) -> Beam:
+    """A beam of one section."""
+    return Beam(length, section, foundation=foundation, axial_force=axial_force)
+
+
+def snake(name: str) -> str:
+    """LumpedMass -> lumped_mass."""
+    return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()

@@ -1,0 +1,75 @@
+"""Whether a run gains energy that nothing gave it: the sign of a step beyond the limit of stability."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from solvers.compiled.kernels import inner, kernel
+from solvers.problem import Array, System
+from solvers.stepping.stability import takes, work_of
+
+NOW, BEGAN, LEAST, IN_A_ROW, MOST_INPUT, HELD = range(6)  # places in `Space.watch`, see `watched`
+
+
+STEPS_OF_GAIN = 8  # steps in a row: one alone may be the ledger's, as in the first step of a load
+
+
+_FAR, STEPS_FAR = 1e3, 3  # times the energy given, and then steps in a row
+
+
+@kernel
+def gains(problem, state, space):
+    """Whether for some steps there is twice the energy that was ever there or came in, or far more for a few."""
+    ledger = 2 * problem.k.size
+    watch = space.watch
+    watch[MOST_INPUT] = max(watch[MOST_INPUT], state.x[ledger])
+    given = watch[BEGAN] + watch[MOST_INPUT]
+    for s in range(problem.gap.size):  # a stop gives at most what it held
+        given += min(max(-state.x[ledger + 2 + 2 * s], 0.0), watch[HELD + s])
+    more = watch[NOW] > 2.0 * given + watch[LEAST]
+    watch[IN_A_ROW] = watch[IN_A_ROW] + 1.0 if more else 0.0
+    far = watch[NOW] > _FAR * (given + watch[LEAST])
+    return watch[IN_A_ROW] >= STEPS_OF_GAIN or (far and watch[IN_A_ROW] >= STEPS_FAR)
+
+
+@inner
+def modal_gains(problem, state, space):
+    """The same on decoupled modes; damping that couples them has an energy of its own form, looked at outside."""
+    if problem.loss.shape[0] > 0:
+        return False
+    n, energy = problem.k.size, 0.0
+    for i in range(n):
+        energy += 0.5 * (state.x[n + i] ** 2 + problem.k[i] * state.x[i] ** 2)
+    space.watch[NOW] = energy
+    return gains(problem, state, space)
+
+
+def watched(system: System, motion: Array, least: float) -> Array:
+    """What `gains` looks at, J: stored now, at the start, negligible; steps that gained; most input, held by stops."""
+    q, q_dot = np.split(motion, 2)
+    stored = abs(float(system.energy(q, q_dot)))
+    known = system.about_laws
+    if "take" not in known:
+        known["take"] = [takes(contact.law) for contact in system.contacts]
+    held = [
+        work_of(contact.law, -float(contact.direction @ q) - contact.gap) if fair else math.inf
+        for contact, fair in zip(system.contacts, known["take"], strict=True)
+    ]
+    return np.array([stored, stored, least, 0.0, 0.0, *held])
+
+
+def largest_loads(problem: Any) -> Array:
+    """Bound of every load's signal (L,)."""
+    largest = np.zeros(len(problem.load))
+    np.add.at(largest, problem.tone_load, np.abs(problem.tone_amplitude))
+    for j, load in enumerate(problem.table_load):
+        largest[load] += np.abs(problem.table[problem.table_start[j] : problem.table_start[j + 1], 0]).max()
+    return largest
+
+
+def negligible_energy(problem: Any, inverse_mass: Array, dt: float) -> float:
+    """What rounding in the loads may bring: 1e-10 of the energy ½ vᵀM⁻¹v (s dt)² of the largest in one step, J."""
+    return 0.5e-10 * dt**2 * float(np.sum(inverse_mass * largest_loads(problem) ** 2))

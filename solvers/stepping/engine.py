@@ -1,0 +1,113 @@
+"""One run of a stepping method: its problem, its state, its share of the loop, and words for what went wrong."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from solvers.compiled.kernels import rhs
+from solvers.compiled.state import (
+    CALLS,
+    DONE,
+    GAINED,
+    H_CONTACT,
+    H_FLIGHT,
+    RUNNING,
+    State,
+    begin_contacts,
+    new_state,
+    problem_of,
+)
+from solvers.problem import Array, Forcing, Status, System
+from solvers.stepping.energy_gain import IN_A_ROW, NOW, STEPS_OF_GAIN, gains, largest_loads, negligible_energy, watched
+from solvers.stepping.events import HENON
+from solvers.stepping.loop import march, new_space
+from solvers.stepping.stability import kinks_of, shortest_contact
+
+
+def absolute_tolerance(method: Any, problem: Any, z: Array, fastest: float) -> float:
+    """The method's own, or less where start and loads are so small that it would stand above rtol times the motion."""
+    p, v = np.abs(z).reshape(2, -1).max(axis=1)
+    push = np.abs(problem.load).max(axis=1, initial=0.0) @ largest_loads(problem) / fastest
+    size = max(p, v / fastest, push / fastest)
+    return float(min(method.atol, method.rtol * size) if size > 0.0 else method.atol)
+
+
+class Engine:
+    """One run of a stepping method: problem, state, and its share of the loop."""
+
+    def __init__(self, method: Any, system: System, z: Array, forcing: Forcing, duration: float) -> None:
+        self.method, self.duration, self.system = method, duration, system
+        self.problem = problem_of(system, forcing)
+        self.back = system.blocks.T
+        if method.events == HENON:
+            self.problem.levels[:, 1:] = math.inf  # kinks are not looked for
+        self.state: State = new_state(z, len(system.contacts))
+        dt = 0.0 if method.adaptive else max(method.steps)
+        least = negligible_energy(self.problem, np.sum(self.problem.load * self.problem.power, axis=1), dt)
+        watch = watched(system, self.back @ z, least)
+        self.space = new_space(self.state, method.work_rows, watch, method.constants, kinks_of(system))
+        fastest = max([math.sqrt(abs(k)) for k in self.problem.k] + list(self.problem.c) + [1.0 / duration])
+        self.state.now[[H_FLIGHT, H_CONTACT]] = 0.1 / fastest, 0.01 / fastest
+        self.atol = absolute_tolerance(method, self.problem, z, fastest)
+        if not method.adaptive:
+            self.state.now[[H_FLIGHT, H_CONTACT]] = method.steps
+
+    def start(self) -> None:
+        """Put every stop on its piece and evaluate the first rate."""
+        state = self.state
+        begin_contacts(self.problem, state)
+        state.count[CALLS] += rhs(
+            *(self.problem, 0.0, state.x, state.piece, state.entry_rate, state.rate, self.space.work[0])
+        )
+
+    def keeps_ledger(self, sampled: bool) -> bool:
+        """The ledger is integrated along, always."""
+        return True
+
+    def march(self, budget: int, log: Array, out: Array, due: Array) -> int:
+        """Go on for a stretch."""
+        method = self.method
+        dt_flight, dt_contact = (math.inf, math.inf) if method.adaptive else method.steps
+        code = march(
+            *(method.step, self.problem, self.state, self.space, self.duration, budget),
+            *(dt_flight, dt_contact, method.rtol, self.atol),
+            *(method.adaptive, method.events, log, out, due),
+        )
+        return GAINED if code in (DONE, RUNNING) and self._gained() else code
+
+    def _gained(self) -> bool:
+        """Whether a run with coupled damping holds more energy than it was ever given; see `gains`."""
+        if not self.problem.loss.size or self.method.adaptive:
+            return False
+        size = 2 * self.problem.k.size
+        self.space.watch[NOW] = self.system.energy(*np.split(self.back @ self.state.x[:size], 2))
+        self.space.watch[IN_A_ROW] = STEPS_OF_GAIN
+        return bool(gains(self.problem, self.state, self.space))
+
+    def explain(self, code: Status) -> str:
+        """What grew, and the step to try."""
+        if code not in (Status.GAINED, Status.DIVERGED) or self.method.adaptive:
+            return ""
+        q, q_dot = np.split(self.back @ self.state.x[: 2 * self.problem.k.size], 2)
+        return explanation(self.method, self.system, q, q_dot, self.duration)
+
+
+def explanation(method: Any, system: System, q: Array, q_dot: Array, duration: float) -> str:
+    """The coordinate that grew, and the predicted limits."""
+    modal = not system.sparse and not np.any(system.M - np.eye(system.size))
+    share = np.abs(q_dot * (system.M @ q_dot))
+    if modal:  # among the modes that a step amplifies, if any
+        k, c = np.diag(system.K), np.diag(system.C)
+        grows = [max(method.radius(h, *pair) for h in method.steps) > 1.0 + 1e-9 for pair in zip(k, c, strict=True)]
+        share = np.where(grows, share + k * q**2, 0.0) if any(grows) else share + k * q**2
+    worst = int(np.argmax(np.nan_to_num(share, nan=math.inf, posinf=math.inf)))
+    where = f"coordinate {worst} of {system.size}"
+    if modal:
+        where = f"mode {worst + 1} of {system.size} (ω = {math.sqrt(abs(system.K[worst, worst])):.6g} rad/s)"
+    limit = method.stable_dt(system, duration=duration)
+    step = min(limit.flight, limit.contact, *method.steps, 0.1 * shortest_contact(system))
+    grown = f"; it grew in {where}, steps {method.steps[0]:g} s in flight and {method.steps[1]:g} s in contact"
+    return f"{grown}, predicted limits {limit.flight:.3g} s and {limit.contact:.3g} s: try {0.5 * step:.2g} s"
