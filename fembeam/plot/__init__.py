@@ -6,6 +6,7 @@
 
 from fembeam.model import places
 from fembeam.plot.animation import animate, frame
+from fembeam.plot.basins import basins
 from fembeam.plot.laws import identification, loops, restitutions
 from fembeam.plot.methods import failures, speed_accuracy, stability_map
 from fembeam.plot.mode_count import mode_count, smallest_model
@@ -26,6 +27,7 @@ from fembeam.plot.response import (
 
 __all__ = [
     "animate",
+    "basins",
     "branch",
     "contacts",
     "densities",

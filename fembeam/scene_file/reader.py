@@ -2,8 +2,8 @@
 
     [beam] [[supports]] [[masses]] [[springs]] [[dashpots]] [[stops]] [[forces]] [[impactors]] [damping] [base]
     gravity = 9.81
-    [reduce] [simulate] [orbit] [branch] [mode_count] [smallest_model] [ensemble]
-    [speed_accuracy]
+    [reduce] [simulate] [orbit] [branch] [basins] [mode_count] [smallest_model]
+    [ensemble] [speed_accuracy]
 
 The keys of a table are the arguments of the constructor behind it, read from its signature, so that nothing is
 declared twice: a constructor that gains an argument gains a key. Units are SI, names those of the library.
@@ -20,6 +20,7 @@ from typing import Any, NoReturn
 
 from fembeam.beams import Beam, ModalDamping, Rayleigh, Section, Taper
 from fembeam.scene import FEATURES, Scene, Source
+from fembeam.scene_file.basins_table import BasinsTable
 from fembeam.scene_file.branch_table import BranchTable
 from fembeam.scene_file.ensemble_table import EnsembleTable
 from fembeam.scene_file.keys import Constructors, converted, fits, listed, nearest, parameters, required, shown, wanted
@@ -82,6 +83,7 @@ STUDIES: Constructors = {
     "simulate": Simulate,
     "orbit": OrbitTable,
     "branch": BranchTable,
+    "basins": BasinsTable,
     "ensemble": EnsembleTable,
     "mode_count": ModeCountTable,
     "smallest_model": SmallestModelTable,
