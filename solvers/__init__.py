@@ -12,6 +12,8 @@ from solvers.problem import Contact, ContactLog, Cost, Energy, Parameter, Soluti
 
 _LATER = {
     "integrate": "integration",
+    "integrate_many": "many",
+    "ManySolutions": "many",
     "HenonRK2": "stepping.henon",
     "DormandPrince": "stepping.dormand_prince",
     "Exponential": "exponential.method",
@@ -40,6 +42,7 @@ __all__ = [
     "Exponential",
     "GeneralizedAlpha",
     "HenonRK2",
+    "ManySolutions",
     "Newmark",
     "Orbit",
     "OrbitError",
@@ -50,6 +53,7 @@ __all__ = [
     "System",
     "branch",
     "integrate",
+    "integrate_many",
     "lumped",
     "lyapunov",
     "orbit",

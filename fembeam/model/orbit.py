@@ -158,6 +158,15 @@ def checked_period(period: int) -> int:
 
 def _check_smallest(orbit: Orbit, once: float) -> None:
     """An orbit of period k must not repeat sooner."""
+    shorter = _smallest(orbit, once)
+    if shorter < orbit.period:
+        raise solvers.OrbitError(
+            f"no orbit of period {orbit.period} near the start: Newton's method went to one of period {shorter}"
+        )
+
+
+def _smallest(orbit: Orbit, once: float) -> int:
+    """Periods of the load after which an orbit repeats."""
     n = len(orbit.model.omega)
     for shorter in range(1, orbit.period):
         if orbit.period % shorter:
@@ -168,9 +177,8 @@ def _check_smallest(orbit: Orbit, once: float) -> None:
             (np.repeat(np.abs(orbit.state[:n]).max(), n), np.repeat(np.abs(orbit.state[n:]).max(), n))
         )
         if np.all(np.abs(end - orbit.state) <= SAME * scale + 1e-300):
-            raise solvers.OrbitError(
-                f"no orbit of period {orbit.period} near the start: Newton's method went to one of period {shorter}"
-            )
+            return shorter
+    return orbit.period
 
 
 def _from_nothing(model: Model, count: int, once: float, shots: int | None) -> Orbit:
@@ -266,10 +274,21 @@ def _settle(model: Model, once: float, start: Vector, longest: int, method: Any)
         for k in range(1, longest + 1):
             if np.all(np.abs(strobes[k:] - strobes[:-k]) <= 1e-3 * size):
                 try:
-                    return x, Orbit(model, solvers.orbit(model.system, k * once, x), k)
+                    return x, _once_around(model, x, k, once)
                 except solvers.OrbitError:
                     break
     return x, None
+
+
+def _once_around(model: Model, x: Vector, k: int, once: float) -> Orbit:
+    """The orbit near a state that nearly repeats after k periods; a decaying transient may have hidden that it is
+    shorter.
+    """
+    found = Orbit(model, solvers.orbit(model.system, k * once, x), k)
+    shorter = _smallest(found, once)
+    if shorter == k:
+        return found
+    return Orbit(model, solvers.orbit(model.system, shorter * once, periodic.at_zero(found.found)), shorter)
 
 
 def _same(a: Orbit | None, b: Orbit | None, once: float) -> bool:

@@ -7,6 +7,7 @@ is what all share. Imports: `statistics`, `model` and the rooms below. Begin wit
 
 from fembeam.model import places
 from fembeam.plot.animation import animate, frame
+from fembeam.plot.basins import basins
 from fembeam.plot.contact_histograms import contacts
 from fembeam.plot.laws import identification, loops, restitutions
 from fembeam.plot.methods import failures, speed_accuracy, stability_map
@@ -19,6 +20,7 @@ from fembeam.plot.style import styled
 
 __all__ = [
     "animate",
+    "basins",
     "branch",
     "contacts",
     "densities",

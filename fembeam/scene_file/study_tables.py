@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import solvers
+from fembeam.scene_file.basins_table import BasinsTable
 from fembeam.scene_file.keys import Constructors, parameters
 from fembeam.scene_file.orbit_tables import BranchTable, OrbitTable
 from fembeam.study.ensemble import Ensemble, ensemble
@@ -216,6 +217,7 @@ STUDIES: Constructors = {
     "simulate": Simulate,
     "orbit": OrbitTable,
     "branch": BranchTable,
+    "basins": BasinsTable,
     "ensemble": EnsembleTable,
     "mode_count": _table_of(mode_count),
     "smallest_model": _table_of(smallest_model),

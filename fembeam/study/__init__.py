@@ -1,9 +1,9 @@
 """Studies: questions asked of a scene or a model by many runs, each answered by a table and a figure."""
 
-from fembeam.study.bifurcation import Bifurcation, bifurcation
 from fembeam.study.ensemble import Ensemble, ensemble
 from fembeam.study.failure_gallery import Failure, gallery
 from fembeam.study.mode_count import ModeCount, mode_count
+from fembeam.study.settling import Basins, Bifurcation, basins, bifurcation
 from fembeam.study.smallest_model import smallest_model
 from fembeam.study.smallest_model_result import NotMetError, SmallestModel
 from fembeam.study.speed_accuracy import NoReferenceError, speed_accuracy
@@ -12,6 +12,7 @@ from fembeam.study.stability_map import StabilityMap, Verdict, stability_map
 from fembeam.study.stationary import Response, characteristics, stationary
 
 __all__ = [
+    "Basins",
     "Bifurcation",
     "Ensemble",
     "Failure",
@@ -24,6 +25,7 @@ __all__ = [
     "SpeedAccuracy",
     "StabilityMap",
     "Verdict",
+    "basins",
     "bifurcation",
     "characteristics",
     "ensemble",

@@ -1,7 +1,8 @@
 r"""Work against error on a beam that hits its stop.
 
 ``python tests/bench/impact.py [--modes 2 10 30] [--starts 12] [--quick] [--chart FILE.png]`` prints one table per mode
-count, and draws all points, peers included, on one chart. Every
+count, and draws all points, peers included, on one chart; ``--many 1200`` compares calls for so many starts at once
+instead. Every
 method runs the same starts over ten periods; the error is that of the tip at the end against `reference`, in units of
 1 mm. All methods are timed by turns in one process, the fastest of several rounds counts for each start, and medians
 over the starts are printed. Ratios are taken at equal error, each method's time being interpolated in log-log between
@@ -12,13 +13,15 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
 import time
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import peers
-from reference import MODES, STARTS, Problem, problem
+from reference import DURATION, LENGTH, MODES, STARTS, Problem, problem
+from taylor_ensemble import Ensemble
 
 import fembeam as fb
 import solvers
@@ -209,6 +212,39 @@ def chart(points: dict[int, list[Point]]) -> Any:
     return fb.plot.speed_accuracy(study.SpeedAccuracy(drawn, 1e-3, nothing, nothing, "tip after ten periods / 1 mm"))
 
 
+def many(of: Problem, count: int, rounds: int) -> list[str]:
+    """Time per start of calls for many starts at once, by turns; processor time shows what other work takes away."""
+    starts, tips = (np.resize(values, (count, *values.shape[1:])) for values in (of.starts, of.tips))
+    method, ensemble = solvers.Exponential(1e-8), Ensemble(of, 1e-8)
+    single, alone = peers.exponential(of, {"rtol": 1e-8}), peers.heyoka(of, {"tol": 1e-8})
+
+    def ours(threads: int) -> Any:
+        ends = solvers.integrate_many(of.system, *np.hsplit(starts, 2), DURATION, method, threads)
+        return ends.q @ of.phi
+
+    calls = {
+        "integrate_many": lambda: ours(1),
+        "integrate_many, 2 threads": lambda: ours(2),
+        "integrate, one by one": lambda: [single(start)[0] for start in starts[:100]],
+        "heyoka, its ensemble": lambda: ensemble(starts[:100]),
+        "heyoka, one by one": lambda: [alone(start)[0] for start in starts[:100]],
+    }
+    wall, processor, error = (dict.fromkeys(calls, math.inf) for _ in range(3))
+    for _ in range(rounds):
+        for name, call in calls.items():
+            begin, spent = time.perf_counter(), time.process_time()
+            found = np.asarray(call(), dtype=float)
+            wall[name] = min(wall[name], (time.perf_counter() - begin) / len(found))
+            processor[name] = min(processor[name], (time.process_time() - spent) / len(found))
+            error[name] = float(np.median(np.abs(found - tips[: len(found)]))) / LENGTH
+    own = wall["integrate_many"]
+    load = f"load of the machine {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""
+    return [f"{'call':26s} {'µs a start':>10s} {'processor µs':>12s} {'error':>8s} {'times':>6s}   {load}"] + [
+        f"{name:26s} {1e6 * wall[name]:10.0f} {1e6 * processor[name]:12.0f} {error[name]:8.0e} {wall[name] / own:6.2f}"
+        for name in calls
+    ]
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -216,10 +252,14 @@ def main() -> None:
     parser.add_argument("--starts", type=int, default=STARTS)
     parser.add_argument("--quick", action="store_true", help="fewer rounds, and slow settings on few starts")
     parser.add_argument("--chart", metavar="FILE.png", help="draw all points")
+    parser.add_argument("--many", type=int, metavar="STARTS", help="calls for so many starts at once, nothing else")
     given, drawn = parser.parse_args(), {}
     patience, rounds = (SHORT, 3) if given.quick else (PATIENCE, ROUNDS)
     for modes in given.modes:
         of = problem(modes)
+        if given.many:
+            print(f"\n{modes} modes, 10 periods", *many(of, given.many, rounds), sep="\n", flush=True)
+            continue
         points = prepared(of)
         measure(points, of, min(given.starts, STARTS), patience, rounds)
         print(f"\n{modes} modes, 10 periods")

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -105,11 +105,14 @@ def _settled(
     scene = with_value(model.scene, path, value)
     if changes_structure(path):
         model = scene.reduce(modes=list(model.modes))
-    system, once, n = replace(model, scene=scene).system, load_period(scene), len(model.omega)
+        system = model.system
+    else:
+        system = model.system_like(scene)
+    once, n = load_period(scene), len(model.omega)
     method = solvers.Exponential(1e-8, ledger=False)
-    # settling needs no samples, but a restart would forget the entry rate of a contact under way
-    run = solvers.integrate(system, start[:n], start[n:], (settle + keep) * once, once / LOOKS, method)
-    first = settle * LOOKS
-    states = np.concatenate((run.q, run.q_dot), axis=1)[first::LOOKS][:keep]
-    u = np.abs(run.q[first : first + keep * LOOKS] @ model.phi(z))
+    # settling needs no samples; but it is one run: a restart would forget the entry rate of a contact under way
+    looks = np.arange(settle * LOOKS, (settle + keep) * LOOKS) * (once / LOOKS)
+    run = solvers.integrate(system, start[:n], start[n:], (settle + keep) * once, looks, method)
+    states = np.concatenate((run.q, run.q_dot), axis=1)[::LOOKS]
+    u = np.abs(run.q @ model.phi(z))
     return states, u.reshape(keep, LOOKS).max(axis=1)

@@ -1,0 +1,245 @@
+"""Basins of attraction: which periodic orbit each start of a grid comes to.
+
+A start belongs to a stable orbit of period k (in periods T of the load) when its state at a multiple of T is within
+`NEAR` of one of the orbit's k states there: |q - q_j| <= NEAR max|q| and the same for q̇, in the maximum norm, sizes
+those over the orbit. Runs double their length, from t = 0 anew, until they are there or the longest has been made.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+import solvers
+from fembeam.model import Attractor, Orbit, load_period
+from fembeam.study.execution.checkpoint import Checkpoint, identity
+from fembeam.study.execution.executors import spread
+from fembeam.study.settling.plane import WHERE, Axis, axis_of, checked_plane, checked_points, starts_of
+from fembeam.support import aligned, require
+from solvers.orbits.shots import delayed
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from fembeam.model import Model
+
+Vector = NDArray[np.float64]
+NEAR = 1e-3
+FIRST = 25  # periods of the shortest runs
+COARSE = 5  # starts along each axis that are settled to find orbits
+TRIES = 12  # starts left over that are settled to find more
+UNSETTLED, FAILED = -1, -2  # labels of starts that came to no orbit, and of runs that failed
+
+
+@dataclass(frozen=True, eq=False)
+class Basins:
+    """Where the starts of a grid settle.
+
+    Attributes
+    ----------
+    x, y : `Axis` with direction, values (nx,), (ny,) and name. origin : (2n,) the state at x = y = 0.
+    label : (ny, nx) number of the attractor of each start; -1 where none was reached, -2 where the run failed.
+    attractors : those reached, the most frequent first, each with its number of starts.
+    """
+
+    x: Axis
+    y: Axis
+    origin: Vector
+    label: NDArray[np.int64]
+    attractors: tuple[Attractor, ...]
+
+    @property
+    def shares(self) -> Vector:
+        """(a,) part of the starts that comes to each attractor."""
+        return np.array([one.count for one in self.attractors]) / self.label.size
+
+    def __str__(self) -> str:
+        """Attractors with their shares of the starts."""
+        others = (("not settled", UNSETTLED), ("run failed", FAILED))
+        rows = [(one.name, one.count) for one in self.attractors]
+        rows += [(name, count) for name, kind in others if (count := int(np.sum(self.label == kind)))]
+        table = [(name, count, f"{count / self.label.size:.2%}") for name, count in rows]
+        size = " x ".join(map(str, self.label.shape[::-1]))
+        head = f"{size} starts: " + ", ".join(
+            f"{axis.name} from {axis.values[0]:g} to {axis.values[-1]:g}" for axis in (self.x, self.y)
+        )
+        return f"{head}\n{aligned(('comes to', 'starts', 'share'), table)}"
+
+    def figure(self) -> Figure:
+        """The map, a colour for each attractor."""
+        from fembeam.plot import basins as drawn
+
+        return drawn(self)
+
+
+@dataclass(frozen=True, eq=False)
+class _Known:
+    """A stable orbit with its states (k, 2n) at multiples of the load's period, and the sizes (2n,) of its motion."""
+
+    orbit: Orbit
+    states: Vector
+    size: Vector
+
+    @classmethod
+    def of(cls, orbit: Orbit, once: float) -> _Known:
+        """From an orbit, by one run over its period."""
+        found, n = orbit.found, len(orbit.model.omega)
+        times = np.sort((np.arange(orbit.period) * once - found.phase) % found.period)
+        later = delayed(found.system, found.phase)
+        run = solvers.integrate(later, found.state[:n], found.state[n:], found.period, times, found.method)
+        sizes = [np.repeat(np.abs(part).max(), n) for part in (orbit.run.q, orbit.run.q_dot)]
+        return cls(orbit, np.hstack((run.q, run.q_dot)), np.concatenate(sizes))
+
+    def holds(self, states: Vector) -> Any:
+        """(k,) whether each state is on it."""
+        distance = np.abs(states[:, None, :] - self.states) / self.size
+        return (distance.max(axis=2) <= NEAR).any(axis=1)
+
+
+def basins(
+    model: Model,
+    x: Any = "displacement",
+    x_span: tuple[float, float] = (-1e-2, 1e-2),
+    y: Any = "velocity",
+    y_span: tuple[float, float] = (-1.0, 1.0),
+    points: int | tuple[int, int] = 100,
+    *,
+    z: float | None = None,
+    start: ArrayLike | None = None,
+    settle: int = 200,
+    longest: int = 8,
+    threads: int = 1,
+    checkpoint: str | os.PathLike[str] | None = None,
+    progress: bool = False,
+) -> Basins:
+    """Colour a plane of starts by the periodic orbit each comes to.
+
+    Parameters
+    ----------
+    model : under periodic loads.
+    x, y : the plane's axes: "displacement" (m; the beam bent by a force at z), "velocity" (m/s; struck at z), the
+        number of a state in [q, q̇], or a direction (2n,).
+    x_span, y_span : (lowest, highest) along them.
+    points : how many along both, or (along x, along y), at least 2.
+    z : place of displacement and velocity, m; None is the first stop, else the tip.
+    start : (2n,) state at x = y = 0, to which both are added; None is rest.
+    settle : most periods of the load a start is given. Where damping is ζω at least, a disturbance of an orbit
+        without contacts falls to `NEAR` in 7/(ζω T).
+    longest : orbits of at most so many periods are looked for; longer or chaotic motion counts as not settled.
+    threads : how many work at the same time.
+    checkpoint : file written whole after each row of the grid; what it holds is not computed again.
+    progress : show a bar (only on a terminal).
+
+    Returns
+    -------
+    Basins. Orbits are found by `Model.attractors` from a coarse grid, and from starts that came to none of these; one
+    whose basin no such start hits is missed, and its starts count as not settled.
+
+    Raises
+    ------
+    ValueError for bad input or the checkpoint of another study; KeyboardInterrupt with finished rows in the checkpoint.
+
+    Examples
+    --------
+    >>> import fembeam as fb
+    >>> beam = fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01))
+    >>> scene = fb.Scene(beam, [fb.Clamped(0.0)], base=fb.Harmonic(1e-3, 100.0), damping=fb.ModalDamping(0.05))
+    >>> print(basins(scene.reduce(modes=1), points=4))
+    4 x 4 starts: displacement at 0.5 m / m from -0.01 to 0.01, velocity at 0.5 m / (m/s) from -1 to 1
+    comes to                    starts    share
+    period 1 with 0 impacts         16  100.00%
+    """
+    from fembeam.model import observed
+
+    columns, rows = checked_points(points)
+    place = observed(model) if z is None else z
+    across, up = axis_of(model, x, x_span, columns, place), axis_of(model, y, y_span, rows, place)
+    origin, once = checked_plane(model, start, across, up), load_period(model.scene)
+    for name, count in (("settle", settle), ("longest", longest)):
+        whole = isinstance(count, (int, np.integer)) and not isinstance(count, bool) and count > 0
+        require(whole, f"{name} counts periods of the load and must be above 0", count, WHERE, "give a whole number")
+    starts = starts_of(origin, across, up)
+    asked = partial(basins, x=across, y=up, start=origin, settle=settle, longest=longest)
+    kept = Checkpoint(checkpoint, {} if checkpoint is None else identity(model, asked))
+    known = _found(model, _coarse(starts), longest, once)
+    missing = [row for row in range(rows) if str(row) not in kept.values]
+    task = partial(_settled, model, starts, known, settle, once, threads)
+    spread(task, missing, None, "basins" if progress else None, lambda i, v: kept.add(str(missing[i]), {"state": v}))
+    states = np.array([kept.values[str(row)]["state"] for row in range(rows)])
+    label, known = _labelled(model, states.reshape(-1, states.shape[-1]), known, longest, once)
+    return _sorted(across, up, origin, label.reshape(rows, columns), known)
+
+
+def _coarse(starts: Vector) -> Vector:
+    """Some starts of the grid, its corners among them."""
+    rows, columns = (np.unique(np.linspace(0, size - 1, COARSE).astype(int)) for size in starts.shape[:2])
+    return starts[np.ix_(rows, columns)].reshape(-1, starts.shape[2])
+
+
+def _found(model: Model, starts: Sequence[Vector] | Vector, longest: int, once: float) -> list[_Known]:
+    """The stable orbits that starts come to."""
+    found = model.attractors(starts=list(starts), longest=longest)
+    return [_Known.of(one.orbit, once) for one in found if one.orbit is not None and one.orbit.stable]
+
+
+def _settled(
+    model: Model, starts: Vector, known: list[_Known], settle: int, once: float, threads: int, row: int
+) -> Vector:
+    """(nx, 2n) states that the starts of a row come to, at multiples of the load's period; NaN where a run failed."""
+    n, method = len(model.omega), solvers.Exponential(1e-8, ledger=False)
+    states, left = starts[row].copy(), np.arange(starts.shape[1])
+    lengths = [FIRST << i for i in range(40) if FIRST << i < settle]
+    for periods in [*lengths, settle]:
+        begin = starts[row, left]
+        runs = solvers.integrate_many(model.system, begin[:, :n], begin[:, n:], periods * once, method, threads,
+                                      check=False)  # fmt: skip
+        if np.any(runs.status == solvers.Status.INTERRUPTED):
+            raise KeyboardInterrupt
+        done = runs.status == solvers.Status.DONE
+        states[left] = np.where(done[:, None], np.hstack((runs.q, runs.q_dot)), math.nan)
+        left = left[(_labels(states[left], known) == UNSETTLED)]
+        if not left.size:
+            break
+    return states
+
+
+def _labels(states: Vector, known: list[_Known]) -> NDArray[np.int64]:
+    """(k,) number of the orbit each state is on."""
+    label = np.where(np.isfinite(states).all(axis=1), UNSETTLED, FAILED)
+    for i, one in enumerate(known):
+        label[(label == UNSETTLED) & one.holds(states)] = i
+    return label
+
+
+def _labelled(
+    model: Model, states: Vector, known: list[_Known], longest: int, once: float
+) -> tuple[NDArray[np.int64], list[_Known]]:
+    """Labels of all states, and the orbits, those found from states that were on none of the first ones included."""
+    label = _labels(states, known)
+    left = np.flatnonzero(label == UNSETTLED)
+    for _ in range(TRIES):
+        if not left.size:
+            break
+        more = _found(model, states[left[:1]], longest, once)
+        known = known + [one for one in more if not any(other.holds(one.states).any() for other in known)]
+        label = _labels(states, known)
+        left = left[1:][label[left[1:]] == UNSETTLED]
+    return label, known
+
+
+def _sorted(x: Axis, y: Axis, origin: Vector, label: NDArray[np.int64], known: list[_Known]) -> Basins:
+    """The result, the largest basin first."""
+    counts = np.array([np.sum(label == i) for i in range(len(known))], dtype=int)
+    order = [i for i in np.argsort(-counts, kind="stable").tolist() if counts[i]]
+    renumbered = label.copy()
+    for new, old in enumerate(order):
+        renumbered[label == old] = new
+    attractors = tuple(Attractor(known[i].orbit, int(counts[i]), known[i].states[0]) for i in order)
+    return Basins(x, y, origin, renumbered, attractors)

@@ -1,0 +1,162 @@
+"""The loop of `method` over many starts: one compiled call takes one after the other to the end.
+
+It runs the very machine code of a single run, through its address, so that every bit of the results is the same.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import types
+
+from solvers.compiled.handles import opener
+from solvers.compiled.kernels import INTEGERS, MATRIX, PROBLEM, REAL, VECTOR, entry, inner
+from solvers.compiled.state import (
+    DIVERGED,
+    DONE,
+    LOG_FULL,
+    LOGGED,
+    PEAK_DELTA,
+    PEAK_FORCE,
+    REJECTED,
+    RUNNING,
+    STATE,
+    STATUSES,
+    STEPS,
+    T,
+)
+from solvers.exponential.energy_guard import ALLOWED, FACTOR, FIRST, LAST, too_much, unknown
+from solvers.exponential.method import Engine, advance
+from solvers.exponential.preparation import SPACE
+from solvers.problem import COLUMNS, Array, ContactLog, Status
+
+NEXT, BEYOND, BEGUN = range(3)  # places in a cursor: the start at work, the end of its stretch, whether it is under way
+CODE, CONTACTS = range(2)  # columns of Ends.count
+REACHED, EXCHANGED, ENERGY = range(3)  # columns of Ends.number; three of energy, as in Space.energy
+_STOP, _DELTA, _FORCE = (list(ContactLog.__dataclass_fields__).index(n) for n in ("stop", "peak_indentation", "peak_force"))
+_CUBE = types.Array(REAL, 3, "C")
+_RUN = types.FunctionType(advance.nopython_signatures[0])
+_NEVER, _NOWHERE = np.array([np.inf]), np.empty((0, 0))
+_problem, _state, _space = opener(PROBLEM), opener(STATE), opener(SPACE)
+
+
+class Ends(NamedTuple):
+    """What becomes of k starts."""
+
+    x: Any  # (k, 2N) states of all blocks
+    count: Any  # (k, 2) code of the status, number of contacts
+    number: Any  # (k, 5) time reached, Σ peak force × peak indentation, energies
+    peak: Any  # (k, m, 2) largest indentation and force
+
+    @classmethod
+    def of(cls, starts: int, width: int, stops: int) -> Ends:
+        """Of starts that have not begun."""
+        count = np.zeros((starts, 2), dtype=np.int64)
+        count[:, CODE] = STATUSES.index(Status.INTERRUPTED)
+        x, number = np.full((starts, width), np.nan), np.zeros((starts, 5))
+        return cls(x, count, number, np.zeros((starts, stops, 2)))
+
+
+@inner
+def _note(stop, delta, force, count, number, peak):
+    """A contact among those of its start."""
+    count[CONTACTS] += 1
+    number[EXCHANGED] += abs(delta * force)
+    peak[stop, 0], peak[stop, 1] = max(peak[stop, 0], delta), max(peak[stop, 1], force)
+
+
+@inner
+def _begin(problem, state, numbers, rest, start):
+    """The state of a run at t = 0, as `Workspace.begin` makes it."""
+    for i in range(rest.size):
+        numbers[i] = rest[i]
+    own = start.size // 2
+    for b in range(own):
+        state.x[b] += start[b]
+        state.x[problem.k.size + b] += start[own + b]
+
+
+@inner
+def _end(problem, state, space, code, x, count, number, peak):
+    """The outcome of a run that is over."""
+    finite = True
+    for e in range(x.size):
+        x[e] = state.x[e]
+    for value in state.x:
+        finite &= np.isfinite(value)
+    for s in range(problem.gap.size):
+        if state.piece[s] > 0:
+            _note(s, state.open[s, PEAK_DELTA], state.open[s, PEAK_FORCE], count, number, peak)
+    count[CODE] = DIVERGED if code == DONE and not finite else code
+    number[REACHED] = state.now[T]
+    for i in range(3):
+        number[ENERGY + i] = space.energy[i]
+
+
+@entry(
+    types.void(
+        *(_RUN, *[types.int64] * 4, VECTOR, VECTOR, MATRIX, INTEGERS, REAL, types.int64, REAL, REAL),
+        *(MATRIX, MATRIX, VECTOR, MATRIX, types.Array(types.int64, 2, "C"), MATRIX, _CUBE),
+    )
+)
+def advance_many(
+    run, problem_at, tables_at, state_at, space_at, numbers, rest, starts, cursor, t_end, budget, rtol, reach,
+    log, out, due, x, count, number, peak,
+):  # fmt: skip
+    """Take the starts of a stretch to ``t_end`` one after the other, for about ``budget`` steps of them all.
+
+    ``run`` is `method.advance`; ``numbers`` is a workspace's memory and ``rest`` what it holds before a start is added.
+    The last four are the arrays of `Ends`.
+    """
+    problem, state, space = _problem(problem_at), _state(state_at), _space(space_at)
+    spent = 0
+    while cursor[NEXT] < cursor[BEYOND] and spent < budget:
+        i = cursor[NEXT]
+        if not cursor[BEGUN]:
+            _begin(problem, state, numbers, rest, starts[i])
+            cursor[BEGUN] = 1
+        spent -= state.count[STEPS] + state.count[REJECTED]
+        code = run(
+            problem_at, tables_at, state_at, space_at, t_end, budget, rtol, reach, log, out, due, False
+        )  # fmt: skip
+        spent += state.count[STEPS] + state.count[REJECTED] + 1
+        for row in range(state.count[LOGGED]):
+            _note(np.int64(log[row, _STOP]), log[row, _DELTA], log[row, _FORCE], count[i], number[i], peak[i])
+        state.count[LOGGED] = 0
+        if code != RUNNING and code != LOG_FULL:
+            _end(problem, state, space, code, x[i], count[i], number[i], peak[i])
+            cursor[NEXT], cursor[BEGUN] = i + 1, 0
+
+
+class Worker:
+    """An engine that takes stretches of the starts to their ends; each thread has one of its own."""
+
+    def __init__(self, engine: Engine, starts: Array, ends: Ends, budget: int) -> None:
+        self.engine, self.cursor = engine, np.zeros(3, dtype=np.int64)
+        workspace, log = engine.workspace, np.empty((max(256, 2 * len(engine.problem.gap)), COLUMNS))
+        self.arguments = (
+            *(advance, *engine.addresses, workspace.numbers, workspace.rest, starts, self.cursor),
+            *(engine.duration, budget, engine.method.rtol, engine.reach, log, _NOWHERE, _NEVER, *ends),
+        )
+
+    def take(self, first: int, beyond: int) -> None:
+        """Make these starts the stretch to work at."""
+        self.cursor[:] = first, beyond, 0
+
+    def march(self) -> bool:
+        """Go on with the stretch for a while; whether it is done."""
+        advance_many(*self.arguments)
+        return bool(self.cursor[NEXT] == self.cursor[BEYOND])
+
+
+def judged(engine: Engine, ends: Ends) -> Any:
+    """(k,) `Status` of every start: that of its run, unless it ends with more energy than it can have been given."""
+    status = np.array(STATUSES, dtype=object)[ends.count[:, CODE]]
+    energy = ends.number[:, ENERGY:]
+    slack = unknown(1.0, np.zeros(1), engine.method.rtol) * (energy[:, FIRST] + ends.number[:, EXCHANGED])
+    much = (ends.count[:, CODE] == DONE) & (energy[:, LAST] > FACTOR * (energy[:, ALLOWED] + slack))
+    for i in np.flatnonzero(much):
+        if too_much(engine.system, energy[i], engine.problem, engine.duration, slack[i]):
+            status[i] = Status.UNBALANCED
+    return status

@@ -1,0 +1,212 @@
+"""Many starts of one system at once: checked, shared out among threads, collected in arrays.
+
+A start counts as one piece of work: its numbers do not depend on the others, on their order, or on the threads.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass
+from threading import Event
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from solvers.integration import _BUDGET, _forcing
+from solvers.problem import Array, SolverError, Status, System, counted
+from solvers.problem.run_arguments import _check_laws, _times
+
+if TYPE_CHECKING:
+    from solvers.exponential.many import Worker
+
+_STRETCH = 64  # starts a thread takes at once, at most
+_LOOK = 0.1  # s between two looks at the threads
+
+
+@dataclass(frozen=True, eq=False)
+class ManySolutions:
+    """Ends of k runs of one system with m stops.
+
+    Attributes
+    ----------
+    q, q_dot : (k, n) coordinates and rates at the end; NaN for a start that was not finished after Ctrl-C.
+    t : (k,) time reached, s. status : (k,) `Status` of each run.
+    contacts : (k,) how many there were, those under way at the end included.
+    peak_indentation, peak_force : (k, m) largest of each stop, m and N; 0 where it was not touched.
+    seconds : wall time of all of them.
+    """
+
+    q: Array
+    q_dot: Array
+    t: Array
+    status: Any
+    contacts: Any
+    peak_indentation: Array
+    peak_force: Array
+    seconds: float
+
+    def __len__(self) -> int:
+        return len(self.status)
+
+    def __repr__(self) -> str:
+        found = {status: int(np.sum(self.status == status)) for status in Status}
+        states = ", ".join(f"{number} {status.value}" for status, number in found.items() if number)
+        return f"<{counted(len(self), 'run')}, {counted(int(self.contacts.sum()), 'contact')}: {states}>"
+
+
+def integrate_many(
+    system: System,
+    q0: ArrayLike,
+    q_dot0: ArrayLike,
+    duration: float,
+    method: Any = None,
+    threads: int = 1,
+    progress: Callable[[int], None] | None = None,
+    *,
+    check: bool = True,
+) -> ManySolutions:
+    """Integrate a system from many starts in one compiled loop; each ends as `integrate` ends it, bit for bit.
+
+    Parameters
+    ----------
+    system : the problem; see `integrate`.
+    q0, q_dot0 : (k, n) initial coordinates and rates, a start in each row; not changed.
+    duration : s, > 0, of every run.
+    method : `Exponential`, the only one that offers this; None takes ``Exponential(rtol=1e-8)``.
+    threads : how many work at the same time, each without Python's lock; results do not depend on it.
+    progress : called with the number of starts finished now and then.
+    check : raise when a run fails; False returns all of them, with their status.
+
+    Returns
+    -------
+    ManySolutions. After Ctrl-C the starts not finished have NaN and `Status.INTERRUPTED`.
+
+    Raises
+    ------
+    ValueError and TypeError for bad input, before computing; SolverError (with ``.solution``, all the runs) when one
+    fails, with its index.
+
+    Examples
+    --------
+    >>> system = System.modal(omega=[2.0], zeta=[0.0])
+    >>> ends = integrate_many(system, [[1.0], [0.5]], [[0.0], [0.0]], duration=np.pi)
+    >>> ends
+    <2 runs, 0 contacts: 2 finished>
+    >>> bool(np.abs(ends.q[:, 0] - [1.0, 0.5]).max() < 1e-7)
+    True
+    """
+    from solvers.exponential.many import CONTACTS, REACHED, Ends, Worker, judged
+    from solvers.exponential.method import Exponential
+
+    method = Exponential() if method is None else method
+    if not isinstance(method, Exponential):
+        raise TypeError(f"integrate_many offers Exponential only, got {method!r}; call integrate for each start")
+    starts = _starts(system, q0, q_dot0)
+    _times(duration, None)
+    _check_threads(threads)
+    _check_laws(system)
+    forcing, begin = _forcing(system, duration, min(max(method.rtol, 1e-12), 1e-6)), time.perf_counter()
+    engines = [method.engine(system, starts[0], forcing, duration) for _ in range(min(threads, len(starts)))]
+    ends = Ends.of(len(starts), engines[0].back.shape[1], len(system.contacts))
+    _to_the_end([Worker(engine, starts, ends, _BUDGET) for engine in engines], len(starts), progress)
+    status = judged(engines[0], ends)
+    for engine in engines:
+        engine.release()
+    motion, n = _products(engines[0].back, ends.x), system.size
+    t, contacts, peaks = ends.number[:, REACHED], ends.count[:, CONTACTS], (ends.peak[..., 0], ends.peak[..., 1])
+    found = ManySolutions(motion[:, :n], motion[:, n:], t, status, contacts, *peaks, time.perf_counter() - begin)
+    if check:
+        _check_status(found, duration)
+    return found
+
+
+def _starts(system: System, q0: ArrayLike, q_dot0: ArrayLike) -> Array:
+    """Checked starts (k, 2n), in the coordinates of the blocks."""
+    n, parts = system.size, [np.asarray(values, dtype=float) for values in (q0, q_dot0)]
+    for name, part in zip(("q0", "q_dot0"), parts, strict=True):
+        if part.ndim != 2 or part.shape[1] != n or not len(part):
+            raise ValueError(f"{name} must have shape (k, {n}), a start in each of k > 0 rows, got {part.shape}")
+        bad = np.argwhere(~np.isfinite(part))
+        if bad.size:
+            row, column = bad[0].tolist()
+            raise ValueError(f"{name} must be finite, got {part[row, column]} at start {row}, coordinate {column}")
+    if len(parts[0]) != len(parts[1]):
+        raise ValueError(f"q0 and q_dot0 must have as many rows, got {len(parts[0])} and {len(parts[1])}")
+    return _products(system.blocks.inverse, np.hstack(parts))
+
+
+def _products(matrix: Array, rows: Array) -> Array:
+    """matrix · row for each row, every one a product of its own: one of all of them at once rounds otherwise."""
+    return np.ascontiguousarray(np.matmul(matrix, rows[:, :, None])[:, :, 0])
+
+
+def _check_threads(threads: int) -> None:
+    """A count of threads."""
+    if not isinstance(threads, (int, np.integer)) or isinstance(threads, bool) or threads < 1:
+        raise ValueError(f"threads must be a whole number above 0, got {threads!r}")
+
+
+def _check_status(found: ManySolutions, duration: float) -> None:
+    """Raise for the first run that failed."""
+    failed = [i for i, status in enumerate(found.status) if status not in (Status.DONE, Status.INTERRUPTED)]
+    if failed:
+        first = failed[0]
+        others = f" ({len(failed)} of {len(found)} starts failed)" if len(failed) > 1 else ""
+        raise SolverError(
+            f"start {first} stopped at t = {found.t[first]:.9g} s of {duration:g} s: {found.status[first].value}{others}",
+            found,
+        )
+
+
+def _to_the_end(workers: list[Worker], count: int, progress: Callable[[int], None] | None) -> None:
+    """Let the workers share the starts; after Ctrl-C they stop where they are."""
+    size = max(1, min(_STRETCH, math.ceil(count / (4 * len(workers)))))
+    stretches, stop, done = iter(range(0, count, size)), Event(), [0] * len(workers)
+    tell = (lambda: progress(sum(done))) if progress else (lambda: None)
+    tasks = [_stretches(worker, stretches, size, count, stop, done, i) for i, worker in enumerate(workers)]
+    try:
+        if len(tasks) == 1:
+            for _ in tasks[0]:
+                tell()
+        else:
+            _in_threads(tasks, stop, tell)
+    except KeyboardInterrupt:
+        pass
+    tell()
+
+
+def _stretches(
+    worker: Worker, stretches: Iterator[int], size: int, count: int, stop: Event, done: list[int], i: int
+) -> Iterator[None]:
+    """The work of one thread, with a look at the world outside in between."""
+    for first in stretches:
+        beyond = min(first + size, count)
+        worker.take(first, beyond)
+        while not worker.march():
+            if stop.is_set():
+                return
+            yield
+        done[i] += beyond - first
+        if stop.is_set():
+            return
+        yield
+
+
+def _in_threads(tasks: list[Iterator[None]], stop: Event, tell: Callable[[], None]) -> None:
+    """Each in a thread of its own, until all are done or this one is interrupted."""
+    with ThreadPoolExecutor(len(tasks)) as pool:
+        futures: list[Future[int]] = [pool.submit(sum, (0 for _ in task)) for task in tasks]
+        try:
+            left = set(futures)
+            while left:
+                left = wait(left, _LOOK).not_done
+                tell()
+        except BaseException:
+            stop.set()
+            raise
+    for future in futures:
+        future.result()
