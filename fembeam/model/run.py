@@ -22,6 +22,7 @@ from solvers.problem import counted
 if TYPE_CHECKING:
     from fembeam.model.model import Model
     from fembeam.model.section_forces import Extremes
+    from fembeam.response import Reactions
     from fembeam.scene_file import SceneFile
 
 Vector = NDArray[np.float64]
@@ -145,6 +146,27 @@ class Run:
 
         values = rates @ (self.shapes, *self.others)[body](z).T
         return (values.T + frame_motion(self, order)).T if absolute else values
+
+    def reactions(self) -> Reactions:
+        """Forces (N) and moments (N m) that supports, springs and dashpots exert on the beams, at the samples.
+
+        K u_s = f - M (ü + r (ÿ + g)) of the unreduced finite-element model: they balance loads, contact forces and the
+        inertia of the kept modes to rounding, exactly so in statics; the modes left out follow statically. Structural
+        damping counts as internal: springs carry their share of it. A contact shorter than the period of the highest
+        mode kept acts on the supports as if waves took no time: keep more modes until the extremes settle.
+
+        Returns
+        -------
+        Reactions : of each beam supports, then springs; then all dashpots. ``[i].force``, ``[i].moment`` (k,) and
+            ``[i].extremes("force")``; contact forces with the frame are `force`. ValueError for a run read from a file.
+
+        References
+        ----------
+        R.R. Craig, A.J. Kurdila, Fundamentals of Structural Dynamics (2006), 11.4: mode-acceleration method.
+        """
+        from fembeam.response import reactions
+
+        return reactions(self)
 
     def slope(self, z: ArrayLike, body: int = 0) -> Vector:
         """u_z(z, t), rad."""
