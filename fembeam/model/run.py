@@ -22,6 +22,7 @@ from solvers.problem import counted
 if TYPE_CHECKING:
     from fembeam.model.model import Model
     from fembeam.model.section_forces import Extremes
+    from fembeam.response import Reactions
     from fembeam.scene_file import SceneFile
 
 Vector = NDArray[np.float64]
@@ -117,13 +118,55 @@ class Run:
         """Whether the run reached its end."""
         return self.status == solvers.Status.DONE.value
 
-    def displacement(self, z: ArrayLike, body: int = 0) -> Vector:
-        """u(z, t) of a beam (0 the scene's own) relative to the frame, m: (k,) at one z, (k, j) at z (j,)."""
-        return self.q @ (self.shapes, *self.others)[body](z).T
+    def displacement(self, z: ArrayLike, body: int = 0, absolute: bool = False) -> Vector:
+        """u(z, t) of a beam (0 the scene's own), m: (k,) at one z, (k, j) at z (j,).
 
-    def velocity(self, z: ArrayLike, body: int = 0) -> Vector:
-        """u̇(z, t) relative to the frame, m/s."""
-        return self.q_dot @ (self.shapes, *self.others)[body](z).T
+        Relative to the frame, or ``absolute``: u + y. That needs the model, which a run read from a file has not.
+        """
+        return self._motion(self.q, z, body, absolute, 0)
+
+    def velocity(self, z: ArrayLike, body: int = 0, absolute: bool = False) -> Vector:
+        """u̇(z, t) relative to the frame, m/s, or ``absolute``: u̇ + ẏ; shapes as for `displacement`."""
+        return self._motion(self.q_dot, z, body, absolute, 1)
+
+    def acceleration(self, z: ArrayLike, body: int = 0, absolute: bool = False) -> Vector:
+        """ü(z, t) relative to the frame, m/s², or ``absolute``: ü + ÿ; shapes as for `displacement`.
+
+        ü = φ(z)·q'' with q'' of the equations of motion at the samples, the contact forces of the laws included: the
+        instant's value, not a mean over the sample. Under a short contact it holds what the kept modes carry of the
+        force, Σ φ_i(z) φ_i(z_s) F, and grows with their number. ValueError for a run read from a file.
+        """
+        from fembeam.response import coordinates
+
+        return self._motion(coordinates(self), z, body, absolute, 2)
+
+    def _motion(self, rates: Vector, z: ArrayLike, body: int, absolute: bool, order: int) -> Vector:
+        """A derivative of u at z (k,) or (k, j), with that of the frame's motion if absolute."""
+        from fembeam.response import frame_motion
+
+        values = rates @ (self.shapes, *self.others)[body](z).T
+        return (values.T + frame_motion(self, order)).T if absolute else values
+
+    def reactions(self) -> Reactions:
+        """Forces (N) and moments (N m) that supports, springs and dashpots exert on the beams, at the samples.
+
+        K u_s = f - M (ü + r (ÿ + g)) of the unreduced finite-element model: they balance loads, contact forces and the
+        inertia of the kept modes to rounding, exactly so in statics; the modes left out follow statically. Structural
+        damping counts as internal: springs carry their share of it. A contact shorter than the period of the highest
+        mode kept acts on the supports as if waves took no time: keep more modes until the extremes settle.
+
+        Returns
+        -------
+        Reactions : of each beam supports, then springs; then all dashpots. ``[i].force``, ``[i].moment`` (k,) and
+            ``[i].extremes("force")``; contact forces with the frame are `force`. ValueError for a run read from a file.
+
+        References
+        ----------
+        R.R. Craig, A.J. Kurdila, Fundamentals of Structural Dynamics (2006), 11.4: mode-acceleration method.
+        """
+        from fembeam.response import reactions
+
+        return reactions(self)
 
     def slope(self, z: ArrayLike, body: int = 0) -> Vector:
         """u_z(z, t), rad."""
@@ -167,10 +210,9 @@ class Run:
         require(quantity in known, f"quantity must be one of {', '.join(known)}", quantity, "Run", "choose one")
         if quantity in known[:2]:
             return (self.shapes, *self.others)[body](z, known.index(quantity)), z, np.zeros(len(z))
-        require(self.model is not None, f"the {quantity} needs the model of the run", "a run read from a file", "Run",
-                "simulate again, or use dataclasses.replace(run, model=model)")  # fmt: skip
-        assert self.model is not None
-        forces = self.model.section_forces[body]
+        from fembeam.response import model_of
+
+        forces = model_of(self, quantity).section_forces[body]
         rows = getattr(forces, quantity)(z)
         if quantity != "stress":
             return rows, z, np.zeros(len(z))

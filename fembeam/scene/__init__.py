@@ -4,7 +4,7 @@ Imports: `beams`, `excitation`, `support`, `reduction`; `Scene.reduce` opens the
 `scene`, then `assembly`.
 """
 
-from fembeam.scene.assembly import Matrices
+from fembeam.scene.assembly import Matrices, unsupported
 from fembeam.scene.contact_rows import heights, loaded, loads, touches, watched, weight
 from fembeam.scene.impactor import Impactor
 from fembeam.scene.parameters import changes_structure, path_of, replaced, value_of, with_value
@@ -37,6 +37,7 @@ __all__ = [
     "replaced",
     "signals_of",
     "touches",
+    "unsupported",
     "value_of",
     "watched",
     "weight",

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -274,6 +275,16 @@ def _on_nodes(scene: Scene, nodes: Vector, modes: int | None) -> Matrices:
     r = np.tile([1.0, 0.0], len(nodes))
     M, K, C = (A.tocsr()[free][:, free] for A in (M_all, K_all, C_all))
     return Matrices(scene.beam, M, K, root, C, scene.damping, r[free], (M_all @ r)[free], nodes, dofs, modes)
+
+
+def unsupported(scene: Scene, matrices: Matrices) -> Matrices:
+    """The same bodies on the same nodes without their supports: M, K and rows on all dofs, to find reactions with."""
+    beams = []
+    for part, known in zip((scene, *scene.bodies), matrices.beams, strict=True):
+        loose = copy(part)  # not a scene to be simulated, hence without its checks
+        object.__setattr__(loose, "supports", ())
+        beams.append(_on_nodes(loose, known.nodes, known.modes))
+    return _joined(tuple(beams), matrices.impactors)
 
 
 def _lumped(nodes: Vector, items: Sequence[tuple[float, float, float, float]]) -> sparse.csr_matrix:

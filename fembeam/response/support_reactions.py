@@ -1,0 +1,232 @@
+"""Forces and moments that supports, springs and dashpots exert on the beams, by d'Alembert's principle.
+
+At every sample supports and springs balance statically all that acts on the unreduced finite-element model,
+
+    K u_s = f - M (ü + r (ÿ + g)),    reaction = (K_all u_s + M_all (ü + r (ÿ + g)) - f) on the supported dofs,
+
+f the loads, contact forces and dashpots, ü the motion of the kept modes. Modes left out follow statically, so that
+forces and moments balance whatever the number of modes. Structural damping is taken as part of the internal forces.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse import linalg as sparse_linalg
+
+import reduction
+from fembeam.beams import bending_root, hermite_rows
+from fembeam.response.acceleration import coordinates, frame_motion, model_of
+from fembeam.scene import loads, touches, unsupported
+from fembeam.support import aligned, require
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from fembeam.model import Model, Run
+    from fembeam.scene import Matrices, Scene
+
+Vector = NDArray[np.float64]
+REFINED = 4  # times; each gains the digits that rounding of K, eps n⁴ of n elements, leaves: one does to 1000 elements
+GAUSS = np.polynomial.legendre.leggauss(3)
+
+
+@dataclass(frozen=True, eq=False)
+class Reaction:
+    """What one support, spring or dashpot exerts on its beam.
+
+    Attributes
+    ----------
+    part : the Clamped, Pinned, Guided, Spring or Dashpot. body : the beam it holds, 0 the scene's own.
+    t : (k,) s. force : (k,) N, positive up. moment : (k,) N m, positive where it turns u_z up; zeros where the part
+        exerts none.
+    """
+
+    part: Any
+    body: int
+    t: Vector
+    force: Vector
+    moment: Vector
+
+    @property
+    def name(self) -> str:
+        """Such as "Clamped at z = 0 m"."""
+        return f"{type(self.part).__name__} at z = {self.part.z:g} m" + (f" of beam {self.body}" if self.body else "")
+
+    def __repr__(self) -> str:
+        return f"<reaction of {self.name}, largest force {self.largest()[0]:.5g} N>"
+
+    def extremes(self, quantity: str = "force") -> tuple[tuple[float, float], tuple[float, float]]:
+        """((least, its time), (greatest, its time)) over the samples of the "force" or the "moment"."""
+        require(quantity in ("force", "moment"), "quantity must be 'force' or 'moment'", quantity, "Reaction.extremes",
+                "choose one")  # fmt: skip
+        values = getattr(self, quantity)
+        low, high = int(np.argmin(values)), int(np.argmax(values))
+        return (float(values[low]), float(self.t[low])), (float(values[high]), float(self.t[high]))
+
+    def largest(self, quantity: str = "force") -> tuple[float, float]:
+        """The value largest in size, and its time."""
+        return max(self.extremes(quantity), key=lambda found: abs(found[0]))
+
+
+@dataclass(frozen=True, eq=False)
+class Reactions:
+    """All reactions of a run: of each beam its supports in the scene's order, then springs, then dashpots.
+
+    Index or iterate: ``run.reactions()[0].force``. `print` shows the extremes.
+    """
+
+    each: tuple[Reaction, ...]
+
+    def __len__(self) -> int:
+        return len(self.each)
+
+    def __getitem__(self, index: int) -> Reaction:
+        return self.each[index]
+
+    def __iter__(self) -> Iterator[Reaction]:
+        return iter(self.each)
+
+    def __repr__(self) -> str:
+        return f"<{len(self)} reactions: {', '.join(one.name for one in self)}>"
+
+    def __str__(self) -> str:
+        head = ["reaction", "least force / N", "greatest / N", "least moment / N m", "greatest / N m"]
+        rows = [[one.name, *(found[0] for q in ("force", "moment") for found in one.extremes(q))] for one in self]
+        return aligned(head, rows)
+
+    @property
+    def force(self) -> Vector:
+        """Sum of all forces (k,), N."""
+        return np.asarray(sum(one.force for one in self))
+
+
+def reactions(run: Run) -> Reactions:
+    """The reactions at the samples; `Run.reactions` explains them."""
+    model = model_of(run, "support reactions")
+    full = unsupported(model.scene, model.matrices)
+    columns, histories = _acting(run, model, full)
+    found, done = [], 0
+    for body, scene in enumerate((model.scene, *model.scene.bodies)):
+        size = full.beams[body].M.shape[0]
+        held = _Held(scene, model.matrices.beams[body], columns[done : done + size])
+        for part in (*scene.supports, *scene.springs):
+            force, moment = (rows @ histories for rows in held.by(part))
+            found.append(Reaction(part, body, run.t, force + _of_the_foot(part, run.t), moment))
+        done += size
+    return Reactions((*found, *_dashpots(run, model)))
+
+
+def _of_the_foot(part: Any, t: Vector) -> Vector | float:
+    """What a moving foot adds to the force of its spring."""
+    foot = getattr(part, "foot", None)
+    return 0.0 if foot is None else part.stiffness * np.broadcast_to(foot(t), t.shape)
+
+
+def _dashpots(run: Run, model: Model) -> Iterator[Reaction]:
+    """Reactions of the dashpots, -c u̇ and -γ u̇_z."""
+    for body, part in enumerate((model.scene, *model.scene.bodies)):
+        for dashpot in part.dashpots:
+            force = -dashpot.damping * (run.q_dot @ model.phi(dashpot.z, 0, body))
+            moment = -dashpot.rotational * (run.q_dot @ model.phi(dashpot.z, 1, body))
+            yield Reaction(dashpot, body, run.t, force, moment)
+
+
+def _acting(run: Run, model: Model, full: Matrices) -> tuple[Vector, Vector]:
+    """All that acts but supports and springs: columns (N_all, c) on all dofs, and their histories (c, k)."""
+    scene = model.scene
+    rows = [touch.row for touch in touches(scene, full)]
+    histories = [run.force(stop) for stop in range(len(rows))]
+    for row, signal in loads(scene, full):
+        rows.append(row)
+        histories.append(np.broadcast_to(signal(run.t), run.t.shape))
+    for one in _dashpots(run, model):
+        rows += [full.interpolation(one.part.z, derivative, one.body) for derivative in (0, 1)]
+        histories += [one.force, one.moment]
+    vectors = np.zeros((full.M.shape[0], len(model.omega)))
+    vectors[_kept(model.matrices, full)] = model.basis.vectors
+    inertia = np.column_stack([full.M @ vectors, full.base_load])
+    pushed = sparse.vstack([sparse.csr_matrix((0, full.M.shape[0])), *rows]).toarray().T
+    frame = frame_motion(run, 2) + scene.gravity
+    return np.hstack([pushed, -inertia]), np.vstack([*histories, coordinates(run).T, frame])
+
+
+def _kept(matrices: Matrices, full: Matrices) -> NDArray[np.int64]:
+    """Numbers of the free dofs among all."""
+    free = [np.ravel(beam.dofs) >= 0 for beam in matrices.beams]
+    return np.flatnonzero(np.concatenate([*free, np.ones(len(full.impactors), dtype=bool)]))
+
+
+class _Held:
+    """One beam's static answer to unit loads: stresses y with B_freeᵀ y = load, reactions B_supportedᵀ y - load.
+
+    K = Bᵀ diag(sign) B. The stresses are refined, not the displacements: K u loses eps n³ of the load, Bᵀ y eps n.
+    """
+
+    def __init__(self, scene: Scene, matrices: Matrices, columns: Vector) -> None:
+        self.matrices, self.columns = matrices, columns
+        self.springs, self.nodes = list(scene.springs), matrices.nodes
+        self.B, self.sign = _factor(scene, matrices.nodes)
+        self.free = np.flatnonzero(matrices.dofs.ravel() >= 0)
+
+    @cached_property
+    def stresses(self) -> Vector:
+        """Y (rows of B, c)."""
+        B = self.B[:, self.free]
+        solve, stress = _solver(self.matrices), np.zeros((B.shape[0], self.columns.shape[1]))
+        for _ in range(REFINED):
+            left = self.columns[self.free] - B.T @ (self.sign[:, None] * stress)
+            stress += B @ solve(left)
+        return self.sign[:, None] * stress
+
+    def by(self, part: Any) -> tuple[Vector, Vector]:
+        """Force and moment (c,) of a support or spring per unit of each column."""
+        if any(part is spring for spring in self.springs):
+            first, count = self.springs.index(part) - 2 * len(self.springs), len(self.springs)
+            stiffness = np.sqrt([part.stiffness, part.rotational])
+            return tuple(-stiffness[i] * self.stresses[first + i * count] for i in range(2))  # type: ignore[return-value]
+        dof = 2 * int(np.argmin(np.abs(self.nodes - part.z)))
+        balance = self.B[:, dof : dof + 2].T @ self.stresses - self.columns[dof : dof + 2]
+        return tuple(balance * np.array(part.fixed)[:, None])  # type: ignore[return-value]
+
+
+def _factor(scene: Scene, nodes: Vector) -> tuple[sparse.csr_matrix, Vector]:
+    """B on all dofs and the signs of its rows: -1 those of compression; the springs' rows come last, √k u then √κ u_z.
+
+    Springs without stiffness have rows of zeros.
+    """
+    force = scene.beam.axial_force
+    bending = bending_root(replace(scene.beam, axial_force=0.0), nodes)
+    h = np.repeat(np.diff(nodes), 3)
+    inside = np.repeat(nodes[:-1], 3) + h * np.tile(0.5 + GAUSS[0] / 2, len(nodes) - 1)
+    weight = np.sqrt(abs(force) * h * np.tile(GAUSS[1] / 2, len(nodes) - 1))
+    slopes = sparse.diags(weight) @ hermite_rows(nodes, inside, 1)
+    z = np.array([spring.z for spring in scene.springs], dtype=float)
+    springs = [
+        sparse.diags(np.sqrt([getattr(spring, name) for spring in scene.springs])) @ hermite_rows(nodes, z, derivative)
+        for derivative, name in enumerate(("stiffness", "rotational"))
+    ]
+    B = sparse.vstack([bending, slopes, *(springs if len(z) else ())], format="csr")
+    sign = np.ones(B.shape[0])
+    sign[bending.shape[0] : bending.shape[0] + len(weight)] = np.sign(force)
+    return B, sign
+
+
+def _solver(matrices: Matrices) -> Any:
+    """F -> K⁻¹ f; of a beam with rigid-body modes that of the part of f that does not drive them."""
+    M, K = matrices.M, matrices.K
+    lowest = reduction.modal_basis(M, K, min(2, M.shape[0]), root=matrices.root)
+    rigid = sparse.csr_matrix(M @ lowest.vectors[:, lowest.omega == 0.0])
+    count = rigid.shape[1]
+    bordered = sparse.bmat([[K, rigid], [rigid.T, None]], format="csc") if count else K.tocsc()
+    factors = sparse_linalg.splu(bordered)
+
+    def solve(f: Vector) -> Vector:
+        return np.asarray(factors.solve(np.vstack([f, np.zeros((count, f.shape[1]))]))[: f.shape[0]])
+
+    return solve

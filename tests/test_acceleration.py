@@ -1,0 +1,73 @@
+"""Accelerations of runs: against closed forms, differences of exact velocities, and the equation of motion."""
+
+import numpy as np
+import pytest
+from problems import STEEL
+
+import fembeam as fb
+from contacts import Hertz, KelvinVoigt
+
+BEAM = fb.Beam(0.2599, fb.Section(**STEEL))
+BASE = fb.Harmonic(amplitude=1e-3, omega=195.0, phase=0.3)
+
+
+def scene(**parts):
+    parts = {"base": BASE, "damping": fb.ModalDamping(0.02), **parts}
+    return fb.Scene(BEAM, [fb.Clamped(0.0)], **parts)
+
+
+def test_free_vibration_of_one_mode():
+    model = scene(base=None).reduce(modes=1)
+    omega, zeta = model.omega[0], 0.02
+    run = model.simulate(0.2, 1e-3, start=[1e-4, 0.0])
+    damped = omega * np.sqrt(1 - zeta**2)
+    envelope = 1e-4 * np.exp(-zeta * omega * run.t)
+    exact = -(omega**2) * envelope * (np.cos(damped * run.t) - zeta * omega / damped * np.sin(damped * run.t))
+    z = 0.2
+    np.testing.assert_allclose(run.acceleration(z), model.phi(z)[0] * exact, atol=1e-8 * np.abs(exact).max())
+    np.testing.assert_allclose(run.acceleration(z, absolute=True), run.acceleration(z))
+
+
+def test_absolute_motion_is_that_of_the_frame_on_top():
+    run = scene().reduce(modes=2).simulate(0.1, 1e-3)
+    for name, order in (("displacement", 0), ("velocity", 1), ("acceleration", 2)):
+        history = getattr(run, name)
+        frame = BASE.derivative(order)(run.t)
+        np.testing.assert_allclose(history(0.2, absolute=True) - history(0.2), frame, atol=1e-12 * np.abs(frame).max())
+        both = history([0.1, 0.2], absolute=True)
+        np.testing.assert_allclose(both[:, 1], history(0.2, absolute=True), rtol=1e-12)
+
+
+@pytest.mark.parametrize("law", [Hertz(1e7), KelvinVoigt(1e5, 20.0)])
+def test_it_is_the_slope_of_the_velocity_through_contacts_dashpots_and_forces(law):
+    """Central differences err by h²/6 of the third derivative; samples beside entries and exits are left out."""
+    rig = scene(
+        stops=[fb.Stop(0.24, law)],
+        dashpots=[fb.Dashpot(0.1, 0.5)],
+        forces=[fb.PointForce(0.15, fb.Harmonic(2.0, 80.0))],
+        gravity=9.81,
+    )
+    run = rig.reduce(modes=3, residual=True).simulate(0.1, 2e-7)
+    step, z = run.t[1], 0.2
+    velocity, acceleration = run.velocity(z), run.acceleration(z)
+    slope = (velocity[2:] - velocity[:-2]) / (2 * step)
+    edges = np.concatenate([run.contacts.t_in, run.contacts.t_out[np.isfinite(run.contacts.t_out)]])
+    assert len(edges) > 4
+    away = np.abs(run.t[1:-1, None] - edges).min(axis=1) > 3 * step
+    error = np.abs(slope - acceleration[1:-1])[away]
+    assert error.max() < 1e-4 * np.abs(acceleration).max()
+
+
+def test_bodies_and_runs_from_files(tmp_path):
+    other = fb.Scene(BEAM, [fb.Clamped(0.0)], damping=fb.ModalDamping(0.01))
+    stop = fb.Stop(0.25, Hertz(1e7), gap=1e-4, on=(1, 0.2))
+    run = scene(bodies=[other], stops=[stop]).reduce(2).simulate(0.05, 1e-6)
+    velocity, acceleration = run.velocity(0.2, body=1), run.acceleration(0.2, body=1)
+    assert len(run.contacts)
+    slope = (velocity[2:] - velocity[:-2]) / 2e-6
+    np.testing.assert_allclose(acceleration[1:-1], slope, atol=1e-3 * np.abs(slope).max())
+    again = fb.load(run.save(tmp_path / "run"))
+    with pytest.raises(ValueError, match="needs the model of the run"):
+        again.acceleration(0.2)
+    with pytest.raises(ValueError, match="needs the model of the run"):
+        again.velocity(0.2, absolute=True)
