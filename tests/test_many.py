@@ -30,7 +30,8 @@ def random_system(rng, stops):
     """Two to four modes against stops on both sides, under a tone and, now and then, a sampled load."""
     n = int(rng.integers(2, 5))
     contacts = [
-        Contact(rng.normal(size=n), LAWS[rng.integers(len(LAWS))], float(rng.uniform(-1e-4, 1e-3))) for _ in range(stops)
+        Contact(rng.normal(size=n), LAWS[rng.integers(len(LAWS))], float(rng.uniform(-1e-4, 1e-3)))
+        for _ in range(stops)
     ]
     loads = [(rng.normal(size=n), fb.Harmonic(float(rng.uniform(5.0, 50.0)), float(rng.uniform(20.0, 200.0))))]
     loads += [(rng.normal(size=n), Wobble())] * int(rng.integers(2))
@@ -42,7 +43,9 @@ def alone(system, q, q_dot, duration, method):
     for start in zip(q, q_dot, strict=True):
         run = integrate(system, *start, duration, method=method, check=False)
         log, stops = run.contacts, range(len(system.contacts))
-        peaks = [[part[log.stop == s].max(initial=0.0) for s in stops] for part in (log.peak_indentation, log.peak_force)]
+        peaks = [
+            [part[log.stop == s].max(initial=0.0) for s in stops] for part in (log.peak_indentation, log.peak_force)
+        ]
         yield run.q[-1], run.q_dot[-1], run.t[-1], run.status, len(log), *peaks
 
 
@@ -331,7 +334,9 @@ def test_axes_are_what_they_say():
     struck = axis_of(model, "velocity", (0.0, 1.0), 2, 0.2).direction
     assert model.phi(0.2) @ pulled[:3] == pytest.approx(1.0) and not pulled[3:].any()
     assert model.phi(0.2) @ struck[3:] == pytest.approx(1.0) and not struck[:3].any()
-    np.testing.assert_allclose(pulled[:3] / pulled[0], model.equilibrium({0.2: 1e-3})[:3] / model.equilibrium({0.2: 1e-3})[0])
+    np.testing.assert_allclose(
+        pulled[:3] / pulled[0], model.equilibrium({0.2: 1e-3})[:3] / model.equilibrium({0.2: 1e-3})[0]
+    )
     assert axis_of(model, 4, (0.0, 1.0), 2, 0.2).name == "q_dot[1]"
 
 

@@ -11,7 +11,7 @@ from solvers.compiled.state import T, touching
 from solvers.exponential.contact.node_response import sample_signals
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.flight import add_taylor, energy_norms, taylor
-from solvers.exponential.tables import propagate
+from solvers.exponential.responses import propagate
 
 _SHORT = 0.15  # radians of the fastest block up to which order 6 and three points are right to 1e-10
 

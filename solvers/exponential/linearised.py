@@ -63,6 +63,7 @@ from solvers.compiled.state import (
     rate_tolerance,
 )
 from solvers.compiled.sums import combine
+from solvers.exponential.contact.blocks import carry_free, goes_through_blocks, kick, pair, see, way_of
 from solvers.exponential.contact.collocation import arrive
 from solvers.exponential.contact.crossings import FORCE, side_at
 from solvers.exponential.contact.landing import regular_step, start_landing
@@ -72,7 +73,7 @@ from solvers.exponential.contact.nodes import S
 from solvers.exponential.energy import inside
 from solvers.exponential.flight import signal_derivatives, turn
 from solvers.exponential.preparation import SPACE, TABLES
-from solvers.exponential.tables import propagate
+from solvers.exponential.responses import propagate
 
 _OFF = 1e-10  # relative distance from a knot at which a law is on one side of it for sure
 
@@ -226,17 +227,23 @@ def _signal_slopes(problem, tables, space, slopes, family, level, t):
         for i in range(S):
             response[0, i], response[1, i] = 0.0, 0.0
         for load in problem.table_load:
-            combine(tables.forced[family, level, s, stops + load], slopes.signal[load], S, response, response)
+            matrix = pair(problem, tables, space, family, level, s, stops + load)
+            combine(matrix, slopes.signal[load], S, response, response)
 
 
 @inlined
 def _solve(problem, tables, shadow, space, slopes, nudge, family, level, column, shift):
     """Changes of all forces (and, in a moving frame, signals) at the nodes, one column."""
-    row, size, stops = 0, 2 * problem.k.size, problem.gap.size
+    row, size, stops, through = 0, 2 * problem.k.size, problem.gap.size, goes_through_blocks(tables)
+    if through:
+        carry_free(problem, tables, space, family, level, slopes.y[column])
     for s in range(stops):
         if shadow.piece[s] == 0:
             continue
-        combine(tables.free[family, level, s], slopes.y[column], size, None, space.motion[s])
+        if through:
+            see(problem, space, s, 0.0, space.motion[s])
+        else:
+            combine(tables.free[tables.kind[family], level, s], slopes.y[column], size, None, space.motion[s])
         for i in range(S):
             change = slopes.entry[column, s] * space.slope[s, 2, i]
             if _is_parameter(nudge, slopes, column):
@@ -271,13 +278,15 @@ def _move(problem, tables, shadow, space, slopes, family, level, y, part):
         inside(problem, tables, shadow, space, family, tables.step[level], part, y)
         return
     turn(problem, tables.step_propagator[level, 0], tables.step_propagator[level, 1], y)
-    for u in range(space.force.shape[0]):
+    if goes_through_blocks(tables):
+        kick(problem, tables, shadow, space, slopes.force, family, level, y)
+    for u in range(0 if goes_through_blocks(tables) else space.force.shape[0]):
         if u < stops and shadow.piece[u] == 0:
             continue
         for j in range(S):
-            kick = tables.kick[family, level, u, j]
+            row = tables.kick[way_of(tables, family, u), level, u, j]
             for e in range(size):
-                y[e] += kick[e] * slopes.force[u, j]
+                y[e] += row[e] * slopes.force[u, j]
 
 
 @inner

@@ -13,6 +13,7 @@ from solvers.compiled.handles import Cast, Layout, Mould
 from solvers.compiled.kernels import INTEGERS, MATRIX, PROBLEM, REAL, VECTOR, Problem
 from solvers.compiled.state import STATE, State, begin_state, problem_of, state_shapes
 from solvers.compiled.sums import padded
+from solvers.exponential.contact.blocks import POOL
 from solvers.exponential.contact.node_response import Space
 from solvers.exponential.contact.nodes import S, series_of
 from solvers.exponential.tables import OF_TONES, Tables, build, doublings, fill_tones, known_of
@@ -27,15 +28,17 @@ def _arrays(*dimensions: int) -> list[Any]:
 TABLES = types.NamedTuple(
     [
         *_arrays(1, 3, 4, 2, 3, 2, 3, 2, 2, 2, 2, 0, 0, 2, 1, 2),
-        *_arrays(1, 3, 1, 1, 2, 2, 2, 2, 3, 3, 4, 3, 5, 6, 5, 4, 2, 2, 2, 2, 4),
+        *(*_arrays(1, 3, 1, 1, 2, 2, 2, 2, 3, 3, 4, 3), INTEGERS, INTEGERS),
+        *_arrays(5, 6, 5, 5, 5, 5, 3, 2, 2, 2, 2, 2, 4),
         *(VECTOR, INTEGERS, INTEGERS, MATRIX),
     ],
     Tables,
 )
 SPACE = types.NamedTuple(
     [
-        *(*_arrays(1, 2, 2, 1, 1, 1, 1, 2, 3, 1, 3, 2, 1, 3, 2, 3, 2, 1), INTEGERS, MATRIX),
+        *(*_arrays(1, 2, 2, 1, 1, 1, 1, 2, 3, 1, 3, 2, 1, 3, 2, 3, 1), INTEGERS, MATRIX),
         *(*_arrays(1, 1, 1, 1, 2, 1, 2, 1, 1, 1, 1, 1, 1), INTEGERS),
+        *(*_arrays(2, 2, 2, 1, 2, 3), INTEGERS),
     ],
     Space,
 )
@@ -47,7 +50,7 @@ class Workspace:
     def __init__(self, layout: Layout, rest: Array, blocks: int) -> None:
         self.layout = layout
         self.block, words = layout.block()
-        self.numbers = self.block[: layout.size]
+        self.numbers = self.block[: layout.slices[1][Space._fields.index("jacobian")][0].start]
         self.addresses = [words + start for start in layout.starts]
         self.state = State._make(layout.arrays(self.block, 0))
         self.energy = layout.array(self.block, 1, Space._fields.index("energy"))
@@ -146,7 +149,8 @@ class _Skeleton:
         self.back, self.fastest = among_tones(system.blocks.T, self.tones), max(float(_speeds(system).max()), 1e-3)
         ledger = np.zeros_like(problem.load), problem.power, among_tones(loss, self.tones)
         tables = build(problem, self.tones, self.series, known_of(laws), dt_cell, ledger)
-        self.layout = _layout(len(problem.gap), len(problem.load), len(problem.k), len(forcing.table_dt))
+        sizes = len(problem.gap), len(problem.load), len(problem.k), len(forcing.table_dt)
+        self.layout = _layout(*sizes, POOL if tables.ahead.size else 0)
         self.problem = Mould(problem, PROBLEM, ("gap", "k", "read", "read_rate", "power"))
         self.tables = Mould(tables, TABLES, OF_TONES)
 
@@ -201,27 +205,18 @@ def _check_passive(system: System) -> None:
 
 
 @lru_cache(maxsize=64)
-def _layout(stops: int, loads: int, blocks: int, signals: int) -> Layout:
-    """Places of the arrays of `State` and `Space`."""
+def _layout(stops: int, loads: int, blocks: int, signals: int, pool: int) -> Layout:
+    """Places of the arrays of `State` and `Space`; a pool if motion goes through the blocks."""
     size, width = 2 * blocks, 2 * blocks + 2 + 2 * stops
+    rows = size if pool else 0
     space = [
         *((padded(width),), (7, padded(size)), (signals, 6), (7,), (blocks,), (loads,), (stops,)),
         (2, padded(blocks)),
         *((stops, 2, S), (S,), (stops, 2, S), (stops + loads, S), (S,), (stops, 2, 8), (stops, S), (stops, 3, S)),
-        *((stops * S, stops * S), (stops * S,), (stops * S,), (18, padded(width + 2))),
+        *((stops * S,), (stops * S,), (18, padded(width + 2))),
         *([(stops,)] * 4),
-        *(
-            (stops, S),
-            (stops,),
-            (4, 3 * S),
-            (stops,),
-            (stops,),
-            (S + 2,),
-            (1,),
-            (1,),
-            (3,),
-            (6,),
-        ),
+        *((stops, S), (stops,), (4, 3 * S), (stops,), (stops,), (S + 2,), (1,), (1,), (3,), (6,)),
+        *((stops, 2), (rows, S), (rows, S), (padded(rows),), (stops * S, stops * S), (pool, S, 2 * S), (pool,)),
     ]
     return Layout([STATE, SPACE], [state_shapes(width, stops), space])
 

@@ -54,7 +54,7 @@ def _direction(model: Model, kind: Any, z: float) -> tuple[Vector, str]:
 
 
 def _pulled(model: Model, z: float) -> Vector:
-    """q of the shape a force at z bends the beam to, per metre there."""
+    """The q of the shape a force at z bends the beam to, per metre there."""
     loose = (model.omega <= 0.0) & (model.phi(z) != 0.0)
     require(not loose.any(), "a force at z moves the beam without end", z, WHERE, "use velocity, or numbers of states")
     return _shape(model, z, 1.0 / np.where(model.omega > 0.0, model.omega, np.inf) ** 2)

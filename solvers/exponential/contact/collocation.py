@@ -22,12 +22,13 @@ import math
 
 import numpy as np
 
-from solvers.compiled.kernels import contact_forces, copy, dot, indentation, inlined, inner, sizes
+from solvers.compiled.kernels import contact_forces, copy, dot, indentation, inlined, inner
 from solvers.compiled.simd import eight, total
 from solvers.compiled.state import CALLS, T
 from solvers.compiled.sums import combine, renew, sweep
+from solvers.exponential.contact.blocks import goes_through_blocks, kick, pair, way_of
 from solvers.exponential.contact.node_newton import MOST_ITERATIONS, newton
-from solvers.exponential.contact.node_response import node_forces, respond
+from solvers.exponential.contact.node_response import node_forces, respond, ripple_of
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.peaks import step_peaks
 from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR, STIFFNESS
@@ -86,13 +87,14 @@ def solve_forces(problem, tables, state, space, family, level, rtol):
         return newton(problem, tables, state, space, family, level)
     before, alone = 0.0, _alone(tables, state)
     law, unit = tables.inlined[max(alone, 0)], 1.0 / space.accuracy[max(alone, 0)] ** 2
+    own = pair(problem, tables, space, family, level, max(alone, 0), max(alone, 0))
     stiffness, rooted, damping = law[STIFFNESS], law[EXPONENT] == 1.5, law[DAMPING]
     factor = law[FACTOR] / state.entry_rate[max(alone, 0)]
     for iteration in range(MOST_ITERATIONS):
         if alone >= 0:
             change, largest = sweep(
-                *(tables.forced[family, level, alone, alone], space.free[alone], space.force[alone]),
-                *(space.motion[alone], stiffness, rooted, factor, damping),
+                *(own, space.free[alone], space.force[alone], space.motion[alone]),
+                *(stiffness, rooted, factor, damping),
             )
             change, largest = change * unit, largest * unit
             state.count[CALLS] += S
@@ -155,19 +157,35 @@ def step_error(problem, tables, state, space, family, level, fresh, rtol):
             beyond += 0.01 * _hidden_kink(problem, state, space, u, largest, fresh)
         if beyond == 0.0:
             continue
-        ripple = sizes(tables.ripple[family, level, u], state.x, 2 * n)
+        ripple = ripple_of(tables.sway[u], tables.alias[tables.kind[family], level], state.x, n)
         stiffness = tables.exponent[u] * largest / max(deepest, 1e-300)
         span = h / max(1.0, h * tables.mobility[u, u] * space.viscous[u])  # a strong dashpot damps such errors
         space.beyond[u] = span * (beyond + 0.1 * stiffness * ripple)
+    _sum_errors(problem, tables, space, family, h)
     worst = 0.0
     for s in range(stops):
-        error = _signal_error(problem, tables, space, family, h, s) if problem.table_dt.size else 0.0
-        for u in range(stops):
-            error = max(error, 0.0) + abs(tables.mobility[s, u]) * space.beyond[u]
-        error /= rtol * max(space.scale[s], _fastest(space.motion[s, 1]))
+        error = space.m[s] / (rtol * max(space.scale[s], _fastest(space.motion[s, 1])))
         if not error <= worst:
             worst = error
+            if error != error:
+                break
     return worst
+
+
+@inner
+def _sum_errors(problem, tables, space, family, h):
+    """Errors of all indentation rates, m/s, by what the forces' and the signals' polynomials leave out."""
+    stops, error = problem.gap.size, space.m
+    for s in range(stops):
+        error[s] = 0.0
+    for j in range(problem.table_dt.size):
+        beyond = h * _beyond_signal(problem, tables, space, family, j)
+        for s in range(stops):
+            error[s] += abs(tables.direct[s, problem.table_load[j]]) * beyond
+    for u in range(stops):
+        if space.beyond[u] != 0.0:
+            for s in range(stops):
+                error[s] += abs(tables.mobility[s, u]) * space.beyond[u]
 
 
 @inner
@@ -199,30 +217,31 @@ def _beyond(coefficients, largest, power):
 
 
 @inner
-def _signal_error(problem, tables, space, family, h, s):
-    """The same of one stop for the sampled signals, which an entry step integrates at half the order."""
-    power, error = S // 2 if family == 0 else 1, 0.0
-    for j in range(problem.table_dt.size):
-        load = problem.table_load[j]
-        values, largest = space.force[problem.gap.size + load], 0.0
-        for i in range(S):
-            largest = max(largest, abs(values[i]))
-        combine(tables.tail[family], values, S, None, space.trial)
-        error += abs(tables.direct[s, load]) * h * _beyond(space.trial, largest, power)
-    return error
+def _beyond_signal(problem, tables, space, family, j):
+    """The same of a sampled signal, which an entry step integrates at half the order."""
+    values, largest = space.force[problem.gap.size + problem.table_load[j]], 0.0
+    for i in range(S):
+        largest = max(largest, abs(values[i]))
+    combine(tables.tail[family], values, S, None, space.trial)
+    return _beyond(space.trial, largest, S // 2 if family == 0 else 1)
 
 
 @inner
 def arrive(problem, tables, state, space, family, level):
     """State at the end of the step, into ``space.x_new``."""
     x, n = space.x_new, problem.k.size
+    if goes_through_blocks(tables):
+        for e in range(2 * n):
+            x[e] = 0.0
+        kick(problem, tables, state, space, space.force, family, level, x)
     first = True
-    for u in range(space.force.shape[0]):
+    for u in range(0 if goes_through_blocks(tables) else space.force.shape[0]):
         if u >= problem.gap.size or state.piece[u] > 0:
+            rows = tables.kick[way_of(tables, family, u), level, u]
             if first:
-                combine(tables.kick[family, level, u], space.force[u], S, None, x)
+                combine(rows, space.force[u], S, None, x)
             else:
-                combine(tables.kick[family, level, u], space.force[u], S, x, x)
+                combine(rows, space.force[u], S, x, x)
             first = False
     alpha, beta = tables.step_propagator[level, 0], tables.step_propagator[level, 1]
     for b in range(n):

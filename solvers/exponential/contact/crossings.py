@@ -1,7 +1,8 @@
 """What may end a step in contact: borders of the pieces of all stops, open ones included, and bends of their laws.
 
 Between two points of a step δ is taken as the cubic through both values and rates, around the highest node of an open
-stop as in `peaks`; such a stop keeps a distance of the ripple too, which fast modes may have between the nodes.
+stop as in `peaks`; such a stop keeps a distance of the ripple too, which fast modes may have between the nodes. With
+many stops, one that a bound of |δ̈| keeps from its surface is not looked at further.
 
 A bend is where the law of a stop in contact has a kink that is not at a given indentation: δ̇ = 0 for one that damps on
 approach only, F = 0 for one cut where it would pull. Its side is the sign of δ̇, or of the force before it is cut. No
@@ -15,12 +16,15 @@ import math
 import numpy as np
 
 from solvers.compiled.dop853_tableau import STAGES, C
-from solvers.compiled.kernels import call_force, copy, dot, indentation, inlined, inner, sizes
+from solvers.compiled.kernels import call_force, copy, dot, indentation, inlined, inner
+from solvers.compiled.simd import put, spread
 from solvers.compiled.state import PEAK_FORCE, T_IN, T, surface_tolerance
 from solvers.compiled.sums import above_zero
-from solvers.exponential.contact.node_response import respond
+from solvers.exponential.contact.blocks import ENTERING, GOING_ON, carry_forces, goes_through_blocks, see
+from solvers.exponential.contact.node_response import respond, ripple_of
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.peaks import deepest
+from solvers.exponential.flight import energy_norms
 
 RATE, FORCE = 1.0, 2.0  # kinds of bends in Tables.bend; 0 for a law that has none
 FREE, TURNED = -1, -2  # of a landing: nothing else happens on the way, or something does that wants shorter steps
@@ -68,7 +72,7 @@ def _turns(rates, begin, end, up, down):
 def _passes_between(problem, tables, state, space, family, h, s, lower, upper):
     """Whether δ leaves [lower, upper] between two points of the step or at one."""
     size = 2 * problem.k.size
-    t, delta, rate = 0.0, indentation(problem, s, state.x), dot(problem.read_rate[s], state.x, size)
+    t, delta, rate = 0.0, space.seen[s, 0], space.seen[s, 1]
     for i in range(S + 1):
         if i < S:
             after, delta_new, rate_new = h * tables.times[family, i], space.motion[s, 0, i], space.motion[s, 1, i]
@@ -82,28 +86,75 @@ def _passes_between(problem, tables, state, space, family, h, s, lower, upper):
 
 
 @inner
+def _bound_rates(problem, tables, state, space, h):
+    """Into ``space.m`` bounds of |δ̈| of all stops on a step; forces are taken as twice their largest node value."""
+    n, stops = problem.k.size, problem.gap.size
+    energy_norms(problem, state.x, space.norms)
+    for s in range(stops):
+        space.m[s] = 0.0
+    for u in range(space.force.shape[0] if problem.table_dt.size else stops):
+        if u < stops and state.piece[u] == 0:
+            continue
+        largest, push = 0.0, problem.push[u] if u < stops else problem.load[u - stops]
+        for i in range(S):
+            largest = max(largest, 2.0 * abs(space.force[u, i]))
+        for b in range(n):
+            space.norms[b] += h * largest * math.sqrt(push[n + b] ** 2 + problem.k[b] * push[b] ** 2)
+        for s in range(stops):
+            direct = tables.mobility[s, u] if u < stops else tables.direct[s, u - stops]
+            space.m[s] += largest * abs(direct)
+    for s in range(stops):
+        space.m[s] += dot(tables.weight[s], space.norms, n)
+
+
+@inlined
+def _stays_away(space, s, h):
+    """Whether an open stop cannot be reached on the step; its motion then is taken as what it begins with."""
+    delta, rate = space.seen[s, 0], space.seen[s, 1]
+    put(space.motion[s, 0], 0, spread(delta))
+    put(space.motion[s, 1], 0, spread(rate))
+    return delta + h * max(rate, 0.0) + 0.5 * h * h * space.m[s] < 0.0
+
+
+@inlined
+def _watch(problem, tables, state, space, family, level, s, carried):
+    """Motion of an open stop at the nodes, by the blocks if there are many; whether forces have been carried there."""
+    if not goes_through_blocks(tables):
+        respond(problem, tables, state, space, family, level, s)
+        return carried
+    if not carried:
+        carry_forces(problem, tables, state, space, family, level, GOING_ON)
+        carry_forces(problem, tables, state, space, family, level, ENTERING)
+    see(problem, space, s, problem.gap[s], space.motion[s])
+    return True
+
+
+@inner
 def leaves_piece(problem, tables, state, space, family, level):
     """Whether any stop may cross a border of its piece on the step."""
-    size = 2 * problem.k.size
+    size, h, carried, through = 2 * problem.k.size, tables.step[level], False, goes_through_blocks(tables)
+    if through:
+        _bound_rates(problem, tables, state, space, h)
     for s in range(problem.gap.size):
         piece, ripple = state.piece[s], 0.0
         upper, lower = problem.levels[s, piece], -np.inf
         if piece == 0:
-            respond(problem, tables, state, space, family, level, s)
-            ripple = sizes(tables.ripple[family, level, s], state.x, size)
+            if through and _stays_away(space, s, h):
+                continue
+            carried = _watch(problem, tables, state, space, family, level, s, carried)
+            ripple = ripple_of(tables.sway[s], tables.alias[tables.kind[family], level], state.x, problem.k.size)
         else:
             lower = problem.levels[s, piece - 1]
         lowest = highest = indentation(problem, s, space.x_new)
         for i in range(S):
             lowest, highest = min(lowest, space.motion[s, 0, i]), max(highest, space.motion[s, 0, i])
-        begin, end = dot(problem.read_rate[s], state.x, size), dot(problem.read_rate[s], space.x_new, size)
+        begin, end = space.seen[s, 1], dot(problem.read_rate[s], space.x_new, size)
         turns = _turns(space.motion[s, 1], begin, end, piece > 0, upper < np.inf)
         if not turns and lower <= lowest and highest + ripple <= upper:
             continue
         tolerance = 8.0 * surface_tolerance(problem, s, state.x)
         if not (lower - tolerance <= lowest and highest + ripple <= upper + tolerance):
             return True
-        h = tables.step[level]
         if piece == 0 and deepest(problem, tables, state, space, family, h, s) > upper + tolerance:
             return True
         if _passes_between(problem, tables, state, space, family, h, s, lower - tolerance, upper + tolerance):

@@ -69,8 +69,9 @@ def _rate(problem, tables, ledger, variable, stop, span, w, piece, entry_rate, s
             out[e] += load[e] * value
     out[size], out[size + 1] = powers(problem, tables, w[t], w) if ledger else (0.0, 0.0)
     for s in range(problem.gap.size):
-        force, rate = 0.0, dot(problem.read_rate[s], w, size)
+        force, rate = 0.0, 0.0
         if piece[s] > 0:
+            rate = dot(problem.read_rate[s], w, size)
             force = _force(problem, tables, s, indentation(problem, s, w), rate, side[s], entry_rate[s], batch)
             calls += 1
             for e in range(size):

@@ -6,6 +6,7 @@ import numpy as np
 
 from solvers.compiled.kernels import contact_gradient, copy, inlined, inner
 from solvers.compiled.state import CALLS, rate_tolerance
+from solvers.exponential.contact.blocks import pair
 from solvers.exponential.contact.node_response import node_forces, respond
 from solvers.exponential.contact.nodes import S
 
@@ -30,7 +31,7 @@ def linearise(problem, tables, state, space, family, level):
             for u in range(stops):
                 if state.piece[u] == 0:
                     continue
-                matrix = tables.forced[family, level, s, u]
+                matrix = pair(problem, tables, space, family, level, s, u)
                 for j in range(S):
                     value = space.slope[s, 0, i] * matrix[j, i] + space.slope[s, 1, i] * matrix[j, S + i]
                     space.jacobian[row + i, column + j] = (1.0 if s == u and i == j else 0.0) - value

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from solvers.compiled.kernels import inlined, inner, law_forces, table_value
+from solvers.compiled.kernels import inlined, inner, law_forces, reordered, table_value
 from solvers.compiled.simd import put, spread
 from solvers.compiled.state import CALLS, T
 from solvers.compiled.sums import above_zero, combine
+from solvers.exponential.contact.blocks import SIGNALS, carry_forces, carry_free, goes_through_blocks, pair, see
 from solvers.exponential.contact.nodes import S
 
 
@@ -30,7 +31,6 @@ class Space(NamedTuple):
     summary: Any  # (m, 2, 8) of the forces and the indentations, see Tables.summary
     previous: Any  # (m, S) forces of the last accepted step
     slope: Any  # (m, 3, S) derivatives of the laws at the nodes
-    jacobian: Any  # (m S, m S)
     residual: Any  # (m S,)
     pivots: Any  # (m S,)
     work: Any  # (18, x.size + 2 padded) of the Runge–Kutta steps
@@ -47,7 +47,14 @@ class Space(NamedTuple):
     reach: Any  # (1,) radians of the fastest block that a landing may take
     duration: Any  # (1,) s, that of the contact begun last, if it were free
     energy: Any  # (3,) see `energy_guard`
-    last: Any  # (6,) see `contact_step`
+    last: Any  # (6,) see `step`
+    seen: Any  # (m, 2) δ and δ̇ at the begin of the step
+    carried: Any  # (2N, S) of many stops, as the rest but for the matrix, see `blocks`
+    pushed: Any  # (2N, S)
+    mixed: Any  # (2N,)
+    jacobian: Any  # (m S, m S) used up to the stops that touch together; from here on runs find what others left
+    pairs: Any  # (POOL, S, 2S)
+    tags: Any  # (POOL,) which pairs these are
 
 
 @inner
@@ -62,18 +69,26 @@ def sample_signals(problem, tables, space, family, t, h):
 
 @inner
 def free_response(problem, tables, state, space, family, level):
-    """Indentations and rates at the nodes without the contact forces, signals included."""
-    stops, size = problem.gap.size, 2 * problem.k.size
+    """Indentations and rates at the nodes without the contact forces, signals included; of many stops the touching."""
+    stops, size, through = problem.gap.size, 2 * problem.k.size, goes_through_blocks(tables)
     if problem.table_dt.size:
         sample_signals(problem, tables, space, family, state.now[T], tables.step[level])
+    if through:
+        carry_free(problem, tables, space, family, level, state.x)
+        if problem.table_dt.size:
+            carry_forces(problem, tables, state, space, family, level, SIGNALS)
     for s in range(stops):
         free = space.free[s]
+        if through:
+            if state.piece[s] > 0:
+                see(problem, space, s, problem.gap[s], free)
+            continue
         put(free[0], 0, spread(-problem.gap[s]))
         put(free[1], 0, spread(0.0))
-        combine(tables.free[family, level, s], state.x, size, free, free)
+        combine(tables.free[tables.kind[family], level, s], state.x, size, free, free)
         for j in range(problem.table_dt.size):
             u = stops + problem.table_load[j]
-            combine(tables.forced[family, level, s, u], space.force[u], S, free, free)
+            combine(tables.forced[tables.kind[family], level, u, s], space.force[u], S, free, free)
 
 
 @inlined
@@ -82,8 +97,17 @@ def respond(problem, tables, state, space, family, level, s):
     motion, start = space.motion[s], space.free[s]
     for u in range(problem.gap.size):
         if state.piece[u] > 0:
-            combine(tables.forced[family, level, s, u], space.force[u], S, start, motion)
+            combine(pair(problem, tables, space, family, level, s, u), space.force[u], S, start, motion)
             start = motion
+
+
+@reordered
+def ripple_of(sway, alias, x, n):
+    """Error of a stop's indentation between the nodes of a step from the state x."""
+    error = 0.0
+    for b in range(n):
+        error += sway[b] * (alias[b] * abs(x[b]) + alias[n + b] * abs(x[n + b]))
+    return error
 
 
 @inlined

@@ -11,6 +11,7 @@ begins with t^{λ/κ}, λ/κ the smallest p: κ = 2, λ = 3 for Hertz's law, κ 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -69,8 +70,15 @@ def _family(power: float, lead: float) -> _Family:
 
 
 class Families(NamedTuple):
-    """All kinds of contact steps of a problem: the smooth one, then one per stop to enter it."""
+    """All contact steps of a problem: the smooth one, then one per stop to enter it; most stops are of few kinds.
 
+    The large tables have an index of the kind of nodes, or of the way of a force: a kind, and whether with its weight.
+    """
+
+    kind: Any  # (f,) each family's kind, and the way of all forces without a weight
+    enters: Any  # (f,) the way of the force of the stop that enters
+    kinds: Any  # (kinds,) a family of each kind
+    ways: Any  # (ways, 2) a family of each way, and 1 for the weight σ^λ
     power: Any  # (f,)
     lead: Any
     nodes: Any  # (f, S), as the rest in `Tables`
@@ -98,21 +106,34 @@ def series_of(law: Any) -> tuple[float, float]:
 @lru_cache(maxsize=64)
 def families_of(series: tuple[tuple[float, float], ...]) -> Families:
     """Kinds of steps for the stops' (κ, λ)."""
-    found = [_family(*kind) for kind in ((1.0, 0.0), *series)]
+    kinds = list(dict.fromkeys(((1.0, 0.0), *series)))
+    found = [_family(*kind) for kind in kinds]
+    kind = np.array([kinds.index(one) for one in ((1.0, 0.0), *series)])
+    first = [kind.tolist().index(i) for i in range(len(kinds))]
+    weighted = [i for i, family in enumerate(found) if family.lead]
+    enters = np.array([len(kinds) + weighted.index(i) if i in weighted else i for i in range(len(kinds))])
+
+    def each(of: Callable[[_Family], Any]) -> Any:
+        return np.ascontiguousarray(np.array([of(f) for f in found])[kind])
+
     return Families(
-        power=np.array([f.power for f in found]),
-        lead=np.array([f.lead for f in found]),
-        nodes=np.array([f.nodes for f in found]),
-        times=np.array([f.nodes**f.power for f in found]),
-        weights=np.array([f.weights for f in found]),
-        plain=np.array([_plain_weights(f) for f in found]),
-        summary=np.ascontiguousarray([_summary(f) for f in found]),
-        tail=np.ascontiguousarray([_tail(f.nodes) for f in found]),
-        zoom=np.ascontiguousarray([[_zoom(f, *bracket) for bracket in _brackets(f)] for f in found]),
-        places=np.array([_brackets(f) for f in found]),
-        extend=np.ascontiguousarray([_extensions(f, found[0]) for f in found]),
-        lagrange=np.array([_weights(f.nodes) * [np.ones(S), f.nodes ** (-f.lead)] for f in found]),
-        alias=np.array([_alias(f) for f in found]),
+        kind=kind,
+        enters=enters[kind],
+        kinds=np.array(first),
+        ways=np.array([*((f, 0) for f in first), *((first[i], 1) for i in weighted)]),
+        power=each(lambda f: f.power),
+        lead=each(lambda f: f.lead),
+        nodes=each(lambda f: f.nodes),
+        times=each(lambda f: f.nodes**f.power),
+        weights=each(lambda f: f.weights),
+        plain=each(_plain_weights),
+        summary=each(_summary),
+        tail=each(lambda f: _tail(f.nodes)),
+        zoom=each(lambda f: [_zoom(f, *bracket) for bracket in _brackets(f)]),
+        places=each(_brackets),
+        extend=each(lambda f: _extensions(f, found[0])),
+        lagrange=each(lambda f: _weights(f.nodes) * [np.ones(S), f.nodes ** (-f.lead)]),
+        alias=each(_alias),
     )
 
 

@@ -13,9 +13,7 @@ import numpy as np
 from solvers.compiled.kernels import contact_forces, copy, dot, indentation, inlined, inner, merged, rhs
 from solvers.compiled.state import (
     CALLS,
-    HEAD,
     LAW_NOT_FINITE,
-    PART,
     REJECTED,
     RUNNING,
     SAMPLED,
@@ -23,13 +21,11 @@ from solvers.compiled.state import (
     STEP_TOO_SMALL,
     STEPS,
     T_IN,
-    TAPED,
     T,
     rate_tolerance,
     surface_tolerance,
     switch,
     switch_on_surface,
-    tape,
     touching,
 )
 from solvers.compiled.sums import combine
@@ -38,8 +34,9 @@ from solvers.exponential.contact.crossings import bend_ahead, choose_sides, leav
 from solvers.exponential.contact.landing import land, land_on_bend
 from solvers.exponential.contact.node_response import free_response
 from solvers.exponential.contact.nodes import S
-from solvers.exponential.contact.peaks import state_peaks, step_peaks
-from solvers.exponential.energy import account, inside
+from solvers.exponential.contact.outputs import end_inside, record, tape_forces
+from solvers.exponential.contact.peaks import state_peaks
+from solvers.exponential.energy import account
 from solvers.exponential.flight import energy_norms
 
 LEVEL, FAMILY, FRESH, STOP, WANTED, BEGUN = range(6)  # places in Space.last
@@ -130,7 +127,7 @@ def _nearest_surface(problem, state, space):
     for s in range(problem.gap.size):
         delta = indentation(problem, s, state.x)
         rate = dot(problem.read_rate[s], state.x, size)
-        space.scale[s] = max(space.scale[s], abs(rate))
+        space.scale[s], space.seen[s, 0], space.seen[s, 1] = max(space.scale[s], abs(rate)), delta, rate
         piece = state.piece[s]
         if rate < 0.0 and piece > 0:
             time, way = (delta - problem.levels[s, piece - 1]) / -rate, -1
@@ -182,25 +179,6 @@ def _try(problem, tables, state, space, family, level, rtol):
         return 1.0 if bottom else np.inf, first, bent
     error = step_error(problem, tables, state, space, family, level, space.last[FRESH] > 0, rtol)
     return min(error, 1.0) if bottom else error, first, bent
-
-
-@inner
-def _record(problem, tables, state, space, family, level, t_end, out, due, ledger):
-    """Samples inside the converged step, and the state at the end of the run if that lies inside."""
-    t, h = state.now[T], tables.step[level]
-    while True:
-        sampled = due[state.count[SAMPLED]] <= min(t + h, t_end)
-        if not sampled and t + h < t_end:
-            return
-        span = due[state.count[SAMPLED]] - t if sampled else t_end - t
-        row = out[state.count[SAMPLED]] if sampled else space.work[17]
-        copy(state.x, row, state.x.size)
-        inside(problem, tables, state, space, family, h, span, row)
-        if ledger:
-            account(problem, tables, state, space, family, h, span, state.x, row)
-        if not sampled:
-            return
-        state.count[SAMPLED] += 1
 
 
 @inner
@@ -276,16 +254,17 @@ def touch(problem, tables, state, space, t_end, rtol, log, out, due, ledger):
     h = tables.step[level]
     end = state.now[T] + h
     if end >= t_end or due[state.count[SAMPLED]] <= end:
-        _record(problem, tables, state, space, family, level, t_end, out, due, ledger)
+        record(problem, tables, state, space, family, level, t_end, out, due, ledger)
     if end >= t_end:
-        _end_inside(problem, tables, state, space, family, level, t_end)
+        end_inside(problem, tables, state, space, family, level, t_end)
         return RUNNING
     for s in range(problem.gap.size):
-        copy(space.force[s], space.previous[s], S)
+        if state.piece[s] > 0:
+            copy(space.force[s], space.previous[s], S)
     if ledger:
         account(problem, tables, state, space, family, h, h, state.x, state.x)
     if state.tape.shape[0]:
-        _tape_forces(problem, state, space, STEP, end, family, level)
+        tape_forces(problem, state, space, STEP, end, family, level)
     finish_step(problem, tables, state, space, family, level)
     if bent >= 0:  # crossed within the shortest step
         space.side[bent] = -space.side[bent]
@@ -302,31 +281,6 @@ def _law_fails(state, space):
             if state.piece[s] > 0 and not abs(space.force[s, i]) < np.inf:
                 return True
     return False
-
-
-@inner
-def _end_inside(problem, tables, state, space, family, level, t_end):
-    """End the run within the step found, at the state `_record` has left in ``space.work[17]``."""
-    x, share = space.work[17], (t_end - state.now[T]) / tables.step[level]
-    place = share ** (1.0 / tables.power[family])
-    for s in range(problem.gap.size):
-        if state.piece[s] > 0:
-            step_peaks(problem, tables, state, space, family, tables.step[level], s, min(place, 1.0))
-    if state.tape.shape[0]:
-        _tape_forces(problem, state, space, PART, t_end, family, level)
-    copy(x, state.x, state.x.size)
-    state_peaks(problem, state, space, x)
-    state.now[T] = t_end
-    state.count[STEPS] += 1
-
-
-@inner
-def _tape_forces(problem, state, space, kind, ended, family, level):
-    """A row of the tape with the forces at the nodes."""
-    forces = state.tape[state.count[TAPED], HEAD + state.x.size :]
-    for s in range(problem.gap.size):
-        copy(space.force[s], forces[s * S : (s + 1) * S], S)
-    tape(state, kind, state.now[T], ended, ended - state.now[T], family, level, state.x)
 
 
 @inner

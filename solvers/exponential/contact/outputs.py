@@ -1,0 +1,53 @@
+"""What a contact step leaves besides its end: samples inside, the state at the end of a run, a row of the tape."""
+
+from __future__ import annotations
+
+from solvers.compiled.kernels import copy, inner
+from solvers.compiled.state import HEAD, PART, SAMPLED, STEPS, TAPED, T, tape
+from solvers.exponential.contact.nodes import S
+from solvers.exponential.contact.peaks import state_peaks, step_peaks
+from solvers.exponential.energy import account, inside
+
+
+@inner
+def record(problem, tables, state, space, family, level, t_end, out, due, ledger):
+    """Samples inside the converged step, and the state at the end of the run if that lies inside."""
+    t, h = state.now[T], tables.step[level]
+    while True:
+        sampled = due[state.count[SAMPLED]] <= min(t + h, t_end)
+        if not sampled and t + h < t_end:
+            return
+        span = due[state.count[SAMPLED]] - t if sampled else t_end - t
+        row = out[state.count[SAMPLED]] if sampled else space.work[17]
+        copy(state.x, row, state.x.size)
+        inside(problem, tables, state, space, family, h, span, row)
+        if ledger:
+            account(problem, tables, state, space, family, h, span, state.x, row)
+        if not sampled:
+            return
+        state.count[SAMPLED] += 1
+
+
+@inner
+def end_inside(problem, tables, state, space, family, level, t_end):
+    """End the run within the step found, at the state `record` has left in ``space.work[17]``."""
+    x, share = space.work[17], (t_end - state.now[T]) / tables.step[level]
+    place = share ** (1.0 / tables.power[family])
+    for s in range(problem.gap.size):
+        if state.piece[s] > 0:
+            step_peaks(problem, tables, state, space, family, tables.step[level], s, min(place, 1.0))
+    if state.tape.shape[0]:
+        tape_forces(problem, state, space, PART, t_end, family, level)
+    copy(x, state.x, state.x.size)
+    state_peaks(problem, state, space, x)
+    state.now[T] = t_end
+    state.count[STEPS] += 1
+
+
+@inner
+def tape_forces(problem, state, space, kind, ended, family, level):
+    """A row of the tape with the forces at the nodes."""
+    forces = state.tape[state.count[TAPED], HEAD + state.x.size :]
+    for s in range(problem.gap.size):
+        copy(space.force[s], forces[s * S : (s + 1) * S], S)
+    tape(state, kind, state.now[T], ended, ended - state.now[T], family, level, state.x)

@@ -1,0 +1,159 @@
+"""What a force known at the nodes of a contact step does through the blocks, per step length.
+
+A block's response to the j-th node value is (α, β) of ∫_0^{t_i} E(t_i - τ) w(σ) L_j(σ)/w(σ_j) dτ at the nodes t_i and
+at the end. No more need be known for any number of stops: a stop pushes blocks and reads blocks, and what stop u does
+to stop s is one sum over the blocks, `fill_pair`. For a few stops these sums are made beforehand, for all pairs.
+
+A *kind* is a set of nodes, one per (κ, λ); a *way* is a kind with or without the weight σ^λ of the force.
+"""
+
+from __future__ import annotations
+
+import math
+
+from solvers.compiled.kernels import inner, kernel
+from solvers.compiled.sums import combine
+from solvers.exponential.contact.nodes import S, lagrange
+
+_PANEL = 6.0  # radians of the fastest oscillation per quadrature panel of 12 points
+
+
+@kernel
+def propagate(k, c, x):
+    """(α, β) of exp(A x), any damping: e^{-cx/2} [cos θ, sin θ / ω_d], its hyperbolic form, or their limit."""
+    half = 0.5 * c
+    discriminant = half * half - k
+    if discriminant < 0.0:
+        omega = math.sqrt(-discriminant)
+        decay = math.exp(-half * x)
+        beta = decay * math.sin(omega * x) / omega
+        return decay * math.cos(omega * x) + half * beta, beta
+    root = math.sqrt(discriminant)
+    slow = -k / (half + root) if half + root > 0.0 else 0.0
+    decay = math.exp(slow * x)
+    beta = decay * x if root * x < 1e-12 else -decay * math.expm1(-2.0 * root * x) / (2.0 * root)
+    return decay - slow * beta, beta
+
+
+@kernel
+def fill_propagators(k, c, blocks, h, out):
+    """(len(h), 2, N): α, β of the blocks from the first to before the last."""
+    for i in range(h.size):
+        for b in range(blocks[0], blocks[1]):
+            out[i, 0, b], out[i, 1, b] = propagate(k[b], c[b], h[i])
+
+
+@inner
+def _block_response(k, c, h, power, lead, nodes, weights, gauss, out, basis):
+    """out[i, j] = (α, β) of ∫_0^{t_i} E(t_i - τ) w(σ) L_j(σ)/w(σ_j) dτ; i = S is the end of the step."""
+    count, rate = nodes.size, math.sqrt(k) + c
+    for i in range(count + 1):
+        a = nodes[i - 1] if i > 0 else 0.0
+        b = nodes[i] if i < count else 1.0
+        ta, tb = h * a**power, h * b**power
+        ea, eb = propagate(k, c, tb - ta)
+        for j in range(count):  # carry the integral so far to the new node
+            alpha = out[i - 1, j, 0] if i > 0 else 0.0
+            beta = out[i - 1, j, 1] if i > 0 else 0.0
+            out[i, j, 0] = ea * alpha - k * eb * beta
+            out[i, j, 1] = ea * beta + eb * alpha - c * eb * beta
+        panels = 1 + int(rate * (tb - ta) / _PANEL)
+        for panel in range(panels):
+            left = a + (b - a) * panel / panels
+            width = (b - a) / panels
+            for g in range(gauss.shape[1]):
+                sigma = left + width * gauss[0, g]
+                t, measure = h * sigma, h * width * gauss[1, g]
+                if power > 1.0:
+                    pace = sigma ** (power - 1.0)
+                    t, measure = t * pace, measure * power * pace
+                if lead > 0.0:
+                    measure *= sigma**lead
+                alpha, beta = propagate(k, c, tb - t)
+                lagrange(nodes, weights, sigma, basis)
+                for j in range(count):
+                    out[i, j, 0] += alpha * measure * basis[j]
+                    out[i, j, 1] += beta * measure * basis[j]
+
+
+@inner
+def fill_pair(problem, push, read, read_rate, response, weights, out):
+    """(S, 2S) δ and δ̇ at the nodes that ``read`` sees from the node values of a force that pushes by ``push``.
+
+    With A² = -k - c A the sum over the blocks of r (α + β A) b is Σ α (r·b) + β (r·A b).
+    """
+    size, own = problem.k.size, response.shape[1] // 2
+    for d in range(2):
+        row = read if d == 0 else read_rate
+        for b in range(own):
+            p, v = push[b], push[size + b]
+            weights[b] = row[b] * p + row[size + b] * v
+            weights[own + b] = row[b] * v - row[size + b] * (problem.k[b] * p + problem.c[b] * v)
+        for j in range(S):
+            combine(response[j], weights, 2 * own, None, out[j, d * S : (d + 1) * S])
+
+
+@inner
+def _fill_kick(problem, push, ending, out):
+    """(S, 2N) state change at the end."""
+    size = problem.k.size
+    for b in range(ending.shape[1]):
+        p, v = push[b], push[size + b]
+        for j in range(S):
+            alpha, beta = ending[0, b, j], ending[1, b, j]
+            out[j, b] = alpha * p + beta * v
+            out[j, size + b] = alpha * v - beta * (problem.k[b] * p + problem.c[b] * v)
+
+
+@inner
+def _fill_level(problem, h, power, lead, nodes, weights, gauss, response, ending, work, basis):
+    """Blocks' responses on one step length, at the nodes and at the end."""
+    own = ending.shape[1]
+    for b in range(own):
+        _block_response(problem.k[b], problem.c[b], h, power, lead, nodes, weights, gauss, work, basis)
+        for j in range(S):
+            for i in range(S):
+                response[j, b, i], response[j, own + b, i] = work[i, j, 0], work[i, j, 1]
+            ending[0, b, j], ending[1, b, j] = work[S, j, 0], work[S, j, 1]
+
+
+@kernel
+def fill_way(problem, h, power, lead, nodes, weights, gauss, inputs, response, ending, forced, kick, work, sums):
+    """All step lengths of one way: blocks' responses and, where there is room for them, all pairs.
+
+    Where pairs are kept the responses are working space, of one length.
+    """
+    pairs = forced.shape[0] > 0
+    for level in range(h.size):
+        rows, ends = response[0 if pairs else level], ending[0 if pairs else level]
+        _fill_level(problem, h[level], power, lead, nodes, weights, gauss, rows, ends, work, sums)
+        for u in range(inputs.shape[0] if pairs else 0):
+            _fill_kick(problem, inputs[u], ends, kick[level, u])
+            for s in range(problem.gap.size):
+                fill_pair(problem, inputs[u], problem.read[s], problem.read_rate[s], rows, sums, forced[level, u, s])
+
+
+@kernel
+def fill_ahead(problem, blocks, h, power, nodes, out):
+    """(J, 2, N, S): α, β of some of the blocks at the nodes of one kind."""
+    for level in range(h.size):
+        for b in range(blocks[0], blocks[1]):
+            for i in range(S):
+                span = h[level] * nodes[i] ** power
+                out[level, 0, b, i], out[level, 1, b, i] = propagate(problem.k[b], problem.c[b], span)
+
+
+@kernel
+def fill_free(problem, blocks, h, power, nodes, out):
+    """(J, m, 2N, 2S): what the state of some of the blocks does to all stops at the nodes of one kind."""
+    size = problem.k.size
+    for level in range(h.size):
+        for b in range(blocks[0], blocks[1]):
+            k, c = problem.k[b], problem.c[b]
+            for i in range(S):
+                alpha, beta = propagate(k, c, h[level] * nodes[i] ** power)
+                for s in range(problem.gap.size):
+                    for d in range(2):
+                        r = problem.read[s] if d == 0 else problem.read_rate[s]
+                        out[level, s, b, d * S + i] = r[b] * alpha - r[size + b] * k * beta
+                        out[level, s, size + b, d * S + i] = r[b] * beta + r[size + b] * (alpha - c * beta)
