@@ -194,7 +194,7 @@ def test_force_is_the_law_with_the_latched_entry_rate(law):
 def test_force_uses_the_floor_of_slow_entries():
     law = Hysteretic(2.1e8, 0.9, entry_rate_floor=10.0)
     run = paper_scene(law=law).reduce(2).simulate(PERIOD, PERIOD / 2000)
-    assert run.contacts.floored.all()
+    assert run.contacts.entry_rate_clipped.all()
     during = run.indentation() > 0.0
     expected = law.force(run.indentation()[during], -run.velocity(TIP)[during], 10.0)
     np.testing.assert_allclose(run.force()[during], expected, rtol=1e-13)

@@ -27,7 +27,7 @@ from solvers.compiled.state import (
 )
 from solvers.stepping.events import (
     IGNORED,
-    LANDED,
+    LOCATED,
     MOST_LANDINGS,
     NONE,
     coefficients_of,
@@ -196,7 +196,7 @@ def look(problem, state, t_end, log, events):
     if events == IGNORED:
         switched = _switch_by_sign(problem, state, log)
     else:
-        switched = switch_on_surface(problem, state, log, events == LANDED)
+        switched = switch_on_surface(problem, state, log, events == LOCATED)
     return EVENT if switched else RUNNING
 
 
