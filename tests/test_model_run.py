@@ -344,6 +344,22 @@ def test_damaged_file_is_refused(run, tmp_path, damage):
         fb.load(path)
 
 
+def test_files_of_earlier_versions_are_read(run, tmp_path):
+    with np.load(run.save(tmp_path / "run.npz")) as data:
+        arrays = {key: data[key] for key in data.files}
+    arrays["contact_floored"] = arrays.pop("contact_entry_rate_clipped")
+    np.savez(tmp_path / "run.npz", **arrays)
+    again = fb.load(tmp_path / "run.npz")
+    assert np.array_equal(again.contacts.entry_rate_clipped, run.contacts.entry_rate_clipped)
+
+
+def test_old_names_work_and_name_the_new(run):
+    with pytest.warns(DeprecationWarning, match="entry_rate_clipped"):
+        assert run.contacts.floored is run.contacts.entry_rate_clipped
+    with pytest.warns(DeprecationWarning, match="contact_rows"):
+        assert run.model.touches is run.model.contact_rows
+
+
 @pytest.mark.parametrize(
     ("name", "change", "message"),
     [

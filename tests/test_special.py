@@ -75,10 +75,13 @@ def test_torus_bifurcation_where_a_nonlinear_stop_drives_as_much_as_the_mass_is_
 
 
 def test_subharmonic_branch_ends_at_a_flip():
-    """Followed back from where it is settled, the doubled branch stops at the flip it was born at."""
+    """Followed back from where it is settled, the doubled branch ends at the flip where it begins."""
     problem = Bilinear(0.88, zeta=0.05)  # doubles its period between 0.83 and 0.93 rad/s
     found = branch(over(problem, periods=2), (0.86, 1.0), problem.settled(), at=0.88, step=0.3).run()
     assert found.status == (BranchStatus.SUBHARMONIC_END, BranchStatus.END)
+    assert BranchStatus["BORN"] is BranchStatus.SUBHARMONIC_END  # its name in saved branches of earlier versions
+    with pytest.warns(DeprecationWarning, match="walks"):
+        assert found.arms is found.walks
     ending = found.orbits[-1]
     assert ending.mark == "flip"
     there = replace(problem, omega=ending.parameter)

@@ -77,7 +77,7 @@ class Branch:
         return (self._orbit(one) for one in self.found)
 
     def run(self, progress: bool = False) -> Branch:
-        """Compute all of it; after Ctrl-C what was found is kept, and another call goes on."""
+        """Compute all of it; after Ctrl-C the orbits found are kept, and another call continues."""
         from tqdm import tqdm
 
         with tqdm(self.found, unit=" orbits", disable=None if progress else True) as bar:

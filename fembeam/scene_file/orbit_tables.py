@@ -112,7 +112,7 @@ class BranchTable:
         _check_period(self.period, "[branch]")
 
     def run(self, model: Model, folder: Path, progress: bool = False) -> Branch:
-        """The branch; goes on where an interrupted one left ``branch.npz`` in the folder.
+        """The branch; continues where an interrupted one left ``branch.npz`` in the folder.
 
         Raises
         ------

@@ -70,7 +70,7 @@ class _Meeting(PeriodicProblem):
 
 @dataclass(frozen=True, eq=False)
 class Grazing:
-    """An orbit that meets stops' surfaces at a rate, and goes on with an entry rate of at least ``floor``."""
+    """An orbit that meets stops' surfaces at a rate, and continues with an entry rate of at least ``floor``."""
 
     stops: tuple[int | None, ...]  # on whose surfaces the shots begin
     speed: float

@@ -89,7 +89,7 @@ def _interpolant(h, x, x_new, work, dense):
 
 @dataclass(frozen=True)
 class DormandPrince:
-    """DOP853 with every entry, exit and kink landed on; the independent reference for any problem.
+    """DOP853 with every entry, exit and kink located; the independent reference for any problem.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ NONE = 2.0
 MOST_LANDINGS = 60
 """Steps tried to land: where the level is only just reached Newton halves its distance, so does bisection."""
 IGNORED, HENON, LOCATED = range(3)
-"""What a method does about events: pieces follow at the end of a step; Hénon's step onto an entry; all landed on."""
+"""What a method does about events: pieces follow at the end of a step; Hénon's step onto an entry; all located."""
 
 
 @inner

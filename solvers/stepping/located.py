@@ -45,7 +45,7 @@ _PEAK_NODES = np.linspace(0.0, 1.0, 9)
 _KINK_NODES = np.array([0.0, 1 / 16, 1 / 4, 1 / 2, 3 / 4, 7 / 8, 31 / 32, 127 / 128, 511 / 512, 1.0])
 
 
-_AT_AN_END = 1e-6  # share of a step: a kink as near to an end as that is landed on
+_AT_AN_END = 1e-6  # share of a step: a kink as near to an end as that counts as reached
 
 
 @inner
@@ -136,7 +136,7 @@ def _sample(state, space, h, out, due):
 
 @kernel
 def landing_tolerance(problem, state, stop):
-    """Distance from a level that counts as landed on it."""
+    """Distance from a level that counts as reached."""
     return 4.0 * surface_tolerance(problem, stop, state.x)
 
 

@@ -1,4 +1,4 @@
-"""Finished realisations in one file that is written whole, so that a study goes on where it was interrupted."""
+"""Finished realisations in one file that is written whole, so that a study continues where it was interrupted."""
 
 from __future__ import annotations
 
