@@ -6,7 +6,6 @@ q_i'' + 2 ζ_i ω_i q_i' + ω_i² q_i = -Γ_i (ÿ + g) + Σ φ_i(z_f) f + Σ_s w
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -26,9 +25,8 @@ if TYPE_CHECKING:
 SEEN = ("forces", "springs", "bodies", "impactors")  # parts of a scene besides stops that a system is made of
 
 
-@dataclass(frozen=True, eq=False)
 class ModalEquations:
-    """A scene on n coordinates, as matrices, contacts and loads; `Model` describes the attributes."""
+    """A scene on n coordinates, as matrices, contacts and loads: what follows from the fields of `Model`."""
 
     scene: Scene
     matrices: Matrices
@@ -36,8 +34,7 @@ class ModalEquations:
     modes: tuple[int, ...]
     shapes: Shapes
     counts: tuple[tuple[int, int], ...]
-    others: tuple[Shapes, ...] = ()
-    way: dict[str, Any] = field(default_factory=dict)
+    others: tuple[Shapes, ...]
 
     @property
     def omega(self) -> Vector:

@@ -11,15 +11,16 @@ from __future__ import annotations
 import dataclasses
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+import reduction
 import solvers
 from fembeam.model.equations import ModalEquations
-from fembeam.model.shapes import Vector
+from fembeam.model.shapes import Shapes, Vector
 from fembeam.scene import with_signals
 from fembeam.support import require, require_positive
 
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from fembeam.model.branch import Branch
     from fembeam.model.orbit import Attractor, Orbit
     from fembeam.model.run import Run
-    from fembeam.scene import Scene
+    from fembeam.scene import Matrices, Scene
     from fembeam.scene.contact_rows import ContactRow
 
 Field = Callable[[Vector], Any] | None  # of displacement in m or velocity in m/s, over z (k,)
@@ -53,6 +54,15 @@ class Model(ModalEquations):
     way : arguments of `Scene.reduce` that make it again, with mode numbers instead of criteria.
     static_share : part of the static compliance that the model keeps at every stop, then at every force; 1 is all.
     """
+
+    scene: Scene
+    matrices: Matrices
+    basis: reduction.Basis
+    modes: tuple[int, ...]
+    shapes: Shapes
+    counts: tuple[tuple[int, int], ...]
+    others: tuple[Shapes, ...] = ()
+    way: dict[str, Any] = field(default_factory=dict)
 
     @property
     def touches(self) -> list[ContactRow]:
