@@ -1,9 +1,8 @@
 """Contact laws: indentation, its rate and the entry rate in; force out.
 
-The force acts while ``delta > 0`` and is positive when it pushes the bodies apart. A law knows nothing but these three
-numbers. Laws with memory (Bouc–Wen, Jenkins, Iwan) are left out on purpose: their state must be integrated, landed on
-at yield and return, differentiated and saved along with the structure's, which every method here would have to carry
-for elements that act all the time and need none of what makes contacts hard.
+The force acts while ``delta > 0`` and is positive when it pushes the bodies apart. A law depends on these three numbers
+only. Laws with a state of their own (Bouc–Wen, Jenkins, Iwan) are not included: every method would have to integrate
+that state, locate yield and return, differentiate and save it, for elements that act all the time.
 """
 
 from contacts.curves import PiecewiseLinear, Tabulated

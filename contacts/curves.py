@@ -86,7 +86,7 @@ class PiecewiseLinear(Law):
         """What a user should know."""
         damped = any(np.atleast_1d(self.damping))
         pulls = "pulls at the end of a rebound, where the dashpot outweighs the spring" if damped else "never pulls"
-        return pulls, "integrators land on every knot; smooth between"
+        return pulls, "integrators locate every knot; smooth between"
 
     def exact_restitution(self, entry_rate: float, mass: float) -> float | None:
         """Elastic without damping: 1."""
@@ -119,7 +119,7 @@ class Tabulated(Law):
     Notes
     -----
     Between points the force is monotone and its slope continuous; the curvature jumps at the points, so integrators
-    land on each. Thin a dense table out before: every point costs two landings per contact.
+    locate each. Thin a dense table out before: every point costs two located events per contact.
 
     References
     ----------
@@ -141,7 +141,7 @@ class Tabulated(Law):
     units: ClassVar[dict[str, str]] = {"indentation": "m", "measured": "N"}
     remarks: ClassVar[tuple[str, ...]] = (  # type: ignore[misc]
         "never pulls",
-        "integrators land on every point; smooth between",
+        "integrators locate every point; smooth between",
     )
 
     def __post_init__(self) -> None:

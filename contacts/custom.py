@@ -84,7 +84,7 @@ def law(
     ----------
     function : ``f(delta, delta_dot, entry_rate, parameter, ...) -> force``; further arguments are the law's
         parameters, bound by keyword; defaults are kept.
-    knots : indentations (m) where the force has a kink; integrators land on them.
+    knots : indentations (m) where the force has a kink; integrators locate them.
     jump : say True when the force is not zero at the instant of entry.
     exponent : leading exponent of the force at first touch; None finds it when parameters are bound.
     entry_rate_floor : smallest entry rate handed to the function, m/s.
@@ -209,7 +209,7 @@ def _check_jump(made: CustomLaw) -> None:
         if nearer > 0.5 * near and nearer > 1e-12 * np.abs(made.force(1e-3, rate, 1.0)):
             raise ValueError(
                 f"law {made.name!r} jumps to {nearer:g} N at delta = 0+ with delta_dot = {rate:g} m/s; "
-                "declare it with @law(jump=True), so that integrators land on it"
+                "declare it with @law(jump=True), so that integrators locate it"
             )
 
 

@@ -1,4 +1,4 @@
-"""What a law is, in words: equation, parameters, what it does to a free mass, where to be careful."""
+"""A law as text: equation, parameters, restitution of a free mass, where it pulls or is singular."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def _restitution(law: Law, entry_rate: float, mass: float) -> str:
 
 
 def _observed(law: Law, entry_rate: float, mass: float) -> list[str]:
-    """Where a law that says nothing of itself pulls and jumps, by trying it."""
+    """Where a law without `remarks` pulls and jumps, from samples of its force."""
     deepest = bounce(law, entry_rate, mass).delta.max()
     delta, delta_dot = np.meshgrid(deepest * np.linspace(0.02, 1.0, 50), entry_rate * np.linspace(-1.0, 1.0, 41))
     force = law.force(delta, delta_dot, entry_rate)

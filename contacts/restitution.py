@@ -1,7 +1,7 @@
-"""What a law really does to a free mass: its restitution.
+"""Restitution that a law achieves on a free mass.
 
 For F = K δ^p (1 + a δ̇/δ̇⁻) a relation gives it. With s = δ̇/δ̇⁻ the motion obeys s ds/(1 + a s) = -K δ^p dδ/(m δ̇⁻²);
-the elastic term gives nothing over a closed loop, so from s = 1 to s = -r
+the elastic term cancels over a closed loop, so from s = 1 to s = -r
 
     a (1 + r) = ln[(1 + a)/(1 - a r)],
 
@@ -132,7 +132,7 @@ def restitution(law: Law, entry_rate: float = 1.0, mass: float = 1.0) -> float:
 def bounce(law: Law, entry_rate: float = 1.0, mass: float = 1.0) -> Bounce:
     """Throw a free mass onto a stop and integrate m δ̈ = -F from entry to exit.
 
-    Each stretch between knots and the turning point is integrated by itself (DOP853, relative tolerance 1e-12).
+    Each segment between knots and the turning point is integrated by itself (DOP853, relative tolerance 1e-12).
 
     Parameters
     ----------

@@ -11,6 +11,7 @@ import sys
 import warnings
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import pdoc
 
@@ -65,8 +66,23 @@ def short(annotation: object, *rest: object) -> str:
     return text
 
 
+def with_hidden_bases(listed: Any) -> Any:
+    """The members a page shows of a class: its own and those of bases that no package offers by name."""
+
+    def members(one: Any) -> list[Any]:
+        found = listed.func(one)
+        for (module, name), inherited in one._members_by_origin.items():
+            home = sys.modules.get(module.split(".")[0])
+            if module.split(".")[0] in PACKAGES and name not in home.__all__ and module != one.taken_from[0]:
+                found = found + [member for member in inherited if member not in found]
+        return found
+
+    return members
+
+
 def build(folder: Path) -> None:
     """Write the pages into a folder."""
+    pdoc.doc.Class.own_members = property(with_hidden_bases(pdoc.doc.Class.own_members))
     warnings.simplefilter("error")
     pdoc.docstrings.convert, inspect.formatannotation, pdoc.doc.formatannotation = readable, short, short
     look = {"template_directory": HOME / "templates", "footer_text": "SI units, angular frequencies in rad/s"}

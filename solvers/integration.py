@@ -1,7 +1,7 @@
-"""The front door: check, hand over to a method's compiled loop in short stretches, collect the result.
+"""The entry point `integrate`: check the input, run a method's loop in short blocks of steps, collect the result.
 
-Stretches are short so that Ctrl-C is heard and progress shown; the state between them is complete, so an
-interrupted run keeps everything computed.
+Blocks are short so that Ctrl-C and progress are served; the state between them is complete, so an interrupted run keeps
+everything computed.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ from solvers.problem import (
 )
 from solvers.problem.run_arguments import _check_laws, _check_tangent, _start, _times
 
-_BUDGET = 20_000  # steps between two looks at the world outside
+_BUDGET = 20_000  # steps in a block: between two checks for signals and calls of `progress`
 _DEPTH, _FORCE = (list(ContactLog.__dataclass_fields__).index(name) for name in ("peak_indentation", "peak_force"))
 _NEVER, _NOWHERE = np.array([math.inf]), np.empty((0, 0))  # no output is due
 
@@ -72,7 +72,7 @@ def integrate(
     q0, q_dot0 : (n,) initial coordinates and rates; not changed.
     duration : s, > 0.
     dt : output sampling, s, or the output times themselves, increasing, within [0, duration]: a contact can so be
-        looked at as closely as one likes. None keeps the final state and the contact log only.
+        sampled as finely as needed. None keeps the final state and the contact log only.
     method : `Exponential`, `DormandPrince`, `HenonRK2`, `RK4`, `CentralDifference`, `Newmark` or `GeneralizedAlpha`;
         None takes ``Exponential(rtol=1e-8)``.
     tangent : True adds the derivative of the final [q, q̇] with respect to [q0, q_dot0], (2n, 2n), to the solution; a
@@ -143,7 +143,7 @@ def _forcing(system: System, duration: float, rtol: float) -> Forcing:
 
 
 class _Run:
-    """One run: a method's engine, its output, and the loop over stretches."""
+    """One run: a method's engine, its output, and the loop over blocks of steps."""
 
     def __init__(self, system: System, engine: Any, times: Array | None, tangent: Any) -> None:
         self.system, self.engine, self.times = system, engine, times
@@ -156,7 +156,7 @@ class _Run:
             from solvers.exponential.tangent import Tangent
 
             self.tangent = Tangent(system, engine, tangent if isinstance(tangent, Parameter) else None)
-            self.state = engine.state  # with a tape
+            self.state = engine.state  # with the event record
         self.log = np.empty((max(256, 2 * len(system.contacts)), COLUMNS))
         self.begin = self.state.x[: 2 * engine.problem.k.size].copy()
         if times is not None and self.due[0] == 0.0:
@@ -173,7 +173,7 @@ class _Run:
         return self.engine.explain(status) if hasattr(self.engine, "explain") else ""
 
     def to_the_end(self, progress: Callable[[float], None] | None) -> Status:
-        """Stretch after stretch until done, failed or interrupted."""
+        """Block after block until done, failed or interrupted."""
         code = RUNNING
         try:
             self.engine.start()
@@ -193,7 +193,7 @@ class _Run:
         return STATUSES[code] if finite or STATUSES[code] is not Status.DONE else Status.DIVERGED
 
     def solution(self, status: Status, seconds: float) -> Solution:
-        """Collect outputs, log and ledger."""
+        """Collect outputs, log and energy balance."""
         size, n = self.begin.size, self.system.size
         back = self.engine.back
         if self.times is None:
@@ -216,7 +216,7 @@ class _Run:
         return Solution(t, motion[:, :n], motion[:, n:], log, ledger, status, cost, **more)
 
     def _balances(self, powers: Array, complete: bool, motion: Array, rows: Array) -> bool:
-        """Whether the energy does, by the ledger if there is one; methods that do not say are looked at as they go."""
+        """Whether the energy balance closes, where it is kept; methods without `gains` are checked step by step."""
         if not hasattr(self.engine, "gains"):
             return True
         exchanged = rows[:, _DEPTH] * rows[:, _FORCE]
@@ -226,7 +226,7 @@ class _Run:
         return not unbalanced(self.system, powers, motion, begin, exchanged, self.engine.method.rtol)
 
     def release(self) -> None:
-        """Leave to other runs what this one wrote to."""
+        """Return working arrays for use by other runs."""
         if hasattr(self.engine, "release"):
             self.engine.release()
 
@@ -251,7 +251,7 @@ class _Run:
 
 
 def _energy(system: System, powers: Array, complete: bool, motion: Array, back: Array, begin: Array) -> Energy:
-    """The ledger of a run; its input and damping are NaN where it kept none."""
+    """The energy balance of a run; input and damping are NaN where it was not kept."""
     if not complete:
         powers = np.hstack((np.full((len(powers), 2), math.nan), powers[:, 2:]))
     return Energy.of_run(system.M, system.K, powers, motion, back @ begin)

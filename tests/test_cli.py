@@ -383,7 +383,7 @@ def test_the_new_scene_is_checked_and_runs(tmp_path, capsys):
     stop = found["stops"][0]
     strike = read(path).scene.reduce(modes=3).strike(stop["speed"])
     assert stop["time"] == pytest.approx(float(strike.t_out[0] - strike.t_in[0]))
-    assert found["memory"] == pytest.approx(1 / (0.02 * 106.945812), rel=1e-6)
+    assert found["correlation_time"] == found["memory"] == pytest.approx(1 / (0.02 * 106.945812), rel=1e-6)
     assert len(found["warnings"]) == 1
     assert "excite modes above the 3 kept" in found["warnings"][0]
     found = json.loads(printed(capsys, "run", path, "--out", out, "--json", "--quiet", "--set", "simulate.duration=3"))
@@ -500,7 +500,7 @@ def test_any_terminal_can_show_what_is_said(encoding):
         return found.stdout.decode(encoding), found.stderr.decode(encoding)
 
     plain = said("check", EXAMPLE, "--set", "base.band=[0, 1e5]")
-    assert ("1/min(zetaomega)" if encoding == "ascii" else "memory of the structure") in plain[0]
+    assert ("1/min(zetaomega)" if encoding == "ascii" else "correlation time of the structure") in plain[0]
     assert "?" not in plain[0] + plain[1]
     assert "loads reach 100000 rad/s" in plain[1]
     assert json.loads(said("check", EXAMPLE, "--json")[0])["modes"]

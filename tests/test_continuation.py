@@ -63,9 +63,9 @@ def damped():
 @pytest.fixture(scope="module")
 def doubled(damped):
     """The subharmonic branch born at the upper flip, its first orbits."""
-    born = damped.doubled(marks(damped, "flip")[-1])
-    list(itertools.islice(born, 8))
-    return born
+    following = damped.doubled(marks(damped, "flip")[-1])
+    list(itertools.islice(following, 8))
+    return following
 
 
 # --- special points -----------------------------------------------------------------------------------------------
@@ -117,7 +117,7 @@ def test_doubled_branch_is_born_at_the_flip_with_twice_the_period(damped, double
     assert doubled.orbits[-1].stable
 
 
-def test_no_special_point_is_reported_at_the_birth(doubled):
+def test_no_special_point_is_reported_at_the_subharmonic_end(doubled):
     assert [found.mark for found in doubled.orbits[1:5]] == [""] * 4
 
 

@@ -53,6 +53,15 @@ def anchors(path):
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
+def test_files_named_in_the_architecture_exist():
+    """Paths in CONTRIBUTING; 25 at most of them on the way of one run."""
+    text = (HOME / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    named = re.findall(r"`((?:contacts|reduction|solvers|fembeam|tests|docs)/[\w/]+\.py)`", text)
+    assert [name for name in named if not (HOME / name).is_file()] == []
+    way = text[text.index("### The way of one run") : text.index("A method of constant step replaces")]
+    assert 18 <= len(set(re.findall(r"`[\w/]+\.py`", way))) <= 25
+
+
 @pytest.mark.parametrize("page", PAGES)
 def test_links(page):
     path = HOME / page

@@ -128,8 +128,8 @@ def test_entry_rate_is_latched_for_each_contact():
 @pytest.mark.parametrize("speed", [1e-5, 4e-4])
 def test_slow_entries_use_the_floor_and_say_so(speed):
     slow, fast = bounce(LN, speed).contacts, bounce(LN, 2e-3).contacts
-    assert slow.floored.tolist() == [True]
-    assert fast.floored.tolist() == [False]
+    assert slow.entry_rate_clipped.tolist() == [True]
+    assert fast.entry_rate_clipped.tolist() == [False]
     # below the floor the law is F = K δ^p (1 + a' δ̇/speed) with the smaller a' = a speed/floor
     assert slow.speed_out[0] / speed == pytest.approx(achieved_restitution(0.5625 * speed / 1e-3), rel=1e-9)
     assert slow.speed_in[0] == pytest.approx(speed, rel=1e-14)
@@ -137,8 +137,8 @@ def test_slow_entries_use_the_floor_and_say_so(speed):
 
 def test_floor_is_the_laws_own():
     law = replace(LN, entry_rate_floor=0.5)
-    assert bounce(law, 0.4).contacts.floored[0]
-    assert not bounce(law, 0.6).contacts.floored[0]
+    assert bounce(law, 0.4).contacts.entry_rate_clipped[0]
+    assert not bounce(law, 0.6).contacts.entry_rate_clipped[0]
 
 
 def test_grazing_leaves_no_trace():
@@ -147,7 +147,7 @@ def test_grazing_leaves_no_trace():
     missed, touched = (integrate(s, [1.0], [0.0], 0.6, 0.1, FINE) for s in system)
     assert len(missed.contacts) == 0
     assert len(touched.contacts) == 1
-    assert touched.contacts.floored[0]
+    assert touched.contacts.entry_rate_clipped[0]
     assert touched.contacts.peak_indentation[0] <= 1.001e-9
     np.testing.assert_allclose(touched.q, missed.q, atol=1e-8)
 
@@ -328,7 +328,7 @@ def test_start_at_rest_on_the_surface_pushed_in():
     static = push / stiffness
     np.testing.assert_allclose(run.q[:, 0], -static * (1 - np.cos(100 * run.t)), atol=1e-11)
     assert run.contacts.t_in[0] == pytest.approx(0.0, abs=1e-6)
-    assert run.contacts.floored[0]
+    assert run.contacts.entry_rate_clipped[0]
     assert run.contacts.peak_indentation[0] == pytest.approx(2 * static, rel=1e-9)
 
 
@@ -351,7 +351,7 @@ def test_start_inside_a_contact_is_logged_from_the_start():
     assert log.t_in[0] == 0.0
     assert log.t_out[0] == pytest.approx(math.pi / 200, rel=1e-12)
     assert log.speed_out[0] == pytest.approx(depth * 100, rel=1e-12)
-    assert log.floored[0]
+    assert log.entry_rate_clipped[0]
     assert log.peak_force[0] == pytest.approx(200.0, rel=1e-12)
     assert log.energy_loss[0] == pytest.approx(-0.5 * stiffness * depth**2, rel=1e-12)
 
@@ -438,7 +438,7 @@ def test_log_grows_with_the_number_of_contacts():
 def test_log_columns_have_their_kinds():
     log = bounce(LN).contacts
     assert log.stop.dtype.kind == "i"
-    assert log.floored.dtype.kind == "b"
+    assert log.entry_rate_clipped.dtype.kind == "b"
     assert {len(column) for column in log.arrays().values()} == {len(log)} == {1}
     empty = integrate(System.modal([1.0], 0.0), [1.0], [0.0], 1.0).contacts
     assert len(empty) == 0

@@ -191,7 +191,7 @@ def test_slow_entries(speed):
     system = free_mass(PAPER_LAW, gap=0.1 * speed)
     ours, theirs = (integrate(system, [0.0], [-speed], 0.5, method=m) for m in (Exponential(1e-12), RK))
     assert len(ours.contacts) == len(theirs.contacts) == 1
-    assert ours.contacts.floored[0] == (speed < 1e-3)
+    assert ours.contacts.entry_rate_clipped[0] == (speed < 1e-3)
     assert ours.contacts.t_in[0] == pytest.approx(0.1, rel=1e-12)
     assert abs(ours.q_dot[0, 0] - theirs.q_dot[0, 0]) < 1e-11 * max(speed, 1e-4)
 

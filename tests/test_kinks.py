@@ -1,4 +1,4 @@
-"""Kinks of branches: contacts that merge, corners at the floor of the entry rate, grazings; a beam of one mode."""
+"""Nonsmooth points of branches: contacts that merge, corners at the entry rate's floor, grazings; one mode."""
 
 import math
 
@@ -11,7 +11,7 @@ from solvers import Contact, DormandPrince, OrbitError, System, branch, integrat
 from solvers.branches.bifurcations import between
 from solvers.branches.continuation import BranchStatus
 from solvers.branches.grazing import signature
-from solvers.branches.nonsmooth import kinks_near
+from solvers.branches.nonsmooth import nonsmooth_near
 
 LATCHED = Hysteretic(2.1e8, 0.5625, entry_rate_floor=5e-3)
 TWO = 328.9, [1.58306e-4, -0.0933967169]  # rad/s, an orbit of two contacts over two periods of the drive
@@ -128,9 +128,9 @@ def test_a_corner_at_the_floor_turns_the_branch():
     assert corner.contacts.speed_in.min() == pytest.approx(law.entry_rate_floor, rel=1e-3)
     assert max(one.parameter for one in found.orbits) == pytest.approx(corner.parameter, rel=1e-10)
     place = found.orbits.index(corner)
-    floored = [int(one.contacts.floored.sum()) for one in found.orbits]
-    assert {*floored[:place]} | {*floored[place + 1 :]} == {0, 1}
-    assert len({*floored[:place]}) == len({*floored[place + 1 :]}) == 1
+    clipped = [int(one.contacts.entry_rate_clipped.sum()) for one in found.orbits]
+    assert {*clipped[:place]} | {*clipped[place + 1 :]} == {0, 1}
+    assert len({*clipped[:place]}) == len({*clipped[place + 1 :]}) == 1
     end = marks(found, "merging")  # it would go on outside the span
     assert len(end) == 1
     assert found.status == (BranchStatus.END, BranchStatus.END)
@@ -139,7 +139,7 @@ def test_a_corner_at_the_floor_turns_the_branch():
 def test_a_law_without_memory_has_no_merging():
     system, period = family(PiecewiseLinear([1e6]))(300.0)
     found = orbit(system, period)
-    assert {kink.kind for kink in kinks_near(found)} <= {"grazing"}
+    assert {nonsmooth.kind for nonsmooth in nonsmooth_near(found)} <= {"grazing"}
 
 
 def test_two_flips_between_two_orbits_are_seen_by_the_one_before():
@@ -147,7 +147,7 @@ def test_two_flips_between_two_orbits_are_seen_by_the_one_before():
     found = branch(family(Hysteretic(2.1e8, 0.5625), 1), (77.0, 103.0), [3.305e-4, 0.01542], at=103.0).run()
     flips = [one.parameter for one in marks(found, "flip")]
     assert flips == pytest.approx([90.186248, 79.463069], abs=1e-5)
-    points = found.arms[0].passed
+    points = found.walks[0].passed
     last, a = [point for point in points if point.chain.parameter > flips[0] + 0.5][-2:]
     b = next(point for point in points if point.chain.parameter < flips[1])
 
@@ -160,7 +160,7 @@ def test_two_flips_between_two_orbits_are_seen_by_the_one_before():
 
 
 def test_the_floor_is_marked_where_it_is_met():
-    """Stability and the floored contacts change at marked orbits only; at one floor |mu| falls from 3.1 to 0."""
+    """Stability and the clipped contacts change at marked orbits only; at one floor |mu| falls from 3.1 to 0."""
     make, _, _ = random_family(np.random.default_rng(13), "amplitude")
     found = branch(make, (1.44, 1.51), np.zeros(4), step=0.3).run()
     assert [one.mark for one in found.special] == ["grazing", "floor", "fold", "floor", "merging", "merging"]

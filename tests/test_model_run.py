@@ -194,7 +194,7 @@ def test_force_is_the_law_with_the_latched_entry_rate(law):
 def test_force_uses_the_floor_of_slow_entries():
     law = Hysteretic(2.1e8, 0.9, entry_rate_floor=10.0)
     run = paper_scene(law=law).reduce(2).simulate(PERIOD, PERIOD / 2000)
-    assert run.contacts.floored.all()
+    assert run.contacts.entry_rate_clipped.all()
     during = run.indentation() > 0.0
     expected = law.force(run.indentation()[during], -run.velocity(TIP)[during], 10.0)
     np.testing.assert_allclose(run.force()[during], expected, rtol=1e-13)
@@ -342,6 +342,22 @@ def test_damaged_file_is_refused(run, tmp_path, damage):
     )
     with pytest.raises(ValueError, match=r"run.npz is not a saved run, or is damaged"):
         fb.load(path)
+
+
+def test_files_of_earlier_versions_are_read(run, tmp_path):
+    with np.load(run.save(tmp_path / "run.npz")) as data:
+        arrays = {key: data[key] for key in data.files}
+    arrays["contact_floored"] = arrays.pop("contact_entry_rate_clipped")
+    np.savez(tmp_path / "run.npz", **arrays)
+    again = fb.load(tmp_path / "run.npz")
+    assert np.array_equal(again.contacts.entry_rate_clipped, run.contacts.entry_rate_clipped)
+
+
+def test_old_names_work_and_name_the_new(run):
+    with pytest.warns(DeprecationWarning, match="entry_rate_clipped"):
+        assert run.contacts.floored is run.contacts.entry_rate_clipped
+    with pytest.warns(DeprecationWarning, match="contact_rows"):
+        assert run.model.touches is run.model.contact_rows
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from scipy.special import ellipj, ellipk
 from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, law
 from solvers import Contact, DormandPrince, Exponential, HenonRK2, OrbitError, System, integrate, orbit
 from solvers.orbits import delayed
-from solvers.orbits.open_times import latches, quiet_intervals
+from solvers.orbits.open_times import latches, open_intervals
 from solvers.problem import ContactLog
 
 OMEGA, ZETA, PHI, GAMMA = (
@@ -383,7 +383,7 @@ def test_a_law_that_latches_is_known_whatever_its_floor(stop, latched):
 
 @pytest.mark.parametrize("seed", [170, 229])
 def test_an_orbit_whose_contacts_lie_elsewhere_than_the_start_says_is_an_orbit_for_ever(seed):
-    """From rest no stop is closed at t = 0, on the orbit one with memory is."""
+    """From rest no stop is closed at t = 0, on the orbit one whose law latches the entry rate is."""
     make, (low, _), modes = random_family(np.random.default_rng(seed))
     system, period = make(low)
     found = orbit(system, period, np.zeros(2 * modes))
@@ -397,4 +397,4 @@ def test_quiet_times_leave_out_what_goes_on_in_the_next_period():
     system = System.modal([1.0], [0.1], [Contact([1.0], HYSTERETIC)])
     rows = np.zeros((2, 10))
     rows[:, 1:3] = [(2.0, 3.0), (8.0, 11.0)]
-    assert quiet_intervals(system, ContactLog.of_rows(rows), 10.0) == [(1.0, 2.0), (3.0, 8.0)]
+    assert open_intervals(system, ContactLog.of_rows(rows), 10.0) == [(1.0, 2.0), (3.0, 8.0)]

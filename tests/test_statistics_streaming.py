@@ -15,7 +15,7 @@ from fembeam.statistics.scales import KURTOSIS, LEVEL, LINEAR, SKEWNESS
 from fembeam.statistics.streaming import up_crossings
 from fembeam.study import segments as stretches
 from fembeam.study import stationary
-from fembeam.study.segments import memory
+from fembeam.study.segments import correlation_time
 
 
 def coloured(seed, n=40_000):
@@ -416,15 +416,15 @@ def test_a_transient_that_lasts_is_warned_of():
 
 def test_memory_is_the_slowest_decay():
     model = cantilever(2, base=fb.BandNoise(1e-4, (0.0, 600.0)))
-    assert memory(model) == pytest.approx(1.0 / (0.05 * model.omega[0]))
+    assert correlation_time(model) == pytest.approx(1.0 / (0.05 * model.omega[0]))
 
 
 def test_memory_of_many_modes():
     """A decay of 0.5 1/s beside frequencies of 1e5 rad/s and their squares."""
     model = cantilever(20, damping=0.005, base=fb.BandNoise(1e-4, (0.0, 600.0)))
-    assert memory(model) == pytest.approx(1.0 / (0.005 * model.omega[0]), rel=1e-9)
+    assert correlation_time(model) == pytest.approx(1.0 / (0.005 * model.omega[0]), rel=1e-9)
     light = cantilever(12, damping=1e-7, base=fb.BandNoise(1e-4, (0.0, 600.0)))
-    assert memory(light) == pytest.approx(1e7 / light.omega[0], rel=1e-3)
+    assert correlation_time(light) == pytest.approx(1e7 / light.omega[0], rel=1e-3)
 
 
 @pytest.mark.parametrize(

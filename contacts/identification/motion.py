@@ -20,7 +20,7 @@ _ROUGHER = 2
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """The motion as a law sees it, and how it depends on numbers of known covariance.
+    """Indentation and rate as arguments of a law, and their derivatives by numbers of known covariance.
 
     Attributes
     ----------

@@ -24,7 +24,7 @@ ERROR_CONSTANT = 1 / 1440  # relative error of omega of a cubic Hermite mesh: (b
 WAVE_STEP = (0.65 * FREQUENCY_TOLERANCE / ERROR_CONSTANT) ** 0.25  # beta h = 0.175, a third below the promise
 SAME_PLACE = 1e-9  # of the length: features closer than this share a node
 SHORTEST = 1e-4  # of the length: rounding of K grows like (length/h)³, 2e-4 of the first omega² here
-INSIDE = np.array([1e-9, 0.5, 1 - 1e-9])  # where a tapered interval is looked at
+INSIDE = np.array([1e-9, 0.5, 1 - 1e-9])  # where a tapered interval is sampled
 
 
 def on_beam(z: Vector, beam: Beam, where: str) -> Vector:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 PERIODS = 20.0  # of the lowest mode that the trial lasts
 MOST_PERIODS = 3000.0  # of the highest mode that it may take
 NOMINAL_SPEED = 0.1  # m/s, where the trial tells none
-MOST_MODES = 40  # looked at when asking how many a contact excites
+MOST_MODES = 40  # considered when counting those a contact excites
 
 
 @dataclass(frozen=True)
@@ -54,12 +54,12 @@ class Check:
     touched: list[Touched]
     steps: dict[str, float]
     modes: dict[str, int]
-    memory: float
+    correlation_time: float
     warnings: list[str]
 
     def __str__(self) -> str:
         lines = [mode_table(self.model)]
-        lines.append(f"\nmemory of the structure 1/min(ζω): {self.memory:.3g} s")
+        lines.append(f"\ncorrelation time of the structure 1/min(ζω): {self.correlation_time:.3g} s")
         for one in self.touched:
             seen = f"{one.contacts} contacts in a short trial" if one.contacts else "no contact in a trial"
             lines.append(
@@ -74,7 +74,8 @@ class Check:
         """For JSON."""
         return {
             "modes": mode_rows(self.model),
-            "memory": self.memory,
+            "correlation_time": self.correlation_time,
+            "memory": self.correlation_time,  # its old name, for one release
             "stops": [asdict(one) for one in self.touched],
             "suggested_modes": self.modes,
             "suggested_steps": self.steps,
@@ -98,7 +99,7 @@ def check(file: SceneFile, model: Model) -> Check:
         steps["output step dt to see the force, 20 in a contact"] = shortest / 20
     steps |= _limits(model)
     found = [*doubts(file, model), *_of_trial(model, touched)]
-    return Check(model, touched, steps, _suggested_modes(file, shortest), _memory(model), found)
+    return Check(model, touched, steps, _suggested_modes(file, shortest), _correlation_time(model), found)
 
 
 def _fastest(model: Model) -> float:
@@ -196,11 +197,11 @@ def _limits(model: Model) -> dict[str, float]:
     return found
 
 
-def _memory(model: Model) -> float:
+def _correlation_time(model: Model) -> float:
     """Time constant of the slowest decay, s; infinite without damping."""
-    from fembeam.study.segments import memory
+    from fembeam.study.segments import correlation_time
 
     try:
-        return memory(model)
+        return correlation_time(model)
     except ValueError:
         return math.inf

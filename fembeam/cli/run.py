@@ -1,7 +1,7 @@
 """The command `fembeam run`: every study of a scene file into a result folder, one after the other.
 
-A study that fails does not keep the others from being done; a signal does. What is computed is written before it is
-printed, and the record of the folder says what is finished, so that `--resume` goes on from there.
+If a study fails the others still run; a signal ends them all. Results are written before they are printed, and the
+folder's record says which studies are finished, so that `--resume` continues there.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def run(job: Job) -> int:
 
     Raises
     ------
-    ValueError : no study in the file, or dear results in the folder that would be lost.
+    ValueError : no study in the file, or a checkpoint in the folder that would be overwritten.
     """
     studies = sorted(job.file.studies, key="simulate".__ne__)  # the cheapest one first
     if not studies:
@@ -73,11 +73,11 @@ def run(job: Job) -> int:
 
 
 def _refuse_to_lose(job: Job, studies: list[str]) -> None:
-    """Checkpoints hold hours of work: they are gone on with, or removed by their owner."""
+    """Refuse to overwrite checkpoints, which hold hours of work."""
     for name in studies:
         path = job.folder / f"{name}.npz"
         if hasattr(job.file.studies[name], "write") and path.exists():
-            raise ValueError(f"{path} holds results of [{name}]: add --resume to go on with them, delete it to begin "
+            raise ValueError(f"{path} holds results of [{name}]: add --resume to continue, delete it to begin "
                              "anew, or choose another folder")  # fmt: skip
 
 
@@ -219,7 +219,7 @@ def _simulated(file: SceneFile, model: Model, progress: bool) -> tuple[Run, int]
 
 
 def reduced(file: SceneFile, **arguments: Any) -> Model:
-    """The reduced model; what is wrong is said with the file."""
+    """The reduced model; errors name the file."""
     try:
         return file.scene.reduce(**arguments)
     except (ValueError, TypeError, RuntimeError) as error:  # RuntimeError: modes that cannot be computed

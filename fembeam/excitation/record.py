@@ -33,7 +33,7 @@ from fembeam.support import number
 Quantity = Literal["displacement", "acceleration", "force"]
 Interpolation = Literal["spectral", "linear"]
 EDGE = 0.25  # the band fades out over this part of lo below it and of hi above it
-MOVING = 0.3  # y''(0) above this part of the rms of y'' is told
+MOVING = 0.3  # y''(0) above this part of the rms of y'' is warned of
 
 
 class _Known(str):

@@ -1,4 +1,4 @@
-"""Orbits of a model along one scalar of its scene; saved whole, and gone on with from a file."""
+"""Orbits of a model along one scalar of its scene; saved to a file and continued from it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ import solvers
 from fembeam.model.orbit import Orbit, checked_period, load_period, orbit
 from fembeam.scene import changes_structure, path_of, replaced, value_of
 from fembeam.support import require, written_whole
-from solvers.branches import restored
+from solvers.branches import restarted
 
 if TYPE_CHECKING:
     from fembeam.model.model import Model
@@ -27,7 +27,7 @@ Vector = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """A model whose scene has one number varied: parameter -> (system, period), as `solvers.branch` wants it."""
+    """A model whose scene has one number varied: parameter -> (system, period), the form `solvers.branch` takes."""
 
     model: Model
     name: str
@@ -77,7 +77,7 @@ class Branch:
         return (self._orbit(one) for one in self.found)
 
     def run(self, progress: bool = False) -> Branch:
-        """Compute all of it; after Ctrl-C what was found is kept, and another call goes on."""
+        """Compute all of it; after Ctrl-C the orbits found are kept, and another call continues."""
         from tqdm import tqdm
 
         with tqdm(self.found, unit=" orbits", disable=None if progress else True) as bar:
@@ -97,7 +97,7 @@ class Branch:
 
     @property
     def status(self) -> str:
-        """How each direction ended, in words."""
+        """How each direction ended, as sentences."""
         return "; ".join(status.value for status in self.found.status)
 
     @property
@@ -156,17 +156,17 @@ class Branch:
 
     def save(self, path: str | Path) -> None:
         """Write all that is known as .npz, enough to go on from; written whole or not at all."""
-        arms = []
-        for arm in self.found.arms:
-            arms.append([
+        walks = []
+        for walk in self.found.walks:
+            walks.append([
                 {"parameter": one.parameter, "state": one.state.tolist(), "phase": one.phase, "mark": one.mark,
                  "residual": one.residual, "iterations": one.iterations}
-                for one in arm.orbits
+                for one in walk.orbits
             ])  # fmt: skip
         record = {
             **{"name": self.family.name, "period": self.family.period, "scene": repr(self.family.model.scene)},
-            **{"modes": list(self.family.model.modes), "span": self.found.arms[0].span},
-            **{"step": self.found.arms[0].largest, "status": [s.name for s in self.found.status], "arms": arms},
+            **{"modes": list(self.family.model.modes), "span": self.found.walks[0].span},
+            **{"step": self.found.walks[0].largest, "status": [s.name for s in self.found.status], "arms": walks},
         }
         with written_whole(Path(path)) as file:
             np.savez_compressed(file, branch=np.array(json.dumps(record)))
@@ -194,7 +194,7 @@ def follow(
 
 
 def resumed(model: Model, path: str | Path) -> Branch:
-    """A saved branch of this model, ready to be gone on with."""
+    """A saved branch of this model, to be continued."""
     with np.load(path, allow_pickle=False) as file:
         require(
             "branch" in file, f"{path} holds no branch", sorted(file), "Model.resume", "give what Branch.save wrote"
@@ -204,4 +204,4 @@ def resumed(model: Model, path: str | Path) -> Branch:
     require(same, f"{path} belongs to another scene or other modes", record["modes"], "Model.resume",
             f"use the model of {record['scene']}")  # fmt: skip
     family = Family(model, record["name"], record["period"])
-    return Branch(family, restored(family, tuple(record["span"]), record["arms"], record["status"], record["step"]))
+    return Branch(family, restarted(family, tuple(record["span"]), record["arms"], record["status"], record["step"]))

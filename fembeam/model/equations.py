@@ -6,7 +6,6 @@ q_i'' + 2 ζ_i ω_i q_i' + ω_i² q_i = -Γ_i (ÿ + g) + Σ φ_i(z_f) f + Σ_s w
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -16,8 +15,8 @@ from numpy.typing import ArrayLike
 import reduction
 import solvers
 from fembeam.model.shapes import Shapes, Vector
-from fembeam.scene import loads, touches, weight
-from fembeam.scene.contact_rows import Touch
+from fembeam.scene import contact_rows, loads, weight
+from fembeam.scene.contact_rows import ContactRow
 
 if TYPE_CHECKING:
     from fembeam.model.section_forces import SectionForces
@@ -26,9 +25,8 @@ if TYPE_CHECKING:
 SEEN = ("forces", "springs", "bodies", "impactors")  # parts of a scene besides stops that a system is made of
 
 
-@dataclass(frozen=True, eq=False)
 class ModalEquations:
-    """A scene on n coordinates, as matrices, contacts and loads; `Model` describes the attributes."""
+    """A scene on n coordinates, as matrices, contacts and loads: what follows from the fields of `Model`."""
 
     scene: Scene
     matrices: Matrices
@@ -36,8 +34,7 @@ class ModalEquations:
     modes: tuple[int, ...]
     shapes: Shapes
     counts: tuple[tuple[int, int], ...]
-    others: tuple[Shapes, ...] = ()
-    way: dict[str, Any] = field(default_factory=dict)
+    others: tuple[Shapes, ...]
 
     @property
     def omega(self) -> Vector:
@@ -106,14 +103,14 @@ class ModalEquations:
         return tuple(section_forces(self, body) for body in range(len(self.matrices.beams)))
 
     @cached_property
-    def touches(self) -> list[Touch]:
+    def contact_rows(self) -> list[ContactRow]:
         """The contacts in the order of the log: of each beam its stops, then its impactors."""
-        return touches(self.scene, self.matrices)
+        return contact_rows(self.scene, self.matrices)
 
     @cached_property
     def directions(self) -> Vector:
         """(m, n): w of every contact on the coordinates, δ = -w·q - gap."""
-        rows = [self.basis.project(touch.row.T)[:, 0] for touch in self.touches]
+        rows = [self.basis.project(one.row.T)[:, 0] for one in self.contact_rows]
         return np.array(rows).reshape(len(rows), len(self.omega))
 
     @cached_property
@@ -126,9 +123,9 @@ class ModalEquations:
         n = len(self.omega)
         C = np.diag(self._of_each_beam(lambda damping, omega, modes: damping.modal_coefficients(omega, modes), scene))
         C = C + self.basis.project_matrix(self.matrices.dashpots)
-        same = self.touches if scene is self.scene else touches(scene, self.matrices)
+        same = self.contact_rows if scene is self.scene else contact_rows(scene, self.matrices)
         pairs = zip(self.directions, same, strict=True)
-        contacts = [solvers.Contact(direction, touch.law, touch.gap) for direction, touch in pairs]
+        contacts = [solvers.Contact(direction, one.law, one.gap) for direction, one in pairs]
         rows = [(self.basis.project(row.T)[:, 0], signal) for row, signal in loads(scene, self.matrices)]
         return solvers.System(np.eye(n), C, np.diag(self.omega**2), contacts, [*rows, *self._frame_loads(scene)])
 

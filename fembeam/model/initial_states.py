@@ -86,12 +86,12 @@ def _on_nodes(beam: Matrices, field: Field) -> Vector:
 
 def _check_strikers(model: Model, q: Vector) -> None:
     """Raise ValueError when a field puts a free impactor inside the beam."""
-    for touch, direction in zip(model.touches, model.directions, strict=True):
-        kind, number = touch.on
+    for contact, direction in zip(model.contact_rows, model.directions, strict=True):
+        kind, number = contact.on
         if kind == "impactor" and model.matrices.impactors[number].stiffness == 0:
-            delta = float(-direction @ q - touch.gap)
-            scale = float(np.abs(direction) @ np.abs(q)) + touch.gap
-            require(delta <= 1e-9 * scale, f"impactor {number} (z = {touch.z} m) must start outside the beam: δ ≤ 0",
+            delta = float(-direction @ q - contact.gap)
+            scale = float(np.abs(direction) @ np.abs(q)) + contact.gap
+            require(delta <= 1e-9 * scale, f"impactor {number} (z = {contact.z} m) must start outside the beam: δ ≤ 0",
                     delta, "Model.state", "widen its gap")  # fmt: skip
 
 
@@ -116,8 +116,8 @@ def _settled(model: Model, load: Vector, free: NDArray[np.bool_]) -> Vector:
     τ doubles while it goes well; the damping carries a body that nothing holds yet to the contact that will.
     """
     K, f, W = model.omega[free] ** 2, load[free], model.directions[:, free]
-    gaps = np.array([touch.gap for touch in model.touches])
-    laws = [touch.law for touch in model.touches]
+    gaps = np.array([contact.gap for contact in model.contact_rows])
+    laws = [contact.law for contact in model.contact_rows]
     q = np.zeros(len(f))
     forces, slopes = _pushed(laws, -W @ q - gaps)
     residual = f + forces @ W - K * q

@@ -9,16 +9,18 @@ every impactor.
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+import reduction
 import solvers
 from fembeam.model.equations import ModalEquations
-from fembeam.model.shapes import Vector
+from fembeam.model.shapes import Shapes, Vector
 from fembeam.scene import with_signals
 from fembeam.support import require, require_positive
 
@@ -28,10 +30,11 @@ if TYPE_CHECKING:
     from fembeam.model.branch import Branch
     from fembeam.model.orbit import Attractor, Orbit
     from fembeam.model.run import Run
-    from fembeam.scene import Scene
+    from fembeam.scene import Matrices, Scene
+    from fembeam.scene.contact_rows import ContactRow
 
 Field = Callable[[Vector], Any] | None  # of displacement in m or velocity in m/s, over z (k,)
-UNDRIVEN = ("zeta", "participation", "moving_mass", "section_forces", "touches", "directions")  # whatever drives
+UNDRIVEN = ("zeta", "participation", "moving_mass", "section_forces", "contact_rows", "directions")  # whatever drives
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +54,21 @@ class Model(ModalEquations):
     way : arguments of `Scene.reduce` that make it again, with mode numbers instead of criteria.
     static_share : part of the static compliance that the model keeps at every stop, then at every force; 1 is all.
     """
+
+    scene: Scene
+    matrices: Matrices
+    basis: reduction.Basis
+    modes: tuple[int, ...]
+    shapes: Shapes
+    counts: tuple[tuple[int, int], ...]
+    others: tuple[Shapes, ...] = ()
+    way: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def touches(self) -> list[ContactRow]:
+        """Old name of `contact_rows`."""
+        warnings.warn("Model.touches is now Model.contact_rows", DeprecationWarning, stacklevel=2)
+        return self.contact_rows
 
     def again(self, scene: Scene) -> Model:
         """Another scene reduced in the same way: the same mode numbers, mesh size and kind of static shapes."""
@@ -255,7 +273,7 @@ class Model(ModalEquations):
         return follow(self, parameter, span, period, start, at, options)
 
     def resume(self, path: str | Path) -> Branch:
-        """A branch that `Branch.save` wrote, ready to be gone on with; refused if it belongs to another scene."""
+        """A branch written by `Branch.save`, to be continued; refused if it belongs to another scene."""
         from fembeam.model.branch import resumed
 
         return resumed(self, path)

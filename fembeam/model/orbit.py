@@ -219,7 +219,7 @@ class Attractor:
 
     @property
     def name(self) -> str:
-        """Period and number of impacts in words."""
+        """Period and number of impacts as text."""
         if self.orbit is None:
             return "not periodic"
         return f"period {self.period} with {counted(len(self.orbit.contacts), 'impact')}"

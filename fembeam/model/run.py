@@ -1,4 +1,4 @@
-"""What a simulation gives: histories at any place, forces, contact log, energy ledger; saved whole or not at all."""
+"""What a simulation gives: histories at any place, forces, contact log, energy balance; saved whole or not at all."""
 
 from __future__ import annotations
 
@@ -49,8 +49,8 @@ class Run:
     ----------
     t, q, q_dot : (k,) s, (k, n) and (k, n) modal coordinates and rates.
     contacts : log of contacts: stop, t_in, t_out, speed_in, speed_out, peak_indentation, peak_force, impulse,
-        energy_loss, floored (arrays).
-    energy : ledger at t: input, damping, contact, stored, residual in J; made when first looked at, by ``ledger``.
+        energy_loss, entry_rate_clipped (arrays).
+    energy : energy balance at t: input, damping, contact, stored, residual in J; made by ``ledger`` when first read.
     status : how it ended, a sentence.
     cost : steps, rejections, law_calls, events, seconds.
     """
@@ -79,7 +79,7 @@ class Run:
 
     @cached_property
     def energy(self) -> solvers.Energy:
-        """The energy ledger."""
+        """The energy balance."""
         return self.ledger()
 
     @property
@@ -94,7 +94,9 @@ class Run:
     @classmethod
     def of(cls, model: Model, solution: solvers.Solution) -> Run:
         """A model's solution with what it takes to read it."""
-        stops = np.array([(touch.z, touch.push, touch.gap) for touch in model.touches], dtype=float).reshape(-1, 3)
+        stops = np.array(
+            [(contact.z, contact.push, contact.gap) for contact in model.contact_rows], dtype=float
+        ).reshape(-1, 3)
         strikers = np.array([impactor.mass for impactor in model.matrices.impactors], dtype=float)
         status = solution.status.value
         if not solution.status.good:
@@ -279,7 +281,7 @@ class Run:
         if self.stored_forces is not None:
             return self.stored_forces
         assert self.model is not None
-        forces = [self._force_of(s, touch.law) for s, touch in enumerate(self.model.touches)]
+        forces = [self._force_of(s, contact.law) for s, contact in enumerate(self.model.contact_rows)]
         return np.array(forces).reshape(len(forces), len(self.t))
 
     def _force_of(self, stop: int, law: Any) -> Vector:

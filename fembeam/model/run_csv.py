@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 CONTACT_UNITS = {
     "stop": "", "t_in": "s", "t_out": "s", "speed_in": "m/s", "speed_out": "m/s", "peak_indentation": "m",
-    "peak_force": "N", "impulse": "N s", "energy_loss": "J", "floored": "",
+    "peak_force": "N", "impulse": "N s", "energy_loss": "J", "entry_rate_clipped": "",
 }  # fmt: skip
 DIGITS = "%.12g"
 

@@ -17,6 +17,8 @@ from fembeam.model.run import FORMAT, Run
 from fembeam.model.shapes import Shapes
 from fembeam.scene import Source
 
+OLD_NAMES = {"contact_floored": "contact_entry_rate_clipped"}  # in files of earlier versions
+
 
 def load(path: str | os.PathLike[str]) -> Run:
     """Read a run written by `Run.save`.
@@ -40,7 +42,7 @@ def load(path: str | os.PathLike[str]) -> Run:
     try:
         with np.load(path, allow_pickle=False) as data:
             about = json.loads(str(data["about"]))
-            arrays = {name: data[name] for name in data.files if name != "about"}
+            arrays = {OLD_NAMES.get(name, name): data[name] for name in data.files if name != "about"}
         if about["format"] != FORMAT:
             raise ValueError(f"it has format {about['format']}, this version reads {FORMAT}")
         return _of_arrays(about, arrays, Path(path))

@@ -60,7 +60,7 @@ def to_vtu(run: Run, path: str | os.PathLike[str], sample: int = -1) -> Path:
 
 
 def _geometry(run: Run) -> tuple[Vector, list[tuple[str, Any]]]:
-    """Points (p, 3) of all beams, then impactors; lines, of no length for impactors: XDMF wants one kind of cell."""
+    """Points (p, 3) of all beams, then impactors; lines, of zero length for impactors, as XDMF has one kind of cell."""
     require(run.model is not None, "the fields need the model of the run", "a run read from a file", "export",
             "simulate again, or use dataclasses.replace(run, model=model)")  # fmt: skip
     assert run.model is not None

@@ -1,4 +1,4 @@
-"""Whether the arrays of a saved run belong together; a file that was cut, edited or mixed up is refused in words.
+"""Consistency of the arrays of a saved run; a truncated or edited file is refused with the reason.
 
 k samples, n coordinates, m contacts, b nodes of a beam, c entries of the log:
 t (k,), q, q_dot (k, n), force (m, k), stops (m, 3), directions (m, n), strikers (i,), nodes (b,), shapes (2b, n),

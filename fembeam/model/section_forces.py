@@ -77,7 +77,7 @@ def section_forces(model: ModalEquations, body: int = 0) -> SectionForces:
     first = sum(before.M.shape[0] for before in model.matrices.beams[:body])
     mine = slice(first, first + beam.M.shape[0])
     vectors = model.basis.vectors[mine]
-    rows = sparse.vstack([touch.row for touch in model.touches] or [sparse.csr_matrix((0, len(model.basis.vectors)))])
+    rows = sparse.vstack([one.row for one in model.contact_rows] or [sparse.csr_matrix((0, len(model.basis.vectors)))])
     inertia = _inertia(beam, vectors, model.omega, rows.tocsc()[:, mine].toarray().T)
     return _of_vectors(beam, vectors, inertia)
 

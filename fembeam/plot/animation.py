@@ -111,9 +111,9 @@ class _Stage:
 
     def __init__(self, run: Run, samples: NDArray[np.int64], fps: float | None) -> None:
         assert run.model is not None
-        self.run, self.samples, self.touches = run, samples, run.model.touches
+        self.run, self.samples, self.contact_rows = run, samples, run.model.contact_rows
         self.beams, self.strikers = heights(run.model.scene)
-        self.forces = [run.force(i)[samples] for i in range(len(self.touches))]
+        self.forces = [run.force(i)[samples] for i in range(len(self.contact_rows))]
         self.largest = max([float(np.abs(force).max()) for force in self.forces], default=0.0)
         self.lines = self._displaced()
         step = float(np.median(np.diff(run.t[samples])))
@@ -141,7 +141,7 @@ class _Stage:
             self.beam_axis.plot([], [], "o", color=GREY, markersize=10, transform=self._beside(side, 6.0))[0]
             for side in self._sides()
         ]
-        self.arrows = self.beam_axis.quiver(*np.zeros((4, max(1, len(self.touches)))), color=RED, angles="xy",
+        self.arrows = self.beam_axis.quiver(*np.zeros((4, max(1, len(self.contact_rows)))), color=RED, angles="xy",
                                             scale_units="xy", scale=1, width=0.007, pivot="tip", zorder=5)  # fmt: skip
         self.title = self.beam_axis.set_title(" ")
         self._fixed(self.beam_axis)
@@ -158,15 +158,15 @@ class _Stage:
         return self.figure
 
     def _name(self, number: int) -> str:
-        """A contact in words."""
-        kind, which = self.touches[number].on
-        place = f"z = {1e3 * self.touches[number].z:.4g} mm"
+        """A contact as text."""
+        kind, which = self.contact_rows[number].on
+        place = f"z = {1e3 * self.contact_rows[number].z:.4g} mm"
         return f"{ {'frame': 'stop', 'body': 'beams', 'impactor': f'impactor {which}'}[kind] }, {place}"
 
     def _limits(self, axis: Axes) -> float:
         """Set the view, on the beams: an impactor may leave it; returns its height in mm."""
         rows = [line for _, line in self.lines] + [np.array(self.strikers)] * bool(self.strikers)
-        stops = [-touch.push * touch.gap for touch in self.touches if touch.on[0] == "frame"]
+        stops = [-contact.push * contact.gap for contact in self.contact_rows if contact.on[0] == "frame"]
         low = 1e3 * min(*(float(row.min()) for row in rows), *stops, 0.0)
         high = 1e3 * max(*(float(row.max()) for row in rows), *stops, 0.0)
         spread = max(high - low, 1e-9)
@@ -180,9 +180,9 @@ class _Stage:
     def _sides(self) -> list[float]:
         """For every impactor +1 when it sits over its beam, -1 under it, 0 when it embraces it."""
         pushes: list[list[float]] = [[] for _ in self.strikers]
-        for touch in self.touches:
-            if touch.on[0] == "impactor":
-                pushes[touch.on[1]].append(-touch.push)
+        for contact in self.contact_rows:
+            if contact.on[0] == "impactor":
+                pushes[contact.on[1]].append(-contact.push)
         return [sum(each) for each in pushes]
 
     def _beside(self, side: float, points: float) -> Any:
@@ -202,11 +202,11 @@ class _Stage:
         for body, height in zip((scene, *scene.bodies), self.beams, strict=True):
             for support in body.supports:
                 axis.plot(1e3 * support.z, 1e3 * height, "s", color="black", markersize=7, clip_on=False)
-        for touch in self.touches:
-            if touch.on[0] == "frame":
-                at = 1e3 * (self.beams[touch.body] - touch.push * touch.gap)
-                axis.plot(1e3 * touch.z, at, marker="^" if touch.push > 0 else "v", color="black", markersize=9,
-                          transform=self._beside(-touch.push, 6.0), clip_on=False, zorder=1)  # fmt: skip
+        for contact in self.contact_rows:
+            if contact.on[0] == "frame":
+                at = 1e3 * (self.beams[contact.body] - contact.push * contact.gap)
+                axis.plot(1e3 * contact.z, at, marker="^" if contact.push > 0 else "v", color="black", markersize=9,
+                          transform=self._beside(-contact.push, 6.0), clip_on=False, zorder=1)  # fmt: skip
 
     def show(self, number: int) -> list[Artist]:
         """Move everything to one frame."""
@@ -224,14 +224,14 @@ class _Stage:
 
     def _point(self, number: int) -> None:
         """An arrow for every contact force, ending at its place on the beam."""
-        if not self.touches:
+        if not self.contact_rows:
             return
         ends, lengths = [], []
-        for touch, force in zip(self.touches, self.forces, strict=True):
-            along, line = self.lines[touch.body]
-            ends.append((1e3 * touch.z, 1e3 * float(np.interp(touch.z, along, line[number]))))
+        for contact, force in zip(self.contact_rows, self.forces, strict=True):
+            along, line = self.lines[contact.body]
+            ends.append((1e3 * contact.z, 1e3 * float(np.interp(contact.z, along, line[number]))))
             share = float(force[number]) / self.largest if self.largest > 0 else 0.0
-            lengths.append(touch.push * share * STAY * self.span if share else np.nan)
+            lengths.append(contact.push * share * STAY * self.span if share else np.nan)
         at: Any = np.array(ends)
         self.arrows.set_offsets(at)
         self.arrows.set_UVC(np.zeros(len(lengths)), np.array(lengths))

@@ -74,7 +74,7 @@ def _draw(ax: Axes, points: Sequence[Point], name: str, colour: object, marker: 
 
 
 def _known(value: float, floor: float) -> float:
-    """What can be told from the reference, and has a logarithm."""
+    """Points whose error exceeds the reference's and is positive."""
     return max(value, floor, _SMALLEST)
 
 

@@ -191,13 +191,13 @@ def _contacts(run: Run, discard: float) -> list[dict[str, Any]]:
             for name, values in columns.items():
                 row[name] = {"mean": float(values[kept].mean()), "max": float(values[kept].max())}
             row["energy_loss"] = float(log.energy_loss[kept].sum())
-            row["floored"] = int(log.floored[kept].sum())
+            row["entry_rate_clipped"] = int(log.entry_rate_clipped[kept].sum())
         rows.append(row)
     return rows
 
 
 def _energy(run: Run) -> dict[str, float]:
-    """The ledger at the end, J, and its residual relative to what went in."""
+    """The energy balance at the end, J, and its residual relative to what went in."""
     if not len(run.t):
         return {}
     ledger = run.energy

@@ -1,4 +1,4 @@
-"""What a result folder knows of itself: which studies are done, of which scene, in which files.
+"""The record of a result folder: which studies are done, of which scene, in which files.
 
 The record is rewritten whole after every study. With it a run can go on, and a report shows one scene's results only.
 """

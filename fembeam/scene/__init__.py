@@ -5,7 +5,7 @@ Imports: `beams`, `excitation`, `support`, `reduction`; `Scene.reduce` opens the
 """
 
 from fembeam.scene.assembly import Matrices, unsupported
-from fembeam.scene.contact_rows import heights, loaded, loads, touches, watched, weight
+from fembeam.scene.contact_rows import contact_rows, heights, loaded, loads, watched, weight
 from fembeam.scene.impactor import Impactor
 from fembeam.scene.parameters import changes_structure, path_of, replaced, value_of, with_value
 from fembeam.scene.parts import Clamped, Dashpot, Guided, LumpedMass, Pinned, PointForce, PointMoment, Spring, Stop
@@ -32,11 +32,11 @@ __all__ = [
     "changes_structure",
     "heights",
     "loaded",
+    "contact_rows",
     "loads",
     "path_of",
     "replaced",
     "signals_of",
-    "touches",
     "unsupported",
     "value_of",
     "watched",

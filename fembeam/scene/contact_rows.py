@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Touch:
+class ContactRow:
     """One contact of a scene.
 
     Attributes
@@ -40,12 +40,12 @@ class Touch:
     on: tuple[str, int]
 
 
-def touches(scene: Scene, matrices: Matrices) -> list[Touch]:
+def contact_rows(scene: Scene, matrices: Matrices) -> list[ContactRow]:
     """All contacts in the order of the log: for each beam its stops, then its impactors."""
-    return list(_touches(scene, matrices))
+    return list(_contact_rows(scene, matrices))
 
 
-def _touches(scene: Scene, matrices: Matrices) -> Iterator[Touch]:
+def _contact_rows(scene: Scene, matrices: Matrices) -> Iterator[ContactRow]:
     """The same, one by one."""
     count = 0
     for body, part in enumerate((scene, *scene.bodies)):
@@ -55,11 +55,11 @@ def _touches(scene: Scene, matrices: Matrices) -> Iterator[Touch]:
             if stop.on is not None:
                 on = ("body", stop.on[0])
                 row = row - stop.push * matrices.interpolation(stop.on[1], body=stop.on[0])
-            yield Touch(row, stop.law, stop.gap, stop.push, body, stop.z, on)
+            yield ContactRow(row, stop.law, stop.gap, stop.push, body, stop.z, on)
         for impactor in part.impactors:
             row = matrices.interpolation(impactor.z, body=body) - matrices.striker(count)
             for push in impactor.pushes:
-                yield Touch(push * row, impactor.law, impactor.gap, push, body, impactor.z, ("impactor", count))
+                yield ContactRow(push * row, impactor.law, impactor.gap, push, body, impactor.z, ("impactor", count))
             count += 1
 
 

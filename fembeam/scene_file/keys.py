@@ -74,7 +74,7 @@ def entry_type(hint: Any) -> Any:
 
 
 def wanted(hint: Any) -> str:
-    """The annotated type in words."""
+    """The annotated type as text."""
     return " or ".join(dict.fromkeys(_words(hint)))
 
 

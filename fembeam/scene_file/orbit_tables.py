@@ -112,7 +112,7 @@ class BranchTable:
         _check_period(self.period, "[branch]")
 
     def run(self, model: Model, folder: Path, progress: bool = False) -> Branch:
-        """The branch; goes on where an interrupted one left ``branch.npz`` in the folder.
+        """The branch; continues where an interrupted one left ``branch.npz`` in the folder.
 
         Raises
         ------
@@ -134,8 +134,8 @@ class BranchTable:
         """A saved branch answers this table."""
         from fembeam.scene import path_of
 
-        arm = branch.found.arms[0]
-        theirs = branch.family.name, branch.family.period, *map(float, arm.span), arm.largest
+        walk = branch.found.walks[0]
+        theirs = branch.family.name, branch.family.period, *map(float, walk.span), walk.largest
         mine = path_of(model.scene, self.parameter), self.period, *map(float, self.span), self.step
         require(theirs == mine, f"{path} belongs to another branch", theirs, "[branch]",
                 f"parameter, period, span, step are {mine} here; choose another folder or delete it")  # fmt: skip

@@ -38,7 +38,7 @@ MOST_SEEDS = 100_000
 
 @dataclass(frozen=True)
 class ModeStudy:
-    """A study over numbers of modes and what is asked of it: arguments of its function, `seeds` being a count."""
+    """A study over numbers of modes and what is asked: arguments of its function, `seeds` being a count."""
 
     study: Callable[..., Any]
     arguments: dict[str, Any]

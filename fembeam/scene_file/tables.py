@@ -1,4 +1,4 @@
-"""Tables of a scene file as objects: keys checked against constructors, what these refuse said with the table."""
+"""Tables of a scene file as objects: keys checked against constructors; errors name the table."""
 
 from __future__ import annotations
 
@@ -139,7 +139,7 @@ class TableReader:
         return self.made(constructor, self.arguments(constructor, table, where, *also, chosen_by=chosen_by), where)
 
     def made(self, constructor: Callable[..., Any], arguments: Table, where: str) -> Any:
-        """Call a constructor; what it refuses is said with the table."""
+        """Call a constructor; its errors name the table."""
         try:
             return constructor(**arguments)
         except SceneFileError:

@@ -269,7 +269,7 @@ def singular_latch() -> Failure:
         *("entry rate / (m/s)", "dashpot at 10 μm / (N s/m)"),
         (speeds, np.array(peaks["naive"])),
         (speeds, np.array(peaks["ours"])),
-        ("a/entry_rate without bound", "floored, and the log says where"),
+        ("a/entry_rate without bound", "entry rate clipped, and the log says where"),
         *(peaks["naive"][0] / peaks["ours"][0], _disagreement(pressed, [1e-15], [-1e-6], 0.05)),
         scale="loglog",
     )

@@ -182,7 +182,7 @@ def cut(run: Run, begin: float, end: float) -> Run:
 
 
 def _ledger_of(run: Run, kept: slice) -> solvers.Energy:
-    """The energy ledger of some of a run's samples."""
+    """The energy balance of some of a run's samples."""
     columns = {f.name: getattr(run.energy, f.name) for f in fields(run.energy)}
     return replace(run.energy, **{name: column[kept] for name, column in columns.items() if np.ndim(column)})
 

@@ -185,7 +185,7 @@ def mode_count(
     residual : with static shapes of stops and forces (True), without (False), both (None, if there are any).
     reference : a count, or "full" for all modes of the finest count's mesh; None: the finest of the counts.
     start : function of a model that gives its initial state, such as ``lambda m: m.state(velocity=…)``; None: rest.
-    solver : one of `solvers`; None: `Exponential(1e-8)` without energy ledger.
+    solver : one of `solvers`; None: `Exponential(1e-8)` without energy balance.
     executor : any `concurrent.futures.Executor`; counts are spread over it.
 
     Returns

@@ -174,5 +174,5 @@ class _Search:
 
 
 def _words(choice: Choice) -> str:
-    """A choice of modes in words."""
+    """A choice of modes as text."""
     return f"{choice.modes} mode{'s' * (choice.modes > 1)}" + " with static shapes" * choice.residual

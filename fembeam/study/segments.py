@@ -1,4 +1,4 @@
-"""A long run cut into stretches: from where, how long, under which signals."""
+"""A long run cut into segments: from where, how long, under which signals."""
 
 from __future__ import annotations
 
@@ -18,19 +18,17 @@ from fembeam.study.realisations import child, noises, renewed, shifted
 
 Vector = NDArray[np.float64]
 
-LEAD_IN = 10.0  # memory times: what came before has fallen to e^-10
-STRETCH = 400.0  # memory times of a stretch under tones
-BATCHES = 8  # of such a stretch, so that one is 50 memory times; noise has one realisation to a batch
+LEAD_IN = 10.0  # correlation times: what came before has fallen to e^-10
+SEGMENT = 400.0  # correlation times of a segment under tones
+BATCHES = 8  # of such a segment, so that one is 50 correlation times; noise has one realisation to a batch
 REALISATIONS = 16  # of noise in a run, at least, unless they would be shorter than
-SHORTEST = 8.0  # memory times
-LONGEST = 100.0  # memory times, and eight segments of the spectrum: the lead-in costs at most 5 %
-RENEWAL = (
-    5.0  # memory times left out after noise was renewed: the state is stationary already, and e^-5 of it is foreign
-)
-MOST_SAMPLES = 2_000_000  # of a stretch
+SHORTEST = 8.0  # correlation times
+LONGEST = 100.0  # correlation times, and eight segments of the spectrum: the lead-in costs at most 5 %
+RENEWAL = 5.0  # correlation times left out after noise was renewed: e^-5 of the old noise is left
+MOST_SAMPLES = 2_000_000  # of a segment
 
 
-def memory(model: Model) -> float:
+def correlation_time(model: Model) -> float:
     """Time constant 1/min(ζω) of the slowest decay of the linear structure, s.
 
     The eigenvalues are those of the state (Ωr, r'), r undamped modal coordinates: its matrix holds frequencies, not
@@ -51,8 +49,8 @@ def memory(model: Model) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Stretch:
-    """One stretch: its run and what of it counts, from `begin` on."""
+class Segment:
+    """One segment: its run and what of it counts, from `begin` on."""
 
     run: Run
     begin: float
@@ -60,7 +58,7 @@ class Stretch:
 
 
 @dataclass
-class Stretches:
+class Segments:
     """Where the long run stands."""
 
     model: Model
@@ -68,12 +66,12 @@ class Stretches:
     dt: float
     state: Vector
     solver: Any
-    memory: float
-    repeats: bool  # more than one stretch is possible
+    correlation_time: float
+    repeats: bool  # more than one segment is possible
     random: bool
     first_lead: float
     longest: float
-    batches: int  # of a stretch
+    batches: int  # of a segment
     shortest: float  # s of a realisation
     index: int = 0
     dropped: int = 0
@@ -85,9 +83,9 @@ class Stretches:
     @classmethod
     def of(
         cls, model: Model, duration: float, dt: float, discard: float | None, start: Any, solver: Any, segment: int
-    ) -> Stretches:
+    ) -> Segments:
         """The plan for a model; a realisation holds two half-overlapping segments (samples) of the spectrum."""
-        forgets, found = memory(model), list(signals_of(model.scene).values())
+        forgets, found = correlation_time(model), list(signals_of(model.scene).values())
         repeats = all(isinstance(s, BandNoise) or hasattr(s, "tones") for s in found)
         random = bool(noises(model))
         longest = _longest(found, forgets, dt) if repeats else math.inf
@@ -98,8 +96,9 @@ class Stretches:
         least = LEAD_IN * forgets * (not repeats) + FEWEST_BATCHES * forgets
         if discard is None and duration < least:
             raise ValueError(
-                f"duration must be at least {least:.4g} s, {least / forgets:.0f} times the memory of the structure, to "
-                f"see whether the transient has died out, got {duration:g} s; simulate longer, or give discard="
+                f"duration must be at least {least:.4g} s, {least / forgets:.0f} correlation times of the "
+                f"structure, to see whether the transient has died out, got {duration:g} s; simulate longer, or give "
+                "discard="
             )
         short = max(0.0, FEWEST_BATCHES * forgets - longest)  # of what the transient is looked for in
         lead = LEAD_IN * forgets + short if discard is None else discard
@@ -107,20 +106,20 @@ class Stretches:
         batches = 1 if repeats and random else BATCHES
         return cls(model, duration, dt, state, solver, forgets, repeats, random, lead, longest, batches, shortest)
 
-    def pieces(self) -> Iterator[Stretch]:
-        """Stretch after stretch until the duration is reached."""
+    def pieces(self) -> Iterator[Segment]:
+        """Segment after segment until the duration is reached."""
         if not self.repeats:
             run = self._run(self.duration)
-            yield Stretch(run, self.first_lead, self._border(run))
+            yield Segment(run, self.first_lead, self._border(run))
             return
         while self.kept < self.duration - 0.5 * self.dt:
-            lead = self.first_lead if self.index == 0 else RENEWAL * self.memory * self.random
+            lead = self.first_lead if self.index == 0 else RENEWAL * self.correlation_time * self.random
             wanted = min(self.longest, self.duration - self.kept)
             run = self._run(math.ceil((lead + wanted) / self.dt - 1e-9) * self.dt)
-            yield Stretch(run, lead, self._border(run))
+            yield Segment(run, lead, self._border(run))
 
     def _run(self, duration: float) -> Run:
-        """One stretch from the state reached."""
+        """One segment from the state reached."""
         i = self.index + self.dropped
         model = renewed(self.model, lambda _, seed: child(seed, i)) if self.repeats else self.model
         scene = with_signals(model.scene, lambda signal: shifted(signal, self.time))
@@ -143,32 +142,32 @@ class Stretches:
                 return i
         return last
 
-    def drop(self, piece: Stretch) -> None:
-        """Leave the whole stretch to the transient."""
+    def drop(self, piece: Segment) -> None:
+        """Leave the whole segment to the transient."""
         self.dropped += 1
         self._go_on(piece)
         self.discarded += self.dt * piece.end
 
-    def keep(self, piece: Stretch, kept: float) -> None:
+    def keep(self, piece: Segment, kept: float) -> None:
         """Count what the statistics took."""
         self.index += 1
         self.kept += kept
         self._go_on(piece)
         self.discarded += self.dt * piece.end - kept
 
-    def _go_on(self, piece: Stretch) -> None:
-        """Continue from the border of a stretch."""
+    def _go_on(self, piece: Segment) -> None:
+        """Continue from the border of a segment."""
         self.state = np.concatenate((piece.run.q[piece.end], piece.run.q_dot[piece.end]))
         self.time += self.dt * piece.end
 
 
 def _longest(found: list[Any], forgets: float, dt: float) -> float:
-    """Seconds of a stretch at most, under signals that can be continued."""
+    """Seconds of a segment at most, under signals that can be continued."""
     asked = [s.period or math.inf for s in found if isinstance(s, BandNoise) and s.period_was_given]
-    longest = min(STRETCH * forgets, *(s - LEAD_IN * forgets for s in (MOST_SAMPLES * dt, *asked)))
+    longest = min(SEGMENT * forgets, *(s - LEAD_IN * forgets for s in (MOST_SAMPLES * dt, *asked)))
     if not longest > FEWEST_BATCHES * forgets:
         raise ValueError(
-            f"a stretch needs {(LEAD_IN + FEWEST_BATCHES) * forgets:.4g} s of its own noise and at most "
+            f"a segment needs {(LEAD_IN + FEWEST_BATCHES) * forgets:.4g} s of its own noise and at most "
             f"{MOST_SAMPLES} samples; lengthen the period of the noise, or dt = {dt:g} s"
         )
     return longest

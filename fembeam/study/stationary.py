@@ -1,13 +1,13 @@
 """A long run in constant memory: statistics of a stationary response with standard errors.
 
-The run is cut into stretches. Noise is renewed in each (an independent realisation from the state reached) and the
-lead-in, five times the memory 1/min(ζω) of the linear structure, is left out; sums of tones go on where they were, from
-the last sample in free flight, so that no contact is cut. The statistics need no more memory than one stretch.
+The run is cut into segments. The noise is renewed in each (an independent realisation from the state reached) and the
+lead-in, five correlation times 1/min(ζω) of the linear structure, is left out; sums of tones continue from the last
+sample in free flight, so that no contact is cut. The statistics need no more storage than one segment.
 
 A standard error tells how results scatter from one seed to another. Noise here is a sum of lines of fixed power, so
 that parts of one realisation say little about it: over a period of the noise the variance of a linear response is the
-same for every seed, while that of its parts scatters. Under noise a batch is therefore a whole stretch; under tones and
-records, which have one realisation only, a stretch holds eight.
+same for every seed, while that of its parts scatters. Under noise a batch is therefore a whole segment; under tones and
+records, which have one realisation only, a segment holds eight.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ from fembeam.statistics.impacts import Impacts
 from fembeam.statistics.initial_transient import Settling, settling
 from fembeam.statistics.spectra import FINEST_RESOLUTION
 from fembeam.statistics.streaming import Signal
-from fembeam.study.segments import Stretch, Stretches
+from fembeam.study.segments import Segment, Segments
 from fembeam.support import bar, number
 
 Vector = NDArray[np.float64]
 Watch = Callable[[Run], Any]
 
 FEWEST_BATCHES = 16  # before `until` is asked
-TRIES = 4  # stretches dropped while the transient lasts
+TRIES = 4  # segments dropped while the transient lasts
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +105,7 @@ def stationary(
         samples are counted too. None: δ of every stop (the tip when there is none) and mid-beam.
     until : stop when the relative standard error falls below it, in (0, 1).
     of : function of the `Response` giving the `Estimate`, or several, that `until` is about; None: every variance.
-    discard : s to leave out at the start; None: until the transient has died out, at least ten memory times.
+    discard : s to leave out at the start; None: until the transient has died out, at least ten correlation times.
     segment : samples of a Welch segment; None: 2 rad/s of resolution.
     bins, levels : name -> edges of the histogram, level of the crossings (0 unless given).
     start : (2n,) as for `Model.simulate`.
@@ -118,15 +118,15 @@ def stationary(
 
     Warns
     -----
-    UserWarning : the transient had not died out within the stretches that were dropped for it; or the run is too short
-        for two realisations of the noise, eight memory times and 1.5 segments of the spectrum each: no standard errors.
+    UserWarning : the transient had not died out within the segments dropped for it; or the run is too short for two
+        realisations of the noise, eight correlation times and 1.5 segments of the spectrum each: no standard errors.
 
     Notes
     -----
-    Standard errors are those between realisations of the noise: at least 16 in a run, of 8 to 100 memory times each;
-    fewer where the duration allows no more. Intervals of 95 % hold 93 to 97 % from two realisations on. Records and
-    other signals that cannot be continued are run as one stretch of eight batches, a sum of tones in batches of about
-    50 memory times. A response that switches between two regimes less often than that needs an `ensemble`.
+    Standard errors are those between realisations of the noise: at least 16 in a run, of 8 to 100 correlation times
+    each; fewer where the duration allows no more. Intervals of 95 % hold 93 to 97 % from two realisations on. Records
+    and other signals that cannot be continued are run as one segment of eight batches, a sum of tones in batches of
+    about 50 correlation times. A response that switches between two regimes less often than that needs an `ensemble`.
 
     Examples
     --------
@@ -140,7 +140,7 @@ def stationary(
     check(model, duration, dt, until, discard)
     segment = segment or default_segment(dt)
     solver = solver or solvers.Exponential(1e-8, ledger=False)
-    plan = Stretches.of(model, duration, dt, discard, start, solver, segment)
+    plan = Segments.of(model, duration, dt, discard, start, solver, segment)
     watched = dict(watch) if watch else watched_by_default(model)
     sums = _Sums(watched, dt, segment, dict(bins or {}), dict(levels or {}), len(model.scene.stops))
     settled, enough = None, None if until is None else False
@@ -223,9 +223,9 @@ def displacement(run: Run, z: float) -> tuple[Vector, Vector]:
     return run.displacement(z), run.velocity(z)
 
 
-def _settled(signals: list[Vector], piece: Stretch, plan: Stretches) -> Settling:
+def _settled(signals: list[Vector], piece: Segment, plan: Segments) -> Settling:
     """End of the transient of the slowest signal."""
-    found = [settling(x[: piece.end + 1], plan.dt, plan.memory) for x in signals]
+    found = [settling(x[: piece.end + 1], plan.dt, plan.correlation_time) for x in signals]
     return Settling(max(f.time for f in found), max(f.drift for f in found), all(f.died_out for f in found))
 
 
@@ -258,8 +258,8 @@ class _Sums:
                     )
         self.impacts = [Impacts() for _ in range(self.stops)]
 
-    def add(self, piece: Stretch, seen: Mapping[str, tuple[Vector, Vector | None]], batches: int) -> float:
-        """Take in a stretch, batch by batch; returns its seconds."""
+    def add(self, piece: Segment, seen: Mapping[str, tuple[Vector, Vector | None]], batches: int) -> float:
+        """Take in a segment, batch by batch; returns its seconds."""
         first = math.ceil(piece.begin / self.dt - 1e-9)
         borders = np.linspace(first, piece.end, batches + 1).round().astype(int)
         for name, (x, rate) in seen.items():
@@ -280,7 +280,7 @@ class _Sums:
         edges = None if bins is None else np.asarray(bins, dtype=np.float64)
         return Signal(x, self.dt, segment, self.levels.get(name, 0.0), edges)
 
-    def response(self, plan: Stretches, settled: Settling | None, enough: bool | None) -> Response:
+    def response(self, plan: Segments, settled: Settling | None, enough: bool | None) -> Response:
         """The statistics so far."""
         return Response(self.signals, self.impacts, plan.kept, plan.discarded, settled, enough, plan.seconds)
 

@@ -6,6 +6,6 @@ begins of shots, `subharmonic_end` ends a branch on that of half the period, `re
 `orbits` and the rooms below it. Begin with `continuation.branch`.
 """
 
-from solvers.branches.restart import restored
+from solvers.branches.restart import restarted
 
-__all__ = ["restored"]
+__all__ = ["restarted"]

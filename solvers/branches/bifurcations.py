@@ -10,8 +10,8 @@ A special point is a sign change of its test function along the arclength. With 
     floor            a contact's entry rate less its law's floor, below which the law does not see it
 
 All but the grazings are continuous along the branch, so that Brent's method finds their zeros in a few orbits. A
-multiplier that jumps over the unit circle at a grazing or a floor has no flip of its own: only the kink is reported.
-Kinks that stop Newton's method are met before, by `nonsmooth`.
+multiplier that jumps over the unit circle at a grazing or a floor is reported as that, not as a flip too. Points where
+Newton's method fails because the return map is not smooth are located before, by `nonsmooth`.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from solvers.branches.point import Point, corrected, cubic, is_straight, tangent_of
-from solvers.orbits import Chain, Orbit, OrbitError, orbit_of, with_memory
+from solvers.orbits import Chain, Orbit, OrbitError, latching_stops, orbit_of
 from solvers.problem import Array
 
 ROUNDING = 1e-9  # of the test functions: what is at a special point all along is marked nowhere
@@ -33,7 +33,7 @@ _SHARP = 1e-10  # of the parameter, or of the way between the points: how sharpl
 _AT = 1e-4  # distance from the unit circle of the multiplier at what passes for a special point
 _MOST_TRIALS = 25
 _SAME = 1e-6  # relative difference of states that are the same
-_MOST_TOUCHES = 60  # more than halving alone takes: with rounding left in an indentation, no secant is of use
+_MOST_TRIALS_OF_GRAZING = 60  # more than halving alone takes: with rounding left in an indentation, no secant is of use
 _NUDGES = 0.0, 1e-7, -1e-7, 1e-6, -1e-6  # of the way: at some guesses rounding keeps the residual over its tolerance
 _MOST_GRAZINGS = 4  # looked for between two points
 
@@ -78,17 +78,17 @@ def _is_at(orbit: Orbit, name: str) -> bool:
 
 
 @dataclass(eq=False)
-class Stretch:
-    """The way between two neighbouring points of a branch; every orbit found on it makes the next guess better.
+class Segment:
+    """The part of a branch between two neighbouring points; every orbit found on it improves the next guess.
 
-    What the cubic c(s) through both with their tangents lacks of the branch is s² (way - s)² times a smooth function.
+    Branch minus the cubic through both points and tangents is s² (way - s)² times a smooth function, interpolated here.
     """
 
     a: Point
     b: Point
     way: float
     straight: bool = field(init=False)
-    known: list[tuple[float, Array]] = field(default_factory=list)  # (arclength, what the cubic lacks of the branch)
+    known: list[tuple[float, Array]] = field(default_factory=list)  # (arclength, the smooth function there)
     trials: dict[float, tuple[Chain, Orbit]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -143,96 +143,96 @@ def between(a: Point, b: Point, way: float, before: tuple[Point, float] | None =
 
     ``before`` is the point before a and the way from it: the three together may tell of two special points on the way.
     """
-    stretch = Stretch(a, b, way)
-    found = list(_kinks(stretch))
-    places = [0.0, *sorted(place for place, _ in found or _dips(stretch, before)), way]
+    segment = Segment(a, b, way)
+    found = list(_nonsmooth_points(segment))
+    places = [0.0, *sorted(place for place, _ in found or _dips(segment, before)), way]
     for begin, end in pairwise(places):
-        found += _roots(stretch, begin, end)
+        found += _roots(segment, begin, end)
     return [orbit for _, orbit in sorted(found, key=lambda pair: pair[0])]
 
 
-def _roots(stretch: Stretch, begin: float, end: float) -> Iterator[tuple[float, Orbit]]:
+def _roots(segment: Segment, begin: float, end: float) -> Iterator[tuple[float, Orbit]]:
     """(arclength, orbit) of all zeros of test functions that the signs at both ends tell of."""
-    before, after = stretch.indicators(begin), stretch.indicators(end)
+    before, after = segment.indicators(begin), segment.indicators(end)
     names = [name for name in before if before[name] * after[name] < 0.0]
     names = [name for name in names if min(abs(before[name]), abs(after[name])) > ROUNDING]
     if "fold" in names and "branch point" in names:
         names.remove("branch point")
     for name in names:
-        pair = _root(stretch, begin, end, name)
+        pair = _root(segment, begin, end, name)
         if pair is not None:
             yield pair
 
 
-def _dips(stretch: Stretch, before: tuple[Point, float] | None) -> Iterator[tuple[float, Orbit]]:
-    """(arclength, orbit) where a test function of one sign at both ends has the other, by a parabola through three."""
+def _dips(segment: Segment, before: tuple[Point, float] | None) -> Iterator[tuple[float, Orbit]]:
+    """(arclength, orbit) where a test function changes its sign twice on the way, by a parabola through three."""
     if before is None:
         return
-    first, begin, end = (indicators_at(point) for point in (before[0], stretch.a, stretch.b))
+    first, begin, end = (indicators_at(point) for point in (before[0], segment.a, segment.b))
     for name in ("flip", "neimark-sacker"):
         f = begin[name]
-        back, ahead = (f - first[name]) / before[1], (end[name] - f) / stretch.way  # slopes on both sides
-        bend = (ahead - back) / (before[1] + stretch.way)
-        slope = ahead - bend * stretch.way
+        back, ahead = (f - first[name]) / before[1], (end[name] - f) / segment.way  # slopes on both sides
+        bend = (ahead - back) / (before[1] + segment.way)
+        slope = ahead - bend * segment.way
         place = -0.5 * slope / bend if bend else 0.0
-        if f * end[name] > 0.0 > f * (f + 0.5 * slope * place) and 0.0 < place < stretch.way:
+        if f * end[name] > 0.0 > f * (f + 0.5 * slope * place) and 0.0 < place < segment.way:
             try:
-                yield place, stretch.at(place)[1]
+                yield place, segment.at(place)[1]
             except OrbitError:
                 continue
 
 
-def _root(stretch: Stretch, begin: float, end: float, name: str) -> tuple[float, Orbit] | None:
+def _root(segment: Segment, begin: float, end: float, name: str) -> tuple[float, Orbit] | None:
     """(arclength, orbit) where a test function is zero; None where it only jumps."""
-    pair = _zero(stretch, begin, end, lambda s: stretch.indicators(s)[name])
+    pair = _zero(segment, begin, end, lambda s: segment.indicators(s)[name])
     return (pair[0], replace(pair[1], mark=name)) if pair is not None and _is_at(pair[1], name) else None
 
 
-def _zero(stretch: Stretch, begin: float, end: float, value: Callable[[float], float]) -> tuple[float, Orbit] | None:
+def _zero(segment: Segment, begin: float, end: float, value: Callable[[float], float]) -> tuple[float, Orbit] | None:
     """(arclength, orbit) where a function of the arclength changes its sign; None where no orbit is found."""
     from scipy.optimize import brentq
 
     found: dict[float, tuple[float, Orbit]] = {}
 
     def nearby(s: float) -> float:
-        found[s] = stretch.near(s, end - begin)
+        found[s] = segment.near(s, end - begin)
         return value(found[s][0])
 
     try:
         place, _ = brentq(
             *(nearby, begin, end),
-            **{"xtol": stretch.sharpness(), "maxiter": _MOST_TRIALS, "full_output": True, "disp": False},
+            **{"xtol": segment.sharpness(), "maxiter": _MOST_TRIALS, "full_output": True, "disp": False},
         )
         return found[place]
     except (OrbitError, np.linalg.LinAlgError, IndexError, KeyError):
         return None
 
 
-def _kinks(stretch: Stretch) -> Iterator[tuple[float, Orbit]]:
+def _nonsmooth_points(segment: Segment) -> Iterator[tuple[float, Orbit]]:
     """(arclength, orbit) where the number of contacts changes, and where an entry rate passes its law's floor."""
-    begin, first = 0.0, stretch.a.orbit
+    begin, first = 0.0, segment.a.orbit
     for _ in range(_MOST_GRAZINGS):
-        if len(first.contacts) == len(stretch.b.orbit.contacts):
+        if len(first.contacts) == len(segment.b.orbit.contacts):
             break
-        found = _grazing(stretch, begin, first)
+        found = _grazing(segment, begin, first)
         if found is None:
             return
-        near, place, touched, behind, last = found
-        yield from _floors(stretch, begin, near)
-        yield place, touched
+        near, place, grazed, behind, last = found
+        yield from _floors(segment, begin, near)
+        yield place, grazed
         begin, first = behind, last
-    yield from _floors(stretch, begin, stretch.way)
+    yield from _floors(segment, begin, segment.way)
 
 
-def _floors(stretch: Stretch, begin: float, end: float) -> Iterator[tuple[float, Orbit]]:
+def _floors(segment: Segment, begin: float, end: float) -> Iterator[tuple[float, Orbit]]:
     """(arclength, orbit) where an entry rate passes its law's floor, between two places of as many contacts."""
-    first, last = (_over_floor(stretch.orbit(s)) for s in (begin, end))
+    first, last = (_over_floor(segment.orbit(s)) for s in (begin, end))
     for number in np.flatnonzero(first * last < 0.0) if len(first) == len(last) else ():
 
         def over(s: float, number: int = int(number)) -> float:
-            return float(_over_floor(stretch.orbit(s))[number])
+            return float(_over_floor(segment.orbit(s))[number])
 
-        pair = _zero(stretch, begin, end, over)
+        pair = _zero(segment, begin, end, over)
         if pair is not None and np.abs(_over_floor(pair[1])).min(initial=1.0) < _AT:  # else it only jumped
             yield pair[0], replace(pair[1], mark="floor")
 
@@ -240,40 +240,40 @@ def _floors(stretch: Stretch, begin: float, end: float) -> Iterator[tuple[float,
 def _over_floor(orbit: Orbit) -> Array:
     """Entry rate less the floor, in units of it, of every contact in the order of stops and time; 1 where none acts."""
     log, over = orbit.contacts, np.ones(len(orbit.contacts))
-    for stop in with_memory(orbit.system):
+    for stop in latching_stops(orbit.system):
         mine, floor = log.stop == stop, orbit.system.contacts[stop].law.entry_rate_floor
         over[mine] = log.speed_in[mine] / floor - 1.0 if floor else 1.0
     ordered: Array = over[np.lexsort((log.t_in, log.stop))]
     return ordered
 
 
-def _grazing(stretch: Stretch, begin: float, first: Orbit) -> tuple[float, float, Orbit, float, Orbit] | None:
+def _grazing(segment: Segment, begin: float, first: Orbit) -> tuple[float, float, Orbit, float, Orbit] | None:
     """Where the number of contacts changes first after a place: place before, place, orbit, place and orbit behind.
 
     There the shallowest contact's indentation goes to zero, or the flight between two contacts that become one.
     """
-    last, behind = stretch.b.orbit, stretch.way
+    last, behind = segment.b.orbit, segment.way
     more = len(last.contacts) > len(first.contacts)  # whether contacts are added on the way
     distance = _distance(last, first) if more else _distance(first, last)
     near, near_orbit = begin, first
     known = [(behind, distance(last)) if more else (begin, distance(first))]  # on the side with more contacts
-    sharp = stretch.sharpness()
-    for _ in range(_MOST_TOUCHES):
-        touched, bare = (behind, near) if more else (near, behind)
-        place = 0.5 * (touched + bare)
-        root = touched + 2.0 * sharp
+    sharp = segment.sharpness()
+    for _ in range(_MOST_TRIALS_OF_GRAZING):
+        grazed, bare = (behind, near) if more else (near, behind)
+        place = 0.5 * (grazed + bare)
+        root = grazed + 2.0 * sharp
         if len(known) > 1 and known[-1][1] != known[-2][1]:
             (s0, f0), (s1, f1) = known[-2:]
             root = s1 - f1 * (s1 - s0) / (f1 - f0)
-            if min(bare, touched) < root < max(bare, touched):
-                place = root + 0.01 * (touched - root)
-        if abs(behind - near) <= sharp or abs(root - touched) <= sharp:
+            if min(bare, grazed) < root < max(bare, grazed):
+                place = root + 0.01 * (grazed - root)
+        if abs(behind - near) <= sharp or abs(root - grazed) <= sharp:
             if abs(behind - near) <= sharp and _parted(near_orbit, last):
                 return None
             at, touching = (behind, last) if more else (near, near_orbit)
             return near, at, replace(touching, mark="grazing"), behind, last
         try:
-            place, orbit = stretch.near(place, behind - near)
+            place, orbit = segment.near(place, behind - near)
         except OrbitError:
             return None
         same = len(orbit.contacts) == len(first.contacts)
@@ -287,7 +287,7 @@ def _grazing(stretch: Stretch, begin: float, first: Orbit) -> tuple[float, float
 
 
 def _parted(a: Orbit, b: Orbit) -> bool:
-    """Whether orbits at one place of the branch are two: it jumps there, as where contacts with memory merge."""
+    """Whether two orbits at one place of the branch differ: it jumps there, as where two contacts merge."""
     return bool(np.abs(a.state - b.state).max() > _SAME * np.abs(a.state).max())
 
 

@@ -1,15 +1,16 @@
 """Branches of periodic orbits by pseudo-arclength continuation.
 
-From each point a guess a step ahead, on the tangent or on the cubic through the point before too; Newton's method back
-to the branch (Keller, Numerical solution of bifurcation and nonlinear eigenvalue problems, 1977); then a step as long
-as the guess was good. A branch may fold back, has kinks where contacts graze, and jumps where two contacts become one.
-`walk` controls the steps, `point` takes one, `bifurcations` locates the special points it passed,
-`nonsmooth` leads across kinks and jumps.
+Each step predicts a point, on the tangent or on the cubic through the last two points, corrects it by Newton's method
+(Keller, Numerical solution of bifurcation and nonlinear eigenvalue problems, 1977), and sets the next step by the error
+of the prediction. A branch may fold; it has corners where contacts graze, and jumps where two contacts become one.
+`walk` controls the steps, `point` takes one, `bifurcations` locates the special points passed, `nonsmooth` leads across
+corners and jumps.
 """
 
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -18,10 +19,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from solvers.branches.point import Point, metric_of, point_of
-from solvers.branches.reshooting import with_quiet_begin
+from solvers.branches.reshooting import reshot
 from solvers.branches.subharmonic_end import Scaled
-from solvers.branches.walk import Arm, BranchStatus
-from solvers.orbits import Orbit, Problem, at_zero, checked, checked_start, newton, orbit_of, solved_chain
+from solvers.branches.walk import BranchStatus, Walk
+from solvers.orbits import Orbit, PeriodicProblem, at_zero, checked, checked_start, newton, orbit_of, solved_chain
 from solvers.problem import System
 
 
@@ -32,20 +33,26 @@ class Branch:
     Interrupt an iteration and start another: it gives what is known, then goes on from there.
     """
 
-    arms: list[Arm]
+    walks: list[Walk]
     kept: dict[int, Any] = field(default_factory=dict)  # for the user of the branch
+
+    @property
+    def arms(self) -> list[Walk]:
+        """Old name of `walks`."""
+        warnings.warn("Branch.arms is now Branch.walks", DeprecationWarning, stacklevel=2)
+        return self.walks
 
     @property
     def orbits(self) -> list[Orbit]:
         """What is known so far, from one end of the branch to the other; special ones carry a ``mark``."""
-        behind = self.arms[1].orbits[:0:-1] if len(self.arms) > 1 else []
-        return behind + self.arms[0].orbits
+        behind = self.walks[1].orbits[:0:-1] if len(self.walks) > 1 else []
+        return behind + self.walks[0].orbits
 
     @property
     def status(self) -> tuple[BranchStatus, ...]:
         """How each direction ended."""
-        closed = self.arms[0].status is BranchStatus.CLOSED  # then there is but one direction
-        return tuple(arm.status for arm in self.arms[: 1 if closed else None])
+        closed = self.walks[0].status is BranchStatus.CLOSED  # then there is but one direction
+        return tuple(walk.status for walk in self.walks[: 1 if closed else None])
 
     @property
     def special(self) -> list[Orbit]:
@@ -54,17 +61,17 @@ class Branch:
 
     def __iter__(self) -> Iterator[Orbit]:
         """Known orbits, then new ones, one direction after the other."""
-        for number, arm in enumerate(self.arms):
-            if self.arms[0].status is BranchStatus.CLOSED and number:
+        for number, walk in enumerate(self.walks):
+            if self.walks[0].status is BranchStatus.CLOSED and number:
                 return
-            i = min(number, 1)  # both arms begin with the same orbit
+            i = min(number, 1)  # both walks begin with the same orbit
             while True:
-                while i < len(arm.orbits):
-                    yield arm.orbits[i]
+                while i < len(walk.orbits):
+                    yield walk.orbits[i]
                     i += 1
-                if arm.status is not BranchStatus.RUNNING:
+                if walk.status is not BranchStatus.RUNNING:
                     break
-                arm.extend()
+                walk.extend()
 
     def run(self) -> Branch:
         """Compute all of it."""
@@ -76,19 +83,19 @@ class Branch:
         """The branch of twice the period that is born at a flip of this one."""
         if flip.mark != "flip":
             raise ValueError(f"a branch doubles at an orbit marked 'flip', got one marked {flip.mark!r}")
-        arm = self.arms[0]
-        old = arm.first.problem
+        walk = self.walks[0]
+        old = walk.first.problem
         fraction = flip.phase / flip.period
-        problem = Problem(Scaled(old.make, 2.0), old.method, (0.5 * fraction, 0.5 * fraction + 0.5), old.step)
+        problem = PeriodicProblem(Scaled(old.make, 2.0), old.method, (0.5 * fraction, 0.5 * fraction + 0.5), old.step)
         values, vectors = np.linalg.eig(flip.monodromy)
         v = vectors[:, np.argmin(np.abs(values + 1.0))].real
         x = np.array([flip.state, flip.state])
-        metric = metric_of(problem, flip.parameter, x, arm.span[1] - arm.span[0])
+        metric = metric_of(problem, flip.parameter, x, walk.span[1] - walk.span[0])
         tangent = np.concatenate((v, -v, [0.0]))
         tangent /= math.sqrt(tangent @ metric @ tangent)
         chain = problem.evaluate(x, flip.parameter)
         orbit = orbit_of(problem, chain, flip.residual, 0, parameter=flip.parameter, mark="flip")
-        return Branch([Arm(Point(orbit, problem, chain, tangent, metric), arm.span, arm.largest)])
+        return Branch([Walk(Point(orbit, problem, chain, tangent, metric), walk.span, walk.largest)])
 
 
 def branch(
@@ -148,8 +155,8 @@ def branch(
     metric = metric_of(problem, parameter, chain.x, high - low)
     ahead = np.zeros(len(metric))
     ahead[-1] = 1.0
-    point = with_quiet_begin(point_of(problem, chain, error, iterations, metric, ahead))
+    point = reshot(point_of(problem, chain, error, iterations, metric, ahead))
     back = replace(point, tangent=-point.tangent)
     return Branch(
-        [Arm(p, (low, high), step) for p, room in ((point, parameter < high), (back, parameter > low)) if room]
+        [Walk(p, (low, high), step) for p, room in ((point, parameter < high), (back, parameter > low)) if room]
     )

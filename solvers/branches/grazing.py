@@ -1,13 +1,13 @@
 """Orbits that meet a stop's surface at a given rate: grazing ones, and those that enter at their law's floor.
 
-Shots from a quiet time to the meeting at t*, and on from there, solve
+Shots from an open interval to the meeting at t*, and on from there, solve
 
     Φ_0(x_0) = x_1,   Φ_1(x_1) = x_2,   ...,   δ(x_1) = 0,   δ̇(x_1) = v
 
-for the shots' states, the parameter and t*. What a branch's return map does beside such an orbit is smooth on either
-side, if not across. An orbit that repeats itself within its period, or is symmetric, meets surfaces at several times
-at once: then every meeting adds its time and its two conditions, of which only two are independent, and the equations
-are solved in the sense of least squares.
+for the shots' states, the parameter and t*. The return map is smooth on either side of such an orbit, not across it.
+An orbit that repeats itself within its period, or is symmetric, meets surfaces at several times at once: then every
+meeting adds its time and its two conditions, of which only two are independent, and the equations are solved in the
+sense of least squares.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from solvers.branches.point import Point, moved, tangent_of
-from solvers.orbits import Chain, Orbit, OrbitError, Problem, delayed, flown, newton, orbit_of, with_memory
+from solvers.orbits import Chain, Orbit, OrbitError, PeriodicProblem, delayed, flown, latching_stops, newton, orbit_of
 from solvers.problem import Array, System
 
 _MOST = 8  # iterations of Newton's method
@@ -43,7 +43,7 @@ class _Raised:
 
 
 @dataclass(frozen=True, eq=False)
-class _Meeting(Problem):
+class _Meeting(PeriodicProblem):
     """Shots of which some begin on the surface of a stop, with an entry rate of at least ``floor``."""
 
     stops: tuple[int | None, ...] = ()  # of every shot, None where it does not begin on a surface
@@ -69,8 +69,8 @@ class _Meeting(Problem):
 
 
 @dataclass(frozen=True, eq=False)
-class Touch:
-    """An orbit that meets stops' surfaces at a rate, and goes on with an entry rate of at least ``floor``."""
+class Grazing:
+    """An orbit that meets stops' surfaces at a rate, and continues with an entry rate of at least ``floor``."""
 
     stops: tuple[int | None, ...]  # on whose surfaces the shots begin
     speed: float
@@ -91,7 +91,7 @@ class Touch:
 
     @property
     def rate_before(self) -> float:
-        """At which the stop's last contact before the meeting was entered; a dip of rounding's size is none."""
+        """Entry rate of the stop's last contact before the meeting; indentations of rounding's size do not count."""
         first = self.places[0]
         log = self.chain.solutions[first - 1].contacts
         mine = (log.stop == self.stops[first]) & (log.peak_indentation > 1e-4 * log.peak_indentation.max(initial=0.0))
@@ -103,10 +103,10 @@ def _places(stops: Sequence[int | None]) -> list[int]:
     return [i for i, stop in enumerate(stops) if stop is not None]
 
 
-def first_touch(
+def first_grazing(
     point: Point, begins: Sequence[tuple[float, int | None]], speed: float, floor: float, within: float
-) -> Touch:
-    """The touch near a point, whose orbit nearly meets surfaces at some times, counted from its phase.
+) -> Grazing:
+    """The grazing orbit near a point, whose orbit nearly meets surfaces at some times, counted from its phase.
 
     ``begins`` are the later shots' (time, stop met or None) in their order; ``within`` is an arclength. Raises
     OrbitError.
@@ -128,8 +128,8 @@ def solved(
     speed: float,
     floor: float,
     within: float = math.inf,
-) -> Touch:
-    """The touch near a guess, by Newton's method, no step of which is longer than ``within``; raises OrbitError."""
+) -> Grazing:
+    """The grazing orbit near a guess, by Newton's method with steps of at most ``within``; raises OrbitError."""
     problem, size = point.problem, len(point.orbit.state)
     for _ in range(_MOST):
         fractions = _with_meetings(fractions, stops, unknowns)
@@ -145,7 +145,7 @@ def solved(
         if not way < within:
             break
         if way < _CLOSE and at_once:
-            return Touch(stops, speed, floor, _with_meetings(fractions, stops, unknowns), unknowns, chain)
+            return Grazing(stops, speed, floor, _with_meetings(fractions, stops, unknowns), unknowns, chain)
     met = ", ".join(str(stop) for stop in stops if stop is not None)
     raise OrbitError(f"no orbit that meets stop {met} at {speed:g} m/s was found in {_MOST} iterations")
 
@@ -177,7 +177,7 @@ def _linear(problem: _Meeting, chain: Chain, speed: float) -> tuple[Array, Array
     return matrix, -np.concatenate((chain.residual.ravel(), misses))
 
 
-def _gap_slope(problem: Problem, parameter: float, stop: int) -> float:
+def _gap_slope(problem: PeriodicProblem, parameter: float, stop: int) -> float:
     """Derivative of a stop's gap by the parameter."""
     behind, ahead = (problem.make(parameter + s * problem.step)[0].contacts[stop].gap for s in (-1.0, 1.0))
     return (ahead - behind) / (2.0 * problem.step)
@@ -196,45 +196,45 @@ def _length(point: Point, state: Array, parameter: float) -> float:
     return math.sqrt(len(point.chain.x) * state @ G[:size, :size] @ state + G[-1, -1] * parameter**2)
 
 
-def unknowns_at(point: Point, touch: Touch) -> Array:
-    """A touch as unknowns of the branch: states of its shots, flown with the touch's own floor, and the parameter."""
-    problem, known = point.problem, touch.unknowns[: touch.chain.x.size].reshape(touch.chain.x.shape)
-    meeting = _Meeting(problem.make, problem.method, touch.fractions, problem.step, touch.stops, touch.floor)
-    shots, period = meeting.shots(touch.parameter), problem.make(touch.parameter)[1]
+def unknowns_at(point: Point, grazing: Grazing) -> Array:
+    """A grazing orbit as unknowns of the branch: states of its shots, integrated with its own floor; the parameter."""
+    problem, known = point.problem, grazing.unknowns[: grazing.chain.x.size].reshape(grazing.chain.x.shape)
+    meeting = _Meeting(problem.make, problem.method, grazing.fractions, problem.step, grazing.stops, grazing.floor)
+    shots, period = meeting.shots(grazing.parameter), problem.make(grazing.parameter)[1]
     x = [known[0]]
     for fraction in problem.fractions[1:]:
-        i = max(i for i, begin in enumerate(touch.fractions) if begin < fraction)
-        x.append(flown(shots[i][0], known[i], (fraction - touch.fractions[i]) * period, problem.method))
-    return np.append(np.concatenate(x), touch.parameter)
+        i = max(i for i, begin in enumerate(grazing.fractions) if begin < fraction)
+        x.append(flown(shots[i][0], known[i], (fraction - grazing.fractions[i]) * period, problem.method))
+    return np.append(np.concatenate(x), grazing.parameter)
 
 
-def orbit_at(point: Point, touch: Touch, **more: Any) -> Orbit:
-    """A touch as an orbit of the branch; raises OrbitError."""
-    y, problem = unknowns_at(point, touch), point.problem
-    chain, error, iterations = newton(problem, y[:-1].reshape(point.chain.x.shape), touch.parameter)
-    return orbit_of(problem, chain, error, iterations, parameter=touch.parameter, **more)
+def orbit_at(point: Point, grazing: Grazing, **more: Any) -> Orbit:
+    """A grazing orbit as an orbit of the branch; raises OrbitError."""
+    y, problem = unknowns_at(point, grazing), point.problem
+    chain, error, iterations = newton(problem, y[:-1].reshape(point.chain.x.shape), grazing.parameter)
+    return orbit_of(problem, chain, error, iterations, parameter=grazing.parameter, **more)
 
 
 def signature(orbit: Orbit) -> tuple[int, int]:
-    """Numbers of contacts, and of those entered below their law's floor; they stay the same between kinks."""
+    """Numbers of contacts and of clipped entry rates; both stay the same between nonsmooth points."""
     log = orbit.contacts
-    return len(log), int(np.sum(log.floored[np.isin(log.stop, with_memory(orbit.system))]))
+    return len(log), int(np.sum(log.entry_rate_clipped[np.isin(log.stop, latching_stops(orbit.system))]))
 
 
-def beside(point: Point, touch: Touch, sign: float, wanted: tuple[int, int | None]) -> Point:
-    """An orbit of a signature very near a touch, where the indentation at t*, or its rate at entry, is more or less.
+def beside(point: Point, grazing: Grazing, sign: float, wanted: tuple[int, int | None]) -> Point:
+    """An orbit very near a grazing orbit on one side: indentation at t*, or rate at entry, above or below it.
 
-    Its tangent points away from the touch; None leaves a part of the signature open. Raises OrbitError.
+    Its tangent points away from the grazing orbit. It has the wanted signature; None: any. Raises OrbitError.
     """
     problem, size = point.problem, len(point.orbit.state)
-    by_state, by_parameter, aside = _indicators(point, touch)
+    by_state, by_parameter, aside = _indicators(point, grazing)
     towards = np.linalg.solve(point.metric[:size, :size], by_state.T)
-    ends = unknowns_at(point, touch)
+    ends = unknowns_at(point, grazing)
     off = towards @ np.linalg.solve(by_state @ towards, np.full(len(by_state), sign * aside))
-    x = _shots(problem, ends[:size] + off, touch.parameter)
+    x = _shots(problem, ends[:size] + off, grazing.parameter)
     along = np.zeros(len(point.metric))
     along[-1] = 1.0
-    tangent = tangent_of(problem.evaluate(x, touch.parameter), point.metric, along)
+    tangent = tangent_of(problem.evaluate(x, grazing.parameter), point.metric, along)
     tangent *= sign * np.sign(by_state[0] @ tangent[:size] + by_parameter[0] * tangent[-1])
     launch = replace(point, tangent=tangent)
     for s in _OFF:
@@ -242,31 +242,31 @@ def beside(point: Point, touch: Touch, sign: float, wanted: tuple[int, int | Non
             found = moved(launch, ends + s * tangent, abs(launch.share) > _STEEP)
         except OrbitError:
             continue
-        contacts, floored = signature(found.orbit)
-        if wanted in ((contacts, floored), (contacts, None)):
+        contacts, clipped = signature(found.orbit)
+        if wanted in ((contacts, clipped), (contacts, None)):
             return found
-    raise OrbitError("no orbit was found beside the touch")
+    raise OrbitError("no orbit was found beside the grazing orbit")
 
 
-def _indicators(point: Point, touch: Touch) -> tuple[Array, Array, float]:
-    """What changes its sign at a touch: derivatives by the first state and the parameter; how far aside to look."""
+def _indicators(point: Point, grazing: Grazing) -> tuple[Array, Array, float]:
+    """Derivatives of what changes sign at a grazing orbit, by first state and parameter; how far aside to look."""
     rows, aside = [], _ASIDE[0] * float(point.orbit.contacts.peak_indentation.max(initial=0.0))
-    chain, n = touch.chain, point.orbit.system.size
+    chain, n = grazing.chain, point.orbit.system.size
     columns = np.eye(2 * n, 2 * n + 1)
-    for place in range(1, len(touch.stops)):
+    for place in range(1, len(grazing.stops)):
         columns = chain.tangents[place - 1] @ columns
         columns[:, -1] += chain.by_parameter[place - 1]
-        stop = touch.stops[place]
+        stop = grazing.stops[place]
         if stop is not None:
             w, rate = -point.orbit.system.contacts[stop].direction, _rate(chain, place)
             row = w @ columns[:n]
-            row[-1] -= _gap_slope(point.problem, touch.parameter, stop)
-            rows.append(w @ columns[n:] - (w @ rate[n:]) / touch.speed * row if touch.speed else row)
-    aside = _ASIDE[1] * touch.speed or aside or _ASIDE[0] * float(np.abs(chain.x[0, :n]).max())
+            row[-1] -= _gap_slope(point.problem, grazing.parameter, stop)
+            rows.append(w @ columns[n:] - (w @ rate[n:]) / grazing.speed * row if grazing.speed else row)
+    aside = _ASIDE[1] * grazing.speed or aside or _ASIDE[0] * float(np.abs(chain.x[0, :n]).max())
     return np.array(rows)[:, :-1], np.array(rows)[:, -1], aside
 
 
-def _shots(problem: Problem, x: Array, parameter: float) -> Array:
+def _shots(problem: PeriodicProblem, x: Array, parameter: float) -> Array:
     """States of all shots (m, 2n) of the motion from the first one."""
     (system, _), period = problem.shots(parameter)[0], problem.make(parameter)[1]
     begins = [(fraction - problem.fractions[0]) * period for fraction in problem.fractions]

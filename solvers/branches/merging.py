@@ -1,10 +1,10 @@
 """Where two contacts of one stop become one, or one becomes two, and a branch goes over to another.
 
-A law that latches its entry rate forgets it in the shortest flight. As the flight between two contacts vanishes, the
-second is entered ever more slowly, down to its law's floor; without the flight the first one's rate still acts. So the
-return map jumps, and a branch ends there. The way over the jump are orbits that touch the surface from within and go
-on with any rate between both: no motions of the system, but those of every law that forgets gradually as the flight
-grows. They lead from the end of one branch (the floor) to that of the other (the first contact's entry rate).
+A law with an entry rate takes a new one after any flight, however short. As the flight between two contacts vanishes,
+the second is entered ever more slowly, down to the law's floor; without the flight the first one's rate still acts. So
+the return map jumps, and a branch ends there. The two ends are joined by auxiliary orbits: they graze the surface from
+within and continue with an entry rate that is a free parameter. They solve the same equations with another rate, not
+the system itself; the rate is varied from the floor (end of one branch) to the first contact's (end of the other).
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from solvers.branches.grazing import Touch, solved
+from solvers.branches.grazing import Grazing, solved
 from solvers.branches.point import Point
 from solvers.orbits import OrbitError
 from solvers.problem import Array, SolverError
@@ -23,9 +23,9 @@ _FACTORS = 1.02, 1.5, 4.0  # least, first and largest ratio of successive rates
 _SAME = 1e-7  # relative difference of rates that are the same
 
 
-def led(point: Point, touch: Touch, floor: float | None) -> Touch:
-    """The touch with another rate, None: that of the contact before it, reached in steps; raises OrbitError."""
-    known, factor = [touch], _FACTORS[1]
+def led(point: Point, grazing: Grazing, floor: float | None) -> Grazing:
+    """The grazing orbit with another rate, None: that of the contact before it, reached in steps; raises OrbitError."""
+    known, factor = [grazing], _FACTORS[1]
     for _ in range(_MOST_STEPS):
         last = known[-1]
         ratio = (floor or last.rate_before) / last.floor
@@ -40,12 +40,12 @@ def led(point: Point, touch: Touch, floor: float | None) -> Touch:
             factor = math.sqrt(factor)
             if factor < _FACTORS[0]:
                 break
-    raise OrbitError("the way over the jump was lost")
+    raise OrbitError("the orbits that lead over the jump were lost")
 
 
-def _ahead(known: list[Touch], rate: float) -> Array:
+def _ahead(known: list[Grazing], rate: float) -> Array:
     """Guess of the unknowns at a rate: the polynomial in its logarithm through the ones known (Lagrange)."""
-    places = np.log([touch.floor for touch in known])
+    places = np.log([grazing.floor for grazing in known])
     weights = [np.prod([(math.log(rate) - b) / (a - b) for b in places if b != a]) for a in places]
-    guess: Array = sum(w * touch.unknowns for w, touch in zip(weights, known, strict=True))
+    guess: Array = sum(w * grazing.unknowns for w, grazing in zip(weights, known, strict=True))
     return guess

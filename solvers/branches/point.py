@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from solvers.orbits import Border, Chain, Orbit, Problem, newton, orbit_of, weights
+from solvers.orbits import Border, Chain, Orbit, PeriodicProblem, newton, orbit_of, weights
 from solvers.problem import Array
 
 _STEEP = 0.02  # parameter's share of the tangent below which the parameter is not what is held fixed
@@ -25,7 +25,7 @@ class Point:
     """An orbit on the branch with what it takes to go on from it."""
 
     orbit: Orbit
-    problem: Problem
+    problem: PeriodicProblem
     chain: Chain
     tangent: Array
     metric: Array
@@ -48,7 +48,7 @@ class Point:
         return math.sqrt(y @ self.metric @ y)
 
 
-def metric_of(problem: Problem, parameter: float, x: Array, width: float) -> Array:
+def metric_of(problem: PeriodicProblem, parameter: float, x: Array, width: float) -> Array:
     """Matrix of the arclength over [states, parameter]."""
     W = weights(*problem.make(parameter))
     size = float(np.linalg.norm(x @ W.T, axis=1).max()) or 1.0  # an orbit at rest has none
@@ -70,7 +70,9 @@ def tangent_of(chain: Chain, metric: Array, along: Array) -> Array:
     return unit
 
 
-def point_of(problem: Problem, chain: Chain, error: float, iterations: int, metric: Array, along: Array) -> Point:
+def point_of(
+    problem: PeriodicProblem, chain: Chain, error: float, iterations: int, metric: Array, along: Array
+) -> Point:
     """The point of a solved chain."""
     tangent = tangent_of(chain, metric, along)
     orbit = orbit_of(problem, chain, error, iterations, parameter=chain.parameter)

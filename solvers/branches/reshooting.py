@@ -1,7 +1,7 @@
 """Shots of a branch that begin later, because a contact has come near one of their begins.
 
-One with memory must not be under way there. One whose force jumps must not begin or end there: the state at a fixed
-time has a corner where the jump passes it, so that no step of Newton's method, however short, leads across.
+A contact whose law depends on the entry rate must not be under way there. One whose force jumps must not begin or end
+there: the state at a fixed time has a corner where the jump passes it, which Newton's method does not cross.
 """
 
 from __future__ import annotations
@@ -13,24 +13,24 @@ from typing import Any
 import numpy as np
 
 from solvers.branches.point import Point, point_of
-from solvers.orbits import Chain, OrbitError, delayed, flown, newton, quiet_begins, with_memory
+from solvers.orbits import Chain, OrbitError, delayed, flown, latching_stops, newton, open_begins
 from solvers.problem import Array, ContactLog, System
 
-_MARGIN = 0.1  # of the longest quiet time that must lie on both sides of a shot's begin
+_MARGIN = 0.1  # of the longest open interval that must lie on both sides of a shot's begin
 
 
-def _restless(system: System, log: ContactLog) -> Any:
-    """Which contacts of a log are with a stop whose law has memory, or whose force jumps."""
+def _to_keep_clear_of(system: System, log: ContactLog) -> Any:
+    """Which contacts of a log no shot may begin near: the law depends on the entry rate, or the force jumps."""
     jumping = [stop for stop, contact in enumerate(system.contacts) if contact.law.jump]
-    return np.isin(log.stop, [*with_memory(system), *jumping])
+    return np.isin(log.stop, [*latching_stops(system), *jumping])
 
 
-def with_quiet_begin(point: Point) -> Point:
+def reshot(point: Point) -> Point:
     """The same point, its shots begun later where a contact has come near one of their begins."""
     orbit, m = point.orbit, len(point.problem.fractions)
     log, period = orbit.contacts, orbit.period
     offsets = [(f - point.problem.fractions[0]) * period for f in point.problem.fractions]
-    mine = _restless(orbit.system, log)
+    mine = _to_keep_clear_of(orbit.system, log)
     ends = np.concatenate((log.t_in[mine], log.t_out[mine]))
     times = np.concatenate((ends - period, ends, ends + period))
 
@@ -39,7 +39,7 @@ def with_quiet_begin(point: Point) -> Point:
 
     if away(offsets) > _MARGIN * period / (1 + len(log)):
         return point
-    begins = quiet_begins(orbit.system, log, period, m, False)
+    begins = open_begins(orbit.system, log, period, m, False)
     if len(begins) < m or not away(begins) > away(offsets):
         return point
     later = delayed(orbit.system, orbit.phase)

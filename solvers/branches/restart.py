@@ -10,15 +10,15 @@ import numpy as np
 
 from solvers.branches.continuation import Branch
 from solvers.branches.point import Point, metric_of, point_of
-from solvers.branches.walk import Arm, BranchStatus
-from solvers.orbits import Problem, checked, newton
+from solvers.branches.walk import BranchStatus, Walk
+from solvers.orbits import PeriodicProblem, checked, newton
 from solvers.problem import System
 
 
-def restored(
+def restarted(
     make_system: Callable[[float], tuple[System, float]],
     span: tuple[float, float],
-    arms: list[list[dict[str, Any]]],
+    walks: list[list[dict[str, Any]]],
     status: list[str],
     step: float,
     method: Any = None,
@@ -26,15 +26,15 @@ def restored(
     """A branch from records (parameter, state, phase, mark, iterations) of its orbits per direction, to go on with."""
     return Branch(
         [
-            _restored_arm(make_system, span, records, BranchStatus[name], step, method)
-            for records, name in zip(arms, status, strict=True)
+            _restarted_walk(make_system, span, records, BranchStatus[name], step, method)
+            for records, name in zip(walks, status, strict=True)
         ]
     )
 
 
-def _restored_arm(
+def _restarted_walk(
     make: Any, span: tuple[float, float], records: list[dict[str, Any]], status: BranchStatus, step: float, method: Any
-) -> Arm:
+) -> Walk:
     """One direction; orbits are integrated once more, their states are not changed."""
     points: list[Point] = []
     system, period = make(records[0]["parameter"])
@@ -42,7 +42,7 @@ def _restored_arm(
     for record in records:
         _, period = make(record["parameter"])
         x = np.array([record["state"]])
-        problem = Problem(make, method, (record["phase"] / period,), 1e-6 * width)
+        problem = PeriodicProblem(make, method, (record["phase"] / period,), 1e-6 * width)
         chain, error, _ = newton(problem, x, record["parameter"], slope=True)
         metric = points[0].metric if points else metric_of(problem, record["parameter"], x, width)
         moved = np.append(x.ravel(), record["parameter"])
@@ -55,6 +55,6 @@ def _restored_arm(
     if len(points) > 1:  # the first tangent points to the second orbit
         ahead = first.tangent @ first.metric @ (points[1].unknowns - first.unknowns)
         first = replace(first, tangent=first.tangent * np.sign(ahead))
-    arm = Arm(first, span, step)
-    arm.point, arm.orbits, arm.status = points[-1], [point.orbit for point in points], status
-    return arm
+    walk = Walk(first, span, step)
+    walk.point, walk.orbits, walk.status = points[-1], [point.orbit for point in points], status
+    return walk

@@ -1,7 +1,7 @@
-"""Where a branch is born at a flip of one of half its period; followed beyond, it would return as its own copy.
+"""Where a subharmonic branch ends: at a flip of the branch of half its period, beyond which it would retrace itself.
 
-Along a branch of period T the distance d(x) = Φ_{T/2}(x) - x of half a period vanishes and turns round at its birth,
-where the branch also folds. The birth itself is located on the branch of half the period, as its flip.
+Along a branch of period T the difference d(x) = Φ_{T/2}(x) - x over half a period vanishes and changes its sign there,
+and the branch folds. The end is located on the branch of half the period, as its flip.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Scaled:
         return system, self.factor * period
 
 
-def birth(a: Point, b: Point, fold: Orbit) -> Orbit | None:
+def subharmonic_end(a: Point, b: Point, fold: Orbit) -> Orbit | None:
     """The flip of half the period that a fold between two points of a branch is; None if it is a plain fold."""
     if misfit(fold.system, 0.5 * fold.period) or a.problem.fractions != b.problem.fractions:
         return None

@@ -1,4 +1,4 @@
-"""One direction of a branch: how long a step to take, what to refuse, where it ends."""
+"""The arclength walk along one direction of a branch: step size, refused orbits, where it ends."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from enum import Enum
 import numpy as np
 
 from solvers.branches.bifurcations import ROUNDING, between, indicators_at
-from solvers.branches.grazing import Touch, signature, unknowns_at
-from solvers.branches.nonsmooth import ERRORS, Kink, before, behind, kinks_near, marked, met
+from solvers.branches.grazing import Grazing, signature, unknowns_at
+from solvers.branches.nonsmooth import ERRORS, NonsmoothPoint, before, behind, marked, met, nonsmooth_near
 from solvers.branches.point import Point, corrected, cubic, is_straight, moved
-from solvers.branches.reshooting import with_quiet_begin
-from solvers.branches.subharmonic_end import birth
+from solvers.branches.reshooting import reshot
+from solvers.branches.subharmonic_end import subharmonic_end
 from solvers.orbits import Orbit, OrbitError, is_cut
 from solvers.problem import Array
 
@@ -22,15 +22,15 @@ _SMALLEST = 1e-8  # arclength step at which a branch counts as lost
 _GOOD = 0.06, 0.1  # distance of a good guess from the branch, in units of the step: on a cubic, on the tangent
 _MANY = 6  # Newton iterations that ask for shorter steps
 _SHARPEST = 0.8  # cosine of the largest turn between two orbits
-_THERE = 3e-6  # arclength within which a kink may lie behind
-_NEAR_KINK = 1e-4  # arclength step below which a fold may hide behind a kink
-_NEAR = 1e-4  # arclength from where a branch is lost within which a kink may be why
-_AROUND = 3.0  # arclength, in units of a failed step, within which a kink is looked for
-_AGAIN = 0.03  # part of a step after whose failure kinks are looked for again
-_MOST_KINKS = 6  # tried at a time
-_LAST = 3e-7  # arclength step below which any turn counts as a kink
+_THERE = 3e-6  # arclength within which a nonsmooth point may lie behind
+_NEAR_NONSMOOTH = 1e-4  # arclength step below which a fold may hide behind a nonsmooth point
+_NEAR = 1e-4  # arclength from where a branch is lost within which a nonsmooth point may be why
+_AROUND = 3.0  # arclength, in units of a failed step, within which a nonsmooth point is looked for
+_AGAIN = 0.03  # part of a step after whose failure nonsmooth points are looked for again
+_MOST_NONSMOOTH = 6  # tried at a time
+_LAST = 3e-7  # arclength step below which any turn counts as a nonsmooth point
 _FARTHEST = 20.0  # distance of an orbit from the one before, in steps, beyond which it belongs to another branch
-_BEHIND = 0.003  # first step behind a kink, in units of the largest
+_BEHIND = 0.003  # first step behind a nonsmooth point, in units of the largest
 
 
 class BranchStatus(Enum):
@@ -40,14 +40,15 @@ class BranchStatus(Enum):
     END = "reached the end of the span"
     CLOSED = "closed: came back to its first orbit"
     RETURNED = "came back to an orbit it had passed: it turned round or went over to another branch"
-    BORN = "reached its birth at a flip of the branch of half the period"
+    SUBHARMONIC_END = "reached its subharmonic end: a flip of the branch of half the period"
+    BORN = SUBHARMONIC_END  # its name in files of earlier versions
     JUMP = "ended where two contacts of a stop become one, or one two: no orbits were found that lead over the jump"
     LOST = "lost: no orbit was found however small the step; where multipliers are large, more shots may help"
     LIMIT = f"stopped after {MOST_ORBITS} orbits"
 
 
 @dataclass(eq=False)
-class Arm:
+class Walk:
     """One direction of a branch, walked as far as it has been asked for."""
 
     point: Point
@@ -57,8 +58,8 @@ class Arm:
     status: BranchStatus = BranchStatus.RUNNING
     step: float = 0.0
     before: tuple[Point, float] | None = None  # the point before and the way from it
-    tried: float = math.inf  # step after whose failure kinks were looked for
-    at_jump: bool = False  # whether the kinks found then hold one that it leads to, and no way over it
+    tried: float = math.inf  # step after whose failure nonsmooth points were looked for
+    at_jump: bool = False  # whether one of them is a jump that could not be crossed
     passed: list[Point] = field(default_factory=list)
     values: list[float] = field(default_factory=list)  # of the parameter there
 
@@ -74,19 +75,19 @@ class Arm:
             h = self.step
             following = self._next() if h >= _SMALLEST else None
             if following is None and (self.step < _SMALLEST or h < _AGAIN * self.tried):
-                kink, self.tried = self._kink_ahead(h), h
-                if kink is not None and (kink[0] is None or self._taken(kink[0])):
-                    return self._cross(*kink)
+                nonsmooth, self.tried = self._nonsmooth_ahead(h), h
+                if nonsmooth is not None and (nonsmooth[0] is None or self._taken(nonsmooth[0])):
+                    return self._cross(*nonsmooth)
                 if self.step < _SMALLEST and self.status is BranchStatus.RUNNING:
                     self.status = BranchStatus.JUMP if self.at_jump else BranchStatus.LOST
-                if kink is not None or self.status is not BranchStatus.RUNNING:
+                if nonsmooth is not None or self.status is not BranchStatus.RUNNING:
                     return None
         if self._taken(following) and self.status is BranchStatus.RUNNING:
             self._finish_or_go_on(following)
         return None
 
     def _taken(self, following: Point) -> bool:
-        """Whether the next orbit is good; then it and the special points before it are kept, or a birth among them."""
+        """Whether the next orbit is good; it and the special points before it are kept, up to a subharmonic end."""
         a = self.point
         way = float(a.tangent @ a.metric @ (following.unknowns - a.unknowns))
         special = between(a, following, way, self.before)
@@ -95,40 +96,40 @@ class Arm:
             self.status, self.step = BranchStatus.RUNNING, 0.2 * way
             return False
         for place, fold in enumerate(special):
-            born = birth(a, following, fold) if fold.mark == "fold" else None
-            if born is not None:
-                self.status = BranchStatus.BORN
-                self.orbits += [*special[:place], born]
+            ending = subharmonic_end(a, following, fold) if fold.mark == "fold" else None
+            if ending is not None:
+                self.status = BranchStatus.SUBHARMONIC_END
+                self.orbits += [*special[:place], ending]
                 return False
         self.orbits += [*special, following.orbit]
-        self.before = None if {"grazing", "floor"} & {*marks} else (a, way)  # no cubic across a kink
+        self.before = None if {"grazing", "floor"} & {*marks} else (a, way)  # no cubic across a nonsmooth point
         return True
 
-    def _kink_ahead(self, reach: float) -> tuple[Point | None, Point, list[Orbit]] | None:
-        """Last point before a kink within reach, None if the arm is there; the first one behind it; orbits to keep."""
+    def _nonsmooth_ahead(self, reach: float) -> tuple[Point | None, Point, list[Orbit]] | None:
+        """Last point before a nonsmooth one in reach, None if already there; first one behind it; orbits to keep."""
         a, reach = self.point, max(1.5 * reach, _NEAR if self.step < _SMALLEST else 0.0)
         self.at_jump = False
-        for kink in kinks_near(a.orbit)[:_MOST_KINKS]:
+        for nonsmooth in nonsmooth_near(a.orbit)[:_MOST_NONSMOOTH]:
             try:
-                touch = met(a, kink, _AROUND * reach)
-                last = self._last_before(kink, touch, reach)
+                grazing = met(a, nonsmooth, _AROUND * reach)
+                last = self._last_before(nonsmooth, grazing, reach)
                 if last is not None:
-                    self.at_jump = self.at_jump or kink.kind == "merging"
-                    point = behind(last, kink, touch)
-                    return (None if last is a else last), point, marked(last, point, kink, touch)
+                    self.at_jump = self.at_jump or nonsmooth.kind == "merging"
+                    point = behind(last, nonsmooth, grazing)
+                    return (None if last is a else last), point, marked(last, point, nonsmooth, grazing)
             except ERRORS:
                 continue
         return None
 
-    def _last_before(self, kink: Kink, touch: Touch, reach: float) -> Point | None:
-        """The last point before a kink if it lies on the way within reach; raises one of ERRORS."""
+    def _last_before(self, nonsmooth: NonsmoothPoint, grazing: Grazing, reach: float) -> Point | None:
+        """The last point before a nonsmooth point if it lies on the way within reach; raises one of ERRORS."""
         a = self.point
-        off = unknowns_at(a, touch) - a.unknowns
+        off = unknowns_at(a, grazing) - a.unknowns
         way, whole = float(a.tangent @ a.metric @ off), math.sqrt(off @ a.metric @ off)
         if not -_THERE < way < reach or whole > 2.0 * abs(way) + _THERE:
             return None
         try:
-            last = before(a, kink, touch)
+            last = before(a, nonsmooth, grazing)
         except ERRORS:
             return a if 0.0 < way <= _LAST else None  # a itself is near enough
         if not a.tangent @ a.metric @ last.tangent > 0.0:
@@ -136,13 +137,13 @@ class Arm:
         return last if way > _SMALLEST else a
 
     def _cross(self, last: Point | None, point: Point, found: list[Orbit]) -> None:
-        """Go on behind a kink."""
+        """Go on behind a nonsmooth point."""
         a = last or self.point
         inside = self._inside(point.unknowns)  # a jump may lead out of the span
         self.orbits[len(self.orbits) - (last is not None) :] = found if inside else found[:-1]
         self._pass(a)
         self._pass(point)
-        self.point, self.before, self.step = with_quiet_begin(point), None, _BEHIND * self.largest
+        self.point, self.before, self.step = reshot(point), None, _BEHIND * self.largest
         if not inside:
             self.status = BranchStatus.END
         elif len(self.orbits) >= MOST_ORBITS:
@@ -164,7 +165,7 @@ class Arm:
         sharp = aligned < _SHARPEST or strayed > 0.5 * way
         across = signature(a.orbit) != signature(b.orbit)
         hops = h < (_THERE if across else _LAST) and way > 0.0 and strayed < _FARTHEST * h
-        if (sharp and not hops) or is_cut(b.chain, b.orbit.system):  # a kink that was not met is hopped over
+        if (sharp and not hops) or is_cut(b.chain, b.orbit.system):  # one not located is stepped over
             self.step *= 0.2 if len(a.orbit.contacts) != len(b.orbit.contacts) else 0.5
             return None
         if b.chain.parameter in self.span:
@@ -191,7 +192,7 @@ class Arm:
         try:
             return moved(self.point, guess, straight)
         except OrbitError:
-            if self.step > _NEAR_KINK or not straight:
+            if self.step > _NEAR_NONSMOOTH or not straight:
                 raise
             return moved(self.point, guess, False)
 
@@ -232,7 +233,7 @@ class Arm:
         elif len(self.orbits) >= MOST_ORBITS:
             self.status = BranchStatus.LIMIT
         else:
-            self.point = with_quiet_begin(point)
+            self.point = reshot(point)
 
     def _met(self, point: Point) -> int | None:
         """Number of an orbit passed before that lies on the way just gone; 0 is the first."""

@@ -206,7 +206,7 @@ def table_value(problem, j, t):
 
 @inner
 def add_loads(problem, t, x, rate):
-    """Add all loads at time t to the state's rate and their power to the ledger."""
+    """Add all loads at time t to the state's rate and their power to the energy balance."""
     size = 2 * problem.k.size
     for i in range(problem.tone_omega.size):
         angle = problem.tone_omega[i] * t

@@ -33,7 +33,7 @@ class State(NamedTuple):
     """Everything a run changes; it can be continued from here."""
 
     now: Any  # (4,) time, flight step, contact step, time of the last event
-    x: Any  # (2n + 2 + 2m,) of the blocks, then the ledger, see `kernels`
+    x: Any  # (2n + 2 + 2m,) of the blocks, then the energy balance, see `kernels`
     rate: Any  # of x
     piece: Any  # (m,) 0 in flight, j > 0 between levels j-1 and j
     entry_rate: Any  # (m,) latched

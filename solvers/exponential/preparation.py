@@ -88,7 +88,7 @@ class Prepared(NamedTuple):
 
 
 def ready_for(system: System, forcing: Forcing, duration: float, rtol: float) -> tuple[Forcing, Prepared]:
-    """The forcing as the method takes it, and the tables; what a run just like the last one needs is at hand."""
+    """The forcing as the method takes it, and the tables; those of an identical earlier run are reused."""
     last = system.kept.get("run")
     if last and last[0] is forcing and last[1] == (duration, rtol):
         return forcing, last[2]

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from solvers.orbits.periodic_orbit import OrbitError
-from solvers.orbits.shots import Chain, Problem
+from solvers.orbits.shots import Chain, PeriodicProblem
 from solvers.problem import Array, SolverError, System
 
 TOLERANCE = 1e-10  # of the residual, in units of the orbit's size
@@ -48,7 +48,7 @@ class Border:
 
 
 def newton(
-    problem: Problem,
+    problem: PeriodicProblem,
     x: Array,
     parameter: float,
     border: Border | None = None,
@@ -92,7 +92,7 @@ class _Measure:
     infinity nor vanishing passes for convergence or its failure.
     """
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: PeriodicProblem) -> None:
         self.problem, self.first, self.stored = problem, 0.0, 0.0
 
     def __call__(self, chain: Chain) -> float:
@@ -121,7 +121,7 @@ class _Measure:
         return most
 
 
-def _fire(problem: Problem, unknowns: Array, measure: _Measure, slope: bool) -> tuple[Any, float]:
+def _fire(problem: PeriodicProblem, unknowns: Array, measure: _Measure, slope: bool) -> tuple[Any, float]:
     """The chain at given unknowns and its relative residual, inf where it cannot be integrated."""
     x, parameter = unknowns[:-1].reshape(len(problem.fractions), -1), float(unknowns[-1])
     try:

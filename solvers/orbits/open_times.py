@@ -16,43 +16,43 @@ def latches(contact: Contact) -> bool:
     return bool(np.any(contact.law.force(delta, rate, rate) != contact.law.force(delta, rate, 2.0 * rate)))
 
 
-def with_memory(system: System) -> list[int]:
-    """The stops whose law latches."""
+def latching_stops(system: System) -> list[int]:
+    """The stops whose law depends on the entry rate."""
     about = system.about_laws
-    if "with memory" not in about:
-        about["with memory"] = [s for s, contact in enumerate(system.contacts) if latches(contact)]
-    known: list[int] = about["with memory"]
+    if "latching stops" not in about:
+        about["latching stops"] = [s for s, contact in enumerate(system.contacts) if latches(contact)]
+    known: list[int] = about["latching stops"]
     return known
 
 
-def quiet_intervals(system: System, contacts: ContactLog, period: float) -> list[tuple[float, float]]:
-    """Intervals of one period in which every stop is open; if there are none, every one that latches its entry rate."""
+def open_intervals(system: System, contacts: ContactLog, period: float) -> list[tuple[float, float]]:
+    """Intervals of a period in which all stops are open; if there are none, all whose law latches the entry rate."""
     ends = np.where(np.isnan(contacts.t_out), period, contacts.t_out)
-    for stops in (range(len(system.contacts)), with_memory(system)):
+    for stops in (range(len(system.contacts)), latching_stops(system)):
         mine = np.isin(contacts.stop, list(stops))
-        quiet, end = [], 0.0
+        open_spans, end = [], 0.0
         found = list(zip(contacts.t_in[mine], ends[mine], strict=True))
         found += [(0.0, left - period) for _, left in found if left > period]  # what goes on in the next period
         for begin, left in [*sorted(found), (period, period)]:
             if begin > end:
-                quiet.append((float(end), float(begin)))
+                open_spans.append((float(end), float(begin)))
             end = max(end, left)
-        if quiet:
-            return quiet
+        if open_spans:
+            return open_spans
     return []
 
 
-def quiet_begins(system: System, contacts: ContactLog, period: float, count: int, zero: bool) -> list[float]:
-    """Times for the begins of ``count`` shots: zero if that will do, then the middles of the longest quiet intervals.
+def open_begins(system: System, contacts: ContactLog, period: float, count: int, zero: bool) -> list[float]:
+    """Times for the begins of ``count`` shots: zero if asked for, then the middles of the longest open intervals.
 
-    Fewer when there is no quiet time at all.
+    Fewer when there is no open interval.
     """
-    quiet = quiet_intervals(system, contacts, period)
+    open_spans = open_intervals(system, contacts, period)
     begins = [0.0] if zero else []
-    while quiet and len(begins) < count:
-        a, b = quiet.pop(max(range(len(quiet)), key=lambda i: quiet[i][1] - quiet[i][0]))
+    while open_spans and len(begins) < count:
+        a, b = open_spans.pop(max(range(len(open_spans)), key=lambda i: open_spans[i][1] - open_spans[i][0]))
         begins.append(0.5 * (a + b))
-        quiet += [(a, begins[-1]), (begins[-1], b)]
+        open_spans += [(a, begins[-1]), (begins[-1], b)]
     return sorted(begins)
 
 
@@ -63,9 +63,9 @@ def closed(system: System, x: Array, stops: Sequence[int]) -> bool:
 
 
 def is_cut(chain: Chain, system: System) -> bool:
-    """Whether a contact with memory is under way where a shot begins."""
+    """Whether a contact whose law latches the entry rate is under way where a shot begins."""
     logs = [solution.contacts for solution in chain.solutions]
-    latched = [np.isin(one.stop, with_memory(system)) for one in logs]
+    latched = [np.isin(one.stop, latching_stops(system)) for one in logs]
     return any(
         np.any(mine & ((one.t_in == 0.0) | np.isnan(one.t_out))) for mine, one in zip(latched, logs, strict=True)
     )

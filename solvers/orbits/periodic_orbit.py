@@ -1,4 +1,4 @@
-"""A periodic motion: its state, contacts, Floquet multipliers, and what speaks against the verdict on its stability."""
+"""A periodic motion: its state, contacts, Floquet multipliers, and why its stability may be in doubt."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from solvers.exponential.method import Exponential
 from solvers.integration import integrate
-from solvers.orbits.shots import Chain, Problem, delayed
+from solvers.orbits.shots import Chain, PeriodicProblem, delayed
 from solvers.problem import Array, ContactLog, Solution, SolverError, System
 
 _NEAR_ONE = 0.01  # | |μ| - 1 | below which a verdict on stability is doubtful
@@ -35,7 +35,7 @@ class Orbit:
     residual : size of Φ(x) - x relative to the orbit's. iterations : of Newton's method.
     contacts : log of one period, times counted from ``phase``.
     system, method : of what, and how it was integrated.
-    doubt : why the verdict on stability may be wrong; empty when nothing speaks against it.
+    doubt : why `stable` may be wrong; empty when no reason was found.
     parameter : value of the branch's parameter, NaN outside a branch.
     mark : "fold", "flip", "neimark-sacker", "branch point", "grazing", "floor" or "merging" at special points of a
         branch, else empty. Two orbits marked "merging" follow each other where a branch jumps because two contacts
@@ -99,7 +99,7 @@ def flown(system: System, x: Array, duration: float, method: Any) -> Array:
     return state
 
 
-def orbit_of(problem: Problem, chain: Chain, residual: float, iterations: int, **more: Any) -> Orbit:
+def orbit_of(problem: PeriodicProblem, chain: Chain, residual: float, iterations: int, **more: Any) -> Orbit:
     """The orbit a solved chain describes."""
     system, period = problem.make(chain.parameter)
     phase = problem.fractions[0] * period
@@ -113,7 +113,7 @@ def orbit_of(problem: Problem, chain: Chain, residual: float, iterations: int, *
 
 
 def judged(orbit: Orbit) -> Orbit:
-    """The orbit with what speaks against its verdict on stability, after a look at a tighter tolerance."""
+    """The orbit with the reasons why `stable` may be wrong, checked with a tighter tolerance too."""
     n, x = orbit.system.size, orbit.state
     tight = replace(orbit.method, rtol=max(0.03 * orbit.method.rtol, 1e-12))
     later = delayed(orbit.system, orbit.phase)
@@ -126,7 +126,7 @@ def judged(orbit: Orbit) -> Orbit:
 
 
 def _doubts(orbit: Orbit) -> Iterator[str]:
-    """What speaks against the verdict at first sight."""
+    """Reasons that the orbit itself shows."""
     largest = abs(orbit.multipliers[0])
     if abs(largest - 1.0) < _NEAR_ONE:
         yield f"|μ| = {largest:.6g} is within {_NEAR_ONE:g} of one"
@@ -134,5 +134,5 @@ def _doubts(orbit: Orbit) -> Iterator[str]:
     if len(log) and log.speed_in.min() < 0.01 * log.speed_in.max():
         slowest = log.speed_in.argmin()
         yield f"the contact at {log.t_in[slowest]:.6g} s grazes: it is entered at {log.speed_in[slowest]:.3g} m/s"
-    elif np.any(log.floored):
+    elif np.any(log.entry_rate_clipped):
         yield "an entry rate lies below its law's floor"

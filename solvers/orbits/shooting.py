@@ -8,7 +8,7 @@ of m shots (one, or several where errors grow too fast within a period) converge
 `solvers.exponential.tangent` differentiates the shots exactly. Floquet multipliers are the eigenvalues of the monodromy
 matrix, the product of the shots' tangents.
 
-A law that latches its entry rate remembers the past while in contact, so a shot may begin only while every such stop is
+A law that depends on the entry rate needs the past while in contact, so a shot may begin only while every such stop is
 open: `Orbit.phase` is the time within the period to which `Orbit.state` belongs, zero wherever that is possible.
 """
 
@@ -24,9 +24,9 @@ from numpy.typing import ArrayLike
 from solvers.exponential.method import Exponential
 from solvers.integration import integrate
 from solvers.orbits.newton import newton, weights
-from solvers.orbits.open_times import closed, is_cut, quiet_begins, with_memory
+from solvers.orbits.open_times import closed, is_cut, latching_stops, open_begins
 from solvers.orbits.periodic_orbit import Orbit, OrbitError, at_zero, flown, judged, orbit_of
-from solvers.orbits.shots import Chain, Problem
+from solvers.orbits.shots import Chain, PeriodicProblem
 from solvers.problem import Array, System
 from solvers.problem.run_arguments import check_slopes
 
@@ -94,9 +94,9 @@ def _near(system: System, period: float, x: Array, method: Any, shots: int | Non
 def _from_zero(orbit: Orbit) -> Orbit:
     """The orbit seen from t = 0 if no stop that latches is closed then."""
     x = at_zero(orbit)
-    if orbit.phase == 0.0 or closed(orbit.system, x, with_memory(orbit.system)):
+    if orbit.phase == 0.0 or closed(orbit.system, x, latching_stops(orbit.system)):
         return orbit
-    problem = Problem(_Constant(orbit.system, orbit.period), orbit.method)
+    problem = PeriodicProblem(_Constant(orbit.system, orbit.period), orbit.method)
     try:
         chain, residual, iterations = newton(problem, x[None, :], 0.0)
     except OrbitError:
@@ -105,7 +105,7 @@ def _from_zero(orbit: Orbit) -> Orbit:
 
 
 def _check_isolated(chain: Chain, W: Array) -> None:
-    """An orbit whose neighbours are orbits too, or that only rounding holds, is none."""
+    """Refuse an orbit whose neighbours are orbits too, to rounding."""
     away = W @ (chain.monodromy() - np.eye(len(W))) @ np.linalg.inv(W)
     values = np.linalg.svd(away, compute_uv=False)
     if values[-1] <= 1e-12 * max(values[0], 1.0):
@@ -113,7 +113,7 @@ def _check_isolated(chain: Chain, W: Array) -> None:
 
 
 def checked(system: System, period: float, method: Any, shots: int | None) -> Any:
-    """The method, after a look at everything else."""
+    """The method; the other arguments are checked too."""
     if not 0.0 < period < math.inf:
         raise ValueError(f"period must be positive and finite (s), got {period!r}")
     if shots is not None and not (isinstance(shots, int) and 1 <= shots <= 100):
@@ -159,11 +159,13 @@ def settled(system: System, period: float, method: Any, longest: int = 400) -> A
     return flown(system, np.zeros(2 * system.size), count * period, replace(method, rtol=max(method.rtol, 1e-8)))
 
 
-def solved_chain(system: System, period: float, x: Array, method: Any, count: int) -> tuple[Problem, Chain, float, int]:
+def solved_chain(
+    system: System, period: float, x: Array, method: Any, count: int
+) -> tuple[PeriodicProblem, Chain, float, int]:
     """The chain of an orbit near a state, with its relative residual and the iterations.
 
-    The orbit's contacts may lie elsewhere than the guess's: where one with memory is under way at the begin of a shot,
-    which knows nothing of its entry rate, the shots begin anew in quiet times.
+    The orbit's contacts may lie elsewhere than the guess's. A shot that begins in a contact lacks its entry rate; if
+    the law depends on it, the shots are begun again in open intervals.
     """
     for _ in range(_MOST_BEGINS):
         problem, guess = _start_chain(system, period, x, method, count)
@@ -174,17 +176,17 @@ def solved_chain(system: System, period: float, x: Array, method: Any, count: in
     raise OrbitError("wherever shots begin, a contact of the orbit whose law latches the entry rate is under way")
 
 
-def _start_chain(system: System, period: float, x: Array, method: Any, count: int) -> tuple[Problem, Array]:
-    """Shots that begin in quiet times, and a guess of their states from a run over one period."""
+def _start_chain(system: System, period: float, x: Array, method: Any, count: int) -> tuple[PeriodicProblem, Array]:
+    """Shots that begin in open intervals, and a guess of their states from a run over one period."""
     n = system.size
     first = integrate(system, x[:n], x[n:], period, method=method)
-    begins = quiet_begins(system, first.contacts, period, count, not closed(system, x, range(len(system.contacts))))
-    if not begins and not closed(system, x, with_memory(system)):
+    begins = open_begins(system, first.contacts, period, count, not closed(system, x, range(len(system.contacts))))
+    if not begins and not closed(system, x, latching_stops(system)):
         begins = [0.0]
     if len(begins) < count:
         raise OrbitError("at no time of the period are all stops open whose law latches the entry rate")
     states = [x if t == 0.0 else flown(system, x, t, method) for t in begins]
-    return Problem(_Constant(system, period), method, tuple(t / period for t in begins)), np.array(states)
+    return PeriodicProblem(_Constant(system, period), method, tuple(t / period for t in begins)), np.array(states)
 
 
 @dataclass(frozen=True)

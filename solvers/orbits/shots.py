@@ -38,7 +38,7 @@ def delayed(system: System, delay: float) -> System:
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class PeriodicProblem:
     """A family of periodic problems: the system and its period for each value of a parameter.
 
     ``fractions`` (m,) are the shots' begins in units of the period, ascending; ``step`` is the parameter's difference,
@@ -77,8 +77,8 @@ class Problem:
             residual[i] = np.concatenate((solution.q[-1], solution.q_dot[-1])) - x[(i + 1) % m]
             tangents.append(solution.tangent[:, : 2 * n])
             if h:
-                stretch = (sides[1][i][1] - sides[0][i][1]) / (2.0 * h)
-                by_parameter[i] = solution.tangent[:, -1] + solution.rate * stretch
+                lengthening = (sides[1][i][1] - sides[0][i][1]) / (2.0 * h)
+                by_parameter[i] = solution.tangent[:, -1] + solution.rate * lengthening
             solutions.append(solution)
         return Chain(x, parameter, residual, np.array(tangents), by_parameter, solutions, slope or self.step == 0.0)
 

@@ -1,7 +1,8 @@
-"""What a run returns: states, contact log, energy ledger, status, cost."""
+"""What a run returns: states, contact log, energy balance, status, cost."""
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
 from enum import Enum
@@ -63,7 +64,7 @@ class ContactLog:
     ----------
     stop : index of the stop. t_in, t_out : s. speed_in, speed_out : m/s, both positive.
     peak_indentation : m. peak_force : N. impulse : N s. energy_loss : J taken out of the beam.
-    floored : whether the entry speed was below the law's floor (also for a contact that began at t = 0).
+    entry_rate_clipped : whether the entry speed was below the law's floor (also for a contact that began at t = 0).
     """
 
     stop: Any
@@ -75,7 +76,13 @@ class ContactLog:
     peak_force: Array
     impulse: Array
     energy_loss: Array
-    floored: Any
+    entry_rate_clipped: Any
+
+    @property
+    def floored(self) -> Any:
+        """Old name of `entry_rate_clipped`."""
+        warnings.warn("ContactLog.floored is now entry_rate_clipped", DeprecationWarning, stacklevel=2)
+        return self.entry_rate_clipped
 
     def __len__(self) -> int:
         return len(self.stop)
@@ -130,7 +137,7 @@ def _make_whole(row: Array, rest: Array, later: float) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Energy:
-    """Ledger at the output times, J: stored - initial = input - damping - contact + residual.
+    """Energy balance at the output times, J: stored - initial = input - damping - contact + residual.
 
     ``input`` is the work of all loads, ``damping`` what C took, ``contact`` the work done on the stops (in a contact
     it contains what the stop will give back), ``residual`` the error.
@@ -149,11 +156,11 @@ class Energy:
         return cls(powers[:, 0], powers[:, 1], powers[:, 2::2].sum(axis=1), stored, float(initial))
 
     def __repr__(self) -> str:
-        return f"<energy ledger of {counted(len(self.stored), 'sample')}>"
+        return f"<energy balance of {counted(len(self.stored), 'sample')}>"
 
     @property
     def residual(self) -> Array:
-        """What the ledger does not account for."""
+        """What the energy balance does not account for."""
         return self.stored - self.initial - self.input + self.damping + self.contact
 
 
@@ -175,7 +182,7 @@ class Solution:
     Attributes
     ----------
     t : (k,) s. q, q_dot : (k, n) coordinates and rates then; without output samples k = 1, the end.
-    contacts : log, and energy : ledger, made when first looked at, by calling ``log`` and ``ledger``.
+    contacts : log, and energy : energy balance, made when first looked at, by calling ``log`` and ``ledger``.
     status : how it ended. cost : what it took.
     tangent : (2n, 2n or 2n + 1) derivative of the final [q, q̇], and rate : (2n,) its derivative by time; None unless
         asked for.
@@ -215,5 +222,5 @@ class Solution:
 
     @cached_property
     def energy(self) -> Energy:
-        """The energy ledger."""
+        """The energy balance."""
         return self.ledger()

@@ -84,7 +84,7 @@ def _given_times(duration: float, given: ArrayLike) -> Array:
 
 
 def _check_laws(system: System) -> None:
-    """Every law is finite at rest, so that a NaN is met before the run; looked at once per system."""
+    """Every law is finite at rest, so that a NaN is found before the run; checked once per system."""
     if system.about_laws.get("finite"):
         return
     delta = np.array([1e-12, 1e-6, 1e-3])

@@ -134,7 +134,7 @@ class System:
         self._check_contacts_and_loads()
 
     def _check_contacts_and_loads(self, known: Sequence[Any] = ()) -> None:
-        """Contacts and loads fit the matrices; of the loads with known vectors only the signals are looked at."""
+        """Contacts and loads fit the matrices; of loads with unchanged vectors only the signals are checked."""
         object.__setattr__(self, "contacts", tuple(self.contacts))
         object.__setattr__(self, "loads", tuple(self._load(i, pair, known) for i, pair in enumerate(self.loads)))
         for i, contact in enumerate(self.contacts):

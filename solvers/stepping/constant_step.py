@@ -10,7 +10,7 @@ import numpy as np
 
 from solvers.problem import Array, Forcing, System
 from solvers.stepping.critical_step import eigen_oscillators
-from solvers.stepping.events import IGNORED, LANDED
+from solvers.stepping.events import IGNORED, LOCATED
 from solvers.stepping.stability import Limit, Radius, limit
 
 
@@ -33,7 +33,7 @@ class ConstantStep(ABC):
     @property
     def events(self) -> int:
         """What is done about events."""
-        return LANDED if self.locate else IGNORED
+        return LOCATED if self.locate else IGNORED
 
     @property
     @abstractmethod
@@ -90,7 +90,7 @@ class ConstantStep(ABC):
 
 
 def refuse(method: ConstantStep, system: System, duration: float) -> None:
-    """ValueError for a step above its limit; looked at once per system."""
+    """ValueError for a step above its limit; checked once per system."""
     key = "limit", type(method), method.constants, duration
     if key not in system.kept:
         system.kept[key] = method.stable_dt(system, duration=duration)

@@ -47,7 +47,7 @@ def eigen_oscillators(M: Any, C: Any, K: Any) -> tuple[Array, Array]:
 
 
 def _oscillators_of(values: Array) -> tuple[Array, Array]:
-    """(k, c) of eigenvalues, without those that are nothing but rounding."""
+    """(k, c) of eigenvalues, without those of rounding's size."""
     size = np.abs(values)
     values = values[size >= _NOTHING * size.max(initial=0.0)]
     real = np.abs(values.imag) <= _NOTHING * np.abs(values)

@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 from solvers.compiled.dop853_tableau import E3, E5, EXTENDED, STAGES, A, C, D
 from solvers.compiled.kernels import copy, inner, kernel, rhs
 from solvers.problem import Array, Forcing, System
-from solvers.stepping.events import LANDED
+from solvers.stepping.events import LOCATED
 
 
 @kernel
@@ -89,7 +89,7 @@ def _interpolant(h, x, x_new, work, dense):
 
 @dataclass(frozen=True)
 class DormandPrince:
-    """DOP853 with every entry, exit and kink landed on; the independent reference for any problem.
+    """DOP853 with every entry, exit and kink located; the independent reference for any problem.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ class DormandPrince:
     atol: float = 1e-14
 
     adaptive: ClassVar[bool] = True
-    events: ClassVar[int] = LANDED
+    events: ClassVar[int] = LOCATED
     work_rows: ClassVar[int] = EXTENDED + 2
     constants: ClassVar[tuple[float, ...]] = ()
 

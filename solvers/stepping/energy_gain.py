@@ -1,4 +1,4 @@
-"""Whether a run gains energy that nothing gave it: the sign of a step beyond the limit of stability."""
+"""Whether a run gains energy without input: the sign of a step beyond the limit of stability."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 
 from solvers.compiled.kernels import inner, kernel
 from solvers.problem import Array, System
-from solvers.stepping.stability import takes, work_of
+from solvers.stepping.stability import is_dissipative, work_of
 
 NOW, BEGAN, LEAST, IN_A_ROW, MOST_INPUT, HELD = range(6)  # places in `Space.watch`, see `watched`
 
 
-STEPS_OF_GAIN = 8  # steps in a row: one alone may be the ledger's, as in the first step of a load
+STEPS_OF_GAIN = 8  # steps in a row: one alone may be the energy balance's, as in the first step of a load
 
 
 _FAR, STEPS_FAR = 1e3, 3  # times the energy given, and then steps in a row
@@ -22,12 +22,12 @@ _FAR, STEPS_FAR = 1e3, 3  # times the energy given, and then steps in a row
 
 @kernel
 def gains(problem, state, space):
-    """Whether for some steps there is twice the energy that was ever there or came in, or far more for a few."""
+    """Whether for some steps the energy exceeds twice the initial energy plus all input, or by far for fewer steps."""
     ledger = 2 * problem.k.size
     watch = space.watch
     watch[MOST_INPUT] = max(watch[MOST_INPUT], state.x[ledger])
     given = watch[BEGAN] + watch[MOST_INPUT]
-    for s in range(problem.gap.size):  # a stop gives at most what it held
+    for s in range(problem.gap.size):  # a stop returns at most what it stored
         given += min(max(-state.x[ledger + 2 + 2 * s], 0.0), watch[HELD + s])
     more = watch[NOW] > 2.0 * given + watch[LEAST]
     watch[IN_A_ROW] = watch[IN_A_ROW] + 1.0 if more else 0.0
@@ -37,7 +37,7 @@ def gains(problem, state, space):
 
 @inner
 def modal_gains(problem, state, space):
-    """The same on decoupled modes; damping that couples them has an energy of its own form, looked at outside."""
+    """The same on decoupled modes; coupling damping has another form of the energy, checked by the engine."""
     if problem.loss.shape[0] > 0:
         return False
     n, energy = problem.k.size, 0.0
@@ -48,15 +48,15 @@ def modal_gains(problem, state, space):
 
 
 def watched(system: System, motion: Array, least: float) -> Array:
-    """What `gains` looks at, J: stored now, at the start, negligible; steps that gained; most input, held by stops."""
+    """What `gains` compares, J: stored now, at the start, negligible; steps that gained; most input, held by stops."""
     q, q_dot = np.split(motion, 2)
     stored = abs(float(system.energy(q, q_dot)))
     known = system.about_laws
-    if "take" not in known:
-        known["take"] = [takes(contact.law) for contact in system.contacts]
+    if "dissipative" not in known:
+        known["dissipative"] = [is_dissipative(contact.law) for contact in system.contacts]
     held = [
-        work_of(contact.law, -float(contact.direction @ q) - contact.gap) if fair else math.inf
-        for contact, fair in zip(system.contacts, known["take"], strict=True)
+        work_of(contact.law, -float(contact.direction @ q) - contact.gap) if dissipative else math.inf
+        for contact, dissipative in zip(system.contacts, known["dissipative"], strict=True)
     ]
     return np.array([stored, stored, least, 0.0, 0.0, *held])
 

@@ -28,7 +28,7 @@ from solvers.stepping.stability import kinks_of, shortest_contact
 
 
 def absolute_tolerance(method: Any, problem: Any, z: Array, fastest: float) -> float:
-    """The method's own, or less where start and loads are so small that it would stand above rtol times the motion."""
+    """The method's own, or less where start and loads are so small that it would exceed rtol times the motion."""
     p, v = np.abs(z).reshape(2, -1).max(axis=1)
     push = np.abs(problem.load).max(axis=1, initial=0.0) @ largest_loads(problem) / fastest
     size = max(p, v / fastest, push / fastest)
@@ -64,11 +64,11 @@ class Engine:
         )
 
     def keeps_ledger(self, sampled: bool) -> bool:
-        """The ledger is integrated along, always."""
+        """The energy balance is integrated along, always."""
         return True
 
     def march(self, budget: int, log: Array, out: Array, due: Array) -> int:
-        """Go on for a stretch."""
+        """Advance by at most ``budget`` steps."""
         method = self.method
         dt_flight, dt_contact = (math.inf, math.inf) if method.adaptive else method.steps
         code = march(
@@ -79,7 +79,7 @@ class Engine:
         return GAINED if code in (DONE, RUNNING) and self._gained() else code
 
     def _gained(self) -> bool:
-        """Whether a run with coupled damping holds more energy than it was ever given; see `gains`."""
+        """Whether a run with coupling damping gained energy; see `gains`."""
         if not self.problem.loss.size or self.method.adaptive:
             return False
         size = 2 * self.problem.k.size

@@ -1,4 +1,4 @@
-"""Where, within one step, a stop leaves its piece of the law: flight, or a stretch between two knots.
+"""Where, within one step, a stop leaves its segment of the law: free flight, or the range between two knots.
 
 Inside a step the indentation is the polynomial of the method's dense output,
 ``δ(θ) = δ₀ + θ(r₀ + (1-θ)(r₁ + θ(r₂ + (1-θ)(r₃ + ...))))``, θ in [0, 1].
@@ -16,8 +16,8 @@ UNRESOLVED = -1.0
 NONE = 2.0
 MOST_LANDINGS = 60
 """Steps tried to land: where the level is only just reached Newton halves its distance, so does bisection."""
-IGNORED, HENON, LANDED = range(3)
-"""What a method does about events: pieces follow at the end of a step; Hénon's step onto an entry; all landed on."""
+IGNORED, HENON, LOCATED = range(3)
+"""What a method does about events: pieces follow at the end of a step; Hénon's step onto an entry; all located."""
 
 
 @inner

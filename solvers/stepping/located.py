@@ -27,7 +27,7 @@ from solvers.compiled.state import (
 )
 from solvers.stepping.events import (
     IGNORED,
-    LANDED,
+    LOCATED,
     MOST_LANDINGS,
     NONE,
     coefficients_of,
@@ -45,7 +45,7 @@ _PEAK_NODES = np.linspace(0.0, 1.0, 9)
 _KINK_NODES = np.array([0.0, 1 / 16, 1 / 4, 1 / 2, 3 / 4, 7 / 8, 31 / 32, 127 / 128, 511 / 512, 1.0])
 
 
-_AT_AN_END = 1e-6  # share of a step: a kink as near to an end as that is landed on
+_AT_AN_END = 1e-6  # share of a step: a kink as near to an end as that counts as reached
 
 
 @inner
@@ -136,7 +136,7 @@ def _sample(state, space, h, out, due):
 
 @kernel
 def landing_tolerance(problem, state, stop):
-    """Distance from a level that counts as landed on it."""
+    """Distance from a level that counts as reached."""
     return 4.0 * surface_tolerance(problem, stop, state.x)
 
 
@@ -196,7 +196,7 @@ def look(problem, state, t_end, log, events):
     if events == IGNORED:
         switched = _switch_by_sign(problem, state, log)
     else:
-        switched = switch_on_surface(problem, state, log, events == LANDED)
+        switched = switch_on_surface(problem, state, log, events == LOCATED)
     return EVENT if switched else RUNNING
 
 

@@ -1,4 +1,4 @@
-"""THE main loop of the stepping methods: try a step, look for events, land, accept, record.
+"""The main loop of the stepping methods: try a step, look for events, locate them, accept, record.
 
 A method is one compiled ``step`` of declared signature, so a new method does not recompile the loop.
 """
@@ -37,7 +37,7 @@ from solvers.problem import Array
 from solvers.stepping.energy_gain import modal_gains
 from solvers.stepping.events import (
     HENON,
-    LANDED,
+    LOCATED,
     NONE,
     UNRESOLVED,
     entry_by_sign,
@@ -63,7 +63,7 @@ class Space(NamedTuple):
     work: Any  # (rows, x.size) of the method
     coefficients: Any  # (2, 8)
     watch: Any  # see `watched`
-    kinks: Any  # (m,) where laws bend inside a piece, see `stability.kinks_of`; looked at under error control
+    kinks: Any  # (m,) where laws have kinks inside a segment, see `stability.kinks_of`; used under error control
 
 
 SPACE = types.NamedTuple([VECTOR, VECTOR, MATRIX, MATRIX, MATRIX, VECTOR, INTEGERS], Space)
@@ -95,7 +95,7 @@ def march(
     """Advance the state to ``t_end`` or for ``budget`` steps; returns a status code."""
     now, count = state.now, state.count
     not_finite, by_hand = False, False
-    nearest = 0.0  # what is nearer to a kink than this is on it: there rounding switches the law to and fro
+    nearest = 0.0  # a kink nearer than this has been reached: there rounding switches the law to and fro
     for _ in range(budget):
         # --- end of the run, and what can stop it early
         code = look(problem, state, t_end, log, events)
@@ -124,7 +124,7 @@ def march(
 
         # --- events
         stop, direction, tried = -1, 0, h
-        if events == LANDED:
+        if events == LOCATED:
             theta, stop, direction, level = find(problem, state, space)
             if theta == UNRESOLVED:
                 now[phase] = h / 32.0
@@ -154,7 +154,7 @@ def march(
                 )
                 hermite(h, state.x, state.rate, space.x_new, space.rate_new, space.dense)
 
-        # --- a law that bends within its piece: end there, the error of a step across it is not what is estimated
+        # --- a law with a kink inside its segment: end the step there, the error estimate fails across it
         if adaptive and phase == H_CONTACT:
             theta = _kink(problem, state, space)
             if theta < NONE and theta * h > nearest:

@@ -126,7 +126,7 @@ def step(problem, t, h, x, rate, piece, entry_rate, x_new, rate_new, dense, work
     calls += rhs(problem, t + h, x_new, piece, entry_rate, rate_new, work[2])
     if alpha_m != 0.0 or alpha_f != 0.0:
         copy(effective, rate_new[n : 2 * n], n)
-    for i in range(2 * n, x.size):  # the ledger by the trapezoidal rule
+    for i in range(2 * n, x.size):  # the energy balance by the trapezoidal rule
         x_new[i] = x[i] + 0.5 * h * (rate[i] + rate_new[i])
     hermite(h, x, rate, x_new, rate_new, dense)
     return 0.0, calls

@@ -47,7 +47,7 @@ class RK4(ConstantStep):
     Parameters
     ----------
     dt : step, s.
-    locate : land on every entry, exit and kink (on the cubic interpolant); False lets the force act from the end of the
+    locate : locate every entry, exit and kink (on the cubic interpolant); False lets the force act from the end of the
         step in which a contact began, to show what that costs.
     force_unstable : run even where the step is predicted to be unstable.
 

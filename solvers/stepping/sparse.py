@@ -28,7 +28,7 @@ from solvers.compiled.state import (
 from solvers.problem import Array, Forcing, Status, System
 from solvers.stepping.energy_gain import LEAST, NOW, gains, negligible_energy, watched
 from solvers.stepping.engine import explanation
-from solvers.stepping.events import LANDED, MOST_LANDINGS, NONE, UNRESOLVED, nearer
+from solvers.stepping.events import LOCATED, MOST_LANDINGS, NONE, UNRESOLVED, nearer
 from solvers.stepping.henon import hermite
 from solvers.stepping.located import EVENT, accept, find, landing_tolerance, look
 from solvers.stepping.loop import new_space
@@ -69,7 +69,7 @@ class MatrixEngine:
         self.rate(self.state.now[T], self.state.x, self.state.rate)
 
     def keeps_ledger(self, sampled: bool) -> bool:
-        """The ledger is integrated along, always."""
+        """The energy balance is integrated along, always."""
         return True
 
     def march(self, budget: int, log: Array, out: Array, due: Array) -> int:
@@ -86,7 +86,7 @@ class MatrixEngine:
             state.now[H_FLIGHT] = method.dt
             self.attempt(h)
             stop, direction = -1, 0
-            if method.events == LANDED:
+            if method.events == LOCATED:
                 theta, stop, direction, level = find(self.problem, state, space)
                 h = self._landed(h, theta, stop, direction, level)
                 if h < 0.0:  # look closer
@@ -105,7 +105,7 @@ class MatrixEngine:
 
     def attempt(self, h: float) -> None:
         """One step from the present state."""
-        with np.errstate(all="ignore"):  # what is not finite is told by `accept`
+        with np.errstate(all="ignore"):  # `accept` reports what is not finite
             self.method.matrix_step(self, h)
         _interpolate(h, self.state, self.space)
 

@@ -188,8 +188,8 @@ def work_of(law: Any, delta: float) -> float:
     return 0.0 if delta <= 0.0 else 0.5 * delta * float(_WEIGHTS @ law.force(0.5 * delta * (1.0 + _NODES), 0.0, 1.0))
 
 
-def takes(law: Any) -> bool:
-    """Whether a law never gives more energy than it took: it pushes at rest, and its damping is against the motion."""
+def is_dissipative(law: Any) -> bool:
+    """Whether a law is dissipative: it pushes at rest, and its damping acts against the motion."""
     deepest = 2.0 * _depth(law, 1.0, EXPECTED_SPEED)
     delta, rate = np.meshgrid(deepest * np.geomspace(1e-6, 1.0, 13), np.linspace(-2.0, 2.0, 9))
     slow = law.force(delta, 0.0, EXPECTED_SPEED)
@@ -208,7 +208,7 @@ def kinks_of(system: System) -> list[int]:
 
 
 def _kinks(law: Any) -> int:
-    """The same of a law, by trying it out: a user's law need not declare its bends."""
+    """The same of a law, from samples of its force: a user's law need not declare them."""
     delta = 2.0 * _depth(law, 1.0, EXPECTED_SPEED) * np.geomspace(1e-6, 1.0, 13)
     with np.errstate(all="ignore"):
         cut = any(np.any(law.force(delta, rate, EXPECTED_SPEED) == 0.0) for rate in (-1e3, -1.0, 1.0))

@@ -27,17 +27,17 @@ import solvers.branches.walk
 from solvers import Branch, DormandPrince, Orbit, OrbitError, branch, integrate, orbit
 from solvers.branches.continuation import BranchStatus
 from solvers.branches.grazing import signature
-from solvers.orbits import Problem, delayed, flown, quiet_begins
+from solvers.orbits import PeriodicProblem, delayed, flown, open_begins
 
 CHECKED = 5  # orbits of a branch that are integrated again
 
 
 class Counted:
-    """`Problem.evaluate`, counted."""
+    """`PeriodicProblem.evaluate`, counted."""
 
     def __init__(self) -> None:
-        self.count, self.evaluate = 0, Problem.evaluate
-        Problem.evaluate = lambda *arguments: self(*arguments)  # type: ignore[method-assign]
+        self.count, self.evaluate = 0, PeriodicProblem.evaluate
+        PeriodicProblem.evaluate = lambda *arguments: self(*arguments)  # type: ignore[method-assign]
 
     def __call__(self, *arguments):
         """One evaluation."""
@@ -57,12 +57,12 @@ def drift(one: Orbit, method: Any) -> tuple[float, int]:
 def reach(one: Orbit, error: float) -> float:
     """How far an error can carry an orbit off by the end of two periods, of its size.
 
-    The error is one of each coordinate's size, either way, made at a quiet time, of which there are up to eight; its
+    The error is one of each coordinate's size, either way, made at an open time, of which there are up to eight; its
     worst direction lies within √(2n) of theirs. Beside a jump of the return map such errors end on its other side.
     """
     n, run, worst = one.system.size, one.samples(), 0.0
     scale = np.concatenate([np.full(n, np.abs(part).max()) for part in (run.q, run.q_dot)])
-    for t in [0.0, *quiet_begins(one.system, one.contacts, one.period, 8, False)]:
+    for t in [0.0, *open_begins(one.system, one.contacts, one.period, 8, False)]:
         x = flown(delayed(one.system, one.phase), one.state, t, one.method) if t else one.state
         for off in error * np.vstack((np.diag(scale), -np.diag(scale))):
             end = flown(delayed(one.system, one.phase + t), x + off, 2.0 * one.period - t, one.method)
@@ -90,8 +90,8 @@ def check_orbits(seed: int, found: Branch, ends: Counter[str]) -> None:
 
 def check_marks(seed: int, found: Branch, ends: Counter[str]) -> None:
     """Tell what changes between two orbits without a mark."""
-    for arm in found.arms:
-        for a, b in pairwise(arm.orbits):
+    for walk in found.walks:
+        for a, b in pairwise(walk.orbits):
             for what, before, after in (("contacts", *map(signature, (a, b))), ("stability", a.stable, b.stable)):
                 if before != after and not (a.mark or b.mark):
                     ends[f"unmarked {what}"] += 1
@@ -130,12 +130,12 @@ def main(count: str = "100", first: str = "0", over: str = "omega", most: str = 
         assert all(one.residual <= 1e-10 and span[0] <= one.parameter <= span[1] for one in found.orbits), seed
         check_orbits(seed, found, checks)
         check_marks(seed, found, checks)
-        for arm in found.arms:
-            ends[arm.status.name] += 1
-            if arm.status in (BranchStatus.LOST, BranchStatus.JUMP):
-                last = arm.orbits[-1]
+        for walk in found.walks:
+            ends[walk.status.name] += 1
+            if walk.status in (BranchStatus.LOST, BranchStatus.JUMP):
+                last = walk.orbits[-1]
                 laws = [(contact.law, round(contact.gap, 6)) for contact in last.system.contacts]
-                print(f"seed {seed}: {arm.status.name} at {last.parameter:.9g}, {len(arm.orbits)} orbits, {laws}, "
+                print(f"seed {seed}: {walk.status.name} at {last.parameter:.9g}, {len(walk.orbits)} orbits, {laws}, "
                       f"entered at {last.contacts.speed_in} m/s, |mu| {np.abs(last.multipliers)}")  # fmt: skip
     print(
         f"{count} systems of {stops} stop(s) over {over}: directions ended {dict(ends)}; special points {dict(marks)}"

@@ -1,4 +1,4 @@
-"""Finished realisations in one file that is written whole, so that a study goes on where it was interrupted."""
+"""Finished realisations in one file that is written whole, so that a study continues where it was interrupted."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def _deciding(text: str | None) -> str | None:
 
 
 def _difference(name: str, theirs: str | None, ours: str | None) -> str:
-    """What differs, in words."""
+    """What differs, as text."""
     readable = [None if text is None else text.partition(" #")[0] for text in (theirs, ours)]
     if readable[0] == readable[1]:
         return f"{name} {_short(readable[1])} has other code, or reads other values, than there"

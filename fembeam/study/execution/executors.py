@@ -1,4 +1,4 @@
-"""One function over many items: here in turn, or on whatever executor the user brings.
+"""One function over many items: here in turn, or on the user's executor.
 
 Any `concurrent.futures.Executor` will do: threads, processes, `dask.distributed.Client.get_executor()`,
 `mpi4py.futures.MPIPoolExecutor`. Results come in the order of the items, whichever is ready first.

@@ -163,16 +163,19 @@ def _brackets(family: _Family) -> Any:
 def _zoom(family: _Family, begin: float, end: float) -> Any:
     """(2S + 2, 2S): δ and h δ̇ at the points `LOCAL` of [begin, end] from those at the nodes and at the step's begin.
 
-    δ is Hermite's polynomial in σ, its rate the slope over dt/dσ. Where that vanishes, beside the begin of an entry
-    step, the rate is δ̇(0) + σ^κ × the polynomial through (δ̇ - δ̇(0))/σ^κ at the nodes.
+    δ is Hermite's polynomial in σ. δ̇ of a smooth step is the polynomial through its values: in a short one the slope of
+    the former is the rounding of δ over h. On an entry step it is that slope over dt/dσ, and where that vanishes, beside
+    the begin, δ̇(0) + σ^κ × the polynomial through (δ̇ - δ̇(0))/σ^κ at the nodes.
     """
     x, y = np.append(family.nodes, 0.0), begin + 0.5 * (LOCAL + 1.0) * (end - begin)
     basis, turn = _interpolation(x, y), _differentiation(x)
     slopes, own = basis @ turn, np.diag(turn)
     apart = y[:, None] - x
-    by_value, by_slope = (1.0 - 2.0 * own * apart) * basis**2, apart * basis**2
     pace_x, pace_y = (family.power * place ** (family.power - 1.0) for place in (x, y))  # dt/(h dσ)
-    if begin == 0.0 and family.power > 1.0:
+    values = [(1.0 - 2.0 * own * apart) * basis**2, apart * basis**2 * pace_x]
+    if family.power == 1.0:
+        rates = [np.zeros_like(basis), basis]
+    elif begin == 0.0:
         shares = _interpolation(family.nodes, y) * np.divide.outer(y, family.nodes) ** family.power
         rates = [np.zeros_like(basis), np.column_stack((shares, 1.0 - shares.sum(axis=1)))]
     else:
@@ -180,7 +183,7 @@ def _zoom(family: _Family, begin: float, end: float) -> Any:
             (-2.0 * own * basis**2 + 2.0 * (1.0 - 2.0 * own * apart) * basis * slopes) / pace_y[:, None],
             (basis**2 + 2.0 * apart * basis * slopes) * pace_x / pace_y[:, None],
         ]
-    return np.block([[by_value, by_slope * pace_x], rates]).T[_NODES_FIRST]
+    return np.block([values, rates]).T[_NODES_FIRST]
 
 
 def _tail(nodes: Any) -> Any:
