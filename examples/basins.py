@@ -25,7 +25,9 @@ scene = fb.Scene(
 )
 model = scene.reduce(modes=1)
 x_span, y_span = (0.0, 0.04), (-6.0, 6.0)  # m above the stop, m/s
-found = fb.study.basins(model, "displacement", x_span, "velocity", y_span, points=(120, 90), threads=os.cpu_count() or 1)
+found = fb.study.basins(
+    model, "displacement", x_span, "velocity", y_span, points=(120, 90), threads=os.cpu_count() or 1
+)
 
 random = np.random.default_rng(2003)
 places, speeds = random.uniform(*x_span, sample), random.uniform(*y_span, sample)

@@ -1,7 +1,7 @@
 """Figures: one function per question, each returns a matplotlib figure.
 
 `response` and `animation` hold those of one run, `laws` those of contact laws, `orbits` those of periodic motion,
-`random` those of random motion, `study` and `chart` those of studies.
+`basins` maps of starts, `random` those of random motion, `mode_count` and `methods` those of studies.
 """
 
 from fembeam.model import places
