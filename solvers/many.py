@@ -140,7 +140,7 @@ def _starts(system: System, q0: ArrayLike, q_dot0: ArrayLike) -> Array:
 
 
 def _products(matrix: Array, rows: Array) -> Array:
-    """matrix · row for each row, every one a product of its own: one of all of them at once rounds otherwise."""
+    """Matrix · row for each row, every one a product of its own: one of all of them at once rounds otherwise."""
     return np.ascontiguousarray(np.matmul(matrix, rows[:, :, None])[:, :, 0])
 
 
@@ -156,10 +156,8 @@ def _check_status(found: ManySolutions, duration: float) -> None:
     if failed:
         first = failed[0]
         others = f" ({len(failed)} of {len(found)} starts failed)" if len(failed) > 1 else ""
-        raise SolverError(
-            f"start {first} stopped at t = {found.t[first]:.9g} s of {duration:g} s: {found.status[first].value}{others}",
-            found,
-        )
+        where = f"start {first} stopped at t = {found.t[first]:.9g} s of {duration:g} s"
+        raise SolverError(f"{where}: {found.status[first].value}{others}", found)
 
 
 def _to_the_end(workers: list[Worker], count: int, progress: Callable[[int], None] | None) -> None:

@@ -78,7 +78,7 @@ def test_coupled_damping_and_a_contact_under_way_at_the_end():
 
 
 def test_long_runs_with_more_contacts_than_the_log_holds_and_more_steps_than_one_call_takes():
-    """A mass between two elastic stops 2 mm apart at 1 m/s: some 500 impacts a second, to within the time in contact."""
+    """A mass between two elastic stops 2 mm apart at 1 m/s: some 500 impacts a second, less a few."""
     stops = [Contact([1.0], Hertz(1e9), 1e-3), Contact([-1.0], Hertz(1e9), 1e-3)]
     system = System([[1.0]], [[0.0]], [[0.0]], stops)
     q, q_dot = np.zeros((3, 1)), np.array([[1.0], [-0.9], [1.1]])
@@ -98,7 +98,8 @@ def test_results_do_not_depend_on_threads_order_or_company():
         np.testing.assert_array_equal(integrate_many(system, q, q_dot, 0.2, threads=threads).q, first.q)
     np.testing.assert_array_equal(integrate_many(system, q[order], q_dot[order], 0.2, threads=2).q, first.q[order])
     np.testing.assert_array_equal(integrate_many(system, q[7:8], q_dot[7:8], 0.2).q_dot, first.q_dot[7:8])
-    assert "300 runs" in repr(first) and "300 finished" in repr(first)
+    assert "300 runs" in repr(first)
+    assert "300 finished" in repr(first)
 
 
 @law
@@ -142,7 +143,8 @@ def test_after_an_interrupt_finished_starts_are_kept(threads):
     found = integrate_many(system, q, q_dot, 1.0, threads=threads, progress=stop)
     left = found.status == Status.INTERRUPTED
     np.testing.assert_array_equal(np.isnan(found.q).any(axis=1), left)
-    assert seen[-1] <= (~left).sum() and (threads > 1 or 0 < left.sum() < 3000)
+    assert seen[-1] <= (~left).sum()
+    assert threads > 1 or 0 < left.sum() < 3000
     done = np.flatnonzero(~left)[:3]
     assert_same(integrate_many(system, q[done], q_dot[done], 1.0), alone(system, q[done], q_dot[done], 1.0, None))
     np.testing.assert_array_equal(found.q[done], integrate_many(system, q[done], q_dot[done], 1.0).q)
@@ -152,7 +154,8 @@ def test_errors_of_the_caller_come_through_and_progress_counts():
     system = paper_scene().reduce(1).system
     seen = []
     integrate_many(system, np.zeros((500, 1)), np.zeros((500, 1)), 0.05, threads=2, progress=seen.append)
-    assert seen[-1] == 500 and seen == sorted(seen)
+    assert seen[-1] == 500
+    assert seen == sorted(seen)
     for threads in (1, 2):
         with pytest.raises(ZeroDivisionError):
             integrate_many(system, np.zeros((50, 1)), np.zeros((50, 1)), 0.05, None, threads, lambda done: 1 // 0)
@@ -200,8 +203,9 @@ def interior(label):
 def test_a_linear_beam_has_one_basin():
     scene = replace(paper_scene(), stops=[])
     found = fb.study.basins(scene.reduce(2), points=(5, 4), threads=2)
-    assert found.label.tolist() == [[0] * 5] * 4 and found.shares.tolist() == [1.0]
-    assert str(found).splitlines()[-1].split() == "period 1 with 0 impacts 20 100.00%".split()
+    assert found.label.tolist() == [[0] * 5] * 4
+    assert found.shares.tolist() == [1.0]
+    assert str(found).splitlines()[-1].split() == ["period", "1", "with", "0", "impacts", "20", "100.00%"]
 
 
 def test_starts_settled_one_by_one_come_to_what_the_map_says(map_of_both):
@@ -226,8 +230,8 @@ def test_basins_are_invariant(map_of_both):
     known = [_Known.of(one.orbit, once) for one in map_of_both.attractors]
     ends = _settled(BOTH, images[None, free], known, 200, once, 1, 0)
     wanted = map_of_both.label[rows, columns][free]
-    # rounding may decide near an edge between grid points; twenty times as many as seen
-    assert np.mean(_labels(ends, known) != wanted) < 0.02
+    # of 65 none is in another basin here; elsewhere rounding may decide for one near an edge between grid points
+    assert np.sum(_labels(ends, known) != wanted) <= 3
 
 
 def test_starts_on_an_orbit_belong_to_it(map_of_both):
@@ -257,7 +261,7 @@ def free_motion(model, starts, gap):
 
 
 def test_a_slow_transient_does_not_make_an_orbit_longer():
-    """At 80 rad/s three periods of the load take nearly four of the beam's own: the transient repeats, the orbit is 1."""
+    """At 80 rad/s three periods of the load are nearly four of the beam's: the transient repeats after 3."""
     found = gapped(0.3, omega=80.0).attractors(starts=3)
     assert [one.name for one in found] == ["period 1 with 0 impacts"]
 
@@ -268,7 +272,9 @@ def test_starts_that_never_touch_a_stop_come_to_the_linear_motion():
     starts = starts_of(found.origin, found.x, found.y).reshape(-1, 2)
     linear = [i for i, one in enumerate(found.attractors) if one.name == "period 1 with 0 impacts"]
     known = free_motion(model, starts, 2e-3)
-    assert known.sum() > 3 and len(linear) == 1 and len(found.attractors) > 1
+    assert known.sum() > 3
+    assert len(linear) == 1
+    assert len(found.attractors) > 1
     assert (found.label.ravel()[known] == linear[0]).all()
 
 
@@ -320,20 +326,25 @@ def test_what_does_not_settle_and_what_fails_is_marked():
     """At 300 rad/s the motion is chaotic; a start deep in the stop at rest is refused by the balance of energy."""
     model = paper_scene(fb.Harmonic(1e-3, 300.0)).reduce(1)
     found = fb.study.basins(model, x_span=(0.0, 0.01), y_span=(-1.0, 1.0), points=4, settle=50)
-    assert (found.label == -1).all() and not found.attractors
-    assert str(found).splitlines()[-1].split() == "not settled 16 100.00%".split()
+    assert (found.label == -1).all()
+    assert not found.attractors
+    assert str(found).splitlines()[-1].split() == ["not", "settled", "16", "100.00%"]
     deep = paper_scene(fb.Harmonic(1e-3, 430.0)).reduce(1)
     mixed = fb.study.basins(deep, x_span=(-0.017, 0.017), y_span=(-0.0451, 0.0451), points=2, settle=25)
-    assert (mixed.label[:, 0] == -2).any() and (mixed.label[:, 1] != -2).all()
-    assert "run failed" in str(mixed) and len(mixed.figure().legends) == 1
+    assert (mixed.label[:, 0] == -2).any()
+    assert (mixed.label[:, 1] != -2).all()
+    assert "run failed" in str(mixed)
+    assert len(mixed.figure().legends) == 1
 
 
 def test_axes_are_what_they_say():
     model = paper_scene().reduce(3)
     pulled = axis_of(model, "displacement", (0.0, 1.0), 2, 0.2).direction
     struck = axis_of(model, "velocity", (0.0, 1.0), 2, 0.2).direction
-    assert model.phi(0.2) @ pulled[:3] == pytest.approx(1.0) and not pulled[3:].any()
-    assert model.phi(0.2) @ struck[3:] == pytest.approx(1.0) and not struck[:3].any()
+    assert model.phi(0.2) @ pulled[:3] == pytest.approx(1.0)
+    assert not pulled[3:].any()
+    assert model.phi(0.2) @ struck[3:] == pytest.approx(1.0)
+    assert not struck[:3].any()
     np.testing.assert_allclose(
         pulled[:3] / pulled[0], model.equilibrium({0.2: 1e-3})[:3] / model.equilibrium({0.2: 1e-3})[0]
     )

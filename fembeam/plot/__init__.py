@@ -1,8 +1,8 @@
 """Figures: one function per question, each returns a matplotlib figure.
 
 `response`, `spectra`, `contact_histograms` and `animation` hold those of one run, `laws` those of contact laws,
-`orbits` those of periodic motion, `random` those of random motion, `mode_count` and `methods` those of studies; `style`
-is what all share. Imports: `statistics`, `model` and the rooms below. Begin with `response`.
+`orbits` those of periodic motion, `basins` maps of starts, `random` those of random motion, `mode_count` and `methods`
+those of studies; `style` is what all share. Imports: `statistics`, `model` and the rooms below. Begin with `response`.
 """
 
 from fembeam.model import places

@@ -34,8 +34,9 @@ from solvers.problem import COLUMNS, Array, ContactLog, Status
 NEXT, BEYOND, BEGUN = range(3)  # places in a cursor: the start at work, the end of its stretch, whether it is under way
 CODE, CONTACTS = range(2)  # columns of Ends.count
 REACHED, EXCHANGED, ENERGY = range(3)  # columns of Ends.number; three of energy, as in Space.energy
-_NAMES = list(ContactLog.__dataclass_fields__)
-_STOP, _DELTA, _FORCE = (_NAMES.index(name) for name in ("stop", "peak_indentation", "peak_force"))
+_STOP, _DELTA, _FORCE = (
+    list(ContactLog.__dataclass_fields__).index(n) for n in ("stop", "peak_indentation", "peak_force")
+)
 _CUBE = types.Array(REAL, 3, "C")
 _RUN = types.FunctionType(advance.nopython_signatures[0])
 _NEVER, _NOWHERE = np.array([np.inf]), np.empty((0, 0))

@@ -153,8 +153,8 @@ def basins(
     >>> scene = fb.Scene(beam, [fb.Clamped(0.0)], base=fb.Harmonic(1e-3, 100.0), damping=fb.ModalDamping(0.05))
     >>> print(basins(scene.reduce(modes=1), points=4))
     4 x 4 starts: displacement at 0.5 m / m from -0.01 to 0.01, velocity at 0.5 m / (m/s) from -1 to 1
-    comes to                    starts    share
-    period 1 with 0 impacts         16  100.00%
+    comes to                 starts    share
+    period 1 with 0 impacts      16  100.00%
     """
     from fembeam.model import observed
 

@@ -32,18 +32,20 @@ def axis_of(model: Model, kind: Any, span: Any, points: int, z: float) -> Axis:
     valid = ends.shape == (2,) and bool(np.isfinite(ends).all()) and ends[0] < ends[1]
     require(valid, "a span must be two finite values, ascending", span, WHERE, "give (lowest, highest)")
     direction, name = _direction(model, kind, z)
-    return Axis(direction, np.linspace(*ends, points), name)
+    return Axis(direction, np.linspace(ends[0], ends[1], points), name)
 
 
 def _direction(model: Model, kind: Any, z: float) -> tuple[Vector, str]:
     """The direction an axis goes, and its name."""
     n = len(model.omega)
-    if kind == "displacement" if isinstance(kind, str) else False:
+    if isinstance(kind, str) and kind == "displacement":
         return np.concatenate((_pulled(model, z), np.zeros(n))), f"displacement at {z:g} m / m"
-    if kind == "velocity" if isinstance(kind, str) else False:
+    if isinstance(kind, str) and kind == "velocity":
         return np.concatenate((np.zeros(n), _shape(model, z, np.ones(n)))), f"velocity at {z:g} m / (m/s)"
     if isinstance(kind, (int, np.integer)) and not isinstance(kind, bool):
-        require(0 <= kind < 2 * n, f"the number of a state must lie in [0, {2 * n})", kind, WHERE, "q first, then q̇")
+        require(
+            bool(0 <= kind < 2 * n), f"the number of a state must lie in [0, {2 * n})", kind, WHERE, "q first, then q̇"
+        )
         return np.eye(2 * n)[kind], f"q[{kind}]" if kind < n else f"q_dot[{kind - n}]"
     advice = f'give "displacement", "velocity", the number of a state, or a vector of {2 * n} numbers'
     require(not isinstance(kind, (str, bool)) and kind is not None, "an axis is not known", kind, WHERE, advice)
@@ -54,7 +56,7 @@ def _direction(model: Model, kind: Any, z: float) -> tuple[Vector, str]:
 
 
 def _pulled(model: Model, z: float) -> Vector:
-    """The q of the shape a force at z bends the beam to, per metre there."""
+    """Q of the shape a force at z bends the beam to, per metre there."""
     loose = (model.omega <= 0.0) & (model.phi(z) != 0.0)
     require(not loose.any(), "a force at z moves the beam without end", z, WHERE, "use velocity, or numbers of states")
     return _shape(model, z, 1.0 / np.where(model.omega > 0.0, model.omega, np.inf) ** 2)
@@ -90,7 +92,7 @@ def checked_plane(model: Model, start: ArrayLike | None, x: Axis, y: Axis) -> Ve
     origin = model.rest() if start is None else np.array(start, dtype=float)
     fine = origin.shape == (size,) and bool(np.isfinite(origin).all())
     require(fine, f"start must be {size} finite numbers", start, WHERE, "use model.state(displacement, velocity)")
-    units = [axis.direction / max(np.linalg.norm(axis.direction), 1e-300) for axis in (x, y)]
+    units = [axis.direction / max(float(np.linalg.norm(axis.direction)), 1e-300) for axis in (x, y)]
     flat = np.linalg.svd(np.array(units), compute_uv=False)[-1] < 1e-9
     require(not flat, "x and y must be two directions", (x.name, y.name), WHERE, "choose another one")
     return origin
