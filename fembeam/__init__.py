@@ -29,6 +29,7 @@ _ROOMS = {
     "scene": "Clamped Dashpot Guided LumpedMass Pinned PointForce PointMoment Scene Spring Stop Impactor",
     "excitation": "Harmonic Multisine BandNoise RollOff Record Pulse Step",
     "model": "Model Attractor Orbit Branch Run load",
+    "response": "response_spectrum",
     "statistics": "moments pdf psd",
 }
 _HOME = {name: room for room, names in _ROOMS.items() for name in names.split()}
@@ -68,6 +69,7 @@ __all__ = [
     "pdf",
     "plot",
     "psd",
+    "response_spectrum",
     "study",
 ]
 
@@ -76,6 +78,7 @@ if TYPE_CHECKING:
     from fembeam.beams import Beam, ModalDamping, Rayleigh, Section, Taper
     from fembeam.excitation import BandNoise, Harmonic, Multisine, Pulse, Record, RollOff, Step
     from fembeam.model import Attractor, Branch, Model, Orbit, Run, load
+    from fembeam.response import response_spectrum
     from fembeam.scene import (
         Clamped,
         Dashpot,

@@ -1,12 +1,13 @@
 """Figures: one function per question, each returns a matplotlib figure.
 
 `response` and `animation` hold those of one run, `laws` those of contact laws, `orbits` those of periodic motion,
-`random` those of random motion, `study` and `chart` those of studies.
+`random` those of random motion, `linear` spectra and frequency response, `study` and `chart` those of studies.
 """
 
 from fembeam.model import places
 from fembeam.plot.animation import animate, frame
 from fembeam.plot.laws import identification, loops, restitutions
+from fembeam.plot.linear import frequency_response, response_spectrum
 from fembeam.plot.methods import failures, speed_accuracy, stability_map
 from fembeam.plot.mode_count import mode_count, smallest_model
 from fembeam.plot.orbits import branch, orbit, peak
@@ -31,6 +32,7 @@ __all__ = [
     "densities",
     "failures",
     "frame",
+    "frequency_response",
     "identification",
     "loops",
     "mode_count",
@@ -41,6 +43,7 @@ __all__ = [
     "places",
     "random_densities",
     "random_spectra",
+    "response_spectrum",
     "responses",
     "restitutions",
     "segment_for",

@@ -5,6 +5,20 @@ Imports: `scene`, `beams`, `support`, `reduction`. Begin with `acceleration`, th
 """
 
 from fembeam.response.acceleration import coordinates, frame_motion, model_of
+from fembeam.response.spectra import ResponseSpectrum, floor_spectrum, response_spectrum
 from fembeam.response.support_reactions import Reaction, Reactions, reactions
+from fembeam.response.transfer import FrequencyResponse, frequency_response
 
-__all__ = ["Reaction", "Reactions", "coordinates", "frame_motion", "model_of", "reactions"]
+__all__ = [
+    "FrequencyResponse",
+    "Reaction",
+    "Reactions",
+    "ResponseSpectrum",
+    "coordinates",
+    "floor_spectrum",
+    "frame_motion",
+    "frequency_response",
+    "model_of",
+    "reactions",
+    "response_spectrum",
+]
