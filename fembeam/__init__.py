@@ -27,7 +27,7 @@ __version__ = "0.1.0"
 _ROOMS = {
     "beams": "Section Taper Beam ModalDamping Rayleigh",
     "scene": "Clamped Dashpot Guided LumpedMass Pinned PointForce PointMoment Scene Spring Stop Impactor",
-    "excitation": "Harmonic Multisine BandNoise RollOff Record Pulse Step",
+    "excitation": "Harmonic Multisine BandNoise RollOff Record Pulse SineSweep Step",
     "model": "Model Attractor Orbit Branch Run load",
     "response": "response_spectrum",
     "statistics": "moments pdf psd",
@@ -60,6 +60,7 @@ __all__ = [
     "Run",
     "Scene",
     "Section",
+    "SineSweep",
     "Spring",
     "Step",
     "Stop",
@@ -76,7 +77,7 @@ __all__ = [
 if TYPE_CHECKING:
     from fembeam import plot, study
     from fembeam.beams import Beam, ModalDamping, Rayleigh, Section, Taper
-    from fembeam.excitation import BandNoise, Harmonic, Multisine, Pulse, Record, RollOff, Step
+    from fembeam.excitation import BandNoise, Harmonic, Multisine, Pulse, Record, RollOff, SineSweep, Step
     from fembeam.model import Attractor, Branch, Model, Orbit, Run, load
     from fembeam.response import response_spectrum
     from fembeam.scene import (
