@@ -270,8 +270,16 @@ class Run:
         """δ̇(t) (k,) of a stop, m/s: of both bodies where the stop moves."""
         return -self.q_dot @ self.directions[self._stop(stop)]
 
-    def force(self, stop: int = 0) -> Vector:
-        """Contact force (k,) of a stop, N, from its law and the entry rate latched at the time."""
+    def force(self, stop: int = 0, mean: bool = False) -> Vector:
+        """Contact force (k,) of a stop, N, from its law and the entry rate latched at the time.
+
+        ``mean``: over each sample (halfway to its neighbours) instead of at it, so that contacts shorter than a sample
+        are seen: the trapezoidal rule over the samples gives the log's impulses exactly.
+        """
+        if mean:
+            from fembeam.response import mean_force
+
+            return mean_force(self, self._stop(stop))
         return self._forces[self._stop(stop)]
 
     def _stop(self, stop: int) -> int:
