@@ -13,7 +13,7 @@ from contacts import Hertz
 # a made record: broad-band ground acceleration (m/s²) of 10 s that rises and dies away
 rng, step = np.random.default_rng(3), 0.01
 t = step * np.arange(1001)
-shaken = 4.0 * rng.standard_normal(len(t)) * np.sin(np.pi * t / t[-1]) ** 2
+shaken = 2.0 * rng.standard_normal(len(t)) * np.sin(np.pi * t / t[-1]) ** 2
 ground = fb.Record(t, shaken, quantity="acceleration", interpolation="linear")
 
 length, middle = 6.0, 2.7
@@ -21,12 +21,12 @@ pipe = fb.Section.tube(E=2.0e11, rho=7850.0, outer=0.114, inner=0.102)
 scene = fb.Scene(
     beam=fb.Beam(length, pipe),
     supports=[fb.Pinned(0.0), fb.Pinned(length)],
-    stops=[fb.Stop(middle, Hertz(5e8), gap=8e-3, side=side) for side in ("below", "above")],
+    stops=[fb.Stop(middle, Hertz(5e8), gap=2e-3, side=side) for side in ("below", "above")],
     damping=fb.ModalDamping(0.03),
     base=ground,
 )
-model = scene.reduce(modes=5)
-run = model.simulate(duration=10.0, dt=2e-4)
+model = scene.reduce(modes=10)
+run = model.simulate(duration=10.0, dt=1e-4)
 reactions = run.reactions()
 
 # momentum: supports and stops carry the inertia of the whole pipe, here summed along it
@@ -40,7 +40,7 @@ periods = np.geomspace(0.02, 2.0, 60)
 ground_spectrum = fb.response_spectrum(t, shaken, periods=periods, zeta=0.05)
 floor = run.floor_spectrum(middle, periods=periods, zeta=0.05)
 free = scene.beam, scene.supports
-smooth = fb.Scene(*free, damping=scene.damping, base=ground).reduce(modes=5).simulate(duration=10.0, dt=2e-4)
+smooth = fb.Scene(*free, damping=scene.damping, base=ground).reduce(modes=10).simulate(duration=10.0, dt=1e-4)
 without = smooth.floor_spectrum(middle, periods=periods, zeta=0.05)
 
 if __name__ == "__main__":

@@ -42,6 +42,7 @@ def test_the_exact_damped_cantilever():
     assert model.frequency_response([0.0], L, L).values[0] == pytest.approx(L**3 / (3 * SQUARE.bending_stiffness))
 
 
+@pytest.mark.filterwarnings("ignore:Badly conditioned")
 def test_against_scipy_with_dashpots_and_a_shaken_foot():
     scene = fb.Scene(
         BEAM, [fb.Pinned(0.0)], springs=[fb.Spring(0.3, 5e4, foot=fb.Harmonic(1e-3, 10.0))],
@@ -79,7 +80,7 @@ def test_the_figure_shows_amplitude_and_phase():
     )
     upper, lower = fb.plot.frequency_response(found).axes
     np.testing.assert_allclose(upper.lines[1].get_ydata(), found.amplitude[:, 1])
-    assert np.abs(lower.lines[0].get_ydata()).max() <= 180.0
+    assert np.abs(np.diff(lower.lines[0].get_ydata())).max() < 90.0  # no jump by a turn
     assert len(repr(found)) < 200
 
 

@@ -35,8 +35,8 @@ def response_spectrum(spectrum: ResponseSpectrum) -> Figure:
     order = np.argsort(spectrum.period)
     period = spectrum.period[order]
     for i, zeta in enumerate(spectrum.zeta):
-        colour = f"C{i}"
-        upper.loglog(period, spectrum.acceleration[i, order], color=colour, label=f"ζ = {zeta:g}")
+        (line,) = upper.loglog(period, spectrum.acceleration[i, order], label=f"ζ = {zeta:g}")
+        colour = line.get_color()
         upper.loglog(period, spectrum.pseudo_acceleration[i, order], color=colour, linestyle="--", alpha=0.6)
         lower.loglog(period, 1e3 * spectrum.displacement[i, order], color=colour)
     upper.set(ylabel="largest acceleration / m s⁻²", title="Response spectrum; dashed: pseudo-acceleration ω² max |x|")
@@ -59,19 +59,21 @@ def frequency_response(found: FrequencyResponse) -> Figure:
     ['|H| / m/m', 'phase / °']
     """
     from matplotlib.figure import Figure
+    from matplotlib.ticker import MultipleLocator
 
     figure = Figure(figsize=(7.0, 4.8), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
-    values = found.values.reshape(len(found.omega), -1)
-    for column, z in zip(values.T, np.atleast_1d(found.output), strict=True):
-        upper.semilogy(found.omega, np.abs(column), label=f"z = {z:.4g} m")
-        lower.plot(found.omega, np.degrees(np.angle(column)))
+    amplitude, phase = (values.reshape(len(found.omega), -1).T for values in (found.amplitude, found.phase))
+    for size, angle, z in zip(amplitude, phase, np.atleast_1d(found.output), strict=True):
+        upper.semilogy(found.omega, size, label=f"z = {z:.4g} m")
+        lower.plot(found.omega, np.degrees(angle))
     for natural in found.natural[found.natural < found.omega[-1]]:
         for axis in (upper, lower):
             axis.axvline(natural, color="0.6", linestyle=":", linewidth=0.8, zorder=0)
     kind = "absolute" if found.absolute else "relative"
     upper.set(ylabel=f"|H| / {found.unit}", title=f"Linear frequency response, {kind} displacement per {found.input}")
-    lower.set(xlabel="ω / rad s⁻¹", ylabel="phase / °", yticks=(-180, -90, 0, 90, 180))
+    lower.set(xlabel="ω / rad s⁻¹", ylabel="phase / °")
+    lower.yaxis.set_major_locator(MultipleLocator(90.0))
     lower.set_xlim(float(found.omega[0]), float(found.omega[-1]))
     upper.legend()
     return figure
