@@ -27,8 +27,9 @@ __version__ = "0.1.0"
 _ROOMS = {
     "beams": "Section Taper Beam ModalDamping Rayleigh",
     "scene": "Clamped Dashpot Guided LumpedMass Pinned PointForce PointMoment Scene Spring Stop Impactor",
-    "excitation": "Harmonic Multisine BandNoise RollOff Record Pulse Step",
+    "excitation": "Harmonic Multisine BandNoise RollOff Record Pulse SineSweep Step",
     "model": "Model Attractor Orbit Branch Run load",
+    "response": "response_spectrum",
     "statistics": "moments pdf psd",
 }
 _HOME = {name: room for room, names in _ROOMS.items() for name in names.split()}
@@ -59,6 +60,7 @@ __all__ = [
     "Run",
     "Scene",
     "Section",
+    "SineSweep",
     "Spring",
     "Step",
     "Stop",
@@ -68,14 +70,16 @@ __all__ = [
     "pdf",
     "plot",
     "psd",
+    "response_spectrum",
     "study",
 ]
 
 if TYPE_CHECKING:
     from fembeam import plot, study
     from fembeam.beams import Beam, ModalDamping, Rayleigh, Section, Taper
-    from fembeam.excitation import BandNoise, Harmonic, Multisine, Pulse, Record, RollOff, Step
+    from fembeam.excitation import BandNoise, Harmonic, Multisine, Pulse, Record, RollOff, SineSweep, Step
     from fembeam.model import Attractor, Branch, Model, Orbit, Run, load
+    from fembeam.response import response_spectrum
     from fembeam.scene import (
         Clamped,
         Dashpot,

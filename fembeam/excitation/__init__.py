@@ -1,4 +1,4 @@
-"""Signals with exact derivatives: tones, pulses, noise of a given spectrum, records; nothing of beams.
+"""Signals with exact derivatives: tones, sweeps, pulses, noise of a given spectrum, records; nothing of beams.
 
 A signal is a function of t with `derivative(order)`; line spectra offer their `tones()` or values on a grid. Imports:
 `support`. Begin with `tones`, then `line_spectrum`.
@@ -8,6 +8,18 @@ from fembeam.excitation.noise import BandNoise
 from fembeam.excitation.psd import RollOff
 from fembeam.excitation.pulses import Pulse, Step
 from fembeam.excitation.record import Interpolation, Quantity, Record
+from fembeam.excitation.sweep import SineSweep
 from fembeam.excitation.tones import Harmonic, Multisine
 
-__all__ = ["BandNoise", "Harmonic", "Interpolation", "Multisine", "Pulse", "Quantity", "Record", "RollOff", "Step"]
+__all__ = [
+    "BandNoise",
+    "Harmonic",
+    "Interpolation",
+    "Multisine",
+    "Pulse",
+    "Quantity",
+    "Record",
+    "RollOff",
+    "SineSweep",
+    "Step",
+]

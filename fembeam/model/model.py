@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from fembeam.model.branch import Branch
     from fembeam.model.orbit import Attractor, Orbit
     from fembeam.model.run import Run
+    from fembeam.response import FrequencyResponse
     from fembeam.scene import Matrices, Scene
     from fembeam.scene.contact_rows import ContactRow
 
@@ -197,6 +198,45 @@ class Model(ModalEquations):
         with bar(duration, progress) as report:
             solution = solvers.integrate(lasting.system, start[:n], start[n:], duration, dt, solver, progress=report)
         return Run.of(lasting, solution)
+
+    def frequency_response(
+        self,
+        omega: ArrayLike,
+        input: str | float = "base",
+        output: ArrayLike | None = None,
+        absolute: bool = False,
+        body: int = 0,
+    ) -> FrequencyResponse:
+        """Steady displacement per unit of a harmonic input, complex, of the linear scene: its contacts stay open.
+
+        (K + iωC - ω²) q = v,   H(ω) = φ(z)·q;   v = ω² Γ of the base, φ(z_f) of a force. Dashpots and static shapes
+        are in C and in the coordinates.
+
+        Parameters
+        ----------
+        omega : (k,) rad/s, ≥ 0.
+        input : "base", a displacement of the frame; a place z in m, where a force acts; or a signal of the scene,
+            such as "forces[0]" or "springs[0].foot".
+        output : z in m, or (j,); None: the first stop, else the tip. body : the beam it is on.
+        absolute : add the frame's own motion (transmissibility); only for "base".
+
+        Returns
+        -------
+        FrequencyResponse : values (k,) or (k, j), amplitude, phase, decibel; draw it by `plot.frequency_response`.
+
+        Raises
+        ------
+        ValueError : an unknown input (lists those there are), omega at a natural frequency without damping.
+
+        References
+        ----------
+        D.J. Ewins, Modal Testing (2000), section 2.4.
+        """
+        from fembeam.model.watched_places import observed
+        from fembeam.response import frequency_response
+
+        places = observed(self) if output is None else output
+        return frequency_response(self, omega, input, places, absolute, body)
 
     def orbit(self, period: int = 1, start: ArrayLike | Orbit | None = None, shots: int | None = None) -> Orbit:
         """Find a periodic motion by shooting.

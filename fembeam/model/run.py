@@ -150,17 +150,16 @@ class Run:
         return (values.T + frame_motion(self, order)).T if absolute else values
 
     def reactions(self) -> Reactions:
-        """Forces (N) and moments (N m) that supports, springs and dashpots exert on the beams, at the samples.
+        """Forces (N) and moments (N m) of supports, springs and dashpots on the beams, at the samples.
 
-        K u_s = f - M (ü + r (ÿ + g)) of the unreduced finite-element model: they balance loads, contact forces and the
-        inertia of the kept modes to rounding, exactly so in statics; the modes left out follow statically. Structural
-        damping counts as internal: springs carry their share of it. A contact shorter than the period of the highest
-        mode kept acts on the supports as if waves took no time: keep more modes until the extremes settle.
+        They balance loads, contact forces and the inertia of the kept modes on the finite-element model; modes left
+        out follow statically, structural damping counts as internal. A contact shorter than the period of the highest
+        mode kept acts at once: keep more modes until the extremes settle. ValueError for a run read from a file.
 
         Returns
         -------
-        Reactions : of each beam supports, then springs; then all dashpots. ``[i].force``, ``[i].moment`` (k,) and
-            ``[i].extremes("force")``; contact forces with the frame are `force`. ValueError for a run read from a file.
+        Reactions : of each beam supports, then springs; then dashpots. ``[i].force``, ``[i].moment`` (k,),
+            ``[i].extremes("force")``. (Stops: `force`.)
 
         References
         ----------
@@ -169,6 +168,15 @@ class Run:
         from fembeam.response import reactions
 
         return reactions(self)
+
+    def floor_spectrum(self, z: float, omega: ArrayLike | None = None, zeta: ArrayLike = 0.05, **options: Any) -> Any:
+        """`fembeam.response_spectrum` of the absolute acceleration at z: what equipment there has to stand.
+
+        omega or ``periods=``, zeta : as there; ``body=`` another beam. Warns where samples do not resolve contacts.
+        """
+        from fembeam.response import floor_spectrum
+
+        return floor_spectrum(self, z, omega, zeta, **options)
 
     def slope(self, z: ArrayLike, body: int = 0) -> Vector:
         """u_z(z, t), rad."""
@@ -264,8 +272,16 @@ class Run:
         """δ̇(t) (k,) of a stop, m/s: of both bodies where the stop moves."""
         return -self.q_dot @ self.directions[self._stop(stop)]
 
-    def force(self, stop: int = 0) -> Vector:
-        """Contact force (k,) of a stop, N, from its law and the entry rate latched at the time."""
+    def force(self, stop: int = 0, mean: bool = False) -> Vector:
+        """Contact force (k,) of a stop, N, from its law and the entry rate latched at the time.
+
+        ``mean``: over each sample (halfway to its neighbours) instead of at it, so that contacts shorter than a sample
+        are seen: the trapezoidal rule over the samples gives the log's impulses exactly.
+        """
+        if mean:
+            from fembeam.response import mean_force
+
+            return mean_force(self, self._stop(stop))
         return self._forces[self._stop(stop)]
 
     def _stop(self, stop: int) -> int:

@@ -1,7 +1,8 @@
 """Figures: one function per question, each returns a matplotlib figure.
 
 `response`, `spectra`, `contact_histograms` and `animation` hold those of one run, `laws` those of contact laws,
-`orbits` those of periodic motion, `basins` maps of starts, `random` those of random motion, `mode_count` and `methods`
+`orbits` those of periodic motion, `basins` maps of starts, `random` those of random motion, `linear`
+spectra and frequency response, `mode_count` and `methods`
 those of studies; `style` is what all share. Imports: `statistics`, `model` and the rooms below. Begin with `response`.
 """
 
@@ -10,6 +11,7 @@ from fembeam.plot.animation import animate, frame
 from fembeam.plot.basins import basins
 from fembeam.plot.contact_histograms import contacts
 from fembeam.plot.laws import identification, loops, restitutions
+from fembeam.plot.linear import frequency_response, response_spectrum
 from fembeam.plot.methods import failures, speed_accuracy, stability_map
 from fembeam.plot.mode_count import mode_count, smallest_model
 from fembeam.plot.orbits import branch, orbit, peak
@@ -26,6 +28,7 @@ __all__ = [
     "densities",
     "failures",
     "frame",
+    "frequency_response",
     "identification",
     "loops",
     "mode_count",
@@ -36,6 +39,7 @@ __all__ = [
     "places",
     "random_densities",
     "random_spectra",
+    "response_spectrum",
     "responses",
     "restitutions",
     "segment_for",

@@ -202,6 +202,7 @@ def _factor(scene: Scene, nodes: Vector) -> tuple[sparse.csr_matrix, Vector]:
     """
     force = scene.beam.axial_force
     bending = bending_root(replace(scene.beam, axial_force=0.0), nodes)
+    assert bending is not None  # as it is but under compression
     h = np.repeat(np.diff(nodes), 3)
     inside = np.repeat(nodes[:-1], 3) + h * np.tile(0.5 + GAUSS[0] / 2, len(nodes) - 1)
     weight = np.sqrt(abs(force) * h * np.tile(GAUSS[1] / 2, len(nodes) - 1))

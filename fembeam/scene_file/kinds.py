@@ -11,7 +11,7 @@ from typing import Any, Literal, get_origin
 import contacts
 import solvers
 from fembeam.beams import Section, Taper
-from fembeam.excitation import BandNoise, Harmonic, Interpolation, Multisine, Pulse, Quantity, Record, Step
+from fembeam.excitation import BandNoise, Harmonic, Interpolation, Multisine, Pulse, Quantity, Record, SineSweep, Step
 from fembeam.scene import PLACES
 from fembeam.scene_file.keys import Constructors
 from fembeam.study.quantities import QUANTITIES
@@ -50,6 +50,17 @@ def record(
     return Record.from_csv(path, columns, scale, band, quantity, detrend, interpolation, padding)
 
 
+def sine_sweep(
+    amplitude: float,
+    omega0: float,
+    omega1: float,
+    duration: float,
+    rate: Literal["linear", "logarithmic"] = "linear",
+) -> SineSweep:
+    """`SineSweep` for a scene file, where `kind` is the kind of signal."""
+    return SineSweep(amplitude, omega0, omega1, duration, rate)
+
+
 SIGNALS: Constructors = {
     "harmonic": Harmonic,
     "multisine": Multisine,
@@ -58,6 +69,7 @@ SIGNALS: Constructors = {
     "rolled_off_noise": BandNoise.rolled_off,
     "record": record,
     "pulse": Pulse,
+    "sine_sweep": sine_sweep,
     "step": Step,
 }
 SOLVERS = {

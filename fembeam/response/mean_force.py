@@ -1,0 +1,73 @@
+"""Contact force as its mean over each sample, so that a contact between two samples is seen with its impulse.
+
+    F_j = (1/w_j) ∫ F dt over the cell of sample j, which ends halfway to its neighbours;   Σ F_j w_j = Σ impulses
+
+Impulses are those of the contact log. Of a contact over several cells the law says how its impulse is shared, on the
+cubic through δ and δ̇ at entry, samples and exit.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fembeam.response.acceleration import model_of
+from fembeam.support import require
+
+if TYPE_CHECKING:
+    from fembeam.model import Run
+    from solvers import ContactLog
+
+Vector = NDArray[np.float64]
+Motion = tuple[Vector, Vector, Vector]
+FINER = 16  # parts of every piece of the cubic, on which the force is integrated
+
+
+def mean_force(run: Run, stop: int) -> Vector:
+    """Mean contact force (k,) of a stop over the cells of the samples, N; `Run.force` explains it."""
+    law, t = model_of(run, "mean force").touches[stop].law, run.t
+    require(len(t) > 1, "the mean force needs samples", len(t), "Run.force", "give simulate a dt")
+    edges = np.concatenate([t[:1], (t[1:] + t[:-1]) / 2, t[-1:]])
+    log = run.contacts
+    mine = np.flatnonzero(log.stop == stop % len(run.stops))
+    ends = np.where(np.isnan(log.t_out), t[-1], log.t_out)
+    first, last = (np.searchsorted(edges, times[mine], side="right") - 1 for times in (log.t_in, ends))
+    inside = (first == last) & (first >= 0) & (first < len(t))
+    impulse = np.bincount(first[inside], log.impulse[mine[inside]], len(t)).astype(float)
+    motion = (t, run.indentation(stop), run.indentation_rate(stop))
+    for contact in mine[~inside]:
+        knots = _knots(log, contact, ends[contact], motion)
+        impulse += log.impulse[contact] * _shares(law, abs(log.speed_in[contact]), knots, edges)
+    return impulse / np.diff(edges)
+
+
+def _shares(law: Any, speed: float, knots: Motion, edges: Vector) -> Vector:
+    """Part (k,) of a contact's impulse in each cell."""
+    from scipy.integrate import cumulative_trapezoid
+    from scipy.interpolate import CubicHermiteSpline
+
+    t, delta, rate = knots
+    fine = np.interp(np.arange(FINER * (len(t) - 1) + 1) / FINER, np.arange(len(t)), t)
+    fine = np.union1d(fine, edges[(edges > t[0]) & (edges < t[-1])])
+    cubic = CubicHermiteSpline(t, delta, rate)
+    entry_rate = np.full(len(fine), max(speed, law.entry_rate_floor))
+    force = np.maximum(law.force(cubic(fine), cubic(fine, 1), entry_rate), 0.0)
+    grown = cumulative_trapezoid(force, fine, initial=0.0)
+    if not grown[-1] > 0.0:
+        grown = fine - fine[0]
+    return np.diff(np.interp(edges, fine, grown / grown[-1]))
+
+
+def _knots(log: ContactLog, contact: int, end: float, motion: Motion) -> Motion:
+    """Times, δ and δ̇ at entry, at the samples of a contact and at its exit; δ = 0 at both ends but where cut."""
+    begin = log.t_in[contact]
+    within = slice(np.searchsorted(motion[0], begin), np.searchsorted(motion[0], end, side="right"))
+    t, delta, rate = (values[within] for values in motion)
+    enters, leaves = int(not len(t) or t[0] > begin), int(not len(t) or t[-1] < end)
+    return (
+        np.concatenate([[begin] * enters, t, [end] * leaves]),
+        np.concatenate([[0.0] * enters, delta, [0.0] * leaves]),
+        np.concatenate([[log.speed_in[contact]] * enters, rate, [-log.speed_out[contact]] * leaves]),
+    )

@@ -1,0 +1,233 @@
+"""Response spectra: the largest response of single oscillators to a recorded or computed acceleration.
+
+    x'' + 2 ζ ω x' + ω² x = -a(t),   at rest at the first sample,   a piecewise linear between samples
+
+With z = x' - λ̄ x, λ = -ζω + iω√(1 - ζ²), this is z' = λ z - a, whose exact step is
+
+    z_{j+1} = exp(λh) z_j - h [(φ_1 - φ_2)(λh) a_j + φ_2(λh) a_{j+1}],   φ_1(x) = (eˣ - 1)/x,  φ_2(x) = (eˣ - 1 - x)/x²
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fembeam.support import require
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from fembeam.model import Run
+
+Vector = NDArray[np.float64]
+UNIFORM = 1e-6  # of a step, that times may be off a uniform grid
+FINE = 0.1  # ω h up to which the cubic through values and slopes keeps maxima to 1e-5, mostly (ω h)⁴/384
+MOST_PARTS = 32  # of a step, reached at its Nyquist frequency: above it the oscillator all but follows the record
+BLOCK = 1 << 16  # steps of the record at once, so that memory stays small
+SERIES = 18  # terms of φ_2 for |x| < 1, right to rounding
+FEW = 10  # samples in a contact, below which its acceleration is not resolved
+
+
+@dataclass(frozen=True, eq=False)
+class ResponseSpectrum:
+    """Largest responses of oscillators, one row for each damping ratio.
+
+    Attributes
+    ----------
+    omega : (p,) rad/s. zeta : (d,) damping ratios.
+    displacement, velocity : (d, p) max |x| in m and max |x'| in m/s, relative to what carries the oscillator.
+    acceleration : (d, p) max |x'' + a| = max |2 ζ ω x' + ω² x| in m/s², absolute.
+    """
+
+    omega: Vector
+    zeta: Vector
+    displacement: Vector
+    velocity: Vector
+    acceleration: Vector
+
+    def __repr__(self) -> str:
+        low, high = self.omega.min(), self.omega.max()
+        return f"<response spectrum of {len(self.omega)} oscillators, {low:.4g} to {high:.4g} rad/s, zeta {self.zeta}>"
+
+    @property
+    def period(self) -> Vector:
+        """2π/ω (p,) in s."""
+        return 2 * np.pi / self.omega
+
+    @property
+    def pseudo_velocity(self) -> Vector:
+        """ω max |x| (d, p), m/s."""
+        return self.omega * self.displacement
+
+    @property
+    def pseudo_acceleration(self) -> Vector:
+        """ω² max |x| (d, p), m/s²: the largest spring force per mass."""
+        return self.omega**2 * self.displacement
+
+
+def response_spectrum(
+    t: ArrayLike,
+    acceleration: ArrayLike,
+    omega: ArrayLike | None = None,
+    zeta: ArrayLike = 0.05,
+    *,
+    periods: ArrayLike | None = None,
+) -> ResponseSpectrum:
+    """Maxima of oscillators on a base of given acceleration, by the exact recursion for piecewise-linear records.
+
+        x'' + 2 ζ ω x' + ω² x = -a(t),   x = x' = 0 at the first sample
+
+    Parameters
+    ----------
+    t : (k,) s, uniform, k ≥ 2.
+    acceleration : (k,) m/s², absolute acceleration a of the base or floor; straight lines between samples.
+    omega : (p,) rad/s, > 0; or ``periods`` (p,) in s instead.
+    zeta : one damping ratio or (d,), 0 ≤ ζ < 1.
+
+    Returns
+    -------
+    ResponseSpectrum : arrays (d, p).
+
+    Raises
+    ------
+    ValueError : lengths that differ, times off a uniform grid, numbers that are not finite or out of range, both or
+        neither of omega and periods.
+
+    Notes
+    -----
+    Maxima are those between samples too, right to 1e-5 for the piecewise-linear record; for one that is smooth between
+    its samples the error is about (ω_a h)²/12 of its part at ω_a. What comes after the last sample does not count:
+    append zeros to see the free vibration, above all for periods longer than the record.
+
+    References
+    ----------
+    N.C. Nigam, P.C. Jennings, Calculation of response spectra from strong-motion earthquake records, Bull. Seism. Soc.
+    Am. 59 (1969) 909.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> t = np.linspace(0.0, 10.0, 1001)
+    >>> step = response_spectrum(t, np.ones(1001), periods=[0.5, 1.0], zeta=0.0)
+    >>> np.round(step.pseudo_acceleration, 6)  # twice the static answer
+    array([[2., 2.]])
+    """
+    step, values = _checked_record(t, acceleration)
+    omega, zeta = _checked_oscillators(omega, periods), _checked_damping(zeta)
+    found = np.array([[_largest(step, values, w, d) for w in omega] for d in zeta])
+    return ResponseSpectrum(omega, zeta, *np.moveaxis(found, -1, 0))
+
+
+def floor_spectrum(
+    run: Run, z: float, omega: ArrayLike | None, zeta: ArrayLike, body: int = 0, **options: Any
+) -> ResponseSpectrum:
+    """The spectrum of the absolute acceleration at z; `Run.floor_spectrum` explains it."""
+    require(len(run.t) > 1, "a floor spectrum needs output samples", len(run.t), "Run.floor_spectrum",
+            "give simulate a dt")  # fmt: skip
+    lengths = run.contacts.t_out - run.contacts.t_in
+    shortest, step = float(np.nanmin(lengths, initial=np.inf)), float(run.t[1] - run.t[0])
+    if shortest < FEW * step:
+        import warnings
+
+        warnings.warn(f"contacts of {shortest:.2g} s are not resolved by samples {step:.2g} s apart: their "
+                      f"acceleration is missed or counted too long; simulate with dt below {shortest / FEW:.2g}",
+                      UserWarning, stacklevel=3)  # fmt: skip
+    return response_spectrum(run.t, run.acceleration(z, body, absolute=True), omega, zeta, **options)
+
+
+def _checked_record(t: ArrayLike, acceleration: ArrayLike) -> tuple[float, Vector]:
+    """The step and the samples."""
+    times, values = np.asarray(t, dtype=float), np.asarray(acceleration, dtype=float)
+    where = "response_spectrum"
+    fits = times.ndim == 1 and times.shape == values.shape and times.size > 1
+    require(fits, "t and acceleration must have one length of at least 2", (times.shape, values.shape), where,
+            "give one sample for each time")  # fmt: skip
+    for name, column in (("t", times), ("acceleration", values)):
+        bad = ~np.isfinite(column)
+        require(not bad.any(), f"{name} must be finite", f"{column[bad][:1]} at sample {int(bad.argmax())}", where,
+                "cut or mend the record")  # fmt: skip
+    step = (times[-1] - times[0]) / (times.size - 1)
+    off = np.abs(times - times[0] - step * np.arange(times.size)).max()
+    require(step > 0 and off <= UNIFORM * step, "t must increase in equal steps", f"{off:.3g} s off", where,
+            "interpolate to a uniform grid")  # fmt: skip
+    return float(step), values
+
+
+def _checked_oscillators(omega: ArrayLike | None, periods: ArrayLike | None) -> Vector:
+    """Frequencies (p,), rad/s."""
+    require((omega is None) != (periods is None), "give omega or periods, one of them", (omega, periods),
+            "response_spectrum", "omega in rad/s, or periods in s")  # fmt: skip
+    name, given = ("omega", omega) if periods is None else ("periods", periods)
+    values = np.atleast_1d(np.array(given, dtype=float))
+    valid = values.ndim == 1 and values.size > 0 and bool(np.all(np.isfinite(values) & (values > 0)))
+    require(valid, f"{name} must be positive and finite", given, "response_spectrum", "give at least one")
+    return values if periods is None else 2 * np.pi / values
+
+
+def _checked_damping(zeta: ArrayLike) -> Vector:
+    """Damping ratios (d,)."""
+    values = np.atleast_1d(np.array(zeta, dtype=float))
+    valid = values.ndim == 1 and values.size > 0 and bool(np.all((values >= 0) & (values < 1)))
+    require(valid, "zeta must be at least 0 and below 1", zeta, "response_spectrum", "give ratios such as 0.05")
+    return values
+
+
+def _largest(step: float, record: Vector, omega: float, zeta: float) -> Vector:
+    """Max |x|, |x'|, |x'' + a| of one oscillator."""
+    largest = np.zeros(3)
+    for a, x, v, h in _motion(step, record, omega, zeta):
+        absolute = -2 * zeta * omega * v - omega**2 * x
+        rate = absolute - a
+        for i, (value, slope) in enumerate(
+            ((x, v), (v, rate), (absolute, -2 * zeta * omega * rate - omega**2 * v)),
+        ):
+            largest[i] = max(largest[i], _peak(value, slope, h))
+    return largest
+
+
+def _motion(step: float, record: Vector, omega: float, zeta: float) -> Iterator[tuple[Vector, Vector, Vector, float]]:
+    """Record a, motion x and x' of an oscillator on a grid fine enough for its maxima, block by block, and its step."""
+    from scipy.signal import lfilter
+
+    parts = int(np.clip(np.ceil(omega * step / FINE), 1, MOST_PARTS))
+    h, damped = step / parts, omega * np.sqrt(1 - zeta**2)
+    exponent = complex(-zeta * omega, damped) * h
+    late = h * _phi2(exponent)
+    early = h * np.expm1(exponent) / exponent - late
+    state, last = np.array([late * record[0]]), np.empty(0)  # so that z = 0 at the first sample
+    for first in range(0, len(record) - 1, BLOCK):
+        samples = record[first : first + BLOCK + 1]
+        a = np.interp(np.arange(parts * (len(samples) - 1) + 1) / parts, np.arange(len(samples)), samples)
+        fresh = a if first == 0 else a[1:]
+        z, state = lfilter([-late, -early], [1.0, -np.exp(exponent)], fresh.astype(complex), zi=state)
+        z = np.concatenate([last, z])
+        last = z[-1:]
+        x = z.imag / damped
+        yield a, x, z.real - zeta * omega * x, h
+
+
+def _phi2(x: complex) -> complex:
+    """(eˣ - 1 - x)/x², by its series near 0."""
+    if abs(x) >= 1:
+        return complex((np.expm1(x) - x) / x**2)
+    total = term = 0.5 + 0j
+    for k in range(3, SERIES + 3):
+        term *= x / k
+        total += term
+    return total
+
+
+def _peak(value: Vector, slope: Vector, h: float) -> float:
+    """Max |f| of the cubic pieces through values and slopes (k,) on a grid of step h."""
+    size = np.abs(value)
+    turning = np.flatnonzero((slope[:-1] * slope[1:] < 0) & (np.maximum(size[:-1], size[1:]) > 0.5 * size.max()))
+    f0, f1, d0, d1 = value[turning], value[turning + 1], h * slope[turning], h * slope[turning + 1]
+    # f' = d0 + 2 b s + 3 c s²: the root between 0 and 1, where d0 and d1 differ in sign
+    b, c = 3 * (f1 - f0) - 2 * d0 - d1, d0 + d1 - 2 * (f1 - f0)
+    root = np.sqrt(np.maximum(b**2 - 3 * c * d0, 0.0))
+    s = np.clip(-d0 / (b + np.where(d0 < 0, root, -root)), 0.0, 1.0)
+    inside = np.abs(f0 + s * (d0 + s * (b + s * c)))
+    return float(max(size.max(), inside.max(initial=0.0)))

@@ -1,0 +1,111 @@
+"""Frequency response of the linear scene: what a harmonic input of unit size moves, all contacts open.
+
+(K + iωC - ω² M) q = v,   H(ω) = φ(z)·q,   v = ω² Γ of a base displacement, φ(z_f) of a force
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fembeam.scene import signals_of
+from fembeam.support import is_finite, require
+
+if TYPE_CHECKING:
+    from fembeam.model import Model
+
+Vector = NDArray[np.float64]
+AT_ONCE = 4_000_000  # matrix entries solved together
+WHERE = "Model.frequency_response"
+
+
+@dataclass(frozen=True, eq=False)
+class FrequencyResponse:
+    """Complex response H to inputs cos(ωt): displacement Re(H exp(iωt)).
+
+    Attributes
+    ----------
+    omega : (k,) rad/s. values : complex (k,), or (k, j) for several places; `unit` says of what.
+    input : what drives, in words. output : z in m, one or (j,). absolute : whether the frame's motion is in it.
+    natural : (n,) undamped natural frequencies of the model, rad/s.
+    """
+
+    omega: Vector
+    values: NDArray[np.complex128]
+    input: str
+    output: float | Vector
+    absolute: bool
+    unit: str
+    natural: Vector
+
+    def __repr__(self) -> str:
+        span = f"{self.omega[0]:.4g} to {self.omega[-1]:.4g} rad/s"
+        return f"<frequency response at z = {self.output} m to {self.input}, {span}>"
+
+    @property
+    def amplitude(self) -> Vector:
+        """|H|."""
+        return np.abs(self.values)
+
+    @property
+    def phase(self) -> Vector:
+        """Phase in rad, continuous along omega; the response lags where it is negative."""
+        return np.unwrap(np.angle(self.values), axis=0)
+
+    @property
+    def decibel(self) -> Vector:
+        """20 log10 |H|; -inf where nothing moves."""
+        with np.errstate(divide="ignore"):
+            return 20 * np.log10(self.amplitude)
+
+
+def frequency_response(
+    model: Model, omega: ArrayLike, driven: str | float, output: ArrayLike, absolute: bool, body: int
+) -> FrequencyResponse:
+    """The response of a model without its contacts; `Model.frequency_response` explains it."""
+    require(not absolute or driven == "base", "absolute is for the input 'base'", driven, WHERE, "leave it out")
+    frequencies, places = _checked(omega, model), model.phi(output, 0, body)
+    vector, power, said, unit = _driving(model, driven)
+    values = _solved(model, frequencies, vector) @ places.T
+    values = (values.T * frequencies**power + float(absolute)).T
+    return FrequencyResponse(frequencies, values, said, np.array(output, dtype=float)[()], absolute, unit, model.omega)
+
+
+def _driving(model: Model, driven: str | float) -> tuple[Vector, int, str, str]:
+    """Vector (n,) and power of ω of an input of size 1, what it is in words, the unit of the response to it."""
+    if driven == "base":
+        return model.participation, 2, "displacement of the frame", "m/m"
+    if is_finite(driven):
+        return model.phi(float(driven)), 0, f"force at z = {driven} m", "m/N"
+    names = [path for path in signals_of(model.scene) if path != "base"]  # in the order of the loads
+    inputs = [name.removesuffix(".signal") for name in names]
+    known = isinstance(driven, str) and driven.removesuffix(".signal") in inputs
+    require(known, f"input must be a place z in m, or one of {', '.join(['base', *inputs])}", driven, WHERE, "use one")
+    number = inputs.index(str(driven).removesuffix(".signal"))
+    vector = np.asarray(model.system.loads[number][0], dtype=float)
+    return vector, 0, inputs[number], "m/m" if inputs[number].endswith("foot") else "m per unit"
+
+
+def _checked(omega: ArrayLike, model: Model) -> Vector:
+    """Frequencies (k,) at which the system is not singular."""
+    values = np.atleast_1d(np.array(omega, dtype=float))
+    valid = values.ndim == 1 and values.size > 0 and bool(np.all(np.isfinite(values) & (values >= 0)))
+    require(valid, "omega must be at least 0 and finite, (k,)", omega, WHERE, "give frequencies in rad/s")
+    undamped = not np.any(model.system.C)
+    singular = np.isin(values, model.omega if undamped else model.omega[model.omega == 0.0])
+    require(not singular.any(), "omega must not be an undamped natural frequency", values[singular][:1].tolist(),
+            WHERE, "move it, or add damping")  # fmt: skip
+    return values
+
+
+def _solved(model: Model, omega: Vector, vector: Vector) -> NDArray[np.complex128]:
+    """Coordinates (k, n) of (K + iωC - ω²) q = vector, some frequencies at a time."""
+    C, K, one = model.system.C, model.system.K, np.eye(len(vector))
+    answers = []
+    for part in np.array_split(omega, len(omega) * len(vector) ** 2 // AT_ONCE + 1):
+        w = part[:, None, None]
+        answers.append(np.linalg.solve(K + 1j * w * C - w**2 * one, vector[:, None].astype(complex))[..., 0])
+    return np.concatenate(answers)

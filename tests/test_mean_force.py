@@ -1,0 +1,62 @@
+"""Contact force as the mean over each sample: impulses to rounding, the mean of finely sampled forces, bad input."""
+
+import numpy as np
+import pytest
+from problems import STEEL, TIP, paper_scene
+
+import fembeam as fb
+from contacts import Hertz, KelvinVoigt
+
+
+def scene(*stops, **more):
+    parts = {"damping": fb.ModalDamping(0.02), "base": fb.Harmonic(1e-3, 195.0), **more}
+    return fb.Scene(fb.Beam(0.2599, fb.Section(**STEEL)), [fb.Clamped(0.0)], stops=list(stops), **parts)
+
+
+@pytest.mark.parametrize("dt", [1e-2, 1e-3, 1e-4, 1.3e-5])
+def test_impulses_are_kept_whatever_the_sampling(dt):
+    below, above = fb.Stop(TIP, KelvinVoigt(1e5, 20.0), gap=1e-4), fb.Stop(0.15, Hertz(1e8), gap=1e-5, side="above")
+    run = scene(below, above).reduce(3).simulate(0.2, dt)
+    for stop in (0, 1, -1):
+        mean, log = run.force(stop, mean=True), run.contacts
+        impulses = log.impulse[log.stop == stop % 2]
+        assert len(impulses) > 3
+        assert np.trapezoid(mean, run.t) == pytest.approx(impulses.sum(), rel=1e-12)
+        assert mean.min() >= 0.0
+        assert mean.max() <= log.peak_force[log.stop == stop % 2].max()
+
+
+def test_it_is_the_mean_of_the_force_sampled_finely():
+    model = scene(fb.Stop(TIP, Hertz(2e6))).reduce(2)  # contacts of some ms
+    fine, coarse = model.simulate(0.2, 1e-6), model.simulate(0.2, 2e-4)
+    force, cell = fine.force(), 200
+    whole = np.concatenate([[0.0], np.cumsum((force[1:] + force[:-1]) / 2)]) * 1e-6
+    edges = np.concatenate([[0], np.arange(cell // 2, len(force), cell), [len(force) - 1]])
+    expected = np.diff(whole[edges]) / np.diff(fine.t[edges])
+    np.testing.assert_allclose(coarse.force(mean=True), expected, atol=2e-4 * expected.max())
+
+
+def test_contacts_cut_by_start_and_end_and_samples_of_ones_own():
+    pressed = scene(fb.Stop(TIP, Hertz(1e7), gap=-1e-4), base=None).reduce(2)
+    run = pressed.simulate(0.01, 1e-3, start=pressed.equilibrium())
+    np.testing.assert_allclose(run.force(mean=True), run.force(), rtol=1e-6)
+    model = paper_scene().reduce(2)
+    whole = model.simulate(0.1, 1e-4)
+    cut = whole.contacts.t_in[1] + 1e-4
+    part = model.simulate(cut, np.linspace(0.0, cut, 12))
+    assert np.isnan(part.contacts.t_out[-1])
+    assert np.trapezoid(part.force(mean=True), part.t) == pytest.approx(part.contacts.impulse.sum(), rel=1e-12)
+    late = model.simulate(0.1, np.linspace(0.04, 0.1, 61))
+    seen = late.contacts.impulse[late.contacts.t_in > 0.04].sum()
+    assert np.trapezoid(late.force(mean=True), late.t) == pytest.approx(seen, rel=1e-12)
+
+
+def test_bad_input(tmp_path):
+    model = paper_scene().reduce(2)
+    run = model.simulate(0.05, 1e-3)
+    with pytest.raises(ValueError, match="stop must be below 1"):
+        run.force(1, mean=True)
+    with pytest.raises(ValueError, match="needs the model of the run"):
+        fb.load(run.save(tmp_path / "run")).force(mean=True)
+    with pytest.raises(ValueError, match="the mean force needs samples"):
+        model.simulate(0.05).force(mean=True)

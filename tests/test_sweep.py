@@ -1,0 +1,91 @@
+"""Sine sweeps: SciPy's chirp, derivatives in closed form and by differences, nodes, resonances, scene files."""
+
+import numpy as np
+import pytest
+from scipy.interpolate import BPoly
+from scipy.signal import chirp
+
+import fembeam as fb
+from fembeam.scene_file import read
+
+KINDS = ["linear", "logarithmic"]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(("start", "end"), [(20.0, 300.0), (300.0, 20.0), (50.0, 50.0)])
+def test_it_is_the_chirp_of_scipy(kind, start, end):
+    sweep, t = fb.SineSweep(2.0, start, end, 10.0, kind), np.linspace(0.0, 10.0, 5001)
+    expected = chirp(t, start / (2 * np.pi), 10.0, end / (2 * np.pi), kind, phi=-90.0)
+    np.testing.assert_allclose(sweep(t), 2.0 * expected, atol=1e-9)
+    assert sweep.omega(0.0) == pytest.approx(start)
+    assert sweep.omega(10.0) == pytest.approx(end)
+    np.testing.assert_allclose(sweep.rate(t[1:-1]), np.gradient(sweep.omega(t), t)[1:-1], rtol=1e-5, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_derivatives_are_exact(kind):
+    """The second in closed form, A (ω̇ cos θ - ω² sin θ); the others against differences of fourth order."""
+    sweep, t = fb.SineSweep(1e-3, 100.0, 30.0, 5.0, kind), np.linspace(0.0, 5.0, 301)
+    theta, omega = sweep.angle(t), sweep.omega(t)
+    np.testing.assert_allclose(sweep.derivative(1)(t), 1e-3 * omega * np.cos(theta), atol=1e-12)
+    second = 1e-3 * (sweep.rate(t) * np.cos(theta) - omega**2 * np.sin(theta))
+    np.testing.assert_allclose(sweep.derivative(2)(t), second, atol=1e-11)
+    for order in range(2, 6):
+        one, h = sweep.derivative(order), 1e-5
+        slope = (8 * (one(t + h) - one(t - h)) - (one(t + 2 * h) - one(t - 2 * h))) / (12 * h)
+        expected = sweep.derivative(order + 1)(t)
+        np.testing.assert_allclose(slope, expected, atol=1e-8 * np.abs(expected).max())
+        assert one.derivative(1) == sweep.derivative(order + 1)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_nodes_keep_their_promise(kind):
+    y = fb.SineSweep(1e-3, 20.0, 200.0, 6.0, kind).derivative(2)
+    t = np.random.default_rng(2).uniform(0.0, 6.0, 4000)
+    for rtol in (1e-4, 1e-8):
+        dt, rows = y.nodes(6.0, rtol)
+        inside = BPoly.from_derivatives(dt * np.arange(len(rows)), rows)(t)
+        error = np.abs(inside - y(t)).max() / np.abs(y(t)).max()
+        assert 0.01 * rtol < error < rtol
+
+
+@pytest.mark.parametrize(("start", "end"), [(60.0, 160.0), (160.0, 60.0)])
+def test_a_slow_sweep_finds_the_resonance_up_and_down(start, end):
+    """|ω̇| = 0.06 (ζω)²: the maximum is that of steady motion to 1 %."""
+    beam = fb.Beam(0.2599, fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12))
+    sweep = fb.SineSweep(1e-4, start, end, 60.0)
+    supports, mass = [fb.Clamped(0.0)], [fb.LumpedMass(0.24445, 25.4e-3, 3e-6)]
+    scene = fb.Scene(beam, supports, mass, damping=fb.ModalDamping(0.05), base=sweep)
+    model = scene.reduce(1)
+    run = model.simulate(60.0, 1e-3)
+    steady = 1e-4 * model.frequency_response(np.linspace(60.0, 160.0, 2001), output=0.24445).amplitude
+    assert np.abs(run.displacement(0.24445)).max() == pytest.approx(steady.max(), rel=1e-2)
+    with pytest.raises(ValueError, match="SineSweep is 60 s long and shorter than the duration of 61 s"):
+        model.simulate(61.0, 1e-3)
+
+
+def test_scene_file(tmp_path):
+    text = """
+    beam = {length = 0.5, section = {E = 2.1e11, rho = 7800.0, A = 1e-4, I = 1e-9}}
+    supports = [{kind = "clamped", z = 0.0}]
+    base = {kind = "sine_sweep", amplitude = 1e-3, omega0 = 60.0, omega1 = 200.0, duration = 5.0, rate = "logarithmic"}
+    """
+    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
+    assert read(tmp_path / "scene.toml").scene.base == fb.SineSweep(1e-3, 60.0, 200.0, 5.0, "logarithmic")
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"omega0": 0.0}, "omega0"),
+        ({"omega1": -1.0}, "omega1"),
+        ({"duration": np.nan}, "duration"),
+        ({"amplitude": np.inf}, "amplitude"),
+        ({"kind": "quadratic"}, "kind must be 'linear' or 'logarithmic', got 'quadratic'"),
+    ],
+)
+def test_bad_input(changed, message):
+    with pytest.raises(ValueError, match=message):
+        fb.SineSweep(**{"amplitude": 1.0, "omega0": 1.0, "omega1": 2.0, "duration": 1.0, **changed})
+    with pytest.raises(ValueError, match="integer of at least 0"):
+        fb.SineSweep(1.0, 1.0, 2.0, 1.0).derivative(-1)
