@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 import solvers
 from fembeam.model.shapes import Shapes
 from fembeam.scene import Source
-from fembeam.support import require, versions, written_whole
+from fembeam.support import require
 from solvers.problem import counted
 
 if TYPE_CHECKING:
@@ -26,19 +25,6 @@ if TYPE_CHECKING:
     from fembeam.scene_file import SceneFile
 
 Vector = NDArray[np.float64]
-FORMAT = 2
-UNITS = {
-    "t, contact_t_in, contact_t_out": "s",
-    "q": "m √kg",
-    "q_dot": "m √kg/s",
-    "force, contact_peak_force": "N",
-    "contact_speed_in, contact_speed_out": "m/s",
-    "contact_peak_indentation, nodes, stops[:, 0], stops[:, 2]": "m",
-    "contact_impulse": "N s",
-    "contact_energy_loss, energy_*": "J",
-    "shapes, directions": "1/√kg",
-    "strikers": "kg",
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -314,30 +300,6 @@ class Run:
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write everything to one ``.npz`` file, whole or not at all; read it with `load`."""
-        about = {
-            "format": FORMAT,
-            "status": self.status,
-            "scene": self.scene,
-            "cost": {f.name: getattr(self.cost, f.name) for f in fields(self.cost)},
-            "units": UNITS,
-            "versions": versions(),
-        }
-        if self.source is not None:
-            about["scene_file"] = {"name": self.source.path.name, "text": self.source.text,
-                                   "overrides": self.source.overrides, "files": list(self.source.files)}  # fmt: skip
-        carried = self.source.files.values() if self.source else ()
-        arrays = {
-            **{"t": self.t, "q": self.q, "q_dot": self.q_dot, "force": self._forces},
-            **{"stops": self.stops, "directions": self.directions, "strikers": self.strikers},
-            **{"nodes": self.shapes.nodes, "shapes": self.shapes.values},
-            **{f"nodes_{i}": shapes.nodes for i, shapes in enumerate(self.others, 1)},
-            **{f"shapes_{i}": shapes.values for i, shapes in enumerate(self.others, 1)},
-            **{f"contact_{name}": column for name, column in self.contacts.arrays().items()},
-            **{f"energy_{f.name}": getattr(self.energy, f.name) for f in fields(self.energy)},
-            **{f"file_{i}": np.frombuffer(content, dtype=np.uint8) for i, content in enumerate(carried)},
-        }
-        target = Path(path)
-        target = target if target.suffix == ".npz" else target.with_name(target.name + ".npz")
-        with written_whole(target) as file:
-            np.savez(file, about=json.dumps(about), **arrays)  # type: ignore[arg-type]
-        return target
+        from fembeam.model.run_file import save
+
+        return save(self, Path(path))

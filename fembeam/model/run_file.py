@@ -1,4 +1,4 @@
-"""A run read from a file."""
+"""A run written to a file, and read from one."""
 
 from __future__ import annotations
 
@@ -13,11 +13,56 @@ import numpy as np
 
 import solvers
 from fembeam.model import saved_arrays
-from fembeam.model.run import FORMAT, Run
+from fembeam.model.run import Run
 from fembeam.model.shapes import Shapes
 from fembeam.scene import Source
+from fembeam.support import versions, written_whole
 
 OLD_NAMES = {"contact_floored": "contact_entry_rate_clipped"}  # in files of earlier versions
+
+FORMAT = 2
+UNITS = {
+    "t, contact_t_in, contact_t_out": "s",
+    "q": "m √kg",
+    "q_dot": "m √kg/s",
+    "force, contact_peak_force": "N",
+    "contact_speed_in, contact_speed_out": "m/s",
+    "contact_peak_indentation, nodes, stops[:, 0], stops[:, 2]": "m",
+    "contact_impulse": "N s",
+    "contact_energy_loss, energy_*": "J",
+    "shapes, directions": "1/√kg",
+    "strikers": "kg",
+}
+
+
+def save(run: Run, path: Path) -> Path:
+    """Write everything to one ``.npz`` file, whole or not at all."""
+    about = {
+        "format": FORMAT,
+        "status": run.status,
+        "scene": run.scene,
+        "cost": {f.name: getattr(run.cost, f.name) for f in fields(run.cost)},
+        "units": UNITS,
+        "versions": versions(),
+    }
+    if run.source is not None:
+        about["scene_file"] = {"name": run.source.path.name, "text": run.source.text,
+                               "overrides": run.source.overrides, "files": list(run.source.files)}  # fmt: skip
+    carried = run.source.files.values() if run.source else ()
+    arrays = {
+        **{"t": run.t, "q": run.q, "q_dot": run.q_dot, "force": run._forces},
+        **{"stops": run.stops, "directions": run.directions, "strikers": run.strikers},
+        **{"nodes": run.shapes.nodes, "shapes": run.shapes.values},
+        **{f"nodes_{i}": shapes.nodes for i, shapes in enumerate(run.others, 1)},
+        **{f"shapes_{i}": shapes.values for i, shapes in enumerate(run.others, 1)},
+        **{f"contact_{name}": column for name, column in run.contacts.arrays().items()},
+        **{f"energy_{f.name}": getattr(run.energy, f.name) for f in fields(run.energy)},
+        **{f"file_{i}": np.frombuffer(content, dtype=np.uint8) for i, content in enumerate(carried)},
+    }
+    target = path if path.suffix == ".npz" else path.with_name(path.name + ".npz")
+    with written_whole(target) as file:
+        np.savez(file, about=json.dumps(about), **arrays)  # type: ignore[arg-type]
+    return target
 
 
 def load(path: str | os.PathLike[str]) -> Run:

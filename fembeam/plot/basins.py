@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fembeam.plot.response import BLUE, GREEN, GREY, ORANGE, RED, _sheet, _titled, styled
+from fembeam.plot.style import BLUE, GREEN, GREY, ORANGE, RED, sheet, styled, titled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,7 +33,7 @@ def basins(found: Basins) -> Figure:
     from matplotlib.colors import to_rgb
     from matplotlib.patches import Patch
 
-    figure, (axis,) = _sheet(None, 1, 1, (6.4, 4.8))
+    figure, (axis,) = sheet(None, 1, 1, (6.4, 4.8))
     names = {i: (one.name, COLOURS[i % len(COLOURS)]) for i, one in enumerate(found.attractors)}
     image = np.zeros((*found.label.shape, 3))
     entries = []
@@ -48,4 +48,4 @@ def basins(found: Basins) -> Figure:
     axis.imshow(image, origin="lower", extent=extent, aspect="auto", interpolation="nearest")
     axis.set(xlabel=found.x.name, ylabel=found.y.name)
     figure.legend(handles=entries, loc="outside lower center", ncols=2)
-    return _titled(figure, None, f"What {found.label.size} starts come to")
+    return titled(figure, None, f"What {found.label.size} starts come to")

@@ -27,7 +27,7 @@ FINER = 16  # parts of every piece of the cubic, on which the force is integrate
 
 def mean_force(run: Run, stop: int) -> Vector:
     """Mean contact force (k,) of a stop over the cells of the samples, N; `Run.force` explains it."""
-    law, t = model_of(run, "mean force").touches[stop].law, run.t
+    law, t = model_of(run, "mean force").contact_rows[stop].law, run.t
     require(len(t) > 1, "the mean force needs samples", len(t), "Run.force", "give simulate a dt")
     edges = np.concatenate([t[:1], (t[1:] + t[:-1]) / 2, t[-1:]])
     log = run.contacts

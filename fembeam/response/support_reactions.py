@@ -22,7 +22,7 @@ from scipy.sparse import linalg as sparse_linalg
 import reduction
 from fembeam.beams import bending_root, hermite_rows
 from fembeam.response.acceleration import coordinates, frame_motion, model_of
-from fembeam.scene import loads, touches, unsupported
+from fembeam.scene import contact_rows, loads, unsupported
 from fembeam.support import aligned, require
 
 if TYPE_CHECKING:
@@ -140,7 +140,7 @@ def _dashpots(run: Run, model: Model) -> Iterator[Reaction]:
 def _acting(run: Run, model: Model, full: Matrices) -> tuple[Vector, Vector]:
     """All that acts but supports and springs: columns (N_all, c) on all dofs, and their histories (c, k)."""
     scene = model.scene
-    rows = [touch.row for touch in touches(scene, full)]
+    rows = [touch.row for touch in contact_rows(scene, full)]
     histories = [run.force(stop) for stop in range(len(rows))]
     for row, signal in loads(scene, full):
         rows.append(row)

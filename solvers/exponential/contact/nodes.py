@@ -163,8 +163,8 @@ def _brackets(family: _Family) -> Any:
 def _zoom(family: _Family, begin: float, end: float) -> Any:
     """(2S + 2, 2S): δ and h δ̇ at the points `LOCAL` of [begin, end] from those at the nodes and at the step's begin.
 
-    δ is Hermite's polynomial in σ. δ̇ of a smooth step is the polynomial through its values: in a short one the slope of
-    the former is the rounding of δ over h. On an entry step it is that slope over dt/dσ, and where that vanishes, beside
+    δ is Hermite's polynomial in σ. δ̇ of a smooth step is the polynomial through its values; in a short one the slope of
+    the former is rounding over h. On an entry step it is that slope over dt/dσ, and where that vanishes, beside
     the begin, δ̇(0) + σ^κ × the polynomial through (δ̇ - δ̇(0))/σ^κ at the nodes.
     """
     x, y = np.append(family.nodes, 0.0), begin + 0.5 * (LOCAL + 1.0) * (end - begin)
