@@ -184,10 +184,7 @@ def new_state(z: Any, stops: int) -> State:
 
 def problem_of(system: System, forcing: Forcing) -> Problem:
     """Arrays the kernels read, in block coordinates."""
-    about = system.about_structure
-    if "linear" not in about:
-        about["linear"] = _linear_part(system)
-    return _problem(system, forcing, about["linear"])
+    return _problem(system, forcing, system.about_structure.get("linear", lambda: _linear_part(system)))
 
 
 def _linear_part(system: System) -> dict[str, Array]:

@@ -11,7 +11,6 @@ force, ∫ E(t_i - τ) F(τ) dτ, are computed by composite Gauss quadrature fin
 from __future__ import annotations
 
 import math
-from collections import OrderedDict
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -23,6 +22,7 @@ from solvers.compiled.state import parameters_of
 from solvers.compiled.sums import padded
 from solvers.exponential.contact.nodes import PHASES, Families, S, families_of, gauss, lagrange
 from solvers.exponential.phi_functions import signal_responses
+from solvers.problem import Memo
 
 STIFFNESS, EXPONENT, FACTOR, DAMPING = range(4)  # of an inlined law
 TAYLOR_REACH = 0.02  # |λ| x up to which a Taylor step of order 6 is exact to rounding
@@ -273,8 +273,7 @@ OF_TONES = (
     *("signal_rows", "power_rows", "loss_rows", "cell"),
 )
 
-_KNOWN: OrderedDict[bytes, _Blocks] = OrderedDict()  # structures met lately: a tone, gap or stiffness more is cheap
-_MOST_KNOWN = 16
+_KNOWN = Memo(1 << 27)  # `_Blocks` of structures met lately: a tone, gap or stiffness more is cheap
 
 
 def build(
@@ -387,12 +386,12 @@ def _blocks(problem: Problem, tones: int, h: Any, contact_h: Any, families: Fami
     rows = (row.reshape(-1, 2, size)[:, :, :own] for row in (problem.push, problem.read, problem.load))
     arrays = (problem.k[:own], problem.c[:own], *rows, h, contact_h, *families[:3])
     key = b"|".join((b"%d" % tones, *(array.tobytes() for array in arrays)))
-    if key not in _KNOWN:
-        _KNOWN[key] = _filled(_empty(problem, h, contact_h, families), problem, (0, own), h, contact_h, families)
-        while len(_KNOWN) > _MOST_KNOWN:
-            _KNOWN.popitem(last=False)
-    _KNOWN.move_to_end(key)
-    return _KNOWN[key]
+
+    def make() -> _Blocks:
+        return _filled(_empty(problem, h, contact_h, families), problem, (0, own), h, contact_h, families)
+
+    known: _Blocks = _KNOWN.get(key, make)
+    return known
 
 
 def _empty(problem: Problem, h: Any, contact_h: Any, families: Families) -> _Blocks:

@@ -18,10 +18,8 @@ def latches(contact: Contact) -> bool:
 
 def with_memory(system: System) -> list[int]:
     """The stops whose law latches."""
-    about = system.about_laws
-    if "with memory" not in about:
-        about["with memory"] = [s for s, contact in enumerate(system.contacts) if latches(contact)]
-    known: list[int] = about["with memory"]
+    contacts = enumerate(system.contacts)
+    known: list[int] = system.about_laws.get("with memory", lambda: [s for s, one in contacts if latches(one)])
     return known
 
 

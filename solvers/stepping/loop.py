@@ -237,12 +237,10 @@ def watched(system: System, motion: Array, least: float) -> Array:
     """What `gains` looks at, J: stored now, at the start, negligible; steps that gained; most input, held by stops."""
     q, q_dot = np.split(motion, 2)
     stored = abs(float(system.energy(q, q_dot)))
-    known = system.about_laws
-    if "take" not in known:
-        known["take"] = [takes(contact.law) for contact in system.contacts]
+    known = system.about_laws.get("take", lambda: [takes(contact.law) for contact in system.contacts])
     held = [
         work_of(contact.law, -float(contact.direction @ q) - contact.gap) if fair else math.inf
-        for contact, fair in zip(system.contacts, known["take"], strict=True)
+        for contact, fair in zip(system.contacts, known, strict=True)
     ]
     return np.array([stored, stored, least, 0.0, 0.0, *held])
 
