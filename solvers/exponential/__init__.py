@@ -2,8 +2,8 @@
 
 `method` is the loop, `preparation` and `tables` make its numbers, `flight` and `safe_steps` move free of contact, the
 folder `contact` holds one step in contact; `energy` books work, `energy_guard` refuses runs that do not balance,
-`linearised` and `tangent` differentiate a run. Imports: `compiled`, `problem`. Its files load machine code when
-imported; begin with `method`.
+`linearised`, `linearised_step` and `tangent` differentiate a run. Imports: `compiled`, `problem`. Its files load
+machine code when imported; begin with `method`.
 """
 
 from typing import Any

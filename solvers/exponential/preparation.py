@@ -13,7 +13,7 @@ from solvers.compiled.handles import Cast, Layout, Mould
 from solvers.compiled.kernels import INTEGERS, MATRIX, PROBLEM, REAL, VECTOR, Problem
 from solvers.compiled.state import STATE, State, begin_state, problem_of, state_shapes
 from solvers.compiled.sums import padded
-from solvers.exponential.contact.node_response import Space
+from solvers.exponential.contact.node_response import START, Space
 from solvers.exponential.contact.nodes import S, series_of
 from solvers.exponential.tables import OF_TONES, Tables, build, doublings, fill_tones, known_of
 from solvers.problem import Array, Forcing, System, on_one_grid, tones_as_nodes
@@ -217,7 +217,7 @@ def _layout(stops: int, loads: int, blocks: int, signals: int) -> Layout:
         *((padded(width),), (7, padded(size)), (signals, 6), (7,), (blocks,), (loads,), (stops,)),
         (2, padded(blocks)),
         *((stops, 2, S), (S,), (stops, 2, S), (stops + loads, S), (S,), (stops, 2, 8), (stops, S), (stops, 3, S)),
-        *((stops * S, stops * S), (stops * S,), (stops * S,), (18, padded(width + 2))),
+        *((stops * S, stops * S), (stops * S,), (stops * S,), (START + 1, padded(width + 2))),
         *([(stops,)] * 4),
         *(
             (stops, S),

@@ -36,7 +36,7 @@ from solvers.compiled.sums import combine
 from solvers.exponential.contact.collocation import arrive, contact_time, finish_step, solve_forces, step_error
 from solvers.exponential.contact.crossings import bend_ahead, choose_sides, leaves_piece
 from solvers.exponential.contact.landing import land, land_on_bend
-from solvers.exponential.contact.node_response import free_response
+from solvers.exponential.contact.node_response import LANDED, START, free_response
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.peaks import state_peaks, step_peaks
 from solvers.exponential.energy import account, inside
@@ -193,7 +193,7 @@ def _record(problem, tables, state, space, family, level, t_end, out, due, ledge
         if not sampled and t + h < t_end:
             return
         span = due[state.count[SAMPLED]] - t if sampled else t_end - t
-        row = out[state.count[SAMPLED]] if sampled else space.work[17]
+        row = out[state.count[SAMPLED]] if sampled else space.work[START]
         copy(state.x, row, state.x.size)
         inside(problem, tables, state, space, family, h, span, row)
         if ledger:
@@ -220,7 +220,7 @@ def _land_first(problem, tables, state, space, stop, direction, near, rtol, t_en
         landed = land(problem, tables, state, space, stop, direction, near, rtol, t_end, out, due, ledger)
         if landed == stop or landed < 0:
             return landed, direction
-        above = indentation(problem, landed, space.work[15]) > problem.levels[landed, state.piece[landed]]
+        above = indentation(problem, landed, space.work[LANDED]) > problem.levels[landed, state.piece[landed]]
         stop, direction = landed, 1 if above else -1
     return -1, 0
 
@@ -304,8 +304,8 @@ def _law_fails(state, space):
 
 @inner
 def _end_inside(problem, tables, state, space, family, level, t_end):
-    """End the run within the step found, at the state `_record` has left in ``space.work[17]``."""
-    x, share = space.work[17], (t_end - state.now[T]) / tables.step[level]
+    """End the run within the step found, at the state `_record` has left in ``space.work[START]``."""
+    x, share = space.work[START], (t_end - state.now[T]) / tables.step[level]
     place = share ** (1.0 / tables.power[family])
     for s in range(problem.gap.size):
         if state.piece[s] > 0:
