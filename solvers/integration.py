@@ -132,13 +132,13 @@ def prepared_run(
 
 def _forcing(system: System, duration: float, rtol: float) -> Forcing:
     """Arrays of all signals; those of tones are kept, as long as no signal can have changed."""
-    kept: Forcing | None = system.kept.get("forcing")
+    kept: Forcing | None = system.kept.find("forcing")
     if kept is None:
         kept = hand_over([signal for _, signal in system.loads], duration, rtol)
         options = [getattr(type(signal), "__dataclass_params__", None) for _, signal in system.loads]
         fixed = all(found is not None and found.frozen for found in options)
         if fixed and not kept.table_dt.size:
-            system.kept["forcing"] = kept
+            kept = system.kept.store("forcing", kept)
     return kept
 
 

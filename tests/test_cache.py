@@ -13,7 +13,7 @@ import contacts.kernels as laws
 import solvers.compiled.cache as cache
 
 CALL = "import solvers.outer as o; print(o.outer(1.0), sum(o.outer.stats.cache_hits.values()))"
-INNER = "from solvers.compiled.kernels import inner\n@inner\ndef times(x): return {} * x\n"
+INNER = "from solvers.compiled.decorators import inner\n@inner\ndef times(x): return {} * x\n"
 OUTER = INNER.replace("inner", "kernel").replace("def times(x): return {} * x", "def outer(x): return times(x)")
 OUTER = "from solvers.inner import times\n" + OUTER
 
@@ -24,7 +24,7 @@ def package(tmp_path):
     home = tmp_path / "solvers"
     home.mkdir()
     (home / "compiled").mkdir()
-    for name in ("cache.py", "kernels.py"):
+    for name in ("cache.py", "decorators.py"):
         shutil.copy(cache.HOME / "compiled" / name, home / "compiled")
     for folder in (home, home / "compiled"):
         (folder / "__init__.py").touch()
@@ -54,7 +54,7 @@ def test_a_changed_inner_function_is_compiled_anew_and_the_old_one_found_again(p
 
 def test_what_changes_while_a_process_runs_is_not_kept(package):
     write = f"open({str(package / 'inner.py')!r}, 'w').write({INNER.format(30.0)!r})"
-    change = f"import solvers.compiled.kernels; {write}; "
+    change = f"import solvers.compiled.decorators; {write}; "
     assert ran(change + CALL, package.parent)[0] == ["30.0", "0"]
     (package / "inner.py").write_text(INNER.format(2.0))
     assert ran(CALL, package.parent)[0] == ["2.0", "0"]
@@ -62,7 +62,7 @@ def test_what_changes_while_a_process_runs_is_not_kept(package):
 
 def test_the_users_own_functions_keep_their_folder(package):
     (package.parent / "own.py").write_text("import numba\n@numba.njit(cache=True)\ndef own(x):\n    return x\n")
-    ran("import solvers.compiled.kernels, own; own.own(1.0)", package.parent)
+    ran("import solvers.compiled.decorators, own; own.own(1.0)", package.parent)
     assert list((package.parent / "__pycache__").glob("own.*.nbi"))
 
 
@@ -109,7 +109,7 @@ def test_laws_are_compiled_where_nothing_can_be_written(package, tmp_path):
     assert ran("import solvers.laws as k; print(k.power.address > 0)", package.parent, **environment)[0] == ["True"]
 
 
-@pytest.mark.parametrize("module", ["contacts.kernels", "solvers.compiled.kernels"])
+@pytest.mark.parametrize("module", ["contacts.kernels", "solvers.compiled.decorators"])
 def test_without_machine_code_one_sentence_is_said(module):
     code = f"try:\n    import {module}\nexcept RuntimeError as error:\n    print(error)"
     said, warned = ran(code, cache.HOME.parent, NUMBA_DISABLE_JIT="1")

@@ -1,5 +1,7 @@
 """Eights, vector sums and handles against numpy and the tuples they stand for."""
 
+import ast
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -7,6 +9,7 @@ import pytest
 from numba import njit, types
 
 from contacts import Hertz, KelvinVoigt, Viscoelastic
+from solvers.compiled import decorators
 from solvers.compiled.handles import Layout, Mould, Packed, opener
 from solvers.compiled.simd import bits, eight, put, raised, root, spread, total
 from solvers.compiled.sums import combine, padded
@@ -276,3 +279,39 @@ def test_steps_are_interpolated_around_every_node():
 )
 def test_force_at_entry_is_a_series_in_the_root_of_time_its_powers_need(made, series):
     assert series_of(made) == pytest.approx(series)
+
+
+PRIVATE = "numba.core", "numba.np", "llvmlite"
+USERS = {  # the files that stand on what numba does not promise, and why
+    "solvers/compiled/decorators.py",  # options of njit, described there
+    "solvers/compiled/cache.py",  # llvmlite's version
+    "solvers/compiled/handles.py",  # a type of its own, and loads through a pointer
+    "solvers/compiled/simd.py",  # a type of its own, and vector instructions
+    "solvers/compiled/kernels.py",  # calls of C functions at an address
+    "contacts/kernels.py",  # the same
+    "contacts/custom.py",  # parameters as a tuple; the compiler's errors
+}
+OPTION_NAMES = {"_nrt", "forceinline", "no_cpython_wrapper", "no_cfunc_wrapper", "inline"}
+
+
+def leans_on(path):
+    """What a file uses of numba that is not promised: modules imported, options of decorators."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+        names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+        yield from (name for name in names if name.startswith(PRIVATE))
+        if isinstance(node, ast.keyword) and node.arg in OPTION_NAMES:
+            yield node.arg
+        if isinstance(node, ast.Constant) and node.value in OPTION_NAMES - {"inline"}:
+            yield node.value
+
+
+def test_only_named_files_stand_on_what_numba_does_not_promise():
+    home = Path(decorators.__file__).parent.parent.parent
+    files = [
+        path for package in ("fembeam", "contacts", "reduction", "solvers") for path in home.glob(package + "/**/*.py")
+    ]
+    found = {str(path.relative_to(home).as_posix()): {*leans_on(path)} for path in files}
+    assert {name for name, used in found.items() if used} == USERS
+    assert {name for name, used in found.items() if used & OPTION_NAMES} == {"solvers/compiled/decorators.py"}
+    assert found["solvers/compiled/decorators.py"] == OPTION_NAMES

@@ -179,7 +179,5 @@ def _cell(model: Model, method: Any, dt: float, duration: float, tolerance: floa
 def _truth(model: Model, duration: float, start: Any) -> Any:
     """The reference, once per model."""
     key = "truth of a stability map", duration, None if start is None else tuple(np.asarray(start))
-    if key not in model.system.kept:
-        best = solvers.Exponential(1e-11, ledger=False)
-        model.system.kept[key] = model.simulate(duration, duration / SAMPLES, start, best)
-    return model.system.kept[key]
+    best = solvers.Exponential(1e-11, ledger=False)
+    return model.system.kept.get(key, lambda: model.simulate(duration, duration / SAMPLES, start, best))

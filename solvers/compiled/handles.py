@@ -126,6 +126,11 @@ class Cast(NamedTuple):
     block: Any  # its own arrays, then the descriptors
     address: int
 
+    @property
+    def nbytes(self) -> int:
+        """Of what no other cast shares."""
+        return int(self.block.nbytes)
+
 
 class Mould:
     """A named tuple to be packed again and again: the arrays named are every cast's own, all casts share the others."""

@@ -8,89 +8,43 @@ The state a stepping method integrates is x = [p (n), v (n), ledger (2 + 2m)]:
 
 from __future__ import annotations
 
-import gc
-from collections.abc import Callable
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import ir
-from numba import config, njit, types
+from numba import types
 from numba.extending import intrinsic
 
-from solvers.compiled.cache import kept
-
-if config.DISABLE_JIT:
-    raise RuntimeError("NUMBA_DISABLE_JIT is set, but time integration runs as machine code only: unset it")
-
-
-def _compiled(function: Any, *signature: Any, **options: Any) -> Any:
-    """A function compiled by numba, its machine code kept in the folder of these sources."""
-    with kept(function) as keep:
-        return njit(*signature, cache=keep, **options)(function)
-
-
-def _decorator(**options: Any) -> Callable[[Any], Any]:
-    return partial(_compiled, **options)
-
-
-_OPTIONS: Any = {"nogil": True, "error_model": "numpy", "_nrt": False}
-kernel = _decorator(**_OPTIONS)
-"""Decorator of the compiled functions Python calls. They allocate nothing, so reference counting is switched off:
-passing twenty arrays down a call would otherwise cost ten times the arithmetic of a two-mode step."""
-_INNER: Any = {**_OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-inner = _decorator(**_INNER)
-"""The same for functions only kernels call: no wrappers, which would take most of their compile time."""
-inlined = _decorator(**_INNER, forceinline=True)
-"""The same for what the innermost loops call, from few places: there even passing the arrays' descriptors costs more
-than the arithmetic. Everywhere else it would only cost compile time."""
-merged = _decorator(**_INNER, inline="always")
-"""The same for the long functions one kernel calls once each: compiled as a part of it."""
-reordered = _decorator(**_INNER, forceinline=True, fastmath={"reassoc", "contract"})
-"""The same for sums whose order does not matter, so that they can be vectorised."""
-
-
-def entry(signature: Any) -> Callable[[Any], Any]:
-    """Decorator of a kernel that is compiled, or loaded, when its module is imported.
-
-    Meanwhile the garbage collector rests: the compiler keeps most of what it makes, and looking through that again and
-    again takes a sixth of the time.
-    """
-
-    def compiled(function: Any) -> Any:
-        collects = gc.isenabled()
-        gc.disable()
-        try:
-            return _compiled(function, signature, **_OPTIONS)
-        finally:
-            if collects:
-                gc.enable()
-
-    return compiled
+from solvers.compiled.decorators import entry as entry  # handed on: whoever writes kernels needs them all
+from solvers.compiled.decorators import inlined, inner, kernel, reordered
+from solvers.compiled.decorators import merged as merged
 
 
 class Problem(NamedTuple):
-    """Everything a kernel reads and never writes."""
+    """Everything a kernel reads and never writes; `state.problem_of` fills it, in SI units.
 
-    k: Any  # (n,) block stiffness
-    c: Any  # (n,) block damping
-    loss: Any  # (2n, 2n) damping power zᵀ loss z, or (0, 0): then Σ c v²
+    z = [p, v] are block coordinates, for mass-normalised modes in √kg m and √kg m/s.
+    """
+
+    k: Any  # (n,) block stiffness, 1/s²
+    c: Any  # (n,) block damping, 1/s
+    loss: Any  # (2n, 2n) damping power zᵀ loss z in W, or (0, 0): then Σ c v²
     push: Any  # (m, 2n) state rate per newton of stop s
-    read: Any  # (m, 2n) indentation = read·z - gap
-    read_rate: Any  # (m, 2n) indentation rate = read_rate·z
-    levels: Any  # (m, J) ascending indentations where a stop changes piece: 0, knots, then inf
-    gap: Any  # (m,)
+    read: Any  # (m, 2n) indentation = read·z - gap, m
+    read_rate: Any  # (m, 2n) indentation rate = read_rate·z, m/s
+    levels: Any  # (m, J) ascending indentations, m, where a stop changes piece: 0, knots, then inf
+    gap: Any  # (m,) m
     law: Any  # (m,) addresses of the compiled forces
     gradient: Any  # (m,) addresses of their derivatives
     parameters: Any  # (m, P) their parameters
-    floor: Any  # (m,) smallest entry rates
+    floor: Any  # (m,) smallest entry rates, m/s
     load: Any  # (L, 2n) state rate per unit of signal l
-    power: Any  # (L, 2n) input power = signal × power·z
+    power: Any  # (L, 2n) input power = signal × power·z, W
     tone_omega: Any  # (K,) rad/s
-    tone_amplitude: Any  # (K,) complex
+    tone_amplitude: Any  # (K,) complex, a of Re a e^{iωt}
     tone_load: Any  # (K,) the load each drives
     table: Any  # (rows, 3) [s, s', s''] at the nodes of all sampled signals
-    table_dt: Any  # (J,)
+    table_dt: Any  # (J,) s
     table_start: Any  # (J + 1,) first row of each, and the end
     table_load: Any  # (J,) the load each drives
 

@@ -30,14 +30,17 @@ KIND, BEGAN, ENDED, SPAN, FIRST, SECOND, HEAD = range(7)  # columns of the tape:
 
 
 class State(NamedTuple):
-    """Everything a run changes; it can be continued from here."""
+    """Everything a run changes; it can be continued from here.
 
-    now: Any  # (4,) time, flight step, contact step, time of the last event
-    x: Any  # (2n + 2 + 2m,) of the blocks, then the energy balance, see `kernels`
-    rate: Any  # of x
+    `begin_state` fills it, after that kernels alone write, through all of a run. Units as in `kernels.Problem`.
+    """
+
+    now: Any  # (4,) s: time, flight step, contact step, time of the last event
+    x: Any  # (2n + 2 + 2m,) of the blocks, then the ledger in J (impulses in N s), see `kernels`
+    rate: Any  # of x, per s; stepping methods only
     piece: Any  # (m,) 0 in flight, j > 0 between levels j-1 and j
-    entry_rate: Any  # (m,) latched
-    open: Any  # (m, 7) of the contacts under way
+    entry_rate: Any  # (m,) m/s, latched
+    open: Any  # (m, 7) of the contacts under way, SI units, columns named above
     count: Any  # (8,) steps, rejected ones, law calls, ..., as named above
     tape: Any  # (rows, HEAD + x.size + forces) what happened in contact, for the tangent; no rows, no tape
 
@@ -184,10 +187,7 @@ def new_state(z: Any, stops: int) -> State:
 
 def problem_of(system: System, forcing: Forcing) -> Problem:
     """Arrays the kernels read, in block coordinates."""
-    about = system.about_structure
-    if "linear" not in about:
-        about["linear"] = _linear_part(system)
-    return _problem(system, forcing, about["linear"])
+    return _problem(system, forcing, system.about_structure.get("linear", lambda: _linear_part(system)))
 
 
 def _linear_part(system: System) -> dict[str, Array]:

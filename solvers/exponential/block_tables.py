@@ -7,7 +7,6 @@ A few stops have tables of what reaches every one of them; with more only the re
 from __future__ import annotations
 
 import math
-from collections import OrderedDict
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,6 +15,7 @@ from solvers.compiled.kernels import Problem
 from solvers.compiled.sums import padded
 from solvers.exponential.contact.nodes import PHASES, Families, S, gauss
 from solvers.exponential.responses import fill_ahead, fill_free, fill_propagators, fill_way
+from solvers.problem import Memo
 
 FEW = 4  # stops that have tables of their own; more go through the blocks, which is quicker from there on
 MOST_BYTES = 4e9
@@ -35,8 +35,7 @@ class Blocks(NamedTuple):
     ending: Any
 
 
-_KNOWN: OrderedDict[bytes, Blocks] = OrderedDict()  # structures met lately: a tone, gap or stiffness more is cheap
-_MOST_KNOWN = 16
+_KNOWN = Memo(1 << 27)  # `Blocks` of structures met lately: a tone, gap or stiffness more is cheap
 
 
 def blocks_of(problem: Problem, tones: int, h: Any, contact_h: Any, families: Families) -> Blocks:
@@ -46,13 +45,13 @@ def blocks_of(problem: Problem, tones: int, h: Any, contact_h: Any, families: Fa
     rows = (row.reshape(-1, 2, size)[:, :, :own] for row in (problem.push, problem.read, problem.load))
     arrays = (problem.k[:own], problem.c[:own], *rows, h, contact_h, families.power, families.lead, families.nodes)
     key = b"|".join((b"%d %d" % (tones, FEW), *(array.tobytes() for array in arrays)))
-    if key not in _KNOWN:
+
+    def make() -> Blocks:
         _require_room(len(problem.gap), len(problem.load), size, len(contact_h), families)
-        _KNOWN[key] = filled(_empty(problem, own, h, contact_h, families), problem, (0, own), h, contact_h, families)
-        while len(_KNOWN) > _MOST_KNOWN:
-            _KNOWN.popitem(last=False)
-    _KNOWN.move_to_end(key)
-    return _KNOWN[key]
+        return filled(_empty(problem, own, h, contact_h, families), problem, (0, own), h, contact_h, families)
+
+    known: Blocks = _KNOWN.get(key, make)
+    return known
 
 
 def _shapes(stops: int, loads: int, size: int, own: int, levels: int, families: Families) -> dict[str, tuple[int, ...]]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from solvers.compiled.kernels import copy, dot, inlined, inner, table_value
 from solvers.compiled.state import T, touching
-from solvers.exponential.contact.node_response import sample_signals
+from solvers.exponential.contact.node_response import PLAIN, PRODUCTS, WEIGHTED, WITHIN, sample_signals
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.flight import add_taylor, energy_norms, taylor
 from solvers.exponential.responses import propagate
@@ -73,7 +73,8 @@ def inside(problem, tables, state, space, family, h, span, row):
         row[n + b] = alpha * v - beta * (problem.k[b] * p + problem.c[b] * v)
     if problem.table_dt.size == 0 and not touching(state):
         return
-    nodes, plain, weighted, products = tables.nodes[family], space.work[0], space.work[1], space.work[2]
+    nodes, work = tables.nodes[family], space.work
+    plain, weighted, products = work[PLAIN], work[WEIGHTED], work[PRODUCTS]
     _scales(nodes, lead, plain, weighted)
     end = (span / h) ** (1.0 / power)
     panels = 1 + int(tables.fastest * span / 4.0)
@@ -118,7 +119,7 @@ def account(problem, tables, state, space, family, h, length, x, row):
 
     Gauss's rule in parts of 3 radians of the fastest block that moves at the begin or the end of the step.
     """
-    size, inner = 2 * problem.k.size, space.work[16]
+    size, inner = 2 * problem.k.size, space.work[WITHIN]
     energy_norms(problem, x, space.norms)
     fastest = energetic(problem, tables, space.norms)
     energy_norms(problem, space.x_new, space.norms)
@@ -141,11 +142,11 @@ def account_flight(problem, tables, state, space, h, x):
             sample_signals(problem, tables, space, np.int64(0), state.now[T], h)  # literals would compile it twice
         account(problem, tables, state, space, np.int64(0), h, h, x, state.x)
         return
-    size, inner = 2 * problem.k.size, space.work[16]
+    size, inner = 2 * problem.k.size, space.work[WITHIN]
     taylor(problem, x, state.now[T], space.terms, space.six)
     for i in range(3):
         span = h * (0.5 + 0.3872983346207417 * (i - 1))  # Gauss's three points, sqrt(3/5)/2 apart
-        add_taylor(space.terms, inner, span, size, space.values, space.work[0])
+        add_taylor(space.terms, inner, span, size, space.values, space.work[PLAIN])
         gain, loss = powers(problem, tables, state.now[T] + span, inner)
         weight = h * (4.0 if i == 1 else 2.5) / 9.0
         state.x[size] += weight * gain

@@ -68,7 +68,7 @@ from solvers.exponential.contact.collocation import arrive
 from solvers.exponential.contact.crossings import FORCE, side_at
 from solvers.exponential.contact.landing import regular_step, start_landing
 from solvers.exponential.contact.node_newton import factorise, linearise, substitute
-from solvers.exponential.contact.node_response import free_response, respond
+from solvers.exponential.contact.node_response import START, free_response, respond
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.energy import inside
 from solvers.exponential.flight import signal_derivatives, turn
@@ -393,7 +393,7 @@ def _stage_rates(problem, ahead, behind, tables, shadow, space, slopes, nudge, w
 def _land(problem, ahead, behind, tables, shadow, space, slopes, nudge, row):
     """A landing: the variational equation on the Runge–Kutta step's own stages."""
     variable, stop, size = int(row[FIRST]), int(row[SECOND]), 2 * problem.k.size
-    w, width, span = space.work[17], shadow.x.size, row[SPAN]
+    w, width, span = space.work[START], shadow.x.size, row[SPAN]
     start_landing(problem, tables, shadow, space, stop)
     _note_sides(problem, tables, shadow, space)
     ledger = np.bool_(0)  # a literal would be compiled for itself

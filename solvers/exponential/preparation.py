@@ -14,7 +14,7 @@ from solvers.compiled.kernels import INTEGERS, MATRIX, PROBLEM, REAL, VECTOR, Pr
 from solvers.compiled.state import STATE, State, begin_state, problem_of, state_shapes
 from solvers.compiled.sums import padded
 from solvers.exponential.contact.blocks import POOL
-from solvers.exponential.contact.node_response import Space
+from solvers.exponential.contact.node_response import START, Space
 from solvers.exponential.contact.nodes import S, series_of
 from solvers.exponential.tables import OF_TONES, Tables, build, doublings, fill_tones, known_of
 from solvers.problem import Array, Forcing, System, on_one_grid, tones_as_nodes
@@ -79,6 +79,11 @@ class Prepared(NamedTuple):
     rest: Array  # state of the tones' blocks at t = 0, the structure's less their steady response
     spare: list[Workspace]  # of runs that are over
 
+    @property
+    def nbytes(self) -> int:
+        """Of what belongs to this one only; the rest is its skeleton's."""
+        return self.problem.nbytes + self.tables.nbytes + int(self.back.nbytes)
+
     def workspace(self) -> Workspace:
         """One that no other run uses; making its arrays takes as long as many steps."""
         try:
@@ -89,39 +94,37 @@ class Prepared(NamedTuple):
 
 def ready_for(system: System, forcing: Forcing, duration: float, rtol: float) -> tuple[Forcing, Prepared]:
     """The forcing as the method takes it, and the tables; those of an identical earlier run are reused."""
-    last = system.kept.get("run")
-    if last and last[0] is forcing and last[1] == (duration, rtol):
-        return forcing, last[2]
+    last = system.kept.find(("run", duration, rtol))
+    if last and last[0] is forcing:
+        return forcing, last[1]
     taken = on_one_grid(without_resonance(system, forcing, duration, rtol), duration)
     prepared = prepared_for(system, taken)
     if taken is forcing and not forcing.table.size:
-        system.kept["run"] = forcing, (duration, rtol), prepared
+        system.kept.store(("run", duration, rtol), (forcing, prepared))
     return taken, prepared
 
 
 def prepared_for(system: System, forcing: Forcing) -> Prepared:
-    """Tables of a system, made once and kept on it, those of the last grid of its sampled signals only."""
+    """Tables of a system, made once for each grid of its sampled signals and kept on it."""
     dt_cell = float(forcing.table_dt[0]) if forcing.table_dt.size else 1.0
-    key = dt_cell, *(part.tobytes() for part in (forcing.tone_omega, forcing.tone_amplitude, forcing.tone_load))
-    if system.kept.get("exponential", (None,))[0] != key:
+    tones = forcing.tone_omega, forcing.tone_amplitude, forcing.tone_load
+
+    def make() -> Prepared:
         gaps = [contact.gap for contact in system.contacts]
-        system.kept["exponential"] = key, _skeleton_for(system, forcing, dt_cell).with_tones(forcing, gaps)
-    prepared: Prepared = system.kept["exponential"][1]
+        return _skeleton_for(system, forcing, dt_cell).with_tones(forcing, gaps)
+
+    key = "tables", dt_cell, forcing.table_load.tobytes(), *(part.tobytes() for part in tones)
+    prepared: Prepared = system.kept.get(key, make)
     return prepared
 
 
 def _skeleton_for(system: System, forcing: Forcing, dt_cell: float) -> _Skeleton:
-    """What systems have in common that differ in tones, sampled values and gaps only; the latest is kept for them."""
+    """What systems have in common that differ in tones, sampled values and gaps only."""
     about, laws = system.about_structure, system.about_laws
-    if "passive" not in about:
-        _check_passive(system)
-        about["passive"] = True
+    about.get("passive", lambda: _check_passive(system))
     places = (part.tobytes() for part in (forcing.tone_load, forcing.table_dt, forcing.table_load))
-    key = *places, doublings(_speeds(system), forcing.tone_omega)
-    known = about.get("skeleton", (None, None))
-    if known[0] != key or known[1] is not laws:
-        known = about["skeleton"] = key, laws, _Skeleton(system, forcing, dt_cell)
-    skeleton: _Skeleton = known[2]
+    key = "skeleton", laws, *places, doublings(_speeds(system), forcing.tone_omega)
+    skeleton: _Skeleton = about.get(key, lambda: _Skeleton(system, forcing, dt_cell))
     return skeleton
 
 
@@ -153,6 +156,11 @@ class _Skeleton:
         self.layout = _layout(*sizes, POOL if tables.ahead.size else 0)
         self.problem = Mould(problem, PROBLEM, ("gap", "k", "read", "read_rate", "power"))
         self.tables = Mould(tables, TABLES, OF_TONES)
+
+    @property
+    def nbytes(self) -> int:
+        """Of problem and tables."""
+        return sum(getattr(array, "nbytes", 8) for mould in (self.problem, self.tables) for array in mould.value)
 
     def with_tones(self, forcing: Forcing, gaps: list[float]) -> Prepared:
         """The same with the columns of given tones, and with given gaps."""
@@ -190,8 +198,8 @@ def _of_tones(rows: Array, n: int) -> Array:
     return rows.reshape(len(rows), 2, rows.shape[1] // 2)[:, :, n:]
 
 
-def _check_passive(system: System) -> None:
-    """No block gains energy by itself: what proves that no contact is missed rests on that."""
+def _check_passive(system: System) -> bool:
+    """True if no block gains energy by itself, else ValueError: what proves that no contact is missed rests on that."""
     k, c = system.blocks.k, system.blocks.c
     if np.any(k < 0.0):
         raise ValueError(
@@ -202,6 +210,7 @@ def _check_passive(system: System) -> None:
         raise ValueError(
             f"C must not drive the motion for Exponential, its lowest 2ζω is {c.min():g}; use DormandPrince, or a law"
         )
+    return True
 
 
 @lru_cache(maxsize=64)
@@ -213,7 +222,7 @@ def _layout(stops: int, loads: int, blocks: int, signals: int, pool: int) -> Lay
         *((padded(width),), (7, padded(size)), (signals, 6), (7,), (blocks,), (loads,), (stops,)),
         (2, padded(blocks)),
         *((stops, 2, S), (S,), (stops, 2, S), (stops + loads, S), (S,), (stops, 2, 8), (stops, S), (stops, 3, S)),
-        *((stops * S,), (stops * S,), (18, padded(width + 2))),
+        *((stops * S,), (stops * S,), (START + 1, padded(width + 2))),
         *([(stops,)] * 4),
         *((stops, S), (stops,), (4, 3 * S), (stops,), (stops,), (S + 2,), (1,), (1,), (3,), (6,)),
         *((stops, 2), (rows, S), (rows, S), (padded(rows),), (stops * S, stops * S), (pool, S, 2 * S), (pool,)),
@@ -227,15 +236,10 @@ def without_resonance(system: System, forcing: Forcing, duration: float, rtol: f
     That is those on the frequency of a block hardly damped, and those whose steady response l/|k - Ω² + iΩc| is a
     thousand times what the load can do within the duration, l duration²/2: their difference would lose its digits.
     """
-    key = forcing.tone_omega.tobytes(), forcing.tone_load.tobytes()
-    if system.kept.get("distances", (None,))[0] != key:
-        tones = zip(forcing.tone_omega, forcing.tone_load, strict=True)
-        system.kept["distances"] = key, [_distance(system, omega, load) for omega, load in tones]
-    resonant = [
-        i
-        for i, (absolute, relative) in enumerate(system.kept["distances"][1])
-        if relative <= 1e-6 or absolute * duration**2 < 2e-3
-    ]
+    key = "distances", forcing.tone_omega.tobytes(), forcing.tone_load.tobytes()
+    tones = zip(forcing.tone_omega, forcing.tone_load, strict=True)
+    found = system.kept.get(key, lambda: [_distance(system, omega, load) for omega, load in tones])
+    resonant = [i for i, (absolute, relative) in enumerate(found) if relative <= 1e-6 or absolute * duration**2 < 2e-3]
     return tones_as_nodes(forcing, resonant, duration, rtol) if resonant else forcing
 
 

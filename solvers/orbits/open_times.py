@@ -18,10 +18,8 @@ def latches(contact: Contact) -> bool:
 
 def latching_stops(system: System) -> list[int]:
     """The stops whose law depends on the entry rate."""
-    about = system.about_laws
-    if "latching stops" not in about:
-        about["latching stops"] = [s for s, contact in enumerate(system.contacts) if latches(contact)]
-    known: list[int] = about["latching stops"]
+    contacts = enumerate(system.contacts)
+    known: list[int] = system.about_laws.get("latching", lambda: [s for s, one in contacts if latches(one)])
     return known
 
 

@@ -3,11 +3,13 @@
 M q'' + C q' + K q = Σ v_l s_l(t) + Σ w_c F_c(-w_c·q - gap_c, ...)
 
 `system` holds matrices, contacts and loads and decouples them into blocks, `signals` samples loads for compiled code,
-`result` is the solution with its log of contacts and its energies. Imports: numpy, scipy. Begin with `system.System`.
+`memo` keeps what was computed once, `result` is the solution with its log of contacts and its energies.
+Imports: numpy, scipy. Begin with `system.System`.
 """
 
 from solvers.problem.decoupling import decouple
 from solvers.problem.matrices import Array, dense, product
+from solvers.problem.memo import Memo
 from solvers.problem.result import COLUMNS, ContactLog, Cost, Energy, Solution, SolverError, Status, counted
 from solvers.problem.signals import Forcing, hand_over, on_one_grid, tones_as_nodes
 from solvers.problem.system import Contact, Law, Parameter, System, require_step
@@ -21,6 +23,7 @@ __all__ = [
     "Energy",
     "Forcing",
     "Law",
+    "Memo",
     "Parameter",
     "Solution",
     "SolverError",

@@ -27,15 +27,18 @@ def _check_tangent(tangent: Any, method: Any, system: System) -> None:
 
 def check_slopes(system: System) -> None:
     """No law has an infinite slope at its surface, F ~ δ^r with r < 1 but for a declared jump."""
-    if system.about_laws.get("finite slopes"):
-        return
+    system.about_laws.get("finite slopes", lambda: _finite_slopes(system))
+
+
+def _finite_slopes(system: System) -> bool:
+    """True, or ValueError."""
     delta = np.array([1e-12, 1e-10])
     for i, contact in enumerate(system.contacts):
         viscous = contact.law.force(delta, 1.0, 1.0) - contact.law.force(delta, 0.0, 1.0)
         if not contact.law.jump and 0.0 < abs(viscous[1]) < 95.0 * abs(viscous[0]):
             trouble = f"its slope is infinite at the surface: {contact.law!r}"
             raise ValueError(f"tangent is not offered for the law of contact {i}: {trouble}")
-    system.about_laws["finite slopes"] = True
+    return True
 
 
 def _start(system: System, q0: ArrayLike, q_dot0: ArrayLike, method: Any) -> Array:
@@ -85,12 +88,15 @@ def _given_times(duration: float, given: ArrayLike) -> Array:
 
 def _check_laws(system: System) -> None:
     """Every law is finite at rest, so that a NaN is found before the run; checked once per system."""
-    if system.about_laws.get("finite"):
-        return
+    system.about_laws.get("finite", lambda: _finite(system))
+
+
+def _finite(system: System) -> bool:
+    """True, or ValueError."""
     delta = np.array([1e-12, 1e-6, 1e-3])
     for i, contact in enumerate(system.contacts):
         force = contact.law.force(delta, 0.0, 1.0)
         if not np.all(np.isfinite(force)):
             where = delta[~np.isfinite(force)][0]
             raise ValueError(f"the law of contact {i} is not finite at delta = {where:g} m: {contact.law!r}")
-    system.about_laws["finite"] = True
+    return True

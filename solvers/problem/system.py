@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike
 
 from solvers.problem.decoupling import Blocks, decouple
 from solvers.problem.matrices import Array, _check_mass, _square, dense, product
+from solvers.problem.memo import Memo
 
 
 class Law(Protocol):
@@ -120,7 +121,11 @@ class System:
     K: Any
     contacts: Sequence[Contact] = ()
     loads: Sequence[tuple[ArrayLike, Signal]] = ()
-    kept: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)  # what methods prepare once
+    # what methods prepare once, by what it depends on: all of the system; matrices and vectors of contacts and loads;
+    # the laws. The last two are shared by systems made by `like` as long as these parts stay
+    kept: Memo = field(default_factory=Memo, init=False, repr=False)
+    about_structure: Memo = field(default_factory=Memo, init=False, repr=False)
+    about_laws: Memo = field(default_factory=Memo, init=False, repr=False)
 
     def __post_init__(self) -> None:
         for name in "MCK":
@@ -148,16 +153,16 @@ class System:
     ) -> System:
         """The same structure with other contacts or loads; its matrices are neither checked nor decoupled again."""
         other = object.__new__(System)
-        other.__dict__.update(self.__dict__, blocks=self.blocks, push=self.push, kept={})
+        other.__dict__.update(self.__getstate__(), blocks=self.blocks, push=self.push)
         for name, value in (("contacts", contacts), ("loads", loads)):
             if value is not None:
                 other.__dict__[name] = value
         other._check_contacts_and_loads([vector for vector, _ in self.loads])
         if len(self.contacts) == len(other.contacts):
             if all(a.law is b.law for a, b in zip(self.contacts, other.contacts, strict=True)):
-                other.kept["laws"] = self.about_laws
+                other.__dict__["about_laws"] = self.about_laws
             if self._vectors_are_those_of(other):
-                other.kept["structure"] = self.about_structure
+                other.__dict__["about_structure"] = self.about_structure
         return other
 
     def _vectors_are_those_of(self, other: System) -> bool:
@@ -170,21 +175,9 @@ class System:
         pairs += [(a, b) for (a, _), (b, _) in zip(self.loads, other.loads, strict=True)]
         return all(a is b or np.array_equal(a, b) for a, b in pairs)
 
-    @property
-    def about_structure(self) -> dict[str, Any]:
-        """What was found of matrices, directions and loads' vectors; shared like `about_laws`."""
-        known: dict[str, Any] = self.kept.setdefault("structure", {})
-        return known
-
     def __getstate__(self) -> dict[str, Any]:
         """What a copy or another process gets: all but what methods have prepared, which holds addresses of memory."""
-        return {**self.__dict__, "kept": {}}
-
-    @property
-    def about_laws(self) -> dict[str, Any]:
-        """What was found of the laws so far; systems made by `like` share it as long as they have the same laws."""
-        known: dict[str, Any] = self.kept.setdefault("laws", {})
-        return known
+        return {**self.__dict__, "kept": Memo(), "about_structure": Memo(), "about_laws": Memo()}
 
     def _load(self, i: int, pair: tuple[ArrayLike, Signal], known: Sequence[Any]) -> tuple[Array, Signal]:
         """One checked load."""

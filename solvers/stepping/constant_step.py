@@ -92,9 +92,7 @@ class ConstantStep(ABC):
 def refuse(method: ConstantStep, system: System, duration: float) -> None:
     """ValueError for a step above its limit; checked once per system."""
     key = "limit", type(method), method.constants, duration
-    if key not in system.kept:
-        system.kept[key] = method.stable_dt(system, duration=duration)
-    found = system.kept[key]
+    found = system.kept.get(key, lambda: method.stable_dt(system, duration=duration))
     for where, step, longest, mode in (
         ("in flight", method.steps[0], found.flight, found.mode),
         ("in contact, hit at 1 m/s", method.steps[1], found.contact, found.contact_mode),

@@ -51,12 +51,10 @@ def watched(system: System, motion: Array, least: float) -> Array:
     """What `gains` compares, J: stored now, at the start, negligible; steps that gained; most input, held by stops."""
     q, q_dot = np.split(motion, 2)
     stored = abs(float(system.energy(q, q_dot)))
-    known = system.about_laws
-    if "dissipative" not in known:
-        known["dissipative"] = [is_dissipative(contact.law) for contact in system.contacts]
+    known = system.about_laws.get("dissipative", lambda: [is_dissipative(contact.law) for contact in system.contacts])
     held = [
         work_of(contact.law, -float(contact.direction @ q) - contact.gap) if dissipative else math.inf
-        for contact, dissipative in zip(system.contacts, known["dissipative"], strict=True)
+        for contact, dissipative in zip(system.contacts, known, strict=True)
     ]
     return np.array([stored, stored, least, 0.0, 0.0, *held])
 

@@ -200,10 +200,7 @@ def is_dissipative(law: Any) -> bool:
 
 def kinks_of(system: System) -> list[int]:
     """Per stop: 1 where the law is cut at zero while δ > 0, plus 2 where it bends at δ̇ = 0; found once per system."""
-    known = system.about_laws
-    if "kinks" not in known:
-        known["kinks"] = [_kinks(contact.law) for contact in system.contacts]
-    found: list[int] = known["kinks"]
+    found: list[int] = system.about_laws.get("kinks", lambda: [_kinks(contact.law) for contact in system.contacts])
     return found
 
 

@@ -51,7 +51,7 @@ def run(system: solvers.System, seconds: float) -> Any:
 
 def table_bytes(system: solvers.System) -> int:
     """What the method keeps for a system: tables, and one run's working space as far as it was used."""
-    prepared = system.kept["exponential"][1]
+    prepared = next(v for v, _ in system.kept._entries.values() if hasattr(v, "tables"))
     arrays = [array for array in prepared.tables.value if isinstance(array, np.ndarray)]
     return sum(array.nbytes for array in arrays)
 

@@ -1,6 +1,8 @@
 """Kernels run as plain Python: import this before the packages.
 
 Compiled code reaches laws and arrays by their addresses; here both are found again in a table and in memory.
+The packages have no such mode themselves: it is for coverage only. A run of two modes over ten periods takes 1.3 s
+instead of 0.1 ms, its tables 23 s.
 """
 
 from __future__ import annotations

@@ -29,6 +29,7 @@ from solvers.compiled.state import (
 )
 from solvers.compiled.sums import combine
 from solvers.exponential.contact.crossings import FORCE, FREE, on_the_way, side_at
+from solvers.exponential.contact.node_response import BATCH, DIFFERENCE, LANDED, START
 from solvers.exponential.contact.peaks import state_peaks
 from solvers.exponential.energy import powers
 
@@ -94,9 +95,9 @@ def _rate(problem, tables, ledger, variable, stop, span, w, piece, entry_rate, s
 
 @inner
 def regular_step(problem, tables, ledger, variable, stop, span, w, piece, entry_rate, side, work):
-    """One DOP853 step of the chosen variable from ``w`` into ``work[15]``, its stages into ``work``; law calls."""
+    """One DOP853 step of the chosen variable from ``w`` into ``work[LANDED]``, its stages into ``work``; law calls."""
     calls = 0
-    batch, trial = work[STAGES + 2], work[STAGES + 3]
+    batch, trial = work[BATCH], work[LANDED]
     for i in range(STAGES):
         combine(work, A[i], i, w, trial)
         calls += _rate(problem, tables, ledger, variable, stop, span, trial, piece, entry_rate, side, work[i], batch)
@@ -110,7 +111,7 @@ def _error(problem, space, part, rtol):
 
     It is a ``part`` of the embedded difference.
     """
-    difference, worst = space.work[STAGES + 1], 0.0
+    difference, worst = space.work[DIFFERENCE], 0.0
     combine(space.work, E5, STAGES, None, difference)
     for s in range(problem.gap.size):
         error = 0.0
@@ -137,17 +138,17 @@ def _goes_ahead(space, size):
 
 @inner
 def _step(problem, tables, state, space, variable, stop, span, ledger):
-    """A step from ``space.work[17]``."""
+    """A step from ``space.work[START]``."""
     state.count[CALLS] += regular_step(
-        *(problem, tables, ledger, variable, stop, span, space.work[17]),
+        *(problem, tables, ledger, variable, stop, span, space.work[START]),
         *(state.piece, state.entry_rate, space.side, space.work),
     )
 
 
 @inner
 def _length_to(problem, tables, state, space, variable, stop, span, landed, time, ledger):
-    """Length of the step whose end, in ``space.work[15]``, is at a time before the landing; inf when not found."""
-    w, x, size, tries = space.work[17], space.work[15], state.x.size, 0
+    """Length of the step whose end, in ``space.work[LANDED]``, is at a time before the landing; inf when not found."""
+    w, x, size, tries = space.work[START], space.work[LANDED], state.x.size, 0
     t = w[size]
     left = (landed - time) / (landed - t) if landed > t else 0.0
     kappa = tables.power[1 + stop]
@@ -165,8 +166,8 @@ def _length_to(problem, tables, state, space, variable, stop, span, landed, time
 
 @inner
 def start_landing(problem, tables, state, space, stop):
-    """The state as a landing of ``stop`` begins it, with t and δ^{1/κ}, into ``space.work[17]``."""
-    w, size, delta = space.work[17], state.x.size, max(indentation(problem, stop, state.x), 0.0)
+    """The state as a landing of ``stop`` begins it, with t and δ^{1/κ}, into ``space.work[START]``."""
+    w, size, delta = space.work[START], state.x.size, max(indentation(problem, stop, state.x), 0.0)
     copy(state.x, w, size)
     w[size], w[size + 1] = state.now[T], delta ** (1.0 / tables.power[1 + stop])
 
@@ -183,8 +184,8 @@ def _begin_peaks(state, space):
 
 @inner
 def _accept(problem, tables, state, space, variable, stop, span, t_end, out, due, ledger):
-    """Move the state to the end of the landing in ``space.work[15]``, or to that of the run; samples on the way."""
-    w, x, size = space.work[17], space.work[15], state.x.size
+    """Move the state to the end of the landing in ``space.work[LANDED]``, or to that of the run; samples on the way."""
+    w, x, size = space.work[START], space.work[LANDED], state.x.size
     landed, t = x[size], state.now[T]
     _begin_peaks(state, space)
     copy(x, state.x, size)
@@ -229,7 +230,7 @@ def land(problem, tables, state, space, stop, direction, near, rtol, t_end, out,
     if not leaving and state.piece[stop] > 0 and abs(level - delta) > 0.2 * max(level, delta):
         return -1
     start_landing(problem, tables, state, space, stop)
-    w, x = space.work[17], space.work[15]
+    w, x = space.work[START], space.work[LANDED]
     variable = ROOT if leaving and tables.power[1 + stop] > 1.0 else INDENTATION
     span = -w[size + 1] if variable == ROOT else level - delta
     _step(problem, tables, state, space, variable, stop, span, ledger)
@@ -257,7 +258,7 @@ def land_on_bend(problem, tables, state, space, stop, near, rtol, t_end, out, du
     if not 0.0 < near <= furthest:
         return False
     start_landing(problem, tables, state, space, stop)
-    w, x, batch = space.work[17], space.work[15], space.trial
+    w, x, batch = space.work[START], space.work[LANDED], space.trial
     before, apart, span = 0.0, side_at(problem, tables, state, stop, w, batch), near
     if abs(apart) <= 1e-6 * largest:  # it begins on the bend, which is no second point for the next one
         before = 0.9 * near

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from solvers.compiled.dop853_tableau import STAGES
 from solvers.compiled.kernels import inlined, inner, law_forces, reordered, table_value
 from solvers.compiled.simd import put, spread
 from solvers.compiled.state import CALLS, T
@@ -11,9 +12,21 @@ from solvers.compiled.sums import above_zero, combine
 from solvers.exponential.contact.blocks import SIGNALS, carry_forces, carry_free, goes_through_blocks, pair, see
 from solvers.exponential.contact.nodes import S
 
+DIFFERENCE, BATCH, LANDED, WITHIN, START = range(STAGES + 1, STAGES + 6)
+"""Rows of `Space.work` behind the stages of a landing's Runge–Kutta step and the rate at its end: its embedded
+difference; numbers for one law call; trial states, at last the one landed on; a state within a step, for the energy
+ledger; the state a landing begins with, or the end of a run within a step."""
+PLAIN, WEIGHTED, PRODUCTS = range(3)  # the first rows while a force is interpolated between the nodes, see `energy`
+DELTAS, RATES, FORCES, KNOWN = range(4)  # rows of `Space.around`: m, m/s, N at points around a node; what they are from
+
 
 class Space(NamedTuple):
-    """Working arrays of the exponential integrator; stops are the first index of the contact ones."""
+    """Working arrays of the exponential integrator; stops are the first index of the contact ones.
+
+    Written by kernels only. `previous` and what has one number per stop may last from step to step, what is at the
+    nodes is new in each. States are block coordinates, for mass-normalised modes in √kg m and √kg m/s, then the ledger
+    in J, and J and N s per stop; indentations are in m, rates in m/s, forces in N, signals in their own units.
+    """
 
     x_new: Any  # (x.size padded,)
     terms: Any  # (7, 2N padded) derivatives of the state
@@ -33,14 +46,14 @@ class Space(NamedTuple):
     slope: Any  # (m, 3, S) derivatives of the laws at the nodes
     residual: Any  # (m S,)
     pivots: Any  # (m S,)
-    work: Any  # (18, x.size + 2 padded) of the Runge–Kutta steps
+    work: Any  # (START + 1, x.size + 2 padded) states and rates, rows as named above
     scale: Any  # (m,) m/s: a step's error in an indentation rate is measured in rtol × scale
     share: Any  # (m,) of the duration of a contact of each stop that its first step may take; 0: not known yet
     accuracy: Any  # (m,) N: change of a force within which it counts as found
     beyond: Any  # (m,) N s: impulse that a step's polynomials leave out
     guess: Any  # (m, S) forces the iterations begin with
     viscous: Any  # (m,) N s/m: slope of a force by its rate, where Newton's method has found it; else 0
-    around: Any  # (4, 3S) see `peaks`
+    around: Any  # (4, 3S) rows as named above, see `peaks`
     side: Any  # (m,) sign of the side of its bend on which each stop is
     side_at_begin: Any  # (m,) the same at the begin of the step that is tried
     sides: Any  # (S + 2,) see `crossings`

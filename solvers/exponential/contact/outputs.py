@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from solvers.compiled.kernels import copy, inner
 from solvers.compiled.state import HEAD, PART, SAMPLED, STEPS, TAPED, T, tape
+from solvers.exponential.contact.node_response import START
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.peaks import state_peaks, step_peaks
 from solvers.exponential.energy import account, inside
@@ -18,7 +19,7 @@ def record(problem, tables, state, space, family, level, t_end, out, due, ledger
         if not sampled and t + h < t_end:
             return
         span = due[state.count[SAMPLED]] - t if sampled else t_end - t
-        row = out[state.count[SAMPLED]] if sampled else space.work[17]
+        row = out[state.count[SAMPLED]] if sampled else space.work[START]
         copy(state.x, row, state.x.size)
         inside(problem, tables, state, space, family, h, span, row)
         if ledger:
@@ -30,8 +31,8 @@ def record(problem, tables, state, space, family, level, t_end, out, due, ledger
 
 @inner
 def end_inside(problem, tables, state, space, family, level, t_end):
-    """End the run within the step found, at the state `record` has left in ``space.work[17]``."""
-    x, share = space.work[17], (t_end - state.now[T]) / tables.step[level]
+    """End the run within the step found, at the state `record` has left in ``space.work[START]``."""
+    x, share = space.work[START], (t_end - state.now[T]) / tables.step[level]
     place = share ** (1.0 / tables.power[family])
     for s in range(problem.gap.size):
         if state.piece[s] > 0:

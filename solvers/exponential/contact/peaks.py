@@ -10,6 +10,7 @@ from __future__ import annotations
 from solvers.compiled.kernels import contact_forces, copy, dot, indentation, inlined, inner
 from solvers.compiled.state import PEAK_DELTA, PEAK_FORCE
 from solvers.compiled.sums import combine
+from solvers.exponential.contact.node_response import DELTAS, FORCES, KNOWN, RATES
 from solvers.exponential.contact.nodes import LOCAL, MONOMIALS, S
 
 _MOST = 6  # steps to a summit
@@ -80,15 +81,15 @@ def _highest(tables, values, family, limit):
 @inner
 def _motion_around(problem, tables, state, space, family, h, s, place):
     """Indentations and rates of stop s around a node of the step that begins at the state, into ``space.around``."""
-    around, motion, known = space.around, space.motion[s], space.around[3]
+    around, motion, known = space.around, space.motion[s], space.around[KNOWN]
     copy(motion[0], known, S)
     for i in range(S):
         known[S + i] = h * motion[1, i]
     known[2 * S] = indentation(problem, s, state.x)
     known[2 * S + 1] = h * dot(problem.read_rate[s], state.x, 2 * problem.k.size)
-    combine(tables.zoom[family, place], known, 2 * S + 2, None, around[0])
+    combine(tables.zoom[family, place], known, 2 * S + 2, None, around[DELTAS])
     for i in range(S):
-        around[1, i] = around[0, S + i] / h
+        around[RATES, i] = around[DELTAS, S + i] / h
 
 
 @inner
@@ -96,7 +97,7 @@ def deepest(problem, tables, state, space, family, h, s):
     """Largest indentation of stop s around its highest node of a step."""
     place = _highest(tables, space.motion[s, 0], family, 1.0)
     _motion_around(problem, tables, state, space, family, h, s, place)
-    return summit(space.around[0], 1.0, space.trial)
+    return summit(space.around[DELTAS], 1.0, space.trial)
 
 
 @inner
@@ -118,11 +119,11 @@ def step_peaks(problem, tables, state, space, family, h, s, limit):
         if seen != place:
             _motion_around(problem, tables, state, space, family, h, s, place)
             around, seen = space.around, place
-            contact_forces(problem, s, around[0, :S], around[1, :S], state.entry_rate[s], around[2, :S])
+            contact_forces(problem, s, around[DELTAS, :S], around[RATES, :S], state.entry_rate[s], around[FORCES, :S])
         begin, end = tables.places[family, place]
         within = min(2.0 * (limit - begin) / (end - begin) - 1.0, 1.0)
         if within > -1.0:
-            best = summit(space.around[2] if d == 0 else space.around[0], within, space.trial)
+            best = summit(space.around[FORCES] if d == 0 else space.around[DELTAS], within, space.trial)
             state.open[s, column] = max(state.open[s, column], best)
 
 

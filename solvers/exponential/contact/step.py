@@ -32,7 +32,7 @@ from solvers.compiled.sums import combine
 from solvers.exponential.contact.collocation import arrive, contact_time, finish_step, solve_forces, step_error
 from solvers.exponential.contact.crossings import bend_ahead, choose_sides, leaves_piece
 from solvers.exponential.contact.landing import land, land_on_bend
-from solvers.exponential.contact.node_response import free_response
+from solvers.exponential.contact.node_response import LANDED, free_response
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.outputs import end_inside, record, tape_forces
 from solvers.exponential.contact.peaks import state_peaks
@@ -198,7 +198,7 @@ def _land_first(problem, tables, state, space, stop, direction, near, rtol, t_en
         landed = land(problem, tables, state, space, stop, direction, near, rtol, t_end, out, due, ledger)
         if landed == stop or landed < 0:
             return landed, direction
-        above = indentation(problem, landed, space.work[15]) > problem.levels[landed, state.piece[landed]]
+        above = indentation(problem, landed, space.work[LANDED]) > problem.levels[landed, state.piece[landed]]
         stop, direction = landed, 1 if above else -1
     return -1, 0
 

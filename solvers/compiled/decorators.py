@@ -1,0 +1,78 @@
+"""The decorators of compiled functions: which options of numba they use, what each is worth, what to do without it.
+
+Times without an option over times with it, of runs of the paper's scene (rtol 1e-8) with 2, 10 and 30 modes and of one
+under noise, by turns on one machine; ``python tests/bench/compiler_options.py NAME`` repeats those that have a name:
+
+| name       | option                              | 2    | 10   | 30   | noise | where numba drops it            |
+|------------|-------------------------------------|------|------|------|-------|---------------------------------|
+| nrt        | ``_nrt=False``, no reference counts | 1.56 | 1.74 | 1.85 | 1.81  | leave it out                    |
+| force      | ``forceinline``                     | 1.05 | 1.04 | 1.01 | 1.15  | `inlined` becomes `inner`       |
+| merged     | ``inline="always"`` (documented)    | 1.07 | 1.07 | 1.05 | 1.04  | `merged` becomes `inner`        |
+| alias      | the mark in `handles._attribute`    | 1.20 | 1.10 | 1.08 | 0.98  | leave the mark out              |
+|            | arrays by address, `handles`        | 1.73 | 1.82 | 1.82 | 1.46  | hand over the named tuples      |
+|            | eight numbers as one, `simd`        | 1.47 | 1.64 | 1.79 | 1.27  | plain loops in `sums`, `flight` |
+
+``no_cpython_wrapper`` and ``no_cfunc_wrapper`` save most of the compile time of inner functions and no run time.
+``_nrt``, ``forceinline`` and these two are not documented by numba, nor is what `handles` and `simd` import of
+``numba.core``: hence the upper bound of its version in pyproject.toml. With a new version: raise the bound, run the
+tests and the bench; what fails is left out as the table says.
+"""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from numba import config, njit
+
+from solvers.compiled.cache import kept
+
+if config.DISABLE_JIT:
+    raise RuntimeError("NUMBA_DISABLE_JIT is set, but time integration runs as machine code only: unset it")
+
+
+def _compiled(function: Any, *signature: Any, **options: Any) -> Any:
+    """A function compiled by numba, its machine code kept in the folder of these sources."""
+    with kept(function) as keep:
+        return njit(*signature, cache=keep, **options)(function)
+
+
+def _decorator(**options: Any) -> Callable[[Any], Any]:
+    return partial(_compiled, **options)
+
+
+_OPTIONS: Any = {"nogil": True, "error_model": "numpy", "_nrt": False}
+kernel = _decorator(**_OPTIONS)
+"""Decorator of the compiled functions Python calls. They allocate nothing, so reference counting is switched off:
+passing twenty arrays down a call would otherwise cost ten times the arithmetic of a two-mode step."""
+_INNER: Any = {**_OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+inner = _decorator(**_INNER)
+"""The same for functions only kernels call: no wrappers, which would take most of their compile time."""
+inlined = _decorator(**_INNER, forceinline=True)
+"""The same for what the innermost loops call, from few places: there even passing the arrays' descriptors costs more
+than the arithmetic. Everywhere else it would only cost compile time."""
+merged = _decorator(**_INNER, inline="always")
+"""The same for the long functions one kernel calls once each: compiled as a part of it."""
+reordered = _decorator(**_INNER, forceinline=True, fastmath={"reassoc", "contract"})
+"""The same for sums whose order does not matter, so that they can be vectorised."""
+
+
+def entry(signature: Any) -> Callable[[Any], Any]:
+    """Decorator of a kernel that is compiled, or loaded, when its module is imported.
+
+    Meanwhile the garbage collector rests: the compiler keeps most of what it makes, and looking through that again and
+    again takes a sixth of the time.
+    """
+
+    def compiled(function: Any) -> Any:
+        collects = gc.isenabled()
+        gc.disable()
+        try:
+            return _compiled(function, signature, **_OPTIONS)
+        finally:
+            if collects:
+                gc.enable()
+
+    return compiled

@@ -1,0 +1,142 @@
+"""What each option of the compiler is worth: run times without it over those with it, by turns.
+
+    python tests/bench/compiler_options.py merged force nrt alias [--against TREE]
+
+A copy of the packages with one option switched off and this tree each get a process of their own, compile for a
+minute, and then run the twelve starts of `reference` in turns, with 2, 10 and 30 modes, and three modes under noise.
+Printed are medians over the starts of the ratios of shortest times, and whether all ends are the same bit for bit.
+``--against`` compares this tree with another one instead.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+HOME = Path(__file__).resolve().parent.parent.parent
+PACKAGES = "fembeam", "contacts", "reduction", "solvers"
+CASES = ["2", "10", "30", "noise"]
+ROUNDS = 40
+OPTIONS = {  # file, what is there, what is there instead
+    "merged": ("decorators.py", ', inline="always"', ""),
+    "force": ("decorators.py", "forceinline=True", "forceinline=False"),
+    "nrt": ("decorators.py", ', "_nrt": False', ""),
+    "alias": ("handles.py", '    loaded.set_metadata("tbaa", _constant(builder.module))\n', ""),
+}
+
+
+def without(option: str, place: str) -> Path:
+    """A copy of the packages without an option."""
+    for package in PACKAGES:
+        shutil.copytree(HOME / package, Path(place, package), ignore=shutil.ignore_patterns("__pycache__"))
+    name, there, instead = OPTIONS[option]
+    path = Path(place, "solvers", "compiled", name)
+    text = path.read_text(encoding="utf-8")
+    if there not in text:
+        raise LookupError(f"{path.name} has no {there!r} any more: change OPTIONS")
+    path.write_text(text.replace(there, instead), encoding="utf-8")
+    return Path(place)
+
+
+def runs_of(case: str) -> list[Callable[[], Any]]:
+    """The runs of one case; each returns a number of its end."""
+    import numpy as np
+    import peers
+    from reference import problem
+
+    import contacts
+    import fembeam
+    import solvers
+
+    if case != "noise":
+        of = problem(int(case))
+        run = peers.exponential(of, {"rtol": 1e-8})
+        return [lambda start=start: run(start)[0] for start in of.starts[:12]]
+    stop = solvers.Contact([1.0, 0.5, 0.3], contacts.Hertz(1e8), 1e-4)
+    load = [1.0, 0.7, 0.2], fembeam.BandNoise(50.0, (0.0, 300.0), seed=1)
+    one, rest = solvers.System.modal([100.0, 900.0, 2500.0], 0.01, [stop], [load]), np.zeros(3)
+    starts = [np.array([-0.3 + 0.01 * i, 0.1, 0.0]) for i in range(12)]
+    return [lambda start=start: solvers.integrate(one, rest, start, 0.5).q[-1, 0] for start in starts]
+
+
+def serve() -> None:
+    """Time the runs of every case asked for on a line."""
+    known: dict[str, list[Callable[[], Any]]] = {}
+    for line in sys.stdin:
+        case = line.strip()
+        if case not in known:
+            known[case] = runs_of(case)
+        seconds, ends = [], []
+        for run in known[case]:
+            begin = time.perf_counter()
+            ends.append(float(run()))
+            seconds.append(time.perf_counter() - begin)
+        print(json.dumps([seconds, ends]), flush=True)
+
+
+class Worker:
+    """A process that runs the code of one tree."""
+
+    def __init__(self, tree: Path) -> None:
+        command = [sys.executable, __file__, "--serve"]
+        paths = {**os.environ, "PYTHONPATH": str(tree)}
+        self.process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=tree, env=paths
+        )
+
+    def ask(self, case: str) -> list[list[float]]:
+        """Times and ends."""
+        assert self.process.stdin
+        assert self.process.stdout
+        print(case, file=self.process.stdin, flush=True)
+        found: list[list[float]] = json.loads(self.process.stdout.readline())
+        return found
+
+
+def compare(trees: list[Path]) -> str:
+    """One line: of every case the time of the first tree over that of the second."""
+    workers, cells = [Worker(tree) for tree in trees], []
+    for case in CASES:
+        best, same = [[float("inf")] * 12 for _ in trees], True
+        for turn in range(ROUNDS + 1):
+            order = (0, 1) if turn % 2 else (1, 0)
+            found = [part for _, part in sorted((i, workers[i].ask(case)) for i in order)]
+            if turn:  # the first is not warm
+                best = [[*map(min, old, new[0])] for old, new in zip(best, found, strict=True)]
+            same &= found[0][1] == found[1][1]
+        ratio = statistics.median(a / b for a, b in zip(*best, strict=True))
+        cells.append(f"{case}: {ratio:.3f}{'' if same else ' (other ends)'}")
+    for worker in workers:
+        worker.process.communicate()
+    return "   ".join(cells)
+
+
+def main() -> None:
+    """Read the arguments; print a line per option."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("options", nargs="*", choices=[*OPTIONS, []])
+    parser.add_argument("--against", type=Path)
+    parser.add_argument("--serve", action="store_true", help=argparse.SUPPRESS)
+    arguments = parser.parse_args()
+    if arguments.serve:
+        serve()
+        return
+    if arguments.against:
+        print("this tree over the other  ", compare([HOME, arguments.against.resolve()]))
+    for option in arguments.options:
+        with tempfile.TemporaryDirectory() as place:
+            print(f"without {option:8s}", compare([without(option, place), HOME]), flush=True)
+
+
+if __name__ == "__main__":
+    main()
