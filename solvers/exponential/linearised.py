@@ -16,7 +16,6 @@ A parameter adds a column. Where it changes only loads' tones, gaps and laws, Y_
 the steady response to the tones, known in closed form at any time, so that W obeys the equations above with P among the
 indentations; laws contribute ∂F/∂parameter. See Leine, Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical
 Systems, 2004, Chapter 7, for saltation.
-
 At an entry of zero rate (to rounding) the derivative does not exist; dt* is taken as zero there.
 """
 

@@ -101,7 +101,13 @@ def chart(rows: list[dict[str, float]], path: str) -> None:
     axes[1].set(xlabel="stops", ylabel="MB", title="memory")
     axes[1].legend()
     for axis in axes:
-        axis.grid(True, which="both", alpha=0.3)
+        lowest, highest = axis.get_ylim()
+        axis.grid(True, alpha=0.3)
+        axis.set_xticks(stops, [str(number) for number in stops])
+        ticks = [tick for power in range(5) for tick in (10**power, 2 * 10**power, 5 * 10**power)]
+        axis.set_yticks(ticks, [str(tick) for tick in ticks])
+        axis.set_ylim(lowest, highest)
+        axis.minorticks_off()
     figure.savefig(path, dpi=130)
 
 
