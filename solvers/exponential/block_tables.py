@@ -17,7 +17,7 @@ from solvers.exponential.contact.nodes import PHASES, Families, S, gauss
 from solvers.exponential.responses import fill_ahead, fill_free, fill_propagators, fill_way
 from solvers.problem import Memo
 
-FEW = 4  # stops that have tables of their own; more go through the blocks, which is quicker from there on
+FEW = 2  # stops that have tables of their own; three are as quick through the blocks, more are quicker
 MOST_BYTES = 4e9
 
 

@@ -16,7 +16,6 @@ A parameter adds a column. Where it changes only loads' tones, gaps and laws, Y_
 the steady response to the tones, known in closed form at any time, so that W obeys the equations above with P among the
 indentations; laws contribute ∂F/∂parameter. See Leine, Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical
 Systems, 2004, Chapter 7, for saltation.
-
 At an entry of zero rate (to rounding) the derivative does not exist; dt* is taken as zero there.
 """
 
@@ -215,14 +214,16 @@ def _by_parameter(ahead, behind, shadow, space, nudge, slopes, s):
 
 
 @inlined
-def _signal_slopes(problem, tables, space, slopes, family, level, t):
-    """Slopes of the sampled signals at the nodes, and the response to them."""
+def _signal_slopes(problem, tables, shadow, space, slopes, family, level, t):
+    """Slopes of the sampled signals at the nodes, and the response of the stops in contact to them."""
     stops, h = problem.gap.size, tables.step[level]
     for j in range(problem.table_dt.size):
         for i in range(S):
             signal_derivatives(problem, j, t + h * tables.times[family, i], space.six[j])
             slopes.signal[problem.table_load[j], i] = space.six[j, 1]
     for s in range(stops):
+        if shadow.piece[s] == 0:
+            continue
         response = slopes.response[s]
         for i in range(S):
             response[0, i], response[1, i] = 0.0, 0.0
@@ -313,7 +314,7 @@ def _step(problem, ahead, behind, tables, shadow, space, slopes, nudge, row, mod
         else:
             arrive(problem, tables, shadow, space, family, level)
         rhs(problem, row[ENDED], end, shadow.piece, shadow.entry_rate, slopes.rate[1], slopes.batch)
-        _signal_slopes(problem, tables, space, slopes, family, level, t)
+        _signal_slopes(problem, tables, shadow, space, slopes, family, level, t)
     for c in range(slopes.y.shape[0]):
         y = slopes.y[c]
         shift = slopes.shift[c, family - 1] if moving else 0.0
