@@ -9,12 +9,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from solvers.compiled.handles import Cast, Layout, Mould
+from solvers.compiled.handles import Cast, Layout, Mould, Packed
 from solvers.compiled.kernels import INTEGERS, MATRIX, PROBLEM, REAL, VECTOR, Problem
 from solvers.compiled.state import STATE, State, begin_state, problem_of, state_shapes
 from solvers.compiled.sums import padded
 from solvers.exponential.contact.node_response import Space
 from solvers.exponential.contact.nodes import S, series_of
+from solvers.exponential.energy_tables import books_for
+from solvers.exponential.flight import LONG
 from solvers.exponential.tables import OF_TONES, Tables, build, doublings, fill_tones, known_of
 from solvers.problem import Array, Forcing, System, on_one_grid, tones_as_nodes
 
@@ -35,7 +37,7 @@ TABLES = types.NamedTuple(
 SPACE = types.NamedTuple(
     [
         *(*_arrays(1, 2, 2, 1, 1, 1, 1, 2, 3, 1, 3, 2, 1, 3, 2, 3, 2, 1), INTEGERS, MATRIX),
-        *(*_arrays(1, 1, 1, 1, 2, 1, 2, 1, 1, 1, 1, 1), INTEGERS),
+        *(*_arrays(1, 1, 1, 1, 2, 1, 2, 1, 1, 1, 1, 2, 1), INTEGERS),
     ],
     Space,
 )
@@ -75,6 +77,15 @@ class Prepared(NamedTuple):
     layout: Layout  # of State and Space
     rest: Array  # state of the tones' blocks at t = 0, the structure's less their steady response
     spare: list[Workspace]  # of runs that are over
+    kept: dict[float, Packed]  # tables of the energy ledger by the spacing of outputs, the latest
+
+    def books_for(self, spacing: float) -> Packed:
+        """Tables of the energy ledger for outputs of a spacing, s."""
+        if spacing not in self.kept:
+            made = books_for(self.problem.value, self.tables.value, spacing)
+            self.kept.clear()
+            self.kept[spacing] = made
+        return self.kept[spacing]
 
     def workspace(self) -> Workspace:
         """One that no other run uses; making its arrays takes as long as many steps."""
@@ -170,7 +181,7 @@ class _Skeleton:
         fill_tones(tables.value, problem.value, self.tones, self.series)
         rest = among_tones(-response.real.sum(axis=0), self.tones)
         rest[n : n + self.tones] = 1.0
-        return Prepared(problem, tables, back, self.layout, rest, [])
+        return Prepared(problem, tables, back, self.layout, rest, [], {})
 
     def _tables(self, forcing: Forcing, turn: Array) -> Cast:
         """Tables that know the signals made of tones, Re(a e^{iΩt}) = Re a · p + Im a/Ω · v; ``turn`` is 1/Ω."""
@@ -205,7 +216,7 @@ def _layout(stops: int, loads: int, blocks: int, signals: int) -> Layout:
     """Places of the arrays of `State` and `Space`."""
     size, width = 2 * blocks, 2 * blocks + 2 + 2 * stops
     space = [
-        *((padded(width),), (7, padded(size)), (signals, 6), (7,), (blocks,), (loads,), (stops,)),
+        *((padded(width),), (LONG, padded(size)), (signals, 6), (LONG,), (blocks,), (loads,), (stops,)),
         (2, padded(blocks)),
         *((stops, 2, S), (S,), (stops, 2, S), (stops + loads, S), (S,), (stops, 2, 8), (stops, S), (stops, 3, S)),
         *((stops * S, stops * S), (stops * S,), (stops * S,), (18, padded(width + 2))),
@@ -218,6 +229,7 @@ def _layout(stops: int, loads: int, blocks: int, signals: int) -> Layout:
             (S + 2,),
             (1,),
             (1,),
+            (2 + loads, max(32, padded(size + 6 * signals), 2 * padded(6 * signals))),
             (3,),
             (6,),
         ),

@@ -39,7 +39,8 @@ from solvers.exponential.contact.landing import land, land_on_bend
 from solvers.exponential.contact.node_response import free_response
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.peaks import state_peaks, step_peaks
-from solvers.exponential.energy import account, inside
+from solvers.exponential.books import book_contact
+from solvers.exponential.energy import inside
 from solvers.exponential.flight import energy_norms
 
 LEVEL, FAMILY, FRESH, STOP, WANTED, BEGUN = range(6)  # places in Space.last
@@ -185,7 +186,7 @@ def _try(problem, tables, state, space, family, level, rtol):
 
 
 @inner
-def _record(problem, tables, state, space, family, level, t_end, out, due, ledger):
+def _record(problem, tables, books, state, space, family, level, t_end, out, due):
     """Samples inside the converged step, and the state at the end of the run if that lies inside."""
     t, h = state.now[T], tables.step[level]
     while True:
@@ -196,8 +197,8 @@ def _record(problem, tables, state, space, family, level, t_end, out, due, ledge
         row = out[state.count[SAMPLED]] if sampled else space.work[17]
         copy(state.x, row, state.x.size)
         inside(problem, tables, state, space, family, h, span, row)
-        if ledger:
-            account(problem, tables, state, space, family, h, span, state.x, row)
+        if books.kept > 0.0:
+            book_contact(problem, tables, books, state, space, family, level, span, row)
         if not sampled:
             return
         state.count[SAMPLED] += 1
@@ -226,9 +227,9 @@ def _land_first(problem, tables, state, space, stop, direction, near, rtol, t_en
 
 
 @merged
-def touch(problem, tables, state, space, t_end, rtol, log, out, due, ledger):
+def touch(problem, tables, books, state, space, t_end, rtol, log, out, due):
     """One accepted step in contact: land if a border is near, else collocate; returns a status code."""
-    last, bottom = space.last, tables.step.size - 1
+    last, bottom, ledger = space.last, tables.step.size - 1, books.kept > 0.0
     near, stop, direction = _nearest_surface(problem, state, space)
     if near <= 0.0 and switch_on_surface(problem, state, log, True):
         if touching(state):
@@ -274,14 +275,14 @@ def touch(problem, tables, state, space, t_end, rtol, log, out, due, ledger):
     h = tables.step[level]
     end = state.now[T] + h
     if end >= t_end or due[state.count[SAMPLED]] <= end:
-        _record(problem, tables, state, space, family, level, t_end, out, due, ledger)
+        _record(problem, tables, books, state, space, family, level, t_end, out, due)
     if end >= t_end:
         _end_inside(problem, tables, state, space, family, level, t_end)
         return RUNNING
     for s in range(problem.gap.size):
         copy(space.force[s], space.previous[s], S)
     if ledger:
-        account(problem, tables, state, space, family, h, h, state.x, state.x)
+        book_contact(problem, tables, books, state, space, family, level, h, state.x)
     if state.tape.shape[0]:
         _tape_forces(problem, state, space, STEP, end, family, level)
     finish_step(problem, tables, state, space, family, level)
