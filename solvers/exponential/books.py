@@ -1,24 +1,27 @@
 """The energy ledger step by step: whole steps by the forms of `energy_tables`, parts of steps by series.
 
 Within a part the state is the Taylor series of its differential equation in panels of `LONG_REACH` radians of the
-fastest block, and the powers are summed by Gauss's rule with six points, which is exact to rounding there.
+fastest block, and the powers are summed by Gauss's rule with five points, 2e-12 off at most.
+
+A flight is booked from a *mark* on, its begin, the last output, or with sampled signals the last cell's begin: whatever
+steps it takes, a form of its own then holds most of what it does.
 """
 
 from __future__ import annotations
 
 import math
 
-from solvers.compiled.kernels import copy, dot, inner, reordered
+from solvers.compiled.kernels import copy, dot, inlined, inner, reordered
 from solvers.compiled.simd import eight, put, spread, total
 from solvers.compiled.state import T
 from solvers.compiled.sums import combine
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.energy import account, powers
 from solvers.exponential.energy_contact import BEGIN
-from solvers.exponential.flight import LONG, LONG_REACH, add_taylor, level_within, signal_derivatives, turn
+from solvers.exponential.flight import LONG, LONG_REACH, add_signals, level_within, signal_derivatives, turn
 
-SERIES, BRIEF = -1, -2  # kinds of flight steps that have no tables
 _SCRATCH, _MOVING, _MARK = 9, 10, 11  # rows of Space.work; those before hold a load on the blocks and its derivatives
+_EXACT = 1e-17  # share of the last term of a series
 
 
 @reordered
@@ -33,46 +36,64 @@ def _own_loss(plain, x, n):
 
 @inner
 def mark(problem, state, space):
-    """Note where a flight without sampled signals begins that `book_until` shall book."""
+    """Note the state from which `book_until` shall book a flight; its ledger is complete."""
     copy(state.x, space.work[_MARK], 2 * problem.k.size)
     space.work[_MARK, 2 * problem.k.size] = state.now[T]
 
 
 @inner
-def book_until(problem, tables, books, state, space, t, x):
-    """Add to the ledger what a flight without sampled signals does from the mark until it is at x; that is the new mark.
-
-    It is booked from output to output, whatever steps it takes.
-    """
-    begin, size = space.work[_MARK], 2 * problem.k.size
-    span = t - begin[size]
-    if books.closed > 0.0 and abs(span - books.spacing) <= 4e-16 * t:
-        _book_forms(problem, books, space, tables.h.size, begin, state.x)
-        span = 0.0
-    while books.closed > 0.0 and span >= tables.h[tables.h.size - 1]:
+def book_until(problem, tables, books, space, t, row):
+    """Add to the ledger of ``row`` what happens in flight from the mark to t, within a cell, whatever steps are taken."""
+    x, size = space.work[_MOVING], 2 * problem.k.size
+    copy(space.work[_MARK], x, size)
+    begin = space.work[_MARK, size]
+    span, level = t - begin, tables.h.size
+    if books.closed > 0.0 and abs(span - books.spacing) <= _rounding(problem, books, t):
+        _derive(problem, space, begin)
+        _book_forms(problem, books, space, level, x, row)
+        return
+    while books.closed > 0.0 and tables.fastest * span > LONG_REACH:
         level = level_within(tables, span)
-        _book_forms(problem, books, space, level, begin, state.x)
-        turn(problem, tables.propagator[level, 0], tables.propagator[level, 1], begin)
-        span -= tables.h[level]
+        _derive(problem, space, begin)
+        _book_forms(problem, books, space, level, x, row)
+        turn(problem, tables.propagator[level, 0], tables.propagator[level, 1], x)
+        if problem.table_dt.size:
+            add_signals(problem, tables.signal[level], x, begin, space.six)
+        begin, span = begin + tables.h[level], span - tables.h[level]
     if span > 0.0:
-        book_series(problem, tables, books, space, t - span, span, begin, state.x)
-    copy(x, begin, size)
-    begin[size] = t
+        _book_series(problem, tables, books, space, begin, span, x, row)
 
 
 @inner
-def book_flight(problem, tables, books, state, space, kind, h, x):
-    """Add to the ledger what loads and damping do over a flight step under sampled signals from x on, by its place in the tables."""
-    if kind == BRIEF:
-        _book_brief(problem, tables, state, space, h)
-        return
+def book_output(problem, tables, books, state, space, t, row):
+    """Complete the ledger of an output at t; without sampled signals the flight is booked on from there."""
+    size = 2 * problem.k.size
+    copy(state.x[size:], row[size:], 2)
+    book_until(problem, tables, books, space, t, row)
+    if problem.table_dt.size == 0:
+        copy(row[size:], state.x[size:], 2)
+        copy(row, space.work[_MARK], size)
+        space.work[_MARK, size] = t
+
+
+@inner
+def book_on(problem, tables, books, state, space):
+    """Complete the ledger of the state, from which the flight is booked on."""
+    book_until(problem, tables, books, space, state.now[T], state.x)
+    mark(problem, state, space)
+
+
+@inlined
+def _rounding(problem, books, t):
+    """By which the time between two outputs, or two cells' ends, may differ from the step in the tables."""
+    return 1e-7 * books.spacing if problem.table_dt.size else 4e-16 * t
+
+
+@inner
+def _derive(problem, space, t):
+    """Derivatives of the sampled signals at t, into ``space.six``."""
     for j in range(problem.table_dt.size):
-        signal_derivatives(problem, j, state.now[T], space.six[j])
-    if kind == SERIES or books.closed == 0.0:
-        copy(x, space.work[_MOVING], 2 * problem.k.size)
-        book_series(problem, tables, books, space, state.now[T], h, space.work[_MOVING], state.x)
-        return
-    _book_forms(problem, books, space, kind, x, state.x)
+        signal_derivatives(problem, j, t, space.six[j])
 
 
 @inner
@@ -97,31 +118,18 @@ def _book_forms(problem, books, space, level, x, row):
 
 
 @inner
-def _book_brief(problem, tables, state, space, h):
-    """The same for a step on the Taylor polynomial in ``space.terms``, by Gauss's rule with three points."""
-    size, inner = 2 * problem.k.size, space.work[_SCRATCH]
-    for i in range(3):
-        span = h * (0.5 + 0.3872983346207417 * (i - 1))  # sqrt(3/5)/2 apart
-        add_taylor(space.terms, inner, span, size, space.values, space.work[0])
-        gain, loss = powers(problem, tables, state.now[T] + span, inner)
-        weight = h * (4.0 if i == 1 else 2.5) / 9.0
-        state.x[size] += weight * gain
-        state.x[size + 1] += weight * loss
-
-
-@inner
-def book_series(problem, tables, books, space, t, span, x, row):
-    """Move the state x of a flight on within a cell, and add to the ledger of ``row`` what happens meanwhile."""
+def _book_series(problem, tables, books, space, t, span, x, row):
+    """The same by series for a part of a cell from x at t on; x moves."""
     panels, size = max(1, int(math.ceil(tables.fastest * span / LONG_REACH - 1e-9))), 2 * problem.k.size
     for i in range(panels):
         _clear(space, size)
+        _derive(problem, space, t + i * span / panels)
         for j in range(problem.table_dt.size):
-            signal_derivatives(problem, j, t + i * span / panels, space.six[j])
             load = problem.load[problem.table_load[j]]
             for order in range(space.six.shape[1]):
                 for e in range(size):
                     space.work[order, e] += load[e] * space.six[j, order]
-        _book_panel(problem, tables, books, space, t + i * span / panels, span / panels, x, row)
+        _book_panel(problem, tables, books, space, t + i * span / panels, span / panels, x, row, i + 1 < panels)
 
 
 @inner
@@ -133,28 +141,38 @@ def _clear(space, size):
 
 
 @inner
-def _book_panel(problem, tables, books, space, t, span, x, row):
-    """Move x on under the load in ``space.work``, and add work and damping to the ledger of ``row``."""
+def _book_panel(problem, tables, books, space, t, span, x, row, further):
+    """Add work and damping under the load in ``space.work`` to the ledger of ``row``; x moves if told to go further."""
     n, terms, weights, z = problem.k.size, space.terms, space.book[0], space.work[_SCRATCH]
     copy(x, terms[0], 2 * n)
-    for i in range(LONG - 1):
+    count, size = 1, 1.0
+    while count < LONG and (count <= S or size > _EXACT):
+        i, count = count - 1, count + 1
+        size *= tables.fastest * span / (i + 1.0)
         for b in range(n):
             terms[i + 1, b] = terms[i, n + b]
             terms[i + 1, n + b] = -problem.k[b] * terms[i, b] - problem.c[b] * terms[i, n + b]
         if i < S:
             for e in range(2 * n):
                 terms[i + 1, e] += space.work[i, e]
+    for q in range(books.gauss.shape[1]):
+        part = span * books.gauss[0, q]
+        _sum_up(terms, weights, count, part, z)
+        gain, loss = powers(problem, tables, t + part, z)
+        row[2 * n] += span * books.gauss[1, q] * gain
+        row[2 * n + 1] += span * books.gauss[1, q] * loss
+    if further:
+        _sum_up(terms, weights, count, span, z)
+        copy(z, x, 2 * n)
+
+
+@inner
+def _sum_up(terms, weights, count, span, z):
+    """The state at ``span`` by its series."""
     weights[0] = 1.0
-    for q in range(books.gauss.shape[1] + 1):
-        part = span * books.gauss[0, q] if q < books.gauss.shape[1] else span
-        for i in range(LONG - 1):
-            weights[i + 1] = weights[i] * part / (i + 1.0)
-        combine(terms, weights, LONG, None, z)
-        if q < books.gauss.shape[1]:
-            gain, loss = powers(problem, tables, t + part, z)
-            row[2 * n] += span * books.gauss[1, q] * gain
-            row[2 * n + 1] += span * books.gauss[1, q] * loss
-    copy(z, x, 2 * n)
+    for i in range(count - 1):
+        weights[i + 1] = weights[i] * span / (i + 1.0)
+    combine(terms, weights, count, None, z)
 
 
 @inner
@@ -182,7 +200,7 @@ def _book_pieces(problem, tables, books, state, space, h, span, row):
             if u >= problem.gap.size or state.piece[u] > 0:
                 push = problem.push[u] if u < problem.gap.size else problem.load[u - problem.gap.size]
                 _add_force(books, space, space.force[u], push, h, begin / h, size)
-        _book_panel(problem, tables, books, space, state.now[T] + begin, span / panels, x, row)
+        _book_panel(problem, tables, books, space, state.now[T] + begin, span / panels, x, row, i + 1 < panels)
 
 
 @inner

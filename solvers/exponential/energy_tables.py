@@ -43,7 +43,7 @@ class Books(NamedTuple):
     plain: Any  # (l, 3, n): damping = Σ rows × (p², p v, v²)
     rows: Any  # (l, d + 6J, 2 × 2N padded): work, then damping, from the state per unit of a driver
     pairs: Any  # (l, 6J, 2 × 6J padded): the same from the signals
-    gauss: Any  # (2, 6)
+    gauss: Any  # (2, 5)
     monomials: Any  # (S, S): coefficients of the powers of σ from values at the nodes of a smooth step
     kind: Any  # (f,) contact table of every family
     first: float  # contact step at which the tables begin
@@ -67,7 +67,7 @@ def _empty(kept: float, families: int) -> Books:
     kind, longest = np.zeros(families, dtype=np.int64), np.zeros(1)
     return Books(
         *(kept, 0.0, 0.0, none, nothing, nothing, nothing),
-        *(gauss(6), _monomials(), kind, 0.0, longest, contact, contact),
+        *(gauss(5), _monomials(), kind, 0.0, longest, contact, contact),
     )
 
 

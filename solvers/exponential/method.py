@@ -46,7 +46,7 @@ from solvers.compiled.state import (
     switch_on_surface,
     touching,
 )
-from solvers.exponential.books import book_until, mark
+from solvers.exponential.books import book_on, mark
 from solvers.exponential.contact.landing import reach
 from solvers.exponential.contact.step import BEGUN, FRESH, begin, latest, touch
 from solvers.exponential.energy_guard import FIRST, note_energy, own_energy, too_much, unknown
@@ -94,12 +94,11 @@ def advance(problem_at, tables_at, state_at, space_at, books_at, t_end, budget, 
             if code != RUNNING:
                 return code
             continue
-        deferred = books.kept > 0.0 and problem.table_dt.size == 0
-        if deferred:
+        if books.kept > 0.0:
             mark(problem, state, space)
         stop = fly(problem, tables, books, state, space, t_end, budget, out, due)
-        if deferred:
-            book_until(problem, tables, books, state, space, state.now[T], state.x)
+        if books.kept > 0.0:
+            book_on(problem, tables, books, state, space)
         if stop >= 0:
             switch(problem, state, stop, np.int64(1), log)  # a literal would be compiled for itself
             begin(problem, tables, state, space, stop)

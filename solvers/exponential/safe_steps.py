@@ -17,7 +17,7 @@ import numpy as np
 
 from solvers.compiled.kernels import copy, dot, indentation, inlined, inner, merged
 from solvers.compiled.state import SAMPLED, STEPS, T, rate_tolerance, surface_tolerance
-from solvers.exponential.books import BRIEF, SERIES, book_flight, book_series, book_until
+from solvers.exponential.books import book_on, book_output
 from solvers.exponential.flight import (
     LONG_REACH,
     ORDER,
@@ -146,16 +146,12 @@ def _sample(problem, tables, books, state, space, t, out, due):
     while due[state.count[SAMPLED]] < state.now[T]:
         wanted = due[state.count[SAMPLED]]
         parts = max(1, int(np.ceil(tables.fastest * (wanted - t) / LONG_REACH)))
-        if books.kept > 0.0 and problem.table_dt.size:
-            book_series(problem, tables, books, space, t, wanted - t, space.x_new, space.x_new)
-            parts = 0
         for i in range(parts):
             span = (wanted - t) / parts
             go_on(problem, space.x_new, t + i * span, span, space.terms[0], space.six)
-        if books.kept > 0.0 and problem.table_dt.size == 0:
-            book_until(problem, tables, books, state, space, wanted, space.x_new)
-            copy(state.x[2 * problem.k.size :], space.x_new[2 * problem.k.size :], 2)
         copy(space.x_new, out[state.count[SAMPLED]], state.x.size)
+        if books.kept > 0.0:
+            book_output(problem, tables, books, state, space, wanted, out[state.count[SAMPLED]])
         state.count[SAMPLED], t = state.count[SAMPLED] + 1, wanted
 
 
@@ -194,9 +190,9 @@ def fly(problem, tables, books, state, space, t_end, budget, out, due):
     dt_cell = problem.table_dt[0] if sampled else np.inf
     for count in range(budget):
         if due[state.count[SAMPLED]] <= now[T]:
-            if ledger and not sampled:
-                book_until(problem, tables, books, state, space, now[T], state.x)
             copy(state.x, out[state.count[SAMPLED]], state.x.size)
+            if ledger:
+                book_output(problem, tables, books, state, space, now[T], out[state.count[SAMPLED]])
             state.count[SAMPLED] += 1
         if now[T] >= t_end:
             return -1
@@ -224,14 +220,14 @@ def fly(problem, tables, books, state, space, t_end, budget, out, due):
                 for s in range(stops):
                     space.m[s] = _acceleration_bound(problem, tables, s, space.norms, space.bounds, rest)
             span = min(span, rest)
-            if ledger and sampled or first <= begin + span:
+            if first <= begin + span:
                 copy(state.x, space.x_new, state.x.size)
             for s in range(stops):
                 g, v = -indentation(problem, s, state.x), -dot(problem.read_rate[s], state.x, size)
                 span = min(span, _safe(g, v, space.m[s]))
 
         # --- go: a Taylor step that looks for roots, a whole cell, or a tabulated step
-        stop, kind = -1, BRIEF
+        stop = -1
         if span < shortest:
             taylor(problem, state.x, now[T], space.terms, space.six)
             h = min(shortest, target - now[T], rest)
@@ -241,23 +237,23 @@ def fly(problem, tables, books, state, space, t_end, budget, out, due):
                     h, stop = root, s
             add_taylor(space.terms, state.x, h, size, space.values, space.work[0])
         elif span == rest and abs(offset) < 1e-7 * dt_cell:
-            h, kind = rest, tables.h.size
+            h = rest
             go_through(problem, tables, state.x, cell)
         elif sampled and tables.fastest * span <= LONG_REACH:
-            h, kind = span, SERIES
+            h = span
             go_on(problem, state.x, now[T], h, space.terms[0], space.six)
         else:
-            kind = level_within(tables, span)
-            h = tables.h[kind]
-            turn(problem, tables.propagator[kind, 0], tables.propagator[kind, 1], state.x)
+            level = level_within(tables, span)
+            h = tables.h[level]
+            turn(problem, tables.propagator[level, 0], tables.propagator[level, 1], state.x)
             if sampled:
-                add_signals(problem, tables.signal[kind], state.x, now[T], space.six)
-        if ledger and sampled:
-            book_flight(problem, tables, books, state, space, kind, h, space.x_new)
+                add_signals(problem, tables.signal[level], state.x, now[T], space.six)
         now[T] = target if now[T] + h >= target else now[T] + h
         state.count[STEPS] += 1
         if first < now[T]:
             _sample(problem, tables, books, state, space, begin, out, due)
+        if ledger and sampled and cell_of(problem, now[T])[0] != cell:
+            book_on(problem, tables, books, state, space)
         if stop >= 0:
             return stop
     return -2
