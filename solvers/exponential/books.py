@@ -43,7 +43,7 @@ def mark(problem, state, space):
 
 @inner
 def book_until(problem, tables, books, space, t, row):
-    """Add to the ledger of ``row`` what happens in flight from the mark to t, within a cell, whatever steps are taken."""
+    """Add to the ledger of ``row`` what a flight does from the mark to t, within a cell, whatever steps it takes."""
     x, size = space.work[_MOVING], 2 * problem.k.size
     copy(space.work[_MARK], x, size)
     begin = space.work[_MARK, size]
@@ -120,7 +120,7 @@ def _book_forms(problem, books, space, level, x, row):
 @inner
 def _book_series(problem, tables, books, space, t, span, x, row):
     """The same by series for a part of a cell from x at t on; x moves."""
-    panels, size = max(1, int(math.ceil(tables.fastest * span / LONG_REACH - 1e-9))), 2 * problem.k.size
+    panels, size = max(1, math.ceil(tables.fastest * span / LONG_REACH - 1e-9)), 2 * problem.k.size
     for i in range(panels):
         _clear(space, size)
         _derive(problem, space, t + i * span / panels)
@@ -142,37 +142,32 @@ def _clear(space, size):
 
 @inner
 def _book_panel(problem, tables, books, space, t, span, x, row, further):
-    """Add work and damping under the load in ``space.work`` to the ledger of ``row``; x moves if told to go further."""
-    n, terms, weights, z = problem.k.size, space.terms, space.book[0], space.work[_SCRATCH]
+    """Add work and damping under the load in ``space.work`` to the ledger of ``row``; x moves if told to go further.
+
+    Term i of the series is span^i times a derivative.
+    """
+    n, terms, z = problem.k.size, space.terms, space.work[_SCRATCH]
     copy(x, terms[0], 2 * n)
-    count, size = 1, 1.0
+    count, size, power = 1, 1.0, span
     while count < LONG and (count <= S or size > _EXACT):
         i, count = count - 1, count + 1
         size *= tables.fastest * span / (i + 1.0)
         for b in range(n):
-            terms[i + 1, b] = terms[i, n + b]
-            terms[i + 1, n + b] = -problem.k[b] * terms[i, b] - problem.c[b] * terms[i, n + b]
+            p, v = terms[i, b], terms[i, n + b]
+            terms[i + 1, b], terms[i + 1, n + b] = span * v, -span * (problem.k[b] * p + problem.c[b] * v)
         if i < S:
             for e in range(2 * n):
-                terms[i + 1, e] += space.work[i, e]
-    for q in range(books.gauss.shape[1]):
-        part = span * books.gauss[0, q]
-        _sum_up(terms, weights, count, part, z)
-        gain, loss = powers(problem, tables, t + part, z)
+                terms[i + 1, e] += power * space.work[i, e]
+            power *= span
+    points = books.gauss.shape[1]
+    for q in range(points):
+        combine(terms, books.series[q], count, None, z)
+        gain, loss = powers(problem, tables, t + span * books.gauss[0, q], z)
         row[2 * n] += span * books.gauss[1, q] * gain
         row[2 * n + 1] += span * books.gauss[1, q] * loss
     if further:
-        _sum_up(terms, weights, count, span, z)
+        combine(terms, books.series[points], count, None, z)
         copy(z, x, 2 * n)
-
-
-@inner
-def _sum_up(terms, weights, count, span, z):
-    """The state at ``span`` by its series."""
-    weights[0] = 1.0
-    for i in range(count - 1):
-        weights[i + 1] = weights[i] * span / (i + 1.0)
-    combine(terms, weights, count, None, z)
 
 
 @inner
@@ -190,7 +185,7 @@ def book_contact(problem, tables, books, state, space, family, level, span, row)
 @inner
 def _book_pieces(problem, tables, books, state, space, h, span, row):
     """The same on a part of a smooth step, whose forces are polynomials of time, by series."""
-    panels, size = max(1, int(math.ceil(tables.fastest * span / LONG_REACH - 1e-9))), 2 * problem.k.size
+    panels, size = max(1, math.ceil(tables.fastest * span / LONG_REACH - 1e-9)), 2 * problem.k.size
     x = space.work[_MOVING]
     copy(state.x, x, size)
     for i in range(panels):
@@ -221,7 +216,7 @@ def _add_force(books, space, force, push, h, place, size):
 
 @inner
 def _steady_nodes(problem, tables, books, state, space, kind, place, h, weights):
-    """Signals at the nodes into ``space.book``, p and v of the tones into ``space.terms``; work on the steady motion."""
+    """Signals at the nodes into ``space.book``, p and v of the tones into ``space.terms``; work on steady motion."""
     n, size, gain = int(tables.own), problem.k.size, 0.0
     for k in range(size - n):
         alpha, beta = eight(books.steady[kind, place, k, 0], 0), eight(books.steady[kind, place, k, 1], 0)

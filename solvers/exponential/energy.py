@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from solvers.compiled.kernels import copy, dot, inlined, inner, reordered, table_value
 from solvers.compiled.state import T, touching
 from solvers.exponential.contact.nodes import S
@@ -143,4 +141,3 @@ def account(problem, tables, state, space, family, h, length, x, row):
         gain, loss = powers(problem, tables, state.now[T] + span, inner)
         row[size] += length / parts * weight * gain
         row[size + 1] += length / parts * weight * loss
-

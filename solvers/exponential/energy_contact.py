@@ -1,9 +1,9 @@
 """Work and damping over contact steps: tables made when a run first keeps an energy ledger.
 
 The force on a block is a polynomial times its weight, see `contact.nodes`. So the block's velocity v is linear in
-y = (plain forces at the nodes, those of the stop that enters, p₀, v₀), hence ∫ L_i v dt too, L_i the nodes' polynomials,
-and ∫ v² dt is a quadratic form. With signals g at the nodes the input work is Σ_i g_i ∫ L_i v dt; with the steady motion
-w that tones give a block, its damping is c (∫ v² dt + 2 Σ_i w_i ∫ L_i v dt + ∫ w² dt).
+y = (plain forces at the nodes, those of the stop that enters, p₀, v₀), and so is ∫ L_i v dt with the nodes' L_i,
+while ∫ v² dt is a quadratic form. With signals g at the nodes the input work is Σ_i g_i ∫ L_i v dt; with the steady
+motion w that tones give a block, its damping is c (∫ v² dt + 2 Σ_i w_i ∫ L_i v dt + ∫ w² dt).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from solvers.compiled.kernels import inner, kernel
 from solvers.exponential.contact.nodes import S, gauss, lagrange
 from solvers.exponential.tables import propagate
 
-_PANEL, _POINTS = 1.5, 12  # radians of a panel and its points: exact to rounding
+_PANEL, _POINTS = 1.5, 16  # radians of a panel and its points: exact to rounding
 BEGIN, ROWS = 2 * S, 2 * S + 2  # rows of a table: plain forces, those of the stop that enters, from here on p₀ and v₀
 WIDE = 2 * S + 16  # of a row: ∫ L_i v dt for all nodes, then ∫ v v_row dt for all rows, and zeros
 
@@ -65,8 +65,11 @@ def _fill(k, c, h, power, lead, nodes, weights, points, so_far, velocity, basis,
 
 @inner
 def _moved(k, c, x, p, v):
-    """A block's state after x."""
-    alpha, beta = propagate(k, c, x)
+    """A block's state after x, or before: det exp(A x) = e^{-cx} turns α I + β A round."""
+    alpha, beta = propagate(k, c, abs(x))
+    if x < 0.0:
+        grown = math.exp(-c * x)
+        alpha, beta = grown * (alpha - c * beta), -grown * beta
     return alpha * p + beta * v, alpha * v - beta * (k * p + c * v)
 
 

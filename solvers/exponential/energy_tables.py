@@ -24,6 +24,7 @@ from solvers.compiled.kernels import INTEGERS, MATRIX, REAL, VECTOR, Problem
 from solvers.compiled.sums import padded
 from solvers.exponential.contact.nodes import S, gauss
 from solvers.exponential.energy_contact import contact_table
+from solvers.exponential.flight import LONG
 from solvers.exponential.phi_functions import signal_responses
 from solvers.exponential.tables import Tables, propagate
 
@@ -44,7 +45,8 @@ class Books(NamedTuple):
     rows: Any  # (l, d + 6J, 2 × 2N padded): work, then damping, from the state per unit of a driver
     pairs: Any  # (l, 6J, 2 × 6J padded): the same from the signals
     gauss: Any  # (2, 5)
-    monomials: Any  # (S, S): coefficients of the powers of σ from values at the nodes of a smooth step
+    series: Any  # (6, LONG): weights of a series' terms at Gauss's points and at the end
+    monomials: Any  # (S, S): coefficients of powers of σ from values at a smooth step's nodes
     kind: Any  # (f,) contact table of every family
     first: float  # contact step at which the tables begin
     longest: Any  # (kinds,) s: contact step up to which they may be used
@@ -54,7 +56,19 @@ class Books(NamedTuple):
 
 BOOKS = types.NamedTuple(
     [
-        *(REAL, REAL, REAL, INTEGERS, *(types.Array(REAL, 3, "C"),) * 3, MATRIX, MATRIX, INTEGERS, REAL, VECTOR),
+        *(
+            REAL,
+            REAL,
+            REAL,
+            INTEGERS,
+            *(types.Array(REAL, 3, "C"),) * 3,
+            MATRIX,
+            MATRIX,
+            MATRIX,
+            INTEGERS,
+            REAL,
+            VECTOR,
+        ),
         *(types.Array(REAL, 5, "C"),) * 2,
     ],
     Books,
@@ -64,11 +78,15 @@ BOOKS = types.NamedTuple(
 def _empty(kept: float, families: int) -> Books:
     """A ledger without tables."""
     none, nothing, contact = np.zeros(0, dtype=np.int64), np.zeros((0, 0, 0)), np.zeros((0, 0, 0, 0, 0))
+    flight = kept, 0.0, 0.0, none, nothing, nothing, nothing
     kind, longest = np.zeros(families, dtype=np.int64), np.zeros(1)
-    return Books(
-        *(kept, 0.0, 0.0, none, nothing, nothing, nothing),
-        *(gauss(5), _monomials(), kind, 0.0, longest, contact, contact),
-    )
+    return Books(*flight, gauss(5), _series(), _monomials(), kind, 0.0, longest, contact, contact)
+
+
+def _series() -> Any:
+    """(6, LONG) x^i/i! at Gauss's points and at 1."""
+    points = np.append(gauss(5)[0], 1.0)
+    return np.array([[x**i / math.factorial(i) for i in range(LONG)] for x in points])
 
 
 def _monomials() -> Any:

@@ -1,6 +1,6 @@
 """What the energy ledger of sampled runs costs: time with it over time without, by turns, and what it leaves open.
 
-    python tests/bench/energy_cost.py [seconds] [rounds]     the paper's beam, dt = 1 ms: one line per excitation and model
+python tests/bench/energy_cost.py [seconds] [rounds]     the paper's beam, dt = 1 ms: one line per excitation and model
 """
 
 import sys
@@ -15,7 +15,7 @@ from contacts import Hysteretic
 BASES = {
     "noise": fb.BandNoise(2.5e-4, (0.0, 1226.6), seed=1),
     "tone": fb.Harmonic(1e-3, 195.0),
-    "three tones": fb.Multisine((195.0, 390.0, 780.0), (1e-3, 1e-4, 3e-5)),
+    "three tones": fb.Multisine((1e-3, 1e-4, 3e-5), (195.0, 390.0, 780.0)),
 }
 Z_STOP = 0.24445
 

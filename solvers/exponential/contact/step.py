@@ -33,13 +33,13 @@ from solvers.compiled.state import (
     touching,
 )
 from solvers.compiled.sums import combine
+from solvers.exponential.books import book_contact
 from solvers.exponential.contact.collocation import arrive, contact_time, finish_step, solve_forces, step_error
 from solvers.exponential.contact.crossings import bend_ahead, choose_sides, leaves_piece
 from solvers.exponential.contact.landing import land, land_on_bend
 from solvers.exponential.contact.node_response import free_response
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.peaks import state_peaks, step_peaks
-from solvers.exponential.books import book_contact
 from solvers.exponential.energy import inside
 from solvers.exponential.flight import energy_norms
 
