@@ -1,9 +1,10 @@
 """The main method: exact flight between contacts, forces by collocation within them, exact derivatives.
 
 `method` is the loop, `preparation` and `tables` make its numbers, `flight` and `safe_steps` move free of contact, the
-folder `contact` holds one step in contact; `energy` books work, `energy_guard` refuses runs that do not balance,
-`linearised` and `tangent` differentiate a run. Imports: `compiled`, `problem`. Its files load machine code when
-imported; begin with `method`.
+folder `contact` holds one step in contact; `books` keeps the energy ledger with the forms of `energy_tables` and
+`energy_contact`, `energy` where they do not reach, `energy_guard` refuses runs that do not balance, `linearised` and
+`tangent` differentiate a run. Imports: `compiled`, `problem`. Its files load machine code when imported; begin with
+`method`.
 """
 
 from typing import Any
