@@ -1,19 +1,15 @@
-"""Energy ledger and states inside a step, by quadrature of what the step has found."""
+"""Powers of loads and damping, and states and energy ledger inside a contact step by quadrature of its forces."""
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from solvers.compiled.kernels import copy, dot, inlined, inner, table_value
+from solvers.compiled.kernels import copy, dot, inlined, inner, reordered, table_value
 from solvers.compiled.state import T, touching
-from solvers.exponential.contact.node_response import PLAIN, PRODUCTS, WEIGHTED, WITHIN, sample_signals
+from solvers.exponential.contact.node_response import PLAIN, PRODUCTS, WEIGHTED, WITHIN
 from solvers.exponential.contact.nodes import S
-from solvers.exponential.flight import add_taylor, energy_norms, taylor
+from solvers.exponential.flight import energy_norms
 from solvers.exponential.responses import propagate
-
-_SHORT = 0.15  # radians of the fastest block up to which order 6 and three points are right to 1e-10
 
 
 @inner
@@ -51,14 +47,29 @@ def _between(products, scales, values):
 @inner
 def powers(problem, tables, t, x):
     """Power of the loads and of the damping at time t, W."""
-    size, gain, loss = 2 * problem.k.size, 0.0, 0.0
-    for load in range(tables.power_rows.shape[0]):
+    size, gain, loss, own = 2 * problem.k.size, 0.0, 0.0, int(tables.own)
+    for load in range(tables.power_rows.shape[0] if own < problem.k.size else 0):
         gain += dot(tables.signal_rows[load], x, size) * dot(tables.power_rows[load], x, size)
     for j in range(problem.table_dt.size):
         gain += table_value(problem, j, t) * dot(tables.power_rows[problem.table_load[j]], x, size)
-    for r in range(tables.loss_rows.shape[0]):
-        loss += dot(tables.loss_rows[r], x, size) ** 2
+    if tables.loss_rows.shape[0] > own:  # damping that couples the blocks has a row per coordinate
+        for r in range(tables.loss_rows.shape[0]):
+            loss += dot(tables.loss_rows[r], x, size) ** 2
+    else:
+        loss = _plain_loss(problem.k.size, own, tables.loss_rows, x)
     return gain, loss
+
+
+@reordered
+def _plain_loss(n, own, rows, x):
+    """Power of damping by rows that read a block's own rate and the tones only, W."""
+    loss = 0.0
+    for b in range(own):
+        value = rows[b, n + b] * x[n + b]
+        for k in range(own, n):
+            value += rows[b, k] * x[k] + rows[b, n + k] * x[n + k]
+        loss += value * value
+    return loss
 
 
 @inner
@@ -132,22 +143,3 @@ def account(problem, tables, state, space, family, h, length, x, row):
         gain, loss = powers(problem, tables, state.now[T] + span, inner)
         row[size] += length / parts * weight * gain
         row[size + 1] += length / parts * weight * loss
-
-
-@inner
-def account_flight(problem, tables, state, space, h, x):
-    """The same for a whole flight step: on its Taylor polynomial where that reaches, else as above."""
-    if tables.fastest * h > _SHORT:
-        if problem.table_dt.size:
-            sample_signals(problem, tables, space, np.int64(0), state.now[T], h)  # literals would compile it twice
-        account(problem, tables, state, space, np.int64(0), h, h, x, state.x)
-        return
-    size, inner = 2 * problem.k.size, space.work[WITHIN]
-    taylor(problem, x, state.now[T], space.terms, space.six)
-    for i in range(3):
-        span = h * (0.5 + 0.3872983346207417 * (i - 1))  # Gauss's three points, sqrt(3/5)/2 apart
-        add_taylor(space.terms, inner, span, size, space.values, space.work[PLAIN])
-        gain, loss = powers(problem, tables, state.now[T] + span, inner)
-        weight = h * (4.0 if i == 1 else 2.5) / 9.0
-        state.x[size] += weight * gain
-        state.x[size + 1] += weight * loss

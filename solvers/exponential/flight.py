@@ -14,7 +14,7 @@ from solvers.compiled.sums import combine
 
 ORDER = 6
 _CURVED = int(0.345 * 2**50)  # by which a logarithm that is linear between powers of two can be wrong, times four
-_LONG = 14  # terms of a series that is exact to rounding up to |λ| x = LONG_REACH: 0.6^14/14! = 9e-15
+LONG = 14  # terms of a series that is exact to rounding up to |λ| x = LONG_REACH: 0.6^14/14! = 9e-15
 LONG_REACH = 0.6
 
 
@@ -146,7 +146,7 @@ def go_on(problem, x, t, span, term, six):
     copy(x, term, 2 * n)
     for j in range(problem.table_dt.size):
         signal_derivatives(problem, j, t, six[j])
-    for i in range(_LONG - 1):
+    for i in range(LONG - 1):
         for b in range(n):
             p, v = term[b], term[n + b]
             term[b], term[n + b] = v, -problem.k[b] * p - problem.c[b] * v

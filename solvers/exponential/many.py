@@ -27,6 +27,7 @@ from solvers.compiled.state import (
     T,
 )
 from solvers.exponential.energy_guard import ALLOWED, FACTOR, FIRST, LAST, too_much, unknown
+from solvers.exponential.energy_tables import NO_BOOKS
 from solvers.exponential.method import Engine, advance
 from solvers.exponential.preparation import SPACE
 from solvers.problem import COLUMNS, Array, ContactLog, Status
@@ -98,12 +99,12 @@ def _end(problem, state, space, code, x, count, number, peak):
 
 @entry(
     types.void(
-        *(_RUN, *[types.int64] * 4, VECTOR, VECTOR, MATRIX, INTEGERS, REAL, types.int64, REAL, REAL),
+        *(_RUN, *[types.int64] * 5, VECTOR, VECTOR, MATRIX, INTEGERS, REAL, types.int64, REAL, REAL),
         *(MATRIX, MATRIX, VECTOR, MATRIX, types.Array(types.int64, 2, "C"), MATRIX, _CUBE),
     )
 )
 def advance_many(
-    run, problem_at, tables_at, state_at, space_at, numbers, rest, starts, cursor, t_end, budget, rtol, reach,
+    run, problem_at, tables_at, state_at, space_at, books_at, numbers, rest, starts, cursor, t_end, budget, rtol, reach,
     log, out, due, x, count, number, peak,
 ):  # fmt: skip
     """Take the starts of a stretch to ``t_end`` one after the other, for about ``budget`` steps of them all.
@@ -120,7 +121,7 @@ def advance_many(
             cursor[BEGUN] = 1
         spent -= state.count[STEPS] + state.count[REJECTED]
         code = run(
-            problem_at, tables_at, state_at, space_at, t_end, budget, rtol, reach, log, out, due, False
+            problem_at, tables_at, state_at, space_at, books_at, t_end, budget, rtol, reach, log, out, due
         )  # fmt: skip
         spent += state.count[STEPS] + state.count[REJECTED] + 1
         for row in range(state.count[LOGGED]):
@@ -138,7 +139,7 @@ class Worker:
         self.engine, self.cursor = engine, np.zeros(3, dtype=np.int64)
         workspace, log = engine.workspace, np.empty((max(256, 2 * len(engine.problem.gap)), COLUMNS))
         self.arguments = (
-            *(advance, *engine.addresses, workspace.numbers, workspace.rest, starts, self.cursor),
+            *(advance, *engine.addresses, NO_BOOKS.address, workspace.numbers, workspace.rest, starts, self.cursor),
             *(engine.duration, budget, engine.method.rtol, engine.reach, log, _NOWHERE, _NEVER, *ends),
         )
 

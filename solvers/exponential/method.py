@@ -46,24 +46,27 @@ from solvers.compiled.state import (
     switch_on_surface,
     touching,
 )
+from solvers.exponential.books import book_on, mark
 from solvers.exponential.contact.landing import reach
 from solvers.exponential.contact.step import BEGUN, FRESH, begin, latest, touch
 from solvers.exponential.energy_guard import FIRST, note_energy, own_energy, too_much, unknown
+from solvers.exponential.energy_tables import BOOKS, NO_BOOKS
 from solvers.exponential.preparation import SPACE, TABLES, ready_for
 from solvers.exponential.safe_steps import fly
 from solvers.problem import Array, Forcing, System
 
 _problem, _tables, _state, _space = opener(PROBLEM), opener(TABLES), opener(STATE), opener(SPACE)
+_books = opener(BOOKS)
 
 
-@entry(types.int64(*[types.int64] * 4, REAL, types.int64, REAL, REAL, MATRIX, MATRIX, VECTOR, types.boolean))
-def advance(problem_at, tables_at, state_at, space_at, t_end, budget, rtol, reach, log, out, due, ledger):
+@entry(types.int64(*[types.int64] * 5, REAL, types.int64, REAL, REAL, MATRIX, MATRIX, VECTOR))
+def advance(problem_at, tables_at, state_at, space_at, books_at, t_end, budget, rtol, reach, log, out, due):
     """Advance the state to ``t_end`` or for about ``budget`` steps; returns a status code.
 
     ``out`` gets the states at the times ``due``, the last of which is infinite; ``reach`` is that of `landing.reach`.
     """
     problem, tables, state, space = _problem(problem_at), _tables(tables_at), _state(state_at), _space(space_at)
-    last = space.last
+    books, last = _books(books_at), space.last
     if not last[BEGUN]:
         last[BEGUN], space.reach[0] = 1, reach
         space.energy[FIRST] = own_energy(problem, tables, state.x)
@@ -87,11 +90,15 @@ def advance(problem_at, tables_at, state_at, space_at, t_end, budget, rtol, reac
                 begin(problem, tables, state, space, latest(state))
             continue
         if touching(state):
-            code = touch(problem, tables, state, space, t_end, rtol, log, out, due, ledger)
+            code = touch(problem, tables, books, state, space, t_end, rtol, log, out, due)
             if code != RUNNING:
                 return code
             continue
-        stop = fly(problem, tables, state, space, t_end, budget, out, due, ledger)
+        if books.kept > 0.0:
+            mark(problem, state, space)
+        stop = fly(problem, tables, books, state, space, t_end, budget, out, due)
+        if books.kept > 0.0:
+            book_on(problem, tables, books, state, space)
         if stop >= 0:
             switch(problem, state, stop, np.int64(1), log)  # a literal would be compiled for itself
             begin(problem, tables, state, space, stop)
@@ -106,8 +113,8 @@ class Exponential:
     ----------
     rtol : error of an indentation rate that one contact step may make, relative to the speed of entry (or a tenth of
         what the motion could reach at the stop, whichever is larger), in [1e-12, 1e-2]. Flight is exact.
-    ledger : keep the energy ledger of runs with output samples, by quadrature; without it their input and damping
-        are NaN and the run several times quicker. Runs with ``dt=None`` keep none.
+    ledger : keep the energy ledger of runs with output samples, by closed forms of the steps; without it their input
+        and damping are NaN, the motion is the same and 1.5 to 2.7 times as quick. Runs with ``dt=None`` keep none.
 
     Notes
     -----
@@ -132,6 +139,11 @@ class Exponential:
     def engine(self, system: System, z: Array, forcing: Forcing, duration: float) -> Engine:
         """The method made ready for one run."""
         return Engine(self, system, z, forcing, duration)
+
+
+def _spacing(due: Array) -> float:
+    """Time between two outputs, s."""
+    return float(due[1] - due[0]) if len(due) > 2 else 1.0
 
 
 class Engine:
@@ -177,7 +189,8 @@ class Engine:
 
     def march(self, budget: int, log: Array, out: Array, due: Array) -> int:
         """Go on for a stretch."""
+        books = self.prepared.books_for(_spacing(due)) if self.keeps_ledger(len(out) > 0) else NO_BOOKS
         return advance(
-            *(*self.addresses, self.duration, budget, self.method.rtol, self.reach),
-            *(log, out, due, self.keeps_ledger(len(out) > 0)),
+            *(*self.addresses, books.address, self.duration, budget, self.method.rtol, self.reach),
+            *(log, out, due),
         )

@@ -9,13 +9,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from solvers.compiled.handles import Cast, Layout, Mould
+from solvers.compiled.handles import Cast, Layout, Mould, Packed
 from solvers.compiled.kernels import INTEGERS, MATRIX, PROBLEM, REAL, VECTOR, Problem
 from solvers.compiled.state import STATE, State, begin_state, problem_of, state_shapes
 from solvers.compiled.sums import padded
 from solvers.exponential.contact.blocks import POOL
 from solvers.exponential.contact.node_response import START, Space
 from solvers.exponential.contact.nodes import S, series_of
+from solvers.exponential.energy_tables import books_for
+from solvers.exponential.flight import LONG
 from solvers.exponential.tables import OF_TONES, Tables, build, doublings, fill_tones, known_of
 from solvers.problem import Array, Forcing, System, on_one_grid, tones_as_nodes
 
@@ -37,7 +39,7 @@ TABLES = types.NamedTuple(
 SPACE = types.NamedTuple(
     [
         *(*_arrays(1, 2, 2, 1, 1, 1, 1, 2, 3, 1, 3, 2, 1, 3, 2, 3, 1), INTEGERS, MATRIX),
-        *(*_arrays(1, 1, 1, 1, 2, 1, 2, 1, 1, 1, 1, 1, 1), INTEGERS),
+        *(*_arrays(1, 1, 1, 1, 2, 1, 2, 1, 1, 1, 1, 1, 2, 1), INTEGERS),
         *(*_arrays(2, 2, 2, 1, 2, 3), INTEGERS),
     ],
     Space,
@@ -78,6 +80,15 @@ class Prepared(NamedTuple):
     layout: Layout  # of State and Space
     rest: Array  # state of the tones' blocks at t = 0, the structure's less their steady response
     spare: list[Workspace]  # of runs that are over
+    kept: dict[float, Packed]  # tables of the energy ledger by the spacing of outputs, the latest
+
+    def books_for(self, spacing: float) -> Packed:
+        """Tables of the energy ledger for outputs of a spacing, s."""
+        if spacing not in self.kept:
+            made = books_for(self.problem.value, self.tables.value, spacing)
+            self.kept.clear()
+            self.kept[spacing] = made
+        return self.kept[spacing]
 
     @property
     def nbytes(self) -> int:
@@ -182,7 +193,7 @@ class _Skeleton:
         fill_tones(tables.value, problem.value, self.tones, self.series)
         rest = among_tones(-response.real.sum(axis=0), self.tones)
         rest[n : n + self.tones] = 1.0
-        return Prepared(problem, tables, back, self.layout, rest, [])
+        return Prepared(problem, tables, back, self.layout, rest, [], {})
 
     def _tables(self, forcing: Forcing, turn: Array) -> Cast:
         """Tables that know the signals made of tones, Re(a e^{iΩt}) = Re a · p + Im a/Ω · v; ``turn`` is 1/Ω."""
@@ -219,12 +230,13 @@ def _layout(stops: int, loads: int, blocks: int, signals: int, pool: int) -> Lay
     size, width = 2 * blocks, 2 * blocks + 2 + 2 * stops
     rows = size if pool else 0
     space = [
-        *((padded(width),), (7, padded(size)), (signals, 6), (7,), (blocks,), (loads,), (stops,)),
+        *((padded(width),), (LONG, padded(size)), (signals, 6), (LONG,), (blocks,), (loads,), (stops,)),
         (2, padded(blocks)),
         *((stops, 2, S), (S,), (stops, 2, S), (stops + loads, S), (S,), (stops, 2, 8), (stops, S), (stops, 3, S)),
         *((stops * S,), (stops * S,), (START + 1, padded(width + 2))),
         *([(stops,)] * 4),
-        *((stops, S), (stops,), (4, 3 * S), (stops,), (stops,), (S + 2,), (1,), (1,), (3,), (6,)),
+        *((stops, S), (stops,), (4, 3 * S), (stops,), (stops,), (S + 2,), (1,), (1,)),
+        *((2 + loads, max(32, padded(size + 6 * signals), 2 * padded(6 * signals))), (3,), (6,)),
         *((stops, 2), (rows, S), (rows, S), (padded(rows),), (stops * S, stops * S), (pool, S, 2 * S), (pool,)),
     ]
     return Layout([STATE, SPACE], [state_shapes(width, stops), space])

@@ -17,7 +17,7 @@ import numpy as np
 
 from solvers.compiled.kernels import copy, dot, indentation, inlined, inner, merged
 from solvers.compiled.state import SAMPLED, STEPS, T, rate_tolerance, surface_tolerance
-from solvers.exponential.energy import account_flight, energetic
+from solvers.exponential.books import book_on, book_output
 from solvers.exponential.flight import (
     LONG_REACH,
     ORDER,
@@ -133,15 +133,15 @@ def _bisect(coefficients, sign, b, guess):
 
 
 @inlined
-def _target(tables, t, first, second, t_end, ledger):
+def _target(tables, t, first, second, t_end):
     """Where a step must end: at an output time unless that is near enough to be evaluated from the step's start."""
-    if ledger or tables.fastest * (first - t) > LONG_REACH:
+    if tables.fastest * (first - t) > LONG_REACH:
         return min(first, t_end)
     return t_end if tables.fastest * (second - first) <= LONG_REACH else min(second, t_end)
 
 
 @inner
-def _sample(problem, tables, state, space, t, out, due):
+def _sample(problem, tables, books, state, space, t, out, due):
     """Outputs before the end of the step that began at t with the state in ``space.x_new``."""
     while due[state.count[SAMPLED]] < state.now[T]:
         wanted = due[state.count[SAMPLED]]
@@ -150,6 +150,8 @@ def _sample(problem, tables, state, space, t, out, due):
             span = (wanted - t) / parts
             go_on(problem, space.x_new, t + i * span, span, space.terms[0], space.six)
         copy(space.x_new, out[state.count[SAMPLED]], state.x.size)
+        if books.kept > 0.0:
+            book_output(problem, tables, books, state, space, wanted, out[state.count[SAMPLED]])
         state.count[SAMPLED], t = state.count[SAMPLED] + 1, wanted
 
 
@@ -180,18 +182,17 @@ def _glide(problem, tables, state, space, most, budget):
 
 
 @merged
-def fly(problem, tables, state, space, t_end, budget, out, due, ledger):
-    """Fly until a stop is reached (returns its index), the end (-1), or the budget is spent (-2).
-
-    With an energy ledger steps end on the output times too; else these are evaluated from the start of a step.
-    """
+def fly(problem, tables, books, state, space, t_end, budget, out, due):
+    """Fly until a stop is reached (returns its index), the end (-1), or the budget is spent (-2)."""
     stops, size, now = problem.gap.size, 2 * problem.k.size, state.now
     shortest = tables.h[tables.h.size - 1]
-    sampled = problem.table_dt.size > 0
+    sampled, ledger = problem.table_dt.size > 0, books.kept > 0.0
     dt_cell = problem.table_dt[0] if sampled else np.inf
     for count in range(budget):
         if due[state.count[SAMPLED]] <= now[T]:
             copy(state.x, out[state.count[SAMPLED]], state.x.size)
+            if ledger:
+                book_output(problem, tables, books, state, space, now[T], out[state.count[SAMPLED]])
             state.count[SAMPLED] += 1
         if now[T] >= t_end:
             return -1
@@ -199,7 +200,7 @@ def fly(problem, tables, state, space, t_end, budget, out, due, ledger):
         # --- how far the output, the end and the signals' cell allow
         first = due[state.count[SAMPLED]]
         second = due[min(state.count[SAMPLED] + 1, out.shape[0])]
-        target = _target(tables, now[T], first, second, t_end, ledger)
+        target = _target(tables, now[T], first, second, t_end)
         begin, span, rest, offset, cell = now[T], target - now[T], np.inf, 0.0, 0
         if sampled:
             cell, offset = cell_of(problem, now[T])
@@ -207,7 +208,7 @@ def fly(problem, tables, state, space, t_end, budget, out, due, ledger):
             for j in range(problem.table_dt.size):
                 space.bounds[j] = _signal_bound(problem, j, cell)
         # --- how far no stop can be reached
-        if first == np.inf and not sampled and not ledger:  # nothing else happens on the way
+        if first == np.inf and not sampled:  # nothing else happens on the way
             flown, steps, span = _glide(problem, tables, state, space, span, budget)
             now[T] += flown
             state.count[STEPS] += steps
@@ -219,9 +220,7 @@ def fly(problem, tables, state, space, t_end, budget, out, due, ledger):
                 for s in range(stops):
                     space.m[s] = _acceleration_bound(problem, tables, s, space.norms, space.bounds, rest)
             span = min(span, rest)
-            if ledger:
-                span = min(span, 3.0 / energetic(problem, tables, space.norms))
-            if ledger or first <= begin + span:
+            if first <= begin + span:
                 copy(state.x, space.x_new, state.x.size)
             for s in range(stops):
                 g, v = -indentation(problem, s, state.x), -dot(problem.read_rate[s], state.x, size)
@@ -249,12 +248,12 @@ def fly(problem, tables, state, space, t_end, budget, out, due, ledger):
             turn(problem, tables.propagator[level, 0], tables.propagator[level, 1], state.x)
             if sampled:
                 add_signals(problem, tables.signal[level], state.x, now[T], space.six)
-        if ledger:
-            account_flight(problem, tables, state, space, h, space.x_new)
         now[T] = target if now[T] + h >= target else now[T] + h
         state.count[STEPS] += 1
         if first < now[T]:
-            _sample(problem, tables, state, space, begin, out, due)
+            _sample(problem, tables, books, state, space, begin, out, due)
+        if ledger and sampled and cell_of(problem, now[T])[0] != cell:
+            book_on(problem, tables, books, state, space)
         if stop >= 0:
             return stop
     return -2

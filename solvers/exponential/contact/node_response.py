@@ -29,9 +29,9 @@ class Space(NamedTuple):
     """
 
     x_new: Any  # (x.size padded,)
-    terms: Any  # (7, 2N padded) derivatives of the state
+    terms: Any  # (14, 2N padded) derivatives of the state
     six: Any  # (tables, 6) derivatives of the signals
-    values: Any  # (7,)
+    values: Any  # (14,)
     norms: Any  # (N,)
     bounds: Any  # (L,)
     m: Any  # (m,)
@@ -59,6 +59,7 @@ class Space(NamedTuple):
     sides: Any  # (S + 2,) see `crossings`
     reach: Any  # (1,) radians of the fastest block that a landing may take
     duration: Any  # (1,) s, that of the contact begun last, if it were free
+    book: Any  # (2 + L, numbers) see `books`
     energy: Any  # (3,) see `energy_guard`
     last: Any  # (6,) see `step`
     seen: Any  # (m, 2) δ and δ̇ at the begin of the step

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from solvers.compiled.kernels import copy, inner
 from solvers.compiled.state import HEAD, PART, SAMPLED, STEPS, TAPED, T, tape
+from solvers.exponential.books import book_contact
 from solvers.exponential.contact.node_response import START
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.peaks import state_peaks, step_peaks
-from solvers.exponential.energy import account, inside
+from solvers.exponential.energy import inside
 
 
 @inner
-def record(problem, tables, state, space, family, level, t_end, out, due, ledger):
+def record(problem, tables, books, state, space, family, level, t_end, out, due):
     """Samples inside the converged step, and the state at the end of the run if that lies inside."""
     t, h = state.now[T], tables.step[level]
     while True:
@@ -22,8 +23,8 @@ def record(problem, tables, state, space, family, level, t_end, out, due, ledger
         row = out[state.count[SAMPLED]] if sampled else space.work[START]
         copy(state.x, row, state.x.size)
         inside(problem, tables, state, space, family, h, span, row)
-        if ledger:
-            account(problem, tables, state, space, family, h, span, state.x, row)
+        if books.kept > 0.0:
+            book_contact(problem, tables, books, state, space, family, level, span, row)
         if not sampled:
             return
         state.count[SAMPLED] += 1

@@ -29,6 +29,7 @@ from solvers.compiled.state import (
     touching,
 )
 from solvers.compiled.sums import combine
+from solvers.exponential.books import book_contact
 from solvers.exponential.contact.collocation import arrive, contact_time, finish_step, solve_forces, step_error
 from solvers.exponential.contact.crossings import bend_ahead, choose_sides, leaves_piece
 from solvers.exponential.contact.landing import land, land_on_bend
@@ -36,7 +37,6 @@ from solvers.exponential.contact.node_response import LANDED, free_response
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.outputs import end_inside, record, tape_forces
 from solvers.exponential.contact.peaks import state_peaks
-from solvers.exponential.energy import account
 from solvers.exponential.flight import energy_norms
 
 LEVEL, FAMILY, FRESH, STOP, WANTED, BEGUN = range(6)  # places in Space.last
@@ -204,9 +204,9 @@ def _land_first(problem, tables, state, space, stop, direction, near, rtol, t_en
 
 
 @merged
-def touch(problem, tables, state, space, t_end, rtol, log, out, due, ledger):
+def touch(problem, tables, books, state, space, t_end, rtol, log, out, due):
     """One accepted step in contact: land if a border is near, else collocate; returns a status code."""
-    last, bottom = space.last, tables.step.size - 1
+    last, bottom, ledger = space.last, tables.step.size - 1, books.kept > 0.0
     near, stop, direction = _nearest_surface(problem, state, space)
     if near <= 0.0 and switch_on_surface(problem, state, log, True):
         if touching(state):
@@ -254,7 +254,7 @@ def touch(problem, tables, state, space, t_end, rtol, log, out, due, ledger):
     h = tables.step[level]
     end = state.now[T] + h
     if end >= t_end or due[state.count[SAMPLED]] <= end:
-        record(problem, tables, state, space, family, level, t_end, out, due, ledger)
+        record(problem, tables, books, state, space, family, level, t_end, out, due)
     if end >= t_end:
         end_inside(problem, tables, state, space, family, level, t_end)
         return RUNNING
@@ -262,7 +262,7 @@ def touch(problem, tables, state, space, t_end, rtol, log, out, due, ledger):
         if state.piece[s] > 0:
             copy(space.force[s], space.previous[s], S)
     if ledger:
-        account(problem, tables, state, space, family, h, h, state.x, state.x)
+        book_contact(problem, tables, books, state, space, family, level, h, state.x)
     if state.tape.shape[0]:
         tape_forces(problem, state, space, STEP, end, family, level)
     finish_step(problem, tables, state, space, family, level)

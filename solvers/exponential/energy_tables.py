@@ -1,0 +1,287 @@
+"""Work and damping of whole steps as quadratic forms, made when a run first keeps an energy ledger.
+
+With y = (x, s), the state and the derivatives s, s', ..., s⁽⁵⁾ of every sampled signal, flight is y' = B y, and input
+work and damping of a step are
+
+    ∫ y^T P y dt = y₀^T M(h) y₀,   M(2h) = M(h) + Φ(h)^T M(h) Φ(h),   Φ = exp(B h),
+
+begun by Gauss's rule on steps on which Φ is a short Taylor series. Kept are, for every *driver* i (tones and signals;
+with coupled damping every coordinate), the rows that give work and damping, and the structure's blocks' own damping.
+
+Tables of contact steps are those of `energy_contact`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import types
+
+from solvers.compiled.handles import Packed
+from solvers.compiled.kernels import INTEGERS, MATRIX, REAL, VECTOR, Problem
+from solvers.compiled.sums import padded
+from solvers.exponential.contact.nodes import S, gauss
+from solvers.exponential.energy_contact import contact_table
+from solvers.exponential.flight import LONG
+from solvers.exponential.phi_functions import signal_responses
+from solvers.exponential.responses import propagate
+from solvers.exponential.tables import Tables
+
+_OCTAVE = 4  # flight steps of which each is twice as long as the last
+_BRIEF = 0.04  # |λ| h up to which twelve terms of a Taylor series are exact
+_MOST_NUMBERS = 10_000_000  # of the rows: with more drivers the work is summed by series
+_REACH = 200.0  # radians of the fastest block up to which a contact step has tables
+
+
+class Books(NamedTuple):
+    """Numbers of the energy ledger; l counts flight steps and one more, j contact steps."""
+
+    kept: float  # whether there is a ledger
+    closed: float  # whether there are rows for flight
+    spacing: float  # s, of the last step in the tables
+    driver: Any  # (d,) columns of the state that drive
+    plain: Any  # (l, 3, n): damping = Σ rows × (p², p v, v²)
+    rows: Any  # (l, d + 6J, 2 × 2N padded): work, then damping, from the state per unit of a driver
+    pairs: Any  # (l, 6J, 2 × 6J padded): the same from the signals
+    gauss: Any  # (2, 5)
+    series: Any  # (6, LONG): weights of a series' terms at Gauss's points and at the end
+    monomials: Any  # (S, S): coefficients of powers of σ from values at a smooth step's nodes
+    kind: Any  # (f,) contact table of every family
+    first: float  # contact step at which the tables begin
+    longest: Any  # (kinds,) s: contact step up to which they may be used
+    steady: Any  # (kinds, j, K, 2, S): α, β of every tone at the nodes
+    contact: Any  # (kinds, j, n, ROWS, WIDE)
+
+
+BOOKS = types.NamedTuple(
+    [
+        *(
+            REAL,
+            REAL,
+            REAL,
+            INTEGERS,
+            *(types.Array(REAL, 3, "C"),) * 3,
+            MATRIX,
+            MATRIX,
+            MATRIX,
+            INTEGERS,
+            REAL,
+            VECTOR,
+        ),
+        *(types.Array(REAL, 5, "C"),) * 2,
+    ],
+    Books,
+)
+
+
+def _empty(kept: float, families: int) -> Books:
+    """A ledger without tables."""
+    none, nothing, contact = np.zeros(0, dtype=np.int64), np.zeros((0, 0, 0)), np.zeros((0, 0, 0, 0, 0))
+    flight = kept, 0.0, 0.0, none, nothing, nothing, nothing
+    kind, longest = np.zeros(families, dtype=np.int64), np.zeros(1)
+    return Books(*flight, gauss(5), _series(), _monomials(), kind, 0.0, longest, contact, contact)
+
+
+def _series() -> Any:
+    """(6, LONG) x^i/i! at Gauss's points and at 1."""
+    points = np.append(gauss(5)[0], 1.0)
+    return np.array([[x**i / math.factorial(i) for i in range(LONG)] for x in points])
+
+
+def _monomials() -> Any:
+    """(S, S) coefficients of 1, σ, σ², ... from values at Gauss's nodes."""
+    return np.ascontiguousarray(np.linalg.inv(np.vander(gauss(S)[0], increasing=True)))
+
+
+NO_BOOKS = Packed(_empty(0.0, 1), BOOKS)
+
+
+def books_for(problem: Problem, tables: Tables, spacing: float) -> Packed:
+    """Everything a run with ledger needs beyond the tables of the motion; ``spacing`` is that of its outputs, s."""
+    books, n = _empty(1.0, len(tables.power)), len(problem.k)
+    if not (_coupled(tables) or problem.push[:, :n].any() or problem.load[:, :n].any()):
+        books = _contact_part(books, problem, tables)
+    driver = np.flatnonzero(_drives(problem, tables))
+    size, signals = 2 * len(problem.k), len(problem.table_dt)
+    if (len(tables.h) + 1) * (len(driver) + 6 * signals) * 2 * padded(size) <= _MOST_NUMBERS:
+        books = _flight_part(books, problem, tables, driver, spacing)
+    return Packed(books, BOOKS)
+
+
+def _coupled(tables: Tables) -> bool:
+    """Whether damping couples the blocks: then it has a row per coordinate, else per block."""
+    return len(tables.loss_rows) > int(tables.own)
+
+
+def _drives(problem: Problem, tables: Tables) -> Any:
+    """(2N,) whether a coordinate is a driver: those of tones, and all if damping couples the blocks."""
+    own = np.arange(2 * len(problem.k)) % len(problem.k) < int(tables.own)
+    return np.ones_like(own) if _coupled(tables) else ~own
+
+
+# --- flight
+
+
+def _flight_part(books: Books, problem: Problem, tables: Tables, driver: Any, spacing: float) -> Books:
+    """The forms of all flight steps, and of the cell or, without sampled signals, of the time between two outputs."""
+    powers = _power_forms(problem, tables)
+    levels = -(-len(tables.h) // _OCTAVE) * _OCTAVE
+    h = tables.h[0] * 2.0 ** (-np.arange(levels) / _OCTAVE)
+    forms = _doubled(problem, powers, h, _OCTAVE, tables.propagator, tables.signal)[: len(tables.h)]
+    spacing = problem.table_dt[0] if len(problem.table_dt) else spacing
+    forms = np.concatenate((forms, _forms_of(problem, powers, spacing)))
+    size, n, own = 2 * len(problem.k), len(problem.k), int(tables.own)
+    signals = np.arange(size, powers.shape[-1])
+    rows = forms[:, :, np.concatenate((driver, signals)), :size]
+    once = np.isin(np.arange(size), driver)
+    rows[:, :, : len(driver)] *= np.where(once, 1.0, 2.0)
+    rows[:, :, len(driver) :] *= 2.0
+    b = np.arange(0 if _coupled(tables) else own)
+    plain = np.stack((forms[:, 1, b, b], 2.0 * forms[:, 1, b, n + b], forms[:, 1, n + b, n + b]), axis=1)
+    pairs = forms[:, :, size:, size:]
+    return books._replace(
+        **{"closed": 1.0, "spacing": spacing, "driver": driver.astype(np.int64), "plain": np.ascontiguousarray(plain)},
+        **{"rows": _beside(rows), "pairs": _beside(pairs)},
+    )
+
+
+def _beside(forms: Any) -> Any:
+    """(l, d, 2 × padded): the two forms' rows beside each other."""
+    steps, _, rows, columns = forms.shape
+    out = np.zeros((steps, rows, 2, padded(columns)))
+    out[..., :columns] = forms.transpose(0, 2, 1, 3)
+    return out.reshape(steps, rows, 2 * padded(columns))
+
+
+def _power_forms(problem: Problem, tables: Tables) -> Any:
+    """(2, Y, Y) input power and damping power as forms of y."""
+    size = 2 * len(problem.k)
+    forms = np.zeros((2, *(size + 6 * len(problem.table_dt),) * 2))
+    forms[0, :size, :size] = tables.signal_rows.T @ tables.power_rows
+    for j, load in enumerate(problem.table_load):
+        forms[0, size + 6 * j, :size] += tables.power_rows[load]
+    forms[0] = 0.5 * (forms[0] + forms[0].T)
+    forms[1, :size, :size] = tables.loss_rows.T @ tables.loss_rows
+    return forms
+
+
+def _generator(problem: Problem) -> Any:
+    """(Y, Y) B of y' = B y."""
+    n, size = len(problem.k), 2 * len(problem.k)
+    out, b = np.zeros((size + 6 * len(problem.table_dt),) * 2), np.arange(n)
+    out[b, n + b], out[n + b, b], out[n + b, n + b] = 1.0, -problem.k, -problem.c
+    for j, load in enumerate(problem.table_load):
+        first = size + 6 * j
+        out[:size, first] = problem.load[load]
+        out[first + np.arange(5), first + np.arange(1, 6)] = 1.0
+    return out
+
+
+def _brief_forms(problem: Problem, powers: Any, h: Any) -> Any:
+    """(len(h), 2, Y, Y) forms of steps of at most `_BRIEF`, by Gauss's rule on the Taylor series of Φ."""
+    generator, (points, weights) = _generator(problem), gauss(8)
+    out = np.zeros((len(h), *powers.shape))
+    for point, weight in zip(points, weights, strict=True):
+        term = np.broadcast_to(np.eye(len(generator)), (len(h), *generator.shape))
+        flow = term.copy()
+        for i in range(1, 12):
+            term = (point * h / i)[:, None, None] * (term @ generator)
+            flow += term
+        flow = flow[:, None]
+        out += (weight * h)[:, None, None, None] * (flow.transpose(0, 1, 3, 2) @ powers @ flow)
+    return out
+
+
+def _doubled(problem: Problem, powers: Any, h: Any, octave: int, propagator: Any, signal: Any) -> Any:
+    """(len(h), 2, Y, Y) forms of falling steps, each twice as long as that ``octave`` places behind."""
+    shorter = 0
+    fastest = float((np.sqrt(problem.k) + problem.c).max())
+    brief = h[-octave:]
+    while brief[0] * fastest > _BRIEF:
+        brief, shorter = 0.5 * brief, shorter + 1
+    form, forms = _brief_forms(problem, powers, brief), []
+    for _ in range(shorter):
+        flow = _flow(problem, brief, *_moves(problem, brief))[:, None]
+        form, brief = form + flow.transpose(0, 1, 3, 2) @ form @ flow, 2.0 * brief
+    forms.append(form)
+    for end in range(len(h), octave, -octave):
+        which = slice(end - octave, end)
+        if end > len(propagator):
+            moves = _moves(problem, h[which])
+        else:
+            moves = propagator[which], signal[which]
+        flow = _flow(problem, h[which], *moves)[:, None]
+        form = form + flow.transpose(0, 1, 3, 2) @ form @ flow
+        forms.append(form)
+    return np.concatenate(forms[::-1])
+
+
+def _moves(problem: Problem, h: Any) -> tuple[Any, Any]:
+    """Propagators and responses to signals for a few steps."""
+    moves = [[propagate(k, c, step) for k, c in zip(problem.k, problem.c, strict=True)] for step in h]
+    return np.array(moves).transpose(0, 2, 1), signal_responses(problem, np.ascontiguousarray(h))
+
+
+def _forms_of(problem: Problem, powers: Any, h: float) -> Any:
+    """(1, 2, Y, Y) forms of one step of any length."""
+    fastest = float((np.sqrt(problem.k) + problem.c).max())
+    steps = h * 2.0 ** -np.arange(1 + max(0, math.ceil(math.log2(max(h * fastest, 1e-300) / _BRIEF))))
+    return _doubled(problem, powers, steps, 1, *_moves(problem, steps))[:1]
+
+
+def _flow(problem: Problem, h: Any, propagator: Any, signal: Any) -> Any:
+    """(len(h), Y, Y) Φ(h)."""
+    n, b = len(problem.k), np.arange(len(problem.k))
+    size = 2 * n
+    out = np.zeros((len(h), *(size + 6 * len(problem.table_dt),) * 2))
+    alpha, beta = propagator[:, 0, :n], propagator[:, 1, :n]
+    out[:, b, b], out[:, b, n + b] = alpha, beta
+    out[:, n + b, b], out[:, n + b, n + b] = -problem.k * beta, alpha - problem.c * beta
+    for j, load in enumerate(problem.table_load):
+        first = size + 6 * j
+        out[:, :size, first : first + 6] = signal[:, load].transpose(0, 2, 1)
+        power = np.ones_like(h)
+        for apart in range(6):
+            rows = first + np.arange(6 - apart)
+            out[:, rows, rows + apart] = power[:, None]
+            power = power * h / (apart + 1.0)
+    return out
+
+
+# --- contact
+
+
+def _contact_part(books: Books, problem: Problem, tables: Tables) -> Books:
+    """The tables of contact steps: one kind for all stops whose forces begin alike."""
+    own = int(tables.own)
+    fastest = float((np.sqrt(problem.k) + problem.c)[:own].max())
+    h = tables.step[int(np.searchsorted(-tables.step * fastest, -_REACH)) :]
+    families = list(zip(tables.power.tolist(), tables.lead.tolist(), strict=True))
+    kinds = list(dict.fromkeys(families))
+    places = tables.nodes[[families.index(kind) for kind in kinds]]
+    structure = [part.tobytes() for part in (problem.k[:own], problem.c[:own], h)]
+    of_kinds = [contact_table(*structure, *kind, row.tobytes()) for kind, row in zip(kinds, places, strict=True)]
+    return books._replace(
+        kind=np.array([kinds.index(family) for family in families], dtype=np.int64),
+        first=float(len(tables.step) - len(h)),
+        longest=_longest(np.sqrt(problem.k[own:].max(initial=0.0)), kinds, h),
+        steady=_steady(np.sqrt(problem.k[own:]), h, places ** np.array([power for power, _ in kinds])[:, None]),
+        contact=np.stack(of_kinds),
+    )
+
+
+def _longest(omega: float, kinds: Any, h: Any) -> Any:
+    """(kinds,) step up to which the nodes' polynomials hold a tone to 1e-11: cos is a series in σ^(2 power)."""
+    terms = [S // int(power) for power, _ in kinds]
+    phases = np.array([(1e-11 * 2.0 ** (2 * S - 1) * math.factorial(count)) ** (1.0 / count) for count in terms])
+    return np.minimum(phases / omega, h[0]) if omega > 0.0 else np.full(len(kinds), h[0])
+
+
+def _steady(omega: Any, h: Any, times: Any) -> Any:
+    """(kinds, j, K, 2, S) α, β of tones at the nodes of all steps."""
+    phase = omega[:, None] * (h[:, None] * times[:, None, :])[:, :, None, :]
+    moving = np.where(omega > 0.0, omega, 1.0)[:, None]
+    sine = np.where(omega[:, None] > 0.0, np.sin(phase), (h[:, None] * times[:, None, :])[:, :, None, :])
+    return np.ascontiguousarray(np.stack((np.cos(phase), sine / moving), axis=3))

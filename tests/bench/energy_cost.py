@@ -1,0 +1,66 @@
+"""What the energy ledger of sampled runs costs: time with it over time without, by turns, and what it leaves open.
+
+python tests/bench/energy_cost.py [seconds] [rounds]     the paper's beam, dt = 1 ms: one line per excitation and model
+"""
+
+import sys
+import time
+
+import numpy as np
+
+import fembeam as fb
+import solvers
+from contacts import Hysteretic
+
+BASES = {
+    "noise": fb.BandNoise(2.5e-4, (0.0, 1226.6), seed=1),
+    "tone": fb.Harmonic(1e-3, 195.0),
+    "three tones": fb.Multisine((1e-3, 1e-4, 3e-5), (195.0, 390.0, 780.0)),
+}
+Z_STOP = 0.24445
+
+
+def beam(modes, base):
+    """The model of `examples/beam_stop.py` with so many modes."""
+    scene = fb.Scene(
+        beam=fb.Beam(0.2599, fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)),
+        supports=[fb.Clamped(0.0)],
+        masses=[fb.LumpedMass(Z_STOP, mass=25.4e-3, inertia=3.0e-6)],
+        stops=[fb.Stop(Z_STOP, law=Hysteretic.lankarani_nikravesh(2.1e8, restitution=0.5))],
+        damping=fb.ModalDamping([0.02, *[0.01] * (modes - 1)]),
+        base=base,
+    )
+    return scene.reduce(modes=modes)
+
+
+def compared(model, seconds, rounds):
+    """Seconds with and without ledger, by turns, and the run with it."""
+    runs = {}
+    spent = {ledger: [] for ledger in (True, False)}
+    for turn in range(rounds + 1):
+        for ledger, times in spent.items():
+            begin = time.process_time()
+            runs[ledger] = model.simulate(seconds, 1e-3, solver=solvers.Exponential(1e-8, ledger=ledger))
+            if turn:  # the first one makes tables
+                times.append(time.process_time() - begin)
+    return *(np.array(times) for times in spent.values()), runs[True]
+
+
+def main(seconds=60.0, rounds=5):
+    """One line per case."""
+    for name, base in BASES.items():
+        for modes in (2, 10, 30):
+            on, off, run = compared(beam(modes, base), seconds, rounds)
+            energy = run.energy
+            scale = max(np.abs(energy.input).max(), energy.stored.max())
+            print(
+                f"{name}, {modes} modes: {seconds / off.min():.0f} simulated seconds per second without ledger, "
+                f"{seconds / on.min():.0f} with: {np.median(on / off):.2f} times the time "
+                f"({len(run.contacts)} contacts, {run.cost.steps} steps); residual "
+                f"{np.abs(energy.residual).max() / scale:.1e} of the energy handled",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    main(*map(float, sys.argv[1:2]), *map(int, sys.argv[2:3]))

@@ -1,0 +1,226 @@
+"""Work and damping of whole steps and of runs: against quadrature, closed forms, and the balance of energy."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad_vec
+from scipy.linalg import expm
+
+import fembeam as fb
+from contacts import Hertz, PiecewiseLinear
+from solvers import Contact, Exponential, System, integrate
+from solvers.exponential.contact.nodes import S
+from solvers.exponential.energy_contact import BEGIN, contact_table
+from solvers.exponential.preparation import ready_for
+from solvers.problem import hand_over
+
+FREE = [Contact([1.0, 1.0, 1.0, 0.5], Hertz(1e6), gap=1e9)]
+
+
+class Nodes:
+    """A signal that is known at nodes only: two unequal waves."""
+
+    def __call__(self, t):
+        return np.sin(7.0 * t) + 0.3 * np.cos(31.0 * t)
+
+    def nodes(self, duration, rtol):
+        """Rows [s, s', s'']."""
+        t = np.arange(np.ceil(duration / 0.02) + 2) * 0.02
+        return 0.02, np.stack(
+            (
+                self(t),
+                7.0 * np.cos(7.0 * t) - 9.3 * np.sin(31.0 * t),
+                -49.0 * np.sin(7.0 * t) - 288.3 * np.cos(31.0 * t),
+            ),
+            axis=1,
+        )
+
+
+def blocks(signals, omega=(0.0, 9.0, 40.0, 75.0), zeta=(0.0, 1.0, 3.0, 0.02)):
+    """A rigid, a critically damped, an overdamped and an oscillating block, each of which every load pushes."""
+    loads = [(np.array([1.0, -0.7, 0.4, 0.9]) * (i + 1.0), signal) for i, signal in enumerate(signals)]
+    return System.modal(omega, zeta, FREE, loads)
+
+
+def prepared(system, spacing=0.013, duration=1.0):
+    """What a run of the system would prepare, and its ledger's tables."""
+    forcing = hand_over([signal for _, signal in system.loads], duration, 1e-10)
+    forcing, made = ready_for(system, forcing, duration, 1e-10)
+    problem = made.problem.value._replace(table=forcing.table, table_start=forcing.table_start)
+    return problem, made.tables.value, made.books_for(spacing).value
+
+
+def quadrature(problem, tables, h, x, s):
+    """Work and damping of a step from x under signals with derivatives s, by adaptive quadrature of exponentials."""
+    n = len(problem.k)
+    size, signals = 2 * n, len(problem.table_dt)
+    generator = np.zeros((size + 6 * signals,) * 2)
+    generator[:n, n:size], generator[n:size, :n] = np.eye(n), -np.diag(problem.k)
+    generator[n:size, n:size] = -np.diag(problem.c)
+    for j, load in enumerate(problem.table_load):
+        generator[:size, size + 6 * j] = problem.load[load]
+        generator[size + 6 * j : size + 6 * j + 5, size + 6 * j + 1 : size + 6 * j + 6] = np.eye(5)
+
+    def rates(t):
+        y = expm(generator * t) @ np.concatenate((x, *s))
+        signal = tables.signal_rows @ y[:size]
+        for j, load in enumerate(problem.table_load):
+            signal[load] += y[size + 6 * j]
+        return np.array([signal @ (tables.power_rows @ y[:size]), np.sum((tables.loss_rows @ y[:size]) ** 2)])
+
+    return quad_vec(rates, 0.0, h, epsabs=0.0, epsrel=1e-13, limit=400)[0]
+
+
+def by_forms(books, level, x, s):
+    """The same by the tables."""
+    n = len(x) // 2
+    given = np.concatenate((x[books.driver], *s))
+    rows = (given @ books.rows[level]).reshape(2, -1)[:, : len(x)] @ x
+    own = books.plain.shape[2]
+    p, v = x[:own], x[n : n + own]
+    rows[1] += (books.plain[level] * [p * p, p * v, v * v]).sum()
+    signals = given[len(books.driver) :]
+    if len(signals):
+        rows += (signals @ books.pairs[level]).reshape(2, -1)[:, : len(signals)] @ signals
+    return rows
+
+
+@pytest.mark.parametrize(
+    "signals", [[], [Nodes()], [fb.Harmonic(2.0, 13.0)], [fb.Harmonic(2.0, 13.0), Nodes()]], ids=len
+)
+def test_forms_of_flight_steps_are_their_quadrature(signals):
+    """Long and short steps and the step of its own length, for rigid, critical, over- and hardly damped blocks."""
+    problem, tables, books = prepared(blocks(signals))
+    rng = np.random.default_rng(1)
+    scale = np.concatenate((np.ones(len(problem.k)), np.maximum(np.sqrt(problem.k), 1.0)))
+    assert books.spacing == (problem.table_dt[0] if len(problem.table_dt) else 0.013)
+    for level in (len(tables.h), 8, 19, 30, len(tables.h) - 1):
+        h = np.append(tables.h, books.spacing)[level]
+        x = rng.standard_normal(len(scale)) * scale
+        s = [rng.standard_normal(6) * 7.0 ** np.arange(6) for _ in problem.table_dt]
+        exact = quadrature(problem, tables, h, x, s)
+        parts = sum(abs(quadrature(problem, tables, h, x * sign, s)) for sign in (1.0, -1.0))  # sizes that may cancel
+        np.testing.assert_array_less(abs(by_forms(books, level, x, s) - exact), 1e-12 * parts + 1e-300)
+
+
+@pytest.mark.parametrize(("power", "lead"), [(1.0, 0.0), (2.0, 3.0), (4.0, 1.0)])
+@pytest.mark.parametrize(("k", "c"), [(0.0, 0.0), (4.0, 4.0), (30.0, 40.0), (900.0, 0.6)])
+def test_tables_of_contact_steps_are_their_quadrature(power, lead, k, c):
+    """∫ L_i v dt and ∫ v² dt of a block under forces given at the nodes, all of one integration of the equation."""
+    from scipy.integrate import solve_ivp
+    from scipy.special import roots_jacobi
+
+    nodes = 0.5 * (1.0 + roots_jacobi(S, 0.0, lead + power - 1.0)[0])
+    arrays = [np.array(values).tobytes() for values in ([k], [c], [0.7])]
+    table = contact_table(*arrays, power, lead, nodes.tobytes())[0, 0]
+    rng = np.random.default_rng(2)
+    y = np.concatenate((rng.standard_normal(2 * S), [0.3, -1.0], np.zeros(6)))
+    if not lead:
+        y[S : 2 * S] = 0.0
+
+    def lagrange(sigma):
+        return np.array([np.prod([(sigma - b) / (a - b) for b in nodes if b != a]) for a in nodes])
+
+    def rate(sigma, z):
+        basis, pace = lagrange(sigma), 0.7 * power * sigma ** (power - 1.0)
+        weighted = (sigma / nodes) ** lead if lead else np.zeros(S)
+        force = basis @ y[:S] + (basis * weighted) @ y[S : 2 * S]
+        v = z[1]
+        return pace * np.concatenate(([v, force - k * z[0] - c * v, v * v], basis * v))
+
+    exact = solve_ivp(rate, (0.0, 1.0), [0.3, -1.0, *np.zeros(1 + S)], "DOP853", rtol=3e-14, atol=1e-14).y[2:, -1]
+    sums = y[: BEGIN + 2] @ table
+    np.testing.assert_allclose(sums[:S], exact[1:], rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(sums[S : S + BEGIN + 2] @ y[: BEGIN + 2], exact[0], rtol=1e-12)
+
+
+@pytest.mark.parametrize("dt", [3e-4, 1e-2, 0.3])
+@pytest.mark.parametrize("signals", [[], [Nodes()], [fb.Harmonic(2.0, 13.0), Nodes()]], ids=len)
+def test_free_motion_balances_to_rounding(signals, dt):
+    """Outputs closer than a step, within cells, and over many of them."""
+    run = integrate(blocks(signals), [0.1, 0.2, 0.1, 0.05], [1.0, 1.0, -2.0, 3.0], 1.0, dt)
+    energy = run.energy
+    assert energy.damping[-1] > 0.1 * energy.initial
+    assert np.abs(energy.residual).max() < 1e-12 * (energy.initial + np.abs(energy.input).max())
+
+
+def test_work_of_a_tone_at_resonance_grows_with_time():
+    """Undamped at ω from rest under sin ωt: q̇ = t sin(ωt)/2, ω q = (sin ωt - ωt cos ωt)/2ω; work like t²/8."""
+    omega, t = 40.0, np.arange(401) * 5e-3
+    tone = fb.Multisine([1.0], [omega], [np.pi / 2])
+    run = integrate(System.modal([omega], 0.0, [], [([1.0], tone)]), [0.0], [0.0], 2.0, 5e-3)
+    q_dot, omega_q = 0.5 * t * np.sin(omega * t), (np.sin(omega * t) - omega * t * np.cos(omega * t)) / (2.0 * omega)
+    work = 0.5 * (q_dot**2 + omega_q**2)
+    np.testing.assert_allclose(run.energy.input, work, atol=1e-8 * work.max())
+    assert np.abs(run.energy.residual).max() < 1e-12 * work.max()
+
+
+def test_steady_motion_takes_what_damping_takes():
+    """In steady motion under a tone a ramp: the power is ζ ω³ |Z|² for ever."""
+    omega, zeta = 40.0, 0.05
+    run = integrate(
+        System.modal([omega], zeta, [], [([1.0], fb.Harmonic(1.0, omega))]), [0.0], [0.0], 20.0, 2.0 * np.pi / omega
+    )
+    power = zeta * omega**3 * (1.0 / (2.0 * zeta * omega**2)) ** 2
+    late = run.t > 15.0
+    slope = np.polyfit(run.t[late], run.energy.input[late], 1)[0]
+    assert slope == pytest.approx(power, rel=1e-6)
+    assert np.polyfit(run.t[late], run.energy.damping[late], 1)[0] == pytest.approx(power, rel=1e-6)
+
+
+def test_a_signal_longer_than_the_run_and_many_tones_balance():
+    """Tables that go on beyond the end; more tones than rows are kept for, where the work is summed by series."""
+    noise = System.modal(
+        [30.0, 200.0], 0.02, [Contact([1.0, 0.5], Hertz(1e6))], [([1.0, 0.3], fb.BandNoise(3.0, (5.0, 300.0), seed=4))]
+    )
+    run = integrate(noise, [0.0, 0.0], [0.0, 0.0], 1.2345, 1e-3)
+    assert len(run.contacts) > 3
+    assert np.abs(run.energy.residual).max() < 1e-8 * np.abs(run.energy.input).max()
+    tones = fb.Multisine(np.full(300, 0.3), np.linspace(5.0, 280.0, 300), np.arange(300) ** 2 * 0.1)
+    many = System.modal([30.1, 201.3], 0.02, [Contact([1.0, 0.5], Hertz(1e6))], [([1.0, 0.3], tones)])
+    run = integrate(many, [0.0, 0.0], [0.0, 0.0], 0.2, 1e-3)
+    assert np.abs(run.energy.residual).max() < 1e-8 * np.abs(run.energy.input).max()
+
+
+def test_coupled_damping_balances():
+    """A dashpot between two masses, struck; damping is a full form there."""
+    M, K = np.eye(3), np.array([[900.0, -400.0, 0.0], [-400.0, 800.0, -400.0], [0.0, -400.0, 400.0]])
+    C = np.zeros((3, 3))
+    C[0, 0], C[1:, 1:] = 3.0, [[2.0, -2.0], [-2.0, 2.0]]
+    for signal in (fb.Harmonic(20.0, 17.0), Nodes()):
+        system = System(M, C, K, [Contact([0.0, 0.0, 1.0], Hertz(1e5))], [([0.0, 50.0, 0.0], signal)])
+        run = integrate(system, [0.0] * 3, [0.0, 0.0, -1.0], 1.0, 2e-3)
+        assert len(run.contacts) >= 3
+        handled = np.abs(run.energy.input).max() + run.energy.initial
+        assert run.energy.damping[-1] > 1e-2 * handled
+        assert np.abs(run.energy.residual).max() < 1e-8 * handled
+
+
+@pytest.mark.parametrize("law", [Hertz(1e6), PiecewiseLinear([1e4, 5e4], [1e-3])])
+@pytest.mark.parametrize("signal", [fb.Harmonic(30.0, 17.0), Nodes()])
+def test_the_ledger_leaves_the_motion_alone(law, signal):
+    """The same steps with and without, bit for bit; and many outputs within one contact balance as well."""
+    system = System.modal([20.0, 130.0, 900.0], 0.02, [Contact([1.0, 0.6, 0.4], law)], [([1.0, 0.4, 0.2], signal)])
+    start = [0.0, 0.0, 0.0], [-0.5, 0.0, 0.0]
+    for dt in (2e-5, 1e-3):
+        with_it, without = (
+            integrate(system, *start, 0.2, dt, Exponential(1e-8, ledger=kept)) for kept in (True, False)
+        )
+        np.testing.assert_array_equal(with_it.q, without.q)
+        np.testing.assert_array_equal(with_it.contacts.t_out, without.contacts.t_out)
+        assert with_it.cost.steps == without.cost.steps
+        assert len(with_it.contacts) >= 1
+        handled = np.abs(with_it.energy.input).max() + with_it.energy.initial
+        assert np.abs(with_it.energy.residual).max() < 2e-9 * handled
+        assert np.all(np.diff(with_it.energy.damping) >= -1e-13 * handled)
+        assert np.all(np.isnan(without.energy.input))
+
+
+def test_outputs_of_another_spacing_give_the_same_ledger():
+    """Where samples coincide; every other one of twice as many."""
+    system = blocks([fb.Harmonic(2.0, 13.0), Nodes()])
+    start = [0.1, 0.2, 0.1, 0.05], [1.0, 1.0, -2.0, 3.0]
+    fine, coarse = (integrate(system, *start, 1.0, dt).energy for dt in (5e-3, 1e-2))
+    for name in ("input", "damping"):
+        np.testing.assert_allclose(
+            getattr(fine, name)[::2], getattr(coarse, name), rtol=0.0, atol=1e-12 * fine.damping[-1]
+        )
