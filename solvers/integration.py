@@ -29,7 +29,7 @@ from solvers.compiled.state import (
     T,
     contact_row,
 )
-from solvers.exponential.energy_guard import unbalanced
+from solvers.exponential.energy.guard import unbalanced
 from solvers.problem import (
     COLUMNS,
     Array,

@@ -9,7 +9,7 @@ import fembeam as fb
 from contacts import Hertz, PiecewiseLinear
 from solvers import Contact, Exponential, System, integrate
 from solvers.exponential.contact.nodes import S
-from solvers.exponential.energy_contact import BEGIN, contact_table
+from solvers.exponential.energy.contact_tables import BEGIN, contact_table
 from solvers.exponential.preparation import ready_for
 from solvers.problem import hand_over
 

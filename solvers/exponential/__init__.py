@@ -1,11 +1,10 @@
 """The main method: exact flight between contacts, forces by collocation within them, exact derivatives.
 
 `method` is the loop, `preparation` and `tables` make its numbers, `responses` and `block_tables` those that grow with
-blocks and stops, `flight` and `safe_steps` move free of contact, the folder `contact` holds one step in contact;
-`books` keeps the energy balance with the forms of `energy_tables` and `energy_contact`, `energy` where they do not
-reach, `energy_guard` refuses runs that do not balance, `linearised` and `tangent` differentiate a run, `many` takes
-many starts to their ends. Imports: `compiled`, `problem`. Its files load machine code when imported; begin with
-`method`.
+blocks and stops, `flight` and `safe_steps` move free of contact, the folder `contact` holds one step in contact; the
+folder `energy` keeps the energy balance and refuses runs that do not balance; `linearised`, `linearised_step` and
+`tangent` differentiate a run, `many` takes many starts to their ends. Imports: `compiled`, `problem`. Its files load
+machine code when imported; begin with `method`.
 """
 
 from typing import Any

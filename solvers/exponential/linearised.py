@@ -69,7 +69,7 @@ from solvers.exponential.contact.landing import regular_step, start_landing
 from solvers.exponential.contact.node_newton import factorise, linearise, substitute
 from solvers.exponential.contact.node_response import START, free_response, respond
 from solvers.exponential.contact.nodes import S
-from solvers.exponential.energy import inside
+from solvers.exponential.energy.quadrature import inside
 from solvers.exponential.flight import signal_derivatives, turn
 from solvers.exponential.preparation import SPACE, TABLES
 from solvers.exponential.responses import propagate

@@ -26,8 +26,8 @@ from solvers.compiled.state import (
     STEPS,
     T,
 )
-from solvers.exponential.energy_guard import ALLOWED, FACTOR, FIRST, LAST, too_much, unknown
-from solvers.exponential.energy_tables import NO_BOOKS
+from solvers.exponential.energy.flight_tables import NO_BOOKS
+from solvers.exponential.energy.guard import ALLOWED, FACTOR, FIRST, LAST, too_much, unknown
 from solvers.exponential.method import Engine, advance
 from solvers.exponential.preparation import SPACE
 from solvers.problem import COLUMNS, Array, ContactLog, Status

@@ -46,11 +46,11 @@ from solvers.compiled.state import (
     switch_on_surface,
     touching,
 )
-from solvers.exponential.books import book_on, mark
 from solvers.exponential.contact.landing import reach
 from solvers.exponential.contact.step import BEGUN, FRESH, begin, latest, touch
-from solvers.exponential.energy_guard import FIRST, note_energy, own_energy, too_much, unknown
-from solvers.exponential.energy_tables import BOOKS, NO_BOOKS
+from solvers.exponential.energy.books import book_on, mark
+from solvers.exponential.energy.flight_tables import BOOKS, NO_BOOKS
+from solvers.exponential.energy.guard import FIRST, note_energy, own_energy, too_much, unknown
 from solvers.exponential.preparation import SPACE, TABLES, ready_for
 from solvers.exponential.safe_steps import fly
 from solvers.problem import Array, Forcing, System
@@ -120,7 +120,7 @@ class Exponential:
     -----
     Cost is nearly independent of rtol and grows linearly with the number of modes. See the module for its limits. A run
     with a ledger that leaves more than (20 rtol + 1e-9) of the energy handled unaccounted for is refused, one without
-    if it ends with four times the energy it can have been given, see `energy_guard`.
+    if it ends with four times the energy it can have been given, see `energy.guard`.
 
     Examples
     --------

@@ -16,7 +16,7 @@ from solvers.compiled.sums import padded
 from solvers.exponential.contact.blocks import POOL
 from solvers.exponential.contact.node_response import START, Space
 from solvers.exponential.contact.nodes import S, series_of
-from solvers.exponential.energy_tables import books_for
+from solvers.exponential.energy.flight_tables import books_for
 from solvers.exponential.flight import LONG
 from solvers.exponential.tables import OF_TONES, Tables, build, doublings, fill_tones, known_of
 from solvers.problem import Array, Forcing, System, on_one_grid, tones_as_nodes

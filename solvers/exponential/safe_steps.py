@@ -17,7 +17,7 @@ import numpy as np
 
 from solvers.compiled.kernels import copy, dot, indentation, inlined, inner, merged
 from solvers.compiled.state import SAMPLED, STEPS, T, rate_tolerance, surface_tolerance
-from solvers.exponential.books import book_on, book_output
+from solvers.exponential.energy.books import book_on, book_output
 from solvers.exponential.flight import (
     LONG_REACH,
     ORDER,

@@ -31,7 +31,7 @@ from solvers.compiled.sums import combine
 from solvers.exponential.contact.crossings import FORCE, FREE, on_the_way, side_at
 from solvers.exponential.contact.node_response import BATCH, DIFFERENCE, LANDED, START
 from solvers.exponential.contact.peaks import state_peaks
-from solvers.exponential.energy import powers
+from solvers.exponential.energy.quadrature import powers
 
 INDENTATION, ROOT, TIME = range(3)
 _MOST_TRIES = 8  # to meet an output time on the way to a landing, or a bend

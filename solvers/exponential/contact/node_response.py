@@ -60,7 +60,7 @@ class Space(NamedTuple):
     reach: Any  # (1,) radians of the fastest block that a landing may take
     duration: Any  # (1,) s, that of the contact begun last, if it were free
     book: Any  # (2 + L, numbers) see `books`
-    energy: Any  # (3,) see `energy_guard`
+    energy: Any  # (3,) see `energy.guard`
     last: Any  # (6,) see `step`
     seen: Any  # (m, 2) δ and δ̇ at the begin of the step
     carried: Any  # (2N, S) of many stops, as the rest but for the matrix, see `blocks`

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from solvers.compiled.kernels import copy, inner
 from solvers.compiled.state import HEAD, PART, SAMPLED, STEPS, TAPED, T, tape
-from solvers.exponential.books import book_contact
 from solvers.exponential.contact.node_response import START
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.peaks import state_peaks, step_peaks
-from solvers.exponential.energy import inside
+from solvers.exponential.energy.books import book_contact
+from solvers.exponential.energy.quadrature import inside
 
 
 @inner

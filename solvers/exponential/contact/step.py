@@ -29,7 +29,6 @@ from solvers.compiled.state import (
     touching,
 )
 from solvers.compiled.sums import combine
-from solvers.exponential.books import book_contact
 from solvers.exponential.contact.collocation import arrive, contact_time, finish_step, solve_forces, step_error
 from solvers.exponential.contact.crossings import bend_ahead, choose_sides, leaves_piece
 from solvers.exponential.contact.landing import land, land_on_bend
@@ -37,6 +36,7 @@ from solvers.exponential.contact.node_response import LANDED, free_response
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.outputs import end_inside, record, tape_forces
 from solvers.exponential.contact.peaks import state_peaks
+from solvers.exponential.energy.books import book_contact
 from solvers.exponential.flight import energy_norms
 
 LEVEL, FAMILY, FRESH, STOP, WANTED, BEGUN = range(6)  # places in Space.last

@@ -8,7 +8,7 @@ work and damping of a step are
 begun by Gauss's rule on steps on which Φ is a short Taylor series. Kept are, for every *driver* i (tones and signals;
 with coupled damping every coordinate), the rows that give work and damping, and the structure's blocks' own damping.
 
-Tables of contact steps are those of `energy_contact`.
+Tables of contact steps are those of `contact_tables`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from solvers.compiled.handles import Packed
 from solvers.compiled.kernels import INTEGERS, MATRIX, REAL, VECTOR, Problem
 from solvers.compiled.sums import padded
 from solvers.exponential.contact.nodes import S, gauss
-from solvers.exponential.energy_contact import contact_table
+from solvers.exponential.energy.contact_tables import contact_table
 from solvers.exponential.flight import LONG
 from solvers.exponential.phi_functions import signal_responses
 from solvers.exponential.responses import propagate

@@ -1,4 +1,4 @@
-"""The energy ledger step by step: whole steps by the forms of `energy_tables`, parts of steps by series.
+"""The energy ledger step by step: whole steps by the forms of `flight_tables`, parts of steps by series.
 
 Within a part the state is the Taylor series of its differential equation in panels of `LONG_REACH` radians of the
 fastest block, and the powers are summed by Gauss's rule with five points, 2e-12 off at most.
@@ -16,8 +16,8 @@ from solvers.compiled.simd import eight, put, spread, total
 from solvers.compiled.state import T
 from solvers.compiled.sums import combine
 from solvers.exponential.contact.nodes import S
-from solvers.exponential.energy import account, powers
-from solvers.exponential.energy_contact import BEGIN
+from solvers.exponential.energy.contact_tables import BEGIN
+from solvers.exponential.energy.quadrature import account, powers
 from solvers.exponential.flight import LONG, LONG_REACH, add_signals, level_within, signal_derivatives, turn
 
 _SCRATCH, _MOVING, _MARK = 9, 10, 11  # rows of Space.work; those before hold a load on the blocks and its derivatives
