@@ -21,18 +21,13 @@ At an entry of zero rate (to rounding) the derivative does not exist; dt* is tak
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
 import numpy as np
 from numba import types
 
 from solvers.compiled.dop853_tableau import STAGES, A
 from solvers.compiled.handles import opener
 from solvers.compiled.kernels import (
-    MATRIX,
     PROBLEM,
-    REAL,
-    VECTOR,
     call_gradient,
     contact_forces,
     contact_gradient,
@@ -52,7 +47,6 @@ from solvers.compiled.state import (
     HEAD,
     KIND,
     LANDING,
-    PART,
     SECOND,
     SPAN,
     STATE,
@@ -62,77 +56,18 @@ from solvers.compiled.state import (
     rate_tolerance,
 )
 from solvers.compiled.sums import combine
-from solvers.exponential.contact.blocks import carry_free, goes_through_blocks, kick, pair, see, way_of
-from solvers.exponential.contact.collocation import arrive
 from solvers.exponential.contact.crossings import FORCE, side_at
 from solvers.exponential.contact.landing import regular_step, start_landing
-from solvers.exponential.contact.node_newton import factorise, linearise, substitute
-from solvers.exponential.contact.node_response import START, free_response, respond
-from solvers.exponential.contact.nodes import S
-from solvers.exponential.energy.quadrature import inside
-from solvers.exponential.flight import signal_derivatives, turn
+from solvers.exponential.contact.node_response import START
+from solvers.exponential.linearised_step import NUDGE, SLOPES, change_of, explicit, is_parameter, linearise_step
 from solvers.exponential.preparation import SPACE, TABLES
 from solvers.exponential.responses import propagate
 
 _OFF = 1e-10  # relative distance from a knot at which a law is on one side of it for sure
 
 
-class Slopes(NamedTuple):
-    """Derivatives carried along and working space; columns are the first index."""
-
-    y: Any  # (columns, x.size) of the state at fixed time
-    entry: Any  # (columns, m) of the latched entry rates
-    shift: Any  # (columns, m) of the entry times
-    force: Any  # (m + L, S) of one column: forces, then signals, at the nodes of a step
-    signal: Any  # (L, S) slopes of the sampled signals there
-    response: Any  # (m, 2, S) of δ and δ̇ to these slopes
-    by_parameter: Any  # (m, S) ∂F/∂parameter there
-    rate: Any  # (2, x.size) of the state at both ends of a step; at last the first is that at the time reached
-    stages: Any  # (STAGES, columns, x.size) of a landing
-    trial: Any  # (columns, x.size)
-    batch: Any  # (8,)
-
-
-class Nudge(NamedTuple):
-    """What a parameter changes per unit, besides the state; none when ``step`` is zero."""
-
-    step: float  # half the distance of the two systems it was taken from
-    law_step: float  # the same; zero where their laws are the same
-    omega: Any  # (K,) tones
-    steady: Any  # (K, m, 2, 4): (Re a, Im a, Re b, Im b) of δ and δ̇ = Re (a + t b) e^{iωt}
-    gap: Any  # (m,)
-
-
-_CUBE = types.Array(REAL, 3, "C")
-SLOPES = types.NamedTuple([*[MATRIX] * 5, _CUBE, MATRIX, MATRIX, _CUBE, MATRIX, VECTOR], Slopes)
-NUDGE = types.NamedTuple([REAL, REAL, VECTOR, types.Array(REAL, 4, "C"), VECTOR], Nudge)
 _problem, _tables, _state, _space = opener(PROBLEM), opener(TABLES), opener(STATE), opener(SPACE)
 _slopes, _nudge = opener(SLOPES), opener(NUDGE)
-
-
-@inlined
-def _explicit(nudge, s, d, t):
-    """Change of δ (d = 0) or δ̇ that the parameter makes by itself at time t."""
-    total = -nudge.gap[s] if d == 0 else 0.0
-    for j in range(nudge.omega.size):
-        a = nudge.steady[j, s, d]
-        angle = nudge.omega[j] * t
-        total += (a[0] + t * a[2]) * np.cos(angle) - (a[1] + t * a[3]) * np.sin(angle)
-    return total
-
-
-@inlined
-def _change(problem, nudge, slopes, column, s, d, t):
-    """Change of δ or δ̇ of a stop at fixed time."""
-    row = problem.read[s] if d == 0 else problem.read_rate[s]
-    value = dot(row, slopes.y[column], 2 * problem.k.size)
-    return value + _explicit(nudge, s, d, t) if _is_parameter(nudge, slopes, column) else value
-
-
-@inlined
-def _is_parameter(nudge, slopes, column):
-    """Whether a column is the parameter's."""
-    return nudge.step > 0.0 and column == slopes.y.shape[0] - 1
 
 
 @inner
@@ -163,7 +98,7 @@ def _begin(problem, shadow, slopes, nudge):
         if shadow.piece[s] > 0:
             rate = dot(problem.read_rate[s], shadow.x, 2 * problem.k.size)
             for c in range(slopes.y.shape[0]):
-                change = _change(problem, nudge, slopes, c, s, 1, 0.0)
+                change = change_of(problem, nudge, slopes, c, s, 1, 0.0)
                 slopes.entry[c, s] = 0.0 if abs(rate) < problem.floor[s] else np.sign(rate) * change
 
 
@@ -186,147 +121,16 @@ def _cross(problem, shadow, slopes, nudge, s, direction):
         jump -= _force(problem, shadow, s, below, rate, slopes.batch)
     jump *= direction
     for c in range(slopes.y.shape[0]):
-        moved = _change(problem, nudge, slopes, c, s, 0, t)
+        moved = change_of(problem, nudge, slopes, c, s, 0, t)
         shift = -moved / rate if abs(rate) > still else 0.0
         if entering:
             floored = abs(rate) < problem.floor[s]
-            change = _change(problem, nudge, slopes, c, s, 1, t) + acceleration * shift
+            change = change_of(problem, nudge, slopes, c, s, 1, t) + acceleration * shift
             slopes.shift[c, s] = shift
             slopes.entry[c, s] = 0.0 if floored else change
         for e in range(size):
             slopes.y[c, e] -= problem.push[s, e] * jump * shift
     shadow.piece[s] += direction
-
-
-@inlined
-def _by_parameter(ahead, behind, shadow, space, nudge, slopes, s):
-    """∂F/∂parameter at the nodes of a stop, from the law at both parameters."""
-    for i in range(S):
-        slopes.by_parameter[s, i] = 0.0
-    if nudge.law_step == 0.0:
-        return
-    delta, rate = space.motion[s, 0], space.motion[s, 1]
-    copy(delta, space.clipped, S)
-    contact_forces(ahead, s, space.clipped, rate, shadow.entry_rate[s], slopes.by_parameter[s])
-    contact_forces(behind, s, space.clipped, rate, shadow.entry_rate[s], space.trial)
-    for i in range(S):
-        slopes.by_parameter[s, i] = (slopes.by_parameter[s, i] - space.trial[i]) / (2.0 * nudge.law_step)
-
-
-@inlined
-def _signal_slopes(problem, tables, shadow, space, slopes, family, level, t):
-    """Slopes of the sampled signals at the nodes, and the response of the stops in contact to them."""
-    stops, h = problem.gap.size, tables.step[level]
-    for j in range(problem.table_dt.size):
-        for i in range(S):
-            signal_derivatives(problem, j, t + h * tables.times[family, i], space.six[j])
-            slopes.signal[problem.table_load[j], i] = space.six[j, 1]
-    for s in range(stops):
-        if shadow.piece[s] == 0:
-            continue
-        response = slopes.response[s]
-        for i in range(S):
-            response[0, i], response[1, i] = 0.0, 0.0
-        for load in problem.table_load:
-            matrix = pair(problem, tables, space, family, level, s, stops + load)
-            combine(matrix, slopes.signal[load], S, response, response)
-
-
-@inlined
-def _solve(problem, tables, shadow, space, slopes, nudge, family, level, column, shift):
-    """Changes of all forces (and, in a moving frame, signals) at the nodes, one column."""
-    row, size, stops, through = 0, 2 * problem.k.size, problem.gap.size, goes_through_blocks(tables)
-    if through:
-        carry_free(problem, tables, space, family, level, slopes.y[column])
-    for s in range(stops):
-        if shadow.piece[s] == 0:
-            continue
-        if through:
-            see(problem, space, s, 0.0, space.motion[s])
-        else:
-            combine(tables.free[tables.kind[family], level, s], slopes.y[column], size, None, space.motion[s])
-        for i in range(S):
-            change = slopes.entry[column, s] * space.slope[s, 2, i]
-            if _is_parameter(nudge, slopes, column):
-                change += slopes.by_parameter[s, i]
-            for d in range(2):
-                value = space.motion[s, d, i]
-                if shift != 0.0:
-                    value += shift * slopes.response[s, d, i]
-                if _is_parameter(nudge, slopes, column):
-                    value += _explicit(nudge, s, d, shadow.now[T] + tables.step[level] * tables.times[family, i])
-                change += space.slope[s, d, i] * value
-            space.residual[row + i] = change
-        row += S
-    substitute(space.jacobian, space.pivots, row, space.residual)
-    row = 0
-    for s in range(stops):
-        if shadow.piece[s] > 0:
-            copy(space.residual[row : row + S], slopes.force[s], S)
-            row += S
-    for load in problem.table_load:
-        for i in range(S):
-            slopes.force[stops + load, i] = shift * slopes.signal[load, i]
-
-
-@inlined
-def _move(problem, tables, shadow, space, slopes, family, level, y, part):
-    """Take one column to the end of the step, or to the ``part`` of it that lies within the run."""
-    size, stops = 2 * problem.k.size, problem.gap.size
-    if part < np.inf:
-        for u in range(space.force.shape[0]):
-            copy(slopes.force[u], space.force[u], S)
-        inside(problem, tables, shadow, space, family, tables.step[level], part, y)
-        return
-    turn(problem, tables.step_propagator[level, 0], tables.step_propagator[level, 1], y)
-    if goes_through_blocks(tables):
-        kick(problem, tables, shadow, space, slopes.force, family, level, y)
-    for u in range(0 if goes_through_blocks(tables) else space.force.shape[0]):
-        if u < stops and shadow.piece[u] == 0:
-            continue
-        for j in range(S):
-            row = tables.kick[way_of(tables, family, u), level, u, j]
-            for e in range(size):
-                y[e] += row[e] * slopes.force[u, j]
-
-
-@inner
-def _step(problem, ahead, behind, tables, shadow, space, slopes, nudge, row, modes):
-    """A collocated step, linearised as it was taken."""
-    family, level, t = int(row[FIRST]), int(row[SECOND]), row[BEGAN]
-    size, stops = 2 * problem.k.size, problem.gap.size
-    free_response(problem, tables, shadow, space, family, level)
-    for s in range(stops):
-        copy(row[HEAD + shadow.x.size + s * S : HEAD + shadow.x.size + (s + 1) * S], space.force[s], S)
-    for s in range(stops):
-        if shadow.piece[s] > 0:
-            respond(problem, tables, shadow, space, family, level, s)
-            _by_parameter(ahead, behind, shadow, space, nudge, slopes, s)
-    factorise(space.jacobian, space.pivots, linearise(problem, tables, shadow, space, family, level))
-    moving = tables.power[family] > 1.0
-    part = row[SPAN] if row[KIND] == PART else np.inf
-    if moving:
-        rhs(problem, t, shadow.x, shadow.piece, shadow.entry_rate, slopes.rate[0], slopes.batch)
-        end = space.x_new
-        if part < np.inf:
-            copy(shadow.x, end, shadow.x.size)
-            inside(problem, tables, shadow, space, family, tables.step[level], part, end)
-        else:
-            arrive(problem, tables, shadow, space, family, level)
-        rhs(problem, row[ENDED], end, shadow.piece, shadow.entry_rate, slopes.rate[1], slopes.batch)
-        _signal_slopes(problem, tables, shadow, space, slopes, family, level, t)
-    for c in range(slopes.y.shape[0]):
-        y = slopes.y[c]
-        shift = slopes.shift[c, family - 1] if moving else 0.0
-        for e in range(size if moving else 0):
-            y[e] += slopes.rate[0, e] * shift
-        _solve(problem, tables, shadow, space, slopes, nudge, family, level, c, shift)
-        _move(problem, tables, shadow, space, slopes, family, level, y, part)
-        if moving:
-            for e in range(size):
-                y[e] -= slopes.rate[1, e] * shift
-            for b in range(modes, problem.k.size):  # tones do not change; their rounding would outlive the rest
-                y[b], y[problem.k.size + b] = 0.0, 0.0
 
 
 @inner
@@ -381,10 +185,10 @@ def _stage_rates(problem, ahead, behind, tables, shadow, space, slopes, nudge, w
             change = batch[4] * slopes.entry[c, s]
             for d in range(2):
                 value = dot(problem.read[s] if d == 0 else problem.read_rate[s], y, size)
-                if _is_parameter(nudge, slopes, c):
-                    value += _explicit(nudge, s, d, t)
+                if is_parameter(nudge, slopes, c):
+                    value += explicit(nudge, s, d, t)
                 change += batch[2 + d] * value
-            if nudge.law_step > 0.0 and _is_parameter(nudge, slopes, c):
+            if nudge.law_step > 0.0 and is_parameter(nudge, slopes, c):
                 change += (batch[5] - batch[6]) / (2.0 * nudge.law_step)
             for e in range(size):
                 out[c, e] += factor * problem.push[s, e] * change
@@ -442,7 +246,7 @@ def replay(
         elif row[KIND] == LANDING:
             _land(problem, ahead, behind, tables, shadow, space, slopes, nudge, row)
         else:
-            _step(problem, ahead, behind, tables, shadow, space, slopes, nudge, row, modes)
+            linearise_step(problem, ahead, behind, tables, shadow, space, slopes, nudge, row, modes)
         shadow.now[T] = row[ENDED]
     state.count[TAPED] = 0
     _coast(problem, state.now[T] - shadow.now[T], slopes.y)

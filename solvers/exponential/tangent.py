@@ -14,7 +14,8 @@ from solvers.compiled.handles import Layout, Packed
 from solvers.compiled.kernels import PROBLEM, Problem
 from solvers.compiled.state import HEAD, STATE, State, T, begin_state, law_parameters, state_shapes
 from solvers.exponential.contact.nodes import S
-from solvers.exponential.linearised import NUDGE, SLOPES, Nudge, Slopes, replay
+from solvers.exponential.linearised import replay
+from solvers.exponential.linearised_step import NUDGE, SLOPES, Nudge, Slopes
 from solvers.exponential.preparation import places_among_tones, steady_response
 from solvers.problem import Array, Parameter, SolverError, System
 
