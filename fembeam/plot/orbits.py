@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -41,11 +41,13 @@ def branch(
     axes : to draw into; None makes a figure.
     labels : of the branches; None tells their period.
     """
+    from fembeam.plot.figure import sheet
+
     several = [branches] if not isinstance(branches, Sequence) else list(branches)
     require(bool(several), "nothing to draw", branches, "plot.branch", "give one branch or more")
     model = several[0].family.model
     place = observed(model) if z is None else z
-    axis = _axis() if axes is None else axes
+    figure, (axis,) = sheet(1, 1, (6.4, 3.8), axes)
     if cloud is not None:
         axis.plot(cloud[0], 1e3 * cloud[1], ".", color=GREY, markersize=2.0, label="simulated", rasterized=True)
     for i, one in enumerate(several):
@@ -55,15 +57,7 @@ def branch(
     axis.set_xlabel(UNITS.get(name, name))
     axis.set_ylabel(f"max |u({place:.4g} m)| / mm")
     _legend(axis, several)
-    figure: Any = axis.figure
-    return figure  # type: ignore[no-any-return]
-
-
-def _axis() -> Axes:
-    """One pair of axes in a new figure."""
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(6.4, 3.8), layout="constrained").subplots()
+    return figure
 
 
 def peak(orbit: Orbit, z: float) -> float:
@@ -112,8 +106,12 @@ def _legend(axis: Axes, several: list[Branch]) -> None:
 
 
 @styled
-def orbit(one: Orbit, z: float | None = None) -> Figure:
+def orbit(one: Orbit, z: float | None = None, axes: Sequence[Axes] | None = None) -> Figure:
     """One orbit at z (m; None: the first stop): time history with its contacts shaded, and phase portrait.
+
+    Parameters
+    ----------
+    one : to draw. z : m. axes : two to draw into; None makes a figure.
 
     Examples
     --------
@@ -125,11 +123,10 @@ def orbit(one: Orbit, z: float | None = None) -> Figure:
     >>> [axis.get_xlabel() for axis in orbit(model.orbit()).axes]
     ['t / ms', 'u / mm']
     """
-    from matplotlib.figure import Figure
+    from fembeam.plot.figure import heading, sheet
 
     place = observed(one.model) if z is None else z
-    figure = Figure(figsize=(6.4, 2.8), layout="constrained")
-    left, right = figure.subplots(1, 2, width_ratios=[3, 2])
+    figure, (left, right) = sheet(1, 2, (6.4, 2.8), axes, width_ratios=[3, 2])
     t, u, v = one.run.t, 1e3 * one.run.displacement(place), one.run.velocity(place)
     left.plot(1e3 * t, u)
     for begin, end in zip(one.contacts.t_in, one.contacts.t_out, strict=True):
@@ -142,7 +139,6 @@ def orbit(one: Orbit, z: float | None = None) -> Figure:
     right.set_ylabel("velocity / m/s")
     kind = "stable" if one.stable else "unstable"
     at = "" if np.isnan(one.parameter) else f" at {one.parameter:.6g}"
-    figure.suptitle(
-        f"Period {one.period}, {counted(len(one.contacts), 'contact')}, {kind}{at}", x=0.01, ha="left", fontsize=10
-    )
+    title = f"Period {one.period}, {counted(len(one.contacts), 'contact')}, {kind}{at}"
+    heading([left], title, axes is None, weight="normal")
     return figure

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fembeam.plot.orbits import branch
-from fembeam.plot.response import BLUE, GREY, RED, _fit_levels, _sheet, styled
+from fembeam.plot.response import BLUE, GREY, RED, _fit_levels, styled
 from fembeam.statistics import Spectrum
 
 if TYPE_CHECKING:
@@ -30,6 +30,7 @@ def random_spectra(
     omega_max: float,
     bands: Mapping[str, tuple[float, float]] | None = None,
     branches: Mapping[str, Sequence[Branch]] | None = None,
+    axes: Axes | Sequence[Axes] | None = None,
 ) -> Figure:
     """Power spectral densities, one panel each, with 95 % confidence shaded where it is known.
 
@@ -39,12 +40,16 @@ def random_spectra(
     omega_max : rad/s, end of the axes.
     bands : title -> excited band in rad/s, marked on top of its panel.
     branches : title -> branches of periodic motion along ω, drawn beside the panel of that title.
+    axes : to draw into, one per panel, with branches two, the spectrum's first; None makes a figure.
     """
+    from fembeam.plot.figure import sheet
+
     columns = 2 if branches else 1
-    figure, axes = _sheet(None, len(panels), columns, (4.6 * columns + 2.4, 2.1 * len(panels) + 0.5), squeeze=False)
+    size = 4.6 * columns + 2.4, 2.1 * len(panels) + 0.5
+    figure, drawn = sheet(len(panels), columns, size, axes, squeeze=False)
     for row, (title, shown) in enumerate(panels.items()):
         lines = {label: x if isinstance(x, Spectrum) else x.psd for label, x in shown.items()}
-        axis = axes[row * columns]
+        axis = drawn[row * columns]
         for i, (label, line) in enumerate(lines.items()):
             _curve(axis, line, omega_max, label, f"C{i}")
         _fit_levels(axis, list(lines.values()), omega_max)
@@ -54,19 +59,20 @@ def random_spectra(
         if len(lines) > 1:
             axis.legend(loc="upper right")
         if branches:
-            _beside(axes[row * columns + 1], branches.get(title), omega_max)
-    for axis in axes[-columns:]:
+            _beside(drawn[row * columns + 1], branches.get(title), omega_max)
+    for axis in drawn[-columns:]:
         axis.set_xlabel("ω / rad s⁻¹")
     return figure
 
 
 @styled
-def random_densities(signals: Mapping[str, Signal]) -> Figure:
+def random_densities(signals: Mapping[str, Signal], axes: Axes | Sequence[Axes] | None = None) -> Figure:
     """Probability densities with 95 % confidence against the Gaussian of the same mean and deviation.
 
     Parameters
     ----------
     signals : name -> signal, m, such as those of `fembeam.study.stationary`.
+    axes : to draw into, one per signal; None makes a figure.
 
     Examples
     --------
@@ -78,8 +84,10 @@ def random_densities(signals: Mapping[str, Signal]) -> Figure:
     >>> random_densities({"tip": found["tip u"]}).axes[0].get_xlabel()
     'tip / mm'
     """
-    figure, axes = _sheet(None, 1, len(signals), (3.5 * len(signals), 3.1))
-    for axis, (name, signal) in zip(axes, signals.items(), strict=True):
+    from fembeam.plot.figure import sheet
+
+    figure, drawn = sheet(1, len(signals), (3.5 * len(signals), 3.1), axes)
+    for axis, (name, signal) in zip(drawn, signals.items(), strict=True):
         density, mean, std = signal.pdf, 1e3 * float(signal.mean.value), 1e3 * float(signal.std.value)
         x, p = 1e3 * density.x, 1e-3 * density.density
         axis.plot(x, p, color=BLUE, label="simulated, 95 %")
@@ -90,8 +98,8 @@ def random_densities(signals: Mapping[str, Signal]) -> Figure:
         axis.plot(wide, normal, color=RED, linestyle="--", label="Gaussian")
         axis.set_title(f"{name}: skewness {signal.skewness!r}")
         axis.set(xlabel=f"{name} / mm", xlim=(wide[0], wide[-1]), ylim=(0, None))
-    axes[0].set_ylabel("probability density / mm⁻¹")
-    axes[0].legend(loc="upper left")
+    drawn[0].set_ylabel("probability density / mm⁻¹")
+    drawn[0].legend(loc="upper left")
     return figure
 
 

@@ -235,10 +235,9 @@ def spectra_of(run: Run, discard: float = 0.0) -> Mapping[str, Spectrum]:
 
 def _sheet(run: Run | None, rows: int, columns: int, size: tuple[float, float], **options: Any) -> tuple[Figure, Any]:
     """A figure with its axes as a flat list."""
-    from matplotlib.figure import Figure
+    from fembeam.plot.figure import sheet
 
-    figure = Figure(figsize=size, layout="constrained")
-    return figure, list(np.atleast_1d(figure.subplots(rows, columns, **options)).ravel())
+    return sheet(rows, columns, size, **options)
 
 
 def _titled(figure: Figure, run: Run | None, title: str) -> Figure:
