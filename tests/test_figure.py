@@ -95,12 +95,12 @@ def test_axes_of_studies(model, given):
     study = fb.study.mode_count(model.scene, [1, 2], "amplitude", duration=0.2, dt=1e-3)
     figure, axes = given
     assert plot.mode_count(study, axes=axes) is figure
-    assert "amplitude against " in axes[0].get_title()
+    assert "amplitude against " in axes[0].get_title(loc="left")
     assert figure._suptitle is None
 
 
 def test_another_number_of_axes_is_refused(given):
-    with pytest.raises(ValueError, match="as many as the figure has panels, got 2 in fembeam.plot; give 1"):
+    with pytest.raises(ValueError, match=r"as many as the figure has panels, got 2 in fembeam\.plot; give 1"):
         plot.loops({"Hertz": Hertz(1e9)}, axes=given[1])
     figure, axes = sheet(1, 2, (1.0, 1.0), np.array(given[1]))
     assert (figure, axes) == given

@@ -21,9 +21,7 @@ COLOURS = 6  # of the library's style
 
 
 @styled
-def loops(
-    laws: Mapping[str, Law], entry_rate: float = 1.0, mass: float = 1.0, axes: Axes | None = None
-) -> Figure:
+def loops(laws: Mapping[str, Law], entry_rate: float = 1.0, mass: float = 1.0, axes: Axes | None = None) -> Figure:
     """Force against indentation while a free mass bounces off each law.
 
     Parameters
@@ -100,11 +98,11 @@ def identification(found: Identified, axes: Sequence[Axes] | None = None) -> Fig
     figure, (above, below) = sheet(2, 1, (7.0, 4.8), axes, sharex=True, height_ratios=[2, 1])
     scale, unit = _force_unit(max(float(np.abs(one.force).max()) for one in found.collisions))
     for number, one in enumerate(found.collisions):
-        delta, label = 1e3 * one.delta, {"label": "measured"} if number == 0 else {}
-        above.plot(delta, scale * one.force, ".", color=BLUE, markersize=3, **label)
+        delta, (measured, fitted) = 1e3 * one.delta, ("measured", "fitted") if number == 0 else (None, None)
+        above.plot(delta, scale * one.force, ".", color=BLUE, markersize=3, label=measured)
         below.plot(delta, scale * (one.force - one.fitted), ".", color=BLUE, markersize=3)
-        order, label = np.flatnonzero(one.delta > 0.0), {"label": "fitted"} if number == 0 else {}
-        above.plot(delta[order], scale * one.fitted[order], color=RED, **label)
+        order = np.flatnonzero(one.delta > 0.0)
+        above.plot(delta[order], scale * one.fitted[order], color=RED, label=fitted)
     below.axhline(0.0, color=GREY, linewidth=0.6)
     for sign in (-2.0, 2.0):
         below.axhline(sign * scale * found.noise, color=GREY, linewidth=0.6, linestyle="--")

@@ -126,7 +126,7 @@ def stability_map(*maps: StabilityMap, axes: Axes | Sequence[Axes] | None = None
             ax.step(np.append(kept, kept[-1]), places, color="black", ls=style, lw=1.6, where="pre")
             ax.vlines(kept, places[:-1], places[1:], color="black", ls=style, lw=1.6)
         ax.set(xscale="log", xlabel="step / s", yticks=range(len(found.rows)), title=found.method)
-        ax.set_xlim(_edges(found.steps)[[0, -1]])
+        ax.set_xlim(*_edges(found.steps)[[0, -1]])
         ax.set_yticklabels([f"{row:g}" for row in found.rows])
         ax.set_ylabel({"modes": "number of modes", "stiffness": "contact stiffness / SI"}[found.axis])
     entries: list = [Patch(color=colour, label=verdict.words) for verdict, colour in colours.items()]

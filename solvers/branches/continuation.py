@@ -22,7 +22,7 @@ from solvers.branches.reshooting import with_quiet_begin
 from solvers.branches.subharmonic_end import Scaled
 from solvers.branches.walk import Arm, BranchStatus
 from solvers.orbits import Orbit, Problem, at_zero, checked, checked_start, newton, orbit_of, solved_chain
-from solvers.problem import System
+from solvers.problem import System, counted
 
 
 @dataclass(eq=False)
@@ -34,6 +34,9 @@ class Branch:
 
     arms: list[Arm]
     kept: dict[int, Any] = field(default_factory=dict)  # for the user of the branch
+
+    def __repr__(self) -> str:
+        return f"<branch of {counted(len(self.orbits), 'orbit')}: {'; '.join(one.value for one in self.status)}>"
 
     @property
     def orbits(self) -> list[Orbit]:

@@ -7,6 +7,7 @@ M q'' + C q' + K q = Σ v_l s_l(t) + Σ w_c F_c(-w_c·q - gap_c, ...)
 """
 
 from solvers.problem.decoupling import decouple
+from solvers.problem.frames import dataframe, optional
 from solvers.problem.matrices import Array, dense, product
 from solvers.problem.result import COLUMNS, ContactLog, Cost, Energy, Solution, SolverError, Status, counted
 from solvers.problem.signals import Forcing, hand_over, on_one_grid, tones_as_nodes
@@ -27,10 +28,12 @@ __all__ = [
     "Status",
     "System",
     "counted",
+    "dataframe",
     "decouple",
     "dense",
     "hand_over",
     "on_one_grid",
+    "optional",
     "product",
     "require_step",
     "tones_as_nodes",

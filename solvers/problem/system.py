@@ -122,6 +122,9 @@ class System:
     loads: Sequence[tuple[ArrayLike, Signal]] = ()
     kept: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)  # what methods prepare once
 
+    def __repr__(self) -> str:
+        return f"<system of size {self.size}, contacts: {len(self.contacts)}, loads: {len(self.loads)}>"
+
     def __post_init__(self) -> None:
         for name in "MCK":
             object.__setattr__(self, name, _square(name, getattr(self, name)))
