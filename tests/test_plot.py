@@ -132,7 +132,7 @@ def test_random_figures_have_units_bands_and_confidence():
     one = SimpleNamespace(
         family=SimpleNamespace(model=model, period=2, name="base.omega"),
         **{"parameter": np.array([100.0, 150.0, 200.0]), "stable": np.array([True, False, True])},
-        **{"orbits": orbits, "special": []},
+        **{"orbits": orbits, "special": [], "ends": []},
     )
     branches = {"broad": [one]}
     panels = {"broad": {"δ": signal, "mid": signal.psd}, "narrow": {"δ": signal.psd}}

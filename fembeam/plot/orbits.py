@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fembeam.model import observed
+from fembeam.plot.axis_names import axis_name
 from fembeam.plot.response import GREEN, GREY, ORANGE, RED, Vector, styled
 from fembeam.support import require
 from solvers.problem import counted
@@ -20,7 +21,8 @@ if TYPE_CHECKING:
 
 MARKS = {"fold": ("o", GREY), "flip": ("s", RED), "neimark-sacker": ("D", GREEN), "branch point": ("P", "black"),
          "grazing": ("x", "black"), "floor": ("+", "black"), "merging": ("^", ORANGE)}  # fmt: skip
-UNITS = {"base.omega": "ω / rad/s", "base.amplitude": "base amplitude / m"}
+SPAN, CLOSED = "reached the end of the span", "closed"  # ends that are no surprise
+ENDS = "*Xhd8"  # marks of the others, one for each reason
 
 
 @styled
@@ -32,6 +34,8 @@ def branch(
     labels: Sequence[str] | None = None,
 ) -> Figure:
     """Response diagram: largest |u| at z over a period against the parameter, dashed where unstable.
+
+    Special orbits are marked, and where and why each direction ended: by a bar at an end of the span.
 
     Parameters
     ----------
@@ -53,8 +57,9 @@ def branch(
     for i, one in enumerate(several):
         label = f"period {one.family.period}" if labels is None else labels[i]
         _draw_branch(axis, one, place, f"C{i}", label)
+    _draw_ends(axis, several, place)
     name = several[0].family.name
-    axis.set_xlabel(UNITS.get(name, name))
+    axis.set_xlabel(axis_name(name, model.scene))
     axis.set_ylabel(f"max |u({place:.4g} m)| / mm")
     _legend(axis, several)
     return figure
@@ -83,6 +88,20 @@ def _draw_branch(axis: Axes, one: Branch, z: float, color: str, label: str) -> N
             marker, edge = MARKS[orbit.mark]
             face = "white" if marker != "x" else edge
             axis.plot(orbit.parameter, height, marker, color=edge, markerfacecolor=face, markersize=3.5, linewidth=0.8)
+
+
+def _draw_ends(axis: Axes, several: list[Branch], z: float) -> None:
+    """A bar at the end of the span, elsewhere a mark for each reason; a closed branch has no end."""
+    ends = [(orbit, why.split(":")[0]) for one in several for orbit, why in one.ends]
+    reasons = [why for why in dict.fromkeys(why for _, why in ends) if why not in (SPAN, CLOSED)]
+    marks = {SPAN: ("|", GREY), **{why: (mark, RED) for why, mark in zip(reasons, ENDS, strict=False)}}
+    labelled = set()
+    for orbit, why in ends:
+        if why in marks:
+            label = None if why in labelled else f"end: {why}"
+            mark, colour = marks[why]
+            axis.plot(orbit.parameter, 1e3 * peak(orbit, z), mark, color=colour, markersize=8, zorder=3, label=label)
+            labelled.add(why)
 
 
 def _legend(axis: Axes, several: list[Branch]) -> None:

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from fembeam.statistics import Signal
 
 Vector = NDArray[np.float64]
-SURE = 1.96  # standard errors on either side: 95 %
 FURTHEST = 5.0  # standard deviations shown of a density
 
 
@@ -91,8 +90,8 @@ def random_densities(signals: Mapping[str, Signal], axes: Axes | Sequence[Axes] 
         density, mean, std = signal.pdf, 1e3 * float(signal.mean.value), 1e3 * float(signal.std.value)
         x, p = 1e3 * density.x, 1e-3 * density.density
         axis.plot(x, p, color=BLUE, label="simulated, 95 %")
-        if density.standard_error is not None:
-            _ribbon(axis, x, p, 1e-3 * density.standard_error, BLUE)
+        if density.estimate is not None:
+            _ribbon(axis, x, [1e-3 * bound for bound in density.interval()], BLUE)
         wide = mean + std * np.linspace(-FURTHEST, FURTHEST, 301)
         normal = np.exp(-0.5 * ((wide - mean) / std) ** 2) / (std * np.sqrt(2 * np.pi))
         axis.plot(wide, normal, color=RED, linestyle="--", label="Gaussian")
@@ -107,13 +106,14 @@ def _curve(axis: Axes, line: Spectrum, omega_max: float, label: str, colour: str
     """One spectrum without ω = 0, with its confidence."""
     kept = (line.omega > 0) & (line.omega <= omega_max) & (line.density > 0)
     axis.semilogy(line.omega[kept], line.density[kept], color=colour, label=label)
-    if line.standard_error is not None:
-        _ribbon(axis, line.omega[kept], line.density[kept], line.standard_error[kept], colour)
+    if line.estimate is not None:
+        _ribbon(axis, line.omega[kept], [bound[kept] for bound in line.interval()], colour)
 
 
-def _ribbon(axis: Axes, x: Vector, y: Vector, error: Vector, colour: str) -> None:
-    """A shaded 95 % interval, above zero."""
-    axis.fill_between(x, np.maximum(y - SURE * error, 0.05 * y), y + SURE * error, color=colour, alpha=0.3, linewidth=0)
+def _ribbon(axis: Axes, x: Vector, bounds: Sequence[Vector], colour: str) -> None:
+    """A shaded 95 % interval, which is not below zero."""
+    low, high = bounds
+    axis.fill_between(x, np.maximum(low, 0.0), high, color=colour, alpha=0.3, linewidth=0)
 
 
 def _beside(axis: Axes, several: Sequence[Branch] | None, omega_max: float) -> None:
