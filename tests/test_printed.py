@@ -1,6 +1,7 @@
 """What objects say of themselves: a line as repr, tables in print and in notebooks, tables of pandas and xarray."""
 
 import dataclasses
+import io
 import logging
 import re
 import subprocess
@@ -14,7 +15,7 @@ import fembeam as fb
 import solvers
 from contacts import Hertz, Tabulated, bounce, identify
 from fembeam import study
-from fembeam.support import Printed, html_table
+from fembeam.support import Printed, counting, html_table
 
 
 @pytest.fixture(scope="module")
@@ -141,6 +142,23 @@ def test_the_package_is_a_command():
     done = subprocess.run([sys.executable, "-m", "fembeam", "--help"], capture_output=True, text=True, check=False)
     assert done.returncode == 0
     assert "simulate a scene file" in done.stdout
+
+
+class Terminal(io.StringIO):
+    """A stream that says it is a terminal."""
+
+    def isatty(self):
+        return True
+
+
+@pytest.mark.parametrize(
+    ("stream", "wanted", "seen"), [(Terminal, True, True), (Terminal, False, False), (io.StringIO, True, False)]
+)
+def test_terminals_get_a_bar_when_asked_and_pipes_none(monkeypatch, recwarn, stream, wanted, seen):
+    monkeypatch.setattr(sys, "stderr", stream())
+    assert list(counting(wanted, range(3))) == [0, 1, 2]
+    assert ("100%" in sys.stderr.getvalue()) == seen
+    assert not recwarn.list
 
 
 def test_work_is_told_to_those_who_listen(things, caplog, capfd):

@@ -297,7 +297,7 @@ class Model(Printed):
             contact log only.
         start : (2n,) as made by `rest`, `state` or `equilibrium`; None is rest.
         solver : one of the methods in `solvers`; None is the library's best.
-        progress : show a bar (only on a terminal).
+        progress : show a bar (on terminals and in notebooks only).
 
         Returns
         -------

@@ -108,7 +108,7 @@ def ensemble(
         (functions, closures, globals, arguments) has changed. Files and the environment that these read are not seen.
     until : stop when the relative standard error of every mean is below it; asked after 8, 16, 32, … realisations
         in the order of the seeds, whatever the executor.
-    progress : show a bar (only on a terminal).
+    progress : show a bar (on terminals and in notebooks only).
 
     Returns
     -------

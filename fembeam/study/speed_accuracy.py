@@ -61,7 +61,7 @@ def speed_accuracy(
     agreement : largest difference of the two references, relative to the quantity's size; for statistics on long
         horizons, where runs differ, as much as their scatter.
     rounds : how often each run is timed; the fastest counts. Slow settings run fewer, very slow ones fewer starts.
-    progress : show a bar (only on a terminal).
+    progress : show a bar (on terminals and in notebooks only).
 
     Returns
     -------

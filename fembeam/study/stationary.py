@@ -126,7 +126,7 @@ def stationary(
     bins, levels : name -> edges of the histogram, level of the crossings (0 unless given).
     start : (2n,) as for `Model.simulate`.
     solver : None is ``solvers.Exponential(1e-8, ledger=False)``.
-    progress : show a bar (only on a terminal).
+    progress : show a bar (on terminals and in notebooks only).
 
     Raises
     ------
