@@ -1,7 +1,7 @@
-"""Figures: one function per question, each returns a matplotlib figure.
+"""Figures: one function per question, each returns a matplotlib Figure; most draw into your own axes with `axes=`.
 
 `response` and `animation` hold those of one run, `laws` those of contact laws, `orbits` those of periodic motion,
-`random` those of random motion, `study` and `chart` those of studies.
+`random` those of random motion, `mode_count` and `methods` those of studies, `figure` what is common to all.
 """
 
 from fembeam.model import places
