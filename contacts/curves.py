@@ -10,11 +10,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
+from zlib import crc32
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contacts.law import Law
+
+MOST_SHOWN = 8  # numbers of a kind in a repr
 
 
 @dataclass(frozen=True)
@@ -143,6 +146,14 @@ class Tabulated(Law):
         "never pulls",
         "integrators locate every point; smooth between",
     )
+
+    def __repr__(self) -> str:
+        """All of few points; of many how many there are, and a digest that tells one table from another."""
+        if len(self.indentation) <= MOST_SHOWN:
+            return f"Tabulated(indentation={self.indentation!r}, measured={self.measured!r})"
+        last = f"the last ({self.indentation[-1]:g} m, {self.measured[-1]:g} N)"
+        digest = crc32(repr((self.indentation, self.measured)).encode())
+        return f"Tabulated({len(self.indentation)} points, {last}, digest {digest:08x})"
 
     def __post_init__(self) -> None:
         points = _numbers(self.indentation, "indentation"), _numbers(self.measured, "measured")

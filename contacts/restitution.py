@@ -92,6 +92,9 @@ class Bounce:
     force: NDArray[np.float64]
     left: bool
 
+    def __repr__(self) -> str:
+        return f"<bounce of {self.t[-1]:.4g} s at {self.delta_dot[0]:.4g} m/s, restitution {self.restitution:.4g}>"
+
     @property
     def restitution(self) -> float:
         """Exit over entry speed."""

@@ -44,6 +44,9 @@ class Basis:
     vectors: Vector
     omega: Vector
 
+    def __repr__(self) -> str:
+        return f"<basis of {len(self.omega)} vectors over {len(self.vectors)} dofs>"
+
     def __post_init__(self) -> None:
         vectors, omega = np.array(self.vectors, dtype=float), np.array(self.omega, dtype=float)
         if vectors.ndim != 2 or omega.shape != vectors.shape[1:]:

@@ -67,3 +67,8 @@ def __getattr__(name: str) -> Any:
     value = getattr(import_module(f"solvers.{_LATER[name]}"), name)
     globals()[name] = value
     return value
+
+
+def __dir__() -> list[str]:
+    """Public names."""
+    return __all__

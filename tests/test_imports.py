@@ -67,11 +67,11 @@ def modules_read(path):
 
 
 def arrows():
-    """Rooms, and those each reads; the four packages' own `__init__` only hand names on."""
+    """Rooms, and those each reads; the four packages' own `__init__` and `__main__` only hand names on."""
     found = {}
     for path in FILES:
         parts = path.relative_to(HOME).with_suffix("").parts
-        if len(parts) == 2 and parts[1] == "__init__":
+        if len(parts) == 2 and parts[1] in ("__init__", "__main__"):
             continue
         mine = room_of(".".join(parts))
         read = {room_of(name) for name in modules_read(path) if name.split(".")[0] in OURS}

@@ -61,7 +61,7 @@ def test_branch_marks_the_flip_and_its_copy_from_a_file_is_the_same(model, tmp_p
         paper_scene(fb.Harmonic(2e-3, 195.0)).reduce(1).resume(tmp_path / "b.npz")
     branch.to_csv(tmp_path / "b.csv")
     assert len((tmp_path / "b.csv").read_text().splitlines()) == 1 + len(branch.orbits)
-    assert fb.plot.branch(branch).axes[0].get_xlabel() == "ω / rad/s"
+    assert fb.plot.branch(branch).axes[0].get_xlabel() == "drive frequency ω / rad s⁻¹"
     assert "1 contact, unstable" in fb.plot.orbit(flips[0])._suptitle.get_text()
 
 

@@ -9,6 +9,7 @@ import pytest
 import fembeam as fb
 from contacts import PUBLISHED, Hertz, Hysteretic, bounce, identify
 from fembeam import plot, statistics
+from fembeam.plot.axis_names import axis_name
 from fembeam.results import files as report
 
 
@@ -132,7 +133,7 @@ def test_random_figures_have_units_bands_and_confidence():
     one = SimpleNamespace(
         family=SimpleNamespace(model=model, period=2, name="base.omega"),
         **{"parameter": np.array([100.0, 150.0, 200.0]), "stable": np.array([True, False, True])},
-        **{"orbits": orbits, "special": []},
+        **{"orbits": orbits, "special": [], "ends": []},
     )
     branches = {"broad": [one]}
     panels = {"broad": {"δ": signal, "mid": signal.psd}, "narrow": {"δ": signal.psd}}
@@ -178,3 +179,63 @@ def test_figures_of_laws():
 def test_figures_of_nothing_are_refused(draw):
     with pytest.raises(ValueError, match=r"nothing to draw, got .* in plot\.\w+; give "):
         draw()
+
+
+PATHS = {
+    "base.omega": "drive frequency ω / rad s⁻¹",
+    "base.amplitude": "base amplitude / m",
+    "forces[0].signal.omega": "drive frequency ω / rad s⁻¹",
+    "forces[0].signal.amplitude": "drive amplitude / N",
+    "forces[1].signal.amplitude": "drive amplitude / N m",
+    "stops[0].gap": "gap of stop 0 / m",
+    "stops[0].law.stiffness": "contact stiffness of stop 0 / N/m^p",
+    "masses[0].mass": "mass of mass 0 / kg",
+    "dashpots[0].rotational": "rotational damping of dashpot 0 / N m s/rad",
+    "damping.zeta[0]": "damping ratio ζ",
+    "bodies[0].springs[1].foot.omega": "drive frequency ω of beam 1 / rad s⁻¹",
+    "stops[0].law.something": "stops[0].law.something",
+}
+
+
+@pytest.mark.parametrize(("path", "words"), PATHS.items(), ids=list(PATHS))
+def test_parameters_in_words(run, path, words):
+    load = fb.Harmonic(1.0, 2.0)
+    scene = dataclasses.replace(run.model.scene, forces=[fb.PointForce(0.1, load), fb.PointMoment(0.1, load)])
+    assert axis_name(path, scene) == words
+
+
+def test_ends_of_branches_are_marked_and_explained(run):
+    scene = dataclasses.replace(run.model.scene, base=None, forces=[fb.PointForce(0.2, fb.Harmonic(1.0, 60.0))])
+    whole = scene.reduce(1).branch("forces[0].signal.omega", (55.0, 60.0)).run()
+    assert [why for _, why in whole.ends] == ["reached the end of the span"]
+    assert whole.ends[0][0].parameter in (55.0, 60.0)
+    axis = plot.branch(whole).axes[0]
+    assert axis.get_xlabel() == "drive frequency ω / rad s⁻¹"
+    assert "end: reached the end of the span" in texts(axis.figure)
+    lost = SimpleNamespace(
+        **{name: getattr(whole, name) for name in ("family", "parameter", "stable", "orbits", "special")},
+        ends=[(whole.orbits[0], "lost: no orbit was found"), (whole.orbits[-1], "closed: came back")],
+    )
+    axis = plot.branch([lost]).axes[0]
+    assert "end: lost" in texts(axis.figure)
+    assert "end: closed" not in texts(axis.figure)
+    (mark,) = [line for line in axis.lines if line.get_label() == "end: lost"]
+    assert mark.get_xdata() == [whole.orbits[0].parameter]
+
+
+def test_shaded_bands_are_the_intervals_of_the_estimates():
+    signal = statistics.Signal(np.random.default_rng(1).standard_normal(4000), 1e-3, 64)
+    for part in np.split(np.random.default_rng(2).standard_normal(8000), 8):
+        signal.add(part)
+    drawn = {
+        "psd": (plot.random_spectra({"": {"x": signal}}, 1e4), signal.psd.omega, signal.psd.interval()),
+        "pdf": (plot.random_densities({"x": signal}), 1e3 * signal.pdf.x, signal.pdf.interval()),
+    }
+    for name, (figure, x, (low, high)) in drawn.items():
+        scale = 1e-3 if name == "pdf" else 1.0
+        corners = figure.axes[0].collections[0].get_paths()[0].vertices
+        i = len(x) // 2
+        at = np.sort(corners[np.isclose(corners[:, 0], x[i]), 1])
+        assert at[[0, -1]] == pytest.approx([scale * max(low[i], 0.0), scale * high[i]]), name
+    with pytest.raises(ValueError, match="no scatter to tell an interval from"):
+        fb.pdf([0.0, 1.0, 1.0]).interval()

@@ -52,6 +52,9 @@ class Collision:
     stiffness: float
     damping_factor: float
 
+    def __repr__(self) -> str:
+        return f"<collision at {self.entry_rate:.4g} m/s, {len(self.force)} samples, largest {self.force.max():.4g} N>"
+
 
 @dataclass(frozen=True, eq=False)
 class Identified:
@@ -83,6 +86,11 @@ class Identified:
     collisions: tuple[Collision, ...]
     remarks: tuple[str, ...]
     confidence: float
+
+    def __repr__(self) -> str:
+        return (
+            f"<law from {len(self.collisions)} collisions: stiffness {self.stiffness}, restitution {self.restitution}>"
+        )
 
     @property
     def law(self) -> Hysteretic:

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import solvers
-from fembeam.cli.modes import mode_rows, mode_table
 from fembeam.cli.unit_checks import doubts
+from fembeam.model.mode_table import mode_rows, mode_table
 from fembeam.scene import signals_of
 
 if TYPE_CHECKING:

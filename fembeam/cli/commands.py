@@ -153,8 +153,8 @@ def _check(arguments: argparse.Namespace) -> int:
 
 def _modes(arguments: argparse.Namespace) -> int:
     """The command `modes`."""
-    from fembeam.cli.modes import mode_rows, mode_table
     from fembeam.cli.run import reduced
+    from fembeam.model.mode_table import mode_rows, mode_table
 
     file = _read(arguments)
     wanted = dict(file.reduce)

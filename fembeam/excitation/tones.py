@@ -15,6 +15,7 @@ import cmath
 import math
 from dataclasses import dataclass, replace
 from typing import Any
+from zlib import crc32
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,6 +28,7 @@ from fembeam.support import frozen, number
 __all__ = ["BandNoise", "Harmonic", "Multisine", "Record"]
 
 Tones = tuple[NDArray[np.float64], NDArray[np.complex128]]
+MOST_SHOWN = 8  # numbers of a kind in a repr
 
 
 @dataclass(frozen=True)
@@ -125,6 +127,15 @@ class Multisine:
         """The phases, present once the object is made."""
         assert self.phase is not None
         return self.phase
+
+    def __repr__(self) -> str:
+        """All of few tones; of many how many there are, and a digest that tells one sum from another."""
+        columns = self.amplitude, self.omega, self._phase
+        if self.omega.size <= MOST_SHOWN:
+            amplitude, omega, phase = (column.tolist() for column in columns)
+            return f"Multisine(amplitude={amplitude}, omega={omega}, phase={phase})"
+        span = f"{self.omega.min():g} to {self.omega.max():g} rad/s"
+        return f"Multisine({self.omega.size} tones, {span}, digest {crc32(np.concatenate(columns).tobytes()):08x})"
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Multisine):

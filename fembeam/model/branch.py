@@ -16,8 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 import solvers
 from fembeam.model.orbit import Orbit, checked_period, load_period, orbit
 from fembeam.scene import changes_structure, path_of, replaced, value_of
-from fembeam.support import require, written_whole
+from fembeam.support import Part, Printed, counting, note, require, written_whole
 from solvers.branches import restarted
+from solvers.problem import counted, dataframe
 
 if TYPE_CHECKING:
     from fembeam.model.model import Model
@@ -33,6 +34,9 @@ class Family:
     name: str
     period: int
     kept: dict[float, tuple[solvers.System, float]] = field(default_factory=dict, repr=False)
+
+    def __repr__(self) -> str:
+        return f"<{self.model!r} along {self.name}, period {self.period}>"
 
     def at(self, parameter: float) -> Model:
         """The model at a value of the parameter."""
@@ -54,7 +58,7 @@ class Family:
 
 
 @dataclass(frozen=True, eq=False)
-class Branch:
+class Branch(Printed):
     """Orbits along a parameter, computed as they are asked for; iterate over it, or call `run`.
 
     Attributes
@@ -78,11 +82,10 @@ class Branch:
 
     def run(self, progress: bool = False) -> Branch:
         """Compute all of it; after Ctrl-C the orbits found are kept, and another call continues."""
-        from tqdm import tqdm
-
-        with tqdm(self.found, unit=" orbits", disable=None if progress else True) as bar:
+        with counting(progress, self.found, unit=" orbits") as bar:
             for one in bar:
                 bar.set_postfix_str(f"{self.family.name} = {one.parameter:.6g}", refresh=False)
+        note("%r", self)
         return self
 
     @property
@@ -99,6 +102,12 @@ class Branch:
     def status(self) -> str:
         """How each direction ended, as sentences."""
         return "; ".join(status.value for status in self.found.status)
+
+    @property
+    def ends(self) -> list[tuple[Orbit, str]]:
+        """The last orbit of each direction, and in words how it ended."""
+        pairs = zip(self.found.arms, self.found.status, strict=False)
+        return [(self._orbit(arm.orbits[-1]), status.value) for arm, status in pairs]
 
     @property
     def parameter(self) -> Vector:
@@ -138,6 +147,10 @@ class Branch:
             })  # fmt: skip
         return rows
 
+    def to_dataframe(self) -> Any:
+        """The table as one of pandas, one orbit a row; ImportError without pandas."""
+        return dataframe(self.table())
+
     def to_csv(self, path: str | Path) -> None:
         """Write the table; the file is written whole or not at all."""
         rows, text = self.table(), io.StringIO()
@@ -147,12 +160,19 @@ class Branch:
         with written_whole(Path(path)) as file:
             file.write(text.getvalue().encode())
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
+        known = self.parameter
+        span = f"{self.family.name} = {known.min():.6g} to {known.max():.6g}"
+        return f"<branch of {counted(len(known), 'orbit')} of period {self.family.period}, {span}: {self.status}>"
+
+    def _parts(self) -> list[Part]:
         """Special orbits and how each direction ended."""
-        rows = [f"{one.mark:>15}  {self.family.name} = {one.parameter:.9g}" for one in self.found.special]
+        found = [(one, one.mark) for one in self.found.special] + [(one.found, "end") for one, _ in self.ends]
+        rows = [(mark, f"{one.parameter:.9g}", "yes" if one.stable else "no") for one, mark in found]
         stable = int(np.sum(self.stable))
-        head = f"{len(rows)} special among {len(self.parameter)} orbits of period {self.family.period}, {stable} stable"
-        return "\n".join([head, *rows, self.status])
+        count = f"{len(self.found.special)} special among {len(self.parameter)} orbits"
+        head = f"{count} of period {self.family.period}, {stable} stable"
+        return [head, (("", self.family.name, "stable"), rows), self.status]
 
     def save(self, path: str | Path) -> None:
         """Write all that is known as .npz, enough to go on from; written whole or not at all."""

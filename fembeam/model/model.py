@@ -22,7 +22,8 @@ import solvers
 from fembeam.model.equations import ModalEquations
 from fembeam.model.shapes import Shapes, Vector
 from fembeam.scene import with_signals
-from fembeam.support import require, require_positive
+from fembeam.support import Part, Printed, note, require, require_positive
+from solvers.problem import counted
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -39,7 +40,7 @@ UNDRIVEN = ("zeta", "participation", "moving_mass", "section_forces", "contact_r
 
 
 @dataclass(frozen=True, eq=False)
-class Model(ModalEquations):
+class Model(Printed, ModalEquations):
     """A scene reduced to n coordinates; made by `Scene.reduce`.
 
     Attributes
@@ -64,6 +65,15 @@ class Model(ModalEquations):
     counts: tuple[tuple[int, int], ...]
     others: tuple[Shapes, ...] = ()
     way: dict[str, Any] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        size = f"{counted(len(self.omega), 'coordinate')}, {self.omega.min():.6g} to {self.omega.max():.6g} rad/s"
+        return f"<model of {size}, with {counted(len(self.touches), 'contact')}>"
+
+    def _parts(self) -> list[Part]:
+        from fembeam.model.mode_table import mode_part
+
+        return [repr(self), mode_part(self)]
 
     @property
     def touches(self) -> list[ContactRow]:
@@ -177,7 +187,7 @@ class Model(ModalEquations):
             contact log only.
         start : (2n,) as made by `rest`, `state` or `equilibrium`; None is rest.
         solver : one of the methods in `solvers`; None is the library's best.
-        progress : show a bar (only on a terminal).
+        progress : show a bar (on terminals and in notebooks only).
 
         Returns
         -------
@@ -197,7 +207,9 @@ class Model(ModalEquations):
         lasting = self.lasting(duration) if 0.0 < duration < np.inf else self
         with bar(duration, progress) as report:
             solution = solvers.integrate(lasting.system, start[:n], start[n:], duration, dt, solver, progress=report)
-        return Run.of(lasting, solution)
+        run = Run.of(lasting, solution)
+        note("%r, integrated in %.3g s", run, run.cost.seconds)
+        return run
 
     def frequency_response(
         self,

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import solvers
 from fembeam.scene import signals_of
-from fembeam.support import require
+from fembeam.support import Part, Printed, require
 from solvers.orbits import periodic_orbit as periodic
 from solvers.orbits import shooting
 from solvers.orbits import shots as chain
@@ -38,7 +38,7 @@ LONGEST_REASON = 120  # characters of why shooting failed; the rest is in the er
 
 
 @dataclass(frozen=True, eq=False)
-class Orbit:
+class Orbit(Printed):
     """A periodic motion of a model.
 
     Attributes
@@ -95,6 +95,17 @@ class Orbit:
         """Lowest and highest displacement (m, relative to the frame) at z over the period."""
         lowest, highest = extremes_of(self.run.t, self.run.displacement(z), self.run.velocity(z))
         return lowest, highest
+
+    def _parts(self) -> list[Part]:
+        """What kind of orbit, its multipliers, its contacts."""
+        doubt: list[Part] = [f"in doubt: {self.found.doubt}"] if self.found.doubt else []
+        multipliers = [(float(abs(one)), float(np.angle(one))) for one in self.multipliers]
+        table: Part = ("multiplier |μ|", "angle / rad"), multipliers
+        names = "t_in", "t_out", "speed_in", "peak_force"
+        columns = [getattr(self.contacts, name).tolist() for name in names]
+        rows = [(f"stop {stop}", *row) for stop, *row in zip(self.contacts.stop, *columns, strict=True)]
+        log: list[Part] = [(("contact", "t_in / s", "t_out / s", "entry speed / m/s", "peak force / N"), rows)]
+        return [repr(self), *doubt, table, *(log if rows else [])]
 
     def __repr__(self) -> str:
         contacts, kind = counted(len(self.contacts), "contact"), "stable" if self.stable else "unstable"

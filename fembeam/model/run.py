@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 import solvers
 from fembeam.model.shapes import Shapes
 from fembeam.scene import Source
-from fembeam.support import require
+from fembeam.support import Part, Printed, require
 from solvers.problem import counted
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class Run(Printed):
     """A simulated motion of a reduced model.
 
     Attributes
@@ -62,6 +62,11 @@ class Run:
     def __repr__(self) -> str:
         reached = f"to t = {self.t[-1]:g} s" if len(self.t) else "without samples"
         return f"<run {reached}, {counted(len(self.contacts), 'contact')}: {self.status}>"
+
+    def _parts(self) -> list[Part]:
+        from fembeam.model.run_csv import parts
+
+        return parts(self)
 
     @cached_property
     def energy(self) -> solvers.Energy:
@@ -234,6 +239,21 @@ class Run:
         from fembeam.model.run_csv import write
 
         return write(self, Path(folder), stride)
+
+    def to_dataframe(self, stride: int = 1) -> Any:
+        """Every `stride`-th sample at the usual places as a table of pandas over t; ImportError without pandas."""
+        from fembeam.model.run_csv import to_dataframe
+
+        return to_dataframe(self, stride)
+
+    def to_xarray(self, z: ArrayLike | None = None) -> Any:
+        """Displacement and velocity over t and z (m; None: the mesh), stops and coordinates as a Dataset of xarray.
+
+        SI units in the attributes. ImportError without xarray.
+        """
+        from fembeam.model.run_csv import to_xarray
+
+        return to_xarray(self, z)
 
     def impactor_displacement(self, impactor: int = 0) -> Vector:
         """x(t) (k,) of an impactor from its place at the start, relative to the frame, m."""

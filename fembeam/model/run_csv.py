@@ -1,19 +1,23 @@
-"""A run as CSV for spreadsheets: histories and contacts, units in the head of every column."""
+"""A run as tables: CSV for spreadsheets, pandas, xarray, what print shows; units in the head of every column."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fembeam.model.watched_places import places
 from fembeam.support import require
+from solvers.problem import dataframe, optional
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
+
+    from numpy.typing import ArrayLike
 
     from fembeam.model.run import Run, Vector
+    from fembeam.support import Part
 
 CONTACT_UNITS = {
     "stop": "", "t_in": "s", "t_out": "s", "speed_in": "m/s", "speed_out": "m/s", "peak_indentation": "m",
@@ -24,16 +28,46 @@ DIGITS = "%.12g"
 
 def write(run: Run, folder: Path, stride: int = 1) -> list[Path]:
     """Write `histories.csv` and `contacts.csv`; see `Run.to_csv`."""
-    require(stride >= 1, "stride must be at least 1", stride, "Run.to_csv", "1 keeps every sample")
+    kept = histories(run, stride)
+    units = ((name, CONTACT_UNITS.get(name, ""), column) for name, column in run.contacts.arrays().items())
+    log = {f"{name} [{unit}]" if unit else name: column for name, unit, column in units}
+    return [_write(folder / "histories.csv", kept), _write(folder / "contacts.csv", log)]
+
+
+def histories(run: Run, stride: int) -> dict[str, Vector]:
+    """Columns of every `stride`-th sample at the usual places and stops, by name and unit."""
+    require(stride >= 1, "stride must be at least 1", stride, "Run", "1 keeps every sample")
     columns = {"t [s]": run.t}
     for name, z in places(run.shapes).items():
         columns |= {f"displacement {name} [m]": run.displacement(z), f"velocity {name} [m/s]": run.velocity(z)}
     for stop in range(len(run.stops)):
         columns |= {f"indentation {stop} [m]": run.indentation(stop), f"force {stop} [N]": run.force(stop)}
-    kept = {name: column[::stride] for name, column in columns.items()}
-    units = ((name, CONTACT_UNITS.get(name, ""), column) for name, column in run.contacts.arrays().items())
-    log = {f"{name} [{unit}]" if unit else name: column for name, unit, column in units}
-    return [_write(folder / "histories.csv", kept), _write(folder / "contacts.csv", log)]
+    return {name: column[::stride] for name, column in columns.items()}
+
+
+def to_dataframe(run: Run, stride: int = 1) -> Any:
+    """See `Run.to_dataframe`."""
+    return dataframe(histories(run, stride)).set_index("t [s]")
+
+
+def to_xarray(run: Run, z: ArrayLike | None = None) -> Any:
+    """See `Run.to_xarray`."""
+    place = run.shapes.nodes if z is None else np.atleast_1d(np.asarray(z, dtype=float))
+    variables = {
+        "displacement": (("t", "z"), run.displacement(place), {"units": "m"}),
+        "velocity": (("t", "z"), run.velocity(place), {"units": "m/s"}),
+        "indentation": (("t", "stop"), _side_by_side(run, run.indentation), {"units": "m"}),
+        "force": (("t", "stop"), _side_by_side(run, run.force), {"units": "N"}),
+        "q": (("t", "coordinate"), run.q, {"units": "m √kg"}),
+        "q_dot": (("t", "coordinate"), run.q_dot, {"units": "m √kg/s"}),
+    }
+    axes = {"t": ("t", run.t, {"units": "s"}), "z": ("z", place, {"units": "m"}), "stop": np.arange(len(run.stops))}
+    return optional("xarray", "a data set").Dataset(variables, axes, {"status": run.status, "scene": run.scene})
+
+
+def _side_by_side(run: Run, history: Callable[[int], Vector]) -> Vector:
+    """A history of every stop, (k, m)."""
+    return np.array([history(stop) for stop in range(len(run.stops))]).reshape(len(run.stops), len(run.t)).T
 
 
 def _write(target: Path, columns: Mapping[str, Vector]) -> Path:
@@ -44,3 +78,19 @@ def _write(target: Path, columns: Mapping[str, Vector]) -> Path:
         rows = np.column_stack([np.asarray(column, dtype=float) for column in columns.values()])
         np.savetxt(file, rows, fmt=DIGITS, delimiter=",", header=",".join(columns), comments="", encoding="utf-8")
     return target
+
+
+def parts(run: Run) -> list[Part]:
+    """What print shows of a run: how it ended, its signals, the contacts of each stop."""
+    signals = {f"displacement, {name}": run.displacement(z) for name, z in places(run.shapes).items()}
+    signals |= {f"indentation, stop {i}": run.indentation(i) for i in range(len(run.stops))}
+    moved = [(name, *map(float, (x.mean(), x.std(), x.min(), x.max()))) for name, x in signals.items() if len(x)]
+    log, rows = run.contacts, []
+    for stop in range(len(run.stops)):
+        mine = log.stop == stop
+        force, speed = log.peak_force[mine], log.speed_in[mine]
+        numbers = (float(force.max()), float(force.mean()), float(speed.mean())) if mine.any() else (None,) * 3
+        rows.append((f"stop {stop}", int(mine.sum()), *numbers))
+    found: list[Part] = [repr(run), (("", "mean / m", "std / m", "min / m", "max / m"), moved)]
+    head = "", "contacts", "largest force / N", "mean peak force / N", "mean entry speed / m/s"
+    return [*found, (head, rows)] if rows else found

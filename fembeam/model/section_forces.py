@@ -45,6 +45,9 @@ class SectionForces:
     moments: Vector
     shears: Vector
 
+    def __repr__(self) -> str:
+        return f"<section forces of {self.moments.shape[2]} coordinates in {len(self.nodes) - 1} elements>"
+
     def moment(self, z: ArrayLike) -> Vector:
         """(k, n) at z (k,)."""
         element, x, h = self._places(z)
@@ -134,6 +137,9 @@ class Extremes:
     highest: Vector
     t_lowest: Vector
     t_highest: Vector
+
+    def __repr__(self) -> str:
+        return f"<extremes at {len(self.z)} places, {self.lowest.min():.4g} to {self.highest.max():.4g}>"
 
     @property
     def largest(self) -> tuple[float, float, float]:

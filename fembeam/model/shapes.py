@@ -20,6 +20,9 @@ class Shapes:
     nodes: Vector
     values: Vector
 
+    def __repr__(self) -> str:
+        return f"<{self.values.shape[1]} shapes over {self.nodes[0]:g} to {self.nodes[-1]:g} m>"
+
     def __call__(self, z: ArrayLike, derivative: int = 0) -> Vector:
         """φ(z): (n,) at one z, (k, n) at z (k,); derivative 1 is the slope, 2 the curvature."""
         places = np.asarray(z, dtype=float)

@@ -1,9 +1,9 @@
-"""Figures: one function per question, each returns a matplotlib figure.
+"""Figures: one function per question, each returns a matplotlib Figure; most draw into your own axes with `axes=`.
 
 `response`, `spectra`, `contact_histograms` and `animation` hold those of one run, `laws` those of contact laws,
-`orbits` those of periodic motion, `basins` maps of starts, `random` those of random motion, `linear`
-spectra and frequency response, `mode_count` and `methods`
-those of studies; `style` is what all share. Imports: `statistics`, `model` and the rooms below. Begin with `response`.
+`orbits` those of periodic motion, `basins` maps of starts, `random` those of random motion, `linear` spectra and
+frequency response, `mode_count` and `methods` those of studies; `style` and `figure` are what all share. Imports:
+`statistics`, `model` and the rooms below. Begin with `response`.
 """
 
 from fembeam.model import places

@@ -12,19 +12,23 @@ from fembeam.plot.style import BLUE, GREY, RED, Vector, styled
 from fembeam.support import require
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 COLOURS = 6  # of the library's style
 
 
 @styled
-def loops(laws: Mapping[str, Law], entry_rate: float = 1.0, mass: float = 1.0) -> Figure:
+def loops(laws: Mapping[str, Law], entry_rate: float = 1.0, mass: float = 1.0, axes: Axes | None = None) -> Figure:
     """Force against indentation while a free mass bounces off each law.
 
     Parameters
     ----------
     laws : by the name to show.
     entry_rate, mass : of the bounce, m/s and kg.
+    axes : to draw into; None makes a figure.
 
     Notes
     -----
@@ -36,11 +40,10 @@ def loops(laws: Mapping[str, Law], entry_rate: float = 1.0, mass: float = 1.0) -
     >>> figure.axes[0].get_ylabel()
     'contact force / N'
     """
-    from matplotlib.figure import Figure
+    from fembeam.plot.figure import heading, legend, sheet
 
     require(bool(laws), "nothing to draw", laws, "plot.loops", "give laws by name, {name: law}")
-    figure = Figure(figsize=(7.0, 4.2), layout="constrained")
-    axis = figure.subplots()
+    figure, (axis,) = sheet(1, 1, (7.0, 4.2), axes)
     thrown = {name: bounce(law, entry_rate, mass) for name, law in laws.items()}
     scale, unit = _force_unit(max(float(one.force.max()) for one in thrown.values()))
     for number, (name, one) in enumerate(thrown.items()):
@@ -49,27 +52,26 @@ def loops(laws: Mapping[str, Law], entry_rate: float = 1.0, mass: float = 1.0) -
     axis.axhline(0.0, color=GREY, linewidth=0.6)
     axis.set_xlabel("indentation δ / mm")
     axis.set_ylabel(f"contact force / {unit}")
-    figure.legend(loc="outside right center")
-    figure.suptitle(
-        f"Bounce of {mass:g} kg at {entry_rate:g} m/s, achieved restitution e",
-        x=0.01,
-        ha="left",
-        fontsize=10,
-        fontweight="bold",
-    )
+    legend(axis, axes is None, "outside right center")
+    heading([axis], f"Bounce of {mass:g} kg at {entry_rate:g} m/s, achieved restitution e", axes is None)
     return figure
 
 
 @styled
-def restitutions() -> Figure:
+def restitutions(axes: Sequence[Axes] | None = None) -> Figure:
     """Achieved against nominal restitution for every constructor that takes one: what the published formulas do.
 
+    Parameters
+    ----------
+    axes : two to draw into; None makes a figure.
+
+    Notes
+    -----
     `KelvinVoigt.anagnostopoulos` does as `Viscoelastic.tsuji`: exact, and on the same line with ``clamp=True``.
     """
-    from matplotlib.figure import Figure
+    from fembeam.plot.figure import legend, sheet
 
-    figure = Figure(figsize=(7.0, 5.0), layout="constrained")
-    whole, near = figure.subplots(1, 2)
+    figure, (whole, near) = sheet(1, 2, (7.0, 5.0), axes)
     nominal = np.linspace(0.02, 1.0, 99)
     makers = {name: getattr(Hysteretic, name) for name in PUBLISHED if name not in ("zhang_sharf", "achieving")}
     lines = {name: [restitution(make(1e8, e)) for e in nominal] for name, make in makers.items()}
@@ -84,24 +86,23 @@ def restitutions() -> Figure:
         near.plot(nominal, np.array(achieved) - nominal, _line(number))
     whole.set(xlim=(0, 1), ylim=(0, 1), xlabel="nominal restitution", ylabel="achieved by a free mass")
     near.set(xlim=(0, 1), ylim=(-0.05, 0.1), xlabel="nominal restitution", ylabel="achieved - nominal")
-    figure.legend(loc="outside lower center", ncols=3)
+    legend(whole, axes is None, "outside lower center", ncols=3 if axes is None else 1)
     return figure
 
 
 @styled
-def identification(found: Identified) -> Figure:
-    """Measured and fitted loops of every collision, and the residuals."""
-    from matplotlib.figure import Figure
+def identification(found: Identified, axes: Sequence[Axes] | None = None) -> Figure:
+    """Measured and fitted loops of every collision, and the residuals; into two `axes` where they are given."""
+    from fembeam.plot.figure import heading, sheet
 
-    figure = Figure(figsize=(7.0, 4.8), layout="constrained")
-    above, below = figure.subplots(2, 1, sharex=True, height_ratios=[2, 1])
+    figure, (above, below) = sheet(2, 1, (7.0, 4.8), axes, sharex=True, height_ratios=[2, 1])
     scale, unit = _force_unit(max(float(np.abs(one.force).max()) for one in found.collisions))
     for number, one in enumerate(found.collisions):
-        delta, label = 1e3 * one.delta, {"label": "measured"} if number == 0 else {}
-        above.plot(delta, scale * one.force, ".", color=BLUE, markersize=3, **label)
+        delta, (measured, fitted) = 1e3 * one.delta, ("measured", "fitted") if number == 0 else (None, None)
+        above.plot(delta, scale * one.force, ".", color=BLUE, markersize=3, label=measured)
         below.plot(delta, scale * (one.force - one.fitted), ".", color=BLUE, markersize=3)
-        order, label = np.flatnonzero(one.delta > 0.0), {"label": "fitted"} if number == 0 else {}
-        above.plot(delta[order], scale * one.fitted[order], color=RED, **label)
+        order = np.flatnonzero(one.delta > 0.0)
+        above.plot(delta[order], scale * one.fitted[order], color=RED, label=fitted)
     below.axhline(0.0, color=GREY, linewidth=0.6)
     for sign in (-2.0, 2.0):
         below.axhline(sign * scale * found.noise, color=GREY, linewidth=0.6, linestyle="--")
@@ -112,7 +113,7 @@ def identification(found: Identified) -> Figure:
     p, a, r = found.exponent.value, found.damping_factor, found.restitution
     title = f"K = {found.stiffness.value:.4g} N/m^{p:.3g}, a = {a.value:.3g} ({a.low:.3g} to {a.high:.3g}), "
     title += f"restitution {r.value:.3g} ({r.low:.3g} to {r.high:.3g})"
-    figure.suptitle(title, x=0.01, ha="left", fontsize=10, fontweight="bold")
+    heading([above], title, axes is None)
     return figure
 
 

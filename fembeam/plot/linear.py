@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fembeam.plot.response import styled
+from fembeam.plot.style import styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -24,21 +24,21 @@ _SMALLEST = 1e-16
 
 
 @styled
-def speed_accuracy(result: SpeedAccuracy) -> Figure:
+def speed_accuracy(result: SpeedAccuracy, axes: Axes | Sequence[Axes] | None = None) -> Figure:
     """Error against time: of integration on the left, with the error of too few modes on the right.
 
     Modes are colours, methods markers; medians over the starts with quartiles; a line joins the settings of a method,
     a thick one the front of each model. On the right a finer step below a dashed line (the exact model with so few
-    modes) is wasted. What lies below the disagreement of the references is drawn there: it is not known.
+    modes) is wasted. What lies below the disagreement of the references is drawn there: it is not known. `axes` to draw
+    into are one, or two where there are several models.
     """
-    from matplotlib.figure import Figure
+    from fembeam.plot.figure import sheet
 
     sizes = sorted(result.reduction)
     panels = 2 if max(result.reduction.values()) > 0.0 else 1
-    figure = Figure(figsize=(5.2 * panels + 2.1, 4.8), layout="constrained")
-    axes = np.atleast_1d(figure.subplots(1, panels, sharey=True))
+    figure, drawn = sheet(1, panels, (5.2 * panels + 2.1, 4.8), axes, sharey=True)
     methods = list(dict.fromkeys(point.method for point in result.points))
-    for ax, name in zip(axes, ("errors", "totals"), strict=False):
+    for ax, name in zip(drawn, ("errors", "totals"), strict=False):
         for n, colour in zip(sizes, _colours(len(sizes)), strict=True):
             for method, marker in zip(methods, MARKERS * 3, strict=False):
                 mine = [p for p in result.points if p.modes == n and p.method == method and p.seconds.size]
@@ -52,13 +52,13 @@ def speed_accuracy(result: SpeedAccuracy) -> Figure:
         ax.set(xscale="log", yscale="log")
         ax.invert_xaxis()
         ax.grid(alpha=0.25, lw=0.5)
-    axes[0].set(xlabel=f"error of integration: {result.quantity}", ylabel="time of a run / ms")
+    drawn[0].set(xlabel=f"error of integration: {result.quantity}", ylabel="time of a run / ms")
     claim = result.claim()
-    axes[0].set_title("Integration alone; thick: the front of each model" + (f"\n{claim}" if claim else ""))
+    drawn[0].set_title("Integration alone; thick: the front of each model" + (f"\n{claim}" if claim else ""))
     if panels == 2:
-        axes[1].set(xlabel=f"error against {sizes[-1]} modes: {result.quantity}")
-        axes[1].set_title("Integration and reduction; dashed: exact solution with so few modes")
-    _legends(figure, sizes, methods)
+        drawn[1].set(xlabel=f"error against {sizes[-1]} modes: {result.quantity}")
+        drawn[1].set_title("Integration and reduction; dashed: exact solution with so few modes")
+    _legends(drawn[-1], sizes, methods, axes is None)
     return figure
 
 
@@ -85,35 +85,39 @@ def _colours(count: int) -> list:
     return [colormaps["viridis_r"](0.15 + 0.8 * i / max(count - 1, 1)) for i in range(count)]
 
 
-def _legends(figure: Figure, sizes: Sequence[int], methods: Sequence[str]) -> None:
+def _legends(axis: Axes, sizes: Sequence[int], methods: Sequence[str], own: bool) -> None:
     """Markers for methods, colours for modes, beside the axes."""
     from matplotlib.lines import Line2D
+
+    from fembeam.plot.figure import legend
 
     entries = [Line2D([], [], color=c, lw=3, label=f"{n} mode{'s' if n > 1 else ''}")
                for n, c in zip(sizes, _colours(len(sizes)), strict=True)]  # fmt: skip
     entries += [
         Line2D([], [], color="black", marker=k, lw=0, ms=5, label=m) for m, k in zip(methods, MARKERS * 3, strict=False)
     ]
-    figure.legend(handles=entries, loc="outside right upper")
+    legend(axis, own, "outside right upper", handles=entries)
 
 
 @styled
-def stability_map(*maps: StabilityMap) -> Figure:
-    """Verdicts over step and modes (or stiffness), one panel per map, predicted limits drawn over them."""
+def stability_map(*maps: StabilityMap, axes: Axes | Sequence[Axes] | None = None) -> Figure:
+    """Verdicts over step and modes (or stiffness), one panel per map, predicted limits drawn over them.
+
+    Parameters
+    ----------
+    maps : one or more. axes : to draw into, one per map; None makes a figure.
+    """
     from matplotlib.colors import ListedColormap
-    from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
+
+    from fembeam.plot.figure import legend
 
     require(bool(maps), "nothing to draw", maps, "plot.stability_map", "give one map or more of fb.study.stability_map")
     colours = dict(zip(maps[0].VERDICTS, ("#8fd0b5", "#f6d58a", "#b7c9e8", "#eba07a"), strict=True))
     columns = min(len(maps), 2)
-    rows = -(-len(maps) // columns)
-    figure = Figure(figsize=(4.6 * columns + 0.2, 3.0 * rows + 0.7), layout="constrained")
-    axes = figure.subplots(rows, columns, squeeze=False).ravel()
-    for ax in axes[len(maps) :]:
-        ax.set_axis_off()
-    for ax, found in zip(axes, maps, strict=False):
+    figure, drawn = _gallery(len(maps), columns, (4.6 * columns + 0.2, 3.0, 0.7), axes)
+    for ax, found in zip(drawn, maps, strict=True):
         places = np.arange(len(found.rows) + 1) - 0.5
         ax.pcolormesh(_edges(found.steps), places, found.verdict, cmap=ListedColormap(list(colours.values())),
                       vmin=-0.5, vmax=3.5, edgecolors="white", lw=0.4)  # fmt: skip
@@ -122,7 +126,7 @@ def stability_map(*maps: StabilityMap) -> Figure:
             ax.step(np.append(kept, kept[-1]), places, color="black", ls=style, lw=1.6, where="pre")
             ax.vlines(kept, places[:-1], places[1:], color="black", ls=style, lw=1.6)
         ax.set(xscale="log", xlabel="step / s", yticks=range(len(found.rows)), title=found.method)
-        ax.set_xlim(_edges(found.steps)[[0, -1]])
+        ax.set_xlim(*_edges(found.steps)[[0, -1]])
         ax.set_yticklabels([f"{row:g}" for row in found.rows])
         ax.set_ylabel({"modes": "number of modes", "stiffness": "contact stiffness / SI"}[found.axis])
     entries: list = [Patch(color=colour, label=verdict.words) for verdict, colour in colours.items()]
@@ -130,8 +134,23 @@ def stability_map(*maps: StabilityMap) -> Figure:
         Line2D([], [], color="black", ls=s, label=f"predicted limit {w}")
         for s, w in (("-", "in flight"), (":", "in contact"))
     ]
-    figure.legend(handles=entries, loc="outside lower center", ncols=3)
+    legend(drawn[-1], axes is None, "outside lower center", handles=entries, ncols=3)
     return figure
+
+
+def _gallery(
+    count: int, columns: int, size: tuple[float, float, float], axes: Axes | Sequence[Axes] | None
+) -> tuple[Figure, list[Axes]]:
+    """That many panels in columns, the rest of the last row empty; size: width, height of a row, height to spare."""
+    from fembeam.plot.figure import sheet
+
+    if axes is not None:
+        return sheet(count, 1, (0.0, 0.0), axes)
+    rows = -(-count // columns)
+    figure, made = sheet(rows, columns, (size[0], size[1] * rows + size[2]), squeeze=False)
+    for unused in made[count:]:
+        unused.set_axis_off()
+    return figure, made[:count]
 
 
 def _edges(steps: np.ndarray) -> np.ndarray:
@@ -143,8 +162,12 @@ def _edges(steps: np.ndarray) -> np.ndarray:
 
 
 @styled
-def failures(cases: Sequence[Failure]) -> Figure:
+def failures(cases: Sequence[Failure], axes: Axes | Sequence[Axes] | None = None) -> Figure:
     """A gallery: each case with what the naive method gives (red) and what this library gives or says (blue).
+
+    Parameters
+    ----------
+    cases : to show. axes : to draw into, one per case; None makes a figure.
 
     Examples
     --------
@@ -152,13 +175,9 @@ def failures(cases: Sequence[Failure]) -> Figure:
     >>> failures([jumped_contact()]).axes[0].get_ylabel()
     'displacement / mm'
     """
-    from matplotlib.figure import Figure
-
     require(bool(cases), "nothing to draw", cases, "plot.failures", "give fb.study.gallery()")
-    rows = -(-len(cases) // 2)
-    figure = Figure(figsize=(9.6, 2.75 * rows), layout="constrained")
-    axes = figure.subplots(rows, 2, squeeze=False).ravel()
-    for ax, case in zip(axes, cases, strict=False):
+    figure, drawn = _gallery(len(cases), 2, (9.6, 2.75, 0.0), axes)
+    for ax, case in zip(drawn, cases, strict=True):
         few = len(case.naive[0]) < 40
         ax.plot(*case.ours, color=BLUE, lw=1.3)
         ax.plot(*case.naive, color=RED, lw=0.9, marker="o" if few else "", ms=3)
@@ -171,8 +190,6 @@ def failures(cases: Sequence[Failure]) -> Figure:
         for height, colour, words in zip((25, 14), (RED, BLUE), case.said, strict=True):
             ax.annotate(words, (0.0, 1.0), (0, height), "axes fraction", "offset points", color=colour, fontsize=7.5,
                         va="top")  # fmt: skip
-    for ax in axes[len(cases) :]:
-        ax.set_axis_off()
     return figure
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fembeam.plot.style import BLUE, GREY, ORANGE, RED, sheet, styled, titled
+from fembeam.plot.style import BLUE, GREY, ORANGE, RED, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,10 +22,10 @@ LOWEST = 1e-12  # relative; smaller errors are drawn here
 
 
 @styled
-def mode_count(study: ModeCount) -> Figure:
+def mode_count(study: ModeCount, axes: Sequence[Axes] | None = None) -> Figure:
     """Error against the reference, with its 95 % uncertainty, and time of integration, over the coordinates kept.
 
-    Hollow marks are errors within noise.
+    Hollow marks are errors within noise. `axes` are two to draw into; None makes a figure.
 
     Examples
     --------
@@ -36,7 +36,9 @@ def mode_count(study: ModeCount) -> Figure:
     >>> [axis.get_ylabel() for axis in figure.axes]
     ['relative error', 'integration / s']
     """
-    figure, (left, right) = sheet(None, 1, 2, (8.0, 3.6))
+    from fembeam.plot.figure import heading, sheet
+
+    figure, (left, right) = sheet(1, 2, (8.0, 3.6), axes)
     for kind, colour, mark, name in KINDS:
         rows = [row for row in study.rows if row.residual == kind and np.isfinite(row.error)]
         _errors(left, [row for row in rows if not row.reference], colour, mark, name)
@@ -46,29 +48,38 @@ def mode_count(study: ModeCount) -> Figure:
     reference = next(row for row in study.rows if row.reference)
     _whole_numbers([left, right], [row.measured.coordinates for row in study.rows])
     left.set_ylabel("relative error")
-    left.set_title(f"against {reference.measured.coordinates} coordinates; hollow: within noise")
     left.legend()
     right.set_ylim(bottom=0.0)
     right.set_ylabel("integration / s")
     right.set_title("time of all runs of a model")
-    return titled(figure, None, f"Convergence of {study.quantity} with modes")
+    against = f"against {reference.measured.coordinates} coordinates; hollow: within noise"
+    left.set_title(against if axes is None else f"{study.quantity} {against}")
+    if axes is None:
+        heading([left], f"Convergence of {study.quantity} with modes", True)
+    return figure
 
 
 @styled
-def smallest_model(result: SmallestModel) -> Figure:
-    """Reduction errors over coordinates and, once reached, integration errors over rtol; tolerance and answer."""
+def smallest_model(result: SmallestModel, axes: Axes | Sequence[Axes] | None = None) -> Figure:
+    """Reduction errors over coordinates and, once reached, integration errors over rtol; tolerance and answer.
+
+    `axes` to draw into are one, or two once integration was reached; None makes a figure.
+    """
+    from fembeam.plot.figure import heading, sheet
+
     reached = bool(result.integration)
-    figure, axes = sheet(None, 1, 1 + reached, (8.0 if reached else 4.4, 3.6))
-    _reduction(axes[0], result)
+    figure, drawn = sheet(1, 1 + reached, (8.0 if reached else 4.4, 3.6), axes)
+    _reduction(drawn[0], result)
     if reached:
-        _integration(axes[1], result)
-    for axis in axes:
+        _integration(drawn[1], result)
+    for axis in drawn:
         axis.set_yscale("log")
         axis.axhline(result.tolerance, color=GREY, linestyle="--", label=f"tolerance {result.tolerance:g}")
         axis.set_ylabel("relative error")
-    axes[0].legend()
+    drawn[0].legend()
     state = "Smallest model" if result.met else "NOT MET: smallest model"
-    return titled(figure, None, f"{state} for {result.quantity}")
+    heading(drawn, f"{state} for {result.quantity}", axes is None)
+    return figure
 
 
 def _reduction(axis: Axes, result: SmallestModel) -> None:

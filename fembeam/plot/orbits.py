@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fembeam.model import observed
+from fembeam.plot.axis_names import axis_name
 from fembeam.plot.style import GREEN, GREY, ORANGE, RED, Vector, styled
 from fembeam.support import require
 from solvers.problem import counted
@@ -20,7 +21,8 @@ if TYPE_CHECKING:
 
 MARKS = {"fold": ("o", GREY), "flip": ("s", RED), "neimark-sacker": ("D", GREEN), "branch point": ("P", "black"),
          "grazing": ("x", "black"), "floor": ("+", "black"), "merging": ("^", ORANGE)}  # fmt: skip
-UNITS = {"base.omega": "ω / rad/s", "base.amplitude": "base amplitude / m"}
+SPAN, CLOSED = "reached the end of the span", "closed"  # ends that are no surprise
+ENDS = "*Xhd8"  # marks of the others, one for each reason
 
 
 @styled
@@ -33,6 +35,8 @@ def branch(
 ) -> Figure:
     """Response diagram: largest |u| at z over a period against the parameter, dashed where unstable.
 
+    Special orbits are marked, and where and why each direction ended: by a bar at an end of the span.
+
     Parameters
     ----------
     branches : one or several along the same parameter.
@@ -41,29 +45,24 @@ def branch(
     axes : to draw into; None makes a figure.
     labels : of the branches; None tells their period.
     """
+    from fembeam.plot.figure import sheet
+
     several = [branches] if not isinstance(branches, Sequence) else list(branches)
     require(bool(several), "nothing to draw", branches, "plot.branch", "give one branch or more")
     model = several[0].family.model
     place = observed(model) if z is None else z
-    axis = _axis() if axes is None else axes
+    figure, (axis,) = sheet(1, 1, (6.4, 3.8), axes)
     if cloud is not None:
         axis.plot(cloud[0], 1e3 * cloud[1], ".", color=GREY, markersize=2.0, label="simulated", rasterized=True)
     for i, one in enumerate(several):
         label = f"period {one.family.period}" if labels is None else labels[i]
         _draw_branch(axis, one, place, f"C{i}", label)
+    _draw_ends(axis, several, place)
     name = several[0].family.name
-    axis.set_xlabel(UNITS.get(name, name))
+    axis.set_xlabel(axis_name(name, model.scene))
     axis.set_ylabel(f"max |u({place:.4g} m)| / mm")
     _legend(axis, several)
-    figure: Any = axis.figure
-    return figure  # type: ignore[no-any-return]
-
-
-def _axis() -> Axes:
-    """One pair of axes in a new figure."""
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(6.4, 3.8), layout="constrained").subplots()
+    return figure
 
 
 def peak(orbit: Orbit, z: float) -> float:
@@ -91,6 +90,20 @@ def _draw_branch(axis: Axes, one: Branch, z: float, color: str, label: str) -> N
             axis.plot(orbit.parameter, height, marker, color=edge, markerfacecolor=face, markersize=3.5, linewidth=0.8)
 
 
+def _draw_ends(axis: Axes, several: list[Branch], z: float) -> None:
+    """A bar at the end of the span, elsewhere a mark for each reason; a closed branch has no end."""
+    ends = [(orbit, why.split(":")[0]) for one in several for orbit, why in one.ends]
+    reasons = [why for why in dict.fromkeys(why for _, why in ends) if why not in (SPAN, CLOSED)]
+    marks = {SPAN: ("|", GREY), **{why: (mark, RED) for why, mark in zip(reasons, ENDS, strict=False)}}
+    labelled = set()
+    for orbit, why in ends:
+        if why in marks:
+            label = None if why in labelled else f"end: {why}"
+            mark, colour = marks[why]
+            axis.plot(orbit.parameter, 1e3 * peak(orbit, z), mark, color=colour, markersize=8, zorder=3, label=label)
+            labelled.add(why)
+
+
 def _legend(axis: Axes, several: list[Branch]) -> None:
     """Branches, the dashes' meaning, the marks that occur."""
     from matplotlib.lines import Line2D
@@ -112,8 +125,12 @@ def _legend(axis: Axes, several: list[Branch]) -> None:
 
 
 @styled
-def orbit(one: Orbit, z: float | None = None) -> Figure:
+def orbit(one: Orbit, z: float | None = None, axes: Sequence[Axes] | None = None) -> Figure:
     """One orbit at z (m; None: the first stop): time history with its contacts shaded, and phase portrait.
+
+    Parameters
+    ----------
+    one : to draw. z : m. axes : two to draw into; None makes a figure.
 
     Examples
     --------
@@ -125,11 +142,10 @@ def orbit(one: Orbit, z: float | None = None) -> Figure:
     >>> [axis.get_xlabel() for axis in orbit(model.orbit()).axes]
     ['t / ms', 'u / mm']
     """
-    from matplotlib.figure import Figure
+    from fembeam.plot.figure import heading, sheet
 
     place = observed(one.model) if z is None else z
-    figure = Figure(figsize=(6.4, 2.8), layout="constrained")
-    left, right = figure.subplots(1, 2, width_ratios=[3, 2])
+    figure, (left, right) = sheet(1, 2, (6.4, 2.8), axes, width_ratios=[3, 2])
     t, u, v = one.run.t, 1e3 * one.run.displacement(place), one.run.velocity(place)
     left.plot(1e3 * t, u)
     for begin, end in zip(one.contacts.t_in, one.contacts.t_out, strict=True):
@@ -142,7 +158,6 @@ def orbit(one: Orbit, z: float | None = None) -> Figure:
     right.set_ylabel("velocity / m/s")
     kind = "stable" if one.stable else "unstable"
     at = "" if np.isnan(one.parameter) else f" at {one.parameter:.6g}"
-    figure.suptitle(
-        f"Period {one.period}, {counted(len(one.contacts), 'contact')}, {kind}{at}", x=0.01, ha="left", fontsize=10
-    )
+    title = f"Period {one.period}, {counted(len(one.contacts), 'contact')}, {kind}{at}"
+    heading([left], title, axes is None, weight="normal")
     return figure

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fembeam.plot.orbits import branch
-from fembeam.plot.style import BLUE, GREY, RED, fit_levels, sheet, styled
+from fembeam.plot.style import BLUE, GREY, RED, fit_levels, styled
 from fembeam.statistics import Spectrum
 
 if TYPE_CHECKING:
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from fembeam.statistics import Signal
 
 Vector = NDArray[np.float64]
-SURE = 1.96  # standard errors on either side: 95 %
 FURTHEST = 5.0  # standard deviations shown of a density
 
 
@@ -30,6 +29,7 @@ def random_spectra(
     omega_max: float,
     bands: Mapping[str, tuple[float, float]] | None = None,
     branches: Mapping[str, Sequence[Branch]] | None = None,
+    axes: Axes | Sequence[Axes] | None = None,
 ) -> Figure:
     """Power spectral densities, one panel each, with 95 % confidence shaded where it is known.
 
@@ -39,12 +39,16 @@ def random_spectra(
     omega_max : rad/s, end of the axes.
     bands : title -> excited band in rad/s, marked on top of its panel.
     branches : title -> branches of periodic motion along ω, drawn beside the panel of that title.
+    axes : to draw into, one per panel, with branches two, the spectrum's first; None makes a figure.
     """
+    from fembeam.plot.figure import sheet
+
     columns = 2 if branches else 1
-    figure, axes = sheet(None, len(panels), columns, (4.6 * columns + 2.4, 2.1 * len(panels) + 0.5), squeeze=False)
+    size = 4.6 * columns + 2.4, 2.1 * len(panels) + 0.5
+    figure, drawn = sheet(len(panels), columns, size, axes, squeeze=False)
     for row, (title, shown) in enumerate(panels.items()):
         lines = {label: x if isinstance(x, Spectrum) else x.psd for label, x in shown.items()}
-        axis = axes[row * columns]
+        axis = drawn[row * columns]
         for i, (label, line) in enumerate(lines.items()):
             _curve(axis, line, omega_max, label, f"C{i}")
         fit_levels(axis, list(lines.values()), omega_max)
@@ -54,19 +58,20 @@ def random_spectra(
         if len(lines) > 1:
             axis.legend(loc="upper right")
         if branches:
-            _beside(axes[row * columns + 1], branches.get(title), omega_max)
-    for axis in axes[-columns:]:
+            _beside(drawn[row * columns + 1], branches.get(title), omega_max)
+    for axis in drawn[-columns:]:
         axis.set_xlabel("ω / rad s⁻¹")
     return figure
 
 
 @styled
-def random_densities(signals: Mapping[str, Signal]) -> Figure:
+def random_densities(signals: Mapping[str, Signal], axes: Axes | Sequence[Axes] | None = None) -> Figure:
     """Probability densities with 95 % confidence against the Gaussian of the same mean and deviation.
 
     Parameters
     ----------
     signals : name -> signal, m, such as those of `fembeam.study.stationary`.
+    axes : to draw into, one per signal; None makes a figure.
 
     Examples
     --------
@@ -78,20 +83,22 @@ def random_densities(signals: Mapping[str, Signal]) -> Figure:
     >>> random_densities({"tip": found["tip u"]}).axes[0].get_xlabel()
     'tip / mm'
     """
-    figure, axes = sheet(None, 1, len(signals), (3.5 * len(signals), 3.1))
-    for axis, (name, signal) in zip(axes, signals.items(), strict=True):
+    from fembeam.plot.figure import sheet
+
+    figure, drawn = sheet(1, len(signals), (3.5 * len(signals), 3.1), axes)
+    for axis, (name, signal) in zip(drawn, signals.items(), strict=True):
         density, mean, std = signal.pdf, 1e3 * float(signal.mean.value), 1e3 * float(signal.std.value)
         x, p = 1e3 * density.x, 1e-3 * density.density
         axis.plot(x, p, color=BLUE, label="simulated, 95 %")
-        if density.standard_error is not None:
-            _ribbon(axis, x, p, 1e-3 * density.standard_error, BLUE)
+        if density.estimate is not None:
+            _ribbon(axis, x, [1e-3 * bound for bound in density.interval()], BLUE)
         wide = mean + std * np.linspace(-FURTHEST, FURTHEST, 301)
         normal = np.exp(-0.5 * ((wide - mean) / std) ** 2) / (std * np.sqrt(2 * np.pi))
         axis.plot(wide, normal, color=RED, linestyle="--", label="Gaussian")
         axis.set_title(f"{name}: skewness {signal.skewness!r}")
         axis.set(xlabel=f"{name} / mm", xlim=(wide[0], wide[-1]), ylim=(0, None))
-    axes[0].set_ylabel("probability density / mm⁻¹")
-    axes[0].legend(loc="upper left")
+    drawn[0].set_ylabel("probability density / mm⁻¹")
+    drawn[0].legend(loc="upper left")
     return figure
 
 
@@ -99,13 +106,14 @@ def _curve(axis: Axes, line: Spectrum, omega_max: float, label: str, colour: str
     """One spectrum without ω = 0, with its confidence."""
     kept = (line.omega > 0) & (line.omega <= omega_max) & (line.density > 0)
     axis.semilogy(line.omega[kept], line.density[kept], color=colour, label=label)
-    if line.standard_error is not None:
-        _ribbon(axis, line.omega[kept], line.density[kept], line.standard_error[kept], colour)
+    if line.estimate is not None:
+        _ribbon(axis, line.omega[kept], [bound[kept] for bound in line.interval()], colour)
 
 
-def _ribbon(axis: Axes, x: Vector, y: Vector, error: Vector, colour: str) -> None:
-    """A shaded 95 % interval, above zero."""
-    axis.fill_between(x, np.maximum(y - SURE * error, 0.05 * y), y + SURE * error, color=colour, alpha=0.3, linewidth=0)
+def _ribbon(axis: Axes, x: Vector, bounds: Sequence[Vector], colour: str) -> None:
+    """A shaded 95 % interval, which is not below zero."""
+    low, high = bounds
+    axis.fill_between(x, np.maximum(low, 0.0), high, color=colour, alpha=0.3, linewidth=0)
 
 
 def _beside(axis: Axes, several: Sequence[Branch] | None, omega_max: float) -> None:

@@ -55,10 +55,9 @@ def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
 
 def sheet(run: Run | None, rows: int, columns: int, size: tuple[float, float], **options: Any) -> tuple[Figure, Any]:
     """A figure with its axes as a flat list."""
-    from matplotlib.figure import Figure
+    from fembeam.plot.figure import sheet as drawn_sheet
 
-    figure = Figure(figsize=size, layout="constrained")
-    return figure, list(np.atleast_1d(figure.subplots(rows, columns, **options)).ravel())
+    return drawn_sheet(rows, columns, size, **options)
 
 
 def titled(figure: Figure, run: Run | None, title: str) -> Figure:

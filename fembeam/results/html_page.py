@@ -12,7 +12,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fembeam.support import written_whole
+from fembeam.support import html_table, written_whole
 
 if TYPE_CHECKING:
     from fembeam.scene import Source
@@ -114,21 +114,21 @@ def _simulation(found: dict[str, Any]) -> Iterator[str]:
             [i + 1, w, w / 6.283185307179586, z]
             for i, (w, z) in enumerate(zip(found["omega"], found["zeta"], strict=True))
         ]
-        yield "<h2>Model</h2>" + table(["coordinate", "ω / rad s⁻¹", "Hz", "ζ"], rows)
+        yield "<h2>Model</h2>" + html_table(["coordinate", "ω / rad s⁻¹", "Hz", "ζ"], rows)
     if found["moments"]:
         names = {"mean": "mean / m", "std": "std / m", "std_error": "± s.e.", "skewness": "skewness",
                  "kurtosis": "kurtosis", "min": "min / m", "max": "max / m"}  # fmt: skip
         rows = [[words, *(row.get(key) for row in found["moments"].values())] for key, words in names.items()]
-        yield "<h2>Response</h2>" + table(["", *found["moments"]], rows)
+        yield "<h2>Response</h2>" + html_table(["", *found["moments"]], rows)
         yield f'<p class="note">{escape(found["confidence"])}</p>'
     if found["contacts"]:
         rows = [[words, *(_of_stop(row, *keys) for row in found["contacts"])] for words, *keys in CONTACT_ROWS]
-        yield "<h2>Contacts</h2>" + table(["", *(f"stop {row['stop']}" for row in found["contacts"])], rows)
+        yield "<h2>Contacts</h2>" + html_table(["", *(f"stop {row['stop']}" for row in found["contacts"])], rows)
     if found["energy"]:
         names = {"input": "put in", "damping": "lost in damping", "contact": "lost in contacts", "stored": "stored"}
         rows = [[words, found["energy"][name]] for name, words in names.items()]
         residual = found["energy"]["residual_over_input"]
-        yield "<h2>Energy</h2>" + table(["", "J"], rows)
+        yield "<h2>Energy</h2>" + html_table(["", "J"], rows)
         yield f'<p class="note">Missing in this balance, an estimate of the error: {residual:.1e} of the input.</p>'
 
 
@@ -157,24 +157,6 @@ def _settings(found: dict[str, Any], source: Source | None) -> Iterator[str]:
     if found:
         versions = ", ".join(f"{name} {number}" for name, number in found["versions"].items())
         yield f'<p class="note">{escape(found["units"])}. {escape(versions)}.</p>'
-
-
-def table(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
-    r"""A table that scrolls sideways where the screen is narrow.
-
-    Examples
-    --------
-    >>> table(["", "m"], [["u & v", 0.1]])
-    '<div class="wide"><table><tr><th></th><th>m</th></tr>\n<tr><td>u &amp; v</td><td>0.1</td></tr></table></div>'
-    """
-    lines = ["".join(f"<th>{escape(str(cell))}</th>" for cell in head)]
-    lines += ["".join(f"<td>{escape(_cell(cell))}</td>" for cell in row) for row in rows]
-    return '<div class="wide"><table>' + "\n".join(f"<tr>{line}</tr>" for line in lines) + "</table></div>"
-
-
-def _cell(value: Any) -> str:
-    """A value of a table."""
-    return "–" if value is None else f"{value:.5g}" if isinstance(value, float) else str(value)
 
 
 def _words(name: str) -> str:

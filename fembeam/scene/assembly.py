@@ -143,6 +143,9 @@ class Matrices:
             return f"{size}: elements as asked, frequency_error(omega) estimates the error"
         return f"{size}: the lowest {self.modes} frequencies are right to {FREQUENCY_TOLERANCE:g} relative"
 
+    def __repr__(self) -> str:
+        return f"<matrices of {self.accuracy}>"
+
     def __str__(self) -> str:
         return f"Matrices: {self.accuracy}"
 

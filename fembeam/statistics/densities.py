@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fembeam.statistics.batches import Estimate
+
 MOST_BINS = 200
 
 
@@ -24,11 +26,23 @@ class Density:
         Probability per unit of x; the sum of density times bin width is 1.
     standard_error : array, shape (n,), optional
         Of the density, where it was estimated from batches of a long run.
+    estimate : Estimate, optional
+        The density with what its intervals are made from.
     """
 
     x: NDArray[np.float64]
     density: NDArray[np.float64]
     standard_error: NDArray[np.float64] | None = None
+    estimate: Estimate | None = None
+
+    def interval(self, confidence: float = 0.95) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Bounds (n,), (n,) of the density's confidence interval in each bin; see `Estimate.interval`."""
+        if self.estimate is None:
+            raise ValueError("this density has no scatter to tell an interval from; take one of `stationary`")
+        return self.estimate.interval(confidence)
+
+    def __repr__(self) -> str:
+        return f"<density of {self.x.size} bins, {self.x[0]:.4g} to {self.x[-1]:.4g}>"
 
     def __iter__(self) -> Iterator[NDArray[np.float64]]:
         return iter((self.x, self.density))

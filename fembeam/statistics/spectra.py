@@ -44,6 +44,9 @@ class Spectrum:
     standard_error: NDArray[np.float64] | None = None
     estimate: Estimate | None = None
 
+    def __repr__(self) -> str:
+        return f"<spectrum of {self.omega.size} lines to {self.omega[-1]:.6g} rad/s, {self.n_segments} segments>"
+
     def __iter__(self) -> Iterator[NDArray[np.float64]]:
         return iter((self.omega, self.density))
 

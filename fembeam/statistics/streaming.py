@@ -53,6 +53,10 @@ class Signal:
         self._last: tuple[float, float] | None = None
         self.smallest, self.largest = math.inf, -math.inf
 
+    def __repr__(self) -> str:
+        total = self.batches.total
+        return f"<signal of {int(total[N])} samples, std {float(self.std.value):.4g}>" if total[N] else "<empty signal>"
+
     def cut(self) -> None:
         """The next samples do not follow the last ones."""
         self._last = None
@@ -125,7 +129,7 @@ class Signal:
         """Probability density; its integral is 1 - `outside`."""
         width = np.diff(self.edges)
         found = self._of(lambda s: s[PLAIN + 1 : self._welch_at - 1] / (s[N] * width))
-        return Density((self.edges[1:] + self.edges[:-1]) / 2, found.value, found.standard_error)
+        return Density((self.edges[1:] + self.edges[:-1]) / 2, found.value, found.standard_error, found)
 
     @property
     def psd(self) -> Spectrum:

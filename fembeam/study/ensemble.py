@@ -21,7 +21,8 @@ from fembeam.statistics.batches import Estimate
 from fembeam.study.execution.checkpoint import Checkpoint, Values, identity
 from fembeam.study.execution.executors import spread
 from fembeam.study.realisations import Seed, child, noises, realisation, seed_key
-from fembeam.support import number
+from fembeam.support import Part, Printed, note, number
+from solvers.problem import counted, dataframe
 
 FIRST_ROUND = 8  # realisations before `until` is asked for the first time
 
@@ -35,7 +36,7 @@ class Failure:
 
 
 @dataclass(frozen=True, eq=False)
-class Ensemble:
+class Ensemble(Printed):
     """Values of a quantity over independent realisations.
 
     Attributes
@@ -60,12 +61,20 @@ class Ensemble:
             raise KeyError(f"the quantity has no {name!r}; it has {', '.join(map(repr, self.values))}")
         return Estimate.of_mean(self.values[name])
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
+        failed = f", {len(self.failures)} failed" if self.failures else ""
+        return f"<ensemble of {counted(len(self), 'realisation')}{failed}>"
+
+    def _parts(self) -> list[Part]:
         """Means and standard errors of the named numbers, one a line."""
         numbers = {name: self[name] for name, values in self.values.items() if values.ndim == 1}
-        width = max(map(len, numbers), default=0)
         head = f"{len(self)} realisations" + (f", {len(self.failures)} failed" if self.failures else "")
-        return "\n".join([head, *(f"{name:{width}}  {found!r}" for name, found in numbers.items())])
+        return [head, (("", "mean ± standard error"), [(name, repr(found)) for name, found in numbers.items()])]
+
+    def to_dataframe(self) -> Any:
+        """A table of pandas: one realisation a row, the named numbers as columns; ImportError without pandas."""
+        numbers = {name or "value": values for name, values in self.values.items() if values.ndim == 1}
+        return dataframe(numbers, index=[seed_key(seed) for seed in self.seeds])
 
     @property
     def mean(self) -> Estimate:
@@ -99,7 +108,7 @@ def ensemble(
         (functions, closures, globals, arguments) has changed. Files and the environment that these read are not seen.
     until : stop when the relative standard error of every mean is below it; asked after 8, 16, 32, … realisations
         in the order of the seeds, whatever the executor.
-    progress : show a bar (only on a terminal).
+    progress : show a bar (on terminals and in notebooks only).
 
     Returns
     -------
@@ -130,6 +139,7 @@ def ensemble(
         missing = [seed for seed in chosen[:count] if seed_key(seed) not in {*kept.values, *failed}]
         _compute(partial(_value, model, quantity), missing, kept, failed, executor, progress)
         found = _collected(chosen[:count], kept, failed, until)
+        note("%r, %d of them computed now", found, len(missing))
         if found.enough:
             break
     if found.failures:

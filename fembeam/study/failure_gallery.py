@@ -43,6 +43,9 @@ class Failure:
     our_error: float
     scale: str = "linear"
 
+    def __repr__(self) -> str:
+        return f"<failure: {self.title}, error {self.naive_error:.2g}, ours {self.our_error:.2g}>"
+
 
 def gallery(scene: Scene) -> list[Failure]:
     """All cases; ``scene`` is the beam of those with many modes, with one Hertz-like stop at its gap of zero.

@@ -24,7 +24,8 @@ import solvers
 from fembeam.study.execution.executors import spread
 from fembeam.study.measure import Case, Measured, Plan, Start, measure
 from fembeam.study.quantities import Quantity, label, named
-from fembeam.support import require
+from fembeam.support import Part, Printed, require
+from solvers.problem import dataframe
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -84,7 +85,7 @@ class Row:
 
 
 @dataclass(frozen=True, eq=False)
-class ModeCount:
+class ModeCount(Printed):
     """A convergence study; print it for the table.
 
     Attributes
@@ -141,10 +142,22 @@ class ModeCount:
                 return row
         raise ValueError(f"no row with {modes} modes, residual={residual}, in this study; rows are {self._names}")
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
+        return f"<convergence of {self.quantity} with modes, {len(self.rows)} models>"
+
+    def _parts(self) -> list[Part]:
         rates = f"observed rate: {self.rate:.2f} modes alone, {self.rate_residual:.2f} with static shapes"
-        doubt = [f"IN DOUBT: {self.doubt}"] if self.doubt else []
-        return "\n".join((self.quantity, table(HEAD, [row.cells() for row in self.rows]), rates, *doubt))
+        doubt: list[Part] = [f"IN DOUBT: {self.doubt}"] if self.doubt else []
+        return [self.quantity, (HEAD, [row.cells() for row in self.rows]), rates, *doubt]
+
+    def to_dataframe(self) -> Any:
+        """The rows as a table of pandas; ImportError without pandas."""
+        names = "modes", "residual", "value", "error", "uncertainty", "reference"
+        measured = "coordinates", "share", "periods", "seconds"
+        return dataframe([
+            {name: getattr(row, name) for name in names} | {name: getattr(row.measured, name) for name in measured}
+            for row in self.rows
+        ])  # fmt: skip
 
     def figure(self) -> Figure:
         """Error and time against the number of coordinates."""
@@ -294,13 +307,6 @@ def observed_rate(rows: Sequence[Row]) -> float:
         return float("nan")
     modes, errors = np.log(used).T
     return -float(np.polyfit(modes, errors, 1)[0])
-
-
-def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Columns aligned to the right."""
-    widths = [max(len(row[i]) for row in (head, *rows)) for i in range(len(head))]
-    lines = ["  ".join(c.rjust(w) for c, w in zip(row, widths, strict=True)).rstrip() for row in (head, *rows)]
-    return "\n".join(lines)
 
 
 def checked_counts(counts: Iterable[int]) -> list[int]:

@@ -9,7 +9,8 @@ import numpy as np
 
 import solvers
 from fembeam.study.measure import Measured
-from fembeam.study.mode_count import table
+from fembeam.support import Part, Printed
+from solvers.problem import dataframe
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -55,7 +56,7 @@ class Evidence:
 
 
 @dataclass(frozen=True, eq=False)
-class SmallestModel:
+class SmallestModel(Printed):
     """The answer; print it for the evidence.
 
     Attributes
@@ -101,12 +102,25 @@ class SmallestModel:
         """The solver with that tolerance."""
         return None if self.choice is None else solvers.Exponential(self.choice.rtol)
 
-    def __str__(self) -> str:
-        parts = [f"{self.quantity} to {self.tolerance:g}: {self.verdict}"]
+    def __repr__(self) -> str:
+        return f"<smallest model for {self.quantity} to {self.tolerance:g}: {self.verdict}>"
+
+    def _parts(self) -> list[Part]:
+        parts: list[Part] = [f"{self.quantity} to {self.tolerance:g}: {self.verdict}"]
         for title, lines in (("reduction", self.reduction), ("integration", self.integration)):
             if lines:
-                parts += [f"\n{title}:", table(HEAD, [line.cells() for line in lines])]
-        return "\n".join(parts)
+                parts += [f"\n{title}:", (HEAD, [line.cells() for line in lines])]
+        return parts
+
+    def to_dataframe(self) -> Any:
+        """The rows as a table of pandas; ImportError without pandas."""
+        lines = [("reduction", line) for line in self.reduction] + [("integration", line) for line in self.integration]
+        names = "error", "uncertainty", "remark"
+        return dataframe([
+            {"part": part} | line.choice._asdict() | {name: getattr(line, name) for name in names}
+            | {"coordinates": line.measured.coordinates, "seconds": line.measured.seconds}
+            for part, line in lines
+        ])  # fmt: skip
 
     def figure(self) -> Figure:
         """Errors against coordinates and against rtol, with the tolerance."""

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 import solvers
 from fembeam.model import Run
 from fembeam.study.speed_accuracy_result import Point, SpeedAccuracy, median
-from fembeam.support import require, require_positive
+from fembeam.support import counting, require, require_positive
 
 if TYPE_CHECKING:
     from fembeam.model import Model
@@ -61,7 +61,7 @@ def speed_accuracy(
     agreement : largest difference of the two references, relative to the quantity's size; for statistics on long
         horizons, where runs differ, as much as their scatter.
     rounds : how often each run is timed; the fastest counts. Slow settings run fewer, very slow ones fewer starts.
-    progress : show a bar (only on a terminal).
+    progress : show a bar (on terminals and in notebooks only).
 
     Returns
     -------
@@ -223,12 +223,10 @@ def _references(models: list[Model], states: Vector, ask: _Question, agreement: 
 
 def _measure(trials: list[_Trial], states: Vector, ask: _Question, rounds: int, progress: bool) -> None:
     """All trials by turns, so that a slow moment of the machine hits all alike."""
-    from tqdm import tqdm
-
     for trial in trials:  # compile, build tables
         trial.measure(0, states[0], ask)
         trial.seconds.clear()
-    for turn in tqdm(range(rounds), disable=None if progress else True):
+    for turn in counting(progress, range(rounds)):
         for trial in trials:
             for start, state in enumerate(states):
                 patient = trial.spent < (MORE_PATIENCE if turn else PATIENCE)

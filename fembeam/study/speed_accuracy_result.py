@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fembeam.support import written_whole
+from fembeam.support import Part, Printed, written_whole
+from solvers.problem import dataframe
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -63,7 +64,7 @@ class Point:
 
 
 @dataclass(frozen=True, eq=False)
-class SpeedAccuracy:
+class SpeedAccuracy(Printed):
     """The answer of `speed_accuracy`.
 
     Attributes
@@ -120,19 +121,18 @@ class SpeedAccuracy:
             for p in self.points
         ]
 
-    def __str__(self) -> str:
-        lines = [
-            f"{'method':18s} {'setting':>22s} {'modes':>5s} {'µs':>10s} {'error':>8s} {'total':>8s} {'law calls':>9s}"
-        ]
-        for row in self.rows():
-            head = f"{row['method']:18s} {row['setting']:>22s} {row['modes']:5d}"
-            numbers = (
-                f"{1e6 * row['seconds']:10.0f} {row['error']:8.1e} {row['total_error']:8.1e} {row['law_calls']:9.0f}"
-            )
-            lines.append(f"{head} {row['failure'] or numbers}{' front' if row['front'] else ''}")
-        lines += [f"{n} modes: reduction error {self.reduction[n]:.1e}, reference known to {self.floor[n]:.0e}"
-                  for n in self.reduction]  # fmt: skip
-        return "\n".join([*lines, self.claim()]).rstrip()
+    def __repr__(self) -> str:
+        return f"<speed against accuracy of {len(self.points)} points, {self.quantity}>"
+
+    def _parts(self) -> list[Part]:
+        head = "method", "setting", "modes", "µs", "error", "total", "law calls", ""
+        known = [f"{n} modes: reduction error {self.reduction[n]:.1e}, reference known to {self.floor[n]:.0e}"
+                 for n in self.reduction]  # fmt: skip
+        return [(head, [_cells(row) for row in self.rows()]), *known, *filter(None, [self.claim()])]
+
+    def to_dataframe(self) -> Any:
+        """The rows as a table of pandas; ImportError without pandas."""
+        return dataframe(self.rows())
 
     def figure(self) -> Figure:
         """``fb.plot.speed_accuracy`` of it."""
@@ -150,6 +150,16 @@ class SpeedAccuracy:
         writer.writerows(rows)
         with written_whole(Path(path)) as file:
             file.write(text.getvalue().encode())
+
+
+def _cells(row: dict[str, Any]) -> tuple[str, ...]:
+    """A line of the printed table; a failure stands in its last column."""
+    named = row["method"], row["setting"], str(row["modes"])
+    if row["failure"]:
+        return *named, "", "", "", "", row["failure"]
+    error, total = f"{row['error']:.1e}", f"{row['total_error']:.1e}"
+    numbers = f"{1e6 * row['seconds']:.0f}", error, total, f"{row['law_calls']:.0f}"
+    return *named, *numbers, "front" if row["front"] else ""
 
 
 def median(values: Vector) -> float:

@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 import solvers
 from fembeam.study.speed_accuracy import method_name
-from fembeam.support import require
+from fembeam.support import Part, Printed, require
+from solvers.problem import dataframe
 
 if TYPE_CHECKING:
     from fembeam.model import Model
@@ -37,7 +38,7 @@ class Verdict(IntEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class StabilityMap:
+class StabilityMap(Printed):
     """A grid of verdicts.
 
     Attributes
@@ -58,13 +59,24 @@ class StabilityMap:
     contact: Vector
     tolerance: float
 
-    def __str__(self) -> str:
-        letters = ".wMU"
-        lines = [f"{self.axis:>10s}  " + " ".join(f"{dt:7.1e}" for dt in self.steps) + "   predicted"]
-        for row, line, flight, contact in zip(self.rows, self.verdict, self.flight, self.contact, strict=True):
-            cells = " ".join(f"{letters[v]:^7s}" for v in line)
-            lines.append(f"{row:10g}  {cells}   {min(flight, contact):.1e}")
-        return "\n".join([*lines, ". accurate, w wrong, M missed contacts, U unstable"])
+    def __repr__(self) -> str:
+        return f"<stability of {self.method} over {len(self.steps)} steps and {len(self.rows)} values of {self.axis}>"
+
+    def _parts(self) -> list[Part]:
+        head = self.axis, *(f"{dt:.1e}" for dt in self.steps), "predicted"
+        limits = np.minimum(self.flight, self.contact)
+        rows = [
+            (f"{row:g}", *(".wMU"[v] for v in line), f"{limit:.1e}")
+            for row, line, limit in zip(self.rows, self.verdict, limits, strict=True)
+        ]
+        return [(head, rows), ". accurate, w wrong, M missed contacts, U unstable"]
+
+    def to_dataframe(self) -> Any:
+        """A table of pandas, one run a row; ImportError without pandas."""
+        row, column = np.indices(self.verdict.shape).reshape(2, -1)
+        words = [Verdict(int(one)).words for one in self.verdict.ravel()]
+        return dataframe({self.axis: self.rows[row], "step": self.steps[column], "verdict": words,
+                          "error": self.error.ravel()})  # fmt: skip
 
 
 def stability_map(

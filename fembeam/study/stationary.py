@@ -32,7 +32,8 @@ from fembeam.statistics.initial_transient import Settling, settling
 from fembeam.statistics.spectra import FINEST_RESOLUTION
 from fembeam.statistics.streaming import Signal
 from fembeam.study.segments import Segment, Segments
-from fembeam.support import bar, number
+from fembeam.support import Part, Printed, bar, note, number
+from solvers.problem import dataframe
 
 Vector = NDArray[np.float64]
 Watch = Callable[[Run], Any]
@@ -42,7 +43,7 @@ TRIES = 4  # segments dropped while the transient lasts
 
 
 @dataclass(frozen=True, eq=False)
-class Response:
+class Response(Printed):
     """Statistics of a stationary response.
 
     Attributes
@@ -68,6 +69,21 @@ class Response:
         if name not in self.signals:
             raise KeyError(f"no signal {name!r} was watched; there are {', '.join(self.signals)}")
         return self.signals[name]
+
+    def __repr__(self) -> str:
+        return f"<stationary response of {', '.join(self.signals)} over {self.duration:.4g} s>"
+
+    def _parts(self) -> list[Part]:
+        """Every number with its standard error and 95 % interval."""
+        rows = [(name, repr(one), *map(float, one.interval())) for name, one in self.numbers().items()]
+        return [repr(self), (("", "value ± standard error", "95 % from", "to"), rows)]
+
+    def to_dataframe(self) -> Any:
+        """A table of pandas: value, standard error and 95 % interval by name; ImportError without pandas."""
+        found = self.numbers()
+        columns = "value", "standard_error", "low", "high"
+        rows = [(one.value, one.standard_error, *one.interval()) for one in found.values()]
+        return dataframe([dict(zip(columns, map(float, row), strict=True)) for row in rows], index=list(found))
 
     def numbers(self) -> dict[str, Estimate]:
         """Every number with its standard error, by names such as "δ std" and "stop 0 rate"."""
@@ -110,7 +126,7 @@ def stationary(
     bins, levels : name -> edges of the histogram, level of the crossings (0 unless given).
     start : (2n,) as for `Model.simulate`.
     solver : None is ``solvers.Exponential(1e-8, ledger=False)``.
-    progress : show a bar (only on a terminal).
+    progress : show a bar (on terminals and in notebooks only).
 
     Raises
     ------
@@ -170,7 +186,9 @@ def stationary(
     if plan.index * plan.batches < 2:
         warnings.warn(f"{plan.kept:.4g} s hold one realisation of the noise, which tells no standard error; "
                       f"simulate at least {2 * plan.shortest:.3g} s", UserWarning, stacklevel=2)  # fmt: skip
-    return sums.response(plan, settled, enough)
+    response = sums.response(plan, settled, enough)
+    note("%r, %.4g s before it left out", response, response.discarded)
+    return response
 
 
 def characteristics(model: Model, duration: float, dt: float, **options: Any) -> dict[str, Any]:

@@ -13,15 +13,22 @@ from fembeam.support.checks import (
     require_positive,
 )
 from fembeam.support.files import written_whole
-from fembeam.support.progress import bar
+from fembeam.support.notes import note
+from fembeam.support.printed import Part, Printed, html_table
+from fembeam.support.progress import bar, counting
 from fembeam.support.text_tables import aligned
 from fembeam.support.versions import versions
 
 __all__ = [
+    "Part",
+    "Printed",
     "aligned",
     "bar",
+    "counting",
     "frozen",
+    "html_table",
     "is_finite",
+    "note",
     "number",
     "require",
     "require_finite",

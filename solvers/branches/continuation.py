@@ -23,7 +23,7 @@ from solvers.branches.reshooting import reshot
 from solvers.branches.subharmonic_end import Scaled
 from solvers.branches.walk import BranchStatus, Walk
 from solvers.orbits import Orbit, PeriodicProblem, at_zero, checked, checked_start, newton, orbit_of, solved_chain
-from solvers.problem import System
+from solvers.problem import System, counted
 
 
 @dataclass(eq=False)
@@ -35,6 +35,9 @@ class Branch:
 
     walks: list[Walk]
     kept: dict[int, Any] = field(default_factory=dict)  # for the user of the branch
+
+    def __repr__(self) -> str:
+        return f"<branch of {counted(len(self.orbits), 'orbit')}: {'; '.join(one.value for one in self.status)}>"
 
     @property
     def arms(self) -> list[Walk]:

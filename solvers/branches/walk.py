@@ -63,6 +63,9 @@ class Walk:
     passed: list[Point] = field(default_factory=list)
     values: list[float] = field(default_factory=list)  # of the parameter there
 
+    def __repr__(self) -> str:
+        return f"<one direction of a branch, {len(self.orbits)} orbits: {self.status.value}>"
+
     def __post_init__(self) -> None:
         self.first, self.step = self.point, self.step or 0.2 * self.largest
         self.orbits = [self.point.orbit]

@@ -13,7 +13,7 @@ import numpy as np
 from solvers.exponential.method import Exponential
 from solvers.integration import integrate
 from solvers.orbits.shots import Chain, PeriodicProblem, delayed
-from solvers.problem import Array, ContactLog, Solution, SolverError, System
+from solvers.problem import Array, ContactLog, Solution, SolverError, System, counted
 
 _NEAR_ONE = 0.01  # | |μ| - 1 | below which a verdict on stability is doubtful
 
@@ -62,6 +62,10 @@ class Orbit:
     doubt: str = ""
     parameter: float = math.nan
     mark: str = ""
+
+    def __repr__(self) -> str:
+        kind = "stable" if self.stable else "unstable"
+        return f"<{kind} orbit of {self.period:.6g} s, {counted(len(self.contacts), 'contact')}>"
 
     @cached_property
     def multipliers(self) -> Any:

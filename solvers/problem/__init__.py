@@ -8,6 +8,7 @@ Imports: numpy, scipy. Begin with `system.System`.
 """
 
 from solvers.problem.decoupling import decouple
+from solvers.problem.frames import dataframe, optional
 from solvers.problem.matrices import Array, dense, product
 from solvers.problem.memo import Memo
 from solvers.problem.result import COLUMNS, ContactLog, Cost, Energy, Solution, SolverError, Status, counted
@@ -30,10 +31,12 @@ __all__ = [
     "Status",
     "System",
     "counted",
+    "dataframe",
     "decouple",
     "dense",
     "hand_over",
     "on_one_grid",
+    "optional",
     "product",
     "require_step",
     "tones_as_nodes",

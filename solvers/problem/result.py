@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from solvers.problem.frames import dataframe
 from solvers.problem.matrices import Array
 from solvers.problem.system import stored_energy
 
@@ -123,6 +124,10 @@ class ContactLog:
     def arrays(self) -> dict[str, Any]:
         """All columns by name."""
         return {f.name: getattr(self, f.name) for f in fields(self)}
+
+    def to_dataframe(self) -> Any:
+        """A table of pandas, one contact a row, in SI units; ImportError where pandas is missing."""
+        return dataframe(self.arrays())
 
 
 COLUMNS = len(fields(ContactLog))

@@ -127,6 +127,9 @@ class System:
     about_structure: Memo = field(default_factory=Memo, init=False, repr=False)
     about_laws: Memo = field(default_factory=Memo, init=False, repr=False)
 
+    def __repr__(self) -> str:
+        return f"<system of size {self.size}, contacts: {len(self.contacts)}, loads: {len(self.loads)}>"
+
     def __post_init__(self) -> None:
         for name in "MCK":
             object.__setattr__(self, name, _square(name, getattr(self, name)))

@@ -10,6 +10,8 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import Executor, as_completed
 from typing import TypeVar
 
+from fembeam.support import counting
+
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
@@ -46,11 +48,9 @@ def spread(
     ...     spread(abs, [-3, 2, -1], pool)
     [3, 2, 1]
     """
-    from tqdm import tqdm
-
     work = list(items)
     tell = seen or (lambda index, result: None)
-    with tqdm(total=len(work), desc=progress, disable=None if progress else True) as bar:
+    with counting(progress is not None, total=len(work), desc=progress) as bar:
         if executor is None:
             results = []
             for index, item in enumerate(work):

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,7 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 import solvers
 from fembeam.model import load_period
 from fembeam.scene import changes_structure, path_of, with_value
-from fembeam.support import require
+from fembeam.support import Part, Printed, require
+from solvers.problem import dataframe
 
 if TYPE_CHECKING:
     from fembeam.model import Model
@@ -27,7 +28,7 @@ LOOKS = 128  # samples per period for the peaks
 
 
 @dataclass(frozen=True, eq=False)
-class Bifurcation:
+class Bifurcation(Printed):
     """What settled motion does at each value of a parameter.
 
     Attributes
@@ -41,6 +42,20 @@ class Bifurcation:
     parameter: Vector
     strobes: Vector
     peaks: Vector
+
+    def __repr__(self) -> str:
+        return f"<settled motion at {len(self.parameter)} values of {self.name}, {self.peaks.shape[1]} periods each>"
+
+    def _parts(self) -> list[Part]:
+        """Smallest and largest peak at each value."""
+        lowest, highest = 1e3 * self.peaks.min(axis=1), 1e3 * self.peaks.max(axis=1)
+        rows = list(zip(self.parameter.tolist(), lowest.tolist(), highest.tolist(), strict=True))
+        return [repr(self), ((self.name, "smallest peak / mm", "largest peak / mm"), rows)]
+
+    def to_dataframe(self) -> Any:
+        """A table of pandas, one period a row, the peak in m; ImportError without pandas."""
+        parameter, peaks = self.cloud()
+        return dataframe({self.name: parameter, "peak": peaks})
 
     def cloud(self) -> tuple[Vector, Vector]:
         """(parameter, peak) of every period, flat, as `fembeam.plot.branch` takes it."""

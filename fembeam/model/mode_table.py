@@ -5,7 +5,11 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from fembeam.support import aligned
+
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from fembeam.model import Model
 
 
@@ -23,16 +27,16 @@ def mode_rows(model: Model) -> list[dict[str, Any]]:
 
 def mode_table(model: Model) -> str:
     """The rows as text, with units and the sum."""
+    return aligned(*mode_part(model))
+
+
+def mode_part(model: Model) -> tuple[Sequence[str], list[Sequence[str]]]:
+    """Head and rows of the table: units first, the sum last."""
     mass = model.moving_mass
     head = "mode", "rad/s", "Hz", "zeta", "participation", "effective mass", "% of moving mass"
-    unit = "", "", "", "", "√kg", "kg", f"{mass:.6g} kg"
     formats = "", ".6f", ".6f", ".4g", ".6g", ".6g", ".3f"
     found = mode_rows(model)
-    rows = [tuple(map(format, [*list(row.values())[:-1], 100 * row["share"]], formats)) for row in found]
+    rows: list[Sequence[str]] = [("", "", "", "", "√kg", "kg", f"{mass:.6g} kg")]
+    rows += [tuple(map(format, [*list(row.values())[:-1], 100 * row["share"]], formats)) for row in found]
     share = 100 * sum(row["share"] for row in found)
-    rows.append(("all", "", "", "", "", f"{model.effective_mass.sum():.6g}", f"{share:.3f}"))
-    widths = [max(len(row[i]) for row in (head, unit, *rows)) for i in range(len(head))]
-    lines = [
-        "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in (head, unit, *rows)
-    ]
-    return "\n".join(line.rstrip() for line in lines)
+    return head, [*rows, ("all", "", "", "", "", f"{model.effective_mass.sum():.6g}", f"{share:.3f}")]

@@ -1,0 +1,72 @@
+"""Names of a scene's numbers in words, with units, for axes."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from fembeam.scene import Scene
+
+SIGNALS = {"base": "base", "foot": "foot", "signal": "drive"}
+LAWS = {"stiffness": ("contact stiffness", "N/m^p"), "exponent": ("exponent of the contact law", ""),
+        "damping_factor": ("hysteresis factor", "s/m"), "damping": ("contact damping", "N s/m^p")}  # fmt: skip
+PARTS = {
+    "gap": ("gap", "m"), "z": ("place z", "m"), "mass": ("mass", "kg"), "inertia": ("rotary inertia", "kg m²"),
+    "stiffness": ("stiffness", "N/m"), "rotational": ("rotational stiffness", "N m/rad"),
+    "damping": ("damping", "N s/m"), "length": ("length", "m"), "E": ("Young's modulus", "N/m²"),
+    "rho": ("density", "kg/m³"), "A": ("area", "m²"), "I": ("second moment of area", "m⁴"),
+    "gravity": ("gravity", "m/s²"), "alpha": ("Rayleigh's α", "1/s"), "beta": ("Rayleigh's β", "s"),
+    "axial_force": ("axial force", "N"), "foundation": ("foundation stiffness", "N/m²"),
+    "velocity": ("velocity", "m/s"), "offset": ("offset of the centre of mass", "m"), "zeta": ("damping ratio ζ", ""),
+}  # fmt: skip
+OWNERS = {"masses": "mass", "springs": "spring", "dashpots": "dashpot", "stops": "stop", "forces": "force",
+          "bodies": "beam"}  # fmt: skip
+
+
+def axis_name(path: str, scene: Scene) -> str:
+    """A parameter of a scene as the words of an axis, with its unit; a path that is not known stays as it is.
+
+    Examples
+    --------
+    >>> from fembeam import Beam, Scene, Section
+    >>> scene = Scene(Beam(0.5, Section.circle(2.1e11, 7800.0, 0.01)))
+    >>> axis_name("forces[0].signal.omega", scene), axis_name("stops[1].gap", scene)
+    ('drive frequency ω / rad s⁻¹', 'gap of stop 1 / m')
+    """
+    owner = re.match(r"(bodies\[(\d+)\]\.)?(\w+)(\[(\d+)\])?", path)
+    last = re.sub(r"\[\d+\]$", "", path.rsplit(".", 1)[-1])
+    assert owner is not None
+    kind, number, beam = owner[3], owner[5], owner[2]
+    signal = next((part for part in path.split(".") if part in SIGNALS), "")
+    if signal:
+        turns = kind == "forces" and _turns(scene, beam, int(number))
+        name, unit = _of_signal(kind, signal, last, turns)
+    elif kind == "dashpots" and last == "rotational":
+        name, unit = f"rotational damping of dashpot {number}", "N m s/rad"
+    else:
+        name, unit = (LAWS if ".law." in path else PARTS).get(last, ("", ""))
+        name += f" of {OWNERS[kind]} {number}" if name and kind in OWNERS else ""
+    if not name:
+        return path
+    name += f" of beam {int(beam) + 1}" if beam else ""
+    return f"{name} / {unit}" if unit else name
+
+
+def _turns(scene: Scene, beam: str | None, number: int) -> bool:
+    """Whether a force of a scene, or of one of its further beams, is a moment."""
+    from fembeam.scene import PointMoment
+
+    forces = (scene if beam is None else scene.bodies[int(beam)]).forces
+    return number < len(forces) and isinstance(forces[number], PointMoment)
+
+
+def _of_signal(kind: str, signal: str, last: str, turns: bool) -> tuple[str, str]:
+    """Name and unit of a signal's number."""
+    if last == "omega":
+        return "drive frequency ω", "rad s⁻¹"
+    if last == "phase":
+        return f"{SIGNALS[signal]} phase", "rad"
+    if last == "amplitude":
+        return f"{SIGNALS[signal]} amplitude", "m" if kind != "forces" else "N m" if turns else "N"
+    return "", ""

@@ -1,0 +1,97 @@
+"""The figures of this library: made without pyplot, shown by notebooks as they are and by `show` in a window."""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib import figure as of_matplotlib
+
+from fembeam.support import require
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+
+MANY_ROOM = "the axes must be as many as the figure has panels"
+
+
+class Figure(of_matplotlib.Figure):
+    """A matplotlib Figure that pyplot learns of when it is shown, and not before.
+
+    Examples
+    --------
+    >>> import matplotlib.pyplot as plt
+    >>> figure = Figure()
+    >>> figure._repr_png_()[1:4], plt.get_fignums()
+    (b'PNG', [])
+    """
+
+    def _repr_png_(self) -> bytes:
+        """The picture a notebook shows."""
+        file = io.BytesIO()
+        self.savefig(file, format="png", dpi=self.dpi)
+        return file.getvalue()
+
+    def show(self, warn: bool = True) -> None:
+        """Open a window and, in a script, wait until it is closed; in a notebook the picture appears.
+
+        Parameters
+        ----------
+        warn : as matplotlib does, when its backend has no windows; without a display there is no picture and no word.
+        """
+        import warnings
+
+        from matplotlib import pyplot as plt
+
+        manager = self.canvas.manager
+        if manager is None or not plt.fignum_exists(manager.num):
+            plt.figure(FigureClass=lambda **_: self)  # type: ignore[arg-type]  # makes a window for this very figure
+        with warnings.catch_warnings():
+            if not warn:
+                warnings.simplefilter("ignore", UserWarning)
+            plt.show()
+
+
+def sheet(
+    rows: int, columns: int, size: tuple[float, float], axes: Axes | Sequence[Axes] | None = None, **options: Any
+) -> tuple[of_matplotlib.Figure, list[Axes]]:
+    """A new figure with its axes as a flat list, or the axes that are given and their figure.
+
+    Parameters
+    ----------
+    rows, columns, size : of the panels, and of the figure in inches.
+    axes : to draw into: one, or as many as there are panels, row by row; None makes a figure.
+    options : of `Figure.subplots`.
+
+    Raises
+    ------
+    ValueError : another number of axes.
+    """
+    if axes is None:
+        made = Figure(figsize=size, layout="constrained")
+        return made, list(np.atleast_1d(made.subplots(rows, columns, **options)).ravel())
+    given: list[Axes] = list(np.ravel(np.asarray(axes, dtype=object)))
+    require(len(given) == rows * columns, MANY_ROOM, len(given), "fembeam.plot", f"give {rows * columns}")
+    figure: Any = given[0].figure
+    return figure, given
+
+
+def heading(axes: Sequence[Axes], title: str, own: bool, weight: str = "bold") -> None:
+    """A title over a figure of our own, or over the first of the axes that were given."""
+    figure: Any = axes[0].figure
+    if own:
+        figure.suptitle(title, x=0.01, ha="left", fontsize=10, fontweight=weight)
+    else:
+        axes[0].set_title(title)
+
+
+def legend(axis: Axes, own: bool, loc: str, **options: Any) -> None:
+    """A legend beside the axes of a figure of our own, or within axes that were given."""
+    figure: Any = axis.figure
+    if own:
+        figure.legend(loc=loc, **options)
+    else:
+        axis.legend(**options)
