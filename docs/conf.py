@@ -37,7 +37,7 @@ html_theme_options = {
     "footer_start": ["copyright"],
     "footer_end": [],
 }
-copyright = "MIT licence. SI units, angular frequencies in rad/s"
+copyright = "2026, the fembeam authors; MIT licence"
 
 autosummary_generate = True
 autosummary_ignore_module_all = False
