@@ -22,6 +22,7 @@ extensions = [
 exclude_patterns = ["_build", "_templates", "guide.md", "gallery/*.md5", "gallery/*.ipynb", "gallery/*.py"]
 templates_path = ["_templates"]
 default_role = "py:obj"
+highlight_language = "none"  # indented blocks are formulas; code says its language
 suppress_warnings = ["config.cache"]  # the order of examples is a class of ours
 myst_heading_anchors = 3
 
