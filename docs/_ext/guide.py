@@ -38,6 +38,9 @@ def pieces() -> dict[tuple[str, str], str]:
 
 def expanded(text: str) -> str:
     """A page with the guide's sections in their places."""
+    lost = [name for name, words in MARK.findall(text) if (name, words) not in pieces()]
+    if lost:
+        raise ValueError(f"guide.md has no section {lost[0]!r}, which a page asks for; rename it in both")
     return MARK.sub(lambda mark: pieces()[mark[1], mark[2] or ""], text)
 
 
