@@ -1,0 +1,71 @@
+"""The scripts of `examples/` for sphinx-gallery: in course order, with headings and the figures they write."""
+
+import re
+import shutil
+from pathlib import Path
+
+from docstrings import blocks
+from sphinx_gallery.scrapers import figure_rst
+
+HOME = Path(__file__).resolve().parent.parent
+EXAMPLES = HOME.parent / "examples"
+COPIES = HOME / "_build" / "examples"
+HEADER = """Course
+======
+
+One idea per script, each ending in an asserted number, from theory or from an independent computation. Output and
+figures are of this build; long ones ran with their switch ``--quick``. Every page offers its script and a notebook.
+"""
+
+
+def copy() -> None:
+    """Copies of all scripts, whose docstrings begin with a heading, and of the files they read."""
+    COPIES.mkdir(parents=True, exist_ok=True)
+    for path in [*EXAMPLES.glob("*.toml"), *EXAMPLES.glob("*.csv")]:
+        shutil.copy(path, COPIES)
+    (COPIES / "GALLERY_HEADER.rst").write_text(HEADER, encoding="utf-8")
+    for path in EXAMPLES.glob("*.py"):
+        (COPIES / path.name).write_text(headed(path.read_text(encoding="utf-8")), encoding="utf-8")
+
+
+def headed(code: str) -> str:
+    """A script whose docstring has a title: its first sentence up to the colon."""
+    _, text, rest = code.split('"""', 2)
+    title = re.split(r"[:.]", " ".join(text.split("\n\n")[0].split()), maxsplit=1)[0]
+    return f'r"""\n{title}\n{"=" * len(title)}\n\n{blocks(text)}\n"""{rest}'
+
+
+class Lesson:
+    """Key that sorts scripts by their number in the course."""
+
+    def __init__(self, folder: str) -> None:
+        course = (EXAMPLES / "README.md").read_text(encoding="utf-8")
+        self.names = re.findall(r"^\| \d+ \| \[(\w+\.py)\]", course, re.MULTILINE)
+
+    def __call__(self, name: str) -> int:
+        """Place of a script."""
+        return self.names.index(Path(name).name)
+
+
+def written_figures(block: object, variables: dict, gallery_conf: dict) -> str:
+    """Take over the PNG files that a script has written into its folder."""
+    found = []
+    for path in sorted(COPIES.glob("*.png"), key=lambda path: path.stat().st_mtime):
+        target = next(variables["image_path_iterator"])
+        shutil.move(path, target)
+        found.append(target)
+    return figure_rst(found, gallery_conf["src_dir"])
+
+
+def arguments(gallery_conf: dict, variables: dict) -> list[str]:
+    """The quick way, and a name for the figure, where a script takes them; it also learns where its file is."""
+    variables["example_globals"]["__file__"] = variables["src_file"]
+    code = Path(variables["src_file"]).read_text(encoding="utf-8")
+    offered = {"[FIGURE.png]": "figure.png", "--quick": "--quick"}
+    return [argument for sign, argument in offered.items() if sign in code]
+
+
+def setup(app: object) -> dict[str, bool]:
+    """Copy before the gallery looks for its scripts."""
+    app.connect("config-inited", lambda app, config: copy(), priority=1)
+    return {"parallel_read_safe": True}
