@@ -204,8 +204,8 @@ def test_numbers_of_contacts_follow_the_bodies(tmp_path):
                      impactors=[fb.Impactor(0.4, 0.1, -1.0, HERTZ, gap=3e-3)],
                      stops=[fb.Stop(0.5, HERTZ, 1e-3), fb.Stop(0.2, HERTZ, 4e-3, on=(1, 0.2))])  # fmt: skip
     model = scene.reduce(2)
-    assert [touch.gap for touch in model.touches] == [1e-3, 4e-3, 3e-3, 2e-3]
-    assert [touch.body for touch in model.touches] == [0, 0, 0, 1]
+    assert [row.gap for row in model.contact_rows] == [1e-3, 4e-3, 3e-3, 2e-3]
+    assert [row.body for row in model.contact_rows] == [0, 0, 0, 1]
     assert model.phi(0.5)[0] > 0
     assert model.phi(0.3, body=1)[2] > 0
     assert model.names == ["1", "2", "1 of beam 1", "2 of beam 1", "impactor 0"]

@@ -253,7 +253,7 @@ def test_an_ensemble_is_written_and_goes_on(tmp_path, capsys):
     found = json.loads((out / "ensemble.json").read_text())
     assert found["numbers"]["δ skewness"]["mean"] < -0.7
     ensemble_scene(tmp_path, ("realisations = 3", "realisations = 4\nworkers = 2"))
-    assert "--resume to go on with them" in refused(capsys, "run", path, "--out", out)
+    assert "--resume to continue" in refused(capsys, "run", path, "--out", out)
     assert printed(capsys, "run", path, "--out", out, "--quiet", "--resume").startswith("4 realisations\n")
     before = (out / "ensemble.npz").stat().st_mtime_ns
     assert printed(capsys, "run", path, "--out", out, "--quiet", "--resume").startswith("4 realisations\n")

@@ -123,7 +123,7 @@ def test_other_signals_leave_the_rest_of_a_model_as_it_is():
         quick, anew = (other.simulate(0.4, 0.01) for other in (model.under(scene), replace(model, scene=scene)))
         assert np.array_equal(quick.q, anew.q)
         assert np.array_equal(quick.contacts.t_in, anew.contacts.t_in)
-    assert model.under(model.scene).touches is model.touches
+    assert model.under(model.scene).contact_rows is model.contact_rows
 
 
 def test_a_model_under_loads_that_come_or_go_is_that_made_anew():

@@ -17,7 +17,7 @@ from fembeam.study import ensemble
 from fembeam.study.execution.checkpoint import identity
 from fembeam.study.measure import Plan, runs
 from fembeam.study.realisations import realisation
-from fembeam.study.segments import Stretches
+from fembeam.study.segments import Segments
 
 BEAM = fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01))
 PLAIN = {"float", "str", "str | None", "tuple[int, float] | None"}  # annotations of what is no signal
@@ -116,9 +116,9 @@ def test_checkpoints_know_every_signal_but_not_its_seed(path, scene_with):
 
 
 @everywhere
-def test_every_signal_goes_on_in_the_next_stretch_and_lasts(path, scene_with):
+def test_every_signal_goes_on_in_the_next_segment_and_lasts(path, scene_with):
     model = scene_with(TONE).reduce(modes=1)
-    plan = Stretches.of(model, 10.0, 1e-3, 0.0, None, None, 256)
+    plan = Segments.of(model, 10.0, 1e-3, 0.0, None, None, 256)
     plan.time = 0.3
     assert signals_of(plan._run(0.05).model.scene)[path](0.1) == pytest.approx(TONE(0.4), abs=1e-17)
     long = scene_with(NOISE).reduce(modes=1).lasting(1e3)

@@ -13,7 +13,7 @@ from fembeam.statistics import Batches, Estimate, Impacts, Signal, moments, psd,
 from fembeam.statistics.batches import MOST
 from fembeam.statistics.scales import KURTOSIS, LEVEL, LINEAR, SKEWNESS
 from fembeam.statistics.streaming import up_crossings
-from fembeam.study import segments as stretches
+from fembeam.study import segments
 from fembeam.study import stationary
 from fembeam.study.segments import correlation_time
 
@@ -324,10 +324,10 @@ def test_hertz_stop_under_wide_band_noise_has_the_exact_density(modes):
     within(found.impacts[0].rate, np.interp(0.0, delta, p) * rate / math.sqrt(2 * math.pi), bias)
 
 
-def test_tones_go_on_through_the_stretches(monkeypatch):
+def test_tones_go_on_through_the_segments(monkeypatch):
     model = cantilever(2, base=fb.Harmonic(2e-4, 160.0), stops=[fb.Stop(0.5, law=Hertz(1e8))])
     whole = stationary(model, 8.0, 1e-3, discard=1.0)
-    monkeypatch.setattr(stretches, "STRETCH", 34.0)
+    monkeypatch.setattr(segments, "SEGMENT", 34.0)
     parts = stationary(model, 8.0, 1e-3, discard=1.0)
     assert whole["δ"].batches.per_row < parts["δ"].batches.full / 8
     assert parts.impacts[0].number == whole.impacts[0].number > 100
@@ -399,7 +399,7 @@ def test_the_same_seed_gives_the_same_bits_and_the_model_is_left_alone():
     assert model.scene.base.seed == 1
 
 
-def test_a_record_is_one_stretch():
+def test_a_record_is_one_segment():
     t = np.linspace(0.0, 60.0, 60_001)
     record = fb.Record(t, 1e-5 * coloured(3, t.size), band=(5.0, 600.0))
     found = stationary(cantilever(1, base=record), 60.0, 2e-3)

@@ -106,7 +106,7 @@ class Branch(Printed):
     @property
     def ends(self) -> list[tuple[Orbit, str]]:
         """The last orbit of each direction, and in words how it ended."""
-        pairs = zip(self.found.arms, self.found.status, strict=False)
+        pairs = zip(self.found.walks, self.found.status, strict=False)
         return [(self._orbit(arm.orbits[-1]), status.value) for arm, status in pairs]
 
     @property

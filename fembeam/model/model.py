@@ -68,7 +68,7 @@ class Model(Printed, ModalEquations):
 
     def __repr__(self) -> str:
         size = f"{counted(len(self.omega), 'coordinate')}, {self.omega.min():.6g} to {self.omega.max():.6g} rad/s"
-        return f"<model of {size}, with {counted(len(self.touches), 'contact')}>"
+        return f"<model of {size}, with {counted(len(self.contact_rows), 'contact')}>"
 
     def _parts(self) -> list[Part]:
         from fembeam.model.mode_table import mode_part
