@@ -13,8 +13,7 @@ from fembeam.statistics import Batches, Estimate, Impacts, Signal, moments, psd,
 from fembeam.statistics.batches import MOST
 from fembeam.statistics.scales import KURTOSIS, LEVEL, LINEAR, SKEWNESS
 from fembeam.statistics.streaming import up_crossings
-from fembeam.study import segments
-from fembeam.study import stationary
+from fembeam.study import segments, stationary
 from fembeam.study.segments import correlation_time
 
 

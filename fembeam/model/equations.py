@@ -5,6 +5,7 @@ q_i'' + 2 ζ_i ω_i q_i' + ω_i² q_i = -Γ_i (ÿ + g) + Σ φ_i(z_f) f + Σ_s w
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -151,3 +152,15 @@ class ModalEquations:
         kept = own.loads[: len(own.loads) - len(frame)]
         moved = [(vector, signal) for (vector, _), (_, signal) in zip(own.loads[len(kept) :], frame, strict=True)]
         return own.like([*contacts, *own.contacts[count:]], [*kept, *moved])
+
+    @property
+    def touches(self) -> list[ContactRow]:
+        """Old name of `contact_rows`."""
+        warnings.warn("Model.touches is now Model.contact_rows", DeprecationWarning, stacklevel=2)
+        return self.contact_rows
+
+    def rest(self) -> Vector:
+        """The start [q, q_dot] (2n,) of everything undeflected and at rest but the impactors, at their velocity."""
+        from fembeam.model import initial_states
+
+        return initial_states.rest(self)

@@ -16,6 +16,7 @@ import reduction
 from fembeam.support import require, require_finite
 
 if TYPE_CHECKING:
+    from fembeam.model.equations import ModalEquations
     from fembeam.model.model import Field, Model
     from fembeam.scene import Matrices
 
@@ -26,7 +27,7 @@ SETTLED = 1e-12  # of the forces at work: an equilibrium
 MOST_STEPS = 2000
 
 
-def rest(model: Model) -> Vector:
+def rest(model: ModalEquations) -> Vector:
     """[q, q_dot] (2n,): zero but for the impactors' velocities."""
     start = np.zeros(2 * len(model.omega))
     if strikers := model.matrices.impactors:

@@ -9,7 +9,6 @@ every impactor.
 from __future__ import annotations
 
 import dataclasses
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
@@ -33,7 +32,6 @@ if TYPE_CHECKING:
     from fembeam.model.run import Run
     from fembeam.response import FrequencyResponse
     from fembeam.scene import Matrices, Scene
-    from fembeam.scene.contact_rows import ContactRow
 
 Field = Callable[[Vector], Any] | None  # of displacement in m or velocity in m/s, over z (k,)
 UNDRIVEN = ("zeta", "participation", "moving_mass", "section_forces", "contact_rows", "directions")  # whatever drives
@@ -75,12 +73,6 @@ class Model(Printed, ModalEquations):
 
         return [repr(self), mode_part(self)]
 
-    @property
-    def touches(self) -> list[ContactRow]:
-        """Old name of `contact_rows`."""
-        warnings.warn("Model.touches is now Model.contact_rows", DeprecationWarning, stacklevel=2)
-        return self.contact_rows
-
     def again(self, scene: Scene) -> Model:
         """Another scene reduced in the same way: the same mode numbers, mesh size and kind of static shapes."""
         return scene.reduce(**self.way)
@@ -112,12 +104,6 @@ class Model(Printed, ModalEquations):
         kept = {name: self.__dict__[name] for name in UNDRIVEN if name in self.__dict__}
         other.__dict__.update(kept, system=self.system_like(scene))
         return other
-
-    def rest(self) -> Vector:
-        """The start [q, q_dot] (2n,) of everything undeflected and at rest but the impactors, at their velocity."""
-        from fembeam.model import initial_states
-
-        return initial_states.rest(self)
 
     def state(self, displacement: Field | Sequence[Field] = None, velocity: Field | Sequence[Field] = None) -> Vector:
         """The start [q, q_dot] (2n,) nearest, in the mass norm, to given fields u(z) in m and u̇(z) in m/s.

@@ -193,34 +193,19 @@ class Run(Printed):
         quantity : "displacement", "slope", "moment", "shear" or "stress".
         z : places (j,) in m; None: all nodes of the mesh.
         """
-        from fembeam.model.section_forces import extremes
+        from fembeam.model.section_forces import extremes, rows_of
 
         places = (self.shapes, *self.others)[body].nodes if z is None else np.atleast_1d(np.asarray(z, dtype=float))
-        return extremes(self.t, self.q, *self._rows(quantity, places, body))
+        return extremes(self.t, self.q, *rows_of(self, quantity, places, body))
 
     def _field(self, quantity: str, z: ArrayLike, body: int) -> Vector:
         """A field over time: (k,) at one z, (k, j) at z (j,)."""
+        from fembeam.model.section_forces import rows_of
+
         places = np.asarray(z, dtype=float)
-        shapes, _, offset = self._rows(quantity, np.atleast_1d(places), body)
+        shapes, _, offset = rows_of(self, quantity, np.atleast_1d(places), body)
         values = self.q @ shapes.T + offset
         return values if places.ndim else values[:, 0]
-
-    def _rows(self, quantity: str, z: Vector, body: int) -> tuple[Vector, Vector, Vector]:
-        """What turns q into a field: shapes (j, n), the places themselves, a constant part (j,)."""
-        known = ("displacement", "slope", "moment", "shear", "stress")
-        require(quantity in known, f"quantity must be one of {', '.join(known)}", quantity, "Run", "choose one")
-        if quantity in known[:2]:
-            return (self.shapes, *self.others)[body](z, known.index(quantity)), z, np.zeros(len(z))
-        from fembeam.response import model_of
-
-        forces = model_of(self, quantity).section_forces[body]
-        rows = getattr(forces, quantity)(z)
-        if quantity != "stress":
-            return rows, z, np.zeros(len(z))
-        bare = ~np.isfinite(rows).all(axis=1)
-        require(not bare.any(), "every section must know its outer fibre", z[bare][:1].tolist(), "Run.stress",
-                "give Section(..., fibre=)")  # fmt: skip
-        return rows, z, forces.beam.axial_force / forces.beam.profile(z).A
 
     def to_xdmf(self, path: str | os.PathLike[str], stride: int = 1) -> Path:
         """Write every `stride`-th sample for ParaView: displacement, velocity, slope, moment, shear, stress."""

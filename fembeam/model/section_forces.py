@@ -20,9 +20,11 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from fembeam.beams import Beam, element_matrices, joining, on_beam
+from fembeam.support import require
 
 if TYPE_CHECKING:
     from fembeam.model.equations import ModalEquations
+    from fembeam.model.run import Run
     from fembeam.scene import Matrices
 
 Vector = NDArray[np.float64]
@@ -161,3 +163,21 @@ def extremes(t: Vector, q: Vector, shapes: Vector, z: Vector, offset: Vector) ->
         columns = np.arange(values.shape[1])
         found[:, part] = values[low, columns], values[high, columns], t[low], t[high]
     return Extremes(z, *found)
+
+
+def rows_of(run: Run, quantity: str, z: Vector, body: int) -> tuple[Vector, Vector, Vector]:
+    """What turns q into a field: shapes (j, n), the places themselves, a constant part (j,)."""
+    known = ("displacement", "slope", "moment", "shear", "stress")
+    require(quantity in known, f"quantity must be one of {', '.join(known)}", quantity, "Run", "choose one")
+    if quantity in known[:2]:
+        return (run.shapes, *run.others)[body](z, known.index(quantity)), z, np.zeros(len(z))
+    from fembeam.response import model_of
+
+    forces = model_of(run, quantity).section_forces[body]
+    rows = getattr(forces, quantity)(z)
+    if quantity != "stress":
+        return rows, z, np.zeros(len(z))
+    bare = ~np.isfinite(rows).all(axis=1)
+    require(not bare.any(), "every section must know its outer fibre", z[bare][:1].tolist(), "Run.stress",
+            "give Section(..., fibre=)")  # fmt: skip
+    return rows, z, forces.beam.axial_force / forces.beam.profile(z).A

@@ -9,7 +9,8 @@ from fembeam.study.smallest_model_result import NotMetError, SmallestModel
 from fembeam.study.speed_accuracy import NoReferenceError, speed_accuracy
 from fembeam.study.speed_accuracy_result import Point, SpeedAccuracy
 from fembeam.study.stability_map import StabilityMap, Verdict, stability_map
-from fembeam.study.stationary import Response, characteristics, stationary
+from fembeam.study.stationary import characteristics, stationary
+from fembeam.study.stationary_result import Response
 
 __all__ = [
     "Basins",

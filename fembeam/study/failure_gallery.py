@@ -1,7 +1,4 @@
-"""A gallery of failures: what a naive method gives where it should not be trusted, beside what this library gives.
-
-Each case is a small problem of its own with a known answer; `gallery` runs all of them in seconds.
-"""
+"""Failures of naive methods beside what this library gives: small problems with known answers, seconds in all."""
 
 from __future__ import annotations
 
