@@ -19,7 +19,7 @@ from solvers.exponential.contact.nodes import S, series_of
 from solvers.exponential.energy.flight_tables import books_for
 from solvers.exponential.flight import LONG
 from solvers.exponential.tables import OF_TONES, Tables, build, doublings, fill_tones, known_of
-from solvers.problem import Array, Forcing, System, on_one_grid, tones_as_nodes
+from solvers.problem import Array, Forcing, Memo, System, on_one_grid, tones_as_nodes
 
 
 def _arrays(*dimensions: int) -> list[Any]:
@@ -80,15 +80,12 @@ class Prepared(NamedTuple):
     layout: Layout  # of State and Space
     rest: Array  # state of the tones' blocks at t = 0, the structure's less their steady response
     spare: list[Workspace]  # of runs that are over
-    kept: dict[float, Packed]  # tables of the energy ledger by the spacing of outputs, the latest
+    kept: Memo  # tables of the energy balance by the spacing of outputs
 
     def books_for(self, spacing: float) -> Packed:
         """Tables of the energy ledger for outputs of a spacing, s."""
-        if spacing not in self.kept:
-            made = books_for(self.problem.value, self.tables.value, spacing)
-            self.kept.clear()
-            self.kept[spacing] = made
-        return self.kept[spacing]
+        made: Packed = self.kept.get(spacing, lambda: books_for(self.problem.value, self.tables.value, spacing))
+        return made
 
     @property
     def nbytes(self) -> int:
@@ -193,7 +190,7 @@ class _Skeleton:
         fill_tones(tables.value, problem.value, self.tones, self.series)
         rest = among_tones(-response.real.sum(axis=0), self.tones)
         rest[n : n + self.tones] = 1.0
-        return Prepared(problem, tables, back, self.layout, rest, [], {})
+        return Prepared(problem, tables, back, self.layout, rest, [], Memo())
 
     def _tables(self, forcing: Forcing, turn: Array) -> Cast:
         """Tables that know the signals made of tones, Re(a e^{iΩt}) = Re a · p + Im a/Ω · v; ``turn`` is 1/Ω."""
