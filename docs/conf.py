@@ -17,9 +17,8 @@ extensions = [
     "sphinx_gallery.gen_gallery",
     "docstrings",
     "course",
-    "guide",
 ]
-exclude_patterns = ["_build", "_templates", "guide.md", "gallery/*.md5", "gallery/*.ipynb", "gallery/*.py"]
+exclude_patterns = ["_build", "_templates", "gallery/*.md5", "gallery/*.ipynb", "gallery/*.py"]
 templates_path = ["_templates"]
 default_role = "py:obj"
 highlight_language = "none"  # indented blocks are formulas; code says its language

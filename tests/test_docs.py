@@ -2,7 +2,6 @@
 
 import os
 import re
-import runpy
 import shutil
 import subprocess
 import sys
@@ -18,9 +17,11 @@ import solvers
 
 HOME = Path(__file__).parent.parent
 PACKAGES = Path(fembeam.__file__).parent.parent  # elsewhere, where a wheel is tested
-GUIDE = runpy.run_path(str(HOME / "docs" / "_ext" / "guide.py"))
-SITE = [path.relative_to(HOME).as_posix() for path in GUIDE["pages"]()]
-PAGES = ["README.md", "CONTRIBUTING.md", "docs/guide.md", "examples/README.md", *SITE]
+BUILT = {"_build", "gallery", "generated"}
+SITE = [
+    path.relative_to(HOME).as_posix() for path in sorted((HOME / "docs").rglob("*.md")) if not BUILT & set(path.parts)
+]
+PAGES = ["README.md", "CONTRIBUTING.md", "examples/README.md", *SITE]
 BLOCK = re.compile(r"^```python\n(.*?)^```", re.M | re.S)
 
 
@@ -40,11 +41,10 @@ def run(folder, *command):
 
 
 def text_of(page):
-    """A page as it is read, with the sections of the guide in their places."""
-    return GUIDE["expanded"]((HOME / page).read_text(encoding="utf-8"))
+    return (HOME / page).read_text(encoding="utf-8")
 
 
-WITH_CODE = [page for page in ["README.md", "docs/guide.md", *SITE] if BLOCK.search(text_of(page))]
+WITH_CODE = [page for page in ["README.md", *SITE] if BLOCK.search(text_of(page))]
 
 
 @pytest.mark.parametrize("page", WITH_CODE)
@@ -63,9 +63,19 @@ def test_code_of_a_page(page, tmp_path):
         run(tmp_path, re.match(r"# (\w+\.py)\n", block)[1])
 
 
-def test_every_section_of_the_guide_stands_on_one_page():
-    marks = [mark for page in SITE for mark in GUIDE["MARK"].findall((HOME / page).read_text(encoding="utf-8"))]
-    assert sorted(marks) == sorted(key for key, text in GUIDE["pieces"]().items() if text)
+def test_the_front_page_leads_to_every_task():
+    """One click from the front page to each how-to page."""
+    tasks = {path.name for path in (HOME / "docs" / "how_to").glob("*.md")} - {"index.md"}
+    assert tasks == set(re.findall(r"\]\(how_to/(\w+\.md)\)", text_of("docs/index.md"))) - {"index.md"}
+
+
+def test_figures_of_benchmarks_stand_on_two_pages():
+    naming = {page for page in SITE if "tests/bench/" in text_of(page)}
+    assert naming == {"docs/evidence.md", "docs/explanation/cost.md"}
+
+
+def test_readme_is_short():
+    assert len(text_of("README.md").splitlines()) <= 120
 
 
 def anchors(path):
@@ -97,7 +107,7 @@ def test_links(page):
 
 def test_files_the_pages_name():
     for page in PAGES:
-        text = (HOME / page).read_text(encoding="utf-8")
+        text = text_of(page)
         for name in re.findall(r"\b(?:examples|tests|docs|fembeam|solvers|contacts)/[\w/]+\.(?:py|toml|csv)\b", text):
             found = (HOME / name).exists() or (PACKAGES / name).exists()
             assert found, f"{page} names {name}, which is not there"

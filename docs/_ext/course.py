@@ -1,4 +1,7 @@
-"""The scripts of `examples/` for sphinx-gallery: in course order, with headings and the figures they write."""
+"""The scripts of `examples/` for sphinx-gallery: in course order, with headings and the figures they write.
+
+Links of the pages to scripts lead to their pages in the gallery.
+"""
 
 import re
 import shutil
@@ -10,6 +13,7 @@ from sphinx_gallery.scrapers import figure_rst
 HOME = Path(__file__).resolve().parent.parent
 EXAMPLES = HOME.parent / "examples"
 COPIES = HOME / "_build" / "examples"
+SCRIPT = re.compile(r"\[([^\]]+)\]\((?:\.\./)+examples/(\w+)\.py\)")
 HEADER = """Course
 ======
 
@@ -65,7 +69,13 @@ def arguments(gallery_conf: dict, variables: dict) -> list[str]:
     return [argument for sign, argument in offered.items() if sign in code]
 
 
+def linked(app: object, name: str, source: list[str]) -> None:
+    """A page as it is read, with links to scripts as links within the site."""
+    source[0] = SCRIPT.sub(r"{doc}`\1 </gallery/\2>`", source[0])
+
+
 def setup(app: object) -> dict[str, bool]:
     """Copy before the gallery looks for its scripts."""
     app.connect("config-inited", lambda app, config: copy(), priority=1)
+    app.connect("source-read", linked)
     return {"parallel_read_safe": True}

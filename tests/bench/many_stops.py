@@ -3,7 +3,8 @@ r"""Cost against the number of stops: a tube in support plates with gaps on both
 ``python tests/bench/many_stops.py [--stops 1 4 40] [--modes 30] [--seconds 0.5] [--chart FILE.png]`` prints for each
 number of stops the size of the method's tables, what a process's largest memory grows by, the time of the first call
 (machine code loaded, tables not made), processor time per simulated second and per contact. Every number of stops has
-a process of its own, and its shortest of several runs counts. ``--chart docs/many_stops.png`` makes the guide's figure.
+a process of its own, and its shortest of several runs counts. ``--chart docs/many_stops.png`` makes
+the figure of docs/explanation/cost.md.
 """
 
 from __future__ import annotations
