@@ -30,6 +30,8 @@ html_title = f"fembeam {version}"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_show_sourcelink = False
+# no pages stand below these
+html_sidebars = {page: [] for page in ("tutorial/first_hour", "evidence", "architecture", "changelog")}
 html_theme_options = {
     "show_prev_next": True,
     "navigation_with_keys": False,

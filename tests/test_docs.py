@@ -78,6 +78,10 @@ def test_readme_is_short():
     assert len(text_of("README.md").splitlines()) <= 120
 
 
+def test_the_version_to_cite():
+    assert re.search(r"^version: (.+)$", text_of("CITATION.cff"), re.M)[1] == fembeam.__version__
+
+
 def anchors(path):
     """Names of the headings of a page, as they are linked to."""
     headings = re.findall(r"^#+ (.*)$", path.read_text(encoding="utf-8"), re.M)

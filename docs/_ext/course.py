@@ -1,6 +1,6 @@
 """The scripts of `examples/` for sphinx-gallery: in course order, with headings and the figures they write.
 
-Links of the pages to scripts lead to their pages in the gallery.
+Links of the pages to scripts, and to the course as a whole, lead to their pages in the gallery.
 """
 
 import re
@@ -14,6 +14,7 @@ HOME = Path(__file__).resolve().parent.parent
 EXAMPLES = HOME.parent / "examples"
 COPIES = HOME / "_build" / "examples"
 SCRIPT = re.compile(r"\[([^\]]+)\]\((?:\.\./)+examples/(\w+)\.py\)")
+COURSE = re.compile(r"\[([^\]]+)\]\((?:\.\./)+examples/README\.md\)")
 HEADER = """Course
 ======
 
@@ -71,7 +72,8 @@ def arguments(gallery_conf: dict, variables: dict) -> list[str]:
 
 def linked(app: object, name: str, source: list[str]) -> None:
     """A page as it is read, with links to scripts as links within the site."""
-    source[0] = SCRIPT.sub(r"{doc}`\1 </gallery/\2>`", source[0])
+    text = SCRIPT.sub(r"{doc}`\1 </gallery/\2>`", source[0])
+    source[0] = COURSE.sub(r"{doc}`\1 </gallery/index>`", text)
 
 
 def setup(app: object) -> dict[str, bool]:
