@@ -42,7 +42,7 @@ CONTACT_ROWS = (
     ("largest peak / N", "peak_force", "max"),
     ("mean entry / m s⁻¹", "entry_speed", "mean"),
 )
-ORDER = ("time_history", "psd", "densities", "contacts", "modes")
+ORDER = ("time_history", "psd", "densities", "response_spectrum", "contacts", "modes")
 
 
 def write_page(
