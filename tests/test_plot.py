@@ -11,6 +11,7 @@ import fembeam as fb
 from contacts import PUBLISHED, Hertz, Hysteretic, bounce, identify
 from fembeam import plot, statistics
 from fembeam.plot.axis_names import axis_name
+from fembeam.response import backbone
 from fembeam.results import files as report
 
 
@@ -366,6 +367,24 @@ def test_ends_of_branches_are_marked_and_explained(run):
     assert "end: closed" not in texts(axis.figure)
     (mark,) = [line for line in axis.lines if line.get_label() == "end: lost"]
     assert mark.get_xdata() == [whole.orbits[0].parameter]
+
+
+def test_linear_response_and_backbone_lie_behind_a_branch(run):
+    stops = [fb.Stop(0.24445, Hertz(2.1e8), gap=1e-3, side=side) for side in ("below", "above")]
+    load = fb.PointForce(0.2, fb.Harmonic(0.05, 60.0))
+    scene = dataclasses.replace(run.model.scene, base=None, stops=stops, forces=[load])
+    branch = scene.reduce(2).branch("forces[0].signal.omega", tuple(np.array([0.97, 1.02]) * run.model.omega[0])).run()
+    axis = plot.branch(branch).axes[0]
+    drawn = {line.get_label(): line for line in axis.lines}
+    omega, height = drawn["linear, no contact"].get_data()
+    H = branch.family.model.frequency_response(omega, "forces[0]", 0.24445)
+    assert height == pytest.approx(1e3 * 0.05 * H.amplitude)
+    peaks = 1e3 * np.array([plot.peak(orbit, 0.24445) for orbit in branch.orbits])
+    assert axis.dataLim.y1 == pytest.approx(peaks.max())  # what lies behind does not widen the limits
+    omega, height = drawn["backbone of the lowest mode"].get_data()
+    seen = np.isfinite(omega)
+    assert omega[seen] == pytest.approx(backbone(branch.family.model, 0.24445, 1e-3 * height[seen]))
+    assert "backbone" not in texts(plot.branch(scene.reduce(1).branch("amplitude", (0.04, 0.06)).run()))
 
 
 def test_shaded_bands_are_the_intervals_of_the_estimates():
