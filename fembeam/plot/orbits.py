@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -130,7 +130,7 @@ def _draw_behind(axis: Axes, several: list[Branch], z: float) -> None:
             _behind(axis, np.where(shown, along, np.nan), heights, "-.", None if i else "backbone of the lowest mode")
 
 
-def _behind(axis: Axes, x: Vector, y: Vector, style: str, label: str | None) -> None:
+def _behind(axis: Axes, x: Vector, y: Vector, style: Any, label: str | None) -> None:
     """A thin grey line that does not widen the limits."""
     from matplotlib.lines import Line2D
 
