@@ -19,7 +19,7 @@ from fembeam.plot.random import random_densities, random_spectra
 from fembeam.plot.response import densities, mode_shapes, time_history
 from fembeam.plot.run_signals import batches, responses, sampling_of, stationary
 from fembeam.plot.spectra import peaks, segment_for, spectra_of, spectrum
-from fembeam.plot.style import styled
+from fembeam.plot.style import one_legend, styled
 
 __all__ = [
     "animate",
@@ -36,6 +36,7 @@ __all__ = [
     "loops",
     "mode_count",
     "mode_shapes",
+    "one_legend",
     "orbit",
     "peak",
     "peaks",

@@ -49,13 +49,13 @@ def branch(
     axes : to draw into; None makes a figure.
     labels : of the branches; None tells their period.
     """
-    from fembeam.plot.figure import sheet
+    from fembeam.plot.figure import legend, sheet
 
     several = [branches] if not isinstance(branches, Sequence) else list(branches)
     require(bool(several), "nothing to draw", branches, "plot.branch", "give one branch or more")
     model = several[0].family.model
     place = observed(model) if z is None else z
-    figure, (axis,) = sheet(1, 1, (6.4, 3.8), axes)
+    figure, (axis,) = sheet(1, 1, (8.4, 3.8), axes)
     if cloud is not None:
         axis.plot(cloud[0], 1e3 * cloud[1], ".", color=GREY, markersize=2.0, label="simulated", rasterized=True)
     for i, one in enumerate(several):
@@ -66,7 +66,8 @@ def branch(
     name = several[0].family.name
     axis.set_xlabel(axis_name(name, model.scene))
     axis.set_ylabel(f"max |u({place:.4g} m)| / mm")
-    _legend(axis, several)
+    handles, words = _entries(axis, several)
+    legend(axis, axes is None, "outside right upper", handles=handles, labels=words, fontsize=8)
     return figure
 
 
@@ -137,8 +138,8 @@ def _behind(axis: Axes, x: Vector, y: Vector, style: Any, label: str | None) -> 
     axis.add_artist(Line2D(x, y, color=GREY, linestyle=style, linewidth=0.8, zorder=1, label=label))
 
 
-def _legend(axis: Axes, several: list[Branch]) -> None:
-    """Branches, the dashes' meaning, the marks that occur."""
+def _entries(axis: Axes, several: list[Branch]) -> tuple[list[Any], list[str]]:
+    """Handles and labels of a legend: branches, the dashes' meaning, the marks that occur."""
     from matplotlib.lines import Line2D
 
     handles, labels = axis.get_legend_handles_labels()
@@ -154,7 +155,7 @@ def _legend(axis: Axes, several: list[Branch]) -> None:
                 Line2D([], [], marker=marker, color=edge, markerfacecolor=face, markersize=3.5, linestyle="")
             )
             labels.append(kind)
-    axis.legend(handles, labels, fontsize=8)
+    return handles, labels
 
 
 @styled

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fembeam.plot.orbits import branch
-from fembeam.plot.style import BLUE, GREY, RED, curve, fit_levels, ribbon, styled
+from fembeam.plot.style import BLUE, GREY, RED, curve, fit_levels, one_legend, ribbon, styled
 from fembeam.statistics import Spectrum
 
 if TYPE_CHECKING:
@@ -60,6 +60,8 @@ def random_spectra(
             _beside(drawn[row * columns + 1], branches.get(title), omega_max)
     for axis in drawn[-columns:]:
         axis.set_xlabel("ω / rad s⁻¹")
+    if branches and axes is None:
+        one_legend(drawn[1::2])
     return figure
 
 

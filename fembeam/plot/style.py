@@ -92,3 +92,26 @@ def ribbon(axis: Axes, x: Vector, bounds: Sequence[Vector], colour: Any, **optio
     """A shaded 95 % interval, which is not below zero."""
     low, high = bounds
     axis.fill_between(x, np.maximum(low, 0.0), high, color=colour, alpha=0.3, linewidth=0, **options)
+
+
+def one_legend(axes: Sequence[Axes]) -> None:
+    """One legend beside the figure in place of those within several axes, every label once.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> axes = Figure(layout="constrained").subplots(1, 2)
+    >>> for axis in axes:
+    ...     _ = axis.plot([0.0, 1.0], label="same")
+    ...     _ = axis.legend()
+    >>> one_legend(axes)
+    >>> [text.get_text() for text in axes[0].figure.legends[0].get_texts()], axes[0].get_legend()
+    (['same'], None)
+    """
+    entries: dict[str, Any] = {}
+    for inner in [found for axis in axes if (found := axis.get_legend()) is not None]:
+        for text, handle in zip(inner.get_texts(), inner.legend_handles, strict=True):
+            entries.setdefault(text.get_text(), handle)
+        inner.remove()
+    figure: Any = axes[0].figure
+    figure.legend(entries.values(), entries, loc="outside right upper", fontsize=8)
