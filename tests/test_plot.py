@@ -114,6 +114,11 @@ def test_what_lasts_and_what_does_not(run, knocked):
         assert plot.stationary(driven.simulate(1.9, 1e-3), 0.2) == lasts
 
 
+def run_at(run, times):
+    """The same motion at other times."""
+    return run.model.simulate(float(times[-1]), times)
+
+
 def test_a_transient_gets_a_response_spectrum_instead_of_a_psd(knocked, tmp_path):
     drawn = report.figures(knocked)
     assert list(drawn) == ["time_history", "response_spectrum", "contacts", "modes"]
@@ -124,6 +129,8 @@ def test_a_transient_gets_a_response_spectrum_instead_of_a_psd(knocked, tmp_path
     assert level[::20] == pytest.approx(exact.acceleration[0])
     assert "z = 120 mm, ζ = 0.05" in texts(figure)
     assert "Contacts are shorter than ten samples" in texts(figure)
+    uneven = run_at(knocked, np.geomspace(0.4, 4.0, 300))
+    assert "response_spectrum" not in report.figures(uneven)
     assert "response_spectrum" not in report.figures(fb.load(knocked.save(tmp_path / "run")))
 
 

@@ -93,7 +93,8 @@ def figures(run: Run, discard: float = 0.0) -> dict[str, Callable[[], Figure]]:
     drawn: dict[str, Callable[[], Figure]] = {}
     if len(run.t) > 1:
         drawn["time_history"] = lambda: plot.time_history(run)
-    if kept >= FEWEST_SAMPLES and all(np.ptp(x) > 0 for x in plot.responses(run, discard).values()):
+    even = len(run.t) > 1 and np.ptp(np.diff(run.t)) < 1e-6 * (run.t[1] - run.t[0])
+    if even and kept >= FEWEST_SAMPLES and all(np.ptp(x) > 0 for x in plot.responses(run, discard).values()):
         if plot.stationary(run, discard):
             drawn["psd"] = lambda: plot.spectrum(run, discard)
             drawn["densities"] = lambda: plot.densities(run, discard)
