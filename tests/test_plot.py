@@ -155,6 +155,17 @@ def test_linear_response_lies_in_the_band_of_a_linear_run(run):
     assert not plot.spectrum(run).axes[0].collections  # 1.9 s hold no four independent parts
 
 
+@pytest.mark.parametrize("changes", [{"supports": []}, {"damping": fb.ModalDamping(0.0)}], ids=["free", "undamped"])
+@pytest.mark.filterwarnings("ignore:2 rigid-body modes")
+def test_spectra_of_free_and_of_undamped_beams_are_drawn(run, changes):
+    for modes in (2, 4):
+        model = dataclasses.replace(run.model.scene, **changes).reduce(modes)
+        figure = plot.spectrum(model.simulate(1.0, 1e-3))
+        lines = [line for line in figure.axes[0].lines if line.get_label() == "linear, no contact"]
+        assert len(lines) == (model.omega[-1] > 0.0)
+        assert all(np.isfinite(line.get_ydata()).all() for line in lines)
+
+
 def test_every_natural_frequency_in_view_is_named(run):
     many = dataclasses.replace(run.model.scene, base=fb.Harmonic(1e-3, 60.0)).reduce(12).simulate(1.0, 1e-3)
     figure = plot.spectrum(many, omega_max=3000.0)

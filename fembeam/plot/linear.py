@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fembeam.plot.style import plain_decades, styled
+from fembeam.plot.style import Vector, plain_decades, styled
 from fembeam.support import require
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from fembeam.model import Run
+    from fembeam.model import Model, Run
     from fembeam.response import FrequencyResponse, ResponseSpectrum
 
 OSCILLATORS = 60  # of a run's response spectrum
@@ -103,6 +103,14 @@ def floor_spectrum(run: Run, z: float | None = None, zeta: float = 0.05, axes: S
         (axes or figure.axes)[0].set_title("Contacts are shorter than ten samples: levels are rough; lower dt")
     heading(figure.axes if axes is None else axes, "Response spectra of absolute motion", axes is None, run=run)
     return figure
+
+
+def frequencies(model: Model, low: float, high: float, count: int) -> Vector:
+    """Where to draw a linear response, rad/s, > 0: even steps and the resonances, but for those without damping."""
+    damped = model.zeta > 0.0
+    natural = model.omega[damped & (model.omega > low) & (model.omega < high)]
+    even = np.linspace(low, high, count)
+    return np.setdiff1d(np.union1d(even[even > 0.0], natural), model.omega[~damped])
 
 
 @styled

@@ -9,6 +9,7 @@ import numpy as np
 
 from fembeam.model import observed
 from fembeam.plot.axis_names import axis_name
+from fembeam.plot.linear import frequencies
 from fembeam.plot.style import GREEN, GREY, ORANGE, RED, Vector, styled
 from fembeam.scene import signals_of
 from fembeam.support import require
@@ -119,8 +120,7 @@ def _draw_behind(axis: Axes, several: list[Branch], z: float) -> None:
     if list(signals) != [path] or path == family.name:
         return
     model, (low, high) = family.model, (f(f(one.parameter) for one in several) for f in (min, max))
-    natural = model.omega[(model.omega > low) & (model.omega < high)]
-    omega = np.union1d(np.linspace(low, high, BEHIND), natural[model.zeta[: len(natural)] > 0.0])
+    omega = frequencies(model, low, high, BEHIND)
     linear = model.frequency_response(omega, path, z).amplitude * abs(signals[path].amplitude)
     _behind(axis, omega, 1e3 * linear, "-", "linear, no contact")
     heights = np.linspace(0.0, axis.dataLim.y1, BEHIND // 2)[1:]

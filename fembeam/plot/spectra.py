@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fembeam.model import places
+from fembeam.plot.linear import frequencies
 from fembeam.plot.run_signals import estimated, responses, sampling_of
 from fembeam.plot.style import BLUE, GREEN, GREY, Vector, curve, drawable, fit_levels, styled
 from fembeam.scene import signals_of
@@ -106,8 +107,9 @@ def _linear(run: Run) -> dict[str, Spectrum]:
     if row is not None and row.on[0] != "frame":  # δ is of two bodies
         return {}
     watched, found = places(run.shapes), {}
-    ends = run.model.omega
-    omega = np.union1d(np.linspace(0.0, 2.5 * ends[-1], LINEAR_POINTS + 1)[1:], ends[ends > 0.0])
+    omega = frequencies(run.model, 0.0, 2.5 * float(run.model.omega.max()), LINEAR_POINTS)
+    if not len(omega):  # rigid-body modes alone
+        return {}
     for name in responses(run):
         z, body = (row.z, row.body) if name == "δ" and row is not None else (watched[name.removesuffix(" u")], 0)
         H = run.model.frequency_response(omega, path, z, body=body)
