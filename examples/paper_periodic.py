@@ -58,7 +58,7 @@ def summits(branch, period):
     return branch.parameter[found], heights[found]
 
 
-figure, total = Figure(figsize=(6.8, 6.4), layout="constrained"), 0.0
+figure, total = Figure(figsize=(8.8, 6.4), layout="constrained"), 0.0
 for modes, axis in zip((1, 2), figure.subplots(2, 1, sharex=True, sharey=True), strict=True):
     model = scene.reduce(modes=modes)
     found, seconds = branches(model)
@@ -74,6 +74,7 @@ for modes, axis in zip((1, 2), figure.subplots(2, 1, sharex=True, sharey=True), 
     cloud = fb.study.bifurcation(model, "omega", values, settle=120, keep=6).cloud()
     fb.plot.branch(found, TIP, cloud, axis)
     axis.set(title=f"{modes} mode{'s' * (modes > 1)}", ylim=(0.0, 60.0))
+fb.plot.one_legend(figure.axes)
 print(f"all branches in {total:.1f} s")
 for path in [name for name in sys.argv[1:] if name.endswith(".png")]:
     figure.savefig(path, dpi=150)

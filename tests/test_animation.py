@@ -8,6 +8,7 @@ import pytest
 
 import fembeam as fb
 from contacts import Hertz, Hysteretic
+from fembeam.plot import animation
 
 STEEL = fb.Section.rectangle(2.1e11, 7850.0, 0.01, 0.01)
 
@@ -47,6 +48,38 @@ def test_a_frame_shows_the_bodies_where_they_are(run):
     (arrows,) = axis.collections
     assert arrows.V[2] < 0
     assert arrows.Umask.tolist() == [run.force(0)[i] == 0, True, False]
+
+
+def test_no_force_is_lost_between_pictures(run):
+    log = run.contacts
+    for frames in (2, 3, 7, 40):
+        stage = animation._Stage(run, animation._samples(run, None, frames), None)
+        for stop, shown in enumerate(stage.forces):
+            mine = log.peak_force[log.stop == stop]
+            assert shown.max() == pytest.approx(mine.max(initial=0.0))
+    assert stage.force_axis.get_ylabel() == "peak contact\nforce / N"
+
+
+def test_a_contact_between_two_samples_shows_in_the_nearest_picture(run):
+    number = int(np.argmax(run.contacts.peak_force))
+    begin = float(run.contacts.t_in[number])
+    columns = {name: column[[number]] for name, column in run.contacts.arrays().items()}
+    log = replace(run.contacts, **columns | {"t_out": np.array([begin + 1e-6])})
+    short = replace(run, contacts=log, stored_forces=np.zeros((len(run.stops), len(run.t))))
+    stage = animation._Stage(short, animation._samples(short, None, 30), 25.0)
+    (picture,) = np.flatnonzero(stage.forces[log.stop[0]])
+    assert picture == np.argmin(np.abs(run.t[stage.samples] - begin))
+    assert stage.forces[log.stop[0]][picture] == log.peak_force[0]
+
+
+PACES = {25.0: "66.7 times slower than real time", 5e3: "3 times faster than real time", 1 / 6e-4: "in real time"}
+
+
+@pytest.mark.parametrize("fps", PACES)
+def test_the_title_says_how_fast_the_film_is(run, fps):
+    stage = animation._Stage(run, animation._samples(run, None, 34), fps)  # 0.6 ms from picture to picture
+    stage.show(3)
+    assert stage.title.get_text().endswith(f" s, {PACES[fps]}")
 
 
 @pytest.mark.parametrize(

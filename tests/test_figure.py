@@ -70,6 +70,10 @@ def test_a_script_shows_a_figure():
     assert done.stdout.strip() == "went on", done.stderr
 
 
+def spectrum():
+    return fb.response_spectrum([0.0, 1.0, 2.0], [0.0, 1.0, 0.0], periods=[0.5, 1.0])
+
+
 @pytest.mark.parametrize(
     ("draw", "panels"),
     [
@@ -78,14 +82,35 @@ def test_a_script_shows_a_figure():
         (lambda model, axes: plot.identification(collisions(), axes=axes), 2),
         (lambda model, axes: plot.orbit(model.orbit(), axes=axes), 2),
         (lambda model, axes: plot.branch(model.branch("amplitude", (0.9e-3, 1e-3)).run(), axes=axes[0]), 1),
+        (lambda model, axes: plot.mode_shapes(model, axes=axes[0]), 1),
+        (lambda model, axes: plot.time_history(model.simulate(0.3, 1e-3), axes=axes), 2),
+        (lambda model, axes: plot.spectrum(model.simulate(0.3, 1e-3), axes=axes), 2),
+        (lambda model, axes: plot.densities(model.simulate(0.3, 1e-3), axes=axes), 2),
+        (lambda model, axes: plot.floor_spectrum(model.simulate(0.3, 1e-3), axes=axes), 2),
+        (lambda model, axes: plot.response_spectrum(spectrum(), axes=axes), 2),
+        (lambda model, axes: plot.frequency_response(model.frequency_response([1.0, 2.0]), axes=axes), 2),
         (lambda model, axes: plot.failures([fb.study.failure_gallery.jumped_contact()], axes=axes[0]), 1),
     ],
-    ids=["loops", "restitutions", "identification", "orbit", "branch", "failures"],
+    ids=[
+        "loops",
+        "restitutions",
+        "identification",
+        "orbit",
+        "branch",
+        "modes",
+        "history",
+        "psd",
+        "densities",
+        "floor",
+        "response spectrum",
+        "frequency response",
+        "failures",
+    ],
 )
 def test_axes_that_are_given_are_drawn_into_and_nothing_else_is_changed(model, given, draw, panels):
     figure, axes = given
     assert draw(model, axes) is figure
-    assert [bool(axis.lines) for axis in axes] == [True, panels == 2]
+    assert [axis.has_data() for axis in axes] == [True, panels == 2]
     assert figure._suptitle is None
     assert not figure.legends
     assert figure.axes == axes
@@ -97,6 +122,17 @@ def test_axes_of_studies(model, given):
     assert plot.mode_count(study, axes=axes) is figure
     assert "amplitude against " in axes[0].get_title(loc="left")
     assert figure._suptitle is None
+
+
+def test_axes_of_contacts_and_basins(model, given):
+    figure = of_matplotlib.Figure()
+    axes = list(figure.subplots(2, 2).ravel())
+    assert plot.contacts(model.simulate(0.5, 1e-3), axes=axes) is figure
+    assert all(axis.get_title(loc="left") for axis in axes)
+    figure, axes = given
+    assert plot.basins(fb.study.basins(model, points=2), axes=axes[0]) is figure
+    assert axes[0].images
+    assert not figure.legends
 
 
 def test_another_number_of_axes_is_refused(given):

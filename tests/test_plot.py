@@ -5,11 +5,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from matplotlib.text import Text
 
 import fembeam as fb
 from contacts import PUBLISHED, Hertz, Hysteretic, bounce, identify
 from fembeam import plot, statistics
 from fembeam.plot.axis_names import axis_name
+from fembeam.response import backbone
 from fembeam.results import files as report
 
 
@@ -45,7 +47,169 @@ def test_histories_are_those_of_the_run(run):
     line = plot.time_history(run, window).axes[0].lines[0]
     t, u = line.get_data()
     assert window[0] - 2e-3 <= t[0] <= window[0]
-    assert np.interp(1.1, t, u) == pytest.approx(1e3 * run.displacement(0.2599)[1100], rel=1e-9)
+    assert np.interp(1.1, t, u) == pytest.approx(1e3 * run.displacement(0.24445)[1100], rel=1e-9)
+    t, u = plot.time_history(run, window, z=0.1).axes[0].lines[0].get_data()
+    assert np.interp(1.1, t, u) == pytest.approx(1e3 * run.displacement(0.1)[1100], rel=1e-9)
+
+
+def shaded(axis):
+    """Times (k, 2) at which the bands of an axis begin and end."""
+    return np.array([[band.get_x(), band.get_x() + band.get_width()] for band in axis.patches]).reshape(-1, 2)
+
+
+@pytest.fixture(scope="module")
+def knocked():
+    """A beam with two stops at different places after a pulse, sampled so that its contacts are short."""
+    beam = fb.Beam(0.2599, fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12))
+    stops = [fb.Stop(0.12, Hertz(2.1e8), 2e-4), fb.Stop(0.2599, Hertz(2.1e8), 1e-3, side="above")]
+    load = fb.PointForce(0.2599, fb.Pulse(30.0, length=5e-3, at=0.5))
+    scene = fb.Scene(beam, [fb.Clamped(0.0)], stops=stops, forces=[load], damping=fb.ModalDamping(0.02))
+    return scene.reduce(3).simulate(4.0, 2e-4)
+
+
+def test_the_window_of_a_transient_is_about_its_largest_force(knocked, run):
+    log = knocked.contacts
+    largest = int(np.argmax(log.peak_force))
+    assert 0.5 < log.t_in[largest] < 1.0
+    lo, hi = plot.time_history(knocked).axes[1].get_xlim()
+    assert lo < log.t_in[largest] < hi < 2.0
+    assert plot.time_history(run).axes[1].get_xlim()[1] >= run.t[-1]  # noise lasts: the end
+
+
+def test_shaded_contacts_are_those_of_the_stop_whose_motion_is_drawn(knocked):
+    log = knocked.contacts
+    stop = int(log.stop[np.argmax(log.peak_force)])
+    upper, lower = (figure := plot.time_history(knocked, (0.4, 1.2))).axes
+    mine = (log.stop == stop) & (log.t_in < 1.2)
+    assert 0 < np.count_nonzero(mine) < np.count_nonzero(log.t_in < 1.2)
+    np.testing.assert_allclose(shaded(upper), np.transpose([log.t_in[mine], log.t_out[mine]]))
+    t, u = upper.lines[0].get_data()
+    at = np.searchsorted(knocked.t, 0.6)
+    z = knocked.stops[stop, 0]
+    assert np.interp(knocked.t[at], t, u) == pytest.approx(1e3 * knocked.displacement(z)[at])
+    assert f"contacts of stop {stop} shaded" in texts(figure)
+    tops = [segment[1, 1] for lines in lower.collections for segment in lines.get_segments()]
+    short = (log.t_out - log.t_in < 10 * 2e-4) & (log.t_in < 1.2)
+    assert sorted(tops) == pytest.approx(sorted(log.peak_force[short]))
+    other = 1 - stop
+    figure = plot.time_history(knocked, (0.4, 1.2), z=knocked.stops[other, 0])
+    assert len(shaded(figure.axes[0])) == np.count_nonzero((log.stop == other) & (log.t_in < 1.2))
+    assert "all stops shaded" in texts(plot.time_history(knocked, (0.4, 1.2), z=0.05))
+
+
+def test_a_window_without_contact_says_so(knocked):
+    figure = plot.time_history(knocked, (0.1, 0.3))
+    assert "no contact in this window" in texts(figure)
+    assert figure.axes[1].get_ylabel() == "contact force / N"
+
+
+def test_what_lasts_and_what_does_not(run, knocked):
+    scene, t = run.model.scene, 1e-3 * np.arange(2001)
+    free = run.model.under(dataclasses.replace(scene, base=None))
+    assert plot.stationary(run)
+    assert not plot.stationary(knocked)
+    assert not plot.stationary(free.simulate(0.5, 1e-3, start=np.array([1e-3, 0.0, 0.0, 0.0])))
+    for record, lasts in ((np.sin(60.0 * t), True), (np.sin(60.0 * t) * np.exp(-4.0 * t), False)):
+        driven = run.model.under(dataclasses.replace(scene, base=fb.Record(t, record, quantity="acceleration")))
+        assert plot.stationary(driven.simulate(1.9, 1e-3), 0.2) == lasts
+
+
+def run_at(run, times):
+    """The same motion at other times."""
+    return run.model.simulate(float(times[-1]), times)
+
+
+def test_a_transient_gets_a_response_spectrum_instead_of_a_psd(knocked, tmp_path):
+    drawn = report.figures(knocked)
+    assert list(drawn) == ["time_history", "response_spectrum", "contacts", "modes"]
+    figure = drawn["response_spectrum"]()
+    period, level = figure.axes[0].lines[0].get_data()
+    with pytest.warns(UserWarning, match="not resolved by samples"):
+        exact = knocked.floor_spectrum(0.12, periods=period[::20], zeta=0.05)
+    assert level[::20] == pytest.approx(exact.acceleration[0])
+    assert "z = 120 mm, ζ = 0.05" in texts(figure)
+    assert "Contacts are shorter than ten samples" in texts(figure)
+    uneven = run_at(knocked, np.geomspace(0.4, 4.0, 300))
+    assert "response_spectrum" not in report.figures(uneven)
+    assert "response_spectrum" not in report.figures(fb.load(knocked.save(tmp_path / "run")))
+
+
+def test_linear_response_lies_in_the_band_of_a_linear_run(run):
+    noise = fb.BandNoise(2e-4, (0.0, 1226.6), seed=3)
+    scene = dataclasses.replace(run.model.scene, stops=[], base=noise, damping=fb.ModalDamping(0.1))
+    linear = scene.reduce(2).simulate(100.0, 1e-3)
+    figure = plot.spectrum(linear, discard=5.0, omega_max=1200.0)
+    upper = figure.axes[0]
+    omega, level = next(line for line in upper.lines if line.get_label() == "linear, no contact").get_data()
+    H = linear.model.frequency_response(omega, output=0.2599)
+    assert level == pytest.approx(H.amplitude**2 * noise.psd_at(omega))
+    assert "95 % shaded" in texts(figure)
+    line = plot.spectra_of(linear, 5.0)["tip u"]
+    low, high = line.interval()
+    broad = (line.omega > 150.0) & (line.omega < 700.0)  # between the resonances: no leakage
+    expected = np.interp(line.omega[broad], omega, level)
+    # of 95 % intervals over ~280 lines whose neighbours are correlated by the window
+    inside = np.mean((low[broad] <= expected) & (expected <= high[broad]))
+    assert inside > 0.85
+    assert len(upper.collections) >= 1
+    assert not plot.spectrum(run).axes[0].collections  # 1.9 s hold no four independent parts
+
+
+@pytest.mark.parametrize("changes", [{"supports": []}, {"damping": fb.ModalDamping(0.0)}], ids=["free", "undamped"])
+@pytest.mark.filterwarnings("ignore:2 rigid-body modes")
+def test_spectra_of_free_and_of_undamped_beams_are_drawn(run, changes):
+    for modes in (2, 4):
+        model = dataclasses.replace(run.model.scene, **changes).reduce(modes)
+        figure = plot.spectrum(model.simulate(1.0, 1e-3))
+        lines = [line for line in figure.axes[0].lines if line.get_label() == "linear, no contact"]
+        assert len(lines) == (model.omega[-1] > 0.0)
+        assert all(np.isfinite(line.get_ydata()).all() for line in lines)
+
+
+def test_every_natural_frequency_in_view_is_named(run):
+    many = dataclasses.replace(run.model.scene, base=fb.Harmonic(1e-3, 60.0)).reduce(12).simulate(1.0, 1e-3)
+    figure = plot.spectrum(many, omega_max=3000.0)
+    wide = plot.spectrum(dataclasses.replace(many, t=many.t / 100), omega_max=2e5)
+    for drawn, top in ((figure, 3000.0), (wide, 2e5)):
+        drawn.draw_without_rendering()
+        names = [text for text in drawn.axes[0].texts if "omega" in text.get_text()]
+        assert len(names) == np.count_nonzero(many.model.omega < top)
+        assert apart(names)
+        assert not any(text.get_bbox_patch() for text in drawn.axes[0].texts)
+
+
+def test_contacts_say_what_is_left_out(run):
+    count = 9000
+    speed = np.geomspace(0.01, 0.5, count)
+    ratio = np.full(count, 0.7)
+    ratio[:100] = 3.0
+    columns = {name: np.resize(column, count) for name, column in run.contacts.arrays().items()}
+    log = dataclasses.replace(run.contacts, **columns | {"speed_in": speed, "speed_out": ratio * speed,
+                              "t_in": np.full(count, 1.0), "t_out": np.full(count, 1.001)})  # fmt: skip
+    figure = plot.contacts(dataclasses.replace(run, contacts=log))
+    axis = figure.axes[3]
+    assert f"of {count} drawn" in axis.get_title(loc="left")
+    above = next(line for line in axis.lines if line.get_marker() == "^")
+    assert len(above.get_xdata()) == 100 - count // 200  # but for the slowest 0.5 %
+    assert above.get_label() == "55 above, up to 3"
+    assert max(above.get_ydata()) < axis.get_ylim()[1]
+    assert [ax.get_title(loc="left").split()[2] for ax in figure.axes[:3]] == ["ms", "N", "m"]
+    some = {name: column[:150] for name, column in run.contacts.arrays().items()}
+    few = plot.contacts(dataclasses.replace(run, contacts=dataclasses.replace(run.contacts, **some)))
+    assert "without" not in few.axes[0].get_xlabel()
+    counts = sum(patch.get_height() for patch in few.axes[0].patches)
+    assert counts == 150
+
+
+def test_the_legend_of_modes_is_inside_and_covers_no_curve(run):
+    figure = plot.mode_shapes(run.model.scene.reduce(6))
+    figure.draw_without_rendering()
+    (axis,) = figure.axes
+    assert not figure.legends
+    box = axis.get_legend().get_window_extent()
+    assert axis.bbox.y0 < box.y0
+    assert box.y1 < axis.bbox.y1
+    assert axis.transData.transform((0.0, 1.0))[1] < box.y0
 
 
 def test_peaks_of_two_tones():
@@ -57,7 +221,7 @@ def test_peaks_of_two_tones():
 
 def apart(labels):
     """Whether no two of the drawn texts overlap."""
-    boxes = [label.get_window_extent() for label in labels if label.get_visible() and label.get_text()]
+    boxes = [Text.get_window_extent(label) for label in labels if label.get_visible() and label.get_text()]
     assert len(boxes) > 1
     return not any(one.overlaps(other) for i, one in enumerate(boxes) for other in boxes[:i])
 
@@ -70,7 +234,7 @@ def test_labels_of_a_periodic_motion_do_not_overlap(run):
     assert apart(figure.axes[0].texts)
     figure = plot.spectrum(dataclasses.replace(driven, t=driven.t / 10), omega_max=2e4)  # all six frequencies in view
     figure.draw_without_rendering()
-    assert apart(figure.axes[1].texts)
+    assert apart([text for text in figure.axes[0].texts if "omega" in text.get_text()])
 
 
 @pytest.mark.parametrize("highest", [1.0, 1.7, 5.0, 300.0])
@@ -129,7 +293,8 @@ def test_random_figures_have_units_bands_and_confidence():
     for part in np.split(x, 8):
         signal.add(part)
     orbits = [SimpleNamespace(extremes=lambda z: (-2e-3, 1e-3), mark=None) for _ in range(3)]
-    model = SimpleNamespace(scene=SimpleNamespace(stops=[SimpleNamespace(z=0.25)]))
+    nothing = {"base": None, "forces": [], "springs": [], "bodies": []}
+    model = SimpleNamespace(scene=SimpleNamespace(stops=[SimpleNamespace(z=0.25)], **nothing))
     one = SimpleNamespace(
         family=SimpleNamespace(model=model, period=2, name="base.omega"),
         **{"parameter": np.array([100.0, 150.0, 200.0]), "stable": np.array([True, False, True])},
@@ -223,6 +388,24 @@ def test_ends_of_branches_are_marked_and_explained(run):
     assert mark.get_xdata() == [whole.orbits[0].parameter]
 
 
+def test_linear_response_and_backbone_lie_behind_a_branch(run):
+    stops = [fb.Stop(0.24445, Hertz(2.1e8), gap=1e-3, side=side) for side in ("below", "above")]
+    load = fb.PointForce(0.2, fb.Harmonic(0.05, 60.0))
+    scene = dataclasses.replace(run.model.scene, base=None, stops=stops, forces=[load])
+    branch = scene.reduce(2).branch("forces[0].signal.omega", tuple(np.array([0.97, 1.02]) * run.model.omega[0])).run()
+    axis = plot.branch(branch).axes[0]
+    drawn = {line.get_label(): line for line in axis.lines}
+    omega, height = drawn["linear, no contact"].get_data()
+    H = branch.family.model.frequency_response(omega, "forces[0]", 0.24445)
+    assert height == pytest.approx(1e3 * 0.05 * H.amplitude)
+    peaks = 1e3 * np.array([plot.peak(orbit, 0.24445) for orbit in branch.orbits])
+    assert axis.dataLim.y1 == pytest.approx(peaks.max())  # what lies behind does not widen the limits
+    omega, height = drawn["backbone of the lowest mode"].get_data()
+    seen = np.isfinite(omega)
+    assert omega[seen] == pytest.approx(backbone(branch.family.model, 0.24445, 1e-3 * height[seen]))
+    assert "backbone" not in texts(plot.branch(scene.reduce(1).branch("amplitude", (0.04, 0.06)).run()))
+
+
 def test_shaded_bands_are_the_intervals_of_the_estimates():
     signal = statistics.Signal(np.random.default_rng(1).standard_normal(4000), 1e-3, 64)
     for part in np.split(np.random.default_rng(2).standard_normal(8000), 8):
@@ -235,7 +418,9 @@ def test_shaded_bands_are_the_intervals_of_the_estimates():
         scale = 1e-3 if name == "pdf" else 1.0
         corners = figure.axes[0].collections[0].get_paths()[0].vertices
         i = len(x) // 2
-        at = np.sort(corners[np.isclose(corners[:, 0], x[i]), 1])
-        assert at[[0, -1]] == pytest.approx([scale * max(low[i], 0.0), scale * high[i]]), name
+        beside = 0.51 * (x[1] - x[0]) * (name == "pdf") + 1e-9  # a step has its corners between the bins
+        at = corners[np.abs(corners[:, 0] - x[i]) < beside, 1]
+        for bound in (scale * max(low[i], 0.0), scale * high[i]):
+            assert np.isclose(at, bound).any(), name
     with pytest.raises(ValueError, match="no scatter to tell an interval from"):
         fb.pdf([0.0, 1.0, 1.0]).interval()

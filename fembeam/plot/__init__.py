@@ -1,9 +1,9 @@
-"""Figures: one function per question, each returns a matplotlib Figure; most draw into your own axes with `axes=`.
+"""Figures: one function per question, each returns a matplotlib Figure; all but moving pictures draw into your `axes`.
 
 `response`, `spectra`, `contact_histograms` and `animation` hold those of one run, `laws` those of contact laws,
 `orbits` those of periodic motion, `basins` maps of starts, `random` those of random motion, `linear` spectra and
-frequency response, `mode_count` and `methods` those of studies; `style` and `figure` are what all share. Imports:
-`statistics`, `model` and the rooms below. Begin with `response`.
+frequency response, `mode_count` and `methods` those of studies; `run_signals`, `style` and `figure` are what they
+share. Imports: `statistics`, `model` and the rooms below. Begin with `response`.
 """
 
 from fembeam.model import places
@@ -11,28 +11,32 @@ from fembeam.plot.animation import animate, frame
 from fembeam.plot.basins import basins
 from fembeam.plot.contact_histograms import contacts
 from fembeam.plot.laws import identification, loops, restitutions
-from fembeam.plot.linear import frequency_response, response_spectrum
+from fembeam.plot.linear import floor_spectrum, frequency_response, response_spectrum
 from fembeam.plot.methods import failures, speed_accuracy, stability_map
 from fembeam.plot.mode_count import mode_count, smallest_model
 from fembeam.plot.orbits import branch, orbit, peak
 from fembeam.plot.random import random_densities, random_spectra
-from fembeam.plot.response import densities, mode_shapes, responses, time_history
+from fembeam.plot.response import densities, mode_shapes, time_history
+from fembeam.plot.run_signals import batches, responses, sampling_of, stationary
 from fembeam.plot.spectra import peaks, segment_for, spectra_of, spectrum
-from fembeam.plot.style import styled
+from fembeam.plot.style import one_legend, styled
 
 __all__ = [
     "animate",
     "basins",
+    "batches",
     "branch",
     "contacts",
     "densities",
     "failures",
+    "floor_spectrum",
     "frame",
     "frequency_response",
     "identification",
     "loops",
     "mode_count",
     "mode_shapes",
+    "one_legend",
     "orbit",
     "peak",
     "peaks",
@@ -42,12 +46,14 @@ __all__ = [
     "response_spectrum",
     "responses",
     "restitutions",
+    "sampling_of",
     "segment_for",
     "smallest_model",
     "spectra_of",
     "spectrum",
     "speed_accuracy",
     "stability_map",
+    "stationary",
     "styled",
     "time_history",
 ]

@@ -37,13 +37,15 @@ def animate(
 ) -> Path:
     """Write a run as a moving picture: deflected beams, stops, impactors, an arrow for every contact force.
 
+    The arrow is the largest force in the time nearest to its picture, so that no contact is lost between pictures.
+
     Parameters
     ----------
     run : with samples close enough to show the motion: at least `frames` of them in the window.
     path : .gif, or .mp4 where the program ffmpeg is installed.
     window : (from, to) in s; None: all of it.
     frames : how many pictures, evenly spread over the window's samples; at most 1000.
-    fps : pictures per second. The title says how much slower than real time that is.
+    fps : pictures per second. The title says how much slower or faster than real time that is.
 
     Returns
     -------
@@ -104,6 +106,40 @@ def _samples(run: Run, window: tuple[float, float] | None, frames: int) -> NDArr
     return inside[np.unique(np.linspace(0, len(inside) - 1, frames).round().astype(int))]
 
 
+def _peaks(run: Run, stop: int, samples: NDArray[np.int64]) -> Vector:
+    """Largest force (pictures,) of a contact in the time nearest to each picture: of samples, and of logged peaks.
+
+    A logged peak counts where the samples of its contact are highest; without any, in its middle.
+    """
+    force, log, t = np.abs(run.force(stop)), run.contacts, run.t
+    shown, found = t[samples], np.zeros(len(samples))
+    between = (shown[1:] + shown[:-1]) / 2
+    inside = slice(samples[0], samples[-1] + 1)
+    np.maximum.at(found, np.searchsorted(between, t[inside]), force[inside])
+    mine = log.stop == stop
+    for begin, end, peak in zip(log.t_in[mine], log.t_out[mine], log.peak_force[mine], strict=True):
+        first, last = np.searchsorted(t, [begin, np.nan_to_num(end, nan=np.inf)])
+        when = t[first + int(np.argmax(force[first:last]))] if last > first else (begin + end) / 2
+        if shown[0] <= when <= shown[-1]:
+            picture = int(np.searchsorted(between, when))
+            found[picture] = max(found[picture], peak)
+    return found
+
+
+def _pace(ratio: float) -> str:
+    """Time of the run per time of the film, in words.
+
+    Examples
+    --------
+    >>> _pace(3.3), _pace(0.01), _pace(1.0)
+    (', 3.3 times faster than real time', ', 100 times slower than real time', ', in real time')
+    """
+    if abs(ratio - 1.0) < 0.005:
+        return ", in real time"
+    way, times = ("faster", ratio) if ratio > 1.0 else ("slower", 1.0 / ratio)
+    return f", {times:.{0 if times >= 100 else 1}f} times {way} than real time".replace(".0 ", " ")
+
+
 class _Stage:
     """The figure and what moves in it."""
 
@@ -113,11 +149,10 @@ class _Stage:
         assert run.model is not None
         self.run, self.samples, self.contact_rows = run, samples, run.model.contact_rows
         self.beams, self.strikers = heights(run.model.scene)
-        self.forces = [run.force(i)[samples] for i in range(len(self.contact_rows))]
+        self.forces = [_peaks(run, i, samples) for i in range(len(self.contact_rows))]
         self.largest = max([float(np.abs(force).max()) for force in self.forces], default=0.0)
         self.lines = self._displaced()
-        step = float(np.median(np.diff(run.t[samples])))
-        self.speed = "" if fps is None else f", {1 / (step * fps):.3g} times slower than real"
+        self.speed = "" if fps is None else _pace(fps * float(np.median(np.diff(run.t[samples]))))
         self._build()
 
     def _displaced(self) -> list[tuple[Vector, Vector]]:
@@ -146,10 +181,10 @@ class _Stage:
         self.title = self.beam_axis.set_title(" ")
         self._fixed(self.beam_axis)
         for i, force in enumerate(self.forces):
-            self.force_axis.plot(self.run.t[self.samples], force, color=f"C{i}", label=self._name(i))
+            self.force_axis.step(self.run.t[self.samples], force, color=f"C{i}", where="mid", label=self._name(i))
         self.cursor = self.force_axis.axvline(self.run.t[self.samples[0]], color=ORANGE)
         self.force_axis.set_xlabel("time / s")
-        self.force_axis.set_ylabel("contact force / N")
+        self.force_axis.set_ylabel("peak contact\nforce / N")
         self.force_axis.set_xlim(*self.run.t[self.samples[[0, -1]]])
         if len(self.forces) > 1:
             self.figure.legend(*self.force_axis.get_legend_handles_labels(), loc="outside lower center", ncols=4)

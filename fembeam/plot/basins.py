@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fembeam.plot.style import BLUE, GREEN, GREY, ORANGE, RED, sheet, styled, titled
+from fembeam.plot.style import BLUE, GREEN, GREY, ORANGE, RED, styled
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from fembeam.study.settling import Basins
@@ -18,8 +19,8 @@ OTHERS = {-1: ("not settled", "black"), -2: ("run failed", GREY)}
 
 
 @styled
-def basins(found: Basins) -> Figure:
-    """A plane of starts, coloured by what each comes to.
+def basins(found: Basins, axes: Axes | None = None) -> Figure:
+    """A plane of starts, coloured by what each comes to; `axes` to draw into.
 
     Examples
     --------
@@ -33,7 +34,9 @@ def basins(found: Basins) -> Figure:
     from matplotlib.colors import to_rgb
     from matplotlib.patches import Patch
 
-    figure, (axis,) = sheet(None, 1, 1, (6.4, 4.8))
+    from fembeam.plot.figure import heading, legend, sheet
+
+    figure, (axis,) = sheet(1, 1, (6.4, 4.8), axes)
     names = {i: (one.name, COLOURS[i % len(COLOURS)]) for i, one in enumerate(found.attractors)}
     image = np.zeros((*found.label.shape, 3))
     entries = []
@@ -47,5 +50,6 @@ def basins(found: Basins) -> Figure:
     extent = (x[0] - half[0], x[-1] + half[0], y[0] - half[1], y[-1] + half[1])
     axis.imshow(image, origin="lower", extent=extent, aspect="auto", interpolation="nearest")
     axis.set(xlabel=found.x.name, ylabel=found.y.name)
-    figure.legend(handles=entries, loc="outside lower center", ncols=2)
-    return titled(figure, None, f"What {found.label.size} starts come to")
+    legend(axis, axes is None, "outside lower center", handles=entries, ncols=2 if axes is None else 1)
+    heading([axis], f"What {found.label.size} starts come to", axes is None)
+    return figure

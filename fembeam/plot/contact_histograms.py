@@ -6,9 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fembeam.plot.style import BLUE, GREEN, RED, Vector, sheet, styled, titled
+from fembeam.plot.style import BLUE, GREEN, RED, Vector, plain_decades, styled
+from solvers.problem import counted
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -16,55 +19,83 @@ if TYPE_CHECKING:
 
 
 MOST_DOTS = 4000
+MANY = 200  # contacts: from here on histograms leave out the top 1 %, which would squeeze the rest
+FEWEST_BINS, MOST_BINS = 10, 50
+SLOWEST = 0.005  # part of the contacts, the slowest, left out of restitutions: a logarithmic axis would be theirs
+HIGHEST = 0.98  # quantile of restitutions up to which they are drawn at their place
 
 
 @styled
-def contacts(run: Run, discard: float = 0.0) -> Figure:
+def contacts(run: Run, discard: float = 0.0, axes: Sequence[Axes] | None = None) -> Figure:
     """Histograms of duration, peak force and entry speed, and restitution (exit over entry speed) per contact.
 
-    Only contacts that began after `discard` and ended count. Raises ValueError when there is none.
+    Only contacts that began after `discard` and ended count. `axes` to draw into are four; None makes a figure. Raises
+    ValueError when there is no contact.
     """
+    from fembeam.plot.figure import heading, sheet
+
     log = run.contacts
     kept = np.isfinite(log.t_out) & (log.t_in >= discard)
     if not np.any(kept):
         raise ValueError("the run has no finished contact to draw")
-    figure, axes = sheet(run, 2, 2, (7.0, 4.8))
-    for axis, values, label in (
-        (axes[0], 1e3 * (log.t_out - log.t_in)[kept], "duration / ms"),
-        (axes[1], log.peak_force[kept], "peak force / N"),
-        (axes[2], log.speed_in[kept], "entry speed / m s⁻¹"),
+    figure, drawn = sheet(2, 2, (7.0, 4.8), axes)
+    for axis, values, name, unit in (
+        (drawn[0], 1e3 * (log.t_out - log.t_in)[kept], "duration", "ms"),
+        (drawn[1], log.peak_force[kept], "peak force", "N"),
+        (drawn[2], log.speed_in[kept], "entry speed", "m s⁻¹"),
     ):
-        _histogram(axis, values, label)
-    _restitutions(axes[3], log.speed_in[kept], log.speed_out[kept])
-    span = float(run.t[-1]) - discard
-    return titled(figure, run, f"{np.count_nonzero(kept)} contacts, {np.count_nonzero(kept) / span:.3g} per second")
+        _histogram(axis, values, name, unit)
+    _restitutions(drawn[3], log.speed_in[kept], log.speed_out[kept])
+    if axes is None:
+        count, stops = int(np.count_nonzero(kept)), len(np.unique(log.stop[kept]))
+        of = f" of {stops} stops" if stops > 1 else ""
+        rate = count / (float(run.t[-1]) - discard)
+        heading(drawn, f"{counted(count, 'contact')}{of}, {rate:.3g} per second", True, run=run)
+    return figure
 
 
-def _histogram(axis: Axes, values: Vector, label: str) -> None:
-    """Counts up to the 99 % quantile, with the mean."""
-    edges = np.histogram_bin_edges(values, 50, (0.0, float(np.quantile(values, 0.99))))
-    axis.hist(values, edges.tolist(), color=BLUE, alpha=0.7)
+def _histogram(axis: Axes, values: Vector, name: str, unit: str) -> None:
+    """Counts, of many contacts up to the 99 % quantile, with the mean."""
+    from matplotlib.ticker import MaxNLocator
+
+    cut = len(values) >= MANY
+    top = float(np.quantile(values, 0.99)) if cut else float(values.max())
+    bins = int(np.clip(np.sqrt(len(values)), FEWEST_BINS, MOST_BINS))
+    axis.hist(values, np.histogram_bin_edges(values, bins, (0.0, top or 1.0)).tolist(), color=BLUE, alpha=0.7)
     axis.axvline(values.mean(), color=RED, linestyle="--")
-    axis.set_title(f"mean {values.mean():.3g} (dashed), largest {values.max():.4g}")
-    axis.set_xlabel(f"{label}, without the top 1 %")
+    axis.set_title(f"mean {values.mean():.4g} {unit} (dashed), largest {values.max():.4g} {unit}", fontsize=8)
+    axis.set_xlabel(f"{name} / {unit}" + ", without the top 1 %" * cut)
     axis.set_ylabel("contacts")
+    axis.yaxis.set_major_locator(MaxNLocator(integer=True))
 
 
 def _restitutions(axis: Axes, speed_in: Vector, speed_out: Vector) -> None:
-    """Restitution against entry speed, at most MOST_DOTS evenly picked contacts."""
-    moving = np.flatnonzero(speed_in > 0)
-    if not len(moving):  # all began at rest on the stop
+    """Restitution against entry speed, at most MOST_DOTS evenly picked contacts; triangles lie above the axis."""
+    moving = speed_in > 0.0
+    if not moving.any():  # all began at rest on the stop
         axis.set_title("no contact began with a speed")
         axis.set_axis_off()
         return
-    picked = moving[:: max(1, -(-len(moving) // MOST_DOTS))]
-    restitution = speed_out[picked] / speed_in[picked]
-    low, high = 0.8 * np.quantile(speed_in[picked], 0.005), 1.2 * speed_in[picked].max()
-    axis.plot(speed_in[picked], restitution, ".", markersize=2, alpha=0.4, color=GREEN)
-    axis.axhline(float(np.median(restitution)), color=RED, linestyle="--")
-    axis.set_title(f"median {np.median(restitution):.3f} of the {len(picked)} shown (dashed)")
-    axis.set_xscale("log" if high > 10 * low else "linear")  # ticks within a decade of a logarithmic axis overlap
+    speed, restitution = speed_in[moving], speed_out[moving] / speed_in[moving]
+    every = -(-len(speed) // MOST_DOTS)
+    slow = np.quantile(speed, SLOWEST) if len(speed) >= MANY else 0.0
+    top = max(1.05, 1.1 * float(np.quantile(restitution, HIGHEST)))
+    median = float(np.median(restitution))
+    beyond = (restitution > top) & (speed >= slow)
+    axis.plot(speed[::every], np.where(beyond, np.nan, restitution)[::every], ".", markersize=2, alpha=0.4, color=GREEN)
+    axis.axhline(median, color=RED, linestyle="--")
+    axis.set_ylim(0, top)
+    if beyond.any():
+        axis.plot(speed[beyond], np.full(np.count_nonzero(beyond), 1.06 * top), "^", markersize=4, color=GREEN,
+                  label=f"{np.count_nonzero(beyond)} above, up to {restitution[beyond].max():.3g}")  # fmt: skip
+        axis.legend(loc="upper right", fontsize=8, handletextpad=0.2, borderpad=0.0)
+        axis.set_ylim(0, 1.3 * top)
+    shown = f"{len(speed[::every])} of {len(speed)} drawn" if every > 1 else f"of {counted(len(speed), 'contact')}"
+    axis.set_title(f"median {median:.3f} (dashed){';' * (every > 1)} {shown}", fontsize=8)
+    low, high = 0.8 * max(float(slow), float(speed.min())), 1.2 * float(speed.max())
+    if high > 10 * low:
+        axis.set_xscale("log")
+        plain_decades(axis.xaxis, low, high)
     axis.set_xlim(low, high)
-    axis.set_ylim(0, max(1.05, 1.1 * float(np.quantile(restitution, 0.98))))
-    axis.set_xlabel("entry speed / m s⁻¹")
+    axis.set_xlabel("entry speed / m s⁻¹" + ", top 99.5 %" * bool(slow))
     axis.set_ylabel("exit / entry speed")

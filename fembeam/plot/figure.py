@@ -8,12 +8,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib import figure as of_matplotlib
 
+from fembeam.plot.style import RED
 from fembeam.support import require
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from matplotlib.axes import Axes
+
+    from fembeam.model import Run
 
 MANY_ROOM = "the axes must be as many as the figure has panels"
 
@@ -79,13 +82,20 @@ def sheet(
     return figure, given
 
 
-def heading(axes: Sequence[Axes], title: str, own: bool, weight: str = "bold") -> None:
-    """A title over a figure of our own, or over the first of the axes that were given."""
+def heading(axes: Sequence[Axes], title: str, own: bool, weight: str = "bold", run: Run | None = None) -> None:
+    """A title over a figure of our own, or over the first of the axes that were given.
+
+    A run that did not finish says so in it and, in a figure of our own, in red at the foot.
+    """
     figure: Any = axes[0].figure
-    if own:
-        figure.suptitle(title, x=0.01, ha="left", fontsize=10, fontweight=weight)
-    else:
+    partial = run is not None and not run.complete
+    title = "Partial: " * partial + title
+    if not own:
         axes[0].set_title(title)
+        return
+    figure.suptitle(title, x=0.01, ha="left", fontsize=10, fontweight=weight)
+    if run is not None and partial:
+        figure.supxlabel(f"PARTIAL RESULT: {run.status}", color=RED, fontsize=8, wrap=True)
 
 
 def legend(axis: Axes, own: bool, loc: str, **options: Any) -> None:

@@ -2,23 +2,39 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fembeam.plot.style import styled
+from fembeam.plot.style import Vector, plain_decades, styled
+from fembeam.support import require
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from fembeam.model import Model, Run
     from fembeam.response import FrequencyResponse, ResponseSpectrum
+
+OSCILLATORS = 60  # of a run's response spectrum
+FEWEST = 12  # samples in the shortest period drawn: the error of straight lines between them is near 2 %
 
 
 @styled
-def response_spectrum(spectrum: ResponseSpectrum) -> Figure:
+def response_spectrum(
+    spectrum: ResponseSpectrum | Mapping[str, ResponseSpectrum], axes: Sequence[Axes] | None = None
+) -> Figure:
     """Largest absolute acceleration and relative displacement over the period, a line for each damping ratio.
 
     Dashed: pseudo-acceleration ω² max |x|, the largest spring force per mass.
+
+    Parameters
+    ----------
+    spectrum : one, or several by name. axes : two to draw into; None makes a figure.
 
     Examples
     --------
@@ -28,26 +44,80 @@ def response_spectrum(spectrum: ResponseSpectrum) -> Figure:
     >>> [axis.get_ylabel() for axis in response_spectrum(found).axes]
     ['largest acceleration / m s⁻²', 'largest displacement / mm']
     """
-    from matplotlib.figure import Figure
+    from fembeam.plot.figure import sheet
 
-    figure = Figure(figsize=(7.0, 5.2), layout="constrained")
-    upper, lower = figure.subplots(2, 1, sharex=True)
-    order = np.argsort(spectrum.period)
-    period = spectrum.period[order]
-    for i, zeta in enumerate(spectrum.zeta):
-        (line,) = upper.loglog(period, spectrum.acceleration[i, order], label=f"ζ = {zeta:g}")
-        colour = line.get_color()
-        upper.loglog(period, spectrum.pseudo_acceleration[i, order], color=colour, linestyle="--", alpha=0.6)
-        lower.loglog(period, 1e3 * spectrum.displacement[i, order], color=colour)
+    figure, (upper, lower) = sheet(2, 1, (7.0, 5.2), axes, sharex=True)
+    several = spectrum if isinstance(spectrum, Mapping) else {"": spectrum}
+    require(bool(several), "nothing to draw", spectrum, "plot.response_spectrum", "give one spectrum or more")
+    for name, one in several.items():
+        order = np.argsort(one.period)
+        period = one.period[order]
+        for i, zeta in enumerate(one.zeta):
+            label = f"{name}, ζ = {zeta:g}".removeprefix(", ")
+            (line,) = upper.loglog(period, one.acceleration[i, order], label=label)
+            colour = line.get_color()
+            upper.loglog(period, one.pseudo_acceleration[i, order], color=colour, linestyle="--", alpha=0.6)
+            lower.loglog(period, 1e3 * one.displacement[i, order], color=colour)
     upper.set(ylabel="largest acceleration / m s⁻²", title="Response spectrum; dashed: pseudo-acceleration ω² max |x|")
-    lower.set(xlabel="period / s", ylabel="largest displacement / mm", xlim=(period[0], period[-1]))
+    lower.set(xlabel="period / s", ylabel="largest displacement / mm")
+    for axis in (upper, lower):
+        axis.margins(x=0.0)
+        plain_decades(axis.xaxis, *axis.get_xlim())
+        axis.grid(which="both", alpha=0.25, linewidth=0.5)
     upper.legend()
     return figure
 
 
 @styled
-def frequency_response(found: FrequencyResponse) -> Figure:
+def floor_spectrum(run: Run, z: float | None = None, zeta: float = 0.05, axes: Sequence[Axes] | None = None) -> Figure:
+    """Response spectra of a transient: of the absolute motion at z and of the frame's.
+
+    Parameters
+    ----------
+    run : with its model. zeta : damping ratio of the oscillators.
+    z : m; None: the first stop, else the tip. axes : two to draw into; None makes a figure.
+
+    Notes
+    -----
+    Periods from that of the highest mode kept to four times that of the lowest, and at least twelve samples. Where the
+    samples do not resolve the contacts the figure says so.
+    """
+    from fembeam.model import observed
+    from fembeam.plot.figure import heading
+    from fembeam.plot.run_signals import sampling_of
+    from fembeam.response import frame_motion, model_of
+    from fembeam.response import response_spectrum as computed
+
+    model = model_of(run, "response spectrum")
+    place, step = observed(model) if z is None else z, sampling_of(run)
+    swinging = model.omega[model.omega > 0.0]
+    lowest, highest = swinging.min() / 4, min(swinging.max(), 2 * np.pi / (FEWEST * step))
+    omega = np.geomspace(min(lowest, highest / 10), highest, OSCILLATORS)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        found = {f"z = {1e3 * place:.5g} mm": run.floor_spectrum(place, omega, zeta)}
+    if model.scene.base is not None:
+        found["frame"] = computed(run.t, frame_motion(run, 2), omega, zeta)
+    figure = response_spectrum(found, axes)
+    if said:
+        (axes or figure.axes)[0].set_title("Contacts are shorter than ten samples: levels are rough; lower dt")
+    heading(figure.axes if axes is None else axes, "Response spectra of absolute motion", axes is None, run=run)
+    return figure
+
+
+def frequencies(model: Model, low: float, high: float, count: int) -> Vector:
+    """Where to draw a linear response, rad/s, > 0: even steps and the resonances, but for those without damping."""
+    damped = model.zeta > 0.0
+    natural = model.omega[damped & (model.omega > low) & (model.omega < high)]
+    even = np.linspace(low, high, count)
+    return np.setdiff1d(np.union1d(even[even > 0.0], natural), model.omega[~damped])
+
+
+@styled
+def frequency_response(found: FrequencyResponse, axes: Sequence[Axes] | None = None) -> Figure:
     """Amplitude (logarithmic) and phase over frequency, a line for each place; dotted: natural frequencies.
+
+    `axes` to draw into are two.
 
     Examples
     --------
@@ -58,11 +128,11 @@ def frequency_response(found: FrequencyResponse) -> Figure:
     >>> [axis.get_ylabel() for axis in frequency_response(found).axes]
     ['|H| / m/m', 'phase / °']
     """
-    from matplotlib.figure import Figure
     from matplotlib.ticker import MultipleLocator
 
-    figure = Figure(figsize=(7.0, 4.8), layout="constrained")
-    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
+    from fembeam.plot.figure import sheet
+
+    figure, (upper, lower) = sheet(2, 1, (7.0, 4.8), axes, sharex=True, height_ratios=(2, 1))
     amplitude, phase = (values.reshape(len(found.omega), -1).T for values in (found.amplitude, found.phase))
     for size, angle, z in zip(amplitude, phase, np.atleast_1d(found.output), strict=True):
         upper.semilogy(found.omega, size, label=f"z = {z:.4g} m")

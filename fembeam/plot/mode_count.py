@@ -130,6 +130,8 @@ def _bars(y: Any, spread: Any) -> Any:
 
 def _whole_numbers(axes: Sequence[Axes], coordinates: Sequence[int]) -> None:
     """Logarithmic axes of coordinates with plain numbers, thinned out so that none overlap."""
+    from matplotlib.ticker import NullLocator
+
     ticks: list[int] = []
     for n in sorted(set(coordinates)):
         if not ticks or n >= 1.3 * ticks[-1]:
@@ -137,5 +139,5 @@ def _whole_numbers(axes: Sequence[Axes], coordinates: Sequence[int]) -> None:
     for axis in axes:
         axis.set_xscale("log")
         axis.set_xticks(ticks, [str(n) for n in ticks])
-        axis.minorticks_off()
+        axis.xaxis.set_minor_locator(NullLocator())
         axis.set_xlabel("coordinates (modes + static shapes)")

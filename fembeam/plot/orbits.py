@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fembeam.model import observed
 from fembeam.plot.axis_names import axis_name
+from fembeam.plot.linear import frequencies
 from fembeam.plot.style import GREEN, GREY, ORANGE, RED, Vector, styled
+from fembeam.scene import signals_of
 from fembeam.support import require
 from solvers.problem import counted
 
@@ -23,6 +25,7 @@ MARKS = {"fold": ("o", GREY), "flip": ("s", RED), "neimark-sacker": ("D", GREEN)
          "grazing": ("x", "black"), "floor": ("+", "black"), "merging": ("^", ORANGE)}  # fmt: skip
 SPAN, CLOSED = "reached the end of the span", "closed"  # ends that are no surprise
 ENDS = "*Xhd8"  # marks of the others, one for each reason
+BEHIND = 400  # points of the linear response
 
 
 @styled
@@ -35,7 +38,9 @@ def branch(
 ) -> Figure:
     """Response diagram: largest |u| at z over a period against the parameter, dashed where unstable.
 
-    Special orbits are marked, and where and why each direction ended: by a bar at an end of the span.
+    Special orbits are marked, and where and why each direction ended: by a bar at an end of the span. Along the
+    frequency of the only load the linear response (all contacts open) lies behind, and for each period the backbone of
+    the lowest mode: its free vibration against the stops, at the frequency of the load that it answers in that period.
 
     Parameters
     ----------
@@ -45,23 +50,25 @@ def branch(
     axes : to draw into; None makes a figure.
     labels : of the branches; None tells their period.
     """
-    from fembeam.plot.figure import sheet
+    from fembeam.plot.figure import legend, sheet
 
     several = [branches] if not isinstance(branches, Sequence) else list(branches)
     require(bool(several), "nothing to draw", branches, "plot.branch", "give one branch or more")
     model = several[0].family.model
     place = observed(model) if z is None else z
-    figure, (axis,) = sheet(1, 1, (6.4, 3.8), axes)
+    figure, (axis,) = sheet(1, 1, (8.4, 3.8), axes)
     if cloud is not None:
         axis.plot(cloud[0], 1e3 * cloud[1], ".", color=GREY, markersize=2.0, label="simulated", rasterized=True)
     for i, one in enumerate(several):
         label = f"period {one.family.period}" if labels is None else labels[i]
         _draw_branch(axis, one, place, f"C{i}", label)
     _draw_ends(axis, several, place)
+    _draw_behind(axis, several, place)
     name = several[0].family.name
     axis.set_xlabel(axis_name(name, model.scene))
     axis.set_ylabel(f"max |u({place:.4g} m)| / mm")
-    _legend(axis, several)
+    handles, words = _entries(axis, several)
+    legend(axis, axes is None, "outside right upper", handles=handles, labels=words, fontsize=8)
     return figure
 
 
@@ -104,8 +111,35 @@ def _draw_ends(axis: Axes, several: list[Branch], z: float) -> None:
             labelled.add(why)
 
 
-def _legend(axis: Axes, several: list[Branch]) -> None:
-    """Branches, the dashes' meaning, the marks that occur."""
+def _draw_behind(axis: Axes, several: list[Branch], z: float) -> None:
+    """Linear response and backbones along the frequency of the only load; the axes keep the limits of the branches."""
+    from fembeam.response import backbone
+
+    family = several[0].family
+    path, signals = family.name.removesuffix(".omega"), signals_of(family.model.scene)
+    if list(signals) != [path] or path == family.name:
+        return
+    model, (low, high) = family.model, (f(f(one.parameter) for one in several) for f in (min, max))
+    omega = frequencies(model, low, high, BEHIND)
+    linear = model.frequency_response(omega, path, z).amplitude * abs(signals[path].amplitude)
+    _behind(axis, omega, 1e3 * linear, "-", "linear, no contact")
+    heights = np.linspace(0.0, axis.dataLim.y1, BEHIND // 2)[1:]
+    for i, period in enumerate(sorted({one.family.period for one in several})):
+        along = period * backbone(model, z, 1e-3 * heights)
+        shown = (along >= low) & (along <= high)
+        if shown.any() and model.contact_rows:
+            _behind(axis, np.where(shown, along, np.nan), heights, "-.", None if i else "backbone of the lowest mode")
+
+
+def _behind(axis: Axes, x: Vector, y: Vector, style: Any, label: str | None) -> None:
+    """A thin grey line that does not widen the limits."""
+    from matplotlib.lines import Line2D
+
+    axis.add_artist(Line2D(x, y, color=GREY, linestyle=style, linewidth=0.8, zorder=1, label=label))
+
+
+def _entries(axis: Axes, several: list[Branch]) -> tuple[list[Any], list[str]]:
+    """Handles and labels of a legend: branches, the dashes' meaning, the marks that occur."""
     from matplotlib.lines import Line2D
 
     handles, labels = axis.get_legend_handles_labels()
@@ -121,7 +155,7 @@ def _legend(axis: Axes, several: list[Branch]) -> None:
                 Line2D([], [], marker=marker, color=edge, markerfacecolor=face, markersize=3.5, linestyle="")
             )
             labels.append(kind)
-    axis.legend(handles, labels, fontsize=8)
+    return handles, labels
 
 
 @styled

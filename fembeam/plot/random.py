@@ -6,10 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fembeam.plot.orbits import branch
-from fembeam.plot.style import BLUE, GREY, RED, fit_levels, styled
+from fembeam.plot.style import BLUE, GREY, RED, curve, fit_levels, one_legend, ribbon, styled
 from fembeam.statistics import Spectrum
 
 if TYPE_CHECKING:
@@ -17,10 +16,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from fembeam.model import Branch
-    from fembeam.statistics import Signal
+    from fembeam.statistics import Estimate, Signal
 
-Vector = NDArray[np.float64]
 FURTHEST = 5.0  # standard deviations shown of a density
+ROOM = 1.3  # of the highest density, the height of its axis, so that the legend has room
 
 
 @styled
@@ -50,7 +49,7 @@ def random_spectra(
         lines = {label: x if isinstance(x, Spectrum) else x.psd for label, x in shown.items()}
         axis = drawn[row * columns]
         for i, (label, line) in enumerate(lines.items()):
-            _curve(axis, line, omega_max, label, f"C{i}")
+            curve(axis, line, omega_max, label=label, color=f"C{i}")
         fit_levels(axis, list(lines.values()), omega_max)
         if bands and title in bands:
             axis.axvspan(*bands[title], ymin=0.96, color=GREY, alpha=0.6, linewidth=0)
@@ -61,6 +60,8 @@ def random_spectra(
             _beside(drawn[row * columns + 1], branches.get(title), omega_max)
     for axis in drawn[-columns:]:
         axis.set_xlabel("ω / rad s⁻¹")
+    if branches and axes is None:
+        one_legend(drawn[1::2])
     return figure
 
 
@@ -86,34 +87,33 @@ def random_densities(signals: Mapping[str, Signal], axes: Axes | Sequence[Axes] 
     from fembeam.plot.figure import sheet
 
     figure, drawn = sheet(1, len(signals), (3.5 * len(signals), 3.1), axes)
-    for axis, (name, signal) in zip(drawn, signals.items(), strict=True):
-        density, mean, std = signal.pdf, 1e3 * float(signal.mean.value), 1e3 * float(signal.std.value)
-        x, p = 1e3 * density.x, 1e-3 * density.density
-        axis.plot(x, p, color=BLUE, label="simulated, 95 %")
-        if density.estimate is not None:
-            _ribbon(axis, x, [1e-3 * bound for bound in density.interval()], BLUE)
-        wide = mean + std * np.linspace(-FURTHEST, FURTHEST, 301)
-        normal = np.exp(-0.5 * ((wide - mean) / std) ** 2) / (std * np.sqrt(2 * np.pi))
-        axis.plot(wide, normal, color=RED, linestyle="--", label="Gaussian")
-        axis.set_title(f"{name}: skewness {signal.skewness!r}")
-        axis.set(xlabel=f"{name} / mm", xlim=(wide[0], wide[-1]), ylim=(0, None))
-    drawn[0].set_ylabel("probability density / mm⁻¹")
-    drawn[0].legend(loc="upper left")
+    density_panels(drawn, signals)
     return figure
 
 
-def _curve(axis: Axes, line: Spectrum, omega_max: float, label: str, colour: str) -> None:
-    """One spectrum without ω = 0, with its confidence."""
-    kept = (line.omega > 0) & (line.omega <= omega_max) & (line.density > 0)
-    axis.semilogy(line.omega[kept], line.density[kept], color=colour, label=label)
-    if line.estimate is not None:
-        _ribbon(axis, line.omega[kept], [bound[kept] for bound in line.interval()], colour)
+def density_panels(axes: Sequence[Axes], signals: Mapping[str, Signal]) -> None:
+    """One density each, with its confidence where it is known, against its Gaussian."""
+    for axis, (name, signal) in zip(axes, signals.items(), strict=True):
+        density, mean, std = signal.pdf, 1e3 * float(signal.mean.value), 1e3 * float(signal.std.value)
+        x, p = 1e3 * density.x, 1e-3 * density.density
+        sure = density.estimate is not None and density.estimate.batches > 1
+        axis.step(x, p, where="mid", color=BLUE, label="simulated, 95 % shaded" if sure else "simulated")
+        if sure:
+            ribbon(axis, x, [1e-3 * bound for bound in density.interval()], BLUE, step="mid")
+        wide = mean + std * np.linspace(-FURTHEST, FURTHEST, 301)
+        normal = np.exp(-0.5 * ((wide - mean) / std) ** 2) / (std * np.sqrt(2 * np.pi))
+        axis.plot(wide, normal, color=RED, linestyle="--", label="Gaussian")
+        axis.set_title(f"{name}: skewness {_rounded(signal.skewness)},\nkurtosis {_rounded(signal.kurtosis)}")
+        axis.set(xlabel=f"{name} / mm", xlim=(wide[0], wide[-1]), ylim=(0, ROOM * max(p.max(), normal.max())))
+    axes[0].set_ylabel("probability density / mm⁻¹")
+    axes[0].legend(loc="upper left", fontsize=8)
 
 
-def _ribbon(axis: Axes, x: Vector, bounds: Sequence[Vector], colour: str) -> None:
-    """A shaded 95 % interval, which is not below zero."""
-    low, high = bounds
-    axis.fill_between(x, np.maximum(low, 0.0), high, color=colour, alpha=0.3, linewidth=0)
+def _rounded(found: Estimate) -> str:
+    """An estimate to two decimals, or to two digits of its standard error where it has one."""
+    error = float(found.standard_error)
+    digits = max(2, 1 - int(np.floor(np.log10(error)))) if error > 0.0 else 2
+    return f"{float(found.value):z.{digits}f}" + (f" ± {error:.{digits}f}" if error > 0.0 else "")
 
 
 def _beside(axis: Axes, several: Sequence[Branch] | None, omega_max: float) -> None:

@@ -23,157 +23,221 @@ Examples
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fembeam.model import places
-from fembeam.plot.style import BLUE, GREY, ORANGE, RED, Vector, sheet, styled, titled
-from fembeam.statistics import moments, pdf
+from fembeam.plot.random import density_panels
+from fembeam.plot.run_signals import estimated, sampling_of, stationary
+from fembeam.plot.spectra import segment_for
+from fembeam.plot.style import BLUE, GREY, ORANGE, Vector, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from numpy.typing import NDArray
 
     from fembeam.model import Model, Run
 
+PERIODS = 8  # of the lowest mode in a time history
+BEFORE = 0.3  # of a transient's window, before the largest force
+FEW = 10  # samples in a contact, below which its peak is drawn instead of its history
+LEGEND_COLUMNS, LEGEND_ROW = 2, 0.2  # of mode shapes; a row's height in units of the axis
+
 
 @styled
-def time_history(run: Run, window: tuple[float, float] | None = None, z: float | None = None) -> Figure:
+def time_history(
+    run: Run,
+    window: tuple[float, float] | None = None,
+    z: float | None = None,
+    axes: Axes | Sequence[Axes] | None = None,
+) -> Figure:
     """Displacement and contact force over a readable window, contacts shaded.
 
     Parameters
     ----------
     run : with at least 2 samples.
-    window : (from, to) in s; None: the last eight periods of the lowest mode (or 400 samples).
-    z : where, in m; None: the tip.
+    window : (from, to) in s; None: eight periods of the lowest mode (or 400 samples), the last ones of a motion that
+        lasts, of a transient those about the largest contact force, else the largest displacement.
+    z : where, in m; None: the stop of the largest force in the window, on its beam; without contacts the tip.
+    axes : to draw into, two where there are stops; None makes a figure.
 
     Notes
     -----
-    Between samples the displacement is the cubic through values and rates. The force is drawn as sampled where a
-    contact has ten samples, else as the logged peak of each contact.
+    Shaded are the contacts of the stops at z, of all stops where there is none. Between samples the displacement is the
+    cubic through values and rates. Contacts shorter than ten samples are drawn as their logged peak.
     """
-    lo, hi = window or _last_window(run)
-    if z is None:
-        name, z = next(iter(places(run.shapes).items()))
-    else:
-        name = f"z = {z:.4g} m"
-    figure, axes = sheet(run, 2 if len(run.stops) else 1, 1, (7.0, 4.2), sharex=True)
-    t, u = _between_samples(run, z, lo, hi)
-    axes[0].plot(t, 1e3 * u, color=BLUE)
-    axes[0].set_ylabel("displacement / mm")
+    from fembeam.plot.figure import heading, sheet
+
+    lo, hi = window or _window(run)
+    body, place = _watched(run, lo, hi) if z is None else (0, z)
+    figure, drawn = sheet(2 if len(run.stops) else 1, 1, (7.0, 4.2), axes, sharex=True)
+    t, u = _between_samples(run, place, body, lo, hi)
+    drawn[0].plot(t, 1e3 * u, color=BLUE)
+    drawn[0].set_ylabel("displacement / mm")
+    title = f"Displacement at {_name(run, body, place)} relative to the frame"
     if len(run.stops):
-        _shade_contacts(axes, run, lo, hi)
-        _draw_forces(axes[1], run, lo, hi)
-    axes[-1].set_xlabel("time / s")
-    axes[-1].set_xlim(lo, hi)
-    shaded = ", contacts shaded" if len(run.stops) else ""
-    return titled(figure, run, f"Displacement at {name} relative to the frame{shaded}")
+        stops = _stops_at(run, body, place)
+        _shade_contacts(drawn, run, stops, lo, hi)
+        _draw_forces(drawn[1], run, lo, hi)
+        title += f", contacts of {_listed(stops, len(run.stops))} shaded"
+    drawn[-1].set_xlabel("time / s")
+    beside = 0.0 if window else 0.01 * (hi - lo)  # so that a contact at the first instant is seen
+    drawn[-1].set_xlim(lo - beside, hi + beside)
+    heading(drawn, title, axes is None, run=run)
+    return figure
 
 
 @styled
-def densities(run: Run, discard: float = 0.0) -> Figure:
-    """Probability densities of δ (or the tip) and mid-beam against the Gaussian of the same mean and deviation."""
-    signals = responses(run, discard)
-    figure, axes = sheet(run, 1, len(signals), (7.0, 3.1))
-    for axis, (name, values) in zip(axes, signals.items(), strict=True):
-        x, density = pdf(1e3 * values)
-        found = moments(1e3 * values)
-        axis.fill_between(x, density, step="mid", color=BLUE, alpha=0.3, linewidth=0)
-        axis.step(x, density, where="mid", color=BLUE, label="simulated")
-        wide = np.linspace(-5, 5, 301)
-        normal = np.exp(-0.5 * wide**2) / (found.std * np.sqrt(2 * np.pi))
-        axis.plot(found.mean + wide * found.std, normal, color=RED, linestyle="--", label="Gaussian")
-        axis.set_title(f"{name}: skewness {found.skewness:.2f}, kurtosis {found.kurtosis:.2f}")
-        axis.set_xlabel(f"{name} / mm")
-        axis.set_xlim(found.mean - 5 * found.std, found.mean + 5 * found.std)
-        axis.set_ylim(bottom=0)
-    axes[0].set_ylabel("probability density / mm⁻¹")
-    axes[0].legend(loc="upper left")
-    return titled(figure, run, "Probability densities against the Gaussian of the same mean and deviation")
+def densities(run: Run, discard: float = 0.0, axes: Axes | Sequence[Axes] | None = None) -> Figure:
+    """Probability densities of δ (or the tip) and mid-beam against the Gaussian of the same mean and deviation.
+
+    Shaded: 95 % confidence, where the run holds at least four independent parts. `axes` to draw into: one each.
+    """
+    from fembeam.plot.figure import heading, sheet
+
+    signals = estimated(run, discard, segment_for(int(np.count_nonzero(run.t >= discard)), sampling_of(run)))
+    figure, drawn = sheet(1, len(signals), (7.0, 3.1), axes)
+    density_panels(drawn, signals)
+    if axes is None:
+        heading(drawn, "Probability densities against the Gaussian of the same mean and deviation", True, run=run)
+    return figure
 
 
 @styled
-def mode_shapes(model: Model) -> Figure:
-    """The first modes (at most six), scaled to 1, with supports, stops and masses at their places."""
-    figure, (axis,) = sheet(None, 1, 1, (7.0, 3.4))
+def mode_shapes(model: Model, axes: Axes | None = None) -> Figure:
+    """The first modes (at most six), scaled to 1, with supports, stops and masses at their places.
+
+    `axes` to draw into; None makes a figure.
+    """
+    from fembeam.plot.figure import heading, sheet
+
+    figure, (axis,) = sheet(1, 1, (7.0, 3.8), axes)
     z = np.linspace(0.0, model.scene.beam.length, 401)
     shapes = model.phi(z)
     scale = np.abs(shapes).max(axis=0)
     axis.axhline(0.0, color=GREY, linewidth=0.6)
     for i in np.flatnonzero(scale)[:6]:  # other bodies' modes do not move this beam
-        label = f"mode {model.names[i]}: {model.omega[i]:.4g} rad/s, ζ = {model.zeta[i]:.3g}"
-        axis.plot(1e3 * z, shapes[:, i] / scale[i], label=label)
+        label = f"mode {model.names[i]}: {model.omega[i]:.{0 if model.omega[i] >= 1e3 else 1}f} rad/s"
+        axis.plot(1e3 * z, shapes[:, i] / scale[i], label=f"{label}, ζ = {model.zeta[i]:.3g}")
     _mark_features(axis, model)
     axis.set_xlabel("z / mm")
     axis.set_ylabel("φ / max |φ|")
-    axis.set_ylim(-1.25, 1.25)
-    figure.legend(*axis.get_legend_handles_labels(), loc="outside right upper")
-    return titled(figure, None, "Mode shapes of the linear beam")
+    rows = -(-len(axis.get_legend_handles_labels()[1]) // LEGEND_COLUMNS)
+    axis.set_ylim(-1.15, 1.2 + LEGEND_ROW * rows)  # the legend has room of its own above the curves
+    axis.set_yticks([-1.0, -0.5, 0.0, 0.5, 1.0])
+    axis.legend(loc="upper center", ncols=LEGEND_COLUMNS, fontsize=8)
+    heading([axis], "Mode shapes of the linear beam", axes is None)
+    return figure
 
 
-def responses(run: Run, discard: float = 0.0) -> dict[str, Vector]:
-    """Signals worth a density, m: δ of the first stop (the tip when there is none) and mid-beam."""
-    kept = run.t >= discard
-    named = places(run.shapes)
-    first = {"δ": run.indentation(0)} if len(run.stops) else {}
-    if not first and "tip" in named:
-        first = {"tip u": run.displacement(named["tip"])}
-    return {name: x[kept] for name, x in {**first, "mid-beam u": run.displacement(named["mid-beam"])}.items()}
-
-
-def sampling_of(run: Run) -> float:
-    """Output sampling, s."""
-    return float(run.t[1] - run.t[0])
-
-
-def _last_window(run: Run) -> tuple[float, float]:
-    """The last eight periods of the lowest mode that swings, or 400 samples."""
-    end = float(run.t[-1])
+def _window(run: Run) -> tuple[float, float]:
+    """Eight periods of the lowest mode that swings (or 400 samples): the last ones, of a transient about its peak."""
+    begin, end = float(run.t[0]), float(run.t[-1])
     swinging = [] if run.model is None else [omega for omega in run.model.omega if omega > 0]
-    length = 8 * 2 * np.pi / min(swinging) if swinging else 400 * sampling_of(run)
-    return max(float(run.t[0]), end - length), end
+    length = min(PERIODS * 2 * np.pi / min(swinging) if swinging else 400 * sampling_of(run), end - begin)
+    if stationary(run):
+        return end - length, end
+    if len(run.contacts):
+        about = float(run.contacts.t_in[np.argmax(run.contacts.peak_force)])
+    else:
+        about = float(run.t[np.argmax(np.abs(run.displacement(_resting_place(run))))])
+    start = min(max(begin, about - BEFORE * length), end - length)
+    return start, start + length
 
 
-def _between_samples(run: Run, z: float, lo: float, hi: float) -> tuple[Vector, Vector]:
+def _resting_place(run: Run) -> float:
+    """Where to look when nothing touches: the tip, else mid-beam."""
+    return next(iter(places(run.shapes).values()))
+
+
+def _watched(run: Run, lo: float, hi: float) -> tuple[int, float]:
+    """Beam and z of the stop with the largest force between two times; of the first one; of the tip."""
+    if not len(run.stops):
+        return 0, _resting_place(run)
+    log = run.contacts
+    inside = np.flatnonzero(_within(run, lo, hi))
+    stop = int(log.stop[inside[np.argmax(log.peak_force[inside])]]) if len(inside) else 0
+    return _bodies(run)[stop], float(run.stops[stop, 0])
+
+
+def _bodies(run: Run) -> list[int]:
+    """The beam of every contact; a run read from a file does not know."""
+    return [0] * len(run.stops) if run.model is None else [row.body for row in run.model.contact_rows]
+
+
+def _stops_at(run: Run, body: int, z: float) -> NDArray[np.int64]:
+    """Numbers of the contacts at a place, or of all where there is none."""
+    near = np.isclose(run.stops[:, 0], z) & (np.array(_bodies(run)) == body)
+    return np.flatnonzero(near if near.any() else ~near)
+
+
+def _listed(stops: NDArray[np.int64], count: int) -> str:
+    """Numbers of stops as words."""
+    if len(stops) == count > 1:
+        return "all stops"
+    return f"stop{'s' * (len(stops) > 1)} " + ", ".join(map(str, stops))
+
+
+def _name(run: Run, body: int, z: float) -> str:
+    """A place as words."""
+    known = (name for name, at in places(run.shapes).items() if body == 0 and np.isclose(at, z))
+    return next(known, f"z = {1e3 * z:.5g} mm") + (f" of beam {body}" if body else "")
+
+
+def _within(run: Run, lo: float, hi: float) -> NDArray[np.bool_]:
+    """Which contacts overlap a window."""
+    return (run.contacts.t_in < hi) & ~(run.contacts.t_out <= lo)  # NaN: not ended yet
+
+
+def _between_samples(run: Run, z: float, body: int, lo: float, hi: float) -> tuple[Vector, Vector]:
     """(t, u) on a grid eight times finer than the samples, by cubics through values and rates."""
     from scipy.interpolate import CubicHermiteSpline
 
     first, last = np.searchsorted(run.t, [lo, hi])
     kept = slice(max(0, first - 1), last + 1)
-    t, shape = run.t[kept], run.shapes(z)
+    t, shape = run.t[kept], (run.shapes, *run.others)[body](z)
     fine = np.linspace(t[0], t[-1], 8 * (len(t) - 1) + 1)
     return fine, CubicHermiteSpline(t, run.q[kept] @ shape, run.q_dot[kept] @ shape)(fine)
 
 
-def _shade_contacts(axes: list[Axes], run: Run, lo: float, hi: float) -> None:
-    """A band for every contact in the window."""
+def _shade_contacts(axes: list[Axes], run: Run, stops: NDArray[np.int64], lo: float, hi: float) -> None:
+    """A band for every contact of some stops in the window."""
     left, right = run.contacts.t_in, np.where(np.isnan(run.contacts.t_out), run.t[-1], run.contacts.t_out)
-    for index in np.flatnonzero((right > lo) & (left < hi)):
+    for index in np.flatnonzero(_within(run, lo, hi) & np.isin(run.contacts.stop, stops)):
         for axis in axes:
             axis.axvspan(left[index], right[index], color=ORANGE, alpha=0.4, linewidth=0.8)
 
 
 def _draw_forces(axis: Axes, run: Run, lo: float, hi: float) -> None:
-    """The force of every stop: as sampled, or as peaks where samples are too coarse for it."""
-    log = run.contacts
-    inside = (log.t_in < hi) & ~(log.t_out < lo)
-    lasting = (log.t_out - log.t_in)[inside & np.isfinite(log.t_out)]
-    if len(lasting) and np.median(lasting) < 10 * sampling_of(run):
-        for stop in np.unique(log.stop[inside]):
-            mine = inside & (log.stop == stop)
-            axis.vlines(
-                log.t_in[mine], 0.0, log.peak_force[mine], color=f"C{stop}", linewidth=1.2, label=f"stop {stop}"
-            )
-        axis.set_ylabel("peak contact force / N")
+    """The force of every stop touched in the window: as sampled, and as peaks of contacts too short for that."""
+    log, inside = run.contacts, _within(run, lo, hi)
+    short = inside & (log.t_out - log.t_in < FEW * sampling_of(run))
+    kept = (run.t >= lo) & (run.t <= hi)
+    for stop in np.unique(log.stop[inside]):
+        mine = log.stop == stop
+        look: dict[str, Any] = {"color": f"C{stop}", "label": _stop_name(run, int(stop))}
+        if np.any(mine & inside & ~short):
+            axis.plot(run.t[kept], run.force(int(stop))[kept], **look)
+            look.pop("label")
+        axis.vlines(log.t_in[mine & short], 0.0, log.peak_force[mine & short], linewidth=1.2, **look)
+    kind = "peak contact force" if np.all(short[inside]) else "contact force"
+    axis.set_ylabel(f"{kind} / N" if inside.any() else "contact force / N")
+    if len(run.stops) > 1 and inside.any():
+        axis.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=2, borderaxespad=0.0, fontsize=8)
+    if inside.any():
+        axis.set_ylim(bottom=min(0.0, axis.get_ylim()[0]))
     else:
-        kept = (run.t >= lo) & (run.t <= hi)
-        for stop in range(len(run.stops)):
-            axis.plot(run.t[kept], run.force(stop)[kept], color=f"C{stop}", label=f"stop {stop}")
-        axis.set_ylabel("contact force / N")
-    if len(run.stops) > 1:
-        axis.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=len(run.stops), borderaxespad=0.0)
-    axis.set_ylim(bottom=min(0.0, axis.get_ylim()[0]))
+        axis.set(ylim=(0.0, 1.0), yticks=[0.0])
+        axis.text(0.5, 0.5, "no contact in this window", transform=axis.transAxes, ha="center", color=GREY)
+
+
+def _stop_name(run: Run, stop: int) -> str:
+    """A contact as words."""
+    z, push, _ = run.stops[stop]
+    return f"stop {stop}, {'below' if push > 0 else 'above'}, z = {1e3 * z:.5g} mm"
 
 
 def _mark_features(axis: Axes, model: Model) -> None:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fembeam.plot.response import responses, sampling_of
-from fembeam.plot.style import BLUE, GREEN, GREY, Vector, drawable, fit_levels, sheet, styled, titled
-from fembeam.statistics import psd
+from fembeam.model import places
+from fembeam.plot.linear import frequencies
+from fembeam.plot.run_signals import estimated, responses, sampling_of
+from fembeam.plot.style import BLUE, GREEN, GREY, Vector, curve, drawable, fit_levels, styled
+from fembeam.scene import signals_of
+from fembeam.statistics import Spectrum, psd
 from fembeam.statistics.spectra import FINEST_RESOLUTION
 
 if TYPE_CHECKING:
@@ -17,10 +20,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from fembeam.model import Run
-    from fembeam.statistics import Spectrum
 
 
 LABEL_WIDTH = 0.05  # of the axis, taken up by a frequency of four digits
+NAME_WIDTH, UPRIGHT = 0.13, 0.026  # of the axis, taken up by the name of a natural frequency, level and upright
+LINEAR_POINTS = 2000
 
 
 def segment_for(samples: int, dt: float) -> int:
@@ -29,7 +33,9 @@ def segment_for(samples: int, dt: float) -> int:
 
 
 @styled
-def spectrum(run: Run, discard: float = 0.0, omega_max: float | None = None) -> Figure:
+def spectrum(
+    run: Run, discard: float = 0.0, omega_max: float | None = None, axes: Sequence[Axes] | None = None
+) -> Figure:
     """Power spectral densities: base motion, indentation δ of the first stop (or the tip), mid-beam.
 
     Parameters
@@ -37,43 +43,78 @@ def spectrum(run: Run, discard: float = 0.0, omega_max: float | None = None) -> 
     run : with at least 64 samples after `discard`.
     discard : s at the beginning to leave out.
     omega_max : rad/s, end of the axis; None: 2.5 times the highest frequency kept.
+    axes : two to draw into; None makes a figure.
 
     Notes
     -----
-    Dotted lines are the natural frequencies of the linear model, numbers the peaks of the first curve.
+    Shaded: 95 % confidence, where the run holds at least four independent parts. Under one noise the response of the
+    linear scene, |H|² S with all contacts open, is dashed. Dotted lines are the natural frequencies of the linear
+    model, named at the top; numbers are the peaks of the first curve. Of a transient the levels hold for this stretch
+    of time only: see `floor_spectrum`.
     """
-    figure, (upper, lower) = sheet(run, 2, 1, (7.0, 5.2), sharex=True)
-    spectra = spectra_of(run, discard)
+    from fembeam.plot.figure import heading, sheet
+
+    figure, (upper, lower) = sheet(2, 1, (7.0, 5.6), axes, sharex=True)
+    spectra, linear = spectra_of(run, discard), _linear(run)
     response = {name: s for name, s in spectra.items() if name != "base y"}
-    top = omega_max or _axis_end(run, next(iter(response.values())))
     main, *others = response
+    top = omega_max or _axis_end(run, response[main])
     for axis, names in ((upper, [n for n in ("base y", main) if n in spectra]), (lower, others or [main])):
+        behind = [linear[name] for name in names if name in linear]
         for name in names:
-            colour = {"base y": GREY, main: BLUE}.get(name, GREEN)
-            axis.semilogy(*drawable(spectra[name], top), color=colour, label=name)
+            curve(axis, spectra[name], top, color={"base y": GREY, main: BLUE}.get(name, GREEN), label=name)
+        for line in behind:  # thin, and in front: where both agree both are seen
+            curve(axis, line, top, color="black", linestyle="--", linewidth=0.7, label="linear, no contact")
         axis.set_ylabel("PSD / m² s rad⁻¹")
         axis.legend(loc="upper right")
-        fit_levels(axis, [spectra[name] for name in names if name != "base y"], top)
+        fit_levels(axis, [spectra[name] for name in names if name != "base y"], top, behind)
     _mark_peaks(upper, spectra[main], top)
     _mark_frequencies((upper, lower), run, top)
     lower.set_xlabel("ω / rad s⁻¹")
     lower.set_xlim(0, top)
-    line = spectra[main]
+    heading([upper], _about(run, discard, spectra[main]), axes is None, run=run)
+    return figure
+
+
+def _about(run: Run, discard: float, line: Spectrum) -> str:
+    """What the spectra rest on."""
     lasting = np.count_nonzero(run.t >= discard) * sampling_of(run)
     about = f"{lasting:.4g} s, {line.n_segments} segments, lines {line.omega[1]:.2g} rad/s apart"
-    return titled(figure, run, f"Power spectral densities ({about})")
+    sure = line.estimate is not None and line.estimate.batches > 1
+    return f"Power spectral densities ({about}{', 95 % shaded' if sure else ''})"
 
 
 def spectra_of(run: Run, discard: float = 0.0) -> Mapping[str, Spectrum]:
-    """Spectra of the base motion (where the run knows it) and of `responses`."""
-    signals = {name: (x, sampling_of(run)) for name, x in responses(run, discard).items()}
+    """Spectra of the base motion (where the run knows it) and of `responses`, these with their confidence."""
     base = None if run.model is None else run.model.scene.base
+    samples, dt = int(np.count_nonzero(run.t >= discard)), sampling_of(run)
+    found = {name: signal.psd for name, signal in estimated(run, discard, segment_for(samples, dt)).items()}
     if base is not None and hasattr(base, "nodes"):  # a sum of many lines: by FFT on its own grid
         dt, values = base.nodes(float(run.t[-1]), 1e-3)
-        signals["base y"] = values[:, 0], dt
+        found["base y"] = psd(values[:, 0], dt, segment_for(len(values), dt))
     elif base is not None:
-        signals["base y"] = np.asarray(base(run.t)), sampling_of(run)
-    return {name: psd(x, dt, segment_for(x.size, dt)) for name, (x, dt) in signals.items()}
+        found["base y"] = psd(np.asarray(base(run.t)), dt, segment_for(len(run.t), dt))
+    return found
+
+
+def _linear(run: Run) -> dict[str, Spectrum]:
+    """|H|² S of the `responses` with all contacts open, under one noise of known density; else nothing."""
+    signals = {} if run.model is None else signals_of(run.model.scene)
+    if run.model is None or len(signals) != 1 or not hasattr(next(iter(signals.values())), "psd_at"):
+        return {}
+    ((path, noise),) = signals.items()
+    row = next(iter(run.model.contact_rows), None)
+    if row is not None and row.on[0] != "frame":  # δ is of two bodies
+        return {}
+    watched, found = places(run.shapes), {}
+    omega = frequencies(run.model, 0.0, 2.5 * float(run.model.omega.max()), LINEAR_POINTS)
+    if not len(omega):  # rigid-body modes alone
+        return {}
+    for name in responses(run):
+        z, body = (row.z, row.body) if name == "δ" and row is not None else (watched[name.removesuffix(" u")], 0)
+        H = run.model.frequency_response(omega, path, z, body=body)
+        found[name] = Spectrum(omega, H.amplitude**2 * noise.psd_at(omega), 0)
+    return found
 
 
 def _axis_end(run: Run, line: Spectrum) -> float:
@@ -97,32 +138,43 @@ def peaks(line: Spectrum, omega_max: float = np.inf, count: int = 10) -> Vector:
 
 def _mark_peaks(axis: Axes, line: Spectrum, top: float) -> None:
     """Write the frequency over every prominent peak, of close ones over the highest only."""
+    from matplotlib.patheffects import withStroke
+
+    halo = [withStroke(linewidth=2.0, foreground="white")]  # where a dotted line runs through
     omega, density = drawable(line, top)
     heights = {float(peak): density[np.abs(omega - peak) < 15].max() for peak in peaks(line, top)}
     labelled: list[float] = []
     for peak in sorted(heights, key=lambda at: -heights[at]):
         if all(abs(peak - other) >= LABEL_WIDTH * top for other in labelled):
             labelled.append(peak)
-            _note(axis, f"{peak:.0f}", (peak, heights[peak]), (0, 4), BLUE)
+            axis.annotate(f"{peak:.0f}", (peak, heights[peak]), xytext=(0, 4), textcoords="offset points", ha="center",
+                          fontsize=8, color=BLUE, path_effects=halo)  # fmt: skip
 
 
 def _mark_frequencies(axes: tuple[Axes, ...], run: Run, top: float) -> None:
-    """Dotted lines at the natural frequencies, named where there is room."""
-    free = 0.0  # of labels, from here on
-    for i, omega in enumerate([] if run.model is None else run.model.omega[run.model.omega < top]):
-        for axis in axes:
-            axis.axvline(omega, color=GREY, linestyle=":", linewidth=0.8, zorder=0)
-        if omega < free:
-            continue
-        free = omega + 3 * LABEL_WIDTH * top
-        _note(axes[-1], rf"$\omega_{{{i + 1}}}$ = {omega:.0f}", (omega, 0.03), (3, 0), GREY, ("data", "axes fraction"))
+    """Dotted lines at the natural frequencies, their names above the first of the axes."""
+    omega = np.array([] if run.model is None else run.model.omega[run.model.omega < top])
+    for axis in axes:
+        for value in omega:
+            axis.axvline(value, color=GREY, linestyle=":", linewidth=0.8, zorder=0)
+    close = len(omega) > 1 and np.diff(omega).min() < NAME_WIDTH * top
+    every = max(1, int(np.ceil(len(omega) * UPRIGHT)))  # more than the width holds: some
+    shown = np.arange(len(omega))[::every]
+    along = apart(omega[shown] / top, UPRIGHT) if close else omega[shown] / top
+    for i, x in zip(shown, along, strict=True):
+        axes[0].annotate(rf"$\omega_{{{i + 1}}}$ = {omega[i]:.0f}", (omega[i], 1.0), xycoords=("data", "axes fraction"),
+                         xytext=(x, 1.06), textcoords="axes fraction", ha="center", va="bottom", fontsize=8, color=GREY,
+                         rotation=90 if close else 0, arrowprops={"arrowstyle": "-", "color": GREY, "linewidth": 0.6,
+                                                                  "shrinkA": 0, "shrinkB": 0})  # fmt: skip
 
 
-def _note(
-    axis: Axes, text: str, at: tuple[float, float], shift: tuple[float, float], colour: str, frame: Any = "data"
-) -> None:
-    """A short text shifted (points) from a place, on a white ground so that no line runs through it."""
-    ground = {"facecolor": "white", "linewidth": 0, "pad": 0.5, "alpha": 0.8}
-    side = "left" if shift[0] else "center"
-    axis.annotate(text, at, xytext=shift, xycoords=frame, textcoords="offset points", ha=side, fontsize=8,
-                  color=colour, bbox=ground)  # fmt: skip
+def apart(x: Vector, gap: float) -> Vector:
+    """Ascending places x within [0, 1], moved as little as need be to lie `gap` apart; (len(x) - 1) gap <= 1.
+
+    Examples
+    --------
+    >>> apart(np.array([0.0, 0.01, 0.5, 0.99, 1.0]), 0.1).round(3).tolist()
+    [0.0, 0.1, 0.5, 0.9, 1.0]
+    """
+    steps = gap * np.arange(len(x))
+    return np.minimum(np.maximum.accumulate(x - steps) + steps, 1.0 - steps[::-1])

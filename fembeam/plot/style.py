@@ -1,8 +1,8 @@
-"""What all figures share: colours, type, the sheet of axes with its title."""
+"""What all figures share: colours, type, how a spectrum is drawn."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import wraps
 from typing import TYPE_CHECKING, Any, ParamSpec
 
@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import XAxis
     from matplotlib.figure import Figure
 
-    from fembeam.model import Run
     from fembeam.statistics import Spectrum
 
 
@@ -53,30 +53,65 @@ def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
     return inside
 
 
-def sheet(run: Run | None, rows: int, columns: int, size: tuple[float, float], **options: Any) -> tuple[Figure, Any]:
-    """A figure with its axes as a flat list."""
-    from fembeam.plot.figure import sheet as drawn_sheet
-
-    return drawn_sheet(rows, columns, size, **options)
-
-
-def titled(figure: Figure, run: Run | None, title: str) -> Figure:
-    """Set the title, with the status of a run that did not finish."""
-    partial = run is not None and not run.complete
-    figure.suptitle("Partial: " * partial + title, x=0.01, ha="left", fontsize=10, fontweight="bold")
-    if run is not None and partial:
-        figure.supxlabel(f"PARTIAL RESULT: {run.status}", color=RED, fontsize=8, wrap=True)
-    return figure
-
-
 def drawable(line: Spectrum, top: float) -> tuple[Vector, Vector]:
     """The curve up to the end of the axis, without ω = 0 (the mean is gone) and without zeros."""
     kept = (line.omega > 0) & (line.omega <= top) & (line.density > 0)
     return line.omega[kept], line.density[kept]
 
 
-def fit_levels(axis: Axes, lines: list[Spectrum], top: float) -> None:
-    """Limits from the responses, so that a band-limited input does not stretch the axis to rounding errors."""
+def fit_levels(axis: Axes, lines: list[Spectrum], top: float, behind: list[Spectrum] | None = None) -> None:
+    """Limits from the responses, so that a band-limited input does not stretch the axis to rounding errors.
+
+    What lies `behind` shows its peaks, not its valleys.
+    """
     levels = np.concatenate([drawable(line, top)[1] for line in lines])
     if len(levels):
-        axis.set_ylim(max(levels.min(), 1e-9 * levels.max()) / 3, 10 * levels.max())
+        highest = max(drawable(line, top)[1].max(initial=0.0) for line in [*lines, *(behind or [])])
+        axis.set_ylim(max(levels.min(), 1e-9 * highest) / 3, 10 * highest)
+
+
+def plain_decades(axis: XAxis, low: float, high: float) -> None:
+    """Ticks of a logarithmic axis as plain numbers: 1, 2, 5 in every decade while they have room."""
+    from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
+
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 100 * low else (1.0,)))
+    axis.set_major_formatter(FormatStrFormatter("%g"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def curve(axis: Axes, line: Spectrum, top: float, **options: Any) -> None:
+    """One spectrum up to the end of the axis, with its 95 % confidence shaded where it is known."""
+    omega, density = drawable(line, top)
+    (drawn,) = axis.semilogy(omega, density, **options)
+    if line.estimate is not None and line.estimate.batches > 1:
+        shown = np.isin(line.omega, omega)
+        ribbon(axis, omega, [bound[shown] for bound in line.interval()], drawn.get_color())
+
+
+def ribbon(axis: Axes, x: Vector, bounds: Sequence[Vector], colour: Any, **options: Any) -> None:
+    """A shaded 95 % interval, which is not below zero."""
+    low, high = bounds
+    axis.fill_between(x, np.maximum(low, 0.0), high, color=colour, alpha=0.3, linewidth=0, **options)
+
+
+def one_legend(axes: Sequence[Axes]) -> None:
+    """One legend beside the figure in place of those within several axes, every label once.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> axes = Figure(layout="constrained").subplots(1, 2)
+    >>> for axis in axes:
+    ...     _ = axis.plot([0.0, 1.0], label="same")
+    ...     _ = axis.legend()
+    >>> one_legend(axes)
+    >>> [text.get_text() for text in axes[0].figure.legends[0].get_texts()], axes[0].get_legend()
+    (['same'], None)
+    """
+    entries: dict[str, Any] = {}
+    for inner in [found for axis in axes if (found := axis.get_legend()) is not None]:
+        for text, handle in zip(inner.get_texts(), inner.legend_handles, strict=True):
+            entries.setdefault(text.get_text(), handle)
+        inner.remove()
+    figure: Any = axes[0].figure
+    figure.legend(entries.values(), entries, loc="outside right upper", fontsize=8)

@@ -24,8 +24,6 @@ from fembeam.support import aligned, versions, written_whole
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MOST_BATCHES, FEWEST_BATCHES = 32, 4  # of a history, for standard errors
-MEMORIES = 10.0  # time constants of the structure that a batch lasts at least
 FEWEST_SAMPLES = 64  # below this neither a spectrum nor a density says anything
 
 
@@ -95,9 +93,13 @@ def figures(run: Run, discard: float = 0.0) -> dict[str, Callable[[], Figure]]:
     drawn: dict[str, Callable[[], Figure]] = {}
     if len(run.t) > 1:
         drawn["time_history"] = lambda: plot.time_history(run)
-    if kept >= FEWEST_SAMPLES and all(np.ptp(x) > 0 for x in plot.responses(run, discard).values()):
-        drawn["psd"] = lambda: plot.spectrum(run, discard)
-        drawn["densities"] = lambda: plot.densities(run, discard)
+    even = len(run.t) > 1 and np.ptp(np.diff(run.t)) < 1e-6 * (run.t[1] - run.t[0])
+    if even and kept >= FEWEST_SAMPLES and all(np.ptp(x) > 0 for x in plot.responses(run, discard).values()):
+        if plot.stationary(run, discard):
+            drawn["psd"] = lambda: plot.spectrum(run, discard)
+            drawn["densities"] = lambda: plot.densities(run, discard)
+        elif run.model is not None and np.any(run.model.omega > 0.0):
+            drawn["response_spectrum"] = lambda: plot.floor_spectrum(run)
     if np.any(np.isfinite(log.t_out) & (log.t_in >= discard)):
         drawn["contacts"] = lambda: plot.contacts(run, discard)
     if (model := run.model) is not None:
@@ -136,17 +138,8 @@ def _moments(run: Run, discard: float) -> dict[str, dict[str, float]]:
     signals = {f"displacement, {name}": run.displacement(z)[kept] for name, z in plot.places(run.shapes).items()}
     signals |= {f"indentation, stop {i}": run.indentation(i)[kept] for i in range(len(run.stops))}
     extremes = {name: {"min": float(x.min()), "max": float(x.max())} for name, x in signals.items()}
-    error = partial(_error_of_std, parts=batches(run, discard))
+    error = partial(_error_of_std, parts=plot.batches(run, discard))
     return {name: asdict(moments(x)) | {"std_error": error(x)} | extremes[name] for name, x in signals.items()}
-
-
-def batches(run: Run, discard: float) -> int:
-    """How many nearly independent parts the samples make, at most `MOST_BATCHES`; 0 when too few or not known."""
-    if run.model is None or len(run.t) < 2:
-        return 0
-    decay = (run.model.zeta * run.model.omega).min()
-    count = min(MOST_BATCHES, int(max(float(run.t[-1]) - discard, 0.0) * decay / MEMORIES))
-    return count if count >= FEWEST_BATCHES else 0
 
 
 def _error_of_std(x: NDArray[np.float64], parts: int) -> float | None:
@@ -169,7 +162,7 @@ def _error_of_rate(entries: NDArray[np.float64], begin: float, end: float, parts
 
 def _confidence(run: Run, discard: float) -> str:
     """What the standard errors rest on."""
-    parts = batches(run, discard)
+    parts = plot.batches(run, discard)
     if not parts:
         return "No standard errors: too short for independent parts, or the structure has no damping."
     span = (float(run.t[-1]) - discard) / parts
@@ -180,7 +173,7 @@ def _contacts(run: Run, discard: float) -> list[dict[str, Any]]:
     """Number, rate, means and maxima of every stop's contacts that ended."""
     log = run.contacts
     span = max(float(run.t[-1]) - discard, 0.0) if len(run.t) else 0.0
-    rows, parts = [], batches(run, discard)
+    rows, parts = [], plot.batches(run, discard)
     for stop in range(len(run.stops)):
         kept = (log.stop == stop) & (log.t_in >= discard) & np.isfinite(log.t_out)
         row: dict[str, Any] = {"stop": stop, "z": float(run.stops[stop, 0]), "number": int(kept.sum())}

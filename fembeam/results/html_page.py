@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import base64
 import json
+import math
 from collections.abc import Iterator, Sequence
 from html import escape
+from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,27 +24,48 @@ body { font: 16px/1.5 system-ui, sans-serif; color: #222; background: #fff; max-
   padding: 1rem }
 h1, h2, p, li { overflow-wrap: anywhere }
 h1 { font-size: 1.5rem; margin: 0 } h2 { font-size: 1.15rem; margin: 2rem 0 .5rem; border-bottom: 1px solid #ccc }
-.wide { overflow-x: auto } table { border-collapse: collapse; font-variant-numeric: tabular-nums }
+.wide, pre { overflow-x: auto; background: linear-gradient(to right, var(--ground) 40%, transparent) 0 0 / 2.5rem 100%,
+  linear-gradient(to left, var(--ground) 40%, transparent) 100% 0 / 2.5rem 100%,
+  linear-gradient(to right, #0003, transparent) 0 0 / .8rem 100%,
+  linear-gradient(to left, #0003, transparent) 100% 0 / .8rem 100%; background-repeat: no-repeat;
+  background-attachment: local, local, scroll, scroll; background-color: var(--ground) }
+body { --ground: #fff } pre { --ground: #f6f6f6; padding: .75rem; font-size: .85rem; line-height: 1.4 }
+table { border-collapse: collapse; font-variant-numeric: tabular-nums }
 td { white-space: nowrap } th { vertical-align: bottom }
 th, td { text-align: right; padding: .15rem .6rem; border-bottom: 1px solid #eee }
 th:first-child, td:first-child { text-align: left; padding-left: 0 } th { font-weight: 600 }
-img { max-width: 100%; height: auto } figure { margin: 1rem 0 } figcaption { color: #555; font-size: .9rem }
-pre { overflow-x: auto; background: #f6f6f6; padding: .75rem; font-size: .85rem; line-height: 1.4 }
-@media (max-width: 40rem) { body { padding: .75rem } figure img { max-width: none; width: 38rem }
-  table { font-size: .85rem } th, td { padding: .15rem .4rem } }
+img { max-width: 100%; height: auto; display: block } figure { margin: 1.5rem 0 }
+figcaption { color: #555; font-size: .9rem }
+@media (max-width: 40rem) { body { padding: .75rem } table, pre { font-size: .8rem } th, td { padding: .15rem .4rem }
+  figure { position: relative } figure img { max-width: none; width: 38rem }
+  figure::after { content: ""; position: absolute; inset: 1.5rem 0 0 auto; width: 1.2rem; pointer-events: none;
+    background: linear-gradient(to left, #0004, transparent) } figcaption::after { content: " (scrolls sideways →)" } }
 .good { color: #00664a } .bad { color: #a83c00; font-weight: 600 } .note { color: #555; font-size: .9rem }
 """
-CONTACT_ROWS = (
-    ("at z / m", "z"),
-    ("number", "number"),
-    ("per second", "rate"),
-    ("± s.e.", "rate_error"),
-    ("mean time / s", "duration", "mean"),
-    ("mean peak / N", "peak_force", "mean"),
-    ("largest peak / N", "peak_force", "max"),
-    ("mean entry / m s⁻¹", "entry_speed", "mean"),
+CONTACT_ROWS: tuple[
+    tuple[str, float, str, str], ...
+] = (  # words, unit of the figures per SI unit, place in the summary
+    ("at z / mm", 1e3, "z", ""),
+    ("number", 1.0, "number", ""),
+    ("per second", 1.0, "rate", ""),
+    ("± s.e.", 1.0, "rate_error", ""),
+    ("mean time / ms", 1e3, "duration", "mean"),
+    ("mean peak / N", 1.0, "peak_force", "mean"),
+    ("largest peak / N", 1.0, "peak_force", "max"),
+    ("mean entry / m s⁻¹", 1.0, "entry_speed", "mean"),
 )
-ORDER = ("time_history", "psd", "densities", "contacts", "modes")
+MOMENT_ROWS = (
+    ("mean / mm", 1e3, "mean"),
+    ("std / mm", 1e3, "std"),
+    ("± s.e.", 1e3, "std_error"),
+    ("skewness", 1.0, "skewness"),
+    ("kurtosis", 1.0, "kurtosis"),
+    ("min / mm", 1e3, "min"),
+    ("max / mm", 1e3, "max"),
+)
+SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+PREFIXES = ("p", "n", "µ", "m", "", "k", "M", "G", "T")
+ORDER = ("time_history", "psd", "densities", "response_spectrum", "contacts", "modes")
 
 
 def write_page(
@@ -88,7 +111,8 @@ def _sections(files: Sequence[Path], source: Source | None, warnings: Sequence[s
         yield from _simulation(found)
     for path in files:
         if path.suffix == ".txt":
-            yield f"<h2>{escape(_words(path.stem))}</h2><pre>{escape(path.read_text(encoding='utf-8'))}</pre>"
+            yield f"<h2>{escape(_words(path.stem))}</h2>"
+            yield from _text(path.read_text(encoding="utf-8"))
     yield from _figures(files)
     yield from _settings(found, source)
 
@@ -103,38 +127,89 @@ def _status(found: dict[str, Any]) -> str:
     """How the run ended."""
     kind = "good" if found["complete"] else "bad"
     cost, seconds = found["cost"], found["simulated_seconds"]
-    about = f"{seconds:g} s simulated in {found['wall_seconds']:.3g} s, {cost['events']} events, {cost['steps']} steps"
+    took = _rounded(found["wall_seconds"], 3)
+    about = f"{seconds:g} s simulated in {took} s, {cost['events']} events, {cost['steps']} steps"
     return f'<p><span class="{kind}">{escape(found["status"])}</span><br><span class="note">{about}</span></p>'
 
 
+def _text(content: str) -> Iterator[str]:
+    """Tables as they are, sentences as paragraphs that wrap."""
+    for is_table, lines in groupby(content.splitlines(), key=lambda line: "  " in line.strip()):
+        if is_table:
+            yield "<pre>" + escape("\n".join(lines)) + "</pre>"
+        else:
+            yield from (f"<p>{escape(line)}</p>" for line in lines if line.strip())
+
+
 def _simulation(found: dict[str, Any]) -> Iterator[str]:
-    """Tables of [simulate]."""
+    """Tables of [simulate], in the units of the figures."""
     if found["omega"]:
         rows = [
-            [i + 1, w, w / 6.283185307179586, z]
+            [i + 1, _rounded(w, 5), _rounded(w / 6.283185307179586, 5), f"{z:.4g}"]
             for i, (w, z) in enumerate(zip(found["omega"], found["zeta"], strict=True))
         ]
         yield "<h2>Model</h2>" + html_table(["coordinate", "ω / rad s⁻¹", "Hz", "ζ"], rows)
     if found["moments"]:
-        names = {"mean": "mean / m", "std": "std / m", "std_error": "± s.e.", "skewness": "skewness",
-                 "kurtosis": "kurtosis", "min": "min / m", "max": "max / m"}  # fmt: skip
-        rows = [[words, *(row.get(key) for row in found["moments"].values())] for key, words in names.items()]
+        signals = found["moments"].values()
+        rows = [[words, *(_scaled(row.get(key), unit, words) for row in signals)] for words, unit, key in MOMENT_ROWS]
         yield "<h2>Response</h2>" + html_table(["", *found["moments"]], rows)
         yield f'<p class="note">{escape(found["confidence"])}</p>'
     if found["contacts"]:
-        rows = [[words, *(_of_stop(row, *keys) for row in found["contacts"])] for words, *keys in CONTACT_ROWS]
+        rows = [
+            [words, *(_scaled(_of_stop(row, *keys), unit, words) for row in found["contacts"])]
+            for words, unit, *keys in CONTACT_ROWS
+        ]
         yield "<h2>Contacts</h2>" + html_table(["", *(f"stop {row['stop']}" for row in found["contacts"])], rows)
     if found["energy"]:
         names = {"input": "put in", "damping": "lost in damping", "contact": "lost in contacts", "stored": "stored"}
-        rows = [[words, found["energy"][name]] for name, words in names.items()]
+        rows = [[words, with_prefix(found["energy"][name], "J")] for name, words in names.items()]
         residual = found["energy"]["residual_over_input"]
-        yield "<h2>Energy</h2>" + html_table(["", "J"], rows)
+        yield "<h2>Energy</h2>" + html_table(["", ""], rows)
         yield f'<p class="note">Missing in this balance, an estimate of the error: {residual:.1e} of the input.</p>'
 
 
 def _of_stop(row: dict[str, Any], key: str, part: str = "") -> Any:
     """One number of a stop."""
     return row.get(key, {}).get(part) if part else row.get(key)
+
+
+def _scaled(value: Any, unit: float, words: str) -> Any:
+    """A number in the unit of its row; of a standard error two digits, of a place all."""
+    if value is None or isinstance(value, int):
+        return value
+    return f"{unit * value:.6g}" if " z " in words else _rounded(unit * value, 2 if "s.e." in words else 4)
+
+
+def _rounded(value: float, digits: int = 4) -> str:
+    """A number to so many significant digits, with a power of 1000 where it is very large or small.
+
+    Examples
+    --------
+    >>> _rounded(0.0345678), _rounded(-123456.7), _rounded(1.2345e-7), _rounded(0.0)
+    ('0.03457', '-123.5·10³', '123.5·10⁻⁹', '0')
+    """
+    if value == 0.0 or not math.isfinite(value):
+        return f"{value:g}"
+    value = float(f"{value:.{digits - 1}e}")
+    power = math.floor(math.log10(abs(value)))
+    thousands = 0 if -3 <= power < 5 else power // 3
+    decimals = max(0, digits - 1 - power + 3 * thousands)
+    exponent = str(3 * thousands).translate(SUPERSCRIPT)
+    return f"{value / 1e3**thousands:.{decimals}f}" + f"·10{exponent}" * bool(thousands)
+
+
+def with_prefix(value: float, unit: str, digits: int = 4) -> str:
+    """A number to so many significant digits with the prefix of its unit that keeps it between 1 and 1000.
+
+    Examples
+    --------
+    >>> with_prefix(0.0123456, "J"), with_prefix(-45678.9, "J"), with_prefix(0.0, "J")
+    ('12.35 mJ', '-45.68 kJ', '0 J')
+    """
+    scaled = float(f"{value:.{digits - 1}e}")
+    power = 0 if scaled == 0.0 or not math.isfinite(scaled) else math.floor(math.log10(abs(scaled))) // 3
+    power = min(max(power, -4), 4)
+    return f"{_rounded(value / 1e3**power, digits)} {PREFIXES[power + 4]}{unit}"
 
 
 def _figures(files: Sequence[Path]) -> Iterator[str]:
@@ -146,7 +221,7 @@ def _figures(files: Sequence[Path]) -> Iterator[str]:
     for path in paths:
         data, name = base64.b64encode(path.read_bytes()).decode(), escape(_words(path.stem))
         image = f'<div class="wide"><img src="data:image/png;base64,{data}" alt="{name}"></div>'
-        yield f"<figure>{image}<figcaption>{name}</figcaption></figure>"
+        yield f"<figure><figcaption>{name}</figcaption>{image}</figure>"
 
 
 def _settings(found: dict[str, Any], source: Source | None) -> Iterator[str]:
@@ -161,5 +236,5 @@ def _settings(found: dict[str, Any], source: Source | None) -> Iterator[str]:
 
 def _words(name: str) -> str:
     """time_history -> Time history."""
-    known = {"psd": "Power spectral densities"}
+    known = {"psd": "Power spectral densities", "response_spectrum": "Response spectra"}
     return known.get(name, name.replace("_", " ").capitalize())

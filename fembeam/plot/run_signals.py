@@ -1,0 +1,77 @@
+"""The signals of a run that its figures show, and what may be said of them: how long they last, in how many parts."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fembeam.model import places
+from fembeam.plot.style import Vector
+from fembeam.scene import signals_of
+from fembeam.statistics import Signal, pdf
+
+if TYPE_CHECKING:
+    from fembeam.model import Run
+
+MOST_BATCHES, FEWEST_BATCHES = 32, 4  # of a history, for standard errors
+MEMORIES = 10.0  # time constants of the structure that a batch lasts at least
+STEADY = 0.1  # of the largest mean square over a quarter of the time: below it the motion comes and goes
+
+
+def responses(run: Run, discard: float = 0.0) -> dict[str, Vector]:
+    """Signals worth a density, m: δ of the first stop (the tip when there is none) and mid-beam."""
+    kept = run.t >= discard
+    named = places(run.shapes)
+    first = {"δ": run.indentation(0)} if len(run.stops) else {}
+    if not first and "tip" in named:
+        first = {"tip u": run.displacement(named["tip"])}
+    return {name: x[kept] for name, x in {**first, "mid-beam u": run.displacement(named["mid-beam"])}.items()}
+
+
+def sampling_of(run: Run) -> float:
+    """Output sampling, s."""
+    return float(run.t[1] - run.t[0])
+
+
+def stationary(run: Run, discard: float = 0.0) -> bool:
+    """Whether a run may settle to a motion that lasts: tones and noise drive it, or it neither grows nor dies away.
+
+    Free motion does not. Of records, of signals of the user and of runs read from a file the motion itself tells: its
+    mean square over each quarter of the time is a tenth or more of the largest.
+    """
+    loads = None if run.model is None else list(signals_of(run.model.scene).values())
+    if loads is not None and all(hasattr(load, "tones") or hasattr(load, "psd_at") for load in loads):
+        return bool(loads)
+    x = next(iter(responses(run, discard).values()))
+    if len(x) < 4:
+        return False
+    power = [float(np.mean(part**2)) for part in np.array_split(x - x.mean(), 4)]
+    return min(power) >= STEADY * max(power)
+
+
+def batches(run: Run, discard: float) -> int:
+    """How many nearly independent parts the samples make, at most `MOST_BATCHES`; 0 when too few or not known."""
+    if run.model is None or len(run.t) < 2:
+        return 0
+    decay = (run.model.zeta * run.model.omega).min()
+    count = min(MOST_BATCHES, int(max(float(run.t[-1]) - discard, 0.0) * decay / MEMORIES))
+    return count if count >= FEWEST_BATCHES else 0
+
+
+def estimated(run: Run, discard: float, segment: int) -> dict[str, Signal]:
+    """The `responses` with density and spectrum, each with its confidence where the run has independent parts.
+
+    Parameters
+    ----------
+    segment : samples of a Welch segment; a part holds two of them at least.
+    """
+    found = {}
+    for name, x in responses(run, discard).items():
+        # the last edge lies beyond the samples
+        bins = np.linspace(x.min(), x.max() + 1e-9 * np.ptp(x), len(pdf(x).x) + 1)
+        found[name] = signal = Signal(x, sampling_of(run), segment, bins=bins)
+        parts = min(batches(run, discard), len(x) // segment)
+        for part in np.array_split(x, parts if parts >= FEWEST_BATCHES else 1):
+            signal.add(part)
+    return found

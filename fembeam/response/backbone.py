@@ -1,0 +1,70 @@
+"""Backbone of the lowest mode: how fast it vibrates freely against its stops, over the amplitude.
+
+    ½ q'² + V(q) = E,   V(q) = ½ ω² q² + Σ_s ∫ F_s dδ_s,   δ_s = -w_s q - gap_s,   2π/Ω = 2 ∫ dq/√(2 (E - V))
+
+from one turning point to the other. The elastic part of the laws (δ' = 0) counts; other modes and damping do not.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from fembeam.model import Model
+
+Vector = NDArray[np.float64]
+NODES = 48  # of Gauss and Legendre on each piece between the places where stops are met
+
+
+def backbone(model: Model, z: float, amplitudes: Vector) -> Vector:
+    """Ω (k,) in rad/s at which the lowest mode vibrates freely with max |u(z)| of so many m (k,), > 0.
+
+    NaN where this does not hold: gravity or preload, bodies that touch each other, a mode at rest at z, forces that
+    attract. Errors below 1e-6 for smooth laws; where other modes take part the backbone of the structure lies beside.
+
+    References
+    ----------
+    A.H. Nayfeh, D.T. Mook, Nonlinear Oscillations (1979), section 2.3.
+    """
+    shape = float(model.phi(z)[0])
+    apart = all(row.on[0] == "frame" and row.body == 0 and row.gap >= 0.0 for row in model.contact_rows)
+    if model.scene.gravity != 0.0 or not apart or model.omega[0] == 0.0 or shape == 0.0:
+        return np.full(len(amplitudes), np.nan)
+    return np.array([_frequency(model, amplitude / abs(shape)) for amplitude in amplitudes])
+
+
+def _frequency(model: Model, furthest: float) -> float:
+    """Ω of the vibration whose larger turning point is so far from 0."""
+    from scipy.optimize import brentq
+
+    ends = np.array([-furthest, furthest])
+    energies = _potential(model, ends)
+    far = int(np.argmin(energies))  # the other side is stopped earlier
+    near = brentq(lambda q: float(_potential(model, np.array([q]))[0] - energies[far]), 0.0, ends[1 - far],
+                  xtol=1e-15 * furthest, rtol=1e-15)  # fmt: skip
+    low, high = sorted((float(ends[far]), near))
+    rows = zip(model.directions[:, 0], model.contact_rows, strict=True)
+    met = [-row.gap / w for w, row in rows if w != 0.0]
+    knots = np.unique([low, *(q for q in met if low < q < high), high])
+    angle, weight = np.polynomial.legendre.leggauss(NODES)
+    angle, weight = 0.5 * np.pi * (1.0 + angle), 0.5 * np.pi * weight
+    half = 0.5 * np.diff(knots)[:, None]
+    q = knots[:-1, None] + half * (1.0 - np.cos(angle))  # takes the roots at turning points away
+    left = energies[far] - _potential(model, q.ravel()).reshape(q.shape)
+    if not np.all(left > 0.0):
+        return np.nan
+    return float(np.pi / np.sum(weight * half * np.sin(angle) / np.sqrt(2.0 * left)))
+
+
+def _potential(model: Model, q: Vector) -> Vector:
+    """V (k,) of the lowest mode."""
+    at, weight = np.polynomial.legendre.leggauss(NODES)
+    at, weight = 0.5 * (1.0 + at), 0.5 * weight
+    energy = 0.5 * model.omega[0] ** 2 * q**2
+    for w, row in zip(model.directions[:, 0], model.contact_rows, strict=True):
+        delta = np.maximum(-w * q - row.gap, 0.0)
+        energy += delta * (row.law.force(delta[:, None] * at, 0.0, 1.0) @ weight)
+    return np.asarray(energy)

@@ -1,0 +1,69 @@
+"""Backbone of the lowest mode against closed forms and simulated free vibration."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import fembeam as fb
+from contacts import Hertz, KelvinVoigt
+from fembeam.response import backbone
+
+BEAM = fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01))
+AMPLITUDES = np.array([1e-4, 1e-3, 2e-3, 8e-3])
+
+
+def model(*stops, **changes):
+    scene = fb.Scene(BEAM, [fb.Clamped(0.0)], stops=list(stops), **changes)
+    return scene.reduce(modes=1)
+
+
+def test_without_stops_it_is_the_natural_frequency():
+    one = model()
+    assert backbone(one, 0.5, AMPLITUDES) == pytest.approx(np.full(4, one.omega[0]), rel=1e-10)
+
+
+def test_a_stop_that_just_touches_is_a_bilinear_oscillator():
+    one = model(fb.Stop(0.5, KelvinVoigt(4e4, 0.0)))
+    stiff = np.sqrt(one.omega[0] ** 2 + 4e4 * one.phi(0.5)[0] ** 2)
+    exact = 2 * one.omega[0] * stiff / (one.omega[0] + stiff)
+    assert backbone(one, 0.5, AMPLITUDES) == pytest.approx(np.full(4, exact), rel=1e-8)
+
+
+def test_two_linear_stops_with_a_gap():
+    gap, k = 1e-3, 4e4
+    one = model(*(fb.Stop(0.5, KelvinVoigt(k, 0.0), gap, side) for side in ("below", "above")))
+    free = one.omega[0]
+    stiff = np.sqrt(free**2 + k * one.phi(0.5)[0] ** 2)
+    for amplitude in (0.5e-3, 2e-3, 8e-3):
+        if amplitude < gap:
+            exact = free
+        else:  # a quarter: through the gap, then about the displaced rest of the stiff branch
+            rest = gap * (1 - free**2 / stiff**2)
+            turn = np.arccos((gap - rest) / (amplitude - rest)) / stiff
+            speed = stiff * np.sqrt((amplitude - rest) ** 2 - (gap - rest) ** 2)
+            through = np.arctan(free * gap / speed) / free
+            exact = np.pi / 2 / (turn + through)
+        assert backbone(one, 0.5, np.array([amplitude]))[0] == pytest.approx(exact, rel=1e-8)
+
+
+def test_free_vibration_against_a_stiff_stop_has_its_period():
+    one = model(fb.Stop(0.5, Hertz(1e9), gap=5e-4), damping=fb.ModalDamping(0.0))
+    start = np.array([2e-3 / one.phi(0.5)[0], 0.0])
+    run = one.simulate(0.4, 1e-5, start=start)
+    t = run.contacts.t_in
+    period = (t[-1] - t[0]) / (len(t) - 1)
+    assert backbone(one, 0.5, np.array([2e-3]))[0] == pytest.approx(2 * np.pi / period, rel=1e-5)
+
+
+def test_what_has_no_backbone_of_this_kind_is_nan():
+    stop = fb.Stop(0.5, Hertz(1e9))
+    other = fb.Scene(fb.Beam(0.3, BEAM.section), [fb.Clamped(0.0)])
+    cases = [
+        model(stop, gravity=9.81),
+        model(dataclasses.replace(stop, gap=-1e-4)),
+        model(fb.Stop(0.3, Hertz(1e8), 2e-3, on=(1, 0.3)), bodies=[other]),
+    ]
+    for one in cases:
+        assert np.isnan(backbone(one, 0.5, AMPLITUDES)).all()
+    assert np.isnan(backbone(model(stop), 0.0, AMPLITUDES)).all()

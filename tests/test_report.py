@@ -1,0 +1,76 @@
+"""The page of a result folder: units of the figures beside the tables, sensible digits, sentences that wrap."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+import fembeam as fb
+from contacts import Hysteretic
+from fembeam.results import files
+from fembeam.results import html_page as html
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Results of a run of 20 s, and a study's text with a long sentence."""
+    steel = fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)
+    scene = fb.Scene(
+        beam=fb.Beam(0.2599, steel),
+        supports=[fb.Clamped(0.0)],
+        stops=[fb.Stop(0.24445, law=Hysteretic.lankarani_nikravesh(2.1e8, restitution=0.5))],
+        damping=fb.ModalDamping(0.05),
+        base=fb.BandNoise(2.5e-4, (0.0, 1226.6), seed=1),
+    )
+    place = tmp_path_factory.mktemp("results")
+    files.write(scene.reduce(2).simulate(20.0, 1e-3), place, discard=1.0)
+    (place / "study.txt").write_text("modes  value\n1      0.5\n\n" + "IN DOUBT: " + "many words " * 30 + "\n")
+    html.write_page(place)
+    return place
+
+
+def cells(text, head):
+    """Numbers of a row of a table as text."""
+    row = re.search(rf"<tr><td>{re.escape(head)}</td>(.*?)</tr>", text)[1]
+    return re.findall(r"<td>(.*?)</td>", row)
+
+
+def test_tables_have_the_units_of_the_figures_and_few_digits(folder):
+    text = (folder / "report.html").read_text(encoding="utf-8")
+    found = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    moments, (stop,) = found["moments"].values(), found["contacts"]
+    for head, key in (("mean / mm", "mean"), ("std / mm", "std"), ("max / mm", "max")):
+        exact = [1e3 * row[key] for row in moments]
+        assert [float(cell) for cell in cells(text, head)] == pytest.approx(exact, rel=5e-4), head
+    assert all(len(cell.strip("-").replace(".", "").lstrip("0")) == 4 for cell in cells(text, "std / mm"))
+    errors = [f"{1e3 * row['std_error']:.1e}" for row in moments]
+    assert [f"{float(cell):.1e}" for cell in cells(text, "± s.e.")] in (errors, [f"{stop['rate_error']:.1e}"])
+    (time,) = cells(text, "mean time / ms")
+    assert float(time) == pytest.approx(1e3 * stop["duration"]["mean"], rel=5e-4)
+    assert cells(text, "at z / mm") == ["244.45"]
+    assert cells(text, "number") == [str(stop["number"])]
+    (stored,) = cells(text, "stored")
+    value, unit = stored.split()
+    assert float(value) * {"mJ": 1e-3, "µJ": 1e-6, "J": 1.0}[unit] == pytest.approx(found["energy"]["stored"], rel=5e-4)
+
+
+def test_sentences_wrap_and_tables_keep_their_lines(folder):
+    text = (folder / "report.html").read_text(encoding="utf-8")
+    assert "<pre>modes  value\n1      0.5</pre>" in text
+    assert "<p>IN DOUBT: many words" in text
+
+
+@pytest.mark.parametrize("value", [1.0, -9.9996, 0.00099999, 12345.6, 99999.9, 3.2e7, 4.5e-8, 1e-30, 123.0])
+def test_rounded_numbers_keep_four_digits(value):
+    mantissa, _, power = html._rounded(value).partition("·10")
+    exponent = int(power.translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")) or 0)
+    assert float(mantissa) * 10.0**exponent == pytest.approx(value, rel=5.01e-4)
+    assert exponent % 3 == 0
+    assert len(mantissa.strip("-").replace(".", "").lstrip("0")) in (4, 5)
+    if abs(value) > 1e-12:
+        assert 1.0 <= abs(float(html.with_prefix(value, "J").split()[0])) < 1000.0
+
+
+def test_numbers_that_are_not_finite_stay_words():
+    assert (html._rounded(np.inf), html._rounded(np.nan), html.with_prefix(np.nan, "J")) == ("inf", "nan", "nan J")
