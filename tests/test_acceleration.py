@@ -67,7 +67,5 @@ def test_bodies_and_runs_from_files(tmp_path):
     slope = (velocity[2:] - velocity[:-2]) / 2e-6
     np.testing.assert_allclose(acceleration[1:-1], slope, atol=1e-3 * np.abs(slope).max())
     again = fb.load(run.save(tmp_path / "run"))
-    with pytest.raises(ValueError, match="needs the model of the run"):
-        again.acceleration(0.2)
-    with pytest.raises(ValueError, match="needs the model of the run"):
-        again.velocity(0.2, absolute=True)
+    np.testing.assert_array_equal(again.acceleration(0.2, body=1), acceleration)
+    np.testing.assert_array_equal(again.velocity(0.2, absolute=True), run.velocity(0.2, absolute=True))
