@@ -229,17 +229,24 @@ class Run(Printed):
 
         return to_vtu(self, path, sample, stride)
 
-    def to_csv(self, folder: str | os.PathLike[str], stride: int = 1) -> list[Path]:
-        """Write every `stride`-th sample at the usual places as `histories.csv`, and the log as `contacts.csv`."""
+    def to_csv(self, folder: str | os.PathLike[str], stride: int = 1, **chosen: Any) -> list[Path]:
+        """Write every `stride`-th sample as `histories.csv`, and the log as `contacts.csv`.
+
+        Parameters
+        ----------
+        chosen : ``places=`` z in m (j,), else tip and mid-beam. ``quantities=`` from displacement, velocity,
+            acceleration, each also "absolute …", slope, moment, shear, stress; indentation, force (of stops);
+            reactions (of supports, springs, dashpots). Else displacement, velocity, indentation, force.
+        """
         from fembeam.model.run_csv import write
 
-        return write(self, Path(folder), stride)
+        return write(self, Path(folder), stride, **chosen)
 
-    def to_dataframe(self, stride: int = 1) -> Any:
-        """Every `stride`-th sample at the usual places as a table of pandas over t; ImportError without pandas."""
+    def to_dataframe(self, stride: int = 1, **chosen: Any) -> Any:
+        """The same histories as a table of pandas over t; ImportError without pandas."""
         from fembeam.model.run_csv import to_dataframe
 
-        return to_dataframe(self, stride)
+        return to_dataframe(self, stride, **chosen)
 
     def to_xarray(self, z: ArrayLike | None = None) -> Any:
         """Displacement and velocity over t and z (m; None: the mesh), stops and coordinates as a Dataset of xarray.

@@ -72,6 +72,8 @@ duration = 10.0
 dt = 5e-4                   # output sampling; the solver chooses its own steps
 discard = 2.0               # transient that statistics leave out
 # solver = {{ kind = "exponential", rtol = 1e-10 }}
+# places = [0.13, 0.25]     # z of outputs: extremes in a table, histories as CSV
+# quantities = ["displacement", "stress", "absolute acceleration", "reactions"]   # an unknown one lists them all
 
 # [mode_count]              # how many modes it takes
 # counts = [1, 2, 3, 5]
