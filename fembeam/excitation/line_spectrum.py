@@ -21,6 +21,7 @@ HERMITE_CONSTANT = 46080.0  # |error| <= h^6/46080 max|s^(6)| for the quintic He
 HERMITE_RMS = math.sqrt(math.factorial(13))  # rms of the error <= h^6/√13! rms of s^(6): see `LineSpectrum.nodes`
 HERMITE_MEAN = 100800.0  # mean of (x(1-x))³/720 over a cell is 1/100800: what the interpolant takes off a line
 _CHUNK = 2048
+EDGE = 0.25  # a band fades out over this part of lo below it and of hi above it
 MANY = 1 << 18  # terms of a sum, above which transforms are quicker
 FINEST_RTOL = 1e-13  # finer is below the rounding of the FFT
 
@@ -190,6 +191,22 @@ def _interleave(rows: NDArray[np.float64], columns: NDArray[np.float64]) -> None
     n = min(rows.shape[1], len(columns))
     for i in range(0, n, _CHUNK):
         columns[i : min(i + _CHUNK, n)] = rows[:, i : min(i + _CHUNK, n)].T
+
+
+def within(lines: LineSpectrum, band: tuple[float, float]) -> LineSpectrum:
+    """The lines in the band, with smooth edges outside it: a sharp edge rings over the whole record."""
+    omega, (lo, hi) = lines.omega, band
+    if not np.any((omega >= lo) & (omega <= hi)):
+        raise ValueError(
+            f"Record band {band} rad/s holds no line: the record resolves {lines.spacing:.6g} to "
+            f"{omega[-1]:.6g} rad/s; widen the band"
+        )
+    outside = np.maximum(omega / hi - 1, 0.0)
+    if lo > 0:
+        outside = np.maximum(outside, 1 - omega / lo)
+    weight = np.cos(np.pi / 2 * np.minimum(outside / EDGE, 1.0)) ** 2
+    kept = np.flatnonzero(outside < EDGE)
+    return LineSpectrum(lines.spacing, int(kept[0]) + 1, (weight * lines.amplitude)[kept])
 
 
 @cache

@@ -48,7 +48,8 @@ zeta = [0.02, 0.01]         # ratios of the modes, the last for all higher ones;
 
 [base]                      # motion of the frame; leave out for none
 kind = "harmonic"           # or multisine, band_noise (std, band, seed), pulse, step, or
-                            # record (path of a CSV file, quantity = "displacement" or "acceleration")
+                            # record (path of a CSV file, quantity = "displacement" or "acceleration"),
+                            # earthquake (path of a CSV, AT2 or COSMOS file; unit = "g" or "m/s2" of a CSV)
 amplitude = 1e-3            # m
 omega = 195.0               # rad/s
 
