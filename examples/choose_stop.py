@@ -23,14 +23,15 @@ from contacts import KelvinVoigt
 
 length, limit, omega, amplitude, lag = 0.8, 7.5, 25.0, 2e-3, 2e-3  # m, N, rad/s, m, s: damping over stiffness
 low, high = np.array([-20e-3, 2.5]), np.array([2e-3, 5.0])  # gap in m, log10 of the stiffness in N/m
+SETTINGS = {"rhobeg": 0.2, "tol": 1e-3, "maxiter": 40}
 
 
 def scene(gap: float = 0.0, stiffness: float = 1e3) -> fb.Scene:
     section = fb.Section.rectangle(E=7.0e10, rho=2700.0, width=0.04, height=0.008)
     stop = fb.Stop(length, KelvinVoigt(stiffness, damping=lag * stiffness, clamp=True), gap=gap)
     parts = {"masses": [fb.LumpedMass(length, mass=0.5)], "stops": [stop], "damping": fb.ModalDamping(0.05)}
-    base = fb.Harmonic(amplitude, omega)
-    return fb.Scene(fb.Beam(length, section), [fb.Clamped(0.0)], base=base, gravity=9.81, **parts)
+    drive = {"base": fb.Harmonic(amplitude, omega), "gravity": 9.81}
+    return fb.Scene(fb.Beam(length, section), [fb.Clamped(0.0)], **parts, **drive)
 
 
 model = scene().reduce(modes=2)
@@ -52,8 +53,7 @@ def search(start: np.ndarray) -> tuple[np.ndarray, int]:
         return response(*(low + x * (high - low)).tolist())
 
     allowed = {"type": "ineq", "fun": lambda x: np.array([limit - asked(x)[1], *x, *(1 - x)])}
-    options = {"rhobeg": 0.2, "tol": 1e-3, "maxiter": 40}
-    found = minimize(lambda x: 1e3 * asked(x)[0], start, method="COBYLA", constraints=allowed, options=options)
+    found = minimize(lambda x: 1e3 * asked(x)[0], start, method="COBYLA", constraints=allowed, options=SETTINGS)
     return low + found.x * (high - low), found.nfev
 
 
@@ -72,8 +72,7 @@ if __name__ == "__main__":
     begin, starts = time.perf_counter(), np.random.default_rng(1).uniform(size=(5, 2))
     with ProcessPoolExecutor() as pool:  # with joblib: Parallel(n_jobs=-1)(delayed(search)(start) for start in starts)
         choices, counts = zip(*pool.map(search, starts), strict=True)
-    seconds, exact, found = time.perf_counter() - begin, closed_form(), [response(*choice) for choice in choices]
-    pairs = zip(found, map(tuple, choices), strict=True)
+    seconds, exact, pairs = time.perf_counter() - begin, closed_form(), [(response(*at), tuple(at)) for at in choices]
     (rms, force), (gap, exponent) = min(pair for pair in pairs if pair[0][1] < 1.001 * limit)
     print(f"gap {1e3 * gap:.2f} mm, stiffness {10**exponent:.0f} N/m: rms {1e3 * rms:.4f} mm, force {force:.3f} N")
     print(f"{sum(counts)} runs in {seconds:.1f} s; closed form {1e3 * exact:.4f} mm")
