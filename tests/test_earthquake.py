@@ -118,3 +118,20 @@ def test_what_is_wrong_is_said_with_the_file(tmp_path, text, options, message):
     (tmp_path / "quake.txt").write_text(text)
     with pytest.raises(ValueError, match=rf"quake\.txt: {message}"):
         fb.Record.earthquake(tmp_path / "quake.txt", **options)
+
+
+def test_check_follows_a_record_to_its_end(tmp_path, recwarn):
+    """Shaken late, and not for twenty periods of the beam: the trial is as long as the record."""
+    from fembeam.cli.check import check
+
+    (tmp_path / "quake.AT2").write_text(peer())
+    beam = '[beam]\nlength = 2.0\nsection = { shape = "circle", E = 2e11, rho = 7800, diameter = 0.01 }\n'
+    support = '[[supports]]\nkind = "clamped"\nz = 0\n[damping]\nzeta = 0.02\n'
+    stop = '[[stops]]\nz = 2.0\ngap = 5e-3\nlaw = { kind = "hertz", stiffness = 1e7 }\n'
+    text = beam + support + stop + '[base]\nkind = "earthquake"\npath = "quake.AT2"\n'
+    (tmp_path / "scene.toml").write_text(text)
+    file = read(tmp_path / "scene.toml")
+    model = file.scene.reduce(2)
+    assert 20 * 2 * np.pi / model.omega[0] > T[-1]
+    assert check(file, model).touched[0].contacts > 0
+    assert not [str(w.message) for w in recwarn if "a trial" in str(w.message)]
