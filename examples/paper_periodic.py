@@ -1,9 +1,8 @@
 """The periodic response of the paper's beam: harmonic, 1/2 and 1/3 subharmonic branches, with one mode and with two.
 
 Reproduces Figs 4 and 5 of van de Wouw et al., Int. J. Non-Linear Mech. 38 (2003) 767: the subharmonic resonances reach
-higher than the harmonic one, and the second mode dents the tops of the harmonic and the 1/2 subharmonic peak.
-Brute-force simulations (grey) are the independent check. Away from the resonances branches fold and double hundreds of
-times; --whole follows them there too, to both ends. With --quick they span the resonances only.
+higher than the harmonic one, and the second mode dents the tops of the harmonic and the 1/2 subharmonic peak. Grey are
+brute-force simulations. Away from resonances branches fold hundreds of times: --whole follows them; --quick does less.
 
     python examples/paper_periodic.py [FIGURE.png] [--quick | --whole]
 """

@@ -163,6 +163,16 @@ def test_long_sums_are_chunked_without_a_seam():
     assert whole[-1] == pytest.approx(noise(3.0), abs=1e-12)
 
 
+@pytest.mark.parametrize("order", [0, 2])
+def test_many_equal_steps_are_summed_as_any_instants_are(order):
+    signal = BandNoise(1e-3, (100.0, 1000.0), seed=4).lasting(60.0)
+    signal = signal.derivative(order) if order else signal
+    mixed = np.random.default_rng(1).permutation(20001)
+    for t in (1.7 + 2e-3 * np.arange(20001), np.linspace(50.0, 0.0, 20001)):
+        values = signal(t)
+        np.testing.assert_allclose(values[mixed], signal(t[mixed]), atol=1e-9 * values.std())
+
+
 def test_kurtosis_is_gaussian():
     found = np.array([moments(BandNoise(1.0, BROAD, seed=s).series()[1]).kurtosis for s in range(40)])
     error = found.std(ddof=1) / math.sqrt(found.size)

@@ -113,9 +113,13 @@ def _parser() -> argparse.ArgumentParser:
     compare.add_argument("--out", metavar="DIR", type=Path, help="folder for overlaid figures")
     compare.add_argument("--json", action="store_true", help="print JSON instead of a table")
     export = command("export", _export, "write a saved run as CSV: histories and contacts", scene=False)
-    export.add_argument("run", metavar="RUN.npz", type=Path)
+    export.add_argument("run", metavar="RUN", type=Path, help="run.npz, or a run saved as HDF5")
     export.add_argument("--out", metavar="DIR", type=Path, required=True)
     export.add_argument("--stride", metavar="N", type=int, default=1, help="keep every N-th sample")
+    export.add_argument("--places", metavar="Z", type=float, nargs="+",
+                        help="z in m; default: those in the scene file's [simulate], else usual ones")  # fmt: skip
+    export.add_argument("--quantities", metavar="NAME", nargs="+", help="such as displacement, stress, reactions, "
+                        "'absolute acceleration'; an unknown one lists all; default: as for places")  # fmt: skip
     command("schema", _schema, "print the JSON Schema of scene files", scene=False)
     return parser
 
@@ -183,7 +187,10 @@ def _export(arguments: argparse.Namespace) -> int:
     from fembeam.results import files as report
 
     run = load(arguments.run)
-    written = run.to_csv(report.prepared(arguments.out), arguments.stride)
+    study = None if run.source is None else run.scene_file.studies.get("simulate")
+    asked = {name: getattr(arguments, name) for name in ("places", "quantities") if getattr(arguments, name)}
+    chosen = {**({} if study is None else study.outputs), **asked}
+    written = run.to_csv(report.prepared(arguments.out), arguments.stride, **chosen)
     say(f"wrote {', '.join(path.name for path in written)} to {arguments.out}")
     return 0
 

@@ -185,10 +185,11 @@ def _simulation(job: Job) -> Outcome:
         except (ValueError, TypeError, ArithmeticError, MemoryError) as error:
             say(f"error: {_placed(job.file, '[simulate]', error)}")
             return Outcome(BAD_INPUT)
-        found = report.summary(done, study.discard, time.perf_counter() - begin)
+        found = report.summary(done, study.discard, time.perf_counter() - begin, study.outputs)
         outcome = Outcome(code, found, report.text(found))
         try:
-            outcome.files = report.write(done, job.folder, study.discard, {**found, "warnings": list(warned)})
+            found = {**found, "warnings": list(warned)}
+            outcome.files = report.write(done, job.folder, study.discard, found, study.outputs)
         except OSError as error:
             outcome.code, outcome.last = _unwritten(error).code, True
             return outcome

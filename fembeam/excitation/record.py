@@ -18,7 +18,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fembeam.excitation.line_spectrum import LineSpectrum, checked_band, checked_order
+from fembeam.excitation.line_spectrum import LineSpectrum, checked_band, checked_order, within
 from fembeam.excitation.polyline import Polyline
 from fembeam.excitation.samples import (
     checked_samples,
@@ -32,7 +32,6 @@ from fembeam.support import number
 
 Quantity = Literal["displacement", "acceleration", "force"]
 Interpolation = Literal["spectral", "linear"]
-EDGE = 0.25  # the band fades out over this part of lo below it and of hi above it
 MOVING = 0.3  # y''(0) above this part of the rms of y'' is warned of
 
 
@@ -184,6 +183,17 @@ class Record:
         except ValueError as error:
             raise ValueError(f"{path}: {error}") from None
 
+    @classmethod
+    def earthquake(cls, path: str | Path, unit: str | None = None, **options: Any) -> Record:
+        """An earthquake's acceleration from columns, a PEER (AT2) or a COSMOS file: `excitation.earthquake.earthquake`.
+
+        ``unit`` "g", "m/s2" or "cm/s2" of columns; options are ``columns``, ``baseline=True``, ``band``,
+        ``interpolation="linear"``, ``padding``.
+        """
+        from fembeam.excitation.earthquake import earthquake
+
+        return earthquake(path, unit, **options)  # type: ignore[arg-type]
+
     def __repr__(self) -> str:
         tail = f".derivative({self.order})" if self.order else ""
         head = f"Record({self.t.size} samples over {self.duration:.6g} s"
@@ -220,7 +230,7 @@ class Record:
         sines = dst(y[1:-1] - (line[0] + line[1] * h * np.arange(1, n)), type=1) / n
         lines = LineSpectrum(math.pi / self.duration, 1, -1j * sines)
         if self.band is not None:
-            lines = _within(lines, self.band)
+            lines = within(lines, self.band)
         if self.band is not None and self.band[0] > 0:
             line = (0.0, 0.0)
         c_0, c_1 = (*line, 0.0, 0.0)[power : power + 2] if 0 <= power <= 2 else (0.0, 0.0)
@@ -295,19 +305,3 @@ class Record:
         return (f"Record begins with y'' near {start:.2g} m/s² (rms {rms:.3g}), but y'' of a displacement record is "
                 "zero at its ends: its first samples load the structure wrongly; begin where it is at rest, fade it "
                 "in, or give the acceleration")  # fmt: skip
-
-
-def _within(lines: LineSpectrum, band: tuple[float, float]) -> LineSpectrum:
-    """The lines in the band, with smooth edges outside it: a sharp edge rings over the whole record."""
-    omega, (lo, hi) = lines.omega, band
-    if not np.any((omega >= lo) & (omega <= hi)):
-        raise ValueError(
-            f"Record band {band} rad/s holds no line: the record resolves {lines.spacing:.6g} to "
-            f"{omega[-1]:.6g} rad/s; widen the band"
-        )
-    outside = np.maximum(omega / hi - 1, 0.0)
-    if lo > 0:
-        outside = np.maximum(outside, 1 - omega / lo)
-    weight = np.cos(np.pi / 2 * np.minimum(outside / EDGE, 1.0)) ** 2
-    kept = np.flatnonzero(outside < EDGE)
-    return LineSpectrum(lines.spacing, int(kept[0]) + 1, (weight * lines.amplitude)[kept])

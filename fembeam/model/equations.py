@@ -20,7 +20,7 @@ from fembeam.scene import contact_rows, loads, weight
 from fembeam.scene.contact_rows import ContactRow
 
 if TYPE_CHECKING:
-    from fembeam.model.section_forces import SectionForces
+    from fembeam.response import SectionForces
     from fembeam.scene import Matrices, Scene
 
 SEEN = ("forces", "springs", "bodies", "impactors")  # parts of a scene besides stops that a system is made of
@@ -99,7 +99,7 @@ class ModalEquations:
     @cached_property
     def section_forces(self) -> tuple[SectionForces, ...]:
         """Bending moment and shear force per unit of each coordinate, on each beam."""
-        from fembeam.model.section_forces import section_forces
+        from fembeam.response import section_forces
 
         return tuple(section_forces(self, body) for body in range(len(self.matrices.beams)))
 

@@ -20,8 +20,7 @@ from solvers.problem import counted
 
 if TYPE_CHECKING:
     from fembeam.model.model import Model
-    from fembeam.model.section_forces import Extremes
-    from fembeam.response import Reactions
+    from fembeam.response import Extremes, Reactions, Readout
     from fembeam.scene_file import SceneFile
 
 Vector = NDArray[np.float64]
@@ -55,6 +54,7 @@ class Run(Printed):
     scene: str
     model: Model | None = None
     stored_forces: Vector | None = None  # (m, k) of a run read from a file
+    stored: Readout | None = None  # likewise
     others: tuple[Shapes, ...] = ()  # of the further beams
     source: Source | None = None  # of a run made from a scene file
     versions: dict[str, str] = field(default_factory=dict)  # that made a run read from a file
@@ -72,6 +72,13 @@ class Run(Printed):
     def energy(self) -> solvers.Energy:
         """The energy balance."""
         return self.ledger()
+
+    @cached_property
+    def readout(self) -> Readout:
+        """What it is read with: loads, section forces, reactions; of the model, else of the file."""
+        from fembeam.response import Readout
+
+        return self.stored if self.stored is not None and self.model is None else Readout(self.model, self.t)
 
     @property
     def scene_file(self) -> SceneFile:
@@ -114,7 +121,7 @@ class Run(Printed):
     def displacement(self, z: ArrayLike, body: int = 0, absolute: bool = False) -> Vector:
         """u(z, t) of a beam (0 the scene's own), m: (k,) at one z, (k, j) at z (j,).
 
-        Relative to the frame, or ``absolute``: u + y. That needs the model, which a run read from a file has not.
+        Relative to the frame, or ``absolute``: u + y.
         """
         return self._motion(self.q, z, body, absolute, 0)
 
@@ -127,7 +134,7 @@ class Run(Printed):
 
         ü = φ(z)·q'' with q'' of the equations of motion at the samples, the contact forces of the laws included: the
         instant's value, not a mean over the sample. Under a short contact it holds what the kept modes carry of the
-        force, Σ φ_i(z) φ_i(z_s) F, and grows with their number. ValueError for a run read from a file.
+        force, Σ φ_i(z) φ_i(z_s) F, and grows with their number.
         """
         from fembeam.response import coordinates
 
@@ -145,7 +152,7 @@ class Run(Printed):
 
         They balance loads, contact forces and the inertia of the kept modes on the finite-element model; modes left
         out follow statically, structural damping counts as internal. A contact shorter than the period of the highest
-        mode kept acts at once: keep more modes until the extremes settle. ValueError for a run read from a file.
+        mode kept acts at once: keep more modes until the extremes settle.
 
         Returns
         -------
@@ -193,43 +200,53 @@ class Run(Printed):
         quantity : "displacement", "slope", "moment", "shear" or "stress".
         z : places (j,) in m; None: all nodes of the mesh.
         """
-        from fembeam.model.section_forces import extremes, rows_of
+        from fembeam.response import extremes, rows_of
 
         places = (self.shapes, *self.others)[body].nodes if z is None else np.atleast_1d(np.asarray(z, dtype=float))
         return extremes(self.t, self.q, *rows_of(self, quantity, places, body))
 
     def _field(self, quantity: str, z: ArrayLike, body: int) -> Vector:
         """A field over time: (k,) at one z, (k, j) at z (j,)."""
-        from fembeam.model.section_forces import rows_of
+        from fembeam.response import rows_of
 
         places = np.asarray(z, dtype=float)
         shapes, _, offset = rows_of(self, quantity, np.atleast_1d(places), body)
         values = self.q @ shapes.T + offset
         return values if places.ndim else values[:, 0]
 
-    def to_xdmf(self, path: str | os.PathLike[str], stride: int = 1) -> Path:
-        """Write every `stride`-th sample for ParaView: displacement, velocity, slope, moment, shear, stress."""
+    def to_xdmf(self, path: str | os.PathLike[str], stride: int = 1, hdf5: bool = False) -> Path:
+        """Write every `stride`-th sample for ParaView: displacement, velocity, slope, moment, shear, stress.
+
+        ``hdf5``: the numbers go to an .h5 file beside it, quicker and smaller than text; ImportError without h5py.
+        """
         from fembeam.model.run_paraview import to_xdmf
 
-        return to_xdmf(self, path, stride)
+        return to_xdmf(self, path, stride, hdf5)
 
-    def to_vtu(self, path: str | os.PathLike[str], sample: int = -1) -> Path:
-        """Write one sample for ParaView."""
+    def to_vtu(self, path: str | os.PathLike[str], sample: int = -1, stride: int | None = None) -> Path:
+        """Write one sample for ParaView; or every `stride`-th one as .vtu files and a .pvd beside them to open."""
         from fembeam.model.run_paraview import to_vtu
 
-        return to_vtu(self, path, sample)
+        return to_vtu(self, path, sample, stride)
 
-    def to_csv(self, folder: str | os.PathLike[str], stride: int = 1) -> list[Path]:
-        """Write every `stride`-th sample at the usual places as `histories.csv`, and the log as `contacts.csv`."""
+    def to_csv(self, folder: str | os.PathLike[str], stride: int = 1, **chosen: Any) -> list[Path]:
+        """Write every `stride`-th sample as `histories.csv`, and the log as `contacts.csv`.
+
+        Parameters
+        ----------
+        chosen : ``places=`` z in m (j,), else tip and mid-beam. ``quantities=`` from displacement, velocity,
+            acceleration, each also "absolute …", slope, moment, shear, stress; indentation, force (of stops);
+            reactions (of supports, springs, dashpots). Else displacement, velocity, indentation, force.
+        """
         from fembeam.model.run_csv import write
 
-        return write(self, Path(folder), stride)
+        return write(self, Path(folder), stride, **chosen)
 
-    def to_dataframe(self, stride: int = 1) -> Any:
-        """Every `stride`-th sample at the usual places as a table of pandas over t; ImportError without pandas."""
+    def to_dataframe(self, stride: int = 1, **chosen: Any) -> Any:
+        """The same histories as a table of pandas over t; ImportError without pandas."""
         from fembeam.model.run_csv import to_dataframe
 
-        return to_dataframe(self, stride)
+        return to_dataframe(self, stride, **chosen)
 
     def to_xarray(self, z: ArrayLike | None = None) -> Any:
         """Displacement and velocity over t and z (m; None: the mesh), stops and coordinates as a Dataset of xarray.
@@ -267,7 +284,8 @@ class Run(Printed):
         """Contact force (k,) of a stop, N, from its law and the entry rate latched at the time.
 
         ``mean``: over each sample (halfway to its neighbours) instead of at it, so that contacts shorter than a sample
-        are seen: the trapezoidal rule over the samples gives the log's impulses exactly.
+        are seen: the trapezoidal rule over the samples gives the log's impulses exactly. Needs the model, whose law
+        shares the impulse of a contact among samples: ValueError for a run read from a file.
         """
         if mean:
             from fembeam.response import mean_force
@@ -287,24 +305,16 @@ class Run(Printed):
         """Forces (m, k)."""
         if self.stored_forces is not None:
             return self.stored_forces
-        assert self.model is not None
-        forces = [self._force_of(s, contact.law) for s, contact in enumerate(self.model.contact_rows)]
-        return np.array(forces).reshape(len(forces), len(self.t))
+        from fembeam.response import forces
 
-    def _force_of(self, stop: int, law: Any) -> Vector:
-        """Force history of one stop."""
-        mine = self.contacts.stop == stop
-        entered, speed = self.contacts.t_in[mine], self.contacts.speed_in[mine]
-        if not len(entered):
-            return np.zeros(len(self.t))
-        order = np.argsort(entered)
-        last = np.searchsorted(entered[order], self.t, side="right") - 1
-        entry_rate = np.maximum(np.abs(speed[order])[np.maximum(last, 0)], law.entry_rate_floor)
-        delta = np.where(last >= 0, self.indentation(stop), -1.0)
-        return np.asarray(law.force(delta, -self.q_dot @ self.directions[stop], entry_rate))
+        return forces(self)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write everything to one ``.npz`` file, whole or not at all; read it with `load`."""
+        """Write everything to one file, whole or not at all; read it with `load`.
+
+        ``.npz``, or HDF5 if the path ends in .h5 or .hdf5 (ImportError without h5py). The file holds what the methods
+        read, but no laws: `force` with ``mean`` needs the run itself.
+        """
         from fembeam.model.run_file import save
 
         return save(self, Path(path))

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
-from fembeam.model.watched_places import places
+from fembeam.model.watched_places import places as usual_places
 from fembeam.support import require
 from solvers.problem import dataframe, optional
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import ArrayLike
 
@@ -24,30 +24,80 @@ CONTACT_UNITS = {
     "peak_force": "N", "impulse": "N s", "energy_loss": "J", "entry_rate_clipped": "",
 }  # fmt: skip
 DIGITS = "%.12g"
+Output = Literal[
+    "displacement",
+    "velocity",
+    "acceleration",
+    "absolute displacement",
+    "absolute velocity",
+    "absolute acceleration",
+    "slope",
+    "moment",
+    "shear",
+    "stress",
+    "indentation",
+    "force",
+    "reactions",
+]
+UNITS = {  # of what `histories` can be asked for
+    **dict.fromkeys(get_args(Output), "m"),
+    **{"velocity": "m/s", "absolute velocity": "m/s", "acceleration": "m/s²", "absolute acceleration": "m/s²"},
+    **{"slope": "rad", "moment": "N m", "shear": "N", "stress": "N/m²", "force": "N"},
+}
+USUAL = ("displacement", "velocity", "indentation", "force")
+ELSEWHERE = ("indentation", "force", "reactions")  # not at places: of stops and of supports
 
 
-def write(run: Run, folder: Path, stride: int = 1) -> list[Path]:
+def write(run: Run, folder: Path, stride: int = 1, **chosen: Any) -> list[Path]:
     """Write `histories.csv` and `contacts.csv`; see `Run.to_csv`."""
-    kept = histories(run, stride)
+    kept = histories(run, stride, **chosen)
     units = ((name, CONTACT_UNITS.get(name, ""), column) for name, column in run.contacts.arrays().items())
     log = {f"{name} [{unit}]" if unit else name: column for name, unit, column in units}
     return [_write(folder / "histories.csv", kept), _write(folder / "contacts.csv", log)]
 
 
-def histories(run: Run, stride: int) -> dict[str, Vector]:
-    """Columns of every `stride`-th sample at the usual places and stops, by name and unit."""
+def histories(
+    run: Run, stride: int = 1, places: Sequence[float] | None = None, quantities: Sequence[str] | None = None
+) -> dict[str, Vector]:
+    """Columns of every `stride`-th sample, by name and unit: quantities at places, of stops, of supports."""
     require(stride >= 1, "stride must be at least 1", stride, "Run", "1 keeps every sample")
+    asked = USUAL if quantities is None else quantities
+    unknown = [name for name in asked if name not in UNITS]
+    require(not unknown, f"quantities must be among {', '.join(UNITS)}", unknown, "Run", "choose from these")
+    where = usual_places(run.shapes) if places is None else {f"at {z:.12g} m": z for z in places}
     columns = {"t [s]": run.t}
-    for name, z in places(run.shapes).items():
-        columns |= {f"displacement {name} [m]": run.displacement(z), f"velocity {name} [m/s]": run.velocity(z)}
+    for name, z in where.items():
+        columns |= {f"{what} {name} [{UNITS[what]}]": _at(run, what, z) for what in asked if what not in ELSEWHERE}
     for stop in range(len(run.stops)):
-        columns |= {f"indentation {stop} [m]": run.indentation(stop), f"force {stop} [N]": run.force(stop)}
+        of_stops = (what for what in asked if what in ("indentation", "force"))
+        columns |= {f"{what} {stop} [{UNITS[what]}]": getattr(run, what)(stop) for what in of_stops}
+    for i, one in enumerate(run.reactions() if "reactions" in asked else ()):
+        about = f"{i} ({one.name})"
+        columns |= {f"reaction force {about} [N]": one.force, f"reaction moment {about} [N m]": one.moment}
     return {name: column[::stride] for name, column in columns.items()}
 
 
-def to_dataframe(run: Run, stride: int = 1) -> Any:
+def _at(run: Run, quantity: str, z: float) -> Vector:
+    """A quantity (k,) at a place."""
+    name = quantity.removeprefix("absolute ")
+    return getattr(run, name)(z) if name == quantity else getattr(run, name)(z, absolute=True)
+
+
+def extremes_table(columns: Mapping[str, Vector], discard: float = 0.0) -> dict[str, dict[str, float]]:
+    """Mean, standard deviation, least and greatest value with their times of `histories` from t = discard on."""
+    t = columns["t [s]"]
+    kept, found = t >= discard, {}
+    for name, values in list(columns.items())[1:] if kept.any() else ():
+        x = values[kept]
+        low, high = int(np.argmin(x)), int(np.argmax(x))
+        numbers = (x.mean(), x.std(), x[low], t[kept][low], x[high], t[kept][high])
+        found[name] = dict(zip(("mean", "std", "min", "t_min", "max", "t_max"), map(float, numbers), strict=True))
+    return found
+
+
+def to_dataframe(run: Run, stride: int = 1, **chosen: Any) -> Any:
     """See `Run.to_dataframe`."""
-    return dataframe(histories(run, stride)).set_index("t [s]")
+    return dataframe(histories(run, stride, **chosen)).set_index("t [s]")
 
 
 def to_xarray(run: Run, z: ArrayLike | None = None) -> Any:
@@ -82,7 +132,7 @@ def _write(target: Path, columns: Mapping[str, Vector]) -> Path:
 
 def parts(run: Run) -> list[Part]:
     """What print shows of a run: how it ended, its signals, the contacts of each stop."""
-    signals = {f"displacement, {name}": run.displacement(z) for name, z in places(run.shapes).items()}
+    signals = {f"displacement, {name}": run.displacement(z) for name, z in usual_places(run.shapes).items()}
     signals |= {f"indentation, stop {i}": run.indentation(i) for i in range(len(run.stops))}
     moved = [(name, *map(float, (x.mean(), x.std(), x.min(), x.max()))) for name, x in signals.items() if len(x)]
     log, rows = run.contacts, []

@@ -1,4 +1,4 @@
-"""A run written to a file, and read from one."""
+"""A run written to a file, ``.npz`` or HDF5, and read from one."""
 
 from __future__ import annotations
 
@@ -15,12 +15,16 @@ import solvers
 from fembeam.model import saved_arrays
 from fembeam.model.run import Run
 from fembeam.model.shapes import Shapes
+from fembeam.response import READOUT_UNITS, packed, unpacked
 from fembeam.scene import Source
 from fembeam.support import versions, written_whole
+from solvers.problem import optional
 
 OLD_NAMES = {"contact_floored": "contact_entry_rate_clipped"}  # in files of earlier versions
 
 FORMAT = 2
+HDF5 = (".h5", ".hdf5")
+SIGNATURE = b"\x89HDF\r\n\x1a\n"  # of HDF5
 UNITS = {
     "t, contact_t_in, contact_t_out": "s",
     "q": "m √kg",
@@ -32,11 +36,27 @@ UNITS = {
     "contact_energy_loss, energy_*": "J",
     "shapes, directions": "1/√kg",
     "strikers": "kg",
+    **READOUT_UNITS,
 }
 
 
 def save(run: Run, path: Path) -> Path:
-    """Write everything to one ``.npz`` file, whole or not at all."""
+    """Write everything to one file, whole or not at all: HDF5 if it ends in .h5 or .hdf5, else ``.npz``."""
+    hdf5 = optional("h5py", "a run in HDF5") if path.suffix in HDF5 else None
+    about, arrays = _contents(run)
+    target = path if hdf5 or path.suffix == ".npz" else path.with_name(path.name + ".npz")
+    with written_whole(target) as file:
+        if hdf5 is None:
+            np.savez(file, about=about, **arrays)  # type: ignore[arg-type]
+        else:
+            with hdf5.File(file, "w") as group:
+                for name, content in {"about": about, **arrays}.items():
+                    group[name] = content
+    return target
+
+
+def _contents(run: Run) -> tuple[str, dict[str, Any]]:
+    """Words as JSON, and arrays by name."""
     about = {
         "format": FORMAT,
         "status": run.status,
@@ -59,10 +79,10 @@ def save(run: Run, path: Path) -> Path:
         **{f"energy_{f.name}": getattr(run.energy, f.name) for f in fields(run.energy)},
         **{f"file_{i}": np.frombuffer(content, dtype=np.uint8) for i, content in enumerate(carried)},
     }
-    target = path if path.suffix == ".npz" else path.with_name(path.name + ".npz")
-    with written_whole(target) as file:
-        np.savez(file, about=json.dumps(about), **arrays)  # type: ignore[arg-type]
-    return target
+    if run.model is not None or run.stored is not None:  # else from a file of an earlier version
+        about["readout"], read = packed(run.readout)
+        arrays |= read
+    return json.dumps(about, default=float), arrays
 
 
 def load(path: str | os.PathLike[str]) -> Run:
@@ -70,8 +90,8 @@ def load(path: str | os.PathLike[str]) -> Run:
 
     Raises
     ------
-    FileNotFoundError; ValueError when the file is not a run of this library, is damaged, or its arrays contradict each
-    other.
+    FileNotFoundError; ImportError for HDF5 without h5py; ValueError when the file is not a run of this library, is
+    damaged, or its arrays contradict each other.
 
     Examples
     --------
@@ -85,16 +105,26 @@ def load(path: str | os.PathLike[str]) -> Run:
     ('finished', 11)
     """
     try:
-        with np.load(path, allow_pickle=False) as data:
-            about = json.loads(str(data["about"]))
-            arrays = {OLD_NAMES.get(name, name): data[name] for name in data.files if name != "about"}
+        arrays = _read(Path(path))
+        about = json.loads(str(arrays.pop("about")))
         if about["format"] != FORMAT:
             raise ValueError(f"it has format {about['format']}, this version reads {FORMAT}")
-        return _of_arrays(about, arrays, Path(path))
-    except FileNotFoundError:
+        return _of_arrays(about, {OLD_NAMES.get(name, name): array for name, array in arrays.items()}, Path(path))
+    except (FileNotFoundError, ImportError):
         raise
     except Exception as error:
         raise ValueError(f"{path} is not a saved run, or is damaged: {error}") from error
+
+
+def _read(path: Path) -> dict[str, Any]:
+    """Arrays by name, and the words."""
+    with path.open("rb") as file:
+        hdf5 = file.read(len(SIGNATURE)) == SIGNATURE
+    if not hdf5:
+        with np.load(path, allow_pickle=False) as data:
+            return {name: data[name] for name in data.files}
+    with optional("h5py", "a run in HDF5").File(path, "r") as group:
+        return {name: entry.asstr()[()] if name == "about" else entry[()] for name, entry in group.items()}
 
 
 def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run:
@@ -106,19 +136,22 @@ def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run
         name = Path(given["name"]).name
         source = Source(path.with_name(name), given["text"], tuple(given["overrides"]), files, of_run=True)
     bodies = sum(name.split("_")[0] == "nodes" for name in arrays)
+    shapes = [Shapes(arrays[f"nodes{i}"], arrays[f"shapes{i}"]) for i in ("", *(f"_{j}" for j in range(1, bodies)))]
+    nodes = [one.nodes for one in shapes]
     return Run(
         *(arrays["t"], arrays["q"], arrays["q_dot"]),
         contacts=solvers.ContactLog(*(arrays[f"contact_{f.name}"] for f in fields(solvers.ContactLog))),
         ledger=partial(solvers.Energy, *(arrays[f"energy_{f.name}"] for f in fields(solvers.Energy))),
         status=about["status"],
         cost=solvers.Cost(**about["cost"]),
-        shapes=Shapes(arrays["nodes"], arrays["shapes"]),
+        shapes=shapes[0],
         stops=arrays["stops"],
         directions=arrays["directions"],
         strikers=arrays["strikers"],
         scene=about["scene"],
         stored_forces=arrays["force"],
-        others=tuple(Shapes(arrays[f"nodes_{i}"], arrays[f"shapes_{i}"]) for i in range(1, bodies)),
+        stored=unpacked(about["readout"], arrays, nodes) if "readout" in about else None,
+        others=tuple(shapes[1:]),
         source=source,
         versions=about.get("versions", {}),
     )

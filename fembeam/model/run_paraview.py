@@ -1,4 +1,4 @@
-"""Runs for ParaView: XDMF time series and VTU files through meshio, written whole or not at all.
+"""Runs for ParaView: XDMF time series, VTU files and series of them through meshio, written whole or not at all.
 
 Beams lie along x, deflect along y; bodies and impactors at their distance from the scene's beam. `displacement` and
 `velocity` are vectors (use the filter Warp By Vector), `slope`, `moment`, `shear`, `stress` numbers at the nodes.
@@ -11,12 +11,14 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fembeam.scene import heights
+from fembeam.response import rows_of
 from fembeam.support import require
+from solvers.problem import optional
 
 if TYPE_CHECKING:
     from fembeam.model.run import Run
@@ -24,90 +26,122 @@ if TYPE_CHECKING:
 Vector = NDArray[np.float64]
 
 SECTION_FIELDS = ("slope", "moment", "shear", "stress")
+PVD = """<?xml version="1.0"?>
+<VTKFile type="Collection" version="0.1">
+<Collection>
+{}
+</Collection>
+</VTKFile>
+"""
 
 
-def to_xdmf(run: Run, path: str | os.PathLike[str], stride: int = 1) -> Path:
-    """Write every `stride`-th sample of a run as an XDMF time series; returns the path.
+def to_xdmf(run: Run, path: str | os.PathLike[str], stride: int = 1, hdf5: bool = False) -> Path:
+    """Write every `stride`-th sample of a run as an XDMF time series, its numbers as text or in HDF5; returns the path.
 
     Raises
     ------
-    ValueError : the run was read from a file and does not know its scene, stride below 1, a path without folder.
+    ValueError : the run was read from a file of an earlier version, stride below 1, a path without folder.
+    ImportError : HDF5 without h5py.
     """
-    import meshio
+    from meshio.xdmf import TimeSeriesWriter
 
-    require(isinstance(stride, int) and stride >= 1, "stride must be a whole number above 0", stride, "to_xdmf",
-            "give 1 for every sample")  # fmt: skip
-    points, cells = _geometry(run)
+    h5py = optional("h5py", "XDMF with HDF5 data") if hdf5 else None
+    samples, points, cells, values = _samples(run, stride), *_geometry(run), _fields(run)
 
     def write(target: str) -> None:
-        with meshio.xdmf.TimeSeriesWriter(target, data_format="XML") as writer:
-            writer.write_points_cells(points, cells)
-            for sample in range(0, len(run.t), stride):
-                writer.write_data(float(run.t[sample]), point_data=_values(run, sample))
+        writer = TimeSeriesWriter(target, data_format="HDF" if hdf5 else "XML")
+        if h5py is not None:  # as a context it would take the working directory
+            writer.h5_filename = os.path.splitext(target)[0] + ".h5"
+            writer.h5_file = h5py.File(writer.h5_filename, "w")
+        writer.write_points_cells(points, cells)
+        for sample in samples:
+            writer.write_data(float(run.t[sample]), point_data=values(sample))
+        writer.__exit__()
 
     return _whole(Path(path), ".xdmf", write)
 
 
-def to_vtu(run: Run, path: str | os.PathLike[str], sample: int = -1) -> Path:
-    """Write one sample of a run as VTU; returns the path."""
+def to_vtu(run: Run, path: str | os.PathLike[str], sample: int = -1, stride: int | None = None) -> Path:
+    """Write one sample of a run as VTU, or every `stride`-th and their times as PVD; returns the path to open."""
     import meshio
 
     require(-len(run.t) <= sample < len(run.t), f"sample must be below {len(run.t)}, the number of samples", sample,
             "to_vtu", "count from 0, or from the end with -1")  # fmt: skip
-    points, cells = _geometry(run)
-    mesh = meshio.Mesh(points, cells, point_data=_values(run, sample % len(run.t)))
-    return _whole(Path(path), ".vtu", lambda target: meshio.write(target, mesh, file_format="vtu"))
+    points, cells, values = *_geometry(run), _fields(run)
+
+    def write_one(target: str, number: int) -> None:
+        meshio.write(target, meshio.Mesh(points, cells, point_data=values(number)), file_format="vtu")
+
+    if stride is None:
+        return _whole(Path(path), ".vtu", lambda target: write_one(target, sample))
+    samples = _samples(run, stride)
+
+    def write(target: str) -> None:
+        stem = os.path.splitext(target)[0]
+        names = [f"{stem}_{number:0{len(str(len(samples)))}d}.vtu" for number in range(len(samples))]
+        for name, number in zip(names, samples, strict=True):
+            write_one(name, number)
+        rows = [f'<DataSet timestep="{float(run.t[number])!r}" file="{quoteattr(os.path.basename(name))[1:-1]}"/>'
+                for name, number in zip(names, samples, strict=True)]  # fmt: skip
+        Path(target).write_text(PVD.format("\n".join(rows)), encoding="utf-8")
+
+    path = Path(path)
+    return _whole(path.with_suffix("") if path.suffix == ".vtu" else path, ".pvd", write)
+
+
+def _samples(run: Run, stride: int) -> range:
+    """Numbers of the samples to be written."""
+    require(isinstance(stride, int) and stride >= 1, "stride must be a whole number above 0", stride, "export",
+            "give 1 for every sample")  # fmt: skip
+    return range(0, len(run.t), stride)
 
 
 def _geometry(run: Run) -> tuple[Vector, list[tuple[str, Any]]]:
     """Points (p, 3) of all beams, then impactors; lines, of zero length for impactors, as XDMF has one kind of cell."""
-    require(run.model is not None, "the fields need the model of the run", "a run read from a file", "export",
-            "simulate again, or use dataclasses.replace(run, model=model)")  # fmt: skip
-    assert run.model is not None
-    beams, strikers = heights(run.model.scene)
     parts, lines, count = [], [], 0
-    for shapes, height in zip((run.shapes, *run.others), beams, strict=True):
+    for shapes, height in zip((run.shapes, *run.others), run.readout.heights, strict=True):
         size = len(shapes.nodes)
         parts.append(np.column_stack([shapes.nodes, np.full(size, height), np.zeros(size)]))
         lines.append(np.column_stack([np.arange(size - 1), np.arange(1, size)]) + count)
         count += size
-    places = [impactor.z for impactor in run.model.matrices.impactors]
-    parts.append(np.column_stack([places, strikers, np.zeros(len(places))]))
+    places = run.readout.striker_places
+    parts.append(np.column_stack([places, np.zeros(len(places))]))
     lines.append(np.repeat(count + np.arange(len(places))[:, None], 2, axis=1))
     return np.concatenate(parts), [("line", np.concatenate(lines))]
 
 
-def _values(run: Run, sample: int) -> dict[str, Vector]:
-    """Fields at one sample; stress only where every section knows its fibre."""
-    from dataclasses import replace
+def _fields(run: Run) -> Callable[[int], dict[str, Vector]]:
+    """The fields at the points as a function of the sample; stress only where every section knows its fibre."""
+    known = all(np.isfinite(f.beam.profile(f.nodes).fibre).all() for f in run.readout.section_forces)
+    rows = {name: _rows(run, name) for name in ("displacement", *SECTION_FIELDS[: None if known else -1])}
+    moved, _ = rows.pop("displacement")
 
-    now = replace(run, t=run.t[[sample]], q=run.q[[sample]], q_dot=run.q_dot[[sample]])
-    bodies = list(enumerate((run.shapes, *run.others)))
-    vectors = {
-        "displacement": [now.displacement(shapes.nodes, body)[0] for body, shapes in bodies],
-        "velocity": [now.velocity(shapes.nodes, body)[0] for body, shapes in bodies],
-    }
-    count = range(len(run.strikers))
-    vectors["displacement"].append(np.array([now.impactor_displacement(i)[0] for i in count]))
-    vectors["velocity"].append(np.array([now.impactor_velocity(i)[0] for i in count]))
-    fields = {}
-    for name, values in vectors.items():
-        up = np.concatenate(values)
-        fields[name] = np.column_stack([np.zeros(len(up)), up, np.zeros(len(up))])
-    assert run.model is not None
-    known = all(np.isfinite(f.beam.profile(f.nodes).fibre).all() for f in run.model.section_forces)
-    for name in SECTION_FIELDS if known else SECTION_FIELDS[:-1]:
-        parts = [now._field(name, shapes.nodes, body)[0] for body, shapes in bodies]
-        fields[name] = np.concatenate([*parts, np.zeros(len(run.strikers))])
-    return fields
+    def at(sample: int) -> dict[str, Vector]:
+        vectors = {"displacement": moved @ run.q[sample], "velocity": moved @ run.q_dot[sample]}
+        still = np.zeros(len(moved))
+        numbers = {name: shapes @ run.q[sample] + constant for name, (shapes, constant) in rows.items()}
+        return {name: np.column_stack([still, up, still]) for name, up in vectors.items()} | numbers
+
+    return at
+
+
+def _rows(run: Run, quantity: str) -> tuple[Vector, Vector]:
+    """What turns q into a field at the points: shapes (p, n) and a constant part (p,); impactors have displacement."""
+    parts = [rows_of(run, quantity, one.nodes, body) for body, one in enumerate((run.shapes, *run.others))]
+    count = len(run.strikers)
+    strikers = np.eye(run.q.shape[1])[run.q.shape[1] - count :] / np.sqrt(run.strikers)[:, None]
+    last = strikers if quantity == "displacement" else np.zeros_like(strikers)
+    return np.vstack([*(shapes for shapes, _, _ in parts), last]), np.concatenate(
+        [*(constant for _, _, constant in parts), np.zeros(count)]
+    )
 
 
 def _whole(target: Path, suffix: str, write: Callable[[str], None]) -> Path:
-    """Let meshio write beside the target, then give the file its name."""
+    """Let meshio write beside the target, then give the files their names, the one to be opened last."""
     target = target if target.suffix == suffix else target.with_name(target.name + suffix)
     require(target.parent.is_dir(), "the folder must exist", str(target.parent), f"export to {suffix}", "make it first")
     with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}.") as folder:
-        draft = os.path.join(folder, target.name)
-        write(draft)
-        os.replace(draft, target)
+        write(os.path.join(folder, target.name))
+        for name in sorted(os.listdir(folder), key=target.name.__eq__):
+            os.replace(os.path.join(folder, name), target.with_name(name))
     return target

@@ -2,7 +2,7 @@
 
 k samples, n coordinates, m contacts, b nodes of a beam, c entries of the log:
 t (k,), q, q_dot (k, n), force (m, k), stops (m, 3), directions (m, n), strikers (i,), nodes (b,), shapes (2b, n),
-contact_* (c,), energy_* (k,) but energy_initial.
+contact_* (c,), energy_* (k,) but energy_initial; what `fembeam.response.readout` reads a run with.
 """
 
 from __future__ import annotations
@@ -12,7 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from fembeam.response import READOUT_FINITE, expected_readout
+
 Shape = tuple[int, ...]
+FINITE = {"shapes", "stops", "directions", "strikers", *READOUT_FINITE}
 
 
 def check(arrays: Mapping[str, Any]) -> None:
@@ -25,7 +28,7 @@ def check(arrays: Mapping[str, Any]) -> None:
     for name in ("t", *(name for name in arrays if name.split("_")[0] == "nodes")):
         steps = np.diff(arrays[name])
         _need(np.isfinite(arrays[name]).all() and np.all(steps > 0), f"{name} must be finite and increase")
-    for name in ("shapes", "stops", "directions", "strikers"):
+    for name in (name for name in arrays if name.rstrip("_0123456789") in FINITE):
         _need(np.isfinite(arrays[name]).all(), f"{name} must be finite")
     _need(np.all(arrays["strikers"] > 0), "strikers must be positive masses")
     _check_log(arrays)
@@ -42,7 +45,7 @@ def expected(arrays: Mapping[str, Any]) -> dict[str, Shape]:
         if name.split("_")[0] == "nodes":
             b = arrays[name].size
             shapes |= {name: (b,), name.replace("nodes", "shapes"): (2 * b, n)}
-    return shapes
+    return shapes | (expected_readout(arrays) if "reactions" in arrays else {})
 
 
 def _check_log(arrays: Mapping[str, Any]) -> None:

@@ -74,7 +74,7 @@ def floor_spectrum(run: Run, z: float | None = None, zeta: float = 0.05, axes: S
 
     Parameters
     ----------
-    run : with its model. zeta : damping ratio of the oscillators.
+    run : of this session, or read from its file. zeta : damping ratio of the oscillators.
     z : m; None: the first stop, else the tip. axes : two to draw into; None makes a figure.
 
     Notes
@@ -82,21 +82,19 @@ def floor_spectrum(run: Run, z: float | None = None, zeta: float = 0.05, axes: S
     Periods from that of the highest mode kept to four times that of the lowest, and at least twelve samples. Where the
     samples do not resolve the contacts the figure says so.
     """
-    from fembeam.model import observed
     from fembeam.plot.figure import heading
-    from fembeam.plot.run_signals import sampling_of
-    from fembeam.response import frame_motion, model_of
+    from fembeam.plot.run_signals import sampling_of, watched
+    from fembeam.response import frame_motion
     from fembeam.response import response_spectrum as computed
 
-    model = model_of(run, "response spectrum")
-    place, step = observed(model) if z is None else z, sampling_of(run)
-    swinging = model.omega[model.omega > 0.0]
+    place, step = watched(run) if z is None else z, sampling_of(run)
+    swinging = run.readout.omega[run.readout.omega > 0.0]
     lowest, highest = swinging.min() / 4, min(swinging.max(), 2 * np.pi / (FEWEST * step))
     omega = np.geomspace(min(lowest, highest / 10), highest, OSCILLATORS)
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         found = {f"z = {1e3 * place:.5g} mm": run.floor_spectrum(place, omega, zeta)}
-    if model.scene.base is not None:
+    if run.readout.base is not None:
         found["frame"] = computed(run.t, frame_motion(run, 2), omega, zeta)
     figure = response_spectrum(found, axes)
     if said:

@@ -29,6 +29,11 @@ def responses(run: Run, discard: float = 0.0) -> dict[str, Vector]:
     return {name: x[kept] for name, x in {**first, "mid-beam u": run.displacement(named["mid-beam"])}.items()}
 
 
+def watched(run: Run) -> float:
+    """The place to watch, m: of the first stop, else the tip, else mid-beam."""
+    return float(run.stops[0, 0]) if len(run.stops) else next(iter(places(run.shapes).values()))
+
+
 def sampling_of(run: Run) -> float:
     """Output sampling, s."""
     return float(run.t[1] - run.t[0])

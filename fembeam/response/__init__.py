@@ -1,28 +1,42 @@
-"""What engineers read off a run or a model: accelerations, support reactions, mean forces, spectra, transfer functions.
+"""What engineers read off a run or a model: accelerations, section forces, support reactions, mean forces, spectra,
+transfer functions.
 
 Each file answers one question with functions of a `Run` or a `Model`, which offer them as methods; they know neither.
-Imports: `scene`, `beams`, `support`, `reduction`. Begin with `acceleration`, then `support_reactions`.
+`readout` is what a run keeps for them in its file. Imports: `scene`, `beams`, `support`, `reduction`. Begin with it.
 """
 
-from fembeam.response.acceleration import coordinates, frame_motion, model_of
 from fembeam.response.backbone import backbone
-from fembeam.response.mean_force import mean_force
+from fembeam.response.mean_force import forces, mean_force
+from fembeam.response.readout import Readout, coordinates, frame_motion
+from fembeam.response.saved_readout import READOUT_FINITE, READOUT_UNITS, expected_readout, packed, unpacked
+from fembeam.response.section_forces import Extremes, SectionForces, extremes, rows_of, section_forces
 from fembeam.response.spectra import ResponseSpectrum, floor_spectrum, response_spectrum
 from fembeam.response.support_reactions import Reaction, Reactions, reactions
 from fembeam.response.transfer import FrequencyResponse, frequency_response
 
 __all__ = [
+    "READOUT_FINITE",
+    "READOUT_UNITS",
+    "Extremes",
     "FrequencyResponse",
     "Reaction",
     "Reactions",
+    "Readout",
     "ResponseSpectrum",
+    "SectionForces",
     "backbone",
     "coordinates",
+    "expected_readout",
+    "extremes",
     "floor_spectrum",
+    "forces",
     "frame_motion",
     "frequency_response",
     "mean_force",
-    "model_of",
+    "packed",
     "reactions",
     "response_spectrum",
+    "rows_of",
+    "section_forces",
+    "unpacked",
 ]

@@ -1,4 +1,4 @@
-"""Contact force as its mean over each sample, so that a contact between two samples is seen with its impulse.
+"""Contact force at the samples, and as its mean over each: a contact between two samples is seen with its impulse.
 
     F_j = (1/w_j) ∫ F dt over the cell of sample j, which ends halfway to its neighbours;   Σ F_j w_j = Σ impulses
 
@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fembeam.response.acceleration import model_of
 from fembeam.support import require
 
 if TYPE_CHECKING:
@@ -25,9 +24,28 @@ Motion = tuple[Vector, Vector, Vector]
 FINER = 16  # parts of every piece of the cubic, on which the force is integrated
 
 
+def forces(run: Run) -> Vector:
+    """Contact forces (m, k) of a run at its samples, N, from the laws and the entry rates latched at the time."""
+    found = [_force_of(run, stop, contact.law) for stop, contact in enumerate(run.readout.model.contact_rows)]
+    return np.array(found).reshape(len(found), len(run.t))
+
+
+def _force_of(run: Run, stop: int, law: Any) -> Vector:
+    """Force history (k,) of one stop."""
+    mine = run.contacts.stop == stop
+    entered, speed = run.contacts.t_in[mine], run.contacts.speed_in[mine]
+    if not len(entered):
+        return np.zeros(len(run.t))
+    order = np.argsort(entered)
+    last = np.searchsorted(entered[order], run.t, side="right") - 1
+    entry_rate = np.maximum(np.abs(speed[order])[np.maximum(last, 0)], law.entry_rate_floor)
+    delta = np.where(last >= 0, run.indentation(stop), -1.0)
+    return np.asarray(law.force(delta, run.indentation_rate(stop), entry_rate))
+
+
 def mean_force(run: Run, stop: int) -> Vector:
     """Mean contact force (k,) of a stop over the cells of the samples, N; `Run.force` explains it."""
-    law, t = model_of(run, "mean force").contact_rows[stop].law, run.t
+    law, t = run.readout.model.contact_rows[stop].law, run.t
     require(len(t) > 1, "the mean force needs samples", len(t), "Run.force", "give simulate a dt")
     edges = np.concatenate([t[:1], (t[1:] + t[:-1]) / 2, t[-1:]])
     log = run.contacts

@@ -21,8 +21,8 @@ from scipy.sparse import linalg as sparse_linalg
 
 import reduction
 from fembeam.beams import bending_root, hermite_rows
-from fembeam.response.acceleration import coordinates, frame_motion, model_of
-from fembeam.scene import contact_rows, loads, unsupported
+from fembeam.response.readout import coordinates
+from fembeam.scene import Spring, contact_rows, loads, unsupported
 from fembeam.support import aligned, require
 
 if TYPE_CHECKING:
@@ -108,52 +108,56 @@ class Reactions:
 
 def reactions(run: Run) -> Reactions:
     """The reactions at the samples; `Run.reactions` explains them."""
-    model = model_of(run, "support reactions")
+    parts, rows = run.readout.reactions
+    histories = np.vstack([run._forces, run.readout.loads, coordinates(run).T, run.q_dot.T])
+    pairs = zip(parts, rows, strict=True)
+    return Reactions(tuple(Reaction(part, body, run.t, *(row @ histories)) for (part, body), row in pairs))
+
+
+def reaction_rows(model: Model) -> tuple[list[tuple[Any, int]], Vector]:
+    """(part, body) of each reaction, and its force and moment (r, 2, c) per unit of [F; s; q''; q']."""
     full = unsupported(model.scene, model.matrices)
-    columns, histories = _acting(run, model, full)
-    found, done = [], 0
+    columns = _acting(model, full)
+    parts, rows, done = [], [], 0
+    feet = len(model.contact_rows)  # where the loads begin
     for body, scene in enumerate((model.scene, *model.scene.bodies)):
         size = full.beams[body].M.shape[0]
         held = _Held(scene, model.matrices.beams[body], columns[done : done + size])
+        feet += len(scene.forces)
         for part in (*scene.supports, *scene.springs):
-            force, moment = (rows @ histories for rows in held.by(part))
-            found.append(Reaction(part, body, run.t, force + _of_the_foot(part, run.t), moment))
+            row = np.array(held.by(part))
+            if isinstance(part, Spring) and part.foot is not None:  # a moving foot adds to the force of its spring
+                row[0, feet] += part.stiffness
+                feet += 1
+            parts.append((part, body))
+            rows.append(row)
         done += size
-    return Reactions((*found, *_dashpots(run, model)))
+    for part, body, rates in _dashpots(model):
+        parts.append((part, body))
+        rows.append(np.hstack([np.zeros((2, columns.shape[1] - rates.shape[1])), rates]))
+    return parts, np.array(rows).reshape(len(rows), 2, columns.shape[1])
 
 
-def _of_the_foot(part: Any, t: Vector) -> Vector | float:
-    """What a moving foot adds to the force of its spring."""
-    foot = getattr(part, "foot", None)
-    return 0.0 if foot is None else part.stiffness * np.broadcast_to(foot(t), t.shape)
+def _dashpots(model: Model) -> Iterator[tuple[Any, int, Vector]]:
+    """The dashpots with their bodies, and force and moment (2, n) per unit of q': -c φ and -γ φ_z."""
+    for body, scene in enumerate((model.scene, *model.scene.bodies)):
+        for part in scene.dashpots:
+            rates = (-part.damping * model.phi(part.z, 0, body), -part.rotational * model.phi(part.z, 1, body))
+            yield part, body, np.array(rates)
 
 
-def _dashpots(run: Run, model: Model) -> Iterator[Reaction]:
-    """Reactions of the dashpots, -c u̇ and -γ u̇_z."""
-    for body, part in enumerate((model.scene, *model.scene.bodies)):
-        for dashpot in part.dashpots:
-            force = -dashpot.damping * (run.q_dot @ model.phi(dashpot.z, 0, body))
-            moment = -dashpot.rotational * (run.q_dot @ model.phi(dashpot.z, 1, body))
-            yield Reaction(dashpot, body, run.t, force, moment)
-
-
-def _acting(run: Run, model: Model, full: Matrices) -> tuple[Vector, Vector]:
-    """All that acts but supports and springs: columns (N_all, c) on all dofs, and their histories (c, k)."""
-    scene = model.scene
-    rows = [touch.row for touch in contact_rows(scene, full)]
-    histories = [run.force(stop) for stop in range(len(rows))]
-    for row, signal in loads(scene, full):
-        rows.append(row)
-        histories.append(np.broadcast_to(signal(run.t), run.t.shape))
-    for one in _dashpots(run, model):
-        rows += [full.interpolation(one.part.z, derivative, one.body) for derivative in (0, 1)]
-        histories += [one.force, one.moment]
-    vectors = np.zeros((full.M.shape[0], len(model.omega)))
+def _acting(model: Model, full: Matrices) -> Vector:
+    """All that acts but supports and springs, on all dofs: columns (N_all, c) per unit of [F; s; q''; q']."""
+    scene, size = model.scene, full.M.shape[0]
+    rows = [one.row for one in contact_rows(scene, full)] + [row for row, _ in loads(scene, full)]
+    pushed = sparse.vstack([sparse.csr_matrix((0, size)), *rows]).toarray().T
+    frame = -full.base_load[:, None].repeat(len(model.contact_rows) + len(model.system.loads) - len(rows), axis=1)
+    vectors, damped = np.zeros((size, len(model.omega))), np.zeros((size, len(model.omega)))
     vectors[_kept(model.matrices, full)] = model.basis.vectors
-    inertia = np.column_stack([full.M @ vectors, full.base_load])
-    pushed = sparse.vstack([sparse.csr_matrix((0, full.M.shape[0])), *rows]).toarray().T
-    frame = frame_motion(run, 2) + scene.gravity
-    return np.hstack([pushed, -inertia]), np.vstack([*histories, coordinates(run).T, frame])
+    for part, body, rates in _dashpots(model):
+        for derivative in (0, 1):
+            damped += full.interpolation(part.z, derivative, body).T @ rates[[derivative]]
+    return np.hstack([pushed, frame, -(full.M @ vectors), damped])
 
 
 def _kept(matrices: Matrices, full: Matrices) -> NDArray[np.int64]:

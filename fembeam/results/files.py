@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from fembeam import plot
 from fembeam.model import Run
+from fembeam.model.run_csv import extremes_table, histories
 from fembeam.statistics import moments
 from fembeam.statistics.batches import Batches, Estimate
 from fembeam.support import aligned, versions, written_whole
@@ -38,7 +39,13 @@ def prepared(folder: str | Path) -> Path:
         raise ValueError(f"output folder {folder} is not writable: {error.strerror}; choose another") from error
 
 
-def write(run: Run, folder: str | Path, discard: float = 0.0, found: dict[str, Any] | None = None) -> list[Path]:
+def write(
+    run: Run,
+    folder: str | Path,
+    discard: float = 0.0,
+    found: dict[str, Any] | None = None,
+    outputs: dict[str, Any] | None = None,
+) -> list[Path]:
     """Write a run with its summary and figures.
 
     Parameters
@@ -47,6 +54,7 @@ def write(run: Run, folder: str | Path, discard: float = 0.0, found: dict[str, A
     folder : must exist.
     discard : s at the beginning that statistics leave out.
     found : its `summary`, if made already.
+    outputs : places and quantities, as for `Run.to_csv`: their extremes as text, all samples as CSV.
 
     Returns
     -------
@@ -58,8 +66,11 @@ def write(run: Run, folder: str | Path, discard: float = 0.0, found: dict[str, A
     """
     folder = Path(folder)
     written = [run.save(folder / "run.npz")]
-    written.append(write_json(folder / "summary.json", summary(run, discard) if found is None else found))
+    found = summary(run, discard, outputs=outputs) if found is None else found
+    written.append(write_json(folder / "summary.json", found))
     written += [write_figure(folder / f"{name}.png", draw()) for name, draw in figures(run, discard).items()]
+    if outputs:
+        written += [write_text(folder / "outputs.txt", _outputs(found)), *run.to_csv(folder, **outputs)]
     return written
 
 
@@ -107,8 +118,10 @@ def figures(run: Run, discard: float = 0.0) -> dict[str, Callable[[], Figure]]:
     return drawn
 
 
-def summary(run: Run, discard: float = 0.0, seconds: float | None = None) -> dict[str, Any]:
-    """What a run says in numbers: modes, moments, contacts, energy, cost, status, versions."""
+def summary(
+    run: Run, discard: float = 0.0, seconds: float | None = None, outputs: dict[str, Any] | None = None
+) -> dict[str, Any]:
+    """What a run says in numbers: modes, moments, contacts, outputs asked for, energy, cost, status, versions."""
     model = run.model
     return {
         "status": run.status,
@@ -121,6 +134,7 @@ def summary(run: Run, discard: float = 0.0, seconds: float | None = None) -> dic
         "moments": _moments(run, discard),
         "confidence": _confidence(run, discard),
         "contacts": _contacts(run, discard),
+        **({"outputs": extremes_table(histories(run, **outputs), discard)} if outputs else {}),
         "energy": _energy(run),
         "cost": asdict(run.cost),
         "dt": float(run.t[1] - run.t[0]) if len(run.t) > 1 else None,
@@ -202,7 +216,7 @@ def _energy(run: Run) -> dict[str, float]:
 
 
 def text(found: dict[str, Any]) -> str:
-    """The tables of a summary: moments and extremes of signals, contacts of stops."""
+    """The tables of a summary: moments and extremes of signals, contacts of stops, outputs asked for."""
     head = ("", "mean/m", "std/m", "skewness", "kurtosis", "min/m", "max/m")
     moments = [[name, *(row[key.partition("/")[0]] for key in head[1:])] for name, row in found["moments"].items()]
     tables = [aligned(head, moments)] if moments else []
@@ -211,7 +225,14 @@ def text(found: dict[str, Any]) -> str:
         [f"stop {row['stop']}", row["number"], row["rate"], *(row.get(c, {}).get("mean") for c in columns.values())]
         for row in found["contacts"]
     ]
-    return "\n\n".join(tables + ([aligned(("", "contacts", "per second", *columns), rows)] if rows else []))
+    tables += [aligned(("", "contacts", "per second", *columns), rows)] if rows else []
+    return "\n\n".join(tables + ([_outputs(found)] if found.get("outputs") else []))
+
+
+def _outputs(found: dict[str, Any]) -> str:
+    """The table of the outputs asked for."""
+    head = ("output", "mean", "std", "min", "at t/s", "max", "at t/s")
+    return aligned(head, [[name, *row.values()] for name, row in found["outputs"].items()])
 
 
 def plain(result: Any) -> Any:

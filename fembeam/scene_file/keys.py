@@ -91,6 +91,8 @@ def _words(hint: Any) -> list[str]:
     entry = entry_type(hint)
     if entry is None:
         return []
+    if get_origin(entry) is Literal:
+        return [f"a list of {', '.join(map(repr, get_args(entry)))}"]
     count = f"{len(inner)} " if origin is tuple and Ellipsis not in inner else ""
     return [f"a list of {count}{'whole ' if entry is int else ''}numbers"]
 

@@ -12,6 +12,7 @@ import contacts
 import solvers
 from fembeam.beams import Section, Taper
 from fembeam.excitation import BandNoise, Harmonic, Interpolation, Multisine, Pulse, Quantity, Record, SineSweep, Step
+from fembeam.excitation.earthquake import earthquake
 from fembeam.scene import PLACES
 from fembeam.scene_file.keys import Constructors
 from fembeam.study.quantities import QUANTITIES
@@ -68,6 +69,7 @@ SIGNALS: Constructors = {
     "noise_of_psd": BandNoise.of_psd,
     "rolled_off_noise": BandNoise.rolled_off,
     "record": record,
+    "earthquake": earthquake,
     "pulse": Pulse,
     "sine_sweep": sine_sweep,
     "step": Step,

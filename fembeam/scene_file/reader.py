@@ -73,12 +73,12 @@ def read(path: str | Path, overrides: Sequence[str] = ()) -> SceneFile:
 
 def _source(path: Path) -> Source:
     """The text of a scene file or of the one a run was made from."""
-    if path.suffix == ".npz":
+    if path.suffix in (".npz", ".h5", ".hdf5"):
         from fembeam.model import load
 
         try:
             source = load(path).source
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, ImportError) as error:
             raise SceneFileError(f"{path}: cannot be read: {error}") from None
         if source is None:
             raise SceneFileError(f"{path}: holds no scene file; this run was made in Python, so repeat it there")

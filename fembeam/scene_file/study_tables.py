@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import solvers
+from fembeam.beams import on_beam
+from fembeam.model.run_csv import Output
 from fembeam.scene_file.basins_table import BasinsTable
 from fembeam.scene_file.keys import Constructors, parameters
 from fembeam.scene_file.orbit_tables import BranchTable, OrbitTable
@@ -195,12 +197,17 @@ class Simulate:
     dt : output sampling in s, > 0.
     solver : a method of `solvers`; None is the library's best. In a file { kind = "…", … }.
     discard : s at the beginning that statistics leave out, 0 to below the duration.
+    places : z in m of the outputs; None: tip and mid-beam.
+    quantities : outputs at the places, of stops and of supports; None: displacement, velocity, indentation, force.
+        With either, means and extremes are tabled and histories written as CSV.
     """
 
     duration: float
     dt: float
     solver: Any = None
     discard: float = 0.0
+    places: Sequence[float] | None = None
+    quantities: Sequence[Output] | None = None
 
     def __post_init__(self) -> None:
         require_positive("duration", self.duration, "simulate", "give s")
@@ -211,6 +218,20 @@ class Simulate:
                 raise ValueError(
                     f"{name} must be below the duration of {self.duration:g} s, got {getattr(self, name):g}"
                 )
+
+    def check(self, scene: Scene) -> None:
+        """Places lie on the beam, sections know their fibre where stress is asked for."""
+        beam = scene.beam
+        places = (0.0, beam.length / 2, beam.length) if self.places is None else self.places
+        z = on_beam(np.array(places, dtype=float), beam, "places")
+        if "stress" in (self.quantities or ()) and not np.isfinite(beam.profile(z).fibre).all():
+            raise ValueError("stress needs the outer fibre of sections; give fibre in m, or a shape that knows it")
+
+    @property
+    def outputs(self) -> dict[str, Any]:
+        """What is asked for, as `Run.to_csv` takes it; empty where nothing is."""
+        chosen = {"places": self.places, "quantities": self.quantities}
+        return {name: value for name, value in chosen.items() if value is not None}
 
 
 STUDIES: Constructors = {

@@ -48,7 +48,8 @@ zeta = [0.02, 0.01]         # ratios of the modes, the last for all higher ones;
 
 [base]                      # motion of the frame; leave out for none
 kind = "harmonic"           # or multisine, band_noise (std, band, seed), pulse, step, or
-                            # record (path of a CSV file, quantity = "displacement" or "acceleration")
+                            # record (path of a CSV file, quantity = "displacement" or "acceleration"),
+                            # earthquake (path of a CSV, AT2 or COSMOS file; unit = "g" or "m/s2" of a CSV)
 amplitude = 1e-3            # m
 omega = 195.0               # rad/s
 
@@ -72,6 +73,8 @@ duration = 10.0
 dt = 5e-4                   # output sampling; the solver chooses its own steps
 discard = 2.0               # transient that statistics leave out
 # solver = {{ kind = "exponential", rtol = 1e-10 }}
+# places = [0.13, 0.25]     # z of outputs: extremes in a table, histories as CSV
+# quantities = ["displacement", "stress", "absolute acceleration", "reactions"]   # an unknown one lists them all
 
 # [mode_count]              # how many modes it takes
 # counts = [1, 2, 3, 5]

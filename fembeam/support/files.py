@@ -15,7 +15,7 @@ def written_whole(target: Path) -> Iterator[Any]:
     """A binary file that appears under its name only once it is complete."""
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
     try:
-        with os.fdopen(handle, "wb") as file:
+        with os.fdopen(handle, "w+b") as file:
             yield file
         mask = os.umask(0)  # mkstemp makes private files; results are for the user's group too
         os.umask(mask)

@@ -171,9 +171,7 @@ def rows_of(run: Run, quantity: str, z: Vector, body: int) -> tuple[Vector, Vect
     require(quantity in known, f"quantity must be one of {', '.join(known)}", quantity, "Run", "choose one")
     if quantity in known[:2]:
         return (run.shapes, *run.others)[body](z, known.index(quantity)), z, np.zeros(len(z))
-    from fembeam.response import model_of
-
-    forces = model_of(run, quantity).section_forces[body]
+    forces = run.readout.section_forces[body]
     rows = getattr(forces, quantity)(z)
     if quantity != "stress":
         return rows, z, np.zeros(len(z))

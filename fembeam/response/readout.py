@@ -1,0 +1,128 @@
+"""What a run is read with besides its coordinates: made of its model when asked for, or read from its file.
+
+    q'' = Σ_l v_l s_l(t) + Σ_s w_s F_s - C q' - K q,    reactions = R [F; s; q''; q']
+
+k samples, n coordinates, m contacts, l loads, r reactions. No scene, law or signal is needed to read it.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fembeam.scene import heights, loads
+from fembeam.support import require
+
+if TYPE_CHECKING:
+    from fembeam.model import Model, Run
+
+Vector = NDArray[np.float64]
+
+
+class Readout:
+    """Loads, damping, the frame's motion, section forces, reactions, heights of one run; each made once.
+
+    `kept` are those of a file, by the names of the properties; what is neither there nor of a model is a ValueError.
+    """
+
+    def __init__(self, model: Model | None, t: Vector, kept: dict[str, Any] | None = None) -> None:
+        self._model, self.t = model, t
+        self.__dict__.update(kept or {})
+
+    @property
+    def model(self) -> Model:
+        """The model; ValueError without one."""
+        require(self._model is not None, "this needs the model of the run",
+                "a run read from a file that does not keep it", "Run",
+                "simulate again, or use dataclasses.replace(run, model=model)")  # fmt: skip
+        assert self._model is not None
+        return self._model
+
+    @cached_property
+    def stiffness(self) -> Vector:
+        """K (n, n), 1/s²; M is 1."""
+        return np.asarray(self.model.system.K)
+
+    @cached_property
+    def omega(self) -> Vector:
+        """Natural frequencies ω (n,) with all contacts open, rad/s: K is diagonal."""
+        return np.sqrt(np.diag(self.stiffness))
+
+    @cached_property
+    def damping(self) -> Vector:
+        """C (n, n), 1/s."""
+        return np.asarray(self.model.system.C)
+
+    @cached_property
+    def load_vectors(self) -> Vector:
+        """Vectors v (l, n)."""
+        vectors = [vector for vector, _ in self.model.system.loads]
+        return np.array(vectors, dtype=float).reshape(len(vectors), len(self.stiffness))
+
+    @cached_property
+    def loads(self) -> Vector:
+        """Signals s (l, k): of forces and feet, then the frame's ÿ if it moves, then gravity."""
+        signals = [signal for _, signal in self.model.system.loads]
+        return np.array([_sampled(signal, self.t) for signal in signals]).reshape(len(signals), len(self.t))
+
+    @cached_property
+    def base(self) -> int | None:
+        """Number of ÿ among the loads; None for a frame at rest."""
+        scene = self.model.scene
+        return None if scene.base is None else len(loads(scene, self.model.matrices))
+
+    @cached_property
+    def frame(self) -> Vector:
+        """Its motion y and ẏ (2, k), m and m/s; (0, k) for a frame at rest."""
+        base = self.model.scene.base
+        motions = () if base is None else (base, base.derivative(1))
+        return np.array([_sampled(motion, self.t) for motion in motions]).reshape(len(motions), len(self.t))
+
+    @cached_property
+    def section_forces(self) -> Any:
+        """`SectionForces` of each beam."""
+        return self.model.section_forces
+
+    @cached_property
+    def reactions(self) -> tuple[list[tuple[Any, int]], Vector]:
+        """(part, body) of each reaction and R (r, 2, m + l + 2 n): force and moment."""
+        from fembeam.response.support_reactions import reaction_rows
+
+        return reaction_rows(self.model)
+
+    @cached_property
+    def heights(self) -> Vector:
+        """Heights of the beams (b,), m."""
+        return np.array(heights(self.model.scene)[0])
+
+    @cached_property
+    def striker_places(self) -> Vector:
+        """Place z and height of each impactor (i, 2), m."""
+        along = [impactor.z for impactor in self.model.matrices.impactors]
+        return np.array([along, heights(self.model.scene)[1]]).T.reshape(-1, 2)
+
+
+def _sampled(signal: Any, t: Vector) -> Vector:
+    """A signal at the samples (k,)."""
+    return np.broadcast_to(np.asarray(signal(t), dtype=float), t.shape)
+
+
+def coordinates(run: Run) -> Vector:
+    """Modal accelerations q'' (k, n) at the samples, m √kg/s², with the contact forces of the laws there.
+
+    Not from differences of the samples: contacts shorter than a sample would be lost, and digits with them.
+    """
+    read = run.readout
+    driven = run._forces.T @ run.directions + read.loads.T @ read.load_vectors
+    return np.asarray(driven - run.q_dot @ read.damping.T - run.q @ read.stiffness.T)
+
+
+def frame_motion(run: Run, order: int = 0) -> Vector:
+    """The frame's displacement y (k,) at the samples, or a derivative up to the second; zeros for a frame at rest."""
+    base = run.readout.base
+    if base is None:
+        return np.zeros(len(run.t))
+    return np.array(run.readout.loads[base] if order == 2 else run.readout.frame[order])

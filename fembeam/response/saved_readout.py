@@ -1,0 +1,104 @@
+"""What a run is read with as plain arrays and words, so that a file of it can be read without its scene or code."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, fields
+from typing import Any
+
+from fembeam.beams import Beam, Section, Taper
+from fembeam.response.readout import Readout, Vector
+from fembeam.response.section_forces import SectionForces
+from fembeam.scene import FEATURES
+
+PLAIN = ("stiffness", "damping", "load_vectors", "loads", "frame", "heights", "striker_places")
+READOUT_FINITE = {*PLAIN, "reactions", "moments", "shears"}
+READOUT_UNITS = {
+    "stiffness": "1/s²",
+    "damping": "1/s",
+    "frame": "m, m/s",
+    "moments": "N m/(m √kg)",
+    "shears": "N/(m √kg)",
+    "heights, striker_places": "m",
+}
+HOLDING = {part.__name__: part for name in ("supports", "springs", "dashpots") for part in FEATURES[name]}
+
+Arrays = dict[str, Vector]
+Shape = tuple[int, ...]
+
+
+def packed(read: Readout) -> tuple[dict[str, Any], Arrays]:
+    """Words for JSON, and arrays by name."""
+    parts, rows = read.reactions
+    about = {
+        "base": read.base,
+        "beams": [_beam_as_words(one.beam) for one in read.section_forces],
+        "parts": [{"kind": type(part).__name__, "body": body, **_numbers(part)} for part, body in parts],
+    }
+    arrays = {name: getattr(read, name) for name in PLAIN} | {"reactions": rows}
+    for i, one in enumerate(read.section_forces):
+        arrays |= {f"moments_{i}": one.moments, f"shears_{i}": one.shears}
+    return about, arrays
+
+
+def unpacked(about: Mapping[str, Any], arrays: Mapping[str, Any], nodes: list[Vector]) -> Readout:
+    """The same from a file, with the nodes of its beams; ValueError where words and arrays contradict each other."""
+    counts = {"bodies": ("beams", len(nodes)), "reactions": ("parts", len(arrays["reactions"]))}
+    for what, (name, count) in counts.items():
+        if len(about[name]) != count:
+            raise ValueError(f"{name} must be {count}, the number of {what}, there are {len(about[name])}")
+    if about["base"] is not None and not 0 <= about["base"] < len(arrays["loads"]):
+        raise ValueError(f"base must be the number of a load, it is {about['base']}")
+    forces = tuple(
+        SectionForces(_beam_of_words(beam), nodes[i], arrays[f"moments_{i}"], arrays[f"shears_{i}"])
+        for i, beam in enumerate(about["beams"])
+    )
+    reactions = [_part(dict(words)) for words in about["parts"]], arrays["reactions"]
+    kept = {name: arrays[name] for name in PLAIN}
+    return Readout(None, arrays["t"], kept | {"base": about["base"], "section_forces": forces, "reactions": reactions})
+
+
+def expected_readout(arrays: Mapping[str, Any]) -> dict[str, Shape]:
+    """{name: shape} of what is there, as follow from q, the loads, stops, reactions and nodes."""
+    (k, n), m, loads, r = arrays["q"].shape, len(arrays["stops"]), len(arrays["loads"]), len(arrays["reactions"])
+    bodies = sum(name.split("_")[0] == "nodes" for name in arrays)
+    shapes: dict[str, Shape] = {
+        **{"stiffness": (n, n), "damping": (n, n), "load_vectors": (loads, n), "loads": (loads, k)},
+        **{"frame": (2 if len(arrays["frame"]) else 0, k), "reactions": (r, 2, m + loads + 2 * n)},
+        **{"heights": (bodies,), "striker_places": (len(arrays["strikers"]), 2)},
+    }
+    for i in range(bodies):
+        elements = arrays[f"nodes_{i}" if i else "nodes"].size - 1
+        shapes |= {f"{name}_{i}": (elements, 2, n) for name in ("moments", "shears")}
+    return shapes
+
+
+def _numbers(part: Any) -> dict[str, Any]:
+    """The fields of a support, spring or dashpot but its signals."""
+    values = {field.name: getattr(part, field.name) for field in fields(part)}
+    return {name: value for name, value in values.items() if not callable(value)}
+
+
+def _part(words: dict[str, Any]) -> tuple[Any, int]:
+    """A support, spring (without the motion of its foot) or dashpot, and its body."""
+    made, body = HOLDING[words.pop("kind")], int(words.pop("body"))
+    return made(**{name: tuple(value) if isinstance(value, list) else value for name, value in words.items()}), body
+
+
+def _beam_as_words(beam: Beam) -> dict[str, Any]:
+    """Spans and what acts along the beam."""
+    spans = [[length, asdict(section)] for length, section in beam.spans]
+    return {"spans": spans, "foundation": beam.foundation, "axial_force": beam.axial_force}
+
+
+def _beam_of_words(words: Mapping[str, Any]) -> Beam:
+    """The same as a beam."""
+    spans = [(length, _section(section)) for length, section in words["spans"]]
+    return Beam.of_spans(spans, words["foundation"], words["axial_force"])
+
+
+def _section(words: Mapping[str, Any]) -> Section | Taper:
+    """A section or a taper of two."""
+    if "start" in words:
+        return Taper(Section(**words["start"]), Section(**words["end"]))
+    return Section(**words)

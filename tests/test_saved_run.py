@@ -1,0 +1,171 @@
+"""A run read from its file gives what the run gave: fields, reactions, spectra, ParaView; npz and HDF5, old files."""
+
+import json
+import sys
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+from problems import STEEL
+
+import fembeam as fb
+from contacts import Hertz, law
+from fembeam.response.saved_readout import PLAIN
+
+SQUARE = fb.Section.rectangle(2.1e11, 7850.0, 0.01, 0.01)
+THIN = fb.Section.rectangle(2.1e11, 7850.0, 0.01, 0.005)
+L = 0.4
+HDF5 = pytest.param(".h5", marks=pytest.mark.skipif(not find_spec("h5py"), reason="the extra hdf5 is not installed"))
+
+
+@law
+def cubic(delta, delta_dot, entry_rate, stiffness):
+    return stiffness * delta**3
+
+
+def rig(**more):
+    """Almost everything a scene can hold, with a law and a foot that no file can keep."""
+    tapered = fb.Beam.of_spans([(0.1, SQUARE), (L - 0.1, fb.Taper(SQUARE, THIN))], 1e3, 500.0)
+    other = fb.Scene(fb.Beam(0.3, SQUARE), [fb.Clamped(0.0)], damping=fb.ModalDamping(0.01))
+    return fb.Scene(
+        tapered,
+        [fb.Clamped(0.0), fb.Pinned(0.12)],
+        masses=[fb.LumpedMass(L, mass=25.4e-3, inertia=3.0e-6)],
+        springs=[fb.Spring(0.2, 300.0, rotational=0.05, foot=fb.Harmonic(1e-3, 90.0)), fb.Spring(0.3, 10.0)],
+        stops=[fb.Stop(L, cubic(stiffness=1e13), gap=1e-4), fb.Stop(0.3, Hertz(1e8), 1e-4, "above", on=(1, 0.3))],
+        forces=[fb.PointForce(0.23, fb.Harmonic(2.0, 300.0)), fb.PointMoment(0.12, fb.Harmonic(0.1, 200.0))],
+        damping=fb.ModalDamping(0.02),
+        base=fb.Harmonic(1e-3, 195.0),
+        bodies=[other],
+        gravity=9.81,
+        **more,
+    )
+
+
+DASHPOTS = {"dashpots": [fb.Dashpot(0.22, 0.3, rotational=1e-4)]}
+IMPACTORS = {"impactors": [fb.Impactor(L, 0.1, -1.0, Hertz(1e9), gap=2e-3)]}
+
+
+@pytest.fixture(scope="module", params=[DASHPOTS, IMPACTORS], ids=["dashpot", "impactor"])
+def run(request):
+    made = rig(**request.param).reduce(3).simulate(0.05, 1e-3)
+    assert len(made.contacts) > 3
+    return made
+
+
+def readings(run):
+    """All that is read off a run."""
+    found = {}
+    for name in ("displacement", "velocity", "acceleration"):
+        for absolute in (False, True):
+            found[f"{name} {absolute}"] = getattr(run, name)([0.1, 0.33], absolute=absolute)
+        found[f"{name} of the other"] = getattr(run, name)(0.2, body=1)
+    for name in ("slope", "moment", "shear", "stress"):
+        found[name], found[f"{name} of the other"] = getattr(run, name)([0.0, 0.05, 0.31]), getattr(run, name)(0.2, 1)
+    for one in run.reactions():
+        found |= {f"force of {one.name}": one.force, f"moment of {one.name}": one.moment}
+    for stop in range(len(run.stops)):
+        found |= {f"force {stop}": run.force(stop), f"indentation {stop}": run.indentation(stop)}
+    for i in range(len(run.strikers)):
+        found["impactor"] = run.impactor_displacement(i)
+    found["extremes"] = run.extremes("stress").highest
+    with pytest.warns(UserWarning, match="not resolved"):
+        found["floor"] = run.floor_spectrum(0.33, [50.0, 300.0]).acceleration
+    return found
+
+
+@pytest.mark.parametrize("suffix", [".npz", HDF5])
+def test_all_is_read_from_the_file(run, tmp_path, suffix):
+    path = run.save(tmp_path / f"run{suffix}")
+    assert [entry.name for entry in tmp_path.iterdir()] == [f"run{suffix}"]
+    twice = fb.load(fb.load(path).save(tmp_path / f"twice{suffix}"))
+    live, again = readings(run), readings(twice)
+    assert live.keys() == again.keys()
+    for name, values in live.items():
+        np.testing.assert_array_equal(again[name], values, err_msg=name)
+    assert repr(twice.reactions()) == repr(run.reactions())
+    assert str(twice) == str(run)
+    for kind in ("to_xdmf", "to_vtu"):
+        files = [getattr(each, kind)(tmp_path / name).read_bytes() for each, name in ((run, "a"), (twice, "b"))]
+        assert files[0] == files[1]
+
+
+def test_nothing_of_elements_times_samples_is_stored(run, tmp_path):
+    """A sample adds t, q, q̇, its contact forces and loads, y and ẏ, four energies."""
+    model = run.model
+    sizes = []
+    for count in (1000, 2000):
+        with np.load(model.simulate(0.05, 0.05 / count).save(tmp_path / "run.npz")) as data:
+            arrays = {name: data[name].size for name in data.files if not name.startswith(("contact_", "about"))}
+        sizes.append(arrays)
+    more = sum(sizes[1].values()) - sum(sizes[0].values())
+    n, stops, loads, frame, energies = len(model.omega), len(run.stops), 5, 2, 4
+    assert more == 1000 * (1 + 2 * n + stops + loads + frame + energies)
+
+
+def test_a_beam_on_two_supports_without_anything_else(tmp_path):
+    bare = fb.Section(**STEEL)
+    run = fb.Scene(fb.Beam(1.0, bare), [fb.Pinned(0.0), fb.Pinned(1.0)], gravity=9.81).reduce(2).simulate(0.01, 1e-3)
+    again = fb.load(run.save(tmp_path / "run"))
+    np.testing.assert_array_equal(again.reactions().force, run.reactions().force)
+    np.testing.assert_array_equal(again.acceleration(0.5, absolute=True), run.acceleration(0.5))
+    with pytest.raises(ValueError, match="every section must know its outer fibre"):
+        again.stress(0.5)
+
+
+def changed(path, change):
+    """A saved run with its arrays and words changed."""
+    with np.load(path) as data:
+        arrays = {name: data[name] for name in data.files}
+    about = json.loads(str(arrays["about"]))
+    change(about, arrays)
+    np.savez(path, **arrays | {"about": json.dumps(about)})
+
+
+def test_a_file_of_an_earlier_version_says_what_it_lacks(run, tmp_path):
+    path = run.save(tmp_path / "run.npz")
+
+    def older(about, arrays):
+        del about["readout"]
+        for name in (*PLAIN, "reactions"):
+            del arrays[name]
+
+    changed(path, older)
+    again = fb.load(path)
+    np.testing.assert_array_equal(again.displacement(0.3), run.displacement(0.3))
+    for ask in (lambda: again.moment(0.1), again.reactions, lambda: again.acceleration(0.1),
+                lambda: again.displacement(0.1, absolute=True), lambda: again.to_vtu(tmp_path / "x")):  # fmt: skip
+        with pytest.raises(ValueError, match="a run read from a file that does not keep it"):
+            ask()
+    np.testing.assert_array_equal(fb.load(again.save(tmp_path / "again")).q, run.q)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda about, arrays: arrays.update(loads=arrays["loads"][:, 1:]), "loads must have shape"),
+        (lambda about, arrays: arrays.update(reactions=arrays["reactions"][..., 1:]), "reactions must have shape"),
+        (lambda about, arrays: arrays.update(moments_1=arrays["moments_1"] * np.nan), "moments_1 must be finite"),
+        (lambda about, arrays: about["readout"]["parts"][0].update(kind="System"), "'System'"),
+        (lambda about, arrays: about["readout"]["beams"].pop(), "bodies"),
+        (lambda about, arrays: about["readout"].update(base=17), "base"),
+        (lambda about, arrays: about["readout"]["parts"].pop(), "parts"),
+    ],
+)
+def test_contradictions_are_refused(run, tmp_path, change, message):
+    path = run.save(tmp_path / "run.npz")
+    changed(path, change)
+    with pytest.raises(ValueError, match=rf"is not a saved run, or is damaged.*{message}"):
+        fb.load(path)
+
+
+def test_hdf5_is_optional(run, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    with pytest.raises(ImportError, match="a run in HDF5 needs h5py, which is optional: pip install h5py"):
+        run.save(tmp_path / "run.h5")
+    with pytest.raises(ImportError, match="XDMF with HDF5 data needs h5py"):
+        run.to_xdmf(tmp_path / "run", hdf5=True)
+    assert not list(tmp_path.iterdir())
+    (tmp_path / "given.h5").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(100))
+    with pytest.raises(ImportError, match="needs h5py"):
+        fb.load(tmp_path / "given.h5")
