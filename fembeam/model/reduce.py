@@ -12,7 +12,7 @@ from scipy import sparse
 import reduction
 from fembeam.model.model import Model
 from fembeam.model.shapes import Shapes
-from fembeam.scene import Matrices, loaded, watched
+from fembeam.scene import LocalCoordinate, Matrices, loaded, watched
 from fembeam.support import require
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def reduced(
 
 
 def _of_beam(
-    beam: Matrices, places: list[tuple[float, int]], chosen: tuple[int, ...], residual: bool, interface: bool
+    beam: Matrices, places: list[LocalCoordinate], chosen: tuple[int, ...], residual: bool, interface: bool
 ) -> reduction.Basis:
     """The basis of one beam by itself, static shapes where it is loaded included."""
     if interface:
@@ -74,9 +74,9 @@ def _of_beam(
     return basis
 
 
-def _rows(beam: Matrices, places: list[tuple[float, int]]) -> sparse.csr_matrix:
-    """Rows of u or u_z at (z, derivative)."""
-    return sparse.vstack([beam.interpolation(z, derivative) for z, derivative in places], format="csr")
+def _rows(beam: Matrices, places: list[LocalCoordinate]) -> sparse.csr_matrix:
+    """Rows of u or u_z, or of their difference between two places: their static shape is that of opposite loads."""
+    return sparse.vstack([place.row(beam) for place in places], format="csr")
 
 
 def _continued(chosen: tuple[int, ...], count: int) -> tuple[int, ...]:
@@ -84,9 +84,9 @@ def _continued(chosen: tuple[int, ...], count: int) -> tuple[int, ...]:
     return (*chosen, *range(chosen[-1] + 1, chosen[-1] + 1 + count - len(chosen)))
 
 
-def _oriented(basis: reduction.Basis, beam: Matrices, z: float | None) -> reduction.Basis:
-    """Positive at z, or where each mode moves most."""
-    return reduction.oriented(basis, beam.interpolation(beam.nodes if z is None else z))
+def _oriented(basis: reduction.Basis, beam: Matrices, place: LocalCoordinate | None) -> reduction.Basis:
+    """Positive at a place, or where each mode moves most."""
+    return reduction.oriented(basis, beam.interpolation(beam.nodes) if place is None else place.row(beam))
 
 
 def _joined(bases: list[reduction.Basis], matrices: Matrices) -> reduction.Basis:

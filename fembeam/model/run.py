@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import solvers
 from fembeam.model.shapes import Shapes
-from fembeam.scene import Source
+from fembeam.scene import Source, unit_of
 from fembeam.support import Part, Printed, require
 from solvers.problem import counted
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from fembeam.model.model import Model
     from fembeam.model.section_forces import Extremes
     from fembeam.response import Reactions
+    from fembeam.scene.contact_rows import ContactRow
     from fembeam.scene_file import SceneFile
 
 Vector = NDArray[np.float64]
@@ -58,6 +59,7 @@ class Run(Printed):
     others: tuple[Shapes, ...] = ()  # of the further beams
     source: Source | None = None  # of a run made from a scene file
     versions: dict[str, str] = field(default_factory=dict)  # that made a run read from a file
+    kinds: Vector = field(default_factory=lambda: np.zeros((0, 2), dtype=bool))  # (m, 2): of rotation, always acting
 
     def __repr__(self) -> str:
         reached = f"to t = {self.t[-1]:g} s" if len(self.t) else "without samples"
@@ -104,6 +106,7 @@ class Run(Printed):
             ),
             *(model.shapes, stops, model.directions, strikers, repr(model.scene), model),
             others=model.others,
+            kinds=np.array([(one.rotation, one.always) for one in model.contact_rows], dtype=bool).reshape(-1, 2),
         )
 
     @property
@@ -255,16 +258,28 @@ class Run(Printed):
                 "count from 0")  # fmt: skip
         return coordinates[:, coordinates.shape[1] - count + impactor] / np.sqrt(self.strikers[impactor])
 
+    def unit(self, quantity: str, stop: int | None = None) -> str:
+        """Unit of "indentation", "speed", "force" or "impulse" of a stop; None: of a column that all of them share."""
+        return unit_of(quantity, self.kinds[:, 0] if stop is None else self.kinds[[self._stop(stop)], 0])
+
+    def name(self, stop: int) -> str:
+        """What tables call a stop or element: "stop 0", "element 1", "stop 2 (rad, N m)" of rotation."""
+        rotation, always = self.kinds[self._stop(stop)]
+        return f"{'element' if always else 'stop'} {stop}" + " (rad, N m)" * bool(rotation)
+
     def indentation(self, stop: int = 0) -> Vector:
-        """δ(t) (k,) of a stop, m; negative while it is open. Contacts of impactors count on after the stops."""
+        """δ(t) (k,) of a stop, m or rad; negative while it is open. Elements, then impactors, count on after the stops.
+
+        Of an element its deformation d(t).
+        """
         return -self.q @ self.directions[self._stop(stop)] - self.stops[stop, 2]
 
     def indentation_rate(self, stop: int = 0) -> Vector:
-        """δ̇(t) (k,) of a stop, m/s: of both bodies where the stop moves."""
+        """δ̇(t) (k,) of a stop or element, m/s or rad/s: of both bodies where the stop moves."""
         return -self.q_dot @ self.directions[self._stop(stop)]
 
     def force(self, stop: int = 0, mean: bool = False) -> Vector:
-        """Contact force (k,) of a stop, N, from its law and the entry rate latched at the time.
+        """Contact force (k,) of a stop, N or N m, from its law and the entry rate latched at the time; of an element F.
 
         ``mean``: over each sample (halfway to its neighbours) instead of at it, so that contacts shorter than a sample
         are seen: the trapezoidal rule over the samples gives the log's impulses exactly.
@@ -288,20 +303,22 @@ class Run(Printed):
         if self.stored_forces is not None:
             return self.stored_forces
         assert self.model is not None
-        forces = [self._force_of(s, contact.law) for s, contact in enumerate(self.model.contact_rows)]
+        forces = [self._force_of(s, contact) for s, contact in enumerate(self.model.contact_rows)]
         return np.array(forces).reshape(len(forces), len(self.t))
 
-    def _force_of(self, stop: int, law: Any) -> Vector:
-        """Force history of one stop."""
+    def _force_of(self, stop: int, contact: ContactRow) -> Vector:
+        """Force history of one stop or element."""
+        if contact.always:
+            return np.asarray(contact.force(self.indentation(stop), self.indentation_rate(stop)))
         mine = self.contacts.stop == stop
         entered, speed = self.contacts.t_in[mine], self.contacts.speed_in[mine]
         if not len(entered):
             return np.zeros(len(self.t))
         order = np.argsort(entered)
         last = np.searchsorted(entered[order], self.t, side="right") - 1
-        entry_rate = np.maximum(np.abs(speed[order])[np.maximum(last, 0)], law.entry_rate_floor)
+        entry_rate = np.maximum(np.abs(speed[order])[np.maximum(last, 0)], contact.law.entry_rate_floor)
         delta = np.where(last >= 0, self.indentation(stop), -1.0)
-        return np.asarray(law.force(delta, -self.q_dot @ self.directions[stop], entry_rate))
+        return np.asarray(contact.force(delta, self.indentation_rate(stop), entry_rate))
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write everything to one ``.npz`` file, whole or not at all; read it with `load`."""

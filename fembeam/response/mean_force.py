@@ -27,19 +27,21 @@ FINER = 16  # parts of every piece of the cubic, on which the force is integrate
 
 def mean_force(run: Run, stop: int) -> Vector:
     """Mean contact force (k,) of a stop over the cells of the samples, N; `Run.force` explains it."""
-    law, t = model_of(run, "mean force").contact_rows[stop].law, run.t
+    contact, t = model_of(run, "mean force").contact_rows[stop], run.t
     require(len(t) > 1, "the mean force needs samples", len(t), "Run.force", "give simulate a dt")
     edges = np.concatenate([t[:1], (t[1:] + t[:-1]) / 2, t[-1:]])
-    log = run.contacts
+    motion = (t, run.indentation(stop), run.indentation_rate(stop))
+    if contact.always:
+        return np.diff(_impulse(contact.force, motion, edges)) / np.diff(edges)
+    law, log = contact.law, run.contacts
     mine = np.flatnonzero(log.stop == stop % len(run.stops))
     ends = np.where(np.isnan(log.t_out), t[-1], log.t_out)
     first, last = (np.searchsorted(edges, times[mine], side="right") - 1 for times in (log.t_in, ends))
     inside = (first == last) & (first >= 0) & (first < len(t))
     impulse = np.bincount(first[inside], log.impulse[mine[inside]], len(t)).astype(float)
-    motion = (t, run.indentation(stop), run.indentation_rate(stop))
-    for contact in mine[~inside]:
-        knots = _knots(log, contact, ends[contact], motion)
-        impulse += log.impulse[contact] * _shares(law, abs(log.speed_in[contact]), knots, edges)
+    for entry in mine[~inside]:
+        knots = _knots(log, entry, ends[entry], motion)
+        impulse += log.impulse[entry] * _shares(law, abs(log.speed_in[entry]), knots, edges)
     return impulse / np.diff(edges)
 
 
