@@ -206,7 +206,9 @@ class _Run:
         complete = self.engine.keeps_ledger(self.times is not None)
         ledger = partial(_energy, self.system, powers, complete, motion, back, self.begin)
         rows = self._rows()
-        log = partial(ContactLog.of_rows, rows)
+        always = np.array([contact.always for contact in self.system.contacts])
+        stops = rows[~always[rows[:, 0].astype(int)]] if always.any() else rows
+        log = partial(ContactLog.of_rows, stops)
         if status is Status.DONE and not self._balances(powers, complete, motion, rows):
             status = Status.UNBALANCED
         count = self.state.count.tolist()

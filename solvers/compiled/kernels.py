@@ -32,7 +32,7 @@ class Problem(NamedTuple):
     push: Any  # (m, 2n) state rate per newton of stop s
     read: Any  # (m, 2n) indentation = read·z - gap, m
     read_rate: Any  # (m, 2n) indentation rate = read_rate·z, m/s
-    levels: Any  # (m, J) ascending indentations, m, where a stop changes piece: 0, knots, then inf
+    levels: Any  # (m, J) ascending indentations, m, where a stop changes piece: 0 (-inf if it always acts), knots, inf
     gap: Any  # (m,) m
     law: Any  # (m,) addresses of the compiled forces
     gradient: Any  # (m,) addresses of their derivatives
@@ -95,9 +95,9 @@ call_gradient = _c_function(3)
 
 @inlined
 def contact_forces(problem, stop, delta, delta_dot, entry_rate, force):
-    """Forces of one stop at a batch of indentations; below the surface the law is continued from it."""
+    """Forces of one stop at a batch of indentations; below its surface the law is continued from it."""
     for i in range(delta.size):
-        delta[i] = max(delta[i], 0.0)
+        delta[i] = max(delta[i], problem.levels[stop, 0])
     law_forces(problem, stop, delta.size, delta, delta_dot, entry_rate, force)
 
 
@@ -111,7 +111,7 @@ def law_forces(problem, stop, n, delta, delta_dot, entry_rate, force):
 def contact_gradient(problem, stop, delta, delta_dot, entry_rate, by_delta, by_rate, by_entry):
     """Derivatives of the forces, likewise."""
     for i in range(delta.size):
-        delta[i] = max(delta[i], 0.0)
+        delta[i] = max(delta[i], problem.levels[stop, 0])
     results = (by_delta, by_rate, by_entry)
     call_gradient(problem.gradient[stop], delta.size, delta, delta_dot, entry_rate, problem.parameters[stop], results)
 

@@ -233,7 +233,7 @@ def _problem(system: System, forcing: Forcing, linear: dict[str, Array]) -> Prob
     most = max([len(c.law.knots) for c in contacts], default=0) + 1
     levels = np.full((m, most + 1), math.inf)
     for i, contact in enumerate(contacts):
-        levels[i, : len(contact.law.knots) + 1] = (0.0, *contact.law.knots)
+        levels[i, : len(contact.law.knots) + 1] = (-math.inf if contact.always else 0.0, *contact.law.knots)
     return Problem(
         **linear,
         levels=levels,

@@ -155,7 +155,7 @@ def _gradient(problem, tables, shadow, space, s, batch):
     if tables.bend[s] != FORCE:
         contact_gradient(problem, s, d, v, rate, batch[2:3], batch[3:4], batch[4:5])
     elif space.beyond[s] > 0.0:
-        batch[0] = max(batch[0], 0.0)
+        batch[0] = max(batch[0], problem.levels[s, 0])
         results = batch[2:3], batch[3:4], batch[4:5]
         call_gradient(tables.uncut_gradient[s], 1, d, v, rate, tables.uncut_parameters[s], results)
     else:

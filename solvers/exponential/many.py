@@ -89,7 +89,7 @@ def _end(problem, state, space, code, x, count, number, peak):
     for value in state.x:
         finite &= np.isfinite(value)
     for s in range(problem.gap.size):
-        if state.piece[s] > 0:
+        if state.piece[s] > 0 and problem.levels[s, 0] == 0.0:
             _note(s, state.open[s, PEAK_DELTA], state.open[s, PEAK_FORCE], count, number, peak)
     count[CODE] = DIVERGED if code == DONE and not finite else code
     number[REACHED] = state.now[T]

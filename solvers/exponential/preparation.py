@@ -151,15 +151,15 @@ class _Skeleton:
     def __init__(self, system: System, forcing: Forcing, dt_cell: float) -> None:
         plain, self.tones = problem_of(system, forcing), len(forcing.tone_omega)
         self.k, self.c, self.load = plain.k, plain.c, plain.load  # not the whole, which holds the sampled signals
-        laws = [contact.law for contact in system.contacts]
-        self.series = tuple(series_of(law) for law in laws)
+        contacts = system.contacts
+        self.series = tuple((1.0, 0.0) if c.always else series_of(c.law) for c in contacts)
         problem, loss = _widened(plain, forcing), _loss_rows(plain)
         read_by = plain.read, plain.power, loss, system.blocks.T
         self.rows, ends = np.concatenate(read_by), np.cumsum([len(rows) for rows in read_by]).tolist()
         self.places = [slice(end - len(rows), end) for rows, end in zip(read_by, ends, strict=True)]
         self.back, self.fastest = among_tones(system.blocks.T, self.tones), max(float(_speeds(system).max()), 1e-3)
         ledger = np.zeros_like(problem.load), problem.power, among_tones(loss, self.tones)
-        tables = build(problem, self.tones, self.series, known_of(laws), dt_cell, ledger)
+        tables = build(problem, self.tones, self.series, known_of(contacts), dt_cell, ledger)
         sizes = len(problem.gap), len(problem.load), len(problem.k), len(forcing.table_dt)
         self.layout = _layout(*sizes, POOL if tables.ahead.size else 0)
         self.problem = Mould(problem, PROBLEM, ("gap", "k", "read", "read_rate", "power"))

@@ -48,7 +48,7 @@ def reach(rtol: float) -> float:
 @inlined
 def _force(problem, tables, s, delta, delta_dot, side, entry_rate, batch):
     """Force of stop s; a law that is cut at zero goes on beyond it on the side on which the step began."""
-    batch[0], batch[1], batch[2] = max(delta, 0.0), delta_dot, 0.0
+    batch[0], batch[1], batch[2] = max(delta, problem.levels[s, 0]), delta_dot, 0.0
     if tables.bend[s] != FORCE:
         law_forces(problem, s, 1, batch[0:1], batch[1:2], entry_rate, batch[2:3])
     elif side > 0.0:

@@ -8,7 +8,7 @@ from solvers.compiled.dop853_tableau import STAGES
 from solvers.compiled.kernels import inlined, inner, law_forces, reordered, table_value
 from solvers.compiled.simd import put, spread
 from solvers.compiled.state import CALLS, T
-from solvers.compiled.sums import above_zero, combine
+from solvers.compiled.sums import above, combine
 from solvers.exponential.contact.blocks import SIGNALS, carry_forces, carry_free, goes_through_blocks, pair, see
 from solvers.exponential.contact.nodes import S
 
@@ -127,6 +127,6 @@ def ripple_of(sway, alias, x, n):
 @inlined
 def node_forces(problem, state, space, s):
     """The law of stop s at the nodes, into ``space.trial``."""
-    above_zero(space.motion[s, 0], space.clipped)
+    above(space.motion[s, 0], problem.levels[s, 0], space.clipped)
     law_forces(problem, s, S, space.clipped, space.motion[s, 1], state.entry_rate[s], space.trial)
     state.count[CALLS] += S

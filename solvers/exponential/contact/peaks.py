@@ -135,6 +135,8 @@ def state_peaks(problem, state, space, x):
         if state.piece[s] > 0:
             batch[0] = indentation(problem, s, x)
             batch[1] = dot(problem.read_rate[s], x, 2 * problem.k.size)
-            state.open[s, PEAK_DELTA] = max(state.open[s, PEAK_DELTA], batch[0])
             contact_forces(problem, s, batch[0:1], batch[1:2], state.entry_rate[s], batch[2:3])
+            if problem.levels[s, 0] < 0.0:
+                batch[0], batch[2] = abs(batch[0]), abs(batch[2])
+            state.open[s, PEAK_DELTA] = max(state.open[s, PEAK_DELTA], batch[0])
             state.open[s, PEAK_FORCE] = max(state.open[s, PEAK_FORCE], batch[2])
