@@ -27,11 +27,6 @@ if TYPE_CHECKING:
 SEEN = ("forces", "springs", "bodies", "impactors")  # parts of a scene besides those with laws that make a system
 
 
-def _contact(direction: Vector, law: Any, gap: float, always: bool) -> solvers.Contact:
-    """A contact or an element on the model's coordinates."""
-    return solvers.Contact(direction, law, gap, always)
-
-
 def _placed(part: Any) -> tuple[Any, ...]:
     """Where and how a stop or element acts: all of it but its law and gap."""
     return tuple(getattr(part, f.name) for f in fields(part) if f.name not in ("law", "gap"))
@@ -137,7 +132,7 @@ class ModalEquations:
         C = C + self.basis.project_matrix(self.matrices.dashpots)
         same = self.contact_rows if scene is self.scene else contact_rows(scene, self.matrices)
         pairs = zip(self.directions, same, strict=True)
-        contacts = [_contact(direction, one.law, one.gap, one.always) for direction, one in pairs]
+        contacts = [solvers.Contact(direction, one.law, one.gap, one.always) for direction, one in pairs]
         rows = [(self.basis.project(row.T)[:, 0], signal) for row, signal in loads(scene, self.matrices)]
         return solvers.System(np.eye(n), C, np.diag(self.omega**2), contacts, [*rows, *self._frame_loads(scene)])
 
@@ -149,7 +144,7 @@ class ModalEquations:
     def system_like(self, scene: Scene) -> solvers.System:
         """The same as `system_of`, quicker where only base motion, gaps and laws of its stops and elements differ."""
         own, frame = self.system, self._frame_loads(scene)
-        parts, known = ((*one.stops, *one.elements) for one in (scene, self.scene))
+        parts, known = scene.acting, self.scene.acting
         if (
             any(_placed(new) != _placed(old) for new, old in zip(parts, known, strict=True))
             or any(getattr(scene, name) != getattr(self.scene, name) for name in SEEN)

@@ -148,8 +148,10 @@ def _check_static(scene: Scene, residual: bool, interface: bool) -> None:
     """Raise ValueError when static shapes are asked for twice, or have no place to be loaded at."""
     require(not (residual and interface), "residual and interface exclude each other", True, "Scene.reduce",
             "keep one: either makes the model exact for slow loads at its places")  # fmt: skip
-    require(not (residual or interface) or bool(loaded(scene, 0)), "static shapes need a stop, a force or a dashpot", 0,
-            "Scene.reduce", "leave out residual and interface")  # fmt: skip
+    known = [bool(loaded(scene, body)) for body in range(1 + len(scene.bodies))]
+    met = all(known) if interface else any(known) or not residual
+    require(met, "static shapes need a stop, an element, a force or a dashpot", known, "Scene.reduce",
+            "leave out residual and interface")  # fmt: skip
 
 
 def _enough(scene: Scene, elements: int | None, omega_max: float | None, mass_share: float | None) -> int:

@@ -95,15 +95,7 @@ class Run(Printed):
         if not solution.status.good:
             status += f" (t = {solution.t[-1]:g} s)" if len(solution.t) else " (before the first sample)"
         return cls(
-            *(
-                solution.t,
-                solution.q,
-                solution.q_dot,
-                solution.contacts,
-                solution.ledger,
-                status,
-                solution.cost,
-            ),
+            *(solution.t, solution.q, solution.q_dot, solution.contacts, solution.ledger, status, solution.cost),
             *(model.shapes, stops, model.directions, strikers, repr(model.scene), model),
             others=model.others,
             kinds=np.array([(one.rotation, one.always) for one in model.contact_rows], dtype=bool).reshape(-1, 2),
@@ -263,9 +255,9 @@ class Run(Printed):
         return unit_of(quantity, self.kinds[:, 0] if stop is None else self.kinds[[self._stop(stop)], 0])
 
     def name(self, stop: int) -> str:
-        """What tables call a stop or element: "stop 0", "element 1", "stop 2 (rad, N m)" of rotation."""
+        """What tables call a stop or element: "stop 0", "element 1", "stop 2 (rotation)"."""
         rotation, always = self.kinds[self._stop(stop)]
-        return f"{'element' if always else 'stop'} {stop}" + " (rad, N m)" * bool(rotation)
+        return f"{'element' if always else 'stop'} {stop}" + " (rotation)" * bool(rotation)
 
     def indentation(self, stop: int = 0) -> Vector:
         """δ(t) (k,) of a stop, m or rad; negative while it is open. Elements, then impactors, count on after the stops.

@@ -1,8 +1,8 @@
 """Consistency of the arrays of a saved run; a truncated or edited file is refused with the reason.
 
 k samples, n coordinates, m contacts, b nodes of a beam, c entries of the log:
-t (k,), q, q_dot (k, n), force (m, k), stops (m, 3), kinds (m, 2), directions (m, n), strikers (i,), nodes (b,), shapes (2b, n),
-contact_* (c,), energy_* (k,) but energy_initial.
+t (k,), q, q_dot (k, n), force (m, k), stops (m, 3), kinds (m, 2), directions (m, n), strikers (i,), nodes (b,),
+shapes (2b, n), contact_* (c,), energy_* (k,) but energy_initial.
 """
 
 from __future__ import annotations

@@ -22,6 +22,5 @@ def places(shapes: Shapes) -> dict[str, float]:
 
 def observed(model: Model) -> float:
     """The place to watch: the first stop or element of displacement, else the tip."""
-    parts = (*model.scene.stops, *model.scene.elements)
-    acting = [part.z for part in parts if not part.coordinate.rotation]
+    acting = [part.z for part in model.scene.acting if not part.coordinate.rotation]
     return acting[0] if acting else next(iter(places(model.shapes).values()))

@@ -8,6 +8,7 @@ cubic through δ and δ̇ at entry, samples and exit.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,7 +33,7 @@ def mean_force(run: Run, stop: int) -> Vector:
     edges = np.concatenate([t[:1], (t[1:] + t[:-1]) / 2, t[-1:]])
     motion = (t, run.indentation(stop), run.indentation_rate(stop))
     if contact.always:
-        return np.diff(_impulse(contact.force, motion, edges)) / np.diff(edges)
+        return np.diff(np.interp(edges, *_grown(contact.force, motion, edges))) / np.diff(edges)
     law, log = contact.law, run.contacts
     mine = np.flatnonzero(log.stop == stop % len(run.stops))
     ends = np.where(np.isnan(log.t_out), t[-1], log.t_out)
@@ -47,6 +48,15 @@ def mean_force(run: Run, stop: int) -> Vector:
 
 def _shares(law: Any, speed: float, knots: Motion, edges: Vector) -> Vector:
     """Part (k,) of a contact's impulse in each cell."""
+    rate = max(speed, law.entry_rate_floor)
+    t, grown = _grown(lambda d, v: np.maximum(law.force(d, v, rate), 0.0), knots, edges)
+    if not grown[-1] > 0.0:
+        grown = t - t[0]
+    return np.diff(np.interp(edges, t, grown / grown[-1]))
+
+
+def _grown(force: Callable[[Vector, Vector], Any], knots: Motion, edges: Vector) -> tuple[Vector, Vector]:
+    """Times, the edges within among them, and the impulse grown till then, of a force of δ and δ̇ on their cubic."""
     from scipy.integrate import cumulative_trapezoid
     from scipy.interpolate import CubicHermiteSpline
 
@@ -54,12 +64,7 @@ def _shares(law: Any, speed: float, knots: Motion, edges: Vector) -> Vector:
     fine = np.interp(np.arange(FINER * (len(t) - 1) + 1) / FINER, np.arange(len(t)), t)
     fine = np.union1d(fine, edges[(edges > t[0]) & (edges < t[-1])])
     cubic = CubicHermiteSpline(t, delta, rate)
-    entry_rate = np.full(len(fine), max(speed, law.entry_rate_floor))
-    force = np.maximum(law.force(cubic(fine), cubic(fine, 1), entry_rate), 0.0)
-    grown = cumulative_trapezoid(force, fine, initial=0.0)
-    if not grown[-1] > 0.0:
-        grown = fine - fine[0]
-    return np.diff(np.interp(edges, fine, grown / grown[-1]))
+    return fine, cumulative_trapezoid(force(cubic(fine), cubic(fine, 1)), fine, initial=0.0)
 
 
 def _knots(log: ContactLog, contact: int, end: float, motion: Motion) -> Motion:

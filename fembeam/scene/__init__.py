@@ -1,4 +1,4 @@
-"""What there is: supports, masses, springs, stops, elements, impactors, loads; full matrices, contact rows, all signals.
+"""What there is: supports, masses, springs, stops, elements, impactors, loads; full matrices, contact rows, signals.
 
 Imports: `beams`, `excitation`, `support`, `reduction`; `Scene.reduce` opens the door to `fembeam.model`. Begin with
 `scene`, then `assembly`.

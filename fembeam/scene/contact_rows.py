@@ -1,7 +1,8 @@
 """Who touches whom in a scene: contacts and loads as rows on all dofs, beams, bodies and impactors alike.
 
-δ = -w·u - gap, and the contact pushes with +w F:  w = ±(row of one body - row of the other). An element that always acts
-is one of them, with w = -W.
+δ = -w·u - gap, and the contact pushes with +w F:  w = ±(row of one body - row of the other)
+
+Elements, which always act, are contacts with w = -W.
 """
 
 from __future__ import annotations
@@ -62,11 +63,11 @@ def _contact_rows(scene: Scene, matrices: Matrices) -> Iterator[ContactRow]:
     """The same, one by one."""
     count = 0
     for body, part in enumerate((scene, *scene.bodies)):
-        for one, push, always in [*((s, s.push, False) for s in part.stops), *((e, -1.0, True) for e in part.elements)]:
+        for one in part.acting:
             place = one.coordinate
             on = ("frame", 0) if place.to is None else ("body", place.to[0] or body)
-            row = push * place.row(matrices, body)
-            yield ContactRow(row, one.law, one.gap, push, body, one.z, on, place.rotation, always)
+            row = one.push * place.row(matrices, body)
+            yield ContactRow(row, one.law, one.gap, one.push, body, one.z, on, place.rotation, one.always)
         for impactor in part.impactors:
             row = matrices.interpolation(impactor.z, body=body) - matrices.striker(count)
             for push in impactor.pushes:
@@ -91,15 +92,10 @@ def weight(scene: Scene) -> Harmonic:
     return Harmonic(scene.gravity, 0.0)
 
 
-def acting(scene: Scene) -> list[LocalCoordinate]:
-    """What the stops and elements of a scene's own beam act on."""
-    return [one.coordinate for one in (*scene.stops, *scene.elements)]
-
-
 def watched(scene: Scene, body: int) -> LocalCoordinate | None:
-    """Where the modes of a beam shall be positive: at its first stop, element or impactor, or where another meets it."""
+    """Where the modes of a beam shall be positive: at its first stop, element, impactor, or where another meets it."""
     part = (scene, *scene.bodies)[body]
-    places = acting(part) + [LocalCoordinate(impactor.z) for impactor in part.impactors]
+    places = [one.coordinate for one in part.acting] + [LocalCoordinate(impactor.z) for impactor in part.impactors]
     places += _from_the_first(scene, body)
     return LocalCoordinate(places[0].z, places[0].derivative) if places else None
 
@@ -107,7 +103,7 @@ def watched(scene: Scene, body: int) -> LocalCoordinate | None:
 def loaded(scene: Scene, body: int) -> list[LocalCoordinate]:
     """Where a force or moment acts on a beam, or a pair of them: of stops, elements, loads, dashpots, strikers."""
     part = (scene, *scene.bodies)[body]
-    places = [own for place in acting(part) for own in place.on_body(body, body)]
+    places = [own for one in part.acting for own in one.coordinate.on_body(body, body)]
     places += [LocalCoordinate(force.z, _derivative(force)) for force in part.forces]
     places += [LocalCoordinate(spring.z) for spring in part.springs if spring.foot is not None]
     places += [LocalCoordinate(dashpot.z) for dashpot in part.dashpots if dashpot.damping]
@@ -118,12 +114,15 @@ def loaded(scene: Scene, body: int) -> list[LocalCoordinate]:
 
 def _from_the_first(scene: Scene, body: int) -> list[LocalCoordinate]:
     """Where stops and elements of the scene's own beam meet another."""
-    return [own for place in acting(scene) for own in place.on_body(0, body)] if body else []
+    return [own for one in scene.acting for own in one.coordinate.on_body(0, body)] if body else []
 
 
 def static_rows(scene: Scene, matrices: Matrices) -> sparse.csr_matrix:
     """Rows (m, N) of the scene's own stops, elements, then forces: where the model may miss static compliance."""
-    places = [*acting(scene), *(LocalCoordinate(force.z, _derivative(force)) for force in scene.forces)]
+    places = [
+        *(one.coordinate for one in scene.acting),
+        *(LocalCoordinate(force.z, _derivative(force)) for force in scene.forces),
+    ]
     blank = sparse.csr_matrix((0, matrices.M.shape[0]))
     return sparse.vstack([blank, *(place.row(matrices) for place in places)], format="csr")
 

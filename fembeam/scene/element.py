@@ -1,6 +1,6 @@
-"""Local elements that act at any deformation, of both signs: nonlinear springs, hinge springs, links between two places.
+"""Local elements that act at any deformation, of both signs: nonlinear springs, hinge springs, links of two places.
 
-    d = W u - gap,    the element pushes the structure with -Wᵀ F(d, ḋ)
+d = W u - gap,    the element pushes the structure with -Wᵀ F(d, ḋ)
 """
 
 from __future__ import annotations
@@ -52,6 +52,8 @@ class Element:
     of: Of = "displacement"
     to: float | tuple[int, float] | None = None
     gap: float = 0.0
+    push = -1.0  # δ = d: direction -W
+    always = True
 
     def __post_init__(self) -> None:
         where = f"Element at z = {self.z}"

@@ -1,6 +1,6 @@
 """The coordinate a stop or an element acts on: u or u_z at one place, or its difference to a second place.
 
-    d = W u - gap,    W = row of u(z) or u_z(z), less that of the second place
+d = W u - gap,    W = row of u(z) or u_z(z), less that of the second place
 """
 
 from __future__ import annotations

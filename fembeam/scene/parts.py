@@ -154,6 +154,7 @@ class Stop:
     side: str = "below"
     on: float | tuple[int, float] | None = None
     of: Of = "displacement"
+    always = False
 
     def __post_init__(self) -> None:
         where = f"Stop at z = {self.z}"

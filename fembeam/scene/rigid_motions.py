@@ -58,11 +58,11 @@ def _held(scene: Scene, index: int) -> bool:
 def _sides(scene: Scene, rotation: bool, to: int | None = None) -> set[float]:
     """From which sides stops and elements of a beam hold it, or those that lead `to` another hold that."""
     found: set[float] = set()
-    for part in (*scene.stops, *scene.elements):
+    for part in scene.acting:
         place = part.coordinate
         leads = None if place.to is None else place.to[0]
         if place.rotation == rotation and leads != 0 and to in (None, leads):
-            found |= {getattr(part, "push", 1.0), getattr(part, "push", -1.0)}
+            found |= {part.push, -part.push} if part.always else {part.push}
     return found
 
 

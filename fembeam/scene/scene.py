@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from fembeam.beams import Beam, ModalDamping, Rayleigh
 from fembeam.scene.assembly import Matrices, assemble, buckling_load
-from fembeam.scene.contact_rows import acting
 from fembeam.scene.element import Element
 from fembeam.scene.impactor import Impactor
 from fembeam.scene.local_coordinate import LocalCoordinate
@@ -186,9 +185,14 @@ class Scene:
         return reduced(self, modes, elements, omega_max, mass_share, residual, interface)
 
     @property
+    def acting(self) -> list[Stop | Element]:
+        """Stops, then elements: what acts on the scene's own beam by a law."""
+        return [*self.stops, *self.elements]
+
+    @property
     def loaded_places(self) -> list[float]:
         """Coordinates of stops, elements, then forces."""
-        return [part.z for part in (*self.stops, *self.elements, *self.forces)]
+        return [part.z for part in (*self.acting, *self.forces)]
 
     def buckling_load(self, elements: int | None = None) -> float:
         """The compression (N, positive) at which the beam buckles, on top of its own axial force.
@@ -200,7 +204,7 @@ class Scene:
     @property
     def places(self) -> list[float]:
         """Coordinates of all features, second places of stops and elements included, in no order."""
-        second = [place.to[1] for place in acting(self) if place.to is not None and place.to[0] == 0]
+        second = [place.to[1] for place in (one.coordinate for one in self.acting) if place.to and place.to[0] == 0]
         return [feature.z for name in FEATURES for feature in getattr(self, name)] + second
 
     @property
@@ -247,9 +251,10 @@ class Scene:
             plain = body.base is None and body.gravity == 0 and not body.bodies
             require(plain, "a body must not have base, gravity or bodies of its own", body,
                     f"bodies[{index}] of Scene", "give them to the outer scene")  # fmt: skip
-        for name, key, parts in (("stops", "on", self.stops), ("elements", "to", self.elements)):
-            for index, part in enumerate(parts):
-                self._check_second(part.coordinate, key, f"{name}[{index}] of Scene")
+        for index, stop in enumerate(self.stops):
+            self._check_second(stop.coordinate, "on", f"stops[{index}] of Scene")
+        for index, element in enumerate(self.elements):
+            self._check_second(element.coordinate, "to", f"elements[{index}] of Scene")
 
     def _check_second(self, place: LocalCoordinate, key: str, where: str) -> None:
         """Raise ValueError unless what a stop or element acts on exists and can move."""
