@@ -150,7 +150,7 @@ def _check_static(scene: Scene, residual: bool, interface: bool) -> None:
             "keep one: either makes the model exact for slow loads at its places")  # fmt: skip
     known = [bool(loaded(scene, body)) for body in range(1 + len(scene.bodies))]
     met = all(known) if interface else any(known) or not residual
-    require(met, "static shapes need a stop, an element, a force or a dashpot", known, "Scene.reduce",
+    require(met, "static shapes need a stop, a force or a dashpot, or an element", known, "Scene.reduce",
             "leave out residual and interface")  # fmt: skip
 
 

@@ -164,8 +164,8 @@ class Scene:
         elements : of the mesh; None: as few as make every kept frequency right to 1e-6.
         omega_max : instead of `modes`: all of them up to this frequency, rad/s.
         mass_share : instead of `modes`: as many as carry this share of the mass that a base motion moves, in (0, 1).
-        residual : add the residual static shape of every stop, force, moment, moving foot and dashpot (its rotation,
-            too); the model is then exact for slow loads there.
+        residual : add the residual static shape of every stop, element, force, moment, moving foot and dashpot (its
+            rotation, too), between two places that of opposite loads; the model is then exact for slow loads there.
         interface : Craig–Bampton: static shapes of the same places and `modes` modes with them held; with
             modes=0 Guyan's condensation.
 
