@@ -4,8 +4,8 @@ A bar of moment of inertia J, free to turn by ±gap, then held by a moment κ (|
 
     T = 4 gap/Ω + 2π √(J/κ),    Ω its rate between the stops
 
-At a stiff hinge modes alone converge like 1/N; with the static shape of its moment few are enough. A beam pinned at both
-ends with a hinge spring has κ (cot x - coth x) = 2 x EI/L, ω = (x/L)² √(EI/ρA).
+At a stiff hinge modes alone converge like 1/N; with the static shape of its moment few are enough. A beam pinned at
+both ends with a hinge spring has κ (cot x - coth x) = 2 x EI/L, ω = (x/L)² √(EI/ρA).
 """
 
 import numpy as np
@@ -41,5 +41,6 @@ for modes, residual in ((1, False), (20, False), (1, True), (4, True)):
     model = held.reduce(modes, residual=residual)
     stiffness, _ = model.linear_elements
     omega = np.sqrt(np.linalg.eigvalsh(model.system.K + stiffness)[0])
-    print(f"{modes:3d} modes{' and static shape' if residual else '':17s} {omega:12.3f} rad/s, {omega / exact:.6f} of it")
+    shape = " and static shape" if residual else ""
+    print(f"{modes:3d} modes{shape:17s} {omega:12.3f} rad/s, {omega / exact:.6f} of it")
 assert abs(omega / exact - 1) < 1e-6
