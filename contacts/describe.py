@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from contacts.custom import CustomLaw
-from contacts.law import Law, Sum, parts_of
+from contacts.law import Law
 from contacts.restitution import bounce, restitution
+from contacts.sums import Sum, parts_of
 
 
 def describe(law: Law, entry_rate: float = 1.0, mass: float = 1.0) -> str:

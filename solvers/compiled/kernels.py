@@ -21,7 +21,7 @@ from solvers.compiled.decorators import merged as merged
 
 
 class Problem(NamedTuple):
-    """Everything a kernel reads and never writes; `state.problem_of` fills it, in SI units.
+    """Everything a kernel reads and, but for latched numbers, never writes; `state.problem_of` fills it, in SI units.
 
     z = [p, v] are block coordinates, for mass-normalised modes in √kg m and √kg m/s.
     """
@@ -36,8 +36,12 @@ class Problem(NamedTuple):
     gap: Any  # (m,) m
     law: Any  # (m,) addresses of the compiled forces
     gradient: Any  # (m,) addresses of their derivatives
-    parameters: Any  # (m, P) their parameters
+    parameters: Any  # (m, P) their parameters; of laws with memory the run's own, numbers latched among them
     floor: Any  # (m,) smallest entry rates, m/s
+    borders: Any  # (m,) addresses of the margins of laws with memory, 0 for others
+    renewal: Any  # (m,) addresses of what they latch on a border
+    border_count: Any  # (m,) how many borders
+    opening: Any  # (m,) place among the parameters of a segment code that is 0 while the law is open, or -1
     load: Any  # (L, 2n) state rate per unit of signal l
     power: Any  # (L, 2n) input power = signal × power·z, W
     tone_omega: Any  # (K,) rad/s
@@ -57,7 +61,20 @@ _COMPLEX = types.Array(types.complex128, 1, "C")
 PROBLEM = types.NamedTuple(
     [
         *[VECTOR, VECTOR, MATRIX, MATRIX, MATRIX, MATRIX, MATRIX, VECTOR, INTEGERS, INTEGERS],
-        *[MATRIX, VECTOR, MATRIX, MATRIX, VECTOR, _COMPLEX, INTEGERS, MATRIX, VECTOR, INTEGERS, INTEGERS],
+        *[
+            MATRIX,
+            VECTOR,
+            *[INTEGERS] * 4,
+            MATRIX,
+            MATRIX,
+            VECTOR,
+            _COMPLEX,
+            INTEGERS,
+            MATRIX,
+            VECTOR,
+            INTEGERS,
+            INTEGERS,
+        ],
     ],
     Problem,
 )
@@ -87,6 +104,21 @@ def _c_function(outputs):
         return signature, codegen
 
     return call
+
+
+@intrinsic
+def call_renewal(typingctx, address, border, delta, delta_dot, entry_rate, parameters):
+    """Call a law's C function that latches numbers on a border, at an address; returns the code of the event."""
+    known = [types.int64, types.int64, types.float64, types.float64, types.float64]
+    signature = types.int64(*known, parameters)
+
+    def codegen(context, builder, sig, args):
+        real, long = ir.DoubleType(), ir.IntType(64)
+        declared = ir.FunctionType(long, [long, real, real, real, real.as_pointer()])
+        data = context.make_array(sig.args[5])(context, builder, args[5]).data
+        return builder.call(builder.inttoptr(args[0], declared.as_pointer()), [*args[1:5], data])
+
+    return signature, codegen
 
 
 call_force = _c_function(1)

@@ -86,6 +86,10 @@ class Contact:
         direction = np.array(self.direction, dtype=float, ndmin=1)
         if direction.ndim != 1 or not np.all(np.isfinite(direction)):
             raise ValueError(f"direction of a Contact must be a finite vector, got {self.direction!r}")
+        if getattr(self.law, "opens", False):
+            object.__setattr__(self, "always", True)  # its law itself says where it is open
+        elif getattr(self.law, "memory", ()) and not self.always:
+            raise ValueError(f"{self.law!r} has a memory and acts at both signs of delta: give always=True")
         if not np.isfinite(self.gap):
             raise ValueError(f"gap must be finite, got {self.gap!r}; use no Contact at all for a stop out of reach")
         if not hasattr(self.law, "entry_rate_floor") or isinstance(self.law, type):

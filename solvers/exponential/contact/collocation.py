@@ -24,7 +24,7 @@ import numpy as np
 
 from solvers.compiled.kernels import contact_forces, contact_gradient, copy, dot, indentation, inlined, inner
 from solvers.compiled.simd import eight, total
-from solvers.compiled.state import CALLS, PEAK_DELTA, PEAK_FORCE, T
+from solvers.compiled.state import CALLS, PEAK_DELTA, PEAK_FORCE, T, is_open
 from solvers.compiled.sums import combine, renew, sweep
 from solvers.exponential.contact.blocks import goes_through_blocks, kick, pair, way_of
 from solvers.exponential.contact.node_newton import MOST_ITERATIONS, newton
@@ -274,7 +274,7 @@ def finish_step(problem, tables, state, space, family, level):
             state.x[size + 3 + 2 * s] += h * total(impulses)
             if problem.levels[s, 0] == 0.0:
                 step_peaks(problem, tables, state, space, family, h, s, 1.0)
-            else:
+            elif not is_open(problem, s):
                 state.open[s, PEAK_DELTA] = max(state.open[s, PEAK_DELTA], _size(space.motion[s, 0]))
                 state.open[s, PEAK_FORCE] = max(state.open[s, PEAK_FORCE], _size(space.force[s]))
     copy(space.x_new, state.x, size)

@@ -61,8 +61,14 @@ class Space(NamedTuple):
     duration: Any  # (1,) s, that of the contact begun last, if it were free
     book: Any  # (2 + L, numbers) see `books`
     energy: Any  # (3,) see `energy.guard`
-    last: Any  # (6,) see `step`
+    last: Any  # (7,) see `step`
     seen: Any  # (m, 2) δ and δ̇ at the begin of the step
+    margin: Any  # (B S,) margins of an element's borders at points, row by row, B the most of any; see `borders`
+    ends: Any  # (4 B,)
+    fired: Any  # (B,)
+    largest: Any  # (m, B) largest margins on the step tried last
+    noise: Any  # (m, B) their rounding
+    landed: Any  # (2,) element and border that a landing in time has found to lie before its own, or -1
     carried: Any  # (2N, S) of many stops, as the rest but for the matrix, see `blocks`
     pushed: Any  # (2N, S)
     mixed: Any  # (2N,)
