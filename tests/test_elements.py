@@ -7,12 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
+from scipy.integrate import cumulative_simpson, quad, simpson
 from scipy.optimize import brentq
 
 import fembeam as fb
+import reduction
 import solvers
-from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, Polynomial, Tabulated, law
+from contacts import Hertz, Hysteretic, Jenkins, KelvinVoigt, PiecewiseLinear, Polynomial, Tabulated, law
 from fembeam.plot.axis_names import axis_name
 from fembeam.scene import changes_structure, with_value
 from fembeam.scene_file import SceneFileError, json_schema, read
@@ -490,3 +491,32 @@ def test_studies_know_rotations_and_elements():
     assert fb.study.smallest_model(spring, "amplitude", tolerance=0.01, duration=3.0, dt=0.01).modes <= 2
     with pytest.raises(ValueError, match="must have a stop or element"):
         fb.study.stability_map(replace(scene, stops=()), solvers.RK4, [1e-4])
+
+
+# --- laws with memory -----------------------------------------------------------------------------------------------
+
+
+def test_an_element_with_memory_is_replayed():
+    """Jenkins at the tip: the force keeps its limit, and moves the beam as the equations say."""
+    model = beam([fb.Clamped(0.0)], elements=[fb.Element(1.0, Jenkins(40.0, 0.6))]).reduce(2, residual=True)
+    start = np.concatenate([np.zeros(3), [0.0, 0.0, 0.0]])
+    start[:3] = model.equilibrium({1.0: -0.1})[:3]
+    start[:3] *= 3.0 / np.abs(start[:3] @ model.phi(1.0)) * 0.05
+    run = model.simulate(3.0, 5e-4, start)
+    events = run.transitions
+    assert set(events.event) == {"stick", "slip"}
+    assert len(events) > 6
+    force, d = run.force(), run.indentation()
+    assert np.abs(force).max() == pytest.approx(0.6, rel=1e-12)
+    rise = cumulative_simpson(run.acceleration(1.0), x=run.t, initial=0)
+    np.testing.assert_allclose(run.velocity(1.0) - run.velocity(1.0)[0], rise, atol=2e-4 * np.abs(rise).max())
+    assert simpson(force * run.velocity(1.0), x=run.t) == pytest.approx(run.energy.contact[-1], rel=1e-3)
+    assert run.force(mean=True)[1:-1] == pytest.approx(force[1:-1], abs=0.02)
+    assert d[0] == pytest.approx(-0.15, rel=1e-9)
+    with pytest.raises(reduction.AccuracyError, match=r"element at z = 1.0 m slips or yields before equilibrium"):
+        model.equilibrium({1.0: -2.0})
+
+
+def test_laws_that_never_open_are_no_stops():
+    with pytest.raises(ValueError, match=r"law must be one that opens, .* make it an Element"):
+        fb.Stop(0.5, Jenkins(1.0, 1.0))

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import reduction
-from fembeam.scene import tangent
+from fembeam.scene import called, tangent
 from fembeam.support import require, require_finite
 
 if TYPE_CHECKING:
@@ -128,6 +128,7 @@ def _settled(model: Model, load: Vector, free: NDArray[np.bool_]) -> Vector:
     for _ in range(MOST_STEPS):
         scale = np.abs(f).max(initial=0.0) + np.abs(forces[:, None] * W).max(initial=0.0) + np.abs(K * q).max(initial=0)
         if np.abs(residual).max(initial=0.0) <= SETTLED * scale:
+            _check_memory(rows, -W @ q - gaps)
             return q
         J = np.diag(1 / tau + K) + (W.T * slopes) @ W
         trial = q + np.linalg.solve(J, residual)
@@ -143,6 +144,19 @@ def _settled(model: Model, load: Vector, free: NDArray[np.bool_]) -> Vector:
         f"no static equilibrium found, forces out of balance by {np.abs(residual).max():.3g} (modal) in "
         "Model.equilibrium; does anything carry the loads?"
     )
+
+
+def _check_memory(rows: list[ContactRow], delta: Vector) -> None:
+    """Raise AccuracyError when an element with memory would pass a border, such as slip, on the way."""
+    for row, d in zip(rows, delta, strict=True):
+        margins = np.ones(getattr(row.law, "borders", 0))
+        if len(margins):
+            called(row.law.memory_kernel("borders"), d, 0.0, row.law.parameters, margins)
+        if np.any(margins < 0):
+            raise reduction.AccuracyError(
+                f"the element at z = {row.z} m slips or yields before equilibrium in Model.equilibrium, and where it "
+                "rests depends on how it gets there; simulate from rest instead, with damping"
+            )
 
 
 def _pushed(rows: list[ContactRow], delta: Vector) -> tuple[Vector, Vector]:

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from fembeam.model.model import Model
     from fembeam.model.section_forces import Extremes
     from fembeam.response import Reactions
-    from fembeam.scene.contact_rows import ContactRow
     from fembeam.scene_file import SceneFile
 
 Vector = NDArray[np.float64]
@@ -59,6 +58,7 @@ class Run(Printed):
     others: tuple[Shapes, ...] = ()  # of the further beams
     source: Source | None = None  # of a run made from a scene file
     versions: dict[str, str] = field(default_factory=dict)  # that made a run read from a file
+    borders: Callable[[], Any] | None = field(default=None, repr=False)  # what `transitions` are made by
     kinds: Vector = field(default_factory=lambda: np.zeros((0, 2), dtype=bool))  # (m, 2): of rotation, always acting
 
     def __repr__(self) -> str:
@@ -74,6 +74,16 @@ class Run(Printed):
     def energy(self) -> solvers.Energy:
         """The energy balance."""
         return self.ledger()
+
+    @cached_property
+    def transitions(self) -> Any:
+        """Borders that laws with memory passed, see `solvers.problem.Transitions`: times of stick, slip and yield.
+
+        ValueError for a run read from a file.
+        """
+        if self.borders is None:
+            raise ValueError("a run read from a file has no transitions; simulate again")
+        return self.borders()
 
     @property
     def scene_file(self) -> SceneFile:
@@ -98,6 +108,7 @@ class Run(Printed):
             *(solution.t, solution.q, solution.q_dot, solution.contacts, solution.ledger, status, solution.cost),
             *(model.shapes, stops, model.directions, strikers, repr(model.scene), model),
             others=model.others,
+            borders=solution.borders,
             kinds=np.array([(one.rotation, one.always) for one in model.contact_rows], dtype=bool).reshape(-1, 2),
         )
 
@@ -294,23 +305,11 @@ class Run(Printed):
         """Forces (m, k)."""
         if self.stored_forces is not None:
             return self.stored_forces
-        assert self.model is not None
-        forces = [self._force_of(s, contact) for s, contact in enumerate(self.model.contact_rows)]
-        return np.array(forces).reshape(len(forces), len(self.t))
+        from fembeam.response import contact_force
 
-    def _force_of(self, stop: int, contact: ContactRow) -> Vector:
-        """Force history of one stop or element."""
-        if contact.always:
-            return np.asarray(contact.force(self.indentation(stop), self.indentation_rate(stop)))
-        mine = self.contacts.stop == stop
-        entered, speed = self.contacts.t_in[mine], self.contacts.speed_in[mine]
-        if not len(entered):
-            return np.zeros(len(self.t))
-        order = np.argsort(entered)
-        last = np.searchsorted(entered[order], self.t, side="right") - 1
-        entry_rate = np.maximum(np.abs(speed[order])[np.maximum(last, 0)], contact.law.entry_rate_floor)
-        delta = np.where(last >= 0, self.indentation(stop), -1.0)
-        return np.asarray(contact.force(delta, self.indentation_rate(stop), entry_rate))
+        assert self.model is not None
+        forces = [contact_force(self, s, contact) for s, contact in enumerate(self.model.contact_rows)]
+        return np.array(forces).reshape(len(forces), len(self.t))
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write everything to one ``.npz`` file, whole or not at all; read it with `load`."""

@@ -9,12 +9,14 @@ cubic through δ and δ̇ at entry, samples and exit.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fembeam.response.acceleration import model_of
+from fembeam.response.contact_force import force_at
 from fembeam.support import require
 
 if TYPE_CHECKING:
@@ -28,14 +30,15 @@ FINER = 16  # parts of every piece of the cubic, on which the force is integrate
 
 def mean_force(run: Run, stop: int) -> Vector:
     """Mean contact force (k,) of a stop over the cells of the samples, N; `Run.force` explains it."""
+    stop %= len(run.stops)
     contact, t = model_of(run, "mean force").contact_rows[stop], run.t
     require(len(t) > 1, "the mean force needs samples", len(t), "Run.force", "give simulate a dt")
     edges = np.concatenate([t[:1], (t[1:] + t[:-1]) / 2, t[-1:]])
     motion = (t, run.indentation(stop), run.indentation_rate(stop))
-    if contact.always:
-        return np.diff(np.interp(edges, *_grown(contact.force, motion, edges))) / np.diff(edges)
+    if contact.always or contact.remembers:
+        return np.diff(np.interp(edges, *_grown(partial(force_at, run, stop, contact), motion, edges))) / np.diff(edges)
     law, log = contact.law, run.contacts
-    mine = np.flatnonzero(log.stop == stop % len(run.stops))
+    mine = np.flatnonzero(log.stop == stop)
     ends = np.where(np.isnan(log.t_out), t[-1], log.t_out)
     first, last = (np.searchsorted(edges, times[mine], side="right") - 1 for times in (log.t_in, ends))
     inside = (first == last) & (first >= 0) & (first < len(t))
@@ -49,14 +52,14 @@ def mean_force(run: Run, stop: int) -> Vector:
 def _shares(law: Any, speed: float, knots: Motion, edges: Vector) -> Vector:
     """Part (k,) of a contact's impulse in each cell."""
     rate = max(speed, law.entry_rate_floor)
-    t, grown = _grown(lambda d, v: np.maximum(law.force(d, v, rate), 0.0), knots, edges)
+    t, grown = _grown(lambda _, d, v: np.maximum(law.force(d, v, rate), 0.0), knots, edges)
     if not grown[-1] > 0.0:
         grown = t - t[0]
     return np.diff(np.interp(edges, t, grown / grown[-1]))
 
 
-def _grown(force: Callable[[Vector, Vector], Any], knots: Motion, edges: Vector) -> tuple[Vector, Vector]:
-    """Times, the edges within among them, and the impulse grown till then, of a force of δ and δ̇ on their cubic."""
+def _grown(force: Callable[[Vector, Vector, Vector], Any], knots: Motion, edges: Vector) -> tuple[Vector, Vector]:
+    """Times, the edges within among them, and the impulse grown till then, of a force of t, δ and δ̇ on their cubic."""
     from scipy.integrate import cumulative_trapezoid
     from scipy.interpolate import CubicHermiteSpline
 
@@ -64,7 +67,7 @@ def _grown(force: Callable[[Vector, Vector], Any], knots: Motion, edges: Vector)
     fine = np.interp(np.arange(FINER * (len(t) - 1) + 1) / FINER, np.arange(len(t)), t)
     fine = np.union1d(fine, edges[(edges > t[0]) & (edges < t[-1])])
     cubic = CubicHermiteSpline(t, delta, rate)
-    return fine, cumulative_trapezoid(force(cubic(fine), cubic(fine, 1)), fine, initial=0.0)
+    return fine, cumulative_trapezoid(force(fine, cubic(fine), cubic(fine, 1)), fine, initial=0.0)
 
 
 def _knots(log: ContactLog, contact: int, end: float, motion: Motion) -> Motion:

@@ -47,6 +47,11 @@ class ContactRow:
     rotation: bool = False
     always: bool = False
 
+    @property
+    def remembers(self) -> bool:
+        """Whether its law has a memory: latched numbers that are renewed on borders."""
+        return bool(getattr(self.law, "memory", ()))
+
     def force(self, delta: Any, rate: Any = 0.0, entry_rate: Any = 1.0) -> Any:
         """Force on arrays: of an element at both signs of δ, of others zero where δ <= 0."""
         if self.always:

@@ -100,9 +100,15 @@ def force_both_ways(law: Any, d: Any, rate: Any = 0.0) -> NDArray[np.float64]:
 
 
 def tangent(law: Any, d: float, rate: float = 0.0) -> tuple[float, float]:
-    """∂F/∂d and ∂F/∂ḋ of a law at one deformation."""
+    """∂F/∂d and ∂F/∂ḋ of a law at one deformation, of one with memory at the start of a run."""
+    slopes = np.zeros((3, 1))
+    called(law.gradient, d, rate, law.parameters, *slopes)
+    return float(slopes[0, 0]), float(slopes[1, 0])
+
+
+def called(kernel: Any, d: Any, rate: Any, parameters: NDArray[np.float64], *out: NDArray[np.float64]) -> None:
+    """Call a compiled function of a law at deformations and rates (k,); it fills `out`."""
     pointer = ctypes.POINTER(ctypes.c_double)
-    arrays = [np.array(x, dtype=float, ndmin=1) for x in (d, rate, law.parameters, 0.0, 0.0, 0.0)]
-    at = [x.ctypes.data_as(pointer) for x in arrays]
-    law.gradient.ctypes(1, *at[:2], 1.0, *at[2:])
-    return float(arrays[3][0]), float(arrays[4][0])
+    arrays = [np.array(x, dtype=float, ndmin=1) for x in (d, rate, parameters)]
+    d_at, rate_at, parameters_at = (x.ctypes.data_as(pointer) for x in arrays)
+    kernel.ctypes(len(arrays[0]), d_at, rate_at, 1.0, parameters_at, *(x.ctypes.data_as(pointer) for x in out))
