@@ -22,7 +22,10 @@ class Slider:
     def end(self, q, v, side, s):
         """Time until the piece ends; inf if it never does."""
         omega, rest = self.piece(side, s)
-        size, phase = math.hypot(q - rest, v / omega), math.atan2(-v / omega, q - rest)  # q = rest + size cos(ωt + phase)
+        size, phase = (
+            math.hypot(q - rest, v / omega),
+            math.atan2(-v / omega, q - rest),
+        )  # q = rest + size cos(ωt + phase)
         if side:
             ahead = (-phase if side > 0 else math.pi - phase) % (2.0 * math.pi)
             return ahead / omega

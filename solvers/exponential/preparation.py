@@ -40,7 +40,7 @@ SPACE = types.NamedTuple(
     [
         *(*_arrays(1, 2, 2, 1, 1, 1, 1, 2, 3, 1, 3, 2, 1, 3, 2, 3, 1), INTEGERS, MATRIX),
         *(*_arrays(1, 1, 1, 1, 2, 1, 2, 1, 1, 1, 1, 1, 2, 1), INTEGERS),
-        *(*_arrays(2, 1, 1, 1, 2), INTEGERS),
+        *(*_arrays(2, 1, 1, 1, 2, 2), INTEGERS),
         *(*_arrays(2, 2, 1, 2, 3), INTEGERS),
     ],
     Space,
@@ -235,7 +235,7 @@ def _layout(stops: int, loads: int, blocks: int, signals: int, borders: int, poo
         *([(stops,)] * 4),
         *((stops, S), (stops,), (4, 3 * S), (stops,), (stops,), (S + 2,), (1,), (1,)),
         *((2 + loads, max(32, padded(size + 6 * signals), 2 * padded(6 * signals))), (3,), (7,)),
-        *((stops, 2), (borders * S,), (2 * borders,), (borders,), (stops, borders), (2,)),
+        *((stops, 2), (borders * S,), (4 * borders,), (borders,), (stops, borders), (stops, borders), (2,)),
         *((rows, S), (rows, S), (padded(rows),), (stops * S, stops * S), (pool, S, 2 * S), (pool,)),
     ]
     return Layout([STATE, SPACE], [state_shapes(width, stops), space])

@@ -64,9 +64,10 @@ class Space(NamedTuple):
     last: Any  # (7,) see `step`
     seen: Any  # (m, 2) δ and δ̇ at the begin of the step
     margin: Any  # (B S,) margins of an element's borders at points, row by row, B the most of any; see `borders`
-    ends: Any  # (2 B,)
+    ends: Any  # (4 B,)
     fired: Any  # (B,)
     largest: Any  # (m, B) largest margins on the step tried last
+    noise: Any  # (m, B) their rounding
     landed: Any  # (2,) element and border that a landing in time has found to lie before its own, or -1
     carried: Any  # (2N, S) of many stops, as the rest but for the matrix, see `blocks`
     pushed: Any  # (2N, S)
