@@ -8,7 +8,7 @@ from contacts.curves import PiecewiseLinear, Tabulated
 from contacts.custom import CustomLaw, law
 from contacts.identification import Estimate, Identified, identify, read_collisions
 from contacts.law import Law
-from contacts.memory import Jenkins
+from contacts.memory import BoucWen, Coulomb, ElastoPlastic, Iwan, Jenkins, WaltonBraun
 from contacts.polynomial import Polynomial
 from contacts.power_laws import PUBLISHED, Hertz, Hysteretic
 from contacts.restitution import Bounce, achieved_restitution, bounce, damping_factor_for, restitution
@@ -17,12 +17,16 @@ from contacts.viscous import KelvinVoigt, Viscoelastic
 
 __all__ = [
     "PUBLISHED",
+    "BoucWen",
     "Bounce",
+    "Coulomb",
     "CustomLaw",
+    "ElastoPlastic",
     "Estimate",
     "Hertz",
     "Hysteretic",
     "Identified",
+    "Iwan",
     "Jenkins",
     "KelvinVoigt",
     "Law",
@@ -31,6 +35,7 @@ __all__ = [
     "Sum",
     "Tabulated",
     "Viscoelastic",
+    "WaltonBraun",
     "achieved_restitution",
     "bounce",
     "damping_factor_for",

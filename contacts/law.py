@@ -61,6 +61,7 @@ class Law(ABC):
     events : names of the codes `renew` returns.
     jumps : whether the force jumps at a border.
     one_sided : whether the law is defined for delta > 0 only.
+    reach : δ in m at which all of the memory is at work, 0 without one.
     opens : whether the first latched number is a segment code that is 0 while the contact is open, F = 0.
     entry_rate_floor : entry rates below it (m/s) are raised to it before the law sees them.
     kinds : names by which scene files choose it, each with the constructor it stands for, "" being the class.
@@ -84,6 +85,7 @@ class Law(ABC):
     jumps: bool = False
     one_sided: bool = True
     opens: bool = False
+    reach: float = 0.0
     entry_rate_floor: float = ENTRY_RATE_FLOOR
 
     @property
@@ -194,10 +196,14 @@ class Law(ABC):
             out.flat[chosen] = self.batch(float(rate))(d.flat[chosen], v.flat[chosen])
         return out[()]
 
-    def batch(self, entry_rate: float) -> Callable[[NDArray, NDArray], NDArray]:
-        """The force at one entry rate as a lean function of 1-D arrays ``delta >= 0`` and ``delta_dot``."""
+    def batch(self, entry_rate: float, parameters: NDArray | None = None) -> Callable[[NDArray, NDArray], NDArray]:
+        """The force at one entry rate as a lean function of 1-D arrays ``delta >= 0`` and ``delta_dot``.
+
+        With memory at the start of a run, or with other ``parameters``.
+        """
         pointer = ctypes.POINTER(ctypes.c_double)
-        call, parameters, rate = self.kernel.ctypes, self.parameters, max(entry_rate, self.entry_rate_floor)
+        call, rate = self.kernel.ctypes, max(entry_rate, self.entry_rate_floor)
+        parameters = self.parameters if parameters is None else parameters
 
         def evaluate(delta: NDArray, delta_dot: NDArray) -> NDArray:
             force = np.empty(len(delta))
@@ -207,6 +213,24 @@ class Law(ABC):
             return force
 
         return evaluate
+
+    def along(self, delta: ArrayLike) -> NDArray[np.float64]:
+        """Force in N along a path of δ, passed slowly from the start of a run on: loops of a law with memory.
+
+        Exact whatever the distance of the points: borders between them are found to rounding. Dashpots give nothing.
+
+        Parameters
+        ----------
+        delta : (k,) m, finite, one after the other.
+
+        Returns
+        -------
+        (k,) forces. ValueError for a path that is not a row of finite numbers, for a force that is not finite, and for
+        a border that falls to zero again at once after its renewal.
+        """
+        from contacts.path import along
+
+        return along(self, delta)
 
     def stored(self, delta: float, parameters: NDArray[np.float64]) -> float:
         """Energy in J that the element would give back at rest from ``delta`` with these parameters.

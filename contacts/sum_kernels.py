@@ -1,10 +1,15 @@
-"""Compiled memory of laws in parallel: each part's borders and latched numbers by the addresses of its own kernels."""
+"""Compiled memory of laws in parallel: what each part latches, by the addresses of its own kernels.
+
+A law of stops beside one with memory stands behind a gate, open while δ > 0, that latches the rate at entry: parameters
+(code, rate at entry, floor, address, address of its derivatives, its own).
+"""
 
 from llvmlite import ir
 from numba import cfunc, njit, types
+from numba.core import cgutils
 from numba.extending import intrinsic
 
-from contacts.kernels import PART, REALS, SIGNATURE, compiled
+from contacts.kernels import GRADIENT, PART, REALS, SIGNATURE, compiled
 
 RENEW = types.int64(types.int64, types.float64, types.float64, types.float64, REALS)
 RENEW_GRADIENT = types.void(types.int64, types.float64, types.float64, types.float64, REALS, REALS)
@@ -113,3 +118,80 @@ def parallel_renew_gradient(j, delta, delta_dot, entry_rate, parameters, out):
         first += borders
         row += count
         at += PART + int(parameters[at + SIZE])
+
+
+GATE = 5  # numbers before those of a law behind a gate: code, rate at entry, floor, two addresses
+_slopes_of = _call(GRADIENT)
+
+
+@intrinsic
+def _room(typingctx):
+    """A pointer to one number that lasts until the function returns."""
+
+    def codegen(context, builder, sig, args):
+        return cgutils.alloca_once(builder, ir.DoubleType())
+
+    return REALS(), codegen
+
+
+@compiled(cfunc, SIGNATURE)
+def gated(n, delta, delta_dot, entry_rate, parameters, force):
+    """The law behind the gate while that is open, code 1; a little below the surface its force is that at δ = 0."""
+    inside, own, rate = _room(), _from(parameters, GATE), max(parameters[1], parameters[2])
+    for i in range(n):
+        force[i] = 0.0
+        if parameters[0] != 0.0:
+            inside[0] = max(delta[i], 0.0)
+            _fill((int(parameters[3]), 1, inside, _from(delta_dot, i), rate, own, _from(force, i)))
+
+
+@compiled(njit)
+def _gate_slopes(delta, delta_dot, parameters):
+    """Derivatives of the law behind an open gate by δ, its rate, and the rate at entry, which a floor may hide."""
+    d, v, by_delta, by_rate, by_entry = _room(), _room(), _room(), _room(), _room()
+    d[0], v[0], rate = max(delta, 0.0), delta_dot, max(parameters[1], parameters[2])
+    _slopes_of((int(parameters[4]), 1, d, v, rate, _from(parameters, GATE), by_delta, by_rate, by_entry))
+    return by_delta[0], by_rate[0], by_entry[0] if parameters[1] > parameters[2] else 0.0
+
+
+@compiled(cfunc, GRADIENT)
+def gated_gradient(n, delta, delta_dot, entry_rate, parameters, by_delta, by_rate, by_entry):
+    """Derivatives of `gated`; that by the rate at entry belongs to its own."""
+    for i in range(n):
+        by_delta[i], by_rate[i], by_entry[i] = 0.0, 0.0, 0.0
+        if parameters[0] != 0.0:
+            by_delta[i], by_rate[i], _ = _gate_slopes(delta[i], delta_dot[i], parameters)
+
+
+@compiled(cfunc, SIGNATURE)
+def gated_borders(n, delta, delta_dot, entry_rate, parameters, values):
+    """The indentation, which opens or closes the gate."""
+    for i in range(n):
+        values[i] = -delta[i] if parameters[0] == 0.0 else delta[i]
+
+
+@compiled(cfunc, RENEW)
+def gated_renew(j, delta, delta_dot, entry_rate, parameters):
+    """Latch the rate at entry; or shut the gate."""
+    if parameters[0] != 0.0:
+        parameters[0] = 0.0
+        return 1
+    parameters[0], parameters[1] = 1.0, delta_dot
+    return 0
+
+
+@compiled(cfunc, SIGNATURE)
+def gated_memory_gradient(n, delta, delta_dot, entry_rate, parameters, by_memory):
+    """Derivatives of `gated` by its own rate at entry."""
+    for i in range(n):
+        by_memory[i], by_memory[n + i] = 0.0, 0.0
+        if parameters[0] != 0.0:
+            by_memory[n + i] = _gate_slopes(delta[i], delta_dot[i], parameters)[2]
+
+
+@compiled(cfunc, RENEW_GRADIENT)
+def gated_renew_gradient(j, delta, delta_dot, entry_rate, parameters, out):
+    """The rate at entry is that of the mass, once."""
+    for i in range(8):
+        out[i] = 0.0
+    out[5 if j == 0 and parameters[0] == 0.0 else 7] = 1.0

@@ -19,7 +19,8 @@ HEAD = 11  # numbers before those of each part; as `contacts.kernels.PART`, whic
 class Sum(Law):
     """Laws in parallel, ``F = F_1 + F_2 + ...``; written ``law_a + law_b``.
 
-    Each part keeps its own floor of the entry rate.
+    Each part keeps its own floor of the entry rate. Beside laws with memory, which may act at both signs of δ, laws of
+    stops act while δ > 0, with the entry rate of that contact; all laws without memory do so beside one that opens.
 
     Parameters
     ----------
@@ -74,32 +75,46 @@ class Sum(Law):
         return min(part.entry_rate_floor for part in self.parts)
 
     @property
+    def acting(self) -> tuple[Law, ...]:
+        """The parts, those of stops behind gates if others have a memory."""
+        remembering = [part for part in self.parts if part.memory]
+        opens = any(part.opens for part in remembering)
+        gated = [bool(remembering) and not part.memory and (opens or part.one_sided) for part in self.parts]
+        return tuple(Gated(part) if gate else part for part, gate in zip(self.parts, gated, strict=True))
+
+    @property
     def one_sided(self) -> bool:  # type: ignore[override]
-        """Whether any part is."""
-        return any(part.one_sided for part in self.parts)
+        """Whether any part is; with memory, whether all that remember are."""
+        remembering = [part.one_sided for part in self.parts if part.memory]
+        return all(remembering) if remembering else any(part.one_sided for part in self.parts)
 
     @property
     def jumps(self) -> bool:  # type: ignore[override]
         """Whether any part jumps at a border."""
-        return any(part.jumps for part in self.parts)
+        return any(part.jumps for part in self.acting)
+
+    @property
+    def reach(self) -> float:  # type: ignore[override]
+        """The largest."""
+        return max(part.reach for part in self.parts)
 
     @property
     def borders(self) -> int:  # type: ignore[override]
         """Those of all parts, in order."""
-        return sum(part.borders for part in self.parts)
+        return sum(part.borders for part in self.acting)
 
     @property
     def events(self) -> tuple[str, ...]:  # type: ignore[override]
         """Those of all parts, in order."""
-        return tuple(chain.from_iterable(part.events for part in self.parts))
+        return tuple(chain.from_iterable(part.events for part in self.acting))
 
     @property
     def memory(self) -> tuple[int, ...]:  # type: ignore[override]
         """Places of the latched numbers of all parts, in order."""
-        if not any(part.memory for part in self.parts):
+        if not any(part.memory for part in self.acting):
             return ()
         return tuple(
-            start + place for part, (start, _) in zip(self.parts, self._spans(), strict=True) for place in part.memory
+            start + place for part, (start, _) in zip(self.acting, self._spans(), strict=True) for place in part.memory
         )
 
     @property
@@ -109,8 +124,8 @@ class Sum(Law):
         A head is (address, address of its derivatives, floor, size, addresses of the four kernels of its memory or
         zeros, number of borders, of latched numbers, of events). Addresses lie below 2**53: exact as floats.
         """
-        numbers: list[NDArray] = [np.array([len(self.parts)], dtype=float)]
-        for part in self.parts:
+        numbers: list[NDArray] = [np.array([len(self.acting)], dtype=float)]
+        for part in self.acting:
             own = part.parameters
             head = [part.address, part.gradient_address, part.entry_rate_floor, own.size]
             head += [
@@ -132,12 +147,46 @@ class Sum(Law):
     def stored(self, delta: float, parameters: NDArray[np.float64]) -> float:
         """Energy stored by all parts, J."""
         spans = self._spans()
-        return sum(part.stored(delta, parameters[a:b]) for part, (a, b) in zip(self.parts, spans, strict=True))
+        return sum(part.stored(delta, parameters[a:b]) for part, (a, b) in zip(self.acting, spans, strict=True))
 
     def _spans(self) -> list[tuple[int, int]]:
         """Where the parameters of each part begin and end."""
-        ends = np.cumsum([1] + [HEAD + part.parameters.size for part in self.parts]).tolist()
+        ends = np.cumsum([1] + [HEAD + part.parameters.size for part in self.acting]).tolist()
         return [(start + HEAD, end) for start, end in pairwise(ends)]
+
+
+@dataclass(frozen=True)
+class Gated(Law):
+    """A law of stops as one with memory: it acts while δ > 0 and latches the rate at entry; made by `Sum`."""
+
+    law: Law
+
+    home: ClassVar[str] = "contacts.sum_kernels"
+    compiled: ClassVar[str] = "gated"
+    memory: ClassVar[tuple[int, ...]] = (0, 1)  # type: ignore[misc]
+    borders: ClassVar[int] = 1  # type: ignore[misc]
+    events: ClassVar[tuple[str, ...]] = ("contact", "open")  # type: ignore[misc]
+    opens: ClassVar[bool] = True  # type: ignore[misc]
+
+    @property
+    def jumps(self) -> bool:  # type: ignore[override]
+        """Whether the force does when contact begins."""
+        return self.law.jump
+
+    @property
+    def knots(self) -> tuple[float, ...]:  # type: ignore[override]
+        """Those of the law."""
+        return self.law.knots
+
+    @property
+    def parameters(self) -> NDArray[np.float64]:
+        """(code, rate at entry, floor, address, address of the derivatives, those of the law), open at first."""
+        law = self.law
+        return np.array([0.0, 0.0, law.entry_rate_floor, law.address, law.gradient_address, *law.parameters])
+
+    def stored(self, delta: float, parameters: NDArray[np.float64]) -> float:
+        """What the law stores for δ > 0, J."""
+        return self.law.stored(delta, parameters[5:]) if delta > 0.0 else 0.0
 
 
 def parts_of(law: Law) -> tuple[Law, ...]:

@@ -7,6 +7,9 @@ between two reversals is known in closed form. Begin with `friction`, where a sl
 May import `contacts.law`, `contacts.kernels` and `contacts.sum_kernels`.
 """
 
-from contacts.memory.friction import Jenkins
+from contacts.memory.bouc_wen import BoucWen
+from contacts.memory.friction import Coulomb, ElastoPlastic, Jenkins
+from contacts.memory.iwan import Iwan
+from contacts.memory.walton_braun import WaltonBraun
 
-__all__ = ["Jenkins"]
+__all__ = ["BoucWen", "Coulomb", "ElastoPlastic", "Iwan", "Jenkins", "WaltonBraun"]

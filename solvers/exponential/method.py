@@ -27,6 +27,7 @@ from numba import types
 
 from solvers.compiled.handles import Cast, Packed, opener
 from solvers.compiled.kernels import MATRIX, PROBLEM, REAL, VECTOR, entry
+from solvers.compiled.renewals import most_rows
 from solvers.compiled.state import (
     AT_ONCE,
     CHATTER,
@@ -73,16 +74,14 @@ def advance(problem_at, tables_at, state_at, space_at, books_at, t_end, budget, 
         begin_contacts(problem, state)
         if touching(state):
             begin(problem, tables, state, space, latest(state))
-    begun, borders = state.count[STEPS] + state.count[REJECTED], problem.gap.size
-    for count in problem.border_count:
-        borders += 2 * count
+    begun, rows = state.count[STEPS] + state.count[REJECTED], most_rows(problem)
     while state.count[STEPS] + state.count[REJECTED] - begun < budget:
         if state.now[T] >= t_end:
             note_energy(problem, tables, state, space)
             return DONE
-        if state.count[LOGGED] + borders > log.shape[0]:
+        if state.count[LOGGED] + rows > log.shape[0]:
             return LOG_FULL
-        if state.tape.shape[0] and state.count[TAPED] + borders + 2 > state.tape.shape[0]:
+        if state.tape.shape[0] and state.count[TAPED] + rows + 2 > state.tape.shape[0]:
             return RUNNING
         if state.count[AT_ONCE] > MOST_EVENTS_AT_ONCE:
             return CHATTER
@@ -164,6 +163,7 @@ class Engine:
         if own:
             packed = Packed(packed.value._replace(**own), PROBLEM)
         self.packed, self.problem, self.prepared = packed, packed.value, prepared
+        self.first_parameters = prepared.problem.value.parameters
         self.workspace = prepared.workspace()
         self.workspace.begin(z)
         self.addresses = packed.address, prepared.tables.address, *self.workspace.addresses

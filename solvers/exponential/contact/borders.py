@@ -10,21 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from solvers.compiled.kernels import call_force, call_renewal, dot, indentation, inlined, inner
-from solvers.compiled.state import (
-    AT_ONCE,
-    EVENTS,
-    LAST_EVENT,
-    LOGGED,
-    RENEWAL,
-    T,
-    contact_row,
-    is_open,
-    open_contact,
-    rate_tolerance,
-    surface_tolerance,
-    tape,
-)
+from solvers.compiled.kernels import dot, indentation, inlined, inner
+from solvers.compiled.renewals import margins, margins_in, note_event, renew
+from solvers.compiled.state import rate_tolerance, surface_tolerance
 from solvers.exponential.contact.node_response import DELTAS, RATES, START
 from solvers.exponential.contact.nodes import LOCAL, S
 from solvers.exponential.contact.peaks import motion_around, summit
@@ -33,21 +21,6 @@ _ON = 1e-9  # margin, in units of the largest of the step, at which a step count
 _SAME = 1e-11  # the same for the sign of a node
 _TOGETHER = 1e-9  # part of its way at which a border counts as reached when another is landed on
 _NEAR = 0.2  # lowest node, in units of the largest margin, below which the motion between nodes is looked at
-
-
-@inlined
-def margins(problem, state, s, n, delta, rate, out):
-    """Margins of the borders of element s at n points, row by row."""
-    call_force(problem.borders[s], n, delta, rate, state.entry_rate[s], problem.parameters[s], (out,))
-
-
-@inner
-def margins_in(problem, state, s, x, batch, out):
-    """The same in one state; returns δ and δ̇."""
-    batch[0] = indentation(problem, s, x)
-    batch[1] = dot(problem.read_rate[s], x, 2 * problem.k.size)
-    margins(problem, state, s, 1, batch[0:1], batch[1:2], out)
-    return batch[0], batch[1]
 
 
 @inner
@@ -158,33 +131,11 @@ def passed(problem, state, space, element, border, w, x):
 
 
 @inner
-def _renew(problem, state, s, j, delta, rate, log):
-    """Renew what element s latches on its border j; a row of the log tells of it."""
-    size, t = 2 * problem.k.size, state.now[T]
-    if state.tape.shape[0]:
-        tape(state, RENEWAL, t, t, 0.0, s, j, state.x)
-    was_open = is_open(problem, s)
-    row = log[state.count[LOGGED]]
-    row[0], row[1], row[2], row[4], row[5] = -1.0 - s, t, j, delta, rate
-    batch = row[4:7]
-    call_force(problem.law[s], 1, batch[0:1], batch[1:2], state.entry_rate[s], problem.parameters[s], (batch[2:3],))
-    row[7], row[8], row[9] = state.x[size + 3 + 2 * s], state.x[size + 2 + 2 * s], 0.0
-    row[3] = call_renewal(problem.renewal[s], j, delta, rate, state.entry_rate[s], problem.parameters[s])
-    state.count[LOGGED] += 1
-    state.count[EVENTS] += 1
-    if was_open and not is_open(problem, s):
-        open_contact(problem, state, s, t, rate)
-    if is_open(problem, s) and not was_open:
-        contact_row(problem, state, s, t, -rate, log[state.count[LOGGED]])
-        state.count[LOGGED] += 1
-
-
-@inner
 def renew_border(problem, state, space, element, border, log):
     """Renew one border in the present state."""
     delta, rate = margins_in(problem, state, element, state.x, space.trial, space.margin)
-    _renew(problem, state, element, border, delta, rate, log)
-    _note_event(state)
+    renew(problem, state, element, border, delta, rate, log)
+    note_event(state)
 
 
 @inner
@@ -208,13 +159,5 @@ def renew_all(problem, state, space, element, border, log):
             space.fired[j] = 1.0 if landed else 0.0
         for j in range(count):
             if space.fired[j] > 0.0:
-                _renew(problem, state, s, j, delta, rate, log)
-    _note_event(state)
-
-
-@inlined
-def _note_event(state):
-    """Count events at one instant."""
-    t = state.now[T]
-    state.count[AT_ONCE] = state.count[AT_ONCE] + 1 if t == state.now[LAST_EVENT] else 0
-    state.now[LAST_EVENT] = t
+                renew(problem, state, s, j, delta, rate, log)
+    note_event(state)

@@ -16,6 +16,7 @@ import numpy as np
 
 from solvers.compiled.dop853_tableau import E5, STAGES, A
 from solvers.compiled.kernels import call_force, copy, dot, indentation, inlined, inner, law_forces, table_value
+from solvers.compiled.renewals import margins_in
 from solvers.compiled.state import (
     CALLS,
     LANDING,
@@ -28,7 +29,7 @@ from solvers.compiled.state import (
     tape,
 )
 from solvers.compiled.sums import combine
-from solvers.exponential.contact.borders import margins_in, passed
+from solvers.exponential.contact.borders import passed
 from solvers.exponential.contact.crossings import FORCE, FREE, TURNED, on_the_way, side_at
 from solvers.exponential.contact.node_response import BATCH, DIFFERENCE, LANDED, START
 from solvers.exponential.contact.peaks import state_peaks
