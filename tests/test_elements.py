@@ -13,7 +13,21 @@ from scipy.optimize import brentq
 import fembeam as fb
 import reduction
 import solvers
-from contacts import Hertz, Hysteretic, Jenkins, KelvinVoigt, PiecewiseLinear, Polynomial, Tabulated, law
+from contacts import (
+    BoucWen,
+    Coulomb,
+    ElastoPlastic,
+    Hertz,
+    Hysteretic,
+    Iwan,
+    Jenkins,
+    KelvinVoigt,
+    PiecewiseLinear,
+    Polynomial,
+    Tabulated,
+    WaltonBraun,
+    law,
+)
 from fembeam.plot.axis_names import axis_name
 from fembeam.scene import changes_structure, with_value
 from fembeam.scene_file import SceneFileError, json_schema, read
@@ -277,6 +291,7 @@ def entering(delta, delta_dot, entry_rate, stiffness):
         (Hysteretic(1e9, 0.2), "not a number"),
         (entering(stiffness=1.0), "depends on the rate of entry"),
         (KelvinVoigt(1.0, 1.0, clamp=True), "is cut at zero"),
+        (WaltonBraun(1.0, 2.0), "is cut at zero"),
         (Tabulated([1e-3, 2e-3], [1.0, 3.0]), "a table of measured forces begins at d = 0"),
     ],
 )
@@ -293,6 +308,11 @@ def test_laws_for_positive_indentation_only_are_refused(law, why):
         PiecewiseLinear([1.0, 2.0], (0.1,)),
         KelvinVoigt(1.0, 2.0) + Polynomial([0.0, 0.0, 3.0]),
         softened(stiffness=2.0),
+        Jenkins(1.0, 2.0) + KelvinVoigt(1.0, 0.0),
+        Coulomb(1.0, 100.0),
+        Iwan([1.0, 1.0], [1.0, 2.0]),
+        BoucWen(1.0, 0.1, 1.0, 0.5, 0.5),
+        ElastoPlastic(1.0, 1.0, 0.1),
     ],
 )
 def test_laws_for_both_signs_are_taken(law):
@@ -517,6 +537,21 @@ def test_an_element_with_memory_is_replayed():
         model.equilibrium({1.0: -2.0})
 
 
+def test_a_stop_with_memory_is_replayed():
+    """A yielding stop under a falling tip: the force of every blow has the peak of the log, less at the same depth."""
+    stop = fb.Stop(1.0, WaltonBraun(200.0, 900.0))
+    model = beam([fb.Clamped(0.0)], stops=[stop], gravity=1.0).reduce(2)
+    run = model.simulate(6.0, 2e-4, model.state(displacement=lambda z: 0.1 * z**2))
+    log, force = run.contacts, run.force()
+    assert len(log) > 1
+    assert force.min() >= 0.0
+    first = (run.t >= log.t_in[0]) & (run.t <= log.t_out[0])
+    assert force[first].max() == pytest.approx(log.peak_force[0], rel=1e-4)
+    assert simpson(force[first], x=run.t[first]) == pytest.approx(log.impulse[0], rel=1e-3)
+    assert np.all(force[run.indentation() < 0.0] == 0.0)
+
+
 def test_laws_that_never_open_are_no_stops():
     with pytest.raises(ValueError, match=r"law must be one that opens, .* make it an Element"):
         fb.Stop(0.5, Jenkins(1.0, 1.0))
+    fb.Stop(0.5, WaltonBraun(1.0, 2.0))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import fields
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -152,7 +152,7 @@ class ModalEquations:
         ):
             return self.system_of(scene)
         contacts = [
-            contact if new is old else replace(contact, law=new.law, gap=new.gap)
+            contact if new is old else solvers.Contact(contact.direction, new.law, new.gap, new.always)
             for contact, new, old in zip(own.contacts, parts, known, strict=False)
         ]
         kept = own.loads[: len(own.loads) - len(frame)]

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import reduction
-from fembeam.scene import called, tangent
+from contacts.path import borders
+from fembeam.scene import tangent
 from fembeam.support import require, require_finite
 
 if TYPE_CHECKING:
@@ -149,10 +150,7 @@ def _settled(model: Model, load: Vector, free: NDArray[np.bool_]) -> Vector:
 def _check_memory(rows: list[ContactRow], delta: Vector) -> None:
     """Raise AccuracyError when an element with memory would pass a border, such as slip, on the way."""
     for row, d in zip(rows, delta, strict=True):
-        margins = np.ones(getattr(row.law, "borders", 0))
-        if len(margins):
-            called(row.law.memory_kernel("borders"), d, 0.0, row.law.parameters, margins)
-        if np.any(margins < 0):
+        if row.remembers and np.any(borders(row.law, np.array([d]), 0.0, row.law.parameters) < 0):
             raise reduction.AccuracyError(
                 f"the element at z = {row.z} m slips or yields before equilibrium in Model.equilibrium, and where it "
                 "rests depends on how it gets there; simulate from rest instead, with damping"

@@ -6,13 +6,12 @@ renewed from δ and δ̇ there, as the run has logged them.
 
 from __future__ import annotations
 
-import ctypes
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fembeam.scene import called
+from contacts.path import renew
 
 if TYPE_CHECKING:
     from fembeam.model import Run
@@ -20,7 +19,6 @@ if TYPE_CHECKING:
     from solvers.problem import Transitions
 
 Vector = NDArray[np.float64]
-POINTER = ctypes.POINTER(ctypes.c_double)
 
 
 def contact_force(run: Run, stop: int, contact: ContactRow) -> Vector:
@@ -52,10 +50,9 @@ def _replayed(law: Any, log: Transitions, stop: int, t: Vector, delta: Vector, r
     parameters, force, begin = np.array(law.parameters), np.empty(len(t)), 0
     for passed, end in enumerate(ends):
         if end > begin:
-            called(law.kernel, delta[begin:end], rate[begin:end], parameters, force[begin:end])
+            force[begin:end] = law.batch(1.0, parameters)(delta[begin:end], rate[begin:end])
         if passed < len(mine):
             at = mine[passed]
-            renew = law.memory_kernel("renew").ctypes
-            renew(int(log.border[at]), log.delta[at], log.delta_dot[at], 1.0, parameters.ctypes.data_as(POINTER))
+            renew(law, int(log.border[at]), log.delta[at], log.delta_dot[at], parameters)
         begin = max(begin, end)
     return force

@@ -6,7 +6,7 @@ Imports: `beams`, `excitation`, `support`, `reduction`; `Scene.reduce` opens the
 
 from fembeam.scene.assembly import Matrices, unsupported
 from fembeam.scene.contact_rows import contact_rows, heights, loaded, loads, static_rows, watched, weight
-from fembeam.scene.element import Element, called, tangent
+from fembeam.scene.element import Element, tangent
 from fembeam.scene.impactor import Impactor
 from fembeam.scene.local_coordinate import LocalCoordinate, unit_of
 from fembeam.scene.parameters import changes_structure, path_of, replaced, value_of, with_value
@@ -33,7 +33,6 @@ __all__ = [
     "Source",
     "Spring",
     "Stop",
-    "called",
     "changes_structure",
     "heights",
     "loaded",

@@ -89,7 +89,7 @@ def one_sided(law: Any) -> Iterator[str]:
         yield "a table of measured forces begins at d = 0"
     elif np.any(pulled != later):
         yield "its force depends on the rate of entry, and nothing enters"
-    elif getattr(law, "bend", None) or (np.any(pushed) and not np.any(pulled)):
+    elif getattr(law, "bend", None) or getattr(law, "opens", False) or (np.any(pushed) and not np.any(pulled)):
         yield "its force is cut at zero"
 
 
@@ -101,14 +101,8 @@ def force_both_ways(law: Any, d: Any, rate: Any = 0.0) -> NDArray[np.float64]:
 
 def tangent(law: Any, d: float, rate: float = 0.0) -> tuple[float, float]:
     """∂F/∂d and ∂F/∂ḋ of a law at one deformation, of one with memory at the start of a run."""
-    slopes = np.zeros((3, 1))
-    called(law.gradient, d, rate, law.parameters, *slopes)
-    return float(slopes[0, 0]), float(slopes[1, 0])
-
-
-def called(kernel: Any, d: Any, rate: Any, parameters: NDArray[np.float64], *out: NDArray[np.float64]) -> None:
-    """Call a compiled function of a law at deformations and rates (k,); it fills `out`."""
     pointer = ctypes.POINTER(ctypes.c_double)
-    arrays = [np.array(x, dtype=float, ndmin=1) for x in (d, rate, parameters)]
-    d_at, rate_at, parameters_at = (x.ctypes.data_as(pointer) for x in arrays)
-    kernel.ctypes(len(arrays[0]), d_at, rate_at, 1.0, parameters_at, *(x.ctypes.data_as(pointer) for x in out))
+    arrays = [np.array(x, dtype=float, ndmin=1) for x in (d, rate, law.parameters, 0.0, 0.0, 0.0)]
+    at = [x.ctypes.data_as(pointer) for x in arrays]
+    law.gradient.ctypes(1, *at[:2], 1.0, *at[2:])
+    return float(arrays[3][0]), float(arrays[4][0])
