@@ -1,27 +1,33 @@
 """Contact laws: indentation, its rate and the entry rate in; force out.
 
 The force acts while ``delta > 0`` and is positive when it pushes the bodies apart. A law depends on these three numbers
-only. Laws with a state of their own (Bouc–Wen, Jenkins, Iwan) are not included: every method would have to integrate
-that state, locate yield and return, differentiate and save it, for elements that act all the time.
+alone, or also on a few latched ones that are renewed at borders: `contacts.memory`.
 """
 
 from contacts.curves import PiecewiseLinear, Tabulated
 from contacts.custom import CustomLaw, law
 from contacts.identification import Estimate, Identified, identify, read_collisions
-from contacts.law import Law, Sum, parallel
+from contacts.law import Law
+from contacts.memory import BoucWen, Coulomb, ElastoPlastic, Iwan, Jenkins, WaltonBraun
 from contacts.polynomial import Polynomial
 from contacts.power_laws import PUBLISHED, Hertz, Hysteretic
 from contacts.restitution import Bounce, achieved_restitution, bounce, damping_factor_for, restitution
+from contacts.sums import Sum, parallel
 from contacts.viscous import KelvinVoigt, Viscoelastic
 
 __all__ = [
     "PUBLISHED",
+    "BoucWen",
     "Bounce",
+    "Coulomb",
     "CustomLaw",
+    "ElastoPlastic",
     "Estimate",
     "Hertz",
     "Hysteretic",
     "Identified",
+    "Iwan",
+    "Jenkins",
     "KelvinVoigt",
     "Law",
     "PiecewiseLinear",
@@ -29,6 +35,7 @@ __all__ = [
     "Sum",
     "Tabulated",
     "Viscoelastic",
+    "WaltonBraun",
     "achieved_restitution",
     "bounce",
     "damping_factor_for",

@@ -6,7 +6,7 @@ import inspect
 import math
 from dataclasses import dataclass, field
 from importlib import import_module
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,8 @@ class CustomLaw(Law):
     exponent: float = 1.0
     entry_rate_floor: float = ENTRY_RATE_FLOOR
     derivative: Function | None = field(default=None, repr=False)
+
+    one_sided: ClassVar[bool] = False  # type: ignore[misc]
 
     @property
     def parameters(self) -> NDArray[np.float64]:

@@ -27,8 +27,8 @@ def compiled(function: Function, derivative: Function | None, count: int) -> tup
     def differences(n, delta, delta_dot, entry_rate, values, by_delta, by_rate, by_entry):  # type: ignore[no-untyped-def]
         for i in range(n):
             d, v, r = delta[i], delta_dot[i], entry_rate
-            h = 1e-5 * d + 1e-14  # relative to the cube root of rounding; below the surface the law is not asked
-            low = max(d - h, 0.0)
+            h = 1e-5 * abs(d) + 1e-14  # relative to the cube root of rounding; a stop is not asked below its surface
+            low = d - h if d < 0.0 else max(d - h, 0.0)
             by_delta[i] = (scalar(d + h, v, r, *values) - scalar(low, v, r, *values)) / (d + h - low)
             h = 1e-5 * max(abs(v), r)
             by_rate[i] = (scalar(d, v + h, r, *values) - scalar(d, v - h, r, *values)) / (2.0 * h)

@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 
 from contacts.custom import CustomLaw
-from contacts.law import Law, Sum, parts_of
+from contacts.law import Law
+from contacts.path import work
 from contacts.restitution import bounce, restitution
+from contacts.sums import Sum, parts_of
 
 
 def describe(law: Law, entry_rate: float = 1.0, mass: float = 1.0) -> str:
@@ -20,10 +22,13 @@ def describe(law: Law, entry_rate: float = 1.0, mass: float = 1.0) -> str:
         lines += [f"  {_name(part)}: {part.equation}; {_values(part)}" for part in law.parts]
     else:
         lines.append(f"  parameters: {_values(law)}")
-    lines.append(f"  restitution: {_restitution(law, entry_rate, mass)}")
+    if law.memory and not law.opens:
+        lines += [f"  {_cycle(law)}"] if law.reach > 0.0 else []
+    else:
+        lines.append(f"  restitution: {_restitution(law, entry_rate, mass)}")
     if law.nominal is not None:
         lines.append(f"  {law.nominal[0]}: {_source(law)}")
-    remarks = law.remarks or _observed(law, entry_rate, mass)
+    remarks = law.remarks or (() if law.memory else _observed(law, entry_rate, mass))
     lines += [f"  {remark}" for remark in remarks]
     if law.knots:
         shown = ", ".join(f"{knot:.4g}" for knot in law.knots[:6]) + (", …" if len(law.knots) > 6 else "")
@@ -45,12 +50,19 @@ def _values(law: Law) -> str:
 
 
 def _shown(value: Any) -> str:
-    """A number, a flag, or a short sequence."""
-    if isinstance(value, (bool, np.bool_)):
+    """A number, a flag, a word, or a short sequence."""
+    if isinstance(value, (bool, np.bool_, str, type(None))):
         return str(value)
     if isinstance(value, (tuple, list)):
         return f"({', '.join(f'{x:.6g}' for x in value[:6])}{', …' if len(value) > 6 else ''})"
     return f"{value:.6g}"
+
+
+def _cycle(law: Law) -> str:
+    """Loss of the second slow cycle, large enough for all of the memory."""
+    X = law.reach
+    lost = work(law, [0.0, X, -X, X, -X, X]) - work(law, [0.0, X, -X, X])
+    return f"a slow cycle between δ = ±{X:.4g} m loses {lost:.6g} J"
 
 
 def _restitution(law: Law, entry_rate: float, mass: float) -> str:

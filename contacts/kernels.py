@@ -6,31 +6,32 @@ from llvmlite import ir
 from numba import carray, cfunc, config, njit, types
 from numba.extending import intrinsic
 
-_REALS = types.CPointer(types.float64)
-SIGNATURE = types.void(types.int64, _REALS, _REALS, types.float64, _REALS, _REALS)
-GRADIENT = types.void(types.int64, _REALS, _REALS, types.float64, _REALS, _REALS, _REALS, _REALS)
+REALS = types.CPointer(types.float64)
+SIGNATURE = types.void(types.int64, REALS, REALS, types.float64, REALS, REALS)
+GRADIENT = types.void(types.int64, REALS, REALS, types.float64, REALS, REALS, REALS, REALS)
+PART = 11  # numbers in a sum's parameters before those of each part
 
 if config.DISABLE_JIT:
     raise RuntimeError("NUMBA_DISABLE_JIT is set, but contact laws run as machine code only: unset it")
 
 
-def _compiled(decorator, *signature):
+def compiled(decorator, *signature):
     """The decorator with our options; machine code is kept where numba finds a folder it may write to.
 
     It looks whether this file has changed: that is enough, since all that these functions call is in it.
     """
 
-    def compiled(function):
+    def made(function):
         try:
             return decorator(*signature, error_model="numpy", cache=True)(function)
         except RuntimeError:  # no folder: then each process compiles for a second
             return decorator(*signature, error_model="numpy")(function)
 
-    return compiled
+    return made
 
 
-_force = _compiled(cfunc, SIGNATURE)
-_gradient = _compiled(cfunc, GRADIENT)
+_force = compiled(cfunc, SIGNATURE)
+_gradient = compiled(cfunc, GRADIENT)
 
 
 @_force
@@ -75,7 +76,7 @@ def power_gradient(n, delta, delta_dot, entry_rate, parameters, by_delta, by_rat
             by_delta[i], by_rate[i], by_entry[i] = 0.0, 0.0, 0.0
 
 
-@_compiled(njit)
+@compiled(njit)
 def _horner(coefficients, first, count, x):
     """Value and slope at x of the polynomial with ``count`` coefficients from ``first`` on, the constant first."""
     value, slope = coefficients[first + count - 1], 0.0
@@ -85,7 +86,7 @@ def _horner(coefficients, first, count, x):
     return value, slope
 
 
-@_compiled(njit)
+@compiled(njit)
 def _piece(table, m, d, v):
     """Place in the table of the piece that holds d, by bisection."""
     # on a knot, to rounding, the piece it comes from: the dashpot may jump there, and steps end on knots
@@ -151,7 +152,7 @@ def _call(outputs):
     @intrinsic
     def call(typingctx, address, point, delta, delta_dot, entry_rate, parameters, offset):
         results = types.UniTuple(types.float64, outputs)
-        signature = results(types.int64, types.int64, _REALS, _REALS, types.float64, _REALS, types.int64)
+        signature = results(types.int64, types.int64, REALS, REALS, types.float64, REALS, types.int64)
 
         def codegen(context, builder, sig, args):
             from numba.core import cgutils
@@ -176,15 +177,15 @@ _gradient_at = _call(3)
 
 @_force
 def parallel(n, delta, delta_dot, entry_rate, parameters, force):
-    """Sum of laws by their addresses: parameters (count, then per law: address, gradient's, floor, size, its own)."""
+    """Sum of laws by their addresses; parameters as in `contacts.sums.Sum.parameters`."""
     for i in range(n):
         force[i] = 0.0
     at = 1
     for _ in range(int(parameters[0])):
         rate = max(entry_rate, parameters[at + 2])
         for i in range(n):
-            force[i] += _force_at(int(parameters[at]), i, delta, delta_dot, rate, parameters, at + 4)[0]
-        at += 4 + int(parameters[at + 3])
+            force[i] += _force_at(int(parameters[at]), i, delta, delta_dot, rate, parameters, at + PART)[0]
+        at += PART + int(parameters[at + 3])
 
 
 @_gradient
@@ -196,9 +197,9 @@ def parallel_gradient(n, delta, delta_dot, entry_rate, parameters, by_delta, by_
     for _ in range(int(parameters[0])):
         rate, address = max(entry_rate, parameters[at + 2]), int(parameters[at + 1])
         for i in range(n):
-            slopes = _gradient_at(address, i, delta, delta_dot, rate, parameters, at + 4)
+            slopes = _gradient_at(address, i, delta, delta_dot, rate, parameters, at + PART)
             by_delta[i] += slopes[0]
             by_rate[i] += slopes[1]
             if entry_rate > parameters[at + 2]:
                 by_entry[i] += slopes[2]
-        at += 4 + int(parameters[at + 3])
+        at += PART + int(parameters[at + 3])

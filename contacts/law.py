@@ -8,6 +8,18 @@ through the address of one compiled function with a declared C signature,
 
 so a new law never recompiles an integrator, and a batch of ``n`` values costs one call. The main integrator has power
 laws of exponent 1 and 3/2 inlined: `Law.inlined` decides.
+
+A law may have a memory: some of its parameters are latched numbers, renewed where a border function of the present
+segment falls to zero. Integrators keep a copy of the parameters per contact and per run; four kernels more read and
+write it, with B borders and l latched numbers,
+
+    void borders(n, delta, delta_dot, entry_rate, parameters, double *values)             (B, n), > 0 in the segment
+    int64 renew(int64 j, double delta, double delta_dot, double entry_rate, parameters)   the index of the event
+    void memory_gradient(n, delta, delta_dot, entry_rate, parameters, double *by_memory)  (l, n), dF/dL
+    void renew_gradient(j, delta, delta_dot, entry_rate, parameters, double *out)         (l, 2 + l), dL'/d(δ, δ̇, L)
+
+The last takes the parameters before the renewal; its rows and columns of segment codes are zero, and j = -1 asks for
+the derivative of no renewal.
 """
 
 from __future__ import annotations
@@ -16,12 +28,15 @@ import ctypes
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import reduce
-from typing import Any, ClassVar
+from dataclasses import replace
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    from contacts.sums import Sum
 
 ENTRY_RATE_FLOOR = 1e-3
 """Smallest entry rate a law is given by default, m/s: a/entry_rate is singular at grazing."""
@@ -40,13 +55,22 @@ class Law(ABC):
     powers : exponents of all terms at first touch, 0 for one that jumps.
     bend : where else the force has a kink: "rate" at delta_dot = 0, "force" where it is cut at zero (`uncut` is then
         the law without the cut), None nowhere.
+    memory : places in `parameters` of the latched numbers, segment codes included; the values there are those at the
+        start of a run.
+    borders : number of border functions; one that does not exist in a segment has the value 1.
+    events : names of the codes `renew` returns.
+    jumps : whether the force jumps at a border.
+    one_sided : whether the law is defined for delta > 0 only.
+    reach : δ in m at which all of the memory is at work, 0 without one.
+    opens : whether the first latched number is a segment code that is 0 while the contact is open, F = 0.
     entry_rate_floor : entry rates below it (m/s) are raised to it before the law sees them.
     kinds : names by which scene files choose it, each with the constructor it stands for, "" being the class.
     equation, units, remarks : what `describe` says of it: the formula, units of the parameters, where it pulls, where
         it is singular, how it is integrated.
     """
 
-    compiled: ClassVar[str] = ""  # its force in contacts.kernels; the derivatives are <compiled>_gradient
+    home: ClassVar[str] = "contacts.kernels"  # the module of its kernels
+    compiled: ClassVar[str] = ""  # its force there; the derivatives are <compiled>_gradient, and so on
     kinds: ClassVar[dict[str, str]] = {}
     equation: ClassVar[str] = ""
     units: ClassVar[dict[str, str]] = {}
@@ -55,6 +79,13 @@ class Law(ABC):
     knots: tuple[float, ...] = ()
     jump: bool = False
     exponent: float = 1.0
+    memory: tuple[int, ...] = ()
+    borders: int = 0
+    events: tuple[str, ...] = ()
+    jumps: bool = False
+    one_sided: bool = True
+    opens: bool = False
+    reach: float = 0.0
     entry_rate_floor: float = ENTRY_RATE_FLOOR
 
     @property
@@ -80,16 +111,16 @@ class Law(ABC):
     @property
     def kernel(self) -> Any:
         """The compiled force (a numba ``cfunc``) with the module's C signature."""
-        from contacts import kernels
-
-        return getattr(kernels, self.compiled)
+        return getattr(import_module(self.home), self.compiled)
 
     @property
     def gradient(self) -> Any:
         """The compiled derivatives of the force, likewise."""
-        from contacts import kernels
+        return getattr(import_module(self.home), f"{self.compiled}_gradient")
 
-        return getattr(kernels, f"{self.compiled}_gradient")
+    def memory_kernel(self, name: str) -> Any:
+        """The compiled "borders", "renew", "memory_gradient" or "renew_gradient" of a law with memory."""
+        return getattr(import_module(self.home), f"{self.compiled}_{name}")
 
     @property
     def address(self) -> int:
@@ -100,6 +131,29 @@ class Law(ABC):
     def gradient_address(self) -> int:
         """Address of the compiled derivatives."""
         return int(self.gradient.address)
+
+    @property
+    def borders_address(self) -> int:
+        """Address of the compiled border functions; 0 without memory, as for the next three."""
+        return self._memory_address("borders")
+
+    @property
+    def renew_address(self) -> int:
+        """Address of the compiled renewal of the latched numbers."""
+        return self._memory_address("renew")
+
+    @property
+    def memory_gradient_address(self) -> int:
+        """Address of the compiled derivatives of the force by the latched numbers."""
+        return self._memory_address("memory_gradient")
+
+    @property
+    def renew_gradient_address(self) -> int:
+        """Address of the compiled derivatives of the renewal."""
+        return self._memory_address("renew_gradient")
+
+    def _memory_address(self, name: str) -> int:
+        return int(self.memory_kernel(name).address) if self.memory else 0
 
     @property
     def inlined(self) -> tuple[float, float, float, float] | None:
@@ -114,10 +168,14 @@ class Law(ABC):
         """Both laws at once."""
         if not isinstance(other, Law):
             return NotImplemented
+        from contacts.sums import Sum, parts_of
+
         return Sum((*parts_of(self), *parts_of(other)))
 
     def force(self, delta: ArrayLike, delta_dot: ArrayLike = 0.0, entry_rate: ArrayLike = 1.0) -> NDArray[np.float64]:
         """Contact force in N, zero where ``delta <= 0``.
+
+        With memory it is that at the start of a run, at both signs of ``delta`` unless the law is one-sided.
 
         Parameters
         ----------
@@ -129,7 +187,8 @@ class Law(ABC):
         """
         d, v, r = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (delta, delta_dot, entry_rate)))
         out = np.where(np.isnan(d + v + r), math.nan, 0.0)
-        touching = np.flatnonzero((d > 0.0) & ~np.isnan(out))
+        everywhere = bool(self.memory) and not self.one_sided
+        touching = np.flatnonzero(((d > 0.0) | everywhere) & ~np.isnan(out))
         touching = touching[np.argsort(r.flat[touching], kind="stable")]
         rates, starts = np.unique(r.flat[touching], return_index=True)
         for rate, start, count in zip(rates, starts, np.diff(starts, append=len(touching)), strict=True):
@@ -137,10 +196,14 @@ class Law(ABC):
             out.flat[chosen] = self.batch(float(rate))(d.flat[chosen], v.flat[chosen])
         return out[()]
 
-    def batch(self, entry_rate: float) -> Callable[[NDArray, NDArray], NDArray]:
-        """The force at one entry rate as a lean function of 1-D arrays ``delta >= 0`` and ``delta_dot``."""
+    def batch(self, entry_rate: float, parameters: NDArray | None = None) -> Callable[[NDArray, NDArray], NDArray]:
+        """The force at one entry rate as a lean function of 1-D arrays ``delta >= 0`` and ``delta_dot``.
+
+        With memory at the start of a run, or with other ``parameters``.
+        """
         pointer = ctypes.POINTER(ctypes.c_double)
-        call, parameters, rate = self.kernel.ctypes, self.parameters, max(entry_rate, self.entry_rate_floor)
+        call, rate = self.kernel.ctypes, max(entry_rate, self.entry_rate_floor)
+        parameters = self.parameters if parameters is None else parameters
 
         def evaluate(delta: NDArray, delta_dot: NDArray) -> NDArray:
             force = np.empty(len(delta))
@@ -150,6 +213,36 @@ class Law(ABC):
             return force
 
         return evaluate
+
+    def along(self, delta: ArrayLike) -> NDArray[np.float64]:
+        """Force in N along a path of δ, passed slowly from the start of a run on: loops of a law with memory.
+
+        Exact whatever the distance of the points: borders between them are found to rounding. Dashpots give nothing.
+
+        Parameters
+        ----------
+        delta : (k,) m, finite, one after the other.
+
+        Returns
+        -------
+        (k,) forces. ValueError for a path that is not a row of finite numbers, for a force that is not finite, and for
+        a border that falls to zero again at once after its renewal.
+        """
+        from contacts.path import along
+
+        return along(self, delta)
+
+    def stored(self, delta: float, parameters: NDArray[np.float64]) -> float:
+        """Energy in J that the element would give back at rest from ``delta`` with these parameters.
+
+        Without memory the integral of the force at rest from 0 to ``delta``.
+        """
+        if self.one_sided and delta <= 0.0:
+            return 0.0
+        from scipy.integrate import quad
+
+        kinks = [knot for knot in self.knots if knot < delta] or None
+        return float(quad(lambda x: self.batch(1.0)(np.array([x]), np.zeros(1))[0], 0.0, delta, points=kinks)[0])
 
     def exact_restitution(self, entry_rate: float, mass: float) -> float | None:
         """Restitution of a free mass where a closed relation gives it, else None; see `contacts.restitution`."""
@@ -165,94 +258,6 @@ class Law(ABC):
         from contacts.describe import describe
 
         return describe(self, entry_rate, mass)
-
-
-@dataclass(frozen=True)
-class Sum(Law):
-    """Laws in parallel, ``F = F_1 + F_2 + ...``; written ``law_a + law_b``.
-
-    Each part keeps its own floor of the entry rate.
-
-    Parameters
-    ----------
-    parts : the laws F_1, F_2, ...
-
-    Examples
-    --------
-    >>> from contacts import Hertz, KelvinVoigt
-    >>> float((Hertz(1e9) + KelvinVoigt(1e6, 100.0)).force(1e-4, 0.5))
-    1150.0
-    """
-
-    parts: tuple[Law, ...]
-
-    def __post_init__(self) -> None:
-        wrong = [part for part in self.parts if not isinstance(part, Law)]
-        if wrong or not self.parts:
-            raise ValueError(f"parts of Sum must be contact laws, at least one, got {wrong[0] if wrong else ()!r}")
-
-    compiled: ClassVar[str] = "parallel"
-    equation: ClassVar[str] = "F = sum of the laws below"
-
-    @property
-    def knots(self) -> tuple[float, ...]:  # type: ignore[override]
-        """The knots of all parts."""
-        return tuple(sorted({knot for part in self.parts for knot in part.knots}))
-
-    @property
-    def jump(self) -> bool:  # type: ignore[override]
-        """Whether any part jumps."""
-        return any(part.jump for part in self.parts)
-
-    @property
-    def exponent(self) -> float:  # type: ignore[override]
-        """The smallest."""
-        return min(part.exponent for part in self.parts)
-
-    @property
-    def powers(self) -> tuple[float, ...]:
-        """Those of all parts."""
-        return tuple(sorted({power for part in self.parts for power in part.powers}))
-
-    @property
-    def bend(self) -> str | None:
-        """That of the parts if they have but one at the same place: a cut part's is not at a zero of the sum."""
-        bends = {part.bend for part in self.parts}
-        return "rate" if bends <= {"rate", None} and "rate" in bends else None
-
-    @property
-    def entry_rate_floor(self) -> float:  # type: ignore[override]
-        """The smallest; the others are applied inside."""
-        return min(part.entry_rate_floor for part in self.parts)
-
-    @property
-    def parameters(self) -> NDArray[np.float64]:
-        """(count, then per part: address, address of its derivatives, floor, size, parameters)."""
-        numbers: list[NDArray] = [np.array([len(self.parts)], dtype=float)]
-        for part in self.parts:
-            own = part.parameters
-            head = [part.address, part.gradient_address, part.entry_rate_floor, own.size]
-            numbers += [np.array(head, dtype=float), own]  # addresses lie below 2**53: exact as floats
-        return np.concatenate(numbers)
-
-
-def parts_of(law: Law) -> tuple[Law, ...]:
-    """The laws that act in parallel in one law."""
-    return law.parts if isinstance(law, Sum) else (law,)
-
-
-def parallel(laws: list[Law]) -> Law:
-    """All laws at once, as ``laws[0] + laws[1] + ...``; for scene files. ValueError for an empty list.
-
-    Examples
-    --------
-    >>> from contacts import Hertz, KelvinVoigt
-    >>> float(parallel([Hertz(1e9), KelvinVoigt(1e6, 0.0)]).force(1e-4))
-    1100.0
-    """
-    if not laws:
-        raise ValueError("laws must name at least one law")
-    return reduce(lambda a, b: a + b, laws)
 
 
 def number(owner: object, name: str, low: float = 0.0, *, strict: bool = False) -> None:

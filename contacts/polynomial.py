@@ -43,6 +43,7 @@ class Polynomial(Law):
     kinds: ClassVar[dict[str, str]] = {"polynomial": ""}
     equation: ClassVar[str] = "F = Σ coefficients[j-1] δ^j, j = 1..k"
     units: ClassVar[dict[str, str]] = {"coefficients": "N/m^j"}
+    one_sided: ClassVar[bool] = False  # type: ignore[misc]
 
     def __post_init__(self) -> None:
         try:

@@ -149,7 +149,8 @@ def bounce(law: Law, entry_rate: float = 1.0, mass: float = 1.0) -> Bounce:
 
     Raises
     ------
-    ValueError for an entry rate or a mass that is not positive; RuntimeError for a law that never stops the mass.
+    ValueError for an entry rate or a mass that is not positive and for a law with memory; RuntimeError for a law that
+    never stops the mass.
 
     Examples
     --------
@@ -159,6 +160,11 @@ def bounce(law: Law, entry_rate: float = 1.0, mass: float = 1.0) -> Bounce:
     (1.0, True)
     """
     _check_throw(entry_rate, mass)
+    if law.memory:
+        raise ValueError(
+            f"bounce knows laws without memory, got {law!r}; integrate a mass on it (solvers.integrate), or lead it "
+            "along a path (Law.along)"
+        )
     force = law.batch(entry_rate)
     scale = entry_rate, mass, force
     t, y = np.zeros(1), np.array([[0.0], [entry_rate]])

@@ -90,6 +90,11 @@ class KelvinVoigt(Law):
         return law
 
     @property
+    def one_sided(self) -> bool:  # type: ignore[override]
+        """A cut is made for one side."""
+        return self.clamp
+
+    @property
     def jump(self) -> bool:  # type: ignore[override]
         """The dashpot's force appears at once."""
         return self.damping > 0.0

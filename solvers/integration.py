@@ -42,6 +42,7 @@ from solvers.problem import (
     SolverError,
     Status,
     System,
+    Transitions,
     hand_over,
     product,
 )
@@ -206,24 +207,35 @@ class _Run:
         complete = self.engine.keeps_ledger(self.times is not None)
         ledger = partial(_energy, self.system, powers, complete, motion, back, self.begin)
         rows = self._rows()
-        log = partial(ContactLog.of_rows, rows)
+        log = partial(ContactLog.of_rows, self._of_stops(rows))
+        transitions = partial(Transitions.of_rows, rows[rows[:, 0] < 0.0], self.system.contacts)
         if status is Status.DONE and not self._balances(powers, complete, motion, rows):
             status = Status.UNBALANCED
         count = self.state.count.tolist()
         cost = Cost(count[STEPS], count[REJECTED], count[CALLS], count[EVENTS], seconds)
         known = self.tangent is not None and status is Status.DONE
         more = {"tangent": self.tangent.matrix(), "rate": self.tangent.rate()} if known else {}
-        return Solution(t, motion[:, :n], motion[:, n:], log, ledger, status, cost, **more)
+        return Solution(t, motion[:, :n], motion[:, n:], log, ledger, status, cost, **more, borders=transitions)
 
     def _balances(self, powers: Array, complete: bool, motion: Array, rows: Array) -> bool:
         """Whether the energy balance closes, where it is kept; methods without `gains` are checked step by step."""
         if not hasattr(self.engine, "gains"):
             return True
+        rows = rows[rows[:, 0] >= 0.0]
         exchanged = rows[:, _DEPTH] * rows[:, _FORCE]
         if not complete or not len(motion):
             return not self.engine.gains(exchanged)
         begin = self.engine.back @ self.begin
         return not unbalanced(self.system, powers, motion, begin, exchanged, self.engine.method.rtol)
+
+    def _of_stops(self, rows: Array) -> Array:
+        """The rows of contacts that begin and end; one with memory under way is none while its law is open."""
+        always = np.array([c.always and not getattr(c.law, "opens", False) for c in self.system.contacts])
+        opening, parameters = self.engine.problem.opening, self.engine.problem.parameters
+        shut = np.array([place < 0 or parameters[s, place] != 0.0 for s, place in enumerate(opening)])
+        stop = rows[:, 0].astype(int)
+        kept: Array = rows[(stop >= 0) & ~always[stop] & (shut[stop] | ~np.isnan(rows[:, 2]))] if len(rows) else rows
+        return kept
 
     def release(self) -> None:
         """Return working arrays for use by other runs."""

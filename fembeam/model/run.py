@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import solvers
 from fembeam.model.shapes import Shapes
-from fembeam.scene import Source
+from fembeam.scene import Source, unit_of
 from fembeam.support import Part, Printed, require
 from solvers.problem import counted
 
@@ -58,6 +58,10 @@ class Run(Printed):
     others: tuple[Shapes, ...] = ()  # of the further beams
     source: Source | None = None  # of a run made from a scene file
     versions: dict[str, str] = field(default_factory=dict)  # that made a run read from a file
+    borders: Callable[[], Any] | None = field(default=None, repr=False)  # what `transitions` are made by
+    kinds: NDArray[np.bool_] = field(
+        default_factory=lambda: np.zeros((0, 2), dtype=bool)
+    )  # (m, 2): of rotation, always acting
 
     def __repr__(self) -> str:
         reached = f"to t = {self.t[-1]:g} s" if len(self.t) else "without samples"
@@ -80,6 +84,16 @@ class Run(Printed):
 
         return self.stored if self.stored is not None and self.model is None else Readout(self.model, self.t)
 
+    @cached_property
+    def transitions(self) -> Any:
+        """Borders that laws with memory passed, see `solvers.problem.Transitions`: times of stick, slip and yield.
+
+        ValueError for a run read from a file.
+        """
+        if self.borders is None:
+            raise ValueError("a run read from a file has no transitions; simulate again")
+        return self.borders()
+
     @property
     def scene_file(self) -> SceneFile:
         """The scene, reduction and studies this run was made from; ValueError for a run made in Python."""
@@ -100,17 +114,11 @@ class Run(Printed):
         if not solution.status.good:
             status += f" (t = {solution.t[-1]:g} s)" if len(solution.t) else " (before the first sample)"
         return cls(
-            *(
-                solution.t,
-                solution.q,
-                solution.q_dot,
-                solution.contacts,
-                solution.ledger,
-                status,
-                solution.cost,
-            ),
+            *(solution.t, solution.q, solution.q_dot, solution.contacts, solution.ledger, status, solution.cost),
             *(model.shapes, stops, model.directions, strikers, repr(model.scene), model),
             others=model.others,
+            borders=solution.borders,
+            kinds=np.array([(one.rotation, one.always) for one in model.contact_rows], dtype=bool).reshape(-1, 2),
         )
 
     @property
@@ -272,16 +280,28 @@ class Run(Printed):
                 "count from 0")  # fmt: skip
         return coordinates[:, coordinates.shape[1] - count + impactor] / np.sqrt(self.strikers[impactor])
 
+    def unit(self, quantity: str, stop: int | None = None) -> str:
+        """Unit of "indentation", "speed", "force" or "impulse" of a stop; None: of a column that all of them share."""
+        return unit_of(quantity, self.kinds[:, 0] if stop is None else self.kinds[[self._stop(stop)], 0])
+
+    def name(self, stop: int) -> str:
+        """What tables call a stop or element: "stop 0", "element 1", "stop 2 (rotation)"."""
+        rotation, always = self.kinds[self._stop(stop)]
+        return f"{'element' if always else 'stop'} {stop}" + " (rotation)" * bool(rotation)
+
     def indentation(self, stop: int = 0) -> Vector:
-        """δ(t) (k,) of a stop, m; negative while it is open. Contacts of impactors count on after the stops."""
+        """δ(t) (k,) of a stop, m or rad; negative while it is open. Elements, then impactors, count on after the stops.
+
+        Of an element its deformation d(t).
+        """
         return -self.q @ self.directions[self._stop(stop)] - self.stops[stop, 2]
 
     def indentation_rate(self, stop: int = 0) -> Vector:
-        """δ̇(t) (k,) of a stop, m/s: of both bodies where the stop moves."""
+        """δ̇(t) (k,) of a stop or element, m/s or rad/s: of both bodies where the stop moves."""
         return -self.q_dot @ self.directions[self._stop(stop)]
 
     def force(self, stop: int = 0, mean: bool = False) -> Vector:
-        """Contact force (k,) of a stop, N, from its law and the entry rate latched at the time.
+        """Contact force (k,) of a stop, N or N m, from its law and the entry rate latched at the time; of an element F.
 
         ``mean``: over each sample (halfway to its neighbours) instead of at it, so that contacts shorter than a sample
         are seen: the trapezoidal rule over the samples gives the log's impulses exactly. Needs the model, whose law

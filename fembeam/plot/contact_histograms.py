@@ -39,13 +39,14 @@ def contacts(run: Run, discard: float = 0.0, axes: Sequence[Axes] | None = None)
     if not np.any(kept):
         raise ValueError("the run has no finished contact to draw")
     figure, drawn = sheet(2, 2, (7.0, 4.8), axes)
+    speed = run.unit("speed").replace("/s", " s⁻¹")
     for axis, values, name, unit in (
         (drawn[0], 1e3 * (log.t_out - log.t_in)[kept], "duration", "ms"),
-        (drawn[1], log.peak_force[kept], "peak force", "N"),
-        (drawn[2], log.speed_in[kept], "entry speed", "m s⁻¹"),
+        (drawn[1], log.peak_force[kept], "peak force", run.unit("force")),
+        (drawn[2], log.speed_in[kept], "entry speed", speed),
     ):
         _histogram(axis, values, name, unit)
-    _restitutions(drawn[3], log.speed_in[kept], log.speed_out[kept])
+    _restitutions(drawn[3], log.speed_in[kept], log.speed_out[kept], speed)
     if axes is None:
         count, stops = int(np.count_nonzero(kept)), len(np.unique(log.stop[kept]))
         of = f" of {stops} stops" if stops > 1 else ""
@@ -69,7 +70,7 @@ def _histogram(axis: Axes, values: Vector, name: str, unit: str) -> None:
     axis.yaxis.set_major_locator(MaxNLocator(integer=True))
 
 
-def _restitutions(axis: Axes, speed_in: Vector, speed_out: Vector) -> None:
+def _restitutions(axis: Axes, speed_in: Vector, speed_out: Vector, unit: str) -> None:
     """Restitution against entry speed, at most MOST_DOTS evenly picked contacts; triangles lie above the axis."""
     moving = speed_in > 0.0
     if not moving.any():  # all began at rest on the stop
@@ -97,5 +98,5 @@ def _restitutions(axis: Axes, speed_in: Vector, speed_out: Vector) -> None:
         axis.set_xscale("log")
         plain_decades(axis.xaxis, low, high)
     axis.set_xlim(low, high)
-    axis.set_xlabel("entry speed / m s⁻¹" + ", top 99.5 %" * bool(slow))
+    axis.set_xlabel(f"entry speed / {unit}" + ", top 99.5 %" * bool(slow))
     axis.set_ylabel("exit / entry speed")

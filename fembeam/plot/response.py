@@ -30,7 +30,7 @@ import numpy as np
 
 from fembeam.model import places
 from fembeam.plot.random import density_panels
-from fembeam.plot.run_signals import estimated, sampling_of, stationary
+from fembeam.plot.run_signals import estimated, first_stop, natural, sampling_of, stationary
 from fembeam.plot.spectra import segment_for
 from fembeam.plot.style import BLUE, GREY, ORANGE, Vector, styled
 
@@ -82,7 +82,7 @@ def time_history(
         stops = _stops_at(run, body, place)
         _shade_contacts(drawn, run, stops, lo, hi)
         _draw_forces(drawn[1], run, lo, hi)
-        title += f", contacts of {_listed(stops, len(run.stops))} shaded"
+        title += f", contacts of {_listed(stops, run)} shaded" if len(stops) else ""
     drawn[-1].set_xlabel("time / s")
     beside = 0.0 if window else 0.01 * (hi - lo)  # so that a contact at the first instant is seen
     drawn[-1].set_xlim(lo - beside, hi + beside)
@@ -136,7 +136,7 @@ def mode_shapes(model: Model, axes: Axes | None = None) -> Figure:
 def _window(run: Run) -> tuple[float, float]:
     """Eight periods of the lowest mode that swings (or 400 samples): the last ones, of a transient about its peak."""
     begin, end = float(run.t[0]), float(run.t[-1])
-    swinging = [] if run.model is None else [omega for omega in run.model.omega if omega > 0]
+    swinging = [omega for omega in natural(run) if omega > 0]
     length = min(PERIODS * 2 * np.pi / min(swinging) if swinging else 400 * sampling_of(run), end - begin)
     if stationary(run):
         return end - length, end
@@ -154,12 +154,12 @@ def _resting_place(run: Run) -> float:
 
 
 def _watched(run: Run, lo: float, hi: float) -> tuple[int, float]:
-    """Beam and z of the stop with the largest force between two times; of the first one; of the tip."""
-    if not len(run.stops):
+    """Beam and z of the stop of displacement with the largest force between two times; of the first one; of the tip."""
+    log, first = run.contacts, first_stop(run)
+    if first is None:
         return 0, _resting_place(run)
-    log = run.contacts
-    inside = np.flatnonzero(_within(run, lo, hi))
-    stop = int(log.stop[inside[np.argmax(log.peak_force[inside])]]) if len(inside) else 0
+    inside = np.flatnonzero(_within(run, lo, hi) & ~run.kinds[log.stop, 0])
+    stop = int(log.stop[inside[np.argmax(log.peak_force[inside])]]) if len(inside) else first
     return _bodies(run)[stop], float(run.stops[stop, 0])
 
 
@@ -169,14 +169,15 @@ def _bodies(run: Run) -> list[int]:
 
 
 def _stops_at(run: Run, body: int, z: float) -> NDArray[np.int64]:
-    """Numbers of the contacts at a place, or of all where there is none."""
-    near = np.isclose(run.stops[:, 0], z) & (np.array(_bodies(run)) == body)
-    return np.flatnonzero(near if near.any() else ~near)
+    """Numbers of the stops at a place, or of all where there is none; elements have no contacts."""
+    stops = ~run.kinds[:, 1]
+    near = stops & np.isclose(run.stops[:, 0], z) & (np.array(_bodies(run)) == body)
+    return np.flatnonzero(near if near.any() else stops)
 
 
-def _listed(stops: NDArray[np.int64], count: int) -> str:
+def _listed(stops: NDArray[np.int64], run: Run) -> str:
     """Numbers of stops as words."""
-    if len(stops) == count > 1:
+    if len(stops) == np.count_nonzero(~run.kinds[:, 1]) > 1:
         return "all stops"
     return f"stop{'s' * (len(stops) > 1)} " + ", ".join(map(str, stops))
 
@@ -212,22 +213,24 @@ def _shade_contacts(axes: list[Axes], run: Run, stops: NDArray[np.int64], lo: fl
 
 
 def _draw_forces(axis: Axes, run: Run, lo: float, hi: float) -> None:
-    """The force of every stop touched in the window: as sampled, and as peaks of contacts too short for that."""
+    """The force of every element and stop touched in the window: sampled, and peaks of contacts too short for that."""
     log, inside = run.contacts, _within(run, lo, hi)
     short = inside & (log.t_out - log.t_in < FEW * sampling_of(run))
     kept = (run.t >= lo) & (run.t <= hi)
-    for stop in np.unique(log.stop[inside]):
+    always = np.flatnonzero(run.kinds[:, 1])
+    drawn = np.union1d(always, log.stop[inside])
+    for stop in drawn:
         mine = log.stop == stop
         look: dict[str, Any] = {"color": f"C{stop}", "label": _stop_name(run, int(stop))}
-        if np.any(mine & inside & ~short):
+        if stop in always or np.any(mine & inside & ~short):
             axis.plot(run.t[kept], run.force(int(stop))[kept], **look)
             look.pop("label")
         axis.vlines(log.t_in[mine & short], 0.0, log.peak_force[mine & short], linewidth=1.2, **look)
-    kind = "peak contact force" if np.all(short[inside]) else "contact force"
-    axis.set_ylabel(f"{kind} / N" if inside.any() else "contact force / N")
-    if len(run.stops) > 1 and inside.any():
+    kind = "peak contact force" if len(drawn) > len(always) and np.all(short[inside]) else "contact force"
+    axis.set_ylabel(f"{'force' if len(always) else kind} / {run.unit('force')}")
+    if len(run.stops) > 1 and len(drawn):
         axis.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=2, borderaxespad=0.0, fontsize=8)
-    if inside.any():
+    if len(drawn):
         axis.set_ylim(bottom=min(0.0, axis.get_ylim()[0]))
     else:
         axis.set(ylim=(0.0, 1.0), yticks=[0.0])
@@ -236,18 +239,23 @@ def _draw_forces(axis: Axes, run: Run, lo: float, hi: float) -> None:
 
 def _stop_name(run: Run, stop: int) -> str:
     """A contact as words."""
-    z, push, _ = run.stops[stop]
-    return f"stop {stop}, {'below' if push > 0 else 'above'}, z = {1e3 * z:.5g} mm"
+    (z, push, _), one_sided = run.stops[stop], not run.kinds[stop].any()
+    side = f", {'below' if push > 0 else 'above'}" if one_sided else ""
+    return f"{run.name(stop)}{side}, z = {1e3 * z:.5g} mm"
 
 
 def _mark_features(axis: Axes, model: Model) -> None:
-    """Supports as squares, masses as circles, stops as triangles on their side of the beam."""
+    """Supports as squares, masses as circles, stops as triangles on their side of the beam, elements as diamonds."""
     scene = model.scene
+    stops = [stop for stop in scene.stops if not stop.coordinate.rotation]
+    turned = [stop for stop in scene.stops if stop.coordinate.rotation]
     marks: list[tuple[str, list[tuple[float, float]], str, str]] = [
         ("support", [(s.z, 0.0) for s in scene.supports], "s", "black"),
         ("mass", [(m.z, 0.0) for m in scene.masses], "o", GREY),
-        ("stop below", [(s.z, -0.13) for s in scene.stops if s.push > 0], "^", "black"),
-        ("stop above", [(s.z, 0.13) for s in scene.stops if s.push < 0], "v", "black"),
+        ("stop below", [(s.z, -0.13) for s in stops if s.push > 0], "^", "black"),
+        ("stop above", [(s.z, 0.13) for s in stops if s.push < 0], "v", "black"),
+        ("stop of rotation", [(s.z, 0.0) for s in turned], "P", "black"),
+        ("element", [(e.z, 0.0) for e in scene.elements], "D", "black"),
     ]
     for label, points, marker, colour in marks:
         if points:

@@ -20,18 +20,30 @@ STEADY = 0.1  # of the largest mean square over a quarter of the time: below it 
 
 
 def responses(run: Run, discard: float = 0.0) -> dict[str, Vector]:
-    """Signals worth a density, m: δ of the first stop (the tip when there is none) and mid-beam."""
+    """Signals worth a density, m: δ of the first stop of displacement (the tip when there is none) and mid-beam."""
     kept = run.t >= discard
-    named = places(run.shapes)
-    first = {"δ": run.indentation(0)} if len(run.stops) else {}
+    named, stop = places(run.shapes), first_stop(run)
+    first = {} if stop is None else {"δ": run.indentation(stop)}
     if not first and "tip" in named:
         first = {"tip u": run.displacement(named["tip"])}
     return {name: x[kept] for name, x in {**first, "mid-beam u": run.displacement(named["mid-beam"])}.items()}
 
 
+def first_stop(run: Run) -> int | None:
+    """Number of the first stop or element that acts on displacement, not on the slope."""
+    found = np.flatnonzero(~run.kinds[:, 0])
+    return int(found[0]) if len(found) else None
+
+
 def watched(run: Run) -> float:
-    """The place to watch, m: of the first stop, else the tip, else mid-beam."""
-    return float(run.stops[0, 0]) if len(run.stops) else next(iter(places(run.shapes).values()))
+    """The place to watch, m: of the first stop of displacement, else the tip, else mid-beam."""
+    stop = first_stop(run)
+    return next(iter(places(run.shapes).values())) if stop is None else float(run.stops[stop, 0])
+
+
+def natural(run: Run) -> Vector:
+    """Natural frequencies, rad/s; none of a run read from a file of an earlier version, which does not hold them."""
+    return run.readout.omega if run.model is not None or run.stored is not None else np.zeros(0)
 
 
 def sampling_of(run: Run) -> float:
@@ -57,9 +69,9 @@ def stationary(run: Run, discard: float = 0.0) -> bool:
 
 def batches(run: Run, discard: float) -> int:
     """How many nearly independent parts the samples make, at most `MOST_BATCHES`; 0 when too few or not known."""
-    if run.model is None or len(run.t) < 2:
+    if not len(natural(run)) or len(run.t) < 2:
         return 0
-    decay = (run.model.zeta * run.model.omega).min()
+    decay = np.diag(run.readout.damping).min() / 2  # ζω
     count = min(MOST_BATCHES, int(max(float(run.t[-1]) - discard, 0.0) * decay / MEMORIES))
     return count if count >= FEWEST_BATCHES else 0
 

@@ -9,8 +9,9 @@ import numpy as np
 
 from fembeam.model import places
 from fembeam.plot.linear import frequencies
-from fembeam.plot.run_signals import estimated, responses, sampling_of
+from fembeam.plot.run_signals import estimated, first_stop, natural, responses, sampling_of
 from fembeam.plot.style import BLUE, GREEN, GREY, Vector, curve, drawable, fit_levels, styled
+from fembeam.response import frame_motion
 from fembeam.scene import signals_of
 from fembeam.statistics import Spectrum, psd
 from fembeam.statistics.spectra import FINEST_RESOLUTION
@@ -87,6 +88,7 @@ def _about(run: Run, discard: float, line: Spectrum) -> str:
 def spectra_of(run: Run, discard: float = 0.0) -> Mapping[str, Spectrum]:
     """Spectra of the base motion (where the run knows it) and of `responses`, these with their confidence."""
     base = None if run.model is None else run.model.scene.base
+    shaken = run.model is None and len(natural(run)) > 0 and run.readout.base is not None
     samples, dt = int(np.count_nonzero(run.t >= discard)), sampling_of(run)
     found = {name: signal.psd for name, signal in estimated(run, discard, segment_for(samples, dt)).items()}
     if base is not None and hasattr(base, "nodes"):  # a sum of many lines: by FFT on its own grid
@@ -94,6 +96,8 @@ def spectra_of(run: Run, discard: float = 0.0) -> Mapping[str, Spectrum]:
         found["base y"] = psd(values[:, 0], dt, segment_for(len(values), dt))
     elif base is not None:
         found["base y"] = psd(np.asarray(base(run.t)), dt, segment_for(len(run.t), dt))
+    elif shaken:  # of a run read from a file: its samples
+        found["base y"] = psd(frame_motion(run), dt, segment_for(len(run.t), dt))
     return found
 
 
@@ -103,7 +107,8 @@ def _linear(run: Run) -> dict[str, Spectrum]:
     if run.model is None or len(signals) != 1 or not hasattr(next(iter(signals.values())), "psd_at"):
         return {}
     ((path, noise),) = signals.items()
-    row = next(iter(run.model.contact_rows), None)
+    stop = first_stop(run)
+    row = None if stop is None else run.model.contact_rows[stop]
     if row is not None and row.on[0] != "frame":  # δ is of two bodies
         return {}
     watched, found = places(run.shapes), {}
@@ -119,7 +124,7 @@ def _linear(run: Run) -> dict[str, Spectrum]:
 
 def _axis_end(run: Run, line: Spectrum) -> float:
     """2.5 times the highest frequency kept, within what the samples resolve."""
-    highest = 0.0 if run.model is None else 2.5 * float(run.model.omega[-1])
+    highest = 2.5 * float(natural(run).max(initial=0.0))
     return float(min(highest or np.inf, line.omega[-1]))  # 0: rigid-body modes alone
 
 
@@ -153,7 +158,8 @@ def _mark_peaks(axis: Axes, line: Spectrum, top: float) -> None:
 
 def _mark_frequencies(axes: tuple[Axes, ...], run: Run, top: float) -> None:
     """Dotted lines at the natural frequencies, their names above the first of the axes."""
-    omega = np.array([] if run.model is None else run.model.omega[run.model.omega < top])
+    omega = natural(run)
+    omega = omega[omega < top]
     for axis in axes:
         for value in omega:
             axis.axvline(value, color=GREY, linestyle=":", linewidth=0.8, zorder=0)

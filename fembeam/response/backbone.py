@@ -23,15 +23,16 @@ def backbone(model: Model, z: float, amplitudes: Vector) -> Vector:
     """Ω (k,) in rad/s at which the lowest mode vibrates freely with max |u(z)| of so many m (k,), > 0.
 
     NaN where this does not hold: gravity or preload, bodies that touch each other, a mode at rest at z, forces that
-    attract. Errors below 1e-6 for smooth laws; where other modes take part the backbone of the structure lies beside.
+    attract, laws with memory. Errors below 1e-6 for smooth laws; where other modes take part the backbone of the structure lies beside.
 
     References
     ----------
     A.H. Nayfeh, D.T. Mook, Nonlinear Oscillations (1979), section 2.3.
     """
     shape = float(model.phi(z)[0])
-    apart = all(row.on[0] == "frame" and row.body == 0 and row.gap >= 0.0 for row in model.contact_rows)
-    if model.scene.gravity != 0.0 or not apart or model.omega[0] == 0.0 or shape == 0.0:
+    apart = all(row.on[0] == "frame" and row.body == 0 and not row.remembers for row in model.contact_rows)
+    loaded = any(row.force(-row.gap) != 0.0 for row in model.contact_rows)
+    if model.scene.gravity != 0.0 or loaded or not apart or model.omega[0] == 0.0 or shape == 0.0:
         return np.full(len(amplitudes), np.nan)
     return np.array([_frequency(model, amplitude / abs(shape)) for amplitude in amplitudes])
 
@@ -65,6 +66,7 @@ def _potential(model: Model, q: Vector) -> Vector:
     at, weight = 0.5 * (1.0 + at), 0.5 * weight
     energy = 0.5 * model.omega[0] ** 2 * q**2
     for w, row in zip(model.directions[:, 0], model.contact_rows, strict=True):
-        delta = np.maximum(-w * q - row.gap, 0.0)
-        energy += delta * (row.law.force(delta[:, None] * at, 0.0, 1.0) @ weight)
+        delta = -w * q - row.gap
+        delta = delta if row.always else np.maximum(delta, 0.0)
+        energy += delta * (row.force(delta[:, None] * at) @ weight)
     return np.asarray(energy)

@@ -14,6 +14,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fembeam.scene import unit_of
 from fembeam.support import html_table, written_whole
 
 if TYPE_CHECKING:
@@ -50,18 +51,18 @@ CONTACT_ROWS: tuple[
     ("per second", 1.0, "rate", ""),
     ("± s.e.", 1.0, "rate_error", ""),
     ("mean time / ms", 1e3, "duration", "mean"),
-    ("mean peak / N", 1.0, "peak_force", "mean"),
-    ("largest peak / N", 1.0, "peak_force", "max"),
-    ("mean entry / m s⁻¹", 1.0, "entry_speed", "mean"),
+    ("mean peak / {force}", 1.0, "peak_force", "mean"),
+    ("largest peak / {force}", 1.0, "peak_force", "max"),
+    ("mean entry / {speed}", 1.0, "entry_speed", "mean"),
 )
 MOMENT_ROWS = (
-    ("mean / mm", 1e3, "mean"),
-    ("std / mm", 1e3, "std"),
+    ("mean / {}", 1e3, "mean"),
+    ("std / {}", 1e3, "std"),
     ("± s.e.", 1e3, "std_error"),
     ("skewness", 1.0, "skewness"),
     ("kurtosis", 1.0, "kurtosis"),
-    ("min / mm", 1e3, "min"),
-    ("max / mm", 1e3, "max"),
+    ("min / {}", 1e3, "min"),
+    ("max / {}", 1e3, "max"),
 )
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 PREFIXES = ("p", "n", "µ", "m", "", "k", "M", "G", "T")
@@ -143,6 +144,7 @@ def _text(content: str) -> Iterator[str]:
 
 def _simulation(found: dict[str, Any]) -> Iterator[str]:
     """Tables of [simulate], in the units of the figures."""
+    rotations = found.get("rotations", [])
     if found["omega"]:
         rows = [
             [i + 1, _rounded(w, 5), _rounded(w / 6.283185307179586, 5), f"{z:.4g}"]
@@ -151,15 +153,24 @@ def _simulation(found: dict[str, Any]) -> Iterator[str]:
         yield "<h2>Model</h2>" + html_table(["coordinate", "ω / rad s⁻¹", "Hz", "ζ"], rows)
     if found["moments"]:
         signals = found["moments"].values()
-        rows = [[words, *(_scaled(row.get(key), unit, words) for row in signals)] for words, unit, key in MOMENT_ROWS]
+        length = " or ".join(f"m{unit}" for unit in unit_of("indentation", [False, *rotations]).split(" or "))
+        rows = [
+            [words.format(length), *(_scaled(row.get(key), unit, words) for row in signals)]
+            for words, unit, key in MOMENT_ROWS
+        ]
         yield "<h2>Response</h2>" + html_table(["", *found["moments"]], rows)
         yield f'<p class="note">{escape(found["confidence"])}</p>'
     if found["contacts"]:
+        force, speed = (unit_of(of, rotations).replace("/s", " s⁻¹") for of in ("force", "speed"))
         rows = [
-            [words, *(_scaled(_of_stop(row, *keys), unit, words) for row in found["contacts"])]
+            [
+                words.format(force=force, speed=speed),
+                *(_scaled(_of_stop(row, *keys), unit, words) for row in found["contacts"]),
+            ]
             for words, unit, *keys in CONTACT_ROWS
         ]
-        yield "<h2>Contacts</h2>" + html_table(["", *(f"stop {row['stop']}" for row in found["contacts"])], rows)
+        stops = [row.get("name", f"stop {row['stop']}") for row in found["contacts"]]
+        yield "<h2>Contacts</h2>" + html_table(["", *stops], rows)
     if found["energy"]:
         names = {"input": "put in", "damping": "lost in damping", "contact": "lost in contacts", "stored": "stored"}
         rows = [[words, with_prefix(found["energy"][name], "J")] for name, words in names.items()]

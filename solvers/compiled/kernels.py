@@ -21,7 +21,7 @@ from solvers.compiled.decorators import merged as merged
 
 
 class Problem(NamedTuple):
-    """Everything a kernel reads and never writes; `state.problem_of` fills it, in SI units.
+    """Everything a kernel reads and, but for latched numbers, never writes; `state.problem_of` fills it, in SI units.
 
     z = [p, v] are block coordinates, for mass-normalised modes in √kg m and √kg m/s.
     """
@@ -32,12 +32,19 @@ class Problem(NamedTuple):
     push: Any  # (m, 2n) state rate per newton of stop s
     read: Any  # (m, 2n) indentation = read·z - gap, m
     read_rate: Any  # (m, 2n) indentation rate = read_rate·z, m/s
-    levels: Any  # (m, J) ascending indentations, m, where a stop changes piece: 0, knots, then inf
+    levels: Any  # (m, J) ascending indentations, m, where a stop changes piece: 0 (-inf if it always acts), knots, inf
     gap: Any  # (m,) m
     law: Any  # (m,) addresses of the compiled forces
     gradient: Any  # (m,) addresses of their derivatives
-    parameters: Any  # (m, P) their parameters
+    parameters: Any  # (m, P) their parameters; of laws with memory the run's own, numbers latched among them
     floor: Any  # (m,) smallest entry rates, m/s
+    borders: Any  # (m,) addresses of the margins of laws with memory, 0 for others
+    renewal: Any  # (m,) addresses of what they latch on a border
+    border_count: Any  # (m,) how many borders
+    latched: Any  # (m, l) places of the latched numbers among the parameters, padded by -1
+    by_latched: Any  # (m,) addresses of the forces' derivatives by them
+    by_renewal: Any  # (m,) addresses of the derivatives of what is latched on a border
+    opening: Any  # (m,) place among the parameters of a segment code that is 0 while the law is open, or -1
     load: Any  # (L, 2n) state rate per unit of signal l
     power: Any  # (L, 2n) input power = signal × power·z, W
     tone_omega: Any  # (K,) rad/s
@@ -57,7 +64,8 @@ _COMPLEX = types.Array(types.complex128, 1, "C")
 PROBLEM = types.NamedTuple(
     [
         *[VECTOR, VECTOR, MATRIX, MATRIX, MATRIX, MATRIX, MATRIX, VECTOR, INTEGERS, INTEGERS],
-        *[MATRIX, VECTOR, MATRIX, MATRIX, VECTOR, _COMPLEX, INTEGERS, MATRIX, VECTOR, INTEGERS, INTEGERS],
+        *[MATRIX, VECTOR, *[INTEGERS] * 3, types.Array(types.int64, 2, "C"), *[INTEGERS] * 3],
+        *[MATRIX, MATRIX, VECTOR, _COMPLEX, INTEGERS, MATRIX, VECTOR, INTEGERS, INTEGERS],
     ],
     Problem,
 )
@@ -89,15 +97,47 @@ def _c_function(outputs):
     return call
 
 
+@intrinsic
+def call_renewal(typingctx, address, border, delta, delta_dot, entry_rate, parameters):
+    """Call a law's C function that latches numbers on a border, at an address; returns the code of the event."""
+    known = [types.int64, types.int64, types.float64, types.float64, types.float64]
+    signature = types.int64(*known, parameters)
+
+    def codegen(context, builder, sig, args):
+        real, long = ir.DoubleType(), ir.IntType(64)
+        declared = ir.FunctionType(long, [long, real, real, real, real.as_pointer()])
+        data = context.make_array(sig.args[5])(context, builder, args[5]).data
+        return builder.call(builder.inttoptr(args[0], declared.as_pointer()), [*args[1:5], data])
+
+    return signature, codegen
+
+
+@intrinsic
+def call_renewal_gradient(typingctx, address, border, delta, delta_dot, entry_rate, parameters, out):
+    """Call a law's C function for the derivatives of what it latches on a border, at an address."""
+    known = [types.int64, types.int64, types.float64, types.float64, types.float64]
+    signature = types.void(*known, parameters, out)
+
+    def codegen(context, builder, sig, args):
+        real, long = ir.DoubleType(), ir.IntType(64)
+        reals = real.as_pointer()
+        declared = ir.FunctionType(ir.VoidType(), [long, real, real, real, reals, reals])
+        data = [context.make_array(sig.args[i])(context, builder, args[i]).data for i in (5, 6)]
+        builder.call(builder.inttoptr(args[0], declared.as_pointer()), [*args[1:5], *data])
+        return context.get_dummy_value()
+
+    return signature, codegen
+
+
 call_force = _c_function(1)
 call_gradient = _c_function(3)
 
 
 @inlined
 def contact_forces(problem, stop, delta, delta_dot, entry_rate, force):
-    """Forces of one stop at a batch of indentations; below the surface the law is continued from it."""
+    """Forces of one stop at a batch of indentations; below its surface the law is continued from it."""
     for i in range(delta.size):
-        delta[i] = max(delta[i], 0.0)
+        delta[i] = max(delta[i], problem.levels[stop, 0])
     law_forces(problem, stop, delta.size, delta, delta_dot, entry_rate, force)
 
 
@@ -111,7 +151,7 @@ def law_forces(problem, stop, n, delta, delta_dot, entry_rate, force):
 def contact_gradient(problem, stop, delta, delta_dot, entry_rate, by_delta, by_rate, by_entry):
     """Derivatives of the forces, likewise."""
     for i in range(delta.size):
-        delta[i] = max(delta[i], 0.0)
+        delta[i] = max(delta[i], problem.levels[stop, 0])
     results = (by_delta, by_rate, by_entry)
     call_gradient(problem.gradient[stop], delta.size, delta, delta_dot, entry_rate, problem.parameters[stop], results)
 

@@ -24,7 +24,7 @@ T, H_FLIGHT, H_CONTACT, LAST_EVENT = range(4)  # places in State.now
 STEPS, REJECTED, CALLS, EVENTS, LOGGED, SAMPLED, AT_ONCE, TAPED = range(8)  # places in State.count
 T_IN, SPEED_IN, PEAK_DELTA, PEAK_FORCE, WORK_IN, IMPULSE_IN, FLOORED = range(7)  # columns of State.open
 MOST_EVENTS_AT_ONCE = 100
-STEP, PART, LANDING, EVENT = 0.0, 1.0, 2.0, 3.0  # kinds of tape rows
+STEP, PART, LANDING, EVENT, RENEWAL = 0.0, 1.0, 2.0, 3.0, 4.0  # kinds of tape rows
 KIND, BEGAN, ENDED, SPAN, FIRST, SECOND, HEAD = range(7)  # columns of the tape: two whole numbers that the kind
 # explains, then the state a row begins with and the forces at the nodes of a step
 
@@ -74,7 +74,7 @@ def tape(state, kind, began, ended, span, first, second, x):
 
 
 @inner
-def _open(problem, state, s, t, delta_dot):
+def open_contact(problem, state, s, t, delta_dot):
     """Latch the entry rate and begin a row of the contact log."""
     ledger = 2 * problem.k.size + 2 + 2 * s
     state.entry_rate[s] = max(abs(delta_dot), problem.floor[s])
@@ -97,7 +97,7 @@ def begin_contacts(problem, state):
             piece += 1
         state.piece[s] = piece
         if piece > 0:
-            _open(problem, state, s, state.now[T], dot(problem.read_rate[s], state.x, 2 * problem.k.size))
+            open_contact(problem, state, s, state.now[T], dot(problem.read_rate[s], state.x, 2 * problem.k.size))
             state.open[s, PEAK_DELTA] = delta
 
 
@@ -125,7 +125,7 @@ def switch(problem, state, s, direction, log):
     if state.tape.shape[0]:
         tape(state, EVENT, t, t, 0.0, s, direction, state.x)
     if direction > 0 and state.piece[s] == 0:
-        _open(problem, state, s, t, delta_dot)
+        open_contact(problem, state, s, t, delta_dot)
     if direction < 0 and state.piece[s] == 1:
         contact_row(problem, state, s, t, -delta_dot, log[state.count[LOGGED]])
         state.count[LOGGED] += 1
@@ -153,6 +153,13 @@ def switch_on_surface(problem, state, log, locates):
             switch(problem, state, s, direction, log)
             switched = True
     return switched
+
+
+@inlined
+def is_open(problem, s):
+    """Whether a law with memory is open, so that no force acts at any indentation at hand."""
+    place = problem.opening[s]
+    return place >= 0 and problem.parameters[s, place] == 0.0
 
 
 @inlined
@@ -233,7 +240,7 @@ def _problem(system: System, forcing: Forcing, linear: dict[str, Array]) -> Prob
     most = max([len(c.law.knots) for c in contacts], default=0) + 1
     levels = np.full((m, most + 1), math.inf)
     for i, contact in enumerate(contacts):
-        levels[i, : len(contact.law.knots) + 1] = (0.0, *contact.law.knots)
+        levels[i, : len(contact.law.knots) + 1] = (-math.inf if contact.always else 0.0, *contact.law.knots)
     return Problem(
         **linear,
         levels=levels,
@@ -242,8 +249,39 @@ def _problem(system: System, forcing: Forcing, linear: dict[str, Array]) -> Prob
         gradient=np.array([c.law.gradient_address for c in contacts], dtype=np.int64),
         parameters=law_parameters(system),
         floor=np.array([c.law.entry_rate_floor for c in contacts], dtype=float),
+        borders=_integers(contacts, "borders_address"),
+        renewal=_integers(contacts, "renew_address"),
+        border_count=_integers(contacts, "borders"),
+        latched=_latched(contacts),
+        by_latched=_integers(contacts, "memory_gradient_address"),
+        by_renewal=_integers(contacts, "renew_gradient_address"),
+        opening=np.array([_opening(c.law) for c in contacts], dtype=np.int64),
         **vars(forcing),
     )
+
+
+def most_borders(problem: Problem) -> int:
+    """The largest number of borders of any law."""
+    return int(problem.border_count.max(initial=0))
+
+
+def _integers(contacts: Sequence[Any], name: str) -> Array:
+    """(m,) whole numbers of the laws, 0 where a law does not know of them."""
+    return np.array([getattr(contact.law, name, 0) for contact in contacts], dtype=np.int64)
+
+
+def _latched(contacts: Sequence[Any]) -> Array:
+    """(m, l) places of the latched numbers among the parameters, padded by -1."""
+    places = [getattr(contact.law, "memory", ()) for contact in contacts]
+    table = np.full((len(contacts), max([len(row) for row in places], default=0)), -1, dtype=np.int64)
+    for row, own in zip(table, places, strict=True):
+        row[: len(own)] = own
+    return table
+
+
+def _opening(law: Law) -> int:
+    """Place of the segment code that is 0 while the law is open, or -1."""
+    return int(law.memory[0]) if getattr(law, "opens", False) else -1
 
 
 def law_parameters(system: System) -> Array:

@@ -53,9 +53,9 @@ def sweep(rows, free, force, motion, stiffness, rooted, damping, viscosity):
 
 
 @inlined
-def above_zero(source, result):
-    """Eight numbers, the negative ones raised to zero; NaN stays."""
-    put(result, 0, raised(eight(source, 0)))
+def above(source, least, result):
+    """Eight numbers, the negative ones raised to zero if that is the least one allowed; NaN stays."""
+    put(result, 0, raised(eight(source, 0)) if least == 0.0 else eight(source, 0))
 
 
 @inlined

@@ -11,7 +11,7 @@ import numpy as np
 from numba import types
 
 from solvers.compiled.handles import opener
-from solvers.compiled.kernels import INTEGERS, MATRIX, PROBLEM, REAL, VECTOR, entry, inner
+from solvers.compiled.kernels import INTEGERS, MATRIX, PROBLEM, REAL, VECTOR, copy, entry, inner
 from solvers.compiled.state import (
     DIVERGED,
     DONE,
@@ -25,6 +25,7 @@ from solvers.compiled.state import (
     STATUSES,
     STEPS,
     T,
+    is_open,
 )
 from solvers.exponential.energy.flight_tables import NO_BOOKS
 from solvers.exponential.energy.guard import ALLOWED, FACTOR, FIRST, LAST, too_much, unknown
@@ -70,8 +71,10 @@ def _note(stop, delta, force, count, number, peak):
 
 
 @inner
-def _begin(problem, state, numbers, rest, start):
-    """The state of a run at t = 0, as `Workspace.begin` makes it."""
+def _begin(problem, state, numbers, rest, parameters, start):
+    """The state of a run at t = 0, as `Workspace.begin` makes it, and what its laws have latched."""
+    for s in range(problem.gap.size if problem.border_count.any() else 0):
+        copy(parameters[s], problem.parameters[s], parameters.shape[1])
     for i in range(rest.size):
         numbers[i] = rest[i]
     own = start.size // 2
@@ -89,7 +92,7 @@ def _end(problem, state, space, code, x, count, number, peak):
     for value in state.x:
         finite &= np.isfinite(value)
     for s in range(problem.gap.size):
-        if state.piece[s] > 0:
+        if state.piece[s] > 0 and (problem.levels[s, 0] == 0.0 or problem.opening[s] >= 0) and not is_open(problem, s):
             _note(s, state.open[s, PEAK_DELTA], state.open[s, PEAK_FORCE], count, number, peak)
     count[CODE] = DIVERGED if code == DONE and not finite else code
     number[REACHED] = state.now[T]
@@ -99,17 +102,18 @@ def _end(problem, state, space, code, x, count, number, peak):
 
 @entry(
     types.void(
-        *(_RUN, *[types.int64] * 5, VECTOR, VECTOR, MATRIX, INTEGERS, REAL, types.int64, REAL, REAL),
+        *(_RUN, *[types.int64] * 5, VECTOR, VECTOR, MATRIX, MATRIX, INTEGERS, REAL, types.int64, REAL, REAL),
         *(MATRIX, MATRIX, VECTOR, MATRIX, types.Array(types.int64, 2, "C"), MATRIX, _CUBE),
     )
 )
 def advance_many(
-    run, problem_at, tables_at, state_at, space_at, books_at, numbers, rest, starts, cursor, t_end, budget, rtol, reach,
-    log, out, due, x, count, number, peak,
+    run, problem_at, tables_at, state_at, space_at, books_at, numbers, rest, parameters, starts, cursor,
+    t_end, budget, rtol, reach, log, out, due, x, count, number, peak,
 ):  # fmt: skip
     """Take the starts of a stretch to ``t_end`` one after the other, for about ``budget`` steps of them all.
 
-    ``run`` is `method.advance`; ``numbers`` is a workspace's memory and ``rest`` what it holds before a start is added.
+    ``run`` is `method.advance`; ``numbers`` is a workspace's memory and ``rest`` what it holds before a start is added,
+    ``parameters`` what the laws have latched then.
     The last four are the arrays of `Ends`.
     """
     problem, state, space = _problem(problem_at), _state(state_at), _space(space_at)
@@ -117,7 +121,7 @@ def advance_many(
     while cursor[NEXT] < cursor[BEYOND] and spent < budget:
         i = cursor[NEXT]
         if not cursor[BEGUN]:
-            _begin(problem, state, numbers, rest, starts[i])
+            _begin(problem, state, numbers, rest, parameters, starts[i])
             cursor[BEGUN] = 1
         spent -= state.count[STEPS] + state.count[REJECTED]
         code = run(
@@ -125,6 +129,8 @@ def advance_many(
         )  # fmt: skip
         spent += state.count[STEPS] + state.count[REJECTED] + 1
         for row in range(state.count[LOGGED]):
+            if log[row, _STOP] < 0.0:  # a border of a law with memory
+                continue
             _note(np.int64(log[row, _STOP]), log[row, _DELTA], log[row, _FORCE], count[i], number[i], peak[i])
         state.count[LOGGED] = 0
         if code != RUNNING and code != LOG_FULL:
@@ -137,9 +143,11 @@ class Worker:
 
     def __init__(self, engine: Engine, starts: Array, ends: Ends, budget: int) -> None:
         self.engine, self.cursor = engine, np.zeros(3, dtype=np.int64)
-        workspace, log = engine.workspace, np.empty((max(256, 2 * len(engine.problem.gap)), COLUMNS))
+        workspace, parameters = engine.workspace, engine.prepared.problem.value.parameters
+        log = np.empty((max(256, 2 * len(engine.problem.gap)), COLUMNS))
         self.arguments = (
-            *(advance, *engine.addresses, NO_BOOKS.address, workspace.numbers, workspace.rest, starts, self.cursor),
+            *(advance, *engine.addresses, NO_BOOKS.address, workspace.numbers, workspace.rest, parameters),
+            *(starts, self.cursor),
             *(engine.duration, budget, engine.method.rtol, engine.reach, log, _NOWHERE, _NEVER, *ends),
         )
 

@@ -27,6 +27,7 @@ from numba import types
 
 from solvers.compiled.handles import Cast, Packed, opener
 from solvers.compiled.kernels import MATRIX, PROBLEM, REAL, VECTOR, entry
+from solvers.compiled.renewals import most_rows
 from solvers.compiled.state import (
     AT_ONCE,
     CHATTER,
@@ -73,14 +74,14 @@ def advance(problem_at, tables_at, state_at, space_at, books_at, t_end, budget, 
         begin_contacts(problem, state)
         if touching(state):
             begin(problem, tables, state, space, latest(state))
-    begun = state.count[STEPS] + state.count[REJECTED]
+    begun, rows = state.count[STEPS] + state.count[REJECTED], most_rows(problem)
     while state.count[STEPS] + state.count[REJECTED] - begun < budget:
         if state.now[T] >= t_end:
             note_energy(problem, tables, state, space)
             return DONE
-        if state.count[LOGGED] + problem.gap.size > log.shape[0]:
+        if state.count[LOGGED] + rows > log.shape[0]:
             return LOG_FULL
-        if state.tape.shape[0] and state.count[TAPED] + problem.gap.size + 2 > state.tape.shape[0]:
+        if state.tape.shape[0] and state.count[TAPED] + rows + 2 > state.tape.shape[0]:
             return RUNNING
         if state.count[AT_ONCE] > MOST_EVENTS_AT_ONCE:
             return CHATTER
@@ -154,9 +155,15 @@ class Engine:
         forcing, prepared = ready_for(system, forcing, duration, method.rtol)
         self.back = prepared.back
         packed: Cast | Packed = prepared.problem
+        own: dict[str, Array] = {}
         if forcing.table.size:
-            packed = Packed(packed.value._replace(table=forcing.table, table_start=forcing.table_start), PROBLEM)
+            own = {"table": forcing.table, "table_start": forcing.table_start}
+        if prepared.problem.value.border_count.any():  # laws latch numbers among their parameters
+            own["parameters"] = prepared.problem.value.parameters.copy()
+        if own:
+            packed = Packed(packed.value._replace(**own), PROBLEM)
         self.packed, self.problem, self.prepared = packed, packed.value, prepared
+        self.first_parameters = prepared.problem.value.parameters
         self.workspace = prepared.workspace()
         self.workspace.begin(z)
         self.addresses = packed.address, prepared.tables.address, *self.workspace.addresses

@@ -11,7 +11,7 @@ from numba import types
 
 from solvers.compiled.handles import Cast, Layout, Mould, Packed
 from solvers.compiled.kernels import INTEGERS, MATRIX, PROBLEM, REAL, VECTOR, Problem
-from solvers.compiled.state import STATE, State, begin_state, problem_of, state_shapes
+from solvers.compiled.state import STATE, State, begin_state, most_borders, problem_of, state_shapes
 from solvers.compiled.sums import padded
 from solvers.exponential.contact.blocks import POOL
 from solvers.exponential.contact.node_response import START, Space
@@ -40,7 +40,8 @@ SPACE = types.NamedTuple(
     [
         *(*_arrays(1, 2, 2, 1, 1, 1, 1, 2, 3, 1, 3, 2, 1, 3, 2, 3, 1), INTEGERS, MATRIX),
         *(*_arrays(1, 1, 1, 1, 2, 1, 2, 1, 1, 1, 1, 1, 2, 1), INTEGERS),
-        *(*_arrays(2, 2, 2, 1, 2, 3), INTEGERS),
+        *(*_arrays(2, 1, 1, 1, 2, 2), INTEGERS),
+        *(*_arrays(2, 2, 1, 2, 3), INTEGERS),
     ],
     Space,
 )
@@ -151,16 +152,16 @@ class _Skeleton:
     def __init__(self, system: System, forcing: Forcing, dt_cell: float) -> None:
         plain, self.tones = problem_of(system, forcing), len(forcing.tone_omega)
         self.k, self.c, self.load = plain.k, plain.c, plain.load  # not the whole, which holds the sampled signals
-        laws = [contact.law for contact in system.contacts]
-        self.series = tuple(series_of(law) for law in laws)
+        contacts = system.contacts
+        self.series = tuple((1.0, 0.0) if c.always else series_of(c.law) for c in contacts)
         problem, loss = _widened(plain, forcing), _loss_rows(plain)
         read_by = plain.read, plain.power, loss, system.blocks.T
         self.rows, ends = np.concatenate(read_by), np.cumsum([len(rows) for rows in read_by]).tolist()
         self.places = [slice(end - len(rows), end) for rows, end in zip(read_by, ends, strict=True)]
         self.back, self.fastest = among_tones(system.blocks.T, self.tones), max(float(_speeds(system).max()), 1e-3)
         ledger = np.zeros_like(problem.load), problem.power, among_tones(loss, self.tones)
-        tables = build(problem, self.tones, self.series, known_of(laws), dt_cell, ledger)
-        sizes = len(problem.gap), len(problem.load), len(problem.k), len(forcing.table_dt)
+        tables = build(problem, self.tones, self.series, known_of(contacts), dt_cell, ledger)
+        sizes = len(problem.gap), len(problem.load), len(problem.k), len(forcing.table_dt), most_borders(problem)
         self.layout = _layout(*sizes, POOL if tables.ahead.size else 0)
         self.problem = Mould(problem, PROBLEM, ("gap", "k", "read", "read_rate", "power"))
         self.tables = Mould(tables, TABLES, OF_TONES)
@@ -222,7 +223,7 @@ def _check_passive(system: System) -> bool:
 
 
 @lru_cache(maxsize=64)
-def _layout(stops: int, loads: int, blocks: int, signals: int, pool: int) -> Layout:
+def _layout(stops: int, loads: int, blocks: int, signals: int, borders: int, pool: int) -> Layout:
     """Places of the arrays of `State` and `Space`; a pool if motion goes through the blocks."""
     size, width = 2 * blocks, 2 * blocks + 2 + 2 * stops
     rows = size if pool else 0
@@ -233,8 +234,9 @@ def _layout(stops: int, loads: int, blocks: int, signals: int, pool: int) -> Lay
         *((stops * S,), (stops * S,), (START + 1, padded(width + 2))),
         *([(stops,)] * 4),
         *((stops, S), (stops,), (4, 3 * S), (stops,), (stops,), (S + 2,), (1,), (1,)),
-        *((2 + loads, max(32, padded(size + 6 * signals), 2 * padded(6 * signals))), (3,), (6,)),
-        *((stops, 2), (rows, S), (rows, S), (padded(rows),), (stops * S, stops * S), (pool, S, 2 * S), (pool,)),
+        *((2 + loads, max(32, padded(size + 6 * signals), 2 * padded(6 * signals))), (3,), (7,)),
+        *((stops, 2), (borders * S,), (4 * borders,), (borders,), (stops, borders), (stops, borders), (2,)),
+        *((rows, S), (rows, S), (padded(rows),), (stops * S, stops * S), (pool, S, 2 * S), (pool,)),
     ]
     return Layout([STATE, SPACE], [state_shapes(width, stops), space])
 

@@ -96,13 +96,15 @@ class Known(NamedTuple):
     uncut_parameters: Any
 
 
-def known_of(laws: Sequence[Any]) -> Known:
-    """The same of given laws; see `solvers.problem.system.Law`."""
+def known_of(contacts: Sequence[Any]) -> Known:
+    """The same of the laws of contacts; see `solvers.problem.system.Law`. Those that always act are called."""
+    laws = [contact.law for contact in contacts]
+    inlined = [None if contact.always else getattr(contact.law, "inlined", None) for contact in contacts]
     bends = [getattr(law, "bend", None) for law in laws]
     uncut = [law.uncut if bend == "force" else law for law, bend in zip(laws, bends, strict=True)]
     return Known(
         np.array([law.exponent for law in laws], dtype=float),
-        np.array([getattr(law, "inlined", None) or (0.0,) * 4 for law in laws]).reshape(-1, 4),
+        np.array([own or (0.0,) * 4 for own in inlined]).reshape(-1, 4),
         np.array([(None, "rate", "force").index(bend) for bend in bends], dtype=float),
         np.array([law.address for law in uncut], dtype=np.int64),
         np.array([law.gradient_address for law in uncut], dtype=np.int64),

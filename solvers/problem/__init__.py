@@ -11,7 +11,17 @@ from solvers.problem.decoupling import decouple
 from solvers.problem.frames import dataframe, optional
 from solvers.problem.matrices import Array, dense, product
 from solvers.problem.memo import Memo
-from solvers.problem.result import COLUMNS, ContactLog, Cost, Energy, Solution, SolverError, Status, counted
+from solvers.problem.result import (
+    COLUMNS,
+    ContactLog,
+    Cost,
+    Energy,
+    Solution,
+    SolverError,
+    Status,
+    Transitions,
+    counted,
+)
 from solvers.problem.signals import Forcing, hand_over, on_one_grid, tones_as_nodes
 from solvers.problem.system import Contact, Law, Parameter, System, require_step
 
@@ -30,6 +40,7 @@ __all__ = [
     "SolverError",
     "Status",
     "System",
+    "Transitions",
     "counted",
     "dataframe",
     "decouple",

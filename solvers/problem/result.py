@@ -141,6 +141,58 @@ def _make_whole(row: Array, rest: Array, later: float) -> None:
 
 
 @dataclass(frozen=True, eq=False)
+class Transitions:
+    """Borders that laws with memory have passed, in order of time, one array entry each.
+
+    Attributes
+    ----------
+    contact : index of the contact. t : s. border : index of the border among those of its law.
+    event : what it was, by the law's names, such as "stick" and "slip".
+    delta, delta_dot, force : m, m/s and N as the border was met.
+    impulse : N s, and work : J, done by the law's force since the run began, before the border.
+    """
+
+    contact: Any
+    t: Array
+    border: Any
+    event: Any
+    delta: Array
+    delta_dot: Array
+    force: Array
+    impulse: Array
+    work: Array
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def __repr__(self) -> str:
+        return f"<{counted(len(self), 'transition')} of laws with memory>"
+
+    @classmethod
+    def of_rows(cls, rows: Array, contacts: Sequence[Any]) -> Transitions:
+        """From the kernels' table."""
+        columns: list[Any] = [*rows[:, :9].T.copy()]
+        contact, border, code = (column.astype(int) for column in (-1.0 - rows[:, 0], rows[:, 2], rows[:, 3]))
+        names = [contacts[c].law.events[i] for c, i in zip(contact, code, strict=True)]
+        columns[0], columns[2], columns[3] = contact, border, np.array(names, dtype=object)
+        return cls(*columns)
+
+    def slid(self) -> Array:
+        """(k,) m: path of the slip that each "stick" ends, 0 for other rows."""
+        path, begun = np.zeros(len(self)), {}
+        for i, key in enumerate(zip(self.contact, self.border, strict=True)):
+            if self.event[i] == "slip":
+                begun[key] = self.delta[i]
+            elif self.event[i] == "stick" and key in begun:
+                path[i] = abs(self.delta[i] - begun.pop(key))
+        return path
+
+    def to_dataframe(self) -> Any:
+        """A table of pandas, one transition a row, in SI units; ImportError where pandas is missing."""
+        return dataframe({f.name: getattr(self, f.name) for f in fields(self)})
+
+
+@dataclass(frozen=True, eq=False)
 class Energy:
     """Energy balance at the output times, J: stored - initial = input - damping - contact + residual.
 
@@ -215,6 +267,7 @@ class Solution:
     cost: Cost
     tangent: Array | None = None
     rate: Array | None = None
+    borders: Callable[[], Transitions] = field(default=lambda: Transitions.of_rows(np.empty((0, 10)), ()), repr=False)
 
     def __repr__(self) -> str:
         reached = f"to t = {self.t[-1]:g} s" if len(self.t) else "without samples"
@@ -224,6 +277,11 @@ class Solution:
     def contacts(self) -> ContactLog:
         """The contact log."""
         return self.log()
+
+    @cached_property
+    def transitions(self) -> Transitions:
+        """What laws with memory have met: the times of stick, slip and yield."""
+        return self.borders()
 
     @cached_property
     def energy(self) -> Energy:

@@ -95,8 +95,10 @@ def _finite(system: System) -> bool:
     """True, or ValueError."""
     delta = np.array([1e-12, 1e-6, 1e-3])
     for i, contact in enumerate(system.contacts):
-        force = contact.law.force(delta, 0.0, 1.0)
+        places = np.concatenate((-delta, delta)) if contact.always else delta
+        force = contact.law.batch(1.0)(places, 0.0 * places)
         if not np.all(np.isfinite(force)):
-            where = delta[~np.isfinite(force)][0]
-            raise ValueError(f"the law of contact {i} is not finite at delta = {where:g} m: {contact.law!r}")
+            where = places[~np.isfinite(force)][0]
+            hint = "; one defined for delta > 0 only is no law of a contact that always acts" if where < 0.0 else ""
+            raise ValueError(f"the law of contact {i} is not finite at delta = {where:g} m: {contact.law!r}{hint}")
     return True

@@ -61,13 +61,14 @@ Signal = Callable[[Any], Any]
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """One stop: ``delta = -direction @ q - gap``; it pushes with ``+direction * force`` while ``delta > 0``.
+    """One stop: ``delta = -direction @ q - gap``; it pushes with ``+direction * force`` while ``delta > 0``, or always.
 
     Parameters
     ----------
     direction : (n,), the way the stop pushes.
     law : a contact law, such as those of the package `contacts`.
     gap : clearance in m; negative for a preload.
+    always : whether the law acts at both signs of ``delta``; its knots still count from ``delta = 0``.
 
     Examples
     --------
@@ -79,11 +80,16 @@ class Contact:
     direction: Array
     law: Law
     gap: float = 0.0
+    always: bool = False
 
     def __post_init__(self) -> None:
         direction = np.array(self.direction, dtype=float, ndmin=1)
         if direction.ndim != 1 or not np.all(np.isfinite(direction)):
             raise ValueError(f"direction of a Contact must be a finite vector, got {self.direction!r}")
+        if getattr(self.law, "opens", False):
+            object.__setattr__(self, "always", True)  # its law itself says where it is open
+        elif getattr(self.law, "memory", ()) and not self.always:
+            raise ValueError(f"{self.law!r} has a memory and acts at both signs of delta: give always=True")
         if not np.isfinite(self.gap):
             raise ValueError(f"gap must be finite, got {self.gap!r}; use no Contact at all for a stop out of reach")
         if not hasattr(self.law, "entry_rate_floor") or isinstance(self.law, type):
@@ -162,7 +168,8 @@ class System:
                 other.__dict__[name] = value
         other._check_contacts_and_loads([vector for vector, _ in self.loads])
         if len(self.contacts) == len(other.contacts):
-            if all(a.law is b.law for a, b in zip(self.contacts, other.contacts, strict=True)):
+            pairs = zip(self.contacts, other.contacts, strict=True)
+            if all(a.law is b.law and a.always == b.always for a, b in pairs):
                 other.__dict__["about_laws"] = self.about_laws
             if self._vectors_are_those_of(other):
                 other.__dict__["about_structure"] = self.about_structure

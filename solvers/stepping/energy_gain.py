@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from solvers.compiled.kernels import inner, kernel
-from solvers.problem import Array, System
+from solvers.problem import Array, Contact, System
 from solvers.stepping.stability import is_dissipative, work_of
 
 NOW, BEGAN, LEAST, IN_A_ROW, MOST_INPUT, HELD = range(6)  # places in `Space.watch`, see `watched`
@@ -53,10 +53,16 @@ def watched(system: System, motion: Array, least: float) -> Array:
     stored = abs(float(system.energy(q, q_dot)))
     known = system.about_laws.get("dissipative", lambda: [is_dissipative(contact.law) for contact in system.contacts])
     held = [
-        work_of(contact.law, -float(contact.direction @ q) - contact.gap) if dissipative else math.inf
+        _held(contact, -float(contact.direction @ q) - contact.gap) if dissipative else math.inf
         for contact, dissipative in zip(system.contacts, known, strict=True)
     ]
     return np.array([stored, stored, least, 0.0, 0.0, *held])
+
+
+def _held(contact: Contact, delta: float) -> float:
+    """Energy that a contact may give back, J."""
+    law: Any = contact.law
+    return float(law.stored(delta, law.parameters)) if contact.always else work_of(law, delta)
 
 
 def largest_loads(problem: Any) -> Array:

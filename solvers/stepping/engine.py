@@ -48,7 +48,7 @@ class Engine:
         dt = 0.0 if method.adaptive else max(method.steps)
         least = negligible_energy(self.problem, np.sum(self.problem.load * self.problem.power, axis=1), dt)
         watch = watched(system, self.back @ z, least)
-        self.space = new_space(self.state, method.work_rows, watch, method.constants, kinks_of(system))
+        self.space = new_space(self.problem, self.state, method.work_rows, watch, method.constants, kinks_of(system))
         fastest = max([math.sqrt(abs(k)) for k in self.problem.k] + list(self.problem.c) + [1.0 / duration])
         self.state.now[[H_FLIGHT, H_CONTACT]] = 0.1 / fastest, 0.01 / fastest
         self.atol = absolute_tolerance(method, self.problem, z, fastest)

@@ -77,6 +77,8 @@ def crossing(coefficients, rates, level, sign, tolerance):
 
     Between two nodes δ may rise and fall again; that it does is seen by its rate, the polynomial ``rates``.
     """
+    if abs(level) == np.inf:
+        return NONE
     last = sign * (coefficients[0] - level)
     tolerance = max(tolerance, 2.0 * last)  # a start a little outside, after a graze, is no crossing yet
     rising = sign * rates[0] > 0.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from solvers.compiled.kernels import contact_forces, copy, dot, indentation, inner, kernel
+from solvers.compiled.renewals import most_rows
 from solvers.compiled.state import (
     AT_ONCE,
     CALLS,
@@ -21,10 +22,12 @@ from solvers.compiled.state import (
     SAMPLED,
     STEPS,
     T,
+    is_open,
     surface_tolerance,
     switch,
     switch_on_surface,
 )
+from solvers.stepping.borders import border_apart, renew_passed
 from solvers.stepping.events import (
     IGNORED,
     LOCATED,
@@ -53,7 +56,8 @@ def _peaks(problem, state, space):
     """Largest indentation and force of the step just accepted, for every stop in contact."""
     delta_of, rate_of = space.coefficients[0], space.coefficients[1]
     for s in range(problem.gap.size):
-        if state.piece[s] == 0:
+        always = problem.levels[s, 0] == -np.inf and problem.opening[s] < 0  # no contact of the log
+        if state.piece[s] == 0 or always or is_open(problem, s):
             continue
         coefficients_of(problem.read[s], problem.gap[s], state.x, space.dense, delta_of)
         coefficients_of(problem.read_rate[s], 0.0, state.x, space.dense, rate_of)
@@ -141,8 +145,11 @@ def landing_tolerance(problem, state, stop):
 
 
 @inner
-def _land(step, problem, state, space, h, longest, stop, direction, level, rtol, atol):
-    """Repeat the step with the duration that ends on ``level``; returns it, else minus the step to try instead."""
+def _land(step, problem, state, space, h, longest, stop, direction, level, border, rtol, atol):
+    """Repeat the step with the duration that ends on ``level``, or on a ``border`` that is not -1.
+
+    Returns the duration, else minus the step to try instead.
+    """
     tolerance = landing_tolerance(problem, state, stop)
     before, beyond = 0.0, longest
     for _ in range(MOST_LANDINGS):
@@ -152,10 +159,12 @@ def _land(step, problem, state, space, h, longest, stop, direction, level, rtol,
         )
         state.count[CALLS] += calls
         distance = direction * (indentation(problem, stop, space.x_new) - level)
+        slope = direction * dot(problem.read_rate[stop], space.x_new, 2 * problem.k.size)
+        if border >= 0:
+            distance, slope, tolerance = border_apart(problem, state, space, h, stop, border)
         if abs(distance) <= tolerance:
             return _if_accurate(h, error)
         before, beyond = (h, beyond) if distance < 0.0 else (before, h)
-        slope = direction * dot(problem.read_rate[stop], space.x_new, 2 * problem.k.size)
         corrected = nearer(h, distance, slope, before, beyond, longest)
         if not corrected > 0.0:  # a graze, off the surface by rounding or in need of a closer look
             return _if_accurate(h, error) if abs(distance) <= 100.0 * tolerance else -0.5 * longest
@@ -185,11 +194,11 @@ def _switch_by_sign(problem, state, log):
 
 
 @kernel
-def look(problem, state, t_end, log, events):
-    """Before a step: a status code if the run is over, EVENT if a stop switched, else RUNNING."""
+def look(problem, state, space, t_end, log, events):
+    """Before a step: a status code if the run is over, EVENT if a stop switched or passed a border, else RUNNING."""
     if state.now[T] >= t_end:
         return DONE
-    if state.count[LOGGED] + problem.gap.size > log.shape[0]:
+    if state.count[LOGGED] + most_rows(problem) > log.shape[0]:
         return LOG_FULL
     if state.count[AT_ONCE] > MOST_EVENTS_AT_ONCE:
         return CHATTER
@@ -197,7 +206,7 @@ def look(problem, state, t_end, log, events):
         switched = _switch_by_sign(problem, state, log)
     else:
         switched = switch_on_surface(problem, state, log, events == LOCATED)
-    return EVENT if switched else RUNNING
+    return EVENT if renew_passed(problem, state, space, log) or switched else RUNNING
 
 
 @kernel

@@ -34,6 +34,7 @@ from solvers.compiled.state import (
     touching,
 )
 from solvers.problem import Array
+from solvers.stepping.borders import border_ahead, border_space, renew_border, renew_together
 from solvers.stepping.energy_gain import modal_gains
 from solvers.stepping.events import (
     HENON,
@@ -64,9 +65,19 @@ class Space(NamedTuple):
     coefficients: Any  # (2, 8)
     watch: Any  # see `watched`
     kinks: Any  # (m,) where laws have kinks inside a segment, see `stability.kinks_of`; used under error control
+    margin: Any  # (nodes × B,) margins of an element's borders, row by row, B the most of any; see `borders`
+    points: Any  # (2, nodes) its δ and δ̇
+    trial: Any  # (2,) δ and δ̇ at one point
+    one: Any  # (B,) margins there
+    scale: Any  # (m, 2) what rounding may make of δ and δ̇, m and m/s
+    begun: Any  # (m, B) margins as the step began
+    present: Any  # (m, B) margins in the state looked at last
+    rounding: Any  # (m, B) what rounding may make of these
 
 
-SPACE = types.NamedTuple([VECTOR, VECTOR, MATRIX, MATRIX, MATRIX, VECTOR, INTEGERS], Space)
+SPACE = types.NamedTuple(
+    [VECTOR, VECTOR, MATRIX, MATRIX, MATRIX, VECTOR, INTEGERS, VECTOR, MATRIX, VECTOR, VECTOR, *[MATRIX] * 4], Space
+)
 
 
 @entry(
@@ -98,7 +109,7 @@ def march(
     nearest = 0.0  # a kink nearer than this has been reached: there rounding switches the law to and fro
     for _ in range(budget):
         # --- end of the run, and what can stop it early
-        code = look(problem, state, t_end, log, events)
+        code = look(problem, state, space, t_end, log, events)
         if code == EVENT:
             count[CALLS] += rhs(problem, now[T], state.x, state.piece, state.entry_rate, state.rate, space.work[0])
             continue
@@ -123,15 +134,25 @@ def march(
             continue
 
         # --- events
-        stop, direction, tried = -1, 0, h
+        stop, direction, border, tried = -1, 0, -1, h
         if events == LOCATED:
             theta, stop, direction, level = find(problem, state, space)
+            if adaptive and theta != UNRESOLVED:
+                place, element, number = border_ahead(problem, state, space)
+                if place == 0.0:  # it begins on the border and goes across
+                    renew_border(problem, state, space, element, number, log)
+                    count[CALLS] += rhs(
+                        *(problem, now[T], state.x, state.piece, state.entry_rate, state.rate, space.work[0])
+                    )
+                    continue
+                if place < theta:
+                    theta, stop, border = place, element, number
             if theta == UNRESOLVED:
                 now[phase] = h / 32.0
                 count[REJECTED] += 1
                 continue
             if theta < NONE:
-                h = _land(step, problem, state, space, theta * h, tried, stop, direction, level, rtol, atol)
+                h = _land(step, problem, state, space, theta * h, tried, stop, direction, level, border, rtol, atol)
                 if h < 0.0:  # the interpolant crosses, the step does not, or not to the tolerance: look closer
                     now[phase] = -h
                     count[REJECTED] += 1
@@ -164,9 +185,11 @@ def march(
 
         # --- accept, record
         at_end = stop < 0 and h == tried and h >= t_end - now[T]
-        code = accept(problem, state, space, h, stop, direction, at_end, t_end, log, out, due)
+        code = accept(problem, state, space, h, stop if border < 0 else -1, direction, at_end, t_end, log, out, due)
         if code != RUNNING:
             return code
+        if border >= 0 and now[T] < t_end:
+            renew_together(problem, state, space, stop, border, log)
         if stop >= 0:
             count[CALLS] += rhs(problem, now[T], state.x, state.piece, state.entry_rate, state.rate, space.work[0])
         if modal_gains(problem, state, space):
@@ -180,7 +203,9 @@ def march(
     return RUNNING
 
 
-def new_space(state: State, work_rows: int, watch: Array, constants: tuple[float, ...] = (), kinks: Any = ()) -> Space:
+def new_space(
+    problem: Any, state: State, work_rows: int, watch: Array, constants: tuple[float, ...] = (), kinks: Any = ()
+) -> Space:
     """Working arrays; a method's constants stand in the last row of ``work``."""
     size = state.x.size
     work = np.empty((work_rows, size))
@@ -193,4 +218,5 @@ def new_space(state: State, work_rows: int, watch: Array, constants: tuple[float
         np.empty((2, 8)),
         watch,
         np.array(kinks, dtype=np.int64),
+        *border_space(problem),
     )

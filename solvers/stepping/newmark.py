@@ -44,7 +44,7 @@ def contact_force(problem, s, entry_rate, delta, delta_dot, by_force, rate_by_fo
     for _ in range(MOST_SWEEPS):
         batch[0] = delta - by_force * (F - force)
         batch[1] = delta_dot - rate_by_force * (F - force)
-        inside = batch[0] > 0.0
+        inside = batch[0] > problem.levels[s, 0]
         contact_forces(problem, s, batch[0:1], batch[1:2], entry_rate, batch[2:3])
         contact_gradient(problem, s, batch[0:1], batch[1:2], entry_rate, batch[3:4], batch[4:5], batch[5:6])
         calls += 1

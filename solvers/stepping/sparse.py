@@ -47,7 +47,7 @@ class MatrixEngine:
         self.back = eye_array(2 * system.size, format="csc")
         self.state: State = new_state(z, len(system.contacts))
         self.state.now[H_FLIGHT] = method.dt
-        self.space = new_space(self.state, 4, watched(system, z, 0.0))
+        self.space = new_space(self.problem, self.state, 4, watched(system, z, 0.0))
         self.solvers: dict[Any, Any] = {}
         self.replies: dict[Any, Array] = {}  # acceleration per newton of a stop
         self.directions = directions_of(system)
@@ -76,7 +76,7 @@ class MatrixEngine:
         """Go on for a stretch; the loop of `loop.march` for a constant step."""
         state, space, method, t_end = self.state, self.space, self.method, self.duration
         for _ in range(budget):
-            code = look(self.problem, state, t_end, log, method.events)
+            code = look(self.problem, state, space, t_end, log, method.events)
             if code == EVENT:
                 self.refresh()
                 continue

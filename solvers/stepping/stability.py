@@ -117,7 +117,7 @@ def limit(method: ConstantStep, system: System, indentation: float | None, lasti
     if not system.contacts:
         return Limit(flight, math.inf, mode, -1)
     C, K, half_period = with_tangents(system, indentation)
-    if any(contact.gap < 0.0 for contact in system.contacts) or lasting == math.inf:
+    if any(contact.always or contact.gap < 0.0 for contact in system.contacts) or lasting == math.inf:
         half_period = lasting  # a preloaded contact may last for ever
     contact, contact_mode = _shortest(method, system, *method.critical(system.M, C, K), min(lasting, half_period))
     return Limit(flight, contact, mode, contact_mode)

@@ -22,9 +22,9 @@ import math
 
 import numpy as np
 
-from solvers.compiled.kernels import contact_forces, copy, dot, indentation, inlined, inner
+from solvers.compiled.kernels import contact_forces, contact_gradient, copy, dot, indentation, inlined, inner
 from solvers.compiled.simd import eight, total
-from solvers.compiled.state import CALLS, T
+from solvers.compiled.state import CALLS, PEAK_DELTA, PEAK_FORCE, T, is_open
 from solvers.compiled.sums import combine, renew, sweep
 from solvers.exponential.contact.blocks import goes_through_blocks, kick, pair, way_of
 from solvers.exponential.contact.node_newton import MOST_ITERATIONS, newton
@@ -126,12 +126,24 @@ def _top(values):
 
 
 @inlined
-def _fastest(rates):
+def _size(values):
     """Largest size of node values."""
     best = 0.0
     for i in range(S):
-        best = max(best, abs(rates[i]))
+        best = max(best, abs(values[i]))
     return best
+
+
+@inlined
+def _largest(problem, tables, state, space, u):
+    """Largest force of a stop on the step, N, and its stiffness there, N/m."""
+    if problem.levels[u, 0] == 0.0:
+        largest = _top(space.force[u])
+        return largest, tables.exponent[u] * largest / max(_top(space.motion[u, 0]), 1e-300)
+    copy(space.motion[u, 0], space.clipped, S)
+    slope = space.slope[u]
+    contact_gradient(problem, u, space.clipped, space.motion[u, 1], state.entry_rate[u], slope[0], slope[1], slope[2])
+    return _size(space.force[u]), _size(slope[0])
 
 
 @inner
@@ -147,7 +159,7 @@ def step_error(problem, tables, state, space, family, level, fresh, rtol):
             continue
         gauss = family == 0 or u == family - 1
         combine(tables.summary[family], space.force[u], S, None, space.summary[u, 0])
-        largest, deepest = _top(space.force[u]), _top(space.motion[u, 0])
+        largest, stiffness = _largest(problem, tables, state, space, u)
         if gauss:
             beyond = _beyond(space.summary[u, 0], largest, S // 2)
         else:
@@ -158,13 +170,12 @@ def step_error(problem, tables, state, space, family, level, fresh, rtol):
         if beyond == 0.0:
             continue
         ripple = ripple_of(tables.sway[u], tables.alias[tables.kind[family], level], state.x, n)
-        stiffness = tables.exponent[u] * largest / max(deepest, 1e-300)
         span = h / max(1.0, h * tables.mobility[u, u] * space.viscous[u])  # a strong dashpot damps such errors
         space.beyond[u] = span * (beyond + 0.1 * stiffness * ripple)
     _sum_errors(problem, tables, space, family, h)
     worst = 0.0
     for s in range(stops):
-        error = space.m[s] / (rtol * max(space.scale[s], _fastest(space.motion[s, 1])))
+        error = space.m[s] / (rtol * max(space.scale[s], _size(space.motion[s, 1])))
         if not error <= worst:
             worst = error
             if error != error:
@@ -261,7 +272,11 @@ def finish_step(problem, tables, state, space, family, level):
             impulses = eight(weights, 0) * eight(space.force[s], 0)
             state.x[size + 2 + 2 * s] += h * total(impulses * eight(space.motion[s, 1], 0))
             state.x[size + 3 + 2 * s] += h * total(impulses)
-            step_peaks(problem, tables, state, space, family, h, s, 1.0)
+            if problem.levels[s, 0] == 0.0:
+                step_peaks(problem, tables, state, space, family, h, s, 1.0)
+            elif not is_open(problem, s):
+                state.open[s, PEAK_DELTA] = max(state.open[s, PEAK_DELTA], _size(space.motion[s, 0]))
+                state.open[s, PEAK_FORCE] = max(state.open[s, PEAK_FORCE], _size(space.force[s]))
     copy(space.x_new, state.x, size)
     state.now[T] += h
 

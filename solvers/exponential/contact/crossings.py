@@ -19,7 +19,7 @@ from solvers.compiled.dop853_tableau import STAGES, C
 from solvers.compiled.kernels import call_force, copy, dot, indentation, inlined, inner
 from solvers.compiled.simd import put, spread
 from solvers.compiled.state import PEAK_FORCE, T_IN, T, surface_tolerance
-from solvers.compiled.sums import above_zero
+from solvers.compiled.sums import above
 from solvers.exponential.contact.blocks import ENTERING, GOING_ON, carry_forces, goes_through_blocks, see
 from solvers.exponential.contact.node_response import respond, ripple_of
 from solvers.exponential.contact.nodes import S
@@ -138,6 +138,8 @@ def leaves_piece(problem, tables, state, space, family, level):
     for s in range(problem.gap.size):
         piece, ripple = state.piece[s], 0.0
         upper, lower = problem.levels[s, piece], -np.inf
+        if piece > 0 and problem.levels[s, piece - 1] == -np.inf and upper == np.inf:
+            continue
         if piece == 0:
             if through and _stays_away(space, s, h):
                 continue
@@ -174,7 +176,7 @@ def _sides(problem, tables, state, s, n, delta, rate, out):
 @inner
 def side_at(problem, tables, state, s, x, batch):
     """δ̇, or the force before it is cut, in the state x."""
-    batch[0] = max(indentation(problem, s, x), 0.0)
+    batch[0] = max(indentation(problem, s, x), problem.levels[s, 0])
     batch[1] = dot(problem.read_rate[s], x, 2 * problem.k.size)
     _sides(problem, tables, state, s, 1, batch[0:1], batch[1:2], batch[2:3])
     return batch[2]
@@ -200,7 +202,7 @@ def bend_ahead(problem, tables, state, space, family, level, fresh, rtol):
         if tables.bend[s] == 0.0 or state.piece[s] == 0:
             continue
         values, begin = space.sides, side_at(problem, tables, state, s, state.x, space.trial)
-        above_zero(space.motion[s, 0], space.clipped)
+        above(space.motion[s, 0], problem.levels[s, 0], space.clipped)
         _sides(problem, tables, state, s, S, space.clipped, space.motion[s, 1], values)
         values[S] = side_at(problem, tables, state, s, space.x_new, space.trial)
         largest = abs(begin)
@@ -247,7 +249,7 @@ def on_the_way(problem, tables, state, space, stop, bends, w, x):
                 return s
             if long and _passes(d, a, slope_a, b, slope_b, lower, upper):
                 return TURNED
-        if not long or piece == 0:
+        if not long or piece == 0 or problem.levels[s, 0] < 0.0:
             continue
         if slope_a > 0.0 > slope_b and (s != stop or tables.bend[s] != RATE):
             return TURNED

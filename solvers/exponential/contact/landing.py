@@ -16,6 +16,7 @@ import numpy as np
 
 from solvers.compiled.dop853_tableau import E5, STAGES, A
 from solvers.compiled.kernels import call_force, copy, dot, indentation, inlined, inner, law_forces, table_value
+from solvers.compiled.renewals import margins_in
 from solvers.compiled.state import (
     CALLS,
     LANDING,
@@ -28,7 +29,8 @@ from solvers.compiled.state import (
     tape,
 )
 from solvers.compiled.sums import combine
-from solvers.exponential.contact.crossings import FORCE, FREE, on_the_way, side_at
+from solvers.exponential.contact.borders import passed
+from solvers.exponential.contact.crossings import FORCE, FREE, TURNED, on_the_way, side_at
 from solvers.exponential.contact.node_response import BATCH, DIFFERENCE, LANDED, START
 from solvers.exponential.contact.peaks import state_peaks
 from solvers.exponential.energy.quadrature import powers
@@ -48,7 +50,7 @@ def reach(rtol: float) -> float:
 @inlined
 def _force(problem, tables, s, delta, delta_dot, side, entry_rate, batch):
     """Force of stop s; a law that is cut at zero goes on beyond it on the side on which the step began."""
-    batch[0], batch[1], batch[2] = max(delta, 0.0), delta_dot, 0.0
+    batch[0], batch[1], batch[2] = max(delta, problem.levels[s, 0]), delta_dot, 0.0
     if tables.bend[s] != FORCE:
         law_forces(problem, s, 1, batch[0:1], batch[1:2], entry_rate, batch[2:3])
     elif side > 0.0:
@@ -245,28 +247,47 @@ def land(problem, tables, state, space, stop, direction, near, rtol, t_end, out,
     ):
         return -1
     other = on_the_way(problem, tables, state, space, stop, False, w, x)
+    if other == FREE and passed(problem, state, space, -1, -1, w, x)[0] >= 0:
+        other = TURNED
     if other != FREE:
         return max(other, -1)
     done = _accept(problem, tables, state, space, variable, stop, span, t_end, out, due, ledger)
     return stop if done else -1
 
 
+@inlined
+def _apart(problem, tables, state, space, stop, border, x):
+    """What falls to zero where a landing in time ends: the margin of a border, or if that is -1 the side of a bend."""
+    if border < 0:
+        value = side_at(problem, tables, state, stop, x, space.trial)
+    else:
+        margins_in(problem, state, stop, x, space.trial, space.margin)
+        value = space.margin[border]
+    return value
+
+
 @inner
-def land_on_bend(problem, tables, state, space, stop, near, rtol, t_end, out, due, ledger):
-    """Try to land on the bend of ``stop`` about ``near`` s ahead; whether it succeeded."""
+def land_on_bend(problem, tables, state, space, stop, border, near, rtol, t_end, out, due, ledger):
+    """Try to land on the bend of ``stop``, or on a border of its law, about ``near`` s ahead; whether it succeeded.
+
+    A border that is passed before is noted in ``space.landed``.
+    """
     furthest, largest = space.reach[0] / tables.fastest, space.sides[space.sides.size - 1]
+    if border >= 0:
+        largest = space.largest[stop, border]
+    space.landed[0] = -1
     if not 0.0 < near <= furthest:
         return False
     start_landing(problem, tables, state, space, stop)
-    w, x, batch = space.work[START], space.work[LANDED], space.trial
-    before, apart, span = 0.0, side_at(problem, tables, state, stop, w, batch), near
+    w, x = space.work[START], space.work[LANDED]
+    before, apart, span = 0.0, _apart(problem, tables, state, space, stop, border, w), near
     if abs(apart) <= 1e-6 * largest:  # it begins on the bend, which is no second point for the next one
         before = 0.9 * near
         _step(problem, tables, state, space, TIME, stop, before, ledger)
-        apart = side_at(problem, tables, state, stop, x, batch)
+        apart = _apart(problem, tables, state, space, stop, border, x)
     for _ in range(_MOST_TRIES):
         _step(problem, tables, state, space, TIME, stop, span, ledger)
-        value = side_at(problem, tables, state, stop, x, batch)
+        value = _apart(problem, tables, state, space, stop, border, x)
         if abs(value) <= 1e-10 * largest:
             break
         following = span - value * (span - before) / (value - apart)
@@ -276,6 +297,9 @@ def land_on_bend(problem, tables, state, space, stop, near, rtol, t_end, out, du
     if not (abs(value) <= 1e-6 * largest and _error(problem, space, _PART, rtol) <= 1.0):
         return False
     if on_the_way(problem, tables, state, space, stop, True, w, x) != FREE:
+        return False
+    space.landed[0], space.landed[1] = passed(problem, state, space, stop, border, w, x)
+    if space.landed[0] >= 0:
         return False
     lower, upper = problem.levels[stop, state.piece[stop] - 1], problem.levels[stop, state.piece[stop]]
     if not lower < indentation(problem, stop, x) < upper:

@@ -8,7 +8,7 @@ from solvers.compiled.dop853_tableau import STAGES
 from solvers.compiled.kernels import inlined, inner, law_forces, reordered, table_value
 from solvers.compiled.simd import put, spread
 from solvers.compiled.state import CALLS, T
-from solvers.compiled.sums import above_zero, combine
+from solvers.compiled.sums import above, combine
 from solvers.exponential.contact.blocks import SIGNALS, carry_forces, carry_free, goes_through_blocks, pair, see
 from solvers.exponential.contact.nodes import S
 
@@ -61,8 +61,14 @@ class Space(NamedTuple):
     duration: Any  # (1,) s, that of the contact begun last, if it were free
     book: Any  # (2 + L, numbers) see `books`
     energy: Any  # (3,) see `energy.guard`
-    last: Any  # (6,) see `step`
+    last: Any  # (7,) see `step`
     seen: Any  # (m, 2) δ and δ̇ at the begin of the step
+    margin: Any  # (B S,) margins of an element's borders at points, row by row, B the most of any; see `borders`
+    ends: Any  # (4 B,)
+    fired: Any  # (B,)
+    largest: Any  # (m, B) largest margins on the step tried last
+    noise: Any  # (m, B) their rounding
+    landed: Any  # (2,) element and border that a landing in time has found to lie before its own, or -1
     carried: Any  # (2N, S) of many stops, as the rest but for the matrix, see `blocks`
     pushed: Any  # (2N, S)
     mixed: Any  # (2N,)
@@ -127,6 +133,6 @@ def ripple_of(sway, alias, x, n):
 @inlined
 def node_forces(problem, state, space, s):
     """The law of stop s at the nodes, into ``space.trial``."""
-    above_zero(space.motion[s, 0], space.clipped)
+    above(space.motion[s, 0], problem.levels[s, 0], space.clipped)
     law_forces(problem, s, S, space.clipped, space.motion[s, 1], state.entry_rate[s], space.trial)
     state.count[CALLS] += S

@@ -36,7 +36,7 @@ def end_inside(problem, tables, state, space, family, level, t_end):
     x, share = space.work[START], (t_end - state.now[T]) / tables.step[level]
     place = share ** (1.0 / tables.power[family])
     for s in range(problem.gap.size):
-        if state.piece[s] > 0:
+        if state.piece[s] > 0 and problem.levels[s, 0] == 0.0:
             step_peaks(problem, tables, state, space, family, tables.step[level], s, min(place, 1.0))
     if state.tape.shape[0]:
         tape_forces(problem, state, space, PART, t_end, family, level)

@@ -8,7 +8,7 @@ polynomial through these points differs from that of the motion by less than the
 from __future__ import annotations
 
 from solvers.compiled.kernels import contact_forces, copy, dot, indentation, inlined, inner
-from solvers.compiled.state import PEAK_DELTA, PEAK_FORCE
+from solvers.compiled.state import PEAK_DELTA, PEAK_FORCE, is_open
 from solvers.compiled.sums import combine
 from solvers.exponential.contact.node_response import DELTAS, FORCES, KNOWN, RATES
 from solvers.exponential.contact.nodes import LOCAL, MONOMIALS, S
@@ -79,7 +79,7 @@ def _highest(tables, values, family, limit):
 
 
 @inner
-def _motion_around(problem, tables, state, space, family, h, s, place):
+def motion_around(problem, tables, state, space, family, h, s, place):
     """Indentations and rates of stop s around a node of the step that begins at the state, into ``space.around``."""
     around, motion, known = space.around, space.motion[s], space.around[KNOWN]
     copy(motion[0], known, S)
@@ -96,7 +96,7 @@ def _motion_around(problem, tables, state, space, family, h, s, place):
 def deepest(problem, tables, state, space, family, h, s):
     """Largest indentation of stop s around its highest node of a step."""
     place = _highest(tables, space.motion[s, 0], family, 1.0)
-    _motion_around(problem, tables, state, space, family, h, s, place)
+    motion_around(problem, tables, state, space, family, h, s, place)
     return summit(space.around[DELTAS], 1.0, space.trial)
 
 
@@ -117,7 +117,7 @@ def step_peaks(problem, tables, state, space, family, h, s, limit):
                 continue  # falling from its begin
         place = max(place, 0)
         if seen != place:
-            _motion_around(problem, tables, state, space, family, h, s, place)
+            motion_around(problem, tables, state, space, family, h, s, place)
             around, seen = space.around, place
             contact_forces(problem, s, around[DELTAS, :S], around[RATES, :S], state.entry_rate[s], around[FORCES, :S])
         begin, end = tables.places[family, place]
@@ -132,9 +132,11 @@ def state_peaks(problem, state, space, x):
     """Raise the peaks of all stops in contact by their indentations and forces in the state x."""
     batch = space.trial
     for s in range(problem.gap.size):
-        if state.piece[s] > 0:
+        if state.piece[s] > 0 and not is_open(problem, s):
             batch[0] = indentation(problem, s, x)
             batch[1] = dot(problem.read_rate[s], x, 2 * problem.k.size)
-            state.open[s, PEAK_DELTA] = max(state.open[s, PEAK_DELTA], batch[0])
             contact_forces(problem, s, batch[0:1], batch[1:2], state.entry_rate[s], batch[2:3])
+            if problem.levels[s, 0] < 0.0:
+                batch[0], batch[2] = abs(batch[0]), abs(batch[2])
+            state.open[s, PEAK_DELTA] = max(state.open[s, PEAK_DELTA], batch[0])
             state.open[s, PEAK_FORCE] = max(state.open[s, PEAK_FORCE], batch[2])

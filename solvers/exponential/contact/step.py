@@ -29,6 +29,7 @@ from solvers.compiled.state import (
     touching,
 )
 from solvers.compiled.sums import combine
+from solvers.exponential.contact.borders import border_ahead, renew_all, renew_border
 from solvers.exponential.contact.collocation import arrive, contact_time, finish_step, solve_forces, step_error
 from solvers.exponential.contact.crossings import bend_ahead, choose_sides, leaves_piece
 from solvers.exponential.contact.landing import land, land_on_bend
@@ -39,7 +40,7 @@ from solvers.exponential.contact.peaks import state_peaks
 from solvers.exponential.energy.books import book_contact
 from solvers.exponential.flight import energy_norms
 
-LEVEL, FAMILY, FRESH, STOP, WANTED, BEGUN = range(6)  # places in Space.last
+LEVEL, FAMILY, FRESH, STOP, WANTED, BEGUN, BORDER = range(7)  # places in Space.last
 ENTRY, PIECE = 1, 2  # values of FRESH: the first step of a contact, or of a piece of its law; 0 for others
 _GOAL = 0.3  # error aimed at, in units of the tolerance
 _ORDER = 15.0  # the error estimate falls like h^15
@@ -164,7 +165,8 @@ def _predict(problem, tables, state, space, level):
 def _try(problem, tables, state, space, family, level, rtol):
     """Attempt one contact step; error in units of the tolerance, inf when it must be shorter anyway.
 
-    With inf comes the time of a bend that is in its way and the stop, else inf and -1.
+    With inf comes the time of a bend or border that is in its way and the stop, else inf and -1; of a border
+    ``space.last`` holds which it is, else -1.
     """
     bottom, first, bent = level == tables.step.size - 1, np.inf, -1
     free_response(problem, tables, state, space, family, level)
@@ -175,6 +177,10 @@ def _try(problem, tables, state, space, family, level, rtol):
     if leaves_piece(problem, tables, state, space, family, level):
         return 1.0 if bottom else np.inf, first, bent
     first, bent = bend_ahead(problem, tables, state, space, family, level, space.last[FRESH] > 0, rtol)
+    space.last[BORDER] = -1
+    time, element, border = border_ahead(problem, tables, state, space, family, level)
+    if time < first:
+        first, bent, space.last[BORDER] = time, element, border
     if bent >= 0:
         return 1.0 if bottom else np.inf, first, bent
     error = step_error(problem, tables, state, space, family, level, space.last[FRESH] > 0, rtol)
@@ -201,6 +207,32 @@ def _land_first(problem, tables, state, space, stop, direction, near, rtol, t_en
         above = indentation(problem, landed, space.work[LANDED]) > problem.levels[landed, state.piece[landed]]
         stop, direction = landed, 1 if above else -1
     return -1, 0
+
+
+@inner
+def _land_in_time(problem, tables, state, space, stop, first, rtol, t_end, out, due, ledger):
+    """Land on a bend or border of ``stop``, or on a border met before; (stop, whether it succeeded)."""
+    border, near = space.last[BORDER], first
+    for _ in range(problem.gap.size + 1):
+        if land_on_bend(problem, tables, state, space, stop, border, near, rtol, t_end, out, due, ledger):
+            space.last[BORDER] = border
+            return stop, True
+        if space.last[BORDER] < 0 or space.landed[0] < 0:
+            break
+        stop, border = space.landed[0], space.landed[1]
+    return stop, False
+
+
+@inlined
+def _renew(problem, state, space, stop, alone, log):
+    """What ends on a bend goes on beyond it: the other side, or numbers latched on a border."""
+    border = space.last[BORDER]
+    if border < 0:
+        space.side[stop] = -space.side[stop]
+    elif alone:
+        renew_border(problem, state, space, stop, border, log)
+    else:
+        renew_all(problem, state, space, stop, border, log)
 
 
 @merged
@@ -237,9 +269,13 @@ def touch(problem, tables, books, state, space, t_end, rtol, log, out, due):
         error, first, bent = _try(problem, tables, state, space, family, level, rtol)
         if error <= 1.0:
             break
-        if bent >= 0 and land_on_bend(problem, tables, state, space, bent, first, rtol, t_end, out, due, ledger):
+        landed = first == 0.0 and last[BORDER] >= 0  # it begins on the border and goes across
+        if bent >= 0 and not landed:
+            bent, landed = _land_in_time(problem, tables, state, space, bent, first, rtol, t_end, out, due, ledger)
+        if landed:
             state.count[STEPS] += 1
-            space.side[bent] = -space.side[bent]
+            if state.now[T] < t_end:
+                _renew(problem, state, space, bent, first == 0.0, log)
             last[FRESH], last[FAMILY], last[WANTED] = PIECE, 0, max(level, wanted)
             return RUNNING
         if level == bottom:
@@ -266,9 +302,10 @@ def touch(problem, tables, books, state, space, t_end, rtol, log, out, due):
     if state.tape.shape[0]:
         tape_forces(problem, state, space, STEP, end, family, level)
     finish_step(problem, tables, state, space, family, level)
-    if bent >= 0:  # crossed within the shortest step
-        space.side[bent] = -space.side[bent]
     _adapt(tables, space, level, family, wanted, error)
+    if bent >= 0:  # crossed within the shortest step
+        _renew(problem, state, space, bent, True, log)
+        last[FRESH] = PIECE if last[BORDER] >= 0 else 0
     state.count[STEPS] += 1
     return RUNNING
 

@@ -1,0 +1,15 @@
+"""Laws with memory: elastic dry friction, hysteresis, yielding.
+
+Between borders the force is a smooth function φ_p(δ, δ̇; L) of a segment p and a few latched numbers L; at a border the
+numbers are renewed and another segment begins (`contacts.law` gives the kernels). Nothing is integrated: what happens
+between two reversals is known in closed form. Begin with `friction`, where a slider sticks or slips.
+
+May import `contacts.law`, `contacts.kernels` and `contacts.sum_kernels`.
+"""
+
+from contacts.memory.bouc_wen import BoucWen
+from contacts.memory.friction import Coulomb, ElastoPlastic, Jenkins
+from contacts.memory.iwan import Iwan
+from contacts.memory.walton_braun import WaltonBraun
+
+__all__ = ["BoucWen", "Coulomb", "ElastoPlastic", "Iwan", "Jenkins", "WaltonBraun"]

@@ -1,0 +1,165 @@
+"""A law led along a given path of δ, slowly: exact between borders, which are found to rounding.
+
+The rate enters by its sign alone, so that dashpots give nothing. A path is cut into runs at its turning points
+and runs into stretches at the borders: all borders that are below zero, and stay so, are renewed together.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from contacts.law import Law
+
+Vector = NDArray[np.float64]
+SLOW = 1e-100  # m/s: a sign, hardly a force
+SAMPLES = np.linspace(0.0, 1.0, 17)  # of the borders over a run; one that dips below zero between two is not seen
+NEAR = 2.0**-20  # part of a run over which a border that is zero to rounding is seen to rise or fall
+ROUNDING = 64.0  # spacings of numbers as large as the path, the least such distance
+_REALS = ctypes.POINTER(ctypes.c_double)
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A piece of a path without a border: from ``begin`` to ``end``, within the points ``first`` to ``last``."""
+
+    begin: float
+    end: float
+    first: int
+    last: int
+    rate: float
+    parameters: Vector
+
+
+def along(law: Law, delta: ArrayLike) -> Vector:
+    """Force at every point of a path; see `Law.along`."""
+    path = _checked(law, delta)
+    forces = np.empty(path.size)
+    for one in walk(law, path):
+        points = path[one.first : one.last + 1]
+        inside = (points >= min(one.begin, one.end)) & (points <= max(one.begin, one.end))
+        forces[one.first : one.last + 1][inside] = _force(law, points[inside], one)
+    return forces
+
+
+def work(law: Law, delta: ArrayLike) -> float:
+    """Work done on a law along a path, ∫F dδ in J: the area of a closed loop; see `Law.along`."""
+    nodes, weights = np.polynomial.legendre.leggauss(16)
+    total = 0.0
+    for one in walk(law, _checked(law, delta)):
+        half, middle = 0.5 * (one.end - one.begin), 0.5 * (one.end + one.begin)
+        total += half * float(weights @ _force(law, middle + half * nodes, one))
+    return total
+
+
+def walk(law: Law, path: Vector) -> Iterator[Stretch]:
+    """The stretches of a path, one after the other; their parameters are not kept by the next."""
+    row = law.parameters
+    tiny = ROUNDING * float(np.spacing(np.abs(path).max()))
+    for first, last in _runs(path):
+        begin, end = float(path[first]), float(path[last])
+        rate = math.copysign(SLOW, end - begin)
+        goal = end if end != begin else begin + ROUNDING * tiny  # a path that rests is one about to rise
+        for a, b in _stretches(law, row, begin, goal, rate, tiny):
+            yield Stretch(a, b if end != begin else begin, first, last, rate, row.copy())
+
+
+def _checked(law: Law, delta: ArrayLike) -> Vector:
+    path = np.asarray(delta, dtype=float)
+    if path.ndim != 1 or not path.size or not np.all(np.isfinite(path)):
+        raise ValueError(
+            f"path of {type(law).__name__} must be a row of finite indentations in m, got an array of shape "
+            f"{path.shape}{'' if np.all(np.isfinite(path)) else ' that holds nan or inf'}"
+        )
+    return path
+
+
+def _runs(path: Vector) -> Iterator[tuple[int, int]]:
+    """First and last point of every monotone run."""
+    steps = np.sign(np.diff(path))
+    moving = np.flatnonzero(steps)
+    turns = moving[1:][steps[moving[1:]] != steps[moving[:-1]]].tolist()
+    ends = [0, *turns, path.size - 1]
+    yield from pairwise(ends)
+
+
+def _stretches(
+    law: Law, row: Vector, at: float, goal: float, rate: float, tiny: float
+) -> Iterator[tuple[float, float]]:
+    """Begin and end of every stretch of a run; renews the row between them."""
+    renewals = 0
+    while True:
+        points = at + (goal - at) * SAMPLES
+        probe = at + math.copysign(min(max(NEAR * abs(goal - at), tiny), abs(goal - at)), goal - at)
+        points = np.concatenate(([at, probe], points[1:-1], [goal]))
+        values = borders(law, points, rate, row)
+        fired = np.flatnonzero(np.all(values[:, :2] < 0.0, axis=1))
+        if fired.size and at != goal:
+            for j in fired:
+                renew(law, int(j), at, rate, row)
+            renewals += 1
+            _check_renewals(law, renewals, int(fired[0]), at)
+            continue
+        fallen = np.any(values[:, 1:] < 0.0, axis=0)
+        if at == goal or not np.any(fallen):
+            yield at, goal
+            return
+        k = int(np.argmax(fallen))
+        end = _first_fallen(law, row, points[k], points[k + 1], rate)
+        yield at, end
+        renewals = renewals if end == at else 0
+        at = end
+
+
+def _first_fallen(law: Law, row: Vector, low: float, high: float, rate: float) -> float:
+    """Where the first border falls below zero between two points, to rounding."""
+    while True:
+        points = low + (high - low) * SAMPLES
+        points[-1] = high
+        k = int(np.argmax(np.any(borders(law, points[1:], rate, row) < 0.0, axis=0)))
+        if points[k] == low and points[k + 1] == high:
+            return high
+        if abs(high - low) <= 2.0 * np.spacing(max(abs(high), abs(low))):
+            return high
+        low, high = float(points[k]), float(points[k + 1])
+
+
+def _check_renewals(law: Law, renewals: int, border: int, at: float) -> None:
+    """A border that falls again at once will do so for ever."""
+    if renewals > 4 * law.borders + 4:
+        raise ValueError(
+            f"border {border} of {type(law).__name__} falls to zero again at once, at δ = {at:.6g} m: after a renewal "
+            "it must be positive, or zero and rising"
+        )
+
+
+def borders(law: Law, delta: Vector, rate: float, row: Vector) -> Vector:
+    """Border functions of a law at points, (B, n)."""
+    values = np.empty((law.borders, delta.size))
+    if law.borders:
+        arrays = (np.ascontiguousarray(delta), np.full(delta.size, rate), row, values)
+        d, v, p, b = (x.ctypes.data_as(_REALS) for x in arrays)
+        law.memory_kernel("borders").ctypes(delta.size, d, v, 1.0, p, b)
+    return values
+
+
+def renew(law: Law, border: int, delta: float, rate: float, row: Vector) -> int:
+    """Renew a law's latched numbers in a row of parameters; returns the event."""
+    return int(law.memory_kernel("renew").ctypes(border, delta, rate, 1.0, row.ctypes.data_as(_REALS)))
+
+
+def _force(law: Law, delta: Vector, one: Stretch) -> Vector:
+    """Force in a stretch."""
+    forces = law.batch(1.0, one.parameters)(delta, np.full(delta.size, one.rate))
+    if law.one_sided and not law.memory:
+        forces[delta <= 0.0] = 0.0
+    if not np.all(np.isfinite(forces)):
+        wrong = int(np.argmin(np.isfinite(forces)))
+        raise ValueError(f"force of {type(law).__name__} is {forces[wrong]} N at δ = {delta[wrong]:.6g} m")
+    return forces

@@ -1,0 +1,75 @@
+"""Borders of laws with memory: their margins, and what is latched and logged where one is met.
+
+A law tells by margins b_j(δ, δ̇) how far the borders of its segment are; all are positive inside. Where one falls to
+zero the law renews the numbers it latches, which stand among its parameters, and another segment begins.
+"""
+
+from __future__ import annotations
+
+from solvers.compiled.kernels import call_force, call_renewal, dot, indentation, inlined, inner
+from solvers.compiled.state import (
+    AT_ONCE,
+    EVENTS,
+    LAST_EVENT,
+    LOGGED,
+    RENEWAL,
+    T,
+    contact_row,
+    is_open,
+    open_contact,
+    tape,
+)
+
+
+@inlined
+def margins(problem, state, s, n, delta, rate, out):
+    """Margins of the borders of element s at n points, row by row."""
+    call_force(problem.borders[s], n, delta, rate, state.entry_rate[s], problem.parameters[s], (out,))
+
+
+@inner
+def margins_in(problem, state, s, x, batch, out):
+    """The same in one state; returns δ and δ̇."""
+    batch[0] = indentation(problem, s, x)
+    batch[1] = dot(problem.read_rate[s], x, 2 * problem.k.size)
+    margins(problem, state, s, 1, batch[0:1], batch[1:2], out)
+    return batch[0], batch[1]
+
+
+@inner
+def renew(problem, state, s, j, delta, rate, log):
+    """Renew what element s latches on its border j; a row of the log tells of it."""
+    size, t = 2 * problem.k.size, state.now[T]
+    if state.tape.shape[0]:
+        tape(state, RENEWAL, t, t, 0.0, s, j, state.x)
+    was_open = is_open(problem, s)
+    row = log[state.count[LOGGED]]
+    row[0], row[1], row[2], row[4], row[5] = -1.0 - s, t, j, delta, rate
+    batch = row[4:7]
+    call_force(problem.law[s], 1, batch[0:1], batch[1:2], state.entry_rate[s], problem.parameters[s], (batch[2:3],))
+    row[7], row[8], row[9] = state.x[size + 3 + 2 * s], state.x[size + 2 + 2 * s], 0.0
+    row[3] = call_renewal(problem.renewal[s], j, delta, rate, state.entry_rate[s], problem.parameters[s])
+    state.count[LOGGED] += 1
+    state.count[EVENTS] += 1
+    if was_open and not is_open(problem, s):
+        open_contact(problem, state, s, t, rate)
+    if is_open(problem, s) and not was_open:
+        contact_row(problem, state, s, t, -rate, log[state.count[LOGGED]])
+        state.count[LOGGED] += 1
+
+
+@inlined
+def note_event(state):
+    """Count events at one instant."""
+    t = state.now[T]
+    state.count[AT_ONCE] = state.count[AT_ONCE] + 1 if t == state.now[LAST_EVENT] else 0
+    state.now[LAST_EVENT] = t
+
+
+@inlined
+def most_rows(problem):
+    """How many rows of the log the events of one instant may take."""
+    rows = problem.gap.size
+    for count in problem.border_count:
+        rows += 2 * count
+    return rows

@@ -1,0 +1,178 @@
+"""Borders of laws with memory in a step: located on its dense output, or passed and made good at its end.
+
+Under error control no step goes across a border: `border_ahead` finds the first one on the dense output, the step is
+repeated to end there, and `renew_together` renews all borders reached. A margin that is zero at the begin of a step, as
+after a renewal, is judged by its sign as soon as that is more than rounding. Methods of constant step go across:
+`renew_passed` renews at the end of a step what it has passed, until no margin is below zero (a return map).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from solvers.compiled.kernels import dot, inner, kernel
+from solvers.compiled.renewals import margins, margins_in, note_event, renew
+from solvers.compiled.state import most_borders, rate_tolerance, surface_tolerance
+from solvers.stepping.events import NONE, coefficients_of, golden_section, polynomial
+
+_NODES = np.array([0.0, *(2.0**i for i in (-20, -15, -11, -8, -7, -6, -5, -4, -3, -2)), *(np.arange(3, 9) / 8.0)])
+_TOGETHER = 1e-12  # part of its way at which a border counts as reached when another is landed on
+_AHEAD = 1e-4  # part of a step over which the rate of a margin is differenced
+
+
+def border_space(problem: Any) -> list[Any]:
+    """Working arrays: those of the borders among the fields of `loop.Space`, in order."""
+    stops, most, n = problem.gap.size, most_borders(problem), _NODES.size
+    return [np.empty(n * most), np.empty((2, n)), np.empty(2), np.empty(most), np.zeros((stops, 2))] + [
+        np.zeros((stops, most)) for _ in range(3)
+    ]
+
+
+@inner
+def _present(problem, state, space, s, x):
+    """Margins of element s in a state, and by moved δ and δ̇ what rounding may make of them; returns δ and δ̇."""
+    delta, rate = margins_in(problem, state, s, x, space.trial, space.margin)
+    scale, count = space.scale[s], problem.border_count[s]
+    scale[0] = max(scale[0], 4.0 * surface_tolerance(problem, s, x))
+    scale[1] = max(scale[1], rate_tolerance(problem, s, x))
+    for j in range(count):
+        space.present[s, j] = space.margin[j]
+        space.rounding[s, j] = 1e-15 * abs(space.margin[j])
+    for i in range(2):
+        space.trial[0], space.trial[1] = delta + (1 - i) * scale[0], rate + i * scale[1]
+        margins(problem, state, s, 1, space.trial[0:1], space.trial[1:2], space.margin)
+        for j in range(count):
+            space.rounding[s, j] += abs(space.margin[j] - space.present[s, j])
+    return delta, rate
+
+
+@inner
+def _watch(problem, state, space, s):
+    """Margins of element s at the nodes of the step just tried."""
+    coefficients_of(problem.read[s], problem.gap[s], state.x, space.dense, space.coefficients[0])
+    coefficients_of(problem.read_rate[s], 0.0, state.x, space.dense, space.coefficients[1])
+    for i in range(_NODES.size):
+        space.points[0, i] = polynomial(space.coefficients[0], _NODES[i])
+        space.points[1, i] = polynomial(space.coefficients[1], _NODES[i])
+    margins(problem, state, s, _NODES.size, space.points[0], space.points[1], space.margin)
+
+
+@inner
+def _beyond(known, theta):
+    """Minus a margin at θ of the step."""
+    problem, state, space, s, j = known
+    space.trial[0], space.trial[1] = polynomial(space.coefficients[0], theta), polynomial(space.coefficients[1], theta)
+    margins(problem, state, s, 1, space.trial[0:1], space.trial[1:2], space.one)
+    return -space.one[j]
+
+
+@inner
+def _first_beyond(known, a, b):
+    """Bisection for where a margin falls below zero in [a, b]."""
+    for _ in range(50):
+        middle = 0.5 * (a + b)
+        if _beyond(known, middle) > 0.0:
+            b = middle
+        else:
+            a = middle
+    return b
+
+
+@inner
+def _lowest(known, values, i, rounding):
+    """Place of the lowest margin around node i if it is below zero, else NONE; node i is not above its neighbours."""
+    before, after = values[i - 1], values[min(i + 1, _NODES.size - 1)]
+    if values[i] > before or values[i] > after or values[i] > 2.0 * (max(before, after) - values[i]):
+        return NONE
+    place, beyond = golden_section(_beyond, known, _NODES[i - 1], _NODES[min(i + 1, _NODES.size - 1)])
+    return place if beyond > rounding else NONE
+
+
+@inner
+def _crossing(problem, state, space, s, j):
+    """First θ at which a margin of the element watched falls below zero, or NONE; 0 where it does so at once."""
+    known, n = (problem, state, space, s, j), _NODES.size
+    values, rounding = space.margin[n * j : n * j + n], space.rounding[s, j]
+    inside = values[0] > rounding
+    for i in range(1, n):
+        if values[i] < -rounding:
+            return _first_beyond(known, _NODES[i - 1], _NODES[i]) if inside else 0.0
+        lowest = _lowest(known, values, i, rounding)
+        if lowest < NONE:
+            return _first_beyond(known, _NODES[i - 1], lowest) if inside else 0.0
+        inside |= values[i] > rounding
+    return NONE
+
+
+@kernel
+def border_ahead(problem, state, space):
+    """(θ, element, border) of the first border on the step just tried; θ = NONE without one."""
+    theta, element, border = NONE, -1, -1
+    for s in range(problem.gap.size):
+        if problem.border_count[s] == 0:
+            continue
+        _present(problem, state, space, s, state.x)
+        _watch(problem, state, space, s)
+        for j in range(problem.border_count[s]):
+            found = _crossing(problem, state, space, s, j)
+            space.begun[s, j] = space.present[s, j]
+            if found < theta:
+                theta, element, border = found, s, j
+    return theta, element, border
+
+
+@inner
+def border_apart(problem, state, space, h, s, j):
+    """(distance beyond a border, its rate, its rounding) at the end of the step of duration h just tried."""
+    delta, rate = _present(problem, state, space, s, space.x_new)
+    time, size = _AHEAD * h, 2 * problem.k.size
+    space.trial[0] = delta + time * dot(problem.read[s], space.rate_new, size)
+    space.trial[1] = rate + time * dot(problem.read_rate[s], space.rate_new, size)
+    margins(problem, state, s, 1, space.trial[0:1], space.trial[1:2], space.one)
+    present = space.present[s, j]
+    return -present, (present - space.one[j]) / time, space.rounding[s, j]
+
+
+@inner
+def renew_border(problem, state, space, s, j, log):
+    """Renew one border in the present state."""
+    delta, rate = margins_in(problem, state, s, state.x, space.trial, space.margin)
+    renew(problem, state, s, j, delta, rate, log)
+    note_event(state)
+
+
+@kernel
+def renew_together(problem, state, space, element, border, log):
+    """Renew the border landed on, and all whose margins have fallen to zero with it.
+
+    Which ones is judged from the state alone, before any is renewed.
+    """
+    for s in range(problem.gap.size):
+        if problem.border_count[s] == 0:
+            continue
+        delta, rate = _present(problem, state, space, s, state.x)
+        for j in range(problem.border_count[s]):
+            begun, rounding = space.begun[s, j], space.rounding[s, j]
+            reached = begun > rounding and space.present[s, j] <= max(8.0 * rounding, _TOGETHER * begun)
+            if reached or (s == element and j == border):
+                renew(problem, state, s, j, delta, rate, log)
+    note_event(state)
+
+
+@inner
+def renew_passed(problem, state, space, log):
+    """Renew every border whose margin is below zero in the present state; whether there was any."""
+    found = False
+    for s in range(problem.gap.size):
+        if problem.border_count[s] == 0:
+            continue
+        delta, rate = _present(problem, state, space, s, state.x)
+        for j in range(problem.border_count[s]):
+            if space.present[s, j] < -space.rounding[s, j]:
+                renew(problem, state, s, j, delta, rate, log)
+                found = True
+    if found:
+        note_event(state)
+    return found
