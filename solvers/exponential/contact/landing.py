@@ -273,8 +273,9 @@ def land_on_bend(problem, tables, state, space, stop, border, near, rtol, t_end,
     A border that is passed before is noted in ``space.landed``.
     """
     furthest, largest = space.reach[0] / tables.fastest, space.sides[space.sides.size - 1]
-    if border >= 0:
-        largest = space.largest[stop, border]
+    enough = 1e-10 * largest
+    if border >= 0:  # one that is missed by more may seem to be passed the other way by the next step
+        largest, enough = space.largest[stop, border], 0.1 * space.noise[stop, border]
     space.landed[0] = -1
     if not 0.0 < near <= furthest:
         return False
@@ -288,9 +289,11 @@ def land_on_bend(problem, tables, state, space, stop, border, near, rtol, t_end,
     for _ in range(_MOST_TRIES):
         _step(problem, tables, state, space, TIME, stop, span, ledger)
         value = _apart(problem, tables, state, space, stop, border, x)
-        if abs(value) <= 1e-10 * largest:
+        if abs(value) <= enough:
             break
         following = span - value * (span - before) / (value - apart)
+        if abs(following - span) <= 1e-15 * span and border >= 0:
+            break
         if not 0.1 * near < following <= furthest or following == span:
             return False
         before, apart, span = span, value, following
