@@ -11,7 +11,7 @@ from solvers.compiled.kernels import call_force, call_renewal, call_renewal_grad
 from solvers.compiled.state import T
 from solvers.exponential.linearised_step import change_of, is_parameter
 
-_SHARE, _LEAST = 1e-4, 1e-9  # of differences: part of a number, and at least this in its unit
+_SHARE, _LEAST = 1e-7, 1e-10  # of differences: part of a number, and at least this in its unit; margins may bend
 
 
 @inner
