@@ -15,9 +15,10 @@ from solvers.compiled.kernels import copy, dot, inlined, inner, reordered
 from solvers.compiled.simd import eight, put, spread, total
 from solvers.compiled.state import T
 from solvers.compiled.sums import combine
+from solvers.exponential.contact.node_response import WITHIN
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.energy.contact_tables import BEGIN
-from solvers.exponential.energy.quadrature import account, powers
+from solvers.exponential.energy.quadrature import inside, powers
 from solvers.exponential.flight import LONG, LONG_REACH, add_signals, level_within, signal_derivatives, turn
 
 _SCRATCH, _MOVING, _MARK = 9, 10, 11  # rows of Space.work; those before hold a load on the blocks and its derivatives
@@ -171,47 +172,15 @@ def _book_panel(problem, tables, books, space, t, span, x, row, further):
 
 
 @inner
-def book_contact(problem, tables, books, state, space, family, level, span, row):
-    """Add to the ledger of ``row`` what loads and damping do over ``span`` of the contact step just found."""
-    h = tables.step[level]
-    if span == h and level >= books.first and h <= books.longest[books.kind[family]]:
+def book_contact(problem, tables, books, state, space, family, level, h, row):
+    """Add to the ledger of ``row`` what loads and damping do over the contact step of length h just found."""
+    if level >= books.first and h <= books.longest[books.kind[family]]:
         _book_nodes(problem, tables, books, state, space, family, level - int(books.first), h, row)
-    elif family == 0:
-        _book_pieces(problem, tables, books, state, space, h, span, row)
-    else:
-        account(problem, tables, state, space, family, h, span, state.x, row)
-
-
-@inner
-def _book_pieces(problem, tables, books, state, space, h, span, row):
-    """The same on a part of a smooth step, whose forces are polynomials of time, by series."""
-    panels, size = max(1, math.ceil(tables.fastest * span / LONG_REACH - 1e-9)), 2 * problem.k.size
-    x = space.work[_MOVING]
-    copy(state.x, x, size)
-    for i in range(panels):
-        begin = i * span / panels
-        _clear(space, size)
-        for u in range(space.force.shape[0]):
-            if u >= problem.gap.size or state.piece[u] > 0:
-                push = problem.push[u] if u < problem.gap.size else problem.load[u - problem.gap.size]
-                _add_force(books, space, space.force[u], push, h, begin / h, size)
-        _book_panel(problem, tables, books, space, state.now[T] + begin, span / panels, x, row, i + 1 < panels)
-
-
-@inner
-def _add_force(books, space, force, push, h, place, size):
-    """Derivatives at a place in (0, 1) of a force known at a smooth step's nodes, times its push, to the load."""
-    powers = space.book[0]
-    for i in range(S):
-        powers[i] = dot(books.monomials[i], force, S)
-    for i in range(S):  # Horner's scheme moves the polynomial to the place
-        for m in range(S - 2, i - 1, -1):
-            powers[m] += place * powers[m + 1]
-    factor = 1.0
-    for i in range(S):
-        for e in range(size):
-            space.work[i, e] += factor * powers[i] * push[e]
-        factor *= (i + 1.0) / h
+        return
+    x, size = space.work[WITHIN], 2 * problem.k.size
+    copy(state.x, x, state.x.size)
+    inside(problem, tables, state, space, family, h, 0.0, h, x, books.kept > 0.0)
+    copy(x[size:], row[size:], 2)
 
 
 @inner

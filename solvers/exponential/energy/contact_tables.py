@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from solvers.compiled.kernels import inner, kernel
-from solvers.exponential.contact.nodes import S, gauss, lagrange
+from solvers.exponential.contact.nodes import S, gauss, lagrange, so_far
 from solvers.exponential.responses import propagate
 
 _PANEL, _POINTS = 1.5, 16  # radians of a panel and its points: exact to rounding
@@ -32,16 +32,8 @@ def contact_table(stiffness: bytes, damping: bytes, steps: bytes, power: float, 
     points = gauss(_POINTS)
     out = np.zeros((len(h), len(k), ROWS, WIDE))
     space = np.zeros((_POINTS, ROWS)), np.zeros((_POINTS, S)), np.zeros((_POINTS, ROWS, 2)), np.zeros((ROWS, 2))
-    _fill(k.copy(), c.copy(), h.copy(), power, lead, nodes.copy(), weights, points, _so_far(points[0]), *space, out)
+    _fill(k.copy(), c.copy(), h.copy(), power, lead, nodes.copy(), weights, points, so_far(points[0]), *space, out)
     return out
-
-
-def _so_far(points: Any) -> Any:
-    """(q, r): integral from 0 to point q of the polynomial through values at the points r."""
-    legendre = np.polynomial.legendre
-    x, one = 2.0 * points - 1.0, np.eye(len(points))
-    integrals = [legendre.legval(x, legendre.legint(row, lbnd=-1.0)) for row in one]
-    return np.ascontiguousarray(0.5 * np.array(integrals).T @ np.linalg.inv(legendre.legvander(x, len(x) - 1)))
 
 
 @kernel

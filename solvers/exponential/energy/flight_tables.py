@@ -47,7 +47,6 @@ class Books(NamedTuple):
     pairs: Any  # (l, 6J, 2 × 6J padded): the same from the signals
     gauss: Any  # (2, 5)
     series: Any  # (6, LONG): weights of a series' terms at Gauss's points and at the end
-    monomials: Any  # (S, S): coefficients of powers of σ from values at a smooth step's nodes
     kind: Any  # (f,) contact table of every family
     first: float  # contact step at which the tables begin
     longest: Any  # (kinds,) s: contact step up to which they may be used
@@ -65,7 +64,6 @@ BOOKS = types.NamedTuple(
             *(types.Array(REAL, 3, "C"),) * 3,
             MATRIX,
             MATRIX,
-            MATRIX,
             INTEGERS,
             REAL,
             VECTOR,
@@ -81,18 +79,13 @@ def _empty(kept: float, families: int) -> Books:
     none, nothing, contact = np.zeros(0, dtype=np.int64), np.zeros((0, 0, 0)), np.zeros((0, 0, 0, 0, 0))
     flight = kept, 0.0, 0.0, none, nothing, nothing, nothing
     kind, longest = np.zeros(families, dtype=np.int64), np.zeros(1)
-    return Books(*flight, gauss(5), _series(), _monomials(), kind, 0.0, longest, contact, contact)
+    return Books(*flight, gauss(5), _series(), kind, 0.0, longest, contact, contact)
 
 
 def _series() -> Any:
     """(6, LONG) x^i/i! at Gauss's points and at 1."""
     points = np.append(gauss(5)[0], 1.0)
     return np.array([[x**i / math.factorial(i) for i in range(LONG)] for x in points])
-
-
-def _monomials() -> Any:
-    """(S, S) coefficients of 1, σ, σ², ... from values at Gauss's nodes."""
-    return np.ascontiguousarray(np.linalg.inv(np.vander(gauss(S)[0], increasing=True)))
 
 
 NO_BOOKS = Packed(_empty(0.0, 1), BOOKS)
