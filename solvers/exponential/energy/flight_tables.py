@@ -51,7 +51,7 @@ class Books(NamedTuple):
     first: float  # contact step at which the tables begin
     longest: Any  # (kinds,) s: contact step up to which they may be used
     steady: Any  # (kinds, j, K, 2, S): α, β of every tone at the nodes
-    contact: Any  # (kinds, j, n, ROWS, WIDE)
+    contact: Any  # (kinds, j, n, 3S + 5, 2S)
 
 
 BOOKS = types.NamedTuple(
@@ -93,8 +93,8 @@ NO_BOOKS = Packed(_empty(0.0, 1), BOOKS)
 
 def books_for(problem: Problem, tables: Tables, spacing: float) -> Packed:
     """Everything a run with ledger needs beyond the tables of the motion; ``spacing`` is that of its outputs, s."""
-    books, n = _empty(1.0, len(tables.power)), len(problem.k)
-    if not (_coupled(tables) or problem.push[:, :n].any() or problem.load[:, :n].any()):
+    books, own = _empty(1.0, len(tables.power)), int(tables.own)
+    if not (_coupled(tables) or any(part[:, :own].any() for part in (problem.push, problem.load, problem.read_rate))):
         books = _contact_part(books, problem, tables)
     driver = np.flatnonzero(_drives(problem, tables))
     size, signals = 2 * len(problem.k), len(problem.table_dt)
