@@ -1,15 +1,17 @@
 """Work and damping of whole steps and of runs: against quadrature, closed forms, and the balance of energy."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import quad_vec
 from scipy.linalg import expm
 
 import fembeam as fb
-from contacts import Hertz, PiecewiseLinear
+from contacts import Hertz, Hysteretic, Jenkins, KelvinVoigt, PiecewiseLinear, Viscoelastic
 from solvers import Contact, Exponential, System, integrate
 from solvers.exponential.contact.nodes import S
-from solvers.exponential.energy.contact_tables import BEGIN, contact_table
+from solvers.exponential.energy.contact_tables import BEGAN, ENTERING, SQUARES, contact_table
 from solvers.exponential.preparation import ready_for
 from solvers.problem import hand_over
 
@@ -113,9 +115,8 @@ def test_tables_of_contact_steps_are_their_quadrature(power, lead, k, c):
     arrays = [np.array(values).tobytes() for values in ([k], [c], [0.7])]
     table = contact_table(*arrays, power, lead, nodes.tobytes())[0, 0]
     rng = np.random.default_rng(2)
-    y = np.concatenate((rng.standard_normal(2 * S), [0.3, -1.0], np.zeros(6)))
-    if not lead:
-        y[S : 2 * S] = 0.0
+    start, forces = [0.3, -1.0], rng.standard_normal(S)
+    entering = rng.standard_normal(S) if lead else np.zeros(S)
 
     def lagrange(sigma):
         return np.array([np.prod([(sigma - b) / (a - b) for b in nodes if b != a]) for a in nodes])
@@ -123,14 +124,16 @@ def test_tables_of_contact_steps_are_their_quadrature(power, lead, k, c):
     def rate(sigma, z):
         basis, pace = lagrange(sigma), 0.7 * power * sigma ** (power - 1.0)
         weighted = (sigma / nodes) ** lead if lead else np.zeros(S)
-        force = basis @ y[:S] + (basis * weighted) @ y[S : 2 * S]
+        force = basis @ forces + (basis * weighted) @ entering
         v = z[1]
         return pace * np.concatenate(([v, force - k * z[0] - c * v, v * v], basis * v))
 
-    exact = solve_ivp(rate, (0.0, 1.0), [0.3, -1.0, *np.zeros(1 + S)], "DOP853", rtol=3e-14, atol=1e-14).y[2:, -1]
-    sums = y[: BEGIN + 2] @ table
+    exact = solve_ivp(rate, (0.0, 1.0), [*start, *np.zeros(1 + S)], "DOP853", rtol=3e-14, atol=1e-14).y[2:, -1]
+    sums = np.concatenate((forces, start)) @ table[:BEGAN] + entering @ table[ENTERING:SQUARES]
+    squares = sums[S:] @ forces + table[BEGAN, :3] @ [start[0] ** 2, start[0] * start[1], start[1] ** 2]
+    squares += np.concatenate((entering, start)) @ table[SQUARES:, :S] @ entering
     np.testing.assert_allclose(sums[:S], exact[1:], rtol=0.0, atol=1e-12)
-    np.testing.assert_allclose(sums[S : S + BEGIN + 2] @ y[: BEGIN + 2], exact[0], rtol=1e-12)
+    np.testing.assert_allclose(squares, exact[0], rtol=1e-12)
 
 
 @pytest.mark.parametrize("dt", [3e-4, 1e-2, 0.3])
@@ -224,3 +227,42 @@ def test_outputs_of_another_spacing_give_the_same_ledger():
         np.testing.assert_allclose(
             getattr(fine, name)[::2], getattr(coarse, name), rtol=0.0, atol=1e-12 * fine.damping[-1]
         )
+
+
+def unaccounted(run):
+    """Energy a run does not account for, in units of what it handled, the exchange within its contacts included."""
+    energy, log = run.energy, run.contacts
+    handled = energy.initial + sum(np.abs(part).max() for part in (energy.stored, energy.input, energy.damping))
+    return np.abs(energy.residual).max() / (handled + np.abs(log.peak_force * log.peak_indentation).sum())
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9, 1e-12])
+@pytest.mark.parametrize(
+    "law",
+    [
+        *(Hertz(1e6), Hysteretic(1e6, 0.4), Viscoelastic.tsuji(1e6, 0.6, 1.0), KelvinVoigt(2e4, 20.0)),
+        *(PiecewiseLinear([1e4, 5e4], [5e-3]), Jenkins(400.0, 1.5)),
+    ],
+    ids=lambda law: type(law).__name__,
+)
+def test_samples_within_contacts_balance_as_well_as_their_ends(law, rtol):
+    """Many samples within every step, one mode and two: rtol or rounding, however stiff or flat the law."""
+    jenkins = isinstance(law, Jenkins)
+    for n in (1, 2):
+        rows = np.array([1.0, -1.2])[:n]
+        contact = Contact(-rows, law, gap=0.0 if jenkins else 0.01, always=jenkins)
+        system = System.modal([10.0, 63.0][:n], 0.01, [contact], [(rows, fb.Harmonic(30.0, 14.0))])
+        run = integrate(system, np.zeros(n), -0.8 * rows, 1.0, 1.7e-4, Exponential(rtol))
+        assert len(run.contacts) >= 3 or jenkins
+        assert unaccounted(run) < 2.0 * rtol + 1e-12
+
+
+def test_work_against_a_force_that_hardly_changes():
+    """Steps of a slider grow until fast modes oscillate between the nodes of a step, where no node sees their work."""
+    omega, rows = [10.0, 63.0, 180.0, 400.0, 900.0, 2000.0], np.array([1.0, -1.2, 0.9, 1.1, -0.8, 0.7])
+    contact = Contact(-rows, Jenkins(400.0, 1.5), always=True)
+    for n in (2, 6):
+        system = System.modal(omega[:n], 0.01, [replace(contact, direction=-rows[:n])], [])
+        run = integrate(system, np.zeros(n), -0.8 * rows[:n], 1.0, 1e-3, Exponential(1e-10))
+        assert len(run.transitions) > 2
+        assert unaccounted(run) < 1e-11

@@ -175,7 +175,8 @@ def _move(problem, tables, shadow, space, slopes, family, level, y, part):
     if part < np.inf:
         for u in range(space.force.shape[0]):
             copy(slopes.force[u], space.force[u], S)
-        inside(problem, tables, shadow, space, family, tables.step[level], part, y)
+        ledger = np.bool_(0)  # a literal would be compiled for itself
+        inside(problem, tables, shadow, space, family, tables.step[level], 0.0, part, y, ledger)
         return
     turn(problem, tables.step_propagator[level, 0], tables.step_propagator[level, 1], y)
     if goes_through_blocks(tables):
@@ -210,7 +211,7 @@ def linearise_step(problem, ahead, behind, tables, shadow, space, slopes, nudge,
         end = space.x_new
         if part < np.inf:
             copy(shadow.x, end, shadow.x.size)
-            inside(problem, tables, shadow, space, family, tables.step[level], part, end)
+            inside(problem, tables, shadow, space, family, tables.step[level], 0.0, part, end, np.bool_(0))
         else:
             arrive(problem, tables, shadow, space, family, level)
         rhs(problem, row[ENDED], end, shadow.piece, shadow.entry_rate, slopes.rate[1], slopes.batch)

@@ -30,7 +30,7 @@ def _arrays(*dimensions: int) -> list[Any]:
 TABLES = types.NamedTuple(
     [
         *_arrays(1, 3, 4, 2, 3, 2, 3, 2, 2, 2, 2, 0, 0, 2, 1, 2),
-        *(*_arrays(1, 3, 1, 1, 2, 2, 2, 2, 3, 3, 4, 3), INTEGERS, INTEGERS),
+        *(*_arrays(1, 3, 1, 1, 2, 2, 2, 2, 3, 3, 3, 4, 3), INTEGERS, INTEGERS),
         *_arrays(5, 6, 5, 5, 5, 5, 3, 2, 2, 2, 2, 2, 4),
         *(VECTOR, INTEGERS, INTEGERS, MATRIX),
     ],
@@ -41,7 +41,7 @@ SPACE = types.NamedTuple(
         *(*_arrays(1, 2, 2, 1, 1, 1, 1, 2, 3, 1, 3, 2, 1, 3, 2, 3, 1), INTEGERS, MATRIX),
         *(*_arrays(1, 1, 1, 1, 2, 1, 2, 1, 1, 1, 1, 1, 2, 1), INTEGERS),
         *(*_arrays(2, 1, 1, 1, 2, 2), INTEGERS),
-        *(*_arrays(2, 2, 1, 2, 3), INTEGERS),
+        *(*_arrays(2, 2, 1, 2, 3), INTEGERS, *_arrays(2, 3, 2)),
     ],
     Space,
 )
@@ -237,6 +237,7 @@ def _layout(stops: int, loads: int, blocks: int, signals: int, borders: int, poo
         *((2 + loads, max(32, padded(size + 6 * signals), 2 * padded(6 * signals))), (3,), (7,)),
         *((stops, 2), (borders * S,), (4 * borders,), (borders,), (stops, borders), (stops, borders), (2,)),
         *((rows, S), (rows, S), (padded(rows),), (stops * S, stops * S), (pool, S, 2 * S), (pool,)),
+        *((size, S), (blocks, 5, S), (S + 1 + stops + loads, S)),
     ]
     return Layout([STATE, SPACE], [state_shapes(width, stops), space])
 

@@ -22,7 +22,7 @@ from solvers.compiled.kernels import Problem
 from solvers.compiled.state import parameters_of
 from solvers.compiled.sums import padded
 from solvers.exponential.block_tables import Blocks, blocks_of, filled
-from solvers.exponential.contact.nodes import families_of, gauss
+from solvers.exponential.contact.nodes import S, families_of, gauss, so_far
 from solvers.exponential.phi_functions import signal_responses
 from solvers.exponential.responses import fill_propagators
 
@@ -61,6 +61,7 @@ class Tables(NamedTuple):
     weights: Any  # (f, S): ∫F dt = h Σ weights F
     plain: Any  # (f, S): the same of a force without the weight σ^λ
     summary: Any  # (f, S, 8): from node values, the last four Jacobi coefficients, both ends' values, both slopes
+    lagrange: Any  # (f, 2, S): 1/Π (σ_j - σ_i) of the nodes' polynomials, and the same over σ_j^λ
     tail: Any  # (f, S, 8): from node values of a signal, the last four Legendre coefficients in σ
     zoom: Any  # (f, S, 2S + 2, 2S): δ and h δ̇ at points around a node from those at all nodes and at the begin
     places: Any  # (f, S, 2): the interval of σ these points span
@@ -77,7 +78,7 @@ class Tables(NamedTuple):
     signal_rows: Any  # (L, 2N): a load's tones from the state
     power_rows: Any  # (L, 2N): input power = signal × power row
     loss_rows: Any  # (r, 2N): damping power = Σ (row·z)²
-    gauss: Any  # (2, 8) points and weights on (0, 1) for the energy ledger
+    gauss: Any  # (2 + S, S): points and weights on (0, 1), then to all points the integrals of each one's polynomial
     extend: Any  # (f, 5, S, S): the force on the next smooth step, 2^{(i-2)/2} times shorter, from that of the last
     bend: Any  # (m,) kind of the law's bend, see `contact.crossings`
     uncut: Any  # (m,) addresses of the laws without their cut at F = 0, and of their derivatives
@@ -162,6 +163,7 @@ def build(
         weights=families.weights,
         plain=families.plain,
         summary=families.summary,
+        lagrange=families.lagrange,
         tail=families.tail,
         zoom=families.zoom,
         places=families.places,
@@ -178,7 +180,7 @@ def build(
         signal_rows=ledger[0],
         power_rows=ledger[1],
         loss_rows=ledger[2],
-        gauss=gauss(8),
+        gauss=np.concatenate((gauss(S), so_far(gauss(S)[0]).T)),
         extend=families.extend,
     )
 

@@ -16,7 +16,6 @@ DIFFERENCE, BATCH, LANDED, WITHIN, START = range(STAGES + 1, STAGES + 6)
 """Rows of `Space.work` behind the stages of a landing's Runge–Kutta step and the rate at its end: its embedded
 difference; numbers for one law call; trial states, at last the one landed on; a state within a step, for the energy
 ledger; the state a landing begins with, or the end of a run within a step."""
-PLAIN, WEIGHTED, PRODUCTS = range(3)  # the first rows while a force is interpolated between the nodes, see `energy`
 DELTAS, RATES, FORCES, KNOWN = range(4)  # rows of `Space.around`: m, m/s, N at points around a node; what they are from
 
 
@@ -75,6 +74,9 @@ class Space(NamedTuple):
     jacobian: Any  # (m S, m S) used up to the stops that touch together; from here on runs find what others left
     pairs: Any  # (POOL, S, 2S)
     tags: Any  # (POOL,) which pairs these are
+    along: Any  # (2N, S) p and v of the blocks at a panel's points, as the next two of any number of stops
+    moves: Any  # (N, 5, S), see `energy.quadrature`
+    between: Any  # (S + 1 + m + L, S)
 
 
 @inner

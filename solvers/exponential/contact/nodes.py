@@ -45,6 +45,14 @@ def gauss(count: int) -> Any:
     return np.array([0.5 * (1.0 + x), 0.5 * w])
 
 
+def so_far(points: Any) -> Any:
+    """(q, r): integral from 0 to point q of (0, 1) of the polynomial that is 1 at point r and 0 at the others."""
+    legendre = np.polynomial.legendre
+    x, one = 2.0 * points - 1.0, np.eye(len(points))
+    integrals = [legendre.legval(x, legendre.legint(row, lbnd=-1.0)) for row in one]
+    return np.ascontiguousarray(0.5 * np.array(integrals).T @ np.linalg.inv(legendre.legvander(x, len(x) - 1)))
+
+
 class _Family(NamedTuple):
     """Nodes of a kind of contact step, t = h σ^power, F = σ^lead × polynomial."""
 

@@ -7,27 +7,25 @@ from solvers.compiled.state import HEAD, PART, SAMPLED, STEPS, TAPED, T, tape
 from solvers.exponential.contact.node_response import START
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.peaks import state_peaks, step_peaks
-from solvers.exponential.energy.books import book_contact
 from solvers.exponential.energy.quadrature import inside
 
 
 @inner
 def record(problem, tables, books, state, space, family, level, t_end, out, due):
     """Samples inside the converged step, and the state at the end of the run if that lies inside."""
-    t, h = state.now[T], tables.step[level]
+    t, h, begin, row = state.now[T], tables.step[level], 0.0, state.x
     while True:
         sampled = due[state.count[SAMPLED]] <= min(t + h, t_end)
         if not sampled and t + h < t_end:
             return
         span = due[state.count[SAMPLED]] - t if sampled else t_end - t
-        row = out[state.count[SAMPLED]] if sampled else space.work[START]
-        copy(state.x, row, state.x.size)
-        inside(problem, tables, state, space, family, h, span, row)
-        if books.kept > 0.0:
-            book_contact(problem, tables, books, state, space, family, level, span, row)
+        following = out[state.count[SAMPLED]] if sampled else space.work[START]
+        copy(row, following, state.x.size)
+        inside(problem, tables, state, space, family, h, begin, span, following, books.kept > 0.0)
         if not sampled:
             return
         state.count[SAMPLED] += 1
+        begin, row = span, following
 
 
 @inner

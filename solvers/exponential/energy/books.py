@@ -15,13 +15,16 @@ from solvers.compiled.kernels import copy, dot, inlined, inner, reordered
 from solvers.compiled.simd import eight, put, spread, total
 from solvers.compiled.state import T
 from solvers.compiled.sums import combine
+from solvers.exponential.contact.collocation import _beyond, _size
+from solvers.exponential.contact.node_response import WITHIN
 from solvers.exponential.contact.nodes import S
-from solvers.exponential.energy.contact_tables import BEGIN
-from solvers.exponential.energy.quadrature import account, powers
+from solvers.exponential.energy.contact_tables import BEGAN, ENTERING, SQUARES
+from solvers.exponential.energy.quadrature import inside, powers
 from solvers.exponential.flight import LONG, LONG_REACH, add_signals, level_within, signal_derivatives, turn
 
 _SCRATCH, _MOVING, _MARK = 9, 10, 11  # rows of Space.work; those before hold a load on the blocks and its derivatives
 _EXACT = 1e-17  # share of the last term of a series
+_UNSEEN = 10.0  # times what a polynomial is thought to leave out
 
 
 @reordered
@@ -171,47 +174,33 @@ def _book_panel(problem, tables, books, space, t, span, x, row, further):
 
 
 @inner
-def book_contact(problem, tables, books, state, space, family, level, span, row):
-    """Add to the ledger of ``row`` what loads and damping do over ``span`` of the contact step just found."""
-    h = tables.step[level]
-    if span == h and level >= books.first and h <= books.longest[books.kind[family]]:
+def book_contact(problem, tables, books, state, space, family, level, h, row):
+    """Add to the ledger of ``row`` what loads and damping do over the contact step of length h just found."""
+    if level >= books.first and h <= books.longest[books.kind[family]]:
         _book_nodes(problem, tables, books, state, space, family, level - int(books.first), h, row)
-    elif family == 0:
-        _book_pieces(problem, tables, books, state, space, h, span, row)
-    else:
-        account(problem, tables, state, space, family, h, span, state.x, row)
+        return
+    x, size = space.work[WITHIN], 2 * problem.k.size
+    copy(state.x, x, state.x.size)
+    inside(problem, tables, state, space, family, h, 0.0, h, x, books.kept > 0.0)
+    for s in range(problem.gap.size):
+        if state.piece[s] > 0:
+            _add_unseen(tables, space, family, h, s, x[size + 2 + 2 * s] - state.x[size + 2 + 2 * s], row[size + 2 :])
+    copy(x[size:], row[size:], 2)
 
 
 @inner
-def _book_pieces(problem, tables, books, state, space, h, span, row):
-    """The same on a part of a smooth step, whose forces are polynomials of time, by series."""
-    panels, size = max(1, math.ceil(tables.fastest * span / LONG_REACH - 1e-9)), 2 * problem.k.size
-    x = space.work[_MOVING]
-    copy(state.x, x, size)
-    for i in range(panels):
-        begin = i * span / panels
-        _clear(space, size)
-        for u in range(space.force.shape[0]):
-            if u >= problem.gap.size or state.piece[u] > 0:
-                push = problem.push[u] if u < problem.gap.size else problem.load[u - problem.gap.size]
-                _add_force(books, space, space.force[u], push, h, begin / h, size)
-        _book_panel(problem, tables, books, space, state.now[T] + begin, span / panels, x, row, i + 1 < panels)
+def _add_unseen(tables, space, family, h, s, work, works):
+    """Add of a contact's work what `finish_step` leaves out, which sums at the nodes.
 
-
-@inner
-def _add_force(books, space, force, push, h, place, size):
-    """Derivatives at a place in (0, 1) of a force known at a smooth step's nodes, times its push, to the load."""
-    powers = space.book[0]
-    for i in range(S):
-        powers[i] = dot(books.monomials[i], force, S)
-    for i in range(S):  # Horner's scheme moves the polynomial to the place
-        for m in range(S - 2, i - 1, -1):
-            powers[m] += place * powers[m + 1]
-    factor = 1.0
-    for i in range(S):
-        for e in range(size):
-            space.work[i, e] += factor * powers[i] * push[e]
-        factor *= (i + 1.0) / h
+    That is no more than the polynomial through the powers at the nodes may be wrong: so the sum still tests the rest. A
+    force that is constant lets steps grow until the velocity oscillates between the nodes.
+    """
+    weights = tables.weights[family] if family == 0 or s == family - 1 else tables.plain[family]
+    powers = eight(space.force[s], 0) * eight(space.motion[s, 1], 0)
+    put(space.trial, 0, powers)
+    combine(tables.tail[family], space.trial, S, None, space.clipped)
+    most = _UNSEEN * h * _beyond(space.clipped, _size(space.trial), S // 2 if family == 0 else 1)
+    works[2 * s] += min(max(work - h * total(eight(weights, 0) * powers), -most), most)
 
 
 @inner
@@ -244,12 +233,12 @@ def _of_tones(row, space, n, size):
 
 @inner
 def _block_forces(problem, tables, state, space, family, b, y):
-    """Forces on a block at the nodes, plain ones and that of the stop that enters, then its state, into y; signals."""
+    """Forces on a block at the nodes and its state, for plain forces and for that of the stop that enters; signals."""
     size, signal, plain, entering = problem.k.size, spread(0.0), spread(0.0), spread(0.0)
     for u in range(problem.gap.size):
         if state.piece[u] > 0:
             force = spread(problem.push[u, size + b]) * eight(space.force[u], 0)
-            if u == family - 1 and tables.lead[family] > 0.0:
+            if _enters(tables, family, u):
                 entering += force
             else:
                 plain += force
@@ -257,32 +246,48 @@ def _block_forces(problem, tables, state, space, family, b, y):
         plain += spread(problem.load[load, size + b]) * eight(space.force[problem.gap.size + load], 0)
         signal += spread(tables.power_rows[load, size + b]) * eight(space.book[2 + load], 0)
     put(y, 0, plain)
-    put(y, S, entering)
-    y[BEGIN], y[BEGIN + 1] = state.x[b], state.x[size + b]
+    put(y, 2 * S, entering)
+    y[S], y[S + 1] = state.x[b], state.x[size + b]
+    y[3 * S], y[3 * S + 1] = y[S], y[S + 1]
     return signal
+
+
+@inlined
+def _enters(tables, family, u):
+    """Whether the force of a stop has a weight on a step."""
+    return u == family - 1 and tables.lead[family] > 0.0
 
 
 @inner
 def _book_nodes(problem, tables, books, state, space, family, place, h, row):
     """The same for a whole step by its tables."""
-    n, size, kind, weights = int(tables.own), problem.k.size, books.kind[family], tables.plain[family]
-    y, sums, loss = space.book[0], space.book[1], 0.0
-    put(y, BEGIN, spread(0.0))
-    gain = _steady_nodes(problem, tables, books, state, space, kind, place, h, weights)
+    n, size, kind, weights = int(tables.own), problem.k.size, books.kind[family], eight(tables.plain[family], 0)
+    y, sums, entering = space.book[0], space.book[1], tables.lead[family] > 0.0
+    gain, loss = _steady_nodes(problem, tables, books, state, space, kind, place, h, tables.plain[family]), 0.0
+    gains, losses = spread(0.0), spread(0.0)
     for b in range(n):
-        signal = _block_forces(problem, tables, state, space, family, b, y)
-        table = books.contact[kind, place, b]
-        combine(table, y, S, None, sums)
-        if tables.lead[family] > 0.0:
-            combine(table[S:], y[S:], S, sums, sums)
-        combine(table[BEGIN:], y[BEGIN:], 2, sums, sums)
-        moments = eight(sums, 0)
-        squares = eight(sums, S) * eight(y, 0) + eight(sums, 2 * S) * eight(y, S) + eight(sums, 3 * S) * eight(y, 2 * S)
-        gain += total(signal * moments)
-        loss += problem.c[b] * total(squares)
+        signal, p, v = _block_forces(problem, tables, state, space, family, b, y), state.x[b], state.x[size + b]
+        table, c = books.contact[kind, place, b], problem.c[b]
+        combine(table, y, S + 2, None, sums)
+        if entering:
+            combine(table[ENTERING:], y[2 * S :], S, sums, sums)
+        moments, squares = eight(sums, 0), eight(sums, S) * eight(y, 0)
+        if entering:
+            combine(table[SQUARES:], y[2 * S :], S + 2, None, sums)
+            squares += eight(sums, 0) * eight(y, 2 * S)
+        put(space.along[b], 0, moments)
+        gains += signal * moments
+        losses += spread(c) * squares
+        loss += c * (table[BEGAN, 0] * p * p + table[BEGAN, 1] * p * v + table[BEGAN, 2] * v * v)
         if n < size:
             steady = _of_tones(tables.loss_rows[b], space, n, size)
-            loss += 2.0 * tables.loss_rows[b, size + b] * total(steady * moments)
-            loss += h * total(eight(weights, 0) * steady * steady)
-    row[2 * size] += gain
-    row[2 * size + 1] += loss
+            losses += spread(2.0 * tables.loss_rows[b, size + b]) * steady * moments
+            losses += spread(h) * weights * steady * steady
+    row[2 * size] += gain + total(gains)
+    row[2 * size + 1] += loss + total(losses)
+    for s in range(problem.gap.size):
+        if state.piece[s] > 0 and not _enters(tables, family, s):
+            combine(space.along, problem.read_rate[s, size:], n, None, space.trial)
+            steady = spread(h) * weights * _of_tones(problem.read_rate[s], space, n, size)
+            work = total(eight(space.force[s], 0) * (eight(space.trial, 0) + steady))
+            _add_unseen(tables, space, family, h, s, work, row[2 * size + 2 :])

@@ -47,12 +47,11 @@ class Books(NamedTuple):
     pairs: Any  # (l, 6J, 2 × 6J padded): the same from the signals
     gauss: Any  # (2, 5)
     series: Any  # (6, LONG): weights of a series' terms at Gauss's points and at the end
-    monomials: Any  # (S, S): coefficients of powers of σ from values at a smooth step's nodes
     kind: Any  # (f,) contact table of every family
     first: float  # contact step at which the tables begin
     longest: Any  # (kinds,) s: contact step up to which they may be used
     steady: Any  # (kinds, j, K, 2, S): α, β of every tone at the nodes
-    contact: Any  # (kinds, j, n, ROWS, WIDE)
+    contact: Any  # (kinds, j, n, 3S + 5, 2S)
 
 
 BOOKS = types.NamedTuple(
@@ -63,7 +62,6 @@ BOOKS = types.NamedTuple(
             REAL,
             INTEGERS,
             *(types.Array(REAL, 3, "C"),) * 3,
-            MATRIX,
             MATRIX,
             MATRIX,
             INTEGERS,
@@ -81,7 +79,7 @@ def _empty(kept: float, families: int) -> Books:
     none, nothing, contact = np.zeros(0, dtype=np.int64), np.zeros((0, 0, 0)), np.zeros((0, 0, 0, 0, 0))
     flight = kept, 0.0, 0.0, none, nothing, nothing, nothing
     kind, longest = np.zeros(families, dtype=np.int64), np.zeros(1)
-    return Books(*flight, gauss(5), _series(), _monomials(), kind, 0.0, longest, contact, contact)
+    return Books(*flight, gauss(5), _series(), kind, 0.0, longest, contact, contact)
 
 
 def _series() -> Any:
@@ -90,18 +88,13 @@ def _series() -> Any:
     return np.array([[x**i / math.factorial(i) for i in range(LONG)] for x in points])
 
 
-def _monomials() -> Any:
-    """(S, S) coefficients of 1, σ, σ², ... from values at Gauss's nodes."""
-    return np.ascontiguousarray(np.linalg.inv(np.vander(gauss(S)[0], increasing=True)))
-
-
 NO_BOOKS = Packed(_empty(0.0, 1), BOOKS)
 
 
 def books_for(problem: Problem, tables: Tables, spacing: float) -> Packed:
     """Everything a run with ledger needs beyond the tables of the motion; ``spacing`` is that of its outputs, s."""
-    books, n = _empty(1.0, len(tables.power)), len(problem.k)
-    if not (_coupled(tables) or problem.push[:, :n].any() or problem.load[:, :n].any()):
+    books, own = _empty(1.0, len(tables.power)), int(tables.own)
+    if not (_coupled(tables) or any(part[:, :own].any() for part in (problem.push, problem.load, problem.read_rate))):
         books = _contact_part(books, problem, tables)
     driver = np.flatnonzero(_drives(problem, tables))
     size, signals = 2 * len(problem.k), len(problem.table_dt)
