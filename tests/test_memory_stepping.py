@@ -8,7 +8,17 @@ from scipy.sparse import csc_array
 from sliders import Slider
 
 from contacts import Hertz, Jenkins, KelvinVoigt
-from solvers import RK4, CentralDifference, Contact, DormandPrince, GeneralizedAlpha, HenonRK2, Newmark, System, integrate
+from solvers import (
+    RK4,
+    CentralDifference,
+    Contact,
+    DormandPrince,
+    GeneralizedAlpha,
+    HenonRK2,
+    Newmark,
+    System,
+    integrate,
+)
 
 DECAY = Slider(spring=1.0, stiffness=4.0, limit=0.3)
 START, DURATION = (0.05, 3.0), 30.0
