@@ -41,6 +41,9 @@ class Problem(NamedTuple):
     borders: Any  # (m,) addresses of the margins of laws with memory, 0 for others
     renewal: Any  # (m,) addresses of what they latch on a border
     border_count: Any  # (m,) how many borders
+    latched: Any  # (m, l) places of the latched numbers among the parameters, padded by -1
+    by_latched: Any  # (m,) addresses of the forces' derivatives by them
+    by_renewal: Any  # (m,) addresses of the derivatives of what is latched on a border
     opening: Any  # (m,) place among the parameters of a segment code that is 0 while the law is open, or -1
     load: Any  # (L, 2n) state rate per unit of signal l
     power: Any  # (L, 2n) input power = signal × power·z, W
@@ -61,20 +64,8 @@ _COMPLEX = types.Array(types.complex128, 1, "C")
 PROBLEM = types.NamedTuple(
     [
         *[VECTOR, VECTOR, MATRIX, MATRIX, MATRIX, MATRIX, MATRIX, VECTOR, INTEGERS, INTEGERS],
-        *[
-            MATRIX,
-            VECTOR,
-            *[INTEGERS] * 4,
-            MATRIX,
-            MATRIX,
-            VECTOR,
-            _COMPLEX,
-            INTEGERS,
-            MATRIX,
-            VECTOR,
-            INTEGERS,
-            INTEGERS,
-        ],
+        *[MATRIX, VECTOR, *[INTEGERS] * 3, types.Array(types.int64, 2, "C"), *[INTEGERS] * 3],
+        *[MATRIX, MATRIX, VECTOR, _COMPLEX, INTEGERS, MATRIX, VECTOR, INTEGERS, INTEGERS],
     ],
     Problem,
 )
@@ -117,6 +108,23 @@ def call_renewal(typingctx, address, border, delta, delta_dot, entry_rate, param
         declared = ir.FunctionType(long, [long, real, real, real, real.as_pointer()])
         data = context.make_array(sig.args[5])(context, builder, args[5]).data
         return builder.call(builder.inttoptr(args[0], declared.as_pointer()), [*args[1:5], data])
+
+    return signature, codegen
+
+
+@intrinsic
+def call_renewal_gradient(typingctx, address, border, delta, delta_dot, entry_rate, parameters, out):
+    """Call a law's C function for the derivatives of what it latches on a border, at an address."""
+    known = [types.int64, types.int64, types.float64, types.float64, types.float64]
+    signature = types.void(*known, parameters, out)
+
+    def codegen(context, builder, sig, args):
+        real, long = ir.DoubleType(), ir.IntType(64)
+        reals = real.as_pointer()
+        declared = ir.FunctionType(ir.VoidType(), [long, real, real, real, reals, reals])
+        data = [context.make_array(sig.args[i])(context, builder, args[i]).data for i in (5, 6)]
+        builder.call(builder.inttoptr(args[0], declared.as_pointer()), [*args[1:5], *data])
+        return context.get_dummy_value()
 
     return signature, codegen
 

@@ -252,6 +252,9 @@ def _problem(system: System, forcing: Forcing, linear: dict[str, Array]) -> Prob
         borders=_integers(contacts, "borders_address"),
         renewal=_integers(contacts, "renew_address"),
         border_count=_integers(contacts, "borders"),
+        latched=_latched(contacts),
+        by_latched=_integers(contacts, "memory_gradient_address"),
+        by_renewal=_integers(contacts, "renew_gradient_address"),
         opening=np.array([_opening(c.law) for c in contacts], dtype=np.int64),
         **vars(forcing),
     )
@@ -265,6 +268,15 @@ def most_borders(problem: Problem) -> int:
 def _integers(contacts: Sequence[Any], name: str) -> Array:
     """(m,) whole numbers of the laws, 0 where a law does not know of them."""
     return np.array([getattr(contact.law, name, 0) for contact in contacts], dtype=np.int64)
+
+
+def _latched(contacts: Sequence[Any]) -> Array:
+    """(m, l) places of the latched numbers among the parameters, padded by -1."""
+    places = [getattr(contact.law, "memory", ()) for contact in contacts]
+    table = np.full((len(contacts), max([len(row) for row in places], default=0)), -1, dtype=np.int64)
+    for row, own in zip(table, places, strict=True):
+        row[: len(own)] = own
+    return table
 
 
 def _opening(law: Law) -> int:

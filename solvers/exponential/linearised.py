@@ -4,6 +4,7 @@ Every accepted contact step is linearised as it was taken. With Y the derivative
 
     flight   Y ← E(t) Y                                            (exact)
     entry    dt* = -dδ/δ̇,  d(entry rate) = dδ̇ + δ̈ dt*              (latched until the exit)
+    border   dt* = -db/ḃ,  dL ← m_L dL + m_δ (dδ + δ̇ dt*) + m_δ̇ (dδ̇ + δ̈ dt*)   (what a law with memory latches)
     jump     Y ← Y - b ΔF dt*                                      (saltation: the law's force jumps by ΔF)
     step     (1 - D C) dF = D (free response of Y) + ∂F/∂(entry rate) d(entry rate),   Y ← E(h) Y + kick dF
     landing  the variational equation, on the stages of the Runge–Kutta step
@@ -47,6 +48,7 @@ from solvers.compiled.state import (
     HEAD,
     KIND,
     LANDING,
+    RENEWAL,
     SECOND,
     SPAN,
     STATE,
@@ -59,7 +61,17 @@ from solvers.compiled.sums import combine
 from solvers.exponential.contact.crossings import FORCE, side_at
 from solvers.exponential.contact.landing import regular_step, start_landing
 from solvers.exponential.contact.node_response import START
-from solvers.exponential.linearised_step import NUDGE, SLOPES, change_of, explicit, is_parameter, linearise_step
+from solvers.exponential.linearised_border import pass_border
+from solvers.exponential.linearised_step import (
+    NUDGE,
+    SLOPES,
+    by_latched,
+    change_by_latched,
+    change_of,
+    explicit,
+    is_parameter,
+    linearise_step,
+)
 from solvers.exponential.preparation import SPACE, TABLES
 from solvers.exponential.responses import propagate
 
@@ -177,12 +189,13 @@ def _stage_rates(problem, ahead, behind, tables, shadow, space, slopes, nudge, w
         batch[0], batch[1] = _inside_piece(problem, shadow, s, w), dot(problem.read_rate[s], w, size)
         rate = shadow.entry_rate[s]
         _gradient(problem, tables, shadow, space, s, batch)
+        by_latched(problem, shadow, slopes, s, 1, batch[0:1], batch[1:2])
         if nudge.law_step > 0.0:
             contact_forces(ahead, s, batch[0:1], batch[1:2], rate, batch[5:6])
             contact_forces(behind, s, batch[0:1], batch[1:2], rate, batch[6:7])
         for c in range(slopes.y.shape[0]):
             y = slopes.trial[c]
-            change = batch[4] * slopes.entry[c, s]
+            change = batch[4] * slopes.entry[c, s] + change_by_latched(problem, slopes, c, s, 1, 0)
             for d in range(2):
                 value = dot(problem.read[s] if d == 0 else problem.read_rate[s], y, size)
                 if is_parameter(nudge, slopes, c):
@@ -243,6 +256,8 @@ def replay(
         copy(row[HEAD:], shadow.x, shadow.x.size)
         if row[KIND] == EVENT:
             _cross(problem, shadow, slopes, nudge, int(row[FIRST]), int(row[SECOND]))
+        elif row[KIND] == RENEWAL:
+            pass_border(problem, ahead, behind, shadow, slopes, nudge, int(row[FIRST]), int(row[SECOND]))
         elif row[KIND] == LANDING:
             _land(problem, ahead, behind, tables, shadow, space, slopes, nudge, row)
         else:

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from solvers.compiled.kernels import MATRIX, REAL, VECTOR, contact_forces, copy, dot, inlined, inner, rhs
+from solvers.compiled.kernels import MATRIX, REAL, VECTOR, call_force, contact_forces, copy, dot, inlined, inner, rhs
 from solvers.compiled.state import BEGAN, ENDED, FIRST, HEAD, KIND, PART, SECOND, SPAN, T
 from solvers.compiled.sums import combine
 from solvers.exponential.contact.blocks import carry_free, goes_through_blocks, kick, pair, see, way_of
@@ -33,6 +33,9 @@ class Slopes(NamedTuple):
     stages: Any  # (STAGES, columns, x.size) of a landing
     trial: Any  # (columns, x.size)
     batch: Any  # (8,)
+    latched: Any  # (columns, m l) of what laws with memory have latched, see Problem.latched
+    by_latched: Any  # (m, l S) derivatives of their forces by it, row by row
+    renewed: Any  # (l (2 + l) + 4 P + 2 B,) working space
 
 
 class Nudge(NamedTuple):
@@ -46,7 +49,7 @@ class Nudge(NamedTuple):
 
 
 _CUBE = types.Array(REAL, 3, "C")
-SLOPES = types.NamedTuple([*[MATRIX] * 5, _CUBE, MATRIX, MATRIX, _CUBE, MATRIX, VECTOR], Slopes)
+SLOPES = types.NamedTuple([*[MATRIX] * 5, _CUBE, MATRIX, MATRIX, _CUBE, MATRIX, VECTOR, MATRIX, MATRIX, VECTOR], Slopes)
 NUDGE = types.NamedTuple([REAL, REAL, VECTOR, types.Array(REAL, 4, "C"), VECTOR], Nudge)
 
 
@@ -73,6 +76,24 @@ def change_of(problem, nudge, slopes, column, s, d, t):
 def is_parameter(nudge, slopes, column):
     """Whether a column is the parameter's."""
     return nudge.step > 0.0 and column == slopes.y.shape[0] - 1
+
+
+@inlined
+def by_latched(problem, shadow, slopes, s, n, delta, rate):
+    """∂F/∂(latched numbers) of a law with memory at n points."""
+    if problem.by_latched[s] != 0:
+        address, out = problem.by_latched[s], slopes.by_latched[s]
+        call_force(address, n, delta, rate, shadow.entry_rate[s], problem.parameters[s], (out,))
+
+
+@inlined
+def change_by_latched(problem, slopes, column, s, n, i):
+    """Change of a force at point i of n by the changes of what is latched."""
+    total, most = 0.0, problem.latched.shape[1]
+    for place in range(most if problem.by_latched[s] != 0 else 0):
+        if problem.latched[s, place] >= 0:
+            total += slopes.by_latched[s, place * n + i] * slopes.latched[column, s * most + place]
+    return total
 
 
 @inlined
@@ -124,6 +145,7 @@ def _solve(problem, tables, shadow, space, slopes, nudge, family, level, column,
             combine(tables.free[tables.kind[family], level, s], slopes.y[column], size, None, space.motion[s])
         for i in range(S):
             change = slopes.entry[column, s] * space.slope[s, 2, i]
+            change += change_by_latched(problem, slopes, column, s, S, i)
             if is_parameter(nudge, slopes, column):
                 change += slopes.by_parameter[s, i]
             for d in range(2):
@@ -179,6 +201,7 @@ def linearise_step(problem, ahead, behind, tables, shadow, space, slopes, nudge,
         if shadow.piece[s] > 0:
             respond(problem, tables, shadow, space, family, level, s)
             _by_parameter(ahead, behind, shadow, space, nudge, slopes, s)
+            by_latched(problem, shadow, slopes, s, S, space.motion[s, 0], space.motion[s, 1])
     factorise(space.jacobian, space.pivots, linearise(problem, tables, shadow, space, family, level))
     moving = tables.power[family] > 1.0
     part = row[SPAN] if row[KIND] == PART else np.inf

@@ -12,7 +12,7 @@ import numpy as np
 from solvers.compiled.dop853_tableau import STAGES
 from solvers.compiled.handles import Layout, Packed
 from solvers.compiled.kernels import PROBLEM, Problem
-from solvers.compiled.state import HEAD, STATE, State, T, begin_state, law_parameters, state_shapes
+from solvers.compiled.state import HEAD, STATE, State, T, begin_state, law_parameters, most_borders, state_shapes
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.linearised import replay
 from solvers.exponential.linearised_step import NUDGE, SLOPES, Nudge, Slopes
@@ -20,7 +20,7 @@ from solvers.exponential.preparation import places_among_tones, steady_response
 from solvers.problem import Array, Parameter, SolverError, System
 
 _ROWS = 256  # of the tape between two replays: some 25 contacts, within which no derivative overflows
-_CARRIED = [Slopes._fields.index(name) for name in ("y", "entry", "shift", "rate")]
+_CARRIED = [Slopes._fields.index(name) for name in ("y", "entry", "shift", "rate", "latched")]
 _LARGE = 1e100  # size at which the derivatives are scaled down
 
 
@@ -31,25 +31,31 @@ class Tangent:
         self.engine, self.blocks = engine, system.blocks
         problem, state = engine.problem, engine.state
         stops, loads, size = len(problem.gap), len(problem.load), 2 * len(problem.k)
+        if problem.border_count.any():  # the record is followed with what was latched then
+            problem = problem._replace(parameters=engine.first_parameters.copy())
         width, n = state.x.size, system.size
         change = _Change.of(system, parameter, engine) if parameter else None
         self.exact = change is not None
         self.change, columns = change or _Change.none(problem, n), 2 * n + self.exact
-        layout = _layout(stops, loads, width, columns)
+        latched, parameters = problem.latched.shape[1], problem.parameters.shape[1]
+        layout = _layout(stops, loads, width, columns, latched, parameters + most_borders(problem))
         self.block, words = layout.block()
-        self.y, self.entry, self.shift, self.end_rate = (layout.array(self.block, 0, i) for i in _CARRIED)
+        self.y, self.entry, self.shift, self.end_rate, self.latched = (layout.array(self.block, 0, i) for i in _CARRIED)
         begin_state(State._make(layout.arrays(self.block, 1)), state.x[:size])
         self.places = places_among_tones(n, size // 2 - n)
         self.y[: 2 * n, self.places] = system.blocks.inverse.T
         self.y[2 * n :, self.places] = -self.change.steady(0.0)
         engine.record(np.empty((_ROWS, HEAD + width + stops * S)))
         self.packed = [
-            *(engine.packed if same is problem else Packed(same, PROBLEM) for same in self.change.problems),
+            *(engine.packed if same is engine.problem else Packed(same, PROBLEM) for same in self.change.problems),
             Packed(self.change.nudge, NUDGE),
         ]
+        if problem is not engine.problem:
+            self.packed.append(Packed(problem, PROBLEM))
         slopes, shadow = (words + start for start in layout.starts)
-        ahead, behind, nudge = (packed.address for packed in self.packed)
+        ahead, behind, nudge = (packed.address for packed in self.packed[:3])
         problem_at, *others = engine.addresses
+        problem_at = problem_at if problem is engine.problem else self.packed[-1].address
         self.addresses = problem_at, ahead, behind, *others, shadow, slopes, nudge, system.size
         self.log_scale = 0.0  # the derivatives are exp(log_scale) times what is kept
         self.history: list[tuple[float, float]] = []  # (time, ln of their size)
@@ -63,7 +69,7 @@ class Tangent:
         size = _size(self.y)
         self.history.append((float(engine.state.now[T]), self.log_scale + math.log(size) if size > 0.0 else -math.inf))
         if not 1.0 / _LARGE < size < _LARGE and size > 0.0:
-            for array in (self.y, self.entry, self.shift):
+            for array in (self.y, self.entry, self.shift, self.latched):
                 array /= size
             self.log_scale += math.log(size)
 
@@ -81,10 +87,11 @@ class Tangent:
 
 
 @lru_cache(maxsize=64)
-def _layout(stops: int, loads: int, width: int, columns: int) -> Layout:
+def _layout(stops: int, loads: int, width: int, columns: int, latched: int, others: int) -> Layout:
     """Places of the arrays of `Slopes` and of the shadow's `State`."""
     slopes = [(columns, width), (columns, stops), (columns, stops), (stops + loads, S), (loads, S), (stops, 2, S)]
     slopes += [(stops, S), (2, width), (STAGES, columns, width), (columns, width), (8,)]
+    slopes += [(columns, stops * latched), (stops, latched * S), (latched * (5 + latched) + 2 + others,)]
     return Layout([SLOPES, STATE], [slopes, state_shapes(width, stops)])
 
 

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from solvers.compiled.kernels import inner
+from solvers.compiled.state import PEAK_FORCE, T
 from solvers.problem import Array, Energy, System, dense
 
 MULTIPLE, ROUNDING = 20.0, 1e-9
@@ -47,8 +48,10 @@ def note_energy(problem, tables, state, space):
         steady = 0.0
         for b in range(int(tables.own), n):
             steady += np.hypot(problem.read_rate[s, b], problem.read_rate[s, n + b] * np.sqrt(problem.k[b]))
-        work, impulse = state.x[2 * n + 2 + 2 * s], state.x[2 * n + 3 + 2 * s]
-        allowed += 2.0 * steady * abs(impulse) - work
+        work, impulse = state.x[2 * n + 2 + 2 * s], abs(state.x[2 * n + 3 + 2 * s])
+        if problem.levels[s, 0] < 0.0:  # a force of both signs
+            impulse = state.open[s, PEAK_FORCE] * state.now[T]
+        allowed += 2.0 * steady * impulse - work
     space.energy[LAST], space.energy[ALLOWED] = own_energy(problem, tables, state.x), max(allowed, 0.0)
 
 
