@@ -280,7 +280,7 @@ def land_on_bend(problem, tables, state, space, stop, border, near, rtol, t_end,
         return False
     start_landing(problem, tables, state, space, stop)
     w, x = space.work[START], space.work[LANDED]
-    before, apart, span = 0.0, _apart(problem, tables, state, space, stop, border, w), near
+    before, apart, span, near_enough = 0.0, _apart(problem, tables, state, space, stop, border, w), near, False
     if abs(apart) <= 1e-6 * largest:  # it begins on the bend, which is no second point for the next one
         before = 0.9 * near
         _step(problem, tables, state, space, TIME, stop, before, ledger)
@@ -288,9 +288,12 @@ def land_on_bend(problem, tables, state, space, stop, border, near, rtol, t_end,
     for _ in range(_MOST_TRIES):
         _step(problem, tables, state, space, TIME, stop, span, ledger)
         value = _apart(problem, tables, state, space, stop, border, x)
-        if abs(value) <= 1e-10 * largest:
+        last, near_enough = near_enough, abs(value) <= 1e-10 * largest
+        if value == 0.0 or (near_enough and (last or border < 0)):  # what misses a border is seen beyond it: once more
             break
         following = span - value * (span - before) / (value - apart)
+        if near_enough and following == span:
+            break
         if not 0.1 * near < following <= furthest or following == span:
             return False
         before, apart, span = span, value, following
