@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -64,6 +64,7 @@ def integrate(
     *,
     progress: Callable[[float], None] | None = None,
     check: bool = True,
+    memory: Sequence[ArrayLike | None] | None = None,
 ) -> Solution:
     """Integrate M q̈ + C q̇ + K q = Σ v_l s_l(t) + Σ w_s F_s from (q0, q_dot0) at t = 0 over ``duration``.
 
@@ -80,6 +81,8 @@ def integrate(
         `Parameter` adds one more column, with respect to that parameter at fixed duration. `Exponential` only.
     progress : called with the simulated time now and then.
     check : raise when the run fails; False returns the partial solution with its status instead.
+    memory : what the laws have latched at the start, one entry per contact as `Solution.memory` has it, None for what
+        a law begins with; by it a run goes on from another one's end.
 
     Returns
     -------
@@ -100,7 +103,7 @@ def integrate(
         from solvers.exponential.method import Exponential
 
         method = Exponential()
-    run = prepared_run(system, q0, q_dot0, duration, dt, method, tangent)
+    run = prepared_run(system, q0, q_dot0, duration, dt, method, tangent, memory)
     begin = time.perf_counter()
     status = run.to_the_end(progress)
     solution = run.solution(status, time.perf_counter() - begin)
@@ -108,7 +111,7 @@ def integrate(
     if isinstance(tangent, Parameter) and status is Status.DONE and not run.tangent.exact:
         ends = [_end(s, q0, q_dot0, duration, method) for s in (tangent.behind, tangent.ahead)]
         column = (ends[1] - ends[0]) / (2.0 * tangent.step)
-        solution = replace(solution, tangent=np.column_stack((run.tangent.matrix(), column)))
+        solution = replace(solution, tangent=np.column_stack((solution.tangent, column)))
     if check and status not in (Status.DONE, Status.INTERRUPTED):
         raise SolverError(
             f"stopped at t = {run.time:.9g} s of {duration:g} s: {status.value}{run.explanation(status)}", solution
@@ -118,7 +121,14 @@ def integrate(
 
 
 def prepared_run(
-    system: System, q0: ArrayLike, q_dot0: ArrayLike, duration: float, dt: Any, method: Any, tangent: Any
+    system: System,
+    q0: ArrayLike,
+    q_dot0: ArrayLike,
+    duration: float,
+    dt: Any,
+    method: Any,
+    tangent: Any,
+    memory: Sequence[ArrayLike | None] | None = None,
 ) -> _Run:
     """A run ready to start, everything checked."""
     if not hasattr(method, "engine") or isinstance(method, type):
@@ -128,7 +138,25 @@ def prepared_run(
     times = _times(duration, dt)
     _check_laws(system)
     forcing = _forcing(system, duration, min(max(method.rtol, 1e-12), 1e-6))
-    return _Run(system, method.engine(system, z, forcing, duration), times, tangent)
+    latched = _latched(system, memory)
+    engine = method.engine(system, z, forcing, duration)
+    for s, numbers in latched:
+        engine.problem.parameters[s, list(system.contacts[s].law.memory)] = numbers
+    return _Run(system, engine, times, tangent)
+
+
+def _latched(system: System, memory: Sequence[ArrayLike | None] | None) -> list[tuple[int, Array]]:
+    """(contact, latched numbers) of those given, checked."""
+    if memory is None:
+        return []
+    if len(memory) != len(system.contacts):
+        raise ValueError(f"memory must have one entry per contact, {len(system.contacts)}, got {len(memory)}")
+    given = [(s, np.array(numbers, dtype=float)) for s, numbers in enumerate(memory) if numbers is not None]
+    for s, numbers in given:
+        count = len(getattr(system.contacts[s].law, "memory", ()))
+        if numbers.shape != (count,) or not np.isfinite(numbers).all():
+            raise ValueError(f"memory of contact {s} must be {count} finite numbers, got {memory[s]!r}")
+    return given
 
 
 def _forcing(system: System, duration: float, rtol: float) -> Forcing:
@@ -156,13 +184,26 @@ class _Run:
         if tangent:
             from solvers.exponential.tangent import Tangent
 
-            self.tangent = Tangent(system, engine, tangent if isinstance(tangent, Parameter) else None)
+            self.tangent = Tangent(system, engine, tangent if isinstance(tangent, Parameter) else None, True)
             self.state = engine.state  # with the event record
         self.log = np.empty((max(256, 2 * len(system.contacts)), COLUMNS))
         self.begin = self.state.x[: 2 * engine.problem.k.size].copy()
         if times is not None and self.due[0] == 0.0:
             self.out[0] = self.state.x
             self.state.count[SAMPLED] = 1
+
+    def _derivatives(self) -> dict[str, Array]:
+        """Derivatives of the end, with and without what is latched."""
+        matrix, n2 = self.tangent.matrix(), 2 * self.system.size
+        own = matrix.shape[1] - n2 - self.tangent.exact
+        more = {"tangent": np.delete(matrix, np.s_[n2 : n2 + own], axis=1), "rate": self.tangent.rate()}
+        return {**more, "memory_tangent": np.vstack((matrix, self.tangent.latched_matrix()))} if own else more
+
+    @property
+    def memory(self) -> tuple[Array, ...]:
+        """What the laws have latched by now, one array per contact."""
+        rows = zip(self.system.contacts, self.engine.problem.parameters, strict=True)
+        return tuple(row[list(getattr(contact.law, "memory", ()))] for contact, row in rows)
 
     @property
     def time(self) -> float:
@@ -214,8 +255,10 @@ class _Run:
         count = self.state.count.tolist()
         cost = Cost(count[STEPS], count[REJECTED], count[CALLS], count[EVENTS], seconds)
         known = self.tangent is not None and status is Status.DONE
-        more = {"tangent": self.tangent.matrix(), "rate": self.tangent.rate()} if known else {}
-        return Solution(t, motion[:, :n], motion[:, n:], log, ledger, status, cost, **more, borders=transitions)
+        more = self._derivatives() if known else {}
+        return Solution(
+            t, motion[:, :n], motion[:, n:], log, ledger, status, cost, **more, borders=transitions, memory=self.memory
+        )
 
     def _balances(self, powers: Array, complete: bool, motion: Array, rows: Array) -> bool:
         """Whether the energy balance closes, where it is kept; methods without `gains` are checked step by step."""

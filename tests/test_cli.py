@@ -609,7 +609,7 @@ def test_the_schema_knows_what_the_reader_knows(capsys):
     schema = json.loads(printed(capsys, "schema"))
     valid = re.search(r"valid: (.*)\)", refused_text(EXAMPLE.read_text(encoding="utf-8") + "\n[nothing]\n"))[1]
     assert sorted(schema["properties"]) == sorted(valid.split(", "))
-    laws = next(d["anyOf"] for name, d in schema["$defs"].items() if name == "kind such as hertz")
+    laws = next(d["anyOf"] for name, d in schema["$defs"].items() if name == "kind such as bouc_wen")
     assert [law["properties"]["kind"]["const"] for law in laws] == list(kinds.LAWS)
     masses = schema["properties"]["masses"]["items"]
     assert masses["required"] == ["z", "mass"]

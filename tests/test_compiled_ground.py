@@ -290,6 +290,7 @@ USERS = {  # the files that stand on what numba does not promise, and why
     "solvers/compiled/kernels.py",  # calls of C functions at an address
     "contacts/kernels.py",  # the same
     "contacts/sum_kernels.py",  # the same
+    "contacts/memory/custom_kernels.py",  # parameters as a tuple
     "contacts/custom_kernels.py",  # parameters as a tuple; the compiler's errors
 }
 OPTION_NAMES = {"_nrt", "forceinline", "no_cpython_wrapper", "no_cfunc_wrapper", "inline"}

@@ -1,7 +1,8 @@
 """Derivative of what a law with memory latches on a border; see `linearised`.
 
 The border b(δ, δ̇, L) = 0 is met dt* = -db/ḃ later, db at fixed time, ḃ = b_δ δ̇ + b_δ̇ δ̈; the map L' = m(L, δ, δ̇)
-then gives dL' = m_L dL + m_δ (dδ + δ̇ dt*) + m_δ̇ (dδ̇ + δ̈ dt*). Derivatives of b are differences, those of m the law's own.
+then gives dL' = m_L dL + m_δ (dδ + δ̇ dt*) + m_δ̇ (dδ̇ + δ̈ dt*). Derivatives of b are
+differences, those of m the law's own.
 """
 
 from __future__ import annotations

@@ -163,7 +163,6 @@ class Engine:
         if own:
             packed = Packed(packed.value._replace(**own), PROBLEM)
         self.packed, self.problem, self.prepared = packed, packed.value, prepared
-        self.first_parameters = prepared.problem.value.parameters
         self.workspace = prepared.workspace()
         self.workspace.begin(z)
         self.addresses = packed.address, prepared.tables.address, *self.workspace.addresses

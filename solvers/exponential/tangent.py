@@ -27,24 +27,28 @@ _LARGE = 1e100  # size at which the derivatives are scaled down
 class Tangent:
     """Derivatives of one run of an engine, carried along as its tape grows."""
 
-    def __init__(self, system: System, engine: Any, parameter: Parameter | None) -> None:
+    def __init__(self, system: System, engine: Any, parameter: Parameter | None, latched: bool = False) -> None:
         self.engine, self.blocks = engine, system.blocks
         problem, state = engine.problem, engine.state
         stops, loads, size = len(problem.gap), len(problem.load), 2 * len(problem.k)
         if problem.border_count.any():  # the record is followed with what was latched then
-            problem = problem._replace(parameters=engine.first_parameters.copy())
+            problem = problem._replace(parameters=problem.parameters.copy())
         width, n = state.x.size, system.size
         change = _Change.of(system, parameter, engine) if parameter else None
         self.exact = change is not None
-        self.change, columns = change or _Change.none(problem, n), 2 * n + self.exact
-        latched, parameters = problem.latched.shape[1], problem.parameters.shape[1]
-        layout = _layout(stops, loads, width, columns, latched, parameters + most_borders(problem))
+        self.places_latched = np.flatnonzero(problem.latched.ravel() >= 0)  # among those of all contacts
+        own = len(self.places_latched) if latched else 0
+        self.change, columns = change or _Change.none(problem, n), 2 * n + own + self.exact
+        places, parameters = problem.latched.shape[1], problem.parameters.shape[1]
+        layout = _layout(stops, loads, width, columns, places, parameters + most_borders(problem))
         self.block, words = layout.block()
         self.y, self.entry, self.shift, self.end_rate, self.latched = (layout.array(self.block, 0, i) for i in _CARRIED)
         begin_state(State._make(layout.arrays(self.block, 1)), state.x[:size])
         self.places = places_among_tones(n, size // 2 - n)
         self.y[: 2 * n, self.places] = system.blocks.inverse.T
-        self.y[2 * n :, self.places] = -self.change.steady(0.0)
+        if self.exact:
+            self.y[-1, self.places] = -self.change.steady(0.0)
+        self.latched[2 * n : 2 * n + own, self.places_latched[:own]] = np.eye(own)
         engine.record(np.empty((_ROWS, HEAD + width + stops * S)))
         self.packed = [
             *(engine.packed if same is engine.problem else Packed(same, PROBLEM) for same in self.change.problems),
@@ -82,8 +86,14 @@ class Tangent:
         if self.log_scale > 600.0:
             raise OverflowError(f"the tangent grew to e^{self.log_scale:.0f}; shorten the run, or use solvers.lyapunov")
         y = math.exp(self.log_scale) * self.y[:, self.places]
-        y[2 * self.blocks.k.size :] += self.change.steady(self.engine.state.now[T])
+        if self.exact:
+            y[-1] += self.change.steady(self.engine.state.now[T])
         return self.blocks.T @ y.T
+
+    def latched_matrix(self) -> Array:
+        """(l, columns) derivatives of what is latched at the time reached, codes of segments among it (zero)."""
+        matrix: Array = math.exp(self.log_scale) * self.latched[:, self.places_latched].T
+        return matrix
 
 
 @lru_cache(maxsize=64)
@@ -144,8 +154,16 @@ class _Change:
         nudge = Nudge(parameter.step, parameter.step, tones.omega, np.ascontiguousarray(steady), shift)
         if all(one.law is other.law for one, other in zip(*(side.contacts for side in sides), strict=True)):
             return cls(nudge._replace(law_step=0.0), [engine.problem] * 2, a, b)
-        problems = [engine.problem._replace(parameters=law_parameters(side)) for side in reversed(sides)]
+        problems = [engine.problem._replace(parameters=_parameters(side, engine.problem)) for side in reversed(sides)]
         return cls(nudge, problems, a, b)
+
+
+def _parameters(side: System, problem: Problem) -> Array:
+    """Parameters of the laws of a side with what the run has latched."""
+    parameters = law_parameters(side)
+    for row, run, places in zip(parameters, problem.parameters, problem.latched, strict=True):
+        row[places[places >= 0]] = run[places[places >= 0]]
+    return parameters
 
 
 class _Tones(NamedTuple):

@@ -243,6 +243,9 @@ class Solution:
     status : how it ended. cost : what it took.
     tangent : (2n, 2n or 2n + 1) derivative of the final [q, q̇], and rate : (2n,) its derivative by time; None unless
         asked for.
+    memory : what the laws have latched at the end, one array per contact, empty for laws without memory.
+    memory_tangent : (2n + l, 2n + l or 2n + l + 1) derivative of the final [q, q̇, memory] with respect to the same at
+        the start, and to a parameter; codes of segments have zeros. None without laws with memory.
 
     Examples
     --------
@@ -267,6 +270,8 @@ class Solution:
     cost: Cost
     tangent: Array | None = None
     rate: Array | None = None
+    memory: tuple[Array, ...] = ()
+    memory_tangent: Array | None = None
     borders: Callable[[], Transitions] = field(default=lambda: Transitions.of_rows(np.empty((0, 10)), ()), repr=False)
 
     def __repr__(self) -> str:

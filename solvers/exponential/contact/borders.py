@@ -50,9 +50,10 @@ def _crossing(problem, tables, space, s, j, family, h):
     node: then a shorter step is asked for, which will tell.
     """
     noise, before, t = space.noise[s, j], space.ends[4 * j], 0.0
-    if before < -noise:
+    near = max(_ON * space.largest[s, j], noise)
+    if before < -near:
         return 0.0
-    on = before <= max(_ON * space.largest[s, j], noise)
+    on = before <= near
     for i in range(S + 1):
         value = space.margin[S * j + i] if i < S else space.ends[4 * j + 1]
         after = h * tables.times[family, i] if i < S else h

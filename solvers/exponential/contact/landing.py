@@ -273,14 +273,15 @@ def land_on_bend(problem, tables, state, space, stop, border, near, rtol, t_end,
     A border that is passed before is noted in ``space.landed``.
     """
     furthest, largest = space.reach[0] / tables.fastest, space.sides[space.sides.size - 1]
-    if border >= 0:
-        largest = space.largest[stop, border]
+    enough = 1e-10 * largest
+    if border >= 0:  # one that is missed by more may seem to be passed the other way by the next step
+        largest, enough = space.largest[stop, border], 0.1 * space.noise[stop, border]
     space.landed[0] = -1
     if not 0.0 < near <= furthest:
         return False
     start_landing(problem, tables, state, space, stop)
     w, x = space.work[START], space.work[LANDED]
-    before, apart, span, near_enough = 0.0, _apart(problem, tables, state, space, stop, border, w), near, False
+    before, apart, span = 0.0, _apart(problem, tables, state, space, stop, border, w), near
     if abs(apart) <= 1e-6 * largest:  # it begins on the bend, which is no second point for the next one
         before = 0.9 * near
         _step(problem, tables, state, space, TIME, stop, before, ledger)
@@ -288,11 +289,10 @@ def land_on_bend(problem, tables, state, space, stop, border, near, rtol, t_end,
     for _ in range(_MOST_TRIES):
         _step(problem, tables, state, space, TIME, stop, span, ledger)
         value = _apart(problem, tables, state, space, stop, border, x)
-        last, near_enough = near_enough, abs(value) <= 1e-10 * largest
-        if value == 0.0 or (near_enough and (last or border < 0)):  # what misses a border is seen beyond it: once more
+        if abs(value) <= enough:
             break
         following = span - value * (span - before) / (value - apart)
-        if near_enough and following == span:
+        if abs(following - span) <= 1e-15 * span and border >= 0:
             break
         if not 0.1 * near < following <= furthest or following == span:
             return False
