@@ -32,7 +32,7 @@ class Problem(NamedTuple):
     push: Any  # (m, 2n) state rate per newton of stop s
     read: Any  # (m, 2n) indentation = read·z - gap, m
     read_rate: Any  # (m, 2n) indentation rate = read_rate·z, m/s
-    levels: Any  # (m, J) ascending indentations, m, where a stop changes piece: 0 (-inf if it always acts), knots, inf
+    knots: Any  # (m, J) ascending indentations, m, where a stop changes piece: 0 (-inf if it always acts), knots, inf
     gap: Any  # (m,) m
     law: Any  # (m,) addresses of the compiled forces
     gradient: Any  # (m,) addresses of their derivatives
@@ -137,7 +137,7 @@ call_gradient = _c_function(3)
 def contact_forces(problem, stop, delta, delta_dot, entry_rate, force):
     """Forces of one stop at a batch of indentations; below its surface the law is continued from it."""
     for i in range(delta.size):
-        delta[i] = max(delta[i], problem.levels[stop, 0])
+        delta[i] = max(delta[i], problem.knots[stop, 0])
     law_forces(problem, stop, delta.size, delta, delta_dot, entry_rate, force)
 
 
@@ -151,7 +151,7 @@ def law_forces(problem, stop, n, delta, delta_dot, entry_rate, force):
 def contact_gradient(problem, stop, delta, delta_dot, entry_rate, by_delta, by_rate, by_entry):
     """Derivatives of the forces, likewise."""
     for i in range(delta.size):
-        delta[i] = max(delta[i], problem.levels[stop, 0])
+        delta[i] = max(delta[i], problem.knots[stop, 0])
     results = (by_delta, by_rate, by_entry)
     call_gradient(problem.gradient[stop], delta.size, delta, delta_dot, entry_rate, problem.parameters[stop], results)
 
@@ -173,7 +173,7 @@ def dot(a, b, n):
 
 
 @reordered
-def sizes(a, b, n):
+def abs_dot(a, b, n):
     """Sum of the sizes of the first n products."""
     total = 0.0
     for i in range(n):
@@ -233,7 +233,7 @@ def _damping_power(problem, x):
 
 
 @kernel
-def rhs(problem, t, x, piece, entry_rate, rate, batch):
+def rhs(problem, t, x, segment, entry_rate, rate, batch):
     """State rate with the stops' pieces frozen (piece > 0: in contact); returns the number of law calls.
 
     ``batch`` is working space of three numbers.
@@ -249,7 +249,7 @@ def rhs(problem, t, x, piece, entry_rate, rate, batch):
     for s in range(problem.gap.size):
         rate[size + 2 + 2 * s] = 0.0
         rate[size + 3 + 2 * s] = 0.0
-        if piece[s] > 0:
+        if segment[s] > 0:
             delta_dot = dot(problem.read_rate[s], x, size)
             batch[0] = indentation(problem, s, x)
             batch[1] = delta_dot
