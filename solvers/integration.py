@@ -29,7 +29,7 @@ from solvers.compiled.state import (
     T,
     contact_row,
 )
-from solvers.exponential.energy.guard import unbalanced
+from solvers.exponential.energy.check import unbalanced
 from solvers.problem import (
     COLUMNS,
     Array,
@@ -241,7 +241,7 @@ class _Run:
     def _rows(self) -> Array:
         """The log, contacts under way last."""
         logged = self.log[: self.state.count[LOGGED]].copy()
-        under_way = [s for s, piece in enumerate(self.state.piece.tolist()) if piece > 0]
+        under_way = [s for s, segment in enumerate(self.state.segment.tolist()) if segment > 0]
         if not under_way:
             return logged
         rows = np.empty((len(under_way), COLUMNS))

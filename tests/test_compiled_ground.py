@@ -10,11 +10,11 @@ from numba import njit, types
 
 from contacts import Hertz, KelvinVoigt, Viscoelastic
 from solvers.compiled import decorators
-from solvers.compiled.handles import Layout, Mould, Packed, opener
-from solvers.compiled.simd import bits, eight, put, raised, root, spread, total
+from solvers.compiled.packed import Layout, Packed, PackedTemplate, unpacker
+from solvers.compiled.simd import bit_pattern, load8, positive8, splat8, sqrt8, store8, sum8
 from solvers.compiled.sums import combine, padded
-from solvers.exponential.contact.nodes import LOCAL, families_of, series_of
-from solvers.exponential.contact.peaks import summit
+from solvers.exponential.contact.nodes import LOCAL, node_sets_of, series_of
+from solvers.exponential.contact.peaks import local_maximum
 from solvers.exponential.flight import level_within
 
 OPTIONS = {"error_model": "numpy", "_nrt": False}
@@ -77,7 +77,7 @@ class Things(NamedTuple):
 KIND = types.NamedTuple(
     [types.float64[::1], types.float64, types.Array(types.float64, 3, "C"), types.int64[::1]], Things
 )
-_open = opener(KIND)
+_open = unpacker(KIND)
 
 
 @njit(**OPTIONS)
@@ -129,8 +129,8 @@ def test_what_does_not_fit_the_declared_kind_is_refused_by_name(name, value):
 
 def test_casts_of_a_mould_own_what_they_were_told_to_and_share_the_rest():
     one = things()
-    mould = Mould(one, KIND, ["vector", "cube"])
-    first, second = mould.cast(), mould.cast(number=8.0)
+    mould = PackedTemplate(one, KIND, ["vector", "cube"])
+    first, second = mould.copy(), mould.copy(number=8.0)
     first.value.vector[:] = 5.0
     assert (first.value.number, second.value.number, one.number) == (0.25, 8.0, 0.25)
     assert first.value.count is second.value.count is one.count
@@ -149,7 +149,7 @@ class Pair(NamedTuple):
 
 
 PAIR = types.NamedTuple([types.Array(types.float64, 2, "C"), types.int64[::1]], Pair)
-_open_pair = opener(PAIR)
+_open_pair = unpacker(PAIR)
 
 
 @njit(**OPTIONS)
@@ -171,7 +171,7 @@ def test_tuples_of_a_layout_share_one_block_and_do_not_overlap():
     np.testing.assert_array_equal(second.values[:, 0], [0, 10, 20, 30])
     assert (first.marks[0], second.marks[0], second.marks[1]) == (3, 1, 0)
     longer = np.zeros((5, 2))
-    layout.exchange(block, 1, 0, longer)
+    layout.replace_array(block, 1, 0, longer)
     write(start + layout.starts[1])
     np.testing.assert_array_equal(longer[:, 1], [1, 11, 21, 31, 41])
 
@@ -179,20 +179,20 @@ def test_tuples_of_a_layout_share_one_block_and_do_not_overlap():
 @njit(**OPTIONS)
 def in_eights(x, y, out):
     for i in range(0, x.size, 8):
-        a, b = eight(x, i), eight(y, i)
-        more = a * b - spread(0.5)
-        more += root(raised(a))
-        put(out, i, more)
-    return total(eight(out, 8))
+        a, b = load8(x, i), load8(y, i)
+        more = a * b - splat8(0.5)
+        more += sqrt8(positive8(a))
+        store8(out, i, more)
+    return sum8(load8(out, 8))
 
 
 @njit(**OPTIONS)
 def bits_of(number):
-    return bits(number)
+    return bit_pattern(number)
 
 
 class Lengths(NamedTuple):
-    h: np.ndarray
+    flight_step: np.ndarray
 
 
 # compiled anew: the library's own caches must not know a type that only this file has
@@ -231,7 +231,7 @@ def test_level_is_the_longest_tabulated_step_within_the_span():
     assert np.all((found == 0) | (h[found - 1] > spans))
 
 
-summit_of = njit(**OPTIONS)(summit.py_func)
+summit_of = njit(**OPTIONS)(local_maximum.py_func)
 
 
 def test_summit_is_the_polynomials_maximum_around_its_highest_point():
@@ -254,11 +254,11 @@ def test_summit_is_the_polynomials_maximum_around_its_highest_point():
 def test_steps_are_interpolated_around_every_node():
     """δ and h δ̇ of a motion that eight nodes resolve, between the neighbours of each node."""
     motion = np.array([lambda t: np.sin(3.0 * t + 0.2), lambda t: 3.0 * np.cos(3.0 * t + 0.2)])
-    families, h = families_of(((2.0, 3.0), (4.0, 1.0))), 0.7
+    node_sets, h = node_sets_of(((2.0, 3.0), (4.0, 1.0))), 0.7
     for f, error in ((0, 1e-6), (1, 3e-6), (2, 1e-5)):
-        t = h * families.nodes[f] ** families.power[f]
-        for zoom, (begin, end) in zip(families.zoom[f], families.places[f], strict=True):
-            at = h * (begin + 0.5 * (LOCAL + 1.0) * (end - begin)) ** families.power[f]
+        t = h * node_sets.nodes[f] ** node_sets.time_exponent[f]
+        for zoom, (begin, end) in zip(node_sets.local_interpolation[f], node_sets.local_interval[f], strict=True):
+            at = h * (begin + 0.5 * (LOCAL + 1.0) * (end - begin)) ** node_sets.time_exponent[f]
             known = [motion[0](t), h * motion[1](t), [motion[0](0.0), h * motion[1](0.0)]]
             found = np.concatenate(known) @ zoom
             np.testing.assert_allclose(found, np.concatenate((motion[0](at), h * motion[1](at))), atol=error)
@@ -285,7 +285,7 @@ PRIVATE = "numba.core", "numba.np", "llvmlite"
 USERS = {  # the files that stand on what numba does not promise, and why
     "solvers/compiled/decorators.py",  # options of njit, described there
     "solvers/compiled/cache.py",  # llvmlite's version
-    "solvers/compiled/handles.py",  # a type of its own, and loads through a pointer
+    "solvers/compiled/packed.py",  # a type of its own, and loads through a pointer
     "solvers/compiled/simd.py",  # a type of its own, and vector instructions
     "solvers/compiled/kernels.py",  # calls of C functions at an address
     "contacts/kernels.py",  # the same

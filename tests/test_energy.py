@@ -10,7 +10,7 @@ from contacts import Hertz, PiecewiseLinear
 from solvers import Contact, Exponential, System, integrate
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.energy.contact_tables import BEGIN, contact_table
-from solvers.exponential.preparation import ready_for
+from solvers.exponential.preparation import prepare_run
 from solvers.problem import hand_over
 
 FREE = [Contact([1.0, 1.0, 1.0, 0.5], Hertz(1e6), gap=1e9)]
@@ -44,9 +44,9 @@ def blocks(signals, omega=(0.0, 9.0, 40.0, 75.0), zeta=(0.0, 1.0, 3.0, 0.02)):
 def prepared(system, spacing=0.013, duration=1.0):
     """What a run of the system would prepare, and its ledger's tables."""
     forcing = hand_over([signal for _, signal in system.loads], duration, 1e-10)
-    forcing, made = ready_for(system, forcing, duration, 1e-10)
+    forcing, made = prepare_run(system, forcing, duration, 1e-10)
     problem = made.problem.value._replace(table=forcing.table, table_start=forcing.table_start)
-    return problem, made.tables.value, made.books_for(spacing).value
+    return problem, made.tables.value, made.energy_tables_for(spacing).value
 
 
 def quadrature(problem, tables, h, x, s):
@@ -70,17 +70,17 @@ def quadrature(problem, tables, h, x, s):
     return quad_vec(rates, 0.0, h, epsabs=0.0, epsrel=1e-13, limit=400)[0]
 
 
-def by_forms(books, level, x, s):
+def by_forms(energy_tables, level, x, s):
     """The same by the tables."""
     n = len(x) // 2
-    given = np.concatenate((x[books.driver], *s))
-    rows = (given @ books.rows[level]).reshape(2, -1)[:, : len(x)] @ x
-    own = books.plain.shape[2]
+    given = np.concatenate((x[energy_tables.driver], *s))
+    rows = (given @ energy_tables.rows[level]).reshape(2, -1)[:, : len(x)] @ x
+    own = energy_tables.plain.shape[2]
     p, v = x[:own], x[n : n + own]
-    rows[1] += (books.plain[level] * [p * p, p * v, v * v]).sum()
-    signals = given[len(books.driver) :]
+    rows[1] += (energy_tables.plain[level] * [p * p, p * v, v * v]).sum()
+    signals = given[len(energy_tables.driver) :]
     if len(signals):
-        rows += (signals @ books.pairs[level]).reshape(2, -1)[:, : len(signals)] @ signals
+        rows += (signals @ energy_tables.pairs[level]).reshape(2, -1)[:, : len(signals)] @ signals
     return rows
 
 
@@ -89,17 +89,17 @@ def by_forms(books, level, x, s):
 )
 def test_forms_of_flight_steps_are_their_quadrature(signals):
     """Long and short steps and the step of its own length, for rigid, critical, over- and hardly damped blocks."""
-    problem, tables, books = prepared(blocks(signals))
+    problem, tables, energy_tables = prepared(blocks(signals))
     rng = np.random.default_rng(1)
     scale = np.concatenate((np.ones(len(problem.k)), np.maximum(np.sqrt(problem.k), 1.0)))
-    assert books.spacing == (problem.table_dt[0] if len(problem.table_dt) else 0.013)
-    for level in (len(tables.h), 8, 19, 30, len(tables.h) - 1):
-        h = np.append(tables.h, books.spacing)[level]
+    assert energy_tables.spacing == (problem.table_dt[0] if len(problem.table_dt) else 0.013)
+    for level in (len(tables.flight_step), 8, 19, 30, len(tables.flight_step) - 1):
+        h = np.append(tables.flight_step, energy_tables.spacing)[level]
         x = rng.standard_normal(len(scale)) * scale
         s = [rng.standard_normal(6) * 7.0 ** np.arange(6) for _ in problem.table_dt]
         exact = quadrature(problem, tables, h, x, s)
         parts = sum(abs(quadrature(problem, tables, h, x * sign, s)) for sign in (1.0, -1.0))  # sizes that may cancel
-        np.testing.assert_array_less(abs(by_forms(books, level, x, s) - exact), 1e-12 * parts + 1e-300)
+        np.testing.assert_array_less(abs(by_forms(energy_tables, level, x, s) - exact), 1e-12 * parts + 1e-300)
 
 
 @pytest.mark.parametrize(("power", "lead"), [(1.0, 0.0), (2.0, 3.0), (4.0, 1.0)])

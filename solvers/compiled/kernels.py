@@ -32,7 +32,7 @@ class Problem(NamedTuple):
     push: Any  # (m, 2n) state rate per newton of stop s
     read: Any  # (m, 2n) indentation = read·z - gap, m
     read_rate: Any  # (m, 2n) indentation rate = read_rate·z, m/s
-    levels: Any  # (m, J) ascending indentations, m, where a stop changes piece: 0, knots, then inf
+    knots: Any  # (m, J) ascending indentations, m, where a stop changes piece: 0, knots, then inf
     gap: Any  # (m,) m
     law: Any  # (m,) addresses of the compiled forces
     gradient: Any  # (m,) addresses of their derivatives
@@ -133,7 +133,7 @@ def dot(a, b, n):
 
 
 @reordered
-def sizes(a, b, n):
+def abs_dot(a, b, n):
     """Sum of the sizes of the first n products."""
     total = 0.0
     for i in range(n):
@@ -193,7 +193,7 @@ def _damping_power(problem, x):
 
 
 @kernel
-def rhs(problem, t, x, piece, entry_rate, rate, batch):
+def rhs(problem, t, x, segment, entry_rate, rate, batch):
     """State rate with the stops' pieces frozen (piece > 0: in contact); returns the number of law calls.
 
     ``batch`` is working space of three numbers.
@@ -209,7 +209,7 @@ def rhs(problem, t, x, piece, entry_rate, rate, batch):
     for s in range(problem.gap.size):
         rate[size + 2 + 2 * s] = 0.0
         rate[size + 3 + 2 * s] = 0.0
-        if piece[s] > 0:
+        if segment[s] > 0:
             delta_dot = dot(problem.read_rate[s], x, size)
             batch[0] = indentation(problem, s, x)
             batch[1] = delta_dot

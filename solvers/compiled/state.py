@@ -9,7 +9,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from solvers.compiled.kernels import INTEGERS, MATRIX, VECTOR, Problem, dot, indentation, inlined, inner, kernel, sizes
+from solvers.compiled.kernels import (
+    INTEGERS,
+    MATRIX,
+    VECTOR,
+    Problem,
+    abs_dot,
+    dot,
+    indentation,
+    inlined,
+    inner,
+    kernel,
+)
 from solvers.problem import Array, Forcing, Law, Status, System
 
 STATUSES = list(Status)
@@ -21,8 +32,8 @@ DONE, RUNNING, STEP_TOO_SMALL, DIVERGED, CHATTER, LOG_FULL, LAW_NOT_FINITE, GAIN
     )
 )
 T, H_FLIGHT, H_CONTACT, LAST_EVENT = range(4)  # places in State.now
-STEPS, REJECTED, CALLS, EVENTS, LOGGED, SAMPLED, AT_ONCE, TAPED = range(8)  # places in State.count
-T_IN, SPEED_IN, PEAK_DELTA, PEAK_FORCE, WORK_IN, IMPULSE_IN, FLOORED = range(7)  # columns of State.open
+STEPS, REJECTED, CALLS, EVENTS, LOGGED, SAMPLED, AT_ONCE, RECORDED = range(8)  # places in State.count
+T_IN, SPEED_IN, PEAK_DELTA, PEAK_FORCE, WORK_IN, IMPULSE_IN, RATE_CLIPPED = range(7)  # columns of State.open
 MOST_EVENTS_AT_ONCE = 100
 STEP, PART, LANDING, EVENT = 0.0, 1.0, 2.0, 3.0  # kinds of tape rows
 KIND, BEGAN, ENDED, SPAN, FIRST, SECOND, HEAD = range(7)  # columns of the tape: two whole numbers that the kind
@@ -38,11 +49,11 @@ class State(NamedTuple):
     now: Any  # (4,) s: time, flight step, contact step, time of the last event
     x: Any  # (2n + 2 + 2m,) of the blocks, then the ledger in J (impulses in N s), see `kernels`
     rate: Any  # of x, per s; stepping methods only
-    piece: Any  # (m,) 0 in flight, j > 0 between levels j-1 and j
+    segment: Any  # (m,) 0 in flight, j > 0 between levels j-1 and j
     entry_rate: Any  # (m,) m/s, latched
-    open: Any  # (m, 7) of the contacts under way, SI units, columns named above
+    active: Any  # (m, 7) of the contacts under way, SI units, columns named above
     count: Any  # (8,) steps, rejected ones, law calls, ..., as named above
-    tape: Any  # (rows, HEAD + x.size + forces) what happened in contact, for the tangent; no rows, no tape
+    event_record: Any  # (rows, HEAD + x.size + forces) what happened in contact, for the tangent; no rows, no tape
 
 
 STATE = types.NamedTuple(
@@ -54,37 +65,37 @@ STATE = types.NamedTuple(
 @inner
 def surface_tolerance(problem, s, x):
     """Distance within which a stop counts as on a level: rounding of δ."""
-    return 1e-15 * (abs(problem.gap[s]) + sizes(problem.read[s], x, 2 * problem.k.size)) + 1e-20
+    return 1e-15 * (abs(problem.gap[s]) + abs_dot(problem.read[s], x, 2 * problem.k.size)) + 1e-20
 
 
 @inner
 def rate_tolerance(problem, s, x):
     """Indentation rate below which a stop counts as at rest: rounding of δ̇, coupled blocks amplify it."""
-    return 1e-13 * sizes(problem.read_rate[s], x, 2 * problem.k.size)
+    return 1e-13 * abs_dot(problem.read_rate[s], x, 2 * problem.k.size)
 
 
 @inner
-def tape(state, kind, began, ended, span, first, second, x):
+def write_event(state, kind, began, ended, span, first, second, x):
     """Write a row of the tape: what happened from ``began`` at x to ``ended``."""
-    row = state.tape[state.count[TAPED]]
+    row = state.event_record[state.count[RECORDED]]
     row[KIND], row[BEGAN], row[ENDED], row[SPAN], row[FIRST], row[SECOND] = kind, began, ended, span, first, second
     for e in range(state.x.size):
         row[HEAD + e] = x[e]
-    state.count[TAPED] += 1
+    state.count[RECORDED] += 1
 
 
 @inner
-def _open(problem, state, s, t, delta_dot):
+def _begin_contact(problem, state, s, t, delta_dot):
     """Latch the entry rate and begin a row of the contact log."""
-    ledger = 2 * problem.k.size + 2 + 2 * s
+    balance = 2 * problem.k.size + 2 + 2 * s
     state.entry_rate[s] = max(abs(delta_dot), problem.floor[s])
-    state.open[s, T_IN] = t
-    state.open[s, SPEED_IN] = abs(delta_dot)
-    state.open[s, PEAK_DELTA] = 0.0
-    state.open[s, PEAK_FORCE] = 0.0
-    state.open[s, WORK_IN] = state.x[ledger]
-    state.open[s, IMPULSE_IN] = state.x[ledger + 1]
-    state.open[s, FLOORED] = 1.0 if abs(delta_dot) < problem.floor[s] else 0.0
+    state.active[s, T_IN] = t
+    state.active[s, SPEED_IN] = abs(delta_dot)
+    state.active[s, PEAK_DELTA] = 0.0
+    state.active[s, PEAK_FORCE] = 0.0
+    state.active[s, WORK_IN] = state.x[balance]
+    state.active[s, IMPULSE_IN] = state.x[balance + 1]
+    state.active[s, RATE_CLIPPED] = 1.0 if abs(delta_dot) < problem.floor[s] else 0.0
 
 
 @kernel
@@ -92,29 +103,29 @@ def begin_contacts(problem, state):
     """Put every stop on its piece at the start of a run and open the contacts under way."""
     for s in range(problem.gap.size):
         delta = indentation(problem, s, state.x)
-        piece = 0
-        while delta > problem.levels[s, piece] + surface_tolerance(problem, s, state.x):
-            piece += 1
-        state.piece[s] = piece
-        if piece > 0:
-            _open(problem, state, s, state.now[T], dot(problem.read_rate[s], state.x, 2 * problem.k.size))
-            state.open[s, PEAK_DELTA] = delta
+        segment = 0
+        while delta > problem.knots[s, segment] + surface_tolerance(problem, s, state.x):
+            segment += 1
+        state.segment[s] = segment
+        if segment > 0:
+            _begin_contact(problem, state, s, state.now[T], dot(problem.read_rate[s], state.x, 2 * problem.k.size))
+            state.active[s, PEAK_DELTA] = delta
 
 
 @kernel
 def contact_row(problem, state, s, t_out, speed_out, row):
     """Write the log row of the contact under way at stop s."""
-    ledger = 2 * problem.k.size + 2 + 2 * s
+    balance = 2 * problem.k.size + 2 + 2 * s
     row[0] = s
-    row[1] = state.open[s, T_IN]
+    row[1] = state.active[s, T_IN]
     row[2] = t_out
-    row[3] = state.open[s, SPEED_IN]
+    row[3] = state.active[s, SPEED_IN]
     row[4] = speed_out
-    row[5] = state.open[s, PEAK_DELTA]
-    row[6] = state.open[s, PEAK_FORCE]
-    row[7] = state.x[ledger + 1] - state.open[s, IMPULSE_IN]
-    row[8] = state.x[ledger] - state.open[s, WORK_IN]
-    row[9] = state.open[s, FLOORED]
+    row[5] = state.active[s, PEAK_DELTA]
+    row[6] = state.active[s, PEAK_FORCE]
+    row[7] = state.x[balance + 1] - state.active[s, IMPULSE_IN]
+    row[8] = state.x[balance] - state.active[s, WORK_IN]
+    row[9] = state.active[s, RATE_CLIPPED]
 
 
 @inner
@@ -122,14 +133,14 @@ def switch(problem, state, s, direction, log):
     """Move stop s one piece up or down; open or close its contact."""
     t = state.now[T]
     delta_dot = dot(problem.read_rate[s], state.x, 2 * problem.k.size)
-    if state.tape.shape[0]:
-        tape(state, EVENT, t, t, 0.0, s, direction, state.x)
-    if direction > 0 and state.piece[s] == 0:
-        _open(problem, state, s, t, delta_dot)
-    if direction < 0 and state.piece[s] == 1:
+    if state.event_record.shape[0]:
+        write_event(state, EVENT, t, t, 0.0, s, direction, state.x)
+    if direction > 0 and state.segment[s] == 0:
+        _begin_contact(problem, state, s, t, delta_dot)
+    if direction < 0 and state.segment[s] == 1:
         contact_row(problem, state, s, t, -delta_dot, log[state.count[LOGGED]])
         state.count[LOGGED] += 1
-    state.piece[s] += direction
+    state.segment[s] += direction
     state.count[EVENTS] += 1
     state.count[AT_ONCE] = state.count[AT_ONCE] + 1 if t == state.now[LAST_EVENT] else 0
     state.now[LAST_EVENT] = t
@@ -145,9 +156,11 @@ def switch_on_surface(problem, state, log, locates):
         tolerance = surface_tolerance(problem, s, state.x) if locates else 0.0
         still = rate_tolerance(problem, s, state.x)
         direction = 0
-        if delta >= problem.levels[s, state.piece[s]] - tolerance and delta_dot > still:
+        if delta >= problem.knots[s, state.segment[s]] - tolerance and delta_dot > still:
             direction = 1
-        elif state.piece[s] > 0 and delta <= problem.levels[s, state.piece[s] - 1] + tolerance and delta_dot < -still:
+        elif (
+            state.segment[s] > 0 and delta <= problem.knots[s, state.segment[s] - 1] + tolerance and delta_dot < -still
+        ):
             direction = -1
         if direction != 0:
             switch(problem, state, s, direction, log)
@@ -156,11 +169,11 @@ def switch_on_surface(problem, state, log, locates):
 
 
 @inlined
-def touching(state):
+def in_contact(state):
     """Whether any stop is in contact."""
     most = 0
-    for piece in state.piece:
-        most = max(most, piece)
+    for segment in state.segment:
+        most = max(most, segment)
     return most > 0
 
 
@@ -231,12 +244,12 @@ def _problem(system: System, forcing: Forcing, linear: dict[str, Array]) -> Prob
     """The linear part with the laws and the signals."""
     contacts, m = system.contacts, len(system.contacts)
     most = max([len(c.law.knots) for c in contacts], default=0) + 1
-    levels = np.full((m, most + 1), math.inf)
+    knots = np.full((m, most + 1), math.inf)
     for i, contact in enumerate(contacts):
-        levels[i, : len(contact.law.knots) + 1] = (0.0, *contact.law.knots)
+        knots[i, : len(contact.law.knots) + 1] = (0.0, *contact.law.knots)
     return Problem(
         **linear,
-        levels=levels,
+        knots=knots,
         gap=np.array([c.gap for c in contacts], dtype=float),
         law=np.array([c.law.address for c in contacts], dtype=np.int64),
         gradient=np.array([c.law.gradient_address for c in contacts], dtype=np.int64),

@@ -25,8 +25,8 @@ from typing import ClassVar
 import numpy as np
 from numba import types
 
-from solvers.compiled.handles import Cast, Packed, opener
 from solvers.compiled.kernels import MATRIX, PROBLEM, REAL, VECTOR, entry
+from solvers.compiled.packed import Packed, PackedCopy, unpacker
 from solvers.compiled.state import (
     AT_ONCE,
     CHATTER,
@@ -34,74 +34,76 @@ from solvers.compiled.state import (
     LOG_FULL,
     LOGGED,
     MOST_EVENTS_AT_ONCE,
+    RECORDED,
     REJECTED,
     RUNNING,
     STATE,
     STEPS,
-    TAPED,
     State,
     T,
     begin_contacts,
+    in_contact,
     switch,
     switch_on_surface,
-    touching,
 )
-from solvers.exponential.contact.landing import reach
-from solvers.exponential.contact.step import BEGUN, FRESH, begin, latest, touch
-from solvers.exponential.energy.books import book_on, mark
-from solvers.exponential.energy.flight_tables import BOOKS, NO_BOOKS
-from solvers.exponential.energy.guard import FIRST, note_energy, own_energy, too_much, unknown
-from solvers.exponential.preparation import SPACE, TABLES, ready_for
+from solvers.exponential.contact.landing import landing_reach
+from solvers.exponential.contact.step import BEGUN, NEW, advance_contact, begin_steps, latest_entered
+from solvers.exponential.energy.balance import account_state, start_account
+from solvers.exponential.energy.check import FIRST, has_gained, note_energy, own_energy, tolerated_energy
+from solvers.exponential.energy.flight_tables import ENERGY_TABLES, NO_ENERGY_TABLES
+from solvers.exponential.preparation import SCRATCH, TABLES, prepare_run
 from solvers.exponential.safe_steps import fly
 from solvers.problem import Array, Forcing, System
 
-_problem, _tables, _state, _space = opener(PROBLEM), opener(TABLES), opener(STATE), opener(SPACE)
-_books = opener(BOOKS)
+_problem, _tables, _state, _scratch = unpacker(PROBLEM), unpacker(TABLES), unpacker(STATE), unpacker(SCRATCH)
+_energy_tables = unpacker(ENERGY_TABLES)
 
 
 @entry(types.int64(*[types.int64] * 5, REAL, types.int64, REAL, REAL, MATRIX, MATRIX, VECTOR))
-def advance(problem_at, tables_at, state_at, space_at, books_at, t_end, budget, rtol, reach, log, out, due):
+def advance(
+    problem_at, tables_at, state_at, scratch_at, energy_tables_at, t_end, budget, rtol, landing_reach, log, out, due
+):
     """Advance the state to ``t_end`` or for about ``budget`` steps; returns a status code.
 
-    ``out`` gets the states at the times ``due``, the last of which is infinite; ``reach`` is that of `landing.reach`.
+    ``out`` gets the states at the times ``due``, the last of which is infinite; ``landing_reach`` is that of `landing.landing_reach`.
     """
-    problem, tables, state, space = _problem(problem_at), _tables(tables_at), _state(state_at), _space(space_at)
-    books, last = _books(books_at), space.last
-    if not last[BEGUN]:
-        last[BEGUN], space.reach[0] = 1, reach
-        space.energy[FIRST] = own_energy(problem, tables, state.x)
+    problem, tables, state, scratch = _problem(problem_at), _tables(tables_at), _state(state_at), _scratch(scratch_at)
+    energy_tables, control = _energy_tables(energy_tables_at), scratch.control
+    if not control[BEGUN]:
+        control[BEGUN], scratch.landing_reach[0] = 1, landing_reach
+        scratch.energy[FIRST] = own_energy(problem, tables, state.x)
         begin_contacts(problem, state)
-        if touching(state):
-            begin(problem, tables, state, space, latest(state))
+        if in_contact(state):
+            begin_steps(problem, tables, state, scratch, latest_entered(state))
     begun = state.count[STEPS] + state.count[REJECTED]
     while state.count[STEPS] + state.count[REJECTED] - begun < budget:
         if state.now[T] >= t_end:
-            note_energy(problem, tables, state, space)
+            note_energy(problem, tables, state, scratch)
             return DONE
         if state.count[LOGGED] + problem.gap.size > log.shape[0]:
             return LOG_FULL
-        if state.tape.shape[0] and state.count[TAPED] + problem.gap.size + 2 > state.tape.shape[0]:
+        if state.event_record.shape[0] and state.count[RECORDED] + problem.gap.size + 2 > state.event_record.shape[0]:
             return RUNNING
         if state.count[AT_ONCE] > MOST_EVENTS_AT_ONCE:
             return CHATTER
-        between = touching(state) and not last[FRESH]  # in a contact no border is met but by landing on it
+        between = in_contact(state) and not control[NEW]  # in a contact no border is met but by landing on it
         if not between and switch_on_surface(problem, state, log, True):
-            if touching(state):
-                begin(problem, tables, state, space, latest(state))
+            if in_contact(state):
+                begin_steps(problem, tables, state, scratch, latest_entered(state))
             continue
-        if touching(state):
-            code = touch(problem, tables, books, state, space, t_end, rtol, log, out, due)
+        if in_contact(state):
+            code = advance_contact(problem, tables, energy_tables, state, scratch, t_end, rtol, log, out, due)
             if code != RUNNING:
                 return code
             continue
-        if books.kept > 0.0:
-            mark(problem, state, space)
-        stop = fly(problem, tables, books, state, space, t_end, budget, out, due)
-        if books.kept > 0.0:
-            book_on(problem, tables, books, state, space)
+        if energy_tables.active > 0.0:
+            start_account(problem, state, scratch)
+        stop = fly(problem, tables, energy_tables, state, scratch, t_end, budget, out, due)
+        if energy_tables.active > 0.0:
+            account_state(problem, tables, energy_tables, state, scratch)
         if stop >= 0:
             switch(problem, state, stop, np.int64(1), log)  # a literal would be compiled for itself
-            begin(problem, tables, state, space, stop)
+            begin_steps(problem, tables, state, scratch, stop)
     return RUNNING
 
 
@@ -120,7 +122,7 @@ class Exponential:
     -----
     Cost is nearly independent of rtol and grows linearly with the number of modes. See the module for its limits. A run
     with a ledger that leaves more than (20 rtol + 1e-9) of the energy handled unaccounted for is refused, one without
-    if it ends with four times the energy it can have been given, see `energy.guard`.
+    if it ends with four times the energy it can have been given, see `energy.check`.
 
     Examples
     --------
@@ -150,10 +152,15 @@ class Engine:
     """One run: problem with tones among the blocks, tables, state."""
 
     def __init__(self, method: Exponential, system: System, z: Array, forcing: Forcing, duration: float) -> None:
-        self.method, self.system, self.duration, self.reach = method, system, duration, reach(method.rtol)
-        forcing, prepared = ready_for(system, forcing, duration, method.rtol)
+        self.method, self.system, self.duration, self.landing_reach = (
+            method,
+            system,
+            duration,
+            landing_reach(method.rtol),
+        )
+        forcing, prepared = prepare_run(system, forcing, duration, method.rtol)
         self.back = prepared.back
-        packed: Cast | Packed = prepared.problem
+        packed: PackedCopy | Packed = prepared.problem
         if forcing.table.size:
             packed = Packed(packed.value._replace(table=forcing.table, table_start=forcing.table_start), PROBLEM)
         self.packed, self.problem, self.prepared = packed, packed.value, prepared
@@ -166,14 +173,14 @@ class Engine:
         """The state reached."""
         return self.workspace.state
 
-    def record(self, tape: Array) -> None:
+    def record_events(self, event_record: Array) -> None:
         """Write what happens in contact to a tape."""
-        self.workspace.record(tape)
+        self.workspace.record_events(event_record)
 
     def release(self) -> None:
         """Leave the workspace to another run; nothing may look at this one's state any more."""
-        if not self.workspace.state.tape.size:
-            self.prepared.spare.append(self.workspace)
+        if not self.workspace.state.event_record.size:
+            self.prepared.spare_workspaces.append(self.workspace)
 
     def start(self) -> None:
         """The compiled loop does so itself."""
@@ -184,13 +191,15 @@ class Engine:
 
     def gains(self, exchanged: Array) -> bool:
         """Whether the finished run holds more energy than it can have been given."""
-        slack = unknown(self.workspace.energy[FIRST], exchanged, self.method.rtol)
-        return too_much(self.system, self.workspace.energy, self.problem, self.duration, slack)
+        slack = tolerated_energy(self.workspace.energy[FIRST], exchanged, self.method.rtol)
+        return has_gained(self.system, self.workspace.energy, self.problem, self.duration, slack)
 
     def march(self, budget: int, log: Array, out: Array, due: Array) -> int:
         """Go on for a stretch."""
-        books = self.prepared.books_for(_spacing(due)) if self.keeps_ledger(len(out) > 0) else NO_BOOKS
+        energy_tables = (
+            self.prepared.energy_tables_for(_spacing(due)) if self.keeps_ledger(len(out) > 0) else NO_ENERGY_TABLES
+        )
         return advance(
-            *(*self.addresses, books.address, self.duration, budget, self.method.rtol, self.reach),
+            *(*self.addresses, energy_tables.address, self.duration, budget, self.method.rtol, self.landing_reach),
             *(log, out, due),
         )

@@ -9,16 +9,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from solvers.compiled.handles import Cast, Layout, Mould, Packed
 from solvers.compiled.kernels import INTEGERS, MATRIX, PROBLEM, REAL, VECTOR, Problem
+from solvers.compiled.packed import Layout, Packed, PackedCopy, PackedTemplate
 from solvers.compiled.state import STATE, State, begin_state, problem_of, state_shapes
 from solvers.compiled.sums import padded
-from solvers.exponential.contact.blocks import POOL
-from solvers.exponential.contact.node_response import START, Space
+from solvers.exponential.contact.many_stops import POOL
+from solvers.exponential.contact.node_response import START, Scratch
 from solvers.exponential.contact.nodes import S, series_of
-from solvers.exponential.energy.flight_tables import books_for
-from solvers.exponential.flight import LONG
-from solvers.exponential.tables import OF_TONES, Tables, build, doublings, fill_tones, known_of
+from solvers.exponential.energy.flight_tables import energy_tables_for
+from solvers.exponential.flight import SERIES_TERMS
+from solvers.exponential.tables import TONE_TABLES, Tables, build, doublings, fill_tones, law_tables_of
 from solvers.problem import Array, Forcing, Memo, System, on_one_grid, tones_as_nodes
 
 
@@ -36,13 +36,13 @@ TABLES = types.NamedTuple(
     ],
     Tables,
 )
-SPACE = types.NamedTuple(
+SCRATCH = types.NamedTuple(
     [
         *(*_arrays(1, 2, 2, 1, 1, 1, 1, 2, 3, 1, 3, 2, 1, 3, 2, 3, 1), INTEGERS, MATRIX),
         *(*_arrays(1, 1, 1, 1, 2, 1, 2, 1, 1, 1, 1, 1, 2, 1), INTEGERS),
         *(*_arrays(2, 2, 2, 1, 2, 3), INTEGERS),
     ],
-    Space,
+    Scratch,
 )
 
 
@@ -52,10 +52,10 @@ class Workspace:
     def __init__(self, layout: Layout, rest: Array, blocks: int) -> None:
         self.layout = layout
         self.block, words = layout.block()
-        self.numbers = self.block[: layout.slices[1][Space._fields.index("jacobian")][0].start]
+        self.numbers = self.block[: layout.slices[1][Scratch._fields.index("jacobian")][0].start]
         self.addresses = [words + start for start in layout.starts]
         self.state = State._make(layout.arrays(self.block, 0))
-        self.energy = layout.array(self.block, 1, Space._fields.index("energy"))
+        self.energy = layout.array(self.block, 1, Scratch._fields.index("energy"))
         begin_state(self.state, rest)
         self.rest = self.numbers.copy()
         self.own = self.state.x[: rest.size].reshape(2, -1)[:, :blocks]
@@ -65,26 +65,26 @@ class Workspace:
         self.numbers[:] = self.rest
         self.own += z.reshape(2, -1)
 
-    def record(self, tape: Array) -> None:
+    def record_events(self, event_record: Array) -> None:
         """Let another array be the tape."""
-        self.state = self.state._replace(tape=tape)
-        self.layout.exchange(self.block, 0, State._fields.index("tape"), tape)
+        self.state = self.state._replace(event_record=event_record)
+        self.layout.replace_array(self.block, 0, State._fields.index("event_record"), event_record)
 
 
 class Prepared(NamedTuple):
     """What does not change from run to run of one system."""
 
-    problem: Cast
-    tables: Cast
+    problem: PackedCopy
+    tables: PackedCopy
     back: Array  # (2n, 2N): [q, q̇] from the state of all blocks
     layout: Layout  # of State and Space
     rest: Array  # state of the tones' blocks at t = 0, the structure's less their steady response
-    spare: list[Workspace]  # of runs that are over
+    spare_workspaces: list[Workspace]  # of runs that are over
     kept: Memo  # tables of the energy balance by the spacing of outputs
 
-    def books_for(self, spacing: float) -> Packed:
+    def energy_tables_for(self, spacing: float) -> Packed:
         """Tables of the energy ledger for outputs of a spacing, s."""
-        made: Packed = self.kept.get(spacing, lambda: books_for(self.problem.value, self.tables.value, spacing))
+        made: Packed = self.kept.get(spacing, lambda: energy_tables_for(self.problem.value, self.tables.value, spacing))
         return made
 
     @property
@@ -95,44 +95,44 @@ class Prepared(NamedTuple):
     def workspace(self) -> Workspace:
         """One that no other run uses; making its arrays takes as long as many steps."""
         try:
-            return self.spare.pop()
+            return self.spare_workspaces.pop()
         except IndexError:
             return Workspace(self.layout, self.rest, self.back.shape[0] // 2)
 
 
-def ready_for(system: System, forcing: Forcing, duration: float, rtol: float) -> tuple[Forcing, Prepared]:
+def prepare_run(system: System, forcing: Forcing, duration: float, rtol: float) -> tuple[Forcing, Prepared]:
     """The forcing as the method takes it, and the tables; those of an identical earlier run are reused."""
     last = system.kept.find(("run", duration, rtol))
     if last and last[0] is forcing:
         return forcing, last[1]
     taken = on_one_grid(without_resonance(system, forcing, duration, rtol), duration)
-    prepared = prepared_for(system, taken)
+    prepared = prepare_system(system, taken)
     if taken is forcing and not forcing.table.size:
         system.kept.store(("run", duration, rtol), (forcing, prepared))
     return taken, prepared
 
 
-def prepared_for(system: System, forcing: Forcing) -> Prepared:
+def prepare_system(system: System, forcing: Forcing) -> Prepared:
     """Tables of a system, made once for each grid of its sampled signals and kept on it."""
     dt_cell = float(forcing.table_dt[0]) if forcing.table_dt.size else 1.0
     tones = forcing.tone_omega, forcing.tone_amplitude, forcing.tone_load
 
     def make() -> Prepared:
         gaps = [contact.gap for contact in system.contacts]
-        return _skeleton_for(system, forcing, dt_cell).with_tones(forcing, gaps)
+        return _shared_tables_for(system, forcing, dt_cell).with_tones(forcing, gaps)
 
     key = "tables", dt_cell, forcing.table_load.tobytes(), *(part.tobytes() for part in tones)
     prepared: Prepared = system.kept.get(key, make)
     return prepared
 
 
-def _skeleton_for(system: System, forcing: Forcing, dt_cell: float) -> _Skeleton:
+def _shared_tables_for(system: System, forcing: Forcing, dt_cell: float) -> _SharedTables:
     """What systems have in common that differ in tones, sampled values and gaps only."""
     about, laws = system.about_structure, system.about_laws
     about.get("passive", lambda: _check_passive(system))
     places = (part.tobytes() for part in (forcing.tone_load, forcing.table_dt, forcing.table_load))
     key = "skeleton", laws, *places, doublings(_speeds(system), forcing.tone_omega)
-    skeleton: _Skeleton = about.get(key, lambda: _Skeleton(system, forcing, dt_cell))
+    skeleton: _SharedTables = about.get(key, lambda: _SharedTables(system, forcing, dt_cell))
     return skeleton
 
 
@@ -142,7 +142,7 @@ def _speeds(system: System) -> Array:
     return speeds
 
 
-class _Skeleton:
+class _SharedTables:
     """The problem and its tables with room for tones, each of which becomes one more undamped block.
 
     The steady response to Re(a e^{iΩt}) is Re(Z e^{iΩt}) = Re Z · p + Im Z/Ω · v with p = cos Ωt, v = -Ω sin Ωt.
@@ -158,12 +158,12 @@ class _Skeleton:
         self.rows, ends = np.concatenate(read_by), np.cumsum([len(rows) for rows in read_by]).tolist()
         self.places = [slice(end - len(rows), end) for rows, end in zip(read_by, ends, strict=True)]
         self.back, self.fastest = among_tones(system.blocks.T, self.tones), max(float(_speeds(system).max()), 1e-3)
-        ledger = np.zeros_like(problem.load), problem.power, among_tones(loss, self.tones)
-        tables = build(problem, self.tones, self.series, known_of(laws), dt_cell, ledger)
+        energy_rows = np.zeros_like(problem.load), problem.power, among_tones(loss, self.tones)
+        tables = build(problem, self.tones, self.series, law_tables_of(laws), dt_cell, energy_rows)
         sizes = len(problem.gap), len(problem.load), len(problem.k), len(forcing.table_dt)
-        self.layout = _layout(*sizes, POOL if tables.ahead.size else 0)
-        self.problem = Mould(problem, PROBLEM, ("gap", "k", "read", "read_rate", "power"))
-        self.tables = Mould(tables, TABLES, OF_TONES)
+        self.layout = _layout(*sizes, POOL if tables.node_propagator.size else 0)
+        self.problem = PackedTemplate(problem, PROBLEM, ("gap", "k", "read", "read_rate", "power"))
+        self.tables = PackedTemplate(tables, TABLES, TONE_TABLES)
 
     @property
     def nbytes(self) -> int:
@@ -178,7 +178,7 @@ class _Skeleton:
         turn = 1.0 / np.where(omega > 0.0, omega, np.inf)
         steady = np.concatenate((response.real, response.imag * turn[:, None])).T  # (2n, 2 tones)
         columns = (self.rows @ steady).reshape(len(self.rows), 2, self.tones)
-        problem, tables, back = self.problem.cast(), self._tables(forcing, turn), self.back.copy()
+        problem, tables, back = self.problem.copy(), self._tables(forcing, turn), self.back.copy()
         read_by = problem.value.read, problem.value.power, tables.value.loss_rows, back
         for rows, place in zip(read_by, self.places, strict=True):
             _of_tones(rows, n)[:] = columns[place]
@@ -192,9 +192,9 @@ class _Skeleton:
         rest[n : n + self.tones] = 1.0
         return Prepared(problem, tables, back, self.layout, rest, [], Memo())
 
-    def _tables(self, forcing: Forcing, turn: Array) -> Cast:
+    def _tables(self, forcing: Forcing, turn: Array) -> PackedCopy:
         """Tables that know the signals made of tones, Re(a e^{iΩt}) = Re a · p + Im a/Ω · v; ``turn`` is 1/Ω."""
-        tables = self.tables.cast(fastest=max(self.fastest, float(forcing.tone_omega.max(initial=0.0))))
+        tables = self.tables.copy(fastest=max(self.fastest, float(forcing.tone_omega.max(initial=0.0))))
         rows, load, each = tables.value.signal_rows, forcing.tone_load, np.arange(self.tones)
         rows[load, each - self.tones + rows.shape[1] // 2] = forcing.tone_amplitude.real
         rows[load, each - self.tones] = forcing.tone_amplitude.imag * turn
@@ -223,11 +223,11 @@ def _check_passive(system: System) -> bool:
 
 @lru_cache(maxsize=64)
 def _layout(stops: int, loads: int, blocks: int, signals: int, pool: int) -> Layout:
-    """Places of the arrays of `State` and `Space`; a pool if motion goes through the blocks."""
+    """Places of the arrays of `State` and `Scratch`; a pool if motion goes through the blocks."""
     size, width = 2 * blocks, 2 * blocks + 2 + 2 * stops
     rows = size if pool else 0
-    space = [
-        *((padded(width),), (LONG, padded(size)), (signals, 6), (LONG,), (blocks,), (loads,), (stops,)),
+    scratch = [
+        *((padded(width),), (SERIES_TERMS, padded(size)), (signals, 6), (SERIES_TERMS,), (blocks,), (loads,), (stops,)),
         (2, padded(blocks)),
         *((stops, 2, S), (S,), (stops, 2, S), (stops + loads, S), (S,), (stops, 2, 8), (stops, S), (stops, 3, S)),
         *((stops * S,), (stops * S,), (START + 1, padded(width + 2))),
@@ -236,7 +236,7 @@ def _layout(stops: int, loads: int, blocks: int, signals: int, pool: int) -> Lay
         *((2 + loads, max(32, padded(size + 6 * signals), 2 * padded(6 * signals))), (3,), (6,)),
         *((stops, 2), (rows, S), (rows, S), (padded(rows),), (stops * S, stops * S), (pool, S, 2 * S), (pool,)),
     ]
-    return Layout([STATE, SPACE], [state_shapes(width, stops), space])
+    return Layout([STATE, SCRATCH], [state_shapes(width, stops), scratch])
 
 
 def without_resonance(system: System, forcing: Forcing, duration: float, rtol: float) -> Forcing:

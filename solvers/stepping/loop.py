@@ -31,7 +31,7 @@ from solvers.compiled.state import (
     STEP_TOO_SMALL,
     State,
     T,
-    touching,
+    in_contact,
 )
 from solvers.problem import Array
 from solvers.stepping.energy_gain import modal_gains
@@ -100,19 +100,19 @@ def march(
         # --- end of the run, and what can stop it early
         code = look(problem, state, t_end, log, events)
         if code == EVENT:
-            count[CALLS] += rhs(problem, now[T], state.x, state.piece, state.entry_rate, state.rate, space.work[0])
+            count[CALLS] += rhs(problem, now[T], state.x, state.segment, state.entry_rate, state.rate, space.work[0])
             continue
         if code != RUNNING:
             return code
 
         # --- try a step
-        phase = H_CONTACT if touching(state) else H_FLIGHT
+        phase = H_CONTACT if in_contact(state) else H_FLIGHT
         nearest = nearest if phase == H_CONTACT else 0.0
         h = min(now[phase], dt_contact if phase == H_CONTACT else dt_flight, t_end - now[T])
         if h < 4e-15 * now[T] and h < t_end - now[T]:
             return LAW_NOT_FINITE if not_finite else STEP_TOO_SMALL
         error, calls = step(
-            *(problem, now[T], h, state.x, state.rate, state.piece, state.entry_rate),
+            *(problem, now[T], h, state.x, state.rate, state.segment, state.entry_rate),
             *(space.x_new, space.rate_new, space.dense, space.work, rtol, atol),
         )
         count[CALLS] += calls
@@ -137,10 +137,10 @@ def march(
                     count[REJECTED] += 1
                     continue
         elif events == HENON and phase == H_FLIGHT and not by_hand:  # the paper's scheme
-            theta, stop = entry_by_sign(problem, state.x, space.x_new, state.piece)
+            theta, stop = entry_by_sign(problem, state.x, space.x_new, state.segment)
             if theta < NONE:
                 duration = henon_landing(
-                    *(problem, now[T], h, state.x, state.rate, state.piece, state.entry_rate),
+                    *(problem, now[T], h, state.x, state.rate, state.segment, state.entry_rate),
                     *(stop, 0.0, space.x_new, space.work),
                 )
                 if duration < 0.0:  # it grazes: walk in with the small step
@@ -149,7 +149,7 @@ def march(
                     continue
                 h, direction = duration, 1
                 count[CALLS] += rhs(
-                    *(problem, now[T] + h, space.x_new, state.piece, state.entry_rate),
+                    *(problem, now[T] + h, space.x_new, state.segment, state.entry_rate),
                     *(space.rate_new, space.work[0]),
                 )
                 hermite(h, state.x, state.rate, space.x_new, space.rate_new, space.dense)
@@ -168,7 +168,7 @@ def march(
         if code != RUNNING:
             return code
         if stop >= 0:
-            count[CALLS] += rhs(problem, now[T], state.x, state.piece, state.entry_rate, state.rate, space.work[0])
+            count[CALLS] += rhs(problem, now[T], state.x, state.segment, state.entry_rate, state.rate, space.work[0])
         if modal_gains(problem, state, space):
             return GAINED
 

@@ -160,7 +160,7 @@ def in_pieces():
         run = integration.prepared_run(one, *begin(one), 0.03, None, method, method is MAIN)
         run.log = np.empty((1, COLUMNS))
         if run.tangent:
-            run.engine.record(run.engine.state.tape[:6])
+            run.engine.record_events(run.engine.state.event_record[:6])
         run.to_the_end(None)
     integration._BUDGET = budget
 

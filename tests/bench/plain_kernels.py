@@ -48,8 +48,8 @@ numba.carray = lambda array, shape: array[: shape[0]]
 ndarray.to_fixed_tuple = lambda array, n: tuple(array[:n])
 
 import contacts.kernels as laws  # noqa: E402
-import solvers.compiled.handles as handle  # noqa: E402
 import solvers.compiled.kernels as ground  # noqa: E402
+import solvers.compiled.packed as handle  # noqa: E402
 
 
 def opener(kind):

@@ -17,17 +17,17 @@ import numpy as np
 
 from solvers.compiled.dop853_tableau import STAGES, C
 from solvers.compiled.kernels import call_force, copy, dot, indentation, inlined, inner
-from solvers.compiled.simd import put, spread
+from solvers.compiled.simd import splat8, store8
 from solvers.compiled.state import PEAK_FORCE, T_IN, T, surface_tolerance
-from solvers.compiled.sums import above_zero
-from solvers.exponential.contact.blocks import ENTERING, GOING_ON, carry_forces, goes_through_blocks, see
+from solvers.compiled.sums import clip_negative
+from solvers.exponential.contact.many_stops import CONTINUING, ENTERING, add_block_motion, motion_at_nodes, uses_blocks
 from solvers.exponential.contact.node_response import respond, ripple_of
 from solvers.exponential.contact.nodes import S
-from solvers.exponential.contact.peaks import deepest
+from solvers.exponential.contact.peaks import largest_indentation
 from solvers.exponential.flight import energy_norms
 
 RATE, FORCE = 1.0, 2.0  # kinds of bends in Tables.bend; 0 for a law that has none
-FREE, TURNED = -1, -2  # of a landing: nothing else happens on the way, or something does that wants shorter steps
+CLEAR, TOO_LONG = -1, -2  # of a landing: nothing else happens on the way, or something does that wants shorter steps
 _ON = 1e-9  # value, in units of the largest of the step, at which a stop counts as on its bend
 _TOGETHER = 1e-6  # part of its way by which a stop may be carried over its bend when another lands
 _SAME = 1e-11  # the same for the sign of a node
@@ -69,16 +69,16 @@ def _turns(rates, begin, end, up, down):
 
 
 @inner
-def _passes_between(problem, tables, state, space, family, h, s, lower, upper):
+def _passes_between(problem, tables, state, scratch, node_set, h, s, lower, upper):
     """Whether δ leaves [lower, upper] between two points of the step or at one."""
     size = 2 * problem.k.size
-    t, delta, rate = 0.0, space.seen[s, 0], space.seen[s, 1]
+    t, delta, rate = 0.0, scratch.start_motion[s, 0], scratch.start_motion[s, 1]
     for i in range(S + 1):
         if i < S:
-            after, delta_new, rate_new = h * tables.times[family, i], space.motion[s, 0, i], space.motion[s, 1, i]
+            after, delta_new, rate_new = h * tables.times[node_set, i], scratch.motion[s, 0, i], scratch.motion[s, 1, i]
         else:
-            after, delta_new = h, indentation(problem, s, space.x_new)
-            rate_new = dot(problem.read_rate[s], space.x_new, size)
+            after, delta_new = h, indentation(problem, s, scratch.x_new)
+            rate_new = dot(problem.read_rate[s], scratch.x_new, size)
         if _passes(after - t, delta, rate, delta_new, rate_new, lower, upper):
             return True
         t, delta, rate = after, delta_new, rate_new
@@ -86,78 +86,80 @@ def _passes_between(problem, tables, state, space, family, h, s, lower, upper):
 
 
 @inner
-def _bound_rates(problem, tables, state, space, h):
-    """Into ``space.m`` bounds of |δ̈| of all stops on a step; forces are taken as twice their largest node value."""
+def _bound_rates(problem, tables, state, scratch, h):
+    """Into ``scratch.per_stop`` bounds of |δ̈| of all stops on a step; forces are taken as twice their largest node value."""
     n, stops = problem.k.size, problem.gap.size
-    energy_norms(problem, state.x, space.norms)
+    energy_norms(problem, state.x, scratch.norms)
     for s in range(stops):
-        space.m[s] = 0.0
-    for u in range(space.force.shape[0] if problem.table_dt.size else stops):
-        if u < stops and state.piece[u] == 0:
+        scratch.per_stop[s] = 0.0
+    for u in range(scratch.force.shape[0] if problem.table_dt.size else stops):
+        if u < stops and state.segment[u] == 0:
             continue
         largest, push = 0.0, problem.push[u] if u < stops else problem.load[u - stops]
         for i in range(S):
-            largest = max(largest, 2.0 * abs(space.force[u, i]))
+            largest = max(largest, 2.0 * abs(scratch.force[u, i]))
         for b in range(n):
-            space.norms[b] += h * largest * math.sqrt(push[n + b] ** 2 + problem.k[b] * push[b] ** 2)
+            scratch.norms[b] += h * largest * math.sqrt(push[n + b] ** 2 + problem.k[b] * push[b] ** 2)
         for s in range(stops):
-            direct = tables.mobility[s, u] if u < stops else tables.direct[s, u - stops]
-            space.m[s] += largest * abs(direct)
+            direct = tables.accelerance[s, u] if u < stops else tables.load_acceleration[s, u - stops]
+            scratch.per_stop[s] += largest * abs(direct)
     for s in range(stops):
-        space.m[s] += dot(tables.weight[s], space.norms, n)
+        scratch.per_stop[s] += dot(tables.acceleration_weight[s], scratch.norms, n)
 
 
 @inlined
-def _stays_away(space, s, h):
+def _stays_away(scratch, s, h):
     """Whether an open stop cannot be reached on the step; its motion then is taken as what it begins with."""
-    delta, rate = space.seen[s, 0], space.seen[s, 1]
-    put(space.motion[s, 0], 0, spread(delta))
-    put(space.motion[s, 1], 0, spread(rate))
-    return delta + h * max(rate, 0.0) + 0.5 * h * h * space.m[s] < 0.0
+    delta, rate = scratch.start_motion[s, 0], scratch.start_motion[s, 1]
+    store8(scratch.motion[s, 0], 0, splat8(delta))
+    store8(scratch.motion[s, 1], 0, splat8(rate))
+    return delta + h * max(rate, 0.0) + 0.5 * h * h * scratch.per_stop[s] < 0.0
 
 
 @inlined
-def _watch(problem, tables, state, space, family, level, s, carried):
+def _watch(problem, tables, state, scratch, node_set, level, s, carried):
     """Motion of an open stop at the nodes, by the blocks if there are many; whether forces have been carried there."""
-    if not goes_through_blocks(tables):
-        respond(problem, tables, state, space, family, level, s)
+    if not uses_blocks(tables):
+        respond(problem, tables, state, scratch, node_set, level, s)
         return carried
     if not carried:
-        carry_forces(problem, tables, state, space, family, level, GOING_ON)
-        carry_forces(problem, tables, state, space, family, level, ENTERING)
-    see(problem, space, s, problem.gap[s], space.motion[s])
+        add_block_motion(problem, tables, state, scratch, node_set, level, CONTINUING)
+        add_block_motion(problem, tables, state, scratch, node_set, level, ENTERING)
+    motion_at_nodes(problem, scratch, s, problem.gap[s], scratch.motion[s])
     return True
 
 
 @inner
-def leaves_piece(problem, tables, state, space, family, level):
+def leaves_segment(problem, tables, state, scratch, node_set, level):
     """Whether any stop may cross a border of its piece on the step."""
-    size, h, carried, through = 2 * problem.k.size, tables.step[level], False, goes_through_blocks(tables)
+    size, h, carried, through = 2 * problem.k.size, tables.contact_step[level], False, uses_blocks(tables)
     if through:
-        _bound_rates(problem, tables, state, space, h)
+        _bound_rates(problem, tables, state, scratch, h)
     for s in range(problem.gap.size):
-        piece, ripple = state.piece[s], 0.0
-        upper, lower = problem.levels[s, piece], -np.inf
-        if piece == 0:
-            if through and _stays_away(space, s, h):
+        segment, ripple = state.segment[s], 0.0
+        upper, lower = problem.knots[s, segment], -np.inf
+        if segment == 0:
+            if through and _stays_away(scratch, s, h):
                 continue
-            carried = _watch(problem, tables, state, space, family, level, s, carried)
-            ripple = ripple_of(tables.sway[s], tables.alias[tables.kind[family], level], state.x, problem.k.size)
+            carried = _watch(problem, tables, state, scratch, node_set, level, s, carried)
+            ripple = ripple_of(
+                tables.ripple_weight[s], tables.alias[tables.kind[node_set], level], state.x, problem.k.size
+            )
         else:
-            lower = problem.levels[s, piece - 1]
-        lowest = highest = indentation(problem, s, space.x_new)
+            lower = problem.knots[s, segment - 1]
+        lowest = highest = indentation(problem, s, scratch.x_new)
         for i in range(S):
-            lowest, highest = min(lowest, space.motion[s, 0, i]), max(highest, space.motion[s, 0, i])
-        begin, end = space.seen[s, 1], dot(problem.read_rate[s], space.x_new, size)
-        turns = _turns(space.motion[s, 1], begin, end, piece > 0, upper < np.inf)
+            lowest, highest = min(lowest, scratch.motion[s, 0, i]), max(highest, scratch.motion[s, 0, i])
+        begin, end = scratch.start_motion[s, 1], dot(problem.read_rate[s], scratch.x_new, size)
+        turns = _turns(scratch.motion[s, 1], begin, end, segment > 0, upper < np.inf)
         if not turns and lower <= lowest and highest + ripple <= upper:
             continue
         tolerance = 8.0 * surface_tolerance(problem, s, state.x)
         if not (lower - tolerance <= lowest and highest + ripple <= upper + tolerance):
             return True
-        if piece == 0 and deepest(problem, tables, state, space, family, h, s) > upper + tolerance:
+        if segment == 0 and largest_indentation(problem, tables, state, scratch, node_set, h, s) > upper + tolerance:
             return True
-        if _passes_between(problem, tables, state, space, family, h, s, lower - tolerance, upper + tolerance):
+        if _passes_between(problem, tables, state, scratch, node_set, h, s, lower - tolerance, upper + tolerance):
             return True
     return False
 
@@ -181,85 +183,85 @@ def side_at(problem, tables, state, s, x, batch):
 
 
 @inner
-def choose_sides(problem, tables, state, space):
+def choose_sides(problem, tables, state, scratch):
     """On which side of their bends the contacts that begin now are."""
     for s in range(problem.gap.size):
-        if tables.bend[s] > 0.0 and state.piece[s] > 0 and state.open[s, T_IN] == state.now[T]:
-            space.side[s] = -1.0 if side_at(problem, tables, state, s, state.x, space.trial) < 0.0 else 1.0
+        if tables.bend[s] > 0.0 and state.segment[s] > 0 and state.active[s, T_IN] == state.now[T]:
+            scratch.side[s] = -1.0 if side_at(problem, tables, state, s, state.x, scratch.trial) < 0.0 else 1.0
 
 
 @inner
-def bend_ahead(problem, tables, state, space, family, level, fresh, rtol):
+def first_bend(problem, tables, state, scratch, node_set, level, is_new, rtol):
     """(time after the begin of the step, stop) of the first bend on it; no stop is -1.
 
-    A stop that begins on its bend (``fresh``), or was carried over it, takes the side of the first node; one whose
+    A stop that begins on its bend (``is_new``), or was carried over it, takes the side of the first node; one whose
     rate, or force, stays within the tolerance bends without harm.
     """
-    first, stop, h = np.inf, -1, tables.step[level]
+    first, stop, h = np.inf, -1, tables.contact_step[level]
     for s in range(problem.gap.size):
-        if tables.bend[s] == 0.0 or state.piece[s] == 0:
+        if tables.bend[s] == 0.0 or state.segment[s] == 0:
             continue
-        values, begin = space.sides, side_at(problem, tables, state, s, state.x, space.trial)
-        above_zero(space.motion[s, 0], space.clipped)
-        _sides(problem, tables, state, s, S, space.clipped, space.motion[s, 1], values)
-        values[S] = side_at(problem, tables, state, s, space.x_new, space.trial)
+        values, begin = scratch.bend_values, side_at(problem, tables, state, s, state.x, scratch.trial)
+        clip_negative(scratch.motion[s, 0], scratch.clipped)
+        _sides(problem, tables, state, s, S, scratch.clipped, scratch.motion[s, 1], values)
+        values[S] = side_at(problem, tables, state, s, scratch.x_new, scratch.trial)
         largest = abs(begin)
         for i in range(S + 1):
             largest = max(largest, abs(values[i]))
-        harmless = 0.01 * rtol * space.scale[s] if tables.bend[s] == RATE else space.accuracy[s]
+        harmless = 0.01 * rtol * scratch.reference_speed[s] if tables.bend[s] == RATE else scratch.force_tolerance[s]
         if largest <= harmless:
             continue
-        on = space.side[s] * begin < 0.0 or (fresh and abs(begin) <= _ON * largest)
-        if on and space.side[s] * values[0] < -_SAME * largest:
-            space.side[s] = -space.side[s]
+        on = scratch.side[s] * begin < 0.0 or (is_new and abs(begin) <= _ON * largest)
+        if on and scratch.side[s] * values[0] < -_SAME * largest:
+            scratch.side[s] = -scratch.side[s]
         before, t = begin, 0.0
         for i in range(S + 1):
-            after = h * tables.times[family, i] if i < S else h
-            if space.side[s] * values[i] < -_SAME * largest:
-                way = before / (before - values[i]) if space.side[s] * before > 0.0 else 0.0
+            after = h * tables.times[node_set, i] if i < S else h
+            if scratch.side[s] * values[i] < -_SAME * largest:
+                way = before / (before - values[i]) if scratch.side[s] * before > 0.0 else 0.0
                 if t + way * (after - t) < first:
                     first, stop = t + way * (after - t), s
-                    space.sides[S + 1] = largest
+                    scratch.bend_values[S + 1] = largest
                 break
             before, t = values[i], after
     return first, stop
 
 
 @inner
-def on_the_way(problem, tables, state, space, stop, bends, w, x):
+def before_landing(problem, tables, state, scratch, stop, bends, w, x):
     """What happens besides the landing of ``stop``, on a bend or not, between the states w and x, which end in times.
 
     FREE, TURNED, or another stop that has crossed a border of its piece. A peak must lie in another kind of step.
     """
     size, width = 2 * problem.k.size, state.x.size
     d = x[width] - w[width]
-    long = d > 4.0 * tables.step[tables.step.size - 1]
+    long = d > 4.0 * tables.contact_step[tables.contact_step.size - 1]
     for s in range(problem.gap.size):
-        piece, slope_a, slope_b = state.piece[s], 0.0, 0.0
+        segment, slope_a, slope_b = state.segment[s], 0.0, 0.0
         if s != stop or bends:
             slope_a, slope_b = dot(problem.read_rate[s], w, size), dot(problem.read_rate[s], x, size)
         if s != stop:
             a, b = indentation(problem, s, w), indentation(problem, s, x)
             tolerance = surface_tolerance(problem, s, x)
-            upper = problem.levels[s, piece] + tolerance
-            lower = problem.levels[s, piece - 1] - tolerance if piece > 0 else -np.inf
+            upper = problem.knots[s, segment] + tolerance
+            lower = problem.knots[s, segment - 1] - tolerance if segment > 0 else -np.inf
             if not lower <= b <= upper:
                 return s
             if long and _passes(d, a, slope_a, b, slope_b, lower, upper):
-                return TURNED
-        if not long or piece == 0:
+                return TOO_LONG
+        if not long or segment == 0:
             continue
         if slope_a > 0.0 > slope_b and (s != stop or tables.bend[s] != RATE):
-            return TURNED
+            return TOO_LONG
         if s != stop and tables.bend[s] > 0.0:
-            before = space.side[s] * side_at(problem, tables, state, s, w, space.trial)
-            if space.side[s] * side_at(problem, tables, state, s, x, space.trial) < -_TOGETHER * abs(before):
-                return TURNED
-        if not bends and tables.bend[s] == FORCE and _pulls_inside(space.work, size + 3 + 2 * s, width):
-            return TURNED
-        if _force_turns(space.work, size + 3 + 2 * s, width, state.open[s, PEAK_FORCE]):
-            return TURNED
-    return FREE
+            before = scratch.side[s] * side_at(problem, tables, state, s, w, scratch.trial)
+            if scratch.side[s] * side_at(problem, tables, state, s, x, scratch.trial) < -_TOGETHER * abs(before):
+                return TOO_LONG
+        if not bends and tables.bend[s] == FORCE and _pulls_inside(scratch.stages, size + 3 + 2 * s, width):
+            return TOO_LONG
+        if _force_turns(scratch.stages, size + 3 + 2 * s, width, state.active[s, PEAK_FORCE]):
+            return TOO_LONG
+    return CLEAR
 
 
 @inlined

@@ -4,7 +4,7 @@
     ROOT          dt = κ u^{κ-1} du/δ̇, u = δ^{1/κ}, κ as at entry: lands exactly on δ = 0, where δ^{3/2} is singular
     TIME          dt                lands on a bend by the secant rule; the force is continuous there
 
-The unknowns are [p, v, ledger, t, u]. Every block moves by less than `_reach` radians, within which the step is exact
+The unknowns are [p, v, ledger, t, u]. Every block moves by less than `_landing_reach` radians, within which the step is exact
 to the tolerance whatever the stops see of it; what the forces add is estimated by a tenth of the embedded fifth-order
 difference, for every stop in units of its own tolerance: in these variables that stays a few times above the true
 error, where DOP853's own mixed estimate falls below it.
@@ -25,10 +25,10 @@ from solvers.compiled.state import (
     T,
     rate_tolerance,
     surface_tolerance,
-    tape,
+    write_event,
 )
 from solvers.compiled.sums import combine
-from solvers.exponential.contact.crossings import FORCE, FREE, on_the_way, side_at
+from solvers.exponential.contact.crossings import CLEAR, FORCE, before_landing, side_at
 from solvers.exponential.contact.node_response import BATCH, DIFFERENCE, LANDED, START
 from solvers.exponential.contact.peaks import state_peaks
 from solvers.exponential.energy.quadrature import powers
@@ -40,7 +40,7 @@ _PART_OF_FOURTH = 1e-2  # with u = δ^{1/4}: terms t² = u⁸ are exact in the s
 _LAST = 0.09  # indentation, in units of the deepest, from which the last step is tried
 
 
-def reach(rtol: float) -> float:
+def landing_reach(rtol: float) -> float:
     """Radians of the fastest block within which DOP853 is exact to a tenth of rtol: its error is 7e-8 θ⁹."""
     return min((0.1 * rtol / 7e-8) ** (1.0 / 9.0), 1.5)
 
@@ -57,7 +57,7 @@ def _force(problem, tables, s, delta, delta_dot, side, entry_rate, batch):
 
 
 @inlined
-def _rate(problem, tables, ledger, variable, stop, span, w, piece, entry_rate, side, out, batch):
+def _rate(problem, tables, with_energy, variable, stop, span, w, segment, entry_rate, side, out, batch):
     """Derivative of the unknowns with respect to the chosen variable, times its span; ``w`` ends in (t, u)."""
     n, calls = problem.k.size, 0
     size, t = 2 * n, 2 * n + 2 + 2 * problem.gap.size
@@ -68,10 +68,10 @@ def _rate(problem, tables, ledger, variable, stop, span, w, piece, entry_rate, s
         value, load = table_value(problem, j, w[t]), problem.load[problem.table_load[j]]
         for e in range(size):
             out[e] += load[e] * value
-    out[size], out[size + 1] = powers(problem, tables, w[t], w) if ledger else (0.0, 0.0)
+    out[size], out[size + 1] = powers(problem, tables, w[t], w) if with_energy else (0.0, 0.0)
     for s in range(problem.gap.size):
         force, rate = 0.0, 0.0
-        if piece[s] > 0:
+        if segment[s] > 0:
             rate = dot(problem.read_rate[s], w, size)
             force = _force(problem, tables, s, indentation(problem, s, w), rate, side[s], entry_rate[s], batch)
             calls += 1
@@ -84,7 +84,7 @@ def _rate(problem, tables, ledger, variable, stop, span, w, piece, entry_rate, s
     if variable == INDENTATION:
         factor = span / delta_dot
     elif variable == ROOT:
-        kappa = tables.power[1 + stop]
+        kappa = tables.time_exponent[1 + stop]
         factor = span * kappa * w[t + 1] ** (kappa - 1.0) / delta_dot
     for e in range(t):
         out[e] *= factor
@@ -94,37 +94,39 @@ def _rate(problem, tables, ledger, variable, stop, span, w, piece, entry_rate, s
 
 
 @inner
-def regular_step(problem, tables, ledger, variable, stop, span, w, piece, entry_rate, side, work):
+def landing_step(problem, tables, with_energy, variable, stop, span, w, segment, entry_rate, side, work):
     """One DOP853 step of the chosen variable from ``w`` into ``work[LANDED]``, its stages into ``work``; law calls."""
     calls = 0
     batch, trial = work[BATCH], work[LANDED]
     for i in range(STAGES):
         combine(work, A[i], i, w, trial)
-        calls += _rate(problem, tables, ledger, variable, stop, span, trial, piece, entry_rate, side, work[i], batch)
+        calls += _rate(
+            problem, tables, with_energy, variable, stop, span, trial, segment, entry_rate, side, work[i], batch
+        )
     combine(work, A[STAGES], STAGES, w, trial)
     return calls
 
 
 @inner
-def _error(problem, space, part, rtol):
+def _error(problem, scratch, part, rtol):
     """Error of the step just taken in the indentation rates, in units of each stop's tolerance; the largest.
 
     It is a ``part`` of the embedded difference.
     """
-    difference, worst = space.work[DIFFERENCE], 0.0
-    combine(space.work, E5, STAGES, None, difference)
+    difference, worst = scratch.stages[DIFFERENCE], 0.0
+    combine(scratch.stages, E5, STAGES, None, difference)
     for s in range(problem.gap.size):
         error = 0.0
         for e in range(2 * problem.k.size):
             error += abs(problem.read_rate[s, e] * difference[e])
-        error *= part / (rtol * space.scale[s])
+        error *= part / (rtol * scratch.reference_speed[s])
         if not error <= worst:
             worst = error
     return worst
 
 
 @inner
-def _goes_ahead(space, size):
+def _goes_ahead(scratch, size):
     """Whether time passes forward in every stage of the step just taken.
 
     If it does not, the stop turns back before the border, the step passes a pole of 1/δ̇, and its embedded difference
@@ -132,29 +134,29 @@ def _goes_ahead(space, size):
     """
     ahead = True
     for i in range(STAGES):
-        ahead &= space.work[i, size] >= -1e-9 * space.work[0, size]
+        ahead &= scratch.stages[i, size] >= -1e-9 * scratch.stages[0, size]
     return ahead
 
 
 @inner
-def _step(problem, tables, state, space, variable, stop, span, ledger):
-    """A step from ``space.work[START]``."""
-    state.count[CALLS] += regular_step(
-        *(problem, tables, ledger, variable, stop, span, space.work[START]),
-        *(state.piece, state.entry_rate, space.side, space.work),
+def _step(problem, tables, state, scratch, variable, stop, span, with_energy):
+    """A step from ``scratch.stages[START]``."""
+    state.count[CALLS] += landing_step(
+        *(problem, tables, with_energy, variable, stop, span, scratch.stages[START]),
+        *(state.segment, state.entry_rate, scratch.side, scratch.stages),
     )
 
 
 @inner
-def _length_to(problem, tables, state, space, variable, stop, span, landed, time, ledger):
-    """Length of the step whose end, in ``space.work[LANDED]``, is at a time before the landing; inf when not found."""
-    w, x, size, tries = space.work[START], space.work[LANDED], state.x.size, 0
+def _length_to(problem, tables, state, scratch, variable, stop, span, landed, time, with_energy):
+    """Length of the step whose end, in ``scratch.stages[LANDED]``, is at a time before the landing; inf when not found."""
+    w, x, size, tries = scratch.stages[START], scratch.stages[LANDED], state.x.size, 0
     t = w[size]
     left = (landed - time) / (landed - t) if landed > t else 0.0
-    kappa = tables.power[1 + stop]
+    kappa = tables.time_exponent[1 + stop]
     length = span * (1.0 - (left ** (1.0 / kappa) if variable == ROOT else left))
     while True:
-        _step(problem, tables, state, space, variable, stop, length, ledger)
+        _step(problem, tables, state, scratch, variable, stop, length, with_energy)
         late, tries = x[size] - time, tries + 1
         pace = 1.0 if variable == TIME else dot(problem.read_rate[stop], x, 2 * problem.k.size)  # d(variable)/dt
         if variable == ROOT:
@@ -165,35 +167,35 @@ def _length_to(problem, tables, state, space, variable, stop, span, landed, time
 
 
 @inner
-def start_landing(problem, tables, state, space, stop):
-    """The state as a landing of ``stop`` begins it, with t and δ^{1/κ}, into ``space.work[START]``."""
-    w, size, delta = space.work[START], state.x.size, max(indentation(problem, stop, state.x), 0.0)
+def start_landing(problem, tables, state, scratch, stop):
+    """The state as a landing of ``stop`` begins it, with t and δ^{1/κ}, into ``scratch.stages[START]``."""
+    w, size, delta = scratch.stages[START], state.x.size, max(indentation(problem, stop, state.x), 0.0)
     copy(state.x, w, size)
-    w[size], w[size + 1] = state.now[T], delta ** (1.0 / tables.power[1 + stop])
+    w[size], w[size + 1] = state.now[T], delta ** (1.0 / tables.time_exponent[1 + stop])
 
 
 @inner
-def _begin_peaks(state, space):
+def _begin_peaks(state, scratch):
     """Peaks by the state a landing begins with, whose forces its first stage has found."""
-    work, size = space.work, state.x.size
-    for s in range(state.piece.size):
-        if state.piece[s] > 0:
-            column = size - 2 * state.piece.size + 2 * s + 1
-            state.open[s, PEAK_FORCE] = max(state.open[s, PEAK_FORCE], work[0, column] / work[0, size])
+    work, size = scratch.stages, state.x.size
+    for s in range(state.segment.size):
+        if state.segment[s] > 0:
+            column = size - 2 * state.segment.size + 2 * s + 1
+            state.active[s, PEAK_FORCE] = max(state.active[s, PEAK_FORCE], work[0, column] / work[0, size])
 
 
 @inner
-def _accept(problem, tables, state, space, variable, stop, span, t_end, out, due, ledger):
-    """Move the state to the end of the landing in ``space.work[LANDED]``, or to that of the run; samples on the way."""
-    w, x, size = space.work[START], space.work[LANDED], state.x.size
+def _accept(problem, tables, state, scratch, variable, stop, span, t_end, out, due, with_energy):
+    """Move the state to the end of the landing in ``scratch.stages[LANDED]``, or to that of the run; samples on the way."""
+    w, x, size = scratch.stages[START], scratch.stages[LANDED], state.x.size
     landed, t = x[size], state.now[T]
-    _begin_peaks(state, space)
+    _begin_peaks(state, scratch)
     copy(x, state.x, size)
     while True:
         time = min(due[state.count[SAMPLED]], t_end)
         if time > landed:
             break
-        length = _length_to(problem, tables, state, space, variable, stop, span, landed, time, ledger)
+        length = _length_to(problem, tables, state, scratch, variable, stop, span, landed, time, with_energy)
         if length == np.inf:
             copy(w, state.x, size)
             return False
@@ -204,68 +206,68 @@ def _accept(problem, tables, state, space, variable, stop, span, t_end, out, due
             copy(x, state.x, size)
             landed, span = t_end, length
             break
-    if state.tape.shape[0]:
-        tape(state, LANDING, t, landed, span, variable, stop, w)
+    if state.event_record.shape[0]:
+        write_event(state, LANDING, t, landed, span, variable, stop, w)
     state.now[T] = landed
     if variable == TIME or landed == t_end:
-        state_peaks(problem, state, space, state.x)
+        state_peaks(problem, state, scratch, state.x)
     return True
 
 
 @inner
-def land(problem, tables, state, space, stop, direction, near, rtol, t_end, out, due, ledger):
+def land(problem, tables, state, scratch, stop, direction, near, rtol, t_end, out, due, with_energy):
     """Try to land on a border of ``stop``, about ``near`` s ahead.
 
     Returns ``stop`` if it succeeded, another stop whose border is crossed before, or -1.
     """
     size, t = state.x.size, state.now[T]
-    delta, furthest = indentation(problem, stop, state.x), space.reach[0] / tables.fastest
-    level = problem.levels[stop, state.piece[stop] - (1 if direction < 0 else 0)]
-    leaving = direction < 0 and state.piece[stop] == 1
+    delta, furthest = indentation(problem, stop, state.x), scratch.landing_reach[0] / tables.fastest
+    level = problem.knots[stop, state.segment[stop] - (1 if direction < 0 else 0)]
+    leaving = direction < 0 and state.segment[stop] == 1
     rate = dot(problem.read_rate[stop], state.x, 2 * problem.k.size)
     if near > furthest or abs(rate) <= rate_tolerance(problem, stop, state.x):
         return -1
-    if leaving and delta > _LAST * state.open[stop, PEAK_DELTA]:
+    if leaving and delta > _LAST * state.active[stop, PEAK_DELTA]:
         return -1
-    if not leaving and state.piece[stop] > 0 and abs(level - delta) > 0.2 * max(level, delta):
+    if not leaving and state.segment[stop] > 0 and abs(level - delta) > 0.2 * max(level, delta):
         return -1
-    start_landing(problem, tables, state, space, stop)
-    w, x = space.work[START], space.work[LANDED]
-    variable = ROOT if leaving and tables.power[1 + stop] > 1.0 else INDENTATION
+    start_landing(problem, tables, state, scratch, stop)
+    w, x = scratch.stages[START], scratch.stages[LANDED]
+    variable = ROOT if leaving and tables.time_exponent[1 + stop] > 1.0 else INDENTATION
     span = -w[size + 1] if variable == ROOT else level - delta
-    _step(problem, tables, state, space, variable, stop, span, ledger)
-    landed, part = x[size], _PART_OF_FOURTH if variable == ROOT and tables.power[1 + stop] == 4.0 else _PART
+    _step(problem, tables, state, scratch, variable, stop, span, with_energy)
+    landed, part = x[size], _PART_OF_FOURTH if variable == ROOT and tables.time_exponent[1 + stop] == 4.0 else _PART
     width = surface_tolerance(problem, stop, state.x) / abs(rate)  # a distance may be that much rounding
     if not t <= landed <= t + min(4.0 * near, furthest) + width:
         return -1
     if not (
-        _goes_ahead(space, size)
-        and _error(problem, space, part, rtol) <= 1.0
+        _goes_ahead(scratch, size)
+        and _error(problem, scratch, part, rtol) <= 1.0
         and direction * dot(problem.read_rate[stop], x, 2 * problem.k.size) >= 0.0  # it has not turned back
     ):
         return -1
-    other = on_the_way(problem, tables, state, space, stop, False, w, x)
-    if other != FREE:
+    other = before_landing(problem, tables, state, scratch, stop, False, w, x)
+    if other != CLEAR:
         return max(other, -1)
-    done = _accept(problem, tables, state, space, variable, stop, span, t_end, out, due, ledger)
+    done = _accept(problem, tables, state, scratch, variable, stop, span, t_end, out, due, with_energy)
     return stop if done else -1
 
 
 @inner
-def land_on_bend(problem, tables, state, space, stop, near, rtol, t_end, out, due, ledger):
+def land_on_bend(problem, tables, state, scratch, stop, near, rtol, t_end, out, due, with_energy):
     """Try to land on the bend of ``stop`` about ``near`` s ahead; whether it succeeded."""
-    furthest, largest = space.reach[0] / tables.fastest, space.sides[space.sides.size - 1]
+    furthest, largest = scratch.landing_reach[0] / tables.fastest, scratch.bend_values[scratch.bend_values.size - 1]
     if not 0.0 < near <= furthest:
         return False
-    start_landing(problem, tables, state, space, stop)
-    w, x, batch = space.work[START], space.work[LANDED], space.trial
+    start_landing(problem, tables, state, scratch, stop)
+    w, x, batch = scratch.stages[START], scratch.stages[LANDED], scratch.trial
     before, apart, span = 0.0, side_at(problem, tables, state, stop, w, batch), near
     if abs(apart) <= 1e-6 * largest:  # it begins on the bend, which is no second point for the next one
         before = 0.9 * near
-        _step(problem, tables, state, space, TIME, stop, before, ledger)
+        _step(problem, tables, state, scratch, TIME, stop, before, with_energy)
         apart = side_at(problem, tables, state, stop, x, batch)
     for _ in range(_MOST_TRIES):
-        _step(problem, tables, state, space, TIME, stop, span, ledger)
+        _step(problem, tables, state, scratch, TIME, stop, span, with_energy)
         value = side_at(problem, tables, state, stop, x, batch)
         if abs(value) <= 1e-10 * largest:
             break
@@ -273,11 +275,11 @@ def land_on_bend(problem, tables, state, space, stop, near, rtol, t_end, out, du
         if not 0.1 * near < following <= furthest or following == span:
             return False
         before, apart, span = span, value, following
-    if not (abs(value) <= 1e-6 * largest and _error(problem, space, _PART, rtol) <= 1.0):
+    if not (abs(value) <= 1e-6 * largest and _error(problem, scratch, _PART, rtol) <= 1.0):
         return False
-    if on_the_way(problem, tables, state, space, stop, True, w, x) != FREE:
+    if before_landing(problem, tables, state, scratch, stop, True, w, x) != CLEAR:
         return False
-    lower, upper = problem.levels[stop, state.piece[stop] - 1], problem.levels[stop, state.piece[stop]]
+    lower, upper = problem.knots[stop, state.segment[stop] - 1], problem.knots[stop, state.segment[stop]]
     if not lower < indentation(problem, stop, x) < upper:
         return False
-    return _accept(problem, tables, state, space, TIME, stop, span, t_end, out, due, ledger)
+    return _accept(problem, tables, state, scratch, TIME, stop, span, t_end, out, due, with_energy)

@@ -24,15 +24,29 @@ WIDE = 2 * S + 16  # of a row: ∫ L_i v dt for all nodes, then ∫ v v_row dt f
 
 
 @lru_cache(maxsize=16)
-def contact_table(stiffness: bytes, damping: bytes, steps: bytes, power: float, lead: float, places: bytes) -> Any:
+def contact_table(
+    stiffness: bytes, damping: bytes, steps: bytes, time_exponent: float, weight_exponent: float, places: bytes
+) -> Any:
     """(j, n, ROWS, WIDE) of one kind of steps, t = h σ^power, for blocks (k, c) and steps given as arrays' bytes."""
     k, c, h, nodes = (np.frombuffer(part) for part in (stiffness, damping, steps, places))
     apart = 1.0 / (nodes[:, None] - nodes + np.eye(len(nodes))).prod(axis=1)
-    weights = np.array([apart, apart * nodes ** (-lead)])
+    weights = np.array([apart, apart * nodes ** (-weight_exponent)])
     points = gauss(_POINTS)
     out = np.zeros((len(h), len(k), ROWS, WIDE))
-    space = np.zeros((_POINTS, ROWS)), np.zeros((_POINTS, S)), np.zeros((_POINTS, ROWS, 2)), np.zeros((ROWS, 2))
-    _fill(k.copy(), c.copy(), h.copy(), power, lead, nodes.copy(), weights, points, _so_far(points[0]), *space, out)
+    scratch = np.zeros((_POINTS, ROWS)), np.zeros((_POINTS, S)), np.zeros((_POINTS, ROWS, 2)), np.zeros((ROWS, 2))
+    _fill(
+        k.copy(),
+        c.copy(),
+        h.copy(),
+        time_exponent,
+        weight_exponent,
+        nodes.copy(),
+        weights,
+        points,
+        _so_far(points[0]),
+        *scratch,
+        out,
+    )
     return out
 
 
@@ -45,21 +59,34 @@ def _so_far(points: Any) -> Any:
 
 
 @kernel
-def _fill(k, c, h, power, lead, nodes, weights, points, so_far, velocity, basis, pushed, state, out):
+def _fill(k, c, h, time_exponent, weight_exponent, nodes, weights, points, so_far, velocity, basis, pushed, state, out):
     """All tables of a kind; the arguments between ``so_far`` and the result are working space."""
     for level in range(h.size):
         for b in range(k.size):
-            panels = 1 + int(power * (math.sqrt(k[b]) + c[b]) * h[level] / _PANEL)
+            panels = 1 + int(time_exponent * (math.sqrt(k[b]) + c[b]) * h[level] / _PANEL)
             for e in range(ROWS):
                 state[e, 0] = 1.0 if e == BEGIN else 0.0
                 state[e, 1] = 1.0 if e == BEGIN + 1 else 0.0
             for panel in range(panels):
                 begin, width = panel / panels, 1.0 / panels
-                _push(k[b], c[b], h[level], power, lead, nodes, weights, points, begin, width, basis, pushed)
-                _move(k[b], c[b], h[level], power, points, so_far, begin, width, pushed, state, velocity)
+                _push(
+                    k[b],
+                    c[b],
+                    h[level],
+                    time_exponent,
+                    weight_exponent,
+                    nodes,
+                    weights,
+                    points,
+                    begin,
+                    width,
+                    basis,
+                    pushed,
+                )
+                _move(k[b], c[b], h[level], time_exponent, points, so_far, begin, width, pushed, state, velocity)
                 for q in range(points.shape[1]):
                     sigma = begin + width * points[0, q]
-                    measure = points[1, q] * width * h[level] * power * sigma ** (power - 1.0)
+                    measure = points[1, q] * width * h[level] * time_exponent * sigma ** (time_exponent - 1.0)
                     _add_products(measure, basis[q], velocity[q], out[level, b])
 
 
@@ -74,14 +101,16 @@ def _moved(k, c, x, p, v):
 
 
 @inner
-def _push(k, c, h, power, lead, nodes, weights, points, begin, width, basis, pushed):
+def _push(k, c, h, time_exponent, weight_exponent, nodes, weights, points, begin, width, basis, pushed):
     """Unit forces at the points of a panel, per σ, as (p, v) moved back to the panel's begin."""
-    start = h * begin**power
+    start = h * begin**time_exponent
     for q in range(points.shape[1]):
         sigma = begin + width * points[0, q]
-        p, v = _moved(k, c, start - h * sigma**power, 0.0, width * h * power * sigma ** (power - 1.0))
+        p, v = _moved(
+            k, c, start - h * sigma**time_exponent, 0.0, width * h * time_exponent * sigma ** (time_exponent - 1.0)
+        )
         lagrange(nodes, weights[1], sigma, basis[q])
-        weight = sigma**lead if lead > 0.0 else 0.0
+        weight = sigma**weight_exponent if weight_exponent > 0.0 else 0.0
         for j in range(S):
             force = basis[q, j] * weight
             pushed[q, S + j, 0], pushed[q, S + j, 1] = force * p, force * v
@@ -91,12 +120,12 @@ def _push(k, c, h, power, lead, nodes, weights, points, begin, width, basis, pus
 
 
 @inner
-def _move(k, c, h, power, points, so_far, begin, width, pushed, state, velocity):
+def _move(k, c, h, time_exponent, points, so_far, begin, width, pushed, state, velocity):
     """Velocities at the points of a panel by the variation of constants; ``state`` goes on to its end."""
-    count, start = points.shape[1], h * begin**power
+    count, start = points.shape[1], h * begin**time_exponent
     for q in range(count + 1):
         end = begin + width * points[0, q] if q < count else begin + width
-        span = h * end**power - start
+        span = h * end**time_exponent - start
         for e in range(ROWS):
             p, v = state[e, 0], state[e, 1]
             for r in range(count if e < BEGIN else 0):

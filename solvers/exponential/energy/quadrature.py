@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from solvers.compiled.kernels import copy, dot, inlined, inner, reordered, table_value
-from solvers.compiled.state import T, touching
+from solvers.compiled.state import T, in_contact
 from solvers.exponential.contact.node_response import PLAIN, PRODUCTS, WEIGHTED, WITHIN
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.flight import energy_norms
@@ -47,7 +47,7 @@ def _between(products, scales, values):
 @inner
 def powers(problem, tables, t, x):
     """Power of the loads and of the damping at time t, W."""
-    size, gain, loss, own = 2 * problem.k.size, 0.0, 0.0, int(tables.own)
+    size, gain, loss, own = 2 * problem.k.size, 0.0, 0.0, int(tables.own_blocks)
     for load in range(tables.power_rows.shape[0] if own < problem.k.size else 0):
         gain += dot(tables.signal_rows[load], x, size) * dot(tables.power_rows[load], x, size)
     for j in range(problem.table_dt.size):
@@ -73,34 +73,34 @@ def _plain_loss(n, own, rows, x):
 
 
 @inner
-def inside(problem, tables, state, space, family, h, span, row):
+def state_within(problem, tables, state, scratch, node_set, h, span, row):
     """State at ``span`` after the start of a step of length h, by quadrature of its forces; ``row`` holds the start."""
     stops, n = problem.gap.size, problem.k.size
-    power, lead = tables.power[family], tables.lead[family]  # t = h σ^power
+    time_exponent, weight_exponent = tables.time_exponent[node_set], tables.weight_exponent[node_set]  # t = h σ^power
     for b in range(n):
         alpha, beta = propagate(problem.k[b], problem.c[b], span)
         p, v = row[b], row[n + b]
         row[b] = alpha * p + beta * v
         row[n + b] = alpha * v - beta * (problem.k[b] * p + problem.c[b] * v)
-    if problem.table_dt.size == 0 and not touching(state):
+    if problem.table_dt.size == 0 and not in_contact(state):
         return
-    nodes, work = tables.nodes[family], space.work
+    nodes, work = tables.nodes[node_set], scratch.stages
     plain, weighted, products = work[PLAIN], work[WEIGHTED], work[PRODUCTS]
-    _scales(nodes, lead, plain, weighted)
-    end = (span / h) ** (1.0 / power)
+    _scales(nodes, weight_exponent, plain, weighted)
+    end = (span / h) ** (1.0 / time_exponent)
     panels = 1 + int(tables.fastest * span / 4.0)
     for g in range(panels * S):
         sigma = end * (g // S + tables.nodes[0, g % S]) / panels
-        time = h * sigma**power
-        measure = end * tables.weights[0, g % S] / panels * h * power * sigma ** (power - 1.0)
+        time = h * sigma**time_exponent
+        measure = end * tables.weights[0, g % S] / panels * h * time_exponent * sigma ** (time_exponent - 1.0)
         _products(nodes, sigma, products)
         for u in range(stops + problem.load.shape[0]):
-            if u < stops and state.piece[u] == 0:
+            if u < stops and state.segment[u] == 0:
                 continue
-            if lead > 0.0 and u == family - 1:
-                impulse = measure * sigma**lead * _between(products, weighted, space.force[u])
+            if weight_exponent > 0.0 and u == node_set - 1:
+                impulse = measure * sigma**weight_exponent * _between(products, weighted, scratch.force[u])
             else:
-                impulse = measure * _between(products, plain, space.force[u])
+                impulse = measure * _between(products, plain, scratch.force[u])
             push = problem.push[u] if u < stops else problem.load[u - stops]
             for b in range(n):
                 alpha, beta = propagate(problem.k[b], problem.c[b], span - time)
@@ -108,14 +108,14 @@ def inside(problem, tables, state, space, family, h, span, row):
                 row[b] += alpha * p + beta * v
                 row[n + b] += alpha * v - beta * (problem.k[b] * p + problem.c[b] * v)
             if u < stops:
-                row[2 * n + 2 + 2 * u] += impulse * _between(products, plain, space.motion[u, 1])
+                row[2 * n + 2 + 2 * u] += impulse * _between(products, plain, scratch.motion[u, 1])
                 row[2 * n + 3 + 2 * u] += impulse
 
 
 @inner
-def energetic(problem, tables, norms):
+def fastest_moving(problem, tables, norms):
     """Fastest block that carries more than 1e-12 of the energy, or tone, rad/s."""
-    total, fastest, own = 0.0, 1e-3, int(tables.own)
+    total, fastest, own = 0.0, 1e-3, int(tables.own_blocks)
     for b in range(own):
         total += norms[b] ** 2
     for b in range(problem.k.size):
@@ -125,21 +125,21 @@ def energetic(problem, tables, norms):
 
 
 @inner
-def account(problem, tables, state, space, family, h, length, x, row):
+def account_by_quadrature(problem, tables, state, scratch, node_set, h, length, x, row):
     """Add to the ledger of ``row`` what loads and damping do over ``length`` of a step of length h from ``x`` on.
 
     Gauss's rule in parts of 3 radians of the fastest block that moves at the begin or the end of the step.
     """
-    size, inner = 2 * problem.k.size, space.work[WITHIN]
-    energy_norms(problem, x, space.norms)
-    fastest = energetic(problem, tables, space.norms)
-    energy_norms(problem, space.x_new, space.norms)
-    parts = 1 + int(max(fastest, energetic(problem, tables, space.norms)) * length / 3.0)
+    size, inner = 2 * problem.k.size, scratch.stages[WITHIN]
+    energy_norms(problem, x, scratch.norms)
+    fastest = fastest_moving(problem, tables, scratch.norms)
+    energy_norms(problem, scratch.x_new, scratch.norms)
+    parts = 1 + int(max(fastest, fastest_moving(problem, tables, scratch.norms)) * length / 3.0)
     for i in range(tables.gauss.shape[1] * parts):
         place, weight = tables.gauss[0, i % 8], tables.gauss[1, i % 8]
         span = length * (i // 8 + place) / parts
         copy(x, inner, x.size)
-        inside(problem, tables, state, space, family, h, span, inner)
+        state_within(problem, tables, state, scratch, node_set, h, span, inner)
         gain, loss = powers(problem, tables, state.now[T] + span, inner)
         row[size] += length / parts * weight * gain
         row[size + 1] += length / parts * weight * loss

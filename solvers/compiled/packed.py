@@ -1,7 +1,7 @@
 """Named tuples of arrays handed to compiled code as one address.
 
 Unboxing a tuple of arrays costs 0.15 µs per array and call, and passing it to a compiled function copies all its
-descriptors. A `Handle` is a pointer to the descriptors, written once: its attributes are those of the tuple, and what
+descriptors. A `PackedType` is a pointer to the descriptors, written once: its attributes are those of the tuple, and what
 a kernel does not use it does not load.
 """
 
@@ -23,7 +23,7 @@ from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, mod
 _META = [0, 0]  # owner and parent of an array: nobody, the tuple is kept alive by Python
 
 
-class Handle(types.Type):
+class PackedType(types.Type):
     """Pointer to the descriptors of a named tuple's arrays."""
 
     def __init__(self, kind: types.NamedTuple) -> None:
@@ -31,25 +31,25 @@ class Handle(types.Type):
         super().__init__(name=f"Handle({kind.instance_class.__name__})")
 
 
-register_model(Handle)(models.OpaqueModel)
+register_model(PackedType)(models.OpaqueModel)
 
 
 @infer_getattr
 class _Attributes(AttributeTemplate):
     """Types of the attributes: those of the tuple."""
 
-    key = Handle
+    key = PackedType
 
-    def generic_resolve(self, handle: Handle, name: str) -> Any:
-        fields = handle.kind.fields
-        return handle.kind.types[fields.index(name)] if name in fields else None
+    def generic_resolve(self, packed: PackedType, name: str) -> Any:
+        fields = packed.kind.fields
+        return packed.kind.types[fields.index(name)] if name in fields else None
 
 
-@lower_getattr_generic(Handle)
-def _attribute(context, builder, handle, value, name):
+@lower_getattr_generic(PackedType)
+def _attribute(context, builder, packed, value, name):
     """Load one array's descriptor, marked as what never changes, so that loops need not look again."""
-    index = handle.kind.fields.index(name)
-    place = builder.bitcast(value, context.get_value_type(handle.kind).as_pointer())
+    index = packed.kind.fields.index(name)
+    place = builder.bitcast(value, context.get_value_type(packed.kind).as_pointer())
     loaded = builder.load(builder.gep(place, [ir.IntType(32)(0), ir.IntType(32)(index)]))
     loaded.set_metadata("tbaa", _constant(builder.module))
     return loaded
@@ -63,17 +63,17 @@ def _constant(module):
     return module.add_metadata([kind, kind, long(0), long(1)])
 
 
-def opener(kind: types.NamedTuple) -> Any:
+def unpacker(kind: types.NamedTuple) -> Any:
     """The compiled function that turns an address into a handle."""
 
     @intrinsic
-    def handle(typingctx, address):
+    def packed(typingctx, address):
         def codegen(context, builder, signature, arguments):
             return builder.inttoptr(arguments[0], context.get_value_type(signature.return_type))
 
-        return Handle(kind)(types.int64), codegen
+        return PackedType(kind)(types.int64), codegen
 
-    return handle
+    return packed
 
 
 _EXPECTED: dict[type, list[tuple[Any, int, Any]]] = {}  # by class: hashing a type of so many arrays takes long
@@ -119,8 +119,8 @@ class Packed:
         self.address = address_of(self.block)
 
 
-class Cast(NamedTuple):
-    """What a `Mould` makes: a packed named tuple."""
+class PackedCopy(NamedTuple):
+    """What a `PackedTemplate` makes: a packed named tuple."""
 
     value: Any
     block: Any  # its own arrays, then the descriptors
@@ -132,7 +132,7 @@ class Cast(NamedTuple):
         return int(self.block.nbytes)
 
 
-class Mould:
+class PackedTemplate:
     """A named tuple to be packed again and again: the arrays named are every cast's own, all casts share the others."""
 
     def __init__(self, value: Any, kind: types.NamedTuple, own: Sequence[str]) -> None:
@@ -150,7 +150,7 @@ class Mould:
         words = np.array([*chain(*described)], dtype=np.int64)
         self.block = np.concatenate([*(array.ravel() for array in arrays), words.view(float)])
 
-    def cast(self, **numbers: float) -> Cast:
+    def copy(self, **numbers: float) -> PackedCopy:
         """A new one, to write into its own arrays, with some plain numbers of its own."""
         block = self.block.copy()
         address = address_of(block)
@@ -158,7 +158,7 @@ class Mould:
         for name, number in numbers.items():
             block[self.size + self.begins[name]] = number
         arrays = {name: block[place].reshape(shape) for name, place, shape in self.slices}
-        return Cast(self.value._replace(**arrays, **numbers), block, address + 8 * self.size)
+        return PackedCopy(self.value._replace(**arrays, **numbers), block, address + 8 * self.size)
 
 
 def _descriptor(shape: tuple[int, ...], data: int) -> list[int]:
@@ -209,7 +209,7 @@ class Layout:
         part = block[place] if kind == "float64" else block[place].view(kind)
         return part if len(shape) == 1 else part.reshape(shape)
 
-    def exchange(self, block: Any, i: int, j: int, array: Any) -> None:
+    def replace_array(self, block: Any, i: int, j: int, array: Any) -> None:
         """Let the j-th array of the i-th tuple be another one, of the same kind, which somebody must keep alive."""
         words = _descriptor(array.shape, address_of(array))
         begin = self.size + self.descriptors[i][j]

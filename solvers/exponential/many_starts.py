@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from solvers.compiled.handles import opener
 from solvers.compiled.kernels import INTEGERS, MATRIX, PROBLEM, REAL, VECTOR, entry, inner
+from solvers.compiled.packed import unpacker
 from solvers.compiled.state import (
     DIVERGED,
     DONE,
@@ -26,10 +26,10 @@ from solvers.compiled.state import (
     STEPS,
     T,
 )
-from solvers.exponential.energy.flight_tables import NO_BOOKS
-from solvers.exponential.energy.guard import ALLOWED, FACTOR, FIRST, LAST, too_much, unknown
+from solvers.exponential.energy.check import ALLOWED, FACTOR, FIRST, LAST, has_gained, tolerated_energy
+from solvers.exponential.energy.flight_tables import NO_ENERGY_TABLES
 from solvers.exponential.method import Engine, advance
-from solvers.exponential.preparation import SPACE
+from solvers.exponential.preparation import SCRATCH
 from solvers.problem import COLUMNS, Array, ContactLog, Status
 
 NEXT, BEYOND, BEGUN = range(3)  # places in a cursor: the start at work, the end of its stretch, whether it is under way
@@ -41,10 +41,10 @@ _STOP, _DELTA, _FORCE = (
 _CUBE = types.Array(REAL, 3, "C")
 _RUN = types.FunctionType(advance.nopython_signatures[0])
 _NEVER, _NOWHERE = np.array([np.inf]), np.empty((0, 0))
-_problem, _state, _space = opener(PROBLEM), opener(STATE), opener(SPACE)
+_problem, _state, _scratch = unpacker(PROBLEM), unpacker(STATE), unpacker(SCRATCH)
 
 
-class Ends(NamedTuple):
+class Outcomes(NamedTuple):
     """What becomes of k starts."""
 
     x: Any  # (k, 2N) states of all blocks
@@ -53,7 +53,7 @@ class Ends(NamedTuple):
     peak: Any  # (k, m, 2) largest indentation and force
 
     @classmethod
-    def of(cls, starts: int, width: int, stops: int) -> Ends:
+    def of(cls, starts: int, width: int, stops: int) -> Outcomes:
         """Of starts that have not begun."""
         count = np.zeros((starts, 2), dtype=np.int64)
         count[:, CODE] = STATUSES.index(Status.INTERRUPTED)
@@ -81,7 +81,7 @@ def _begin(problem, state, numbers, rest, start):
 
 
 @inner
-def _end(problem, state, space, code, x, count, number, peak):
+def _end(problem, state, scratch, code, x, count, number, peak):
     """The outcome of a run that is over."""
     finite = True
     for e in range(x.size):
@@ -89,12 +89,12 @@ def _end(problem, state, space, code, x, count, number, peak):
     for value in state.x:
         finite &= np.isfinite(value)
     for s in range(problem.gap.size):
-        if state.piece[s] > 0:
-            _note(s, state.open[s, PEAK_DELTA], state.open[s, PEAK_FORCE], count, number, peak)
+        if state.segment[s] > 0:
+            _note(s, state.active[s, PEAK_DELTA], state.active[s, PEAK_FORCE], count, number, peak)
     count[CODE] = DIVERGED if code == DONE and not finite else code
     number[REACHED] = state.now[T]
     for i in range(3):
-        number[ENERGY + i] = space.energy[i]
+        number[ENERGY + i] = scratch.energy[i]
 
 
 @entry(
@@ -104,15 +104,15 @@ def _end(problem, state, space, code, x, count, number, peak):
     )
 )
 def advance_many(
-    run, problem_at, tables_at, state_at, space_at, books_at, numbers, rest, starts, cursor, t_end, budget, rtol, reach,
+    run, problem_at, tables_at, state_at, scratch_at, energy_tables_at, numbers, rest, starts, cursor, t_end, budget, rtol, landing_reach,
     log, out, due, x, count, number, peak,
 ):  # fmt: skip
     """Take the starts of a stretch to ``t_end`` one after the other, for about ``budget`` steps of them all.
 
     ``run`` is `method.advance`; ``numbers`` is a workspace's memory and ``rest`` what it holds before a start is added.
-    The last four are the arrays of `Ends`.
+    The last four are the arrays of `Outcomes`.
     """
-    problem, state, space = _problem(problem_at), _state(state_at), _space(space_at)
+    problem, state, scratch = _problem(problem_at), _state(state_at), _scratch(scratch_at)
     spent = 0
     while cursor[NEXT] < cursor[BEYOND] and spent < budget:
         i = cursor[NEXT]
@@ -121,29 +121,37 @@ def advance_many(
             cursor[BEGUN] = 1
         spent -= state.count[STEPS] + state.count[REJECTED]
         code = run(
-            problem_at, tables_at, state_at, space_at, books_at, t_end, budget, rtol, reach, log, out, due
+            problem_at, tables_at, state_at, scratch_at, energy_tables_at, t_end, budget, rtol, landing_reach, log, out, due
         )  # fmt: skip
         spent += state.count[STEPS] + state.count[REJECTED] + 1
         for row in range(state.count[LOGGED]):
             _note(np.int64(log[row, _STOP]), log[row, _DELTA], log[row, _FORCE], count[i], number[i], peak[i])
         state.count[LOGGED] = 0
         if code != RUNNING and code != LOG_FULL:
-            _end(problem, state, space, code, x[i], count[i], number[i], peak[i])
+            _end(problem, state, scratch, code, x[i], count[i], number[i], peak[i])
             cursor[NEXT], cursor[BEGUN] = i + 1, 0
 
 
 class Worker:
     """An engine that takes stretches of the starts to their ends; each thread has one of its own."""
 
-    def __init__(self, engine: Engine, starts: Array, ends: Ends, budget: int) -> None:
+    def __init__(self, engine: Engine, starts: Array, outcomes: Outcomes, budget: int) -> None:
         self.engine, self.cursor = engine, np.zeros(3, dtype=np.int64)
         workspace, log = engine.workspace, np.empty((max(256, 2 * len(engine.problem.gap)), COLUMNS))
         self.arguments = (
-            *(advance, *engine.addresses, NO_BOOKS.address, workspace.numbers, workspace.rest, starts, self.cursor),
-            *(engine.duration, budget, engine.method.rtol, engine.reach, log, _NOWHERE, _NEVER, *ends),
+            *(
+                advance,
+                *engine.addresses,
+                NO_ENERGY_TABLES.address,
+                workspace.numbers,
+                workspace.rest,
+                starts,
+                self.cursor,
+            ),
+            *(engine.duration, budget, engine.method.rtol, engine.landing_reach, log, _NOWHERE, _NEVER, *outcomes),
         )
 
-    def take(self, first: int, beyond: int) -> None:
+    def assign(self, first: int, beyond: int) -> None:
         """Make these starts the stretch to work at."""
         self.cursor[:] = first, beyond, 0
 
@@ -153,13 +161,13 @@ class Worker:
         return bool(self.cursor[NEXT] == self.cursor[BEYOND])
 
 
-def judged(engine: Engine, ends: Ends) -> Any:
+def final_statuses(engine: Engine, outcomes: Outcomes) -> Any:
     """(k,) `Status` of every start: that of its run, unless it ends with more energy than it can have been given."""
-    status = np.array(STATUSES, dtype=object)[ends.count[:, CODE]]
-    energy = ends.number[:, ENERGY:]
-    slack = unknown(1.0, np.zeros(1), engine.method.rtol) * (energy[:, FIRST] + ends.number[:, EXCHANGED])
-    much = (ends.count[:, CODE] == DONE) & (energy[:, LAST] > FACTOR * (energy[:, ALLOWED] + slack))
+    status = np.array(STATUSES, dtype=object)[outcomes.count[:, CODE]]
+    energy = outcomes.number[:, ENERGY:]
+    slack = tolerated_energy(1.0, np.zeros(1), engine.method.rtol) * (energy[:, FIRST] + outcomes.number[:, EXCHANGED])
+    much = (outcomes.count[:, CODE] == DONE) & (energy[:, LAST] > FACTOR * (energy[:, ALLOWED] + slack))
     for i in np.flatnonzero(much):
-        if too_much(engine.system, energy[i], engine.problem, engine.duration, slack[i]):
+        if has_gained(engine.system, energy[i], engine.problem, engine.duration, slack[i]):
             status[i] = Status.UNBALANCED
     return status

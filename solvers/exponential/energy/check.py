@@ -33,26 +33,26 @@ FIRST, LAST, ALLOWED = range(3)  # places in Space.energy
 def own_energy(problem, tables, x):
     """Energy of the motion less the steady response to tones."""
     n, energy = problem.k.size, 0.0
-    for b in range(int(tables.own)):
+    for b in range(int(tables.own_blocks)):
         energy += 0.5 * (x[n + b] * x[n + b] + problem.k[b] * x[b] * x[b])
     return energy
 
 
 @inner
-def note_energy(problem, tables, state, space):
+def note_energy(problem, tables, state, scratch):
     """At the end of a run: its energy, and what it may be without sampled loads."""
     n = problem.k.size
-    allowed = space.energy[FIRST]
+    allowed = scratch.energy[FIRST]
     for s in range(problem.gap.size):
         steady = 0.0
-        for b in range(int(tables.own), n):
+        for b in range(int(tables.own_blocks), n):
             steady += np.hypot(problem.read_rate[s, b], problem.read_rate[s, n + b] * np.sqrt(problem.k[b]))
         work, impulse = state.x[2 * n + 2 + 2 * s], state.x[2 * n + 3 + 2 * s]
         allowed += 2.0 * steady * abs(impulse) - work
-    space.energy[LAST], space.energy[ALLOWED] = own_energy(problem, tables, state.x), max(allowed, 0.0)
+    scratch.energy[LAST], scratch.energy[ALLOWED] = own_energy(problem, tables, state.x), max(allowed, 0.0)
 
 
-def unknown(handled: float, exchanged: Array, rtol: float) -> float:
+def tolerated_energy(handled: float, exchanged: Array, rtol: float) -> float:
     """Energy, J, that a run need not account for.
 
     ``exchanged`` (k,) : peak force times peak indentation of every contact.
@@ -60,7 +60,7 @@ def unknown(handled: float, exchanged: Array, rtol: float) -> float:
     return (MULTIPLE * rtol + ROUNDING) * float(handled + np.abs(exchanged).sum())
 
 
-def too_much(system: System, energy: Any, sampled: Any, duration: float, slack: float) -> bool:
+def has_gained(system: System, energy: Any, sampled: Any, duration: float, slack: float) -> bool:
     """Whether a run without ledger ends with more energy than it can have been given; ``sampled`` are its loads."""
     _, last, allowed = energy.tolist()
     allowed += slack
@@ -76,8 +76,8 @@ def too_much(system: System, energy: Any, sampled: Any, duration: float, slack: 
 
 
 def unbalanced(system: System, powers: Array, motion: Array, begin: Array, exchanged: Array, rtol: float) -> bool:
-    """Whether the ledger of a run (rows of powers and motion at its samples) does not balance; see `unknown`."""
+    """Whether the ledger of a run (rows of powers and motion at its samples) does not balance; see `tolerated_energy`."""
     rows = np.unique(np.linspace(0, len(powers) - 1, _SAMPLES).astype(int))
-    ledger = Energy.of_run(system.M, system.K, powers[rows], motion[rows], begin)
-    parts = ledger.initial, *(np.abs(part).max() for part in (ledger.stored, ledger.input, ledger.damping))
-    return not np.abs(ledger.residual).max() <= unknown(sum(parts), exchanged, rtol)
+    balance = Energy.of_run(system.M, system.K, powers[rows], motion[rows], begin)
+    parts = balance.initial, *(np.abs(part).max() for part in (balance.stored, balance.input, balance.damping))
+    return not np.abs(balance.residual).max() <= tolerated_energy(sum(parts), exchanged, rtol)

@@ -1,0 +1,309 @@
+"""The energy ledger step by step: whole steps by the forms of `flight_tables`, parts of steps by series.
+
+Within a part the state is the Taylor series of its differential equation in panels of `SERIES_REACH` radians of the
+fastest block, and the powers are summed by Gauss's rule with five points, 2e-12 off at most.
+
+A flight is booked from a *mark* on, its begin, the last output, or with sampled signals the last cell's begin: whatever
+steps it takes, a form of its own then holds most of what it does.
+"""
+
+from __future__ import annotations
+
+import math
+
+from solvers.compiled.kernels import copy, dot, inlined, inner, reordered
+from solvers.compiled.simd import load8, splat8, store8, sum8
+from solvers.compiled.state import T
+from solvers.compiled.sums import combine
+from solvers.exponential.contact.nodes import S
+from solvers.exponential.energy.contact_tables import BEGIN
+from solvers.exponential.energy.quadrature import account_by_quadrature, powers
+from solvers.exponential.flight import (
+    SERIES_REACH,
+    SERIES_TERMS,
+    add_signals,
+    level_within,
+    propagate_blocks,
+    signal_derivatives,
+)
+
+_TERM_SUM, _MOVING, _MARK = 9, 10, 11  # rows of Space.work; those before hold a load on the blocks and its derivatives
+_EXACT = 1e-17  # share of the last term of a series
+
+
+@reordered
+def _own_loss(plain, x, n):
+    """Damping of blocks by themselves."""
+    loss, blocks = 0.0, plain.shape[1]
+    for b in range(blocks):
+        p, v = x[b], x[n + b]
+        loss += plain[0, b] * p * p + plain[1, b] * p * v + plain[2, b] * v * v
+    return loss
+
+
+@inner
+def start_account(problem, state, scratch):
+    """Note the state from which `account_until` shall book a flight; its ledger is complete."""
+    copy(state.x, scratch.stages[_MARK], 2 * problem.k.size)
+    scratch.stages[_MARK, 2 * problem.k.size] = state.now[T]
+
+
+@inner
+def account_until(problem, tables, energy_tables, scratch, t, row):
+    """Add to the ledger of ``row`` what a flight does from the mark to t, within a cell, whatever steps it takes."""
+    x, size = scratch.stages[_MOVING], 2 * problem.k.size
+    copy(scratch.stages[_MARK], x, size)
+    begin = scratch.stages[_MARK, size]
+    span, level = t - begin, tables.flight_step.size
+    if energy_tables.closed > 0.0 and abs(span - energy_tables.spacing) <= _rounding(problem, energy_tables, t):
+        _derive(problem, scratch, begin)
+        _account_forms(problem, energy_tables, scratch, level, x, row)
+        return
+    while energy_tables.closed > 0.0 and tables.fastest * span > SERIES_REACH:
+        level = level_within(tables, span)
+        _derive(problem, scratch, begin)
+        _account_forms(problem, energy_tables, scratch, level, x, row)
+        propagate_blocks(problem, tables.flight_propagator[level, 0], tables.flight_propagator[level, 1], x)
+        if problem.table_dt.size:
+            add_signals(problem, tables.signal[level], x, begin, scratch.signal_terms)
+        begin, span = begin + tables.flight_step[level], span - tables.flight_step[level]
+    if span > 0.0:
+        _account_series(problem, tables, energy_tables, scratch, begin, span, x, row)
+
+
+@inner
+def account_output(problem, tables, energy_tables, state, scratch, t, row):
+    """Complete the ledger of an output at t; without sampled signals the flight is booked on from there."""
+    size = 2 * problem.k.size
+    copy(state.x[size:], row[size:], 2)
+    account_until(problem, tables, energy_tables, scratch, t, row)
+    if problem.table_dt.size == 0:
+        copy(row[size:], state.x[size:], 2)
+        copy(row, scratch.stages[_MARK], size)
+        scratch.stages[_MARK, size] = t
+
+
+@inner
+def account_state(problem, tables, energy_tables, state, scratch):
+    """Complete the ledger of the state, from which the flight is booked on."""
+    account_until(problem, tables, energy_tables, scratch, state.now[T], state.x)
+    start_account(problem, state, scratch)
+
+
+@inlined
+def _rounding(problem, energy_tables, t):
+    """By which the time between two outputs, or two cells' ends, may differ from the step in the tables."""
+    return 1e-7 * energy_tables.spacing if problem.table_dt.size else 4e-16 * t
+
+
+@inner
+def _derive(problem, scratch, t):
+    """Derivatives of the sampled signals at t, into ``scratch.signal_terms``."""
+    for j in range(problem.table_dt.size):
+        signal_derivatives(problem, j, t, scratch.signal_terms[j])
+
+
+@inner
+def _account_forms(problem, energy_tables, scratch, level, x, row):
+    """The same by the forms of a step, from the signals' derivatives in ``scratch.signal_terms``."""
+    n, driven, given = problem.k.size, energy_tables.driver.size, scratch.energy_sums[0]
+    signals = 6 * problem.table_dt.size
+    for i in range(driven):
+        given[i] = x[energy_tables.driver[i]]
+    for i in range(signals):
+        given[driven + i] = scratch.signal_terms[i // 6, i % 6]
+    sums = scratch.terms
+    combine(energy_tables.rows[level], given, driven + signals, None, sums)
+    gain, loss = dot(sums[0], x, 2 * n), dot(sums[1], x, 2 * n) + _own_loss(energy_tables.plain[level], x, n)
+    if signals:
+        sums, given, half = scratch.energy_sums[1], given[driven:], energy_tables.pairs.shape[2] // 2
+        combine(energy_tables.pairs[level], given, signals, None, sums)
+        gain += dot(sums, given, signals)
+        loss += dot(sums[half:], given, signals)
+    row[2 * n] += gain
+    row[2 * n + 1] += loss
+
+
+@inner
+def _account_series(problem, tables, energy_tables, scratch, t, span, x, row):
+    """The same by series for a part of a cell from x at t on; x moves."""
+    panels, size = max(1, math.ceil(tables.fastest * span / SERIES_REACH - 1e-9)), 2 * problem.k.size
+    for i in range(panels):
+        _clear(scratch, size)
+        _derive(problem, scratch, t + i * span / panels)
+        for j in range(problem.table_dt.size):
+            load = problem.load[problem.table_load[j]]
+            for order in range(scratch.signal_terms.shape[1]):
+                for e in range(size):
+                    scratch.stages[order, e] += load[e] * scratch.signal_terms[j, order]
+        _account_panel(
+            problem, tables, energy_tables, scratch, t + i * span / panels, span / panels, x, row, i + 1 < panels
+        )
+
+
+@inner
+def _clear(scratch, size):
+    """No load on the blocks."""
+    for order in range(S):
+        for e in range(size):
+            scratch.stages[order, e] = 0.0
+
+
+@inner
+def _account_panel(problem, tables, energy_tables, scratch, t, span, x, row, further):
+    """Add work and damping under the load in ``scratch.stages`` to the ledger of ``row``; x moves if told to go further.
+
+    Term i of the series is span^i times a derivative.
+    """
+    n, terms, z = problem.k.size, scratch.terms, scratch.stages[_TERM_SUM]
+    copy(x, terms[0], 2 * n)
+    count, size, power = 1, 1.0, span
+    while count < SERIES_TERMS and (count <= S or size > _EXACT):
+        i, count = count - 1, count + 1
+        size *= tables.fastest * span / (i + 1.0)
+        for b in range(n):
+            p, v = terms[i, b], terms[i, n + b]
+            terms[i + 1, b], terms[i + 1, n + b] = span * v, -span * (problem.k[b] * p + problem.c[b] * v)
+        if i < S:
+            for e in range(2 * n):
+                terms[i + 1, e] += power * scratch.stages[i, e]
+            power *= span
+    points = energy_tables.gauss.shape[1]
+    for q in range(points):
+        combine(terms, energy_tables.series[q], count, None, z)
+        gain, loss = powers(problem, tables, t + span * energy_tables.gauss[0, q], z)
+        row[2 * n] += span * energy_tables.gauss[1, q] * gain
+        row[2 * n + 1] += span * energy_tables.gauss[1, q] * loss
+    if further:
+        combine(terms, energy_tables.series[points], count, None, z)
+        copy(z, x, 2 * n)
+
+
+@inner
+def account_contact(problem, tables, energy_tables, state, scratch, node_set, level, span, row):
+    """Add to the ledger of ``row`` what loads and damping do over ``span`` of the contact step just found."""
+    h = tables.contact_step[level]
+    if span == h and level >= energy_tables.first and h <= energy_tables.longest[energy_tables.kind[node_set]]:
+        _account_nodes(
+            problem, tables, energy_tables, state, scratch, node_set, level - int(energy_tables.first), h, row
+        )
+    elif node_set == 0:
+        _account_part(problem, tables, energy_tables, state, scratch, h, span, row)
+    else:
+        account_by_quadrature(problem, tables, state, scratch, node_set, h, span, state.x, row)
+
+
+@inner
+def _account_part(problem, tables, energy_tables, state, scratch, h, span, row):
+    """The same on a part of a smooth step, whose forces are polynomials of time, by series."""
+    panels, size = max(1, math.ceil(tables.fastest * span / SERIES_REACH - 1e-9)), 2 * problem.k.size
+    x = scratch.stages[_MOVING]
+    copy(state.x, x, size)
+    for i in range(panels):
+        begin = i * span / panels
+        _clear(scratch, size)
+        for u in range(scratch.force.shape[0]):
+            if u >= problem.gap.size or state.segment[u] > 0:
+                push = problem.push[u] if u < problem.gap.size else problem.load[u - problem.gap.size]
+                _add_force(energy_tables, scratch, scratch.force[u], push, h, begin / h, size)
+        _account_panel(
+            problem, tables, energy_tables, scratch, state.now[T] + begin, span / panels, x, row, i + 1 < panels
+        )
+
+
+@inner
+def _add_force(energy_tables, scratch, force, push, h, place, size):
+    """Derivatives at a place in (0, 1) of a force known at a smooth step's nodes, times its push, to the load."""
+    powers = scratch.energy_sums[0]
+    for i in range(S):
+        powers[i] = dot(energy_tables.monomials[i], force, S)
+    for i in range(S):  # Horner's scheme moves the polynomial to the place
+        for m in range(S - 2, i - 1, -1):
+            powers[m] += place * powers[m + 1]
+    factor = 1.0
+    for i in range(S):
+        for e in range(size):
+            scratch.stages[i, e] += factor * powers[i] * push[e]
+        factor *= (i + 1.0) / h
+
+
+@inner
+def _steady_nodes(problem, tables, energy_tables, state, scratch, kind, place, h, weights):
+    """Signals at the nodes into ``scratch.energy_sums``, p and v of the tones into ``scratch.terms``; work on steady motion."""
+    n, size, gain = int(tables.own_blocks), problem.k.size, 0.0
+    for k in range(size - n):
+        alpha, beta = (
+            load8(energy_tables.steady[kind, place, k, 0], 0),
+            load8(energy_tables.steady[kind, place, k, 1], 0),
+        )
+        p, v = splat8(state.x[n + k]), splat8(state.x[size + n + k])
+        store8(scratch.terms, 2 * S * k, alpha * p + beta * v)
+        store8(scratch.terms, 2 * S * k + S, alpha * v - beta * splat8(problem.k[n + k]) * p)
+    for load in range(tables.power_rows.shape[0]):
+        signal, power = load8(scratch.force[problem.gap.size + load], 0), splat8(0.0)
+        signal += _of_tones(tables.signal_rows[load], scratch, n, size)
+        power += _of_tones(tables.power_rows[load], scratch, n, size)
+        store8(scratch.energy_sums[2 + load], 0, signal)
+        gain += h * sum8(load8(weights, 0) * signal * power)
+    return gain
+
+
+@inner
+def _of_tones(row, scratch, n, size):
+    """A row's sum over the tones at the nodes."""
+    values = splat8(0.0)
+    for k in range(size - n):
+        values += splat8(row[n + k]) * load8(scratch.terms, 2 * S * k)
+        values += splat8(row[size + n + k]) * load8(scratch.terms, 2 * S * k + S)
+    return values
+
+
+@inner
+def _block_forces(problem, tables, state, scratch, node_set, b, y):
+    """Forces on a block at the nodes, plain ones and that of the stop that enters, then its state, into y; signals."""
+    size, signal, plain, entering = problem.k.size, splat8(0.0), splat8(0.0), splat8(0.0)
+    for u in range(problem.gap.size):
+        if state.segment[u] > 0:
+            force = splat8(problem.push[u, size + b]) * load8(scratch.force[u], 0)
+            if u == node_set - 1 and tables.weight_exponent[node_set] > 0.0:
+                entering += force
+            else:
+                plain += force
+    for load in range(tables.power_rows.shape[0]):
+        plain += splat8(problem.load[load, size + b]) * load8(scratch.force[problem.gap.size + load], 0)
+        signal += splat8(tables.power_rows[load, size + b]) * load8(scratch.energy_sums[2 + load], 0)
+    store8(y, 0, plain)
+    store8(y, S, entering)
+    y[BEGIN], y[BEGIN + 1] = state.x[b], state.x[size + b]
+    return signal
+
+
+@inner
+def _account_nodes(problem, tables, energy_tables, state, scratch, node_set, place, h, row):
+    """The same for a whole step by its tables."""
+    n, size, kind, weights = (
+        int(tables.own_blocks),
+        problem.k.size,
+        energy_tables.kind[node_set],
+        tables.plain[node_set],
+    )
+    y, sums, loss = scratch.energy_sums[0], scratch.energy_sums[1], 0.0
+    store8(y, BEGIN, splat8(0.0))
+    gain = _steady_nodes(problem, tables, energy_tables, state, scratch, kind, place, h, weights)
+    for b in range(n):
+        signal = _block_forces(problem, tables, state, scratch, node_set, b, y)
+        table = energy_tables.contact[kind, place, b]
+        combine(table, y, S, None, sums)
+        if tables.weight_exponent[node_set] > 0.0:
+            combine(table[S:], y[S:], S, sums, sums)
+        combine(table[BEGIN:], y[BEGIN:], 2, sums, sums)
+        moments = load8(sums, 0)
+        squares = load8(sums, S) * load8(y, 0) + load8(sums, 2 * S) * load8(y, S) + load8(sums, 3 * S) * load8(y, 2 * S)
+        gain += sum8(signal * moments)
+        loss += problem.c[b] * sum8(squares)
+        if n < size:
+            steady = _of_tones(tables.loss_rows[b], scratch, n, size)
+            loss += 2.0 * tables.loss_rows[b, size + b] * sum8(steady * moments)
+            loss += h * sum8(load8(weights, 0) * steady * steady)
+    row[2 * size] += gain
+    row[2 * size + 1] += loss
