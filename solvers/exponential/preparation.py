@@ -1,4 +1,4 @@
-"""What the exponential method prepares once per system: tones among the blocks, tables, layout of the working space."""
+"""What the exponential method prepares once per system: a block per tone, tables, layout of the working arrays."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ SCRATCH = types.NamedTuple(
 
 
 class Workspace:
-    """What one run writes to: a block of memory, its arrays, and where compiled code finds their descriptors."""
+    """The memory one run writes to: a block, its arrays, and the addresses of their descriptors for compiled code."""
 
     def __init__(self, layout: Layout, rest: Array, blocks: int) -> None:
         self.layout = layout
@@ -66,34 +66,34 @@ class Workspace:
         self.own += z.reshape(2, -1)
 
     def record_events(self, event_record: Array) -> None:
-        """Let another array be the tape."""
+        """Let another array be the event record."""
         self.state = self.state._replace(event_record=event_record)
         self.layout.replace_array(self.block, 0, State._fields.index("event_record"), event_record)
 
 
 class Prepared(NamedTuple):
-    """What does not change from run to run of one system."""
+    """What all runs of one system share."""
 
     problem: PackedCopy
     tables: PackedCopy
     back: Array  # (2n, 2N): [q, q̇] from the state of all blocks
-    layout: Layout  # of State and Space
-    rest: Array  # state of the tones' blocks at t = 0, the structure's less their steady response
+    layout: Layout  # of State and Scratch
+    rest: Array  # state at t = 0: the tones' blocks, and minus the steady response of the structure's blocks
     spare_workspaces: list[Workspace]  # of runs that are over
     kept: Memo  # tables of the energy balance by the spacing of outputs
 
     def energy_tables_for(self, spacing: float) -> Packed:
-        """Tables of the energy ledger for outputs of a spacing, s."""
+        """Tables of the energy balance for outputs of a spacing, s."""
         made: Packed = self.kept.get(spacing, lambda: energy_tables_for(self.problem.value, self.tables.value, spacing))
         return made
 
     @property
     def nbytes(self) -> int:
-        """Of what belongs to this one only; the rest is its skeleton's."""
+        """Of the memory that belongs to this one only; the rest is in `_SharedTables`."""
         return self.problem.nbytes + self.tables.nbytes + int(self.back.nbytes)
 
     def workspace(self) -> Workspace:
-        """One that no other run uses; making its arrays takes as long as many steps."""
+        """A workspace that no other run uses; a spare one if there is, as making one takes as long as many steps."""
         try:
             return self.spare_workspaces.pop()
         except IndexError:
@@ -101,7 +101,7 @@ class Prepared(NamedTuple):
 
 
 def prepare_run(system: System, forcing: Forcing, duration: float, rtol: float) -> tuple[Forcing, Prepared]:
-    """The forcing as the method takes it, and the tables; those of an identical earlier run are reused."""
+    """The forcing without resonant tones and on one grid, and the tables; those of an equal earlier run are reused."""
     last = system.kept.find(("run", duration, rtol))
     if last and last[0] is forcing:
         return forcing, last[1]
@@ -127,13 +127,13 @@ def prepare_system(system: System, forcing: Forcing) -> Prepared:
 
 
 def _shared_tables_for(system: System, forcing: Forcing, dt_cell: float) -> _SharedTables:
-    """What systems have in common that differ in tones, sampled values and gaps only."""
+    """The tables shared by systems that differ in tones, sampled values and gaps only."""
     about, laws = system.about_structure, system.about_laws
     about.get("passive", lambda: _check_passive(system))
     places = (part.tobytes() for part in (forcing.tone_load, forcing.table_dt, forcing.table_load))
-    key = "skeleton", laws, *places, doublings(_speeds(system), forcing.tone_omega)
-    skeleton: _SharedTables = about.get(key, lambda: _SharedTables(system, forcing, dt_cell))
-    return skeleton
+    key = "tables", laws, *places, doublings(_speeds(system), forcing.tone_omega)
+    shared: _SharedTables = about.get(key, lambda: _SharedTables(system, forcing, dt_cell))
+    return shared
 
 
 def _speeds(system: System) -> Array:
@@ -143,7 +143,7 @@ def _speeds(system: System) -> Array:
 
 
 class _SharedTables:
-    """The problem and its tables with room for tones, each of which becomes one more undamped block.
+    """The problem and its tables with columns for tones, each of which becomes one more undamped block.
 
     The steady response to Re(a e^{iΩt}) is Re(Z e^{iΩt}) = Re Z · p + Im Z/Ω · v with p = cos Ωt, v = -Ω sin Ωt.
     """
@@ -168,10 +168,10 @@ class _SharedTables:
     @property
     def nbytes(self) -> int:
         """Of problem and tables."""
-        return sum(getattr(array, "nbytes", 8) for mould in (self.problem, self.tables) for array in mould.value)
+        return sum(getattr(array, "nbytes", 8) for part in (self.problem, self.tables) for array in part.value)
 
     def with_tones(self, forcing: Forcing, gaps: list[float]) -> Prepared:
-        """The same with the columns of given tones, and with given gaps."""
+        """A copy with the columns of given tones, and with given gaps."""
         omega, amplitude, n = forcing.tone_omega, forcing.tone_amplitude, len(self.k)
         load = self.load[forcing.tone_load] * amplitude[:, None]
         response = steady_response(self.k, self.c, load, omega[:, None])
@@ -207,7 +207,7 @@ def _of_tones(rows: Array, n: int) -> Array:
 
 
 def _check_passive(system: System) -> bool:
-    """True if no block gains energy by itself, else ValueError: what proves that no contact is missed rests on that."""
+    """True if no block gains energy by itself, else ValueError: the proof that no contact is missed assumes it."""
     k, c = system.blocks.k, system.blocks.c
     if np.any(k < 0.0):
         raise ValueError(
@@ -223,7 +223,7 @@ def _check_passive(system: System) -> bool:
 
 @lru_cache(maxsize=64)
 def _layout(stops: int, loads: int, blocks: int, signals: int, pool: int) -> Layout:
-    """Places of the arrays of `State` and `Scratch`; a pool if motion goes through the blocks."""
+    """Shapes and places of the arrays of `State` and `Scratch`; ``pool`` pairs of stops, 0 for a few stops."""
     size, width = 2 * blocks, 2 * blocks + 2 + 2 * stops
     rows = size if pool else 0
     scratch = [
@@ -240,10 +240,10 @@ def _layout(stops: int, loads: int, blocks: int, signals: int, pool: int) -> Lay
 
 
 def without_resonance(system: System, forcing: Forcing, duration: float, rtol: float) -> Forcing:
-    """Tones without a useful steady response are sampled instead.
+    """The forcing with tones near resonance replaced by samples.
 
-    That is those on the frequency of a block hardly damped, and those whose steady response l/|k - Ω² + iΩc| is a
-    thousand times what the load can do within the duration, l duration²/2: their difference would lose its digits.
+    A tone is replaced if it is at the frequency of a hardly damped block, or if its steady response l/|k - Ω² + iΩc| is
+    a thousand times the motion it can cause within the duration, l duration²/2: the difference would lose its digits.
     """
     key = "distances", forcing.tone_omega.tobytes(), forcing.tone_load.tobytes()
     tones = zip(forcing.tone_omega, forcing.tone_load, strict=True)
@@ -282,7 +282,7 @@ def steady_response(k: Array, c: Array, load: Any, omega: Any) -> Any:
 
 
 def _widened(problem: Problem, forcing: Forcing) -> Problem:
-    """The problem with one block per tone, which nothing reads yet; tones are no load any more, tables empty."""
+    """The problem with one block per tone, whose read rows are zero; tones and sampled values are removed."""
     tones, none = len(forcing.tone_omega), np.zeros(0)
     sampled = np.zeros_like(problem.load)
     sampled[forcing.table_load] = problem.load[forcing.table_load]
@@ -303,13 +303,13 @@ def _widened(problem: Problem, forcing: Forcing) -> Problem:
 
 @lru_cache(maxsize=64)
 def places_among_tones(n: int, tones: int) -> Any:
-    """(2n,) where the blocks' own coordinates stand among those of the tones' blocks."""
+    """(2n,) indices of the structure's coordinates among those with the tones' blocks."""
     own = np.arange(n)
     return np.concatenate((own, own + (n + tones)))
 
 
 def among_tones(rows: Array, tones: int) -> Array:
-    """Block coordinates (..., 2n) with zeros for the tones' blocks."""
+    """Block coordinates (..., 2n) widened by zeros for the tones' blocks."""
     n = rows.shape[-1] // 2
     out = np.zeros((*rows.shape[:-1], 2, n + tones))
     out[..., :n] = rows.reshape(*rows.shape[:-1], 2, n)

@@ -75,7 +75,7 @@ def _safe(g, v, bound):
 def _first_root(problem, terms, s, x, longest, values, slopes):
     """First time in [0, longest] at which δ becomes positive on the Taylor polynomial; -1 if it does not.
 
-    ``values`` and ``slopes`` are working space for the coefficients of the polynomial and of its derivative.
+    ``values`` and ``slopes`` are scratch for the coefficients of the polynomial and of its derivative.
     """
     factorial = 1.0
     for i in range(ORDER + 1):
@@ -112,9 +112,9 @@ def _horner(coefficients, x):
 
 @inner
 def _bisect(coefficients, sign, b, guess):
-    """Newton with bisection as its guard for the sign change of a polynomial in [0, b], to rounding.
+    """Sign change of a polynomial in [0, b], to rounding, by Newton's method with bisection as safeguard.
 
-    Its steps double the digits: what a step of 1e-11 leaves is rounding. A double root is known to 1e-8 at best.
+    A step doubles the digits, so after one of 1e-11 the error is rounding. A double root is found to 1e-8 at best.
     """
     a, x = 0.0, guess if 0.0 < guess < b else b
     for _ in range(60):
@@ -142,7 +142,7 @@ def _target(tables, t, first, second, t_end):
 
 @inner
 def _sample(problem, tables, energy_tables, state, scratch, t, out, due):
-    """Outputs before the end of the step that began at t with the state in ``scratch.x_new``."""
+    """Write the outputs that are due within the step that began at t with the state in ``scratch.x_new``."""
     while due[state.count[SAMPLED]] < state.now[T]:
         wanted = due[state.count[SAMPLED]]
         parts = max(1, int(np.ceil(tables.fastest * (wanted - t) / SERIES_REACH)))
@@ -157,9 +157,9 @@ def _sample(problem, tables, energy_tables, state, scratch, t, out, due):
 
 @inner
 def _fly_tabulated(problem, tables, state, scratch, most, budget):
-    """Tabulated steps without signals or output until a stop is near, or the time left, ``most``, or the budget spent.
+    """Tabulated steps without signals or output, until a stop is near, or the time ``most`` or the budget is used up.
 
-    Positions and rates of the blocks stand apart meanwhile, in eights. Returns (time flown, steps, safe time).
+    p and v of the blocks are in two arrays, eight numbers a vector. Returns (time flown, steps, safe time left).
     """
     n, x, flown, count = problem.k.size, scratch.split_state, 0.0, 0
     for b in range(n):

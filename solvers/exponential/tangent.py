@@ -19,13 +19,13 @@ from solvers.exponential.linearised_step import DERIVATIVES, VARIATION, Derivati
 from solvers.exponential.preparation import places_among_tones, steady_response
 from solvers.problem import Array, Parameter, SolverError, System
 
-_ROWS = 256  # of the tape between two replays: some 25 contacts, within which no derivative overflows
+_ROWS = 256  # of the event record: some 25 contacts, within which no derivative overflows
 _CARRIED = [Derivatives._fields.index(name) for name in ("y", "entry", "shift", "rate")]
 _LARGE = 1e100  # size at which the derivatives are scaled down
 
 
 class Tangent:
-    """Derivatives of one run of an engine, carried along as its tape grows."""
+    """Derivatives of one run of an engine, moved along as its event record grows."""
 
     def __init__(self, system: System, engine: Any, parameter: Parameter | None) -> None:
         self.engine, self.blocks = engine, system.blocks
@@ -55,7 +55,7 @@ class Tangent:
         self.history: list[tuple[float, float]] = []  # (time, ln of their size)
 
     def follow(self) -> None:
-        """Replay what the engine has taped, and let it tape anew."""
+        """Move the derivatives to the time the engine has reached, and empty its event record."""
         engine = self.engine
         linearise_run(*self.addresses, not self.history)
         if not np.all(np.isfinite(self.y)):
@@ -82,21 +82,21 @@ class Tangent:
 
 @lru_cache(maxsize=64)
 def _layout(stops: int, loads: int, width: int, columns: int) -> Layout:
-    """Places of the arrays of `Derivatives` and of the shadow's `State`."""
+    """Shapes and places of the arrays of `Derivatives` and of the past `State`."""
     derivatives = [(columns, width), (columns, stops), (columns, stops), (stops + loads, S), (loads, S), (stops, 2, S)]
     derivatives += [(stops, S), (2, width), (STAGES, columns, width), (columns, width), (8,)]
     return Layout([DERIVATIVES, STATE], [derivatives, state_shapes(width, stops)])
 
 
 def _size(y: Array) -> float:
-    """Frobenius norm; in units of the largest entry, whose square may lie beyond the range of numbers."""
+    """Frobenius norm; in units of the largest entry, as its square may overflow."""
     largest = float(np.abs(y).max())
     return largest * math.sqrt(np.vdot(y / largest, y / largest)) if largest > 0.0 else 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class _Change:
-    """What a parameter changes: the nudge, the problems with laws ahead and behind, the steady response per tone."""
+    """Changes by a parameter: explicit ones, problems with the laws ahead and behind, steady response per tone."""
 
     variation: Variation
     problems: list[Problem]

@@ -1,7 +1,7 @@
 """One step in contact: land on a border that is near, else collocate the forces on the longest step that meets rtol.
 
-The error of a step is the largest over all stops, each in units of rtol × its own reference speed, the speed of entry
-or a tenth of what the motion could reach there; the step looks at the borders of all stops, open ones included.
+The error of a step is the largest over all stops, each in units of rtol × its own reference speed: the speed of entry,
+or a tenth of the speed the motion could reach there. The borders of all stops are checked, in contact or not.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ from solvers.exponential.contact.peaks import state_peaks
 from solvers.exponential.energy.balance import account_contact
 from solvers.exponential.flight import energy_norms
 
-LEVEL, NODE_SET, NEW, STOP, NEXT_LEVEL, BEGUN = range(6)  # places in Space.last
-ENTRY, SEGMENT = 1, 2  # values of FRESH: the first step of a contact, or of a piece of its law; 0 for others
+LEVEL, NODE_SET, NEW, STOP, NEXT_LEVEL, BEGUN = range(6)  # places in Scratch.control
+ENTRY, SEGMENT = 1, 2  # values of NEW: the first step of a contact, or of a segment of its law; 0 for other steps
 _GOAL = 0.3  # error aimed at, in units of the tolerance
 _ORDER = 15.0  # the error estimate falls like h^15
 _LEAST = 1e-60  # m/s, of a reference speed
@@ -48,7 +48,7 @@ _LEAST = 1e-60  # m/s, of a reference speed
 
 @inner
 def begin_steps(problem, tables, state, scratch, stop):
-    """Reference speeds, first step and nodes after ``stop`` has switched: entered, changed its piece, or left."""
+    """Reference speeds, first step and nodes after ``stop`` has entered, changed its segment, or left."""
     control, size, others = scratch.control, 2 * problem.k.size, False
     energy_norms(problem, state.x, scratch.norms)
     for s in range(problem.gap.size):
@@ -72,7 +72,7 @@ def begin_steps(problem, tables, state, scratch, stop):
 
 @inner
 def _first_step(problem, tables, state, scratch, stop):
-    """Level of the first step of a contact, a share of the duration it would have if it were free."""
+    """Level of the first step of a contact, a share of the duration of an impact on this stop alone."""
     speed = abs(dot(problem.read_rate[stop], state.x, 2 * problem.k.size))
     duration = contact_time(problem, tables, scratch, stop, max(speed, 1e-3 * scratch.reference_speed[stop]))
     if scratch.first_step_share[stop] == 0.0:
@@ -83,7 +83,7 @@ def _first_step(problem, tables, state, scratch, stop):
 
 @inner
 def _entry_nodes(problem, tables, state, stop, level):
-    """Kind of the next step: an entry if a force of broken exponent has just begun, that of ``stop`` before others."""
+    """Node set of the next step: of an entry if a force with broken exponent has just begun, first that of ``stop``."""
     found, while_ago = 0, 1e-6 * tables.contact_step[level]
     for s in range(state.segment.size):
         if state.segment[s] == 1 and tables.time_exponent[1 + s] > 1.0 and (found == 0 or s == stop):
@@ -95,7 +95,7 @@ def _entry_nodes(problem, tables, state, stop, level):
 
 @inner
 def _switch_pressed(problem, state, log):
-    """Switch every open stop at rest on its surface that the forces of others press; whether any did."""
+    """Switch every stop at rest on its surface that other stops' forces press into it; returns whether any did."""
     switched = False
     for s in range(problem.gap.size):
         if state.segment[s] > 0 or abs(indentation(problem, s, state.x)) > surface_tolerance(problem, s, state.x):
@@ -112,7 +112,7 @@ def _switch_pressed(problem, state, log):
 
 @inlined
 def level_of(tables, h):
-    """Contact step of about h, the shortest one if need be."""
+    """Level of the longest contact step up to h, or of the shortest of all."""
     last = tables.contact_step.size - 1
     j = min(max(int(np.ceil(2.0 * math.log2(tables.contact_step[0] / h))), 0), last)
     return j + 1 if tables.contact_step[j] > h and j < last else j
@@ -120,20 +120,17 @@ def level_of(tables, h):
 
 @inner
 def _nearest_surface(problem, state, scratch):
-    """(time, stop, direction) of the border of a piece that will be met first at the present rates.
+    """(time, stop, direction) of the border of a segment that is met first at the present rates.
 
-    These may be faster than those at entry: the reference speeds follow.
+    Raises the reference speeds to these rates, which may exceed those at entry.
     """
     size = 2 * problem.k.size
     near, stop, direction = np.inf, -1, 0
     for s in range(problem.gap.size):
         delta = indentation(problem, s, state.x)
         rate = dot(problem.read_rate[s], state.x, size)
-        scratch.reference_speed[s], scratch.start_motion[s, 0], scratch.start_motion[s, 1] = (
-            max(scratch.reference_speed[s], abs(rate)),
-            delta,
-            rate,
-        )
+        scratch.start_motion[s, 0], scratch.start_motion[s, 1] = delta, rate
+        scratch.reference_speed[s] = max(scratch.reference_speed[s], abs(rate))
         segment = state.segment[s]
         if rate < 0.0 and segment > 0:
             time, way = (delta - problem.knots[s, segment - 1]) / -rate, -1
@@ -148,7 +145,7 @@ def _nearest_surface(problem, state, scratch):
 
 @inner
 def _predict(problem, tables, state, scratch, level):
-    """First guess of the forces: the last step's polynomial, or the law on the free response."""
+    """First guess of the forces: the polynomial of the last step, or the law for the free response."""
     control = scratch.control
     for s in range(problem.gap.size):
         if state.segment[s] == 0:
@@ -168,9 +165,9 @@ def _predict(problem, tables, state, scratch, level):
 
 @merged
 def _attempt(problem, tables, state, scratch, node_set, level, rtol):
-    """Attempt one contact step; error in units of the tolerance, inf when it must be shorter anyway.
+    """Attempt one contact step; (error in units of the tolerance, time of a bend it crosses, stop of that bend).
 
-    With inf comes the time of a bend that is in its way and the stop, else inf and -1.
+    The error is inf if the step must be shorter for another reason; time and stop are inf and -1 without a bend.
     """
     bottom, first, bent = level == tables.contact_step.size - 1, np.inf, -1
     free_response(problem, tables, state, scratch, node_set, level)
@@ -189,7 +186,7 @@ def _attempt(problem, tables, state, scratch, node_set, level, rtol):
 
 @inner
 def latest_entered(state):
-    """The stop in contact that was entered last."""
+    """The stop in contact with the latest entry."""
     stop = -1
     for s in range(state.segment.size):
         if state.segment[s] > 0 and (stop < 0 or state.active[s, T_IN] >= state.active[stop, T_IN]):
@@ -199,7 +196,7 @@ def latest_entered(state):
 
 @inner
 def _land_first(problem, tables, state, scratch, stop, direction, near, rtol, t_end, out, due, with_energy):
-    """Land on the border met first, which another stop's may be; (stop, direction), or (-1, 0)."""
+    """Land on the border met first, be it that of another stop; (stop, direction), or (-1, 0) if not possible."""
     for _ in range(problem.gap.size + 1):
         landed = land(problem, tables, state, scratch, stop, direction, near, rtol, t_end, out, due, with_energy)
         if landed == stop or landed < 0:
@@ -252,7 +249,7 @@ def advance_contact(problem, tables, energy_tables, state, scratch, t_end, rtol,
             return LAW_NOT_FINITE if _law_fails(state, scratch) else STEP_TOO_SMALL
         copy(scratch.side_at_begin, scratch.side, scratch.side.size)
         state.count[REJECTED] += 1
-        if bent >= 0:  # go near it, then end a step on it
+        if bent >= 0:  # a step that ends near the bend, so that the next one can land on it
             level = max(level + 1, level_of(tables, 0.9 * first))
             continue
         level = min(bottom, level + (1 + int(2.0 / _ORDER * math.log2(error / _GOAL)) if error < np.inf else 2))
@@ -281,7 +278,7 @@ def advance_contact(problem, tables, energy_tables, state, scratch, t_end, rtol,
 
 @inner
 def _law_fails(state, scratch):
-    """Whether a law gave a force that is not finite."""
+    """Whether a force is not finite."""
     for s in range(state.segment.size):
         for i in range(S):
             if state.segment[s] > 0 and not abs(scratch.force[s, i]) < np.inf:
@@ -293,7 +290,7 @@ def _law_fails(state, scratch):
 def _adapt(tables, scratch, level, node_set, wanted, error):
     """Size of the next step from the error of this one."""
     control, longer = scratch.control, 2.0 / _ORDER * math.log2(_GOAL / max(error, 1e-30))  # in levels
-    if control[NEW] == ENTRY:  # the next contact of this stop begins with what was right here
+    if control[NEW] == ENTRY:  # the next contact of this stop begins with the step that was right here
         s = control[STOP]
         if level != control[NEXT_LEVEL]:
             scratch.first_step_share[s] = tables.contact_step[level] / scratch.duration[0]

@@ -1,10 +1,10 @@
-"""The energy ledger step by step: whole steps by the forms of `flight_tables`, parts of steps by series.
+"""The energy balance step by step: whole steps by the forms of `flight_tables`, parts of steps by series.
 
-Within a part the state is the Taylor series of its differential equation in panels of `SERIES_REACH` radians of the
-fastest block, and the powers are summed by Gauss's rule with five points, 2e-12 off at most.
+On a part of a step the state is the Taylor series of its differential equation, in panels of `SERIES_REACH` radians of
+the fastest block; the powers are integrated by Gauss's rule with five points, with an error of 2e-12 at most.
 
-A flight is booked from a *mark* on, its begin, the last output, or with sampled signals the last cell's begin: whatever
-steps it takes, a form of its own then holds most of what it does.
+A flight is accounted for from a *mark* on: the begin of the flight, the last output or, with sampled signals, the begin
+of the present cell. Between marks, one form covers the time, whatever steps the flight has taken.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ from solvers.exponential.flight import (
     signal_derivatives,
 )
 
-_TERM_SUM, _MOVING, _MARK = 9, 10, 11  # rows of Space.work; those before hold a load on the blocks and its derivatives
+_TERM_SUM, _MOVING, _MARK = 9, 10, 11  # rows of Scratch.stages; those before hold a load on the blocks and derivatives
 _EXACT = 1e-17  # share of the last term of a series
 
 
 @reordered
 def _own_loss(plain, x, n):
-    """Damping of blocks by themselves."""
+    """Energy dissipated by the structure's blocks without tones."""
     loss, blocks = 0.0, plain.shape[1]
     for b in range(blocks):
         p, v = x[b], x[n + b]
@@ -43,14 +43,14 @@ def _own_loss(plain, x, n):
 
 @inner
 def start_account(problem, state, scratch):
-    """Note the state from which `account_until` shall book a flight; its ledger is complete."""
+    """Set the mark, from which `account_until` accounts for a flight; the balance of the state is complete."""
     copy(state.x, scratch.stages[_MARK], 2 * problem.k.size)
     scratch.stages[_MARK, 2 * problem.k.size] = state.now[T]
 
 
 @inner
 def account_until(problem, tables, energy_tables, scratch, t, row):
-    """Add to the ledger of ``row`` what a flight does from the mark to t, within a cell, whatever steps it takes."""
+    """Add work and damping of a flight from the mark to t, within one cell, to the balance of ``row``."""
     x, size = scratch.stages[_MOVING], 2 * problem.k.size
     copy(scratch.stages[_MARK], x, size)
     begin = scratch.stages[_MARK, size]
@@ -73,7 +73,7 @@ def account_until(problem, tables, energy_tables, scratch, t, row):
 
 @inner
 def account_output(problem, tables, energy_tables, state, scratch, t, row):
-    """Complete the ledger of an output at t; without sampled signals the flight is booked on from there."""
+    """Complete the balance of an output at t; without sampled signals the mark moves there."""
     size = 2 * problem.k.size
     copy(state.x[size:], row[size:], 2)
     account_until(problem, tables, energy_tables, scratch, t, row)
@@ -85,14 +85,14 @@ def account_output(problem, tables, energy_tables, state, scratch, t, row):
 
 @inner
 def account_state(problem, tables, energy_tables, state, scratch):
-    """Complete the ledger of the state, from which the flight is booked on."""
+    """Complete the balance of the state, and set the mark there."""
     account_until(problem, tables, energy_tables, scratch, state.now[T], state.x)
     start_account(problem, state, scratch)
 
 
 @inlined
 def _rounding(problem, energy_tables, t):
-    """By which the time between two outputs, or two cells' ends, may differ from the step in the tables."""
+    """Difference allowed between the step of the tables and the time between two outputs, or of a cell."""
     return 1e-7 * energy_tables.spacing if problem.table_dt.size else 4e-16 * t
 
 
@@ -105,7 +105,7 @@ def _derive(problem, scratch, t):
 
 @inner
 def _account_forms(problem, energy_tables, scratch, level, x, row):
-    """The same by the forms of a step, from the signals' derivatives in ``scratch.signal_terms``."""
+    """The same by the forms of a step, from the derivatives of the signals in ``scratch.signal_terms``."""
     n, driven, given = problem.k.size, energy_tables.driver.size, scratch.energy_sums[0]
     signals = 6 * problem.table_dt.size
     for i in range(driven):
@@ -126,7 +126,7 @@ def _account_forms(problem, energy_tables, scratch, level, x, row):
 
 @inner
 def _account_series(problem, tables, energy_tables, scratch, t, span, x, row):
-    """The same by series for a part of a cell from x at t on; x moves."""
+    """The same by series for a part of a cell from x at t on; x is moved to the last panel."""
     panels, size = max(1, math.ceil(tables.fastest * span / SERIES_REACH - 1e-9)), 2 * problem.k.size
     for i in range(panels):
         _clear(scratch, size)
@@ -143,7 +143,7 @@ def _account_series(problem, tables, energy_tables, scratch, t, span, x, row):
 
 @inner
 def _clear(scratch, size):
-    """No load on the blocks."""
+    """Set the load on the blocks and its derivatives to zero."""
     for order in range(S):
         for e in range(size):
             scratch.stages[order, e] = 0.0
@@ -151,9 +151,9 @@ def _clear(scratch, size):
 
 @inner
 def _account_panel(problem, tables, energy_tables, scratch, t, span, x, row, further):
-    """Add work and damping under the load in ``scratch.stages`` to the ledger of ``row``; x moves if told to go further.
+    """Add work and damping under the load in ``scratch.stages`` to the balance of ``row``.
 
-    Term i of the series is span^i times a derivative.
+    x is moved to the end of the panel if ``further``. Term i of the series is span^i times a derivative.
     """
     n, terms, z = problem.k.size, scratch.terms, scratch.stages[_TERM_SUM]
     copy(x, terms[0], 2 * n)
@@ -181,7 +181,7 @@ def _account_panel(problem, tables, energy_tables, scratch, t, span, x, row, fur
 
 @inner
 def account_contact(problem, tables, energy_tables, state, scratch, node_set, level, span, row):
-    """Add to the ledger of ``row`` what loads and damping do over ``span`` of the contact step just found."""
+    """Add work of loads and damping over ``span`` of the contact step just found to the balance of ``row``."""
     h = tables.contact_step[level]
     if span == h and level >= energy_tables.first and h <= energy_tables.longest[energy_tables.kind[node_set]]:
         _account_nodes(
@@ -195,7 +195,7 @@ def account_contact(problem, tables, energy_tables, state, scratch, node_set, le
 
 @inner
 def _account_part(problem, tables, energy_tables, state, scratch, h, span, row):
-    """The same on a part of a smooth step, whose forces are polynomials of time, by series."""
+    """The same by series, for a part of a smooth step, whose forces are polynomials of time."""
     panels, size = max(1, math.ceil(tables.fastest * span / SERIES_REACH - 1e-9)), 2 * problem.k.size
     x = scratch.stages[_MOVING]
     copy(state.x, x, size)
@@ -213,7 +213,7 @@ def _account_part(problem, tables, energy_tables, state, scratch, h, span, row):
 
 @inner
 def _add_force(energy_tables, scratch, force, push, h, place, size):
-    """Derivatives at a place in (0, 1) of a force known at a smooth step's nodes, times its push, to the load."""
+    """Add to the load the derivatives at ``place`` in (0, 1) of a force given at the nodes of a smooth step."""
     powers = scratch.energy_sums[0]
     for i in range(S):
         powers[i] = dot(energy_tables.monomials[i], force, S)
@@ -229,7 +229,7 @@ def _add_force(energy_tables, scratch, force, push, h, place, size):
 
 @inner
 def _steady_nodes(problem, tables, energy_tables, state, scratch, kind, place, h, weights):
-    """Signals at the nodes into ``scratch.energy_sums``, p and v of the tones into ``scratch.terms``; work on steady motion."""
+    """Work of the signals on the steady motion; signals at the nodes go to ``energy_sums``, tones to ``terms``."""
     n, size, gain = int(tables.own_blocks), problem.k.size, 0.0
     for k in range(size - n):
         alpha, beta = (
@@ -260,7 +260,7 @@ def _of_tones(row, scratch, n, size):
 
 @inner
 def _block_forces(problem, tables, state, scratch, node_set, b, y):
-    """Forces on a block at the nodes, plain ones and that of the stop that enters, then its state, into y; signals."""
+    """Forces on a block at the nodes, without and with the weight of an entry, and its state, into y; its signals."""
     size, signal, plain, entering = problem.k.size, splat8(0.0), splat8(0.0), splat8(0.0)
     for u in range(problem.gap.size):
         if state.segment[u] > 0:
@@ -280,7 +280,7 @@ def _block_forces(problem, tables, state, scratch, node_set, b, y):
 
 @inner
 def _account_nodes(problem, tables, energy_tables, state, scratch, node_set, place, h, row):
-    """The same for a whole step by its tables."""
+    """The same by the tables, for a whole step."""
     n, size, kind, weights = (
         int(tables.own_blocks),
         problem.k.size,

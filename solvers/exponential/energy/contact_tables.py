@@ -1,4 +1,4 @@
-"""Work and damping over contact steps: tables made when a run first keeps an energy ledger.
+"""Work and damping over contact steps: tables made for the first run with an energy balance.
 
 The force on a block is a polynomial times its weight, see `contact.nodes`. So the block's velocity v is linear in
 y = (plain forces at the nodes, those of the stop that enters, p₀, v₀), and so is ∫ L_i v dt with the nodes' L_i,
@@ -27,7 +27,7 @@ WIDE = 2 * S + 16  # of a row: ∫ L_i v dt for all nodes, then ∫ v v_row dt f
 def contact_table(
     stiffness: bytes, damping: bytes, steps: bytes, time_exponent: float, weight_exponent: float, places: bytes
 ) -> Any:
-    """(j, n, ROWS, WIDE) of one kind of steps, t = h σ^power, for blocks (k, c) and steps given as arrays' bytes."""
+    """(j, n, ROWS, WIDE) of one kind of steps, t = h σ^κ, for blocks (k, c) and steps given as the bytes of arrays."""
     k, c, h, nodes = (np.frombuffer(part) for part in (stiffness, damping, steps, places))
     apart = 1.0 / (nodes[:, None] - nodes + np.eye(len(nodes))).prod(axis=1)
     weights = np.array([apart, apart * nodes ** (-weight_exponent)])
@@ -60,7 +60,7 @@ def _so_far(points: Any) -> Any:
 
 @kernel
 def _fill(k, c, h, time_exponent, weight_exponent, nodes, weights, points, so_far, velocity, basis, pushed, state, out):
-    """All tables of a kind; the arguments between ``so_far`` and the result are working space."""
+    """All tables of a kind; the arguments between ``so_far`` and the result are scratch."""
     for level in range(h.size):
         for b in range(k.size):
             panels = 1 + int(time_exponent * (math.sqrt(k[b]) + c[b]) * h[level] / _PANEL)
@@ -92,7 +92,7 @@ def _fill(k, c, h, time_exponent, weight_exponent, nodes, weights, points, so_fa
 
 @inner
 def _moved(k, c, x, p, v):
-    """A block's state after x, or before: det exp(A x) = e^{-cx} turns α I + β A round."""
+    """State of a block after the time x, or before if x < 0: det exp(A x) = e^{-cx} gives the inverse of α I + β A."""
     alpha, beta = propagate(k, c, abs(x))
     if x < 0.0:
         grown = math.exp(-c * x)
@@ -121,7 +121,7 @@ def _push(k, c, h, time_exponent, weight_exponent, nodes, weights, points, begin
 
 @inner
 def _move(k, c, h, time_exponent, points, so_far, begin, width, pushed, state, velocity):
-    """Velocities at the points of a panel by the variation of constants; ``state`` goes on to its end."""
+    """Velocities at the points of a panel by the variation of constants; ``state`` is moved to its end."""
     count, start = points.shape[1], h * begin**time_exponent
     for q in range(count + 1):
         end = begin + width * points[0, q] if q < count else begin + width
@@ -141,7 +141,7 @@ def _move(k, c, h, time_exponent, points, so_far, begin, width, pushed, state, v
 
 @inner
 def _add_products(measure, basis, velocity, out):
-    """One point's part of all integrals."""
+    """Add the part of one point to all integrals."""
     for e in range(ROWS):
         value = measure * velocity[e]
         for i in range(S):

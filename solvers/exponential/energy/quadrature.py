@@ -1,4 +1,4 @@
-"""Powers of loads and damping, and states and energy ledger inside a contact step by quadrature of its forces."""
+"""Powers of loads and damping; states and energy balance inside a contact step, by quadrature of its forces."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def _scales(nodes, exponent, plain, weighted):
 
 @inner
 def _products(nodes, sigma, out):
-    """Π (σ - σ_i) without i = j, for every j."""
+    """Π_{i ≠ j} (σ - σ_i) for every j."""
     for j in range(S):
         product = 1.0
         for i in range(S):
@@ -62,7 +62,7 @@ def powers(problem, tables, t, x):
 
 @reordered
 def _plain_loss(n, own, rows, x):
-    """Power of damping by rows that read a block's own rate and the tones only, W."""
+    """Power of damping, W, by rows with entries for the block's own rate and the tones only."""
     loss = 0.0
     for b in range(own):
         value = rows[b, n + b] * x[n + b]
@@ -74,7 +74,7 @@ def _plain_loss(n, own, rows, x):
 
 @inner
 def state_within(problem, tables, state, scratch, node_set, h, span, row):
-    """State at ``span`` after the start of a step of length h, by quadrature of its forces; ``row`` holds the start."""
+    """Move ``row``, the state at the begin of a step of length h, by ``span``, by quadrature of the step's forces."""
     stops, n = problem.gap.size, problem.k.size
     time_exponent, weight_exponent = tables.time_exponent[node_set], tables.weight_exponent[node_set]  # t = h σ^power
     for b in range(n):
@@ -114,7 +114,7 @@ def state_within(problem, tables, state, scratch, node_set, h, span, row):
 
 @inner
 def fastest_moving(problem, tables, norms):
-    """Fastest block that carries more than 1e-12 of the energy, or tone, rad/s."""
+    """Speed, rad/s, of the fastest tone or block with more than 1e-12 of the energy."""
     total, fastest, own = 0.0, 1e-3, int(tables.own_blocks)
     for b in range(own):
         total += norms[b] ** 2
@@ -126,9 +126,9 @@ def fastest_moving(problem, tables, norms):
 
 @inner
 def account_by_quadrature(problem, tables, state, scratch, node_set, h, length, x, row):
-    """Add to the ledger of ``row`` what loads and damping do over ``length`` of a step of length h from ``x`` on.
+    """Add work of loads and damping over ``length`` of a step of length h from ``x`` on to the balance of ``row``.
 
-    Gauss's rule in parts of 3 radians of the fastest block that moves at the begin or the end of the step.
+    Gauss's rule on parts of 3 radians of the fastest block that moves at the begin or the end of the step.
     """
     size, inner = 2 * problem.k.size, scratch.stages[WITHIN]
     energy_norms(problem, x, scratch.norms)
