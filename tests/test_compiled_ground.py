@@ -109,7 +109,7 @@ def expected(of):
 def test_attributes_of_packed_arguments_are_those_of_the_tuple():
     one = things()
     wanted = expected(one)
-    np.testing.assert_allclose(seen(Packed(one, KIND).address), wanted, rtol=1e-14)
+    np.testing.assert_allclose(seen(Packed.of(one, KIND).address), wanted, rtol=1e-14)
     assert one.vector[0] == -1.0
 
 
@@ -124,7 +124,7 @@ def test_attributes_of_packed_arguments_are_those_of_the_tuple():
 )
 def test_what_does_not_fit_the_declared_kind_is_refused_by_name(name, value):
     with pytest.raises(TypeError, match=f"{name} must be a contiguous"):
-        Packed(things()._replace(**{name: value}), KIND)
+        Packed.of(things()._replace(**{name: value}), KIND)
 
 
 def test_copies_of_a_template_have_own_arrays_and_share_the_rest():

@@ -111,24 +111,22 @@ def _described(value: Any, kind: types.NamedTuple) -> list[list[int]]:
     return found
 
 
-class Packed:
-    """A named tuple with the address of its arrays' descriptors."""
-
-    def __init__(self, value: Any, kind: types.NamedTuple) -> None:
-        self.value, self.block = value, np.array([*chain(*_described(value, kind))], dtype=np.int64)
-        self.address = address_of(self.block)
-
-
-class PackedCopy(NamedTuple):
-    """A packed named tuple made by a `PackedTemplate`."""
+class Packed(NamedTuple):
+    """A named tuple with the address of the descriptors of its arrays."""
 
     value: Any
-    block: Any  # its own arrays, then the descriptors
+    block: Any  # the descriptors; before them the own arrays of a copy made by `PackedTemplate`
     address: int
+
+    @classmethod
+    def of(cls, value: Any, kind: types.NamedTuple) -> Packed:
+        """Pack a named tuple; TypeError for an array that is not of the declared kind."""
+        block = np.array([*chain(*_described(value, kind))], dtype=np.int64)
+        return cls(value, block, address_of(block))
 
     @property
     def nbytes(self) -> int:
-        """Of the memory that no other copy shares."""
+        """Of the memory that no other one shares."""
         return int(self.block.nbytes)
 
 
@@ -150,7 +148,7 @@ class PackedTemplate:
         words = np.array([*chain(*described)], dtype=np.int64)
         self.block = np.concatenate([*(array.ravel() for array in arrays), words.view(float)])
 
-    def copy(self, **numbers: float) -> PackedCopy:
+    def copy(self, **numbers: float) -> Packed:
         """A new packed tuple with own arrays to write into, and with some plain numbers replaced."""
         block = self.block.copy()
         address = address_of(block)
@@ -158,7 +156,7 @@ class PackedTemplate:
         for name, number in numbers.items():
             block[self.size + self.begins[name]] = number
         arrays = {name: block[place].reshape(shape) for name, place, shape in self.slices}
-        return PackedCopy(self.value._replace(**arrays, **numbers), block, address + 8 * self.size)
+        return Packed(self.value._replace(**arrays, **numbers), block, address + 8 * self.size)
 
 
 def _descriptor(shape: tuple[int, ...], data: int) -> list[int]:

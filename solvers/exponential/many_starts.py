@@ -5,6 +5,7 @@ It calls the machine code of a single run through its address, so that all resul
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,7 +27,7 @@ from solvers.compiled.state import (
     STEPS,
     T,
 )
-from solvers.exponential.energy.check import ALLOWED, FACTOR, FIRST, LAST, has_gained, tolerated_energy
+from solvers.exponential.energy.check import ALLOWED, FACTOR, LAST, has_gained
 from solvers.exponential.energy.flight_tables import NO_ENERGY_TABLES
 from solvers.exponential.method import Engine, advance
 from solvers.exponential.preparation import SCRATCH
@@ -166,9 +167,9 @@ def final_statuses(engine: Engine, outcomes: Outcomes) -> Any:
     """(k,) `Status` of every start: that of its run, or `UNBALANCED` if it ends with more energy than it was given."""
     status = np.array(STATUSES, dtype=object)[outcomes.count[:, CODE]]
     energy = outcomes.number[:, ENERGY:]
-    slack = tolerated_energy(1.0, np.zeros(1), engine.method.rtol) * (energy[:, FIRST] + outcomes.number[:, EXCHANGED])
-    much = (outcomes.count[:, CODE] == DONE) & (energy[:, LAST] > FACTOR * (energy[:, ALLOWED] + slack))
+    much = (outcomes.count[:, CODE] == DONE) & (energy[:, LAST] > FACTOR * energy[:, ALLOWED])
     for i in np.flatnonzero(much):
-        if has_gained(engine.system, energy[i], engine.problem, engine.duration, slack[i]):
+        exchanged = partial(float, outcomes.number[i, EXCHANGED])
+        if has_gained(engine.system, energy[i], engine.problem, engine.duration, exchanged, engine.method.rtol):
             status[i] = Status.UNBALANCED
     return status

@@ -27,7 +27,7 @@ import numpy as np
 from numba import types
 
 from solvers.compiled.kernels import MATRIX, PROBLEM, REAL, VECTOR, entry
-from solvers.compiled.packed import Packed, PackedCopy, unpacker
+from solvers.compiled.packed import Packed, unpacker
 from solvers.compiled.state import (
     AT_ONCE,
     CHATTER,
@@ -50,7 +50,7 @@ from solvers.compiled.state import (
 from solvers.exponential.contact.landing import landing_reach
 from solvers.exponential.contact.step import BEGUN, NEW, advance_contact, begin_steps, latest_entered
 from solvers.exponential.energy.balance import account_state, start_account
-from solvers.exponential.energy.check import FACTOR, FIRST, has_gained, note_energy, own_energy, tolerated_energy
+from solvers.exponential.energy.check import FIRST, has_gained, note_energy, own_energy
 from solvers.exponential.energy.flight_tables import ENERGY_TABLES, NO_ENERGY_TABLES
 from solvers.exponential.preparation import SCRATCH, TABLES, prepare_run
 from solvers.exponential.safe_steps import fly
@@ -162,9 +162,9 @@ class Engine:
         )
         forcing, prepared = prepare_run(system, forcing, duration, method.rtol)
         self.back = prepared.back
-        packed: PackedCopy | Packed = prepared.problem
+        packed = prepared.problem
         if forcing.table.size:
-            packed = Packed(packed.value._replace(table=forcing.table, table_start=forcing.table_start), PROBLEM)
+            packed = Packed.of(packed.value._replace(table=forcing.table, table_start=forcing.table_start), PROBLEM)
         self.packed, self.problem, self.prepared = packed, packed.value, prepared
         self.workspace = prepared.workspace()
         self.workspace.begin(z)
@@ -192,12 +192,8 @@ class Engine:
         return self.method.ledger and sampled
 
     def gains(self, exchanged: Callable[[], Array]) -> bool:
-        """Whether the finished run holds more energy than it can have been given; see `tolerated_energy`."""
-        first, last, allowed = self.workspace.energy.tolist()
-        if not last > FACTOR * allowed:
-            return False
-        slack = tolerated_energy(first, exchanged(), self.method.rtol)
-        return has_gained(self.system, self.workspace.energy, self.problem, self.duration, slack)
+        """Whether the finished run holds more energy than it can have been given."""
+        return has_gained(self.system, self.workspace.energy, self.problem, self.duration, exchanged, self.method.rtol)
 
     def march(self, budget: int, log: Array, out: Array, due: Array) -> int:
         """Advance by about ``budget`` steps."""

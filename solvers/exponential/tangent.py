@@ -44,8 +44,8 @@ class Tangent:
         self.y[2 * n :, self.places] = -self.change.steady(0.0)
         engine.record_events(np.empty((_ROWS, HEAD + width + stops * S)))
         self.packed = [
-            *(engine.packed if same is problem else Packed(same, PROBLEM) for same in self.change.problems),
-            Packed(self.change.variation, VARIATION),
+            *(engine.packed if same is problem else Packed.of(same, PROBLEM) for same in self.change.problems),
+            Packed.of(self.change.variation, VARIATION),
         ]
         derivatives, past = (words + start for start in layout.starts)
         ahead, behind, variation = (packed.address for packed in self.packed)

@@ -16,6 +16,7 @@ and sampled loads v_l s_l(t) raise √(2E) by at most Σ_l |v_l|_{M⁻¹} ∫|s_
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -60,11 +61,18 @@ def tolerated_energy(handled: float, exchanged: Array, rtol: float) -> float:
     return (MULTIPLE * rtol + ROUNDING) * float(handled + np.abs(exchanged).sum())
 
 
-def has_gained(system: System, energy: Any, sampled: Any, duration: float, slack: float) -> bool:
-    """Whether a run without balance ends with more energy than it can have been given; ``sampled`` are its loads."""
-    _, last, allowed = energy.tolist()
-    allowed += slack
+def has_gained(
+    system: System, energy: Any, sampled: Any, duration: float, exchanged: Callable[[], Any], rtol: float
+) -> bool:
+    """Whether a run without balance ends with more energy than it can have been given; ``sampled`` are its loads.
+
+    ``exchanged`` as in `tolerated_energy`, asked for only where it matters.
+    """
+    first, last, allowed = energy.tolist()
     if not last > FACTOR * allowed or system.blocks.loss.size:
+        return False
+    allowed += tolerated_energy(first, exchanged(), rtol)
+    if not last > FACTOR * allowed:
         return False
     speed = math.sqrt(2.0 * allowed)
     for j, load in enumerate(sampled.table_load):

@@ -95,7 +95,7 @@ def _monomials() -> Any:
     return np.ascontiguousarray(np.linalg.inv(np.vander(gauss(S)[0], increasing=True)))
 
 
-NO_ENERGY_TABLES = Packed(_empty(0.0, 1), ENERGY_TABLES)
+NO_ENERGY_TABLES = Packed.of(_empty(0.0, 1), ENERGY_TABLES)
 
 
 def energy_tables_for(problem: Problem, tables: Tables, spacing: float) -> Packed:
@@ -107,7 +107,7 @@ def energy_tables_for(problem: Problem, tables: Tables, spacing: float) -> Packe
     size, signals = 2 * len(problem.k), len(problem.table_dt)
     if (len(tables.flight_step) + 1) * (len(driver) + 6 * signals) * 2 * padded(size) <= _MOST_NUMBERS:
         energy_tables = _flight_part(energy_tables, problem, tables, driver, spacing)
-    return Packed(energy_tables, ENERGY_TABLES)
+    return Packed.of(energy_tables, ENERGY_TABLES)
 
 
 def _coupled(tables: Tables) -> bool:
