@@ -207,6 +207,46 @@ def _land_first(problem, tables, state, scratch, stop, direction, near, rtol, t_
 
 
 @merged
+def _try_landing(problem, tables, state, scratch, stop, direction, near, rtol, t_end, log, out, due, with_energy):
+    """Land on the border met first and switch its stop, if it is near enough; whether it was done."""
+    stop, direction = _land_first(
+        problem, tables, state, scratch, stop, direction, near, rtol, t_end, out, due, with_energy
+    )
+    if stop < 0:
+        return False
+    state.count[STEPS] += 1
+    if state.now[T] < t_end:
+        switch(problem, state, stop, direction, log)
+        if in_contact(state):
+            begin_steps(problem, tables, state, scratch, stop)
+    return True
+
+
+@merged
+def _accept(problem, tables, energy_tables, state, scratch, node_set, level, wanted, error, bent, t_end, out, due):
+    """Complete the step found: samples, the end of the run if it is within, energy, event record, next step."""
+    h = tables.contact_step[level]
+    end = state.now[T] + h
+    if end >= t_end or due[state.count[SAMPLED]] <= end:
+        sample_step(problem, tables, energy_tables, state, scratch, node_set, level, t_end, out, due)
+    if end >= t_end:
+        end_run(problem, tables, state, scratch, node_set, level, t_end)
+        return
+    for s in range(problem.gap.size):
+        if state.segment[s] > 0:
+            copy(scratch.force[s], scratch.previous[s], S)
+    if energy_tables.active > 0.0:
+        account_contact(problem, tables, energy_tables, state, scratch, node_set, level, h, state.x)
+    if state.event_record.shape[0]:
+        record_forces(problem, state, scratch, STEP, end, node_set, level)
+    finish_step(problem, tables, state, scratch, node_set, level)
+    if bent >= 0:  # crossed within the shortest step
+        scratch.side[bent] = -scratch.side[bent]
+    _adapt(tables, scratch, level, node_set, wanted, error)
+    state.count[STEPS] += 1
+
+
+@merged
 def advance_contact(problem, tables, energy_tables, state, scratch, t_end, rtol, log, out, due):
     """One accepted step in contact: land if a border is near, else collocate; returns a status code."""
     control, bottom, with_energy = scratch.control, tables.contact_step.size - 1, energy_tables.active > 0.0
@@ -218,17 +258,10 @@ def advance_contact(problem, tables, energy_tables, state, scratch, t_end, rtol,
     if control[NEW] == ENTRY and _switch_pressed(problem, state, log):
         begin_steps(problem, tables, state, scratch, latest_entered(state))
         return RUNNING
-    if stop >= 0:
-        stop, direction = _land_first(
-            problem, tables, state, scratch, stop, direction, near, rtol, t_end, out, due, with_energy
-        )
-        if stop >= 0:
-            state.count[STEPS] += 1
-            if state.now[T] < t_end:
-                switch(problem, state, stop, direction, log)
-                if in_contact(state):
-                    begin_steps(problem, tables, state, scratch, stop)
-            return RUNNING
+    if stop >= 0 and _try_landing(
+        problem, tables, state, scratch, stop, direction, near, rtol, t_end, log, out, due, with_energy
+    ):
+        return RUNNING
     node_set = control[NODE_SET] if control[NEW] else 0
     longest = 0.8 * near
     if problem.table_dt.size:
@@ -254,25 +287,7 @@ def advance_contact(problem, tables, energy_tables, state, scratch, t_end, rtol,
             continue
         level = min(bottom, level + (1 + int(2.0 / _ORDER * math.log2(error / _GOAL)) if error < np.inf else 2))
         wanted = level
-    h = tables.contact_step[level]
-    end = state.now[T] + h
-    if end >= t_end or due[state.count[SAMPLED]] <= end:
-        sample_step(problem, tables, energy_tables, state, scratch, node_set, level, t_end, out, due)
-    if end >= t_end:
-        end_run(problem, tables, state, scratch, node_set, level, t_end)
-        return RUNNING
-    for s in range(problem.gap.size):
-        if state.segment[s] > 0:
-            copy(scratch.force[s], scratch.previous[s], S)
-    if with_energy:
-        account_contact(problem, tables, energy_tables, state, scratch, node_set, level, h, state.x)
-    if state.event_record.shape[0]:
-        record_forces(problem, state, scratch, STEP, end, node_set, level)
-    finish_step(problem, tables, state, scratch, node_set, level)
-    if bent >= 0:  # crossed within the shortest step
-        scratch.side[bent] = -scratch.side[bent]
-    _adapt(tables, scratch, level, node_set, wanted, error)
-    state.count[STEPS] += 1
+    _accept(problem, tables, energy_tables, state, scratch, node_set, level, wanted, error, bent, t_end, out, due)
     return RUNNING
 
 
