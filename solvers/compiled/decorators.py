@@ -8,8 +8,8 @@ under noise, by turns on one machine; ``python tests/bench/compiler_options.py N
 | nrt        | ``_nrt=False``, no reference counts | 1.56 | 1.74 | 1.85 | 1.81  | leave it out                    |
 | force      | ``forceinline``                     | 1.05 | 1.04 | 1.01 | 1.15  | `inlined` becomes `inner`       |
 | merged     | ``inline="always"`` (documented)    | 1.07 | 1.07 | 1.05 | 1.04  | `merged` becomes `inner`        |
-| alias      | the mark in `packed._attribute`    | 1.20 | 1.10 | 1.08 | 0.98  | leave the mark out              |
-|            | arrays by address, `packed`        | 1.73 | 1.82 | 1.82 | 1.46  | hand over the named tuples      |
+| alias      | the mark in `packed._attribute`     | 1.20 | 1.10 | 1.08 | 0.98  | leave the mark out              |
+|            | arrays by address, `packed`         | 1.73 | 1.82 | 1.82 | 1.46  | hand over the named tuples      |
 |            | eight numbers as one, `simd`        | 1.47 | 1.64 | 1.79 | 1.27  | plain loops in `sums`, `flight` |
 
 ``no_cpython_wrapper`` and ``no_cfunc_wrapper`` save most of the compile time of inner functions and no run time.

@@ -15,9 +15,9 @@ from solvers.compiled.state import (
     RENEWAL,
     T,
     contact_row,
-    event_record,
     is_open,
     open_contact,
+    write_event,
 )
 
 
@@ -37,11 +37,11 @@ def margins_in(problem, state, s, x, batch, out):
 
 
 @inner
-def replace_values(problem, state, s, j, delta, rate, log):
+def renew(problem, state, s, j, delta, rate, log):
     """Renew what element s latches on its border j; a row of the log tells of it."""
     size, t = 2 * problem.k.size, state.now[T]
     if state.event_record.shape[0]:
-        event_record(state, RENEWAL, t, t, 0.0, s, j, state.x)
+        write_event(state, RENEWAL, t, t, 0.0, s, j, state.x)
     was_open = is_open(problem, s)
     row = log[state.count[LOGGED]]
     row[0], row[1], row[2], row[4], row[5] = -1.0 - s, t, j, delta, rate

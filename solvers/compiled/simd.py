@@ -1,7 +1,7 @@
-"""Eight numbers as one value of compiled code, with + - * and √.
+"""Eight numbers as one value of compiled code (SIMD), with + - * and √.
 
-The compiler makes vectors of a loop only where it can prove that arrays do not overlap, and then leaves a rest to be
-done one by one.
+The compiler vectorises a loop only where it can prove that arrays do not overlap; then the entries beyond the last
+multiple of the vector's length are done one by one.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class _Model(models.PrimitiveModel):
 
 
 def _operator(function, instruction):
-    """Let compiled code know an operator between eights; products may be fused into sums."""
+    """Define an operator between two vectors in compiled code; products may be fused into sums."""
 
     @infer_global(function)
     class _Typing(ConcreteTemplate):
@@ -62,13 +62,13 @@ def _place(context, builder, kind, array, offset=None):
 
 
 def _places(places):
-    """Which numbers of a vector another one takes."""
+    """Indices of the numbers a shuffle takes."""
     return ir.Constant(ir.VectorType(ir.IntType(32), len(places)), list(places))
 
 
 @intrinsic
 def bit_pattern(typingctx, number):
-    """A number's bits as an integer: its logarithm to base 2 times 2^52, linear between powers of two."""
+    """A number's bits as an integer: 2^52 times its logarithm to base 2, interpolated linearly between powers of 2."""
 
     def codegen(context, builder, signature, arguments):
         return builder.bitcast(arguments[0], ir.IntType(64))

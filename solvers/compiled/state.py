@@ -1,4 +1,4 @@
-"""The state of a run, and what happens to it when a stop switches: pieces, latched rates, contact log."""
+"""The arrays a run changes, the change of a stop's segment with its latched rate, and the contact log."""
 
 from __future__ import annotations
 
@@ -33,27 +33,27 @@ DONE, RUNNING, STEP_TOO_SMALL, DIVERGED, CHATTER, LOG_FULL, LAW_NOT_FINITE, GAIN
 )
 T, H_FLIGHT, H_CONTACT, LAST_EVENT = range(4)  # places in State.now
 STEPS, REJECTED, CALLS, EVENTS, LOGGED, SAMPLED, AT_ONCE, RECORDED = range(8)  # places in State.count
-T_IN, SPEED_IN, PEAK_DELTA, PEAK_FORCE, WORK_IN, IMPULSE_IN, RATE_CLIPPED = range(7)  # columns of State.open
+T_IN, SPEED_IN, PEAK_DELTA, PEAK_FORCE, WORK_IN, IMPULSE_IN, RATE_CLIPPED = range(7)  # columns of State.active
 MOST_EVENTS_AT_ONCE = 100
-STEP, PART, LANDING, EVENT, RENEWAL = 0.0, 1.0, 2.0, 3.0, 4.0  # kinds of tape rows
-KIND, BEGAN, ENDED, SPAN, FIRST, SECOND, HEAD = range(7)  # columns of the tape: two whole numbers that the kind
-# explains, then the state a row begins with and the forces at the nodes of a step
+STEP, PART, LANDING, EVENT, RENEWAL = 0.0, 1.0, 2.0, 3.0, 4.0  # kinds of rows of State.event_record
+KIND, BEGAN, ENDED, SPAN, FIRST, SECOND, HEAD = range(7)  # columns of State.event_record: FIRST and SECOND are two
+# whole numbers whose meaning depends on the kind; from HEAD on the state at the row's begin, then the nodes' forces
 
 
 class State(NamedTuple):
-    """Everything a run changes; it can be continued from here.
+    """All that a run changes; a run can be continued from it.
 
-    `begin_state` fills it, after that kernels alone write, through all of a run. Units as in `kernels.Problem`.
+    `begin_state` fills it; from then on kernels alone write to it. Units as in `kernels.Problem`.
     """
 
     now: Any  # (4,) s: time, flight step, contact step, time of the last event
-    x: Any  # (2n + 2 + 2m,) of the blocks, then the ledger in J (impulses in N s), see `kernels`
+    x: Any  # (2n + 2 + 2m,) of the blocks, then the energy balance in J (impulses in N s), see `kernels`
     rate: Any  # of x, per s; stepping methods only
-    segment: Any  # (m,) 0 in flight, j > 0 between levels j-1 and j
+    segment: Any  # (m,) of the law: 0 in flight, j > 0 between the stop's knots j-1 and j
     entry_rate: Any  # (m,) m/s, latched
-    active: Any  # (m, 7) of the contacts under way, SI units, columns named above
-    count: Any  # (8,) steps, rejected ones, law calls, ..., as named above
-    event_record: Any  # (rows, HEAD + x.size + forces) what happened in contact, for the tangent; no rows, no tape
+    active: Any  # (m, 7) contacts under way, SI units, columns named above
+    count: Any  # (8,) steps, rejected steps, law calls, ..., as named above
+    event_record: Any  # (rows, HEAD + x.size + forces) contact steps and events, for the tangent; else no rows
 
 
 STATE = types.NamedTuple(
@@ -64,19 +64,19 @@ STATE = types.NamedTuple(
 
 @inner
 def surface_tolerance(problem, s, x):
-    """Distance within which a stop counts as on a level: rounding of δ."""
+    """Distance, m, within which a stop counts as on a knot: rounding of δ."""
     return 1e-15 * (abs(problem.gap[s]) + abs_dot(problem.read[s], x, 2 * problem.k.size)) + 1e-20
 
 
 @inner
 def rate_tolerance(problem, s, x):
-    """Indentation rate below which a stop counts as at rest: rounding of δ̇, coupled blocks amplify it."""
+    """Indentation rate, m/s, below which a stop counts as at rest: rounding of δ̇, which coupled blocks amplify."""
     return 1e-13 * abs_dot(problem.read_rate[s], x, 2 * problem.k.size)
 
 
 @inner
 def write_event(state, kind, began, ended, span, first, second, x):
-    """Write a row of the tape: what happened from ``began`` at x to ``ended``."""
+    """Append a row to the event record: what happened from ``began``, in the state x, to ``ended``."""
     row = state.event_record[state.count[RECORDED]]
     row[KIND], row[BEGAN], row[ENDED], row[SPAN], row[FIRST], row[SECOND] = kind, began, ended, span, first, second
     for e in range(state.x.size):
@@ -86,7 +86,7 @@ def write_event(state, kind, began, ended, span, first, second, x):
 
 @inner
 def open_contact(problem, state, s, t, delta_dot):
-    """Latch the entry rate and begin a row of the contact log."""
+    """Latch the entry rate and begin the row of a contact under way."""
     balance = 2 * problem.k.size + 2 + 2 * s
     state.entry_rate[s] = max(abs(delta_dot), problem.floor[s])
     state.active[s, T_IN] = t
@@ -100,7 +100,7 @@ def open_contact(problem, state, s, t, delta_dot):
 
 @kernel
 def begin_contacts(problem, state):
-    """Put every stop on its piece at the start of a run and open the contacts under way."""
+    """Find the segment of every stop at the start of a run and begin the contacts under way."""
     for s in range(problem.gap.size):
         delta = indentation(problem, s, state.x)
         segment = 0
@@ -130,7 +130,7 @@ def contact_row(problem, state, s, t_out, speed_out, row):
 
 @inner
 def switch(problem, state, s, direction, log):
-    """Move stop s one piece up or down; open or close its contact."""
+    """Move stop s one segment up or down; begin its contact, or end it and log it."""
     t = state.now[T]
     delta_dot = dot(problem.read_rate[s], state.x, 2 * problem.k.size)
     if state.event_record.shape[0]:
@@ -148,7 +148,7 @@ def switch(problem, state, s, direction, log):
 
 @inlined
 def switch_on_surface(problem, state, log, locates):
-    """Switch every stop that sits on a border of its piece and moves out of it; returns whether any did."""
+    """Switch every stop that is on an end of its segment and moves out of it; returns whether any did."""
     switched = False
     for s in range(problem.gap.size):
         delta = indentation(problem, s, state.x)
@@ -206,7 +206,7 @@ def new_state(z: Any, stops: int) -> State:
 
 
 def problem_of(system: System, forcing: Forcing) -> Problem:
-    """Arrays the kernels read, in block coordinates."""
+    """The arrays that kernels read, in block coordinates."""
     return _problem(system, forcing, system.about_structure.get("linear", lambda: _linear_part(system)))
 
 
@@ -248,7 +248,7 @@ def _vectors(system: System) -> Array:
 
 
 def _problem(system: System, forcing: Forcing, linear: dict[str, Array]) -> Problem:
-    """The linear part with the laws and the signals."""
+    """The linear arrays with those of the laws and the signals."""
     contacts, m = system.contacts, len(system.contacts)
     most = max([len(c.law.knots) for c in contacts], default=0) + 1
     knots = np.full((m, most + 1), math.inf)
@@ -283,7 +283,7 @@ def _integers(contacts: Sequence[Any], name: str) -> Array:
     return np.array([getattr(contact.law, name, 0) for contact in contacts], dtype=np.int64)
 
 
-def _latched(contacts: Sequence[Any]) -> Array:
+def _latched(contacts: Sequence[Any]) -> Any:
     """(m, l) places of the latched numbers among the parameters, padded by -1."""
     places = [getattr(contact.law, "memory", ()) for contact in contacts]
     table = np.full((len(contacts), max([len(row) for row in places], default=0)), -1, dtype=np.int64)
@@ -292,7 +292,7 @@ def _latched(contacts: Sequence[Any]) -> Array:
     return table
 
 
-def _opening(law: Law) -> int:
+def _opening(law: Any) -> int:
     """Place of the segment code that is 0 while the law is open, or -1."""
     return int(law.memory[0]) if getattr(law, "opens", False) else -1
 

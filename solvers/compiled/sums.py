@@ -1,8 +1,8 @@
-"""Weighted sums of table rows, and iterations for the forces at eight nodes, in vector registers.
+"""Weighted sums of table rows, and the iteration for the forces at eight nodes, in vector registers.
 
-The compiler cannot know that a result does not overlap the table it is computed from, and therefore neither vectorises
-these sums nor keeps them in registers by itself. Rows, start and result hold a multiple of `WIDTH` numbers. What is
-said of eight numbers is meant for the `node_sets.S` nodes of a contact step.
+The compiler cannot know that a result does not overlap the table it is computed from; so it neither vectorises these
+sums nor keeps them in registers by itself. Rows, start and result hold a multiple of `WIDTH` numbers; the functions of
+eight numbers serve the S = 8 nodes of a contact step, see `contact.nodes`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ def padded(size: int) -> int:
 
 @inlined
 def replace_values(old, new):
-    """Eight numbers take new values: the squares of their change and of their new size, summed."""
+    """Replace eight numbers by new ones; returns the sums of the squares of the changes and of the new values."""
     after = load8(new, 0)
     change = after - load8(old, 0)
     store8(old, 0, after)
@@ -27,13 +27,14 @@ def replace_values(old, new):
 
 @inlined
 def iterate_power_law(rows, free, force, motion, stiffness, rooted, damping, viscosity):
-    """One iteration for the forces at eight nodes, all in registers: squares of their change and size, summed.
+    """One fixed-point iteration for the forces at eight nodes; returns Σ change² and Σ force², N².
 
-    Indentations and rates at the nodes are free + Σ_e force[e] rows[e], kept in ``motion``; the new forces are
-    K d (1 + a d') + c d' with d no less than zero, or with d √d for d if ``rooted``.
+    ``rows`` (8, 16) is what a unit force at a node does to δ and δ̇ at all nodes. Indentations and rates are
+    free + Σ_e force[e] rows[e] and are written to ``motion`` (2, 8); the new forces K d (1 + a δ̇) + c δ̇ to ``force``
+    (8,), with d = max(δ, 0), or d^{3/2} if ``rooted``.
     """
     old, delta, rate = load8(force, 0), load8(free[0], 0), load8(free[1], 0)
-    more, faster = splat8(0.0), splat8(0.0)  # each sum waits for its own last term only
+    more, faster = splat8(0.0), splat8(0.0)  # two chains of sums run side by side in the processor
     for e in range(0, WIDTH, 2):
         one, two = splat8(force[e]), splat8(force[e + 1])
         delta += one * load8(rows[e], 0)
@@ -60,11 +61,11 @@ def above(source, least, result):
 
 @inlined
 def combine(rows, weights, count, start, result):
-    """Sum rows: result = start + Σ_{e < count} weights[e] rows[e]; start may be result, or None for zero."""
+    """Sum rows: result = start + Σ_{e < count} weights[e] rows[e]; ``start`` may be ``result``, or None for zero."""
     width = rows.shape[-1]
     for first in range(0, width, WIDTH):
         even = splat8(0.0) if start is None else load8(start, first)
-        odd = splat8(0.0)  # each waits for its own last sum only
+        odd = splat8(0.0)  # a second chain of sums
         for e in range(0, count - 1, 2):
             even += splat8(weights[e]) * load8(rows, e * width + first)
             odd += splat8(weights[e + 1]) * load8(rows, (e + 1) * width + first)

@@ -1,7 +1,7 @@
-"""The tables that grow with blocks and stops: what a state and forces do on contact steps, and what structures share.
+"""The tables that grow with blocks and stops: responses to a state and to forces on contact steps.
 
-A few stops have tables of what reaches every one of them; with more only the responses of the blocks are kept, see
-`contact.many_stops`.
+For a few stops the response of every stop to every force is kept; for more only those of the blocks are, see
+`contact.many_stops`. Systems of equal structure share them.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from solvers.exponential.contact.nodes import PHASES, NodeSets, S, gauss
 from solvers.exponential.responses import fill_free, fill_node_propagators, fill_propagators, fill_weighting
 from solvers.problem import Memo
 
-FEW = 2  # stops that have tables of their own; three are as quick through the blocks, more are quicker
+FEW = 2  # stops up to which each has tables of its own: with three both ways take the same time
 MOST_BYTES = 4e9
 
 
 class Blocks(NamedTuple):
-    """The part of the tables that takes long, block by block; no contact force reaches the tones' blocks."""
+    """The tables that take long to fill, block by block; contact forces do not act on the tones' blocks."""
 
     flight_propagator: Any
     contact_propagator: Any
@@ -35,11 +35,11 @@ class Blocks(NamedTuple):
     block_end_response: Any
 
 
-_CACHE = Memo(1 << 27)  # `Blocks` of structures met lately: a tone, gap or stiffness more is cheap
+_CACHE = Memo(1 << 27)  # `Blocks` of recent structures: another tone, gap or stiffness of a stop is cheap
 
 
 def blocks_of(problem: Problem, tones: int, h: Any, contact_h: Any, node_sets: NodeSets) -> Blocks:
-    """Tables of all blocks, zero for the tones; those of a structure met lately are kept."""
+    """Tables of all blocks, zero for the tones; those of recent structures are kept."""
     size = len(problem.k)
     own = size - tones
     rows = (row.reshape(-1, 2, size)[:, :, :own] for row in (problem.push, problem.read, problem.load))
@@ -66,7 +66,7 @@ def blocks_of(problem: Problem, tones: int, h: Any, contact_h: Any, node_sets: N
 def _shapes(
     stops: int, loads: int, size: int, own: int, levels: int, node_sets: NodeSets
 ) -> dict[str, tuple[int, ...]]:
-    """Of the tables that a few stops have, and those of many; what the others have is empty."""
+    """Shapes of the tables for a few stops and of those for many; one of the two groups is empty."""
     kinds, weightings, inputs, few = len(node_sets.kinds), len(node_sets.weightings), stops + loads, stops <= FEW
     many = 0 if few else levels
     levels = levels if few else 0
@@ -81,7 +81,7 @@ def _shapes(
 
 
 def _require_room(stops: int, loads: int, size: int, levels: int, node_sets: NodeSets) -> None:
-    """Refuse tables, or matrices of stops that touch together, beyond what a machine has."""
+    """Refuse tables and matrices of simultaneous contacts that need more than `MOST_BYTES`."""
     numbers = sum(math.prod(shape) for shape in _shapes(stops, loads, size, size, levels, node_sets).values())
     wanted = 8 * (numbers + (S * stops) ** 2)
     if wanted > MOST_BYTES:
@@ -122,7 +122,7 @@ def filled(
 
 
 def _fill_weightings(tables: Blocks, problem: Problem, contact_h: Any, node_sets: NodeSets) -> None:
-    """What forces do; the responses of the blocks are working space where pairs are kept."""
+    """Responses to forces; those of the blocks are scratch where the response of every stop is kept."""
     inputs = np.ascontiguousarray(np.concatenate((problem.push, problem.load)).reshape(-1, 2 * len(problem.k)))
     own = tables.block_end_response.shape[3]
     response, ending = tables.block_response, tables.block_end_response

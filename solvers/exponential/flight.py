@@ -1,7 +1,7 @@
 """Exact flight: propagators of the blocks, polynomial signals, Taylor steps.
 
 A flight step multiplies every block by its tabulated propagator α I + β A and adds the response to the quintics
-of the sampled signals; what is shorter than the shortest table entry is a Taylor step of order 6, exact to rounding.
+of the sampled signals; a step below the shortest of the tables is a Taylor step of order 6, exact to rounding.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from solvers.compiled.simd import WIDTH, bit_pattern, load8, splat8, sqrt8, stor
 from solvers.compiled.sums import combine
 
 ORDER = 6
-_CURVED = int(0.345 * 2**50)  # by which a logarithm that is linear between powers of two can be wrong, times four
-SERIES_TERMS = 14  # terms of a series that is exact to rounding up to |λ| x = LONG_REACH: 0.6^14/14! = 9e-15
+_CURVED = int(0.345 * 2**50)  # error of a logarithm that is linear between powers of two, times four
+SERIES_TERMS = 14  # terms of a series that is exact to rounding up to |λ| x = SERIES_REACH: 0.6^14/14! = 9e-15
 SERIES_REACH = 0.6
 
 
@@ -41,7 +41,7 @@ def cell_of(problem, t):
 
 @inlined
 def _quintic(problem, j, cell):
-    """Coefficients of node table j on a cell, in powers of the part of the cell."""
+    """Coefficients of the quintic of node table j on a cell, in powers of (t - start)/dt."""
     dt = problem.table_dt[j]
     row = problem.table_start[j] + cell
     a, b = problem.table[row], problem.table[row + 1]
@@ -133,7 +133,7 @@ def taylor_terms(problem, x, t, terms, signal_terms):
 
 @inner
 def taylor_step(terms, x, span, size, weights, sums):
-    """Taylor step of the given duration; the last two arguments are working space."""
+    """Taylor step of the given duration; the last two arguments are scratch."""
     weights[0] = 1.0
     for i in range(ORDER):
         weights[i + 1] = weights[i] * span / (i + 1.0)

@@ -1,4 +1,4 @@
-"""Derivative of a run of `method`, carried over what its tape tells.
+"""Derivative of a run of `method`, step by step along its event record.
 
 Every accepted contact step is linearised as it was taken. With Y the derivative of the state at fixed time,
 
@@ -9,9 +9,9 @@ Every accepted contact step is linearised as it was taken. With Y the derivative
     step     (1 - D C) dF = D (free response of Y) + ∂F/∂(entry rate) d(entry rate),   Y ← E(h) Y + kick dF
     landing  the variational equation, on the stages of the Runge–Kutta step
 
-The first step of a power law with a broken exponent knows the force as t^p times a smooth function of √t, where t
-counts from the entry. Its derivative at fixed time is singular there, so that step is linearised in a frame which moves
-with the entry, Y + f dt*, f the state's rate, and brought back at its end.
+On the first step of a power law with a broken exponent the force is t^p times a smooth function of √t, with t from the
+entry on. Its derivative at fixed time is singular there; so that step is linearised in a frame that moves with the
+entry, Y + f dt* with f the rate of the state, and transformed back at its end.
 
 A parameter adds a column. Where it changes only loads' tones, gaps and laws, Y_p = W + P(t) with P the derivative of
 the steady response to the tones, known in closed form at any time, so that W obeys the equations above with P among the
@@ -75,7 +75,7 @@ from solvers.exponential.linearised_step import (
 from solvers.exponential.preparation import SCRATCH, TABLES
 from solvers.exponential.responses import propagate
 
-_OFF = 1e-10  # relative distance from a knot at which a law is on one side of it for sure
+_OFF = 1e-10  # relative distance from a knot at which a law is certainly on one side of it
 
 
 _problem, _tables, _state, _scratch = unpacker(PROBLEM), unpacker(TABLES), unpacker(STATE), unpacker(SCRATCH)
@@ -104,7 +104,7 @@ def _force(problem, past, s, delta, delta_dot, batch):
 
 @inner
 def _begin(problem, past, derivatives, variation):
-    """Put the stops on their pieces as the run does at its start, and latch the derivative of their rates."""
+    """Find the segments of the stops as the run does at its start, and latch the derivatives of their rates."""
     begin_contacts(problem, past)
     for s in range(problem.gap.size):
         if past.segment[s] > 0:
@@ -116,7 +116,7 @@ def _begin(problem, past, derivatives, variation):
 
 @inner
 def _cross_knot(problem, past, derivatives, variation, s, direction):
-    """A stop passes a border of its piece."""
+    """A stop passes a border of its segment."""
     size, t = 2 * problem.k.size, past.now[T]
     rate = dot(problem.read_rate[s], past.x, size)
     segment = past.segment[s]
@@ -147,14 +147,14 @@ def _cross_knot(problem, past, derivatives, variation, s, direction):
 
 @inner
 def _inside_segment(problem, past, s, x):
-    """Indentation, kept off the knots at which the slope of the law would be that of the next piece."""
+    """Indentation, kept off the knots, where the slope of the law could be that of the next segment."""
     lower, upper = problem.knots[s, past.segment[s] - 1], problem.knots[s, past.segment[s]]
     return min(max(indentation(problem, s, x), lower * (1.0 + _OFF)), upper * (1.0 - _OFF))
 
 
 @inner
 def _note_sides(problem, tables, past, scratch):
-    """Into ``scratch.unresolved`` whether each law that is cut at zero pushes as a landing begins."""
+    """Force before its cut at the begin of a landing, for laws cut at zero force, into ``scratch.unresolved``."""
     for s in range(problem.gap.size):
         if past.segment[s] > 0 and tables.bend[s] == FORCE:
             scratch.unresolved[s] = side_at(problem, tables, past, s, past.x, scratch.trial)
@@ -162,7 +162,7 @@ def _note_sides(problem, tables, past, scratch):
 
 @inlined
 def _gradient(problem, tables, past, scratch, s, batch):
-    """Derivatives of a law at one stage of a landing, on the side of its bend on which that began."""
+    """Derivatives of a law at one stage of a landing, on the side of its bend on which the landing began."""
     d, v, rate = batch[0:1], batch[1:2], past.entry_rate[s]
     if tables.bend[s] != FORCE:
         contact_gradient(problem, s, d, v, rate, batch[2:3], batch[3:4], batch[4:5])
@@ -261,10 +261,10 @@ def linearise_run(
     modes,
     begins,
 ):
-    """Carry the derivatives over what a run has taped, up to the time it has reached, and let it tape anew.
+    """Move the derivatives along the event record of a run to the time it has reached, and empty the record.
 
-    ``ahead`` and ``behind`` are the problems whose laws have the parameter's other values, ``past`` the state as it
-    was; blocks beyond the ``modes`` are tones.
+    ``ahead`` and ``behind`` are the problems whose laws have the other values of the parameter, ``past`` the state at
+    the time the derivatives have reached; blocks from ``modes`` on are tones.
     """
     problem, ahead, behind, tables = _problem(problem_at), _problem(ahead_at), _problem(behind_at), _tables(tables_at)
     state, scratch, past = _state(state_at), _scratch(scratch_at), _state(past_at)

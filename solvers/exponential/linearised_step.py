@@ -1,4 +1,4 @@
-"""Derivatives carried along a run, and the derivative of one collocated step; see `linearised`."""
+"""The derivatives moved along a run, and the derivative of one collocated step; see `linearised`."""
 
 from __future__ import annotations
 
@@ -27,7 +27,10 @@ from solvers.exponential.flight import propagate_blocks, signal_derivatives
 
 
 class Derivatives(NamedTuple):
-    """Derivatives carried along and working space; columns are the first index."""
+    """Derivatives and scratch arrays; the first index counts columns: the 2n start coordinates, then the parameter.
+
+    `Tangent` fills y, from then on `linearise_run` alone writes to them.
+    """
 
     y: Any  # (columns, x.size) of the state at fixed time
     entry: Any  # (columns, m) of the latched entry rates
@@ -36,7 +39,7 @@ class Derivatives(NamedTuple):
     signal: Any  # (L, S) slopes of the sampled signals there
     response: Any  # (m, 2, S) of δ and δ̇ to these slopes
     by_parameter: Any  # (m, S) ∂F/∂parameter there
-    rate: Any  # (2, x.size) of the state at both ends of a step; at last the first is that at the time reached
+    rate: Any  # (2, x.size) of the state at both ends of a step; after a call the first is that at the time reached
     stages: Any  # (STAGES, columns, x.size) of a landing
     trial: Any  # (columns, x.size)
     batch: Any  # (8,)
@@ -46,9 +49,9 @@ class Derivatives(NamedTuple):
 
 
 class Variation(NamedTuple):
-    """What a parameter changes per unit, besides the state; none when ``step`` is zero."""
+    """Changes by a parameter, per unit, besides that of the state; ``step`` is zero without a parameter."""
 
-    step: float  # half the distance of the two systems it was taken from
+    step: float  # half the distance between the two systems of the difference
     law_step: float  # the same; zero where their laws are the same
     omega: Any  # (K,) tones
     steady: Any  # (K, m, 2, 4): (Re a, Im a, Re b, Im b) of δ and δ̇ = Re (a + t b) e^{iωt}
@@ -64,7 +67,7 @@ VARIATION = types.NamedTuple([REAL, REAL, VECTOR, types.Array(REAL, 4, "C"), VEC
 
 @inlined
 def explicit_change(variation, s, d, t):
-    """Change of δ (d = 0) or δ̇ that the parameter makes by itself at time t."""
+    """Explicit change of δ (d = 0) or δ̇ by the parameter at time t: the state is held fixed."""
     total = -variation.gap[s] if d == 0 else 0.0
     for j in range(variation.omega.size):
         a = variation.steady[j, s, d]
@@ -75,7 +78,7 @@ def explicit_change(variation, s, d, t):
 
 @inlined
 def change_of(problem, variation, derivatives, column, s, d, t):
-    """Change of δ or δ̇ of a stop at fixed time."""
+    """Change of δ (d = 0) or δ̇ of a stop at fixed time, in one column."""
     row = problem.read[s] if d == 0 else problem.read_rate[s]
     value = dot(row, derivatives.y[column], 2 * problem.k.size)
     return value + explicit_change(variation, s, d, t) if is_parameter(variation, derivatives, column) else value
@@ -107,7 +110,7 @@ def change_by_latched(problem, derivatives, column, s, n, i):
 
 @inlined
 def _by_parameter(ahead, behind, past, scratch, variation, derivatives, s):
-    """∂F/∂parameter at the nodes of a stop, from the law at both parameters."""
+    """∂F/∂parameter at the nodes of a stop, by the difference of the law at both parameters."""
     for i in range(S):
         derivatives.by_parameter[s, i] = 0.0
     if variation.law_step == 0.0:
@@ -241,5 +244,5 @@ def linearise_step(problem, ahead, behind, tables, past, scratch, derivatives, v
         if moving:
             for e in range(size):
                 y[e] -= derivatives.rate[1, e] * shift
-            for b in range(modes, problem.k.size):  # tones do not change; their rounding would outlive the rest
+            for b in range(modes, problem.k.size):  # tones do not change; undamped, their rounding would stay
                 y[b], y[problem.k.size + b] = 0.0, 0.0

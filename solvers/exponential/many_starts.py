@@ -1,10 +1,11 @@
-"""The loop of `method` over many starts: one compiled call takes one after the other to the end.
+"""Many starts: one compiled call integrates one start after the other by `method.advance`.
 
-It runs the very machine code of a single run, through its address, so that every bit of the results is the same.
+It calls the machine code of a single run through its address, so that all results are the same bit for bit.
 """
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,15 +28,15 @@ from solvers.compiled.state import (
     T,
     is_open,
 )
-from solvers.exponential.energy.check import ALLOWED, FACTOR, FIRST, LAST, has_gained, tolerated_energy
+from solvers.exponential.energy.check import ALLOWED, FACTOR, LAST, has_gained
 from solvers.exponential.energy.flight_tables import NO_ENERGY_TABLES
 from solvers.exponential.method import Engine, advance
 from solvers.exponential.preparation import SCRATCH
 from solvers.problem import COLUMNS, Array, ContactLog, Status
 
-NEXT, BEYOND, BEGUN = range(3)  # places in a cursor: the start at work, the end of its stretch, whether it is under way
-CODE, CONTACTS = range(2)  # columns of Ends.count
-REACHED, EXCHANGED, ENERGY = range(3)  # columns of Ends.number; three of energy, as in Space.energy
+NEXT, BEYOND, BEGUN = range(3)  # places in a cursor: present start, end of the stretch, whether the start has begun
+CODE, CONTACTS = range(2)  # columns of Outcomes.count
+REACHED, EXCHANGED, ENERGY = range(3)  # columns of Outcomes.number; three of energy, as in Scratch.energy
 _STOP, _DELTA, _FORCE = (
     list(ContactLog.__dataclass_fields__).index(n) for n in ("stop", "peak_indentation", "peak_force")
 )
@@ -46,7 +47,7 @@ _problem, _state, _scratch = unpacker(PROBLEM), unpacker(STATE), unpacker(SCRATC
 
 
 class Outcomes(NamedTuple):
-    """What becomes of k starts."""
+    """Outcomes of k starts."""
 
     x: Any  # (k, 2N) states of all blocks
     count: Any  # (k, 2) code of the status, number of contacts
@@ -55,7 +56,7 @@ class Outcomes(NamedTuple):
 
     @classmethod
     def of(cls, starts: int, width: int, stops: int) -> Outcomes:
-        """Of starts that have not begun."""
+        """Those of starts that have not begun."""
         count = np.zeros((starts, 2), dtype=np.int64)
         count[:, CODE] = STATUSES.index(Status.INTERRUPTED)
         x, number = np.full((starts, width), np.nan), np.zeros((starts, 5))
@@ -64,7 +65,7 @@ class Outcomes(NamedTuple):
 
 @inner
 def _note(stop, delta, force, count, number, peak):
-    """A contact among those of its start."""
+    """Count a contact and its peaks among those of its start."""
     count[CONTACTS] += 1
     number[EXCHANGED] += abs(delta * force)
     peak[stop, 0], peak[stop, 1] = max(peak[stop, 0], delta), max(peak[stop, 1], force)
@@ -85,7 +86,7 @@ def _begin(problem, state, numbers, rest, parameters, start):
 
 @inner
 def _end(problem, state, scratch, code, x, count, number, peak):
-    """The outcome of a run that is over."""
+    """Write the outcome of a finished run."""
     finite = True
     for e in range(x.size):
         x[e] = state.x[e]
@@ -110,7 +111,7 @@ def advance_many(
     run, problem_at, tables_at, state_at, scratch_at, energy_tables_at, numbers, rest, parameters, starts, cursor,
     t_end, budget, rtol, landing_reach, log, out, due, x, count, number, peak,
 ):  # fmt: skip
-    """Take the starts of a stretch to ``t_end`` one after the other, for about ``budget`` steps of them all.
+    """Integrate the starts of a stretch to ``t_end`` one after the other, for about ``budget`` steps altogether.
 
     ``run`` is `method.advance`; ``numbers`` is a workspace's memory and ``rest`` what it holds before a start is added,
     ``parameters`` what the laws have latched then.
@@ -125,8 +126,9 @@ def advance_many(
             cursor[BEGUN] = 1
         spent -= state.count[STEPS] + state.count[REJECTED]
         code = run(
-            problem_at, tables_at, state_at, scratch_at, energy_tables_at, t_end, budget, rtol, landing_reach, log, out, due
-        )  # fmt: skip
+            *(problem_at, tables_at, state_at, scratch_at, energy_tables_at),
+            *(t_end, budget, rtol, landing_reach, log, out, due),
+        )
         spent += state.count[STEPS] + state.count[REJECTED] + 1
         for row in range(state.count[LOGGED]):
             if log[row, _STOP] < 0.0:  # a border of a law with memory
@@ -139,7 +141,7 @@ def advance_many(
 
 
 class Worker:
-    """An engine that takes stretches of the starts to their ends; each thread has one of its own."""
+    """An engine that integrates stretches of the starts; each thread has one of its own."""
 
     def __init__(self, engine: Engine, starts: Array, outcomes: Outcomes, budget: int) -> None:
         self.engine, self.cursor = engine, np.zeros(3, dtype=np.int64)
@@ -152,22 +154,22 @@ class Worker:
         )
 
     def assign(self, first: int, beyond: int) -> None:
-        """Make these starts the stretch to work at."""
+        """Set the stretch of starts to integrate."""
         self.cursor[:] = first, beyond, 0
 
     def march(self) -> bool:
-        """Go on with the stretch for a while; whether it is done."""
+        """Continue with the stretch for about a budget of steps; whether it is done."""
         advance_many(*self.arguments)
         return bool(self.cursor[NEXT] == self.cursor[BEYOND])
 
 
 def final_statuses(engine: Engine, outcomes: Outcomes) -> Any:
-    """(k,) `Status` of every start: that of its run, unless it ends with more energy than it can have been given."""
+    """(k,) `Status` of every start: that of its run, or `UNBALANCED` if it ends with more energy than it was given."""
     status = np.array(STATUSES, dtype=object)[outcomes.count[:, CODE]]
     energy = outcomes.number[:, ENERGY:]
-    slack = tolerated_energy(1.0, np.zeros(1), engine.method.rtol) * (energy[:, FIRST] + outcomes.number[:, EXCHANGED])
-    much = (outcomes.count[:, CODE] == DONE) & (energy[:, LAST] > FACTOR * (energy[:, ALLOWED] + slack))
+    much = (outcomes.count[:, CODE] == DONE) & (energy[:, LAST] > FACTOR * energy[:, ALLOWED])
     for i in np.flatnonzero(much):
-        if has_gained(engine.system, energy[i], engine.problem, engine.duration, slack[i]):
+        exchanged = partial(float, outcomes.number[i, EXCHANGED])
+        if has_gained(engine.system, energy[i], engine.problem, engine.duration, exchanged, engine.method.rtol):
             status[i] = Status.UNBALANCED
     return status

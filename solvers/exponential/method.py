@@ -1,4 +1,4 @@
-"""The main method: exact flight, collocated contact, every event landed on.
+"""The main method: exact flight, collocated contact, every event located.
 
 A tone Re(a e^{iΩt}) of a load is subtracted as its steady response, which then is one more undamped block with
 k = Ω², c = 0 that no force pushes; so flight under tones is an autonomous linear system and exact in one
@@ -7,18 +7,19 @@ safe, `contact` solves the contacts and lands on their ends.
 
 Limitations
 -----------
-* In flight no contact of the model is missed, however short. While one stop is in contact the others are watched by
+* In flight no contact of the model is missed, however short. While one stop is in contact the others are checked by
   polynomials through 8 nodes per step: of 16 000 contacts 1e-4 to 1e-1 of the amplitude deep none was missed
-  (`python tests/bench/second_contacts.py 100`), but nothing is proven.
-* Touching is no contact: a stop counts as entered where δ becomes positive. An entry at rest counts when δ̈ > 0; one
-  at rest that another stop's force brings about is noticed a shortest step (1e-9 s) late.
-* A law that bends elsewhere than at its declared knots and its `bend` is integrated with smaller steps, at lower order;
-  so is the beginning of one whose powers of δ are no multiples of 1/4. The tolerance is kept.
+  (`python tests/bench/second_contacts.py 100`), but this is not proven.
+* A contact begins where δ becomes positive; δ = 0 alone is no contact. An entry with δ̇ = 0 counts if δ̈ > 0; where
+  the force of another stop causes such an entry, it is found one shortest step (1e-9 s) late.
+* A law with a kink elsewhere than at its declared knots and its `bend` is integrated with smaller steps, at lower
+  order; so is the begin of a contact whose law has powers of δ that are no multiples of 1/4. The tolerance is kept.
 * K and C must be positive semi-definite (no buckled modes, no negative damping; a contact law may drive).
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -26,7 +27,7 @@ import numpy as np
 from numba import types
 
 from solvers.compiled.kernels import MATRIX, PROBLEM, REAL, VECTOR, entry
-from solvers.compiled.packed import Packed, PackedCopy, unpacker
+from solvers.compiled.packed import Packed, unpacker
 from solvers.compiled.renewals import most_rows
 from solvers.compiled.state import (
     AT_ONCE,
@@ -50,7 +51,7 @@ from solvers.compiled.state import (
 from solvers.exponential.contact.landing import landing_reach
 from solvers.exponential.contact.step import BEGUN, NEW, advance_contact, begin_steps, latest_entered
 from solvers.exponential.energy.balance import account_state, start_account
-from solvers.exponential.energy.check import FIRST, has_gained, note_energy, own_energy, tolerated_energy
+from solvers.exponential.energy.check import FIRST, has_gained, note_energy, own_energy
 from solvers.exponential.energy.flight_tables import ENERGY_TABLES, NO_ENERGY_TABLES
 from solvers.exponential.preparation import SCRATCH, TABLES, prepare_run
 from solvers.exponential.safe_steps import fly
@@ -66,7 +67,8 @@ def advance(
 ):
     """Advance the state to ``t_end`` or for about ``budget`` steps; returns a status code.
 
-    ``out`` gets the states at the times ``due``, the last of which is infinite; ``landing_reach`` is that of `landing.landing_reach`.
+    Row i of ``out`` gets the state at the time ``due[i]``; the last of these times is infinite. ``log`` gets a row per
+    finished contact. ``landing_reach`` is that of `landing.landing_reach`.
     """
     problem, tables, state, scratch = _problem(problem_at), _tables(tables_at), _state(state_at), _scratch(scratch_at)
     energy_tables, control = _energy_tables(energy_tables_at), scratch.control
@@ -87,7 +89,7 @@ def advance(
             return RUNNING
         if state.count[AT_ONCE] > MOST_EVENTS_AT_ONCE:
             return CHATTER
-        between = in_contact(state) and not control[NEW]  # in a contact no border is met but by landing on it
+        between = in_contact(state) and not control[NEW]  # within a contact a border is met by landing on it only
         if not between and switch_on_surface(problem, state, log, True):
             if in_contact(state):
                 begin_steps(problem, tables, state, scratch, latest_entered(state))
@@ -116,14 +118,14 @@ class Exponential:
     ----------
     rtol : error of an indentation rate that one contact step may make, relative to the speed of entry (or a tenth of
         what the motion could reach at the stop, whichever is larger), in [1e-12, 1e-2]. Flight is exact.
-    ledger : keep the energy ledger of runs with output samples, by closed forms of the steps; without it their input
+    ledger : keep the energy balance of runs with output samples, by closed forms of the steps; without it their input
         and damping are NaN, the motion is the same and 1.5 to 2.7 times as quick. Runs with ``dt=None`` keep none.
 
     Notes
     -----
-    Cost is nearly independent of rtol and grows linearly with the number of modes. See the module for its limits. A run
-    with a ledger that leaves more than (20 rtol + 1e-9) of the energy handled unaccounted for is refused, one without
-    if it ends with four times the energy it can have been given, see `energy.check`.
+    Cost is nearly independent of rtol and grows linearly with the number of modes. See the module for the limits. A run
+    whose energy balance has a residual above (20 rtol + 1e-9) of the energy handled is refused; a run without a balance
+    is refused if it ends with four times the energy it can have been given, see `energy.check`.
 
     Examples
     --------
@@ -140,7 +142,7 @@ class Exponential:
             raise ValueError(f"rtol must lie in [1e-12, 1e-2], got {self.rtol!r}")
 
     def engine(self, system: System, z: Array, forcing: Forcing, duration: float) -> Engine:
-        """The method made ready for one run."""
+        """The method prepared for one run."""
         return Engine(self, system, z, forcing, duration)
 
 
@@ -150,7 +152,7 @@ def _spacing(due: Array) -> float:
 
 
 class Engine:
-    """One run: problem with tones among the blocks, tables, state."""
+    """One run: the problem with a block per tone, its tables, its state."""
 
     def __init__(self, method: Exponential, system: System, z: Array, forcing: Forcing, duration: float) -> None:
         self.method, self.system, self.duration, self.landing_reach = (
@@ -161,14 +163,14 @@ class Engine:
         )
         forcing, prepared = prepare_run(system, forcing, duration, method.rtol)
         self.back = prepared.back
-        packed: PackedCopy | Packed = prepared.problem
+        packed = prepared.problem
         own: dict[str, Array] = {}
         if forcing.table.size:
             own = {"table": forcing.table, "table_start": forcing.table_start}
         if prepared.problem.value.border_count.any():  # laws latch numbers among their parameters
             own["parameters"] = prepared.problem.value.parameters.copy()
         if own:
-            packed = Packed(packed.value._replace(**own), PROBLEM)
+            packed = Packed.of(packed.value._replace(**own), PROBLEM)
         self.packed, self.problem, self.prepared = packed, packed.value, prepared
         self.workspace = prepared.workspace()
         self.workspace.begin(z)
@@ -180,28 +182,27 @@ class Engine:
         return self.workspace.state
 
     def record_events(self, event_record: Array) -> None:
-        """Write what happens in contact to a tape."""
+        """Record contact steps and events in an array, for the tangent."""
         self.workspace.record_events(event_record)
 
     def release(self) -> None:
-        """Leave the workspace to another run; nothing may look at this one's state any more."""
+        """Leave the workspace to another run; this run's state must not be read any more."""
         if not self.workspace.state.event_record.size:
             self.prepared.spare_workspaces.append(self.workspace)
 
     def start(self) -> None:
-        """The compiled loop does so itself."""
+        """Nothing to do: the compiled loop starts by itself."""
 
     def keeps_ledger(self, sampled: bool) -> bool:
-        """Whether input and damping of the energy ledger are known."""
+        """Whether input and damping of the energy balance are known."""
         return self.method.ledger and sampled
 
-    def gains(self, exchanged: Array) -> bool:
+    def gains(self, exchanged: Callable[[], Array]) -> bool:
         """Whether the finished run holds more energy than it can have been given."""
-        slack = tolerated_energy(self.workspace.energy[FIRST], exchanged, self.method.rtol)
-        return has_gained(self.system, self.workspace.energy, self.problem, self.duration, slack)
+        return has_gained(self.system, self.workspace.energy, self.problem, self.duration, exchanged, self.method.rtol)
 
     def march(self, budget: int, log: Array, out: Array, due: Array) -> int:
-        """Go on for a stretch."""
+        """Advance by about ``budget`` steps."""
         energy_tables = (
             self.prepared.energy_tables_for(_spacing(due)) if self.keeps_ledger(len(out) > 0) else NO_ENERGY_TABLES
         )

@@ -1,10 +1,10 @@
-"""What a force known at the nodes of a contact step does through the blocks, per step length.
+"""Responses of the blocks to a force given at the nodes of a contact step, per step length.
 
 A block's response to the j-th node value is (α, β) of ∫_0^{t_i} E(t_i - τ) w(σ) L_j(σ)/w(σ_j) dτ at the nodes t_i and
-at the end. No more need be known for any number of stops: a stop pushes blocks and reads blocks, and what stop u does
-to stop s is one sum over the blocks, `fill_pair`. For a few stops these sums are made beforehand, for all pairs.
+at the end. The response of stop s to the force of stop u is a sum of these over the blocks, `fill_pair`. For a few
+stops it is made beforehand, for all pairs.
 
-A *kind* is a set of nodes, one per (κ, λ); a *way* is a kind with or without the weight σ^λ of the force.
+A *kind* is a set of nodes, one per (κ, λ); a *weighting* is a kind with or without the weight σ^λ of the force.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def _block_response(k, c, h, time_exponent, weight_exponent, nodes, weights, gau
 
 @inner
 def fill_pair(problem, push, read, read_rate, response, weights, out):
-    """(S, 2S) δ and δ̇ at the nodes that ``read`` sees from the node values of a force that pushes by ``push``.
+    """(S, 2S) response of δ and δ̇ at the nodes, by ``read``, to the node values of a force that acts by ``push``.
 
     With A² = -k - c A the sum over the blocks of r (α + β A) b is Σ α (r·b) + β (r·A b).
     """
@@ -136,9 +136,9 @@ def fill_weighting(
     work,
     sums,
 ):
-    """All step lengths of one way: blocks' responses and, where there is room for them, all pairs.
+    """Responses of one weighting on all step lengths: of the blocks and, for a few stops, of all pairs.
 
-    Where pairs are kept the responses are working space, of one length.
+    For a few stops (``forced`` is not empty) the blocks' responses are scratch for one length.
     """
     pairs = forced.shape[0] > 0
     for level in range(h.size):
@@ -162,7 +162,7 @@ def fill_node_propagators(problem, blocks, h, time_exponent, nodes, out):
 
 @kernel
 def fill_free(problem, blocks, h, time_exponent, nodes, out):
-    """(J, m, 2N, 2S): what the state of some of the blocks does to all stops at the nodes of one kind."""
+    """(J, m, 2N, 2S): δ and δ̇ of all stops at the nodes of one kind from the state of some of the blocks."""
     size = problem.k.size
     for level in range(h.size):
         for b in range(blocks[0], blocks[1]):

@@ -75,7 +75,7 @@ def _safe(g, v, bound):
 def _first_root(problem, terms, s, x, longest, values, slopes):
     """First time in [0, longest] at which δ becomes positive on the Taylor polynomial; -1 if it does not.
 
-    ``values`` and ``slopes`` are working space for the coefficients of the polynomial and of its derivative.
+    ``values`` and ``slopes`` are scratch for the coefficients of the polynomial and of its derivative.
     """
     factorial = 1.0
     for i in range(ORDER + 1):
@@ -112,9 +112,9 @@ def _horner(coefficients, x):
 
 @inner
 def _bisect(coefficients, sign, b, guess):
-    """Newton with bisection as its guard for the sign change of a polynomial in [0, b], to rounding.
+    """Sign change of a polynomial in [0, b], to rounding, by Newton's method with bisection as safeguard.
 
-    Its steps double the digits: what a step of 1e-11 leaves is rounding. A double root is known to 1e-8 at best.
+    A step doubles the digits, so after one of 1e-11 the error is rounding. A double root is found to 1e-8 at best.
     """
     a, x = 0.0, guess if 0.0 < guess < b else b
     for _ in range(60):
@@ -142,7 +142,7 @@ def _target(tables, t, first, second, t_end):
 
 @inner
 def _sample(problem, tables, energy_tables, state, scratch, t, out, due):
-    """Outputs before the end of the step that began at t with the state in ``scratch.x_new``."""
+    """Write the outputs that are due within the step that began at t with the state in ``scratch.x_new``."""
     while due[state.count[SAMPLED]] < state.now[T]:
         wanted = due[state.count[SAMPLED]]
         parts = max(1, int(np.ceil(tables.fastest * (wanted - t) / SERIES_REACH)))
@@ -157,9 +157,9 @@ def _sample(problem, tables, energy_tables, state, scratch, t, out, due):
 
 @inner
 def _fly_tabulated(problem, tables, state, scratch, most, budget):
-    """Tabulated steps without signals or output until a stop is near, or the time left, ``most``, or the budget spent.
+    """Tabulated steps without signals or output, until a stop is near, or the time ``most`` or the budget is used up.
 
-    Positions and rates of the blocks stand apart meanwhile, in eights. Returns (time flown, steps, safe time).
+    p and v of the blocks are in two arrays, eight numbers a vector. Returns (time flown, steps, safe time left).
     """
     n, x, flown, count = problem.k.size, scratch.split_state, 0.0, 0
     for b in range(n):
@@ -181,12 +181,51 @@ def _fly_tabulated(problem, tables, state, scratch, most, budget):
     return flown, count, span
 
 
+@inlined
+def _safe_span(problem, tables, state, scratch, span, rest, renew):
+    """``span``, or the time within which no stop can be reached; ``renew`` the bounds of |δ̈| for the time ``rest``."""
+    if renew:
+        energy_norms(problem, state.x, scratch.norms)
+        for s in range(problem.gap.size):
+            scratch.per_stop[s] = _acceleration_bound(problem, tables, s, scratch.norms, scratch.signal_bounds, rest)
+    for s in range(problem.gap.size):
+        g, v = -indentation(problem, s, state.x), -dot(problem.read_rate[s], state.x, 2 * problem.k.size)
+        span = min(span, _safe(g, v, scratch.per_stop[s]))
+    return span
+
+
+@merged
+def _fly_step(problem, tables, state, scratch, span, target, rest, offset, cell, dt_cell):
+    """Move by up to ``span``: Taylor step that looks for roots, whole cell, or table. (time, stop reached or -1)."""
+    size, now, stop = 2 * problem.k.size, state.now, -1
+    sampled, shortest = problem.table_dt.size > 0, tables.flight_step[tables.flight_step.size - 1]
+    if span < shortest:
+        taylor_terms(problem, state.x, now[T], scratch.terms, scratch.signal_terms)
+        h = min(shortest, target - now[T], rest)
+        for s in range(problem.gap.size):
+            root = _first_root(problem, scratch.terms, s, state.x, h, scratch.values, scratch.trial)
+            if root >= 0.0:
+                h, stop = root, s
+        taylor_step(scratch.terms, state.x, h, size, scratch.values, scratch.stages[0])
+    elif span == rest and abs(offset) < 1e-7 * dt_cell:
+        h = rest
+        cross_cell(problem, tables, state.x, cell)
+    elif sampled and tables.fastest * span <= SERIES_REACH:
+        h = span
+        fly_series(problem, state.x, now[T], h, scratch.terms[0], scratch.signal_terms)
+    else:
+        level = level_within(tables, span)
+        h = tables.flight_step[level]
+        propagate_blocks(problem, tables.flight_propagator[level, 0], tables.flight_propagator[level, 1], state.x)
+        if sampled:
+            add_signals(problem, tables.signal[level], state.x, now[T], scratch.signal_terms)
+    return h, stop
+
+
 @merged
 def fly(problem, tables, energy_tables, state, scratch, t_end, budget, out, due):
     """Fly until a stop is reached (returns its index), the end (-1), or the budget is spent (-2)."""
-    stops, size, now = problem.gap.size, 2 * problem.k.size, state.now
-    shortest = tables.flight_step[tables.flight_step.size - 1]
-    sampled, with_energy = problem.table_dt.size > 0, energy_tables.active > 0.0
+    now, sampled, with_energy = state.now, problem.table_dt.size > 0, energy_tables.active > 0.0
     dt_cell = problem.table_dt[0] if sampled else np.inf
     for count in range(budget):
         if due[state.count[SAMPLED]] <= now[T]:
@@ -197,7 +236,7 @@ def fly(problem, tables, energy_tables, state, scratch, t_end, budget, out, due)
         if now[T] >= t_end:
             return -1
 
-        # --- how far the output, the end and the signals' cell allow
+        # --- the time up to the next output, the end, or the end of the signals' cell
         first = due[state.count[SAMPLED]]
         second = due[min(state.count[SAMPLED] + 1, out.shape[0])]
         target = _target(tables, now[T], first, second, t_end)
@@ -207,49 +246,19 @@ def fly(problem, tables, energy_tables, state, scratch, t_end, budget, out, due)
             rest = max(dt_cell - offset, 1e-9 * dt_cell)
             for j in range(problem.table_dt.size):
                 scratch.signal_bounds[j] = _signal_bound(problem, j, cell)
-        # --- how far no stop can be reached
-        if first == np.inf and not sampled:  # nothing else happens on the way
+        # --- the time within which no stop can be reached
+        if first == np.inf and not sampled:  # no output and no cell ends before
             flown, steps, span = _fly_tabulated(problem, tables, state, scratch, span, budget)
             now[T] += flown
             state.count[STEPS] += steps
             if steps >= budget:
                 return -2
         else:
-            if sampled or count % _REFRESH == 0:
-                energy_norms(problem, state.x, scratch.norms)
-                for s in range(stops):
-                    scratch.per_stop[s] = _acceleration_bound(
-                        problem, tables, s, scratch.norms, scratch.signal_bounds, rest
-                    )
             span = min(span, rest)
             if first <= begin + span:
                 copy(state.x, scratch.x_new, state.x.size)
-            for s in range(stops):
-                g, v = -indentation(problem, s, state.x), -dot(problem.read_rate[s], state.x, size)
-                span = min(span, _safe(g, v, scratch.per_stop[s]))
-
-        # --- go: a Taylor step that looks for roots, a whole cell, or a tabulated step
-        stop = -1
-        if span < shortest:
-            taylor_terms(problem, state.x, now[T], scratch.terms, scratch.signal_terms)
-            h = min(shortest, target - now[T], rest)
-            for s in range(stops):
-                root = _first_root(problem, scratch.terms, s, state.x, h, scratch.values, scratch.trial)
-                if root >= 0.0:
-                    h, stop = root, s
-            taylor_step(scratch.terms, state.x, h, size, scratch.values, scratch.stages[0])
-        elif span == rest and abs(offset) < 1e-7 * dt_cell:
-            h = rest
-            cross_cell(problem, tables, state.x, cell)
-        elif sampled and tables.fastest * span <= SERIES_REACH:
-            h = span
-            fly_series(problem, state.x, now[T], h, scratch.terms[0], scratch.signal_terms)
-        else:
-            level = level_within(tables, span)
-            h = tables.flight_step[level]
-            propagate_blocks(problem, tables.flight_propagator[level, 0], tables.flight_propagator[level, 1], state.x)
-            if sampled:
-                add_signals(problem, tables.signal[level], state.x, now[T], scratch.signal_terms)
+            span = _safe_span(problem, tables, state, scratch, span, rest, sampled or count % _REFRESH == 0)
+        h, stop = _fly_step(problem, tables, state, scratch, span, target, rest, offset, cell, dt_cell)
         now[T] = target if now[T] + h >= target else now[T] + h
         state.count[STEPS] += 1
         if first < now[T]:

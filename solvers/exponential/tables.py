@@ -1,12 +1,13 @@
-"""Everything the exponential integrator knows before it starts: propagators and force responses per step size.
+"""Tables of the exponential method: propagators and responses to forces for every step size.
 
 A block p'' + c p' + k p = 0 moves by E(x) = exp(A x) = α I + β A with A = [[0, 1], [-k, -c]], A² = -k I - c A, so two
 numbers (α, β) are a propagator and products stay of this form. Flight steps are h_l = h_0 2^{-l/4}; contact steps
 are every second of them.
 
-On a contact step a force is known by its values at a few nodes, see `contact.nodes`, and what it does by the responses
-of the blocks, see `responses`. A few stops have tables of what every one does to every other; the motion of more goes
-through the blocks, see `contact.many_stops`, and memory grows with the blocks and hardly with the stops.
+On a contact step a force is given by its values at a few nodes, see `contact.nodes`, and its effect by the responses of
+the blocks, see `responses`. For a few stops there are tables of the response of each stop to each force; with more, the
+motion of the blocks is computed first, see `contact.many_stops`: then memory grows with the blocks, hardly with the
+stops.
 """
 
 from __future__ import annotations
@@ -34,26 +35,30 @@ _SHORT = 1e-9  # s: a stop may be far stiffer than the structure
 
 
 class Tables(NamedTuple):
-    """Numbers per step size; l counts flight steps, j contact steps."""
+    """Numbers per step size, read by kernels only; `build` and `fill_tones` write them.
 
-    flight_step: Any  # (l,)
+    l counts flight steps, j contact steps, f node sets (the smooth one, then one per stop that enters), m stops, L
+    loads, N blocks with those of the tones.
+    """
+
+    flight_step: Any  # (l,) s, falling
     flight_propagator: Any  # (l, 2, N padded): α, β of every block
     signal: Any  # (l, L, 6, 2N): state change by a signal t^k/k!
-    cell: Any  # (2, N) propagator of a whole cell of the sampled signals
-    cell_signal: Any  # (L, 6, 2N)
-    block_k_c: Any  # (2, N padded): k, c
+    cell: Any  # (2, N): α, β over a whole cell of the sampled signals
+    cell_signal: Any  # (L, 6, 2N): state change over a cell
+    block_k_c: Any  # (2, N padded): k in 1/s², c in 1/s
     stop_rows: Any  # (m, 4, N padded): the first two rows give δ + gap from p and v, the others δ̇
     acceleration_weight: Any  # (m, N padded): |δ̈| <= Σ weight × energy norm
-    rate_weight: Any  # (m, N): |δ̇| <= Σ reach × energy norm
+    rate_weight: Any  # (m, N): |δ̇| <= Σ weight × energy norm
     load_acceleration: Any  # (m, L): δ̈ per unit of a signal
     load_norm: Any  # (L, N): energy norm of a load per block
-    fastest: float  # |λ|max
-    own_blocks: float  # number of the structure's own blocks; those behind are tones
-    accelerance: Any  # (m, m): δ̈ of stop s per newton at stop u, positive where the force opens the contact
-    exponent: Any  # (m,) leading exponents p
-    power_law: Any  # (m, 4) (K, p, a, c) of a force K δ^p (1 + a δ̇/δ̇⁻) + c δ̇; p = 0 for the laws to be called
-    contact_step: Any  # (j,) contact steps
-    contact_propagator: Any  # (j, 2, N)
+    fastest: float  # |λ|max, rad/s
+    own_blocks: float  # number of the structure's blocks; those behind them are tones
+    accelerance: Any  # (m, m): -δ̈ of stop s per newton at stop u, positive where the force opens the contact
+    exponent: Any  # (m,) leading exponents p of the laws
+    power_law: Any  # (m, 4): K, p, a, c of a force K δ^p (1 + a δ̇/δ̇⁻) + c δ̇; p = 0 for laws that are called
+    contact_step: Any  # (j,) s, falling
+    contact_propagator: Any  # (j, 2, N): α, β of every block
     time_exponent: Any  # (f,) κ
     weight_exponent: Any  # (f,) λ
     nodes: Any  # (f, S) σ
@@ -67,16 +72,16 @@ class Tables(NamedTuple):
         Any  # (f, S, 2S + 2, 2S): δ and h δ̇ at points around a node from those at all nodes and at the begin
     )
     local_interval: Any  # (f, S, 2): the interval of σ these points span
-    kind: Any  # (f,) indices into the tables below, see `contact.nodes.NodeSets`
-    entering: Any  # (f,)
-    free: Any  # (kinds, j, m, 2N, 2S): δ and δ̇ at the nodes from the state; of a few stops, as the next two
-    forced: Any  # (ways, j, m + L, m, S, 2S): the same from the forces and signals at the nodes
-    end_response: Any  # (ways, j, m + L, S, 2N padded): state change at the end
-    node_propagator: Any  # (kinds, j, 2, N, S): α, β of every block at the nodes; of many stops, as the next two
-    block_response: Any  # (ways, j, S, 2 own, S): α of the blocks, then β, at the nodes, by a force's node values
-    block_end_response: Any  # (ways, j, 2, own, S): the same at the end
-    alias: Any  # (kinds, j, 2N): a stop's error between the nodes <= Σ sway (alias |p| + alias |v|)
-    ripple_weight: Any  # (m, N)
+    kind: Any  # (f,) index of the kinds, and of the weightings of plain forces, below; see `contact.nodes.NodeSets`
+    entering: Any  # (f,) index of the weighting of the force of the stop that enters
+    free: Any  # (kinds, j, m, 2N, 2S): δ and δ̇ at the nodes from the state; for a few stops, as the next two
+    forced: Any  # (weightings, j, m + L, m, S, 2S): the same from the forces and signals at the nodes
+    end_response: Any  # (weightings, j, m + L, S, 2N padded): state change at the end
+    node_propagator: Any  # (kinds, j, 2, N, S): α, β of every block at the nodes; for many stops, as the next two
+    block_response: Any  # (weightings, j, S, 2 own, S): α, then β, of the blocks at the nodes per node value
+    block_end_response: Any  # (weightings, j, 2, own, S): the same at the end
+    alias: Any  # (kinds, j, 2N): error of δ between the nodes <= Σ ripple_weight (alias |p| + alias |v|)
+    ripple_weight: Any  # (m, N): amplitude of δ per unit of an oscillating block's rate
     signal_rows: Any  # (L, 2N): a load's tones from the state
     power_rows: Any  # (L, 2N): input power = signal × power row
     loss_rows: Any  # (r, 2N): damping power = Σ (row·z)²
@@ -84,14 +89,14 @@ class Tables(NamedTuple):
     extrapolation: (
         Any  # (f, 5, S, S): the force on the next smooth step, 2^{(i-2)/2} times shorter, from that of the last
     )
-    bend: Any  # (m,) kind of the law's bend, see `contact.crossings`
-    uncut: Any  # (m,) addresses of the laws without their cut at F = 0, and of their derivatives
-    uncut_gradient: Any
+    bend: Any  # (m,) kind of the law's bend: 0 for none, else as named in `contact.crossings`
+    uncut: Any  # (m,) addresses of the laws without their cut at F = 0
+    uncut_gradient: Any  # (m,) and of their derivatives
     uncut_parameters: Any  # (m, P)
 
 
 class LawTables(NamedTuple):
-    """What the tables hold of the laws."""
+    """Entries of `Tables` that come from the laws."""
 
     exponent: Any
     power_law: Any
@@ -117,7 +122,7 @@ def law_tables_of(contacts: Sequence[Any]) -> LawTables:
     )
 
 
-# the tables that tones have a part in
+# tables with columns for the tones
 TONE_TABLES = (
     *(
         "flight_propagator",
@@ -143,7 +148,7 @@ def build(
     dt_cell: float,
     energy_rows: tuple[Any, Any, Any],
 ) -> Tables:
-    """Tables of a problem whose last blocks are ``tones``, but for their columns, which `fill_tones` fills."""
+    """Tables of a problem whose last blocks are ``tones``; the columns of these are filled by `fill_tones`."""
     size = len(problem.k)
     omega, damping = np.sqrt(problem.k), problem.c
     fastest = float(max((omega + damping).max(), 1e-3))
@@ -201,7 +206,7 @@ def build(
 
 
 def fill_tones(tables: Tables, problem: Problem, tones: int, series: tuple[tuple[float, float], ...]) -> None:
-    """Fill the columns of a problem's last blocks, its ``tones``, into tables `build` has made."""
+    """Fill the columns of the last blocks of a problem, its ``tones``, into tables that `build` has made."""
     if not tones:
         return
     size = len(problem.k)
@@ -221,13 +226,13 @@ def fill_tones(tables: Tables, problem: Problem, tones: int, series: tuple[tuple
 
 
 def doublings(speeds: Any, tones: Any) -> int:
-    """How many times twice as fast as a structure's blocks the fastest tone is, rounded up; 0 for a slower one."""
+    """Octaves by which the fastest tone is above the fastest block of a structure, rounded up; 0 for a slower one."""
     ratio = float(tones.max(initial=0.0)) / max(float(speeds.max()), 1e-3)
     return math.ceil(math.log2(max(ratio, 1.0)))
 
 
 def _steps(omega: Any, damping: Any, tones: int) -> tuple[Any, Any]:
-    """Flight and contact steps. They depend on the structure alone, but for tones faster than it."""
+    """Flight and contact steps, s: functions of the structure alone unless a tone is faster than it."""
     own = omega.size - tones
     times = doublings((omega + damping)[:own], omega[own:])
     return _steps_of(omega[:own].tobytes(), damping[:own].tobytes(), times)
@@ -235,7 +240,7 @@ def _steps(omega: Any, damping: Any, tones: int) -> tuple[Any, Any]:
 
 @lru_cache(maxsize=64)
 def _steps_of(omegas: bytes, dampings: bytes, doublings: int) -> tuple[Any, Any]:
-    """Steps for a structure's frequencies and dampings, and for tones so many times twice as fast."""
+    """Steps for the frequencies and dampings of a structure, and for tones faster by some octaves."""
     omega, damping = np.frombuffer(omegas), np.frombuffer(dampings)
     fastest = max(float((omega + damping).max()), 1e-3)
     moving = np.concatenate((omega[omega > 0], damping[damping > 0]))
@@ -249,7 +254,7 @@ def _steps_of(omegas: bytes, dampings: bytes, doublings: int) -> tuple[Any, Any]
 
 
 def _ripple_weight(read: Any, omega: Any) -> Any:
-    """(m, N): what a block that oscillates does to a stop, per unit of its rate."""
+    """(m, N): amplitude of δ per unit of an oscillating block's rate."""
     p, v = np.abs(read[:, : omega.size]), np.abs(read[:, omega.size :])
     return np.ascontiguousarray(p / np.where(omega > 0.0, omega, np.inf) + v)
 

@@ -16,16 +16,17 @@ from solvers.compiled.state import HEAD, STATE, State, T, begin_state, law_param
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.linearised import linearise_run
 from solvers.exponential.linearised_step import DERIVATIVES, VARIATION, Derivatives, Variation
-from solvers.exponential.preparation import places_among_tones, steady_response
+from solvers.exponential.preparation import places_among_tones
+from solvers.exponential.steady_response import steady_response
 from solvers.problem import Array, Parameter, SolverError, System
 
-_ROWS = 256  # of the tape between two replays: some 25 contacts, within which no derivative overflows
+_ROWS = 256  # of the event record: some 25 contacts, within which no derivative overflows
 _CARRIED = [Derivatives._fields.index(name) for name in ("y", "entry", "shift", "rate", "latched")]
 _LARGE = 1e100  # size at which the derivatives are scaled down
 
 
 class Tangent:
-    """Derivatives of one run of an engine, carried along as its tape grows."""
+    """Derivatives of one run of an engine, moved along as its event record grows."""
 
     def __init__(self, system: System, engine: Any, parameter: Parameter | None, latched: bool = False) -> None:
         self.engine, self.blocks = engine, system.blocks
@@ -51,11 +52,11 @@ class Tangent:
         self.latched[2 * n : 2 * n + own, self.places_latched[:own]] = np.eye(own)
         engine.record_events(np.empty((_ROWS, HEAD + width + stops * S)))
         self.packed = [
-            *(engine.packed if same is engine.problem else Packed(same, PROBLEM) for same in self.change.problems),
-            Packed(self.change.variation, VARIATION),
+            *(engine.packed if same is engine.problem else Packed.of(same, PROBLEM) for same in self.change.problems),
+            Packed.of(self.change.variation, VARIATION),
         ]
         if problem is not engine.problem:
-            self.packed.append(Packed(problem, PROBLEM))
+            self.packed.append(Packed.of(problem, PROBLEM))
         derivatives, past = (words + start for start in layout.starts)
         ahead, behind, variation = (packed.address for packed in self.packed[:3])
         problem_at, *others = engine.addresses
@@ -65,7 +66,7 @@ class Tangent:
         self.history: list[tuple[float, float]] = []  # (time, ln of their size)
 
     def follow(self) -> None:
-        """Replay what the engine has taped, and let it tape anew."""
+        """Move the derivatives to the time the engine has reached, and empty its event record."""
         engine = self.engine
         linearise_run(*self.addresses, not self.history)
         if not np.all(np.isfinite(self.y)):
@@ -98,7 +99,7 @@ class Tangent:
 
 @lru_cache(maxsize=64)
 def _layout(stops: int, loads: int, width: int, columns: int, latched: int, others: int) -> Layout:
-    """Places of the arrays of `Derivatives` and of the shadow's `State`."""
+    """Shapes and places of the arrays of `Derivatives` and of the past `State`."""
     derivatives = [(columns, width), (columns, stops), (columns, stops), (stops + loads, S), (loads, S), (stops, 2, S)]
     derivatives += [(stops, S), (2, width), (STAGES, columns, width), (columns, width), (8,)]
     derivatives += [(columns, stops * latched), (stops, latched * S), (latched * (5 + latched) + 2 + others,)]
@@ -106,14 +107,14 @@ def _layout(stops: int, loads: int, width: int, columns: int, latched: int, othe
 
 
 def _size(y: Array) -> float:
-    """Frobenius norm; in units of the largest entry, whose square may lie beyond the range of numbers."""
+    """Frobenius norm; in units of the largest entry, as its square may overflow."""
     largest = float(np.abs(y).max())
     return largest * math.sqrt(np.vdot(y / largest, y / largest)) if largest > 0.0 else 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class _Change:
-    """What a parameter changes: the nudge, the problems with laws ahead and behind, the steady response per tone."""
+    """Changes by a parameter: explicit ones, problems with the laws ahead and behind, steady response per tone."""
 
     variation: Variation
     problems: list[Problem]

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from solvers.compiled.kernels import dot, indentation, inlined, inner
-from solvers.compiled.renewals import margins, margins_in, note_event, replace_values
+from solvers.compiled.renewals import margins, margins_in, note_event, renew
 from solvers.compiled.state import rate_tolerance, surface_tolerance
 from solvers.exponential.contact.node_response import DELTAS, RATES, START
 from solvers.exponential.contact.nodes import LOCAL, S
@@ -135,7 +135,7 @@ def passed(problem, state, scratch, element, border, w, x):
 def renew_border(problem, state, scratch, element, border, log):
     """Renew one border in the present state."""
     delta, rate = margins_in(problem, state, element, state.x, scratch.trial, scratch.margin)
-    replace_values(problem, state, element, border, delta, rate, log)
+    renew(problem, state, element, border, delta, rate, log)
     note_event(state)
 
 
@@ -160,5 +160,5 @@ def renew_all(problem, state, scratch, element, border, log):
             scratch.fired[j] = 1.0 if landed else 0.0
         for j in range(count):
             if scratch.fired[j] > 0.0:
-                replace_values(problem, state, s, j, delta, rate, log)
+                renew(problem, state, s, j, delta, rate, log)
     note_event(state)

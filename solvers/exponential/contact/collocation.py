@@ -1,4 +1,4 @@
-"""Contact: propagate the linear structure exactly, collocate the force alone.
+"""A contact step: the linear structure is propagated exactly, the force alone is collocated.
 
 On a step of length h the unknowns are the forces at S nodes of every stop in contact, whatever the number of modes:
 
@@ -8,12 +8,12 @@ iterated from the extrapolated polynomial of the step before. The state at the e
 step of a law with broken powers of δ uses t = h σ^κ and F = σ^λ g(σ), which restores full order at the singular start
 (see `nodes`); the last one, onto δ = 0, is one Runge–Kutta step in δ^{1/κ} (see `landing`).
 
-Step control: with A₁ >= A₂ the sizes of the last two and the two before of the force's S Jacobi coefficients, the force
-beyond the polynomial is taken as A₁ max((A₁/A₂)^{S/2}, A₁/F_max), and what it does to the indentation rate of every
-stop, open or closed, is compared with rtol × a reference speed of that stop. Fast modes whose oscillation the nodes
-cannot follow are charged for it, and so is the tail of the sampled signals, whose cells may be shorter than the step. A
-kink of the law between an end of the step and the nearest node leaves no trace in the coefficients; there law and
-polynomial are compared.
+Error estimate: let A₁ be the larger of the last two Jacobi coefficients of the force, in size, and A₂ the larger of the
+two before them. The part of the force that the polynomial leaves out is estimated by A₁ max((A₁/A₂)^{S/2}, A₁/F_max).
+Its effect on the indentation rate of every stop, in contact or not, is compared with rtol × the reference speed of that
+stop. Added to it are the oscillation of modes too fast for the nodes, and the part of the sampled signals, whose cells
+may be shorter than the step, that their polynomials leave out. A kink of the law between an end of the step and the
+nearest node does not show in the coefficients; there the law is compared with the polynomial.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR, STIFFNESS
 
 @inlined
 def _alone(tables, state):
-    """The stop in contact if there is but one and its law is inlined, else -1."""
+    """The stop in contact if it is the only one and its law is a power law of the tables, else -1."""
     alone, count = -1, 0
     for s in range(state.segment.size):
         if state.segment[s] > 0:
@@ -46,7 +46,7 @@ def _alone(tables, state):
 
 @inlined
 def _iterate(problem, tables, state, scratch, node_set, level):
-    """One iteration for the forces of all stops in contact: squares of their change and size, in units of accuracy."""
+    """One iteration for the forces of all stops in contact; Σ change² and Σ force² in units of their tolerance."""
     change, largest = 0.0, 0.0
     for s in range(problem.gap.size):
         if state.segment[s] > 0:
@@ -62,9 +62,9 @@ def _iterate(problem, tables, state, scratch, node_set, level):
 
 @inner
 def _set_accuracy(problem, tables, state, scratch, h, rtol):
-    """Change of each stop's force, N, that moves no indentation rate by more than a twentieth of its tolerance.
+    """Tolerance of each stop's force, N: it changes no indentation rate by more than a twentieth of its tolerance.
 
-    Returns whether a dashpot is so strong that iterations will diverge, by its slope where Newton used it last.
+    Returns whether a dashpot is so strong that iterations would diverge, by its slope in the last Newton iteration.
     """
     stiff = False
     for u in range(problem.gap.size):
@@ -82,7 +82,7 @@ def _set_accuracy(problem, tables, state, scratch, h, rtol):
 
 @inner
 def solve_forces(problem, tables, state, scratch, node_set, level, rtol):
-    """Fixed point of the forces; whether it was found."""
+    """Solve for the forces by fixed-point iteration, else by Newton's method; returns whether a solution was found."""
     if _set_accuracy(problem, tables, state, scratch, tables.contact_step[level], rtol):
         return newton(problem, tables, state, scratch, node_set, level)
     before, alone = 0.0, _alone(tables, state)
@@ -104,8 +104,8 @@ def solve_forces(problem, tables, state, scratch, node_set, level, rtol):
             break
         settled, change = change <= 1e-27 * largest, math.sqrt(change)
         if iteration == 0:
-            before = change / 0.3  # as iterations usually go
-        # changes that shrink by r = change/before, taken as 1/20 at least, 0.9 at most, add up to change r/(1 - r) more
+            before = change / 0.3  # the usual ratio of two changes
+        # with r = change/before, within [1/20, 0.9], the changes still to come add up to change r/(1 - r)
         if settled or (change <= 20.0 and change * change <= max(before - change, change / 9.0)):
             return True
         if iteration > 2 and change > 0.6 * before:
@@ -126,7 +126,7 @@ def _top(values):
 
 
 @inlined
-def _size(values):
+def largest_size(values):
     """Largest size of node values."""
     best = 0.0
     for i in range(S):
@@ -145,14 +145,14 @@ def _largest(problem, tables, state, scratch, u):
     contact_gradient(
         problem, u, scratch.clipped, scratch.motion[u, 1], state.entry_rate[u], slope[0], slope[1], slope[2]
     )
-    return _size(scratch.force[u]), _size(slope[0])
+    return largest_size(scratch.force[u]), largest_size(slope[0])
 
 
 @inner
 def step_error(problem, tables, state, scratch, node_set, level, is_new, rtol):
-    """Error of the indentation rates by the forces' unresolved part, in units of each stop's tolerance; the largest.
+    """Largest error of an indentation rate by the unresolved part of the forces, in units of the stop's tolerance.
 
-    On an entry step the force of the stop that enters is integrated by Gauss's rule, those of the others are not.
+    On an entry step the nodes are those of Gauss's rule for the stop that enters, not for the others.
     """
     n, stops, h = problem.k.size, problem.gap.size, tables.contact_step[level]
     for u in range(stops):
@@ -163,10 +163,10 @@ def step_error(problem, tables, state, scratch, node_set, level, is_new, rtol):
         combine(tables.summary[node_set], scratch.force[u], S, None, scratch.summary[u, 0])
         largest, stiffness = _largest(problem, tables, state, scratch, u)
         if gauss:
-            unresolved = _unresolved(scratch.summary[u, 0], largest, S // 2)
+            unresolved = unresolved_part(scratch.summary[u, 0], largest, S // 2)
         else:
             combine(tables.tail[node_set], scratch.force[u], S, None, scratch.trial)
-            unresolved = _unresolved(scratch.trial, largest, 1)
+            unresolved = unresolved_part(scratch.trial, largest, 1)
         if node_set == 0 and tables.power_law[u, EXPONENT] == 0.0:
             unresolved += 0.01 * _hidden_kink(problem, state, scratch, u, largest, is_new)
         if unresolved == 0.0:
@@ -177,7 +177,7 @@ def step_error(problem, tables, state, scratch, node_set, level, is_new, rtol):
     _sum_errors(problem, tables, scratch, node_set, h)
     worst = 0.0
     for s in range(stops):
-        error = scratch.per_stop[s] / (rtol * max(scratch.reference_speed[s], _size(scratch.motion[s, 1])))
+        error = scratch.per_stop[s] / (rtol * max(scratch.reference_speed[s], largest_size(scratch.motion[s, 1])))
         if not error <= worst:
             worst = error
             if error != error:
@@ -187,7 +187,7 @@ def step_error(problem, tables, state, scratch, node_set, level, is_new, rtol):
 
 @inner
 def _sum_errors(problem, tables, scratch, node_set, h):
-    """Errors of all indentation rates, m/s, by what the forces' and the signals' polynomials leave out."""
+    """Errors of all indentation rates, m/s, by the unresolved parts of forces and signals, into ``per_stop``."""
     stops, error = problem.gap.size, scratch.per_stop
     for s in range(stops):
         error[s] = 0.0
@@ -203,9 +203,9 @@ def _sum_errors(problem, tables, scratch, node_set, h):
 
 @inner
 def _hidden_kink(problem, state, scratch, u, largest, is_new):
-    """Force, in N, by which law and polynomial differ at an end of a smooth step, if no coefficient explains it.
+    """Difference, N, of law and polynomial at an end of a smooth step, where the last coefficients are smaller.
 
-    The law then bends between that end and the next node, a fiftieth of the step at most: clamp=True does.
+    Then the law has a kink between that end and the next node, within a fiftieth of the step, as with clamp=True.
     """
     size, delta, rate = 2 * problem.k.size, scratch.clipped[0:2], scratch.trial[0:2]
     delta[0], rate[0] = indentation(problem, u, scratch.x_new), dot(problem.read_rate[u], scratch.x_new, size)
@@ -219,8 +219,8 @@ def _hidden_kink(problem, state, scratch, u, largest, is_new):
 
 
 @inlined
-def _unresolved(coefficients, largest, power):
-    """Size of what a polynomial leaves out, from its last four coefficients."""
+def unresolved_part(coefficients, largest, power):
+    """Estimate of the part that a polynomial leaves out, from its last four coefficients."""
     before = max(abs(coefficients[0]), abs(coefficients[1]))
     last = max(abs(coefficients[2]), abs(coefficients[3]))
     if last <= 1e-14 * largest:
@@ -231,12 +231,12 @@ def _unresolved(coefficients, largest, power):
 
 @inner
 def _unresolved_signal(problem, tables, scratch, node_set, j):
-    """The same of a sampled signal, which an entry step integrates at half the order."""
+    """The same for a sampled signal; an entry step integrates it at half the order."""
     values, largest = scratch.force[problem.gap.size + problem.table_load[j]], 0.0
     for i in range(S):
         largest = max(largest, abs(values[i]))
     combine(tables.tail[node_set], values, S, None, scratch.trial)
-    return _unresolved(scratch.trial, largest, S // 2 if node_set == 0 else 1)
+    return unresolved_part(scratch.trial, largest, S // 2 if node_set == 0 else 1)
 
 
 @inner
@@ -265,7 +265,7 @@ def end_state(problem, tables, state, scratch, node_set, level):
 
 @inner
 def finish_step(problem, tables, state, scratch, node_set, level):
-    """Move the state to the end of the step; ledger and peaks of the contacts."""
+    """Move the state to the end of the step; update the energy balance and the peaks of the contacts."""
     stops, size = problem.gap.size, 2 * problem.k.size
     h = tables.contact_step[level]
     for s in range(stops):
@@ -277,21 +277,21 @@ def finish_step(problem, tables, state, scratch, node_set, level):
             if problem.knots[s, 0] == 0.0:
                 step_peaks(problem, tables, state, scratch, node_set, h, s, 1.0)
             elif not is_open(problem, s):
-                state.active[s, PEAK_DELTA] = max(state.active[s, PEAK_DELTA], _size(scratch.motion[s, 0]))
-                state.active[s, PEAK_FORCE] = max(state.active[s, PEAK_FORCE], _size(scratch.force[s]))
+                state.active[s, PEAK_DELTA] = max(state.active[s, PEAK_DELTA], largest_size(scratch.motion[s, 0]))
+                state.active[s, PEAK_FORCE] = max(state.active[s, PEAK_FORCE], largest_size(scratch.force[s]))
     copy(scratch.x_new, state.x, size)
     state.now[T] += h
 
 
 @inner
 def contact_time(problem, tables, scratch, s, speed):
-    """Duration a free impact at this speed would have, from the law's energy: T = 3.2 δ_m/v."""
+    """Duration, s, of an impact at this speed on one stop alone, from the law's energy: T = 3.2 δ_m/v."""
     speed = max(speed, 1e-12)
     accelerance = max(tables.accelerance[s, s], 1e-300)
     target = 0.5 * speed * speed / accelerance
     p = tables.exponent[s]
     deepest = 1e-3 * speed
-    for _ in range(4):  # a law that is no power needs more than one
+    for _ in range(4):  # one is enough for a power law
         scratch.clipped[0], scratch.trial[0] = deepest, 0.0
         contact_forces(problem, s, scratch.clipped[0:1], scratch.trial[0:1], speed, scratch.trial[1:2])
         energy = scratch.trial[1] * deepest / (p + 1.0)

@@ -1,12 +1,13 @@
-"""What may end a step in contact: borders of the pieces of all stops, open ones included, and bends of their laws.
+"""Events within a step in contact: a stop passes a border of its segment of the law, or a bend of the law.
 
-Between two points of a step δ is taken as the cubic through both values and rates, around the highest node of an open
-stop as in `peaks`; such a stop keeps a distance of the ripple too, which fast modes may have between the nodes. With
-many stops, one that a bound of |δ̈| keeps from its surface is not looked at further.
+The borders of all stops are checked, those out of contact included. Between two points of a step δ is taken as the
+cubic through both values and rates, around the highest node of a stop out of contact as in `peaks`; such a stop must
+also keep the distance of the ripple that fast modes may have between the nodes. With many stops, one that cannot reach
+its surface by a bound of |δ̈| is not checked further.
 
-A bend is where the law of a stop in contact has a kink that is not at a given indentation: δ̇ = 0 for one that damps on
-approach only, F = 0 for one cut where it would pull. Its side is the sign of δ̇, or of the force before it is cut. No
-step goes across; one step ends on it.
+A bend is a kink of the law that is not at a given indentation: at δ̇ = 0 for a law that damps on approach only, at F = 0
+for one that is cut where it would pull. The side of a bend is the sign of δ̇, or of the force before the cut. No step
+crosses a bend; one step ends on it.
 """
 
 from __future__ import annotations
@@ -27,15 +28,15 @@ from solvers.exponential.contact.peaks import largest_indentation
 from solvers.exponential.flight import energy_norms
 
 RATE, FORCE = 1.0, 2.0  # kinds of bends in Tables.bend; 0 for a law that has none
-CLEAR, TOO_LONG = -1, -2  # of a landing: nothing else happens on the way, or something does that wants shorter steps
-_ON = 1e-9  # value, in units of the largest of the step, at which a stop counts as on its bend
-_TOGETHER = 1e-6  # part of its way by which a stop may be carried over its bend when another lands
-_SAME = 1e-11  # the same for the sign of a node
+CLEAR, TOO_LONG = -1, -2  # of a landing: no other event before it, or one that requires shorter steps
+_ON = 1e-9  # value, in units of the largest of the step, up to which a stop counts as on its bend
+_TOGETHER = 1e-6  # share of its last value by which a stop may pass its bend when another stop lands
+_SAME = 1e-11  # value, in units of the largest of the step, up to which a node may be on the wrong side
 
 
 @inner
 def extremum(d, a, slope_a, b, slope_b):
-    """Value where the cubic through (0, a) and (d, b) turns; its slopes there have opposite signs."""
+    """Extremum of the cubic through (0, a) and (d, b) with given slopes of opposite signs."""
     mean = (b - a) / d
     c2 = (3.0 * mean - 2.0 * slope_a - slope_b) / d
     c3 = (slope_a + slope_b - 2.0 * mean) / (d * d)
@@ -47,7 +48,7 @@ def extremum(d, a, slope_a, b, slope_b):
 
 @inlined
 def _passes(d, a, slope_a, b, slope_b, lower, upper):
-    """Whether δ leaves [lower, upper] before the second point or at it."""
+    """Whether the cubic through two points leaves [lower, upper] between them or at the second."""
     if not lower <= b <= upper:
         return True
     if slope_a > 0.0 > slope_b:
@@ -59,7 +60,7 @@ def _passes(d, a, slope_a, b, slope_b, lower, upper):
 
 @inlined
 def _turns(rates, begin, end, up, down):
-    """Whether the rate changes its sign upwards or downwards, as asked, between two points of a step."""
+    """Whether the rate changes its sign between two points of a step, upwards if ``up`` or downwards if ``down``."""
     before, found = begin, False
     for i in range(S + 1):
         after = rates[i] if i < S else end
@@ -87,7 +88,7 @@ def _passes_between(problem, tables, state, scratch, node_set, h, s, lower, uppe
 
 @inner
 def _bound_rates(problem, tables, state, scratch, h):
-    """Into ``scratch.per_stop`` bounds of |δ̈| of all stops on a step; forces are taken as twice their largest node value."""
+    """Bounds of |δ̈| of all stops into ``scratch.per_stop``; forces are taken as twice their largest node value."""
     n, stops = problem.k.size, problem.gap.size
     energy_norms(problem, state.x, scratch.norms)
     for s in range(stops):
@@ -109,7 +110,7 @@ def _bound_rates(problem, tables, state, scratch, h):
 
 @inlined
 def _stays_away(scratch, s, h):
-    """Whether an open stop cannot be reached on the step; its motion then is taken as what it begins with."""
+    """Whether a stop out of contact cannot be reached on the step; its motion is set to that at the begin."""
     delta, rate = scratch.start_motion[s, 0], scratch.start_motion[s, 1]
     store8(scratch.motion[s, 0], 0, splat8(delta))
     store8(scratch.motion[s, 1], 0, splat8(rate))
@@ -118,7 +119,7 @@ def _stays_away(scratch, s, h):
 
 @inlined
 def _watch(problem, tables, state, scratch, node_set, level, s, carried):
-    """Motion of an open stop at the nodes, by the blocks if there are many; whether forces have been carried there."""
+    """Motion at the nodes of a stop out of contact; returns whether the motion of the blocks has been computed."""
     if not uses_blocks(tables):
         respond(problem, tables, state, scratch, node_set, level, s)
         return carried
@@ -131,7 +132,7 @@ def _watch(problem, tables, state, scratch, node_set, level, s, carried):
 
 @inner
 def leaves_segment(problem, tables, state, scratch, node_set, level):
-    """Whether any stop may cross a border of its piece on the step."""
+    """Whether any stop may cross a border of its segment on the step."""
     size, h, carried, through = 2 * problem.k.size, tables.contact_step[level], False, uses_blocks(tables)
     if through:
         _bound_rates(problem, tables, state, scratch, h)
@@ -168,7 +169,7 @@ def leaves_segment(problem, tables, state, scratch, node_set, level):
 
 @inlined
 def _sides(problem, tables, state, s, n, delta, rate, out):
-    """δ̇ or the force before it is cut, at n points with δ >= 0."""
+    """δ̇, or the force before its cut, at n points with δ >= 0; the sign is the side of the bend."""
     if tables.bend[s] == RATE:
         copy(rate, out, n)
     else:
@@ -177,7 +178,7 @@ def _sides(problem, tables, state, s, n, delta, rate, out):
 
 @inner
 def side_at(problem, tables, state, s, x, batch):
-    """δ̇, or the force before it is cut, in the state x."""
+    """The same in the state x."""
     batch[0] = max(indentation(problem, s, x), problem.knots[s, 0])
     batch[1] = dot(problem.read_rate[s], x, 2 * problem.k.size)
     _sides(problem, tables, state, s, 1, batch[0:1], batch[1:2], batch[2:3])
@@ -186,7 +187,7 @@ def side_at(problem, tables, state, s, x, batch):
 
 @inner
 def choose_sides(problem, tables, state, scratch):
-    """On which side of their bends the contacts that begin now are."""
+    """Find the side of its bend for every contact that begins now."""
     for s in range(problem.gap.size):
         if tables.bend[s] > 0.0 and state.segment[s] > 0 and state.active[s, T_IN] == state.now[T]:
             scratch.side[s] = -1.0 if side_at(problem, tables, state, s, state.x, scratch.trial) < 0.0 else 1.0
@@ -196,8 +197,8 @@ def choose_sides(problem, tables, state, scratch):
 def first_bend(problem, tables, state, scratch, node_set, level, is_new, rtol):
     """(time after the begin of the step, stop) of the first bend on it; no stop is -1.
 
-    A stop that begins on its bend (``is_new``), or was carried over it, takes the side of the first node; one whose
-    rate, or force, stays within the tolerance bends without harm.
+    A stop that begins on its bend (``is_new``), or was taken across it by the landing of another stop, gets the side of
+    the first node. A bend of a rate, or force, within the tolerance is not an event.
     """
     first, stop, h = np.inf, -1, tables.contact_step[level]
     for s in range(problem.gap.size):
@@ -231,9 +232,10 @@ def first_bend(problem, tables, state, scratch, node_set, level, is_new, rtol):
 
 @inner
 def before_landing(problem, tables, state, scratch, stop, bends, w, x):
-    """What happens besides the landing of ``stop``, on a bend or not, between the states w and x, which end in times.
+    """Other events between the states w and x, which end in times, besides the landing of ``stop``.
 
-    FREE, TURNED, or another stop that has crossed a border of its piece. A peak must lie in another kind of step.
+    Returns `CLEAR`, `TOO_LONG`, or another stop that has crossed a border of its segment. A peak must not lie within a
+    landing, whose steps have no interpolant.
     """
     size, width = 2 * problem.k.size, state.x.size
     d = x[width] - w[width]
@@ -268,8 +270,8 @@ def before_landing(problem, tables, state, scratch, stop, bends, w, x):
 
 @inlined
 def _force_turns(work, column, width, known):
-    """Whether a force, the impulse's rate over that of time, has a maximum above ``known`` inside a landing."""
-    if work[0, column] / work[0, width] < 0.5 * known:  # such steps are short for every contact
+    """Whether a force, the rate of the impulse over that of time, has a maximum above ``known`` inside a landing."""
+    if work[0, column] / work[0, width] < 0.5 * known:  # too far below the peak for a higher maximum
         return False
     last, highest = STAGES - 1 if work[STAGES - 1, width] != 0.0 else STAGES - 2, known
     for i in range(1, last):

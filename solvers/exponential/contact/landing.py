@@ -1,13 +1,15 @@
-"""Landing on a border: one Runge–Kutta step in a variable in which the contact is smooth, DOP853 with t an unknown.
+"""Locating the end of a contact, or of a segment of its law: one Runge–Kutta step that lands on the border.
+
+It is a step of DOP853 with t among the unknowns, in a variable in which the motion is smooth:
 
     INDENTATION   dt = dδ/δ̇         lands exactly on a kink, or on another stop's surface
     ROOT          dt = κ u^{κ-1} du/δ̇, u = δ^{1/κ}, κ as at entry: lands exactly on δ = 0, where δ^{3/2} is singular
     TIME          dt                lands on a bend by the secant rule; the force is continuous there
 
-The unknowns are [p, v, ledger, t, u]. Every block moves by less than `_landing_reach` radians, within which the step is exact
-to the tolerance whatever the stops see of it; what the forces add is estimated by a tenth of the embedded fifth-order
-difference, for every stop in units of its own tolerance: in these variables that stays a few times above the true
-error, where DOP853's own mixed estimate falls below it.
+The unknowns are [p, v, energy balance, t, u]. The fastest block moves by less than `landing_reach` radians, within
+which the step of every block is exact to the tolerance. The error by the forces is estimated by a tenth of the embedded
+fifth-order difference, for every stop in units of its own tolerance: in these variables this is a few times the true
+error, while DOP853's own mixed estimate is below it.
 """
 
 from __future__ import annotations
@@ -36,20 +38,20 @@ from solvers.exponential.contact.peaks import state_peaks
 from solvers.exponential.energy.quadrature import powers
 
 INDENTATION, ROOT, TIME = range(3)
-_MOST_TRIES = 8  # to meet an output time on the way to a landing, or a bend
+_MOST_TRIES = 8  # to find the step that ends at an output time, or on a bend
 _PART = 0.1  # of the embedded difference that counts as the error
 _PART_OF_FOURTH = 1e-2  # with u = δ^{1/4}: terms t² = u⁸ are exact in the step, and all of the difference
 _LAST = 0.09  # indentation, in units of the deepest, from which the last step is tried
 
 
 def landing_reach(rtol: float) -> float:
-    """Radians of the fastest block within which DOP853 is exact to a tenth of rtol: its error is 7e-8 θ⁹."""
+    """Angle, rad, of the fastest block up to which DOP853's error, 7e-8 θ⁹, is below a tenth of rtol."""
     return min((0.1 * rtol / 7e-8) ** (1.0 / 9.0), 1.5)
 
 
 @inlined
 def _force(problem, tables, s, delta, delta_dot, side, entry_rate, batch):
-    """Force of stop s; a law that is cut at zero goes on beyond it on the side on which the step began."""
+    """Force of stop s; a law cut at zero force is continued as on the side of the cut where the step began."""
     batch[0], batch[1], batch[2] = max(delta, problem.knots[s, 0]), delta_dot, 0.0
     if tables.bend[s] != FORCE:
         law_forces(problem, s, 1, batch[0:1], batch[1:2], entry_rate, batch[2:3])
@@ -60,7 +62,7 @@ def _force(problem, tables, s, delta, delta_dot, side, entry_rate, batch):
 
 @inlined
 def _rate(problem, tables, with_energy, variable, stop, span, w, segment, entry_rate, side, out, batch):
-    """Derivative of the unknowns with respect to the chosen variable, times its span; ``w`` ends in (t, u)."""
+    """Derivative of the unknowns ``w`` = [state, t, u] by the chosen variable, times its span; number of law calls."""
     n, calls = problem.k.size, 0
     size, t = 2 * n, 2 * n + 2 + 2 * problem.gap.size
     for b in range(n):
@@ -97,7 +99,7 @@ def _rate(problem, tables, with_energy, variable, stop, span, w, segment, entry_
 
 @inner
 def landing_step(problem, tables, with_energy, variable, stop, span, w, segment, entry_rate, side, work):
-    """One DOP853 step of the chosen variable from ``w`` into ``work[LANDED]``, its stages into ``work``; law calls."""
+    """One DOP853 step of the chosen variable from ``w`` to ``work[LANDED]``, stages in ``work``; count of law calls."""
     calls = 0
     batch, trial = work[BATCH], work[LANDED]
     for i in range(STAGES):
@@ -111,9 +113,9 @@ def landing_step(problem, tables, with_energy, variable, stop, span, w, segment,
 
 @inner
 def _error(problem, scratch, part, rtol):
-    """Error of the step just taken in the indentation rates, in units of each stop's tolerance; the largest.
+    """Largest error of an indentation rate in the step just taken, in units of the stop's tolerance.
 
-    It is a ``part`` of the embedded difference.
+    It is estimated by a ``part`` of the embedded difference.
     """
     difference, worst = scratch.stages[DIFFERENCE], 0.0
     combine(scratch.stages, E5, STAGES, None, difference)
@@ -129,10 +131,10 @@ def _error(problem, scratch, part, rtol):
 
 @inner
 def _goes_ahead(scratch, size):
-    """Whether time passes forward in every stage of the step just taken.
+    """Whether time goes forward in every stage of the step just taken.
 
     If it does not, the stop turns back before the border, the step passes a pole of 1/δ̇, and its embedded difference
-    tells nothing. On δ = 0, where the last stages of `ROOT` end, dt/du = 0 but for rounding.
+    is no estimate. At δ = 0, where the last stages of `ROOT` end, dt/du = 0 up to rounding.
     """
     ahead = True
     for i in range(STAGES):
@@ -142,7 +144,7 @@ def _goes_ahead(scratch, size):
 
 @inner
 def _step(problem, tables, state, scratch, variable, stop, span, with_energy):
-    """A step from ``scratch.stages[START]``."""
+    """A step from ``scratch.stages[START]`` to ``scratch.stages[LANDED]``."""
     state.count[CALLS] += landing_step(
         *(problem, tables, with_energy, variable, stop, span, scratch.stages[START]),
         *(state.segment, state.entry_rate, scratch.side, scratch.stages),
@@ -151,7 +153,7 @@ def _step(problem, tables, state, scratch, variable, stop, span, with_energy):
 
 @inner
 def _length_to(problem, tables, state, scratch, variable, stop, span, landed, time, with_energy):
-    """Length of the step whose end, in ``scratch.stages[LANDED]``, is at a time before the landing; inf when not found."""
+    """Length of the step that ends, in ``scratch.stages[LANDED]``, at a time before the landing; inf if not found."""
     w, x, size, tries = scratch.stages[START], scratch.stages[LANDED], state.x.size, 0
     t = w[size]
     left = (landed - time) / (landed - t) if landed > t else 0.0
@@ -170,7 +172,7 @@ def _length_to(problem, tables, state, scratch, variable, stop, span, landed, ti
 
 @inner
 def start_landing(problem, tables, state, scratch, stop):
-    """The state as a landing of ``stop`` begins it, with t and δ^{1/κ}, into ``scratch.stages[START]``."""
+    """Put the state at the begin of a landing of ``stop``, with t and δ^{1/κ}, into ``scratch.stages[START]``."""
     w, size, delta = scratch.stages[START], state.x.size, max(indentation(problem, stop, state.x), 0.0)
     copy(state.x, w, size)
     w[size], w[size + 1] = state.now[T], delta ** (1.0 / tables.time_exponent[1 + stop])
@@ -178,7 +180,7 @@ def start_landing(problem, tables, state, scratch, stop):
 
 @inner
 def _begin_peaks(state, scratch):
-    """Peaks by the state a landing begins with, whose forces its first stage has found."""
+    """Raise the peak forces by those at the begin of a landing, which its first stage has computed."""
     work, size = scratch.stages, state.x.size
     for s in range(state.segment.size):
         if state.segment[s] > 0:
@@ -188,7 +190,7 @@ def _begin_peaks(state, scratch):
 
 @inner
 def _accept(problem, tables, state, scratch, variable, stop, span, t_end, out, due, with_energy):
-    """Move the state to the end of the landing in ``scratch.stages[LANDED]``, or to that of the run; samples on the way."""
+    """Move the state to the landing in ``scratch.stages[LANDED]``, or to the end of the run; write samples between."""
     w, x, size = scratch.stages[START], scratch.stages[LANDED], state.x.size
     landed, t = x[size], state.now[T]
     _begin_peaks(state, scratch)
@@ -284,7 +286,7 @@ def land_on_bend(problem, tables, state, scratch, stop, border, near, rtol, t_en
     start_landing(problem, tables, state, scratch, stop)
     w, x = scratch.stages[START], scratch.stages[LANDED]
     before, apart, span = 0.0, _apart(problem, tables, state, scratch, stop, border, w), near
-    if abs(apart) <= 1e-6 * largest:  # it begins on the bend, which is no second point for the next one
+    if abs(apart) <= 1e-6 * largest:  # it begins on a bend: the secant needs another point
         before = 0.9 * near
         _step(problem, tables, state, scratch, TIME, stop, before, with_energy)
         apart = _apart(problem, tables, state, scratch, stop, border, x)

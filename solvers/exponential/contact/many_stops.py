@@ -1,9 +1,9 @@
-"""Contact steps of many stops, through the blocks: a force pushes blocks, blocks move, a stop reads blocks.
+"""Contact steps with many stops: forces move the blocks, and the motion of a stop is a sum over the blocks.
 
-Up to `block_tables.FEW` stops have tables of what reaches each of them; their size, and what of it a step must fetch,
-grow with the square of the number of stops. Beyond, ``scratch.block_motion`` holds p and v of all blocks at the nodes, free or
-under all forces, from which a stop's indentation is one sum over the blocks. What stops that touch together do to each
-other is summed up for them when they first do, and kept in a pool of bounded size.
+Up to `block_tables.FEW` stops there are tables of the response of each stop to each force. Their size, and the part a
+step must load, grow with the square of the number of stops. With more stops ``scratch.block_motion`` holds p and v of
+all blocks at the nodes, without forces or with all of them. The response of one stop to the force of another is summed
+up when both are in contact for the first time, and kept in a pool of bounded size.
 """
 
 from __future__ import annotations
@@ -14,19 +14,19 @@ from solvers.compiled.sums import combine
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.responses import fill_pair
 
-SIGNALS, CONTINUING, ENTERING = range(3)  # groups of inputs; a force has the weight σ^λ on the step on which it enters
+SIGNALS, CONTINUING, ENTERING = range(3)  # groups of inputs: signals, forces without and with the weight σ^λ
 POOL = 4093  # pairs of stops and step lengths, a kilobyte each; prime, so that few of one step share a place
 
 
 @inlined
 def uses_blocks(tables):
-    """Whether there are too many stops for tables of each."""
+    """Whether there are more stops than have tables of their own."""
     return tables.node_propagator.shape[1] > 0
 
 
 @inlined
 def weighting_of(tables, node_set, u):
-    """Index of the tables of what input u does on a step of a family."""
+    """Index of the weighting of input u on a step with given nodes."""
     return tables.entering[node_set] if u == node_set - 1 else tables.kind[node_set]
 
 
@@ -43,7 +43,7 @@ def pair_response(problem, tables, scratch, node_set, level, s, u):
 
 @inner
 def _in_pool(problem, tables, scratch, weighting, level, s, u):
-    """Where the same of many stops is in the pool, summed up if another pair has its place."""
+    """Index of that response in the pool, for many stops; it is summed up if another pair has its place."""
     stops, inputs = problem.gap.size, scratch.force.shape[0]
     key = ((weighting * tables.contact_step.size + level) * stops + s) * inputs + u + 1
     place = key % scratch.pool_keys.size
@@ -71,7 +71,7 @@ def free_block_motion(problem, tables, scratch, node_set, level, x):
 
 @inner
 def _sum_pushes(problem, tables, state, scratch, force, node_set, group):
-    """What the inputs of one group push the blocks by, at the nodes, into ``scratch.block_force``; whether there are any."""
+    """State rates of the blocks by one group of inputs, at the nodes, into ``scratch.block_force``; whether any act."""
     stops, size, own, found = problem.gap.size, problem.k.size, tables.block_response.shape[3] // 2, False
     for u in range(force.shape[0]):
         if (u >= stops) != (group == SIGNALS) or (u < stops and state.segment[u] == 0):
@@ -89,7 +89,7 @@ def _sum_pushes(problem, tables, state, scratch, force, node_set, group):
 
 @inner
 def add_block_motion(problem, tables, state, scratch, node_set, level, group):
-    """Add to the blocks at the nodes what the present forces of one group, or the signals, do."""
+    """Add the response to the present forces of one group, or to the signals, to the blocks at the nodes."""
     if not _sum_pushes(problem, tables, state, scratch, scratch.force, node_set, group):
         return
     n, own, block_motion, block_force = (
@@ -111,7 +111,7 @@ def add_block_motion(problem, tables, state, scratch, node_set, level, group):
 
 @inner
 def add_end_response(problem, tables, state, scratch, force, node_set, level, x):
-    """Add to a state what forces and signals do until the end of the step."""
+    """Add the response at the end of the step to forces and signals to a state."""
     n, own = problem.k.size, tables.block_response.shape[3] // 2
     for group in range(0 if problem.table_dt.size else 1, 3):
         if not _sum_pushes(problem, tables, state, scratch, force, node_set, group):

@@ -1,4 +1,4 @@
-"""Newton's method for the forces of a contact step, where a stiff or strongly damped law defeats iteration."""
+"""Newton's method for the forces of a contact step, for stiff or strongly damped laws."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def _note_viscosity(state, scratch):
 
 @inner
 def newton(problem, tables, state, scratch, node_set, level):
-    """Newton's method for the forces, where a stiff or strongly damped law defeats the plain iteration."""
+    """Solve for the forces by Newton's method, where the fixed-point iteration diverges; whether it converged."""
     stops = problem.gap.size
     for _ in range(MOST_ITERATIONS):
         row = 0

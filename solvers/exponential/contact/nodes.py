@@ -1,6 +1,6 @@
-"""Kinds of contact steps: their nodes, the weights of their forces, what is told from node values.
+"""Node sets of contact steps: nodes, weights of the forces, and what is computed from the values at the nodes.
 
-A force is known by its values F_j at S nodes σ_j of (0, 1), t = h σ^κ:
+A force is given by its values F_j at S nodes σ_j of (0, 1), t = h σ^κ:
 
     F(t) = w(σ) Σ_j L_j(σ) F_j / w(σ_j),
 
@@ -20,10 +20,10 @@ import numpy as np
 from solvers.compiled.kernels import kernel
 
 S = 8  # nodes of a contact step: 6 is a little faster at 1e-6, 10 and 12 bring nothing
-_CHECKED = (np.arange(24) + 0.5) / 24  # places between the nodes where their interpolant is compared
+_CHECKED = (np.arange(24) + 0.5) / 24  # points where the interpolant of the nodes is compared
 _NODES_FIRST = [*range(S), *range(S + 1, 2 * S + 1), S, 2 * S + 1]
 PHASES = np.geomspace(1e-2, 1e4, 600)  # ω h
-LOCAL = -np.cos(np.pi * np.arange(S) / (S - 1))  # points of an interval, its ends among them, where a summit is sought
+LOCAL = -np.cos(np.pi * np.arange(S) / (S - 1))  # Chebyshev points of an interval in which a maximum is sought
 MONOMIALS = np.ascontiguousarray(np.linalg.inv(np.vander(LOCAL, increasing=True)).T)
 
 
@@ -54,7 +54,7 @@ def so_far(points: Any) -> Any:
 
 
 class _NodeSet(NamedTuple):
-    """Nodes of a kind of contact step, t = h σ^power, F = σ^lead × polynomial."""
+    """Nodes of one kind of contact step, t = h σ^κ, F = σ^λ × polynomial; κ and λ are its exponents."""
 
     time_exponent: float
     weight_exponent: float
@@ -64,7 +64,7 @@ class _NodeSet(NamedTuple):
 
 
 def _node_set(time_exponent: float, weight_exponent: float) -> _NodeSet:
-    """Gauss–Jacobi nodes on (0, 1) for the weight of ∫F dt, and the coefficients they give."""
+    """Gauss–Jacobi nodes on (0, 1) for the weight of ∫F dt, and the polynomial's coefficients from node values."""
     from scipy.special import eval_jacobi, roots_jacobi
 
     beta = weight_exponent + time_exponent - 1.0
@@ -78,15 +78,16 @@ def _node_set(time_exponent: float, weight_exponent: float) -> _NodeSet:
 
 
 class NodeSets(NamedTuple):
-    """All contact steps of a problem: the smooth one, then one per stop to enter it; most stops are of few kinds.
+    """The node sets of a problem: that of smooth steps, then one per stop, for the step on which it enters contact.
 
-    The large tables have an index of the kind of nodes, or of the way of a force: a kind, and whether with its weight.
+    Many stops have equal nodes. So the large tables are indexed by the kind of the nodes, or by the weighting of a
+    force: a kind, with or without the weight σ^λ.
     """
 
-    kind: Any  # (f,) each family's kind, and the way of all forces without a weight
-    entering: Any  # (f,) the way of the force of the stop that enters
-    kinds: Any  # (kinds,) a family of each kind
-    weightings: Any  # (ways, 2) a family of each way, and 1 for the weight σ^λ
+    kind: Any  # (f,) of each node set; also the weighting of forces without the weight
+    entering: Any  # (f,) weighting of the force of the stop that enters
+    kinds: Any  # (kinds,) a node set of each kind
+    weightings: Any  # (weightings, 2) a node set of each, and 1 for the weight σ^λ
     time_exponent: Any  # (f,)
     weight_exponent: Any
     nodes: Any  # (f, S), as the rest in `Tables`
@@ -113,7 +114,7 @@ def series_of(law: Any) -> tuple[float, float]:
 
 @lru_cache(maxsize=64)
 def node_sets_of(series: tuple[tuple[float, float], ...]) -> NodeSets:
-    """Kinds of steps for the stops' (κ, λ)."""
+    """The node sets for the (κ, λ) of all stops."""
     kinds = list(dict.fromkeys(((1.0, 0.0), *series)))
     found = [_node_set(*kind) for kind in kinds]
     kind = np.array([kinds.index(one) for one in ((1.0, 0.0), *series)])
@@ -157,7 +158,7 @@ def _summary(node_set: _NodeSet) -> Any:
 
 
 def _plain_weights(node_set: _NodeSet) -> Any:
-    """(S,) Σ weights × values = ∫ (polynomial through the values) dt/h, without the force's weight σ^λ."""
+    """(S,) weights of ∫ (polynomial through node values) dt/h, without the force's weight σ^λ."""
     points, weights = gauss(12)
     return (weights * node_set.time_exponent * points ** (node_set.time_exponent - 1.0)) @ _interpolation(
         node_set.nodes, points
@@ -165,7 +166,7 @@ def _plain_weights(node_set: _NodeSet) -> Any:
 
 
 def _brackets(node_set: _NodeSet) -> Any:
-    """(S, 2) beginning and end of the interval between the neighbours of every node."""
+    """(S, 2) ends of the interval between the neighbours of every node."""
     ends = np.concatenate(([0.0], node_set.nodes, [1.0]))
     return np.column_stack((ends[:-2], ends[2:]))
 

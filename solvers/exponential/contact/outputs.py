@@ -1,4 +1,4 @@
-"""What a contact step leaves besides its end: samples inside, the state at the end of a run, a row of the tape."""
+"""Outputs of a contact step: samples inside it, the state at the end of a run, a row of the event record."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from solvers.exponential.energy.quadrature import state_within
 
 @inner
 def sample_step(problem, tables, energy_tables, state, scratch, node_set, level, t_end, out, due):
-    """Samples inside the converged step, and the state at the end of the run if that lies inside."""
+    """Write the samples inside the converged step, and the state at the end of the run if it is inside."""
     t, h, begin, row = state.now[T], tables.contact_step[level], 0.0, state.x
     while True:
         sampled = due[state.count[SAMPLED]] <= min(t + h, t_end)
@@ -30,7 +30,7 @@ def sample_step(problem, tables, energy_tables, state, scratch, node_set, level,
 
 @inner
 def end_run(problem, tables, state, scratch, node_set, level, t_end):
-    """End the run within the step found, at the state `sample_step` has left in ``scratch.stages[START]``."""
+    """End the run within the step, in the state that `sample_step` has put into ``scratch.stages[START]``."""
     x, share = scratch.stages[START], (t_end - state.now[T]) / tables.contact_step[level]
     place = share ** (1.0 / tables.time_exponent[node_set])
     for s in range(problem.gap.size):
@@ -46,7 +46,7 @@ def end_run(problem, tables, state, scratch, node_set, level, t_end):
 
 @inner
 def record_forces(problem, state, scratch, kind, ended, node_set, level):
-    """A row of the tape with the forces at the nodes."""
+    """Append a row with the forces at the nodes to the event record."""
     forces = state.event_record[state.count[RECORDED], HEAD + state.x.size :]
     for s in range(problem.gap.size):
         copy(scratch.force[s], forces[s * S : (s + 1) * S], S)

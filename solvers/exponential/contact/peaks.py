@@ -1,8 +1,8 @@
-"""Largest indentation and force of a contact: maxima of what each step knows of them, not of its nodes.
+"""Largest indentation and force of a contact: maxima of the interpolants of each step, not of its node values.
 
-Around the highest node of a step, between its neighbours, δ and δ̇ at eight points follow from δ and δ̇ at all nodes and
-at the begin of the step by Hermite's polynomial of degree 17, and the forces there from the law. The maximum of the
-polynomial through these points differs from that of the motion by less than the motion does from the exact one.
+Between the neighbours of the highest node, δ and δ̇ at eight points are interpolated from δ and δ̇ at all nodes and at
+the begin of the step by Hermite's polynomial of degree 17; the forces there are those of the law. The maximum of the
+polynomial through these points is closer to that of the motion than the motion is to the exact one.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from solvers.compiled.sums import combine
 from solvers.exponential.contact.node_response import DELTAS, FORCES, KNOWN, RATES
 from solvers.exponential.contact.nodes import LOCAL, MONOMIALS, S
 
-_MOST = 6  # steps to a summit
+_MOST = 6  # Newton steps to a maximum
 
 
 @inlined
@@ -29,7 +29,7 @@ def _local(coefficients, x):
 
 @inlined
 def _guess(values, place):
-    """Summit of the parabola through a point of `LOCAL` and its neighbours, and the neighbours; an end stays."""
+    """Vertex of the parabola through a point of `LOCAL` and its neighbours, and these; at an end the point itself."""
     if place == 0 or place == S - 1:
         return LOCAL[place], LOCAL[max(place - 1, 0)], LOCAL[min(place + 1, S - 1)]
     low, b, high = LOCAL[place - 1], LOCAL[place], LOCAL[place + 1]
@@ -40,10 +40,10 @@ def _guess(values, place):
 
 @inner
 def local_maximum(values, limit, coefficients):
-    """Maximum on [-1, limit] of the polynomial through the values at `LOCAL`, around the highest of these.
+    """Maximum on [-1, limit] of the polynomial through the values at `LOCAL`, near the highest of these.
 
-    From the summit of the parabola through that point and its neighbours Newton's method for the slope goes on; the
-    local parabola's summit is off by the third power of its last step.
+    Newton's method for a zero of the slope begins at the vertex of the parabola through that point and its neighbours;
+    the error of the maximum is of the third order in the last step.
     """
     place = 0
     for i in range(S):
@@ -70,7 +70,7 @@ def local_maximum(values, limit, coefficients):
 
 @inlined
 def _highest(tables, values, node_set, limit):
-    """Place of the largest node value up to σ = limit, or -1."""
+    """Index of the largest node value up to σ = limit, or -1."""
     place = -1
     for i in range(S):
         if tables.nodes[node_set, i] <= limit and (place < 0 or values[i] > values[place]):
@@ -80,7 +80,7 @@ def _highest(tables, values, node_set, limit):
 
 @inner
 def motion_around(problem, tables, state, scratch, node_set, h, s, place):
-    """Indentations and rates of stop s around a node of the step that begins at the state, into ``scratch.local_motion``."""
+    """Indentations and rates of stop s around a node of the step from the state, into ``scratch.local_motion``."""
     local_motion, motion, known = scratch.local_motion, scratch.motion[s], scratch.local_motion[KNOWN]
     copy(motion[0], known, S)
     for i in range(S):

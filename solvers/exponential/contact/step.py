@@ -1,7 +1,7 @@
 """One step in contact: land on a border that is near, else collocate the forces on the longest step that meets rtol.
 
-The error of a step is the largest over all stops, each in units of rtol × its own reference speed, the speed of entry
-or a tenth of what the motion could reach there; the step looks at the borders of all stops, open ones included.
+The error of a step is the largest over all stops, each in units of rtol × its own reference speed: the speed of entry,
+or a tenth of the speed the motion could reach there. The borders of all stops are checked, in contact or not.
 """
 
 from __future__ import annotations
@@ -29,19 +29,19 @@ from solvers.compiled.state import (
     switch_on_surface,
 )
 from solvers.compiled.sums import combine
-from solvers.exponential.contact.borders import border_ahead, renew_all, renew_border
+from solvers.exponential.contact.borders import border_ahead
 from solvers.exponential.contact.collocation import contact_time, end_state, finish_step, solve_forces, step_error
 from solvers.exponential.contact.crossings import choose_sides, first_bend, leaves_segment
-from solvers.exponential.contact.landing import land, land_on_bend
-from solvers.exponential.contact.node_response import LANDED, free_response
+from solvers.exponential.contact.node_response import free_response
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.outputs import end_run, record_forces, sample_step
 from solvers.exponential.contact.peaks import state_peaks
+from solvers.exponential.contact.segment_ends import go_beyond, land_first, land_in_time
 from solvers.exponential.energy.balance import account_contact
 from solvers.exponential.flight import energy_norms
 
-LEVEL, NODE_SET, NEW, STOP, NEXT_LEVEL, BEGUN, BORDER = range(7)  # places in Space.last
-ENTRY, SEGMENT = 1, 2  # values of FRESH: the first step of a contact, or of a piece of its law; 0 for others
+LEVEL, NODE_SET, NEW, STOP, NEXT_LEVEL, BEGUN = range(6)  # places in Scratch.control
+ENTRY, SEGMENT = 1, 2  # values of NEW: the first step of a contact, or of a segment of its law; 0 for other steps
 _GOAL = 0.3  # error aimed at, in units of the tolerance
 _ORDER = 15.0  # the error estimate falls like h^15
 _LEAST = 1e-60  # m/s, of a reference speed
@@ -49,7 +49,7 @@ _LEAST = 1e-60  # m/s, of a reference speed
 
 @inner
 def begin_steps(problem, tables, state, scratch, stop):
-    """Reference speeds, first step and nodes after ``stop`` has switched: entered, changed its piece, or left."""
+    """Reference speeds, first step and nodes after ``stop`` has entered, changed its segment, or left."""
     control, size, others = scratch.control, 2 * problem.k.size, False
     energy_norms(problem, state.x, scratch.norms)
     for s in range(problem.gap.size):
@@ -73,7 +73,7 @@ def begin_steps(problem, tables, state, scratch, stop):
 
 @inner
 def _first_step(problem, tables, state, scratch, stop):
-    """Level of the first step of a contact, a share of the duration it would have if it were free."""
+    """Level of the first step of a contact, a share of the duration of an impact on this stop alone."""
     speed = abs(dot(problem.read_rate[stop], state.x, 2 * problem.k.size))
     duration = contact_time(problem, tables, scratch, stop, max(speed, 1e-3 * scratch.reference_speed[stop]))
     if scratch.first_step_share[stop] == 0.0:
@@ -84,7 +84,7 @@ def _first_step(problem, tables, state, scratch, stop):
 
 @inner
 def _entry_nodes(problem, tables, state, stop, level):
-    """Kind of the next step: an entry if a force of broken exponent has just begun, that of ``stop`` before others."""
+    """Node set of the next step: of an entry if a force with broken exponent has just begun, first that of ``stop``."""
     found, while_ago = 0, 1e-6 * tables.contact_step[level]
     for s in range(state.segment.size):
         if state.segment[s] == 1 and tables.time_exponent[1 + s] > 1.0 and (found == 0 or s == stop):
@@ -96,7 +96,7 @@ def _entry_nodes(problem, tables, state, stop, level):
 
 @inner
 def _switch_pressed(problem, state, log):
-    """Switch every open stop at rest on its surface that the forces of others press; whether any did."""
+    """Switch every stop at rest on its surface that other stops' forces press into it; returns whether any did."""
     switched = False
     for s in range(problem.gap.size):
         if state.segment[s] > 0 or abs(indentation(problem, s, state.x)) > surface_tolerance(problem, s, state.x):
@@ -113,7 +113,7 @@ def _switch_pressed(problem, state, log):
 
 @inlined
 def level_of(tables, h):
-    """Contact step of about h, the shortest one if need be."""
+    """Level of the longest contact step up to h, or of the shortest of all."""
     last = tables.contact_step.size - 1
     j = min(max(int(np.ceil(2.0 * math.log2(tables.contact_step[0] / h))), 0), last)
     return j + 1 if tables.contact_step[j] > h and j < last else j
@@ -121,20 +121,17 @@ def level_of(tables, h):
 
 @inner
 def _nearest_surface(problem, state, scratch):
-    """(time, stop, direction) of the border of a piece that will be met first at the present rates.
+    """(time, stop, direction) of the border of a segment that is met first at the present rates.
 
-    These may be faster than those at entry: the reference speeds follow.
+    Raises the reference speeds to these rates, which may exceed those at entry.
     """
     size = 2 * problem.k.size
     near, stop, direction = np.inf, -1, 0
     for s in range(problem.gap.size):
         delta = indentation(problem, s, state.x)
         rate = dot(problem.read_rate[s], state.x, size)
-        scratch.reference_speed[s], scratch.start_motion[s, 0], scratch.start_motion[s, 1] = (
-            max(scratch.reference_speed[s], abs(rate)),
-            delta,
-            rate,
-        )
+        scratch.start_motion[s, 0], scratch.start_motion[s, 1] = delta, rate
+        scratch.reference_speed[s] = max(scratch.reference_speed[s], abs(rate))
         segment = state.segment[s]
         if rate < 0.0 and segment > 0:
             time, way = (delta - problem.knots[s, segment - 1]) / -rate, -1
@@ -149,7 +146,7 @@ def _nearest_surface(problem, state, scratch):
 
 @inner
 def _predict(problem, tables, state, scratch, level):
-    """First guess of the forces: the last step's polynomial, or the law on the free response."""
+    """First guess of the forces: the polynomial of the last step, or the law for the free response."""
     control = scratch.control
     for s in range(problem.gap.size):
         if state.segment[s] == 0:
@@ -169,7 +166,7 @@ def _predict(problem, tables, state, scratch, level):
 
 @merged
 def _attempt(problem, tables, state, scratch, node_set, level, rtol):
-    """Attempt one contact step; error in units of the tolerance, inf when it must be shorter anyway.
+    """Attempt one contact step; (error in units of the tolerance, time of a bend it crosses, stop of that bend).
 
     With inf comes the time of a bend or border that is in its way and the stop, else inf and -1; of a border
     ``scratch.control`` holds which it is, else -1.
@@ -183,10 +180,10 @@ def _attempt(problem, tables, state, scratch, node_set, level, rtol):
     if leaves_segment(problem, tables, state, scratch, node_set, level):
         return 1.0 if bottom else np.inf, first, bent
     first, bent = first_bend(problem, tables, state, scratch, node_set, level, scratch.control[NEW] > 0, rtol)
-    scratch.control[BORDER] = -1
+    scratch.border[0] = -1
     time, element, border = border_ahead(problem, tables, state, scratch, node_set, level)
     if time < first:
-        first, bent, scratch.control[BORDER] = time, element, border
+        first, bent, scratch.border[0] = time, element, border
     if bent >= 0:
         return 1.0 if bottom else np.inf, first, bent
     error = step_error(problem, tables, state, scratch, node_set, level, scratch.control[NEW] > 0, rtol)
@@ -195,7 +192,7 @@ def _attempt(problem, tables, state, scratch, node_set, level, rtol):
 
 @inner
 def latest_entered(state):
-    """The stop in contact that was entered last."""
+    """The stop in contact with the latest entry."""
     stop = -1
     for s in range(state.segment.size):
         if state.segment[s] > 0 and (stop < 0 or state.active[s, T_IN] >= state.active[stop, T_IN]):
@@ -203,42 +200,45 @@ def latest_entered(state):
     return stop
 
 
-@inner
-def _land_first(problem, tables, state, scratch, stop, direction, near, rtol, t_end, out, due, with_energy):
-    """Land on the border met first, which another stop's may be; (stop, direction), or (-1, 0)."""
-    for _ in range(problem.gap.size + 1):
-        landed = land(problem, tables, state, scratch, stop, direction, near, rtol, t_end, out, due, with_energy)
-        if landed == stop or landed < 0:
-            return landed, direction
-        above = indentation(problem, landed, scratch.stages[LANDED]) > problem.knots[landed, state.segment[landed]]
-        stop, direction = landed, 1 if above else -1
-    return -1, 0
+@merged
+def _try_landing(problem, tables, state, scratch, stop, direction, near, rtol, t_end, log, out, due, with_energy):
+    """Land on the border met first and switch its stop, if it is near enough; whether it was done."""
+    stop, direction = land_first(
+        problem, tables, state, scratch, stop, direction, near, rtol, t_end, out, due, with_energy
+    )
+    if stop < 0:
+        return False
+    state.count[STEPS] += 1
+    if state.now[T] < t_end:
+        switch(problem, state, stop, direction, log)
+        if in_contact(state):
+            begin_steps(problem, tables, state, scratch, stop)
+    return True
 
 
-@inner
-def _land_in_time(problem, tables, state, scratch, stop, first, rtol, t_end, out, due, with_energy):
-    """Land on a bend or border of ``stop``, or on a border met before; (stop, whether it succeeded)."""
-    border, near = scratch.control[BORDER], first
-    for _ in range(problem.gap.size + 1):
-        if land_on_bend(problem, tables, state, scratch, stop, border, near, rtol, t_end, out, due, with_energy):
-            scratch.control[BORDER] = border
-            return stop, True
-        if scratch.control[BORDER] < 0 or scratch.landed[0] < 0:
-            break
-        stop, border = scratch.landed[0], scratch.landed[1]
-    return stop, False
-
-
-@inlined
-def _renew(problem, state, scratch, stop, alone, log):
-    """What ends on a bend goes on beyond it: the other side, or numbers latched on a border."""
-    border = scratch.control[BORDER]
-    if border < 0:
-        scratch.side[stop] = -scratch.side[stop]
-    elif alone:
-        renew_border(problem, state, scratch, stop, border, log)
-    else:
-        renew_all(problem, state, scratch, stop, border, log)
+@merged
+def _accept(problem, tables, energy_tables, state, scratch, node_set, level, wanted, error, bent, t_end, log, out, due):
+    """Complete the step found: samples, the end of the run if it is within, energy, event record, next step."""
+    h = tables.contact_step[level]
+    end = state.now[T] + h
+    if end >= t_end or due[state.count[SAMPLED]] <= end:
+        sample_step(problem, tables, energy_tables, state, scratch, node_set, level, t_end, out, due)
+    if end >= t_end:
+        end_run(problem, tables, state, scratch, node_set, level, t_end)
+        return
+    for s in range(problem.gap.size):
+        if state.segment[s] > 0:
+            copy(scratch.force[s], scratch.previous[s], S)
+    if energy_tables.active > 0.0:
+        account_contact(problem, tables, energy_tables, state, scratch, node_set, level, h, state.x)
+    if state.event_record.shape[0]:
+        record_forces(problem, state, scratch, STEP, end, node_set, level)
+    finish_step(problem, tables, state, scratch, node_set, level)
+    _adapt(tables, scratch, level, node_set, wanted, error)
+    if bent >= 0:  # crossed within the shortest step
+        go_beyond(problem, state, scratch, bent, True, log)
+        scratch.control[NEW] = SEGMENT if scratch.border[0] >= 0 else 0
+    state.count[STEPS] += 1
 
 
 @merged
@@ -253,17 +253,10 @@ def advance_contact(problem, tables, energy_tables, state, scratch, t_end, rtol,
     if control[NEW] == ENTRY and _switch_pressed(problem, state, log):
         begin_steps(problem, tables, state, scratch, latest_entered(state))
         return RUNNING
-    if stop >= 0:
-        stop, direction = _land_first(
-            problem, tables, state, scratch, stop, direction, near, rtol, t_end, out, due, with_energy
-        )
-        if stop >= 0:
-            state.count[STEPS] += 1
-            if state.now[T] < t_end:
-                switch(problem, state, stop, direction, log)
-                if in_contact(state):
-                    begin_steps(problem, tables, state, scratch, stop)
-            return RUNNING
+    if stop >= 0 and _try_landing(
+        problem, tables, state, scratch, stop, direction, near, rtol, t_end, log, out, due, with_energy
+    ):
+        return RUNNING
     node_set = control[NODE_SET] if control[NEW] else 0
     longest = 0.8 * near
     if problem.table_dt.size:
@@ -275,52 +268,33 @@ def advance_contact(problem, tables, energy_tables, state, scratch, t_end, rtol,
         error, first, bent = _attempt(problem, tables, state, scratch, node_set, level, rtol)
         if error <= 1.0:
             break
-        landed = first == 0.0 and control[BORDER] >= 0  # it begins on the border and goes across
+        landed = first == 0.0 and scratch.border[0] >= 0  # it begins on the border and goes across
         if bent >= 0 and not landed:
-            bent, landed = _land_in_time(
+            bent, landed = land_in_time(
                 problem, tables, state, scratch, bent, first, rtol, t_end, out, due, with_energy
             )
         if landed:
             state.count[STEPS] += 1
             if state.now[T] < t_end:
-                _renew(problem, state, scratch, bent, first == 0.0, log)
+                go_beyond(problem, state, scratch, bent, first == 0.0, log)
             control[NEW], control[NODE_SET], control[NEXT_LEVEL] = SEGMENT, 0, max(level, wanted)
             return RUNNING
         if level == bottom:
             return LAW_NOT_FINITE if _law_fails(state, scratch) else STEP_TOO_SMALL
         copy(scratch.side_at_begin, scratch.side, scratch.side.size)
         state.count[REJECTED] += 1
-        if bent >= 0:  # go near it, then end a step on it
+        if bent >= 0:  # a step that ends near the bend, so that the next one can land on it
             level = max(level + 1, level_of(tables, 0.9 * first))
             continue
         level = min(bottom, level + (1 + int(2.0 / _ORDER * math.log2(error / _GOAL)) if error < np.inf else 2))
         wanted = level
-    h = tables.contact_step[level]
-    end = state.now[T] + h
-    if end >= t_end or due[state.count[SAMPLED]] <= end:
-        sample_step(problem, tables, energy_tables, state, scratch, node_set, level, t_end, out, due)
-    if end >= t_end:
-        end_run(problem, tables, state, scratch, node_set, level, t_end)
-        return RUNNING
-    for s in range(problem.gap.size):
-        if state.segment[s] > 0:
-            copy(scratch.force[s], scratch.previous[s], S)
-    if with_energy:
-        account_contact(problem, tables, energy_tables, state, scratch, node_set, level, h, state.x)
-    if state.event_record.shape[0]:
-        record_forces(problem, state, scratch, STEP, end, node_set, level)
-    finish_step(problem, tables, state, scratch, node_set, level)
-    _adapt(tables, scratch, level, node_set, wanted, error)
-    if bent >= 0:  # crossed within the shortest step
-        _renew(problem, state, scratch, bent, True, log)
-        control[NEW] = SEGMENT if control[BORDER] >= 0 else 0
-    state.count[STEPS] += 1
+    _accept(problem, tables, energy_tables, state, scratch, node_set, level, wanted, error, bent, t_end, log, out, due)
     return RUNNING
 
 
 @inner
 def _law_fails(state, scratch):
-    """Whether a law gave a force that is not finite."""
+    """Whether a force is not finite."""
     for s in range(state.segment.size):
         for i in range(S):
             if state.segment[s] > 0 and not abs(scratch.force[s, i]) < np.inf:
@@ -332,7 +306,7 @@ def _law_fails(state, scratch):
 def _adapt(tables, scratch, level, node_set, wanted, error):
     """Size of the next step from the error of this one."""
     control, longer = scratch.control, 2.0 / _ORDER * math.log2(_GOAL / max(error, 1e-30))  # in levels
-    if control[NEW] == ENTRY:  # the next contact of this stop begins with what was right here
+    if control[NEW] == ENTRY:  # the next contact of this stop begins with the step that was right here
         s = control[STOP]
         if level != control[NEXT_LEVEL]:
             scratch.first_step_share[s] = tables.contact_step[level] / scratch.duration[0]

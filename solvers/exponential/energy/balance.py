@@ -1,10 +1,10 @@
-"""The energy ledger step by step: whole steps by the forms of `flight_tables`, parts of steps by series.
+"""The energy balance step by step: whole steps by the forms of `flight_tables`, parts of steps by series.
 
-Within a part the state is the Taylor series of its differential equation in panels of `SERIES_REACH` radians of the
-fastest block, and the powers are summed by Gauss's rule with five points, 2e-12 off at most.
+On a part of a step the state is the Taylor series of its differential equation, in panels of `SERIES_REACH` radians of
+the fastest block; the powers are integrated by Gauss's rule with five points, with an error of 2e-12 at most.
 
-A flight is booked from a *mark* on, its begin, the last output, or with sampled signals the last cell's begin: whatever
-steps it takes, a form of its own then holds most of what it does.
+A flight is accounted for from a *mark* on: the begin of the flight, the last output or, with sampled signals, the begin
+of the present cell. Between marks, one form covers the time, whatever steps the flight has taken.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from solvers.compiled.kernels import copy, dot, inlined, inner, reordered
 from solvers.compiled.simd import load8, splat8, store8, sum8
 from solvers.compiled.state import T
 from solvers.compiled.sums import combine
-from solvers.exponential.contact.collocation import _beyond, _size
+from solvers.exponential.contact.collocation import largest_size, unresolved_part
 from solvers.exponential.contact.node_response import WITHIN
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.energy.contact_tables import BEGAN, ENTERING, SQUARES
@@ -29,14 +29,14 @@ from solvers.exponential.flight import (
     signal_derivatives,
 )
 
-_TERM_SUM, _MOVING, _MARK = 9, 10, 11  # rows of Space.work; those before hold a load on the blocks and its derivatives
+_TERM_SUM, _MOVING, _MARK = 9, 10, 11  # rows of Scratch.stages; those before hold a load on the blocks and derivatives
 _EXACT = 1e-17  # share of the last term of a series
 _UNSEEN = 10.0  # times what a polynomial is thought to leave out
 
 
 @reordered
 def _own_loss(plain, x, n):
-    """Damping of blocks by themselves."""
+    """Energy dissipated by the structure's blocks without tones."""
     loss, blocks = 0.0, plain.shape[1]
     for b in range(blocks):
         p, v = x[b], x[n + b]
@@ -46,14 +46,14 @@ def _own_loss(plain, x, n):
 
 @inner
 def start_account(problem, state, scratch):
-    """Note the state from which `account_until` shall book a flight; its ledger is complete."""
+    """Set the mark, from which `account_until` accounts for a flight; the balance of the state is complete."""
     copy(state.x, scratch.stages[_MARK], 2 * problem.k.size)
     scratch.stages[_MARK, 2 * problem.k.size] = state.now[T]
 
 
 @inner
 def account_until(problem, tables, energy_tables, scratch, t, row):
-    """Add to the ledger of ``row`` what a flight does from the mark to t, within a cell, whatever steps it takes."""
+    """Add work and damping of a flight from the mark to t, within one cell, to the balance of ``row``."""
     x, size = scratch.stages[_MOVING], 2 * problem.k.size
     copy(scratch.stages[_MARK], x, size)
     begin = scratch.stages[_MARK, size]
@@ -76,7 +76,7 @@ def account_until(problem, tables, energy_tables, scratch, t, row):
 
 @inner
 def account_output(problem, tables, energy_tables, state, scratch, t, row):
-    """Complete the ledger of an output at t; without sampled signals the flight is booked on from there."""
+    """Complete the balance of an output at t; without sampled signals the mark moves there."""
     size = 2 * problem.k.size
     copy(state.x[size:], row[size:], 2)
     account_until(problem, tables, energy_tables, scratch, t, row)
@@ -88,14 +88,14 @@ def account_output(problem, tables, energy_tables, state, scratch, t, row):
 
 @inner
 def account_state(problem, tables, energy_tables, state, scratch):
-    """Complete the ledger of the state, from which the flight is booked on."""
+    """Complete the balance of the state, and set the mark there."""
     account_until(problem, tables, energy_tables, scratch, state.now[T], state.x)
     start_account(problem, state, scratch)
 
 
 @inlined
 def _rounding(problem, energy_tables, t):
-    """By which the time between two outputs, or two cells' ends, may differ from the step in the tables."""
+    """Difference allowed between the step of the tables and the time between two outputs, or of a cell."""
     return 1e-7 * energy_tables.spacing if problem.table_dt.size else 4e-16 * t
 
 
@@ -108,7 +108,7 @@ def _derive(problem, scratch, t):
 
 @inner
 def _account_forms(problem, energy_tables, scratch, level, x, row):
-    """The same by the forms of a step, from the signals' derivatives in ``scratch.signal_terms``."""
+    """The same by the forms of a step, from the derivatives of the signals in ``scratch.signal_terms``."""
     n, driven, given = problem.k.size, energy_tables.driver.size, scratch.energy_sums[0]
     signals = 6 * problem.table_dt.size
     for i in range(driven):
@@ -129,7 +129,7 @@ def _account_forms(problem, energy_tables, scratch, level, x, row):
 
 @inner
 def _account_series(problem, tables, energy_tables, scratch, t, span, x, row):
-    """The same by series for a part of a cell from x at t on; x moves."""
+    """The same by series for a part of a cell from x at t on; x is moved to the last panel."""
     panels, size = max(1, math.ceil(tables.fastest * span / SERIES_REACH - 1e-9)), 2 * problem.k.size
     for i in range(panels):
         _clear(scratch, size)
@@ -146,7 +146,7 @@ def _account_series(problem, tables, energy_tables, scratch, t, span, x, row):
 
 @inner
 def _clear(scratch, size):
-    """No load on the blocks."""
+    """Set the load on the blocks and its derivatives to zero."""
     for order in range(S):
         for e in range(size):
             scratch.stages[order, e] = 0.0
@@ -154,9 +154,9 @@ def _clear(scratch, size):
 
 @inner
 def _account_panel(problem, tables, energy_tables, scratch, t, span, x, row, further):
-    """Add work and damping under the load in ``scratch.stages`` to the ledger of ``row``; x moves if told to go further.
+    """Add work and damping under the load in ``scratch.stages`` to the balance of ``row``.
 
-    Term i of the series is span^i times a derivative.
+    x is moved to the end of the panel if ``further``. Term i of the series is span^i times a derivative.
     """
     n, terms, z = problem.k.size, scratch.terms, scratch.stages[_TERM_SUM]
     copy(x, terms[0], 2 * n)
@@ -212,13 +212,13 @@ def _add_unseen(tables, scratch, node_set, h, s, work, works):
     powers = load8(scratch.force[s], 0) * load8(scratch.motion[s, 1], 0)
     store8(scratch.trial, 0, powers)
     combine(tables.tail[node_set], scratch.trial, S, None, scratch.clipped)
-    most = _UNSEEN * h * _beyond(scratch.clipped, _size(scratch.trial), S // 2 if node_set == 0 else 1)
+    most = _UNSEEN * h * unresolved_part(scratch.clipped, largest_size(scratch.trial), S // 2 if node_set == 0 else 1)
     works[2 * s] += min(max(work - h * sum8(load8(weights, 0) * powers), -most), most)
 
 
 @inner
 def _steady_nodes(problem, tables, energy_tables, state, scratch, kind, place, h, weights):
-    """Signals at the nodes into ``scratch.energy_sums``, p and v of the tones into ``scratch.terms``; work on steady motion."""
+    """Work of the signals on the steady motion; signals at the nodes go to ``energy_sums``, tones to ``terms``."""
     n, size, gain = int(tables.own_blocks), problem.k.size, 0.0
     for k in range(size - n):
         alpha, beta = (
@@ -276,7 +276,7 @@ def _enters(tables, node_set, u):
 
 @inner
 def _account_nodes(problem, tables, energy_tables, state, scratch, node_set, place, h, row):
-    """The same for a whole step by its tables."""
+    """The same by the tables, for a whole step."""
     n, size, kind, weights = (
         int(tables.own_blocks),
         problem.k.size,

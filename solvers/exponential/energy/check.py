@@ -1,21 +1,22 @@
-"""Whether a finished run's energy balances: with the ledger at its samples, without one by a bound that costs nothing.
+"""Whether the energy of a finished run balances: by its samples, or by a bound that costs nothing if there are none.
 
-The energy handled is what there was at first, came in, was lost to damping or is stored, and for every contact its peak
-force times its peak indentation. With ledger a run is refused whose residual exceeds (`MULTIPLE` rtol + `ROUNDING`)
-times that energy.
+The energy handled is the initial energy, the input, the energy dissipated and stored, and for every contact the peak
+force times the peak indentation. A run with an energy balance is refused if the residual exceeds (`MULTIPLE` rtol +
+`ROUNDING`) times the energy handled.
 
-Without, the motion less the steady response to tones is looked at: its energy E at the end is at most that at the begin
-plus what the contacts gave,
+Without a balance, let E be the energy of the motion minus the steady response to tones. At the end it is at most that
+at the begin plus the work of the contacts,
 
     E <= E₀ + Σ_s (2 max|δ̇_s of the steady response| |∫F_s dt| - ∫F_s δ̇_s dt) =: E_c,
 
-and sampled loads v_l s_l(t) raise √(2E) by at most Σ_l |v_l|_{M⁻¹} ∫|s_l| dt. A run is refused whose energy is more
-than `FACTOR` times what this allows and what it need not account for: a run that only loses too much passes.
+and sampled loads v_l s_l(t) raise √(2E) by at most Σ_l |v_l|_{M⁻¹} ∫|s_l| dt. A run is refused if E is more than
+`FACTOR` times this bound plus the tolerated energy. A run that only loses too much energy passes.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -26,13 +27,13 @@ from solvers.problem import Array, Energy, System, dense
 
 MULTIPLE, ROUNDING = 20.0, 1e-9
 FACTOR = 4.0
-_SAMPLES = 64  # of the ledger that are looked at, the last one among them
-FIRST, LAST, ALLOWED = range(3)  # places in Space.energy
+_SAMPLES = 64  # of the balance that are checked, the last one among them
+FIRST, LAST, ALLOWED = range(3)  # places in Scratch.energy
 
 
 @inner
 def own_energy(problem, tables, x):
-    """Energy of the motion less the steady response to tones."""
+    """Energy, J, of the motion minus the steady response to tones."""
     n, energy = problem.k.size, 0.0
     for b in range(int(tables.own_blocks)):
         energy += 0.5 * (x[n + b] * x[n + b] + problem.k[b] * x[b] * x[b])
@@ -41,7 +42,7 @@ def own_energy(problem, tables, x):
 
 @inner
 def note_energy(problem, tables, state, scratch):
-    """At the end of a run: its energy, and what it may be without sampled loads."""
+    """At the end of a run: its energy, and the bound E_c, into ``scratch.energy``."""
     n = problem.k.size
     allowed = scratch.energy[FIRST]
     for s in range(problem.gap.size):
@@ -56,18 +57,25 @@ def note_energy(problem, tables, state, scratch):
 
 
 def tolerated_energy(handled: float, exchanged: Array, rtol: float) -> float:
-    """Energy, J, that a run need not account for.
+    """Energy, J, that may be missing in the balance of a run.
 
     ``exchanged`` (k,) : peak force times peak indentation of every contact.
     """
     return (MULTIPLE * rtol + ROUNDING) * float(handled + np.abs(exchanged).sum())
 
 
-def has_gained(system: System, energy: Any, sampled: Any, duration: float, slack: float) -> bool:
-    """Whether a run without ledger ends with more energy than it can have been given; ``sampled`` are its loads."""
-    _, last, allowed = energy.tolist()
-    allowed += slack
+def has_gained(
+    system: System, energy: Any, sampled: Any, duration: float, exchanged: Callable[[], Any], rtol: float
+) -> bool:
+    """Whether a run without balance ends with more energy than it can have been given; ``sampled`` are its loads.
+
+    ``exchanged`` as in `tolerated_energy`, asked for only where it matters.
+    """
+    first, last, allowed = energy.tolist()
     if not last > FACTOR * allowed or system.blocks.loss.size:
+        return False
+    allowed += tolerated_energy(first, exchanged(), rtol)
+    if not last > FACTOR * allowed:
         return False
     speed = math.sqrt(2.0 * allowed)
     for j, load in enumerate(sampled.table_load):
@@ -79,7 +87,7 @@ def has_gained(system: System, energy: Any, sampled: Any, duration: float, slack
 
 
 def unbalanced(system: System, powers: Array, motion: Array, begin: Array, exchanged: Array, rtol: float) -> bool:
-    """Whether the ledger of a run (rows of powers and motion at its samples) does not balance; see `tolerated_energy`."""
+    """Whether the energy of a run, given by powers and motion at its samples, is off by more than is tolerated."""
     rows = np.unique(np.linspace(0, len(powers) - 1, _SAMPLES).astype(int))
     balance = Energy.of_run(system.M, system.K, powers[rows], motion[rows], begin)
     parts = balance.initial, *(np.abs(part).max() for part in (balance.stored, balance.input, balance.damping))

@@ -1,4 +1,4 @@
-"""Work and damping over contact steps: tables made when a run first keeps an energy ledger.
+"""Work and damping over contact steps: tables made for the first run with an energy balance.
 
 The force on a block is a polynomial times its weight, see `contact.nodes`. So the block's velocity v is linear in
 y = (plain forces at the nodes, those of the stop that enters, p₀, v₀), and so is ∫ L_i v dt with the nodes' L_i,
@@ -69,7 +69,7 @@ def _once(moments: Any, squares: Any) -> Any:
 
 @kernel
 def _fill(k, c, h, time_exponent, weight_exponent, nodes, weights, points, so_far, velocity, basis, pushed, state, out):
-    """All tables of a kind; the arguments between ``so_far`` and the result are working space."""
+    """All tables of a kind; the arguments between ``so_far`` and the result are scratch."""
     for level in range(h.size):
         for b in range(k.size):
             panels = 1 + int(time_exponent * (math.sqrt(k[b]) + c[b]) * h[level] / _PANEL)
@@ -101,7 +101,7 @@ def _fill(k, c, h, time_exponent, weight_exponent, nodes, weights, points, so_fa
 
 @inner
 def _moved(k, c, x, p, v):
-    """A block's state after x, or before: det exp(A x) = e^{-cx} turns α I + β A round."""
+    """State of a block after the time x, or before if x < 0: det exp(A x) = e^{-cx} gives the inverse of α I + β A."""
     alpha, beta = propagate(k, c, abs(x))
     if x < 0.0:
         grown = math.exp(-c * x)
@@ -130,7 +130,7 @@ def _push(k, c, h, time_exponent, weight_exponent, nodes, weights, points, begin
 
 @inner
 def _move(k, c, h, time_exponent, points, so_far, begin, width, pushed, state, velocity):
-    """Velocities at the points of a panel by the variation of constants; ``state`` goes on to its end."""
+    """Velocities at the points of a panel by the variation of constants; ``state`` is moved to its end."""
     count, start = points.shape[1], h * begin**time_exponent
     for q in range(count + 1):
         end = begin + width * points[0, q] if q < count else begin + width

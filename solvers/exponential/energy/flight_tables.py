@@ -1,12 +1,12 @@
-"""Work and damping of whole steps as quadratic forms, made when a run first keeps an energy ledger.
+"""Work and damping of whole steps as quadratic forms: tables made for the first run with an energy balance.
 
 With y = (x, s), the state and the derivatives s, s', ..., s⁽⁵⁾ of every sampled signal, flight is y' = B y, and input
 work and damping of a step are
 
     ∫ y^T P y dt = y₀^T M(h) y₀,   M(2h) = M(h) + Φ(h)^T M(h) Φ(h),   Φ = exp(B h),
 
-begun by Gauss's rule on steps on which Φ is a short Taylor series. Kept are, for every *driver* i (tones and signals;
-with coupled damping every coordinate), the rows that give work and damping, and the structure's blocks' own damping.
+started by Gauss's rule on steps short enough for a Taylor series of Φ. Kept are the damping of the structure's blocks
+and, for every *driver* (tones and signals; with coupled damping every coordinate), the rows that give work and damping.
 
 Tables of contact steps are those of `contact_tables`.
 """
@@ -31,14 +31,14 @@ from solvers.exponential.tables import Tables
 
 _OCTAVE = 4  # flight steps of which each is twice as long as the last
 _BRIEF = 0.04  # |λ| h up to which twelve terms of a Taylor series are exact
-_MOST_NUMBERS = 10_000_000  # of the rows: with more drivers the work is summed by series
+_MOST_NUMBERS = 10_000_000  # in the rows: with more drivers the work is computed by series
 _REACH = 200.0  # radians of the fastest block up to which a contact step has tables
 
 
 class EnergyTables(NamedTuple):
-    """Numbers of the energy ledger; l counts flight steps and one more, j contact steps."""
+    """Numbers of the energy balance, read by kernels only; l counts flight steps and one more, j contact steps."""
 
-    active: float  # whether there is a ledger
+    active: float  # whether there is a balance
     closed: float  # whether there are rows for flight
     spacing: float  # s, of the last step in the tables
     driver: Any  # (d,) columns of the state that drive
@@ -47,7 +47,7 @@ class EnergyTables(NamedTuple):
     pairs: Any  # (l, 6J, 2 × 6J padded): the same from the signals
     gauss: Any  # (2, 5)
     series: Any  # (6, LONG): weights of a series' terms at Gauss's points and at the end
-    kind: Any  # (f,) contact table of every family
+    kind: Any  # (f,) contact table of every node set
     first: float  # contact step at which the tables begin
     longest: Any  # (kinds,) s: contact step up to which they may be used
     steady: Any  # (kinds, j, K, 2, S): α, β of every tone at the nodes
@@ -75,7 +75,7 @@ ENERGY_TABLES = types.NamedTuple(
 
 
 def _empty(kept: float, node_sets: int) -> EnergyTables:
-    """A ledger without tables."""
+    """A balance without tables."""
     none, nothing, contact = np.zeros(0, dtype=np.int64), np.zeros((0, 0, 0)), np.zeros((0, 0, 0, 0, 0))
     flight = kept, 0.0, 0.0, none, nothing, nothing, nothing
     kind, longest = np.zeros(node_sets, dtype=np.int64), np.zeros(1)
@@ -88,7 +88,7 @@ def _series() -> Any:
     return np.array([[x**i / math.factorial(i) for i in range(SERIES_TERMS)] for x in points])
 
 
-NO_ENERGY_TABLES = Packed(_empty(0.0, 1), ENERGY_TABLES)
+NO_ENERGY_TABLES = Packed.of(_empty(0.0, 1), ENERGY_TABLES)
 
 
 def energy_tables_for(problem: Problem, tables: Tables, spacing: float) -> Packed:
@@ -100,7 +100,7 @@ def energy_tables_for(problem: Problem, tables: Tables, spacing: float) -> Packe
     size, signals = 2 * len(problem.k), len(problem.table_dt)
     if (len(tables.flight_step) + 1) * (len(driver) + 6 * signals) * 2 * padded(size) <= _MOST_NUMBERS:
         energy_tables = _flight_part(energy_tables, problem, tables, driver, spacing)
-    return Packed(energy_tables, ENERGY_TABLES)
+    return Packed.of(energy_tables, ENERGY_TABLES)
 
 
 def _coupled(tables: Tables) -> bool:
@@ -249,7 +249,7 @@ def _flow(problem: Problem, h: Any, propagator: Any, signal: Any) -> Any:
 
 
 def _contact_part(energy_tables: EnergyTables, problem: Problem, tables: Tables) -> EnergyTables:
-    """The tables of contact steps: one kind for all stops whose forces begin alike."""
+    """The tables of contact steps, one for all stops with the same exponents κ and λ."""
     own = int(tables.own_blocks)
     fastest = float((np.sqrt(problem.k) + problem.c)[:own].max())
     h = tables.contact_step[int(np.searchsorted(-tables.contact_step * fastest, -_REACH)) :]
@@ -268,7 +268,7 @@ def _contact_part(energy_tables: EnergyTables, problem: Problem, tables: Tables)
 
 
 def _longest(omega: float, kinds: Any, h: Any) -> Any:
-    """(kinds,) step up to which the nodes' polynomials hold a tone to 1e-11: cos is a series in σ^(2 power)."""
+    """(kinds,) step up to which polynomials through the nodes resolve a tone to 1e-11: cos is a series in σ^{2κ}."""
     terms = [S // int(power) for power, _ in kinds]
     phases = np.array([(1e-11 * 2.0 ** (2 * S - 1) * math.factorial(count)) ** (1.0 / count) for count in terms])
     return np.minimum(phases / omega, h[0]) if omega > 0.0 else np.full(len(kinds), h[0])

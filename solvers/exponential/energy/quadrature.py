@@ -37,7 +37,7 @@ def powers(problem, tables, t, x):
 
 @reordered
 def _plain_loss(n, own, rows, x):
-    """Power of damping by rows that read a block's own rate and the tones only, W."""
+    """Power of damping, W, by rows with entries for the block's own rate and the tones only."""
     loss = 0.0
     for b in range(own):
         value = rows[b, n + b] * x[n + b]
@@ -109,7 +109,7 @@ def _moves(problem, scratch, length):
 
 @inlined
 def _pushed(problem, state, scratch, b, moves):
-    """What moves a block at the points, p and v as of the panel's begin, into ``scratch.trial`` and ``scratch.clipped``."""
+    """Into ``scratch.trial`` and ``.clipped`` what moves a block at the points, p and v as of the panel's begin."""
     n, stops, p, v = problem.k.size, problem.gap.size, splat8(0.0), splat8(0.0)
     for u in range(scratch.force.shape[0]):
         if u >= stops or state.segment[u] > 0:
