@@ -8,7 +8,18 @@ from contacts.curves import PiecewiseLinear, Tabulated
 from contacts.custom import CustomLaw, law
 from contacts.identification import Estimate, Identified, identify, read_collisions
 from contacts.law import Law
-from contacts.memory import BoucWen, Coulomb, ElastoPlastic, Iwan, Jenkins, WaltonBraun
+from contacts.memory import (
+    Border,
+    BoucWen,
+    Coulomb,
+    CustomMemoryLaw,
+    ElastoPlastic,
+    Iwan,
+    Jenkins,
+    Segment,
+    WaltonBraun,
+    memory_law,
+)
 from contacts.polynomial import Polynomial
 from contacts.power_laws import PUBLISHED, Hertz, Hysteretic
 from contacts.restitution import Bounce, achieved_restitution, bounce, damping_factor_for, restitution
@@ -17,10 +28,12 @@ from contacts.viscous import KelvinVoigt, Viscoelastic
 
 __all__ = [
     "PUBLISHED",
+    "Border",
     "BoucWen",
     "Bounce",
     "Coulomb",
     "CustomLaw",
+    "CustomMemoryLaw",
     "ElastoPlastic",
     "Estimate",
     "Hertz",
@@ -32,6 +45,7 @@ __all__ = [
     "Law",
     "PiecewiseLinear",
     "Polynomial",
+    "Segment",
     "Sum",
     "Tabulated",
     "Viscoelastic",
@@ -41,6 +55,7 @@ __all__ = [
     "damping_factor_for",
     "identify",
     "law",
+    "memory_law",
     "parallel",
     "read_collisions",
     "restitution",

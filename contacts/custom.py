@@ -130,7 +130,7 @@ def law(
     probe = inspect.Signature(list(inspect.signature(function).parameters.values())[3:])
 
     def bind(**values: float) -> CustomLaw:
-        pairs = _bound(who, probe, values)
+        pairs = bound_values(who, probe, values)
         made = CustomLaw(who, function, pairs, *options, exponent or 1.0, entry_rate_floor, derivative)
         _check_force(made)
         _check_jump(made)
@@ -162,7 +162,7 @@ def _checked_names(function: Function, who: str) -> tuple[str, ...]:
     return names
 
 
-def _bound(who: str, probe: inspect.Signature, values: dict[str, Any]) -> tuple[tuple[str, float], ...]:
+def bound_values(who: str, probe: inspect.Signature, values: dict[str, Any]) -> tuple[tuple[str, float], ...]:
     """Parameters of a law by name, defaults filled in, as finite numbers."""
     names = list(probe.parameters)
     unknown = [name for name in values if name not in probe.parameters]

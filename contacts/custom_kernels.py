@@ -44,12 +44,12 @@ def compiled(function: Function, derivative: Function | None, count: int) -> tup
                 by_delta[i], by_rate[i], by_entry[i] = given(delta[i], delta_dot[i], entry_rate, *values)
 
     forces, slopes = njit(error_model="numpy")(forces), njit(error_model="numpy")(slopes)
-    forces_kernel = _or_say_where(lambda: cfunc(SIGNATURE)(_batch(forces, count)), function, "law")
+    forces_kernel = or_say_where(lambda: cfunc(SIGNATURE)(batch_of(forces, count)), function, "law")
     kind = "law" if derivative is None else "derivative"
-    return forces_kernel, _or_say_where(lambda: cfunc(GRADIENT)(_gradient_batch(slopes, count)), source, kind)
+    return forces_kernel, or_say_where(lambda: cfunc(GRADIENT)(gradient_batch(slopes, count)), source, kind)
 
 
-def _batch(forces: Any, count: int) -> Function:
+def batch_of(forces: Any, count: int) -> Function:
     """The batch kernel of a law; forces from where it raises are NaN."""
     from numba import carray
     from numba.np.unsafe.ndarray import to_fixed_tuple
@@ -66,7 +66,7 @@ def _batch(forces: Any, count: int) -> Function:
     return batch
 
 
-def _gradient_batch(slopes: Any, count: int) -> Function:
+def gradient_batch(slopes: Any, count: int) -> Function:
     """The batch kernel of a law's derivatives, likewise."""
     from numba import carray
     from numba.np.unsafe.ndarray import to_fixed_tuple
@@ -83,7 +83,7 @@ def _gradient_batch(slopes: Any, count: int) -> Function:
     return batch
 
 
-def _or_say_where(compile_it: Callable[[], Any], function: Function, kind: str) -> Any:
+def or_say_where(compile_it: Callable[[], Any], function: Function, kind: str) -> Any:
     """Compile, or say which line of the user's function cannot be."""
     from numba.core.errors import NumbaError
 

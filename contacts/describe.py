@@ -10,16 +10,16 @@ import numpy as np
 
 from contacts.custom import CustomLaw
 from contacts.law import Law
-from contacts.path import work
+from contacts.path import name_of, work
 from contacts.restitution import bounce, restitution
 from contacts.sums import Sum, parts_of
 
 
 def describe(law: Law, entry_rate: float = 1.0, mass: float = 1.0) -> str:
     """Text of `Law.describe`."""
-    lines = [f"{_name(law)}: {law.equation}"]
+    lines = [f"{name_of(law)}: {law.equation}"]
     if isinstance(law, Sum):
-        lines += [f"  {_name(part)}: {part.equation}; {_values(part)}" for part in law.parts]
+        lines += [f"  {name_of(part)}: {part.equation}; {_values(part)}" for part in law.parts]
     else:
         lines.append(f"  parameters: {_values(law)}")
     if law.memory and not law.opens:
@@ -36,15 +36,12 @@ def describe(law: Law, entry_rate: float = 1.0, mass: float = 1.0) -> str:
     return "\n".join(lines)
 
 
-def _name(law: Law) -> str:
-    """Class, or the user's function."""
-    return law.name if isinstance(law, CustomLaw) else type(law).__name__
-
-
 def _values(law: Law) -> str:
     """Parameters with their units."""
+    if own := getattr(law, "values", None):  # a user's
+        return ", ".join(f"{name} = {value:.6g}" for name, value in own)
     if isinstance(law, CustomLaw):
-        return ", ".join(f"{name} = {value:.6g}" for name, value in law.values) or "none"
+        return "none"
     told = [(f.name, getattr(law, f.name)) for f in fields(law) if f.init]  # type: ignore[arg-type]
     return ", ".join(f"{name} = {_shown(value)} {law.units.get(name, '')}".rstrip() for name, value in told)
 

@@ -70,11 +70,16 @@ def walk(law: Law, path: Vector) -> Iterator[Stretch]:
             yield Stretch(a, b if end != begin else begin, first, last, rate, row.copy())
 
 
+def name_of(law: Law) -> str:
+    """A law's class, or the name of a user's own."""
+    return str(getattr(law, "name", type(law).__name__))
+
+
 def _checked(law: Law, delta: ArrayLike) -> Vector:
     path = np.asarray(delta, dtype=float)
     if path.ndim != 1 or not path.size or not np.all(np.isfinite(path)):
         raise ValueError(
-            f"path of {type(law).__name__} must be a row of finite indentations in m, got an array of shape "
+            f"path of {name_of(law)} must be a row of finite indentations in m, got an array of shape "
             f"{path.shape}{'' if np.all(np.isfinite(path)) else ' that holds nan or inf'}"
         )
     return path
@@ -134,7 +139,7 @@ def _check_renewals(law: Law, renewals: int, border: int, at: float) -> None:
     """A border that falls again at once will do so for ever."""
     if renewals > 4 * law.borders + 4:
         raise ValueError(
-            f"border {border} of {type(law).__name__} falls to zero again at once, at δ = {at:.6g} m: after a renewal "
+            f"border {border} of {name_of(law)} falls to zero again at once, at δ = {at:.6g} m: after a renewal "
             "it must be positive, or zero and rising"
         )
 
@@ -161,5 +166,5 @@ def _force(law: Law, delta: Vector, one: Stretch) -> Vector:
         forces[delta <= 0.0] = 0.0
     if not np.all(np.isfinite(forces)):
         wrong = int(np.argmin(np.isfinite(forces)))
-        raise ValueError(f"force of {type(law).__name__} is {forces[wrong]} N at δ = {delta[wrong]:.6g} m")
+        raise ValueError(f"force of {name_of(law)} is {forces[wrong]} N at δ = {delta[wrong]:.6g} m")
     return forces

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -29,7 +29,7 @@ from solvers.compiled.state import (
     T,
     contact_row,
 )
-from solvers.exponential.energy.guard import unbalanced
+from solvers.exponential.energy.check import unbalanced
 from solvers.problem import (
     COLUMNS,
     Array,
@@ -46,7 +46,7 @@ from solvers.problem import (
     hand_over,
     product,
 )
-from solvers.problem.run_arguments import _check_laws, _check_tangent, _start, _times
+from solvers.problem.run_arguments import _check_laws, _check_tangent, _start, _times, latched_at_start
 
 _BUDGET = 20_000  # steps in a block: between two checks for signals and calls of `progress`
 _DEPTH, _FORCE = (list(ContactLog.__dataclass_fields__).index(name) for name in ("peak_indentation", "peak_force"))
@@ -64,6 +64,7 @@ def integrate(
     *,
     progress: Callable[[float], None] | None = None,
     check: bool = True,
+    memory: Sequence[ArrayLike | None] | None = None,
 ) -> Solution:
     """Integrate M q̈ + C q̇ + K q = Σ v_l s_l(t) + Σ w_s F_s from (q0, q_dot0) at t = 0 over ``duration``.
 
@@ -80,6 +81,8 @@ def integrate(
         `Parameter` adds one more column, with respect to that parameter at fixed duration. `Exponential` only.
     progress : called with the simulated time now and then.
     check : raise when the run fails; False returns the partial solution with its status instead.
+    memory : what the laws have latched at the start, one entry per contact as `Solution.memory` has it, None for what
+        a law begins with; by it a run goes on from another one's end.
 
     Returns
     -------
@@ -100,15 +103,16 @@ def integrate(
         from solvers.exponential.method import Exponential
 
         method = Exponential()
-    run = prepared_run(system, q0, q_dot0, duration, dt, method, tangent)
+    run = prepared_run(system, q0, q_dot0, duration, dt, method, tangent, memory)
     begin = time.perf_counter()
     status = run.to_the_end(progress)
     solution = run.solution(status, time.perf_counter() - begin)
     status = solution.status
     if isinstance(tangent, Parameter) and status is Status.DONE and not run.tangent.exact:
         ends = [_end(s, q0, q_dot0, duration, method) for s in (tangent.behind, tangent.ahead)]
+        known: Any = solution.tangent
         column = (ends[1] - ends[0]) / (2.0 * tangent.step)
-        solution = replace(solution, tangent=np.column_stack((run.tangent.matrix(), column)))
+        solution = replace(solution, tangent=np.column_stack((known, column)))
     if check and status not in (Status.DONE, Status.INTERRUPTED):
         raise SolverError(
             f"stopped at t = {run.time:.9g} s of {duration:g} s: {status.value}{run.explanation(status)}", solution
@@ -118,7 +122,14 @@ def integrate(
 
 
 def prepared_run(
-    system: System, q0: ArrayLike, q_dot0: ArrayLike, duration: float, dt: Any, method: Any, tangent: Any
+    system: System,
+    q0: ArrayLike,
+    q_dot0: ArrayLike,
+    duration: float,
+    dt: Any,
+    method: Any,
+    tangent: Any,
+    memory: Sequence[ArrayLike | None] | None = None,
 ) -> _Run:
     """A run ready to start, everything checked."""
     if not hasattr(method, "engine") or isinstance(method, type):
@@ -128,7 +139,12 @@ def prepared_run(
     times = _times(duration, dt)
     _check_laws(system)
     forcing = _forcing(system, duration, min(max(method.rtol, 1e-12), 1e-6))
-    return _Run(system, method.engine(system, z, forcing, duration), times, tangent)
+    latched = latched_at_start(system, memory)
+    engine = method.engine(system, z, forcing, duration)
+    for s, numbers in latched:
+        law: Any = system.contacts[s].law
+        engine.problem.parameters[s, list(law.memory)] = numbers
+    return _Run(system, engine, times, tangent)
 
 
 def _forcing(system: System, duration: float, rtol: float) -> Forcing:
@@ -156,13 +172,28 @@ class _Run:
         if tangent:
             from solvers.exponential.tangent import Tangent
 
-            self.tangent = Tangent(system, engine, tangent if isinstance(tangent, Parameter) else None)
+            self.tangent = Tangent(system, engine, tangent if isinstance(tangent, Parameter) else None, True)
             self.state = engine.state  # with the event record
         self.log = np.empty((max(256, 2 * len(system.contacts)), COLUMNS))
         self.begin = self.state.x[: 2 * engine.problem.k.size].copy()
         if times is not None and self.due[0] == 0.0:
             self.out[0] = self.state.x
             self.state.count[SAMPLED] = 1
+
+    def _derivatives(self) -> dict[str, Array]:
+        """Derivatives of the end, with and without what is latched."""
+        matrix, n2 = self.tangent.matrix(), 2 * self.system.size
+        own = matrix.shape[1] - n2 - self.tangent.exact
+        more = {"tangent": np.delete(matrix, np.s_[n2 : n2 + own], axis=1), "rate": self.tangent.rate()}
+        return {**more, "memory_tangent": np.vstack((matrix, self.tangent.latched_matrix()))} if own else more
+
+    @property
+    def memory(self) -> tuple[Array, ...]:
+        """What the laws have latched by now, one array per contact."""
+        if not self.engine.problem.border_count.any():
+            return tuple(np.empty(0) for _ in self.system.contacts)
+        rows = zip(self.system.contacts, self.engine.problem.parameters, strict=True)
+        return tuple(row[list(getattr(contact.law, "memory", ()))] for contact, row in rows)
 
     @property
     def time(self) -> float:
@@ -189,8 +220,7 @@ class _Run:
         except KeyboardInterrupt:
             return Status.INTERRUPTED
         x = self.state.x
-        with np.errstate(over="ignore", invalid="ignore"):  # loads of 1e300 overflow where no method looks
-            finite = math.isfinite(x.dot(x)) or np.isfinite(x).all()
+        finite = math.isfinite(sum(x.tolist())) or np.isfinite(x).all()  # a sum may overflow
         return STATUSES[code] if finite or STATUSES[code] is not Status.DONE else Status.DIVERGED
 
     def solution(self, status: Status, seconds: float) -> Solution:
@@ -208,28 +238,30 @@ class _Run:
         ledger = partial(_energy, self.system, powers, complete, motion, back, self.begin)
         rows = self._rows()
         log = partial(ContactLog.of_rows, self._of_stops(rows))
-        transitions = partial(Transitions.of_rows, rows[rows[:, 0] < 0.0], self.system.contacts)
+        transitions = partial(Transitions.of_rows, rows, self.system.contacts)
         if status is Status.DONE and not self._balances(powers, complete, motion, rows):
             status = Status.UNBALANCED
         count = self.state.count.tolist()
         cost = Cost(count[STEPS], count[REJECTED], count[CALLS], count[EVENTS], seconds)
         known = self.tangent is not None and status is Status.DONE
-        more = {"tangent": self.tangent.matrix(), "rate": self.tangent.rate()} if known else {}
-        return Solution(t, motion[:, :n], motion[:, n:], log, ledger, status, cost, **more, borders=transitions)
+        more = self._derivatives() if known else {}
+        return Solution(
+            t, motion[:, :n], motion[:, n:], log, ledger, status, cost, **more, borders=transitions, memory=self.memory
+        )
 
     def _balances(self, powers: Array, complete: bool, motion: Array, rows: Array) -> bool:
         """Whether the energy balance closes, where it is kept; methods without `gains` are checked step by step."""
         if not hasattr(self.engine, "gains"):
             return True
-        rows = rows[rows[:, 0] >= 0.0]
-        exchanged = rows[:, _DEPTH] * rows[:, _FORCE]
         if not complete or not len(motion):
-            return not self.engine.gains(exchanged)
+            return not self.engine.gains(partial(_exchanged, rows))
         begin = self.engine.back @ self.begin
-        return not unbalanced(self.system, powers, motion, begin, exchanged, self.engine.method.rtol)
+        return not unbalanced(self.system, powers, motion, begin, _exchanged(rows), self.engine.method.rtol)
 
     def _of_stops(self, rows: Array) -> Array:
         """The rows of contacts that begin and end; one with memory under way is none while its law is open."""
+        if not any(contact.always for contact in self.system.contacts):
+            return rows
         always = np.array([c.always and not getattr(c.law, "opens", False) for c in self.system.contacts])
         opening, parameters = self.engine.problem.opening, self.engine.problem.parameters
         shut = np.array([place < 0 or parameters[s, place] != 0.0 for s, place in enumerate(opening)])
@@ -253,13 +285,18 @@ class _Run:
     def _rows(self) -> Array:
         """The log, contacts under way last."""
         logged = self.log[: self.state.count[LOGGED]].copy()
-        under_way = [s for s, piece in enumerate(self.state.piece.tolist()) if piece > 0]
+        under_way = [s for s, segment in enumerate(self.state.segment.tolist()) if segment > 0]
         if not under_way:
             return logged
         rows = np.empty((len(under_way), COLUMNS))
         for s, row in zip(under_way, rows, strict=True):
             contact_row(self.engine.problem, self.state, s, math.nan, math.nan, row)
         return np.concatenate((logged, rows))
+
+
+def _exchanged(rows: Array) -> Array:
+    """(k,) peak force times peak indentation of every contact of a log, J."""
+    return (rows[:, _DEPTH] * rows[:, _FORCE])[rows[:, 0] >= 0.0]
 
 
 def _energy(system: System, powers: Array, complete: bool, motion: Array, back: Array, begin: Array) -> Energy:

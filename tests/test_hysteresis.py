@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+import fembeam as fb
 from contacts import BoucWen, Coulomb, ElastoPlastic, Hertz, Iwan, Jenkins, KelvinVoigt, Polynomial, WaltonBraun
 from contacts.path import walk, work
 
@@ -258,3 +259,19 @@ def test_points_do_not_change_a_path():
     fine = np.union1d(fine, np.arange(path.size))
     dense = law.along(np.interp(fine, np.arange(path.size), path))
     np.testing.assert_allclose(dense[np.isin(fine, np.arange(path.size))], law.along(path), rtol=1e-10, atol=1e-10)
+
+
+def test_a_figure_of_loops():
+    wen = BoucWen(2e4, 0.1, 1.0, 1e3, 4e2)
+    figure = fb.plot.hysteresis({"four": FOUR, "smooth": wen})
+    lines = [line for line in figure.axes[0].lines if len(line.get_xdata()) > 2]
+    assert [line.get_label() for line in lines] == ["four", "smooth"]
+    d, force = lines[1].get_data()
+    assert np.abs(d).max() == pytest.approx(1e3 * wen.reach, rel=1e-12)
+    np.testing.assert_allclose(force, wen.along(1e-3 * np.asarray(d)), rtol=1e-9, atol=1e-9)
+    stop = fb.plot.hysteresis({"stop": WaltonBraun(K1, K2)}, path=[-1e-4, 1e-3, 0.0])
+    assert stop.axes[0].lines[0].get_ydata().max() == pytest.approx(100.0, rel=1e-9)
+    with pytest.raises(ValueError, match="there is no path for a law without a size of its own"):
+        fb.plot.hysteresis({"stop": WaltonBraun(K1, K2)})
+    with pytest.raises(ValueError, match="nothing to draw"):
+        fb.plot.hysteresis({})

@@ -3,6 +3,8 @@
 import ctypes
 import itertools
 import math
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -21,7 +23,8 @@ from contacts import (
     bounce,
     restitution,
 )
-from contacts.sums import Gated, Sum
+from contacts.kernels import PART
+from contacts.sums import HEAD, Gated, Sum
 
 POINTER = ctypes.POINTER(ctypes.c_double)
 RENEWED = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_double, ctypes.c_double, ctypes.c_double, POINTER)
@@ -293,3 +296,14 @@ def test_who_may_act_where():
         "Polynomial",
     ]
     assert STOPS.events == ("contact", "unload", "reload", "open", "contact", "open", "contact", "open")
+
+
+def test_a_run_without_memory_loads_none_of_this():
+    code = (
+        "import sys, fembeam as fb\nfrom contacts import Hertz, KelvinVoigt\n"
+        "(Hertz(1e8) + KelvinVoigt(1e6, 1.0)).parameters\n"
+        "print([name for name in sys.modules if name.startswith('contacts') and name.endswith('_kernels')])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "['contacts.custom_kernels', 'contacts.memory.custom_kernels']"  # no numba in these
+    assert HEAD == PART

@@ -1,14 +1,31 @@
 """Scene files: what they make, and what they say when they are wrong."""
 
+import math
 from pathlib import Path
 
 import pytest
 
 import fembeam as fb
 import solvers
-from contacts import PUBLISHED, Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, Tabulated, Viscoelastic
+from contacts import (
+    PUBLISHED,
+    BoucWen,
+    Coulomb,
+    ElastoPlastic,
+    Hertz,
+    Hysteretic,
+    Iwan,
+    Jenkins,
+    KelvinVoigt,
+    PiecewiseLinear,
+    Tabulated,
+    Viscoelastic,
+    WaltonBraun,
+)
 from fembeam import scene_file
 from fembeam.scene_file import SceneFileError
+from fembeam.scene_file.keys import fits, parameters, required
+from fembeam.scene_file.kinds import LAWS
 
 EXAMPLE = (Path(__file__).parent.parent / "examples" / "beam_stop.toml").read_text(encoding="utf-8")
 SIMPLE = """
@@ -73,6 +90,27 @@ def test_laws(tmp_path, text, law):
     (tmp_path / "curve.csv").write_text("delta,force\n1e-3,5\n2e-3,20\n")
     file = read(tmp_path, SIMPLE + f'[[stops]]\nz = 0.5\ngap = 1e-3\nside = "above"\nlaw = {{ {text} }}')
     assert file.scene.stops == (fb.Stop(0.5, law=law, gap=1e-3, side="above"),)
+
+
+@pytest.mark.parametrize(
+    ("kind", "keys", "law"),
+    [
+        ("jenkins", {"stiffness": 20000, "limit": 10}, Jenkins(2e4, 10.0)),
+        ("coulomb", {"limit": 10, "stiffness": 2e4, "static_limit": 12}, Coulomb(10.0, 2e4, 12.0)),
+        ("elasto_plastic", {"stiffness": 2e4, "yield_force": 10}, ElastoPlastic(2e4, 10.0)),
+        ("iwan", {"stiffness": [2e4, 1e4], "limits": [10, math.inf]}, Iwan([2e4, 1e4], [10.0, math.inf])),
+        ("iwan_uniform", {"stiffness": 2e4, "limit": 10, "parts": 5}, Iwan.uniform(2e4, 10.0, 5)),
+        ("iwan_backbone", {"delta": [1e-3, 2e-3], "force": [10, 12]}, Iwan.from_backbone([1e-3, 2e-3], [10.0, 12.0])),
+        ("bouc_wen", {"stiffness": 1e4, "alpha": 0.1, "A": 1, "beta": 500, "gamma": 200, "n": 2},
+         BoucWen(1e4, 0.1, 1.0, 500.0, 200.0, 2)),
+        ("walton_braun", {"loading": 1e5, "unloading": 4e5, "set": "forgotten"}, WaltonBraun(1e5, 4e5, "forgotten")),
+    ],
+)  # fmt: skip
+def test_laws_with_memory(kind, keys, law):
+    expected = parameters(LAWS[kind])
+    assert all(fits(value, expected[key].annotation) for key, value in keys.items())
+    assert set(required(expected)) <= set(keys)
+    assert LAWS[kind](**keys) == law
 
 
 def test_everything_that_hangs_on_a_beam(tmp_path):

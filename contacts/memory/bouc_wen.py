@@ -32,7 +32,8 @@ class BoucWen(Law):
     R. Bouc, Proc. 4th Conf. Nonlinear Oscillations, Prague (1967) 315; Y.-K. Wen, J. Eng. Mech. Div. ASCE 102 (1976)
     249-263. With β + γ > 0 and β >= 0 |z| stays below (A/(β + γ))^(1/n). With β + γ < 0 it grows without bound, for
     n = 2 to infinity at a finite δ, where the force is nan. Loops within a loop do not close, and drift (no
-    return-point memory): a property of the model, not of materials. At z = 0 the force has a weak kink where β ≠ 0.
+    return-point memory): a property of the model, not of materials. At z = 0 the force has a weak kink where β ≠ 0;
+    steps end there.
 
     Examples
     --------
@@ -55,8 +56,8 @@ class BoucWen(Law):
     )
     units: ClassVar[dict[str, str]] = {"stiffness": "N/m", "beta": "1/m^n", "gamma": "1/m^n"}
     memory: ClassVar[tuple[int, ...]] = (6, 7, 8)  # type: ignore[misc]
-    borders: ClassVar[int] = 1  # type: ignore[misc]
-    events: ClassVar[tuple[str, ...]] = ("reversal",)  # type: ignore[misc]
+    borders: ClassVar[int] = 2  # type: ignore[misc]
+    events: ClassVar[tuple[str, ...]] = ("reversal", "zero")  # type: ignore[misc]
     one_sided: ClassVar[bool] = False  # type: ignore[misc]
 
     def __post_init__(self) -> None:

@@ -104,18 +104,20 @@ def bouc_wen_gradient(n, delta, delta_dot, entry_rate, parameters, by_delta, by_
 
 @compiled(cfunc, SIGNATURE)
 def bouc_wen_borders(n, delta, delta_dot, entry_rate, parameters, values):
-    """The rate in the direction of this segment."""
+    """The rate in the direction of this segment; the way to z = 0, where the force bends, while that lies ahead."""
     for i in range(n):
-        values[i] = _sign(parameters, delta[i], delta_dot[i]) * delta_dot[i]
+        sign = _sign(parameters, delta[i], delta_dot[i])
+        values[i] = sign * delta_dot[i]
+        ahead = sign * parameters[8] < 0.0
+        values[n + i] = -sign * _response(parameters, delta[i], delta_dot[i])[0] if ahead else 1.0
 
 
 @compiled(cfunc, RENEW)
 def bouc_wen_renew(j, delta, delta_dot, entry_rate, parameters):
-    """Latch the point of reversal."""
-    z = _response(parameters, delta, delta_dot)[0]
-    parameters[6] = -_sign(parameters, delta, delta_dot)
-    parameters[7], parameters[8] = delta, z
-    return 0
+    """Latch the point of reversal, or that at which z is zero."""
+    z, sign = _response(parameters, delta, delta_dot)[0], _sign(parameters, delta, delta_dot)
+    parameters[6], parameters[7], parameters[8] = -sign if j == 0 else sign, delta, z if j == 0 else 0.0
+    return j
 
 
 @compiled(cfunc, SIGNATURE)
@@ -135,5 +137,7 @@ def bouc_wen_renew_gradient(j, delta, delta_dot, entry_rate, parameters, out):
     if j < 0:
         out[8], out[14] = 1.0, 1.0
         return
-    _, slope, by_start = _response(parameters, delta, delta_dot)
-    out[5], out[10], out[13], out[14] = 1.0, slope, -slope, by_start
+    out[5] = 1.0
+    if j == 0:
+        _, slope, by_start = _response(parameters, delta, delta_dot)
+        out[10], out[13], out[14] = slope, -slope, by_start

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from contacts.law import check_number
 from contacts.memory.friction import Slider, Sliders
@@ -79,7 +79,7 @@ class Iwan(Sliders):
         return cls([stiffness / parts] * parts, [limit * (2 * j - 1) / parts**2 for j in range(1, parts + 1)])
 
     @classmethod
-    def from_backbone(cls, delta: ArrayLike, force: ArrayLike, slope: float = 0.0) -> Iwan:
+    def from_backbone(cls, delta: Sequence[float], force: Sequence[float], slope: float = 0.0) -> Iwan:
         """The elements whose first loading passes straight through given points.
 
         Parameters

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import solvers
+from fembeam.model.contact_histories import ContactHistories
 from fembeam.model.shapes import Shapes
-from fembeam.scene import Source, unit_of
-from fembeam.support import Part, Printed, require
+from fembeam.scene import Source
+from fembeam.support import Part, Printed
 from solvers.problem import counted
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Run(Printed):
+class Run(ContactHistories, Printed):
     """A simulated motion of a reduced model.
 
     Attributes
@@ -265,41 +266,6 @@ class Run(Printed):
 
         return to_xarray(self, z)
 
-    def impactor_displacement(self, impactor: int = 0) -> Vector:
-        """x(t) (k,) of an impactor from its place at the start, relative to the frame, m."""
-        return self._striker(self.q, impactor)
-
-    def impactor_velocity(self, impactor: int = 0) -> Vector:
-        """ẋ(t) (k,) of an impactor relative to the frame, m/s."""
-        return self._striker(self.q_dot, impactor)
-
-    def _striker(self, coordinates: Vector, impactor: int) -> Vector:
-        """One of the last columns, without its √m."""
-        count = len(self.strikers)
-        require(0 <= impactor < count, f"impactor must be below {count}, the number of impactors", impactor, "Run",
-                "count from 0")  # fmt: skip
-        return coordinates[:, coordinates.shape[1] - count + impactor] / np.sqrt(self.strikers[impactor])
-
-    def unit(self, quantity: str, stop: int | None = None) -> str:
-        """Unit of "indentation", "speed", "force" or "impulse" of a stop; None: of a column that all of them share."""
-        return unit_of(quantity, self.kinds[:, 0] if stop is None else self.kinds[[self._stop(stop)], 0])
-
-    def name(self, stop: int) -> str:
-        """What tables call a stop or element: "stop 0", "element 1", "stop 2 (rotation)"."""
-        rotation, always = self.kinds[self._stop(stop)]
-        return f"{'element' if always else 'stop'} {stop}" + " (rotation)" * bool(rotation)
-
-    def indentation(self, stop: int = 0) -> Vector:
-        """δ(t) (k,) of a stop, m or rad; negative while it is open. Elements, then impactors, count on after the stops.
-
-        Of an element its deformation d(t).
-        """
-        return -self.q @ self.directions[self._stop(stop)] - self.stops[stop, 2]
-
-    def indentation_rate(self, stop: int = 0) -> Vector:
-        """δ̇(t) (k,) of a stop or element, m/s or rad/s: of both bodies where the stop moves."""
-        return -self.q_dot @ self.directions[self._stop(stop)]
-
     def force(self, stop: int = 0, mean: bool = False) -> Vector:
         """Contact force (k,) of a stop, N or N m, from its law and the entry rate latched at the time; of an element F.
 
@@ -312,13 +278,6 @@ class Run(Printed):
 
             return mean_force(self, self._stop(stop))
         return self._forces[self._stop(stop)]
-
-    def _stop(self, stop: int) -> int:
-        """The number of a contact, checked."""
-        count = len(self.stops)
-        require(-count <= stop < count, f"stop must be below {count}, the number of stops", stop, "Run",
-                "count from 0")  # fmt: skip
-        return stop
 
     @cached_property
     def _forces(self) -> Vector:

@@ -10,7 +10,7 @@ from fembeam.model import places
 from fembeam.plot.animation import animate, frame
 from fembeam.plot.basins import basins
 from fembeam.plot.contact_histograms import contacts
-from fembeam.plot.laws import identification, loops, restitutions
+from fembeam.plot.laws import hysteresis, identification, loops, restitutions
 from fembeam.plot.linear import floor_spectrum, frequency_response, response_spectrum
 from fembeam.plot.methods import failures, speed_accuracy, stability_map
 from fembeam.plot.mode_count import mode_count, smallest_model
@@ -32,6 +32,7 @@ __all__ = [
     "floor_spectrum",
     "frame",
     "frequency_response",
+    "hysteresis",
     "identification",
     "loops",
     "mode_count",

@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike
 
+POINTS = 100  # between two turning points of a path
 COLOURS = 6  # of the library's style
 
 
@@ -54,6 +56,45 @@ def loops(laws: Mapping[str, Law], entry_rate: float = 1.0, mass: float = 1.0, a
     axis.set_ylabel(f"contact force / {unit}")
     legend(axis, axes is None, "outside right center")
     heading([axis], f"Bounce of {mass:g} kg at {entry_rate:g} m/s, achieved restitution e", axes is None)
+    return figure
+
+
+@styled
+def hysteresis(laws: Mapping[str, Law], path: ArrayLike | None = None, axes: Axes | None = None) -> Figure:
+    """Force along a slow path of δ for laws with memory: their loops.
+
+    Parameters
+    ----------
+    laws : by the name to show.
+    path : (k,) m, turning points; None takes four growing cycles, up to all of each law's memory.
+    axes : to draw into; None makes a figure.
+
+    Notes
+    -----
+    The area of a loop is the energy lost in it. Raises ValueError without a path for a law that has no size of its
+    own, as `contacts.WaltonBraun`.
+
+    Examples
+    --------
+    >>> from contacts import Jenkins
+    >>> figure = hysteresis({"damper": Jenkins(2e4, 10.0)})
+    >>> figure.axes[0].get_xlabel()
+    'δ / mm'
+    """
+    from fembeam.plot.figure import heading, legend, sheet
+
+    require(bool(laws), "nothing to draw", laws, "plot.hysteresis", "give laws by name, {name: law}")
+    figure, (axis,) = sheet(1, 1, (7.0, 4.2), axes)
+    paths = {name: _turns(name, law, path) for name, law in laws.items()}
+    forces = {name: law.along(paths[name]) for name, law in laws.items()}
+    scale, unit = _force_unit(max(float(np.abs(force).max()) for force in forces.values()))
+    for number, name in enumerate(laws):
+        axis.plot(1e3 * paths[name], scale * forces[name], _line(number), label=name)
+    axis.axhline(0.0, color=GREY, linewidth=0.6)
+    axis.set_xlabel("δ / mm")
+    axis.set_ylabel(f"force / {unit}")
+    legend(axis, axes is None, "outside right center")
+    heading([axis], "Force along a slow path", axes is None)
     return figure
 
 
@@ -120,6 +161,18 @@ def identification(found: Identified, axes: Sequence[Axes] | None = None) -> Fig
 def _force_unit(strongest: float) -> tuple[float, str]:
     """Factor and name of the unit that suits a force in N."""
     return (1e-3, "kN") if strongest > 2e3 else (1.0, "N")
+
+
+def _turns(name: str, law: Law, path: ArrayLike | None) -> Vector:
+    """A path through turning points, with points enough between them to look smooth."""
+    if path is None:
+        need = "give turning points in m, path=[0, 1e-3, 0]"
+        require(law.reach > 0.0, "there is no path for a law without a size of its own", name, "plot.hysteresis", need)
+        turns = np.append(0.0, law.reach * np.repeat([0.25, 0.5, 0.75, 1.0], 2) * np.tile([1.0, -1.0], 4))
+    else:
+        turns = np.asarray(path, dtype=float)
+    places = np.linspace(0.0, turns.size - 1.0, POINTS * (turns.size - 1) + 1)
+    return np.interp(places, np.arange(turns.size), turns)
 
 
 def _line(number: int) -> str:

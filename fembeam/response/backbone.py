@@ -23,7 +23,8 @@ def backbone(model: Model, z: float, amplitudes: Vector) -> Vector:
     """Ω (k,) in rad/s at which the lowest mode vibrates freely with max |u(z)| of so many m (k,), > 0.
 
     NaN where this does not hold: gravity or preload, bodies that touch each other, a mode at rest at z, forces that
-    attract, laws with memory. Errors below 1e-6 for smooth laws; where other modes take part the backbone of the structure lies beside.
+    attract, laws with memory. Errors below 1e-6 for smooth laws; where other modes take part the backbone of the
+    structure lies beside.
 
     References
     ----------

@@ -41,7 +41,8 @@ gap = 0.0                   # < 0: pressed against the beam
 side = "below"              # or "above"
 law = {{ kind = "achieving", stiffness = 2e8, restitution = 0.7 }}
 # other laws: hertz (stiffness), kelvin_voigt (stiffness, damping), piecewise_linear (slopes, knots),
-# tabulated_file (path of a CSV file with indentation and force), ...; an unknown name lists them all
+# tabulated_file (path of a CSV file with indentation and force), with memory jenkins (stiffness, limit), walton_braun
+# (loading, unloading), ...; an unknown name lists them all
 
 # [[elements]]              # act always, at both signs of u - gap
 # z = 0.2

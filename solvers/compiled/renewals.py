@@ -17,7 +17,7 @@ from solvers.compiled.state import (
     contact_row,
     is_open,
     open_contact,
-    tape,
+    write_event,
 )
 
 
@@ -40,8 +40,8 @@ def margins_in(problem, state, s, x, batch, out):
 def renew(problem, state, s, j, delta, rate, log):
     """Renew what element s latches on its border j; a row of the log tells of it."""
     size, t = 2 * problem.k.size, state.now[T]
-    if state.tape.shape[0]:
-        tape(state, RENEWAL, t, t, 0.0, s, j, state.x)
+    if state.event_record.shape[0]:
+        write_event(state, RENEWAL, t, t, 0.0, s, j, state.x)
     was_open = is_open(problem, s)
     row = log[state.count[LOGGED]]
     row[0], row[1], row[2], row[4], row[5] = -1.0 - s, t, j, delta, rate

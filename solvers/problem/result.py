@@ -171,6 +171,7 @@ class Transitions:
     @classmethod
     def of_rows(cls, rows: Array, contacts: Sequence[Any]) -> Transitions:
         """From the kernels' table."""
+        rows = rows[rows[:, 0] < 0.0]
         columns: list[Any] = [*rows[:, :9].T.copy()]
         contact, border, code = (column.astype(int) for column in (-1.0 - rows[:, 0], rows[:, 2], rows[:, 3]))
         names = [contacts[c].law.events[i] for c, i in zip(contact, code, strict=True)]
@@ -243,6 +244,9 @@ class Solution:
     status : how it ended. cost : what it took.
     tangent : (2n, 2n or 2n + 1) derivative of the final [q, q̇], and rate : (2n,) its derivative by time; None unless
         asked for.
+    memory : what the laws have latched at the end, one array per contact, empty for laws without memory.
+    memory_tangent : (2n + l, 2n + l or 2n + l + 1) derivative of the final [q, q̇, memory] with respect to the same at
+        the start, and to a parameter; codes of segments have zeros. None without laws with memory.
 
     Examples
     --------
@@ -267,6 +271,8 @@ class Solution:
     cost: Cost
     tangent: Array | None = None
     rate: Array | None = None
+    memory: tuple[Array, ...] = ()
+    memory_tangent: Array | None = None
     borders: Callable[[], Transitions] = field(default=lambda: Transitions.of_rows(np.empty((0, 10)), ()), repr=False)
 
     def __repr__(self) -> str:

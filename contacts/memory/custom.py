@@ -1,0 +1,232 @@
+"""How to write one's own law with memory: plain functions for the force of each segment, its borders and renewals."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contacts.custom import bound_values
+from contacts.law import Law, check_number
+from contacts.memory.custom_kernels import Function, Pieces, compiled
+from contacts.path import walk
+
+PROBES = 0.01, 0.1, 1.0  # parts of its reach at which a law is led through a cycle when its parameters are bound
+JUMP = 1e-6  # of the largest force on the way: what may change at a border by rounding
+
+
+@dataclass(frozen=True)
+class Border:
+    """Where a segment ends.
+
+    Parameters
+    ----------
+    value : function that is > 0 inside the segment and falls through zero at its end; smooth, also a little beyond.
+        A border at a reversal is the rate in the direction of the segment.
+    to : name of the next segment.
+    renew : function that returns the latched numbers of the next segment, one number or a tuple; None keeps them.
+    """
+
+    value: Function
+    to: str
+    renew: Function | None = None
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A part of a law's motion in which its force is smooth.
+
+    Parameters
+    ----------
+    force : function that returns the force, smooth and defined a little beyond the borders.
+    borders : one or several; () for a segment that never ends.
+    slopes : function that returns ∂F/∂δ, ∂F/∂δ̇ and ∂F/∂(each latched number); None takes central differences.
+    """
+
+    force: Function
+    borders: Border | tuple[Border, ...] = ()
+    slopes: Function | None = None
+
+    @property
+    def ends(self) -> tuple[Border, ...]:
+        """The borders as a tuple."""
+        return (self.borders,) if isinstance(self.borders, Border) else tuple(self.borders)
+
+
+@dataclass(frozen=True)
+class CustomMemoryLaw(Law):
+    """A user's law with memory, its parameters bound; made by what `memory_law` returns, see there."""
+
+    name: str
+    segments: tuple[tuple[str, Segment], ...] = field(repr=False)
+    latched: tuple[tuple[str, float], ...]
+    values: tuple[tuple[str, float], ...]
+    reach: float = 1e-3
+    jumps: bool = False
+    opens: bool = False
+
+    @property
+    def pieces(self) -> Pieces:
+        """Functions of all segments, with the places of those that follow."""
+        places = {name: k for k, (name, _) in enumerate(self.segments)}
+        ends = [tuple((end.value, end.renew, places[end.to]) for end in one.ends) for _, one in self.segments]
+        return tuple((one.force, one.slopes, own) for (_, one), own in zip(self.segments, ends, strict=True))
+
+    @property
+    def parameters(self) -> NDArray[np.float64]:
+        """(segment, latched numbers, parameters), at the start of a run."""
+        return np.array([0.0, *(value for _, value in (*self.latched, *self.values))])
+
+    @property
+    def memory(self) -> tuple[int, ...]:  # type: ignore[override]
+        """Segment and latched numbers."""
+        return tuple(range(1 + len(self.latched)))
+
+    @property
+    def borders(self) -> int:  # type: ignore[override]
+        """As many as the segment with most of them has, at least one."""
+        return max(1, *(len(one.ends) for _, one in self.segments))
+
+    @property
+    def events(self) -> tuple[str, ...]:  # type: ignore[override]
+        """The segment that begins."""
+        return tuple(name for name, _ in self.segments)
+
+    @property
+    def one_sided(self) -> bool:  # type: ignore[override]
+        """A law that opens is one of a stop."""
+        return self.opens
+
+    @property
+    def equation(self) -> str:  # type: ignore[override]
+        """First lines of the docstrings of the segments' forces, or their names."""
+        told = ((name, inspect.getdoc(one.force) or one.force.__name__) for name, one in self.segments)
+        return "; ".join(f"{name}: {text.splitlines()[0]}" for name, text in told)
+
+    @property
+    def kernel(self) -> Any:
+        """The force, compiled once per process."""
+        return self.memory_kernel("")
+
+    @property
+    def gradient(self) -> Any:
+        """Its derivatives."""
+        return self.memory_kernel("gradient")
+
+    def memory_kernel(self, name: str) -> Any:
+        """Borders, renewals and their derivatives."""
+        return compiled(self.pieces, len(self.latched), 1 + len(self.latched) + len(self.values), name)
+
+    def stored(self, delta: float, parameters: NDArray[np.float64]) -> float:
+        """Not known of a user's law: nan."""
+        return float("nan")
+
+
+def memory_law(
+    name: str,
+    segments: Mapping[str, Segment],
+    latched: Mapping[str, float] | None = None,
+    *,
+    reach: float = 1e-3,
+    jumps: bool = False,
+    opens: bool = False,
+) -> Callable[..., CustomMemoryLaw]:
+    """Make a law with memory of plain functions: the force in each segment, where it ends, what is latched there.
+
+    All functions take the same arguments, ``(delta, delta_dot, latched numbers, parameters)``, and are compiled by
+    numba, once; no integrator is recompiled. The entry rate of stops is not given: latch it.
+
+    Parameters
+    ----------
+    name : to show.
+    segments : `Segment` by name; a run begins in the first.
+    latched : start value of every latched number by name, in the order of the arguments.
+    reach : m, > 0; binding leads the law through slow cycles of 1 %, 10 % and 100 % of it, to find mistakes.
+    jumps : say True if the force jumps at a border.
+    opens : say True if the first segment is that of an open stop: no force, and the law is for δ > 0 only.
+
+    Returns
+    -------
+    A maker: call it with the parameters by keyword to get a law.
+
+    Raises
+    ------
+    TypeError for functions with other arguments or that cannot be compiled; ValueError for segments that are not there.
+    On binding: ValueError for a border that falls to zero again at once, a force that is not finite, or one that jumps
+    at a border without ``jumps=True``.
+
+    Examples
+    --------
+    >>> def spring(delta, delta_dot, set, stiffness):
+    ...     return stiffness * (delta - set)
+    >>> spring_with_set = memory_law("spring with set", {"always": Segment(spring)}, {"set": 1e-4})
+    >>> float(spring_with_set(stiffness=1e4).along([1e-3])[0])
+    9.0
+    """
+    starts = {} if latched is None else dict(latched)
+    for key, value in starts.items():
+        check_number(value, f"start of latched {key!r} of law {name!r}", -np.inf)
+    check_number(reach, f"reach of law {name!r}", strict=True)
+    probe = _checked_functions(name, segments, starts)
+    start = tuple((key, float(value)) for key, value in starts.items())
+
+    def bind(**values: float) -> CustomMemoryLaw:
+        pairs = bound_values(name, probe, values)
+        made = CustomMemoryLaw(name, tuple(segments.items()), start, pairs, float(reach), jumps, opens)
+        _check_cycles(made)
+        return made
+
+    return bind
+
+
+def _checked_functions(name: str, segments: Mapping[str, Segment], starts: Mapping[str, float]) -> inspect.Signature:
+    """Signature of the parameters, the same in all functions; segments that follow exist."""
+    if not segments or not all(isinstance(one, Segment) for one in segments.values()):
+        raise ValueError(f"segments of law {name!r} must be contacts.Segment by name, at least one, got {segments!r}")
+    expected = ("delta", "delta_dot", *starts)
+    first: Function = next(iter(segments.values())).force
+    given = inspect.signature(first)
+    if tuple(given.parameters)[: len(expected)] != expected:
+        raise TypeError(
+            f"functions of law {name!r} must take ({', '.join(expected)}, parameters...), but {first.__name__!r} takes "
+            f"{given}"
+        )
+    for where, one in segments.items():
+        for end in one.ends:
+            if end.to not in segments:
+                raise ValueError(f"law {name!r}: {where!r} ends in {end.to!r}; its segments are {', '.join(segments)}")
+        for function in _functions(one):
+            if tuple(inspect.signature(function).parameters) != tuple(given.parameters):
+                raise TypeError(
+                    f"functions of law {name!r} must take the same arguments, but {first.__name__!r} takes {given} and "
+                    f"{function.__name__!r} {inspect.signature(function)}"
+                )
+    return inspect.Signature(list(given.parameters.values())[len(expected) :])
+
+
+def _functions(one: Segment) -> list[Function]:
+    """All functions of a segment."""
+    found = [one.force, one.slopes, *(f for end in one.ends for f in (end.value, end.renew))]
+    return [function for function in found if function is not None]
+
+
+def _check_cycles(law: CustomMemoryLaw) -> None:
+    """Lead a law through slow cycles; the walk itself refuses borders that fall again at once and forces of nan."""
+    for X in (part * law.reach for part in PROBES):
+        path = X * np.array([0.0, 1.0, -1.0, 1.0, 0.3, 0.8, 0.0])
+        largest = np.abs(law.along(path)).max()
+        for before, after in pairwise(walk(law, path)):
+            left, right = (law.batch(1.0, one.parameters) for one in (before, after))
+            at, rate = np.array([after.begin]), np.array([after.rate])
+            jump = float((right(at, rate) - left(at, rate))[0])
+            if not law.jumps and not abs(jump) <= JUMP * largest:
+                names = [law.events[int(one.parameters[0])] for one in (before, after)]
+                raise ValueError(
+                    f"force of law {law.name!r} jumps by {jump:.6g} N from {names[0]!r} to {names[1]!r} at δ = "
+                    f"{after.begin:.6g} m; if it is to, declare it with jumps=True, else correct what is latched there"
+                )

@@ -1,0 +1,254 @@
+"""Compiling a user's law with memory: scalar functions per segment and border into the six kernels.
+
+Every function takes (δ, δ̇, latched numbers, parameters); a row of parameters is (segment, latched numbers, parameters).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+Function = Callable[..., Any]
+Pieces = tuple[tuple[Function, Function | None, tuple[tuple[Function, Function | None, int], ...]], ...]
+LEAST = 1e-11, 1e-8, 1e-9  # steps of differences at zero: δ in m, its rate in m/s, a latched number of any unit
+RELATIVE = 1e-5
+
+
+@lru_cache(maxsize=256)
+def compiled(pieces: Pieces, latched: int, count: int, name: str) -> Any:
+    """One kernel of segments (force, slopes, borders (value, renewal, next)) with ``count`` numbers in a row."""
+    from numba import cfunc
+
+    from contacts.custom_kernels import or_say_where
+
+    signature, function = _kernels(pieces, latched, count)[name]
+    return or_say_where(lambda: cfunc(signature)(function), pieces[0][0], "law with memory")
+
+
+@lru_cache(maxsize=256)
+def _kernels(pieces: Pieces, latched: int, count: int) -> dict[str, tuple[Any, Function]]:
+    """Signature and function of every kernel by name; nothing is compiled yet."""
+    from numba import njit
+
+    from contacts.custom_kernels import batch_of, gradient_batch
+    from contacts.kernels import GRADIENT, SIGNATURE
+    from contacts.sum_kernels import RENEW, RENEW_GRADIENT
+
+    scalar, several = njit(error_model="numpy"), 2 + latched
+    width = max(1, *(len(borders) for *_, borders in pieces))
+    padded = [border for *_, borders in pieces for border in (*borders, *[None] * width)[:width]]
+    force = _chosen([_read(scalar(f)) for f, *_ in pieces])
+    slopes = [_written(scalar(s), several) if s else _written_slopes(scalar(f), several, count) for f, s, _ in pieces]
+    value = _chosen([_read(scalar(b[0])) if b else _nowhere() for b in padded])
+    renewals = [_written(scalar(b[1]), latched) if b and b[1] else _kept(latched) for b in padded]
+    renewal_slopes = _chosen([_jacobian(f, latched, several, count) for f in renewals])
+    following = tuple(float(b[2]) if b else 0.0 for b in padded)
+    forces, by_point, by_memory, borders = _points(force, _chosen(slopes), value, latched, width)
+    return {
+        "": (SIGNATURE, batch_of(forces, count)),
+        "gradient": (GRADIENT, gradient_batch(by_point, count)),
+        "memory_gradient": (SIGNATURE, batch_of(by_memory, count)),
+        "borders": (SIGNATURE, batch_of(borders, count)),
+        "renew": (RENEW, _renew(_chosen(renewals), following, width, latched, count)),
+        "renew_gradient": (RENEW_GRADIENT, _renew_gradient(renewal_slopes, width, latched, count)),
+    }
+
+
+def _given(delta: float, delta_dot: float, row: tuple[float, ...]) -> tuple[float, ...]:
+    """Arguments of a user's function; as one sum, which compiles where unpacking does not."""
+    motion = delta, delta_dot
+    return motion + row[1:]
+
+
+def _chosen(functions: Sequence[Function]) -> Function:
+    """The function of a number, called with a tuple: a chain of branches, as compiled code holds no such list."""
+    from numba import njit
+
+    def either(k: int, function: Function, rest: Function | None) -> Function:
+        if rest is None:
+            return njit(lambda s, given: function(*given))
+
+        def pick(s, given):  # type: ignore[no-untyped-def]
+            if s == k:
+                return function(*given)
+            return rest(s, given)
+
+        return njit(pick)
+
+    chain = None
+    for k in range(len(functions) - 1, -1, -1):
+        chain = either(k, functions[k], chain)
+    assert chain is not None
+    return chain
+
+
+def _read(function: Function) -> Function:
+    """A user's function of a tuple."""
+    from numba import njit
+
+    return njit(lambda given: function(*given))
+
+
+def _nowhere() -> Function:
+    """A border that does not exist."""
+    from numba import njit
+
+    return njit(lambda given: 1.0)
+
+
+def _kept(latched: int) -> Function:
+    """A renewal that changes nothing but the segment."""
+    from numba import njit
+
+    def keep(out, given):  # type: ignore[no-untyped-def]
+        for i in range(latched):
+            out[i] = given[2 + i]
+
+    return njit(keep)
+
+
+def _written(function: Function, count: int) -> Function:
+    """A function that writes what another returns, one number or a tuple of several, of any types."""
+    from numba import njit
+
+    def entry(i: int, rest: Function | None) -> Function:
+        def last(new, out):  # type: ignore[no-untyped-def]
+            out[i] = float(new[i])
+
+        def write(new, out):  # type: ignore[no-untyped-def]
+            out[i] = float(new[i])
+            rest(new, out)
+
+        return njit(last if rest is None else write)
+
+    if count == 1:
+
+        def one(out, given):  # type: ignore[no-untyped-def]
+            out[0] = float(function(*given))
+
+        return njit(one)
+    fill = None
+    for i in range(count - 1, -1, -1):
+        fill = entry(i, fill)
+
+    def several(out, given):  # type: ignore[no-untyped-def]
+        fill(function(*given), out)
+
+    return njit(several)
+
+
+def _jacobian(write: Function, rows: int, columns: int, count: int) -> Function:
+    """Derivatives of what `write` writes by its first arguments, (rows, columns), by central differences."""
+    from numba import njit
+    from numba.np.unsafe.ndarray import to_fixed_tuple
+
+    size = count + 1  # δ, its rate and a row without its segment
+
+    def fill(table, given):  # type: ignore[no-untyped-def]
+        at, ends = np.array(given), np.empty((2, rows))
+        for c in range(columns):
+            x = at[c]
+            h = RELATIVE * abs(x) + LEAST[min(c, 2)]
+            for side in range(2):
+                at[c] = x + (2 * side - 1) * h
+                write(ends[side], to_fixed_tuple(at, size))
+            at[c] = x
+            for i in range(rows):
+                table[i, c] = (ends[1, i] - ends[0, i]) / (2.0 * h)
+
+    return njit(fill, error_model="numpy")
+
+
+def _written_slopes(force: Function, columns: int, count: int) -> Function:
+    """Derivatives of a force by differences, written like given ones."""
+    from numba import njit
+
+    jacobian = _jacobian(_written(force, 1), 1, columns, count)
+
+    def slopes(out, given):  # type: ignore[no-untyped-def]
+        jacobian(out.reshape((1, columns)), given)
+
+    return njit(slopes)
+
+
+def _points(force: Function, slopes: Function, value: Function, latched: int, width: int) -> tuple[Function, ...]:
+    """Force, its derivatives by the motion and by the latched numbers, and borders, at n points."""
+    from numba import njit
+
+    room, given = 2 + latched, njit(_given)
+
+    def forces(n, delta, delta_dot, entry_rate, row, out):  # type: ignore[no-untyped-def]
+        for i in range(n):
+            out[i] = force(row[0], (given(delta[i], delta_dot[i], row),))
+
+    def by_point(n, delta, delta_dot, entry_rate, row, by_delta, by_rate, by_entry):  # type: ignore[no-untyped-def]
+        out = np.empty(room)
+        for i in range(n):
+            slopes(row[0], (out, given(delta[i], delta_dot[i], row)))
+            by_delta[i], by_rate[i], by_entry[i] = out[0], out[1], 0.0
+
+    def by_memory(n, delta, delta_dot, entry_rate, row, rows):  # type: ignore[no-untyped-def]
+        out = np.empty(room)
+        for i in range(n):
+            slopes(row[0], (out, given(delta[i], delta_dot[i], row)))
+            rows[i] = 0.0
+            for k in range(latched):
+                rows[(1 + k) * n + i] = out[2 + k]
+
+    def borders(n, delta, delta_dot, entry_rate, row, values):  # type: ignore[no-untyped-def]
+        for j in range(width):
+            for i in range(n):
+                values[j * n + i] = value(row[0] * width + j, (given(delta[i], delta_dot[i], row),))
+
+    return tuple(njit(f, error_model="numpy") for f in (forces, by_point, by_memory, borders))
+
+
+def _renew(renewal: Function, following: tuple[float, ...], width: int, latched: int, count: int) -> Function:
+    """The renewal of the latched numbers, nan where it raises, and of the segment, whose place is the event."""
+    from numba import carray, njit
+    from numba.np.unsafe.ndarray import to_fixed_tuple
+
+    given = njit(_given)
+
+    def renew(j, delta, delta_dot, entry_rate, parameters):  # type: ignore[no-untyped-def]
+        row, out = to_fixed_tuple(carray(parameters, (count,)), count), np.full(latched, math.nan)
+        place = int(row[0]) * width + j
+        try:
+            renewal(place, (out, given(delta, delta_dot, row)))
+        except Exception:
+            out[:] = math.nan
+        for k in range(latched):
+            parameters[1 + k] = out[k]
+        parameters[0] = following[place]
+        return int(following[place])
+
+    return renew
+
+
+def _renew_gradient(slopes: Function, width: int, latched: int, count: int) -> Function:
+    """Derivatives of the renewal, nan where it raises; those by and of the segment are zero."""
+    from numba import carray, njit
+    from numba.np.unsafe.ndarray import to_fixed_tuple
+
+    columns, given = 3 + latched, njit(_given)
+
+    def renew_gradient(j, delta, delta_dot, entry_rate, parameters, out):  # type: ignore[no-untyped-def]
+        row, table = to_fixed_tuple(carray(parameters, (count,)), count), np.zeros((latched, 2 + latched))
+        for k in range(latched):
+            table[k, 2 + k] = 1.0
+        try:
+            if j >= 0:
+                slopes(int(row[0]) * width + j, (table, given(delta, delta_dot, row)))
+        except Exception:
+            table[:] = math.nan
+        for i in range((1 + latched) * columns):
+            out[i] = 0.0
+        for k in range(latched):
+            for c in range(2 + latched):
+                out[(1 + k) * columns + (c if c < 2 else c + 1)] = table[k, c]
+
+    return renew_gradient

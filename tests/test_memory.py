@@ -1,0 +1,140 @@
+"""Laws with memory under the main method: exact pieces, simultaneous borders, latched starts, tangents."""
+
+import numpy as np
+import pytest
+from sliders import Slider
+
+from contacts import Hertz, KelvinVoigt
+from contacts.memory import BoucWen, Coulomb, Iwan, Jenkins, WaltonBraun
+from fembeam import Harmonic
+from solvers import Contact, Exponential, Parameter, System, integrate
+
+OMEGA, ZETA = [1.0, 3.7, 9.0], [0.01, 0.01, 0.02]
+
+
+def element(law, *direction, gap=0.0):
+    """A contact that always acts."""
+    return Contact(direction, law, gap=gap, always=True)
+
+
+def beam(*contacts, omega=1.3, load=1.5):
+    """Three modes under a tone."""
+    return System.modal(OMEGA, ZETA, contacts, [([1.0, 0.3, 0.2], Harmonic(load, omega))])
+
+
+def end(system, x, duration, rtol=1e-12, **more):
+    """Final [q, q̇] of a run without output."""
+    n = system.size
+    run = integrate(system, x[:n], x[n:], duration, method=Exponential(rtol), **more)
+    return np.concatenate((run.q[-1], run.q_dot[-1])), run
+
+
+@pytest.mark.parametrize(("spring", "stiffness", "limit"), [(1.0, 50.0, 0.05), (4.0, 4.0, 0.3), (1.0, 2000.0, 0.02)])
+@pytest.mark.parametrize("rtol", [1e-6, 1e-10])
+def test_stick_and_slip_follow_their_exact_pieces(spring, stiffness, limit, rtol):
+    """Free decay of a mass at a spring and a slider: end, times of stick and slip, energy."""
+    q, v, events = Slider(spring, stiffness, limit).run(0.0, 1.7, 10.0)
+    system = System([[1.0]], [[0.0]], [[spring]], [element(Jenkins(stiffness, limit), -1.0)])
+    run = integrate(system, [0.0], [1.7], 10.0, dt=0.5, method=Exponential(rtol))
+    last = integrate(system, [0.0], [1.7], 10.0, method=Exponential(rtol))
+    assert abs(last.q[-1, 0] - q) < 3.0 * rtol
+    assert abs(last.q_dot[-1, 0] - v) < 10.0 * rtol
+    assert run.transitions.event.tolist() == ["slip" if side else "stick" for _, side in events]
+    assert abs(run.transitions.t - [t for t, _ in events]).max() < 100.0 * rtol
+    assert abs(run.energy.residual).max() < 10.0 * rtol + 1e-8
+
+
+def test_parallel_sliders_reverse_together():
+    """Four sliders that all slip turn at one instant; two elements on one row do what their sum does."""
+    limits = [0.01, 0.02, 0.04, 0.08]
+    law = Iwan([25.0] * 4, limits)
+    system = System([[1.0]], [[0.0]], [[2.0]], [element(law, -1.0)])
+    run = integrate(system, [0.0], [1.0], 10.0, method=Exponential(1e-10))
+    first = run.transitions
+    stuck = first.t[first.event == "stick"][:4]
+    assert len(set(stuck.tolist())) == 1
+    parts = [element(Jenkins(25.0, limit), -1.0) for limit in limits]
+    apart = integrate(System([[1.0]], [[0.0]], [[2.0]], parts), [0.0], [1.0], 10.0, method=Exponential(1e-10))
+    assert abs(apart.q[-1, 0] - run.q[-1, 0]) < 1e-8
+    assert len(apart.transitions) == len(first)
+
+
+def test_a_run_goes_on_from_another_ones_end():
+    system = beam(element(Jenkins(50.0, 0.4), -1.0, -0.5, 0.3), element(Jenkins(30.0, 0.2), -0.2, 0.9, -0.5), load=0.0)
+    x = np.array([0.0, 0.0, 0.0, 1.0, -0.5, 0.3])
+    whole, _ = end(system, x, 9.0)
+    half, first = end(system, x, 4.5)
+    assert abs(end(system, half, 4.5, memory=first.memory)[0] - whole).max() < 1e-9
+    assert abs(end(system, half, 4.5)[0] - whole).max() > 1e-3  # without what was latched
+
+
+@pytest.mark.parametrize(
+    "laws",
+    [
+        (Jenkins(50.0, 0.4), Jenkins(30.0, 0.2) + KelvinVoigt(5.0, 0.1)),
+        (Iwan([30.0, 30.0, 20.0], [0.05, 0.1, 0.3]), Coulomb(0.2, 40.0)),
+        (BoucWen(20.0, 0.2, 1.0, 3.0, 1.0, n=1), Jenkins(50.0, 0.3)),
+        (BoucWen(20.0, 0.2, 1.0, 3.0, -1.0, n=2), BoucWen(10.0, 0.5, 1.0, 2.0, 1.0, n=1)),
+    ],
+)
+def test_tangent_over_many_borders(laws):
+    """Derivatives by the start, by what is latched and by a load's frequency against differences of runs."""
+    contacts = element(laws[0], -1.0, -0.5, 0.3), element(laws[1], -0.2, 0.9, -0.5)
+    x, duration, step = np.array([0.0, 0.0, 0.0, 1.0, -0.5, 0.3]), 12.0, 1e-6
+    _, run = end(beam(*contacts), x, duration)
+    assert len(run.transitions) > 15
+    parameter = Parameter(beam(*contacts, omega=1.3 - step), beam(*contacts, omega=1.3 + step), step)
+    found = end(beam(*contacts), x, duration, tangent=parameter)[1].tangent
+    wanted = [
+        (end(beam(*contacts), x + step * e, duration)[0] - end(beam(*contacts), x - step * e, duration)[0])
+        for e in np.eye(6)
+    ]
+    wanted.append(end(parameter.ahead, x, duration)[0] - end(parameter.behind, x, duration)[0])
+    wanted = np.transpose(wanted) / (2.0 * step)
+    assert abs(found - wanted).max() < 3e-7 * max(1.0, abs(wanted).max())
+
+
+def test_tangent_by_the_slider():
+    system = beam(element(Jenkins(50.0, 0.4), -1.0, -0.5, 0.3))
+    x, step = np.array([0.0, 0.0, 0.0, 1.0, -0.5, 0.3]), 1e-6
+    begin = np.array([0.0, 1e-3])
+    a, b = (end(system, x, 0.02, memory=[begin + side * np.array([0.0, step])])[1] for side in (-1.0, 1.0))
+    wanted = (b.q[-1] - a.q[-1]) / (2.0 * step)
+    found = end(system, x, 0.02, memory=[begin], tangent=True)[1].memory_tangent
+    assert found.shape == (8, 8)
+    assert abs(found[:3, 7] - wanted).max() < 1e-7 * abs(wanted).max()
+
+
+def test_a_yielding_stop_logs_its_contacts():
+    """A ball thrown at a Walton–Braun stop leaves with √(k₁/k₂) of its speed, a set behind it."""
+    law = WaltonBraun(1e4, 4e4, set="forgotten")
+    system = System([[2.0]], [[0.0]], [[0.0]], [Contact([1.0], law)])
+    run = integrate(system, [1e-3], [-0.5], 0.2, dt=1e-2, method=Exponential(1e-11))
+    log = run.contacts
+    assert len(log) == 1
+    assert abs(log.speed_out[0] - 0.25) < 1e-10
+    deepest = 0.5 * np.sqrt(2.0 / 1e4)
+    assert abs(log.peak_indentation[0] - deepest) < 1e-10
+    assert abs(log.peak_force[0] - 1e4 * deepest) < 1e-6
+    duration = 0.5 * np.pi * (np.sqrt(2.0 / 1e4) + np.sqrt(2.0 / 4e4))
+    assert abs(log.t_out[0] - log.t_in[0] - duration) < 1e-10
+    assert abs(log.energy_loss[0] - 0.5 * 2.0 * (0.25 - 0.0625)) < 1e-10
+
+
+def test_stops_and_sliders_side_by_side():
+    contacts = [element(Jenkins(40.0, 0.3), -1.0, -0.5, 0.3), Contact([1.0, 0.5, 0.2], Hertz(1e4), gap=0.4)]
+    run = integrate(beam(*contacts), [0.0] * 3, [1.0, 0.0, 0.0], 30.0, dt=0.1, method=Exponential(1e-9))
+    assert len(run.contacts) > 2
+    assert len(run.transitions) > 10
+    assert abs(run.energy.residual).max() < 1e-6 * run.energy.input.max()
+
+
+def test_bad_memory_is_refused():
+    system = beam(element(Jenkins(50.0, 0.4), -1.0, -0.5, 0.3))
+    zero = np.zeros(3)
+    with pytest.raises(ValueError, match="one entry per contact, 1, got 2"):
+        integrate(system, zero, zero, 1.0, memory=[None, None])
+    with pytest.raises(ValueError, match="2 finite numbers"):
+        integrate(system, zero, zero, 1.0, memory=[[0.0]])
+    with pytest.raises(ValueError, match="always=True"):
+        Contact([1.0], Jenkins(50.0, 0.4))

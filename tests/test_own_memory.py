@@ -1,0 +1,246 @@
+"""A user's law with memory, made of plain functions: the same as a built-in one, and what is refused."""
+
+import math
+import pickle
+
+import numpy as np
+import pytest
+from test_memory_laws import asked, borders, forces, renewal_slopes, renewed, with_memory
+
+from contacts import Border, Jenkins, Polynomial, Segment, WaltonBraun, memory_law
+
+
+def pull(delta, delta_dot, way, slider, stiffness, limit):
+    """F = stiffness (δ - s)."""
+    return stiffness * (delta - slider)
+
+
+def left(delta, delta_dot, way, slider, stiffness, limit):
+    return limit - abs(stiffness * (delta - slider))
+
+
+def let_go(delta, delta_dot, way, slider, stiffness, limit):
+    return math.copysign(1.0, delta - slider), slider
+
+
+def drag(delta, delta_dot, way, slider, stiffness, limit):
+    return way * limit
+
+
+def onwards(delta, delta_dot, way, slider, stiffness, limit):
+    return way * delta_dot
+
+
+def hold(delta, delta_dot, way, slider, stiffness, limit):
+    return 0, delta - way * limit / stiffness
+
+
+def pull_slopes(delta, delta_dot, way, slider, stiffness, limit):
+    return stiffness, 0, 0.0, -stiffness
+
+
+STICK, SLIP = Segment(pull, Border(left, "slip", let_go)), Segment(drag, Border(onwards, "stick", hold))
+LATCHED = {"way": 0.0, "slider": 0.0}
+friction = memory_law("friction", {"stick": STICK, "slip": SLIP}, LATCHED, reach=2e-3)
+OWN, JENKINS = friction(stiffness=2e4, limit=10.0), Jenkins(2e4, 10.0)
+
+
+def test_it_is_the_built_in_law():
+    path = 2e-3 * np.random.default_rng(1).uniform(-1.0, 1.0, 300)
+    np.testing.assert_allclose(OWN.along(path), JENKINS.along(path), rtol=1e-13, atol=1e-13)
+    assert (OWN.memory, OWN.borders, OWN.events) == ((0, 1, 2), 1, ("stick", "slip"))
+    assert not OWN.one_sided
+    both = OWN + JENKINS + Polynomial([1e3])
+    np.testing.assert_allclose(both.along(path), 2.0 * JENKINS.along(path) + 1e3 * path, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("numbers", [(0.0, 0.0, 1e-4), (1.0, 1.0, 1e-4), (1.0, -1.0, 0.0)])
+@pytest.mark.parametrize("slopes", [None, pull_slopes])
+def test_kernels(numbers, slopes):
+    segments = {"stick": Segment(pull, Border(left, "slip", let_go), slopes), "slip": SLIP}
+    law, row = memory_law("friction", segments, LATCHED)(stiffness=2e4, limit=10.0), None
+    row = with_memory(law, *numbers)
+    code, way, slider = numbers
+    d, v = [3e-4, -2e-4], [0.1, -0.3]
+    force = [way * 10.0] * 2 if code else [2e4 * (x - slider) for x in d]
+    np.testing.assert_allclose(forces(law, d, v, row), force, rtol=1e-14)
+    value = [way * x for x in v] if code else [10.0 - abs(x) for x in force]
+    np.testing.assert_allclose(borders(law, d, v, row)[0], value, rtol=1e-14)
+    k = 0.0 if code else 2e4
+    np.testing.assert_allclose(asked(law, "gradient", 3, d, v, row), [[k] * 2, [0.0] * 2, [0.0] * 2], rtol=1e-7)
+    by_way = 10.0 if code else 0.0
+    found = asked(law, "memory_gradient_address", 3, d, v, row)
+    np.testing.assert_allclose(found, [[0.0] * 2, [by_way] * 2, [-k] * 2], rtol=1e-7)
+    event, after = renewed(law, 0, d[0], v[0], row)
+    assert law.events[event] == ("stick" if code else "slip")
+    expected = [0.0, 0.0, d[0] - way * 10.0 / 2e4] if code else [1.0, 1.0, slider]
+    np.testing.assert_allclose(after[:3], expected, rtol=1e-14)
+    table = np.zeros((3, 5))
+    if code:
+        table[2, [0, 3]] = 1.0, -10.0 / 2e4
+    else:
+        table[2, 4] = 1.0
+    np.testing.assert_allclose(renewal_slopes(law, 0, d[0], v[0], row), table, rtol=1e-7, atol=1e-12)
+    same = np.diag([0.0, 1.0, 1.0])
+    np.testing.assert_array_equal(renewal_slopes(law, -1, d[0], v[0], row), np.hstack((np.zeros((3, 2)), same)))
+
+
+def test_it_travels_and_tells_of_itself():
+    assert pickle.loads(pickle.dumps(OWN)) == OWN
+    assert "friction: stick: F = stiffness (δ - s).; slip: drag" in OWN.describe()
+    assert "stiffness = 20000, limit = 10" in OWN.describe()
+    assert f"loses {4 * 10.0 * (2e-3 - 5e-4):.6g} J" in OWN.describe()
+    assert math.isnan(OWN.stored(1e-3, OWN.parameters))
+
+
+def nothing(delta, delta_dot, dent, k1, k2):
+    return 0
+
+
+def load(delta, delta_dot, dent, k1, k2):
+    return k1 * delta
+
+
+def unload(delta, delta_dot, dent, k1, k2):
+    return k2 * (delta - dent)
+
+
+def touch(delta, delta_dot, dent, k1, k2):
+    return dent - delta
+
+
+def turn(delta, delta_dot, dent, k1, k2):
+    return delta_dot
+
+
+def dented(delta, delta_dot, dent, k1, k2):
+    return delta * (1.0 - k1 / k2)
+
+
+def inside(delta, delta_dot, dent, k1, k2):
+    return delta - dent
+
+
+def below_first(delta, delta_dot, dent, k1, k2):
+    return dent * k2 / (k2 - k1) - delta
+
+
+def test_a_stop_of_several_borders_that_opens():
+    stop = memory_law(
+        "dented stop",
+        {
+            "open": Segment(nothing, Border(touch, "again")),
+            "load": Segment(load, Border(turn, "again", dented)),
+            "again": Segment(unload, (Border(inside, "open"), Border(below_first, "load"))),
+        },
+        {"dent": 0.0},
+        opens=True,
+    )
+    own, given = stop(k1=1e5, k2=4e5), WaltonBraun(1e5, 4e5)
+    assert (own.opens, own.one_sided, own.borders, own.memory) == (True, True, 2, (0, 1))
+    path = 2e-3 * np.random.default_rng(2).uniform(-0.5, 1.0, 200)
+    np.testing.assert_allclose(own.along(path), given.along(path), rtol=1e-11, atol=1e-11)
+
+
+def soft(delta, delta_dot, k):
+    return k * delta
+
+
+def hard(delta, delta_dot, k):
+    return 3.0 * k * delta
+
+
+def below(delta, delta_dot, k):
+    return -delta
+
+
+def above(delta, delta_dot, k):
+    return delta
+
+
+def test_a_law_of_segments_alone():
+    law = memory_law(
+        "bilinear", {"below": Segment(soft, Border(below, "above")), "above": Segment(hard, Border(above, "below"))}
+    )
+    np.testing.assert_allclose(law(k=1e3).along([-1.0, 1.0, -0.5]), [-1e3, 3e3, -500.0], rtol=1e-14)
+
+
+def too_far(delta, delta_dot, way, slider, stiffness, limit):
+    return 0.0, delta - 1.5 * way * limit / stiffness
+
+
+def too_near(delta, delta_dot, way, slider, stiffness, limit):
+    return 0.0, delta - 0.5 * way * limit / stiffness
+
+
+def bad_arguments(delta, delta_dot, stiffness):
+    return 0.0
+
+
+def nan_force(delta, delta_dot, way, slider, stiffness, limit):
+    return math.sqrt(-1.0 - delta**2)
+
+
+def no_number(delta, delta_dot, way, slider, stiffness, limit):
+    return "strong"
+
+
+def made(stick=STICK, slip=SLIP, **options):
+    return lambda: memory_law("mine", {"stick": stick, "slip": slip}, LATCHED, **options)(stiffness=2e4, limit=10.0)
+
+
+MISTAKES = [
+    (
+        made(slip=Segment(drag, Border(onwards, "stick", too_near))),
+        "force of law 'mine' jumps by -5 N from 'slip' to 'stick'",
+    ),
+    (made(slip=Segment(drag, Border(onwards, "stick", too_far)), jumps=True), "border 0 of mine falls to zero again"),
+    (made(slip=Segment(drag, Border(onwards, "stick")), jumps=True), "border 0 of mine falls to zero again at once"),
+    (made(stick=Segment(nan_force, Border(left, "slip", let_go))), "force of mine is nan N at δ = "),
+    (made(slip=Segment(drag, Border(onwards, "stuck", hold))), "law 'mine': 'slip' ends in 'stuck'; its segments are"),
+    (made(reach=0.0), "reach of law 'mine' must be finite and > 0, got 0.0"),
+    (lambda: memory_law("mine", {}), "segments of law 'mine' must be contacts.Segment by name, at least one"),
+    (
+        lambda: memory_law("mine", {"stick": STICK}, {"way": math.nan}),
+        "start of latched 'way' of law 'mine' must be finite",
+    ),
+]
+
+
+@pytest.mark.parametrize(("make", "said"), MISTAKES)
+def test_mistakes_get_a_sentence(make, said):
+    with pytest.raises(ValueError, match=said):
+        make()
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (made(slip=Segment(bad_arguments)), "must take the same arguments, but 'pull' takes .* and 'bad_arguments'"),
+        (
+            lambda: memory_law("mine", {"a": Segment(bad_arguments)}, LATCHED),
+            "must take .delta, delta_dot, way, slider, par",
+        ),
+        (
+            made(stick=Segment(no_number, Border(left, "slip", let_go))),
+            "law with memory 'no_number' .* cannot be compiled",
+        ),
+        (lambda: friction(stiffness=1.0), "law 'friction': missing a required argument: 'limit'"),
+        (lambda: friction(stiffness=1.0, limit=1.0, mass=2.0), "law 'friction': unexpected 'mass'"),
+    ],
+)
+def test_functions_that_do_not_fit(make, said):
+    with pytest.raises(TypeError, match=said):
+        make()
+
+
+def raising(delta, delta_dot, way, slider, stiffness, limit):
+    if delta > 1e9:
+        raise ValueError
+    return 0.0, delta - way * limit / stiffness
+
+
+def test_a_renewal_that_raises_gives_nan():
+    law = made(slip=Segment(drag, Border(onwards, "stick", raising)))()
+    _, after = renewed(law, 0, 2e9, 0.1, with_memory(law, 1.0, 1.0, 0.0))
+    assert np.isnan(after[1:3]).all()
