@@ -1,7 +1,9 @@
 """Contact laws: indentation, its rate and the entry rate in; force out.
 
-The force acts while ``delta > 0`` and is positive when it pushes the bodies apart. A law depends on these three numbers
-alone, or also on a few latched ones that are renewed at borders: `contacts.memory`.
+The force acts while ``delta > 0`` and is positive when it pushes the bodies apart. Laws of these three numbers:
+`Hertz`, `Hysteretic`, `KelvinVoigt`, `Viscoelastic`, `PiecewiseLinear`, `Polynomial`, `Tabulated`, and one's own with
+`@law`. Laws with memory, of a few latched numbers that are renewed at borders: `Jenkins`, `Coulomb`, `Iwan`,
+`ElastoPlastic`, `BoucWen`, `WaltonBraun`, and with `memory_law` one's own (`contacts.memory`). Laws add: ``a + b``.
 """
 
 from contacts.curves import PiecewiseLinear, Tabulated

@@ -96,6 +96,14 @@ def test_refusals(run, tmp_path, name, options, message):
         fb.plot.animate(run, tmp_path / name, **options)
 
 
+def test_a_run_read_from_its_file_looks_the_same(run, tmp_path):
+    own, loaded = (fb.plot.frame(one, 0.01) for one in (run, fb.load(run.save(tmp_path / "run"))))
+    for axis, again in zip(own.axes, loaded.axes, strict=True):
+        assert axis.get_ylim() == again.get_ylim()
+        for line, other in zip(axis.lines, again.lines, strict=True):
+            np.testing.assert_array_equal(line.get_xydata(), other.get_xydata())
+
+
 def test_a_run_without_its_model_cannot_be_drawn(run, tmp_path):
     with pytest.raises(ValueError, match="needs the model of the run"):
         fb.plot.animate(replace(run, model=None), tmp_path / "run.gif")

@@ -121,6 +121,19 @@ def test_a_yielding_stop_logs_its_contacts():
     assert abs(log.energy_loss[0] - 0.5 * 2.0 * (0.25 - 0.0625)) < 1e-10
 
 
+def test_a_yielding_stop_beside_a_spring():
+    """What is lost is the area of the yielding part's loop, F² (1/k₁ - 1/k₂)/2, F its largest force."""
+    contact = Contact([1.0], WaltonBraun(1e4, 4e4, set="forgotten") + KelvinVoigt(5e3, 0.0))
+    assert contact.always  # without being told
+    run = integrate(
+        System([[2.0]], [[0.0]], [[0.0]], [contact]), [1e-3], [-0.5], 0.2, dt=1e-2, method=Exponential(1e-10)
+    )
+    force = 1e4 * 0.5 * np.sqrt(2.0 / 1.5e4)
+    lost = 0.5 * force**2 * (1e-4 - 0.25e-4)
+    assert abs(run.q_dot[-1, 0] - np.sqrt(0.25 - lost)) < 1e-8
+    assert abs(run.energy.residual).max() < 1e-9
+
+
 def test_stops_and_sliders_side_by_side():
     contacts = [element(Jenkins(40.0, 0.3), -1.0, -0.5, 0.3), Contact([1.0, 0.5, 0.2], Hertz(1e4), gap=0.4)]
     run = integrate(beam(*contacts), [0.0] * 3, [1.0, 0.0, 0.0], 30.0, dt=0.1, method=Exponential(1e-9))

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 import solvers
 from fembeam.model.contact_histories import ContactHistories
 from fembeam.model.shapes import Shapes
-from fembeam.scene import Source
+from fembeam.scene import ON, Source
 from fembeam.support import Part, Printed
 from solvers.problem import counted
 
@@ -60,9 +60,8 @@ class Run(ContactHistories, Printed):
     source: Source | None = None  # of a run made from a scene file
     versions: dict[str, str] = field(default_factory=dict)  # that made a run read from a file
     borders: Callable[[], Any] | None = field(default=None, repr=False)  # what `transitions` are made by
-    kinds: NDArray[np.bool_] = field(
-        default_factory=lambda: np.zeros((0, 2), dtype=bool)
-    )  # (m, 2): of rotation, always acting
+    on: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 3), dtype=int))  # (m, 3): body, of ON, number
+    kinds: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 2), dtype=bool))  # of rotation, always acting
 
     def __repr__(self) -> str:
         reached = f"to t = {self.t[-1]:g} s" if len(self.t) else "without samples"
@@ -107,9 +106,8 @@ class Run(ContactHistories, Printed):
     @classmethod
     def of(cls, model: Model, solution: solvers.Solution) -> Run:
         """A model's solution with what it takes to read it."""
-        stops = np.array(
-            [(contact.z, contact.push, contact.gap) for contact in model.contact_rows], dtype=float
-        ).reshape(-1, 3)
+        rows = model.contact_rows
+        stops = np.array([(one.z, one.push, one.gap) for one in rows], dtype=float).reshape(-1, 3)
         strikers = np.array([impactor.mass for impactor in model.matrices.impactors], dtype=float)
         status = solution.status.value
         if not solution.status.good:
@@ -119,7 +117,8 @@ class Run(ContactHistories, Printed):
             *(model.shapes, stops, model.directions, strikers, repr(model.scene), model),
             others=model.others,
             borders=solution.borders,
-            kinds=np.array([(one.rotation, one.always) for one in model.contact_rows], dtype=bool).reshape(-1, 2),
+            on=np.array([(one.body, ON.index(one.on[0]), one.on[1]) for one in rows], dtype=int).reshape(-1, 3),
+            kinds=np.array([(one.rotation, one.always) for one in rows], dtype=bool).reshape(-1, 2),
         )
 
     @property

@@ -37,6 +37,7 @@ UNITS = {
     "shapes, directions": "1/√kg",
     "strikers": "kg",
     **READOUT_UNITS,
+    "on": "of each contact: the beam it pushes, whether from frame 0, body 1 or impactor 2, the number of that",
     "kinds": "(of rotation, always acting) of each contact: rad for m, N m for N where it is of rotation",
 }
 
@@ -72,7 +73,8 @@ def _contents(run: Run) -> tuple[str, dict[str, Any]]:
     carried = run.source.files.values() if run.source else ()
     arrays = {
         **{"t": run.t, "q": run.q, "q_dot": run.q_dot, "force": run._forces},
-        **{"stops": run.stops, "kinds": run.kinds, "directions": run.directions, "strikers": run.strikers},
+        **{"stops": run.stops, "on": run.on, "kinds": run.kinds},
+        **{"directions": run.directions, "strikers": run.strikers},
         **{"nodes": run.shapes.nodes, "shapes": run.shapes.values},
         **{f"nodes_{i}": shapes.nodes for i, shapes in enumerate(run.others, 1)},
         **{f"shapes_{i}": shapes.values for i, shapes in enumerate(run.others, 1)},
@@ -130,7 +132,8 @@ def _read(path: Path) -> dict[str, Any]:
 
 def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run:
     """A run from the contents of its file."""
-    arrays.setdefault("kinds", np.zeros((len(arrays["stops"]), 2), dtype=bool))  # of earlier versions
+    arrays.setdefault("on", np.zeros((len(arrays["stops"]), 3), dtype=int))  # of earlier versions
+    arrays.setdefault("kinds", np.zeros((len(arrays["stops"]), 2), dtype=bool))
     saved_arrays.check({name: array for name, array in arrays.items() if not name.startswith("file_")})
     source = None
     if given := about.get("scene_file"):
@@ -156,5 +159,6 @@ def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run
         others=tuple(shapes[1:]),
         source=source,
         versions=about.get("versions", {}),
+        on=arrays["on"],
         kinds=arrays["kinds"].astype(bool),
     )

@@ -1,8 +1,8 @@
 """Consistency of the arrays of a saved run; a truncated or edited file is refused with the reason.
 
 k samples, n coordinates, m contacts, b nodes of a beam, c entries of the log:
-t (k,), q, q_dot (k, n), force (m, k), stops (m, 3), kinds (m, 2), directions (m, n), strikers (i,), nodes (b,),
-shapes (2b, n), contact_* (c,), energy_* (k,) but energy_initial; what `fembeam.response.readout` reads a
+t (k,), q, q_dot (k, n), force (m, k), stops (m, 3), kinds (m, 2), on (m, 3), directions (m, n), strikers (i,),
+nodes (b,), shapes (2b, n), contact_* (c,), energy_* (k,) but energy_initial; what `fembeam.response.readout` reads a
 run with.
 """
 
@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from fembeam.response import READOUT_FINITE, expected_readout
+from fembeam.scene import ON
 
 Shape = tuple[int, ...]
 FINITE = {"shapes", "stops", "directions", "strikers", *READOUT_FINITE}
@@ -32,6 +33,10 @@ def check(arrays: Mapping[str, Any]) -> None:
     for name in (name for name in arrays if name.rstrip("_0123456789") in FINITE):
         _need(np.isfinite(arrays[name]).all(), f"{name} must be finite")
     _need(np.all(arrays["strikers"] > 0), "strikers must be positive masses")
+    beams = sum(name.split("_")[0] == "nodes" for name in arrays)
+    most = [beams, len(ON), max(beams, len(arrays["strikers"]))]
+    whole = arrays["on"].dtype.kind in "iu" and np.all((arrays["on"] >= 0) & (arrays["on"] < most))
+    _need(whole, f"on must hold whole numbers from 0, below {most}")
     _check_log(arrays)
 
 
@@ -39,7 +44,7 @@ def expected(arrays: Mapping[str, Any]) -> dict[str, Shape]:
     """{name: shape} that follow from q, stops, the nodes and the entries of the log."""
     (k, n), m, entries = arrays["q"].shape, len(arrays["stops"]), arrays["contact_stop"].size
     shapes: dict[str, Shape] = {"t": (k,), "q_dot": (k, n), "force": (m, k), "stops": (m, 3), "directions": (m, n)}
-    shapes["kinds"] = (m, 2)
+    shapes |= {"kinds": (m, 2), "on": (m, 3)}
     shapes["strikers"] = (min(arrays["strikers"].size, n),)
     shapes |= {name: (entries,) for name in arrays if name.startswith("contact_")}
     shapes |= {name: () if name == "energy_initial" else (k,) for name in arrays if name.startswith("energy_")}

@@ -17,7 +17,7 @@ from fembeam.plot.mode_count import mode_count, smallest_model
 from fembeam.plot.orbits import branch, orbit, peak
 from fembeam.plot.random import random_densities, random_spectra
 from fembeam.plot.response import densities, mode_shapes, time_history
-from fembeam.plot.run_signals import batches, responses, sampling_of, stationary
+from fembeam.plot.run_signals import batches, natural, responses, sampling_of, stationary
 from fembeam.plot.spectra import peaks, segment_for, spectra_of, spectrum
 from fembeam.plot.style import one_legend, styled
 
@@ -37,6 +37,7 @@ __all__ = [
     "loops",
     "mode_count",
     "mode_shapes",
+    "natural",
     "one_legend",
     "orbit",
     "peak",

@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fembeam.plot.style import BLUE, GREY, ORANGE, RED, styled
-from fembeam.scene import heights
+from fembeam.scene import ON
 from fembeam.support import require
 
 if TYPE_CHECKING:
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from fembeam.model import Run
-    from fembeam.scene.contact_rows import ContactRow
 
 Vector = NDArray[np.float64]
 
@@ -54,7 +53,8 @@ def animate(
 
     Raises
     ------
-    ValueError : another suffix, no ffmpeg, fewer than 2 samples in the window, a run that does not know its scene.
+    ValueError : another suffix, no ffmpeg, fewer than 2 samples in the window, a run read from a file of an
+        earlier version, which does not hold heights and supports.
     """
     from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
 
@@ -97,8 +97,6 @@ def frame(run: Run, t: float, window: tuple[float, float] | None = None) -> Figu
 
 def _samples(run: Run, window: tuple[float, float] | None, frames: int) -> NDArray[np.int64]:
     """Numbers of the samples to show."""
-    require(run.model is not None, "the picture needs the model of the run", "a run read from a file", "animate",
-            "simulate again, or use dataclasses.replace(run, model=model)")  # fmt: skip
     whole = isinstance(frames, (int, np.integer)) and 2 <= frames <= MOST_FRAMES
     require(whole, f"frames must be 2 to {MOST_FRAMES}", frames, "animate", "give a count")
     lo, hi = window or (float(run.t[0]), float(run.t[-1]))
@@ -141,9 +139,28 @@ def _pace(ratio: float) -> str:
     return f", {times:.{0 if times >= 100 else 1}f} times {way} than real time".replace(".0 ", " ")
 
 
-def _one_sided(contact: ContactRow) -> bool:
-    """Whether it is a stop on the frame that the beam runs into."""
-    return contact.on[0] == "frame" and not (contact.rotation or contact.always)
+class _Contact(NamedTuple):
+    """A stop, element or impactor as the run knows it."""
+
+    z: float
+    push: float
+    gap: float
+    body: int
+    on: str
+    number: int
+    rotation: bool
+    always: bool
+
+    @property
+    def is_stop(self) -> bool:
+        """Whether it is a stop on the frame that the beam runs into."""
+        return self.on == "frame" and not (self.rotation or self.always)
+
+
+def _contacts(run: Run) -> list[_Contact]:
+    """All contacts in the order of the log."""
+    rows = zip(run.stops.tolist(), run.on.tolist(), run.kinds.tolist(), strict=True)
+    return [_Contact(*place, body, ON[kind], number, *acts) for place, (body, kind, number), acts in rows]
 
 
 class _Stage:
@@ -152,9 +169,8 @@ class _Stage:
     figure: Figure
 
     def __init__(self, run: Run, samples: NDArray[np.int64], fps: float | None) -> None:
-        assert run.model is not None
-        self.run, self.samples, self.contact_rows = run, samples, run.model.contact_rows
-        self.beams, self.strikers = heights(run.model.scene)
+        self.run, self.samples, self.contact_rows = run, samples, _contacts(run)
+        self.beams, self.strikers = run.readout.heights, run.readout.striker_places
         self.forces = [
             run.force(i)[samples] if one.always else _peaks(run, i, samples) for i, one in enumerate(self.contact_rows)
         ]
@@ -203,16 +219,14 @@ class _Stage:
 
     def _name(self, number: int) -> str:
         """A contact as text."""
-        kind, which = self.contact_rows[number].on
-        always = "element" if self.contact_rows[number].always else ""
-        place = f"z = {1e3 * self.contact_rows[number].z:.4g} mm"
-        named = {"frame": "stop", "body": "beams", "impactor": f"impactor {which}"}[kind]
-        return f"{always or named}, {place}"
+        one = self.contact_rows[number]
+        named = {"frame": "stop", "body": "beams", "impactor": f"impactor {one.number}"}[one.on]
+        return f"{'element' if one.always else named}, z = {1e3 * one.z:.4g} mm"
 
     def _limits(self, axis: Axes) -> float:
         """Set the view, on the beams: an impactor may leave it; returns its height in mm."""
-        rows = [line for _, line in self.lines] + [np.array(self.strikers)] * bool(self.strikers)
-        stops = [-contact.push * contact.gap for contact in self.contact_rows if _one_sided(contact)]
+        rows = [line for _, line in self.lines] + [self.strikers[:, 1]] * bool(len(self.strikers))
+        stops = [-contact.push * contact.gap for contact in self.contact_rows if contact.is_stop]
         low = 1e3 * min(*(float(row.min()) for row in rows), *stops, 0.0)
         high = 1e3 * max(*(float(row.max()) for row in rows), *stops, 0.0)
         spread = max(high - low, 1e-9)
@@ -227,8 +241,8 @@ class _Stage:
         """For every impactor +1 when it sits over its beam, -1 under it, 0 when it embraces it."""
         pushes: list[list[float]] = [[] for _ in self.strikers]
         for contact in self.contact_rows:
-            if contact.on[0] == "impactor":
-                pushes[contact.on[1]].append(-contact.push)
+            if contact.on == "impactor":
+                pushes[contact.number].append(-contact.push)
         return [sum(each) for each in pushes]
 
     def _beside(self, side: float, points: float) -> Any:
@@ -239,20 +253,17 @@ class _Stage:
 
     def _ball(self, impactor: int) -> Vector:
         """Height (frames,) of an impactor."""
-        return self.strikers[impactor] + self.run.impactor_displacement(impactor)[self.samples]
+        return self.strikers[impactor, 1] + self.run.impactor_displacement(impactor)[self.samples]
 
     def _fixed(self, axis: Axes) -> None:
         """Supports and stops on the frame."""
-        assert self.run.model is not None
-        scene = self.run.model.scene
-        for body, height in zip((scene, *scene.bodies), self.beams, strict=True):
-            for support in body.supports:
-                axis.plot(1e3 * support.z, 1e3 * height, "s", color="black", markersize=7, clip_on=False)
+        for z, body in self.run.readout.supports:
+            axis.plot(1e3 * z, 1e3 * self.beams[int(body)], "s", color="black", markersize=7, clip_on=False)
         for contact in self.contact_rows:
-            if contact.on[0] == "frame" and not _one_sided(contact):
+            if contact.on == "frame" and not contact.is_stop:
                 axis.plot(1e3 * contact.z, 1e3 * self.beams[contact.body], "D", color="black", markersize=7,
                           clip_on=False, zorder=1)  # fmt: skip
-            elif _one_sided(contact):
+            elif contact.is_stop:
                 at = 1e3 * (self.beams[contact.body] - contact.push * contact.gap)
                 axis.plot(1e3 * contact.z, at, marker="^" if contact.push > 0 else "v", color="black", markersize=9,
                           transform=self._beside(-contact.push, 6.0), clip_on=False, zorder=1)  # fmt: skip
@@ -261,9 +272,7 @@ class _Stage:
         """Move everything to one frame."""
         for curve, (z, line) in zip(self.curves, self.lines, strict=True):
             curve.set_data(1e3 * z, 1e3 * line[number])
-        assert self.run.model is not None
-        places = [impactor.z for impactor in self.run.model.matrices.impactors]
-        for i, (ball, place) in enumerate(zip(self.balls, places, strict=True)):
+        for i, (ball, (place, _)) in enumerate(zip(self.balls, self.strikers, strict=True)):
             ball.set_data([1e3 * place], [1e3 * self._ball(i)[number]])
         self._point(number)
         now = float(self.run.t[self.samples[number]])

@@ -160,18 +160,13 @@ def _watched(run: Run, lo: float, hi: float) -> tuple[int, float]:
         return 0, _resting_place(run)
     inside = np.flatnonzero(_within(run, lo, hi) & ~run.kinds[log.stop, 0])
     stop = int(log.stop[inside[np.argmax(log.peak_force[inside])]]) if len(inside) else first
-    return _bodies(run)[stop], float(run.stops[stop, 0])
-
-
-def _bodies(run: Run) -> list[int]:
-    """The beam of every contact; a run read from a file does not know."""
-    return [0] * len(run.stops) if run.model is None else [row.body for row in run.model.contact_rows]
+    return int(run.on[stop, 0]), float(run.stops[stop, 0])
 
 
 def _stops_at(run: Run, body: int, z: float) -> NDArray[np.int64]:
     """Numbers of the stops at a place, or of all where there is none; elements have no contacts."""
     stops = ~run.kinds[:, 1]
-    near = stops & np.isclose(run.stops[:, 0], z) & (np.array(_bodies(run)) == body)
+    near = stops & np.isclose(run.stops[:, 0], z) & (run.on[:, 0] == body)
     return np.flatnonzero(near if near.any() else stops)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from fembeam.model import places
 from fembeam.plot.style import Vector
-from fembeam.scene import signals_of
+from fembeam.scene import lasting
 from fembeam.statistics import Signal, pdf
 
 if TYPE_CHECKING:
@@ -57,9 +57,9 @@ def stationary(run: Run, discard: float = 0.0) -> bool:
     Free motion does not. Of records, of signals of the user and of runs read from a file the motion itself tells: its
     mean square over each quarter of the time is a tenth or more of the largest.
     """
-    loads = None if run.model is None else list(signals_of(run.model.scene).values())
-    if loads is not None and all(hasattr(load, "tones") or hasattr(load, "psd_at") for load in loads):
-        return bool(loads)
+    known = None if run.model is None else lasting(run.model.scene)
+    if known is not None:
+        return known
     x = next(iter(responses(run, discard).values()))
     if len(x) < 4:
         return False

@@ -94,6 +94,13 @@ class Readout:
         return reaction_rows(self.model)
 
     @cached_property
+    def supports(self) -> Vector:
+        """Place z and body of each support (s, 2)."""
+        scene = self.model.scene
+        found = [(support.z, body) for body, one in enumerate((scene, *scene.bodies)) for support in one.supports]
+        return np.array(found, dtype=float).reshape(-1, 2)
+
+    @cached_property
     def heights(self) -> Vector:
         """Heights of the beams (b,), m."""
         return np.array(heights(self.model.scene)[0])

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, fields
 from typing import Any
 
+import numpy as np
+
 from fembeam.beams import Beam, Section, Taper
 from fembeam.response.readout import Readout, Vector
 from fembeam.response.section_forces import SectionForces
@@ -53,9 +55,15 @@ def unpacked(about: Mapping[str, Any], arrays: Mapping[str, Any], nodes: list[Ve
         SectionForces(_beam_of_words(beam), nodes[i], arrays[f"moments_{i}"], arrays[f"shears_{i}"])
         for i, beam in enumerate(about["beams"])
     )
-    reactions = [_part(dict(words)) for words in about["parts"]], arrays["reactions"]
-    kept = {name: arrays[name] for name in PLAIN}
-    return Readout(None, arrays["t"], kept | {"base": about["base"], "section_forces": forces, "reactions": reactions})
+    parts = [_part(dict(words)) for words in about["parts"]]
+    kept: dict[str, Any] = {name: arrays[name] for name in PLAIN}
+    held = [(part.z, body) for part, body in parts if isinstance(part, FEATURES["supports"])]
+    kept["supports"] = np.array(held, dtype=float).reshape(-1, 2)
+    return Readout(
+        None,
+        arrays["t"],
+        kept | {"base": about["base"], "section_forces": forces, "reactions": (parts, arrays["reactions"])},
+    )
 
 
 def expected_readout(arrays: Mapping[str, Any]) -> dict[str, Shape]:

@@ -110,7 +110,7 @@ def figures(run: Run, discard: float = 0.0) -> dict[str, Callable[[], Figure]]:
         if plot.stationary(run, discard):
             drawn["psd"] = lambda: plot.spectrum(run, discard)
             drawn["densities"] = lambda: plot.densities(run, discard)
-        elif run.model is not None and np.any(run.model.omega > 0.0):
+        elif np.any(plot.natural(run) > 0.0):
             drawn["response_spectrum"] = lambda: plot.floor_spectrum(run)
     if np.any(np.isfinite(log.t_out) & (log.t_in >= discard)):
         drawn["contacts"] = lambda: plot.contacts(run, discard)

@@ -5,18 +5,19 @@ Imports: `beams`, `excitation`, `support`, `reduction`; `Scene.reduce` opens the
 """
 
 from fembeam.scene.assembly import Matrices, unsupported
-from fembeam.scene.contact_rows import contact_rows, heights, loaded, loads, static_rows, watched, weight
+from fembeam.scene.contact_rows import ON, contact_rows, heights, loaded, loads, static_rows, watched, weight
 from fembeam.scene.element import Element, tangent
 from fembeam.scene.impactor import Impactor
 from fembeam.scene.local_coordinate import LocalCoordinate, unit_of
 from fembeam.scene.parameters import changes_structure, path_of, replaced, value_of, with_value
 from fembeam.scene.parts import Clamped, Dashpot, Guided, LumpedMass, Pinned, PointForce, PointMoment, Spring, Stop
 from fembeam.scene.scene import FEATURES, Scene
-from fembeam.scene.signals import PLACES, signals_of, with_signals
+from fembeam.scene.signals import PLACES, lasting, signals_of, with_signals
 from fembeam.scene.source import Source
 
 __all__ = [
     "FEATURES",
+    "ON",
     "PLACES",
     "Clamped",
     "Dashpot",
@@ -35,6 +36,7 @@ __all__ = [
     "Stop",
     "changes_structure",
     "heights",
+    "lasting",
     "loaded",
     "contact_rows",
     "loads",

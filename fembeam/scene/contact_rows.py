@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from fembeam.scene.scene import Scene
 
 
+ON = ("frame", "body", "impactor")  # what a contact pushes from
+
+
 @dataclass(frozen=True, eq=False)
 class ContactRow:
     """One contact of a scene, or one element.

@@ -31,6 +31,16 @@ def signals_of(scene: Scene) -> dict[str, Any]:
     return dict(_listed(scene))
 
 
+def lasting(scene: Scene) -> bool | None:
+    """Whether a scene is driven by tones and noise alone, so that its motion settles; False without loads.
+
+    None where other signals drive it, such as records, of which one cannot tell.
+    """
+    signals = signals_of(scene).values()
+    known = all(hasattr(signal, "tones") or hasattr(signal, "psd_at") for signal in signals)
+    return bool(signals) if known else None
+
+
 def _listed(scene: Scene) -> Iterator[tuple[str, Any]]:
     """The same, one by one."""
     if scene.base is not None:

@@ -68,7 +68,8 @@ class Contact:
     direction : (n,), the way the stop pushes.
     law : a contact law, such as those of the package `contacts`.
     gap : clearance in m; negative for a preload.
-    always : whether the law acts at both signs of ``delta``; its knots still count from ``delta = 0``.
+    always : whether the law acts at both signs of ``delta``; its knots still count from ``delta = 0``. Of a
+        law with memory for δ > 0 only, such as `contacts.WaltonBraun`, it is set: the law says where it is open.
 
     Examples
     --------
@@ -86,7 +87,7 @@ class Contact:
         direction = np.array(self.direction, dtype=float, ndmin=1)
         if direction.ndim != 1 or not np.all(np.isfinite(direction)):
             raise ValueError(f"direction of a Contact must be a finite vector, got {self.direction!r}")
-        if getattr(self.law, "opens", False):
+        if getattr(self.law, "memory", ()) and getattr(self.law, "one_sided", False):
             object.__setattr__(self, "always", True)  # its law itself says where it is open
         elif getattr(self.law, "memory", ()) and not self.always:
             raise ValueError(f"{self.law!r} has a memory and acts at both signs of delta: give always=True")
