@@ -272,9 +272,11 @@ def finish_step(problem, tables, state, space, family, level):
             impulses = eight(weights, 0) * eight(space.force[s], 0)
             state.x[size + 2 + 2 * s] += h * total(impulses * eight(space.motion[s, 1], 0))
             state.x[size + 3 + 2 * s] += h * total(impulses)
-            if problem.levels[s, 0] == 0.0:
+            if is_open(problem, s):
+                continue
+            if problem.levels[s, 0] == 0.0 or problem.opening[s] >= 0:
                 step_peaks(problem, tables, state, space, family, h, s, 1.0)
-            elif not is_open(problem, s):
+            else:
                 state.open[s, PEAK_DELTA] = max(state.open[s, PEAK_DELTA], _size(space.motion[s, 0]))
                 state.open[s, PEAK_FORCE] = max(state.open[s, PEAK_FORCE], _size(space.force[s]))
     copy(space.x_new, state.x, size)

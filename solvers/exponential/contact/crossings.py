@@ -18,7 +18,7 @@ import numpy as np
 from solvers.compiled.dop853_tableau import STAGES, C
 from solvers.compiled.kernels import call_force, copy, dot, indentation, inlined, inner
 from solvers.compiled.simd import put, spread
-from solvers.compiled.state import PEAK_FORCE, T_IN, T, surface_tolerance
+from solvers.compiled.state import PEAK_FORCE, T_IN, T, is_open, surface_tolerance
 from solvers.compiled.sums import above
 from solvers.exponential.contact.blocks import ENTERING, GOING_ON, carry_forces, goes_through_blocks, see
 from solvers.exponential.contact.node_response import respond, ripple_of
@@ -249,7 +249,11 @@ def on_the_way(problem, tables, state, space, stop, bends, w, x):
                 return s
             if long and _passes(d, a, slope_a, b, slope_b, lower, upper):
                 return TURNED
-        if not long or piece == 0 or problem.levels[s, 0] < 0.0:
+        if not long or piece == 0 or is_open(problem, s):
+            continue
+        if problem.levels[s, 0] < 0.0:  # no contact of the log but where the law opens
+            if problem.opening[s] >= 0 and slope_a > 0.0 and slope_b < -_TOGETHER * slope_a:
+                return TURNED
             continue
         if slope_a > 0.0 > slope_b and (s != stop or tables.bend[s] != RATE):
             return TURNED

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from solvers.compiled.kernels import copy, inner
-from solvers.compiled.state import HEAD, PART, SAMPLED, STEPS, TAPED, T, tape
+from solvers.compiled.state import HEAD, PART, SAMPLED, STEPS, TAPED, T, is_open, tape
 from solvers.exponential.contact.node_response import START
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.peaks import state_peaks, step_peaks
@@ -36,7 +36,7 @@ def end_inside(problem, tables, state, space, family, level, t_end):
     x, share = space.work[START], (t_end - state.now[T]) / tables.step[level]
     place = share ** (1.0 / tables.power[family])
     for s in range(problem.gap.size):
-        if state.piece[s] > 0 and problem.levels[s, 0] == 0.0:
+        if state.piece[s] > 0 and (problem.levels[s, 0] == 0.0 or problem.opening[s] >= 0) and not is_open(problem, s):
             step_peaks(problem, tables, state, space, family, tables.step[level], s, min(place, 1.0))
     if state.tape.shape[0]:
         tape_forces(problem, state, space, PART, t_end, family, level)
