@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from sliders import Slider
 
 from contacts import Hertz, KelvinVoigt
 from contacts.memory import BoucWen, Coulomb, Iwan, Jenkins, WaltonBraun
 from fembeam import Harmonic
-from sliders import Slider
 from solvers import Contact, Exponential, Parameter, System, integrate
 
 OMEGA, ZETA = [1.0, 3.7, 9.0], [0.01, 0.01, 0.02]
