@@ -7,7 +7,7 @@ from sliders import Slider
 from contacts import Hertz, KelvinVoigt
 from contacts.memory import BoucWen, Coulomb, Iwan, Jenkins, WaltonBraun
 from fembeam import Harmonic
-from solvers import Contact, Exponential, Parameter, System, integrate
+from solvers import Contact, DormandPrince, Exponential, Parameter, System, integrate
 
 OMEGA, ZETA = [1.0, 3.7, 9.0], [0.01, 0.01, 0.02]
 
@@ -57,6 +57,20 @@ def test_parallel_sliders_reverse_together():
     apart = integrate(System([[1.0]], [[0.0]], [[2.0]], parts), [0.0], [1.0], 10.0, method=Exponential(1e-10))
     assert abs(apart.q[-1, 0] - run.q[-1, 0]) < 1e-8
     assert len(apart.transitions) == len(first)
+
+
+@pytest.mark.parametrize("seed", [3, 24])
+def test_fast_modes_hide_no_border(seed):
+    """While a slider slips its force is constant, and steps could grow until the nodes miss what fast modes do."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(4, 12))
+    omega = np.cumsum(10.0 ** rng.uniform(0.0, 1.0, n))
+    slider = element(Jenkins(10.0 ** rng.uniform(1, 3), 10.0 ** rng.uniform(-1.5, 0.0)), *-rng.standard_normal(n))
+    system = System.modal(omega, 0.003, [slider], [(rng.standard_normal(n), Harmonic(1.0, 1.3))])
+    start = np.zeros(n), 0.1 * rng.standard_normal(2 * n)[n:]
+    run, other = (integrate(system, *start, 6.0, method=method) for method in (Exponential(1e-6), DormandPrince(1e-9)))
+    assert len(run.transitions) == len(other.transitions)
+    assert abs(run.q - other.q).max() < 1e-5
 
 
 def test_a_run_goes_on_from_another_ones_end():

@@ -12,6 +12,7 @@ from solvers.compiled.state import (
     EVENTS,
     LAST_EVENT,
     LOGGED,
+    PEAK_DELTA,
     RENEWAL,
     T,
     contact_row,
@@ -53,6 +54,7 @@ def renew(problem, state, s, j, delta, rate, log):
     state.count[EVENTS] += 1
     if was_open and not is_open(problem, s):
         open_contact(problem, state, s, t, rate)
+        state.active[s, PEAK_DELTA] = delta
     if is_open(problem, s) and not was_open:
         contact_row(problem, state, s, t, -rate, log[state.count[LOGGED]])
         state.count[LOGGED] += 1

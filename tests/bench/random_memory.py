@@ -147,7 +147,7 @@ def numbers(solution: Any, scene: Scene, size: float, duration: float) -> dict[s
     """What `numbers_of` compares, with the transitions, element by element and border by border."""
     found, rows = numbers_of(solution, scene, size, duration), solution.transitions
     i = np.lexsort((rows.t, rows.border, rows.contact))
-    i = i[rows.t[i] > 1e-12 * duration]  # a start beyond borders passes them in any order
+    i = i[rows.t[i] > 1e-7 * duration]  # a start beyond borders passes them in any order, or within a shortest step
     contact = rows.contact[i].astype(int)
     found["order"] = [
         *found["order"],

@@ -3,7 +3,8 @@
 A law with memory tells by margins b_j(δ, δ̇) how far its borders are; all are positive inside the present segment. No
 step goes across a border: the step before ends near it, a landing in time ends on it by the secant rule, and there all
 borders are renewed whose margins have fallen to zero, also those of other elements that share the motion. Between two
-nodes a margin is watched where it is small, by the polynomial through points around its lowest node.
+nodes a margin is watched where it is small, by the polynomial through points around its lowest node; a step whose nodes
+do not resolve the fast blocks keeps a distance of what these may add.
 """
 
 from __future__ import annotations
@@ -13,10 +14,12 @@ import numpy as np
 from solvers.compiled.kernels import dot, indentation, inlined, inner
 from solvers.compiled.renewals import margins, margins_in, note_event, renew
 from solvers.compiled.state import rate_tolerance, surface_tolerance
-from solvers.exponential.contact.node_response import DELTAS, RATES, START
+from solvers.exponential.contact.node_response import DELTAS, KNOWN, RATES, START, rate_ripple_of, ripple_of
 from solvers.exponential.contact.nodes import LOCAL, S
 from solvers.exponential.contact.peaks import local_maximum, motion_around
 
+ENDS = 6  # points at which margins are evaluated besides the nodes
+UNRESOLVED = -2
 _ON = 1e-9  # margin, in units of the largest of the step, at which a step counts as begun on the border
 _SAME = 1e-11  # the same for the sign of a node
 _TOGETHER = 1e-9  # part of its way at which a border counts as reached when another is landed on
@@ -24,17 +27,25 @@ _NEAR = 0.2  # lowest node, in units of the largest margin, below which the moti
 
 
 @inner
-def _margins_on_step(problem, state, scratch, s):
-    """Margins at the nodes and at both ends of the step that has just been tried, their largest and their rounding."""
-    size, batch, delta, rate = 2 * problem.k.size, scratch.trial, scratch.start_motion[s, 0], scratch.start_motion[s, 1]
-    batch[0], batch[1] = delta, indentation(problem, s, scratch.x_new)
-    batch[2], batch[3] = delta + surface_tolerance(problem, s, state.x), delta
-    batch[4], batch[5] = rate, dot(problem.read_rate[s], scratch.x_new, size)
-    batch[6], batch[7] = rate, rate + rate_tolerance(problem, s, state.x)
-    margins(problem, state, s, 4, batch[0:4], batch[4:8], scratch.ends)
+def _margins_on_step(problem, tables, state, scratch, s, node_set, level):
+    """Margins at the nodes and at both ends of the step that has just been tried, their largest and their rounding.
+
+    The begin is looked at once more with rounding added to δ and to δ̇, and with their ripple.
+    """
+    n, delta, rate = problem.k.size, scratch.start_motion[s, 0], scratch.start_motion[s, 1]
+    weight, alias = tables.ripple_weight[s], tables.alias[tables.kind[node_set], level]
+    deltas, rates = scratch.local_motion[KNOWN, :ENDS], scratch.local_motion[KNOWN, ENDS : 2 * ENDS]
+    for i in range(ENDS):
+        deltas[i], rates[i] = delta, rate
+    deltas[1], rates[1] = indentation(problem, s, scratch.x_new), dot(problem.read_rate[s], scratch.x_new, 2 * n)
+    deltas[2] += surface_tolerance(problem, s, state.x)
+    rates[3] += rate_tolerance(problem, s, state.x)
+    deltas[4] += ripple_of(weight, alias, state.x, n)
+    rates[5] += rate_ripple_of(weight, problem.k, alias, state.x, n)
+    margins(problem, state, s, ENDS, deltas, rates, scratch.ends)
     margins(problem, state, s, S, scratch.motion[s, 0], scratch.motion[s, 1], scratch.margin)
     for j in range(problem.border_count[s]):
-        ends = scratch.ends[4 * j : 4 * j + 4]
+        ends = scratch.ends[ENDS * j : ENDS * (j + 1)]
         largest = max(abs(ends[0]), abs(ends[1]))
         for i in range(S):
             largest = max(largest, abs(scratch.margin[S * j + i]))
@@ -49,13 +60,13 @@ def _crossing(problem, tables, scratch, s, j, node_set, h):
     It is 0 where the margin is negative from the begin on. One that begins at zero may have risen before the first
     node: then a shorter step is asked for, which will tell.
     """
-    noise, before, t = scratch.noise[s, j], scratch.ends[4 * j], 0.0
+    noise, before, t = scratch.noise[s, j], scratch.ends[ENDS * j], 0.0
     near = max(_ON * scratch.largest[s, j], noise)
     if before < -near:
         return 0.0
     on = before <= near
     for i in range(S + 1):
-        value = scratch.margin[S * j + i] if i < S else scratch.ends[4 * j + 1]
+        value = scratch.margin[S * j + i] if i < S else scratch.ends[ENDS * j + 1]
         after = h * tables.times[node_set, i] if i < S else h
         if value < -noise:
             return t + (after - t) * (0.5 if on and i == 0 else max(before, 0.0) / (max(before, 0.0) - value))
@@ -70,7 +81,7 @@ def _between_nodes(problem, tables, state, scratch, s, j, node_set, h):
     for i in range(S):
         if values[i] < values[lowest]:
             lowest = i
-    ends = min(scratch.ends[4 * j], scratch.ends[4 * j + 1])
+    ends = min(scratch.ends[ENDS * j], scratch.ends[ENDS * j + 1])
     if values[lowest] > _NEAR * scratch.largest[s, j] or ends < values[lowest]:
         return np.inf
     motion_around(problem, tables, state, scratch, node_set, h, s, lowest)
@@ -89,21 +100,36 @@ def _between_nodes(problem, tables, state, scratch, s, j, node_set, h):
     return h * sigma ** tables.time_exponent[node_set]
 
 
+@inlined
+def _hides(scratch, s, j):
+    """Whether fast blocks, which the nodes do not resolve, may take a margin below zero between them."""
+    ends = scratch.ends[ENDS * j : ENDS * (j + 1)]
+    ripple, lowest = abs(ends[4] - ends[0]) + abs(ends[5] - ends[0]), ends[1]
+    for i in range(S):
+        lowest = min(lowest, scratch.margin[S * j + i])
+    return ripple > scratch.noise[s, j] and lowest < ripple
+
+
 @inner
 def border_ahead(problem, tables, state, scratch, node_set, level):
-    """(time after the begin of the step, element, border) of the first border on it; no element is -1."""
+    """(time after the begin of the step, element, border) of the first border on it.
+
+    The element is -1 if there is none, and `UNRESOLVED` if the step is too long to tell.
+    """
     first, element, border, h = np.inf, -1, -1, tables.contact_step[level]
     for s in range(problem.gap.size):
         count = problem.border_count[s]
         if count == 0:
             continue
-        _margins_on_step(problem, state, scratch, s)
+        _margins_on_step(problem, tables, state, scratch, s, node_set, level)
         for j in range(count):
             if scratch.largest[s, j] <= scratch.noise[s, j]:
                 continue
             time = _crossing(problem, tables, scratch, s, j, node_set, h)
             if time == np.inf:
                 time = _between_nodes(problem, tables, state, scratch, s, j, node_set, h)
+            if time == np.inf and _hides(scratch, s, j):
+                return np.inf, UNRESOLVED, -1
             if time < first:
                 first, element, border = time, s, j
     return first, element, border

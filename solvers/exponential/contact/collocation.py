@@ -274,9 +274,11 @@ def finish_step(problem, tables, state, scratch, node_set, level):
             impulses = load8(weights, 0) * load8(scratch.force[s], 0)
             state.x[size + 2 + 2 * s] += h * sum8(impulses * load8(scratch.motion[s, 1], 0))
             state.x[size + 3 + 2 * s] += h * sum8(impulses)
-            if problem.knots[s, 0] == 0.0:
+            if is_open(problem, s):
+                continue
+            if problem.knots[s, 0] == 0.0 or problem.opening[s] >= 0:
                 step_peaks(problem, tables, state, scratch, node_set, h, s, 1.0)
-            elif not is_open(problem, s):
+            else:
                 state.active[s, PEAK_DELTA] = max(state.active[s, PEAK_DELTA], largest_size(scratch.motion[s, 0]))
                 state.active[s, PEAK_FORCE] = max(state.active[s, PEAK_FORCE], largest_size(scratch.force[s]))
     copy(scratch.x_new, state.x, size)

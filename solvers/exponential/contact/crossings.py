@@ -19,7 +19,7 @@ import numpy as np
 from solvers.compiled.dop853_tableau import STAGES, C
 from solvers.compiled.kernels import call_force, copy, dot, indentation, inlined, inner
 from solvers.compiled.simd import splat8, store8
-from solvers.compiled.state import PEAK_FORCE, T_IN, T, surface_tolerance
+from solvers.compiled.state import PEAK_FORCE, T_IN, T, is_open, surface_tolerance
 from solvers.compiled.sums import above
 from solvers.exponential.contact.many_stops import CONTINUING, ENTERING, add_block_motion, motion_at_nodes, uses_blocks
 from solvers.exponential.contact.node_response import respond, ripple_of
@@ -253,7 +253,11 @@ def before_landing(problem, tables, state, scratch, stop, bends, w, x):
                 return s
             if long and _passes(d, a, slope_a, b, slope_b, lower, upper):
                 return TOO_LONG
-        if not long or segment == 0 or problem.knots[s, 0] < 0.0:
+        if not long or segment == 0 or is_open(problem, s):
+            continue
+        if problem.knots[s, 0] < 0.0:  # no contact of the log but where the law opens
+            if problem.opening[s] >= 0 and slope_a > 0.0 and slope_b < -_TOGETHER * slope_a:
+                return TOO_LONG
             continue
         if slope_a > 0.0 > slope_b and (s != stop or tables.bend[s] != RATE):
             return TOO_LONG

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 from solvers.compiled.dop853_tableau import STAGES
@@ -75,7 +76,7 @@ class Scratch(NamedTuple):
     control: Any  # (6,) of the step control, places named in `step`
     start_motion: Any  # (m, 2) δ and δ̇ at the begin of the step
     margin: Any  # (B S,) margins of an element's borders at points, row by row, B the most of any; see `borders`
-    ends: Any  # (4 B,)
+    ends: Any  # (6 B,)
     fired: Any  # (B,)
     largest: Any  # (m, B) largest margins on the step tried last
     noise: Any  # (m, B) their rounding
@@ -145,6 +146,15 @@ def ripple_of(ripple_weight, alias, x, n):
     error = 0.0
     for b in range(n):
         error += ripple_weight[b] * (alias[b] * abs(x[b]) + alias[n + b] * abs(x[n + b]))
+    return error
+
+
+@reordered
+def rate_ripple_of(ripple_weight, k, alias, x, n):
+    """The same of its rate, m/s."""
+    error = 0.0
+    for b in range(n):
+        error += ripple_weight[b] * math.sqrt(k[b]) * (alias[b] * abs(x[b]) + alias[n + b] * abs(x[n + b]))
     return error
 
 

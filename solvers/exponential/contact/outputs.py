@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from solvers.compiled.kernels import copy, inner
-from solvers.compiled.state import HEAD, PART, RECORDED, SAMPLED, STEPS, T, write_event
+from solvers.compiled.state import HEAD, PART, RECORDED, SAMPLED, STEPS, T, is_open, write_event
 from solvers.exponential.contact.node_response import START
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.peaks import state_peaks, step_peaks
@@ -34,7 +34,8 @@ def end_run(problem, tables, state, scratch, node_set, level, t_end):
     x, share = scratch.stages[START], (t_end - state.now[T]) / tables.contact_step[level]
     place = share ** (1.0 / tables.time_exponent[node_set])
     for s in range(problem.gap.size):
-        if state.segment[s] > 0 and problem.knots[s, 0] == 0.0:
+        logged = problem.knots[s, 0] == 0.0 or (problem.opening[s] >= 0 and not is_open(problem, s))
+        if state.segment[s] > 0 and logged:
             step_peaks(problem, tables, state, scratch, node_set, tables.contact_step[level], s, min(place, 1.0))
     if state.event_record.shape[0]:
         record_forces(problem, state, scratch, PART, t_end, node_set, level)

@@ -29,7 +29,7 @@ from solvers.compiled.state import (
     switch_on_surface,
 )
 from solvers.compiled.sums import combine
-from solvers.exponential.contact.borders import border_ahead
+from solvers.exponential.contact.borders import UNRESOLVED, border_ahead
 from solvers.exponential.contact.collocation import contact_time, end_state, finish_step, solve_forces, step_error
 from solvers.exponential.contact.crossings import choose_sides, first_bend, leaves_segment
 from solvers.exponential.contact.node_response import free_response
@@ -182,6 +182,8 @@ def _attempt(problem, tables, state, scratch, node_set, level, rtol):
     first, bent = first_bend(problem, tables, state, scratch, node_set, level, scratch.control[NEW] > 0, rtol)
     scratch.border[0] = -1
     time, element, border = border_ahead(problem, tables, state, scratch, node_set, level)
+    if element == UNRESOLVED and not bottom:
+        return np.inf, np.inf, -1
     if time < first:
         first, bent, scratch.border[0] = time, element, border
     if bent >= 0:

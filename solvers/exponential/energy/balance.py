@@ -31,7 +31,7 @@ from solvers.exponential.flight import (
 
 _TERM_SUM, _MOVING, _MARK = 9, 10, 11  # rows of Scratch.stages; those before hold a load on the blocks and derivatives
 _EXACT = 1e-17  # share of the last term of a series
-_UNSEEN = 10.0  # times what a polynomial is thought to leave out
+_UNSEEN = 10.0  # times what a polynomial leaves out: aliases of fast blocks need not look like the end of a series
 
 
 @reordered
@@ -212,7 +212,7 @@ def _add_unseen(tables, scratch, node_set, h, s, work, works):
     powers = load8(scratch.force[s], 0) * load8(scratch.motion[s, 1], 0)
     store8(scratch.trial, 0, powers)
     combine(tables.tail[node_set], scratch.trial, S, None, scratch.clipped)
-    most = _UNSEEN * h * unresolved_part(scratch.clipped, largest_size(scratch.trial), S // 2 if node_set == 0 else 1)
+    most = _UNSEEN * h * unresolved_part(scratch.clipped, largest_size(scratch.trial), 1)
     works[2 * s] += min(max(work - h * sum8(load8(weights, 0) * powers), -most), most)
 
 
@@ -237,7 +237,7 @@ def _steady_nodes(problem, tables, energy_tables, state, scratch, kind, place, h
     return gain
 
 
-@inner
+@inlined
 def _of_tones(row, scratch, n, size):
     """A row's sum over the tones at the nodes."""
     values = splat8(0.0)
@@ -247,7 +247,7 @@ def _of_tones(row, scratch, n, size):
     return values
 
 
-@inner
+@inlined
 def _block_forces(problem, tables, state, scratch, node_set, b, y):
     """Forces on a block at the nodes and its state, for plain forces and for that of the stop that enters; signals."""
     size, signal, plain, entering = problem.k.size, splat8(0.0), splat8(0.0), splat8(0.0)
