@@ -30,7 +30,10 @@ def _margins_on_step(problem, state, scratch, s):
     batch[0], batch[1] = delta, indentation(problem, s, scratch.x_new)
     batch[2], batch[3] = delta + surface_tolerance(problem, s, state.x), delta
     batch[4], batch[5] = rate, dot(problem.read_rate[s], scratch.x_new, size)
-    batch[6], batch[7] = rate, rate + rate_tolerance(problem, s, state.x)
+    still = max(
+        rate_tolerance(problem, s, state.x), 1e-14 * scratch.reference_speed[s]
+    )  # what comes to rest turns no more
+    batch[6], batch[7] = rate, rate + still
     margins(problem, state, s, 4, batch[0:4], batch[4:8], scratch.ends)
     margins(problem, state, s, S, scratch.motion[s, 0], scratch.motion[s, 1], scratch.margin)
     for j in range(problem.border_count[s]):
