@@ -99,7 +99,8 @@ class DormandPrince:
 
     Notes
     -----
-    Explicit: steps are bounded by the fastest mode (about hω < 6), and in contact by the stop's stiffness.
+    Explicit: steps are bounded by the fastest mode (about hω < 6), and in contact by the stop's stiffness. Borders of
+    laws with memory are located like entries and exits; those met at one instant are renewed together.
 
     Examples
     --------

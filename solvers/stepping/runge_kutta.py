@@ -55,7 +55,8 @@ class RK4(ConstantStep):
     -----
     Stable for hω < 2√2 on an undamped mode, h|λ| < 2.785 on an overdamped one. Order 4 on smooth motion; through
     contact 4 if the law is smooth between its ends (a linear stop), 2.5 for Hertz, whose force begins as δ^1.5; without
-    location 2 at best, 1 for laws that jump or that latch the entry rate.
+    location 2 at best, 1 for laws that jump or that latch the entry rate. Borders of laws with memory are not located:
+    what a step has passed is renewed at its end, order 2, or 1 where the force jumps at a border.
 
     Examples
     --------

@@ -157,6 +157,8 @@ def numbers(solution: Any, scene: Scene, size: float, duration: float) -> dict[s
     largest = {name: np.zeros(len(scene.system.contacts)) for name in values}
     for name, row in values.items():
         np.maximum.at(largest[name], contact, np.abs(row))
+    log = solution.contacts
+    np.maximum.at(largest["force"], np.asarray(log.stop, dtype=int), np.abs(log.peak_force))  # it opens at zero
     largest["work"] = np.maximum(largest["work"], largest["force"] * largest["delta"])
     spacing = duration / (1.0 + np.bincount(contact, minlength=len(scene.system.contacts)))
     for name, row in values.items():

@@ -23,6 +23,7 @@ UNRESOLVED = -2
 _ON = 1e-9  # margin, in units of the largest of the step, at which a step counts as begun on the border
 _SAME = 1e-11  # the same for the sign of a node
 _TOGETHER = 1e-9  # part of its way at which a border counts as reached when another is landed on
+_REST = 1e-14  # rate, in units of the reference speed, at which what has come to rest turns no more
 _NEAR = 0.2  # lowest node, in units of the largest margin, below which the motion between nodes is looked at
 
 
@@ -39,7 +40,7 @@ def _margins_on_step(problem, tables, state, scratch, s, node_set, level):
         deltas[i], rates[i] = delta, rate
     deltas[1], rates[1] = indentation(problem, s, scratch.x_new), dot(problem.read_rate[s], scratch.x_new, 2 * n)
     deltas[2] += surface_tolerance(problem, s, state.x)
-    rates[3] += rate_tolerance(problem, s, state.x)
+    rates[3] += max(rate_tolerance(problem, s, state.x), _REST * scratch.reference_speed[s])
     deltas[4] += ripple_of(weight, alias, state.x, n)
     rates[5] += rate_ripple_of(weight, problem.k, alias, state.x, n)
     margins(problem, state, s, ENDS, deltas, rates, scratch.ends)
