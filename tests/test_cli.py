@@ -428,6 +428,12 @@ def test_doubtful_numbers(override, message):
     assert any(message in one for one in said(override))
 
 
+def test_a_transient_is_kept_in_whole():
+    sweep = "base={kind = 'sine_sweep', amplitude = 1e-3, omega0 = 60.0, omega1 = 300.0, duration = 600.0}"
+    file = read(EXAMPLE, (sweep, "simulate.discard=0.0"))
+    assert not any("keeps the transient" in one for one in doubts(file, file.scene.reduce(**file.reduce)))
+
+
 def test_a_stop_that_is_too_soft(capsys):
     found = json.loads(printed(capsys, "check", EXAMPLE, "--json", "--set", "stops[0].law.stiffness=1"))
     assert any("so soft that a contact lasts half the lowest period" in one for one in found["warnings"])

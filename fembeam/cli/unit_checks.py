@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fembeam.scene import signals_of
+from fembeam.scene import lasting, signals_of
 
 if TYPE_CHECKING:
     from fembeam.beams import Beam

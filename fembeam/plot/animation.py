@@ -159,8 +159,11 @@ class _Contact(NamedTuple):
 
 def _contacts(run: Run) -> list[_Contact]:
     """All contacts in the order of the log."""
-    rows = zip(run.stops.tolist(), run.on.tolist(), run.kinds.tolist(), strict=True)
-    return [_Contact(*place, body, ON[kind], number, *acts) for place, (body, kind, number), acts in rows]
+    rows: Any = zip(run.stops.tolist(), run.on.tolist(), run.kinds.tolist(), strict=True)
+    return [
+        _Contact(*place, body=body, on=ON[kind], number=number, rotation=rotation, always=always)
+        for place, (body, kind, number), (rotation, always) in rows
+    ]
 
 
 class _Stage:

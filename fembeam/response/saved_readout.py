@@ -59,11 +59,8 @@ def unpacked(about: Mapping[str, Any], arrays: Mapping[str, Any], nodes: list[Ve
     kept: dict[str, Any] = {name: arrays[name] for name in PLAIN}
     held = [(part.z, body) for part, body in parts if isinstance(part, FEATURES["supports"])]
     kept["supports"] = np.array(held, dtype=float).reshape(-1, 2)
-    return Readout(
-        None,
-        arrays["t"],
-        kept | {"base": about["base"], "section_forces": forces, "reactions": (parts, arrays["reactions"])},
-    )
+    kept |= {"base": about["base"], "section_forces": forces, "reactions": (parts, arrays["reactions"])}
+    return Readout(None, arrays["t"], kept)
 
 
 def expected_readout(arrays: Mapping[str, Any]) -> dict[str, Shape]:
