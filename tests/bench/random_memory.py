@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import sys
 import warnings
-from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
@@ -21,7 +20,7 @@ from typing import Any
 
 import numpy as np
 from drawn import Scene, draw_law, draw_signal
-from random_scenes import TooStiffError, Verdict, against, numbers_of, references, run
+from random_scenes import TooStiffError, Verdict, against, numbers_of, references, report, run
 
 import fembeam as fb
 from contacts import KelvinVoigt, Polynomial
@@ -168,7 +167,7 @@ def numbers(solution: Any, scene: Scene, size: float, duration: float) -> dict[s
     return found
 
 
-def judge(seed: int) -> list[tuple[str, Verdict, int]]:
+def judge(seed: int) -> list[tuple[str, Verdict]]:
     """Draw, run and compare, at every tolerance."""
     scene, found = draw(seed), []
     with warnings.catch_warnings(), np.errstate(over="ignore"):
@@ -177,35 +176,17 @@ def judge(seed: int) -> list[tuple[str, Verdict, int]]:
             known = references(shortened(scene))
         except (TooStiffError, SolverError):
             known = None, None
-        count = len(known[0].transitions) if known[0] is not None else 0
         for rtol in TOLERANCES:
             words = f"seed {seed} rtol {rtol:g}: {scene.words}"
-            found.append((words, against(scene, *known, rtol, seed, numbers, disturbed), count))
+            found.append((words, against(scene, *known, rtol, seed, numbers, disturbed)))
     return found
 
 
 def main(count: int = 500, first: int = 0, processes: int = 2) -> int:
     """Run and print; returns the number of failures."""
-    kinds: Counter[str] = Counter()
-    errors: dict[str, list[float]] = {}
-    transitions = 0
     with ProcessPoolExecutor(processes) as pool:
-        for i, verdicts in enumerate(pool.map(judge, range(first, first + count), chunksize=2)):
-            for words, verdict, met in verdicts:
-                passed = verdict.kind in ("fine", "ill-conditioned", "the reference failed")
-                kinds[verdict.kind if passed else "failures"] += 1
-                transitions += met if verdict.kind == "fine" else 0
-                if not passed:
-                    print(f"{words}\n    {verdict.kind[:400]}", flush=True)
-                for name, error in verdict.errors.items():
-                    errors.setdefault(name, []).append(error)
-            if i % 100 == 99:
-                print(f"... {i + 1}: {dict(kinds)}", flush=True)
-    print(f"{count} systems at {len(TOLERANCES)} tolerances, {transitions} transitions compared: {dict(kinds)}")
-    for name, values in errors.items():
-        at = np.quantile(values, [0.5, 0.99, 1.0])
-        print(f"  {name:17s} error in units of rtol × amplification: median {at[0]:.2g}, 99 % {at[1]:.3g}, {at[2]:.3g}")
-    return kinds["failures"]
+        found = pool.map(judge, range(first, first + count), chunksize=2)
+        return report(found, 100, f"{count} systems at {len(TOLERANCES)} tolerances")
 
 
 if __name__ == "__main__":

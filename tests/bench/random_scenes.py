@@ -18,6 +18,7 @@ from __future__ import annotations
 import sys
 import warnings
 from collections import Counter
+from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
@@ -261,27 +262,34 @@ def amplified(
     return amplification
 
 
-def main(count: int = 1000, first: int = 0, processes: int = 2) -> int:
-    """Run and print; returns the number of failures."""
+def report(found: Iterable[list[tuple[str, Verdict]]], every: int, what: str) -> int:
+    """Print failures as they come, then how large the errors were; returns the number of failures."""
     kinds: Counter[str] = Counter()
     errors: dict[str, list[float]] = {}
-    contacts = 0
-    with ProcessPoolExecutor(processes) as pool:
-        for i, (words, verdict) in enumerate(pool.map(judge, range(first, first + count), chunksize=5)):
+    events = 0
+    for i, verdicts in enumerate(found):
+        for words, verdict in verdicts:
             passed = verdict.kind in ("fine", "ill-conditioned", "the reference failed")
             kinds[verdict.kind if passed else "failures"] += 1
-            contacts += verdict.contacts if verdict.kind == "fine" else 0
+            events += verdict.contacts if verdict.kind == "fine" else 0
             if not passed:
                 print(f"{words}\n    {verdict.kind}", flush=True)
             for name, error in verdict.errors.items():
                 errors.setdefault(name, []).append(error)
-            if i % 200 == 199:
-                print(f"... {i + 1}: {dict(kinds)}", flush=True)
-    print(f"{count} scenes, {contacts} contacts compared: {dict(kinds)}")
+        if i % every == every - 1:
+            print(f"... {i + 1}: {dict(kinds)}", flush=True)
+    print(f"{what}, {events} events compared: {dict(kinds)}")
     for name, values in errors.items():
         at = np.quantile(values, [0.5, 0.99, 1.0])
         print(f"  {name:17s} error in units of rtol × amplification: median {at[0]:.2g}, 99 % {at[1]:.3g}, {at[2]:.3g}")
     return kinds["failures"]
+
+
+def main(count: int = 1000, first: int = 0, processes: int = 2) -> int:
+    """Run and print; returns the number of failures."""
+    with ProcessPoolExecutor(processes) as pool:
+        found = pool.map(judge, range(first, first + count), chunksize=5)
+        return report(([verdict] for verdict in found), 200, f"{count} scenes")
 
 
 if __name__ == "__main__":

@@ -77,14 +77,23 @@ def _crossing(problem, tables, scratch, s, j, node_set, h):
 
 @inner
 def _between_nodes(problem, tables, state, scratch, s, j, node_set, h):
-    """The same where a margin is below zero between the nodes around its lowest one only."""
-    values, lowest = scratch.margin[S * j : S * j + S], 0
+    """The same where a margin is below zero between the nodes around one of its minima only.
+
+    A step that begins on the border has its lowest margin there, and may come back to it later.
+    """
+    ends, values = scratch.ends[ENDS * j : ENDS * (j + 1)], scratch.margin[S * j : S * j + S]
     for i in range(S):
-        if values[i] < values[lowest]:
-            lowest = i
-    ends = min(scratch.ends[ENDS * j], scratch.ends[ENDS * j + 1])
-    if values[lowest] > _NEAR * scratch.largest[s, j] or ends < values[lowest]:
-        return np.inf
+        before, after = values[i - 1] if i > 0 else ends[0], values[i + 1] if i < S - 1 else ends[1]
+        if values[i] <= min(before, after, _NEAR * scratch.largest[s, j]):
+            time = _dip(problem, tables, state, scratch, s, j, node_set, h, i)
+            if time < np.inf:
+                return time
+    return np.inf
+
+
+@inner
+def _dip(problem, tables, state, scratch, s, j, node_set, h, lowest):
+    """The same around one node."""
     motion_around(problem, tables, state, scratch, node_set, h, s, lowest)
     margins(problem, state, s, S, scratch.local_motion[DELTAS], scratch.local_motion[RATES], scratch.margin)
     below, deepest = scratch.trial, 0

@@ -303,6 +303,8 @@ def land_on_bend(problem, tables, state, scratch, stop, border, near, rtol, t_en
         before, apart, span = span, value, following
     if not (abs(value) <= 1e-6 * largest and _error(problem, scratch, _PART, rtol) <= 1.0):
         return False
+    if border >= 0 and (value - apart) * (span - before) > 0.0:  # it rises: the margin has been below zero before
+        return False
     if before_landing(problem, tables, state, scratch, stop, True, w, x) != CLEAR:
         return False
     scratch.landed[0], scratch.landed[1] = passed(problem, state, scratch, stop, border, w, x)
