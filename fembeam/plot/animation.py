@@ -161,8 +161,8 @@ def _contacts(run: Run) -> list[_Contact]:
     """All contacts in the order of the log."""
     rows: Any = zip(run.stops.tolist(), run.on.tolist(), run.kinds.tolist(), strict=True)
     return [
-        _Contact(*place, body=body, on=ON[kind], number=number, rotation=rotation, always=always)
-        for place, (body, kind, number), (rotation, always) in rows
+        _Contact(z, push, gap, body, ON[kind], number, rotation, always)
+        for (z, push, gap), (body, kind, number), (rotation, always) in rows
     ]
 
 

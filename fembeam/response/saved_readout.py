@@ -57,7 +57,7 @@ def unpacked(about: Mapping[str, Any], arrays: Mapping[str, Any], nodes: list[Ve
     )
     parts = [_part(dict(words)) for words in about["parts"]]
     kept: dict[str, Any] = {name: arrays[name] for name in PLAIN}
-    held = [(part.z, body) for part, body in parts if isinstance(part, FEATURES["supports"])]
+    held = [(part.z, body) for part, body in parts if type(part) in FEATURES["supports"]]
     kept["supports"] = np.array(held, dtype=float).reshape(-1, 2)
     kept |= {"base": about["base"], "section_forces": forces, "reactions": (parts, arrays["reactions"])}
     return Readout(None, arrays["t"], kept)
