@@ -22,7 +22,7 @@ def describe(law: Law, entry_rate: float = 1.0, mass: float = 1.0) -> str:
         lines += [f"  {name_of(part)}: {part.equation}; {_values(part)}" for part in law.parts]
     else:
         lines.append(f"  parameters: {_values(law)}")
-    if law.memory and not law.one_sided:
+    if law.memory and not law.opens:
         lines += [f"  {_cycle(law)}"] if law.reach > 0.0 else []
     else:
         lines.append(f"  restitution: {_restitution(law, entry_rate, mass)}")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fembeam as fb
-from contacts import Hertz, KelvinVoigt
+from contacts import Hertz, Jenkins, KelvinVoigt, Polynomial
 from fembeam.response import backbone
 
 BEAM = fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01))
@@ -45,6 +45,16 @@ def test_two_linear_stops_with_a_gap():
             through = np.arctan(free * gap / speed) / free
             exact = np.pi / 2 / (turn + through)
         assert backbone(one, 0.5, np.array([amplitude]))[0] == pytest.approx(exact, rel=1e-8)
+
+
+def test_an_element_acts_on_both_sides():
+    """Two stops without a gap are the same; a stiffening offset loads the beam at rest, friction has no backbone."""
+    cubic = Polynomial([1e3, 0.0, 1e11])
+    pair = model(*(fb.Stop(0.5, cubic, side=side) for side in ("below", "above")))
+    one = model(elements=[fb.Element(0.5, cubic)])
+    assert backbone(one, 0.5, AMPLITUDES) == pytest.approx(backbone(pair, 0.5, AMPLITUDES), rel=1e-8)
+    for element in (fb.Element(0.5, cubic, gap=1e-3), fb.Element(0.5, Jenkins(1e4, 1.0))):
+        assert np.isnan(backbone(model(elements=[element]), 0.5, AMPLITUDES)).all()
 
 
 def test_free_vibration_against_a_stiff_stop_has_its_period():

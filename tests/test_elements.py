@@ -398,6 +398,16 @@ def test_units_in_reports(mixed, tmp_path):
     assert "mean entry / m s⁻¹ or rad s⁻¹" in page
 
 
+def test_a_time_history_names_what_acts(mixed):
+    """The place is that of the stop of displacement; the element's moment is drawn though it has no contacts."""
+    figure = fb.plot.time_history(mixed, window=(0.0, 6.0))
+    _, lower = figure.axes
+    assert figure.get_suptitle().startswith("Displacement at mid-beam relative to the frame, contacts of stop 1 shaded")
+    assert lower.get_ylabel() == "force / N or N m"
+    names = {"stop 0 (rotation), z = 0 mm", "stop 1, below, z = 500 mm", "element 2 (rotation), z = 1000 mm"}
+    assert names == {text.get_text() for text in lower.get_legend().get_texts()}
+
+
 def test_a_saved_run_keeps_its_kinds(mixed, tmp_path):
     again = fb.load(mixed.save(tmp_path / "run"))
     assert again.name(2) == "element 2 (rotation)"

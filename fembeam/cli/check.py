@@ -195,6 +195,8 @@ def highest_driven(scene: Any) -> float:
     for signal in signals_of(scene).values():
         if getattr(signal, "band", None) is not None:
             tops.append(float(np.max(signal.band)))
+        elif hasattr(signal, "omega1"):
+            tops.append(max(signal.omega0, signal.omega1))
         elif hasattr(signal, "omega"):
             tops.append(float(np.max(signal.omega)))
         else:
