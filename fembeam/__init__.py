@@ -26,7 +26,7 @@ __version__ = "0.1.0"
 
 _ROOMS = {
     "beams": "Section Taper Beam ModalDamping Rayleigh",
-    "scene": "Clamped Dashpot Guided LumpedMass Pinned PointForce PointMoment Scene Spring Stop Impactor",
+    "scene": "Clamped Dashpot Element Guided LumpedMass Pinned PointForce PointMoment Scene Spring Stop Impactor",
     "excitation": "Harmonic Multisine BandNoise RollOff Record Pulse SineSweep Step",
     "model": "Model Attractor Orbit Branch Run load",
     "response": "response_spectrum",
@@ -42,6 +42,7 @@ __all__ = [
     "Branch",
     "Clamped",
     "Dashpot",
+    "Element",
     "Guided",
     "Harmonic",
     "Impactor",
@@ -83,6 +84,7 @@ if TYPE_CHECKING:
     from fembeam.scene import (
         Clamped,
         Dashpot,
+        Element,
         Guided,
         Impactor,
         LumpedMass,

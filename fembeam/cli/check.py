@@ -16,7 +16,7 @@ import numpy as np
 import solvers
 from fembeam.cli.unit_checks import doubts
 from fembeam.model.mode_table import mode_rows, mode_table
-from fembeam.scene import signals_of
+from fembeam.scene import signals_of, unit_of
 
 if TYPE_CHECKING:
     from fembeam.model import Model
@@ -34,8 +34,8 @@ class Touched:
 
     Attributes
     ----------
-    contacts : in the trial. speed : m/s, the trial's median, else nominal. time : s that such a contact lasts.
-    peak_force : N. periods : contact time over the shortest period kept.
+    contacts : in the trial. speed : m/s (rad/s of rotation), the trial's median, else nominal. time : s that such a
+        contact lasts. peak_force : N or N m. periods : contact time over the shortest period kept.
     """
 
     stop: int
@@ -62,13 +62,25 @@ class Check:
         lines.append(f"\ncorrelation time of the structure 1/min(ζω): {self.correlation_time:.3g} s")
         for one in self.touched:
             seen = f"{one.contacts} contacts in a short trial" if one.contacts else "no contact in a trial"
+            speed, force = (unit_of(of, [self.model.contact_rows[one.stop].rotation]) for of in ("speed", "force"))
             lines.append(
-                f"stop {one.stop}: {seen}; at {one.speed:.3g} m/s a contact lasts {one.time:.3g} s "
-                f"({one.periods:.2g} periods of the highest mode kept), peak force {one.peak_force:.3g} N"
+                f"stop {one.stop}: {seen}; at {one.speed:.3g} {speed} a contact lasts {one.time:.3g} s "
+                f"({one.periods:.2g} periods of the highest mode kept), peak force {one.peak_force:.3g} {force}"
             )
+        if self.stiffened:
+            lowest = ", ".join(f"{omega:.6g}" for omega in self.stiffened[:3])
+            lines.append(f"elements: with their stiffness at u = 0 the lowest frequencies are {lowest} rad/s")
         lines += [f"suggested {what}: {count}" for what, count in self.modes.items()]
         lines += [f"suggested {what}: {step:.2g} s" for what, step in self.steps.items()]
         return "\n".join(lines)
+
+    @property
+    def stiffened(self) -> list[float]:
+        """Frequencies with the stiffness of the elements, rad/s; empty without elements."""
+        if not any(one.always for one in self.model.contact_rows):
+            return []
+        squares = np.linalg.eigvalsh(self.model.system.K + self.model.linear_elements[0])
+        return np.sqrt(np.maximum(squares, 0.0)).tolist()  # type: ignore[no-any-return]
 
     def plain(self) -> dict[str, Any]:
         """For JSON."""
@@ -80,6 +92,7 @@ class Check:
             "suggested_modes": self.modes,
             "suggested_steps": self.steps,
             "warnings": self.warnings,
+            **({"omega_with_elements": self.stiffened} if self.stiffened else {}),
         }
 
 

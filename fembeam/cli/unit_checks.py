@@ -12,8 +12,10 @@ from fembeam.scene import signals_of
 if TYPE_CHECKING:
     from fembeam.beams import Beam
     from fembeam.model import Model
-    from fembeam.scene import Scene
+    from fembeam.scene import Element, Scene, Stop
     from fembeam.scene_file import SceneFile
+
+STEEP = 0.35  # rad; the slope of a beam
 
 
 def doubts(file: SceneFile, model: Model) -> list[str]:
@@ -64,13 +66,20 @@ def of_features(scene: Scene) -> list[str]:
     for i, mass in enumerate(scene.masses):
         if mass.mass > 1000 * weight:
             found.append(f"masses[{i}] = {mass.mass:g} kg is {mass.mass / weight:.2g} times the beam: is it in grams?")
-    for i, stop in enumerate(scene.stops):
-        if abs(stop.gap) > 0.2 * scene.beam.length:
-            found.append(f"stops[{i}]: a gap of {stop.gap:g} m on a beam of {scene.beam.length:g} m: is it in mm?")
+    for i, part in enumerate(scene.acting):
+        at = f"stops[{i}]" if i < len(scene.stops) else f"elements[{i - len(scene.stops)}]"
+        found += [f"{at}: {said}" for said in [_of_gap(part, scene.beam.length)] if said]
     ratios = np.atleast_1d(np.asarray(getattr(scene.damping, "zeta", 0.0), dtype=float))
     if ratios.max() >= 0.5:
         found.append(f"zeta = {ratios.max():g} looks like per cent: 1 is critical damping")
     return found
+
+
+def _of_gap(part: Stop | Element, length: float) -> str:
+    """What is wrong with a gap; small slopes are assumed up to about 20 degrees."""
+    if part.coordinate.rotation:
+        return f"a gap of {part.gap:g} rad is no small slope: is it in degrees?" if abs(part.gap) > STEEP else ""
+    return f"a gap of {part.gap:g} m on a beam of {length:g} m: is it in mm?" if abs(part.gap) > 0.2 * length else ""
 
 
 def of_loads(scene: Scene, model: Model) -> list[str]:

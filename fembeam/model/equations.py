@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from dataclasses import fields
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -16,14 +17,19 @@ from numpy.typing import ArrayLike
 import reduction
 import solvers
 from fembeam.model.shapes import Shapes, Vector
-from fembeam.scene import contact_rows, loads, weight
+from fembeam.scene import contact_rows, loads, static_rows, tangent, weight
 from fembeam.scene.contact_rows import ContactRow
 
 if TYPE_CHECKING:
     from fembeam.model.section_forces import SectionForces
     from fembeam.scene import Matrices, Scene
 
-SEEN = ("forces", "springs", "bodies", "impactors")  # parts of a scene besides stops that a system is made of
+SEEN = ("forces", "springs", "bodies", "impactors")  # parts of a scene besides those with laws that make a system
+
+
+def _placed(part: Any) -> tuple[Any, ...]:
+    """Where and how a stop or element acts: all of it but its law and gap."""
+    return tuple(getattr(part, f.name) for f in fields(part) if f.name not in ("law", "gap"))
 
 
 class ModalEquations:
@@ -88,8 +94,8 @@ class ModalEquations:
 
     @cached_property
     def static_share(self) -> Vector:
-        """Σ (bᵀφ_i)²/ω_i² / bᵀK⁻¹b at every stop, then every force (m,)."""
-        rows, full = self.matrices.interpolation(self.scene.loaded_places), self.matrices
+        """Σ (bᵀφ_i)²/ω_i² / bᵀK⁻¹b at every stop, every element, then every force (m,)."""
+        rows, full = static_rows(self.scene, self.matrices), self.matrices
         return reduction.static_share(self.basis, full.M, full.K, rows.T, full.root) if rows.shape[0] else np.zeros(0)
 
     def phi(self, z: ArrayLike, derivative: int = 0, body: int = 0) -> Vector:
@@ -126,7 +132,7 @@ class ModalEquations:
         C = C + self.basis.project_matrix(self.matrices.dashpots)
         same = self.contact_rows if scene is self.scene else contact_rows(scene, self.matrices)
         pairs = zip(self.directions, same, strict=True)
-        contacts = [solvers.Contact(direction, one.law, one.gap) for direction, one in pairs]
+        contacts = [solvers.Contact(direction, one.law, one.gap, one.always) for direction, one in pairs]
         rows = [(self.basis.project(row.T)[:, 0], signal) for row, signal in loads(scene, self.matrices)]
         return solvers.System(np.eye(n), C, np.diag(self.omega**2), contacts, [*rows, *self._frame_loads(scene)])
 
@@ -136,22 +142,30 @@ class ModalEquations:
         return moved + ([] if scene.gravity == 0.0 else [(-self.participation, weight(scene))])
 
     def system_like(self, scene: Scene) -> solvers.System:
-        """The same as `system_of`, quicker where only base motion, gaps and laws of the scene's own stops differ."""
-        own, count, frame = self.system, len(self.scene.stops), self._frame_loads(scene)
-        parts = zip(scene.stops, self.scene.stops, strict=True)
+        """The same as `system_of`, quicker where only base motion, gaps and laws of its stops and elements differ."""
+        own, frame = self.system, self._frame_loads(scene)
+        parts, known = scene.acting, self.scene.acting
         if (
-            any((new.z, new.side, new.on) != (old.z, old.side, old.on) for new, old in parts)
+            any(_placed(new) != _placed(old) for new, old in zip(parts, known, strict=True))
             or any(getattr(scene, name) != getattr(self.scene, name) for name in SEEN)
             or (scene.base is None, scene.gravity == 0.0) != (self.scene.base is None, self.scene.gravity == 0.0)
         ):
             return self.system_of(scene)
         contacts = [
-            contact if new is old else solvers.Contact(contact.direction, new.law, new.gap)
-            for contact, new, old in zip(own.contacts, scene.stops, self.scene.stops, strict=False)
+            contact if new is old else solvers.Contact(contact.direction, new.law, new.gap, new.always)
+            for contact, new, old in zip(own.contacts, parts, known, strict=False)
         ]
         kept = own.loads[: len(own.loads) - len(frame)]
         moved = [(vector, signal) for (vector, _), (_, signal) in zip(own.loads[len(kept) :], frame, strict=True)]
-        return own.like([*contacts, *own.contacts[count:]], [*kept, *moved])
+        return own.like([*contacts, *own.contacts[len(known) :]], [*kept, *moved])
+
+    @cached_property
+    def linear_elements(self) -> tuple[Vector, Vector]:
+        """Stiffness and damping (n, n) of the elements at d = -gap, nothing deflected: Σ w ∂F/∂d wᵀ, Σ w ∂F/∂ḋ wᵀ."""
+        always = [(w, one) for w, one in zip(self.directions, self.contact_rows, strict=True) if one.always]
+        slopes = np.array([tangent(one.law, -one.gap) for _, one in always]).reshape(-1, 2)
+        W = np.array([w for w, _ in always]).reshape(-1, len(self.omega))
+        return (W.T * slopes[:, 0]) @ W, (W.T * slopes[:, 1]) @ W
 
     @property
     def touches(self) -> list[ContactRow]:

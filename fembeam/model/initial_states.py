@@ -13,12 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 import reduction
+from contacts.path import borders
+from fembeam.scene import tangent
 from fembeam.support import require, require_finite
 
 if TYPE_CHECKING:
     from fembeam.model.equations import ModalEquations
     from fembeam.model.model import Field, Model
     from fembeam.scene import Matrices
+    from fembeam.scene.contact_rows import ContactRow
 
 Vector = NDArray[np.float64]
 
@@ -117,19 +120,20 @@ def _settled(model: Model, load: Vector, free: NDArray[np.bool_]) -> Vector:
     τ doubles while it goes well; the damping carries a body that nothing holds yet to the contact that will.
     """
     K, f, W = model.omega[free] ** 2, load[free], model.directions[:, free]
-    gaps = np.array([contact.gap for contact in model.contact_rows])
-    laws = [contact.law for contact in model.contact_rows]
+    rows = model.contact_rows
+    gaps = np.array([contact.gap for contact in rows])
     q = np.zeros(len(f))
-    forces, slopes = _pushed(laws, -W @ q - gaps)
+    forces, slopes = _pushed(rows, -W @ q - gaps)
     residual = f + forces @ W - K * q
     tau = 1e-3 / max(K.max(initial=0.0), 1e-6)
     for _ in range(MOST_STEPS):
         scale = np.abs(f).max(initial=0.0) + np.abs(forces[:, None] * W).max(initial=0.0) + np.abs(K * q).max(initial=0)
         if np.abs(residual).max(initial=0.0) <= SETTLED * scale:
+            _check_memory(rows, -W @ q - gaps)
             return q
         J = np.diag(1 / tau + K) + (W.T * slopes) @ W
         trial = q + np.linalg.solve(J, residual)
-        trial_forces, trial_slopes = _pushed(laws, -W @ trial - gaps)
+        trial_forces, trial_slopes = _pushed(rows, -W @ trial - gaps)
         after = f + trial_forces @ W - K * trial
         if np.linalg.norm(after) <= (1 + 1e-12) * np.linalg.norm(residual):
             q, forces, slopes, residual, tau = trial, trial_forces, trial_slopes, after, min(2 * tau, 1e300)
@@ -143,12 +147,24 @@ def _settled(model: Model, load: Vector, free: NDArray[np.bool_]) -> Vector:
     )
 
 
-def _pushed(laws: list, delta: Vector) -> tuple[Vector, Vector]:
-    """Static forces (m,) and their slopes ∂F/∂δ (m,), the slopes by differences."""
-    force, slope = np.zeros(len(laws)), np.zeros(len(laws))
-    for i, (law, d) in enumerate(zip(laws, delta, strict=True)):
-        if d > 0:
+def _check_memory(rows: list[ContactRow], delta: Vector) -> None:
+    """Raise AccuracyError when an element with memory would pass a border, such as slip, on the way."""
+    for row, d in zip(rows, delta, strict=True):
+        if row.remembers and np.any(borders(row.law, np.array([d]), 0.0, row.law.parameters) < 0):
+            raise reduction.AccuracyError(
+                f"the element at z = {row.z} m slips or yields before equilibrium in Model.equilibrium, and where it "
+                "rests depends on how it gets there; simulate from rest instead, with damping"
+            )
+
+
+def _pushed(rows: list[ContactRow], delta: Vector) -> tuple[Vector, Vector]:
+    """Static forces (m,) and their slopes ∂F/∂δ (m,), of stops by differences."""
+    force, slope = np.zeros(len(rows)), np.zeros(len(rows))
+    for i, (row, d) in enumerate(zip(rows, delta, strict=True)):
+        if row.always:
+            force[i], slope[i] = float(row.force(d)), max(tangent(row.law, d)[0], 0.0)
+        elif d > 0:
             step = 1e-6 * d
-            low, force[i], high = (float(f) for f in law.force(np.array([d - step, d, d + step]), 0.0, 1.0))
+            low, force[i], high = (float(f) for f in row.force(np.array([d - step, d, d + step])))
             slope[i] = max((high - low) / (2 * step), 0.0)
     return force, slope

@@ -52,7 +52,8 @@ class Model(Printed, ModalEquations):
     shapes : φ(z) of the scene's own beam; call ``model.phi(z)``. others : the same for its `bodies`.
     counts : of modes and of static shapes, (modes, static), of each beam.
     way : arguments of `Scene.reduce` that make it again, with mode numbers instead of criteria.
-    static_share : part of the static compliance that the model keeps at every stop, then at every force; 1 is all.
+    static_share : part of the static compliance that the model keeps at every stop, every element, then at every
+        force; 1 is all.
     """
 
     scene: Scene
@@ -208,7 +209,7 @@ class Model(Printed, ModalEquations):
         """Steady displacement per unit of a harmonic input, complex, of the linear scene: its contacts stay open.
 
         (K + iωC - ω²) q = v,   H(ω) = φ(z)·q;   v = ω² Γ of the base, φ(z_f) of a force. Dashpots and static shapes
-        are in C and in the coordinates.
+        are in C and in the coordinates; elements act with their stiffness and damping at u = 0.
 
         Parameters
         ----------

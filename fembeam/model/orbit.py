@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import solvers
-from fembeam.scene import signals_of
+from fembeam.scene import signals_of, unit_of
 from fembeam.support import Part, Printed, require
 from solvers.orbits import periodic_orbit as periodic
 from solvers.orbits import shooting
@@ -104,7 +104,10 @@ class Orbit(Printed):
         names = "t_in", "t_out", "speed_in", "peak_force"
         columns = [getattr(self.contacts, name).tolist() for name in names]
         rows = [(f"stop {stop}", *row) for stop, *row in zip(self.contacts.stop, *columns, strict=True)]
-        log: list[Part] = [(("contact", "t_in / s", "t_out / s", "entry speed / m/s", "peak force / N"), rows)]
+        speed, force = (unit_of(of, [one.rotation for one in self.model.contact_rows]) for of in ("speed", "force"))
+        log: list[Part] = [
+            (("contact", "t_in / s", "t_out / s", f"entry speed / {speed}", f"peak force / {force}"), rows)
+        ]
         return [repr(self), *doubt, table, *(log if rows else [])]
 
     def __repr__(self) -> str:

@@ -12,7 +12,7 @@ from scipy import sparse
 import reduction
 from fembeam.model.model import Model
 from fembeam.model.shapes import Shapes
-from fembeam.scene import Matrices, loaded, watched
+from fembeam.scene import LocalCoordinate, Matrices, loaded, watched
 from fembeam.support import require
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def reduced(
 
 
 def _of_beam(
-    beam: Matrices, places: list[tuple[float, int]], chosen: tuple[int, ...], residual: bool, interface: bool
+    beam: Matrices, places: list[LocalCoordinate], chosen: tuple[int, ...], residual: bool, interface: bool
 ) -> reduction.Basis:
     """The basis of one beam by itself, static shapes where it is loaded included."""
     if interface:
@@ -74,9 +74,9 @@ def _of_beam(
     return basis
 
 
-def _rows(beam: Matrices, places: list[tuple[float, int]]) -> sparse.csr_matrix:
-    """Rows of u or u_z at (z, derivative)."""
-    return sparse.vstack([beam.interpolation(z, derivative) for z, derivative in places], format="csr")
+def _rows(beam: Matrices, places: list[LocalCoordinate]) -> sparse.csr_matrix:
+    """Rows of u or u_z, or of their difference between two places: their static shape is that of opposite loads."""
+    return sparse.vstack([place.row(beam) for place in places], format="csr")
 
 
 def _continued(chosen: tuple[int, ...], count: int) -> tuple[int, ...]:
@@ -84,9 +84,9 @@ def _continued(chosen: tuple[int, ...], count: int) -> tuple[int, ...]:
     return (*chosen, *range(chosen[-1] + 1, chosen[-1] + 1 + count - len(chosen)))
 
 
-def _oriented(basis: reduction.Basis, beam: Matrices, z: float | None) -> reduction.Basis:
-    """Positive at z, or where each mode moves most."""
-    return reduction.oriented(basis, beam.interpolation(beam.nodes if z is None else z))
+def _oriented(basis: reduction.Basis, beam: Matrices, place: LocalCoordinate | None) -> reduction.Basis:
+    """Positive at a place, or where each mode moves most."""
+    return reduction.oriented(basis, beam.interpolation(beam.nodes) if place is None else place.row(beam))
 
 
 def _joined(bases: list[reduction.Basis], matrices: Matrices) -> reduction.Basis:
@@ -148,8 +148,10 @@ def _check_static(scene: Scene, residual: bool, interface: bool) -> None:
     """Raise ValueError when static shapes are asked for twice, or have no place to be loaded at."""
     require(not (residual and interface), "residual and interface exclude each other", True, "Scene.reduce",
             "keep one: either makes the model exact for slow loads at its places")  # fmt: skip
-    require(not (residual or interface) or bool(loaded(scene, 0)), "static shapes need a stop, a force or a dashpot", 0,
-            "Scene.reduce", "leave out residual and interface")  # fmt: skip
+    known = [bool(loaded(scene, body)) for body in range(1 + len(scene.bodies))]
+    met = all(known) if interface else any(known) or not residual
+    require(met, "static shapes need a stop, a force or a dashpot, or an element", known, "Scene.reduce",
+            "leave out residual and interface")  # fmt: skip
 
 
 def _enough(scene: Scene, elements: int | None, omega_max: float | None, mass_share: float | None) -> int:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import solvers
 from fembeam.model.shapes import Shapes
-from fembeam.scene import Source
+from fembeam.scene import Source, unit_of
 from fembeam.support import Part, Printed, require
 from solvers.problem import counted
 
@@ -58,6 +58,8 @@ class Run(Printed):
     others: tuple[Shapes, ...] = ()  # of the further beams
     source: Source | None = None  # of a run made from a scene file
     versions: dict[str, str] = field(default_factory=dict)  # that made a run read from a file
+    borders: Callable[[], Any] | None = field(default=None, repr=False)  # what `transitions` are made by
+    kinds: Vector = field(default_factory=lambda: np.zeros((0, 2), dtype=bool))  # (m, 2): of rotation, always acting
 
     def __repr__(self) -> str:
         reached = f"to t = {self.t[-1]:g} s" if len(self.t) else "without samples"
@@ -72,6 +74,16 @@ class Run(Printed):
     def energy(self) -> solvers.Energy:
         """The energy balance."""
         return self.ledger()
+
+    @cached_property
+    def transitions(self) -> Any:
+        """Borders that laws with memory passed, see `solvers.problem.Transitions`: times of stick, slip and yield.
+
+        ValueError for a run read from a file.
+        """
+        if self.borders is None:
+            raise ValueError("a run read from a file has no transitions; simulate again")
+        return self.borders()
 
     @property
     def scene_file(self) -> SceneFile:
@@ -93,17 +105,11 @@ class Run(Printed):
         if not solution.status.good:
             status += f" (t = {solution.t[-1]:g} s)" if len(solution.t) else " (before the first sample)"
         return cls(
-            *(
-                solution.t,
-                solution.q,
-                solution.q_dot,
-                solution.contacts,
-                solution.ledger,
-                status,
-                solution.cost,
-            ),
+            *(solution.t, solution.q, solution.q_dot, solution.contacts, solution.ledger, status, solution.cost),
             *(model.shapes, stops, model.directions, strikers, repr(model.scene), model),
             others=model.others,
+            borders=solution.borders,
+            kinds=np.array([(one.rotation, one.always) for one in model.contact_rows], dtype=bool).reshape(-1, 2),
         )
 
     @property
@@ -255,16 +261,28 @@ class Run(Printed):
                 "count from 0")  # fmt: skip
         return coordinates[:, coordinates.shape[1] - count + impactor] / np.sqrt(self.strikers[impactor])
 
+    def unit(self, quantity: str, stop: int | None = None) -> str:
+        """Unit of "indentation", "speed", "force" or "impulse" of a stop; None: of a column that all of them share."""
+        return unit_of(quantity, self.kinds[:, 0] if stop is None else self.kinds[[self._stop(stop)], 0])
+
+    def name(self, stop: int) -> str:
+        """What tables call a stop or element: "stop 0", "element 1", "stop 2 (rotation)"."""
+        rotation, always = self.kinds[self._stop(stop)]
+        return f"{'element' if always else 'stop'} {stop}" + " (rotation)" * bool(rotation)
+
     def indentation(self, stop: int = 0) -> Vector:
-        """δ(t) (k,) of a stop, m; negative while it is open. Contacts of impactors count on after the stops."""
+        """δ(t) (k,) of a stop, m or rad; negative while it is open. Elements, then impactors, count on after the stops.
+
+        Of an element its deformation d(t).
+        """
         return -self.q @ self.directions[self._stop(stop)] - self.stops[stop, 2]
 
     def indentation_rate(self, stop: int = 0) -> Vector:
-        """δ̇(t) (k,) of a stop, m/s: of both bodies where the stop moves."""
+        """δ̇(t) (k,) of a stop or element, m/s or rad/s: of both bodies where the stop moves."""
         return -self.q_dot @ self.directions[self._stop(stop)]
 
     def force(self, stop: int = 0, mean: bool = False) -> Vector:
-        """Contact force (k,) of a stop, N, from its law and the entry rate latched at the time.
+        """Contact force (k,) of a stop, N or N m, from its law and the entry rate latched at the time; of an element F.
 
         ``mean``: over each sample (halfway to its neighbours) instead of at it, so that contacts shorter than a sample
         are seen: the trapezoidal rule over the samples gives the log's impulses exactly.
@@ -287,21 +305,11 @@ class Run(Printed):
         """Forces (m, k)."""
         if self.stored_forces is not None:
             return self.stored_forces
-        assert self.model is not None
-        forces = [self._force_of(s, contact.law) for s, contact in enumerate(self.model.contact_rows)]
-        return np.array(forces).reshape(len(forces), len(self.t))
+        from fembeam.response import contact_force
 
-    def _force_of(self, stop: int, law: Any) -> Vector:
-        """Force history of one stop."""
-        mine = self.contacts.stop == stop
-        entered, speed = self.contacts.t_in[mine], self.contacts.speed_in[mine]
-        if not len(entered):
-            return np.zeros(len(self.t))
-        order = np.argsort(entered)
-        last = np.searchsorted(entered[order], self.t, side="right") - 1
-        entry_rate = np.maximum(np.abs(speed[order])[np.maximum(last, 0)], law.entry_rate_floor)
-        delta = np.where(last >= 0, self.indentation(stop), -1.0)
-        return np.asarray(law.force(delta, -self.q_dot @ self.directions[stop], entry_rate))
+        assert self.model is not None
+        forces = [contact_force(self, s, contact) for s, contact in enumerate(self.model.contact_rows)]
+        return np.array(forces).reshape(len(forces), len(self.t))
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write everything to one ``.npz`` file, whole or not at all; read it with `load`."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fembeam.model.watched_places import places
+from fembeam.scene import unit_of
 from fembeam.support import require
 from solvers.problem import dataframe, optional
 
@@ -19,19 +20,23 @@ if TYPE_CHECKING:
     from fembeam.model.run import Run, Vector
     from fembeam.support import Part
 
-CONTACT_UNITS = {
-    "stop": "", "t_in": "s", "t_out": "s", "speed_in": "m/s", "speed_out": "m/s", "peak_indentation": "m",
-    "peak_force": "N", "impulse": "N s", "energy_loss": "J", "entry_rate_clipped": "",
-}  # fmt: skip
+CONTACT_UNITS = {"t_in": "s", "t_out": "s", "energy_loss": "J"}
+CONTACT_QUANTITIES = {"speed_in": "speed", "speed_out": "speed", "peak_indentation": "indentation",
+                      "peak_force": "force", "impulse": "impulse"}  # fmt: skip
 DIGITS = "%.12g"
 
 
 def write(run: Run, folder: Path, stride: int = 1) -> list[Path]:
     """Write `histories.csv` and `contacts.csv`; see `Run.to_csv`."""
     kept = histories(run, stride)
-    units = ((name, CONTACT_UNITS.get(name, ""), column) for name, column in run.contacts.arrays().items())
+    units = ((name, _unit_of_column(run, name), column) for name, column in run.contacts.arrays().items())
     log = {f"{name} [{unit}]" if unit else name: column for name, unit, column in units}
     return [_write(folder / "histories.csv", kept), _write(folder / "contacts.csv", log)]
+
+
+def _unit_of_column(run: Run, name: str) -> str:
+    """Unit of a column of the log; "m or rad" where stops of both kinds share it."""
+    return run.unit(CONTACT_QUANTITIES[name]) if name in CONTACT_QUANTITIES else CONTACT_UNITS.get(name, "")
 
 
 def histories(run: Run, stride: int) -> dict[str, Vector]:
@@ -41,7 +46,8 @@ def histories(run: Run, stride: int) -> dict[str, Vector]:
     for name, z in places(run.shapes).items():
         columns |= {f"displacement {name} [m]": run.displacement(z), f"velocity {name} [m/s]": run.velocity(z)}
     for stop in range(len(run.stops)):
-        columns |= {f"indentation {stop} [m]": run.indentation(stop), f"force {stop} [N]": run.force(stop)}
+        for name, history in (("indentation", run.indentation), ("force", run.force)):
+            columns[f"{name} {stop} [{run.unit(name, stop)}]"] = history(stop)
     return {name: column[::stride] for name, column in columns.items()}
 
 
@@ -56,8 +62,8 @@ def to_xarray(run: Run, z: ArrayLike | None = None) -> Any:
     variables = {
         "displacement": (("t", "z"), run.displacement(place), {"units": "m"}),
         "velocity": (("t", "z"), run.velocity(place), {"units": "m/s"}),
-        "indentation": (("t", "stop"), _side_by_side(run, run.indentation), {"units": "m"}),
-        "force": (("t", "stop"), _side_by_side(run, run.force), {"units": "N"}),
+        "indentation": (("t", "stop"), _side_by_side(run, run.indentation), {"units": run.unit("indentation")}),
+        "force": (("t", "stop"), _side_by_side(run, run.force), {"units": run.unit("force")}),
         "q": (("t", "coordinate"), run.q, {"units": "m √kg"}),
         "q_dot": (("t", "coordinate"), run.q_dot, {"units": "m √kg/s"}),
     }
@@ -83,14 +89,16 @@ def _write(target: Path, columns: Mapping[str, Vector]) -> Path:
 def parts(run: Run) -> list[Part]:
     """What print shows of a run: how it ended, its signals, the contacts of each stop."""
     signals = {f"displacement, {name}": run.displacement(z) for name, z in places(run.shapes).items()}
-    signals |= {f"indentation, stop {i}": run.indentation(i) for i in range(len(run.stops))}
+    signals |= {f"indentation, {run.name(i)}": run.indentation(i) for i in range(len(run.stops))}
     moved = [(name, *map(float, (x.mean(), x.std(), x.min(), x.max()))) for name, x in signals.items() if len(x)]
     log, rows = run.contacts, []
     for stop in range(len(run.stops)):
         mine = log.stop == stop
-        force, speed = log.peak_force[mine], log.speed_in[mine]
-        numbers = (float(force.max()), float(force.mean()), float(speed.mean())) if mine.any() else (None,) * 3
-        rows.append((f"stop {stop}", int(mine.sum()), *numbers))
-    found: list[Part] = [repr(run), (("", "mean / m", "std / m", "min / m", "max / m"), moved)]
-    head = "", "contacts", "largest force / N", "mean peak force / N", "mean entry speed / m/s"
+        peak, entry = log.peak_force[mine], log.speed_in[mine]
+        numbers = (float(peak.max()), float(peak.mean()), float(entry.mean())) if mine.any() else (None,) * 3
+        if not run.kinds[stop, 1]:
+            rows.append((run.name(stop), int(mine.sum()), *numbers))
+    length, force, speed = unit_of("indentation", [False, *run.kinds[:, 0]]), run.unit("force"), run.unit("speed")
+    found: list[Part] = [repr(run), (("", *(f"{name} / {length}" for name in ("mean", "std", "min", "max"))), moved)]
+    head = "", "contacts", f"largest force / {force}", f"mean peak force / {force}", f"mean entry speed / {speed}"
     return [*found, (head, rows)] if rows else found

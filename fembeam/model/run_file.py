@@ -32,6 +32,7 @@ UNITS = {
     "contact_energy_loss, energy_*": "J",
     "shapes, directions": "1/√kg",
     "strikers": "kg",
+    "kinds": "(of rotation, always acting) of each contact: rad for m, N m for N where it is of rotation",
 }
 
 
@@ -51,7 +52,7 @@ def save(run: Run, path: Path) -> Path:
     carried = run.source.files.values() if run.source else ()
     arrays = {
         **{"t": run.t, "q": run.q, "q_dot": run.q_dot, "force": run._forces},
-        **{"stops": run.stops, "directions": run.directions, "strikers": run.strikers},
+        **{"stops": run.stops, "kinds": run.kinds, "directions": run.directions, "strikers": run.strikers},
         **{"nodes": run.shapes.nodes, "shapes": run.shapes.values},
         **{f"nodes_{i}": shapes.nodes for i, shapes in enumerate(run.others, 1)},
         **{f"shapes_{i}": shapes.values for i, shapes in enumerate(run.others, 1)},
@@ -99,6 +100,7 @@ def load(path: str | os.PathLike[str]) -> Run:
 
 def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run:
     """A run from the contents of its file."""
+    arrays.setdefault("kinds", np.zeros((len(arrays["stops"]), 2), dtype=bool))  # of earlier versions
     saved_arrays.check({name: array for name, array in arrays.items() if not name.startswith("file_")})
     source = None
     if given := about.get("scene_file"):
@@ -121,4 +123,5 @@ def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run
         others=tuple(Shapes(arrays[f"nodes_{i}"], arrays[f"shapes_{i}"]) for i in range(1, bodies)),
         source=source,
         versions=about.get("versions", {}),
+        kinds=arrays["kinds"].astype(bool),
     )

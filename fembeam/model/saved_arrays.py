@@ -1,8 +1,8 @@
 """Consistency of the arrays of a saved run; a truncated or edited file is refused with the reason.
 
 k samples, n coordinates, m contacts, b nodes of a beam, c entries of the log:
-t (k,), q, q_dot (k, n), force (m, k), stops (m, 3), directions (m, n), strikers (i,), nodes (b,), shapes (2b, n),
-contact_* (c,), energy_* (k,) but energy_initial.
+t (k,), q, q_dot (k, n), force (m, k), stops (m, 3), kinds (m, 2), directions (m, n), strikers (i,), nodes (b,),
+shapes (2b, n), contact_* (c,), energy_* (k,) but energy_initial.
 """
 
 from __future__ import annotations
@@ -35,6 +35,7 @@ def expected(arrays: Mapping[str, Any]) -> dict[str, Shape]:
     """{name: shape} that follow from q, stops, the nodes and the entries of the log."""
     (k, n), m, entries = arrays["q"].shape, len(arrays["stops"]), arrays["contact_stop"].size
     shapes: dict[str, Shape] = {"t": (k,), "q_dot": (k, n), "force": (m, k), "stops": (m, 3), "directions": (m, n)}
+    shapes["kinds"] = (m, 2)
     shapes["strikers"] = (min(arrays["strikers"].size, n),)
     shapes |= {name: (entries,) for name in arrays if name.startswith("contact_")}
     shapes |= {name: () if name == "energy_initial" else (k,) for name in arrays if name.startswith("energy_")}

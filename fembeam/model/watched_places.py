@@ -21,6 +21,6 @@ def places(shapes: Shapes) -> dict[str, float]:
 
 
 def observed(model: Model) -> float:
-    """The place to watch: the first stop, else the tip."""
-    stops = model.scene.stops
-    return stops[0].z if stops else next(iter(places(model.shapes).values()))
+    """The place to watch: the first stop or element of displacement, else the tip."""
+    acting = [part.z for part in model.scene.acting if not part.coordinate.rotation]
+    return acting[0] if acting else next(iter(places(model.shapes).values()))

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from fembeam.model import Run
+    from fembeam.scene.contact_rows import ContactRow
 
 Vector = NDArray[np.float64]
 
@@ -104,6 +105,11 @@ def _samples(run: Run, window: tuple[float, float] | None, frames: int) -> NDArr
     return inside[np.unique(np.linspace(0, len(inside) - 1, frames).round().astype(int))]
 
 
+def _one_sided(contact: ContactRow) -> bool:
+    """Whether it is a stop on the frame that the beam runs into."""
+    return contact.on[0] == "frame" and not (contact.rotation or contact.always)
+
+
 class _Stage:
     """The figure and what moves in it."""
 
@@ -114,7 +120,8 @@ class _Stage:
         self.run, self.samples, self.contact_rows = run, samples, run.model.contact_rows
         self.beams, self.strikers = heights(run.model.scene)
         self.forces = [run.force(i)[samples] for i in range(len(self.contact_rows))]
-        self.largest = max([float(np.abs(force).max()) for force in self.forces], default=0.0)
+        pushes = [f for f, one in zip(self.forces, self.contact_rows, strict=True) if not one.rotation]
+        self.largest = max([float(np.abs(force).max()) for force in pushes], default=0.0)
         self.lines = self._displaced()
         step = float(np.median(np.diff(run.t[samples])))
         self.speed = "" if fps is None else f", {1 / (step * fps):.3g} times slower than real"
@@ -149,7 +156,7 @@ class _Stage:
             self.force_axis.plot(self.run.t[self.samples], force, color=f"C{i}", label=self._name(i))
         self.cursor = self.force_axis.axvline(self.run.t[self.samples[0]], color=ORANGE)
         self.force_axis.set_xlabel("time / s")
-        self.force_axis.set_ylabel("contact force / N")
+        self.force_axis.set_ylabel(f"contact force / {self.run.unit('force')}")
         self.force_axis.set_xlim(*self.run.t[self.samples[[0, -1]]])
         if len(self.forces) > 1:
             self.figure.legend(*self.force_axis.get_legend_handles_labels(), loc="outside lower center", ncols=4)
@@ -160,13 +167,15 @@ class _Stage:
     def _name(self, number: int) -> str:
         """A contact as text."""
         kind, which = self.contact_rows[number].on
+        always = "element" if self.contact_rows[number].always else ""
         place = f"z = {1e3 * self.contact_rows[number].z:.4g} mm"
-        return f"{ {'frame': 'stop', 'body': 'beams', 'impactor': f'impactor {which}'}[kind] }, {place}"
+        named = {"frame": "stop", "body": "beams", "impactor": f"impactor {which}"}[kind]
+        return f"{always or named}, {place}"
 
     def _limits(self, axis: Axes) -> float:
         """Set the view, on the beams: an impactor may leave it; returns its height in mm."""
         rows = [line for _, line in self.lines] + [np.array(self.strikers)] * bool(self.strikers)
-        stops = [-contact.push * contact.gap for contact in self.contact_rows if contact.on[0] == "frame"]
+        stops = [-contact.push * contact.gap for contact in self.contact_rows if _one_sided(contact)]
         low = 1e3 * min(*(float(row.min()) for row in rows), *stops, 0.0)
         high = 1e3 * max(*(float(row.max()) for row in rows), *stops, 0.0)
         spread = max(high - low, 1e-9)
@@ -203,7 +212,10 @@ class _Stage:
             for support in body.supports:
                 axis.plot(1e3 * support.z, 1e3 * height, "s", color="black", markersize=7, clip_on=False)
         for contact in self.contact_rows:
-            if contact.on[0] == "frame":
+            if contact.on[0] == "frame" and not _one_sided(contact):
+                axis.plot(1e3 * contact.z, 1e3 * self.beams[contact.body], "D", color="black", markersize=7,
+                          clip_on=False, zorder=1)  # fmt: skip
+            elif _one_sided(contact):
                 at = 1e3 * (self.beams[contact.body] - contact.push * contact.gap)
                 axis.plot(1e3 * contact.z, at, marker="^" if contact.push > 0 else "v", color="black", markersize=9,
                           transform=self._beside(-contact.push, 6.0), clip_on=False, zorder=1)  # fmt: skip
@@ -223,7 +235,7 @@ class _Stage:
         return [*self.curves, *self.balls, self.arrows, self.cursor]
 
     def _point(self, number: int) -> None:
-        """An arrow for every contact force, ending at its place on the beam."""
+        """An arrow for every contact force, ending at its place on the beam; moments have none."""
         if not self.contact_rows:
             return
         ends, lengths = [], []
@@ -231,7 +243,7 @@ class _Stage:
             along, line = self.lines[contact.body]
             ends.append((1e3 * contact.z, 1e3 * float(np.interp(contact.z, along, line[number]))))
             share = float(force[number]) / self.largest if self.largest > 0 else 0.0
-            lengths.append(contact.push * share * STAY * self.span if share else np.nan)
+            lengths.append(contact.push * share * STAY * self.span if share and not contact.rotation else np.nan)
         at: Any = np.array(ends)
         self.arrows.set_offsets(at)
         self.arrows.set_UVC(np.zeros(len(lengths)), np.array(lengths))

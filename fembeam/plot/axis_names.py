@@ -19,9 +19,11 @@ PARTS = {
     "gravity": ("gravity", "m/s²"), "alpha": ("Rayleigh's α", "1/s"), "beta": ("Rayleigh's β", "s"),
     "axial_force": ("axial force", "N"), "foundation": ("foundation stiffness", "N/m²"),
     "velocity": ("velocity", "m/s"), "offset": ("offset of the centre of mass", "m"), "zeta": ("damping ratio ζ", ""),
+    "on": ("second place", "m"), "to": ("second place", "m"),
 }  # fmt: skip
-OWNERS = {"masses": "mass", "springs": "spring", "dashpots": "dashpot", "stops": "stop", "forces": "force",
-          "bodies": "beam"}  # fmt: skip
+TURNED = {"m": "rad", "N/m^p": "N m/rad^p", "s/m": "s/rad", "N s/m^p": "N m s/rad^p"}  # of rotation
+OWNERS = {"masses": "mass", "springs": "spring", "dashpots": "dashpot", "stops": "stop", "elements": "element",
+          "forces": "force", "bodies": "beam"}  # fmt: skip
 
 
 def axis_name(path: str, scene: Scene) -> str:
@@ -46,11 +48,19 @@ def axis_name(path: str, scene: Scene) -> str:
         name, unit = f"rotational damping of dashpot {number}", "N m s/rad"
     else:
         name, unit = (LAWS if ".law." in path else PARTS).get(last, ("", ""))
+        if kind in ("stops", "elements") and last not in ("z", "on", "to") and _rotates(scene, beam, kind, int(number)):
+            unit = TURNED.get(unit, unit)
         name += f" of {OWNERS[kind]} {number}" if name and kind in OWNERS else ""
     if not name:
         return path
     name += f" of beam {int(beam) + 1}" if beam else ""
     return f"{name} / {unit}" if unit else name
+
+
+def _rotates(scene: Scene, beam: str | None, kind: str, number: int) -> bool:
+    """Whether a stop or element of a scene, or of one of its further beams, acts on the slope."""
+    parts = getattr(scene if beam is None else scene.bodies[int(beam)], kind)
+    return number < len(parts) and parts[number].coordinate.rotation
 
 
 def _turns(scene: Scene, beam: str | None, number: int) -> bool:

@@ -29,15 +29,21 @@ def contacts(run: Run, discard: float = 0.0) -> Figure:
     if not np.any(kept):
         raise ValueError("the run has no finished contact to draw")
     figure, axes = sheet(run, 2, 2, (7.0, 4.8))
+    force, speed = run.unit("force"), _speed(run)
     for axis, values, label in (
         (axes[0], 1e3 * (log.t_out - log.t_in)[kept], "duration / ms"),
-        (axes[1], log.peak_force[kept], "peak force / N"),
-        (axes[2], log.speed_in[kept], "entry speed / m s⁻¹"),
+        (axes[1], log.peak_force[kept], f"peak force / {force}"),
+        (axes[2], log.speed_in[kept], f"entry speed / {speed}"),
     ):
         _histogram(axis, values, label)
-    _restitutions(axes[3], log.speed_in[kept], log.speed_out[kept])
+    _restitutions(axes[3], log.speed_in[kept], log.speed_out[kept], speed)
     span = float(run.t[-1]) - discard
     return titled(figure, run, f"{np.count_nonzero(kept)} contacts, {np.count_nonzero(kept) / span:.3g} per second")
+
+
+def _speed(run: Run) -> str:
+    """Unit of entry speeds."""
+    return run.unit("speed").replace("/s", " s⁻¹")
 
 
 def _histogram(axis: Axes, values: Vector, label: str) -> None:
@@ -50,7 +56,7 @@ def _histogram(axis: Axes, values: Vector, label: str) -> None:
     axis.set_ylabel("contacts")
 
 
-def _restitutions(axis: Axes, speed_in: Vector, speed_out: Vector) -> None:
+def _restitutions(axis: Axes, speed_in: Vector, speed_out: Vector, unit: str) -> None:
     """Restitution against entry speed, at most MOST_DOTS evenly picked contacts."""
     moving = np.flatnonzero(speed_in > 0)
     if not len(moving):  # all began at rest on the stop
@@ -66,5 +72,5 @@ def _restitutions(axis: Axes, speed_in: Vector, speed_out: Vector) -> None:
     axis.set_xscale("log" if high > 10 * low else "linear")  # ticks within a decade of a logarithmic axis overlap
     axis.set_xlim(low, high)
     axis.set_ylim(0, max(1.05, 1.1 * float(np.quantile(restitution, 0.98))))
-    axis.set_xlabel("entry speed / m s⁻¹")
+    axis.set_xlabel(f"entry speed / {unit}")
     axis.set_ylabel("exit / entry speed")

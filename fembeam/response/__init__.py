@@ -5,6 +5,7 @@ Imports: `scene`, `beams`, `support`, `reduction`. Begin with `acceleration`, th
 """
 
 from fembeam.response.acceleration import coordinates, frame_motion, model_of
+from fembeam.response.contact_force import contact_force
 from fembeam.response.mean_force import mean_force
 from fembeam.response.spectra import ResponseSpectrum, floor_spectrum, response_spectrum
 from fembeam.response.support_reactions import Reaction, Reactions, reactions
@@ -15,6 +16,7 @@ __all__ = [
     "Reaction",
     "Reactions",
     "ResponseSpectrum",
+    "contact_force",
     "coordinates",
     "floor_spectrum",
     "frame_motion",

@@ -8,12 +8,15 @@ cubic through δ and δ̇ at entry, samples and exit.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fembeam.response.acceleration import model_of
+from fembeam.response.contact_force import force_at
 from fembeam.support import require
 
 if TYPE_CHECKING:
@@ -27,24 +30,36 @@ FINER = 16  # parts of every piece of the cubic, on which the force is integrate
 
 def mean_force(run: Run, stop: int) -> Vector:
     """Mean contact force (k,) of a stop over the cells of the samples, N; `Run.force` explains it."""
-    law, t = model_of(run, "mean force").contact_rows[stop].law, run.t
+    stop %= len(run.stops)
+    contact, t = model_of(run, "mean force").contact_rows[stop], run.t
     require(len(t) > 1, "the mean force needs samples", len(t), "Run.force", "give simulate a dt")
     edges = np.concatenate([t[:1], (t[1:] + t[:-1]) / 2, t[-1:]])
-    log = run.contacts
-    mine = np.flatnonzero(log.stop == stop % len(run.stops))
+    motion = (t, run.indentation(stop), run.indentation_rate(stop))
+    if contact.always or contact.remembers:
+        return np.diff(np.interp(edges, *_grown(partial(force_at, run, stop, contact), motion, edges))) / np.diff(edges)
+    law, log = contact.law, run.contacts
+    mine = np.flatnonzero(log.stop == stop)
     ends = np.where(np.isnan(log.t_out), t[-1], log.t_out)
     first, last = (np.searchsorted(edges, times[mine], side="right") - 1 for times in (log.t_in, ends))
     inside = (first == last) & (first >= 0) & (first < len(t))
     impulse = np.bincount(first[inside], log.impulse[mine[inside]], len(t)).astype(float)
-    motion = (t, run.indentation(stop), run.indentation_rate(stop))
-    for contact in mine[~inside]:
-        knots = _knots(log, contact, ends[contact], motion)
-        impulse += log.impulse[contact] * _shares(law, abs(log.speed_in[contact]), knots, edges)
+    for entry in mine[~inside]:
+        knots = _knots(log, entry, ends[entry], motion)
+        impulse += log.impulse[entry] * _shares(law, abs(log.speed_in[entry]), knots, edges)
     return impulse / np.diff(edges)
 
 
 def _shares(law: Any, speed: float, knots: Motion, edges: Vector) -> Vector:
     """Part (k,) of a contact's impulse in each cell."""
+    rate = max(speed, law.entry_rate_floor)
+    t, grown = _grown(lambda _, d, v: np.maximum(law.force(d, v, rate), 0.0), knots, edges)
+    if not grown[-1] > 0.0:
+        grown = t - t[0]
+    return np.diff(np.interp(edges, t, grown / grown[-1]))
+
+
+def _grown(force: Callable[[Vector, Vector, Vector], Any], knots: Motion, edges: Vector) -> tuple[Vector, Vector]:
+    """Times, the edges within among them, and the impulse grown till then, of a force of t, δ and δ̇ on their cubic."""
     from scipy.integrate import cumulative_trapezoid
     from scipy.interpolate import CubicHermiteSpline
 
@@ -52,12 +67,7 @@ def _shares(law: Any, speed: float, knots: Motion, edges: Vector) -> Vector:
     fine = np.interp(np.arange(FINER * (len(t) - 1) + 1) / FINER, np.arange(len(t)), t)
     fine = np.union1d(fine, edges[(edges > t[0]) & (edges < t[-1])])
     cubic = CubicHermiteSpline(t, delta, rate)
-    entry_rate = np.full(len(fine), max(speed, law.entry_rate_floor))
-    force = np.maximum(law.force(cubic(fine), cubic(fine, 1), entry_rate), 0.0)
-    grown = cumulative_trapezoid(force, fine, initial=0.0)
-    if not grown[-1] > 0.0:
-        grown = fine - fine[0]
-    return np.diff(np.interp(edges, fine, grown / grown[-1]))
+    return fine, cumulative_trapezoid(force(fine, cubic(fine), cubic(fine, 1)), fine, initial=0.0)
 
 
 def _knots(log: ContactLog, contact: int, end: float, motion: Motion) -> Motion:

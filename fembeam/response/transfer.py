@@ -94,16 +94,23 @@ def _checked(omega: ArrayLike, model: Model) -> Vector:
     values = np.atleast_1d(np.array(omega, dtype=float))
     valid = values.ndim == 1 and values.size > 0 and bool(np.all(np.isfinite(values) & (values >= 0)))
     require(valid, "omega must be at least 0 and finite, (k,)", omega, WHERE, "give frequencies in rad/s")
-    undamped = not np.any(model.system.C)
-    singular = np.isin(values, model.omega if undamped else model.omega[model.omega == 0.0])
+    C, K = _linear(model)
+    natural = np.sqrt(np.maximum(np.linalg.eigvalsh(K), 0.0)) if model.scene.elements else model.omega
+    singular = np.isin(values, natural[natural == 0.0] if np.any(C) else natural)
     require(not singular.any(), "omega must not be an undamped natural frequency", values[singular][:1].tolist(),
             WHERE, "move it, or add damping")  # fmt: skip
     return values
 
 
+def _linear(model: Model) -> tuple[Vector, Vector]:
+    """C and K with the tangents of the elements."""
+    K, C = model.linear_elements
+    return model.system.C + C, model.system.K + K
+
+
 def _solved(model: Model, omega: Vector, vector: Vector) -> NDArray[np.complex128]:
     """Coordinates (k, n) of (K + iωC - ω²) q = vector, some frequencies at a time."""
-    C, K, one = model.system.C, model.system.K, np.eye(len(vector))
+    C, K, one = *_linear(model), np.eye(len(vector))
     answers = []
     for part in np.array_split(omega, len(omega) * len(vector) ** 2 // AT_ONCE + 1):
         w = part[:, None, None]

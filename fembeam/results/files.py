@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from fembeam import plot
 from fembeam.model import Run
+from fembeam.scene import unit_of
 from fembeam.statistics import moments
 from fembeam.statistics.batches import Batches, Estimate
 from fembeam.support import aligned, versions, written_whole
@@ -124,17 +125,18 @@ def summary(run: Run, discard: float = 0.0, seconds: float | None = None) -> dic
         "dt": float(run.t[1] - run.t[0]) if len(run.t) > 1 else None,
         "scene": run.scene,
         "units": "SI: m, s, N, J, rad/s",
+        **({"rotations": run.kinds[:, 0].tolist()} if run.kinds[:, 0].any() else {}),
         "versions": versions(),
     }
 
 
 def _moments(run: Run, discard: float) -> dict[str, dict[str, float]]:
-    """Moments of the displacements at the usual places and of every stop's indentation, m."""
+    """Moments of the displacements at the usual places and of every stop's indentation, m or rad."""
     kept = run.t >= discard
     if np.count_nonzero(kept) < 2:
         return {}
     signals = {f"displacement, {name}": run.displacement(z)[kept] for name, z in plot.places(run.shapes).items()}
-    signals |= {f"indentation, stop {i}": run.indentation(i)[kept] for i in range(len(run.stops))}
+    signals |= {f"indentation, {run.name(i)}": run.indentation(i)[kept] for i in range(len(run.stops))}
     extremes = {name: {"min": float(x.min()), "max": float(x.max())} for name, x in signals.items()}
     error = partial(_error_of_std, parts=batches(run, discard))
     return {name: asdict(moments(x)) | {"std_error": error(x)} | extremes[name] for name, x in signals.items()}
@@ -181,9 +183,10 @@ def _contacts(run: Run, discard: float) -> list[dict[str, Any]]:
     log = run.contacts
     span = max(float(run.t[-1]) - discard, 0.0) if len(run.t) else 0.0
     rows, parts = [], batches(run, discard)
-    for stop in range(len(run.stops)):
+    for stop in np.flatnonzero(run.kinds[:, 1] == 0).tolist():
         kept = (log.stop == stop) & (log.t_in >= discard) & np.isfinite(log.t_out)
         row: dict[str, Any] = {"stop": stop, "z": float(run.stops[stop, 0]), "number": int(kept.sum())}
+        row |= {"name": run.name(stop)} if run.kinds[stop, 0] else {}
         row["rate"] = row["number"] / span if span > 0 else None
         row["rate_error"] = _error_of_rate(log.t_in[kept], discard, discard + span, parts)
         columns = {"duration": log.t_out - log.t_in, "peak_force": log.peak_force, "entry_speed": log.speed_in}
@@ -210,12 +213,16 @@ def _energy(run: Run) -> dict[str, float]:
 
 def text(found: dict[str, Any]) -> str:
     """The tables of a summary: moments and extremes of signals, contacts of stops."""
-    head = ("", "mean/m", "std/m", "skewness", "kurtosis", "min/m", "max/m")
+    rotations = found.get("rotations", [])
+    m, force, speed = unit_of("indentation", [False, *rotations]), *(unit_of(q, rotations) for q in ("force", "speed"))
+    head = ("", f"mean/{m}", f"std/{m}", "skewness", "kurtosis", f"min/{m}", f"max/{m}")
     moments = [[name, *(row[key.partition("/")[0]] for key in head[1:])] for name, row in found["moments"].items()]
     tables = [aligned(head, moments)] if moments else []
-    columns = {"mean time/s": "duration", "mean peak force/N": "peak_force", "mean entry speed/(m/s)": "entry_speed"}
+    columns = {"mean time/s": "duration", f"mean peak force/{force}": "peak_force",
+               f"mean entry speed/({speed})": "entry_speed"}  # fmt: skip
     rows = [
-        [f"stop {row['stop']}", row["number"], row["rate"], *(row.get(c, {}).get("mean") for c in columns.values())]
+        [row.get("name", f"stop {row['stop']}"), row["number"], row["rate"]]
+        + [row.get(column, {}).get("mean") for column in columns.values()]
         for row in found["contacts"]
     ]
     return "\n\n".join(tables + ([aligned(("", "contacts", "per second", *columns), rows)] if rows else []))

@@ -12,6 +12,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fembeam.scene import unit_of
 from fembeam.support import html_table, written_whole
 
 if TYPE_CHECKING:
@@ -38,9 +39,9 @@ CONTACT_ROWS = (
     ("per second", "rate"),
     ("± s.e.", "rate_error"),
     ("mean time / s", "duration", "mean"),
-    ("mean peak / N", "peak_force", "mean"),
-    ("largest peak / N", "peak_force", "max"),
-    ("mean entry / m s⁻¹", "entry_speed", "mean"),
+    ("mean peak / {force}", "peak_force", "mean"),
+    ("largest peak / {force}", "peak_force", "max"),
+    ("mean entry / {speed}", "entry_speed", "mean"),
 )
 ORDER = ("time_history", "psd", "densities", "contacts", "modes")
 
@@ -109,6 +110,7 @@ def _status(found: dict[str, Any]) -> str:
 
 def _simulation(found: dict[str, Any]) -> Iterator[str]:
     """Tables of [simulate]."""
+    rotations = found.get("rotations", [])
     if found["omega"]:
         rows = [
             [i + 1, w, w / 6.283185307179586, z]
@@ -116,14 +118,20 @@ def _simulation(found: dict[str, Any]) -> Iterator[str]:
         ]
         yield "<h2>Model</h2>" + html_table(["coordinate", "ω / rad s⁻¹", "Hz", "ζ"], rows)
     if found["moments"]:
-        names = {"mean": "mean / m", "std": "std / m", "std_error": "± s.e.", "skewness": "skewness",
-                 "kurtosis": "kurtosis", "min": "min / m", "max": "max / m"}  # fmt: skip
+        m = unit_of("indentation", [False, *rotations])
+        names = {"mean": f"mean / {m}", "std": f"std / {m}", "std_error": "± s.e.", "skewness": "skewness",
+                 "kurtosis": "kurtosis", "min": f"min / {m}", "max": f"max / {m}"}  # fmt: skip
         rows = [[words, *(row.get(key) for row in found["moments"].values())] for key, words in names.items()]
         yield "<h2>Response</h2>" + html_table(["", *found["moments"]], rows)
         yield f'<p class="note">{escape(found["confidence"])}</p>'
     if found["contacts"]:
-        rows = [[words, *(_of_stop(row, *keys) for row in found["contacts"])] for words, *keys in CONTACT_ROWS]
-        yield "<h2>Contacts</h2>" + html_table(["", *(f"stop {row['stop']}" for row in found["contacts"])], rows)
+        force, speed = (unit_of(of, rotations).replace("/s", " s⁻¹") for of in ("force", "speed"))
+        rows = [
+            [words.format(force=force, speed=speed), *(_of_stop(row, *keys) for row in found["contacts"])]
+            for words, *keys in CONTACT_ROWS
+        ]
+        stops = [row.get("name", f"stop {row['stop']}") for row in found["contacts"]]
+        yield "<h2>Contacts</h2>" + html_table(["", *stops], rows)
     if found["energy"]:
         names = {"input": "put in", "damping": "lost in damping", "contact": "lost in contacts", "stored": "stored"}
         rows = [[words, found["energy"][name]] for name, words in names.items()]

@@ -1,12 +1,14 @@
-"""What there is: supports, masses, springs, stops, impactors, loads; full matrices, contact rows, all signals.
+"""What there is: supports, masses, springs, stops, elements, impactors, loads; full matrices, contact rows, signals.
 
 Imports: `beams`, `excitation`, `support`, `reduction`; `Scene.reduce` opens the door to `fembeam.model`. Begin with
 `scene`, then `assembly`.
 """
 
 from fembeam.scene.assembly import Matrices, unsupported
-from fembeam.scene.contact_rows import contact_rows, heights, loaded, loads, watched, weight
+from fembeam.scene.contact_rows import contact_rows, heights, loaded, loads, static_rows, watched, weight
+from fembeam.scene.element import Element, tangent
 from fembeam.scene.impactor import Impactor
+from fembeam.scene.local_coordinate import LocalCoordinate, unit_of
 from fembeam.scene.parameters import changes_structure, path_of, replaced, value_of, with_value
 from fembeam.scene.parts import Clamped, Dashpot, Guided, LumpedMass, Pinned, PointForce, PointMoment, Spring, Stop
 from fembeam.scene.scene import FEATURES, Scene
@@ -18,8 +20,10 @@ __all__ = [
     "PLACES",
     "Clamped",
     "Dashpot",
+    "Element",
     "Guided",
     "Impactor",
+    "LocalCoordinate",
     "LumpedMass",
     "Matrices",
     "Pinned",
@@ -37,6 +41,9 @@ __all__ = [
     "path_of",
     "replaced",
     "signals_of",
+    "static_rows",
+    "tangent",
+    "unit_of",
     "unsupported",
     "value_of",
     "watched",

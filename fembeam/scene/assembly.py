@@ -156,8 +156,9 @@ def assemble(scene: Scene, elements: int | None, modes: int | None, probes: Sequ
     own = _one_beam(scene, elements, modes, probes)
     if not scene.bodies and not scene.impactors:
         return own
-    touched = [[s.on[1] for s in scene.stops if s.on and s.on[0] == b + 1] for b in range(len(scene.bodies))]
-    others = [_one_beam(body, elements, modes, at) for body, at in zip(scene.bodies, touched, strict=True)]
+    second = [part.coordinate.to or (0, 0.0) for part in scene.acting]
+    met = [[z for number, z in second if number == b + 1] for b in range(len(scene.bodies))]
+    others = [_one_beam(body, elements, modes, at) for body, at in zip(scene.bodies, met, strict=True)]
     return _joined((own, *others), tuple(i for body in (scene, *scene.bodies) for i in body.impactors))
 
 
@@ -242,7 +243,7 @@ def buckling_load(scene: Scene, elements: int | None = None) -> float:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
         beam = replace(scene.beam, axial_force=0.0)
-        relaxed = replace(scene, beam=beam, bodies=(), impactors=(), stops=())
+        relaxed = replace(scene, beam=beam, bodies=(), impactors=(), stops=(), elements=())
     held = relaxed.rigid_body_modes == 0
     require(held, "supports and springs must hold the beam", f"{relaxed.rigid_body_modes} rigid-body modes",
             "buckling_load", "add a support")  # fmt: skip

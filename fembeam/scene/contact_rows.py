@@ -1,6 +1,8 @@
 """Who touches whom in a scene: contacts and loads as rows on all dofs, beams, bodies and impactors alike.
 
 δ = -w·u - gap, and the contact pushes with +w F:  w = ±(row of one body - row of the other)
+
+Elements, which always act, are contacts with w = -W.
 """
 
 from __future__ import annotations
@@ -12,6 +14,9 @@ from typing import TYPE_CHECKING, Any
 from scipy import sparse
 
 from fembeam.excitation import Harmonic
+from fembeam.scene.element import force_both_ways
+from fembeam.scene.local_coordinate import LocalCoordinate
+from fembeam.scene.parts import PointMoment
 
 if TYPE_CHECKING:
     from fembeam.scene.assembly import Matrices
@@ -20,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class ContactRow:
-    """One contact of a scene.
+    """One contact of a scene, or one element.
 
     Attributes
     ----------
@@ -29,6 +34,7 @@ class ContactRow:
     push : +1 when it pushes its beam up, -1 down.
     body, z : the beam it pushes (0 the scene's own) and where.
     on : ("frame", 0), ("body", b) or ("impactor", i): what it pushes from.
+    rotation : whether it acts on the slope: rad and N m. always : whether it acts at both signs of δ, an element.
     """
 
     row: sparse.csr_matrix
@@ -38,10 +44,23 @@ class ContactRow:
     body: int
     z: float
     on: tuple[str, int]
+    rotation: bool = False
+    always: bool = False
+
+    @property
+    def remembers(self) -> bool:
+        """Whether its law has a memory: latched numbers that are renewed on borders."""
+        return bool(getattr(self.law, "memory", ()))
+
+    def force(self, delta: Any, rate: Any = 0.0, entry_rate: Any = 1.0) -> Any:
+        """Force on arrays: of an element at both signs of δ, of others zero where δ <= 0."""
+        if self.always:
+            return force_both_ways(self.law, delta, rate)
+        return self.law.force(delta, rate, entry_rate)
 
 
 def contact_rows(scene: Scene, matrices: Matrices) -> list[ContactRow]:
-    """All contacts in the order of the log: for each beam its stops, then its impactors."""
+    """All contacts in the order of the log: for each beam its stops, then its elements, then its impactors."""
     return list(_contact_rows(scene, matrices))
 
 
@@ -49,13 +68,11 @@ def _contact_rows(scene: Scene, matrices: Matrices) -> Iterator[ContactRow]:
     """The same, one by one."""
     count = 0
     for body, part in enumerate((scene, *scene.bodies)):
-        for stop in part.stops:
-            row = stop.push * matrices.interpolation(stop.z, body=body)
-            on = ("frame", 0)
-            if stop.on is not None:
-                on = ("body", stop.on[0])
-                row = row - stop.push * matrices.interpolation(stop.on[1], body=stop.on[0])
-            yield ContactRow(row, stop.law, stop.gap, stop.push, body, stop.z, on)
+        for one in part.acting:
+            place = one.coordinate
+            on = ("frame", 0) if place.to is None else ("body", place.to[0] or body)
+            row = one.push * place.row(matrices, body)
+            yield ContactRow(row, one.law, one.gap, one.push, body, one.z, on, place.rotation, one.always)
         for impactor in part.impactors:
             row = matrices.interpolation(impactor.z, body=body) - matrices.striker(count)
             for push in impactor.pushes:
@@ -65,13 +82,10 @@ def _contact_rows(scene: Scene, matrices: Matrices) -> Iterator[ContactRow]:
 
 def loads(scene: Scene, matrices: Matrices) -> list[tuple[sparse.csr_matrix, Any]]:
     """(row (1, N), signal) of every point force, moment and moving foot."""
-    from fembeam.scene.parts import PointMoment
-
     rows = []
     for body, part in enumerate((scene, *scene.bodies)):
         for force in part.forces:
-            derivative = int(isinstance(force, PointMoment))
-            rows.append((matrices.interpolation(force.z, derivative, body), force.signal))
+            rows.append((matrices.interpolation(force.z, _derivative(force), body), force.signal))
         for spring in part.springs:
             if spring.foot is not None:
                 rows.append((spring.stiffness * matrices.interpolation(spring.z, body=body), spring.foot))
@@ -83,34 +97,53 @@ def weight(scene: Scene) -> Harmonic:
     return Harmonic(scene.gravity, 0.0)
 
 
-def watched(scene: Scene, body: int) -> float | None:
-    """Where the modes of a beam shall be positive: at its first stop or impactor, or where another beam meets it."""
+def watched(scene: Scene, body: int) -> LocalCoordinate | None:
+    """Where the modes of a beam shall be positive: at its first stop, element, impactor, or where another meets it."""
     part = (scene, *scene.bodies)[body]
-    places = [stop.z for stop in part.stops] + [impactor.z for impactor in part.impactors]
-    places += [stop.on[1] for stop in scene.stops if stop.on is not None and stop.on[0] == body]
-    return places[0] if places else None
+    places = [one.coordinate for one in part.acting] + [LocalCoordinate(impactor.z) for impactor in part.impactors]
+    places += _from_the_first(scene, body)
+    return LocalCoordinate(places[0].z, places[0].derivative) if places else None
 
 
-def loaded(scene: Scene, body: int) -> list[tuple[float, int]]:
-    """Where a point load acts on a beam: (z, 0) for forces, (z, 1) for moments, of stops, loads, dashpots, strikers."""
-    from fembeam.scene.parts import PointMoment
-
+def loaded(scene: Scene, body: int) -> list[LocalCoordinate]:
+    """Where a force or moment acts on a beam, or a pair of them: of stops, elements, loads, dashpots, strikers."""
     part = (scene, *scene.bodies)[body]
-    places = [(stop.z, 0) for stop in part.stops]
-    places += [(force.z, int(isinstance(force, PointMoment))) for force in part.forces]
-    places += [(spring.z, 0) for spring in part.springs if spring.foot is not None]
-    places += [(dashpot.z, 0) for dashpot in part.dashpots if dashpot.damping]
-    places += [(dashpot.z, 1) for dashpot in part.dashpots if dashpot.rotational]
-    places += [(impactor.z, 0) for impactor in part.impactors]
-    return places + [(stop.on[1], 0) for stop in scene.stops if stop.on is not None and stop.on[0] == body]
+    places = [own for one in part.acting for own in one.coordinate.on_body(body, body)]
+    places += [LocalCoordinate(force.z, _derivative(force)) for force in part.forces]
+    places += [LocalCoordinate(spring.z) for spring in part.springs if spring.foot is not None]
+    places += [LocalCoordinate(dashpot.z) for dashpot in part.dashpots if dashpot.damping]
+    places += [LocalCoordinate(dashpot.z, 1) for dashpot in part.dashpots if dashpot.rotational]
+    places += [LocalCoordinate(impactor.z) for impactor in part.impactors]
+    return places + _from_the_first(scene, body)
+
+
+def _from_the_first(scene: Scene, body: int) -> list[LocalCoordinate]:
+    """Where stops and elements of the scene's own beam meet another."""
+    return [own for one in scene.acting for own in one.coordinate.on_body(0, body)] if body else []
+
+
+def static_rows(scene: Scene, matrices: Matrices) -> sparse.csr_matrix:
+    """Rows (m, N) of the scene's own stops, elements, then forces: where the model may miss static compliance."""
+    places = [
+        *(one.coordinate for one in scene.acting),
+        *(LocalCoordinate(force.z, _derivative(force)) for force in scene.forces),
+    ]
+    blank = sparse.csr_matrix((0, matrices.M.shape[0]))
+    return sparse.vstack([blank, *(place.row(matrices) for place in places)], format="csr")
+
+
+def _derivative(force: Any) -> int:
+    """1 of a moment, 0 of a force."""
+    return int(isinstance(force, PointMoment))
 
 
 def heights(scene: Scene) -> tuple[list[float], list[float]]:
     """Where the undeflected bodies lie over the scene's own beam, m, so that gaps are seen: beams, impactors."""
     beams = [0.0] * (1 + len(scene.bodies))
     for stop in reversed(scene.stops):
-        if stop.on is not None:
-            beams[stop.on[0]] = -stop.push * stop.gap
+        place = stop.coordinate
+        if place.to is not None and place.to[0] and not place.rotation:
+            beams[place.to[0]] = -stop.push * stop.gap
     strikers = [
         beams[body] - (impactor.pushes[0] * impactor.gap if len(impactor.pushes) == 1 else 0.0)
         for body, part in enumerate((scene, *scene.bodies))

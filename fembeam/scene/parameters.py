@@ -18,7 +18,7 @@ from fembeam.support import require
 if TYPE_CHECKING:
     from fembeam.scene.scene import Scene
 
-LISTS = ("masses", "springs", "dashpots", "stops", "forces")
+LISTS = ("masses", "springs", "dashpots", "stops", "elements", "forces")
 
 
 def scalars(scene: Scene, within: str = "") -> dict[str, float]:
@@ -96,4 +96,5 @@ def _replaced(item: Any, path: list[str], value: float) -> Any:
 def changes_structure(path: str) -> bool:
     """Whether a parameter changes the mode shapes or frequencies: anything but signals, gaps and laws."""
     part = re.sub(r"^(bodies\[\d+\]\.)+", "", path)
-    return not (is_of_signal(path) or part.startswith("stops")) or path.endswith(".z")
+    place = re.fullmatch(r"\w+\[\d+\]\.(z|on|to)(\[\d+\])?", part)
+    return not (is_of_signal(path) or part.startswith(("stops", "elements"))) or place is not None

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fembeam.scene.impactor import check_law
+from fembeam.scene.local_coordinate import LocalCoordinate, Of, local_coordinate
 from fembeam.support import require, require_finite, require_non_negative
 
 
@@ -129,39 +130,55 @@ class Dashpot:
 
 @dataclass(frozen=True)
 class Stop:
-    """A one-sided stop: δ = -u - gap below the beam, δ = u - gap above it.
+    """A one-sided stop: δ = -u - gap below the beam, δ = u - gap above it; of rotation δ = ∓u_z - gap.
 
     `law` gives the repulsive force for δ > 0; `gap` in m, negative = preload. It sits on the frame, or `on` another
-    beam of the scene: `on=(body, z)`, body 1 the first of `Scene.bodies`; u is then the difference, u - u_body(z).
-    ValueError for a side that is neither "below" nor "above", or a gap that is not finite.
+    beam of the scene: `on=(body, z)`, body 1 the first of `Scene.bodies`; u is then the difference, u - u_body(z). A
+    number for `on` is a second place on the same beam. With `of="rotation"` it limits the slope u_z, a hinge with
+    freeplay: gap in rad, force a moment in N m, "below" stops u_z < 0, "above" u_z > 0.
+    ValueError for a side that is neither "below" nor "above", an `of` that is neither, a gap that is not finite.
 
     Examples
     --------
-    >>> from contacts import Hertz
+    >>> from contacts import Hertz, KelvinVoigt
     >>> both = [Stop(0.2, Hertz(1e9), gap=1e-3, side=side) for side in ("below", "above")]
     >>> [stop.side for stop in both]
     ['below', 'above']
+    >>> Stop(0.0, KelvinVoigt(500.0, 0.1), gap=0.02, side="above", of="rotation").coordinate.rotation
+    True
     """
 
     z: float
     law: Any
     gap: float = 0.0
     side: str = "below"
-    on: tuple[int, float] | None = None
+    on: float | tuple[int, float] | None = None
+    of: Of = "displacement"
+    always = False
 
     def __post_init__(self) -> None:
         where = f"Stop at z = {self.z}"
-        require_finite("gap", self.gap, where, "give the clearance in m, negative for a preload")
+        require_finite("gap", self.gap, where, "give the clearance in m (rad of a rotation), negative for a preload")
         require(self.side in ("below", "above"), "side must be 'below' or 'above'", self.side, where, "choose one")
-        require(self.on is None or (isinstance(self.on, (tuple, list)) and len(self.on) == 2),
-                "on must be (body, z) or None", self.on, where,
-                "name a beam of bodies, 1 the first, and a place")  # fmt: skip
+        local_coordinate(self.z, self.of, self.on, where, "on")
         check_law(self.law, where)
+        lasting = getattr(self.law, "memory", ()) and not getattr(self.law, "opens", False)
+        require(not lasting, "law must be one that opens", self.law, where, "make it an Element, which always acts")
+
+    def __repr__(self) -> str:
+        """As it was called; `of` only where it is not the usual one, as in saved branches of earlier versions."""
+        kind = "" if self.of == "displacement" else f", of={self.of!r}"
+        return f"Stop(z={self.z!r}, law={self.law!r}, gap={self.gap!r}, side={self.side!r}, on={self.on!r}{kind})"
 
     @property
     def push(self) -> float:
         """Direction in which the stop pushes the beam: +1 (up) from below, -1 from above."""
         return 1.0 if self.side == "below" else -1.0
+
+    @property
+    def coordinate(self) -> LocalCoordinate:
+        """What it acts on."""
+        return local_coordinate(self.z, self.of, self.on, f"Stop at z = {self.z}", "on")
 
 
 @dataclass(frozen=True)

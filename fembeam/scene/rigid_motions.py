@@ -12,13 +12,17 @@ if TYPE_CHECKING:
     from fembeam.scene.scene import Scene
 
 
-def rigid_body_modes(scene: Scene) -> int:
-    """How many of the motions u = a + b z nothing resists, of supports, springs, foundation, tension: 0, 1 or 2."""
+def rigid_body_modes(scene: Scene, turning: bool = True) -> int:
+    """How many of the motions u = a + b z nothing resists, of supports, springs, foundation, tension: 0, 1 or 2.
+
+    Without `turning` the slope is held as well.
+    """
     rows = [row for s in scene.supports for row, fixed in zip(_rigid_rows(s.z), s.fixed, strict=True) if fixed]
     for spring in scene.springs:
         translation, rotation = _rigid_rows(spring.z)
         rows += [translation] * (spring.stiffness > 0) + [rotation] * (spring.rotational > 0)
     rows += [(1.0, 0.0), (0.0, 1.0)] * (scene.beam.foundation > 0) + [(0.0, 1.0)] * (scene.beam.axial_force != 0)
+    rows += [] if turning else [(0.0, 1.0)]
     scaled = np.array([*rows, (0.0, 0.0)]) / (1.0, scene.beam.length)
     return 2 - int(np.linalg.matrix_rank(scaled, tol=1e-9))
 
@@ -37,11 +41,29 @@ def drifting(scene: Scene) -> list[str]:
 
 
 def _held(scene: Scene, index: int) -> bool:
-    """Whether stops push a beam (0 the scene's own) from both sides, or against gravity."""
+    """Whether stops or elements hold a beam (0 the scene's own) from both sides, or stops against gravity.
+
+    Those of rotation hold one that is supported somewhere.
+    """
     beam = scene.bodies[index - 1] if index else scene
-    pushes = {stop.push for stop in beam.stops}
-    pushes |= {-stop.push for stop in scene.stops if stop.on is not None and stop.on[0] == index}
-    return len(pushes) == 2 or (scene.gravity != 0.0 and np.sign(scene.gravity) in pushes)
+    pushes, turns = _sides(beam, rotation=False), _sides(beam, rotation=True)
+    if index:
+        pushes |= {-side for side in _sides(scene, rotation=False, to=index)}
+    lies = scene.gravity != 0.0
+    if len(pushes) == 2 or (lies and np.sign(scene.gravity) in pushes):
+        return True
+    return (len(turns) == 2 or (lies and bool(turns))) and rigid_body_modes(beam, turning=False) == 0
+
+
+def _sides(scene: Scene, rotation: bool, to: int | None = None) -> set[float]:
+    """From which sides stops and elements of a beam hold it, or those that lead `to` another hold that."""
+    found: set[float] = set()
+    for part in scene.acting:
+        place = part.coordinate
+        leads = None if place.to is None else place.to[0]
+        if place.rotation == rotation and leads != 0 and to in (None, leads):
+            found |= {part.push, -part.push} if part.always else {part.push}
+    return found
 
 
 def _rigid_rows(z: float) -> tuple[tuple[float, float], tuple[float, float]]:

@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from fembeam.beams import Beam, ModalDamping, Rayleigh
 from fembeam.scene.assembly import Matrices, assemble, buckling_load
+from fembeam.scene.element import Element
 from fembeam.scene.impactor import Impactor
+from fembeam.scene.local_coordinate import LocalCoordinate
 from fembeam.scene.parts import (
     Dashpot,
     LumpedMass,
@@ -37,6 +39,7 @@ FEATURES: dict[str, tuple[type, ...]] = {
     "springs": (Spring,),
     "dashpots": (Dashpot,),
     "stops": (Stop,),
+    "elements": (Element,),
     "forces": (PointForce, PointMoment),
     "impactors": (Impactor,),
 }
@@ -55,10 +58,12 @@ class Scene:
     masses, springs, dashpots, stops, forces : lists, any length; kept as tuples.
     damping : ModalDamping or Rayleigh, of the structure without dashpots.
     base : frame motion y(t) that knows its derivatives, `derivative(order)`, or None.
-    impactors : rigid masses beside the beam. Their contacts are numbered after those of the stops.
-    bodies : further beams, each a Scene of its own with its supports, stops, forces, damping; a `Stop` with `on` lets
-        the beam of this scene meet them. Their contacts are numbered after those of this scene.
+    impactors : rigid masses beside the beam. Their contacts are numbered after those of the stops and elements.
+    bodies : further beams, each a Scene of its own with its supports, stops, forces, damping; a `Stop` with `on`, or an
+        `Element` with `to`, lets the beam of this scene meet them. Their contacts are numbered after those of this
+        scene.
     gravity : g in m/s², pulls everything down; for all bodies.
+    elements : of Element, local elements that always act, numbered on after the stops.
 
     Raises
     ------
@@ -92,6 +97,12 @@ class Scene:
     impactors: Sequence[Impactor] = ()
     bodies: Sequence[Scene] = ()
     gravity: float = 0.0
+    elements: Sequence[Element] = ()
+
+    def __repr__(self) -> str:
+        """As it was called; `elements` only where there are any, as in saved branches of earlier versions."""
+        shown = [f.name for f in fields(self) if f.name != "elements" or self.elements]
+        return f"Scene({', '.join(f'{name}={getattr(self, name)!r}' for name in shown)})"
 
     def __post_init__(self) -> None:
         if not isinstance(self.beam, Beam):
@@ -153,8 +164,8 @@ class Scene:
         elements : of the mesh; None: as few as make every kept frequency right to 1e-6.
         omega_max : instead of `modes`: all of them up to this frequency, rad/s.
         mass_share : instead of `modes`: as many as carry this share of the mass that a base motion moves, in (0, 1).
-        residual : add the residual static shape of every stop, force, moment, moving foot and dashpot (its rotation,
-            too); the model is then exact for slow loads there.
+        residual : add the residual static shape of every stop, element, force, moment, moving foot and dashpot (its
+            rotation, too), between two places that of opposite loads; the model is then exact for slow loads there.
         interface : Craig–Bampton: static shapes of the same places and `modes` modes with them held; with
             modes=0 Guyan's condensation.
 
@@ -174,9 +185,14 @@ class Scene:
         return reduced(self, modes, elements, omega_max, mass_share, residual, interface)
 
     @property
+    def acting(self) -> list[Stop | Element]:
+        """Stops, then elements: what acts on the scene's own beam by a law."""
+        return [*self.stops, *self.elements]
+
+    @property
     def loaded_places(self) -> list[float]:
-        """Coordinates of stops, then forces."""
-        return [stop.z for stop in self.stops] + [force.z for force in self.forces]
+        """Coordinates of stops, elements, then forces."""
+        return [part.z for part in (*self.acting, *self.forces)]
 
     def buckling_load(self, elements: int | None = None) -> float:
         """The compression (N, positive) at which the beam buckles, on top of its own axial force.
@@ -187,8 +203,9 @@ class Scene:
 
     @property
     def places(self) -> list[float]:
-        """Coordinates of all features, in no order."""
-        return [feature.z for name in FEATURES for feature in getattr(self, name)]
+        """Coordinates of all features, second places of stops and elements included, in no order."""
+        second = [place.to[1] for place in (one.coordinate for one in self.acting) if place.to and place.to[0] == 0]
+        return [feature.z for name in FEATURES for feature in getattr(self, name)] + second
 
     @property
     def rigid_body_modes(self) -> int:
@@ -223,7 +240,8 @@ class Scene:
             require(apart, "supports must not share one place", (first, second), "Scene", "keep one")
         for j, stop in enumerate(self.stops):
             for i, other in enumerate(self.stops[:j]):
-                same = abs(stop.z - other.z) <= near and (stop.side, stop.on) == (other.side, other.on)
+                alike = (stop.side, stop.on, stop.of) == (other.side, other.on, other.of)
+                same = abs(stop.z - other.z) <= near and alike
                 require(not same, f"stops must not share one place and side (z = {stop.z} m, {stop.side})", (i, j),
                         "stops of Scene", "make them one stop with one law, such as PiecewiseLinear")  # fmt: skip
 
@@ -234,15 +252,26 @@ class Scene:
             require(plain, "a body must not have base, gravity or bodies of its own", body,
                     f"bodies[{index}] of Scene", "give them to the outer scene")  # fmt: skip
         for index, stop in enumerate(self.stops):
-            if stop.on is None:
-                continue
-            number, z = stop.on
-            where = f"stops[{index}] of Scene"
-            known = isinstance(number, int) and 1 <= number <= len(self.bodies)
-            require(known, f"on must name a body, 1 to {len(self.bodies)}", number, where, "add the beam to bodies")
-            length = self.bodies[number - 1].beam.length
-            require_finite("z of on", z, where, "give the coordinate along that beam in m")
-            require(0 <= z <= length, f"z of on must lie on body {number}, 0 to {length} m", z, where, "move it")
+            self._check_second(stop.coordinate, "on", f"stops[{index}] of Scene")
+        for index, element in enumerate(self.elements):
+            self._check_second(element.coordinate, "to", f"elements[{index}] of Scene")
+
+    def _check_second(self, place: LocalCoordinate, key: str, where: str) -> None:
+        """Raise ValueError unless what a stop or element acts on exists and can move."""
+        if place.to is None:
+            held = [support for support in self.supports if support.z == place.z and support.fixed[1]]
+            require(not (place.rotation and held), "the beam must be free to turn at z", held[:1], where,
+                    "support it by Pinned there")  # fmt: skip
+            return
+        number, z = place.to
+        known = isinstance(number, int) and 0 <= number <= len(self.bodies)
+        require(known, f"{key} must name a body, 1 to {len(self.bodies)}", number, where, "add the beam to bodies")
+        length = self.bodies[number - 1].beam.length if number else self.beam.length
+        named = f"body {number}" if number else "the beam"
+        require_finite(f"z of {key}", z, where, "give the coordinate along that beam in m")
+        require(0 <= z <= length, f"z of {key} must lie on {named}, 0 to {length} m", z, where, "move it")
+        apart = number > 0 or abs(z - place.z) > 1e-9 * length
+        require(apart, f"z of {key} must be another place", z, where, "leave it out for an end on the frame")
 
 
 def _listed(name: str, value: Any, kinds: tuple[type, ...]) -> tuple[Any, ...]:

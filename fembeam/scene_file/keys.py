@@ -69,7 +69,7 @@ def entry_type(hint: Any) -> Any:
     if origin in ARRAYS:
         return float
     if origin in (list, tuple, Sequence, Iterable) and get_args(hint):
-        return get_args(hint)[0]
+        return float if float in get_args(hint) else get_args(hint)[0]  # (number of a body, place) are numbers
     return None
 
 

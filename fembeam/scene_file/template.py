@@ -44,6 +44,12 @@ law = {{ kind = "achieving", stiffness = 2e8, restitution = 0.7 }}
 # tabulated_file (path of a CSV file with indentation and force), with memory jenkins (stiffness, limit), walton_braun
 # (loading, unloading), ...; an unknown name lists them all
 
+# [[elements]]              # act always, at both signs of u - gap
+# z = 0.2
+# law = {{ kind = "polynomial", coefficients = [0, 0, 1e9] }}   # or kelvin_voigt (stiffness, damping), ...
+# of = "rotation"           # of the slope: a hinge spring, N m over rad (stops have it as well); else displacement
+# to = 0.1                  # other end on the beam; left out: the frame
+
 [damping]
 zeta = [0.02, 0.01]         # ratios of the modes, the last for all higher ones; or alpha and beta of Rayleigh
 

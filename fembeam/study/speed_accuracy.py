@@ -29,7 +29,12 @@ class NoReferenceError(solvers.SolverError):
 
 
 def end_displacement(run: Run) -> Vector:
-    """The displacement u at the first stop, or at the far end, at the end of the run: the default quantity."""
+    """The displacement u at the first stop, or at the far end, at the end of the run: the default quantity.
+
+    δ of a first stop of rotation.
+    """
+    if len(run.stops) and run.kinds[0, 0]:
+        return np.asarray(run.indentation(0)[-1])
     return np.asarray(run.displacement(run.stops[0][0] if len(run.stops) else run.shapes.nodes[-1])[-1])
 
 

@@ -95,11 +95,11 @@ def stability_map(
 
     Parameters
     ----------
-    scene : with at least one stop.
+    scene : with at least one stop or element.
     method : step -> method, such as `solvers.RK4` or ``lambda dt: solvers.HenonRK2(dt, dt / 4)``.
     steps : (k,) s.
     modes : mode counts, one row each; with ``stiffness`` a single one.
-    stiffness : stiffnesses for the laws of all stops, one row each.
+    stiffness : stiffnesses for the laws of all stops and elements, one row each.
     duration : s; some ten impacts at most, as later trajectories of any two settings differ.
     tolerance : largest error of an accurate run, relative to the range of δ at the first stop.
     start : model -> (2n,); None is rest.
@@ -128,7 +128,7 @@ def stability_map(
     where = "stability_map"
     require(bool(np.all(np.isfinite(steps) & (steps > 0.0))), "steps must be positive (s)", steps.tolist(), where,
             "e.g. [1e-5, 1e-4]")  # fmt: skip
-    require(len(scene.stops) > 0, "the scene must have a stop", len(scene.stops), where, "add one")
+    require(len(scene.acting) > 0, "the scene must have a stop or element", 0, where, "add one")
     require(0.0 < tolerance < 1.0, "tolerance must lie in (0, 1)", tolerance, where, "e.g. 0.01")
     models, axis, rows = _models(scene, modes, stiffness)
     cells = [[_cell(model, method, dt, duration, tolerance, start) for dt in steps] for model in models]
@@ -154,13 +154,16 @@ def _models(scene: Scene, modes: int | Sequence[int], stiffness: Sequence[float]
         return [scene.reduce(modes=n) for n in counts], "modes", counts
     require(isinstance(modes, (int, np.integer)), "modes must be one count when stiffness is given", modes,
             "stability_map", "e.g. modes=2")  # fmt: skip
-    for stop in scene.stops:
-        require(hasattr(stop.law, "stiffness"), "every law must have a stiffness", stop.law, "stability_map",
+    for part in scene.acting:
+        require(hasattr(part.law, "stiffness"), "every law must have a stiffness", part.law, "stability_map",
                 "vary modes instead")  # fmt: skip
     models = []
     for value in stiffness:
-        stops = [replace(stop, law=replace(stop.law, stiffness=float(value))) for stop in scene.stops]
-        models.append(replace(scene, stops=stops).reduce(modes=int(modes)))  # type: ignore[arg-type]
+        changed: dict[str, Any] = {
+            name: [replace(part, law=replace(part.law, stiffness=float(value))) for part in getattr(scene, name)]
+            for name in ("stops", "elements")
+        }
+        models.append(replace(scene, **changed).reduce(modes=int(modes)))  # type: ignore[arg-type]
     return models, "stiffness", list(stiffness)
 
 

@@ -1,0 +1,58 @@
+"""Force of a stop or element along a run: of its law, with the entry rates and the latched numbers of the time.
+
+A law with memory is replayed: from one border it passed to the next its latched numbers stay, at a border they are
+renewed from δ and δ̇ there, as the run has logged them.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contacts.path import renew
+
+if TYPE_CHECKING:
+    from fembeam.model import Run
+    from fembeam.scene.contact_rows import ContactRow
+    from solvers.problem import Transitions
+
+Vector = NDArray[np.float64]
+
+
+def contact_force(run: Run, stop: int, contact: ContactRow) -> Vector:
+    """Force (k,) of one stop or element at the samples."""
+    if contact.always or contact.remembers:
+        return force_at(run, stop, contact, run.t, run.indentation(stop), run.indentation_rate(stop))
+    mine = run.contacts.stop == stop
+    entered, speed = run.contacts.t_in[mine], run.contacts.speed_in[mine]
+    if not len(entered):
+        return np.zeros(len(run.t))
+    order = np.argsort(entered)
+    last = np.searchsorted(entered[order], run.t, side="right") - 1
+    entry_rate = np.maximum(np.abs(speed[order])[np.maximum(last, 0)], contact.law.entry_rate_floor)
+    delta = np.where(last >= 0, run.indentation(stop), -1.0)
+    return np.asarray(contact.force(delta, run.indentation_rate(stop), entry_rate))
+
+
+def force_at(run: Run, stop: int, contact: ContactRow, t: Vector, delta: Vector, rate: Vector) -> Vector:
+    """Force of one that always acts at times t (k,), ascending, of deformations and rates there."""
+    if contact.remembers:
+        return _replayed(contact.law, run.transitions, stop, t, delta, rate)
+    return np.asarray(contact.force(delta, rate))
+
+
+def _replayed(law: Any, log: Transitions, stop: int, t: Vector, delta: Vector, rate: Vector) -> Vector:
+    """The force between the borders it passed, each with the latched numbers of its time."""
+    mine = np.flatnonzero(log.contact == stop)
+    ends = np.append(np.searchsorted(t, log.t[mine]), len(t))
+    parameters, force, begin = np.array(law.parameters), np.empty(len(t)), 0
+    for passed, end in enumerate(ends):
+        if end > begin:
+            force[begin:end] = law.batch(1.0, parameters)(delta[begin:end], rate[begin:end])
+        if passed < len(mine):
+            at = mine[passed]
+            renew(law, int(log.border[at]), log.delta[at], log.delta_dot[at], parameters)
+        begin = max(begin, end)
+    return force
