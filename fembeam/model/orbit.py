@@ -78,8 +78,8 @@ class Orbit(Printed):
 
     @property
     def mark(self) -> str:
-        """What is special about it on a branch: "fold", "flip", "neimark-sacker", "branch point", "grazing", "floor",
-        "merging"; else "".
+        """What is special about it on a branch: "fold", "flip", "neimark-sacker", "branch point", "grazing", "stick",
+        "floor", "merging"; else "".
         """
         return self.found.mark
 

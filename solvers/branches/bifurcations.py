@@ -4,12 +4,14 @@ A special point is a sign change of its test function along the arclength. With 
 
     fold             parameter's share of the tangent
     flip             Π (μ_i + 1) / (1 + |μ_i|)                          (period doubling)
-    neimark-sacker   Π_{i<j} (μ_i μ_j - 1) / (1 + |μ_i μ_j|), at a complex pair
-    branch point     Π (μ_i - 1) / (1 + |μ_i|), where there is no fold
+    neimark-sacker   Π_{i<j} (1 - μ_i μ_j) / (1 + |μ_i μ_j|), at a complex pair
+    branch point     Π (1 - μ_i) / (1 + |μ_i|), where there is no fold
     grazing          number of contacts within the period changes
+    stick            number of borders that laws with memory pass changes: a phase of slip, stick or yielding is born
     floor            a contact's entry rate less its law's floor, below which the law does not see it
 
-All but the grazings are continuous along the branch, so that Brent's method finds their zeros in a few orbits. A
+μ_i are the transverse ones: those of a family of orbits are 1 all along. All but the grazings and sticks are continuous
+along the branch, so that Brent's method finds their zeros in a few orbits. A
 multiplier that jumps over the unit circle at a grazing or a floor is reported as that, not as a flip too. Points where
 Newton's method fails because the return map is not smooth are located before, by `nonsmooth`.
 """
@@ -40,13 +42,13 @@ _MOST_GRAZINGS = 4  # looked for between two points
 
 def indicators(orbit: Orbit, tangent: Array) -> dict[str, float]:
     """Test functions of an orbit; each changes its sign at a special point of its name."""
-    mu = orbit.multipliers
+    mu = orbit.transverse
     first, second = _pairs(len(mu))
     return {
         "fold": float(tangent[-1]),
         "flip": _product(mu, 1.0),
-        "neimark-sacker": _product(mu[first] * mu[second], -1.0),
-        "branch point": _product(mu, -1.0),
+        "neimark-sacker": _product(-mu[first] * mu[second], 1.0),
+        "branch point": _product(-mu, 1.0),
     }
 
 
@@ -70,7 +72,7 @@ def _product(values: Any, shift: float) -> float:
 
 def _is_at(orbit: Orbit, name: str) -> bool:
     """Whether a multiplier is where a special point has it."""
-    mu = orbit.multipliers
+    mu = orbit.transverse
     if name == "neimark-sacker":
         turning = np.abs(mu.imag) > 1e-6 * np.abs(mu)
         return bool(np.any(np.abs(np.abs(mu[turning]) - 1.0) < _AT))
@@ -219,9 +221,24 @@ def _nonsmooth_points(segment: Segment) -> Iterator[tuple[float, Orbit]]:
             return
         near, place, grazed, behind, last = found
         yield from _floors(segment, begin, near)
-        yield place, grazed
+        yield place, replace(grazed, mark="grazing")
         begin, first = behind, last
     yield from _floors(segment, begin, segment.way)
+    if len(segment.a.orbit.contacts) == len(segment.b.orbit.contacts):
+        yield from _sticks(segment)
+
+
+def _sticks(segment: Segment) -> Iterator[tuple[float, Orbit]]:
+    """(arclength, orbit) where the number of transitions changes."""
+    begin, first = 0.0, segment.a.orbit
+    for _ in range(_MOST_GRAZINGS):
+        if len(first.transitions) == len(segment.b.orbit.transitions):
+            return
+        found = _grazing(segment, begin, first, "transitions")
+        if found is None:
+            return
+        _, place, at, begin, first = found
+        yield place, replace(at, mark="stick")
 
 
 def _floors(segment: Segment, begin: float, end: float) -> Iterator[tuple[float, Orbit]]:
@@ -247,14 +264,19 @@ def _over_floor(orbit: Orbit) -> Array:
     return ordered
 
 
-def _grazing(segment: Segment, begin: float, first: Orbit) -> tuple[float, float, Orbit, float, Orbit] | None:
+def _grazing(
+    segment: Segment, begin: float, first: Orbit, log: str = "contacts"
+) -> tuple[float, float, Orbit, float, Orbit] | None:
     """Where the number of contacts changes first after a place: place before, place, orbit, place and orbit behind.
 
-    There the shallowest contact's indentation goes to zero, or the flight between two contacts that become one.
+    There the shallowest contact's indentation goes to zero, or the flight between two contacts that become one; of
+    "transitions" the time between two.
     """
     last, behind = segment.b.orbit, segment.way
-    more = len(last.contacts) > len(first.contacts)  # whether contacts are added on the way
-    distance = _distance(last, first) if more else _distance(first, last)
+    more = _count(last, log) > _count(first, log)  # whether contacts are added on the way
+    distance = _shortest_phase
+    if log == "contacts":
+        distance = _distance(last, first) if more else _distance(first, last)
     near, near_orbit = begin, first
     known = [(behind, distance(last)) if more else (begin, distance(first))]  # on the side with more contacts
     sharp = segment.sharpness()
@@ -271,12 +293,12 @@ def _grazing(segment: Segment, begin: float, first: Orbit) -> tuple[float, float
             if abs(behind - near) <= sharp and _parted(near_orbit, last):
                 return None
             at, touching = (behind, last) if more else (near, near_orbit)
-            return near, at, replace(touching, mark="grazing"), behind, last
+            return near, at, touching, behind, last
         try:
             place, orbit = segment.near(place, behind - near)
         except OrbitError:
             return None
-        same = len(orbit.contacts) == len(first.contacts)
+        same = _count(orbit, log) == _count(first, log)
         if same:
             near, near_orbit = place, orbit
         else:
@@ -284,6 +306,11 @@ def _grazing(segment: Segment, begin: float, first: Orbit) -> tuple[float, float
         if same != more:
             known.append((place, distance(orbit)))
     return None
+
+
+def _count(orbit: Orbit, log: str) -> int:
+    """Number of contacts or transitions."""
+    return len(getattr(orbit, log))
 
 
 def _parted(a: Orbit, b: Orbit) -> bool:
@@ -301,6 +328,15 @@ def _distance(more: Orbit, less: Orbit) -> Callable[[Orbit], float]:
 def _shallowest(orbit: Orbit) -> float:
     """Smallest peak indentation of an orbit's contacts."""
     return float(orbit.contacts.peak_indentation.min(initial=np.inf))
+
+
+def _shortest_phase(orbit: Orbit) -> float:
+    """Square of the shortest time between two transitions of a contact: it vanishes like a root."""
+    log, shortest = orbit.transitions, orbit.period
+    for contact in np.unique(log.contact):
+        times = np.unique(log.t[log.contact == contact])
+        shortest = min(shortest, float(np.diff(times, append=times[0] + orbit.period).min()))
+    return shortest**2
 
 
 def _shortest_flight(orbit: Orbit) -> float:

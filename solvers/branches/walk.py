@@ -105,7 +105,7 @@ class Walk:
                 self.orbits += [*special[:place], ending]
                 return False
         self.orbits += [*special, following.orbit]
-        self.before = None if {"grazing", "floor"} & {*marks} else (a, way)  # no cubic across a nonsmooth point
+        self.before = None if {"grazing", "stick", "floor"} & {*marks} else (a, way)  # no cubic across a nonsmooth point
         return True
 
     def _nonsmooth_ahead(self, reach: float) -> tuple[Point | None, Point, list[Orbit]] | None:
@@ -166,7 +166,7 @@ class Walk:
         way, aligned = float(a.tangent @ a.metric @ off), float(a.tangent @ a.metric @ b.tangent)
         strayed = math.sqrt(max(float(off @ a.metric @ off) - way**2, 0.0))
         sharp = aligned < _SHARPEST or strayed > 0.5 * way
-        across = signature(a.orbit) != signature(b.orbit)
+        across = signature(a.orbit) != signature(b.orbit) or len(a.orbit.transitions) != len(b.orbit.transitions)
         hops = h < (_THERE if across else _LAST) and way > 0.0 and strayed < _FARTHEST * h
         if (sharp and not hops) or is_cut(b.chain, b.orbit.system):  # one not located is stepped over
             self.step *= 0.2 if len(a.orbit.contacts) != len(b.orbit.contacts) else 0.5
@@ -262,10 +262,10 @@ class Walk:
 
 def _jumped(a: Point, b: Point, marks: list[str]) -> bool:
     """Whether b lies on another branch: the parameter turns, a multiplier passes one, or contacts come, all unseen."""
-    turned = a.share * b.share < 0.0 and not {"fold", "floor"} & {*marks}
+    turned = a.share * b.share < 0.0 and not {"fold", "floor", "stick"} & {*marks}
     first, second = (indicators_at(point)["branch point"] for point in (a, b))
     passed = first * second < 0.0 and min(abs(first), abs(second)) > ROUNDING
-    passed = passed and not {"fold", "floor", "branch point"} & {*marks}
+    passed = passed and not {"fold", "floor", "branch point", "stick"} & {*marks}
     return "grazing" not in marks and (turned or passed or not _same_contacts(a.orbit, b.orbit))
 
 
