@@ -95,7 +95,7 @@ class Branch(Printed):
 
     @property
     def special(self) -> list[Orbit]:
-        """Folds, flips, Neimark–Sacker, branch and grazing points."""
+        """Folds, flips, Neimark–Sacker, branch, grazing and stick points."""
         return [one for one in self.orbits if one.mark]
 
     @property
@@ -132,7 +132,7 @@ class Branch(Printed):
         """One row per orbit: parameter, period, stability, largest multiplier, impacts, peaks, residual, mark."""
         rows = []
         for one in self.found.orbits:
-            log, largest = one.contacts, one.multipliers[0]
+            log, largest = one.contacts, one.transverse[0]
             rows.append({
                 self.family.name: one.parameter,
                 "period": self.family.period,
@@ -179,7 +179,7 @@ class Branch(Printed):
         walks = []
         for walk in self.found.walks:
             walks.append([
-                {"parameter": one.parameter, "state": one.state.tolist(), "phase": one.phase, "mark": one.mark,
+                {"parameter": one.parameter, "state": one.whole.tolist(), "phase": one.phase, "mark": one.mark,
                  "residual": one.residual, "iterations": one.iterations}
                 for one in walk.orbits
             ])  # fmt: skip

@@ -22,6 +22,8 @@ from fembeam.support import Part, Printed, require
 from solvers.orbits import periodic_orbit as periodic
 from solvers.orbits import shooting
 from solvers.orbits import shots as chain
+from solvers.orbits.whole_state import begun, flown
+from solvers.orbits.whole_state import run as run_from
 from solvers.problem import counted
 
 if TYPE_CHECKING:
@@ -58,8 +60,13 @@ class Orbit(Printed):
 
     @property
     def multipliers(self) -> Any:
-        """Floquet multipliers (2n,), largest first."""
+        """Floquet multipliers, largest first: (2n,), more with laws with memory."""
         return self.found.multipliers
+
+    @property
+    def transitions(self) -> Any:
+        """Borders that laws with memory pass within one period: stick, slip, yielding."""
+        return self.found.transitions
 
     @property
     def stable(self) -> bool:
@@ -99,6 +106,7 @@ class Orbit(Printed):
     def _parts(self) -> list[Part]:
         """What kind of orbit, its multipliers, its contacts."""
         doubt: list[Part] = [f"in doubt: {self.found.doubt}"] if self.found.doubt else []
+        doubt += self._of_memory()
         multipliers = [(float(abs(one)), float(np.angle(one))) for one in self.multipliers]
         table: Part = ("multiplier |μ|", "angle / rad"), multipliers
         names = "t_in", "t_out", "speed_in", "peak_force"
@@ -110,9 +118,23 @@ class Orbit(Printed):
         ]
         return [repr(self), *doubt, table, *(log if rows else [])]
 
+    def _of_memory(self) -> list[Part]:
+        """What laws with memory do to the orbit: that it is one of a family, how many multipliers are zero."""
+        family, found = self.found.family, list[Part]()
+        if family:
+            which = ", ".join(str(contact) for contact in sorted({contact for contact, _ in family}))
+            count = counted(len(family), "latched number")
+            found.append(f"one of a family: {count} of contact {which} never renewed, each a multiplier 1")
+        if self.found.forgotten:
+            found.append(f"{counted(self.found.forgotten, 'multiplier')} zero: what is latched forgets its past")
+        return found
+
     def __repr__(self) -> str:
         contacts, kind = counted(len(self.contacts), "contact"), "stable" if self.stable else "unstable"
-        return f"<{kind} orbit of period {self.period} with {contacts}, |μ| = {abs(self.multipliers[0]):.4g}>"
+        if self.transitions:
+            contacts += f", {counted(len(self.transitions), 'transition')}"
+        kind += ", one of a family" if self.found.family else ""
+        return f"<{kind} orbit of period {self.period} with {contacts}, |μ| = {abs(self.found.transverse[0]):.4g}>"
 
 
 def extremes_of(t: Vector, u: Vector, v: Vector) -> tuple[float, float]:
@@ -186,7 +208,7 @@ def _smallest(orbit: Orbit, once: float) -> int:
         if orbit.period % shorter:
             continue
         later = chain.delayed(orbit.model.system, orbit.found.phase)
-        end = periodic.flown(later, orbit.state, shorter * once, orbit.found.method)
+        end = flown(later, orbit.found.whole, shorter * once, orbit.found.method)[: 2 * n]
         scale = np.concatenate(
             (np.repeat(np.abs(orbit.state[:n]).max(), n), np.repeat(np.abs(orbit.state[n:]).max(), n))
         )
@@ -277,21 +299,21 @@ def _starts(model: Model, once: float, starts: int | Sequence[ArrayLike], seed: 
 def _settle(model: Model, once: float, start: Vector, longest: int, method: Any) -> tuple[Vector, Orbit | None]:
     """Last state of a long run (at a multiple of the load's period), and the orbit it has come to."""
     n = len(model.omega)
-    x = start
+    x = begun(model.system, start)
     for _ in range(3):
         slowest = float((0.5 * model.system.blocks.c)[model.system.blocks.c > 0.0].min(initial=math.inf))
         count = min(max(math.ceil(7.0 / (slowest * once)), 40), 400) + 4 * longest
-        run = solvers.integrate(model.system, x[:n], x[n:], count * once, once, method)
+        run = run_from(model.system, x, count * once, once, method)
         strobes = np.concatenate((run.q, run.q_dot), axis=1)[-3 * longest :]
-        x = strobes[-1]
+        x = np.concatenate((strobes[-1], *run.memory))
         size = np.abs(strobes).max(axis=0)
         for k in range(1, longest + 1):
             if np.all(np.abs(strobes[k:] - strobes[:-k]) <= 1e-3 * size):
                 try:
-                    return x, _once_around(model, x, k, once)
+                    return x[: 2 * n], _once_around(model, x, k, once)
                 except solvers.OrbitError:
                     break
-    return x, None
+    return x[: 2 * n], None
 
 
 def _once_around(model: Model, x: Vector, k: int, once: float) -> Orbit:
@@ -312,8 +334,9 @@ def _same(a: Orbit | None, b: Orbit | None, once: float) -> bool:
     if a.period != b.period or len(a.contacts) != len(b.contacts):
         return False
     x, y = periodic.at_zero(a.found), periodic.at_zero(b.found)
+    n2 = len(a.state)
     for _ in range(a.period):
-        if np.linalg.norm(x - y) <= 1e-5 * np.linalg.norm(x):
+        if np.linalg.norm(x[:n2] - y[:n2]) <= 1e-5 * np.linalg.norm(x[:n2]):
             return True
-        y = periodic.flown(b.model.system, y, once, b.found.method)
+        y = flown(b.model.system, y, once, b.found.method)
     return False

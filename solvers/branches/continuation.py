@@ -22,7 +22,17 @@ from solvers.branches.point import Point, metric_of, point_of
 from solvers.branches.reshooting import reshot
 from solvers.branches.subharmonic_end import Scaled
 from solvers.branches.walk import BranchStatus, Walk
-from solvers.orbits import Orbit, PeriodicProblem, at_zero, checked, checked_start, codes, newton, orbit_of, solved_chain
+from solvers.orbits import (
+    Orbit,
+    PeriodicProblem,
+    at_zero,
+    checked,
+    checked_start,
+    codes,
+    newton,
+    orbit_of,
+    solved_chain,
+)
 from solvers.problem import System, counted
 
 

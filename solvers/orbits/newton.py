@@ -16,6 +16,9 @@ from solvers.orbits.shots import Chain, PeriodicProblem
 from solvers.problem import Array, SolverError, System
 
 TOLERANCE = 1e-10  # of the residual, in units of the orbit's size
+_ROUGH = (
+    1e-8  # taken with laws with memory if no step is better: a border hardly met is met in one run, not in the next
+)
 _NEARLY = 1e-5  # relative residual after which the next step is expected to be the last
 _MOST_HALVINGS = 6
 _MOST_SEGMENTS = 3  # begins of a period in other segments than it ended with
@@ -66,8 +69,8 @@ def newton(
 ) -> tuple[Chain, float, int]:
     """Solve the chain from a first guess; returns it with its relative residual and the iterations.
 
-    x is (m, N), with what is latched. With a border the parameter is an unknown too. ``slope`` asks for the derivatives by the parameter of what is
-    returned; ``most`` is the number of iterations allowed. Raises OrbitError.
+    x is (m, N), with what is latched. With a border the parameter is an unknown too. ``slope`` asks for the
+    derivatives by the parameter of what is returned; ``most`` is the number of iterations allowed. Raises OrbitError.
     """
     unknowns = guess = np.append(x.ravel(), parameter)
     measure = _Measure(problem)
@@ -84,9 +87,10 @@ def newton(
             break
         unknowns, chain, error = np.append(trial.x.ravel(), unknowns[-1] + 0.5**halving * step[-1]), trial, trial_error
         history.append(error)
-    if error <= TOLERANCE and slope and not chain.has_slope:
+    enough = _ROUGH if chain is not None and chain.coordinates < x.shape[1] else TOLERANCE
+    if error <= enough and slope and not chain.has_slope:
         chain, error = _fire(problem, unknowns, measure, True)
-    if not error <= TOLERANCE:
+    if not error <= enough:
         raise OrbitError(
             f"{len(history)} iterations of Newton's method reduced the residual from {history[0]:.3g} to {error:.3g} "
             "of the motion's size"

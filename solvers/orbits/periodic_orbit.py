@@ -45,10 +45,10 @@ class Orbit:
     doubt : why `stable` may be wrong; empty when no reason was found.
     parameter : value of the branch's parameter, NaN outside a branch.
     mark : "fold", "flip", "neimark-sacker", "branch point", "grazing", "stick", "floor" or "merging" at special points
-        of a branch, else empty. At a "stick" the number of `transitions` changes: a phase of stick or slip, a yielding
-        or a reversal is born or dies; the branch may have a corner. Two orbits marked "merging" follow each other where a branch jumps because two contacts
+        of a branch, else empty. Two orbits marked "merging" follow each other where a branch jumps because two contacts
         become one. At a "grazing" or "floor" (an entry rate meets its law's floor) multipliers jump, and the branch may
-        turn back with a corner.
+        turn back with a corner; likewise at a "stick", where the number of `transitions` changes: a phase of stick or
+        slip, a yielding or a reversal comes or goes.
 
     Examples
     --------
@@ -130,7 +130,8 @@ def _eigenvalues(matrix: Array) -> Any:
     """Eigenvalues, those exactly zero that singular values tell of; rounding spreads them if they are multiple."""
     from scipy.linalg import matrix_balance
 
-    matrix, whole = matrix_balance(matrix, permute=False)[0], len(matrix)
+    with np.errstate(invalid="ignore"):  # scales beyond the whole numbers
+        matrix, whole = matrix_balance(matrix, permute=False)[0], len(matrix)
     while len(matrix):
         u, s, v = np.linalg.svd(matrix)
         rank = int(np.sum(s > _LOST * s[0]))
