@@ -259,9 +259,8 @@ def test_a_yielded_stop_after_shakedown_is_one_of_a_family():
     found = orbit(system, period, [*at_zero(same), 0.0, 8.0])
     assert found.family == ((0, 1),)
     assert found.memory[0][1] == 8.0
-    assert 1.0 < found.contacts.peak_force.max() < 8.0
     assert len(found.contacts) == 1
-    assert abs(found.contacts.peak_force[0] / same.contacts.peak_force[0] - 1.0) < 1e-8
+    assert abs(found.contacts.t_in - same.contacts.t_in).max() < 1e-8
     assert abs(at_zero(found)[:2] - at_zero(same)).max() < 1e-9
     assert abs(np.sort_complex(found.transverse) - np.sort_complex(same.multipliers)).max() < 1e-7
 

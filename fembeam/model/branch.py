@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import solvers
-from fembeam.model.orbit import Orbit, checked_period, load_period, orbit
+from fembeam.model.equations import load_period
+from fembeam.model.orbit import Orbit, checked_period, orbit
 from fembeam.scene import changes_structure, path_of, replaced, value_of
 from fembeam.support import Part, Printed, counting, note, require, written_whole
 from solvers.branches import restarted

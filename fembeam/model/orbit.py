@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from functools import cached_property
 from textwrap import shorten
 from typing import TYPE_CHECKING, Any
@@ -17,7 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import solvers
-from fembeam.scene import signals_of, unit_of
+from fembeam.model.equations import load_period
+from fembeam.scene import unit_of
 from fembeam.support import Part, Printed, require
 from solvers.orbits import periodic_orbit as periodic
 from solvers.orbits import shooting
@@ -149,27 +149,6 @@ def extremes_of(t: Vector, u: Vector, v: Vector) -> tuple[float, float]:
             found.append((u[:-1] + s * (a + s * (b + s * c)))[inside])
     values = np.concatenate(found)
     return float(values.min()), float(values.max())
-
-
-def load_period(scene: Scene) -> float:
-    """Period of all loads together, s; an error where there is none."""
-    return common_period(list(signals_of(scene).values()))
-
-
-def common_period(signals: list[Any]) -> float:
-    """Period of some signals together, s."""
-    others = [signal for signal in signals if not hasattr(signal, "tones")]
-    require(not others, "an orbit needs periodic loads", others, "the scene", "use Harmonic or Multisine")
-    omega = np.concatenate([np.asarray(signal.tones()[0], dtype=float) for signal in signals] or [np.zeros(0)])
-    omega = omega[omega > 0.0]
-    require(omega.size > 0, "an orbit needs a load with a period", signals, "the scene", "add base=Harmonic(...)")
-    if omega.size == 1:
-        return 2.0 * math.pi / float(omega[0])
-    ratios = [Fraction(w / omega.min()).limit_denominator(1000) for w in omega]
-    off = max(abs(float(r) * omega.min() / w - 1.0) for r, w in zip(ratios, omega, strict=True))
-    require(off < 1e-9, "the tones have no common period", omega.tolist(), "the scene", "make their ratios rational")
-    common = Fraction(math.gcd(*(r.numerator for r in ratios)), math.lcm(*(r.denominator for r in ratios)))
-    return 2.0 * math.pi / (omega.min() * float(common))
 
 
 def orbit(model: Model, period: int, start: ArrayLike | Orbit | None, shots: int | None) -> Orbit:
