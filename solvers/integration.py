@@ -29,7 +29,7 @@ from solvers.compiled.state import (
     T,
     contact_row,
 )
-from solvers.exponential.energy.guard import unbalanced
+from solvers.exponential.energy.check import unbalanced
 from solvers.problem import (
     COLUMNS,
     Array,
@@ -46,7 +46,7 @@ from solvers.problem import (
     hand_over,
     product,
 )
-from solvers.problem.run_arguments import _check_laws, _check_tangent, _start, _times
+from solvers.problem.run_arguments import _check_laws, _check_tangent, _start, _times, latched_at_start
 
 _BUDGET = 20_000  # steps in a block: between two checks for signals and calls of `progress`
 _DEPTH, _FORCE = (list(ContactLog.__dataclass_fields__).index(name) for name in ("peak_indentation", "peak_force"))
@@ -110,8 +110,9 @@ def integrate(
     status = solution.status
     if isinstance(tangent, Parameter) and status is Status.DONE and not run.tangent.exact:
         ends = [_end(s, q0, q_dot0, duration, method) for s in (tangent.behind, tangent.ahead)]
+        known: Any = solution.tangent
         column = (ends[1] - ends[0]) / (2.0 * tangent.step)
-        solution = replace(solution, tangent=np.column_stack((solution.tangent, column)))
+        solution = replace(solution, tangent=np.column_stack((known, column)))
     if check and status not in (Status.DONE, Status.INTERRUPTED):
         raise SolverError(
             f"stopped at t = {run.time:.9g} s of {duration:g} s: {status.value}{run.explanation(status)}", solution
@@ -138,25 +139,12 @@ def prepared_run(
     times = _times(duration, dt)
     _check_laws(system)
     forcing = _forcing(system, duration, min(max(method.rtol, 1e-12), 1e-6))
-    latched = _latched(system, memory)
+    latched = latched_at_start(system, memory)
     engine = method.engine(system, z, forcing, duration)
     for s, numbers in latched:
-        engine.problem.parameters[s, list(system.contacts[s].law.memory)] = numbers
+        law: Any = system.contacts[s].law
+        engine.problem.parameters[s, list(law.memory)] = numbers
     return _Run(system, engine, times, tangent)
-
-
-def _latched(system: System, memory: Sequence[ArrayLike | None] | None) -> list[tuple[int, Array]]:
-    """(contact, latched numbers) of those given, checked."""
-    if memory is None:
-        return []
-    if len(memory) != len(system.contacts):
-        raise ValueError(f"memory must have one entry per contact, {len(system.contacts)}, got {len(memory)}")
-    given = [(s, np.array(numbers, dtype=float)) for s, numbers in enumerate(memory) if numbers is not None]
-    for s, numbers in given:
-        count = len(getattr(system.contacts[s].law, "memory", ()))
-        if numbers.shape != (count,) or not np.isfinite(numbers).all():
-            raise ValueError(f"memory of contact {s} must be {count} finite numbers, got {memory[s]!r}")
-    return given
 
 
 def _forcing(system: System, duration: float, rtol: float) -> Forcing:
@@ -202,6 +190,8 @@ class _Run:
     @property
     def memory(self) -> tuple[Array, ...]:
         """What the laws have latched by now, one array per contact."""
+        if not self.engine.problem.border_count.any():
+            return tuple(np.empty(0) for _ in self.system.contacts)
         rows = zip(self.system.contacts, self.engine.problem.parameters, strict=True)
         return tuple(row[list(getattr(contact.law, "memory", ()))] for contact, row in rows)
 
@@ -230,8 +220,7 @@ class _Run:
         except KeyboardInterrupt:
             return Status.INTERRUPTED
         x = self.state.x
-        with np.errstate(over="ignore", invalid="ignore"):  # loads of 1e300 overflow where no method looks
-            finite = math.isfinite(x.dot(x)) or np.isfinite(x).all()
+        finite = math.isfinite(sum(x.tolist())) or np.isfinite(x).all()  # a sum may overflow
         return STATUSES[code] if finite or STATUSES[code] is not Status.DONE else Status.DIVERGED
 
     def solution(self, status: Status, seconds: float) -> Solution:
@@ -249,7 +238,7 @@ class _Run:
         ledger = partial(_energy, self.system, powers, complete, motion, back, self.begin)
         rows = self._rows()
         log = partial(ContactLog.of_rows, self._of_stops(rows))
-        transitions = partial(Transitions.of_rows, rows[rows[:, 0] < 0.0], self.system.contacts)
+        transitions = partial(Transitions.of_rows, rows, self.system.contacts)
         if status is Status.DONE and not self._balances(powers, complete, motion, rows):
             status = Status.UNBALANCED
         count = self.state.count.tolist()
@@ -264,15 +253,15 @@ class _Run:
         """Whether the energy balance closes, where it is kept; methods without `gains` are checked step by step."""
         if not hasattr(self.engine, "gains"):
             return True
-        rows = rows[rows[:, 0] >= 0.0]
-        exchanged = rows[:, _DEPTH] * rows[:, _FORCE]
         if not complete or not len(motion):
-            return not self.engine.gains(exchanged)
+            return not self.engine.gains(partial(_exchanged, rows))
         begin = self.engine.back @ self.begin
-        return not unbalanced(self.system, powers, motion, begin, exchanged, self.engine.method.rtol)
+        return not unbalanced(self.system, powers, motion, begin, _exchanged(rows), self.engine.method.rtol)
 
     def _of_stops(self, rows: Array) -> Array:
         """The rows of contacts that begin and end; one with memory under way is none while its law is open."""
+        if not any(contact.always for contact in self.system.contacts):
+            return rows
         always = np.array([c.always and not getattr(c.law, "opens", False) for c in self.system.contacts])
         opening, parameters = self.engine.problem.opening, self.engine.problem.parameters
         shut = np.array([place < 0 or parameters[s, place] != 0.0 for s, place in enumerate(opening)])
@@ -296,13 +285,18 @@ class _Run:
     def _rows(self) -> Array:
         """The log, contacts under way last."""
         logged = self.log[: self.state.count[LOGGED]].copy()
-        under_way = [s for s, piece in enumerate(self.state.piece.tolist()) if piece > 0]
+        under_way = [s for s, segment in enumerate(self.state.segment.tolist()) if segment > 0]
         if not under_way:
             return logged
         rows = np.empty((len(under_way), COLUMNS))
         for s, row in zip(under_way, rows, strict=True):
             contact_row(self.engine.problem, self.state, s, math.nan, math.nan, row)
         return np.concatenate((logged, rows))
+
+
+def _exchanged(rows: Array) -> Array:
+    """(k,) peak force times peak indentation of every contact of a log, J."""
+    return (rows[:, _DEPTH] * rows[:, _FORCE])[rows[:, 0] >= 0.0]
 
 
 def _energy(system: System, powers: Array, complete: bool, motion: Array, back: Array, begin: Array) -> Energy:

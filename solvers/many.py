@@ -21,7 +21,7 @@ from solvers.problem import Array, SolverError, Status, System, counted
 from solvers.problem.run_arguments import _check_laws, _times
 
 if TYPE_CHECKING:
-    from solvers.exponential.many import Worker
+    from solvers.exponential.many_starts import Worker
 
 _STRETCH = 64  # starts a thread takes at once, at most
 _LOOK = 0.1  # s between two looks at the threads
@@ -99,7 +99,7 @@ def integrate_many(
     >>> bool(np.abs(ends.q[:, 0] - [1.0, 0.5]).max() < 1e-7)
     True
     """
-    from solvers.exponential.many import CONTACTS, REACHED, Ends, Worker, judged
+    from solvers.exponential.many_starts import CONTACTS, REACHED, Outcomes, Worker, final_statuses
     from solvers.exponential.method import Exponential
 
     method = Exponential() if method is None else method
@@ -111,13 +111,17 @@ def integrate_many(
     _check_laws(system)
     forcing, begin = _forcing(system, duration, min(max(method.rtol, 1e-12), 1e-6)), time.perf_counter()
     engines = [method.engine(system, starts[0], forcing, duration) for _ in range(min(threads, len(starts)))]
-    ends = Ends.of(len(starts), engines[0].back.shape[1], len(system.contacts))
-    _to_the_end([Worker(engine, starts, ends, _BUDGET) for engine in engines], len(starts), progress)
-    status = judged(engines[0], ends)
+    outcomes = Outcomes.of(len(starts), engines[0].back.shape[1], len(system.contacts))
+    _to_the_end([Worker(engine, starts, outcomes, _BUDGET) for engine in engines], len(starts), progress)
+    status = final_statuses(engines[0], outcomes)
     for engine in engines:
         engine.release()
-    motion, n = _products(engines[0].back, ends.x), system.size
-    t, contacts, peaks = ends.number[:, REACHED], ends.count[:, CONTACTS], (ends.peak[..., 0], ends.peak[..., 1])
+    motion, n = _products(engines[0].back, outcomes.x), system.size
+    t, contacts, peaks = (
+        outcomes.number[:, REACHED],
+        outcomes.count[:, CONTACTS],
+        (outcomes.peak[..., 0], outcomes.peak[..., 1]),
+    )
     found = ManySolutions(motion[:, :n], motion[:, n:], t, status, contacts, *peaks, time.perf_counter() - begin)
     if check:
         _check_status(found, duration)
@@ -183,7 +187,7 @@ def _stretches(
     """The work of one thread, with a look at the world outside in between."""
     for first in stretches:
         beyond = min(first + size, count)
-        worker.take(first, beyond)
+        worker.assign(first, beyond)
         while not worker.march():
             if stop.is_set():
                 return

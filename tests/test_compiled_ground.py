@@ -1,4 +1,4 @@
-"""Eights, vector sums and handles against numpy and the tuples they stand for."""
+"""SIMD vectors, sums and packed arguments against numpy and the tuples they stand for."""
 
 import ast
 from pathlib import Path
@@ -10,11 +10,11 @@ from numba import njit, types
 
 from contacts import Hertz, KelvinVoigt, Viscoelastic
 from solvers.compiled import decorators
-from solvers.compiled.handles import Layout, Mould, Packed, opener
-from solvers.compiled.simd import bits, eight, put, raised, root, spread, total
+from solvers.compiled.packed import Layout, Packed, PackedTemplate, unpacker
+from solvers.compiled.simd import bit_pattern, load8, positive8, splat8, sqrt8, store8, sum8
 from solvers.compiled.sums import combine, padded
-from solvers.exponential.contact.nodes import LOCAL, families_of, series_of
-from solvers.exponential.contact.peaks import summit
+from solvers.exponential.contact.nodes import LOCAL, node_sets_of, series_of
+from solvers.exponential.contact.peaks import local_maximum
 from solvers.exponential.flight import level_within
 
 OPTIONS = {"error_model": "numpy", "_nrt": False}
@@ -66,7 +66,7 @@ def test_combine_may_add_to_its_own_start():
 
 
 class Things(NamedTuple):
-    """What a handle points to."""
+    """Arrays and a number to pack."""
 
     vector: np.ndarray
     number: float
@@ -77,12 +77,12 @@ class Things(NamedTuple):
 KIND = types.NamedTuple(
     [types.float64[::1], types.float64, types.Array(types.float64, 3, "C"), types.int64[::1]], Things
 )
-_open = opener(KIND)
+_open = unpacker(KIND)
 
 
 @njit(**OPTIONS)
 def look(address, out):
-    """Sums, shapes and single entries seen through the handle; writes one entry back."""
+    """Sums, shapes and single entries read through the address; writes one entry back."""
     things = _open(address)
     out[0], out[1], out[2] = things.vector.sum(), things.number, things.cube[1, 2, 3]
     out[3], out[4], out[5] = things.cube.shape[0], things.cube.shape[2], things.count[1]
@@ -106,10 +106,10 @@ def expected(of):
     return [of.vector.sum(), of.number, of.cube[1, 2, 3], 2, 4, of.count[1], of.cube[1].sum()]
 
 
-def test_attributes_of_a_handle_are_those_of_the_tuple():
+def test_attributes_of_packed_arguments_are_those_of_the_tuple():
     one = things()
     wanted = expected(one)
-    np.testing.assert_allclose(seen(Packed(one, KIND).address), wanted, rtol=1e-14)
+    np.testing.assert_allclose(seen(Packed.of(one, KIND).address), wanted, rtol=1e-14)
     assert one.vector[0] == -1.0
 
 
@@ -124,19 +124,19 @@ def test_attributes_of_a_handle_are_those_of_the_tuple():
 )
 def test_what_does_not_fit_the_declared_kind_is_refused_by_name(name, value):
     with pytest.raises(TypeError, match=f"{name} must be a contiguous"):
-        Packed(things()._replace(**{name: value}), KIND)
+        Packed.of(things()._replace(**{name: value}), KIND)
 
 
-def test_casts_of_a_mould_own_what_they_were_told_to_and_share_the_rest():
+def test_copies_of_a_template_have_own_arrays_and_share_the_rest():
     one = things()
-    mould = Mould(one, KIND, ["vector", "cube"])
-    first, second = mould.cast(), mould.cast(number=8.0)
+    template = PackedTemplate(one, KIND, ["vector", "cube"])
+    first, second = template.copy(), template.copy(number=8.0)
     first.value.vector[:] = 5.0
     assert (first.value.number, second.value.number, one.number) == (0.25, 8.0, 0.25)
     assert first.value.count is second.value.count is one.count
-    for cast in (first, second):
-        wanted = expected(cast.value)
-        np.testing.assert_allclose(seen(cast.address), wanted, rtol=1e-14)
+    for copy in (first, second):
+        wanted = expected(copy.value)
+        np.testing.assert_allclose(seen(copy.address), wanted, rtol=1e-14)
     np.testing.assert_array_equal(second.value.vector[1:], one.vector[1:])
     assert one.vector[0] != -1.0
 
@@ -149,7 +149,7 @@ class Pair(NamedTuple):
 
 
 PAIR = types.NamedTuple([types.Array(types.float64, 2, "C"), types.int64[::1]], Pair)
-_open_pair = opener(PAIR)
+_open_pair = unpacker(PAIR)
 
 
 @njit(**OPTIONS)
@@ -171,47 +171,47 @@ def test_tuples_of_a_layout_share_one_block_and_do_not_overlap():
     np.testing.assert_array_equal(second.values[:, 0], [0, 10, 20, 30])
     assert (first.marks[0], second.marks[0], second.marks[1]) == (3, 1, 0)
     longer = np.zeros((5, 2))
-    layout.exchange(block, 1, 0, longer)
+    layout.replace_array(block, 1, 0, longer)
     write(start + layout.starts[1])
     np.testing.assert_array_equal(longer[:, 1], [1, 11, 21, 31, 41])
 
 
 @njit(**OPTIONS)
-def in_eights(x, y, out):
+def in_vectors(x, y, out):
     for i in range(0, x.size, 8):
-        a, b = eight(x, i), eight(y, i)
-        more = a * b - spread(0.5)
-        more += root(raised(a))
-        put(out, i, more)
-    return total(eight(out, 8))
+        a, b = load8(x, i), load8(y, i)
+        more = a * b - splat8(0.5)
+        more += sqrt8(positive8(a))
+        store8(out, i, more)
+    return sum8(load8(out, 8))
 
 
 @njit(**OPTIONS)
 def bits_of(number):
-    return bits(number)
+    return bit_pattern(number)
 
 
 class Lengths(NamedTuple):
-    h: np.ndarray
+    flight_step: np.ndarray
 
 
 # compiled anew: the library's own caches must not know a type that only this file has
 level_of = njit(**OPTIONS)(level_within.py_func)
 
 
-def test_eights_calculate_like_numbers():
+def test_vectors_calculate_like_numbers():
     rng = np.random.default_rng(1)
     x, y, out = rng.standard_normal(16), rng.standard_normal(16), np.full(20, np.nan)
     expected = x * y - 0.5 + np.sqrt(np.maximum(x, 0.0))
-    assert in_eights(x, y, out) == pytest.approx(expected[8:].sum(), rel=1e-14)
+    assert in_vectors(x, y, out) == pytest.approx(expected[8:].sum(), rel=1e-14)
     np.testing.assert_allclose(out[:16], expected, rtol=1e-15, atol=1e-15)
     assert np.isnan(out[16:]).all()
 
 
-def test_not_a_number_is_not_raised_to_zero():
+def test_not_a_number_is_not_clipped_to_zero():
     x, out = np.zeros(16), np.zeros(16)
     x[3] = np.nan
-    in_eights(x, x, out)
+    in_vectors(x, x, out)
     assert np.flatnonzero(np.isnan(out)).tolist() == [3]
 
 
@@ -231,10 +231,10 @@ def test_level_is_the_longest_tabulated_step_within_the_span():
     assert np.all((found == 0) | (h[found - 1] > spans))
 
 
-summit_of = njit(**OPTIONS)(summit.py_func)
+maximum_of = njit(**OPTIONS)(local_maximum.py_func)
 
 
-def test_summit_is_the_polynomials_maximum_around_its_highest_point():
+def test_maximum_is_that_of_the_polynomial_around_its_highest_point():
     """Of what a step looks like between three of its nodes: terms that fall."""
     rng, fine = np.random.default_rng(3), np.linspace(-1.0, 1.0, 20_001)
     for _ in range(400):
@@ -244,7 +244,7 @@ def test_summit_is_the_polynomials_maximum_around_its_highest_point():
         place = int(np.where(seen, values, -np.inf).argmax())
         low, high = LOCAL[max(place - 1, 0)], min(LOCAL[min(place + 1, 7)], limit)
         inside = polynomial(fine[(fine >= low) & (fine <= high)])
-        found = summit_of(values, limit, np.empty(8))
+        found = maximum_of(values, limit, np.empty(8))
         assert max(values[place], polynomial(limit)) <= found + 1e-12
         assert found <= polynomial(np.append(fine[fine <= limit], limit)).max() + 1e-6
         if 0 < place < 7 and inside.argmax() not in (0, inside.size - 1):
@@ -254,11 +254,11 @@ def test_summit_is_the_polynomials_maximum_around_its_highest_point():
 def test_steps_are_interpolated_around_every_node():
     """δ and h δ̇ of a motion that eight nodes resolve, between the neighbours of each node."""
     motion = np.array([lambda t: np.sin(3.0 * t + 0.2), lambda t: 3.0 * np.cos(3.0 * t + 0.2)])
-    families, h = families_of(((2.0, 3.0), (4.0, 1.0))), 0.7
+    node_sets, h = node_sets_of(((2.0, 3.0), (4.0, 1.0))), 0.7
     for f, error in ((0, 1e-6), (1, 3e-6), (2, 1e-5)):
-        t = h * families.nodes[f] ** families.power[f]
-        for zoom, (begin, end) in zip(families.zoom[f], families.places[f], strict=True):
-            at = h * (begin + 0.5 * (LOCAL + 1.0) * (end - begin)) ** families.power[f]
+        t = h * node_sets.nodes[f] ** node_sets.time_exponent[f]
+        for zoom, (begin, end) in zip(node_sets.local_interpolation[f], node_sets.local_interval[f], strict=True):
+            at = h * (begin + 0.5 * (LOCAL + 1.0) * (end - begin)) ** node_sets.time_exponent[f]
             known = [motion[0](t), h * motion[1](t), [motion[0](0.0), h * motion[1](0.0)]]
             found = np.concatenate(known) @ zoom
             np.testing.assert_allclose(found, np.concatenate((motion[0](at), h * motion[1](at))), atol=error)
@@ -285,7 +285,7 @@ PRIVATE = "numba.core", "numba.np", "llvmlite"
 USERS = {  # the files that stand on what numba does not promise, and why
     "solvers/compiled/decorators.py",  # options of njit, described there
     "solvers/compiled/cache.py",  # llvmlite's version
-    "solvers/compiled/handles.py",  # a type of its own, and loads through a pointer
+    "solvers/compiled/packed.py",  # a type of its own, and loads through a pointer
     "solvers/compiled/simd.py",  # a type of its own, and vector instructions
     "solvers/compiled/kernels.py",  # calls of C functions at an address
     "contacts/kernels.py",  # the same

@@ -1,16 +1,18 @@
 """Work and damping of whole steps and of runs: against quadrature, closed forms, and the balance of energy."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import quad_vec
 from scipy.linalg import expm
 
 import fembeam as fb
-from contacts import Hertz, PiecewiseLinear
+from contacts import Hertz, Hysteretic, Jenkins, KelvinVoigt, PiecewiseLinear, Viscoelastic
 from solvers import Contact, Exponential, System, integrate
 from solvers.exponential.contact.nodes import S
-from solvers.exponential.energy.contact_tables import BEGIN, contact_table
-from solvers.exponential.preparation import ready_for
+from solvers.exponential.energy.contact_tables import BEGAN, ENTERING, SQUARES, contact_table
+from solvers.exponential.preparation import prepare_run
 from solvers.problem import hand_over
 
 FREE = [Contact([1.0, 1.0, 1.0, 0.5], Hertz(1e6), gap=1e9)]
@@ -44,9 +46,9 @@ def blocks(signals, omega=(0.0, 9.0, 40.0, 75.0), zeta=(0.0, 1.0, 3.0, 0.02)):
 def prepared(system, spacing=0.013, duration=1.0):
     """What a run of the system would prepare, and its ledger's tables."""
     forcing = hand_over([signal for _, signal in system.loads], duration, 1e-10)
-    forcing, made = ready_for(system, forcing, duration, 1e-10)
+    forcing, made = prepare_run(system, forcing, duration, 1e-10)
     problem = made.problem.value._replace(table=forcing.table, table_start=forcing.table_start)
-    return problem, made.tables.value, made.books_for(spacing).value
+    return problem, made.tables.value, made.energy_tables_for(spacing).value
 
 
 def quadrature(problem, tables, h, x, s):
@@ -70,17 +72,17 @@ def quadrature(problem, tables, h, x, s):
     return quad_vec(rates, 0.0, h, epsabs=0.0, epsrel=1e-13, limit=400)[0]
 
 
-def by_forms(books, level, x, s):
+def by_forms(energy_tables, level, x, s):
     """The same by the tables."""
     n = len(x) // 2
-    given = np.concatenate((x[books.driver], *s))
-    rows = (given @ books.rows[level]).reshape(2, -1)[:, : len(x)] @ x
-    own = books.plain.shape[2]
+    given = np.concatenate((x[energy_tables.driver], *s))
+    rows = (given @ energy_tables.rows[level]).reshape(2, -1)[:, : len(x)] @ x
+    own = energy_tables.plain.shape[2]
     p, v = x[:own], x[n : n + own]
-    rows[1] += (books.plain[level] * [p * p, p * v, v * v]).sum()
-    signals = given[len(books.driver) :]
+    rows[1] += (energy_tables.plain[level] * [p * p, p * v, v * v]).sum()
+    signals = given[len(energy_tables.driver) :]
     if len(signals):
-        rows += (signals @ books.pairs[level]).reshape(2, -1)[:, : len(signals)] @ signals
+        rows += (signals @ energy_tables.pairs[level]).reshape(2, -1)[:, : len(signals)] @ signals
     return rows
 
 
@@ -89,17 +91,17 @@ def by_forms(books, level, x, s):
 )
 def test_forms_of_flight_steps_are_their_quadrature(signals):
     """Long and short steps and the step of its own length, for rigid, critical, over- and hardly damped blocks."""
-    problem, tables, books = prepared(blocks(signals))
+    problem, tables, energy_tables = prepared(blocks(signals))
     rng = np.random.default_rng(1)
     scale = np.concatenate((np.ones(len(problem.k)), np.maximum(np.sqrt(problem.k), 1.0)))
-    assert books.spacing == (problem.table_dt[0] if len(problem.table_dt) else 0.013)
-    for level in (len(tables.h), 8, 19, 30, len(tables.h) - 1):
-        h = np.append(tables.h, books.spacing)[level]
+    assert energy_tables.spacing == (problem.table_dt[0] if len(problem.table_dt) else 0.013)
+    for level in (len(tables.flight_step), 8, 19, 30, len(tables.flight_step) - 1):
+        h = np.append(tables.flight_step, energy_tables.spacing)[level]
         x = rng.standard_normal(len(scale)) * scale
         s = [rng.standard_normal(6) * 7.0 ** np.arange(6) for _ in problem.table_dt]
         exact = quadrature(problem, tables, h, x, s)
         parts = sum(abs(quadrature(problem, tables, h, x * sign, s)) for sign in (1.0, -1.0))  # sizes that may cancel
-        np.testing.assert_array_less(abs(by_forms(books, level, x, s) - exact), 1e-12 * parts + 1e-300)
+        np.testing.assert_array_less(abs(by_forms(energy_tables, level, x, s) - exact), 1e-12 * parts + 1e-300)
 
 
 @pytest.mark.parametrize(("power", "lead"), [(1.0, 0.0), (2.0, 3.0), (4.0, 1.0)])
@@ -113,9 +115,8 @@ def test_tables_of_contact_steps_are_their_quadrature(power, lead, k, c):
     arrays = [np.array(values).tobytes() for values in ([k], [c], [0.7])]
     table = contact_table(*arrays, power, lead, nodes.tobytes())[0, 0]
     rng = np.random.default_rng(2)
-    y = np.concatenate((rng.standard_normal(2 * S), [0.3, -1.0], np.zeros(6)))
-    if not lead:
-        y[S : 2 * S] = 0.0
+    start, forces = [0.3, -1.0], rng.standard_normal(S)
+    entering = rng.standard_normal(S) if lead else np.zeros(S)
 
     def lagrange(sigma):
         return np.array([np.prod([(sigma - b) / (a - b) for b in nodes if b != a]) for a in nodes])
@@ -123,14 +124,16 @@ def test_tables_of_contact_steps_are_their_quadrature(power, lead, k, c):
     def rate(sigma, z):
         basis, pace = lagrange(sigma), 0.7 * power * sigma ** (power - 1.0)
         weighted = (sigma / nodes) ** lead if lead else np.zeros(S)
-        force = basis @ y[:S] + (basis * weighted) @ y[S : 2 * S]
+        force = basis @ forces + (basis * weighted) @ entering
         v = z[1]
         return pace * np.concatenate(([v, force - k * z[0] - c * v, v * v], basis * v))
 
-    exact = solve_ivp(rate, (0.0, 1.0), [0.3, -1.0, *np.zeros(1 + S)], "DOP853", rtol=3e-14, atol=1e-14).y[2:, -1]
-    sums = y[: BEGIN + 2] @ table
+    exact = solve_ivp(rate, (0.0, 1.0), [*start, *np.zeros(1 + S)], "DOP853", rtol=3e-14, atol=1e-14).y[2:, -1]
+    sums = np.concatenate((forces, start)) @ table[:BEGAN] + entering @ table[ENTERING:SQUARES]
+    squares = sums[S:] @ forces + table[BEGAN, :3] @ [start[0] ** 2, start[0] * start[1], start[1] ** 2]
+    squares += np.concatenate((entering, start)) @ table[SQUARES:, :S] @ entering
     np.testing.assert_allclose(sums[:S], exact[1:], rtol=0.0, atol=1e-12)
-    np.testing.assert_allclose(sums[S : S + BEGIN + 2] @ y[: BEGIN + 2], exact[0], rtol=1e-12)
+    np.testing.assert_allclose(squares, exact[0], rtol=1e-12)
 
 
 @pytest.mark.parametrize("dt", [3e-4, 1e-2, 0.3])
@@ -224,3 +227,42 @@ def test_outputs_of_another_spacing_give_the_same_ledger():
         np.testing.assert_allclose(
             getattr(fine, name)[::2], getattr(coarse, name), rtol=0.0, atol=1e-12 * fine.damping[-1]
         )
+
+
+def unaccounted(run):
+    """Energy a run does not account for, in units of what it handled, the exchange within its contacts included."""
+    energy, log = run.energy, run.contacts
+    handled = energy.initial + sum(np.abs(part).max() for part in (energy.stored, energy.input, energy.damping))
+    return np.abs(energy.residual).max() / (handled + np.abs(log.peak_force * log.peak_indentation).sum())
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9, 1e-12])
+@pytest.mark.parametrize(
+    "law",
+    [
+        *(Hertz(1e6), Hysteretic(1e6, 0.4), Viscoelastic.tsuji(1e6, 0.6, 1.0), KelvinVoigt(2e4, 20.0)),
+        *(PiecewiseLinear([1e4, 5e4], [5e-3]), Jenkins(400.0, 1.5)),
+    ],
+    ids=lambda law: type(law).__name__,
+)
+def test_samples_within_contacts_balance_as_well_as_their_ends(law, rtol):
+    """Many samples within every step, one mode and two: rtol or rounding, however stiff or flat the law."""
+    jenkins = isinstance(law, Jenkins)
+    for n in (1, 2):
+        rows = np.array([1.0, -1.2])[:n]
+        contact = Contact(-rows, law, gap=0.0 if jenkins else 0.01, always=jenkins)
+        system = System.modal([10.0, 63.0][:n], 0.01, [contact], [(rows, fb.Harmonic(30.0, 14.0))])
+        run = integrate(system, np.zeros(n), -0.8 * rows, 1.0, 1.7e-4, Exponential(rtol))
+        assert len(run.contacts) >= 3 or jenkins
+        assert unaccounted(run) < 2.0 * rtol + 1e-12
+
+
+def test_work_against_a_force_that_hardly_changes():
+    """Steps of a slider grow until fast modes oscillate between the nodes of a step, where no node sees their work."""
+    omega, rows = [10.0, 63.0, 180.0, 400.0, 900.0, 2000.0], np.array([1.0, -1.2, 0.9, 1.1, -0.8, 0.7])
+    contact = Contact(-rows, Jenkins(400.0, 1.5), always=True)
+    for n in (2, 6):
+        system = System.modal(omega[:n], 0.01, [replace(contact, direction=-rows[:n])], [])
+        run = integrate(system, np.zeros(n), -0.8 * rows[:n], 1.0, 1e-3, Exponential(1e-10))
+        assert len(run.transitions) > 2
+        assert unaccounted(run) < 1e-11

@@ -7,7 +7,8 @@ import pytest
 from scipy.sparse import csc_array
 from sliders import Slider
 
-from contacts import Hertz, Jenkins, KelvinVoigt
+from contacts import Coulomb, Hertz, Jenkins, KelvinVoigt
+from contacts.memory import WaltonBraun
 from solvers import (
     RK4,
     CentralDifference,
@@ -208,3 +209,52 @@ def test_sparse_matrices_carry_the_same_latches(method):
     assert np.allclose(ends[0].q, ends[1].q, atol=1e-9)
     assert np.allclose(ends[0].transitions.t, ends[1].transitions.t, atol=1e-9)
     assert len(ends[0].transitions) > 6
+
+
+# --- yielding stops --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("kind", "seen"), [("kept", 1), ("forgotten", 2)])
+def test_blows_on_a_yielding_stop(kind, seen):
+    """A free mass thrown between a yielding stop and a spring: restitution √(k₁/k₂), set, peak, impulse."""
+    mass, speed, loading, unloading = 2.0, 0.5, 1e4, 4e4
+    stop = Contact([1.0], WaltonBraun(loading, unloading, kind))
+    ball = System([[mass]], [[0.0]], [[0.0]], [stop])
+    solution = integrate(ball, [0.01], [-speed], 0.1, dt=0.02, method=DormandPrince(1e-12))
+    log = solution.contacts
+    deepest = speed * math.sqrt(mass / loading)
+    assert len(log) == 1
+    assert np.allclose([log.t_in[0], log.speed_in[0], log.speed_out[0]], [0.02, speed, 0.5 * speed], rtol=1e-10)
+    assert np.allclose([log.peak_indentation[0], log.peak_force[0]], [deepest, loading * deepest], rtol=1e-10)
+    quarters = 0.5 * math.pi * (math.sqrt(mass / loading) + math.sqrt(mass / unloading))
+    assert np.allclose([log.t_out[0] - log.t_in[0], log.impulse[0]], [quarters, 1.5 * mass * speed], rtol=1e-9)
+    assert abs(solution.energy.residual).max() < 1e-10
+    events = solution.transitions.event.tolist()
+    assert events == ["contact", "unload", "open", "forget"][: 2 + seen]
+
+
+@pytest.mark.parametrize("method", CONSTANT, ids=NAMES)
+def test_a_start_in_a_yielding_stop_is_no_gain_of_energy(method):
+    ball = System([[1.0]], [[0.0]], [[1e-4]], [Contact([1.0], WaltonBraun(1e4, 2e4))])
+    end = integrate(ball, [-1e-2], [0.0], 0.1, method=method(1e-5))
+    assert abs(end.q_dot[-1, 0] - math.sqrt(0.5)) < 1e-3  # ½ k₁ δ² · k₁/k₂
+
+
+def test_steps_too_long_for_unloading_are_refused():
+    ball = System([[1.0]], [[0.0]], [[1.0]], [Contact([1.0], WaltonBraun(1e2, 1e4))])
+    limit = CentralDifference(1e-3).stable_dt(ball)
+    assert abs(limit.contact - 2.0 / math.sqrt(1.0 + 1e4)) < 1e-6
+    with pytest.raises(ValueError, match="unstable in contact"):
+        integrate(ball, [0.1], [-1.0], 1.0, method=CentralDifference(0.03))
+
+
+def test_a_force_that_jumps_leaves_constant_steps_order_one():
+    """Static above kinetic friction: the jump is late by part of a step."""
+    law = Coulomb(0.3, 4.0, static_limit=0.6)
+    exact = run(DormandPrince(1e-12), law, duration=6.0)
+    assert "slip" in exact.transitions.event
+    for method in (RK4, Newmark):
+        for h in (4e-3, 2e-3, 1e-3, 5e-4):
+            end = run(method(h), law, duration=6.0)
+            apart = math.hypot(end.q[-1, 0] - exact.q[-1, 0], end.q_dot[-1, 0] - exact.q_dot[-1, 0])
+            assert apart < 1.0 * h

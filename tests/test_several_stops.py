@@ -9,7 +9,7 @@ import pytest
 import fembeam as fb
 from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, Viscoelastic
 from solvers import Contact, DormandPrince, Exponential, SolverError, Status, System, integrate
-from solvers.exponential.energy import guard as balance
+from solvers.exponential.energy import check as balance
 
 NUMBERS = ("t_in", "t_out", "speed_in", "speed_out", "peak_indentation", "peak_force", "impulse", "energy_loss")
 

@@ -16,7 +16,7 @@ from contacts import Hertz, Hysteretic
 from fembeam import BandNoise, Harmonic
 from solvers import Contact, System
 from solvers.exponential import block_tables
-from solvers.exponential.preparation import prepared_for
+from solvers.exponential.preparation import prepare_system
 from solvers.problem import Memo, hand_over
 
 THREADS = 8
@@ -95,7 +95,7 @@ def test_no_thread_gets_the_tables_of_anothers_grid():
     shared = system(loads=[shake])
     forcings = [hand_over([shake], duration, 1e-8) for duration in (0.02, 0.03)]
     asked = [(i % 3 % 2,) for i in range(1600)]
-    found = at_once(lambda i: float(prepared_for(shared, forcings[i]).problem.value.table_dt[0]), asked)
+    found = at_once(lambda i: float(prepare_system(shared, forcings[i]).problem.value.table_dt[0]), asked)
     assert [i for i, (key,) in enumerate(asked) if found[i] != forcings[key].table_dt[0]] == []
 
 
@@ -103,7 +103,7 @@ def test_tables_let_go_by_other_threads_are_made_again(monkeypatch):
     def work(omega):
         return end(system(omega, loads=[]), 0.01)
 
-    monkeypatch.setattr(block_tables, "_KNOWN", Memo(1))
+    monkeypatch.setattr(block_tables, "_CACHE", Memo(1))
     asked = [(100.0 + i % 5,) for i in range(80)]
     wanted = {key: work(*key) for key in set(asked)}
     assert at_once(work, asked) == [wanted[key] for key in asked]

@@ -1,8 +1,9 @@
 """Scene files: TOML in, a scene with its reduction and studies out.
 
-`reader` reads the file, `tables` makes objects of its tables, `keys` checks names against constructors, `kinds` lists
-what a `kind` may be, the tables of studies follow; `json_schema` and `template` are made from the same. Imports:
-`study`, `results` and the rooms below. Begin with `reader`.
+`reader` reads the file; `tables` checks every key and value and makes the objects; `keys` has the names and types of
+the keys, read from the constructors, `kinds` the values of `kind`. `study_tables`, `orbit_tables` and `basins_table`
+are the tables of studies; `json_schema` and `template` are made from the same. Imports: `study`, `results` and the
+rooms below. Begin with `reader`.
 """
 
 from fembeam.scene_file.json_schema import json_schema

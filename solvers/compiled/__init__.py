@@ -1,8 +1,9 @@
-"""The compiled ground: what every kernel stands on.
+"""What all compiled functions share.
 
-`decorators` says which options of the compiler are used and why; `kernels` has the problem's arrays, calls of laws and
-the right-hand side; `handles` passes arrays by their address; `simd` is a type of eight numbers and `sums` weighted
-sums of table rows; `state` is what a run changes, its log among it, `renewals` what laws with memory latch;
-`dop853_tableau` holds coefficients; `cache` keeps machine code. Imports: `problem`, numba. Other rooms import
-from these files: kernels need their constants by name. Begin with `kernels`.
+`decorators` states which options of the compiler are used, and what each is worth; `kernels` has the arrays of a
+problem, the right-hand side (where a stop's force enters the equations) and the calls of laws; `state` has the arrays
+a run changes, and the contact log; `packed` passes named tuples of arrays by their address; `simd` is a type of eight
+numbers and `sums` the weighted sums made with it; `renewals` is what laws with memory latch; `dop853_tableau` holds
+coefficients; `cache` keeps machine code. Imports: `problem`, numba. Other rooms import from these files: kernels need
+their constants by name. Begin with `kernels`.
 """

@@ -26,7 +26,7 @@ from numba import config
 
 HOME = Path(__file__).parent.parent
 PREFIX = "fembeam-kernels-"
-KEPT = 4  # folders of other sources, versions or interpreters that stay: whoever changes between them compiles once
+KEPT = 4  # folders of other sources, versions or interpreters that stay, so that changing between them compiles once
 DIGITS = 16  # of a digest
 UNUSED = 24 * 3600.0  # s without a start after which one beyond these is removed; until then a process may need it
 _LOCK = threading.RLock()  # numba's setting belongs to the process
@@ -82,7 +82,7 @@ def _opened(place: Path, name: str) -> bool:
 
 
 def _remove_unused(place: Path, folder: Path) -> None:
-    """Remove what nobody has started with for a day, but for the last few; no process is likely to be left of it."""
+    """Remove folders unused for a day, but for the last few; no process that uses them is likely to be left."""
     last_used = {}
     for other in place.glob(PREFIX + "[0-9a-f]" * DIGITS):  # nothing but what was made here
         with suppress(OSError):  # removed by another process just now

@@ -8,12 +8,12 @@ under noise, by turns on one machine; ``python tests/bench/compiler_options.py N
 | nrt        | ``_nrt=False``, no reference counts | 1.56 | 1.74 | 1.85 | 1.81  | leave it out                    |
 | force      | ``forceinline``                     | 1.05 | 1.04 | 1.01 | 1.15  | `inlined` becomes `inner`       |
 | merged     | ``inline="always"`` (documented)    | 1.07 | 1.07 | 1.05 | 1.04  | `merged` becomes `inner`        |
-| alias      | the mark in `handles._attribute`    | 1.20 | 1.10 | 1.08 | 0.98  | leave the mark out              |
-|            | arrays by address, `handles`        | 1.73 | 1.82 | 1.82 | 1.46  | hand over the named tuples      |
+| alias      | the mark in `packed._attribute`     | 1.20 | 1.10 | 1.08 | 0.98  | leave the mark out              |
+|            | arrays by address, `packed`         | 1.73 | 1.82 | 1.82 | 1.46  | hand over the named tuples      |
 |            | eight numbers as one, `simd`        | 1.47 | 1.64 | 1.79 | 1.27  | plain loops in `sums`, `flight` |
 
 ``no_cpython_wrapper`` and ``no_cfunc_wrapper`` save most of the compile time of inner functions and no run time.
-``_nrt``, ``forceinline`` and these two are not documented by numba, nor is what `handles` and `simd` import of
+``_nrt``, ``forceinline`` and these two are not documented by numba, nor is what `packed` and `simd` import of
 ``numba.core``: hence the upper bound of its version in pyproject.toml. With a new version: raise the bound, run the
 tests and the bench; what fails is left out as the table says.
 """

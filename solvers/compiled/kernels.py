@@ -1,9 +1,11 @@
-"""Compiled ground floor of the stepping methods: problem data, law calls, signals, right-hand side.
+"""Arrays of a problem, calls of contact laws, signals, and the right-hand side of the equations of motion.
 
-The state a stepping method integrates is x = [p (n), v (n), ledger (2 + 2m)]:
+The state is x = [p (n), v (n), energy balance (2 + 2m)], with b the push and r the read row of a stop:
 
     p' = v + b^p·F,   v' = -k p - c v + b^v·F + l·s(t),   δ_s = r_s·[p, v] - g_s
-    ledger: input power, damping power, then per stop force × indentation rate and force.
+
+The entries of the energy balance are the integrals of input power and damping power, then for every stop of force ×
+indentation rate (work done on the stop, J) and of force (impulse, N s).
 """
 
 from __future__ import annotations
@@ -15,13 +17,13 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from solvers.compiled.decorators import entry as entry  # handed on: whoever writes kernels needs them all
+from solvers.compiled.decorators import entry as entry  # re-exported for files of kernels
 from solvers.compiled.decorators import inlined, inner, kernel, reordered
 from solvers.compiled.decorators import merged as merged
 
 
 class Problem(NamedTuple):
-    """Everything a kernel reads and, but for latched numbers, never writes; `state.problem_of` fills it, in SI units.
+    """Arrays that kernels read and, but for latched numbers, never write; `state.problem_of` fills them, in SI units.
 
     z = [p, v] are block coordinates, for mass-normalised modes in √kg m and √kg m/s.
     """
@@ -32,7 +34,7 @@ class Problem(NamedTuple):
     push: Any  # (m, 2n) state rate per newton of stop s
     read: Any  # (m, 2n) indentation = read·z - gap, m
     read_rate: Any  # (m, 2n) indentation rate = read_rate·z, m/s
-    levels: Any  # (m, J) ascending indentations, m, where a stop changes piece: 0 (-inf if it always acts), knots, inf
+    knots: Any  # (m, J) ascending indentations, m, between two segments: 0 (-inf if it always acts), knots, then inf
     gap: Any  # (m,) m
     law: Any  # (m,) addresses of the compiled forces
     gradient: Any  # (m,) addresses of their derivatives
@@ -72,7 +74,7 @@ PROBLEM = types.NamedTuple(
 
 
 def _c_function(outputs):
-    """An intrinsic that calls a law's C function at an address, passing arrays by their data pointers."""
+    """An intrinsic that calls the C function of a law at an address, with pointers to the arrays' numbers."""
 
     @intrinsic
     def call(typingctx, address, n, delta, delta_dot, entry_rate, parameters, results):
@@ -135,30 +137,30 @@ call_gradient = _c_function(3)
 
 @inlined
 def contact_forces(problem, stop, delta, delta_dot, entry_rate, force):
-    """Forces of one stop at a batch of indentations; below its surface the law is continued from it."""
+    """Forces, N, of one stop at ``delta.size`` indentations and rates; those below its surface are raised to it."""
     for i in range(delta.size):
-        delta[i] = max(delta[i], problem.levels[stop, 0])
+        delta[i] = max(delta[i], problem.knots[stop, 0])
     law_forces(problem, stop, delta.size, delta, delta_dot, entry_rate, force)
 
 
 @inlined
 def law_forces(problem, stop, n, delta, delta_dot, entry_rate, force):
-    """The law of one stop on the first n indentations, none of them below the surface."""
+    """Forces of one stop at the first n indentations, none of which is negative."""
     call_force(problem.law[stop], n, delta, delta_dot, entry_rate, problem.parameters[stop], (force,))
 
 
 @inner
 def contact_gradient(problem, stop, delta, delta_dot, entry_rate, by_delta, by_rate, by_entry):
-    """Derivatives of the forces, likewise."""
+    """Derivatives of the forces by indentation, rate and entry rate; negative indentations are set to 0 in place."""
     for i in range(delta.size):
-        delta[i] = max(delta[i], problem.levels[stop, 0])
+        delta[i] = max(delta[i], problem.knots[stop, 0])
     results = (by_delta, by_rate, by_entry)
     call_gradient(problem.gradient[stop], delta.size, delta, delta_dot, entry_rate, problem.parameters[stop], results)
 
 
 @inlined
 def copy(source, target, n):
-    """First n entries; a slice assignment would allocate."""
+    """Copy the first n entries; a slice assignment would allocate."""
     for i in range(n):
         target[i] = source[i]
 
@@ -173,8 +175,8 @@ def dot(a, b, n):
 
 
 @reordered
-def sizes(a, b, n):
-    """Sum of the sizes of the first n products."""
+def abs_dot(a, b, n):
+    """Sum of the absolute values of the first n products."""
     total = 0.0
     for i in range(n):
         total += abs(a[i] * b[i])
@@ -213,7 +215,7 @@ def add_loads(problem, t, x, rate):
 
 @inner
 def _add_load(problem, load, value, size, x, rate):
-    """One signal's share."""
+    """Add the load of one signal of a given value."""
     for i in range(size):
         rate[i] += problem.load[load, i] * value
     rate[size] += value * dot(problem.power[load], x, size)
@@ -221,7 +223,7 @@ def _add_load(problem, load, value, size, x, rate):
 
 @inlined
 def _damping_power(problem, x):
-    """Power the linear damping takes."""
+    """Power dissipated by the linear damping, W."""
     n, power = problem.k.size, 0.0
     if problem.loss.shape[0] == 0:
         for i in range(n):
@@ -233,10 +235,10 @@ def _damping_power(problem, x):
 
 
 @kernel
-def rhs(problem, t, x, piece, entry_rate, rate, batch):
-    """State rate with the stops' pieces frozen (piece > 0: in contact); returns the number of law calls.
+def rhs(problem, t, x, segment, entry_rate, rate, batch):
+    """Write x' into ``rate`` with every stop on its ``segment`` (> 0: in contact); returns the number of law calls.
 
-    ``batch`` is working space of three numbers.
+    ``batch`` is scratch for three numbers.
     """
     n, calls = problem.k.size, 0
     size = 2 * n
@@ -249,7 +251,7 @@ def rhs(problem, t, x, piece, entry_rate, rate, batch):
     for s in range(problem.gap.size):
         rate[size + 2 + 2 * s] = 0.0
         rate[size + 3 + 2 * s] = 0.0
-        if piece[s] > 0:
+        if segment[s] > 0:
             delta_dot = dot(problem.read_rate[s], x, size)
             batch[0] = indentation(problem, s, x)
             batch[1] = delta_dot
@@ -264,5 +266,5 @@ def rhs(problem, t, x, piece, entry_rate, rate, batch):
 
 @inlined
 def indentation(problem, s, x):
-    """Indentation of stop s."""
+    """Indentation of stop s, m."""
     return dot(problem.read[s], x, 2 * problem.k.size) - problem.gap[s]

@@ -12,12 +12,13 @@ from solvers.compiled.state import (
     EVENTS,
     LAST_EVENT,
     LOGGED,
+    PEAK_DELTA,
     RENEWAL,
     T,
     contact_row,
     is_open,
     open_contact,
-    tape,
+    write_event,
 )
 
 
@@ -40,8 +41,8 @@ def margins_in(problem, state, s, x, batch, out):
 def renew(problem, state, s, j, delta, rate, log):
     """Renew what element s latches on its border j; a row of the log tells of it."""
     size, t = 2 * problem.k.size, state.now[T]
-    if state.tape.shape[0]:
-        tape(state, RENEWAL, t, t, 0.0, s, j, state.x)
+    if state.event_record.shape[0]:
+        write_event(state, RENEWAL, t, t, 0.0, s, j, state.x)
     was_open = is_open(problem, s)
     row = log[state.count[LOGGED]]
     row[0], row[1], row[2], row[4], row[5] = -1.0 - s, t, j, delta, rate
@@ -53,6 +54,7 @@ def renew(problem, state, s, j, delta, rate, log):
     state.count[EVENTS] += 1
     if was_open and not is_open(problem, s):
         open_contact(problem, state, s, t, rate)
+        state.active[s, PEAK_DELTA] = delta
     if is_open(problem, s) and not was_open:
         contact_row(problem, state, s, t, -rate, log[state.count[LOGGED]])
         state.count[LOGGED] += 1

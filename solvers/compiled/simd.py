@@ -1,7 +1,7 @@
-"""Eight numbers as one value of compiled code, with + - * and √.
+"""Eight numbers as one value of compiled code (SIMD), with + - * and √.
 
-The compiler makes vectors of a loop only where it can prove that arrays do not overlap, and then leaves a rest to be
-done one by one.
+The compiler vectorises a loop only where it can prove that arrays do not overlap; then the entries beyond the last
+multiple of the vector's length are done one by one.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ WIDTH = 8
 _VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
 
 
-class Eight(types.Type):
+class Vector8(types.Type):
     """Type of eight numbers."""
 
     def __init__(self) -> None:
         super().__init__(name="Eight")
 
 
-EIGHT = Eight()
+VECTOR8 = Vector8()
 
 
-@register_model(Eight)
+@register_model(Vector8)
 class _Model(models.PrimitiveModel):
     """One vector register, or as many as the machine needs."""
 
@@ -38,13 +38,13 @@ class _Model(models.PrimitiveModel):
 
 
 def _operator(function, instruction):
-    """Let compiled code know an operator between eights; products may be fused into sums."""
+    """Define an operator between two vectors in compiled code; products may be fused into sums."""
 
     @infer_global(function)
     class _Typing(ConcreteTemplate):
-        cases: ClassVar = [signature(EIGHT, EIGHT, EIGHT)]
+        cases: ClassVar = [signature(VECTOR8, VECTOR8, VECTOR8)]
 
-    @lower_builtin(function, EIGHT, EIGHT)
+    @lower_builtin(function, VECTOR8, VECTOR8)
     def lowered(context, builder, signature, arguments):
         return getattr(builder, instruction)(*arguments, flags=("contract",))
 
@@ -62,13 +62,13 @@ def _place(context, builder, kind, array, offset=None):
 
 
 def _places(places):
-    """Which numbers of a vector another one takes."""
+    """Indices of the numbers a shuffle takes."""
     return ir.Constant(ir.VectorType(ir.IntType(32), len(places)), list(places))
 
 
 @intrinsic
-def bits(typingctx, number):
-    """A number's bits as an integer: its logarithm to base 2 times 2^52, linear between powers of two."""
+def bit_pattern(typingctx, number):
+    """A number's bits as an integer: 2^52 times its logarithm to base 2, interpolated linearly between powers of 2."""
 
     def codegen(context, builder, signature, arguments):
         return builder.bitcast(arguments[0], ir.IntType(64))
@@ -77,17 +77,17 @@ def bits(typingctx, number):
 
 
 @intrinsic
-def eight(typingctx, array, first):
+def load8(typingctx, array, first):
     """The eight numbers of an array from ``first`` on; rows of an array with more dimensions follow each other."""
 
     def codegen(context, builder, signature, arguments):
         return builder.load(_place(context, builder, signature.args[0], *arguments), align=8)
 
-    return EIGHT(array, types.intp), codegen
+    return VECTOR8(array, types.intp), codegen
 
 
 @intrinsic
-def put(typingctx, array, first, numbers):
+def store8(typingctx, array, first, numbers):
     """Write eight numbers into an array."""
 
     def codegen(context, builder, signature, arguments):
@@ -95,11 +95,11 @@ def put(typingctx, array, first, numbers):
         builder.store(numbers, _place(context, builder, signature.args[0], array, first), align=8)
         return context.get_dummy_value()
 
-    return types.void(array, types.intp, EIGHT), codegen
+    return types.void(array, types.intp, VECTOR8), codegen
 
 
 @intrinsic
-def spread(typingctx, number):
+def splat8(typingctx, number):
     """Eight times the same number."""
 
     def codegen(context, builder, signature, arguments):
@@ -107,33 +107,33 @@ def spread(typingctx, number):
         first = builder.insert_element(nothing, arguments[0], ir.IntType(32)(0))
         return builder.shuffle_vector(first, nothing, _places([0] * WIDTH))
 
-    return EIGHT(types.float64), codegen
+    return VECTOR8(types.float64), codegen
 
 
 @intrinsic
-def root(typingctx, numbers):
+def sqrt8(typingctx, numbers):
     """Square roots."""
 
     def codegen(context, builder, signature, arguments):
         kind = ir.FunctionType(_VECTOR, [_VECTOR])
         return builder.call(cgutils.get_or_insert_function(builder.module, kind, f"llvm.sqrt.v{WIDTH}f64"), arguments)
 
-    return EIGHT(EIGHT), codegen
+    return VECTOR8(VECTOR8), codegen
 
 
 @intrinsic
-def raised(typingctx, numbers):
+def positive8(typingctx, numbers):
     """The negative ones raised to zero; NaN stays."""
 
     def codegen(context, builder, signature, arguments):
         zero = ir.Constant(_VECTOR, [0.0] * WIDTH)
         return builder.select(builder.fcmp_ordered("<", arguments[0], zero), zero, arguments[0])
 
-    return EIGHT(EIGHT), codegen
+    return VECTOR8(VECTOR8), codegen
 
 
 @intrinsic
-def total(typingctx, numbers):
+def sum8(typingctx, numbers):
     """Sum of eight numbers, by halves."""
 
     def codegen(context, builder, signature, arguments):
@@ -147,4 +147,4 @@ def total(typingctx, numbers):
             vector = builder.fadd(low, high)
         return builder.extract_element(vector, ir.IntType(32)(0))
 
-    return types.float64(EIGHT), codegen
+    return types.float64(VECTOR8), codegen

@@ -1,4 +1,4 @@
-"""The state of a run, and what happens to it when a stop switches: pieces, latched rates, contact log."""
+"""The arrays a run changes, the change of a stop's segment with its latched rate, and the contact log."""
 
 from __future__ import annotations
 
@@ -9,7 +9,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from solvers.compiled.kernels import INTEGERS, MATRIX, VECTOR, Problem, dot, indentation, inlined, inner, kernel, sizes
+from solvers.compiled.kernels import (
+    INTEGERS,
+    MATRIX,
+    VECTOR,
+    Problem,
+    abs_dot,
+    dot,
+    indentation,
+    inlined,
+    inner,
+    kernel,
+)
 from solvers.problem import Array, Forcing, Law, Status, System
 
 STATUSES = list(Status)
@@ -21,28 +32,28 @@ DONE, RUNNING, STEP_TOO_SMALL, DIVERGED, CHATTER, LOG_FULL, LAW_NOT_FINITE, GAIN
     )
 )
 T, H_FLIGHT, H_CONTACT, LAST_EVENT = range(4)  # places in State.now
-STEPS, REJECTED, CALLS, EVENTS, LOGGED, SAMPLED, AT_ONCE, TAPED = range(8)  # places in State.count
-T_IN, SPEED_IN, PEAK_DELTA, PEAK_FORCE, WORK_IN, IMPULSE_IN, FLOORED = range(7)  # columns of State.open
+STEPS, REJECTED, CALLS, EVENTS, LOGGED, SAMPLED, AT_ONCE, RECORDED = range(8)  # places in State.count
+T_IN, SPEED_IN, PEAK_DELTA, PEAK_FORCE, WORK_IN, IMPULSE_IN, RATE_CLIPPED = range(7)  # columns of State.active
 MOST_EVENTS_AT_ONCE = 100
-STEP, PART, LANDING, EVENT, RENEWAL = 0.0, 1.0, 2.0, 3.0, 4.0  # kinds of tape rows
-KIND, BEGAN, ENDED, SPAN, FIRST, SECOND, HEAD = range(7)  # columns of the tape: two whole numbers that the kind
-# explains, then the state a row begins with and the forces at the nodes of a step
+STEP, PART, LANDING, EVENT, RENEWAL = 0.0, 1.0, 2.0, 3.0, 4.0  # kinds of rows of State.event_record
+KIND, BEGAN, ENDED, SPAN, FIRST, SECOND, HEAD = range(7)  # columns of State.event_record: FIRST and SECOND are two
+# whole numbers whose meaning depends on the kind; from HEAD on the state at the row's begin, then the nodes' forces
 
 
 class State(NamedTuple):
-    """Everything a run changes; it can be continued from here.
+    """All that a run changes; a run can be continued from it.
 
-    `begin_state` fills it, after that kernels alone write, through all of a run. Units as in `kernels.Problem`.
+    `begin_state` fills it; from then on kernels alone write to it. Units as in `kernels.Problem`.
     """
 
     now: Any  # (4,) s: time, flight step, contact step, time of the last event
-    x: Any  # (2n + 2 + 2m,) of the blocks, then the ledger in J (impulses in N s), see `kernels`
+    x: Any  # (2n + 2 + 2m,) of the blocks, then the energy balance in J (impulses in N s), see `kernels`
     rate: Any  # of x, per s; stepping methods only
-    piece: Any  # (m,) 0 in flight, j > 0 between levels j-1 and j
+    segment: Any  # (m,) of the law: 0 in flight, j > 0 between the stop's knots j-1 and j
     entry_rate: Any  # (m,) m/s, latched
-    open: Any  # (m, 7) of the contacts under way, SI units, columns named above
-    count: Any  # (8,) steps, rejected ones, law calls, ..., as named above
-    tape: Any  # (rows, HEAD + x.size + forces) what happened in contact, for the tangent; no rows, no tape
+    active: Any  # (m, 7) contacts under way, SI units, columns named above
+    count: Any  # (8,) steps, rejected steps, law calls, ..., as named above
+    event_record: Any  # (rows, HEAD + x.size + forces) contact steps and events, for the tangent; else no rows
 
 
 STATE = types.NamedTuple(
@@ -53,83 +64,83 @@ STATE = types.NamedTuple(
 
 @inner
 def surface_tolerance(problem, s, x):
-    """Distance within which a stop counts as on a level: rounding of δ."""
-    return 1e-15 * (abs(problem.gap[s]) + sizes(problem.read[s], x, 2 * problem.k.size)) + 1e-20
+    """Distance, m, within which a stop counts as on a knot: rounding of δ."""
+    return 1e-15 * (abs(problem.gap[s]) + abs_dot(problem.read[s], x, 2 * problem.k.size)) + 1e-20
 
 
 @inner
 def rate_tolerance(problem, s, x):
-    """Indentation rate below which a stop counts as at rest: rounding of δ̇, coupled blocks amplify it."""
-    return 1e-13 * sizes(problem.read_rate[s], x, 2 * problem.k.size)
+    """Indentation rate, m/s, below which a stop counts as at rest: rounding of δ̇, which coupled blocks amplify."""
+    return 1e-13 * abs_dot(problem.read_rate[s], x, 2 * problem.k.size)
 
 
 @inner
-def tape(state, kind, began, ended, span, first, second, x):
-    """Write a row of the tape: what happened from ``began`` at x to ``ended``."""
-    row = state.tape[state.count[TAPED]]
+def write_event(state, kind, began, ended, span, first, second, x):
+    """Append a row to the event record: what happened from ``began``, in the state x, to ``ended``."""
+    row = state.event_record[state.count[RECORDED]]
     row[KIND], row[BEGAN], row[ENDED], row[SPAN], row[FIRST], row[SECOND] = kind, began, ended, span, first, second
     for e in range(state.x.size):
         row[HEAD + e] = x[e]
-    state.count[TAPED] += 1
+    state.count[RECORDED] += 1
 
 
 @inner
 def open_contact(problem, state, s, t, delta_dot):
-    """Latch the entry rate and begin a row of the contact log."""
-    ledger = 2 * problem.k.size + 2 + 2 * s
+    """Latch the entry rate and begin the row of a contact under way."""
+    balance = 2 * problem.k.size + 2 + 2 * s
     state.entry_rate[s] = max(abs(delta_dot), problem.floor[s])
-    state.open[s, T_IN] = t
-    state.open[s, SPEED_IN] = abs(delta_dot)
-    state.open[s, PEAK_DELTA] = 0.0
-    state.open[s, PEAK_FORCE] = 0.0
-    state.open[s, WORK_IN] = state.x[ledger]
-    state.open[s, IMPULSE_IN] = state.x[ledger + 1]
-    state.open[s, FLOORED] = 1.0 if abs(delta_dot) < problem.floor[s] else 0.0
+    state.active[s, T_IN] = t
+    state.active[s, SPEED_IN] = abs(delta_dot)
+    state.active[s, PEAK_DELTA] = 0.0
+    state.active[s, PEAK_FORCE] = 0.0
+    state.active[s, WORK_IN] = state.x[balance]
+    state.active[s, IMPULSE_IN] = state.x[balance + 1]
+    state.active[s, RATE_CLIPPED] = 1.0 if abs(delta_dot) < problem.floor[s] else 0.0
 
 
 @kernel
 def begin_contacts(problem, state):
-    """Put every stop on its piece at the start of a run and open the contacts under way."""
+    """Find the segment of every stop at the start of a run and begin the contacts under way."""
     for s in range(problem.gap.size):
         delta = indentation(problem, s, state.x)
-        piece = 0
-        while delta > problem.levels[s, piece] + surface_tolerance(problem, s, state.x):
-            piece += 1
-        state.piece[s] = piece
-        if piece > 0:
+        segment = 0
+        while delta > problem.knots[s, segment] + surface_tolerance(problem, s, state.x):
+            segment += 1
+        state.segment[s] = segment
+        if segment > 0:
             open_contact(problem, state, s, state.now[T], dot(problem.read_rate[s], state.x, 2 * problem.k.size))
-            state.open[s, PEAK_DELTA] = delta
+            state.active[s, PEAK_DELTA] = delta
 
 
 @kernel
 def contact_row(problem, state, s, t_out, speed_out, row):
     """Write the log row of the contact under way at stop s."""
-    ledger = 2 * problem.k.size + 2 + 2 * s
+    balance = 2 * problem.k.size + 2 + 2 * s
     row[0] = s
-    row[1] = state.open[s, T_IN]
+    row[1] = state.active[s, T_IN]
     row[2] = t_out
-    row[3] = state.open[s, SPEED_IN]
+    row[3] = state.active[s, SPEED_IN]
     row[4] = speed_out
-    row[5] = state.open[s, PEAK_DELTA]
-    row[6] = state.open[s, PEAK_FORCE]
-    row[7] = state.x[ledger + 1] - state.open[s, IMPULSE_IN]
-    row[8] = state.x[ledger] - state.open[s, WORK_IN]
-    row[9] = state.open[s, FLOORED]
+    row[5] = state.active[s, PEAK_DELTA]
+    row[6] = state.active[s, PEAK_FORCE]
+    row[7] = state.x[balance + 1] - state.active[s, IMPULSE_IN]
+    row[8] = state.x[balance] - state.active[s, WORK_IN]
+    row[9] = state.active[s, RATE_CLIPPED]
 
 
 @inner
 def switch(problem, state, s, direction, log):
-    """Move stop s one piece up or down; open or close its contact."""
+    """Move stop s one segment up or down; begin its contact, or end it and log it."""
     t = state.now[T]
     delta_dot = dot(problem.read_rate[s], state.x, 2 * problem.k.size)
-    if state.tape.shape[0]:
-        tape(state, EVENT, t, t, 0.0, s, direction, state.x)
-    if direction > 0 and state.piece[s] == 0:
+    if state.event_record.shape[0]:
+        write_event(state, EVENT, t, t, 0.0, s, direction, state.x)
+    if direction > 0 and state.segment[s] == 0:
         open_contact(problem, state, s, t, delta_dot)
-    if direction < 0 and state.piece[s] == 1:
+    if direction < 0 and state.segment[s] == 1:
         contact_row(problem, state, s, t, -delta_dot, log[state.count[LOGGED]])
         state.count[LOGGED] += 1
-    state.piece[s] += direction
+    state.segment[s] += direction
     state.count[EVENTS] += 1
     state.count[AT_ONCE] = state.count[AT_ONCE] + 1 if t == state.now[LAST_EVENT] else 0
     state.now[LAST_EVENT] = t
@@ -137,7 +148,7 @@ def switch(problem, state, s, direction, log):
 
 @inlined
 def switch_on_surface(problem, state, log, locates):
-    """Switch every stop that sits on a border of its piece and moves out of it; returns whether any did."""
+    """Switch every stop that is on an end of its segment and moves out of it; returns whether any did."""
     switched = False
     for s in range(problem.gap.size):
         delta = indentation(problem, s, state.x)
@@ -145,9 +156,11 @@ def switch_on_surface(problem, state, log, locates):
         tolerance = surface_tolerance(problem, s, state.x) if locates else 0.0
         still = rate_tolerance(problem, s, state.x)
         direction = 0
-        if delta >= problem.levels[s, state.piece[s]] - tolerance and delta_dot > still:
+        if delta >= problem.knots[s, state.segment[s]] - tolerance and delta_dot > still:
             direction = 1
-        elif state.piece[s] > 0 and delta <= problem.levels[s, state.piece[s] - 1] + tolerance and delta_dot < -still:
+        elif (
+            state.segment[s] > 0 and delta <= problem.knots[s, state.segment[s] - 1] + tolerance and delta_dot < -still
+        ):
             direction = -1
         if direction != 0:
             switch(problem, state, s, direction, log)
@@ -163,11 +176,11 @@ def is_open(problem, s):
 
 
 @inlined
-def touching(state):
+def in_contact(state):
     """Whether any stop is in contact."""
     most = 0
-    for piece in state.piece:
-        most = max(most, piece)
+    for segment in state.segment:
+        most = max(most, segment)
     return most > 0
 
 
@@ -193,7 +206,7 @@ def new_state(z: Any, stops: int) -> State:
 
 
 def problem_of(system: System, forcing: Forcing) -> Problem:
-    """Arrays the kernels read, in block coordinates."""
+    """The arrays that kernels read, in block coordinates."""
     return _problem(system, forcing, system.about_structure.get("linear", lambda: _linear_part(system)))
 
 
@@ -235,15 +248,15 @@ def _vectors(system: System) -> Array:
 
 
 def _problem(system: System, forcing: Forcing, linear: dict[str, Array]) -> Problem:
-    """The linear part with the laws and the signals."""
+    """The linear arrays with those of the laws and the signals."""
     contacts, m = system.contacts, len(system.contacts)
     most = max([len(c.law.knots) for c in contacts], default=0) + 1
-    levels = np.full((m, most + 1), math.inf)
+    knots = np.full((m, most + 1), math.inf)
     for i, contact in enumerate(contacts):
-        levels[i, : len(contact.law.knots) + 1] = (-math.inf if contact.always else 0.0, *contact.law.knots)
+        knots[i, : len(contact.law.knots) + 1] = (-math.inf if contact.always else 0.0, *contact.law.knots)
     return Problem(
         **linear,
-        levels=levels,
+        knots=knots,
         gap=np.array([c.gap for c in contacts], dtype=float),
         law=np.array([c.law.address for c in contacts], dtype=np.int64),
         gradient=np.array([c.law.gradient_address for c in contacts], dtype=np.int64),
@@ -270,7 +283,7 @@ def _integers(contacts: Sequence[Any], name: str) -> Array:
     return np.array([getattr(contact.law, name, 0) for contact in contacts], dtype=np.int64)
 
 
-def _latched(contacts: Sequence[Any]) -> Array:
+def _latched(contacts: Sequence[Any]) -> Any:
     """(m, l) places of the latched numbers among the parameters, padded by -1."""
     places = [getattr(contact.law, "memory", ()) for contact in contacts]
     table = np.full((len(contacts), max([len(row) for row in places], default=0)), -1, dtype=np.int64)
@@ -279,7 +292,7 @@ def _latched(contacts: Sequence[Any]) -> Array:
     return table
 
 
-def _opening(law: Law) -> int:
+def _opening(law: Any) -> int:
     """Place of the segment code that is 0 while the law is open, or -1."""
     return int(law.memory[0]) if getattr(law, "opens", False) else -1
 

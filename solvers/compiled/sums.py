@@ -1,14 +1,14 @@
-"""Weighted sums of table rows, and iterations for the forces at eight nodes, in vector registers.
+"""Weighted sums of table rows, and the iteration for the forces at eight nodes, in vector registers.
 
-The compiler cannot know that a result does not overlap the table it is computed from, and therefore neither vectorises
-these sums nor keeps them in registers by itself. Rows, start and result hold a multiple of `WIDTH` numbers. What is
-said of eight numbers is meant for the `families.S` nodes of a contact step.
+The compiler cannot know that a result does not overlap the table it is computed from; so it neither vectorises these
+sums nor keeps them in registers by itself. Rows, start and result hold a multiple of `WIDTH` numbers; the functions of
+eight numbers serve the S = 8 nodes of a contact step, see `contact.nodes`.
 """
 
 from __future__ import annotations
 
 from solvers.compiled.kernels import inlined
-from solvers.compiled.simd import WIDTH, eight, put, raised, root, spread, total
+from solvers.compiled.simd import WIDTH, load8, positive8, splat8, sqrt8, store8, sum8
 
 
 def padded(size: int) -> int:
@@ -17,57 +17,58 @@ def padded(size: int) -> int:
 
 
 @inlined
-def renew(old, new):
-    """Eight numbers take new values: the squares of their change and of their new size, summed."""
-    after = eight(new, 0)
-    change = after - eight(old, 0)
-    put(old, 0, after)
-    return total(change * change), total(after * after)
+def replace_values(old, new):
+    """Replace eight numbers by new ones; returns the sums of the squares of the changes and of the new values."""
+    after = load8(new, 0)
+    change = after - load8(old, 0)
+    store8(old, 0, after)
+    return sum8(change * change), sum8(after * after)
 
 
 @inlined
-def sweep(rows, free, force, motion, stiffness, rooted, damping, viscosity):
-    """One iteration for the forces at eight nodes, all in registers: squares of their change and size, summed.
+def iterate_power_law(rows, free, force, motion, stiffness, rooted, damping, viscosity):
+    """One fixed-point iteration for the forces at eight nodes; returns Σ change² and Σ force², N².
 
-    Indentations and rates at the nodes are free + Σ_e force[e] rows[e], kept in ``motion``; the new forces are
-    K d (1 + a d') + c d' with d no less than zero, or with d √d for d if ``rooted``.
+    ``rows`` (8, 16) is what a unit force at a node does to δ and δ̇ at all nodes. Indentations and rates are
+    free + Σ_e force[e] rows[e] and are written to ``motion`` (2, 8); the new forces K d (1 + a δ̇) + c δ̇ to ``force``
+    (8,), with d = max(δ, 0), or d^{3/2} if ``rooted``.
     """
-    old, delta, rate = eight(force, 0), eight(free[0], 0), eight(free[1], 0)
-    more, faster = spread(0.0), spread(0.0)  # each sum waits for its own last term only
+    old, delta, rate = load8(force, 0), load8(free[0], 0), load8(free[1], 0)
+    more, faster = splat8(0.0), splat8(0.0)  # two chains of sums run side by side in the processor
     for e in range(0, WIDTH, 2):
-        one, two = spread(force[e]), spread(force[e + 1])
-        delta += one * eight(rows[e], 0)
-        rate += one * eight(rows[e], WIDTH)
-        more += two * eight(rows[e + 1], 0)
-        faster += two * eight(rows[e + 1], WIDTH)
+        one, two = splat8(force[e]), splat8(force[e + 1])
+        delta += one * load8(rows[e], 0)
+        rate += one * load8(rows[e], WIDTH)
+        more += two * load8(rows[e + 1], 0)
+        faster += two * load8(rows[e + 1], WIDTH)
     delta, rate = delta + more, rate + faster
-    put(motion[0], 0, delta)
-    put(motion[1], 0, rate)
-    deep = raised(delta)
+    store8(motion[0], 0, delta)
+    store8(motion[1], 0, rate)
+    deep = positive8(delta)
     if rooted:
-        deep = deep * root(deep)
-    new = spread(stiffness) * deep * (spread(1.0) + spread(damping) * rate) + spread(viscosity) * rate
-    put(force, 0, new)
+        deep = deep * sqrt8(deep)
+    new = splat8(stiffness) * deep * (splat8(1.0) + splat8(damping) * rate) + splat8(viscosity) * rate
+    store8(force, 0, new)
     change = new - old
-    return total(change * change), total(new * new)
+    return sum8(change * change), sum8(new * new)
 
 
 @inlined
 def above(source, least, result):
     """Eight numbers, the negative ones raised to zero if that is the least one allowed; NaN stays."""
-    put(result, 0, raised(eight(source, 0)) if least == 0.0 else eight(source, 0))
+    store8(result, 0, positive8(load8(source, 0)) if least == 0.0 else load8(source, 0))
 
 
 @inlined
 def combine(rows, weights, count, start, result):
-    """Sum rows: result = start + Σ_{e < count} weights[e] rows[e]; start may be result, or None for zero."""
+    """Sum rows: result = start + Σ_{e < count} weights[e] rows[e]; ``start`` may be ``result``, or None for zero."""
     width = rows.shape[-1]
     for first in range(0, width, WIDTH):
-        even = spread(0.0) if start is None else eight(start, first)
-        odd = spread(0.0)  # each waits for its own last sum only
+        even = splat8(0.0) if start is None else load8(start, first)
+        odd = splat8(0.0)  # a second chain of sums
         for e in range(0, count - 1, 2):
-            even += spread(weights[e]) * eight(rows, e * width + first)
-            odd += spread(weights[e + 1]) * eight(rows, (e + 1) * width + first)
+            even += splat8(weights[e]) * load8(rows, e * width + first)
+            odd += splat8(weights[e + 1]) * load8(rows, (e + 1) * width + first)
         if count % 2:
-            even += spread(weights[count - 1]) * eight(rows, (count - 1) * width + first)
-        put(result, first, even + odd)
+            even += splat8(weights[count - 1]) * load8(rows, (count - 1) * width + first)
+        store8(result, first, even + odd)

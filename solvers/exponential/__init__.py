@@ -1,10 +1,11 @@
 """The main method: exact flight between contacts, forces by collocation within them, exact derivatives.
 
-`method` is the loop, `preparation` and `tables` make its numbers, `responses` and `block_tables` those that grow with
-blocks and stops, `flight` and `safe_steps` move free of contact, the folder `contact` holds one step in contact; the
-folder `energy` keeps the energy balance and refuses runs that do not balance; `linearised`, `linearised_step` and
-`tangent` differentiate a run, `many` takes many starts to their ends. Imports: `compiled`, `problem`. Its files load
-machine code when imported; begin with `method`.
+`method` has the settings and the loop over flights and contacts. `safe_steps` takes flight steps that miss no contact
+and finds where a contact begins, `flight` evaluates them; the folder `contact` takes a step in contact and locates
+where it ends. `preparation` prepares a system, `tables`, `block_tables`, `responses` and `phi_functions` make the
+tables. The folder `energy` has the energy balance and refuses runs that do not balance. `tangent`, `linearised` and
+`linearised_step` differentiate a run; `many_starts` integrates many starts. Imports: `compiled`, `problem`. Its files
+load machine code when imported; begin with `method`.
 """
 
 from typing import Any

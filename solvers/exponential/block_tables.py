@@ -1,7 +1,7 @@
-"""The tables that grow with blocks and stops: what a state and forces do on contact steps, and what structures share.
+"""The tables that grow with blocks and stops: responses to a state and to forces on contact steps.
 
-A few stops have tables of what reaches every one of them; with more only the responses of the blocks are kept, see
-`contact.blocks`.
+For a few stops the response of every stop to every force is kept; for more only those of the blocks are, see
+`contact.many_stops`. Systems of equal structure share them.
 """
 
 from __future__ import annotations
@@ -13,65 +13,76 @@ import numpy as np
 
 from solvers.compiled.kernels import Problem
 from solvers.compiled.sums import padded
-from solvers.exponential.contact.nodes import PHASES, Families, S, gauss
-from solvers.exponential.responses import fill_ahead, fill_free, fill_propagators, fill_way
+from solvers.exponential.contact.nodes import PHASES, NodeSets, S, gauss
+from solvers.exponential.responses import fill_free, fill_node_propagators, fill_propagators, fill_weighting
 from solvers.problem import Memo
 
-FEW = 2  # stops that have tables of their own; three are as quick through the blocks, more are quicker
+FEW = 2  # stops up to which each has tables of its own: with three both ways take the same time
 MOST_BYTES = 4e9
 
 
 class Blocks(NamedTuple):
-    """The part of the tables that takes long, block by block; no contact force reaches the tones' blocks."""
+    """The tables that take long to fill, block by block; contact forces do not act on the tones' blocks."""
 
-    propagator: Any
-    step_propagator: Any
+    flight_propagator: Any
+    contact_propagator: Any
     alias: Any
     free: Any
-    ahead: Any
+    node_propagator: Any
     forced: Any
-    kick: Any
-    response: Any
-    ending: Any
+    end_response: Any
+    block_response: Any
+    block_end_response: Any
 
 
-_KNOWN = Memo(1 << 27)  # `Blocks` of structures met lately: a tone, gap or stiffness more is cheap
+_CACHE = Memo(1 << 27)  # `Blocks` of recent structures: another tone, gap or stiffness of a stop is cheap
 
 
-def blocks_of(problem: Problem, tones: int, h: Any, contact_h: Any, families: Families) -> Blocks:
-    """Tables of all blocks, zero for the tones; those of a structure met lately are kept."""
+def blocks_of(problem: Problem, tones: int, h: Any, contact_h: Any, node_sets: NodeSets) -> Blocks:
+    """Tables of all blocks, zero for the tones; those of recent structures are kept."""
     size = len(problem.k)
     own = size - tones
     rows = (row.reshape(-1, 2, size)[:, :, :own] for row in (problem.push, problem.read, problem.load))
-    arrays = (problem.k[:own], problem.c[:own], *rows, h, contact_h, families.power, families.lead, families.nodes)
+    arrays = (
+        problem.k[:own],
+        problem.c[:own],
+        *rows,
+        h,
+        contact_h,
+        node_sets.time_exponent,
+        node_sets.weight_exponent,
+        node_sets.nodes,
+    )
     key = b"|".join((b"%d %d" % (tones, FEW), *(array.tobytes() for array in arrays)))
 
     def make() -> Blocks:
-        _require_room(len(problem.gap), len(problem.load), size, len(contact_h), families)
-        return filled(_empty(problem, own, h, contact_h, families), problem, (0, own), h, contact_h, families)
+        _require_room(len(problem.gap), len(problem.load), size, len(contact_h), node_sets)
+        return filled(_empty(problem, own, h, contact_h, node_sets), problem, (0, own), h, contact_h, node_sets)
 
-    known: Blocks = _KNOWN.get(key, make)
+    known: Blocks = _CACHE.get(key, make)
     return known
 
 
-def _shapes(stops: int, loads: int, size: int, own: int, levels: int, families: Families) -> dict[str, tuple[int, ...]]:
-    """Of the tables that a few stops have, and those of many; what the others have is empty."""
-    kinds, ways, inputs, few = len(families.kinds), len(families.ways), stops + loads, stops <= FEW
+def _shapes(
+    stops: int, loads: int, size: int, own: int, levels: int, node_sets: NodeSets
+) -> dict[str, tuple[int, ...]]:
+    """Shapes of the tables for a few stops and of those for many; one of the two groups is empty."""
+    kinds, weightings, inputs, few = len(node_sets.kinds), len(node_sets.weightings), stops + loads, stops <= FEW
     many = 0 if few else levels
     levels = levels if few else 0
     return {
         "free": (kinds, levels, stops, 2 * size, 2 * S),
-        "ahead": (kinds, many, 2, size, S),
-        "forced": (ways, levels, inputs, stops, S, 2 * S),
-        "kick": (ways, levels, inputs, S, padded(2 * size)),
-        "response": (ways, many, S, 2 * own, S),
-        "ending": (ways, many, 2, own, S),
+        "node_propagator": (kinds, many, 2, size, S),
+        "forced": (weightings, levels, inputs, stops, S, 2 * S),
+        "end_response": (weightings, levels, inputs, S, padded(2 * size)),
+        "block_response": (weightings, many, S, 2 * own, S),
+        "block_end_response": (weightings, many, 2, own, S),
     }
 
 
-def _require_room(stops: int, loads: int, size: int, levels: int, families: Families) -> None:
-    """Refuse tables, or matrices of stops that touch together, beyond what a machine has."""
-    numbers = sum(math.prod(shape) for shape in _shapes(stops, loads, size, size, levels, families).values())
+def _require_room(stops: int, loads: int, size: int, levels: int, node_sets: NodeSets) -> None:
+    """Refuse tables and matrices of simultaneous contacts that need more than `MOST_BYTES`."""
+    numbers = sum(math.prod(shape) for shape in _shapes(stops, loads, size, size, levels, node_sets).values())
     wanted = 8 * (numbers + (S * stops) ** 2)
     if wanted > MOST_BYTES:
         raise ValueError(
@@ -80,51 +91,57 @@ def _require_room(stops: int, loads: int, size: int, levels: int, families: Fami
         )
 
 
-def _empty(problem: Problem, own: int, h: Any, contact_h: Any, families: Families) -> Blocks:
+def _empty(problem: Problem, own: int, h: Any, contact_h: Any, node_sets: NodeSets) -> Blocks:
     """Zeros for the tables of all blocks."""
     size, levels = len(problem.k), len(contact_h)
-    shapes = _shapes(len(problem.gap), len(problem.load), size, own, levels, families)
+    shapes = _shapes(len(problem.gap), len(problem.load), size, own, levels, node_sets)
     return Blocks(
-        propagator=np.zeros((len(h), 2, padded(size))),
-        step_propagator=np.zeros((levels, 2, size)),
-        alias=np.zeros((len(families.kinds), levels, 2 * size)),
+        flight_propagator=np.zeros((len(h), 2, padded(size))),
+        contact_propagator=np.zeros((levels, 2, size)),
+        alias=np.zeros((len(node_sets.kinds), levels, 2 * size)),
         **{name: np.zeros(shape) for name, shape in shapes.items()},
     )
 
 
 def filled(
-    tables: Blocks, problem: Problem, blocks: tuple[int, int], h: Any, contact_h: Any, families: Families
+    tables: Blocks, problem: Problem, blocks: tuple[int, int], h: Any, contact_h: Any, node_sets: NodeSets
 ) -> Blocks:
     """The tables, filled for the blocks from the first to before the last."""
-    fill_propagators(problem.k, problem.c, blocks, h, tables.propagator)
-    fill_propagators(problem.k, problem.c, blocks, contact_h, tables.step_propagator)
-    for i, f in enumerate(families.kinds):
-        power, nodes = families.power[f], families.nodes[f]
-        if tables.ahead.size:
-            fill_ahead(problem, blocks, contact_h, power, nodes, tables.ahead[i])
+    fill_propagators(problem.k, problem.c, blocks, h, tables.flight_propagator)
+    fill_propagators(problem.k, problem.c, blocks, contact_h, tables.contact_propagator)
+    for i, f in enumerate(node_sets.kinds):
+        time_exponent, nodes = node_sets.time_exponent[f], node_sets.nodes[f]
+        if tables.node_propagator.size:
+            fill_node_propagators(problem, blocks, contact_h, time_exponent, nodes, tables.node_propagator[i])
         else:
-            fill_free(problem, blocks, contact_h, power, nodes, tables.free[i])
-        _fill_alias(tables.alias[i], problem.k, blocks, contact_h, families.alias[f])
+            fill_free(problem, blocks, contact_h, time_exponent, nodes, tables.free[i])
+        _fill_alias(tables.alias[i], problem.k, blocks, contact_h, node_sets.alias[f])
     if blocks[0] == 0:
-        _fill_ways(tables, problem, contact_h, families)
+        _fill_weightings(tables, problem, contact_h, node_sets)
     return tables
 
 
-def _fill_ways(tables: Blocks, problem: Problem, contact_h: Any, families: Families) -> None:
-    """What forces do; the responses of the blocks are working space where pairs are kept."""
+def _fill_weightings(tables: Blocks, problem: Problem, contact_h: Any, node_sets: NodeSets) -> None:
+    """Responses to forces; those of the blocks are scratch where the response of every stop is kept."""
     inputs = np.ascontiguousarray(np.concatenate((problem.push, problem.load)).reshape(-1, 2 * len(problem.k)))
-    own = tables.ending.shape[3]
-    response, ending = tables.response, tables.ending
+    own = tables.block_end_response.shape[3]
+    response, ending = tables.block_response, tables.block_end_response
     if not response.size:
         response, ending = (
-            np.empty((len(families.ways), 1, S, 2 * own, S)),
-            np.empty((len(families.ways), 1, 2, own, S)),
+            np.empty((len(node_sets.weightings), 1, S, 2 * own, S)),
+            np.empty((len(node_sets.weightings), 1, 2, own, S)),
         )
-    for i, (f, weighted) in enumerate(families.ways):
-        fill_way(
-            *(problem, contact_h, families.power[f], families.lead[f] * weighted, families.nodes[f]),
-            *(families.lagrange[f, weighted], gauss(12), inputs, response[i], ending[i], tables.forced[i]),
-            *(tables.kick[i], np.zeros((S + 1, S, 2)), np.zeros(max(2 * own, S))),
+    for i, (f, weighted) in enumerate(node_sets.weightings):
+        fill_weighting(
+            *(
+                problem,
+                contact_h,
+                node_sets.time_exponent[f],
+                node_sets.weight_exponent[f] * weighted,
+                node_sets.nodes[f],
+            ),
+            *(node_sets.lagrange[f, weighted], gauss(12), inputs, response[i], ending[i], tables.forced[i]),
+            *(tables.end_response[i], np.zeros((S + 1, S, 2)), np.zeros(max(2 * own, S))),
         )
 
 

@@ -1,7 +1,7 @@
 """Exact flight: propagators of the blocks, polynomial signals, Taylor steps.
 
 A flight step multiplies every block by its tabulated propagator α I + β A and adds the response to the quintics
-of the sampled signals; what is shorter than the shortest table entry is a Taylor step of order 6, exact to rounding.
+of the sampled signals; a step below the shortest of the tables is a Taylor step of order 6, exact to rounding.
 """
 
 from __future__ import annotations
@@ -9,21 +9,23 @@ from __future__ import annotations
 import math
 
 from solvers.compiled.kernels import copy, inlined, inner
-from solvers.compiled.simd import WIDTH, bits, eight, put, root, spread, total
+from solvers.compiled.simd import WIDTH, bit_pattern, load8, splat8, sqrt8, store8, sum8
 from solvers.compiled.sums import combine
 
 ORDER = 6
-_CURVED = int(0.345 * 2**50)  # by which a logarithm that is linear between powers of two can be wrong, times four
-LONG = 14  # terms of a series that is exact to rounding up to |λ| x = LONG_REACH: 0.6^14/14! = 9e-15
-LONG_REACH = 0.6
+_CURVED = int(0.345 * 2**50)  # error of a logarithm that is linear between powers of two, times four
+SERIES_TERMS = 14  # terms of a series that is exact to rounding up to |λ| x = SERIES_REACH: 0.6^14/14! = 9e-15
+SERIES_REACH = 0.6
 
 
 @inlined
 def level_within(tables, span):
     """Index of the longest tabulated step not above ``span``, which is at least the shortest one."""
-    level = ((bits(tables.h[0]) - bits(span) - _CURVED) >> 50) + 1  # never too high: 2^50 are a quarter octave
-    level = min(max(level, 0), tables.h.size - 1)
-    while tables.h[level] > span and level < tables.h.size - 1:
+    level = (
+        (bit_pattern(tables.flight_step[0]) - bit_pattern(span) - _CURVED) >> 50
+    ) + 1  # never too high: 2^50 are a quarter octave
+    level = min(max(level, 0), tables.flight_step.size - 1)
+    while tables.flight_step[level] > span and level < tables.flight_step.size - 1:
         level += 1
     return level
 
@@ -39,7 +41,7 @@ def cell_of(problem, t):
 
 @inlined
 def _quintic(problem, j, cell):
-    """Coefficients of node table j on a cell, in powers of the part of the cell."""
+    """Coefficients of the quintic of node table j on a cell, in powers of (t - start)/dt."""
     dt = problem.table_dt[j]
     row = problem.table_start[j] + cell
     a, b = problem.table[row], problem.table[row + 1]
@@ -69,7 +71,7 @@ def signal_derivatives(problem, j, t, out):
 
 
 @inlined
-def turn(problem, alpha, beta, x):
+def propagate_blocks(problem, alpha, beta, x):
     """Multiply every block by its propagator α I + β A."""
     n = problem.k.size
     for b in range(n):
@@ -79,22 +81,22 @@ def turn(problem, alpha, beta, x):
 
 
 @inner
-def add_signals(problem, response, x, t, six):
+def add_signals(problem, response, x, t, signal_terms):
     """Add the response to the polynomial signals of the step that began at t."""
     size = 2 * problem.k.size
     for j in range(problem.table_dt.size):
-        signal_derivatives(problem, j, t, six[j])
+        signal_derivatives(problem, j, t, signal_terms[j])
         rows = response[problem.table_load[j]]
         for i in range(6):
             for e in range(size):
-                x[e] += six[j, i] * rows[i, e]
+                x[e] += signal_terms[j, i] * rows[i, e]
 
 
 @inner
-def go_through(problem, tables, x, cell):
+def cross_cell(problem, tables, x, cell):
     """Move the state through a whole cell of the sampled signals."""
     size = 2 * problem.k.size
-    turn(problem, tables.cell[0], tables.cell[1], x)
+    propagate_blocks(problem, tables.cell[0], tables.cell[1], x)
     for j in range(problem.table_dt.size):
         r = 1.0 / problem.table_dt[j]
         s0, s1, s2, c3, c4, c5 = _quintic(problem, j, cell)
@@ -112,13 +114,13 @@ def go_through(problem, tables, x, cell):
 
 
 @inner
-def taylor(problem, x, t, terms, six):
+def taylor_terms(problem, x, t, terms, signal_terms):
     """Rows y, y', ..., y⁽⁶⁾ at time t in flight: y⁽ⁱ⁺¹⁾ = A y⁽ⁱ⁾ + load s⁽ⁱ⁾."""
     n = problem.k.size
     for e in range(2 * n):
         terms[0, e] = x[e]
     for j in range(problem.table_dt.size):
-        signal_derivatives(problem, j, t, six[j])
+        signal_derivatives(problem, j, t, signal_terms[j])
     for i in range(ORDER):
         for b in range(n):
             terms[i + 1, b] = terms[i, n + b]
@@ -126,12 +128,12 @@ def taylor(problem, x, t, terms, six):
         for j in range(problem.table_dt.size):
             load = problem.load[problem.table_load[j]]
             for e in range(2 * n):
-                terms[i + 1, e] += six[j, i] * load[e]
+                terms[i + 1, e] += signal_terms[j, i] * load[e]
 
 
 @inner
-def add_taylor(terms, x, span, size, weights, sums):
-    """Taylor step of the given duration; the last two arguments are working space."""
+def taylor_step(terms, x, span, size, weights, sums):
+    """Taylor step of the given duration; the last two arguments are scratch."""
     weights[0] = 1.0
     for i in range(ORDER):
         weights[i + 1] = weights[i] * span / (i + 1.0)
@@ -140,55 +142,55 @@ def add_taylor(terms, x, span, size, weights, sums):
 
 
 @inner
-def go_on(problem, x, t, span, term, six):
+def fly_series(problem, x, t, span, term, signal_terms):
     """Move the state x of a flight by ``span`` <= LONG_REACH/|λ|max within a cell: the series, y⁽ⁱ⁺¹⁾ from y⁽ⁱ⁾."""
     n, weight = problem.k.size, 1.0
     copy(x, term, 2 * n)
     for j in range(problem.table_dt.size):
-        signal_derivatives(problem, j, t, six[j])
-    for i in range(LONG - 1):
+        signal_derivatives(problem, j, t, signal_terms[j])
+    for i in range(SERIES_TERMS - 1):
         for b in range(n):
             p, v = term[b], term[n + b]
             term[b], term[n + b] = v, -problem.k[b] * p - problem.c[b] * v
-        if i < six.shape[1]:
+        if i < signal_terms.shape[1]:
             for j in range(problem.table_dt.size):
                 load = problem.load[problem.table_load[j]]
                 for e in range(2 * n):
-                    term[e] += six[j, i] * load[e]
+                    term[e] += signal_terms[j, i] * load[e]
         weight *= span / (i + 1.0)
         for e in range(2 * n):
             x[e] += weight * term[e]
 
 
 @inlined
-def turn_apart(tables, level, x):
+def propagate_split(tables, level, x):
     """A tabulated step of the blocks' p and v, eight blocks at once."""
-    alpha, beta = tables.propagator[level, 0], tables.propagator[level, 1]
+    alpha, beta = tables.flight_propagator[level, 0], tables.flight_propagator[level, 1]
     for i in range(0, x.shape[1], WIDTH):
-        p, v, a, b = eight(x[0], i), eight(x[1], i), eight(alpha, i), eight(beta, i)
-        put(x[0], i, a * p + b * v)
-        put(x[1], i, a * v - b * (eight(tables.apart[0], i) * p + eight(tables.apart[1], i) * v))
+        p, v, a, b = load8(x[0], i), load8(x[1], i), load8(alpha, i), load8(beta, i)
+        store8(x[0], i, a * p + b * v)
+        store8(x[1], i, a * v - b * (load8(tables.block_k_c[0], i) * p + load8(tables.block_k_c[1], i) * v))
 
 
 @inlined
-def look(tables, s, x):
+def motion_of_stop(tables, s, x):
     """δ + gap and δ̇ of a stop from the blocks' p and v."""
-    rows, delta, rate = tables.look[s], spread(0.0), spread(0.0)
+    rows, delta, rate = tables.stop_rows[s], splat8(0.0), splat8(0.0)
     for i in range(0, x.shape[1], WIDTH):
-        p, v = eight(x[0], i), eight(x[1], i)
-        delta += eight(rows[0], i) * p + eight(rows[1], i) * v
-        rate += eight(rows[2], i) * p + eight(rows[3], i) * v
-    return total(delta), total(rate)
+        p, v = load8(x[0], i), load8(x[1], i)
+        delta += load8(rows[0], i) * p + load8(rows[1], i) * v
+        rate += load8(rows[2], i) * p + load8(rows[3], i) * v
+    return sum8(delta), sum8(rate)
 
 
 @inlined
-def bound_apart(tables, s, x):
+def acceleration_bound_split(tables, s, x):
     """M: bound of |δ̈| of a stop from now on, without signals, from the blocks' p and v."""
-    bound = spread(0.0)
+    bound = splat8(0.0)
     for i in range(0, x.shape[1], WIDTH):
-        p, v = eight(x[0], i), eight(x[1], i)
-        bound += eight(tables.weight[s], i) * root(v * v + eight(tables.apart[0], i) * p * p)
-    return total(bound)
+        p, v = load8(x[0], i), load8(x[1], i)
+        bound += load8(tables.acceleration_weight[s], i) * sqrt8(v * v + load8(tables.block_k_c[0], i) * p * p)
+    return sum8(bound)
 
 
 @inlined

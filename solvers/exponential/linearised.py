@@ -1,4 +1,4 @@
-"""Derivative of a run of `method`, carried over what its tape tells.
+"""Derivative of a run of `method`, step by step along its event record.
 
 Every accepted contact step is linearised as it was taken. With Y the derivative of the state at fixed time,
 
@@ -9,9 +9,9 @@ Every accepted contact step is linearised as it was taken. With Y the derivative
     step     (1 - D C) dF = D (free response of Y) + ∂F/∂(entry rate) d(entry rate),   Y ← E(h) Y + kick dF
     landing  the variational equation, on the stages of the Runge–Kutta step
 
-The first step of a power law with a broken exponent knows the force as t^p times a smooth function of √t, where t
-counts from the entry. Its derivative at fixed time is singular there, so that step is linearised in a frame which moves
-with the entry, Y + f dt*, f the state's rate, and brought back at its end.
+On the first step of a power law with a broken exponent the force is t^p times a smooth function of √t, with t from the
+entry on. Its derivative at fixed time is singular there; so that step is linearised in a frame that moves with the
+entry, Y + f dt* with f the rate of the state, and transformed back at its end.
 
 A parameter adds a column. Where it changes only loads' tones, gaps and laws, Y_p = W + P(t) with P the derivative of
 the steady response to the tones, known in closed form at any time, so that W obeys the equations above with P among the
@@ -26,7 +26,6 @@ import numpy as np
 from numba import types
 
 from solvers.compiled.dop853_tableau import STAGES, A
-from solvers.compiled.handles import opener
 from solvers.compiled.kernels import (
     PROBLEM,
     call_gradient,
@@ -40,6 +39,7 @@ from solvers.compiled.kernels import (
     inner,
     rhs,
 )
+from solvers.compiled.packed import unpacker
 from solvers.compiled.state import (
     BEGAN,
     ENDED,
@@ -48,42 +48,42 @@ from solvers.compiled.state import (
     HEAD,
     KIND,
     LANDING,
+    RECORDED,
     RENEWAL,
     SECOND,
     SPAN,
     STATE,
-    TAPED,
     T,
     begin_contacts,
     rate_tolerance,
 )
 from solvers.compiled.sums import combine
 from solvers.exponential.contact.crossings import FORCE, side_at
-from solvers.exponential.contact.landing import regular_step, start_landing
+from solvers.exponential.contact.landing import landing_step, start_landing
 from solvers.exponential.contact.node_response import START
 from solvers.exponential.linearised_border import pass_border
 from solvers.exponential.linearised_step import (
-    NUDGE,
-    SLOPES,
+    DERIVATIVES,
+    VARIATION,
     by_latched,
     change_by_latched,
     change_of,
-    explicit,
+    explicit_change,
     is_parameter,
     linearise_step,
 )
-from solvers.exponential.preparation import SPACE, TABLES
+from solvers.exponential.preparation import SCRATCH, TABLES
 from solvers.exponential.responses import propagate
 
-_OFF = 1e-10  # relative distance from a knot at which a law is on one side of it for sure
+_OFF = 1e-10  # relative distance from a knot at which a law is certainly on one side of it
 
 
-_problem, _tables, _state, _space = opener(PROBLEM), opener(TABLES), opener(STATE), opener(SPACE)
-_slopes, _nudge = opener(SLOPES), opener(NUDGE)
+_problem, _tables, _state, _scratch = unpacker(PROBLEM), unpacker(TABLES), unpacker(STATE), unpacker(SCRATCH)
+_derivatives, _variation = unpacker(DERIVATIVES), unpacker(VARIATION)
 
 
 @inner
-def _coast(problem, duration, y):
+def _fly(problem, duration, y):
     """Flight."""
     n = problem.k.size
     for b in range(n):
@@ -95,79 +95,79 @@ def _coast(problem, duration, y):
 
 
 @inner
-def _force(problem, shadow, s, delta, delta_dot, batch):
+def _force(problem, past, s, delta, delta_dot, batch):
     """Force of one stop."""
     batch[0], batch[1] = delta, delta_dot
-    contact_forces(problem, s, batch[0:1], batch[1:2], shadow.entry_rate[s], batch[2:3])
+    contact_forces(problem, s, batch[0:1], batch[1:2], past.entry_rate[s], batch[2:3])
     return batch[2]
 
 
 @inner
-def _begin(problem, shadow, slopes, nudge):
-    """Put the stops on their pieces as the run does at its start, and latch the derivative of their rates."""
-    begin_contacts(problem, shadow)
+def _begin(problem, past, derivatives, variation):
+    """Find the segments of the stops as the run does at its start, and latch the derivatives of their rates."""
+    begin_contacts(problem, past)
     for s in range(problem.gap.size):
-        if shadow.piece[s] > 0:
-            rate = dot(problem.read_rate[s], shadow.x, 2 * problem.k.size)
-            for c in range(slopes.y.shape[0]):
-                change = change_of(problem, nudge, slopes, c, s, 1, 0.0)
-                slopes.entry[c, s] = 0.0 if abs(rate) < problem.floor[s] else np.sign(rate) * change
+        if past.segment[s] > 0:
+            rate = dot(problem.read_rate[s], past.x, 2 * problem.k.size)
+            for c in range(derivatives.y.shape[0]):
+                change = change_of(problem, variation, derivatives, c, s, 1, 0.0)
+                derivatives.entry[c, s] = 0.0 if abs(rate) < problem.floor[s] else np.sign(rate) * change
 
 
 @inner
-def _cross(problem, shadow, slopes, nudge, s, direction):
-    """A stop passes a border of its piece."""
-    size, t = 2 * problem.k.size, shadow.now[T]
-    rate = dot(problem.read_rate[s], shadow.x, size)
-    piece = shadow.piece[s]
-    entering = piece == 0
-    border = piece if direction > 0 else piece - 1
-    rhs(problem, t, shadow.x, shadow.piece, shadow.entry_rate, slopes.rate[0], slopes.batch)
-    acceleration = dot(problem.read_rate[s], slopes.rate[0], size)
-    still = rate_tolerance(problem, s, shadow.x)
+def _cross_knot(problem, past, derivatives, variation, s, direction):
+    """A stop passes a border of its segment."""
+    size, t = 2 * problem.k.size, past.now[T]
+    rate = dot(problem.read_rate[s], past.x, size)
+    segment = past.segment[s]
+    entering = segment == 0
+    border = segment if direction > 0 else segment - 1
+    rhs(problem, t, past.x, past.segment, past.entry_rate, derivatives.rate[0], derivatives.batch)
+    acceleration = dot(problem.read_rate[s], derivatives.rate[0], size)
+    still = rate_tolerance(problem, s, past.x)
     if entering:
-        shadow.entry_rate[s] = max(abs(rate), problem.floor[s])
-    below, above = problem.levels[s, border] * (1.0 - _OFF), problem.levels[s, border] * (1.0 + _OFF) + 1e-300
-    jump = _force(problem, shadow, s, above, rate, slopes.batch)
+        past.entry_rate[s] = max(abs(rate), problem.floor[s])
+    below, above = problem.knots[s, border] * (1.0 - _OFF), problem.knots[s, border] * (1.0 + _OFF) + 1e-300
+    jump = _force(problem, past, s, above, rate, derivatives.batch)
     if border > 0:
-        jump -= _force(problem, shadow, s, below, rate, slopes.batch)
+        jump -= _force(problem, past, s, below, rate, derivatives.batch)
     jump *= direction
-    for c in range(slopes.y.shape[0]):
-        moved = change_of(problem, nudge, slopes, c, s, 0, t)
+    for c in range(derivatives.y.shape[0]):
+        moved = change_of(problem, variation, derivatives, c, s, 0, t)
         shift = -moved / rate if abs(rate) > still else 0.0
         if entering:
             floored = abs(rate) < problem.floor[s]
-            change = change_of(problem, nudge, slopes, c, s, 1, t) + acceleration * shift
-            slopes.shift[c, s] = shift
-            slopes.entry[c, s] = 0.0 if floored else change
+            change = change_of(problem, variation, derivatives, c, s, 1, t) + acceleration * shift
+            derivatives.shift[c, s] = shift
+            derivatives.entry[c, s] = 0.0 if floored else change
         for e in range(size):
-            slopes.y[c, e] -= problem.push[s, e] * jump * shift
-    shadow.piece[s] += direction
+            derivatives.y[c, e] -= problem.push[s, e] * jump * shift
+    past.segment[s] += direction
 
 
 @inner
-def _inside_piece(problem, shadow, s, x):
-    """Indentation, kept off the knots at which the slope of the law would be that of the next piece."""
-    lower, upper = problem.levels[s, shadow.piece[s] - 1], problem.levels[s, shadow.piece[s]]
+def _inside_segment(problem, past, s, x):
+    """Indentation, kept off the knots, where the slope of the law could be that of the next segment."""
+    lower, upper = problem.knots[s, past.segment[s] - 1], problem.knots[s, past.segment[s]]
     return min(max(indentation(problem, s, x), lower * (1.0 + _OFF)), upper * (1.0 - _OFF))
 
 
 @inner
-def _note_sides(problem, tables, shadow, space):
-    """Into ``space.beyond`` whether each law that is cut at zero pushes as a landing begins."""
+def _note_sides(problem, tables, past, scratch):
+    """Force before its cut at the begin of a landing, for laws cut at zero force, into ``scratch.unresolved``."""
     for s in range(problem.gap.size):
-        if shadow.piece[s] > 0 and tables.bend[s] == FORCE:
-            space.beyond[s] = side_at(problem, tables, shadow, s, shadow.x, space.trial)
+        if past.segment[s] > 0 and tables.bend[s] == FORCE:
+            scratch.unresolved[s] = side_at(problem, tables, past, s, past.x, scratch.trial)
 
 
 @inlined
-def _gradient(problem, tables, shadow, space, s, batch):
-    """Derivatives of a law at one stage of a landing, on the side of its bend on which that began."""
-    d, v, rate = batch[0:1], batch[1:2], shadow.entry_rate[s]
+def _gradient(problem, tables, past, scratch, s, batch):
+    """Derivatives of a law at one stage of a landing, on the side of its bend on which the landing began."""
+    d, v, rate = batch[0:1], batch[1:2], past.entry_rate[s]
     if tables.bend[s] != FORCE:
         contact_gradient(problem, s, d, v, rate, batch[2:3], batch[3:4], batch[4:5])
-    elif space.beyond[s] > 0.0:
-        batch[0] = max(batch[0], problem.levels[s, 0])
+    elif scratch.unresolved[s] > 0.0:
+        batch[0] = max(batch[0], problem.knots[s, 0])
         results = batch[2:3], batch[3:4], batch[4:5]
         call_gradient(tables.uncut_gradient[s], 1, d, v, rate, tables.uncut_parameters[s], results)
     else:
@@ -175,95 +175,117 @@ def _gradient(problem, tables, shadow, space, s, batch):
 
 
 @inlined
-def _stage_rates(problem, ahead, behind, tables, shadow, space, slopes, nudge, w, factor, out):
+def _stage_rates(problem, ahead, behind, tables, past, scratch, derivatives, variation, w, factor, out):
     """Variational equation at one stage of a landing; ``w`` is the state with its time, factor dt along the step."""
-    n, size, t, batch = problem.k.size, 2 * problem.k.size, w[shadow.x.size], slopes.batch
-    for c in range(slopes.y.shape[0]):
-        y = slopes.trial[c]
+    n, size, t, batch = problem.k.size, 2 * problem.k.size, w[past.x.size], derivatives.batch
+    for c in range(derivatives.y.shape[0]):
+        y = derivatives.trial[c]
         for b in range(n):
             out[c, b] = factor * y[n + b]
             out[c, n + b] = factor * (-problem.k[b] * y[b] - problem.c[b] * y[n + b])
     for s in range(problem.gap.size):
-        if shadow.piece[s] == 0:
+        if past.segment[s] == 0:
             continue
-        batch[0], batch[1] = _inside_piece(problem, shadow, s, w), dot(problem.read_rate[s], w, size)
-        rate = shadow.entry_rate[s]
-        _gradient(problem, tables, shadow, space, s, batch)
-        by_latched(problem, shadow, slopes, s, 1, batch[0:1], batch[1:2])
-        if nudge.law_step > 0.0:
+        batch[0], batch[1] = _inside_segment(problem, past, s, w), dot(problem.read_rate[s], w, size)
+        rate = past.entry_rate[s]
+        _gradient(problem, tables, past, scratch, s, batch)
+        by_latched(problem, past, derivatives, s, 1, batch[0:1], batch[1:2])
+        if variation.law_step > 0.0:
             contact_forces(ahead, s, batch[0:1], batch[1:2], rate, batch[5:6])
             contact_forces(behind, s, batch[0:1], batch[1:2], rate, batch[6:7])
-        for c in range(slopes.y.shape[0]):
-            y = slopes.trial[c]
-            change = batch[4] * slopes.entry[c, s] + change_by_latched(problem, slopes, c, s, 1, 0)
+        for c in range(derivatives.y.shape[0]):
+            y = derivatives.trial[c]
+            change = batch[4] * derivatives.entry[c, s] + change_by_latched(problem, derivatives, c, s, 1, 0)
             for d in range(2):
                 value = dot(problem.read[s] if d == 0 else problem.read_rate[s], y, size)
-                if is_parameter(nudge, slopes, c):
-                    value += explicit(nudge, s, d, t)
+                if is_parameter(variation, derivatives, c):
+                    value += explicit_change(variation, s, d, t)
                 change += batch[2 + d] * value
-            if nudge.law_step > 0.0 and is_parameter(nudge, slopes, c):
-                change += (batch[5] - batch[6]) / (2.0 * nudge.law_step)
+            if variation.law_step > 0.0 and is_parameter(variation, derivatives, c):
+                change += (batch[5] - batch[6]) / (2.0 * variation.law_step)
             for e in range(size):
                 out[c, e] += factor * problem.push[s, e] * change
 
 
 @inner
-def _land(problem, ahead, behind, tables, shadow, space, slopes, nudge, row):
+def _land(problem, ahead, behind, tables, past, scratch, derivatives, variation, row):
     """A landing: the variational equation on the Runge–Kutta step's own stages."""
     variable, stop, size = int(row[FIRST]), int(row[SECOND]), 2 * problem.k.size
-    w, width, span = space.work[START], shadow.x.size, row[SPAN]
-    start_landing(problem, tables, shadow, space, stop)
-    _note_sides(problem, tables, shadow, space)
-    ledger = np.bool_(0)  # a literal would be compiled for itself
-    regular_step(
-        *(problem, tables, ledger, variable, stop, span, w, shadow.piece, shadow.entry_rate),
-        *(space.beyond, space.work),
+    w, width, span = scratch.stages[START], past.x.size, row[SPAN]
+    start_landing(problem, tables, past, scratch, stop)
+    _note_sides(problem, tables, past, scratch)
+    with_energy = np.bool_(0)  # a literal would be compiled for itself
+    landing_step(
+        *(problem, tables, with_energy, variable, stop, span, w, past.segment, past.entry_rate),
+        *(scratch.unresolved, scratch.stages),
     )
-    trial = space.work[STAGES + 1]
+    trial = scratch.stages[STAGES + 1]
     for i in range(STAGES + 1):
-        combine(space.work, A[i], i, w, trial)
-        for c in range(slopes.y.shape[0]):
+        combine(scratch.stages, A[i], i, w, trial)
+        for c in range(derivatives.y.shape[0]):
             for e in range(size):
                 total = 0.0
                 for j in range(i):
-                    total += A[i, j] * slopes.stages[j, c, e]
-                slopes.trial[c, e] = slopes.y[c, e] + total
+                    total += A[i, j] * derivatives.stages[j, c, e]
+                derivatives.trial[c, e] = derivatives.y[c, e] + total
         if i < STAGES:
-            factor = space.work[i, width]
-            _stage_rates(problem, ahead, behind, tables, shadow, space, slopes, nudge, trial, factor, slopes.stages[i])
-    for c in range(slopes.y.shape[0]):
-        copy(slopes.trial[c], slopes.y[c], size)
+            factor = scratch.stages[i, width]
+            _stage_rates(
+                problem,
+                ahead,
+                behind,
+                tables,
+                past,
+                scratch,
+                derivatives,
+                variation,
+                trial,
+                factor,
+                derivatives.stages[i],
+            )
+    for c in range(derivatives.y.shape[0]):
+        copy(derivatives.trial[c], derivatives.y[c], size)
 
 
 @entry(types.void(*[types.int64] * 10, types.boolean))
-def replay(
-    problem_at, ahead_at, behind_at, tables_at, state_at, space_at, shadow_at, slopes_at, nudge_at, modes, begins
+def linearise_run(
+    problem_at,
+    ahead_at,
+    behind_at,
+    tables_at,
+    state_at,
+    scratch_at,
+    past_at,
+    derivatives_at,
+    variation_at,
+    modes,
+    begins,
 ):
-    """Carry the derivatives over what a run has taped, up to the time it has reached, and let it tape anew.
+    """Move the derivatives along the event record of a run to the time it has reached, and empty the record.
 
-    ``ahead`` and ``behind`` are the problems whose laws have the parameter's other values, ``shadow`` the state as it
-    was; blocks beyond the ``modes`` are tones.
+    ``ahead`` and ``behind`` are the problems whose laws have the other values of the parameter, ``past`` the state at
+    the time the derivatives have reached; blocks from ``modes`` on are tones.
     """
     problem, ahead, behind, tables = _problem(problem_at), _problem(ahead_at), _problem(behind_at), _tables(tables_at)
-    state, space, shadow = _state(state_at), _space(space_at), _state(shadow_at)
-    slopes, nudge = _slopes(slopes_at), _nudge(nudge_at)
+    state, scratch, past = _state(state_at), _scratch(scratch_at), _state(past_at)
+    derivatives, variation = _derivatives(derivatives_at), _variation(variation_at)
     if begins:
-        _begin(problem, shadow, slopes, nudge)
-    for r in range(state.count[TAPED]):
-        row = state.tape[r]
-        _coast(problem, row[BEGAN] - shadow.now[T], slopes.y)
-        shadow.now[T] = row[BEGAN]
-        copy(row[HEAD:], shadow.x, shadow.x.size)
+        _begin(problem, past, derivatives, variation)
+    for r in range(state.count[RECORDED]):
+        row = state.event_record[r]
+        _fly(problem, row[BEGAN] - past.now[T], derivatives.y)
+        past.now[T] = row[BEGAN]
+        copy(row[HEAD:], past.x, past.x.size)
         if row[KIND] == EVENT:
-            _cross(problem, shadow, slopes, nudge, int(row[FIRST]), int(row[SECOND]))
+            _cross_knot(problem, past, derivatives, variation, int(row[FIRST]), int(row[SECOND]))
         elif row[KIND] == RENEWAL:
-            pass_border(problem, ahead, behind, shadow, slopes, nudge, int(row[FIRST]), int(row[SECOND]))
+            pass_border(problem, ahead, behind, past, derivatives, variation, int(row[FIRST]), int(row[SECOND]))
         elif row[KIND] == LANDING:
-            _land(problem, ahead, behind, tables, shadow, space, slopes, nudge, row)
+            _land(problem, ahead, behind, tables, past, scratch, derivatives, variation, row)
         else:
-            linearise_step(problem, ahead, behind, tables, shadow, space, slopes, nudge, row, modes)
-        shadow.now[T] = row[ENDED]
-    state.count[TAPED] = 0
-    _coast(problem, state.now[T] - shadow.now[T], slopes.y)
-    shadow.now[T] = state.now[T]
-    rhs(problem, state.now[T], state.x, state.piece, state.entry_rate, slopes.rate[0], slopes.batch)
+            linearise_step(problem, ahead, behind, tables, past, scratch, derivatives, variation, row, modes)
+        past.now[T] = row[ENDED]
+    state.count[RECORDED] = 0
+    _fly(problem, state.now[T] - past.now[T], derivatives.y)
+    past.now[T] = state.now[T]
+    rhs(problem, state.now[T], state.x, state.segment, state.entry_rate, derivatives.rate[0], derivatives.batch)

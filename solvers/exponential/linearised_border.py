@@ -11,7 +11,7 @@ from solvers.compiled.kernels import call_force, call_renewal, call_renewal_grad
 from solvers.compiled.state import T
 from solvers.exponential.linearised_step import change_of, is_parameter
 
-_SHARE, _LEAST = 1e-4, 1e-9  # of differences: part of a number, and at least this in its unit
+_SHARE, _LEAST = 1e-7, 1e-10  # of differences: part of a number, and at least this in its unit; margins may bend
 
 
 @inner
@@ -80,7 +80,7 @@ def pass_border(problem, ahead, behind, shadow, slopes, nudge, s, j):
     """A law with memory passes its border j: derivatives of what it latches, and of the motion if its force jumps."""
     size, t, most, width = 2 * problem.k.size, shadow.now[T], problem.latched.shape[1], problem.parameters.shape[1]
     delta, rate = indentation(problem, s, shadow.x), dot(problem.read_rate[s], shadow.x, size)
-    rhs(problem, t, shadow.x, shadow.piece, shadow.entry_rate, slopes.rate[0], slopes.batch)
+    rhs(problem, t, shadow.x, shadow.segment, shadow.entry_rate, slopes.rate[0], slopes.batch)
     acceleration = dot(problem.read_rate[s], slopes.rate[0], size)
     first = most * (2 + most) + width
     by, explicit = slopes.renewed[first : first + 2 + most], slopes.renewed[first + 2 + most : first + 2 + 2 * most]

@@ -1,4 +1,4 @@
-"""Derivatives carried along a run, and the derivative of one collocated step; see `linearised`."""
+"""The derivatives moved along a run, and the derivative of one collocated step; see `linearised`."""
 
 from __future__ import annotations
 
@@ -10,17 +10,27 @@ from numba import types
 from solvers.compiled.kernels import MATRIX, REAL, VECTOR, call_force, contact_forces, copy, dot, inlined, inner, rhs
 from solvers.compiled.state import BEGAN, ENDED, FIRST, HEAD, KIND, PART, SECOND, SPAN, T
 from solvers.compiled.sums import combine
-from solvers.exponential.contact.blocks import carry_free, goes_through_blocks, kick, pair, see, way_of
-from solvers.exponential.contact.collocation import arrive
+from solvers.exponential.contact.collocation import end_state
+from solvers.exponential.contact.many_stops import (
+    add_end_response,
+    free_block_motion,
+    motion_at_nodes,
+    pair_response,
+    uses_blocks,
+    weighting_of,
+)
 from solvers.exponential.contact.node_newton import factorise, linearise, substitute
 from solvers.exponential.contact.node_response import free_response, respond
 from solvers.exponential.contact.nodes import S
-from solvers.exponential.energy.quadrature import inside
-from solvers.exponential.flight import signal_derivatives, turn
+from solvers.exponential.energy.quadrature import state_within
+from solvers.exponential.flight import propagate_blocks, signal_derivatives
 
 
-class Slopes(NamedTuple):
-    """Derivatives carried along and working space; columns are the first index."""
+class Derivatives(NamedTuple):
+    """Derivatives and scratch arrays; the first index counts columns: the 2n start coordinates, then the parameter.
+
+    `Tangent` fills y, from then on `linearise_run` alone writes to them.
+    """
 
     y: Any  # (columns, x.size) of the state at fixed time
     entry: Any  # (columns, m) of the latched entry rates
@@ -29,7 +39,7 @@ class Slopes(NamedTuple):
     signal: Any  # (L, S) slopes of the sampled signals there
     response: Any  # (m, 2, S) of δ and δ̇ to these slopes
     by_parameter: Any  # (m, S) ∂F/∂parameter there
-    rate: Any  # (2, x.size) of the state at both ends of a step; at last the first is that at the time reached
+    rate: Any  # (2, x.size) of the state at both ends of a step; after a call the first is that at the time reached
     stages: Any  # (STAGES, columns, x.size) of a landing
     trial: Any  # (columns, x.size)
     batch: Any  # (8,)
@@ -38,10 +48,10 @@ class Slopes(NamedTuple):
     renewed: Any  # (l (2 + l) + 4 P + 2 B,) working space
 
 
-class Nudge(NamedTuple):
-    """What a parameter changes per unit, besides the state; none when ``step`` is zero."""
+class Variation(NamedTuple):
+    """Changes by a parameter, per unit, besides that of the state; ``step`` is zero without a parameter."""
 
-    step: float  # half the distance of the two systems it was taken from
+    step: float  # half the distance between the two systems of the difference
     law_step: float  # the same; zero where their laws are the same
     omega: Any  # (K,) tones
     steady: Any  # (K, m, 2, 4): (Re a, Im a, Re b, Im b) of δ and δ̇ = Re (a + t b) e^{iωt}
@@ -49,181 +59,190 @@ class Nudge(NamedTuple):
 
 
 _CUBE = types.Array(REAL, 3, "C")
-SLOPES = types.NamedTuple([*[MATRIX] * 5, _CUBE, MATRIX, MATRIX, _CUBE, MATRIX, VECTOR, MATRIX, MATRIX, VECTOR], Slopes)
-NUDGE = types.NamedTuple([REAL, REAL, VECTOR, types.Array(REAL, 4, "C"), VECTOR], Nudge)
+DERIVATIVES = types.NamedTuple(
+    [*[MATRIX] * 5, _CUBE, MATRIX, MATRIX, _CUBE, MATRIX, VECTOR, MATRIX, MATRIX, VECTOR], Derivatives
+)
+VARIATION = types.NamedTuple([REAL, REAL, VECTOR, types.Array(REAL, 4, "C"), VECTOR], Variation)
 
 
 @inlined
-def explicit(nudge, s, d, t):
-    """Change of δ (d = 0) or δ̇ that the parameter makes by itself at time t."""
-    total = -nudge.gap[s] if d == 0 else 0.0
-    for j in range(nudge.omega.size):
-        a = nudge.steady[j, s, d]
-        angle = nudge.omega[j] * t
+def explicit_change(variation, s, d, t):
+    """Explicit change of δ (d = 0) or δ̇ by the parameter at time t: the state is held fixed."""
+    total = -variation.gap[s] if d == 0 else 0.0
+    for j in range(variation.omega.size):
+        a = variation.steady[j, s, d]
+        angle = variation.omega[j] * t
         total += (a[0] + t * a[2]) * np.cos(angle) - (a[1] + t * a[3]) * np.sin(angle)
     return total
 
 
 @inlined
-def change_of(problem, nudge, slopes, column, s, d, t):
-    """Change of δ or δ̇ of a stop at fixed time."""
+def change_of(problem, variation, derivatives, column, s, d, t):
+    """Change of δ (d = 0) or δ̇ of a stop at fixed time, in one column."""
     row = problem.read[s] if d == 0 else problem.read_rate[s]
-    value = dot(row, slopes.y[column], 2 * problem.k.size)
-    return value + explicit(nudge, s, d, t) if is_parameter(nudge, slopes, column) else value
+    value = dot(row, derivatives.y[column], 2 * problem.k.size)
+    return value + explicit_change(variation, s, d, t) if is_parameter(variation, derivatives, column) else value
 
 
 @inlined
-def is_parameter(nudge, slopes, column):
+def is_parameter(variation, derivatives, column):
     """Whether a column is the parameter's."""
-    return nudge.step > 0.0 and column == slopes.y.shape[0] - 1
+    return variation.step > 0.0 and column == derivatives.y.shape[0] - 1
 
 
 @inlined
-def by_latched(problem, shadow, slopes, s, n, delta, rate):
+def by_latched(problem, past, derivatives, s, n, delta, rate):
     """∂F/∂(latched numbers) of a law with memory at n points."""
     if problem.by_latched[s] != 0:
-        address, out = problem.by_latched[s], slopes.by_latched[s]
-        call_force(address, n, delta, rate, shadow.entry_rate[s], problem.parameters[s], (out,))
+        address, out = problem.by_latched[s], derivatives.by_latched[s]
+        call_force(address, n, delta, rate, past.entry_rate[s], problem.parameters[s], (out,))
 
 
 @inlined
-def change_by_latched(problem, slopes, column, s, n, i):
+def change_by_latched(problem, derivatives, column, s, n, i):
     """Change of a force at point i of n by the changes of what is latched."""
     total, most = 0.0, problem.latched.shape[1]
     for place in range(most if problem.by_latched[s] != 0 else 0):
         if problem.latched[s, place] >= 0:
-            total += slopes.by_latched[s, place * n + i] * slopes.latched[column, s * most + place]
+            total += derivatives.by_latched[s, place * n + i] * derivatives.latched[column, s * most + place]
     return total
 
 
 @inlined
-def _by_parameter(ahead, behind, shadow, space, nudge, slopes, s):
-    """∂F/∂parameter at the nodes of a stop, from the law at both parameters."""
+def _by_parameter(ahead, behind, past, scratch, variation, derivatives, s):
+    """∂F/∂parameter at the nodes of a stop, by the difference of the law at both parameters."""
     for i in range(S):
-        slopes.by_parameter[s, i] = 0.0
-    if nudge.law_step == 0.0:
+        derivatives.by_parameter[s, i] = 0.0
+    if variation.law_step == 0.0:
         return
-    delta, rate = space.motion[s, 0], space.motion[s, 1]
-    copy(delta, space.clipped, S)
-    contact_forces(ahead, s, space.clipped, rate, shadow.entry_rate[s], slopes.by_parameter[s])
-    contact_forces(behind, s, space.clipped, rate, shadow.entry_rate[s], space.trial)
+    delta, rate = scratch.motion[s, 0], scratch.motion[s, 1]
+    copy(delta, scratch.clipped, S)
+    contact_forces(ahead, s, scratch.clipped, rate, past.entry_rate[s], derivatives.by_parameter[s])
+    contact_forces(behind, s, scratch.clipped, rate, past.entry_rate[s], scratch.trial)
     for i in range(S):
-        slopes.by_parameter[s, i] = (slopes.by_parameter[s, i] - space.trial[i]) / (2.0 * nudge.law_step)
+        derivatives.by_parameter[s, i] = (derivatives.by_parameter[s, i] - scratch.trial[i]) / (
+            2.0 * variation.law_step
+        )
 
 
 @inlined
-def _signal_slopes(problem, tables, shadow, space, slopes, family, level, t):
+def _signal_slopes(problem, tables, past, scratch, derivatives, node_set, level, t):
     """Slopes of the sampled signals at the nodes, and the response of the stops in contact to them."""
-    stops, h = problem.gap.size, tables.step[level]
+    stops, h = problem.gap.size, tables.contact_step[level]
     for j in range(problem.table_dt.size):
         for i in range(S):
-            signal_derivatives(problem, j, t + h * tables.times[family, i], space.six[j])
-            slopes.signal[problem.table_load[j], i] = space.six[j, 1]
+            signal_derivatives(problem, j, t + h * tables.times[node_set, i], scratch.signal_terms[j])
+            derivatives.signal[problem.table_load[j], i] = scratch.signal_terms[j, 1]
     for s in range(stops):
-        if shadow.piece[s] == 0:
+        if past.segment[s] == 0:
             continue
-        response = slopes.response[s]
+        response = derivatives.response[s]
         for i in range(S):
             response[0, i], response[1, i] = 0.0, 0.0
         for load in problem.table_load:
-            matrix = pair(problem, tables, space, family, level, s, stops + load)
-            combine(matrix, slopes.signal[load], S, response, response)
+            matrix = pair_response(problem, tables, scratch, node_set, level, s, stops + load)
+            combine(matrix, derivatives.signal[load], S, response, response)
 
 
 @inlined
-def _solve(problem, tables, shadow, space, slopes, nudge, family, level, column, shift):
+def _solve(problem, tables, past, scratch, derivatives, variation, node_set, level, column, shift):
     """Changes of all forces (and, in a moving frame, signals) at the nodes, one column."""
-    row, size, stops, through = 0, 2 * problem.k.size, problem.gap.size, goes_through_blocks(tables)
+    row, size, stops, through = 0, 2 * problem.k.size, problem.gap.size, uses_blocks(tables)
     if through:
-        carry_free(problem, tables, space, family, level, slopes.y[column])
+        free_block_motion(problem, tables, scratch, node_set, level, derivatives.y[column])
     for s in range(stops):
-        if shadow.piece[s] == 0:
+        if past.segment[s] == 0:
             continue
         if through:
-            see(problem, space, s, 0.0, space.motion[s])
+            motion_at_nodes(problem, scratch, s, 0.0, scratch.motion[s])
         else:
-            combine(tables.free[tables.kind[family], level, s], slopes.y[column], size, None, space.motion[s])
+            combine(tables.free[tables.kind[node_set], level, s], derivatives.y[column], size, None, scratch.motion[s])
         for i in range(S):
-            change = slopes.entry[column, s] * space.slope[s, 2, i]
-            change += change_by_latched(problem, slopes, column, s, S, i)
-            if is_parameter(nudge, slopes, column):
-                change += slopes.by_parameter[s, i]
+            change = derivatives.entry[column, s] * scratch.slope[s, 2, i]
+            change += change_by_latched(problem, derivatives, column, s, S, i)
+            if is_parameter(variation, derivatives, column):
+                change += derivatives.by_parameter[s, i]
             for d in range(2):
-                value = space.motion[s, d, i]
+                value = scratch.motion[s, d, i]
                 if shift != 0.0:
-                    value += shift * slopes.response[s, d, i]
-                if is_parameter(nudge, slopes, column):
-                    value += explicit(nudge, s, d, shadow.now[T] + tables.step[level] * tables.times[family, i])
-                change += space.slope[s, d, i] * value
-            space.residual[row + i] = change
+                    value += shift * derivatives.response[s, d, i]
+                if is_parameter(variation, derivatives, column):
+                    value += explicit_change(
+                        variation, s, d, past.now[T] + tables.contact_step[level] * tables.times[node_set, i]
+                    )
+                change += scratch.slope[s, d, i] * value
+            scratch.residual[row + i] = change
         row += S
-    substitute(space.jacobian, space.pivots, row, space.residual)
+    substitute(scratch.jacobian, scratch.pivots, row, scratch.residual)
     row = 0
     for s in range(stops):
-        if shadow.piece[s] > 0:
-            copy(space.residual[row : row + S], slopes.force[s], S)
+        if past.segment[s] > 0:
+            copy(scratch.residual[row : row + S], derivatives.force[s], S)
             row += S
     for load in problem.table_load:
         for i in range(S):
-            slopes.force[stops + load, i] = shift * slopes.signal[load, i]
+            derivatives.force[stops + load, i] = shift * derivatives.signal[load, i]
 
 
 @inlined
-def _move(problem, tables, shadow, space, slopes, family, level, y, part):
+def _move(problem, tables, past, scratch, derivatives, node_set, level, y, part):
     """Take one column to the end of the step, or to the ``part`` of it that lies within the run."""
     size, stops = 2 * problem.k.size, problem.gap.size
     if part < np.inf:
-        for u in range(space.force.shape[0]):
-            copy(slopes.force[u], space.force[u], S)
-        inside(problem, tables, shadow, space, family, tables.step[level], part, y)
+        for u in range(scratch.force.shape[0]):
+            copy(derivatives.force[u], scratch.force[u], S)
+        ledger = np.bool_(0)  # a literal would be compiled for itself
+        state_within(problem, tables, past, scratch, node_set, tables.contact_step[level], 0.0, part, y, ledger)
         return
-    turn(problem, tables.step_propagator[level, 0], tables.step_propagator[level, 1], y)
-    if goes_through_blocks(tables):
-        kick(problem, tables, shadow, space, slopes.force, family, level, y)
-    for u in range(0 if goes_through_blocks(tables) else space.force.shape[0]):
-        if u < stops and shadow.piece[u] == 0:
+    propagate_blocks(problem, tables.contact_propagator[level, 0], tables.contact_propagator[level, 1], y)
+    if uses_blocks(tables):
+        add_end_response(problem, tables, past, scratch, derivatives.force, node_set, level, y)
+    for u in range(0 if uses_blocks(tables) else scratch.force.shape[0]):
+        if u < stops and past.segment[u] == 0:
             continue
         for j in range(S):
-            row = tables.kick[way_of(tables, family, u), level, u, j]
+            row = tables.end_response[weighting_of(tables, node_set, u), level, u, j]
             for e in range(size):
-                y[e] += row[e] * slopes.force[u, j]
+                y[e] += row[e] * derivatives.force[u, j]
 
 
 @inner
-def linearise_step(problem, ahead, behind, tables, shadow, space, slopes, nudge, row, modes):
+def linearise_step(problem, ahead, behind, tables, past, scratch, derivatives, variation, row, modes):
     """A collocated step, linearised as it was taken."""
-    family, level, t = int(row[FIRST]), int(row[SECOND]), row[BEGAN]
+    node_set, level, t = int(row[FIRST]), int(row[SECOND]), row[BEGAN]
     size, stops = 2 * problem.k.size, problem.gap.size
-    free_response(problem, tables, shadow, space, family, level)
+    free_response(problem, tables, past, scratch, node_set, level)
     for s in range(stops):
-        copy(row[HEAD + shadow.x.size + s * S : HEAD + shadow.x.size + (s + 1) * S], space.force[s], S)
+        copy(row[HEAD + past.x.size + s * S : HEAD + past.x.size + (s + 1) * S], scratch.force[s], S)
     for s in range(stops):
-        if shadow.piece[s] > 0:
-            respond(problem, tables, shadow, space, family, level, s)
-            _by_parameter(ahead, behind, shadow, space, nudge, slopes, s)
-            by_latched(problem, shadow, slopes, s, S, space.motion[s, 0], space.motion[s, 1])
-    factorise(space.jacobian, space.pivots, linearise(problem, tables, shadow, space, family, level))
-    moving = tables.power[family] > 1.0
+        if past.segment[s] > 0:
+            respond(problem, tables, past, scratch, node_set, level, s)
+            _by_parameter(ahead, behind, past, scratch, variation, derivatives, s)
+            by_latched(problem, past, derivatives, s, S, scratch.motion[s, 0], scratch.motion[s, 1])
+    factorise(scratch.jacobian, scratch.pivots, linearise(problem, tables, past, scratch, node_set, level))
+    moving = tables.time_exponent[node_set] > 1.0
     part = row[SPAN] if row[KIND] == PART else np.inf
     if moving:
-        rhs(problem, t, shadow.x, shadow.piece, shadow.entry_rate, slopes.rate[0], slopes.batch)
-        end = space.x_new
+        rhs(problem, t, past.x, past.segment, past.entry_rate, derivatives.rate[0], derivatives.batch)
+        end = scratch.x_new
         if part < np.inf:
-            copy(shadow.x, end, shadow.x.size)
-            inside(problem, tables, shadow, space, family, tables.step[level], part, end)
+            copy(past.x, end, past.x.size)
+            state_within(
+                problem, tables, past, scratch, node_set, tables.contact_step[level], 0.0, part, end, np.bool_(0)
+            )
         else:
-            arrive(problem, tables, shadow, space, family, level)
-        rhs(problem, row[ENDED], end, shadow.piece, shadow.entry_rate, slopes.rate[1], slopes.batch)
-        _signal_slopes(problem, tables, shadow, space, slopes, family, level, t)
-    for c in range(slopes.y.shape[0]):
-        y = slopes.y[c]
-        shift = slopes.shift[c, family - 1] if moving else 0.0
+            end_state(problem, tables, past, scratch, node_set, level)
+        rhs(problem, row[ENDED], end, past.segment, past.entry_rate, derivatives.rate[1], derivatives.batch)
+        _signal_slopes(problem, tables, past, scratch, derivatives, node_set, level, t)
+    for c in range(derivatives.y.shape[0]):
+        y = derivatives.y[c]
+        shift = derivatives.shift[c, node_set - 1] if moving else 0.0
         for e in range(size if moving else 0):
-            y[e] += slopes.rate[0, e] * shift
-        _solve(problem, tables, shadow, space, slopes, nudge, family, level, c, shift)
-        _move(problem, tables, shadow, space, slopes, family, level, y, part)
+            y[e] += derivatives.rate[0, e] * shift
+        _solve(problem, tables, past, scratch, derivatives, variation, node_set, level, c, shift)
+        _move(problem, tables, past, scratch, derivatives, node_set, level, y, part)
         if moving:
             for e in range(size):
-                y[e] -= slopes.rate[1, e] * shift
-            for b in range(modes, problem.k.size):  # tones do not change; their rounding would outlive the rest
+                y[e] -= derivatives.rate[1, e] * shift
+            for b in range(modes, problem.k.size):  # tones do not change; undamped, their rounding would stay
                 y[b], y[problem.k.size + b] = 0.0, 0.0

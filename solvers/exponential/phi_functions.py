@@ -1,4 +1,4 @@
-"""What loads that are polynomials of time do to the blocks: φ-functions of their matrices."""
+"""Responses of the blocks to loads that are polynomials of time: φ-functions of their matrices."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from solvers.compiled.kernels import Problem
 
 
 def signal_responses(problem: Problem, h: Any) -> Any:
-    """State change (len(h), L, 6, 2N) by loads t^k/k!, k = 0..5; those asked for lately are kept."""
+    """State change (len(h), L, 6, 2N) by loads t^k/k!, k = 0..5; the latest are kept."""
     if not np.any(problem.load):
         return np.zeros((len(h), len(problem.load), 6, 2 * len(problem.k)))
     return _polynomial_responses(*(array.tobytes() for array in (problem.k, problem.c, problem.load, h)))

@@ -1,25 +1,25 @@
-"""What the exponential method prepares once per system: tones among the blocks, tables, layout of the working space."""
+"""What the exponential method prepares once per system: a block per tone, tables, layout of the working arrays."""
 
 from __future__ import annotations
 
-import math
 from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
 
-from solvers.compiled.handles import Cast, Layout, Mould, Packed
 from solvers.compiled.kernels import INTEGERS, MATRIX, PROBLEM, REAL, VECTOR, Problem
+from solvers.compiled.packed import Layout, Packed, PackedTemplate
 from solvers.compiled.state import STATE, State, begin_state, most_borders, problem_of, state_shapes
 from solvers.compiled.sums import padded
-from solvers.exponential.contact.blocks import POOL
-from solvers.exponential.contact.node_response import START, Space
+from solvers.exponential.contact.many_stops import POOL
+from solvers.exponential.contact.node_response import START, Scratch
 from solvers.exponential.contact.nodes import S, series_of
-from solvers.exponential.energy.flight_tables import books_for
-from solvers.exponential.flight import LONG
-from solvers.exponential.tables import OF_TONES, Tables, build, doublings, fill_tones, known_of
-from solvers.problem import Array, Forcing, Memo, System, on_one_grid, tones_as_nodes
+from solvers.exponential.energy.flight_tables import energy_tables_for
+from solvers.exponential.flight import SERIES_TERMS
+from solvers.exponential.steady_response import steady_response, without_resonance
+from solvers.exponential.tables import TONE_TABLES, Tables, build, doublings, fill_tones, law_tables_of
+from solvers.problem import Array, Forcing, Memo, System, on_one_grid
 
 
 def _arrays(*dimensions: int) -> list[Any]:
@@ -30,33 +30,33 @@ def _arrays(*dimensions: int) -> list[Any]:
 TABLES = types.NamedTuple(
     [
         *_arrays(1, 3, 4, 2, 3, 2, 3, 2, 2, 2, 2, 0, 0, 2, 1, 2),
-        *(*_arrays(1, 3, 1, 1, 2, 2, 2, 2, 3, 3, 4, 3), INTEGERS, INTEGERS),
+        *(*_arrays(1, 3, 1, 1, 2, 2, 2, 2, 3, 3, 3, 4, 3), INTEGERS, INTEGERS),
         *_arrays(5, 6, 5, 5, 5, 5, 3, 2, 2, 2, 2, 2, 4),
         *(VECTOR, INTEGERS, INTEGERS, MATRIX),
     ],
     Tables,
 )
-SPACE = types.NamedTuple(
+SCRATCH = types.NamedTuple(
     [
         *(*_arrays(1, 2, 2, 1, 1, 1, 1, 2, 3, 1, 3, 2, 1, 3, 2, 3, 1), INTEGERS, MATRIX),
         *(*_arrays(1, 1, 1, 1, 2, 1, 2, 1, 1, 1, 1, 1, 2, 1), INTEGERS),
-        *(*_arrays(2, 1, 1, 1, 2, 2), INTEGERS),
-        *(*_arrays(2, 2, 1, 2, 3), INTEGERS),
+        *(*_arrays(2, 1, 1, 1, 2, 2), INTEGERS, INTEGERS),
+        *(*_arrays(2, 2, 1, 2, 3), INTEGERS, *_arrays(2, 3, 2)),
     ],
-    Space,
+    Scratch,
 )
 
 
 class Workspace:
-    """What one run writes to: a block of memory, its arrays, and where compiled code finds their descriptors."""
+    """The memory one run writes to: a block, its arrays, and the addresses of their descriptors for compiled code."""
 
     def __init__(self, layout: Layout, rest: Array, blocks: int) -> None:
         self.layout = layout
         self.block, words = layout.block()
-        self.numbers = self.block[: layout.slices[1][Space._fields.index("jacobian")][0].start]
+        self.numbers = self.block[: layout.slices[1][Scratch._fields.index("jacobian")][0].start]
         self.addresses = [words + start for start in layout.starts]
         self.state = State._make(layout.arrays(self.block, 0))
-        self.energy = layout.array(self.block, 1, Space._fields.index("energy"))
+        self.energy = layout.array(self.block, 1, Scratch._fields.index("energy"))
         begin_state(self.state, rest)
         self.rest = self.numbers.copy()
         self.own = self.state.x[: rest.size].reshape(2, -1)[:, :blocks]
@@ -66,75 +66,79 @@ class Workspace:
         self.numbers[:] = self.rest
         self.own += z.reshape(2, -1)
 
-    def record(self, tape: Array) -> None:
-        """Let another array be the tape."""
-        self.state = self.state._replace(tape=tape)
-        self.layout.exchange(self.block, 0, State._fields.index("tape"), tape)
+    def record_events(self, event_record: Array) -> None:
+        """Let another array be the event record."""
+        self.state = self.state._replace(event_record=event_record)
+        self.layout.replace_array(self.block, 0, State._fields.index("event_record"), event_record)
 
 
 class Prepared(NamedTuple):
-    """What does not change from run to run of one system."""
+    """What all runs of one system share."""
 
-    problem: Cast
-    tables: Cast
+    problem: Packed
+    tables: Packed
     back: Array  # (2n, 2N): [q, q̇] from the state of all blocks
-    layout: Layout  # of State and Space
-    rest: Array  # state of the tones' blocks at t = 0, the structure's less their steady response
-    spare: list[Workspace]  # of runs that are over
+    layout: Layout  # of State and Scratch
+    rest: Array  # state at t = 0: the tones' blocks, and minus the steady response of the structure's blocks
+    spare_workspaces: list[Workspace]  # of runs that are over
     kept: Memo  # tables of the energy balance by the spacing of outputs
 
-    def books_for(self, spacing: float) -> Packed:
-        """Tables of the energy ledger for outputs of a spacing, s."""
-        made: Packed = self.kept.get(spacing, lambda: books_for(self.problem.value, self.tables.value, spacing))
+    def energy_tables_for(self, spacing: float) -> Packed:
+        """Tables of the energy balance for outputs of a spacing, s."""
+        made: Packed = self.kept.get(spacing, lambda: energy_tables_for(self.problem.value, self.tables.value, spacing))
         return made
 
     @property
     def nbytes(self) -> int:
-        """Of what belongs to this one only; the rest is its skeleton's."""
+        """Of the memory that belongs to this one only; the rest is in `_SharedTables`."""
         return self.problem.nbytes + self.tables.nbytes + int(self.back.nbytes)
 
     def workspace(self) -> Workspace:
-        """One that no other run uses; making its arrays takes as long as many steps."""
+        """A workspace that no other run uses, a spare one if there is.
+
+        With a new one for every run, the runs of `tests/bench/compiler_options.py` take 1.15, 1.09, 1.05 and, under
+        noise, 1.03 times as long.
+        """
         try:
-            return self.spare.pop()
+            return self.spare_workspaces.pop()
         except IndexError:
             return Workspace(self.layout, self.rest, self.back.shape[0] // 2)
 
 
-def ready_for(system: System, forcing: Forcing, duration: float, rtol: float) -> tuple[Forcing, Prepared]:
-    """The forcing as the method takes it, and the tables; those of an identical earlier run are reused."""
+def prepare_run(system: System, forcing: Forcing, duration: float, rtol: float) -> tuple[Forcing, Prepared]:
+    """The forcing without resonant tones and on one grid, and the tables; those of an equal earlier run are reused."""
     last = system.kept.find(("run", duration, rtol))
     if last and last[0] is forcing:
         return forcing, last[1]
     taken = on_one_grid(without_resonance(system, forcing, duration, rtol), duration)
-    prepared = prepared_for(system, taken)
+    prepared = prepare_system(system, taken)
     if taken is forcing and not forcing.table.size:
         system.kept.store(("run", duration, rtol), (forcing, prepared))
     return taken, prepared
 
 
-def prepared_for(system: System, forcing: Forcing) -> Prepared:
+def prepare_system(system: System, forcing: Forcing) -> Prepared:
     """Tables of a system, made once for each grid of its sampled signals and kept on it."""
     dt_cell = float(forcing.table_dt[0]) if forcing.table_dt.size else 1.0
     tones = forcing.tone_omega, forcing.tone_amplitude, forcing.tone_load
 
     def make() -> Prepared:
         gaps = [contact.gap for contact in system.contacts]
-        return _skeleton_for(system, forcing, dt_cell).with_tones(forcing, gaps)
+        return _shared_tables_for(system, forcing, dt_cell).with_tones(forcing, gaps)
 
     key = "tables", dt_cell, forcing.table_load.tobytes(), *(part.tobytes() for part in tones)
     prepared: Prepared = system.kept.get(key, make)
     return prepared
 
 
-def _skeleton_for(system: System, forcing: Forcing, dt_cell: float) -> _Skeleton:
-    """What systems have in common that differ in tones, sampled values and gaps only."""
+def _shared_tables_for(system: System, forcing: Forcing, dt_cell: float) -> _SharedTables:
+    """The tables shared by systems that differ in tones, sampled values and gaps only."""
     about, laws = system.about_structure, system.about_laws
     about.get("passive", lambda: _check_passive(system))
     places = (part.tobytes() for part in (forcing.tone_load, forcing.table_dt, forcing.table_load))
-    key = "skeleton", laws, *places, doublings(_speeds(system), forcing.tone_omega)
-    skeleton: _Skeleton = about.get(key, lambda: _Skeleton(system, forcing, dt_cell))
-    return skeleton
+    key = "tables", laws, *places, doublings(_speeds(system), forcing.tone_omega)
+    shared: _SharedTables = about.get(key, lambda: _SharedTables(system, forcing, dt_cell))
+    return shared
 
 
 def _speeds(system: System) -> Array:
@@ -143,8 +147,8 @@ def _speeds(system: System) -> Array:
     return speeds
 
 
-class _Skeleton:
-    """The problem and its tables with room for tones, each of which becomes one more undamped block.
+class _SharedTables:
+    """The problem and its tables with columns for tones, each of which becomes one more undamped block.
 
     The steady response to Re(a e^{iΩt}) is Re(Z e^{iΩt}) = Re Z · p + Im Z/Ω · v with p = cos Ωt, v = -Ω sin Ωt.
     """
@@ -159,27 +163,27 @@ class _Skeleton:
         self.rows, ends = np.concatenate(read_by), np.cumsum([len(rows) for rows in read_by]).tolist()
         self.places = [slice(end - len(rows), end) for rows, end in zip(read_by, ends, strict=True)]
         self.back, self.fastest = among_tones(system.blocks.T, self.tones), max(float(_speeds(system).max()), 1e-3)
-        ledger = np.zeros_like(problem.load), problem.power, among_tones(loss, self.tones)
-        tables = build(problem, self.tones, self.series, known_of(contacts), dt_cell, ledger)
+        energy_rows = np.zeros_like(problem.load), problem.power, among_tones(loss, self.tones)
+        tables = build(problem, self.tones, self.series, law_tables_of(contacts), dt_cell, energy_rows)
         sizes = len(problem.gap), len(problem.load), len(problem.k), len(forcing.table_dt), most_borders(problem)
-        self.layout = _layout(*sizes, POOL if tables.ahead.size else 0)
-        self.problem = Mould(problem, PROBLEM, ("gap", "k", "read", "read_rate", "power"))
-        self.tables = Mould(tables, TABLES, OF_TONES)
+        self.layout = _layout(*sizes, POOL if tables.node_propagator.size else 0)
+        self.problem = PackedTemplate(problem, PROBLEM, ("gap", "k", "read", "read_rate", "power"))
+        self.tables = PackedTemplate(tables, TABLES, TONE_TABLES)
 
     @property
     def nbytes(self) -> int:
         """Of problem and tables."""
-        return sum(getattr(array, "nbytes", 8) for mould in (self.problem, self.tables) for array in mould.value)
+        return sum(getattr(array, "nbytes", 8) for part in (self.problem, self.tables) for array in part.value)
 
     def with_tones(self, forcing: Forcing, gaps: list[float]) -> Prepared:
-        """The same with the columns of given tones, and with given gaps."""
+        """A copy with the columns of given tones, and with given gaps."""
         omega, amplitude, n = forcing.tone_omega, forcing.tone_amplitude, len(self.k)
         load = self.load[forcing.tone_load] * amplitude[:, None]
         response = steady_response(self.k, self.c, load, omega[:, None])
         turn = 1.0 / np.where(omega > 0.0, omega, np.inf)
         steady = np.concatenate((response.real, response.imag * turn[:, None])).T  # (2n, 2 tones)
         columns = (self.rows @ steady).reshape(len(self.rows), 2, self.tones)
-        problem, tables, back = self.problem.cast(), self._tables(forcing, turn), self.back.copy()
+        problem, tables, back = self.problem.copy(), self._tables(forcing, turn), self.back.copy()
         read_by = problem.value.read, problem.value.power, tables.value.loss_rows, back
         for rows, place in zip(read_by, self.places, strict=True):
             _of_tones(rows, n)[:] = columns[place]
@@ -193,9 +197,9 @@ class _Skeleton:
         rest[n : n + self.tones] = 1.0
         return Prepared(problem, tables, back, self.layout, rest, [], Memo())
 
-    def _tables(self, forcing: Forcing, turn: Array) -> Cast:
+    def _tables(self, forcing: Forcing, turn: Array) -> Packed:
         """Tables that know the signals made of tones, Re(a e^{iΩt}) = Re a · p + Im a/Ω · v; ``turn`` is 1/Ω."""
-        tables = self.tables.cast(fastest=max(self.fastest, float(forcing.tone_omega.max(initial=0.0))))
+        tables = self.tables.copy(fastest=max(self.fastest, float(forcing.tone_omega.max(initial=0.0))))
         rows, load, each = tables.value.signal_rows, forcing.tone_load, np.arange(self.tones)
         rows[load, each - self.tones + rows.shape[1] // 2] = forcing.tone_amplitude.real
         rows[load, each - self.tones] = forcing.tone_amplitude.imag * turn
@@ -208,7 +212,7 @@ def _of_tones(rows: Array, n: int) -> Array:
 
 
 def _check_passive(system: System) -> bool:
-    """True if no block gains energy by itself, else ValueError: what proves that no contact is missed rests on that."""
+    """True if no block gains energy by itself, else ValueError: the proof that no contact is missed assumes it."""
     k, c = system.blocks.k, system.blocks.c
     if np.any(k < 0.0):
         raise ValueError(
@@ -224,46 +228,22 @@ def _check_passive(system: System) -> bool:
 
 @lru_cache(maxsize=64)
 def _layout(stops: int, loads: int, blocks: int, signals: int, borders: int, pool: int) -> Layout:
-    """Places of the arrays of `State` and `Space`; a pool if motion goes through the blocks."""
+    """Shapes and places of the arrays of `State` and `Scratch`; ``pool`` pairs of stops, 0 for a few stops."""
     size, width = 2 * blocks, 2 * blocks + 2 + 2 * stops
     rows = size if pool else 0
-    space = [
-        *((padded(width),), (LONG, padded(size)), (signals, 6), (LONG,), (blocks,), (loads,), (stops,)),
+    scratch = [
+        *((padded(width),), (SERIES_TERMS, padded(size)), (signals, 6), (SERIES_TERMS,), (blocks,), (loads,), (stops,)),
         (2, padded(blocks)),
         *((stops, 2, S), (S,), (stops, 2, S), (stops + loads, S), (S,), (stops, 2, 8), (stops, S), (stops, 3, S)),
         *((stops * S,), (stops * S,), (START + 1, padded(width + 2))),
         *([(stops,)] * 4),
         *((stops, S), (stops,), (4, 3 * S), (stops,), (stops,), (S + 2,), (1,), (1,)),
-        *((2 + loads, max(32, padded(size + 6 * signals), 2 * padded(6 * signals))), (3,), (7,)),
-        *((stops, 2), (borders * S,), (4 * borders,), (borders,), (stops, borders), (stops, borders), (2,)),
+        *((2 + loads, max(32, padded(size + 6 * signals), 2 * padded(6 * signals))), (3,), (6,)),
+        *((stops, 2), (borders * S,), (6 * borders,), (borders,), (stops, borders), (stops, borders), (1,), (2,)),
         *((rows, S), (rows, S), (padded(rows),), (stops * S, stops * S), (pool, S, 2 * S), (pool,)),
+        *((size, S), (blocks, 5, S), (S + 1 + stops + loads, S)),
     ]
-    return Layout([STATE, SPACE], [state_shapes(width, stops), space])
-
-
-def without_resonance(system: System, forcing: Forcing, duration: float, rtol: float) -> Forcing:
-    """Tones without a useful steady response are sampled instead.
-
-    That is those on the frequency of a block hardly damped, and those whose steady response l/|k - Ω² + iΩc| is a
-    thousand times what the load can do within the duration, l duration²/2: their difference would lose its digits.
-    """
-    key = "distances", forcing.tone_omega.tobytes(), forcing.tone_load.tobytes()
-    tones = zip(forcing.tone_omega, forcing.tone_load, strict=True)
-    found = system.kept.get(key, lambda: [_distance(system, omega, load) for omega, load in tones])
-    resonant = [i for i, (absolute, relative) in enumerate(found) if relative <= 1e-6 or absolute * duration**2 < 2e-3]
-    return tones_as_nodes(forcing, resonant, duration, rtol) if resonant else forcing
-
-
-def _distance(system: System, omega: float, load: int) -> tuple[float, float]:
-    """Smallest |k - Ω² + iΩc| of the blocks a load pushes, absolute and relative to max(k, Ω²)."""
-    vector, blocks = system.push @ np.asarray(system.loads[load][0]), system.blocks
-    pushed = (vector[: system.size] != 0.0) | (vector[system.size :] != 0.0)
-    if not pushed.any():
-        return math.inf, math.inf
-    k, c = blocks.k[pushed], blocks.c[pushed]
-    distance = np.abs(k - omega**2 + 1j * omega * c)
-    scale = np.maximum(k, max(omega**2, 1e-300))
-    return float(distance.min()), float((distance / scale).min())
+    return Layout([STATE, SCRATCH], [state_shapes(width, stops), scratch])
 
 
 def _loss_rows(problem: Problem) -> Array:
@@ -275,16 +255,8 @@ def _loss_rows(problem: Problem) -> Array:
     return np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
 
 
-def steady_response(k: Array, c: Array, load: Any, omega: Any) -> Any:
-    """(..., 2n) complex amplitude Z of the blocks' response Re(Z e^{iΩt}) to the state rate Re(load e^{iΩt})."""
-    lp, lv, turn = load[..., : k.size], load[..., k.size :], 1j * omega
-    # (iΩ - A)⁻¹ of a block: [[iΩ + c, 1], [-k, iΩ]] / (k - Ω² + iΩc)
-    inverse = 1.0 / np.where((lp == 0.0) & (lv == 0.0), 1.0, k - omega**2 + turn * c)
-    return np.concatenate((((turn + c) * lp + lv) * inverse, (turn * lv - k * lp) * inverse), axis=-1)
-
-
 def _widened(problem: Problem, forcing: Forcing) -> Problem:
-    """The problem with one block per tone, which nothing reads yet; tones are no load any more, tables empty."""
+    """The problem with one block per tone, whose read rows are zero; tones and sampled values are removed."""
     tones, none = len(forcing.tone_omega), np.zeros(0)
     sampled = np.zeros_like(problem.load)
     sampled[forcing.table_load] = problem.load[forcing.table_load]
@@ -305,13 +277,13 @@ def _widened(problem: Problem, forcing: Forcing) -> Problem:
 
 @lru_cache(maxsize=64)
 def places_among_tones(n: int, tones: int) -> Any:
-    """(2n,) where the blocks' own coordinates stand among those of the tones' blocks."""
+    """(2n,) indices of the structure's coordinates among those with the tones' blocks."""
     own = np.arange(n)
     return np.concatenate((own, own + (n + tones)))
 
 
 def among_tones(rows: Array, tones: int) -> Array:
-    """Block coordinates (..., 2n) with zeros for the tones' blocks."""
+    """Block coordinates (..., 2n) widened by zeros for the tones' blocks."""
     n = rows.shape[-1] // 2
     out = np.zeros((*rows.shape[:-1], 2, n + tones))
     out[..., :n] = rows.reshape(*rows.shape[:-1], 2, n)

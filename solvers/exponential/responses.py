@@ -1,10 +1,10 @@
-"""What a force known at the nodes of a contact step does through the blocks, per step length.
+"""Responses of the blocks to a force given at the nodes of a contact step, per step length.
 
 A block's response to the j-th node value is (α, β) of ∫_0^{t_i} E(t_i - τ) w(σ) L_j(σ)/w(σ_j) dτ at the nodes t_i and
-at the end. No more need be known for any number of stops: a stop pushes blocks and reads blocks, and what stop u does
-to stop s is one sum over the blocks, `fill_pair`. For a few stops these sums are made beforehand, for all pairs.
+at the end. The response of stop s to the force of stop u is a sum of these over the blocks, `fill_pair`. For a few
+stops it is made beforehand, for all pairs.
 
-A *kind* is a set of nodes, one per (κ, λ); a *way* is a kind with or without the weight σ^λ of the force.
+A *kind* is a set of nodes, one per (κ, λ); a *weighting* is a kind with or without the weight σ^λ of the force.
 """
 
 from __future__ import annotations
@@ -44,13 +44,13 @@ def fill_propagators(k, c, blocks, h, out):
 
 
 @inner
-def _block_response(k, c, h, power, lead, nodes, weights, gauss, out, basis):
+def _block_response(k, c, h, time_exponent, weight_exponent, nodes, weights, gauss, out, basis):
     """out[i, j] = (α, β) of ∫_0^{t_i} E(t_i - τ) w(σ) L_j(σ)/w(σ_j) dτ; i = S is the end of the step."""
     count, rate = nodes.size, math.sqrt(k) + c
     for i in range(count + 1):
         a = nodes[i - 1] if i > 0 else 0.0
         b = nodes[i] if i < count else 1.0
-        ta, tb = h * a**power, h * b**power
+        ta, tb = h * a**time_exponent, h * b**time_exponent
         ea, eb = propagate(k, c, tb - ta)
         for j in range(count):  # carry the integral so far to the new node
             alpha = out[i - 1, j, 0] if i > 0 else 0.0
@@ -64,11 +64,11 @@ def _block_response(k, c, h, power, lead, nodes, weights, gauss, out, basis):
             for g in range(gauss.shape[1]):
                 sigma = left + width * gauss[0, g]
                 t, measure = h * sigma, h * width * gauss[1, g]
-                if power > 1.0:
-                    pace = sigma ** (power - 1.0)
-                    t, measure = t * pace, measure * power * pace
-                if lead > 0.0:
-                    measure *= sigma**lead
+                if time_exponent > 1.0:
+                    pace = sigma ** (time_exponent - 1.0)
+                    t, measure = t * pace, measure * time_exponent * pace
+                if weight_exponent > 0.0:
+                    measure *= sigma**weight_exponent
                 alpha, beta = propagate(k, c, tb - t)
                 lagrange(nodes, weights, sigma, basis)
                 for j in range(count):
@@ -78,7 +78,7 @@ def _block_response(k, c, h, power, lead, nodes, weights, gauss, out, basis):
 
 @inner
 def fill_pair(problem, push, read, read_rate, response, weights, out):
-    """(S, 2S) δ and δ̇ at the nodes that ``read`` sees from the node values of a force that pushes by ``push``.
+    """(S, 2S) response of δ and δ̇ at the nodes, by ``read``, to the node values of a force that acts by ``push``.
 
     With A² = -k - c A the sum over the blocks of r (α + β A) b is Σ α (r·b) + β (r·A b).
     """
@@ -94,7 +94,7 @@ def fill_pair(problem, push, read, read_rate, response, weights, out):
 
 
 @inner
-def _fill_kick(problem, push, ending, out):
+def _fill_end_response(problem, push, ending, out):
     """(S, 2N) state change at the end."""
     size = problem.k.size
     for b in range(ending.shape[1]):
@@ -106,11 +106,13 @@ def _fill_kick(problem, push, ending, out):
 
 
 @inner
-def _fill_level(problem, h, power, lead, nodes, weights, gauss, response, ending, work, basis):
+def _fill_level(problem, h, time_exponent, weight_exponent, nodes, weights, gauss, response, ending, work, basis):
     """Blocks' responses on one step length, at the nodes and at the end."""
     own = ending.shape[1]
     for b in range(own):
-        _block_response(problem.k[b], problem.c[b], h, power, lead, nodes, weights, gauss, work, basis)
+        _block_response(
+            problem.k[b], problem.c[b], h, time_exponent, weight_exponent, nodes, weights, gauss, work, basis
+        )
         for j in range(S):
             for i in range(S):
                 response[j, b, i], response[j, own + b, i] = work[i, j, 0], work[i, j, 1]
@@ -118,40 +120,55 @@ def _fill_level(problem, h, power, lead, nodes, weights, gauss, response, ending
 
 
 @kernel
-def fill_way(problem, h, power, lead, nodes, weights, gauss, inputs, response, ending, forced, kick, work, sums):
-    """All step lengths of one way: blocks' responses and, where there is room for them, all pairs.
+def fill_weighting(
+    problem,
+    h,
+    time_exponent,
+    weight_exponent,
+    nodes,
+    weights,
+    gauss,
+    inputs,
+    response,
+    ending,
+    forced,
+    end_response,
+    work,
+    sums,
+):
+    """Responses of one weighting on all step lengths: of the blocks and, for a few stops, of all pairs.
 
-    Where pairs are kept the responses are working space, of one length.
+    For a few stops (``forced`` is not empty) the blocks' responses are scratch for one length.
     """
     pairs = forced.shape[0] > 0
     for level in range(h.size):
         rows, ends = response[0 if pairs else level], ending[0 if pairs else level]
-        _fill_level(problem, h[level], power, lead, nodes, weights, gauss, rows, ends, work, sums)
+        _fill_level(problem, h[level], time_exponent, weight_exponent, nodes, weights, gauss, rows, ends, work, sums)
         for u in range(inputs.shape[0] if pairs else 0):
-            _fill_kick(problem, inputs[u], ends, kick[level, u])
+            _fill_end_response(problem, inputs[u], ends, end_response[level, u])
             for s in range(problem.gap.size):
                 fill_pair(problem, inputs[u], problem.read[s], problem.read_rate[s], rows, sums, forced[level, u, s])
 
 
 @kernel
-def fill_ahead(problem, blocks, h, power, nodes, out):
+def fill_node_propagators(problem, blocks, h, time_exponent, nodes, out):
     """(J, 2, N, S): α, β of some of the blocks at the nodes of one kind."""
     for level in range(h.size):
         for b in range(blocks[0], blocks[1]):
             for i in range(S):
-                span = h[level] * nodes[i] ** power
+                span = h[level] * nodes[i] ** time_exponent
                 out[level, 0, b, i], out[level, 1, b, i] = propagate(problem.k[b], problem.c[b], span)
 
 
 @kernel
-def fill_free(problem, blocks, h, power, nodes, out):
-    """(J, m, 2N, 2S): what the state of some of the blocks does to all stops at the nodes of one kind."""
+def fill_free(problem, blocks, h, time_exponent, nodes, out):
+    """(J, m, 2N, 2S): δ and δ̇ of all stops at the nodes of one kind from the state of some of the blocks."""
     size = problem.k.size
     for level in range(h.size):
         for b in range(blocks[0], blocks[1]):
             k, c = problem.k[b], problem.c[b]
             for i in range(S):
-                alpha, beta = propagate(k, c, h[level] * nodes[i] ** power)
+                alpha, beta = propagate(k, c, h[level] * nodes[i] ** time_exponent)
                 for s in range(problem.gap.size):
                     for d in range(2):
                         r = problem.read[s] if d == 0 else problem.read_rate[s]

@@ -17,22 +17,22 @@ import numpy as np
 
 from solvers.compiled.kernels import copy, dot, indentation, inlined, inner, merged
 from solvers.compiled.state import SAMPLED, STEPS, T, rate_tolerance, surface_tolerance
-from solvers.exponential.energy.books import book_on, book_output
+from solvers.exponential.energy.balance import account_output, account_state
 from solvers.exponential.flight import (
-    LONG_REACH,
     ORDER,
+    SERIES_REACH,
+    acceleration_bound_split,
     add_signals,
-    add_taylor,
-    bound_apart,
     cell_of,
+    cross_cell,
     energy_norms,
-    go_on,
-    go_through,
+    fly_series,
     level_within,
-    look,
-    taylor,
-    turn,
-    turn_apart,
+    motion_of_stop,
+    propagate_blocks,
+    propagate_split,
+    taylor_step,
+    taylor_terms,
 )
 
 _REFRESH = 8  # flight steps between two evaluations of the bound
@@ -54,11 +54,11 @@ def _signal_bound(problem, j, cell):
 def _acceleration_bound(problem, tables, s, norms, signal_bounds, horizon):
     """M: bound of |δ̈| of stop s over the horizon, signals included."""
     n = problem.k.size
-    total = dot(tables.weight[s], norms, n)
+    total = dot(tables.acceleration_weight[s], norms, n)
     for j in range(problem.table_dt.size):
         load = problem.table_load[j]
-        growth = dot(tables.weight[s], tables.load_norm[load], n)
-        total += signal_bounds[j] * (horizon * growth + abs(tables.direct[s, load]))
+        growth = dot(tables.acceleration_weight[s], tables.load_norm[load], n)
+        total += signal_bounds[j] * (horizon * growth + abs(tables.load_acceleration[s, load]))
     return total
 
 
@@ -75,7 +75,7 @@ def _safe(g, v, bound):
 def _first_root(problem, terms, s, x, longest, values, slopes):
     """First time in [0, longest] at which δ becomes positive on the Taylor polynomial; -1 if it does not.
 
-    ``values`` and ``slopes`` are working space for the coefficients of the polynomial and of its derivative.
+    ``values`` and ``slopes`` are scratch for the coefficients of the polynomial and of its derivative.
     """
     factorial = 1.0
     for i in range(ORDER + 1):
@@ -112,9 +112,9 @@ def _horner(coefficients, x):
 
 @inner
 def _bisect(coefficients, sign, b, guess):
-    """Newton with bisection as its guard for the sign change of a polynomial in [0, b], to rounding.
+    """Sign change of a polynomial in [0, b], to rounding, by Newton's method with bisection as safeguard.
 
-    Its steps double the digits: what a step of 1e-11 leaves is rounding. A double root is known to 1e-8 at best.
+    A step doubles the digits, so after one of 1e-11 the error is rounding. A double root is found to 1e-8 at best.
     """
     a, x = 0.0, guess if 0.0 < guess < b else b
     for _ in range(60):
@@ -135,69 +135,108 @@ def _bisect(coefficients, sign, b, guess):
 @inlined
 def _target(tables, t, first, second, t_end):
     """Where a step must end: at an output time unless that is near enough to be evaluated from the step's start."""
-    if tables.fastest * (first - t) > LONG_REACH:
+    if tables.fastest * (first - t) > SERIES_REACH:
         return min(first, t_end)
-    return t_end if tables.fastest * (second - first) <= LONG_REACH else min(second, t_end)
+    return t_end if tables.fastest * (second - first) <= SERIES_REACH else min(second, t_end)
 
 
 @inner
-def _sample(problem, tables, books, state, space, t, out, due):
-    """Outputs before the end of the step that began at t with the state in ``space.x_new``."""
+def _sample(problem, tables, energy_tables, state, scratch, t, out, due):
+    """Write the outputs that are due within the step that began at t with the state in ``scratch.x_new``."""
     while due[state.count[SAMPLED]] < state.now[T]:
         wanted = due[state.count[SAMPLED]]
-        parts = max(1, int(np.ceil(tables.fastest * (wanted - t) / LONG_REACH)))
+        parts = max(1, int(np.ceil(tables.fastest * (wanted - t) / SERIES_REACH)))
         for i in range(parts):
             span = (wanted - t) / parts
-            go_on(problem, space.x_new, t + i * span, span, space.terms[0], space.six)
-        copy(space.x_new, out[state.count[SAMPLED]], state.x.size)
-        if books.kept > 0.0:
-            book_output(problem, tables, books, state, space, wanted, out[state.count[SAMPLED]])
+            fly_series(problem, scratch.x_new, t + i * span, span, scratch.terms[0], scratch.signal_terms)
+        copy(scratch.x_new, out[state.count[SAMPLED]], state.x.size)
+        if energy_tables.active > 0.0:
+            account_output(problem, tables, energy_tables, state, scratch, wanted, out[state.count[SAMPLED]])
         state.count[SAMPLED], t = state.count[SAMPLED] + 1, wanted
 
 
 @inner
-def _glide(problem, tables, state, space, most, budget):
-    """Tabulated steps without signals or output until a stop is near, or the time left, ``most``, or the budget spent.
+def _fly_tabulated(problem, tables, state, scratch, most, budget):
+    """Tabulated steps without signals or output, until a stop is near, or the time ``most`` or the budget is used up.
 
-    Positions and rates of the blocks stand apart meanwhile, in eights. Returns (time flown, steps, safe time).
+    p and v of the blocks are in two arrays, eight numbers a vector. Returns (time flown, steps, safe time left).
     """
-    n, x, flown, count = problem.k.size, space.apart, 0.0, 0
+    n, x, flown, count = problem.k.size, scratch.split_state, 0.0, 0
     for b in range(n):
         x[0, b], x[1, b] = state.x[b], state.x[n + b]
     while True:
         span = most - flown
         for s in range(problem.gap.size):
             if count % _REFRESH == 0:
-                space.m[s] = bound_apart(tables, s, x)
-            delta, rate = look(tables, s, x)
-            span = min(span, _safe(problem.gap[s] - delta, -rate, space.m[s]))
-        if span < tables.h[tables.h.size - 1] or count >= budget:
+                scratch.per_stop[s] = acceleration_bound_split(tables, s, x)
+            delta, rate = motion_of_stop(tables, s, x)
+            span = min(span, _safe(problem.gap[s] - delta, -rate, scratch.per_stop[s]))
+        if span < tables.flight_step[tables.flight_step.size - 1] or count >= budget:
             break
         level = level_within(tables, span)
-        turn_apart(tables, level, x)
-        flown, count = flown + tables.h[level], count + 1
+        propagate_split(tables, level, x)
+        flown, count = flown + tables.flight_step[level], count + 1
     for b in range(n):
         state.x[b], state.x[n + b] = x[0, b], x[1, b]
     return flown, count, span
 
 
+@inlined
+def _safe_span(problem, tables, state, scratch, span, rest, renew):
+    """``span``, or the time within which no stop can be reached; ``renew`` the bounds of |δ̈| for the time ``rest``."""
+    if renew:
+        energy_norms(problem, state.x, scratch.norms)
+        for s in range(problem.gap.size):
+            scratch.per_stop[s] = _acceleration_bound(problem, tables, s, scratch.norms, scratch.signal_bounds, rest)
+    for s in range(problem.gap.size):
+        g, v = -indentation(problem, s, state.x), -dot(problem.read_rate[s], state.x, 2 * problem.k.size)
+        span = min(span, _safe(g, v, scratch.per_stop[s]))
+    return span
+
+
 @merged
-def fly(problem, tables, books, state, space, t_end, budget, out, due):
+def _fly_step(problem, tables, state, scratch, span, target, rest, offset, cell, dt_cell):
+    """Move by up to ``span``: Taylor step that looks for roots, whole cell, or table. (time, stop reached or -1)."""
+    size, now, stop = 2 * problem.k.size, state.now, -1
+    sampled, shortest = problem.table_dt.size > 0, tables.flight_step[tables.flight_step.size - 1]
+    if span < shortest:
+        taylor_terms(problem, state.x, now[T], scratch.terms, scratch.signal_terms)
+        h = min(shortest, target - now[T], rest)
+        for s in range(problem.gap.size):
+            root = _first_root(problem, scratch.terms, s, state.x, h, scratch.values, scratch.trial)
+            if root >= 0.0:
+                h, stop = root, s
+        taylor_step(scratch.terms, state.x, h, size, scratch.values, scratch.stages[0])
+    elif span == rest and abs(offset) < 1e-7 * dt_cell:
+        h = rest
+        cross_cell(problem, tables, state.x, cell)
+    elif sampled and tables.fastest * span <= SERIES_REACH:
+        h = span
+        fly_series(problem, state.x, now[T], h, scratch.terms[0], scratch.signal_terms)
+    else:
+        level = level_within(tables, span)
+        h = tables.flight_step[level]
+        propagate_blocks(problem, tables.flight_propagator[level, 0], tables.flight_propagator[level, 1], state.x)
+        if sampled:
+            add_signals(problem, tables.signal[level], state.x, now[T], scratch.signal_terms)
+    return h, stop
+
+
+@merged
+def fly(problem, tables, energy_tables, state, scratch, t_end, budget, out, due):
     """Fly until a stop is reached (returns its index), the end (-1), or the budget is spent (-2)."""
-    stops, size, now = problem.gap.size, 2 * problem.k.size, state.now
-    shortest = tables.h[tables.h.size - 1]
-    sampled, ledger = problem.table_dt.size > 0, books.kept > 0.0
+    now, sampled, with_energy = state.now, problem.table_dt.size > 0, energy_tables.active > 0.0
     dt_cell = problem.table_dt[0] if sampled else np.inf
     for count in range(budget):
         if due[state.count[SAMPLED]] <= now[T]:
             copy(state.x, out[state.count[SAMPLED]], state.x.size)
-            if ledger:
-                book_output(problem, tables, books, state, space, now[T], out[state.count[SAMPLED]])
+            if with_energy:
+                account_output(problem, tables, energy_tables, state, scratch, now[T], out[state.count[SAMPLED]])
             state.count[SAMPLED] += 1
         if now[T] >= t_end:
             return -1
 
-        # --- how far the output, the end and the signals' cell allow
+        # --- the time up to the next output, the end, or the end of the signals' cell
         first = due[state.count[SAMPLED]]
         second = due[min(state.count[SAMPLED] + 1, out.shape[0])]
         target = _target(tables, now[T], first, second, t_end)
@@ -206,54 +245,26 @@ def fly(problem, tables, books, state, space, t_end, budget, out, due):
             cell, offset = cell_of(problem, now[T])
             rest = max(dt_cell - offset, 1e-9 * dt_cell)
             for j in range(problem.table_dt.size):
-                space.bounds[j] = _signal_bound(problem, j, cell)
-        # --- how far no stop can be reached
-        if first == np.inf and not sampled:  # nothing else happens on the way
-            flown, steps, span = _glide(problem, tables, state, space, span, budget)
+                scratch.signal_bounds[j] = _signal_bound(problem, j, cell)
+        # --- the time within which no stop can be reached
+        if first == np.inf and not sampled:  # no output and no cell ends before
+            flown, steps, span = _fly_tabulated(problem, tables, state, scratch, span, budget)
             now[T] += flown
             state.count[STEPS] += steps
             if steps >= budget:
                 return -2
         else:
-            if sampled or count % _REFRESH == 0:
-                energy_norms(problem, state.x, space.norms)
-                for s in range(stops):
-                    space.m[s] = _acceleration_bound(problem, tables, s, space.norms, space.bounds, rest)
             span = min(span, rest)
             if first <= begin + span:
-                copy(state.x, space.x_new, state.x.size)
-            for s in range(stops):
-                g, v = -indentation(problem, s, state.x), -dot(problem.read_rate[s], state.x, size)
-                span = min(span, _safe(g, v, space.m[s]))
-
-        # --- go: a Taylor step that looks for roots, a whole cell, or a tabulated step
-        stop = -1
-        if span < shortest:
-            taylor(problem, state.x, now[T], space.terms, space.six)
-            h = min(shortest, target - now[T], rest)
-            for s in range(stops):
-                root = _first_root(problem, space.terms, s, state.x, h, space.values, space.trial)
-                if root >= 0.0:
-                    h, stop = root, s
-            add_taylor(space.terms, state.x, h, size, space.values, space.work[0])
-        elif span == rest and abs(offset) < 1e-7 * dt_cell:
-            h = rest
-            go_through(problem, tables, state.x, cell)
-        elif sampled and tables.fastest * span <= LONG_REACH:
-            h = span
-            go_on(problem, state.x, now[T], h, space.terms[0], space.six)
-        else:
-            level = level_within(tables, span)
-            h = tables.h[level]
-            turn(problem, tables.propagator[level, 0], tables.propagator[level, 1], state.x)
-            if sampled:
-                add_signals(problem, tables.signal[level], state.x, now[T], space.six)
+                copy(state.x, scratch.x_new, state.x.size)
+            span = _safe_span(problem, tables, state, scratch, span, rest, sampled or count % _REFRESH == 0)
+        h, stop = _fly_step(problem, tables, state, scratch, span, target, rest, offset, cell, dt_cell)
         now[T] = target if now[T] + h >= target else now[T] + h
         state.count[STEPS] += 1
         if first < now[T]:
-            _sample(problem, tables, books, state, space, begin, out, due)
-        if ledger and sampled and cell_of(problem, now[T])[0] != cell:
-            book_on(problem, tables, books, state, space)
+            _sample(problem, tables, energy_tables, state, scratch, begin, out, due)
+        if with_energy and sampled and cell_of(problem, now[T])[0] != cell:
+            account_state(problem, tables, energy_tables, state, scratch)
         if stop >= 0:
             return stop
     return -2

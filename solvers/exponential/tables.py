@@ -1,12 +1,13 @@
-"""Everything the exponential integrator knows before it starts: propagators and force responses per step size.
+"""Tables of the exponential method: propagators and responses to forces for every step size.
 
 A block p'' + c p' + k p = 0 moves by E(x) = exp(A x) = α I + β A with A = [[0, 1], [-k, -c]], A² = -k I - c A, so two
 numbers (α, β) are a propagator and products stay of this form. Flight steps are h_l = h_0 2^{-l/4}; contact steps
 are every second of them.
 
-On a contact step a force is known by its values at a few nodes, see `contact.nodes`, and what it does by the responses
-of the blocks, see `responses`. A few stops have tables of what every one does to every other; the motion of more goes
-through the blocks, see `contact.blocks`, and memory grows with the blocks and hardly with the stops.
+On a contact step a force is given by its values at a few nodes, see `contact.nodes`, and its effect by the responses of
+the blocks, see `responses`. For a few stops there are tables of the response of each stop to each force; with more, the
+motion of the blocks is computed first, see `contact.many_stops`: then memory grows with the blocks, hardly with the
+stops.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from solvers.compiled.kernels import Problem
 from solvers.compiled.state import parameters_of
 from solvers.compiled.sums import padded
 from solvers.exponential.block_tables import Blocks, blocks_of, filled
-from solvers.exponential.contact.nodes import families_of, gauss
+from solvers.exponential.contact.nodes import S, gauss, node_sets_of, so_far
 from solvers.exponential.phi_functions import signal_responses
 from solvers.exponential.responses import fill_propagators
 
@@ -34,75 +35,84 @@ _SHORT = 1e-9  # s: a stop may be far stiffer than the structure
 
 
 class Tables(NamedTuple):
-    """Numbers per step size; l counts flight steps, j contact steps."""
+    """Numbers per step size, read by kernels only; `build` and `fill_tones` write them.
 
-    h: Any  # (l,)
-    propagator: Any  # (l, 2, N padded): α, β of every block
+    l counts flight steps, j contact steps, f node sets (the smooth one, then one per stop that enters), m stops, L
+    loads, N blocks with those of the tones.
+    """
+
+    flight_step: Any  # (l,) s, falling
+    flight_propagator: Any  # (l, 2, N padded): α, β of every block
     signal: Any  # (l, L, 6, 2N): state change by a signal t^k/k!
-    cell: Any  # (2, N) propagator of a whole cell of the sampled signals
-    cell_signal: Any  # (L, 6, 2N)
-    apart: Any  # (2, N padded): k, c
-    look: Any  # (m, 4, N padded): the first two rows give δ + gap from p and v, the others δ̇
-    weight: Any  # (m, N padded): |δ̈| <= Σ weight × energy norm
-    reach: Any  # (m, N): |δ̇| <= Σ reach × energy norm
-    direct: Any  # (m, L): δ̈ per unit of a signal
+    cell: Any  # (2, N): α, β over a whole cell of the sampled signals
+    cell_signal: Any  # (L, 6, 2N): state change over a cell
+    block_k_c: Any  # (2, N padded): k in 1/s², c in 1/s
+    stop_rows: Any  # (m, 4, N padded): the first two rows give δ + gap from p and v, the others δ̇
+    acceleration_weight: Any  # (m, N padded): |δ̈| <= Σ weight × energy norm
+    rate_weight: Any  # (m, N): |δ̇| <= Σ weight × energy norm
+    load_acceleration: Any  # (m, L): δ̈ per unit of a signal
     load_norm: Any  # (L, N): energy norm of a load per block
-    fastest: float  # |λ|max
-    own: float  # number of the structure's own blocks; those behind are tones
-    mobility: Any  # (m, m): δ̈ of stop s per newton at stop u, positive where the force opens the contact
-    exponent: Any  # (m,) leading exponents p
-    inlined: Any  # (m, 4) (K, p, a, c) of a force K δ^p (1 + a δ̇/δ̇⁻) + c δ̇; p = 0 for the laws to be called
-    step: Any  # (j,) contact steps
-    step_propagator: Any  # (j, 2, N)
-    power: Any  # (f,) κ
-    lead: Any  # (f,) λ
+    fastest: float  # |λ|max, rad/s
+    own_blocks: float  # number of the structure's blocks; those behind them are tones
+    accelerance: Any  # (m, m): -δ̈ of stop s per newton at stop u, positive where the force opens the contact
+    exponent: Any  # (m,) leading exponents p of the laws
+    power_law: Any  # (m, 4): K, p, a, c of a force K δ^p (1 + a δ̇/δ̇⁻) + c δ̇; p = 0 for laws that are called
+    contact_step: Any  # (j,) s, falling
+    contact_propagator: Any  # (j, 2, N): α, β of every block
+    time_exponent: Any  # (f,) κ
+    weight_exponent: Any  # (f,) λ
     nodes: Any  # (f, S) σ
     times: Any  # (f, S) σ^κ
     weights: Any  # (f, S): ∫F dt = h Σ weights F
     plain: Any  # (f, S): the same of a force without the weight σ^λ
     summary: Any  # (f, S, 8): from node values, the last four Jacobi coefficients, both ends' values, both slopes
+    lagrange: Any  # (f, 2, S): 1/Π (σ_j - σ_i) of the nodes' polynomials, and the same over σ_j^λ
     tail: Any  # (f, S, 8): from node values of a signal, the last four Legendre coefficients in σ
-    zoom: Any  # (f, S, 2S + 2, 2S): δ and h δ̇ at points around a node from those at all nodes and at the begin
-    places: Any  # (f, S, 2): the interval of σ these points span
-    kind: Any  # (f,) indices into the tables below, see `contact.nodes.Families`
-    enters: Any  # (f,)
-    free: Any  # (kinds, j, m, 2N, 2S): δ and δ̇ at the nodes from the state; of a few stops, as the next two
-    forced: Any  # (ways, j, m + L, m, S, 2S): the same from the forces and signals at the nodes
-    kick: Any  # (ways, j, m + L, S, 2N padded): state change at the end
-    ahead: Any  # (kinds, j, 2, N, S): α, β of every block at the nodes; of many stops, as the next two
-    response: Any  # (ways, j, S, 2 own, S): α of the blocks, then β, at the nodes, by a force's node values
-    ending: Any  # (ways, j, 2, own, S): the same at the end
-    alias: Any  # (kinds, j, 2N): a stop's error between the nodes <= Σ sway (alias |p| + alias |v|)
-    sway: Any  # (m, N)
+    local_interpolation: (
+        Any  # (f, S, 2S + 2, 2S): δ and h δ̇ at points around a node from those at all nodes and at the begin
+    )
+    local_interval: Any  # (f, S, 2): the interval of σ these points span
+    kind: Any  # (f,) index of the kinds, and of the weightings of plain forces, below; see `contact.nodes.NodeSets`
+    entering: Any  # (f,) index of the weighting of the force of the stop that enters
+    free: Any  # (kinds, j, m, 2N, 2S): δ and δ̇ at the nodes from the state; for a few stops, as the next two
+    forced: Any  # (weightings, j, m + L, m, S, 2S): the same from the forces and signals at the nodes
+    end_response: Any  # (weightings, j, m + L, S, 2N padded): state change at the end
+    node_propagator: Any  # (kinds, j, 2, N, S): α, β of every block at the nodes; for many stops, as the next two
+    block_response: Any  # (weightings, j, S, 2 own, S): α, then β, of the blocks at the nodes per node value
+    block_end_response: Any  # (weightings, j, 2, own, S): the same at the end
+    alias: Any  # (kinds, j, 2N): error of δ between the nodes <= Σ ripple_weight (alias |p| + alias |v|)
+    ripple_weight: Any  # (m, N): amplitude of δ per unit of an oscillating block's rate
     signal_rows: Any  # (L, 2N): a load's tones from the state
     power_rows: Any  # (L, 2N): input power = signal × power row
     loss_rows: Any  # (r, 2N): damping power = Σ (row·z)²
-    gauss: Any  # (2, 8) points and weights on (0, 1) for the energy ledger
-    extend: Any  # (f, 5, S, S): the force on the next smooth step, 2^{(i-2)/2} times shorter, from that of the last
-    bend: Any  # (m,) kind of the law's bend, see `contact.crossings`
-    uncut: Any  # (m,) addresses of the laws without their cut at F = 0, and of their derivatives
-    uncut_gradient: Any
+    gauss: Any  # (2 + S, S): points and weights on (0, 1), then to all points the integrals of each one's polynomial
+    extrapolation: (
+        Any  # (f, 5, S, S): the force on the next smooth step, 2^{(i-2)/2} times shorter, from that of the last
+    )
+    bend: Any  # (m,) kind of the law's bend: 0 for none, else as named in `contact.crossings`
+    uncut: Any  # (m,) addresses of the laws without their cut at F = 0
+    uncut_gradient: Any  # (m,) and of their derivatives
     uncut_parameters: Any  # (m, P)
 
 
-class Known(NamedTuple):
-    """What the tables hold of the laws."""
+class LawTables(NamedTuple):
+    """Entries of `Tables` that come from the laws."""
 
     exponent: Any
-    inlined: Any
+    power_law: Any
     bend: Any
     uncut: Any
     uncut_gradient: Any
     uncut_parameters: Any
 
 
-def known_of(contacts: Sequence[Any]) -> Known:
+def law_tables_of(contacts: Sequence[Any]) -> LawTables:
     """The same of the laws of contacts; see `solvers.problem.system.Law`. Those that always act are called."""
     laws = [contact.law for contact in contacts]
     inlined = [None if contact.always else getattr(contact.law, "inlined", None) for contact in contacts]
     bends = [getattr(law, "bend", None) for law in laws]
     uncut = [law.uncut if bend == "force" else law for law, bend in zip(laws, bends, strict=True)]
-    return Known(
+    return LawTables(
         np.array([law.exponent for law in laws], dtype=float),
         np.array([own or (0.0,) * 4 for own in inlined]).reshape(-1, 4),
         np.array([(None, "rate", "force").index(bend) for bend in bends], dtype=float),
@@ -112,9 +122,20 @@ def known_of(contacts: Sequence[Any]) -> Known:
     )
 
 
-# the tables that tones have a part in
-OF_TONES = (
-    *("propagator", "step_propagator", "free", "ahead", "alias", "sway", "apart", "look", "weight", "reach"),
+# tables with columns for the tones
+TONE_TABLES = (
+    *(
+        "flight_propagator",
+        "contact_propagator",
+        "free",
+        "node_propagator",
+        "alias",
+        "ripple_weight",
+        "block_k_c",
+        "stop_rows",
+        "acceleration_weight",
+        "rate_weight",
+    ),
     *("signal_rows", "power_rows", "loss_rows", "cell"),
 )
 
@@ -123,91 +144,95 @@ def build(
     problem: Problem,
     tones: int,
     series: tuple[tuple[float, float], ...],
-    laws: Known,
+    laws: LawTables,
     dt_cell: float,
-    ledger: tuple[Any, Any, Any],
+    energy_rows: tuple[Any, Any, Any],
 ) -> Tables:
-    """Tables of a problem whose last blocks are ``tones``, but for their columns, which `fill_tones` fills."""
+    """Tables of a problem whose last blocks are ``tones``; the columns of these are filled by `fill_tones`."""
     size = len(problem.k)
     omega, damping = np.sqrt(problem.k), problem.c
     fastest = float(max((omega + damping).max(), 1e-3))
     h, contact_h = _steps(omega, damping, tones)
-    families = families_of(series)
-    blocks = blocks_of(problem, tones, h, contact_h, families)
+    node_sets = node_sets_of(series)
+    blocks = blocks_of(problem, tones, h, contact_h, node_sets)
     return Tables(
-        h=h,
-        propagator=blocks.propagator,
+        flight_step=h,
+        flight_propagator=blocks.flight_propagator,
         signal=signal_responses(problem, h),
         cell=_cell(problem, dt_cell),
         cell_signal=signal_responses(problem, np.array([dt_cell]))[0],
-        apart=_in_eights(np.array([problem.k, problem.c])),
-        look=_in_eights(np.concatenate((problem.read, problem.read_rate), axis=1).reshape(-1, 4, size)),
-        weight=_in_eights(
+        block_k_c=_in_eights(np.array([problem.k, problem.c])),
+        stop_rows=_in_eights(np.concatenate((problem.read, problem.read_rate), axis=1).reshape(-1, 4, size)),
+        acceleration_weight=_in_eights(
             np.abs(problem.read[:, :size]) * (omega + damping)
             + np.abs(problem.read[:, size:]) * (problem.k + damping * (omega + damping))
         ),
-        reach=np.abs(problem.read[:, :size]) + np.abs(problem.read[:, size:]) * (omega + damping),
-        direct=problem.read_rate @ problem.load.T,
+        rate_weight=np.abs(problem.read[:, :size]) + np.abs(problem.read[:, size:]) * (omega + damping),
+        load_acceleration=problem.read_rate @ problem.load.T,
         load_norm=np.sqrt(problem.load[:, size:] ** 2 + problem.k * problem.load[:, :size] ** 2),
         fastest=fastest,
-        own=float(size - tones),
-        mobility=-problem.read_rate @ problem.push.T,
+        own_blocks=float(size - tones),
+        accelerance=-problem.read_rate @ problem.push.T,
         **laws._asdict(),
-        step=contact_h,
-        step_propagator=blocks.step_propagator,
-        power=families.power,
-        lead=families.lead,
-        nodes=families.nodes,
-        times=families.times,
-        weights=families.weights,
-        plain=families.plain,
-        summary=families.summary,
-        tail=families.tail,
-        zoom=families.zoom,
-        places=families.places,
-        kind=families.kind,
-        enters=families.enters,
+        contact_step=contact_h,
+        contact_propagator=blocks.contact_propagator,
+        time_exponent=node_sets.time_exponent,
+        weight_exponent=node_sets.weight_exponent,
+        nodes=node_sets.nodes,
+        times=node_sets.times,
+        weights=node_sets.weights,
+        plain=node_sets.plain,
+        summary=node_sets.summary,
+        lagrange=node_sets.lagrange,
+        tail=node_sets.tail,
+        local_interpolation=node_sets.local_interpolation,
+        local_interval=node_sets.local_interval,
+        kind=node_sets.kind,
+        entering=node_sets.entering,
         free=blocks.free,
         forced=blocks.forced,
-        kick=blocks.kick,
-        ahead=blocks.ahead,
-        response=blocks.response,
-        ending=blocks.ending,
+        end_response=blocks.end_response,
+        node_propagator=blocks.node_propagator,
+        block_response=blocks.block_response,
+        block_end_response=blocks.block_end_response,
         alias=blocks.alias,
-        sway=_sway(problem.read, omega),
-        signal_rows=ledger[0],
-        power_rows=ledger[1],
-        loss_rows=ledger[2],
-        gauss=gauss(8),
-        extend=families.extend,
+        ripple_weight=_ripple_weight(problem.read, omega),
+        signal_rows=energy_rows[0],
+        power_rows=energy_rows[1],
+        loss_rows=energy_rows[2],
+        gauss=np.concatenate((gauss(S), so_far(gauss(S)[0]).T)),
+        extrapolation=node_sets.extrapolation,
     )
 
 
 def fill_tones(tables: Tables, problem: Problem, tones: int, series: tuple[tuple[float, float], ...]) -> None:
-    """Fill the columns of a problem's last blocks, its ``tones``, into tables `build` has made."""
+    """Fill the columns of the last blocks of a problem, its ``tones``, into tables that `build` has made."""
     if not tones:
         return
     size = len(problem.k)
     own, k = size - tones, problem.k[size - tones :]
     p, v, omega = np.abs(problem.read[:, own:size]), np.abs(problem.read[:, size + own :]), np.sqrt(k)
-    tables.weight[:, own:size], tables.reach[:, own:] = p * omega + v * k, p + v * omega
-    tables.apart[0, own:size], tables.sway[:, own:] = k, _sway(problem.read, np.sqrt(problem.k))[:, own:]
+    tables.acceleration_weight[:, own:size], tables.rate_weight[:, own:] = p * omega + v * k, p + v * omega
+    tables.block_k_c[0, own:size], tables.ripple_weight[:, own:] = (
+        k,
+        _ripple_weight(problem.read, np.sqrt(problem.k))[:, own:],
+    )
     for i, rows in enumerate((problem.read, problem.read_rate)):
-        tables.look[:, 2 * i : 2 * i + 2, own:size] = rows.reshape(-1, 2, size)[:, :, own:]
+        tables.stop_rows[:, 2 * i : 2 * i + 2, own:size] = rows.reshape(-1, 2, size)[:, :, own:]
     if problem.table_dt.size:
         fill_propagators(problem.k, problem.c, (own, size), problem.table_dt[:1], tables.cell[None])
     blocks = Blocks(*(getattr(tables, name) for name in Blocks._fields))
-    filled(blocks, problem, (own, size), tables.h, tables.step, families_of(series))
+    filled(blocks, problem, (own, size), tables.flight_step, tables.contact_step, node_sets_of(series))
 
 
 def doublings(speeds: Any, tones: Any) -> int:
-    """How many times twice as fast as a structure's blocks the fastest tone is, rounded up; 0 for a slower one."""
+    """Octaves by which the fastest tone is above the fastest block of a structure, rounded up; 0 for a slower one."""
     ratio = float(tones.max(initial=0.0)) / max(float(speeds.max()), 1e-3)
     return math.ceil(math.log2(max(ratio, 1.0)))
 
 
 def _steps(omega: Any, damping: Any, tones: int) -> tuple[Any, Any]:
-    """Flight and contact steps. They depend on the structure alone, but for tones faster than it."""
+    """Flight and contact steps, s: functions of the structure alone unless a tone is faster than it."""
     own = omega.size - tones
     times = doublings((omega + damping)[:own], omega[own:])
     return _steps_of(omega[:own].tobytes(), damping[:own].tobytes(), times)
@@ -215,7 +240,7 @@ def _steps(omega: Any, damping: Any, tones: int) -> tuple[Any, Any]:
 
 @lru_cache(maxsize=64)
 def _steps_of(omegas: bytes, dampings: bytes, doublings: int) -> tuple[Any, Any]:
-    """Steps for a structure's frequencies and dampings, and for tones so many times twice as fast."""
+    """Steps for the frequencies and dampings of a structure, and for tones faster by some octaves."""
     omega, damping = np.frombuffer(omegas), np.frombuffer(dampings)
     fastest = max(float((omega + damping).max()), 1e-3)
     moving = np.concatenate((omega[omega > 0], damping[damping > 0]))
@@ -228,8 +253,8 @@ def _steps_of(omegas: bytes, dampings: bytes, doublings: int) -> tuple[Any, Any]
     return h, longest * 2.0 ** (-0.25 * np.arange(first, bottom + 2, 2))
 
 
-def _sway(read: Any, omega: Any) -> Any:
-    """(m, N): what a block that oscillates does to a stop, per unit of its rate."""
+def _ripple_weight(read: Any, omega: Any) -> Any:
+    """(m, N): amplitude of δ per unit of an oscillating block's rate."""
     p, v = np.abs(read[:, : omega.size]), np.abs(read[:, omega.size :])
     return np.ascontiguousarray(p / np.where(omega > 0.0, omega, np.inf) + v)
 

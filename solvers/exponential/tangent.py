@@ -10,22 +10,23 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solvers.compiled.dop853_tableau import STAGES
-from solvers.compiled.handles import Layout, Packed
 from solvers.compiled.kernels import PROBLEM, Problem
+from solvers.compiled.packed import Layout, Packed
 from solvers.compiled.state import HEAD, STATE, State, T, begin_state, law_parameters, most_borders, state_shapes
 from solvers.exponential.contact.nodes import S
-from solvers.exponential.linearised import replay
-from solvers.exponential.linearised_step import NUDGE, SLOPES, Nudge, Slopes
-from solvers.exponential.preparation import places_among_tones, steady_response
+from solvers.exponential.linearised import linearise_run
+from solvers.exponential.linearised_step import DERIVATIVES, VARIATION, Derivatives, Variation
+from solvers.exponential.preparation import places_among_tones
+from solvers.exponential.steady_response import steady_response
 from solvers.problem import Array, Parameter, SolverError, System
 
-_ROWS = 256  # of the tape between two replays: some 25 contacts, within which no derivative overflows
-_CARRIED = [Slopes._fields.index(name) for name in ("y", "entry", "shift", "rate", "latched")]
+_ROWS = 256  # of the event record: some 25 contacts, within which no derivative overflows
+_CARRIED = [Derivatives._fields.index(name) for name in ("y", "entry", "shift", "rate", "latched")]
 _LARGE = 1e100  # size at which the derivatives are scaled down
 
 
 class Tangent:
-    """Derivatives of one run of an engine, carried along as its tape grows."""
+    """Derivatives of one run of an engine, moved along as its event record grows."""
 
     def __init__(self, system: System, engine: Any, parameter: Parameter | None, latched: bool = False) -> None:
         self.engine, self.blocks = engine, system.blocks
@@ -49,25 +50,25 @@ class Tangent:
         if self.exact:
             self.y[-1, self.places] = -self.change.steady(0.0)
         self.latched[2 * n : 2 * n + own, self.places_latched[:own]] = np.eye(own)
-        engine.record(np.empty((_ROWS, HEAD + width + stops * S)))
+        engine.record_events(np.empty((_ROWS, HEAD + width + stops * S)))
         self.packed = [
-            *(engine.packed if same is engine.problem else Packed(same, PROBLEM) for same in self.change.problems),
-            Packed(self.change.nudge, NUDGE),
+            *(engine.packed if same is engine.problem else Packed.of(same, PROBLEM) for same in self.change.problems),
+            Packed.of(self.change.variation, VARIATION),
         ]
         if problem is not engine.problem:
-            self.packed.append(Packed(problem, PROBLEM))
-        slopes, shadow = (words + start for start in layout.starts)
-        ahead, behind, nudge = (packed.address for packed in self.packed[:3])
+            self.packed.append(Packed.of(problem, PROBLEM))
+        derivatives, past = (words + start for start in layout.starts)
+        ahead, behind, variation = (packed.address for packed in self.packed[:3])
         problem_at, *others = engine.addresses
         problem_at = problem_at if problem is engine.problem else self.packed[-1].address
-        self.addresses = problem_at, ahead, behind, *others, shadow, slopes, nudge, system.size
+        self.addresses = problem_at, ahead, behind, *others, past, derivatives, variation, system.size
         self.log_scale = 0.0  # the derivatives are exp(log_scale) times what is kept
         self.history: list[tuple[float, float]] = []  # (time, ln of their size)
 
     def follow(self) -> None:
-        """Replay what the engine has taped, and let it tape anew."""
+        """Move the derivatives to the time the engine has reached, and empty its event record."""
         engine = self.engine
-        replay(*self.addresses, not self.history)
+        linearise_run(*self.addresses, not self.history)
         if not np.all(np.isfinite(self.y)):
             raise SolverError(f"the tangent is not finite any more at t = {engine.state.now[T]:g} s: a contact grazes")
         size = _size(self.y)
@@ -98,40 +99,40 @@ class Tangent:
 
 @lru_cache(maxsize=64)
 def _layout(stops: int, loads: int, width: int, columns: int, latched: int, others: int) -> Layout:
-    """Places of the arrays of `Slopes` and of the shadow's `State`."""
-    slopes = [(columns, width), (columns, stops), (columns, stops), (stops + loads, S), (loads, S), (stops, 2, S)]
-    slopes += [(stops, S), (2, width), (STAGES, columns, width), (columns, width), (8,)]
-    slopes += [(columns, stops * latched), (stops, latched * S), (latched * (5 + latched) + 2 + others,)]
-    return Layout([SLOPES, STATE], [slopes, state_shapes(width, stops)])
+    """Shapes and places of the arrays of `Derivatives` and of the past `State`."""
+    derivatives = [(columns, width), (columns, stops), (columns, stops), (stops + loads, S), (loads, S), (stops, 2, S)]
+    derivatives += [(stops, S), (2, width), (STAGES, columns, width), (columns, width), (8,)]
+    derivatives += [(columns, stops * latched), (stops, latched * S), (latched * (5 + latched) + 2 + others,)]
+    return Layout([DERIVATIVES, STATE], [derivatives, state_shapes(width, stops)])
 
 
 def _size(y: Array) -> float:
-    """Frobenius norm; in units of the largest entry, whose square may lie beyond the range of numbers."""
+    """Frobenius norm; in units of the largest entry, as its square may overflow."""
     largest = float(np.abs(y).max())
     return largest * math.sqrt(np.vdot(y / largest, y / largest)) if largest > 0.0 else 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class _Change:
-    """What a parameter changes: the nudge, the problems with laws ahead and behind, the steady response per tone."""
+    """Changes by a parameter: explicit ones, problems with the laws ahead and behind, steady response per tone."""
 
-    nudge: Nudge
+    variation: Variation
     problems: list[Problem]
     a: Any  # (K, 2n) complex: the steady response changes by Re (a + t b) e^{iωt}
     b: Any
 
     def steady(self, t: float) -> Array:
         """Change of the steady response at time t, in block coordinates."""
-        waves = (self.a + t * self.b) * np.exp(1j * self.nudge.omega * t)[:, None]
+        waves = (self.a + t * self.b) * np.exp(1j * self.variation.omega * t)[:, None]
         return waves.sum(axis=0).real
 
     @classmethod
     def none(cls, problem: Problem, n: int) -> _Change:
         """No parameter."""
         stops = len(problem.gap)
-        nudge = Nudge(0.0, 0.0, np.zeros(0), np.zeros((0, stops, 2, 4)), np.zeros(stops))
+        variation = Variation(0.0, 0.0, np.zeros(0), np.zeros((0, stops, 2, 4)), np.zeros(stops))
         none = np.zeros((0, 2 * n), dtype=complex)
-        return cls(nudge, [problem] * 2, none, none)
+        return cls(variation, [problem] * 2, none, none)
 
     @classmethod
     def of(cls, system: System, parameter: Parameter, engine: Any) -> _Change | None:
@@ -151,11 +152,11 @@ class _Change:
         steady = (rows @ parts.reshape(-1, own.size).T).reshape(len(rows), 2, 4, len(a)).transpose(3, 0, 1, 2)
         gaps = [np.array([contact.gap for contact in side.contacts]) for side in sides]
         shift = (gaps[1] - gaps[0]) / width
-        nudge = Nudge(parameter.step, parameter.step, tones.omega, np.ascontiguousarray(steady), shift)
+        variation = Variation(parameter.step, parameter.step, tones.omega, np.ascontiguousarray(steady), shift)
         if all(one.law is other.law for one, other in zip(*(side.contacts for side in sides), strict=True)):
-            return cls(nudge._replace(law_step=0.0), [engine.problem] * 2, a, b)
+            return cls(variation._replace(law_step=0.0), [engine.problem] * 2, a, b)
         problems = [engine.problem._replace(parameters=_parameters(side, engine.problem)) for side in reversed(sides)]
-        return cls(nudge, problems, a, b)
+        return cls(variation, problems, a, b)
 
 
 def _parameters(side: System, problem: Problem) -> Array:

@@ -171,6 +171,7 @@ class Transitions:
     @classmethod
     def of_rows(cls, rows: Array, contacts: Sequence[Any]) -> Transitions:
         """From the kernels' table."""
+        rows = rows[rows[:, 0] < 0.0]
         columns: list[Any] = [*rows[:, :9].T.copy()]
         contact, border, code = (column.astype(int) for column in (-1.0 - rows[:, 0], rows[:, 2], rows[:, 3]))
         names = [contacts[c].law.events[i] for c, i in zip(contact, code, strict=True)]

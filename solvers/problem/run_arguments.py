@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -96,9 +97,24 @@ def _finite(system: System) -> bool:
     delta = np.array([1e-12, 1e-6, 1e-3])
     for i, contact in enumerate(system.contacts):
         places = np.concatenate((-delta, delta)) if contact.always else delta
-        force = contact.law.batch(1.0)(places, 0.0 * places)
+        law: Any = contact.law
+        force = law.batch(1.0)(places, 0.0 * places)
         if not np.all(np.isfinite(force)):
             where = places[~np.isfinite(force)][0]
             hint = "; one defined for delta > 0 only is no law of a contact that always acts" if where < 0.0 else ""
             raise ValueError(f"the law of contact {i} is not finite at delta = {where:g} m: {contact.law!r}{hint}")
     return True
+
+
+def latched_at_start(system: System, memory: Sequence[ArrayLike | None] | None) -> list[tuple[int, Array]]:
+    """(contact, latched numbers) of those given, checked."""
+    if memory is None:
+        return []
+    if len(memory) != len(system.contacts):
+        raise ValueError(f"memory must have one entry per contact, {len(system.contacts)}, got {len(memory)}")
+    given = [(s, np.array(numbers, dtype=float)) for s, numbers in enumerate(memory) if numbers is not None]
+    for s, numbers in given:
+        count = len(getattr(system.contacts[s].law, "memory", ()))
+        if numbers.shape != (count,) or not np.isfinite(numbers).all():
+            raise ValueError(f"memory of contact {s} must be {count} finite numbers, got {memory[s]!r}")
+    return given

@@ -8,6 +8,7 @@ after a renewal, is judged by its sign as soon as that is more than rounding. Me
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -40,8 +41,9 @@ def _present(problem, state, space, s, x):
     for j in range(count):
         space.present[s, j] = space.margin[j]
         space.rounding[s, j] = 1e-15 * abs(space.margin[j])
-    for i in range(2):
-        space.trial[0], space.trial[1] = delta + (1 - i) * scale[0], rate + i * scale[1]
+    for i in range(2):  # moved the way the motion goes: a law that has not moved yet may look at the sign of δ
+        space.trial[0] = delta + (1 - i) * math.copysign(scale[0], rate)
+        space.trial[1] = rate + i * math.copysign(scale[1], rate)
         margins(problem, state, s, 1, space.trial[0:1], space.trial[1:2], space.margin)
         for j in range(count):
             space.rounding[s, j] += abs(space.margin[j] - space.present[s, j])

@@ -19,7 +19,7 @@ from solvers.stepping.events import LOCATED
 
 
 @kernel
-def step(problem, t, h, x, rate, piece, entry_rate, x_new, rate_new, dense, work, rtol, atol):
+def step(problem, t, h, x, rate, segment, entry_rate, x_new, rate_new, dense, work, rtol, atol):
     """One step; returns (error estimate in units of the tolerance, law calls). ``work`` holds the stages."""
     trial, batch = work[EXTENDED], work[EXTENDED + 1]
     copy(rate, work[0], x.size)
@@ -28,13 +28,13 @@ def step(problem, t, h, x, rate, piece, entry_rate, x_new, rate_new, dense, work
         _stage(i, h, x, work, trial)
         if i == STAGES:  # its weights are the step's: the stage is the new state, its rate the new rate
             copy(trial, x_new, x.size)
-        calls += rhs(problem, t + C[i] * h, trial, piece, entry_rate, work[i], batch)
+        calls += rhs(problem, t + C[i] * h, trial, segment, entry_rate, work[i], batch)
     copy(work[STAGES], rate_new, x.size)
     error = _error(2 * problem.k.size, h, x, x_new, work, rtol, atol)
     if error <= 1.0:
         for i in range(STAGES + 1, EXTENDED):
             _stage(i, h, x, work, trial)
-            calls += rhs(problem, t + C[i] * h, trial, piece, entry_rate, work[i], batch)
+            calls += rhs(problem, t + C[i] * h, trial, segment, entry_rate, work[i], batch)
         _interpolant(h, x, x_new, work, dense)
     return error, calls
 
@@ -99,7 +99,8 @@ class DormandPrince:
 
     Notes
     -----
-    Explicit: steps are bounded by the fastest mode (about hω < 6), and in contact by the stop's stiffness.
+    Explicit: steps are bounded by the fastest mode (about hω < 6), and in contact by the stop's stiffness. Borders of
+    laws with memory are located like entries and exits; those met at one instant are renewed together.
 
     Examples
     --------

@@ -60,8 +60,10 @@ def watched(system: System, motion: Array, least: float) -> Array:
 
 
 def _held(contact: Contact, delta: float) -> float:
-    """Energy that a contact may give back, J."""
+    """Energy that a contact may give back, J; unknown (inf) of one that opens and begins in contact."""
     law: Any = contact.law
+    if getattr(law, "opens", False) and delta > 0.0:
+        return math.inf
     return float(law.stored(delta, law.parameters)) if contact.always else work_of(law, delta)
 
 

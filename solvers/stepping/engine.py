@@ -43,7 +43,7 @@ class Engine:
         self.problem = problem_of(system, forcing)
         self.back = system.blocks.T
         if method.events == HENON:
-            self.problem.levels[:, 1:] = math.inf  # kinks are not looked for
+            self.problem.knots[:, 1:] = math.inf  # kinks are not looked for
         self.state: State = new_state(z, len(system.contacts))
         dt = 0.0 if method.adaptive else max(method.steps)
         least = negligible_energy(self.problem, np.sum(self.problem.load * self.problem.power, axis=1), dt)
@@ -60,7 +60,7 @@ class Engine:
         state = self.state
         begin_contacts(self.problem, state)
         state.count[CALLS] += rhs(
-            *(self.problem, 0.0, state.x, state.piece, state.entry_rate, state.rate, self.space.work[0])
+            *(self.problem, 0.0, state.x, state.segment, state.entry_rate, state.rate, self.space.work[0])
         )
 
     def keeps_ledger(self, sampled: bool) -> bool:

@@ -112,29 +112,29 @@ def nearer(h, distance, rate, before, beyond, longest):
 
 
 @inner
-def first_event(problem, x, dense, piece, coefficients):
+def first_event(problem, x, dense, segment, coefficients):
     """(θ, stop, direction ±1) of the earliest crossing of the step by any stop."""
     theta, stop, direction = NONE, -1, 0
     for s in range(problem.gap.size):
         coefficients_of(problem.read[s], problem.gap[s], x, dense, coefficients[0])
         coefficients_of(problem.read_rate[s], 0.0, x, dense, coefficients[1])
         tolerance = surface_tolerance(problem, s, x)
-        found = crossing(coefficients[0], coefficients[1], problem.levels[s, piece[s]], 1.0, tolerance)
+        found = crossing(coefficients[0], coefficients[1], problem.knots[s, segment[s]], 1.0, tolerance)
         if found < theta:
             theta, stop, direction = found, s, 1
-        if piece[s] > 0:
-            found = crossing(coefficients[0], coefficients[1], problem.levels[s, piece[s] - 1], -1.0, tolerance)
+        if segment[s] > 0:
+            found = crossing(coefficients[0], coefficients[1], problem.knots[s, segment[s] - 1], -1.0, tolerance)
             if found < theta:
                 theta, stop, direction = found, s, -1
     return theta, stop, direction
 
 
 @inner
-def entry_by_sign(problem, x, x_new, piece):
+def entry_by_sign(problem, x, x_new, segment):
     """(θ, stop) of the stop that is inside at the end of a step but was not at its start; the paper's test."""
     theta, stop = NONE, -1
     for s in range(problem.gap.size):
-        if piece[s] == 0:
+        if segment[s] == 0:
             after = indentation(problem, s, x_new)
             if after > 0.0:
                 before = indentation(problem, s, x)

@@ -40,22 +40,22 @@ def hermite(h, x, rate, x_new, rate_new, dense):
 
 
 @kernel
-def step(problem, t, h, x, rate, piece, entry_rate, x_new, rate_new, dense, work, rtol, atol):
+def step(problem, t, h, x, rate, segment, entry_rate, x_new, rate_new, dense, work, rtol, atol):
     """One Heun step; returns (error estimate 0, law calls). ``dense`` gets the cubic Hermite interpolant."""
     size = x.size
     trial, second, batch = work[0], work[1], work[2]
     for i in range(size):
         trial[i] = x[i] + h * rate[i]
-    calls = rhs(problem, t + h, trial, piece, entry_rate, second, batch)
+    calls = rhs(problem, t + h, trial, segment, entry_rate, second, batch)
     for i in range(size):
         x_new[i] = x[i] + 0.5 * h * (rate[i] + second[i])
-    calls += rhs(problem, t + h, x_new, piece, entry_rate, rate_new, batch)
+    calls += rhs(problem, t + h, x_new, segment, entry_rate, rate_new, batch)
     hermite(h, x, rate, x_new, rate_new, dense)
     return 0.0, calls
 
 
 @inner
-def land(problem, t, h, x, rate, piece, entry_rate, stop, level, x_new, work):
+def land(problem, t, h, x, rate, segment, entry_rate, stop, level, x_new, work):
     """Hénon's step of stop ``stop`` onto ``level``; returns its duration, or -1 where it fails (δ̇ near 0)."""
     size = 2 * problem.k.size
     trial, second, batch = work[0], work[1], work[2]
@@ -65,7 +65,7 @@ def land(problem, t, h, x, rate, piece, entry_rate, stop, level, x_new, work):
         return -1.0
     for i in range(x.size):
         trial[i] = x[i] + distance * rate[i] / delta_dot
-    rhs(problem, t + distance / delta_dot, trial, piece, entry_rate, second, batch)
+    rhs(problem, t + distance / delta_dot, trial, segment, entry_rate, second, batch)
     second_delta_dot = dot(problem.read_rate[stop], trial, size)
     duration = 0.5 * distance * (1.0 / delta_dot + 1.0 / second_delta_dot)
     if not (second_delta_dot > 0.0 and 0.0 <= duration <= 2.0 * h):

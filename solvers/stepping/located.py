@@ -56,8 +56,8 @@ def _peaks(problem, state, space):
     """Largest indentation and force of the step just accepted, for every stop in contact."""
     delta_of, rate_of = space.coefficients[0], space.coefficients[1]
     for s in range(problem.gap.size):
-        always = problem.levels[s, 0] == -np.inf and problem.opening[s] < 0  # no contact of the log
-        if state.piece[s] == 0 or always or is_open(problem, s):
+        always = problem.knots[s, 0] == -np.inf and problem.opening[s] < 0  # no contact of the log
+        if state.segment[s] == 0 or always or is_open(problem, s):
             continue
         coefficients_of(problem.read[s], problem.gap[s], state.x, space.dense, delta_of)
         coefficients_of(problem.read_rate[s], 0.0, state.x, space.dense, rate_of)
@@ -68,10 +68,10 @@ def _peaks(problem, state, space):
                 value = _peak_value(known, _PEAK_NODES[i])
                 if value > best:
                     best, place = value, i
-            if best > 0.9 * state.open[s, column]:
+            if best > 0.9 * state.active[s, column]:
                 a, b = _PEAK_NODES[max(place - 1, 0)], _PEAK_NODES[min(place + 1, _PEAK_NODES.size - 1)]
                 best = max(best, golden_section(_peak_value, known, a, b)[1])
-                state.open[s, column] = max(state.open[s, column], best)
+                state.active[s, column] = max(state.active[s, column], best)
 
 
 @inner
@@ -91,7 +91,7 @@ def _kink(problem, state, space):
     """θ of the first place inside the step where a clamped force begins or ends, or a damper of approach; else NONE."""
     first, batch = NONE, space.work[0]
     for s in range(problem.gap.size):
-        if state.piece[s] == 0 or space.kinks[s] == 0:
+        if state.segment[s] == 0 or space.kinks[s] == 0:
             continue
         coefficients_of(problem.read[s], problem.gap[s], state.x, space.dense, space.coefficients[0])
         coefficients_of(problem.read_rate[s], 0.0, state.x, space.dense, space.coefficients[1])
@@ -154,7 +154,7 @@ def _land(step, problem, state, space, h, longest, stop, direction, level, borde
     before, beyond = 0.0, longest
     for _ in range(MOST_LANDINGS):
         error, calls = step(
-            *(problem, state.now[T], h, state.x, state.rate, state.piece, state.entry_rate),
+            *(problem, state.now[T], h, state.x, state.rate, state.segment, state.entry_rate),
             *(space.x_new, space.rate_new, space.dense, space.work, rtol, atol),
         )
         state.count[CALLS] += calls
@@ -184,10 +184,10 @@ def _switch_by_sign(problem, state, log):
     switched = False
     for s in range(problem.gap.size):
         delta = indentation(problem, s, state.x)
-        if delta > problem.levels[s, state.piece[s]]:
+        if delta > problem.knots[s, state.segment[s]]:
             switch(problem, state, s, 1, log)
             switched = True
-        elif state.piece[s] > 0 and delta <= problem.levels[s, state.piece[s] - 1]:
+        elif state.segment[s] > 0 and delta <= problem.knots[s, state.segment[s] - 1]:
             switch(problem, state, s, -1, log)
             switched = True
     return switched
@@ -212,10 +212,10 @@ def look(problem, state, space, t_end, log, events):
 @kernel
 def find(problem, state, space):
     """(θ, stop, direction, level) of the first event of a step; θ as of `first_event`."""
-    theta, stop, direction = first_event(problem, state.x, space.dense, state.piece, space.coefficients)
+    theta, stop, direction = first_event(problem, state.x, space.dense, state.segment, space.coefficients)
     level = 0.0
     if 0.0 <= theta < NONE:
-        level = problem.levels[stop, state.piece[stop] - (1 if direction < 0 else 0)]
+        level = problem.knots[stop, state.segment[stop] - (1 if direction < 0 else 0)]
     return theta, stop, direction, level
 
 
@@ -242,7 +242,7 @@ def _law_fails(problem, state, space, h):
     for s in range(problem.gap.size):
         batch[0] = indentation(problem, s, state.x) + h * dot(problem.read[s], state.rate, 2 * problem.k.size)
         batch[1] = dot(problem.read_rate[s], state.x, 2 * problem.k.size)
-        if state.piece[s] > 0 and np.isfinite(batch[0]):
+        if state.segment[s] > 0 and np.isfinite(batch[0]):
             contact_forces(problem, s, batch[0:1], batch[1:2], state.entry_rate[s], batch[2:3])
             if not np.isfinite(batch[2]):
                 return True

@@ -31,7 +31,7 @@ from solvers.compiled.state import (
     STEP_TOO_SMALL,
     State,
     T,
-    touching,
+    in_contact,
 )
 from solvers.problem import Array
 from solvers.stepping.borders import border_ahead, border_space, renew_border, renew_together
@@ -111,19 +111,19 @@ def march(
         # --- end of the run, and what can stop it early
         code = look(problem, state, space, t_end, log, events)
         if code == EVENT:
-            count[CALLS] += rhs(problem, now[T], state.x, state.piece, state.entry_rate, state.rate, space.work[0])
+            count[CALLS] += rhs(problem, now[T], state.x, state.segment, state.entry_rate, state.rate, space.work[0])
             continue
         if code != RUNNING:
             return code
 
         # --- try a step
-        phase = H_CONTACT if touching(state) else H_FLIGHT
+        phase = H_CONTACT if in_contact(state) else H_FLIGHT
         nearest = nearest if phase == H_CONTACT else 0.0
         h = min(now[phase], dt_contact if phase == H_CONTACT else dt_flight, t_end - now[T])
         if h < 4e-15 * now[T] and h < t_end - now[T]:
             return LAW_NOT_FINITE if not_finite else STEP_TOO_SMALL
         error, calls = step(
-            *(problem, now[T], h, state.x, state.rate, state.piece, state.entry_rate),
+            *(problem, now[T], h, state.x, state.rate, state.segment, state.entry_rate),
             *(space.x_new, space.rate_new, space.dense, space.work, rtol, atol),
         )
         count[CALLS] += calls
@@ -142,7 +142,7 @@ def march(
                 if place == 0.0:  # it begins on the border and goes across
                     renew_border(problem, state, space, element, number, log)
                     count[CALLS] += rhs(
-                        *(problem, now[T], state.x, state.piece, state.entry_rate, state.rate, space.work[0])
+                        *(problem, now[T], state.x, state.segment, state.entry_rate, state.rate, space.work[0])
                     )
                     continue
                 if place < theta:
@@ -158,10 +158,10 @@ def march(
                     count[REJECTED] += 1
                     continue
         elif events == HENON and phase == H_FLIGHT and not by_hand:  # the paper's scheme
-            theta, stop = entry_by_sign(problem, state.x, space.x_new, state.piece)
+            theta, stop = entry_by_sign(problem, state.x, space.x_new, state.segment)
             if theta < NONE:
                 duration = henon_landing(
-                    *(problem, now[T], h, state.x, state.rate, state.piece, state.entry_rate),
+                    *(problem, now[T], h, state.x, state.rate, state.segment, state.entry_rate),
                     *(stop, 0.0, space.x_new, space.work),
                 )
                 if duration < 0.0:  # it grazes: walk in with the small step
@@ -170,7 +170,7 @@ def march(
                     continue
                 h, direction = duration, 1
                 count[CALLS] += rhs(
-                    *(problem, now[T] + h, space.x_new, state.piece, state.entry_rate),
+                    *(problem, now[T] + h, space.x_new, state.segment, state.entry_rate),
                     *(space.rate_new, space.work[0]),
                 )
                 hermite(h, state.x, state.rate, space.x_new, space.rate_new, space.dense)
@@ -191,7 +191,7 @@ def march(
         if border >= 0 and now[T] < t_end:
             renew_together(problem, state, space, stop, border, log)
         if stop >= 0:
-            count[CALLS] += rhs(problem, now[T], state.x, state.piece, state.entry_rate, state.rate, space.work[0])
+            count[CALLS] += rhs(problem, now[T], state.x, state.segment, state.entry_rate, state.rate, space.work[0])
         if modal_gains(problem, state, space):
             return GAINED
 

@@ -44,7 +44,7 @@ def contact_force(problem, s, entry_rate, delta, delta_dot, by_force, rate_by_fo
     for _ in range(MOST_SWEEPS):
         batch[0] = delta - by_force * (F - force)
         batch[1] = delta_dot - rate_by_force * (F - force)
-        inside = batch[0] > problem.levels[s, 0]
+        inside = batch[0] > problem.knots[s, 0]
         contact_forces(problem, s, batch[0:1], batch[1:2], entry_rate, batch[2:3])
         contact_gradient(problem, s, batch[0:1], batch[1:2], entry_rate, batch[3:4], batch[4:5], batch[5:6])
         calls += 1
@@ -64,18 +64,18 @@ def _accelerate(n, i, a, h, beta, gamma, x):
 
 
 @inner
-def _touch(problem, h, piece, entry_rate, x_new, rate_new, work):
+def _touch(problem, h, segment, entry_rate, x_new, rate_new, work):
     """Add what the stops in contact do to the end of a step, by turns until their forces agree; law calls."""
     n, stops, active, calls = problem.k.size, problem.gap.size, 0, 0
     force, effective, batch = work[0], work[1], work[2]
     kept, beta, gamma = 1.0 - work[3][1], work[3][2], work[3][3]
     for s in range(stops):
-        active += 1 if piece[s] > 0 else 0
+        active += 1 if segment[s] > 0 else 0
         force[s] = 0.0
     for _ in range(MOST_SWEEPS if active else 0):
         largest, change = 0.0, 0.0
         for s in range(stops):
-            if piece[s] == 0:
+            if segment[s] == 0:
                 continue
             compliance = 0.0
             for i in range(n):
@@ -98,7 +98,7 @@ def _touch(problem, h, piece, entry_rate, x_new, rate_new, work):
 
 
 @kernel
-def step(problem, t, h, x, rate, piece, entry_rate, x_new, rate_new, dense, work, rtol, atol):
+def step(problem, t, h, x, rate, segment, entry_rate, x_new, rate_new, dense, work, rtol, atol):
     """One step on decoupled modes; the last row of ``work`` holds (α_m, α_f, β, γ).
 
     Returns (error estimate 0, law calls). ``dense`` gets the cubic Hermite interpolant.
@@ -107,7 +107,7 @@ def step(problem, t, h, x, rate, piece, entry_rate, x_new, rate_new, dense, work
     alpha_m, alpha_f, beta, gamma = work[3][0], work[3][1], work[3][2], work[3][3]
     effective, kept, calls = work[1], 1.0 - alpha_f, 0
     if alpha_f != 0.0:
-        calls += rhs(problem, t, x, piece, entry_rate, dense[0], work[2])
+        calls += rhs(problem, t, x, segment, entry_rate, dense[0], work[2])
     for i in range(n):  # predict
         x_new[i] = x[i] + h * x[n + i] + h * h * (0.5 - beta) * rate[n + i]
         x_new[n + i] = x[n + i] + h * (1.0 - gamma) * rate[n + i]
@@ -120,10 +120,10 @@ def step(problem, t, h, x, rate, piece, entry_rate, x_new, rate_new, dense, work
             a += alpha_f * dense[0, n + i]
         _accelerate(n, i, a / effective[i], h, beta, gamma, x_new)
         rate_new[n + i] = a / effective[i]
-    calls += _touch(problem, h, piece, entry_rate, x_new, rate_new, work)
+    calls += _touch(problem, h, segment, entry_rate, x_new, rate_new, work)
     copy(rate_new[n : 2 * n], effective, n)
     copy(x[2 * n :], x_new[2 * n :], x.size - 2 * n)
-    calls += rhs(problem, t + h, x_new, piece, entry_rate, rate_new, work[2])
+    calls += rhs(problem, t + h, x_new, segment, entry_rate, rate_new, work[2])
     if alpha_m != 0.0 or alpha_f != 0.0:
         copy(effective, rate_new[n : 2 * n], n)
     for i in range(2 * n, x.size):  # the energy balance by the trapezoidal rule

@@ -21,7 +21,7 @@ from solvers.stepping.stability import Radius, taylor_radius
 
 
 @kernel
-def step(problem, t, h, x, rate, piece, entry_rate, x_new, rate_new, dense, work, rtol, atol):
+def step(problem, t, h, x, rate, segment, entry_rate, x_new, rate_new, dense, work, rtol, atol):
     """One step; returns (error estimate 0, law calls). ``dense`` gets the cubic Hermite interpolant."""
     size = x.size
     trial, stage, batch = work[0], work[1], work[2]
@@ -30,12 +30,12 @@ def step(problem, t, h, x, rate, piece, entry_rate, x_new, rate_new, dense, work
         x_new[i] = x[i] + h / 6.0 * rate[i]
         trial[i] = x[i] + 0.5 * h * rate[i]
     for j in range(1, 4):
-        calls += rhs(problem, t + (h if j == 3 else 0.5 * h), trial, piece, entry_rate, stage, batch)
+        calls += rhs(problem, t + (h if j == 3 else 0.5 * h), trial, segment, entry_rate, stage, batch)
         weight, reach = (h / 6.0, 0.0) if j == 3 else (h / 3.0, h if j == 2 else 0.5 * h)
         for i in range(size):
             x_new[i] += weight * stage[i]
             trial[i] = x[i] + reach * stage[i]
-    calls += rhs(problem, t + h, x_new, piece, entry_rate, rate_new, batch)
+    calls += rhs(problem, t + h, x_new, segment, entry_rate, rate_new, batch)
     hermite(h, x, rate, x_new, rate_new, dense)
     return 0.0, calls
 
@@ -55,7 +55,8 @@ class RK4(ConstantStep):
     -----
     Stable for hω < 2√2 on an undamped mode, h|λ| < 2.785 on an overdamped one. Order 4 on smooth motion; through
     contact 4 if the law is smooth between its ends (a linear stop), 2.5 for Hertz, whose force begins as δ^1.5; without
-    location 2 at best, 1 for laws that jump or that latch the entry rate.
+    location 2 at best, 1 for laws that jump or that latch the entry rate. Borders of laws with memory are not located:
+    what a step has passed is renewed at its end, order 2, or 1 where the force jumps at a border.
 
     Examples
     --------

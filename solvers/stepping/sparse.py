@@ -146,16 +146,16 @@ class MatrixEngine:
 
     # --- what steps are made of
 
-    def forces(self, t: float, x: Array, piece: Any, out: Array) -> None:
+    def forces(self, t: float, x: Array, segment: Any, out: Array) -> None:
         """Loads and contacts on [q, q̇]: out = [q̇, force, ledger rates]."""
-        calls = rhs(self.problem, t, x, piece, self.state.entry_rate, out, self.space.work[3])
+        calls = rhs(self.problem, t, x, segment, self.state.entry_rate, out, self.space.work[3])
         self.state.count[CALLS] += calls
 
     def rate(self, t: float, x: Array, out: Array) -> None:
         """Rate of the whole state, M⁻¹ included."""
         n = self.system.size
         q, q_dot = x[:n], x[n : 2 * n]
-        self.forces(t, x, self.state.piece, out)
+        self.forces(t, x, self.state.segment, out)
         damping = self.C @ q_dot
         out[2 * n + 1] = q_dot @ damping
         out[n : 2 * n] = self.solver("mass", lambda: self.M)(out[n : 2 * n] - damping - self.K @ q)
@@ -226,15 +226,15 @@ def newmark_step(engine: MatrixEngine, h: float) -> None:
         old = alpha_f * (engine.M @ rate_new[n : 2 * n])
     q[:] = x[:n] + h * x[n : 2 * n] + h * h * (0.5 - beta) * a
     v[:] = x[n : 2 * n] + h * (1.0 - gamma) * a
-    engine.forces(state.now[T] + h, x_new, np.zeros_like(state.piece), rate_new)
+    engine.forces(state.now[T] + h, x_new, np.zeros_like(state.segment), rate_new)
     inertia = alpha_m * (engine.M @ a) if alpha_m != 0.0 else 0.0
     a_new = solve(kept * (rate_new[n : 2 * n] - engine.C @ v - engine.K @ q) + old - inertia)
     q += beta * h * h * a_new
     v += gamma * h * a_new
-    if state.piece.any():
+    if state.segment.any():
         a_new = a_new + _contact_accelerations(engine, h, solve, kept, beta, gamma)
     x_new[2 * n :] = x[2 * n :]
-    engine.forces(state.now[T] + h, x_new, state.piece, rate_new)
+    engine.forces(state.now[T] + h, x_new, state.segment, rate_new)
     rate_new[2 * n + 1] = v @ (engine.C @ v)
     rate_new[n : 2 * n] = a_new
     x_new[2 * n :] += 0.5 * h * (rate[2 * n :] + rate_new[2 * n :])
@@ -243,7 +243,7 @@ def newmark_step(engine: MatrixEngine, h: float) -> None:
 def _contact_accelerations(engine: MatrixEngine, h: float, solve: Any, kept: float, beta: float, gamma: float) -> Array:
     """Accelerations from the stops in contact, added to the end of the step by turns until all forces agree."""
     n, state, x_new = engine.system.size, engine.state, engine.space.x_new
-    problem, active = engine.problem, np.flatnonzero(state.piece)
+    problem, active = engine.problem, np.flatnonzero(state.segment)
     force, total = np.zeros(len(active)), np.zeros(n)
     reply = [kept * engine.reply(h, int(s), solve) for s in active]
     for _ in range(MOST_SWEEPS):

@@ -31,7 +31,7 @@ OPTIONS = {  # file, what is there, what is there instead
     "merged": ("decorators.py", ', inline="always"', ""),
     "force": ("decorators.py", "forceinline=True", "forceinline=False"),
     "nrt": ("decorators.py", ', "_nrt": False', ""),
-    "alias": ("handles.py", '    loaded.set_metadata("tbaa", _constant(builder.module))\n', ""),
+    "alias": ("packed.py", '    loaded.set_metadata("tbaa", _constant(builder.module))\n', ""),
 }
 
 

@@ -1,6 +1,7 @@
 """One step in contact: forces by collocation at eight nodes, or a landing on an event.
 
-`step` chooses, `nodes` and `node_response` tell motion from forces, of many stops through the `blocks`, `collocation`
-and `node_newton` solve for them, `landing` ends a step on a border, `crossings` looks for borders between nodes,
-`peaks` for summits; `outputs` are samples inside a step.
+`step` chooses between them and controls the step size. `collocation` and `node_newton` solve for the forces at the
+`nodes`; `node_response` gives the motion under them, through `many_stops` if there are more than two. `landing` locates
+where a contact, or a segment of its law, ends; `crossings` finds borders that a step would pass. `peaks` has the
+largest indentations and forces, `outputs` the samples inside a step.
 """

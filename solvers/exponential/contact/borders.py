@@ -3,7 +3,8 @@
 A law with memory tells by margins b_j(δ, δ̇) how far its borders are; all are positive inside the present segment. No
 step goes across a border: the step before ends near it, a landing in time ends on it by the secant rule, and there all
 borders are renewed whose margins have fallen to zero, also those of other elements that share the motion. Between two
-nodes a margin is watched where it is small, by the polynomial through points around its lowest node.
+nodes a margin is watched where it is small, by the polynomial through points around its lowest node; a step whose nodes
+do not resolve the fast blocks keeps a distance of what these may add.
 """
 
 from __future__ import annotations
@@ -13,50 +14,61 @@ import numpy as np
 from solvers.compiled.kernels import dot, indentation, inlined, inner
 from solvers.compiled.renewals import margins, margins_in, note_event, renew
 from solvers.compiled.state import rate_tolerance, surface_tolerance
-from solvers.exponential.contact.node_response import DELTAS, RATES, START
+from solvers.exponential.contact.node_response import DELTAS, KNOWN, RATES, START, rate_ripple_of, ripple_of
 from solvers.exponential.contact.nodes import LOCAL, S
-from solvers.exponential.contact.peaks import motion_around, summit
+from solvers.exponential.contact.peaks import local_maximum, motion_around
 
+ENDS = 6  # points at which margins are evaluated besides the nodes
+UNRESOLVED = -2
 _ON = 1e-9  # margin, in units of the largest of the step, at which a step counts as begun on the border
 _SAME = 1e-11  # the same for the sign of a node
 _TOGETHER = 1e-9  # part of its way at which a border counts as reached when another is landed on
+_REST = 1e-14  # rate, in units of the reference speed, at which what has come to rest turns no more
 _NEAR = 0.2  # lowest node, in units of the largest margin, below which the motion between nodes is looked at
 
 
 @inner
-def _margins_on_step(problem, state, space, s):
-    """Margins at the nodes and at both ends of the step that has just been tried, their largest and their rounding."""
-    size, batch, delta, rate = 2 * problem.k.size, space.trial, space.seen[s, 0], space.seen[s, 1]
-    batch[0], batch[1] = delta, indentation(problem, s, space.x_new)
-    batch[2], batch[3] = delta + surface_tolerance(problem, s, state.x), delta
-    batch[4], batch[5] = rate, dot(problem.read_rate[s], space.x_new, size)
-    batch[6], batch[7] = rate, rate + rate_tolerance(problem, s, state.x)
-    margins(problem, state, s, 4, batch[0:4], batch[4:8], space.ends)
-    margins(problem, state, s, S, space.motion[s, 0], space.motion[s, 1], space.margin)
+def _margins_on_step(problem, tables, state, scratch, s, node_set, level):
+    """Margins at the nodes and at both ends of the step that has just been tried, their largest and their rounding.
+
+    The begin is looked at once more with rounding added to δ and to δ̇, and with their ripple.
+    """
+    n, delta, rate = problem.k.size, scratch.start_motion[s, 0], scratch.start_motion[s, 1]
+    weight, alias = tables.ripple_weight[s], tables.alias[tables.kind[node_set], level]
+    deltas, rates = scratch.local_motion[KNOWN, :ENDS], scratch.local_motion[KNOWN, ENDS : 2 * ENDS]
+    for i in range(ENDS):
+        deltas[i], rates[i] = delta, rate
+    deltas[1], rates[1] = indentation(problem, s, scratch.x_new), dot(problem.read_rate[s], scratch.x_new, 2 * n)
+    deltas[2] += surface_tolerance(problem, s, state.x)
+    rates[3] += max(rate_tolerance(problem, s, state.x), _REST * scratch.reference_speed[s])
+    deltas[4] += ripple_of(weight, alias, state.x, n)
+    rates[5] += rate_ripple_of(weight, problem.k, alias, state.x, n)
+    margins(problem, state, s, ENDS, deltas, rates, scratch.ends)
+    margins(problem, state, s, S, scratch.motion[s, 0], scratch.motion[s, 1], scratch.margin)
     for j in range(problem.border_count[s]):
-        ends = space.ends[4 * j : 4 * j + 4]
+        ends = scratch.ends[ENDS * j : ENDS * (j + 1)]
         largest = max(abs(ends[0]), abs(ends[1]))
         for i in range(S):
-            largest = max(largest, abs(space.margin[S * j + i]))
-        space.largest[s, j] = largest
-        space.noise[s, j] = max(_SAME * largest, 2.0 * (abs(ends[2] - ends[0]) + abs(ends[3] - ends[0])))
+            largest = max(largest, abs(scratch.margin[S * j + i]))
+        scratch.largest[s, j] = largest
+        scratch.noise[s, j] = max(_SAME * largest, 2.0 * (abs(ends[2] - ends[0]) + abs(ends[3] - ends[0])))
 
 
 @inlined
-def _crossing(problem, tables, space, s, j, family, h):
+def _crossing(problem, tables, scratch, s, j, node_set, h):
     """Time after the begin of the step at which a margin falls below zero by its values at the nodes, or inf.
 
     It is 0 where the margin is negative from the begin on. One that begins at zero may have risen before the first
     node: then a shorter step is asked for, which will tell.
     """
-    noise, before, t = space.noise[s, j], space.ends[4 * j], 0.0
-    near = max(_ON * space.largest[s, j], noise)
+    noise, before, t = scratch.noise[s, j], scratch.ends[ENDS * j], 0.0
+    near = max(_ON * scratch.largest[s, j], noise)
     if before < -near:
         return 0.0
     on = before <= near
     for i in range(S + 1):
-        value = space.margin[S * j + i] if i < S else space.ends[4 * j + 1]
-        after = h * tables.times[family, i] if i < S else h
+        value = scratch.margin[S * j + i] if i < S else scratch.ends[ENDS * j + 1]
+        after = h * tables.times[node_set, i] if i < S else h
         if value < -noise:
             return t + (after - t) * (0.5 if on and i == 0 else max(before, 0.0) / (max(before, 0.0) - value))
         before, t = value, after
@@ -64,53 +76,68 @@ def _crossing(problem, tables, space, s, j, family, h):
 
 
 @inner
-def _between_nodes(problem, tables, state, space, s, j, family, h):
+def _between_nodes(problem, tables, state, scratch, s, j, node_set, h):
     """The same where a margin is below zero between the nodes around its lowest one only."""
-    values, lowest = space.margin[S * j : S * j + S], 0
+    values, lowest = scratch.margin[S * j : S * j + S], 0
     for i in range(S):
         if values[i] < values[lowest]:
             lowest = i
-    ends = min(space.ends[4 * j], space.ends[4 * j + 1])
-    if values[lowest] > _NEAR * space.largest[s, j] or ends < values[lowest]:
+    ends = min(scratch.ends[ENDS * j], scratch.ends[ENDS * j + 1])
+    if values[lowest] > _NEAR * scratch.largest[s, j] or ends < values[lowest]:
         return np.inf
-    motion_around(problem, tables, state, space, family, h, s, lowest)
-    margins(problem, state, s, S, space.around[DELTAS], space.around[RATES], space.margin)
-    below, deepest = space.trial, 0
+    motion_around(problem, tables, state, scratch, node_set, h, s, lowest)
+    margins(problem, state, s, S, scratch.local_motion[DELTAS], scratch.local_motion[RATES], scratch.margin)
+    below, deepest = scratch.trial, 0
     for i in range(S):
-        below[i] = -space.margin[S * j + i]
+        below[i] = -scratch.margin[S * j + i]
         if below[deepest] <= 0.0 and below[i] > below[deepest]:
             deepest = i
-    deep = summit(below, 1.0, space.clipped)
-    margins(problem, state, s, S, space.motion[s, 0], space.motion[s, 1], space.margin)
-    if deep <= space.noise[s, j]:
+    deep = local_maximum(below, 1.0, scratch.clipped)
+    margins(problem, state, s, S, scratch.motion[s, 0], scratch.motion[s, 1], scratch.margin)
+    if deep <= scratch.noise[s, j]:
         return np.inf
-    begin, end = tables.places[family, lowest, 0], tables.places[family, lowest, 1]
+    begin, end = tables.local_interval[node_set, lowest, 0], tables.local_interval[node_set, lowest, 1]
     sigma = begin + 0.5 * (LOCAL[max(deepest, 1)] + 1.0) * (end - begin)
-    return h * sigma ** tables.power[family]
+    return h * sigma ** tables.time_exponent[node_set]
+
+
+@inlined
+def _hides(scratch, s, j):
+    """Whether fast blocks, which the nodes do not resolve, may take a margin below zero between them."""
+    ends = scratch.ends[ENDS * j : ENDS * (j + 1)]
+    ripple, lowest = abs(ends[4] - ends[0]) + abs(ends[5] - ends[0]), ends[1]
+    for i in range(S):
+        lowest = min(lowest, scratch.margin[S * j + i])
+    return ripple > scratch.noise[s, j] and lowest < ripple
 
 
 @inner
-def border_ahead(problem, tables, state, space, family, level):
-    """(time after the begin of the step, element, border) of the first border on it; no element is -1."""
-    first, element, border, h = np.inf, -1, -1, tables.step[level]
+def border_ahead(problem, tables, state, scratch, node_set, level):
+    """(time after the begin of the step, element, border) of the first border on it.
+
+    The element is -1 if there is none, and `UNRESOLVED` if the step is too long to tell.
+    """
+    first, element, border, h = np.inf, -1, -1, tables.contact_step[level]
     for s in range(problem.gap.size):
         count = problem.border_count[s]
         if count == 0:
             continue
-        _margins_on_step(problem, state, space, s)
+        _margins_on_step(problem, tables, state, scratch, s, node_set, level)
         for j in range(count):
-            if space.largest[s, j] <= space.noise[s, j]:
+            if scratch.largest[s, j] <= scratch.noise[s, j]:
                 continue
-            time = _crossing(problem, tables, space, s, j, family, h)
+            time = _crossing(problem, tables, scratch, s, j, node_set, h)
             if time == np.inf:
-                time = _between_nodes(problem, tables, state, space, s, j, family, h)
+                time = _between_nodes(problem, tables, state, scratch, s, j, node_set, h)
+            if time == np.inf and _hides(scratch, s, j):
+                return np.inf, UNRESOLVED, -1
             if time < first:
                 first, element, border = time, s, j
     return first, element, border
 
 
 @inner
-def passed(problem, state, space, element, border, w, x):
+def passed(problem, state, scratch, element, border, w, x):
     """(element, border) of the margin that has gone furthest below zero between the states w and x, or (-1, -1).
 
     The border landed on is left out, and what has been carried over by rounding only.
@@ -120,45 +147,45 @@ def passed(problem, state, space, element, border, w, x):
         count = problem.border_count[s]
         if count == 0:
             continue
-        margins_in(problem, state, s, w, space.trial, space.ends)
-        margins_in(problem, state, s, x, space.trial, space.margin)
+        margins_in(problem, state, s, w, scratch.trial, scratch.ends)
+        margins_in(problem, state, s, x, scratch.trial, scratch.margin)
         for j in range(count):
-            if (s == element and j == border) or space.margin[j] >= -space.noise[s, j]:
+            if (s == element and j == border) or scratch.margin[j] >= -scratch.noise[s, j]:
                 continue
-            share = space.margin[j] / max(space.ends[j], space.noise[s, j])
+            share = scratch.margin[j] / max(scratch.ends[j], scratch.noise[s, j])
             if share < worst:
                 worst, found, which = share, s, j
     return found, which
 
 
 @inner
-def renew_border(problem, state, space, element, border, log):
+def renew_border(problem, state, scratch, element, border, log):
     """Renew one border in the present state."""
-    delta, rate = margins_in(problem, state, element, state.x, space.trial, space.margin)
+    delta, rate = margins_in(problem, state, element, state.x, scratch.trial, scratch.margin)
     renew(problem, state, element, border, delta, rate, log)
     note_event(state)
 
 
 @inner
-def renew_all(problem, state, space, element, border, log):
-    """Renew the border landed on, and all whose margins fell to zero with it since ``space.work[START]``.
+def renew_all(problem, state, scratch, element, border, log):
+    """Renew the border landed on, and all whose margins fell to zero with it since ``scratch.stages[START]``.
 
     Which ones is judged from the state alone, before any is renewed.
     """
-    margins_in(problem, state, element, state.x, space.trial, space.margin)
-    missed = 2.0 * abs(space.margin[border]) / space.largest[element, border]
+    margins_in(problem, state, element, state.x, scratch.trial, scratch.margin)
+    missed = 2.0 * abs(scratch.margin[border]) / scratch.largest[element, border]
     for s in range(problem.gap.size):
         count = problem.border_count[s]
         if count == 0:
             continue
-        margins_in(problem, state, s, space.work[START], space.trial, space.ends)
-        delta, rate = margins_in(problem, state, s, state.x, space.trial, space.margin)
+        margins_in(problem, state, s, scratch.stages[START], scratch.trial, scratch.ends)
+        delta, rate = margins_in(problem, state, s, state.x, scratch.trial, scratch.margin)
         for j in range(count):
-            before, near = space.ends[j], max(space.noise[s, j], missed * space.largest[s, j])
+            before, near = scratch.ends[j], max(scratch.noise[s, j], missed * scratch.largest[s, j])
             near = max(near, _TOGETHER * before)
-            landed = (s == element and j == border) or (before > near and space.margin[j] <= near)
-            space.fired[j] = 1.0 if landed else 0.0
+            landed = (s == element and j == border) or (before > near and scratch.margin[j] <= near)
+            scratch.fired[j] = 1.0 if landed else 0.0
         for j in range(count):
-            if space.fired[j] > 0.0:
+            if scratch.fired[j] > 0.0:
                 renew(problem, state, s, j, delta, rate, log)
     note_event(state)

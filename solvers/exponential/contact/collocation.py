@@ -1,4 +1,4 @@
-"""Contact: propagate the linear structure exactly, collocate the force alone.
+"""A contact step: the linear structure is propagated exactly, the force alone is collocated.
 
 On a step of length h the unknowns are the forces at S nodes of every stop in contact, whatever the number of modes:
 
@@ -8,12 +8,12 @@ iterated from the extrapolated polynomial of the step before. The state at the e
 step of a law with broken powers of δ uses t = h σ^κ and F = σ^λ g(σ), which restores full order at the singular start
 (see `nodes`); the last one, onto δ = 0, is one Runge–Kutta step in δ^{1/κ} (see `landing`).
 
-Step control: with A₁ >= A₂ the sizes of the last two and the two before of the force's S Jacobi coefficients, the force
-beyond the polynomial is taken as A₁ max((A₁/A₂)^{S/2}, A₁/F_max), and what it does to the indentation rate of every
-stop, open or closed, is compared with rtol × a reference speed of that stop. Fast modes whose oscillation the nodes
-cannot follow are charged for it, and so is the tail of the sampled signals, whose cells may be shorter than the step. A
-kink of the law between an end of the step and the nearest node leaves no trace in the coefficients; there law and
-polynomial are compared.
+Error estimate: let A₁ be the larger of the last two Jacobi coefficients of the force, in size, and A₂ the larger of the
+two before them. The part of the force that the polynomial leaves out is estimated by A₁ max((A₁/A₂)^{S/2}, A₁/F_max).
+Its effect on the indentation rate of every stop, in contact or not, is compared with rtol × the reference speed of that
+stop. Added to it are the oscillation of modes too fast for the nodes, and the part of the sampled signals, whose cells
+may be shorter than the step, that their polynomials leave out. A kink of the law between an end of the step and the
+nearest node does not show in the coefficients; there the law is compared with the polynomial.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ import math
 import numpy as np
 
 from solvers.compiled.kernels import contact_forces, contact_gradient, copy, dot, indentation, inlined, inner
-from solvers.compiled.simd import eight, total
+from solvers.compiled.simd import load8, sum8
 from solvers.compiled.state import CALLS, PEAK_DELTA, PEAK_FORCE, T, is_open
-from solvers.compiled.sums import combine, renew, sweep
-from solvers.exponential.contact.blocks import goes_through_blocks, kick, pair, way_of
+from solvers.compiled.sums import combine, iterate_power_law, replace_values
+from solvers.exponential.contact.many_stops import add_end_response, pair_response, uses_blocks, weighting_of
 from solvers.exponential.contact.node_newton import MOST_ITERATIONS, newton
 from solvers.exponential.contact.node_response import node_forces, respond, ripple_of
 from solvers.exponential.contact.nodes import S
@@ -36,84 +36,84 @@ from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR, STIFFNESS
 
 @inlined
 def _alone(tables, state):
-    """The stop in contact if there is but one and its law is inlined, else -1."""
+    """The stop in contact if it is the only one and its law is a power law of the tables, else -1."""
     alone, count = -1, 0
-    for s in range(state.piece.size):
-        if state.piece[s] > 0:
+    for s in range(state.segment.size):
+        if state.segment[s] > 0:
             alone, count = s, count + 1
-    return alone if count == 1 and tables.inlined[alone, EXPONENT] > 0.0 else -1
+    return alone if count == 1 and tables.power_law[alone, EXPONENT] > 0.0 else -1
 
 
 @inlined
-def _iterate(problem, tables, state, space, family, level):
-    """One iteration for the forces of all stops in contact: squares of their change and size, in units of accuracy."""
+def _iterate(problem, tables, state, scratch, node_set, level):
+    """One iteration for the forces of all stops in contact; Σ change² and Σ force² in units of their tolerance."""
     change, largest = 0.0, 0.0
     for s in range(problem.gap.size):
-        if state.piece[s] > 0:
-            respond(problem, tables, state, space, family, level, s)
+        if state.segment[s] > 0:
+            respond(problem, tables, state, scratch, node_set, level, s)
     for s in range(problem.gap.size):
-        if state.piece[s] > 0:
-            node_forces(problem, state, space, s)
-            moved, size = renew(space.force[s], space.trial)
-            unit = 1.0 / space.accuracy[s] ** 2
+        if state.segment[s] > 0:
+            node_forces(problem, state, scratch, s)
+            moved, size = replace_values(scratch.force[s], scratch.trial)
+            unit = 1.0 / scratch.force_tolerance[s] ** 2
             change, largest = change + moved * unit, largest + size * unit
     return change, largest
 
 
 @inner
-def _set_accuracy(problem, tables, state, space, h, rtol):
-    """Change of each stop's force, N, that moves no indentation rate by more than a twentieth of its tolerance.
+def _set_accuracy(problem, tables, state, scratch, h, rtol):
+    """Tolerance of each stop's force, N: it changes no indentation rate by more than a twentieth of its tolerance.
 
-    Returns whether a dashpot is so strong that iterations will diverge, by its slope where Newton used it last.
+    Returns whether a dashpot is so strong that iterations would diverge, by its slope in the last Newton iteration.
     """
     stiff = False
     for u in range(problem.gap.size):
-        if state.piece[u] > 0:
+        if state.segment[u] > 0:
             most = 1e-300
             for s in range(problem.gap.size):
-                most = max(most, abs(tables.mobility[s, u]) / space.scale[s])
-            space.accuracy[u] = 0.05 * rtol / (h * most)
-            stiff |= h * tables.mobility[u, u] * space.viscous[u] > 1.0
-            copy(space.force[u], space.guess[u], S)
+                most = max(most, abs(tables.accelerance[s, u]) / scratch.reference_speed[s])
+            scratch.force_tolerance[u] = 0.05 * rtol / (h * most)
+            stiff |= h * tables.accelerance[u, u] * scratch.viscous[u] > 1.0
+            copy(scratch.force[u], scratch.guess[u], S)
     for u in range(problem.gap.size if not stiff else 0):
-        space.viscous[u] = 0.0
+        scratch.viscous[u] = 0.0
     return stiff
 
 
 @inner
-def solve_forces(problem, tables, state, space, family, level, rtol):
-    """Fixed point of the forces; whether it was found."""
-    if _set_accuracy(problem, tables, state, space, tables.step[level], rtol):
-        return newton(problem, tables, state, space, family, level)
+def solve_forces(problem, tables, state, scratch, node_set, level, rtol):
+    """Solve for the forces by fixed-point iteration, else by Newton's method; returns whether a solution was found."""
+    if _set_accuracy(problem, tables, state, scratch, tables.contact_step[level], rtol):
+        return newton(problem, tables, state, scratch, node_set, level)
     before, alone = 0.0, _alone(tables, state)
-    law, unit = tables.inlined[max(alone, 0)], 1.0 / space.accuracy[max(alone, 0)] ** 2
-    own = pair(problem, tables, space, family, level, max(alone, 0), max(alone, 0))
+    law, unit = tables.power_law[max(alone, 0)], 1.0 / scratch.force_tolerance[max(alone, 0)] ** 2
+    own = pair_response(problem, tables, scratch, node_set, level, max(alone, 0), max(alone, 0))
     stiffness, rooted, damping = law[STIFFNESS], law[EXPONENT] == 1.5, law[DAMPING]
     factor = law[FACTOR] / state.entry_rate[max(alone, 0)]
     for iteration in range(MOST_ITERATIONS):
         if alone >= 0:
-            change, largest = sweep(
-                *(own, space.free[alone], space.force[alone], space.motion[alone]),
+            change, largest = iterate_power_law(
+                *(own, scratch.free[alone], scratch.force[alone], scratch.motion[alone]),
                 *(stiffness, rooted, factor, damping),
             )
             change, largest = change * unit, largest * unit
             state.count[CALLS] += S
         else:
-            change, largest = _iterate(problem, tables, state, space, family, level)
+            change, largest = _iterate(problem, tables, state, scratch, node_set, level)
         if not change < np.inf:
             break
         settled, change = change <= 1e-27 * largest, math.sqrt(change)
         if iteration == 0:
-            before = change / 0.3  # as iterations usually go
-        # changes that shrink by r = change/before, taken as 1/20 at least, 0.9 at most, add up to change r/(1 - r) more
+            before = change / 0.3  # the usual ratio of two changes
+        # with r = change/before, within [1/20, 0.9], the changes still to come add up to change r/(1 - r)
         if settled or (change <= 20.0 and change * change <= max(before - change, change / 9.0)):
             return True
         if iteration > 2 and change > 0.6 * before:
             break
         before = change
     for u in range(problem.gap.size):
-        copy(space.guess[u], space.force[u], S)
-    return newton(problem, tables, state, space, family, level)
+        copy(scratch.guess[u], scratch.force[u], S)
+    return newton(problem, tables, state, scratch, node_set, level)
 
 
 @inlined
@@ -126,7 +126,7 @@ def _top(values):
 
 
 @inlined
-def _size(values):
+def largest_size(values):
     """Largest size of node values."""
     best = 0.0
     for i in range(S):
@@ -135,47 +135,49 @@ def _size(values):
 
 
 @inlined
-def _largest(problem, tables, state, space, u):
+def _largest(problem, tables, state, scratch, u):
     """Largest force of a stop on the step, N, and its stiffness there, N/m."""
-    if problem.levels[u, 0] == 0.0:
-        largest = _top(space.force[u])
-        return largest, tables.exponent[u] * largest / max(_top(space.motion[u, 0]), 1e-300)
-    copy(space.motion[u, 0], space.clipped, S)
-    slope = space.slope[u]
-    contact_gradient(problem, u, space.clipped, space.motion[u, 1], state.entry_rate[u], slope[0], slope[1], slope[2])
-    return _size(space.force[u]), _size(slope[0])
+    if problem.knots[u, 0] == 0.0:
+        largest = _top(scratch.force[u])
+        return largest, tables.exponent[u] * largest / max(_top(scratch.motion[u, 0]), 1e-300)
+    copy(scratch.motion[u, 0], scratch.clipped, S)
+    slope = scratch.slope[u]
+    contact_gradient(
+        problem, u, scratch.clipped, scratch.motion[u, 1], state.entry_rate[u], slope[0], slope[1], slope[2]
+    )
+    return largest_size(scratch.force[u]), largest_size(slope[0])
 
 
 @inner
-def step_error(problem, tables, state, space, family, level, fresh, rtol):
-    """Error of the indentation rates by the forces' unresolved part, in units of each stop's tolerance; the largest.
+def step_error(problem, tables, state, scratch, node_set, level, is_new, rtol):
+    """Largest error of an indentation rate by the unresolved part of the forces, in units of the stop's tolerance.
 
-    On an entry step the force of the stop that enters is integrated by Gauss's rule, those of the others are not.
+    On an entry step the nodes are those of Gauss's rule for the stop that enters, not for the others.
     """
-    n, stops, h = problem.k.size, problem.gap.size, tables.step[level]
+    n, stops, h = problem.k.size, problem.gap.size, tables.contact_step[level]
     for u in range(stops):
-        space.beyond[u] = 0.0
-        if state.piece[u] == 0:
+        scratch.unresolved[u] = 0.0
+        if state.segment[u] == 0:
             continue
-        gauss = family == 0 or u == family - 1
-        combine(tables.summary[family], space.force[u], S, None, space.summary[u, 0])
-        largest, stiffness = _largest(problem, tables, state, space, u)
+        gauss = node_set == 0 or u == node_set - 1
+        combine(tables.summary[node_set], scratch.force[u], S, None, scratch.summary[u, 0])
+        largest, stiffness = _largest(problem, tables, state, scratch, u)
         if gauss:
-            beyond = _beyond(space.summary[u, 0], largest, S // 2)
+            unresolved = unresolved_part(scratch.summary[u, 0], largest, S // 2)
         else:
-            combine(tables.tail[family], space.force[u], S, None, space.trial)
-            beyond = _beyond(space.trial, largest, 1)
-        if family == 0 and tables.inlined[u, EXPONENT] == 0.0:
-            beyond += 0.01 * _hidden_kink(problem, state, space, u, largest, fresh)
-        if beyond == 0.0:
+            combine(tables.tail[node_set], scratch.force[u], S, None, scratch.trial)
+            unresolved = unresolved_part(scratch.trial, largest, 1)
+        if node_set == 0 and tables.power_law[u, EXPONENT] == 0.0:
+            unresolved += 0.01 * _hidden_kink(problem, state, scratch, u, largest, is_new)
+        if unresolved == 0.0:
             continue
-        ripple = ripple_of(tables.sway[u], tables.alias[tables.kind[family], level], state.x, n)
-        span = h / max(1.0, h * tables.mobility[u, u] * space.viscous[u])  # a strong dashpot damps such errors
-        space.beyond[u] = span * (beyond + 0.1 * stiffness * ripple)
-    _sum_errors(problem, tables, space, family, h)
+        ripple = ripple_of(tables.ripple_weight[u], tables.alias[tables.kind[node_set], level], state.x, n)
+        span = h / max(1.0, h * tables.accelerance[u, u] * scratch.viscous[u])  # a strong dashpot damps such errors
+        scratch.unresolved[u] = span * (unresolved + 0.1 * stiffness * ripple)
+    _sum_errors(problem, tables, scratch, node_set, h)
     worst = 0.0
     for s in range(stops):
-        error = space.m[s] / (rtol * max(space.scale[s], _size(space.motion[s, 1])))
+        error = scratch.per_stop[s] / (rtol * max(scratch.reference_speed[s], largest_size(scratch.motion[s, 1])))
         if not error <= worst:
             worst = error
             if error != error:
@@ -184,41 +186,41 @@ def step_error(problem, tables, state, space, family, level, fresh, rtol):
 
 
 @inner
-def _sum_errors(problem, tables, space, family, h):
-    """Errors of all indentation rates, m/s, by what the forces' and the signals' polynomials leave out."""
-    stops, error = problem.gap.size, space.m
+def _sum_errors(problem, tables, scratch, node_set, h):
+    """Errors of all indentation rates, m/s, by the unresolved parts of forces and signals, into ``per_stop``."""
+    stops, error = problem.gap.size, scratch.per_stop
     for s in range(stops):
         error[s] = 0.0
     for j in range(problem.table_dt.size):
-        beyond = h * _beyond_signal(problem, tables, space, family, j)
+        unresolved = h * _unresolved_signal(problem, tables, scratch, node_set, j)
         for s in range(stops):
-            error[s] += abs(tables.direct[s, problem.table_load[j]]) * beyond
+            error[s] += abs(tables.load_acceleration[s, problem.table_load[j]]) * unresolved
     for u in range(stops):
-        if space.beyond[u] != 0.0:
+        if scratch.unresolved[u] != 0.0:
             for s in range(stops):
-                error[s] += abs(tables.mobility[s, u]) * space.beyond[u]
+                error[s] += abs(tables.accelerance[s, u]) * scratch.unresolved[u]
 
 
 @inner
-def _hidden_kink(problem, state, space, u, largest, fresh):
-    """Force, in N, by which law and polynomial differ at an end of a smooth step, if no coefficient explains it.
+def _hidden_kink(problem, state, scratch, u, largest, is_new):
+    """Difference, N, of law and polynomial at an end of a smooth step, where the last coefficients are smaller.
 
-    The law then bends between that end and the next node, a fiftieth of the step at most: clamp=True does.
+    Then the law has a kink between that end and the next node, within a fiftieth of the step, as with clamp=True.
     """
-    size, delta, rate = 2 * problem.k.size, space.clipped[0:2], space.trial[0:2]
-    delta[0], rate[0] = indentation(problem, u, space.x_new), dot(problem.read_rate[u], space.x_new, size)
+    size, delta, rate = 2 * problem.k.size, scratch.clipped[0:2], scratch.trial[0:2]
+    delta[0], rate[0] = indentation(problem, u, scratch.x_new), dot(problem.read_rate[u], scratch.x_new, size)
     delta[1], rate[1] = indentation(problem, u, state.x), dot(problem.read_rate[u], state.x, size)
-    contact_forces(problem, u, delta, rate, state.entry_rate[u], space.trial[2:4])
-    c = space.summary[u, 0]
-    apart = abs(space.trial[2] - c[5])
-    if not fresh:  # one that begins on a knot may begin with a jump
-        apart = max(apart, abs(space.trial[3] - c[4]))
+    contact_forces(problem, u, delta, rate, state.entry_rate[u], scratch.trial[2:4])
+    c = scratch.summary[u, 0]
+    apart = abs(scratch.trial[2] - c[5])
+    if not is_new:  # one that begins on a knot may begin with a jump
+        apart = max(apart, abs(scratch.trial[3] - c[4]))
     return apart if apart > 2.0 * max(abs(c[2]), abs(c[3])) + 1e-12 * largest else 0.0
 
 
 @inlined
-def _beyond(coefficients, largest, power):
-    """Size of what a polynomial leaves out, from its last four coefficients."""
+def unresolved_part(coefficients, largest, power):
+    """Estimate of the part that a polynomial leaves out, from its last four coefficients."""
     before = max(abs(coefficients[0]), abs(coefficients[1]))
     last = max(abs(coefficients[2]), abs(coefficients[3]))
     if last <= 1e-14 * largest:
@@ -228,33 +230,33 @@ def _beyond(coefficients, largest, power):
 
 
 @inner
-def _beyond_signal(problem, tables, space, family, j):
-    """The same of a sampled signal, which an entry step integrates at half the order."""
-    values, largest = space.force[problem.gap.size + problem.table_load[j]], 0.0
+def _unresolved_signal(problem, tables, scratch, node_set, j):
+    """The same for a sampled signal; an entry step integrates it at half the order."""
+    values, largest = scratch.force[problem.gap.size + problem.table_load[j]], 0.0
     for i in range(S):
         largest = max(largest, abs(values[i]))
-    combine(tables.tail[family], values, S, None, space.trial)
-    return _beyond(space.trial, largest, S // 2 if family == 0 else 1)
+    combine(tables.tail[node_set], values, S, None, scratch.trial)
+    return unresolved_part(scratch.trial, largest, S // 2 if node_set == 0 else 1)
 
 
 @inner
-def arrive(problem, tables, state, space, family, level):
-    """State at the end of the step, into ``space.x_new``."""
-    x, n = space.x_new, problem.k.size
-    if goes_through_blocks(tables):
+def end_state(problem, tables, state, scratch, node_set, level):
+    """State at the end of the step, into ``scratch.x_new``."""
+    x, n = scratch.x_new, problem.k.size
+    if uses_blocks(tables):
         for e in range(2 * n):
             x[e] = 0.0
-        kick(problem, tables, state, space, space.force, family, level, x)
+        add_end_response(problem, tables, state, scratch, scratch.force, node_set, level, x)
     first = True
-    for u in range(0 if goes_through_blocks(tables) else space.force.shape[0]):
-        if u >= problem.gap.size or state.piece[u] > 0:
-            rows = tables.kick[way_of(tables, family, u), level, u]
+    for u in range(0 if uses_blocks(tables) else scratch.force.shape[0]):
+        if u >= problem.gap.size or state.segment[u] > 0:
+            rows = tables.end_response[weighting_of(tables, node_set, u), level, u]
             if first:
-                combine(rows, space.force[u], S, None, x)
+                combine(rows, scratch.force[u], S, None, x)
             else:
-                combine(rows, space.force[u], S, x, x)
+                combine(rows, scratch.force[u], S, x, x)
             first = False
-    alpha, beta = tables.step_propagator[level, 0], tables.step_propagator[level, 1]
+    alpha, beta = tables.contact_propagator[level, 0], tables.contact_propagator[level, 1]
     for b in range(n):
         p, v = state.x[b], state.x[n + b]
         x[b] += alpha[b] * p + beta[b] * v
@@ -262,37 +264,39 @@ def arrive(problem, tables, state, space, family, level):
 
 
 @inner
-def finish_step(problem, tables, state, space, family, level):
-    """Move the state to the end of the step; ledger and peaks of the contacts."""
+def finish_step(problem, tables, state, scratch, node_set, level):
+    """Move the state to the end of the step; update the energy balance and the peaks of the contacts."""
     stops, size = problem.gap.size, 2 * problem.k.size
-    h = tables.step[level]
+    h = tables.contact_step[level]
     for s in range(stops):
-        if state.piece[s] > 0:
-            weights = tables.weights[family] if family == 0 or s == family - 1 else tables.plain[family]
-            impulses = eight(weights, 0) * eight(space.force[s], 0)
-            state.x[size + 2 + 2 * s] += h * total(impulses * eight(space.motion[s, 1], 0))
-            state.x[size + 3 + 2 * s] += h * total(impulses)
-            if problem.levels[s, 0] == 0.0:
-                step_peaks(problem, tables, state, space, family, h, s, 1.0)
-            elif not is_open(problem, s):
-                state.open[s, PEAK_DELTA] = max(state.open[s, PEAK_DELTA], _size(space.motion[s, 0]))
-                state.open[s, PEAK_FORCE] = max(state.open[s, PEAK_FORCE], _size(space.force[s]))
-    copy(space.x_new, state.x, size)
+        if state.segment[s] > 0:
+            weights = tables.weights[node_set] if node_set == 0 or s == node_set - 1 else tables.plain[node_set]
+            impulses = load8(weights, 0) * load8(scratch.force[s], 0)
+            state.x[size + 2 + 2 * s] += h * sum8(impulses * load8(scratch.motion[s, 1], 0))
+            state.x[size + 3 + 2 * s] += h * sum8(impulses)
+            if is_open(problem, s):
+                continue
+            if problem.knots[s, 0] == 0.0 or problem.opening[s] >= 0:
+                step_peaks(problem, tables, state, scratch, node_set, h, s, 1.0)
+            else:
+                state.active[s, PEAK_DELTA] = max(state.active[s, PEAK_DELTA], largest_size(scratch.motion[s, 0]))
+                state.active[s, PEAK_FORCE] = max(state.active[s, PEAK_FORCE], largest_size(scratch.force[s]))
+    copy(scratch.x_new, state.x, size)
     state.now[T] += h
 
 
 @inner
-def contact_time(problem, tables, space, s, speed):
-    """Duration a free impact at this speed would have, from the law's energy: T = 3.2 δ_m/v."""
+def contact_time(problem, tables, scratch, s, speed):
+    """Duration, s, of an impact at this speed on one stop alone, from the law's energy: T = 3.2 δ_m/v."""
     speed = max(speed, 1e-12)
-    mobility = max(tables.mobility[s, s], 1e-300)
-    target = 0.5 * speed * speed / mobility
+    accelerance = max(tables.accelerance[s, s], 1e-300)
+    target = 0.5 * speed * speed / accelerance
     p = tables.exponent[s]
     deepest = 1e-3 * speed
-    for _ in range(4):  # a law that is no power needs more than one
-        space.clipped[0], space.trial[0] = deepest, 0.0
-        contact_forces(problem, s, space.clipped[0:1], space.trial[0:1], speed, space.trial[1:2])
-        energy = space.trial[1] * deepest / (p + 1.0)
+    for _ in range(4):  # one is enough for a power law
+        scratch.clipped[0], scratch.trial[0] = deepest, 0.0
+        contact_forces(problem, s, scratch.clipped[0:1], scratch.trial[0:1], speed, scratch.trial[1:2])
+        energy = scratch.trial[1] * deepest / (p + 1.0)
         if not energy > 0.0 or abs(target - energy) < 0.1 * target:
             break
         deepest *= (target / energy) ** (1.0 / (p + 1.0))

@@ -1,13 +1,15 @@
-"""Landing on a border: one Runge–Kutta step in a variable in which the contact is smooth, DOP853 with t an unknown.
+"""Locating the end of a contact, or of a segment of its law: one Runge–Kutta step that lands on the border.
+
+It is a step of DOP853 with t among the unknowns, in a variable in which the motion is smooth:
 
     INDENTATION   dt = dδ/δ̇         lands exactly on a kink, or on another stop's surface
     ROOT          dt = κ u^{κ-1} du/δ̇, u = δ^{1/κ}, κ as at entry: lands exactly on δ = 0, where δ^{3/2} is singular
     TIME          dt                lands on a bend by the secant rule; the force is continuous there
 
-The unknowns are [p, v, ledger, t, u]. Every block moves by less than `_reach` radians, within which the step is exact
-to the tolerance whatever the stops see of it; what the forces add is estimated by a tenth of the embedded fifth-order
-difference, for every stop in units of its own tolerance: in these variables that stays a few times above the true
-error, where DOP853's own mixed estimate falls below it.
+The unknowns are [p, v, energy balance, t, u]. The fastest block moves by less than `landing_reach` radians, within
+which the step of every block is exact to the tolerance. The error by the forces is estimated by a tenth of the embedded
+fifth-order difference, for every stop in units of its own tolerance: in these variables this is a few times the true
+error, while DOP853's own mixed estimate is below it.
 """
 
 from __future__ import annotations
@@ -26,31 +28,31 @@ from solvers.compiled.state import (
     T,
     rate_tolerance,
     surface_tolerance,
-    tape,
+    write_event,
 )
 from solvers.compiled.sums import combine
 from solvers.exponential.contact.borders import passed
-from solvers.exponential.contact.crossings import FORCE, FREE, TURNED, on_the_way, side_at
+from solvers.exponential.contact.crossings import CLEAR, FORCE, TOO_LONG, before_landing, side_at
 from solvers.exponential.contact.node_response import BATCH, DIFFERENCE, LANDED, START
 from solvers.exponential.contact.peaks import state_peaks
 from solvers.exponential.energy.quadrature import powers
 
 INDENTATION, ROOT, TIME = range(3)
-_MOST_TRIES = 8  # to meet an output time on the way to a landing, or a bend
+_MOST_TRIES = 8  # to find the step that ends at an output time, or on a bend
 _PART = 0.1  # of the embedded difference that counts as the error
 _PART_OF_FOURTH = 1e-2  # with u = δ^{1/4}: terms t² = u⁸ are exact in the step, and all of the difference
 _LAST = 0.09  # indentation, in units of the deepest, from which the last step is tried
 
 
-def reach(rtol: float) -> float:
-    """Radians of the fastest block within which DOP853 is exact to a tenth of rtol: its error is 7e-8 θ⁹."""
+def landing_reach(rtol: float) -> float:
+    """Angle, rad, of the fastest block up to which DOP853's error, 7e-8 θ⁹, is below a tenth of rtol."""
     return min((0.1 * rtol / 7e-8) ** (1.0 / 9.0), 1.5)
 
 
 @inlined
 def _force(problem, tables, s, delta, delta_dot, side, entry_rate, batch):
-    """Force of stop s; a law that is cut at zero goes on beyond it on the side on which the step began."""
-    batch[0], batch[1], batch[2] = max(delta, problem.levels[s, 0]), delta_dot, 0.0
+    """Force of stop s; a law cut at zero force is continued as on the side of the cut where the step began."""
+    batch[0], batch[1], batch[2] = max(delta, problem.knots[s, 0]), delta_dot, 0.0
     if tables.bend[s] != FORCE:
         law_forces(problem, s, 1, batch[0:1], batch[1:2], entry_rate, batch[2:3])
     elif side > 0.0:
@@ -59,8 +61,8 @@ def _force(problem, tables, s, delta, delta_dot, side, entry_rate, batch):
 
 
 @inlined
-def _rate(problem, tables, ledger, variable, stop, span, w, piece, entry_rate, side, out, batch):
-    """Derivative of the unknowns with respect to the chosen variable, times its span; ``w`` ends in (t, u)."""
+def _rate(problem, tables, with_energy, variable, stop, span, w, segment, entry_rate, side, out, batch):
+    """Derivative of the unknowns ``w`` = [state, t, u] by the chosen variable, times its span; number of law calls."""
     n, calls = problem.k.size, 0
     size, t = 2 * n, 2 * n + 2 + 2 * problem.gap.size
     for b in range(n):
@@ -70,10 +72,10 @@ def _rate(problem, tables, ledger, variable, stop, span, w, piece, entry_rate, s
         value, load = table_value(problem, j, w[t]), problem.load[problem.table_load[j]]
         for e in range(size):
             out[e] += load[e] * value
-    out[size], out[size + 1] = powers(problem, tables, w[t], w) if ledger else (0.0, 0.0)
+    out[size], out[size + 1] = powers(problem, tables, w[t], w) if with_energy else (0.0, 0.0)
     for s in range(problem.gap.size):
         force, rate = 0.0, 0.0
-        if piece[s] > 0:
+        if segment[s] > 0:
             rate = dot(problem.read_rate[s], w, size)
             force = _force(problem, tables, s, indentation(problem, s, w), rate, side[s], entry_rate[s], batch)
             calls += 1
@@ -86,7 +88,7 @@ def _rate(problem, tables, ledger, variable, stop, span, w, piece, entry_rate, s
     if variable == INDENTATION:
         factor = span / delta_dot
     elif variable == ROOT:
-        kappa = tables.power[1 + stop]
+        kappa = tables.time_exponent[1 + stop]
         factor = span * kappa * w[t + 1] ** (kappa - 1.0) / delta_dot
     for e in range(t):
         out[e] *= factor
@@ -96,67 +98,69 @@ def _rate(problem, tables, ledger, variable, stop, span, w, piece, entry_rate, s
 
 
 @inner
-def regular_step(problem, tables, ledger, variable, stop, span, w, piece, entry_rate, side, work):
-    """One DOP853 step of the chosen variable from ``w`` into ``work[LANDED]``, its stages into ``work``; law calls."""
+def landing_step(problem, tables, with_energy, variable, stop, span, w, segment, entry_rate, side, work):
+    """One DOP853 step of the chosen variable from ``w`` to ``work[LANDED]``, stages in ``work``; count of law calls."""
     calls = 0
     batch, trial = work[BATCH], work[LANDED]
     for i in range(STAGES):
         combine(work, A[i], i, w, trial)
-        calls += _rate(problem, tables, ledger, variable, stop, span, trial, piece, entry_rate, side, work[i], batch)
+        calls += _rate(
+            problem, tables, with_energy, variable, stop, span, trial, segment, entry_rate, side, work[i], batch
+        )
     combine(work, A[STAGES], STAGES, w, trial)
     return calls
 
 
 @inner
-def _error(problem, space, part, rtol):
-    """Error of the step just taken in the indentation rates, in units of each stop's tolerance; the largest.
+def _error(problem, scratch, part, rtol):
+    """Largest error of an indentation rate in the step just taken, in units of the stop's tolerance.
 
-    It is a ``part`` of the embedded difference.
+    It is estimated by a ``part`` of the embedded difference.
     """
-    difference, worst = space.work[DIFFERENCE], 0.0
-    combine(space.work, E5, STAGES, None, difference)
+    difference, worst = scratch.stages[DIFFERENCE], 0.0
+    combine(scratch.stages, E5, STAGES, None, difference)
     for s in range(problem.gap.size):
         error = 0.0
         for e in range(2 * problem.k.size):
             error += abs(problem.read_rate[s, e] * difference[e])
-        error *= part / (rtol * space.scale[s])
+        error *= part / (rtol * scratch.reference_speed[s])
         if not error <= worst:
             worst = error
     return worst
 
 
 @inner
-def _goes_ahead(space, size):
-    """Whether time passes forward in every stage of the step just taken.
+def _goes_ahead(scratch, size):
+    """Whether time goes forward in every stage of the step just taken.
 
     If it does not, the stop turns back before the border, the step passes a pole of 1/δ̇, and its embedded difference
-    tells nothing. On δ = 0, where the last stages of `ROOT` end, dt/du = 0 but for rounding.
+    is no estimate. At δ = 0, where the last stages of `ROOT` end, dt/du = 0 up to rounding.
     """
     ahead = True
     for i in range(STAGES):
-        ahead &= space.work[i, size] >= -1e-9 * space.work[0, size]
+        ahead &= scratch.stages[i, size] >= -1e-9 * scratch.stages[0, size]
     return ahead
 
 
 @inner
-def _step(problem, tables, state, space, variable, stop, span, ledger):
-    """A step from ``space.work[START]``."""
-    state.count[CALLS] += regular_step(
-        *(problem, tables, ledger, variable, stop, span, space.work[START]),
-        *(state.piece, state.entry_rate, space.side, space.work),
+def _step(problem, tables, state, scratch, variable, stop, span, with_energy):
+    """A step from ``scratch.stages[START]`` to ``scratch.stages[LANDED]``."""
+    state.count[CALLS] += landing_step(
+        *(problem, tables, with_energy, variable, stop, span, scratch.stages[START]),
+        *(state.segment, state.entry_rate, scratch.side, scratch.stages),
     )
 
 
 @inner
-def _length_to(problem, tables, state, space, variable, stop, span, landed, time, ledger):
-    """Length of the step whose end, in ``space.work[LANDED]``, is at a time before the landing; inf when not found."""
-    w, x, size, tries = space.work[START], space.work[LANDED], state.x.size, 0
+def _length_to(problem, tables, state, scratch, variable, stop, span, landed, time, with_energy):
+    """Length of the step that ends, in ``scratch.stages[LANDED]``, at a time before the landing; inf if not found."""
+    w, x, size, tries = scratch.stages[START], scratch.stages[LANDED], state.x.size, 0
     t = w[size]
     left = (landed - time) / (landed - t) if landed > t else 0.0
-    kappa = tables.power[1 + stop]
+    kappa = tables.time_exponent[1 + stop]
     length = span * (1.0 - (left ** (1.0 / kappa) if variable == ROOT else left))
     while True:
-        _step(problem, tables, state, space, variable, stop, length, ledger)
+        _step(problem, tables, state, scratch, variable, stop, length, with_energy)
         late, tries = x[size] - time, tries + 1
         pace = 1.0 if variable == TIME else dot(problem.read_rate[stop], x, 2 * problem.k.size)  # d(variable)/dt
         if variable == ROOT:
@@ -167,35 +171,35 @@ def _length_to(problem, tables, state, space, variable, stop, span, landed, time
 
 
 @inner
-def start_landing(problem, tables, state, space, stop):
-    """The state as a landing of ``stop`` begins it, with t and δ^{1/κ}, into ``space.work[START]``."""
-    w, size, delta = space.work[START], state.x.size, max(indentation(problem, stop, state.x), 0.0)
+def start_landing(problem, tables, state, scratch, stop):
+    """Put the state at the begin of a landing of ``stop``, with t and δ^{1/κ}, into ``scratch.stages[START]``."""
+    w, size, delta = scratch.stages[START], state.x.size, max(indentation(problem, stop, state.x), 0.0)
     copy(state.x, w, size)
-    w[size], w[size + 1] = state.now[T], delta ** (1.0 / tables.power[1 + stop])
+    w[size], w[size + 1] = state.now[T], delta ** (1.0 / tables.time_exponent[1 + stop])
 
 
 @inner
-def _begin_peaks(state, space):
-    """Peaks by the state a landing begins with, whose forces its first stage has found."""
-    work, size = space.work, state.x.size
-    for s in range(state.piece.size):
-        if state.piece[s] > 0:
-            column = size - 2 * state.piece.size + 2 * s + 1
-            state.open[s, PEAK_FORCE] = max(state.open[s, PEAK_FORCE], work[0, column] / work[0, size])
+def _begin_peaks(state, scratch):
+    """Raise the peak forces by those at the begin of a landing, which its first stage has computed."""
+    work, size = scratch.stages, state.x.size
+    for s in range(state.segment.size):
+        if state.segment[s] > 0:
+            column = size - 2 * state.segment.size + 2 * s + 1
+            state.active[s, PEAK_FORCE] = max(state.active[s, PEAK_FORCE], work[0, column] / work[0, size])
 
 
 @inner
-def _accept(problem, tables, state, space, variable, stop, span, t_end, out, due, ledger):
-    """Move the state to the end of the landing in ``space.work[LANDED]``, or to that of the run; samples on the way."""
-    w, x, size = space.work[START], space.work[LANDED], state.x.size
+def _accept(problem, tables, state, scratch, variable, stop, span, t_end, out, due, with_energy):
+    """Move the state to the landing in ``scratch.stages[LANDED]``, or to the end of the run; write samples between."""
+    w, x, size = scratch.stages[START], scratch.stages[LANDED], state.x.size
     landed, t = x[size], state.now[T]
-    _begin_peaks(state, space)
+    _begin_peaks(state, scratch)
     copy(x, state.x, size)
     while True:
         time = min(due[state.count[SAMPLED]], t_end)
         if time > landed:
             break
-        length = _length_to(problem, tables, state, space, variable, stop, span, landed, time, ledger)
+        length = _length_to(problem, tables, state, scratch, variable, stop, span, landed, time, with_energy)
         if length == np.inf:
             copy(w, state.x, size)
             return False
@@ -206,89 +210,89 @@ def _accept(problem, tables, state, space, variable, stop, span, t_end, out, due
             copy(x, state.x, size)
             landed, span = t_end, length
             break
-    if state.tape.shape[0]:
-        tape(state, LANDING, t, landed, span, variable, stop, w)
+    if state.event_record.shape[0]:
+        write_event(state, LANDING, t, landed, span, variable, stop, w)
     state.now[T] = landed
     if variable == TIME or landed == t_end:
-        state_peaks(problem, state, space, state.x)
+        state_peaks(problem, state, scratch, state.x)
     return True
 
 
 @inner
-def land(problem, tables, state, space, stop, direction, near, rtol, t_end, out, due, ledger):
+def land(problem, tables, state, scratch, stop, direction, near, rtol, t_end, out, due, with_energy):
     """Try to land on a border of ``stop``, about ``near`` s ahead.
 
     Returns ``stop`` if it succeeded, another stop whose border is crossed before, or -1.
     """
     size, t = state.x.size, state.now[T]
-    delta, furthest = indentation(problem, stop, state.x), space.reach[0] / tables.fastest
-    level = problem.levels[stop, state.piece[stop] - (1 if direction < 0 else 0)]
-    leaving = direction < 0 and state.piece[stop] == 1
+    delta, furthest = indentation(problem, stop, state.x), scratch.landing_reach[0] / tables.fastest
+    level = problem.knots[stop, state.segment[stop] - (1 if direction < 0 else 0)]
+    leaving = direction < 0 and state.segment[stop] == 1
     rate = dot(problem.read_rate[stop], state.x, 2 * problem.k.size)
     if near > furthest or abs(rate) <= rate_tolerance(problem, stop, state.x):
         return -1
-    if leaving and delta > _LAST * state.open[stop, PEAK_DELTA]:
+    if leaving and delta > _LAST * state.active[stop, PEAK_DELTA]:
         return -1
-    if not leaving and state.piece[stop] > 0 and abs(level - delta) > 0.2 * max(level, delta):
+    if not leaving and state.segment[stop] > 0 and abs(level - delta) > 0.2 * max(level, delta):
         return -1
-    start_landing(problem, tables, state, space, stop)
-    w, x = space.work[START], space.work[LANDED]
-    variable = ROOT if leaving and tables.power[1 + stop] > 1.0 else INDENTATION
+    start_landing(problem, tables, state, scratch, stop)
+    w, x = scratch.stages[START], scratch.stages[LANDED]
+    variable = ROOT if leaving and tables.time_exponent[1 + stop] > 1.0 else INDENTATION
     span = -w[size + 1] if variable == ROOT else level - delta
-    _step(problem, tables, state, space, variable, stop, span, ledger)
-    landed, part = x[size], _PART_OF_FOURTH if variable == ROOT and tables.power[1 + stop] == 4.0 else _PART
+    _step(problem, tables, state, scratch, variable, stop, span, with_energy)
+    landed, part = x[size], _PART_OF_FOURTH if variable == ROOT and tables.time_exponent[1 + stop] == 4.0 else _PART
     width = surface_tolerance(problem, stop, state.x) / abs(rate)  # a distance may be that much rounding
     if not t <= landed <= t + min(4.0 * near, furthest) + width:
         return -1
     if not (
-        _goes_ahead(space, size)
-        and _error(problem, space, part, rtol) <= 1.0
+        _goes_ahead(scratch, size)
+        and _error(problem, scratch, part, rtol) <= 1.0
         and direction * dot(problem.read_rate[stop], x, 2 * problem.k.size) >= 0.0  # it has not turned back
     ):
         return -1
-    other = on_the_way(problem, tables, state, space, stop, False, w, x)
-    if other == FREE and passed(problem, state, space, -1, -1, w, x)[0] >= 0:
-        other = TURNED
-    if other != FREE:
+    other = before_landing(problem, tables, state, scratch, stop, False, w, x)
+    if other == CLEAR and passed(problem, state, scratch, -1, -1, w, x)[0] >= 0:
+        other = TOO_LONG
+    if other != CLEAR:
         return max(other, -1)
-    done = _accept(problem, tables, state, space, variable, stop, span, t_end, out, due, ledger)
+    done = _accept(problem, tables, state, scratch, variable, stop, span, t_end, out, due, with_energy)
     return stop if done else -1
 
 
 @inlined
-def _apart(problem, tables, state, space, stop, border, x):
+def _apart(problem, tables, state, scratch, stop, border, x):
     """What falls to zero where a landing in time ends: the margin of a border, or if that is -1 the side of a bend."""
     if border < 0:
-        value = side_at(problem, tables, state, stop, x, space.trial)
+        value = side_at(problem, tables, state, stop, x, scratch.trial)
     else:
-        margins_in(problem, state, stop, x, space.trial, space.margin)
-        value = space.margin[border]
+        margins_in(problem, state, stop, x, scratch.trial, scratch.margin)
+        value = scratch.margin[border]
     return value
 
 
 @inner
-def land_on_bend(problem, tables, state, space, stop, border, near, rtol, t_end, out, due, ledger):
+def land_on_bend(problem, tables, state, scratch, stop, border, near, rtol, t_end, out, due, with_energy):
     """Try to land on the bend of ``stop``, or on a border of its law, about ``near`` s ahead; whether it succeeded.
 
-    A border that is passed before is noted in ``space.landed``.
+    A border that is passed before is noted in ``scratch.landed``.
     """
-    furthest, largest = space.reach[0] / tables.fastest, space.sides[space.sides.size - 1]
+    furthest, largest = scratch.landing_reach[0] / tables.fastest, scratch.bend_values[scratch.bend_values.size - 1]
     enough = 1e-10 * largest
     if border >= 0:  # one that is missed by more may seem to be passed the other way by the next step
-        largest, enough = space.largest[stop, border], 0.1 * space.noise[stop, border]
-    space.landed[0] = -1
+        largest, enough = scratch.largest[stop, border], 0.1 * scratch.noise[stop, border]
+    scratch.landed[0] = -1
     if not 0.0 < near <= furthest:
         return False
-    start_landing(problem, tables, state, space, stop)
-    w, x = space.work[START], space.work[LANDED]
-    before, apart, span = 0.0, _apart(problem, tables, state, space, stop, border, w), near
-    if abs(apart) <= 1e-6 * largest:  # it begins on the bend, which is no second point for the next one
+    start_landing(problem, tables, state, scratch, stop)
+    w, x = scratch.stages[START], scratch.stages[LANDED]
+    before, apart, span = 0.0, _apart(problem, tables, state, scratch, stop, border, w), near
+    if abs(apart) <= 1e-6 * largest:  # it begins on a bend: the secant needs another point
         before = 0.9 * near
-        _step(problem, tables, state, space, TIME, stop, before, ledger)
-        apart = _apart(problem, tables, state, space, stop, border, x)
+        _step(problem, tables, state, scratch, TIME, stop, before, with_energy)
+        apart = _apart(problem, tables, state, scratch, stop, border, x)
     for _ in range(_MOST_TRIES):
-        _step(problem, tables, state, space, TIME, stop, span, ledger)
-        value = _apart(problem, tables, state, space, stop, border, x)
+        _step(problem, tables, state, scratch, TIME, stop, span, with_energy)
+        value = _apart(problem, tables, state, scratch, stop, border, x)
         if abs(value) <= enough:
             break
         following = span - value * (span - before) / (value - apart)
@@ -297,14 +301,14 @@ def land_on_bend(problem, tables, state, space, stop, border, near, rtol, t_end,
         if not 0.1 * near < following <= furthest or following == span:
             return False
         before, apart, span = span, value, following
-    if not (abs(value) <= 1e-6 * largest and _error(problem, space, _PART, rtol) <= 1.0):
+    if not (abs(value) <= 1e-6 * largest and _error(problem, scratch, _PART, rtol) <= 1.0):
         return False
-    if on_the_way(problem, tables, state, space, stop, True, w, x) != FREE:
+    if before_landing(problem, tables, state, scratch, stop, True, w, x) != CLEAR:
         return False
-    space.landed[0], space.landed[1] = passed(problem, state, space, stop, border, w, x)
-    if space.landed[0] >= 0:
+    scratch.landed[0], scratch.landed[1] = passed(problem, state, scratch, stop, border, w, x)
+    if scratch.landed[0] >= 0:
         return False
-    lower, upper = problem.levels[stop, state.piece[stop] - 1], problem.levels[stop, state.piece[stop]]
+    lower, upper = problem.knots[stop, state.segment[stop] - 1], problem.knots[stop, state.segment[stop]]
     if not lower < indentation(problem, stop, x) < upper:
         return False
-    return _accept(problem, tables, state, space, TIME, stop, span, t_end, out, due, ledger)
+    return _accept(problem, tables, state, scratch, TIME, stop, span, t_end, out, due, with_energy)

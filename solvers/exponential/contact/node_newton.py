@@ -1,4 +1,4 @@
-"""Newton's method for the forces of a contact step, where a stiff or strongly damped law defeats iteration."""
+"""Newton's method for the forces of a contact step, for stiff or strongly damped laws."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from solvers.compiled.kernels import contact_gradient, copy, inlined, inner
 from solvers.compiled.state import CALLS, rate_tolerance
-from solvers.exponential.contact.blocks import pair
+from solvers.exponential.contact.many_stops import pair_response
 from solvers.exponential.contact.node_response import node_forces, respond
 from solvers.exponential.contact.nodes import S
 
@@ -14,27 +14,27 @@ MOST_ITERATIONS = 16
 
 
 @inner
-def linearise(problem, tables, state, space, family, level):
+def linearise(problem, tables, state, scratch, node_set, level):
     """J = 1 - ∂law/∂(δ, δ̇) ∂(δ, δ̇)/∂F of all nodes of all stops in contact, row by row; returns its size."""
     stops, row = problem.gap.size, 0
     for s in range(stops):
-        if state.piece[s] == 0:
+        if state.segment[s] == 0:
             continue
-        copy(space.motion[s, 0], space.clipped, S)
+        copy(scratch.motion[s, 0], scratch.clipped, S)
         contact_gradient(
-            *(problem, s, space.clipped, space.motion[s, 1], state.entry_rate[s]),
-            *(space.slope[s, 0], space.slope[s, 1], space.slope[s, 2]),
+            *(problem, s, scratch.clipped, scratch.motion[s, 1], state.entry_rate[s]),
+            *(scratch.slope[s, 0], scratch.slope[s, 1], scratch.slope[s, 2]),
         )
         state.count[CALLS] += S
         for i in range(S):
             column = 0
             for u in range(stops):
-                if state.piece[u] == 0:
+                if state.segment[u] == 0:
                     continue
-                matrix = pair(problem, tables, space, family, level, s, u)
+                matrix = pair_response(problem, tables, scratch, node_set, level, s, u)
                 for j in range(S):
-                    value = space.slope[s, 0, i] * matrix[j, i] + space.slope[s, 1, i] * matrix[j, S + i]
-                    space.jacobian[row + i, column + j] = (1.0 if s == u and i == j else 0.0) - value
+                    value = scratch.slope[s, 0, i] * matrix[j, i] + scratch.slope[s, 1, i] * matrix[j, S + i]
+                    scratch.jacobian[row + i, column + j] = (1.0 if s == u and i == j else 0.0) - value
                 column += S
         row += S
     return row
@@ -73,46 +73,46 @@ def substitute(matrix, pivots, n, x):
 
 
 @inlined
-def _note_viscosity(state, space):
-    """Largest slopes of the forces by their rates, into ``space.viscous``."""
-    for s in range(state.piece.size):
-        if state.piece[s] > 0:
-            space.viscous[s] = 0.0
+def _note_viscosity(state, scratch):
+    """Largest slopes of the forces by their rates, into ``scratch.viscous``."""
+    for s in range(state.segment.size):
+        if state.segment[s] > 0:
+            scratch.viscous[s] = 0.0
             for i in range(S):
-                space.viscous[s] = max(space.viscous[s], abs(space.slope[s, 1, i]))
+                scratch.viscous[s] = max(scratch.viscous[s], abs(scratch.slope[s, 1, i]))
 
 
 @inner
-def newton(problem, tables, state, space, family, level):
-    """Newton's method for the forces, where a stiff or strongly damped law defeats the plain iteration."""
+def newton(problem, tables, state, scratch, node_set, level):
+    """Solve for the forces by Newton's method, where the fixed-point iteration diverges; whether it converged."""
     stops = problem.gap.size
     for _ in range(MOST_ITERATIONS):
         row = 0
         for s in range(stops):
-            if state.piece[s] == 0:
+            if state.segment[s] == 0:
                 continue
-            respond(problem, tables, state, space, family, level, s)
-            node_forces(problem, state, space, s)
+            respond(problem, tables, state, scratch, node_set, level, s)
+            node_forces(problem, state, scratch, s)
             for i in range(S):
-                space.residual[row + i] = space.trial[i] - space.force[s, i]
+                scratch.residual[row + i] = scratch.trial[i] - scratch.force[s, i]
             row += S
-        n = linearise(problem, tables, state, space, family, level)
-        factorise(space.jacobian, space.pivots, n)
-        substitute(space.jacobian, space.pivots, n, space.residual)
+        n = linearise(problem, tables, state, scratch, node_set, level)
+        factorise(scratch.jacobian, scratch.pivots, n)
+        substitute(scratch.jacobian, scratch.pivots, n, scratch.residual)
         found, row = True, 0
-        _note_viscosity(state, space)
+        _note_viscosity(state, scratch)
         for s in range(stops):
-            if state.piece[s] == 0:
+            if state.segment[s] == 0:
                 continue
             change, largest = 0.0, 0.0
             for i in range(S):
-                space.force[s, i] += space.residual[row + i]
-                change += abs(space.residual[row + i])
-                largest = max(largest, abs(space.force[s, i]))
+                scratch.force[s, i] += scratch.residual[row + i]
+                change += abs(scratch.residual[row + i])
+                largest = max(largest, abs(scratch.force[s, i]))
             if not change < np.inf:
                 return False
-            noise = max(3e-14 * largest, 0.1 * space.viscous[s] * rate_tolerance(problem, s, state.x))
-            found &= change <= max(space.accuracy[s], noise)
+            noise = max(3e-14 * largest, 0.1 * scratch.viscous[s] * rate_tolerance(problem, s, state.x))
+            found &= change <= max(scratch.force_tolerance[s], noise)
             row += S
         if found:
             return True

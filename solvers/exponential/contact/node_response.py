@@ -1,138 +1,166 @@
-"""What the stops see on a step of contact: indentations and rates at the nodes, free and under given forces."""
+"""Indentations and rates of the stops at the nodes of a contact step, without and with contact forces."""
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 from solvers.compiled.dop853_tableau import STAGES
 from solvers.compiled.kernels import inlined, inner, law_forces, reordered, table_value
-from solvers.compiled.simd import put, spread
+from solvers.compiled.simd import splat8, store8
 from solvers.compiled.state import CALLS, T
 from solvers.compiled.sums import above, combine
-from solvers.exponential.contact.blocks import SIGNALS, carry_forces, carry_free, goes_through_blocks, pair, see
+from solvers.exponential.contact.many_stops import (
+    SIGNALS,
+    add_block_motion,
+    free_block_motion,
+    motion_at_nodes,
+    pair_response,
+    uses_blocks,
+)
 from solvers.exponential.contact.nodes import S
 
 DIFFERENCE, BATCH, LANDED, WITHIN, START = range(STAGES + 1, STAGES + 6)
-"""Rows of `Space.work` behind the stages of a landing's Runge–Kutta step and the rate at its end: its embedded
+"""Rows of `Scratch.stages` behind the stages of a landing's Runge–Kutta step and the rate at its end: the embedded
 difference; numbers for one law call; trial states, at last the one landed on; a state within a step, for the energy
-ledger; the state a landing begins with, or the end of a run within a step."""
-PLAIN, WEIGHTED, PRODUCTS = range(3)  # the first rows while a force is interpolated between the nodes, see `energy`
-DELTAS, RATES, FORCES, KNOWN = range(4)  # rows of `Space.around`: m, m/s, N at points around a node; what they are from
+balance; the state at the begin of a landing, or at the end of a run within a step."""
+DELTAS, RATES, FORCES, KNOWN = range(
+    4
+)  # rows of `Scratch.local_motion`: m, m/s, N at points around a node; the values they are interpolated from
 
 
-class Space(NamedTuple):
-    """Working arrays of the exponential integrator; stops are the first index of the contact ones.
+class Scratch(NamedTuple):
+    """Working arrays of the exponential integrator; the arrays of contacts have the stop as first index.
 
-    Written by kernels only. `previous` and what has one number per stop may last from step to step, what is at the
-    nodes is new in each. States are block coordinates, for mass-normalised modes in √kg m and √kg m/s, then the ledger
-    in J, and J and N s per stop; indentations are in m, rates in m/s, forces in N, signals in their own units.
+    Only kernels write to them. `previous`, `control` and arrays with one number per stop may last from step to step;
+    values at the nodes are new in each step. States are block coordinates (for mass-normalised modes in √kg m and
+    √kg m/s), then the energy balance in J, and J and N s per stop; indentations are in m, rates in m/s, forces in N,
+    signals in their own units.
     """
 
-    x_new: Any  # (x.size padded,)
-    terms: Any  # (14, 2N padded) derivatives of the state
-    six: Any  # (tables, 6) derivatives of the signals
-    values: Any  # (14,)
-    norms: Any  # (N,)
-    bounds: Any  # (L,)
-    m: Any  # (m,)
-    apart: Any  # (2, N padded) p and v of the blocks
+    x_new: Any  # (x.size padded,) state at the end of the step tried
+    terms: Any  # (14, 2N padded) derivatives of the state, or terms of its Taylor series
+    signal_terms: Any  # (tables, 6) value and derivatives of every sampled signal
+    values: Any  # (14,) coefficients of a polynomial
+    norms: Any  # (N,) energy norms of the blocks, √J
+    signal_bounds: Any  # (L,) bounds of the sampled signals on a cell
+    per_stop: Any  # (m,) bounds of |δ̈| in m/s², or errors of δ̇ in m/s
+    split_state: Any  # (2, N padded) p and v of the blocks
     motion: Any  # (m, 2, S) indentations and their rates at the nodes
-    clipped: Any  # (S,)
-    free: Any  # (m, 2, S)
+    clipped: Any  # (S,) indentations of one stop at the nodes, not below 0
+    free: Any  # (m, 2, S) indentations and rates at the nodes without contact forces
     force: Any  # (m + L, S) forces of the stops, then values of the signals
-    trial: Any  # (S,)
+    trial: Any  # (S,) new forces of one stop, or other numbers of one moment
     summary: Any  # (m, 2, 8) of the forces and the indentations, see Tables.summary
     previous: Any  # (m, S) forces of the last accepted step
-    slope: Any  # (m, 3, S) derivatives of the laws at the nodes
-    residual: Any  # (m S,)
-    pivots: Any  # (m S,)
-    work: Any  # (START + 1, x.size + 2 padded) states and rates, rows as named above
-    scale: Any  # (m,) m/s: a step's error in an indentation rate is measured in rtol × scale
-    share: Any  # (m,) of the duration of a contact of each stop that its first step may take; 0: not known yet
-    accuracy: Any  # (m,) N: change of a force within which it counts as found
-    beyond: Any  # (m,) N s: impulse that a step's polynomials leave out
+    slope: Any  # (m, 3, S) derivatives of the laws at the nodes by δ, δ̇ and entry rate
+    residual: Any  # (m S,) N, then the changes of the forces
+    pivots: Any  # (m S,) of the LU factors
+    stages: Any  # (START + 1, x.size + 2 padded) states and rates, rows as named above
+    reference_speed: Any  # (m,) m/s: an error of an indentation rate is measured in rtol × reference speed
+    first_step_share: (
+        Any  # (m,) of the duration of a contact of each stop that its first step may take; 0: not known yet
+    )
+    force_tolerance: Any  # (m,) N: change of a force within which it counts as found
+    unresolved: Any  # (m,) N s: impulse that the polynomials of a step leave out
     guess: Any  # (m, S) forces the iterations begin with
     viscous: Any  # (m,) N s/m: slope of a force by its rate, where Newton's method has found it; else 0
-    around: Any  # (4, 3S) rows as named above, see `peaks`
-    side: Any  # (m,) sign of the side of its bend on which each stop is
-    side_at_begin: Any  # (m,) the same at the begin of the step that is tried
-    sides: Any  # (S + 2,) see `crossings`
-    reach: Any  # (1,) radians of the fastest block that a landing may take
-    duration: Any  # (1,) s, that of the contact begun last, if it were free
-    book: Any  # (2 + L, numbers) see `books`
-    energy: Any  # (3,) see `energy.guard`
-    last: Any  # (7,) see `step`
-    seen: Any  # (m, 2) δ and δ̇ at the begin of the step
+    local_motion: Any  # (4, 3S) rows as named above, see `peaks`
+    side: Any  # (m,) +1 or -1: side of its law's bend on which each stop is, see `crossings`
+    side_at_begin: Any  # (m,) the same at the begin of the step tried
+    bend_values: Any  # (S + 2,) of one stop at the nodes and at the end, then the largest, see `crossings`
+    landing_reach: Any  # (1,) radians of the fastest block that a landing may take
+    duration: Any  # (1,) s: estimate for the contact begun last, as if nothing else acted on the body
+    energy_sums: Any  # (2 + L, numbers) see `energy.balance`
+    energy: Any  # (3,) J, see `energy.check`
+    control: Any  # (6,) of the step control, places named in `step`
+    start_motion: Any  # (m, 2) δ and δ̇ at the begin of the step
     margin: Any  # (B S,) margins of an element's borders at points, row by row, B the most of any; see `borders`
-    ends: Any  # (4 B,)
+    ends: Any  # (6 B,)
     fired: Any  # (B,)
     largest: Any  # (m, B) largest margins on the step tried last
     noise: Any  # (m, B) their rounding
+    border: Any  # (1,) border that ends the step tried last, -1 for a bend
     landed: Any  # (2,) element and border that a landing in time has found to lie before its own, or -1
-    carried: Any  # (2N, S) of many stops, as the rest but for the matrix, see `blocks`
-    pushed: Any  # (2N, S)
-    mixed: Any  # (2N,)
-    jacobian: Any  # (m S, m S) used up to the stops that touch together; from here on runs find what others left
-    pairs: Any  # (POOL, S, 2S)
-    tags: Any  # (POOL,) which pairs these are
+    block_motion: Any  # (2N, S) p and v at the nodes; for many stops only, as the next two, see `many_stops`
+    block_force: Any  # (2N, S) state rates of the blocks by the forces at the nodes
+    pair_weights: Any  # (2N,) products of a stop's read row with the push of another
+    jacobian: Any  # (m S, m S) used for the stops in contact; this and the next two are not cleared between runs
+    pair_pool: Any  # (POOL, S, 2S) responses of pairs of stops
+    pool_keys: Any  # (POOL,) which pair of stops and step length each of them belongs to
+    along: Any  # (2N, S) p and v of the blocks at a panel's points, as the next two of any number of stops
+    moves: Any  # (N, 5, S), see `energy.quadrature`
+    between: Any  # (S + 1 + m + L, S)
 
 
 @inner
-def sample_signals(problem, tables, space, family, t, h):
+def sample_signals(problem, tables, scratch, node_set, t, h):
     """Values of the sampled signals at the nodes of a step."""
     for j in range(problem.table_dt.size):
         for i in range(S):
-            space.force[problem.gap.size + problem.table_load[j], i] = table_value(
-                problem, j, t + h * tables.times[family, i]
+            scratch.force[problem.gap.size + problem.table_load[j], i] = table_value(
+                problem, j, t + h * tables.times[node_set, i]
             )
 
 
 @inner
-def free_response(problem, tables, state, space, family, level):
-    """Indentations and rates at the nodes without the contact forces, signals included; of many stops the touching."""
-    stops, size, through = problem.gap.size, 2 * problem.k.size, goes_through_blocks(tables)
+def free_response(problem, tables, state, scratch, node_set, level):
+    """Indentations and rates at the nodes without contact forces, signals included, into ``scratch.free``.
+
+    With many stops it is done for those in contact only.
+    """
+    stops, size, through = problem.gap.size, 2 * problem.k.size, uses_blocks(tables)
     if problem.table_dt.size:
-        sample_signals(problem, tables, space, family, state.now[T], tables.step[level])
+        sample_signals(problem, tables, scratch, node_set, state.now[T], tables.contact_step[level])
     if through:
-        carry_free(problem, tables, space, family, level, state.x)
+        free_block_motion(problem, tables, scratch, node_set, level, state.x)
         if problem.table_dt.size:
-            carry_forces(problem, tables, state, space, family, level, SIGNALS)
+            add_block_motion(problem, tables, state, scratch, node_set, level, SIGNALS)
     for s in range(stops):
-        free = space.free[s]
+        free = scratch.free[s]
         if through:
-            if state.piece[s] > 0:
-                see(problem, space, s, problem.gap[s], free)
+            if state.segment[s] > 0:
+                motion_at_nodes(problem, scratch, s, problem.gap[s], free)
             continue
-        put(free[0], 0, spread(-problem.gap[s]))
-        put(free[1], 0, spread(0.0))
-        combine(tables.free[tables.kind[family], level, s], state.x, size, free, free)
+        store8(free[0], 0, splat8(-problem.gap[s]))
+        store8(free[1], 0, splat8(0.0))
+        combine(tables.free[tables.kind[node_set], level, s], state.x, size, free, free)
         for j in range(problem.table_dt.size):
             u = stops + problem.table_load[j]
-            combine(tables.forced[tables.kind[family], level, u, s], space.force[u], S, free, free)
+            combine(tables.forced[tables.kind[node_set], level, u, s], scratch.force[u], S, free, free)
 
 
 @inlined
-def respond(problem, tables, state, space, family, level, s):
-    """Indentation and rate of stop s at the nodes under the present forces."""
-    motion, start = space.motion[s], space.free[s]
+def respond(problem, tables, state, scratch, node_set, level, s):
+    """Indentation and rate of stop s at the nodes under the present forces, into ``scratch.motion``."""
+    motion, start = scratch.motion[s], scratch.free[s]
     for u in range(problem.gap.size):
-        if state.piece[u] > 0:
-            combine(pair(problem, tables, space, family, level, s, u), space.force[u], S, start, motion)
+        if state.segment[u] > 0:
+            combine(pair_response(problem, tables, scratch, node_set, level, s, u), scratch.force[u], S, start, motion)
             start = motion
 
 
 @reordered
-def ripple_of(sway, alias, x, n):
-    """Error of a stop's indentation between the nodes of a step from the state x."""
+def ripple_of(ripple_weight, alias, x, n):
+    """Error, m, of a stop's indentation between the nodes, by blocks that oscillate faster than the nodes resolve."""
     error = 0.0
     for b in range(n):
-        error += sway[b] * (alias[b] * abs(x[b]) + alias[n + b] * abs(x[n + b]))
+        error += ripple_weight[b] * (alias[b] * abs(x[b]) + alias[n + b] * abs(x[n + b]))
+    return error
+
+
+@reordered
+def rate_ripple_of(ripple_weight, k, alias, x, n):
+    """The same of its rate, m/s."""
+    error = 0.0
+    for b in range(n):
+        error += ripple_weight[b] * math.sqrt(k[b]) * (alias[b] * abs(x[b]) + alias[n + b] * abs(x[n + b]))
     return error
 
 
 @inlined
-def node_forces(problem, state, space, s):
-    """The law of stop s at the nodes, into ``space.trial``."""
-    above(space.motion[s, 0], problem.levels[s, 0], space.clipped)
-    law_forces(problem, s, S, space.clipped, space.motion[s, 1], state.entry_rate[s], space.trial)
+def node_forces(problem, state, scratch, s):
+    """Forces of stop s at the nodes by its law, into ``scratch.trial``."""
+    above(scratch.motion[s, 0], problem.knots[s, 0], scratch.clipped)
+    law_forces(problem, s, S, scratch.clipped, scratch.motion[s, 1], state.entry_rate[s], scratch.trial)
     state.count[CALLS] += S

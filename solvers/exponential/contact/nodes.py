@@ -1,6 +1,6 @@
-"""Kinds of contact steps: their nodes, the weights of their forces, what is told from node values.
+"""Node sets of contact steps: nodes, weights of the forces, and what is computed from the values at the nodes.
 
-A force is known by its values F_j at S nodes σ_j of (0, 1), t = h σ^κ:
+A force is given by its values F_j at S nodes σ_j of (0, 1), t = h σ^κ:
 
     F(t) = w(σ) Σ_j L_j(σ) F_j / w(σ_j),
 
@@ -20,10 +20,10 @@ import numpy as np
 from solvers.compiled.kernels import kernel
 
 S = 8  # nodes of a contact step: 6 is a little faster at 1e-6, 10 and 12 bring nothing
-_CHECKED = (np.arange(24) + 0.5) / 24  # places between the nodes where their interpolant is compared
+_CHECKED = (np.arange(24) + 0.5) / 24  # points where the interpolant of the nodes is compared
 _NODES_FIRST = [*range(S), *range(S + 1, 2 * S + 1), S, 2 * S + 1]
 PHASES = np.geomspace(1e-2, 1e4, 600)  # ω h
-LOCAL = -np.cos(np.pi * np.arange(S) / (S - 1))  # points of an interval, its ends among them, where a summit is sought
+LOCAL = -np.cos(np.pi * np.arange(S) / (S - 1))  # Chebyshev points of an interval in which a maximum is sought
 MONOMIALS = np.ascontiguousarray(np.linalg.inv(np.vander(LOCAL, increasing=True)).T)
 
 
@@ -45,51 +45,60 @@ def gauss(count: int) -> Any:
     return np.array([0.5 * (1.0 + x), 0.5 * w])
 
 
-class _Family(NamedTuple):
-    """Nodes of a kind of contact step, t = h σ^power, F = σ^lead × polynomial."""
+def so_far(points: Any) -> Any:
+    """(q, r): integral from 0 to point q of (0, 1) of the polynomial that is 1 at point r and 0 at the others."""
+    legendre = np.polynomial.legendre
+    x, one = 2.0 * points - 1.0, np.eye(len(points))
+    integrals = [legendre.legval(x, legendre.legint(row, lbnd=-1.0)) for row in one]
+    return np.ascontiguousarray(0.5 * np.array(integrals).T @ np.linalg.inv(legendre.legvander(x, len(x) - 1)))
 
-    power: float
-    lead: float
+
+class _NodeSet(NamedTuple):
+    """Nodes of one kind of contact step, t = h σ^κ, F = σ^λ × polynomial; κ and λ are its exponents."""
+
+    time_exponent: float
+    weight_exponent: float
     nodes: Any
     weights: Any
     spectrum: Any
 
 
-def _family(power: float, lead: float) -> _Family:
-    """Gauss–Jacobi nodes on (0, 1) for the weight of ∫F dt, and the coefficients they give."""
+def _node_set(time_exponent: float, weight_exponent: float) -> _NodeSet:
+    """Gauss–Jacobi nodes on (0, 1) for the weight of ∫F dt, and the polynomial's coefficients from node values."""
     from scipy.special import eval_jacobi, roots_jacobi
 
-    beta = lead + power - 1.0
+    beta = weight_exponent + time_exponent - 1.0
     x, w = roots_jacobi(S, 0.0, beta)
     sigma = 0.5 * (1.0 + x)
-    measure = power * w / 2.0 ** (beta + 1.0)
+    measure = time_exponent * w / 2.0 ** (beta + 1.0)
     polynomials = np.array([eval_jacobi(k, 0.0, beta, x) for k in range(S)])
     norm = (polynomials**2 * w).sum(axis=1)
-    scale = sigma ** (-lead)
-    return _Family(power, lead, sigma, measure * scale, polynomials * w * scale / norm[:, None])
+    scale = sigma ** (-weight_exponent)
+    return _NodeSet(time_exponent, weight_exponent, sigma, measure * scale, polynomials * w * scale / norm[:, None])
 
 
-class Families(NamedTuple):
-    """All contact steps of a problem: the smooth one, then one per stop to enter it; most stops are of few kinds.
+class NodeSets(NamedTuple):
+    """The node sets of a problem: that of smooth steps, then one per stop, for the step on which it enters contact.
 
-    The large tables have an index of the kind of nodes, or of the way of a force: a kind, and whether with its weight.
+    Many stops have equal nodes. So the large tables are indexed by the kind of the nodes, or by the weighting of a
+    force: a kind, with or without the weight σ^λ.
     """
 
-    kind: Any  # (f,) each family's kind, and the way of all forces without a weight
-    enters: Any  # (f,) the way of the force of the stop that enters
-    kinds: Any  # (kinds,) a family of each kind
-    ways: Any  # (ways, 2) a family of each way, and 1 for the weight σ^λ
-    power: Any  # (f,)
-    lead: Any
+    kind: Any  # (f,) of each node set; also the weighting of forces without the weight
+    entering: Any  # (f,) weighting of the force of the stop that enters
+    kinds: Any  # (kinds,) a node set of each kind
+    weightings: Any  # (weightings, 2) a node set of each, and 1 for the weight σ^λ
+    time_exponent: Any  # (f,)
+    weight_exponent: Any
     nodes: Any  # (f, S), as the rest in `Tables`
     times: Any
     weights: Any
     plain: Any
     summary: Any
     tail: Any
-    zoom: Any
-    places: Any
-    extend: Any
+    local_interpolation: Any
+    local_interval: Any
+    extrapolation: Any
     lagrange: Any  # (f, 2, S) weights of the Lagrange polynomials, plain and divided by the force's weight
     alias: Any  # (f, P) largest error between the nodes of the interpolant of e^{iωt}, at `PHASES`
 
@@ -97,86 +106,88 @@ class Families(NamedTuple):
 def series_of(law: Any) -> tuple[float, float]:
     """(κ, λ) of a law's force at entry; see the module."""
     powers = getattr(law, "powers", None) or ((0.0, law.exponent) if law.jump else (law.exponent,))
-    for power in (1.0, 2.0, 4.0):
-        if all(abs(power * p - round(power * p)) < 1e-9 for p in powers):
-            return power, power * min(powers) if power > 1.0 else 0.0
+    for time_exponent in (1.0, 2.0, 4.0):
+        if all(abs(time_exponent * p - round(time_exponent * p)) < 1e-9 for p in powers):
+            return time_exponent, time_exponent * min(powers) if time_exponent > 1.0 else 0.0
     return 2.0, 2.0 * min(powers)
 
 
 @lru_cache(maxsize=64)
-def families_of(series: tuple[tuple[float, float], ...]) -> Families:
-    """Kinds of steps for the stops' (κ, λ)."""
+def node_sets_of(series: tuple[tuple[float, float], ...]) -> NodeSets:
+    """The node sets for the (κ, λ) of all stops."""
     kinds = list(dict.fromkeys(((1.0, 0.0), *series)))
-    found = [_family(*kind) for kind in kinds]
+    found = [_node_set(*kind) for kind in kinds]
     kind = np.array([kinds.index(one) for one in ((1.0, 0.0), *series)])
     first = [kind.tolist().index(i) for i in range(len(kinds))]
-    weighted = [i for i, family in enumerate(found) if family.lead]
+    weighted = [i for i, node_set in enumerate(found) if node_set.weight_exponent]
     enters = np.array([len(kinds) + weighted.index(i) if i in weighted else i for i in range(len(kinds))])
 
-    def each(of: Callable[[_Family], Any]) -> Any:
+    def each(of: Callable[[_NodeSet], Any]) -> Any:
         return np.ascontiguousarray(np.array([of(f) for f in found])[kind])
 
-    return Families(
+    return NodeSets(
         kind=kind,
-        enters=enters[kind],
+        entering=enters[kind],
         kinds=np.array(first),
-        ways=np.array([*((f, 0) for f in first), *((first[i], 1) for i in weighted)]),
-        power=each(lambda f: f.power),
-        lead=each(lambda f: f.lead),
+        weightings=np.array([*((f, 0) for f in first), *((first[i], 1) for i in weighted)]),
+        time_exponent=each(lambda f: f.time_exponent),
+        weight_exponent=each(lambda f: f.weight_exponent),
         nodes=each(lambda f: f.nodes),
-        times=each(lambda f: f.nodes**f.power),
+        times=each(lambda f: f.nodes**f.time_exponent),
         weights=each(lambda f: f.weights),
         plain=each(_plain_weights),
         summary=each(_summary),
         tail=each(lambda f: _tail(f.nodes)),
-        zoom=each(lambda f: [_zoom(f, *bracket) for bracket in _brackets(f)]),
-        places=each(_brackets),
-        extend=each(lambda f: _extensions(f, found[0])),
-        lagrange=each(lambda f: _weights(f.nodes) * [np.ones(S), f.nodes ** (-f.lead)]),
+        local_interpolation=each(lambda f: [_zoom(f, *bracket) for bracket in _brackets(f)]),
+        local_interval=each(_brackets),
+        extrapolation=each(lambda f: _extensions(f, found[0])),
+        lagrange=each(lambda f: _weights(f.nodes) * [np.ones(S), f.nodes ** (-f.weight_exponent)]),
         alias=each(_alias),
     )
 
 
-def _summary(family: _Family) -> Any:
+def _summary(node_set: _NodeSet) -> Any:
     """(S, 8): last four coefficients, values and slopes dF/dσ at start and end, from node values."""
     rows = np.zeros((8, S))
-    rows[:4] = family.spectrum[-4:]
-    rows[4:6] = _interpolation(family.nodes, np.array([0.0, 1.0]))
-    rows[6:8] = rows[4:6] @ _differentiation(family.nodes)
-    if family.lead:
-        rows[4], rows[5] = 0.0, rows[5] * family.nodes ** (-family.lead)
+    rows[:4] = node_set.spectrum[-4:]
+    rows[4:6] = _interpolation(node_set.nodes, np.array([0.0, 1.0]))
+    rows[6:8] = rows[4:6] @ _differentiation(node_set.nodes)
+    if node_set.weight_exponent:
+        rows[4], rows[5] = 0.0, rows[5] * node_set.nodes ** (-node_set.weight_exponent)
     return rows.T
 
 
-def _plain_weights(family: _Family) -> Any:
-    """(S,) Σ weights × values = ∫ (polynomial through the values) dt/h, without the force's weight σ^λ."""
+def _plain_weights(node_set: _NodeSet) -> Any:
+    """(S,) weights of ∫ (polynomial through node values) dt/h, without the force's weight σ^λ."""
     points, weights = gauss(12)
-    return (weights * family.power * points ** (family.power - 1.0)) @ _interpolation(family.nodes, points)
+    return (weights * node_set.time_exponent * points ** (node_set.time_exponent - 1.0)) @ _interpolation(
+        node_set.nodes, points
+    )
 
 
-def _brackets(family: _Family) -> Any:
-    """(S, 2) beginning and end of the interval between the neighbours of every node."""
-    ends = np.concatenate(([0.0], family.nodes, [1.0]))
+def _brackets(node_set: _NodeSet) -> Any:
+    """(S, 2) ends of the interval between the neighbours of every node."""
+    ends = np.concatenate(([0.0], node_set.nodes, [1.0]))
     return np.column_stack((ends[:-2], ends[2:]))
 
 
-def _zoom(family: _Family, begin: float, end: float) -> Any:
+def _zoom(node_set: _NodeSet, begin: float, end: float) -> Any:
     """(2S + 2, 2S): δ and h δ̇ at the points `LOCAL` of [begin, end] from those at the nodes and at the step's begin.
 
     δ is Hermite's polynomial in σ. δ̇ of a smooth step is the polynomial through its values; in a short one the slope of
     the former is rounding over h. On an entry step it is that slope over dt/dσ, and where that vanishes, beside
     the begin, δ̇(0) + σ^κ × the polynomial through (δ̇ - δ̇(0))/σ^κ at the nodes.
     """
-    x, y = np.append(family.nodes, 0.0), begin + 0.5 * (LOCAL + 1.0) * (end - begin)
+    x, y = np.append(node_set.nodes, 0.0), begin + 0.5 * (LOCAL + 1.0) * (end - begin)
     basis, turn = _interpolation(x, y), _differentiation(x)
     slopes, own = basis @ turn, np.diag(turn)
     apart = y[:, None] - x
-    pace_x, pace_y = (family.power * place ** (family.power - 1.0) for place in (x, y))  # dt/(h dσ)
+    pace_x, pace_y = (node_set.time_exponent * place ** (node_set.time_exponent - 1.0) for place in (x, y))  # dt/(h dσ)
     values = [(1.0 - 2.0 * own * apart) * basis**2, apart * basis**2 * pace_x]
-    if family.power == 1.0:
+    if node_set.time_exponent == 1.0:
         rates = [np.zeros_like(basis), basis]
     elif begin == 0.0:
-        shares = _interpolation(family.nodes, y) * np.divide.outer(y, family.nodes) ** family.power
+        shares = _interpolation(node_set.nodes, y) * np.divide.outer(y, node_set.nodes) ** node_set.time_exponent
         rates = [np.zeros_like(basis), np.column_stack((shares, 1.0 - shares.sum(axis=1)))]
     else:
         rates = [
@@ -202,11 +213,11 @@ def _differentiation(nodes: Any) -> Any:
     return out
 
 
-def _alias(family: _Family) -> Any:
+def _alias(node_set: _NodeSet) -> Any:
     """(P,) largest error between a family's nodes of the interpolant of e^{iωt}."""
-    waves = np.exp(1j * np.outer(family.nodes**family.power, PHASES))
-    exact = np.exp(1j * np.outer(_CHECKED**family.power, PHASES))
-    return np.minimum(np.abs(_interpolation(family.nodes, _CHECKED) @ waves - exact).max(axis=0), 2.0)
+    waves = np.exp(1j * np.outer(node_set.nodes**node_set.time_exponent, PHASES))
+    exact = np.exp(1j * np.outer(_CHECKED**node_set.time_exponent, PHASES))
+    return np.minimum(np.abs(_interpolation(node_set.nodes, _CHECKED) @ waves - exact).max(axis=0), 2.0)
 
 
 def _weights(nodes: Any) -> Any:
@@ -224,13 +235,13 @@ def _interpolation(nodes: Any, points: Any) -> Any:
     return out
 
 
-def _extensions(family: _Family, smooth: _Family) -> Any:
+def _extensions(node_set: _NodeSet, smooth: _NodeSet) -> Any:
     """Extrapolation of a step's force to the nodes of the next smooth step, 2^{-(i-2)/2} times as long."""
     out = np.empty((5, S, S))
     for i in range(5):
         times = 1.0 + 2.0 ** (-0.5 * (i - 2)) * smooth.nodes
-        sigma = times ** (1.0 / family.power)
-        out[i] = _interpolation(family.nodes, sigma)
-        if family.lead:
-            out[i] *= np.outer(sigma**family.lead, family.nodes ** (-family.lead))
+        sigma = times ** (1.0 / node_set.time_exponent)
+        out[i] = _interpolation(node_set.nodes, sigma)
+        if node_set.weight_exponent:
+            out[i] *= np.outer(sigma**node_set.weight_exponent, node_set.nodes ** (-node_set.weight_exponent))
     return out.transpose(0, 2, 1)

@@ -1,8 +1,8 @@
-"""Largest indentation and force of a contact: maxima of what each step knows of them, not of its nodes.
+"""Largest indentation and force of a contact: maxima of the interpolants of each step, not of its node values.
 
-Around the highest node of a step, between its neighbours, δ and δ̇ at eight points follow from δ and δ̇ at all nodes and
-at the begin of the step by Hermite's polynomial of degree 17, and the forces there from the law. The maximum of the
-polynomial through these points differs from that of the motion by less than the motion does from the exact one.
+Between the neighbours of the highest node, δ and δ̇ at eight points are interpolated from δ and δ̇ at all nodes and at
+the begin of the step by Hermite's polynomial of degree 17; the forces there are those of the law. The maximum of the
+polynomial through these points is closer to that of the motion than the motion is to the exact one.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from solvers.compiled.sums import combine
 from solvers.exponential.contact.node_response import DELTAS, FORCES, KNOWN, RATES
 from solvers.exponential.contact.nodes import LOCAL, MONOMIALS, S
 
-_MOST = 6  # steps to a summit
+_MOST = 6  # Newton steps to a maximum
 
 
 @inlined
@@ -29,7 +29,7 @@ def _local(coefficients, x):
 
 @inlined
 def _guess(values, place):
-    """Summit of the parabola through a point of `LOCAL` and its neighbours, and the neighbours; an end stays."""
+    """Vertex of the parabola through a point of `LOCAL` and its neighbours, and these; at an end the point itself."""
     if place == 0 or place == S - 1:
         return LOCAL[place], LOCAL[max(place - 1, 0)], LOCAL[min(place + 1, S - 1)]
     low, b, high = LOCAL[place - 1], LOCAL[place], LOCAL[place + 1]
@@ -39,11 +39,11 @@ def _guess(values, place):
 
 
 @inner
-def summit(values, limit, coefficients):
-    """Maximum on [-1, limit] of the polynomial through the values at `LOCAL`, around the highest of these.
+def local_maximum(values, limit, coefficients):
+    """Maximum on [-1, limit] of the polynomial through the values at `LOCAL`, near the highest of these.
 
-    From the summit of the parabola through that point and its neighbours Newton's method for the slope goes on; the
-    local parabola's summit is off by the third power of its last step.
+    Newton's method for a zero of the slope begins at the vertex of the parabola through that point and its neighbours;
+    the error of the maximum is of the third order in the last step.
     """
     place = 0
     for i in range(S):
@@ -69,74 +69,83 @@ def summit(values, limit, coefficients):
 
 
 @inlined
-def _highest(tables, values, family, limit):
-    """Place of the largest node value up to σ = limit, or -1."""
+def _highest(tables, values, node_set, limit):
+    """Index of the largest node value up to σ = limit, or -1."""
     place = -1
     for i in range(S):
-        if tables.nodes[family, i] <= limit and (place < 0 or values[i] > values[place]):
+        if tables.nodes[node_set, i] <= limit and (place < 0 or values[i] > values[place]):
             place = i
     return place
 
 
 @inner
-def motion_around(problem, tables, state, space, family, h, s, place):
-    """Indentations and rates of stop s around a node of the step that begins at the state, into ``space.around``."""
-    around, motion, known = space.around, space.motion[s], space.around[KNOWN]
+def motion_around(problem, tables, state, scratch, node_set, h, s, place):
+    """Indentations and rates of stop s around a node of the step from the state, into ``scratch.local_motion``."""
+    local_motion, motion, known = scratch.local_motion, scratch.motion[s], scratch.local_motion[KNOWN]
     copy(motion[0], known, S)
     for i in range(S):
         known[S + i] = h * motion[1, i]
     known[2 * S] = indentation(problem, s, state.x)
     known[2 * S + 1] = h * dot(problem.read_rate[s], state.x, 2 * problem.k.size)
-    combine(tables.zoom[family, place], known, 2 * S + 2, None, around[DELTAS])
+    combine(tables.local_interpolation[node_set, place], known, 2 * S + 2, None, local_motion[DELTAS])
     for i in range(S):
-        around[RATES, i] = around[DELTAS, S + i] / h
+        local_motion[RATES, i] = local_motion[DELTAS, S + i] / h
 
 
 @inner
-def deepest(problem, tables, state, space, family, h, s):
+def largest_indentation(problem, tables, state, scratch, node_set, h, s):
     """Largest indentation of stop s around its highest node of a step."""
-    place = _highest(tables, space.motion[s, 0], family, 1.0)
-    motion_around(problem, tables, state, space, family, h, s, place)
-    return summit(space.around[DELTAS], 1.0, space.trial)
+    place = _highest(tables, scratch.motion[s, 0], node_set, 1.0)
+    motion_around(problem, tables, state, scratch, node_set, h, s, place)
+    return local_maximum(scratch.local_motion[DELTAS], 1.0, scratch.trial)
 
 
 @inner
-def step_peaks(problem, tables, state, space, family, h, s, limit):
+def step_peaks(problem, tables, state, scratch, node_set, h, s, limit):
     """Raise the peaks of stop s by a converged step of length h, up to σ = limit, from ``state.x`` on."""
-    combine(tables.summary[family], space.motion[s, 0], S, None, space.summary[s, 1])
+    combine(tables.summary[node_set], scratch.motion[s, 0], S, None, scratch.summary[s, 1])
     seen = -1
-    for column, values, d in ((PEAK_FORCE, space.force[s], 0), (PEAK_DELTA, space.motion[s, 0], 1)):
-        known, slopes = state.open[s, column], space.summary[s, d]
-        place = _highest(tables, values, family, limit)
+    for column, values, d in ((PEAK_FORCE, scratch.force[s], 0), (PEAK_DELTA, scratch.motion[s, 0], 1)):
+        known, slopes = state.active[s, column], scratch.summary[s, d]
+        place = _highest(tables, values, node_set, limit)
         if place >= 0:
-            state.open[s, column] = max(known, values[place])
+            state.active[s, column] = max(known, values[place])
         if limit >= 1.0:
             if values[place] < 0.95 * known or (place == S - 1 and slopes[7] >= 0.0):
                 continue  # lower, or still rising at the end, where the next step begins
-            if family == 0 and place == 0 and slopes[6] <= 0.0 and known >= slopes[4]:
+            if node_set == 0 and place == 0 and slopes[6] <= 0.0 and known >= slopes[4]:
                 continue  # falling from its begin
         place = max(place, 0)
         if seen != place:
-            motion_around(problem, tables, state, space, family, h, s, place)
-            around, seen = space.around, place
-            contact_forces(problem, s, around[DELTAS, :S], around[RATES, :S], state.entry_rate[s], around[FORCES, :S])
-        begin, end = tables.places[family, place]
+            motion_around(problem, tables, state, scratch, node_set, h, s, place)
+            local_motion, seen = scratch.local_motion, place
+            contact_forces(
+                problem,
+                s,
+                local_motion[DELTAS, :S],
+                local_motion[RATES, :S],
+                state.entry_rate[s],
+                local_motion[FORCES, :S],
+            )
+        begin, end = tables.local_interval[node_set, place]
         within = min(2.0 * (limit - begin) / (end - begin) - 1.0, 1.0)
         if within > -1.0:
-            best = summit(space.around[FORCES] if d == 0 else space.around[DELTAS], within, space.trial)
-            state.open[s, column] = max(state.open[s, column], best)
+            best = local_maximum(
+                scratch.local_motion[FORCES] if d == 0 else scratch.local_motion[DELTAS], within, scratch.trial
+            )
+            state.active[s, column] = max(state.active[s, column], best)
 
 
 @inner
-def state_peaks(problem, state, space, x):
+def state_peaks(problem, state, scratch, x):
     """Raise the peaks of all stops in contact by their indentations and forces in the state x."""
-    batch = space.trial
+    batch = scratch.trial
     for s in range(problem.gap.size):
-        if state.piece[s] > 0 and not is_open(problem, s):
+        if state.segment[s] > 0 and not is_open(problem, s):
             batch[0] = indentation(problem, s, x)
             batch[1] = dot(problem.read_rate[s], x, 2 * problem.k.size)
             contact_forces(problem, s, batch[0:1], batch[1:2], state.entry_rate[s], batch[2:3])
-            if problem.levels[s, 0] < 0.0:
+            if problem.knots[s, 0] < 0.0:
                 batch[0], batch[2] = abs(batch[0]), abs(batch[2])
-            state.open[s, PEAK_DELTA] = max(state.open[s, PEAK_DELTA], batch[0])
-            state.open[s, PEAK_FORCE] = max(state.open[s, PEAK_FORCE], batch[2])
+            state.active[s, PEAK_DELTA] = max(state.active[s, PEAK_DELTA], batch[0])
+            state.active[s, PEAK_FORCE] = max(state.active[s, PEAK_FORCE], batch[2])

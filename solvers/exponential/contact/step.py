@@ -1,7 +1,7 @@
 """One step in contact: land on a border that is near, else collocate the forces on the longest step that meets rtol.
 
-The error of a step is the largest over all stops, each in units of rtol × its own reference speed, the speed of entry
-or a tenth of what the motion could reach there; the step looks at the borders of all stops, open ones included.
+The error of a step is the largest over all stops, each in units of rtol × its own reference speed: the speed of entry,
+or a tenth of the speed the motion could reach there. The borders of all stops are checked, in contact or not.
 """
 
 from __future__ import annotations
@@ -22,70 +22,72 @@ from solvers.compiled.state import (
     STEPS,
     T_IN,
     T,
+    in_contact,
     rate_tolerance,
     surface_tolerance,
     switch,
     switch_on_surface,
-    touching,
 )
 from solvers.compiled.sums import combine
-from solvers.exponential.contact.borders import border_ahead, renew_all, renew_border
-from solvers.exponential.contact.collocation import arrive, contact_time, finish_step, solve_forces, step_error
-from solvers.exponential.contact.crossings import bend_ahead, choose_sides, leaves_piece
-from solvers.exponential.contact.landing import land, land_on_bend
-from solvers.exponential.contact.node_response import LANDED, free_response
+from solvers.exponential.contact.borders import UNRESOLVED, border_ahead
+from solvers.exponential.contact.collocation import contact_time, end_state, finish_step, solve_forces, step_error
+from solvers.exponential.contact.crossings import choose_sides, first_bend, leaves_segment
+from solvers.exponential.contact.node_response import free_response
 from solvers.exponential.contact.nodes import S
-from solvers.exponential.contact.outputs import end_inside, record, tape_forces
+from solvers.exponential.contact.outputs import end_run, record_forces, sample_step
 from solvers.exponential.contact.peaks import state_peaks
-from solvers.exponential.energy.books import book_contact
+from solvers.exponential.contact.segment_ends import go_beyond, land_first, land_in_time
+from solvers.exponential.energy.balance import account_contact
 from solvers.exponential.flight import energy_norms
 
-LEVEL, FAMILY, FRESH, STOP, WANTED, BEGUN, BORDER = range(7)  # places in Space.last
-ENTRY, PIECE = 1, 2  # values of FRESH: the first step of a contact, or of a piece of its law; 0 for others
+LEVEL, NODE_SET, NEW, STOP, NEXT_LEVEL, BEGUN = range(6)  # places in Scratch.control
+ENTRY, SEGMENT = 1, 2  # values of NEW: the first step of a contact, or of a segment of its law; 0 for other steps
 _GOAL = 0.3  # error aimed at, in units of the tolerance
 _ORDER = 15.0  # the error estimate falls like h^15
 _LEAST = 1e-60  # m/s, of a reference speed
 
 
 @inner
-def begin(problem, tables, state, space, stop):
-    """Reference speeds, first step and nodes after ``stop`` has switched: entered, changed its piece, or left."""
-    last, size, others = space.last, 2 * problem.k.size, False
-    energy_norms(problem, state.x, space.norms)
+def begin_steps(problem, tables, state, scratch, stop):
+    """Reference speeds, first step and nodes after ``stop`` has entered, changed its segment, or left."""
+    control, size, others = scratch.control, 2 * problem.k.size, False
+    energy_norms(problem, state.x, scratch.norms)
     for s in range(problem.gap.size):
         speed = abs(dot(problem.read_rate[s], state.x, size))
-        before = state.piece[s] > 0 and state.open[s, T_IN] < state.now[T]
+        before = state.segment[s] > 0 and state.active[s, T_IN] < state.now[T]
         if before:
-            space.scale[s] = max(space.scale[s], speed)
+            scratch.reference_speed[s] = max(scratch.reference_speed[s], speed)
         else:
-            space.scale[s] = max(speed, 0.1 * dot(tables.reach[s], space.norms, problem.k.size), _LEAST)
+            scratch.reference_speed[s] = max(
+                speed, 0.1 * dot(tables.rate_weight[s], scratch.norms, problem.k.size), _LEAST
+            )
         others |= before
-    last[FAMILY], last[FRESH] = 0, PIECE
-    if state.piece[stop] > 0 and state.open[stop, T_IN] == state.now[T]:
-        wanted = _first_step(problem, tables, state, space, stop)
-        last[WANTED] = max(wanted, last[WANTED]) if others else wanted
-        last[FAMILY], last[FRESH], last[STOP] = _entry_nodes(problem, tables, state, stop, wanted), ENTRY, stop
-    choose_sides(problem, tables, state, space)
-    state_peaks(problem, state, space, state.x)
+    control[NODE_SET], control[NEW] = 0, SEGMENT
+    if state.segment[stop] > 0 and state.active[stop, T_IN] == state.now[T]:
+        wanted = _first_step(problem, tables, state, scratch, stop)
+        control[NEXT_LEVEL] = max(wanted, control[NEXT_LEVEL]) if others else wanted
+        control[NODE_SET], control[NEW], control[STOP] = _entry_nodes(problem, tables, state, stop, wanted), ENTRY, stop
+    choose_sides(problem, tables, state, scratch)
+    state_peaks(problem, state, scratch, state.x)
 
 
 @inner
-def _first_step(problem, tables, state, space, stop):
-    """Level of the first step of a contact, a share of the duration it would have if it were free."""
+def _first_step(problem, tables, state, scratch, stop):
+    """Level of the first step of a contact, a share of the duration of an impact on this stop alone."""
     speed = abs(dot(problem.read_rate[stop], state.x, 2 * problem.k.size))
-    duration = contact_time(problem, tables, space, stop, max(speed, 1e-3 * space.scale[stop]))
-    if space.share[stop] == 0.0:
-        space.share[stop] = min(0.1, 4.0 / (tables.fastest * duration))
-    space.duration[0] = duration
-    return level_of(tables, space.share[stop] * duration)
+    duration = contact_time(problem, tables, scratch, stop, max(speed, 1e-3 * scratch.reference_speed[stop]))
+    if scratch.first_step_share[stop] == 0.0:
+        scratch.first_step_share[stop] = min(0.1, 4.0 / (tables.fastest * duration))
+    scratch.duration[0] = duration
+    return level_of(tables, scratch.first_step_share[stop] * duration)
 
 
 @inner
 def _entry_nodes(problem, tables, state, stop, level):
-    """Kind of the next step: an entry if a force of broken exponent has just begun, that of ``stop`` before others."""
-    found, while_ago = 0, 1e-6 * tables.step[level]
-    for s in range(state.piece.size):
-        if state.piece[s] == 1 and tables.power[1 + s] > 1.0 and (found == 0 or s == stop):
+    """Node set of the next step: of an entry if a force with broken exponent has just begun, first that of ``stop``."""
+    found, while_ago = 0, 1e-6 * tables.contact_step[level]
+    for s in range(state.segment.size):
+        if state.segment[s] == 1 and tables.time_exponent[1 + s] > 1.0 and (found == 0 or s == stop):
             rate = dot(problem.read_rate[s], state.x, 2 * problem.k.size)
             if indentation(problem, s, state.x) <= while_ago * rate + 4.0 * surface_tolerance(problem, s, state.x):
                 found = 1 + s
@@ -93,16 +95,16 @@ def _entry_nodes(problem, tables, state, stop, level):
 
 
 @inner
-def _pressed(problem, state, log):
-    """Switch every open stop at rest on its surface that the forces of others press; whether any did."""
+def _switch_pressed(problem, state, log):
+    """Switch every stop at rest on its surface that other stops' forces press into it; returns whether any did."""
     switched = False
     for s in range(problem.gap.size):
-        if state.piece[s] > 0 or abs(indentation(problem, s, state.x)) > surface_tolerance(problem, s, state.x):
+        if state.segment[s] > 0 or abs(indentation(problem, s, state.x)) > surface_tolerance(problem, s, state.x):
             continue
         if abs(dot(problem.read_rate[s], state.x, 2 * problem.k.size)) > rate_tolerance(problem, s, state.x):
             continue
-        batch = state.open[s, :3]  # of a contact not begun yet
-        rhs(problem, state.now[T], state.x, state.piece, state.entry_rate, state.rate, batch)
+        batch = state.active[s, :3]  # of a contact not begun yet
+        rhs(problem, state.now[T], state.x, state.segment, state.entry_rate, state.rate, batch)
         if dot(problem.read_rate[s], state.rate, 2 * problem.k.size) > 0.0:
             switch(problem, state, s, np.int64(1), log)
             switched = True
@@ -111,29 +113,30 @@ def _pressed(problem, state, log):
 
 @inlined
 def level_of(tables, h):
-    """Contact step of about h, the shortest one if need be."""
-    last = tables.step.size - 1
-    j = min(max(int(np.ceil(2.0 * math.log2(tables.step[0] / h))), 0), last)
-    return j + 1 if tables.step[j] > h and j < last else j
+    """Level of the longest contact step up to h, or of the shortest of all."""
+    last = tables.contact_step.size - 1
+    j = min(max(int(np.ceil(2.0 * math.log2(tables.contact_step[0] / h))), 0), last)
+    return j + 1 if tables.contact_step[j] > h and j < last else j
 
 
 @inner
-def _nearest_surface(problem, state, space):
-    """(time, stop, direction) of the border of a piece that will be met first at the present rates.
+def _nearest_surface(problem, state, scratch):
+    """(time, stop, direction) of the border of a segment that is met first at the present rates.
 
-    These may be faster than those at entry: the reference speeds follow.
+    Raises the reference speeds to these rates, which may exceed those at entry.
     """
     size = 2 * problem.k.size
     near, stop, direction = np.inf, -1, 0
     for s in range(problem.gap.size):
         delta = indentation(problem, s, state.x)
         rate = dot(problem.read_rate[s], state.x, size)
-        space.scale[s], space.seen[s, 0], space.seen[s, 1] = max(space.scale[s], abs(rate)), delta, rate
-        piece = state.piece[s]
-        if rate < 0.0 and piece > 0:
-            time, way = (delta - problem.levels[s, piece - 1]) / -rate, -1
+        scratch.start_motion[s, 0], scratch.start_motion[s, 1] = delta, rate
+        scratch.reference_speed[s] = max(scratch.reference_speed[s], abs(rate))
+        segment = state.segment[s]
+        if rate < 0.0 and segment > 0:
+            time, way = (delta - problem.knots[s, segment - 1]) / -rate, -1
         elif rate > 0.0:
-            time, way = (problem.levels[s, piece] - delta) / rate, 1
+            time, way = (problem.knots[s, segment] - delta) / rate, 1
         else:
             continue
         if time < near:
@@ -142,193 +145,174 @@ def _nearest_surface(problem, state, space):
 
 
 @inner
-def _predict(problem, tables, state, space, level):
-    """First guess of the forces: the last step's polynomial, or the law on the free response."""
-    last = space.last
+def _predict(problem, tables, state, scratch, level):
+    """First guess of the forces: the polynomial of the last step, or the law for the free response."""
+    control = scratch.control
     for s in range(problem.gap.size):
-        if state.piece[s] == 0:
+        if state.segment[s] == 0:
             continue
-        if last[FRESH]:
-            copy(space.free[s, 0], space.clipped, S)
-            contact_forces(problem, s, space.clipped, space.free[s, 1], state.entry_rate[s], space.force[s])
+        if control[NEW]:
+            copy(scratch.free[s, 0], scratch.clipped, S)
+            contact_forces(problem, s, scratch.clipped, scratch.free[s, 1], state.entry_rate[s], scratch.force[s])
             state.count[CALLS] += S
             continue
-        shift = level - last[LEVEL] + 2
-        if 0 <= shift < tables.extend.shape[1]:
-            combine(tables.extend[last[FAMILY], shift], space.previous[s], S, None, space.force[s])
+        shift = level - control[LEVEL] + 2
+        if 0 <= shift < tables.extrapolation.shape[1]:
+            combine(tables.extrapolation[control[NODE_SET], shift], scratch.previous[s], S, None, scratch.force[s])
         else:
             for i in range(S):
-                space.force[s, i] = space.previous[s, S - 1]
+                scratch.force[s, i] = scratch.previous[s, S - 1]
 
 
 @merged
-def _try(problem, tables, state, space, family, level, rtol):
-    """Attempt one contact step; error in units of the tolerance, inf when it must be shorter anyway.
+def _attempt(problem, tables, state, scratch, node_set, level, rtol):
+    """Attempt one contact step; (error in units of the tolerance, time of a bend it crosses, stop of that bend).
 
     With inf comes the time of a bend or border that is in its way and the stop, else inf and -1; of a border
-    ``space.last`` holds which it is, else -1.
+    ``scratch.control`` holds which it is, else -1.
     """
-    bottom, first, bent = level == tables.step.size - 1, np.inf, -1
-    free_response(problem, tables, state, space, family, level)
-    _predict(problem, tables, state, space, level)
-    if not solve_forces(problem, tables, state, space, family, level, rtol):
+    bottom, first, bent = level == tables.contact_step.size - 1, np.inf, -1
+    free_response(problem, tables, state, scratch, node_set, level)
+    _predict(problem, tables, state, scratch, level)
+    if not solve_forces(problem, tables, state, scratch, node_set, level, rtol):
         return np.inf, first, bent
-    arrive(problem, tables, state, space, family, level)
-    if leaves_piece(problem, tables, state, space, family, level):
+    end_state(problem, tables, state, scratch, node_set, level)
+    if leaves_segment(problem, tables, state, scratch, node_set, level):
         return 1.0 if bottom else np.inf, first, bent
-    first, bent = bend_ahead(problem, tables, state, space, family, level, space.last[FRESH] > 0, rtol)
-    space.last[BORDER] = -1
-    time, element, border = border_ahead(problem, tables, state, space, family, level)
+    first, bent = first_bend(problem, tables, state, scratch, node_set, level, scratch.control[NEW] > 0, rtol)
+    scratch.border[0] = -1
+    time, element, border = border_ahead(problem, tables, state, scratch, node_set, level)
+    if element == UNRESOLVED and not bottom:
+        return np.inf, np.inf, -1
     if time < first:
-        first, bent, space.last[BORDER] = time, element, border
+        first, bent, scratch.border[0] = time, element, border
     if bent >= 0:
         return 1.0 if bottom else np.inf, first, bent
-    error = step_error(problem, tables, state, space, family, level, space.last[FRESH] > 0, rtol)
+    error = step_error(problem, tables, state, scratch, node_set, level, scratch.control[NEW] > 0, rtol)
     return min(error, 1.0) if bottom else error, first, bent
 
 
 @inner
-def latest(state):
-    """The stop in contact that was entered last."""
+def latest_entered(state):
+    """The stop in contact with the latest entry."""
     stop = -1
-    for s in range(state.piece.size):
-        if state.piece[s] > 0 and (stop < 0 or state.open[s, T_IN] >= state.open[stop, T_IN]):
+    for s in range(state.segment.size):
+        if state.segment[s] > 0 and (stop < 0 or state.active[s, T_IN] >= state.active[stop, T_IN]):
             stop = s
     return stop
 
 
-@inner
-def _land_first(problem, tables, state, space, stop, direction, near, rtol, t_end, out, due, ledger):
-    """Land on the border met first, which another stop's may be; (stop, direction), or (-1, 0)."""
-    for _ in range(problem.gap.size + 1):
-        landed = land(problem, tables, state, space, stop, direction, near, rtol, t_end, out, due, ledger)
-        if landed == stop or landed < 0:
-            return landed, direction
-        above = indentation(problem, landed, space.work[LANDED]) > problem.levels[landed, state.piece[landed]]
-        stop, direction = landed, 1 if above else -1
-    return -1, 0
-
-
-@inner
-def _land_in_time(problem, tables, state, space, stop, first, rtol, t_end, out, due, ledger):
-    """Land on a bend or border of ``stop``, or on a border met before; (stop, whether it succeeded)."""
-    border, near = space.last[BORDER], first
-    for _ in range(problem.gap.size + 1):
-        if land_on_bend(problem, tables, state, space, stop, border, near, rtol, t_end, out, due, ledger):
-            space.last[BORDER] = border
-            return stop, True
-        if space.last[BORDER] < 0 or space.landed[0] < 0:
-            break
-        stop, border = space.landed[0], space.landed[1]
-    return stop, False
-
-
-@inlined
-def _renew(problem, state, space, stop, alone, log):
-    """What ends on a bend goes on beyond it: the other side, or numbers latched on a border."""
-    border = space.last[BORDER]
-    if border < 0:
-        space.side[stop] = -space.side[stop]
-    elif alone:
-        renew_border(problem, state, space, stop, border, log)
-    else:
-        renew_all(problem, state, space, stop, border, log)
+@merged
+def _try_landing(problem, tables, state, scratch, stop, direction, near, rtol, t_end, log, out, due, with_energy):
+    """Land on the border met first and switch its stop, if it is near enough; whether it was done."""
+    stop, direction = land_first(
+        problem, tables, state, scratch, stop, direction, near, rtol, t_end, out, due, with_energy
+    )
+    if stop < 0:
+        return False
+    state.count[STEPS] += 1
+    if state.now[T] < t_end:
+        switch(problem, state, stop, direction, log)
+        if in_contact(state):
+            begin_steps(problem, tables, state, scratch, stop)
+    return True
 
 
 @merged
-def touch(problem, tables, books, state, space, t_end, rtol, log, out, due):
+def _accept(problem, tables, energy_tables, state, scratch, node_set, level, wanted, error, bent, t_end, log, out, due):
+    """Complete the step found: samples, the end of the run if it is within, energy, event record, next step."""
+    h = tables.contact_step[level]
+    end = state.now[T] + h
+    if end >= t_end or due[state.count[SAMPLED]] <= end:
+        sample_step(problem, tables, energy_tables, state, scratch, node_set, level, t_end, out, due)
+    if end >= t_end:
+        end_run(problem, tables, state, scratch, node_set, level, t_end)
+        return
+    for s in range(problem.gap.size):
+        if state.segment[s] > 0:
+            copy(scratch.force[s], scratch.previous[s], S)
+    if energy_tables.active > 0.0:
+        account_contact(problem, tables, energy_tables, state, scratch, node_set, level, h, state.x)
+    if state.event_record.shape[0]:
+        record_forces(problem, state, scratch, STEP, end, node_set, level)
+    finish_step(problem, tables, state, scratch, node_set, level)
+    _adapt(tables, scratch, level, node_set, wanted, error)
+    if bent >= 0:  # crossed within the shortest step
+        go_beyond(problem, state, scratch, bent, True, log)
+        scratch.control[NEW] = SEGMENT if scratch.border[0] >= 0 else 0
+    state.count[STEPS] += 1
+
+
+@merged
+def advance_contact(problem, tables, energy_tables, state, scratch, t_end, rtol, log, out, due):
     """One accepted step in contact: land if a border is near, else collocate; returns a status code."""
-    last, bottom, ledger = space.last, tables.step.size - 1, books.kept > 0.0
-    near, stop, direction = _nearest_surface(problem, state, space)
+    control, bottom, with_energy = scratch.control, tables.contact_step.size - 1, energy_tables.active > 0.0
+    near, stop, direction = _nearest_surface(problem, state, scratch)
     if near <= 0.0 and switch_on_surface(problem, state, log, True):
-        if touching(state):
-            begin(problem, tables, state, space, latest(state))
+        if in_contact(state):
+            begin_steps(problem, tables, state, scratch, latest_entered(state))
         return RUNNING
-    if last[FRESH] == ENTRY and _pressed(problem, state, log):
-        begin(problem, tables, state, space, latest(state))
+    if control[NEW] == ENTRY and _switch_pressed(problem, state, log):
+        begin_steps(problem, tables, state, scratch, latest_entered(state))
         return RUNNING
-    if stop >= 0:
-        stop, direction = _land_first(
-            problem, tables, state, space, stop, direction, near, rtol, t_end, out, due, ledger
-        )
-        if stop >= 0:
-            state.count[STEPS] += 1
-            if state.now[T] < t_end:
-                switch(problem, state, stop, direction, log)
-                if touching(state):
-                    begin(problem, tables, state, space, stop)
-            return RUNNING
-    family = last[FAMILY] if last[FRESH] else 0
+    if stop >= 0 and _try_landing(
+        problem, tables, state, scratch, stop, direction, near, rtol, t_end, log, out, due, with_energy
+    ):
+        return RUNNING
+    node_set = control[NODE_SET] if control[NEW] else 0
     longest = 0.8 * near
     if problem.table_dt.size:
         longest = min(longest, t_end - state.now[T] + problem.table_dt[0])
-    wanted = last[WANTED]
-    level = level_of(tables, longest) if longest < tables.step[wanted] else wanted
-    copy(space.side, space.side_at_begin, space.side.size)
+    wanted = control[NEXT_LEVEL]
+    level = level_of(tables, longest) if longest < tables.contact_step[wanted] else wanted
+    copy(scratch.side, scratch.side_at_begin, scratch.side.size)
     while True:
-        error, first, bent = _try(problem, tables, state, space, family, level, rtol)
+        error, first, bent = _attempt(problem, tables, state, scratch, node_set, level, rtol)
         if error <= 1.0:
             break
-        landed = first == 0.0 and last[BORDER] >= 0  # it begins on the border and goes across
+        landed = first == 0.0 and scratch.border[0] >= 0  # it begins on the border and goes across
         if bent >= 0 and not landed:
-            bent, landed = _land_in_time(problem, tables, state, space, bent, first, rtol, t_end, out, due, ledger)
+            bent, landed = land_in_time(
+                problem, tables, state, scratch, bent, first, rtol, t_end, out, due, with_energy
+            )
         if landed:
             state.count[STEPS] += 1
             if state.now[T] < t_end:
-                _renew(problem, state, space, bent, first == 0.0, log)
-            last[FRESH], last[FAMILY], last[WANTED] = PIECE, 0, max(level, wanted)
+                go_beyond(problem, state, scratch, bent, first == 0.0, log)
+            control[NEW], control[NODE_SET], control[NEXT_LEVEL] = SEGMENT, 0, max(level, wanted)
             return RUNNING
         if level == bottom:
-            return LAW_NOT_FINITE if _law_fails(state, space) else STEP_TOO_SMALL
-        copy(space.side_at_begin, space.side, space.side.size)
+            return LAW_NOT_FINITE if _law_fails(state, scratch) else STEP_TOO_SMALL
+        copy(scratch.side_at_begin, scratch.side, scratch.side.size)
         state.count[REJECTED] += 1
-        if bent >= 0:  # go near it, then end a step on it
+        if bent >= 0:  # a step that ends near the bend, so that the next one can land on it
             level = max(level + 1, level_of(tables, 0.9 * first))
             continue
         level = min(bottom, level + (1 + int(2.0 / _ORDER * math.log2(error / _GOAL)) if error < np.inf else 2))
         wanted = level
-    h = tables.step[level]
-    end = state.now[T] + h
-    if end >= t_end or due[state.count[SAMPLED]] <= end:
-        record(problem, tables, books, state, space, family, level, t_end, out, due)
-    if end >= t_end:
-        end_inside(problem, tables, state, space, family, level, t_end)
-        return RUNNING
-    for s in range(problem.gap.size):
-        if state.piece[s] > 0:
-            copy(space.force[s], space.previous[s], S)
-    if ledger:
-        book_contact(problem, tables, books, state, space, family, level, h, state.x)
-    if state.tape.shape[0]:
-        tape_forces(problem, state, space, STEP, end, family, level)
-    finish_step(problem, tables, state, space, family, level)
-    _adapt(tables, space, level, family, wanted, error)
-    if bent >= 0:  # crossed within the shortest step
-        _renew(problem, state, space, bent, True, log)
-        last[FRESH] = PIECE if last[BORDER] >= 0 else 0
-    state.count[STEPS] += 1
+    _accept(problem, tables, energy_tables, state, scratch, node_set, level, wanted, error, bent, t_end, log, out, due)
     return RUNNING
 
 
 @inner
-def _law_fails(state, space):
-    """Whether a law gave a force that is not finite."""
-    for s in range(state.piece.size):
+def _law_fails(state, scratch):
+    """Whether a force is not finite."""
+    for s in range(state.segment.size):
         for i in range(S):
-            if state.piece[s] > 0 and not abs(space.force[s, i]) < np.inf:
+            if state.segment[s] > 0 and not abs(scratch.force[s, i]) < np.inf:
                 return True
     return False
 
 
 @inner
-def _adapt(tables, space, level, family, wanted, error):
+def _adapt(tables, scratch, level, node_set, wanted, error):
     """Size of the next step from the error of this one."""
-    last, longer = space.last, 2.0 / _ORDER * math.log2(_GOAL / max(error, 1e-30))  # in levels
-    if last[FRESH] == ENTRY:  # the next contact of this stop begins with what was right here
-        s = last[STOP]
-        if level != last[WANTED]:
-            space.share[s] = tables.step[level] / space.duration[0]
-        space.share[s] *= 2.0 ** (0.5 * min(max(longer, -1.0), 0.5))
-    suggested = min(max(level - int(min(math.floor(longer), 2.0)), 0), tables.step.size - 1)
-    last[WANTED] = suggested if level == wanted else min(suggested, wanted)
-    last[LEVEL], last[FAMILY], last[FRESH] = level, family, 0
+    control, longer = scratch.control, 2.0 / _ORDER * math.log2(_GOAL / max(error, 1e-30))  # in levels
+    if control[NEW] == ENTRY:  # the next contact of this stop begins with the step that was right here
+        s = control[STOP]
+        if level != control[NEXT_LEVEL]:
+            scratch.first_step_share[s] = tables.contact_step[level] / scratch.duration[0]
+        scratch.first_step_share[s] *= 2.0 ** (0.5 * min(max(longer, -1.0), 0.5))
+    suggested = min(max(level - int(min(math.floor(longer), 2.0)), 0), tables.contact_step.size - 1)
+    control[NEXT_LEVEL] = suggested if level == wanted else min(suggested, wanted)
+    control[LEVEL], control[NODE_SET], control[NEW] = level, node_set, 0

@@ -1,5 +1,5 @@
-"""The energy balance of a run: work of loads, damping and contacts, and whether they add up.
+"""The energy balance of a run: work of loads, damping and contacts, and whether it closes.
 
-`books` keeps it with closed forms, `flight_tables` those of flight, `contact_tables` those of contact steps;
-`quadrature` serves where they do not reach; `guard` refuses runs that do not balance.
+`balance` adds work and damping step by step: by the closed forms of `flight_tables` and `contact_tables`, else by
+`quadrature`. `check` refuses runs whose balance does not close.
 """

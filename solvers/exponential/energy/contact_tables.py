@@ -1,4 +1,4 @@
-"""Work and damping over contact steps: tables made when a run first keeps an energy ledger.
+"""Work and damping over contact steps: tables made for the first run with an energy balance.
 
 The force on a block is a polynomial times its weight, see `contact.nodes`. So the block's velocity v is linear in
 y = (plain forces at the nodes, those of the stop that enters, p₀, v₀), and so is ∫ L_i v dt with the nodes' L_i,
@@ -15,57 +15,93 @@ from typing import Any
 import numpy as np
 
 from solvers.compiled.kernels import inner, kernel
-from solvers.exponential.contact.nodes import S, gauss, lagrange
+from solvers.exponential.contact.nodes import S, gauss, lagrange, so_far
 from solvers.exponential.responses import propagate
 
 _PANEL, _POINTS = 1.5, 16  # radians of a panel and its points: exact to rounding
-BEGIN, ROWS = 2 * S, 2 * S + 2  # rows of a table: plain forces, those of the stop that enters, from here on p₀ and v₀
-WIDE = 2 * S + 16  # of a row: ∫ L_i v dt for all nodes, then ∫ v v_row dt for all rows, and zeros
+_BEGIN, _ROWS = 2 * S, 2 * S + 2  # rows of y: plain forces, those of the stop that enters, from here on p₀ and v₀
+_WIDE = S + _ROWS  # ∫ L_i v dt for all nodes, then ∫ v v_row dt for all rows
+BEGAN, ENTERING, SQUARES = S + 2, S + 3, 2 * S + 3  # rows of a table behind those of plain forces, p₀ and v₀
 
 
 @lru_cache(maxsize=16)
-def contact_table(stiffness: bytes, damping: bytes, steps: bytes, power: float, lead: float, places: bytes) -> Any:
-    """(j, n, ROWS, WIDE) of one kind of steps, t = h σ^power, for blocks (k, c) and steps given as arrays' bytes."""
+def contact_table(
+    stiffness: bytes, damping: bytes, steps: bytes, time_exponent: float, weight_exponent: float, places: bytes
+) -> Any:
+    """(j, n, 3S + 5, 2S) of one kind of steps, t = h σ^power, for blocks (k, c) and steps given as arrays' bytes.
+
+    With F plain forces, G those of the stop that enters, x = (p₀, v₀), each form once: rows of F and x hold ∫ L_i v dt
+    and the part of ∫ v² dt to be multiplied by F, then x by itself, then G as F, then G and x to be multiplied by G.
+    """
     k, c, h, nodes = (np.frombuffer(part) for part in (stiffness, damping, steps, places))
     apart = 1.0 / (nodes[:, None] - nodes + np.eye(len(nodes))).prod(axis=1)
-    weights = np.array([apart, apart * nodes ** (-lead)])
+    weights = np.array([apart, apart * nodes ** (-weight_exponent)])
     points = gauss(_POINTS)
-    out = np.zeros((len(h), len(k), ROWS, WIDE))
-    space = np.zeros((_POINTS, ROWS)), np.zeros((_POINTS, S)), np.zeros((_POINTS, ROWS, 2)), np.zeros((ROWS, 2))
-    _fill(k.copy(), c.copy(), h.copy(), power, lead, nodes.copy(), weights, points, _so_far(points[0]), *space, out)
+    out = np.zeros((len(h), len(k), _ROWS, _WIDE))
+    scratch = np.zeros((_POINTS, _ROWS)), np.zeros((_POINTS, S)), np.zeros((_POINTS, _ROWS, 2)), np.zeros((_ROWS, 2))
+    _fill(
+        k.copy(),
+        c.copy(),
+        h.copy(),
+        time_exponent,
+        weight_exponent,
+        nodes.copy(),
+        weights,
+        points,
+        so_far(points[0]),
+        *scratch,
+        out,
+    )
+    return _once(out[..., :S], out[..., S:])
+
+
+def _once(moments: Any, squares: Any) -> Any:
+    """The table from ∫ L_i v dt and ∫ v v_row dt of all rows."""
+    f, g, x, (p, v) = slice(S), slice(S, _BEGIN), slice(_BEGIN, _ROWS), (_BEGIN, _BEGIN + 1)
+    out = np.zeros((*moments.shape[:2], SQUARES + S + 2, 2 * S))
+    for rows, of, times in (slice(S), f, 1.0), (slice(S, BEGAN), x, 2.0), (slice(ENTERING, SQUARES), g, 2.0):
+        out[..., rows, :S], out[..., rows, S:] = moments[..., of, :], times * squares[..., of, f]
+    for i, (row, column, times) in enumerate(((p, p, 1.0), (p, v, 2.0), (v, v, 1.0))):
+        out[..., BEGAN, i] = times * squares[..., row, column]
+    out[..., SQUARES : SQUARES + S, :S], out[..., SQUARES + S :, :S] = squares[..., g, g], 2.0 * squares[..., x, g]
     return out
 
 
-def _so_far(points: Any) -> Any:
-    """(q, r): integral from 0 to point q of the polynomial through values at the points r."""
-    legendre = np.polynomial.legendre
-    x, one = 2.0 * points - 1.0, np.eye(len(points))
-    integrals = [legendre.legval(x, legendre.legint(row, lbnd=-1.0)) for row in one]
-    return np.ascontiguousarray(0.5 * np.array(integrals).T @ np.linalg.inv(legendre.legvander(x, len(x) - 1)))
-
-
 @kernel
-def _fill(k, c, h, power, lead, nodes, weights, points, so_far, velocity, basis, pushed, state, out):
-    """All tables of a kind; the arguments between ``so_far`` and the result are working space."""
+def _fill(k, c, h, time_exponent, weight_exponent, nodes, weights, points, so_far, velocity, basis, pushed, state, out):
+    """All tables of a kind; the arguments between ``so_far`` and the result are scratch."""
     for level in range(h.size):
         for b in range(k.size):
-            panels = 1 + int(power * (math.sqrt(k[b]) + c[b]) * h[level] / _PANEL)
-            for e in range(ROWS):
-                state[e, 0] = 1.0 if e == BEGIN else 0.0
-                state[e, 1] = 1.0 if e == BEGIN + 1 else 0.0
+            panels = 1 + int(time_exponent * (math.sqrt(k[b]) + c[b]) * h[level] / _PANEL)
+            for e in range(_ROWS):
+                state[e, 0] = 1.0 if e == _BEGIN else 0.0
+                state[e, 1] = 1.0 if e == _BEGIN + 1 else 0.0
             for panel in range(panels):
                 begin, width = panel / panels, 1.0 / panels
-                _push(k[b], c[b], h[level], power, lead, nodes, weights, points, begin, width, basis, pushed)
-                _move(k[b], c[b], h[level], power, points, so_far, begin, width, pushed, state, velocity)
+                _push(
+                    k[b],
+                    c[b],
+                    h[level],
+                    time_exponent,
+                    weight_exponent,
+                    nodes,
+                    weights,
+                    points,
+                    begin,
+                    width,
+                    basis,
+                    pushed,
+                )
+                _move(k[b], c[b], h[level], time_exponent, points, so_far, begin, width, pushed, state, velocity)
                 for q in range(points.shape[1]):
                     sigma = begin + width * points[0, q]
-                    measure = points[1, q] * width * h[level] * power * sigma ** (power - 1.0)
+                    measure = points[1, q] * width * h[level] * time_exponent * sigma ** (time_exponent - 1.0)
                     _add_products(measure, basis[q], velocity[q], out[level, b])
 
 
 @inner
 def _moved(k, c, x, p, v):
-    """A block's state after x, or before: det exp(A x) = e^{-cx} turns α I + β A round."""
+    """State of a block after the time x, or before if x < 0: det exp(A x) = e^{-cx} gives the inverse of α I + β A."""
     alpha, beta = propagate(k, c, abs(x))
     if x < 0.0:
         grown = math.exp(-c * x)
@@ -74,14 +110,16 @@ def _moved(k, c, x, p, v):
 
 
 @inner
-def _push(k, c, h, power, lead, nodes, weights, points, begin, width, basis, pushed):
+def _push(k, c, h, time_exponent, weight_exponent, nodes, weights, points, begin, width, basis, pushed):
     """Unit forces at the points of a panel, per σ, as (p, v) moved back to the panel's begin."""
-    start = h * begin**power
+    start = h * begin**time_exponent
     for q in range(points.shape[1]):
         sigma = begin + width * points[0, q]
-        p, v = _moved(k, c, start - h * sigma**power, 0.0, width * h * power * sigma ** (power - 1.0))
+        p, v = _moved(
+            k, c, start - h * sigma**time_exponent, 0.0, width * h * time_exponent * sigma ** (time_exponent - 1.0)
+        )
         lagrange(nodes, weights[1], sigma, basis[q])
-        weight = sigma**lead if lead > 0.0 else 0.0
+        weight = sigma**weight_exponent if weight_exponent > 0.0 else 0.0
         for j in range(S):
             force = basis[q, j] * weight
             pushed[q, S + j, 0], pushed[q, S + j, 1] = force * p, force * v
@@ -91,15 +129,15 @@ def _push(k, c, h, power, lead, nodes, weights, points, begin, width, basis, pus
 
 
 @inner
-def _move(k, c, h, power, points, so_far, begin, width, pushed, state, velocity):
-    """Velocities at the points of a panel by the variation of constants; ``state`` goes on to its end."""
-    count, start = points.shape[1], h * begin**power
+def _move(k, c, h, time_exponent, points, so_far, begin, width, pushed, state, velocity):
+    """Velocities at the points of a panel by the variation of constants; ``state`` is moved to its end."""
+    count, start = points.shape[1], h * begin**time_exponent
     for q in range(count + 1):
         end = begin + width * points[0, q] if q < count else begin + width
-        span = h * end**power - start
-        for e in range(ROWS):
+        span = h * end**time_exponent - start
+        for e in range(_ROWS):
             p, v = state[e, 0], state[e, 1]
-            for r in range(count if e < BEGIN else 0):
+            for r in range(count if e < _BEGIN else 0):
                 share = so_far[q, r] if q < count else points[1, r]
                 p += share * pushed[r, e, 0]
                 v += share * pushed[r, e, 1]
@@ -113,9 +151,9 @@ def _move(k, c, h, power, points, so_far, begin, width, pushed, state, velocity)
 @inner
 def _add_products(measure, basis, velocity, out):
     """One point's part of all integrals."""
-    for e in range(ROWS):
+    for e in range(_ROWS):
         value = measure * velocity[e]
         for i in range(S):
             out[e, i] += value * basis[i]
-        for f in range(ROWS):
+        for f in range(_ROWS):
             out[e, S + f] += value * velocity[f]

@@ -1,12 +1,12 @@
-"""Work and damping of whole steps as quadratic forms, made when a run first keeps an energy ledger.
+"""Work and damping of whole steps as quadratic forms: tables made for the first run with an energy balance.
 
 With y = (x, s), the state and the derivatives s, s', ..., s⁽⁵⁾ of every sampled signal, flight is y' = B y, and input
 work and damping of a step are
 
     ∫ y^T P y dt = y₀^T M(h) y₀,   M(2h) = M(h) + Φ(h)^T M(h) Φ(h),   Φ = exp(B h),
 
-begun by Gauss's rule on steps on which Φ is a short Taylor series. Kept are, for every *driver* i (tones and signals;
-with coupled damping every coordinate), the rows that give work and damping, and the structure's blocks' own damping.
+started by Gauss's rule on steps short enough for a Taylor series of Φ. Kept are the damping of the structure's blocks
+and, for every *driver* (tones and signals; with coupled damping every coordinate), the rows that give work and damping.
 
 Tables of contact steps are those of `contact_tables`.
 """
@@ -19,26 +19,26 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from solvers.compiled.handles import Packed
 from solvers.compiled.kernels import INTEGERS, MATRIX, REAL, VECTOR, Problem
+from solvers.compiled.packed import Packed
 from solvers.compiled.sums import padded
 from solvers.exponential.contact.nodes import S, gauss
 from solvers.exponential.energy.contact_tables import contact_table
-from solvers.exponential.flight import LONG
+from solvers.exponential.flight import SERIES_TERMS
 from solvers.exponential.phi_functions import signal_responses
 from solvers.exponential.responses import propagate
 from solvers.exponential.tables import Tables
 
 _OCTAVE = 4  # flight steps of which each is twice as long as the last
 _BRIEF = 0.04  # |λ| h up to which twelve terms of a Taylor series are exact
-_MOST_NUMBERS = 10_000_000  # of the rows: with more drivers the work is summed by series
+_MOST_NUMBERS = 10_000_000  # in the rows: with more drivers the work is computed by series
 _REACH = 200.0  # radians of the fastest block up to which a contact step has tables
 
 
-class Books(NamedTuple):
-    """Numbers of the energy ledger; l counts flight steps and one more, j contact steps."""
+class EnergyTables(NamedTuple):
+    """Numbers of the energy balance, read by kernels only; l counts flight steps and one more, j contact steps."""
 
-    kept: float  # whether there is a ledger
+    active: float  # whether there is a balance
     closed: float  # whether there are rows for flight
     spacing: float  # s, of the last step in the tables
     driver: Any  # (d,) columns of the state that drive
@@ -47,15 +47,14 @@ class Books(NamedTuple):
     pairs: Any  # (l, 6J, 2 × 6J padded): the same from the signals
     gauss: Any  # (2, 5)
     series: Any  # (6, LONG): weights of a series' terms at Gauss's points and at the end
-    monomials: Any  # (S, S): coefficients of powers of σ from values at a smooth step's nodes
-    kind: Any  # (f,) contact table of every family
+    kind: Any  # (f,) contact table of every node set
     first: float  # contact step at which the tables begin
     longest: Any  # (kinds,) s: contact step up to which they may be used
     steady: Any  # (kinds, j, K, 2, S): α, β of every tone at the nodes
-    contact: Any  # (kinds, j, n, ROWS, WIDE)
+    contact: Any  # (kinds, j, n, 3S + 5, 2S)
 
 
-BOOKS = types.NamedTuple(
+ENERGY_TABLES = types.NamedTuple(
     [
         *(
             REAL,
@@ -65,74 +64,70 @@ BOOKS = types.NamedTuple(
             *(types.Array(REAL, 3, "C"),) * 3,
             MATRIX,
             MATRIX,
-            MATRIX,
             INTEGERS,
             REAL,
             VECTOR,
         ),
         *(types.Array(REAL, 5, "C"),) * 2,
     ],
-    Books,
+    EnergyTables,
 )
 
 
-def _empty(kept: float, families: int) -> Books:
-    """A ledger without tables."""
+def _empty(kept: float, node_sets: int) -> EnergyTables:
+    """A balance without tables."""
     none, nothing, contact = np.zeros(0, dtype=np.int64), np.zeros((0, 0, 0)), np.zeros((0, 0, 0, 0, 0))
     flight = kept, 0.0, 0.0, none, nothing, nothing, nothing
-    kind, longest = np.zeros(families, dtype=np.int64), np.zeros(1)
-    return Books(*flight, gauss(5), _series(), _monomials(), kind, 0.0, longest, contact, contact)
+    kind, longest = np.zeros(node_sets, dtype=np.int64), np.zeros(1)
+    return EnergyTables(*flight, gauss(5), _series(), kind, 0.0, longest, contact, contact)
 
 
 def _series() -> Any:
     """(6, LONG) x^i/i! at Gauss's points and at 1."""
     points = np.append(gauss(5)[0], 1.0)
-    return np.array([[x**i / math.factorial(i) for i in range(LONG)] for x in points])
+    return np.array([[x**i / math.factorial(i) for i in range(SERIES_TERMS)] for x in points])
 
 
-def _monomials() -> Any:
-    """(S, S) coefficients of 1, σ, σ², ... from values at Gauss's nodes."""
-    return np.ascontiguousarray(np.linalg.inv(np.vander(gauss(S)[0], increasing=True)))
+NO_ENERGY_TABLES = Packed.of(_empty(0.0, 1), ENERGY_TABLES)
 
 
-NO_BOOKS = Packed(_empty(0.0, 1), BOOKS)
-
-
-def books_for(problem: Problem, tables: Tables, spacing: float) -> Packed:
+def energy_tables_for(problem: Problem, tables: Tables, spacing: float) -> Packed:
     """Everything a run with ledger needs beyond the tables of the motion; ``spacing`` is that of its outputs, s."""
-    books, n = _empty(1.0, len(tables.power)), len(problem.k)
-    if not (_coupled(tables) or problem.push[:, :n].any() or problem.load[:, :n].any()):
-        books = _contact_part(books, problem, tables)
+    energy_tables, own = _empty(1.0, len(tables.time_exponent)), int(tables.own_blocks)
+    if not (_coupled(tables) or any(part[:, :own].any() for part in (problem.push, problem.load, problem.read_rate))):
+        energy_tables = _contact_part(energy_tables, problem, tables)
     driver = np.flatnonzero(_drives(problem, tables))
     size, signals = 2 * len(problem.k), len(problem.table_dt)
-    if (len(tables.h) + 1) * (len(driver) + 6 * signals) * 2 * padded(size) <= _MOST_NUMBERS:
-        books = _flight_part(books, problem, tables, driver, spacing)
-    return Packed(books, BOOKS)
+    if (len(tables.flight_step) + 1) * (len(driver) + 6 * signals) * 2 * padded(size) <= _MOST_NUMBERS:
+        energy_tables = _flight_part(energy_tables, problem, tables, driver, spacing)
+    return Packed.of(energy_tables, ENERGY_TABLES)
 
 
 def _coupled(tables: Tables) -> bool:
     """Whether damping couples the blocks: then it has a row per coordinate, else per block."""
-    return len(tables.loss_rows) > int(tables.own)
+    return len(tables.loss_rows) > int(tables.own_blocks)
 
 
 def _drives(problem: Problem, tables: Tables) -> Any:
     """(2N,) whether a coordinate is a driver: those of tones, and all if damping couples the blocks."""
-    own = np.arange(2 * len(problem.k)) % len(problem.k) < int(tables.own)
+    own = np.arange(2 * len(problem.k)) % len(problem.k) < int(tables.own_blocks)
     return np.ones_like(own) if _coupled(tables) else ~own
 
 
 # --- flight
 
 
-def _flight_part(books: Books, problem: Problem, tables: Tables, driver: Any, spacing: float) -> Books:
+def _flight_part(
+    energy_tables: EnergyTables, problem: Problem, tables: Tables, driver: Any, spacing: float
+) -> EnergyTables:
     """The forms of all flight steps, and of the cell or, without sampled signals, of the time between two outputs."""
     powers = _power_forms(problem, tables)
-    levels = -(-len(tables.h) // _OCTAVE) * _OCTAVE
-    h = tables.h[0] * 2.0 ** (-np.arange(levels) / _OCTAVE)
-    forms = _doubled(problem, powers, h, _OCTAVE, tables.propagator, tables.signal)[: len(tables.h)]
+    levels = -(-len(tables.flight_step) // _OCTAVE) * _OCTAVE
+    h = tables.flight_step[0] * 2.0 ** (-np.arange(levels) / _OCTAVE)
+    forms = _doubled(problem, powers, h, _OCTAVE, tables.flight_propagator, tables.signal)[: len(tables.flight_step)]
     spacing = problem.table_dt[0] if len(problem.table_dt) else spacing
     forms = np.concatenate((forms, _forms_of(problem, powers, spacing)))
-    size, n, own = 2 * len(problem.k), len(problem.k), int(tables.own)
+    size, n, own = 2 * len(problem.k), len(problem.k), int(tables.own_blocks)
     signals = np.arange(size, powers.shape[-1])
     rows = forms[:, :, np.concatenate((driver, signals)), :size]
     once = np.isin(np.arange(size), driver)
@@ -141,7 +136,7 @@ def _flight_part(books: Books, problem: Problem, tables: Tables, driver: Any, sp
     b = np.arange(0 if _coupled(tables) else own)
     plain = np.stack((forms[:, 1, b, b], 2.0 * forms[:, 1, b, n + b], forms[:, 1, n + b, n + b]), axis=1)
     pairs = forms[:, :, size:, size:]
-    return books._replace(
+    return energy_tables._replace(
         **{"closed": 1.0, "spacing": spacing, "driver": driver.astype(np.int64), "plain": np.ascontiguousarray(plain)},
         **{"rows": _beside(rows), "pairs": _beside(pairs)},
     )
@@ -253,19 +248,19 @@ def _flow(problem: Problem, h: Any, propagator: Any, signal: Any) -> Any:
 # --- contact
 
 
-def _contact_part(books: Books, problem: Problem, tables: Tables) -> Books:
-    """The tables of contact steps: one kind for all stops whose forces begin alike."""
-    own = int(tables.own)
+def _contact_part(energy_tables: EnergyTables, problem: Problem, tables: Tables) -> EnergyTables:
+    """The tables of contact steps, one for all stops with the same exponents κ and λ."""
+    own = int(tables.own_blocks)
     fastest = float((np.sqrt(problem.k) + problem.c)[:own].max())
-    h = tables.step[int(np.searchsorted(-tables.step * fastest, -_REACH)) :]
-    families = list(zip(tables.power.tolist(), tables.lead.tolist(), strict=True))
-    kinds = list(dict.fromkeys(families))
-    places = tables.nodes[[families.index(kind) for kind in kinds]]
+    h = tables.contact_step[int(np.searchsorted(-tables.contact_step * fastest, -_REACH)) :]
+    node_sets = list(zip(tables.time_exponent.tolist(), tables.weight_exponent.tolist(), strict=True))
+    kinds = list(dict.fromkeys(node_sets))
+    places = tables.nodes[[node_sets.index(kind) for kind in kinds]]
     structure = [part.tobytes() for part in (problem.k[:own], problem.c[:own], h)]
     of_kinds = [contact_table(*structure, *kind, row.tobytes()) for kind, row in zip(kinds, places, strict=True)]
-    return books._replace(
-        kind=np.array([kinds.index(family) for family in families], dtype=np.int64),
-        first=float(len(tables.step) - len(h)),
+    return energy_tables._replace(
+        kind=np.array([kinds.index(node_set) for node_set in node_sets], dtype=np.int64),
+        first=float(len(tables.contact_step) - len(h)),
         longest=_longest(np.sqrt(problem.k[own:].max(initial=0.0)), kinds, h),
         steady=_steady(np.sqrt(problem.k[own:]), h, places ** np.array([power for power, _ in kinds])[:, None]),
         contact=np.stack(of_kinds),
@@ -273,7 +268,7 @@ def _contact_part(books: Books, problem: Problem, tables: Tables) -> Books:
 
 
 def _longest(omega: float, kinds: Any, h: Any) -> Any:
-    """(kinds,) step up to which the nodes' polynomials hold a tone to 1e-11: cos is a series in σ^(2 power)."""
+    """(kinds,) step up to which polynomials through the nodes resolve a tone to 1e-11: cos is a series in σ^{2κ}."""
     terms = [S // int(power) for power, _ in kinds]
     phases = np.array([(1e-11 * 2.0 ** (2 * S - 1) * math.factorial(count)) ** (1.0 / count) for count in terms])
     return np.minimum(phases / omega, h[0]) if omega > 0.0 else np.full(len(kinds), h[0])

@@ -1,53 +1,28 @@
-"""Powers of loads and damping, and states and energy ledger inside a contact step by quadrature of its forces."""
+"""Powers of loads and damping; the state and the energy ledger inside a contact step, from the forces at its nodes.
+
+With x = E(t) y a block's equation is y' = E(-t) Σ push F. Gauss's collocation solves it, in panels of at most
+`_RADIANS` of the fastest block: y at a panel's points is y₀ + Σ_r a_qr y'_r. Work, damping and impulses are sums over
+the same points. Such a method conserves quadratic forms: what contacts and loads do and damping takes adds up to the
+energy, however little the velocity of a stop is like a polynomial through its values at the nodes.
+"""
 
 from __future__ import annotations
 
-import math
-
-from solvers.compiled.kernels import copy, dot, inlined, inner, reordered, table_value
-from solvers.compiled.state import T, touching
-from solvers.exponential.contact.node_response import PLAIN, PRODUCTS, WEIGHTED, WITHIN
+from solvers.compiled.kernels import dot, inlined, inner, reordered, table_value
+from solvers.compiled.simd import load8, splat8, store8, sum8
+from solvers.compiled.sums import combine
 from solvers.exponential.contact.nodes import S
-from solvers.exponential.flight import energy_norms
 from solvers.exponential.responses import propagate
 
-
-@inner
-def _scales(nodes, exponent, plain, weighted):
-    """1/Π (σ_j - σ_i), and the same over σ_j^exponent."""
-    for j in range(S):
-        product = 1.0
-        for i in range(S):
-            if i != j:
-                product *= nodes[j] - nodes[i]
-        plain[j] = 1.0 / product
-        weighted[j] = plain[j] / nodes[j] ** exponent if exponent > 0.0 else plain[j]
-
-
-@inner
-def _products(nodes, sigma, out):
-    """Π (σ - σ_i) without i = j, for every j."""
-    for j in range(S):
-        product = 1.0
-        for i in range(S):
-            if i != j:
-                product *= sigma - nodes[i]
-        out[j] = product
-
-
-@inlined
-def _between(products, scales, values):
-    """Value of the polynomial through the node values."""
-    total = 0.0
-    for j in range(S):
-        total += products[j] * scales[j] * values[j]
-    return total
+_RADIANS = 3.0  # energies of a damped block are 5e-11 ζ of its own off, the motion less
+_SHARES = 2  # first row of `Tables.gauss` with a_qr, one per r
+_PACE = S  # row of `Scratch.between` with dt of the panel's points; polynomials of the nodes before, forces behind
 
 
 @inner
 def powers(problem, tables, t, x):
     """Power of the loads and of the damping at time t, W."""
-    size, gain, loss, own = 2 * problem.k.size, 0.0, 0.0, int(tables.own)
+    size, gain, loss, own = 2 * problem.k.size, 0.0, 0.0, int(tables.own_blocks)
     for load in range(tables.power_rows.shape[0] if own < problem.k.size else 0):
         gain += dot(tables.signal_rows[load], x, size) * dot(tables.power_rows[load], x, size)
     for j in range(problem.table_dt.size):
@@ -62,7 +37,7 @@ def powers(problem, tables, t, x):
 
 @reordered
 def _plain_loss(n, own, rows, x):
-    """Power of damping by rows that read a block's own rate and the tones only, W."""
+    """Power of damping, W, by rows with entries for the block's own rate and the tones only."""
     loss = 0.0
     for b in range(own):
         value = rows[b, n + b] * x[n + b]
@@ -72,74 +47,155 @@ def _plain_loss(n, own, rows, x):
     return loss
 
 
-@inner
-def inside(problem, tables, state, space, family, h, span, row):
-    """State at ``span`` after the start of a step of length h, by quadrature of its forces; ``row`` holds the start."""
-    stops, n = problem.gap.size, problem.k.size
-    power, lead = tables.power[family], tables.lead[family]  # t = h σ^power
-    for b in range(n):
-        alpha, beta = propagate(problem.k[b], problem.c[b], span)
-        p, v = row[b], row[n + b]
-        row[b] = alpha * p + beta * v
-        row[n + b] = alpha * v - beta * (problem.k[b] * p + problem.c[b] * v)
-    if problem.table_dt.size == 0 and not touching(state):
-        return
-    nodes, work = tables.nodes[family], space.work
-    plain, weighted, products = work[PLAIN], work[WEIGHTED], work[PRODUCTS]
-    _scales(nodes, lead, plain, weighted)
-    end = (span / h) ** (1.0 / power)
-    panels = 1 + int(tables.fastest * span / 4.0)
-    for g in range(panels * S):
-        sigma = end * (g // S + tables.nodes[0, g % S]) / panels
-        time = h * sigma**power
-        measure = end * tables.weights[0, g % S] / panels * h * power * sigma ** (power - 1.0)
-        _products(nodes, sigma, products)
-        for u in range(stops + problem.load.shape[0]):
-            if u < stops and state.piece[u] == 0:
-                continue
-            if lead > 0.0 and u == family - 1:
-                impulse = measure * sigma**lead * _between(products, weighted, space.force[u])
-            else:
-                impulse = measure * _between(products, plain, space.force[u])
-            push = problem.push[u] if u < stops else problem.load[u - stops]
-            for b in range(n):
-                alpha, beta = propagate(problem.k[b], problem.c[b], span - time)
-                p, v = push[b] * impulse, push[n + b] * impulse
-                row[b] += alpha * p + beta * v
-                row[n + b] += alpha * v - beta * (problem.k[b] * p + problem.c[b] * v)
-            if u < stops:
-                row[2 * n + 2 + 2 * u] += impulse * _between(products, plain, space.motion[u, 1])
-                row[2 * n + 3 + 2 * u] += impulse
+@inlined
+def _raised(sigma, time_exponent):
+    """σ^power for a whole number."""
+    value = 1.0
+    for _ in range(int(time_exponent)):
+        value *= sigma
+    return value
 
 
 @inner
-def energetic(problem, tables, norms):
-    """Fastest block that carries more than 1e-12 of the energy, or tone, rad/s."""
-    total, fastest, own = 0.0, 1e-3, int(tables.own)
-    for b in range(own):
-        total += norms[b] ** 2
+def _places(tables, scratch, node_set, h, begin, width):
+    """Points of a panel of σ: σ, times after its begin, dt per unit of the panel, and the nodes' polynomials there."""
+    time_exponent, between, nodes = tables.time_exponent[node_set], scratch.between, tables.nodes[node_set]
+    start = h * _raised(begin, time_exponent)
+    for q in range(S):
+        sigma = begin + width * tables.gauss[0, q]
+        pace = h * _raised(sigma, time_exponent - 1.0)
+        scratch.trial[q], scratch.clipped[q], between[_PACE, q] = (
+            sigma,
+            pace * sigma - start,
+            width * time_exponent * pace,
+        )
+    sigma = load8(scratch.trial, 0)
+    for j in range(S):
+        product = splat8(1.0)
+        for i in range(S):
+            if i != j:
+                product = product * (sigma - splat8(nodes[i]))
+        store8(between[j], 0, product)
+
+
+@inner
+def _forces(problem, tables, state, scratch, node_set):
+    """Forces and signals at these points, times dt."""
+    stops, between = problem.gap.size, scratch.between
+    for u in range(scratch.force.shape[0]):
+        if u < stops and state.segment[u] == 0:
+            continue
+        enters, row = u == node_set - 1 and tables.weight_exponent[node_set] > 0.0, between[_PACE + 1 + u]
+        scales, value = tables.lagrange[node_set, 1 if enters else 0], splat8(0.0)
+        for j in range(S):
+            value += splat8(scales[j] * scratch.force[u, j]) * load8(between[j], 0)
+        store8(row, 0, value * load8(between[_PACE], 0))
+        for q in range(S if enters else 0):
+            row[q] *= scratch.trial[q] ** tables.weight_exponent[node_set]
+
+
+@inner
+def _moves(problem, scratch, length):
+    """α, β of every block from the begin of a panel to its points and, by det E = e^{-ct}, back, then to its end."""
     for b in range(problem.k.size):
-        if b >= own or norms[b] ** 2 > 1e-12 * total:
-            fastest = max(fastest, math.sqrt(problem.k[b]) + problem.c[b])
-    return fastest
+        k, c, out = problem.k[b], problem.c[b], scratch.moves[b]
+        for q in range(S):
+            alpha, beta = propagate(k, c, scratch.clipped[q])
+            grown = 1.0 / (alpha * alpha - c * alpha * beta + k * beta * beta)
+            out[0, q], out[1, q] = alpha, beta
+            out[2, q], out[3, q] = grown * (alpha - c * beta), -grown * beta
+        out[4, 0], out[4, 1] = propagate(k, c, length)
+
+
+@inlined
+def _pushed(problem, state, scratch, b, moves):
+    """Into ``scratch.trial`` and ``.clipped`` what moves a block at the points, p and v as of the panel's begin."""
+    n, stops, p, v = problem.k.size, problem.gap.size, splat8(0.0), splat8(0.0)
+    for u in range(scratch.force.shape[0]):
+        if u >= stops or state.segment[u] > 0:
+            push = problem.push[u] if u < stops else problem.load[u - stops]
+            force = load8(scratch.between[_PACE + 1 + u], 0)
+            p += splat8(push[b]) * force
+            v += splat8(push[n + b]) * force
+    alpha, beta = load8(moves[2], 0), load8(moves[3], 0)
+    store8(scratch.trial, 0, alpha * p + beta * v)
+    store8(scratch.clipped, 0, alpha * v - beta * (splat8(problem.k[b]) * p + splat8(problem.c[b]) * v))
 
 
 @inner
-def account(problem, tables, state, space, family, h, length, x, row):
-    """Add to the ledger of ``row`` what loads and damping do over ``length`` of a step of length h from ``x`` on.
+def _move(problem, tables, state, scratch, row):
+    """Blocks at the points of the panel into ``scratch.along``; ``row`` goes on to its end."""
+    n, gauss, weights = problem.k.size, tables.gauss, load8(tables.gauss[1], 0)
+    for b in range(n):
+        k, c, moves = problem.k[b], problem.c[b], scratch.moves[b]
+        p, v = row[b], row[n + b]
+        p_points, v_points = splat8(p), splat8(v)
+        if b < tables.own_blocks:
+            _pushed(problem, state, scratch, b, moves)
+            for r in range(S):
+                share = load8(gauss[_SHARES + r], 0)
+                p_points += splat8(scratch.trial[r]) * share
+                v_points += splat8(scratch.clipped[r]) * share
+            p += sum8(weights * load8(scratch.trial, 0))
+            v += sum8(weights * load8(scratch.clipped, 0))
+        alpha, beta = load8(moves[0], 0), load8(moves[1], 0)
+        store8(scratch.along[b], 0, alpha * p_points + beta * v_points)
+        store8(scratch.along[n + b], 0, alpha * v_points - beta * (splat8(k) * p_points + splat8(c) * v_points))
+        row[b], row[n + b] = moves[4, 0] * p + moves[4, 1] * v, moves[4, 0] * v - moves[4, 1] * (k * p + c * v)
 
-    Gauss's rule in parts of 3 radians of the fastest block that moves at the begin or the end of the step.
+
+@inner
+def _add_works(problem, tables, state, scratch, row):
+    """Works and impulses of the contacts on the panel."""
+    size = 2 * problem.k.size
+    for s in range(problem.gap.size):
+        if state.segment[s] > 0:
+            combine(scratch.along, problem.read_rate[s], size, None, scratch.trial)
+            impulses = load8(tables.gauss[1], 0) * load8(scratch.between[_PACE + 1 + s], 0)
+            row[size + 2 + 2 * s] += sum8(impulses * load8(scratch.trial, 0))
+            row[size + 3 + 2 * s] += sum8(impulses)
+
+
+@inner
+def _add_powers(problem, tables, scratch, row):
+    """What loads and damping do on the panel."""
+    n, own, rows = problem.k.size, int(tables.own_blocks), tables.loss_rows
+    weights, pace = load8(tables.gauss[1], 0), load8(scratch.between[_PACE], 0)
+    for load in range(tables.power_rows.shape[0]):
+        combine(scratch.along, tables.power_rows[load], 2 * n, None, scratch.trial)
+        combine(scratch.along, tables.signal_rows[load], 2 * n, None, scratch.clipped)
+        signal = load8(scratch.between[_PACE + 1 + problem.gap.size + load], 0) + pace * load8(scratch.clipped, 0)
+        row[2 * n] += sum8(weights * signal * load8(scratch.trial, 0))
+    for r in range(rows.shape[0]):
+        if rows.shape[0] > own:  # damping that couples the blocks
+            combine(scratch.along, rows[r], 2 * n, None, scratch.trial)
+        else:
+            value = splat8(rows[r, n + r]) * load8(scratch.along[n + r], 0)
+            for k in range(own, n):
+                value += splat8(rows[r, k]) * load8(scratch.along[k], 0)
+                value += splat8(rows[r, n + k]) * load8(scratch.along[n + k], 0)
+            store8(scratch.trial, 0, value)
+        value = load8(scratch.trial, 0)
+        row[2 * n + 1] += sum8(weights * pace * value * value)
+
+
+@inner
+def state_within(problem, tables, state, scratch, node_set, h, begin, end, row, ledger):
+    """Take ``row`` from ``begin`` to ``end``, s after the start of a contact step of length h whose forces are known.
+
+    Works of the contacts go with it, those of loads and damping with ``ledger`` only.
     """
-    size, inner = 2 * problem.k.size, space.work[WITHIN]
-    energy_norms(problem, x, space.norms)
-    fastest = energetic(problem, tables, space.norms)
-    energy_norms(problem, space.x_new, space.norms)
-    parts = 1 + int(max(fastest, energetic(problem, tables, space.norms)) * length / 3.0)
-    for i in range(tables.gauss.shape[1] * parts):
-        place, weight = tables.gauss[0, i % 8], tables.gauss[1, i % 8]
-        span = length * (i // 8 + place) / parts
-        copy(x, inner, x.size)
-        inside(problem, tables, state, space, family, h, span, inner)
-        gain, loss = powers(problem, tables, state.now[T] + span, inner)
-        row[size] += length / parts * weight * gain
-        row[size + 1] += length / parts * weight * loss
+    time_exponent = tables.time_exponent[node_set]
+    sigma, last = (begin / h) ** (1.0 / time_exponent), (end / h) ** (1.0 / time_exponent)
+    panels = 1 + int(time_exponent * tables.fastest * (end - begin) / _RADIANS)
+    width = (last - sigma) / panels
+    for i in range(panels):
+        _places(tables, scratch, node_set, h, sigma, width)
+        if i == 0 or time_exponent > 1.0:
+            _moves(problem, scratch, h * (_raised(sigma + width, time_exponent) - _raised(sigma, time_exponent)))
+        _forces(problem, tables, state, scratch, node_set)
+        _move(problem, tables, state, scratch, row)
+        _add_works(problem, tables, state, scratch, row)
+        if ledger:
+            _add_powers(problem, tables, scratch, row)
+        sigma += width

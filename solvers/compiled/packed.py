@@ -1,8 +1,8 @@
 """Named tuples of arrays handed to compiled code as one address.
 
 Unboxing a tuple of arrays costs 0.15 µs per array and call, and passing it to a compiled function copies all its
-descriptors. A `Handle` is a pointer to the descriptors, written once: its attributes are those of the tuple, and what
-a kernel does not use it does not load.
+descriptors. `Packed` writes the descriptors once and gives their address; in compiled code `unpacker` turns the address
+into a value with the tuple's attributes, each of which is loaded where it is used.
 """
 
 from __future__ import annotations
@@ -23,57 +23,57 @@ from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, mod
 _META = [0, 0]  # owner and parent of an array: nobody, the tuple is kept alive by Python
 
 
-class Handle(types.Type):
+class PackedType(types.Type):
     """Pointer to the descriptors of a named tuple's arrays."""
 
     def __init__(self, kind: types.NamedTuple) -> None:
         self.kind = kind
-        super().__init__(name=f"Handle({kind.instance_class.__name__})")
+        super().__init__(name=f"Packed({kind.instance_class.__name__})")
 
 
-register_model(Handle)(models.OpaqueModel)
+register_model(PackedType)(models.OpaqueModel)
 
 
 @infer_getattr
 class _Attributes(AttributeTemplate):
     """Types of the attributes: those of the tuple."""
 
-    key = Handle
+    key = PackedType
 
-    def generic_resolve(self, handle: Handle, name: str) -> Any:
-        fields = handle.kind.fields
-        return handle.kind.types[fields.index(name)] if name in fields else None
+    def generic_resolve(self, packed: PackedType, name: str) -> Any:
+        fields = packed.kind.fields
+        return packed.kind.types[fields.index(name)] if name in fields else None
 
 
-@lower_getattr_generic(Handle)
-def _attribute(context, builder, handle, value, name):
-    """Load one array's descriptor, marked as what never changes, so that loops need not look again."""
-    index = handle.kind.fields.index(name)
-    place = builder.bitcast(value, context.get_value_type(handle.kind).as_pointer())
+@lower_getattr_generic(PackedType)
+def _attribute(context, builder, packed, value, name):
+    """Load one array's descriptor, marked as constant memory, so that loops load it once."""
+    index = packed.kind.fields.index(name)
+    place = builder.bitcast(value, context.get_value_type(packed.kind).as_pointer())
     loaded = builder.load(builder.gep(place, [ir.IntType(32)(0), ir.IntType(32)(index)]))
     loaded.set_metadata("tbaa", _constant(builder.module))
     return loaded
 
 
 def _constant(module):
-    """The mark of memory that never changes, in terms of the compiler's type-based alias analysis."""
+    """The mark of constant memory for the compiler's type-based alias analysis."""
     long = ir.IntType(64)
     root = module.add_metadata([ir.MetaDataString(module, "fembeam")])
     kind = module.add_metadata([ir.MetaDataString(module, "descriptor"), root, long(0)])
     return module.add_metadata([kind, kind, long(0), long(1)])
 
 
-def opener(kind: types.NamedTuple) -> Any:
-    """The compiled function that turns an address into a handle."""
+def unpacker(kind: types.NamedTuple) -> Any:
+    """The compiled function that turns the address of a packed named tuple into a value with its attributes."""
 
     @intrinsic
-    def handle(typingctx, address):
+    def packed(typingctx, address):
         def codegen(context, builder, signature, arguments):
             return builder.inttoptr(arguments[0], context.get_value_type(signature.return_type))
 
-        return Handle(kind)(types.int64), codegen
+        return PackedType(kind)(types.int64), codegen
 
-    return handle
+    return packed
 
 
 _EXPECTED: dict[type, list[tuple[Any, int, Any]]] = {}  # by class: hashing a type of so many arrays takes long
@@ -99,7 +99,7 @@ def address_of(array: Any) -> int:
 
 
 def _described(value: Any, kind: types.NamedTuple) -> list[list[int]]:
-    """Of every field the words that describe it: an array's descriptor, or the number itself."""
+    """For every field its 8-byte words: an array's descriptor, or the number itself."""
     found = []
     for name, item, (expected, ndim, dtype) in zip(value._fields, value, _expected(kind), strict=True):
         if dtype is None:
@@ -111,29 +111,27 @@ def _described(value: Any, kind: types.NamedTuple) -> list[list[int]]:
     return found
 
 
-class Packed:
-    """A named tuple with the address of its arrays' descriptors."""
-
-    def __init__(self, value: Any, kind: types.NamedTuple) -> None:
-        self.value, self.block = value, np.array([*chain(*_described(value, kind))], dtype=np.int64)
-        self.address = address_of(self.block)
-
-
-class Cast(NamedTuple):
-    """What a `Mould` makes: a packed named tuple."""
+class Packed(NamedTuple):
+    """A named tuple with the address of the descriptors of its arrays."""
 
     value: Any
-    block: Any  # its own arrays, then the descriptors
+    block: Any  # the descriptors; before them the own arrays of a copy made by `PackedTemplate`
     address: int
+
+    @classmethod
+    def of(cls, value: Any, kind: types.NamedTuple) -> Packed:
+        """Pack a named tuple; TypeError for an array that is not of the declared kind."""
+        block = np.array([*chain(*_described(value, kind))], dtype=np.int64)
+        return cls(value, block, address_of(block))
 
     @property
     def nbytes(self) -> int:
-        """Of what no other cast shares."""
+        """Of the memory that no other one shares."""
         return int(self.block.nbytes)
 
 
-class Mould:
-    """A named tuple to be packed again and again: the arrays named are every cast's own, all casts share the others."""
+class PackedTemplate:
+    """A named tuple to be packed many times: every copy has its own ``own`` arrays, all copies share the others."""
 
     def __init__(self, value: Any, kind: types.NamedTuple, own: Sequence[str]) -> None:
         self.value, described = value, _described(value, kind)
@@ -150,25 +148,25 @@ class Mould:
         words = np.array([*chain(*described)], dtype=np.int64)
         self.block = np.concatenate([*(array.ravel() for array in arrays), words.view(float)])
 
-    def cast(self, **numbers: float) -> Cast:
-        """A new one, to write into its own arrays, with some plain numbers of its own."""
+    def copy(self, **numbers: float) -> Packed:
+        """A new packed tuple with own arrays to write into, and with some plain numbers replaced."""
         block = self.block.copy()
         address = address_of(block)
         block[self.size :].view(np.int64)[self.own] = address + self.offsets
         for name, number in numbers.items():
             block[self.size + self.begins[name]] = number
         arrays = {name: block[place].reshape(shape) for name, place, shape in self.slices}
-        return Cast(self.value._replace(**arrays, **numbers), block, address + 8 * self.size)
+        return Packed(self.value._replace(**arrays, **numbers), block, address + 8 * self.size)
 
 
 def _descriptor(shape: tuple[int, ...], data: int) -> list[int]:
-    """What compiled code knows of a contiguous array of eight-byte numbers."""
+    """Descriptor of a contiguous array of eight-byte numbers, as compiled code reads it."""
     strides = [8 * math.prod(shape[i + 1 :]) for i in range(len(shape))]
     return [*_META, math.prod(shape), 8, data, *shape, *strides]
 
 
 class Layout:
-    """Named tuples whose arrays lie in one block of memory, so that all a run writes to is one allocation."""
+    """Named tuples whose arrays lie in one block of memory: all that a run writes to is one allocation."""
 
     def __init__(self, kinds: list[types.NamedTuple], shapes: list[list[tuple[int, ...]]]) -> None:
         words: list[int] = []
@@ -209,8 +207,8 @@ class Layout:
         part = block[place] if kind == "float64" else block[place].view(kind)
         return part if len(shape) == 1 else part.reshape(shape)
 
-    def exchange(self, block: Any, i: int, j: int, array: Any) -> None:
-        """Let the j-th array of the i-th tuple be another one, of the same kind, which somebody must keep alive."""
+    def replace_array(self, block: Any, i: int, j: int, array: Any) -> None:
+        """Replace the j-th array of the i-th tuple by another of the same kind, which the caller must keep alive."""
         words = _descriptor(array.shape, address_of(array))
         begin = self.size + self.descriptors[i][j]
         block[begin : begin + len(words)].view(np.int64)[:] = words

@@ -1,17 +1,18 @@
-"""The loop of `method` over many starts: one compiled call takes one after the other to the end.
+"""Many starts: one compiled call integrates one start after the other by `method.advance`.
 
-It runs the very machine code of a single run, through its address, so that every bit of the results is the same.
+It calls the machine code of a single run through its address, so that all results are the same bit for bit.
 """
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
 
-from solvers.compiled.handles import opener
 from solvers.compiled.kernels import INTEGERS, MATRIX, PROBLEM, REAL, VECTOR, copy, entry, inner
+from solvers.compiled.packed import unpacker
 from solvers.compiled.state import (
     DIVERGED,
     DONE,
@@ -27,26 +28,26 @@ from solvers.compiled.state import (
     T,
     is_open,
 )
-from solvers.exponential.energy.flight_tables import NO_BOOKS
-from solvers.exponential.energy.guard import ALLOWED, FACTOR, FIRST, LAST, too_much, unknown
+from solvers.exponential.energy.check import ALLOWED, FACTOR, LAST, has_gained
+from solvers.exponential.energy.flight_tables import NO_ENERGY_TABLES
 from solvers.exponential.method import Engine, advance
-from solvers.exponential.preparation import SPACE
+from solvers.exponential.preparation import SCRATCH
 from solvers.problem import COLUMNS, Array, ContactLog, Status
 
-NEXT, BEYOND, BEGUN = range(3)  # places in a cursor: the start at work, the end of its stretch, whether it is under way
-CODE, CONTACTS = range(2)  # columns of Ends.count
-REACHED, EXCHANGED, ENERGY = range(3)  # columns of Ends.number; three of energy, as in Space.energy
+NEXT, BEYOND, BEGUN = range(3)  # places in a cursor: present start, end of the stretch, whether the start has begun
+CODE, CONTACTS = range(2)  # columns of Outcomes.count
+REACHED, EXCHANGED, ENERGY = range(3)  # columns of Outcomes.number; three of energy, as in Scratch.energy
 _STOP, _DELTA, _FORCE = (
     list(ContactLog.__dataclass_fields__).index(n) for n in ("stop", "peak_indentation", "peak_force")
 )
 _CUBE = types.Array(REAL, 3, "C")
 _RUN = types.FunctionType(advance.nopython_signatures[0])
 _NEVER, _NOWHERE = np.array([np.inf]), np.empty((0, 0))
-_problem, _state, _space = opener(PROBLEM), opener(STATE), opener(SPACE)
+_problem, _state, _scratch = unpacker(PROBLEM), unpacker(STATE), unpacker(SCRATCH)
 
 
-class Ends(NamedTuple):
-    """What becomes of k starts."""
+class Outcomes(NamedTuple):
+    """Outcomes of k starts."""
 
     x: Any  # (k, 2N) states of all blocks
     count: Any  # (k, 2) code of the status, number of contacts
@@ -54,8 +55,8 @@ class Ends(NamedTuple):
     peak: Any  # (k, m, 2) largest indentation and force
 
     @classmethod
-    def of(cls, starts: int, width: int, stops: int) -> Ends:
-        """Of starts that have not begun."""
+    def of(cls, starts: int, width: int, stops: int) -> Outcomes:
+        """Those of starts that have not begun."""
         count = np.zeros((starts, 2), dtype=np.int64)
         count[:, CODE] = STATUSES.index(Status.INTERRUPTED)
         x, number = np.full((starts, width), np.nan), np.zeros((starts, 5))
@@ -64,7 +65,7 @@ class Ends(NamedTuple):
 
 @inner
 def _note(stop, delta, force, count, number, peak):
-    """A contact among those of its start."""
+    """Count a contact and its peaks among those of its start."""
     count[CONTACTS] += 1
     number[EXCHANGED] += abs(delta * force)
     peak[stop, 0], peak[stop, 1] = max(peak[stop, 0], delta), max(peak[stop, 1], force)
@@ -84,20 +85,20 @@ def _begin(problem, state, numbers, rest, parameters, start):
 
 
 @inner
-def _end(problem, state, space, code, x, count, number, peak):
-    """The outcome of a run that is over."""
+def _end(problem, state, scratch, code, x, count, number, peak):
+    """Write the outcome of a finished run."""
     finite = True
     for e in range(x.size):
         x[e] = state.x[e]
     for value in state.x:
         finite &= np.isfinite(value)
     for s in range(problem.gap.size):
-        if state.piece[s] > 0 and (problem.levels[s, 0] == 0.0 or problem.opening[s] >= 0) and not is_open(problem, s):
-            _note(s, state.open[s, PEAK_DELTA], state.open[s, PEAK_FORCE], count, number, peak)
+        if state.segment[s] > 0 and (problem.knots[s, 0] == 0.0 or problem.opening[s] >= 0) and not is_open(problem, s):
+            _note(s, state.active[s, PEAK_DELTA], state.active[s, PEAK_FORCE], count, number, peak)
     count[CODE] = DIVERGED if code == DONE and not finite else code
     number[REACHED] = state.now[T]
     for i in range(3):
-        number[ENERGY + i] = space.energy[i]
+        number[ENERGY + i] = scratch.energy[i]
 
 
 @entry(
@@ -107,16 +108,16 @@ def _end(problem, state, space, code, x, count, number, peak):
     )
 )
 def advance_many(
-    run, problem_at, tables_at, state_at, space_at, books_at, numbers, rest, parameters, starts, cursor,
-    t_end, budget, rtol, reach, log, out, due, x, count, number, peak,
+    run, problem_at, tables_at, state_at, scratch_at, energy_tables_at, numbers, rest, parameters, starts, cursor,
+    t_end, budget, rtol, landing_reach, log, out, due, x, count, number, peak,
 ):  # fmt: skip
-    """Take the starts of a stretch to ``t_end`` one after the other, for about ``budget`` steps of them all.
+    """Integrate the starts of a stretch to ``t_end`` one after the other, for about ``budget`` steps altogether.
 
     ``run`` is `method.advance`; ``numbers`` is a workspace's memory and ``rest`` what it holds before a start is added,
     ``parameters`` what the laws have latched then.
-    The last four are the arrays of `Ends`.
+    The last four are the arrays of `Outcomes`.
     """
-    problem, state, space = _problem(problem_at), _state(state_at), _space(space_at)
+    problem, state, scratch = _problem(problem_at), _state(state_at), _scratch(scratch_at)
     spent = 0
     while cursor[NEXT] < cursor[BEYOND] and spent < budget:
         i = cursor[NEXT]
@@ -125,8 +126,9 @@ def advance_many(
             cursor[BEGUN] = 1
         spent -= state.count[STEPS] + state.count[REJECTED]
         code = run(
-            problem_at, tables_at, state_at, space_at, books_at, t_end, budget, rtol, reach, log, out, due
-        )  # fmt: skip
+            *(problem_at, tables_at, state_at, scratch_at, energy_tables_at),
+            *(t_end, budget, rtol, landing_reach, log, out, due),
+        )
         spent += state.count[STEPS] + state.count[REJECTED] + 1
         for row in range(state.count[LOGGED]):
             if log[row, _STOP] < 0.0:  # a border of a law with memory
@@ -134,40 +136,40 @@ def advance_many(
             _note(np.int64(log[row, _STOP]), log[row, _DELTA], log[row, _FORCE], count[i], number[i], peak[i])
         state.count[LOGGED] = 0
         if code != RUNNING and code != LOG_FULL:
-            _end(problem, state, space, code, x[i], count[i], number[i], peak[i])
+            _end(problem, state, scratch, code, x[i], count[i], number[i], peak[i])
             cursor[NEXT], cursor[BEGUN] = i + 1, 0
 
 
 class Worker:
-    """An engine that takes stretches of the starts to their ends; each thread has one of its own."""
+    """An engine that integrates stretches of the starts; each thread has one of its own."""
 
-    def __init__(self, engine: Engine, starts: Array, ends: Ends, budget: int) -> None:
+    def __init__(self, engine: Engine, starts: Array, outcomes: Outcomes, budget: int) -> None:
         self.engine, self.cursor = engine, np.zeros(3, dtype=np.int64)
         workspace, parameters = engine.workspace, engine.prepared.problem.value.parameters
         log = np.empty((max(256, 2 * len(engine.problem.gap)), COLUMNS))
         self.arguments = (
-            *(advance, *engine.addresses, NO_BOOKS.address, workspace.numbers, workspace.rest, parameters),
+            *(advance, *engine.addresses, NO_ENERGY_TABLES.address, workspace.numbers, workspace.rest, parameters),
             *(starts, self.cursor),
-            *(engine.duration, budget, engine.method.rtol, engine.reach, log, _NOWHERE, _NEVER, *ends),
+            *(engine.duration, budget, engine.method.rtol, engine.landing_reach, log, _NOWHERE, _NEVER, *outcomes),
         )
 
-    def take(self, first: int, beyond: int) -> None:
-        """Make these starts the stretch to work at."""
+    def assign(self, first: int, beyond: int) -> None:
+        """Set the stretch of starts to integrate."""
         self.cursor[:] = first, beyond, 0
 
     def march(self) -> bool:
-        """Go on with the stretch for a while; whether it is done."""
+        """Continue with the stretch for about a budget of steps; whether it is done."""
         advance_many(*self.arguments)
         return bool(self.cursor[NEXT] == self.cursor[BEYOND])
 
 
-def judged(engine: Engine, ends: Ends) -> Any:
-    """(k,) `Status` of every start: that of its run, unless it ends with more energy than it can have been given."""
-    status = np.array(STATUSES, dtype=object)[ends.count[:, CODE]]
-    energy = ends.number[:, ENERGY:]
-    slack = unknown(1.0, np.zeros(1), engine.method.rtol) * (energy[:, FIRST] + ends.number[:, EXCHANGED])
-    much = (ends.count[:, CODE] == DONE) & (energy[:, LAST] > FACTOR * (energy[:, ALLOWED] + slack))
+def final_statuses(engine: Engine, outcomes: Outcomes) -> Any:
+    """(k,) `Status` of every start: that of its run, or `UNBALANCED` if it ends with more energy than it was given."""
+    status = np.array(STATUSES, dtype=object)[outcomes.count[:, CODE]]
+    energy = outcomes.number[:, ENERGY:]
+    much = (outcomes.count[:, CODE] == DONE) & (energy[:, LAST] > FACTOR * energy[:, ALLOWED])
     for i in np.flatnonzero(much):
-        if too_much(engine.system, energy[i], engine.problem, engine.duration, slack[i]):
+        exchanged = partial(float, outcomes.number[i, EXCHANGED])
+        if has_gained(engine.system, energy[i], engine.problem, engine.duration, exchanged, engine.method.rtol):
             status[i] = Status.UNBALANCED
     return status

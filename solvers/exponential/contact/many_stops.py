@@ -1,0 +1,134 @@
+"""Contact steps with many stops: forces move the blocks, and the motion of a stop is a sum over the blocks.
+
+Up to `block_tables.FEW` stops there are tables of the response of each stop to each force. Their size, and the part a
+step must load, grow with the square of the number of stops. With more stops ``scratch.block_motion`` holds p and v of
+all blocks at the nodes, without forces or with all of them. The response of one stop to the force of another is summed
+up when both are in contact for the first time, and kept in a pool of bounded size.
+"""
+
+from __future__ import annotations
+
+from solvers.compiled.kernels import inlined, inner, merged
+from solvers.compiled.simd import load8, splat8, store8, sum8
+from solvers.compiled.sums import combine
+from solvers.exponential.contact.nodes import S
+from solvers.exponential.responses import fill_pair
+
+SIGNALS, CONTINUING, ENTERING = range(3)  # groups of inputs: signals, forces without and with the weight σ^λ
+POOL = 4093  # pairs of stops and step lengths, a kilobyte each; prime, so that few of one step share a place
+
+
+@inlined
+def uses_blocks(tables):
+    """Whether there are more stops than have tables of their own."""
+    return tables.node_propagator.shape[1] > 0
+
+
+@inlined
+def weighting_of(tables, node_set, u):
+    """Index of the weighting of input u on a step with given nodes."""
+    return tables.entering[node_set] if u == node_set - 1 else tables.kind[node_set]
+
+
+@merged
+def pair_response(problem, tables, scratch, node_set, level, s, u):
+    """(S, 2S): δ and δ̇ of stop s at the nodes from the node values of input u."""
+    weighting = weighting_of(tables, node_set, u)
+    if uses_blocks(tables):
+        matrix = scratch.pair_pool[_in_pool(problem, tables, scratch, weighting, level, s, u)]
+    else:
+        matrix = tables.forced[weighting, level, u, s]
+    return matrix
+
+
+@inner
+def _in_pool(problem, tables, scratch, weighting, level, s, u):
+    """Index of that response in the pool, for many stops; it is summed up if another pair has its place."""
+    stops, inputs = problem.gap.size, scratch.force.shape[0]
+    key = ((weighting * tables.contact_step.size + level) * stops + s) * inputs + u + 1
+    place = key % scratch.pool_keys.size
+    if scratch.pool_keys[place] != key:
+        push = problem.push[u] if u < stops else problem.load[u - stops]
+        rows = tables.block_response[weighting, level]
+        fill_pair(
+            problem, push, problem.read[s], problem.read_rate[s], rows, scratch.pair_weights, scratch.pair_pool[place]
+        )
+        scratch.pool_keys[place] = key
+    return place
+
+
+@inner
+def free_block_motion(problem, tables, scratch, node_set, level, x):
+    """All blocks at the nodes from the state at the begin of the step, without forces."""
+    n, block_motion = problem.k.size, scratch.block_motion
+    ahead = tables.node_propagator[tables.kind[node_set], level]
+    for b in range(n):
+        p, v = splat8(x[b]), splat8(x[n + b])
+        alpha, beta = load8(ahead[0, b], 0), load8(ahead[1, b], 0)
+        store8(block_motion[b], 0, alpha * p + beta * v)
+        store8(block_motion[n + b], 0, alpha * v - beta * (splat8(problem.k[b]) * p + splat8(problem.c[b]) * v))
+
+
+@inner
+def _sum_pushes(problem, tables, state, scratch, force, node_set, group):
+    """State rates of the blocks by one group of inputs, at the nodes, into ``scratch.block_force``; whether any act."""
+    stops, size, own, found = problem.gap.size, problem.k.size, tables.block_response.shape[3] // 2, False
+    for u in range(force.shape[0]):
+        if (u >= stops) != (group == SIGNALS) or (u < stops and state.segment[u] == 0):
+            continue
+        if u < stops and (u == node_set - 1) != (group == ENTERING):
+            continue
+        push = problem.push[u] if u < stops else problem.load[u - stops]
+        values = load8(force[u], 0)
+        for e in range(2 * own):
+            before = load8(scratch.block_force[e], 0) if found else splat8(0.0)
+            store8(scratch.block_force[e], 0, before + splat8(push[e if e < own else e - own + size]) * values)
+        found = True
+    return found
+
+
+@inner
+def add_block_motion(problem, tables, state, scratch, node_set, level, group):
+    """Add the response to the present forces of one group, or to the signals, to the blocks at the nodes."""
+    if not _sum_pushes(problem, tables, state, scratch, scratch.force, node_set, group):
+        return
+    n, own, block_motion, block_force = (
+        problem.k.size,
+        tables.block_response.shape[3] // 2,
+        scratch.block_motion,
+        scratch.block_force,
+    )
+    weighting = tables.entering[node_set] if group == ENTERING else tables.kind[node_set]
+    for j in range(S):
+        rows = tables.block_response[weighting, level, j]
+        for b in range(own):
+            p, v = block_force[b, j], block_force[own + b, j]
+            alpha, beta = load8(rows[b], 0), load8(rows[own + b], 0)
+            turned = splat8(problem.k[b] * p + problem.c[b] * v)
+            store8(block_motion[b], 0, load8(block_motion[b], 0) + alpha * splat8(p) + beta * splat8(v))
+            store8(block_motion[n + b], 0, load8(block_motion[n + b], 0) + alpha * splat8(v) - beta * turned)
+
+
+@inner
+def add_end_response(problem, tables, state, scratch, force, node_set, level, x):
+    """Add the response at the end of the step to forces and signals to a state."""
+    n, own = problem.k.size, tables.block_response.shape[3] // 2
+    for group in range(0 if problem.table_dt.size else 1, 3):
+        if not _sum_pushes(problem, tables, state, scratch, force, node_set, group):
+            continue
+        weighting = tables.entering[node_set] if group == ENTERING else tables.kind[node_set]
+        ending = tables.block_end_response[weighting, level]
+        for b in range(own):
+            p, v = load8(scratch.block_force[b], 0), load8(scratch.block_force[own + b], 0)
+            alpha, beta = load8(ending[0, b], 0), load8(ending[1, b], 0)
+            x[b] += sum8(alpha * p + beta * v)
+            x[n + b] += sum8(alpha * v - beta * (splat8(problem.k[b]) * p + splat8(problem.c[b]) * v))
+
+
+@inlined
+def motion_at_nodes(problem, scratch, s, gap, out):
+    """δ + gap and δ̇ of stop s at the nodes from the blocks, less ``gap``."""
+    size = 2 * problem.k.size
+    store8(out[0], 0, splat8(-gap))
+    combine(scratch.block_motion, problem.read[s], size, out[0], out[0])
+    combine(scratch.block_motion, problem.read_rate[s], size, None, out[1])

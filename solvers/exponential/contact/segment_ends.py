@@ -1,0 +1,50 @@
+"""Where a segment of a law ends, a step ends: on a surface or knot, on a bend, or on a border of a law with memory.
+
+Another stop may meet its own border before; then that is landed on. What follows is the next segment: the other side
+of a bend, or numbers latched anew.
+"""
+
+from __future__ import annotations
+
+from solvers.compiled.kernels import indentation, inlined, inner
+from solvers.exponential.contact.borders import renew_all, renew_border
+from solvers.exponential.contact.landing import land, land_on_bend
+from solvers.exponential.contact.node_response import LANDED
+
+
+@inner
+def land_first(problem, tables, state, scratch, stop, direction, near, rtol, t_end, out, due, with_energy):
+    """Land on the border met first, be it that of another stop; (stop, direction), or (-1, 0) if not possible."""
+    for _ in range(problem.gap.size + 1):
+        landed = land(problem, tables, state, scratch, stop, direction, near, rtol, t_end, out, due, with_energy)
+        if landed == stop or landed < 0:
+            return landed, direction
+        above = indentation(problem, landed, scratch.stages[LANDED]) > problem.knots[landed, state.segment[landed]]
+        stop, direction = landed, 1 if above else -1
+    return -1, 0
+
+
+@inner
+def land_in_time(problem, tables, state, scratch, stop, first, rtol, t_end, out, due, with_energy):
+    """Land on a bend or border of ``stop``, or on a border met before; (stop, whether it succeeded)."""
+    border, near = scratch.border[0], first
+    for _ in range(problem.gap.size + 1):
+        if land_on_bend(problem, tables, state, scratch, stop, border, near, rtol, t_end, out, due, with_energy):
+            scratch.border[0] = border
+            return stop, True
+        if scratch.border[0] < 0 or scratch.landed[0] < 0:
+            break
+        stop, border = scratch.landed[0], scratch.landed[1]
+    return stop, False
+
+
+@inlined
+def go_beyond(problem, state, scratch, stop, alone, log):
+    """What ends on a bend goes on beyond it: the other side, or numbers latched on a border."""
+    border = scratch.border[0]
+    if border < 0:
+        scratch.side[stop] = -scratch.side[stop]
+    elif alone:
+        renew_border(problem, state, scratch, stop, border, log)
+    else:
+        renew_all(problem, state, scratch, stop, border, log)

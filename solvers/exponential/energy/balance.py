@@ -1,0 +1,317 @@
+"""The energy balance step by step: whole steps by the forms of `flight_tables`, parts of steps by series.
+
+On a part of a step the state is the Taylor series of its differential equation, in panels of `SERIES_REACH` radians of
+the fastest block; the powers are integrated by Gauss's rule with five points, with an error of 2e-12 at most.
+
+A flight is accounted for from a *mark* on: the begin of the flight, the last output or, with sampled signals, the begin
+of the present cell. Between marks, one form covers the time, whatever steps the flight has taken.
+"""
+
+from __future__ import annotations
+
+import math
+
+from solvers.compiled.kernels import copy, dot, inlined, inner, reordered
+from solvers.compiled.simd import load8, splat8, store8, sum8
+from solvers.compiled.state import T
+from solvers.compiled.sums import combine
+from solvers.exponential.contact.collocation import largest_size, unresolved_part
+from solvers.exponential.contact.node_response import WITHIN
+from solvers.exponential.contact.nodes import S
+from solvers.exponential.energy.contact_tables import BEGAN, ENTERING, SQUARES
+from solvers.exponential.energy.quadrature import powers, state_within
+from solvers.exponential.flight import (
+    SERIES_REACH,
+    SERIES_TERMS,
+    add_signals,
+    level_within,
+    propagate_blocks,
+    signal_derivatives,
+)
+
+_TERM_SUM, _MOVING, _MARK = 9, 10, 11  # rows of Scratch.stages; those before hold a load on the blocks and derivatives
+_EXACT = 1e-17  # share of the last term of a series
+_UNSEEN = 10.0  # times what a polynomial leaves out: aliases of fast blocks need not look like the end of a series
+
+
+@reordered
+def _own_loss(plain, x, n):
+    """Energy dissipated by the structure's blocks without tones."""
+    loss, blocks = 0.0, plain.shape[1]
+    for b in range(blocks):
+        p, v = x[b], x[n + b]
+        loss += plain[0, b] * p * p + plain[1, b] * p * v + plain[2, b] * v * v
+    return loss
+
+
+@inner
+def start_account(problem, state, scratch):
+    """Set the mark, from which `account_until` accounts for a flight; the balance of the state is complete."""
+    copy(state.x, scratch.stages[_MARK], 2 * problem.k.size)
+    scratch.stages[_MARK, 2 * problem.k.size] = state.now[T]
+
+
+@inner
+def account_until(problem, tables, energy_tables, scratch, t, row):
+    """Add work and damping of a flight from the mark to t, within one cell, to the balance of ``row``."""
+    x, size = scratch.stages[_MOVING], 2 * problem.k.size
+    copy(scratch.stages[_MARK], x, size)
+    begin = scratch.stages[_MARK, size]
+    span, level = t - begin, tables.flight_step.size
+    if energy_tables.closed > 0.0 and abs(span - energy_tables.spacing) <= _rounding(problem, energy_tables, t):
+        _derive(problem, scratch, begin)
+        _account_forms(problem, energy_tables, scratch, level, x, row)
+        return
+    while energy_tables.closed > 0.0 and tables.fastest * span > SERIES_REACH:
+        level = level_within(tables, span)
+        _derive(problem, scratch, begin)
+        _account_forms(problem, energy_tables, scratch, level, x, row)
+        propagate_blocks(problem, tables.flight_propagator[level, 0], tables.flight_propagator[level, 1], x)
+        if problem.table_dt.size:
+            add_signals(problem, tables.signal[level], x, begin, scratch.signal_terms)
+        begin, span = begin + tables.flight_step[level], span - tables.flight_step[level]
+    if span > 0.0:
+        _account_series(problem, tables, energy_tables, scratch, begin, span, x, row)
+
+
+@inner
+def account_output(problem, tables, energy_tables, state, scratch, t, row):
+    """Complete the balance of an output at t; without sampled signals the mark moves there."""
+    size = 2 * problem.k.size
+    copy(state.x[size:], row[size:], 2)
+    account_until(problem, tables, energy_tables, scratch, t, row)
+    if problem.table_dt.size == 0:
+        copy(row[size:], state.x[size:], 2)
+        copy(row, scratch.stages[_MARK], size)
+        scratch.stages[_MARK, size] = t
+
+
+@inner
+def account_state(problem, tables, energy_tables, state, scratch):
+    """Complete the balance of the state, and set the mark there."""
+    account_until(problem, tables, energy_tables, scratch, state.now[T], state.x)
+    start_account(problem, state, scratch)
+
+
+@inlined
+def _rounding(problem, energy_tables, t):
+    """Difference allowed between the step of the tables and the time between two outputs, or of a cell."""
+    return 1e-7 * energy_tables.spacing if problem.table_dt.size else 4e-16 * t
+
+
+@inner
+def _derive(problem, scratch, t):
+    """Derivatives of the sampled signals at t, into ``scratch.signal_terms``."""
+    for j in range(problem.table_dt.size):
+        signal_derivatives(problem, j, t, scratch.signal_terms[j])
+
+
+@inner
+def _account_forms(problem, energy_tables, scratch, level, x, row):
+    """The same by the forms of a step, from the derivatives of the signals in ``scratch.signal_terms``."""
+    n, driven, given = problem.k.size, energy_tables.driver.size, scratch.energy_sums[0]
+    signals = 6 * problem.table_dt.size
+    for i in range(driven):
+        given[i] = x[energy_tables.driver[i]]
+    for i in range(signals):
+        given[driven + i] = scratch.signal_terms[i // 6, i % 6]
+    sums = scratch.terms
+    combine(energy_tables.rows[level], given, driven + signals, None, sums)
+    gain, loss = dot(sums[0], x, 2 * n), dot(sums[1], x, 2 * n) + _own_loss(energy_tables.plain[level], x, n)
+    if signals:
+        sums, given, half = scratch.energy_sums[1], given[driven:], energy_tables.pairs.shape[2] // 2
+        combine(energy_tables.pairs[level], given, signals, None, sums)
+        gain += dot(sums, given, signals)
+        loss += dot(sums[half:], given, signals)
+    row[2 * n] += gain
+    row[2 * n + 1] += loss
+
+
+@inner
+def _account_series(problem, tables, energy_tables, scratch, t, span, x, row):
+    """The same by series for a part of a cell from x at t on; x is moved to the last panel."""
+    panels, size = max(1, math.ceil(tables.fastest * span / SERIES_REACH - 1e-9)), 2 * problem.k.size
+    for i in range(panels):
+        _clear(scratch, size)
+        _derive(problem, scratch, t + i * span / panels)
+        for j in range(problem.table_dt.size):
+            load = problem.load[problem.table_load[j]]
+            for order in range(scratch.signal_terms.shape[1]):
+                for e in range(size):
+                    scratch.stages[order, e] += load[e] * scratch.signal_terms[j, order]
+        _account_panel(
+            problem, tables, energy_tables, scratch, t + i * span / panels, span / panels, x, row, i + 1 < panels
+        )
+
+
+@inner
+def _clear(scratch, size):
+    """Set the load on the blocks and its derivatives to zero."""
+    for order in range(S):
+        for e in range(size):
+            scratch.stages[order, e] = 0.0
+
+
+@inner
+def _account_panel(problem, tables, energy_tables, scratch, t, span, x, row, further):
+    """Add work and damping under the load in ``scratch.stages`` to the balance of ``row``.
+
+    x is moved to the end of the panel if ``further``. Term i of the series is span^i times a derivative.
+    """
+    n, terms, z = problem.k.size, scratch.terms, scratch.stages[_TERM_SUM]
+    copy(x, terms[0], 2 * n)
+    count, size, power = 1, 1.0, span
+    while count < SERIES_TERMS and (count <= S or size > _EXACT):
+        i, count = count - 1, count + 1
+        size *= tables.fastest * span / (i + 1.0)
+        for b in range(n):
+            p, v = terms[i, b], terms[i, n + b]
+            terms[i + 1, b], terms[i + 1, n + b] = span * v, -span * (problem.k[b] * p + problem.c[b] * v)
+        if i < S:
+            for e in range(2 * n):
+                terms[i + 1, e] += power * scratch.stages[i, e]
+            power *= span
+    points = energy_tables.gauss.shape[1]
+    for q in range(points):
+        combine(terms, energy_tables.series[q], count, None, z)
+        gain, loss = powers(problem, tables, t + span * energy_tables.gauss[0, q], z)
+        row[2 * n] += span * energy_tables.gauss[1, q] * gain
+        row[2 * n + 1] += span * energy_tables.gauss[1, q] * loss
+    if further:
+        combine(terms, energy_tables.series[points], count, None, z)
+        copy(z, x, 2 * n)
+
+
+@inner
+def account_contact(problem, tables, energy_tables, state, scratch, node_set, level, h, row):
+    """Add to the ledger of ``row`` what loads and damping do over the contact step of length h just found."""
+    if level >= energy_tables.first and h <= energy_tables.longest[energy_tables.kind[node_set]]:
+        _account_nodes(
+            problem, tables, energy_tables, state, scratch, node_set, level - int(energy_tables.first), h, row
+        )
+        return
+    x, size = scratch.stages[WITHIN], 2 * problem.k.size
+    copy(state.x, x, state.x.size)
+    state_within(problem, tables, state, scratch, node_set, h, 0.0, h, x, energy_tables.active > 0.0)
+    for s in range(problem.gap.size):
+        if state.segment[s] > 0:
+            _add_unseen(
+                tables, scratch, node_set, h, s, x[size + 2 + 2 * s] - state.x[size + 2 + 2 * s], row[size + 2 :]
+            )
+    copy(x[size:], row[size:], 2)
+
+
+@inner
+def _add_unseen(tables, scratch, node_set, h, s, work, works):
+    """Add of a contact's work what `finish_step` leaves out, which sums at the nodes.
+
+    That is no more than the polynomial through the powers at the nodes may be wrong: so the sum still tests the rest. A
+    force that is constant lets steps grow until the velocity oscillates between the nodes.
+    """
+    weights = tables.weights[node_set] if node_set == 0 or s == node_set - 1 else tables.plain[node_set]
+    powers = load8(scratch.force[s], 0) * load8(scratch.motion[s, 1], 0)
+    store8(scratch.trial, 0, powers)
+    combine(tables.tail[node_set], scratch.trial, S, None, scratch.clipped)
+    most = _UNSEEN * h * unresolved_part(scratch.clipped, largest_size(scratch.trial), 1)
+    works[2 * s] += min(max(work - h * sum8(load8(weights, 0) * powers), -most), most)
+
+
+@inner
+def _steady_nodes(problem, tables, energy_tables, state, scratch, kind, place, h, weights):
+    """Work of the signals on the steady motion; signals at the nodes go to ``energy_sums``, tones to ``terms``."""
+    n, size, gain = int(tables.own_blocks), problem.k.size, 0.0
+    for k in range(size - n):
+        alpha, beta = (
+            load8(energy_tables.steady[kind, place, k, 0], 0),
+            load8(energy_tables.steady[kind, place, k, 1], 0),
+        )
+        p, v = splat8(state.x[n + k]), splat8(state.x[size + n + k])
+        store8(scratch.terms, 2 * S * k, alpha * p + beta * v)
+        store8(scratch.terms, 2 * S * k + S, alpha * v - beta * splat8(problem.k[n + k]) * p)
+    for load in range(tables.power_rows.shape[0]):
+        signal, power = load8(scratch.force[problem.gap.size + load], 0), splat8(0.0)
+        signal += _of_tones(tables.signal_rows[load], scratch, n, size)
+        power += _of_tones(tables.power_rows[load], scratch, n, size)
+        store8(scratch.energy_sums[2 + load], 0, signal)
+        gain += h * sum8(load8(weights, 0) * signal * power)
+    return gain
+
+
+@inlined
+def _of_tones(row, scratch, n, size):
+    """A row's sum over the tones at the nodes."""
+    values = splat8(0.0)
+    for k in range(size - n):
+        values += splat8(row[n + k]) * load8(scratch.terms, 2 * S * k)
+        values += splat8(row[size + n + k]) * load8(scratch.terms, 2 * S * k + S)
+    return values
+
+
+@inlined
+def _block_forces(problem, tables, state, scratch, node_set, b, y):
+    """Forces on a block at the nodes and its state, for plain forces and for that of the stop that enters; signals."""
+    size, signal, plain, entering = problem.k.size, splat8(0.0), splat8(0.0), splat8(0.0)
+    for u in range(problem.gap.size):
+        if state.segment[u] > 0:
+            force = splat8(problem.push[u, size + b]) * load8(scratch.force[u], 0)
+            if _enters(tables, node_set, u):
+                entering += force
+            else:
+                plain += force
+    for load in range(tables.power_rows.shape[0]):
+        plain += splat8(problem.load[load, size + b]) * load8(scratch.force[problem.gap.size + load], 0)
+        signal += splat8(tables.power_rows[load, size + b]) * load8(scratch.energy_sums[2 + load], 0)
+    store8(y, 0, plain)
+    store8(y, 2 * S, entering)
+    y[S], y[S + 1] = state.x[b], state.x[size + b]
+    y[3 * S], y[3 * S + 1] = y[S], y[S + 1]
+    return signal
+
+
+@inlined
+def _enters(tables, node_set, u):
+    """Whether the force of a stop has a weight on a step."""
+    return u == node_set - 1 and tables.weight_exponent[node_set] > 0.0
+
+
+@inner
+def _account_nodes(problem, tables, energy_tables, state, scratch, node_set, place, h, row):
+    """The same by the tables, for a whole step."""
+    n, size, kind, weights = (
+        int(tables.own_blocks),
+        problem.k.size,
+        energy_tables.kind[node_set],
+        load8(tables.plain[node_set], 0),
+    )
+    y, sums, entering = scratch.energy_sums[0], scratch.energy_sums[1], tables.weight_exponent[node_set] > 0.0
+    gain, loss = (
+        _steady_nodes(problem, tables, energy_tables, state, scratch, kind, place, h, tables.plain[node_set]),
+        0.0,
+    )
+    gains, losses = splat8(0.0), splat8(0.0)
+    for b in range(n):
+        signal, p, v = _block_forces(problem, tables, state, scratch, node_set, b, y), state.x[b], state.x[size + b]
+        table, c = energy_tables.contact[kind, place, b], problem.c[b]
+        combine(table, y, S + 2, None, sums)
+        if entering:
+            combine(table[ENTERING:], y[2 * S :], S, sums, sums)
+        moments, squares = load8(sums, 0), load8(sums, S) * load8(y, 0)
+        if entering:
+            combine(table[SQUARES:], y[2 * S :], S + 2, None, sums)
+            squares += load8(sums, 0) * load8(y, 2 * S)
+        store8(scratch.along[b], 0, moments)
+        gains += signal * moments
+        losses += splat8(c) * squares
+        loss += c * (table[BEGAN, 0] * p * p + table[BEGAN, 1] * p * v + table[BEGAN, 2] * v * v)
+        if n < size:
+            steady = _of_tones(tables.loss_rows[b], scratch, n, size)
+            losses += splat8(2.0 * tables.loss_rows[b, size + b]) * steady * moments
+            losses += splat8(h) * weights * steady * steady
+    row[2 * size] += gain + sum8(gains)
+    row[2 * size + 1] += loss + sum8(losses)
+    for s in range(problem.gap.size):
+        if state.segment[s] > 0 and not _enters(tables, node_set, s):
+            combine(scratch.along, problem.read_rate[s, size:], n, None, scratch.trial)
+            steady = splat8(h) * weights * _of_tones(problem.read_rate[s], scratch, n, size)
+            work = sum8(load8(scratch.force[s], 0) * (load8(scratch.trial, 0) + steady))
+            _add_unseen(tables, scratch, node_set, h, s, work, row[2 * size + 2 :])

@@ -1,0 +1,94 @@
+"""Whether the energy of a finished run balances: by its samples, or by a bound that costs nothing if there are none.
+
+The energy handled is the initial energy, the input, the energy dissipated and stored, and for every contact the peak
+force times the peak indentation. A run with an energy balance is refused if the residual exceeds (`MULTIPLE` rtol +
+`ROUNDING`) times the energy handled.
+
+Without a balance, let E be the energy of the motion minus the steady response to tones. At the end it is at most that
+at the begin plus the work of the contacts,
+
+    E <= E₀ + Σ_s (2 max|δ̇_s of the steady response| |∫F_s dt| - ∫F_s δ̇_s dt) =: E_c,
+
+and sampled loads v_l s_l(t) raise √(2E) by at most Σ_l |v_l|_{M⁻¹} ∫|s_l| dt. A run is refused if E is more than
+`FACTOR` times this bound plus the tolerated energy. A run that only loses too much energy passes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from solvers.compiled.kernels import inner
+from solvers.compiled.state import PEAK_FORCE, T
+from solvers.problem import Array, Energy, System, dense
+
+MULTIPLE, ROUNDING = 20.0, 1e-9
+FACTOR = 4.0
+_SAMPLES = 64  # of the balance that are checked, the last one among them
+FIRST, LAST, ALLOWED = range(3)  # places in Scratch.energy
+
+
+@inner
+def own_energy(problem, tables, x):
+    """Energy, J, of the motion minus the steady response to tones."""
+    n, energy = problem.k.size, 0.0
+    for b in range(int(tables.own_blocks)):
+        energy += 0.5 * (x[n + b] * x[n + b] + problem.k[b] * x[b] * x[b])
+    return energy
+
+
+@inner
+def note_energy(problem, tables, state, scratch):
+    """At the end of a run: its energy, and the bound E_c, into ``scratch.energy``."""
+    n = problem.k.size
+    allowed = scratch.energy[FIRST]
+    for s in range(problem.gap.size):
+        steady = 0.0
+        for b in range(int(tables.own_blocks), n):
+            steady += np.hypot(problem.read_rate[s, b], problem.read_rate[s, n + b] * np.sqrt(problem.k[b]))
+        work, impulse = state.x[2 * n + 2 + 2 * s], abs(state.x[2 * n + 3 + 2 * s])
+        if problem.knots[s, 0] < 0.0:  # a force of both signs
+            impulse = state.active[s, PEAK_FORCE] * state.now[T]
+        allowed += 2.0 * steady * impulse - work
+    scratch.energy[LAST], scratch.energy[ALLOWED] = own_energy(problem, tables, state.x), max(allowed, 0.0)
+
+
+def tolerated_energy(handled: float, exchanged: Array, rtol: float) -> float:
+    """Energy, J, that may be missing in the balance of a run.
+
+    ``exchanged`` (k,) : peak force times peak indentation of every contact.
+    """
+    return (MULTIPLE * rtol + ROUNDING) * float(handled + np.abs(exchanged).sum())
+
+
+def has_gained(
+    system: System, energy: Any, sampled: Any, duration: float, exchanged: Callable[[], Any], rtol: float
+) -> bool:
+    """Whether a run without balance ends with more energy than it can have been given; ``sampled`` are its loads.
+
+    ``exchanged`` as in `tolerated_energy`, asked for only where it matters.
+    """
+    first, last, allowed = energy.tolist()
+    if not last > FACTOR * allowed or system.blocks.loss.size:
+        return False
+    allowed += tolerated_energy(first, exchanged(), rtol)
+    if not last > FACTOR * allowed:
+        return False
+    speed = math.sqrt(2.0 * allowed)
+    for j, load in enumerate(sampled.table_load):
+        rows = sampled.table[sampled.table_start[j] : sampled.table_start[j + 1], 0]
+        vector = np.asarray(system.loads[load][0])
+        size = np.sqrt(vector @ np.linalg.solve(dense(system.M), vector))
+        speed += size * np.abs(rows).mean() * duration
+    return bool(last > FACTOR * 0.5 * speed**2)
+
+
+def unbalanced(system: System, powers: Array, motion: Array, begin: Array, exchanged: Array, rtol: float) -> bool:
+    """Whether the energy of a run, given by powers and motion at its samples, is off by more than is tolerated."""
+    rows = np.unique(np.linspace(0, len(powers) - 1, _SAMPLES).astype(int))
+    balance = Energy.of_run(system.M, system.K, powers[rows], motion[rows], begin)
+    parts = balance.initial, *(np.abs(part).max() for part in (balance.stored, balance.input, balance.damping))
+    return not np.abs(balance.residual).max() <= tolerated_energy(sum(parts), exchanged, rtol)
