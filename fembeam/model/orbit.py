@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
     from fembeam.model.model import Model
     from fembeam.model.run import Run
-    from fembeam.scene import Scene
 
 Vector = NDArray[np.float64]
 SAME = 1e-6  # relative distance below which two states are one
