@@ -11,7 +11,7 @@ import fembeam as fb
 import solvers
 from fembeam.cli import commands as cli
 from fembeam.model import extremes_of
-from fembeam.model.orbit import common_period
+from fembeam.model.equations import common_period
 from fembeam.scene import parameters
 
 

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import solvers
-from fembeam.model.orbit import Orbit, checked_period, load_period, orbit
+from fembeam.model.equations import load_period
+from fembeam.model.orbit import Orbit, checked_period, orbit
 from fembeam.scene import changes_structure, path_of, replaced, value_of
 from fembeam.support import Part, Printed, counting, note, require, written_whole
 from solvers.branches import restarted
@@ -95,7 +96,7 @@ class Branch(Printed):
 
     @property
     def special(self) -> list[Orbit]:
-        """Folds, flips, Neimark–Sacker, branch and grazing points."""
+        """Folds, flips, Neimark–Sacker, branch, grazing and stick points."""
         return [one for one in self.orbits if one.mark]
 
     @property
@@ -132,7 +133,7 @@ class Branch(Printed):
         """One row per orbit: parameter, period, stability, largest multiplier, impacts, peaks, residual, mark."""
         rows = []
         for one in self.found.orbits:
-            log, largest = one.contacts, one.multipliers[0]
+            log, largest = one.contacts, one.transverse[0]
             rows.append({
                 self.family.name: one.parameter,
                 "period": self.family.period,
@@ -179,7 +180,7 @@ class Branch(Printed):
         walks = []
         for walk in self.found.walks:
             walks.append([
-                {"parameter": one.parameter, "state": one.state.tolist(), "phase": one.phase, "mark": one.mark,
+                {"parameter": one.parameter, "state": one.whole.tolist(), "phase": one.phase, "mark": one.mark,
                  "residual": one.residual, "iterations": one.iterations}
                 for one in walk.orbits
             ])  # fmt: skip

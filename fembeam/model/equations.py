@@ -5,9 +5,11 @@ q_i'' + 2 ζ_i ω_i q_i' + ω_i² q_i = -Γ_i (ÿ + g) + Σ φ_i(z_f) f + Σ_s w
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Callable
 from dataclasses import fields
+from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -17,8 +19,9 @@ from numpy.typing import ArrayLike
 import reduction
 import solvers
 from fembeam.model.shapes import Shapes, Vector
-from fembeam.scene import contact_rows, loads, static_rows, tangent, weight
+from fembeam.scene import contact_rows, loads, signals_of, static_rows, tangent, weight
 from fembeam.scene.contact_rows import ContactRow
+from fembeam.support import require
 
 if TYPE_CHECKING:
     from fembeam.response import SectionForces
@@ -178,3 +181,24 @@ class ModalEquations:
         from fembeam.model import initial_states
 
         return initial_states.rest(self)
+
+
+def load_period(scene: Scene) -> float:
+    """Period of all loads together, s; an error where there is none."""
+    return common_period(list(signals_of(scene).values()))
+
+
+def common_period(signals: list[Any]) -> float:
+    """Period of some signals together, s."""
+    others = [signal for signal in signals if not hasattr(signal, "tones")]
+    require(not others, "an orbit needs periodic loads", others, "the scene", "use Harmonic or Multisine")
+    omega = np.concatenate([np.asarray(signal.tones()[0], dtype=float) for signal in signals] or [np.zeros(0)])
+    omega = omega[omega > 0.0]
+    require(omega.size > 0, "an orbit needs a load with a period", signals, "the scene", "add base=Harmonic(...)")
+    if omega.size == 1:
+        return 2.0 * math.pi / float(omega[0])
+    ratios = [Fraction(w / omega.min()).limit_denominator(1000) for w in omega]
+    off = max(abs(float(r) * omega.min() / w - 1.0) for r, w in zip(ratios, omega, strict=True))
+    require(off < 1e-9, "the tones have no common period", omega.tolist(), "the scene", "make their ratios rational")
+    common = Fraction(math.gcd(*(r.numerator for r in ratios)), math.lcm(*(r.denominator for r in ratios)))
+    return 2.0 * math.pi / (omega.min() * float(common))

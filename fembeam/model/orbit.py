@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from functools import cached_property
 from textwrap import shorten
 from typing import TYPE_CHECKING, Any
@@ -17,11 +16,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import solvers
-from fembeam.scene import signals_of, unit_of
+from fembeam.model.equations import load_period
+from fembeam.scene import unit_of
 from fembeam.support import Part, Printed, require
 from solvers.orbits import periodic_orbit as periodic
 from solvers.orbits import shooting
 from solvers.orbits import shots as chain
+from solvers.orbits.whole_state import begun, flown
+from solvers.orbits.whole_state import run as run_from
 from solvers.problem import counted
 
 if TYPE_CHECKING:
@@ -29,7 +31,6 @@ if TYPE_CHECKING:
 
     from fembeam.model.model import Model
     from fembeam.model.run import Run
-    from fembeam.scene import Scene
 
 Vector = NDArray[np.float64]
 SAME = 1e-6  # relative distance below which two states are one
@@ -58,8 +59,13 @@ class Orbit(Printed):
 
     @property
     def multipliers(self) -> Any:
-        """Floquet multipliers (2n,), largest first."""
+        """Floquet multipliers, largest first: (2n,), more with laws with memory."""
         return self.found.multipliers
+
+    @property
+    def transitions(self) -> Any:
+        """Borders that laws with memory pass within one period: stick, slip, yielding."""
+        return self.found.transitions
 
     @property
     def stable(self) -> bool:
@@ -78,8 +84,8 @@ class Orbit(Printed):
 
     @property
     def mark(self) -> str:
-        """What is special about it on a branch: "fold", "flip", "neimark-sacker", "branch point", "grazing", "floor",
-        "merging"; else "".
+        """What is special about it on a branch: "fold", "flip", "neimark-sacker", "branch point", "grazing", "stick",
+        "floor", "merging"; else "".
         """
         return self.found.mark
 
@@ -99,6 +105,7 @@ class Orbit(Printed):
     def _parts(self) -> list[Part]:
         """What kind of orbit, its multipliers, its contacts."""
         doubt: list[Part] = [f"in doubt: {self.found.doubt}"] if self.found.doubt else []
+        doubt += self._of_memory()
         multipliers = [(float(abs(one)), float(np.angle(one))) for one in self.multipliers]
         table: Part = ("multiplier |μ|", "angle / rad"), multipliers
         names = "t_in", "t_out", "speed_in", "peak_force"
@@ -110,9 +117,23 @@ class Orbit(Printed):
         ]
         return [repr(self), *doubt, table, *(log if rows else [])]
 
+    def _of_memory(self) -> list[Part]:
+        """What laws with memory do to the orbit: that it is one of a family, how many multipliers are zero."""
+        family, found = self.found.family, list[Part]()
+        if family:
+            which = ", ".join(str(contact) for contact in sorted({contact for contact, _ in family}))
+            count = counted(len(family), "latched number")
+            found.append(f"one of a family: {count} of contact {which} never renewed, each a multiplier 1")
+        if self.found.forgotten:
+            found.append(f"{counted(self.found.forgotten, 'multiplier')} zero: what is latched forgets its past")
+        return found
+
     def __repr__(self) -> str:
         contacts, kind = counted(len(self.contacts), "contact"), "stable" if self.stable else "unstable"
-        return f"<{kind} orbit of period {self.period} with {contacts}, |μ| = {abs(self.multipliers[0]):.4g}>"
+        if self.transitions:
+            contacts += f", {counted(len(self.transitions), 'transition')}"
+        kind += ", one of a family" if self.found.family else ""
+        return f"<{kind} orbit of period {self.period} with {contacts}, |μ| = {abs(self.found.transverse[0]):.4g}>"
 
 
 def extremes_of(t: Vector, u: Vector, v: Vector) -> tuple[float, float]:
@@ -127,27 +148,6 @@ def extremes_of(t: Vector, u: Vector, v: Vector) -> tuple[float, float]:
             found.append((u[:-1] + s * (a + s * (b + s * c)))[inside])
     values = np.concatenate(found)
     return float(values.min()), float(values.max())
-
-
-def load_period(scene: Scene) -> float:
-    """Period of all loads together, s; an error where there is none."""
-    return common_period(list(signals_of(scene).values()))
-
-
-def common_period(signals: list[Any]) -> float:
-    """Period of some signals together, s."""
-    others = [signal for signal in signals if not hasattr(signal, "tones")]
-    require(not others, "an orbit needs periodic loads", others, "the scene", "use Harmonic or Multisine")
-    omega = np.concatenate([np.asarray(signal.tones()[0], dtype=float) for signal in signals] or [np.zeros(0)])
-    omega = omega[omega > 0.0]
-    require(omega.size > 0, "an orbit needs a load with a period", signals, "the scene", "add base=Harmonic(...)")
-    if omega.size == 1:
-        return 2.0 * math.pi / float(omega[0])
-    ratios = [Fraction(w / omega.min()).limit_denominator(1000) for w in omega]
-    off = max(abs(float(r) * omega.min() / w - 1.0) for r, w in zip(ratios, omega, strict=True))
-    require(off < 1e-9, "the tones have no common period", omega.tolist(), "the scene", "make their ratios rational")
-    common = Fraction(math.gcd(*(r.numerator for r in ratios)), math.lcm(*(r.denominator for r in ratios)))
-    return 2.0 * math.pi / (omega.min() * float(common))
 
 
 def orbit(model: Model, period: int, start: ArrayLike | Orbit | None, shots: int | None) -> Orbit:
@@ -186,7 +186,7 @@ def _smallest(orbit: Orbit, once: float) -> int:
         if orbit.period % shorter:
             continue
         later = chain.delayed(orbit.model.system, orbit.found.phase)
-        end = periodic.flown(later, orbit.state, shorter * once, orbit.found.method)
+        end = flown(later, orbit.found.whole, shorter * once, orbit.found.method)[: 2 * n]
         scale = np.concatenate(
             (np.repeat(np.abs(orbit.state[:n]).max(), n), np.repeat(np.abs(orbit.state[n:]).max(), n))
         )
@@ -277,21 +277,21 @@ def _starts(model: Model, once: float, starts: int | Sequence[ArrayLike], seed: 
 def _settle(model: Model, once: float, start: Vector, longest: int, method: Any) -> tuple[Vector, Orbit | None]:
     """Last state of a long run (at a multiple of the load's period), and the orbit it has come to."""
     n = len(model.omega)
-    x = start
+    x = begun(model.system, start)
     for _ in range(3):
         slowest = float((0.5 * model.system.blocks.c)[model.system.blocks.c > 0.0].min(initial=math.inf))
         count = min(max(math.ceil(7.0 / (slowest * once)), 40), 400) + 4 * longest
-        run = solvers.integrate(model.system, x[:n], x[n:], count * once, once, method)
+        run = run_from(model.system, x, count * once, once, method)
         strobes = np.concatenate((run.q, run.q_dot), axis=1)[-3 * longest :]
-        x = strobes[-1]
+        x = np.concatenate((strobes[-1], *run.memory))
         size = np.abs(strobes).max(axis=0)
         for k in range(1, longest + 1):
             if np.all(np.abs(strobes[k:] - strobes[:-k]) <= 1e-3 * size):
                 try:
-                    return x, _once_around(model, x, k, once)
+                    return x[: 2 * n], _once_around(model, x, k, once)
                 except solvers.OrbitError:
                     break
-    return x, None
+    return x[: 2 * n], None
 
 
 def _once_around(model: Model, x: Vector, k: int, once: float) -> Orbit:
@@ -312,8 +312,9 @@ def _same(a: Orbit | None, b: Orbit | None, once: float) -> bool:
     if a.period != b.period or len(a.contacts) != len(b.contacts):
         return False
     x, y = periodic.at_zero(a.found), periodic.at_zero(b.found)
+    n2 = len(a.state)
     for _ in range(a.period):
-        if np.linalg.norm(x - y) <= 1e-5 * np.linalg.norm(x):
+        if np.linalg.norm(x[:n2] - y[:n2]) <= 1e-5 * np.linalg.norm(x[:n2]):
             return True
-        y = periodic.flown(b.model.system, y, once, b.found.method)
+        y = flown(b.model.system, y, once, b.found.method)
     return False

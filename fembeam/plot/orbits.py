@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from fembeam.model import Branch, Orbit
 
 MARKS = {"fold": ("o", GREY), "flip": ("s", RED), "neimark-sacker": ("D", GREEN), "branch point": ("P", "black"),
-         "grazing": ("x", "black"), "floor": ("+", "black"), "merging": ("^", ORANGE)}  # fmt: skip
+         "grazing": ("x", "black"), "stick": ("d", GREEN), "floor": ("+", "black"),
+         "merging": ("^", ORANGE)}  # fmt: skip
 SPAN, CLOSED = "reached the end of the span", "closed"  # ends that are no surprise
 ENDS = "*Xhd8"  # marks of the others, one for each reason
 BEHIND = 400  # points of the linear response

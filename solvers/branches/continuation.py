@@ -22,7 +22,17 @@ from solvers.branches.point import Point, metric_of, point_of
 from solvers.branches.reshooting import reshot
 from solvers.branches.subharmonic_end import Scaled
 from solvers.branches.walk import BranchStatus, Walk
-from solvers.orbits import Orbit, PeriodicProblem, at_zero, checked, checked_start, newton, orbit_of, solved_chain
+from solvers.orbits import (
+    Orbit,
+    PeriodicProblem,
+    at_zero,
+    checked,
+    checked_start,
+    codes,
+    newton,
+    orbit_of,
+    solved_chain,
+)
 from solvers.problem import System, counted
 
 
@@ -92,11 +102,12 @@ class Branch:
         problem = PeriodicProblem(Scaled(old.make, 2.0), old.method, (0.5 * fraction, 0.5 * fraction + 0.5), old.step)
         values, vectors = np.linalg.eig(flip.monodromy)
         v = vectors[:, np.argmin(np.abs(values + 1.0))].real
-        x = np.array([flip.state, flip.state])
-        metric = metric_of(problem, flip.parameter, x, walk.span[1] - walk.span[0])
-        tangent = np.concatenate((v, -v, [0.0]))
+        chain = problem.evaluate(np.array([flip.whole, flip.whole]), flip.parameter)
+        metric = metric_of(problem, chain, walk.span[1] - walk.span[0])
+        turning = np.zeros(len(flip.whole))
+        turning[~codes(flip.system)] = v
+        tangent = np.concatenate((turning, -turning, [0.0]))
         tangent /= math.sqrt(tangent @ metric @ tangent)
-        chain = problem.evaluate(x, flip.parameter)
         orbit = orbit_of(problem, chain, flip.residual, 0, parameter=flip.parameter, mark="flip")
         return Branch([Walk(Point(orbit, problem, chain, tangent, metric), walk.span, walk.largest)])
 
@@ -117,7 +128,7 @@ def branch(
     ----------
     make_system : parameter -> (system, period in s); the systems must agree in size, contacts and loads.
     span : (lowest, highest) value of the parameter.
-    start : an orbit, or a state [q, q̇] at t = 0 near one.
+    start : an orbit, or a state [q, q̇] at t = 0 near one, as for `orbit`.
     at : the parameter there; None: the orbit's own, else ``span[0]``.
     step : largest step along the branch, in units of the span and the first orbit's size.
     shots : per period.
@@ -151,11 +162,11 @@ def branch(
         raise ValueError(f"the start must lie in the span {span}, got {parameter!r}; give at=")
     system, period = make_system(parameter)
     method = checked(system, period, method, shots)
-    first = at_zero(start) if isinstance(start, Orbit) else checked_start(system, start)
+    first = at_zero(start) if isinstance(start, Orbit) else checked_start(system, start, period, method)
     problem, chain, *_ = solved_chain(system, period, first, method, shots)
     problem = replace(problem, make=make_system, step=1e-6 * (high - low))
     chain, error, iterations = newton(problem, chain.x, parameter, slope=True)
-    metric = metric_of(problem, parameter, chain.x, high - low)
+    metric = metric_of(problem, chain, high - low)
     ahead = np.zeros(len(metric))
     ahead[-1] = 1.0
     point = reshot(point_of(problem, chain, error, iterations, metric, ahead))

@@ -114,7 +114,7 @@ def first_grazing(
     orbit = point.orbit
     later = delayed(orbit.system, orbit.phase)
     times, stops = [t for t, _ in begins], (None, *(stop for _, stop in begins))
-    states = [orbit.state, *(flown(later, orbit.state, t, orbit.method) for t in times)]
+    states = [orbit.whole, *(flown(later, orbit.whole, t, orbit.method) for t in times)]
     rest = tuple((orbit.phase + t) / orbit.period for t in (0.0, *times))
     guess = np.concatenate((*states, [point.chain.parameter], [rest[i] for i in _places(stops)]))
     return solved(point, stops, rest, guess, speed, floor, within)
@@ -130,7 +130,7 @@ def solved(
     within: float = math.inf,
 ) -> Grazing:
     """The grazing orbit near a guess, by Newton's method with steps of at most ``within``; raises OrbitError."""
-    problem, size = point.problem, len(point.orbit.state)
+    problem, size = point.problem, len(point.orbit.whole)
     for _ in range(_MOST):
         fractions = _with_meetings(fractions, stops, unknowns)
         states, parameter = np.split(unknowns, [len(stops) * size])[0], float(unknowns[len(stops) * size])
@@ -167,10 +167,10 @@ def _linear(problem: _Meeting, chain: Chain, speed: float) -> tuple[Array, Array
         rate, stop = _rate(chain, place) * period, problem.stops[place] or 0  # of the state there, per period
         later[k, place - 1] += rate
         later[k, place] -= chain.tangents[place] @ rate
-        begin, w, middle = place * size, system.contacts[stop].direction, place * size + size // 2
-        rows[k, 0, begin:middle] = rows[k, 1, middle : begin + size] = -w
+        n, begin, w = system.size, place * size, system.contacts[stop].direction
+        rows[k, 0, begin : begin + n] = rows[k, 1, begin + n : begin + 2 * n] = -w
         rows[k, 0, m * size] = -_gap_slope(problem, chain.parameter, stop)
-        q, q_dot = np.split(chain.x[place], 2)
+        q, q_dot = np.split(chain.x[place, : 2 * n], 2)
         misses += [-q @ w - system.contacts[stop].gap, -q_dot @ w - speed]
     changes = later.reshape(len(places), -1).T
     matrix = np.vstack((np.column_stack((chain.jacobian(), chain.by_parameter.ravel(), changes)), *rows))
@@ -184,10 +184,10 @@ def _gap_slope(problem: PeriodicProblem, parameter: float, stop: int) -> float:
 
 
 def _rate(chain: Chain, place: int) -> Array:
-    """Of the state at the end of the shot before a place, per second."""
+    """Of the state at the end of the shot before a place, per second; what is latched stays."""
     rate = chain.solutions[place - 1].rate
     assert rate is not None
-    return rate
+    return np.concatenate((rate, np.zeros(chain.x.shape[1] - len(rate))))
 
 
 def _length(point: Point, state: Array, parameter: float) -> float:
@@ -226,7 +226,7 @@ def beside(point: Point, grazing: Grazing, sign: float, wanted: tuple[int, int |
 
     Its tangent points away from the grazing orbit. It has the wanted signature; None: any. Raises OrbitError.
     """
-    problem, size = point.problem, len(point.orbit.state)
+    problem, size = point.problem, len(point.orbit.whole)
     by_state, by_parameter, aside = _indicators(point, grazing)
     towards = np.linalg.solve(point.metric[:size, :size], by_state.T)
     ends = unknowns_at(point, grazing)
@@ -252,7 +252,8 @@ def _indicators(point: Point, grazing: Grazing) -> tuple[Array, Array, float]:
     """Derivatives of what changes sign at a grazing orbit, by first state and parameter; how far aside to look."""
     rows, aside = [], _ASIDE[0] * float(point.orbit.contacts.peak_indentation.max(initial=0.0))
     chain, n = grazing.chain, point.orbit.system.size
-    columns = np.eye(2 * n, 2 * n + 1)
+    size = chain.x.shape[1]
+    columns = np.eye(size, size + 1)
     for place in range(1, len(grazing.stops)):
         columns = chain.tangents[place - 1] @ columns
         columns[:, -1] += chain.by_parameter[place - 1]
@@ -261,13 +262,14 @@ def _indicators(point: Point, grazing: Grazing) -> tuple[Array, Array, float]:
             w, rate = -point.orbit.system.contacts[stop].direction, _rate(chain, place)
             row = w @ columns[:n]
             row[-1] -= _gap_slope(point.problem, grazing.parameter, stop)
-            rows.append(w @ columns[n:] - (w @ rate[n:]) / grazing.speed * row if grazing.speed else row)
+            by_rate = w @ columns[n : 2 * n]
+            rows.append(by_rate - (w @ rate[n : 2 * n]) / grazing.speed * row if grazing.speed else row)
     aside = _ASIDE[1] * grazing.speed or aside or _ASIDE[0] * float(np.abs(chain.x[0, :n]).max())
     return np.array(rows)[:, :-1], np.array(rows)[:, -1], aside
 
 
 def _shots(problem: PeriodicProblem, x: Array, parameter: float) -> Array:
-    """States of all shots (m, 2n) of the motion from the first one."""
+    """States of all shots (m, N) of the motion from the first one."""
     (system, _), period = problem.shots(parameter)[0], problem.make(parameter)[1]
     begins = [(fraction - problem.fractions[0]) * period for fraction in problem.fractions]
     return np.array([x, *(flown(system, x, t, problem.method) for t in begins[1:])])

@@ -20,8 +20,7 @@ import numpy as np
 from solvers.branches.grazing import Grazing, beside, first_grazing, orbit_at, signature
 from solvers.branches.merging import led
 from solvers.branches.point import Point
-from solvers.integration import integrate
-from solvers.orbits import Orbit, delayed, latching_stops
+from solvers.orbits import Orbit, delayed, latching_stops, run
 from solvers.orbits.open_times import open_intervals
 from solvers.problem import ContactLog, SolverError
 
@@ -60,7 +59,7 @@ def _nonsmooth(kind: str, stop: int, times: Sequence[float], sign: int, change: 
 def nonsmooth_near(orbit: Orbit) -> list[NonsmoothPoint]:
     """Nonsmooth points an orbit may be near, the nearest first."""
     found: list[tuple[float, NonsmoothPoint]] = []
-    for stop in range(len(orbit.system.contacts)):
+    for stop in (s for s, contact in enumerate(orbit.system.contacts) if not contact.always):
         found += _slow_contacts(orbit, stop)
         found += _new_grazings(orbit, stop)
     found.sort(key=lambda pair: pair[0])
@@ -102,11 +101,11 @@ def _slow_contacts(orbit: Orbit, stop: int) -> Iterator[tuple[float, NonsmoothPo
 def _new_grazings(orbit: Orbit, stop: int) -> Iterator[tuple[float, NonsmoothPoint]]:
     """(closeness, nonsmooth point) of a stop's flights that come near it and contacts that nearly leave it."""
     log, memory = orbit.contacts, stop in latching_stops(orbit.system)
-    n, contact, mine = orbit.system.size, orbit.system.contacts[stop], _in_order(log, stop)
+    contact, mine = orbit.system.contacts[stop], _in_order(log, stop)
     times = np.linspace(0.0, orbit.period, _SAMPLES + 1)
     method = replace(orbit.method, ledger=False)
-    x, later = orbit.state, delayed(orbit.system, orbit.phase)
-    delta = -integrate(later, x[:n], x[n:], orbit.period, times, method).q @ contact.direction - contact.gap
+    later = delayed(orbit.system, orbit.phase)
+    delta = -run(later, orbit.whole, orbit.period, times, method).q @ contact.direction - contact.gap
     scale = _SHALLOW * max(float(log.peak_indentation.max(initial=0.0)), 1e-3 * float(np.abs(delta).max()))
     inner = np.arange(1, _SAMPLES)
     rising, falling = delta[inner] - delta[inner - 1], delta[inner + 1] - delta[inner]

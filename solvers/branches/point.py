@@ -13,10 +13,11 @@ from functools import cached_property
 
 import numpy as np
 
-from solvers.orbits import Border, Chain, Orbit, PeriodicProblem, newton, orbit_of, weights
+from solvers.orbits import Border, Chain, Orbit, PeriodicProblem, extended, newton, orbit_of, weights
 from solvers.problem import Array
 
 _STEEP = 0.02  # parameter's share of the tangent below which the parameter is not what is held fixed
+_LATCHED = 1e-10  # arclength of what is latched, in units of its own size: keeps the metric regular
 _MOST = 9  # iterations of Newton's method on the way
 
 
@@ -48,13 +49,18 @@ class Point:
         return math.sqrt(y @ self.metric @ y)
 
 
-def metric_of(problem: PeriodicProblem, parameter: float, x: Array, width: float) -> Array:
-    """Matrix of the arclength over [states, parameter]."""
-    W = weights(*problem.make(parameter))
+def metric_of(problem: PeriodicProblem, chain: Chain, width: float) -> Array:
+    """Matrix of the arclength over [states, parameter].
+
+    What is latched hardly counts: it jumps while it does not act, and acts on the state where it does.
+    """
+    W, x, (m, whole) = weights(*problem.make(chain.parameter)), chain.x[:, : chain.coordinates], chain.x.shape
     size = float(np.linalg.norm(x @ W.T, axis=1).max()) or 1.0  # an orbit at rest has none
-    m, n2 = x.shape
-    metric: Array = np.zeros((m * n2 + 1, m * n2 + 1))
-    metric[:-1, :-1] = np.kron(np.eye(m), W.T @ W / (m * size**2))
+    each = W.T @ W / (m * size**2)
+    if chain.coordinates < whole:
+        each = extended(each, (_LATCHED / problem.units(chain)) ** 2 / m)
+    metric: Array = np.zeros((m * whole + 1, m * whole + 1))
+    metric[:-1, :-1] = np.kron(np.eye(m), each)
     metric[-1, -1] = 1.0 / width**2
     return metric
 

@@ -1,7 +1,8 @@
 """Shots of a branch that begin later, because a contact has come near one of their begins.
 
 A contact whose law depends on the entry rate must not be under way there. One whose force jumps must not begin or end
-there: the state at a fixed time has a corner where the jump passes it, which Newton's method does not cross.
+there: the state at a fixed time has a corner where the jump passes it, which Newton's method does not cross. Nor may
+a law with memory pass a border there: what it has latched at a fixed time jumps where the border passes it.
 """
 
 from __future__ import annotations
@@ -31,19 +32,20 @@ def reshot(point: Point) -> Point:
     log, period = orbit.contacts, orbit.period
     offsets = [(f - point.problem.fractions[0]) * period for f in point.problem.fractions]
     mine = _to_keep_clear_of(orbit.system, log)
-    ends = np.concatenate((log.t_in[mine], log.t_out[mine]))
+    passed = orbit.transitions.t
+    ends = np.concatenate((log.t_in[mine], log.t_out[mine], passed))
     times = np.concatenate((ends - period, ends, ends + period))
 
     def away(begins: list[float]) -> float:
         return min(float(np.abs(times - t).min(initial=period)) for t in begins)
 
-    if away(offsets) > _MARGIN * period / (1 + len(log)):
+    if away(offsets) > _MARGIN * period / (1 + len(log) + len(passed)):
         return point
-    begins = open_begins(orbit.system, log, period, m, False)
+    begins = open_begins(orbit.system, log, period, m, False, passed if orbit.memory else None)
     if len(begins) < m or not away(begins) > away(offsets):
         return point
     later = delayed(orbit.system, orbit.phase)
-    x = np.array([flown(later, orbit.state, t, orbit.method) for t in begins])
+    x = np.array([flown(later, orbit.whole, t, orbit.method) for t in begins])
     fractions = [(orbit.phase + t) / period for t in begins]
     turns = math.floor(fractions[0])
     problem = replace(point.problem, fractions=tuple(f - turns for f in fractions))

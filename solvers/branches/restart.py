@@ -23,7 +23,10 @@ def restarted(
     step: float,
     method: Any = None,
 ) -> Branch:
-    """A branch from records (parameter, state, phase, mark, iterations) of its orbits per direction, to go on with."""
+    """A branch from records of its orbits per direction, to go on with.
+
+    A record has parameter, state (as `Orbit.whole`), phase, mark, iterations.
+    """
     return Branch(
         [
             _restarted_walk(make_system, span, records, BranchStatus[name], step, method)
@@ -44,7 +47,7 @@ def _restarted_walk(
         x = np.array([record["state"]])
         problem = PeriodicProblem(make, method, (record["phase"] / period,), 1e-6 * width)
         chain, error, _ = newton(problem, x, record["parameter"], slope=True)
-        metric = points[0].metric if points else metric_of(problem, record["parameter"], x, width)
+        metric = points[0].metric if points else metric_of(problem, chain, width)
         moved = np.append(x.ravel(), record["parameter"])
         if points:
             moved = moved - points[-1].unknowns

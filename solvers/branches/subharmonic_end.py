@@ -47,7 +47,7 @@ def subharmonic_end(a: Point, b: Point, fold: Orbit) -> Orbit | None:
 
 def _half_apart(orbit: Orbit) -> Array:
     """d(x) of an orbit."""
-    return flown(delayed(orbit.system, orbit.phase), orbit.state, 0.5 * orbit.period, orbit.method) - orbit.state
+    return flown(delayed(orbit.system, orbit.phase), orbit.whole, 0.5 * orbit.period, orbit.method) - orbit.whole
 
 
 def _flip(a: Point, fold: Orbit) -> Orbit | None:
@@ -56,7 +56,7 @@ def _flip(a: Point, fold: Orbit) -> Orbit | None:
 
     begin = a.problem.fractions[0]
     half = replace(a.problem, make=Scaled(a.problem.make, 0.5), fractions=(2.0 * begin % 1.0,))
-    x = (fold.state + 0.5 * _half_apart(fold))[None, :]
+    x = (fold.whole + 0.5 * _half_apart(fold))[None, :]
 
     def indicator(parameter: float) -> float:
         chain, error, iterations = newton(half, x, parameter)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 import numpy as np
 
 from solvers.branches.bifurcations import ROUNDING, between, indicators_at
 from solvers.branches.grazing import Grazing, signature, unknowns_at
+from solvers.branches.hopping import hopped
 from solvers.branches.nonsmooth import ERRORS, NonsmoothPoint, before, behind, marked, met, nonsmooth_near
 from solvers.branches.point import Point, corrected, cubic, is_straight, moved
 from solvers.branches.reshooting import reshot
@@ -18,6 +19,7 @@ from solvers.orbits import Orbit, OrbitError, is_cut
 from solvers.problem import Array
 
 MOST_ORBITS = 2000
+_CORNER = 1e-5  # arclength step at which a corner is looked for with laws with memory
 _SMALLEST = 1e-8  # arclength step at which a branch counts as lost
 _GOOD = 0.06, 0.1  # distance of a good guess from the branch, in units of the step: on a cubic, on the tangent
 _MANY = 6  # Newton iterations that ask for shorter steps
@@ -73,10 +75,14 @@ class Walk:
 
     def extend(self) -> None:
         """Find the next orbit and the special points before it, or an end of the branch."""
-        following, self.tried = None, math.inf
+        following, self.tried, first = None, math.inf, True
         while following is None:
             h = self.step
             following = self._next() if h >= _SMALLEST else None
+            if following is None and first and self.step < _CORNER:
+                first, point = False, hopped(self.point, self.span)
+                if point is not None:
+                    return self._hop(point)
             if following is None and (self.step < _SMALLEST or h < _AGAIN * self.tried):
                 nonsmooth, self.tried = self._nonsmooth_ahead(h), h
                 if nonsmooth is not None and (nonsmooth[0] is None or self._taken(nonsmooth[0])):
@@ -105,7 +111,9 @@ class Walk:
                 self.orbits += [*special[:place], ending]
                 return False
         self.orbits += [*special, following.orbit]
-        self.before = None if {"grazing", "floor"} & {*marks} else (a, way)  # no cubic across a nonsmooth point
+        self.before = (
+            None if {"grazing", "stick", "floor"} & {*marks} else (a, way)
+        )  # no cubic across a nonsmooth point
         return True
 
     def _nonsmooth_ahead(self, reach: float) -> tuple[Point | None, Point, list[Orbit]] | None:
@@ -152,6 +160,13 @@ class Walk:
         elif len(self.orbits) >= MOST_ORBITS:
             self.status = BranchStatus.LIMIT
 
+    def _hop(self, point: Point) -> None:
+        """Go on behind a corner of laws with memory, marked if the number of transitions changes there."""
+        same = len(point.orbit.transitions) == len(self.point.orbit.transitions)
+        self._cross(None, point, [point.orbit if same else replace(point.orbit, mark="stick")])
+        if point.chain.parameter in self.span:
+            self.status = BranchStatus.END
+
     def _next(self) -> Point | None:
         """The point a step ahead, the one at the end of the span if that is nearer, or None after a shorter step."""
         a, h = self.point, self.step
@@ -166,7 +181,7 @@ class Walk:
         way, aligned = float(a.tangent @ a.metric @ off), float(a.tangent @ a.metric @ b.tangent)
         strayed = math.sqrt(max(float(off @ a.metric @ off) - way**2, 0.0))
         sharp = aligned < _SHARPEST or strayed > 0.5 * way
-        across = signature(a.orbit) != signature(b.orbit)
+        across = signature(a.orbit) != signature(b.orbit) or len(a.orbit.transitions) != len(b.orbit.transitions)
         hops = h < (_THERE if across else _LAST) and way > 0.0 and strayed < _FARTHEST * h
         if (sharp and not hops) or is_cut(b.chain, b.orbit.system):  # one not located is stepped over
             self.step *= 0.2 if len(a.orbit.contacts) != len(b.orbit.contacts) else 0.5
@@ -262,10 +277,10 @@ class Walk:
 
 def _jumped(a: Point, b: Point, marks: list[str]) -> bool:
     """Whether b lies on another branch: the parameter turns, a multiplier passes one, or contacts come, all unseen."""
-    turned = a.share * b.share < 0.0 and not {"fold", "floor"} & {*marks}
+    turned = a.share * b.share < 0.0 and not {"fold", "floor", "stick"} & {*marks}
     first, second = (indicators_at(point)["branch point"] for point in (a, b))
     passed = first * second < 0.0 and min(abs(first), abs(second)) > ROUNDING
-    passed = passed and not {"fold", "floor", "branch point"} & {*marks}
+    passed = passed and not {"fold", "floor", "branch point", "stick"} & {*marks}
     return "grazing" not in marks and (turned or passed or not _same_contacts(a.orbit, b.orbit))
 
 

@@ -1,15 +1,16 @@
 """Periodic motion by shooting, and Lyapunov exponents.
 
 `shots` integrates the parts of a period, `newton` corrects their states, `open_times` chooses where a shot may begin,
-`shooting` puts them together, `periodic_orbit` is the result with its Floquet multipliers. Imports: `integration` and
-the rooms below it. Begin with `shooting.orbit`.
+`whole_state` appends to a state what laws have latched, `shooting` puts all together, `periodic_orbit` is the result
+with its Floquet multipliers. Imports: `integration` and the rooms below it. Begin with `shooting.orbit`.
 """
 
-from solvers.orbits.newton import Border, newton, weights
+from solvers.orbits.newton import Border, extended, newton, weights
 from solvers.orbits.open_times import is_cut, latching_stops, open_begins
-from solvers.orbits.periodic_orbit import Orbit, OrbitError, at_zero, flown, orbit_of
+from solvers.orbits.periodic_orbit import Orbit, OrbitError, at_zero, orbit_of
 from solvers.orbits.shooting import checked, checked_start, misfit, solved_chain
 from solvers.orbits.shots import Chain, PeriodicProblem, delayed
+from solvers.orbits.whole_state import codes, counts, flown, run
 
 __all__ = [
     "Border",
@@ -20,7 +21,10 @@ __all__ = [
     "at_zero",
     "checked",
     "checked_start",
+    "codes",
+    "counts",
     "delayed",
+    "extended",
     "flown",
     "is_cut",
     "latching_stops",
@@ -28,6 +32,7 @@ __all__ = [
     "newton",
     "open_begins",
     "orbit_of",
+    "run",
     "solved_chain",
     "weights",
 ]

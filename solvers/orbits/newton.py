@@ -16,8 +16,12 @@ from solvers.orbits.shots import Chain, PeriodicProblem
 from solvers.problem import Array, SolverError, System
 
 TOLERANCE = 1e-10  # of the residual, in units of the orbit's size
+_ROUGH = (
+    1e-8  # taken with laws with memory if no step is better: a border hardly met is met in one run, not in the next
+)
 _NEARLY = 1e-5  # relative residual after which the next step is expected to be the last
 _MOST_HALVINGS = 6
+_MOST_SEGMENTS = 3  # begins of a period in other segments than it ended with
 _DEEPEST = 1e3  # energy of a stop in units of the motion's: a period spent deeper takes as long as thousands elsewhere
 
 
@@ -30,6 +34,14 @@ def weights(system: System, period: float) -> Array:
     scale = np.sqrt(blocks.k + (2.0 * math.pi / period) ** 2)
     matrix: Array = np.concatenate((scale, np.ones_like(scale)))[:, None] * blocks.inverse
     return matrix
+
+
+def extended(matrix: Array, more: Array) -> Array:
+    """A matrix with further entries on its diagonal."""
+    size = len(matrix)
+    whole = np.diag(np.concatenate((np.zeros(size), more)))
+    whole[:size, :size] = matrix
+    return whole
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,10 +67,10 @@ def newton(
     slope: bool = False,
     most: int = 25,
 ) -> tuple[Chain, float, int]:
-    """Solve the chain from a first guess (m, 2n); returns it with its relative residual and the iterations.
+    """Solve the chain from a first guess; returns it with its relative residual and the iterations.
 
-    With a border the parameter is an unknown too. ``slope`` asks for the derivatives by the parameter of what is
-    returned; ``most`` is the number of iterations allowed. Raises OrbitError.
+    x is (m, N), with what is latched. With a border the parameter is an unknown too. ``slope`` asks for the
+    derivatives by the parameter of what is returned; ``most`` is the number of iterations allowed. Raises OrbitError.
     """
     unknowns = guess = np.append(x.ravel(), parameter)
     measure = _Measure(problem)
@@ -73,11 +85,12 @@ def newton(
                 break
         else:
             break
-        unknowns, chain, error = unknowns + 0.5**halving * step, trial, trial_error
+        unknowns, chain, error = np.append(trial.x.ravel(), unknowns[-1] + 0.5**halving * step[-1]), trial, trial_error
         history.append(error)
-    if error <= TOLERANCE and slope and not chain.has_slope:
+    enough = _ROUGH if chain is not None and chain.coordinates < x.shape[1] else TOLERANCE
+    if error <= enough and slope and not chain.has_slope:
         chain, error = _fire(problem, unknowns, measure, True)
-    if not error <= TOLERANCE:
+    if not error <= enough:
         raise OrbitError(
             f"{len(history)} iterations of Newton's method reduced the residual from {history[0]:.3g} to {error:.3g} "
             "of the motion's size"
@@ -89,7 +102,7 @@ class _Measure:
     """Size of a residual relative to the motion's.
 
     What counts as the motion's size lies between 1e-4 and 1e3 of the first guess's, so that neither running off to
-    infinity nor vanishing passes for convergence or its failure.
+    infinity nor vanishing passes for convergence or its failure. What is latched counts in units of its own size.
     """
 
     def __init__(self, problem: PeriodicProblem) -> None:
@@ -99,13 +112,20 @@ class _Measure:
         """Relative residual."""
         if not self.first:
             self.W = weights(*self.problem.make(chain.parameter))
-        turned = np.concatenate((chain.residual[-1:], chain.residual[:-1]))
-        parts = np.concatenate((chain.x, chain.x + turned, chain.residual)) @ self.W.T
+        x, missed = chain.x[:, : chain.coordinates], chain.residual[:, : chain.coordinates]
+        turned = np.concatenate((missed[-1:], missed[:-1]))
+        parts = np.concatenate((x, x + turned, missed)) @ self.W.T
         squares = np.einsum("ij,ij->i", parts, parts).reshape(3, -1).max(axis=1)
         size, ends, residual = np.sqrt(squares).tolist()
         if not self.first:
             self.first, self.stored = max(size, ends), self._held(chain.x, chain.parameter)
-        return residual / max(min(size, 1e3 * self.first), 1e-4 * self.first, 1e-300)
+        relative: float = residual / max(min(size, 1e3 * self.first), 1e-4 * self.first, 1e-300)
+        return max(relative, self._latched(chain)) if chain.coordinates < chain.x.shape[1] else relative
+
+    def _latched(self, chain: Chain) -> float:
+        """Relative residual of what is latched; a code that differs counts as one."""
+        sizes = np.where(self.problem.codes(chain)[chain.coordinates :], 1.0, self.problem.units(chain))
+        return float((np.abs(chain.residual[:, chain.coordinates :]) / sizes).max())
 
     def too_deep(self, x: Array, parameter: float) -> bool:
         """Whether a guess has left the motion for the inside of a stop."""
@@ -116,6 +136,8 @@ class _Measure:
         system, _ = self.problem.make(parameter)
         most = 0.0
         for contact in system.contacts:
+            if getattr(contact.law, "memory", ()):
+                continue
             delta = float((-x[:, : system.size] @ contact.direction).max()) - contact.gap
             most = max(most, abs(float(contact.law.force(delta, 0.0, 1.0))) * delta if delta > 0.0 else 0.0)
         return most
@@ -128,10 +150,21 @@ def _fire(problem: PeriodicProblem, unknowns: Array, measure: _Measure, slope: b
         if measure.too_deep(x, parameter):
             return None, math.inf
         chain = problem.evaluate(x, parameter, slope)
+        for _ in range(_MOST_SEGMENTS if chain.coordinates < x.shape[1] else 0):
+            if not np.any(chain.residual[:, problem.codes(chain)]):
+                break
+            chain = problem.evaluate(_with_ends(chain), parameter, slope)
         error = measure(chain)
     except (SolverError, ValueError, ArithmeticError):
         return None, math.inf
     return chain, error if math.isfinite(error) else math.inf
+
+
+def _with_ends(chain: Chain) -> Array:
+    """The shots' states with what is latched where the shots before them end."""
+    x = chain.x.copy()
+    x[:, chain.coordinates :] += np.roll(chain.residual, 1, axis=0)[:, chain.coordinates :]
+    return x
 
 
 def _step(chain: Chain | None, moved: Array, border: Border | None) -> Array:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -23,8 +24,13 @@ def latching_stops(system: System) -> list[int]:
     return known
 
 
-def open_intervals(system: System, contacts: ContactLog, period: float) -> list[tuple[float, float]]:
-    """Intervals of a period in which all stops are open; if there are none, all whose law latches the entry rate."""
+def open_intervals(
+    system: System, contacts: ContactLog, period: float, passed: Array | None = None
+) -> list[tuple[float, float]]:
+    """Intervals of a period in which all stops are open; if there are none, all whose law latches the entry rate.
+
+    They are cut where laws with memory have ``passed`` borders.
+    """
     ends = np.where(np.isnan(contacts.t_out), period, contacts.t_out)
     for stops in (range(len(system.contacts)), latching_stops(system)):
         mine = np.isin(contacts.stop, list(stops))
@@ -36,16 +42,23 @@ def open_intervals(system: System, contacts: ContactLog, period: float) -> list[
                 open_spans.append((float(end), float(begin)))
             end = max(end, left)
         if open_spans:
-            return open_spans
+            return open_spans if passed is None else [part for span in open_spans for part in _cut(*span, passed)]
     return []
 
 
-def open_begins(system: System, contacts: ContactLog, period: float, count: int, zero: bool) -> list[float]:
+def _cut(begin: float, end: float, at: Array) -> Iterator[tuple[float, float]]:
+    """The parts of an interval."""
+    return pairwise([begin, *sorted(at[(at > begin) & (at < end)].tolist()), end])
+
+
+def open_begins(
+    system: System, contacts: ContactLog, period: float, count: int, zero: bool, passed: Array | None = None
+) -> list[float]:
     """Times for the begins of ``count`` shots: zero if asked for, then the middles of the longest open intervals.
 
     Fewer when there is no open interval.
     """
-    open_spans = open_intervals(system, contacts, period)
+    open_spans = open_intervals(system, contacts, period, passed)
     begins = [0.0] if zero else []
     while open_spans and len(begins) < count:
         a, b = open_spans.pop(max(range(len(open_spans)), key=lambda i: open_spans[i][1] - open_spans[i][0]))
@@ -55,8 +68,8 @@ def open_begins(system: System, contacts: ContactLog, period: float, count: int,
 
 
 def closed(system: System, x: Array, stops: Sequence[int]) -> bool:
-    """Whether any of these stops is closed in a state."""
-    contacts = [system.contacts[s] for s in stops]
+    """Whether any of these stops is closed in a state; what always acts is no stop."""
+    contacts = [system.contacts[s] for s in stops if not system.contacts[s].always]
     return any(contact.direction @ x[: system.size] + contact.gap < 0.0 for contact in contacts)
 
 

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from solvers.exponential.method import Exponential
-from solvers.integration import integrate
 from solvers.orbits.shots import Chain, PeriodicProblem, delayed
-from solvers.problem import Array, ContactLog, Solution, SolverError, System, counted
+from solvers.orbits.whole_state import codes, counts, derivatives, flown, memory_of, run, transitions_of
+from solvers.problem import Array, ContactLog, Solution, SolverError, System, Transitions, counted
 
+_LOST = 1e-13  # size of a direction after one period, in units of the largest, below which it is forgotten
 _NEAR_ONE = 0.01  # | |μ| - 1 | below which a verdict on stability is doubtful
 
 
@@ -31,16 +32,23 @@ class Orbit:
     state : (2n,) [q, q̇] at time ``phase`` within the period.
     period : s. phase : s, 0 unless a stop whose law latches its entry rate is closed then; on a branch also where a
         contact with such a law, or with one whose force jumps, comes near t = 0.
-    monodromy : (2n, 2n) derivative of the state one period later. multipliers : its eigenvalues, largest first.
+    memory : what each contact has latched then, as `Solution.memory`; empty without laws with memory.
+    monodromy : (2n + r, 2n + r) derivative of the state one period later, the r latched numbers included that are no
+        codes of segments.
+    family : (contact, place in its memory) of what is latched but never renewed within the period, such as a slider
+        that sticks all the time. Other values give other orbits: this is one of a family, the one of the present
+        values. Each gives a multiplier 1, left out of `transverse`.
     residual : size of Φ(x) - x relative to the orbit's. iterations : of Newton's method.
-    contacts : log of one period, times counted from ``phase``.
+    contacts : log of one period, times counted from ``phase``. transitions : likewise of laws with memory; impulse and
+        work are counted from the begin of the shot.
     system, method : of what, and how it was integrated.
     doubt : why `stable` may be wrong; empty when no reason was found.
     parameter : value of the branch's parameter, NaN outside a branch.
-    mark : "fold", "flip", "neimark-sacker", "branch point", "grazing", "floor" or "merging" at special points of a
-        branch, else empty. Two orbits marked "merging" follow each other where a branch jumps because two contacts
+    mark : "fold", "flip", "neimark-sacker", "branch point", "grazing", "stick", "floor" or "merging" at special points
+        of a branch, else empty. Two orbits marked "merging" follow each other where a branch jumps because two contacts
         become one. At a "grazing" or "floor" (an entry rate meets its law's floor) multipliers jump, and the branch may
-        turn back with a corner.
+        turn back with a corner; likewise at a "stick", where the number of `transitions` changes: a phase of stick or
+        slip, a yielding or a reversal comes or goes.
 
     Examples
     --------
@@ -62,45 +70,82 @@ class Orbit:
     doubt: str = ""
     parameter: float = math.nan
     mark: str = ""
+    memory: tuple[Array, ...] = ()
+    family: tuple[tuple[int, int], ...] = ()
+    transitions: Transitions = field(default_factory=lambda: Transitions.of_rows(np.empty((0, 10)), ()))
 
     def __repr__(self) -> str:
         kind = "stable" if self.stable else "unstable"
-        return f"<{kind} orbit of {self.period:.6g} s, {counted(len(self.contacts), 'contact')}>"
+        one = ", one of a family" if self.family else ""
+        return f"<{kind} orbit of {self.period:.6g} s, {counted(len(self.contacts), 'contact')}{one}>"
+
+    @property
+    def whole(self) -> Array:
+        """[q, q̇] with what is latched, (2n + l,)."""
+        return np.concatenate((self.state, *self.memory)) if self.memory else self.state
 
     @cached_property
     def multipliers(self) -> Any:
-        """Floquet multipliers (2n,), largest first."""
-        values = np.linalg.eigvals(self.monodromy)
-        values = values[np.argsort(-np.abs(values), kind="stable")]
-        values.setflags(write=False)
-        return values
+        """Floquet multipliers (2n + r,), largest first: eigenvalues of the monodromy matrix.
+
+        Exactly 1 for each entry of `family`, exactly 0 as often as `forgotten` tells.
+        """
+        return _in_order(np.concatenate((self.transverse, np.ones(len(self.family)))))
+
+    @cached_property
+    def transverse(self) -> Any:
+        """Multipliers but for those of the family."""
+        if not self.memory:
+            return _in_order(np.linalg.eigvals(self.monodromy))
+        real = np.flatnonzero(~codes(self.system)).tolist()
+        first = 2 * self.system.size + np.concatenate(([0], np.cumsum(counts(self.system))))
+        kept = [i for i in range(len(real)) if real[i] not in {int(first[c]) + place for c, place in self.family}]
+        return _in_order(_eigenvalues(self.monodromy[np.ix_(kept, kept)]))
+
+    @property
+    def forgotten(self) -> int:
+        """How many multipliers are zero: what is latched from δ and δ̇ within the period forgets its past."""
+        return int(np.sum(self.transverse == 0.0)) if self.memory else 0
 
     @property
     def stable(self) -> bool:
-        """Whether every multiplier lies within the unit circle."""
-        return bool(np.abs(self.multipliers[0]) < 1.0)
+        """Whether every multiplier but those of the family lies within the unit circle."""
+        return bool(np.abs(self.transverse[0]) < 1.0)
 
     def samples(self, count: int = 400) -> Solution:
         """One period from ``phase`` on at ``count`` + 1 times, times counted from ``phase``."""
-        n, x = self.system.size, self.state
         later = delayed(self.system, self.phase)
         method = replace(self.method, ledger=False) if isinstance(self.method, Exponential) else self.method
-        return integrate(later, x[:n], x[n:], self.period, self.period / count, method)
+        return run(later, self.whole, self.period, self.period / count, method)
+
+
+def _in_order(values: Any) -> Any:
+    """Eigenvalues, largest first, not to be changed."""
+    values = values[np.argsort(-np.abs(values), kind="stable")]
+    values.setflags(write=False)
+    return values
+
+
+def _eigenvalues(matrix: Array) -> Any:
+    """Eigenvalues, those exactly zero that singular values tell of; rounding spreads them if they are multiple."""
+    from scipy.linalg import matrix_balance
+
+    with np.errstate(invalid="ignore"):  # scales beyond the whole numbers
+        matrix, whole = matrix_balance(matrix, permute=False)[0], len(matrix)
+    while len(matrix):
+        u, s, v = np.linalg.svd(matrix)
+        rank = int(np.sum(s > _LOST * s[0]))
+        if rank == len(matrix):
+            break
+        matrix = (s[:rank, None] * v[:rank]) @ u[:, :rank]  # as u S v has, but for the zeros
+    return np.concatenate((np.linalg.eigvals(matrix), np.zeros(whole - len(matrix))))
 
 
 def at_zero(orbit: Orbit) -> Array:
-    """State of an orbit at t = 0."""
+    """State of an orbit at t = 0, with what is latched."""
     if orbit.phase == 0.0:
-        return orbit.state
-    return flown(delayed(orbit.system, orbit.phase), orbit.state, orbit.period - orbit.phase, orbit.method)
-
-
-def flown(system: System, x: Array, duration: float, method: Any) -> Array:
-    """State after a duration."""
-    n = system.size
-    end = integrate(system, x[:n], x[n:], duration, method=method)
-    state: Array = np.concatenate((end.q[-1], end.q_dot[-1]))
-    return state
+        return orbit.whole
+    return flown(delayed(orbit.system, orbit.phase), orbit.whole, orbit.period - orbit.phase, orbit.method)
 
 
 def orbit_of(problem: PeriodicProblem, chain: Chain, residual: float, iterations: int, **more: Any) -> Orbit:
@@ -109,8 +154,16 @@ def orbit_of(problem: PeriodicProblem, chain: Chain, residual: float, iterations
     phase = problem.fractions[0] * period
     logs = [solution.contacts for solution in chain.solutions]
     begins = [fraction * period - phase for fraction in problem.fractions]
+    state, matrix = chain.x[0].copy(), chain.monodromy()
+    if chain.coordinates < len(state):
+        places = [(contact, place) for contact, count in enumerate(counts(system)) for place in range(count)]
+        more["family"] = tuple(places[i - chain.coordinates] for i in chain.frozen)
+        more["memory"] = memory_of(system, state)
+        more["transitions"] = transitions_of(chain.solutions, begins)
+        real = np.flatnonzero(~problem.codes(chain))
+        state, matrix = state[: chain.coordinates], matrix[np.ix_(real, real)]
     return Orbit(
-        *(chain.x[0].copy(), period, phase, chain.monodromy(), residual, iterations),
+        *(state, period, phase, matrix, residual, iterations),
         *(ContactLog.of_period(logs, begins, period), system, problem.method),
         **more,
     )
@@ -118,12 +171,14 @@ def orbit_of(problem: PeriodicProblem, chain: Chain, residual: float, iterations
 
 def judged(orbit: Orbit) -> Orbit:
     """The orbit with the reasons why `stable` may be wrong, checked with a tighter tolerance too."""
-    n, x = orbit.system.size, orbit.state
     tight = replace(orbit.method, rtol=max(0.03 * orbit.method.rtol, 1e-12))
     later = delayed(orbit.system, orbit.phase)
-    again: Any = integrate(later, x[:n], x[n:], orbit.period, method=tight, tangent=True).tangent
+    _, again = derivatives(later, orbit.whole, orbit.period, tight, True)
+    if orbit.memory:
+        real = np.flatnonzero(~codes(orbit.system))
+        again = again[np.ix_(real, real)]
     doubts = list(_doubts(orbit))
-    largest, second = (np.abs(np.linalg.eigvals(matrix)).max() for matrix in (orbit.monodromy, again))
+    largest, second = (abs(one.transverse[0]) for one in (orbit, replace(orbit, monodromy=again)))
     if (largest < 1.0) != (second < 1.0):
         doubts.append(f"a tighter tolerance gives |μ| = {second:.6g} instead of {largest:.6g}")
     return replace(orbit, doubt="; ".join(doubts))
@@ -131,7 +186,7 @@ def judged(orbit: Orbit) -> Orbit:
 
 def _doubts(orbit: Orbit) -> Iterator[str]:
     """Reasons that the orbit itself shows."""
-    largest = abs(orbit.multipliers[0])
+    largest = abs(orbit.transverse[0])
     if abs(largest - 1.0) < _NEAR_ONE:
         yield f"|μ| = {largest:.6g} is within {_NEAR_ONE:g} of one"
     log = orbit.contacts

@@ -10,6 +10,9 @@ matrix, the product of the shots' tangents.
 
 A law that depends on the entry rate needs the past while in contact, so a shot may begin only while every such stop is
 open: `Orbit.phase` is the time within the period to which `Orbit.state` belongs, zero wherever that is possible.
+
+What laws with memory latch is part of the state x, so that a shot may begin anywhere. A latched number that is not
+renewed within the period makes 1 - Φ' singular: it is held where it is, and the orbit is one of a family.
 """
 
 from __future__ import annotations
@@ -22,16 +25,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from solvers.exponential.method import Exponential
-from solvers.integration import integrate
-from solvers.orbits.newton import newton, weights
+from solvers.orbits.newton import extended, newton, weights
 from solvers.orbits.open_times import closed, is_cut, latching_stops, open_begins
-from solvers.orbits.periodic_orbit import Orbit, OrbitError, at_zero, flown, judged, orbit_of
+from solvers.orbits.periodic_orbit import Orbit, OrbitError, at_zero, judged, orbit_of
 from solvers.orbits.shots import Chain, PeriodicProblem
+from solvers.orbits.whole_state import begun, counts, flown, run
 from solvers.problem import Array, System
 from solvers.problem.run_arguments import check_slopes
 
 _MOST_SHOTS = 6
 _MOST_BEGINS = 4  # times that the begins of shots are chosen anew
+_SETTLING = 2.0  # periods that let laws with memory latch, from a start without
+_FRICTION = 20  # at least as many periods of a run from rest with them, since nothing else may damp it
 _MOST_SETTLINGS = 4  # starts taken from a run from rest, a hundred periods apart
 
 
@@ -48,7 +53,8 @@ def orbit(
     ----------
     system : its loads must have the ``period``.
     period : s, > 0; a multiple of the loads' period for subharmonics.
-    start : (2n,) [q, q̇] at t = 0; None: what a run from rest has settled to.
+    start : (2n,) [q, q̇] at t = 0; None: what a run from rest has settled to. With laws with memory also (2n + l,)
+        with what is latched then, as `Orbit.whole` has it; without, they begin anew and latch over two periods.
     method : an `Exponential`; None takes one with rtol 1e-11.
     shots : per period; None: one, then more if one fails.
 
@@ -68,7 +74,7 @@ def orbit(
     """
     method = checked(system, period, method, shots)
     if start is not None:
-        return _near(system, period, checked_start(system, start), method, shots)
+        return _near(system, period, checked_start(system, start, period, method), method, shots)
     x = settled(system, period, method)
     for _ in range(_MOST_SETTLINGS - 1):
         try:
@@ -84,7 +90,7 @@ def _near(system: System, period: float, x: Array, method: Any, shots: int | Non
     for count in [shots] if shots else range(1, _MOST_SHOTS + 1):
         try:
             problem, chain, residual, iterations = solved_chain(system, period, x, method, count)
-            _check_isolated(chain, weights(system, period))
+            _check_isolated(problem, chain)
             return judged(_from_zero(orbit_of(problem, chain, residual, iterations)))
         except OrbitError as error:
             tried.append(f"{count} shot(s): {error}")
@@ -104,9 +110,15 @@ def _from_zero(orbit: Orbit) -> Orbit:
     return orbit_of(problem, chain, residual, orbit.iterations + iterations)
 
 
-def _check_isolated(chain: Chain, W: Array) -> None:
-    """Refuse an orbit whose neighbours are orbits too, to rounding."""
-    away = W @ (chain.monodromy() - np.eye(len(W))) @ np.linalg.inv(W)
+def _check_isolated(problem: PeriodicProblem, chain: Chain) -> None:
+    """Refuse an orbit whose neighbours are orbits too, to rounding, other latched numbers that stay put aside."""
+    W, matrix = weights(*problem.make(chain.parameter)), chain.monodromy()
+    if chain.coordinates < len(matrix):
+        size = np.linalg.norm(chain.x[0, : chain.coordinates] @ W.T)
+        W = extended(W, size / problem.units(chain))
+        kept = np.delete(np.arange(len(matrix)), chain.frozen)
+        W, matrix = W[np.ix_(kept, kept)], matrix[np.ix_(kept, kept)]
+    away = W @ (matrix - np.eye(len(W))) @ np.linalg.inv(W)
     values = np.linalg.svd(away, compute_uv=False)
     if values[-1] <= 1e-12 * max(values[0], 1.0):
         raise OrbitError("the orbit is not isolated: the linearised return map has the eigenvalue 1 to rounding")
@@ -143,20 +155,28 @@ def misfit(system: System, period: float) -> str:
     return ""
 
 
-def checked_start(system: System, start: ArrayLike) -> Array:
-    """A start of the right shape."""
+def checked_start(system: System, start: ArrayLike, period: float, method: Any) -> Array:
+    """A start of the right shape, with what is latched; where that is not given it is what laws come to latch."""
     x = np.array(start, dtype=float)
-    if x.shape != (2 * system.size,) or not np.all(np.isfinite(x)):
-        raise ValueError(f"start must be {2 * system.size} finite numbers [q, q_dot], got {start!r}")
-    return x
+    n2 = 2 * system.size
+    whole = n2 + sum(counts(system))
+    if x.shape not in ((n2,), (whole,)) or not np.all(np.isfinite(x)):
+        more = f", or {whole} with what is latched" if whole > n2 else ""
+        raise ValueError(f"start must be {n2} finite numbers [q, q_dot]{more}, got {start!r}")
+    return x if x.shape == (whole,) else flown(system, begun(system, x), _SETTLING * period, method)
 
 
 def settled(system: System, period: float, method: Any, longest: int = 400) -> Array:
-    """State to which a run from rest has settled: until the slowest block has decayed, at most ``longest`` periods."""
+    """State to which a run from rest has settled: until the slowest block has decayed, at most ``longest`` periods.
+
+    It comes with what is latched.
+    """
     blocks = system.blocks
     slowest = float((0.5 * blocks.c)[blocks.c > 0.0].min(initial=math.inf))
-    count = min(max(1, math.ceil(7.0 / (slowest * period))), longest)
-    return flown(system, np.zeros(2 * system.size), count * period, replace(method, rtol=max(method.rtol, 1e-8)))
+    least = _FRICTION if any(counts(system)) else 1
+    count = min(max(least, math.ceil(7.0 / (slowest * period))), longest)
+    x = begun(system, np.zeros(2 * system.size))
+    return flown(system, x, count * period, replace(method, rtol=max(method.rtol, 1e-8)))
 
 
 def solved_chain(
@@ -178,9 +198,10 @@ def solved_chain(
 
 def _start_chain(system: System, period: float, x: Array, method: Any, count: int) -> tuple[PeriodicProblem, Array]:
     """Shots that begin in open intervals, and a guess of their states from a run over one period."""
-    n = system.size
-    first = integrate(system, x[:n], x[n:], period, method=method)
-    begins = open_begins(system, first.contacts, period, count, not closed(system, x, range(len(system.contacts))))
+    first = run(system, x, period, method=method)
+    passed = first.transitions.t if any(counts(system)) else None
+    zero = not closed(system, x, range(len(system.contacts)))
+    begins = open_begins(system, first.contacts, period, count, zero, passed)
     if not begins and not closed(system, x, latching_stops(system)):
         begins = [0.0]
     if len(begins) < count:

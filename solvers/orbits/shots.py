@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from solvers.integration import integrate
+from solvers.orbits.whole_state import codes, derivatives, end, units
 from solvers.problem import Array, Parameter, Solution, System
 
+_UNIT = 1e-12  # rounding of the derivatives of what is not renewed
 _KEPT = 4  # values of the parameter whose systems are kept: Newton's method asks for them again
 
 
@@ -64,28 +66,42 @@ class PeriodicProblem:
         return self.kept[parameter]
 
     def evaluate(self, x: Array, parameter: float, slope: bool = True) -> Chain:
-        """Fire all shots from x (m, 2n); without ``slope`` the derivatives by the parameter are left out, as zeros."""
+        """Fire all shots from x (m, N); without ``slope`` the derivatives by the parameter are left out, as zeros."""
         here = self.shots(parameter)
-        n, h, m = here[0][0].size, self.step if slope else 0.0, len(here)
+        h, (m, size) = self.step if slope else 0.0, x.shape
         sides = [self.shots(parameter + s * h) for s in (-1.0, 1.0)] if h else []
-        residual, tangents, by_parameter, solutions = np.empty((m, 2 * n)), [], np.zeros((m, 2 * n)), []
+        residual, tangents, by_parameter, solutions = np.empty((m, size)), [], np.zeros((m, size)), []
         for i, (system, duration) in enumerate(here):
             tangent: Any = Parameter(sides[0][i][0], sides[1][i][0], h) if h else True
-            solution = integrate(system, x[i, :n], x[i, n:], duration, method=self.method, tangent=tangent)
-            assert solution.tangent is not None
+            solution, matrix = derivatives(system, x[i], duration, self.method, tangent)
             assert solution.rate is not None
-            residual[i] = np.concatenate((solution.q[-1], solution.q_dot[-1])) - x[(i + 1) % m]
-            tangents.append(solution.tangent[:, : 2 * n])
+            residual[i] = end(solution) - x[(i + 1) % m]
+            tangents.append(matrix[:, :size])
             if h:
                 lengthening = (sides[1][i][1] - sides[0][i][1]) / (2.0 * h)
-                by_parameter[i] = solution.tangent[:, -1] + solution.rate * lengthening
+                by_parameter[i] = matrix[:, -1]
+                by_parameter[i, : 2 * system.size] += solution.rate * lengthening
             solutions.append(solution)
         return Chain(x, parameter, residual, np.array(tangents), by_parameter, solutions, slope or self.step == 0.0)
+
+    def units(self, chain: Chain) -> Array:
+        """Sizes of what is latched, over the period."""
+        systems = [system for system, _ in self.shots(chain.parameter)]
+        rows = zip(systems, chain.x, chain.solutions, strict=True)
+        found: Array = np.max([units(system, x, solution.transitions) for system, x, solution in rows], axis=0)
+        return found
+
+    def codes(self, chain: Chain) -> Any:
+        """Which entries of a state are codes of segments."""
+        return codes(self.make(chain.parameter)[0])
 
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """What the shots from x (m, 2n) gave: residuals (m, 2n), their derivatives (m, 2n, 2n) and by the parameter."""
+    """What the shots from x (m, N) gave: residuals (m, N), their derivatives (m, N, N) and by the parameter.
+
+    N = 2n + l counts [q, q̇] and what is latched, see `whole_state`.
+    """
 
     x: Array
     parameter: float
@@ -96,13 +112,28 @@ class Chain:
     has_slope: bool = True  # whether ``by_parameter`` is known
 
     def jacobian(self) -> Array:
-        """Derivative (m 2n, m 2n) of the residuals by all states."""
+        """Derivative (m N, m N) of the residuals by all states; what is never renewed is held where it is."""
         m, size = self.residual.shape
         matrix = np.zeros((m, size, m, size))
         for i in range(m):
             matrix[i, :, i, :] += self.tangents[i]
             matrix[i, :, (i + 1) % m, :] -= np.eye(size)
+        if len(self.frozen):
+            matrix[-1, self.frozen] = 0.0
+            matrix[-1, self.frozen, 0, self.frozen] = -1.0
         return matrix.reshape(m * size, m * size)
+
+    @property
+    def coordinates(self) -> int:
+        """2n, the length of [q, q̇]."""
+        return 2 * self.solutions[0].q.shape[1]
+
+    @cached_property
+    def frozen(self) -> Any:
+        """Places in a state of what is latched and never renewed within the period."""
+        first, unit = self.coordinates, np.eye(self.x.shape[1])
+        same = np.abs(self.tangents[:, first:] - unit[first:]) < _UNIT
+        return first + np.flatnonzero(same.all(axis=(0, 2)))
 
     def monodromy(self) -> Array:
         """Product of the shots' tangents."""

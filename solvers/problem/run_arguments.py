@@ -27,7 +27,7 @@ def _check_tangent(tangent: Any, method: Any, system: System) -> None:
 
 
 def check_slopes(system: System) -> None:
-    """No law has an infinite slope at its surface, F ~ δ^r with r < 1 but for a declared jump."""
+    """No law has an infinite slope at its surface, F ~ δ^r with r < 1 but for a declared jump or where it has none."""
     system.about_laws.get("finite slopes", lambda: _finite_slopes(system))
 
 
@@ -36,7 +36,7 @@ def _finite_slopes(system: System) -> bool:
     delta = np.array([1e-12, 1e-10])
     for i, contact in enumerate(system.contacts):
         viscous = contact.law.force(delta, 1.0, 1.0) - contact.law.force(delta, 0.0, 1.0)
-        if not contact.law.jump and 0.0 < abs(viscous[1]) < 95.0 * abs(viscous[0]):
+        if not (contact.law.jump or contact.always) and 0.0 < abs(viscous[1]) < 95.0 * abs(viscous[0]):
             trouble = f"its slope is infinite at the surface: {contact.law!r}"
             raise ValueError(f"tangent is not offered for the law of contact {i}: {trouble}")
     return True

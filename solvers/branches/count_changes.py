@@ -1,0 +1,180 @@
+"""Where orbits between two points of a branch gain or lose contacts or transitions, or pass an entry rate's floor."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from solvers.orbits import Orbit, OrbitError, latching_stops
+from solvers.problem import Array
+
+if TYPE_CHECKING:
+    from solvers.branches.bifurcations import Segment
+
+_AT = 1e-4  # entry rate less the floor, in units of it, at what passes for a point of this
+_MOST_TRIALS = 25
+_SAME = 1e-6  # relative difference of states that are the same
+_MOST_TRIALS_OF_GRAZING = 60  # more than halving alone takes: with rounding left in an indentation, no secant is of use
+_MOST_GRAZINGS = 4  # looked for between two points
+
+
+def zero(segment: Segment, begin: float, end: float, value: Callable[[float], float]) -> tuple[float, Orbit] | None:
+    """(arclength, orbit) where a function of the arclength changes its sign; None where no orbit is found."""
+    from scipy.optimize import brentq
+
+    found: dict[float, tuple[float, Orbit]] = {}
+
+    def nearby(s: float) -> float:
+        found[s] = segment.near(s, end - begin)
+        return value(found[s][0])
+
+    try:
+        place, _ = brentq(
+            *(nearby, begin, end),
+            **{"xtol": segment.sharpness(), "maxiter": _MOST_TRIALS, "full_output": True, "disp": False},
+        )
+        return found[place]
+    except (OrbitError, np.linalg.LinAlgError, IndexError, KeyError):
+        return None
+
+
+def nonsmooth_points(segment: Segment) -> Iterator[tuple[float, Orbit]]:
+    """(arclength, orbit) where the number of contacts changes, and where an entry rate passes its law's floor."""
+    begin, first = 0.0, segment.a.orbit
+    for _ in range(_MOST_GRAZINGS):
+        if len(first.contacts) == len(segment.b.orbit.contacts):
+            break
+        found = _grazing(segment, begin, first)
+        if found is None:
+            return
+        near, place, grazed, behind, last = found
+        yield from _floors(segment, begin, near)
+        yield place, replace(grazed, mark="grazing")
+        begin, first = behind, last
+    yield from _floors(segment, begin, segment.way)
+    if len(segment.a.orbit.contacts) == len(segment.b.orbit.contacts):
+        yield from _sticks(segment)
+
+
+def _sticks(segment: Segment) -> Iterator[tuple[float, Orbit]]:
+    """(arclength, orbit) where the number of transitions changes."""
+    begin, first = 0.0, segment.a.orbit
+    for _ in range(_MOST_GRAZINGS):
+        if len(first.transitions) == len(segment.b.orbit.transitions):
+            return
+        found = _grazing(segment, begin, first, "transitions")
+        if found is None:
+            return
+        _, place, at, begin, first = found
+        yield place, replace(at, mark="stick")
+
+
+def _floors(segment: Segment, begin: float, end: float) -> Iterator[tuple[float, Orbit]]:
+    """(arclength, orbit) where an entry rate passes its law's floor, between two places of as many contacts."""
+    first, last = (_over_floor(segment.orbit(s)) for s in (begin, end))
+    for number in np.flatnonzero(first * last < 0.0) if len(first) == len(last) else ():
+
+        def over(s: float, number: int = int(number)) -> float:
+            return float(_over_floor(segment.orbit(s))[number])
+
+        pair = zero(segment, begin, end, over)
+        if pair is not None and np.abs(_over_floor(pair[1])).min(initial=1.0) < _AT:  # else it only jumped
+            yield pair[0], replace(pair[1], mark="floor")
+
+
+def _over_floor(orbit: Orbit) -> Array:
+    """Entry rate less the floor, in units of it, of every contact in the order of stops and time; 1 where none acts."""
+    log, over = orbit.contacts, np.ones(len(orbit.contacts))
+    for stop in latching_stops(orbit.system):
+        mine, floor = log.stop == stop, orbit.system.contacts[stop].law.entry_rate_floor
+        over[mine] = log.speed_in[mine] / floor - 1.0 if floor else 1.0
+    ordered: Array = over[np.lexsort((log.t_in, log.stop))]
+    return ordered
+
+
+def _grazing(
+    segment: Segment, begin: float, first: Orbit, log: str = "contacts"
+) -> tuple[float, float, Orbit, float, Orbit] | None:
+    """Where the number of contacts changes first after a place: place before, place, orbit, place and orbit behind.
+
+    There the shallowest contact's indentation goes to zero, or the flight between two contacts that become one; of
+    "transitions" the time between two.
+    """
+    last, behind = segment.b.orbit, segment.way
+    more = _count(last, log) > _count(first, log)  # whether contacts are added on the way
+    distance: Callable[[Orbit], float] = _shortest_phase
+    if log == "contacts":
+        distance = _distance(last, first) if more else _distance(first, last)
+    near, near_orbit = begin, first
+    known = [(behind, distance(last)) if more else (begin, distance(first))]  # on the side with more contacts
+    sharp = segment.sharpness()
+    for _ in range(_MOST_TRIALS_OF_GRAZING):
+        grazed, bare = (behind, near) if more else (near, behind)
+        place = 0.5 * (grazed + bare)
+        root = grazed + 2.0 * sharp
+        if len(known) > 1 and known[-1][1] != known[-2][1]:
+            (s0, f0), (s1, f1) = known[-2:]
+            root = s1 - f1 * (s1 - s0) / (f1 - f0)
+            if min(bare, grazed) < root < max(bare, grazed):
+                place = root + 0.01 * (grazed - root)
+        if abs(behind - near) <= sharp or abs(root - grazed) <= sharp:
+            if abs(behind - near) <= sharp and _parted(near_orbit, last):
+                return None
+            at, touching = (behind, last) if more else (near, near_orbit)
+            return near, at, touching, behind, last
+        try:
+            place, orbit = segment.near(place, behind - near)
+        except OrbitError:
+            return None
+        same = _count(orbit, log) == _count(first, log)
+        if same:
+            near, near_orbit = place, orbit
+        else:
+            behind, last = place, orbit
+        if same != more:
+            known.append((place, distance(orbit)))
+    return None
+
+
+def _count(orbit: Orbit, log: str) -> int:
+    """Number of contacts or transitions."""
+    return len(getattr(orbit, log))
+
+
+def _parted(a: Orbit, b: Orbit) -> bool:
+    """Whether two orbits at one place of the branch differ: it jumps there, as where two contacts merge."""
+    return bool(np.abs(a.state - b.state).max() > _SAME * np.abs(a.state).max())
+
+
+def _distance(more: Orbit, less: Orbit) -> Callable[[Orbit], float]:
+    """What goes to zero where an orbit loses a contact another has."""
+    a, b = more.contacts, less.contacts
+    apart = (a.t_in[:, None] > b.t_out) | (a.t_out[:, None] < b.t_in) | (a.stop[:, None] != b.stop)
+    return _shallowest if np.any(np.all(apart, axis=1)) else _shortest_flight
+
+
+def _shallowest(orbit: Orbit) -> float:
+    """Smallest peak indentation of an orbit's contacts."""
+    return float(orbit.contacts.peak_indentation.min(initial=np.inf))
+
+
+def _shortest_phase(orbit: Orbit) -> float:
+    """Square of the shortest time between two transitions of a contact: it vanishes like a root."""
+    log, shortest = orbit.transitions, orbit.period
+    for contact in np.unique(log.contact):
+        times = np.unique(log.t[log.contact == contact])
+        shortest = min(shortest, float(np.diff(times, append=times[0] + orbit.period).min()))
+    return shortest**2
+
+
+def _shortest_flight(orbit: Orbit) -> float:
+    """Square of the shortest time between two contacts of one stop: it vanishes like a root."""
+    log, shortest = orbit.contacts, orbit.period
+    for stop in np.unique(log.stop):
+        mine = log.stop == stop
+        begins, ends = np.sort(log.t_in[mine]), np.sort(log.t_out[mine])
+        shortest = min(shortest, float((np.append(begins[1:], begins[0] + orbit.period) - ends).min()))
+    return shortest**2

@@ -1,0 +1,47 @@
+"""Over points where laws with memory begin or cease to latch, and the branch has a corner that steps do not find.
+
+What is never latched stays where it is, that is one orbit of a family. Where its border is met it begins to move: with
+the parameter as slowly as the orbit asks for, or to another branch of orbits. The motion itself tells how: it is
+continued from the last orbit for some periods at a parameter hardly farther, and Newton's method goes on from there.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from solvers.branches.point import Point, corrected, point_of
+from solvers.orbits import OrbitError, flown
+from solvers.problem import SolverError
+
+_SHARES = 1e-5, 1e-4, 1e-3, 1e-2  # of the span: how far the parameter goes
+_PERIODS = 30  # of the motion there
+_FARTHEST = 20.0  # distance of the orbit there, in units of that on the tangent, beyond which it is of another branch
+
+
+def hopped(a: Point, span: tuple[float, float]) -> Point | None:
+    """The first point found behind a corner near a point, None without laws with memory and where none is found."""
+    for share in _SHARES if a.orbit.memory else ():
+        try:
+            return _behind(a, share, span)
+        except (SolverError, np.linalg.LinAlgError, ValueError, ArithmeticError):
+            continue
+    return None
+
+
+def _behind(a: Point, share: float, span: tuple[float, float]) -> Point:
+    """The point at a parameter farther by a share of the span; raises OrbitError among others."""
+    way = math.copysign(share * (span[1] - span[0]), a.share)
+    parameter = min(max(a.chain.parameter + way, span[0]), span[1])
+    shots, x = a.problem.shots(parameter), a.chain.x[0]
+    states = []
+    for number in range(_PERIODS * len(shots) if a.orbit.stable else len(shots)):
+        states.append(x)
+        x = flown(shots[number % len(shots)][0], x, shots[number % len(shots)][1], a.problem.method)
+    guess = np.append(np.concatenate(states[-len(shots) :]), parameter)
+    chain, error, iterations = corrected(a, guess, True, True)
+    off = np.append(chain.x.ravel(), parameter) - a.unknowns
+    if not 0.0 < math.sqrt(off @ a.metric @ off) * abs(a.share) < _FARTHEST * share:
+        raise OrbitError("the motion goes over to another branch")
+    return point_of(a.problem, chain, error, iterations, a.metric, off)

@@ -1,0 +1,120 @@
+"""States with what laws have latched: x = [q, q̇, L], L the latched numbers of all contacts in a row.
+
+Codes of segments are among L. They are whole numbers, rounded when a run begins, and nothing is differentiated by them.
+Without laws with memory L is empty and x is [q, q̇].
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from solvers.integration import integrate
+from solvers.problem import Array, Parameter, Solution, System, Transitions
+
+_REALS = ctypes.POINTER(ctypes.c_double)
+_AT = ctypes.c_int64, ctypes.c_double, ctypes.c_double, ctypes.c_double, _REALS  # border, δ, δ̇, entry rate, parameters
+_RENEW, _SLOPES = ctypes.CFUNCTYPE(ctypes.c_int64, *_AT), ctypes.CFUNCTYPE(None, *_AT, _REALS)
+
+
+def counts(system: System) -> list[int]:
+    """How many numbers each contact latches."""
+    return [len(getattr(contact.law, "memory", ())) for contact in system.contacts]
+
+
+def codes(system: System) -> Any:
+    """Which entries of x are codes of segments."""
+
+    def found() -> Any:
+        own = [_slopes(contact.law, np.array(contact.law.parameters)) for contact in _remembering(system)]
+        real = [np.diag(slopes[:, 2:]) != 0.0 for slopes in own]
+        return ~np.concatenate((np.ones(2 * system.size, dtype=bool), *real))
+
+    return system.about_laws.get(("codes", system.size), found)
+
+
+def _remembering(system: System) -> list[Any]:
+    """The contacts whose law has a memory."""
+    return [contact for contact, count in zip(system.contacts, counts(system), strict=True) if count]
+
+
+def begun(system: System, x: Array) -> Array:
+    """A state [q, q̇] with what the laws begin with."""
+    latched = [np.asarray(one.law.parameters)[list(one.law.memory)] for one in _remembering(system)]
+    return np.concatenate((x, *latched)) if latched else x
+
+
+def memory_of(system: System, x: Array) -> tuple[Array, ...]:
+    """What each contact has latched in a state, codes rounded; empty without laws with memory."""
+    own = counts(system)
+    if not any(own):
+        return ()
+    latched = np.where(codes(system), np.round(x), x)[2 * system.size :]
+    return tuple(np.split(latched, np.cumsum(own)[:-1]))
+
+
+def run(system: System, x: Array, duration: float, dt: Any = None, method: Any = None, **more: Any) -> Solution:
+    """A run from a state."""
+    n, memory = system.size, memory_of(system, x)
+    return integrate(system, x[:n], x[n : 2 * n], duration, dt, method, memory=memory or None, **more)
+
+
+def end(solution: Solution) -> Array:
+    """The state a run ends with."""
+    state: Array = np.concatenate((solution.q[-1], solution.q_dot[-1], *solution.memory))
+    return state
+
+
+def flown(system: System, x: Array, duration: float, method: Any) -> Array:
+    """State after a duration."""
+    return end(run(system, x, duration, method=method))
+
+
+def derivatives(system: System, x: Array, duration: float, method: Any, tangent: Any) -> tuple[Solution, Array]:
+    """A run, and the derivative of the state it ends with by the one it begins with, then by a parameter."""
+    solution = run(system, x, duration, method=method, tangent=tangent)
+    matrix = solution.tangent if solution.memory_tangent is None else solution.memory_tangent
+    assert matrix is not None
+    if solution.memory_tangent is None:
+        return solution, matrix
+    if isinstance(tangent, Parameter) and matrix.shape[1] == len(x):
+        behind, ahead = (flown(side, x, duration, method) for side in (tangent.behind, tangent.ahead))
+        matrix = np.column_stack((matrix, (ahead - behind) / (2.0 * tangent.step)))
+    without = np.flatnonzero(codes(system))
+    matrix[without] = matrix[:, without] = 0.0
+    return solution, matrix
+
+
+def units(system: System, x: Array, log: Transitions) -> Array:
+    """Size of each latched number over a run from x: of its values, and of what its renewals take from δ and δ̇."""
+    sizes: list[Array] = []
+    for number, latched in enumerate(memory_of(system, x)):
+        law: Any = system.contacts[number].law
+        row, places, size = np.array(law.parameters, dtype=float), list(getattr(law, "memory", ())), np.abs(latched)
+        row[places] = latched
+        for i in np.flatnonzero(log.contact == number) if places else ():
+            at = int(log.border[i]), float(log.delta[i]), float(log.delta_dot[i])
+            taken = np.abs(_slopes(law, row, *at)[:, :2] * at[1:]).max(axis=1)
+            _RENEW(law.renew_address)(*at, 1.0, row.ctypes.data_as(_REALS))
+            size = np.maximum(size, np.maximum(taken, np.abs(row[places])))
+        sizes.append(np.where(size > 0.0, size, 1.0))
+    return np.concatenate((np.zeros(0), *sizes))
+
+
+def _slopes(law: Any, row: Array, border: int = -1, delta: float = 0.0, rate: float = 0.0) -> Array:
+    """Derivatives (l, 2 + l) of a renewal by δ, δ̇ and what is latched; border -1: of none, zero for codes."""
+    count = len(law.memory)
+    out = np.zeros((count, 2 + count))
+    _SLOPES(law.renew_gradient_address)(border, delta, rate, 1.0, *(a.ctypes.data_as(_REALS) for a in (row, out)))
+    return out
+
+
+def transitions_of(solutions: Sequence[Solution], begins: Sequence[float]) -> Transitions:
+    """One log of the runs that make up a period, each of whose times counts from its own begin."""
+    logs = [solution.transitions for solution in solutions]
+    columns = {name: [getattr(log, name) for log in logs] for name in Transitions.__dataclass_fields__}
+    columns["t"] = [t + begin for t, begin in zip(columns["t"], begins, strict=True)]
+    return Transitions(*(np.concatenate(column) for column in columns.values()))
