@@ -6,7 +6,14 @@ alone, or also on a few latched ones that are renewed at borders: `contacts.memo
 
 from contacts.curves import PiecewiseLinear, Tabulated
 from contacts.custom import CustomLaw, law
-from contacts.identification import Estimate, Identified, identify, read_collisions
+from contacts.identification import (
+    Estimate,
+    Identified,
+    IdentifiedLoop,
+    identify,
+    identify_loop,
+    read_collisions,
+)
 from contacts.law import Law
 from contacts.memory import (
     Border,
@@ -39,6 +46,7 @@ __all__ = [
     "Hertz",
     "Hysteretic",
     "Identified",
+    "IdentifiedLoop",
     "Iwan",
     "Jenkins",
     "KelvinVoigt",
@@ -54,6 +62,7 @@ __all__ = [
     "bounce",
     "damping_factor_for",
     "identify",
+    "identify_loop",
     "law",
     "memory_law",
     "parallel",
