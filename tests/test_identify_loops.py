@@ -7,6 +7,8 @@ import pytest
 from scipy.stats import binom, chi2
 
 from contacts import BoucWen, Hertz, Iwan, Jenkins, identify_loop
+from contacts.identification.loop_fit import Fit, Measured
+from contacts.identification.loop_models import Sliders, Smooth
 
 S = np.linspace(0.0, 30.0, 600)
 PATH = 1e-3 * np.sin(S) * (1.0 + 0.5 * np.sin(0.21 * S))
@@ -75,7 +77,7 @@ def test_several_records_with_one_zero_of_force():
 
 @pytest.mark.parametrize(
     ("law", "level", "count"),
-    [(DAMPER, 0.02, 300), (Iwan([2e4, 1e4, 3e3], [4.0, 9.0, np.inf]), 0.02, 100), (WEN, 0.02, 80), (SHARP, 0.02, 80)],
+    [(DAMPER, 0.02, 150), (Iwan([2e4, 1e4, 3e3], [4.0, 9.0, np.inf]), 0.02, 100), (WEN, 0.02, 80), (SHARP, 0.02, 80)],
     ids=["jenkins", "iwan", "wen", "sharp"],
 )
 def test_intervals_hold_the_truth_as_often_as_they_say(law, level, count):
@@ -152,7 +154,7 @@ def test_a_smooth_loop_by_many_sliders():
         warnings.simplefilter("ignore")
         left = [identify_loop(PATH, force, Iwan, parts=parts).noise for parts in (1, 2, 4)]
     assert left[0] > 1.5 * left[1]
-    assert left[1] > 1.5 * left[2]
+    assert left[1] > 1.3 * left[2]
 
 
 def test_a_filtered_channel_widens():
@@ -171,6 +173,24 @@ def test_noise_in_the_displacement_is_told():
     rough = PATH + 1e-5 * np.random.default_rng(11).standard_normal(PATH.size)
     with pytest.warns(UserWarning, match=r"delta turns back \d+ times by less than 1 % of its range"):
         identify_loop(rough, DAMPER.along(PATH))
+
+
+@pytest.mark.parametrize(
+    ("model", "main"),
+    [
+        (Sliders(2, True), [0.3, -0.4, -1.2, -0.5, 0.2]),
+        (Sliders(1, False), [0.3, -1.2]),
+        (Smooth(2), [0.2, 0.1, 3.0, -1.0]),
+    ],
+    ids=str,
+)
+def test_slopes_are_those_of_the_forces(model, main):
+    """Two records; where no sample lies on a kink."""
+    measured = Measured([PATH[:200], PATH[250:]], [DAMPER.along(PATH)[:200], DAMPER.along(PATH)[250:]], True)
+    fit = Fit(measured, model, np.array([*main, 0.1, *np.linspace(-0.4, 0.3, 2 * model.states)]), most=1)
+    theta = fit.theta + 1e-3
+    wanted = [(fit.residual(theta + h) - fit.residual(theta - h)) / 2e-6 for h in 1e-6 * np.eye(theta.size)]
+    assert np.abs(fit.jacobian(theta) - np.transpose(wanted)).max() < 1e-6
 
 
 def test_it_prints():

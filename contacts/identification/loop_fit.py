@@ -17,7 +17,7 @@ from contacts.identification.result import Estimate, inflation_of
 
 ROUNDING = 1e-10
 """Share of the force's half range below which nothing is left to explain."""
-_TIGHT: dict[str, Any] = {"ftol": 1e-13, "xtol": 1e-13, "gtol": 1e-13, "max_nfev": 100}
+_TIGHT: dict[str, Any] = {"ftol": 1e-13, "xtol": 1e-13, "gtol": 1e-13}
 
 
 class Measured:
@@ -46,7 +46,7 @@ class Measured:
 class Fit:
     """Least squares in θ = (parameters of the model, [F₀,] memory at the begin of every record)."""
 
-    def __init__(self, measured: Measured, model: Model, start: Vector) -> None:
+    def __init__(self, measured: Measured, model: Model, start: Vector, most: int = 100) -> None:
         from scipy.optimize import least_squares
 
         self.measured, self.model = measured, model
@@ -59,7 +59,7 @@ class Fit:
             np.append(ends, np.full(len(start) - model.main, way * np.inf))
             for way, ends in zip((-1, 1), model.ends, strict=True)
         )
-        done = least_squares(self.residual, start, "3-point", (low, high), x_scale="jac", **_TIGHT)
+        done = least_squares(self.residual, start, self.jacobian, (low, high), x_scale="jac", max_nfev=most, **_TIGHT)
         self.theta, self.slopes = done.x, done.jac
         self.squares = 2.0 * float(done.cost)
         self.exact = math.sqrt(self.squares / measured.count) < ROUNDING
@@ -72,6 +72,18 @@ class Fit:
         forces = np.concatenate([model.force(theta[: model.main], state, loop) for state, loop in pairs])
         zero = theta[model.main] if self.measured.offset else 0.0
         return np.nan_to_num(forces + zero - self.measured.target, nan=1e3, posinf=1e3, neginf=-1e3)
+
+    def jacobian(self, theta: Vector) -> NDArray[np.float64]:
+        """Its derivatives by θ."""
+        model, at, row = self.model, self.model.main + self.measured.offset, 0
+        out = np.zeros((self.measured.count, theta.size))
+        out[:, model.main : at] = 1.0
+        for i, loop in enumerate(self.measured.loops):
+            own, rows = slice(at + i * model.states, at + (i + 1) * model.states), slice(row, row + loop.x.size)
+            slopes = np.nan_to_num(model.slopes(theta[: model.main], theta[own], loop), posinf=0.0, neginf=0.0)
+            out[rows, : model.main], out[rows, own] = np.split(slopes, [model.main], axis=1)
+            row = rows.stop
+        return out
 
     def covariance(self) -> tuple[NDArray[np.float64], float, float]:
         """(of what is reported: the parameters in SI and F₀; noise; correlation of neighbouring residuals)."""

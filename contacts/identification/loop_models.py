@@ -41,6 +41,18 @@ def extensions(loop: Loop, widths: Vector, start: Vector) -> NDArray[np.float64]
     return out
 
 
+def extension_slopes(loop: Loop, widths: Vector, found: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(2, N, k) derivatives of extensions by widths and by start, which is forgotten where a slider gives way."""
+    out = np.empty((2, *found.shape))
+    out[:, :, 0] = [[0.0], [1.0]]
+    for a, b in loop.runs:
+        e = found[:, a : b + 1]
+        side = np.sign(e) * (np.abs(e) == widths[:, None])
+        out[0, :, a : b + 1] = np.where(side != 0.0, side, out[0, :, a : a + 1])
+        out[1, :, a : b + 1] = np.where(side != 0.0, 0.0, out[1, :, a : a + 1])
+    return out
+
+
 @dataclass(frozen=True)
 class Sliders:
     """θ = (ln k_j, ln f_j/k_j, [k₀]) of ``count`` sliders, with a spring k₀ beside them or without.
@@ -76,6 +88,15 @@ class Sliders:
         stiffness, widths = np.exp(theta[: 2 * self.count]).reshape(2, -1)
         force = stiffness @ extensions(loop, widths, widths * np.sin(state))
         return np.asarray(force + theta[-1] * loop.x if self.spring else force)
+
+    def slopes(self, theta: Vector, state: Vector, loop: Loop) -> NDArray[np.float64]:
+        """(k, main + states) derivatives of the forces."""
+        stiffness, widths = np.exp(theta[: 2 * self.count]).reshape(2, -1)
+        e = extensions(loop, widths, widths * np.sin(state))
+        by_width, by_start = stiffness[:, None] * extension_slopes(loop, widths, e)
+        own = widths * (by_width.T + by_start.T * np.sin(state))
+        spring = [loop.x] * self.spring
+        return np.column_stack((stiffness * e.T, own, *spring, by_start.T * widths * np.cos(state)))
 
     def values(self, theta: Vector, depth: float, strength: float) -> dict[str, float]:
         """Parameters by name in SI."""
@@ -122,6 +143,15 @@ class Smooth:
             force[a : b + 1] = law.batch(1.0, row)(points, np.full(points.size, way))
             z = (force[b] - elastic * points[-1]) / c
         return force
+
+    def slopes(self, theta: Vector, state: Vector, loop: Loop) -> NDArray[np.float64]:
+        """(k, main + states) derivatives of the forces, by differences."""
+        all_of, columns = np.append(theta, state), []
+        for i, step in enumerate(1e-6 * np.maximum(np.abs(all_of), 1e-2)):
+            ends = [all_of + way * step * (np.arange(all_of.size) == i) for way in (-1.0, 1.0)]
+            behind, ahead = (self.force(end[: self.main], end[self.main :], loop) for end in ends)
+            columns.append((ahead - behind) / (2.0 * step))
+        return np.column_stack(columns)
 
     def values(self, theta: Vector, depth: float, strength: float) -> dict[str, float]:
         """Parameters by name in SI; k and α from the elastic and the hysteretic part."""

@@ -12,6 +12,7 @@ from contacts.identification.records import Vector
 
 _WIDTHS = np.geomspace(0.01, 1.9, 30)  # half ranges of the displacement at which a further slider is tried
 _BEGINS = (-0.7, 0.0, 0.7)  # shares of its limit that it may carry at the begin of a record
+_WIDER = 0.2  # logarithm of the widths' ratio of further starts
 _UNLIKELY = 1e-5  # chance that noise alone explains as much as a further slider
 
 
@@ -25,7 +26,8 @@ def fit_sliders(measured: Measured, most: int, spring: bool) -> Fit:
         if measured.count < model.main + measured.offset + count * len(measured.loops) + 4 and best:
             break
         chosen = tried.with_one_more(chosen)
-        fit = Fit(measured, model, tried.start(chosen))
+        rough = [Fit(measured, model, start, most=20) for start in tried.starts(chosen)]
+        fit = Fit(measured, model, min(rough, key=lambda one: one.squares).theta)
         if not _better(squares, numbers, fit):
             break
         best, squares, numbers = fit, fit.squares, fit.theta.size
@@ -67,7 +69,7 @@ def _no_slip(measured: Measured, slope: float, squares: float) -> str:
 
 
 class _Tried:
-    """Sliders of many widths and begins; which of them together explain most, with stiffnesses by linear least squares."""
+    """Sliders of many widths and begins; which together explain most, stiffnesses by linear least squares."""
 
     def __init__(self, measured: Measured, spring: bool) -> None:
         self.measured, self.spring = measured, spring
@@ -104,11 +106,13 @@ class _Tried:
         """The slider that explains most beside others."""
         return int(np.argmax([self.explained([*others, i]) for i in range(self.widths.size)]))
 
-    def start(self, chosen: list[int]) -> Vector:
-        """θ of these sliders."""
+    def starts(self, chosen: list[int]) -> list[Vector]:
+        """θ of these sliders, and with one of them wider or narrower: whether cycles slip makes many minima."""
         weights, begins = self.weights(chosen), np.arcsin(self.begins[chosen]).T.ravel()
-        stiffness = np.maximum(weights[: len(chosen)], 1e-6)
-        return np.concatenate((np.log(stiffness), np.log(self.widths[chosen]), weights[len(chosen) :], begins))
+        stiffness, count = np.maximum(weights[: len(chosen)], 1e-6), len(chosen)
+        theta = np.concatenate((np.log(stiffness), np.log(self.widths[chosen]), weights[count:], begins))
+        other = np.arange(theta.size) == np.arange(count, 2 * count)[:, None]
+        return [theta, *(theta + _WIDER * other), *(theta - _WIDER * other)]
 
 
 def _settled(loop: Loop, width: float) -> float:
