@@ -56,6 +56,7 @@ def identify_loop(
 
     Examples
     --------
+    >>> import numpy as np
     >>> damper = Jenkins(2e4, 10.0)
     >>> path = 1e-3 * np.sin(np.linspace(0.0, 12.0, 200))
     >>> found = identify_loop(path, damper.along(path))
