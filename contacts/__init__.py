@@ -8,7 +8,14 @@ The force acts while ``delta > 0`` and is positive when it pushes the bodies apa
 
 from contacts.curves import PiecewiseLinear, Tabulated
 from contacts.custom import CustomLaw, law
-from contacts.identification import Estimate, Identified, identify, read_collisions
+from contacts.identification import (
+    Estimate,
+    Identified,
+    IdentifiedLoop,
+    identify,
+    identify_loop,
+    read_collisions,
+)
 from contacts.law import Law
 from contacts.memory import (
     Border,
@@ -41,6 +48,7 @@ __all__ = [
     "Hertz",
     "Hysteretic",
     "Identified",
+    "IdentifiedLoop",
     "Iwan",
     "Jenkins",
     "KelvinVoigt",
@@ -56,6 +64,7 @@ __all__ = [
     "bounce",
     "damping_factor_for",
     "identify",
+    "identify_loop",
     "law",
     "memory_law",
     "parallel",

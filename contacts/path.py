@@ -62,7 +62,7 @@ def walk(law: Law, path: Vector) -> Iterator[Stretch]:
     """The stretches of a path, one after the other; their parameters are not kept by the next."""
     row = law.parameters
     tiny = ROUNDING * float(np.spacing(np.abs(path).max()))
-    for first, last in _runs(path):
+    for first, last in monotone_runs(path):
         begin, end = float(path[first]), float(path[last])
         rate = math.copysign(SLOW, end - begin)
         goal = end if end != begin else begin + ROUNDING * tiny  # a path that rests is one about to rise
@@ -85,8 +85,8 @@ def _checked(law: Law, delta: ArrayLike) -> Vector:
     return path
 
 
-def _runs(path: Vector) -> Iterator[tuple[int, int]]:
-    """First and last point of every monotone run."""
+def monotone_runs(path: Vector) -> Iterator[tuple[int, int]]:
+    """First and last point of every monotone run of a path."""
     steps = np.sign(np.diff(path))
     moving = np.flatnonzero(steps)
     turns = moving[1:][steps[moving[1:]] != steps[moving[:-1]]].tolist()

@@ -18,12 +18,11 @@ from numpy.typing import NDArray
 
 from contacts.identification.motion import motion_of
 from contacts.identification.records import Samples, Vector, collisions_of
-from contacts.identification.result import Collision, Estimate, Identified
+from contacts.identification.result import EXACT, Collision, Estimate, Identified, inflation_of
 from contacts.law import check_number
 from contacts.restitution import achieved_restitution
 
 _UNLIKELY = 1e-3  # chance below which collisions that agree would differ so much
-_EXACT = 5e-4  # relative differences that matter to nobody
 
 
 def identify(
@@ -165,8 +164,7 @@ class _Fit:
         own = np.maximum(totals - [float(np.sum(m * m)) for m in moved], 0.05 * totals)
         neighbours = sum(float(r[1:] @ r[:-1]) for r in residuals) - sum(float(np.sum(m[1:] * m[:-1])) for m in moved)
         correlation = min(max(neighbours / own.sum(), -1.0), 1.0) if own.sum() > 0.0 else 0.0
-        long = min(max(0.0, correlation - 2.0 / math.sqrt(freedom)), 0.98)  # what chance does not explain
-        inflation = (1.0 + long) / (1.0 - long)
+        inflation = inflation_of(correlation, freedom)
         middle = np.zeros((self.count, self.count))
         for r, (J, _), m, mine in zip(residuals, jacobians, moved, own, strict=True):
             variance = mine / (len(r) - self.count / len(residuals))
@@ -210,7 +208,7 @@ class _Fit:
         covariance, noise, correlation, inflation, freedom = self.covariance()
         singles = [self.alone(i, inflation) for i in range(len(self.measured))]
         widening, remarks = self._disagreement(singles)
-        if correlation > 0.5 and noise > _EXACT:
+        if correlation > 0.5 and noise > EXACT:
             remarks.append(
                 f"neighbouring residuals are correlated ({correlation:.2f}): the channel is filtered, or the stop does "
                 "not follow this law; see the residuals"
@@ -258,7 +256,7 @@ class _Fit:
             return widening, remarks
         values, errors = (np.array(x) for x in zip(*singles, strict=True))
         for column, name in enumerate(("stiffness", "damping factor")):
-            x, weight = values[:, column], 1.0 / np.maximum(errors[:, column], _EXACT) ** 2
+            x, weight = values[:, column], 1.0 / np.maximum(errors[:, column], EXACT) ** 2
             q = float(weight @ (x - (weight @ x) / weight.sum()) ** 2)
             if chi2.sf(q, len(x) - 1) < _UNLIKELY:
                 widening = max(widening, math.sqrt(q / (len(x) - 1)))

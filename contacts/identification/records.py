@@ -71,7 +71,7 @@ def collisions_of(delta: Any, delta_dot: Any, force: Any, time: Any) -> list[Sam
     if force is None:
         raise ValueError("identify needs the force")
     given = {"delta": delta, "force": force, "delta_dot": delta_dot, "time": time}
-    records = {name: _records(name, values) for name, values in given.items() if values is not None}
+    records = {name: records_of(name, values) for name, values in given.items() if values is not None}
     count = len(records["delta"])
     for name, values in records.items():
         if len(values) != count:
@@ -87,8 +87,8 @@ def collisions_of(delta: Any, delta_dot: Any, force: Any, time: Any) -> list[Sam
     return found
 
 
-def _records(name: str, values: Any) -> list[Vector]:
-    """A list of finite vectors."""
+def records_of(name: str, values: Any) -> list[Vector]:
+    """A list of finite vectors, one per record."""
     several = isinstance(values, (list, tuple)) and len(values) > 0 and np.ndim(values[0]) == 1
     out = []
     for number, one in enumerate(values if several else [values], 1):

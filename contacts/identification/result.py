@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from contacts.identification.records import Vector
 from contacts.power_laws import Hysteretic
+
+EXACT = 5e-4  # relative differences that matter to nobody
+
+
+def inflation_of(correlation: float, freedom: int) -> float:
+    """What a correlation of neighbouring residuals multiplies variances by, as far as chance does not explain it."""
+    long = min(max(0.0, correlation - 2.0 / math.sqrt(freedom)), 0.98)
+    return (1.0 + long) / (1.0 - long)
 
 
 @dataclass(frozen=True)

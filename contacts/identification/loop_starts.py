@@ -1,0 +1,129 @@
+"""Where least squares begin: sliders one by one, where each explains most, while it explains more than noise."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from contacts.identification.loop_fit import ROUNDING, Fit, Measured
+from contacts.identification.loop_models import Loop, Sliders, Smooth, extensions
+from contacts.identification.records import Vector
+
+_WIDTHS = np.geomspace(0.01, 1.9, 30)  # half ranges of the displacement at which a further slider is tried
+_BEGINS = (-0.7, 0.0, 0.7)  # shares of its limit that it may carry at the begin of a record
+_WIDER = 0.2  # logarithm of the widths' ratio of further starts
+_UNLIKELY = 1e-5  # chance that noise alone explains as much as a further slider
+
+
+def fit_sliders(measured: Measured, most: int, spring: bool) -> Fit:
+    """Slider after slider, as long as one explains more than noise would."""
+    slope, squares, numbers = _line(measured)
+    tried, chosen = _Tried(measured, spring), list[int]()
+    best: Fit | None = None
+    for count in range(1, most + 1):
+        model = Sliders(count, spring)
+        if measured.count < model.main + measured.offset + count * len(measured.loops) + 4 and best:
+            break
+        chosen = tried.with_one_more(chosen)
+        rough = [Fit(measured, model, start, most=20) for start in tried.starts(chosen)]
+        fit = Fit(measured, model, min(rough, key=lambda one: one.squares).theta)
+        if not _better(squares, numbers, fit):
+            break
+        best, squares, numbers = fit, fit.squares, fit.theta.size
+        if fit.exact:
+            break
+    if best is None:
+        raise ValueError(_no_slip(measured, slope, squares))
+    return best
+
+
+def _better(squares: float, numbers: int, fit: Fit) -> bool:
+    """Whether a fit explains more than noise would; each width tried is a chance of its own."""
+    from scipy.stats import f as fisher
+
+    more, freedom = max(fit.theta.size - numbers, 1), fit.measured.count - fit.theta.size
+    floor = max(fit.squares, fit.measured.count * ROUNDING**2)
+    gain = (squares - floor) / more / (floor / freedom)
+    return bool(fisher.sf(gain, more, freedom) < _UNLIKELY / _WIDTHS.size)
+
+
+def _line(measured: Measured) -> tuple[float, float, int]:
+    """(slope, squares left, numbers) of straight lines, one slope for all records and each its own height."""
+    heights = np.zeros((measured.count, len(measured.loops)))
+    heights[np.arange(measured.count), np.repeat(range(len(measured.loops)), [x.x.size for x in measured.loops])] = 1.0
+    columns = np.column_stack((np.concatenate([loop.x for loop in measured.loops]), heights))
+    found, *_ = np.linalg.lstsq(columns, measured.target, rcond=None)
+    left = columns @ found - measured.target
+    return float(found[0]), float(left @ left), found.size
+
+
+def _no_slip(measured: Measured, slope: float, squares: float) -> str:
+    """What to say of straight lines."""
+    stiffness, noise = slope * measured.strength / measured.depth, math.sqrt(squares / measured.count)
+    return (
+        f"nothing slips in these records: the force is a line of slope {stiffness:.6g} N/m to within "
+        f"{noise * measured.strength:.3g} N, which tells of the limit only that half the range of force, "
+        f"{measured.strength:.6g} N, does not reach it; load further"
+    )
+
+
+class _Tried:
+    """Sliders of many widths and begins; which together explain most, stiffnesses by linear least squares."""
+
+    def __init__(self, measured: Measured, spring: bool) -> None:
+        self.measured, self.spring = measured, spring
+        settled = [[_settled(loop, width) for loop in measured.loops] for width in _WIDTHS]
+        same = np.outer(_BEGINS, np.ones(len(measured.loops)))
+        self.widths = np.repeat(_WIDTHS, 1 + len(_BEGINS))
+        self.begins = np.concatenate([[own, *same] for own in settled])  # shares of the limit
+        each = [extensions(x, self.widths, self.widths * b) for x, b in zip(measured.loops, self.begins.T, strict=True)]
+        linear = [np.concatenate([loop.x for loop in measured.loops])] * spring
+        self.fixed = list(range(self.widths.size, self.widths.size + spring + measured.offset))
+        columns = np.vstack((*[np.concatenate(each, axis=1)], *linear, *[np.ones(measured.count)] * measured.offset))
+        self.products, self.target = columns @ columns.T, columns @ measured.target
+
+    def weights(self, chosen: list[int]) -> Vector:
+        """Of the sliders, and of spring and offset."""
+        rows = [*chosen, *self.fixed]
+        return np.asarray(np.linalg.lstsq(self.products[np.ix_(rows, rows)], self.target[rows], rcond=1e-12)[0])
+
+    def explained(self, chosen: list[int]) -> float:
+        """Squares that sliders explain together; nothing where one would push."""
+        weights = self.weights(chosen)
+        return float(weights @ self.target[[*chosen, *self.fixed]]) if np.all(weights[: len(chosen)] > 0.0) else 0.0
+
+    def with_one_more(self, chosen: list[int]) -> list[int]:
+        """A further slider; then each is exchanged for a better one until there is none."""
+        chosen, before = [*chosen, self.best(chosen)], -1.0
+        while self.explained(chosen) > before * (1.0 + 1e-9):
+            before = self.explained(chosen)
+            for _ in range(len(chosen)):
+                chosen = [*chosen[1:], self.best(chosen[1:])]
+        return chosen
+
+    def best(self, others: list[int]) -> int:
+        """The slider that explains most beside others."""
+        return int(np.argmax([self.explained([*others, i]) for i in range(self.widths.size)]))
+
+    def starts(self, chosen: list[int]) -> list[Vector]:
+        """θ of these sliders, and with one of them wider or narrower: whether cycles slip makes many minima."""
+        weights, begins = self.weights(chosen), np.arcsin(self.begins[chosen]).T.ravel()
+        stiffness, count = np.maximum(weights[: len(chosen)], 1e-6), len(chosen)
+        theta = np.concatenate((np.log(stiffness), np.log(self.widths[chosen]), weights[count:], begins))
+        other = np.arange(theta.size) == np.arange(count, 2 * count)[:, None]
+        return [theta, *(theta + _WIDER * other), *(theta - _WIDER * other)]
+
+
+def _settled(loop: Loop, width: float) -> float:
+    """Share of its limit that a slider carries once the record has been passed, as in a steady state."""
+    return 0.9 * float(extensions(loop, np.array([width]), np.zeros(1))[0, -1]) / width
+
+
+def smooth_starts(measured: Measured, model: Smooth) -> list[Vector]:
+    """From one slider with a spring: its slopes, and what |z| stays below; γ equal to β, to none and to -β/2."""
+    fit = fit_sliders(measured, 1, True)
+    (stiffness, width), elastic = np.exp(fit.theta[:2]), fit.theta[2]
+    shape, count = width**-model.n, len(measured.loops)
+    rest = [*fit.theta[3:-count], *(width * np.sin(fit.theta[-count:]))]
+    return [np.array([np.log(stiffness), elastic, shape * b, shape * (1.0 - b), *rest]) for b in (0.5, 1.0, 2.0)]

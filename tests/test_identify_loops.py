@@ -1,0 +1,228 @@
+"""Laws with memory from synthetic loops whose truth is known."""
+
+import warnings
+
+import numpy as np
+import pytest
+from scipy.stats import binom, chi2
+
+from contacts import BoucWen, Hertz, Iwan, Jenkins, identify_loop
+from contacts.identification.loop_fit import Fit, Measured
+from contacts.identification.loop_models import Sliders, Smooth
+
+S = np.linspace(0.0, 30.0, 600)
+PATH = 1e-3 * np.sin(S) * (1.0 + 0.5 * np.sin(0.21 * S))
+DAMPER = Jenkins(2e4, 10.0)
+JOINT = Iwan([2e4, 1e4, 5e3, 3e3], [4.0, 6.0, 4.0, np.inf])
+WEN = BoucWen(2e4, 0.1, 1.0, 1500.0, 500.0)
+SHARP = BoucWen(2e4, 0.1, 1.0, 3e6, -1e6, n=2)
+MILLION = 1e-6  # chance of each statistical bound below to fail, some twenty of them
+
+
+def truth(law):
+    """Parameters of a law by the names of the estimates."""
+    if isinstance(law, Iwan):
+        finite = [(k, f) for k, f in zip(law.stiffness, law.limits, strict=True) if f < np.inf]
+        named = {f"stiffness[{i}]": k for i, (k, _) in enumerate(finite)}
+        return {**named, **{f"limits[{i}]": f for i, (_, f) in enumerate(finite)}, "spring": law.spring}
+    names = ("stiffness", "limit") if isinstance(law, Jenkins) else ("stiffness", "alpha", "beta", "gamma")
+    return {name: getattr(law, name) for name in names}
+
+
+def noisy(law, path, level, rng):
+    """Forces with noise relative to the largest."""
+    force = law.along(path)
+    return force + level * np.abs(force).max() * rng.standard_normal(force.size)
+
+
+@pytest.mark.parametrize("law", [DAMPER, JOINT, WEN, SHARP], ids=["jenkins", "iwan", "wen", "sharp"])
+@pytest.mark.parametrize("first", [0, 40, 137])
+def test_clean_loops_give_the_law_back(law, first):
+    """From a fresh begin, from the first turn on, and from the middle of what went before."""
+    path, force = PATH[first:], law.along(PATH)[first:]
+    kept = path.copy(), force.copy()
+    found = identify_loop(path, force, type(law))
+    expected = truth(law)
+    assert list(found.estimates) == list(expected)
+    for name, value in expected.items():
+        assert found.estimates[name].value == pytest.approx(value, rel=1e-6), name
+    assert abs(found.force_offset.value) < 1e-6 * np.abs(force).max()
+    assert found.noise < 1e-8 * np.abs(force).max()
+    assert not found.remarks
+    np.testing.assert_allclose(found.law.along(PATH), law.along(PATH), atol=1e-6 * np.abs(force).max())
+    np.testing.assert_allclose(found.records[0].fitted, force, atol=1e-7 * np.abs(force).max())
+    np.testing.assert_array_equal(kept, (path, force))
+
+
+def test_a_slider_from_four_corners():
+    """Stick and slip on either side, by hand."""
+    path = np.array([0.0, 0.5, 1.0, 1.5, 2.0, 1.5, 1.0, 0.5, 0.0, -0.5, -0.1, 0.3]) * 1e-3
+    force = [0.0, 5.0, 10.0, 10.0, 10.0, 5.0, 0.0, -5.0, -10.0, -10.0, -6.0, -2.0]
+    found = identify_loop(path, force)
+    assert found.law.stiffness == pytest.approx(1e4, rel=1e-8)
+    assert found.law.limit == pytest.approx(10.0, rel=1e-8)
+
+
+def test_several_records_with_one_zero_of_force():
+    """Each begins with a memory of its own."""
+    whole = DAMPER.along(PATH) + 3.0
+    parts = [slice(0, 150), slice(170, 320), slice(390, 600)]
+    found = identify_loop([PATH[p] for p in parts], [whole[p] for p in parts])
+    assert (found.law.stiffness, found.law.limit) == (pytest.approx(2e4, rel=1e-6), pytest.approx(10.0, rel=1e-6))
+    assert found.force_offset.value == pytest.approx(3.0, rel=1e-6)
+    assert len(found.records) == 3
+    with pytest.warns(UserWarning, match="neighbouring residuals are correlated"):
+        identify_loop(PATH, whole, offset=False)
+
+
+@pytest.mark.parametrize(
+    ("law", "level", "count"),
+    [(DAMPER, 0.02, 150), (Iwan([2e4, 1e4, 3e3], [4.0, 9.0, np.inf]), 0.02, 100), (WEN, 0.02, 80), (SHARP, 0.02, 80)],
+    ids=["jenkins", "iwan", "wen", "sharp"],
+)
+def test_intervals_hold_the_truth_as_often_as_they_say(law, level, count):
+    """Counts are binomial with 95 %, and the estimates scatter as the intervals say: χ² of their variance."""
+    rng, expected = np.random.default_rng(3), truth(law)
+    option = {"n": law.n} if isinstance(law, BoucWen) else {"parts": 2} if isinstance(law, Iwan) else {}
+    path = PATH[40:340]
+    whole = [noisy(law, PATH, level, rng)[40:340] for _ in range(count)]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = [identify_loop(path, force, type(law), **option) for force in whole]
+    for name, value in expected.items():
+        held = sum(value in one.estimates[name] for one in found)
+        assert held >= binom.ppf(MILLION, count, 0.95), name
+        values = np.array([one.estimates[name].value for one in found])
+        claimed = np.mean([(one.estimates[name].high - one.estimates[name].value) / 1.968 for one in found])  # t, 295
+        ratio = np.sum((values - values.mean()) ** 2) / claimed**2
+        assert 0.9 * chi2.ppf(MILLION, count - 1) < ratio < 1.1 * chi2.isf(MILLION, count - 1), name
+    noise = level * np.abs(law.along(PATH)).max()
+    left = np.array([one.noise for one in found]) / noise
+    assert abs(np.mean(left**2) - 1.0) < 5.0 * np.sqrt(2.0 / 290.0 / count)
+
+
+@pytest.mark.parametrize(
+    ("law", "other"), [(WEN, Jenkins), (DAMPER, BoucWen), (JOINT, Jenkins), (SHARP, Jenkins)], ids=str
+)
+def test_residuals_tell_a_wrong_law(law, other):
+    force = noisy(law, PATH, 0.005, np.random.default_rng(4))
+    with pytest.warns(UserWarning, match="neighbouring residuals are correlated"):
+        found = identify_loop(PATH, force, other)
+    assert found.noise > 0.01 * np.abs(force).max()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        right = identify_loop(PATH, force, type(law))
+    assert right.noise < 0.006 * np.abs(force).max()
+
+
+@pytest.mark.parametrize("law", [Jenkins, Iwan, BoucWen])
+@pytest.mark.parametrize("level", [0.0, 0.02])
+def test_what_never_slips_tells_nothing_of_the_limit(law, level):
+    force = noisy(Jenkins(2e4, 40.0), PATH, level, np.random.default_rng(5))
+    with pytest.raises(ValueError, match=r"nothing slips in these records: the force is a line of slope (20|199)\d+"):
+        identify_loop(PATH, force, law)
+
+
+def test_a_first_loading_tells_the_limit_only_with_the_zero():
+    path = np.linspace(0.0, 2e-3, 200)
+    force = noisy(DAMPER, path, 0.01, np.random.default_rng(6))
+    with pytest.warns(UserWarning, match="the records do not tell limit"):
+        found = identify_loop(path, force)
+    assert found.law.stiffness == pytest.approx(2e4, rel=0.02)
+    assert 10.0 in identify_loop(path, force, offset=False).estimates["limit"]
+
+
+def test_a_first_loading_tells_the_sum_of_beta_and_gamma():
+    path = np.linspace(0.0, 2e-3, 400)
+    force = noisy(WEN, path, 0.001, np.random.default_rng(7))
+    with pytest.warns(UserWarning, match="trade off, correlation -0.99"):
+        found = identify_loop(path, force, BoucWen, n=1)
+    assert found.law.beta + found.law.gamma == pytest.approx(2000.0, rel=0.05)
+
+
+def test_no_more_sliders_than_there_are():
+    for law in (DAMPER, Iwan([2e4, 1e4], [4.0, 9.0])):
+        for level in (0.0, 0.01):
+            found = identify_loop(PATH, noisy(law, PATH, level, np.random.default_rng(8)), Iwan, parts=6)
+            assert len(found.law.sliders) == len(law.sliders)
+
+
+def test_a_smooth_loop_by_many_sliders():
+    """What a law misses becomes small with their number."""
+    force = noisy(WEN, PATH, 0.002, np.random.default_rng(9))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        left = [identify_loop(PATH, force, Iwan, parts=parts).noise for parts in (1, 2, 4)]
+    assert left[0] > 1.5 * left[1]
+    assert left[1] > 1.3 * left[2]
+
+
+def test_a_filtered_channel_widens():
+    rng = np.random.default_rng(10)
+    white = 0.3 * rng.standard_normal(619)
+    smooth = np.convolve(white, np.full(20, 20**-0.5), "valid")
+    with pytest.warns(UserWarning, match="neighbouring residuals are correlated"):
+        wide = identify_loop(PATH, DAMPER.along(PATH) + smooth).estimates["limit"]
+    narrow = identify_loop(PATH, DAMPER.along(PATH) + white[:600]).estimates["limit"]
+    assert 10.0 in wide
+    assert wide.high - wide.low > 2.0 * (narrow.high - narrow.low)
+
+
+def test_noise_in_the_displacement_is_told():
+    """Every turn of the noise is one of the slider's in the model: the limit comes out too large."""
+    rough = PATH + 1e-5 * np.random.default_rng(11).standard_normal(PATH.size)
+    with pytest.warns(UserWarning, match=r"delta turns back \d+ times by less than 1 % of its range"):
+        identify_loop(rough, DAMPER.along(PATH))
+
+
+@pytest.mark.parametrize(
+    ("model", "main"),
+    [
+        (Sliders(2, True), [0.3, -0.4, -1.2, -0.5, 0.2]),
+        (Sliders(1, False), [0.3, -1.2]),
+        (Smooth(2), [0.2, 0.1, 3.0, -1.0]),
+    ],
+    ids=str,
+)
+def test_slopes_are_those_of_the_forces(model, main):
+    """Two records; where no sample lies on a kink."""
+    measured = Measured([PATH[:200], PATH[250:]], [DAMPER.along(PATH)[:200], DAMPER.along(PATH)[250:]], True)
+    fit = Fit(measured, model, np.array([*main, 0.1, *np.linspace(-0.4, 0.3, 2 * model.states)]), most=1)
+    theta = fit.theta + 1e-3
+    wanted = [(fit.residual(theta + h) - fit.residual(theta - h)) / 2e-6 for h in 1e-6 * np.eye(theta.size)]
+    assert np.abs(fit.jacobian(theta) - np.transpose(wanted)).max() < 1e-6
+
+
+def test_it_prints():
+    found = identify_loop(PATH, WEN.along(PATH), BoucWen)
+    said = str(found)
+    assert "BoucWen from 1 records, 95 % intervals" in said
+    assert "A, n           1 (chosen: loops tell A and beta, gamma together only), 1" in said
+    assert "stiffness 20000" in repr(found)
+
+
+FORCE = DAMPER.along(PATH)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "options", "error", "said"),
+    [
+        ((PATH, FORCE, Hertz), {}, TypeError, "law of identify_loop must be Jenkins, Iwan or BoucWen"),
+        ((PATH, FORCE, DAMPER), {}, TypeError, "the class, got Jenkins"),
+        ((PATH, FORCE, Jenkins), {"parts": 2}, ValueError, "parts of identify_loop belongs to Iwan, got 2 for Jenkins"),
+        ((PATH, FORCE, Iwan), {"n": 2}, ValueError, "n of identify_loop belongs to BoucWen"),
+        ((PATH, FORCE, Iwan), {"parts": 0}, ValueError, "must be a whole number from 1 to 20, got 0"),
+        ((PATH, FORCE, BoucWen), {"n": 3}, ValueError, "must be 1 or 2, got 3"),
+        ((PATH, FORCE), {"confidence": 0.0}, ValueError, r"confidence must lie in \(0, 1\)"),
+        ((PATH, FORCE[:-1]), {}, ValueError, "record 1 has 600 samples of delta and 599 of force"),
+        (([PATH], [FORCE, FORCE]), {}, ValueError, "force has 2 records, delta has 1"),
+        ((np.full(600, np.nan), FORCE), {}, ValueError, "delta of record 1 must be a finite vector, got nan"),
+        ((["a"] * 600, FORCE), {}, ValueError, "delta of record 1 must be an array of numbers"),
+        ((0.0 * PATH, FORCE), {}, ValueError, "delta of record 1 does not move"),
+        ((PATH, 0.0 * FORCE), {}, ValueError, "there is no loop"),
+        ((PATH[:7], FORCE[:7]), {}, ValueError, "the records have 7 samples, at least 8 are needed"),
+    ],
+)
+def test_bad_records_are_refused(arguments, options, error, said):
+    with pytest.raises(error, match=said):
+        identify_loop(*arguments, **options)
