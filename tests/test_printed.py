@@ -34,7 +34,7 @@ def things():
     return {
         **{"model": model, "run": run, "orbit": orbit, "branch": branch, "scene": scene, "hit": hit, "law": found},
         **{"matrices": scene.matrices(20), "basis": model.basis, "shapes": model.shapes, "system": model.system},
-        **{"found orbit": orbit.found, "found branch": branch.found, "arm": branch.found.arms[0]},
+        **{"found orbit": orbit.found, "found branch": branch.found, "arm": branch.found.walks[0]},
         **{"family": branch.family, "extremes": run.extremes(), "forces": model.section_forces[0]},
         **{"collision": found.collisions[0], "psd": fb.psd(run.displacement(0.5), 1e-3)},
         **{"pdf": fb.pdf(run.displacement(0.5)), "tones": fb.Multisine(np.ones(900), np.arange(900.0))},

@@ -45,15 +45,10 @@ def _frequency(model: Model, furthest: float) -> float:
     ends = np.array([-furthest, furthest])
     energies = _potential(model, ends)
     far = int(np.argmin(energies))  # the other side is stopped earlier
-    even = abs(energies[1] - energies[0]) < 1e-13 * energies[far]
-
-    def above(q: float) -> float:
-        """Energy at q above that of the turning point."""
-        return float(_potential(model, np.array([q]))[0] - energies[far])
-
-    near = ends[1 - far]  # of a well of equal sides it is the other turning point
-    if not even:
-        near = brentq(above, 0.0, near, xtol=1e-15 * furthest, rtol=1e-15)
+    near = float(ends[1 - far])
+    if energies[1 - far] - energies[far] > 1e-13 * energies[far]:  # else the well is even, and this the turning point
+        near = brentq(lambda q: float(_potential(model, np.array([q]))[0] - energies[far]), 0.0, near,
+                      xtol=1e-15 * furthest, rtol=1e-15)  # fmt: skip
     low, high = sorted((float(ends[far]), near))
     rows = zip(model.directions[:, 0], model.contact_rows, strict=True)
     met = [-row.gap / w for w, row in rows if w != 0.0]
