@@ -109,7 +109,7 @@ def integrate(
     solution = run.solution(status, time.perf_counter() - begin)
     status = solution.status
     if isinstance(tangent, Parameter) and status is Status.DONE and not run.tangent.exact:
-        ends = [_end(s, q0, q_dot0, duration, method) for s in (tangent.behind, tangent.ahead)]
+        ends = [_end(s, q0, q_dot0, duration, method, memory) for s in (tangent.behind, tangent.ahead)]
         known: Any = solution.tangent
         column = (ends[1] - ends[0]) / (2.0 * tangent.step)
         solution = replace(solution, tangent=np.column_stack((known, column)))
@@ -306,7 +306,7 @@ def _energy(system: System, powers: Array, complete: bool, motion: Array, back: 
     return Energy.of_run(system.M, system.K, powers, motion, back @ begin)
 
 
-def _end(system: System, q0: ArrayLike, q_dot0: ArrayLike, duration: float, method: Any) -> Array:
+def _end(system: System, q0: ArrayLike, q_dot0: ArrayLike, duration: float, method: Any, memory: Any) -> Array:
     """Final [q, q̇] of a plain run."""
-    solution = integrate(system, q0, q_dot0, duration, method=method)
+    solution = integrate(system, q0, q_dot0, duration, method=method, memory=memory)
     return np.concatenate((solution.q[-1], solution.q_dot[-1]))

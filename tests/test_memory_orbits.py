@@ -12,7 +12,7 @@ import fembeam as fb
 from contacts import PiecewiseLinear
 from contacts.memory import BoucWen, Coulomb, ElastoPlastic, Iwan, Jenkins, WaltonBraun
 from solvers import Contact, Exponential, System, branch, integrate, orbit
-from solvers.orbits import at_zero, delayed, flown
+from solvers.orbits import PeriodicProblem, at_zero, delayed, flown
 
 
 def oscillator(law, omega, force=1.0, damping=0.02, direction=-1.0, gap=0.0):
@@ -325,6 +325,22 @@ def test_branch_of_a_beam_with_friction_is_saved_and_gone_on_with(tmp_path):
     whole, resumed = first.run(), model.resume(tmp_path / "branch.npz").run()
     assert abs(whole.orbits[-1].found.whole - resumed.orbits[-1].found.whole).max() < 1e-8
     assert whole.parameter[-1] == resumed.parameter[-1] == 255.0
+
+
+def test_slopes_by_a_parameter_of_the_matrices_know_what_is_latched():
+    """The parameter is a stiffness: differences of runs that begin with the orbit's latched numbers."""
+
+    def family(stiffness):
+        system, period = oscillator(JENKINS, 0.9)
+        return System(system.M, system.C, [[stiffness]], system.contacts, system.loads), period
+
+    x, step = orbit(*family(1.0)).whole, 1e-6
+    chain = PeriodicProblem(family, Exponential(1e-12), step=step).evaluate(x[None, :], 1.0)
+    sides = [family(1.0 + side * step) for side in (-1.0, 1.0)]
+    ends = [flown(system, x, period, Exponential(1e-12)) for system, period in sides]
+    wanted = (ends[1] - ends[0]) / (2.0 * step)
+    assert abs(chain.by_parameter[0] - wanted).max() < 1e-6
+    assert abs(chain.by_parameter[0, 3]) > 1e-3
 
 
 def test_a_start_of_another_length_is_refused():

@@ -23,7 +23,8 @@ from fembeam.study.execution.checkpoint import Checkpoint, identity
 from fembeam.study.execution.executors import spread
 from fembeam.study.settling.plane import WHERE, Axis, axis_of, checked_plane, checked_points, starts_of
 from fembeam.support import aligned, require
-from solvers.orbits.shots import delayed
+from solvers.orbits import delayed
+from solvers.orbits import run as run_from
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -90,10 +91,10 @@ class _Known:
     @classmethod
     def of(cls, orbit: Orbit, once: float) -> _Known:
         """From an orbit, by one run over its period."""
-        found, n = orbit.found, len(orbit.model.omega)
+        found = orbit.found
         times = np.sort((np.arange(orbit.period) * once - found.phase) % found.period)
         later = delayed(found.system, found.phase)
-        run = solvers.integrate(later, found.state[:n], found.state[n:], found.period, times, found.method)
+        run = run_from(later, found.whole, found.period, times, found.method)
         sizes = [np.repeat(np.abs(part).max(), n) for part in (orbit.run.q, orbit.run.q_dot)]
         return cls(orbit, np.hstack((run.q, run.q_dot)), np.concatenate(sizes))
 
