@@ -95,7 +95,7 @@ class _Known:
         times = np.sort((np.arange(orbit.period) * once - found.phase) % found.period)
         later = delayed(found.system, found.phase)
         run = run_from(later, found.whole, found.period, times, found.method)
-        sizes = [np.repeat(np.abs(part).max(), n) for part in (orbit.run.q, orbit.run.q_dot)]
+        sizes = [np.repeat(np.abs(part).max(), len(orbit.model.omega)) for part in (orbit.run.q, orbit.run.q_dot)]
         return cls(orbit, np.hstack((run.q, run.q_dot)), np.concatenate(sizes))
 
     def holds(self, states: Vector) -> Any:
