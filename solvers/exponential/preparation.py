@@ -80,6 +80,8 @@ class Prepared(NamedTuple):
     back: Array  # (2n, 2N): [q, q̇] from the state of all blocks
     layout: Layout  # of State and Scratch
     rest: Array  # state at t = 0: the tones' blocks, and minus the steady response of the structure's blocks
+    steady: Any  # (tones, 2n) complex amplitudes of the steady response to each tone
+    tone_load: Any  # (tones,) the load each belongs to
     spare_workspaces: list[Workspace]  # of runs that are over
     kept: Memo  # tables of the energy balance by the spacing of outputs
 
@@ -195,7 +197,7 @@ class _SharedTables:
         fill_tones(tables.value, problem.value, self.tones, self.series)
         rest = among_tones(-response.real.sum(axis=0), self.tones)
         rest[n : n + self.tones] = 1.0
-        return Prepared(problem, tables, back, self.layout, rest, [], Memo())
+        return Prepared(problem, tables, back, self.layout, rest, response, forcing.tone_load, [], Memo())
 
     def _tables(self, forcing: Forcing, turn: Array) -> Packed:
         """Tables that know the signals made of tones, Re(a e^{iΩt}) = Re a · p + Im a/Ω · v; ``turn`` is 1/Ω."""
