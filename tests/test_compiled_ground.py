@@ -288,6 +288,7 @@ USERS = {  # the files that stand on what numba does not promise, and why
     "solvers/compiled/packed.py",  # a type of its own, and loads through a pointer
     "solvers/compiled/simd.py",  # a type of its own, and vector instructions
     "solvers/compiled/kernels.py",  # calls of C functions at an address
+    "solvers/compiled/parts.py",  # the same
     "contacts/kernels.py",  # the same
     "contacts/sum_kernels.py",  # the same
     "contacts/memory/custom_kernels.py",  # parameters as a tuple
