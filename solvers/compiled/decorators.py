@@ -21,12 +21,14 @@ tests and the bench; what fails is left out as the table says.
 from __future__ import annotations
 
 import gc
+import logging
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
 from numba import cfunc, config, njit
+from numba.core import event
 
 from solvers.compiled.cache import kept
 
@@ -60,16 +62,37 @@ reordered = _decorator(**_INNER, forceinline=True, fastmath={"reassoc", "contrac
 """The same for sums whose order does not matter, so that they can be vectorised."""
 
 
+class _Teller(event.Listener):
+    """Says once per process that code is compiled."""
+
+    told = False
+
+    def on_start(self, _: Any) -> None:
+        """A function was not found in the cache."""
+        if not self.told:
+            self.told = True
+            logging.getLogger("fembeam.solvers").warning(
+                "compiling the integrator, once for this version: 10 to 30 s, later starts load it"
+            )
+
+    def on_end(self, _: Any) -> None:
+        """It is compiled."""
+
+
+_TELLER = _Teller()
+
+
 @contextmanager
-def _garbage_kept() -> Iterator[None]:
-    """Let the garbage collector rest.
+def _compiling() -> Iterator[None]:
+    """Tell of compiling, and let the garbage collector rest.
 
     The compiler keeps most of what it makes; looking through that again and again takes a sixth of the time.
     """
     collects = gc.isenabled()
     gc.disable()
     try:
-        yield
+        with event.install_listener("numba:compile", _TELLER):
+            yield
     finally:
         if collects:
             gc.enable()
@@ -79,7 +102,7 @@ def entry(signature: Any) -> Callable[[Any], Any]:
     """Decorator of a kernel that is compiled, or loaded, when its module is imported."""
 
     def compiled(function: Any) -> Any:
-        with _garbage_kept():
+        with _compiling():
             return _compiled(function, signature, **_OPTIONS)
 
     return compiled
@@ -89,7 +112,7 @@ def c_function(signature: Any) -> Callable[[Any], Any]:
     """The same of a function that is called at its ``address``."""
 
     def compiled(function: Any) -> Any:
-        with _garbage_kept(), kept(function) as keep:
+        with _compiling(), kept(function) as keep:
             return cfunc(signature, cache=keep, error_model="numpy", _nrt=False)(function)
 
     return compiled
