@@ -52,6 +52,19 @@ def test_a_changed_inner_function_is_compiled_anew_and_the_old_one_found_again(p
     assert ran(CALL, package.parent)[0] == ["2.0", "1"]
 
 
+def test_compiling_is_told_in_one_line_and_loading_is_not(package):
+    entry = (
+        "from numba import float64\nfrom solvers.compiled.decorators import entry\nfrom solvers.inner import times\n"
+    )
+    for name in ("one", "two"):
+        made = f"@entry(float64(float64))\ndef {name}(x): return times(x)\n"
+        (package / f"{name}.py").write_text(entry + made)
+    said = ran("import solvers.one, solvers.two", package.parent)[1]
+    assert said.count("\n") == 1
+    assert "compiling" in said
+    assert ran("import solvers.one, solvers.two", package.parent)[1] == ""
+
+
 def test_what_changes_while_a_process_runs_is_not_kept(package):
     write = f"open({str(package / 'inner.py')!r}, 'w').write({INNER.format(30.0)!r})"
     change = f"import solvers.compiled.decorators; {write}; "

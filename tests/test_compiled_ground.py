@@ -7,13 +7,15 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from numba import njit, types
+from scipy.integrate import DOP853
+from scipy.special import eval_jacobi, roots_jacobi
 
 from contacts import Hertz, KelvinVoigt, Viscoelastic
-from solvers.compiled import decorators
+from solvers.compiled import decorators, dop853_tableau
 from solvers.compiled.packed import Layout, Packed, PackedTemplate, unpacker
 from solvers.compiled.simd import bit_pattern, load8, positive8, splat8, sqrt8, store8, sum8
 from solvers.compiled.sums import combine, padded
-from solvers.exponential.contact.nodes import LOCAL, node_sets_of, series_of
+from solvers.exponential.contact.nodes import LOCAL, S, gauss_jacobi, node_sets_of, series_of
 from solvers.exponential.contact.peaks import local_maximum
 from solvers.exponential.flight import level_within
 
@@ -281,13 +283,34 @@ def test_force_at_entry_is_a_series_in_the_root_of_time_its_powers_need(made, se
     assert series_of(made) == pytest.approx(series)
 
 
+def test_coefficients_are_those_of_scipy():
+    size = dop853_tableau.STAGES
+    assert np.array_equal(dop853_tableau.A[:size, :size], DOP853.A[:size, :size])
+    assert np.array_equal(dop853_tableau.A[size, :size], DOP853.B)
+    assert np.array_equal(dop853_tableau.A[size + 1 :], DOP853.A_EXTRA)
+    assert np.array_equal(dop853_tableau.C, [*DOP853.C[:size], 1.0, *DOP853.C_EXTRA])
+    for name in ("E3", "E5", "D"):
+        assert np.array_equal(getattr(dop853_tableau, name), getattr(DOP853, name))
+
+
+@pytest.mark.parametrize("beta", [0.0, 0.5, 1.0, 3.4, 5.0])
+def test_nodes_and_coefficients_of_jacobi_are_those_of_scipy(beta):
+    x, weights, spectrum = gauss_jacobi(beta)
+    expected, areas = roots_jacobi(S, 0.0, beta)
+    np.testing.assert_allclose(x, expected, rtol=0.0, atol=2e-15)
+    np.testing.assert_allclose(weights, areas / 2.0 ** (beta + 1.0), rtol=1e-13)
+    polynomials = np.array([eval_jacobi(k, 0.0, beta, x) for k in range(S)])
+    np.testing.assert_allclose(spectrum @ polynomials.T, np.eye(S), atol=1e-13)
+
+
 PRIVATE = "numba.core", "numba.np", "llvmlite"
 USERS = {  # the files that stand on what numba does not promise, and why
-    "solvers/compiled/decorators.py",  # options of njit, described there
+    "solvers/compiled/decorators.py",  # options of njit, described there; when it compiles
     "solvers/compiled/cache.py",  # llvmlite's version
     "solvers/compiled/packed.py",  # a type of its own, and loads through a pointer
     "solvers/compiled/simd.py",  # a type of its own, and vector instructions
     "solvers/compiled/kernels.py",  # calls of C functions at an address
+    "solvers/compiled/parts.py",  # the same
     "contacts/kernels.py",  # the same
     "contacts/sum_kernels.py",  # the same
     "contacts/memory/custom_kernels.py",  # parameters as a tuple
@@ -316,4 +339,4 @@ def test_only_named_files_stand_on_what_numba_does_not_promise():
     found = {str(path.relative_to(home).as_posix()): {*leans_on(path)} for path in files}
     assert {name for name, used in found.items() if used} == USERS
     assert {name for name, used in found.items() if used & OPTION_NAMES} == {"solvers/compiled/decorators.py"}
-    assert found["solvers/compiled/decorators.py"] == OPTION_NAMES
+    assert found["solvers/compiled/decorators.py"] == OPTION_NAMES | {"numba.core"}

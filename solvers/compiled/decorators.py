@@ -21,11 +21,14 @@ tests and the bench; what fails is left out as the table says.
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable
+import logging
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
-from numba import config, njit
+from numba import cfunc, config, njit
+from numba.core import event
 
 from solvers.compiled.cache import kept
 
@@ -54,25 +57,62 @@ inlined = _decorator(**_INNER, forceinline=True)
 """The same for what the innermost loops call, from few places: there even passing the arrays' descriptors costs more
 than the arithmetic. Everywhere else it would only cost compile time."""
 merged = _decorator(**_INNER, inline="always")
-"""The same for the long functions one kernel calls once each: compiled as a part of it."""
+"""The same for what is called from one place: compiled as a part of the caller, a third quicker than by itself."""
 reordered = _decorator(**_INNER, forceinline=True, fastmath={"reassoc", "contract"})
 """The same for sums whose order does not matter, so that they can be vectorised."""
 
 
-def entry(signature: Any) -> Callable[[Any], Any]:
-    """Decorator of a kernel that is compiled, or loaded, when its module is imported.
+class _Teller(event.Listener):
+    """Says once per process that code is compiled."""
 
-    Meanwhile the garbage collector rests: the compiler keeps most of what it makes, and looking through that again and
-    again takes a sixth of the time.
+    told = False
+
+    def on_start(self, _: Any) -> None:
+        """A function was not found in the cache."""
+        if not self.told:
+            self.told = True
+            logging.getLogger("fembeam.solvers").warning(
+                "compiling the integrator, once for this version: 10 to 30 s, later starts load it"
+            )
+
+    def on_end(self, _: Any) -> None:
+        """It is compiled."""
+
+
+_TELLER = _Teller()
+
+
+@contextmanager
+def _compiling() -> Iterator[None]:
+    """Tell of compiling, and let the garbage collector rest.
+
+    The compiler keeps most of what it makes; looking through that again and again takes a sixth of the time.
     """
+    collects = gc.isenabled()
+    gc.disable()
+    try:
+        with event.install_listener("numba:compile", _TELLER):
+            yield
+    finally:
+        if collects:
+            gc.enable()
+
+
+def entry(signature: Any) -> Callable[[Any], Any]:
+    """Decorator of a kernel that is compiled, or loaded, when its module is imported."""
 
     def compiled(function: Any) -> Any:
-        collects = gc.isenabled()
-        gc.disable()
-        try:
+        with _compiling():
             return _compiled(function, signature, **_OPTIONS)
-        finally:
-            if collects:
-                gc.enable()
+
+    return compiled
+
+
+def c_function(signature: Any) -> Callable[[Any], Any]:
+    """The same of a function that is called at its ``address``."""
+
+    def compiled(function: Any) -> Any:
+        with _compiling(), kept(function) as keep:
+            return cfunc(signature, cache=keep, error_model="numpy", _nrt=False)(function)
 
     return compiled

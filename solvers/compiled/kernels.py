@@ -56,6 +56,7 @@ class Problem(NamedTuple):
     table_dt: Any  # (J,) s
     table_start: Any  # (J + 1,) first row of each, and the end
     table_load: Any  # (J,) the load each drives
+    parts: Any  # addresses of what is compiled by itself, 0 where it is not; see `parts`
 
 
 REAL = types.float64
@@ -67,7 +68,7 @@ PROBLEM = types.NamedTuple(
     [
         *[VECTOR, VECTOR, MATRIX, MATRIX, MATRIX, MATRIX, MATRIX, VECTOR, INTEGERS, INTEGERS],
         *[MATRIX, VECTOR, *[INTEGERS] * 3, types.Array(types.int64, 2, "C"), *[INTEGERS] * 3],
-        *[MATRIX, MATRIX, VECTOR, _COMPLEX, INTEGERS, MATRIX, VECTOR, INTEGERS, INTEGERS],
+        *[MATRIX, MATRIX, VECTOR, _COMPLEX, INTEGERS, MATRIX, VECTOR, *[INTEGERS] * 3],
     ],
     Problem,
 )

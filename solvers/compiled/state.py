@@ -21,6 +21,7 @@ from solvers.compiled.kernels import (
     inner,
     kernel,
 )
+from solvers.compiled.parts import ADDRESSES
 from solvers.problem import Array, Forcing, Law, Status, System
 
 STATUSES = list(Status)
@@ -269,6 +270,7 @@ def _problem(system: System, forcing: Forcing, linear: dict[str, Array]) -> Prob
         by_latched=_integers(contacts, "memory_gradient_address"),
         by_renewal=_integers(contacts, "renew_gradient_address"),
         opening=np.array([_opening(c.law) for c in contacts], dtype=np.int64),
+        parts=ADDRESSES,
         **vars(forcing),
     )
 

@@ -35,8 +35,8 @@ from solvers.compiled.kernels import (
     dot,
     entry,
     indentation,
-    inlined,
     inner,
+    merged,
     rhs,
 )
 from solvers.compiled.packed import unpacker
@@ -59,7 +59,7 @@ from solvers.compiled.state import (
 )
 from solvers.compiled.sums import combine
 from solvers.exponential.contact.crossings import FORCE, side_at
-from solvers.exponential.contact.landing import landing_step, start_landing
+from solvers.exponential.contact.landing_step import landing_step, start_landing
 from solvers.exponential.contact.node_response import START
 from solvers.exponential.linearised_border import pass_border
 from solvers.exponential.linearised_step import (
@@ -102,7 +102,7 @@ def _force(problem, past, s, delta, delta_dot, batch):
     return batch[2]
 
 
-@inner
+@merged
 def _begin(problem, past, derivatives, variation):
     """Find the segments of the stops as the run does at its start, and latch the derivatives of their rates."""
     begin_contacts(problem, past)
@@ -114,7 +114,7 @@ def _begin(problem, past, derivatives, variation):
                 derivatives.entry[c, s] = 0.0 if abs(rate) < problem.floor[s] else np.sign(rate) * change
 
 
-@inner
+@merged
 def _cross_knot(problem, past, derivatives, variation, s, direction):
     """A stop passes a border of its segment."""
     size, t = 2 * problem.k.size, past.now[T]
@@ -145,14 +145,14 @@ def _cross_knot(problem, past, derivatives, variation, s, direction):
     past.segment[s] += direction
 
 
-@inner
+@merged
 def _inside_segment(problem, past, s, x):
     """Indentation, kept off the knots, where the slope of the law could be that of the next segment."""
     lower, upper = problem.knots[s, past.segment[s] - 1], problem.knots[s, past.segment[s]]
     return min(max(indentation(problem, s, x), lower * (1.0 + _OFF)), upper * (1.0 - _OFF))
 
 
-@inner
+@merged
 def _note_sides(problem, tables, past, scratch):
     """Force before its cut at the begin of a landing, for laws cut at zero force, into ``scratch.unresolved``."""
     for s in range(problem.gap.size):
@@ -160,7 +160,7 @@ def _note_sides(problem, tables, past, scratch):
             scratch.unresolved[s] = side_at(problem, tables, past, s, past.x, scratch.trial)
 
 
-@inlined
+@merged
 def _gradient(problem, tables, past, scratch, s, batch):
     """Derivatives of a law at one stage of a landing, on the side of its bend on which the landing began."""
     d, v, rate = batch[0:1], batch[1:2], past.entry_rate[s]
@@ -174,7 +174,7 @@ def _gradient(problem, tables, past, scratch, s, batch):
         batch[2], batch[3], batch[4] = 0.0, 0.0, 0.0
 
 
-@inlined
+@merged
 def _stage_rates(problem, ahead, behind, tables, past, scratch, derivatives, variation, w, factor, out):
     """Variational equation at one stage of a landing; ``w`` is the state with its time, factor dt along the step."""
     n, size, t, batch = problem.k.size, 2 * problem.k.size, w[past.x.size], derivatives.batch
@@ -207,16 +207,15 @@ def _stage_rates(problem, ahead, behind, tables, past, scratch, derivatives, var
                 out[c, e] += factor * problem.push[s, e] * change
 
 
-@inner
+@merged
 def _land(problem, ahead, behind, tables, past, scratch, derivatives, variation, row):
     """A landing: the variational equation on the Runge–Kutta step's own stages."""
     variable, stop, size = int(row[FIRST]), int(row[SECOND]), 2 * problem.k.size
     w, width, span = scratch.stages[START], past.x.size, row[SPAN]
     start_landing(problem, tables, past, scratch, stop)
     _note_sides(problem, tables, past, scratch)
-    with_energy = np.bool_(0)  # a literal would be compiled for itself
     landing_step(
-        *(problem, tables, with_energy, variable, stop, span, w, past.segment, past.entry_rate),
+        *(problem, tables, False, variable, stop, span, w, past.segment, past.entry_rate),
         *(scratch.unresolved, scratch.stages),
     )
     trial = scratch.stages[STAGES + 1]

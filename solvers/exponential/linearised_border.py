@@ -7,7 +7,17 @@ differences, those of m the law's own.
 
 from __future__ import annotations
 
-from solvers.compiled.kernels import call_force, call_renewal, call_renewal_gradient, copy, dot, indentation, inner, rhs
+from solvers.compiled.kernels import (
+    call_force,
+    call_renewal,
+    call_renewal_gradient,
+    copy,
+    dot,
+    indentation,
+    inner,
+    merged,
+    rhs,
+)
 from solvers.compiled.state import T
 from solvers.exponential.linearised_step import change_of, is_parameter
 
@@ -35,7 +45,7 @@ def _force(problem, shadow, s, delta, rate, slopes):
     return batch[5]
 
 
-@inner
+@merged
 def _slopes_of_margin(problem, shadow, s, j, delta, rate, slopes, out):
     """∂b/∂δ, ∂b/∂δ̇ and ∂b/∂L by central differences."""
     width, most = problem.parameters.shape[1], problem.latched.shape[1]
@@ -59,7 +69,7 @@ def _slopes_of_margin(problem, shadow, s, j, delta, rate, slopes, out):
         row[place] = known
 
 
-@inner
+@merged
 def _explicit(problem, ahead, behind, shadow, s, j, delta, rate, slopes, nudge, out):
     """Change of the margin, and of what is latched, per unit of a parameter of the laws; these latch it too."""
     most, width = problem.latched.shape[1], 2.0 * nudge.law_step
@@ -75,7 +85,7 @@ def _explicit(problem, ahead, behind, shadow, s, j, delta, rate, slopes, nudge, 
     return change
 
 
-@inner
+@merged
 def pass_border(problem, ahead, behind, shadow, slopes, nudge, s, j):
     """A law with memory passes its border j: derivatives of what it latches, and of the motion if its force jumps."""
     size, t, most, width = 2 * problem.k.size, shadow.now[T], problem.latched.shape[1], problem.parameters.shape[1]

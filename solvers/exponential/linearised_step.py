@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from solvers.compiled.kernels import MATRIX, REAL, VECTOR, call_force, contact_forces, copy, dot, inlined, inner, rhs
+from solvers.compiled.kernels import MATRIX, REAL, VECTOR, call_force, contact_forces, copy, dot, inlined, merged, rhs
 from solvers.compiled.state import BEGAN, ENDED, FIRST, HEAD, KIND, PART, SECOND, SPAN, T
 from solvers.compiled.sums import combine
 from solvers.exponential.contact.collocation import end_state
@@ -108,7 +108,7 @@ def change_by_latched(problem, derivatives, column, s, n, i):
     return total
 
 
-@inlined
+@merged
 def _by_parameter(ahead, behind, past, scratch, variation, derivatives, s):
     """∂F/∂parameter at the nodes of a stop, by the difference of the law at both parameters."""
     for i in range(S):
@@ -125,7 +125,7 @@ def _by_parameter(ahead, behind, past, scratch, variation, derivatives, s):
         )
 
 
-@inlined
+@merged
 def _signal_slopes(problem, tables, past, scratch, derivatives, node_set, level, t):
     """Slopes of the sampled signals at the nodes, and the response of the stops in contact to them."""
     stops, h = problem.gap.size, tables.contact_step[level]
@@ -144,7 +144,7 @@ def _signal_slopes(problem, tables, past, scratch, derivatives, node_set, level,
             combine(matrix, derivatives.signal[load], S, response, response)
 
 
-@inlined
+@merged
 def _solve(problem, tables, past, scratch, derivatives, variation, node_set, level, column, shift):
     """Changes of all forces (and, in a moving frame, signals) at the nodes, one column."""
     row, size, stops, through = 0, 2 * problem.k.size, problem.gap.size, uses_blocks(tables)
@@ -184,15 +184,14 @@ def _solve(problem, tables, past, scratch, derivatives, variation, node_set, lev
             derivatives.force[stops + load, i] = shift * derivatives.signal[load, i]
 
 
-@inlined
+@merged
 def _move(problem, tables, past, scratch, derivatives, node_set, level, y, part):
     """Take one column to the end of the step, or to the ``part`` of it that lies within the run."""
     size, stops = 2 * problem.k.size, problem.gap.size
     if part < np.inf:
         for u in range(scratch.force.shape[0]):
             copy(derivatives.force[u], scratch.force[u], S)
-        ledger = np.bool_(0)  # a literal would be compiled for itself
-        state_within(problem, tables, past, scratch, node_set, tables.contact_step[level], 0.0, part, y, ledger)
+        state_within(problem, tables, past, scratch, node_set, tables.contact_step[level], 0.0, part, y, False)
         return
     propagate_blocks(problem, tables.contact_propagator[level, 0], tables.contact_propagator[level, 1], y)
     if uses_blocks(tables):
@@ -206,7 +205,7 @@ def _move(problem, tables, past, scratch, derivatives, node_set, level, y, part)
                 y[e] += row[e] * derivatives.force[u, j]
 
 
-@inner
+@merged
 def linearise_step(problem, ahead, behind, tables, past, scratch, derivatives, variation, row, modes):
     """A collocated step, linearised as it was taken."""
     node_set, level, t = int(row[FIRST]), int(row[SECOND]), row[BEGAN]
@@ -227,9 +226,7 @@ def linearise_step(problem, ahead, behind, tables, past, scratch, derivatives, v
         end = scratch.x_new
         if part < np.inf:
             copy(past.x, end, past.x.size)
-            state_within(
-                problem, tables, past, scratch, node_set, tables.contact_step[level], 0.0, part, end, np.bool_(0)
-            )
+            state_within(problem, tables, past, scratch, node_set, tables.contact_step[level], 0.0, part, end, False)
         else:
             end_state(problem, tables, past, scratch, node_set, level)
         rhs(problem, row[ENDED], end, past.segment, past.entry_rate, derivatives.rate[1], derivatives.batch)

@@ -28,6 +28,7 @@ from numba import types
 
 from solvers.compiled.kernels import MATRIX, PROBLEM, REAL, VECTOR, entry
 from solvers.compiled.packed import Packed, unpacker
+from solvers.compiled.parts import EVERY_RUN
 from solvers.compiled.renewals import most_rows
 from solvers.compiled.state import (
     AT_ONCE,
@@ -48,17 +49,19 @@ from solvers.compiled.state import (
     switch,
     switch_on_surface,
 )
+from solvers.exponential.contact.begin import BEGUN, NEW, begin_steps, latest_entered
 from solvers.exponential.contact.landing import landing_reach
-from solvers.exponential.contact.step import BEGUN, NEW, advance_contact, begin_steps, latest_entered
+from solvers.exponential.contact.step import advance_contact
 from solvers.exponential.energy.balance import account_state, start_account
 from solvers.exponential.energy.check import FIRST, has_gained, note_energy, own_energy
 from solvers.exponential.energy.flight_tables import ENERGY_TABLES, NO_ENERGY_TABLES
-from solvers.exponential.preparation import SCRATCH, TABLES, prepare_run
+from solvers.exponential.preparation import SCRATCH, TABLES, load_parts, prepare_run
 from solvers.exponential.safe_steps import fly
 from solvers.problem import Array, Forcing, System
 
 _problem, _tables, _state, _scratch = unpacker(PROBLEM), unpacker(TABLES), unpacker(STATE), unpacker(SCRATCH)
 _energy_tables = unpacker(ENERGY_TABLES)
+load_parts(EVERY_RUN)
 
 
 @entry(types.int64(*[types.int64] * 5, REAL, types.int64, REAL, REAL, MATRIX, MATRIX, VECTOR))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,12 +10,13 @@ from numba import types
 
 from solvers.compiled.kernels import INTEGERS, MATRIX, PROBLEM, REAL, VECTOR, Problem
 from solvers.compiled.packed import Layout, Packed, PackedTemplate
+from solvers.compiled.parts import BORDERS, ENERGY, MANY_STOPS, load
 from solvers.compiled.state import STATE, State, begin_state, most_borders, problem_of, state_shapes
 from solvers.compiled.sums import padded
 from solvers.exponential.contact.many_stops import POOL
 from solvers.exponential.contact.node_response import START, Scratch
 from solvers.exponential.contact.nodes import S, series_of
-from solvers.exponential.energy.flight_tables import energy_tables_for
+from solvers.exponential.energy.flight_tables import ENERGY_TABLES, energy_tables_for
 from solvers.exponential.flight import SERIES_TERMS
 from solvers.exponential.steady_response import steady_response, without_resonance
 from solvers.exponential.tables import TONE_TABLES, Tables, build, doublings, fill_tones, law_tables_of
@@ -45,6 +46,10 @@ SCRATCH = types.NamedTuple(
     ],
     Scratch,
 )
+
+_KINDS = {"problem": PROBLEM, "tables": TABLES, "state": STATE, "scratch": SCRATCH, "energy_tables": ENERGY_TABLES}
+load_parts = partial(load, _KINDS)
+"""Compile functions that are called at their addresses, or load their machine code; see `compiled.parts`."""
 
 
 class Workspace:
@@ -86,7 +91,8 @@ class Prepared(NamedTuple):
     kept: Memo  # tables of the energy balance by the spacing of outputs
 
     def energy_tables_for(self, spacing: float) -> Packed:
-        """Tables of the energy balance for outputs of a spacing, s."""
+        """Tables of the energy balance for outputs of a spacing, s; what reads them is compiled for the first."""
+        load_parts(ENERGY)
         made: Packed = self.kept.get(spacing, lambda: energy_tables_for(self.problem.value, self.tables.value, spacing))
         return made
 
@@ -168,6 +174,10 @@ class _SharedTables:
         energy_rows = np.zeros_like(problem.load), problem.power, among_tones(loss, self.tones)
         tables = build(problem, self.tones, self.series, law_tables_of(contacts), dt_cell, energy_rows)
         sizes = len(problem.gap), len(problem.load), len(problem.k), len(forcing.table_dt), most_borders(problem)
+        if tables.bend.any() or problem.border_count.any():
+            load_parts(BORDERS)
+        if tables.node_propagator.size:
+            load_parts(MANY_STOPS)
         self.layout = _layout(*sizes, POOL if tables.node_propagator.size else 0)
         self.problem = PackedTemplate(problem, PROBLEM, ("gap", "k", "read", "read_rate", "power"))
         self.tables = PackedTemplate(tables, TABLES, TONE_TABLES)

@@ -27,8 +27,8 @@ class Blocks:
 def decouple(M: Array, C: Array, K: Array) -> Blocks:
     """Find the decoupled form of (M, C, K)."""
     n = M.shape[0]
-    if _is_diagonal(M) and _is_diagonal(K) and np.all(np.diag(M) == 1.0):
-        phi, k = np.eye(n), np.diag(K).copy()
+    if _is_diagonal(M) and _is_diagonal(K):
+        phi, k = np.diag(1.0 / np.sqrt(np.diag(M))), np.diag(K) / np.diag(M)
     else:
         phi, k = _modes(M, K)
     damping = phi.T @ C @ phi

@@ -10,8 +10,10 @@ do not resolve the fast blocks keeps a distance of what these may add.
 from __future__ import annotations
 
 import numpy as np
+from numba import types
 
-from solvers.compiled.kernels import dot, indentation, inlined, inner
+from solvers.compiled.kernels import VECTOR, dot, indentation, inlined, inner
+from solvers.compiled.parts import PASSED, part
 from solvers.compiled.renewals import margins, margins_in, note_event, renew
 from solvers.compiled.state import rate_tolerance, surface_tolerance
 from solvers.exponential.contact.node_response import DELTAS, KNOWN, RATES, START, rate_ripple_of, ripple_of
@@ -145,7 +147,7 @@ def border_ahead(problem, tables, state, scratch, node_set, level):
     return first, element, border
 
 
-@inner
+@part(PASSED, types.UniTuple(types.int64, 2), types.int64, types.int64, VECTOR, VECTOR)
 def passed(problem, state, scratch, element, border, w, x):
     """(element, border) of the margin that has gone furthest below zero between the states w and x, or (-1, -1).
 

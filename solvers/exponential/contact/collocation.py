@@ -21,8 +21,20 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import types
 
-from solvers.compiled.kernels import contact_forces, contact_gradient, copy, dot, indentation, inlined, inner
+from solvers.compiled.kernels import (
+    REAL,
+    contact_forces,
+    contact_gradient,
+    copy,
+    dot,
+    indentation,
+    inlined,
+    inner,
+    merged,
+)
+from solvers.compiled.parts import ERROR, SOLVE, part
 from solvers.compiled.simd import load8, sum8
 from solvers.compiled.state import CALLS, PEAK_DELTA, PEAK_FORCE, T, is_open
 from solvers.compiled.sums import combine, iterate_power_law, replace_values
@@ -34,7 +46,7 @@ from solvers.exponential.contact.peaks import step_peaks
 from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR, STIFFNESS
 
 
-@inlined
+@merged
 def _alone(tables, state):
     """The stop in contact if it is the only one and its law is a power law of the tables, else -1."""
     alone, count = -1, 0
@@ -44,7 +56,7 @@ def _alone(tables, state):
     return alone if count == 1 and tables.power_law[alone, EXPONENT] > 0.0 else -1
 
 
-@inlined
+@merged
 def _iterate(problem, tables, state, scratch, node_set, level):
     """One iteration for the forces of all stops in contact; Σ change² and Σ force² in units of their tolerance."""
     change, largest = 0.0, 0.0
@@ -60,7 +72,7 @@ def _iterate(problem, tables, state, scratch, node_set, level):
     return change, largest
 
 
-@inner
+@merged
 def _set_accuracy(problem, tables, state, scratch, h, rtol):
     """Tolerance of each stop's force, N: it changes no indentation rate by more than a twentieth of its tolerance.
 
@@ -80,7 +92,7 @@ def _set_accuracy(problem, tables, state, scratch, h, rtol):
     return stiff
 
 
-@inner
+@part(SOLVE, types.boolean, types.int64, types.int64, types.float64)
 def solve_forces(problem, tables, state, scratch, node_set, level, rtol):
     """Solve for the forces by fixed-point iteration, else by Newton's method; returns whether a solution was found."""
     if _set_accuracy(problem, tables, state, scratch, tables.contact_step[level], rtol):
@@ -134,7 +146,7 @@ def largest_size(values):
     return best
 
 
-@inlined
+@merged
 def _largest(problem, tables, state, scratch, u):
     """Largest force of a stop on the step, N, and its stiffness there, N/m."""
     if problem.knots[u, 0] == 0.0:
@@ -148,7 +160,7 @@ def _largest(problem, tables, state, scratch, u):
     return largest_size(scratch.force[u]), largest_size(slope[0])
 
 
-@inner
+@part(ERROR, REAL, types.int64, types.int64, types.boolean, REAL)
 def step_error(problem, tables, state, scratch, node_set, level, is_new, rtol):
     """Largest error of an indentation rate by the unresolved part of the forces, in units of the stop's tolerance.
 
@@ -185,7 +197,7 @@ def step_error(problem, tables, state, scratch, node_set, level, is_new, rtol):
     return worst
 
 
-@inner
+@merged
 def _sum_errors(problem, tables, scratch, node_set, h):
     """Errors of all indentation rates, m/s, by the unresolved parts of forces and signals, into ``per_stop``."""
     stops, error = problem.gap.size, scratch.per_stop
@@ -201,7 +213,7 @@ def _sum_errors(problem, tables, scratch, node_set, h):
                 error[s] += abs(tables.accelerance[s, u]) * scratch.unresolved[u]
 
 
-@inner
+@merged
 def _hidden_kink(problem, state, scratch, u, largest, is_new):
     """Difference, N, of law and polynomial at an end of a smooth step, where the last coefficients are smaller.
 
@@ -229,7 +241,7 @@ def unresolved_part(coefficients, largest, power):
     return last * max(decay**power, min(last / largest, 1.0))
 
 
-@inner
+@merged
 def _unresolved_signal(problem, tables, scratch, node_set, j):
     """The same for a sampled signal; an entry step integrates it at half the order."""
     values, largest = scratch.force[problem.gap.size + problem.table_load[j]], 0.0
@@ -263,7 +275,7 @@ def end_state(problem, tables, state, scratch, node_set, level):
         x[n + b] += alpha[b] * v - beta[b] * (problem.k[b] * p + problem.c[b] * v)
 
 
-@inner
+@merged
 def finish_step(problem, tables, state, scratch, node_set, level):
     """Move the state to the end of the step; update the energy balance and the peaks of the contacts."""
     stops, size = problem.gap.size, 2 * problem.k.size
@@ -285,7 +297,7 @@ def finish_step(problem, tables, state, scratch, node_set, level):
     state.now[T] += h
 
 
-@inner
+@merged
 def contact_time(problem, tables, scratch, s, speed):
     """Duration, s, of an impact at this speed on one stop alone, from the law's energy: T = 3.2 δ_m/v."""
     speed = max(speed, 1e-12)

@@ -15,9 +15,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import types
 
 from solvers.compiled.dop853_tableau import STAGES, C
-from solvers.compiled.kernels import call_force, copy, dot, indentation, inlined, inner
+from solvers.compiled.kernels import REAL, call_force, copy, dot, indentation, inlined, inner, merged
+from solvers.compiled.parts import BOUNDS, LEAVES, part
 from solvers.compiled.simd import splat8, store8
 from solvers.compiled.state import PEAK_FORCE, T_IN, T, is_open, surface_tolerance
 from solvers.compiled.sums import above
@@ -58,7 +60,7 @@ def _passes(d, a, slope_a, b, slope_b, lower, upper):
     return False
 
 
-@inlined
+@merged
 def _turns(rates, begin, end, up, down):
     """Whether the rate changes its sign between two points of a step, upwards if ``up`` or downwards if ``down``."""
     before, found = begin, False
@@ -69,7 +71,7 @@ def _turns(rates, begin, end, up, down):
     return found
 
 
-@inner
+@merged
 def _passes_between(problem, tables, state, scratch, node_set, h, s, lower, upper):
     """Whether δ leaves [lower, upper] between two points of the step or at one."""
     size = 2 * problem.k.size
@@ -86,7 +88,7 @@ def _passes_between(problem, tables, state, scratch, node_set, h, s, lower, uppe
     return False
 
 
-@inner
+@part(BOUNDS, types.void, REAL)
 def _bound_rates(problem, tables, state, scratch, h):
     """Bounds of |δ̈| of all stops into ``scratch.per_stop``; forces are taken as twice their largest node value."""
     n, stops = problem.k.size, problem.gap.size
@@ -108,7 +110,7 @@ def _bound_rates(problem, tables, state, scratch, h):
         scratch.per_stop[s] += dot(tables.acceleration_weight[s], scratch.norms, n)
 
 
-@inlined
+@merged
 def _stays_away(scratch, s, h):
     """Whether a stop out of contact cannot be reached on the step; its motion is set to that at the begin."""
     delta, rate = scratch.start_motion[s, 0], scratch.start_motion[s, 1]
@@ -117,7 +119,7 @@ def _stays_away(scratch, s, h):
     return delta + h * max(rate, 0.0) + 0.5 * h * h * scratch.per_stop[s] < 0.0
 
 
-@inlined
+@merged
 def _watch(problem, tables, state, scratch, node_set, level, s, carried):
     """Motion at the nodes of a stop out of contact; returns whether the motion of the blocks has been computed."""
     if not uses_blocks(tables):
@@ -130,10 +132,11 @@ def _watch(problem, tables, state, scratch, node_set, level, s, carried):
     return True
 
 
-@inner
+@part(LEAVES, types.boolean, types.int64, types.int64)
 def leaves_segment(problem, tables, state, scratch, node_set, level):
     """Whether any stop may cross a border of its segment on the step."""
-    size, h, carried, through = 2 * problem.k.size, tables.contact_step[level], False, uses_blocks(tables)
+    size, h, through = 2 * problem.k.size, tables.contact_step[level], uses_blocks(tables)
+    carried = np.bool_(0)  # a literal would be compiled for itself
     if through:
         _bound_rates(problem, tables, state, scratch, h)
     for s in range(problem.gap.size):
@@ -272,7 +275,7 @@ def before_landing(problem, tables, state, scratch, stop, bends, w, x):
     return CLEAR
 
 
-@inlined
+@merged
 def _force_turns(work, column, width, known):
     """Whether a force, the rate of the impulse over that of time, has a maximum above ``known`` inside a landing."""
     if work[0, column] / work[0, width] < 0.5 * known:  # too far below the peak for a higher maximum
@@ -284,10 +287,13 @@ def _force_turns(work, column, width, known):
     ends = max(work[0, column] / work[0, width], work[last, column] / work[last, width])
     if max(highest, ends) <= known:
         return False
-    return highest > ends or _turns_at(work, column, width, 0, 1, 2) or _turns_at(work, column, width, 8, 10, last)
+    turns = highest > ends
+    for i, j, k in ((0, 1, 2), (8, 10, last)):
+        turns |= _turns_at(work, column, width, i, j, k)
+    return turns
 
 
-@inlined
+@merged
 def _pulls_inside(work, column, width):
     """Whether a law would pull at an inner stage of a landing."""
     pulls = False

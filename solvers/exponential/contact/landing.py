@@ -16,8 +16,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from solvers.compiled.dop853_tableau import E5, STAGES, A
-from solvers.compiled.kernels import call_force, copy, dot, indentation, inlined, inner, law_forces, table_value
+from solvers.compiled.dop853_tableau import E5, STAGES
+from solvers.compiled.kernels import copy, dot, indentation, inlined, inner, merged
+from solvers.compiled.parts import PASSED
 from solvers.compiled.renewals import margins_in
 from solvers.compiled.state import (
     CALLS,
@@ -32,12 +33,11 @@ from solvers.compiled.state import (
 )
 from solvers.compiled.sums import combine
 from solvers.exponential.contact.borders import passed
-from solvers.exponential.contact.crossings import CLEAR, FORCE, TOO_LONG, before_landing, side_at
-from solvers.exponential.contact.node_response import BATCH, DIFFERENCE, LANDED, START
+from solvers.exponential.contact.crossings import CLEAR, TOO_LONG, before_landing, side_at
+from solvers.exponential.contact.landing_step import INDENTATION, ROOT, TIME, landing_step, start_landing
+from solvers.exponential.contact.node_response import DIFFERENCE, LANDED, START
 from solvers.exponential.contact.peaks import state_peaks
-from solvers.exponential.energy.quadrature import powers
 
-INDENTATION, ROOT, TIME = range(3)
 _MOST_TRIES = 8  # to find the step that ends at an output time, or on a bend
 _PART = 0.1  # of the embedded difference that counts as the error
 _PART_OF_FOURTH = 1e-2  # with u = δ^{1/4}: terms t² = u⁸ are exact in the step, and all of the difference
@@ -47,68 +47,6 @@ _LAST = 0.09  # indentation, in units of the deepest, from which the last step i
 def landing_reach(rtol: float) -> float:
     """Angle, rad, of the fastest block up to which DOP853's error, 7e-8 θ⁹, is below a tenth of rtol."""
     return min((0.1 * rtol / 7e-8) ** (1.0 / 9.0), 1.5)
-
-
-@inlined
-def _force(problem, tables, s, delta, delta_dot, side, entry_rate, batch):
-    """Force of stop s; a law cut at zero force is continued as on the side of the cut where the step began."""
-    batch[0], batch[1], batch[2] = max(delta, problem.knots[s, 0]), delta_dot, 0.0
-    if tables.bend[s] != FORCE:
-        law_forces(problem, s, 1, batch[0:1], batch[1:2], entry_rate, batch[2:3])
-    elif side > 0.0:
-        call_force(tables.uncut[s], 1, batch[0:1], batch[1:2], entry_rate, tables.uncut_parameters[s], (batch[2:3],))
-    return batch[2]
-
-
-@inlined
-def _rate(problem, tables, with_energy, variable, stop, span, w, segment, entry_rate, side, out, batch):
-    """Derivative of the unknowns ``w`` = [state, t, u] by the chosen variable, times its span; number of law calls."""
-    n, calls = problem.k.size, 0
-    size, t = 2 * n, 2 * n + 2 + 2 * problem.gap.size
-    for b in range(n):
-        out[b] = w[n + b]
-        out[n + b] = -problem.k[b] * w[b] - problem.c[b] * w[n + b]
-    for j in range(problem.table_dt.size):
-        value, load = table_value(problem, j, w[t]), problem.load[problem.table_load[j]]
-        for e in range(size):
-            out[e] += load[e] * value
-    out[size], out[size + 1] = powers(problem, tables, w[t], w) if with_energy else (0.0, 0.0)
-    for s in range(problem.gap.size):
-        force, rate = 0.0, 0.0
-        if segment[s] > 0:
-            rate = dot(problem.read_rate[s], w, size)
-            force = _force(problem, tables, s, indentation(problem, s, w), rate, side[s], entry_rate[s], batch)
-            calls += 1
-            for e in range(size):
-                out[e] += problem.push[s, e] * force
-        out[size + 2 + 2 * s] = force * rate
-        out[size + 3 + 2 * s] = force
-    delta_dot = dot(problem.read_rate[stop], w, size)
-    factor = span
-    if variable == INDENTATION:
-        factor = span / delta_dot
-    elif variable == ROOT:
-        kappa = tables.time_exponent[1 + stop]
-        factor = span * kappa * w[t + 1] ** (kappa - 1.0) / delta_dot
-    for e in range(t):
-        out[e] *= factor
-    out[t] = factor
-    out[t + 1] = span if variable == ROOT else 0.0
-    return calls
-
-
-@inner
-def landing_step(problem, tables, with_energy, variable, stop, span, w, segment, entry_rate, side, work):
-    """One DOP853 step of the chosen variable from ``w`` to ``work[LANDED]``, stages in ``work``; count of law calls."""
-    calls = 0
-    batch, trial = work[BATCH], work[LANDED]
-    for i in range(STAGES):
-        combine(work, A[i], i, w, trial)
-        calls += _rate(
-            problem, tables, with_energy, variable, stop, span, trial, segment, entry_rate, side, work[i], batch
-        )
-    combine(work, A[STAGES], STAGES, w, trial)
-    return calls
 
 
 @inner
@@ -129,7 +67,7 @@ def _error(problem, scratch, part, rtol):
     return worst
 
 
-@inner
+@merged
 def _goes_ahead(scratch, size):
     """Whether time goes forward in every stage of the step just taken.
 
@@ -151,7 +89,7 @@ def _step(problem, tables, state, scratch, variable, stop, span, with_energy):
     )
 
 
-@inner
+@merged
 def _length_to(problem, tables, state, scratch, variable, stop, span, landed, time, with_energy):
     """Length of the step that ends, in ``scratch.stages[LANDED]``, at a time before the landing; inf if not found."""
     w, x, size, tries = scratch.stages[START], scratch.stages[LANDED], state.x.size, 0
@@ -170,15 +108,7 @@ def _length_to(problem, tables, state, scratch, variable, stop, span, landed, ti
         length -= late * pace
 
 
-@inner
-def start_landing(problem, tables, state, scratch, stop):
-    """Put the state at the begin of a landing of ``stop``, with t and δ^{1/κ}, into ``scratch.stages[START]``."""
-    w, size, delta = scratch.stages[START], state.x.size, max(indentation(problem, stop, state.x), 0.0)
-    copy(state.x, w, size)
-    w[size], w[size + 1] = state.now[T], delta ** (1.0 / tables.time_exponent[1 + stop])
-
-
-@inner
+@merged
 def _begin_peaks(state, scratch):
     """Raise the peak forces by those at the begin of a landing, which its first stage has computed."""
     work, size = scratch.stages, state.x.size
@@ -218,7 +148,7 @@ def _accept(problem, tables, state, scratch, variable, stop, span, t_end, out, d
     return True
 
 
-@inner
+@merged
 def land(problem, tables, state, scratch, stop, direction, near, rtol, t_end, out, due, with_energy):
     """Try to land on a border of ``stop``, about ``near`` s ahead.
 
@@ -250,8 +180,8 @@ def land(problem, tables, state, scratch, stop, direction, near, rtol, t_end, ou
         and direction * dot(problem.read_rate[stop], x, 2 * problem.k.size) >= 0.0  # it has not turned back
     ):
         return -1
-    other = before_landing(problem, tables, state, scratch, stop, False, w, x)
-    if other == CLEAR and passed(problem, state, scratch, -1, -1, w, x)[0] >= 0:
+    other = before_landing(problem, tables, state, scratch, stop, np.bool_(0), w, x)
+    if other == CLEAR and problem.parts[PASSED] and passed(problem, state, scratch, -1, -1, w, x)[0] >= 0:
         other = TOO_LONG
     if other != CLEAR:
         return max(other, -1)
@@ -270,7 +200,7 @@ def _apart(problem, tables, state, scratch, stop, border, x):
     return value
 
 
-@inner
+@merged
 def land_on_bend(problem, tables, state, scratch, stop, border, near, rtol, t_end, out, due, with_energy):
     """Try to land on the bend of ``stop``, or on a border of its law, about ``near`` s ahead; whether it succeeded.
 
@@ -288,10 +218,10 @@ def land_on_bend(problem, tables, state, scratch, stop, border, near, rtol, t_en
     before, apart, span = 0.0, _apart(problem, tables, state, scratch, stop, border, w), near
     if abs(apart) <= 1e-6 * largest:  # it begins on a bend: the secant needs another point
         before = 0.9 * near
-        _step(problem, tables, state, scratch, TIME, stop, before, with_energy)
+        _step(problem, tables, state, scratch, np.int64(TIME), stop, before, with_energy)
         apart = _apart(problem, tables, state, scratch, stop, border, x)
     for _ in range(_MOST_TRIES):
-        _step(problem, tables, state, scratch, TIME, stop, span, with_energy)
+        _step(problem, tables, state, scratch, np.int64(TIME), stop, span, with_energy)
         value = _apart(problem, tables, state, scratch, stop, border, x)
         if abs(value) <= enough:
             break
@@ -305,7 +235,7 @@ def land_on_bend(problem, tables, state, scratch, stop, border, near, rtol, t_en
         return False
     if border >= 0 and (value - apart) * (span - before) > 0.0:  # it rises: the margin has been below zero before
         return False
-    if before_landing(problem, tables, state, scratch, stop, True, w, x) != CLEAR:
+    if before_landing(problem, tables, state, scratch, stop, np.bool_(1), w, x) != CLEAR:
         return False
     scratch.landed[0], scratch.landed[1] = passed(problem, state, scratch, stop, border, w, x)
     if scratch.landed[0] >= 0:
@@ -313,4 +243,5 @@ def land_on_bend(problem, tables, state, scratch, stop, border, near, rtol, t_en
     lower, upper = problem.knots[stop, state.segment[stop] - 1], problem.knots[stop, state.segment[stop]]
     if not lower < indentation(problem, stop, x) < upper:
         return False
-    return _accept(problem, tables, state, scratch, TIME, stop, span, t_end, out, due, with_energy)
+    variable = np.int64(TIME)  # a literal would be compiled for itself
+    return _accept(problem, tables, state, scratch, variable, stop, span, t_end, out, due, with_energy)

@@ -8,7 +8,10 @@ up when both are in contact for the first time, and kept in a pool of bounded si
 
 from __future__ import annotations
 
-from solvers.compiled.kernels import inlined, inner, merged
+from numba import types
+
+from solvers.compiled.kernels import MATRIX, REAL, VECTOR, inlined, inner, merged
+from solvers.compiled.parts import FREE_BLOCKS, PAIR, PUSHED_BLOCKS, PUSHED_END, STOP_AT_NODES, part
 from solvers.compiled.simd import load8, splat8, store8, sum8
 from solvers.compiled.sums import combine
 from solvers.exponential.contact.nodes import S
@@ -41,7 +44,7 @@ def pair_response(problem, tables, scratch, node_set, level, s, u):
     return matrix
 
 
-@inner
+@part(PAIR, types.int64, *[types.int64] * 4)
 def _in_pool(problem, tables, scratch, weighting, level, s, u):
     """Index of that response in the pool, for many stops; it is summed up if another pair has its place."""
     stops, inputs = problem.gap.size, scratch.force.shape[0]
@@ -57,7 +60,7 @@ def _in_pool(problem, tables, scratch, weighting, level, s, u):
     return place
 
 
-@inner
+@part(FREE_BLOCKS, types.void, types.int64, types.int64, VECTOR)
 def free_block_motion(problem, tables, scratch, node_set, level, x):
     """All blocks at the nodes from the state at the begin of the step, without forces."""
     n, block_motion = problem.k.size, scratch.block_motion
@@ -87,7 +90,7 @@ def _sum_pushes(problem, tables, state, scratch, force, node_set, group):
     return found
 
 
-@inner
+@part(PUSHED_BLOCKS, types.void, *[types.int64] * 3)
 def add_block_motion(problem, tables, state, scratch, node_set, level, group):
     """Add the response to the present forces of one group, or to the signals, to the blocks at the nodes."""
     if not _sum_pushes(problem, tables, state, scratch, scratch.force, node_set, group):
@@ -109,7 +112,7 @@ def add_block_motion(problem, tables, state, scratch, node_set, level, group):
             store8(block_motion[n + b], 0, load8(block_motion[n + b], 0) + alpha * splat8(v) - beta * turned)
 
 
-@inner
+@part(PUSHED_END, types.void, MATRIX, types.int64, types.int64, VECTOR)
 def add_end_response(problem, tables, state, scratch, force, node_set, level, x):
     """Add the response at the end of the step to forces and signals to a state."""
     n, own = problem.k.size, tables.block_response.shape[3] // 2
@@ -125,7 +128,7 @@ def add_end_response(problem, tables, state, scratch, force, node_set, level, x)
             x[n + b] += sum8(alpha * v - beta * (splat8(problem.k[b]) * p + splat8(problem.c[b]) * v))
 
 
-@inlined
+@part(STOP_AT_NODES, types.void, types.int64, REAL, MATRIX)
 def motion_at_nodes(problem, scratch, s, gap, out):
     """δ + gap and δ̇ of stop s at the nodes from the blocks, less ``gap``."""
     size = 2 * problem.k.size

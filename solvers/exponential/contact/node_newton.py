@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import types
 
-from solvers.compiled.kernels import contact_gradient, copy, inlined, inner
+from solvers.compiled.kernels import contact_gradient, copy, inner, merged
+from solvers.compiled.parts import NEWTON, part
 from solvers.compiled.state import CALLS, rate_tolerance
 from solvers.exponential.contact.many_stops import pair_response
 from solvers.exponential.contact.node_response import node_forces, respond
@@ -72,7 +74,7 @@ def substitute(matrix, pivots, n, x):
         x[i] /= matrix[i, i]
 
 
-@inlined
+@merged
 def _note_viscosity(state, scratch):
     """Largest slopes of the forces by their rates, into ``scratch.viscous``."""
     for s in range(state.segment.size):
@@ -82,7 +84,7 @@ def _note_viscosity(state, scratch):
                 scratch.viscous[s] = max(scratch.viscous[s], abs(scratch.slope[s, 1, i]))
 
 
-@inner
+@part(NEWTON, types.boolean, types.int64, types.int64)
 def newton(problem, tables, state, scratch, node_set, level):
     """Solve for the forces by Newton's method, where the fixed-point iteration diverges; whether it converged."""
     stops = problem.gap.size

@@ -6,7 +6,7 @@ import math
 from typing import Any, NamedTuple
 
 from solvers.compiled.dop853_tableau import STAGES
-from solvers.compiled.kernels import inlined, inner, law_forces, reordered, table_value
+from solvers.compiled.kernels import inlined, inner, law_forces, merged, reordered, table_value
 from solvers.compiled.simd import splat8, store8
 from solvers.compiled.state import CALLS, T
 from solvers.compiled.sums import above, combine
@@ -93,7 +93,7 @@ class Scratch(NamedTuple):
     between: Any  # (S + 1 + m + L, S)
 
 
-@inner
+@merged
 def sample_signals(problem, tables, scratch, node_set, t, h):
     """Values of the sampled signals at the nodes of a step."""
     for j in range(problem.table_dt.size):

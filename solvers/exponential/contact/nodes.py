@@ -11,6 +11,7 @@ begins with t^{λ/κ}, λ/κ the smallest p: κ = 2, λ = 3 for Hertz's law, κ 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -53,6 +54,23 @@ def so_far(points: Any) -> Any:
     return np.ascontiguousarray(0.5 * np.array(integrals).T @ np.linalg.inv(legendre.legvander(x, len(x) - 1)))
 
 
+def gauss_jacobi(beta: float) -> Any:
+    """S points on (-1, 1) and weights for (1 + x)^β, their sum 1/(β + 1); (S, S): Jacobi coefficients from values.
+
+    The points are eigenvalues of the matrix of the recurrence (Golub, Welsch, Math. Comp. 23, 1969).
+    """
+    k = np.arange(S)
+    j = 2.0 * k[1:] + beta
+    middle = np.append(beta / (beta + 2.0), beta**2 / (j * (j + 2.0)))
+    side = np.append(0.0, 2.0 * k[1:] * (k[1:] + beta) / (j * np.sqrt(j**2 - 1.0)))
+    x = np.linalg.eigvalsh(np.diag(middle) + np.diag(side[1:], 1) + np.diag(side[1:], -1))
+    found = [np.zeros(S), np.full(S, math.sqrt(beta + 1.0))]  # of norm 1
+    for i in range(S - 1):
+        found.append(((x - middle[i]) * found[-1] - side[i] * found[-2]) / side[i + 1])
+    weights = 1.0 / np.sum(np.square(found), axis=0)
+    return x, weights, np.array(found[1:]) * weights * np.sqrt(2.0 * k + beta + 1.0)[:, None]
+
+
 class _NodeSet(NamedTuple):
     """Nodes of one kind of contact step, t = h σ^κ, F = σ^λ × polynomial; κ and λ are its exponents."""
 
@@ -65,16 +83,10 @@ class _NodeSet(NamedTuple):
 
 def _node_set(time_exponent: float, weight_exponent: float) -> _NodeSet:
     """Gauss–Jacobi nodes on (0, 1) for the weight of ∫F dt, and the polynomial's coefficients from node values."""
-    from scipy.special import eval_jacobi, roots_jacobi
-
-    beta = weight_exponent + time_exponent - 1.0
-    x, w = roots_jacobi(S, 0.0, beta)
+    x, w, spectrum = gauss_jacobi(weight_exponent + time_exponent - 1.0)
     sigma = 0.5 * (1.0 + x)
-    measure = time_exponent * w / 2.0 ** (beta + 1.0)
-    polynomials = np.array([eval_jacobi(k, 0.0, beta, x) for k in range(S)])
-    norm = (polynomials**2 * w).sum(axis=1)
     scale = sigma ** (-weight_exponent)
-    return _NodeSet(time_exponent, weight_exponent, sigma, measure * scale, polynomials * w * scale / norm[:, None])
+    return _NodeSet(time_exponent, weight_exponent, sigma, time_exponent * w * scale, spectrum * scale)
 
 
 class NodeSets(NamedTuple):

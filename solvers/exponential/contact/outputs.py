@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from solvers.compiled.kernels import copy, inner
+from solvers.compiled.kernels import copy, inner, merged
 from solvers.compiled.state import HEAD, PART, RECORDED, SAMPLED, STEPS, T, is_open, write_event
 from solvers.exponential.contact.node_response import START
 from solvers.exponential.contact.nodes import S
@@ -10,7 +10,7 @@ from solvers.exponential.contact.peaks import state_peaks, step_peaks
 from solvers.exponential.energy.quadrature import state_within
 
 
-@inner
+@merged
 def sample_step(problem, tables, energy_tables, state, scratch, node_set, level, t_end, out, due):
     """Write the samples inside the converged step, and the state at the end of the run if it is inside."""
     t, h, begin, row = state.now[T], tables.contact_step[level], 0.0, state.x
@@ -28,7 +28,7 @@ def sample_step(problem, tables, energy_tables, state, scratch, node_set, level,
         begin, row = span, following
 
 
-@inner
+@merged
 def end_run(problem, tables, state, scratch, node_set, level, t_end):
     """End the run within the step, in the state that `sample_step` has put into ``scratch.stages[START]``."""
     x, share = scratch.stages[START], (t_end - state.now[T]) / tables.contact_step[level]

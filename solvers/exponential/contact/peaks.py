@@ -7,7 +7,7 @@ polynomial through these points is closer to that of the motion than the motion 
 
 from __future__ import annotations
 
-from solvers.compiled.kernels import contact_forces, copy, dot, indentation, inlined, inner
+from solvers.compiled.kernels import contact_forces, copy, dot, indentation, inlined, inner, merged
 from solvers.compiled.state import PEAK_DELTA, PEAK_FORCE, is_open
 from solvers.compiled.sums import combine
 from solvers.exponential.contact.node_response import DELTAS, FORCES, KNOWN, RATES
@@ -27,7 +27,7 @@ def _local(coefficients, x):
     return value, slope, curvature
 
 
-@inlined
+@merged
 def _guess(values, place):
     """Vertex of the parabola through a point of `LOCAL` and its neighbours, and these; at an end the point itself."""
     if place == 0 or place == S - 1:
@@ -92,7 +92,7 @@ def motion_around(problem, tables, state, scratch, node_set, h, s, place):
         local_motion[RATES, i] = local_motion[DELTAS, S + i] / h
 
 
-@inner
+@merged
 def largest_indentation(problem, tables, state, scratch, node_set, h, s):
     """Largest indentation of stop s around its highest node of a step."""
     place = _highest(tables, scratch.motion[s, 0], node_set, 1.0)

@@ -6,13 +6,20 @@ of a bend, or numbers latched anew.
 
 from __future__ import annotations
 
-from solvers.compiled.kernels import indentation, inlined, inner
-from solvers.exponential.contact.borders import renew_all, renew_border
+import numpy as np
+from numba import types
+
+from solvers.compiled.kernels import MATRIX, REAL, VECTOR, indentation
+from solvers.compiled.parts import FIRST_END, GO_BEYOND, LAND, LAND_IN_TIME, part
+from solvers.exponential.contact.borders import UNRESOLVED, border_ahead, renew_all, renew_border
+from solvers.exponential.contact.crossings import first_bend
 from solvers.exponential.contact.landing import land, land_on_bend
 from solvers.exponential.contact.node_response import LANDED
 
+_OUTPUT = REAL, REAL, MATRIX, VECTOR, types.boolean  # types of rtol, t_end, out, due, with_energy
 
-@inner
+
+@part(LAND, types.UniTuple(types.int64, 2), types.int64, types.int64, REAL, *_OUTPUT)
 def land_first(problem, tables, state, scratch, stop, direction, near, rtol, t_end, out, due, with_energy):
     """Land on the border met first, be it that of another stop; (stop, direction), or (-1, 0) if not possible."""
     for _ in range(problem.gap.size + 1):
@@ -24,7 +31,21 @@ def land_first(problem, tables, state, scratch, stop, direction, near, rtol, t_e
     return -1, 0
 
 
-@inner
+@part(FIRST_END, types.Tuple((REAL, types.int64)), types.int64, types.int64, types.boolean, REAL)
+def first_end(problem, tables, state, scratch, node_set, level, is_new, rtol):
+    """(time after the begin of the step tried, stop) of the first bend or border on it; no stop is -1.
+
+    Of a border ``scratch.border`` holds which it is, else -1. The stop is `UNRESOLVED` if the step is too long to tell.
+    """
+    first, stop = first_bend(problem, tables, state, scratch, node_set, level, is_new, rtol)
+    time, element, border = border_ahead(problem, tables, state, scratch, node_set, level)
+    scratch.border[0] = border if time < first else -1
+    if element == UNRESOLVED and level < tables.contact_step.size - 1:
+        return np.inf, UNRESOLVED
+    return (time, element) if time < first else (first, stop)
+
+
+@part(LAND_IN_TIME, types.Tuple((types.int64, types.boolean)), types.int64, REAL, *_OUTPUT)
 def land_in_time(problem, tables, state, scratch, stop, first, rtol, t_end, out, due, with_energy):
     """Land on a bend or border of ``stop``, or on a border met before; (stop, whether it succeeded)."""
     border, near = scratch.border[0], first
@@ -38,7 +59,7 @@ def land_in_time(problem, tables, state, scratch, stop, first, rtol, t_end, out,
     return stop, False
 
 
-@inlined
+@part(GO_BEYOND, types.void, types.int64, types.boolean, MATRIX)
 def go_beyond(problem, state, scratch, stop, alone, log):
     """What ends on a bend goes on beyond it: the other side, or numbers latched on a border."""
     border = scratch.border[0]

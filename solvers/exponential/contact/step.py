@@ -9,8 +9,20 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import types
 
-from solvers.compiled.kernels import contact_forces, copy, dot, indentation, inlined, inner, merged, rhs
+from solvers.compiled.kernels import (
+    MATRIX,
+    REAL,
+    VECTOR,
+    contact_forces,
+    copy,
+    dot,
+    indentation,
+    merged,
+    rhs,
+)
+from solvers.compiled.parts import ACCEPT, CONTACT, FIRST_END, part
 from solvers.compiled.state import (
     CALLS,
     LAW_NOT_FINITE,
@@ -20,7 +32,6 @@ from solvers.compiled.state import (
     STEP,
     STEP_TOO_SMALL,
     STEPS,
-    T_IN,
     T,
     in_contact,
     rate_tolerance,
@@ -29,72 +40,32 @@ from solvers.compiled.state import (
     switch_on_surface,
 )
 from solvers.compiled.sums import combine
-from solvers.exponential.contact.borders import UNRESOLVED, border_ahead
-from solvers.exponential.contact.collocation import contact_time, end_state, finish_step, solve_forces, step_error
-from solvers.exponential.contact.crossings import choose_sides, first_bend, leaves_segment
+from solvers.exponential.contact.begin import (
+    ENTRY,
+    LEVEL,
+    NEW,
+    NEXT_LEVEL,
+    NODE_SET,
+    SEGMENT,
+    STOP,
+    begin_steps,
+    latest_entered,
+    level_of,
+)
+from solvers.exponential.contact.borders import UNRESOLVED
+from solvers.exponential.contact.collocation import end_state, finish_step, solve_forces, step_error
+from solvers.exponential.contact.crossings import leaves_segment
 from solvers.exponential.contact.node_response import free_response
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.outputs import end_run, record_forces, sample_step
-from solvers.exponential.contact.peaks import state_peaks
-from solvers.exponential.contact.segment_ends import go_beyond, land_first, land_in_time
+from solvers.exponential.contact.segment_ends import first_end, go_beyond, land_first, land_in_time
 from solvers.exponential.energy.balance import account_contact
-from solvers.exponential.flight import energy_norms
 
-LEVEL, NODE_SET, NEW, STOP, NEXT_LEVEL, BEGUN = range(6)  # places in Scratch.control
-ENTRY, SEGMENT = 1, 2  # values of NEW: the first step of a contact, or of a segment of its law; 0 for other steps
 _GOAL = 0.3  # error aimed at, in units of the tolerance
 _ORDER = 15.0  # the error estimate falls like h^15
-_LEAST = 1e-60  # m/s, of a reference speed
 
 
-@inner
-def begin_steps(problem, tables, state, scratch, stop):
-    """Reference speeds, first step and nodes after ``stop`` has entered, changed its segment, or left."""
-    control, size, others = scratch.control, 2 * problem.k.size, False
-    energy_norms(problem, state.x, scratch.norms)
-    for s in range(problem.gap.size):
-        speed = abs(dot(problem.read_rate[s], state.x, size))
-        before = state.segment[s] > 0 and state.active[s, T_IN] < state.now[T]
-        if before:
-            scratch.reference_speed[s] = max(scratch.reference_speed[s], speed)
-        else:
-            scratch.reference_speed[s] = max(
-                speed, 0.1 * dot(tables.rate_weight[s], scratch.norms, problem.k.size), _LEAST
-            )
-        others |= before
-    control[NODE_SET], control[NEW] = 0, SEGMENT
-    if state.segment[stop] > 0 and state.active[stop, T_IN] == state.now[T]:
-        wanted = _first_step(problem, tables, state, scratch, stop)
-        control[NEXT_LEVEL] = max(wanted, control[NEXT_LEVEL]) if others else wanted
-        control[NODE_SET], control[NEW], control[STOP] = _entry_nodes(problem, tables, state, stop, wanted), ENTRY, stop
-    choose_sides(problem, tables, state, scratch)
-    state_peaks(problem, state, scratch, state.x)
-
-
-@inner
-def _first_step(problem, tables, state, scratch, stop):
-    """Level of the first step of a contact, a share of the duration of an impact on this stop alone."""
-    speed = abs(dot(problem.read_rate[stop], state.x, 2 * problem.k.size))
-    duration = contact_time(problem, tables, scratch, stop, max(speed, 1e-3 * scratch.reference_speed[stop]))
-    if scratch.first_step_share[stop] == 0.0:
-        scratch.first_step_share[stop] = min(0.1, 4.0 / (tables.fastest * duration))
-    scratch.duration[0] = duration
-    return level_of(tables, scratch.first_step_share[stop] * duration)
-
-
-@inner
-def _entry_nodes(problem, tables, state, stop, level):
-    """Node set of the next step: of an entry if a force with broken exponent has just begun, first that of ``stop``."""
-    found, while_ago = 0, 1e-6 * tables.contact_step[level]
-    for s in range(state.segment.size):
-        if state.segment[s] == 1 and tables.time_exponent[1 + s] > 1.0 and (found == 0 or s == stop):
-            rate = dot(problem.read_rate[s], state.x, 2 * problem.k.size)
-            if indentation(problem, s, state.x) <= while_ago * rate + 4.0 * surface_tolerance(problem, s, state.x):
-                found = 1 + s
-    return found
-
-
-@inner
+@merged
 def _switch_pressed(problem, state, log):
     """Switch every stop at rest on its surface that other stops' forces press into it; returns whether any did."""
     switched = False
@@ -111,15 +82,7 @@ def _switch_pressed(problem, state, log):
     return switched
 
 
-@inlined
-def level_of(tables, h):
-    """Level of the longest contact step up to h, or of the shortest of all."""
-    last = tables.contact_step.size - 1
-    j = min(max(int(np.ceil(2.0 * math.log2(tables.contact_step[0] / h))), 0), last)
-    return j + 1 if tables.contact_step[j] > h and j < last else j
-
-
-@inner
+@merged
 def _nearest_surface(problem, state, scratch):
     """(time, stop, direction) of the border of a segment that is met first at the present rates.
 
@@ -144,7 +107,7 @@ def _nearest_surface(problem, state, scratch):
     return near, stop, direction
 
 
-@inner
+@merged
 def _predict(problem, tables, state, scratch, level):
     """First guess of the forces: the polynomial of the last step, or the law for the free response."""
     control = scratch.control
@@ -172,6 +135,7 @@ def _attempt(problem, tables, state, scratch, node_set, level, rtol):
     ``scratch.control`` holds which it is, else -1.
     """
     bottom, first, bent = level == tables.contact_step.size - 1, np.inf, -1
+    scratch.border[0] = -1
     free_response(problem, tables, state, scratch, node_set, level)
     _predict(problem, tables, state, scratch, level)
     if not solve_forces(problem, tables, state, scratch, node_set, level, rtol):
@@ -179,27 +143,14 @@ def _attempt(problem, tables, state, scratch, node_set, level, rtol):
     end_state(problem, tables, state, scratch, node_set, level)
     if leaves_segment(problem, tables, state, scratch, node_set, level):
         return 1.0 if bottom else np.inf, first, bent
-    first, bent = first_bend(problem, tables, state, scratch, node_set, level, scratch.control[NEW] > 0, rtol)
-    scratch.border[0] = -1
-    time, element, border = border_ahead(problem, tables, state, scratch, node_set, level)
-    if element == UNRESOLVED and not bottom:
+    if problem.parts[FIRST_END]:
+        first, bent = first_end(problem, tables, state, scratch, node_set, level, scratch.control[NEW] > 0, rtol)
+    if bent == UNRESOLVED:
         return np.inf, np.inf, -1
-    if time < first:
-        first, bent, scratch.border[0] = time, element, border
     if bent >= 0:
         return 1.0 if bottom else np.inf, first, bent
     error = step_error(problem, tables, state, scratch, node_set, level, scratch.control[NEW] > 0, rtol)
     return min(error, 1.0) if bottom else error, first, bent
-
-
-@inner
-def latest_entered(state):
-    """The stop in contact with the latest entry."""
-    stop = -1
-    for s in range(state.segment.size):
-        if state.segment[s] > 0 and (stop < 0 or state.active[s, T_IN] >= state.active[stop, T_IN]):
-            stop = s
-    return stop
 
 
 @merged
@@ -218,7 +169,7 @@ def _try_landing(problem, tables, state, scratch, stop, direction, near, rtol, t
     return True
 
 
-@merged
+@part(ACCEPT, types.void, *[types.int64] * 3, REAL, types.int64, REAL, MATRIX, MATRIX, VECTOR)
 def _accept(problem, tables, energy_tables, state, scratch, node_set, level, wanted, error, bent, t_end, log, out, due):
     """Complete the step found: samples, the end of the run if it is within, energy, event record, next step."""
     h = tables.contact_step[level]
@@ -243,7 +194,7 @@ def _accept(problem, tables, energy_tables, state, scratch, node_set, level, wan
     state.count[STEPS] += 1
 
 
-@merged
+@part(CONTACT, types.int64, REAL, REAL, MATRIX, MATRIX, VECTOR)
 def advance_contact(problem, tables, energy_tables, state, scratch, t_end, rtol, log, out, due):
     """One accepted step in contact: land if a border is near, else collocate; returns a status code."""
     control, bottom, with_energy = scratch.control, tables.contact_step.size - 1, energy_tables.active > 0.0
@@ -294,7 +245,7 @@ def advance_contact(problem, tables, energy_tables, state, scratch, t_end, rtol,
     return RUNNING
 
 
-@inner
+@merged
 def _law_fails(state, scratch):
     """Whether a force is not finite."""
     for s in range(state.segment.size):
@@ -304,7 +255,7 @@ def _law_fails(state, scratch):
     return False
 
 
-@inner
+@merged
 def _adapt(tables, scratch, level, node_set, wanted, error):
     """Size of the next step from the error of this one."""
     control, longer = scratch.control, 2.0 / _ORDER * math.log2(_GOAL / max(error, 1e-30))  # in levels

@@ -11,7 +11,10 @@ from __future__ import annotations
 
 import math
 
-from solvers.compiled.kernels import copy, dot, inlined, inner, reordered
+from numba import types
+
+from solvers.compiled.kernels import REAL, VECTOR, copy, dot, inlined, inner, merged, reordered
+from solvers.compiled.parts import ACCOUNT_CONTACT, ACCOUNT_FLIGHT, part
 from solvers.compiled.simd import load8, splat8, store8, sum8
 from solvers.compiled.state import T
 from solvers.compiled.sums import combine
@@ -51,7 +54,7 @@ def start_account(problem, state, scratch):
     scratch.stages[_MARK, 2 * problem.k.size] = state.now[T]
 
 
-@inner
+@part(ACCOUNT_FLIGHT, types.void, REAL, VECTOR)
 def account_until(problem, tables, energy_tables, scratch, t, row):
     """Add work and damping of a flight from the mark to t, within one cell, to the balance of ``row``."""
     x, size = scratch.stages[_MOVING], 2 * problem.k.size
@@ -93,7 +96,7 @@ def account_state(problem, tables, energy_tables, state, scratch):
     start_account(problem, state, scratch)
 
 
-@inlined
+@merged
 def _rounding(problem, energy_tables, t):
     """Difference allowed between the step of the tables and the time between two outputs, or of a cell."""
     return 1e-7 * energy_tables.spacing if problem.table_dt.size else 4e-16 * t
@@ -127,7 +130,7 @@ def _account_forms(problem, energy_tables, scratch, level, x, row):
     row[2 * n + 1] += loss
 
 
-@inner
+@merged
 def _account_series(problem, tables, energy_tables, scratch, t, span, x, row):
     """The same by series for a part of a cell from x at t on; x is moved to the last panel."""
     panels, size = max(1, math.ceil(tables.fastest * span / SERIES_REACH - 1e-9)), 2 * problem.k.size
@@ -144,7 +147,7 @@ def _account_series(problem, tables, energy_tables, scratch, t, span, x, row):
         )
 
 
-@inner
+@merged
 def _clear(scratch, size):
     """Set the load on the blocks and its derivatives to zero."""
     for order in range(S):
@@ -152,7 +155,7 @@ def _clear(scratch, size):
             scratch.stages[order, e] = 0.0
 
 
-@inner
+@merged
 def _account_panel(problem, tables, energy_tables, scratch, t, span, x, row, further):
     """Add work and damping under the load in ``scratch.stages`` to the balance of ``row``.
 
@@ -182,7 +185,7 @@ def _account_panel(problem, tables, energy_tables, scratch, t, span, x, row, fur
         copy(z, x, 2 * n)
 
 
-@inner
+@part(ACCOUNT_CONTACT, types.void, types.int64, types.int64, REAL, VECTOR)
 def account_contact(problem, tables, energy_tables, state, scratch, node_set, level, h, row):
     """Add to the ledger of ``row`` what loads and damping do over the contact step of length h just found."""
     if level >= energy_tables.first and h <= energy_tables.longest[energy_tables.kind[node_set]]:
@@ -216,7 +219,7 @@ def _add_unseen(tables, scratch, node_set, h, s, work, works):
     works[2 * s] += min(max(work - h * sum8(load8(weights, 0) * powers), -most), most)
 
 
-@inner
+@merged
 def _steady_nodes(problem, tables, energy_tables, state, scratch, kind, place, h, weights):
     """Work of the signals on the steady motion; signals at the nodes go to ``energy_sums``, tones to ``terms``."""
     n, size, gain = int(tables.own_blocks), problem.k.size, 0.0
@@ -247,7 +250,7 @@ def _of_tones(row, scratch, n, size):
     return values
 
 
-@inlined
+@merged
 def _block_forces(problem, tables, state, scratch, node_set, b, y):
     """Forces on a block at the nodes and its state, for plain forces and for that of the stop that enters; signals."""
     size, signal, plain, entering = problem.k.size, splat8(0.0), splat8(0.0), splat8(0.0)
@@ -274,7 +277,7 @@ def _enters(tables, node_set, u):
     return u == node_set - 1 and tables.weight_exponent[node_set] > 0.0
 
 
-@inner
+@merged
 def _account_nodes(problem, tables, energy_tables, state, scratch, node_set, place, h, row):
     """The same by the tables, for a whole step."""
     n, size, kind, weights = (

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from solvers.compiled.kernels import inner
+from solvers.compiled.kernels import inner, merged
 from solvers.compiled.state import PEAK_FORCE, T
 from solvers.problem import Array, Energy, System, dense
 
@@ -40,7 +40,7 @@ def own_energy(problem, tables, x):
     return energy
 
 
-@inner
+@merged
 def note_energy(problem, tables, state, scratch):
     """At the end of a run: its energy, and the bound E_c, into ``scratch.energy``."""
     n = problem.k.size

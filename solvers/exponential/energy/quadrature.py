@@ -8,7 +8,10 @@ energy, however little the velocity of a stop is like a polynomial through its v
 
 from __future__ import annotations
 
-from solvers.compiled.kernels import dot, inlined, inner, reordered, table_value
+from numba import types
+
+from solvers.compiled.kernels import REAL, VECTOR, dot, inlined, inner, merged, reordered, table_value
+from solvers.compiled.parts import WITHIN_STEP, part
 from solvers.compiled.simd import load8, splat8, store8, sum8
 from solvers.compiled.sums import combine
 from solvers.exponential.contact.nodes import S
@@ -56,7 +59,7 @@ def _raised(sigma, time_exponent):
     return value
 
 
-@inner
+@merged
 def _places(tables, scratch, node_set, h, begin, width):
     """Points of a panel of σ: σ, times after its begin, dt per unit of the panel, and the nodes' polynomials there."""
     time_exponent, between, nodes = tables.time_exponent[node_set], scratch.between, tables.nodes[node_set]
@@ -78,7 +81,7 @@ def _places(tables, scratch, node_set, h, begin, width):
         store8(between[j], 0, product)
 
 
-@inner
+@merged
 def _forces(problem, tables, state, scratch, node_set):
     """Forces and signals at these points, times dt."""
     stops, between = problem.gap.size, scratch.between
@@ -94,7 +97,7 @@ def _forces(problem, tables, state, scratch, node_set):
             row[q] *= scratch.trial[q] ** tables.weight_exponent[node_set]
 
 
-@inner
+@merged
 def _moves(problem, scratch, length):
     """α, β of every block from the begin of a panel to its points and, by det E = e^{-ct}, back, then to its end."""
     for b in range(problem.k.size):
@@ -107,7 +110,7 @@ def _moves(problem, scratch, length):
         out[4, 0], out[4, 1] = propagate(k, c, length)
 
 
-@inlined
+@merged
 def _pushed(problem, state, scratch, b, moves):
     """Into ``scratch.trial`` and ``.clipped`` what moves a block at the points, p and v as of the panel's begin."""
     n, stops, p, v = problem.k.size, problem.gap.size, splat8(0.0), splat8(0.0)
@@ -122,7 +125,7 @@ def _pushed(problem, state, scratch, b, moves):
     store8(scratch.clipped, 0, alpha * v - beta * (splat8(problem.k[b]) * p + splat8(problem.c[b]) * v))
 
 
-@inner
+@merged
 def _move(problem, tables, state, scratch, row):
     """Blocks at the points of the panel into ``scratch.along``; ``row`` goes on to its end."""
     n, gauss, weights = problem.k.size, tables.gauss, load8(tables.gauss[1], 0)
@@ -144,7 +147,7 @@ def _move(problem, tables, state, scratch, row):
         row[b], row[n + b] = moves[4, 0] * p + moves[4, 1] * v, moves[4, 0] * v - moves[4, 1] * (k * p + c * v)
 
 
-@inner
+@merged
 def _add_works(problem, tables, state, scratch, row):
     """Works and impulses of the contacts on the panel."""
     size = 2 * problem.k.size
@@ -156,7 +159,7 @@ def _add_works(problem, tables, state, scratch, row):
             row[size + 3 + 2 * s] += sum8(impulses)
 
 
-@inner
+@merged
 def _add_powers(problem, tables, scratch, row):
     """What loads and damping do on the panel."""
     n, own, rows = problem.k.size, int(tables.own_blocks), tables.loss_rows
@@ -179,7 +182,7 @@ def _add_powers(problem, tables, scratch, row):
         row[2 * n + 1] += sum8(weights * pace * value * value)
 
 
-@inner
+@part(WITHIN_STEP, types.void, types.int64, *[REAL] * 3, VECTOR, types.boolean)
 def state_within(problem, tables, state, scratch, node_set, h, begin, end, row, ledger):
     """Take ``row`` from ``begin`` to ``end``, s after the start of a contact step of length h whose forces are known.
 

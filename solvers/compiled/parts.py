@@ -1,0 +1,83 @@
+"""Parts of the main method that are compiled by themselves and called at an address.
+
+numba links all that a function calls into it, and optimises it there once more, in every caller of a caller: half of
+the time of compiling. A part is optimised once; and one that few runs need is compiled when the first of these is
+prepared. A call at an address costs some nanoseconds, and nothing of a part is inlined: parts are long, or rare.
+
+The addresses are in ``problem.parts``, 0 for what has not been loaded yet. Machine code that is kept holds the places
+named here, never an address.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+from solvers.compiled.decorators import c_function
+from solvers.compiled.packed import PackedType
+
+(BEGIN, CONTACT, SOLVE, NEWTON, LEAVES, ERROR, ACCEPT, LAND, LANDING_STEP, WITHIN_STEP) = range(10)
+(ACCOUNT_FLIGHT, ACCOUNT_CONTACT) = range(10, 12)
+(FIRST_END, LAND_IN_TIME, GO_BEYOND, PASSED) = range(12, 16)
+(PAIR, FREE_BLOCKS, PUSHED_BLOCKS, PUSHED_END, STOP_AT_NODES, BOUNDS) = range(16, 22)
+EVERY_RUN, ENERGY, BORDERS, MANY_STOPS = range(10), range(10, 12), range(12, 16), range(16, 22)
+"""What needs them: every run, those with an energy balance, with bends or memory in a law, with many stops."""
+ADDRESSES = np.zeros(22, dtype=np.int64)
+
+_DECLARED: dict[int, tuple[Any, Any, tuple[Any, ...]]] = {}
+_LOADED: dict[int, Any] = {}
+_LOCK = threading.Lock()
+
+
+def part(place: int, result: Any, *plain: Any) -> Callable[[Any], Any]:
+    """Decorator of the function called at ``problem.parts[place]``.
+
+    Its first argument is the problem, others that are packed come next, then those of the types ``plain``.
+    """
+
+    def declared(function: Any) -> Any:
+        _DECLARED[place] = function, result, plain
+        return _call_at(place, result, plain)
+
+    return declared
+
+
+def load(kinds: Mapping[str, types.NamedTuple], places: Iterable[int]) -> None:
+    """Compile parts, or load their machine code; ``kinds`` are the types of packed arguments by their names."""
+    for place in places:
+        if not ADDRESSES[place]:
+            with _LOCK:
+                function, result, plain = _DECLARED[place]
+                names = function.__code__.co_varnames[: function.__code__.co_argcount - len(plain)]
+                signature = result(*(PackedType(kinds[name]) for name in names), *plain)
+                _LOADED[place] = c_function(signature)(function)
+                ADDRESSES[place] = _LOADED[place].address
+
+
+def _call_at(place: int, result: Any, plain: tuple[Any, ...]) -> Any:
+    """An intrinsic that calls a part with its arguments."""
+
+    @intrinsic
+    def call(typingctx, problem, *others):
+        rest = types.Tuple((*others[: len(others) - len(plain)], *plain))
+
+        def codegen(context, builder, signature, arguments):
+            find = context.get_getattr(problem, "parts")
+            addresses = find(context, builder, problem, arguments[0], "parts")
+            kind = types.Array(types.int64, 1, "C")
+            data = context.make_array(kind)(context, builder, addresses).data
+            address = builder.load(builder.gep(data, [ir.IntType(64)(place)]))
+            expected = [context.get_value_type(kind) for kind in (problem, *rest)]
+            function = ir.FunctionType(context.get_value_type(result), expected).as_pointer()
+            values = [builder.extract_value(arguments[1], i) for i in range(len(rest))]
+            return builder.call(builder.inttoptr(address, function), [arguments[0], *values])
+
+        return result(problem, rest), codegen
+
+    return call

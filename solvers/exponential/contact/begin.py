@@ -1,0 +1,85 @@
+"""The begin of contact steps: reference speeds, length and nodes of the first one."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import types
+
+from solvers.compiled.kernels import dot, indentation, inlined, inner, merged
+from solvers.compiled.parts import BEGIN, part
+from solvers.compiled.state import T_IN, T, surface_tolerance
+from solvers.exponential.contact.collocation import contact_time
+from solvers.exponential.contact.crossings import choose_sides
+from solvers.exponential.contact.peaks import state_peaks
+from solvers.exponential.flight import energy_norms
+
+LEVEL, NODE_SET, NEW, STOP, NEXT_LEVEL, BEGUN = range(6)  # places in Scratch.control
+ENTRY, SEGMENT = 1, 2  # values of NEW: the first step of a contact, or of a segment of its law; 0 for other steps
+_LEAST = 1e-60  # m/s, of a reference speed
+
+
+@part(BEGIN, types.void, types.int64)
+def begin_steps(problem, tables, state, scratch, stop):
+    """Reference speeds, first step and nodes after ``stop`` has entered, changed its segment, or left."""
+    control, size, others = scratch.control, 2 * problem.k.size, False
+    energy_norms(problem, state.x, scratch.norms)
+    for s in range(problem.gap.size):
+        speed = abs(dot(problem.read_rate[s], state.x, size))
+        before = state.segment[s] > 0 and state.active[s, T_IN] < state.now[T]
+        if before:
+            scratch.reference_speed[s] = max(scratch.reference_speed[s], speed)
+        else:
+            scratch.reference_speed[s] = max(
+                speed, 0.1 * dot(tables.rate_weight[s], scratch.norms, problem.k.size), _LEAST
+            )
+        others |= before
+    control[NODE_SET], control[NEW] = 0, SEGMENT
+    if state.segment[stop] > 0 and state.active[stop, T_IN] == state.now[T]:
+        wanted = _first_step(problem, tables, state, scratch, stop)
+        control[NEXT_LEVEL] = max(wanted, control[NEXT_LEVEL]) if others else wanted
+        control[NODE_SET], control[NEW], control[STOP] = _entry_nodes(problem, tables, state, stop, wanted), ENTRY, stop
+    choose_sides(problem, tables, state, scratch)
+    state_peaks(problem, state, scratch, state.x)
+
+
+@merged
+def _first_step(problem, tables, state, scratch, stop):
+    """Level of the first step of a contact, a share of the duration of an impact on this stop alone."""
+    speed = abs(dot(problem.read_rate[stop], state.x, 2 * problem.k.size))
+    duration = contact_time(problem, tables, scratch, stop, max(speed, 1e-3 * scratch.reference_speed[stop]))
+    if scratch.first_step_share[stop] == 0.0:
+        scratch.first_step_share[stop] = min(0.1, 4.0 / (tables.fastest * duration))
+    scratch.duration[0] = duration
+    return level_of(tables, scratch.first_step_share[stop] * duration)
+
+
+@merged
+def _entry_nodes(problem, tables, state, stop, level):
+    """Node set of the next step: of an entry if a force with broken exponent has just begun, first that of ``stop``."""
+    found, while_ago = 0, 1e-6 * tables.contact_step[level]
+    for s in range(state.segment.size):
+        if state.segment[s] == 1 and tables.time_exponent[1 + s] > 1.0 and (found == 0 or s == stop):
+            rate = dot(problem.read_rate[s], state.x, 2 * problem.k.size)
+            if indentation(problem, s, state.x) <= while_ago * rate + 4.0 * surface_tolerance(problem, s, state.x):
+                found = 1 + s
+    return found
+
+
+@inlined
+def level_of(tables, h):
+    """Level of the longest contact step up to h, or of the shortest of all."""
+    last = tables.contact_step.size - 1
+    j = min(max(int(np.ceil(2.0 * math.log2(tables.contact_step[0] / h))), 0), last)
+    return j + 1 if tables.contact_step[j] > h and j < last else j
+
+
+@inner
+def latest_entered(state):
+    """The stop in contact with the latest entry."""
+    stop = -1
+    for s in range(state.segment.size):
+        if state.segment[s] > 0 and (stop < 0 or state.active[s, T_IN] >= state.active[stop, T_IN]):
+            stop = s
+    return stop

@@ -1,0 +1,100 @@
+"""The Runge–Kutta step of a landing: one of DOP853 with t among the unknowns; see `landing` for its variables."""
+
+from __future__ import annotations
+
+from numba import types
+
+from solvers.compiled.dop853_tableau import STAGES, A
+from solvers.compiled.kernels import (
+    INTEGERS,
+    MATRIX,
+    REAL,
+    VECTOR,
+    call_force,
+    copy,
+    dot,
+    indentation,
+    inner,
+    law_forces,
+    merged,
+    table_value,
+)
+from solvers.compiled.parts import LANDING_STEP, part
+from solvers.compiled.state import T
+from solvers.compiled.sums import combine
+from solvers.exponential.contact.crossings import FORCE
+from solvers.exponential.contact.node_response import BATCH, LANDED, START
+from solvers.exponential.energy.quadrature import powers
+
+INDENTATION, ROOT, TIME = range(3)
+_CHOICE = types.boolean, types.int64, types.int64  # types of with_energy, variable, stop
+
+
+@merged
+def _force(problem, tables, s, delta, delta_dot, side, entry_rate, batch):
+    """Force of stop s; a law cut at zero force is continued as on the side of the cut where the step began."""
+    batch[0], batch[1], batch[2] = max(delta, problem.knots[s, 0]), delta_dot, 0.0
+    if tables.bend[s] != FORCE:
+        law_forces(problem, s, 1, batch[0:1], batch[1:2], entry_rate, batch[2:3])
+    elif side > 0.0:
+        call_force(tables.uncut[s], 1, batch[0:1], batch[1:2], entry_rate, tables.uncut_parameters[s], (batch[2:3],))
+    return batch[2]
+
+
+@merged
+def _rate(problem, tables, with_energy, variable, stop, span, w, segment, entry_rate, side, out, batch):
+    """Derivative of the unknowns ``w`` = [state, t, u] by the chosen variable, times its span; number of law calls."""
+    n, calls = problem.k.size, 0
+    size, t = 2 * n, 2 * n + 2 + 2 * problem.gap.size
+    for b in range(n):
+        out[b] = w[n + b]
+        out[n + b] = -problem.k[b] * w[b] - problem.c[b] * w[n + b]
+    for j in range(problem.table_dt.size):
+        value, load = table_value(problem, j, w[t]), problem.load[problem.table_load[j]]
+        for e in range(size):
+            out[e] += load[e] * value
+    out[size], out[size + 1] = powers(problem, tables, w[t], w) if with_energy else (0.0, 0.0)
+    for s in range(problem.gap.size):
+        force, rate = 0.0, 0.0
+        if segment[s] > 0:
+            rate = dot(problem.read_rate[s], w, size)
+            force = _force(problem, tables, s, indentation(problem, s, w), rate, side[s], entry_rate[s], batch)
+            calls += 1
+            for e in range(size):
+                out[e] += problem.push[s, e] * force
+        out[size + 2 + 2 * s] = force * rate
+        out[size + 3 + 2 * s] = force
+    delta_dot = dot(problem.read_rate[stop], w, size)
+    factor = span
+    if variable == INDENTATION:
+        factor = span / delta_dot
+    elif variable == ROOT:
+        kappa = tables.time_exponent[1 + stop]
+        factor = span * kappa * w[t + 1] ** (kappa - 1.0) / delta_dot
+    for e in range(t):
+        out[e] *= factor
+    out[t] = factor
+    out[t + 1] = span if variable == ROOT else 0.0
+    return calls
+
+
+@part(LANDING_STEP, types.int64, *_CHOICE, REAL, VECTOR, INTEGERS, VECTOR, VECTOR, MATRIX)
+def landing_step(problem, tables, with_energy, variable, stop, span, w, segment, entry_rate, side, work):
+    """One DOP853 step of the chosen variable from ``w`` to ``work[LANDED]``, stages in ``work``; count of law calls."""
+    calls = 0
+    batch, trial = work[BATCH], work[LANDED]
+    for i in range(STAGES):
+        combine(work, A[i], i, w, trial)
+        calls += _rate(
+            problem, tables, with_energy, variable, stop, span, trial, segment, entry_rate, side, work[i], batch
+        )
+    combine(work, A[STAGES], STAGES, w, trial)
+    return calls
+
+
+@inner
+def start_landing(problem, tables, state, scratch, stop):
+    """Put the state at the begin of a landing of ``stop``, with t and δ^{1/κ}, into ``scratch.stages[START]``."""
+    w, size, delta = scratch.stages[START], state.x.size, max(indentation(problem, stop, state.x), 0.0)
+    copy(state.x, w, size)
+    w[size], w[size + 1] = state.now[T], delta ** (1.0 / tables.time_exponent[1 + stop])

@@ -1,0 +1,81 @@
+"""Parts of the main method compiled by themselves: what they get and return, and that runs load what they need only."""
+
+import importlib
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from numba import types
+
+from solvers.compiled import parts
+from solvers.compiled.kernels import PROBLEM, VECTOR, Problem, entry
+from solvers.compiled.packed import Packed, unpacker
+
+PLACE = parts.PASSED  # lent for the test
+BEGIN = """
+import numpy as np
+from contacts import Hertz, KelvinVoigt
+from solvers import Contact, Exponential, System, integrate
+from solvers.compiled.parts import *
+def run(law=Hertz(1e6), stops=1, **options):
+    ball = System(M=[[2.0]], C=[[0.0]], K=[[0.0]], contacts=[Contact([1.0], law, 1e-4 * i) for i in range(stops)])
+    integrate(ball, [1e-3], [-0.5], duration=0.02, **options)
+"""
+
+
+@pytest.fixture
+def problem(monkeypatch):
+    """A problem whose table of parts has one of the test's own."""
+    monkeypatch.setattr(parts, "_DECLARED", {})
+    monkeypatch.setattr(parts, "ADDRESSES", np.zeros_like(parts.ADDRESSES))
+    monkeypatch.setattr(parts, "_LOADED", {})
+    arrays = [np.zeros((0,) * getattr(kind, "ndim", 0), str(kind.dtype)) for kind in PROBLEM.types]
+    return Packed.of(Problem(*arrays)._replace(gap=np.array([2.0, 3.0]), parts=parts.ADDRESSES), PROBLEM)
+
+
+def test_a_part_gets_its_arguments_and_returns_a_tuple(problem):
+    result = types.Tuple((types.float64, types.int64, types.boolean))
+
+    @parts.part(PLACE, result, types.int64, VECTOR, types.float64, types.boolean)
+    def scaled(problem, s, x, factor, found):
+        x[0] = factor * problem.gap[s]
+        return x[0] + 1.0, s + 5, not found
+
+    unpacked = unpacker(PROBLEM)
+
+    @entry(types.Tuple((types.float64, types.int64, types.boolean))(types.int64, VECTOR))
+    def call(address, x):
+        return scaled(unpacked(address), 1, x, 2, False)
+
+    parts.load({"problem": PROBLEM}, [PLACE])
+    x = np.zeros(1)
+    assert call(problem.address, x) == (7.0, 6, True)
+    assert x[0] == 6.0
+    loaded = parts.ADDRESSES.copy()
+    parts.load({"problem": PROBLEM}, [PLACE])
+    assert np.array_equal(loaded, parts.ADDRESSES)
+    assert np.count_nonzero(loaded) == 1
+
+
+def test_every_place_has_a_function():
+    importlib.import_module("solvers.exponential.method")
+    groups = parts.EVERY_RUN, parts.ENERGY, parts.BORDERS, parts.MANY_STOPS
+    assert sorted(place for group in groups for place in group) == list(range(len(parts.ADDRESSES)))
+    assert sorted(parts._DECLARED) == list(range(len(parts.ADDRESSES)))
+
+
+@pytest.mark.parametrize(
+    ("run", "needed"),
+    [
+        ("run()", "EVERY_RUN"),
+        ("run(dt=1e-3)", "[*EVERY_RUN, *ENERGY]"),
+        ("run(dt=1e-3, method=Exponential(ledger=False))", "EVERY_RUN"),
+        ("run(tangent=True)", "EVERY_RUN"),
+        ("run(KelvinVoigt(1e6, 0.5, clamp=True))", "[*EVERY_RUN, *BORDERS]"),
+        ("run(stops=4)", "[*EVERY_RUN, *MANY_STOPS]"),
+    ],
+)
+def test_a_run_loads_what_it_needs(run, needed):
+    code = f"{BEGIN}\n{run}\nassert np.flatnonzero(ADDRESSES).tolist() == sorted({needed}), ADDRESSES\n"
+    subprocess.run([sys.executable, "-c", code], check=True)
