@@ -179,7 +179,8 @@ def indentation(run: Run, stop: int) -> tuple[Vector, Vector]:
 
 def displacement(run: Run, z: float) -> tuple[Vector, Vector]:
     """Displacement at z and its rate."""
-    return run.displacement(z), run.velocity(z)
+    shape = run.shapes(z)
+    return run.q @ shape, run.q_dot @ shape
 
 
 def _settled(signals: list[Vector], piece: Segment, plan: Segments) -> Settling:
