@@ -113,20 +113,23 @@ def join(problem, parts, x):
 
 @inlined
 def cross_cell(problem, tables, x, cell, result):
-    """Write into ``result`` p and v of the blocks a whole cell of the sampled signals after x, eight blocks at once."""
+    """Write into ``result`` p and v of the blocks a whole cell of the sampled signals after x, eight blocks at once.
+
+    The signals' part is summed first: it waits for no result of the cell before.
+    """
     width = x.shape[1]
     for i in range(0, width, WIDTH):
-        p, v, a, b = load8(x[0], i), load8(x[1], i), load8(tables.cell[0], i), load8(tables.cell[1], i)
-        place = a * p + b * v
-        rate = a * v - b * (load8(tables.block_k_c[0], i) * p + load8(tables.block_k_c[1], i) * v)
+        place, rate = splat8(0.0), splat8(0.0)
         for j in range(problem.table_dt.size):
             rows, node = tables.cell_signal[problem.table_load[j]], problem.table_start[j] + cell
             for d in range(3):
                 begin, end = splat8(problem.table[node, d]), splat8(problem.table[node + 1, d])
                 place += begin * load8(rows, 2 * d * width + i) + end * load8(rows, (2 * d + 6) * width + i)
                 rate += begin * load8(rows, (2 * d + 1) * width + i) + end * load8(rows, (2 * d + 7) * width + i)
-        store8(result[0], i, place)
-        store8(result[1], i, rate)
+        p, v, a, b = load8(x[0], i), load8(x[1], i), load8(tables.cell[0], i), load8(tables.cell[1], i)
+        power = load8(tables.block_k_c[0], i) * p + load8(tables.block_k_c[1], i) * v
+        store8(result[0], i, place + (a * p + b * v))
+        store8(result[1], i, rate + (a * v - b * power))
 
 
 @inner
@@ -167,14 +170,13 @@ def fly_series(problem, tables, x, t, span, signal_terms):
         p, v, weight = load8(x[0], i), load8(x[1], i), 1.0
         k, c, place, rate = load8(tables.block_k_c[0], i), load8(tables.block_k_c[1], i), p, v
         for order in range(SERIES_TERMS - 1):
-            before = v
-            v = splat8(0.0) - (k * p + c * v)
-            p = before
+            by_p, by_v = splat8(0.0), splat8(0.0)  # of the signals, before what waits for the term before
             if order < 6:
                 for j in range(problem.table_dt.size):
                     rows, value = tables.load_rows[problem.table_load[j]], splat8(signal_terms[j, order])
-                    p += value * load8(rows, i)
-                    v += value * load8(rows, width + i)
+                    by_p += value * load8(rows, i)
+                    by_v += value * load8(rows, width + i)
+            p, v = by_p + v, by_v - k * p - c * v
             weight *= span / (order + 1.0)
             place += splat8(weight) * p
             rate += splat8(weight) * v
