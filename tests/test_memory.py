@@ -119,6 +119,19 @@ def test_tangent_by_the_slider():
     assert abs(found[:3, 7] - wanted).max() < 1e-7 * abs(wanted).max()
 
 
+@pytest.mark.parametrize("rtol", [1e-4, 1e-5, 1e-6, 1e-7, 1e-8])
+def test_a_landing_off_by_rounding_is_not_passed_again(rtol):
+    """A slow mass held by large forces turns every half period: their rounding once made three reversals of one."""
+    held = element(Coulomb(0.67, 128.0, damping=2.31), -0.76), element(Coulomb(1.48, 131.7, damping=8.08), -0.76)
+    joint = element(Iwan([4.44, 3.33, 7.4], [0.644, 0.502, 0.359]), 0.906, gap=0.112)
+    smooth = element(BoucWen(2.11, 0.104, 1.0, 25.1, 11.5), -0.76, gap=0.0714)
+    system = System([[1.0]], [[0.01]], [[1.33**2]], [*held, joint, smooth])
+    rows = integrate(system, [0.42], [0.2], 6.0, method=Exponential(rtol)).transitions
+    reversals = rows.t[(rows.contact == 3) & (rows.border == 0)]
+    assert len(reversals) == 23
+    assert np.diff(reversals).min() > 0.25
+
+
 def test_a_yielding_stop_logs_its_contacts():
     """A ball thrown at a Walton–Braun stop leaves with √(k₁/k₂) of its speed, a set behind it."""
     law = WaltonBraun(1e4, 4e4, set="forgotten")

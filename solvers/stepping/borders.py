@@ -15,7 +15,7 @@ import numpy as np
 
 from solvers.compiled.kernels import dot, inner, kernel
 from solvers.compiled.renewals import margins, margins_in, note_event, renew
-from solvers.compiled.state import most_borders, rate_tolerance, surface_tolerance
+from solvers.compiled.state import LAST_EVENT, T, most_borders, rate_tolerance, surface_tolerance
 from solvers.stepping.events import NONE, coefficients_of, golden_section, polynomial
 
 _NODES = np.array([0.0, *(2.0**i for i in (-20, -15, -11, -8, -7, -6, -5, -4, -3, -2)), *(np.arange(3, 9) / 8.0)])
@@ -94,12 +94,15 @@ def _lowest(known, values, i, rounding):
 
 @inner
 def _crossing(problem, state, space, s, j):
-    """First θ at which a margin of the element watched falls below zero, or NONE; 0 where it does so at once."""
+    """First θ at which a margin of the element watched falls below zero, or NONE; 0 where it does so at once.
+
+    Where the last landing has missed a border by more than rounding, its margin is negative at first, but rises.
+    """
     known, n = (problem, state, space, s, j), _NODES.size
     values, rounding = space.margin[n * j : n * j + n], space.rounding[s, j]
-    inside = values[0] > rounding
+    inside, missed = values[0] > rounding, state.now[T] == state.now[LAST_EVENT] and state.now[T] > 0.0
     for i in range(1, n):
-        if values[i] < -rounding:
+        if values[i] < -rounding and not (missed and values[i] > values[i - 1]):
             return _first_beyond(known, _NODES[i - 1], _NODES[i]) if inside else 0.0
         lowest = _lowest(known, values, i, rounding)
         if lowest < NONE:

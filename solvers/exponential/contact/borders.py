@@ -13,7 +13,7 @@ import numpy as np
 
 from solvers.compiled.kernels import dot, indentation, inlined, inner
 from solvers.compiled.renewals import margins, margins_in, note_event, renew
-from solvers.compiled.state import rate_tolerance, surface_tolerance
+from solvers.compiled.state import LAST_EVENT, T, rate_tolerance, surface_tolerance
 from solvers.exponential.contact.node_response import DELTAS, KNOWN, RATES, START, rate_ripple_of, ripple_of
 from solvers.exponential.contact.nodes import LOCAL, S
 from solvers.exponential.contact.peaks import local_maximum, motion_around
@@ -55,21 +55,23 @@ def _margins_on_step(problem, tables, state, scratch, s, node_set, level):
 
 
 @inlined
-def _crossing(problem, tables, scratch, s, j, node_set, h):
+def _crossing(tables, state, scratch, s, j, node_set, h):
     """Time after the begin of the step at which a margin falls below zero by its values at the nodes, or inf.
 
     It is 0 where the margin is negative from the begin on. One that begins at zero may have risen before the first
-    node: then a shorter step is asked for, which will tell.
+    node: then a shorter step is asked for, which will tell. A landing may have missed its border by more than rounding
+    of this step: then a margin is negative at first, but rises, and crosses only if it falls again.
     """
     noise, before, t = scratch.noise[s, j], scratch.ends[ENDS * j], 0.0
     near = max(_ON * scratch.largest[s, j], noise)
-    if before < -near:
+    missed = state.now[T] == state.now[LAST_EVENT] and state.now[T] > 0.0 and scratch.margin[S * j] > before
+    if before < -near and not missed:
         return 0.0
     on = before <= near
     for i in range(S + 1):
         value = scratch.margin[S * j + i] if i < S else scratch.ends[ENDS * j + 1]
         after = h * tables.times[node_set, i] if i < S else h
-        if value < -noise:
+        if value < -noise and not (missed and before < -noise and value > before):
             return t + (after - t) * (0.5 if on and i == 0 else max(before, 0.0) / (max(before, 0.0) - value))
         before, t = value, after
     return np.inf
@@ -135,7 +137,7 @@ def border_ahead(problem, tables, state, scratch, node_set, level):
         for j in range(count):
             if scratch.largest[s, j] <= scratch.noise[s, j]:
                 continue
-            time = _crossing(problem, tables, scratch, s, j, node_set, h)
+            time = _crossing(tables, state, scratch, s, j, node_set, h)
             if time == np.inf:
                 time = _between_nodes(problem, tables, state, scratch, s, j, node_set, h)
             if time == np.inf and _hides(scratch, s, j):
