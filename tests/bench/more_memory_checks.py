@@ -102,10 +102,7 @@ def two_parts(scene: Scene, rtol: float) -> str:
 
 def _later(system: System, time: float) -> System:
     """A system under tones, from a later time on."""
-    loads = [
-        (vector, fb.Harmonic(tone.amplitude, tone.omega, tone.phase + tone.omega * time))
-        for vector, tone in system.loads
-    ]
+    loads = [(vector, replace(tone, phase=tone.phase + tone.omega * time)) for vector, tone in system.loads]
     return System(system.M, system.C, system.K, system.contacts, loads)
 
 
