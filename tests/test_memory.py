@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from sliders import Slider
 
-from contacts import Hertz, KelvinVoigt
+from contacts import Hertz, KelvinVoigt, Polynomial
 from contacts.memory import BoucWen, Coulomb, Iwan, Jenkins, WaltonBraun
 from fembeam import Harmonic
 from solvers import Contact, DormandPrince, Exponential, Parameter, System, integrate
@@ -130,6 +130,47 @@ def test_a_landing_off_by_rounding_is_not_passed_again(rtol):
     reversals = rows.t[(rows.contact == 3) & (rows.border == 0)]
     assert len(reversals) == 23
     assert np.diff(reversals).min() > 0.25
+
+
+@pytest.mark.parametrize("stiffness", [4.0, 20.0])
+@pytest.mark.parametrize("rtol", [1e-4, 1e-7])
+def test_equal_sliders_let_go_together_in_a_step_that_begins_as_they_stick(stiffness, rtol):
+    """Margins that begin at zero, rise and fall to zero again within one step: five sliders do what their sum does."""
+    law = Iwan([stiffness / 5] * 5, [0.06] * 5)
+    run = integrate(
+        System([[1.0]], [[0.02]], [[1.0]], [element(law, -1.0)]), [0.0], [1.7], 10.0, method=Exponential(rtol)
+    )
+    rows = run.transitions
+    instants = np.unique(rows.t)
+    assert len(rows) == 5 * len(instants) >= 40
+    assert np.diff(instants).min() > 1e-3
+    assert abs(rows.force).max() < 0.3 * (1.0 + 1e-14)
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-8, 1e-10])
+def test_a_free_mass_pressed_at_rest_takes_few_steps(rtol):
+    """Between a yielded stop and a spring, without a stiffness of its own: its motion is the rounding of the forces."""
+    stop = element(WaltonBraun(1.5e5, 2e6, "forgotten"), 1.7, gap=-0.054)
+    hold, spring = element(Coulomb(64.7, 4.2e4, damping=570.0), 0.7), element(Polynomial([0.0, 0.0, 1.2e5]), 1.7)
+    system = System([[1.0]], [[0.02]], [[0.0]], [hold, stop, spring])
+    rest = integrate(system, [0.028], [0.0], 3.0, method=DormandPrince(1e-10))
+    assert abs(rest.q_dot[-1, 0]) < 1e-10
+    latched = [numbers if numbers.size else None for numbers in rest.memory]
+    run = integrate(
+        system, rest.q[-1], rest.q_dot[-1], 0.03, method=Exponential(rtol), memory=latched, progress=few_steps()
+    )
+    assert run.cost.steps < 20_000
+    assert abs(run.q - rest.q).max() < 1e-12
+
+
+def few_steps():
+    """A callback that ends a run after 20 000 steps."""
+    left = iter(range(1))
+
+    def stop(_):
+        assert next(left, None) is not None, "it takes ever shorter steps"
+
+    return stop
 
 
 def test_a_yielding_stop_logs_its_contacts():

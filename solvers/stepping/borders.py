@@ -14,12 +14,13 @@ from typing import Any
 import numpy as np
 
 from solvers.compiled.kernels import dot, inner, kernel
-from solvers.compiled.renewals import margins, margins_in, note_event, renew
+from solvers.compiled.renewals import margins, margins_before, margins_in, note_event, renew
 from solvers.compiled.state import LAST_EVENT, T, most_borders, rate_tolerance, surface_tolerance
 from solvers.stepping.events import NONE, coefficients_of, golden_section, polynomial
 
 _NODES = np.array([0.0, *(2.0**i for i in (-20, -15, -11, -8, -7, -6, -5, -4, -3, -2)), *(np.arange(3, 9) / 8.0)])
 _TOGETHER = 1e-12  # part of its way at which a border counts as reached when another is landed on
+_BEFORE = 1e-3  # part of a landing step before its end
 _AHEAD = 1e-4  # part of a step over which the rate of a margin is differenced
 
 
@@ -149,18 +150,20 @@ def renew_border(problem, state, space, s, j, log):
 
 
 @kernel
-def renew_together(problem, state, space, element, border, log):
-    """Renew the border landed on, and all whose margins have fallen to zero with it.
+def renew_together(problem, state, space, h, element, border, log):
+    """Renew the border landed on by a step of duration h, and all whose margins have fallen to zero with it.
 
-    Which ones is judged from the state alone, before any is renewed.
+    Which ones is judged from the state alone, before any is renewed. One that began at zero, as after its own renewal,
+    has risen and come back if its margin was above zero just before.
     """
     for s in range(problem.gap.size):
         if problem.border_count[s] == 0:
             continue
         delta, rate = _present(problem, state, space, s, state.x)
+        margins_before(problem, state, s, delta, rate, _BEFORE * h, space.trial, space.one)
         for j in range(problem.border_count[s]):
-            begun, rounding = space.begun[s, j], space.rounding[s, j]
-            reached = begun > rounding and space.present[s, j] <= max(8.0 * rounding, _TOGETHER * begun)
+            before, rounding = max(space.begun[s, j], space.one[j]), space.rounding[s, j]
+            reached = before > rounding and space.present[s, j] <= max(8.0 * rounding, _TOGETHER * before)
             if reached or (s == element and j == border):
                 renew(problem, state, s, j, delta, rate, log)
     note_event(state)

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from solvers.compiled.kernels import dot, indentation, inlined, inner
-from solvers.compiled.renewals import margins, margins_in, note_event, renew
+from solvers.compiled.kernels import dot, indentation, inlined, inner, rhs
+from solvers.compiled.renewals import margins, margins_before, margins_in, note_event, renew
 from solvers.compiled.state import LAST_EVENT, T, rate_tolerance, surface_tolerance
 from solvers.exponential.contact.node_response import DELTAS, KNOWN, RATES, START, rate_ripple_of, ripple_of
 from solvers.exponential.contact.nodes import LOCAL, S
@@ -23,6 +23,7 @@ UNRESOLVED = -2
 _ON = 1e-9  # margin, in units of the largest of the step, at which a step counts as begun on the border
 _SAME = 1e-11  # the same for the sign of a node
 _TOGETHER = 1e-9  # part of its way at which a border counts as reached when another is landed on
+_BEFORE = 1e-3  # part of a landing before its end
 _REST = 1e-14  # rate, in units of the reference speed, at which what has come to rest turns no more
 _NEAR = 0.2  # lowest node, in units of the largest margin, below which the motion between nodes is looked at
 
@@ -181,18 +182,23 @@ def renew_border(problem, state, scratch, element, border, log):
 def renew_all(problem, state, scratch, element, border, log):
     """Renew the border landed on, and all whose margins fell to zero with it since ``scratch.stages[START]``.
 
-    Which ones is judged from the state alone, before any is renewed.
+    Which ones is judged from the state alone, before any is renewed. One that began at zero, as after its own renewal,
+    has risen and come back if its margin was above zero just before.
     """
     margins_in(problem, state, element, state.x, scratch.trial, scratch.margin)
     missed = 2.0 * abs(scratch.margin[border]) / scratch.largest[element, border]
+    time = _BEFORE * (state.now[T] - scratch.stages[START, state.x.size])
+    rhs(problem, state.now[T], state.x, state.segment, state.entry_rate, state.rate, scratch.trial)
     for s in range(problem.gap.size):
         count = problem.border_count[s]
         if count == 0:
             continue
-        margins_in(problem, state, s, scratch.stages[START], scratch.trial, scratch.ends)
+        begun, just_before = scratch.ends[:count], scratch.ends[count : 2 * count]
+        margins_in(problem, state, s, scratch.stages[START], scratch.trial, begun)
         delta, rate = margins_in(problem, state, s, state.x, scratch.trial, scratch.margin)
+        margins_before(problem, state, s, delta, rate, time, scratch.trial, just_before)
         for j in range(count):
-            before, near = scratch.ends[j], max(scratch.noise[s, j], missed * scratch.largest[s, j])
+            before, near = max(begun[j], just_before[j]), max(scratch.noise[s, j], missed * scratch.largest[s, j])
             near = max(near, _TOGETHER * before)
             landed = (s == element and j == border) or (before > near and scratch.margin[j] <= near)
             scratch.fired[j] = 1.0 if landed else 0.0

@@ -35,7 +35,7 @@ from solvers.exponential.contact.crossings import choose_sides, first_bend, leav
 from solvers.exponential.contact.node_response import free_response
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.outputs import end_run, record_forces, sample_step
-from solvers.exponential.contact.peaks import state_peaks
+from solvers.exponential.contact.peaks import pressed_speed, state_peaks
 from solvers.exponential.contact.segment_ends import go_beyond, land_first, land_in_time
 from solvers.exponential.energy.balance import account_contact
 from solvers.exponential.flight import energy_norms
@@ -45,6 +45,7 @@ ENTRY, SEGMENT = 1, 2  # values of NEW: the first step of a contact, or of a seg
 _GOAL = 0.3  # error aimed at, in units of the tolerance
 _ORDER = 15.0  # the error estimate falls like h^15
 _LEAST = 1e-60  # m/s, of a reference speed
+_PRESSED = 1e-3  # the least in units of the speed which the force would give: what presses at rest moves by rounding
 
 
 @inner
@@ -58,9 +59,9 @@ def begin_steps(problem, tables, state, scratch, stop):
         if before:
             scratch.reference_speed[s] = max(scratch.reference_speed[s], speed)
         else:
-            scratch.reference_speed[s] = max(
-                speed, 0.1 * dot(tables.rate_weight[s], scratch.norms, problem.k.size), _LEAST
-            )
+            reached = 0.1 * dot(tables.rate_weight[s], scratch.norms, problem.k.size)
+            pressed = _PRESSED * pressed_speed(problem, tables, state, s, scratch.trial)
+            scratch.reference_speed[s] = max(speed, reached, pressed, _LEAST)
         others |= before
     control[NODE_SET], control[NEW] = 0, SEGMENT
     if state.segment[stop] > 0 and state.active[stop, T_IN] == state.now[T]:
