@@ -144,7 +144,7 @@ def test_equal_sliders_let_go_together_in_a_step_that_begins_as_they_stick(stiff
     instants = np.unique(rows.t)
     assert len(rows) == 5 * len(instants) >= 40
     assert np.diff(instants).min() > 1e-3
-    assert abs(rows.force).max() < 0.3 * (1.0 + 1e-14)
+    assert abs(rows.force).max() < 0.3 * (1.0 + 1e-11)  # a landing ends within 1e-12 of the largest margin
 
 
 @pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-8, 1e-10])

@@ -8,10 +8,12 @@ with springs and dashpots, on coordinates of their own, on a shared one or betwe
 or driven by tones, sampled noise, pulses and base motion, from a start at any place or one that is under way; see
 `drawn_memory`. Compared at rtol 1e-4 to 1e-10 are the motion, the log of contacts, the transitions (which, when, at
 which place and force), the work of every element and the energy balance. What a difference is worth is told as in
-`random_scenes`, with two bounds besides, of what the motion itself does not determine better:
+`random_scenes`, with three bounds besides, of what the motion itself does not determine better:
 
 - Where the motion is off by e, a border with the margin b is met at a time off by |∂b/∂(δ, δ̇)| e / |db/dt|. After the
   motion has decayed, or where it grazes a border, this is long: times are compared in units of it (`patience`).
+- Steps err by rtol of the largest rate of the run: a small contact late in a run is compared in units of the run
+  (`widened`).
 - Two transitions between which the motion goes beyond a border and back by less than e may be there or not. They are
   left out of both runs only if the runs differ in them; e is the difference of the two motions (`without_pairs`).
 
@@ -81,9 +83,40 @@ def without_pairs(rows: Any, shown: Any, least: Any) -> Any:
     return np.array(kept, dtype=int)
 
 
+def widened(found: dict[str, Any], scene: Scene, solution: Any) -> None:
+    """Put the numbers of contacts of laws with memory, which always act, in units of the whole run.
+
+    A step's error is rtol of the largest rate that the element has had since the run began, so a small contact late in
+    a run is off by (e_δ, e_v) of the whole: its ends by e_δ/δ̇, its peaks by e_δ and k e_δ, the impulse by k e_δ times
+    its length, the loss by F e_δ.
+    """
+    stops, scale = found["stop"], found["scale"]
+    i = [s for s, stop in enumerate(stops) if scene.system.contacts[stop].always]
+    if not i:
+        return
+    stop = np.asarray(stops, dtype=int)[i]
+    stiffness = np.array([_steepest(scene.system.contacts[s].law) for s in stop])
+    delta, rate = reach(scene, solution)[stop].T
+    length, force = scale["t_in"][i], scale["peak_force"][i]
+    for name, fast in (("t_in", "speed_in"), ("t_out", "speed_out")):
+        scale[name] = scale[name].copy()
+        scale[name][i] = np.maximum(length, delta / np.maximum(np.nan_to_num(np.abs(found[fast][i])), 1e-300))
+    wide = {"speed_in": rate, "speed_out": rate, "peak_indentation": delta, "peak_force": stiffness * delta}
+    wide |= {"impulse": stiffness * delta * length, "energy_loss": force * delta}
+    for name, value in wide.items():
+        scale[name] = scale[name].copy()
+        scale[name][i] = np.maximum(scale[name][i], value)
+
+
+def _steepest(law: Any) -> float:
+    """Stiffness on the line of unloading, N/m, of the yielding parts of a law."""
+    return sum(float(part.unloading) for part in getattr(law, "parts", (law,)) if hasattr(part, "unloading"))
+
+
 def numbers(solution: Any, scene: Scene, size: float, duration: float, patience: Any, least: Any) -> dict[str, Any]:
     """What `numbers_of` compares, with the transitions, element by element and border by border."""
     found, rows = numbers_of(solution, scene, size, duration), solution.transitions
+    widened(found, scene, solution)
     i = shown(rows, duration, least)
     contact = rows.contact[i].astype(int)
     found["order"] = [
