@@ -17,7 +17,7 @@ from fembeam.model.contact_histories import ContactHistories
 from fembeam.model.shapes import Shapes
 from fembeam.scene import ON, Source
 from fembeam.support import Part, Printed
-from solvers.problem import counted
+from solvers.problem import Losses, counted
 
 if TYPE_CHECKING:
     from fembeam.model.model import Model
@@ -60,6 +60,9 @@ class Run(ContactHistories, Printed):
     source: Source | None = None  # of a run made from a scene file
     versions: dict[str, str] = field(default_factory=dict)  # that made a run read from a file
     borders: Callable[[], Any] | None = field(default=None, repr=False)  # what `transitions` are made by
+    lost: Callable[[], Losses] | None = field(default=None, repr=False)  # and `losses`
+    began: tuple[Vector, ...] = ()  # what the laws had latched at the begin, a row per contact, where it was given
+    memory: tuple[Vector, ...] = ()  # and at the end
     on: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 3), dtype=int))  # (m, 3): body, of ON, number
     kinds: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 2), dtype=bool))  # of rotation, always acting
 
@@ -94,6 +97,21 @@ class Run(ContactHistories, Printed):
             raise ValueError("a run read from a file has no transitions; simulate again")
         return self.borders()
 
+    @cached_property
+    def losses(self) -> Losses:
+        """What each stop and element took, see `solvers.problem.Losses`: work, loss, path of slip.
+
+        ValueError for a run read from a file.
+        """
+        if self.lost is None:
+            raise ValueError("a run read from a file has no losses; simulate again")
+        return self.lost()
+
+    @property
+    def end(self) -> Vector:
+        """The last state (2n + l,), [q, q̇] and what laws have latched: a start from which another run goes on."""
+        return np.concatenate((self.q[-1], self.q_dot[-1], *self.memory))
+
     @property
     def scene_file(self) -> SceneFile:
         """The scene, reduction and studies this run was made from; ValueError for a run made in Python."""
@@ -104,7 +122,7 @@ class Run(ContactHistories, Printed):
         return built(self.source)
 
     @classmethod
-    def of(cls, model: Model, solution: solvers.Solution) -> Run:
+    def of(cls, model: Model, solution: solvers.Solution, began: tuple[Vector, ...] = ()) -> Run:
         """A model's solution with what it takes to read it."""
         rows = model.contact_rows
         stops = np.array([(one.z, one.push, one.gap) for one in rows], dtype=float).reshape(-1, 3)
@@ -117,6 +135,9 @@ class Run(ContactHistories, Printed):
             *(model.shapes, stops, model.directions, strikers, repr(model.scene), model),
             others=model.others,
             borders=solution.borders,
+            lost=solution.lost,
+            began=began,
+            memory=solution.memory,
             on=np.array([(one.body, ON.index(one.on[0]), one.on[1]) for one in rows], dtype=int).reshape(-1, 3),
             kinds=np.array([(one.rotation, one.always) for one in rows], dtype=bool).reshape(-1, 2),
         )
