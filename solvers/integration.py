@@ -248,7 +248,8 @@ class _Run:
         cost = Cost(count[STEPS], count[REJECTED], count[CALLS], count[EVENTS], seconds)
         known = self.tangent is not None and status is Status.DONE
         more: dict[str, Any] = {**self._derivatives()} if known else {}
-        more |= {"borders": transitions, "lost": lost, "memory": last[1]}
+        end = np.concatenate((back.dot(last[0][:size]), *last[1]))
+        more |= {"borders": transitions, "lost": lost, "memory": last[1], "end": end}
         return Solution(t, motion[:, :n], motion[:, n:], log, ledger, status, cost, **more)
 
     def _balances(self, powers: Array, complete: bool, motion: Array, rows: Array) -> bool:

@@ -104,7 +104,7 @@ def test_a_run_goes_on_from_the_end_of_another(name):
     model = replace(model.scene, forces=[fb.PointForce(LENGTH, tone)]).reduce(modes=1)
     period, solver = 2.0 * math.pi / float(model.omega[0]), Exponential(1e-10)
     whole = model.simulate(12 * period, period / 50, solver=solver)
-    first = model.simulate(6 * period, period / 50, solver=solver)
+    first = model.simulate(6 * period, 0.7 * period, solver=solver)  # the last sample is not the end
     rest = model.simulate(6 * period, period / 50, first.end, solver)
     assert np.abs(rest.q - whole.q[300:]).max() < 1e-7 * np.abs(whole.q).max()
     assert np.abs(rest.force() - whole.force()[300:]).max() < 1e-6 * np.abs(whole.force()).max()

@@ -37,6 +37,8 @@ class Run(ContactHistories, Printed):
     contacts : log of contacts: stop, t_in, t_out, speed_in, speed_out, peak_indentation, peak_force, impulse,
         energy_loss, entry_rate_clipped (arrays).
     energy : energy balance at t: input, damping, contact, stored, residual in J; made by ``ledger`` when first read.
+    end : (2n + l,) [q, q̇] at the time reached and what laws have latched: a start from which another run goes on; None
+        for a run read from a file that does not tell.
     status : how it ended, a sentence.
     cost : steps, rejections, law_calls, events, seconds.
     """
@@ -62,7 +64,7 @@ class Run(ContactHistories, Printed):
     borders: Callable[[], Any] | None = field(default=None, repr=False)  # what `transitions` are made by
     lost: Callable[[], Losses] | None = field(default=None, repr=False)  # and `losses`
     began: tuple[Vector, ...] = ()  # what the laws had latched at the begin, a row per contact, where it was given
-    memory: tuple[Vector, ...] = ()  # and at the end
+    end: Vector | None = None  # (2n + l,) [q, q̇] and what the laws have latched, at the time reached
     on: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 3), dtype=int))  # (m, 3): body, of ON, number
     kinds: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 2), dtype=bool))  # of rotation, always acting
 
@@ -108,11 +110,6 @@ class Run(ContactHistories, Printed):
         return self.lost()
 
     @property
-    def end(self) -> Vector:
-        """The last state (2n + l,), [q, q̇] and what laws have latched: a start from which another run goes on."""
-        return np.concatenate((self.q[-1], self.q_dot[-1], *self.memory))
-
-    @property
     def scene_file(self) -> SceneFile:
         """The scene, reduction and studies this run was made from; ValueError for a run made in Python."""
         from fembeam.scene_file import built
@@ -134,10 +131,8 @@ class Run(ContactHistories, Printed):
             *(solution.t, solution.q, solution.q_dot, solution.contacts, solution.ledger, status, solution.cost),
             *(model.shapes, stops, model.directions, strikers, repr(model.scene), model),
             others=model.others,
-            borders=solution.borders,
-            lost=solution.lost,
+            **{name: getattr(solution, name) for name in ("borders", "lost", "end")},
             began=began,
-            memory=solution.memory,
             on=np.array([(one.body, ON.index(one.on[0]), one.on[1]) for one in rows], dtype=int).reshape(-1, 3),
             kinds=np.array([(one.rotation, one.always) for one in rows], dtype=bool).reshape(-1, 2),
         )

@@ -246,6 +246,7 @@ class Solution:
     tangent : (2n, 2n or 2n + 1) derivative of the final [q, q̇], and rate : (2n,) its derivative by time; None unless
         asked for.
     memory : what the laws have latched at the end, one array per contact, empty for laws without memory.
+    end : (2n + l,) [q, q̇] at the time reached, which samples need not reach, and the numbers of ``memory`` in a row.
     memory_tangent : (2n + l, 2n + l or 2n + l + 1) derivative of the final [q, q̇, memory] with respect to the same at
         the start, and to a parameter; codes of segments have zeros. None without laws with memory.
 
@@ -276,6 +277,7 @@ class Solution:
     memory_tangent: Array | None = None
     borders: Callable[[], Transitions] = field(default=lambda: Transitions.of_rows(np.empty((0, 10)), ()), repr=False)
     lost: Callable[[], Any] = field(default=lambda: None, repr=False)
+    end: Array | None = field(default=None, repr=False)
 
     def __repr__(self) -> str:
         reached = f"to t = {self.t[-1]:g} s" if len(self.t) else "without samples"
