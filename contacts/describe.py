@@ -22,10 +22,10 @@ def describe(law: Law, entry_rate: float = 1.0, mass: float = 1.0) -> str:
         lines += [f"  {name_of(part)}: {part.equation}; {_values(part)}" for part in law.parts]
     else:
         lines.append(f"  parameters: {_values(law)}")
-    if law.memory and not law.opens:
-        lines += [f"  {_cycle(law)}"] if law.reach > 0.0 else []
-    else:
+    if not law.memory or law.exact_restitution(entry_rate, mass) is not None:
         lines.append(f"  restitution: {_restitution(law, entry_rate, mass)}")
+    elif law.reach > 0.0 and not law.opens:
+        lines.append(f"  {_cycle(law)}")
     if law.nominal is not None:
         lines.append(f"  {law.nominal[0]}: {_source(law)}")
     remarks = law.remarks or (() if law.memory else _observed(law, entry_rate, mass))

@@ -21,6 +21,7 @@ class Sum(Law):
 
     Each part keeps its own floor of the entry rate. Beside laws with memory, which may act at both signs of δ, laws of
     stops act while δ > 0, with the entry rate of that contact; all laws without memory do so beside one that opens.
+    Then contacts are logged from δ = 0 to δ = 0.
 
     Parameters
     ----------
@@ -76,11 +77,18 @@ class Sum(Law):
 
     @property
     def acting(self) -> tuple[Law, ...]:
-        """The parts, those of stops behind gates if others have a memory."""
+        """The parts, those of stops behind gates if others have a memory; before the rest if these open."""
         remembering = [part for part in self.parts if part.memory]
         opens = any(part.opens for part in remembering)
         gated = [bool(remembering) and not part.memory and (opens or part.one_sided) for part in self.parts]
-        return tuple(Gated(part) if gate else part for part, gate in zip(self.parts, gated, strict=True))
+        acting = [Gated(part) if gate else part for part, gate in zip(self.parts, gated, strict=True)]
+        return tuple(sorted(acting, key=lambda part: opens and not isinstance(part, Gated)))
+
+    @property
+    def opens(self) -> bool:  # type: ignore[override]
+        """Whether it is open where δ <= 0, as its first part's gate says: all parts open, and one is behind a gate."""
+        acting = self.acting
+        return isinstance(acting[0], Gated) and all(part.opens for part in acting)
 
     @property
     def one_sided(self) -> bool:  # type: ignore[override]

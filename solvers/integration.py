@@ -37,6 +37,7 @@ from solvers.problem import (
     Cost,
     Energy,
     Forcing,
+    Losses,
     Parameter,
     Solution,
     SolverError,
@@ -175,7 +176,7 @@ class _Run:
             self.tangent = Tangent(system, engine, tangent if isinstance(tangent, Parameter) else None, True)
             self.state = engine.state  # with the event record
         self.log = np.empty((max(256, 2 * len(system.contacts)), COLUMNS))
-        self.begin = self.state.x[: 2 * engine.problem.k.size].copy()
+        self.begin, self.latched = self.state.x[: 2 * engine.problem.k.size].copy(), self.memory
         if times is not None and self.due[0] == 0.0:
             self.out[0] = self.state.x
             self.state.count[SAMPLED] = 1
@@ -239,15 +240,17 @@ class _Run:
         rows = self._rows()
         log = partial(ContactLog.of_rows, self._of_stops(rows))
         transitions = partial(Transitions.of_rows, rows, self.system.contacts)
+        first, last = (self.begin, self.latched), (self.state.x.copy(), self.memory)
+        lost = partial(Losses.of_run, self.system.contacts, back, first, last, powers, transitions)
         if status is Status.DONE and not self._balances(powers, complete, motion, rows):
             status = Status.UNBALANCED
         count = self.state.count.tolist()
         cost = Cost(count[STEPS], count[REJECTED], count[CALLS], count[EVENTS], seconds)
         known = self.tangent is not None and status is Status.DONE
-        more = self._derivatives() if known else {}
-        return Solution(
-            t, motion[:, :n], motion[:, n:], log, ledger, status, cost, **more, borders=transitions, memory=self.memory
-        )
+        more: dict[str, Any] = {**self._derivatives()} if known else {}
+        end = np.concatenate((back.dot(last[0][:size]), *last[1]))
+        more |= {"borders": transitions, "lost": lost, "memory": last[1], "end": end}
+        return Solution(t, motion[:, :n], motion[:, n:], log, ledger, status, cost, **more)
 
     def _balances(self, powers: Array, complete: bool, motion: Array, rows: Array) -> bool:
         """Whether the energy balance closes, where it is kept; methods without `gains` are checked step by step."""

@@ -202,6 +202,31 @@ def test_a_yielding_stop_beside_a_spring():
     assert abs(run.energy.residual).max() < 1e-9
 
 
+@pytest.mark.parametrize("method", [Exponential(1e-11), DormandPrince(1e-12)], ids=["main", "stepping"])
+@pytest.mark.parametrize("kind", ["kept", "forgotten"])
+def test_a_yielding_stop_beside_a_spring_logs_its_contacts(kind, method):
+    """In along k₁ + k, out along k₂ + k to the set δ₀, then along k to δ = 0, where the contact ends."""
+    m, k1, k2, k = 2.0, 1e4, 4e4, 5e3
+    law = WaltonBraun(k1, k2, set=kind) + KelvinVoigt(k, 0.0)
+    assert law.opens
+    run = integrate(System([[m]], [[0.0]], [[0.0]], [Contact([1.0], law)]), [1e-3], [-0.5], 0.2, method=method)
+    log, deepest = run.contacts, 0.5 * np.sqrt(m / (k1 + k))
+    assert len(log) == 1
+    set_, rest = deepest * (1.0 - k1 / k2), (k2 - k1) * deepest / (k2 + k)  # δ₀, and where the way out would rest
+    omega, slow = np.sqrt((k2 + k) / m), np.sqrt(k / m)
+    first = np.arccos((set_ - rest) / (deepest - rest)) / omega
+    speed = np.sqrt(omega**2 * ((deepest - rest) ** 2 - (set_ - rest) ** 2))
+    last = np.arctan(slow * set_ / speed) / slow
+    duration = 0.5 * np.pi * np.sqrt(m / (k1 + k)) + first + last
+    assert abs(log.t_out[0] - log.t_in[0] - duration) < 1e-9
+    assert abs(log.speed_out[0] - np.hypot(speed, slow * set_)) < 1e-9
+    assert abs(log.peak_indentation[0] - deepest) < 1e-9
+    assert abs(log.peak_force[0] - (k1 + k) * deepest) < 1e-5
+    assert abs(log.energy_loss[0] - 0.5 * m * (0.25 - run.q_dot[-1, 0] ** 2)) < 1e-9
+    assert abs(run.losses.loss[0] - log.energy_loss[0]) < 1e-9
+    assert run.transitions.event.tolist().count("contact") == 2  # of the gate and of the yielding part
+
+
 def test_stops_and_sliders_side_by_side():
     contacts = [element(Jenkins(40.0, 0.3), -1.0, -0.5, 0.3), Contact([1.0, 0.5, 0.2], Hertz(1e4), gap=0.4)]
     run = integrate(beam(*contacts), [0.0] * 3, [1.0, 0.0, 0.0], 30.0, dt=0.1, method=Exponential(1e-9))

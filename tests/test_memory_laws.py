@@ -111,7 +111,7 @@ STATES = [
     *((law, state, d, v) for law in WENS for state, d, v in WEN_STATES),
     *((law, (code, 50.0), 7e-4, 0.1) for law in (DENTED, FRESH) for code in (0.0, 1.0, 2.0)),
     *((GATED, (code, rate), 7e-4, 0.1) for code, rate in ((0.0, 0.3), (1.0, 0.3), (1.0, 0.001))),
-    *((STOPS, (c, 50.0, a, 0.3, b, 0.2), 7e-4, 0.1) for c, a, b in itertools.product((0.0, 1.0), repeat=3)),
+    *((STOPS, (a, 0.3, b, 0.2, c, 50.0), 7e-4, 0.1) for c, a, b in itertools.product((0.0, 1.0), repeat=3)),
 ]
 CODES = {
     Jenkins: [0],
@@ -286,16 +286,17 @@ def test_what_a_law_says():
 def test_who_may_act_where():
     assert (JENKINS + Hertz(1e8)).one_sided is False
     assert STOPS.one_sided
-    assert not STOPS.opens
+    assert STOPS.opens
+    assert not (DENTED + DENTED).opens
     assert STOPS.jumps
     assert (DENTED + Hysteretic(1e7, 0.5)).jumps is False
-    assert [type(part).__name__ for part in STOPS.acting] == ["WaltonBraun", "Gated", "Gated"]
+    assert [type(part).__name__ for part in STOPS.acting] == ["Gated", "Gated", "WaltonBraun"]
     assert [type(part).__name__ for part in (JENKINS + Hertz(1e8) + Polynomial([1.0])).acting] == [
         "Jenkins",
         "Gated",
         "Polynomial",
     ]
-    assert STOPS.events == ("contact", "unload", "reload", "open", "contact", "open", "contact", "open")
+    assert STOPS.events == ("contact", "open", "contact", "open", "contact", "unload", "reload", "open")
 
 
 def test_a_run_without_memory_loads_none_of_this():

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 import reduction
 from contacts.path import borders
@@ -50,6 +50,16 @@ def state(model: Model, displacement: Field | Sequence[Field], velocity: Field |
                           "keep more modes", UserWarning, stacklevel=3)  # fmt: skip
     _check_strikers(model, start[:n])
     return start
+
+
+def begun(model: Model, start: ArrayLike) -> tuple[Vector, Vector, tuple[Vector, ...]]:
+    """q, q̇ and, where given, what each law has latched, of a start (2n,) or the (2n + l,) of `Run.end`."""
+    x, n = np.asarray(start, dtype=float), len(model.omega)
+    sizes = [len(getattr(one.law, "memory", ())) for one in model.contact_rows]
+    require(x.shape in ((2 * n,), (2 * n + sum(sizes),)), f"start must have shape ({2 * n},), [q, q_dot]", x.shape,
+            "Model.simulate", "use model.state(displacement, velocity)")  # fmt: skip
+    latched = np.split(x[2 * n :], np.cumsum(sizes)[:-1]) if x.size > 2 * n else ()
+    return x[:n], x[n : 2 * n], tuple(latched)
 
 
 def missed(model: Model, field: Field | Sequence[Field]) -> float:

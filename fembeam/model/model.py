@@ -172,7 +172,8 @@ class Model(Printed, ModalEquations):
         duration : s.
         dt : output sampling in s, or the output times themselves, increasing; None keeps the final state and the
             contact log only.
-        start : (2n,) as made by `rest`, `state` or `equilibrium`; None is rest.
+        start : (2n,) as made by `rest`, `state` or `equilibrium`; None is rest. Or the (2n + l,) of `Run.end`, with
+            what the laws have latched, from which the run goes on.
         solver : one of the methods in `solvers`; None is the library's best.
         progress : show a bar (on terminals and in notebooks only).
 
@@ -184,17 +185,17 @@ class Model(Printed, ModalEquations):
         ------
         ValueError for bad input before computing; solvers.SolverError when the method fails.
         """
+        from fembeam.model import initial_states
         from fembeam.model.run import Run
         from fembeam.support import bar
 
-        start = self.rest() if start is None else np.asarray(start, dtype=float)
-        n = len(self.omega)
-        require(start.shape == (2 * n,), f"start must have shape ({2 * n},), [q, q_dot]", start.shape,
-                "Model.simulate", "use model.state(displacement, velocity)")  # fmt: skip
+        q, q_dot, memory = initial_states.begun(self, self.rest() if start is None else start)
         lasting = self.lasting(duration) if 0.0 < duration < np.inf else self
         with bar(duration, progress) as report:
-            solution = solvers.integrate(lasting.system, start[:n], start[n:], duration, dt, solver, progress=report)
-        run = Run.of(lasting, solution)
+            solution = solvers.integrate(
+                lasting.system, q, q_dot, duration, dt, solver, progress=report, memory=memory or None
+            )
+        run = Run.of(lasting, solution, memory)
         note("%r, integrated in %.3g s", run, run.cost.seconds)
         return run
 

@@ -17,7 +17,7 @@ from fembeam.model.contact_histories import ContactHistories
 from fembeam.model.shapes import Shapes
 from fembeam.scene import ON, Source
 from fembeam.support import Part, Printed
-from solvers.problem import counted
+from solvers.problem import Losses, counted
 
 if TYPE_CHECKING:
     from fembeam.model.model import Model
@@ -37,6 +37,8 @@ class Run(ContactHistories, Printed):
     contacts : log of contacts: stop, t_in, t_out, speed_in, speed_out, peak_indentation, peak_force, impulse,
         energy_loss, entry_rate_clipped (arrays).
     energy : energy balance at t: input, damping, contact, stored, residual in J; made by ``ledger`` when first read.
+    end : (2n + l,) [q, q̇] at the time reached and what laws have latched: a start from which another run goes on; None
+        for a run read from a file that does not tell.
     status : how it ended, a sentence.
     cost : steps, rejections, law_calls, events, seconds.
     """
@@ -60,6 +62,9 @@ class Run(ContactHistories, Printed):
     source: Source | None = None  # of a run made from a scene file
     versions: dict[str, str] = field(default_factory=dict)  # that made a run read from a file
     borders: Callable[[], Any] | None = field(default=None, repr=False)  # what `transitions` are made by
+    lost: Callable[[], Losses] | None = field(default=None, repr=False)  # and `losses`
+    began: tuple[Vector, ...] = ()  # what the laws had latched at the begin, a row per contact, where it was given
+    end: Vector | None = None  # (2n + l,) [q, q̇] and what the laws have latched, at the time reached
     on: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 3), dtype=int))  # (m, 3): body, of ON, number
     kinds: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 2), dtype=bool))  # of rotation, always acting
 
@@ -94,6 +99,16 @@ class Run(ContactHistories, Printed):
             raise ValueError("a run read from a file has no transitions; simulate again")
         return self.borders()
 
+    @cached_property
+    def losses(self) -> Losses:
+        """What each stop and element took, see `solvers.problem.Losses`: work, loss, path of slip.
+
+        ValueError for a run read from a file.
+        """
+        if self.lost is None:
+            raise ValueError("a run read from a file has no losses; simulate again")
+        return self.lost()
+
     @property
     def scene_file(self) -> SceneFile:
         """The scene, reduction and studies this run was made from; ValueError for a run made in Python."""
@@ -104,7 +119,7 @@ class Run(ContactHistories, Printed):
         return built(self.source)
 
     @classmethod
-    def of(cls, model: Model, solution: solvers.Solution) -> Run:
+    def of(cls, model: Model, solution: solvers.Solution, began: tuple[Vector, ...] = ()) -> Run:
         """A model's solution with what it takes to read it."""
         rows = model.contact_rows
         stops = np.array([(one.z, one.push, one.gap) for one in rows], dtype=float).reshape(-1, 3)
@@ -116,7 +131,8 @@ class Run(ContactHistories, Printed):
             *(solution.t, solution.q, solution.q_dot, solution.contacts, solution.ledger, status, solution.cost),
             *(model.shapes, stops, model.directions, strikers, repr(model.scene), model),
             others=model.others,
-            borders=solution.borders,
+            **{name: getattr(solution, name) for name in ("borders", "lost", "end")},
+            began=began,
             on=np.array([(one.body, ON.index(one.on[0]), one.on[1]) for one in rows], dtype=int).reshape(-1, 3),
             kinds=np.array([(one.rotation, one.always) for one in rows], dtype=bool).reshape(-1, 2),
         )

@@ -45,15 +45,25 @@ def _force_of(run: Run, stop: int, contact: ContactRow) -> Vector:
 def force_at(run: Run, stop: int, contact: ContactRow, t: Vector, delta: Vector, rate: Vector) -> Vector:
     """Force of one that always acts at times t (k,), ascending, of deformations and rates there."""
     if contact.remembers:
-        return _replayed(contact.law, run.transitions, stop, t, delta, rate)
+        return _replayed(_begun(run, stop, contact.law), contact.law, run.transitions, stop, t, delta, rate)
     return np.asarray(contact.force(delta, rate))
 
 
-def _replayed(law: Any, log: Transitions, stop: int, t: Vector, delta: Vector, rate: Vector) -> Vector:
+def _begun(run: Run, stop: int, law: Any) -> Vector:
+    """The law's parameters with what it had latched when the run began."""
+    parameters = np.array(law.parameters)
+    if run.began:
+        parameters[list(law.memory)] = run.began[stop]
+    return parameters
+
+
+def _replayed(
+    parameters: Vector, law: Any, log: Transitions, stop: int, t: Vector, delta: Vector, rate: Vector
+) -> Vector:
     """The force between the borders it passed, each with the latched numbers of its time."""
     mine = np.flatnonzero(log.contact == stop)
     ends = np.append(np.searchsorted(t, log.t[mine]), len(t))
-    parameters, force, begin = np.array(law.parameters), np.empty(len(t)), 0
+    force, begin = np.empty(len(t)), 0
     for passed, end in enumerate(ends):
         if end > begin:
             force[begin:end] = law.batch(1.0, parameters)(delta[begin:end], rate[begin:end])

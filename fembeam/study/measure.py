@@ -178,6 +178,7 @@ def cut(run: Run, begin: float, end: float) -> Run:
     return replace(
         run, t=t, q=run.q[kept], q_dot=run.q_dot[kept],
         contacts=solvers.ContactLog(**columns), ledger=partial(_ledger_of, run, kept),
+        lost=lambda: run.losses.part(kept),
     )  # fmt: skip
 
 

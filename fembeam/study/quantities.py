@@ -154,6 +154,20 @@ class MeanEnergy:
         return float(np.mean(np.sum(run.q_dot**2 + (run.q * run.model.omega) ** 2, axis=1)) / 2)
 
 
+@dataclass(frozen=True)
+class Power:
+    """Mean power that one stop or element takes, W: the work done on it over the time of the samples."""
+
+    stop: int = 0
+    sampled: ClassVar[bool] = True
+
+    def __call__(self, run: Run) -> float:
+        """Value of a run."""
+        require(len(run.t) > 1, "the run must have samples", len(run.t), "Power", "give dt")
+        work = run.losses.history[:, self.stop]
+        return float((work[-1] - work[0]) / (run.t[-1] - run.t[0]))
+
+
 QUANTITIES: dict[str, Callable[..., Quantity]] = {
     "amplitude": Amplitude,
     "peak_force": PeakForce,
@@ -163,6 +177,7 @@ QUANTITIES: dict[str, Callable[..., Quantity]] = {
     "psd": Psd,
     "density": Density,
     "energy": MeanEnergy,
+    "power": Power,
 }
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fembeam.model import Run
-from fembeam.statistics.batches import Estimate
+from fembeam.statistics.batches import Batches, Estimate
 from fembeam.statistics.impacts import Impacts
 from fembeam.statistics.initial_transient import Settling
 from fembeam.statistics.streaming import Signal
@@ -36,6 +36,8 @@ class Sums:
     stops: int
     signals: dict[str, Signal] = field(default_factory=dict)
     impacts: list[Impacts] = field(default_factory=list)
+    names: tuple[str, ...] = ()  # of all contacts
+    work: Batches = field(default_factory=lambda: Batches(1))  # rows: seconds, work done on each contact
 
     def __post_init__(self) -> None:
         for option, given in (("bins", self.bins), ("levels", self.levels)):
@@ -59,7 +61,16 @@ class Sums:
         for stop, impacts in enumerate(self.impacts):
             for a, b in pairwise(borders):
                 impacts.add(piece.run.contacts, stop, a * self.dt, b * self.dt)
+        self._add_work(piece.run, borders)
         return self.dt * float(piece.end - first)
+
+    def _add_work(self, run: Run, borders: Any) -> None:
+        """Take in what each contact took between samples."""
+        if not self.names:
+            self.names = tuple(run.name(i) for i in range(len(run.stops)))
+            self.work = Batches(1 + len(self.names))
+        for a, b in pairwise(borders) if self.names else ():
+            self.work.add([(b - a) * self.dt, *(run.losses.history[b] - run.losses.history[a])])
 
     def _signal(self, name: str, x: Vector, batches: int) -> Signal:
         """Empty sums for a signal, arranged by its first samples."""
@@ -70,7 +81,8 @@ class Sums:
 
     def response(self, plan: Segments, settled: Settling | None, enough: bool | None) -> Response:
         """The statistics so far."""
-        return Response(self.signals, self.impacts, plan.kept, plan.discarded, settled, enough, plan.seconds)
+        seen = self.signals, self.impacts, plan.kept, plan.discarded, settled, enough, plan.seconds
+        return Response(*seen, self.names, self.work)
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +98,7 @@ class Response(Printed):
     settling : end of the transient; None when `discard` was given.
     enough : whether the standard error asked for by `until` was reached; None when none was.
     seconds : wall seconds of integration.
+    names : of stops, elements and impactors, in the order of `power`.
     """
 
     signals: dict[str, Signal]
@@ -95,6 +108,8 @@ class Response(Printed):
     settling: Settling | None
     enough: bool | None
     seconds: float
+    names: tuple[str, ...] = ()
+    work: Batches = field(default_factory=lambda: Batches(1), repr=False)
 
     def __getitem__(self, name: str) -> Signal:
         if name not in self.signals:
@@ -116,6 +131,17 @@ class Response(Printed):
         rows = [(one.value, one.standard_error, *one.interval()) for one in found.values()]
         return dataframe([dict(zip(columns, map(float, row), strict=True)) for row in rows], index=list(found))
 
+    def power(self, contact: int | None = None) -> Estimate:
+        """Mean power (W) that a stop or element takes, numbered as in a `Run`; None: all of them together.
+
+        By the work done on it: what is stored meanwhile has no mean.
+        """
+        count = len(self.names)
+        if contact is not None and not -count <= contact < count:
+            raise ValueError(f"contact must be below {count}, the number of stops and elements, got {contact!r}")
+        mine = slice(1, None) if contact is None else slice(1 + contact % count, 2 + contact % count)
+        return self.work.estimate(lambda sums: sums[mine].sum() / sums[0])
+
     def numbers(self) -> dict[str, Estimate]:
         """Every number with its standard error, by names such as "δ std" and "stop 0 rate"."""
         names = ("mean", "std", "skewness", "kurtosis", "crossing_rate")
@@ -123,4 +149,4 @@ class Response(Printed):
         for i, impacts in enumerate(self.impacts):
             found |= {f"stop {i} {name}": getattr(impacts, name) for name in ("rate", "probability")}
             found |= {f"stop {i} {name}": impacts.mean(name) for name in impacts.largest}
-        return found
+        return found | {f"{name} power": self.power(i) for i, name in enumerate(self.names)}

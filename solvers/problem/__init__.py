@@ -3,12 +3,14 @@
 M q'' + C q' + K q = Σ v_l s_l(t) + Σ w_c F_c(-w_c·q - gap_c, ...)
 
 `system` holds matrices, contacts and loads and decouples them into blocks, `signals` samples loads for compiled code,
-`memo` keeps what was computed once, `result` is the solution with its log of contacts and its energies.
+`memo` keeps what was computed once, `result` is the solution with its log of contacts and its energies,
+`losses` what contacts took for good.
 Imports: numpy, scipy. Begin with `system.System`.
 """
 
 from solvers.problem.decoupling import decouple
 from solvers.problem.frames import dataframe, optional
+from solvers.problem.losses import Losses
 from solvers.problem.matrices import Array, dense, product
 from solvers.problem.memo import Memo
 from solvers.problem.result import (
@@ -34,6 +36,7 @@ __all__ = [
     "Energy",
     "Forcing",
     "Law",
+    "Losses",
     "Memo",
     "Parameter",
     "Solution",

@@ -240,11 +240,13 @@ class Solution:
     Attributes
     ----------
     t : (k,) s. q, q_dot : (k, n) coordinates and rates then; without output samples k = 1, the end.
-    contacts : log, and energy : energy balance, made when first looked at, by calling ``log`` and ``ledger``.
+    contacts : log, energy : energy balance, transitions and losses : what laws with memory met, what each contact took;
+        made when first looked at, by calling ``log``, ``ledger``, ``borders`` and ``lost``.
     status : how it ended. cost : what it took.
     tangent : (2n, 2n or 2n + 1) derivative of the final [q, q̇], and rate : (2n,) its derivative by time; None unless
         asked for.
     memory : what the laws have latched at the end, one array per contact, empty for laws without memory.
+    end : (2n + l,) [q, q̇] at the time reached, which samples need not reach, and the numbers of ``memory`` in a row.
     memory_tangent : (2n + l, 2n + l or 2n + l + 1) derivative of the final [q, q̇, memory] with respect to the same at
         the start, and to a parameter; codes of segments have zeros. None without laws with memory.
 
@@ -274,6 +276,8 @@ class Solution:
     memory: tuple[Array, ...] = ()
     memory_tangent: Array | None = None
     borders: Callable[[], Transitions] = field(default=lambda: Transitions.of_rows(np.empty((0, 10)), ()), repr=False)
+    lost: Callable[[], Any] = field(default=lambda: None, repr=False)
+    end: Array | None = field(default=None, repr=False)
 
     def __repr__(self) -> str:
         reached = f"to t = {self.t[-1]:g} s" if len(self.t) else "without samples"
@@ -293,3 +297,8 @@ class Solution:
     def energy(self) -> Energy:
         """The energy balance."""
         return self.ledger()
+
+    @cached_property
+    def losses(self) -> Any:
+        """What each contact has taken, `solvers.problem.Losses`: work, loss, path of slip."""
+        return self.lost()

@@ -1,0 +1,123 @@
+"""What contacts have taken for good: the work done on each less what its law would give back."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from solvers.problem.frames import dataframe
+from solvers.problem.matrices import Array
+from solvers.problem.result import Transitions, counted
+from solvers.problem.system import Contact
+
+Held = tuple[Array, Sequence[Array]]  # a method's state, at the end with its energy balance; what laws have latched
+
+
+@dataclass(frozen=True, eq=False)
+class Losses:
+    """What contacts have taken in a run, one array entry each.
+
+    Attributes
+    ----------
+    work : (m,) J done on each. stored : (m,) J that its law holds more at the end than at the begin; NaN where a law
+        cannot tell.
+    slip : (m,) m (rad of rotation), distance that δ went while sliders slipped, summed over the sliders of a law. A
+        slip without begin and end in the run counts for nothing.
+    history : (k, m) J, work done on each up to the samples.
+
+    Notes
+    -----
+    For a stop that is open at both ends of the run ``loss`` is the sum of its contacts' ``energy_loss``. Laws without
+    memory store the integral of their force at rest.
+    """
+
+    work: Array
+    stored: Array
+    slip: Array
+    history: Array
+
+    def __len__(self) -> int:
+        return len(self.work)
+
+    def __repr__(self) -> str:
+        return f"<losses of {counted(len(self), 'contact')}: {self.loss.sum():.6g} J>"
+
+    @property
+    def loss(self) -> Array:
+        """(m,) J taken for good: work less what is stored."""
+        return self.work - self.stored
+
+    def arrays(self) -> dict[str, Array]:
+        """The columns with one entry per contact, by name."""
+        return {"work": self.work, "stored": self.stored, "loss": self.loss, "slip": self.slip}
+
+    def to_dataframe(self) -> Any:
+        """A table of pandas, one contact a row, in SI units; ImportError where pandas is missing."""
+        return dataframe(self.arrays())
+
+    @classmethod
+    def of_run(
+        cls,
+        contacts: Sequence[Contact],
+        back: Any,
+        begin: Held,
+        end: Held,
+        powers: Array,
+        transitions: Callable[[], Transitions],
+    ) -> Losses:
+        """From the states at begin and end and the integrated powers at the samples (k, 2 + 2m).
+
+        ``back`` makes [q, q̇] of a state; its balance holds input, damping, and work and impulse of each contact.
+        """
+        size = begin[0].size
+        deltas = [_indentations(contacts, back.dot(x[:size])) for x, _ in (begin, end)]
+        first, last = (_stored(contacts, d, latched) for d, (_, latched) in zip(deltas, (begin, end), strict=True))
+        return cls(end[0][size + 2 :: 2], last - first, _slipped(transitions(), *deltas), powers[:, 2::2])
+
+    def part(self, kept: slice) -> Losses:
+        """Of some of the samples: their work; what was stored and slip are not known there."""
+        history = self.history[kept] - self.history[kept][:1]
+        unknown = np.full(len(self), math.nan)
+        return Losses(history[-1] if len(history) else unknown, unknown, unknown, history)
+
+
+def _indentations(contacts: Sequence[Contact], motion: Array) -> Array:
+    """δ (m,) of each contact in a state [q, q̇]."""
+    q = motion[: motion.size // 2]
+    return np.array([float(-contact.direction @ q) - contact.gap for contact in contacts])
+
+
+def _stored(contacts: Sequence[Contact], deltas: Array, memory: Sequence[Array]) -> Array:
+    """(m,) J stored by each law."""
+    return np.array([_stored_by(*one) for one in zip(contacts, deltas.tolist(), memory, strict=True)])
+
+
+def _stored_by(contact: Contact, delta: float, latched: Array) -> float:
+    """J stored by one law; NaN where it cannot tell."""
+    law: Any = contact.law
+    if delta <= 0.0 and not contact.always:
+        return 0.0
+    places = list(getattr(law, "memory", ()))
+    beyond = delta < 0.0 and getattr(law, "one_sided", True) and not places
+    if beyond or not hasattr(law, "stored"):
+        return math.nan
+    row = np.array(law.parameters, dtype=float)
+    row[places] = latched
+    return float(law.stored(delta, row))
+
+
+def _slipped(passed: Transitions, begin: Array, end: Array) -> Array:
+    """(m,) way of δ while sliders slipped, of those also that slip at the begin or at the end of the run."""
+    path, since = np.zeros(len(begin)), {}
+    for contact, border, event, delta in zip(passed.contact, passed.border, passed.event, passed.delta, strict=True):
+        if event == "slip":
+            since[contact, border] = delta
+        elif event == "stick":
+            path[contact] += abs(delta - since.pop((contact, border), begin[contact]))
+    for (contact, _), delta in since.items():
+        path[contact] += abs(end[contact] - delta)
+    return path

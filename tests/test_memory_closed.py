@@ -1,0 +1,250 @@
+"""Laws with memory through the integrator against closed forms: decay and rest, loops, blows, many borders."""
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+from sliders import Slider
+
+from contacts import BoucWen, Coulomb, Iwan, Jenkins, WaltonBraun
+from fembeam import Harmonic
+from solvers import Contact, DormandPrince, Exponential, System, integrate
+
+FINE = Exponential(1e-12)
+
+
+def element(law, *direction):
+    """One that always acts; δ = q for the direction -1."""
+    return Contact(direction or [-1.0], law, always=True)
+
+
+def oscillator(*laws, spring=1.0, loads=()):
+    """A unit mass on a spring with elements."""
+    return System([[1.0]], [[0.0]], [[spring]], [element(law) for law in laws], loads)
+
+
+def force_at_end(law, run, contact=0):
+    """Force of an element in the last state, with what it has latched."""
+    row = np.array(law.parameters)
+    row[list(law.memory)] = run.memory[contact]
+    return float(law.batch(1.0, row)(run.q[-1], run.q_dot[-1])[0])
+
+
+# --- decay and rest --------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class DryFriction:
+    """q'' + K q + F = 0: in stick F = k (q - s) + c q' up to |F| = f, then ±f until q' = 0, where s = q ∓ f/k."""
+
+    spring: float
+    stiffness: float
+    limit: float
+    damping: float
+
+    def stick(self, q, v, s):
+        """(q, v) as functions of time, and where it would rest."""
+        rest = self.stiffness * s / (self.spring + self.stiffness)
+        gamma = 0.5 * self.damping
+        omega = math.sqrt(self.spring + self.stiffness - gamma**2)
+        a, b = q - rest, (v + gamma * (q - rest)) / omega
+
+        def motion(t):
+            c, d, e = np.cos(omega * t), np.sin(omega * t), np.exp(-gamma * t)
+            x = e * (a * c + b * d)
+            return rest + x, -gamma * x + omega * e * (b * c - a * d)
+
+        return motion, rest
+
+    def decay(self, v, s=0.0, q=0.0):
+        """Turning points after a push, and the place of rest."""
+        turns = []
+        while True:
+            motion, rest = self.stick(q, v, s)
+
+            def over(t, motion=motion, s=s):
+                x, rate = motion(t)
+                return np.abs(self.stiffness * (x - s) + self.damping * rate) - self.limit
+
+            grid = np.linspace(0.0, 30.0 / self.damping, 20001)[1:]
+            beyond = np.flatnonzero(over(grid) > 0.0)
+            if not beyond.size:
+                return np.array(turns), rest
+            first = beyond[0]
+            end = brentq(over, grid[first - 1], grid[first], xtol=1e-15) if first else 0.0
+            q, v = motion(end)
+            side, omega = math.copysign(1.0, v), math.sqrt(self.spring)
+            centre = -side * self.limit / self.spring
+            q = centre + side * math.hypot(q - centre, v / omega)
+            turns.append(q)
+            s, v = q - side * self.limit / self.stiffness, 0.0
+
+
+def test_dry_friction_decays_along_a_line_and_rests_for_ever():
+    """Turning points of exact pieces, 4 f/K less per cycle as for a rigid contact; rest in the dead zone, no creep."""
+    exact = DryFriction(spring=1.0, stiffness=1e6, limit=0.1, damping=1e3)
+    turns, rest = exact.decay(v=1.03)
+    system = oscillator(Coulomb(exact.limit, exact.stiffness, damping=exact.damping))
+    run = integrate(system, [0.0], [1.03], 40.0, method=FINE)
+    found = run.transitions.delta[run.transitions.event == "stick"]
+    assert len(found) == len(turns) == math.ceil((abs(turns[0]) - 0.1) / 0.2) + 1
+    assert abs(found - turns).max() < 1e-10
+    line = (np.abs(turns[0]) - 0.2 * np.arange(len(turns))) * (-1.0) ** np.arange(len(turns))
+    assert abs(found - line).max() < 1e-3  # of the order √(1/k)
+    assert abs(run.q[-1, 0] - rest) < 1e-10
+    assert abs(rest) < exact.limit
+    later = integrate(system, run.q[-1], run.q_dot[-1], 1000.0, dt=1.0, method=Exponential(1e-8), memory=run.memory)
+    assert abs(later.q - run.q[-1]).max() < 1e-12
+    assert abs(later.q_dot).max() < 1e-12 * math.sqrt(exact.stiffness)
+    assert not len(later.transitions)
+    assert later.losses.slip[0] == 0.0
+
+
+@pytest.mark.parametrize(("spring", "stiffness", "limit"), [(1.0, 50.0, 0.05), (4.0, 4.0, 0.3), (1.0, 2000.0, 0.02)])
+def test_decay_of_a_slider_is_that_of_its_exact_pieces(spring, stiffness, limit):
+    q, v, events = Slider(spring, stiffness, limit).run(0.0, 1.7, 10.0)
+    run = integrate(oscillator(Jenkins(stiffness, limit), spring=spring), [0.0], [1.7], 10.0, method=FINE)
+    assert abs(run.q[-1, 0] - q) < 1e-10
+    assert abs(run.q_dot[-1, 0] - v) < 1e-10
+    assert abs(run.transitions.t - [t for t, _ in events]).max() < 1e-10
+
+
+# --- loops -----------------------------------------------------------------------------------------------------------
+
+STIFFNESS, LIMITS = (40.0, 20.0, 10.0, 14.0), (0.5, 0.75, 1.0, 0.35)
+TONES = [([1.0], Harmonic(3.0, 1.1)), ([1.0], Harmonic(2.0, 2.3))]
+
+
+def test_sliders_in_parallel_are_one_joint():
+    """Iwan's law and its sliders apart: four reverse at one instant; the force at the end is that of rationals."""
+    law = Iwan(STIFFNESS, LIMITS)
+    apart = [Jenkins(k, f) for k, f in zip(STIFFNESS, LIMITS, strict=True)]
+    whole, parts = (integrate(oscillator(*laws, loads=TONES), [0.0], [0.5], 12.0, method=FINE)
+                    for laws in ((law,), apart))  # fmt: skip
+    log = whole.transitions
+    stuck = log.t[log.event == "stick"]
+    at_once = np.unique(stuck, return_counts=True)[1]
+    assert at_once.max() == 4
+    assert len(parts.transitions) == len(log) > 40
+    assert abs(parts.transitions.t - log.t).max() < 1e-12 * 12.0 + 1e-12
+    assert abs(parts.q[-1] - whole.q[-1]).max() < 1e-12
+    assert whole.losses.loss[0] == pytest.approx(parts.losses.loss.sum(), rel=1e-11)
+    turns = log.delta[log.event == "stick"]
+    sliders = [Fraction(0)] * 4
+    for delta in (*turns.tolist(), whole.q[-1, 0]):
+        d, moved = Fraction(delta), []
+        for k, f, s in zip(map(Fraction, STIFFNESS), map(Fraction, LIMITS), sliders, strict=True):
+            moved.append(d - max(-f, min(f, k * (d - s))) / k)
+        sliders = moved
+    expected = sum(Fraction(k) * (Fraction(float(whole.q[-1, 0])) - s) for k, s in zip(STIFFNESS, sliders, strict=True))
+    assert force_at_end(law, whole) == pytest.approx(float(expected), rel=1e-12, abs=1e-12)
+
+
+SHAPES = [(0.7, 0.3), (0.6, -0.4), (0.4, 0.8)]  # β, γ: softening, pinched, strongly asymmetric about unloading
+
+
+@pytest.mark.parametrize("n", [1, 2])
+@pytest.mark.parametrize(("beta", "gamma"), SHAPES)
+def test_bouc_wen_in_motion_is_its_differential_equation(n, beta, gamma):
+    """z' = A δ' - β |δ'| |z|^(n-1) z - γ δ' |z|^n integrated from one reversal of the run to the next."""
+    law, k = BoucWen(3.0, 0.1, 1.0, beta, gamma, n), 2.7
+    run = integrate(oscillator(law, loads=TONES), [0.0], [0.5], 45.0, method=FINE)
+    log = run.transitions
+    turns = log.delta[log.event == "reversal"]
+    assert len(turns) > 10
+    z, path = 0.0, [0.0, *turns[turns != 0.0].tolist(), run.q[-1, 0]]
+    for begin, end in pairwise(path):
+        z = led(z, begin, end, n, beta, gamma)
+    assert force_at_end(law, run) == pytest.approx(0.3 * run.q[-1, 0] + k * z, rel=1e-11, abs=1e-12)
+
+
+def led(z, begin, end, n, beta, gamma):
+    """z at the end of a monotone way, by an independent integration that ends at zeros of z."""
+    up = math.copysign(1.0, end - begin)
+
+    def zero(_, y):
+        return y[0]
+
+    zero.terminal = True
+    while begin != end:
+        side = up if z == 0.0 else math.copysign(1.0, z)
+        zero.direction = -side
+        found = solve_ivp(lambda _, y, s=side: 1.0 - np.abs(y) ** n * (gamma + beta * up * s), (begin, end), [z],
+                          "DOP853", rtol=2.3e-14, atol=1e-17, events=zero)  # fmt: skip
+        begin, z = found.t[-1], 0.0 if found.status == 1 else found.y[0, -1]
+    return z
+
+
+# --- blows -----------------------------------------------------------------------------------------------------------
+
+MASS, LOADING, UNLOADING = 2.0, 1e4, 4e4
+SPEEDS = (0.5, 0.2, 0.6, 0.6, 0.31, 0.9, 1.4)
+
+
+def blow(speed, largest):
+    """(speed out, largest force, duration) of a blow on the line of unloading up to ``largest``, then on the first."""
+    fast, slow = math.sqrt(UNLOADING / MASS), math.sqrt(LOADING / MASS)
+    elastic = speed * math.sqrt(MASS * UNLOADING)  # force at the deepest point, were it all on that line
+    if elastic <= largest:
+        return speed, largest, math.pi / fast
+    rest = speed**2 - largest**2 / (MASS * UNLOADING)
+    force = math.sqrt(largest**2 + LOADING * MASS * rest)
+    duration = math.asin(largest / elastic) / fast + math.acos(largest / force) / slow + 0.5 * math.pi / fast
+    return force / math.sqrt(MASS * UNLOADING), force, duration
+
+
+@pytest.mark.parametrize("method", [Exponential(1e-12), DormandPrince(1e-13)], ids=["main", "stepping"])
+@pytest.mark.parametrize("kind", ["kept", "forgotten"])
+def test_seven_blows_on_a_yielding_stop(kind, method):
+    """Restitution, set, duration and loss of each blow, of growing and of smaller speeds."""
+    law = WaltonBraun(LOADING, UNLOADING, kind)
+    ball = System([[MASS]], [[0.0]], [[0.0]], [Contact([1.0], law)])
+    largest, memory = 0.0, None
+    for speed in SPEEDS:
+        out, largest, duration = blow(speed, largest if kind == "kept" else 0.0)
+        run = integrate(ball, [2e-3], [-speed], 0.2, method=method, memory=memory)
+        log, memory = run.contacts, run.memory
+        assert len(log) == 1
+        assert abs(log.speed_out[0] - out) < 1e-10
+        assert abs(log.t_out[0] - log.t_in[0] - duration) < 1e-10
+        assert abs(run.losses.loss[0] - 0.5 * MASS * (speed**2 - out**2)) < 1e-10
+        set_ = largest * (1.0 / LOADING - 1.0 / UNLOADING)
+        left = run.transitions.delta[run.transitions.event == "open"]
+        assert abs(left[0] - set_) < 1e-10
+        assert memory[0][1] == pytest.approx(largest if kind == "kept" else 0.0, abs=1e-7)  # N
+
+
+# --- tangents --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "laws",
+    [
+        (Jenkins(50.0, 0.4), Iwan([30.0, 20.0], [0.05, 0.3])),
+        (BoucWen(20.0, 0.2, 1.0, 3.0, 1.0, n=1), Coulomb(0.2, 40.0)),
+    ],
+)
+def test_tangent_over_fifty_borders(laws):
+    """Derivative of the end by the start against differences of fourth order."""
+    contacts = [element(laws[0], -1.0, -0.5, 0.3), element(laws[1], -0.2, 0.9, -0.5)]
+    loads = [([1.0, 0.3, 0.2], Harmonic(1.5, 1.3))]
+    system = System.modal([1.0, 3.7, 9.0], [0.01, 0.01, 0.02], contacts, loads)
+    x, step = np.array([0.02, 0.01, -0.01, 1.0, -0.5, 0.3]), 2e-5  # not at a kink
+
+    def end(start):
+        run = integrate(system, start[:3], start[3:], 25.0, method=FINE)
+        return np.concatenate((run.q[-1], run.q_dot[-1]))
+
+    run = integrate(system, x[:3], x[3:], 25.0, method=FINE, tangent=True)
+    assert len(run.transitions) >= 50
+    columns = [
+        8.0 * (end(x + step * e) - end(x - step * e)) - (end(x + 2 * step * e) - end(x - 2 * step * e))
+        for e in np.eye(6)
+    ]
+    wanted = np.transpose(columns) / (12.0 * step)
+    assert abs(run.tangent - wanted).max() < 1e-7 * max(1.0, abs(wanted).max())
