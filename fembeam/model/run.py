@@ -55,6 +55,7 @@ class Run(ContactHistories, Printed):
     scene: str
     model: Model | None = None
     stored_forces: Vector | None = None  # (m, k) of a run read from a file
+    stored_means: Vector | None = None  # (m, k) likewise, over each sample
     stored: Readout | None = None  # likewise
     others: tuple[Shapes, ...] = ()  # of the further beams
     source: Source | None = None  # of a run made from a scene file
@@ -88,10 +89,10 @@ class Run(ContactHistories, Printed):
     def transitions(self) -> Any:
         """Borders that laws with memory passed, see `solvers.problem.Transitions`: times of stick, slip and yield.
 
-        ValueError for a run read from a file.
+        ValueError for a run read from a file of an earlier version, which does not keep them.
         """
         if self.borders is None:
-            raise ValueError("a run read from a file has no transitions; simulate again")
+            raise ValueError("this run's file is of an earlier version, without transitions; simulate again")
         return self.borders()
 
     @property
@@ -269,8 +270,8 @@ class Run(ContactHistories, Printed):
         """Contact force (k,) of a stop, N or N m, from its law and the entry rate latched at the time; of an element F.
 
         ``mean``: over each sample (halfway to its neighbours) instead of at it, so that contacts shorter than a sample
-        are seen: the trapezoidal rule over the samples gives the log's impulses exactly. Needs the model, whose law
-        shares the impulse of a contact among samples: ValueError for a run read from a file.
+        are seen: the trapezoidal rule over the samples gives the log's impulses exactly. ValueError for a run without
+        samples, or read from a file of an earlier version.
         """
         if mean:
             from fembeam.response import mean_force
@@ -291,7 +292,7 @@ class Run(ContactHistories, Printed):
         """Write everything to one file, whole or not at all; read it with `load`.
 
         ``.npz``, or HDF5 if the path ends in .h5 or .hdf5 (ImportError without h5py). The file holds what the methods
-        read, but no laws: `force` with ``mean`` needs the run itself.
+        read, so that neither the scene nor its laws are needed; `model` is None then.
         """
         from fembeam.model.run_file import save
 

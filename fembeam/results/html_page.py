@@ -145,7 +145,7 @@ def _text(content: str) -> Iterator[str]:
 def _simulation(found: dict[str, Any]) -> Iterator[str]:
     """Tables of [simulate], in the units of the figures."""
     rotations = found.get("rotations", [])
-    if found["omega"]:
+    if found["omega"] and found["zeta"]:
         rows = [
             [i + 1, _rounded(w, 5), _rounded(w / 6.283185307179586, 5), f"{z:.4g}"]
             for i, (w, z) in enumerate(zip(found["omega"], found["zeta"], strict=True))
