@@ -164,6 +164,14 @@ def test_a_beam_on_two_supports_without_anything_else(tmp_path):
         again.stress(0.5)
 
 
+def test_what_is_no_saved_run_is_refused(run, tmp_path):
+    (tmp_path / "table.csv").write_text("t,a\n0,0\n")
+    with pytest.raises(ValueError, match=r"it is neither npz nor HDF5; give a file of Run\.save"):
+        fb.load(tmp_path / "table.csv")
+    with pytest.raises(FileNotFoundError, match=r"there is no folder .*nowhere to write run.npz to; make it first"):
+        run.save(tmp_path / "nowhere" / "run")
+
+
 def changed(path, change):
     """A saved run with its arrays and words changed."""
     with np.load(path) as data:

@@ -16,7 +16,7 @@ import solvers
 from fembeam.model.contact_histories import ContactHistories
 from fembeam.model.shapes import Shapes
 from fembeam.scene import ON, Source
-from fembeam.support import Part, Printed
+from fembeam.support import Part, Printed, require
 from solvers.problem import counted
 
 if TYPE_CHECKING:
@@ -153,7 +153,7 @@ class Run(ContactHistories, Printed):
         """A derivative of u at z (k,) or (k, j), with that of the frame's motion if absolute."""
         from fembeam.response import frame_motion
 
-        values = rates @ (self.shapes, *self.others)[body](z).T
+        values = rates @ self._beam(body)(z).T
         return (values.T + frame_motion(self, order)).T if absolute else values
 
     def reactions(self) -> Reactions:
@@ -211,13 +211,21 @@ class Run(ContactHistories, Printed):
         """
         from fembeam.response import extremes, rows_of
 
-        places = (self.shapes, *self.others)[body].nodes if z is None else np.atleast_1d(np.asarray(z, dtype=float))
+        places = self._beam(body).nodes if z is None else np.atleast_1d(np.asarray(z, dtype=float))
         return extremes(self.t, self.q, *rows_of(self, quantity, places, body))
+
+    def _beam(self, body: int) -> Shapes:
+        """A beam's shapes; ValueError unless there is one of that number."""
+        beams = (self.shapes, *self.others)
+        require(body in range(len(beams)), f"body must be below {len(beams)}, the number of beams", body, "Run",
+                "0 is the scene's own")  # fmt: skip
+        return beams[body]
 
     def _field(self, quantity: str, z: ArrayLike, body: int) -> Vector:
         """A field over time: (k,) at one z, (k, j) at z (j,)."""
         from fembeam.response import rows_of
 
+        self._beam(body)
         places = np.asarray(z, dtype=float)
         shapes, _, offset = rows_of(self, quantity, np.atleast_1d(places), body)
         values = self.q @ shapes.T + offset

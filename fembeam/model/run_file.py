@@ -24,7 +24,7 @@ OLD_NAMES = {"contact_floored": "contact_entry_rate_clipped"}  # in files of ear
 
 FORMAT = 2
 HDF5 = (".h5", ".hdf5")
-SIGNATURE = b"\x89HDF\r\n\x1a\n"  # of HDF5
+SIGNATURE, ZIPPED = b"\x89HDF\r\n\x1a\n", b"PK"  # of HDF5 and npz
 UNITS = {
     "t, contact_t_in, contact_t_out": "s",
     "q": "m √kg",
@@ -149,8 +149,10 @@ def load(path: str | os.PathLike[str]) -> Run:
 def _read(path: Path) -> dict[str, Any]:
     """Arrays by name, and the words."""
     with path.open("rb") as file:
-        hdf5 = file.read(len(SIGNATURE)) == SIGNATURE
-    if not hdf5:
+        begin = file.read(len(SIGNATURE))
+    if not begin.startswith((SIGNATURE, ZIPPED)):
+        raise ValueError("it is neither npz nor HDF5; give a file of Run.save")
+    if begin != SIGNATURE:
         with np.load(path, allow_pickle=False) as data:
             return {name: data[name] for name in data.files}
     with optional("h5py", "a run in HDF5").File(path, "r") as group:
