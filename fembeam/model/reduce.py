@@ -134,6 +134,8 @@ def _numbers(scene: Scene, modes: Any, elements: int | None, interface: bool) ->
                 modes, "Scene.reduce", "say how many elements the mesh shall have")  # fmt: skip
         return tuple(range(scene.matrices(elements).M.shape[0]))
     whole = isinstance(modes, (int, np.integer)) and not isinstance(modes, bool)
+    require(whole or np.ndim(modes) == 1, "modes must be a whole number or a list of them", modes, "Scene.reduce",
+            "ask for modes=2, or modes=[0, 2]")  # fmt: skip
     require(not whole or modes <= MOST_DOFS, f"modes must be at most {MOST_DOFS}", modes, "Scene.reduce", "take fewer")
     listed = list(range(int(modes))) if whole else [int(i) for i in modes]
     enough = len(listed) > 0 or (interface and whole and modes == 0)

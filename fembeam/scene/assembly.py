@@ -226,7 +226,10 @@ def _resolving(scene: Scene, borders: Vector, modes: int) -> Vector:
     coarse = _on_nodes(scene, spread(scene.beam, borders, 2 * modes + 4), None)
     omega = reduction.modal_basis(coarse.M, coarse.K, modes, root=coarse.root).omega[-1]
     waves = np.diff(borders) * wavenumber(scene.beam, borders, float(omega))
-    return divided(borders, np.maximum(1, np.ceil(waves / WAVE_STEP).astype(int)))
+    counts = np.maximum(1, np.ceil(waves / WAVE_STEP))
+    require(counts.sum() <= MOST_ELEMENTS, f"{modes} modes must need at most {MOST_ELEMENTS} elements", counts.sum(),
+            "Scene.matrices", "is a length in mm, or a place next to another one?")  # fmt: skip
+    return divided(borders, counts.astype(int))
 
 
 def _check_buckling(scene: Scene) -> None:

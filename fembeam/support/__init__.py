@@ -9,6 +9,7 @@ from fembeam.support.checks import (
     number,
     require,
     require_finite,
+    require_no_text,
     require_non_negative,
     require_positive,
 )
@@ -32,6 +33,7 @@ __all__ = [
     "number",
     "require",
     "require_finite",
+    "require_no_text",
     "require_non_negative",
     "require_positive",
     "versions",

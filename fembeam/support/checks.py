@@ -39,6 +39,12 @@ def require_non_negative(name: str, value: object, where: str, advice: str) -> N
     require(valid, f"{name} must be finite and not negative", value, where, advice)
 
 
+def require_no_text(where: str, **values: object) -> None:
+    """Raise ValueError for an argument that is text where numbers are meant."""
+    for name, value in values.items():
+        require(not isinstance(value, str), f"{name} must be numbers", value, where, "drop the quotes")
+
+
 def number(name: str, value: Any, above: float = -math.inf, least: float = -math.inf) -> float:
     """The value as a finite float above one bound and not below another, or a clear error."""
     try:
