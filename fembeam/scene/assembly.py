@@ -37,7 +37,7 @@ from fembeam.beams import (
     spread,
     wavenumber,
 )
-from fembeam.support import require, require_finite
+from fembeam.support import is_whole, require, require_finite
 
 if TYPE_CHECKING:
     from fembeam.scene.impactor import Impactor
@@ -207,7 +207,7 @@ def _joined(beams: tuple[Matrices, ...], impactors: tuple[Impactor, ...]) -> Mat
 def _check_counts(elements: int | None, modes: int | None) -> None:
     """Raise ValueError unless both are counts, and the elements few enough to be right."""
     for name, number in (("elements", elements), ("modes", modes)):
-        whole = isinstance(number, (int, np.integer)) and not isinstance(number, bool)
+        whole = is_whole(number)
         require(number is None or (whole and number > 0), f"{name} must be a whole number above 0", number,
                 "Scene.matrices", "give a count, or None")  # fmt: skip
     few = elements is None or elements <= MOST_ELEMENTS

@@ -6,6 +6,7 @@ Imports nothing of ours.
 from fembeam.support.checks import (
     frozen,
     is_finite,
+    is_whole,
     number,
     require,
     require_finite,
@@ -29,6 +30,7 @@ __all__ = [
     "frozen",
     "html_table",
     "is_finite",
+    "is_whole",
     "note",
     "number",
     "require",

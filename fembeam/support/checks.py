@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from numbers import Real
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 def is_finite(value: object) -> bool:
     """Whether value is a real, finite number (booleans are not numbers here)."""
     return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def is_whole(value: object) -> TypeGuard[int]:
+    """Whether value is a whole number (booleans are not numbers here)."""
+    return isinstance(value, (int, np.integer)) and not isinstance(value, bool)
 
 
 def require(valid: bool, rule: str, got: object, where: str, advice: str) -> None:
