@@ -60,7 +60,7 @@ def test_a_part_gets_its_arguments_and_returns_a_tuple(problem):
 
 def test_every_place_has_a_function():
     importlib.import_module("solvers.exponential.method")
-    groups = parts.EVERY_RUN, parts.ENERGY, parts.BORDERS, parts.MANY_STOPS
+    groups = parts.EVERY_RUN, parts.ENERGY, parts.BORDERS, parts.TWO_STOPS, parts.MANY_STOPS
     assert sorted(place for group in groups for place in group) == list(range(len(parts.ADDRESSES)))
     assert sorted(parts._DECLARED) == list(range(len(parts.ADDRESSES)))
 
@@ -73,7 +73,8 @@ def test_every_place_has_a_function():
         ("run(dt=1e-3, method=Exponential(ledger=False))", "EVERY_RUN"),
         ("run(tangent=True)", "EVERY_RUN"),
         ("run(KelvinVoigt(1e6, 0.5, clamp=True))", "[*EVERY_RUN, *BORDERS]"),
-        ("run(stops=4)", "[*EVERY_RUN, *MANY_STOPS]"),
+        ("run(stops=2)", "[*EVERY_RUN, *TWO_STOPS]"),
+        ("run(stops=4)", "[*EVERY_RUN, *TWO_STOPS, *MANY_STOPS]"),
     ],
 )
 def test_a_run_loads_what_it_needs(run, needed):

@@ -56,7 +56,7 @@ inner = _decorator(**_INNER)
 inlined = _decorator(**_INNER, forceinline=True)
 """The same for what the innermost loops call, from few places: there even passing the arrays' descriptors costs more
 than the arithmetic. Everywhere else it would only cost compile time."""
-merged = _decorator(**_INNER, inline="always")
+merged = njit(**_INNER, inline="always")
 """The same for what is called from one place: compiled as a part of the caller, a third quicker than by itself."""
 reordered = _decorator(**_INNER, forceinline=True, fastmath={"reassoc", "contract"})
 """The same for sums whose order does not matter, so that they can be vectorised."""

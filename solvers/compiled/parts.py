@@ -24,11 +24,13 @@ from solvers.compiled.packed import PackedType
 
 (BEGIN, CONTACT, SOLVE, NEWTON, LEAVES, ERROR, ACCEPT, LAND, LANDING_STEP, WITHIN_STEP) = range(10)
 (ACCOUNT_FLIGHT, ACCOUNT_CONTACT) = range(10, 12)
-(FIRST_END, LAND_IN_TIME, GO_BEYOND, PASSED) = range(12, 16)
-(PAIR, FREE_BLOCKS, PUSHED_BLOCKS, PUSHED_END, STOP_AT_NODES, BOUNDS) = range(16, 22)
-EVERY_RUN, ENERGY, BORDERS, MANY_STOPS = range(10), range(10, 12), range(12, 16), range(16, 22)
-"""What needs them: every run, those with an energy balance, with bends or memory in a law, with many stops."""
-ADDRESSES = np.zeros(22, dtype=np.int64)
+(SIDE, FIRST_END, LAND_IN_TIME, GO_BEYOND, PASSED) = range(12, 17)
+(PRESSED,) = range(17, 18)
+(PAIR, FREE_BLOCKS, PUSHED_BLOCKS, PUSHED_END, STOP_AT_NODES, BOUNDS) = range(18, 24)
+EVERY_RUN, ENERGY = range(10), range(10, 12)
+BORDERS, TWO_STOPS, MANY_STOPS = range(12, 17), range(17, 18), range(18, 24)
+"""What needs them: every run, those with an energy balance, with bends or memory in a law, with two or many stops."""
+ADDRESSES = np.zeros(24, dtype=np.int64)
 
 _DECLARED: dict[int, tuple[Any, Any, tuple[Any, ...]]] = {}
 _LOADED: dict[int, Any] = {}
