@@ -22,6 +22,7 @@ from solvers.problem.run_arguments import _check_laws, _times
 
 if TYPE_CHECKING:
     from solvers.exponential.many_starts import Worker
+    from solvers.exponential.method import Engine
 
 _STRETCH = 64  # starts a thread takes at once, at most
 _LOOK = 0.1  # s between two looks at the threads
@@ -67,9 +68,14 @@ def integrate_many(
     threads: int = 1,
     progress: Callable[[int], None] | None = None,
     *,
+    gaps: ArrayLike | None = None,
+    factors: ArrayLike | None = None,
     check: bool = True,
 ) -> ManySolutions:
     """Integrate a system from many starts in one compiled loop; each ends as `integrate` ends it, bit for bit.
+
+    Runs may differ in their gaps and in the amplitudes and phases of tones too, at no cost beside their own steps: the
+    tables of the method do not depend on these. Other parameters need a system, and a call, for each value.
 
     Parameters
     ----------
@@ -79,6 +85,10 @@ def integrate_many(
     method : `Exponential`, the only one that offers this; None takes ``Exponential(rtol=1e-8)``.
     threads : how many work at the same time, each without Python's lock; results do not depend on it.
     progress : called with the number of starts finished now and then.
+    gaps : (k, m) of every stop in each run, m (rad about an axis), in place of those of the system.
+    factors : (k, p) what multiplies the signal of each load in each run; a complex one, r e^{iφ}, turns tones by φ
+        besides. Loads that are sampled, or at resonance with an undamped mode, take 1 only. The numbers are those of
+        `integrate` with such signals to rounding.
     check : raise when a run fails; False returns all of them, with their status.
 
     Returns
@@ -99,7 +109,7 @@ def integrate_many(
     >>> bool(np.abs(ends.q[:, 0] - [1.0, 0.5]).max() < 1e-7)
     True
     """
-    from solvers.exponential.many_starts import CONTACTS, REACHED, Outcomes, Worker, final_statuses
+    from solvers.exponential.many_starts import CONTACTS, REACHED, Outcomes, Worker, final_statuses, whole_starts
     from solvers.exponential.method import Exponential
 
     method = Exponential() if method is None else method
@@ -109,10 +119,12 @@ def integrate_many(
     _times(duration, None)
     _check_threads(threads)
     _check_laws(system)
+    own_gaps, scaled = _gaps(system, gaps, len(starts)), _factors(system, factors, len(starts))
     forcing, begin = _forcing(system, duration, min(max(method.rtol, 1e-12), 1e-6)), time.perf_counter()
     engines = [method.engine(system, starts[0], forcing, duration) for _ in range(min(threads, len(starts)))]
     outcomes = Outcomes.of(len(starts), engines[0].back.shape[1], len(system.contacts))
-    _to_the_end([Worker(engine, starts, outcomes, _BUDGET) for engine in engines], len(starts), progress)
+    starts = whole_starts(engines[0], starts, _of_tones(scaled, engines[0]))
+    _to_the_end([Worker(engine, starts, own_gaps, outcomes, _BUDGET) for engine in engines], len(starts), progress)
     status = final_statuses(engines[0], outcomes)
     for engine in engines:
         engine.release()
@@ -141,6 +153,48 @@ def _starts(system: System, q0: ArrayLike, q_dot0: ArrayLike) -> Array:
     if len(parts[0]) != len(parts[1]):
         raise ValueError(f"q0 and q_dot0 must have as many rows, got {len(parts[0])} and {len(parts[1])}")
     return _products(system.blocks.inverse, np.hstack(parts))
+
+
+def _rows(name: str, values: ArrayLike, count: int, width: int, each: str, kind: type = float) -> Any:
+    """Checked array (k, width)."""
+    rows: Any = np.array(values, dtype=kind, order="C")
+    if rows.shape != (count, width):
+        raise ValueError(f"{name} must have shape {(count, width)}, {each} in the row of each run, got {rows.shape}")
+    bad = np.argwhere(~np.isfinite(rows))
+    if bad.size:
+        row, column = bad[0].tolist()
+        raise ValueError(f"{name} must be finite, got {rows[row, column]} in run {row}, column {column}")
+    return rows
+
+
+def _gaps(system: System, gaps: ArrayLike | None, count: int) -> Array:
+    """(k, m) gaps of each run; no rows if all have those of the system."""
+    if gaps is None:
+        return np.empty((0, 0))
+    rows: Array = _rows("gaps", gaps, count, len(system.contacts), "that of each contact")
+    return rows
+
+
+def _factors(system: System, factors: ArrayLike | None, count: int) -> Any:
+    """(k, p) complex factors of the loads, None without."""
+    return (
+        None if factors is None else _rows("factors", factors, count, len(system.loads), "that of each load", complex)
+    )
+
+
+def _of_tones(factors: Any, engine: Engine) -> Any:
+    """(k, tones) complex factors of the tones; ValueError for loads that are not made of tones alone."""
+    if factors is None:
+        return None
+    for load in np.unique(engine.problem.table_load):
+        bad = np.flatnonzero(factors[:, load] != 1.0)
+        if bad.size:
+            given = f"got {factors[bad[0], load]} in run {bad[0]}"
+            raise ValueError(
+                f"factors: load {load} is sampled or at resonance, so its factor must be 1, {given}; "
+                "scale its signal and call once for each amplitude"
+            )
+    return factors[:, engine.prepared.tone_load]
 
 
 def _products(matrix: Array, rows: Array) -> Array:

@@ -89,6 +89,48 @@ def test_long_runs_with_more_contacts_than_the_log_holds_and_more_steps_than_one
     np.testing.assert_allclose(found.peak_indentation, np.repeat((1.25e-9 * q_dot**2) ** 0.4, 2, axis=1), rtol=1e-5)
 
 
+def with_factor(signal, factor):
+    """A tone times r e^{iφ}."""
+    return replace(signal, amplitude=signal.amplitude * abs(factor), phase=signal.phase + np.angle(factor))
+
+
+@pytest.mark.parametrize("stops", [1, 3])
+def test_runs_over_gaps_amplitudes_and_phases_are_those_of_systems_of_their_own(stops):
+    rng, k = np.random.default_rng([3, stops]), 12
+    contacts = [Contact(rng.normal(size=3), law, 1e-4) for law in LAWS[:stops]]
+    loads = [(rng.normal(size=3), fb.Harmonic(float(rng.uniform(5.0, 50.0)), omega)) for omega in (40.0, 170.0)]
+    system = System.modal([30.0, 200.0, 700.0], [0.02, 0.01, 0.03], contacts, [*loads, (rng.normal(size=3), Wobble())])
+    q, q_dot = 1e-4 * rng.normal(size=(k, 3)), 0.1 * rng.normal(size=(k, 3))
+    gaps, turn = rng.uniform(-1e-4, 1e-3, (k, stops)), np.exp(2j * np.pi * rng.uniform(size=(k, 2)))
+    factors = np.hstack((rng.uniform(0.0, 4.0, (k, 2)) * turn, np.ones((k, 1))))
+    moved, scaled = (integrate_many(system, q, q_dot, 0.2, gaps=gaps, factors=by, threads=2) for by in (None, factors))
+    for i in range(k):
+        own = system.like([replace(c, gap=gap) for c, gap in zip(contacts, gaps[i].tolist(), strict=True)])
+        run = integrate(own, q[i], q_dot[i], 0.2)
+        np.testing.assert_array_equal(moved.q[i], run.q[-1])  # the same tables
+        turned = [(vector, with_factor(signal, by)) for (vector, signal), by in zip(loads, factors[i], strict=False)]
+        run = integrate(own.like(loads=[*turned, system.loads[2]]), q[i], q_dot[i], 0.2)
+        assert scaled.contacts[i] == len(run.contacts)
+        np.testing.assert_allclose(scaled.q_dot[i], run.q_dot[-1], atol=1e-7 * np.abs(scaled.q_dot).max())
+    assert min(scaled.contacts.sum(), moved.contacts.sum()) > 2 * k
+    assert [contact.gap for contact in system.contacts] == [1e-4] * stops
+
+
+def test_what_gaps_and_factors_may_not_be_is_said_before_computing():
+    system = System.modal([30.0], [0.02], [Contact([1.0], Hertz(1e6), 1e-3)], [([1.0], Wobble())])
+    q = np.zeros((2, 1))
+    with pytest.raises(ValueError, match=r"gaps must have shape \(2, 1\), that of each contact .* got \(2,\)"):
+        integrate_many(system, q, q, 0.1, gaps=[1e-3, 2e-3])
+    with pytest.raises(ValueError, match="gaps must be finite, got nan in run 1, column 0"):
+        integrate_many(system, q, q, 0.1, gaps=[[1e-3], [math.nan]])
+    with pytest.raises(
+        ValueError, match=r"load 0 is sampled or at resonance, so its factor must be 1, got .* in run 1"
+    ):
+        integrate_many(system, q, q, 0.1, factors=[[1.0], [2.0]])
+    with pytest.raises(ValueError, match=r"factors must have shape \(2, 1\)"):
+        integrate_many(system, q, q, 0.1, factors=[1.0])
+
+
 def test_results_do_not_depend_on_threads_order_or_company():
     system = paper_scene().reduce(2).system
     rng = np.random.default_rng(5)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from sliders import Slider
 
-from contacts import Hertz, KelvinVoigt
+from contacts import Hertz, KelvinVoigt, Polynomial
 from contacts.memory import BoucWen, Coulomb, Iwan, Jenkins, WaltonBraun
 from fembeam import Harmonic
 from solvers import Contact, DormandPrince, Exponential, Parameter, System, integrate
@@ -117,6 +117,60 @@ def test_tangent_by_the_slider():
     found = end(system, x, 0.02, memory=[begin], tangent=True)[1].memory_tangent
     assert found.shape == (8, 8)
     assert abs(found[:3, 7] - wanted).max() < 1e-7 * abs(wanted).max()
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-5, 1e-6, 1e-7, 1e-8])
+def test_a_landing_off_by_rounding_is_not_passed_again(rtol):
+    """A slow mass held by large forces turns every half period: their rounding once made three reversals of one."""
+    held = element(Coulomb(0.67, 128.0, damping=2.31), -0.76), element(Coulomb(1.48, 131.7, damping=8.08), -0.76)
+    joint = element(Iwan([4.44, 3.33, 7.4], [0.644, 0.502, 0.359]), 0.906, gap=0.112)
+    smooth = element(BoucWen(2.11, 0.104, 1.0, 25.1, 11.5), -0.76, gap=0.0714)
+    system = System([[1.0]], [[0.01]], [[1.33**2]], [*held, joint, smooth])
+    rows = integrate(system, [0.42], [0.2], 6.0, method=Exponential(rtol)).transitions
+    reversals = rows.t[(rows.contact == 3) & (rows.border == 0)]
+    assert len(reversals) == 23
+    assert np.diff(reversals).min() > 0.25
+
+
+@pytest.mark.parametrize("stiffness", [4.0, 20.0])
+@pytest.mark.parametrize("rtol", [1e-4, 1e-7])
+def test_equal_sliders_let_go_together_in_a_step_that_begins_as_they_stick(stiffness, rtol):
+    """Margins that begin at zero, rise and fall to zero again within one step: five sliders do what their sum does."""
+    law = Iwan([stiffness / 5] * 5, [0.06] * 5)
+    run = integrate(
+        System([[1.0]], [[0.02]], [[1.0]], [element(law, -1.0)]), [0.0], [1.7], 10.0, method=Exponential(rtol)
+    )
+    rows = run.transitions
+    instants = np.unique(rows.t)
+    assert len(rows) == 5 * len(instants) >= 40
+    assert np.diff(instants).min() > 1e-3
+    assert abs(rows.force).max() < 0.3 * (1.0 + 1e-11)  # a landing ends within 1e-12 of the largest margin
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-8, 1e-10])
+def test_a_free_mass_pressed_at_rest_takes_few_steps(rtol):
+    """Between a yielded stop and a spring, without a stiffness of its own: its motion is the rounding of the forces."""
+    stop = element(WaltonBraun(1.5e5, 2e6, "forgotten"), 1.7, gap=-0.054)
+    hold, spring = element(Coulomb(64.7, 4.2e4, damping=570.0), 0.7), element(Polynomial([0.0, 0.0, 1.2e5]), 1.7)
+    system = System([[1.0]], [[0.02]], [[0.0]], [hold, stop, spring])
+    rest = integrate(system, [0.028], [0.0], 3.0, method=DormandPrince(1e-10))
+    assert abs(rest.q_dot[-1, 0]) < 1e-10
+    latched = [numbers if numbers.size else None for numbers in rest.memory]
+    run = integrate(
+        system, rest.q[-1], rest.q_dot[-1], 0.03, method=Exponential(rtol), memory=latched, progress=few_steps()
+    )
+    assert run.cost.steps < 20_000
+    assert abs(run.q - rest.q).max() < 1e-12
+
+
+def few_steps():
+    """A callback that ends a run after 20 000 steps."""
+    left = iter(range(1))
+
+    def stop(_):
+        assert next(left, None) is not None, "it takes ever shorter steps"
+
+    return stop
 
 
 def test_a_yielding_stop_logs_its_contacts():

@@ -12,7 +12,7 @@ import solvers.branches.walk
 import solvers.orbits.shots
 from contacts import Hertz, KelvinVoigt, PiecewiseLinear, law
 from solvers import Contact, DormandPrince, OrbitError, System, branch
-from solvers.branches.bifurcations import Segment
+from solvers.branches.bifurcations import Arc
 from solvers.branches.continuation import BranchStatus
 from solvers.orbits import delayed, flown
 
@@ -94,7 +94,7 @@ def test_subharmonic_branch_ends_at_a_flip():
 
 def test_a_guess_at_which_no_orbit_is_found_is_left_aside(monkeypatch):
     """Rounding may keep Newton's method above its tolerance at one guess: every other one is made to fail."""
-    at, asked = Segment.at, []
+    at, asked = Arc.at, []
 
     def failing(segment, s):
         if s not in segment.trials and asked.count(s) == 0:
@@ -103,7 +103,7 @@ def test_a_guess_at_which_no_orbit_is_found_is_left_aside(monkeypatch):
                 raise OrbitError("rounding")
         return at(segment, s)
 
-    monkeypatch.setattr(Segment, "at", failing)
+    monkeypatch.setattr(Arc, "at", failing)
     problem = Bilinear(0.96, zeta=0.05)
     found = branch(over(problem), (0.9, 0.96), problem.settled(), at=0.96, step=0.3).run()
     (flip,) = found.special

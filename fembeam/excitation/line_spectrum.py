@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fembeam.excitation.upsampling import FEWEST_POINTS, fine_grid
 from fembeam.support import number
 
 HERMITE_CONSTANT = 46080.0  # |error| <= h^6/46080 max|s^(6)| for the quintic Hermite interpolant: 6! * 2^6
 HERMITE_RMS = math.sqrt(math.factorial(13))  # rms of the error <= h^6/√13! rms of s^(6): see `LineSpectrum.nodes`
 HERMITE_MEAN = 100800.0  # mean of (x(1-x))³/720 over a cell is 1/100800: what the interpolant takes off a line
-_CHUNK = 2048
 EDGE = 0.25  # a band fades out over this part of lo below it and of hi above it
 MANY = 1 << 18  # terms of a sum, above which transforms are quicker
 FINEST_RTOL = 1e-13  # finer is below the rounding of the FFT
@@ -143,39 +143,25 @@ class LineSpectrum:
         Lines are raised beforehand by what the interpolant takes off them, (ω_k h)^6/100800: what is left of the error
         lies beyond the grid's own frequency, where no structure follows.
         """
-        from scipy.fft import irfft
-
         if not FINEST_RTOL <= rtol < 1:
             raise ValueError(f"rtol must lie in [{FINEST_RTOL:g}, 1), got {rtol!r}")
         _keep_freed_memory()
-        combs, n = self._combs(rtol)
-        dt = self.period / (combs * n)
-        count = math.ceil(duration / dt) + 1
-        wanted = math.ceil(count / combs)
-        values = np.empty((wanted, combs, 3))
-        # comb j holds the nodes j, j + combs, …: short transforms, of all three rows at once, that stay in the cache
-        half = np.zeros((3, n // 2 + 1), dtype=np.complex128)
-        rows, rate = half[:, self.first : self.top + 1], 1j * self.omega
-        np.multiply(self.amplitude, 0.5 + 0.5 / HERMITE_MEAN * (self.omega * dt) ** 6, out=rows[0])
-        np.multiply(rate, rows[0], out=rows[1])
-        np.multiply(rate, rows[1], out=rows[2])
-        turn = np.exp(dt * rate)
-        for comb in range(combs):
-            _interleave(irfft(half, n, norm="forward"), values[:, comb])
-            rows *= turn
-        nodes = values.reshape(-1, 3)[:count]
-        nodes[combs * n :] = nodes[: max(0, count - combs * n)]  # the last node may close the period
-        return dt, nodes
+        ratio, n = self._grids(rtol)
+        dt = self.period / (ratio * n)
+        square = (self.omega * dt) ** 2
+        raised = self.amplitude * (1.0 + square * square * square / HERMITE_MEAN)
+        return dt, fine_grid(raised, self.first, n, ratio, dt, math.ceil(duration / dt) + 1)
 
-    def _combs(self, rtol: float) -> tuple[int, int]:
-        """How many combs of how many nodes the period takes: each holds the highest line, together they keep rtol."""
+    def _grids(self, rtol: float) -> tuple[int, int]:
+        """Nodes per point of the transform, and its length."""
         from scipy.fft import next_fast_len
 
-        sixth = self.derivative(6).rms
-        widest = (HERMITE_RMS * rtol * self.rms / sixth) ** (1 / 6) if sixth > 0 else self.period
-        fewest, needed = 2 * self.top + 1, self.period / widest
-        combs = max(1, int(needed / fewest))
-        return combs, next_fast_len(max(math.ceil(needed / combs), fewest), real=True)
+        square, power = self.omega * self.omega, self.amplitude.real**2 + self.amplitude.imag**2
+        sixth = float(np.sum(power * (square * square * square) ** 2))
+        widest = (HERMITE_RMS * rtol) ** (1 / 6) * (float(np.sum(power)) / sixth) ** (1 / 12) if sixth > 0 else math.inf
+        fewest, needed = FEWEST_POINTS * self.top, self.period / widest
+        ratio = max(1, int(needed / fewest))
+        return ratio, next_fast_len(max(math.ceil(needed / ratio), fewest), real=True)
 
 
 def _equal_steps(t: NDArray[np.float64]) -> bool:
@@ -184,13 +170,6 @@ def _equal_steps(t: NDArray[np.float64]) -> bool:
         return False
     grid = t[0] + (t[-1] - t[0]) / (t.size - 1) * np.arange(t.size)
     return bool(np.abs(t - grid).max() <= 4 * np.finfo(float).eps * np.abs(t).max())
-
-
-def _interleave(rows: NDArray[np.float64], columns: NDArray[np.float64]) -> None:
-    """Write as much of rows (3, n) into columns (m, 3) as fits, piece by piece, within the cache."""
-    n = min(rows.shape[1], len(columns))
-    for i in range(0, n, _CHUNK):
-        columns[i : min(i + _CHUNK, n)] = rows[:, i : min(i + _CHUNK, n)].T
 
 
 def within(lines: LineSpectrum, band: tuple[float, float]) -> LineSpectrum:

@@ -4,6 +4,7 @@
 
 S is the one-sided power spectral density per rad/s, so that the variance over one period is Δω Σ S exactly.
 The lines are known, hence every derivative is exact: multiply by (i k Δω)^n.
+The phases φ_k are drawn from the seed in `noise_lines`.
 """
 
 from __future__ import annotations

@@ -49,7 +49,9 @@ class NoiseLines:
     def _lines(self) -> LineSpectrum:
         """The lines of this signal, drawn from the seed."""
         phase = np.random.default_rng(self.seed).uniform(0.0, 2 * math.pi, self.omega.size)
-        amplitude = np.sqrt(2 * self._spacing * self._density(self.omega)) * np.exp(1j * phase)
+        size, amplitude = np.sqrt(2 * self._spacing * self._density(self.omega)), np.empty(phase.size, np.complex128)
+        np.multiply(size, np.cos(phase), out=amplitude.real)  # in half the time of exp(iφ)
+        np.multiply(size, np.sin(phase), out=amplitude.imag)
         lines = LineSpectrum(self._spacing, self._span[0], amplitude).derivative(self.order)
         lines.amplitude.flags.writeable = False
         return lines

@@ -96,7 +96,7 @@ class Branch(Printed):
 
     @property
     def special(self) -> list[Orbit]:
-        """Folds, flips, Neimark–Sacker, branch, grazing and stick points."""
+        """Folds, flips, Neimark–Sacker, branch, grazing, stick, floor and merging points."""
         return [one for one in self.orbits if one.mark]
 
     @property
@@ -108,7 +108,7 @@ class Branch(Printed):
     def ends(self) -> list[tuple[Orbit, str]]:
         """The last orbit of each direction, and in words how it ended."""
         pairs = zip(self.found.walks, self.found.status, strict=False)
-        return [(self._orbit(arm.orbits[-1]), status.value) for arm, status in pairs]
+        return [(self._orbit(walk.orbits[-1]), status.value) for walk, status in pairs]
 
     @property
     def parameter(self) -> Vector:

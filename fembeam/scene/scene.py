@@ -228,7 +228,8 @@ class Scene:
         if missing or isinstance(self.base, type):
             raise TypeError(f"base must be a motion y(t) that knows its derivatives, got {self.base!r} without "
                             f"{' and '.join(missing) or 'values'} in Scene; use Harmonic, Multisine, BandNoise, "
-                            "Record, Pulse, Step, or an object with __call__(t) and derivative(order)")  # fmt: skip
+                            "Record, Pulse, Step, SineSweep, or an object with __call__(t) and "
+                            "derivative(order)")  # fmt: skip
         self.base.derivative(2)
 
     def _check_conflicts(self) -> None:

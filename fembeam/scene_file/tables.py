@@ -188,7 +188,7 @@ class TableReader:
         return self.choose(kind.constructors(), table, where, kind.key, kind.default)
 
     def check_keys(self, table: Table, valid: Sequence[str], where: str, what: str) -> None:
-        """Every key is a valid one; the nearest one is named otherwise."""
+        """Every key is a valid one, else "unknown key 'mas'; did you mean 'mass'?"."""
         for key in table:
             if key not in valid:
                 self.fail(where, f"unknown {what} {key!r}{nearest(key, valid)} (valid: {listed(valid)})")

@@ -91,17 +91,6 @@ class Estimate:
             ratio = np.where(error == 0.0, 0.0, error / size)
         return float(np.max(np.where(np.isnan(ratio), math.inf, ratio), initial=0.0))
 
-    def exceeds(self, other: Estimate, factor: float = 1.0, errors: float = 4.0) -> bool:
-        """Whether value > factor * other by more than so many standard errors of the difference; NaN never does.
-
-        Examples
-        --------
-        >>> Estimate.of_mean([4.0, 5.0, 6.0]).exceeds(Estimate.of_mean([0.9, 1.0, 1.1]), factor=2.0)
-        True
-        """
-        error = math.hypot(self.standard_error, factor * other.standard_error)
-        return bool(self.value - factor * other.value > errors * error)
-
     def interval(self, confidence: float = 0.95) -> tuple[Any, Any]:
         """Bounds of the confidence interval, by Student's t with batches - 1 degrees of freedom.
 

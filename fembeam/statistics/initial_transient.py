@@ -69,7 +69,8 @@ def settling(x: ArrayLike, dt: float, memory: float) -> Settling:
             f"settling needs {FEWEST_BATCHES} batches of {memory:g} s, got {samples.size * step:g} s; simulate longer"
         )
     parts = samples[: count * length].reshape(count, length)
-    means = [(parts - samples.mean()).mean(axis=1), ((parts - samples.mean()) ** 2).mean(axis=1)]
+    parts = parts - parts[count // 2 :].mean()  # of what is left in any case: a large start would hide the rest
+    means = [parts.mean(axis=1), (parts**2).mean(axis=1)]
     cut = max(_truncation(z) for z in means)
     drift = max(_drift(z[cut:]) for z in means)
     return Settling(cut * length * step, drift, cut < count // 2 and drift < AGREEMENT)
@@ -78,7 +79,8 @@ def settling(x: ArrayLike, dt: float, memory: float) -> Settling:
 def _truncation(z: NDArray[np.float64]) -> int:
     """Batches to leave out, at most half of them."""
     left = len(z) - np.arange(len(z) // 2 + 1)
-    first, second = (np.cumsum((z - z.mean())[::-1] ** k)[::-1][: left.size] / left for k in (1, 2))
+    centred = z[::-1] - z[len(z) // 2 :].mean()
+    first, second = (np.cumsum(centred**k)[::-1][: left.size] / left for k in (1, 2))
     return int(np.argmin((second - first**2) / left))
 
 

@@ -6,6 +6,8 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 import solvers
 from fembeam.study.execution.executors import spread
 from fembeam.study.measure import Case, Measured, Plan, measure
@@ -18,8 +20,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from fembeam.scene import Scene
-
-import numpy as np
 
 RUNGS = ((1, 2, 3, 4, 6, 8), (12, 16), (24, 32), (48, 64), (96, 128))
 TIGHT = 1e-10  # rtol of all models while modes are counted
@@ -52,7 +52,7 @@ class _Search:
         raise NotMetError(self._failure(rejected))
 
     def _rungs(self) -> list[list[int]]:
-        """Counts to be tried, in batches, up to twice `most` and as many as the meshes have."""
+        """Counts to be tried, in batches, up to twice `most`."""
         return [batch for rung in RUNGS if (batch := [n for n in rung if n <= max(2 * self.most, 2)])]
 
     def _measured(self, choices: Sequence[Choice]) -> list[Measured]:

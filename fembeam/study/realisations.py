@@ -37,14 +37,16 @@ def child(seed: Seed, index: int) -> np.random.SeedSequence:
     return np.random.SeedSequence(parent.entropy, spawn_key=(*parent.spawn_key, index))
 
 
-def renewed(model: Model, seed_of: Callable[[int, Seed], Seed]) -> Model:
-    """The model with the seed of its noise number j replaced by seed_of(j, seed)."""
+def renewed(
+    model: Model, seed_of: Callable[[int, Seed], Seed], then: Callable[[Any], Any] = lambda signal: signal
+) -> Model:
+    """The model with the seed of its noise number j replaced by seed_of(j, seed), and every signal by then(signal)."""
     places = {seed_key(seed): j for j, seed in enumerate(noises(model))}
 
     def change(signal: Any) -> Any:
         if not hasattr(signal, "seed"):
-            return signal
-        return replace(signal, seed=seed_of(places[seed_key(signal.seed)], signal.seed))
+            return then(signal)
+        return then(replace(signal, seed=seed_of(places[seed_key(signal.seed)], signal.seed)))
 
     return model.under(with_signals(model.scene, change))
 
@@ -54,9 +56,9 @@ def realisation(model: Model, seed: Seed) -> Model:
     return renewed(model, lambda j, _: child(seed, j))
 
 
-def shifted(signal: Any, time: float) -> Any:
-    """The signal from a later time on, for sums of tones; noise is left as it is."""
-    if not hasattr(signal, "tones") or time == 0.0:
-        return signal
-    omega, amplitude = signal.tones()
-    return Multisine(np.abs(amplitude), omega, np.angle(amplitude) + omega * time)
+def continued(signal: Any, time: float, duration: float) -> Any:
+    """The signal from a later time on, for sums of tones, good for the duration; noise is not moved."""
+    if hasattr(signal, "tones") and time > 0.0:
+        omega, amplitude = signal.tones()
+        signal = Multisine(np.abs(amplitude), omega, np.angle(amplitude) + omega * time)
+    return signal.lasting(duration) if hasattr(signal, "lasting") else signal

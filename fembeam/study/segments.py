@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,9 +13,9 @@ from numpy.typing import NDArray
 
 from fembeam.excitation import BandNoise
 from fembeam.model import Model, Run
-from fembeam.scene import signals_of, with_signals
+from fembeam.scene import signals_of
 from fembeam.statistics.initial_transient import FEWEST_BATCHES
-from fembeam.study.realisations import child, noises, renewed, shifted
+from fembeam.study.realisations import child, continued, noises, renewed
 
 Vector = NDArray[np.float64]
 
@@ -121,9 +122,10 @@ class Segments:
     def _run(self, duration: float) -> Run:
         """One segment from the state reached."""
         i = self.index + self.dropped
-        model = renewed(self.model, lambda _, seed: child(seed, i)) if self.repeats else self.model
-        scene = with_signals(model.scene, lambda signal: shifted(signal, self.time))
-        run = model.under(scene).simulate(duration, self.dt, self.state, self.solver)
+        model, later = self.model, partial(continued, time=self.time, duration=duration)
+        if self.repeats:  # all changes at once: each makes another scene and system
+            model = renewed(model, lambda _, seed: child(seed, i), later)
+        run = model.simulate(duration, self.dt, self.state, self.solver)
         if not run.complete:
             raise KeyboardInterrupt
         self.seconds += run.cost.seconds

@@ -167,8 +167,8 @@ def watched_by_default(model: Model) -> dict[str, Watch]:
     names = ["δ"] if count == 1 else [f"δ {i}" for i in range(count)]
     found: dict[str, Watch] = {name: partial(indentation, stop=i) for i, name in enumerate(names)}
     if not count and "tip" in at:
-        found["tip u"] = partial(displacement, z=at["tip"])
-    found["mid-beam u"] = partial(displacement, z=at["mid-beam"])
+        found["tip u"] = partial(displacement, shape=model.shapes(at["tip"]))
+    found["mid-beam u"] = partial(displacement, shape=model.shapes(at["mid-beam"]))
     return found
 
 
@@ -177,9 +177,9 @@ def indentation(run: Run, stop: int) -> tuple[Vector, Vector]:
     return run.indentation(stop), run.indentation_rate(stop)
 
 
-def displacement(run: Run, z: float) -> tuple[Vector, Vector]:
-    """Displacement at z and its rate."""
-    return run.displacement(z), run.velocity(z)
+def displacement(run: Run, shape: Vector) -> tuple[Vector, Vector]:
+    """Displacement where the modes have these values (n,), and its rate."""
+    return run.q @ shape, run.q_dot @ shape
 
 
 def _settled(signals: list[Vector], piece: Segment, plan: Segments) -> Settling:

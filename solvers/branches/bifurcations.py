@@ -77,7 +77,7 @@ def _is_at(orbit: Orbit, name: str) -> bool:
 
 
 @dataclass(eq=False)
-class Segment:
+class Arc:
     """The part of a branch between two neighbouring points; every orbit found on it improves the next guess.
 
     Branch minus the cubic through both points and tangents is s² (way - s)² times a smooth function, interpolated here.
@@ -142,46 +142,46 @@ def between(a: Point, b: Point, way: float, before: tuple[Point, float] | None =
 
     ``before`` is the point before a and the way from it: the three together may tell of two special points on the way.
     """
-    segment = Segment(a, b, way)
-    found = list(nonsmooth_points(segment))
-    places = [0.0, *sorted(place for place, _ in found or _dips(segment, before)), way]
+    arc = Arc(a, b, way)
+    found = list(nonsmooth_points(arc))
+    places = [0.0, *sorted(place for place, _ in found or _dips(arc, before)), way]
     for begin, end in pairwise(places):
-        found += _roots(segment, begin, end)
+        found += _roots(arc, begin, end)
     return [orbit for _, orbit in sorted(found, key=lambda pair: pair[0])]
 
 
-def _roots(segment: Segment, begin: float, end: float) -> Iterator[tuple[float, Orbit]]:
+def _roots(arc: Arc, begin: float, end: float) -> Iterator[tuple[float, Orbit]]:
     """(arclength, orbit) of all zeros of test functions that the signs at both ends tell of."""
-    before, after = segment.indicators(begin), segment.indicators(end)
+    before, after = arc.indicators(begin), arc.indicators(end)
     names = [name for name in before if before[name] * after[name] < 0.0]
     names = [name for name in names if min(abs(before[name]), abs(after[name])) > ROUNDING]
     if "fold" in names and "branch point" in names:
         names.remove("branch point")
     for name in names:
-        pair = _root(segment, begin, end, name)
+        pair = _root(arc, begin, end, name)
         if pair is not None:
             yield pair
 
 
-def _dips(segment: Segment, before: tuple[Point, float] | None) -> Iterator[tuple[float, Orbit]]:
+def _dips(arc: Arc, before: tuple[Point, float] | None) -> Iterator[tuple[float, Orbit]]:
     """(arclength, orbit) where a test function changes its sign twice on the way, by a parabola through three."""
     if before is None:
         return
-    first, begin, end = (indicators_at(point) for point in (before[0], segment.a, segment.b))
+    first, begin, end = (indicators_at(point) for point in (before[0], arc.a, arc.b))
     for name in ("flip", "neimark-sacker"):
         f = begin[name]
-        back, ahead = (f - first[name]) / before[1], (end[name] - f) / segment.way  # slopes on both sides
-        bend = (ahead - back) / (before[1] + segment.way)
-        slope = ahead - bend * segment.way
+        back, ahead = (f - first[name]) / before[1], (end[name] - f) / arc.way  # slopes on both sides
+        bend = (ahead - back) / (before[1] + arc.way)
+        slope = ahead - bend * arc.way
         place = -0.5 * slope / bend if bend else 0.0
-        if f * end[name] > 0.0 > f * (f + 0.5 * slope * place) and 0.0 < place < segment.way:
+        if f * end[name] > 0.0 > f * (f + 0.5 * slope * place) and 0.0 < place < arc.way:
             try:
-                yield place, segment.at(place)[1]
+                yield place, arc.at(place)[1]
             except OrbitError:
                 continue
 
 
-def _root(segment: Segment, begin: float, end: float, name: str) -> tuple[float, Orbit] | None:
+def _root(arc: Arc, begin: float, end: float, name: str) -> tuple[float, Orbit] | None:
     """(arclength, orbit) where a test function is zero; None where it only jumps."""
-    pair = zero(segment, begin, end, lambda s: segment.indicators(s)[name])
+    pair = zero(arc, begin, end, lambda s: arc.indicators(s)[name])
     return (pair[0], replace(pair[1], mark=name)) if pair is not None and _is_at(pair[1], name) else None

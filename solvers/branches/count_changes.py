@@ -12,7 +12,7 @@ from solvers.orbits import Orbit, OrbitError, latching_stops
 from solvers.problem import Array
 
 if TYPE_CHECKING:
-    from solvers.branches.bifurcations import Segment
+    from solvers.branches.bifurcations import Arc
 
 _AT = 1e-4  # entry rate less the floor, in units of it, at what passes for a point of this
 _MOST_TRIALS = 25
@@ -21,66 +21,66 @@ _MOST_TRIALS_OF_GRAZING = 60  # more than halving alone takes: with rounding lef
 _MOST_GRAZINGS = 4  # looked for between two points
 
 
-def zero(segment: Segment, begin: float, end: float, value: Callable[[float], float]) -> tuple[float, Orbit] | None:
+def zero(arc: Arc, begin: float, end: float, value: Callable[[float], float]) -> tuple[float, Orbit] | None:
     """(arclength, orbit) where a function of the arclength changes its sign; None where no orbit is found."""
     from scipy.optimize import brentq
 
     found: dict[float, tuple[float, Orbit]] = {}
 
     def nearby(s: float) -> float:
-        found[s] = segment.near(s, end - begin)
+        found[s] = arc.near(s, end - begin)
         return value(found[s][0])
 
     try:
         place, _ = brentq(
             *(nearby, begin, end),
-            **{"xtol": segment.sharpness(), "maxiter": _MOST_TRIALS, "full_output": True, "disp": False},
+            **{"xtol": arc.sharpness(), "maxiter": _MOST_TRIALS, "full_output": True, "disp": False},
         )
         return found[place]
     except (OrbitError, np.linalg.LinAlgError, IndexError, KeyError):
         return None
 
 
-def nonsmooth_points(segment: Segment) -> Iterator[tuple[float, Orbit]]:
+def nonsmooth_points(arc: Arc) -> Iterator[tuple[float, Orbit]]:
     """(arclength, orbit) where the number of contacts changes, and where an entry rate passes its law's floor."""
-    begin, first = 0.0, segment.a.orbit
+    begin, first = 0.0, arc.a.orbit
     for _ in range(_MOST_GRAZINGS):
-        if len(first.contacts) == len(segment.b.orbit.contacts):
+        if len(first.contacts) == len(arc.b.orbit.contacts):
             break
-        found = _grazing(segment, begin, first)
+        found = _grazing(arc, begin, first)
         if found is None:
             return
         near, place, grazed, behind, last = found
-        yield from _floors(segment, begin, near)
+        yield from _floors(arc, begin, near)
         yield place, replace(grazed, mark="grazing")
         begin, first = behind, last
-    yield from _floors(segment, begin, segment.way)
-    if len(segment.a.orbit.contacts) == len(segment.b.orbit.contacts):
-        yield from _sticks(segment)
+    yield from _floors(arc, begin, arc.way)
+    if len(arc.a.orbit.contacts) == len(arc.b.orbit.contacts):
+        yield from _sticks(arc)
 
 
-def _sticks(segment: Segment) -> Iterator[tuple[float, Orbit]]:
+def _sticks(arc: Arc) -> Iterator[tuple[float, Orbit]]:
     """(arclength, orbit) where the number of transitions changes."""
-    begin, first = 0.0, segment.a.orbit
+    begin, first = 0.0, arc.a.orbit
     for _ in range(_MOST_GRAZINGS):
-        if len(first.transitions) == len(segment.b.orbit.transitions):
+        if len(first.transitions) == len(arc.b.orbit.transitions):
             return
-        found = _grazing(segment, begin, first, "transitions")
+        found = _grazing(arc, begin, first, "transitions")
         if found is None:
             return
         _, place, at, begin, first = found
         yield place, replace(at, mark="stick")
 
 
-def _floors(segment: Segment, begin: float, end: float) -> Iterator[tuple[float, Orbit]]:
+def _floors(arc: Arc, begin: float, end: float) -> Iterator[tuple[float, Orbit]]:
     """(arclength, orbit) where an entry rate passes its law's floor, between two places of as many contacts."""
-    first, last = (_over_floor(segment.orbit(s)) for s in (begin, end))
+    first, last = (_over_floor(arc.orbit(s)) for s in (begin, end))
     for number in np.flatnonzero(first * last < 0.0) if len(first) == len(last) else ():
 
         def over(s: float, number: int = int(number)) -> float:
-            return float(_over_floor(segment.orbit(s))[number])
+            return float(_over_floor(arc.orbit(s))[number])
 
-        pair = zero(segment, begin, end, over)
+        pair = zero(arc, begin, end, over)
         if pair is not None and np.abs(_over_floor(pair[1])).min(initial=1.0) < _AT:  # else it only jumped
             yield pair[0], replace(pair[1], mark="floor")
 
@@ -96,21 +96,21 @@ def _over_floor(orbit: Orbit) -> Array:
 
 
 def _grazing(
-    segment: Segment, begin: float, first: Orbit, log: str = "contacts"
+    arc: Arc, begin: float, first: Orbit, log: str = "contacts"
 ) -> tuple[float, float, Orbit, float, Orbit] | None:
     """Where the number of contacts changes first after a place: place before, place, orbit, place and orbit behind.
 
     There the shallowest contact's indentation goes to zero, or the flight between two contacts that become one; of
     "transitions" the time between two.
     """
-    last, behind = segment.b.orbit, segment.way
+    last, behind = arc.b.orbit, arc.way
     more = _count(last, log) > _count(first, log)  # whether contacts are added on the way
     distance: Callable[[Orbit], float] = _shortest_phase
     if log == "contacts":
         distance = _distance(last, first) if more else _distance(first, last)
     near, near_orbit = begin, first
     known = [(behind, distance(last)) if more else (begin, distance(first))]  # on the side with more contacts
-    sharp = segment.sharpness()
+    sharp = arc.sharpness()
     for _ in range(_MOST_TRIALS_OF_GRAZING):
         grazed, bare = (behind, near) if more else (near, behind)
         place = 0.5 * (grazed + bare)
@@ -126,7 +126,7 @@ def _grazing(
             at, touching = (behind, last) if more else (near, near_orbit)
             return near, at, touching, behind, last
         try:
-            place, orbit = segment.near(place, behind - near)
+            place, orbit = arc.near(place, behind - near)
         except OrbitError:
             return None
         same = _count(orbit, log) == _count(first, log)

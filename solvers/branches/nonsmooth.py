@@ -84,23 +84,23 @@ def _with_joint(found: Sequence[tuple[float, NonsmoothPoint]]) -> Iterator[Nonsm
 def _slow_contacts(orbit: Orbit, stop: int) -> Iterator[tuple[float, NonsmoothPoint]]:
     """(closeness, nonsmooth point) of a stop's contacts that may pass the floor, vanish or merge with another."""
     log, floor = orbit.contacts, orbit.system.contacts[stop].law.entry_rate_floor
-    mine, memory = _in_order(log, stop), stop in latching_stops(orbit.system)
+    mine, latches = _in_order(log, stop), stop in latching_stops(orbit.system)
     for i, j in enumerate(mine):
         begin, end, speed = float(log.t_in[j]), float(log.t_out[j]), float(log.speed_in[j])
-        if memory and speed < _SLOW * floor:
+        if latches and speed < _SLOW * floor:
             sign = 1 if speed < floor else -1
             yield abs(speed / floor - 1.0), _nonsmooth("floor", stop, (begin,), sign, (0, -sign))
-        if memory and speed < floor and i and begin - log.t_out[mine[i - 1]] < end - begin:
+        if latches and speed < floor and i and begin - log.t_out[mine[i - 1]] < end - begin:
             times = float(log.t_out[mine[i - 1]]), *_after(orbit, mine, i)
             yield speed / floor, _nonsmooth("merging", stop, times, 1, (-1, -1))
-        elif speed < floor if memory else log.peak_indentation[j] < _SHALLOW * log.peak_indentation.max():
-            share = speed / floor if memory else log.peak_indentation[j] / log.peak_indentation.max()
-            yield share, _nonsmooth("grazing", stop, (0.5 * (begin + end),), -1, (-1, -int(memory)))
+        elif speed < floor if latches else log.peak_indentation[j] < _SHALLOW * log.peak_indentation.max():
+            share = speed / floor if latches else log.peak_indentation[j] / log.peak_indentation.max()
+            yield share, _nonsmooth("grazing", stop, (0.5 * (begin + end),), -1, (-1, -int(latches)))
 
 
 def _new_grazings(orbit: Orbit, stop: int) -> Iterator[tuple[float, NonsmoothPoint]]:
     """(closeness, nonsmooth point) of a stop's flights that come near it and contacts that nearly leave it."""
-    log, memory = orbit.contacts, stop in latching_stops(orbit.system)
+    log, latches = orbit.contacts, stop in latching_stops(orbit.system)
     contact, mine = orbit.system.contacts[stop], _in_order(log, stop)
     times = np.linspace(0.0, orbit.period, _SAMPLES + 1)
     method = replace(orbit.method, ledger=False)
@@ -113,8 +113,8 @@ def _new_grazings(orbit: Orbit, stop: int) -> Iterator[tuple[float, NonsmoothPoi
     at = times.copy()
     at[inner] += 0.5 * times[1] * (rising + falling) / apart  # summit of the parabola through three, where one is
     for k in inner[(rising > 0.0) & (falling <= 0.0) & (delta[inner] < 0.0) & (delta[inner] > -scale)]:
-        yield -delta[k] / scale, _nonsmooth("grazing", stop, (float(at[k]),), 1, (1, int(memory)))
-    for k in inner[(rising < 0.0) & (falling >= 0.0) & (delta[inner] > 0.0) & (delta[inner] < scale) & memory]:
+        yield -delta[k] / scale, _nonsmooth("grazing", stop, (float(at[k]),), 1, (1, int(latches)))
+    for k in inner[(rising < 0.0) & (falling >= 0.0) & (delta[inner] > 0.0) & (delta[inner] < scale) & latches]:
         i = int(np.searchsorted(log.t_in[mine], times[k])) - 1
         yield (
             delta[k] / scale,

@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from solvers.orbits import Border, Chain, Orbit, PeriodicProblem, extended, newton, orbit_of, weights
+from solvers.orbits import ArclengthCondition, Chain, Orbit, PeriodicProblem, extended, newton, orbit_of, weights
 from solvers.problem import Array
 
 _STEEP = 0.02  # parameter's share of the tangent below which the parameter is not what is held fixed
@@ -98,8 +98,8 @@ def corrected(a: Point, guess: Array, straight: bool, slope: bool = False) -> tu
 
     Raises OrbitError.
     """
-    border = None if straight else Border(a.metric, a.tangent)
-    return newton(a.problem, guess[:-1].reshape(a.chain.x.shape), float(guess[-1]), border, slope, _MOST)
+    condition = None if straight else ArclengthCondition(a.metric, a.tangent)
+    return newton(a.problem, guess[:-1].reshape(a.chain.x.shape), float(guess[-1]), condition, slope, _MOST)
 
 
 def moved(a: Point, guess: Array, straight: bool) -> Point:

@@ -146,13 +146,13 @@ def contact_forces(problem, stop, delta, delta_dot, entry_rate, force):
 
 @inlined
 def law_forces(problem, stop, n, delta, delta_dot, entry_rate, force):
-    """Forces of one stop at the first n indentations, none of which is negative."""
+    """Forces of one stop at the first n indentations, none of which is below its surface."""
     call_force(problem.law[stop], n, delta, delta_dot, entry_rate, problem.parameters[stop], (force,))
 
 
 @inner
 def contact_gradient(problem, stop, delta, delta_dot, entry_rate, by_delta, by_rate, by_entry):
-    """Derivatives of the forces by indentation, rate and entry rate; negative indentations are set to 0 in place."""
+    """Derivatives of the forces by indentation, rate and entry rate; those below its surface are raised to it."""
     for i in range(delta.size):
         delta[i] = max(delta[i], problem.knots[stop, 0])
     results = (by_delta, by_rate, by_entry)

@@ -38,6 +38,14 @@ def margins_in(problem, state, s, x, batch, out):
 
 
 @inner
+def margins_before(problem, state, s, delta, rate, time, batch, out):
+    """Margins a time before the present state, whose rates are known, from where it is now."""
+    batch[0] = delta - time * rate
+    batch[1] = rate - time * dot(problem.read_rate[s], state.rate, 2 * problem.k.size)
+    margins(problem, state, s, 1, batch[0:1], batch[1:2], out)
+
+
+@inner
 def renew(problem, state, s, j, delta, rate, log):
     """Renew what element s latches on its border j; a row of the log tells of it."""
     size, t = 2 * problem.k.size, state.now[T]

@@ -8,8 +8,11 @@ from __future__ import annotations
 
 import math
 
-from solvers.compiled.kernels import copy, inlined, inner
+import numpy as np
+
+from solvers.compiled.kernels import copy, dot, inlined, inner
 from solvers.compiled.simd import WIDTH, bit_pattern, load8, splat8, sqrt8, store8, sum8
+from solvers.compiled.state import rate_tolerance, surface_tolerance
 from solvers.compiled.sums import combine
 
 ORDER = 6
@@ -92,25 +95,41 @@ def add_signals(problem, response, x, t, signal_terms):
                 x[e] += signal_terms[j, i] * rows[i, e]
 
 
-@inner
-def cross_cell(problem, tables, x, cell):
-    """Move the state through a whole cell of the sampled signals."""
-    size = 2 * problem.k.size
-    propagate_blocks(problem, tables.cell[0], tables.cell[1], x)
-    for j in range(problem.table_dt.size):
-        r = 1.0 / problem.table_dt[j]
-        s0, s1, s2, c3, c4, c5 = _quintic(problem, j, cell)
-        s1, s2, c3, c4, c5 = r * s1, 2.0 * r**2 * s2, 6.0 * r**3 * c3, 24.0 * r**4 * c4, 120.0 * r**5 * c5
-        rows = tables.cell_signal[problem.table_load[j]]
-        for e in range(size):
-            x[e] += (
-                s0 * rows[0, e]
-                + s1 * rows[1, e]
-                + s2 * rows[2, e]
-                + c3 * rows[3, e]
-                + c4 * rows[4, e]
-                + c5 * rows[5, e]
-            )
+@inlined
+def split(problem, x, parts):
+    """Write p and v of the blocks into two rows of their own."""
+    n = problem.k.size
+    for b in range(n):
+        parts[0, b], parts[1, b] = x[b], x[n + b]
+
+
+@inlined
+def join(problem, parts, x):
+    """The reverse of `split`."""
+    n = problem.k.size
+    for b in range(n):
+        x[b], x[n + b] = parts[0, b], parts[1, b]
+
+
+@inlined
+def cross_cell(problem, tables, x, cell, result):
+    """Write into ``result`` p and v of the blocks a whole cell of the sampled signals after x, eight blocks at once.
+
+    The signals' part is summed first: it waits for no result of the cell before.
+    """
+    width = x.shape[1]
+    for i in range(0, width, WIDTH):
+        place, rate = splat8(0.0), splat8(0.0)
+        for j in range(problem.table_dt.size):
+            rows, node = tables.cell_signal[problem.table_load[j]], problem.table_start[j] + cell
+            for d in range(3):
+                begin, end = splat8(problem.table[node, d]), splat8(problem.table[node + 1, d])
+                place += begin * load8(rows, 2 * d * width + i) + end * load8(rows, (2 * d + 6) * width + i)
+                rate += begin * load8(rows, (2 * d + 1) * width + i) + end * load8(rows, (2 * d + 7) * width + i)
+        p, v, a, b = load8(x[0], i), load8(x[1], i), load8(tables.cell[0], i), load8(tables.cell[1], i)
+        power = load8(tables.block_k_c[0], i) * p + load8(tables.block_k_c[1], i) * v
+        store8(result[0], i, place + (a * p + b * v))
+        store8(result[1], i, rate + (a * v - b * power))
 
 
 @inner
@@ -142,24 +161,27 @@ def taylor_step(terms, x, span, size, weights, sums):
 
 
 @inner
-def fly_series(problem, x, t, span, term, signal_terms):
-    """Move the state x of a flight by ``span`` <= LONG_REACH/|λ|max within a cell: the series, y⁽ⁱ⁺¹⁾ from y⁽ⁱ⁾."""
-    n, weight = problem.k.size, 1.0
-    copy(x, term, 2 * n)
+def fly_series(problem, tables, x, t, span, signal_terms):
+    """Move p and v of the blocks by ``span`` <= SERIES_REACH/|λ|max within a cell: the series, y⁽ⁱ⁺¹⁾ from y⁽ⁱ⁾."""
+    width = x.shape[1]
     for j in range(problem.table_dt.size):
         signal_derivatives(problem, j, t, signal_terms[j])
-    for i in range(SERIES_TERMS - 1):
-        for b in range(n):
-            p, v = term[b], term[n + b]
-            term[b], term[n + b] = v, -problem.k[b] * p - problem.c[b] * v
-        if i < signal_terms.shape[1]:
-            for j in range(problem.table_dt.size):
-                load = problem.load[problem.table_load[j]]
-                for e in range(2 * n):
-                    term[e] += signal_terms[j, i] * load[e]
-        weight *= span / (i + 1.0)
-        for e in range(2 * n):
-            x[e] += weight * term[e]
+    for i in range(0, width, WIDTH):
+        p, v, weight = load8(x[0], i), load8(x[1], i), 1.0
+        k, c, place, rate = load8(tables.block_k_c[0], i), load8(tables.block_k_c[1], i), p, v
+        for order in range(SERIES_TERMS - 1):
+            by_p, by_v = splat8(0.0), splat8(0.0)  # of the signals, before what waits for the term before
+            if order < 6:
+                for j in range(problem.table_dt.size):
+                    rows, value = tables.load_rows[problem.table_load[j]], splat8(signal_terms[j, order])
+                    by_p += value * load8(rows, i)
+                    by_v += value * load8(rows, width + i)
+            p, v = by_p + v, by_v - k * p - c * v
+            weight *= span / (order + 1.0)
+            place += splat8(weight) * p
+            rate += splat8(weight) * v
+        store8(x[0], i, place)
+        store8(x[1], i, rate)
 
 
 @inlined
@@ -184,13 +206,13 @@ def motion_of_stop(tables, s, x):
 
 
 @inlined
-def acceleration_bound_split(tables, s, x):
-    """M: bound of |δ̈| of a stop from now on, without signals, from the blocks' p and v."""
-    bound = splat8(0.0)
+def weighted_norms(weights, tables, x):
+    """Σ_b weight_b ε_b of the blocks' energy norms, from p and v."""
+    total = splat8(0.0)
     for i in range(0, x.shape[1], WIDTH):
         p, v = load8(x[0], i), load8(x[1], i)
-        bound += load8(tables.acceleration_weight[s], i) * sqrt8(v * v + load8(tables.block_k_c[0], i) * p * p)
-    return sum8(bound)
+        total += load8(weights, i) * sqrt8(v * v + load8(tables.block_k_c[0], i) * p * p)
+    return sum8(total)
 
 
 @inlined
@@ -199,3 +221,64 @@ def energy_norms(problem, x, out):
     n = problem.k.size
     for b in range(n):
         out[b] = math.sqrt(x[n + b] * x[n + b] + problem.k[b] * x[b] * x[b])
+
+
+@inner
+def first_root(problem, terms, s, x, longest, values, slopes):
+    """First time in [0, longest] at which δ becomes positive on the Taylor polynomial; -1 if it does not.
+
+    ``values`` and ``slopes`` are scratch for the coefficients of the polynomial and of its derivative.
+    """
+    factorial = 1.0
+    for i in range(ORDER + 1):
+        values[i] = dot(problem.read[s], terms[i], 2 * problem.k.size) / factorial
+        factorial *= i + 1.0
+    values[0] -= problem.gap[s]
+    if abs(values[0]) <= surface_tolerance(problem, s, x):
+        values[0] = 0.0
+        if abs(values[1]) <= rate_tolerance(problem, s, x):
+            values[1] = 0.0  # at rest on the surface: the acceleration decides
+    if values[0] >= 0.0 and (values[1] > 0.0 or (values[1] == 0.0 and values[2] > 0.0)):
+        return 0.0
+    end = longest
+    if values[1] > 0.0 and _horner(values, longest)[1] < 0.0:  # δ has its maximum inside
+        for i in range(ORDER):
+            slopes[i] = (i + 1.0) * values[i + 1]
+        slopes[ORDER] = 0.0
+        end = _bisect(slopes, -1.0, longest, -0.5 * values[1] / values[2])
+    if not _horner(values, end)[0] > 0.0:
+        return -1.0
+    square = values[1] * values[1] - 4.0 * values[0] * values[2]
+    return _bisect(values, 1.0, end, -2.0 * values[0] / (values[1] + math.sqrt(max(square, 0.0))))
+
+
+@inlined
+def _horner(coefficients, x):
+    """Value and slope of a polynomial at x."""
+    value, slope = coefficients[ORDER], 0.0
+    for i in range(ORDER - 1, -1, -1):
+        slope = slope * x + value
+        value = value * x + coefficients[i]
+    return value, slope
+
+
+@inner
+def _bisect(coefficients, sign, b, guess):
+    """Sign change of a polynomial in [0, b], to rounding, by Newton's method with bisection as safeguard.
+
+    A step doubles the digits, so after one of 1e-11 the error is rounding. A double root is found to 1e-8 at best.
+    """
+    a, x = 0.0, guess if 0.0 < guess < b else b
+    for _ in range(60):
+        f, slope = _horner(coefficients, x)
+        if sign * f > 0.0:
+            b = x
+        else:
+            a = x
+        following = x - (f / slope if slope != 0.0 else np.inf)
+        if not a < following < b:
+            following = 0.5 * (a + b)
+        if abs(following - x) <= 1e-11 * x:
+            return following
+        x = following
+    return x

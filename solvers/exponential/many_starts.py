@@ -1,6 +1,8 @@
 """Many starts: one compiled call integrates one start after the other by `method.advance`.
 
-It calls the machine code of a single run through its address, so that all results are the same bit for bit.
+It calls the machine code of a single run through its address, so that all results are the same bit for bit. Runs may
+differ in gaps, which one array of the problem holds, and in amplitudes and phases of tones, which are states of the
+tones' blocks at t = 0: neither changes a table.
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ import numpy as np
 from numba import types
 
 from solvers.compiled.kernels import INTEGERS, MATRIX, PROBLEM, REAL, VECTOR, copy, entry, inner
-from solvers.compiled.packed import unpacker
+from solvers.compiled.packed import Packed, unpacker
 from solvers.compiled.state import (
     DIVERGED,
     DONE,
@@ -78,10 +80,7 @@ def _begin(problem, state, numbers, rest, parameters, start):
         copy(parameters[s], problem.parameters[s], parameters.shape[1])
     for i in range(rest.size):
         numbers[i] = rest[i]
-    own = start.size // 2
-    for b in range(own):
-        state.x[b] += start[b]
-        state.x[problem.k.size + b] += start[own + b]
+    copy(start, state.x, start.size)
 
 
 @inner
@@ -103,19 +102,19 @@ def _end(problem, state, scratch, code, x, count, number, peak):
 
 @entry(
     types.void(
-        *(_RUN, *[types.int64] * 5, VECTOR, VECTOR, MATRIX, MATRIX, INTEGERS, REAL, types.int64, REAL, REAL),
+        *(_RUN, *[types.int64] * 5, VECTOR, VECTOR, MATRIX, MATRIX, MATRIX, INTEGERS, REAL, types.int64, REAL, REAL),
         *(MATRIX, MATRIX, VECTOR, MATRIX, types.Array(types.int64, 2, "C"), MATRIX, _CUBE),
     )
 )
 def advance_many(
-    run, problem_at, tables_at, state_at, scratch_at, energy_tables_at, numbers, rest, parameters, starts, cursor,
+    run, problem_at, tables_at, state_at, scratch_at, energy_tables_at, numbers, rest, parameters, starts, gaps, cursor,
     t_end, budget, rtol, landing_reach, log, out, due, x, count, number, peak,
 ):  # fmt: skip
     """Integrate the starts of a stretch to ``t_end`` one after the other, for about ``budget`` steps altogether.
 
     ``run`` is `method.advance`; ``numbers`` is a workspace's memory and ``rest`` what it holds before a start is added,
-    ``parameters`` what the laws have latched then.
-    The last four are the arrays of `Outcomes`.
+    ``parameters`` what the laws have latched then, ``starts`` (k, 2N) and ``gaps`` (k, m) those of each run; without
+    rows in ``gaps`` all have those of the problem. The last four are the arrays of `Outcomes`.
     """
     problem, state, scratch = _problem(problem_at), _state(state_at), _scratch(scratch_at)
     spent = 0
@@ -123,6 +122,8 @@ def advance_many(
         i = cursor[NEXT]
         if not cursor[BEGUN]:
             _begin(problem, state, numbers, rest, parameters, starts[i])
+            if gaps.size:
+                copy(gaps[i], problem.gap, gaps.shape[1])
             cursor[BEGUN] = 1
         spent -= state.count[STEPS] + state.count[REJECTED]
         code = run(
@@ -140,16 +141,36 @@ def advance_many(
             cursor[NEXT], cursor[BEGUN] = i + 1, 0
 
 
+def whole_starts(engine: Engine, z: Array, factors: Any) -> Array:
+    """(k, 2N) states of all blocks at t = 0.
+
+    ``z`` (k, 2n) : those of the structure. ``factors`` (k, tones) : what multiplies the complex amplitude of each tone,
+    None for one. A tone's block holds p = cos Ωt and v = -Ω sin Ωt, so that a factor c makes it Re c and -Ω Im c.
+    """
+    prepared = engine.prepared
+    starts = np.repeat(prepared.rest[None], len(z), axis=0)
+    x = starts.reshape(len(z), 2, -1)
+    n, tones = z.shape[1] // 2, len(prepared.steady)
+    if factors is not None and tones:
+        x[:, 0, n:], x[:, 1, n:] = factors.real, -factors.imag * np.sqrt(engine.problem.k[n:])
+        x[:, :, :n] = -np.einsum("kj,ji->ki", factors, prepared.steady).real.reshape(len(z), 2, n)
+    x[:, :, :n] += z.reshape(len(z), 2, n)
+    return starts
+
+
 class Worker:
     """An engine that integrates stretches of the starts; each thread has one of its own."""
 
-    def __init__(self, engine: Engine, starts: Array, outcomes: Outcomes, budget: int) -> None:
-        self.engine, self.cursor = engine, np.zeros(3, dtype=np.int64)
+    def __init__(self, engine: Engine, starts: Array, gaps: Array, outcomes: Outcomes, budget: int) -> None:
+        self.engine, self.cursor, problem_at = engine, np.zeros(3, dtype=np.int64), engine.addresses[0]
+        if gaps.size:  # those of the problem are shared with other runs
+            self.own = Packed.of(engine.problem._replace(gap=engine.problem.gap.copy()), PROBLEM)
+            problem_at = self.own.address
         workspace, parameters = engine.workspace, engine.prepared.problem.value.parameters
         log = np.empty((max(256, 2 * len(engine.problem.gap)), COLUMNS))
         self.arguments = (
-            *(advance, *engine.addresses, NO_ENERGY_TABLES.address, workspace.numbers, workspace.rest, parameters),
-            *(starts, self.cursor),
+            *(advance, problem_at, *engine.addresses[1:], NO_ENERGY_TABLES.address),
+            *(workspace.numbers, workspace.rest, parameters, starts, gaps, self.cursor),
             *(engine.duration, budget, engine.method.rtol, engine.landing_reach, log, _NOWHERE, _NEVER, *outcomes),
         )
 

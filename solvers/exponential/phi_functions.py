@@ -18,6 +18,21 @@ def signal_responses(problem: Problem, h: Any) -> Any:
     return _polynomial_responses(*(array.tobytes() for array in (problem.k, problem.c, problem.load, h)))
 
 
+def quintic_responses(problem: Problem, h: float) -> Any:
+    """State change (L, 6, 2, N) over a time h by the quintic through s, s', s'' at its begin and at its end."""
+    scale, hermite = h ** np.arange(6.0), np.zeros((6, 6))
+    hermite[:3, :3] = np.diag((1.0, 1.0, 0.5))
+    hermite[3:] = [
+        [-10.0, -6.0, -1.5, 10.0, -4.0, 0.5],
+        [15.0, 8.0, 1.5, -15.0, 7.0, -1.0],
+        [-6.0, -3.0, -0.5, 6.0, -3.0, 0.5],
+    ]
+    factorial = np.array([math.factorial(i) for i in range(6)])
+    derivatives = hermite * np.tile(scale[:3], 2) * (factorial / scale)[:, None]
+    rows: Any = np.einsum("kd,lke->lde", derivatives, signal_responses(problem, np.array([h]))[0])
+    return rows.reshape(-1, 6, 2, len(problem.k))
+
+
 @lru_cache(maxsize=16)
 def _polynomial_responses(stiffnesses: bytes, dampings: bytes, load: bytes, steps: bytes) -> Any:
     """The same from the arrays' bytes: φ-functions by Taylor series and doubling."""

@@ -30,7 +30,7 @@ def _arrays(*dimensions: int) -> list[Any]:
 
 TABLES = types.NamedTuple(
     [
-        *_arrays(1, 3, 4, 2, 3, 2, 3, 2, 2, 2, 2, 0, 0, 2, 1, 2),
+        *_arrays(1, 3, 4, 2, 4, 2, 3, 3, 2, 3, 2, 2, 2, 2, 0, 0, 2, 1, 2),
         *(*_arrays(1, 3, 1, 1, 2, 2, 2, 2, 3, 3, 3, 4, 3), INTEGERS, INTEGERS),
         *_arrays(5, 6, 5, 5, 5, 5, 3, 2, 2, 2, 2, 2, 4),
         *(VECTOR, INTEGERS, INTEGERS, MATRIX),
@@ -39,7 +39,7 @@ TABLES = types.NamedTuple(
 )
 SCRATCH = types.NamedTuple(
     [
-        *(*_arrays(1, 2, 2, 1, 1, 1, 1, 2, 3, 1, 3, 2, 1, 3, 2, 3, 1), INTEGERS, MATRIX),
+        *(*_arrays(1, 2, 2, 1, 1, 1, 1, 3, 3, 1, 3, 2, 1, 3, 2, 3, 1), INTEGERS, MATRIX),
         *(*_arrays(1, 1, 1, 1, 2, 1, 2, 1, 1, 1, 1, 1, 2, 1), INTEGERS),
         *(*_arrays(2, 1, 1, 1, 2, 2), INTEGERS, INTEGERS),
         *(*_arrays(2, 2, 1, 2, 3), INTEGERS, *_arrays(2, 3, 2)),
@@ -85,6 +85,8 @@ class Prepared(NamedTuple):
     back: Array  # (2n, 2N): [q, q̇] from the state of all blocks
     layout: Layout  # of State and Scratch
     rest: Array  # state at t = 0: the tones' blocks, and minus the steady response of the structure's blocks
+    steady: Any  # (tones, 2n) complex amplitudes of the steady response to each tone
+    tone_load: Any  # (tones,) the load each belongs to
     spare_workspaces: list[Workspace]  # of runs that are over
     kept: Memo  # tables of the energy balance by the spacing of outputs
 
@@ -207,7 +209,7 @@ class _SharedTables:
         fill_tones(tables.value, problem.value, self.tones, self.series)
         rest = among_tones(-response.real.sum(axis=0), self.tones)
         rest[n : n + self.tones] = 1.0
-        return Prepared(problem, tables, back, self.layout, rest, [], Memo())
+        return Prepared(problem, tables, back, self.layout, rest, response, forcing.tone_load, [], Memo())
 
     def _tables(self, forcing: Forcing, turn: Array) -> Packed:
         """Tables that know the signals made of tones, Re(a e^{iΩt}) = Re a · p + Im a/Ω · v; ``turn`` is 1/Ω."""
@@ -245,7 +247,7 @@ def _layout(stops: int, loads: int, blocks: int, signals: int, borders: int, poo
     rows = size if pool else 0
     scratch = [
         *((padded(width),), (SERIES_TERMS, padded(size)), (signals, 6), (SERIES_TERMS,), (blocks,), (loads,), (stops,)),
-        (2, padded(blocks)),
+        (3, 2, padded(blocks)),
         *((stops, 2, S), (S,), (stops, 2, S), (stops + loads, S), (S,), (stops, 2, 8), (stops, S), (stops, 3, S)),
         *((stops * S,), (stops * S,), (START + 1, padded(width + 2))),
         *([(stops,)] * 4),

@@ -7,6 +7,14 @@ distance g = -δ that opens at the rate v = -δ̇ cannot be reached before
 
 so steps of at most τ are safe. Close to a contact τ tends to the root from below; within reach of a Taylor
 polynomial of order 6 the root is found on that polynomial, which is exact to rounding there.
+
+Under sampled signals whole cells are crossed first. Within a cell of length h, δ exceeds the larger of its values at
+both ends by at most the error of linear interpolation, which one bound e covers for the next m cells:
+
+    e = Σ_b W_b ε_b + |s|max (A + m G)
+
+`tables.cell_errors` derives it; |s|max is the largest Bézier coefficient of the quintics on these cells. No stop is
+reached on a cell at whose ends δ + e < 0. Only where this does not hold are steps of length τ taken.
 """
 
 from __future__ import annotations
@@ -16,38 +24,40 @@ import math
 import numpy as np
 
 from solvers.compiled.kernels import copy, dot, indentation, inlined, inner, merged
-from solvers.compiled.state import SAMPLED, STEPS, T, rate_tolerance, surface_tolerance
+from solvers.compiled.state import SAMPLED, STEPS, T
 from solvers.exponential.energy.balance import account_output, account_state
 from solvers.exponential.flight import (
-    ORDER,
     SERIES_REACH,
-    acceleration_bound_split,
     add_signals,
     cell_of,
     cross_cell,
     energy_norms,
+    first_root,
     fly_series,
+    join,
     level_within,
     motion_of_stop,
     propagate_blocks,
     propagate_split,
+    split,
     taylor_step,
     taylor_terms,
+    weighted_norms,
 )
 
 _REFRESH = 8  # flight steps between two evaluations of the bound
+_GROUP = 8  # cells that one bound covers: with more it grows, with fewer it is evaluated more often
 
 
 @inner
-def _signal_bound(problem, j, cell):
-    """Bound of |s| on a cell: the largest Bézier coefficient of the quintic."""
-    dt = problem.table_dt[j]
-    row = problem.table_start[j] + cell
-    a, b = problem.table[row], problem.table[row + 1]
-    da, db = 0.2 * dt * a[1], 0.2 * dt * b[1]
-    bound = max(abs(a[0]), abs(b[0]), abs(a[0] + da), abs(b[0] - db))
-    bound = max(bound, abs(a[0] + 2.0 * da + 0.05 * dt * dt * a[2]))
-    return max(bound, abs(b[0] - 2.0 * db + 0.05 * dt * dt * b[2]))
+def _bound_signals(problem, cell, count, bounds):
+    """Bounds of |s| on some cells: each Bézier coefficient of a quintic is at most |s| + 2h/5 |s'| + h²/20 |s''|."""
+    for j in range(problem.table_dt.size):
+        first, bounds[j] = problem.table_start[j] + cell, 0.0
+        slope, bend = 0.4 * problem.table_dt[j], 0.05 * problem.table_dt[j] ** 2
+        for row in range(first, first + count + 1):
+            s, rate, curvature = problem.table[row, 0], problem.table[row, 1], problem.table[row, 2]
+            bounds[j] = max(bounds[j], abs(s) + slope * abs(rate) + bend * abs(curvature))
 
 
 @inlined
@@ -71,67 +81,6 @@ def _safe(g, v, bound):
     return (v + root) / bound if v >= 0.0 else 2.0 * max(g, 0.0) / (root - v)
 
 
-@inner
-def _first_root(problem, terms, s, x, longest, values, slopes):
-    """First time in [0, longest] at which δ becomes positive on the Taylor polynomial; -1 if it does not.
-
-    ``values`` and ``slopes`` are scratch for the coefficients of the polynomial and of its derivative.
-    """
-    factorial = 1.0
-    for i in range(ORDER + 1):
-        values[i] = dot(problem.read[s], terms[i], 2 * problem.k.size) / factorial
-        factorial *= i + 1.0
-    values[0] -= problem.gap[s]
-    if abs(values[0]) <= surface_tolerance(problem, s, x):
-        values[0] = 0.0
-        if abs(values[1]) <= rate_tolerance(problem, s, x):
-            values[1] = 0.0  # at rest on the surface: the acceleration decides
-    if values[0] >= 0.0 and (values[1] > 0.0 or (values[1] == 0.0 and values[2] > 0.0)):
-        return 0.0
-    end = longest
-    if values[1] > 0.0 and _horner(values, longest)[1] < 0.0:  # δ has its maximum inside
-        for i in range(ORDER):
-            slopes[i] = (i + 1.0) * values[i + 1]
-        slopes[ORDER] = 0.0
-        end = _bisect(slopes, -1.0, longest, -0.5 * values[1] / values[2])
-    if not _horner(values, end)[0] > 0.0:
-        return -1.0
-    square = values[1] * values[1] - 4.0 * values[0] * values[2]
-    return _bisect(values, 1.0, end, -2.0 * values[0] / (values[1] + math.sqrt(max(square, 0.0))))
-
-
-@inlined
-def _horner(coefficients, x):
-    """Value and slope of a polynomial at x."""
-    value, slope = coefficients[ORDER], 0.0
-    for i in range(ORDER - 1, -1, -1):
-        slope = slope * x + value
-        value = value * x + coefficients[i]
-    return value, slope
-
-
-@inner
-def _bisect(coefficients, sign, b, guess):
-    """Sign change of a polynomial in [0, b], to rounding, by Newton's method with bisection as safeguard.
-
-    A step doubles the digits, so after one of 1e-11 the error is rounding. A double root is found to 1e-8 at best.
-    """
-    a, x = 0.0, guess if 0.0 < guess < b else b
-    for _ in range(60):
-        f, slope = _horner(coefficients, x)
-        if sign * f > 0.0:
-            b = x
-        else:
-            a = x
-        following = x - (f / slope if slope != 0.0 else np.inf)
-        if not a < following < b:
-            following = 0.5 * (a + b)
-        if abs(following - x) <= 1e-11 * x:
-            return following
-        x = following
-    return x
-
-
 @inlined
 def _target(tables, t, first, second, t_end):
     """Where a step must end: at an output time unless that is near enough to be evaluated from the step's start."""
@@ -141,15 +90,17 @@ def _target(tables, t, first, second, t_end):
 
 
 @inner
-def _sample(problem, tables, energy_tables, state, scratch, t, out, due):
-    """Write the outputs that are due within the step that began at t with the state in ``scratch.x_new``."""
+def _sample(problem, tables, energy_tables, state, scratch, x, t, out, due):
+    """Write the outputs that are due within the step that began at t with the blocks' p and v in x, which is moved."""
+    size = 2 * problem.k.size
     while due[state.count[SAMPLED]] < state.now[T]:
         wanted = due[state.count[SAMPLED]]
         parts = max(1, int(np.ceil(tables.fastest * (wanted - t) / SERIES_REACH)))
         for i in range(parts):
             span = (wanted - t) / parts
-            fly_series(problem, scratch.x_new, t + i * span, span, scratch.terms[0], scratch.signal_terms)
-        copy(scratch.x_new, out[state.count[SAMPLED]], state.x.size)
+            fly_series(problem, tables, x, t + i * span, span, scratch.signal_terms)
+        join(problem, x, out[state.count[SAMPLED]])
+        copy(state.x[size:], out[state.count[SAMPLED], size:], state.x.size - size)
         if energy_tables.active > 0.0:
             account_output(problem, tables, energy_tables, state, scratch, wanted, out[state.count[SAMPLED]])
         state.count[SAMPLED], t = state.count[SAMPLED] + 1, wanted
@@ -161,14 +112,13 @@ def _fly_tabulated(problem, tables, state, scratch, most, budget):
 
     p and v of the blocks are in two arrays, eight numbers a vector. Returns (time flown, steps, safe time left).
     """
-    n, x, flown, count = problem.k.size, scratch.split_state, 0.0, 0
-    for b in range(n):
-        x[0, b], x[1, b] = state.x[b], state.x[n + b]
+    x, flown, count = scratch.split_state[0], 0.0, 0
+    split(problem, state.x, x)
     while True:
         span = most - flown
         for s in range(problem.gap.size):
             if count % _REFRESH == 0:
-                scratch.per_stop[s] = acceleration_bound_split(tables, s, x)
+                scratch.per_stop[s] = weighted_norms(tables.acceleration_weight[s], tables, x)
             delta, rate = motion_of_stop(tables, s, x)
             span = min(span, _safe(problem.gap[s] - delta, -rate, scratch.per_stop[s]))
         if span < tables.flight_step[tables.flight_step.size - 1] or count >= budget:
@@ -176,9 +126,65 @@ def _fly_tabulated(problem, tables, state, scratch, most, budget):
         level = level_within(tables, span)
         propagate_split(tables, level, x)
         flown, count = flown + tables.flight_step[level], count + 1
-    for b in range(n):
-        state.x[b], state.x[n + b] = x[0, b], x[1, b]
+    join(problem, x, state.x)
     return flown, count, span
+
+
+@inlined
+def _bound_cells(problem, tables, scratch, x, cell, count):
+    """Set the errors e of all stops for some cells from here; returns whether a stop may be that near already."""
+    _bound_signals(problem, cell, count, scratch.signal_bounds)
+    for s in range(problem.gap.size):
+        error = weighted_norms(tables.cell_error[s], tables, x)
+        for j in range(problem.table_dt.size):
+            by_signal = tables.cell_error_signal[s, problem.table_load[j]]
+            error += scratch.signal_bounds[j] * (by_signal[0] + count * by_signal[1])
+        scratch.per_stop[s] = error
+    return _near(problem, tables, scratch, x)
+
+
+@inlined
+def _near(problem, tables, scratch, x):
+    """Whether any stop is nearer than its error e, or the state is not finite."""
+    near = False
+    for s in range(problem.gap.size):
+        near |= not motion_of_stop(tables, s, x)[0] + scratch.per_stop[s] < problem.gap[s]
+    return near
+
+
+@merged
+def _cross_cells(problem, tables, energy_tables, state, scratch, t_end, most, out, due):
+    """Cross whole cells as long as no stop is near; returns how many, about ``most`` at most."""
+    h, x, at, now, with_energy = problem.table_dt[0], scratch.split_state, 0, state.now, energy_tables.active > 0.0
+    begin, offset = cell_of(problem, now[T])
+    end = min(int(t_end / h), begin + most, problem.table_start[1] - problem.table_start[0] - 1)
+    cell, bounded = begin, begin
+    if abs(offset) < 1e-7 * h:
+        split(problem, state.x, x[0])
+        while cell < end:
+            if cell == bounded:
+                bounded = min(cell + _GROUP, end)
+                if _bound_cells(problem, tables, scratch, x[at], cell, bounded - cell):
+                    break
+            samples = due[state.count[SAMPLED]] < (cell + 1) * h
+            if samples and tables.fastest * h > SERIES_REACH:
+                break
+            cross_cell(problem, tables, x[at], cell, x[1 - at])
+            if _near(problem, tables, scratch, x[1 - at]):
+                break
+            cell += 1
+            if samples or with_energy:
+                join(problem, x[1 - at], state.x)
+                now[T] = min(cell * h, t_end)
+                _sample(problem, tables, energy_tables, state, scratch, x[at], (cell - 1) * h, out, due)
+                if with_energy:
+                    account_state(problem, tables, energy_tables, state, scratch)
+            at = 1 - at
+        if cell > begin:
+            join(problem, x[at], state.x)
+            now[T] = min(cell * h, t_end)
+            state.count[STEPS] += cell - begin
+    return cell - begin
 
 
 @inlined
@@ -197,22 +203,26 @@ def _safe_span(problem, tables, state, scratch, span, rest, renew):
 @merged
 def _fly_step(problem, tables, state, scratch, span, target, rest, offset, cell, dt_cell):
     """Move by up to ``span``: Taylor step that looks for roots, whole cell, or table. (time, stop reached or -1)."""
-    size, now, stop = 2 * problem.k.size, state.now, -1
+    size, now, stop, x = 2 * problem.k.size, state.now, -1, scratch.split_state
     sampled, shortest = problem.table_dt.size > 0, tables.flight_step[tables.flight_step.size - 1]
     if span < shortest:
         taylor_terms(problem, state.x, now[T], scratch.terms, scratch.signal_terms)
         h = min(shortest, target - now[T], rest)
         for s in range(problem.gap.size):
-            root = _first_root(problem, scratch.terms, s, state.x, h, scratch.values, scratch.trial)
+            root = first_root(problem, scratch.terms, s, state.x, h, scratch.values, scratch.trial)
             if root >= 0.0:
                 h, stop = root, s
         taylor_step(scratch.terms, state.x, h, size, scratch.values, scratch.stages[0])
     elif span == rest and abs(offset) < 1e-7 * dt_cell:
         h = rest
-        cross_cell(problem, tables, state.x, cell)
+        split(problem, state.x, x[0])
+        cross_cell(problem, tables, x[0], cell, x[1])
+        join(problem, x[1], state.x)
     elif sampled and tables.fastest * span <= SERIES_REACH:
         h = span
-        fly_series(problem, state.x, now[T], h, scratch.terms[0], scratch.signal_terms)
+        split(problem, state.x, x[0])
+        fly_series(problem, tables, x[0], now[T], h, scratch.signal_terms)
+        join(problem, x[0], state.x)
     else:
         level = level_within(tables, span)
         h = tables.flight_step[level]
@@ -226,8 +236,10 @@ def _fly_step(problem, tables, state, scratch, span, target, rest, offset, cell,
 def fly(problem, tables, energy_tables, state, scratch, t_end, budget, out, due):
     """Fly until a stop is reached (returns its index), the end (-1), or the budget is spent (-2)."""
     now, sampled, with_energy = state.now, problem.table_dt.size > 0, energy_tables.active > 0.0
-    dt_cell = problem.table_dt[0] if sampled else np.inf
-    for count in range(budget):
+    dt_cell, count = problem.table_dt[0] if sampled else np.inf, 0
+    while count < budget:
+        if sampled:
+            count += _cross_cells(problem, tables, energy_tables, state, scratch, t_end, budget - count, out, due)
         if due[state.count[SAMPLED]] <= now[T]:
             copy(state.x, out[state.count[SAMPLED]], state.x.size)
             if with_energy:
@@ -244,8 +256,7 @@ def fly(problem, tables, energy_tables, state, scratch, t_end, budget, out, due)
         if sampled:
             cell, offset = cell_of(problem, now[T])
             rest = max(dt_cell - offset, 1e-9 * dt_cell)
-            for j in range(problem.table_dt.size):
-                scratch.signal_bounds[j] = _signal_bound(problem, j, cell)
+            _bound_signals(problem, cell, 1, scratch.signal_bounds)
         # --- the time within which no stop can be reached
         if first == np.inf and not sampled:  # no output and no cell ends before
             flown, steps, span = _fly_tabulated(problem, tables, state, scratch, span, budget)
@@ -256,13 +267,14 @@ def fly(problem, tables, energy_tables, state, scratch, t_end, budget, out, due)
         else:
             span = min(span, rest)
             if first <= begin + span:
-                copy(state.x, scratch.x_new, state.x.size)
+                split(problem, state.x, scratch.split_state[2])
             span = _safe_span(problem, tables, state, scratch, span, rest, sampled or count % _REFRESH == 0)
         h, stop = _fly_step(problem, tables, state, scratch, span, target, rest, offset, cell, dt_cell)
         now[T] = target if now[T] + h >= target else now[T] + h
         state.count[STEPS] += 1
+        count += 1
         if first < now[T]:
-            _sample(problem, tables, energy_tables, state, scratch, begin, out, due)
+            _sample(problem, tables, energy_tables, state, scratch, scratch.split_state[2], begin, out, due)
         if with_energy and sampled and cell_of(problem, now[T])[0] != cell:
             account_state(problem, tables, energy_tables, state, scratch)
         if stop >= 0:

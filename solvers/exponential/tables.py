@@ -24,7 +24,7 @@ from solvers.compiled.state import parameters_of
 from solvers.compiled.sums import padded
 from solvers.exponential.block_tables import Blocks, blocks_of, filled
 from solvers.exponential.contact.nodes import S, gauss, node_sets_of, so_far
-from solvers.exponential.phi_functions import signal_responses
+from solvers.exponential.phi_functions import quintic_responses, signal_responses
 from solvers.exponential.responses import fill_propagators
 
 STIFFNESS, EXPONENT, FACTOR, DAMPING = range(4)  # of an inlined law
@@ -44,8 +44,11 @@ class Tables(NamedTuple):
     flight_step: Any  # (l,) s, falling
     flight_propagator: Any  # (l, 2, N padded): α, β of every block
     signal: Any  # (l, L, 6, 2N): state change by a signal t^k/k!
-    cell: Any  # (2, N): α, β over a whole cell of the sampled signals
-    cell_signal: Any  # (L, 6, 2N): state change over a cell
+    cell: Any  # (2, N padded): α, β over a whole cell of the sampled signals
+    cell_signal: Any  # (L, 6, 2, N padded): state change over a cell by s, s', s'' at its begin, then at its end
+    cell_error: Any  # (m, N padded): see `cell_errors`
+    cell_error_signal: Any  # (m, L, 2)
+    load_rows: Any  # (L, 2, N padded): state rate of p and v per unit of a signal
     block_k_c: Any  # (2, N padded): k in 1/s², c in 1/s
     stop_rows: Any  # (m, 4, N padded): the first two rows give δ + gap from p and v, the others δ̇
     acceleration_weight: Any  # (m, N padded): |δ̈| <= Σ weight × energy norm
@@ -136,7 +139,7 @@ TONE_TABLES = (
         "acceleration_weight",
         "rate_weight",
     ),
-    *("signal_rows", "power_rows", "loss_rows", "cell"),
+    *("signal_rows", "power_rows", "loss_rows", "cell", "cell_error"),
 )
 
 
@@ -155,21 +158,22 @@ def build(
     h, contact_h = _steps(omega, damping, tones)
     node_sets = node_sets_of(series)
     blocks = blocks_of(problem, tones, h, contact_h, node_sets)
+    cell_error, cell_error_signal = cell_errors(problem, dt_cell)
     return Tables(
         flight_step=h,
         flight_propagator=blocks.flight_propagator,
         signal=signal_responses(problem, h),
-        cell=_cell(problem, dt_cell),
-        cell_signal=signal_responses(problem, np.array([dt_cell]))[0],
+        cell=_in_eights(_cell(problem, dt_cell)),
+        cell_signal=_in_eights(quintic_responses(problem, dt_cell)),
+        cell_error=_in_eights(cell_error),
+        cell_error_signal=cell_error_signal,
+        load_rows=_in_eights(problem.load.reshape(-1, 2, size)),
         block_k_c=_in_eights(np.array([problem.k, problem.c])),
         stop_rows=_in_eights(np.concatenate((problem.read, problem.read_rate), axis=1).reshape(-1, 4, size)),
-        acceleration_weight=_in_eights(
-            np.abs(problem.read[:, :size]) * (omega + damping)
-            + np.abs(problem.read[:, size:]) * (problem.k + damping * (omega + damping))
-        ),
+        acceleration_weight=_in_eights(_acceleration_weight(problem)),
         rate_weight=np.abs(problem.read[:, :size]) + np.abs(problem.read[:, size:]) * (omega + damping),
         load_acceleration=problem.read_rate @ problem.load.T,
-        load_norm=np.sqrt(problem.load[:, size:] ** 2 + problem.k * problem.load[:, :size] ** 2),
+        load_norm=_load_norm(problem),
         fastest=fastest,
         own_blocks=float(size - tones),
         accelerance=-problem.read_rate @ problem.push.T,
@@ -221,6 +225,7 @@ def fill_tones(tables: Tables, problem: Problem, tones: int, series: tuple[tuple
         tables.stop_rows[:, 2 * i : 2 * i + 2, own:size] = rows.reshape(-1, 2, size)[:, :, own:]
     if problem.table_dt.size:
         fill_propagators(problem.k, problem.c, (own, size), problem.table_dt[:1], tables.cell[None])
+        tables.cell_error[:, own:size] = cell_errors(problem, problem.table_dt[0])[0][:, own:]
     blocks = Blocks(*(getattr(tables, name) for name in Blocks._fields))
     filled(blocks, problem, (own, size), tables.flight_step, tables.contact_step, node_sets_of(series))
 
@@ -257,6 +262,39 @@ def _ripple_weight(read: Any, omega: Any) -> Any:
     """(m, N): amplitude of δ per unit of an oscillating block's rate."""
     p, v = np.abs(read[:, : omega.size]), np.abs(read[:, omega.size :])
     return np.ascontiguousarray(p / np.where(omega > 0.0, omega, np.inf) + v)
+
+
+def _acceleration_weight(problem: Problem) -> Any:
+    """(m, N): amplitude of δ̈ per unit of a block's energy norm."""
+    size, omega, c = len(problem.k), np.sqrt(problem.k), problem.c
+    p, v = np.abs(problem.read[:, :size]), np.abs(problem.read[:, size:])
+    return p * (omega + c) + v * (problem.k + c * (omega + c))
+
+
+def _load_norm(problem: Problem) -> Any:
+    """(L, N): rate at which a unit of a signal can raise a block's energy norm."""
+    size = len(problem.k)
+    return np.sqrt(problem.load[:, size:] ** 2 + problem.k * problem.load[:, :size] ** 2)
+
+
+def cell_errors(problem: Problem, h: float) -> tuple[Any, Any]:
+    """Weights (m, N) and (m, L, 2) of a bound of how far δ is from its linear interpolant between the ends of a cell.
+
+    A block's share of δ differs from its interpolant by at most h²/8 max|δ̈_b|, and by at most twice its amplitude
+    r_b E_b, whichever is smaller. With E_b the largest energy norm, |δ̈_b| <= w_b E_b + |a_b s|, so that
+
+        error <= Σ_b W_b E_b + A |s|max,    W_b = min(w_b h²/8, 2 r_b),    A = |Σ_b a_b| h²/8
+
+    where A is the sum over the blocks whose first bound is taken. As dε_b/dt <= ν_b |s|, E_b <= ε_b + m h ν_b |s|max
+    within m cells; what the signal adds is |s|max (A + m G), G = h Σ W_b ν_b. Returned are W, then A and G.
+    """
+    bent = _acceleration_weight(problem) * (h * h / 8.0)
+    both = 2.0 * _ripple_weight(problem.read, np.sqrt(problem.k))
+    oscillates = (problem.k > 0.0) & (both < bent)
+    weight = np.where(oscillates, both, bent)
+    rate = np.where(np.tile(oscillates, 2), 0.0, problem.read_rate)
+    at_once = np.abs(rate @ problem.load.T) * (h * h / 8.0)
+    return weight, np.stack((at_once, h * weight @ _load_norm(problem).T), axis=2)
 
 
 def _in_eights(rows: Any) -> Any:

@@ -5,7 +5,7 @@
 with its Floquet multipliers. Imports: `integration` and the rooms below it. Begin with `shooting.orbit`.
 """
 
-from solvers.orbits.newton import Border, extended, newton, weights
+from solvers.orbits.newton import ArclengthCondition, extended, newton, weights
 from solvers.orbits.open_times import is_cut, latching_stops, open_begins
 from solvers.orbits.periodic_orbit import Orbit, OrbitError, at_zero, orbit_of
 from solvers.orbits.shooting import checked, checked_start, misfit, solved_chain
@@ -13,7 +13,7 @@ from solvers.orbits.shots import Chain, PeriodicProblem, delayed
 from solvers.orbits.whole_state import codes, counts, flown, run
 
 __all__ = [
-    "Border",
+    "ArclengthCondition",
     "Chain",
     "Orbit",
     "OrbitError",

@@ -45,7 +45,7 @@ def extended(matrix: Array, more: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Border:
+class ArclengthCondition:
     """The arclength condition: scaled by ``metric``, unknowns move only at right angles to ``tangent`` from the guess.
 
     Both are over [states (m 2n), parameter].
@@ -63,23 +63,23 @@ def newton(
     problem: PeriodicProblem,
     x: Array,
     parameter: float,
-    border: Border | None = None,
+    condition: ArclengthCondition | None = None,
     slope: bool = False,
     most: int = 25,
 ) -> tuple[Chain, float, int]:
     """Solve the chain from a first guess; returns it with its relative residual and the iterations.
 
-    x is (m, N), with what is latched. With a border the parameter is an unknown too. ``slope`` asks for the
+    x is (m, N), with what is latched. With a condition the parameter is an unknown too. ``slope`` asks for the
     derivatives by the parameter of what is returned; ``most`` is the number of iterations allowed. Raises OrbitError.
     """
     unknowns = guess = np.append(x.ravel(), parameter)
     measure = _Measure(problem)
-    chain, error = _fire(problem, unknowns, measure, border is not None)
+    chain, error = _fire(problem, unknowns, measure, condition is not None)
     history = [error]
     while not error <= TOLERANCE and len(history) <= most:
-        step = _step(chain, unknowns - guess, border)
+        step = _step(chain, unknowns - guess, condition)
         for halving in range(_MOST_HALVINGS if most > 10 else 2):
-            wanted = border is not None or (slope and error < _NEARLY)
+            wanted = condition is not None or (slope and error < _NEARLY)
             trial, trial_error = _fire(problem, unknowns + 0.5**halving * step, measure, wanted)
             if trial_error < error:
                 break
@@ -167,16 +167,16 @@ def _with_ends(chain: Chain) -> Array:
     return x
 
 
-def _step(chain: Chain | None, moved: Array, border: Border | None) -> Array:
+def _step(chain: Chain | None, moved: Array, condition: ArclengthCondition | None) -> Array:
     """Newton's step of all unknowns."""
     if chain is None:
         raise OrbitError("the motion from the start cannot be integrated over one period")
     matrix: Any = chain.jacobian()
     right = -chain.residual.ravel()
     try:
-        if border is None:
+        if condition is None:
             return np.append(np.linalg.solve(matrix, right), 0.0)
-        row = border.row()
+        row = condition.row()
         matrix = np.block([[matrix, chain.by_parameter.reshape(-1, 1)], [row[None, :]]])
         return np.linalg.solve(matrix, np.append(right, -row @ moved))
     except np.linalg.LinAlgError:

@@ -28,7 +28,7 @@ from solvers.problem.memo import Memo
 
 
 class Law(Protocol):
-    """What a contact law must offer.
+    """What a contact law must offer. `contacts.law.Law` has it all, and what laws with memory add.
 
     The C signature of ``address`` is
     ``void (int64 n, double *delta, double *delta_dot, double entry_rate, double *parameters, double *force)``.
@@ -53,6 +53,9 @@ class Law(Protocol):
 
     def force(self, delta: ArrayLike, delta_dot: ArrayLike, entry_rate: ArrayLike) -> Array:
         """Force on arrays."""
+
+    def batch(self, entry_rate: float) -> Callable[[Array, Array], Array]:
+        """The force as a function of arrays δ and δ̇, for one entry rate."""
 
 
 Signal = Callable[[Any], Any]

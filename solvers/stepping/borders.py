@@ -14,12 +14,13 @@ from typing import Any
 import numpy as np
 
 from solvers.compiled.kernels import dot, inner, kernel
-from solvers.compiled.renewals import margins, margins_in, note_event, renew
-from solvers.compiled.state import most_borders, rate_tolerance, surface_tolerance
+from solvers.compiled.renewals import margins, margins_before, margins_in, note_event, renew
+from solvers.compiled.state import LAST_EVENT, T, most_borders, rate_tolerance, surface_tolerance
 from solvers.stepping.events import NONE, coefficients_of, golden_section, polynomial
 
 _NODES = np.array([0.0, *(2.0**i for i in (-20, -15, -11, -8, -7, -6, -5, -4, -3, -2)), *(np.arange(3, 9) / 8.0)])
 _TOGETHER = 1e-12  # part of its way at which a border counts as reached when another is landed on
+_BEFORE = 1e-3  # part of a landing step before its end
 _AHEAD = 1e-4  # part of a step over which the rate of a margin is differenced
 
 
@@ -94,12 +95,15 @@ def _lowest(known, values, i, rounding):
 
 @inner
 def _crossing(problem, state, space, s, j):
-    """First θ at which a margin of the element watched falls below zero, or NONE; 0 where it does so at once."""
+    """First θ at which a margin of the element watched falls below zero, or NONE; 0 where it does so at once.
+
+    Where the last landing has missed a border by more than rounding, its margin is negative at first, but rises.
+    """
     known, n = (problem, state, space, s, j), _NODES.size
     values, rounding = space.margin[n * j : n * j + n], space.rounding[s, j]
-    inside = values[0] > rounding
+    inside, missed = values[0] > rounding, state.now[T] == state.now[LAST_EVENT] and state.now[T] > 0.0
     for i in range(1, n):
-        if values[i] < -rounding:
+        if values[i] < -rounding and not (missed and values[i] > values[i - 1]):
             return _first_beyond(known, _NODES[i - 1], _NODES[i]) if inside else 0.0
         lowest = _lowest(known, values, i, rounding)
         if lowest < NONE:
@@ -146,18 +150,20 @@ def renew_border(problem, state, space, s, j, log):
 
 
 @kernel
-def renew_together(problem, state, space, element, border, log):
-    """Renew the border landed on, and all whose margins have fallen to zero with it.
+def renew_together(problem, state, space, h, element, border, log):
+    """Renew the border landed on by a step of duration h, and all whose margins have fallen to zero with it.
 
-    Which ones is judged from the state alone, before any is renewed.
+    Which ones is judged from the state alone, before any is renewed. One that began at zero, as after its own renewal,
+    has risen and come back if its margin was above zero just before.
     """
     for s in range(problem.gap.size):
         if problem.border_count[s] == 0:
             continue
         delta, rate = _present(problem, state, space, s, state.x)
+        margins_before(problem, state, s, delta, rate, _BEFORE * h, space.trial, space.one)
         for j in range(problem.border_count[s]):
-            begun, rounding = space.begun[s, j], space.rounding[s, j]
-            reached = begun > rounding and space.present[s, j] <= max(8.0 * rounding, _TOGETHER * begun)
+            before, rounding = max(space.begun[s, j], space.one[j]), space.rounding[s, j]
+            reached = before > rounding and space.present[s, j] <= max(8.0 * rounding, _TOGETHER * before)
             if reached or (s == element and j == border):
                 renew(problem, state, s, j, delta, rate, log)
     note_event(state)

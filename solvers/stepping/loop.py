@@ -189,7 +189,7 @@ def march(
         if code != RUNNING:
             return code
         if border >= 0 and now[T] < t_end:
-            renew_together(problem, state, space, stop, border, log)
+            renew_together(problem, state, space, h, stop, border, log)
         if stop >= 0:
             count[CALLS] += rhs(problem, now[T], state.x, state.segment, state.entry_rate, state.rate, space.work[0])
         if modal_gains(problem, state, space):

@@ -227,6 +227,3 @@ def _depth(law: Any, mass: float, speed: float) -> float:
         enough = work_of(law, 10.0**middle) >= 0.5 * mass * speed**2
         low, high = (low, middle) if enough else (middle, high)
     return float(10.0**low)
-
-
-# --- what all methods of constant step share -------------------------------------------------------------------------

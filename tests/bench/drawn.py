@@ -30,6 +30,7 @@ class Scene:
     duration: float
     words: str
     parts: int = 1  # groups of as many coordinates each that may influence each other little
+    memory: Any = None  # what the laws have latched at the start, as `integrate` takes it
 
 
 def draw_law(rng: np.random.Generator, mass: float, speed: float, time: float) -> Any:

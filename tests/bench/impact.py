@@ -15,7 +15,7 @@ import argparse
 import math
 import os
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -220,12 +220,20 @@ def many(of: Problem, count: int, rounds: int) -> list[str]:
     method, ensemble = solvers.Exponential(1e-8), Ensemble(of, 1e-8)
     single, alone = peers.exponential(of, {"rtol": 1e-8}), peers.heyoka(of, {"tol": 1e-8})
 
-    def ours(threads: int) -> Any:
-        ends = solvers.integrate_many(of.system, *np.hsplit(starts, 2), DURATION, method, threads)
+    gaps = np.tile([[contact.gap for contact in of.system.contacts]], (count, 1))
+
+    def ours(threads: int, **parameters: Any) -> Any:
+        ends = solvers.integrate_many(of.system, *np.hsplit(starts, 2), DURATION, method, threads, **parameters)
         return ends.q @ of.phi
+
+    def own_system(start: Any) -> Any:
+        contacts = [replace(contact) for contact in of.system.contacts]
+        return solvers.integrate(of.system.like(contacts), *np.split(start, 2), DURATION, method=method).q[-1] @ of.phi
 
     calls = {
         "integrate_many": lambda: ours(1),
+        "the same, a gap for each": lambda: ours(1, gaps=gaps, factors=np.ones((count, len(of.system.loads)))),
+        "integrate, a system for each": lambda: [own_system(start) for start in starts[:100]],
         "integrate_many, 2 threads": lambda: ours(2),
         "integrate, one by one": lambda: [single(start)[0] for start in starts[:100]],
         "heyoka, its ensemble": lambda: ensemble(starts[:100]),
@@ -241,8 +249,8 @@ def many(of: Problem, count: int, rounds: int) -> list[str]:
             error[name] = float(np.median(np.abs(found - tips[: len(found)]))) / LENGTH
     own = processor["integrate_many"]
     load = f"load of the machine {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""
-    return [f"{'call':26s} {'µs a start':>10s} {'processor µs':>12s} {'error':>8s} {'times':>6s}   {load}"] + [
-        f"{name:26s} {1e6 * wall[name]:10.0f} {1e6 * spent:12.0f} {error[name]:8.0e} {spent / own:6.2f}"
+    return [f"{'call':28s} {'µs a start':>10s} {'processor µs':>12s} {'error':>8s} {'times':>6s}   {load}"] + [
+        f"{name:28s} {1e6 * wall[name]:10.0f} {1e6 * spent:12.0f} {error[name]:8.0e} {spent / own:6.2f}"
         for name, spent in processor.items()
     ]
 

@@ -65,6 +65,7 @@ def run(scene: Scene, method: Any, move: Any = 0.0, sampled: bool = True) -> Any
         *(scene.system, scene.q0 + move[:n], scene.q_dot0 + move[n:], scene.duration),
         *(scene.duration / SAMPLES if sampled else None, method),
         progress=progress,
+        memory=scene.memory,
     )
 
 

@@ -12,12 +12,13 @@ from solvers.compiled.parts import BEGIN, part
 from solvers.compiled.state import T_IN, T, surface_tolerance
 from solvers.exponential.contact.collocation import contact_time
 from solvers.exponential.contact.crossings import choose_sides
-from solvers.exponential.contact.peaks import state_peaks
+from solvers.exponential.contact.peaks import pressed_speed, state_peaks
 from solvers.exponential.flight import energy_norms
 
 LEVEL, NODE_SET, NEW, STOP, NEXT_LEVEL, BEGUN = range(6)  # places in Scratch.control
 ENTRY, SEGMENT = 1, 2  # values of NEW: the first step of a contact, or of a segment of its law; 0 for other steps
 _LEAST = 1e-60  # m/s, of a reference speed
+_PRESSED = 1e-3  # the least in units of the speed which the force would give: what presses at rest moves by rounding
 
 
 @part(BEGIN, types.void, types.int64)
@@ -31,9 +32,9 @@ def begin_steps(problem, tables, state, scratch, stop):
         if before:
             scratch.reference_speed[s] = max(scratch.reference_speed[s], speed)
         else:
-            scratch.reference_speed[s] = max(
-                speed, 0.1 * dot(tables.rate_weight[s], scratch.norms, problem.k.size), _LEAST
-            )
+            reached = 0.1 * dot(tables.rate_weight[s], scratch.norms, problem.k.size)
+            pressed = _PRESSED * pressed_speed(problem, tables, state, s, scratch.trial)
+            scratch.reference_speed[s] = max(speed, reached, pressed, _LEAST)
         others |= before
     control[NODE_SET], control[NEW] = 0, SEGMENT
     if state.segment[stop] > 0 and state.active[stop, T_IN] == state.now[T]:

@@ -12,10 +12,10 @@ from __future__ import annotations
 import numpy as np
 from numba import types
 
-from solvers.compiled.kernels import VECTOR, dot, indentation, inlined, inner
+from solvers.compiled.kernels import VECTOR, dot, indentation, inlined, inner, rhs
 from solvers.compiled.parts import PASSED, part
-from solvers.compiled.renewals import margins, margins_in, note_event, renew
-from solvers.compiled.state import rate_tolerance, surface_tolerance
+from solvers.compiled.renewals import margins, margins_before, margins_in, note_event, renew
+from solvers.compiled.state import LAST_EVENT, T, rate_tolerance, surface_tolerance
 from solvers.exponential.contact.node_response import DELTAS, KNOWN, RATES, START, rate_ripple_of, ripple_of
 from solvers.exponential.contact.nodes import LOCAL, S
 from solvers.exponential.contact.peaks import local_maximum, motion_around
@@ -25,6 +25,7 @@ UNRESOLVED = -2
 _ON = 1e-9  # margin, in units of the largest of the step, at which a step counts as begun on the border
 _SAME = 1e-11  # the same for the sign of a node
 _TOGETHER = 1e-9  # part of its way at which a border counts as reached when another is landed on
+_BEFORE = 1e-3  # part of a landing before its end
 _REST = 1e-14  # rate, in units of the reference speed, at which what has come to rest turns no more
 _NEAR = 0.2  # lowest node, in units of the largest margin, below which the motion between nodes is looked at
 
@@ -57,21 +58,23 @@ def _margins_on_step(problem, tables, state, scratch, s, node_set, level):
 
 
 @inlined
-def _crossing(problem, tables, scratch, s, j, node_set, h):
+def _crossing(tables, state, scratch, s, j, node_set, h):
     """Time after the begin of the step at which a margin falls below zero by its values at the nodes, or inf.
 
     It is 0 where the margin is negative from the begin on. One that begins at zero may have risen before the first
-    node: then a shorter step is asked for, which will tell.
+    node: then a shorter step is asked for, which will tell. A landing may have missed its border by more than rounding
+    of this step: then a margin is negative at first, but rises, and crosses only if it falls again.
     """
     noise, before, t = scratch.noise[s, j], scratch.ends[ENDS * j], 0.0
     near = max(_ON * scratch.largest[s, j], noise)
-    if before < -near:
+    missed = state.now[T] == state.now[LAST_EVENT] and state.now[T] > 0.0 and scratch.margin[S * j] > before
+    if before < -near and not missed:
         return 0.0
     on = before <= near
     for i in range(S + 1):
         value = scratch.margin[S * j + i] if i < S else scratch.ends[ENDS * j + 1]
         after = h * tables.times[node_set, i] if i < S else h
-        if value < -noise:
+        if value < -noise and not (missed and before < -noise and value > before):
             return t + (after - t) * (0.5 if on and i == 0 else max(before, 0.0) / (max(before, 0.0) - value))
         before, t = value, after
     return np.inf
@@ -137,7 +140,7 @@ def border_ahead(problem, tables, state, scratch, node_set, level):
         for j in range(count):
             if scratch.largest[s, j] <= scratch.noise[s, j]:
                 continue
-            time = _crossing(problem, tables, scratch, s, j, node_set, h)
+            time = _crossing(tables, state, scratch, s, j, node_set, h)
             if time == np.inf:
                 time = _between_nodes(problem, tables, state, scratch, s, j, node_set, h)
             if time == np.inf and _hides(scratch, s, j):
@@ -181,18 +184,23 @@ def renew_border(problem, state, scratch, element, border, log):
 def renew_all(problem, state, scratch, element, border, log):
     """Renew the border landed on, and all whose margins fell to zero with it since ``scratch.stages[START]``.
 
-    Which ones is judged from the state alone, before any is renewed.
+    Which ones is judged from the state alone, before any is renewed. One that began at zero, as after its own renewal,
+    has risen and come back if its margin was above zero just before.
     """
     margins_in(problem, state, element, state.x, scratch.trial, scratch.margin)
     missed = 2.0 * abs(scratch.margin[border]) / scratch.largest[element, border]
+    time = _BEFORE * (state.now[T] - scratch.stages[START, state.x.size])
+    rhs(problem, state.now[T], state.x, state.segment, state.entry_rate, state.rate, scratch.trial)
     for s in range(problem.gap.size):
         count = problem.border_count[s]
         if count == 0:
             continue
-        margins_in(problem, state, s, scratch.stages[START], scratch.trial, scratch.ends)
+        begun, just_before = scratch.ends[:count], scratch.ends[count : 2 * count]
+        margins_in(problem, state, s, scratch.stages[START], scratch.trial, begun)
         delta, rate = margins_in(problem, state, s, state.x, scratch.trial, scratch.margin)
+        margins_before(problem, state, s, delta, rate, time, scratch.trial, just_before)
         for j in range(count):
-            before, near = scratch.ends[j], max(scratch.noise[s, j], missed * scratch.largest[s, j])
+            before, near = max(begun[j], just_before[j]), max(scratch.noise[s, j], missed * scratch.largest[s, j])
             near = max(near, _TOGETHER * before)
             landed = (s == element and j == border) or (before > near and scratch.margin[j] <= near)
             scratch.fired[j] = 1.0 if landed else 0.0

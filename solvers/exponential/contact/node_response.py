@@ -43,9 +43,9 @@ class Scratch(NamedTuple):
     signal_terms: Any  # (tables, 6) value and derivatives of every sampled signal
     values: Any  # (14,) coefficients of a polynomial
     norms: Any  # (N,) energy norms of the blocks, √J
-    signal_bounds: Any  # (L,) bounds of the sampled signals on a cell
-    per_stop: Any  # (m,) bounds of |δ̈| in m/s², or errors of δ̇ in m/s
-    split_state: Any  # (2, N padded) p and v of the blocks
+    signal_bounds: Any  # (L,) bounds of the sampled signals on some cells
+    per_stop: Any  # (m,) bounds of |δ̈| in m/s², errors of δ in m, or of δ̇ in m/s
+    split_state: Any  # (3, 2, N padded) p and v of the blocks, of several states
     motion: Any  # (m, 2, S) indentations and their rates at the nodes
     clipped: Any  # (S,) indentations of one stop at the nodes, not below 0
     free: Any  # (m, 2, S) indentations and rates at the nodes without contact forces

@@ -7,6 +7,8 @@ polynomial through these points is closer to that of the motion than the motion 
 
 from __future__ import annotations
 
+import math
+
 from solvers.compiled.kernels import contact_forces, copy, dot, indentation, inlined, inner, merged
 from solvers.compiled.state import PEAK_DELTA, PEAK_FORCE, is_open
 from solvers.compiled.sums import combine
@@ -149,3 +151,14 @@ def state_peaks(problem, state, scratch, x):
                 batch[0], batch[2] = abs(batch[0]), abs(batch[2])
             state.active[s, PEAK_DELTA] = max(state.active[s, PEAK_DELTA], batch[0])
             state.active[s, PEAK_FORCE] = max(state.active[s, PEAK_FORCE], batch[2])
+
+
+@inner
+def pressed_speed(problem, tables, state, s, batch):
+    """Speed, m/s, that the force of a stop in contact would give on a way as long as its indentation, √(|F δ|/m)."""
+    if state.segment[s] == 0:
+        return 0.0
+    batch[0] = indentation(problem, s, state.x)
+    batch[1] = dot(problem.read_rate[s], state.x, 2 * problem.k.size)
+    contact_forces(problem, s, batch[0:1], batch[1:2], state.entry_rate[s], batch[2:3])
+    return math.sqrt(abs(batch[0] * batch[2] * tables.accelerance[s, s]))

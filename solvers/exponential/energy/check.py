@@ -48,7 +48,10 @@ def note_energy(problem, tables, state, scratch):
     for s in range(problem.gap.size):
         steady = 0.0
         for b in range(int(tables.own_blocks), n):
-            steady += np.hypot(problem.read_rate[s, b], problem.read_rate[s, n + b] * np.sqrt(problem.k[b]))
+            speed = np.hypot(problem.read_rate[s, b], problem.read_rate[s, n + b] * np.sqrt(problem.k[b]))
+            steady += speed * np.hypot(
+                state.x[b], state.x[n + b] / np.sqrt(problem.k[b]) if problem.k[b] > 0.0 else 0.0
+            )
         work, impulse = state.x[2 * n + 2 + 2 * s], abs(state.x[2 * n + 3 + 2 * s])
         if problem.knots[s, 0] < 0.0:  # a force of both signs
             impulse = state.active[s, PEAK_FORCE] * state.now[T]

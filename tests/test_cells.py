@@ -1,0 +1,109 @@
+"""Whole cells of sampled signals are crossed where no stop is near: the bound holds, and no contact is missed."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from contacts import Hertz
+from fembeam import BandNoise
+from solvers import Contact, Exponential, System, integrate
+from solvers.exponential import tables
+from solvers.problem import hand_over
+
+SOFT = Hertz(1e-3)  # hardly disturbs the motion: contacts are those of the linear response
+AFAR = 1e9
+METHOD = Exponential(1e-6, ledger=False)
+CELLS = 120
+
+
+def system_under_noise(omega, zeta, row, gap, seed, band=300.0):
+    """Modes under noise on all of them, with one stop."""
+    noise = BandNoise(1.0, (0.0, band), seed, period=40.0)
+    return System.modal(omega, zeta, [Contact(row, SOFT, gap)], [(np.ones(len(omega)), noise)])
+
+
+def prepared(system, duration):
+    """Problem and tables of a run, with its sampled signal."""
+    forcing = hand_over([signal for _, signal in system.loads], duration, 1e-6)
+    engine = METHOD.engine(system, np.zeros(2 * system.size), forcing, duration)
+    return engine.problem, engine.prepared.tables.value
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    fast=st.lists(st.floats(0.0, 4.0), min_size=1, max_size=5),
+    damping=st.floats(-3.0, 0.3),
+    seed=st.integers(0, 10**6),
+)
+def test_the_bound_of_cells_holds_for_any_modes(fast, damping, seed):
+    """δ between two nodes is nearer to the chord than the bound for 1 and for 8 cells says: slow, fast, overdamped."""
+    rng, n = np.random.default_rng(seed), len(fast)
+    omega, row = np.where(np.array(fast) < 0.3, 0.0, 10.0 ** np.array(fast)), rng.standard_normal(n)
+    system = system_under_noise(omega, 10.0**damping, row, AFAR, seed)
+    problem, known = prepared(system, 1.0)
+    h, parts = problem.table_dt[0], 16
+    t = np.arange(CELLS * parts + 1) * (h / parts)
+    run = integrate(system, rng.standard_normal(n) * 1e-3, rng.standard_normal(n), t[-1] * (1 + 1e-9), t, METHOD)
+    delta = -run.q @ row
+    chord = np.interp(t, t[::parts], delta[::parts])
+    apart = np.abs(delta - chord)[:-1].reshape(CELLS, parts).max(axis=1)
+    z = np.hstack((run.q, run.q_dot))[::parts] @ system.blocks.inverse.T
+    norms = np.sqrt(z[:, n:] ** 2 + problem.k * z[:, :n] ** 2)
+    nodes = np.abs(problem.table[: CELLS + 1]) @ (1.0, 0.4 * h, 0.05 * h * h)
+    largest = np.abs(system.loads[0][1](t[:-1])).reshape(CELLS, parts).max(axis=1)
+    assert np.all(largest <= 1.00001 * np.maximum(nodes[1:], nodes[:-1]))
+    at_once, growing = known.cell_error_signal[0, 0]
+    for m in (1, 8):
+        for k in range(0, CELLS - m, m):
+            bound = norms[k] @ known.cell_error[0, :n] + nodes[k : k + m + 1].max() * (at_once + m * growing)
+            assert apart[k : k + m].max() <= bound * (1.0 + 1e-9) + 1e-13 * np.abs(delta).max()
+
+
+def test_the_bound_is_attained_by_a_constant_acceleration():
+    """A free mass under a constant force: the chord is h²/8 δ̈ away from δ, the bound has that and the growth of ε."""
+    problem, known = prepared(system_under_noise([0.0], 0.0, [1.0], AFAR, 1), 1.0)
+    h = problem.table_dt[0]
+    assert known.cell_error_signal[0, 0, 0] == pytest.approx(h * h / 8.0, rel=1e-12)
+    assert known.cell_error[0, 0] == 0.0
+
+
+def crossings(system, duration, dt):
+    """Log of a run from rest, and its samples of δ."""
+    rest = np.zeros(system.size)
+    run = integrate(system, rest, rest, duration, dt, METHOD)
+    contact = system.contacts[0]
+    return run, None if dt is None else -run.q @ contact.direction - contact.gap
+
+
+@pytest.mark.parametrize("omega", [[60.0, 150.0], [100.0, 900.0], [50.0, 400.0, 30000.0]])
+def test_contacts_are_those_of_steps_that_look_at_the_stops_every_time(omega):
+    """Outputs in every cell of a fast structure make it take the proven steps only: the same contacts either way.
+
+    The slow one crosses cells under outputs too. No sample lies behind a stop but within a contact of the log.
+    """
+    found = 0
+    for seed in range(12):
+        system = system_under_noise(omega, 0.02, [1.0, 0.7, 0.3][: len(omega)], 2e-5 * (1 + seed % 4), seed)
+        plain, _ = crossings(system, 12.0, None)
+        cell = prepared(system, 12.0)[0].table_dt[0]
+        sampled, delta = crossings(system, 12.0, 0.37 * cell)
+        log = sampled.contacts
+        assert len(plain.contacts) == len(log)
+        np.testing.assert_allclose(plain.contacts.t_in, log.t_in, atol=1e-9)
+        ends = np.where(np.isnan(log.t_out), np.inf, log.t_out)
+        last = np.searchsorted(log.t_in, sampled.t + 1e-9) - 1
+        within = (last >= 0) & (sampled.t <= ends[last] + 1e-9)
+        assert np.all(within[delta > 1e-12])
+        found += len(log)
+    assert found > 1000
+
+
+def test_a_bound_of_zero_would_miss_contacts(monkeypatch):
+    """What the tests above rest on: without the bound cells are crossed in which δ rises above zero and falls back."""
+    system = system_under_noise([100.0, 900.0], 0.02, [1.0, 0.7], 4e-5, 3)
+    known = len(crossings(system, 12.0, None)[0].contacts)
+    bounds = tables.cell_errors
+    monkeypatch.setattr(tables, "cell_errors", lambda *arguments: tuple(0.0 * part for part in bounds(*arguments)))
+    system = system_under_noise([100.0, 900.0], 0.021, [1.0, 0.7], 4e-5, 3)
+    assert len(crossings(system, 12.0, None)[0].contacts) < known
