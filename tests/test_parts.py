@@ -3,6 +3,9 @@
 import importlib
 import subprocess
 import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -56,6 +59,22 @@ def test_a_part_gets_its_arguments_and_returns_a_tuple(problem):
     parts.load({"problem": PROBLEM}, [PLACE])
     assert np.array_equal(loaded, parts.ADDRESSES)
     assert np.count_nonzero(loaded) == 1
+
+
+def test_two_threads_compile_a_part_once(problem, monkeypatch):
+    made = []
+
+    def slow(signature):
+        time.sleep(0.1)
+        made.append(signature)
+        return lambda function: SimpleNamespace(address=len(made))
+
+    monkeypatch.setattr(parts, "c_function", slow)
+    parts.part(PLACE, types.void)(lambda problem: None)
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(lambda _: parts.load({"problem": PROBLEM}, [PLACE]), range(4)))
+    assert len(made) == 1
+    assert parts.ADDRESSES[PLACE] == 1
 
 
 def test_every_place_has_a_function():

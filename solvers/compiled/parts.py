@@ -54,12 +54,16 @@ def load(kinds: Mapping[str, types.NamedTuple], places: Iterable[int]) -> None:
     """Compile parts, or load their machine code; ``kinds`` are the types of packed arguments by their names."""
     for place in places:
         if not ADDRESSES[place]:
-            with _LOCK:
-                function, result, plain = _DECLARED[place]
-                names = function.__code__.co_varnames[: function.__code__.co_argcount - len(plain)]
-                signature = result(*(PackedType(kinds[name]) for name in names), *plain)
-                _LOADED[place] = c_function(signature)(function)
+            with _LOCK:  # another thread may have been quicker; what one gave the address of must stay
+                if place not in _LOADED:
+                    _LOADED[place] = _compiled(kinds, *_DECLARED[place])
                 ADDRESSES[place] = _LOADED[place].address
+
+
+def _compiled(kinds: Mapping[str, types.NamedTuple], function: Any, result: Any, plain: tuple[Any, ...]) -> Any:
+    """The C function of a part."""
+    names = function.__code__.co_varnames[: function.__code__.co_argcount - len(plain)]
+    return c_function(result(*(PackedType(kinds[name]) for name in names), *plain))(function)
 
 
 def _call_at(place: int, result: Any, plain: tuple[Any, ...]) -> Any:
