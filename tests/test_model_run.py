@@ -469,7 +469,7 @@ def test_model_survives_pickling(model):
         (lambda run: run.model.simulate(1.0, "1 ms"), "dt must be numbers, got '1 ms'"),
         (lambda run: run.model.simulate(1.0, start="rest"), "start must be numbers, got 'rest'"),
         (lambda run: run.model.scene.reduce(2.5), "modes must be a whole number or a list of them, got 2.5"),
-        (lambda run: replace(run.model.scene, stops=[fb.Stop(0.1, Hertz(1e8), on=(1, 0.1))]), "on must name a body"),
+        (lambda run: replace(run.model.scene, stops=[fb.Stop(0.1, Hertz(1e8), on=(1, 0))]), "must name a body, and"),
     ],
 )  # fmt: skip
 def test_bad_arguments_are_refused_in_words(run, ask, message):

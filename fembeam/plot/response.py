@@ -33,6 +33,7 @@ from fembeam.plot.random import density_panels
 from fembeam.plot.run_signals import estimated, first_stop, natural, sampling_of, stationary
 from fembeam.plot.spectra import segment_for
 from fembeam.plot.style import BLUE, GREY, ORANGE, Vector, place_name, styled
+from fembeam.scene import unit_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -82,7 +83,8 @@ def time_history(
         stops = _stops_at(run, body, place)
         _shade_contacts(drawn, run, stops, lo, hi)
         _draw_forces(drawn[1], run, lo, hi)
-        title += f", contacts of {_listed(stops, run)} shaded" if len(stops) else ""
+        seen = np.isin(run.contacts.stop, stops) & _within(run, lo, hi)
+        title += f", contacts of {_listed(stops, run)} shaded" if seen.any() else ""
     drawn[-1].set_xlabel("time / s")
     beside = 0.0 if window else 0.01 * (hi - lo)  # so that a contact at the first instant is seen
     drawn[-1].set_xlim(lo - beside, hi + beside)
@@ -116,7 +118,7 @@ def mode_shapes(model: Model, axes: Axes | None = None) -> Figure:
 
     figure, (axis,) = sheet(1, 1, (7.0, 3.8), axes)
     z = np.linspace(0.0, model.scene.beam.length, 401)
-    unit = 1e3 if z[-1] < 1.0 else 1.0
+    unit = 1e3 if z[-1] <= 1.0 else 1.0
     shapes = model.phi(z)
     scale = np.abs(shapes).max(axis=0)
     axis.axhline(0.0, color=GREY, linewidth=0.6)
@@ -223,7 +225,8 @@ def _draw_forces(axis: Axes, run: Run, lo: float, hi: float) -> None:
             look.pop("label")
         axis.vlines(log.t_in[mine & short], 0.0, log.peak_force[mine & short], linewidth=1.2, **look)
     kind = "peak contact force" if len(drawn) > len(always) and np.all(short[inside]) else "contact force"
-    axis.set_ylabel(f"{'force' if len(always) else kind} / {run.unit('force')}")
+    unit = unit_of("force", run.kinds[drawn, 0]) if len(drawn) else run.unit("force")
+    axis.set_ylabel(f"{'force' if len(always) else kind} / {unit}")
     if len(run.stops) > 1 and len(drawn):
         axis.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=2, borderaxespad=0.0, fontsize=8)
     if len(drawn):

@@ -54,8 +54,8 @@ def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
 
 
 def place_name(z: float) -> str:
-    """A place in mm, from 1 m on in m."""
-    return f"z = {z:.5g} m" if abs(z) >= 1.0 else f"z = {1e3 * z:.5g} mm"
+    """A place in mm, beyond 1 m in m."""
+    return f"z = {z:.5g} m" if abs(z) > 1.0 else f"z = {1e3 * z:.5g} mm"
 
 
 def drawable(line: Spectrum, top: float) -> tuple[Vector, Vector]:
