@@ -18,6 +18,7 @@ from contacts import (
     memory_law,
 )
 from contacts.path import walk, work
+from fembeam.results.files import summary
 from solvers import RK4, Contact, DormandPrince, Exponential, System, integrate
 
 X, OMEGA, HEAVY = 2e-3, 3.0, 1e12
@@ -146,3 +147,19 @@ def test_a_run_that_goes_on_loses_the_rest():
     np.testing.assert_allclose(first.losses.loss + rest.losses.loss, whole, rtol=1e-8)
     rough = integrate(system, [0.0], [0.7], 0.5, method=RK4(1e-4)).losses.loss
     np.testing.assert_allclose(rough, whole, rtol=1e-3)
+
+
+def test_losses_in_print_csv_and_summary(tmp_path):
+    damper, length = fb.Element(0.5, Jenkins(2e4, 0.05)), 0.5
+    scene = fb.Scene(fb.Beam(length, fb.Section.circle(2.1e11, 7800.0, 0.01)), [fb.Clamped(0.0)], elements=[damper],
+                     damping=fb.ModalDamping(0.01), base=fb.Harmonic(1e-4, 300.0))  # fmt: skip
+    run = scene.reduce(2).simulate(0.1, 1e-3)
+    again = fb.load(run.save(tmp_path / "run"))
+    for one in (run, again):
+        row = next(line.split() for line in str(one).splitlines() if line.split()[:2] == ["element", "0"])
+        taken = run.losses.work[0], run.losses.loss[0], run.losses.slip[0]
+        assert [float(x) for x in row[2:]] == pytest.approx(taken, rel=1e-3)
+        assert summary(one)["losses"]["slip"] == run.losses.slip.tolist()
+        lines = one.to_csv(tmp_path, quantities=["work"])[0].read_text(encoding="utf-8").splitlines()
+        assert lines[0] == "t [s],work 0 [J]"
+        assert float(lines[-1].split(",")[1]) == pytest.approx(run.losses.work[0], rel=1e-9)

@@ -5,16 +5,18 @@ import multiprocessing
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 import fembeam as fb
-from contacts import BoucWen, Coulomb, Jenkins
+from contacts import BoucWen, Coulomb, Jenkins, Polynomial, WaltonBraun
 from fembeam.statistics import Estimate
 from fembeam.study import characteristics, ensemble, stationary
 from fembeam.study.measure import cut
 from fembeam.study.quantities import Power
+from fembeam.study.segments import Segments
 from solvers import Exponential
 
 ZETA, BAND = 0.02, 60.0  # of the first mode, over its ω
@@ -114,6 +116,49 @@ def test_a_run_goes_on_from_the_end_of_another(name):
     assert np.abs(forgetful.q - whole.q[300:]).max() > 1e-3 * np.abs(whole.q).max()
     with pytest.raises(ValueError, match=r"start must have shape \(2,\)"):
         model.simulate(period, start=first.end[:3])
+
+
+def segmented(model, length, count, dt, solver=None):
+    """Runs of the segments of a stationary response, each of ``length`` s, from rest."""
+    plan = Segments.of(model, count * length, dt, 0.0, None, solver, 64)
+    plan.longest, plan.first_lead = length, 0.0
+    runs = []
+    for piece in plan.pieces():
+        runs.append(piece.run)
+        plan.keep(piece, length)
+    return runs
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_segments_of_a_long_run_are_one_run(name):
+    """Under tones: the same motion, force and loss to the tolerance, whatever was latched at the cuts."""
+    model, _ = damped(LAWS[name])
+    omega, force = float(model.omega[0]), 0.1 * model.scene.forces[0].signal.std
+    tones = fb.Multisine([force, 0.7 * force], [omega, 1.37 * omega])
+    model = replace(model.scene, forces=[fb.PointForce(LENGTH, tones)]).reduce(modes=1)
+    length, solver = 400 * 0.1 / omega, Exponential(1e-10)
+    runs = segmented(model, length, 5, 0.1 / omega, solver)
+    whole = model.simulate(5 * length, 0.1 / omega, solver=solver)
+    assert len(runs) == 5
+    q, force = (np.concatenate([f(runs[0])[:1], *(f(run)[1:] for run in runs)])
+                for f in (lambda run: run.q[:, 0], lambda run: run.force()))  # fmt: skip
+    assert np.abs(q - whole.q[:, 0]).max() < 1e-7 * np.abs(q).max()
+    assert np.abs(force - whole.force()).max() < 1e-6 * np.abs(force).max()
+    assert sum(run.losses.loss[0] for run in runs) == pytest.approx(whole.losses.loss[0], rel=1e-7)
+
+
+def test_the_set_of_a_yielding_stop_outlasts_segments_of_noise():
+    """The largest force so far never falls: the stop stays dented when the noise is renewed."""
+    model, _ = damped(lambda k: Polynomial([1e-3 * k]))
+    stiffness = (model.omega[0] / model.phi(LENGTH)[0]) ** 2
+    stop = fb.Stop(LENGTH, WaltonBraun(5.0 * float(stiffness), 20.0 * float(stiffness), "kept"))
+    model = replace(model.scene, elements=[], stops=[stop]).reduce(modes=1)
+    runs = segmented(model, 60.0 / model.omega[0], 5, 0.15 / model.omega[0])
+    largest = [run.end[-1] for run in runs]
+    assert largest[0] > 0.0
+    assert np.all(np.diff(largest) >= 0.0)
+    for before, run in pairwise(runs):
+        assert np.array_equal(run.began[0], before.end[2:])
 
 
 def test_realisations_are_independent_resumable_and_the_same_with_two_workers(tmp_path):

@@ -122,7 +122,7 @@ def test_the_schema_knows_the_quantities():
 def test_every_quantity_and_extremes_from_python(folder):
     run = fb.load(folder / "run.npz")
     found = histories(run, 1, [0.1], list(UNITS))
-    assert len(found) == 1 + 10 + 2 + 2
+    assert len(found) == 1 + 10 + 3 + 2
     np.testing.assert_array_equal(found["slope at 0.1 m [rad]"], run.slope(0.1))
     np.testing.assert_array_equal(found["force 0 [N]"], run.force())
     t = np.linspace(0.0, 1.0, 5)

@@ -262,7 +262,7 @@ class Run(ContactHistories, Printed):
         Parameters
         ----------
         chosen : ``places=`` z in m (j,), else tip and mid-beam. ``quantities=`` from displacement, velocity,
-            acceleration, each also "absolute …", slope, moment, shear, stress; indentation, force (of stops);
+            acceleration, each also "absolute …", slope, moment, shear, stress; indentation, force, work (of stops);
             reactions (of supports, springs, dashpots). Else displacement, velocity, indentation, force.
         """
         from fembeam.model.run_csv import write

@@ -37,15 +37,16 @@ Output = Literal[
     "stress",
     "indentation",
     "force",
+    "work",
     "reactions",
 ]
 UNITS = {  # of what `histories` can be asked for
     **dict.fromkeys(get_args(Output), "m"),
     **{"velocity": "m/s", "absolute velocity": "m/s", "acceleration": "m/s²", "absolute acceleration": "m/s²"},
-    **{"slope": "rad", "moment": "N m", "shear": "N", "stress": "N/m²", "force": "N"},
+    **{"slope": "rad", "moment": "N m", "shear": "N", "stress": "N/m²", "force": "N", "work": "J"},
 }
 USUAL = ("displacement", "velocity", "indentation", "force")
-ELSEWHERE = ("indentation", "force", "reactions")  # not at places: of stops and of supports
+ELSEWHERE = ("indentation", "force", "work", "reactions")  # not at places: of stops and of supports
 
 
 def write(run: Run, folder: Path, stride: int = 1, **chosen: Any) -> list[Path]:
@@ -79,6 +80,7 @@ def histories(
     for stop in range(len(run.stops)):
         of_stops = (what for what in asked if what in ("indentation", "force"))
         columns |= {f"{what} {stop} [{run.unit(what, stop)}]": getattr(run, what)(stop) for what in of_stops}
+        columns |= {f"work {stop} [J]": run.losses.history[:, stop]} if "work" in asked else {}
     for i, one in enumerate(run.reactions() if "reactions" in asked else ()):
         about = f"{i} ({one.name})"
         columns |= {f"reaction force {about} [N]": one.force, f"reaction moment {about} [N m]": one.moment}
@@ -153,4 +155,12 @@ def parts(run: Run) -> list[Part]:
     length, force, speed = unit_of("indentation", [False, *run.kinds[:, 0]]), run.unit("force"), run.unit("speed")
     found: list[Part] = [repr(run), (("", *(f"{name} / {length}" for name in ("mean", "std", "min", "max"))), moved)]
     head = "", "contacts", f"largest force / {force}", f"mean peak force / {force}", f"mean entry speed / {speed}"
-    return [*found, (head, rows)] if rows else found
+    return [*found, *([(head, rows)] if rows else []), *_elements(run)]
+
+
+def _elements(run: Run) -> list[Part]:
+    """Work on every element, what it took for good, and the path of its sliders."""
+    acting = np.flatnonzero(run.kinds[:, 1]).tolist() if run.lost is not None else []
+    rows = [(run.name(i), *(float(x[i]) for x in (run.losses.work, run.losses.loss, run.losses.slip))) for i in acting]
+    length = unit_of("indentation", run.kinds[acting, 0])
+    return [(("", "work / J", "loss / J", f"slip / {length}"), rows)] if rows else []

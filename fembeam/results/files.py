@@ -137,6 +137,7 @@ def summary(
         "contacts": _contacts(run, discard),
         **({"outputs": extremes_table(histories(run, **outputs), discard)} if outputs else {}),
         "energy": _energy(run),
+        **({} if run.lost is None else {"losses": {k: x.tolist() for k, x in run.losses.arrays().items()}}),
         "cost": asdict(run.cost),
         "dt": float(run.t[1] - run.t[0]) if len(run.t) > 1 else None,
         "scene": run.scene,

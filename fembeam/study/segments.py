@@ -132,9 +132,10 @@ class Segments:
         return run
 
     def _border(self, run: Run) -> int:
-        """The last sample that counts: the end under noise, else the last one outside every contact."""
+        """The last sample that counts: the end under noise and with memory, else the last one outside every contact."""
         last, log = len(run.t) - 1, run.contacts
-        if self.random:
+        assert run.end is not None
+        if self.random or run.end.size > 2 * run.q.shape[1]:  # what laws have latched is known at the end alone
             return last
         order = np.argsort(log.t_in)
         t_in, t_out = log.t_in[order], np.where(np.isnan(log.t_out), np.inf, log.t_out)[order]
@@ -159,7 +160,9 @@ class Segments:
 
     def _go_on(self, piece: Segment) -> None:
         """Continue from the border of a segment."""
-        self.state = np.concatenate((piece.run.q[piece.end], piece.run.q_dot[piece.end]))
+        run, whole = piece.run, piece.end == len(piece.run.t) - 1
+        assert run.end is not None
+        self.state = run.end if whole else np.concatenate((run.q[piece.end], run.q_dot[piece.end]))
         self.time += self.dt * piece.end
 
 
