@@ -21,7 +21,7 @@ class Sum(Law):
 
     Each part keeps its own floor of the entry rate. Beside laws with memory, which may act at both signs of δ, laws of
     stops act while δ > 0, with the entry rate of that contact; all laws without memory do so beside one that opens.
-    Then contacts are logged from δ = 0 to δ = 0.
+    Then contacts are logged from δ = 0 to δ = 0; of several laws with memory alone they are not logged.
 
     Parameters
     ----------
