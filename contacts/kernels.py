@@ -1,6 +1,8 @@
 """Compiled forces of the built-in laws and their derivatives, cached; see `contacts.law` for the C signature."""
 
 import math
+import threading
+from functools import partial
 
 from llvmlite import ir
 from numba import carray, cfunc, config, njit, types
@@ -15,6 +17,18 @@ if config.DISABLE_JIT:
     raise RuntimeError("NUMBA_DISABLE_JIT is set, but contact laws run as machine code only: unset it")
 
 
+class Kernel:
+    """A C function that is compiled, or loaded, when its address or another attribute is asked for."""
+
+    def __init__(self, make):
+        self._make, self._lock, self._made = make, threading.Lock(), None
+
+    def __getattr__(self, name):
+        with self._lock:
+            self._made = self._made or self._make()
+        return getattr(self._made, name)
+
+
 def compiled(decorator, *signature):
     """The decorator with our options; machine code is kept where numba finds a folder it may write to.
 
@@ -27,7 +41,7 @@ def compiled(decorator, *signature):
         except RuntimeError:  # no folder: then each process compiles for a second
             return decorator(*signature, error_model="numpy")(function)
 
-    return made
+    return (lambda function: Kernel(partial(made, function))) if decorator is cfunc else made
 
 
 _force = compiled(cfunc, SIGNATURE)

@@ -48,11 +48,13 @@ for limit in LIMITS:
     print(f"{row} {abs(best.found.transverse[0]):13.4f}   {branch.status}")
     assert branch.stable.all()
     assert abs(loss - theory) < 1e-4 * limit * X
-    axis.semilogy(branch.parameter, 1e3 * heights, label=f"{limit:g} N")
+    axis.semilogy(branch.parameter, 1e3 * heights, label=f"f = {limit:g} N")
 assert np.argmin(tops) == 2, "the limit between is the best"
 assert abs(tops[2] - 8.625) < 0.01
 assert tops[2] < 0.4 * min(tops[0], tops[-1])
-axis.set(xlabel="frequency (rad/s)", ylabel="amplitude at the tip (mm)", title="friction damper: limit of slip")
-axis.legend()
+axis.set(xlabel="drive frequency ω / rad s⁻¹", ylabel="amplitude at the damper / mm", yticks=[2, 5, 10, 20, 30])
+axis.yaxis.set_major_formatter("{x:g}")
+axis.yaxis.set_minor_formatter("")
+axis.legend(title="limit of slip", frameon=False)
 for path in sys.argv[1:]:
     figure.savefig(path, dpi=150)

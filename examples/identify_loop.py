@@ -11,6 +11,7 @@ spring, 2 % noise and a zero of the force that is off. A cycle of amplitude X, a
 """
 
 import numpy as np
+from matplotlib.figure import Figure
 
 import fembeam as fb
 from contacts import Iwan, Jenkins, identify_loop
@@ -37,6 +38,9 @@ if __name__ == "__main__":
     print(found)
     print(f"a cycle of 80 µm, larger than any measured, loses {1e3 * loss:.3f} mJ; exactly {1e3 * exact:.3f} mJ")
     print(f"one slider alone leaves {identify_loop(delta, force, Jenkins).noise:.1f} N, noise is 5 N")
-    figure = fb.plot.hysteresis({"found": found.law})
-    figure.axes[0].plot(1e3 * delta, force - found.force_offset.value, ".", markersize=2, zorder=0)
+    figure = Figure(figsize=(7.0, 4.2), layout="constrained")
+    axis = figure.subplots()
+    fb.plot.hysteresis({"found": found.law}, path=delta, axes=axis)
+    axis.plot(1e3 * delta, force - found.force_offset.value, ".", color="0.6", markersize=3, zorder=0, label="measured")
+    axis.legend()
     figure.savefig("identify_loop.png", dpi=110, metadata={"Software": None})

@@ -6,8 +6,8 @@ import sys
 from pathlib import Path
 
 KERNELS = [
-    "solvers.exponential.method",
-    "contacts.kernels, solvers.exponential.linearised, solvers.stepping.loop",
+    "import solvers.exponential.method as m, solvers.compiled.parts as p; m.load_parts(range(len(p.ADDRESSES)))",
+    "import solvers.exponential.linearised, solvers.stepping.loop",
 ]  # take equally long to compile
 
 
@@ -21,5 +21,5 @@ def pytest_sessionstart(session):
     if hasattr(session.config, "workerinput") or not session.config.getoption("numprocesses", None):
         return
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the processors are taken
-    for process in [subprocess.Popen([sys.executable, "-c", f"import {modules}"]) for modules in KERNELS]:
+    for process in [subprocess.Popen([sys.executable, "-c", code]) for code in KERNELS]:
         process.wait()

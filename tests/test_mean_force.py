@@ -51,12 +51,23 @@ def test_contacts_cut_by_start_and_end_and_samples_of_ones_own():
     assert np.trapezoid(late.force(mean=True), late.t) == pytest.approx(seen, rel=1e-12)
 
 
-def test_bad_input(tmp_path):
+def test_a_contact_over_many_samples_is_shared_as_its_law_says():
+    """Of a linear spring F = k δ, whose cubic is exact to dt⁴: the mean is that of k δ by Simpson's rule."""
+    run = scene(fb.Stop(TIP, KelvinVoigt(1e3, 0.0), gap=1e-4)).reduce(1).simulate(0.2, 2e-4)
+    fine = run.readout.model.simulate(0.2, 1e-4).force()
+    t, among = run.t, slice(1, -1)
+    log, held = run.contacts, np.zeros(len(t), dtype=bool)
+    for begin, end in zip(log.t_in, log.t_out, strict=True):
+        held |= (t > begin + 3e-4) & (t < end - 3e-4)
+    expected = (fine[1:-3:2] + 4 * fine[2:-2:2] + fine[3:-1:2]) / 6
+    assert held.sum() > 100
+    np.testing.assert_allclose(run.force(mean=True)[among][held[among]], expected[held[among]], rtol=1e-6)
+
+
+def test_bad_input():
     model = paper_scene().reduce(2)
     run = model.simulate(0.05, 1e-3)
     with pytest.raises(ValueError, match="stop must be below 1"):
         run.force(1, mean=True)
-    with pytest.raises(ValueError, match="needs the model of the run"):
-        fb.load(run.save(tmp_path / "run")).force(mean=True)
     with pytest.raises(ValueError, match="the mean force needs samples"):
         model.simulate(0.05).force(mean=True)

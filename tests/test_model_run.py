@@ -455,3 +455,23 @@ def test_folder_that_does_not_exist_is_an_error(run, tmp_path):
 def test_model_survives_pickling(model):
     again = pickle.loads(pickle.dumps(model))
     np.testing.assert_array_equal(again.simulate(PERIOD).q, model.simulate(PERIOD).q)
+
+
+@pytest.mark.parametrize(
+    ("ask", "message"),
+    [
+        (lambda run: run.displacement(0.1, body=1), "body must be below 1, the number of beams, got 1"),
+        (lambda run: run.stress(0.1, body="tip"), "body must be below 1, the number of beams, got 'tip'"),
+        (lambda run: run.force("below"), "stop must be below 1, the number of stops, got 'below'"),
+        (lambda run: run.to_csv("x", quantities="stress"), "quantities must be a list, got 'stress'"),
+        (lambda run: run.to_csv("x", places=0.1), "places must be a list, got 0.1"),
+        (lambda run: run.model.simulate("1", 1e-3), "duration must be numbers, got '1'"),
+        (lambda run: run.model.simulate(1.0, "1 ms"), "dt must be numbers, got '1 ms'"),
+        (lambda run: run.model.simulate(1.0, start="rest"), "start must be numbers, got 'rest'"),
+        (lambda run: run.model.scene.reduce(2.5), "modes must be a whole number or a list of them, got 2.5"),
+        (lambda run: replace(run.model.scene, stops=[fb.Stop(0.1, Hertz(1e8), on=(1, 0))]), "must name a body, and"),
+    ],
+)  # fmt: skip
+def test_bad_arguments_are_refused_in_words(run, ask, message):
+    with pytest.raises(ValueError, match=message):
+        ask(run)

@@ -18,6 +18,15 @@ CELLS = {
     "bar": "run = model.simulate(0.3, 1e-3, progress=True)",
     "run": "run",
     "orbit": "model.orbit()",
+    "reactions": "run.reactions()",
+    "table": "run.to_dataframe(places=[0.5], quantities=['stress', 'reactions']).abs().max()",
+    "data set": "run.to_xarray()",
+    "short": """
+import solvers
+shown = [model, run, run.contacts, run.energy, run.transitions, run.cost, run.reactions(), run.reactions()[0],
+         run.extremes(), run.floor_spectrum(0.25, [50.0]), model.frequency_response([50.0], 'base', 0.5), model.system,
+         fb.psd(run.displacement(0.5), 1e-3), fb.moments(run.displacement(0.5)), drive, damping, beam, *stops]
+print(max(len(repr(one)) for one in shown), sorted(set(solvers.__all__) - set(dir(solvers))))""",
     "figure": "figure = fb.plot.mode_shapes(model)\nfigure",
     "again": "figure",
     "shown": "figure.show()",
@@ -44,10 +53,23 @@ def kinds(shown):
     return [kind for output in shown for kind in output.get("data", {})]
 
 
-@pytest.mark.parametrize("name", ["model", "run", "orbit"])
+@pytest.mark.parametrize("name", ["model", "run", "orbit", "reactions"])
 def test_results_are_tables(outputs, name):
     (shown,) = outputs[name]
     assert "<table>" in shown.data["text/html"]
+
+
+def test_every_object_shows_on_a_few_lines_and_completes(outputs):
+    length, missing = outputs["short"][-1].text.strip().split(" ", 1)
+    assert int(length) < 600
+    assert missing == "[]"
+
+
+def test_tables_of_pandas_and_xarray_show_themselves(outputs):
+    pytest.importorskip("pandas", reason="the extra notebook is not installed")
+    pytest.importorskip("xarray", reason="the extra notebook is not installed")
+    assert "stress at 0.5 m [N/m²]" in outputs["table"][0].data["text/plain"]
+    assert "displacement" in outputs["data set"][0].data["text/html"]
 
 
 @pytest.mark.parametrize("name", ["figure", "again", "shown", "with magic words"])

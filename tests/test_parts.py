@@ -3,6 +3,9 @@
 import importlib
 import subprocess
 import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -58,9 +61,25 @@ def test_a_part_gets_its_arguments_and_returns_a_tuple(problem):
     assert np.count_nonzero(loaded) == 1
 
 
+def test_two_threads_compile_a_part_once(problem, monkeypatch):
+    made = []
+
+    def slow(signature):
+        time.sleep(0.1)
+        made.append(signature)
+        return lambda function: SimpleNamespace(address=len(made))
+
+    monkeypatch.setattr(parts, "c_function", slow)
+    parts.part(PLACE, types.void)(lambda problem: None)
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(lambda _: parts.load({"problem": PROBLEM}, [PLACE]), range(4)))
+    assert len(made) == 1
+    assert parts.ADDRESSES[PLACE] == 1
+
+
 def test_every_place_has_a_function():
     importlib.import_module("solvers.exponential.method")
-    groups = parts.EVERY_RUN, parts.ENERGY, parts.BORDERS, parts.MANY_STOPS
+    groups = parts.EVERY_RUN, parts.ENERGY, parts.BORDERS, parts.TWO_STOPS, parts.MANY_STOPS
     assert sorted(place for group in groups for place in group) == list(range(len(parts.ADDRESSES)))
     assert sorted(parts._DECLARED) == list(range(len(parts.ADDRESSES)))
 
@@ -73,7 +92,8 @@ def test_every_place_has_a_function():
         ("run(dt=1e-3, method=Exponential(ledger=False))", "EVERY_RUN"),
         ("run(tangent=True)", "EVERY_RUN"),
         ("run(KelvinVoigt(1e6, 0.5, clamp=True))", "[*EVERY_RUN, *BORDERS]"),
-        ("run(stops=4)", "[*EVERY_RUN, *MANY_STOPS]"),
+        ("run(stops=2)", "[*EVERY_RUN, *TWO_STOPS]"),
+        ("run(stops=4)", "[*EVERY_RUN, *TWO_STOPS, *MANY_STOPS]"),
     ],
 )
 def test_a_run_loads_what_it_needs(run, needed):

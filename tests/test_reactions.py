@@ -183,6 +183,7 @@ def test_extremes_tables_and_bad_input():
     assert abs(clamp.largest("moment")[0]) == np.abs(clamp.moment).max()
     assert [type(one.part).__name__ for one in found] == ["Clamped", "Pinned", "Spring", "Dashpot"]
     assert "Dashpot at z = 0.22 m" in str(found)
+    assert "<td>Dashpot at z = 0.22 m</td>" in found._repr_html_()
     assert len(repr(found)) < 200
     with pytest.raises(ValueError, match="quantity must be 'force' or 'moment'"):
         clamp.extremes("stress")

@@ -1,6 +1,7 @@
 """A run read from its file gives what the run gave: fields, reactions, spectra, ParaView; npz and HDF5, old files."""
 
 import json
+import subprocess
 import sys
 from importlib.util import find_spec
 
@@ -9,8 +10,9 @@ import pytest
 from problems import STEEL
 
 import fembeam as fb
-from contacts import Hertz, law
+from contacts import Hertz, Jenkins, law
 from fembeam.response.saved_readout import PLAIN
+from fembeam.results.files import summary
 
 SQUARE = fb.Section.rectangle(2.1e11, 7850.0, 0.01, 0.01)
 THIN = fb.Section.rectangle(2.1e11, 7850.0, 0.01, 0.005)
@@ -66,8 +68,10 @@ def readings(run):
         found |= {f"force of {one.name}": one.force, f"moment of {one.name}": one.moment}
     for stop in range(len(run.stops)):
         found |= {f"force {stop}": run.force(stop), f"indentation {stop}": run.indentation(stop)}
+        found[f"mean force {stop}"] = run.force(stop, mean=True)
     for i in range(len(run.strikers)):
         found["impactor"] = run.impactor_displacement(i)
+    found |= {"loss": run.losses.loss, "work": run.losses.history, "slip": run.losses.slip, "end": run.end}
     found["extremes"] = run.extremes("stress").highest
     with pytest.warns(UserWarning, match="not resolved"):
         found["floor"] = run.floor_spectrum(0.33, [50.0, 300.0]).acceleration
@@ -91,7 +95,7 @@ def test_all_is_read_from_the_file(run, tmp_path, suffix):
 
 
 def test_nothing_of_elements_times_samples_is_stored(run, tmp_path):
-    """A sample adds t, q, q̇, its contact forces and loads, y and ẏ, four energies."""
+    """A sample adds t, q, q̇, contact forces, their means and work, loads, y and ẏ, four energies."""
     model = run.model
     sizes = []
     for count in (1000, 2000):
@@ -100,7 +104,55 @@ def test_nothing_of_elements_times_samples_is_stored(run, tmp_path):
         sizes.append(arrays)
     more = sum(sizes[1].values()) - sum(sizes[0].values())
     n, stops, loads, frame, energies = len(model.omega), len(run.stops), 5, 2, 4
-    assert more == 1000 * (1 + 2 * n + stops + loads + frame + energies)
+    assert more == 1000 * (1 + 2 * n + 3 * stops + loads + frame + energies)
+
+
+@pytest.fixture(scope="module")
+def rubbing():
+    """A run with a friction damper and a stop."""
+    damper = fb.Element(L, Jenkins(2e4, 0.05))
+    scene = fb.Scene(fb.Beam(L, SQUARE), [fb.Clamped(0.0)], elements=[damper], damping=fb.ModalDamping(0.01),
+                     stops=[fb.Stop(L, Hertz(1e8), 1e-4)], base=fb.Harmonic(1e-4, 300.0))  # fmt: skip
+    return scene.reduce(2).simulate(0.1, 1e-3)
+
+
+READ_ELSEWHERE = """
+import json, sys
+import numpy as np
+import fembeam as fb
+from fembeam.results.files import summary
+run = fb.load(sys.argv[1])
+assert run.model is None
+log, found = run.transitions, summary(run)
+print(json.dumps({"events": list(log.event), "t": log.t.tolist(), "work": log.work.tolist(), "repr": repr(log),
+                  "contact": log.contact.tolist(), "border": log.border.tolist(), "slid": log.slid().tolist(),
+                  "mean": run.force(0, mean=True).tolist(), "of the element": run.force(1, mean=True).tolist(),
+                  "omega": found["omega"], "zeta": found["zeta"]}))
+"""
+
+
+@pytest.mark.parametrize("suffix", [".npz", HDF5])
+def test_stick_and_slip_are_read_by_a_process_that_knows_no_scene(rubbing, tmp_path, suffix):
+    path = rubbing.save(tmp_path / f"run{suffix}")
+    read = subprocess.run([sys.executable, "-c", READ_ELSEWHERE, path], capture_output=True, text=True, check=True)
+    found, log, model = json.loads(read.stdout), rubbing.transitions, rubbing.model
+    assert {"stick", "slip"} <= set(log.event)
+    assert (found["events"], found["repr"]) == (list(log.event), repr(log))
+    for name in ("t", "work", "contact", "border"):
+        assert found[name] == getattr(log, name).tolist()
+    assert found["slid"] == log.slid().tolist()
+    assert (found["mean"], found["of the element"]) == tuple(rubbing.force(i, mean=True).tolist() for i in (0, 1))
+    assert (found["omega"], found["zeta"]) == (pytest.approx(model.omega, rel=1e-14), model.zeta.tolist())
+    assert found["omega"] == summary(rubbing)["omega"]
+    assert fb.load(path).transitions.contact.dtype == log.contact.dtype
+
+
+def test_a_run_without_memory_or_samples_keeps_empty_ones(run, tmp_path):
+    again = fb.load(run.save(tmp_path / "run"))
+    assert len(again.transitions) == 0
+    bare = fb.load(run.model.simulate(0.01).save(tmp_path / "bare"))
+    with pytest.raises(ValueError, match="the mean force needs samples"):
+        bare.force(mean=True)
 
 
 def test_a_beam_on_two_supports_without_anything_else(tmp_path):
@@ -111,6 +163,14 @@ def test_a_beam_on_two_supports_without_anything_else(tmp_path):
     np.testing.assert_array_equal(again.acceleration(0.5, absolute=True), run.acceleration(0.5))
     with pytest.raises(ValueError, match="every section must know its outer fibre"):
         again.stress(0.5)
+
+
+def test_what_is_no_saved_run_is_refused(run, tmp_path):
+    (tmp_path / "table.csv").write_text("t,a\n0,0\n")
+    with pytest.raises(ValueError, match=r"it is neither npz nor HDF5; give a file of Run\.save"):
+        fb.load(tmp_path / "table.csv")
+    with pytest.raises(FileNotFoundError, match=r"there is no folder .*nowhere to write run.npz to; make it first"):
+        run.save(tmp_path / "nowhere" / "run")
 
 
 def changed(path, change):
@@ -126,17 +186,21 @@ def test_a_file_of_an_earlier_version_says_what_it_lacks(run, tmp_path):
     path = run.save(tmp_path / "run.npz")
 
     def older(about, arrays):
-        del about["readout"]
-        for name in (*PLAIN, "reactions"):
+        del about["readout"], about["events"]
+        for name in (*PLAIN, "reactions", "mean_force", "transitions", "zeta"):
             del arrays[name]
 
     changed(path, older)
     again = fb.load(path)
     np.testing.assert_array_equal(again.displacement(0.3), run.displacement(0.3))
     for ask in (lambda: again.moment(0.1), again.reactions, lambda: again.acceleration(0.1),
-                lambda: again.displacement(0.1, absolute=True), lambda: again.to_vtu(tmp_path / "x")):  # fmt: skip
+                lambda: again.displacement(0.1, absolute=True), lambda: again.to_vtu(tmp_path / "x"),
+                lambda: again.force(mean=True)):  # fmt: skip
         with pytest.raises(ValueError, match="a run read from a file that does not keep it"):
             ask()
+    with pytest.raises(ValueError, match="file is of an earlier version, without transitions; simulate again"):
+        again.transitions  # noqa: B018
+    assert (summary(again)["omega"], summary(again)["zeta"]) == (None, None)
     np.testing.assert_array_equal(fb.load(again.save(tmp_path / "again")).q, run.q)
 
 
@@ -150,6 +214,11 @@ def test_a_file_of_an_earlier_version_says_what_it_lacks(run, tmp_path):
         (lambda about, arrays: about["readout"]["beams"].pop(), "bodies"),
         (lambda about, arrays: about["readout"].update(base=17), "base"),
         (lambda about, arrays: about["readout"]["parts"].pop(), "parts"),
+        (lambda about, arrays: arrays.update(mean_force=arrays["mean_force"][:, 1:]), "mean_force must have shape"),
+        (lambda about, arrays: arrays.update(zeta=arrays["zeta"] * np.nan), "zeta must be finite"),
+        (lambda about, arrays: arrays.update(transitions=np.full((1, 9), 7.0)), "transitions must name contacts"),
+        (lambda about, arrays: arrays.update(transitions=np.full((1, 9), 1.0)), "index 1 is out of bounds"),
+        (lambda about, arrays: arrays.update(transitions=np.ones((1, 8))), "transitions must have shape"),
     ],
 )
 def test_contradictions_are_refused(run, tmp_path, change, message):

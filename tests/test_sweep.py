@@ -1,11 +1,14 @@
 """Sine sweeps: SciPy's chirp, derivatives in closed form and by differences, nodes, resonances, scene files."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.interpolate import BPoly
 from scipy.signal import StateSpace, chirp, lsim
 
 import fembeam as fb
+from contacts import Hysteretic
 from fembeam.scene_file import read
 
 KINDS = ["linear", "logarithmic"]
@@ -47,6 +50,25 @@ def test_nodes_keep_their_promise(kind):
         inside = BPoly.from_derivatives(dt * np.arange(len(rows)), rows)(t)
         error = np.abs(inside - y(t)).max() / np.abs(y(t)).max()
         assert 0.01 * rtol < error < rtol
+
+
+def test_sweeps_over_a_branch_jump_at_its_folds():
+    """Up, the motion stays on the upper branch to the fold; down, on the branch without contact until it grazes."""
+    section = fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)
+    scene = fb.Scene(fb.Beam(0.2599, section), [fb.Clamped(0.0)], [fb.LumpedMass(0.24445, 25.4e-3, 3e-6)],
+                     stops=[fb.Stop(0.24445, Hysteretic.lankarani_nikravesh(2.1e8, 0.5), gap=3e-3)],
+                     damping=fb.ModalDamping(0.02), base=fb.Harmonic(2e-4, 130.0))  # fmt: skip
+    model = scene.reduce(1)
+    special = model.branch("omega", span=(90.0, 150.0)).run().special
+    grazing, fold = (max(one.parameter for one in special if one.mark == kind) for kind in ("grazing", "fold"))
+    last = []
+    for start, end in ((90.0, 150.0), (150.0, 90.0)):
+        sweep = fb.SineSweep(2e-4, start, end, 60.0)
+        run = model.under(replace(scene, base=sweep)).simulate(60.0)
+        touched = sweep.omega(run.contacts.t_in)
+        last.append(touched[(touched > 100.0) & (touched < 149.0)].max())
+    assert fold - 1.0 < last[0] < fold + 1.5
+    assert grazing - 1.0 < last[1] < grazing + 0.2
 
 
 @pytest.mark.parametrize(("start", "end"), [(60.0, 160.0), (160.0, 60.0)])

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fembeam.excitation.upsampling import FEWEST_POINTS, fine_grid
-from fembeam.support import number
+from fembeam.support import is_whole, number
 
 HERMITE_CONSTANT = 46080.0  # |error| <= h^6/46080 max|s^(6)| for the quintic Hermite interpolant: 6! * 2^6
 HERMITE_RMS = math.sqrt(math.factorial(13))  # rms of the error <= h^6/√13! rms of s^(6): see `LineSpectrum.nodes`
@@ -40,7 +40,7 @@ def checked_band(name: str, band: Any) -> tuple[float, float]:
 
 def checked_order(order: Any) -> int:
     """The number of derivatives as an int >= 0, or a clear error."""
-    if isinstance(order, bool) or not isinstance(order, (int, np.integer)) or order < 0:
+    if not is_whole(order) or order < 0:
         raise ValueError(f"order of the derivative must be an integer of at least 0, got {order!r}")
     return int(order)
 

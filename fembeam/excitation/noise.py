@@ -18,7 +18,7 @@ import numpy as np
 from fembeam.excitation.line_spectrum import checked_band, checked_order
 from fembeam.excitation.noise_lines import NoiseLines
 from fembeam.excitation.psd import Psd, RollOff, Table, checked_table
-from fembeam.support import number
+from fembeam.support import is_whole, number
 
 AUTOMATIC_LINES = 4096  # kurtosis 3 - 1.5/4096: Gaussian to far below any sampling error
 FEWEST_LINES = 8  # below this a sum of cosines is visibly not Gaussian (kurtosis under 2.8)
@@ -216,6 +216,6 @@ def _checked_seed(seed: Any) -> int | np.random.SeedSequence:
     """A seed that gives the same bits every time, or a clear error."""
     if isinstance(seed, np.random.SeedSequence):
         return seed
-    if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
+    if not is_whole(seed) or seed < 0:
         raise ValueError(f"BandNoise seed must be an integer of at least 0 or a SeedSequence, got {seed!r}")
     return int(seed)

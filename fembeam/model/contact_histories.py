@@ -59,6 +59,7 @@ class ContactHistories:
     def _stop(self, stop: int) -> int:
         """The number of a contact, checked."""
         count = len(self.stops)
-        require(-count <= stop < count, f"stop must be below {count}, the number of stops", stop, "Run",
+        whole = isinstance(stop, (int, np.integer))
+        require(whole and -count <= stop < count, f"stop must be below {count}, the number of stops", stop, "Run",
                 "count from 0")  # fmt: skip
         return stop

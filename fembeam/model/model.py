@@ -21,7 +21,7 @@ import solvers
 from fembeam.model.equations import ModalEquations
 from fembeam.model.shapes import Shapes, Vector
 from fembeam.scene import with_signals
-from fembeam.support import Part, Printed, note, require, require_positive
+from fembeam.support import Part, Printed, note, require, require_no_text, require_positive
 from solvers.problem import counted
 
 if TYPE_CHECKING:
@@ -189,6 +189,7 @@ class Model(Printed, ModalEquations):
         from fembeam.model.run import Run
         from fembeam.support import bar
 
+        require_no_text("Model.simulate", duration=duration, dt=dt, start=start)
         q, q_dot, memory = initial_states.begun(self, self.rest() if start is None else start)
         lasting = self.lasting(duration) if 0.0 < duration < np.inf else self
         with bar(duration, progress) as report:

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 import solvers
 from fembeam.model.equations import load_period
 from fembeam.scene import unit_of
-from fembeam.support import Part, Printed, require
+from fembeam.support import Part, Printed, is_whole, require
 from solvers.orbits import periodic_orbit as periodic
 from solvers.orbits import shooting
 from solvers.orbits import shots as chain
@@ -164,7 +164,7 @@ def orbit(model: Model, period: int, start: ArrayLike | Orbit | None, shots: int
 
 def checked_period(period: int) -> int:
     """A whole number of load periods."""
-    whole = isinstance(period, (int, np.integer)) and not isinstance(period, bool)
+    whole = is_whole(period)
     require(whole and period >= 1, "period counts periods of the load and must be a whole number above 0", period,
             "orbit", "period=2 is a 1/2 subharmonic")  # fmt: skip
     return int(period)

@@ -13,7 +13,7 @@ import reduction
 from fembeam.model.model import Model
 from fembeam.model.shapes import Shapes
 from fembeam.scene import LocalCoordinate, Matrices, loaded, watched
-from fembeam.support import require
+from fembeam.support import is_whole, require
 
 if TYPE_CHECKING:
     from fembeam.scene import Scene
@@ -133,7 +133,9 @@ def _numbers(scene: Scene, modes: Any, elements: int | None, interface: bool) ->
         require(modes == "all" and elements is not None, "modes must be a count, a list, or 'all' with elements given",
                 modes, "Scene.reduce", "say how many elements the mesh shall have")  # fmt: skip
         return tuple(range(scene.matrices(elements).M.shape[0]))
-    whole = isinstance(modes, (int, np.integer)) and not isinstance(modes, bool)
+    whole = is_whole(modes)
+    require(whole or np.ndim(modes) == 1, "modes must be a whole number or a list of them", modes, "Scene.reduce",
+            "ask for modes=2, or modes=[0, 2]")  # fmt: skip
     require(not whole or modes <= MOST_DOFS, f"modes must be at most {MOST_DOFS}", modes, "Scene.reduce", "take fewer")
     listed = list(range(int(modes))) if whole else [int(i) for i in modes]
     enough = len(listed) > 0 or (interface and whole and modes == 0)

@@ -16,7 +16,7 @@ import solvers
 from fembeam.model.contact_histories import ContactHistories
 from fembeam.model.shapes import Shapes
 from fembeam.scene import ON, Source
-from fembeam.support import Part, Printed
+from fembeam.support import Part, Printed, require
 from solvers.problem import Losses, counted
 
 if TYPE_CHECKING:
@@ -57,6 +57,7 @@ class Run(ContactHistories, Printed):
     scene: str
     model: Model | None = None
     stored_forces: Vector | None = None  # (m, k) of a run read from a file
+    stored_means: Vector | None = None  # (m, k) likewise, over each sample
     stored: Readout | None = None  # likewise
     others: tuple[Shapes, ...] = ()  # of the further beams
     source: Source | None = None  # of a run made from a scene file
@@ -91,22 +92,16 @@ class Run(ContactHistories, Printed):
 
     @cached_property
     def transitions(self) -> Any:
-        """Borders that laws with memory passed, see `solvers.problem.Transitions`: times of stick, slip and yield.
-
-        ValueError for a run read from a file.
-        """
+        """Borders that laws with memory passed, see `solvers.problem.Transitions`; ValueError for old files."""
         if self.borders is None:
-            raise ValueError("a run read from a file has no transitions; simulate again")
+            raise ValueError("this run's file is of an earlier version, without transitions; simulate again")
         return self.borders()
 
     @cached_property
     def losses(self) -> Losses:
-        """What each stop and element took, see `solvers.problem.Losses`: work, loss, path of slip.
-
-        ValueError for a run read from a file.
-        """
+        """What each stop and element took, see `solvers.problem.Losses`; ValueError for old files."""
         if self.lost is None:
-            raise ValueError("a run read from a file has no losses; simulate again")
+            raise ValueError("this run's file is of an earlier version, without losses; simulate again")
         return self.lost()
 
     @property
@@ -168,7 +163,7 @@ class Run(ContactHistories, Printed):
         """A derivative of u at z (k,) or (k, j), with that of the frame's motion if absolute."""
         from fembeam.response import frame_motion
 
-        values = rates @ (self.shapes, *self.others)[body](z).T
+        values = rates @ self._beam(body)(z).T
         return (values.T + frame_motion(self, order)).T if absolute else values
 
     def reactions(self) -> Reactions:
@@ -226,13 +221,21 @@ class Run(ContactHistories, Printed):
         """
         from fembeam.response import extremes, rows_of
 
-        places = (self.shapes, *self.others)[body].nodes if z is None else np.atleast_1d(np.asarray(z, dtype=float))
+        places = self._beam(body).nodes if z is None else np.atleast_1d(np.asarray(z, dtype=float))
         return extremes(self.t, self.q, *rows_of(self, quantity, places, body))
+
+    def _beam(self, body: int) -> Shapes:
+        """A beam's shapes; ValueError unless there is one of that number."""
+        beams = (self.shapes, *self.others)
+        require(body in range(len(beams)), f"body must be below {len(beams)}, the number of beams", body, "Run",
+                "0 is the scene's own")  # fmt: skip
+        return beams[body]
 
     def _field(self, quantity: str, z: ArrayLike, body: int) -> Vector:
         """A field over time: (k,) at one z, (k, j) at z (j,)."""
         from fembeam.response import rows_of
 
+        self._beam(body)
         places = np.asarray(z, dtype=float)
         shapes, _, offset = rows_of(self, quantity, np.atleast_1d(places), body)
         values = self.q @ shapes.T + offset
@@ -285,8 +288,8 @@ class Run(ContactHistories, Printed):
         """Contact force (k,) of a stop, N or N m, from its law and the entry rate latched at the time; of an element F.
 
         ``mean``: over each sample (halfway to its neighbours) instead of at it, so that contacts shorter than a sample
-        are seen: the trapezoidal rule over the samples gives the log's impulses exactly. Needs the model, whose law
-        shares the impulse of a contact among samples: ValueError for a run read from a file.
+        are seen: the trapezoidal rule over the samples gives the log's impulses exactly. ValueError for a run without
+        samples, or read from a file of an earlier version.
         """
         if mean:
             from fembeam.response import mean_force
@@ -307,7 +310,7 @@ class Run(ContactHistories, Printed):
         """Write everything to one file, whole or not at all; read it with `load`.
 
         ``.npz``, or HDF5 if the path ends in .h5 or .hdf5 (ImportError without h5py). The file holds what the methods
-        read, but no laws: `force` with ``mean`` needs the run itself.
+        read, so that neither the scene nor its laws are needed; `model` is None then.
         """
         from fembeam.model.run_file import save
 

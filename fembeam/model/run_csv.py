@@ -51,6 +51,7 @@ ELSEWHERE = ("indentation", "force", "reactions")  # not at places: of stops and
 def write(run: Run, folder: Path, stride: int = 1, **chosen: Any) -> list[Path]:
     """Write `histories.csv` and `contacts.csv`; see `Run.to_csv`."""
     kept = histories(run, stride, **chosen)
+    folder.mkdir(parents=True, exist_ok=True)
     units = ((name, _unit_of_column(run, name), column) for name, column in run.contacts.arrays().items())
     log = {f"{name} [{unit}]" if unit else name: column for name, unit, column in units}
     return [_write(folder / "histories.csv", kept), _write(folder / "contacts.csv", log)]
@@ -66,6 +67,8 @@ def histories(
 ) -> dict[str, Vector]:
     """Columns of every `stride`-th sample, by name and unit: quantities at places, of stops, of supports."""
     require(stride >= 1, "stride must be at least 1", stride, "Run", "1 keeps every sample")
+    require(not isinstance(quantities, str), "quantities must be a list", quantities, "Run", "put it in brackets")
+    require(places is None or np.ndim(places) == 1, "places must be a list", places, "Run", "put it in brackets")
     asked = USUAL if quantities is None else quantities
     unknown = [name for name in asked if name not in UNITS]
     require(not unknown, f"quantities must be among {', '.join(UNITS)}", unknown, "Run", "choose from these")

@@ -18,26 +18,28 @@ from fembeam.model.shapes import Shapes
 from fembeam.response import READOUT_UNITS, packed, unpacked
 from fembeam.scene import Source
 from fembeam.support import versions, written_whole
-from solvers.problem import optional
+from solvers.problem import Losses, Transitions, optional
 
 OLD_NAMES = {"contact_floored": "contact_entry_rate_clipped"}  # in files of earlier versions
 
 FORMAT = 2
 HDF5 = (".h5", ".hdf5")
-SIGNATURE = b"\x89HDF\r\n\x1a\n"  # of HDF5
+SIGNATURE, ZIPPED = b"\x89HDF\r\n\x1a\n", b"PK"  # of HDF5 and npz
 UNITS = {
     "t, contact_t_in, contact_t_out": "s",
     "q": "m √kg",
     "q_dot": "m √kg/s",
-    "force, contact_peak_force": "N",
+    "force, mean_force, contact_peak_force": "N",
     "contact_speed_in, contact_speed_out": "m/s",
     "contact_peak_indentation, nodes, stops[:, 0], stops[:, 2]": "m",
     "contact_impulse": "N s",
-    "contact_energy_loss, energy_*": "J",
+    "contact_energy_loss, energy_*, work": "J",
+    "losses": "of each contact: work / J, stored / J, slip / m",
     "shapes, directions": "1/√kg",
     "strikers": "kg",
     **READOUT_UNITS,
     "on": "of each contact: the beam it pushes, whether from frame 0, body 1 or impactor 2, the number of that",
+    "transitions": "rows of contact, t / s, border, number in events, δ / m, δ̇ / m/s, F / N, impulse / N s, work / J",
     "kinds": "(of rotation, always acting) of each contact: rad for m, N m for N where it is of rotation",
 }
 
@@ -85,7 +87,38 @@ def _contents(run: Run) -> tuple[str, dict[str, Any]]:
     if run.model is not None or run.stored is not None:  # else from a file of an earlier version
         about["readout"], read = packed(run.readout)
         arrays |= read
+    if run.model is not None or run.stored_means is not None:
+        arrays["mean_force"] = _means(run)
+    if run.borders is not None:
+        about["events"], arrays["transitions"] = _packed(run.transitions)
+    if run.lost is not None:
+        lost = run.losses
+        arrays["losses"], arrays["work"] = np.stack((lost.work, lost.stored, lost.slip), axis=1), lost.history
+    if run.end is not None:
+        arrays["end"] = run.end
     return json.dumps(about, default=float), arrays
+
+
+def _means(run: Run) -> Any:
+    """Mean forces (m, k) of all contacts; NaN where there are too few samples for one."""
+    if len(run.t) < 2:
+        return np.full((len(run.stops), len(run.t)), np.nan)
+    means = [run.force(stop, mean=True) for stop in range(len(run.stops))]
+    return np.array(means).reshape(len(means), len(run.t))
+
+
+def _packed(log: Transitions) -> tuple[list[str], Any]:
+    """Names of events, and the log as a table (k, 9) that numbers them."""
+    columns = {f.name: getattr(log, f.name) for f in fields(log)}
+    events = sorted(set(log.event))
+    columns["event"] = [events.index(event) for event in log.event]
+    return events, np.array(list(columns.values()), dtype=float).T
+
+
+def _unpacked(events: list[str], table: Any) -> list[Any]:
+    """The columns of the log of that table."""
+    contact, t, border, event, *others = table.T.copy()
+    return [contact.astype(int), t, border.astype(int), np.array(events, dtype=object)[event.astype(int)], *others]
 
 
 def load(path: str | os.PathLike[str]) -> Run:
@@ -122,8 +155,10 @@ def load(path: str | os.PathLike[str]) -> Run:
 def _read(path: Path) -> dict[str, Any]:
     """Arrays by name, and the words."""
     with path.open("rb") as file:
-        hdf5 = file.read(len(SIGNATURE)) == SIGNATURE
-    if not hdf5:
+        begin = file.read(len(SIGNATURE))
+    if not begin.startswith((SIGNATURE, ZIPPED)):
+        raise ValueError("it is neither npz nor HDF5; give a file of Run.save")
+    if begin != SIGNATURE:
         with np.load(path, allow_pickle=False) as data:
             return {name: data[name] for name in data.files}
     with optional("h5py", "a run in HDF5").File(path, "r") as group:
@@ -143,6 +178,12 @@ def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run
     bodies = sum(name.split("_")[0] == "nodes" for name in arrays)
     shapes = [Shapes(arrays[f"nodes{i}"], arrays[f"shapes{i}"]) for i in ("", *(f"_{j}" for j in range(1, bodies)))]
     nodes = [one.nodes for one in shapes]
+    transitions = losses = None
+    if "losses" in arrays:
+        work, stored, slip = arrays["losses"].T
+        losses = partial(Losses, work, stored, slip, arrays["work"])
+    if "transitions" in arrays:
+        transitions = partial(Transitions, *_unpacked(about["events"], arrays["transitions"]))
     return Run(
         *(arrays["t"], arrays["q"], arrays["q_dot"]),
         contacts=solvers.ContactLog(*(arrays[f"contact_{f.name}"] for f in fields(solvers.ContactLog))),
@@ -155,6 +196,10 @@ def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run
         strikers=arrays["strikers"],
         scene=about["scene"],
         stored_forces=arrays["force"],
+        stored_means=arrays.get("mean_force"),
+        borders=transitions,
+        lost=losses,
+        end=arrays.get("end"),
         stored=unpacked(about["readout"], arrays, nodes) if "readout" in about else None,
         others=tuple(shapes[1:]),
         source=source,

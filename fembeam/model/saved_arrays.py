@@ -3,21 +3,25 @@
 k samples, n coordinates, m contacts, b nodes of a beam, c entries of the log:
 t (k,), q, q_dot (k, n), force (m, k), stops (m, 3), kinds (m, 2), on (m, 3), directions (m, n), strikers (i,),
 nodes (b,), shapes (2b, n), contact_* (c,), energy_* (k,) but energy_initial; what `fembeam.response.readout` reads a
-run with.
+run with; not of earlier versions mean_force (m, k), zeta (n,), transitions (r, 9), losses (m, 3), work (k, m) and
+end (2n + l,).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
 from fembeam.response import READOUT_FINITE, expected_readout
 from fembeam.scene import ON
+from solvers.problem import Transitions
 
 Shape = tuple[int, ...]
-FINITE = {"shapes", "stops", "directions", "strikers", *READOUT_FINITE}
+TRANSITION_COLUMNS = len(fields(Transitions))
+FINITE = {"transitions", "end", "shapes", "stops", "directions", "strikers", *READOUT_FINITE}
 
 
 def check(arrays: Mapping[str, Any]) -> None:
@@ -37,6 +41,9 @@ def check(arrays: Mapping[str, Any]) -> None:
     most = [beams, len(ON), max(beams, len(arrays["strikers"]))]
     whole = arrays["on"].dtype.kind in "iu" and np.all((arrays["on"] >= 0) & (arrays["on"] < most))
     _need(whole, f"on must hold whole numbers from 0, below {most}")
+    if "transitions" in arrays:
+        contact, m = arrays["transitions"][:, 0], len(arrays["stops"])
+        _need(np.all((contact >= 0) & (contact < m)), f"transitions must name contacts, 0 to {m - 1}")
     _check_log(arrays)
 
 
@@ -45,6 +52,10 @@ def expected(arrays: Mapping[str, Any]) -> dict[str, Shape]:
     (k, n), m, entries = arrays["q"].shape, len(arrays["stops"]), arrays["contact_stop"].size
     shapes: dict[str, Shape] = {"t": (k,), "q_dot": (k, n), "force": (m, k), "stops": (m, 3), "directions": (m, n)}
     shapes |= {"kinds": (m, 2), "on": (m, 3)}
+    later: dict[str, Shape] = {"mean_force": (m, k), "losses": (m, 3), "work": (k, m)}
+    later["transitions"] = len(arrays.get("transitions", ())), TRANSITION_COLUMNS
+    later["end"] = (max(2 * n, len(arrays.get("end", ()))),)
+    shapes |= {name: shape for name, shape in later.items() if name in arrays}
     shapes["strikers"] = (min(arrays["strikers"].size, n),)
     shapes |= {name: (entries,) for name in arrays if name.startswith("contact_")}
     shapes |= {name: () if name == "energy_initial" else (k,) for name in arrays if name.startswith("energy_")}

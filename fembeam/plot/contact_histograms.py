@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fembeam.plot.style import BLUE, GREEN, RED, Vector, plain_decades, styled
+from fembeam.scene import unit_of
 from solvers.problem import counted
 
 if TYPE_CHECKING:
@@ -39,10 +40,11 @@ def contacts(run: Run, discard: float = 0.0, axes: Sequence[Axes] | None = None)
     if not np.any(kept):
         raise ValueError("the run has no finished contact to draw")
     figure, drawn = sheet(2, 2, (7.0, 4.8), axes)
-    speed = run.unit("speed").replace("/s", " s⁻¹")
+    turning = run.kinds[np.unique(log.stop[kept]), 0]
+    force, speed = unit_of("force", turning), unit_of("speed", turning).replace("/s", " s⁻¹")
     for axis, values, name, unit in (
         (drawn[0], 1e3 * (log.t_out - log.t_in)[kept], "duration", "ms"),
-        (drawn[1], log.peak_force[kept], "peak force", run.unit("force")),
+        (drawn[1], log.peak_force[kept], "peak force", force),
         (drawn[2], log.speed_in[kept], "entry speed", speed),
     ):
         _histogram(axis, values, name, unit)
@@ -64,7 +66,8 @@ def _histogram(axis: Axes, values: Vector, name: str, unit: str) -> None:
     bins = int(np.clip(np.sqrt(len(values)), FEWEST_BINS, MOST_BINS))
     axis.hist(values, np.histogram_bin_edges(values, bins, (0.0, top or 1.0)).tolist(), color=BLUE, alpha=0.7)
     axis.axvline(values.mean(), color=RED, linestyle="--")
-    axis.set_title(f"mean {values.mean():.4g} {unit} (dashed), largest {values.max():.4g} {unit}", fontsize=8)
+    of = "" if " or " in unit else f" {unit}"  # a mixed one is on the axis alone
+    axis.set_title(f"mean {values.mean():.4g}{of} (dashed), largest {values.max():.4g}{of}", fontsize=8)
     axis.set_xlabel(f"{name} / {unit}" + ", without the top 1 %" * cut)
     axis.set_ylabel("contacts")
     axis.yaxis.set_major_locator(MaxNLocator(integer=True))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fembeam.plot.style import Vector, plain_decades, styled
+from fembeam.plot.style import Vector, place_name, plain_decades, styled
 from fembeam.support import require
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ def floor_spectrum(run: Run, z: float | None = None, zeta: float = 0.05, axes: S
     omega = np.geomspace(min(lowest, highest / 10), highest, OSCILLATORS)
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
-        found = {f"z = {1e3 * place:.5g} mm": run.floor_spectrum(place, omega, zeta)}
+        found = {place_name(place): run.floor_spectrum(place, omega, zeta)}
     if run.readout.base is not None:
         found["frame"] = computed(run.t, frame_motion(run, 2), omega, zeta)
     figure = response_spectrum(found, axes)

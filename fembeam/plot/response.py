@@ -32,7 +32,8 @@ from fembeam.model import places
 from fembeam.plot.random import density_panels
 from fembeam.plot.run_signals import estimated, first_stop, natural, sampling_of, stationary
 from fembeam.plot.spectra import segment_for
-from fembeam.plot.style import BLUE, GREY, ORANGE, Vector, styled
+from fembeam.plot.style import BLUE, GREY, ORANGE, Vector, place_name, styled
+from fembeam.scene import unit_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -82,7 +83,8 @@ def time_history(
         stops = _stops_at(run, body, place)
         _shade_contacts(drawn, run, stops, lo, hi)
         _draw_forces(drawn[1], run, lo, hi)
-        title += f", contacts of {_listed(stops, run)} shaded" if len(stops) else ""
+        seen = np.isin(run.contacts.stop, stops) & _within(run, lo, hi)
+        title += f", contacts of {_listed(stops, run)} shaded" if seen.any() else ""
     drawn[-1].set_xlabel("time / s")
     beside = 0.0 if window else 0.01 * (hi - lo)  # so that a contact at the first instant is seen
     drawn[-1].set_xlim(lo - beside, hi + beside)
@@ -116,14 +118,15 @@ def mode_shapes(model: Model, axes: Axes | None = None) -> Figure:
 
     figure, (axis,) = sheet(1, 1, (7.0, 3.8), axes)
     z = np.linspace(0.0, model.scene.beam.length, 401)
+    unit = 1e3 if z[-1] <= 1.0 else 1.0
     shapes = model.phi(z)
     scale = np.abs(shapes).max(axis=0)
     axis.axhline(0.0, color=GREY, linewidth=0.6)
     for i in np.flatnonzero(scale)[:6]:  # other bodies' modes do not move this beam
         label = f"mode {model.names[i]}: {model.omega[i]:.{0 if model.omega[i] >= 1e3 else 1}f} rad/s"
-        axis.plot(1e3 * z, shapes[:, i] / scale[i], label=f"{label}, ζ = {model.zeta[i]:.3g}")
-    _mark_features(axis, model)
-    axis.set_xlabel("z / mm")
+        axis.plot(unit * z, shapes[:, i] / scale[i], label=f"{label}, ζ = {model.zeta[i]:.3g}")
+    _mark_features(axis, model, unit)
+    axis.set_xlabel("z / mm" if unit > 1.0 else "z / m")
     axis.set_ylabel("φ / max |φ|")
     rows = -(-len(axis.get_legend_handles_labels()[1]) // LEGEND_COLUMNS)
     axis.set_ylim(-1.15, 1.2 + LEGEND_ROW * rows)  # the legend has room of its own above the curves
@@ -180,7 +183,7 @@ def _listed(stops: NDArray[np.int64], run: Run) -> str:
 def _name(run: Run, body: int, z: float) -> str:
     """A place as words."""
     known = (name for name, at in places(run.shapes).items() if body == 0 and np.isclose(at, z))
-    return next(known, f"z = {1e3 * z:.5g} mm") + (f" of beam {body}" if body else "")
+    return next(known, place_name(z)) + (f" of beam {body}" if body else "")
 
 
 def _within(run: Run, lo: float, hi: float) -> NDArray[np.bool_]:
@@ -222,7 +225,8 @@ def _draw_forces(axis: Axes, run: Run, lo: float, hi: float) -> None:
             look.pop("label")
         axis.vlines(log.t_in[mine & short], 0.0, log.peak_force[mine & short], linewidth=1.2, **look)
     kind = "peak contact force" if len(drawn) > len(always) and np.all(short[inside]) else "contact force"
-    axis.set_ylabel(f"{'force' if len(always) else kind} / {run.unit('force')}")
+    unit = unit_of("force", run.kinds[drawn, 0]) if len(drawn) else run.unit("force")
+    axis.set_ylabel(f"{'force' if len(always) else kind} / {unit}")
     if len(run.stops) > 1 and len(drawn):
         axis.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=2, borderaxespad=0.0, fontsize=8)
     if len(drawn):
@@ -236,10 +240,10 @@ def _stop_name(run: Run, stop: int) -> str:
     """A contact as words."""
     (z, push, _), one_sided = run.stops[stop], not run.kinds[stop].any()
     side = f", {'below' if push > 0 else 'above'}" if one_sided else ""
-    return f"{run.name(stop)}{side}, z = {1e3 * z:.5g} mm"
+    return f"{run.name(stop)}{side}, {place_name(z)}"
 
 
-def _mark_features(axis: Axes, model: Model) -> None:
+def _mark_features(axis: Axes, model: Model, unit: float) -> None:
     """Supports as squares, masses as circles, stops as triangles on their side of the beam, elements as diamonds."""
     scene = model.scene
     stops = [stop for stop in scene.stops if not stop.coordinate.rotation]
@@ -255,4 +259,4 @@ def _mark_features(axis: Axes, model: Model) -> None:
     for label, points, marker, colour in marks:
         if points:
             z, height = np.array(points).T
-            axis.plot(1e3 * z, height, marker, color=colour, label=label, clip_on=False, markersize=7)
+            axis.plot(unit * z, height, marker, color=colour, label=label, clip_on=False, markersize=7)

@@ -53,6 +53,11 @@ def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
     return inside
 
 
+def place_name(z: float) -> str:
+    """A place in mm, beyond 1 m in m."""
+    return f"z = {z:.5g} m" if abs(z) > 1.0 else f"z = {1e3 * z:.5g} mm"
+
+
 def drawable(line: Spectrum, top: float) -> tuple[Vector, Vector]:
     """The curve up to the end of the axis, without ω = 0 (the mean is gone) and without zeros."""
     kept = (line.omega > 0) & (line.omega <= top) & (line.density > 0)

@@ -3,7 +3,7 @@
     F_j = (1/w_j) ∫ F dt over the cell of sample j, which ends halfway to its neighbours;   Σ F_j w_j = Σ impulses
 
 Impulses are those of the contact log. Of a contact over several cells the law says how its impulse is shared, on the
-cubic through δ and δ̇ at entry, samples and exit.
+cubics through δ and δ̇ at entry, samples and exit, by Gauss-Legendre quadrature of each part within one cell.
 """
 
 from __future__ import annotations
@@ -20,63 +20,96 @@ from fembeam.support import require
 
 if TYPE_CHECKING:
     from fembeam.model import Run
-    from solvers import ContactLog
 
 Vector = NDArray[np.float64]
-Motion = tuple[Vector, Vector, Vector]
-FINER = 16  # parts of every piece of the cubic, on which the force is integrated
+Cubics = tuple[Vector, Vector, Vector]  # t, δ, δ̇ where they begin and where they end (3, p), where a cell ends (p,)
+Force = Callable[[NDArray[np.int64], Vector, Vector, Vector], Vector]  # of the cubic's number, t, δ, δ̇
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
+BLOCK = 2**17  # cubics at once, in some 100 MB
 
 
 def mean_force(run: Run, stop: int) -> Vector:
     """Mean contact force (k,) of a stop over the cells of the samples, N; `Run.force` explains it."""
-    stop %= len(run.stops)
-    contact, t = run.readout.model.contact_rows[stop], run.t
+    t = run.t
     require(len(t) > 1, "the mean force needs samples", len(t), "Run.force", "give simulate a dt")
+    if run.stored_means is not None:
+        return run.stored_means[stop]
+    stop %= len(run.stops)
+    contact = run.readout.model.contact_rows[stop]
     edges = np.concatenate([t[:1], (t[1:] + t[:-1]) / 2, t[-1:]])
-    motion = (t, run.indentation(stop), run.indentation_rate(stop))
+    motion = np.array([t, run.indentation(stop), run.indentation_rate(stop)])
     if contact.always or contact.remembers:
-        return np.diff(np.interp(edges, *_grown(partial(force_at, run, stop, contact), motion, edges))) / np.diff(edges)
-    law, log = contact.law, run.contacts
-    mine = np.flatnonzero(log.stop == stop)
-    ends = np.where(np.isnan(log.t_out), t[-1], log.t_out)
-    first, last = (np.searchsorted(edges, times[mine], side="right") - 1 for times in (log.t_in, ends))
-    inside = (first == last) & (first >= 0) & (first < len(t))
-    impulse = np.bincount(first[inside], log.impulse[mine[inside]], len(t)).astype(float)
-    for entry in mine[~inside]:
-        knots = _knots(log, entry, ends[entry], motion)
-        impulse += log.impulse[entry] * _shares(law, abs(log.speed_in[entry]), knots, edges)
-    return impulse / np.diff(edges)
+        force = partial(force_at, run, stop, contact)
+        found = _impulses(lambda _, *at: force(*at), (motion[:, :-1], motion[:, 1:], edges[1:-1]))
+        impulse = np.append(found[:, 0], 0.0) + np.append(0.0, found[:, 1])
+    else:
+        impulse = _of_log(run, stop, contact.law, motion, edges)
+    return np.asarray(impulse / np.diff(edges))
 
 
-def _shares(law: Any, speed: float, knots: Motion, edges: Vector) -> Vector:
-    """Part (k,) of a contact's impulse in each cell."""
-    rate = max(speed, law.entry_rate_floor)
-    t, grown = _grown(lambda _, d, v: np.maximum(law.force(d, v, rate), 0.0), knots, edges)
-    if not grown[-1] > 0.0:
-        grown = t - t[0]
-    return np.diff(np.interp(edges, t, grown / grown[-1]))
+def _of_log(run: Run, stop: int, law: Any, motion: Vector, edges: Vector) -> Vector:
+    """The log's impulses in each cell (k,): of contacts within a cell whole, of others in shares."""
+    log, t = run.contacts, motion[0]
+    end = np.where(np.isnan(log.t_out), t[-1], log.t_out)
+    seen = np.flatnonzero((log.stop == stop) & (end > t[0]) & (log.t_in < t[-1]))
+    first, last = (np.searchsorted(edges, times[seen], side="right") - 1 for times in (log.t_in, end))
+    whole = first == last
+    impulse: Vector = np.bincount(first[whole], log.impulse[seen[whole]], len(t)).astype(float)
+    if whole.all():
+        return impulse
+    cut, rest = seen[~whole], 0.0 * seen[~whole]
+    begins = np.array([log.t_in[cut], rest, log.speed_in[cut]])
+    owner, a, b = _between(motion, begins, np.array([end[cut], rest, -log.speed_out[cut]]))
+    middle = (a[0] + b[0]) / 2
+    interval = np.clip(np.searchsorted(t, middle) - 1, 0, len(t) - 2)
+    rates = np.maximum(np.abs(log.speed_in[cut]), law.entry_rate_floor)[owner]
+    parts = _shares(law, owner, rates, (a, b, edges[1:-1][interval])) * log.impulse[cut][owner, None]
+    parts[(middle < t[0]) | (middle > t[-1])] = 0.0  # of contacts under way at the first or the last sample
+    for half in (0, 1):
+        impulse += np.bincount(interval + half, parts[:, half], len(t))
+    return impulse
 
 
-def _grown(force: Callable[[Vector, Vector, Vector], Any], knots: Motion, edges: Vector) -> tuple[Vector, Vector]:
-    """Times, the edges within among them, and the impulse grown till then, of a force of t, δ and δ̇ on their cubic."""
-    from scipy.integrate import cumulative_trapezoid
-    from scipy.interpolate import CubicHermiteSpline
+def _between(motion: Vector, begins: Vector, ends: Vector) -> tuple[NDArray[np.int64], Vector, Vector]:
+    """The cubics of contacts from entry (3, c) through samples to exit: whose each is, t, δ, δ̇ at both ends."""
+    numbers = np.arange(begins.shape[1])
+    low, high = np.searchsorted(motion[0], begins[0]), np.searchsorted(motion[0], ends[0], side="right")
+    count = high - low
+    within = np.arange(count.sum()) + np.repeat(low - np.cumsum(count) + count, count)
+    owner = np.concatenate([numbers, np.repeat(numbers, count), numbers])
+    order = np.argsort(owner, kind="stable")
+    owner, points = owner[order], np.concatenate([begins, motion[:, within], ends], axis=1)[:, order]
+    cubic = np.flatnonzero((np.diff(owner) == 0) & (np.diff(points[0]) > 0.0))
+    return owner[cubic], points[:, cubic], points[:, cubic + 1]
 
-    t, delta, rate = knots
-    fine = np.interp(np.arange(FINER * (len(t) - 1) + 1) / FINER, np.arange(len(t)), t)
-    fine = np.union1d(fine, edges[(edges > t[0]) & (edges < t[-1])])
-    cubic = CubicHermiteSpline(t, delta, rate)
-    return fine, cumulative_trapezoid(force(fine, cubic(fine), cubic(fine, 1)), fine, initial=0.0)
+
+def _shares(law: Any, owner: NDArray[np.int64], rates: Vector, cubics: Cubics) -> Vector:
+    """Parts (p, 2) of its contact's impulse on each cubic before and after its cell's end; by time where F is 0."""
+    grown = _impulses(lambda cubic, _, d, v: np.maximum(law.force(d, v, rates[cubic]), 0.0), cubics)
+    pushed = np.bincount(owner, grown.sum(axis=1))[owner] > 0.0
+    grown[~pushed] = 2.0 * _halves(cubics)[~pushed]
+    return np.asarray(grown / np.bincount(owner, grown.sum(axis=1))[owner, None])
 
 
-def _knots(log: ContactLog, contact: int, end: float, motion: Motion) -> Motion:
-    """Times, δ and δ̇ at entry, at the samples of a contact and at its exit; δ = 0 at both ends but where cut."""
-    begin = log.t_in[contact]
-    within = slice(np.searchsorted(motion[0], begin), np.searchsorted(motion[0], end, side="right"))
-    t, delta, rate = (values[within] for values in motion)
-    enters, leaves = int(not len(t) or t[0] > begin), int(not len(t) or t[-1] < end)
-    return (
-        np.concatenate([[begin] * enters, t, [end] * leaves]),
-        np.concatenate([[0.0] * enters, delta, [0.0] * leaves]),
-        np.concatenate([[log.speed_in[contact]] * enters, rate, [-log.speed_out[contact]] * leaves]),
-    )
+def _halves(cubics: Cubics) -> Vector:
+    """Half the lengths (p, 2) of a cubic before and after its cell's end, s."""
+    begin, end = cubics[0][0], cubics[1][0]
+    cut = np.clip(cubics[2], begin, end)
+    return np.array([cut - begin, end - cut]).T / 2
+
+
+def _impulses(force: Force, cubics: Cubics) -> Vector:
+    """∫ F dt (p, 2) on each cubic before and after its cell's end."""
+    halves = _halves(cubics)
+    found = np.empty(halves.shape)
+    for block in np.array_split(np.arange(len(found)), len(found) // BLOCK + 1):
+        (begin, d0, v0), (end, d1, v1) = (side[:, block, None, None] for side in cubics[:2])
+        half, h = halves[block][..., None], end - begin
+        centre = np.concatenate([begin + half[:, :1], end - half[:, 1:]], axis=1)
+        t = centre + half * NODES
+        s = (t - begin) / h
+        delta = (1 - s) ** 2 * ((1 + 2 * s) * d0 + s * h * v0) + s**2 * ((3 - 2 * s) * d1 + (s - 1) * h * v1)
+        rate = (1 - s) * ((1 - 3 * s) * v0 - 6 * s * (d0 - d1) / h) + s * (3 * s - 2) * v1
+        at = (np.repeat(block, t[0].size), t.ravel(), delta.ravel(), rate.ravel())
+        found[block] = (force(*at).reshape(t.shape) * (half * WEIGHTS)).sum(axis=-1)
+    return found

@@ -52,6 +52,11 @@ class Readout:
         return np.sqrt(np.diag(self.stiffness))
 
     @cached_property
+    def zeta(self) -> Vector | None:
+        """Damping ratios (n,) of the structure without dashpots; None where an earlier version's file lacks them."""
+        return None if self._model is None else self._model.zeta
+
+    @cached_property
     def damping(self) -> Vector:
         """C (n, n), 1/s."""
         return np.asarray(self.model.system.C)

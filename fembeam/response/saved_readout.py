@@ -14,10 +14,11 @@ from fembeam.response.section_forces import SectionForces
 from fembeam.scene import FEATURES
 
 PLAIN = ("stiffness", "damping", "load_vectors", "loads", "frame", "heights", "striker_places")
-READOUT_FINITE = {*PLAIN, "reactions", "moments", "shears"}
+READOUT_FINITE = {*PLAIN, "zeta", "reactions", "moments", "shears"}
 READOUT_UNITS = {
     "stiffness": "1/s²",
     "damping": "1/s",
+    "zeta": "1, of the structure without dashpots",
     "frame": "m, m/s",
     "moments": "N m/(m √kg)",
     "shears": "N/(m √kg)",
@@ -38,6 +39,8 @@ def packed(read: Readout) -> tuple[dict[str, Any], Arrays]:
         "parts": [{"kind": type(part).__name__, "body": body, **_numbers(part)} for part, body in parts],
     }
     arrays = {name: getattr(read, name) for name in PLAIN} | {"reactions": rows}
+    if read.zeta is not None:
+        arrays["zeta"] = read.zeta
     for i, one in enumerate(read.section_forces):
         arrays |= {f"moments_{i}": one.moments, f"shears_{i}": one.shears}
     return about, arrays
@@ -56,7 +59,7 @@ def unpacked(about: Mapping[str, Any], arrays: Mapping[str, Any], nodes: list[Ve
         for i, beam in enumerate(about["beams"])
     )
     parts: Any = [_part(dict(words)) for words in about["parts"]]
-    kept: dict[str, Any] = {name: arrays[name] for name in PLAIN}
+    kept: dict[str, Any] = {name: arrays[name] for name in (*PLAIN, "zeta") if name in arrays}
     held = [(part.z, body) for part, body in parts if type(part) in FEATURES["supports"]]
     kept["supports"] = np.array(held, dtype=float).reshape(-1, 2)
     kept |= {"base": about["base"], "section_forces": forces, "reactions": (parts, arrays["reactions"])}
@@ -70,6 +73,7 @@ def expected_readout(arrays: Mapping[str, Any]) -> dict[str, Shape]:
     shapes: dict[str, Shape] = {
         **{"stiffness": (n, n), "damping": (n, n), "load_vectors": (loads, n), "loads": (loads, k)},
         **{"frame": (2 if len(arrays["frame"]) else 0, k), "reactions": (r, 2, m + loads + 2 * n)},
+        **({"zeta": (n,)} if "zeta" in arrays else {}),
         **{"heights": (bodies,), "striker_places": (len(arrays["strikers"]), 2)},
     }
     for i in range(bodies):

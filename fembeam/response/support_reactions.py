@@ -23,7 +23,7 @@ import reduction
 from fembeam.beams import bending_root, hermite_rows
 from fembeam.response.readout import coordinates
 from fembeam.scene import Spring, contact_rows, loads, unsupported
-from fembeam.support import aligned, require
+from fembeam.support import Part, Printed, require
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -75,10 +75,10 @@ class Reaction:
 
 
 @dataclass(frozen=True, eq=False)
-class Reactions:
+class Reactions(Printed):
     """All reactions of a run: of each beam its supports in the scene's order, then springs, then dashpots.
 
-    Index or iterate: ``run.reactions()[0].force``. `print` shows the extremes.
+    Index or iterate: ``run.reactions()[0].force``. `print` and notebooks show the extremes.
     """
 
     each: tuple[Reaction, ...]
@@ -95,10 +95,10 @@ class Reactions:
     def __repr__(self) -> str:
         return f"<{len(self)} reactions: {', '.join(one.name for one in self)}>"
 
-    def __str__(self) -> str:
+    def _parts(self) -> list[Part]:
         head = ["reaction", "least force / N", "greatest / N", "least moment / N m", "greatest / N m"]
         rows = [[one.name, *(found[0] for q in ("force", "moment") for found in one.extremes(q))] for one in self]
-        return aligned(head, rows)
+        return [(head, rows)]
 
     @property
     def force(self) -> Vector:

@@ -123,15 +123,15 @@ def summary(
     run: Run, discard: float = 0.0, seconds: float | None = None, outputs: dict[str, Any] | None = None
 ) -> dict[str, Any]:
     """What a run says in numbers: modes, moments, contacts, outputs asked for, energy, cost, status, versions."""
-    model = run.model
+    zeta = run.readout.zeta
     return {
         "status": run.status,
         "complete": run.complete,
         "simulated_seconds": float(run.t[-1]) if len(run.t) else 0.0,
         "discarded_seconds": discard,
         "wall_seconds": run.cost.seconds if seconds is None else seconds,
-        "omega": None if model is None else model.omega.tolist(),
-        "zeta": None if model is None else model.zeta.tolist(),
+        "omega": plot.natural(run).tolist() or None,
+        "zeta": None if zeta is None else zeta.tolist(),
         "moments": _moments(run, discard),
         "confidence": _confidence(run, discard),
         "contacts": _contacts(run, discard),

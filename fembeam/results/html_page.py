@@ -32,7 +32,7 @@ h1 { font-size: 1.5rem; margin: 0 } h2 { font-size: 1.15rem; margin: 2rem 0 .5re
   background-attachment: local, local, scroll, scroll; background-color: var(--ground) }
 body { --ground: #fff } pre { --ground: #f6f6f6; padding: .75rem; font-size: .85rem; line-height: 1.4 }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums }
-td { white-space: nowrap } th { vertical-align: bottom }
+td + td { white-space: nowrap } th { vertical-align: bottom }
 th, td { text-align: right; padding: .15rem .6rem; border-bottom: 1px solid #eee }
 th:first-child, td:first-child { text-align: left; padding-left: 0 } th { font-weight: 600 }
 img { max-width: 100%; height: auto; display: block } figure { margin: 1.5rem 0 }
@@ -64,6 +64,7 @@ MOMENT_ROWS = (
     ("min / {}", 1e3, "min"),
     ("max / {}", 1e3, "max"),
 )
+OUTPUT_COLUMNS = ("mean", "std", "min", "at t / s", "max", "at t / s")
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 PREFIXES = ("p", "n", "µ", "m", "", "k", "M", "G", "T")
 ORDER = ("time_history", "psd", "densities", "response_spectrum", "contacts", "modes")
@@ -111,7 +112,7 @@ def _sections(files: Sequence[Path], source: Source | None, warnings: Sequence[s
     if found:
         yield from _simulation(found)
     for path in files:
-        if path.suffix == ".txt":
+        if path.suffix == ".txt" and not (path.stem == "outputs" and found.get("outputs")):
             yield f"<h2>{escape(_words(path.stem))}</h2>"
             yield from _text(path.read_text(encoding="utf-8"))
     yield from _figures(files)
@@ -145,7 +146,7 @@ def _text(content: str) -> Iterator[str]:
 def _simulation(found: dict[str, Any]) -> Iterator[str]:
     """Tables of [simulate], in the units of the figures."""
     rotations = found.get("rotations", [])
-    if found["omega"]:
+    if found["omega"] and found["zeta"]:
         rows = [
             [i + 1, _rounded(w, 5), _rounded(w / 6.283185307179586, 5), f"{z:.4g}"]
             for i, (w, z) in enumerate(zip(found["omega"], found["zeta"], strict=True))
@@ -171,12 +172,20 @@ def _simulation(found: dict[str, Any]) -> Iterator[str]:
         ]
         stops = [row.get("name", f"stop {row['stop']}") for row in found["contacts"]]
         yield "<h2>Contacts</h2>" + html_table(["", *stops], rows)
+    if found.get("outputs"):
+        rows = [[name, *map(_number, row.values())] for name, row in found["outputs"].items()]
+        yield "<h2>Outputs</h2>" + html_table(["", *OUTPUT_COLUMNS], rows)
     if found["energy"]:
         names = {"input": "put in", "damping": "lost in damping", "contact": "lost in contacts", "stored": "stored"}
         rows = [[words, with_prefix(found["energy"][name], "J")] for name, words in names.items()]
         residual = found["energy"]["residual_over_input"]
         yield "<h2>Energy</h2>" + html_table(["", ""], rows)
         yield f'<p class="note">Missing in this balance, an estimate of the error: {residual:.1e} of the input.</p>'
+
+
+def _number(value: float | None) -> str | None:
+    """A number of a table."""
+    return None if value is None else _rounded(value)
 
 
 def _of_stop(row: dict[str, Any], key: str, part: str = "") -> Any:

@@ -37,7 +37,7 @@ from fembeam.beams import (
     spread,
     wavenumber,
 )
-from fembeam.support import require, require_finite
+from fembeam.support import is_whole, require, require_finite
 
 if TYPE_CHECKING:
     from fembeam.scene.impactor import Impactor
@@ -207,7 +207,7 @@ def _joined(beams: tuple[Matrices, ...], impactors: tuple[Impactor, ...]) -> Mat
 def _check_counts(elements: int | None, modes: int | None) -> None:
     """Raise ValueError unless both are counts, and the elements few enough to be right."""
     for name, number in (("elements", elements), ("modes", modes)):
-        whole = isinstance(number, (int, np.integer)) and not isinstance(number, bool)
+        whole = is_whole(number)
         require(number is None or (whole and number > 0), f"{name} must be a whole number above 0", number,
                 "Scene.matrices", "give a count, or None")  # fmt: skip
     few = elements is None or elements <= MOST_ELEMENTS
@@ -226,7 +226,10 @@ def _resolving(scene: Scene, borders: Vector, modes: int) -> Vector:
     coarse = _on_nodes(scene, spread(scene.beam, borders, 2 * modes + 4), None)
     omega = reduction.modal_basis(coarse.M, coarse.K, modes, root=coarse.root).omega[-1]
     waves = np.diff(borders) * wavenumber(scene.beam, borders, float(omega))
-    return divided(borders, np.maximum(1, np.ceil(waves / WAVE_STEP).astype(int)))
+    counts = np.maximum(1, np.ceil(waves / WAVE_STEP))
+    require(counts.sum() <= MOST_ELEMENTS, f"{modes} modes must need at most {MOST_ELEMENTS} elements", counts.sum(),
+            "Scene.matrices", "is a length in mm, or a place next to another one?")  # fmt: skip
+    return divided(borders, counts.astype(int))
 
 
 def _check_buckling(scene: Scene) -> None:

@@ -266,7 +266,8 @@ class Scene:
             return
         number, z = place.to
         known = isinstance(number, int) and 0 <= number <= len(self.bodies)
-        require(known, f"{key} must name a body, 1 to {len(self.bodies)}", number, where, "add the beam to bodies")
+        among = f"1 to {len(self.bodies)}" if self.bodies else "and there is none"
+        require(known, f"{key} must name a body, {among}", number, where, "add the beam to bodies")
         length = self.bodies[number - 1].beam.length if number else self.beam.length
         named = f"body {number}" if number else "the beam"
         require_finite(f"z of {key}", z, where, "give the coordinate along that beam in m")

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fembeam.statistics.batches import Estimate
+from fembeam.support import is_whole
 
 MOST_BINS = 200
 
@@ -150,7 +151,7 @@ def _bin_count(values: NDArray[np.float64]) -> int:
 def _edges(values: NDArray[np.float64], bins: int | ArrayLike) -> NDArray[np.float64]:
     """Bin edges from a count or from the caller, checked."""
     if np.ndim(bins) == 0:
-        if isinstance(bins, bool) or not isinstance(bins, (int, np.integer)) or bins < 1:
+        if not is_whole(bins) or bins < 1:
             raise ValueError(f"pdf: bins must be a whole number of at least 1, or edges, got {bins!r}")
         return np.histogram_bin_edges(values, int(bins))
     edges = np.asarray(bins, dtype=np.float64)

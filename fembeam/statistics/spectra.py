@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fembeam.statistics.batches import Estimate
 from fembeam.statistics.densities import checked_samples
-from fembeam.support import number
+from fembeam.support import is_whole, number
 
 DEFAULT_SEGMENTS = 32  # with half overlap about 63 segments: the standard error of a level is near 13 %
 SHORTEST_DEFAULT = 256  # samples per segment that a short signal still gets
@@ -138,7 +138,7 @@ def segment_length(n: int, segment: int | None) -> int:
     """Samples per segment, chosen or checked."""
     if segment is None:
         return min(n, max(SHORTEST_DEFAULT, n // DEFAULT_SEGMENTS))
-    if isinstance(segment, bool) or not isinstance(segment, (int, np.integer)) or not 8 <= segment <= n:
+    if not is_whole(segment) or not 8 <= segment <= n:
         raise ValueError(f"psd: segment must be a whole number of samples from 8 to {n}, got {segment!r}")
     return int(segment)
 

@@ -21,7 +21,7 @@ from fembeam.statistics.batches import Estimate
 from fembeam.study.execution.checkpoint import Checkpoint, Values, identity
 from fembeam.study.execution.executors import spread
 from fembeam.study.realisations import Seed, child, noises, realisation, seed_key
-from fembeam.support import Part, Printed, note, number
+from fembeam.support import Part, Printed, is_whole, note, number
 from solvers.problem import counted, dataframe
 
 FIRST_ROUND = 8  # realisations before `until` is asked for the first time
@@ -234,7 +234,7 @@ def _seeds(model: Model, seeds: int | Sequence[Seed]) -> list[Seed]:
         raise ValueError(
             "an ensemble needs a BandNoise as base motion, force or foot; without it all realisations are equal"
         )
-    if isinstance(seeds, (int, np.integer)) and not isinstance(seeds, bool):
+    if is_whole(seeds):
         if seeds < 1:
             raise ValueError(f"seeds must be a number of at least 1 or a list of seeds, got {seeds}")
         return [child(own[0], i) for i in range(int(seeds))]
@@ -253,7 +253,7 @@ def _seeds(model: Model, seeds: int | Sequence[Seed]) -> list[Seed]:
 
 def _seed(seed: Any) -> Seed:
     """One seed, checked."""
-    whole = isinstance(seed, (int, np.integer)) and not isinstance(seed, bool) and seed >= 0
+    whole = is_whole(seed) and seed >= 0
     if not whole and not isinstance(seed, np.random.SeedSequence):
         raise ValueError(f"a seed must be an integer of at least 0 or a SeedSequence, got {seed!r}")
     return int(seed) if whole else seed

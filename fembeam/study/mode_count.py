@@ -24,7 +24,7 @@ import solvers
 from fembeam.study.execution.executors import spread
 from fembeam.study.measure import Case, Measured, Plan, Start, measure
 from fembeam.study.quantities import Quantity, label, named
-from fembeam.support import Part, Printed, require
+from fembeam.support import Part, Printed, is_whole, require
 from solvers.problem import dataframe
 
 if TYPE_CHECKING:
@@ -314,6 +314,6 @@ def checked_counts(counts: Iterable[int]) -> list[int]:
     chosen = list(counts)
     require(len(chosen) > 0, "counts must hold a number of modes", chosen, "study", "e.g. [1, 2, 3, 5, 10]")
     for count in chosen:
-        whole = isinstance(count, (int, np.integer)) and not isinstance(count, bool)
+        whole = is_whole(count)
         require(whole and count > 0, "counts must be whole numbers above 0", count, "study", "e.g. [1, 2, 3]")
     return sorted({int(count) for count in chosen})

@@ -16,13 +16,11 @@ from __future__ import annotations
 from concurrent.futures import Executor
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from fembeam.study.measure import Plan, Start
 from fembeam.study.model_search import _Search
 from fembeam.study.quantities import Quantity, named
 from fembeam.study.smallest_model_result import SmallestModel
-from fembeam.support import is_finite, require
+from fembeam.support import is_finite, is_whole, require
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -94,6 +92,6 @@ def check_goal(tolerance: float, most: int) -> None:
         "smallest_model",
         "e.g. 0.01",
     )
-    whole = isinstance(most, (int, np.integer)) and not isinstance(most, bool)
+    whole = is_whole(most)
     require(whole and 1 <= most <= MOST, f"most must be a whole number, 1 to {MOST}", most, "smallest_model",
             "e.g. 20")  # fmt: skip

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from numbers import Real
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 def is_finite(value: object) -> bool:
     """Whether value is a real, finite number (booleans are not numbers here)."""
     return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def is_whole(value: object) -> TypeGuard[int]:
+    """Whether value is a whole number (booleans are not numbers here)."""
+    return isinstance(value, (int, np.integer)) and not isinstance(value, bool)
 
 
 def require(valid: bool, rule: str, got: object, where: str, advice: str) -> None:
@@ -37,6 +42,12 @@ def require_non_negative(name: str, value: object, where: str, advice: str) -> N
     """Raise ValueError unless value is finite and >= 0."""
     valid = is_finite(value) and value >= 0  # type: ignore[operator]
     require(valid, f"{name} must be finite and not negative", value, where, advice)
+
+
+def require_no_text(where: str, **values: object) -> None:
+    """Raise ValueError for an argument that is text where numbers are meant."""
+    for name, value in values.items():
+        require(not isinstance(value, str), f"{name} must be numbers", value, where, "drop the quotes")
 
 
 def number(name: str, value: Any, above: float = -math.inf, least: float = -math.inf) -> float:

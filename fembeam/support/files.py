@@ -12,7 +12,9 @@ from typing import Any
 
 @contextmanager
 def written_whole(target: Path) -> Iterator[Any]:
-    """A binary file that appears under its name only once it is complete."""
+    """A binary file that appears under its name only once it is complete; FileNotFoundError without its folder."""
+    if not target.parent.is_dir():
+        raise FileNotFoundError(f"there is no folder {target.parent} to write {target.name} to; make it first")
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
     try:
         with os.fdopen(handle, "w+b") as file:

@@ -24,11 +24,13 @@ from solvers.compiled.packed import PackedType
 
 (BEGIN, CONTACT, SOLVE, NEWTON, LEAVES, ERROR, ACCEPT, LAND, LANDING_STEP, WITHIN_STEP) = range(10)
 (ACCOUNT_FLIGHT, ACCOUNT_CONTACT) = range(10, 12)
-(FIRST_END, LAND_IN_TIME, GO_BEYOND, PASSED) = range(12, 16)
-(PAIR, FREE_BLOCKS, PUSHED_BLOCKS, PUSHED_END, STOP_AT_NODES, BOUNDS) = range(16, 22)
-EVERY_RUN, ENERGY, BORDERS, MANY_STOPS = range(10), range(10, 12), range(12, 16), range(16, 22)
-"""What needs them: every run, those with an energy balance, with bends or memory in a law, with many stops."""
-ADDRESSES = np.zeros(22, dtype=np.int64)
+(SIDE, FIRST_END, LAND_IN_TIME, GO_BEYOND, PASSED) = range(12, 17)
+(PRESSED,) = range(17, 18)
+(PAIR, FREE_BLOCKS, PUSHED_BLOCKS, PUSHED_END, STOP_AT_NODES, BOUNDS) = range(18, 24)
+EVERY_RUN, ENERGY = range(10), range(10, 12)
+BORDERS, TWO_STOPS, MANY_STOPS = range(12, 17), range(17, 18), range(18, 24)
+"""What needs them: every run, those with an energy balance, with bends or memory in a law, with two or many stops."""
+ADDRESSES = np.zeros(24, dtype=np.int64)
 
 _DECLARED: dict[int, tuple[Any, Any, tuple[Any, ...]]] = {}
 _LOADED: dict[int, Any] = {}
@@ -52,12 +54,16 @@ def load(kinds: Mapping[str, types.NamedTuple], places: Iterable[int]) -> None:
     """Compile parts, or load their machine code; ``kinds`` are the types of packed arguments by their names."""
     for place in places:
         if not ADDRESSES[place]:
-            with _LOCK:
-                function, result, plain = _DECLARED[place]
-                names = function.__code__.co_varnames[: function.__code__.co_argcount - len(plain)]
-                signature = result(*(PackedType(kinds[name]) for name in names), *plain)
-                _LOADED[place] = c_function(signature)(function)
+            with _LOCK:  # another thread may have been quicker; what one gave the address of must stay
+                if place not in _LOADED:
+                    _LOADED[place] = _compiled(kinds, *_DECLARED[place])
                 ADDRESSES[place] = _LOADED[place].address
+
+
+def _compiled(kinds: Mapping[str, types.NamedTuple], function: Any, result: Any, plain: tuple[Any, ...]) -> Any:
+    """The C function of a part."""
+    names = function.__code__.co_varnames[: function.__code__.co_argcount - len(plain)]
+    return c_function(result(*(PackedType(kinds[name]) for name in names), *plain))(function)
 
 
 def _call_at(place: int, result: Any, plain: tuple[Any, ...]) -> Any:

@@ -10,7 +10,7 @@ from numba import types
 
 from solvers.compiled.kernels import INTEGERS, MATRIX, PROBLEM, REAL, VECTOR, Problem
 from solvers.compiled.packed import Layout, Packed, PackedTemplate
-from solvers.compiled.parts import BORDERS, ENERGY, MANY_STOPS, load
+from solvers.compiled.parts import BORDERS, ENERGY, MANY_STOPS, TWO_STOPS, load
 from solvers.compiled.state import STATE, State, begin_state, most_borders, problem_of, state_shapes
 from solvers.compiled.sums import padded
 from solvers.exponential.contact.many_stops import POOL
@@ -176,6 +176,8 @@ class _SharedTables:
         sizes = len(problem.gap), len(problem.load), len(problem.k), len(forcing.table_dt), most_borders(problem)
         if tables.bend.any() or problem.border_count.any():
             load_parts(BORDERS)
+        if len(contacts) > 1:
+            load_parts(TWO_STOPS)
         if tables.node_propagator.size:
             load_parts(MANY_STOPS)
         self.layout = _layout(*sizes, POOL if tables.node_propagator.size else 0)

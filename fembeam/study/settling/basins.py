@@ -22,7 +22,7 @@ from fembeam.model import Attractor, Orbit, load_period
 from fembeam.study.execution.checkpoint import Checkpoint, identity
 from fembeam.study.execution.executors import spread
 from fembeam.study.settling.plane import WHERE, Axis, axis_of, checked_plane, checked_points, starts_of
-from fembeam.support import aligned, require
+from fembeam.support import aligned, is_whole, require
 from solvers.orbits import delayed
 from solvers.orbits import run as run_from
 
@@ -164,7 +164,7 @@ def basins(
     across, up = axis_of(model, x, x_span, columns, place), axis_of(model, y, y_span, rows, place)
     origin, once = checked_plane(model, start, across, up), load_period(model.scene)
     for name, count in (("settle", settle), ("longest", longest)):
-        whole = isinstance(count, (int, np.integer)) and not isinstance(count, bool) and count > 0
+        whole = is_whole(count) and count > 0
         require(whole, f"{name} counts periods of the load and must be above 0", count, WHERE, "give a whole number")
     starts = starts_of(origin, across, up)
     asked = partial(basins, x=across, y=up, start=origin, settle=settle, longest=longest)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fembeam.support import is_finite, require
+from fembeam.support import is_finite, is_whole, require
 
 if TYPE_CHECKING:
     from fembeam.model import Model
@@ -42,7 +42,7 @@ def _direction(model: Model, kind: Any, z: float) -> tuple[Vector, str]:
         return np.concatenate((_pulled(model, z), np.zeros(n))), f"displacement at {z:g} m / m"
     if isinstance(kind, str) and kind == "velocity":
         return np.concatenate((np.zeros(n), _shape(model, z, np.ones(n)))), f"velocity at {z:g} m / (m/s)"
-    if isinstance(kind, (int, np.integer)) and not isinstance(kind, bool):
+    if is_whole(kind):
         require(
             bool(0 <= kind < 2 * n), f"the number of a state must lie in [0, {2 * n})", kind, WHERE, "q first, then q̇"
         )

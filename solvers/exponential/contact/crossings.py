@@ -18,8 +18,8 @@ import numpy as np
 from numba import types
 
 from solvers.compiled.dop853_tableau import STAGES, C
-from solvers.compiled.kernels import REAL, call_force, copy, dot, indentation, inlined, inner, merged
-from solvers.compiled.parts import BOUNDS, LEAVES, part
+from solvers.compiled.kernels import REAL, VECTOR, call_force, copy, dot, indentation, inlined, inner, merged
+from solvers.compiled.parts import BOUNDS, LEAVES, SIDE, part
 from solvers.compiled.simd import splat8, store8
 from solvers.compiled.state import PEAK_FORCE, T_IN, T, is_open, surface_tolerance
 from solvers.compiled.sums import above
@@ -179,7 +179,7 @@ def _sides(problem, tables, state, s, n, delta, rate, out):
         call_force(tables.uncut[s], n, delta, rate, state.entry_rate[s], tables.uncut_parameters[s], (out,))
 
 
-@inner
+@part(SIDE, REAL, types.int64, VECTOR, VECTOR)
 def side_at(problem, tables, state, s, x, batch):
     """The same in the state x."""
     batch[0] = max(indentation(problem, s, x), problem.knots[s, 0])

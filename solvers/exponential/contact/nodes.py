@@ -20,7 +20,8 @@ import numpy as np
 
 from solvers.compiled.kernels import kernel
 
-S = 8  # nodes of a contact step: 6 is a little faster at 1e-6, 10 and 12 bring nothing
+S: Any = np.int64(8)  # nodes of a contact step: 6 is a little faster at 1e-6, 10 and 12 bring nothing
+# (a plain 8 is a type of its own: numba would compile functions for it and for other whole numbers)
 _CHECKED = (np.arange(24) + 0.5) / 24  # points where the interpolant of the nodes is compared
 _NODES_FIRST = [*range(S), *range(S + 1, 2 * S + 1), S, 2 * S + 1]
 PHASES = np.geomspace(1e-2, 1e4, 600)  # ω h
@@ -229,7 +230,8 @@ def _alias(node_set: _NodeSet) -> Any:
     """(P,) largest error between a family's nodes of the interpolant of e^{iωt}."""
     waves = np.exp(1j * np.outer(node_set.nodes**node_set.time_exponent, PHASES))
     exact = np.exp(1j * np.outer(_CHECKED**node_set.time_exponent, PHASES))
-    return np.minimum(np.abs(_interpolation(node_set.nodes, _CHECKED) @ waves - exact).max(axis=0), 2.0)
+    found = np.einsum("ij,jk", _interpolation(node_set.nodes, _CHECKED), waves)  # BLAS would start its threads for it
+    return np.minimum(np.abs(found - exact).max(axis=0), 2.0)
 
 
 def _weights(nodes: Any) -> Any:

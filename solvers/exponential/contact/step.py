@@ -22,7 +22,7 @@ from solvers.compiled.kernels import (
     merged,
     rhs,
 )
-from solvers.compiled.parts import ACCEPT, CONTACT, FIRST_END, part
+from solvers.compiled.parts import ACCEPT, CONTACT, FIRST_END, PRESSED, part
 from solvers.compiled.state import (
     CALLS,
     LAW_NOT_FINITE,
@@ -65,7 +65,7 @@ _GOAL = 0.3  # error aimed at, in units of the tolerance
 _ORDER = 15.0  # the error estimate falls like h^15
 
 
-@merged
+@part(PRESSED, types.boolean, MATRIX)
 def _switch_pressed(problem, state, log):
     """Switch every stop at rest on its surface that other stops' forces press into it; returns whether any did."""
     switched = False
@@ -203,7 +203,7 @@ def advance_contact(problem, tables, energy_tables, state, scratch, t_end, rtol,
         if in_contact(state):
             begin_steps(problem, tables, state, scratch, latest_entered(state))
         return RUNNING
-    if control[NEW] == ENTRY and _switch_pressed(problem, state, log):
+    if control[NEW] == ENTRY and problem.parts[PRESSED] and _switch_pressed(problem, state, log):
         begin_steps(problem, tables, state, scratch, latest_entered(state))
         return RUNNING
     if stop >= 0 and _try_landing(
