@@ -106,6 +106,9 @@ def single():
             f"{name}: {duration / processor:.0f} simulated seconds per second of processor, {duration / wall:.0f} of "
             f"wall; {share:.0%} of the time without the GIL"
         )
+    noise, run = model.scene.base.derivative(2), partial(model.simulate, seconds, solver=METHOD)
+    made, whole = (best(call)[0] for call in (lambda: noise.lasting(seconds).nodes(seconds, METHOD.rtol), run))
+    print(f"making the noise: {made / whole:.0%} of a run with the contact log only")
 
 
 def scaling(rounds):
