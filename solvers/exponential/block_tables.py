@@ -112,9 +112,12 @@ def filled(
     for i, f in enumerate(node_sets.kinds):
         time_exponent, nodes = node_sets.time_exponent[f], node_sets.nodes[f]
         if tables.node_propagator.size:
-            fill_node_propagators(problem, blocks, contact_h, time_exponent, nodes, tables.node_propagator[i])
+            fill_node_propagators(
+                problem.k, problem.c, blocks, contact_h, time_exponent, nodes, tables.node_propagator[i]
+            )
         else:
-            fill_free(problem, blocks, contact_h, time_exponent, nodes, tables.free[i])
+            structure = problem.k, problem.c, problem.read, problem.read_rate
+            fill_free(*structure, blocks, contact_h, time_exponent, nodes, tables.free[i])
         _fill_alias(tables.alias[i], problem.k, blocks, contact_h, node_sets.alias[f])
     if blocks[0] == 0:
         _fill_weightings(tables, problem, contact_h, node_sets)
@@ -133,13 +136,8 @@ def _fill_weightings(tables: Blocks, problem: Problem, contact_h: Any, node_sets
         )
     for i, (f, weighted) in enumerate(node_sets.weightings):
         fill_weighting(
-            *(
-                problem,
-                contact_h,
-                node_sets.time_exponent[f],
-                node_sets.weight_exponent[f] * weighted,
-                node_sets.nodes[f],
-            ),
+            *(problem.k, problem.c, problem.read, problem.read_rate, contact_h),
+            *(node_sets.time_exponent[f], node_sets.weight_exponent[f] * weighted, node_sets.nodes[f]),
             *(node_sets.lagrange[f, weighted], gauss(12), inputs, response[i], ending[i], tables.forced[i]),
             *(tables.end_response[i], np.zeros((S + 1, S, 2)), np.zeros(max(2 * own, S))),
         )

@@ -77,42 +77,40 @@ def _block_response(k, c, h, time_exponent, weight_exponent, nodes, weights, gau
 
 
 @inner
-def fill_pair(problem, push, read, read_rate, response, weights, out):
+def fill_pair(k, c, push, read, read_rate, response, weights, out):
     """(S, 2S) response of δ and δ̇ at the nodes, by ``read``, to the node values of a force that acts by ``push``.
 
     With A² = -k - c A the sum over the blocks of r (α + β A) b is Σ α (r·b) + β (r·A b).
     """
-    size, own = problem.k.size, response.shape[1] // 2
+    size, own = k.size, response.shape[1] // 2
     for d in range(2):
         row = read if d == 0 else read_rate
         for b in range(own):
             p, v = push[b], push[size + b]
             weights[b] = row[b] * p + row[size + b] * v
-            weights[own + b] = row[b] * v - row[size + b] * (problem.k[b] * p + problem.c[b] * v)
+            weights[own + b] = row[b] * v - row[size + b] * (k[b] * p + c[b] * v)
         for j in range(S):
             combine(response[j], weights, 2 * own, None, out[j, d * S : (d + 1) * S])
 
 
 @inner
-def _fill_end_response(problem, push, ending, out):
+def _fill_end_response(k, c, push, ending, out):
     """(S, 2N) state change at the end."""
-    size = problem.k.size
+    size = k.size
     for b in range(ending.shape[1]):
         p, v = push[b], push[size + b]
         for j in range(S):
             alpha, beta = ending[0, b, j], ending[1, b, j]
             out[j, b] = alpha * p + beta * v
-            out[j, size + b] = alpha * v - beta * (problem.k[b] * p + problem.c[b] * v)
+            out[j, size + b] = alpha * v - beta * (k[b] * p + c[b] * v)
 
 
 @inner
-def _fill_level(problem, h, time_exponent, weight_exponent, nodes, weights, gauss, response, ending, work, basis):
+def _fill_level(k, c, h, time_exponent, weight_exponent, nodes, weights, gauss, response, ending, work, basis):
     """Blocks' responses on one step length, at the nodes and at the end."""
     own = ending.shape[1]
     for b in range(own):
-        _block_response(
-            problem.k[b], problem.c[b], h, time_exponent, weight_exponent, nodes, weights, gauss, work, basis
-        )
+        _block_response(k[b], c[b], h, time_exponent, weight_exponent, nodes, weights, gauss, work, basis)
         for j in range(S):
             for i in range(S):
                 response[j, b, i], response[j, own + b, i] = work[i, j, 0], work[i, j, 1]
@@ -121,7 +119,10 @@ def _fill_level(problem, h, time_exponent, weight_exponent, nodes, weights, gaus
 
 @kernel
 def fill_weighting(
-    problem,
+    k,
+    c,
+    read,
+    read_rate,
     h,
     time_exponent,
     weight_exponent,
@@ -143,34 +144,33 @@ def fill_weighting(
     pairs = forced.shape[0] > 0
     for level in range(h.size):
         rows, ends = response[0 if pairs else level], ending[0 if pairs else level]
-        _fill_level(problem, h[level], time_exponent, weight_exponent, nodes, weights, gauss, rows, ends, work, sums)
+        _fill_level(k, c, h[level], time_exponent, weight_exponent, nodes, weights, gauss, rows, ends, work, sums)
         for u in range(inputs.shape[0] if pairs else 0):
-            _fill_end_response(problem, inputs[u], ends, end_response[level, u])
-            for s in range(problem.gap.size):
-                fill_pair(problem, inputs[u], problem.read[s], problem.read_rate[s], rows, sums, forced[level, u, s])
+            _fill_end_response(k, c, inputs[u], ends, end_response[level, u])
+            for s in range(read.shape[0]):
+                fill_pair(k, c, inputs[u], read[s], read_rate[s], rows, sums, forced[level, u, s])
 
 
 @kernel
-def fill_node_propagators(problem, blocks, h, time_exponent, nodes, out):
+def fill_node_propagators(k, c, blocks, h, time_exponent, nodes, out):
     """(J, 2, N, S): α, β of some of the blocks at the nodes of one kind."""
     for level in range(h.size):
         for b in range(blocks[0], blocks[1]):
             for i in range(S):
                 span = h[level] * nodes[i] ** time_exponent
-                out[level, 0, b, i], out[level, 1, b, i] = propagate(problem.k[b], problem.c[b], span)
+                out[level, 0, b, i], out[level, 1, b, i] = propagate(k[b], c[b], span)
 
 
 @kernel
-def fill_free(problem, blocks, h, time_exponent, nodes, out):
+def fill_free(k, c, read, read_rate, blocks, h, time_exponent, nodes, out):
     """(J, m, 2N, 2S): δ and δ̇ of all stops at the nodes of one kind from the state of some of the blocks."""
-    size = problem.k.size
+    size = k.size
     for level in range(h.size):
         for b in range(blocks[0], blocks[1]):
-            k, c = problem.k[b], problem.c[b]
             for i in range(S):
-                alpha, beta = propagate(k, c, h[level] * nodes[i] ** time_exponent)
-                for s in range(problem.gap.size):
+                alpha, beta = propagate(k[b], c[b], h[level] * nodes[i] ** time_exponent)
+                for s in range(read.shape[0]):
                     for d in range(2):
-                        r = problem.read[s] if d == 0 else problem.read_rate[s]
-                        out[level, s, b, d * S + i] = r[b] * alpha - r[size + b] * k * beta
-                        out[level, s, size + b, d * S + i] = r[b] * beta + r[size + b] * (alpha - c * beta)
+                        r = read[s] if d == 0 else read_rate[s]
+                        out[level, s, b, d * S + i] = r[b] * alpha - r[size + b] * k[b] * beta
+                        out[level, s, size + b, d * S + i] = r[b] * beta + r[size + b] * (alpha - c[b] * beta)

@@ -54,7 +54,8 @@ def _in_pool(problem, tables, scratch, weighting, level, s, u):
         push = problem.push[u] if u < stops else problem.load[u - stops]
         rows = tables.block_response[weighting, level]
         fill_pair(
-            problem, push, problem.read[s], problem.read_rate[s], rows, scratch.pair_weights, scratch.pair_pool[place]
+            *(problem.k, problem.c, push, problem.read[s], problem.read_rate[s]),
+            *(rows, scratch.pair_weights, scratch.pair_pool[place]),
         )
         scratch.pool_keys[place] = key
     return place
