@@ -331,7 +331,10 @@ def test_bad_places_are_refused():
         (lambda: beam(clamp, elements=[fb.Element(1.5, spring)]), r"z must lie on the beam, 0 to 1.0 m, got 1.5"),
         (lambda: beam(clamp, elements=[fb.Element(0.5, spring, to=1.5)]), "z of to must lie on the beam, 0 to 1.0 m"),
         (lambda: beam(clamp, elements=[fb.Element(0.5, spring, to=0.5)]), "z of to must be another place"),
-        (lambda: beam(clamp, elements=[fb.Element(0.5, spring, to=(1, 0.5))]), r"to must name a body, and there is none, got 1"),
+        (
+            lambda: beam(clamp, elements=[fb.Element(0.5, spring, to=(1, 0.5))]),
+            "to must name a body, and there is none",
+        ),
         (lambda: beam(clamp, elements=[fb.Element(0.0, spring, of="rotation")]), "free to turn at z.* by Pinned"),
         (lambda: beam(clamp, stops=[fb.Stop(0.0, spring, of="rotation")]), "free to turn at z.* by Pinned"),
     ):

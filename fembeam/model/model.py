@@ -188,7 +188,7 @@ class Model(Printed, ModalEquations):
         from fembeam.support import bar
 
         for name, value in {"duration": duration, "dt": dt, "start": start}.items():
-            require(not isinstance(value, str), f"{name} must be numbers", value, "Model.simulate", "drop the quotes")
+            require(not isinstance(value, str), f"{name} must not be text", value, "Model.simulate", "drop the quotes")
         start = self.rest() if start is None else np.asarray(start, dtype=float)
         n = len(self.omega)
         require(start.shape == (2 * n,), f"start must have shape ({2 * n},), [q, q_dot]", start.shape,
