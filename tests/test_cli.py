@@ -611,6 +611,32 @@ def report_page(tmp_path_factory):
     return html.write_page(folder / "out", read(path).source, ["E" * 100 + " looks like N/mm²"])
 
 
+def test_a_shell_completes_commands_options_and_files(capsys, tmp_path):
+    pytest.importorskip("shtab", reason="the extra completion is not installed")
+    bash = shutil.which("bash") or pytest.skip("there is no bash")
+    script = tmp_path / "fembeam.bash"
+    script.write_text(printed(capsys, "completion", "bash"), encoding="utf-8")
+    (tmp_path / "scene.toml").touch()
+    for line, expected in {
+        "ru": "run",
+        "run --res": "--resume",
+        "check sc": "scene.toml",
+        "completion z": "zsh",
+    }.items():
+        words = ["fembeam", *line.split()]
+        asked = f"COMP_WORDS=({' '.join(words)}); COMP_CWORD={len(words) - 1}; COMPREPLY=(); _shtab_fembeam"
+        asked = f"source {script}; {asked} fembeam {words[-1]}; echo ${{COMPREPLY[@]}}"
+        found = subprocess.run([bash, "-c", asked], capture_output=True, text=True, check=True, cwd=tmp_path)
+        assert found.stdout.split() == [expected], (line, found)
+    assert "#compdef fembeam" in printed(capsys, "completion", "zsh")
+
+
+def test_an_optional_package_that_is_missing_is_named_in_a_line(capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "shtab", None)
+    assert main(["completion", "bash"]) == 2
+    assert "shell completion needs shtab, which is optional: pip install shtab" in capsys.readouterr().err
+
+
 def test_the_schema_knows_what_the_reader_knows(capsys):
     schema = json.loads(printed(capsys, "schema"))
     valid = re.search(r"valid: (.*)\)", refused_text(EXAMPLE.read_text(encoding="utf-8") + "\n[nothing]\n"))[1]

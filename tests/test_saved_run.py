@@ -169,7 +169,7 @@ def test_what_is_no_saved_run_is_refused(run, tmp_path):
     (tmp_path / "table.csv").write_text("t,a\n0,0\n")
     with pytest.raises(ValueError, match=r"it is neither npz nor HDF5; give a file of Run\.save"):
         fb.load(tmp_path / "table.csv")
-    with pytest.raises(FileNotFoundError, match=r"there is no folder .*nowhere to write run.npz to; make it first"):
+    with pytest.raises(FileNotFoundError, match=r"no such folder to write run.npz to; make it first: .*nowhere"):
         run.save(tmp_path / "nowhere" / "run")
 
 

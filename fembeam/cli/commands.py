@@ -1,4 +1,4 @@
-"""The command line: `fembeam new`, `check`, `modes`, `run`, `compare`, `export`, `schema`.
+"""The command line: `fembeam new`, `check`, `modes`, `run`, `compare`, `export`, `schema`, `completion`.
 
 Tables (with --json: JSON) go to stdout, everything else to stderr; exit codes are those of `messages`.
 """
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from fembeam.scene_file import SceneFile
 
 MODES_SHOWN = 10
+REFUSED = ValueError, TypeError, OSError, ArithmeticError, MemoryError, RuntimeError, ImportError  # said in a line
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -65,7 +66,7 @@ def _failed(error: Exception) -> int:
         return interrupted()
     if isinstance(error, OSError) and error.filename is None:  # a full disk behind stdout
         sys.stdout = None  # type: ignore[assignment]
-    elif not isinstance(error, (ValueError, TypeError, OSError, ArithmeticError, MemoryError, RuntimeError)):
+    elif not isinstance(error, REFUSED):
         raise error
     say(f"error: {one_line(error)}")
     return FAILED if isinstance(error, RuntimeError) or sys.stdout is None else BAD_INPUT
@@ -121,6 +122,8 @@ def _parser() -> argparse.ArgumentParser:
     export.add_argument("--quantities", metavar="NAME", nargs="+", help="such as displacement, stress, reactions, "
                         "'absolute acceleration'; an unknown one lists all; default: as for places")  # fmt: skip
     command("schema", _schema, "print the JSON Schema of scene files", scene=False)
+    complete = command("completion", _completion, "print what a shell completes commands and options by", scene=False)
+    complete.add_argument("shell", choices=["bash", "zsh", "tcsh"])
     return parser
 
 
@@ -139,6 +142,20 @@ def _schema(_: argparse.Namespace) -> int:
     from fembeam.scene_file import json_schema
 
     _print(json_schema(), True)
+    return 0
+
+
+def _completion(arguments: argparse.Namespace) -> int:
+    """The command `completion`, by shtab: it reads the parser once, where argcomplete starts Python at every key."""
+    from pathlib import Path
+
+    from solvers.problem import optional
+
+    shtab, parser = optional("shtab", "shell completion"), _parser()
+    (commands,) = (action.choices for action in parser._actions if action.metavar == "COMMAND")
+    for action in (action for one in dict(commands or {}).values() for action in one._actions if action.type is Path):
+        action.complete = shtab.DIRECTORY if action.metavar == "DIR" else shtab.FILE
+    print(shtab.complete(parser, arguments.shell))
     return 0
 
 

@@ -60,9 +60,11 @@ def branch(
     figure, (axis,) = sheet(1, 1, (8.4, 3.8), axes)
     if cloud is not None:
         axis.plot(cloud[0], 1e3 * cloud[1], ".", color=GREY, markersize=2.0, label="simulated", rasterized=True)
+    periods = [one.family.period for one in several]
+    same = labels is None and len(set(periods)) == len(periods)  # colours: a period has the same on every figure
     for i, one in enumerate(several):
-        label = f"period {one.family.period}" if labels is None else labels[i]
-        _draw_branch(axis, one, place, f"C{i}", label)
+        label = f"period {periods[i]}" if labels is None else labels[i]
+        _draw_branch(axis, one, place, f"C{periods[i] - 1 if same else i}", label)
     _draw_ends(axis, several, place)
     _draw_behind(axis, several, place)
     name = several[0].family.name

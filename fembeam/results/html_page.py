@@ -32,7 +32,7 @@ h1 { font-size: 1.5rem; margin: 0 } h2 { font-size: 1.15rem; margin: 2rem 0 .5re
   background-attachment: local, local, scroll, scroll; background-color: var(--ground) }
 body { --ground: #fff } pre { --ground: #f6f6f6; padding: .75rem; font-size: .85rem; line-height: 1.4 }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums }
-td + td { white-space: nowrap } th { vertical-align: bottom }
+td + td { white-space: nowrap } td:first-child { min-width: 5.5rem } th { vertical-align: bottom }
 th, td { text-align: right; padding: .15rem .6rem; border-bottom: 1px solid #eee }
 th:first-child, td:first-child { text-align: left; padding-left: 0 } th { font-weight: 600 }
 img { max-width: 100%; height: auto; display: block } figure { margin: 1.5rem 0 }

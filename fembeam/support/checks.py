@@ -47,7 +47,7 @@ def require_non_negative(name: str, value: object, where: str, advice: str) -> N
 def require_no_text(where: str, **values: object) -> None:
     """Raise ValueError for an argument that is text where numbers are meant."""
     for name, value in values.items():
-        require(not isinstance(value, str), f"{name} must be numbers", value, where, "drop the quotes")
+        require(not isinstance(value, str), f"{name} must not be text", value, where, "drop the quotes")
 
 
 def number(name: str, value: Any, above: float = -math.inf, least: float = -math.inf) -> float:

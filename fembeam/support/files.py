@@ -6,6 +6,7 @@ import os
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from errno import ENOENT
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from typing import Any
 def written_whole(target: Path) -> Iterator[Any]:
     """A binary file that appears under its name only once it is complete; FileNotFoundError without its folder."""
     if not target.parent.is_dir():
-        raise FileNotFoundError(f"there is no folder {target.parent} to write {target.name} to; make it first")
+        raise FileNotFoundError(ENOENT, f"no such folder to write {target.name} to; make it first", str(target.parent))
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
     try:
         with os.fdopen(handle, "w+b") as file:
