@@ -34,7 +34,7 @@ class Derivatives(NamedTuple):
 
     y: Any  # (columns, x.size) of the state at fixed time
     entry: Any  # (columns, m) of the latched entry rates
-    shift: Any  # (columns, m) of the entry times
+    shift: Any  # (columns, m + 1) of the entry times, and of the time of the last border
     force: Any  # (m + L, S) of one column: forces, then signals, at the nodes of a step
     signal: Any  # (L, S) slopes of the sampled signals there
     response: Any  # (m, 2, S) of δ and δ̇ to these slopes

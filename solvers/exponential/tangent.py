@@ -100,7 +100,14 @@ class Tangent:
 @lru_cache(maxsize=64)
 def _layout(stops: int, loads: int, width: int, columns: int, latched: int, others: int) -> Layout:
     """Shapes and places of the arrays of `Derivatives` and of the past `State`."""
-    derivatives = [(columns, width), (columns, stops), (columns, stops), (stops + loads, S), (loads, S), (stops, 2, S)]
+    derivatives = [
+        (columns, width),
+        (columns, stops),
+        (columns, stops + 1),
+        (stops + loads, S),
+        (loads, S),
+        (stops, 2, S),
+    ]
     derivatives += [(stops, S), (2, width), (STAGES, columns, width), (columns, width), (8,)]
     derivatives += [(columns, stops * latched), (stops, latched * S), (latched * (5 + latched) + 2 + others,)]
     return Layout([DERIVATIVES, STATE], [derivatives, state_shapes(width, stops)])

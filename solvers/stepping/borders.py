@@ -18,6 +18,7 @@ from solvers.compiled.renewals import margins, margins_before, margins_in, note_
 from solvers.compiled.state import LAST_EVENT, T, most_borders, rate_tolerance, surface_tolerance
 from solvers.stepping.events import NONE, coefficients_of, golden_section, polynomial
 
+_MISSED = 1e-6  # margin, in units of the largest of the step, by which a landing may have missed its border
 _NODES = np.array([0.0, *(2.0**i for i in (-20, -15, -11, -8, -7, -6, -5, -4, -3, -2)), *(np.arange(3, 9) / 8.0)])
 _TOGETHER = 1e-12  # part of its way at which a border counts as reached when another is landed on
 _BEFORE = 1e-3  # part of a landing step before its end
@@ -97,11 +98,15 @@ def _lowest(known, values, i, rounding):
 def _crossing(problem, state, space, s, j):
     """First θ at which a margin of the element watched falls below zero, or NONE; 0 where it does so at once.
 
-    Where the last landing has missed a border by more than rounding, its margin is negative at first, but rises.
+    Where the last landing has missed a border by more than rounding, its margin is negative at first, but little, and
+    rises.
     """
     known, n = (problem, state, space, s, j), _NODES.size
     values, rounding = space.margin[n * j : n * j + n], space.rounding[s, j]
-    inside, missed = values[0] > rounding, state.now[T] == state.now[LAST_EVENT] and state.now[T] > 0.0
+    inside, largest = values[0] > rounding, 0.0
+    for value in values:
+        largest = max(largest, abs(value))
+    missed = state.now[T] == state.now[LAST_EVENT] and state.now[T] > 0.0 and values[0] > -_MISSED * largest
     for i in range(1, n):
         if values[i] < -rounding and not (missed and values[i] > values[i - 1]):
             return _first_beyond(known, _NODES[i - 1], _NODES[i]) if inside else 0.0

@@ -25,6 +25,7 @@ UNRESOLVED = -2
 _ON = 1e-9  # margin, in units of the largest of the step, at which a step counts as begun on the border
 _SAME = 1e-11  # the same for the sign of a node
 _TOGETHER = 1e-9  # part of its way at which a border counts as reached when another is landed on
+_MISSED = 1e-6  # margin, in units of the largest of the step, by which a landing may have missed its border
 _BEFORE = 1e-3  # part of a landing before its end
 _REST = 1e-14  # rate, in units of the reference speed, at which what has come to rest turns no more
 _NEAR = 0.2  # lowest node, in units of the largest margin, below which the motion between nodes is looked at
@@ -63,11 +64,13 @@ def _crossing(tables, state, scratch, s, j, node_set, h):
 
     It is 0 where the margin is negative from the begin on. One that begins at zero may have risen before the first
     node: then a shorter step is asked for, which will tell. A landing may have missed its border by more than rounding
-    of this step: then a margin is negative at first, but rises, and crosses only if it falls again.
+    of this step: then a margin is negative at first, but little, rises, and crosses only if it falls again. A slip that
+    begins against its force, as dashpots make it, has a large one and ends at once.
     """
     noise, before, t = scratch.noise[s, j], scratch.ends[ENDS * j], 0.0
     near = max(_ON * scratch.largest[s, j], noise)
     missed = state.now[T] == state.now[LAST_EVENT] and state.now[T] > 0.0 and scratch.margin[S * j] > before
+    missed &= before > -_MISSED * scratch.largest[s, j]
     if before < -near and not missed:
         return 0.0
     on = before <= near
