@@ -17,9 +17,9 @@ from __future__ import annotations
 import numpy as np
 
 from solvers.compiled.dop853_tableau import E5, STAGES
-from solvers.compiled.kernels import copy, dot, indentation, inlined, inner, merged
+from solvers.compiled.kernels import copy, dot, indentation, inlined, inner, merged, rhs
 from solvers.compiled.parts import PASSED
-from solvers.compiled.renewals import margins_in
+from solvers.compiled.renewals import margins_before, margins_in
 from solvers.compiled.state import (
     CALLS,
     LANDING,
@@ -201,6 +201,16 @@ def _apart(problem, tables, state, scratch, stop, border, x):
 
 
 @merged
+def _rises(problem, state, scratch, s, border, time):
+    """Whether a margin was lower so long before the landing, by the rates there."""
+    x, size = scratch.stages[LANDED], state.x.size
+    rhs(problem, x[size], x[:size], state.segment, state.entry_rate, state.rate, scratch.trial)
+    delta, rate = margins_in(problem, state, s, x, scratch.trial, scratch.margin)
+    margins_before(problem, state, s, delta, rate, time, scratch.trial, scratch.ends)
+    return scratch.ends[border] < scratch.margin[border]
+
+
+@merged
 def land_on_bend(problem, tables, state, scratch, stop, border, near, rtol, t_end, out, due, with_energy):
     """Try to land on the bend of ``stop``, or on a border of its law, about ``near`` s ahead; whether it succeeded.
 
@@ -233,7 +243,7 @@ def land_on_bend(problem, tables, state, scratch, stop, border, near, rtol, t_en
         before, apart, span = span, value, following
     if not (abs(value) <= 1e-6 * largest and _error(problem, scratch, _PART, rtol) <= 1.0):
         return False
-    if border >= 0 and (value - apart) * (span - before) > 0.0:  # it rises: the margin has been below zero before
+    if border >= 0 and _rises(problem, state, scratch, stop, border, 1e-3 * span):  # it has been below zero before
         return False
     if before_landing(problem, tables, state, scratch, stop, np.bool_(1), w, x) != CLEAR:
         return False
