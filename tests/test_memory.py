@@ -1,5 +1,7 @@
 """Laws with memory under the main method: exact pieces, simultaneous borders, latched starts, tangents."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from sliders import Slider
@@ -244,3 +246,13 @@ def test_bad_memory_is_refused():
         integrate(system, zero, zero, 1.0, memory=[[0.0]])
     with pytest.raises(ValueError, match="always=True"):
         Contact([1.0], Jenkins(50.0, 0.4))
+
+
+@pytest.mark.parametrize("seed", [50914, 51815, 51997])
+def test_random_systems_against_the_reference(monkeypatch, seed):
+    """Slips that begin against their force, and one that would have come back within a step."""
+    monkeypatch.syspath_prepend(str(Path(__file__).parent / "bench"))
+    from random_memory import judge
+
+    for name, verdict in judge(seed):
+        assert verdict.kind == "fine", (name, verdict)
