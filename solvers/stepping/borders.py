@@ -18,7 +18,7 @@ from solvers.compiled.renewals import margins, margins_before, margins_in, note_
 from solvers.compiled.state import LAST_EVENT, T, most_borders, rate_tolerance, surface_tolerance
 from solvers.stepping.events import NONE, coefficients_of, golden_section, polynomial
 
-_MISSED = 1e-6  # margin, in units of the largest of the step, by which a landing may have missed its border
+_MISSED = 1e-3  # margin, in units of the largest of the step, by which a landing may have missed its border
 _NODES = np.array([0.0, *(2.0**i for i in (-20, -15, -11, -8, -7, -6, -5, -4, -3, -2)), *(np.arange(3, 9) / 8.0)])
 _TOGETHER = 1e-12  # part of its way at which a border counts as reached when another is landed on
 _BEFORE = 1e-3  # part of a landing step before its end
