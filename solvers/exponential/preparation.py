@@ -252,7 +252,7 @@ def _layout(stops: int, loads: int, blocks: int, signals: int, borders: int, poo
         *((stops * S,), (stops * S,), (START + 1, padded(width + 2))),
         *([(stops,)] * 4),
         *((stops, S), (stops,), (4, 3 * S), (stops,), (stops,), (S + 2,), (1,), (1,)),
-        *((2 + loads, max(32, padded(size + 6 * signals), 2 * padded(6 * signals))), (3,), (6,)),
+        *((2 + loads, padded(2 * size + 2 * S * (stops + loads + 2)) + 16 * signals), (3,), (6,)),
         *((stops, 2), (borders * S,), (6 * borders,), (borders,), (stops, borders), (stops, borders), (1,), (2,)),
         *((rows, S), (rows, S), (padded(rows),), (stops * S, stops * S), (pool, S, 2 * S), (pool,)),
         *((size, S), (blocks, 5, S), (S + 1 + stops + loads, S)),

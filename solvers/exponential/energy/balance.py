@@ -189,9 +189,11 @@ def _account_panel(problem, tables, energy_tables, scratch, t, span, x, row, fur
 def account_contact(problem, tables, energy_tables, state, scratch, node_set, level, h, row):
     """Add to the ledger of ``row`` what loads and damping do over the contact step of length h just found."""
     if level >= energy_tables.first and h <= energy_tables.longest[energy_tables.kind[node_set]]:
-        _account_nodes(
-            problem, tables, energy_tables, state, scratch, node_set, level - int(energy_tables.first), h, row
-        )
+        place = level - int(energy_tables.first)
+        if energy_tables.sums.shape[0]:
+            _account_sums(problem, tables, energy_tables, state, scratch, node_set, place, h, row)
+        else:
+            _account_nodes(problem, tables, energy_tables, state, scratch, node_set, place, h, row)
         return
     x, size = scratch.stages[WITHIN], 2 * problem.k.size
     copy(state.x, x, state.x.size)
@@ -217,6 +219,34 @@ def _add_unseen(tables, scratch, node_set, h, s, work, works):
     combine(tables.tail[node_set], scratch.trial, S, None, scratch.clipped)
     most = _UNSEEN * h * unresolved_part(scratch.clipped, largest_size(scratch.trial), 1)
     works[2 * s] += min(max(work - h * sum8(load8(weights, 0) * powers), -most), most)
+
+
+@merged
+def _account_sums(problem, tables, energy_tables, state, scratch, node_set, place, h, row):
+    """The same by the forms that are summed over the blocks, for a whole step."""
+    size, stops, heads = 2 * problem.k.size, problem.gap.size, energy_tables.head
+    y, sums, tones = scratch.energy_sums[0], scratch.energy_sums[1], problem.k.size - int(tables.own_blocks)
+    copy(state.x, y, size)
+    for i in range(heads.size):
+        used = heads[i] >= stops or state.segment[heads[i]] > 0
+        store8(y, size + S * i, load8(scratch.force[heads[i]], 0) if used else splat8(0.0))
+    combine(energy_tables.sums[node_set, place], y, size + S * heads.size, None, sums)
+    losses, gains = splat8(0.0), splat8(0.0)
+    for i in range(heads.size):
+        values = load8(y, size + S * i)
+        losses += values * load8(sums, 2 * S * i)
+        works = values * load8(sums, 2 * S * i + S)
+        if heads[i] >= stops:
+            gains += works
+        elif state.segment[heads[i]] > 0 and not _enters(tables, node_set, heads[i]):
+            _add_unseen(tables, scratch, node_set, h, heads[i], sum8(works), row[size + 2 :])
+    gain, loss = sum8(gains), sum8(losses)
+    loss += _own_loss(energy_tables.free_loss[energy_tables.kind[node_set], place], state.x, problem.k.size)
+    of_tones = sums[2 * S * heads.size :]
+    for k in range(2 * tones):
+        value = state.x[int(tables.own_blocks) + (k if k < tones else k + problem.k.size - tones)]
+        loss, gain = loss + value * of_tones[k], gain + value * of_tones[2 * tones + k]
+    row[size], row[size + 1] = row[size] + gain, row[size + 1] + loss
 
 
 @merged

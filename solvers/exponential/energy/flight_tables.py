@@ -23,6 +23,7 @@ from solvers.compiled.kernels import INTEGERS, MATRIX, REAL, VECTOR, Problem
 from solvers.compiled.packed import Packed
 from solvers.compiled.sums import padded
 from solvers.exponential.contact.nodes import S, gauss
+from solvers.exponential.energy.contact_sums import Steps, Sums, free_loss, tones_at_nodes
 from solvers.exponential.energy.contact_tables import contact_table
 from solvers.exponential.flight import SERIES_TERMS
 from solvers.exponential.phi_functions import signal_responses
@@ -51,7 +52,10 @@ class EnergyTables(NamedTuple):
     first: float  # contact step at which the tables begin
     longest: Any  # (kinds,) s: contact step up to which they may be used
     steady: Any  # (kinds, j, K, 2, S): α, β of every tone at the nodes
-    contact: Any  # (kinds, j, n, 3S + 5, 2S)
+    contact: Any  # (kinds, j, n, 3S + 5, 2S), or none where the next three are
+    head: Any  # (H,) rows of `Scratch.force` that are heads, see `contact_sums`
+    sums: Any  # (f, j, 2N + S H, 2 S H padded with 4K) forms summed over the blocks
+    free_loss: Any  # (kinds, j, 3, n) damping of free motion = Σ rows × (p², p v, v²)
 
 
 ENERGY_TABLES = types.NamedTuple(
@@ -69,6 +73,7 @@ ENERGY_TABLES = types.NamedTuple(
             VECTOR,
         ),
         *(types.Array(REAL, 5, "C"),) * 2,
+        *(INTEGERS, *(types.Array(REAL, 4, "C"),) * 2),
     ],
     EnergyTables,
 )
@@ -78,8 +83,8 @@ def _empty(kept: float, node_sets: int) -> EnergyTables:
     """A balance without tables."""
     none, nothing, contact = np.zeros(0, dtype=np.int64), np.zeros((0, 0, 0)), np.zeros((0, 0, 0, 0, 0))
     flight = kept, 0.0, 0.0, none, nothing, nothing, nothing
-    kind, longest = np.zeros(node_sets, dtype=np.int64), np.zeros(1)
-    return EnergyTables(*flight, gauss(5), _series(), kind, 0.0, longest, contact, contact)
+    kind, longest, sums = np.zeros(node_sets, dtype=np.int64), np.zeros(1), np.zeros((0, 0, 0, 0))
+    return EnergyTables(*flight, gauss(5), _series(), kind, 0.0, longest, contact, contact, none, sums, sums)
 
 
 def _series() -> Any:
@@ -258,12 +263,24 @@ def _contact_part(energy_tables: EnergyTables, problem: Problem, tables: Tables)
     places = tables.nodes[[node_sets.index(kind) for kind in kinds]]
     structure = [part.tobytes() for part in (problem.k[:own], problem.c[:own], h)]
     of_kinds = [contact_table(*structure, *kind, row.tobytes()) for kind, row in zip(kinds, places, strict=True)]
-    return energy_tables._replace(
+    steady = _steady(np.sqrt(problem.k[own:]), h, places ** np.array([power for power, _ in kinds])[:, None])
+    energy_tables = energy_tables._replace(
         kind=np.array([kinds.index(node_set) for node_set in node_sets], dtype=np.int64),
         first=float(len(tables.contact_step) - len(h)),
         longest=_longest(np.sqrt(problem.k[own:].max(initial=0.0)), kinds, h),
-        steady=_steady(np.sqrt(problem.k[own:]), h, places ** np.array([power for power, _ in kinds])[:, None]),
-        contact=np.stack(of_kinds),
+    )
+    sums = Sums(problem, tables)
+    if tables.node_propagator.size or len(node_sets) * len(h) * math.prod(sums.shape) > _MOST_NUMBERS:
+        return energy_tables._replace(steady=steady, contact=np.stack(of_kinds))
+    tones, weights = [tones_at_nodes(part, problem.k[own:]) for part in steady], h[:, None] * tables.plain[:, None]
+    steps = [
+        Steps(of_kinds[kind], f - 1 if tables.weight_exponent[f] > 0.0 else -1, weights[f], tones[kind])
+        for f, kind in enumerate(energy_tables.kind)
+    ]
+    return energy_tables._replace(
+        head=sums.heads,
+        sums=np.stack([sums.of(part) for part in steps]),
+        free_loss=np.stack([free_loss(table, problem.c[:own]) for table in of_kinds]),
     )
 
 
