@@ -1,5 +1,6 @@
 """Work and damping of whole steps and of runs: against quadrature, closed forms, and the balance of energy."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -73,17 +74,22 @@ def quadrature(problem, tables, h, x, s):
 
 
 def by_forms(energy_tables, level, x, s):
-    """The same by the tables."""
-    n = len(x) // 2
-    given = np.concatenate((x[energy_tables.driver], *s))
-    rows = (given @ energy_tables.rows[level]).reshape(2, -1)[:, : len(x)] @ x
-    own = energy_tables.plain.shape[2]
-    p, v = x[:own], x[n : n + own]
-    rows[1] += (energy_tables.plain[level] * [p * p, p * v, v * v]).sum()
-    signals = given[len(energy_tables.driver) :]
+    """The same by the tables; for a whole cell the signals are given by their values at its ends."""
+    n, whole = len(x) // 2, level == len(energy_tables.rows) - 1
+    signals = np.concatenate([at_ends(part, energy_tables.spacing) if whole else part for part in s] or [np.zeros(0)])
+    given = np.concatenate((signals, x[energy_tables.driver]))
+    rows = (given @ energy_tables.rows[level]).reshape(2, 2, -1)[..., :n].reshape(2, -1) @ x
+    p, v = np.split(x, 2)
+    rows[1] += (energy_tables.plain[level][:, :n] * [p * p, p * v, v * v]).sum()
     if len(signals):
         rows += (signals @ energy_tables.pairs[level]).reshape(2, -1)[:, : len(signals)] @ signals
     return rows
+
+
+def at_ends(s, h):
+    """s, s', s'' of a quintic at its begin and after the time h, from its derivatives at the begin."""
+    after = [sum(s[i] * h ** (i - d) / math.factorial(i - d) for i in range(d, 6)) for d in range(3)]
+    return np.concatenate((s[:3], after))
 
 
 @pytest.mark.parametrize(

@@ -52,8 +52,8 @@ from solvers.compiled.state import (
 from solvers.exponential.contact.begin import BEGUN, NEW, begin_steps, latest_entered
 from solvers.exponential.contact.landing import landing_reach
 from solvers.exponential.contact.step import advance_contact
-from solvers.exponential.energy.balance import account_state, start_account
 from solvers.exponential.energy.check import FIRST, has_gained, note_energy, own_energy
+from solvers.exponential.energy.flight_balance import account_state, start_account
 from solvers.exponential.energy.flight_tables import ENERGY_TABLES, NO_ENERGY_TABLES
 from solvers.exponential.preparation import SCRATCH, TABLES, load_parts, prepare_run
 from solvers.exponential.safe_steps import fly

@@ -1,188 +1,24 @@
-"""The energy balance step by step: whole steps by the forms of `flight_tables`, parts of steps by series.
+"""The energy balance of contact steps: whole steps by tables, the rest by `quadrature`.
 
-On a part of a step the state is the Taylor series of its differential equation, in panels of `SERIES_REACH` radians of
-the fastest block; the powers are integrated by Gauss's rule with five points, with an error of 2e-12 at most.
-
-A flight is accounted for from a *mark* on: the begin of the flight, the last output or, with sampled signals, the begin
-of the present cell. Between marks, one form covers the time, whatever steps the flight has taken.
+A step of a system with one or two stops is one form that `contact_sums` has summed over the blocks; with more stops the
+blocks are summed here, each by its forms of `contact_tables`.
 """
 
 from __future__ import annotations
 
-import math
-
 from numba import types
 
-from solvers.compiled.kernels import REAL, VECTOR, copy, dot, inlined, inner, merged, reordered
-from solvers.compiled.parts import ACCOUNT_CONTACT, ACCOUNT_FLIGHT, part
+from solvers.compiled.kernels import REAL, VECTOR, copy, inlined, inner, merged, reordered
+from solvers.compiled.parts import ACCOUNT_CONTACT, part
 from solvers.compiled.simd import load8, splat8, store8, sum8
-from solvers.compiled.state import T
 from solvers.compiled.sums import combine
 from solvers.exponential.contact.collocation import largest_size, unresolved_part
 from solvers.exponential.contact.node_response import WITHIN
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.energy.contact_tables import BEGAN, ENTERING, SQUARES
-from solvers.exponential.energy.quadrature import powers, state_within
-from solvers.exponential.flight import (
-    SERIES_REACH,
-    SERIES_TERMS,
-    add_signals,
-    level_within,
-    propagate_blocks,
-    signal_derivatives,
-)
+from solvers.exponential.energy.quadrature import state_within
 
-_TERM_SUM, _MOVING, _MARK = 9, 10, 11  # rows of Scratch.stages; those before hold a load on the blocks and derivatives
-_EXACT = 1e-17  # share of the last term of a series
 _UNSEEN = 10.0  # times what a polynomial leaves out: aliases of fast blocks need not look like the end of a series
-
-
-@reordered
-def _own_loss(plain, x, n):
-    """Energy dissipated by the structure's blocks without tones."""
-    loss, blocks = 0.0, plain.shape[1]
-    for b in range(blocks):
-        p, v = x[b], x[n + b]
-        loss += plain[0, b] * p * p + plain[1, b] * p * v + plain[2, b] * v * v
-    return loss
-
-
-@inner
-def start_account(problem, state, scratch):
-    """Set the mark, from which `account_until` accounts for a flight; the balance of the state is complete."""
-    copy(state.x, scratch.stages[_MARK], 2 * problem.k.size)
-    scratch.stages[_MARK, 2 * problem.k.size] = state.now[T]
-
-
-@part(ACCOUNT_FLIGHT, types.void, REAL, VECTOR)
-def account_until(problem, tables, energy_tables, scratch, t, row):
-    """Add work and damping of a flight from the mark to t, within one cell, to the balance of ``row``."""
-    x, size = scratch.stages[_MOVING], 2 * problem.k.size
-    copy(scratch.stages[_MARK], x, size)
-    begin = scratch.stages[_MARK, size]
-    span, level = t - begin, tables.flight_step.size
-    if energy_tables.closed > 0.0 and abs(span - energy_tables.spacing) <= _rounding(problem, energy_tables, t):
-        _derive(problem, scratch, begin)
-        _account_forms(problem, energy_tables, scratch, level, x, row)
-        return
-    while energy_tables.closed > 0.0 and tables.fastest * span > SERIES_REACH:
-        level = level_within(tables, span)
-        _derive(problem, scratch, begin)
-        _account_forms(problem, energy_tables, scratch, level, x, row)
-        propagate_blocks(problem, tables.flight_propagator[level, 0], tables.flight_propagator[level, 1], x)
-        if problem.table_dt.size:
-            add_signals(problem, tables.signal[level], x, begin, scratch.signal_terms)
-        begin, span = begin + tables.flight_step[level], span - tables.flight_step[level]
-    if span > 0.0:
-        _account_series(problem, tables, energy_tables, scratch, begin, span, x, row)
-
-
-@inner
-def account_output(problem, tables, energy_tables, state, scratch, t, row):
-    """Complete the balance of an output at t; without sampled signals the mark moves there."""
-    size = 2 * problem.k.size
-    copy(state.x[size:], row[size:], 2)
-    account_until(problem, tables, energy_tables, scratch, t, row)
-    if problem.table_dt.size == 0:
-        copy(row[size:], state.x[size:], 2)
-        copy(row, scratch.stages[_MARK], size)
-        scratch.stages[_MARK, size] = t
-
-
-@inner
-def account_state(problem, tables, energy_tables, state, scratch):
-    """Complete the balance of the state, and set the mark there."""
-    account_until(problem, tables, energy_tables, scratch, state.now[T], state.x)
-    start_account(problem, state, scratch)
-
-
-@merged
-def _rounding(problem, energy_tables, t):
-    """Difference allowed between the step of the tables and the time between two outputs, or of a cell."""
-    return 1e-7 * energy_tables.spacing if problem.table_dt.size else 4e-16 * t
-
-
-@inner
-def _derive(problem, scratch, t):
-    """Derivatives of the sampled signals at t, into ``scratch.signal_terms``."""
-    for j in range(problem.table_dt.size):
-        signal_derivatives(problem, j, t, scratch.signal_terms[j])
-
-
-@inner
-def _account_forms(problem, energy_tables, scratch, level, x, row):
-    """The same by the forms of a step, from the derivatives of the signals in ``scratch.signal_terms``."""
-    n, driven, given = problem.k.size, energy_tables.driver.size, scratch.energy_sums[0]
-    signals = 6 * problem.table_dt.size
-    for i in range(driven):
-        given[i] = x[energy_tables.driver[i]]
-    for i in range(signals):
-        given[driven + i] = scratch.signal_terms[i // 6, i % 6]
-    sums = scratch.terms
-    combine(energy_tables.rows[level], given, driven + signals, None, sums)
-    gain, loss = dot(sums[0], x, 2 * n), dot(sums[1], x, 2 * n) + _own_loss(energy_tables.plain[level], x, n)
-    if signals:
-        sums, given, half = scratch.energy_sums[1], given[driven:], energy_tables.pairs.shape[2] // 2
-        combine(energy_tables.pairs[level], given, signals, None, sums)
-        gain += dot(sums, given, signals)
-        loss += dot(sums[half:], given, signals)
-    row[2 * n] += gain
-    row[2 * n + 1] += loss
-
-
-@merged
-def _account_series(problem, tables, energy_tables, scratch, t, span, x, row):
-    """The same by series for a part of a cell from x at t on; x is moved to the last panel."""
-    panels, size = max(1, math.ceil(tables.fastest * span / SERIES_REACH - 1e-9)), 2 * problem.k.size
-    for i in range(panels):
-        _clear(scratch, size)
-        _derive(problem, scratch, t + i * span / panels)
-        for j in range(problem.table_dt.size):
-            load = problem.load[problem.table_load[j]]
-            for order in range(scratch.signal_terms.shape[1]):
-                for e in range(size):
-                    scratch.stages[order, e] += load[e] * scratch.signal_terms[j, order]
-        _account_panel(
-            problem, tables, energy_tables, scratch, t + i * span / panels, span / panels, x, row, i + 1 < panels
-        )
-
-
-@merged
-def _clear(scratch, size):
-    """Set the load on the blocks and its derivatives to zero."""
-    for order in range(S):
-        for e in range(size):
-            scratch.stages[order, e] = 0.0
-
-
-@merged
-def _account_panel(problem, tables, energy_tables, scratch, t, span, x, row, further):
-    """Add work and damping under the load in ``scratch.stages`` to the balance of ``row``.
-
-    x is moved to the end of the panel if ``further``. Term i of the series is span^i times a derivative.
-    """
-    n, terms, z = problem.k.size, scratch.terms, scratch.stages[_TERM_SUM]
-    copy(x, terms[0], 2 * n)
-    count, size, power = 1, 1.0, span
-    while count < SERIES_TERMS and (count <= S or size > _EXACT):
-        i, count = count - 1, count + 1
-        size *= tables.fastest * span / (i + 1.0)
-        for b in range(n):
-            p, v = terms[i, b], terms[i, n + b]
-            terms[i + 1, b], terms[i + 1, n + b] = span * v, -span * (problem.k[b] * p + problem.c[b] * v)
-        if i < S:
-            for e in range(2 * n):
-                terms[i + 1, e] += power * scratch.stages[i, e]
-            power *= span
-    points = energy_tables.gauss.shape[1]
-    for q in range(points):
-        combine(terms, energy_tables.series[q], count, None, z)
-        gain, loss = powers(problem, tables, t + span * energy_tables.gauss[0, q], z)
-        row[2 * n] += span * energy_tables.gauss[1, q] * gain
-        row[2 * n + 1] += span * energy_tables.gauss[1, q] * loss
-    if further:
-        combine(terms, energy_tables.series[points], count, None, z)
-        copy(z, x, 2 * n)
 
 
 @part(ACCOUNT_CONTACT, types.void, types.int64, types.int64, REAL, VECTOR)
@@ -221,6 +57,16 @@ def _add_unseen(tables, scratch, node_set, h, s, work, works):
     works[2 * s] += min(max(work - h * sum8(load8(weights, 0) * powers), -most), most)
 
 
+@reordered
+def _free_loss(plain, x, n):
+    """Energy dissipated by the free motion of the structure's blocks."""
+    loss, blocks = 0.0, plain.shape[1]
+    for b in range(blocks):
+        p, v = x[b], x[n + b]
+        loss += plain[0, b] * p * p + plain[1, b] * p * v + plain[2, b] * v * v
+    return loss
+
+
 @merged
 def _account_sums(problem, tables, energy_tables, state, scratch, node_set, place, h, row):
     """The same by the forms that are summed over the blocks, for a whole step."""
@@ -241,7 +87,7 @@ def _account_sums(problem, tables, energy_tables, state, scratch, node_set, plac
         elif state.segment[heads[i]] > 0 and not _enters(tables, node_set, heads[i]):
             _add_unseen(tables, scratch, node_set, h, heads[i], sum8(works), row[size + 2 :])
     gain, loss = sum8(gains), sum8(losses)
-    loss += _own_loss(energy_tables.free_loss[energy_tables.kind[node_set], place], state.x, problem.k.size)
+    loss += _free_loss(energy_tables.free_loss[energy_tables.kind[node_set], place], state.x, problem.k.size)
     of_tones = sums[2 * S * heads.size :]
     for k in range(2 * tones):
         value = state.x[int(tables.own_blocks) + (k if k < tones else k + problem.k.size - tones)]
