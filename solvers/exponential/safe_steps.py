@@ -45,6 +45,7 @@ from solvers.exponential.flight import (
     join,
     level_within,
     motion_of_stop,
+    propagate_blocks,
     propagate_split,
     split,
     taylor_step,
@@ -238,10 +239,13 @@ def _fly_step(problem, tables, state, scratch, span, target, rest, offset, cell,
     else:
         level = level_within(tables, span)
         h = tables.flight_step[level]
-        split(problem, state.x, x[0])
-        derive_signals(problem, now[T], scratch.signal_terms)
-        fly_tabulated(problem, tables, level, x[0], scratch.signal_terms)
-        join(problem, x[0], state.x)
+        if sampled:
+            split(problem, state.x, x[0])
+            derive_signals(problem, now[T], scratch.signal_terms)
+            fly_tabulated(problem, tables, level, x[0], scratch.signal_terms)
+            join(problem, x[0], state.x)
+        else:
+            propagate_blocks(problem, tables.flight_propagator[level, 0], tables.flight_propagator[level, 1], state.x)
     return h, stop
 
 
