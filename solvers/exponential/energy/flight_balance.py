@@ -189,50 +189,71 @@ def _account_panels(problem, tables, energy_tables, scratch, x, t, span, row):
 @part(ACCOUNT_SERIES, types.void, REAL, REAL, VECTOR)
 def account_series(problem, tables, energy_tables, scratch, t, span, row):
     """Add work and damping of the motion by `fly_series` that began at t."""
-    n, weights, plain = problem.k.size, scratch.values, int(tables.own_blocks) == problem.k.size
-    count, size = S + 1, 1.0
+    n, plain = problem.k.size, int(tables.own_blocks) == problem.k.size
+    count, size, power = S + 1, 1.0, 1.0
     for i in range(S):
         size *= tables.fastest * span / (i + 1.0)
     while count < SERIES_TERMS and size > _EXACT:
         size *= tables.fastest * span / count
         count += 1
-    for q in range(energy_tables.gauss.shape[1]):
-        power = 1.0
-        for i in range(count):
-            weights[i] = energy_tables.series[q, i] * power
-            power *= span
-        if plain and tables.loss_rows.shape[0] <= n:
-            gain, loss = _plain_powers(problem, tables, energy_tables, scratch, count)
-        else:
-            combine(scratch.terms, weights, count, None, scratch.stages[_SPLIT])
-            _join_row(scratch.stages[_SPLIT], scratch.stages[_JOINED], n, tables.block_k_c.shape[1])
-            gain, loss = powers(problem, tables, t + span * energy_tables.gauss[0, q], scratch.stages[_JOINED])
-        row[2 * n] += span * energy_tables.gauss[1, q] * gain
-        row[2 * n + 1] += span * energy_tables.gauss[1, q] * loss
+    for i in range(count):
+        scratch.values[i] = power
+        power *= span
+    if plain and tables.loss_rows.shape[0] <= n:
+        gain, loss = _of_rates(problem, tables, energy_tables, scratch, count, span)
+    else:
+        gain, loss = _of_states(problem, tables, energy_tables, scratch, t, count, span)
+    row[2 * n] += gain
+    row[2 * n + 1] += loss
 
 
 @merged
-def _join_row(source, target, n, width):
-    """Into a row with p and v of the blocks from one with both padded."""
-    for b in range(n):
-        target[b], target[n + b] = source[b], source[width + b]
-
-
-@merged
-def _plain_powers(problem, tables, energy_tables, scratch, count):
-    """Powers of signals and damping without tones and coupling, where the series have the weights in ``values``."""
-    width, rates, gain, losses = tables.block_k_c.shape[1], scratch.stages[_SPLIT], 0.0, splat8(0.0)
+def _of_rates(problem, tables, energy_tables, scratch, count, span):
+    """The same without tones and coupling; powers of the time are in ``scratch.values``, all points in one pass."""
+    points, series, width = energy_tables.gauss.shape[1], energy_tables.series, tables.block_k_c.shape[1]
+    weights, signals, gains, losses = scratch.energy_sums[0], scratch.energy_sums[1], splat8(0.0), splat8(0.0)
+    for q in range(points):
+        weights[q] = span * energy_tables.gauss[1, q]
+        for j in range(problem.table_dt.size):
+            signal = 0.0
+            for i in range(6):
+                signal += series[q, i] * scratch.values[i] * scratch.signal_terms[j, i]
+            signals[points * j + q] = weights[q] * signal
     for i in range(0, width, WIDTH):
-        v = splat8(0.0)
-        for e in range(count):
-            v += splat8(scratch.values[e]) * load8(scratch.terms[e], width + i)
-        losses += load8(tables.block_k_c[1], i) * v * v
-        store8(rates, i, v)
-    for j in range(problem.table_dt.size):
-        signal, power = 0.0, splat8(0.0)
-        for order in range(6):
-            signal += scratch.values[order] * scratch.signal_terms[j, order]
-        for i in range(0, width, WIDTH):
-            power += load8(energy_tables.power[problem.table_load[j]], i) * load8(rates, i)
-        gain += signal * sum8(power)
-    return gain, sum8(losses)
+        a, b, c, d, e = splat8(0.0), splat8(0.0), splat8(0.0), splat8(0.0), splat8(0.0)
+        for k in range(count):
+            term = splat8(scratch.values[k]) * load8(scratch.terms[k], width + i)
+            a += splat8(series[0, k]) * term
+            b += splat8(series[1, k]) * term
+            c += splat8(series[2, k]) * term
+            d += splat8(series[3, k]) * term
+            e += splat8(series[4, k]) * term
+        losses += load8(tables.block_k_c[1], i) * _sum_of_five(weights, 0, a * a, b * b, c * c, d * d, e * e)
+        for j in range(problem.table_dt.size):
+            power = load8(energy_tables.power[problem.table_load[j]], i)
+            gains += power * _sum_of_five(signals, points * j, a, b, c, d, e)
+    return sum8(gains), sum8(losses)
+
+
+@inlined
+def _sum_of_five(weights, first, a, b, c, d, e):
+    """Weighted sum of a block's numbers at Gauss's points."""
+    outer = splat8(weights[first]) * a + splat8(weights[first + 4]) * e
+    inner_ones = splat8(weights[first + 1]) * b + splat8(weights[first + 3]) * d
+    return outer + inner_ones + splat8(weights[first + 2]) * c
+
+
+@merged
+def _of_states(problem, tables, energy_tables, scratch, t, count, span):
+    """The same in general, point by point."""
+    n, width, z, gain, loss = problem.k.size, tables.block_k_c.shape[1], scratch.stages[_JOINED], 0.0, 0.0
+    for q in range(energy_tables.gauss.shape[1]):
+        for i in range(count):
+            scratch.energy_sums[0, i] = scratch.values[i] * energy_tables.series[q, i]
+        combine(scratch.terms, scratch.energy_sums[0], count, None, scratch.stages[_SPLIT])
+        for b in range(n):
+            z[b], z[n + b] = scratch.stages[_SPLIT, b], scratch.stages[_SPLIT, width + b]
+        by_loads, by_damping = powers(problem, tables, t + span * energy_tables.gauss[0, q], z)
+        gain += span * energy_tables.gauss[1, q] * by_loads
+        loss += span * energy_tables.gauss[1, q] * by_damping
+    return gain, loss
