@@ -142,6 +142,51 @@ def test_tables_of_contact_steps_are_their_quadrature(power, lead, k, c):
     np.testing.assert_allclose(squares, exact[0], rtol=1e-12)
 
 
+def by_sums(problem, tables, energy_tables, node_set, place, x, heads):
+    """Work of loads, of the stop, and damping of a contact step, by the forms that are summed over the blocks."""
+    n, size, last, stops = int(tables.own_blocks), len(x), 2 * S * len(heads), len(problem.gap)
+    sums = np.concatenate((x, heads.ravel())) @ energy_tables.sums[node_set, place]
+    damping, work = np.moveaxis(sums[:last].reshape(-1, 2, S) * heads[:, None], 1, 0)
+    tone = np.append(np.arange(n, size // 2), np.arange(size // 2 + n, size))
+    of_tones = sums[last : last + 2 * len(tone)].reshape(2, -1) @ x[tone]
+    p, v = x.reshape(2, -1)[:, :n]
+    free = (energy_tables.free_loss[energy_tables.kind[node_set], place] * [p * p, p * v, v * v]).sum()
+    return np.array([work[stops:].sum() + of_tones[1], work[:stops].sum(), damping.sum() + of_tones[0] + free])
+
+
+@pytest.mark.parametrize("node_set", [0, 1])
+@pytest.mark.parametrize("signals", [[Nodes()], [fb.Harmonic(2.0, 13.0)], [fb.Harmonic(2.0, 13.0), Nodes()]], ids=len)
+def test_sums_over_blocks_are_their_quadrature(signals, node_set):
+    """Blocks of all kinds under a stop's force, a signal and a tone: one integration of the motion and its powers."""
+    from scipy.integrate import solve_ivp
+
+    problem, tables, energy_tables = prepared(blocks(signals))
+    place = int(np.searchsorted(-tables.contact_step, -0.02)) - int(energy_tables.first)
+    h, n, size = tables.contact_step[place + int(energy_tables.first)], int(tables.own_blocks), len(problem.k)
+    power, lead, nodes = (getattr(tables, name)[node_set] for name in ("time_exponent", "weight_exponent", "nodes"))
+    rng = np.random.default_rng(3)
+    x, heads = rng.standard_normal(2 * size), rng.standard_normal((len(energy_tables.head), S))
+    heads[1:] = 0.7 - 1.1 * nodes**power  # a signal is smooth in time
+    push = np.concatenate((problem.push, problem.load))[energy_tables.head, size : size + n]
+
+    def rate(sigma, z):
+        full, basis = z[: 2 * size], [np.prod([(sigma - b) / (a - b) for b in nodes if b != a]) for a in nodes]
+        values = heads @ basis
+        if lead:
+            values[0] = heads[0] @ (basis * (sigma / nodes) ** lead)
+        signal = tables.signal_rows @ full
+        signal[energy_tables.head[1:] - 1] += values[1:]
+        bent = np.append(push.T @ values, np.zeros(size - n)) - problem.k * full[:size] - problem.c * full[size:]
+        powers = signal @ (tables.power_rows @ full), values[0] * (problem.read_rate[0] @ full)
+        damping = np.sum((tables.loss_rows @ full) ** 2)
+        return h * power * sigma ** (power - 1.0) * np.concatenate((full[size:], bent, powers, [damping]))
+
+    exact = solve_ivp(rate, (0.0, 1.0), [*x, 0.0, 0.0, 0.0], "DOP853", rtol=3e-14, atol=1e-14).y[2 * size :, -1]
+    found = by_sums(problem, tables, energy_tables, node_set, place, x, heads)
+    which = [0, 1, 2] if node_set == 0 else [0, 2]  # the work of a stop that enters is not asked for
+    np.testing.assert_allclose(found[which], exact[which], rtol=0.0, atol=1e-12 * np.abs(exact).max())
+
+
 @pytest.mark.parametrize("dt", [3e-4, 1e-2, 0.3])
 @pytest.mark.parametrize("signals", [[], [Nodes()], [fb.Harmonic(2.0, 13.0), Nodes()]], ids=len)
 def test_free_motion_balances_to_rounding(signals, dt):
