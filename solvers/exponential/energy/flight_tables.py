@@ -33,6 +33,7 @@ from solvers.exponential.tables import Tables
 _OCTAVE = 4  # flight steps of which each is twice as long as the last
 _BRIEF = 0.04  # |λ| h up to which twelve terms of a Taylor series are exact
 _MOST_NUMBERS = 10_000_000  # in the rows: with more drivers the work is computed by series
+_MOST_PER_BLOCK = 1000  # numbers of a form summed over the blocks: with more, of many tones, blocks take less time
 _REACH = 200.0  # radians of the fastest block up to which a contact step has tables
 
 
@@ -278,7 +279,7 @@ def _contact_part(energy_tables: EnergyTables, problem: Problem, tables: Tables)
         longest=_longest(np.sqrt(problem.k[own:].max(initial=0.0)), kinds, h),
     )
     sums = Sums(problem, tables)
-    if tables.node_propagator.size or len(node_sets) * len(h) * math.prod(sums.shape) > _MOST_NUMBERS:
+    if tables.node_propagator.size or math.prod(sums.shape) > _MOST_PER_BLOCK * own:
         return energy_tables._replace(steady=steady, contact=np.stack(of_kinds))
     tones, weights = [tones_at_nodes(part, problem.k[own:]) for part in steady], h[:, None] * tables.plain[:, None]
     steps = [
