@@ -319,7 +319,7 @@ def test_a_branch_says_where_it_turned_round_or_was_lost():
     assert found.endings[1].startswith("lost: no orbit was found")
     assert "; the last orbit, at 2.2, has multipliers up to" in found.endings[1]
     walk.status = BranchStatus.END
-    assert found.endings[1] == "turned round at 2.2 and reached the end of the span at 2.2"
+    assert found.endings[1] == "reached the end of the span: turned round at 2.2, came to 2.2"
 
 
 def test_phases_that_come_and_go_are_located():

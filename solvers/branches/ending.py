@@ -14,7 +14,7 @@ def ending(walk: Walk) -> str:
     if walk.status in (BranchStatus.LOST, BranchStatus.JUMP):
         return f"{word}; the last orbit, at {values[-1]:.9g}, {_about(walk)}"
     if walk.status is BranchStatus.END and values[-1] != walk.span[ahead]:
-        return f"turned round at {(max if ahead else min)(values):.9g} and {word} at {values[-1]:.9g}"
+        return f"{word}: turned round at {(max if ahead else min)(values):.9g}, came to {values[-1]:.9g}"
     return word
 
 
