@@ -20,7 +20,8 @@ from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, Sum, Tabul
 PAPER_LAW = Hysteretic.lankarani_nikravesh(2.1e8, restitution=0.5)
 PAPER_OMEGA = 109.1299120547, 790.6100943811, 2303.729838331
 TIP = 0.24445
-STEEL = {"E": 1.9e11, "rho": 8000.0, "A": 58.3e-6, "I": 18.5e-12}
+STEEL = fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)
+PAPER_BEAM = fb.Beam(0.2599, STEEL)
 
 
 def free_mass(law, mass=1.0, gap=0.0, loads=()):
@@ -125,7 +126,7 @@ def linear_stop():
 def paper_scene(base=None, zeta=(0.02, 0.01), law=None):
     """The clamped beam with a tip mass over an elastic stop; base None is 1 mm at 195 rad/s."""
     return fb.Scene(
-        beam=fb.Beam(0.2599, fb.Section(**STEEL)),
+        beam=PAPER_BEAM,
         supports=[fb.Clamped(0.0)],
         masses=[fb.LumpedMass(TIP, mass=25.4e-3, inertia=3.0e-6)],
         stops=[fb.Stop(TIP, law=PAPER_LAW if law is None else law)],

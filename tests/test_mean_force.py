@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from problems import STEEL, TIP, paper_scene
+from problems import PAPER_BEAM, TIP, paper_scene
 
 import fembeam as fb
 from contacts import Hertz, KelvinVoigt
@@ -10,7 +10,7 @@ from contacts import Hertz, KelvinVoigt
 
 def scene(*stops, **more):
     parts = {"damping": fb.ModalDamping(0.02), "base": fb.Harmonic(1e-3, 195.0), **more}
-    return fb.Scene(fb.Beam(0.2599, fb.Section(**STEEL)), [fb.Clamped(0.0)], stops=list(stops), **parts)
+    return fb.Scene(PAPER_BEAM, [fb.Clamped(0.0)], stops=list(stops), **parts)
 
 
 @pytest.mark.parametrize("dt", [1e-2, 1e-3, 1e-4, 1.3e-5])
