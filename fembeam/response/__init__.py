@@ -2,7 +2,8 @@
 transfer functions.
 
 Each file answers one question with functions of a `Run` or a `Model`, which offer them as methods; they know neither.
-`readout` is what a run keeps for them in its file. Imports: `scene`, `beams`, `support`, `reduction`. Begin with it.
+`readout` is what a run keeps for them in its file. Imports: `scene`, `beams`, `support`, `reduction`. Begin with
+`readout`.
 """
 
 from fembeam.response.backbone import backbone

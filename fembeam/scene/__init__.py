@@ -1,7 +1,7 @@
 """What there is: supports, masses, springs, stops, elements, impactors, loads; full matrices, contact rows, signals.
 
-Imports: `beams`, `excitation`, `support`, `reduction`; `Scene.reduce` opens the door to `fembeam.model`. Begin with
-`scene`, then `assembly`.
+Imports: `beams`, `excitation`, `support`, `reduction`; inside the method `Scene.reduce` also `fembeam.model`.
+Begin with `scene`, then `assembly`.
 """
 
 from fembeam.scene.assembly import Matrices, unsupported

@@ -1,4 +1,4 @@
-"""What every room needs and none owns: checks of arguments, whole files, progress, signals of the system.
+"""What all of fembeam needs: checks of arguments, whole files, progress, signals of the system.
 
 Imports nothing of ours.
 """
