@@ -50,7 +50,7 @@ class Sums:
 
     def add(self, piece: Segment, seen: Mapping[str, tuple[Vector, Vector | None]], batches: int) -> float:
         """Take in a segment, batch by batch; returns its seconds."""
-        first = math.ceil(piece.begin / self.dt - 1e-9)
+        first = math.ceil(piece.start / self.dt - 1e-9)
         borders = np.linspace(first, piece.end, batches + 1).round().astype(int)
         for name, (x, rate) in seen.items():
             if name not in self.signals:
