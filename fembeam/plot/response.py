@@ -138,16 +138,16 @@ def mode_shapes(model: Model, axes: Axes | None = None) -> Figure:
 
 def _window(run: Run) -> tuple[float, float]:
     """Eight periods of the lowest mode that swings (or 400 samples): the last ones, of a transient about its peak."""
-    begin, end = float(run.t[0]), float(run.t[-1])
+    first, end = float(run.t[0]), float(run.t[-1])
     swinging = [omega for omega in natural(run) if omega > 0]
-    length = min(PERIODS * 2 * np.pi / min(swinging) if swinging else 400 * sampling_of(run), end - begin)
+    length = min(PERIODS * 2 * np.pi / min(swinging) if swinging else 400 * sampling_of(run), end - first)
     if stationary(run):
         return end - length, end
     if len(run.contacts):
         about = float(run.contacts.t_in[np.argmax(run.contacts.peak_force)])
     else:
         about = float(run.t[np.argmax(np.abs(run.displacement(_resting_place(run))))])
-    start = min(max(begin, about - BEFORE * length), end - length)
+    start = min(max(first, about - BEFORE * length), end - length)
     return start, start + length
 
 

@@ -12,7 +12,7 @@ from fembeam.scene.local_coordinate import LocalCoordinate, unit_of
 from fembeam.scene.parameters import changes_structure, path_of, replaced, value_of, with_value
 from fembeam.scene.parts import Clamped, Dashpot, Guided, LumpedMass, Pinned, PointForce, PointMoment, Spring, Stop
 from fembeam.scene.scene import FEATURES, Scene
-from fembeam.scene.signals import PLACES, lasting, signals_of, with_signals
+from fembeam.scene.signals import PLACES, persistent_drive, signals_of, with_signals
 from fembeam.scene.source import Source
 
 __all__ = [
@@ -36,11 +36,11 @@ __all__ = [
     "Stop",
     "changes_structure",
     "heights",
-    "lasting",
     "loaded",
     "contact_rows",
     "loads",
     "path_of",
+    "persistent_drive",
     "replaced",
     "signals_of",
     "static_rows",
