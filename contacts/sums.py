@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from contacts.law import Law
 
-HEAD = 11  # numbers before those of each part; as `contacts.kernels.PART`, which is slow to import
+HEAD = 11  # numbers before those of each part; as in `contacts.kernels`, which is slow to import
 
 
 @dataclass(frozen=True)

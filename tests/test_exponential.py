@@ -14,7 +14,7 @@ import fembeam as fb
 from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, Polynomial, Viscoelastic, law
 from solvers import Contact, DormandPrince, Exponential, Status, System, integrate
 from solvers.exponential.preparation import prepare_system
-from solvers.problem import hand_over
+from solvers.problem import forcing_of
 
 RK = DormandPrince(rtol=1e-13, atol=1e-16)
 PERIOD = 2 * math.pi / 195.0
@@ -571,12 +571,12 @@ def test_tables_of_other_tones_and_gaps_are_those_of_a_new_system(omega, scale, 
     stops = [([0.4, 1.1], Hertz(1e8)), ([-0.2, 0.7], Hysteretic(1e7, 1.0))]
     contacts = [Contact(direction, law, 1e-3) for direction, law in stops]
     first = System.modal([100.0, 900.0], [0.01, 0.3], contacts, loads(120.0))
-    prepare_system(first, hand_over([signal for _, signal in first.loads], 1.0, 1e-8))
+    prepare_system(first, forcing_of([signal for _, signal in first.loads], 1.0, 1e-8))
     moved = [Contact(contact.direction, contact.law, gap) for contact, gap in zip(contacts, (2e-3, 0.0), strict=True)]
     changed = [(own, signal) for (own, _), (_, signal) in zip(first.loads, loads(omega, scale), strict=True)]
     other = first.like(moved, changed)
     new = System.modal([100.0, 900.0], [0.01, 0.3], moved, loads(omega, scale))
-    forcing = hand_over([signal for _, signal in changed], 1.0, 1e-8)
+    forcing = forcing_of([signal for _, signal in changed], 1.0, 1e-8)
     before = len(first.about_structure)
     made, wanted = prepare_system(other, forcing), prepare_system(new, forcing)
     assert other.about_structure is first.about_structure
@@ -626,7 +626,7 @@ def test_inlined_laws_and_called_ones_give_the_same_motion(exponent, stops):
 
 def test_what_systems_share_does_not_hold_on_to_sampled_signals():
     system = System.modal([100.0, 900.0], [0.01, 0.3], [Contact([1.0, 0.5], Hertz(1e8), 1e-4)], tones(120.0))
-    forcing = hand_over([signal for _, signal in system.loads], 1.0, 1e-8)
+    forcing = forcing_of([signal for _, signal in system.loads], 1.0, 1e-8)
     problem = prepare_system(system, forcing).problem.value
     table = weakref.ref(forcing.table)
     assert problem.table.size == 0

@@ -160,7 +160,9 @@ def test_a_displacement_that_begins_with_an_acceleration_is_told():
         fb.Scene(fb.Beam(0.5, STEEL), [fb.Clamped(0.0)], base=fb.Record(TIMES, QUAKE, quantity="acceleration"))
 
 
-SCENE = ROD_FILE + """
+SCENE = (
+    ROD_FILE
+    + """
 [damping]
 zeta = 0.02
 [simulate]
@@ -171,6 +173,7 @@ kind = "record"
 path = "quake.csv"
 quantity = "acceleration"
 """
+)
 
 
 def scene_file(folder, more=""):

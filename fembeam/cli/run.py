@@ -106,7 +106,7 @@ def _done_study(job: Job, name: str) -> Outcome:
     if job.resume and (files := folders.kept(job.folder, name, scene)):
         if not job.quiet:
             say(f"[{name}] is done already; its results are kept")
-        return _kept_results(job, name, files)
+        return _kept_results(name, files)
     try:
         folders.record(job.folder, name, scene, [])
         outcome = _simulation(job) if name == "simulate" else _computed(job, name)
@@ -127,7 +127,7 @@ def _how_to_resume(job: Job, name: str) -> str:
     return f"; --resume goes on from {name}.npz" if (job.folder / f"{name}.npz").exists() else ""
 
 
-def _kept_results(job: Job, name: str, files: list[Path]) -> Outcome:
+def _kept_results(name: str, files: list[Path]) -> Outcome:
     """What a finished study left."""
     known = {path.name: path for path in files}
     found = json.loads(known["summary.json" if name == "simulate" else f"{name}.json"].read_text(encoding="utf-8"))

@@ -175,7 +175,7 @@ def _quarter_turns(order: int) -> tuple[float, float]:
 def _checked_column(name: str, values: ArrayLike) -> NDArray[np.float64]:
     """A read-only one-dimensional finite array, or an error that names the first bad entry."""
     try:
-        column = frozen(np.atleast_1d(np.asarray(values, dtype=np.float64)))
+        column = frozen(np.atleast_1d(values))
     except (TypeError, ValueError):
         raise ValueError(f"{name} must be a list of numbers, got {values!r}") from None
     if column.ndim != 1:

@@ -22,7 +22,7 @@ from fembeam.support import Part, Printed, is_whole, require
 from solvers.orbits import periodic_orbit as periodic
 from solvers.orbits import shooting
 from solvers.orbits import shots as chain
-from solvers.orbits.whole_state import begun, flown
+from solvers.orbits.whole_state import flown, with_initial_memory
 from solvers.orbits.whole_state import run as run_from
 from solvers.problem import counted
 
@@ -277,10 +277,9 @@ def _starts(model: Model, T: float, starts: int | Sequence[ArrayLike], seed: int
 def _settle(model: Model, T: float, start: Vector, longest: int, method: Any) -> tuple[Vector, Orbit | None]:
     """Last state of a long run (at a multiple of the load's period), and the orbit it has come to."""
     n = len(model.omega)
-    x = begun(model.system, start)
+    x = with_initial_memory(model.system, start)
     for _ in range(3):
-        slowest = float((0.5 * model.system.blocks.c)[model.system.blocks.c > 0.0].min(initial=math.inf))
-        count = min(max(math.ceil(7.0 / (slowest * T)), 40), 400) + 4 * longest
+        count = min(max(shooting.periods_of_decay(model.system, T), 40), 400) + 4 * longest
         run = run_from(model.system, x, count * T, T, method)
         strobes = np.concatenate((run.q, run.q_dot), axis=1)[-3 * longest :]
         x = np.concatenate((strobes[-1], *run.memory))

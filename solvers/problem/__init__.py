@@ -24,7 +24,7 @@ from solvers.problem.result import (
     Transitions,
     counted,
 )
-from solvers.problem.signals import Forcing, hand_over, on_one_grid, tones_as_nodes
+from solvers.problem.signals import Forcing, forcing_of, on_one_grid, tones_as_nodes
 from solvers.problem.system import Contact, Law, Parameter, System, require_step
 
 __all__ = [
@@ -48,7 +48,7 @@ __all__ = [
     "dataframe",
     "decouple",
     "dense",
-    "hand_over",
+    "forcing_of",
     "on_one_grid",
     "optional",
     "product",
