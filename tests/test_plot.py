@@ -431,3 +431,10 @@ def test_shaded_bands_are_the_intervals_of_the_estimates():
             assert np.isclose(at, bound).any(), name
     with pytest.raises(ValueError, match="no scatter to tell an interval from"):
         fb.pdf([0.0, 1.0, 1.0]).interval()
+
+
+def test_a_figure_of_the_wrong_object_says_what_it_draws(run):
+    with pytest.raises(TypeError, match=r"plot\.time_history draws one Run, got Hertz"):
+        plot.time_history(Hertz(1.0))
+    with pytest.raises(TypeError, match=r"plot\.mode_shapes draws one Model, got Run"):
+        plot.mode_shapes(run)

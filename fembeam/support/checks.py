@@ -53,6 +53,8 @@ def require_no_text(where: str, **values: object) -> None:
 def number(name: str, value: Any, above: float = -math.inf, least: float = -math.inf) -> float:
     """The value as a finite float above one bound and not below another, or a clear error."""
     try:
+        if isinstance(value, (str, bytes)):
+            raise TypeError
         result = float(value)
     except (TypeError, ValueError):
         raise ValueError(f"{name} must be a number, got {value!r}") from None
