@@ -169,8 +169,8 @@ def test_executor_gives_the_same_study():
 
 def largest_forces(run):
     """Of eight fifths of a second, once nothing is known of the start any more."""
-    log, begins = run.contacts, 1.2 + 0.2 * np.arange(8)
-    return [log.peak_force[(log.t_in >= t) & (log.t_in < t + 0.2)].max(initial=0.0) for t in begins]
+    log, starts = run.contacts, 1.2 + 0.2 * np.arange(8)
+    return [log.peak_force[(log.t_in >= t) & (log.t_in < t + 0.2)].max(initial=0.0) for t in starts]
 
 
 largest_forces.sampled = False

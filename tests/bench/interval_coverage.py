@@ -66,11 +66,11 @@ def intervals(response) -> dict[str, tuple[float, float, float]]:
 
 def coverage(case: str, seconds: float, seeds: int, truth: dict[str, tuple[float, float, float]]) -> None:
     """Print the share of intervals that hold the truth, and those below and above it."""
-    beam, rows, begin = model(case, 0), [], time.perf_counter()
+    beam, rows, started = model(case, 0), [], time.perf_counter()
     for seed in range(seeds):
         noise = replace(beam.scene.base, seed=1000 + seed)
         rows.append(intervals(stationary(beam.under(replace(beam.scene, base=noise)), seconds, DT, solver=QUICK)))
-    print(f"{case}, {seconds:g} s, {seeds} seeds, {time.perf_counter() - begin:.0f} s of computing", flush=True)
+    print(f"{case}, {seconds:g} s, {seeds} seeds, {time.perf_counter() - started:.0f} s of computing", flush=True)
     for name, (true, *_) in truth.items():
         value, lo, hi = np.array([row[name] for row in rows]).T
         below, above = np.mean(hi < true), np.mean(lo > true)

@@ -59,11 +59,11 @@ def full(repeats=5):
         "\nall modes of 200 elements, ten periods at 195 rad/s\nmodes  peak force/N  µs/run  µs/run/mode  s to prepare"
     )
     for modes in (2, 20, 100, 400):
-        begin = time.perf_counter()
+        started = time.perf_counter()
         model = SCENE.reduce("all" if modes == 400 else modes, elements=200)
         solver, duration = solvers.Exponential(1e-8), 10 * 2 * np.pi / 195.0
         run = model.simulate(duration, solver=solver)
-        prepared = time.perf_counter() - begin
+        prepared = time.perf_counter() - started
         spent = min(model.simulate(duration, solver=solver).cost.seconds for _ in range(repeats)) * 1e6
         peak = run.contacts.peak_force.max()
         print(f"{modes:5d}  {peak:12.4f}  {spent:6.0f}  {spent / modes:11.1f}  {prepared:12.2f}")
