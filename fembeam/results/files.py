@@ -19,8 +19,7 @@ from fembeam import plot
 from fembeam.model import Run
 from fembeam.model.run_csv import extremes_table, histories
 from fembeam.scene import unit_of
-from fembeam.statistics import moments
-from fembeam.statistics.batches import Batches, Estimate
+from fembeam.statistics import Batches, Estimate, moments
 from fembeam.support import aligned, versions, written_whole
 
 if TYPE_CHECKING:

@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike
 import solvers
 from fembeam.model import Model, Run, places
 from fembeam.scene import signals_of
-from fembeam.statistics.batches import Estimate
+from fembeam.statistics import Estimate
 from fembeam.statistics.initial_transient import Settling, settling
 from fembeam.statistics.spectra import FINEST_RESOLUTION
 from fembeam.study.segments import Segment, Segments

@@ -12,10 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fembeam.model import Run
-from fembeam.statistics.batches import Batches, Estimate
-from fembeam.statistics.impacts import Impacts
+from fembeam.statistics import Batches, Estimate, Impacts, Signal
 from fembeam.statistics.initial_transient import Settling
-from fembeam.statistics.streaming import Signal
 from fembeam.study.segments import Segment, Segments
 from fembeam.support import Part, Printed
 from solvers.problem import dataframe
