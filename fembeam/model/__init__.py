@@ -13,17 +13,3 @@ from fembeam.model.run import Run
 from fembeam.model.run_file import load
 from fembeam.model.shapes import Shapes
 from fembeam.model.watched_places import observed, places
-
-__all__ = [
-    "Attractor",
-    "Branch",
-    "Model",
-    "Orbit",
-    "Run",
-    "Shapes",
-    "extremes_of",
-    "load",
-    "load_period",
-    "observed",
-    "places",
-]

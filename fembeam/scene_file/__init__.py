@@ -10,5 +10,3 @@ from fembeam.scene_file.json_schema import json_schema
 from fembeam.scene_file.reader import SceneFile, built, read
 from fembeam.scene_file.tables import SceneFileError
 from fembeam.scene_file.template import TEMPLATE
-
-__all__ = ["TEMPLATE", "SceneFile", "SceneFileError", "built", "json_schema", "read"]
