@@ -19,11 +19,8 @@ import solvers
 from fembeam.model.equations import load_period
 from fembeam.scene import unit_of
 from fembeam.support import Part, Printed, is_whole, require
-from solvers.orbits import periodic_orbit as periodic
-from solvers.orbits import shooting
-from solvers.orbits import shots as chain
-from solvers.orbits.whole_state import flown, with_initial_memory
-from solvers.orbits.whole_state import run as run_from
+from solvers.orbits import at_zero, delayed, flown, periods_of_decay, settled, with_initial_memory
+from solvers.orbits import run as run_from
 from solvers.problem import counted
 
 if TYPE_CHECKING:
@@ -156,7 +153,7 @@ def orbit(model: Model, period: int, start: ArrayLike | Orbit | None, shots: int
     if start is None:
         return _from_rest(model, count, T, shots)
     if isinstance(start, Orbit):
-        start = periodic.at_zero(start.found)
+        start = at_zero(start.found)
     found = Orbit(model, solvers.orbit(model.system, count * T, start, shots=shots), count)
     _check_not_shorter(found, T)
     return found
@@ -185,7 +182,7 @@ def _periods_to_repeat(orbit: Orbit, T: float) -> int:
     for shorter in range(1, orbit.period):
         if orbit.period % shorter:
             continue
-        later = chain.delayed(orbit.model.system, orbit.found.phase)
+        later = delayed(orbit.model.system, orbit.found.phase)
         end = flown(later, orbit.found.whole, shorter * T, orbit.found.method)[: 2 * n]
         scale = np.concatenate(
             (np.repeat(np.abs(orbit.state[:n]).max(), n), np.repeat(np.abs(orbit.state[n:]).max(), n))
@@ -198,7 +195,7 @@ def _periods_to_repeat(orbit: Orbit, T: float) -> int:
 def _from_rest(model: Model, count: int, T: float, shots: int | None) -> Orbit:
     """What a run from rest settles to, else the first of many attractors with that period."""
     try:
-        start = shooting.settled(model.system, count * T, solvers.Exponential(1e-8))
+        start = settled(model.system, count * T, solvers.Exponential(1e-8))
         return orbit(model, count, start, shots)
     except solvers.OrbitError as error:
         refused = error
@@ -279,7 +276,7 @@ def _settle(model: Model, T: float, start: Vector, longest: int, method: Any) ->
     n = len(model.omega)
     x = with_initial_memory(model.system, start)
     for _ in range(3):
-        count = min(max(shooting.periods_of_decay(model.system, T), 40), 400) + 4 * longest
+        count = min(max(periods_of_decay(model.system, T), 40), 400) + 4 * longest
         run = run_from(model.system, x, count * T, T, method)
         strobes = np.concatenate((run.q, run.q_dot), axis=1)[-3 * longest :]
         x = np.concatenate((strobes[-1], *run.memory))
@@ -301,7 +298,7 @@ def _shortest_orbit(model: Model, x: Vector, k: int, T: float) -> Orbit:
     shorter = _periods_to_repeat(found, T)
     if shorter == k:
         return found
-    return Orbit(model, solvers.orbit(model.system, shorter * T, periodic.at_zero(found.found)), shorter)
+    return Orbit(model, solvers.orbit(model.system, shorter * T, at_zero(found.found)), shorter)
 
 
 def _same(a: Orbit | None, b: Orbit | None, T: float) -> bool:
@@ -310,7 +307,7 @@ def _same(a: Orbit | None, b: Orbit | None, T: float) -> bool:
         return a is b
     if a.period != b.period or len(a.contacts) != len(b.contacts):
         return False
-    x, y = periodic.at_zero(a.found), periodic.at_zero(b.found)
+    x, y = at_zero(a.found), at_zero(b.found)
     n2 = len(a.state)
     for _ in range(a.period):
         if np.linalg.norm(x[:n2] - y[:n2]) <= 1e-5 * np.linalg.norm(x[:n2]):
