@@ -56,8 +56,8 @@ class Fit:
                 "numbers to be found, memory at the start of each record included"
             )
         low, high = (
-            np.append(ends, np.full(len(start) - model.main, way * np.inf))
-            for way, ends in zip((-1, 1), model.ends, strict=True)
+            np.append(ends, np.full(len(start) - model.main, sign * np.inf))
+            for sign, ends in zip((-1, 1), model.ends, strict=True)
         )
         done = least_squares(self.residual, start, self.jacobian, (low, high), x_scale="jac", max_nfev=most, **_TIGHT)
         self.theta, self.slopes = done.x, done.jac

@@ -21,11 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fembeam.excitation.line_spectrum import checked_order
-from fembeam.excitation.noise import BandNoise
-from fembeam.excitation.record import Record
 from fembeam.support import frozen, number
-
-__all__ = ["BandNoise", "Harmonic", "Multisine", "Record"]
 
 Tones = tuple[NDArray[np.float64], NDArray[np.complex128]]
 MOST_SHOWN = 8  # numbers of a kind in a repr

@@ -189,6 +189,3 @@ def failures(cases: Sequence[Failure], axes: Axes | Sequence[Axes] | None = None
             ax.annotate(words, (0.0, 1.0), (0, height), "axes fraction", "offset points", color=colour, fontsize=7.5,
                         va="top")  # fmt: skip
     return figure
-
-
-__all__ = ["failures", "speed_accuracy", "stability_map"]
