@@ -129,7 +129,7 @@ def mode_shapes(model: Model, axes: Axes | None = None) -> Figure:
     axis.set_xlabel("z / mm" if unit > 1.0 else "z / m")
     axis.set_ylabel("φ / max |φ|")
     rows = -(-len(axis.get_legend_handles_labels()[1]) // LEGEND_COLUMNS)
-    axis.set_ylim(-1.15, 1.2 + LEGEND_ROW * rows)  # the legend has room of its own above the curves
+    axis.set_ylim(-1.15, 1.2 + LEGEND_ROW * rows)  # the legend has space of its own above the curves
     axis.set_yticks([-1.0, -0.5, 0.0, 0.5, 1.0])
     axis.legend(loc="upper center", ncols=LEGEND_COLUMNS, fontsize=8)
     heading([axis], "Mode shapes of the linear beam", axes is None)
