@@ -40,7 +40,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
         warned.clear()
         write_anywhere()
-        with interrupts.listening():
+        with interrupts.handling():
             arguments = _parser().parse_args(argv)
             with warnings.catch_warnings():
                 warnings.simplefilter("default", UserWarning)
@@ -62,7 +62,7 @@ def _failed(error: Exception) -> int:
     """Say what is wrong; a traceback is for faults of this library only."""
     from fembeam.support import interrupts
 
-    if interrupts.heard():  # a compiler that is stopped in the middle raises what it likes
+    if interrupts.received():  # a compiler that is stopped in the middle raises what it likes
         say("interrupted; files that were written are whole")
         return interrupted()
     if isinstance(error, OSError) and error.filename is None:  # a full disk behind stdout

@@ -69,7 +69,7 @@ def run(job: Job) -> int:
         code = _report(job, files) or code
     if job.json:
         report.print_json(found)
-    return code or (interrupted() if interrupts.heard() else 0)
+    return code or (interrupted() if interrupts.received() else 0)
 
 
 def _check_checkpoints(job: Job, studies: list[str]) -> None:
@@ -117,7 +117,7 @@ def _done_study(job: Job, name: str) -> Outcome:
     except KeyboardInterrupt:
         say(f"interrupted in [{name}]; files that were written are whole" + _how_to_resume(job, name))
         return Outcome(interrupted(), last=True)
-    if interrupts.heard():
+    if interrupts.received():
         outcome.code, outcome.last = outcome.code or interrupted(), True
     return outcome
 
@@ -151,7 +151,7 @@ def _computed(job: Job, name: str) -> Outcome:
         result, code = error.evidence, FAILED
         say(f"error: {one_line(error)}")
     except (solvers.SolverError, RuntimeError) as error:
-        if interrupts.heard():  # a compiler that is stopped in the middle raises what it likes
+        if interrupts.received():  # a compiler that is stopped in the middle raises what it likes
             raise KeyboardInterrupt from error
         say(f"error: [{name}]: {one_line(error)}")
         return Outcome(FAILED)
