@@ -4,6 +4,7 @@ import json
 import re
 import warnings
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -344,6 +345,32 @@ def test_bad_places_are_refused():
         beam(clamp, elements=[fb.Stop(0.5, spring)])
     hinge = [fb.Stop(1.0, spring, of="rotation"), fb.Stop(1.0, spring)]
     beam(clamp, stops=hinge)  # one place and side, but not the same motion
+
+
+@pytest.mark.parametrize(
+    ("support", "of"),
+    [(fb.Clamped, "displacement"), (fb.Pinned, "displacement"), (fb.Clamped, "rotation"), (fb.Guided, "rotation")],
+)
+def test_what_supports_hold_still_is_no_place_to_act_at(support, of):
+    """Nor is a pair whose places are both held; one of them that is free will do."""
+    act = partial(fb.Element, law=KelvinVoigt(1.0, 0.0), of=of)
+    held, move = [support(0.0), support(0.5)], "move" if of == "displacement" else "turn"
+    message = rf"free to {move} at z, got \[{support.__name__}\(z=0.5\).*elements\[0\]"
+    with pytest.raises(ValueError, match=message):
+        beam(held, elements=[act(0.5)])
+    with pytest.raises(ValueError, match=message.replace("elements", "stops")):
+        beam(held, stops=[fb.Stop(0.5 + 1e-12, KelvinVoigt(1.0, 0.0), of=of)])
+    for to in (0.0, (1, 0.5)):
+        with pytest.raises(ValueError, match=message):
+            beam(held, elements=[act(0.5, to=to)], bodies=[beam(held)])
+    for z, to in ((0.5, 0.8), (0.8, 0.5), (0.5, (1, 0.8)), (0.8, (1, 0.5)), (0.5 + 1e-3, None)):
+        assert beam(held, elements=[act(z, to=to)], bodies=[beam(held)]).reduce(3).directions.any()
+
+
+@pytest.mark.parametrize(("support", "of"), [(fb.Guided, "displacement"), (fb.Pinned, "rotation")])
+def test_what_supports_leave_free_is_a_place_to_act_at(support, of):
+    element = fb.Element(0.0, KelvinVoigt(1.0, 0.0), of=of)
+    assert beam([support(0.0), fb.Pinned(0.9)], elements=[element]).reduce(1).static_share[0] > 0.1
 
 
 def test_what_holds_a_beam_that_supports_do_not_hold():

@@ -259,12 +259,16 @@ class Scene:
 
     def _check_second(self, place: LocalCoordinate, key: str, where: str) -> None:
         """Raise ValueError unless what a stop or element acts on exists and can move."""
-        if place.to is None:
-            held = [support for support in self.supports if support.z == place.z and support.fixed[1]]
-            require(not (place.rotation and held), "the beam must be free to turn at z", held[:1], where,
-                    "support it by Pinned there")  # fmt: skip
-            return
-        number, z = place.to
+        if place.to is not None:
+            self._check_exists(*place.to, place.z, key, where)
+        ends = [(0, place.z), *([] if place.to is None else [place.to])]
+        held = [_holding((self, *self.bodies)[body], z, place.derivative) for body, z in ends]
+        move = "turn" if place.rotation else "move"
+        require(not all(held), f"the beam must be free to {move} at z", [one for end in held for one in end], where,
+                "support it by Pinned there" if place.rotation else "act away from the support")  # fmt: skip
+
+    def _check_exists(self, number: Any, z: Any, first: float, key: str, where: str) -> None:
+        """Raise ValueError unless a second place lies on a beam of the scene, and is not the first one."""
         known = isinstance(number, int) and 0 <= number <= len(self.bodies)
         among = f"1 to {len(self.bodies)}" if self.bodies else "and there is none"
         require(known, f"{key} must name a body, {among}", number, where, "add the beam to bodies")
@@ -272,8 +276,14 @@ class Scene:
         named = f"body {number}" if number else "the beam"
         require_finite(f"z of {key}", z, where, "give the coordinate along that beam in m")
         require(0 <= z <= length, f"z of {key} must lie on {named}, 0 to {length} m", z, where, "move it")
-        apart = number > 0 or abs(z - place.z) > 1e-9 * length
+        apart = number > 0 or abs(z - first) > 1e-9 * length
         require(apart, f"z of {key} must be another place", z, where, "leave it out for an end on the frame")
+
+
+def _holding(beam: Scene, z: float, derivative: int) -> list[Support]:
+    """The supports that hold u (derivative 0) or u_z (1) of a beam at z."""
+    near = 1e-9 * beam.beam.length
+    return [support for support in beam.supports if abs(support.z - z) <= near and support.fixed[derivative]]
 
 
 def _listed(name: str, value: Any, kinds: tuple[type, ...]) -> tuple[Any, ...]:
