@@ -65,6 +65,8 @@ class Law(ABC):
         start of a run.
     borders : number of border functions; one that does not exist in a segment has the value 1.
     events : names of the codes `renew` returns.
+    segment_codes : for each latched number the values it may have if it is the code of a segment, () if it is none;
+        () of a law that does not tell.
     jumps : whether the force jumps at a border.
     one_sided : whether the law is defined for delta > 0 only.
     reach : δ in m at which all of the memory is at work, 0 without one.
@@ -88,6 +90,7 @@ class Law(ABC):
     memory: tuple[int, ...] = ()
     borders: int = 0
     events: tuple[str, ...] = ()
+    segment_codes: tuple[tuple[float, ...], ...] = ()
     jumps: bool = False
     one_sided: bool = True
     opens: bool = False
@@ -257,8 +260,8 @@ def check_number(value: Any, what: str, low: float = 0.0, *, strict: bool = Fals
     """Check one finite number against its lower bound."""
     fine = isinstance(value, (int, float, np.number)) and not isinstance(value, bool) and math.isfinite(value)
     if not fine or value < low or (strict and value == low):
-        bound = f"{'>' if strict else '>='} {low:g}"
-        raise ValueError(f"{what} must be finite and {bound}, got {value!r}")
+        bound = f" and {'>' if strict else '>='} {low:g}" if low > -math.inf else ""
+        raise ValueError(f"{what} must be finite{bound}, got {value!r}")
 
 
 def switch(owner: object, name: str) -> None:

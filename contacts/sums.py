@@ -117,6 +117,11 @@ class Sum(Law):
         return tuple(chain.from_iterable(part.events for part in self.acting))
 
     @property
+    def segment_codes(self) -> tuple[tuple[float, ...], ...]:  # type: ignore[override]
+        """Those of all parts, in order."""
+        return tuple(chain.from_iterable(part.segment_codes or ((),) * len(part.memory) for part in self.acting))
+
+    @property
     def memory(self) -> tuple[int, ...]:  # type: ignore[override]
         """Places of the latched numbers of all parts, in order."""
         if not any(part.memory for part in self.acting):
@@ -170,6 +175,7 @@ class Gated(Law):
     memory: ClassVar[tuple[int, ...]] = (0, 1)  # type: ignore[misc]
     borders: ClassVar[int] = 1  # type: ignore[misc]
     events: ClassVar[tuple[str, ...]] = ("contact", "open")  # type: ignore[misc]
+    segment_codes: ClassVar[tuple[tuple[float, ...], ...]] = ((0.0, 1.0), ())  # type: ignore[misc]
     opens: ClassVar[bool] = True  # type: ignore[misc]
 
     @property

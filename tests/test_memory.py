@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from sliders import Slider
 
-from contacts import Hertz, KelvinVoigt, Polynomial
+from contacts import Border, Hertz, KelvinVoigt, Polynomial, Segment, memory_law
 from contacts.memory import BoucWen, Coulomb, Iwan, Jenkins, WaltonBraun
 from fembeam import Harmonic
-from solvers import Contact, DormandPrince, Exponential, Parameter, System, integrate
+from solvers import Contact, DormandPrince, Exponential, Parameter, System, integrate, orbit
 
 OMEGA, ZETA = [1.0, 3.7, 9.0], [0.01, 0.01, 0.02]
 
@@ -276,6 +276,52 @@ def test_bad_memory_is_refused():
         integrate(system, zero, zero, 1.0, memory=[[0.0]])
     with pytest.raises(ValueError, match="always=True"):
         Contact([1.0], Jenkins(50.0, 0.4))
+
+
+def bent(delta, delta_dot, kink, soft, hard):
+    return soft * delta
+
+
+def stiffer(delta, delta_dot, kink, soft, hard):
+    return soft * delta + (hard - soft) * (delta - kink)
+
+
+def below(delta, delta_dot, kink, soft, hard):
+    return kink - delta
+
+
+def above(delta, delta_dot, kink, soft, hard):
+    return delta - kink
+
+
+BENT = memory_law(
+    "bent",
+    {"soft": Segment(bent, Border(below, "hard")), "hard": Segment(stiffer, Border(above, "soft"))},
+    {"kink": 0.1},
+)(soft=1.0, hard=2.0)
+
+
+@pytest.mark.parametrize(
+    ("law", "numbers", "place", "codes"),
+    [
+        *((Jenkins(50.0, 0.4), [code, 0.0], 0, "-1, 0, 1") for code in (7.0, 0.5, -3.0)),
+        (Iwan([50.0, 20.0], [0.4, 0.3]), [1.0, 0.0, 2.0, 0.0], 2, "-1, 0, 1"),
+        (BoucWen(50.0, 0.1, 1.0, 1.0, 1.0), [3.0, 0.0, 0.0], 0, "-1, 0, 1"),
+        (WaltonBraun(50.0, 100.0), [5.0, 0.0], 0, "0, 1, 2"),
+        (Jenkins(50.0, 0.4) + Hertz(100.0) + WaltonBraun(50.0, 100.0), [2.0, 0.0, 0.0, 0.0, 0.0, 0.0], 0, "0, 1"),
+        (Jenkins(50.0, 0.4) + BENT, [0.0, 0.0, 2.0, 0.1], 2, "0, 1"),
+        (BENT, [-1.0, 0.1], 0, "0, 1"),
+    ],
+)
+def test_codes_that_are_no_segment_of_the_law_are_refused(law, numbers, place, codes):
+    """In a run, and in an orbit's start, which rounds its codes."""
+    system, x = beam(element(Jenkins(50.0, 0.4), 1.0, 0.0, 0.0), element(law, -1.0, -0.5, 0.3)), np.zeros(6)
+    named = rf"memory of contact 1 must have at place {place} .* {type(law).__name__}"
+    told = rf"{named}, one of {codes}, got {numbers[place]:g}$"
+    with pytest.raises(ValueError, match=told):
+        integrate(system, x[:3], x[3:], 1.0, memory=[None, numbers])
+    with pytest.raises(ValueError, match=told):
+        orbit(system, 2.0 * np.pi / 1.3, [*x, 0.0, 0.0, *numbers])
 
 
 @pytest.mark.parametrize("seed", [50914, 51815, 51997, 50754, 50871, 51142])

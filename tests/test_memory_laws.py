@@ -131,6 +131,22 @@ def codes(law):
     return [i for i in CODES[type(law)] if i < len(law.memory)]
 
 
+@pytest.mark.parametrize("law", {type(law): law for law, *_ in STATES}.values(), ids=lambda law: type(law).__name__)
+def test_codes_of_segments_are_those_it_passes_through(law):
+    told = law.segment_codes
+    assert len(told) == len(law.memory)
+    assert [i for i, known in enumerate(told) if known] == codes(law)
+    met = {i: {float(law.parameters[law.memory[i]])} for i in codes(law)}
+    for d, v in itertools.product((-1e-2, 0.0, 1e-2), (-1.0, 1.0)):
+        for numbers in itertools.product(*[known or (1e-3,) for known in told]):
+            for j in range(law.borders):
+                after = renewed(law, j, d, v, with_memory(law, *numbers))[1][list(law.memory)]
+                for i in met:
+                    met[i].add(float(after[i]))
+    for i, seen in met.items():
+        assert seen == set(told[i])
+
+
 @pytest.mark.parametrize(("law", "numbers", "d", "v"), STATES)
 def test_derivatives_are_those_of_the_force(law, numbers, d, v):
     row, h = with_memory(law, *numbers), 1e-8
@@ -255,7 +271,8 @@ def test_jenkins_refuses(bad):
         (lambda: Iwan.from_backbone([1.0], [1.0, 3.0]), "must be as many as delta, 1, got 2"),
         (lambda: BoucWen(1e4, 1.0, 1.0, 1.0, 1.0), "alpha of BoucWen must be below 1, got 1.0"),
         (lambda: BoucWen(1e4, 0.1, 0.0, 1.0, 1.0), "A of BoucWen must be finite and > 0"),
-        (lambda: BoucWen(1e4, 0.1, 1.0, math.nan, 1.0), "beta of BoucWen must be finite"),
+        (lambda: BoucWen(1e4, 0.1, 1.0, math.nan, 1.0), "beta of BoucWen must be finite, got nan$"),
+        (lambda: BoucWen(1e4, 0.1, 1.0, 1.0, -math.inf), "gamma of BoucWen must be finite, got -inf$"),
         (lambda: BoucWen(1e4, 0.1, 1.0, 1.0, 1.0, 3), "n of BoucWen must be 1 or 2, for which"),
         (lambda: WaltonBraun(1e5, 1e4), "unloading of WaltonBraun must be finite and >= 100000, got"),
         (lambda: WaltonBraun(1e5, 1e5, "lost"), 'set of WaltonBraun must be "kept" or "forgotten", got'),

@@ -58,6 +58,7 @@ class BoucWen(Law):
     memory: ClassVar[tuple[int, ...]] = (6, 7, 8)  # type: ignore[misc]
     borders: ClassVar[int] = 2  # type: ignore[misc]
     events: ClassVar[tuple[str, ...]] = ("reversal", "zero")  # type: ignore[misc]
+    segment_codes: ClassVar[tuple[tuple[float, ...], ...]] = ((-1.0, 0.0, 1.0), (), ())  # type: ignore[misc]
     one_sided: ClassVar[bool] = False  # type: ignore[misc]
 
     def __post_init__(self) -> None:

@@ -88,6 +88,11 @@ class CustomMemoryLaw(Law):
         return tuple(range(1 + len(self.latched)))
 
     @property
+    def segment_codes(self) -> tuple[tuple[float, ...], ...]:  # type: ignore[override]
+        """The segments in order."""
+        return (tuple(map(float, range(len(self.segments)))), *[()] * len(self.latched))
+
+    @property
     def borders(self) -> int:  # type: ignore[override]
         """As many as the segment with most of them has, at least one."""
         return max(1, *(len(one.ends) for _, one in self.segments))

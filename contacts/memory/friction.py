@@ -53,6 +53,11 @@ class Sliders(Law):
         return tuple(2 + SLIDER_SIZE * j + place for j in range(self.borders) for place in (4, 5))
 
     @property
+    def segment_codes(self) -> tuple[tuple[float, ...], ...]:  # type: ignore[override]
+        """Stick 0, slip in either direction."""
+        return ((-1.0, 0.0, 1.0), ()) * self.borders
+
+    @property
     def parameters(self) -> NDArray[np.float64]:
         """(N, k_0, then per slider: k, f, f_s, c, code, s), all sticking at 0."""
         return np.array([self.borders, self.spring, *(x for part in self.sliders for x in (*part, 0.0, 0.0))])

@@ -51,6 +51,7 @@ class WaltonBraun(Law):
     units: ClassVar[dict[str, str]] = {"loading": "N/m", "unloading": "N/m"}
     memory: ClassVar[tuple[int, ...]] = (3, 4)  # type: ignore[misc]
     borders: ClassVar[int] = 2  # type: ignore[misc]
+    segment_codes: ClassVar[tuple[tuple[float, ...], ...]] = ((0.0, 1.0, 2.0), ())  # type: ignore[misc]
     opens: ClassVar[bool] = True  # type: ignore[misc]
 
     def __post_init__(self) -> None:

@@ -31,7 +31,7 @@ from solvers.orbits.periodic_orbit import Orbit, OrbitError, at_zero, orbit_of, 
 from solvers.orbits.shots import Chain, PeriodicProblem
 from solvers.orbits.whole_state import counts, flown, run, with_initial_memory
 from solvers.problem import Array, System
-from solvers.problem.run_arguments import check_slopes
+from solvers.problem.run_arguments import check_slopes, latched_at_start
 
 _MOST_SHOTS = 6
 _MOST_CHOICES = 4  # of the starting times of shots
@@ -164,7 +164,10 @@ def checked_start(system: System, start: ArrayLike, period: float, method: Any) 
     if x.shape not in ((n2,), (whole,)) or not np.all(np.isfinite(x)):
         more = f", or {whole} with what is latched" if whole > n2 else ""
         raise ValueError(f"start must be {n2} finite numbers [q, q_dot]{more}, got {start!r}")
-    return x if x.shape == (whole,) else flown(system, with_initial_memory(system, x), _SETTLING * period, method)
+    if x.shape != (whole,):
+        return flown(system, with_initial_memory(system, x), _SETTLING * period, method)
+    latched_at_start(system, np.split(x[n2:], np.cumsum(counts(system))[:-1]) if whole > n2 else None)
+    return x
 
 
 def settled(system: System, period: float, method: Any) -> Array:

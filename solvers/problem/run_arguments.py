@@ -117,4 +117,16 @@ def latched_at_start(system: System, memory: Sequence[ArrayLike | None] | None) 
         count = len(getattr(system.contacts[s].law, "memory", ()))
         if numbers.shape != (count,) or not np.isfinite(numbers).all():
             raise ValueError(f"memory of contact {s} must be {count} finite numbers, got {memory[s]!r}")
+        _check_codes(s, system.contacts[s].law, numbers)
     return given
+
+
+def _check_codes(s: int, law: Any, numbers: Array) -> None:
+    """ValueError for the code of a segment that the law of contact s does not have."""
+    for place, codes in enumerate(getattr(law, "segment_codes", ())):
+        if codes and numbers[place] not in codes:
+            known = ", ".join(f"{code:g}" for code in codes)
+            raise ValueError(
+                f"memory of contact {s} must have at place {place} the code of a segment of {type(law).__name__}, one "
+                f"of {known}, got {numbers[place]:g}"
+            )
