@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from matplotlib.text import Text
+from problems import PAPER_BEAM
 
 import fembeam as fb
 from contacts import PUBLISHED, Hertz, Hysteretic, bounce, identify
@@ -17,9 +18,8 @@ from fembeam.results import files as report
 
 @pytest.fixture(scope="module")
 def run():
-    steel = fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)
     scene = fb.Scene(
-        beam=fb.Beam(0.2599, steel),
+        beam=PAPER_BEAM,
         supports=[fb.Clamped(0.0)],
         stops=[fb.Stop(0.24445, law=Hertz(2.1e8)), fb.Stop(0.2, law=Hertz(2.1e8), gap=1e-3, side="above")],
         damping=fb.ModalDamping(0.02),
@@ -63,10 +63,9 @@ def shaded(axis):
 @pytest.fixture(scope="module")
 def knocked():
     """A beam with two stops at different places after a pulse, sampled so that its contacts are short."""
-    beam = fb.Beam(0.2599, fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12))
     stops = [fb.Stop(0.12, Hertz(2.1e8), 2e-4), fb.Stop(0.2599, Hertz(2.1e8), 1e-3, side="above")]
     load = fb.PointForce(0.2599, fb.Pulse(30.0, length=5e-3, at=0.5))
-    scene = fb.Scene(beam, [fb.Clamped(0.0)], stops=stops, forces=[load], damping=fb.ModalDamping(0.02))
+    scene = fb.Scene(PAPER_BEAM, [fb.Clamped(0.0)], stops=stops, forces=[load], damping=fb.ModalDamping(0.02))
     return scene.reduce(3).simulate(4.0, 2e-4)
 
 

@@ -64,8 +64,8 @@ def number(name: str, value: Any, above: float = -math.inf, least: float = -math
     return result
 
 
-def frozen(values: ArrayLike, dtype: type = np.float64) -> NDArray[Any]:
+def frozen(values: ArrayLike) -> NDArray[np.float64]:
     """A read-only copy, so that neither side can change the other's numbers."""
-    result: NDArray[Any] = np.array(values, dtype=dtype)
+    result = np.array(values, dtype=np.float64)
     result.flags.writeable = False
     return result

@@ -41,7 +41,7 @@ def _remembering(system: System) -> list[Any]:
     return [contact for contact, count in zip(system.contacts, counts(system), strict=True) if count]
 
 
-def begun(system: System, x: Array) -> Array:
+def with_initial_memory(system: System, x: Array) -> Array:
     """A state [q, q̇] with what the laws begin with."""
     latched = [np.asarray(one.law.parameters)[list(one.law.memory)] for one in _remembering(system)]
     return np.concatenate((x, *latched)) if latched else x
@@ -112,9 +112,9 @@ def _slopes(law: Any, row: Array, border: int = -1, delta: float = 0.0, rate: fl
     return out
 
 
-def transitions_of(solutions: Sequence[Solution], begins: Sequence[float]) -> Transitions:
-    """One log of the runs that make up a period, each of whose times counts from its own begin."""
+def transitions_of(solutions: Sequence[Solution], starts: Sequence[float]) -> Transitions:
+    """One log of the runs that make up a period, each of whose times counts from its own start."""
     logs = [solution.transitions for solution in solutions]
     columns = {name: [getattr(log, name) for log in logs] for name in Transitions.__dataclass_fields__}
-    columns["t"] = [t + begin for t, begin in zip(columns["t"], begins, strict=True)]
+    columns["t"] = [t + start for t, start in zip(columns["t"], starts, strict=True)]
     return Transitions(*(np.concatenate(column) for column in columns.values()))

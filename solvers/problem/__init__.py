@@ -24,35 +24,5 @@ from solvers.problem.result import (
     Transitions,
     counted,
 )
-from solvers.problem.signals import Forcing, hand_over, on_one_grid, tones_as_nodes
+from solvers.problem.signals import Forcing, forcing_of, on_one_grid, tones_as_nodes
 from solvers.problem.system import Contact, Law, Parameter, System, require_step
-
-__all__ = [
-    "COLUMNS",
-    "Array",
-    "Contact",
-    "ContactLog",
-    "Cost",
-    "Energy",
-    "Forcing",
-    "Law",
-    "Losses",
-    "Memo",
-    "Parameter",
-    "Solution",
-    "SolverError",
-    "Status",
-    "System",
-    "Transitions",
-    "counted",
-    "dataframe",
-    "decouple",
-    "dense",
-    "hand_over",
-    "on_one_grid",
-    "optional",
-    "product",
-    "renew",
-    "require_step",
-    "tones_as_nodes",
-]
