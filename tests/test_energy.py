@@ -1,10 +1,11 @@
 """Work and damping of whole steps and of runs: against quadrature, closed forms, and the balance of energy."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.integrate import quad_vec
+from scipy.integrate import quad_vec, solve_ivp
 from scipy.linalg import expm
 
 import fembeam as fb
@@ -37,10 +38,10 @@ class Nodes:
         )
 
 
-def blocks(signals, omega=(0.0, 9.0, 40.0, 75.0), zeta=(0.0, 1.0, 3.0, 0.02)):
+def blocks(signals, omega=(0.0, 9.0, 40.0, 75.0), zeta=(0.0, 1.0, 3.0, 0.02), contacts=FREE):
     """A rigid, a critically damped, an overdamped and an oscillating block, each of which every load pushes."""
     loads = [(np.array([1.0, -0.7, 0.4, 0.9]) * (i + 1.0), signal) for i, signal in enumerate(signals)]
-    return System.modal(omega, zeta, FREE, loads)
+    return System.modal(omega, zeta, contacts, loads)
 
 
 def prepared(system, spacing=0.013, duration=1.0):
@@ -73,17 +74,22 @@ def quadrature(problem, tables, h, x, s):
 
 
 def by_forms(energy_tables, level, x, s):
-    """The same by the tables."""
-    n = len(x) // 2
-    given = np.concatenate((x[energy_tables.driver], *s))
-    rows = (given @ energy_tables.rows[level]).reshape(2, -1)[:, : len(x)] @ x
-    own = energy_tables.plain.shape[2]
-    p, v = x[:own], x[n : n + own]
-    rows[1] += (energy_tables.plain[level] * [p * p, p * v, v * v]).sum()
-    signals = given[len(energy_tables.driver) :]
+    """The same by the tables; for a whole cell the signals are given by their values at its ends."""
+    n, whole = len(x) // 2, level == len(energy_tables.rows) - 1
+    signals = np.concatenate([at_ends(part, energy_tables.spacing) if whole else part for part in s] or [np.zeros(0)])
+    given = np.concatenate((signals, x[energy_tables.driver]))
+    rows = (given @ energy_tables.rows[level]).reshape(2, 2, -1)[..., :n].reshape(2, -1) @ x
+    p, v = np.split(x, 2)
+    rows[1] += (energy_tables.plain[level][:, :n] * [p * p, p * v, v * v]).sum()
     if len(signals):
         rows += (signals @ energy_tables.pairs[level]).reshape(2, -1)[:, : len(signals)] @ signals
     return rows
+
+
+def at_ends(s, h):
+    """s, s', s'' of a quintic at its begin and after the time h, from its derivatives at the begin."""
+    after = [sum(s[i] * h ** (i - d) / math.factorial(i - d) for i in range(d, 6)) for d in range(3)]
+    return np.concatenate((s[:3], after))
 
 
 @pytest.mark.parametrize(
@@ -108,7 +114,6 @@ def test_forms_of_flight_steps_are_their_quadrature(signals):
 @pytest.mark.parametrize(("k", "c"), [(0.0, 0.0), (4.0, 4.0), (30.0, 40.0), (900.0, 0.6)])
 def test_tables_of_contact_steps_are_their_quadrature(power, lead, k, c):
     """∫ L_i v dt and ∫ v² dt of a block under forces given at the nodes, all of one integration of the equation."""
-    from scipy.integrate import solve_ivp
     from scipy.special import roots_jacobi
 
     nodes = 0.5 * (1.0 + roots_jacobi(S, 0.0, lead + power - 1.0)[0])
@@ -134,6 +139,52 @@ def test_tables_of_contact_steps_are_their_quadrature(power, lead, k, c):
     squares += np.concatenate((entering, start)) @ table[SQUARES:, :S] @ entering
     np.testing.assert_allclose(sums[:S], exact[1:], rtol=0.0, atol=1e-12)
     np.testing.assert_allclose(squares, exact[0], rtol=1e-12)
+
+
+def by_sums(problem, tables, energy_tables, node_set, place, x, heads):
+    """Work of loads, damping, and work of each stop, of a contact step by the forms that are summed over the blocks."""
+    n, size, last, stops = int(tables.own_blocks), len(x), 2 * S * len(heads), len(problem.gap)
+    sums = np.concatenate((x, heads.ravel())) @ energy_tables.sums[node_set, place]
+    damping, work = np.moveaxis(sums[:last].reshape(-1, 2, S) * heads[:, None], 1, 0)
+    tone = np.append(np.arange(n, size // 2), np.arange(size // 2 + n, size))
+    of_tones = sums[last : last + 2 * len(tone)].reshape(2, -1) @ x[tone]
+    p, v = x.reshape(2, -1)[:, :n]
+    free = (energy_tables.free_loss[energy_tables.kind[node_set], place] * [p * p, p * v, v * v]).sum()
+    return np.array([work[stops:].sum() + of_tones[1], damping.sum() + of_tones[0] + free, *work[:stops].sum(axis=1)])
+
+
+@pytest.mark.parametrize("node_set", [0, 1, 2])
+@pytest.mark.parametrize("signals", [[Nodes()], [fb.Harmonic(2.0, 13.0)], [fb.Harmonic(2.0, 13.0), Nodes()]], ids=len)
+def test_sums_over_blocks_are_their_quadrature(signals, node_set):
+    """Blocks of all kinds under two stops' forces, a signal and a tone: one integration of motion and powers."""
+    stops = [*FREE, Contact([-0.8, 0.3, 1.2, -0.6], Hertz(1e6), gap=1e9)]
+    problem, tables, energy_tables = prepared(blocks(signals, contacts=stops))
+    place = int(np.searchsorted(-tables.contact_step, -0.02)) - int(energy_tables.first)
+    h, n, size = tables.contact_step[place + int(energy_tables.first)], int(tables.own_blocks), len(problem.k)
+    power, lead, nodes = (getattr(tables, name)[node_set] for name in ("time_exponent", "weight_exponent", "nodes"))
+    x, heads = np.split(np.random.default_rng(3).standard_normal(2 * size + S * len(energy_tables.head)), [2 * size])
+    heads = heads.reshape(-1, S)
+    smooth = np.arange(len(heads)) != node_set - 1 if lead else np.arange(len(heads)) > 1
+    heads[smooth] = heads[smooth, :1] * (0.7 - 1.1 * nodes**power)  # in time: signals, forces on another stop's entry
+    push = np.concatenate((problem.push, problem.load))[energy_tables.head, size : size + n]
+
+    def rate(sigma, z):
+        full, basis = z[: 2 * size], [np.prod([(sigma - b) / (a - b) for b in nodes if b != a]) for a in nodes]
+        values = heads @ basis
+        if lead:
+            values[node_set - 1] = heads[node_set - 1] @ (basis * (sigma / nodes) ** lead)
+        signal = tables.signal_rows @ full
+        signal[energy_tables.head[2:] - 2] += values[2:]
+        bent = np.append(push.T @ values, np.zeros(size - n)) - problem.k * full[:size] - problem.c * full[size:]
+        work, damping = signal @ (tables.power_rows @ full), np.sum((tables.loss_rows @ full) ** 2)
+        powers = [work, damping, *values[:2] * (problem.read_rate @ full)]
+        return h * power * sigma ** (power - 1.0) * np.concatenate((full[size:], bent, powers))
+
+    exact = solve_ivp(rate, (0.0, 1.0), [*x, *np.zeros(4)], "DOP853", rtol=3e-14, atol=1e-14).y[2 * size :, -1]
+    error = np.abs(by_sums(problem, tables, energy_tables, node_set, place, x, heads) - exact)
+    if lead:
+        error[1 + node_set] = 0.0  # the work of a stop that enters is not asked for
+    assert error.max() < 1e-12 * np.abs(exact).max()
 
 
 @pytest.mark.parametrize("dt", [3e-4, 1e-2, 0.3])

@@ -23,14 +23,14 @@ from solvers.compiled.decorators import c_function
 from solvers.compiled.packed import PackedType
 
 (BEGIN, CONTACT, SOLVE, NEWTON, LEAVES, ERROR, ACCEPT, LAND, LANDING_STEP, WITHIN_STEP) = range(10)
-(ACCOUNT_FLIGHT, ACCOUNT_CONTACT) = range(10, 12)
-(SIDE, FIRST_END, LAND_IN_TIME, GO_BEYOND, PASSED) = range(12, 17)
-(PRESSED,) = range(17, 18)
-(PAIR, FREE_BLOCKS, PUSHED_BLOCKS, PUSHED_END, STOP_AT_NODES, BOUNDS) = range(18, 24)
-EVERY_RUN, ENERGY = range(10), range(10, 12)
-BORDERS, TWO_STOPS, MANY_STOPS = range(12, 17), range(17, 18), range(18, 24)
+(ACCOUNT_FLIGHT, ACCOUNT_STEP, ACCOUNT_SERIES, ACCOUNT_CONTACT) = range(10, 14)
+(SIDE, FIRST_END, LAND_IN_TIME, GO_BEYOND, PASSED) = range(14, 19)
+(PRESSED,) = range(19, 20)
+(PAIR, FREE_BLOCKS, PUSHED_BLOCKS, PUSHED_END, STOP_AT_NODES, BOUNDS) = range(20, 26)
+EVERY_RUN, ENERGY = range(10), range(10, 14)
+BORDERS, TWO_STOPS, MANY_STOPS = range(14, 19), range(19, 20), range(20, 26)
 """What needs them: every run, those with an energy balance, with bends or memory in a law, with two or many stops."""
-ADDRESSES = np.zeros(24, dtype=np.int64)
+ADDRESSES = np.zeros(26, dtype=np.int64)
 
 _DECLARED: dict[int, tuple[Any, Any, tuple[Any, ...]]] = {}
 _LOADED: dict[int, Any] = {}

@@ -84,15 +84,10 @@ def propagate_blocks(problem, alpha, beta, x):
 
 
 @inner
-def add_signals(problem, response, x, t, signal_terms):
-    """Add the response to the polynomial signals of the step that began at t."""
-    size = 2 * problem.k.size
+def derive_signals(problem, t, signal_terms):
+    """s, s', ..., s⁽⁵⁾ of all node tables at time t."""
     for j in range(problem.table_dt.size):
         signal_derivatives(problem, j, t, signal_terms[j])
-        rows = response[problem.table_load[j]]
-        for i in range(6):
-            for e in range(size):
-                x[e] += signal_terms[j, i] * rows[i, e]
 
 
 @inlined
@@ -161,15 +156,19 @@ def taylor_step(terms, x, span, size, weights, sums):
 
 
 @inner
-def fly_series(problem, tables, x, t, span, signal_terms):
-    """Move p and v of the blocks by ``span`` <= SERIES_REACH/|λ|max within a cell: the series, y⁽ⁱ⁺¹⁾ from y⁽ⁱ⁾."""
+def fly_series(problem, tables, x, t, span, signal_terms, terms):
+    """Move p and v of the blocks by ``span`` <= SERIES_REACH/|λ|max within a cell: the series, y⁽ⁱ⁺¹⁾ from y⁽ⁱ⁾.
+
+    The derivatives of p, then v, are left in the rows of ``terms``.
+    """
     width = x.shape[1]
-    for j in range(problem.table_dt.size):
-        signal_derivatives(problem, j, t, signal_terms[j])
+    derive_signals(problem, t, signal_terms)
     for i in range(0, width, WIDTH):
         p, v, weight = load8(x[0], i), load8(x[1], i), 1.0
         k, c, place, rate = load8(tables.block_k_c[0], i), load8(tables.block_k_c[1], i), p, v
         for order in range(SERIES_TERMS - 1):
+            store8(terms[order], i, p)
+            store8(terms[order], width + i, v)
             by_p, by_v = splat8(0.0), splat8(0.0)  # of the signals, before what waits for the term before
             if order < 6:
                 for j in range(problem.table_dt.size):
@@ -180,13 +179,29 @@ def fly_series(problem, tables, x, t, span, signal_terms):
             weight *= span / (order + 1.0)
             place += splat8(weight) * p
             rate += splat8(weight) * v
+        store8(terms[SERIES_TERMS - 1], i, p)
+        store8(terms[SERIES_TERMS - 1], width + i, v)
         store8(x[0], i, place)
         store8(x[1], i, rate)
 
 
+@inner
+def fly_tabulated(problem, tables, level, x, signal_terms):
+    """A tabulated step of the blocks' p and v under signals with given derivatives at its begin."""
+    propagate_split(tables, level, x)
+    width = 2 * x.shape[1]
+    for j in range(problem.table_dt.size):
+        rows = tables.signal[level, problem.table_load[j]]
+        for i in range(0, width, WIDTH):
+            total = load8(x, i)
+            for order in range(6):
+                total += splat8(signal_terms[j, order]) * load8(rows, order * width + i)
+            store8(x, i, total)
+
+
 @inlined
 def propagate_split(tables, level, x):
-    """A tabulated step of the blocks' p and v, eight blocks at once."""
+    """A tabulated step of the blocks' p and v without signals, eight blocks at once."""
     alpha, beta = tables.flight_propagator[level, 0], tables.flight_propagator[level, 1]
     for i in range(0, x.shape[1], WIDTH):
         p, v, a, b = load8(x[0], i), load8(x[1], i), load8(alpha, i), load8(beta, i)

@@ -52,8 +52,8 @@ from solvers.compiled.state import (
 from solvers.exponential.contact.begin import BEGUN, NEW, begin_steps, latest_entered
 from solvers.exponential.contact.landing import landing_reach
 from solvers.exponential.contact.step import advance_contact
-from solvers.exponential.energy.balance import account_state, start_account
 from solvers.exponential.energy.check import FIRST, has_gained, note_energy, own_energy
+from solvers.exponential.energy.flight_balance import account_state, start_account
 from solvers.exponential.energy.flight_tables import ENERGY_TABLES, NO_ENERGY_TABLES
 from solvers.exponential.preparation import SCRATCH, TABLES, load_parts, prepare_run
 from solvers.exponential.safe_steps import fly
@@ -122,7 +122,7 @@ class Exponential:
     rtol : error of an indentation rate that one contact step may make, relative to the speed of entry (or a tenth of
         what the motion could reach at the stop, whichever is larger), in [1e-12, 1e-2]. Flight is exact.
     ledger : keep the energy balance of runs with output samples, by closed forms of the steps; without it their input
-        and damping are NaN, the motion is the same and 1.2 to 2.2 times as quick. Runs with ``dt=None`` keep none.
+        and damping are NaN, the motion is the same and 1.2 to 1.5 times as quick. Runs with ``dt=None`` keep none.
 
     Notes
     -----

@@ -30,7 +30,7 @@ def _arrays(*dimensions: int) -> list[Any]:
 
 TABLES = types.NamedTuple(
     [
-        *_arrays(1, 3, 4, 2, 4, 2, 3, 3, 2, 3, 2, 2, 2, 2, 0, 0, 2, 1, 2),
+        *_arrays(1, 3, 5, 2, 4, 2, 3, 3, 2, 3, 2, 2, 2, 2, 0, 0, 2, 1, 2),
         *(*_arrays(1, 3, 1, 1, 2, 2, 2, 2, 3, 3, 3, 4, 3), INTEGERS, INTEGERS),
         *_arrays(5, 6, 5, 5, 5, 5, 3, 2, 2, 2, 2, 2, 4),
         *(VECTOR, INTEGERS, INTEGERS, MATRIX),
@@ -246,13 +246,21 @@ def _layout(stops: int, loads: int, blocks: int, signals: int, borders: int, poo
     size, width = 2 * blocks, 2 * blocks + 2 + 2 * stops
     rows = size if pool else 0
     scratch = [
-        *((padded(width),), (SERIES_TERMS, padded(size)), (signals, 6), (SERIES_TERMS,), (blocks,), (loads,), (stops,)),
-        (3, 2, padded(blocks)),
+        *(
+            (padded(width),),
+            (SERIES_TERMS, 2 * padded(blocks)),
+            (signals, 6),
+            (SERIES_TERMS,),
+            (blocks,),
+            (loads,),
+            (stops,),
+        ),
+        (6, 2, padded(blocks)),
         *((stops, 2, S), (S,), (stops, 2, S), (stops + loads, S), (S,), (stops, 2, 8), (stops, S), (stops, 3, S)),
-        *((stops * S,), (stops * S,), (START + 1, padded(width + 2))),
+        *((stops * S,), (stops * S,), (START + 1, max(padded(width + 2), 2 * padded(blocks)))),
         *([(stops,)] * 4),
         *((stops, S), (stops,), (4, 3 * S), (stops,), (stops,), (S + 2,), (1,), (1,)),
-        *((2 + loads, max(32, padded(size + 6 * signals), 2 * padded(6 * signals))), (3,), (6,)),
+        *((2 + loads, padded(2 * size + 2 * S * (stops + loads + 2)) + 16 * signals), (3,), (6,)),
         *((stops, 2), (borders * S,), (6 * borders,), (borders,), (stops, borders), (stops, borders), (1,), (2,)),
         *((rows, S), (rows, S), (padded(rows),), (stops * S, stops * S), (pool, S, 2 * S), (pool,)),
         *((size, S), (blocks, 5, S), (S + 1 + stops + loads, S)),

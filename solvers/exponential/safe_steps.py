@@ -25,15 +25,23 @@ import numpy as np
 
 from solvers.compiled.kernels import copy, dot, indentation, inlined, inner, merged
 from solvers.compiled.state import SAMPLED, STEPS, T
-from solvers.exponential.energy.balance import account_output, account_state
+from solvers.exponential.energy.flight_balance import (
+    account_output,
+    account_state,
+    account_step,
+    copy_split,
+    fly_within,
+    start_account,
+)
 from solvers.exponential.flight import (
     SERIES_REACH,
-    add_signals,
     cell_of,
     cross_cell,
+    derive_signals,
     energy_norms,
     first_root,
     fly_series,
+    fly_tabulated,
     join,
     level_within,
     motion_of_stop,
@@ -91,23 +99,26 @@ def _target(tables, t, first, second, t_end):
 
 @inner
 def _sample(problem, tables, energy_tables, state, scratch, x, t, out, due):
-    """Write the outputs that are due within the step that began at t with the blocks' p and v in x, which is moved."""
-    size = 2 * problem.k.size
+    """Write the outputs that are due within the step that began at t with the blocks' p and v in x, which is moved.
+
+    With sampled signals the balance of the state is that at t, and goes with x; else it follows from the mark.
+    """
+    size, with_energy, before = 2 * problem.k.size, energy_tables.active > 0.0, state.x
+    accounted = with_energy and problem.table_dt.size > 0
     while due[state.count[SAMPLED]] < state.now[T]:
-        wanted = due[state.count[SAMPLED]]
-        parts = max(1, int(np.ceil(tables.fastest * (wanted - t) / SERIES_REACH)))
-        for i in range(parts):
-            span = (wanted - t) / parts
-            fly_series(problem, tables, x, t + i * span, span, scratch.signal_terms)
-        join(problem, x, out[state.count[SAMPLED]])
-        copy(state.x[size:], out[state.count[SAMPLED], size:], state.x.size - size)
-        if energy_tables.active > 0.0:
-            account_output(problem, tables, energy_tables, state, scratch, wanted, out[state.count[SAMPLED]])
+        wanted, row = due[state.count[SAMPLED]], out[state.count[SAMPLED]]
+        copy(before[size:], row[size:], state.x.size - size)
+        fly_within(problem, tables, scratch, x, t, wanted - t, accounted, energy_tables, row)
+        join(problem, x, row)
+        if accounted:
+            before = row
+        elif with_energy:
+            account_output(problem, tables, energy_tables, state, scratch, wanted, row)
         state.count[SAMPLED], t = state.count[SAMPLED] + 1, wanted
 
 
 @inner
-def _fly_tabulated(problem, tables, state, scratch, most, budget):
+def _fly_unsampled(problem, tables, state, scratch, most, budget):
     """Tabulated steps without signals or output, until a stop is near, or the time ``most`` or the budget is used up.
 
     p and v of the blocks are in two arrays, eight numbers a vector. Returns (time flown, steps, safe time left).
@@ -161,29 +172,31 @@ def _cross_cells(problem, tables, energy_tables, state, scratch, t_end, most, ou
     cell, bounded = begin, begin
     if abs(offset) < 1e-7 * h:
         split(problem, state.x, x[0])
+        if with_energy:
+            account_state(problem, tables, energy_tables, state, scratch)
         while cell < end:
             if cell == bounded:
                 bounded = min(cell + _GROUP, end)
                 if _bound_cells(problem, tables, scratch, x[at], cell, bounded - cell):
                     break
-            samples = due[state.count[SAMPLED]] < (cell + 1) * h
-            if samples and tables.fastest * h > SERIES_REACH:
-                break
             cross_cell(problem, tables, x[at], cell, x[1 - at])
             if _near(problem, tables, scratch, x[1 - at]):
                 break
             cell += 1
-            if samples or with_energy:
-                join(problem, x[1 - at], state.x)
+            if due[state.count[SAMPLED]] < cell * h:
                 now[T] = min(cell * h, t_end)
-                _sample(problem, tables, energy_tables, state, scratch, x[at], (cell - 1) * h, out, due)
-                if with_energy:
-                    account_state(problem, tables, energy_tables, state, scratch)
+                copy_split(x[at], x[2])
+                _sample(problem, tables, energy_tables, state, scratch, x[2], (cell - 1) * h, out, due)
+            if with_energy:
+                whole, begin_of_cell = tables.flight_step.size, (cell - 1) * h
+                account_step(problem, tables, energy_tables, scratch, whole, begin_of_cell, x[at], state.x)
             at = 1 - at
         if cell > begin:
             join(problem, x[at], state.x)
             now[T] = min(cell * h, t_end)
             state.count[STEPS] += cell - begin
+            if with_energy:
+                start_account(problem, state, scratch)
     return cell - begin
 
 
@@ -221,14 +234,18 @@ def _fly_step(problem, tables, state, scratch, span, target, rest, offset, cell,
     elif sampled and tables.fastest * span <= SERIES_REACH:
         h = span
         split(problem, state.x, x[0])
-        fly_series(problem, tables, x[0], now[T], h, scratch.signal_terms)
+        fly_series(problem, tables, x[0], now[T], h, scratch.signal_terms, scratch.terms)
         join(problem, x[0], state.x)
     else:
         level = level_within(tables, span)
         h = tables.flight_step[level]
-        propagate_blocks(problem, tables.flight_propagator[level, 0], tables.flight_propagator[level, 1], state.x)
         if sampled:
-            add_signals(problem, tables.signal[level], state.x, now[T], scratch.signal_terms)
+            split(problem, state.x, x[0])
+            derive_signals(problem, now[T], scratch.signal_terms)
+            fly_tabulated(problem, tables, level, x[0], scratch.signal_terms)
+            join(problem, x[0], state.x)
+        else:
+            propagate_blocks(problem, tables.flight_propagator[level, 0], tables.flight_propagator[level, 1], state.x)
     return h, stop
 
 
@@ -259,7 +276,7 @@ def fly(problem, tables, energy_tables, state, scratch, t_end, budget, out, due)
             _bound_signals(problem, cell, 1, scratch.signal_bounds)
         # --- the time within which no stop can be reached
         if first == np.inf and not sampled:  # no output and no cell ends before
-            flown, steps, span = _fly_tabulated(problem, tables, state, scratch, span, budget)
+            flown, steps, span = _fly_unsampled(problem, tables, state, scratch, span, budget)
             now[T] += flown
             state.count[STEPS] += steps
             if steps >= budget:
@@ -267,6 +284,8 @@ def fly(problem, tables, energy_tables, state, scratch, t_end, budget, out, due)
         else:
             span = min(span, rest)
             if first <= begin + span:
+                if with_energy and sampled:
+                    account_state(problem, tables, energy_tables, state, scratch)
                 split(problem, state.x, scratch.split_state[2])
             span = _safe_span(problem, tables, state, scratch, span, rest, sampled or count % _REFRESH == 0)
         h, stop = _fly_step(problem, tables, state, scratch, span, target, rest, offset, cell, dt_cell)

@@ -43,7 +43,7 @@ class Tables(NamedTuple):
 
     flight_step: Any  # (l,) s, falling
     flight_propagator: Any  # (l, 2, N padded): α, β of every block
-    signal: Any  # (l, L, 6, 2N): state change by a signal t^k/k!
+    signal: Any  # (l, L, 6, 2, N padded): state change by a signal t^k/k!
     cell: Any  # (2, N padded): α, β over a whole cell of the sampled signals
     cell_signal: Any  # (L, 6, 2, N padded): state change over a cell by s, s', s'' at its begin, then at its end
     cell_error: Any  # (m, N padded): see `cell_errors`
@@ -162,7 +162,7 @@ def build(
     return Tables(
         flight_step=h,
         flight_propagator=blocks.flight_propagator,
-        signal=signal_responses(problem, h),
+        signal=_in_eights(signal_responses(problem, h).reshape(len(h), len(problem.load), 6, 2, size)),
         cell=_in_eights(_cell(problem, dt_cell)),
         cell_signal=_in_eights(quintic_responses(problem, dt_cell)),
         cell_error=_in_eights(cell_error),

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 
 from solvers.integration import integrate
-from solvers.problem import Array, Parameter, Solution, System, Transitions
+from solvers.problem import Array, Parameter, Solution, System, Transitions, renew
 
 _REALS = ctypes.POINTER(ctypes.c_double)
 _AT = ctypes.c_int64, ctypes.c_double, ctypes.c_double, ctypes.c_double, _REALS  # border, δ, δ̇, entry rate, parameters
-_RENEW, _SLOPES = ctypes.CFUNCTYPE(ctypes.c_int64, *_AT), ctypes.CFUNCTYPE(None, *_AT, _REALS)
+_SLOPES = ctypes.CFUNCTYPE(None, *_AT, _REALS)
 
 
 def counts(system: System) -> list[int]:
@@ -98,7 +98,7 @@ def units(system: System, x: Array, log: Transitions) -> Array:
         for i in np.flatnonzero(log.contact == number) if places else ():
             at = int(log.border[i]), float(log.delta[i]), float(log.delta_dot[i])
             taken = np.abs(_slopes(law, row, *at)[:, :2] * at[1:]).max(axis=1)
-            _RENEW(law.renew_address)(*at, 1.0, row.ctypes.data_as(_REALS))
+            renew(law, row, *at)
             size = np.maximum(size, np.maximum(taken, np.abs(row[places])))
         sizes.append(np.where(size > 0.0, size, 1.0))
     return np.concatenate((np.zeros(0), *sizes))

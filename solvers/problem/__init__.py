@@ -10,7 +10,7 @@ Imports: numpy, scipy. Begin with `system.System`.
 
 from solvers.problem.decoupling import decouple
 from solvers.problem.frames import dataframe, optional
-from solvers.problem.losses import Losses
+from solvers.problem.losses import Losses, renew
 from solvers.problem.matrices import Array, dense, product
 from solvers.problem.memo import Memo
 from solvers.problem.result import (

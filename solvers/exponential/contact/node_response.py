@@ -39,13 +39,13 @@ class Scratch(NamedTuple):
     """
 
     x_new: Any  # (x.size padded,) state at the end of the step tried
-    terms: Any  # (14, 2N padded) derivatives of the state, or terms of its Taylor series
+    terms: Any  # (14, 2 × N padded) derivatives of the state
     signal_terms: Any  # (tables, 6) value and derivatives of every sampled signal
     values: Any  # (14,) coefficients of a polynomial
     norms: Any  # (N,) energy norms of the blocks, √J
     signal_bounds: Any  # (L,) bounds of the sampled signals on some cells
     per_stop: Any  # (m,) bounds of |δ̈| in m/s², errors of δ in m, or of δ̇ in m/s
-    split_state: Any  # (3, 2, N padded) p and v of the blocks, of several states
+    split_state: Any  # (6, 2, N padded) p and v of the blocks, of several states; see `energy.flight_balance`
     motion: Any  # (m, 2, S) indentations and their rates at the nodes
     clipped: Any  # (S,) indentations of one stop at the nodes, not below 0
     free: Any  # (m, 2, S) indentations and rates at the nodes without contact forces
@@ -71,7 +71,7 @@ class Scratch(NamedTuple):
     bend_values: Any  # (S + 2,) of one stop at the nodes and at the end, then the largest, see `crossings`
     landing_reach: Any  # (1,) radians of the fastest block that a landing may take
     duration: Any  # (1,) s: estimate for the contact begun last, as if nothing else acted on the body
-    energy_sums: Any  # (2 + L, numbers) see `energy.balance`
+    energy_sums: Any  # (2 + L, numbers) see `energy.flight_balance` and `contact_balance`
     energy: Any  # (3,) J, see `energy.check`
     control: Any  # (6,) of the step control, places named in `step`
     start_motion: Any  # (m, 2) δ and δ̇ at the begin of the step

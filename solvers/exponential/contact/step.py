@@ -59,7 +59,7 @@ from solvers.exponential.contact.node_response import free_response
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.outputs import end_run, record_forces, sample_step
 from solvers.exponential.contact.segment_ends import first_end, go_beyond, land_first, land_in_time
-from solvers.exponential.energy.balance import account_contact
+from solvers.exponential.energy.contact_balance import account_contact
 
 _GOAL = 0.3  # error aimed at, in units of the tolerance
 _ORDER = 15.0  # the error estimate falls like h^15

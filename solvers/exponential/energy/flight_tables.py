@@ -23,15 +23,17 @@ from solvers.compiled.kernels import INTEGERS, MATRIX, REAL, VECTOR, Problem
 from solvers.compiled.packed import Packed
 from solvers.compiled.sums import padded
 from solvers.exponential.contact.nodes import S, gauss
+from solvers.exponential.energy.contact_sums import Steps, Sums, free_loss, tones_at_nodes
 from solvers.exponential.energy.contact_tables import contact_table
 from solvers.exponential.flight import SERIES_TERMS
-from solvers.exponential.phi_functions import signal_responses
+from solvers.exponential.phi_functions import derivatives_of_ends, signal_responses
 from solvers.exponential.responses import propagate
 from solvers.exponential.tables import Tables
 
 _OCTAVE = 4  # flight steps of which each is twice as long as the last
 _BRIEF = 0.04  # |λ| h up to which twelve terms of a Taylor series are exact
 _MOST_NUMBERS = 10_000_000  # in the rows: with more drivers the work is computed by series
+_MOST_PER_BLOCK = 1000  # numbers of a form summed over the blocks: with more, of many tones, blocks take less time
 _REACH = 200.0  # radians of the fastest block up to which a contact step has tables
 
 
@@ -42,8 +44,9 @@ class EnergyTables(NamedTuple):
     closed: float  # whether there are rows for flight
     spacing: float  # s, of the last step in the tables
     driver: Any  # (d,) columns of the state that drive
-    plain: Any  # (l, 3, n): damping = Σ rows × (p², p v, v²)
-    rows: Any  # (l, d + 6J, 2 × 2N padded): work, then damping, from the state per unit of a driver
+    power: Any  # (L, N padded) input power = signal × power row, from v
+    plain: Any  # (l, 3, N padded): damping = Σ rows × (p², p v, v²)
+    rows: Any  # (l, 6J + d, 4 × N padded): work, then damping, from p, then v, per unit of a signal or driver
     pairs: Any  # (l, 6J, 2 × 6J padded): the same from the signals
     gauss: Any  # (2, 5)
     series: Any  # (6, LONG): weights of a series' terms at Gauss's points and at the end
@@ -51,7 +54,10 @@ class EnergyTables(NamedTuple):
     first: float  # contact step at which the tables begin
     longest: Any  # (kinds,) s: contact step up to which they may be used
     steady: Any  # (kinds, j, K, 2, S): α, β of every tone at the nodes
-    contact: Any  # (kinds, j, n, 3S + 5, 2S)
+    contact: Any  # (kinds, j, n, 3S + 5, 2S), or none where the next three are
+    head: Any  # (H,) rows of `Scratch.force` that are heads, see `contact_sums`
+    sums: Any  # (f, j, 2N + S H, 2 S H padded with 4K) forms summed over the blocks
+    free_loss: Any  # (kinds, j, 3, n) damping of free motion = Σ rows × (p², p v, v²)
 
 
 ENERGY_TABLES = types.NamedTuple(
@@ -61,6 +67,7 @@ ENERGY_TABLES = types.NamedTuple(
             REAL,
             REAL,
             INTEGERS,
+            MATRIX,
             *(types.Array(REAL, 3, "C"),) * 3,
             MATRIX,
             MATRIX,
@@ -69,6 +76,7 @@ ENERGY_TABLES = types.NamedTuple(
             VECTOR,
         ),
         *(types.Array(REAL, 5, "C"),) * 2,
+        *(INTEGERS, *(types.Array(REAL, 4, "C"),) * 2),
     ],
     EnergyTables,
 )
@@ -77,9 +85,9 @@ ENERGY_TABLES = types.NamedTuple(
 def _empty(kept: float, node_sets: int) -> EnergyTables:
     """A balance without tables."""
     none, nothing, contact = np.zeros(0, dtype=np.int64), np.zeros((0, 0, 0)), np.zeros((0, 0, 0, 0, 0))
-    flight = kept, 0.0, 0.0, none, nothing, nothing, nothing
-    kind, longest = np.zeros(node_sets, dtype=np.int64), np.zeros(1)
-    return EnergyTables(*flight, gauss(5), _series(), kind, 0.0, longest, contact, contact)
+    flight = kept, 0.0, 0.0, none, np.zeros((0, 0)), nothing, nothing, nothing
+    kind, longest, sums = np.zeros(node_sets, dtype=np.int64), np.zeros(1), np.zeros((0, 0, 0, 0))
+    return EnergyTables(*flight, gauss(5), _series(), kind, 0.0, longest, contact, contact, none, sums, sums)
 
 
 def _series() -> Any:
@@ -97,6 +105,9 @@ def energy_tables_for(problem: Problem, tables: Tables, spacing: float) -> Packe
     if not (_coupled(tables) or any(part[:, :own].any() for part in (problem.push, problem.load, problem.read_rate))):
         energy_tables = _contact_part(energy_tables, problem, tables)
     driver = np.flatnonzero(_drives(problem, tables))
+    power = np.zeros((len(problem.load), padded(len(problem.k))))
+    power[:, : len(problem.k)] = tables.power_rows[:, len(problem.k) :]
+    energy_tables = energy_tables._replace(power=power)
     size, signals = 2 * len(problem.k), len(problem.table_dt)
     if (len(tables.flight_step) + 1) * (len(driver) + 6 * signals) * 2 * padded(size) <= _MOST_NUMBERS:
         energy_tables = _flight_part(energy_tables, problem, tables, driver, spacing)
@@ -120,34 +131,37 @@ def _drives(problem: Problem, tables: Tables) -> Any:
 def _flight_part(
     energy_tables: EnergyTables, problem: Problem, tables: Tables, driver: Any, spacing: float
 ) -> EnergyTables:
-    """The forms of all flight steps, and of the cell or, without sampled signals, of the time between two outputs."""
-    powers = _power_forms(problem, tables)
+    """The forms of all flight steps, and of the cell or, without sampled signals, of the time between two outputs.
+
+    Of a cell they are those of the signals' values and derivatives at its two ends, else at the begin of the step.
+    """
+    powers, size, n = _power_forms(problem, tables), 2 * len(problem.k), len(problem.k)
     levels = -(-len(tables.flight_step) // _OCTAVE) * _OCTAVE
     h = tables.flight_step[0] * 2.0 ** (-np.arange(levels) / _OCTAVE)
-    forms = _doubled(problem, powers, h, _OCTAVE, tables.flight_propagator, tables.signal)[: len(tables.flight_step)]
+    signal = tables.signal[..., :n].reshape(*tables.signal.shape[:3], size)
+    forms = _doubled(problem, powers, h, _OCTAVE, tables.flight_propagator, signal)[: len(tables.flight_step)]
     spacing = problem.table_dt[0] if len(problem.table_dt) else spacing
-    forms = np.concatenate((forms, _forms_of(problem, powers, spacing)))
-    size, n, own = 2 * len(problem.k), len(problem.k), int(tables.own_blocks)
-    signals = np.arange(size, powers.shape[-1])
-    rows = forms[:, :, np.concatenate((driver, signals)), :size]
-    once = np.isin(np.arange(size), driver)
-    rows[:, :, : len(driver)] *= np.where(once, 1.0, 2.0)
-    rows[:, :, len(driver) :] *= 2.0
-    b = np.arange(0 if _coupled(tables) else own)
-    plain = np.stack((forms[:, 1, b, b], 2.0 * forms[:, 1, b, n + b], forms[:, 1, n + b, n + b]), axis=1)
-    pairs = forms[:, :, size:, size:]
+    last, ends = _forms_of(problem, powers, spacing), np.eye(powers.shape[-1])
+    for first in range(size, len(ends), 6):
+        ends[first : first + 6, first : first + 6] = derivatives_of_ends(spacing)
+    forms = np.concatenate((forms, ends.T @ last @ ends))
+    rows = 2.0 * forms[:, :, np.append(np.arange(size, len(ends)), driver), :size]
+    rows[:, :, len(ends) - size :][..., driver] *= 0.5
+    b = np.arange(0 if _coupled(tables) else int(tables.own_blocks))
+    plain = np.zeros((len(forms), 3, padded(n)))
+    plain[..., b] = np.stack((forms[:, 1, b, b], 2.0 * forms[:, 1, b, n + b], forms[:, 1, n + b, n + b]), axis=1)
     return energy_tables._replace(
-        **{"closed": 1.0, "spacing": spacing, "driver": driver.astype(np.int64), "plain": np.ascontiguousarray(plain)},
-        **{"rows": _beside(rows), "pairs": _beside(pairs)},
+        **{"closed": 1.0, "spacing": spacing, "driver": driver.astype(np.int64), "plain": plain},
+        **{"rows": _beside(rows.reshape(*rows.shape[:-1], 2, n)), "pairs": _beside(forms[:, :, size:, None, size:])},
     )
 
 
 def _beside(forms: Any) -> Any:
-    """(l, d, 2 × padded): the two forms' rows beside each other."""
-    steps, _, rows, columns = forms.shape
-    out = np.zeros((steps, rows, 2, padded(columns)))
-    out[..., :columns] = forms.transpose(0, 2, 1, 3)
-    return out.reshape(steps, rows, 2 * padded(columns))
+    """(l, d, all parts padded): the parts (l, 2, d, parts, columns) of work, then of damping, beside each other."""
+    steps, _, rows, parts, columns = forms.shape
+    out = np.zeros((steps, rows, 2, parts, padded(columns)))
+    out[..., :columns] = forms.transpose(0, 2, 1, 3, 4)
+    return out.reshape(steps, rows, 2 * parts * padded(columns))
 
 
 def _power_forms(problem: Problem, tables: Tables) -> Any:
@@ -258,12 +272,24 @@ def _contact_part(energy_tables: EnergyTables, problem: Problem, tables: Tables)
     places = tables.nodes[[node_sets.index(kind) for kind in kinds]]
     structure = [part.tobytes() for part in (problem.k[:own], problem.c[:own], h)]
     of_kinds = [contact_table(*structure, *kind, row.tobytes()) for kind, row in zip(kinds, places, strict=True)]
-    return energy_tables._replace(
+    steady = _steady(np.sqrt(problem.k[own:]), h, places ** np.array([power for power, _ in kinds])[:, None])
+    energy_tables = energy_tables._replace(
         kind=np.array([kinds.index(node_set) for node_set in node_sets], dtype=np.int64),
         first=float(len(tables.contact_step) - len(h)),
         longest=_longest(np.sqrt(problem.k[own:].max(initial=0.0)), kinds, h),
-        steady=_steady(np.sqrt(problem.k[own:]), h, places ** np.array([power for power, _ in kinds])[:, None]),
-        contact=np.stack(of_kinds),
+    )
+    sums = Sums(problem, tables)
+    if tables.node_propagator.size or math.prod(sums.shape) > _MOST_PER_BLOCK * own:
+        return energy_tables._replace(steady=steady, contact=np.stack(of_kinds))
+    tones, weights = [tones_at_nodes(part, problem.k[own:]) for part in steady], h[:, None] * tables.plain[:, None]
+    steps = [
+        Steps(of_kinds[kind], f - 1 if tables.weight_exponent[f] > 0.0 else -1, weights[f], tones[kind])
+        for f, kind in enumerate(energy_tables.kind)
+    ]
+    return energy_tables._replace(
+        head=sums.heads,
+        sums=np.stack([sums.of(part) for part in steps]),
+        free_loss=np.stack([free_loss(table, problem.c[:own]) for table in of_kinds]),
     )
 
 

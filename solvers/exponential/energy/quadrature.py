@@ -34,14 +34,18 @@ def powers(problem, tables, t, x):
         for r in range(tables.loss_rows.shape[0]):
             loss += dot(tables.loss_rows[r], x, size) ** 2
     else:
-        loss = _plain_loss(problem.k.size, own, tables.loss_rows, x)
+        loss = _plain_loss(problem.k.size, own, problem.c, tables.loss_rows, x)
     return gain, loss
 
 
 @reordered
-def _plain_loss(n, own, rows, x):
-    """Power of damping, W, by rows with entries for the block's own rate and the tones only."""
+def _plain_loss(n, own, c, rows, x):
+    """Power of damping, W, of blocks with c, or with tones by rows with entries for the block's own rate and these."""
     loss = 0.0
+    if own == n:
+        for b in range(n):
+            loss += c[b] * x[n + b] * x[n + b]
+        return loss
     for b in range(own):
         value = rows[b, n + b] * x[n + b]
         for k in range(own, n):

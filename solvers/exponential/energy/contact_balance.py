@@ -1,0 +1,196 @@
+"""The energy balance of contact steps: whole steps by tables, the rest by `quadrature`.
+
+A step of a system with one or two stops is one form that `contact_sums` has summed over the blocks; with more stops the
+blocks are summed here, each by its forms of `contact_tables`.
+"""
+
+from __future__ import annotations
+
+from numba import types
+
+from solvers.compiled.kernels import REAL, VECTOR, copy, inlined, inner, merged, reordered
+from solvers.compiled.parts import ACCOUNT_CONTACT, part
+from solvers.compiled.simd import load8, splat8, store8, sum8
+from solvers.compiled.sums import combine
+from solvers.exponential.contact.collocation import largest_size, unresolved_part
+from solvers.exponential.contact.node_response import WITHIN
+from solvers.exponential.contact.nodes import S
+from solvers.exponential.energy.contact_tables import BEGAN, ENTERING, SQUARES
+from solvers.exponential.energy.quadrature import state_within
+
+_UNSEEN = 10.0  # times what a polynomial leaves out: aliases of fast blocks need not look like the end of a series
+
+
+@part(ACCOUNT_CONTACT, types.void, types.int64, types.int64, REAL, VECTOR)
+def account_contact(problem, tables, energy_tables, state, scratch, node_set, level, h, row):
+    """Add to the ledger of ``row`` what loads and damping do over the contact step of length h just found."""
+    if level >= energy_tables.first and h <= energy_tables.longest[energy_tables.kind[node_set]]:
+        place = level - int(energy_tables.first)
+        if energy_tables.sums.shape[0]:
+            _account_sums(problem, tables, energy_tables, state, scratch, node_set, place, h, row)
+        else:
+            _account_nodes(problem, tables, energy_tables, state, scratch, node_set, place, h, row)
+        return
+    x, size = scratch.stages[WITHIN], 2 * problem.k.size
+    copy(state.x, x, state.x.size)
+    state_within(problem, tables, state, scratch, node_set, h, 0.0, h, x, energy_tables.active > 0.0)
+    for s in range(problem.gap.size):
+        if state.segment[s] > 0:
+            _add_unseen(
+                tables, scratch, node_set, h, s, x[size + 2 + 2 * s] - state.x[size + 2 + 2 * s], row[size + 2 :]
+            )
+    copy(x[size:], row[size:], 2)
+
+
+@inner
+def _add_unseen(tables, scratch, node_set, h, s, work, works):
+    """Add of a contact's work what `finish_step` leaves out, which sums at the nodes.
+
+    That is no more than the polynomial through the powers at the nodes may be wrong: so the sum still tests the rest. A
+    force that is constant lets steps grow until the velocity oscillates between the nodes.
+    """
+    weights = tables.weights[node_set] if node_set == 0 or s == node_set - 1 else tables.plain[node_set]
+    powers = load8(scratch.force[s], 0) * load8(scratch.motion[s, 1], 0)
+    store8(scratch.trial, 0, powers)
+    combine(tables.tail[node_set], scratch.trial, S, None, scratch.clipped)
+    most = _UNSEEN * h * unresolved_part(scratch.clipped, largest_size(scratch.trial), 1)
+    works[2 * s] += min(max(work - h * sum8(load8(weights, 0) * powers), -most), most)
+
+
+@reordered
+def _free_loss(plain, x, n):
+    """Energy dissipated by the free motion of the structure's blocks."""
+    loss, blocks = 0.0, plain.shape[1]
+    for b in range(blocks):
+        p, v = x[b], x[n + b]
+        loss += plain[0, b] * p * p + plain[1, b] * p * v + plain[2, b] * v * v
+    return loss
+
+
+@merged
+def _account_sums(problem, tables, energy_tables, state, scratch, node_set, place, h, row):
+    """The same by the forms that are summed over the blocks, for a whole step."""
+    size, stops, heads = 2 * problem.k.size, problem.gap.size, energy_tables.head
+    y, sums, tones = scratch.energy_sums[0], scratch.energy_sums[1], problem.k.size - int(tables.own_blocks)
+    copy(state.x, y, size)
+    for i in range(heads.size):
+        used = heads[i] >= stops or state.segment[heads[i]] > 0
+        store8(y, size + S * i, load8(scratch.force[heads[i]], 0) if used else splat8(0.0))
+    combine(energy_tables.sums[node_set, place], y, size + S * heads.size, None, sums)
+    losses, gains = splat8(0.0), splat8(0.0)
+    for i in range(heads.size):
+        values = load8(y, size + S * i)
+        losses += values * load8(sums, 2 * S * i)
+        works = values * load8(sums, 2 * S * i + S)
+        if heads[i] >= stops:
+            gains += works
+        elif state.segment[heads[i]] > 0 and not _enters(tables, node_set, heads[i]):
+            _add_unseen(tables, scratch, node_set, h, heads[i], sum8(works), row[size + 2 :])
+    gain, loss = sum8(gains), sum8(losses)
+    loss += _free_loss(energy_tables.free_loss[energy_tables.kind[node_set], place], state.x, problem.k.size)
+    of_tones = sums[2 * S * heads.size :]
+    for k in range(2 * tones):
+        value = state.x[int(tables.own_blocks) + (k if k < tones else k + problem.k.size - tones)]
+        loss, gain = loss + value * of_tones[k], gain + value * of_tones[2 * tones + k]
+    row[size], row[size + 1] = row[size] + gain, row[size + 1] + loss
+
+
+@merged
+def _steady_nodes(problem, tables, energy_tables, state, scratch, kind, place, h, weights):
+    """Work of the signals on the steady motion; signals at the nodes go to ``energy_sums``, tones to ``terms``."""
+    n, size, gain = int(tables.own_blocks), problem.k.size, 0.0
+    for k in range(size - n):
+        alpha, beta = (
+            load8(energy_tables.steady[kind, place, k, 0], 0),
+            load8(energy_tables.steady[kind, place, k, 1], 0),
+        )
+        p, v = splat8(state.x[n + k]), splat8(state.x[size + n + k])
+        store8(scratch.terms, 2 * S * k, alpha * p + beta * v)
+        store8(scratch.terms, 2 * S * k + S, alpha * v - beta * splat8(problem.k[n + k]) * p)
+    for load in range(tables.power_rows.shape[0]):
+        signal, power = load8(scratch.force[problem.gap.size + load], 0), splat8(0.0)
+        signal += _of_tones(tables.signal_rows[load], scratch, n, size)
+        power += _of_tones(tables.power_rows[load], scratch, n, size)
+        store8(scratch.energy_sums[2 + load], 0, signal)
+        gain += h * sum8(load8(weights, 0) * signal * power)
+    return gain
+
+
+@inlined
+def _of_tones(row, scratch, n, size):
+    """A row's sum over the tones at the nodes."""
+    values = splat8(0.0)
+    for k in range(size - n):
+        values += splat8(row[n + k]) * load8(scratch.terms, 2 * S * k)
+        values += splat8(row[size + n + k]) * load8(scratch.terms, 2 * S * k + S)
+    return values
+
+
+@merged
+def _block_forces(problem, tables, state, scratch, node_set, b, y):
+    """Forces on a block at the nodes and its state, for plain forces and for that of the stop that enters; signals."""
+    size, signal, plain, entering = problem.k.size, splat8(0.0), splat8(0.0), splat8(0.0)
+    for u in range(problem.gap.size):
+        if state.segment[u] > 0:
+            force = splat8(problem.push[u, size + b]) * load8(scratch.force[u], 0)
+            if _enters(tables, node_set, u):
+                entering += force
+            else:
+                plain += force
+    for load in range(tables.power_rows.shape[0]):
+        plain += splat8(problem.load[load, size + b]) * load8(scratch.force[problem.gap.size + load], 0)
+        signal += splat8(tables.power_rows[load, size + b]) * load8(scratch.energy_sums[2 + load], 0)
+    store8(y, 0, plain)
+    store8(y, 2 * S, entering)
+    y[S], y[S + 1] = state.x[b], state.x[size + b]
+    y[3 * S], y[3 * S + 1] = y[S], y[S + 1]
+    return signal
+
+
+@inlined
+def _enters(tables, node_set, u):
+    """Whether the force of a stop has a weight on a step."""
+    return u == node_set - 1 and tables.weight_exponent[node_set] > 0.0
+
+
+@merged
+def _account_nodes(problem, tables, energy_tables, state, scratch, node_set, place, h, row):
+    """The same by the tables, for a whole step."""
+    n, size, kind, weights = (
+        int(tables.own_blocks),
+        problem.k.size,
+        energy_tables.kind[node_set],
+        load8(tables.plain[node_set], 0),
+    )
+    y, sums, entering = scratch.energy_sums[0], scratch.energy_sums[1], tables.weight_exponent[node_set] > 0.0
+    gain, loss = (
+        _steady_nodes(problem, tables, energy_tables, state, scratch, kind, place, h, tables.plain[node_set]),
+        0.0,
+    )
+    gains, losses = splat8(0.0), splat8(0.0)
+    for b in range(n):
+        signal, p, v = _block_forces(problem, tables, state, scratch, node_set, b, y), state.x[b], state.x[size + b]
+        table, c = energy_tables.contact[kind, place, b], problem.c[b]
+        combine(table, y, S + 2, None, sums)
+        if entering:
+            combine(table[ENTERING:], y[2 * S :], S, sums, sums)
+        moments, squares = load8(sums, 0), load8(sums, S) * load8(y, 0)
+        if entering:
+            combine(table[SQUARES:], y[2 * S :], S + 2, None, sums)
+            squares += load8(sums, 0) * load8(y, 2 * S)
+        store8(scratch.along[b], 0, moments)
+        gains += signal * moments
+        losses += splat8(c) * squares
+        loss += c * (table[BEGAN, 0] * p * p + table[BEGAN, 1] * p * v + table[BEGAN, 2] * v * v)
+        if n < size:
+            steady = _of_tones(tables.loss_rows[b], scratch, n, size)
+            losses += splat8(2.0 * tables.loss_rows[b, size + b]) * steady * moments
+            losses += splat8(h) * weights * steady * steady
+    row[2 * size] += gain + sum8(gains)
+    row[2 * size + 1] += loss + sum8(losses)
+    for s in range(problem.gap.size):
+        if state.segment[s] > 0 and not _enters(tables, node_set, s):
+            combine(scratch.along, problem.read_rate[s, size:], n, None, scratch.trial)
+            steady = splat8(h) * weights * _of_tones(problem.read_rate[s], scratch, n, size)
+            work = sum8(load8(scratch.force[s], 0) * (load8(scratch.trial, 0) + steady))
+            _add_unseen(tables, scratch, node_set, h, s, work, row[2 * size + 2 :])
