@@ -1,9 +1,13 @@
-"""Contact laws: indentation, its rate and the entry rate in; force out.
+"""Contact laws: indentation, its rate and the entry rate in; force out. They know neither structures nor methods.
 
 The force acts while ``delta > 0`` and is positive when it pushes the bodies apart. Laws of these three numbers:
 `Hertz`, `Hysteretic`, `KelvinVoigt`, `Viscoelastic`, `PiecewiseLinear`, `Polynomial`, `Tabulated`, and one's own with
 `@law`. Laws with memory, of a few latched numbers that are renewed at borders: `Jenkins`, `Coulomb`, `Iwan`,
 `ElastoPlastic`, `BoucWen`, `WaltonBraun`, and with `memory_law` one's own (`contacts.memory`). Laws add: ``a + b``.
+
+`law` holds what every law offers, `kernels` and `sum_kernels` the forces as compiled functions; `restitution` bounces a
+free mass off a law, `path` leads one along given indentations, `contacts.identification` finds laws from measurements.
+Imports: numpy, scipy, numba. Begin with `law`, then `power_laws`.
 """
 
 from contacts.curves import PiecewiseLinear, Tabulated

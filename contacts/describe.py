@@ -64,9 +64,9 @@ def _cycle(law: Law) -> str:
 
 def _restitution(law: Law, entry_rate: float, mass: float) -> str:
     """Nominal and achieved."""
-    way = "by integration" if law.exact_restitution(entry_rate, mass) is None else "exactly"
+    how = "by integration" if law.exact_restitution(entry_rate, mass) is None else "exactly"
     achieved = f"a free mass of {mass:g} kg entering at {entry_rate:g} m/s achieves"
-    value = f"{restitution(law, entry_rate, mass):.6f} ({way})"
+    value = f"{restitution(law, entry_rate, mass):.6f} ({how})"
     if law.nominal is None:
         return f"{achieved} {value}"
     return f"nominal {law.nominal[1]:g} by {law.nominal[0]}; {achieved} {value}"

@@ -11,7 +11,7 @@ from numba.extending import intrinsic
 REALS = types.CPointer(types.float64)
 SIGNATURE = types.void(types.int64, REALS, REALS, types.float64, REALS, REALS)
 GRADIENT = types.void(types.int64, REALS, REALS, types.float64, REALS, REALS, REALS, REALS)
-PART = 11  # numbers in a sum's parameters before those of each part
+HEAD = 11  # numbers in a sum's parameters before those of each part
 
 if config.DISABLE_JIT:
     raise RuntimeError("NUMBA_DISABLE_JIT is set, but contact laws run as machine code only: unset it")
@@ -198,8 +198,8 @@ def parallel(n, delta, delta_dot, entry_rate, parameters, force):
     for _ in range(int(parameters[0])):
         rate = max(entry_rate, parameters[at + 2])
         for i in range(n):
-            force[i] += _force_at(int(parameters[at]), i, delta, delta_dot, rate, parameters, at + PART)[0]
-        at += PART + int(parameters[at + 3])
+            force[i] += _force_at(int(parameters[at]), i, delta, delta_dot, rate, parameters, at + HEAD)[0]
+        at += HEAD + int(parameters[at + 3])
 
 
 @_gradient
@@ -211,9 +211,9 @@ def parallel_gradient(n, delta, delta_dot, entry_rate, parameters, by_delta, by_
     for _ in range(int(parameters[0])):
         rate, address = max(entry_rate, parameters[at + 2]), int(parameters[at + 1])
         for i in range(n):
-            slopes = _gradient_at(address, i, delta, delta_dot, rate, parameters, at + PART)
+            slopes = _gradient_at(address, i, delta, delta_dot, rate, parameters, at + HEAD)
             by_delta[i] += slopes[0]
             by_rate[i] += slopes[1]
             if entry_rate > parameters[at + 2]:
                 by_entry[i] += slopes[2]
-        at += PART + int(parameters[at + 3])
+        at += HEAD + int(parameters[at + 3])

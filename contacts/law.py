@@ -42,6 +42,12 @@ ENTRY_RATE_FLOOR = 1e-3
 """Smallest entry rate a law is given by default, m/s: a/entry_rate is singular at grazing."""
 
 
+def _memory_address(name: str, about: str) -> Any:
+    """A property: where a compiled function of a law with memory is."""
+    doc = f"Address of the compiled function for {about}; 0 without memory."
+    return property(lambda law: int(law.memory_kernel(name).address) if law.memory else 0, doc=doc)
+
+
 class Law(ABC):
     """A contact law: everything an integrator needs to know about a stop's force.
 
@@ -132,28 +138,10 @@ class Law(ABC):
         """Address of the compiled derivatives."""
         return int(self.gradient.address)
 
-    @property
-    def borders_address(self) -> int:
-        """Address of the compiled border functions; 0 without memory, as for the next three."""
-        return self._memory_address("borders")
-
-    @property
-    def renew_address(self) -> int:
-        """Address of the compiled renewal of the latched numbers."""
-        return self._memory_address("renew")
-
-    @property
-    def memory_gradient_address(self) -> int:
-        """Address of the compiled derivatives of the force by the latched numbers."""
-        return self._memory_address("memory_gradient")
-
-    @property
-    def renew_gradient_address(self) -> int:
-        """Address of the compiled derivatives of the renewal."""
-        return self._memory_address("renew_gradient")
-
-    def _memory_address(self, name: str) -> int:
-        return int(self.memory_kernel(name).address) if self.memory else 0
+    borders_address = _memory_address("borders", "the border functions")
+    renew_address = _memory_address("renew", "the renewal of the latched numbers")
+    memory_gradient_address = _memory_address("memory_gradient", "the derivatives of the force by the latched numbers")
+    renew_gradient_address = _memory_address("renew_gradient", "the derivatives of the renewal")
 
     @property
     def inlined(self) -> tuple[float, float, float, float] | None:

@@ -26,10 +26,10 @@ _REALS = ctypes.POINTER(ctypes.c_double)
 
 
 @dataclass(frozen=True)
-class Stretch:
-    """A piece of a path without a border: from ``begin`` to ``end``, within the points ``first`` to ``last``."""
+class Piece:
+    """A piece of a path without a border: from ``start`` to ``end``, within the points ``first`` to ``last``."""
 
-    begin: float
+    start: float
     end: float
     first: int
     last: int
@@ -43,7 +43,7 @@ def along(law: Law, delta: ArrayLike) -> Vector:
     forces = np.empty(path.size)
     for one in walk(law, path):
         points = path[one.first : one.last + 1]
-        inside = (points >= min(one.begin, one.end)) & (points <= max(one.begin, one.end))
+        inside = (points >= min(one.start, one.end)) & (points <= max(one.start, one.end))
         forces[one.first : one.last + 1][inside] = _force(law, points[inside], one)
     return forces
 
@@ -53,21 +53,21 @@ def work(law: Law, delta: ArrayLike) -> float:
     nodes, weights = np.polynomial.legendre.leggauss(16)
     total = 0.0
     for one in walk(law, _checked(law, delta)):
-        half, middle = 0.5 * (one.end - one.begin), 0.5 * (one.end + one.begin)
+        half, middle = 0.5 * (one.end - one.start), 0.5 * (one.end + one.start)
         total += half * float(weights @ _force(law, middle + half * nodes, one))
     return total
 
 
-def walk(law: Law, path: Vector) -> Iterator[Stretch]:
-    """The stretches of a path, one after the other; their parameters are not kept by the next."""
+def walk(law: Law, path: Vector) -> Iterator[Piece]:
+    """The pieces of a path, one after the other; their parameters are not kept by the next."""
     row = law.parameters
     tiny = ROUNDING * float(np.spacing(np.abs(path).max()))
     for first, last in monotone_runs(path):
-        begin, end = float(path[first]), float(path[last])
-        rate = math.copysign(SLOW, end - begin)
-        goal = end if end != begin else begin + ROUNDING * tiny  # a path that rests is one about to rise
-        for a, b in _stretches(law, row, begin, goal, rate, tiny):
-            yield Stretch(a, b if end != begin else begin, first, last, rate, row.copy())
+        start, end = float(path[first]), float(path[last])
+        rate = math.copysign(SLOW, end - start)
+        goal = end if end != start else start + ROUNDING * tiny  # a path that rests is one about to rise
+        for a, b in _pieces(law, row, start, goal, rate, tiny):
+            yield Piece(a, b if end != start else start, first, last, rate, row.copy())
 
 
 def name_of(law: Law) -> str:
@@ -94,9 +94,7 @@ def monotone_runs(path: Vector) -> Iterator[tuple[int, int]]:
     yield from pairwise(ends)
 
 
-def _stretches(
-    law: Law, row: Vector, at: float, goal: float, rate: float, tiny: float
-) -> Iterator[tuple[float, float]]:
+def _pieces(law: Law, row: Vector, at: float, goal: float, rate: float, tiny: float) -> Iterator[tuple[float, float]]:
     """Begin and end of every stretch of a run; renews the row between them."""
     renewals = 0
     while True:
@@ -159,7 +157,7 @@ def renew(law: Law, border: int, delta: float, rate: float, row: Vector) -> int:
     return int(law.memory_kernel("renew").ctypes(border, delta, rate, 1.0, row.ctypes.data_as(_REALS)))
 
 
-def _force(law: Law, delta: Vector, one: Stretch) -> Vector:
+def _force(law: Law, delta: Vector, one: Piece) -> Vector:
     """Force in a stretch."""
     forces = law.batch(1.0, one.parameters)(delta, np.full(delta.size, one.rate))
     if law.one_sided and not law.memory:

@@ -168,17 +168,20 @@ def bounce(law: Law, entry_rate: float = 1.0, mass: float = 1.0) -> Bounce:
     force = law.batch(entry_rate)
     scale = entry_rate, mass, force
     t, y = np.zeros(1), np.array([[0.0], [entry_rate]])
-    way, end = 1, math.inf
+    direction, end = 1, math.inf
     levels, piece = (0.0, *law.knots, math.inf), 0
     while True:
         low, high = levels[piece], levels[piece + 1]
-        times, states, reached = _stretch(scale, t[-1], y[:, -1], way, high if way > 0 else low, end)
+        times, states, reached = _stretch(scale, t[-1], y[:, -1], direction, high if direction > 0 else low, end)
         t, y = np.append(t, times[1:]), np.hstack((y, states[:, 1:]))
-        if not reached and way < 0:
+        if not reached and direction < 0:
             break
         if not reached:
-            way, end = -1, 1e3 * t[-1]  # turned; whoever needs a thousand times as long for the way out never leaves
-        elif way > 0:
+            direction, end = (
+                -1,
+                1e3 * t[-1],
+            )  # turned; a mass that needs a thousand times as long to leave never does
+        elif direction > 0:
             piece += 1
         elif piece == 0:
             break
@@ -190,7 +193,7 @@ def bounce(law: Law, entry_rate: float = 1.0, mass: float = 1.0) -> Bounce:
 
 
 def _stretch(
-    scale: tuple[float, float, Any], start: float, state: NDArray, way: int, level: float, end: float
+    scale: tuple[float, float, Any], start: float, state: NDArray, direction: int, level: float, end: float
 ) -> tuple[NDArray, NDArray, bool]:
     """Integrate until δ reaches the level (True), or the mass turns on its way in or the time is over (False)."""
     from scipy.integrate import solve_ivp
@@ -208,9 +211,9 @@ def _stretch(
     def turned(t: float, y: NDArray) -> float:
         return float(y[1])
 
-    at_level.terminal, at_level.direction = True, way  # type: ignore[attr-defined]
+    at_level.terminal, at_level.direction = True, direction  # type: ignore[attr-defined]
     turned.terminal, turned.direction = True, -1.0  # type: ignore[attr-defined]
-    watched = [turned] if math.isinf(level) else [at_level, *([turned] if way > 0 else [])]
+    watched = [turned] if math.isinf(level) else [at_level, *([turned] if direction > 0 else [])]
     last = min(end, 1e12)
     done = solve_ivp(
         *(motion, (start, last), state, "DOP853"),
@@ -218,10 +221,10 @@ def _stretch(
     )
     if done.status == -1 or not np.all(np.isfinite(done.y)):
         raise RuntimeError(f"the bounce cannot be integrated beyond t = {done.t[-1]:g} s: {done.message}")
-    if way > 0 and done.status == 0:
+    if direction > 0 and done.status == 0:
         raise RuntimeError(f"the law never stops a mass of {mass:g} kg at {entry_rate:g} m/s")
     reached = not math.isinf(level) and len(done.t_events[0]) > 0
-    if way > 0 and not reached:
+    if direction > 0 and not reached:
         done.y[1, -1] = 0.0
     return done.t, done.y, reached
 

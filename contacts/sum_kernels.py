@@ -9,11 +9,11 @@ from numba import cfunc, njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from contacts.kernels import GRADIENT, PART, REALS, SIGNATURE, compiled
+from contacts.kernels import GRADIENT, HEAD, REALS, SIGNATURE, compiled
 
 RENEW = types.int64(types.int64, types.float64, types.float64, types.float64, REALS)
 RENEW_GRADIENT = types.void(types.int64, types.float64, types.float64, types.float64, REALS, REALS)
-FLOOR, SIZE, BORDERS, RENEWAL, BY_MEMORY, RENEWAL_SLOPES, BORDER_COUNT, LATCHED, EVENTS = range(2, PART)  # of a head
+FLOOR, SIZE, BORDERS, RENEWAL, BY_MEMORY, RENEWAL_SLOPES, BORDER_COUNT, LATCHED, EVENTS = range(2, HEAD)  # of a head
 
 
 @intrinsic
@@ -56,10 +56,10 @@ def _rows(kernel, counted, n, delta, delta_dot, entry_rate, parameters, out):
     for _ in range(int(parameters[0])):
         count, rate = int(parameters[at + counted]), max(entry_rate, parameters[at + FLOOR])
         if count > 0:
-            own, rows = _from(parameters, at + PART), _from(out, row * n)
+            own, rows = _from(parameters, at + HEAD), _from(out, row * n)
             _fill((int(parameters[at + kernel]), n, delta, delta_dot, rate, own, rows))
         row += count
-        at += PART + int(parameters[at + SIZE])
+        at += HEAD + int(parameters[at + SIZE])
 
 
 @compiled(cfunc, SIGNATURE)
@@ -81,11 +81,11 @@ def parallel_renew(j, delta, delta_dot, entry_rate, parameters):
     for _ in range(int(parameters[0])):
         count = int(parameters[at + BORDER_COUNT])
         if first <= j < first + count:
-            rate, own = max(entry_rate, parameters[at + FLOOR]), _from(parameters, at + PART)
+            rate, own = max(entry_rate, parameters[at + FLOOR]), _from(parameters, at + HEAD)
             return events + _renew((int(parameters[at + RENEWAL]), j - first, delta, delta_dot, rate, own))
         first += count
         events += int(parameters[at + EVENTS])
-        at += PART + int(parameters[at + SIZE])
+        at += HEAD + int(parameters[at + SIZE])
     return -1
 
 
@@ -105,19 +105,19 @@ def parallel_renew_gradient(j, delta, delta_dot, entry_rate, parameters, out):
     at, width = 1, 2
     for _ in range(int(parameters[0])):
         width += int(parameters[at + LATCHED])
-        at += PART + int(parameters[at + SIZE])
+        at += HEAD + int(parameters[at + SIZE])
     at, first, row = 1, 0, 0
     for _ in range(int(parameters[0])):
         borders, count = int(parameters[at + BORDER_COUNT]), int(parameters[at + LATCHED])
         if count > 0:
             mine = j - first if first <= j < first + borders else -1
-            rate, own = max(entry_rate, parameters[at + FLOOR]), _from(parameters, at + PART)
+            rate, own = max(entry_rate, parameters[at + FLOOR]), _from(parameters, at + HEAD)
             block = _from(out, row * width)
             _slopes((int(parameters[at + RENEWAL_SLOPES]), mine, delta, delta_dot, rate, own, block))
             _spread(block, row, count, width)
         first += borders
         row += count
-        at += PART + int(parameters[at + SIZE])
+        at += HEAD + int(parameters[at + SIZE])
 
 
 GATE = 5  # numbers before those of a law behind a gate: code, rate at entry, floor, two addresses

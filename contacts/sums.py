@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from contacts.law import Law
 
-HEAD = 11  # numbers before those of each part; as `contacts.kernels.PART`, which is slow to import
+HEAD = 11  # numbers before those of each part; as in `contacts.kernels`, which is slow to import
 
 
 @dataclass(frozen=True)
@@ -136,12 +136,8 @@ class Sum(Law):
         for part in self.acting:
             own = part.parameters
             head = [part.address, part.gradient_address, part.entry_rate_floor, own.size]
-            head += [
-                part.borders_address,
-                part.renew_address,
-                part.memory_gradient_address,
-                part.renew_gradient_address,
-            ]
+            head += [part.borders_address, part.renew_address]
+            head += [part.memory_gradient_address, part.renew_gradient_address]
             head += [part.borders, len(part.memory), len(part.events)]
             numbers += [np.array(head, dtype=float), own]
         return np.concatenate(numbers)

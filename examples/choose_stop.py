@@ -69,10 +69,10 @@ def closed_form() -> float:
 
 
 if __name__ == "__main__":
-    begin, starts = time.perf_counter(), np.random.default_rng(1).uniform(size=(5, 2))
+    started, starts = time.perf_counter(), np.random.default_rng(1).uniform(size=(5, 2))
     with ProcessPoolExecutor() as pool:  # with joblib: Parallel(n_jobs=-1)(delayed(search)(start) for start in starts)
         choices, counts = zip(*pool.map(search, starts), strict=True)
-    seconds, exact, pairs = time.perf_counter() - begin, closed_form(), [(response(*at), tuple(at)) for at in choices]
+    seconds, exact, pairs = time.perf_counter() - started, closed_form(), [(response(*at), tuple(at)) for at in choices]
     (rms, force), (gap, exponent) = min(pair for pair in pairs if pair[0][1] < 1.001 * limit)
     print(f"gap {1e3 * gap:.2f} mm, stiffness {10**exponent:.0f} N/m: rms {1e3 * rms:.4f} mm, force {force:.3f} N")
     print(f"{sum(counts)} runs in {seconds:.1f} s; closed form {1e3 * exact:.4f} mm")

@@ -42,9 +42,9 @@ def branches(model):
     for period, omega in STARTS.items():
         start = next(a.orbit for a in model.attractors(omega, starts=6) if a.period == period)
         found.append(model.branch("omega", SPANS[period], period, start, at=omega))
-        begin = time.perf_counter()
+        started = time.perf_counter()
         list(islice(found[-1], MOST[period]))
-        seconds += time.perf_counter() - begin
+        seconds += time.perf_counter() - started
     return found, seconds
 
 

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
 
-_ROOMS = {
+_OFFERED = {
     "beams": "Section Taper Beam ModalDamping Rayleigh",
     "scene": "Clamped Dashpot Element Guided LumpedMass Pinned PointForce PointMoment Scene Spring Stop Impactor",
     "excitation": "Harmonic Multisine BandNoise RollOff Record Pulse SineSweep Step",
@@ -32,7 +32,7 @@ _ROOMS = {
     "response": "response_spectrum",
     "statistics": "moments pdf psd",
 }
-_HOME = {name: room for room, names in _ROOMS.items() for name in names.split()}
+_HOME = {name: folder for folder, names in _OFFERED.items() for name in names.split()}
 _MODULES = ["plot", "study"]
 
 __all__ = [

@@ -1,4 +1,9 @@
-"""Reduction of M u'' + C u' + K u = f to few coordinates: matrices in, basis and reduced matrices out."""
+"""Reduction of M u'' + C u' + K u = f to few coordinates: matrices in, basis and reduced matrices out.
+
+`basis` holds a basis, the reduced matrices and their checks; `modal` finds modes, `truncation` tells how many are
+enough, `interface` adds the static shapes of loaded places. Nothing is known of beams, contacts or time.
+Imports: numpy, scipy. Begin with `modal.modal_basis`.
+"""
 
 from reduction.basis import AccuracyError, Basis, oriented
 from reduction.interface import craig_bampton, guyan, static_share, with_residual

@@ -1,6 +1,9 @@
 """Time integration of linear structures with local contacts: systems, methods, events.
 
-Nothing is compiled or imported from numba before a method is used.
+`problem` holds what is to be solved and what comes out, `compiled` what all compiled functions share. `stepping` has
+the methods of constant or controlled step, `exponential` the main method; `integration` runs any of them, `many` runs
+many starts. `orbits` finds periodic motion, `branches` continues it over a parameter. Imports: numpy, scipy, numba;
+nothing is compiled or imported from numba before a method is used. Begin with `problem.system`, then `integration`.
 """
 
 from __future__ import annotations

@@ -44,12 +44,12 @@ from solvers.problem import (
     Status,
     System,
     Transitions,
-    hand_over,
+    forcing_of,
     product,
 )
-from solvers.problem.run_arguments import _check_laws, _check_tangent, _start, _times, latched_at_start
+from solvers.problem.run_arguments import check_laws, check_tangent, checked_start, latched_at_start, output_times
 
-_BUDGET = 20_000  # steps in a block: between two checks for signals and calls of `progress`
+BLOCK_STEPS = 20_000  # steps in a block: between two checks for signals and calls of `progress`
 _DEPTH, _FORCE = (list(ContactLog.__dataclass_fields__).index(name) for name in ("peak_indentation", "peak_force"))
 _NEVER, _NOWHERE = np.array([math.inf]), np.empty((0, 0))  # no output is due
 
@@ -105,9 +105,9 @@ def integrate(
 
         method = Exponential()
     run = prepared_run(system, q0, q_dot0, duration, dt, method, tangent, memory)
-    begin = time.perf_counter()
+    started = time.perf_counter()
     status = run.to_the_end(progress)
-    solution = run.solution(status, time.perf_counter() - begin)
+    solution = run.solution(status, time.perf_counter() - started)
     status = solution.status
     if isinstance(tangent, Parameter) and status is Status.DONE and not run.tangent.exact:
         ends = [_end(s, q0, q_dot0, duration, method, memory) for s in (tangent.behind, tangent.ahead)]
@@ -135,11 +135,11 @@ def prepared_run(
     """A run ready to start, everything checked."""
     if not hasattr(method, "engine") or isinstance(method, type):
         raise TypeError(f"method must be one of solvers, made with its settings, such as Exponential(), got {method!r}")
-    _check_tangent(tangent, method, system)
-    z = _start(system, q0, q_dot0, method)
-    times = _times(duration, dt)
-    _check_laws(system)
-    forcing = _forcing(system, duration, min(max(method.rtol, 1e-12), 1e-6))
+    check_tangent(tangent, method, system)
+    z = checked_start(system, q0, q_dot0, method)
+    times = output_times(duration, dt)
+    check_laws(system)
+    forcing = kept_forcing(system, duration, min(max(method.rtol, 1e-12), 1e-6))
     latched = latched_at_start(system, memory)
     engine = method.engine(system, z, forcing, duration)
     for s, numbers in latched:
@@ -148,11 +148,11 @@ def prepared_run(
     return _Run(system, engine, times, tangent)
 
 
-def _forcing(system: System, duration: float, rtol: float) -> Forcing:
+def kept_forcing(system: System, duration: float, rtol: float) -> Forcing:
     """Arrays of all signals; those of tones are kept, as long as no signal can have changed."""
     kept: Forcing | None = system.kept.find("forcing")
     if kept is None:
-        kept = hand_over([signal for _, signal in system.loads], duration, rtol)
+        kept = forcing_of([signal for _, signal in system.loads], duration, rtol)
         options = [getattr(type(signal), "__dataclass_params__", None) for _, signal in system.loads]
         fixed = all(found is not None and found.frozen for found in options)
         if fixed and not kept.table_dt.size:
@@ -176,7 +176,7 @@ class _Run:
             self.tangent = Tangent(system, engine, tangent if isinstance(tangent, Parameter) else None, True)
             self.state = engine.state  # with the event record
         self.log = np.empty((max(256, 2 * len(system.contacts)), COLUMNS))
-        self.begin, self.latched = self.state.x[: 2 * engine.problem.k.size].copy(), self.memory
+        self.initial, self.latched = self.state.x[: 2 * engine.problem.k.size].copy(), self.memory
         if times is not None and self.due[0] == 0.0:
             self.out[0] = self.state.x
             self.state.count[SAMPLED] = 1
@@ -213,7 +213,7 @@ class _Run:
             while code in (RUNNING, LOG_FULL):
                 if code == LOG_FULL:
                     self.log = np.concatenate((self.log, np.empty_like(self.log)))
-                code = self.engine.march(_BUDGET, self.log, self.out, self.due)
+                code = self.engine.march(BLOCK_STEPS, self.log, self.out, self.due)
                 if self.tangent:
                     self.tangent.follow()
                 if progress:
@@ -226,7 +226,7 @@ class _Run:
 
     def solution(self, status: Status, seconds: float) -> Solution:
         """Collect outputs, log and energy balance."""
-        size, n = self.begin.size, self.system.size
+        size, n = self.initial.size, self.system.size
         back = self.engine.back
         if self.times is None:
             x, t = self.state.x.copy()[None, :], self.state.now[T : T + 1].copy()
@@ -234,15 +234,15 @@ class _Run:
         else:
             x = self.out[: self._sampled(status)]
             t, motion = self.times[: len(x)], product(x[:, :size], back.T)
-        powers = x[:, size:] if self.times is None else x[:, size:].copy()  # so that all the samples can be let go
+        works = x[:, size:] if self.times is None else x[:, size:].copy()  # so that all the samples can be let go
         complete = self.engine.keeps_ledger(self.times is not None)
-        ledger = partial(_energy, self.system, powers, complete, motion, back, self.begin)
+        ledger = partial(_energy, self.system, works, complete, motion, back, self.initial)
         rows = self._rows()
         log = partial(ContactLog.of_rows, self._of_stops(rows))
         transitions = partial(Transitions.of_rows, rows, self.system.contacts)
-        first, last = (self.begin, self.latched), (self.state.x.copy(), self.memory)
-        lost = partial(Losses.of_run, self.system.contacts, back, first, last, powers, transitions)
-        if status is Status.DONE and not self._balances(powers, complete, motion, rows):
+        first, last = (self.initial, self.latched), (self.state.x.copy(), self.memory)
+        lost = partial(Losses.of_run, self.system.contacts, back, first, last, works, transitions)
+        if status is Status.DONE and not self._balances(works, complete, motion, rows):
             status = Status.UNBALANCED
         count = self.state.count.tolist()
         cost = Cost(count[STEPS], count[REJECTED], count[CALLS], count[EVENTS], seconds)
@@ -252,14 +252,14 @@ class _Run:
         more |= {"borders": transitions, "lost": lost, "memory": last[1], "end": end}
         return Solution(t, motion[:, :n], motion[:, n:], log, ledger, status, cost, **more)
 
-    def _balances(self, powers: Array, complete: bool, motion: Array, rows: Array) -> bool:
+    def _balances(self, works: Array, complete: bool, motion: Array, rows: Array) -> bool:
         """Whether the energy balance closes, where it is kept; methods without `gains` are checked step by step."""
         if not hasattr(self.engine, "gains"):
             return True
         if not complete or not len(motion):
             return not self.engine.gains(partial(_exchanged, rows))
-        begin = self.engine.back @ self.begin
-        return not unbalanced(self.system, powers, motion, begin, _exchanged(rows), self.engine.method.rtol)
+        start = self.engine.back @ self.initial
+        return not unbalanced(self.system, works, motion, start, _exchanged(rows), self.engine.method.rtol)
 
     def _of_stops(self, rows: Array) -> Array:
         """The rows of contacts that begin and end; one with memory under way is none while its law is open."""
@@ -302,11 +302,11 @@ def _exchanged(rows: Array) -> Array:
     return (rows[:, _DEPTH] * rows[:, _FORCE])[rows[:, 0] >= 0.0]
 
 
-def _energy(system: System, powers: Array, complete: bool, motion: Array, back: Array, begin: Array) -> Energy:
+def _energy(system: System, works: Array, complete: bool, motion: Array, back: Array, initial: Array) -> Energy:
     """The energy balance of a run; input and damping are NaN where it was not kept."""
     if not complete:
-        powers = np.hstack((np.full((len(powers), 2), math.nan), powers[:, 2:]))
-    return Energy.of_run(system.M, system.K, powers, motion, back @ begin)
+        works = np.hstack((np.full((len(works), 2), math.nan), works[:, 2:]))
+    return Energy.of_run(system.M, system.K, works, motion, back @ initial)
 
 
 def _end(system: System, q0: ArrayLike, q_dot0: ArrayLike, duration: float, method: Any, memory: Any) -> Array:

@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from solvers.integration import _BUDGET, _forcing
+from solvers.integration import BLOCK_STEPS, kept_forcing
 from solvers.problem import Array, SolverError, Status, System, counted
-from solvers.problem.run_arguments import _check_laws, _times
+from solvers.problem.run_arguments import check_laws, output_times
 
 if TYPE_CHECKING:
     from solvers.exponential.many_starts import Worker
@@ -116,15 +116,16 @@ def integrate_many(
     if not isinstance(method, Exponential):
         raise TypeError(f"integrate_many offers Exponential only, got {method!r}; call integrate for each start")
     starts = _starts(system, q0, q_dot0)
-    _times(duration, None)
+    output_times(duration, None)
     _check_threads(threads)
-    _check_laws(system)
+    check_laws(system)
     own_gaps, scaled = _gaps(system, gaps, len(starts)), _factors(system, factors, len(starts))
-    forcing, begin = _forcing(system, duration, min(max(method.rtol, 1e-12), 1e-6)), time.perf_counter()
+    started = time.perf_counter()
+    forcing = kept_forcing(system, duration, min(max(method.rtol, 1e-12), 1e-6))
     engines = [method.engine(system, starts[0], forcing, duration) for _ in range(min(threads, len(starts)))]
     outcomes = Outcomes.of(len(starts), engines[0].back.shape[1], len(system.contacts))
     starts = whole_starts(engines[0], starts, _of_tones(scaled, engines[0]))
-    _to_the_end([Worker(engine, starts, own_gaps, outcomes, _BUDGET) for engine in engines], len(starts), progress)
+    _to_the_end([Worker(engine, starts, own_gaps, outcomes, BLOCK_STEPS) for engine in engines], len(starts), progress)
     status = final_statuses(engines[0], outcomes)
     for engine in engines:
         engine.release()
@@ -134,7 +135,7 @@ def integrate_many(
         outcomes.count[:, CONTACTS],
         (outcomes.peak[..., 0], outcomes.peak[..., 1]),
     )
-    found = ManySolutions(motion[:, :n], motion[:, n:], t, status, contacts, *peaks, time.perf_counter() - begin)
+    found = ManySolutions(motion[:, :n], motion[:, n:], t, status, contacts, *peaks, time.perf_counter() - started)
     if check:
         _check_status(found, duration)
     return found
@@ -146,10 +147,7 @@ def _starts(system: System, q0: ArrayLike, q_dot0: ArrayLike) -> Array:
     for name, part in zip(("q0", "q_dot0"), parts, strict=True):
         if part.ndim != 2 or part.shape[1] != n or not len(part):
             raise ValueError(f"{name} must have shape (k, {n}), a start in each of k > 0 rows, got {part.shape}")
-        bad = np.argwhere(~np.isfinite(part))
-        if bad.size:
-            row, column = bad[0].tolist()
-            raise ValueError(f"{name} must be finite, got {part[row, column]} at start {row}, coordinate {column}")
+        _check_finite(name, part, "at start {}, coordinate {}")
     if len(parts[0]) != len(parts[1]):
         raise ValueError(f"q0 and q_dot0 must have as many rows, got {len(parts[0])} and {len(parts[1])}")
     return _products(system.blocks.inverse, np.hstack(parts))
@@ -160,11 +158,15 @@ def _rows(name: str, values: ArrayLike, count: int, width: int, each: str, kind:
     rows: Any = np.array(values, dtype=kind, order="C")
     if rows.shape != (count, width):
         raise ValueError(f"{name} must have shape {(count, width)}, {each} in the row of each run, got {rows.shape}")
+    _check_finite(name, rows, "in run {}, column {}")
+    return rows
+
+
+def _check_finite(name: str, rows: Array, where: str) -> None:
+    """ValueError that says where the first number that is not finite stands."""
     bad = np.argwhere(~np.isfinite(rows))
     if bad.size:
-        row, column = bad[0].tolist()
-        raise ValueError(f"{name} must be finite, got {rows[row, column]} in run {row}, column {column}")
-    return rows
+        raise ValueError(f"{name} must be finite, got {rows[tuple(bad[0])]} {where.format(*bad[0])}")
 
 
 def _gaps(system: System, gaps: ArrayLike | None, count: int) -> Array:

@@ -68,21 +68,21 @@ class Bilinear:
         t, x, product, switches = 0.0, np.asarray(x, float), np.eye(2), []
         closed = bool(-x[0] - self.gap > 0.0)
         while t < duration:
-            begin, free = t, x - self.steady(closed, t)
+            start, free = t, x - self.steady(closed, t)
 
-            def at(t, closed=closed, begin=begin, free=free):
-                turned = np.einsum("...ij,j->...i", self.propagator(closed, np.asarray(t) - begin), free)
+            def at(t, closed=closed, start=start, free=free):
+                turned = np.einsum("...ij,j->...i", self.propagator(closed, np.asarray(t) - start), free)
                 return turned + self.steady(closed, t)
 
             def height(t, at=at, sign=1.0 if closed else -1.0):
                 return sign * (at(t)[..., 0] + self.gap)  # negative within the piece
 
-            times = np.append(np.arange(begin + 1e-7, duration, self.period / grid), duration)
+            times = np.append(np.arange(start + 1e-7, duration, self.period / grid), duration)
             out = np.flatnonzero(height(times) > 0.0)
             end = brentq(height, times[out[0] - 1], times[out[0]], xtol=1e-15, rtol=1e-15) if out.size else duration
             if out.size:
                 switches.append(end)
-            product = self.propagator(closed, end - begin) @ product
+            product = self.propagator(closed, end - start) @ product
             t, x, closed = end, at(end), closed != bool(out.size)
         return x, product, np.array(switches)
 

@@ -20,7 +20,16 @@ from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, Sum, Tabul
 PAPER_LAW = Hysteretic.lankarani_nikravesh(2.1e8, restitution=0.5)
 PAPER_OMEGA = 109.1299120547, 790.6100943811, 2303.729838331
 TIP = 0.24445
-STEEL = {"E": 1.9e11, "rho": 8000.0, "A": 58.3e-6, "I": 18.5e-12}
+ROD_FILE = """
+[beam]
+length = 0.5
+section = { shape = "circle", E = 2.1e11, rho = 7800, diameter = 0.01 }
+[[supports]]
+kind = "clamped"
+z = 0
+"""  # a scene file to add to
+STEEL = fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)
+PAPER_BEAM = fb.Beam(0.2599, STEEL)
 
 
 def free_mass(law, mass=1.0, gap=0.0, loads=()):
@@ -125,7 +134,7 @@ def linear_stop():
 def paper_scene(base=None, zeta=(0.02, 0.01), law=None):
     """The clamped beam with a tip mass over an elastic stop; base None is 1 mm at 195 rad/s."""
     return fb.Scene(
-        beam=fb.Beam(0.2599, fb.Section(**STEEL)),
+        beam=PAPER_BEAM,
         supports=[fb.Clamped(0.0)],
         masses=[fb.LumpedMass(TIP, mass=25.4e-3, inertia=3.0e-6)],
         stops=[fb.Stop(TIP, law=PAPER_LAW if law is None else law)],
@@ -252,14 +261,14 @@ def reference(system, q0, q_dot0, duration, t_eval=(), rtol=1e-12, max_step=2e-4
                 continue
             watch.append((s, "leave", surface(s, 0.0, -1.0)))
             watch += [(s, "knot", surface(s, level, 0.0)) for level in levels[s][1:]]
-        begin = t
+        start = t
         part = solve_ivp(
             *(rhs, (t, duration), x, "DOP853"),
             **{"events": [w[2] for w in watch], "rtol": rtol, "atol": rtol * 1e-6, "max_step": max_step},
             dense_output=wanted.size > 0,
         )
         t, x = float(part.t[-1]), part.y[:, -1].copy()
-        mine = (wanted >= begin) & (wanted <= t)
+        mine = (wanted >= start) & (wanted <= t)
         if mine.any():
             states[mine] = part.sol(wanted[mine]).T
         for (s, kind, _), times in zip(watch, part.t_events, strict=True):

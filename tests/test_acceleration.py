@@ -2,18 +2,17 @@
 
 import numpy as np
 import pytest
-from problems import STEEL
+from problems import PAPER_BEAM
 
 import fembeam as fb
 from contacts import Hertz, KelvinVoigt
 
-BEAM = fb.Beam(0.2599, fb.Section(**STEEL))
 BASE = fb.Harmonic(amplitude=1e-3, omega=195.0, phase=0.3)
 
 
 def scene(**parts):
     parts = {"base": BASE, "damping": fb.ModalDamping(0.02), **parts}
-    return fb.Scene(BEAM, [fb.Clamped(0.0)], **parts)
+    return fb.Scene(PAPER_BEAM, [fb.Clamped(0.0)], **parts)
 
 
 def test_free_vibration_of_one_mode():
@@ -69,7 +68,7 @@ def test_it_is_the_slope_of_the_velocity_through_contacts_dashpots_and_forces(la
 
 
 def test_bodies_and_runs_from_files(tmp_path):
-    other = fb.Scene(BEAM, [fb.Clamped(0.0)], damping=fb.ModalDamping(0.01))
+    other = fb.Scene(PAPER_BEAM, [fb.Clamped(0.0)], damping=fb.ModalDamping(0.01))
     stop = fb.Stop(0.25, Hertz(1e7), gap=1e-4, on=(1, 0.2))
     run = scene(bodies=[other], stops=[stop]).reduce(2).simulate(0.05, 1e-6)
     velocity, acceleration = run.velocity(0.2, body=1), run.acceleration(0.2, body=1)

@@ -9,7 +9,7 @@ from contacts import Hertz
 from fembeam import BandNoise
 from solvers import Contact, Exponential, System, integrate
 from solvers.exponential import tables
-from solvers.problem import hand_over
+from solvers.problem import forcing_of
 
 SOFT = Hertz(1e-3)  # hardly disturbs the motion: contacts are those of the linear response
 AFAR = 1e9
@@ -25,7 +25,7 @@ def system_under_noise(omega, zeta, row, gap, seed, band=300.0):
 
 def prepared(system, duration):
     """Problem and tables of a run, with its sampled signal."""
-    forcing = hand_over([signal for _, signal in system.loads], duration, 1e-6)
+    forcing = forcing_of([signal for _, signal in system.loads], duration, 1e-6)
     engine = METHOD.engine(system, np.zeros(2 * system.size), forcing, duration)
     return engine.problem, engine.prepared.tables.value
 

@@ -14,7 +14,7 @@ from solvers import Contact, Exponential, System, integrate
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.energy.contact_tables import BEGAN, ENTERING, SQUARES, contact_table
 from solvers.exponential.preparation import prepare_run
-from solvers.problem import hand_over
+from solvers.problem import forcing_of
 
 FREE = [Contact([1.0, 1.0, 1.0, 0.5], Hertz(1e6), gap=1e9)]
 
@@ -46,7 +46,7 @@ def blocks(signals, omega=(0.0, 9.0, 40.0, 75.0), zeta=(0.0, 1.0, 3.0, 0.02), co
 
 def prepared(system, spacing=0.013, duration=1.0):
     """What a run of the system would prepare, and its ledger's tables."""
-    forcing = hand_over([signal for _, signal in system.loads], duration, 1e-10)
+    forcing = forcing_of([signal for _, signal in system.loads], duration, 1e-10)
     forcing, made = prepare_run(system, forcing, duration, 1e-10)
     problem = made.problem.value._replace(table=forcing.table, table_start=forcing.table_start)
     return problem, made.tables.value, made.energy_tables_for(spacing).value

@@ -80,6 +80,7 @@ def test_multisine_is_a_value_and_leaves_the_arrays_alone():
         (lambda: Harmonic(math.nan, 1.0), "Harmonic amplitude must be finite, got nan"),
         (lambda: Harmonic(1.0, -1.0), r"Harmonic omega \(rad/s\) must be finite of at least 0, got -1.0"),
         (lambda: Harmonic("big", 1.0), "Harmonic amplitude must be a number, got 'big'"),
+        (lambda: Harmonic(1e-3, "195"), r"omega \(rad/s\) must be a number, got '195'"),
         (lambda: Harmonic(1.0, 1.0).derivative(-1), "order of the derivative .* got -1"),
         (lambda: Multisine([1.0], [1.0, 2.0]), r"one length >= 1, got lengths \(1, 2, 2\)"),
         (lambda: Multisine([], []), r"one length >= 1, got lengths \(0, 0, 0\)"),

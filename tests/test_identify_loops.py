@@ -38,7 +38,7 @@ def noisy(law, path, level, rng):
 @pytest.mark.parametrize("law", [DAMPER, JOINT, WEN, SHARP], ids=["jenkins", "iwan", "wen", "sharp"])
 @pytest.mark.parametrize("first", [0, 40, 137])
 def test_clean_loops_give_the_law_back(law, first):
-    """From a fresh begin, from the first turn on, and from the middle of what went before."""
+    """From a fresh start, from the first turn on, and from the middle of what went before."""
     path, force = PATH[first:], law.along(PATH)[first:]
     kept = path.copy(), force.copy()
     found = identify_loop(path, force, type(law))

@@ -8,7 +8,7 @@ from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, Viscoelast
 from solvers import Contact, DormandPrince, Exponential, System, integrate
 from solvers.exponential import block_tables, preparation
 from solvers.exponential.preparation import prepare_system
-from solvers.problem import hand_over
+from solvers.problem import forcing_of
 
 MODES = 6
 LAWS = [
@@ -102,7 +102,7 @@ def test_many_stops_meet_an_independent_method():
 def size_of(stops):
     """Bytes of the tables of so many stops of one law."""
     system = tube(stops, modes=30, laws=LAWS[:1])
-    tables = prepare_system(system, hand_over([signal for _, signal in system.loads], 1.0, 1e-8)).tables.value
+    tables = prepare_system(system, forcing_of([signal for _, signal in system.loads], 1.0, 1e-8)).tables.value
     return sum(array.nbytes for array in tables if isinstance(array, np.ndarray))
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from problems import STEEL, TIP, paper_scene
+from problems import PAPER_BEAM, TIP, paper_scene
 
 import fembeam as fb
 from contacts import Hertz, KelvinVoigt
@@ -10,7 +10,7 @@ from contacts import Hertz, KelvinVoigt
 
 def scene(*stops, **more):
     parts = {"damping": fb.ModalDamping(0.02), "base": fb.Harmonic(1e-3, 195.0), **more}
-    return fb.Scene(fb.Beam(0.2599, fb.Section(**STEEL)), [fb.Clamped(0.0)], stops=list(stops), **parts)
+    return fb.Scene(PAPER_BEAM, [fb.Clamped(0.0)], stops=list(stops), **parts)
 
 
 @pytest.mark.parametrize("dt", [1e-2, 1e-3, 1e-4, 1.3e-5])
@@ -57,8 +57,8 @@ def test_a_contact_over_many_samples_is_shared_as_its_law_says():
     fine = run.readout.model.simulate(0.2, 1e-4).force()
     t, among = run.t, slice(1, -1)
     log, held = run.contacts, np.zeros(len(t), dtype=bool)
-    for begin, end in zip(log.t_in, log.t_out, strict=True):
-        held |= (t > begin + 3e-4) & (t < end - 3e-4)
+    for t_in, t_out in zip(log.t_in, log.t_out, strict=True):
+        held |= (t > t_in + 3e-4) & (t < t_out - 3e-4)
     expected = (fine[1:-3:2] + 4 * fine[2:-2:2] + fine[3:-1:2]) / 6
     assert held.sum() > 100
     np.testing.assert_allclose(run.force(mean=True)[among][held[among]], expected[held[among]], rtol=1e-6)

@@ -12,6 +12,7 @@ import fembeam as fb
 from contacts import PiecewiseLinear
 from contacts.memory import BoucWen, Coulomb, ElastoPlastic, Iwan, Jenkins, WaltonBraun
 from solvers import Contact, Exponential, System, branch, integrate, orbit
+from solvers.branches.walk import BranchStatus
 from solvers.orbits import PeriodicProblem, at_zero, delayed, flown
 
 
@@ -283,6 +284,42 @@ def test_branch_against_runs():
         run = integrate(later, np.zeros(n), np.zeros(n), 300 * one.period, method=Exponential(1e-11))
         assert abs(one.state - [run.q[-1, 0], run.q_dot[-1, 0]]).max() < 1e-6
         assert one.residual < 1e-9
+
+
+@pytest.mark.parametrize("moved", [0.0, 0.02, 0.05])
+def test_a_branch_goes_on_where_a_stuck_slider_begins_to_slip(moved):
+    """One of a family, met on one side, pushes its slider on until both sides slip; it does not lead back.
+
+    Where the slider slips the motion forgets where it began.
+    """
+
+    def family(omega):
+        return oscillator(JENKINS, omega, force=0.3)
+
+    first = orbit(*family(1.3)).whole
+    first[-1] += moved
+    found = branch(family, (1.25, 1.8), orbit(*family(1.3), first), at=1.3).run()
+    assert (found.orbits[0].parameter, found.orbits[-1].parameter) == (1.25, 1.8)
+    assert found.endings == ("reached the end of the span",) * 2
+    last = found.orbits[-1]
+    assert len(last.transitions) == 4
+    run = integrate(delayed(last.system, last.phase), [0.0], [0.0], 300 * last.period, method=Exponential(1e-11))
+    assert abs(last.state - [run.q[-1, 0], run.q_dot[-1, 0]]).max() < 1e-6
+
+
+def test_a_branch_says_where_it_turned_round_or_was_lost():
+    """In words, with the parameter of the last orbit and what may be why."""
+
+    def family(omega):
+        return oscillator(JENKINS, omega, force=0.3)
+
+    found = branch(family, (1.2, 3.0), orbit(*family(2.2)), at=2.2)
+    walk = found.walks[1]
+    walk.status = BranchStatus.LOST
+    assert found.endings[1].startswith("lost: no orbit was found")
+    assert "; the last orbit, at 2.2, has multipliers up to" in found.endings[1]
+    walk.status = BranchStatus.END
+    assert found.endings[1] == "reached the end of the span: turned round at 2.2, came to 2.2"
 
 
 def test_phases_that_come_and_go_are_located():

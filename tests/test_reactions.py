@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from problems import STEEL
+from problems import PAPER_BEAM
 
 import fembeam as fb
 from contacts import Hertz, Hysteretic, PiecewiseLinear
@@ -60,7 +60,7 @@ def test_statics_with_springs_tension_and_a_load_beside_a_support():
 def rig(**more):
     """Everything that can act, on one beam."""
     return fb.Scene(
-        fb.Beam(0.2599, fb.Section(**STEEL)),
+        PAPER_BEAM,
         [fb.Clamped(0.0), fb.Pinned(0.12)],
         masses=[fb.LumpedMass(0.24445, mass=25.4e-3, inertia=3.0e-6, offset=0.01)],
         springs=[fb.Spring(0.2, 300.0, rotational=0.05, foot=fb.Harmonic(1e-3, 90.0))],

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from problems import ROD_FILE
 
 import fembeam as fb
 import solvers
@@ -159,13 +160,9 @@ def test_a_displacement_that_begins_with_an_acceleration_is_told():
         fb.Scene(fb.Beam(0.5, STEEL), [fb.Clamped(0.0)], base=fb.Record(TIMES, QUAKE, quantity="acceleration"))
 
 
-SCENE = """
-[beam]
-length = 0.5
-section = { shape = "circle", E = 2.1e11, rho = 7800, diameter = 0.01 }
-[[supports]]
-kind = "clamped"
-z = 0
+SCENE = (
+    ROD_FILE
+    + """
 [damping]
 zeta = 0.02
 [simulate]
@@ -176,6 +173,7 @@ kind = "record"
 path = "quake.csv"
 quantity = "acceleration"
 """
+)
 
 
 def scene_file(folder, more=""):

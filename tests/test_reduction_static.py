@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from problems import PAPER_BEAM, STEEL
 
 import reduction
 import solvers
@@ -178,12 +179,10 @@ def test_bad_input(call, message):
 
 # --- models of scenes ------------------------------------------------------------------------------------
 
-STEEL = Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)
-
 
 def struck(law=None, damping=0.01, **changes):
     parts = {
-        "beam": Beam(0.2599, STEEL),
+        "beam": PAPER_BEAM,
         "supports": [Clamped(0.0)],
         "masses": [LumpedMass(0.24445, 25.4e-3, inertia=3.0e-6)],
         "stops": [Stop(0.24445, law or Hertz(2.1e8))],

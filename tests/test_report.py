@@ -5,9 +5,9 @@ import re
 
 import numpy as np
 import pytest
+from problems import PAPER_BEAM, PAPER_LAW
 
 import fembeam as fb
-from contacts import Hysteretic
 from fembeam.results import files
 from fembeam.results import html_page as html
 
@@ -15,11 +15,10 @@ from fembeam.results import html_page as html
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """Results of a run of 20 s, and a study's text with a long sentence."""
-    steel = fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)
     scene = fb.Scene(
-        beam=fb.Beam(0.2599, steel),
+        beam=PAPER_BEAM,
         supports=[fb.Clamped(0.0)],
-        stops=[fb.Stop(0.24445, law=Hysteretic.lankarani_nikravesh(2.1e8, restitution=0.5))],
+        stops=[fb.Stop(0.24445, law=PAPER_LAW)],
         damping=fb.ModalDamping(0.05),
         base=fb.BandNoise(2.5e-4, (0.0, 1226.6), seed=1),
     )

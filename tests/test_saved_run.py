@@ -156,8 +156,7 @@ def test_a_run_without_memory_or_samples_keeps_empty_ones(run, tmp_path):
 
 
 def test_a_beam_on_two_supports_without_anything_else(tmp_path):
-    bare = fb.Section(**STEEL)
-    run = fb.Scene(fb.Beam(1.0, bare), [fb.Pinned(0.0), fb.Pinned(1.0)], gravity=9.81).reduce(2).simulate(0.01, 1e-3)
+    run = fb.Scene(fb.Beam(1.0, STEEL), [fb.Pinned(0.0), fb.Pinned(1.0)], gravity=9.81).reduce(2).simulate(0.01, 1e-3)
     again = fb.load(run.save(tmp_path / "run"))
     np.testing.assert_array_equal(again.reactions().force, run.reactions().force)
     np.testing.assert_array_equal(again.acceleration(0.5, absolute=True), run.acceleration(0.5))

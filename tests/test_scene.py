@@ -6,6 +6,7 @@ import sys
 
 import numpy as np
 import pytest
+from problems import PAPER_BEAM
 from scipy import linalg
 
 import reduction
@@ -14,7 +15,6 @@ from fembeam.beams import Beam, ModalDamping, Rayleigh, Section
 from fembeam.excitation import Harmonic
 from fembeam.scene import Clamped, Dashpot, Guided, LumpedMass, Pinned, PointForce, Scene, Spring, Stop
 
-STEEL = Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)
 UNIT = Section(E=1.0, rho=1.0, A=1.0, I=1.0)
 BEAM = Beam(1.0, UNIT)
 
@@ -28,7 +28,7 @@ class Linear:
 
 def paper(inertia=3.0e-6, **parts):
     mass = LumpedMass(0.24445, mass=25.4e-3, inertia=inertia)
-    return Scene(Beam(0.2599, STEEL), [Clamped(0.0)], [mass], **parts)
+    return Scene(PAPER_BEAM, [Clamped(0.0)], [mass], **parts)
 
 
 def basis_of(scene, modes, **mesh):

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from problems import STEEL
 
 import fembeam as fb
 from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, Viscoelastic
@@ -100,10 +101,9 @@ def test_many_independent_stops_move_as_alone(count, ratio, duration):
 
 def test_independent_bodies_keep_their_energy():
     """Two beams of a scene, each with its own stop."""
-    steel = fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)
     beams = [
         {
-            "beam": fb.Beam(length, steel),
+            "beam": fb.Beam(length, STEEL),
             "supports": [fb.Clamped(0.0)],
             "stops": [fb.Stop(0.9 * length, law=Hertz(stiffness), gap=gap)],
         }

@@ -4,6 +4,7 @@ from dataclasses import MISSING, fields, replace
 
 import numpy as np
 import pytest
+from problems import ROD_FILE
 
 import fembeam as fb
 from contacts import Hertz
@@ -152,18 +153,15 @@ def test_orbit_and_branch_of_a_beam_shaken_by_the_foot_of_a_spring_alone():
 
 def test_doubts_see_feet(tmp_path):
     path = tmp_path / "scene.toml"
-    path.write_text("""
-[beam]
-length = 0.5
-section = { shape = "circle", E = 2.1e11, rho = 7800, diameter = 0.01 }
-[[supports]]
-kind = "clamped"
-z = 0
+    path.write_text(
+        ROD_FILE
+        + """
 [[springs]]
 z = 0.5
 stiffness = 100
 foot = { kind = "harmonic", amplitude = 2.0, omega = 1e5 }
-""")
+"""
+    )
     file = read(path)
     said = doubts(file, file.scene.reduce(modes=2))
     assert any("springs[0].foot moves by 2 m" in one for one in said)

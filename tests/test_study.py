@@ -6,10 +6,11 @@ from multiprocessing import get_context
 
 import numpy as np
 import pytest
+from problems import STEEL, paper_scene
 
 import fembeam as fb
 import solvers
-from contacts import Hertz, Hysteretic, KelvinVoigt
+from contacts import Hertz, KelvinVoigt
 from fembeam import scene_file
 from fembeam.cli import main
 from fembeam.study import ModeCount, NotMetError, measure, mode_count, smallest_model
@@ -17,15 +18,7 @@ from fembeam.study.execution.executors import spread
 from fembeam.study.mode_count import difference
 from fembeam.study.quantities import QUANTITIES, Amplitude, Psd, label, named
 
-STEEL = fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)
-SCENE = fb.Scene(
-    beam=fb.Beam(0.2599, STEEL),
-    supports=[fb.Clamped(0.0)],
-    masses=[fb.LumpedMass(0.24445, mass=25.4e-3, inertia=3.0e-6)],
-    stops=[fb.Stop(0.24445, law=Hysteretic.lankarani_nikravesh(2.1e8, restitution=0.5))],
-    damping=fb.ModalDamping([0.02, 0.01]),
-    base=fb.Harmonic(amplitude=1e-3, omega=195.0),
-)
+SCENE = paper_scene()
 FREE = replace(SCENE, stops=[])
 STIFF = replace(SCENE, base=None, stops=[fb.Stop(0.24445, law=Hertz(1e10))])
 
@@ -176,8 +169,8 @@ def test_executor_gives_the_same_study():
 
 def largest_forces(run):
     """Of eight fifths of a second, once nothing is known of the start any more."""
-    log, begins = run.contacts, 1.2 + 0.2 * np.arange(8)
-    return [log.peak_force[(log.t_in >= t) & (log.t_in < t + 0.2)].max(initial=0.0) for t in begins]
+    log, starts = run.contacts, 1.2 + 0.2 * np.arange(8)
+    return [log.peak_force[(log.t_in >= t) & (log.t_in < t + 0.2)].max(initial=0.0) for t in starts]
 
 
 largest_forces.sampled = False

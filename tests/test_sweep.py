@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from problems import PAPER_LAW, TIP, paper_scene
 from scipy.interpolate import BPoly
 from scipy.signal import StateSpace, chirp, lsim
 
 import fembeam as fb
-from contacts import Hysteretic
 from fembeam.scene_file import read
 
 KINDS = ["linear", "logarithmic"]
@@ -54,10 +54,7 @@ def test_nodes_keep_their_promise(kind):
 
 def test_sweeps_over_a_branch_jump_at_its_folds():
     """Up, the motion stays on the upper branch to the fold; down, on the branch without contact until it grazes."""
-    section = fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)
-    scene = fb.Scene(fb.Beam(0.2599, section), [fb.Clamped(0.0)], [fb.LumpedMass(0.24445, 25.4e-3, 3e-6)],
-                     stops=[fb.Stop(0.24445, Hysteretic.lankarani_nikravesh(2.1e8, 0.5), gap=3e-3)],
-                     damping=fb.ModalDamping(0.02), base=fb.Harmonic(2e-4, 130.0))  # fmt: skip
+    scene = replace(paper_scene(fb.Harmonic(2e-4, 130.0), 0.02), stops=[fb.Stop(TIP, PAPER_LAW, gap=3e-3)])
     model = scene.reduce(1)
     special = model.branch("omega", span=(90.0, 150.0)).run().special
     grazing, fold = (max(one.parameter for one in special if one.mark == kind) for kind in ("grazing", "fold"))
@@ -74,11 +71,8 @@ def test_sweeps_over_a_branch_jump_at_its_folds():
 @pytest.mark.parametrize(("start", "end"), [(60.0, 160.0), (160.0, 60.0)])
 def test_a_slow_sweep_finds_the_resonance_up_and_down(start, end):
     """|ω̇| = 0.06 (ζω)²: the maximum is that of steady motion to 1 %."""
-    beam = fb.Beam(0.2599, fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12))
     sweep = fb.SineSweep(1e-4, start, end, 60.0)
-    supports, mass = [fb.Clamped(0.0)], [fb.LumpedMass(0.24445, 25.4e-3, 3e-6)]
-    scene = fb.Scene(beam, supports, mass, damping=fb.ModalDamping(0.05), base=sweep)
-    model = scene.reduce(1)
+    model = replace(paper_scene(sweep, 0.05), stops=[]).reduce(1)
     run = model.simulate(60.0, 1e-3)
     steady = 1e-4 * model.frequency_response(np.linspace(60.0, 160.0, 2001), output=0.24445).amplitude
     assert np.abs(run.displacement(0.24445)).max() == pytest.approx(steady.max(), rel=1e-2)

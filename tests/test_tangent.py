@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from oscillators import Tone
 from scipy.linalg import expm
 
 from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, Viscoelastic, law
@@ -17,19 +18,6 @@ LAWS = {
     "kelvin_voigt": KelvinVoigt(2e5, 30.0),
     "piecewise": PiecewiseLinear([1e5, 4e5], knots=[2e-5]),
 }
-
-
-class Tone:
-    """a cos ωt, as a tone."""
-
-    def __init__(self, amplitude, omega):
-        self.amplitude, self.omega = amplitude, omega
-
-    def __call__(self, t):
-        return self.amplitude * np.cos(self.omega * np.asarray(t))
-
-    def tones(self):
-        return np.array([self.omega]), np.array([self.amplitude + 0j])
 
 
 def beam(n=2, law=LAWS["hysteretic"], amplitude=40.0, omega=195.0, gap=0.0, opposite=None, sampled=False, zeta=1.0):

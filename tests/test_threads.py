@@ -17,7 +17,7 @@ from fembeam import BandNoise, Harmonic
 from solvers import Contact, System
 from solvers.exponential import block_tables
 from solvers.exponential.preparation import prepare_system
-from solvers.problem import Memo, hand_over
+from solvers.problem import Memo, forcing_of
 
 THREADS = 8
 WATCHED = "preparation.py", "tables.py", "system.py", "memo.py"
@@ -93,7 +93,7 @@ def test_runs_at_once_on_one_system_are_those_one_after_the_other():
 
 def test_no_thread_gets_the_tables_of_anothers_grid():
     shared = system(loads=[shake])
-    forcings = [hand_over([shake], duration, 1e-8) for duration in (0.02, 0.03)]
+    forcings = [forcing_of([shake], duration, 1e-8) for duration in (0.02, 0.03)]
     asked = [(i % 3 % 2,) for i in range(1600)]
     found = at_once(lambda i: float(prepare_system(shared, forcings[i]).problem.value.table_dt[0]), asked)
     assert [i for i, (key,) in enumerate(asked) if found[i] != forcings[key].table_dt[0]] == []

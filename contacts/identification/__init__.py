@@ -10,5 +10,3 @@ from contacts.identification.loop_result import IdentifiedLoop
 from contacts.identification.loops import identify_loop
 from contacts.identification.records import read_collisions
 from contacts.identification.result import Estimate, Identified
-
-__all__ = ["Estimate", "Identified", "IdentifiedLoop", "identify", "identify_loop", "read_collisions"]

@@ -44,7 +44,7 @@ class Measured:
 
 
 class Fit:
-    """Least squares in θ = (parameters of the model, [F₀,] memory at the begin of every record)."""
+    """Least squares in θ = (parameters of the model, [F₀,] memory at the start of every record)."""
 
     def __init__(self, measured: Measured, model: Model, start: Vector, most: int = 100) -> None:
         from scipy.optimize import least_squares
@@ -53,11 +53,11 @@ class Fit:
         if measured.count < len(start) + 4:
             raise ValueError(
                 f"the records have {measured.count} samples, at least {len(start) + 4} are needed for the {len(start)} "
-                "numbers to be found, memory at the begin of each record included"
+                "numbers to be found, memory at the start of each record included"
             )
         low, high = (
-            np.append(ends, np.full(len(start) - model.main, way * np.inf))
-            for way, ends in zip((-1, 1), model.ends, strict=True)
+            np.append(ends, np.full(len(start) - model.main, sign * np.inf))
+            for sign, ends in zip((-1, 1), model.ends, strict=True)
         )
         done = least_squares(self.residual, start, self.jacobian, (low, high), x_scale="jac", max_nfev=most, **_TIGHT)
         self.theta, self.slopes = done.x, done.jac

@@ -138,9 +138,9 @@ class Smooth:
         law, force = BoucWen(1.0, 0.0, 1.0, 1.0, 0.0), np.empty(loop.x.size)
         for a, b in loop.runs:
             points = loop.x[a : b + 1]
-            way = 1.0 if points[-1] >= points[0] else -1.0
-            row[6:] = way, points[0], z
-            force[a : b + 1] = law.batch(1.0, row)(points, np.full(points.size, way))
+            direction = 1.0 if points[-1] >= points[0] else -1.0
+            row[6:] = direction, points[0], z
+            force[a : b + 1] = law.batch(1.0, row)(points, np.full(points.size, direction))
             z = (force[b] - elastic * points[-1]) / c
         return force
 
@@ -148,7 +148,7 @@ class Smooth:
         """(k, main + states) derivatives of the forces, by differences."""
         all_of, columns = np.append(theta, state), []
         for i, step in enumerate(1e-6 * np.maximum(np.abs(all_of), 1e-2)):
-            ends = [all_of + way * step * (np.arange(all_of.size) == i) for way in (-1.0, 1.0)]
+            ends = [all_of + sign * step * (np.arange(all_of.size) == i) for sign in (-1.0, 1.0)]
             behind, ahead = (self.force(end[: self.main], end[self.main :], loop) for end in ends)
             columns.append((ahead - behind) / (2.0 * step))
         return np.column_stack(columns)

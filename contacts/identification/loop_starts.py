@@ -11,7 +11,7 @@ from contacts.identification.loop_models import Loop, Sliders, Smooth, extension
 from contacts.identification.records import Vector
 
 _WIDTHS = np.geomspace(0.01, 1.9, 30)  # half ranges of the displacement at which a further slider is tried
-_BEGINS = (-0.7, 0.0, 0.7)  # shares of its limit that it may carry at the begin of a record
+_LOADS_AT_START = (-0.7, 0.0, 0.7)  # shares of its limit that it may carry at the start of a record
 _WIDER = 0.2  # logarithm of the widths' ratio of further starts
 _UNLIKELY = 1e-5  # chance that noise alone explains as much as a further slider
 
@@ -69,15 +69,15 @@ def _no_slip(measured: Measured, slope: float, squares: float) -> str:
 
 
 class _Tried:
-    """Sliders of many widths and begins; which together explain most, stiffnesses by linear least squares."""
+    """Sliders of many widths and starting loads: which together explain most, stiffnesses by linear least squares."""
 
     def __init__(self, measured: Measured, spring: bool) -> None:
         self.measured, self.spring = measured, spring
         settled = [[_settled(loop, width) for loop in measured.loops] for width in _WIDTHS]
-        same = np.outer(_BEGINS, np.ones(len(measured.loops)))
-        self.widths = np.repeat(_WIDTHS, 1 + len(_BEGINS))
-        self.begins = np.concatenate([[own, *same] for own in settled])  # shares of the limit
-        each = [extensions(x, self.widths, self.widths * b) for x, b in zip(measured.loops, self.begins.T, strict=True)]
+        same = np.outer(_LOADS_AT_START, np.ones(len(measured.loops)))
+        self.widths = np.repeat(_WIDTHS, 1 + len(_LOADS_AT_START))
+        self.loads = np.concatenate([[own, *same] for own in settled])  # shares of the limit
+        each = [extensions(x, self.widths, self.widths * b) for x, b in zip(measured.loops, self.loads.T, strict=True)]
         linear = [np.concatenate([loop.x for loop in measured.loops])] * spring
         self.fixed = list(range(self.widths.size, self.widths.size + spring + measured.offset))
         columns = np.vstack((*[np.concatenate(each, axis=1)], *linear, *[np.ones(measured.count)] * measured.offset))
@@ -108,9 +108,9 @@ class _Tried:
 
     def starts(self, chosen: list[int]) -> list[Vector]:
         """θ of these sliders, and with one of them wider or narrower: whether cycles slip makes many minima."""
-        weights, begins = self.weights(chosen), np.arcsin(self.begins[chosen]).T.ravel()
+        weights, loads = self.weights(chosen), np.arcsin(self.loads[chosen]).T.ravel()
         stiffness, count = np.maximum(weights[: len(chosen)], 1e-6), len(chosen)
-        theta = np.concatenate((np.log(stiffness), np.log(self.widths[chosen]), weights[count:], begins))
+        theta = np.concatenate((np.log(stiffness), np.log(self.widths[chosen]), weights[count:], loads))
         other = np.arange(theta.size) == np.arange(count, 2 * count)[:, None]
         return [theta, *(theta + _WIDER * other), *(theta - _WIDER * other)]
 

@@ -59,25 +59,25 @@ def motion_of(samples: Samples, offset: float, exponent: float, damping_factor: 
 
 
 def _rate_at_surface(
-    delta: Vector, delta_dot: Vector, offset: float, exponent: float, damping_factor: float, way: int
+    delta: Vector, delta_dot: Vector, offset: float, exponent: float, damping_factor: float, direction: int
 ) -> tuple[float, float]:
     """|δ̇| at the surface on the way in (1) or out (-1), and its standard error.
 
     A free mass has δ̇ = δ̇_surface × S(y), y = (x/x_max)^{p+1}, with the S of `_swing`; fitted to the outer half of the
     branch, with a term S y for what else acts on the structure where the samples suffice.
     """
-    x, rate = delta - offset, way * delta_dot
+    x, rate = delta - offset, direction * delta_dot
     top = int(np.argmax(x))
-    branch = np.arange(len(x)) <= top if way > 0 else np.arange(len(x)) >= top
+    branch = np.arange(len(x)) <= top if direction > 0 else np.arange(len(x)) >= top
     near = branch & (x > 0.0) & (x < 0.8 * x[top]) & (rate > 0.0)
     count = int(np.count_nonzero(near))
     if count < 2:
         raise ValueError(
-            f"a collision has {count} samples that move {'in' if way > 0 else 'out'}; delta_dot must be the rate of "
-            "delta, and samples dense enough to tell the speeds at its ends"
+            f"a collision has {count} samples that move {'in' if direction > 0 else 'out'}; delta_dot must be the rate "
+            "of delta, and samples dense enough to tell the speeds at its ends"
         )
     y = (x[near] / x[top]) ** (exponent + 1.0)
-    shape = _swing(y, way * damping_factor)
+    shape = _swing(y, direction * damping_factor)
     A = np.column_stack((shape, shape * y)) if count >= 6 else shape[:, None]
     found, *_ = np.linalg.lstsq(A, rate[near], rcond=None)
     left = A @ found - rate[near]
@@ -103,8 +103,8 @@ def _smoothed(samples: Samples, offset: float, exponent: float, damping_factor: 
     first, last = _in_contact(samples.delta, offset)
     A, B, found, covariance, freedom = _polynomial(samples, first, last)
 
-    def ends(coefficients: NDArray[Any], way: int) -> float:
-        return _rate_at_surface(A @ coefficients, B @ coefficients, offset, exponent, damping_factor, way)[0]
+    def ends(coefficients: NDArray[Any], direction: int) -> float:
+        return _rate_at_surface(A @ coefficients, B @ coefficients, offset, exponent, damping_factor, direction)[0]
 
     basis = np.zeros((3, len(samples.delta), len(found)))
     basis[0, first:last], basis[1, first:last] = A, B

@@ -12,16 +12,3 @@ from contacts.memory.custom import Border, CustomMemoryLaw, Segment, memory_law
 from contacts.memory.friction import Coulomb, ElastoPlastic, Jenkins
 from contacts.memory.iwan import Iwan
 from contacts.memory.walton_braun import WaltonBraun
-
-__all__ = [
-    "Border",
-    "BoucWen",
-    "Coulomb",
-    "CustomMemoryLaw",
-    "ElastoPlastic",
-    "Iwan",
-    "Jenkins",
-    "Segment",
-    "WaltonBraun",
-    "memory_law",
-]

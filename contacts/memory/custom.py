@@ -222,11 +222,11 @@ def _check_cycles(law: CustomMemoryLaw) -> None:
         largest = np.abs(law.along(path)).max()
         for before, after in pairwise(walk(law, path)):
             left, right = (law.batch(1.0, one.parameters) for one in (before, after))
-            at, rate = np.array([after.begin]), np.array([after.rate])
+            at, rate = np.array([after.start]), np.array([after.rate])
             jump = float((right(at, rate) - left(at, rate))[0])
             if not law.jumps and not abs(jump) <= JUMP * largest:
                 names = [law.events[int(one.parameters[0])] for one in (before, after)]
                 raise ValueError(
                     f"force of law {law.name!r} jumps by {jump:.6g} N from {names[0]!r} to {names[1]!r} at δ = "
-                    f"{after.begin:.6g} m; if it is to, declare it with jumps=True, else correct what is latched there"
+                    f"{after.start:.6g} m; if it is to, declare it with jumps=True, else correct what is latched there"
                 )

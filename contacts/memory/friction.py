@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from contacts.law import Law, number
 
 Slider = tuple[float, float, float, float]
-PART = 6  # numbers per slider (k, f, f_s, c, code, s); as in the kernels
+SLIDER_SIZE = 6  # numbers per slider (k, f, f_s, c, code, s); as in the kernels
 
 
 class Sliders(Law):
@@ -50,7 +50,7 @@ class Sliders(Law):
     @property
     def memory(self) -> tuple[int, ...]:  # type: ignore[override]
         """Code and place of every slider."""
-        return tuple(2 + PART * j + place for j in range(self.borders) for place in (4, 5))
+        return tuple(2 + SLIDER_SIZE * j + place for j in range(self.borders) for place in (4, 5))
 
     @property
     def parameters(self) -> NDArray[np.float64]:
@@ -59,7 +59,7 @@ class Sliders(Law):
 
     def stored(self, delta: float, parameters: NDArray[np.float64]) -> float:
         """Energy of the springs, F²/2k each, J."""
-        k, f, _, _, code, s = parameters[2:].reshape(-1, PART).T
+        k, f, _, _, code, s = parameters[2:].reshape(-1, SLIDER_SIZE).T
         force = np.where(code == 0.0, k * (delta - s), f)
         return float(0.5 * parameters[1] * delta**2 + np.sum(0.5 * force**2 / k))
 

@@ -11,8 +11,8 @@ from numba import cfunc, njit
 from contacts.kernels import GRADIENT, SIGNATURE, compiled
 from contacts.sum_kernels import RENEW, RENEW_GRADIENT
 
-PART = 6
-STIFFNESS, LIMIT, STATIC, DAMPING, CODE, SLIDER = range(PART)
+SLIDER_SIZE = 6
+STIFFNESS, LIMIT, STATIC, DAMPING, CODE, SLIDER = range(SLIDER_SIZE)
 STICK, SLIP = range(2)  # events
 
 
@@ -28,7 +28,7 @@ def sliders(n, delta, delta_dot, entry_rate, parameters, force):
     for i in range(n):
         force[i] = parameters[1] * delta[i]
     for j in range(int(parameters[0])):
-        at = 2 + PART * j
+        at = 2 + SLIDER_SIZE * j
         code = parameters[at + CODE]
         for i in range(n):
             slip = code * parameters[at + LIMIT]
@@ -40,7 +40,7 @@ def sliders_gradient(n, delta, delta_dot, entry_rate, parameters, by_delta, by_r
     """Derivatives of `sliders`: those of the sliders that stick."""
     k, c = parameters[1], 0.0
     for j in range(int(parameters[0])):
-        at = 2 + PART * j
+        at = 2 + SLIDER_SIZE * j
         if parameters[at + CODE] == 0.0:
             k += parameters[at + STIFFNESS]
             c += parameters[at + DAMPING]
@@ -52,7 +52,7 @@ def sliders_gradient(n, delta, delta_dot, entry_rate, parameters, by_delta, by_r
 def sliders_borders(n, delta, delta_dot, entry_rate, parameters, values):
     """One per slider: what is left to its limit, or the rate in the direction of its slip."""
     for j in range(int(parameters[0])):
-        at = 2 + PART * j
+        at = 2 + SLIDER_SIZE * j
         code = parameters[at + CODE]
         for i in range(n):
             left = parameters[at + STATIC] - abs(_sticking(parameters, at, delta[i], delta_dot[i]))
@@ -62,7 +62,7 @@ def sliders_borders(n, delta, delta_dot, entry_rate, parameters, values):
 @compiled(cfunc, RENEW)
 def sliders_renew(j, delta, delta_dot, entry_rate, parameters):
     """Let slider j go, or hold it where it is."""
-    at = 2 + PART * j
+    at = 2 + SLIDER_SIZE * j
     code = parameters[at + CODE]
     if code == 0.0:
         parameters[at + CODE] = math.copysign(1.0, _sticking(parameters, at, delta, delta_dot))
@@ -76,7 +76,7 @@ def sliders_renew(j, delta, delta_dot, entry_rate, parameters):
 def sliders_memory_gradient(n, delta, delta_dot, entry_rate, parameters, by_memory):
     """Derivatives of `sliders` by code (none) and place of every slider."""
     for j in range(int(parameters[0])):
-        at = 2 + PART * j
+        at = 2 + SLIDER_SIZE * j
         for i in range(n):
             by_memory[2 * j * n + i] = 0.0
             by_memory[(2 * j + 1) * n + i] = -parameters[at + STIFFNESS] if parameters[at + CODE] == 0.0 else 0.0
@@ -91,5 +91,5 @@ def sliders_renew_gradient(j, delta, delta_dot, entry_rate, parameters, out):
         out[i] = 0.0
     for p in range(count):
         row = (2 * p + 1) * width
-        held = p == j and parameters[2 + PART * p + CODE] != 0.0
+        held = p == j and parameters[2 + SLIDER_SIZE * p + CODE] != 0.0
         out[row if held else row + 2 * p + 3] = 1.0

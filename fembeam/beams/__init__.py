@@ -26,27 +26,3 @@ from fembeam.beams.mesh import (
     wavenumber,
 )
 from fembeam.beams.section import Section, Taper
-
-__all__ = [
-    "ERROR_CONSTANT",
-    "FREQUENCY_TOLERANCE",
-    "SAME_PLACE",
-    "SHORTEST",
-    "WAVE_STEP",
-    "Beam",
-    "ModalDamping",
-    "Rayleigh",
-    "Section",
-    "Taper",
-    "bending_matrices",
-    "bending_root",
-    "divided",
-    "element_matrices",
-    "geometric_stiffness",
-    "hermite_rows",
-    "joining",
-    "on_beam",
-    "slowness",
-    "spread",
-    "wavenumber",
-]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import sys
 import warnings
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fembeam import __version__  # nothing slow up here: Ctrl-C before `main` would print a traceback
@@ -39,7 +40,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
         warned.clear()
         write_anywhere()
-        with interrupts.listening():
+        with interrupts.handling():
             arguments = _parser().parse_args(argv)
             with warnings.catch_warnings():
                 warnings.simplefilter("default", UserWarning)
@@ -61,7 +62,7 @@ def _failed(error: Exception) -> int:
     """Say what is wrong; a traceback is for faults of this library only."""
     from fembeam.support import interrupts
 
-    if interrupts.heard():  # a compiler that is stopped in the middle raises what it likes
+    if interrupts.received():  # a compiler that is stopped in the middle raises what it likes
         say("interrupted; files that were written are whole")
         return interrupted()
     if isinstance(error, OSError) and error.filename is None:  # a full disk behind stdout
@@ -75,7 +76,6 @@ def _failed(error: Exception) -> int:
 def _parser() -> argparse.ArgumentParser:
     """Commands and options."""
     import argparse
-    from pathlib import Path
 
     parser = argparse.ArgumentParser(
         prog="fembeam",
@@ -85,35 +85,50 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"fembeam {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-
-    def command(name: str, does: Any, about: str, scene: bool = True) -> argparse.ArgumentParser:
-        made = commands.add_parser(name, help=about, description=about)
-        made.set_defaults(command=does)
-        if scene:
-            made.add_argument("scene", metavar="SCENE", type=Path, help="scene file, or a run.npz that came from one")
-            made.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], help="change one value, "
-                              "such as simulate.duration=10 or stops[0].gap=1e-3; may be repeated")  # fmt: skip
-            made.add_argument("--json", action="store_true", help="print JSON instead of tables")
-        return made
-
-    new = command("new", _new, "write an annotated scene file to begin with", scene=False)
+    new = _command(commands, "new", _new, "write an annotated scene file to begin with")
     new.add_argument("path", metavar="SCENE", type=Path)
-    look = command("check", _check, "tell what a scene is: modes, contacts to expect, steps to take, doubtful units")
-    modes = command("modes", _modes, "print natural frequencies, damping, participation")
-    for each in (look, modes):
+    _scene_commands(commands)
+    _results_commands(commands)
+    _command(commands, "schema", _schema, "print the JSON Schema of scene files")
+    complete = _command(commands, "completion", _completion, "print what a shell completes commands and options by")
+    complete.add_argument("shell", choices=["bash", "zsh", "tcsh"])
+    return parser
+
+
+def _command(commands: Any, name: str, does: Any, about: str) -> argparse.ArgumentParser:
+    """A command that takes no scene file."""
+    made: argparse.ArgumentParser = commands.add_parser(name, help=about, description=about)
+    made.set_defaults(command=does)
+    return made
+
+
+def _scene_commands(commands: Any) -> None:
+    """Commands that read a scene file."""
+    check = _command(commands, "check", _check,
+                     "tell what a scene is: modes, contacts to expect, steps to take, doubtful units")  # fmt: skip
+    modes = _command(commands, "modes", _modes, "print natural frequencies, damping, participation")
+    about = "run the file's studies; write tables, figures, report.html and, for [simulate], run.npz"
+    run = _command(commands, "run", _run, about)
+    for each in (check, modes, run):
+        each.add_argument("scene", metavar="SCENE", type=Path, help="scene file, or a run.npz that came from one")
+        each.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], help="change one value, "
+                          "such as simulate.duration=10 or stops[0].gap=1e-3; may be repeated")  # fmt: skip
+        each.add_argument("--json", action="store_true", help="print JSON instead of tables")
+    for each in (check, modes):
         each.add_argument("--modes", metavar="N", type=int, help=f"how many; default: [reduce], else {MODES_SHOWN}")
-    run = command(
-        "run", _run, "run the file's studies; write tables, figures, report.html and, for [simulate], run.npz"
-    )
     run.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder for the results")
     run.add_argument("--resume", action="store_true", help="go on in DIR: keep the studies that are finished for this "
                      "scene, go on with [ensemble] and [branch]; without it all is computed anew")  # fmt: skip
     run.add_argument("--quiet", action="store_true", help="no progress, no log")
-    compare = command("compare", _compare, "compare the results in two folders", scene=False)
+
+
+def _results_commands(commands: Any) -> None:
+    """Commands that read what `run` has written."""
+    compare = _command(commands, "compare", _compare, "compare the results in two folders")
     compare.add_argument("folders", metavar="DIR", type=Path, nargs=2)
     compare.add_argument("--out", metavar="DIR", type=Path, help="folder for overlaid figures")
     compare.add_argument("--json", action="store_true", help="print JSON instead of a table")
-    export = command("export", _export, "write a saved run as CSV: histories and contacts", scene=False)
+    export = _command(commands, "export", _export, "write a saved run as CSV: histories and contacts")
     export.add_argument("run", metavar="RUN", type=Path, help="run.npz, or a run saved as HDF5")
     export.add_argument("--out", metavar="DIR", type=Path, required=True)
     export.add_argument("--stride", metavar="N", type=int, default=1, help="keep every N-th sample")
@@ -121,10 +136,6 @@ def _parser() -> argparse.ArgumentParser:
                         help="z in m; default: those in the scene file's [simulate], else usual ones")  # fmt: skip
     export.add_argument("--quantities", metavar="NAME", nargs="+", help="such as displacement, stress, reactions, "
                         "'absolute acceleration'; an unknown one lists all; default: as for places")  # fmt: skip
-    command("schema", _schema, "print the JSON Schema of scene files", scene=False)
-    complete = command("completion", _completion, "print what a shell completes commands and options by", scene=False)
-    complete.add_argument("shell", choices=["bash", "zsh", "tcsh"])
-    return parser
 
 
 def _new(arguments: argparse.Namespace) -> int:
@@ -147,8 +158,6 @@ def _schema(_: argparse.Namespace) -> int:
 
 def _completion(arguments: argparse.Namespace) -> int:
     """The command `completion`, by shtab: it reads the parser once, where argcomplete starts Python at every key."""
-    from pathlib import Path
-
     from solvers.problem import optional
 
     shtab, parser = optional("shtab", "shell completion"), _parser()

@@ -54,4 +54,4 @@ def interrupted() -> int:
 
     from fembeam.support import interrupts
 
-    return TERMINATED if interrupts.heard() == signal.SIGTERM else INTERRUPTED
+    return TERMINATED if interrupts.received() == signal.SIGTERM else INTERRUPTED

@@ -55,10 +55,10 @@ def run(job: Job) -> int:
     if not studies:
         raise ValueError(f"{job.file.path}: needs a study, such as a table [simulate] with duration and dt")
     if not job.resume:
-        _refuse_to_lose(job, studies)
+        _check_checkpoints(job, studies)
     code, found, files = 0, {}, []
     for name in studies:
-        outcome = _studied(job, name)
+        outcome = _done_study(job, name)
         if outcome.text and not job.json:
             print(outcome.text)
         code, found[name] = code or outcome.code, outcome.found
@@ -69,15 +69,15 @@ def run(job: Job) -> int:
         code = _report(job, files) or code
     if job.json:
         report.print_json(found)
-    return code or (interrupted() if interrupts.heard() else 0)
+    return code or (interrupted() if interrupts.received() else 0)
 
 
-def _refuse_to_lose(job: Job, studies: list[str]) -> None:
+def _check_checkpoints(job: Job, studies: list[str]) -> None:
     """Refuse to overwrite checkpoints, which hold hours of work."""
     for name in studies:
         path = job.folder / f"{name}.npz"
         if hasattr(job.file.studies[name], "write") and path.exists():
-            raise ValueError(f"{path} holds results of [{name}]: add --resume to continue, delete it to begin "
+            raise ValueError(f"{path} holds results of [{name}]: add --resume to continue, delete it to started "
                              "anew, or choose another folder")  # fmt: skip
 
 
@@ -100,13 +100,13 @@ def _warnings(job: Job, files: list[Path]) -> list[str]:
     return list(dict.fromkeys([*before, *warned]))
 
 
-def _studied(job: Job, name: str) -> Outcome:
+def _done_study(job: Job, name: str) -> Outcome:
     """One study, kept or computed, its end recorded."""
     scene = folders.digest(job.file, name)
     if job.resume and (files := folders.kept(job.folder, name, scene)):
         if not job.quiet:
             say(f"[{name}] is done already; its results are kept")
-        return _known(job, name, files)
+        return _kept_results(name, files)
     try:
         folders.record(job.folder, name, scene, [])
         outcome = _simulation(job) if name == "simulate" else _computed(job, name)
@@ -115,19 +115,19 @@ def _studied(job: Job, name: str) -> Outcome:
     except OSError as error:
         return _unwritten(error)
     except KeyboardInterrupt:
-        say(f"interrupted in [{name}]; files that were written are whole" + _goes_on(job, name))
+        say(f"interrupted in [{name}]; files that were written are whole" + _how_to_resume(job, name))
         return Outcome(interrupted(), last=True)
-    if interrupts.heard():
+    if interrupts.received():
         outcome.code, outcome.last = outcome.code or interrupted(), True
     return outcome
 
 
-def _goes_on(job: Job, name: str) -> str:
+def _how_to_resume(job: Job, name: str) -> str:
     """How to go on."""
     return f"; --resume goes on from {name}.npz" if (job.folder / f"{name}.npz").exists() else ""
 
 
-def _known(job: Job, name: str, files: list[Path]) -> Outcome:
+def _kept_results(name: str, files: list[Path]) -> Outcome:
     """What a finished study left."""
     known = {path.name: path for path in files}
     found = json.loads(known["summary.json" if name == "simulate" else f"{name}.json"].read_text(encoding="utf-8"))
@@ -151,7 +151,7 @@ def _computed(job: Job, name: str) -> Outcome:
         result, code = error.evidence, FAILED
         say(f"error: {one_line(error)}")
     except (solvers.SolverError, RuntimeError) as error:
-        if interrupts.heard():  # a compiler that is stopped in the middle raises what it likes
+        if interrupts.received():  # a compiler that is stopped in the middle raises what it likes
             raise KeyboardInterrupt from error
         say(f"error: [{name}]: {one_line(error)}")
         return Outcome(FAILED)
@@ -175,7 +175,7 @@ def _computed(job: Job, name: str) -> Outcome:
 
 def _simulation(job: Job) -> Outcome:
     """The study [simulate]."""
-    begin, study = time.perf_counter(), job.file.studies["simulate"]
+    started, study = time.perf_counter(), job.file.studies["simulate"]
     model = reduced(job.file, **job.file.reduce)
     if not job.quiet:
         say(f"{len(model.omega)} modes: " + ", ".join(f"{w:.6g}" for w in model.omega) + " rad/s")
@@ -185,7 +185,7 @@ def _simulation(job: Job) -> Outcome:
         except (ValueError, TypeError, ArithmeticError, MemoryError) as error:
             say(f"error: {_placed(job.file, '[simulate]', error)}")
             return Outcome(BAD_INPUT)
-        found = report.summary(done, study.discard, time.perf_counter() - begin, study.outputs)
+        found = report.summary(done, study.discard, time.perf_counter() - started, study.outputs)
         outcome = Outcome(code, found, report.text(found))
         try:
             found = {**found, "warnings": list(warned)}
@@ -196,7 +196,7 @@ def _simulation(job: Job) -> Outcome:
     if code:
         say(f"{done.status}; wrote what was computed to {job.folder}")
     elif not job.quiet:
-        spent = f"{done.cost.seconds:.3g} s of {time.perf_counter() - begin:.3g} s"
+        spent = f"{done.cost.seconds:.3g} s of {time.perf_counter() - started:.3g} s"
         say(f"{len(done.contacts)} contacts in {done.t[-1]:g} s, integrated in {spent}")
         _wrote(job, outcome.files)
     return outcome

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fembeam.scene import lasting, signals_of
+from fembeam.scene import persistent_drive, signals_of
 
 if TYPE_CHECKING:
     from fembeam.beams import Beam
@@ -115,7 +115,7 @@ def of_study(file: SceneFile, model: Model) -> list[str]:
                      f"take {math.pi / (2 * fastest):.1g} s or less")  # fmt: skip
     decay = model.zeta * model.omega
     slowest = float(decay[decay > 0].min()) if np.any(decay > 0) else math.inf
-    if study.discard < 3 / slowest < 0.5 * study.duration and lasting(file.scene):
+    if study.discard < 3 / slowest < 0.5 * study.duration and persistent_drive(file.scene):
         found.append(
             f"discard = {study.discard:g} s keeps the transient in statistics: it lasts about {3 / slowest:.2g} s"
         )

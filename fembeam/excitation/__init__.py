@@ -12,16 +12,3 @@ from fembeam.excitation.pulses import Pulse, Step
 from fembeam.excitation.record import Interpolation, Quantity, Record
 from fembeam.excitation.sweep import SineSweep
 from fembeam.excitation.tones import Harmonic, Multisine
-
-__all__ = [
-    "BandNoise",
-    "Harmonic",
-    "Interpolation",
-    "Multisine",
-    "Pulse",
-    "Quantity",
-    "Record",
-    "RollOff",
-    "SineSweep",
-    "Step",
-]

@@ -252,25 +252,8 @@ class Record:
 
             rms(error) <= dt^6/√13! rms(s^(6)) <= rtol rms(s - straight line)
 
-        Parameters
-        ----------
-        duration : float
-            The grid covers [0, duration], in s; at most the length of the record.
-        rtol : float
-            Rms error of the quintic Hermite interpolant relative to that of the record, in [1e-13, 1). Linear: of
-            its spectrum, see `polyline`.
-
-        Returns
-        -------
-        dt : float
-            Step in s.
-        values : array, shape (N, 3)
-            Rows [s, s', s''] at t = j dt.
-
-        Raises
-        ------
-        ValueError
-            duration beyond the record, or rtol out of range.
+        Arguments and results are those of `BandNoise.nodes`; the duration is at most the length of the record, and with
+        linear interpolation the error is that of its spectrum, see `polyline`.
         """
         self.lasting(duration)
         lines, c_0, c_1 = self._spectrum

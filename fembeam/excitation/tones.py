@@ -21,11 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fembeam.excitation.line_spectrum import checked_order
-from fembeam.excitation.noise import BandNoise
-from fembeam.excitation.record import Record
 from fembeam.support import frozen, number
-
-__all__ = ["BandNoise", "Harmonic", "Multisine", "Record"]
 
 Tones = tuple[NDArray[np.float64], NDArray[np.complex128]]
 MOST_SHOWN = 8  # numbers of a kind in a repr
@@ -175,7 +171,7 @@ def _quarter_turns(order: int) -> tuple[float, float]:
 def _checked_column(name: str, values: ArrayLike) -> NDArray[np.float64]:
     """A read-only one-dimensional finite array, or an error that names the first bad entry."""
     try:
-        column = frozen(np.atleast_1d(np.asarray(values, dtype=np.float64)))
+        column = frozen(np.atleast_1d(values))
     except (TypeError, ValueError):
         raise ValueError(f"{name} must be a list of numbers, got {values!r}") from None
     if column.ndim != 1:

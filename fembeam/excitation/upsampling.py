@@ -7,7 +7,7 @@ m != 0. At four points or more to the period of the highest line, θ <= π/2, th
 the second derivative: rounding. Derivatives of s are those of φ. The sums over l are products of matrices: a block of
 samples times all that a unit sample gives at the grid's points around it.
 
-Source: W. Fessler and B. Sutton, IEEE Trans. Signal Process. 51 (2003) 560, section IV (Kaiser and Bessel's kernel).
+Source: J. A. Fessler and B. P. Sutton, IEEE Trans. Signal Process. 51 (2003) 560, section IV (Kaiser–Bessel kernel).
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """What is computed from a scene: reduction, initial states, runs, orbits, branches, section forces.
 
 `reduce` makes a `model`; that gives a `run`, an `orbit` or a `branch`, saved and exported by the files around them.
-Imports: `scene` and the rooms below, `reduction`, `solvers`; `Run.scene_file` opens the door to `fembeam.scene_file`.
-Begin with `model`.
+Imports: `scene`, `response` and what they import, `reduction`, `solvers`; inside the method `Run.scene_file` also
+`fembeam.scene_file`. Begin with `model`.
 """
 
 from fembeam.model.branch import Branch
@@ -13,17 +13,3 @@ from fembeam.model.run import Run
 from fembeam.model.run_file import load
 from fembeam.model.shapes import Shapes
 from fembeam.model.watched_places import observed, places
-
-__all__ = [
-    "Attractor",
-    "Branch",
-    "Model",
-    "Orbit",
-    "Run",
-    "Shapes",
-    "extremes_of",
-    "load",
-    "load_period",
-    "observed",
-    "places",
-]

@@ -102,13 +102,13 @@ class Branch(Printed):
     @property
     def status(self) -> str:
         """How each direction ended, as sentences."""
-        return "; ".join(status.value for status in self.found.status)
+        return "; ".join(self.found.endings)
 
     @property
     def ends(self) -> list[tuple[Orbit, str]]:
         """The last orbit of each direction, and in words how it ended."""
-        pairs = zip(self.found.walks, self.found.status, strict=False)
-        return [(self._orbit(walk.orbits[-1]), status.value) for walk, status in pairs]
+        pairs = zip(self.found.walks, self.found.endings, strict=False)
+        return [(self._orbit(walk.orbits[-1]), words) for walk, words in pairs]
 
     @property
     def parameter(self) -> Vector:

@@ -33,8 +33,8 @@ MOST_STEPS = 2000
 def rest(model: ModalEquations) -> Vector:
     """[q, q_dot] (2n,): zero but for the impactors' velocities."""
     start = np.zeros(2 * len(model.omega))
-    if strikers := model.matrices.impactors:
-        start[-len(strikers) :] = [np.sqrt(impactor.mass) * impactor.velocity for impactor in strikers]
+    if impactors := model.matrices.impactors:
+        start[-len(impactors) :] = [np.sqrt(impactor.mass) * impactor.velocity for impactor in impactors]
     return start
 
 
@@ -48,11 +48,11 @@ def state(model: Model, displacement: Field | Sequence[Field], velocity: Field |
         if lost > MISSED:
             warnings.warn(f"{lost:.1%} of the {name} (mass norm) in Model.state is not represented by the kept modes; "
                           "keep more modes", UserWarning, stacklevel=3)  # fmt: skip
-    _check_strikers(model, start[:n])
+    _check_impactors(model, start[:n])
     return start
 
 
-def begun(model: Model, start: ArrayLike) -> tuple[Vector, Vector, tuple[Vector, ...]]:
+def split_start(model: Model, start: ArrayLike) -> tuple[Vector, Vector, tuple[Vector, ...]]:
     """q, q̇ and, where given, what each law has latched, of a start (2n,) or the (2n + l,) of `Run.end`."""
     x, n = np.asarray(start, dtype=float), len(model.omega)
     sizes = [len(getattr(one.law, "memory", ())) for one in model.contact_rows]
@@ -98,7 +98,7 @@ def _on_nodes(beam: Matrices, field: Field) -> Vector:
     return both[beam.dofs >= 0]
 
 
-def _check_strikers(model: Model, q: Vector) -> None:
+def _check_impactors(model: Model, q: Vector) -> None:
     """Raise ValueError when a field puts a free impactor inside the beam."""
     for contact, direction in zip(model.contact_rows, model.directions, strict=True):
         kind, number = contact.on

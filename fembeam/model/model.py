@@ -190,7 +190,7 @@ class Model(Printed, ModalEquations):
         from fembeam.support import bar
 
         require_no_text("Model.simulate", duration=duration, dt=dt, start=start)
-        q, q_dot, memory = initial_states.begun(self, self.rest() if start is None else start)
+        q, q_dot, memory = initial_states.split_start(self, self.rest() if start is None else start)
         lasting = self.lasting(duration) if 0.0 < duration < np.inf else self
         with bar(duration, progress) as report:
             solution = solvers.integrate(

@@ -1,6 +1,6 @@
 """Periodic motions of a model: found by shooting, or all that a set of starts settles to.
 
-The load's own period is that of its tones, 2π/ω for one of them; an orbit of period k repeats after k of these, so
+The load's own period T is that of its tones, 2π/ω for one of them; an orbit of period k repeats after k of these, so
 k = 2 is a 1/2 subharmonic.
 """
 
@@ -19,11 +19,8 @@ import solvers
 from fembeam.model.equations import load_period
 from fembeam.scene import unit_of
 from fembeam.support import Part, Printed, is_whole, require
-from solvers.orbits import periodic_orbit as periodic
-from solvers.orbits import shooting
-from solvers.orbits import shots as chain
-from solvers.orbits.whole_state import begun, flown
-from solvers.orbits.whole_state import run as run_from
+from solvers.orbits import at_zero, delayed, flown, periods_of_decay, settled, with_initial_memory
+from solvers.orbits import run as run_from
 from solvers.problem import counted
 
 if TYPE_CHECKING:
@@ -152,13 +149,13 @@ def extremes_of(t: Vector, u: Vector, v: Vector) -> tuple[float, float]:
 
 def orbit(model: Model, period: int, start: ArrayLike | Orbit | None, shots: int | None) -> Orbit:
     """See `Model.orbit`."""
-    count, once = checked_period(period), load_period(model.scene)
+    count, T = checked_period(period), load_period(model.scene)
     if start is None:
-        return _from_nothing(model, count, once, shots)
+        return _from_rest(model, count, T, shots)
     if isinstance(start, Orbit):
-        start = periodic.at_zero(start.found)
-    found = Orbit(model, solvers.orbit(model.system, count * once, start, shots=shots), count)
-    _check_smallest(found, once)
+        start = at_zero(start.found)
+    found = Orbit(model, solvers.orbit(model.system, count * T, start, shots=shots), count)
+    _check_not_shorter(found, T)
     return found
 
 
@@ -170,23 +167,23 @@ def checked_period(period: int) -> int:
     return int(period)
 
 
-def _check_smallest(orbit: Orbit, once: float) -> None:
+def _check_not_shorter(orbit: Orbit, T: float) -> None:
     """An orbit of period k must not repeat sooner."""
-    shorter = _smallest(orbit, once)
+    shorter = _periods_to_repeat(orbit, T)
     if shorter < orbit.period:
         raise solvers.OrbitError(
             f"no orbit of period {orbit.period} near the start: Newton's method went to one of period {shorter}"
         )
 
 
-def _smallest(orbit: Orbit, once: float) -> int:
+def _periods_to_repeat(orbit: Orbit, T: float) -> int:
     """Periods of the load after which an orbit repeats."""
     n = len(orbit.model.omega)
     for shorter in range(1, orbit.period):
         if orbit.period % shorter:
             continue
-        later = chain.delayed(orbit.model.system, orbit.found.phase)
-        end = flown(later, orbit.found.whole, shorter * once, orbit.found.method)[: 2 * n]
+        later = delayed(orbit.model.system, orbit.found.phase)
+        end = flown(later, orbit.found.whole, shorter * T, orbit.found.method)[: 2 * n]
         scale = np.concatenate(
             (np.repeat(np.abs(orbit.state[:n]).max(), n), np.repeat(np.abs(orbit.state[n:]).max(), n))
         )
@@ -195,10 +192,10 @@ def _smallest(orbit: Orbit, once: float) -> int:
     return orbit.period
 
 
-def _from_nothing(model: Model, count: int, once: float, shots: int | None) -> Orbit:
+def _from_rest(model: Model, count: int, T: float, shots: int | None) -> Orbit:
     """What a run from rest settles to, else the first of many attractors with that period."""
     try:
-        start = shooting.settled(model.system, count * once, solvers.Exponential(1e-8))
+        start = settled(model.system, count * T, solvers.Exponential(1e-8))
         return orbit(model, count, start, shots)
     except solvers.OrbitError as error:
         refused = error
@@ -243,13 +240,13 @@ def attractors(
     model: Model, starts: int | Sequence[ArrayLike] = 12, longest: int = 8, seed: int = 0
 ) -> list[Attractor]:
     """See `Model.attractors`."""
-    once = load_period(model.scene)
+    T = load_period(model.scene)
     method = solvers.Exponential(1e-8, ledger=False)
     found: list[Attractor] = []
-    for start in _starts(model, once, starts, seed):
-        state, orbit = _settle(model, once, start, longest, method)
+    for start in _starts(model, T, starts, seed):
+        state, orbit = _settle(model, T, start, longest, method)
         for i, known in enumerate(found):
-            if _same(known.orbit, orbit, once):
+            if _same(known.orbit, orbit, T):
                 found[i] = replace(known, count=known.count + 1)
                 break
         else:
@@ -257,7 +254,7 @@ def attractors(
     return sorted(found, key=lambda a: -a.count)
 
 
-def _starts(model: Model, once: float, starts: int | Sequence[ArrayLike], seed: int) -> list[Vector]:
+def _starts(model: Model, T: float, starts: int | Sequence[ArrayLike], seed: int) -> list[Vector]:
     """Rest and random states of the size the motion from rest has, or the given ones, checked."""
     n = len(model.omega)
     if not isinstance(starts, (int, np.integer)):
@@ -268,53 +265,52 @@ def _starts(model: Model, once: float, starts: int | Sequence[ArrayLike], seed: 
         return states
     require(starts >= 1, "starts must be a count above 0 or a list of states", starts, "attractors", "ask for 12")
     method = solvers.Exponential(1e-6, ledger=False)
-    run = solvers.integrate(model.system, np.zeros(n), np.zeros(n), 20.0 * once, once / 16.0, method)
+    run = solvers.integrate(model.system, np.zeros(n), np.zeros(n), 20.0 * T, T / 16.0, method)
     size = np.concatenate((np.abs(run.q).max(axis=0), np.abs(run.q_dot).max(axis=0)))
     rng = np.random.default_rng(seed)
     return [np.zeros(2 * n), *(2.0 * size * rng.normal(size=2 * n) for _ in range(starts - 1))]
 
 
-def _settle(model: Model, once: float, start: Vector, longest: int, method: Any) -> tuple[Vector, Orbit | None]:
+def _settle(model: Model, T: float, start: Vector, longest: int, method: Any) -> tuple[Vector, Orbit | None]:
     """Last state of a long run (at a multiple of the load's period), and the orbit it has come to."""
     n = len(model.omega)
-    x = begun(model.system, start)
+    x = with_initial_memory(model.system, start)
     for _ in range(3):
-        slowest = float((0.5 * model.system.blocks.c)[model.system.blocks.c > 0.0].min(initial=math.inf))
-        count = min(max(math.ceil(7.0 / (slowest * once)), 40), 400) + 4 * longest
-        run = run_from(model.system, x, count * once, once, method)
+        count = min(max(periods_of_decay(model.system, T), 40), 400) + 4 * longest
+        run = run_from(model.system, x, count * T, T, method)
         strobes = np.concatenate((run.q, run.q_dot), axis=1)[-3 * longest :]
         x = np.concatenate((strobes[-1], *run.memory))
         size = np.abs(strobes).max(axis=0)
         for k in range(1, longest + 1):
             if np.all(np.abs(strobes[k:] - strobes[:-k]) <= 1e-3 * size):
                 try:
-                    return x[: 2 * n], _once_around(model, x, k, once)
+                    return x[: 2 * n], _shortest_orbit(model, x, k, T)
                 except solvers.OrbitError:
                     break
     return x[: 2 * n], None
 
 
-def _once_around(model: Model, x: Vector, k: int, once: float) -> Orbit:
+def _shortest_orbit(model: Model, x: Vector, k: int, T: float) -> Orbit:
     """The orbit near a state that nearly repeats after k periods; a decaying transient may have hidden that it is
     shorter.
     """
-    found = Orbit(model, solvers.orbit(model.system, k * once, x), k)
-    shorter = _smallest(found, once)
+    found = Orbit(model, solvers.orbit(model.system, k * T, x), k)
+    shorter = _periods_to_repeat(found, T)
     if shorter == k:
         return found
-    return Orbit(model, solvers.orbit(model.system, shorter * once, periodic.at_zero(found.found)), shorter)
+    return Orbit(model, solvers.orbit(model.system, shorter * T, at_zero(found.found)), shorter)
 
 
-def _same(a: Orbit | None, b: Orbit | None, once: float) -> bool:
+def _same(a: Orbit | None, b: Orbit | None, T: float) -> bool:
     """Whether two attractors are one: the same orbit, begun in any of its periods."""
     if a is None or b is None:
         return a is b
     if a.period != b.period or len(a.contacts) != len(b.contacts):
         return False
-    x, y = periodic.at_zero(a.found), periodic.at_zero(b.found)
+    x, y = at_zero(a.found), at_zero(b.found)
     n2 = len(a.state)
     for _ in range(a.period):
         if np.linalg.norm(x[:n2] - y[:n2]) <= 1e-5 * np.linalg.norm(x[:n2]):
             return True
-        y = flown(b.model.system, y, once, b.found.method)
+        y = flown(b.model.system, y, T, b.found.method)
     return False

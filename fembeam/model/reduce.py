@@ -36,8 +36,8 @@ def reduced(
     interface: bool,
 ) -> Model:
     """The model of a scene; `Scene.reduce` explains the arguments."""
-    ways = {"modes": modes, "omega_max": omega_max, "mass_share": mass_share}
-    given = [name for name, way in ways.items() if way is not None]
+    choices = {"modes": modes, "omega_max": omega_max, "mass_share": mass_share}
+    given = [name for name, choice in choices.items() if choice is not None]
     require(len(given) < 2, "choose modes in one way", given, "Scene.reduce", "keep one of them")
     _check_static(scene, residual, interface)
     if omega_max is not None or mass_share is not None:

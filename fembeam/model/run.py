@@ -64,7 +64,7 @@ class Run(ContactHistories, Printed):
     versions: dict[str, str] = field(default_factory=dict)  # that made a run read from a file
     borders: Callable[[], Any] | None = field(default=None, repr=False)  # what `transitions` are made by
     lost: Callable[[], Losses] | None = field(default=None, repr=False)  # and `losses`
-    began: tuple[Vector, ...] = ()  # what the laws had latched at the begin, a row per contact, where it was given
+    began: tuple[Vector, ...] = ()  # what the laws had latched at the start, a row per contact, where it was given
     end: Vector | None = None  # (2n + l,) [q, q̇] and what the laws have latched, at the time reached
     on: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 3), dtype=int))  # (m, 3): body, of ON, number
     kinds: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 2), dtype=bool))  # of rotation, always acting

@@ -155,10 +155,10 @@ def load(path: str | os.PathLike[str]) -> Run:
 def _read(path: Path) -> dict[str, Any]:
     """Arrays by name, and the words."""
     with path.open("rb") as file:
-        begin = file.read(len(SIGNATURE))
-    if not begin.startswith((SIGNATURE, ZIPPED)):
+        first_bytes = file.read(len(SIGNATURE))
+    if not first_bytes.startswith((SIGNATURE, ZIPPED)):
         raise ValueError("it is neither npz nor HDF5; give a file of Run.save")
-    if begin != SIGNATURE:
+    if first_bytes != SIGNATURE:
         with np.load(path, allow_pickle=False) as data:
             return {name: data[name] for name in data.files}
     with optional("h5py", "a run in HDF5").File(path, "r") as group:

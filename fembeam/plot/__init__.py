@@ -3,7 +3,7 @@
 `response`, `spectra`, `contact_histograms` and `animation` hold those of one run, `laws` those of contact laws,
 `orbits` those of periodic motion, `basins` maps of starts, `random` those of random motion, `linear` spectra and
 frequency response, `mode_count` and `methods` those of studies; `run_signals`, `style` and `figure` are what they
-share. Imports: `statistics`, `model` and the rooms below. Begin with `response`.
+share. Imports: `statistics`, `model` and what they import. Begin with `response`.
 """
 
 from fembeam.model import places

@@ -116,9 +116,9 @@ def _peaks(run: Run, stop: int, samples: NDArray[np.int64]) -> Vector:
     inside = slice(samples[0], samples[-1] + 1)
     np.maximum.at(found, np.searchsorted(between, t[inside]), force[inside])
     mine = log.stop == stop
-    for begin, end, peak in zip(log.t_in[mine], log.t_out[mine], log.peak_force[mine], strict=True):
-        first, last = np.searchsorted(t, [begin, np.nan_to_num(end, nan=np.inf)])
-        when = t[first + int(np.argmax(force[first:last]))] if last > first else (begin + end) / 2
+    for t_in, t_out, peak in zip(log.t_in[mine], log.t_out[mine], log.peak_force[mine], strict=True):
+        first, last = np.searchsorted(t, [t_in, np.nan_to_num(t_out, nan=np.inf)])
+        when = t[first + int(np.argmax(force[first:last]))] if last > first else (t_in + t_out) / 2
         if shown[0] <= when <= shown[-1]:
             picture = int(np.searchsorted(between, when))
             found[picture] = max(found[picture], peak)
@@ -173,7 +173,7 @@ class _Stage:
 
     def __init__(self, run: Run, samples: NDArray[np.int64], fps: float | None) -> None:
         self.run, self.samples, self.contact_rows = run, samples, _contacts(run)
-        self.beams, self.strikers = run.readout.heights, run.readout.striker_places
+        self.beams, self.impactor_places = run.readout.heights, run.readout.striker_places
         self.forces = [
             run.force(i)[samples] if one.always else _peaks(run, i, samples) for i, one in enumerate(self.contact_rows)
         ]
@@ -228,7 +228,7 @@ class _Stage:
 
     def _limits(self, axis: Axes) -> float:
         """Set the view, on the beams: an impactor may leave it; returns its height in mm."""
-        rows = [line for _, line in self.lines] + [self.strikers[:, 1]] * bool(len(self.strikers))
+        rows = [line for _, line in self.lines] + [self.impactor_places[:, 1]] * bool(len(self.impactor_places))
         stops = [-contact.push * contact.gap for contact in self.contact_rows if contact.is_stop]
         low = 1e3 * min(*(float(row.min()) for row in rows), *stops, 0.0)
         high = 1e3 * max(*(float(row.max()) for row in rows), *stops, 0.0)
@@ -242,7 +242,7 @@ class _Stage:
 
     def _sides(self) -> list[float]:
         """For every impactor +1 when it sits over its beam, -1 under it, 0 when it embraces it."""
-        pushes: list[list[float]] = [[] for _ in self.strikers]
+        pushes: list[list[float]] = [[] for _ in self.impactor_places]
         for contact in self.contact_rows:
             if contact.on == "impactor":
                 pushes[contact.number].append(-contact.push)
@@ -256,7 +256,7 @@ class _Stage:
 
     def _ball(self, impactor: int) -> Vector:
         """Height (frames,) of an impactor."""
-        return self.strikers[impactor, 1] + self.run.impactor_displacement(impactor)[self.samples]
+        return self.impactor_places[impactor, 1] + self.run.impactor_displacement(impactor)[self.samples]
 
     def _fixed(self, axis: Axes) -> None:
         """Supports and stops on the frame."""
@@ -275,7 +275,7 @@ class _Stage:
         """Move everything to one frame."""
         for curve, (z, line) in zip(self.curves, self.lines, strict=True):
             curve.set_data(1e3 * z, 1e3 * line[number])
-        for i, (ball, (place, _)) in enumerate(zip(self.balls, self.strikers, strict=True)):
+        for i, (ball, (place, _)) in enumerate(zip(self.balls, self.impactor_places, strict=True)):
             ball.set_data([1e3 * place], [1e3 * self._ball(i)[number]])
         self._point(number)
         now = float(self.run.t[self.samples[number]])

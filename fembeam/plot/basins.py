@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from fembeam.study.settling import Basins
+    from fembeam.study import Basins
 
 COLOURS = BLUE, ORANGE, GREEN, "#CC79A7", "#56B4E9", "#F0E442", RED
 OTHERS = {-1: ("not settled", "black"), -2: ("run failed", GREY)}

@@ -15,9 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from fembeam.study.failure_gallery import Failure
-    from fembeam.study.speed_accuracy_result import Point, SpeedAccuracy
-    from fembeam.study.stability_map import StabilityMap
+    from fembeam.study import Failure, Point, SpeedAccuracy, StabilityMap
 
 MARKERS = "osD^v<>PX*hpd8H1234"
 _SMALLEST = 1e-16
@@ -191,6 +189,3 @@ def failures(cases: Sequence[Failure], axes: Axes | Sequence[Axes] | None = None
             ax.annotate(words, (0.0, 1.0), (0, height), "axes fraction", "offset points", color=colour, fontsize=7.5,
                         va="top")  # fmt: skip
     return figure
-
-
-__all__ = ["failures", "speed_accuracy", "stability_map"]

@@ -13,8 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from fembeam.study.mode_count import ModeCount
-    from fembeam.study.smallest_model_result import SmallestModel
+    from fembeam.study import ModeCount, SmallestModel
 
 KINDS = ((False, BLUE, "o", "modes alone"), (True, RED, "s", "with static shapes"))
 RING: dict[str, Any] = {"color": ORANGE, "markersize": 11, "fillstyle": "none", "markeredgewidth": 1.5}

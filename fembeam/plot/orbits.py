@@ -185,8 +185,8 @@ def orbit(one: Orbit, z: float | None = None, axes: Sequence[Axes] | None = None
     figure, (left, right) = sheet(1, 2, (6.4, 2.8), axes, width_ratios=[3, 2])
     t, u, v = one.run.t, 1e3 * one.run.displacement(place), one.run.velocity(place)
     left.plot(1e3 * t, u)
-    for begin, end in zip(one.contacts.t_in, one.contacts.t_out, strict=True):
-        left.axvspan(1e3 * begin, 1e3 * (end if np.isfinite(end) else t[-1]), color=ORANGE, alpha=0.4, linewidth=0.8)
+    for t_in, t_out in zip(one.contacts.t_in, one.contacts.t_out, strict=True):
+        left.axvspan(1e3 * t_in, 1e3 * (t_out if np.isfinite(t_out) else t[-1]), color=ORANGE, alpha=0.4, linewidth=0.8)
     left.set_xlabel("t / ms")
     left.set_ylabel(f"u({place:.4g} m) / mm")
     right.plot(u, v)

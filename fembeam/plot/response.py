@@ -129,7 +129,7 @@ def mode_shapes(model: Model, axes: Axes | None = None) -> Figure:
     axis.set_xlabel("z / mm" if unit > 1.0 else "z / m")
     axis.set_ylabel("φ / max |φ|")
     rows = -(-len(axis.get_legend_handles_labels()[1]) // LEGEND_COLUMNS)
-    axis.set_ylim(-1.15, 1.2 + LEGEND_ROW * rows)  # the legend has room of its own above the curves
+    axis.set_ylim(-1.15, 1.2 + LEGEND_ROW * rows)  # the legend has space of its own above the curves
     axis.set_yticks([-1.0, -0.5, 0.0, 0.5, 1.0])
     axis.legend(loc="upper center", ncols=LEGEND_COLUMNS, fontsize=8)
     heading([axis], "Mode shapes of the linear beam", axes is None)
@@ -138,16 +138,16 @@ def mode_shapes(model: Model, axes: Axes | None = None) -> Figure:
 
 def _window(run: Run) -> tuple[float, float]:
     """Eight periods of the lowest mode that swings (or 400 samples): the last ones, of a transient about its peak."""
-    begin, end = float(run.t[0]), float(run.t[-1])
+    first, end = float(run.t[0]), float(run.t[-1])
     swinging = [omega for omega in natural(run) if omega > 0]
-    length = min(PERIODS * 2 * np.pi / min(swinging) if swinging else 400 * sampling_of(run), end - begin)
+    length = min(PERIODS * 2 * np.pi / min(swinging) if swinging else 400 * sampling_of(run), end - first)
     if stationary(run):
         return end - length, end
     if len(run.contacts):
         about = float(run.contacts.t_in[np.argmax(run.contacts.peak_force)])
     else:
         about = float(run.t[np.argmax(np.abs(run.displacement(_resting_place(run))))])
-    start = min(max(begin, about - BEFORE * length), end - length)
+    start = min(max(first, about - BEFORE * length), end - length)
     return start, start + length
 
 

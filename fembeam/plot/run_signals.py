@@ -8,7 +8,7 @@ import numpy as np
 
 from fembeam.model import places
 from fembeam.plot.style import Vector
-from fembeam.scene import lasting
+from fembeam.scene import persistent_drive
 from fembeam.statistics import Signal, pdf
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ def stationary(run: Run, discard: float = 0.0) -> bool:
     Free motion does not. Of records, of signals of the user and of runs read from a file the motion itself tells: its
     mean square over each quarter of the time is a tenth or more of the largest.
     """
-    known = None if run.model is None else lasting(run.model.scene)
+    known = None if run.model is None else persistent_drive(run.model.scene)
     if known is not None:
         return known
     x = next(iter(responses(run, discard).values()))

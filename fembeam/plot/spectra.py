@@ -79,8 +79,8 @@ def spectrum(
 
 def _about(run: Run, discard: float, line: Spectrum) -> str:
     """What the spectra rest on."""
-    lasting = np.count_nonzero(run.t >= discard) * sampling_of(run)
-    about = f"{lasting:.4g} s, {line.n_segments} segments, lines {line.omega[1]:.2g} rad/s apart"
+    seconds = np.count_nonzero(run.t >= discard) * sampling_of(run)
+    about = f"{seconds:.4g} s, {line.n_segments} segments, lines {line.omega[1]:.2g} rad/s apart"
     sure = line.estimate is not None and line.estimate.batches > 1
     return f"Power spectral densities ({about}{', 95 % shaded' if sure else ''})"
 

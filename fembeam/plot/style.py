@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import wraps
+from inspect import signature
 from typing import TYPE_CHECKING, Any, ParamSpec
 
 import numpy as np
@@ -41,12 +42,18 @@ STYLE = {
 
 
 def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
-    """Draw in the library's style, and leave the user's settings alone."""
+    """Draw in the library's style, and leave the user's settings alone.
+
+    TypeError unless the first argument is of the class that ``draw`` names for it.
+    """
+    wanted = next(iter(signature(draw).parameters.values())).annotation
 
     @wraps(draw)
     def inside(*args: P.args, **kwargs: P.kwargs) -> Figure:
         from matplotlib import rc_context
 
+        if args and str(wanted).isidentifier() and wanted not in [one.__name__ for one in type(args[0]).__mro__]:
+            raise TypeError(f"fembeam.plot.{draw.__name__} draws one {wanted}, got {type(args[0]).__name__}")
         with rc_context(STYLE):  # type: ignore[arg-type]
             return draw(*args, **kwargs)
 

@@ -2,7 +2,8 @@
 transfer functions.
 
 Each file answers one question with functions of a `Run` or a `Model`, which offer them as methods; they know neither.
-`readout` is what a run keeps for them in its file. Imports: `scene`, `beams`, `support`, `reduction`. Begin with it.
+`readout` is what a run keeps for them in its file. Imports: `scene`, `beams`, `support`, `reduction`. Begin with
+`readout`.
 """
 
 from fembeam.response.backbone import backbone
@@ -14,30 +15,3 @@ from fembeam.response.section_forces import Extremes, SectionForces, extremes, r
 from fembeam.response.spectra import ResponseSpectrum, floor_spectrum, response_spectrum
 from fembeam.response.support_reactions import Reaction, Reactions, reactions
 from fembeam.response.transfer import FrequencyResponse, frequency_response
-
-__all__ = [
-    "READOUT_FINITE",
-    "READOUT_UNITS",
-    "Extremes",
-    "FrequencyResponse",
-    "Reaction",
-    "Reactions",
-    "Readout",
-    "ResponseSpectrum",
-    "SectionForces",
-    "backbone",
-    "coordinates",
-    "expected_readout",
-    "extremes",
-    "floor_spectrum",
-    "forces",
-    "frame_motion",
-    "frequency_response",
-    "mean_force",
-    "packed",
-    "reactions",
-    "response_spectrum",
-    "rows_of",
-    "section_forces",
-    "unpacked",
-]

@@ -45,11 +45,13 @@ def _force_of(run: Run, stop: int, contact: ContactRow) -> Vector:
 def force_at(run: Run, stop: int, contact: ContactRow, t: Vector, delta: Vector, rate: Vector) -> Vector:
     """Force of one that always acts at times t (k,), ascending, of deformations and rates there."""
     if contact.remembers:
-        return _replayed(_begun(run, stop, contact.law), contact.law, run.transitions, stop, t, delta, rate)
+        return _replayed(
+            _parameters_at_start(run, stop, contact.law), contact.law, run.transitions, stop, t, delta, rate
+        )
     return np.asarray(contact.force(delta, rate))
 
 
-def _begun(run: Run, stop: int, law: Any) -> Vector:
+def _parameters_at_start(run: Run, stop: int, law: Any) -> Vector:
     """The law's parameters with what it had latched when the run began."""
     parameters = np.array(law.parameters)
     if run.began:
@@ -63,12 +65,12 @@ def _replayed(
     """The force between the borders it passed, each with the latched numbers of its time."""
     mine = np.flatnonzero(log.contact == stop)
     ends = np.append(np.searchsorted(t, log.t[mine]), len(t))
-    force, begin = np.empty(len(t)), 0
+    force, first = np.empty(len(t)), 0
     for passed, end in enumerate(ends):
-        if end > begin:
-            force[begin:end] = law.batch(1.0, parameters)(delta[begin:end], rate[begin:end])
+        if end > first:
+            force[first:end] = law.batch(1.0, parameters)(delta[first:end], rate[first:end])
         if passed < len(mine):
             at = mine[passed]
             renew(law, int(log.border[at]), log.delta[at], log.delta_dot[at], parameters)
-        begin = max(begin, end)
+        first = max(first, end)
     return force

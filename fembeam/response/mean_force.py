@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from fembeam.model import Run
 
 Vector = NDArray[np.float64]
-Cubics = tuple[Vector, Vector, Vector]  # t, δ, δ̇ where they begin and where they end (3, p), where a cell ends (p,)
+Cubics = tuple[Vector, Vector, Vector]  # t, δ, δ̇ where they start and where they end (3, p), where a cell ends (p,)
 Force = Callable[[NDArray[np.int64], Vector, Vector, Vector], Vector]  # of the cubic's number, t, δ, δ̇
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
 BLOCK = 2**17  # cubics at once, in some 100 MB
@@ -58,8 +58,8 @@ def _of_log(run: Run, stop: int, law: Any, motion: Vector, edges: Vector) -> Vec
     if whole.all():
         return impulse
     cut, rest = seen[~whole], 0.0 * seen[~whole]
-    begins = np.array([log.t_in[cut], rest, log.speed_in[cut]])
-    owner, a, b = _between(motion, begins, np.array([end[cut], rest, -log.speed_out[cut]]))
+    starts = np.array([log.t_in[cut], rest, log.speed_in[cut]])
+    owner, a, b = _between(motion, starts, np.array([end[cut], rest, -log.speed_out[cut]]))
     middle = (a[0] + b[0]) / 2
     interval = np.clip(np.searchsorted(t, middle) - 1, 0, len(t) - 2)
     rates = np.maximum(np.abs(log.speed_in[cut]), law.entry_rate_floor)[owner]
@@ -70,15 +70,15 @@ def _of_log(run: Run, stop: int, law: Any, motion: Vector, edges: Vector) -> Vec
     return impulse
 
 
-def _between(motion: Vector, begins: Vector, ends: Vector) -> tuple[NDArray[np.int64], Vector, Vector]:
+def _between(motion: Vector, starts: Vector, ends: Vector) -> tuple[NDArray[np.int64], Vector, Vector]:
     """The cubics of contacts from entry (3, c) through samples to exit: whose each is, t, δ, δ̇ at both ends."""
-    numbers = np.arange(begins.shape[1])
-    low, high = np.searchsorted(motion[0], begins[0]), np.searchsorted(motion[0], ends[0], side="right")
+    numbers = np.arange(starts.shape[1])
+    low, high = np.searchsorted(motion[0], starts[0]), np.searchsorted(motion[0], ends[0], side="right")
     count = high - low
     within = np.arange(count.sum()) + np.repeat(low - np.cumsum(count) + count, count)
     owner = np.concatenate([numbers, np.repeat(numbers, count), numbers])
     order = np.argsort(owner, kind="stable")
-    owner, points = owner[order], np.concatenate([begins, motion[:, within], ends], axis=1)[:, order]
+    owner, points = owner[order], np.concatenate([starts, motion[:, within], ends], axis=1)[:, order]
     cubic = np.flatnonzero((np.diff(owner) == 0) & (np.diff(points[0]) > 0.0))
     return owner[cubic], points[:, cubic], points[:, cubic + 1]
 
@@ -93,9 +93,9 @@ def _shares(law: Any, owner: NDArray[np.int64], rates: Vector, cubics: Cubics) -
 
 def _halves(cubics: Cubics) -> Vector:
     """Half the lengths (p, 2) of a cubic before and after its cell's end, s."""
-    begin, end = cubics[0][0], cubics[1][0]
-    cut = np.clip(cubics[2], begin, end)
-    return np.array([cut - begin, end - cut]).T / 2
+    start, end = cubics[0][0], cubics[1][0]
+    cut = np.clip(cubics[2], start, end)
+    return np.array([cut - start, end - cut]).T / 2
 
 
 def _impulses(force: Force, cubics: Cubics) -> Vector:
@@ -103,11 +103,11 @@ def _impulses(force: Force, cubics: Cubics) -> Vector:
     halves = _halves(cubics)
     found = np.empty(halves.shape)
     for block in np.array_split(np.arange(len(found)), len(found) // BLOCK + 1):
-        (begin, d0, v0), (end, d1, v1) = (side[:, block, None, None] for side in cubics[:2])
-        half, h = halves[block][..., None], end - begin
-        centre = np.concatenate([begin + half[:, :1], end - half[:, 1:]], axis=1)
+        (start, d0, v0), (end, d1, v1) = (side[:, block, None, None] for side in cubics[:2])
+        half, h = halves[block][..., None], end - start
+        centre = np.concatenate([start + half[:, :1], end - half[:, 1:]], axis=1)
         t = centre + half * NODES
-        s = (t - begin) / h
+        s = (t - start) / h
         delta = (1 - s) ** 2 * ((1 + 2 * s) * d0 + s * h * v0) + s**2 * ((3 - 2 * s) * d1 + (s - 1) * h * v1)
         rate = (1 - s) * ((1 - 3 * s) * v0 - 6 * s * (d0 - d1) / h) + s * (3 * s - 2) * v1
         at = (np.repeat(block, t[0].size), t.ravel(), delta.ravel(), rate.ravel())

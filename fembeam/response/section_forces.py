@@ -23,8 +23,8 @@ from fembeam.beams import Beam, element_matrices, joining, on_beam
 from fembeam.support import require
 
 if TYPE_CHECKING:
+    from fembeam.model import Run
     from fembeam.model.equations import ModalEquations
-    from fembeam.model.run import Run
     from fembeam.scene import Matrices
 
 Vector = NDArray[np.float64]

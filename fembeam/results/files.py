@@ -19,8 +19,7 @@ from fembeam import plot
 from fembeam.model import Run
 from fembeam.model.run_csv import extremes_table, histories
 from fembeam.scene import unit_of
-from fembeam.statistics import moments
-from fembeam.statistics.batches import Batches, Estimate
+from fembeam.statistics import Batches, Estimate, moments
 from fembeam.support import aligned, versions, written_whole
 
 if TYPE_CHECKING:
@@ -169,11 +168,11 @@ def _error_of_std(x: NDArray[np.float64], parts: int) -> float | None:
     return float(found.estimate(lambda s: math.sqrt(max(s[2] / s[0] - (s[1] / s[0]) ** 2, 0.0))).standard_error)
 
 
-def _error_of_rate(entries: NDArray[np.float64], begin: float, end: float, parts: int) -> float | None:
+def _error_of_rate(entries: NDArray[np.float64], start: float, end: float, parts: int) -> float | None:
     """Standard error of the number of contacts per second over that many batches."""
     if not parts:
         return None
-    counts = np.histogram(entries, parts, (begin, end))[0] * parts / (end - begin)
+    counts = np.histogram(entries, parts, (start, end))[0] * parts / (end - start)
     return float(Estimate.of_mean(counts).standard_error)
 
 

@@ -218,18 +218,18 @@ def _rounded(value: float, digits: int = 4) -> str:
     return f"{value / 1e3**thousands:.{decimals}f}" + f"·10{exponent}" * bool(thousands)
 
 
-def with_prefix(value: float, unit: str, digits: int = 4) -> str:
-    """A number to so many significant digits with the prefix of its unit that keeps it between 1 and 1000.
+def with_prefix(value: float, unit: str) -> str:
+    """A number to four significant digits with the prefix of its unit that keeps it between 1 and 1000.
 
     Examples
     --------
     >>> with_prefix(0.0123456, "J"), with_prefix(-45678.9, "J"), with_prefix(0.0, "J")
     ('12.35 mJ', '-45.68 kJ', '0 J')
     """
-    scaled = float(f"{value:.{digits - 1}e}")
+    scaled = float(f"{value:.3e}")
     power = 0 if scaled == 0.0 or not math.isfinite(scaled) else math.floor(math.log10(abs(scaled))) // 3
     power = min(max(power, -4), 4)
-    return f"{_rounded(value / 1e3**power, digits)} {PREFIXES[power + 4]}{unit}"
+    return f"{_rounded(value / 1e3**power)} {PREFIXES[power + 4]}{unit}"
 
 
 def _figures(files: Sequence[Path]) -> Iterator[str]:

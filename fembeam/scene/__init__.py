@@ -1,7 +1,7 @@
 """What there is: supports, masses, springs, stops, elements, impactors, loads; full matrices, contact rows, signals.
 
-Imports: `beams`, `excitation`, `support`, `reduction`; `Scene.reduce` opens the door to `fembeam.model`. Begin with
-`scene`, then `assembly`.
+Imports: `beams`, `excitation`, `support`, `reduction`; inside the method `Scene.reduce` also `fembeam.model`.
+Begin with `scene`, then `assembly`.
 """
 
 from fembeam.scene.assembly import Matrices, unsupported
@@ -12,44 +12,5 @@ from fembeam.scene.local_coordinate import LocalCoordinate, unit_of
 from fembeam.scene.parameters import changes_structure, path_of, replaced, value_of, with_value
 from fembeam.scene.parts import Clamped, Dashpot, Guided, LumpedMass, Pinned, PointForce, PointMoment, Spring, Stop
 from fembeam.scene.scene import FEATURES, Scene
-from fembeam.scene.signals import PLACES, lasting, signals_of, with_signals
+from fembeam.scene.signals import PLACES, persistent_drive, signals_of, with_signals
 from fembeam.scene.source import Source
-
-__all__ = [
-    "FEATURES",
-    "ON",
-    "PLACES",
-    "Clamped",
-    "Dashpot",
-    "Element",
-    "Guided",
-    "Impactor",
-    "LocalCoordinate",
-    "LumpedMass",
-    "Matrices",
-    "Pinned",
-    "PointForce",
-    "PointMoment",
-    "Scene",
-    "Source",
-    "Spring",
-    "Stop",
-    "changes_structure",
-    "heights",
-    "lasting",
-    "loaded",
-    "contact_rows",
-    "loads",
-    "path_of",
-    "replaced",
-    "signals_of",
-    "static_rows",
-    "tangent",
-    "unit_of",
-    "unsupported",
-    "value_of",
-    "watched",
-    "weight",
-    "with_signals",
-    "with_value",
-]

@@ -91,8 +91,8 @@ class Matrices:
     def C(self) -> sparse.csr_matrix:
         """Structural damping + dashpots."""
         if self.bodies:
-            strikers = sparse.diags([impactor.damping for impactor in self.impactors])
-            return sparse.block_diag([*(body.C for body in self.bodies), strikers], format="csr")
+            dashpots = sparse.diags([impactor.damping for impactor in self.impactors])
+            return sparse.block_diag([*(body.C for body in self.bodies), dashpots], format="csr")
         return (self.damping.matrix(self.M, self.K, self.root) + self.dashpots).tocsr()
 
     @property
@@ -119,7 +119,7 @@ class Matrices:
         blank = [sparse.csr_matrix((len(places), count)) for count in (before, after)]
         return sparse.hstack([blank[0], rows, blank[1]], format="csr") if before or after else rows
 
-    def striker(self, index: int) -> sparse.csr_matrix:
+    def impactor_row(self, index: int) -> sparse.csr_matrix:
         """Row (1, N): the displacement of an impactor."""
         size = self.M.shape[0]
         place = size - len(self.impactors) + index

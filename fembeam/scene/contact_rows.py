@@ -77,7 +77,7 @@ def _contact_rows(scene: Scene, matrices: Matrices) -> Iterator[ContactRow]:
             row = one.push * place.row(matrices, body)
             yield ContactRow(row, one.law, one.gap, one.push, body, one.z, on, place.rotation, one.always)
         for impactor in part.impactors:
-            row = matrices.interpolation(impactor.z, body=body) - matrices.striker(count)
+            row = matrices.interpolation(impactor.z, body=body) - matrices.impactor_row(count)
             for push in impactor.pushes:
                 yield ContactRow(push * row, impactor.law, impactor.gap, push, body, impactor.z, ("impactor", count))
             count += 1
@@ -109,7 +109,7 @@ def watched(scene: Scene, body: int) -> LocalCoordinate | None:
 
 
 def loaded(scene: Scene, body: int) -> list[LocalCoordinate]:
-    """Where a force or moment acts on a beam, or a pair of them: of stops, elements, loads, dashpots, strikers."""
+    """Where a force or moment acts on a beam, or a pair of them: of stops, elements, loads, dashpots, impactors."""
     part = (scene, *scene.bodies)[body]
     places = [own for one in part.acting for own in one.coordinate.on_body(body, body)]
     places += [LocalCoordinate(force.z, _derivative(force)) for force in part.forces]
@@ -147,9 +147,9 @@ def heights(scene: Scene) -> tuple[list[float], list[float]]:
         place = stop.coordinate
         if place.to is not None and place.to[0] and not place.rotation:
             beams[place.to[0]] = -stop.push * stop.gap
-    strikers = [
+    on_impactors = [
         beams[body] - (impactor.pushes[0] * impactor.gap if len(impactor.pushes) == 1 else 0.0)
         for body, part in enumerate((scene, *scene.bodies))
         for impactor in part.impactors
     ]
-    return beams, strikers
+    return beams, on_impactors

@@ -162,8 +162,8 @@ class Stop:
         require(self.side in ("below", "above"), "side must be 'below' or 'above'", self.side, where, "choose one")
         local_coordinate(self.z, self.of, self.on, where, "on")
         check_law(self.law, where)
-        lasting = getattr(self.law, "memory", ()) and not getattr(self.law, "one_sided", False)
-        require(not lasting, "law must be one that opens", self.law, where, "make it an Element, which always acts")
+        acts_always = getattr(self.law, "memory", ()) and not getattr(self.law, "one_sided", False)
+        require(not acts_always, "law must be one that opens", self.law, where, "make it an Element, which always acts")
 
     def __repr__(self) -> str:
         """As it was called; `of` only where it is not the usual one, as in saved branches of earlier versions."""

@@ -31,7 +31,7 @@ def signals_of(scene: Scene) -> dict[str, Any]:
     return dict(_listed(scene))
 
 
-def lasting(scene: Scene) -> bool | None:
+def persistent_drive(scene: Scene) -> bool | None:
     """Whether a scene is driven by tones and noise alone, so that its motion settles; False without loads.
 
     None where other signals drive it, such as records, of which one cannot tell.

@@ -117,13 +117,13 @@ def _line(lines: list[str], where: str, message: str) -> int:
 def _table(lines: list[str], name: str, number: int) -> range:
     """Lines of the number-th table of a name, its sub-tables included."""
     heads = [(i, m[1].strip("\"'")) for i, line in enumerate(lines) if (m := HEADER.match(line))]
-    begins = [i for i, head in heads if head == name] or [i for i, head in heads if head.startswith(f"{name}.")]
-    if number > len(begins):
+    starts = [i for i, head in heads if head == name] or [i for i, head in heads if head.startswith(f"{name}.")]
+    if number > len(starts):
         line = _key(lines, name, range(len(lines)), -1)
         return range(line, line + 1) if line >= 0 else range(0)
-    begin = begins[number - 1]
-    ends = [i for i, head in heads if i > begin and not head.startswith(f"{name}.")] + begins[number:]
-    return range(begin, min(ends, default=len(lines)))
+    start = starts[number - 1]
+    ends = [i for i, head in heads if i > start and not head.startswith(f"{name}.")] + starts[number:]
+    return range(start, min(ends, default=len(lines)))
 
 
 def _key(lines: list[str], word: str, among: range, otherwise: int) -> int:

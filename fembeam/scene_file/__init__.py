@@ -2,13 +2,11 @@
 
 `reader` reads the file; `tables` checks every key and value and makes the objects; `keys` has the names and types of
 the keys, read from the constructors, `kinds` the values of `kind`. `study_tables`, `orbit_tables` and `basins_table`
-are the tables of studies; `json_schema` and `template` are made from the same. Imports: `study`, `results` and the
-rooms below. Begin with `reader`.
+are the tables of studies; `json_schema` and `template` are made from the same. Imports: `study`, `results` and what
+they import. Begin with `reader`.
 """
 
 from fembeam.scene_file.json_schema import json_schema
 from fembeam.scene_file.reader import SceneFile, built, read
 from fembeam.scene_file.tables import SceneFileError
 from fembeam.scene_file.template import TEMPLATE
-
-__all__ = ["TEMPLATE", "SceneFile", "SceneFileError", "built", "json_schema", "read"]

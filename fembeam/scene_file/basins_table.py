@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fembeam.study.settling import Basins, basins
+from fembeam.study import Basins, basins
 
 if TYPE_CHECKING:
     from fembeam.model import Model

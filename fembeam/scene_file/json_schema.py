@@ -33,7 +33,7 @@ def json_schema() -> Schema:
     kinds = _Kinds()
     tables: Schema = {"beam": kinds.beam(), "gravity": {"type": "number", "description": "m/s², 9.81 on the ground"}}
     for name, features in FEATURES.items():
-        tables[name] = {"type": "array", "items": kinds.feature(name, features)}
+        tables[name] = {"type": "array", "items": kinds.feature(features)}
     tables["damping"] = {"anyOf": [kinds.table(ModalDamping), kinds.table(Rayleigh)]}
     tables["base"] = kinds.reference(SIGNAL)
     tables["reduce"] = kinds.table(Scene.reduce)
@@ -84,7 +84,7 @@ class _Kinds:
             self.definitions[name] = {"anyOf": [{"enum": list(choices)}] * kind.by_name + tables}
         return {"$ref": f"#/$defs/{name.replace(' ', '%20')}"}
 
-    def feature(self, name: str, features: tuple[type, ...]) -> Schema:
+    def feature(self, features: tuple[type, ...]) -> Schema:
         """One entry of [[supports]], [[masses]], ..."""
         if len(features) == 1:
             return self.table(features[0])

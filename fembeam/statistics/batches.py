@@ -152,14 +152,14 @@ class Batches:
         self.rows = np.zeros((MOST, size))
         self.full = 0  # rows that are complete
         self.per_row = 1  # batches summed in a row
-        self.begun = 0  # batches in the row under way
+        self.open_row = 0  # batches in the row being filled
 
     def add(self, row: ArrayLike) -> None:
         """Take in the sums of one more batch."""
         self.rows[self.full] += row
-        self.begun += 1
-        if self.begun == self.per_row:
-            self.full, self.begun = self.full + 1, 0
+        self.open_row += 1
+        if self.open_row == self.per_row:
+            self.full, self.open_row = self.full + 1, 0
         if self.full == MOST:
             self.rows[: MOST // 2] = self.rows[0::2] + self.rows[1::2]
             self.rows[MOST // 2 :] = 0.0
@@ -168,7 +168,7 @@ class Batches:
     @property
     def filled(self) -> NDArray[np.float64]:
         """Rows with something in them, the one under way included."""
-        return self.rows[: self.full + (self.begun > 0)]
+        return self.rows[: self.full + (self.open_row > 0)]
 
     @property
     def total(self) -> NDArray[np.float64]:

@@ -38,15 +38,15 @@ class Impacts:
         self.batches = Batches(SUMS + 2 * len(QUANTITIES))
         self.largest = dict.fromkeys(QUANTITIES, math.nan)
 
-    def add(self, log: solvers.ContactLog, stop: int, begin: float, end: float) -> None:
+    def add(self, log: solvers.ContactLog, stop: int, start: float, end: float) -> None:
         """One batch: what the log says of a stop between two times (s)."""
         t_out = np.where(np.isnan(log.t_out), end, log.t_out)
-        mine = (log.stop == stop) & (log.t_in < end) & (t_out > begin)
-        entered = mine & (log.t_in >= begin)
+        mine = (log.stop == stop) & (log.t_in < end) & (t_out > start)
+        entered = mine & (log.t_in >= start)
         whole = entered & np.isfinite(log.t_out)
         row = np.zeros(self.batches.rows.shape[1])
-        row[TIME] = end - begin
-        row[TOUCHING] = (np.minimum(t_out[mine], end) - np.maximum(log.t_in[mine], begin)).sum()
+        row[TIME] = end - start
+        row[TOUCHING] = (np.minimum(t_out[mine], end) - np.maximum(log.t_in[mine], start)).sum()
         row[ENTRIES], row[CONTACTS] = np.count_nonzero(entered), np.count_nonzero(whole)
         for i, (name, values) in enumerate(self._columns(log, whole).items()):
             row[SUMS + 2 * i : SUMS + 2 * i + 2] = values.sum(), (values**2).sum()

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fembeam.model import Model
-from fembeam.statistics.batches import Estimate
+from fembeam.statistics import Estimate
 from fembeam.study.execution.checkpoint import Checkpoint, Values, identity
 from fembeam.study.execution.executors import spread
 from fembeam.study.realisations import Seed, child, noises, realisation, seed_key

@@ -309,10 +309,10 @@ def _forced(method: Any) -> Any:
 
 def _refusal(system: System, method: Any, duration: float) -> str:
     """What the library says to such a step, shortened; empty if nothing."""
-    from solvers.stepping.constant_step import refuse
+    from solvers.stepping.constant_step import check_stability
 
     try:
-        refuse(method, system, duration)
+        check_stability(method, system, duration)
     except ValueError as error:
         return str(error).split(": ", 1)[1].split(";")[0]
     return ""

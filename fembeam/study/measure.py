@@ -120,10 +120,10 @@ class Case:
 
 def measure(case: Case) -> list[Measured]:
     """Reduce once, run and evaluate with every solver; a module-level function, so that processes can be handed it."""
-    begin = perf_counter()
+    started = perf_counter()
     model = case.scene.reduce(**dict(case.reduce))
     model.simulate(1e-3 / max(float(model.omega[0]), 1.0), solver=case.solvers[0])  # load compiled code, make tables
-    preparation = perf_counter() - begin
+    preparation = perf_counter() - started
     return [_measured(case, model, solver, preparation) for solver in case.solvers]
 
 
@@ -156,25 +156,25 @@ def periodic(model: Model, start: Any, solver: Any, sampled: bool) -> list[Run]:
     dt = period / SAMPLES if sampled else None
     run = model.simulate((SETTLING + GROUPS * GROUP) * period, dt, start, solver)
     borders = (SETTLING + GROUP * np.arange(GROUPS + 1)) * period
-    parts = [cut(run, begin, end) for begin, end in pairwise(borders)]
+    parts = [cut(run, a, b) for a, b in pairwise(borders)]
     share = replace(run.cost, seconds=run.cost.seconds / GROUPS)
     return [replace(part, cost=share) for part in parts]
 
 
-def cut(run: Run, begin: float, end: float) -> Run:
-    """The part of a run from begin to end (s), with times counted from begin; the last state only if it has no samples.
+def cut(run: Run, start: float, end: float) -> Run:
+    """The part of a run from start to end (s), with times counted from start; the last state only if it has no samples.
 
     A contact belongs to the part in which it began.
     """
     log, half = run.contacts, 1e-9 * max(float(run.t[-1]), end)
-    mine = (log.t_in >= begin) & (log.t_in < end)
+    mine = (log.t_in >= start) & (log.t_in < end)
     columns = {name: column[mine] for name, column in log.arrays().items()}
-    columns["t_in"], columns["t_out"] = columns["t_in"] - begin, columns["t_out"] - begin
+    columns["t_in"], columns["t_out"] = columns["t_in"] - start, columns["t_out"] - start
     if len(run.t) == 1:
-        kept, t = slice(0, 1), np.array([end - begin])
+        kept, t = slice(0, 1), np.array([end - start])
     else:
-        kept = slice(int(np.searchsorted(run.t, begin - half)), int(np.searchsorted(run.t, end + half)))
-        t = run.t[kept] - begin
+        kept = slice(int(np.searchsorted(run.t, start - half)), int(np.searchsorted(run.t, end + half)))
+        t = run.t[kept] - start
     return replace(
         run, t=t, q=run.q[kept], q_dot=run.q_dot[kept],
         contacts=solvers.ContactLog(**columns), ledger=partial(_ledger_of, run, kept),

@@ -28,7 +28,7 @@ REDUCTION_SHARE = 0.7  # of the tolerance that modes may use up; integration get
 
 
 @dataclass(frozen=True, eq=False)
-class _Search:
+class Search:
     """The search; `seen` keeps every model measured."""
 
     scene: Scene

@@ -77,8 +77,8 @@ class ContactTime:
     def __call__(self, run: Run) -> float:
         """Value of a run."""
         log = run.contacts
-        lasting = (log.t_out - log.t_in)[log.stop == self.stop]
-        return _mean(lasting[np.isfinite(lasting)])
+        durations = (log.t_out - log.t_in)[log.stop == self.stop]
+        return _mean(durations[np.isfinite(durations)])
 
 
 @dataclass(frozen=True)

@@ -51,10 +51,10 @@ def correlation_time(model: Model) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Segment:
-    """One segment: its run and what of it counts, from `begin` on."""
+    """One segment: its run and what of it counts, from `start` on."""
 
     run: Run
-    begin: float
+    start: float  # s
     end: int  # index of the last sample that counts
 
 
@@ -86,26 +86,26 @@ class Segments:
         cls, model: Model, duration: float, dt: float, discard: float | None, start: Any, solver: Any, segment: int
     ) -> Segments:
         """The plan for a model; a realisation holds two half-overlapping segments (samples) of the spectrum."""
-        forgets, found = correlation_time(model), list(signals_of(model.scene).values())
+        tau, found = correlation_time(model), list(signals_of(model.scene).values())
         repeats = all(isinstance(s, BandNoise) or hasattr(s, "tones") for s in found)
         random = bool(noises(model))
-        longest = _longest(found, forgets, dt) if repeats else math.inf
-        shortest = max(SHORTEST * forgets, (1.5 * segment + 2.0) * dt)
+        longest = _longest(found, tau, dt) if repeats else math.inf
+        shortest = max(SHORTEST * tau, (1.5 * segment + 2.0) * dt)
         if repeats and random:
-            most = max(LONGEST * forgets, 8.0 * segment * dt)
+            most = max(LONGEST * tau, 8.0 * segment * dt)
             longest = min(longest, _realisation(duration, shortest, most, dt))
-        least = LEAD_IN * forgets * (not repeats) + FEWEST_BATCHES * forgets
+        least = LEAD_IN * tau * (not repeats) + FEWEST_BATCHES * tau
         if discard is None and duration < least:
             raise ValueError(
-                f"duration must be at least {least:.4g} s, {least / forgets:.0f} correlation times of the "
+                f"duration must be at least {least:.4g} s, {least / tau:.0f} correlation times of the "
                 f"structure, to see whether the transient has died out, got {duration:g} s; simulate longer, or give "
                 "discard="
             )
-        short = max(0.0, FEWEST_BATCHES * forgets - longest)  # of what the transient is looked for in
-        lead = LEAD_IN * forgets + short if discard is None else discard
+        short = max(0.0, FEWEST_BATCHES * tau - longest)  # of what the transient is looked for in
+        lead = LEAD_IN * tau + short if discard is None else discard
         state = model.rest() if start is None else np.array(start, dtype=float)
         batches = 1 if repeats and random else BATCHES
-        return cls(model, duration, dt, state, solver, forgets, repeats, random, lead, longest, batches, shortest)
+        return cls(model, duration, dt, state, solver, tau, repeats, random, lead, longest, batches, shortest)
 
     def pieces(self) -> Iterator[Segment]:
         """Segment after segment until the duration is reached."""
@@ -166,13 +166,13 @@ class Segments:
         self.time += self.dt * piece.end
 
 
-def _longest(found: list[Any], forgets: float, dt: float) -> float:
+def _longest(found: list[Any], tau: float, dt: float) -> float:
     """Seconds of a segment at most, under signals that can be continued."""
     asked = [s.period or math.inf for s in found if isinstance(s, BandNoise) and s.period_was_given]
-    longest = min(SEGMENT * forgets, *(s - LEAD_IN * forgets for s in (MOST_SAMPLES * dt, *asked)))
-    if not longest > FEWEST_BATCHES * forgets:
+    longest = min(SEGMENT * tau, *(s - LEAD_IN * tau for s in (MOST_SAMPLES * dt, *asked)))
+    if not longest > FEWEST_BATCHES * tau:
         raise ValueError(
-            f"a segment needs {(LEAD_IN + FEWEST_BATCHES) * forgets:.4g} s of its own noise and at most "
+            f"a segment needs {(LEAD_IN + FEWEST_BATCHES) * tau:.4g} s of its own noise and at most "
             f"{MOST_SAMPLES} samples; lengthen the period of the noise, or dt = {dt:g} s"
         )
     return longest

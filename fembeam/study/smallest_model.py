@@ -17,7 +17,7 @@ from concurrent.futures import Executor
 from typing import TYPE_CHECKING
 
 from fembeam.study.measure import Plan, Start
-from fembeam.study.model_search import _Search
+from fembeam.study.model_search import Search
 from fembeam.study.quantities import Quantity, named
 from fembeam.study.smallest_model_result import SmallestModel
 from fembeam.support import is_finite, is_whole, require
@@ -79,7 +79,7 @@ def smallest_model(
     plan, kept = Plan(duration, dt, discard, tuple(seeds), start), named(quantity)
     plan.check(scene, kept)
     kinds = (residual,) if residual is not None else (False, True) if scene.loaded_places else (False,)
-    search = _Search(scene, kept, plan, float(tolerance), int(most), kinds, executor)
+    search = Search(scene, kept, plan, float(tolerance), int(most), kinds, executor)
     return search.answer()
 
 

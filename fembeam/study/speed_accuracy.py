@@ -138,13 +138,13 @@ class _Trial:
 
     def measure(self, start: int, state: Vector, ask: _Question) -> None:
         """One timed run; what fails is kept as the reason."""
-        begin = time.perf_counter()
+        started = time.perf_counter()
         try:
             run = ask.run(self.model, state, self.method)
         except (ValueError, solvers.SolverError) as error:
             self.failure = " ".join(str(error).split())
             return
-        took = time.perf_counter() - begin
+        took = time.perf_counter() - started
         self.spent += took
         self.seconds[start] = min(took, self.seconds.get(start, math.inf))
         if start not in self.values:

@@ -178,10 +178,10 @@ def _limits(model: Model, method: Callable[[float], Any], steps: Vector, duratio
 def _cell(model: Model, method: Any, dt: float, duration: float, tolerance: float, start: Any) -> tuple[Verdict, float]:
     """One run judged."""
     forced = replace(method(float(dt)), force_unstable=True)
-    begin = None if start is None else start(model)
-    best = _truth(model, duration, begin)
+    state = None if start is None else start(model)
+    best = _truth(model, duration, state)
     try:
-        run = model.simulate(duration, duration / SAMPLES, begin, forced)
+        run = model.simulate(duration, duration / SAMPLES, state, forced)
     except solvers.SolverError:
         return Verdict.UNSTABLE, np.inf
     delta, wanted = run.indentation(), best.indentation()

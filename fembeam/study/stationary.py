@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike
 import solvers
 from fembeam.model import Model, Run, places
 from fembeam.scene import signals_of
-from fembeam.statistics.batches import Estimate
+from fembeam.statistics import Estimate
 from fembeam.statistics.initial_transient import Settling, settling
 from fembeam.statistics.spectra import FINEST_RESOLUTION
 from fembeam.study.segments import Segment, Segments
@@ -102,18 +102,13 @@ def stationary(
     sums = Sums(watched, dt, segment, dict(bins or {}), dict(levels or {}), len(model.scene.stops))
     settled, enough = None, None if until is None else False
     with bar(duration, progress) as report:
-        for piece in plan.pieces():
-            seen = {name: _samples(look(piece.run)) for name, look in watched.items()}
+        for whole in plan.pieces():
+            piece: Segment | None = whole
+            seen = {name: _samples(look(whole.run)) for name, look in watched.items()}
             if settled is None and discard is None:
-                settled = _settled([x for x, _ in seen.values()], piece, plan)
-                if not settled.died_out and plan.dropped < TRIES and plan.repeats:
-                    plan.drop(piece)
-                    settled = None
-                    continue
-                if plan.batches == 1 and settled.time > piece.begin:  # batches are whole realisations
-                    plan.drop(piece)
-                    continue
-                piece = replace(piece, begin=max(piece.begin, settled.time))
+                settled, piece = _after_transient(whole, [x for x, _ in seen.values()], plan)
+            if piece is None:
+                continue
             plan.keep(piece, sums.add(piece, seen, plan.batches))
             response = sums.response(plan, settled, enough)
             report(min(plan.kept, duration))
@@ -121,12 +116,7 @@ def stationary(
                 enough = all(estimate.relative <= until for estimate in _asked(response, of))
                 if enough:
                     break
-    if settled is not None and not settled.died_out:
-        warnings.warn(f"the transient has not died out: its halves differ by {settled.drift:.1f} standard errors; "
-                      "simulate longer, or give discard=", UserWarning, stacklevel=2)  # fmt: skip
-    if plan.index * plan.batches < 2:
-        warnings.warn(f"{plan.kept:.4g} s hold one realisation of the noise, which tells no standard error; "
-                      f"simulate at least {2 * plan.shortest:.3g} s", UserWarning, stacklevel=2)  # fmt: skip
+    _warn_of_a_short_run(plan, settled)
     response = sums.response(plan, settled, enough)
     note("%r, %.4g s before it left out", response, response.discarded)
     return response
@@ -182,10 +172,30 @@ def displacement(run: Run, shape: Vector) -> tuple[Vector, Vector]:
     return run.q @ shape, run.q_dot @ shape
 
 
+def _after_transient(piece: Segment, signals: list[Vector], plan: Segments) -> tuple[Settling | None, Segment | None]:
+    """The end of the transient, None while it may come later, and what counts of the segment, None if nothing does."""
+    settled = _settled(signals, piece, plan)
+    later = not settled.died_out and plan.dropped < TRIES and plan.repeats
+    if later or (plan.batches == 1 and settled.time > piece.start):  # batches are whole realisations
+        plan.drop(piece)
+        return None if later else settled, None
+    return settled, replace(piece, start=max(piece.start, settled.time))
+
+
 def _settled(signals: list[Vector], piece: Segment, plan: Segments) -> Settling:
     """End of the transient of the slowest signal."""
     found = [settling(x[: piece.end + 1], plan.dt, plan.correlation_time) for x in signals]
     return Settling(max(f.time for f in found), max(f.drift for f in found), all(f.died_out for f in found))
+
+
+def _warn_of_a_short_run(plan: Segments, settled: Settling | None) -> None:
+    """Warn of a transient that goes on, and of a single realisation; the caller's caller is shown."""
+    if settled is not None and not settled.died_out:
+        warnings.warn(f"the transient has not died out: its halves differ by {settled.drift:.1f} standard errors; "
+                      "simulate longer, or give discard=", UserWarning, stacklevel=3)  # fmt: skip
+    if plan.index * plan.batches < 2:
+        warnings.warn(f"{plan.kept:.4g} s hold one realisation of the noise, which tells no standard error; "
+                      f"simulate at least {2 * plan.shortest:.3g} s", UserWarning, stacklevel=3)  # fmt: skip
 
 
 def _samples(seen: Any) -> tuple[Vector, Vector | None]:

@@ -12,10 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fembeam.model import Run
-from fembeam.statistics.batches import Batches, Estimate
-from fembeam.statistics.impacts import Impacts
+from fembeam.statistics import Batches, Estimate, Impacts, Signal
 from fembeam.statistics.initial_transient import Settling
-from fembeam.statistics.streaming import Signal
 from fembeam.study.segments import Segment, Segments
 from fembeam.support import Part, Printed
 from solvers.problem import dataframe
@@ -50,7 +48,7 @@ class Sums:
 
     def add(self, piece: Segment, seen: Mapping[str, tuple[Vector, Vector | None]], batches: int) -> float:
         """Take in a segment, batch by batch; returns its seconds."""
-        first = math.ceil(piece.begin / self.dt - 1e-9)
+        first = math.ceil(piece.start / self.dt - 1e-9)
         borders = np.linspace(first, piece.end, batches + 1).round().astype(int)
         for name, (x, rate) in seen.items():
             if name not in self.signals:

@@ -1,4 +1,4 @@
-"""What every room needs and none owns: checks of arguments, whole files, progress, signals of the system.
+"""What all of fembeam needs: checks of arguments, whole files, progress, signals of the system.
 
 Imports nothing of ours.
 """
@@ -20,24 +20,3 @@ from fembeam.support.printed import Part, Printed, html_table
 from fembeam.support.progress import bar, counting
 from fembeam.support.text_tables import aligned
 from fembeam.support.versions import versions
-
-__all__ = [
-    "Part",
-    "Printed",
-    "aligned",
-    "bar",
-    "counting",
-    "frozen",
-    "html_table",
-    "is_finite",
-    "is_whole",
-    "note",
-    "number",
-    "require",
-    "require_finite",
-    "require_no_text",
-    "require_non_negative",
-    "require_positive",
-    "versions",
-    "written_whole",
-]

@@ -53,6 +53,8 @@ def require_no_text(where: str, **values: object) -> None:
 def number(name: str, value: Any, above: float = -math.inf, least: float = -math.inf) -> float:
     """The value as a finite float above one bound and not below another, or a clear error."""
     try:
+        if isinstance(value, (str, bytes)):
+            raise TypeError
         result = float(value)
     except (TypeError, ValueError):
         raise ValueError(f"{name} must be a number, got {value!r}") from None
@@ -62,8 +64,8 @@ def number(name: str, value: Any, above: float = -math.inf, least: float = -math
     return result
 
 
-def frozen(values: ArrayLike, dtype: type = np.float64) -> NDArray[Any]:
+def frozen(values: ArrayLike) -> NDArray[np.float64]:
     """A read-only copy, so that neither side can change the other's numbers."""
-    result: NDArray[Any] = np.array(values, dtype=dtype)
+    result = np.array(values, dtype=np.float64)
     result.flags.writeable = False
     return result

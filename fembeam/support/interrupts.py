@@ -9,29 +9,29 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-_state: dict[str, Any] = {"heard": 0, "waits": False}
+_state: dict[str, Any] = {"received": 0, "waits": False}
 
 
 @contextmanager
-def listening() -> Iterator[None]:
+def handling() -> Iterator[None]:
     """SIGINT and SIGTERM raise KeyboardInterrupt; outside the main thread nothing changes."""
-    _state.update(heard=0, waits=False)
+    _state.update(received=0, waits=False)
     before, hook = {}, sys.unraisablehook
 
-    def swallowed(said: Any) -> None:
+    def send_again(dropped: Any) -> None:
         """Ctrl-C within a callback of the interpreter or a library is dropped there: send it once more."""
-        if said.exc_type is KeyboardInterrupt:
+        if dropped.exc_type is KeyboardInterrupt:
             from threading import Timer
 
-            Timer(0.05, signal.raise_signal, [heard() or signal.SIGINT]).start()
+            Timer(0.05, signal.raise_signal, [received() or signal.SIGINT]).start()
         else:
-            hook(said)
+            hook(dropped)
 
-    sys.unraisablehook = swallowed
+    sys.unraisablehook = send_again
     try:
         for number in (signal.SIGINT, signal.SIGTERM):
             if signal.getsignal(number) is not signal.SIG_IGN:  # as nohup and background jobs want it
-                before[number] = signal.signal(number, _hear)
+                before[number] = signal.signal(number, _on_signal)
     except ValueError:  # not the main thread
         pass
     try:
@@ -42,9 +42,9 @@ def listening() -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def _hear(number: int, _: Any) -> None:
+def _on_signal(number: int, _: Any) -> None:
     """Note the first signal while it can wait, stop at any other."""
-    first, _state["heard"] = not _state["heard"], number
+    first, _state["received"] = not _state["received"], number
     if not (_state["waits"] and first):
         raise KeyboardInterrupt
     os.write(2, b"\nfembeam: stopping as soon as what was computed can be kept; once more stops at once\n")
@@ -62,10 +62,10 @@ def deferred() -> Iterator[None]:
 
 def check() -> None:
     """Stop here if a signal came."""
-    if heard():
+    if received():
         raise KeyboardInterrupt
 
 
-def heard() -> int:
+def received() -> int:
     """Number of the signal that came, 0 for none."""
-    return int(_state["heard"])
+    return int(_state["received"])

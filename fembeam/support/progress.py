@@ -12,7 +12,7 @@ SIMULATED = "{percentage:3.0f}%|{bar}| {n:.4g}/{total:.4g} s simulated [{elapsed
 
 @contextmanager
 def bar(duration: float, wanted: bool) -> Iterator[Callable[[float], None]]:
-    """A progress bar over simulated seconds; the moment at which signals are heard."""
+    """A progress bar over simulated seconds; where signals that waited are handled."""
     from fembeam.support import interrupts
 
     if not wanted:

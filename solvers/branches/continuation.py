@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from solvers.branches.ending import ending
 from solvers.branches.point import Point, metric_of, point_of
 from solvers.branches.reshooting import reshot
 from solvers.branches.subharmonic_end import Scaled
@@ -47,7 +48,7 @@ class Branch:
     kept: dict[int, Any] = field(default_factory=dict)  # for the user of the branch
 
     def __repr__(self) -> str:
-        return f"<branch of {counted(len(self.orbits), 'orbit')}: {'; '.join(one.value for one in self.status)}>"
+        return f"<branch of {counted(len(self.orbits), 'orbit')}: {'; '.join(self.endings)}>"
 
     @property
     def arms(self) -> list[Walk]:
@@ -66,6 +67,11 @@ class Branch:
         """How each direction ended."""
         closed = self.walks[0].status is BranchStatus.CLOSED  # then there is but one direction
         return tuple(walk.status for walk in self.walks[: 1 if closed else None])
+
+    @property
+    def endings(self) -> tuple[str, ...]:
+        """How each direction ended, in words, with where that is not the end of the span ahead."""
+        return tuple(ending(walk) for walk in self.walks[: len(self.status)])
 
     @property
     def special(self) -> list[Orbit]:

@@ -17,12 +17,17 @@ from solvers.problem import SolverError
 
 _SHARES = 1e-5, 1e-4, 1e-3, 1e-2  # of the span: how far the parameter goes
 _PERIODS = 30  # of the motion there
-_FARTHEST = 20.0  # distance of the orbit there, in units of that on the tangent, beyond which it is of another branch
+_PART, _MOST = 0.25, 0.6  # of the way, and the distance there in units of the whole: more, and it is another branch
 
 
-def hopped(a: Point, span: tuple[float, float]) -> Point | None:
-    """The first point found behind a corner near a point, None without laws with memory and where none is found."""
-    for share in _SHARES if a.orbit.memory else ():
+def hopped(a: Point, span: tuple[float, float], last: float) -> Point | None:
+    """The first point found behind a corner near a point, None without laws with memory and where none is found.
+
+    ``last`` is the share of the span that another hop has just gone, 0 if none has: then one ten times as far is tried
+    first. An orbit that pushes what it latches ahead, so that a border is just met, has a corner everywhere.
+    """
+    shares = sorted(_SHARES, key=lambda share: abs(math.log(share / (10.0 * last)))) if last > 0.0 else _SHARES
+    for share in shares if a.orbit.memory else ():
         try:
             return _behind(a, share, span)
         except (SolverError, np.linalg.LinAlgError, ValueError, ArithmeticError):
@@ -34,6 +39,15 @@ def _behind(a: Point, share: float, span: tuple[float, float]) -> Point:
     """The point at a parameter farther by a share of the span; raises OrbitError among others."""
     way = math.copysign(share * (span[1] - span[0]), a.share)
     parameter = min(max(a.chain.parameter + way, span[0]), span[1])
+    point, distance = _point_at(a, parameter)
+    near = a.chain.parameter + _PART * (parameter - a.chain.parameter)
+    if not 0.0 < _point_at(a, near)[1] < _MOST * distance:
+        raise OrbitError("the motion goes over to another branch")
+    return point
+
+
+def _point_at(a: Point, parameter: float) -> tuple[Point, float]:
+    """The point that the motion leads to, and its distance; raises OrbitError among others."""
     shots, x = a.problem.shots(parameter), a.chain.x[0]
     states = []
     for number in range(_PERIODS * len(shots) if a.orbit.stable else len(shots)):
@@ -42,6 +56,5 @@ def _behind(a: Point, share: float, span: tuple[float, float]) -> Point:
     guess = np.append(np.concatenate(states[-len(shots) :]), parameter)
     chain, error, iterations = corrected(a, guess, True, True)
     off = np.append(chain.x.ravel(), parameter) - a.unknowns
-    if not 0.0 < math.sqrt(off @ a.metric @ off) * abs(a.share) < _FARTHEST * share:
-        raise OrbitError("the motion goes over to another branch")
-    return point_of(a.problem, chain, error, iterations, a.metric, off)
+    ahead = np.append(np.zeros(len(off) - 1), off[-1])  # what is latched may turn the tangent, not the branch
+    return point_of(a.problem, chain, error, iterations, a.metric, ahead), math.sqrt(off @ a.metric @ off)

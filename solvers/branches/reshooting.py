@@ -53,7 +53,9 @@ def reshot(point: Point) -> Point:
         chain, error, iterations = newton(problem, x, point.chain.parameter, slope=True)
     except OrbitError:
         return point
-    return point_of(problem, chain, error, iterations, point.metric, _carried(point, chain, begins))
+    found = point_of(problem, chain, error, iterations, point.metric, _carried(point, chain, begins))
+    leads_back = bool(orbit.memory) and found.share * point.share < 0.0  # one of a family, a border just not met
+    return point if leads_back else found
 
 
 def _carried(point: Point, chain: Chain, begins: list[float]) -> Array:

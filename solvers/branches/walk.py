@@ -61,6 +61,7 @@ class Walk:
     step: float = 0.0
     before: tuple[Point, float] | None = None  # the point before and the way from it
     tried: float = math.inf  # step after whose failure nonsmooth points were looked for
+    hop: float = 0.0  # share of the span of the last hop, 0 after a longer step
     at_jump: bool = False  # whether one of them is a jump that could not be crossed
     passed: list[Point] = field(default_factory=list)
     values: list[float] = field(default_factory=list)  # of the parameter there
@@ -80,7 +81,7 @@ class Walk:
             h = self.step
             following = self._next() if h >= _SMALLEST else None
             if following is None and first and self.step < _CORNER:
-                first, point = False, hopped(self.point, self.span)
+                first, point = False, hopped(self.point, self.span, self.hop)
                 if point is not None:
                     return self._hop(point)
             if following is None and (self.step < _SMALLEST or h < _AGAIN * self.tried):
@@ -163,7 +164,9 @@ class Walk:
     def _hop(self, point: Point) -> None:
         """Go on behind a corner of laws with memory, marked if the number of transitions changes there."""
         same = len(point.orbit.transitions) == len(self.point.orbit.transitions)
+        way = abs(point.chain.parameter - self.point.chain.parameter)
         self._cross(None, point, [point.orbit if same else replace(point.orbit, mark="stick")])
+        self.hop = way / (self.span[1] - self.span[0])
         if point.chain.parameter in self.span:
             self.status = BranchStatus.END
 
@@ -251,6 +254,11 @@ class Walk:
         elif len(self.orbits) >= MOST_ORBITS:
             self.status = BranchStatus.LIMIT
         else:
+            if abs(point.chain.parameter - self.point.chain.parameter) > self.hop * (self.span[1] - self.span[0]):
+                self.hop = 0.0
+            held = len(point.chain.frozen) > len(self.point.chain.frozen)
+            if held and self.point.share * point.share < 0.0:  # a family in what is latched has no way of its own
+                point, self.before = replace(point, tangent=-point.tangent), None
             self.point = reshot(point)
 
     def _met(self, point: Point) -> int | None:

@@ -5,5 +5,5 @@ problem, the right-hand side (where a stop's force enters the equations) and the
 run changes, and the contact log; `packed` passes named tuples of arrays by their address; `simd` is a type of eight
 numbers and `sums` the weighted sums made with it; `parts` are functions compiled by themselves, some when first needed;
 `renewals` is what laws with memory latch; `dop853_tableau` holds coefficients; `cache` keeps machine code. Imports:
-`problem`, numba. Other rooms import from these files: kernels need their constants by name. Begin with `kernels`.
+`problem`, numba. Other folders import from these files: kernels need their constants by name. Begin with `kernels`.
 """

@@ -56,7 +56,7 @@ def _digest(paths: list[str]) -> str:
     return found.hexdigest()[:DIGITS]
 
 
-def _lasting() -> Iterator[Path]:
+def _permanent_places() -> Iterator[Path]:
     """Places that outlive the process, the best first."""
     if config.CACHE_DIR:
         yield Path(config.CACHE_DIR)
@@ -110,8 +110,8 @@ def _warn(what: str) -> None:
 
 
 def _folder(name: str) -> Path | None:
-    """The folder for these sources, or None where nothing can be written; without a lasting one a warning is given."""
-    for place in _lasting():
+    """The folder for these sources, or None where nothing can be written; warns where none is permanent."""
+    for place in _permanent_places():
         if _opened(place, name):
             return place / name
     with suppress(OSError):

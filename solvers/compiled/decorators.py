@@ -65,15 +65,15 @@ reordered = _decorator(**_INNER, forceinline=True, fastmath={"reassoc", "contrac
 """The same for sums whose order does not matter, so that they can be vectorised."""
 
 
-class _Teller(event.Listener):
+class _CompilerNotice(event.Listener):
     """Says once per process that code is compiled."""
 
-    told = False
+    given = False
 
     def on_start(self, _: Any) -> None:
         """A function was not found in the cache."""
-        if not self.told:
-            self.told = True
+        if not self.given:
+            self.given = True
             logging.getLogger("fembeam.solvers").warning(
                 "compiling the integrator, once for this version: 10 to 30 s, later starts load it"
             )
@@ -82,7 +82,7 @@ class _Teller(event.Listener):
         """It is compiled."""
 
 
-_TELLER = _Teller()
+_NOTICE = _CompilerNotice()
 
 
 @contextmanager
@@ -94,7 +94,7 @@ def _compiling() -> Iterator[None]:
     collects = gc.isenabled()
     gc.disable()
     try:
-        with event.install_listener("numba:compile", _TELLER):
+        with event.install_listener("numba:compile", _NOTICE):
             yield
     finally:
         if collects:

@@ -135,15 +135,15 @@ class PackedTemplate:
 
     def __init__(self, value: Any, kind: types.NamedTuple, own: Sequence[str]) -> None:
         self.value, described = value, _described(value, kind)
-        begins = np.cumsum([0] + [len(words) for words in described])
-        self.begins = dict(zip(value._fields, begins.tolist(), strict=False))
+        places = np.cumsum([0] + [len(words) for words in described])
+        self.places = dict(zip(value._fields, places.tolist(), strict=False))
         arrays = [getattr(value, name) for name in own]
         ends = np.cumsum([array.size for array in arrays])
         self.slices = [
             (name, slice(end - array.size, end), array.shape)
             for name, array, end in zip(own, arrays, ends.tolist(), strict=True)
         ]
-        self.size, self.own = int(ends[-1]), np.array([self.begins[name] + 4 for name in own])
+        self.size, self.own = int(ends[-1]), np.array([self.places[name] + 4 for name in own])
         self.offsets = 8 * (ends - [array.size for array in arrays])
         words = np.array([*chain(*described)], dtype=np.int64)
         self.block = np.concatenate([*(array.ravel() for array in arrays), words.view(float)])
@@ -154,7 +154,7 @@ class PackedTemplate:
         address = address_of(block)
         block[self.size :].view(np.int64)[self.own] = address + self.offsets
         for name, number in numbers.items():
-            block[self.size + self.begins[name]] = number
+            block[self.size + self.places[name]] = number
         arrays = {name: block[place].reshape(shape) for name, place, shape in self.slices}
         return Packed(self.value._replace(**arrays, **numbers), block, address + 8 * self.size)
 
@@ -210,5 +210,5 @@ class Layout:
     def replace_array(self, block: Any, i: int, j: int, array: Any) -> None:
         """Replace the j-th array of the i-th tuple by another of the same kind, which the caller must keep alive."""
         words = _descriptor(array.shape, address_of(array))
-        begin = self.size + self.descriptors[i][j]
-        block[begin : begin + len(words)].view(np.int64)[:] = words
+        first = self.size + self.descriptors[i][j]
+        block[first : first + len(words)].view(np.int64)[:] = words

@@ -38,7 +38,7 @@ T_IN, SPEED_IN, PEAK_DELTA, PEAK_FORCE, WORK_IN, IMPULSE_IN, RATE_CLIPPED = rang
 MOST_EVENTS_AT_ONCE = 100
 STEP, PART, LANDING, EVENT, RENEWAL = 0.0, 1.0, 2.0, 3.0, 4.0  # kinds of rows of State.event_record
 KIND, BEGAN, ENDED, SPAN, FIRST, SECOND, HEAD = range(7)  # columns of State.event_record: FIRST and SECOND are two
-# whole numbers whose meaning depends on the kind; from HEAD on the state at the row's begin, then the nodes' forces
+# whole numbers whose meaning depends on the kind; from HEAD on the state at the row's start, then the nodes' forces
 
 
 class State(NamedTuple):

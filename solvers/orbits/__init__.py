@@ -2,37 +2,12 @@
 
 `shots` integrates the parts of a period, `newton` corrects their states, `open_times` chooses where a shot may begin,
 `whole_state` appends to a state what laws have latched, `shooting` puts all together, `periodic_orbit` is the result
-with its Floquet multipliers. Imports: `integration` and the rooms below it. Begin with `shooting.orbit`.
+with its Floquet multipliers. Imports: `integration` and what it imports. Begin with `shooting.orbit`.
 """
 
 from solvers.orbits.newton import ArclengthCondition, extended, newton, weights
 from solvers.orbits.open_times import is_cut, latching_stops, open_begins
 from solvers.orbits.periodic_orbit import Orbit, OrbitError, at_zero, orbit_of
-from solvers.orbits.shooting import checked, checked_start, misfit, solved_chain
+from solvers.orbits.shooting import checked, checked_start, misfit, periods_of_decay, settled, solved_chain
 from solvers.orbits.shots import Chain, PeriodicProblem, delayed
-from solvers.orbits.whole_state import codes, counts, flown, run
-
-__all__ = [
-    "ArclengthCondition",
-    "Chain",
-    "Orbit",
-    "OrbitError",
-    "PeriodicProblem",
-    "at_zero",
-    "checked",
-    "checked_start",
-    "codes",
-    "counts",
-    "delayed",
-    "extended",
-    "flown",
-    "is_cut",
-    "latching_stops",
-    "misfit",
-    "newton",
-    "open_begins",
-    "orbit_of",
-    "run",
-    "solved_chain",
-    "weights",
-]
+from solvers.orbits.whole_state import codes, counts, flown, run, with_initial_memory

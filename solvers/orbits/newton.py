@@ -21,7 +21,7 @@ _ROUGH = (
 )
 _NEARLY = 1e-5  # relative residual after which the next step is expected to be the last
 _MOST_HALVINGS = 6
-_MOST_SEGMENTS = 3  # begins of a period in other segments than it ended with
+_MOST_SEGMENTS = 3  # starts of a period in other segments than it ended with
 _DEEPEST = 1e3  # energy of a stop in units of the motion's: a period spent deeper takes as long as thousands elsewhere
 
 

@@ -37,34 +37,34 @@ def open_intervals(
         open_spans, end = [], 0.0
         found = list(zip(contacts.t_in[mine], ends[mine], strict=True))
         found += [(0.0, left - period) for _, left in found if left > period]  # what goes on in the next period
-        for begin, left in [*sorted(found), (period, period)]:
-            if begin > end:
-                open_spans.append((float(end), float(begin)))
+        for start, left in [*sorted(found), (period, period)]:
+            if start > end:
+                open_spans.append((float(end), float(start)))
             end = max(end, left)
         if open_spans:
             return open_spans if passed is None else [part for span in open_spans for part in _cut(*span, passed)]
     return []
 
 
-def _cut(begin: float, end: float, at: Array) -> Iterator[tuple[float, float]]:
+def _cut(start: float, end: float, at: Array) -> Iterator[tuple[float, float]]:
     """The parts of an interval."""
-    return pairwise([begin, *sorted(at[(at > begin) & (at < end)].tolist()), end])
+    return pairwise([start, *sorted(at[(at > start) & (at < end)].tolist()), end])
 
 
 def open_begins(
     system: System, contacts: ContactLog, period: float, count: int, zero: bool, passed: Array | None = None
 ) -> list[float]:
-    """Times for the begins of ``count`` shots: zero if asked for, then the middles of the longest open intervals.
+    """Times for the starts of ``count`` shots: zero if asked for, then the middles of the longest open intervals.
 
     Fewer when there is no open interval.
     """
     open_spans = open_intervals(system, contacts, period, passed)
-    begins = [0.0] if zero else []
-    while open_spans and len(begins) < count:
+    starts = [0.0] if zero else []
+    while open_spans and len(starts) < count:
         a, b = open_spans.pop(max(range(len(open_spans)), key=lambda i: open_spans[i][1] - open_spans[i][0]))
-        begins.append(0.5 * (a + b))
-        open_spans += [(a, begins[-1]), (begins[-1], b)]
-    return sorted(begins)
+        starts.append(0.5 * (a + b))
+        open_spans += [(a, starts[-1]), (starts[-1], b)]
+    return sorted(starts)
 
 
 def closed(system: System, x: Array, stops: Sequence[int]) -> bool:

@@ -40,7 +40,7 @@ class Orbit:
         values. Each gives a multiplier 1, left out of `transverse`.
     residual : size of Φ(x) - x relative to the orbit's. iterations : of Newton's method.
     contacts : log of one period, times counted from ``phase``. transitions : likewise of laws with memory; impulse and
-        work are counted from the begin of the shot.
+        work are counted from the start of the shot.
     system, method : of what, and how it was integrated.
     doubt : why `stable` may be wrong; empty when no reason was found.
     parameter : value of the branch's parameter, NaN outside a branch.
@@ -153,23 +153,23 @@ def orbit_of(problem: PeriodicProblem, chain: Chain, residual: float, iterations
     system, period = problem.make(chain.parameter)
     phase = problem.fractions[0] * period
     logs = [solution.contacts for solution in chain.solutions]
-    begins = [fraction * period - phase for fraction in problem.fractions]
+    starts = [fraction * period - phase for fraction in problem.fractions]
     state, matrix = chain.x[0].copy(), chain.monodromy()
     if chain.coordinates < len(state):
         places = [(contact, place) for contact, count in enumerate(counts(system)) for place in range(count)]
         more["family"] = tuple(places[i - chain.coordinates] for i in chain.frozen)
         more["memory"] = memory_of(system, state)
-        more["transitions"] = transitions_of(chain.solutions, begins)
+        more["transitions"] = transitions_of(chain.solutions, starts)
         real = np.flatnonzero(~problem.codes(chain))
         state, matrix = state[: chain.coordinates], matrix[np.ix_(real, real)]
     return Orbit(
         *(state, period, phase, matrix, residual, iterations),
-        *(ContactLog.of_period(logs, begins, period), system, problem.method),
+        *(ContactLog.of_period(logs, starts, period), system, problem.method),
         **more,
     )
 
 
-def judged(orbit: Orbit) -> Orbit:
+def with_doubts(orbit: Orbit) -> Orbit:
     """The orbit with the reasons why `stable` may be wrong, checked with a tighter tolerance too."""
     tight = replace(orbit.method, rtol=max(0.03 * orbit.method.rtol, 1e-12))
     later = delayed(orbit.system, orbit.phase)

@@ -27,16 +27,17 @@ from numpy.typing import ArrayLike
 from solvers.exponential.method import Exponential
 from solvers.orbits.newton import extended, newton, weights
 from solvers.orbits.open_times import closed, is_cut, latching_stops, open_begins
-from solvers.orbits.periodic_orbit import Orbit, OrbitError, at_zero, judged, orbit_of
+from solvers.orbits.periodic_orbit import Orbit, OrbitError, at_zero, orbit_of, with_doubts
 from solvers.orbits.shots import Chain, PeriodicProblem
-from solvers.orbits.whole_state import begun, counts, flown, run
+from solvers.orbits.whole_state import counts, flown, run, with_initial_memory
 from solvers.problem import Array, System
 from solvers.problem.run_arguments import check_slopes
 
 _MOST_SHOTS = 6
-_MOST_BEGINS = 4  # times that the begins of shots are chosen anew
+_MOST_CHOICES = 4  # of the starting times of shots
 _SETTLING = 2.0  # periods that let laws with memory latch, from a start without
 _FRICTION = 20  # at least as many periods of a run from rest with them, since nothing else may damp it
+_LONGEST = 400  # periods of a run from rest
 _MOST_SETTLINGS = 4  # starts taken from a run from rest, a hundred periods apart
 
 
@@ -91,7 +92,7 @@ def _near(system: System, period: float, x: Array, method: Any, shots: int | Non
         try:
             problem, chain, residual, iterations = solved_chain(system, period, x, method, count)
             _check_isolated(problem, chain)
-            return judged(_from_zero(orbit_of(problem, chain, residual, iterations)))
+            return with_doubts(_from_zero(orbit_of(problem, chain, residual, iterations)))
         except OrbitError as error:
             tried.append(f"{count} shot(s): {error}")
     raise OrbitError("no orbit found near the start; tried " + "; ".join(tried))
@@ -163,20 +164,24 @@ def checked_start(system: System, start: ArrayLike, period: float, method: Any) 
     if x.shape not in ((n2,), (whole,)) or not np.all(np.isfinite(x)):
         more = f", or {whole} with what is latched" if whole > n2 else ""
         raise ValueError(f"start must be {n2} finite numbers [q, q_dot]{more}, got {start!r}")
-    return x if x.shape == (whole,) else flown(system, begun(system, x), _SETTLING * period, method)
+    return x if x.shape == (whole,) else flown(system, with_initial_memory(system, x), _SETTLING * period, method)
 
 
-def settled(system: System, period: float, method: Any, longest: int = 400) -> Array:
-    """State to which a run from rest has settled: until the slowest block has decayed, at most ``longest`` periods.
+def settled(system: System, period: float, method: Any) -> Array:
+    """State to which a run from rest has settled: until the slowest block has decayed, at most 400 periods.
 
     It comes with what is latched.
     """
-    blocks = system.blocks
-    slowest = float((0.5 * blocks.c)[blocks.c > 0.0].min(initial=math.inf))
     least = _FRICTION if any(counts(system)) else 1
-    count = min(max(least, math.ceil(7.0 / (slowest * period))), longest)
-    x = begun(system, np.zeros(2 * system.size))
+    count = min(max(least, periods_of_decay(system, period)), _LONGEST)
+    x = with_initial_memory(system, np.zeros(2 * system.size))
     return flown(system, x, count * period, replace(method, rtol=max(method.rtol, 1e-8)))
+
+
+def periods_of_decay(system: System, period: float) -> int:
+    """Periods until the slowest of the decoupled blocks that are damped has decayed to e⁻⁷; 0 if none is damped."""
+    rates = 0.5 * system.blocks.c[system.blocks.c > 0.0]
+    return math.ceil(7.0 / (float(rates.min(initial=math.inf)) * period))
 
 
 def solved_chain(
@@ -184,10 +189,10 @@ def solved_chain(
 ) -> tuple[PeriodicProblem, Chain, float, int]:
     """The chain of an orbit near a state, with its relative residual and the iterations.
 
-    The orbit's contacts may lie elsewhere than the guess's. A shot that begins in a contact lacks its entry rate; if
-    the law depends on it, the shots are begun again in open intervals.
+    The orbit's contacts may lie elsewhere than the guess's. A shot that starts in a contact lacks its entry rate; if
+    the law depends on it, the shots start anew in open intervals.
     """
-    for _ in range(_MOST_BEGINS):
+    for _ in range(_MOST_CHOICES):
         problem, guess = _start_chain(system, period, x, method, count)
         chain, residual, iterations = newton(problem, guess, 0.0)
         if not is_cut(chain, system):
@@ -201,13 +206,13 @@ def _start_chain(system: System, period: float, x: Array, method: Any, count: in
     first = run(system, x, period, method=method)
     passed = first.transitions.t if any(counts(system)) else None
     zero = not closed(system, x, range(len(system.contacts)))
-    begins = open_begins(system, first.contacts, period, count, zero, passed)
-    if not begins and not closed(system, x, latching_stops(system)):
-        begins = [0.0]
-    if len(begins) < count:
+    starts = open_begins(system, first.contacts, period, count, zero, passed)
+    if not starts and not closed(system, x, latching_stops(system)):
+        starts = [0.0]
+    if len(starts) < count:
         raise OrbitError("at no time of the period are all stops open whose law latches the entry rate")
-    states = [x if t == 0.0 else flown(system, x, t, method) for t in begins]
-    return PeriodicProblem(_Constant(system, period), method, tuple(t / period for t in begins)), np.array(states)
+    states = [x if t == 0.0 else flown(system, x, t, method) for t in starts]
+    return PeriodicProblem(_Constant(system, period), method, tuple(t / period for t in starts)), np.array(states)
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""A period as a chain of shots: each is a run from its begin to the next one's, with its exact tangent."""
+"""A period as a chain of shots: each is a run from its start to the next one's, with its exact tangent."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def delayed(system: System, delay: float) -> System:
 class PeriodicProblem:
     """A family of periodic problems: the system and its period for each value of a parameter.
 
-    ``fractions`` (m,) are the shots' begins in units of the period, ascending; ``step`` is the parameter's difference,
+    ``fractions`` (m,) are the shots' starts in units of the period, ascending; ``step`` is the parameter's difference,
     zero where there is none.
     """
 
@@ -54,7 +54,7 @@ class PeriodicProblem:
     kept: dict[float, list[tuple[System, float]]] = field(default_factory=dict, init=False, repr=False)
 
     def shots(self, parameter: float) -> list[tuple[System, float]]:
-        """(system from the shot's begin on, duration) of every shot."""
+        """(system from the shot's start on, duration) of every shot."""
         if parameter not in self.kept:
             system, period = self.make(parameter)
             ends = (*self.fractions[1:], self.fractions[0] + 1.0)

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 
 from solvers.integration import integrate
-from solvers.problem import Array, Parameter, Solution, System, Transitions
+from solvers.problem import Array, Parameter, Solution, System, Transitions, renew
 
 _REALS = ctypes.POINTER(ctypes.c_double)
 _AT = ctypes.c_int64, ctypes.c_double, ctypes.c_double, ctypes.c_double, _REALS  # border, δ, δ̇, entry rate, parameters
-_RENEW, _SLOPES = ctypes.CFUNCTYPE(ctypes.c_int64, *_AT), ctypes.CFUNCTYPE(None, *_AT, _REALS)
+_SLOPES = ctypes.CFUNCTYPE(None, *_AT, _REALS)
 
 
 def counts(system: System) -> list[int]:
@@ -41,7 +41,7 @@ def _remembering(system: System) -> list[Any]:
     return [contact for contact, count in zip(system.contacts, counts(system), strict=True) if count]
 
 
-def begun(system: System, x: Array) -> Array:
+def with_initial_memory(system: System, x: Array) -> Array:
     """A state [q, q̇] with what the laws begin with."""
     latched = [np.asarray(one.law.parameters)[list(one.law.memory)] for one in _remembering(system)]
     return np.concatenate((x, *latched)) if latched else x
@@ -98,7 +98,7 @@ def units(system: System, x: Array, log: Transitions) -> Array:
         for i in np.flatnonzero(log.contact == number) if places else ():
             at = int(log.border[i]), float(log.delta[i]), float(log.delta_dot[i])
             taken = np.abs(_slopes(law, row, *at)[:, :2] * at[1:]).max(axis=1)
-            _RENEW(law.renew_address)(*at, 1.0, row.ctypes.data_as(_REALS))
+            renew(law, row, *at)
             size = np.maximum(size, np.maximum(taken, np.abs(row[places])))
         sizes.append(np.where(size > 0.0, size, 1.0))
     return np.concatenate((np.zeros(0), *sizes))
@@ -112,9 +112,9 @@ def _slopes(law: Any, row: Array, border: int = -1, delta: float = 0.0, rate: fl
     return out
 
 
-def transitions_of(solutions: Sequence[Solution], begins: Sequence[float]) -> Transitions:
-    """One log of the runs that make up a period, each of whose times counts from its own begin."""
+def transitions_of(solutions: Sequence[Solution], starts: Sequence[float]) -> Transitions:
+    """One log of the runs that make up a period, each of whose times counts from its own start."""
     logs = [solution.transitions for solution in solutions]
     columns = {name: [getattr(log, name) for log in logs] for name in Transitions.__dataclass_fields__}
-    columns["t"] = [t + begin for t, begin in zip(columns["t"], begins, strict=True)]
+    columns["t"] = [t + start for t, start in zip(columns["t"], starts, strict=True)]
     return Transitions(*(np.concatenate(column) for column in columns.values()))

@@ -10,7 +10,7 @@ Imports: numpy, scipy. Begin with `system.System`.
 
 from solvers.problem.decoupling import decouple
 from solvers.problem.frames import dataframe, optional
-from solvers.problem.losses import Losses
+from solvers.problem.losses import Losses, renew
 from solvers.problem.matrices import Array, dense, product
 from solvers.problem.memo import Memo
 from solvers.problem.result import (
@@ -24,34 +24,5 @@ from solvers.problem.result import (
     Transitions,
     counted,
 )
-from solvers.problem.signals import Forcing, hand_over, on_one_grid, tones_as_nodes
+from solvers.problem.signals import Forcing, forcing_of, on_one_grid, tones_as_nodes
 from solvers.problem.system import Contact, Law, Parameter, System, require_step
-
-__all__ = [
-    "COLUMNS",
-    "Array",
-    "Contact",
-    "ContactLog",
-    "Cost",
-    "Energy",
-    "Forcing",
-    "Law",
-    "Losses",
-    "Memo",
-    "Parameter",
-    "Solution",
-    "SolverError",
-    "Status",
-    "System",
-    "Transitions",
-    "counted",
-    "dataframe",
-    "decouple",
-    "dense",
-    "hand_over",
-    "on_one_grid",
-    "optional",
-    "product",
-    "require_step",
-    "tones_as_nodes",
-]

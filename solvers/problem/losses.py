@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -14,6 +15,9 @@ from solvers.problem.matrices import Array
 from solvers.problem.result import Transitions, counted
 from solvers.problem.system import Contact
 
+_REALS = ctypes.POINTER(ctypes.c_double)
+_RENEW = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, *[ctypes.c_double] * 3, _REALS)
+
 Held = tuple[Array, Sequence[Array]]  # a method's state, at the end with its energy balance; what laws have latched
 
 
@@ -25,8 +29,7 @@ class Losses:
     ----------
     work : (m,) J done on each. stored : (m,) J that its law holds more at the end than at the begin; NaN where a law
         cannot tell.
-    slip : (m,) m (rad of rotation), distance that δ went while sliders slipped, summed over the sliders of a law. A
-        slip without begin and end in the run counts for nothing.
+    slip : (m,) m (rad of rotation), distance that δ went while sliders slipped, summed over the sliders of a law.
     history : (k, m) J, work done on each up to the samples.
 
     Notes
@@ -76,7 +79,9 @@ class Losses:
         size = begin[0].size
         deltas = [_indentations(contacts, back.dot(x[:size])) for x, _ in (begin, end)]
         first, last = (_stored(contacts, d, latched) for d, (_, latched) in zip(deltas, (begin, end), strict=True))
-        return cls(end[0][size + 2 :: 2], last - first, _slipped(transitions(), *deltas), powers[:, 2::2])
+        return cls(
+            end[0][size + 2 :: 2], last - first, _slipped(contacts, begin[1], transitions(), *deltas), powers[:, 2::2]
+        )
 
     def part(self, kept: slice) -> Losses:
         """Of some of the samples: their work; what was stored and slip are not known there."""
@@ -110,9 +115,11 @@ def _stored_by(contact: Contact, delta: float, latched: Array) -> float:
     return float(law.stored(delta, row))
 
 
-def _slipped(passed: Transitions, begin: Array, end: Array) -> Array:
+def _slipped(
+    contacts: Sequence[Contact], memory: Sequence[Array], passed: Transitions, begin: Array, end: Array
+) -> Array:
     """(m,) way of δ while sliders slipped, of those also that slip at the begin or at the end of the run."""
-    path, since = np.zeros(len(begin)), {}
+    path, since = np.zeros(len(begin)), _slipping(contacts, memory, begin)
     for contact, border, event, delta in zip(passed.contact, passed.border, passed.event, passed.delta, strict=True):
         if event == "slip":
             since[contact, border] = delta
@@ -121,3 +128,22 @@ def _slipped(passed: Transitions, begin: Array, end: Array) -> Array:
     for (contact, _), delta in since.items():
         path[contact] += abs(end[contact] - delta)
     return path
+
+
+def _slipping(contacts: Sequence[Contact], memory: Sequence[Array], deltas: Array) -> dict[tuple[int, int], float]:
+    """δ of every slider, by contact and border, that slips with what is latched: it may stick next."""
+    found: dict[tuple[int, int], float] = {}
+    for number, (contact, latched) in enumerate(zip(contacts, memory, strict=True)):
+        law: Any = contact.law
+        for border in range(law.borders) if {"stick", "slip"} <= {*getattr(law, "events", ())} else ():
+            row = np.array(law.parameters, dtype=float)
+            row[list(law.memory)] = latched
+            if renew(law, row, border, float(deltas[number]), 0.0) == "stick":
+                found[number, border] = float(deltas[number])
+    return found
+
+
+def renew(law: Any, row: Array, border: int, delta: float, rate: float) -> str:
+    """Renew what a law has latched in a row of its parameters, as when a border is met; returns the event."""
+    event: str = law.events[_RENEW(law.renew_address)(border, delta, rate, 1.0, row.ctypes.data_as(_REALS))]
+    return event

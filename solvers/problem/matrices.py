@@ -30,7 +30,7 @@ def dense(matrix: Any) -> Array:
     return array
 
 
-def _square(name: str, matrix: Any) -> Any:
+def square_matrix(name: str, matrix: Any) -> Any:
     """A finite, symmetric copy of a matrix: sparse by columns if it was sparse, else dense."""
     if hasattr(matrix, "toarray"):
         from scipy.sparse import csc_array
@@ -51,7 +51,7 @@ def _square(name: str, matrix: Any) -> Any:
     return copied
 
 
-def _check_mass(M: Any) -> None:
+def check_mass(M: Any) -> None:
     """M is positive definite."""
     if hasattr(M, "toarray"):
         if _has_positive_pivots(M):

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from solvers.problem.frames import dataframe
+from solvers.problem.frames import Columns
 from solvers.problem.matrices import Array
 from solvers.problem.system import stored_energy
 
@@ -58,7 +58,7 @@ class SolverError(RuntimeError):
 
 
 @dataclass(frozen=True, eq=False)
-class ContactLog:
+class ContactLog(Columns):
     """Contacts in order of their end, one array entry each; a contact still open at the end has t_out = NaN.
 
     Attributes
@@ -100,34 +100,26 @@ class ContactLog:
         return cls(*columns)
 
     @classmethod
-    def of_period(cls, logs: Sequence[ContactLog], begins: Sequence[float], period: float) -> ContactLog:
-        """One log of the runs that make up a period, each of whose times counts from its own begin.
+    def of_period(cls, logs: Sequence[ContactLog], starts: Sequence[float], period: float) -> ContactLog:
+        """One log of the runs that make up a period, each of whose times counts from its own start.
 
         A contact cut by the end of a run is made whole again with its rest in the next run (of the next period).
         """
         rows = [np.array(list(log.arrays().values()), dtype=float).T for log in logs]
-        for i, begin in enumerate(begins):
+        for i, start in enumerate(starts):
             for row in rows[i][np.isnan(rows[i][:, 2])]:
                 rest = rows[(i + 1) % len(rows)]
-                later = begins[i + 1] if i + 1 < len(rows) else begins[0] + period
+                later = starts[i + 1] if i + 1 < len(rows) else starts[0] + period
                 found = np.flatnonzero((rest[:, 0] == row[0]) & (rest[:, 1] == 0.0) & ~np.isnan(rest[:, 2]))
                 if found.size:
-                    _make_whole(row, rest[found[0]], later - begin)
+                    _make_whole(row, rest[found[0]], later - start)
                     rows[i][(rows[i][:, 0] == row[0]) & np.isnan(rows[i][:, 2])] = row
                     rows[(i + 1) % len(rows)] = np.delete(rest, found[0], axis=0)
         moved = [
-            part + np.array([0.0, begin, begin] + [0.0] * (COLUMNS - 3))
-            for part, begin in zip(rows, begins, strict=True)
+            part + np.array([0.0, start, start] + [0.0] * (COLUMNS - 3))
+            for part, start in zip(rows, starts, strict=True)
         ]
         return cls.of_rows(np.concatenate(moved))
-
-    def arrays(self) -> dict[str, Any]:
-        """All columns by name."""
-        return {f.name: getattr(self, f.name) for f in fields(self)}
-
-    def to_dataframe(self) -> Any:
-        """A table of pandas, one contact a row, in SI units; ImportError where pandas is missing."""
-        return dataframe(self.arrays())
 
 
 COLUMNS = len(fields(ContactLog))
@@ -141,7 +133,7 @@ def _make_whole(row: Array, rest: Array, later: float) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class Transitions:
+class Transitions(Columns):
     """Borders that laws with memory have passed, in order of time, one array entry each.
 
     Attributes
@@ -180,17 +172,13 @@ class Transitions:
 
     def slid(self) -> Array:
         """(k,) m: path of the slip that each "stick" ends, 0 for other rows."""
-        path, begun = np.zeros(len(self)), {}
+        path, slips = np.zeros(len(self)), {}
         for i, key in enumerate(zip(self.contact, self.border, strict=True)):
             if self.event[i] == "slip":
-                begun[key] = self.delta[i]
-            elif self.event[i] == "stick" and key in begun:
-                path[i] = abs(self.delta[i] - begun.pop(key))
+                slips[key] = self.delta[i]
+            elif self.event[i] == "stick" and key in slips:
+                path[i] = abs(self.delta[i] - slips.pop(key))
         return path
-
-    def to_dataframe(self) -> Any:
-        """A table of pandas, one transition a row, in SI units; ImportError where pandas is missing."""
-        return dataframe({f.name: getattr(self, f.name) for f in fields(self)})
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,10 +196,10 @@ class Energy:
     initial: float
 
     @classmethod
-    def of_run(cls, M: Any, K: Any, powers: Array, motion: Array, begin: Array) -> Energy:
-        """From the integrated powers (k, 2 + 2m) and the motion [q, q̇] (k, 2n), which began at (2n,)."""
-        stored, initial = (stored_energy(M, K, *np.split(x, 2, axis=-1)) for x in (motion, begin))
-        return cls(powers[:, 0], powers[:, 1], powers[:, 2::2].sum(axis=1), stored, float(initial))
+    def of_run(cls, M: Any, K: Any, works: Array, motion: Array, start: Array) -> Energy:
+        """From the works (k, 2 + 2m) and the motion [q, q̇] (k, 2n), which began at (2n,)."""
+        stored, initial = (stored_energy(M, K, *np.split(x, 2, axis=-1)) for x in (motion, start))
+        return cls(works[:, 0], works[:, 1], works[:, 2::2].sum(axis=1), stored, float(initial))
 
     def __repr__(self) -> str:
         return f"<energy balance of {counted(len(self.stored), 'sample')}>"

@@ -14,7 +14,7 @@ from solvers.problem import Array, Parameter, System
 _MOST_SAMPLES = 500_000_000
 
 
-def _check_tangent(tangent: Any, method: Any, system: System) -> None:
+def check_tangent(tangent: Any, method: Any, system: System) -> None:
     """A tangent is asked for in one of its forms, of a method that has one, for laws that have one."""
     if tangent is False:
         return
@@ -42,7 +42,7 @@ def _finite_slopes(system: System) -> bool:
     return True
 
 
-def _start(system: System, q0: ArrayLike, q_dot0: ArrayLike, method: Any) -> Array:
+def checked_start(system: System, q0: ArrayLike, q_dot0: ArrayLike, method: Any) -> Array:
     """Checked start in the coordinates a method steps in: decoupled blocks, or the system's own."""
     n = system.size
     start = np.empty(2 * n)
@@ -61,7 +61,7 @@ def _start(system: System, q0: ArrayLike, q_dot0: ArrayLike, method: Any) -> Arr
     return system.blocks.inverse.dot(start)
 
 
-def _times(duration: float, dt: Any) -> Array | None:
+def output_times(duration: float, dt: Any) -> Array | None:
     """Output times of a sampling, or those given; None for none."""
     if not 0.0 < duration < math.inf:
         raise ValueError(f"duration must be positive and finite (s), got {duration!r}")
@@ -87,7 +87,7 @@ def _given_times(duration: float, given: ArrayLike) -> Array:
     return times
 
 
-def _check_laws(system: System) -> None:
+def check_laws(system: System) -> None:
     """Every law is finite at rest, so that a NaN is found before the run; checked once per system."""
     system.about_laws.get("finite", lambda: _finite(system))
 

@@ -1,12 +1,12 @@
-"""How signals reach the compiled integrators.
+"""Signals as arrays, for compiled code.
 
-A signal is any callable t -> value that broadcasts. It is handed over as exactly one of
+A signal is any callable t -> value that broadcasts. It becomes exactly one of
 
 * *tones*: ``signal.tones() -> (omega (k,), amplitude (k,) complex)``, value Re Σ a e^{iωt}, exact;
 * *nodes*: ``signal.nodes(duration, rtol) -> (dt, (N, 3))``, rows [s, s', s''] at t = 0, dt, ...; between them the
   quintic through both ends' values, slopes and curvatures, within ``rtol`` times the signal's size, in the mean
   square at least;
-* nothing of either: sampled here by a quintic spline, refined until it agrees between its nodes. It begins with 64
+* nothing of either: sampled here by a quintic spline, refined until it agrees between its nodes. The first grid has 64
   cells: what is shorter than duration/64, such as a pulse, may hide between them and needs ``nodes``.
 """
 
@@ -36,7 +36,7 @@ class Forcing:
     table_load: Any
 
 
-def hand_over(signals: list[Signal], duration: float, rtol: float) -> Forcing:
+def forcing_of(signals: list[Signal], duration: float, rtol: float) -> Forcing:
     """Arrays of all signals on [0, duration]."""
     tones: list[tuple] = []
     tables: list[tuple[float, Array, int]] = []

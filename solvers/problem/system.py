@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from solvers.problem.decoupling import Blocks, decouple
-from solvers.problem.matrices import Array, _check_mass, _square, dense, product
+from solvers.problem.matrices import Array, check_mass, dense, product, square_matrix
 from solvers.problem.memo import Memo
 
 
@@ -142,13 +142,13 @@ class System:
 
     def __post_init__(self) -> None:
         for name in "MCK":
-            object.__setattr__(self, name, _square(name, getattr(self, name)))
+            object.__setattr__(self, name, square_matrix(name, getattr(self, name)))
         if not self.M.shape == self.C.shape == self.K.shape:
             raise ValueError(f"M, C, K must have one shape, got {self.M.shape}, {self.C.shape}, {self.K.shape}")
         if not all(hasattr(matrix, "toarray") for matrix in (self.M, self.C, self.K)):
             for name in "MCK":
                 object.__setattr__(self, name, dense(getattr(self, name)))
-        _check_mass(self.M)
+        check_mass(self.M)
         self._check_contacts_and_loads()
 
     def _check_contacts_and_loads(self, known: Sequence[Any] = ()) -> None:

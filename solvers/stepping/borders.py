@@ -1,7 +1,7 @@
 """Borders of laws with memory in a step: located on its dense output, or passed and made good at its end.
 
 Under error control no step goes across a border: `border_ahead` finds the first one on the dense output, the step is
-repeated to end there, and `renew_together` renews all borders reached. A margin that is zero at the begin of a step, as
+repeated to end there, and `renew_together` renews all borders reached. A margin that is zero at the start of a step, as
 after a renewal, is judged by its sign as soon as that is more than rounding. Methods of constant step go across:
 `renew_passed` renews at the end of a step what it has passed, until no margin is below zero (a return map).
 """
@@ -16,7 +16,7 @@ import numpy as np
 from solvers.compiled.kernels import dot, inner, kernel
 from solvers.compiled.renewals import margins, margins_before, margins_in, note_event, renew
 from solvers.compiled.state import LAST_EVENT, T, most_borders, rate_tolerance, surface_tolerance
-from solvers.stepping.events import NONE, coefficients_of, golden_section, polynomial
+from solvers.stepping.events import NONE, bisection, coefficients_of, golden_section, polynomial
 
 _MISSED = 1e-3  # margin, in units of the largest of the step, by which a landing may have missed its border
 _NODES = np.array([0.0, *(2.0**i for i in (-20, -15, -11, -8, -7, -6, -5, -4, -3, -2)), *(np.arange(3, 9) / 8.0)])
@@ -73,18 +73,6 @@ def _beyond(known, theta):
 
 
 @inner
-def _first_beyond(known, a, b):
-    """Bisection for where a margin falls below zero in [a, b]."""
-    for _ in range(50):
-        middle = 0.5 * (a + b)
-        if _beyond(known, middle) > 0.0:
-            b = middle
-        else:
-            a = middle
-    return b
-
-
-@inner
 def _lowest(known, values, i, rounding):
     """Place of the lowest margin around node i if it is below zero, else NONE; node i is not above its neighbours."""
     before, after = values[i - 1], values[min(i + 1, _NODES.size - 1)]
@@ -109,10 +97,10 @@ def _crossing(problem, state, space, s, j):
     missed = state.now[T] == state.now[LAST_EVENT] and state.now[T] > 0.0 and values[0] > -_MISSED * largest
     for i in range(1, n):
         if values[i] < -rounding and not (missed and values[i] > values[i - 1]):
-            return _first_beyond(known, _NODES[i - 1], _NODES[i]) if inside else 0.0
+            return bisection(_beyond, known, _NODES[i - 1], _NODES[i]) if inside else 0.0
         lowest = _lowest(known, values, i, rounding)
         if lowest < NONE:
-            return _first_beyond(known, _NODES[i - 1], lowest) if inside else 0.0
+            return bisection(_beyond, known, _NODES[i - 1], lowest) if inside else 0.0
         inside |= values[i] > rounding
     return NONE
 
@@ -128,7 +116,7 @@ def border_ahead(problem, state, space):
         _watch(problem, state, space, s)
         for j in range(problem.border_count[s]):
             found = _crossing(problem, state, space, s, j)
-            space.begun[s, j] = space.present[s, j]
+            space.at_start[s, j] = space.present[s, j]
             if found < theta:
                 theta, element, border = found, s, j
     return theta, element, border
@@ -167,7 +155,7 @@ def renew_together(problem, state, space, h, element, border, log):
         delta, rate = _present(problem, state, space, s, state.x)
         margins_before(problem, state, s, delta, rate, _BEFORE * h, space.trial, space.one)
         for j in range(problem.border_count[s]):
-            before, rounding = max(space.begun[s, j], space.one[j]), space.rounding[s, j]
+            before, rounding = max(space.at_start[s, j], space.one[j]), space.rounding[s, j]
             reached = before > rounding and space.present[s, j] <= max(8.0 * rounding, _TOGETHER * before)
             if reached or (s == element and j == border):
                 renew(problem, state, s, j, delta, rate, log)

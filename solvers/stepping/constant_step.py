@@ -83,8 +83,8 @@ class ConstantStep(ABC):
     def engine(self, system: System, z: Array, forcing: Forcing, duration: float) -> Any:
         """The method made ready for one run; ValueError for a step that is predicted to be unstable or blind."""
         if not self.force_unstable:
-            refuse(self, system, duration)
-            refuse_blind(self, forcing)
+            check_stability(self, system, duration)
+            check_sampling(self, forcing)
         if self.takes_matrices(system):
             from solvers.stepping.sparse import MatrixEngine
 
@@ -94,7 +94,7 @@ class ConstantStep(ABC):
         return Engine(self, system, z, forcing, duration)
 
 
-def refuse(method: ConstantStep, system: System, duration: float) -> None:
+def check_stability(method: ConstantStep, system: System, duration: float) -> None:
     """ValueError for a step above its limit; checked once per system."""
     key = "limit", type(method), method.constants, duration
     found = system.kept.get(key, lambda: method.stable_dt(system, duration=duration))
@@ -110,7 +110,7 @@ def refuse(method: ConstantStep, system: System, duration: float) -> None:
             )
 
 
-def refuse_blind(method: ConstantStep, forcing: Forcing) -> None:
+def check_sampling(method: ConstantStep, forcing: Forcing) -> None:
     """ValueError for a step that samples a load less than twice in its period, and so takes it for a slower one."""
     seen = forcing.tone_omega[forcing.tone_amplitude != 0.0]
     fastest = max([0.0, *seen, *(_mean_frequency(rows) for rows in np.split(forcing.table, forcing.table_start[1:-1]))])

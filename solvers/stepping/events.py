@@ -60,15 +60,22 @@ def _signed(known, theta):
 
 
 @inner
-def _root(coefficients, level, sign, a, b):
-    """Bisection for the outward crossing in [a, b]."""
+def bisection(value, known, a, b):
+    """Where ``value(known, θ)`` becomes positive in [a, b]."""
     for _ in range(50):
         middle = 0.5 * (a + b)
-        if sign * (polynomial(coefficients, middle) - level) > 0.0:
+        if value(known, middle) > 0.0:
             b = middle
         else:
             a = middle
     return b
+
+
+@inner
+def _beyond(known, theta):
+    """sign·(δ - level) at θ."""
+    coefficients, level, sign = known
+    return sign * (polynomial(coefficients, theta) - level)
 
 
 @inner
@@ -87,12 +94,12 @@ def crossing(coefficients, rates, level, sign, tolerance):
         if value > tolerance:
             if i == 1 and last >= -tolerance:
                 return UNRESOLVED
-            return _root(coefficients, level, sign, _NODES[i - 1], _NODES[i])
+            return bisection(_beyond, (coefficients, level, sign), _NODES[i - 1], _NODES[i])
         rises = sign * polynomial(rates, _NODES[i]) > 0.0
         if rising and not rises:
             top = golden_section(_signed, (coefficients, sign), _NODES[i - 1], _NODES[i])[0]
             if sign * (polynomial(coefficients, top) - level) > tolerance:
-                return _root(coefficients, level, sign, _NODES[i - 1], top)
+                return bisection(_beyond, (coefficients, level, sign), _NODES[i - 1], top)
         last, rising = value, rises
     return NONE
 

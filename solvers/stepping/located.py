@@ -40,15 +40,11 @@ from solvers.stepping.events import (
     polynomial,
 )
 
-EVENT = -1  # beside the status codes
+SWITCHED = -1  # beside the status codes: an event has changed the right-hand side
 
 _PEAK_NODES = np.linspace(0.0, 1.0, 9)
-
-
 _KINK_NODES = np.array([0.0, 1 / 16, 1 / 4, 1 / 2, 3 / 4, 7 / 8, 31 / 32, 127 / 128, 511 / 512, 1.0])
-
-
-_AT_AN_END = 1e-6  # share of a step: a kink as near to an end as that counts as reached
+NEAR_END = 1e-6  # share of a step: a kink as near to an end as that counts as reached
 
 
 @inner
@@ -87,7 +83,7 @@ def _peak_value(known, theta):
 
 
 @inner
-def _kink(problem, state, space):
+def first_kink(problem, state, space):
     """θ of the first place inside the step where a clamped force begins or ends, or a damper of approach; else NONE."""
     first, batch = NONE, space.work[0]
     for s in range(problem.gap.size):
@@ -105,7 +101,7 @@ def _kink(problem, state, space):
                 middle = 0.5 * (a + b)
                 same = _side(problem, state, space, s, middle, lowest, batch) == before
                 a, b = (middle, b) if same else (a, middle)
-            if b > _AT_AN_END and b < 1.0 - _AT_AN_END:
+            if b > NEAR_END and b < 1.0 - NEAR_END:
                 first = min(first, b)
                 break
     return first
@@ -145,7 +141,7 @@ def landing_tolerance(problem, state, stop):
 
 
 @inner
-def _land(step, problem, state, space, h, longest, stop, direction, level, border, rtol, atol):
+def land(step, problem, state, space, h, longest, stop, direction, level, border, rtol, atol):
     """Repeat the step with the duration that ends on ``level``, or on a ``border`` that is not -1.
 
     Returns the duration, else minus the step to try instead.
@@ -195,7 +191,7 @@ def _switch_by_sign(problem, state, log):
 
 @kernel
 def look(problem, state, space, t_end, log, events):
-    """Before a step: a status code if the run is over, EVENT if a stop switched or passed a border, else RUNNING."""
+    """Before a step: a status code if the run is over, SWITCHED if a stop switched or passed a border, else RUNNING."""
     if state.now[T] >= t_end:
         return DONE
     if state.count[LOGGED] + most_rows(problem) > log.shape[0]:
@@ -206,7 +202,7 @@ def look(problem, state, space, t_end, log, events):
         switched = _switch_by_sign(problem, state, log)
     else:
         switched = switch_on_surface(problem, state, log, events == LOCATED)
-    return EVENT if renew_passed(problem, state, space, log) or switched else RUNNING
+    return SWITCHED if renew_passed(problem, state, space, log) or switched else RUNNING
 
 
 @kernel

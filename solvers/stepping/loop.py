@@ -17,6 +17,8 @@ from solvers.compiled.kernels import (
     REAL,
     VECTOR,
     entry,
+    inner,
+    merged,
     rhs,
 )
 from solvers.compiled.state import (
@@ -45,9 +47,9 @@ from solvers.stepping.events import (
 )
 from solvers.stepping.henon import hermite
 from solvers.stepping.henon import land as henon_landing
-from solvers.stepping.located import _AT_AN_END, EVENT, _kink, _land, accept, find, look
+from solvers.stepping.located import NEAR_END, SWITCHED, accept, find, first_kink, land, look
 
-STEP = types.FunctionType(
+STEP_FUNCTION = types.FunctionType(
     types.Tuple([REAL, types.int64])(
         *[PROBLEM, REAL, REAL, VECTOR, VECTOR, INTEGERS, VECTOR],
         *[VECTOR, VECTOR, MATRIX, MATRIX, REAL, REAL],
@@ -70,7 +72,7 @@ class Space(NamedTuple):
     trial: Any  # (2,) δ and δ̇ at one point
     one: Any  # (B,) margins there
     scale: Any  # (m, 2) what rounding may make of δ and δ̇, m and m/s
-    begun: Any  # (m, B) margins as the step began
+    at_start: Any  # (m, B) margins at the start of the step
     present: Any  # (m, B) margins in the state looked at last
     rounding: Any  # (m, B) what rounding may make of these
 
@@ -80,9 +82,48 @@ SPACE = types.NamedTuple(
 )
 
 
+@inner
+def _renew_rate(problem, state, space):
+    """Evaluate the state's rate anew, after an event."""
+    state.count[CALLS] += rhs(
+        *(problem, state.now[T], state.x, state.segment, state.entry_rate, state.rate, space.work[0])
+    )
+
+
+@merged
+def _first_event(problem, state, space, adaptive):
+    """(θ, stop, direction, level, border) of what comes first in a step; border -1 where that is an event of a stop."""
+    theta, stop, direction, level = find(problem, state, space)
+    if adaptive and theta != UNRESOLVED:
+        place, element, border = border_ahead(problem, state, space)
+        if place == 0.0 or place < theta:
+            return place, element, direction, level, border
+    return theta, stop, direction, level, -1
+
+
+@merged
+def _entry_by_henon(problem, state, space, h):
+    """(duration, stop) of the paper's step, which ends on an entry; negative where it grazes, (h, -1) without one."""
+    theta, stop = entry_by_sign(problem, state.x, space.x_new, state.segment)
+    if not theta < NONE:
+        return h, -1
+    duration = henon_landing(
+        *(problem, state.now[T], h, state.x, state.rate, state.segment, state.entry_rate),
+        *(stop, 0.0, space.x_new, space.work),
+    )
+    if duration < 0.0:
+        return duration, stop
+    state.count[CALLS] += rhs(
+        *(problem, state.now[T] + duration, space.x_new, state.segment, state.entry_rate),
+        *(space.rate_new, space.work[0]),
+    )
+    hermite(duration, state.x, state.rate, space.x_new, space.rate_new, space.dense)
+    return duration, stop
+
+
 @entry(
     types.int64(
-        *[STEP, PROBLEM, STATE, SPACE, REAL, types.int64, REAL, REAL],
+        *[STEP_FUNCTION, PROBLEM, STATE, SPACE, REAL, types.int64, REAL, REAL],
         *[REAL, REAL, types.boolean, types.int64, MATRIX, MATRIX, VECTOR],
     )
 )
@@ -110,8 +151,8 @@ def march(
     for _ in range(budget):
         # --- end of the run, and what can stop it early
         code = look(problem, state, space, t_end, log, events)
-        if code == EVENT:
-            count[CALLS] += rhs(problem, now[T], state.x, state.segment, state.entry_rate, state.rate, space.work[0])
+        if code == SWITCHED:
+            _renew_rate(problem, state, space)
             continue
         if code != RUNNING:
             return code
@@ -136,50 +177,34 @@ def march(
         # --- events
         stop, direction, border, tried = -1, 0, -1, h
         if events == LOCATED:
-            theta, stop, direction, level = find(problem, state, space)
-            if adaptive and theta != UNRESOLVED:
-                place, element, number = border_ahead(problem, state, space)
-                if place == 0.0:  # it begins on the border and goes across
-                    renew_border(problem, state, space, element, number, log)
-                    count[CALLS] += rhs(
-                        *(problem, now[T], state.x, state.segment, state.entry_rate, state.rate, space.work[0])
-                    )
-                    continue
-                if place < theta:
-                    theta, stop, border = place, element, number
+            theta, stop, direction, level, border = _first_event(problem, state, space, adaptive)
+            if border >= 0 and theta == 0.0:  # the step begins on the border and goes across
+                renew_border(problem, state, space, stop, border, log)
+                _renew_rate(problem, state, space)
+                continue
             if theta == UNRESOLVED:
                 now[phase] = h / 32.0
                 count[REJECTED] += 1
                 continue
             if theta < NONE:
-                h = _land(step, problem, state, space, theta * h, tried, stop, direction, level, border, rtol, atol)
+                h = land(step, problem, state, space, theta * h, tried, stop, direction, level, border, rtol, atol)
                 if h < 0.0:  # the interpolant crosses, the step does not, or not to the tolerance: look closer
                     now[phase] = -h
                     count[REJECTED] += 1
                     continue
         elif events == HENON and phase == H_FLIGHT and not by_hand:  # the paper's scheme
-            theta, stop = entry_by_sign(problem, state.x, space.x_new, state.segment)
-            if theta < NONE:
-                duration = henon_landing(
-                    *(problem, now[T], h, state.x, state.rate, state.segment, state.entry_rate),
-                    *(stop, 0.0, space.x_new, space.work),
-                )
-                if duration < 0.0:  # it grazes: walk in with the small step
-                    now[H_FLIGHT], by_hand = dt_contact, True
-                    count[REJECTED] += 1
-                    continue
-                h, direction = duration, 1
-                count[CALLS] += rhs(
-                    *(problem, now[T] + h, space.x_new, state.segment, state.entry_rate),
-                    *(space.rate_new, space.work[0]),
-                )
-                hermite(h, state.x, state.rate, space.x_new, space.rate_new, space.dense)
+            h, stop = _entry_by_henon(problem, state, space, h)
+            direction = 1
+            if h < 0.0:  # it grazes: walk in with the small step
+                now[H_FLIGHT], by_hand = dt_contact, True
+                count[REJECTED] += 1
+                continue
 
         # --- a law with a kink inside its segment: end the step there, the error estimate fails across it
         if adaptive and phase == H_CONTACT:
-            theta = _kink(problem, state, space)
+            theta = first_kink(problem, state, space)
             if theta < NONE and theta * h > nearest:
-                now[phase], nearest = theta * h, max(nearest, _AT_AN_END * theta * h)
+                now[phase], nearest = theta * h, max(nearest, NEAR_END * theta * h)
                 count[REJECTED] += 1
                 continue
 
@@ -191,7 +216,7 @@ def march(
         if border >= 0 and now[T] < t_end:
             renew_together(problem, state, space, h, stop, border, log)
         if stop >= 0:
-            count[CALLS] += rhs(problem, now[T], state.x, state.segment, state.entry_rate, state.rate, space.work[0])
+            _renew_rate(problem, state, space)
         if modal_gains(problem, state, space):
             return GAINED
 

@@ -30,7 +30,7 @@ from solvers.stepping.energy_gain import LEAST, NOW, gains, negligible_energy, w
 from solvers.stepping.engine import explanation
 from solvers.stepping.events import LOCATED, MOST_LANDINGS, NONE, UNRESOLVED, nearer
 from solvers.stepping.henon import hermite
-from solvers.stepping.located import EVENT, accept, find, landing_tolerance, look
+from solvers.stepping.located import SWITCHED, accept, find, landing_tolerance, look
 from solvers.stepping.loop import new_space
 from solvers.stepping.newmark import MOST_SWEEPS, contact_force
 
@@ -77,7 +77,7 @@ class MatrixEngine:
         state, space, method, t_end = self.state, self.space, self.method, self.duration
         for _ in range(budget):
             code = look(self.problem, state, space, t_end, log, method.events)
-            if code == EVENT:
+            if code == SWITCHED:
                 self.refresh()
                 continue
             if code != RUNNING:

@@ -79,22 +79,22 @@ def alpha_radius(alpha_m: float, alpha_f: float, beta: float, gamma: float) -> R
 # --- limits ----------------------------------------------------------------------------------------------------------
 
 
-def largest_step(radius: Radius, k: float, c: float, lasting: float = math.inf) -> float:
-    """Largest h up to which a mode is not amplified by a tenth within ``lasting`` seconds; 0 if there is none."""
+def largest_step(radius: Radius, k: float, c: float, duration: float = math.inf) -> float:
+    """Largest h up to which a mode is not amplified by a tenth within ``duration`` seconds; 0 if there is none."""
     fastest = max(math.sqrt(abs(k)), abs(c))
     if fastest == 0.0:
         return math.inf
 
     def stable(h: float) -> bool:
         growth = radius(h, k, c) - 1.0
-        return growth <= _SLACK or math.log1p(growth) * max(lasting / h, 1.0) <= _GROWTH
+        return growth <= _SLACK or math.log1p(growth) * max(duration / h, 1.0) <= _GROWTH
 
     grid = np.geomspace(_SMALLEST, _LARGEST, round(_PER_DECADE * math.log10(_LARGEST / _SMALLEST)) + 1) / fastest
     first = next((i for i, h in enumerate(grid) if not stable(h)), None)
     if first is None:
         return math.inf
     if first == 0:
-        return 0.0 if lasting == math.inf else _below(stable, float(grid[0]))
+        return 0.0 if duration == math.inf else _below(stable, float(grid[0]))
     low, high = float(grid[first - 1]), float(grid[first])
     while high - low > 1e-9 * high:
         middle = 0.5 * (low + high)
@@ -111,21 +111,21 @@ def _below(stable: Callable[[float], bool], h: float) -> float:
     return 0.0
 
 
-def limit(method: ConstantStep, system: System, indentation: float | None, lasting: float) -> Limit:
+def limit(method: ConstantStep, system: System, indentation: float | None, duration: float) -> Limit:
     """Predicted limits of a method; see `ConstantStep.stable_dt`."""
-    flight, mode = _shortest(method, system, *method.oscillators(system), lasting)
+    flight, mode = _shortest(method, system, *method.oscillators(system), duration)
     if not system.contacts:
         return Limit(flight, math.inf, mode, -1)
     C, K, half_period = with_tangents(system, indentation)
-    if any(contact.always or contact.gap < 0.0 for contact in system.contacts) or lasting == math.inf:
-        half_period = lasting  # a preloaded contact may last for ever
-    contact, contact_mode = _shortest(method, system, *method.critical(system.M, C, K), min(lasting, half_period))
+    if any(contact.always or contact.gap < 0.0 for contact in system.contacts) or duration == math.inf:
+        half_period = duration  # a preloaded contact may last for ever
+    contact, contact_mode = _shortest(method, system, *method.critical(system.M, C, K), min(duration, half_period))
     return Limit(flight, contact, mode, contact_mode)
 
 
-def _shortest(method: ConstantStep, system: System, k: Array, c: Array, lasting: float) -> tuple[float, int]:
+def _shortest(method: ConstantStep, system: System, k: Array, c: Array, duration: float) -> tuple[float, int]:
     """Smallest of the oscillators' limits, and whose it is; -1 where they are not the modes."""
-    steps = [largest_step(method.radius, *pair, lasting) for pair in zip(k, c, strict=True)]
+    steps = [largest_step(method.radius, *pair, duration) for pair in zip(k, c, strict=True)]
     return min(steps), int(np.argmin(steps)) if len(steps) == system.size else -1
 
 

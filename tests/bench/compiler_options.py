@@ -78,9 +78,9 @@ def serve() -> None:
             known[case] = runs_of(case)
         seconds, ends = [], []
         for run in known[case]:
-            begin = time.perf_counter()
+            started = time.perf_counter()
             ends.append(float(run()))
-            seconds.append(time.perf_counter() - begin)
+            seconds.append(time.perf_counter() - started)
         print(json.dumps([seconds, ends]), flush=True)
 
 

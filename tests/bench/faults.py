@@ -104,9 +104,9 @@ def main(count: int = 50, seed: int = 0) -> int:
     """Try that many; exit code 1 when something was lost."""
     rng, outcomes, lost = np.random.default_rng(seed), Counter(), 0
     with tempfile.TemporaryDirectory() as place:
-        begin = time.perf_counter()
+        started = time.perf_counter()
         code, said = stopped(Path(place), 600.0, signal.SIGKILL, 0.0)
-        life = time.perf_counter() - begin
+        life = time.perf_counter() - started
         assert code == 0, said
     print(f"a whole run takes {life:.1f} s", flush=True)
     for i in range(count):

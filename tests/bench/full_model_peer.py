@@ -112,9 +112,9 @@ class OpenSees:
         self.build()
         self._analysis("ProfileSPD", ("ModifiedNewton", "-initial"), ("Newmark", 0.5, 0.25))
         steps = round(DURATION / dt)
-        begin = time.perf_counter()
+        started = time.perf_counter()
         failed = self.ops.analyze(steps, DURATION / steps)
-        took = time.perf_counter() - begin
+        took = time.perf_counter() - started
         return took, math.nan if failed else float(self.ops.nodeDisp(self.tip, 2))
 
 

@@ -257,9 +257,9 @@ def main(count: int = 10_000, first: int = 0, commands: int = 0) -> int:
     for text in texts:  # compiles, without an alarm
         judge(text)
     for seed in range(first, first + count):
-        text, begin = mutated(np.random.default_rng(seed), texts), time.perf_counter()
+        text, started = mutated(np.random.default_rng(seed), texts), time.perf_counter()
         what, trace = tried(text, judge)
-        slowest = max(slowest, (time.perf_counter() - begin, seed))
+        slowest = max(slowest, (time.perf_counter() - started, seed))
         found[what] += 1
         if trace:
             print(f"seed {seed}: {what}\n" + "\n".join(trace.splitlines()[-7:]), flush=True)

@@ -110,9 +110,9 @@ class Point:
 
     def measure(self, of: Problem, start: int) -> None:
         """One timed run."""
-        begin = time.perf_counter()
+        started = time.perf_counter()
         tip, calls = self.run(of.starts[start])
-        took = time.perf_counter() - begin
+        took = time.perf_counter() - started
         self.spent += took
         self.seconds[start] = min(took, self.seconds.get(start, math.inf))
         self.errors[start], self.calls[start] = of.error(start, float(tip)), calls
@@ -242,9 +242,9 @@ def many(of: Problem, count: int, rounds: int) -> list[str]:
     wall, processor, error = (dict.fromkeys(calls, math.inf) for _ in range(3))
     for _ in range(rounds):
         for name, call in calls.items():
-            begin, spent = time.perf_counter(), time.process_time()
+            started, spent = time.perf_counter(), time.process_time()
             found = np.asarray(call(), dtype=float)
-            wall[name] = min(wall[name], (time.perf_counter() - begin) / len(found))
+            wall[name] = min(wall[name], (time.perf_counter() - started) / len(found))
             processor[name] = min(processor[name], (time.process_time() - spent) / len(found))
             error[name] = float(np.median(np.abs(found - tips[: len(found)]))) / LENGTH
     own = processor["integrate_many"]

@@ -14,15 +14,20 @@ cent of the share. With 400 seeds the share itself is known to 1.1 %.
 from __future__ import annotations
 
 import argparse
+import sys
 import time
 import warnings
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from problems import paper_scene
+
 import fembeam as fb
 import solvers
-from contacts import Hysteretic
 from fembeam.study import stationary
 
 Z_STOP, DT, LONG = 0.24445, 2e-3, 4e4
@@ -39,15 +44,8 @@ LEVELS = (50.0, 109.0, 195.0, 390.0)  # rad/s
 def model(case: str, seed: int):
     """The paper's beam with two modes."""
     band, stop = CASES[case]
-    law = Hysteretic.lankarani_nikravesh(2.1e8, restitution=0.5)
-    return fb.Scene(
-        beam=fb.Beam(0.2599, fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)),
-        supports=[fb.Clamped(0.0)],
-        masses=[fb.LumpedMass(Z_STOP, mass=25.4e-3, inertia=3.0e-6)],
-        stops=[fb.Stop(Z_STOP, law=law)] if stop else [],
-        damping=fb.ModalDamping([0.02, 0.01]),
-        base=fb.BandNoise(std=2.5e-4, band=band, seed=seed),
-    ).reduce(modes=2)
+    scene = paper_scene(fb.BandNoise(std=2.5e-4, band=band, seed=seed))
+    return (scene if stop else replace(scene, stops=[])).reduce(modes=2)
 
 
 def intervals(response) -> dict[str, tuple[float, float, float]]:
@@ -68,11 +66,11 @@ def intervals(response) -> dict[str, tuple[float, float, float]]:
 
 def coverage(case: str, seconds: float, seeds: int, truth: dict[str, tuple[float, float, float]]) -> None:
     """Print the share of intervals that hold the truth, and those below and above it."""
-    beam, rows, begin = model(case, 0), [], time.perf_counter()
+    beam, rows, started = model(case, 0), [], time.perf_counter()
     for seed in range(seeds):
         noise = replace(beam.scene.base, seed=1000 + seed)
         rows.append(intervals(stationary(beam.under(replace(beam.scene, base=noise)), seconds, DT, solver=QUICK)))
-    print(f"{case}, {seconds:g} s, {seeds} seeds, {time.perf_counter() - begin:.0f} s of computing", flush=True)
+    print(f"{case}, {seconds:g} s, {seeds} seeds, {time.perf_counter() - started:.0f} s of computing", flush=True)
     for name, (true, *_) in truth.items():
         value, lo, hi = np.array([row[name] for row in rows]).T
         below, above = np.mean(hi < true), np.mean(lo > true)

@@ -65,13 +65,13 @@ def measured(stops: int, modes: int, seconds: float) -> dict[str, float]:
     """All figures of one number of stops."""
     run(tube(1, 2), 0.1)
     run(tube(2, 2), 0.1)  # machine code is loaded
-    system, before, begin = tube(stops, modes), peak(), time.process_time()
+    system, before, started = tube(stops, modes), peak(), time.process_time()
     run(system, 1e-6)
-    first, times, contacts = time.process_time() - begin, [], 0
+    first, times, contacts = time.process_time() - started, [], 0
     for _ in range(ROUNDS):
-        begin = time.process_time()
+        started = time.process_time()
         solution = run(system, seconds)
-        times.append(time.process_time() - begin)
+        times.append(time.process_time() - started)
         contacts = len(solution.contacts.t_in)
     return {
         **{"stops": stops, "tables": table_bytes(system), "peak": peak() - before, "first": first},

@@ -16,7 +16,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from problems import STEEL, TIP
+from problems import PAPER_BEAM, TIP
 
 import fembeam as fb
 from contacts import Hertz, Jenkins
@@ -31,7 +31,7 @@ DURATION, RTOLS = 20.0, (1e-6, 1e-8)  # s
 def system_of(part: dict[str, object], base: object, modes: int) -> System:
     """The paper's beam with a damper or a stop."""
     scene = fb.Scene(
-        fb.Beam(0.2599, fb.Section(**STEEL)), [fb.Clamped(0.0)], damping=fb.ModalDamping(0.02), base=base,
+        PAPER_BEAM, [fb.Clamped(0.0)], damping=fb.ModalDamping(0.02), base=base,
         masses=[fb.LumpedMass(TIP, mass=25.4e-3, inertia=3.0e-6)], **part,
     )  # fmt: skip
     return scene.reduce(modes).lasting(DURATION).system

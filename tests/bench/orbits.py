@@ -46,9 +46,9 @@ def timed(solve: Callable[[], object]) -> float:
     """Shortest wall time of a few runs after a first one, s."""
     times = []
     for _ in range(1 + REPEATS):
-        begin = time.perf_counter()
+        started = time.perf_counter()
         solve()
-        times.append(time.perf_counter() - begin)
+        times.append(time.perf_counter() - started)
     return min(times[1:])
 
 
@@ -127,9 +127,9 @@ def main() -> None:
         return
     omegas = sorted(orbit.parameter for orbit in branch.orbits)
     for harmonics in HARMONICS:
-        begin = time.perf_counter()
+        started = time.perf_counter()
         found = balanced(omegas, harmonics)
-        seconds = time.perf_counter() - begin
+        seconds = time.perf_counter() - started
         print(
             f"mousai.hb_time, {harmonics} harmonics, newton_krylov, f_tol 1e-9: {len(found)} points, "
             f"{len(found) / seconds:8.1f} points/s, error {error(found):.1e}"

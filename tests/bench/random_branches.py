@@ -46,7 +46,7 @@ class Counted:
 
 
 def drift(one: Orbit, method: Any) -> tuple[float, int]:
-    """How far an orbit is from its begin after two periods, of its size, and the steps that takes."""
+    """How far an orbit is from its start after two periods, of its size, and the steps that takes."""
     later, x = delayed(one.system, one.phase), one.state
     n = one.system.size
     end = integrate(later, x[:n], x[n:], 2.0 * one.period, method=method)

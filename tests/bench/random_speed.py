@@ -7,17 +7,22 @@ python tests/bench/random_speed.py --long 1e6      one run of that many seconds 
 import argparse
 import os
 import resource
+import sys
 import time
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import scipy.fft
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from problems import paper_scene
+
 import fembeam as fb
 import solvers
 import solvers.exponential.method
-from contacts import Hysteretic
 from fembeam.study import ensemble, stationary
 
 METHOD = solvers.Exponential(1e-6, ledger=False)
@@ -26,22 +31,14 @@ RELEASING = [(solvers.exponential.method, "advance"), (scipy.fft, "irfft"), (np.
 
 def paper_model():
     """The paper's beam with two modes under broad-band noise."""
-    scene = fb.Scene(
-        beam=fb.Beam(0.2599, fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)),
-        supports=[fb.Clamped(0.0)],
-        masses=[fb.LumpedMass(0.24445, mass=25.4e-3, inertia=3.0e-6)],
-        stops=[fb.Stop(0.24445, law=Hysteretic.lankarani_nikravesh(2.1e8, restitution=0.5))],
-        damping=fb.ModalDamping([0.02, 0.01]),
-        base=fb.BandNoise(2.5e-4, (0.0, 1226.6), seed=1),
-    )
-    return scene.reduce(modes=2)
+    return paper_scene(fb.BandNoise(2.5e-4, (0.0, 1226.6), seed=1)).reduce(modes=2)
 
 
 def timed(work):
     """Seconds of processor and of wall time that a piece of work takes its worker."""
-    begin = time.thread_time(), time.perf_counter()
+    started = time.thread_time(), time.perf_counter()
     work()
-    return {"processor": time.thread_time() - begin[0], "wall": time.perf_counter() - begin[1]}
+    return {"processor": time.thread_time() - started[0], "wall": time.perf_counter() - started[1]}
 
 
 def contacts_of(model, seconds):
@@ -58,9 +55,9 @@ def best(call, repeats=5):
     """Shortest processor and wall time of several calls, s: on a busy machine only the first tells something."""
     times = []
     for _ in range(repeats):
-        begin = time.process_time(), time.perf_counter()
+        started = time.process_time(), time.perf_counter()
         call()
-        times.append((time.process_time() - begin[0], time.perf_counter() - begin[1]))
+        times.append((time.process_time() - started[0], time.perf_counter() - started[1]))
     return [min(column) for column in zip(*times, strict=True)]
 
 
@@ -70,9 +67,9 @@ def released(call):
 
     def timed(function):
         def wrapped(*arguments, **options):
-            begin = time.thread_time()
+            started = time.thread_time()
             result = function(*arguments, **options)
-            inside[0] += time.thread_time() - begin
+            inside[0] += time.thread_time() - started
             return result
 
         return wrapped
@@ -80,9 +77,9 @@ def released(call):
     try:
         for (module, name), function in kept.items():
             setattr(module, name, timed(function))
-        begin = time.thread_time()
+        started = time.thread_time()
         call()
-        return inside[0] / (time.thread_time() - begin)
+        return inside[0] / (time.thread_time() - started)
     finally:
         for (module, name), function in kept.items():
             setattr(module, name, function)
@@ -146,18 +143,18 @@ def _round(pool, workers, model, quantity, count=16):
     """Wall time; per realisation, processor time, its share of the wall time; time at work of the workers."""
     with pool:
         ensemble(model, 2 * workers, quantity, pool)  # starts workers
-        begin = time.perf_counter()
+        started = time.perf_counter()
         spent = ensemble(model, count, quantity, pool).values
-        wall = time.perf_counter() - begin
+        wall = time.perf_counter() - started
     processor, work = spent["processor"].sum(), spent["wall"].sum()
     return wall, processor / count, processor / work, work / (workers * wall)
 
 
 def memory(seconds):
     """One long run with streaming statistics."""
-    begin = time.perf_counter()
+    started = time.perf_counter()
     found = stationary(paper_model(), seconds, 2e-3, solver=METHOD, progress=True)
-    spent, peak = time.perf_counter() - begin, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    spent, peak = time.perf_counter() - started, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     processor = time.process_time()
     print(f"{seconds:g} s in {spent:.0f} s, {processor:.0f} s of processor ({seconds / processor:.0f} per second)")
     print(f"peak memory {peak:.0f} MB")

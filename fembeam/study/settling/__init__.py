@@ -2,5 +2,3 @@
 
 from fembeam.study.settling.basins import Basins, basins
 from fembeam.study.settling.bifurcation import Bifurcation, bifurcation
-
-__all__ = ["Basins", "Bifurcation", "basins", "bifurcation"]

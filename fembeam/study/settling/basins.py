@@ -82,17 +82,17 @@ class Basins:
 
 @dataclass(frozen=True, eq=False)
 class _Known:
-    """A stable orbit with its states (k, 2n) at multiples of the load's period, and the sizes (2n,) of its motion."""
+    """A stable orbit with its states (k, 2n) at multiples of the load's period T, and the sizes (2n,) of its motion."""
 
     orbit: Orbit
     states: Vector
     size: Vector
 
     @classmethod
-    def of(cls, orbit: Orbit, once: float) -> _Known:
+    def of(cls, orbit: Orbit, T: float) -> _Known:
         """From an orbit, by one run over its period."""
         found = orbit.found
-        times = np.sort((np.arange(orbit.period) * once - found.phase) % found.period)
+        times = np.sort((np.arange(orbit.period) * T - found.phase) % found.period)
         later = delayed(found.system, found.phase)
         run = run_from(later, found.whole, found.period, times, found.method)
         sizes = [np.repeat(np.abs(part).max(), len(orbit.model.omega)) for part in (orbit.run.q, orbit.run.q_dot)]
@@ -162,19 +162,19 @@ def basins(
     columns, rows = checked_points(points)
     place = observed(model) if z is None else z
     across, up = axis_of(model, x, x_span, columns, place), axis_of(model, y, y_span, rows, place)
-    origin, once = checked_plane(model, start, across, up), load_period(model.scene)
+    origin, T = checked_plane(model, start, across, up), load_period(model.scene)
     for name, count in (("settle", settle), ("longest", longest)):
         whole = is_whole(count) and count > 0
         require(whole, f"{name} counts periods of the load and must be above 0", count, WHERE, "give a whole number")
     starts = starts_of(origin, across, up)
     asked = partial(basins, x=across, y=up, start=origin, settle=settle, longest=longest)
     kept = Checkpoint(checkpoint, {} if checkpoint is None else identity(model, asked))
-    known = _found(model, _coarse(starts), longest, once)
+    known = _found(model, _coarse(starts), longest, T)
     missing = [row for row in range(rows) if str(row) not in kept.values]
-    task = partial(_settled, model, starts, known, settle, once, threads)
+    task = partial(_settled, model, starts, known, settle, T, threads)
     spread(task, missing, None, "basins" if progress else None, lambda i, v: kept.add(str(missing[i]), {"state": v}))
     states = np.array([kept.values[str(row)]["state"] for row in range(rows)])
-    label, known = _labelled(model, states.reshape(-1, states.shape[-1]), known, longest, once)
+    label, known = _labelled(model, states.reshape(-1, states.shape[-1]), known, longest, T)
     return _sorted(across, up, origin, label.reshape(rows, columns), known)
 
 
@@ -184,22 +184,22 @@ def _coarse(starts: Vector) -> Vector:
     return starts[np.ix_(rows, columns)].reshape(-1, starts.shape[2])
 
 
-def _found(model: Model, starts: Sequence[Vector] | Vector, longest: int, once: float) -> list[_Known]:
+def _found(model: Model, starts: Sequence[Vector] | Vector, longest: int, T: float) -> list[_Known]:
     """The stable orbits that starts come to."""
     found = model.attractors(starts=list(starts), longest=longest)
-    return [_Known.of(one.orbit, once) for one in found if one.orbit is not None and one.orbit.stable]
+    return [_Known.of(one.orbit, T) for one in found if one.orbit is not None and one.orbit.stable]
 
 
 def _settled(
-    model: Model, starts: Vector, known: list[_Known], settle: int, once: float, threads: int, row: int
+    model: Model, starts: Vector, known: list[_Known], settle: int, T: float, threads: int, row: int
 ) -> Vector:
     """(nx, 2n) states that the starts of a row come to, at multiples of the load's period; NaN where a run failed."""
     n, method = len(model.omega), solvers.Exponential(1e-8, ledger=False)
     states, left = starts[row].copy(), np.arange(starts.shape[1])
     lengths = [FIRST << i for i in range(40) if FIRST << i < settle]
     for periods in [*lengths, settle]:
-        begin = starts[row, left]
-        runs = solvers.integrate_many(model.system, begin[:, :n], begin[:, n:], periods * once, method, threads,
+        present = starts[row, left]
+        runs = solvers.integrate_many(model.system, present[:, :n], present[:, n:], periods * T, method, threads,
                                       check=False)  # fmt: skip
         if np.any(runs.status == solvers.Status.INTERRUPTED):
             raise KeyboardInterrupt
@@ -220,7 +220,7 @@ def _labels(states: Vector, known: list[_Known]) -> NDArray[np.int64]:
 
 
 def _labelled(
-    model: Model, states: Vector, known: list[_Known], longest: int, once: float
+    model: Model, states: Vector, known: list[_Known], longest: int, T: float
 ) -> tuple[NDArray[np.int64], list[_Known]]:
     """Labels of all states, and the orbits, those found from states that were on none of the first ones included."""
     label = _labels(states, known)
@@ -228,7 +228,7 @@ def _labelled(
     for _ in range(TRIES):
         if not left.size:
             break
-        more = _found(model, states[left[:1]], longest, once)
+        more = _found(model, states[left[:1]], longest, T)
         known = known + [one for one in more if not any(other.holds(one.states).any() for other in known)]
         label = _labels(states, known)
         left = left[1:][label[left[1:]] == UNSETTLED]

@@ -1,4 +1,4 @@
-"""Bifurcation diagrams by brute force: simulate, let it settle, look once per period of the load.
+"""Bifurcation diagrams by brute force: simulate, let it settle, look T per period of the load.
 
 Slow and blind to unstable motion, but independent of shooting and continuation: the check on a branch.
 """
@@ -123,11 +123,11 @@ def _settled(
         system = model.system
     else:
         system = model.system_like(scene)
-    once, n = load_period(scene), len(model.omega)
+    T, n = load_period(scene), len(model.omega)
     method = solvers.Exponential(1e-8, ledger=False)
     # settling needs no samples; but it is one run: a restart would forget the entry rate of a contact under way
-    looks = np.arange(settle * LOOKS, (settle + keep) * LOOKS) * (once / LOOKS)
-    run = solvers.integrate(system, start[:n], start[n:], (settle + keep) * once, looks, method)
+    looks = np.arange(settle * LOOKS, (settle + keep) * LOOKS) * (T / LOOKS)
+    run = solvers.integrate(system, start[:n], start[n:], (settle + keep) * T, looks, method)
     states = np.concatenate((run.q, run.q_dot), axis=1)[::LOOKS]
     u = np.abs(run.q @ model.phi(z))
     return states, u.reshape(keep, LOOKS).max(axis=1)

@@ -12,10 +12,11 @@ from __future__ import annotations
 import numpy as np
 from numba import types
 
-from solvers.compiled.kernels import VECTOR, dot, indentation, inlined, inner, rhs
+from solvers.compiled.kernels import VECTOR, dot, indentation, inlined, inner, merged, rhs
 from solvers.compiled.parts import PASSED, part
 from solvers.compiled.renewals import margins, margins_before, margins_in, note_event, renew
 from solvers.compiled.state import LAST_EVENT, T, rate_tolerance, surface_tolerance
+from solvers.exponential.contact.crossings import extremum
 from solvers.exponential.contact.node_response import DELTAS, KNOWN, RATES, START, rate_ripple_of, ripple_of
 from solvers.exponential.contact.nodes import LOCAL, S
 from solvers.exponential.contact.peaks import local_maximum, motion_around
@@ -29,6 +30,8 @@ _MISSED = 1e-3  # margin, in units of the largest of the step, by which a landin
 _BEFORE = 1e-3  # part of a landing before its end
 _REST = 1e-14  # rate, in units of the reference speed, at which what has come to rest turns no more
 _NEAR = 0.2  # lowest node, in units of the largest margin, below which the motion between nodes is looked at
+_ENDS_NEAR = 0.5  # lower end of a landing, in the same units, below which what lies between its ends is looked at
+_CLEAR = 0.03  # the lowest margin between them, in the same units, that counts as above zero
 
 
 @inner
@@ -83,16 +86,30 @@ def _crossing(tables, state, scratch, s, j, node_set, h):
     return np.inf
 
 
+@inlined
+def _turns(a, b, c, first, second):
+    """Whether the parabola through (0, a), (first, b) and (second, c) falls from 0 on, but not down to b."""
+    rise, further = (b - a) / first, (c - b) / (second - first)
+    return rise - (further - rise) * first / second < 0.0 < rise
+
+
 @inner
 def _between_nodes(problem, tables, state, scratch, s, j, node_set, h):
     """The same where a margin is below zero between the nodes around one of its minima only.
 
-    A step that begins on the border has its lowest margin there, and may come back to it later.
+    The lowest margin may stand at an end of the step, as where it begins on the border; then it is looked at too if
+    the margin turns before the next node.
     """
     ends, values = scratch.ends[ENDS * j : ENDS * (j + 1)], scratch.margin[S * j : S * j + S]
+    near, t = _NEAR * scratch.largest[s, j], tables.times[node_set]
     for i in range(S):
         before, after = values[i - 1] if i > 0 else ends[0], values[i + 1] if i < S - 1 else ends[1]
-        if values[i] <= min(before, after, _NEAR * scratch.largest[s, j]):
+        low = values[i] <= min(before, after, near)
+        if i == 0:
+            low |= before <= near and _turns(before, values[0], after, t[0], t[1])
+        elif i == S - 1:
+            low |= after <= near and _turns(after, values[i], before, 1.0 - t[i], 1.0 - t[i - 1])
+        if low:
             time = _dip(problem, tables, state, scratch, s, j, node_set, h, i)
             if time < np.inf:
                 return time
@@ -153,26 +170,54 @@ def border_ahead(problem, tables, state, scratch, node_set, level):
     return first, element, border
 
 
+@merged
+def _dips(problem, state, scratch, s, landed, w, x):
+    """Whether a margin of element s but the one landed on may be below zero between the states w and x.
+
+    It is taken as the cubic through its values and rates, which is coarse: it must not even come near zero.
+    """
+    count, width, values = problem.border_count[s], state.x.size, scratch.ends
+    d = x[width] - w[width]
+    for end in range(2):
+        y, time = x if end else w, _BEFORE * (d if end else -d)
+        rhs(problem, y[width], y[:width], state.segment, state.entry_rate, state.rate, scratch.trial)
+        delta, rate = margins_in(problem, state, s, y, scratch.trial, values[2 * end * count :])
+        margins_before(problem, state, s, delta, rate, time, scratch.trial, values[(2 * end + 1) * count :])
+    for j in range(count):
+        a, b = values[j], values[2 * count + j]
+        fall, rise = (values[count + j] - a) / (_BEFORE * d), (b - values[3 * count + j]) / (_BEFORE * d)
+        known = j != landed and scratch.largest[s, j] > scratch.noise[s, j]
+        if known and fall < 0.0 < rise and extremum(d, a, fall, b, rise) < _CLEAR * scratch.largest[s, j]:
+            return True
+    return False
+
+
 @part(PASSED, types.UniTuple(types.int64, 2), types.int64, types.int64, VECTOR, VECTOR)
 def passed(problem, state, scratch, element, border, w, x):
     """(element, border) of the margin that has gone furthest below zero between the states w and x, or (-1, -1).
 
-    The border landed on is left out, and what has been carried over by rounding only.
+    The border landed on is left out, and what has been carried over by rounding only. The element is `UNRESOLVED` if a
+    margin may have been below zero in between.
     """
-    worst, found, which = -_TOGETHER, -1, -1
+    worst, found, which, dips = -_TOGETHER, -1, -1, False
     for s in range(problem.gap.size):
         count = problem.border_count[s]
         if count == 0:
             continue
         margins_in(problem, state, s, w, scratch.trial, scratch.ends)
         margins_in(problem, state, s, x, scratch.trial, scratch.margin)
+        near = False
         for j in range(count):
-            if (s == element and j == border) or scratch.margin[j] >= -scratch.noise[s, j]:
+            if s == element and j == border:
+                continue
+            near |= min(scratch.ends[j], scratch.margin[j]) < _ENDS_NEAR * scratch.largest[s, j]
+            if scratch.margin[j] >= -scratch.noise[s, j]:
                 continue
             share = scratch.margin[j] / max(scratch.ends[j], scratch.noise[s, j])
             if share < worst:
                 worst, found, which = share, s, j
-    return found, which
+        dips |= near and _dips(problem, state, scratch, s, border if s == element else -1, w, x)
+    return (UNRESOLVED, -1) if dips and found < 0 else (found, which)
 
 
 @inner

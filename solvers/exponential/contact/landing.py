@@ -14,10 +14,12 @@ error, while DOP853's own mixed estimate is below it.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from solvers.compiled.dop853_tableau import E5, STAGES
-from solvers.compiled.kernels import copy, dot, indentation, inlined, inner, merged, rhs
+from solvers.compiled.dop853_tableau import E3, E5, STAGES
+from solvers.compiled.kernels import abs_dot, copy, dot, indentation, inlined, inner, merged, rhs
 from solvers.compiled.parts import PASSED
 from solvers.compiled.renewals import margins_before, margins_in
 from solvers.compiled.state import (
@@ -35,7 +37,7 @@ from solvers.compiled.sums import combine
 from solvers.exponential.contact.borders import passed
 from solvers.exponential.contact.crossings import CLEAR, TOO_LONG, before_landing, side_at
 from solvers.exponential.contact.landing_step import INDENTATION, ROOT, TIME, landing_step, start_landing
-from solvers.exponential.contact.node_response import DIFFERENCE, LANDED, START
+from solvers.exponential.contact.node_response import BATCH, DIFFERENCE, LANDED, START
 from solvers.exponential.contact.peaks import state_peaks
 
 _MOST_TRIES = 8  # to find the step that ends at an output time, or on a bend
@@ -55,13 +57,34 @@ def _error(problem, scratch, part, rtol):
 
     It is estimated by a ``part`` of the embedded difference.
     """
-    difference, worst = scratch.stages[DIFFERENCE], 0.0
-    combine(scratch.stages, E5, STAGES, None, difference)
+    worst = 0.0
+    combine(scratch.stages, E5, STAGES, None, scratch.stages[DIFFERENCE])
     for s in range(problem.gap.size):
-        error = 0.0
-        for e in range(2 * problem.k.size):
-            error += abs(problem.read_rate[s, e] * difference[e])
-        error *= part / (rtol * scratch.reference_speed[s])
+        error = part * abs_dot(problem.read_rate[s], scratch.stages[DIFFERENCE], 2 * problem.k.size)
+        error /= rtol * scratch.reference_speed[s]
+        if not error <= worst:
+            worst = error
+    return worst
+
+
+@inlined
+def _difference(problem, s, d, span):
+    """An embedded difference of δ̇ and δ of a stop, as a rate, m/s."""
+    size = 2 * problem.k.size
+    return abs_dot(problem.read_rate[s], d, size) + abs_dot(problem.read[s], d, size) / span
+
+
+@inner
+def _error_in_time(problem, scratch, span, rtol):
+    """The same of a step in time, from both embedded differences of rate and indentation."""
+    fifth, third, worst = scratch.stages[DIFFERENCE], scratch.stages[BATCH], 0.0
+    combine(scratch.stages, E5, STAGES, None, fifth)
+    combine(scratch.stages, E3, STAGES, None, third)
+    for s in range(problem.gap.size):
+        error = _difference(problem, s, fifth, span)
+        if error > 0.0:
+            error *= error / math.hypot(error, 0.1 * _difference(problem, s, third, span))
+        error /= rtol * scratch.reference_speed[s]
         if not error <= worst:
             worst = error
     return worst
@@ -181,7 +204,7 @@ def land(problem, tables, state, scratch, stop, direction, near, rtol, t_end, ou
     ):
         return -1
     other = before_landing(problem, tables, state, scratch, stop, np.bool_(0), w, x)
-    if other == CLEAR and problem.parts[PASSED] and passed(problem, state, scratch, -1, -1, w, x)[0] >= 0:
+    if other == CLEAR and problem.parts[PASSED] and passed(problem, state, scratch, -1, -1, w, x)[0] != -1:
         other = TOO_LONG
     if other != CLEAR:
         return max(other, -1)
@@ -214,7 +237,7 @@ def _rises(problem, state, scratch, s, border, time):
 def land_on_bend(problem, tables, state, scratch, stop, border, near, rtol, t_end, out, due, with_energy):
     """Try to land on the bend of ``stop``, or on a border of its law, about ``near`` s ahead; whether it succeeded.
 
-    A border that is passed before is noted in ``scratch.landed``.
+    A border that is passed before is noted in ``scratch.landed``: -1 if none is, and less if that cannot be told.
     """
     furthest, largest = scratch.landing_reach[0] / tables.fastest, scratch.bend_values[scratch.bend_values.size - 1]
     enough = 1e-10 * largest
@@ -241,14 +264,14 @@ def land_on_bend(problem, tables, state, scratch, stop, border, near, rtol, t_en
         if not 0.1 * near < following <= furthest or following == span:
             return False
         before, apart, span = span, value, following
-    if not (abs(value) <= 1e-6 * largest and _error(problem, scratch, _PART, rtol) <= 1.0):
+    if not (abs(value) <= 1e-6 * largest and _error_in_time(problem, scratch, span, rtol) <= 1.0):
         return False
     if border >= 0 and _rises(problem, state, scratch, stop, border, 1e-3 * span):  # it has been below zero before
         return False
     if before_landing(problem, tables, state, scratch, stop, np.bool_(1), w, x) != CLEAR:
         return False
     scratch.landed[0], scratch.landed[1] = passed(problem, state, scratch, stop, border, w, x)
-    if scratch.landed[0] >= 0:
+    if scratch.landed[0] != -1:
         return False
     lower, upper = problem.knots[stop, state.segment[stop] - 1], problem.knots[stop, state.segment[stop]]
     if not lower < indentation(problem, stop, x) < upper:

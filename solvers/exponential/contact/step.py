@@ -132,7 +132,7 @@ def _attempt(problem, tables, state, scratch, node_set, level, rtol):
     """Attempt one contact step; (error in units of the tolerance, time of a bend it crosses, stop of that bend).
 
     With inf comes the time of a bend or border that is in its way and the stop, else inf and -1; of a border
-    ``scratch.control`` holds which it is, else -1.
+    ``scratch.border`` holds which it is, else -1.
     """
     bottom, first, bent = level == tables.contact_step.size - 1, np.inf, -1
     scratch.border[0] = -1
