@@ -5,7 +5,8 @@ import pytest
 from problems import PAPER_BEAM, TIP, paper_scene
 
 import fembeam as fb
-from contacts import Hertz, KelvinVoigt
+from contacts import BoucWen, Hertz, Jenkins, KelvinVoigt, WaltonBraun
+from solvers import Exponential
 
 
 def scene(*stops, **more):
@@ -62,6 +63,34 @@ def test_a_contact_over_many_samples_is_shared_as_its_law_says():
     expected = (fine[1:-3:2] + 4 * fine[2:-2:2] + fine[3:-1:2]) / 6
     assert held.sum() > 100
     np.testing.assert_allclose(run.force(mean=True)[among][held[among]], expected[held[among]], rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        fb.Element(TIP, KelvinVoigt(300.0, 1.0)),
+        fb.Element(TIP, Jenkins(300.0, 0.15)),
+        fb.Element(TIP, BoucWen(300.0, 0.1, 1.0, 1e3, 500.0)),
+        fb.Stop(TIP, WaltonBraun(300.0, 600.0), gap=1e-4),
+    ],
+)
+def test_impulses_of_what_always_acts_are_kept_whatever_the_sampling(part, tmp_path):
+    """Against the sum of forces sampled so finely that it is right to 1e-7 of their size; cubics alone miss up to 4 %."""
+    parts = {"stops": [part]} if isinstance(part, fb.Stop) else {"elements": [part]}
+    drive = fb.Harmonic(2e-3, 195.0, 0.7)
+    model = fb.Scene(PAPER_BEAM, [fb.Clamped(0.0)], damping=fb.ModalDamping(0.02), base=drive, **parts).reduce(1)
+    method, duration, count = Exponential(1e-10), 0.2, 40_000
+    fine = model.simulate(duration, duration / count, solver=method)
+    grown = np.append(0.0, np.cumsum(fine.force()[1:] + fine.force()[:-1])) * duration / count / 2
+    size = np.abs(np.diff(grown)).sum()
+    uneven = np.sort(np.random.default_rng(1).choice(np.arange(count + 1), 30, replace=False))
+    for at in (np.arange(0, count + 1, count // 20), uneven):
+        run = model.simulate(duration, fine.t[at], solver=method)
+        expected = grown[at[-1]] - grown[at[0]]
+        for one in (run, fb.load(run.save(tmp_path / "run"))):
+            assert np.trapezoid(one.force(mean=True), one.t) == pytest.approx(expected, abs=1e-6 * size)
+        impulses = run.losses.part(slice(5, None)).impulses[:, 0]
+        np.testing.assert_allclose(impulses, grown[at[5:]] - grown[at[5]], atol=1e-6 * size)
 
 
 def test_bad_input():

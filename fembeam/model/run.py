@@ -288,8 +288,9 @@ class Run(ContactHistories, Printed):
         """Contact force (k,) of a stop, N or N m, from its law and the entry rate latched at the time; of an element F.
 
         ``mean``: over each sample (halfway to its neighbours) instead of at it, so that contacts shorter than a sample
-        are seen: the trapezoidal rule over the samples gives the log's impulses exactly. ValueError for a run without
-        samples, or read from a file of an earlier version.
+        are seen: the trapezoidal rule over the samples gives impulses as exactly as the run has them, those of the log
+        and, from sample to sample, of what always acts. How they fall to both sides of the middle between two samples
+        is found by the law on a cubic. ValueError for a run without samples, or of an earlier version's file.
         """
         if mean:
             from fembeam.response import mean_force

@@ -3,7 +3,8 @@
     F_j = (1/w_j) ∫ F dt over the cell of sample j, which ends halfway to its neighbours;   Σ F_j w_j = Σ impulses
 
 Impulses are those of the contact log. Of a contact over several cells the law says how its impulse is shared, on the
-cubics through δ and δ̇ at entry, samples and exit, by Gauss-Legendre quadrature of each part within one cell.
+cubics through δ and δ̇ at entry, samples and exit, by Gauss-Legendre quadrature of each part within one cell. Of what
+always acts the impulse from sample to sample is that of the run; its halves are found likewise and share what is missed.
 """
 
 from __future__ import annotations
@@ -41,10 +42,17 @@ def mean_force(run: Run, stop: int) -> Vector:
     if contact.always or contact.remembers:
         force = partial(force_at, run, stop, contact)
         found = _impulses(lambda _, *at: force(*at), (motion[:, :-1], motion[:, 1:], edges[1:-1]))
+        found += (_missed(run, stop, found.sum(axis=1)) / 2)[:, None]
         impulse = np.append(found[:, 0], 0.0) + np.append(0.0, found[:, 1])
     else:
         impulse = _of_log(run, stop, contact.law, motion, edges)
     return np.asarray(impulse / np.diff(edges))
+
+
+def _missed(run: Run, stop: int, found: Vector) -> Vector:
+    """What impulses found from sample to sample (k - 1,) lack of those of the run; 0 where it does not tell."""
+    kept = None if run.lost is None else run.losses.impulses
+    return 0.0 * found if kept is None else np.diff(kept[:, stop]) - found
 
 
 def _of_log(run: Run, stop: int, law: Any, motion: Vector, edges: Vector) -> Vector:

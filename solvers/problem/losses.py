@@ -30,7 +30,8 @@ class Losses:
     work : (m,) J done on each. stored : (m,) J that its law holds more at the end than at the begin; NaN where a law
         cannot tell.
     slip : (m,) m (rad of rotation), distance that δ went while sliders slipped, summed over the sliders of a law.
-    history : (k, m) J, work done on each up to the samples.
+    history : (k, m) J, work done on each up to the samples. impulses : (k, m) N s (N m s), of each force likewise;
+        None of a run read from a file.
 
     Notes
     -----
@@ -42,6 +43,7 @@ class Losses:
     stored: Array
     slip: Array
     history: Array
+    impulses: Array | None = None
 
     def __len__(self) -> int:
         return len(self.work)
@@ -80,13 +82,15 @@ class Losses:
         deltas = [_indentations(contacts, back.dot(x[:size])) for x, _ in (begin, end)]
         memories = _renewed_at_once(contacts, begin[1], passed), end[1]
         first, last = (_stored(contacts, *one) for one in zip(deltas, memories, strict=True))
-        return cls(end[0][size + 2 :: 2], last - first, _slipped(contacts, begin[1], passed, *deltas), powers[:, 2::2])
+        slip = _slipped(contacts, begin[1], passed, *deltas)
+        return cls(end[0][size + 2 :: 2], last - first, slip, powers[:, 2::2], powers[:, 3::2])
 
     def part(self, kept: slice) -> Losses:
-        """Of some of the samples: their work; what was stored and slip are not known there."""
+        """Of some of the samples: their work and impulses; what was stored and slip are not known there."""
         history = self.history[kept] - self.history[kept][:1]
+        impulses = None if self.impulses is None else self.impulses[kept] - self.impulses[kept][:1]
         unknown = np.full(len(self), math.nan)
-        return Losses(history[-1] if len(history) else unknown, unknown, unknown, history)
+        return Losses(history[-1] if len(history) else unknown, unknown, unknown, history, impulses)
 
 
 def _renewed_at_once(contacts: Sequence[Contact], memory: Sequence[Array], passed: Transitions) -> list[Array]:
