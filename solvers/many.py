@@ -37,7 +37,8 @@ class ManySolutions:
     q, q_dot : (k, n) coordinates and rates at the end; NaN for a start that was not finished after Ctrl-C.
     t : (k,) time reached, s. status : (k,) `Status` of each run.
     contacts : (k,) how many there were, those under way at the end included.
-    peak_indentation, peak_force : (k, m) largest of each stop, m and N; 0 where it was not touched.
+    peak_indentation, peak_force : (k, m) largest of each stop, m and N; 0 where it was not touched, and of contacts
+        that always act, which have no peaks.
     seconds : wall time of all of them.
     """
 

@@ -579,6 +579,15 @@ def test_an_element_with_memory_is_replayed():
         model.equilibrium({1.0: -2.0})
 
 
+def test_what_yields_before_equilibrium_is_named():
+    law, clamp = WaltonBraun(200.0, 900.0), [fb.Clamped(0.0)]
+    with pytest.raises(reduction.AccuracyError, match=r"the stop at z = 1.0 m is touched before equilibrium"):
+        beam(clamp, stops=[fb.Stop(1.0, law, gap=-0.1)]).reduce(2).equilibrium()
+    striker = fb.Impactor(0.5, 1.0, 0.0, law, gap=-0.1, stiffness=10.0)
+    with pytest.raises(reduction.AccuracyError, match=r"the impactor at z = 0.5 m is touched before equilibrium"):
+        beam(clamp, impactors=[striker]).reduce(2).equilibrium()
+
+
 def test_a_stop_with_memory_is_replayed():
     """A yielding stop under a falling tip: the force of every blow has the peak of the log, less at the same depth."""
     stop = fb.Stop(1.0, WaltonBraun(200.0, 900.0))

@@ -158,12 +158,14 @@ def _settled(model: Model, load: Vector, free: NDArray[np.bool_]) -> Vector:
 
 
 def _check_memory(rows: list[ContactRow], delta: Vector) -> None:
-    """Raise AccuracyError when an element with memory would pass a border, such as slip, on the way."""
+    """Raise AccuracyError when a law with memory would pass a border, such as slip, on the way."""
     for row, d in zip(rows, delta, strict=True):
         if row.remembers and np.any(borders(row.law, np.array([d]), 0.0, row.law.parameters) < 0):
+            kind = "impactor" if row.on[0] == "impactor" else "element" if row.always else "stop"
+            way = "is touched" if getattr(row.law, "opens", False) else "slips or yields"
             raise reduction.AccuracyError(
-                f"the element at z = {row.z} m slips or yields before equilibrium in Model.equilibrium, and where it "
-                "rests depends on how it gets there; simulate from rest instead, with damping"
+                f"the {kind} at z = {row.z} m {way} before equilibrium in Model.equilibrium, and where it rests depends "
+                "on how it gets there; simulate from rest instead, with damping"
             )
 
 

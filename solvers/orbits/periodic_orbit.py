@@ -31,7 +31,7 @@ class Orbit:
     ----------
     state : (2n,) [q, q̇] at time ``phase`` within the period.
     period : s. phase : s, 0 unless a stop whose law latches its entry rate is closed then; on a branch also where a
-        contact with such a law, or with one whose force jumps, comes near t = 0.
+        contact with such a law, or with one whose force jumps, comes near t = 0, or laws with memory pass borders.
     memory : what each contact has latched then, as `Solution.memory`; empty without laws with memory.
     monodromy : (2n + r, 2n + r) derivative of the state one period later, the r latched numbers included that are no
         codes of segments.
