@@ -75,7 +75,7 @@ def test_a_contact_over_many_samples_is_shared_as_its_law_says():
     ],
 )
 def test_impulses_of_what_always_acts_are_kept_whatever_the_sampling(part, tmp_path):
-    """Against the sum of forces sampled so finely that it is right to 1e-7 of their size; cubics alone miss up to 4 %."""
+    """Against the sum of forces so finely sampled that it is right to 1e-7 of their size; cubics miss up to 4 %."""
     parts = {"stops": [part]} if isinstance(part, fb.Stop) else {"elements": [part]}
     drive = fb.Harmonic(2e-3, 195.0, 0.7)
     model = fb.Scene(PAPER_BEAM, [fb.Clamped(0.0)], damping=fb.ModalDamping(0.02), base=drive, **parts).reduce(1)

@@ -164,8 +164,8 @@ def _check_memory(rows: list[ContactRow], delta: Vector) -> None:
             kind = "impactor" if row.on[0] == "impactor" else "element" if row.always else "stop"
             way = "is touched" if getattr(row.law, "opens", False) else "slips or yields"
             raise reduction.AccuracyError(
-                f"the {kind} at z = {row.z} m {way} before equilibrium in Model.equilibrium, and where it rests depends "
-                "on how it gets there; simulate from rest instead, with damping"
+                f"the {kind} at z = {row.z} m {way} before equilibrium in Model.equilibrium, and where it rests "
+                "depends on how it gets there; simulate from rest instead, with damping"
             )
 
 
