@@ -6,15 +6,16 @@ from multiprocessing import get_context
 
 import numpy as np
 import pytest
-from problems import STEEL, paper_scene
+from problems import PAPER_BEAM, STEEL, paper_scene
 
 import fembeam as fb
 import solvers
-from contacts import Hertz, KelvinVoigt
+from contacts import Hertz, Jenkins, KelvinVoigt
 from fembeam import scene_file
 from fembeam.cli import main
 from fembeam.study import ModeCount, NotMetError, measure, mode_count, smallest_model
 from fembeam.study.execution.executors import spread
+from fembeam.study.measure import cut
 from fembeam.study.mode_count import difference
 from fembeam.study.quantities import QUANTITIES, Amplitude, Psd, label, named
 
@@ -378,3 +379,29 @@ def test_mistakes_in_a_file(tmp_path, old, new, message):
     path.write_text(FILE.replace(old, new))
     with pytest.raises(scene_file.SceneFileError, match=message):
         scene_file.read(path)
+
+
+def test_a_part_of_a_run_reads_as_the_run():
+    """From a time that is no drive period, with a stop pressed all the time and a slider that has slipped before."""
+    parts = {
+        "stops": [fb.Stop(0.25, KelvinVoigt(1e3, 0.1), gap=-0.01)],
+        "elements": [fb.Element(0.25, Jenkins(3e3, 0.5))],
+        "base": fb.Harmonic(1e-3, 195.0, 0.7),
+    }
+    run = fb.Scene(PAPER_BEAM, [fb.Clamped(0.0)], damping=fb.ModalDamping(0.02), **parts).reduce(2).simulate(0.3, 1e-3)
+    part, kept = cut(run, 0.1234, 0.2888), slice(124, 289)
+    np.testing.assert_allclose(part.t + 0.1234, run.t[kept], rtol=1e-12)
+    for read in (
+        lambda one: one.force(0),
+        lambda one: one.force(1),
+        lambda one: one.acceleration(0.2, absolute=True),
+        lambda one: one.reactions()[0].force,
+        lambda one: one.force(1, mean=True)[1:-1],
+    ):
+        whole, cells = read(run), read(part)
+        at = kept if len(whole) == len(run.t) else slice(124, 287)
+        np.testing.assert_allclose(cells, whole[at], atol=1e-9 * np.abs(whole).max())
+    log, whole = part.transitions, run.transitions
+    assert 0 < len(log) < len(whole)
+    among = (whole.t >= 0.1234) & (whole.t < 0.2888)
+    np.testing.assert_allclose(log.t + 0.1234, whole.t[among], rtol=1e-12)

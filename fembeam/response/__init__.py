@@ -7,7 +7,7 @@ Each file answers one question with functions of a `Run` or a `Model`, which off
 """
 
 from fembeam.response.backbone import backbone
-from fembeam.response.contact_force import forces
+from fembeam.response.contact_force import forces, latched_before
 from fembeam.response.mean_force import mean_force
 from fembeam.response.readout import Readout, coordinates, frame_motion
 from fembeam.response.saved_readout import READOUT_FINITE, READOUT_UNITS, expected_readout, packed, unpacked

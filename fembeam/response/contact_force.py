@@ -51,11 +51,24 @@ def force_at(run: Run, stop: int, contact: ContactRow, t: Vector, delta: Vector,
     return np.asarray(contact.force(delta, rate))
 
 
+def latched_before(run: Run, time: float) -> tuple[Vector, ...]:
+    """What each law has latched before a time of the run; empty without laws with memory."""
+    rows, found = run.readout.model.contact_rows, []
+    for stop, contact in enumerate(rows) if any(row.remembers for row in rows) else ():
+        law: Any = contact.law
+        parameters = _parameters_at_start(run, stop, law)
+        log = run.transitions
+        for at in np.flatnonzero((log.contact == stop) & (log.t < time)):
+            renew(law, int(log.border[at]), log.delta[at], log.delta_dot[at], parameters)
+        found.append(parameters[list(getattr(law, "memory", ()))])
+    return tuple(found)
+
+
 def _parameters_at_start(run: Run, stop: int, law: Any) -> Vector:
     """The law's parameters with what it had latched when the run began."""
     parameters = np.array(law.parameters)
     if run.began:
-        parameters[list(law.memory)] = run.began[stop]
+        parameters[list(getattr(law, "memory", ()))] = run.began[stop]
     return parameters
 
 

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 import solvers
 from fembeam.model import load_period
+from fembeam.response import Readout, latched_before
 from fembeam.scene import signals_of
 from fembeam.study.quantities import Quantity, label
 from fembeam.study.realisations import child, renewed
@@ -164,7 +165,7 @@ def periodic(model: Model, start: Any, solver: Any, sampled: bool) -> list[Run]:
 def cut(run: Run, start: float, end: float) -> Run:
     """The part of a run from start to end (s), with times counted from start; the last state only if it has no samples.
 
-    A contact belongs to the part in which it began.
+    A contact belongs to the part in which it began; forces at samples are those of the run all the same.
     """
     log, half = run.contacts, 1e-9 * max(float(run.t[-1]), end)
     mine = (log.t_in >= start) & (log.t_in < end)
@@ -175,11 +176,21 @@ def cut(run: Run, start: float, end: float) -> Run:
     else:
         kept = slice(int(np.searchsorted(run.t, start - half)), int(np.searchsorted(run.t, end + half)))
         t = run.t[kept] - start
-    return replace(
+    part = replace(
         run, t=t, q=run.q[kept], q_dot=run.q_dot[kept],
         contacts=solvers.ContactLog(**columns), ledger=partial(_ledger_of, run, kept),
-        lost=lambda: run.losses.part(kept),
+        lost=lambda: run.losses.part(kept), borders=partial(_passed, run, start, end),
+        began=latched_before(run, start), stored_forces=run._forces[:, kept],
     )  # fmt: skip
+    part.__dict__["readout"] = Readout(run.model, run.t[kept])  # signals have the times of the run
+    return part
+
+
+def _passed(run: Run, start: float, end: float) -> Any:
+    """The borders that laws with memory passed from start to end, times counted from start."""
+    log = run.transitions
+    columns = {f.name: getattr(log, f.name)[(log.t >= start) & (log.t < end)] for f in fields(log)}
+    return replace(log, **columns | {"t": columns["t"] - start})
 
 
 def _ledger_of(run: Run, kept: slice) -> solvers.Energy:
