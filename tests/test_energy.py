@@ -87,7 +87,7 @@ def by_forms(energy_tables, level, x, s):
 
 
 def at_ends(s, h):
-    """s, s', s'' of a quintic at its begin and after the time h, from its derivatives at the begin."""
+    """s, s', s'' of a quintic at its start and after the time h, from its derivatives at the start."""
     after = [sum(s[i] * h ** (i - d) / math.factorial(i - d) for i in range(d, 6)) for d in range(3)]
     return np.concatenate((s[:3], after))
 

@@ -98,8 +98,8 @@ def test_losses_wherever_the_run_ends(method):
         assert abs(found[2]) < 1e-10
 
 
-def test_what_is_stored_at_the_begin_is_no_gain():
-    """A spring that lets go gives its energy back: neither gain nor loss; a stop closed at the begin likewise."""
+def test_what_is_stored_at_the_start_is_no_gain():
+    """A spring that lets go gives its energy back: neither gain nor loss; a stop closed at the start likewise."""
     found = swing([Polynomial([1e4]), PiecewiseLinear([1e4])], 0.25, Exponential(1e-10), q=X, v=0.0).losses.loss
     assert abs(found).max() < 1e-7 * 0.5 * 1e4 * X**2
 

@@ -13,7 +13,7 @@ from contacts import PiecewiseLinear
 from contacts.memory import BoucWen, Coulomb, ElastoPlastic, Iwan, Jenkins, WaltonBraun
 from solvers import Contact, Exponential, System, branch, integrate, orbit
 from solvers.branches.walk import BranchStatus
-from solvers.orbits import PeriodicProblem, at_zero, delayed, flown
+from solvers.orbits import PeriodicProblem, at_zero, delayed, state_after
 
 
 def oscillator(law, omega, force=1.0, damping=0.02, direction=-1.0, gap=0.0):
@@ -109,7 +109,7 @@ def test_jenkins_orbit_is_that_of_its_exact_pieces(omega):
     t1, q, t2 = pieces.orbit([log.t[up], log.delta[up], t2])
     assert abs(log.t[up] - t1) < 1e-9
     assert abs(log.delta[up] - q) < 1e-10
-    later = flown(system, found.whole, t1 - found.phase, Exponential(1e-12))
+    later = state_after(system, found.whole, t1 - found.phase, Exponential(1e-12))
     assert abs(later[:2] - [q, 0.0]).max() < 1e-10
     exact = pieces.multipliers(t1, q, t2)
     exact = exact[np.argsort(-abs(exact))]
@@ -195,7 +195,7 @@ def differenced(found, step=1e-6):
         for side in (1.0, -1.0):
             moved = x.copy()
             moved[i] += side * step
-            ends.append(flown(later, moved, found.period, Exponential(1e-12))[whole])
+            ends.append(state_after(later, moved, found.period, Exponential(1e-12))[whole])
         columns.append((ends[0] - ends[1]) / (2.0 * step))
     return np.transpose(columns)
 
@@ -374,7 +374,7 @@ def test_slopes_by_a_parameter_of_the_matrices_know_what_is_latched():
     x, step = orbit(*family(1.0)).whole, 1e-6
     chain = PeriodicProblem(family, Exponential(1e-12), step=step).evaluate(x[None, :], 1.0)
     sides = [family(1.0 + side * step) for side in (-1.0, 1.0)]
-    ends = [flown(system, x, period, Exponential(1e-12)) for system, period in sides]
+    ends = [state_after(system, x, period, Exponential(1e-12)) for system, period in sides]
     wanted = (ends[1] - ends[0]) / (2.0 * step)
     assert abs(chain.by_parameter[0] - wanted).max() < 1e-6
     assert abs(chain.by_parameter[0, 3]) > 1e-3

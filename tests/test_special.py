@@ -14,7 +14,7 @@ from contacts import Hertz, KelvinVoigt, PiecewiseLinear, law
 from solvers import Contact, DormandPrince, OrbitError, System, branch
 from solvers.branches.bifurcations import Arc
 from solvers.branches.continuation import BranchStatus
-from solvers.orbits import delayed, flown
+from solvers.orbits import delayed, state_after
 
 
 @law(jump=True)
@@ -166,7 +166,7 @@ def test_orbits_of_several_stops_close_for_another_integrator(stops, seed, monke
     assert all(status is not BranchStatus.LOST for status in found.status)
     for one in found.orbits[::4]:
         later, x = delayed(one.system, one.phase), one.state
-        end = flown(later, x, 2.0 * one.period, DormandPrince(1e-10))
+        end = state_after(later, x, 2.0 * one.period, DormandPrince(1e-10))
         assert np.abs(end - x).max() < 1e-6 * np.abs(x).max() * max(1.0, abs(one.multipliers[0])) ** 2
 
 
@@ -187,7 +187,7 @@ def test_a_force_that_jumps_may_begin_at_any_time_of_the_period(number, later):
     """Fold and flip at 1.169860 and 1.172158 whichever phase is t = 0, contacts sliding over it on the way."""
     first = solvers.orbit(*ball(0.0)(1.3))
     t = (float(first.contacts.t_in[number]) + later * first.period) % first.period
-    start = flown(first.system, first.state, t, first.method)
+    start = state_after(first.system, first.state, t, first.method)
     found = branch(ball(t), (0.8, 1.3), start, at=1.3, step=0.1).run()
     assert found.status == (BranchStatus.END,)
     assert [one.mark for one in found.special] == ["fold", "flip"]

@@ -19,7 +19,7 @@ import solvers
 from fembeam.model.equations import load_period
 from fembeam.scene import unit_of
 from fembeam.support import Part, Printed, is_whole, require
-from solvers.orbits import at_zero, delayed, flown, periods_of_decay, settled, with_initial_memory
+from solvers.orbits import at_zero, delayed, periods_of_decay, settled, state_after, with_initial_memory
 from solvers.orbits import run as run_from
 from solvers.problem import counted
 
@@ -183,7 +183,7 @@ def _periods_to_repeat(orbit: Orbit, T: float) -> int:
         if orbit.period % shorter:
             continue
         later = delayed(orbit.model.system, orbit.found.phase)
-        end = flown(later, orbit.found.whole, shorter * T, orbit.found.method)[: 2 * n]
+        end = state_after(later, orbit.found.whole, shorter * T, orbit.found.method)[: 2 * n]
         scale = np.concatenate(
             (np.repeat(np.abs(orbit.state[:n]).max(), n), np.repeat(np.abs(orbit.state[n:]).max(), n))
         )
@@ -312,5 +312,5 @@ def _same(a: Orbit | None, b: Orbit | None, T: float) -> bool:
     for _ in range(a.period):
         if np.linalg.norm(x[:n2] - y[:n2]) <= 1e-5 * np.linalg.norm(x[:n2]):
             return True
-        y = flown(b.model.system, y, T, b.found.method)
+        y = state_after(b.model.system, y, T, b.found.method)
     return False

@@ -3,8 +3,8 @@
 `walk` controls the steps along the branch, `point` takes one, `bifurcations` locates folds, flips and tori,
 `count_changes` where contacts or phases of stick come and go, `hopping` leads over corners of laws with memory,
 `grazing`, `merging` and `nonsmooth` lead across the points where the return map is not smooth, `reshooting` moves the
-begins of shots, `subharmonic_end` ends a branch on that of half the period, `restart` reads one back. Imports:
-`orbits` and the rooms below it. Begin with `continuation.branch`.
+starts of shots, `subharmonic_end` ends a branch on that of half the period, `restart` reads one back. Imports:
+`orbits` and what that may. Begin with `continuation.branch`.
 """
 
 from solvers.branches.restart import restarted

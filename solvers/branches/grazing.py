@@ -20,7 +20,17 @@ from typing import Any
 import numpy as np
 
 from solvers.branches.point import Point, moved, tangent_of
-from solvers.orbits import Chain, Orbit, OrbitError, PeriodicProblem, delayed, flown, latching_stops, newton, orbit_of
+from solvers.orbits import (
+    Chain,
+    Orbit,
+    OrbitError,
+    PeriodicProblem,
+    delayed,
+    latching_stops,
+    newton,
+    orbit_of,
+    state_after,
+)
 from solvers.problem import Array, System
 
 _MOST = 8  # iterations of Newton's method
@@ -50,7 +60,7 @@ class _Meeting(PeriodicProblem):
     floor: float = 0.0
 
     def shots(self, parameter: float) -> list[tuple[System, float]]:
-        """(system from the shot's begin on, duration) of every shot."""
+        """(system from the shot's start on, duration) of every shot."""
         known = parameter in self.kept
         shots = super().shots(parameter)
         for i, stop in enumerate(() if known else self.stops):
@@ -114,7 +124,7 @@ def first_grazing(
     orbit = point.orbit
     later = delayed(orbit.system, orbit.phase)
     times, stops = [t for t, _ in begins], (None, *(stop for _, stop in begins))
-    states = [orbit.whole, *(flown(later, orbit.whole, t, orbit.method) for t in times)]
+    states = [orbit.whole, *(state_after(later, orbit.whole, t, orbit.method) for t in times)]
     rest = tuple((orbit.phase + t) / orbit.period for t in (0.0, *times))
     guess = np.concatenate((*states, [point.chain.parameter], [rest[i] for i in _places(stops)]))
     return solved(point, stops, rest, guess, speed, floor, within)
@@ -204,7 +214,7 @@ def unknowns_at(point: Point, grazing: Grazing) -> Array:
     x = [known[0]]
     for fraction in problem.fractions[1:]:
         i = max(i for i, begin in enumerate(grazing.fractions) if begin < fraction)
-        x.append(flown(shots[i][0], known[i], (fraction - grazing.fractions[i]) * period, problem.method))
+        x.append(state_after(shots[i][0], known[i], (fraction - grazing.fractions[i]) * period, problem.method))
     return np.append(np.concatenate(x), grazing.parameter)
 
 
@@ -272,4 +282,4 @@ def _shots(problem: PeriodicProblem, x: Array, parameter: float) -> Array:
     """States of all shots (m, N) of the motion from the first one."""
     (system, _), period = problem.shots(parameter)[0], problem.make(parameter)[1]
     begins = [(fraction - problem.fractions[0]) * period for fraction in problem.fractions]
-    return np.array([x, *(flown(system, x, t, problem.method) for t in begins[1:])])
+    return np.array([x, *(state_after(system, x, t, problem.method) for t in begins[1:])])

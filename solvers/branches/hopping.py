@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from solvers.branches.point import Point, corrected, point_of
-from solvers.orbits import OrbitError, flown
+from solvers.orbits import OrbitError, state_after
 from solvers.problem import SolverError
 
 _SHARES = 1e-5, 1e-4, 1e-3, 1e-2  # of the span: how far the parameter goes
@@ -52,7 +52,7 @@ def _point_at(a: Point, parameter: float) -> tuple[Point, float]:
     states = []
     for number in range(_PERIODS * len(shots) if a.orbit.stable else len(shots)):
         states.append(x)
-        x = flown(shots[number % len(shots)][0], x, shots[number % len(shots)][1], a.problem.method)
+        x = state_after(shots[number % len(shots)][0], x, shots[number % len(shots)][1], a.problem.method)
     guess = np.append(np.concatenate(states[-len(shots) :]), parameter)
     chain, error, iterations = corrected(a, guess, True, True)
     off = np.append(chain.x.ravel(), parameter) - a.unknowns

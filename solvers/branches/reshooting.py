@@ -1,4 +1,4 @@
-"""Shots of a branch that begin later, because a contact has come near one of their begins.
+"""Shots of a branch that begin later, because a contact has come near one of their starts.
 
 A contact whose law depends on the entry rate must not be under way there. One whose force jumps must not begin or end
 there: the state at a fixed time has a corner where the jump passes it, which Newton's method does not cross. Nor may
@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from solvers.branches.point import Point, point_of
-from solvers.orbits import Chain, OrbitError, delayed, flown, latching_stops, newton, open_begins
+from solvers.orbits import Chain, OrbitError, delayed, latching_stops, newton, open_starts, state_after
 from solvers.problem import Array, ContactLog, System
 
-_MARGIN = 0.1  # of the longest open interval that must lie on both sides of a shot's begin
+_MARGIN = 0.1  # of the longest open interval that must lie on both sides of a shot's start
 
 
 def _to_keep_clear_of(system: System, log: ContactLog) -> Any:
@@ -27,7 +27,7 @@ def _to_keep_clear_of(system: System, log: ContactLog) -> Any:
 
 
 def reshot(point: Point) -> Point:
-    """The same point, its shots begun later where a contact has come near one of their begins."""
+    """The same point, its shots begun later where a contact has come near one of their starts."""
     orbit, m = point.orbit, len(point.problem.fractions)
     log, period = orbit.contacts, orbit.period
     offsets = [(f - point.problem.fractions[0]) * period for f in point.problem.fractions]
@@ -41,11 +41,11 @@ def reshot(point: Point) -> Point:
 
     if away(offsets) > _MARGIN * period / (1 + len(log) + len(passed)):
         return point
-    begins = open_begins(orbit.system, log, period, m, False, passed if orbit.memory else None)
+    begins = open_starts(orbit.system, log, period, m, False, passed if orbit.memory else None)
     if len(begins) < m or not away(begins) > away(offsets):
         return point
     later = delayed(orbit.system, orbit.phase)
-    x = np.array([flown(later, orbit.whole, t, orbit.method) for t in begins])
+    x = np.array([state_after(later, orbit.whole, t, orbit.method) for t in begins])
     fractions = [(orbit.phase + t) / period for t in begins]
     turns = math.floor(fractions[0])
     problem = replace(point.problem, fractions=tuple(f - turns for f in fractions))

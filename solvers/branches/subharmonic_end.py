@@ -13,7 +13,7 @@ import numpy as np
 
 from solvers.branches.bifurcations import indicators
 from solvers.branches.point import Point
-from solvers.orbits import Orbit, OrbitError, delayed, flown, misfit, newton, orbit_of
+from solvers.orbits import Orbit, OrbitError, delayed, newton, orbit_of, state_after, why_not_periodic
 from solvers.problem import Array, System
 
 _SHARP = 1e-10  # of the parameter
@@ -34,7 +34,7 @@ class Scaled:
 
 def subharmonic_end(a: Point, b: Point, fold: Orbit) -> Orbit | None:
     """The flip of half the period that a fold between two points of a branch is; None if it is a plain fold."""
-    if misfit(fold.system, 0.5 * fold.period) or a.problem.fractions != b.problem.fractions:
+    if why_not_periodic(fold.system, 0.5 * fold.period) or a.problem.fractions != b.problem.fractions:
         return None
     before, after = (_half_apart(point.orbit) for point in (a, b))
     if before @ a.metric[: len(before), : len(before)] @ after >= 0.0:
@@ -47,7 +47,7 @@ def subharmonic_end(a: Point, b: Point, fold: Orbit) -> Orbit | None:
 
 def _half_apart(orbit: Orbit) -> Array:
     """d(x) of an orbit."""
-    return flown(delayed(orbit.system, orbit.phase), orbit.whole, 0.5 * orbit.period, orbit.method) - orbit.whole
+    return state_after(delayed(orbit.system, orbit.phase), orbit.whole, 0.5 * orbit.period, orbit.method) - orbit.whole
 
 
 def _flip(a: Point, fold: Orbit) -> Orbit | None:

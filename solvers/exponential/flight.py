@@ -187,7 +187,7 @@ def fly_series(problem, tables, x, t, span, signal_terms, terms):
 
 @inner
 def fly_tabulated(problem, tables, level, x, signal_terms):
-    """A tabulated step of the blocks' p and v under signals with given derivatives at its begin."""
+    """A tabulated step of the blocks' p and v under signals with given derivatives at its start."""
     propagate_split(tables, level, x)
     width = 2 * x.shape[1]
     for j in range(problem.table_dt.size):

@@ -154,7 +154,7 @@ def _inside_segment(problem, past, s, x):
 
 @merged
 def _note_sides(problem, tables, past, scratch):
-    """Force before its cut at the begin of a landing, for laws cut at zero force, into ``scratch.unresolved``."""
+    """Force before its cut at the start of a landing, for laws cut at zero force, into ``scratch.unresolved``."""
     for s in range(problem.gap.size):
         if past.segment[s] > 0 and tables.bend[s] == FORCE:
             scratch.unresolved[s] = side_at(problem, tables, past, s, past.x, scratch.trial)

@@ -13,7 +13,7 @@ Limitations
 * A contact begins where δ becomes positive; δ = 0 alone is no contact. An entry with δ̇ = 0 counts if δ̈ > 0; where
   the force of another stop causes such an entry, it is found one shortest step (1e-9 s) late.
 * A law with a kink elsewhere than at its declared knots and its `bend` is integrated with smaller steps, at lower
-  order; so is the begin of a contact whose law has powers of δ that are no multiples of 1/4. The tolerance is kept.
+  order; so is the start of a contact whose law has powers of δ that are no multiples of 1/4. The tolerance is kept.
 * K and C must be positive semi-definite (no buckled modes, no negative damping; a contact law may drive).
 """
 
@@ -49,7 +49,7 @@ from solvers.compiled.state import (
     switch,
     switch_on_surface,
 )
-from solvers.exponential.contact.begin import BEGUN, NEW, begin_steps, latest_entered
+from solvers.exponential.contact.first_step import BEGUN, NEW, begin_steps, latest_entered
 from solvers.exponential.contact.landing import landing_reach
 from solvers.exponential.contact.step import advance_contact
 from solvers.exponential.energy.check import FIRST, has_gained, note_energy, own_energy

@@ -19,13 +19,13 @@ def signal_responses(problem: Problem, h: Any) -> Any:
 
 
 def quintic_responses(problem: Problem, h: float) -> Any:
-    """State change (L, 6, 2, N) over a time h by the quintic through s, s', s'' at its begin and at its end."""
+    """State change (L, 6, 2, N) over a time h by the quintic through s, s', s'' at its start and at its end."""
     rows: Any = np.einsum("kd,lke->lde", derivatives_of_ends(h), signal_responses(problem, np.array([h]))[0])
     return rows.reshape(-1, 6, 2, len(problem.k))
 
 
 def derivatives_of_ends(h: float) -> Any:
-    """(6, 6) derivatives of a quintic at its begin from s, s', s'' there and after the time h."""
+    """(6, 6) derivatives of a quintic at its start from s, s', s'' there and after the time h."""
     scale, hermite = h ** np.arange(6.0), np.zeros((6, 6))
     hermite[:3, :3] = np.diag((1.0, 1.0, 0.5))
     hermite[3:] = [

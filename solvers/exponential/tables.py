@@ -45,7 +45,7 @@ class Tables(NamedTuple):
     flight_propagator: Any  # (l, 2, N padded): α, β of every block
     signal: Any  # (l, L, 6, 2, N padded): state change by a signal t^k/k!
     cell: Any  # (2, N padded): α, β over a whole cell of the sampled signals
-    cell_signal: Any  # (L, 6, 2, N padded): state change over a cell by s, s', s'' at its begin, then at its end
+    cell_signal: Any  # (L, 6, 2, N padded): state change over a cell by s, s', s'' at its start, then at its end
     cell_error: Any  # (m, N padded): see `cell_errors`
     cell_error_signal: Any  # (m, L, 2)
     load_rows: Any  # (L, 2, N padded): state rate of p and v per unit of a signal
@@ -72,7 +72,7 @@ class Tables(NamedTuple):
     lagrange: Any  # (f, 2, S): 1/Π (σ_j - σ_i) of the nodes' polynomials, and the same over σ_j^λ
     tail: Any  # (f, S, 8): from node values of a signal, the last four Legendre coefficients in σ
     local_interpolation: (
-        Any  # (f, S, 2S + 2, 2S): δ and h δ̇ at points around a node from those at all nodes and at the begin
+        Any  # (f, S, 2S + 2, 2S): δ and h δ̇ at points around a node from those at all nodes and at the start
     )
     local_interval: Any  # (f, S, 2): the interval of σ these points span
     kind: Any  # (f,) index of the kinds, and of the weightings of plain forces, below; see `contact.nodes.NodeSets`

@@ -51,7 +51,7 @@ def _cut(start: float, end: float, at: Array) -> Iterator[tuple[float, float]]:
     return pairwise([start, *sorted(at[(at > start) & (at < end)].tolist()), end])
 
 
-def open_begins(
+def open_starts(
     system: System, contacts: ContactLog, period: float, count: int, zero: bool, passed: Array | None = None
 ) -> list[float]:
     """Times for the starts of ``count`` shots: zero if asked for, then the middles of the longest open intervals.

@@ -12,7 +12,7 @@ import numpy as np
 
 from solvers.exponential.method import Exponential
 from solvers.orbits.shots import Chain, PeriodicProblem, delayed
-from solvers.orbits.whole_state import codes, counts, derivatives, flown, memory_of, run, transitions_of
+from solvers.orbits.whole_state import codes, counts, derivatives, memory_of, run, state_after, transitions_of
 from solvers.problem import Array, ContactLog, Solution, SolverError, System, Transitions, counted
 
 _LOST = 1e-13  # size of a direction after one period, in units of the largest, below which it is forgotten
@@ -145,7 +145,7 @@ def at_zero(orbit: Orbit) -> Array:
     """State of an orbit at t = 0, with what is latched."""
     if orbit.phase == 0.0:
         return orbit.whole
-    return flown(delayed(orbit.system, orbit.phase), orbit.whole, orbit.period - orbit.phase, orbit.method)
+    return state_after(delayed(orbit.system, orbit.phase), orbit.whole, orbit.period - orbit.phase, orbit.method)
 
 
 def orbit_of(problem: PeriodicProblem, chain: Chain, residual: float, iterations: int, **more: Any) -> Orbit:

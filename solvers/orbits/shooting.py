@@ -26,10 +26,10 @@ from numpy.typing import ArrayLike
 
 from solvers.exponential.method import Exponential
 from solvers.orbits.newton import extended, newton, weights
-from solvers.orbits.open_times import closed, is_cut, latching_stops, open_begins
+from solvers.orbits.open_times import closed, is_cut, latching_stops, open_starts
 from solvers.orbits.periodic_orbit import Orbit, OrbitError, at_zero, orbit_of, with_doubts
 from solvers.orbits.shots import Chain, PeriodicProblem
-from solvers.orbits.whole_state import counts, flown, run, with_initial_memory
+from solvers.orbits.whole_state import counts, run, state_after, with_initial_memory
 from solvers.problem import Array, System
 from solvers.problem.run_arguments import check_slopes, latched_at_start
 
@@ -81,7 +81,7 @@ def orbit(
         try:
             return _near(system, period, x, method, shots)
         except OrbitError:
-            x = flown(system, x, 100.0 * period, replace(method, rtol=max(method.rtol, 1e-8)))
+            x = state_after(system, x, 100.0 * period, replace(method, rtol=max(method.rtol, 1e-8)))
     return _near(system, period, x, method, shots)
 
 
@@ -135,12 +135,12 @@ def checked(system: System, period: float, method: Any, shots: int | None) -> An
     if not getattr(method, "has_tangent", False):
         raise ValueError(f"method must offer tangents, such as Exponential(), got {method!r}")
     check_slopes(system)
-    if trouble := misfit(system, period):
+    if trouble := why_not_periodic(system, period):
         raise ValueError(trouble)
     return method
 
 
-def misfit(system: System, period: float) -> str:
+def why_not_periodic(system: System, period: float) -> str:
     """Which load does not have a period, in words; empty when all have it."""
     for load, (_, signal) in enumerate(system.loads):
         trouble = f"load {load} does not have the period {period:g} s"
@@ -165,7 +165,7 @@ def checked_start(system: System, start: ArrayLike, period: float, method: Any) 
         more = f", or {whole} with what is latched" if whole > n2 else ""
         raise ValueError(f"start must be {n2} finite numbers [q, q_dot]{more}, got {start!r}")
     if x.shape != (whole,):
-        return flown(system, with_initial_memory(system, x), _SETTLING * period, method)
+        return state_after(system, with_initial_memory(system, x), _SETTLING * period, method)
     latched_at_start(system, np.split(x[n2:], np.cumsum(counts(system))[:-1]) if whole > n2 else None)
     return x
 
@@ -178,7 +178,7 @@ def settled(system: System, period: float, method: Any) -> Array:
     least = _FRICTION if any(counts(system)) else 1
     count = min(max(least, periods_of_decay(system, period)), _LONGEST)
     x = with_initial_memory(system, np.zeros(2 * system.size))
-    return flown(system, x, count * period, replace(method, rtol=max(method.rtol, 1e-8)))
+    return state_after(system, x, count * period, replace(method, rtol=max(method.rtol, 1e-8)))
 
 
 def periods_of_decay(system: System, period: float) -> int:
@@ -209,12 +209,12 @@ def _start_chain(system: System, period: float, x: Array, method: Any, count: in
     first = run(system, x, period, method=method)
     passed = first.transitions.t if any(counts(system)) else None
     zero = not closed(system, x, range(len(system.contacts)))
-    starts = open_begins(system, first.contacts, period, count, zero, passed)
+    starts = open_starts(system, first.contacts, period, count, zero, passed)
     if not starts and not closed(system, x, latching_stops(system)):
         starts = [0.0]
     if len(starts) < count:
         raise OrbitError("at no time of the period are all stops open whose law latches the entry rate")
-    states = [x if t == 0.0 else flown(system, x, t, method) for t in starts]
+    states = [x if t == 0.0 else state_after(system, x, t, method) for t in starts]
     return PeriodicProblem(_Constant(system, period), method, tuple(t / period for t in starts)), np.array(states)
 
 

@@ -68,7 +68,7 @@ def end(solution: Solution) -> Array:
     return state
 
 
-def flown(system: System, x: Array, duration: float, method: Any) -> Array:
+def state_after(system: System, x: Array, duration: float, method: Any) -> Array:
     """State after a duration."""
     return end(run(system, x, duration, method=method))
 
@@ -81,7 +81,7 @@ def derivatives(system: System, x: Array, duration: float, method: Any, tangent:
     if solution.memory_tangent is None:
         return solution, matrix
     if isinstance(tangent, Parameter) and matrix.shape[1] == len(x):
-        behind, ahead = (flown(side, x, duration, method) for side in (tangent.behind, tangent.ahead))
+        behind, ahead = (state_after(side, x, duration, method) for side in (tangent.behind, tangent.ahead))
         matrix = np.column_stack((matrix, (ahead - behind) / (2.0 * tangent.step)))
     without = np.flatnonzero(codes(system))
     matrix[without] = matrix[:, without] = 0.0

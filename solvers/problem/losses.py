@@ -27,7 +27,7 @@ class Losses:
 
     Attributes
     ----------
-    work : (m,) J done on each. stored : (m,) J that its law holds more at the end than at the begin; NaN where a law
+    work : (m,) J done on each. stored : (m,) J that its law holds more at the end than at the start; NaN where a law
         cannot tell.
     slip : (m,) m (rad of rotation), distance that δ went while sliders slipped, summed over the sliders of a law.
     history : (k, m) J, work done on each up to the samples. impulses : (k, m) N s (N m s), of each force likewise;
@@ -134,7 +134,7 @@ def _stored_by(contact: Contact, delta: float, latched: Array) -> float:
 def _slipped(
     contacts: Sequence[Contact], memory: Sequence[Array], passed: Transitions, begin: Array, end: Array
 ) -> Array:
-    """(m,) way of δ while sliders slipped, of those also that slip at the begin or at the end of the run."""
+    """(m,) way of δ while sliders slipped, of those also that slip at the start or at the end of the run."""
     path, since = np.zeros(len(begin)), _slipping(contacts, memory, begin)
     for contact, border, event, delta in zip(passed.contact, passed.border, passed.event, passed.delta, strict=True):
         if event == "slip":

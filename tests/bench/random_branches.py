@@ -27,7 +27,7 @@ import solvers.branches.walk
 from solvers import Branch, DormandPrince, Orbit, OrbitError, branch, integrate, orbit
 from solvers.branches.continuation import BranchStatus
 from solvers.branches.grazing import signature
-from solvers.orbits import PeriodicProblem, delayed, flown, open_begins
+from solvers.orbits import PeriodicProblem, delayed, open_starts, state_after
 
 CHECKED = 5  # orbits of a branch that are integrated again
 
@@ -62,10 +62,10 @@ def reach(one: Orbit, error: float) -> float:
     """
     n, run, worst = one.system.size, one.samples(), 0.0
     scale = np.concatenate([np.full(n, np.abs(part).max()) for part in (run.q, run.q_dot)])
-    for t in [0.0, *open_begins(one.system, one.contacts, one.period, 8, False)]:
-        x = flown(delayed(one.system, one.phase), one.state, t, one.method) if t else one.state
+    for t in [0.0, *open_starts(one.system, one.contacts, one.period, 8, False)]:
+        x = state_after(delayed(one.system, one.phase), one.state, t, one.method) if t else one.state
         for off in error * np.vstack((np.diag(scale), -np.diag(scale))):
-            end = flown(delayed(one.system, one.phase + t), x + off, 2.0 * one.period - t, one.method)
+            end = state_after(delayed(one.system, one.phase + t), x + off, 2.0 * one.period - t, one.method)
             worst = max(worst, float(np.abs(end - one.state).max()))
     return math.sqrt(2.0 * n) * worst / float(np.abs(one.state).max())
 

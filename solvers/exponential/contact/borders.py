@@ -38,7 +38,7 @@ _CLEAR = 0.03  # the lowest margin between them, in the same units, that counts 
 def _margins_on_step(problem, tables, state, scratch, s, node_set, level):
     """Margins at the nodes and at both ends of the step that has just been tried, their largest and their rounding.
 
-    The begin is looked at once more with rounding added to δ and to δ̇, and with their ripple.
+    The start is looked at once more with rounding added to δ and to δ̇, and with their ripple.
     """
     n, delta, rate = problem.k.size, scratch.start_motion[s, 0], scratch.start_motion[s, 1]
     weight, alias = tables.ripple_weight[s], tables.alias[tables.kind[node_set], level]
@@ -63,9 +63,9 @@ def _margins_on_step(problem, tables, state, scratch, s, node_set, level):
 
 @inlined
 def _crossing(tables, state, scratch, s, j, node_set, h):
-    """Time after the begin of the step at which a margin falls below zero by its values at the nodes, or inf.
+    """Time after the start of the step at which a margin falls below zero by its values at the nodes, or inf.
 
-    It is 0 where the margin is negative from the begin on. One that begins at zero may have risen before the first
+    It is 0 where the margin is negative from the start on. One that begins at zero may have risen before the first
     node: then a shorter step is asked for, which will tell. A landing may have missed its border by more than rounding
     of this step: then a margin is negative at first, but little, rises, and crosses only if it falls again. A slip that
     begins against its force, as dashpots make it, has a large one and ends at once.
@@ -147,7 +147,7 @@ def _hides(scratch, s, j):
 
 @inner
 def border_ahead(problem, tables, state, scratch, node_set, level):
-    """(time after the begin of the step, element, border) of the first border on it.
+    """(time after the start of the step, element, border) of the first border on it.
 
     The element is -1 if there is none, and `UNRESOLVED` if the step is too long to tell.
     """

@@ -112,7 +112,7 @@ def _bound_rates(problem, tables, state, scratch, h):
 
 @merged
 def _stays_away(scratch, s, h):
-    """Whether a stop out of contact cannot be reached on the step; its motion is set to that at the begin."""
+    """Whether a stop out of contact cannot be reached on the step; its motion is set to that at the start."""
     delta, rate = scratch.start_motion[s, 0], scratch.start_motion[s, 1]
     store8(scratch.motion[s, 0], 0, splat8(delta))
     store8(scratch.motion[s, 1], 0, splat8(rate))
@@ -198,7 +198,7 @@ def choose_sides(problem, tables, state, scratch):
 
 @inner
 def first_bend(problem, tables, state, scratch, node_set, level, is_new, rtol):
-    """(time after the begin of the step, stop) of the first bend on it; no stop is -1.
+    """(time after the start of the step, stop) of the first bend on it; no stop is -1.
 
     A stop that begins on its bend (``is_new``), or was taken across it by the landing of another stop, gets the side of
     the first node. A bend of a rate, or force, within the tolerance is not an event.

@@ -133,7 +133,7 @@ def _length_to(problem, tables, state, scratch, variable, stop, span, landed, ti
 
 @merged
 def _begin_peaks(state, scratch):
-    """Raise the peak forces by those at the begin of a landing, which its first stage has computed."""
+    """Raise the peak forces by those at the start of a landing, which its first stage has computed."""
     work, size = scratch.stages, state.x.size
     for s in range(state.segment.size):
         if state.segment[s] > 0:

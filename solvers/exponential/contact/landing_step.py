@@ -94,7 +94,7 @@ def landing_step(problem, tables, with_energy, variable, stop, span, w, segment,
 
 @inner
 def start_landing(problem, tables, state, scratch, stop):
-    """Put the state at the begin of a landing of ``stop``, with t and δ^{1/κ}, into ``scratch.stages[START]``."""
+    """Put the state at the start of a landing of ``stop``, with t and δ^{1/κ}, into ``scratch.stages[START]``."""
     w, size, delta = scratch.stages[START], state.x.size, max(indentation(problem, stop, state.x), 0.0)
     copy(state.x, w, size)
     w[size], w[size + 1] = state.now[T], delta ** (1.0 / tables.time_exponent[1 + stop])

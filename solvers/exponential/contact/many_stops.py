@@ -63,7 +63,7 @@ def _in_pool(problem, tables, scratch, weighting, level, s, u):
 
 @part(FREE_BLOCKS, types.void, types.int64, types.int64, VECTOR)
 def free_block_motion(problem, tables, scratch, node_set, level, x):
-    """All blocks at the nodes from the state at the begin of the step, without forces."""
+    """All blocks at the nodes from the state at the start of the step, without forces."""
     n, block_motion = problem.k.size, scratch.block_motion
     ahead = tables.node_propagator[tables.kind[node_set], level]
     for b in range(n):

@@ -23,7 +23,7 @@ from solvers.exponential.contact.nodes import S
 DIFFERENCE, BATCH, LANDED, WITHIN, START = range(STAGES + 1, STAGES + 6)
 """Rows of `Scratch.stages` behind the stages of a landing's Runge–Kutta step and the rate at its end: the embedded
 difference; numbers for one law call; trial states, at last the one landed on; a state within a step, for the energy
-balance; the state at the begin of a landing, or at the end of a run within a step."""
+balance; the state at the start of a landing, or at the end of a run within a step."""
 DELTAS, RATES, FORCES, KNOWN = range(
     4
 )  # rows of `Scratch.local_motion`: m, m/s, N at points around a node; the values they are interpolated from
@@ -67,14 +67,14 @@ class Scratch(NamedTuple):
     viscous: Any  # (m,) N s/m: slope of a force by its rate, where Newton's method has found it; else 0
     local_motion: Any  # (4, 3S) rows as named above, see `peaks`
     side: Any  # (m,) +1 or -1: side of its law's bend on which each stop is, see `crossings`
-    side_at_begin: Any  # (m,) the same at the begin of the step tried
+    side_at_begin: Any  # (m,) the same at the start of the step tried
     bend_values: Any  # (S + 2,) of one stop at the nodes and at the end, then the largest, see `crossings`
     landing_reach: Any  # (1,) radians of the fastest block that a landing may take
     duration: Any  # (1,) s: estimate for the contact begun last, as if nothing else acted on the body
     energy_sums: Any  # (2 + L, numbers) see `energy.flight_balance` and `contact_balance`
     energy: Any  # (3,) J, see `energy.check`
     control: Any  # (6,) of the step control, places named in `step`
-    start_motion: Any  # (m, 2) δ and δ̇ at the begin of the step
+    start_motion: Any  # (m, 2) δ and δ̇ at the start of the step
     margin: Any  # (B S,) margins of an element's borders at points, row by row, B the most of any; see `borders`
     ends: Any  # (6 B,)
     fired: Any  # (B,)

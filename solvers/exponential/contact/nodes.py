@@ -185,11 +185,11 @@ def _brackets(node_set: _NodeSet) -> Any:
 
 
 def _zoom(node_set: _NodeSet, begin: float, end: float) -> Any:
-    """(2S + 2, 2S): δ and h δ̇ at the points `LOCAL` of [begin, end] from those at the nodes and at the step's begin.
+    """(2S + 2, 2S): δ and h δ̇ at the points `LOCAL` of [begin, end] from those at the nodes and at the step's start.
 
     δ is Hermite's polynomial in σ. δ̇ of a smooth step is the polynomial through its values; in a short one the slope of
     the former is rounding over h. On an entry step it is that slope over dt/dσ, and where that vanishes, beside
-    the begin, δ̇(0) + σ^κ × the polynomial through (δ̇ - δ̇(0))/σ^κ at the nodes.
+    the start, δ̇(0) + σ^κ × the polynomial through (δ̇ - δ̇(0))/σ^κ at the nodes.
     """
     x, y = np.append(node_set.nodes, 0.0), begin + 0.5 * (LOCAL + 1.0) * (end - begin)
     basis, turn = _interpolation(x, y), _differentiation(x)

@@ -1,7 +1,7 @@
 """Largest indentation and force of a contact: maxima of the interpolants of each step, not of its node values.
 
 Between the neighbours of the highest node, δ and δ̇ at eight points are interpolated from δ and δ̇ at all nodes and at
-the begin of the step by Hermite's polynomial of degree 17; the forces there are those of the law. The maximum of the
+the start of the step by Hermite's polynomial of degree 17; the forces there are those of the law. The maximum of the
 polynomial through these points is closer to that of the motion than the motion is to the exact one.
 """
 
@@ -116,7 +116,7 @@ def step_peaks(problem, tables, state, scratch, node_set, h, s, limit):
             if values[place] < 0.95 * known or (place == S - 1 and slopes[7] >= 0.0):
                 continue  # lower, or still rising at the end, where the next step begins
             if node_set == 0 and place == 0 and slopes[6] <= 0.0 and known >= slopes[4]:
-                continue  # falling from its begin
+                continue  # falling from its start
         place = max(place, 0)
         if seen != place:
             motion_around(problem, tables, state, scratch, node_set, h, s, place)

@@ -33,7 +33,7 @@ def land_first(problem, tables, state, scratch, stop, direction, near, rtol, t_e
 
 @part(FIRST_END, types.Tuple((REAL, types.int64)), types.int64, types.int64, types.boolean, REAL)
 def first_end(problem, tables, state, scratch, node_set, level, is_new, rtol):
-    """(time after the begin of the step tried, stop) of the first bend or border on it; no stop is -1.
+    """(time after the start of the step tried, stop) of the first bend or border on it; no stop is -1.
 
     Of a border ``scratch.border`` holds which it is, else -1. The stop is `UNRESOLVED` if the step is too long to tell.
     """

@@ -40,7 +40,10 @@ from solvers.compiled.state import (
     switch_on_surface,
 )
 from solvers.compiled.sums import combine
-from solvers.exponential.contact.begin import (
+from solvers.exponential.contact.borders import UNRESOLVED
+from solvers.exponential.contact.collocation import end_state, finish_step, solve_forces, step_error
+from solvers.exponential.contact.crossings import leaves_segment
+from solvers.exponential.contact.first_step import (
     ENTRY,
     LEVEL,
     NEW,
@@ -52,9 +55,6 @@ from solvers.exponential.contact.begin import (
     latest_entered,
     level_of,
 )
-from solvers.exponential.contact.borders import UNRESOLVED
-from solvers.exponential.contact.collocation import end_state, finish_step, solve_forces, step_error
-from solvers.exponential.contact.crossings import leaves_segment
 from solvers.exponential.contact.node_response import free_response
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.outputs import end_run, record_forces, sample_step

@@ -5,7 +5,7 @@ force times the peak indentation. A run with an energy balance is refused if the
 `ROUNDING`) times the energy handled.
 
 Without a balance, let E be the energy of the motion minus the steady response to tones. At the end it is at most that
-at the begin plus the work of the contacts,
+at the start plus the work of the contacts,
 
     E <= E₀ + Σ_s (2 max|δ̇_s of the steady response| |∫F_s dt| - ∫F_s δ̇_s dt) =: E_c,
 

@@ -29,7 +29,7 @@ class Steps:
 
     ``table`` (j, n, 3S + 5, 2S) is that of `contact_table`, ``entering`` the stop whose force has a weight, or -1,
     ``weights`` (j, S) those of the nodes, s, ``tones`` (j, 2K, 2K, S) the motion of the tones at the nodes from that at
-    the begin.
+    the start.
     """
 
     table: Any

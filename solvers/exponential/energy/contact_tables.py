@@ -111,7 +111,7 @@ def _moved(k, c, x, p, v):
 
 @inner
 def _push(k, c, h, time_exponent, weight_exponent, nodes, weights, points, begin, width, basis, pushed):
-    """Unit forces at the points of a panel, per σ, as (p, v) moved back to the panel's begin."""
+    """Unit forces at the points of a panel, per σ, as (p, v) moved back to the panel's start."""
     start = h * begin**time_exponent
     for q in range(points.shape[1]):
         sigma = begin + width * points[0, q]

@@ -1,6 +1,6 @@
 """The energy balance of flight: tabulated steps and cells by the forms of `flight_tables`, the rest by series.
 
-A flight is accounted for from a *mark* on: the begin of the flight, the last output or, with sampled signals, the begin
+A flight is accounted for from a *mark* on: the start of the flight, the last output or, with sampled signals, the start
 of the present cell. Between marks, one form covers the time, whatever steps the flight has taken.
 
 A series reaches `SERIES_REACH` radians of the fastest block. The powers of the motion it gives are integrated by
@@ -107,7 +107,7 @@ def _rounding(problem, energy_tables, t):
 def account_step(problem, tables, energy_tables, scratch, level, t, x, row):
     """Add work and damping of a tabulated step, or of a whole cell, from x at t on.
 
-    The derivatives of the signals at the begin of a tabulated step are in ``scratch.signal_terms``.
+    The derivatives of the signals at the start of a tabulated step are in ``scratch.signal_terms``.
     """
     whole, n, given = level == tables.flight_step.size, problem.k.size, scratch.energy_sums[0]
     if energy_tables.closed == 0.0:
@@ -133,7 +133,7 @@ def account_step(problem, tables, energy_tables, scratch, level, t, x, row):
 
 @merged
 def _nodes_of_cell(problem, scratch, t):
-    """s, s', s'' of every signal at the begin of the cell of t, then at its end, into ``scratch.signal_terms``."""
+    """s, s', s'' of every signal at the start of the cell of t, then at its end, into ``scratch.signal_terms``."""
     for j in range(problem.table_dt.size):
         node = problem.table_start[j] + cell_of(problem, t)[0]
         copy(problem.table[node], scratch.signal_terms[j], 3)

@@ -133,7 +133,7 @@ def _flight_part(
 ) -> EnergyTables:
     """The forms of all flight steps, and of the cell or, without sampled signals, of the time between two outputs.
 
-    Of a cell they are those of the signals' values and derivatives at its two ends, else at the begin of the step.
+    Of a cell they are those of the signals' values and derivatives at its two ends, else at the start of the step.
     """
     powers, size, n = _power_forms(problem, tables), 2 * len(problem.k), len(problem.k)
     levels = -(-len(tables.flight_step) // _OCTAVE) * _OCTAVE

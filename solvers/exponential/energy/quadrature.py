@@ -65,7 +65,7 @@ def _raised(sigma, time_exponent):
 
 @merged
 def _places(tables, scratch, node_set, h, begin, width):
-    """Points of a panel of σ: σ, times after its begin, dt per unit of the panel, and the nodes' polynomials there."""
+    """Points of a panel of σ: σ, times after its start, dt per unit of the panel, and the nodes' polynomials there."""
     time_exponent, between, nodes = tables.time_exponent[node_set], scratch.between, tables.nodes[node_set]
     start = h * _raised(begin, time_exponent)
     for q in range(S):
@@ -103,7 +103,7 @@ def _forces(problem, tables, state, scratch, node_set):
 
 @merged
 def _moves(problem, scratch, length):
-    """α, β of every block from the begin of a panel to its points and, by det E = e^{-ct}, back, then to its end."""
+    """α, β of every block from the start of a panel to its points and, by det E = e^{-ct}, back, then to its end."""
     for b in range(problem.k.size):
         k, c, out = problem.k[b], problem.c[b], scratch.moves[b]
         for q in range(S):
@@ -116,7 +116,7 @@ def _moves(problem, scratch, length):
 
 @merged
 def _pushed(problem, state, scratch, b, moves):
-    """Into ``scratch.trial`` and ``.clipped`` what moves a block at the points, p and v as of the panel's begin."""
+    """Into ``scratch.trial`` and ``.clipped`` what moves a block at the points, p and v as of the panel's start."""
     n, stops, p, v = problem.k.size, problem.gap.size, splat8(0.0), splat8(0.0)
     for u in range(scratch.force.shape[0]):
         if u >= stops or state.segment[u] > 0:

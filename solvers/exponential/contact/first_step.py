@@ -1,4 +1,4 @@
-"""The begin of contact steps: reference speeds, length and nodes of the first one."""
+"""The start of contact steps: reference speeds, length and nodes of the first one."""
 
 from __future__ import annotations
 
