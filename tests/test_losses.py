@@ -7,6 +7,7 @@ import fembeam as fb
 from contacts import (
     Border,
     BoucWen,
+    Coulomb,
     Hysteretic,
     Iwan,
     Jenkins,
@@ -101,6 +102,29 @@ def test_what_is_stored_at_the_begin_is_no_gain():
     """A spring that lets go gives its energy back: neither gain nor loss; a stop closed at the begin likewise."""
     found = swing([Polynomial([1e4]), PiecewiseLinear([1e4])], 0.25, Exponential(1e-10), q=X, v=0.0).losses.loss
     assert abs(found).max() < 1e-7 * 0.5 * 1e4 * X**2
+
+
+@METHODS
+def test_a_start_beyond_a_limit_stores_no_more_than_the_limit_holds(method):
+    """Released from rest far beyond its limit a slider first sticks at once with the force at its limit."""
+    laws = Jenkins(2e3, 1.0), Coulomb(1.0, 2e3), Jenkins(2e3, 1.0) + Iwan([100.0], [0.5])
+    for law, lost, held in zip(laws, (1.0, 1.0, 1.5), (2.5e-4, 2.5e-4, 1.5e-3), strict=True):
+        system = System.modal([5.0], [0.0], contacts=[Contact([1.0], law, always=True)])
+        run = integrate(system, [0.93], [0.0], 0.5, method=method)
+        energy = 0.5 * (25.0 * run.q[-1, 0] ** 2 + run.q_dot[-1, 0] ** 2)
+        assert run.losses.loss[0] == pytest.approx(lost * (0.93 - run.q[-1, 0]), rel=2e-3 * lost)
+        assert energy + run.losses.loss[0] + run.losses.stored[0] == pytest.approx(12.5 * 0.93**2, rel=1e-8)
+        assert abs(run.losses.stored[0]) < held
+
+
+@METHODS
+@pytest.mark.parametrize(("speed", "lost"), [(0.0, 0.0), (-0.3, 0.0), (0.3, 0.75 * 0.5 * 1e3 * 1.8e-4)])
+def test_a_start_inside_a_yielding_stop_stores_what_unloading_gives_back(method, speed, lost):
+    """From δ = 10 mm with F = k₁ δ: F²/2k₂ comes back; further loading by δ̇ loses (1 - k₁/k₂) k₁ (δm² - δ²)/2."""
+    system = System([[2.0]], [[0.0]], [[0.0]], contacts=[Contact([1.0], WaltonBraun(1e3, 4e3))])
+    run = integrate(system, [-1e-2], [-speed], 0.5, method=method)
+    assert run.losses.stored[0] == pytest.approx(-0.0125, rel=1e-8)
+    assert run.losses.loss[0] == pytest.approx(lost, rel=1e-7, abs=1e-10)
 
 
 def test_losses_of_stops_are_those_of_their_log():

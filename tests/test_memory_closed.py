@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from sliders import Slider
 
-from contacts import BoucWen, Coulomb, Iwan, Jenkins, WaltonBraun
+from contacts import BoucWen, Coulomb, Iwan, Jenkins, KelvinVoigt, WaltonBraun
 from fembeam import Harmonic
 from solvers import Contact, DormandPrince, Exponential, System, integrate
 
@@ -217,6 +217,37 @@ def test_seven_blows_on_a_yielding_stop(kind, method):
         left = run.transitions.delta[run.transitions.event == "open"]
         assert abs(left[0] - set_) < 1e-10
         assert memory[0][1] == pytest.approx(largest if kind == "kept" else 0.0, abs=1e-7)  # N
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-8, 1e-10])
+@pytest.mark.parametrize(("loading", "spring", "damping"), [(300.0, 100.0, 1.0), (300.0, 10.0, 6.0), (5e3, 1.0, 9.0)])
+def test_peak_force_of_a_damped_yielding_stop(rtol, loading, spring, damping):
+    """F = (k₁ + k) δ + c δ̇ is largest before δ̇ = 0, where the law unloads.
+
+    δ = v/ω e^(-σt) sin ωt gives F = v e^(-σt) (a sin ωt + c cos ωt), a = (k₁ + k - cσ)/ω, and from F' = 0
+    tan ωt = (a ω - c σ)/(a σ + c ω).
+    """
+    law = WaltonBraun(loading, 3.0 * loading) + KelvinVoigt(spring, damping)
+    system = System.modal([8.0], [0.0], contacts=[Contact([1.0], law)])
+    run = integrate(system, [0.3], [0.0], 0.5, method=Exponential(rtol))
+    stiffness, sigma = loading + spring, 0.5 * damping
+    omega = math.sqrt(64.0 + stiffness - sigma**2)
+    a = (stiffness - damping * sigma) / omega
+    angle = math.atan2(a * omega - damping * sigma, a * sigma + damping * omega)
+    peak = 2.4 * math.exp(-sigma * angle / omega) * (a * math.sin(angle) + damping * math.cos(angle))
+    assert run.contacts.peak_force[0] == pytest.approx(peak, rel=100.0 * rtol)
+
+
+def test_a_pull_is_no_peak_force_of_a_yielding_stop():
+    """A dashpot may pull harder when the stop opens than it pushed before."""
+    law = WaltonBraun(6e3, 16e3, "kept") + KelvinVoigt(11.0, 12.0)
+    loads = [([1.0, 0.5], Harmonic(10.0, 9.0, 0.3))]
+    system = System.modal([8.0, 30.0], [0.01, 0.01], contacts=[Contact([1.0, 0.5], law, gap=0.01)], loads=loads)
+    log, exact = (
+        integrate(system, [0.1, 0.0], [0.0, 1.0], 3.0, method=m).contacts for m in (Exponential(1e-8), DormandPrince())
+    )
+    assert len(log) > 3
+    np.testing.assert_allclose(log.peak_force, exact.peak_force, rtol=1e-5)
 
 
 # --- tangents --------------------------------------------------------------------------------------------------------

@@ -58,7 +58,7 @@ def run(job: Job) -> int:
         _check_checkpoints(job, studies)
     code, found, files = 0, {}, []
     for name in studies:
-        outcome = _done_study(job, name)
+        outcome = _study_outcome(job, name)
         if outcome.text and not job.json:
             print(outcome.text)
         code, found[name] = code or outcome.code, outcome.found
@@ -100,7 +100,7 @@ def _warnings(job: Job, files: list[Path]) -> list[str]:
     return list(dict.fromkeys([*before, *warned]))
 
 
-def _done_study(job: Job, name: str) -> Outcome:
+def _study_outcome(job: Job, name: str) -> Outcome:
     """One study, kept or computed, its end recorded."""
     scene = folders.digest(job.file, name)
     if job.resume and (files := folders.kept(job.folder, name, scene)):

@@ -88,12 +88,14 @@ class Prepared(NamedTuple):
     steady: Any  # (tones, 2n) complex amplitudes of the steady response to each tone
     tone_load: Any  # (tones,) the load each belongs to
     spare_workspaces: list[Workspace]  # of runs that are over
-    kept: Memo  # tables of the energy balance by the spacing of outputs
+    kept: Memo  # tables of the energy balance by the spacing of outputs and the tones, for all systems of the structure
+    tones: bytes
 
     def energy_tables_for(self, spacing: float) -> Packed:
         """Tables of the energy balance for outputs of a spacing, s; what reads them is compiled for the first."""
         load_parts(ENERGY)
-        made: Packed = self.kept.get(spacing, lambda: energy_tables_for(self.problem.value, self.tables.value, spacing))
+        arrays = self.problem.value, self.tables.value
+        made: Packed = self.kept.get((spacing, self.tones), lambda: energy_tables_for(*arrays, spacing))
         return made
 
     @property
@@ -181,6 +183,7 @@ class _SharedTables:
         if tables.node_propagator.size:
             load_parts(MANY_STOPS)
         self.layout = _layout(*sizes, POOL if tables.node_propagator.size else 0)
+        self.kept = Memo()
         self.problem = PackedTemplate(problem, PROBLEM, ("gap", "k", "read", "read_rate", "power"))
         self.tables = PackedTemplate(tables, TABLES, TONE_TABLES)
 
@@ -209,7 +212,8 @@ class _SharedTables:
         fill_tones(tables.value, problem.value, self.tones, self.series)
         rest = among_tones(-response.real.sum(axis=0), self.tones)
         rest[n : n + self.tones] = 1.0
-        return Prepared(problem, tables, back, self.layout, rest, response, forcing.tone_load, [], Memo())
+        key = omega.tobytes() + amplitude.tobytes()
+        return Prepared(problem, tables, back, self.layout, rest, response, forcing.tone_load, [], self.kept, key)
 
     def _tables(self, forcing: Forcing, turn: Array) -> Packed:
         """Tables that know the signals made of tones, Re(a e^{iΩt}) = Re a · p + Im a/Ω · v; ``turn`` is 1/Ω."""

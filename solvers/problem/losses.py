@@ -76,18 +76,30 @@ class Losses:
 
         ``back`` makes [q, q̇] of a state; its balance holds input, damping, and work and impulse of each contact.
         """
-        size = begin[0].size
+        size, passed = begin[0].size, transitions()
         deltas = [_indentations(contacts, back.dot(x[:size])) for x, _ in (begin, end)]
-        first, last = (_stored(contacts, d, latched) for d, (_, latched) in zip(deltas, (begin, end), strict=True))
-        return cls(
-            end[0][size + 2 :: 2], last - first, _slipped(contacts, begin[1], transitions(), *deltas), powers[:, 2::2]
-        )
+        memories = _renewed_at_once(contacts, begin[1], passed), end[1]
+        first, last = (_stored(contacts, *one) for one in zip(deltas, memories, strict=True))
+        return cls(end[0][size + 2 :: 2], last - first, _slipped(contacts, begin[1], passed, *deltas), powers[:, 2::2])
 
     def part(self, kept: slice) -> Losses:
         """Of some of the samples: their work; what was stored and slip are not known there."""
         history = self.history[kept] - self.history[kept][:1]
         unknown = np.full(len(self), math.nan)
         return Losses(history[-1] if len(history) else unknown, unknown, unknown, history)
+
+
+def _renewed_at_once(contacts: Sequence[Contact], memory: Sequence[Array], passed: Transitions) -> list[Array]:
+    """What is latched after the borders passed at t = 0, as where a force begins beyond its limit: no work is done."""
+    found = [np.array(latched) for latched in memory]
+    for row in np.flatnonzero(passed.t == 0.0).tolist():
+        number = int(passed.contact[row])
+        law: Any = contacts[number].law
+        parameters = np.array(law.parameters, dtype=float)
+        parameters[list(law.memory)] = found[number]
+        renew(law, parameters, int(passed.border[row]), float(passed.delta[row]), float(passed.delta_dot[row]))
+        found[number] = parameters[list(law.memory)]
+    return found
 
 
 def _indentations(contacts: Sequence[Contact], motion: Array) -> Array:

@@ -258,11 +258,11 @@ def before_landing(problem, tables, state, scratch, stop, bends, w, x):
                 return TOO_LONG
         if not long or segment == 0 or is_open(problem, s):
             continue
-        if problem.knots[s, 0] < 0.0:  # no contact of the log but where the law opens
-            if problem.opening[s] >= 0 and slope_a > 0.0 and slope_b < -_TOGETHER * slope_a:
-                return TOO_LONG
+        opens = problem.opening[s] >= 0
+        if problem.knots[s, 0] < 0.0 and not opens:  # no contact of the log
             continue
-        if slope_a > 0.0 > slope_b and (s != stop or tables.bend[s] != RATE):
+        rest = -_TOGETHER * slope_a if opens else 0.0  # a law that opens may have a border where δ̇ falls to zero
+        if slope_a > 0.0 and slope_b < rest and (s != stop or tables.bend[s] != RATE):
             return TOO_LONG
         if s != stop and tables.bend[s] > 0.0:
             before = scratch.side[s] * side_at(problem, tables, state, s, w, scratch.trial)

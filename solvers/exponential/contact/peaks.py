@@ -147,7 +147,7 @@ def state_peaks(problem, state, scratch, x):
             batch[0] = indentation(problem, s, x)
             batch[1] = dot(problem.read_rate[s], x, 2 * problem.k.size)
             contact_forces(problem, s, batch[0:1], batch[1:2], state.entry_rate[s], batch[2:3])
-            if problem.knots[s, 0] < 0.0:
+            if problem.knots[s, 0] < 0.0 and problem.opening[s] < 0:  # of both signs
                 batch[0], batch[2] = abs(batch[0]), abs(batch[2])
             state.active[s, PEAK_DELTA] = max(state.active[s, PEAK_DELTA], batch[0])
             state.active[s, PEAK_FORCE] = max(state.active[s, PEAK_FORCE], batch[2])
