@@ -217,11 +217,15 @@ class Law(ABC):
         Returns
         -------
         (k,) forces. ValueError for a path that is not a row of finite numbers, for a force that is not finite, and for
-        a border that falls to zero again at once after its renewal.
+        a border that falls to zero again and again at one place.
         """
         from contacts.path import along
 
         return along(self, delta)
+
+    def border_name(self, border: int, parameters: NDArray[np.float64]) -> str:
+        """A border in words, for messages."""
+        return f"border {border}"
 
     def stored(self, delta: float, parameters: NDArray[np.float64]) -> float:
         """Energy in J that the element would give back at rest from ``delta`` with these parameters.

@@ -96,18 +96,20 @@ def monotone_runs(path: Vector) -> Iterator[tuple[int, int]]:
 
 def _pieces(law: Law, row: Vector, at: float, goal: float, rate: float, tiny: float) -> Iterator[tuple[float, float]]:
     """Begin and end of every stretch of a run; renews the row between them."""
-    renewals = 0
+    near, since, met = max(NEAR * abs(goal - at), tiny), at, list[str]()
     while True:
+        if abs(at - since) > near:
+            since, met = at, []
         points = at + (goal - at) * SAMPLES
         probe = at + math.copysign(min(max(NEAR * abs(goal - at), tiny), abs(goal - at)), goal - at)
         points = np.concatenate(([at, probe], points[1:-1], [goal]))
         values = borders(law, points, rate, row)
         fired = np.flatnonzero(np.all(values[:, :2] < 0.0, axis=1))
         if fired.size and at != goal:
+            met += [law.border_name(int(j), row) for j in fired]
+            _check_met(law, met, at, rate)
             for j in fired:
                 renew(law, int(j), at, rate, row)
-            renewals += 1
-            _check_renewals(law, renewals, int(fired[0]), at)
             continue
         fallen = np.any(values[:, 1:] < 0.0, axis=0)
         if at == goal or not np.any(fallen):
@@ -116,8 +118,9 @@ def _pieces(law: Law, row: Vector, at: float, goal: float, rate: float, tiny: fl
         k = int(np.argmax(fallen))
         end = _first_fallen(law, row, points[k], points[k + 1], rate)
         yield at, end
-        renewals = renewals if end == at else 0
         at = end
+        met.append(law.border_name(int(np.argmin(borders(law, np.array([at]), rate, row))), row))
+        _check_met(law, met, at, rate)
 
 
 def _first_fallen(law: Law, row: Vector, low: float, high: float, rate: float) -> float:
@@ -133,13 +136,22 @@ def _first_fallen(law: Law, row: Vector, low: float, high: float, rate: float) -
         low, high = float(points[k]), float(points[k + 1])
 
 
-def _check_renewals(law: Law, renewals: int, border: int, at: float) -> None:
-    """A border that falls again at once will do so for ever."""
-    if renewals > 4 * law.borders + 4:
-        raise ValueError(
-            f"border {border} of {name_of(law)} falls to zero again at once, at δ = {at:.6g} m: after a renewal "
-            "it must be positive, or zero and rising"
-        )
+def _check_met(law: Law, met: list[str], at: float, rate: float) -> None:
+    """Refuse a law that meets border after border while the path hardly moves: it would do so for ever.
+
+    At one place every part of a law may begin to stick and to slip, and every segment may be passed, twice at most;
+    each is met as a border that falls and as one that is renewed.
+    """
+    if len(met) <= 8 * (law.borders + len(law.events)):
+        return
+    first, *others = sorted(set(met[len(met) // 2 :]))
+    told = f", in turn with {', '.join(others)}" if others else ""
+    sign = ">" if rate > 0.0 else "<"
+    raise ValueError(
+        f"{first} of {name_of(law)} falls to zero again and again at δ = {at:.6g} m, δ̇ {sign} 0{told}: after a renewal "
+        "the borders of the segment that begins must be positive, or zero and rising. Check the sign of these borders, "
+        "what is latched there, and which segment follows"
+    )
 
 
 def borders(law: Law, delta: Vector, rate: float, row: Vector) -> Vector:

@@ -132,6 +132,35 @@ def test_a_first_loading_tells_the_limit_only_with_the_zero():
     assert 10.0 in identify_loop(path, force, offset=False).estimates["limit"]
 
 
+@pytest.mark.parametrize(
+    ("law", "way"),
+    [(Jenkins(3e4, 28.0), 1.0), (Jenkins(3e4, 28.0), -1.0), (Iwan([2e4, 3e4, 5e3], [4.0, 28.0, np.inf]), 1.0)],
+    ids=["down", "up", "iwan"],
+)
+def test_slip_in_one_direction_bounds_the_limit_from_below_only(law, way):
+    """By noise, least squares end on either side of where slip in the other direction begins; what is told is the same.
+
+    Counts are binomial with 95 %. Were the zero of force known, the limit would be told.
+    """
+    t, rng, count = np.linspace(0.0, 1.0, 500), np.random.default_rng(9), 40
+    path = way * (1e-3 * np.sin(8.0 * np.pi * t) * (0.4 + 0.6 * t) - 1e-4 * t)
+    force, name = law.along(path), "limit" if isinstance(law, Jenkins) else "limits[1]"
+    option = {} if isinstance(law, Jenkins) else {"parts": 2}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        forces = force + 0.4 + 0.5 * rng.standard_normal((count, 500))
+        found = [identify_loop(path, one, type(law), **option) for one in forces]
+        known = identify_loop(path, force + 0.5 * rng.standard_normal(500), type(law), offset=False, **option)
+    open_ends = [one.force_offset.high if way > 0.0 else -one.force_offset.low for one in found]
+    for held in (
+        [28.0 in one.estimates[name] and 0.4 in one.force_offset for one in found],
+        [one.estimates[name].high == np.inf == end for one, end in zip(found, open_ends, strict=True)],
+        [any(f"the records do not tell {name}" in told for told in one.remarks) for one in found],
+    ):
+        assert sum(held) >= binom.ppf(MILLION, count, 0.95)
+    assert known.estimates[name].high < np.inf
+
+
 def test_a_first_loading_tells_the_sum_of_beta_and_gamma():
     path = np.linspace(0.0, 2e-3, 400)
     force = noisy(WEN, path, 0.001, np.random.default_rng(7))

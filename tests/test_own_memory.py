@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from test_memory_laws import asked, borders, forces, renewal_slopes, renewed, with_memory
 
-from contacts import Border, Jenkins, Polynomial, Segment, WaltonBraun, memory_law
+from contacts import Border, Iwan, Jenkins, Polynomial, Segment, WaltonBraun, memory_law
 
 
 def pull(delta, delta_dot, way, slider, stiffness, limit):
@@ -165,12 +165,36 @@ def test_a_law_of_segments_alone():
     np.testing.assert_allclose(law(k=1e3).along([-1.0, 1.0, -0.5]), [-1e3, 3e3, -500.0], rtol=1e-14)
 
 
+def test_segments_may_be_passed_at_one_place():
+    segments = {f"s{i}": Segment(soft, Border(below, f"s{i + 1}")) for i in range(12)}
+    law = memory_law("row", {**segments, "s12": Segment(hard, Border(above, "s0"))})(k=1e3)
+    np.testing.assert_allclose(law.along([-1.0, 1.0, -0.5]), [-1e3, 3e3, -500.0], rtol=1e-14)
+
+
+def test_sliders_that_slip_and_stick_together_are_not_refused():
+    path = 2e-3 * np.random.default_rng(3).uniform(-1.0, 1.0, 200)
+    all_at_once = Iwan([2e4] * 30, [10.0 + 1e-13 * j for j in range(30)])
+    np.testing.assert_allclose(all_at_once.along(path), 30.0 * JENKINS.along(path), rtol=1e-10, atol=1e-9)
+
+
 def too_far(delta, delta_dot, way, slider, stiffness, limit):
     return 0.0, delta - 1.5 * way * limit / stiffness
 
 
 def too_near(delta, delta_dot, way, slider, stiffness, limit):
     return 0.0, delta - 0.5 * way * limit / stiffness
+
+
+def backwards(delta, delta_dot, way, slider, stiffness, limit):
+    return -way * delta_dot
+
+
+def beyond(delta, delta_dot, way, slider, stiffness, limit):
+    return abs(stiffness * (delta - slider)) - limit
+
+
+def never(delta, delta_dot, way, slider, stiffness, limit):
+    return -1.0
 
 
 def bad_arguments(delta, delta_dot, stiffness):
@@ -194,8 +218,23 @@ MISTAKES = [
         made(slip=Segment(drag, Border(onwards, "stick", too_near))),
         "force of law 'mine' jumps by -5 N from 'slip' to 'stick'",
     ),
-    (made(slip=Segment(drag, Border(onwards, "stick", too_far)), jumps=True), "border 0 of mine falls to zero again"),
-    (made(slip=Segment(drag, Border(onwards, "stick")), jumps=True), "border 0 of mine falls to zero again at once"),
+    (
+        made(slip=Segment(drag, Border(onwards, "stick", too_far)), jumps=True),
+        "border 'left' of segment 'stick' of mine",
+    ),
+    (made(slip=Segment(drag, Border(onwards, "stick")), jumps=True), "falls to zero again and again at δ = 0.00"),
+    (  # these meet a border at distances of rounding, so that the path goes on, without an end
+        made(slip=Segment(drag, Border(backwards, "stick", hold))),
+        r"border 'backwards' of segment 'slip' of mine falls to zero again and again at δ = 0.0005 m, δ̇ > 0, in turn",
+    ),
+    (
+        made(stick=Segment(pull, Border(beyond, "slip", let_go))),
+        r"at δ = 1e-05 m, δ̇ < 0, in turn with border 'onwards' of segment 'slip'.* Check the sign of these borders",
+    ),
+    (
+        made(slip=Segment(drag, Border(never, "stick", hold))),
+        r"border 'left' of segment 'stick' of mine .* in turn with border 'never' of segment 'slip'",
+    ),
     (made(stick=Segment(nan_force, Border(left, "slip", let_go))), "force of mine is nan N at δ = "),
     (made(slip=Segment(drag, Border(onwards, "stuck", hold))), "law 'mine': 'slip' ends in 'stuck'; its segments are"),
     (made(reach=0.0), "reach of law 'mine' must be finite and > 0, got 0.0"),

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import warnings
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from contacts.identification.loop_models import Loop, Model
+from contacts.identification.loop_models import Loop, Model, Sliders
 from contacts.identification.loop_remarks import remarks_on
 from contacts.identification.loop_result import IdentifiedLoop, MeasuredLoop
 from contacts.identification.records import Vector, records_of
@@ -112,16 +113,49 @@ class Fit:
         steps = 1e-6 * np.eye(self.theta.size)
         return np.transpose([self._reported(self.theta + h) - self._reported(self.theta - h) for h in steps]) / 2e-6
 
+    def _one_way(self, margin: float) -> list[tuple[int, int]]:
+        """(slider, direction) of those that may as well slip in this direction only: with no more squares left.
+
+        Then the limit has no upper end, as the zero of force moves with it. The slope of the squares does not tell:
+        the least are often where slip in the other direction just begins, by noise.
+        """
+        model, most = self.model, self.squares + max(margin, self.measured.count * ROUNDING**2)
+        if not isinstance(model, Sliders) or not self.measured.offset:
+            return []
+        tried = [(j, side) for j in range(model.count) for side in (-1, 1)]
+        return [
+            one for one in tried if Fit(self.measured, replace(model, wide=one[0]), self._widened(*one)).squares <= most
+        ]
+
+    def _widened(self, slider: int, side: int) -> Vector:
+        """θ with a slider that cannot slip both ways, and the same forces while it slips towards one side."""
+        model, theta = self.model, self.theta.copy()
+        theta[model.states + slider] = 0.5
+        before, after = np.exp([x[model.states + slider] for x in (self.theta, theta)])
+        theta[model.main] -= side * math.exp(theta[slider]) * (after - before)
+        states = theta[model.main + 1 + slider :: model.states]  # a view: of this slider, in all records
+        states[:] = np.arcsin(np.clip((before * np.sin(states) + side * (after - before)) / after, -0.999, 0.999))
+        return theta
+
+    def _place_of_limit(self, slider: int) -> int:
+        """Where the limit of a slider stands among what is reported: after all stiffnesses, in the order of slip."""
+        widths = self.theta[self.model.states : 2 * self.model.states]
+        return self.model.states + int(np.count_nonzero(widths < widths[slider]))
+
     def result(self, confidence: float) -> IdentifiedLoop:
         """Everything in SI with intervals."""
         from scipy.stats import t as student
 
-        m, model = self.measured, self.model
+        m, model, freedom = self.measured, self.model, self.measured.count - self.theta.size
         covariance, noise, correlation = self.covariance()
         values, errors = self._reported(self.theta), np.sqrt(np.diag(covariance))
-        widths = float(student.ppf(0.5 + 0.5 * confidence, m.count - self.theta.size)) * errors
-        found = [Estimate(float(x), float(x - w), float(x + w)) for x, w in zip(values, widths, strict=True)]
+        quantile = float(student.ppf(0.5 + 0.5 * confidence, freedom))
+        low, high = values - quantile * errors, values + quantile * errors
         named = model.values(self.theta[: model.main], m.depth, m.strength)
+        for slider, side in self._one_way(quantile**2 * noise**2 * inflation_of(correlation, freedom)):
+            high[self._place_of_limit(slider)] = math.inf
+            (low if side > 0 else high)[-1] = -side * math.inf
+        found = [Estimate(*map(float, ends)) for ends in zip(values, low, high, strict=True)]
         estimates = dict(zip(named, found[:-1], strict=True))
         scaled = np.where(errors > 0.0, errors, 1.0)
         correlations = (covariance / np.outer(scaled, scaled))[:-1, :-1]

@@ -57,11 +57,13 @@ def extension_slopes(loop: Loop, widths: Vector, found: NDArray[np.float64]) -> 
 class Sliders:
     """θ = (ln k_j, ln f_j/k_j, [k₀]) of ``count`` sliders, with a spring k₀ beside them or without.
 
-    Memory is the arc sine of e_j k_j/f_j: a number without bounds, where least squares cannot get stuck.
+    Memory is the arc sine of e_j k_j/f_j: a number without bounds, where least squares cannot get stuck. The slider
+    ``wide``, if any, is as wide as half the range of the displacement or wider: it cannot slip both ways.
     """
 
     count: int
     spring: bool
+    wide: int | None = None
 
     @property
     def main(self) -> int:
@@ -78,7 +80,7 @@ class Sliders:
         """(2, main) bounds, beyond which no record can see."""
         stiffness, width, spring = (
             [[-20.0, 8.0]] * self.count,
-            [[-8.0, 1.0]] * self.count,
+            [[0.0 if j == self.wide else -8.0, 1.0] for j in range(self.count)],
             [[-np.inf, np.inf]] * self.spring,
         )
         return np.array([*stiffness, *width, *spring]).T

@@ -52,7 +52,9 @@ def identify_loop(
     -----
     Intervals are of linear theory with Student's t for independent noise of the force, widened for a correlation of
     neighbouring residuals. Delta counts as exact: a law with memory follows every turn of its noise, so smooth it
-    between the turning points. Of Bouc and Wen's A, β, γ and (1 - α) k loops tell three numbers: A = 1 is chosen.
+    between the turning points. Where a slider that slips in one direction only fits as well, the interval of its
+    limit ends at infinity, and that of the zero of force on one side. Of Bouc and Wen's A, β, γ and (1 - α) k loops
+    tell three numbers: A = 1 is chosen.
 
     Examples
     --------

@@ -127,6 +127,12 @@ class CustomMemoryLaw(Law):
         """Borders, renewals and their derivatives."""
         return compiled(self.pieces, len(self.latched), 1 + len(self.latched) + len(self.values), name)
 
+    def border_name(self, border: int, parameters: NDArray[np.float64]) -> str:
+        """The border's function and its segment."""
+        name, one = self.segments[int(parameters[0])]
+        own = one.ends[border].value.__name__ if border < len(one.ends) else border
+        return f"border {own!r} of segment {name!r}"
+
     def stored(self, delta: float, parameters: NDArray[np.float64]) -> float:
         """Not known of a user's law: nan."""
         return float("nan")
@@ -162,8 +168,8 @@ def memory_law(
     Raises
     ------
     TypeError for functions with other arguments or that cannot be compiled; ValueError for segments that are not there.
-    On binding: ValueError for a border that falls to zero again at once, a force that is not finite, or one that jumps
-    at a border without ``jumps=True``.
+    On binding: ValueError for borders that fall to zero again and again at one place, a force that is not finite, or
+    one that jumps at a border without ``jumps=True``.
 
     Examples
     --------
@@ -221,7 +227,7 @@ def _functions(one: Segment) -> list[Function]:
 
 
 def _check_cycles(law: CustomMemoryLaw) -> None:
-    """Lead a law through slow cycles; the walk itself refuses borders that fall again at once and forces of nan."""
+    """Lead a law through slow cycles; the walk itself refuses borders that fall again and again and forces of nan."""
     for X in (part * law.reach for part in PROBES):
         path = X * np.array([0.0, 1.0, -1.0, 1.0, 0.3, 0.8, 0.0])
         largest = np.abs(law.along(path)).max()
