@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from scipy import sparse
 
-from fembeam.support import is_finite, require, require_finite
+from fembeam.support import is_finite, require
 
 if TYPE_CHECKING:
     from fembeam.scene.assembly import Matrices
@@ -75,7 +75,6 @@ class LocalCoordinate:
 
 def local_coordinate(z: float, of: str, to: Any, where: str, key: str) -> LocalCoordinate:
     """The coordinate that `of` and a second place (a number, a pair, None) name; ValueError for others."""
-    require_finite("z", z, where, "give the coordinate along the beam in m")
     require(of in KINDS, "of must be 'displacement' or 'rotation'", of, where, "choose one")
     pair = (0, to) if is_finite(to) else to
     require(pair is None or (isinstance(pair, (tuple, list)) and len(pair) == 2),
