@@ -15,9 +15,9 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import llvmlite
 import numba
@@ -29,6 +29,7 @@ PREFIX = "fembeam-kernels-"
 KEPT = 4  # folders of other sources, versions or interpreters that stay, so that changing between them compiles once
 DIGITS = 16  # of a digest
 UNUSED = 24 * 3600.0  # s without a start after which one beyond these is removed; until then a process may need it
+_LOOK, _LOOKS = 0.02, 100  # s between two looks whether another process still compiles, and how many in silence
 _LOCK = threading.RLock()  # numba's setting belongs to the process
 
 
@@ -137,6 +138,34 @@ def _is_current(function: Callable[..., Any]) -> bool:
     if path in _STAMPS and _STAMPS[path] != _stamp(path):
         FOLDER = None
     return FOLDER is not None and path in _STAMPS
+
+
+def _lock(file: IO[bytes], waiting: Callable[[], None]) -> None:
+    """Lock a file until it is closed; ``waiting`` is called if another process has it for long."""
+    try:
+        import fcntl
+    except ImportError:  # Windows
+        return
+    for _ in range(_LOOKS):
+        with suppress(BlockingIOError):
+            return fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        time.sleep(_LOOK)
+    waiting()
+    return fcntl.flock(file, fcntl.LOCK_EX)
+
+
+@contextmanager
+def one_process_at_a_time(waiting: Callable[[], None]) -> Iterator[None]:
+    """Let no other process write to the folder meanwhile.
+
+    numba counts the files of a function's signatures: two processes that compile one each at the same time may give
+    both the same number, and every later one would load the wrong code. Those that wait need not compile, too.
+    """
+    with ExitStack() as stack:
+        with suppress(OSError):  # the folder has gone, or its file system has no locks
+            if FOLDER is not None:
+                _lock(stack.enter_context(open(FOLDER / "lock", "ab")), waiting)
+        yield
 
 
 @contextmanager

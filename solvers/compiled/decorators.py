@@ -33,7 +33,7 @@ from typing import Any
 from numba import cfunc, config, njit
 from numba.core import event
 
-from solvers.compiled.cache import kept
+from solvers.compiled.cache import kept, one_process_at_a_time
 
 if config.DISABLE_JIT:
     raise RuntimeError("NUMBA_DISABLE_JIT is set, but time integration runs as machine code only: unset it")
@@ -85,6 +85,13 @@ class _CompilerNotice(event.Listener):
 _NOTICE = _CompilerNotice()
 
 
+def _tell_of_waiting() -> None:
+    """Say that another process compiles."""
+    if not _NOTICE.given:
+        _NOTICE.given = True
+        logging.getLogger("fembeam.solvers").warning("waiting for another process that compiles the integrator")
+
+
 @contextmanager
 def _compiling() -> Iterator[None]:
     """Tell of compiling, and let the garbage collector rest.
@@ -94,7 +101,7 @@ def _compiling() -> Iterator[None]:
     collects = gc.isenabled()
     gc.disable()
     try:
-        with event.install_listener("numba:compile", _NOTICE):
+        with one_process_at_a_time(_tell_of_waiting), event.install_listener("numba:compile", _NOTICE):
             yield
     finally:
         if collects:
