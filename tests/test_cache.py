@@ -73,7 +73,7 @@ def test_processes_compile_one_after_the_other(package):
     (package / "one.py").write_text(entry + "@entry(float64(float64))\ndef one(x): return 2.0 * x\n")
     environment = {**os.environ, "PYTHONPATH": str(package.parent), "NUMBA_CACHE_DIR": ""}
     command = [sys.executable, "-c", held + "    time.sleep(4.0)\n    print(time.time())"]
-    with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) as first:
+    with subprocess.Popen(command, cwd=package.parent, env=environment, stdout=subprocess.PIPE, text=True) as first:
         assert first.stdout.readline() == "1\n"  # it has the lock
         (end,), _ = ran("import solvers.one, time; print(time.time())", package.parent, NUMBA_CACHE_DIR="")
         assert float(end) > float(first.stdout.read())
