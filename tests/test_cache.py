@@ -68,11 +68,11 @@ def test_compiling_is_told_in_one_line_and_loading_is_not(package):
 @pytest.mark.skipif(sys.platform == "win32", reason="no such locks")
 def test_processes_compile_one_after_the_other(package):
     """Two at a time may give the files of two signatures one number, and the wrong code would be loaded ever after."""
-    held = "import solvers.compiled.cache as c, time\nwith c.one_process_at_a_time(print):\n    print(1, flush=True)\n"
+    held = "import solvers.compiled.cache as c, time\nfile = c.lock_folder(print)\nprint(1, flush=True)\n"
     entry = "from numba import float64\nfrom solvers.compiled.decorators import entry\n"
     (package / "one.py").write_text(entry + "@entry(float64(float64))\ndef one(x): return 2.0 * x\n")
     environment = {**os.environ, "PYTHONPATH": str(package.parent), "NUMBA_CACHE_DIR": ""}
-    command = [sys.executable, "-c", held + "    time.sleep(4.0)\n    print(time.time())"]
+    command = [sys.executable, "-c", held + "time.sleep(4.0)\nprint(time.time())"]
     with subprocess.Popen(command, cwd=package.parent, env=environment, stdout=subprocess.PIPE, text=True) as first:
         assert first.stdout.readline() == "1\n"  # it has the lock
         (end,), _ = ran("import solvers.one, time; print(time.time())", package.parent, NUMBA_CACHE_DIR="")

@@ -15,7 +15,7 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
 
@@ -140,32 +140,27 @@ def _is_current(function: Callable[..., Any]) -> bool:
     return FOLDER is not None and path in _STAMPS
 
 
-def _lock(file: IO[bytes], waiting: Callable[[], None]) -> None:
-    """Lock a file until it is closed; ``waiting`` is called if another process has it for long."""
+def lock_folder(waiting: Callable[[], None]) -> IO[bytes] | None:
+    """Keep other processes from the folder until the returned file is closed; ``waiting`` is called if one has it long.
+
+    None where there is nothing to keep, or no locks: on Windows, on some network disks.
+    """
+    if FOLDER is None:
+        return None
     try:
         import fcntl
-    except ImportError:  # Windows
-        return
-    for _ in range(_LOOKS):
-        with suppress(BlockingIOError):
-            return fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        time.sleep(_LOOK)
-    waiting()
-    return fcntl.flock(file, fcntl.LOCK_EX)
 
-
-@contextmanager
-def one_process_at_a_time(waiting: Callable[[], None]) -> Iterator[None]:
-    """Let no other process write to the folder meanwhile.
-
-    numba counts the files of a function's signatures: two processes that compile one each at the same time may give
-    both the same number, and every later one would load the wrong code. Those that wait need not compile, too.
-    """
-    with ExitStack() as stack:
-        with suppress(OSError):  # the folder has gone, or its file system has no locks
-            if FOLDER is not None:
-                _lock(stack.enter_context(open(FOLDER / "lock", "ab")), waiting)
-        yield
+        file = open(FOLDER / "lock", "ab")  # noqa: SIM115  closed by who asked
+        for _ in range(_LOOKS):
+            with suppress(BlockingIOError):
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                return file
+            time.sleep(_LOOK)
+        waiting()
+        fcntl.flock(file, fcntl.LOCK_EX)
+        return file
+    except (ImportError, OSError):
+        return None
 
 
 @contextmanager

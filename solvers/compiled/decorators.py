@@ -25,15 +25,16 @@ from __future__ import annotations
 
 import gc
 import logging
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
-from typing import Any
+from typing import IO, Any
 
 from numba import cfunc, config, njit
 from numba.core import event
 
-from solvers.compiled.cache import kept, one_process_at_a_time
+from solvers.compiled.cache import kept, lock_folder
 
 if config.DISABLE_JIT:
     raise RuntimeError("NUMBA_DISABLE_JIT is set, but time integration runs as machine code only: unset it")
@@ -85,11 +86,37 @@ class _CompilerNotice(event.Listener):
 _NOTICE = _CompilerNotice()
 
 
-def _tell_of_waiting() -> None:
-    """Say that another process compiles."""
-    if not _NOTICE.given:
-        _NOTICE.given = True
+class _OneProcess(event.Listener):
+    """Lets one process at a time compile, from the look into the cache until the code is stored.
+
+    numba counts the files of a function's signatures: two processes that compile one each at the same time may give
+    both the same number, and every later one would load the wrong code. Those that wait need not compile, too.
+    """
+
+    def __init__(self) -> None:
+        self._guard, self._depth = threading.RLock(), 0
+        self._file: IO[bytes] | None = None
+
+    def on_start(self, _: Any) -> None:
+        """A thread asks for numba's compiler lock."""
+        with self._guard:
+            if self._depth == 0:
+                self._file = lock_folder(self._tell)
+            self._depth += 1
+
+    def on_end(self, _: Any) -> None:
+        """It has given it back."""
+        with self._guard:
+            self._depth -= 1
+            if self._depth == 0 and self._file is not None:
+                self._file.close()
+
+    def _tell(self) -> None:
+        """Say why nothing happens."""
         logging.getLogger("fembeam.solvers").warning("waiting for another process that compiles the integrator")
+
+
+event.register("numba:compiler_lock", _OneProcess())
 
 
 @contextmanager
@@ -101,7 +128,7 @@ def _compiling() -> Iterator[None]:
     collects = gc.isenabled()
     gc.disable()
     try:
-        with one_process_at_a_time(_tell_of_waiting), event.install_listener("numba:compile", _NOTICE):
+        with event.install_listener("numba:compile", _NOTICE):
             yield
     finally:
         if collects:
