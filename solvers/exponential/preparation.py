@@ -9,7 +9,7 @@ import numpy as np
 from numba import types
 
 from solvers.compiled.kernels import INTEGERS, MATRIX, PROBLEM, REAL, VECTOR, Problem
-from solvers.compiled.packed import Layout, Packed, PackedTemplate
+from solvers.compiled.packed import Layout, Packed, PackedTemplate, aligned
 from solvers.compiled.parts import BORDERS, ENERGY, MANY_STOPS, TWO_STOPS, load
 from solvers.compiled.state import STATE, State, begin_state, most_borders, problem_of, state_shapes
 from solvers.compiled.sums import padded
@@ -185,7 +185,7 @@ class _SharedTables:
         self.layout = _layout(*sizes, POOL if tables.node_propagator.size else 0)
         self.kept = Memo()
         self.problem = PackedTemplate(problem, PROBLEM, ("gap", "k", "read", "read_rate", "power"))
-        self.tables = PackedTemplate(tables, TABLES, TONE_TABLES)
+        self.tables = PackedTemplate(aligned(tables), TABLES, TONE_TABLES)
 
     @property
     def nbytes(self) -> int:
