@@ -52,6 +52,17 @@ def test_contacts_cut_by_start_and_end_and_samples_of_ones_own():
     assert np.trapezoid(late.force(mean=True), late.t) == pytest.approx(seen, rel=1e-12)
 
 
+@pytest.mark.parametrize("law", [KelvinVoigt(1e5, 20.0), Hertz(1e7)])
+def test_what_comes_after_the_last_sample_is_left_out(law):
+    """A stop that stays pressed: the impulse is that of all forces up to the last sample, 0.4 dt before the end."""
+    model = scene(fb.Stop(TIP, law, gap=-2e-4), base=fb.Harmonic(1e-5, 195.0)).reduce(2)
+    run = model.simulate(0.0324, 1e-3, start=model.equilibrium())
+    assert np.isnan(run.contacts.t_out).all()
+    to_there = model.simulate(0.032, 1e-3, start=model.equilibrium())
+    assert np.trapezoid(run.force(mean=True), run.t) == pytest.approx(to_there.contacts.impulse.sum(), rel=1e-9)
+    np.testing.assert_allclose(run.force(mean=True), to_there.force(mean=True), rtol=1e-9)
+
+
 def test_a_contact_over_many_samples_is_shared_as_its_law_says():
     """Of a linear spring F = k δ, whose cubic is exact to dt⁴: the mean is that of k δ by Simpson's rule."""
     run = scene(fb.Stop(TIP, KelvinVoigt(1e3, 0.0), gap=1e-4)).reduce(1).simulate(0.2, 2e-4)

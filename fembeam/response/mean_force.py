@@ -2,7 +2,7 @@
 
     F_j = (1/w_j) ∫ F dt over the cell of sample j, which ends halfway to its neighbours;   Σ F_j w_j = Σ impulses
 
-Impulses are those of the contact log. Of a contact over several cells the law says how its impulse is shared, on the
+Impulses are those of the contact log, to the last sample. Of a contact over several cells the law says how its impulse is shared, on the
 cubics through δ and δ̇ at entry, samples and exit, by Gauss-Legendre quadrature of each part within one cell. Of what
 always acts the impulse from sample to sample is that of the run; its halves are found likewise and share what misses.
 """
@@ -58,11 +58,11 @@ def _missed(run: Run, stop: int, found: Vector) -> Vector:
 def _of_log(run: Run, stop: int, law: Any, motion: Vector, edges: Vector) -> Vector:
     """The log's impulses in each cell (k,): of contacts within a cell whole, of others in shares."""
     log, t = run.contacts, motion[0]
-    end = np.where(np.isnan(log.t_out), t[-1], log.t_out)
+    end, impulses = np.where(np.isnan(log.t_out), t[-1], log.t_out), _without_the_end(run, stop, motion)
     seen = np.flatnonzero((log.stop == stop) & (end > t[0]) & (log.t_in < t[-1]))
     first, last = (np.searchsorted(edges, times[seen], side="right") - 1 for times in (log.t_in, end))
     whole = first == last
-    impulse: Vector = np.bincount(first[whole], log.impulse[seen[whole]], len(t)).astype(float)
+    impulse: Vector = np.bincount(first[whole], impulses[seen[whole]], len(t)).astype(float)
     if whole.all():
         return impulse
     cut, rest = seen[~whole], 0.0 * seen[~whole]
@@ -71,11 +71,20 @@ def _of_log(run: Run, stop: int, law: Any, motion: Vector, edges: Vector) -> Vec
     middle = (a[0] + b[0]) / 2
     interval = np.clip(np.searchsorted(t, middle) - 1, 0, len(t) - 2)
     rates = np.maximum(np.abs(log.speed_in[cut]), law.entry_rate_floor)[owner]
-    parts = _shares(law, owner, rates, (a, b, edges[1:-1][interval])) * log.impulse[cut][owner, None]
+    parts = _shares(law, owner, rates, (a, b, edges[1:-1][interval])) * impulses[cut][owner, None]
     parts[(middle < t[0]) | (middle > t[-1])] = 0.0  # of contacts under way at the first or the last sample
     for half in (0, 1):
         impulse += np.bincount(interval + half, parts[:, half], len(t))
     return impulse
+
+
+def _without_the_end(run: Run, stop: int, motion: Vector) -> Vector:
+    """The log's impulses, that of a contact open at the end without what came after the last sample."""
+    log, (t, delta, _) = run.contacts, motion
+    mine, lasts = log.stop == stop, np.isnan(log.t_out)
+    whole = delta[0] <= 0.0 or np.any(mine & (log.t_in <= t[0]))  # else a part of a run: a contact began before it
+    kept = run.losses.impulses if whole and run.lost is not None and np.any(mine & lasts) else None
+    return log.impulse if kept is None else np.where(lasts, kept[-1, stop] - log.impulse[mine & ~lasts].sum(), log.impulse)
 
 
 def _between(motion: Vector, starts: Vector, ends: Vector) -> tuple[NDArray[np.int64], Vector, Vector]:
