@@ -58,7 +58,7 @@ def _missed(run: Run, stop: int, found: Vector) -> Vector:
 def _of_log(run: Run, stop: int, law: Any, motion: Vector, edges: Vector) -> Vector:
     """The log's impulses in each cell (k,): of contacts within a cell whole, of others in shares."""
     log, t = run.contacts, motion[0]
-    end, impulses = np.where(np.isnan(log.t_out), t[-1], log.t_out), _without_the_end(run, stop, motion)
+    end, impulses = _to_the_last_sample(run, stop, motion)
     seen = np.flatnonzero((log.stop == stop) & (end > t[0]) & (log.t_in < t[-1]))
     first, last = (np.searchsorted(edges, times[seen], side="right") - 1 for times in (log.t_in, end))
     whole = first == last
@@ -78,13 +78,16 @@ def _of_log(run: Run, stop: int, law: Any, motion: Vector, edges: Vector) -> Vec
     return impulse
 
 
-def _without_the_end(run: Run, stop: int, motion: Vector) -> Vector:
-    """The log's impulses, that of a contact open at the end without what came after the last sample."""
+def _to_the_last_sample(run: Run, stop: int, motion: Vector) -> tuple[Vector, Vector]:
+    """Ends and impulses of the log's contacts, of the one under way at the last sample up to there."""
     log, (t, delta, _) = run.contacts, motion
-    mine, lasts = log.stop == stop, np.isnan(log.t_out)
+    mine, ended = log.stop == stop, log.t_out <= t[-1]
+    lasts = mine & ~ended & (log.t_in < t[-1])
     whole = delta[0] <= 0.0 or np.any(mine & (log.t_in <= t[0]))  # else a part of a run: a contact began before it
-    kept = run.losses.impulses if whole and run.lost is not None and np.any(mine & lasts) else None
-    return log.impulse if kept is None else np.where(lasts, kept[-1, stop] - log.impulse[mine & ~lasts].sum(), log.impulse)
+    kept = run.losses.impulses if whole and run.lost is not None and lasts.any() else None
+    if kept is None:
+        return np.where(np.isnan(log.t_out), t[-1], log.t_out), log.impulse
+    return np.fmin(log.t_out, t[-1]), np.where(lasts, kept[-1, stop] - log.impulse[mine & ended].sum(), log.impulse)
 
 
 def _between(motion: Vector, starts: Vector, ends: Vector) -> tuple[NDArray[np.int64], Vector, Vector]:
