@@ -251,6 +251,14 @@ def test_pinned_beam_turns_exactly_for_hours():
     assert run.displacement(0.4)[-1] == pytest.approx(7200.0 * 0.01 * 0.3, rel=1e-10)
 
 
+def test_a_free_mass_flies_beside_a_beam_whose_dashpot_couples_modes():
+    ball = fb.Impactor(0.3, mass=0.01, velocity=-1.0, law=Hertz(1e8), gap=0.5)
+    beam = fb.Scene(fb.Beam(0.4, STEEL), [fb.Clamped(0.0)], dashpots=[fb.Dashpot(0.35, 0.5)], impactors=[ball])
+    run = beam.reduce(2).simulate(0.4, 0.1)
+    np.testing.assert_allclose(run.indentation(), run.t - 0.5, rtol=1e-12)
+    assert len(run.contacts) == 0
+
+
 # --- bad input ----------------------------------------------------------------------------------------------------
 
 

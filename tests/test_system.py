@@ -92,6 +92,15 @@ def test_rigid_body_modes_become_exact_zeros():
     assert np.all(blocks.k[1:] > 1e5)
 
 
+@pytest.mark.parametrize("free", [0, 1, 2])
+def test_a_free_coordinate_may_stand_anywhere_beside_coupled_ones(free):
+    """As a free mass beside a beam with a dashpot: its block is its own, k = c = 0."""
+    K, row = np.diag([4.0, 9.0, 25.0]), np.array([1.0, 0.5, 0.7])
+    K[free, free] = row[free] = 0.0
+    blocks = check_decoupled(np.eye(3), 0.3 * np.outer(row, row), K)
+    assert blocks.k[0] == blocks.c[0] == 0.0
+
+
 def test_proportional_damping_needs_no_complex_modes():
     M, K = np.diag([1.0, 2.0]), np.array([[3.0, -1.0], [-1.0, 1.0]])
     blocks = decouple(M, 0.1 * M + 0.02 * K, K)

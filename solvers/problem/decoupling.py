@@ -62,6 +62,8 @@ def _modes(M: Array, K: Array) -> tuple[Array, Array]:
 
 def _state_blocks(phi: Array, k: Array, damping: Array) -> Blocks:
     """Blocks of the state matrix [[0, I], [-diag(k), -damping]] whose damping couples the modes."""
+    order = np.argsort(k != 0.0, kind="stable")  # rigid-body modes first
+    phi, k, damping = phi[:, order], k[order], damping[np.ix_(order, order)]
     phi, damping, free = _floating(phi, k, damping)
     k, n = k[free:], k.size - free
     rigid, damping = phi[:, :free], damping[free:, free:]
