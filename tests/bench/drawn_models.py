@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -39,7 +39,7 @@ class Drawn:
     rtol: float
     sizes: tuple[float, float]  # of displacements and velocities
     start: str = "rest"
-    words: list[str] = field(default_factory=list)
+    brief: bool = False  # without the checks on fine meshes
 
 
 def kind_of(table: Table, key: str, makers: Any) -> Any:

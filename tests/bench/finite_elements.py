@@ -19,6 +19,7 @@ from scipy.linalg import eigh, null_space
 Table = dict[str, Any]
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(8)
 POINTS, WEIGHTS = 0.5 + 0.5 * POINTS, 0.5 * WEIGHTS
+CUBICS = np.array([[1.0, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]])
 FIXED = {"clamped": (0, 1), "pinned": (0,), "guided": (1,)}
 
 
@@ -56,9 +57,8 @@ def at(beam: Table, z: float) -> tuple[float, float, float, float, float]:
 
 def hermite(x: float, h: float, order: int) -> Any:
     """Shape functions of (u, u_z) at both ends of an element of length h at the part x, or a derivative by z."""
-    polynomials = ([1, 0, -3, 2], [0, h, -2 * h, h], [0, 0, 3, -2], [0, 0, -h, h])
-    return np.array([np.polynomial.Polynomial(p).deriv(order)(x) if order else np.polynomial.Polynomial(p)(x)
-                     for p in polynomials]) / h**order  # fmt: skip
+    powers = [math.perm(j, order) * x ** (j - order) if j >= order else 0.0 for j in range(4)]
+    return CUBICS @ powers * np.array([1.0, h, 1.0, h]) / h**order
 
 
 @dataclass

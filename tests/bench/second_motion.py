@@ -148,7 +148,9 @@ class Motion:
     def __post_init__(self) -> None:
         self.n, self.W = len(self.omega), np.array([a.w for a in self.acting]).reshape(-1, len(self.omega))
         self.gaps = np.array([a.gap for a in self.acting])
-        self.m = len(self.acting)
+        n, self.m, self.hysteretic = self.n, len(self.acting), [i for i, a in enumerate(self.acting) if a.law["kind"] == "bouc_wen"]
+        self.A = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(self.omega**2), -self.C]])
+        self.D = np.kron(np.eye(2), -self.W)
 
     def local(self, y: Any) -> tuple[Any, Any, Any]:
         """δ, δ̇ and z of all, of one state or of columns of states."""
@@ -167,13 +169,18 @@ class Motion:
 
     def rate(self, t: float, y: Any) -> Any:
         """Derivative of [q, q̇, work of loads, work of damping, work and impulse and z of each]."""
-        n = self.n
-        q, u = y[:n], y[n : 2 * n]
-        _, v, z = self.local(y)
-        F, load, damped = self.forces(y), self.load(t), self.C @ u
-        a = load - damped - self.omega**2 * q + F @ self.W
-        z_rate = [one.z_rate(v[i], z[i]) if one.law["kind"] == "bouc_wen" else 0.0 for i, one in enumerate(self.acting)]
-        return np.concatenate([u, a, [load @ u, damped @ u], F * v, F, z_rate])
+        n, m = self.n, self.m
+        x, u = y[: 2 * n], y[n : 2 * n]
+        local, load, z = self.D @ x, self.load(t), y[2 * n + 2 + 2 * m :]
+        v, found = local[m:], np.zeros(len(y))
+        F = np.array([one.force(local[i] - one.gap, v[i], z[i]) for i, one in enumerate(self.acting)])
+        found[: 2 * n] = self.A @ x
+        found[n : 2 * n] += load + F @ self.W
+        found[2 * n : 2 * n + 2] = load @ u, u @ self.C @ u
+        found[2 * n + 2 : 2 * n + 2 + m], found[2 * n + 2 + m : 2 * n + 2 + 2 * m] = F * v, F
+        for i in self.hysteretic:
+            found[2 * n + 2 + 2 * m + i] = self.acting[i].z_rate(v[i], z[i])
+        return found
 
     def run(self, q: Any, u: Any, duration: float, breaks: list[float], rtol: float, sizes: Any) -> Motion:
         """Integrate; ``breaks``: kinks of signals. ``sizes``: of a displacement and a rate, for absolute tolerances."""
@@ -214,7 +221,7 @@ class Motion:
                 event.terminal, event.direction = True, direction  # type: ignore[attr-defined]
                 events.append(event)
                 what.append((i, to))
-        longest = 0.5 / max(self.omega.max(), 1e-300)
+        longest = 1.0 / max(self.omega.max(), 1e-300)
         found = solve_ivp(self.rate, (t, end), y, "DOP853", dense_output=True, events=events or None, rtol=rtol,
                           atol=atol, max_step=longest)  # fmt: skip
         assert found.status >= 0, found.message
@@ -281,6 +288,7 @@ class Motion:
 
     def at(self, times: Any, shift: Any = 0.0) -> tuple[Any, Any]:
         """States (k, …) and forces (k, m) at times, with [q, q̇] moved by parts of their size in the run."""
+        times = np.minimum(times, self.duration)  # the last sample may be beyond by rounding
         moved = np.zeros((len(self.end), 1))
         if np.any(shift):
             moved[: 2 * self.n, 0] = shift * np.max([np.abs(p[2](np.linspace(*p[:2], 9))).max(axis=1) for p in self.pieces], axis=0)[: 2 * self.n]

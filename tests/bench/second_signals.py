@@ -18,7 +18,10 @@ BELL = Polynomial([1.0, 0.0, -1.0])
 def signal(table: Table, order: int = 0) -> Callable[[float], float]:
     """The signal of a table, or its derivative of an order up to two."""
     kind = table["kind"]
-    if kind in ("harmonic", "multisine"):
+    if kind == "harmonic":
+        w, turn = table["omega"], table.get("phase", 0.0) + order * math.pi / 2
+        return lambda t: table["amplitude"] * w**order * math.cos(w * t + turn)
+    if kind == "multisine":
         a, w, p = (np.atleast_1d(table.get(name, 0.0)) for name in ("amplitude", "omega", "phase"))
         return lambda t: float(np.sum(a * w**order * np.cos(w * t + p + order * math.pi / 2)))
     if kind in ("pulse", "step"):
