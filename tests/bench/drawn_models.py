@@ -1,4 +1,4 @@
-"""Random scenes of all kinds for `random_models.py`, as the tables of a scene file; and what makes scenes of these."""
+"""Random scenes of all kinds for `random_models.py`, as the tables of a scene file."""
 
 from __future__ import annotations
 
@@ -8,24 +8,6 @@ from typing import Any
 
 import numpy as np
 from finite_elements import Part, Table
-
-import contacts
-import fembeam as fb
-
-LAWS = {
-    **{name: getattr(contacts.Hysteretic, name) for name in ("lankarani_nikravesh", "hunt_crossley", "flores", "gonthier")},
-    **{"hertz": contacts.Hertz, "hysteretic": contacts.Hysteretic, "kelvin_voigt": contacts.KelvinVoigt},
-    **{"piecewise_linear": contacts.PiecewiseLinear, "polynomial": contacts.Polynomial, "jenkins": contacts.Jenkins},
-    **{"elasto_plastic": contacts.ElastoPlastic, "bouc_wen": contacts.BoucWen},
-}
-SHAPES = {"general": fb.Section, "rectangle": fb.Section.rectangle, "circle": fb.Section.circle}
-SHAPES |= {"tube": fb.Section.tube, "taper": fb.Taper}
-SIGNALS = {"harmonic": fb.Harmonic, "multisine": fb.Multisine, "band_noise": fb.BandNoise, "pulse": fb.Pulse}
-SIGNALS |= {"step": fb.Step, "sine_sweep": lambda rate="linear", **rest: fb.SineSweep(kind=rate, **rest)}
-PARTS = {"clamped": fb.Clamped, "pinned": fb.Pinned, "guided": fb.Guided}
-PARTS |= {"point_force": fb.PointForce, "point_moment": fb.PointMoment}
-LISTS = {"masses": fb.LumpedMass, "springs": fb.Spring, "dashpots": fb.Dashpot, "stops": fb.Stop}
-LISTS |= {"elements": fb.Element, "impactors": fb.Impactor, "supports": None, "forces": None}
 
 
 @dataclass
@@ -40,62 +22,6 @@ class Drawn:
     sizes: tuple[float, float]  # of displacements and velocities
     start: str = "rest"
     brief: bool = False  # without the checks on fine meshes
-
-
-def kind_of(table: Table, key: str, makers: Any) -> Any:
-    """What a table with a kind or shape stands for."""
-    rest = {k: v for k, v in table.items() if k != key}
-    return makers[table[key]](**{k: nested(k, v) for k, v in rest.items()})
-
-
-def nested(key: str, value: Any) -> Any:
-    """A value of a table, objects instead of tables."""
-    if key == "law":
-        return kind_of(value, "kind", LAWS)
-    if key in ("section", "start", "end") and isinstance(value, dict):
-        return kind_of(value, "shape", SHAPES)
-    return kind_of(value, "kind", SIGNALS) if key in ("signal", "foot", "base") else value
-
-
-def scene_of(tables: Table) -> fb.Scene:
-    """The scene by the constructors."""
-    beam, found = dict(tables["beam"]), {}
-    if "spans" in beam:
-        beam["spans"] = [(span["length"], nested("section", span["section"])) for span in beam["spans"]]
-    else:
-        beam["section"] = nested("section", beam["section"])
-    found["beam"] = (fb.Beam.of_spans if "spans" in beam else fb.Beam)(**beam)
-    for name, maker in LISTS.items():
-        rows = tables.get(name, ())
-        found[name] = [
-            maker(**{k: nested(k, v) for k, v in row.items()}) if maker else kind_of(row, "kind", PARTS) for row in rows
-        ]
-    if "damping" in tables:
-        found["damping"] = (fb.Rayleigh if "alpha" in tables["damping"] else fb.ModalDamping)(**tables["damping"])
-    if "base" in tables:
-        found["base"] = nested("base", tables["base"])
-    return fb.Scene(**found, gravity=tables.get("gravity", 0.0), bodies=[scene_of(b) for b in tables.get("bodies", ())])
-
-
-def toml(value: Any) -> str:
-    """A value of a scene file."""
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{k} = {toml(v)}" for k, v in value.items()) + " }"
-    if isinstance(value, (list, tuple)):
-        return "[" + ", ".join(map(toml, value)) + "]"
-    return str(value).lower() if isinstance(value, bool) else repr(value) if not isinstance(value, str) else f'"{value}"'
-
-
-def scene_file(tables: Table, how: Table) -> str:
-    """The text of the scene file."""
-    lines = [f"gravity = {tables['gravity']!r}"] if "gravity" in tables else []
-    for name, value in [*tables.items(), ("reduce", how)]:
-        if name == "gravity":
-            continue
-        for row in value if isinstance(value, list) else [value]:
-            lines.append(f"[[{name}]]" if isinstance(value, list) else f"[{name}]")
-            lines += [f"{k} = {toml(v)}" for k, v in row.items()]
-    return "\n".join(lines) + "\n"
 
 
 class Drawer:
@@ -124,7 +50,11 @@ class Drawer:
             return {"shape": shape, **material, "width": 2 * h, "height": h}
         if shape == "general":
             return {"shape": shape, **material, "A": h * h, "I": h**4 / 12, "fibre": 0.6 * h}
-        return {"shape": shape, **material, **({"diameter": h} if shape == "circle" else {"outer": h, "inner": 0.7 * h})}
+        return {
+            "shape": shape,
+            **material,
+            **({"diameter": h} if shape == "circle" else {"outer": h, "inner": 0.7 * h}),
+        }
 
     def beam(self, length: float) -> Table:
         """Uniform, tapered, of spans, on a foundation, under axial force."""
@@ -136,7 +66,10 @@ class Drawer:
             found["section"] = {"shape": "taper", "start": one, "end": other}
         elif self.maybe(0.3, 1):
             share = self.u(0.3, 0.7)
-            spans = [{"length": share * length, "section": one}, {"length": length - share * length, "section": self.section(h)}]
+            spans = [
+                {"length": share * length, "section": one},
+                {"length": length - share * length, "section": self.section(h)},
+            ]
             found = {"spans": spans}
         return found
 
@@ -156,9 +89,18 @@ class Drawer:
     def signal(self, size: float, w1: float, base: bool, duration: float) -> Table:
         """A motion or force of about that size around the frequency w1."""
         w = w1 * self.u(0.3, 2.5)
-        kind = self.pick("harmonic", "multisine", "pulse", "step", "sine_sweep", "band_noise") if self.depth >= 2 else "harmonic"
+        kind = (
+            self.pick("harmonic", "multisine", "pulse", "step", "sine_sweep", "band_noise")
+            if self.depth >= 2
+            else "harmonic"
+        )
         if kind == "harmonic":
-            return {"kind": kind, "amplitude": size, "omega": w if base or self.u(0, 1) < 0.8 else 0.0, "phase": self.u(0, 6)}
+            return {
+                "kind": kind,
+                "amplitude": size,
+                "omega": w if base or self.u(0, 1) < 0.8 else 0.0,
+                "phase": self.u(0, 6),
+            }
         if kind == "multisine":
             return {"kind": kind, "amplitude": [size, 0.4 * size], "omega": [w, 2.2 * w], "phase": [self.u(0, 6), 0.3]}
         if kind in ("pulse", "step"):
@@ -178,7 +120,12 @@ class Drawer:
         p = self.pick(1.5, 1.5, 1.0, 2.0) if kind in ("hertz", "hysteretic") else 1.5
         power = k * depth ** (1 - p)
         if kind == "kelvin_voigt":
-            return {"kind": kind, "stiffness": k, "damping": self.u(0.02, 0.5) * math.sqrt(k * mass), "clamp": self.pick(True, False)}
+            return {
+                "kind": kind,
+                "stiffness": k,
+                "damping": self.u(0.02, 0.5) * math.sqrt(k * mass),
+                "clamp": self.pick(True, False),
+            }
         if kind == "piecewise_linear":
             return {"kind": kind, "slopes": [0.5 * k, 2 * k], "knots": [self.u(0.2, 0.8) * depth]}
         if kind == "polynomial":
@@ -213,8 +160,10 @@ class Drawer:
         if self.maybe(0.35, 1):
             found["beam"]["axial_force"] = self.pick(-0.1, 0.5, 3.0) * at_mid * L
         if sprung or self.maybe(0.3, 1):
-            found["springs"] = [{"z": z, "stiffness": self.u(0.5, 5) * stiff, "rotational": self.pick(0.0, 0.1 * stiff * L * L)}
-                                for z in (0.1 * L, 0.8 * L)]  # fmt: skip
+            found["springs"] = []
+            for z in (0.1 * L, 0.8 * L):
+                turning = self.pick(0.0, 0.1 * stiff * L * L)
+                found["springs"].append({"z": z, "stiffness": self.u(0.5, 5) * stiff, "rotational": turning})
         if self.depth == 0 or self.maybe(0.6, 1):
             found["masses"] = [{"z": self.u(0.5, 0.95) * L, "mass": self.u(0.1, 1.5) * mass}]
             if self.maybe(0.5, 1):
@@ -230,7 +179,9 @@ class Drawer:
             whole = Part(found, whole.nodes)
         w1 = math.sqrt(max(whole.free_modes()[0][0], 0.0))
         if self.maybe(0.4, 2):
-            found["damping"] = self.pick({"zeta": self.u(0.0, 0.1)}, {"alpha": 0.02 * w1, "beta": 0.01 / w1}, {"zeta": [0.05, 0.0, 0.3]})
+            found["damping"] = self.pick(
+                {"zeta": self.u(0.0, 0.1)}, {"alpha": 0.02 * w1, "beta": 0.01 / w1}, {"zeta": [0.05, 0.0, 0.3]}
+            )
         return found, w1, float(whole.r @ whole.M @ whole.r)
 
     def draw(self) -> Drawn:
@@ -242,13 +193,17 @@ class Drawer:
         tc = self.u(0.1, 0.5) / w1
         k, deep = 0.3 * mass / tc**2, 0.3 * rate * tc
         tables["stops"] = []
-        for i in range(1 if self.depth < 2 else int(rng.integers(0, 4))):
+        for _ in range(1 if self.depth < 2 else int(rng.integers(0, 4))):
             z, gap = self.u(0.35, 0.85) * L, self.pick(0.0, self.u(0.05, 0.8) * size, -self.u(0.0, 0.2) * size)
             gap = self.u(0.1, 0.6) * size if self.depth == 0 else gap
             stop = {"z": z, "gap": gap, "side": self.pick("below", "above") if self.depth else "below"}
             stop["law"] = self.law(k, deep, mass, rate)
             if self.maybe(0.2, 3):
-                stop |= {"of": "rotation", "gap": gap / L, "law": self.law(0.1 * k * L * L, 5 * deep / L, 0.1 * mass * L * L, rate / L)}
+                stop |= {
+                    "of": "rotation",
+                    "gap": gap / L,
+                    "law": self.law(0.1 * k * L * L, 5 * deep / L, 0.1 * mass * L * L, rate / L),
+                }
             elif self.maybe(0.15, 3):
                 stop["on"] = self.u(0.05, 0.3) * L
             tables["stops"].append(stop)
@@ -258,24 +213,35 @@ class Drawer:
         for _ in range(0 if self.depth < 2 else int(rng.integers(0, 3))):
             kind = self.pick("point_force", "point_moment")
             force = 0.3 * mass * w1 * rate * (0.2 * L if kind == "point_moment" else 1.0)
-            tables["forces"].append({"kind": kind, "z": self.u(0.1, 1.0) * L, "signal": self.signal(force, w1, False, duration)})
+            tables["forces"].append(
+                {"kind": kind, "z": self.u(0.1, 1.0) * L, "signal": self.signal(force, w1, False, duration)}
+            )
         if "springs" in tables and self.maybe(0.4, 2):
             tables["springs"][0]["foot"] = self.signal(size, w1, False, duration)
         if self.maybe(0.25, 2):
             tables["gravity"] = 0.5 * w1 * rate
         tables["elements"] = []
         for _ in range(0 if self.depth < 3 else int(rng.integers(0, 3))):
-            one: Table = {"z": self.u(0.35, 0.9) * L, "law": self.element_law(0.3 * mass * w1**2, size, mass), "gap": self.pick(0.0, 0.1 * size)}
+            one: Table = {
+                "z": self.u(0.35, 0.9) * L,
+                "law": self.element_law(0.3 * mass * w1**2, size, mass),
+                "gap": self.pick(0.0, 0.1 * size),
+            }
             if self.maybe(0.3, 3):
-                one |= {"of": "rotation", "law": self.element_law(0.03 * mass * (w1 * L) ** 2, size / L, 0.1 * mass * L * L), "gap": 0.0}
+                one |= {
+                    "of": "rotation",
+                    "law": self.element_law(0.03 * mass * (w1 * L) ** 2, size / L, 0.1 * mass * L * L),
+                    "gap": 0.0,
+                }
             elif self.maybe(0.25, 3):
                 one["to"] = self.u(0.05, 0.3) * L
             tables["elements"].append(one)
         if self.maybe(0.3, 3):
             side = self.pick("above", "below", "both")
             own = {"stiffness": 0.2 * mass * w1**2, "damping": 0.01 * mass * w1} if rng.random() < 0.5 else {}
-            tables["impactors"] = [{"z": self.u(0.4, 0.8) * L, "mass": 0.2 * mass, "velocity": rate if side == "below" else -rate,
-                                    "law": self.law(k, deep, mass, rate), "gap": self.u(0.1, 1) * size, "side": side, **own}]  # fmt: skip
+            struck = {"z": self.u(0.4, 0.8) * L, "mass": 0.2 * mass, "velocity": rate if side == "below" else -rate}
+            struck |= {"law": self.law(k, deep, mass, rate), "gap": self.u(0.1, 1) * size, "side": side, **own}
+            tables["impactors"] = [struck]
         if self.maybe(0.25, 4):
             self.body(tables, size, k, deep, mass, rate, L)
         tables = {name: value for name, value in tables.items() if value != []}
@@ -299,6 +265,8 @@ class Drawer:
         other["stops"] = [{"z": 0.7 * l2, "gap": 0.5 * size, "side": "above", "law": self.law(k, deep, mass, rate)}]
         tables["bodies"] = [other]
         z = self.u(0.35, 0.85)
-        tables["stops"].append({"z": z * L, "gap": 0.3 * size, "on": (1, 0.6 * l2), "law": self.law(k, deep, mass, rate)})
+        tables["stops"].append(
+            {"z": z * L, "gap": 0.3 * size, "on": (1, 0.6 * l2), "law": self.law(k, deep, mass, rate)}
+        )
         if self.maybe(0.4, 4):
             tables["elements"].append({"z": 0.4 * L, "to": (1, 0.5 * l2), "law": self.element_law(0.2 * k, size, mass)})

@@ -227,7 +227,7 @@ class Whole:
         return self.row(z, order, body) @ self.vectors
 
     def _contacts(self) -> Any:
-        """(w on all dofs, gap, law, always) of stops, then elements of each beam, then impactors."""
+        """(w on all dofs, gap, law, always) of each beam's stops, elements, impactors."""
         for body, part in enumerate(self.parts):
             for name, key in (("stops", "on"), ("elements", "to")):
                 for one in part.tables.get(name, ()):
@@ -238,6 +238,11 @@ class Whole:
                         row = row - self.row(z, order, other)
                     push = -1.0 if name == "elements" or one.get("side") == "above" else 1.0
                     yield push * row, one.get("gap", 0.0), one["law"], name == "elements"
+            if body == 0:
+                yield from self._struck()
+
+    def _struck(self) -> Any:
+        """The same of the impactors, all of the first beam."""
         for i, one in enumerate(self.impactors):
             row = self.row(one["z"])
             row[self.starts[-1] + i] = -1.0

@@ -2,9 +2,9 @@
 
     q'' + C q' + ω² q = -Γ (ÿ + g) + Σ φ f + Σ w F(δ, δ̇),    δ = -w·q - gap
 
-Every law is a machine of few states, each with a smooth force and borders at which it goes over to another one: a stop
-is open until δ rises through zero. Besides the motion, the work of loads and dampers and the work and impulse of every
-contact are integrated.
+Every law is a machine of few states with borders at which it goes over to another one: a stop is open until δ rises
+through zero. Forces cut at zero, and the kink of Bouc and Wen at a reversal, are left to the control of steps.
+Besides the motion, the work of loads and dampers and the work and impulse of every contact are integrated.
 """
 
 from __future__ import annotations
@@ -63,7 +63,8 @@ class Acting:
             return 0.0 * d
         if self.slides:
             return self.h * d + (self.k * (d - self.place) if self.state == "stick" else self.f * SIGN[self.state])
-        return 0.0 * d if self.state == "cut" else self.smooth(d, v, z)
+        force = self.smooth(d, v, z)
+        return np.maximum(force, 0.0) if self.law.get("clamp") else force
 
     def smooth(self, d: Any, v: Any, z: Any = 0.0) -> Any:
         """Force of a law without borders of its own."""
@@ -85,6 +86,11 @@ class Acting:
         a = law["damping_factor"] if kind == "hysteretic" else FACTORS[kind](law["restitution"])
         return power * (1.0 + a * v / self.entry)
 
+    def first_z(self, d: float) -> float:
+        """z of Bouc and Wen (n = 1) at the start: that of a path from δ = 0 straight to where it begins."""
+        rate = self.law["beta"] + self.law["gamma"]
+        return math.copysign(self.law["A"] / rate * -math.expm1(-rate * abs(d)), d)
+
     def z_rate(self, v: float, z: float) -> float:
         """z' of Bouc and Wen."""
         law = self.law
@@ -100,12 +106,7 @@ class Acting:
             return [(lambda d, v, z: force(d) - self.f, 1.0, "up"), (lambda d, v, z: force(d) + self.f, -1.0, "down")]
         if self.slides:
             return [(lambda d, v, z: v, -SIGN[self.state], "stick")]
-        if self.law["kind"] == "bouc_wen":
-            return [(lambda d, v, z: v, 0.0, "on"), (lambda d, v, z: z, 0.0, "on")]
         found = [] if self.always else [(lambda d, v, z: d, -1.0, "open")]
-        if self.law.get("clamp"):
-            turn, to = (1.0, "on") if self.state == "cut" else (-1.0, "cut")
-            found.append((lambda d, v, z: self.smooth(d, v), turn, to))
         if self.state.startswith("branch"):
             j, knots = int(self.state[6:]), self.law.get("knots", ())
             found += [(lambda d, v, z: d - knots[j], 1.0, f"branch{j + 1}")] if j < len(knots) else []
@@ -117,8 +118,6 @@ class Acting:
         self.entry, self.state = max(abs(v), self.floor), "on"
         if self.law["kind"] == "piecewise_linear":
             self.state = f"branch{sum(d > knot for knot in self.law.get('knots', ()))}"
-        elif self.law.get("clamp") and self.smooth(d, v) < 0.0:
-            self.state = "cut"
 
     def go(self, to: str, d: float, v: float) -> None:
         """Pass a border."""
@@ -148,7 +147,8 @@ class Motion:
     def __post_init__(self) -> None:
         self.n, self.W = len(self.omega), np.array([a.w for a in self.acting]).reshape(-1, len(self.omega))
         self.gaps = np.array([a.gap for a in self.acting])
-        n, self.m, self.hysteretic = self.n, len(self.acting), [i for i, a in enumerate(self.acting) if a.law["kind"] == "bouc_wen"]
+        self.hysteretic = [i for i, a in enumerate(self.acting) if a.law["kind"] == "bouc_wen"]
+        n, self.m = self.n, len(self.acting)
         self.A = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(self.omega**2), -self.C]])
         self.D = np.kron(np.eye(2), -self.W)
 
@@ -187,16 +187,19 @@ class Motion:
         self.duration = duration
         n, m = self.n, self.m
         y, t = np.concatenate([q, u, np.zeros(2 + 3 * m)]), 0.0
-        d, v, z = self.local(y)
+        d, v, _ = self.local(y)
         a = -self.W @ self.rate(0.0, y)[n : 2 * n]
         for i, one in enumerate(self.acting):
             if one.law["kind"] == "bouc_wen":
+                y[2 * n + 2 + 2 * m + i] = one.first_z(d[i])
                 continue
             if not one.always and (d[i] > 0 or (d[i] == 0 and (v[i] > 0 or (v[i] == 0 and a[i] > 0)))):
                 one.enter(d[i], v[i])
                 self.begin(i, t, d[i], v[i], y)
             elif one.slides and abs(one.k * d[i]) > one.f:
                 one.state = "up" if d[i] > 0 else "down"
+                if v[i] * d[i] < 0:
+                    one.go("stick", d[i], v[i])
         energy = (sizes[1] ** 2) * np.ones(2 + m)
         atol = rtol * np.concatenate([np.full(n, sizes[0]), np.full(n, sizes[1]), energy, np.full(2 * m, sizes[1])])
         for end in [*[b for b in sorted(set(breaks)) if 0 < b < duration], duration]:
@@ -215,9 +218,11 @@ class Motion:
         events, what = [], []
         for i, one in enumerate(self.acting):
             for value, direction, to in one.borders():
+
                 def event(t: float, y: Any, i: int = i, value: Any = value) -> float:
                     d, v, z = self.local(y)
                     return float(value(d[i], v[i], z[i]))
+
                 event.terminal, event.direction = True, direction  # type: ignore[attr-defined]
                 events.append(event)
                 what.append((i, to))
@@ -264,11 +269,13 @@ class Motion:
         count = 400 + int(8.0 * (b - a) * self.omega.max())
         t, result = np.linspace(a, b, count), []
         for which in (0, 1):
-            value = lambda t, which=which: self.seen(piece, np.atleast_1d(t))[which][i]  # noqa: E731
-            values = value(t)
+            values = self.seen(piece, t)[which][i]
             j = int(np.argmax(values))
             around = (t[max(j - 1, 0)], t[min(j + 1, count - 1)])
-            best = minimize_scalar(lambda x: -value(x)[0], bounds=around, method="bounded", options={"xatol": 1e-9 * (b - a)})
+            best = minimize_scalar(
+                lambda x, which=which: -self.seen(piece, np.array([x]))[which][i, 0], bounds=around, method="bounded",
+                options={"xatol": 1e-9 * (b - a)},
+            )  # fmt: skip
             result.append(max(values[j], -best.fun))
         return result[0], result[1]
 
@@ -283,15 +290,16 @@ class Motion:
 
     def put(self, states: Any) -> None:
         """States of all laws."""
-        for one, (one.state, one.entry, one.place) in zip(self.acting, states, strict=True):
-            pass
+        for one, state in zip(self.acting, states, strict=True):
+            one.state, one.entry, one.place = state
 
     def at(self, times: Any, shift: Any = 0.0) -> tuple[Any, Any]:
         """States (k, …) and forces (k, m) at times, with [q, q̇] moved by parts of their size in the run."""
         times = np.minimum(times, self.duration)  # the last sample may be beyond by rounding
         moved = np.zeros((len(self.end), 1))
         if np.any(shift):
-            moved[: 2 * self.n, 0] = shift * np.max([np.abs(p[2](np.linspace(*p[:2], 9))).max(axis=1) for p in self.pieces], axis=0)[: 2 * self.n]
+            sizes = [np.abs(p[2](np.linspace(*p[:2], 9))).max(axis=1) for p in self.pieces]
+            moved[: 2 * self.n, 0] = shift * np.max(sizes, axis=0)[: 2 * self.n]
         states, forces = np.zeros((len(times), len(self.end))), np.zeros((len(times), self.m))
         for piece in self.pieces:
             here = np.flatnonzero((times >= piece[0]) & (times <= piece[1]))

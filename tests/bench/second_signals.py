@@ -41,7 +41,11 @@ def _once(table: Table, order: int) -> Callable[[float], float]:
         p, long, after = table["peak"] * BELL**9, table["length"], 0.0
     else:
         whole = (BELL**8).integ()
-        p, long, after = table["size"] * (whole - whole(-1.0)) / (whole(1.0) - whole(-1.0)), table["rise"], table["size"]
+        p, long, after = (
+            table["size"] * (whole - whole(-1.0)) / (whole(1.0) - whole(-1.0)),
+            table["rise"],
+            table["size"],
+        )
     p, at = p.deriv(order) * (2 / long) ** order if order else p, table["at"]
 
     def value(t: float) -> float:
