@@ -73,7 +73,8 @@ class Sliders(Law):
 class Jenkins(Sliders):
     """Spring and slider in series: elastic up to a limit, F = k (δ - s), then slip at F = ±f.
 
-    A slider that slips sticks again where δ̇ = 0, with s = δ ∓ f/k. Always active, at both signs of δ.
+    A slider that slips sticks again where δ̇ = 0, with s = δ ∓ f/k. Always active, at both signs of δ. At the start
+    s = 0: a run that begins beyond |δ| = f/k begins in slip.
 
     Parameters
     ----------

@@ -170,8 +170,9 @@ class Model(Printed, ModalEquations):
         Parameters
         ----------
         duration : s.
-        dt : output sampling in s, or the output times themselves, increasing; None keeps the final state and the
-            contact log only.
+        dt : output sampling in s (0, dt, 2 dt, …; what is left of a duration that dt does not divide is run, and in
+            the log, but has no sample), or the output times themselves, increasing; None keeps the final state and
+            the contact log only.
         start : (2n,) as made by `rest`, `state` or `equilibrium`; None is rest. Or the (2n + l,) of `Run.end`, with
             what the laws have latched, from which the run goes on.
         solver : one of the methods in `solvers`; None is the library's best.

@@ -289,8 +289,9 @@ class Run(ContactHistories, Printed):
 
         ``mean``: over each sample (halfway to its neighbours) instead of at it, so that contacts shorter than a sample
         are seen: the trapezoidal rule over the samples gives impulses as exactly as the run has them, those of the log
-        and, from sample to sample, of what always acts. How they fall to both sides of the middle between two samples
-        is found by the law on a cubic. ValueError for a run without samples, or of an earlier version's file.
+        up to the last sample and, from sample to sample, of what always acts. How they fall to both sides of the middle
+        between two samples is found by the law on a cubic. ValueError for a run without samples, or of an earlier
+        version's file.
         """
         if mean:
             from fembeam.response import mean_force

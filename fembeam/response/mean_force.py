@@ -2,9 +2,10 @@
 
     F_j = (1/w_j) ∫ F dt over the cell of sample j, which ends halfway to its neighbours;   Σ F_j w_j = Σ impulses
 
-Impulses are those of the contact log, to the last sample. Of a contact over several cells the law says how its impulse is shared, on the
-cubics through δ and δ̇ at entry, samples and exit, by Gauss-Legendre quadrature of each part within one cell. Of what
-always acts the impulse from sample to sample is that of the run; its halves are found likewise and share what misses.
+Impulses are those of the contact log, to the last sample. Of a contact over several cells the law says how its impulse
+is shared, on the cubics through δ and δ̇ at entry, samples and exit, by Gauss-Legendre quadrature of each part within
+one cell. Of what always acts the impulse from sample to sample is that of the run; its halves are found likewise and
+share what misses.
 """
 
 from __future__ import annotations

@@ -130,7 +130,7 @@ class Part:
         squares, vectors = self.free_modes()
         highest = squares[-1]
         chosen = how["modes"] if isinstance(how["modes"], list) else list(range(how["modes"]))
-        rows = np.array(loaded).reshape(len(loaded), -1)[:, self.free]
+        rows = np.array(loaded).reshape(len(loaded), len(self.M))[:, self.free]
         kept, inside = vectors[:, chosen] if chosen else vectors[:, :0], np.ix_(self.free, self.free)
         M, K = self.M[inside], self.K[inside]
         if how.get("residual") and len(rows):
