@@ -28,7 +28,7 @@ from fembeam.excitation.samples import (
     padded,
     read_rows,
 )
-from fembeam.support import number
+from fembeam.support import OldName, number
 
 Quantity = Literal["displacement", "acceleration", "force"]
 Interpolation = Literal["spectral", "linear"]
@@ -255,7 +255,7 @@ class Record:
         Arguments and results are those of `BandNoise.nodes`; the duration is at most the length of the record, and with
         linear interpolation the error is that of its spectrum, see `polyline`.
         """
-        self.lasting(duration)
+        self.for_duration(duration)
         lines, c_0, c_1 = self._spectrum
         dt, values = lines.nodes(duration, rtol)
         values[:, 0] += c_0 + c_1 * dt * np.arange(len(values))
@@ -266,7 +266,7 @@ class Record:
         """The signal d^order s/dt^order."""
         return replace(self, order=self.order + checked_order(order))
 
-    def lasting(self, duration: float) -> Record:
+    def for_duration(self, duration: float) -> Record:
         """Return the signal itself, when the record is at least `duration` (s) long; an error otherwise."""
         if number("duration (s)", duration, least=0.0) > self.duration * (1 + 1e-9):
             raise ValueError(
@@ -274,6 +274,8 @@ class Record:
                 f"shorten the run, bring a longer record, or give padding (s of zeros behind it)"
             )
         return self
+
+    lasting = OldName("for_duration")
 
     @cached_property
     def doubt(self) -> str:

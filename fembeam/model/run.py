@@ -16,7 +16,7 @@ import solvers
 from fembeam.model.contact_histories import ContactHistories
 from fembeam.model.shapes import Shapes
 from fembeam.scene import ON, Source
-from fembeam.support import Part, Printed, require
+from fembeam.support import OldName, Part, Printed, require
 from solvers.problem import Losses, counted
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ class Run(ContactHistories, Printed):
     shapes: Shapes
     stops: Vector  # (m, 3): z, push, gap of every contact
     directions: Vector  # (m, n): δ = -directions·q - gap
-    strikers: Vector  # (i,): masses of the impactors, whose coordinates √m x are the last ones
+    impactor_masses: Vector  # (i,) of the impactors, whose coordinates √m x are the last ones
     scene: str
     model: Model | None = None
     stored_forces: Vector | None = None  # (m, k) of a run read from a file
@@ -68,6 +68,8 @@ class Run(ContactHistories, Printed):
     end: Vector | None = None  # (2n + l,) [q, q̇] and what the laws have latched, at the time reached
     on: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 3), dtype=int))  # (m, 3): body, of ON, number
     kinds: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 2), dtype=bool))  # of rotation, always acting
+
+    strikers = OldName("impactor_masses")
 
     def __repr__(self) -> str:
         reached = f"to t = {self.t[-1]:g} s" if len(self.t) else "without samples"
@@ -118,13 +120,13 @@ class Run(ContactHistories, Printed):
         """A model's solution with what it takes to read it."""
         rows = model.contact_rows
         stops = np.array([(one.z, one.push, one.gap) for one in rows], dtype=float).reshape(-1, 3)
-        strikers = np.array([impactor.mass for impactor in model.matrices.impactors], dtype=float)
+        masses = np.array([impactor.mass for impactor in model.matrices.impactors], dtype=float)
         status = solution.status.value
         if not solution.status.good:
             status += f" (t = {solution.t[-1]:g} s)" if len(solution.t) else " (before the first sample)"
         return cls(
             *(solution.t, solution.q, solution.q_dot, solution.contacts, solution.ledger, status, solution.cost),
-            *(model.shapes, stops, model.directions, strikers, repr(model.scene), model),
+            *(model.shapes, stops, model.directions, masses, repr(model.scene), model),
             others=model.others,
             **{name: getattr(solution, name) for name in ("borders", "lost", "end")},
             began=began,

@@ -12,5 +12,5 @@ from fembeam.scene.local_coordinate import LocalCoordinate, unit_of
 from fembeam.scene.parameters import changes_structure, path_of, replaced, value_of, with_value
 from fembeam.scene.parts import Clamped, Dashpot, Guided, LumpedMass, Pinned, PointForce, PointMoment, Spring, Stop
 from fembeam.scene.scene import FEATURES, Scene
-from fembeam.scene.signals import PLACES, persistent_drive, signals_of, with_signals
+from fembeam.scene.signals import PLACES, for_duration, persistent_drive, signals_of, with_signals
 from fembeam.scene.source import Source
