@@ -87,7 +87,7 @@ class Record:
     samples per shortest period then (error of y'' 0.2 % of its rms; 20 samples: 0.03 %). Nothing is
     extrapolated at the ends: y'' is zero there and wrong by its own size within the first two samples. For 40
     tones up to half the Nyquist frequency the error of y'' is below 1 % of its rms 10 samples from an end,
-    0.05 % at 50 and 1e-6 at 1000. With a `band` the same loss reaches farther: 7 % at 3 periods of hi from an
+    0.05 % at 50 and 1e-6 at 1000. With a `band` the error extends farther: 7 % at 3 periods of hi from an
     end, 0.1 % at 10; stay as many periods of lo away from the ends when lo > 0.
 
     Examples
@@ -279,7 +279,7 @@ class Record:
 
     @cached_property
     def doubt(self) -> str:
-        """What a scene says of the record as its base motion, "" where there is nothing to say."""
+        """Warning for a record as base motion of a scene; "" for none."""
         if self.quantity != "displacement" or self.order or not isinstance(self._spectrum[0], LineSpectrum):
             return ""
         h, y = self._samples

@@ -43,7 +43,7 @@ class SineSweep:
 
     Notes
     -----
-    A linear mode answers nearly as to steady motion while |ω̇| is well below (ζω)²; a faster sweep finds lower maxima
+    A linear mode responds nearly as to a steady tone while |ω̇| is well below (ζω)²; a faster sweep gives lower maxima
     at shifted frequencies.
 
     References

@@ -1,4 +1,4 @@
-"""What a run tells of its stops, elements and impactors: indentation, rate, motion, names, units."""
+"""Histories of the stops, elements and impactors of a run: indentation, rate, motion; their names and units."""
 
 from __future__ import annotations
 

@@ -139,7 +139,7 @@ class Model(Printed, ModalEquations):
 
         Returns
         -------
-        (2n,) : impactors with a velocity keep their place meanwhile, and have it.
+        (2n,) : impactors with a velocity are held in place while the rest settles, and start with it.
 
         Raises
         ------

@@ -87,7 +87,7 @@ class Run(ContactHistories, Printed):
 
     @cached_property
     def readout(self) -> Readout:
-        """What it is read with: loads, section forces, reactions; of the model, else of the file."""
+        """Loads, damping, section forces and reactions, from the model or from the file."""
         from fembeam.response import Readout
 
         return self.stored if self.stored is not None and self.model is None else Readout(self.model, self.t)
@@ -101,7 +101,7 @@ class Run(ContactHistories, Printed):
 
     @cached_property
     def losses(self) -> Losses:
-        """What each stop and element took, see `solvers.problem.Losses`; ValueError for old files."""
+        """Energy that each stop and element dissipated, see `solvers.problem.Losses`; ValueError for old files."""
         if self.lost is None:
             raise ValueError("this run's file is of an earlier version, without losses; simulate again")
         return self.lost()
@@ -117,7 +117,7 @@ class Run(ContactHistories, Printed):
 
     @classmethod
     def of(cls, model: Model, solution: solvers.Solution, began: tuple[Vector, ...] = ()) -> Run:
-        """A model's solution with what it takes to read it."""
+        """The run of a model from its solution."""
         rows = model.contact_rows
         stops = np.array([(one.z, one.push, one.gap) for one in rows], dtype=float).reshape(-1, 3)
         masses = np.array([impactor.mass for impactor in model.matrices.impactors], dtype=float)
@@ -189,7 +189,7 @@ class Run(ContactHistories, Printed):
         return reactions(self)
 
     def floor_spectrum(self, z: float, omega: ArrayLike | None = None, zeta: ArrayLike = 0.05, **options: Any) -> Any:
-        """`fembeam.response_spectrum` of the absolute acceleration at z: what equipment there has to stand.
+        """`fembeam.response_spectrum` of the absolute acceleration at z: the load on equipment mounted there.
 
         omega or ``periods=``, zeta : as there; ``body=`` another beam. Warns where samples do not resolve contacts.
         """
@@ -291,8 +291,8 @@ class Run(ContactHistories, Printed):
 
         ``mean``: over each sample (halfway to its neighbours) instead of at it, so that contacts shorter than a sample
         are seen: the trapezoidal rule over the samples gives impulses as exactly as the run has them, those of the log
-        and, from sample to sample, of what always acts. How they fall to both sides of the middle between two samples
-        is found by the law on a cubic. ValueError for a run without samples, or of an earlier version's file.
+        and, from sample to sample, of what always acts. Between two samples the law is evaluated on a cubic to divide
+        the impulse at their middle. ValueError for a run without samples, or of an earlier version's file.
         """
         if mean:
             from fembeam.response import mean_force

@@ -1,8 +1,8 @@
-"""What a run is read with besides its coordinates: made of its model when asked for, or read from its file.
+"""What it takes besides coordinates to evaluate a run: computed from its model when asked for, or read from its file.
 
     q'' = Σ_l v_l s_l(t) + Σ_s w_s F_s - C q' - K q,    reactions = R [F; s; q''; q']
 
-k samples, n coordinates, m contacts, l loads, r reactions. No scene, law or signal is needed to read it.
+k samples, n coordinates, m contacts, l loads, r reactions. Neither scene nor laws nor signals are needed then.
 """
 
 from __future__ import annotations

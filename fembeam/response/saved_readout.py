@@ -1,4 +1,4 @@
-"""What a run is read with as plain arrays and words, so that a file of it can be read without its scene or code."""
+"""The `Readout` of a run as arrays and JSON, so that its file can be read without its scene."""
 
 from __future__ import annotations
 

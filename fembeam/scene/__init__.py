@@ -1,4 +1,4 @@
-"""What there is: supports, masses, springs, stops, elements, impactors, loads; full matrices, contact rows, signals.
+"""The scene: supports, masses, springs, stops, elements, impactors, loads; full matrices, contact rows, signals.
 
 Imports: `beams`, `excitation`, `support`, `reduction`; inside the method `Scene.reduce` also `fembeam.model`.
 Begin with `scene`, then `assembly`.

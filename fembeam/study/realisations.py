@@ -25,7 +25,7 @@ def noises(model: Model) -> list[Seed]:
 
 
 def seed_key(seed: Seed) -> str:
-    """What tells one seed from another, as text."""
+    """A seed as text, to compare seeds by."""
     if isinstance(seed, np.random.SeedSequence):
         return f"{seed.entropy}{''.join(f'/{i}' for i in seed.spawn_key)}"
     return str(int(seed))
