@@ -37,7 +37,7 @@ def widened_contact(rng: np.random.Generator, contact: Contact, speed: float, lo
         return contact
     law: Any = draw_own(rng, k, limit, speed) if rng.random() < 0.2 else contact.law
     others: list[Callable[[], Any]] = [
-        lambda: KelvinVoigt(0.0, rng.uniform(0.02, 0.8) * np.sqrt(k * mass)),
+        lambda: KelvinVoigt(1e-6 * k, rng.uniform(0.02, 0.8) * np.sqrt(k * mass)),
         lambda: KelvinVoigt(rng.uniform(0.0, 2.0) * k, 10.0 ** rng.uniform(-3.0, 0.0) * np.sqrt(k * mass)),
         lambda: Polynomial([0.1 * k, 0.0, k * (low / speed) ** 2]),
         lambda: laws(rng, mass, speed, low),

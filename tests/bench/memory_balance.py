@@ -9,7 +9,6 @@ between borders, taken twice with pieces of two lengths: the difference is what 
 
 from __future__ import annotations
 
-import ctypes
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,13 +18,12 @@ from random_scenes import ALLOWED, BALANCE, SAMPLES, handled
 
 from contacts import BoucWen, Coulomb, Jenkins, Law, Sum, WaltonBraun
 from contacts.memory.friction import SLIDER_SIZE, Sliders
+from contacts.path import renew
 from contacts.sums import HEAD, Gated, parts_of
 from solvers import Contact, integrate
 
 NODES, WEIGHTS = (0.5 * (x + one) for x, one in zip(np.polynomial.legendre.leggauss(8), (1.0, 0.0), strict=True))
 FEWEST = 200  # pieces of a run, at least
-_REALS = ctypes.POINTER(ctypes.c_double)
-_RENEW = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, *[ctypes.c_double] * 3, _REALS)
 
 
 @dataclass
@@ -121,7 +119,7 @@ def latched_over(s: int, scene: Scene, dense: Any) -> tuple[list[Any], Any, floa
     mine = np.flatnonzero(passed.contact == s)
     for i in mine.tolist():
         row, d = rows[-1].copy(), float(passed.delta[i])
-        _RENEW(law.renew_address)(int(passed.border[i]), d, float(passed.delta_dot[i]), 1.0, row.ctypes.data_as(_REALS))
+        renew(law, int(passed.border[i]), d, float(passed.delta_dot[i]), row)
         if passed.t[i] > 0.0:  # no work is done at the start
             shed += _springs(law, rows[-1], d) - _springs(law, row, d)
         rows.append(row)
