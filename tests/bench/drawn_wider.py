@@ -14,6 +14,7 @@ from drawn import Scene, draw_law
 from own_memory_laws import draw_own
 
 from contacts import Iwan, KelvinVoigt, Polynomial, WaltonBraun
+from contacts.custom import CustomLaw
 from solvers import Contact, DormandPrince, System, integrate
 
 WIDER_FROM = 100_000  # the first seed
@@ -42,7 +43,7 @@ def widened_contact(rng: np.random.Generator, contact: Contact, speed: float, lo
         lambda: Polynomial([0.1 * k, 0.0, k * (low / speed) ** 2]),
         lambda: laws(rng, mass, speed, low),
         lambda: WaltonBraun(k, k * (1.0 + 10.0 ** rng.uniform(-1.0, 1.0)), str(rng.choice(["kept", "forgotten"]))),
-        lambda: draw_law(rng, mass, speed, 10.0 ** rng.uniform(-1.5, -0.3) / low),
+        lambda: _law_of_stops(rng, mass, speed, low),
         lambda: Iwan([k, 0.3 * k], [limit, np.inf]),
         lambda: draw_own(rng, k, limit, speed),
     ]
@@ -50,6 +51,12 @@ def widened_contact(rng: np.random.Generator, contact: Contact, speed: float, lo
     while rng.random() < (0.8 if opens else 0.4):
         law, opens = law + others[rng.integers(2 if opens and rng.random() < 0.6 else len(others))](), False
     return Contact(contact.direction, law, contact.gap, always=True)
+
+
+def _law_of_stops(rng: np.random.Generator, mass: float, speed: float, low: float) -> Any:
+    """A law of stops; none of a user's own without memory, which would act at both signs of δ and be refused."""
+    law: Any = draw_law(rng, mass, speed, 10.0 ** rng.uniform(-1.5, -0.3) / low)
+    return _law_of_stops(rng, mass, speed, low) if isinstance(law, CustomLaw) else law
 
 
 def in_other_coordinates(rng: np.random.Generator, scene: Scene) -> Scene:

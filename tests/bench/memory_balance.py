@@ -46,24 +46,31 @@ def integrate_at(scene: Scene, method: Any, dt: Any) -> Any:
     return integrate(scene.system, scene.q0, scene.q_dot0, scene.duration, dt, method, memory=scene.memory)
 
 
-def nodes(scene: Scene, known: Any, finer: int) -> tuple[Any, Any]:
+def nodes(scene: Scene, known: Any, pace: float) -> tuple[Any, Any]:
     """Times and weights of Gauss' rule on short pieces between all that a run has met."""
     T = scene.duration
     met = np.concatenate((known.transitions.t, known.contacts.t_in, known.contacts.t_out, [0.0, T]))
     ends = np.unique(np.clip(met[np.isfinite(met)], 0.0, T))
     ends = ends[np.append(True, np.diff(ends) > 1e-11 * T)]
-    system = scene.system
-    fastest = np.sqrt(np.abs(np.linalg.eigvals(np.linalg.solve(system.M, system.K))).max())
-    counts = np.ceil(np.diff(ends) * finer * max(fastest, FEWEST / T)).astype(int)
+    counts = np.ceil(np.diff(ends) * max(pace, FEWEST / T)).astype(int)
     cuts = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(ends[:-1], ends[1:], counts, strict=True)]
     cuts = np.append(np.concatenate(cuts), ends[-1])
     lengths = np.diff(cuts)
     return (cuts[:-1, None] + lengths[:, None] * NODES).ravel(), (lengths[:, None] * WEIGHTS).ravel()
 
 
-def integrals(scene: Scene, method: Any, known: Any, finer: int) -> Integrals:
+def pace_of(scene: Scene, found: Integrals | None = None) -> float:
+    """1/s, the fastest rate of the motion, with springs and dashpots as steep as elements have been in a run."""
+    system, rows = scene.system, np.array([contact.direction for contact in scene.system.contacts])
+    k, c = (0.0, 0.0) if found is None else (np.nan_to_num(found.stiffness), np.nan_to_num(found.damping))
+    K, C = (matrix + (rows.T * more) @ rows for matrix, more in ((system.K, k), (system.C, c)))
+    swings, decays = (np.abs(np.linalg.eigvals(np.linalg.solve(system.M, matrix))).max() for matrix in (K, C))
+    return float(np.sqrt(swings) + decays)
+
+
+def integrals(scene: Scene, method: Any, known: Any, pace: float) -> Integrals:
     """Those of a run of its own, sampled at the nodes."""
-    t, weights = nodes(scene, known, finer)
+    t, weights = nodes(scene, known, pace)
     dense = integrate_at(scene, method, t)
     found = [_of_element(s, scene, dense, weights) for s in range(len(scene.system.contacts))]
     work, *others = np.transpose(found)
@@ -193,11 +200,13 @@ def accounts(scene: Scene, method: Any, rtol: float, reach: Any) -> str:
     """What is wrong with losses and impulses of a run; empty if nothing is.
 
     Where δ and δ̇ are off by rtol of ``reach`` (elements, 2), the largest of the run, work is off by F × rtol × the
-    longest way, and an impulse by F × rtol × the duration × the part of the motion that the element sees.
+    longest way or δ, and an impulse by F × rtol × the duration × the part of the motion that the element sees.
     """
     known = integrate_at(scene, method, scene.duration / SAMPLES)
-    coarse, fine = (integrals(scene, method, known, finer) for finer in (1, 2))
-    allowed, losses, way = ALLOWED * (rtol + 1e-11), known.losses, reach[:, 1] * scene.duration
+    first = integrals(scene, method, known, pace_of(scene))
+    pace = pace_of(scene, first)
+    coarse, fine = (integrals(scene, method, known, finer * pace) for finer in (1, 2))
+    allowed, losses, way = ALLOWED * (rtol + 1e-11), known.losses, reach[:, 0] + reach[:, 1] * scene.duration
     units = {"work": fine.force * way, "loss": fine.force * way, "slip": way}
     units["impulse"] = fine.force * scene.duration * reach[:, 0] / np.maximum(fine.delta, 1e-300)
     found = {"work": losses.work, "loss": losses.loss, "slip": losses.slip, "impulse": losses.impulses[-1]}
@@ -207,7 +216,8 @@ def accounts(scene: Scene, method: Any, rtol: float, reach: Any) -> str:
         doubt = np.abs(getattr(coarse, name) - exact)
         off = np.where(np.isnan(exact), 0.0, np.abs(found[name] - exact) / (allowed * unit + doubt + 1e-300))
         wrong += [f"{name} of {s}: {off[s]:.3g} allowed" for s in np.flatnonzero(~(off <= 1.0))]
-    bound = BALANCE * (rtol + 1e-11) * handled(known) + abs(fine.balance - coarse.balance)
+    energy = handled(known) + float(fine.force @ reach[:, 0])
+    bound = BALANCE * (rtol + 1e-11) * energy + abs(fine.balance - coarse.balance)
     if not abs(fine.balance) <= bound:
         wrong.append(f"balance of quadratures: {abs(fine.balance) / bound:.3g} allowed")
     return ", ".join(wrong + of_laws(scene, known, allowed * units["loss"]))

@@ -33,7 +33,7 @@ from typing import Any
 import numpy as np
 from drawn import Scene
 from drawn_memory import disturbed, draw
-from memory_balance import Integrals, accounts, integrals
+from memory_balance import Integrals, accounts, integrals, pace_of
 from more_memory_checks import more_checks
 from random_scenes import (
     ALLOWED,
@@ -132,8 +132,9 @@ def numbers(
 ) -> dict[str, Any]:
     """What `numbers_of` compares, with losses, and with transitions, element by element and border by border."""
     found, rows = numbers_of(solution, scene, size, duration), solution.transitions
+    way = reach(scene, solution)[:, 0]
     widened(found, scene, solution, along)
-    taken(found, solution.losses, along, reach(scene, solution)[:, 0], duration)
+    taken(found, solution.losses, along, way, duration)
     i = shown(rows, duration, least)
     contact = rows.contact[i].astype(int)
     found["order"] = [
@@ -142,14 +143,7 @@ def numbers(
     ]
     values = {"t": rows.t[i], "delta": rows.delta[i], "force": rows.force[i]}
     values |= {"work": rows.work[i], "impulse": rows.impulse[i]}
-    largest = {name: np.zeros(len(scene.system.contacts)) for name in values}
-    for name, row in values.items():
-        np.maximum.at(largest[name], contact, np.abs(row))
-    log = solution.contacts
-    np.maximum.at(largest["force"], np.asarray(log.stop, dtype=int), np.abs(log.peak_force))  # it opens at zero
-    largest["delta"] = np.maximum(largest["delta"], reach(scene, solution)[:, 0])  # one that only touches is at zero
-    largest["work"] = np.maximum(largest["work"], largest["force"] * largest["delta"])
-    largest["impulse"] = np.maximum(largest["impulse"], largest["force"] * duration)
+    largest = {"delta": way, "force": along.force, "work": along.force * way, "impulse": along.force * duration}
     spacing = duration / (1.0 + np.bincount(contact, minlength=len(scene.system.contacts)))
     for name, row in values.items():
         found[f"border {name}"] = row
@@ -211,7 +205,7 @@ def judged(scene: Scene, rtol: float, seed: int, known: Any) -> Verdict:
     """How the method does on a system of known references."""
     if known[0] is None:
         return against(scene, *known, rtol, seed)
-    along = integrals(scene, REFERENCE, known[0], 1)
+    along = integrals(scene, REFERENCE, known[0], pace_of(scene))
     look = partial(numbers, patience=patience(scene, known[0]), along=along)
     verdict = against(scene, *known, rtol, seed, look, disturbed)
     if not verdict.kind.startswith("events"):
