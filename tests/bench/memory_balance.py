@@ -52,7 +52,7 @@ def nodes(scene: Scene, known: Any, pace: float) -> tuple[Any, Any]:
     met = np.concatenate((known.transitions.t, known.contacts.t_in, known.contacts.t_out, [0.0, T]))
     ends = np.unique(np.clip(met[np.isfinite(met)], 0.0, T))
     ends = ends[np.append(True, np.diff(ends) > 1e-11 * T)]
-    counts = np.ceil(np.diff(ends) * max(pace, FEWEST / T)).astype(int)
+    counts = np.ceil(np.diff(ends) * pace).astype(int)
     cuts = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(ends[:-1], ends[1:], counts, strict=True)]
     cuts = np.append(np.concatenate(cuts), ends[-1])
     lengths = np.diff(cuts)
@@ -65,7 +65,7 @@ def pace_of(scene: Scene, found: Integrals | None = None) -> float:
     k, c = (0.0, 0.0) if found is None else (np.nan_to_num(found.stiffness), np.nan_to_num(found.damping))
     K, C = (matrix + (rows.T * more) @ rows for matrix, more in ((system.K, k), (system.C, c)))
     swings, decays = (np.abs(np.linalg.eigvals(np.linalg.solve(system.M, matrix))).max() for matrix in (K, C))
-    return float(np.sqrt(swings) + decays)
+    return max(float(np.sqrt(swings) + decays), FEWEST / scene.duration)
 
 
 def integrals(scene: Scene, method: Any, known: Any, pace: float) -> Integrals:
@@ -203,8 +203,7 @@ def accounts(scene: Scene, method: Any, rtol: float, reach: Any) -> str:
     longest way or δ, and an impulse by F × rtol × the duration × the part of the motion that the element sees.
     """
     known = integrate_at(scene, method, scene.duration / SAMPLES)
-    first = integrals(scene, method, known, pace_of(scene))
-    pace = pace_of(scene, first)
+    pace = pace_of(scene, integrals(scene, method, known, pace_of(scene)))
     coarse, fine = (integrals(scene, method, known, finer * pace) for finer in (1, 2))
     allowed, losses, way = ALLOWED * (rtol + 1e-11), known.losses, reach[:, 0] + reach[:, 1] * scene.duration
     units = {"work": fine.force * way, "loss": fine.force * way, "slip": way}
