@@ -139,6 +139,6 @@ def bouc_wen_renew_gradient(j, delta, delta_dot, entry_rate, parameters, out):
         out[8], out[14] = 1.0, 1.0
         return
     out[5] = 1.0
-    if j == 0:
-        _, slope, by_start = _response(parameters, delta, delta_dot)
+    z, slope, by_start = _response(parameters, delta, delta_dot)
+    if j == 0 or _sign(parameters, delta, delta_dot) * z > 0.0:  # z is kept; where it is zero the time of it says so
         out[10], out[13], out[14] = slope, -slope, by_start

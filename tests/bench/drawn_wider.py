@@ -43,7 +43,7 @@ def widened_contact(rng: np.random.Generator, contact: Contact, speed: float, lo
         lambda: Polynomial([0.1 * k, 0.0, k * (low / speed) ** 2]),
         lambda: laws(rng, mass, speed, low),
         lambda: WaltonBraun(k, k * (1.0 + 10.0 ** rng.uniform(-1.0, 1.0)), str(rng.choice(["kept", "forgotten"]))),
-        lambda: _law_of_stops(rng, mass, speed, low),
+        lambda: _law_of_stops(rng, mass, speed, low) if law.memory else laws(rng, mass, speed, low),
         lambda: Iwan([k, 0.3 * k], [limit, np.inf]),
         lambda: draw_own(rng, k, limit, speed),
     ]
