@@ -194,6 +194,8 @@ def land(problem, tables, state, scratch, stop, direction, near, rtol, t_end, ou
     span = -w[size + 1] if variable == ROOT else level - delta
     _step(problem, tables, state, scratch, variable, stop, span, with_energy)
     landed, part = x[size], _PART_OF_FOURTH if variable == ROOT and tables.time_exponent[1 + stop] == 4.0 else _PART
+    if scratch.viscous[stop] > 0.0:  # too strong a dashpot for an explicit step
+        part = 1.0
     width = surface_tolerance(problem, stop, state.x) / abs(rate)  # a distance may be that much rounding
     if not t <= landed <= t + min(4.0 * near, furthest) + width:
         return -1
