@@ -185,7 +185,7 @@ def step_error(problem, tables, state, scratch, node_set, level, is_new, rtol):
             continue
         ripple = ripple_of(tables.ripple_weight[u], tables.alias[tables.kind[node_set], level], state.x, n)
         span = h * _undamped_part(tables, scratch, node_set, h, u) if scratch.viscous[u] > 0.0 else h
-        scratch.unresolved[u] = span * (unresolved + 0.1 * stiffness * ripple)
+        scratch.unresolved[u] = span * (unresolved + 0.03 * stiffness * ripple)
     _sum_errors(problem, tables, scratch, node_set, h)
     worst = 0.0
     for s in range(stops):
