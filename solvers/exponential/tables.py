@@ -206,9 +206,15 @@ def build(
         power_rows=energy_rows[1],
         loss_rows=energy_rows[2],
         steady_rate=np.zeros((2 * tones, padded(size - tones))),
-        gauss=np.concatenate((gauss(S), so_far(gauss(S)[0]).T)),
+        gauss=_gauss_rule(),
         extrapolation=node_sets.extrapolation,
     )
+
+
+@lru_cache(maxsize=1)
+def _gauss_rule() -> Any:
+    """Points and weights of Gauss's rule on (0, 1), and the weights of integrals from 0 to each point; only read."""
+    return np.concatenate((gauss(S), so_far(gauss(S)[0]).T))
 
 
 def fill_tones(tables: Tables, problem: Problem, tones: int, series: tuple[tuple[float, float], ...]) -> None:
