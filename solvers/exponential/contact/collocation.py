@@ -184,8 +184,8 @@ def step_error(problem, tables, state, scratch, node_set, level, is_new, rtol):
         if unresolved == 0.0:
             continue
         ripple = ripple_of(tables.ripple_weight[u], tables.alias[tables.kind[node_set], level], state.x, n)
-        span = h / max(1.0, h * tables.accelerance[u, u] * scratch.viscous[u])  # a strong dashpot damps such errors
-        scratch.unresolved[u] = span * (unresolved + 0.1 * stiffness * ripple)
+        span = h * _undamped_part(tables, scratch, node_set, h, u) if scratch.viscous[u] > 0.0 else h
+        scratch.unresolved[u] = span * (unresolved + 0.03 * stiffness * ripple)
     _sum_errors(problem, tables, scratch, node_set, h)
     worst = 0.0
     for s in range(stops):
@@ -195,6 +195,25 @@ def step_error(problem, tables, state, scratch, node_set, level, is_new, rtol):
             if error != error:
                 break
     return worst
+
+
+@merged
+def _undamped_part(tables, scratch, node_set, h, u):
+    """Part of a step from which errors of a rate reach its end, d = h × accelerance × slope of the law by the rate:
+
+        ∫ exp(-∫ d dσ') dσ, the inner integral from σ to 1, with d constant around each node.
+
+    The dashpot of the last nodes counts: that of a stop which is left is weaker than before.
+    """
+    part, left = 0.0, 1.0
+    for k in range(S):
+        i = S - 1 - k
+        share = tables.plain[node_set, i]
+        damped = share * h * tables.accelerance[u, u] * max(scratch.slope[u, 1, i], 0.0)
+        stays = math.exp(-damped)
+        part += left * share * ((1.0 - stays) / damped if damped > 1e-6 else 1.0)
+        left *= stays
+    return part
 
 
 @merged

@@ -43,7 +43,7 @@ from solvers.exponential.contact.peaks import state_peaks
 _MOST_TRIES = 8  # to find the step that ends at an output time, or on a bend
 _PART = 0.1  # of the embedded difference that counts as the error
 _PART_OF_FOURTH = 1e-2  # with u = δ^{1/4}: terms t² = u⁸ are exact in the step, and all of the difference
-_LAST = 0.09  # indentation, in units of the deepest, from which the last step is tried
+_LAST, _MOST = 0.2, 0.4  # indentation / (deepest × reach²) from which the last step is tried, and / deepest at most
 
 
 def landing_reach(rtol: float) -> float:
@@ -171,6 +171,13 @@ def _accept(problem, tables, state, scratch, variable, stop, span, t_end, out, d
     return True
 
 
+@inlined
+def _furthest(problem, tables, scratch):
+    """Longest landing, s: within the reach of the fastest block, and within a cell of the sampled signals."""
+    furthest = scratch.landing_reach[0] / tables.fastest
+    return min(furthest, problem.table_dt[0]) if problem.table_dt.size else furthest
+
+
 @merged
 def land(problem, tables, state, scratch, stop, direction, near, rtol, t_end, out, due, with_energy):
     """Try to land on a border of ``stop``, about ``near`` s ahead.
@@ -178,13 +185,14 @@ def land(problem, tables, state, scratch, stop, direction, near, rtol, t_end, ou
     Returns ``stop`` if it succeeded, another stop whose border is crossed before, or -1.
     """
     size, t = state.x.size, state.now[T]
-    delta, furthest = indentation(problem, stop, state.x), scratch.landing_reach[0] / tables.fastest
+    delta, furthest = indentation(problem, stop, state.x), _furthest(problem, tables, scratch)
     level = problem.knots[stop, state.segment[stop] - (1 if direction < 0 else 0)]
     leaving = direction < 0 and state.segment[stop] == 1
     rate = dot(problem.read_rate[stop], state.x, 2 * problem.k.size)
     if near > furthest or abs(rate) <= rate_tolerance(problem, stop, state.x):
         return -1
-    if leaving and delta > _LAST * state.active[stop, PEAK_DELTA]:
+    last = min(_LAST * scratch.landing_reach[0] ** 2, _MOST)  # the error grows like (δ/deepest)^{9/2}
+    if leaving and delta > last * state.active[stop, PEAK_DELTA]:
         return -1
     if not leaving and state.segment[stop] > 0 and abs(level - delta) > 0.2 * max(level, delta):
         return -1
@@ -194,6 +202,8 @@ def land(problem, tables, state, scratch, stop, direction, near, rtol, t_end, ou
     span = -w[size + 1] if variable == ROOT else level - delta
     _step(problem, tables, state, scratch, variable, stop, span, with_energy)
     landed, part = x[size], _PART_OF_FOURTH if variable == ROOT and tables.time_exponent[1 + stop] == 4.0 else _PART
+    if scratch.viscous[stop] > 0.0:  # too strong a dashpot for an explicit step
+        part = 1.0
     width = surface_tolerance(problem, stop, state.x) / abs(rate)  # a distance may be that much rounding
     if not t <= landed <= t + min(4.0 * near, furthest) + width:
         return -1
@@ -239,7 +249,7 @@ def land_on_bend(problem, tables, state, scratch, stop, border, near, rtol, t_en
 
     A border that is passed before is noted in ``scratch.landed``: -1 if none is, and less if that cannot be told.
     """
-    furthest, largest = scratch.landing_reach[0] / tables.fastest, scratch.bend_values[scratch.bend_values.size - 1]
+    furthest, largest = _furthest(problem, tables, scratch), scratch.bend_values[scratch.bend_values.size - 1]
     enough = 1e-10 * largest
     if border >= 0:  # one that is missed by more may seem to be passed the other way by the next step
         largest, enough = scratch.largest[stop, border], 0.1 * scratch.noise[stop, border]
