@@ -253,7 +253,7 @@ def test_a_pull_is_no_peak_force_of_a_yielding_stop():
 @pytest.mark.parametrize("rate", [-0.5, 0.5])
 @pytest.mark.parametrize("method", [FINE, DormandPrince(1e-12)], ids=["main", "stepping"])
 def test_smooth_hysteresis_begun_beyond_its_zero(method, rate):
-    """z' = A - (β sgn z + γ)|z| from z₀ < 0: e^(γ₋y) to zero at y₀, 1 - e^(-γ₊(y - y₀)) beyond; F does not jump there."""
+    """z' = A - (β sgn z + γ)|z| from z₀ < 0: e^(γ₋y) to zero at y₀, 1 - e^(-γ₊(y - y₀)) beyond; F is continuous."""
     law, beta, gamma, before = BoucWen(1.0, 0.26, 1.0, 0.9, 0.4), 0.9, 0.4, -0.3
     zero = -math.log1p((gamma - beta) * before) / (gamma - beta)  # y at z = 0
     z = (1.0 - math.exp(-(beta + gamma) * (1.0 - zero))) / (beta + gamma)

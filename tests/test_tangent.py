@@ -200,8 +200,8 @@ def test_bad_input():
         integrate(beam(1, Viscoelastic.tsuji(2e7, 0.6, 0.3)), [0.0], [0.0], 1.0, tangent=True)
     with pytest.raises(ValueError, match="its slope is infinite"):
         integrate(beam(1, Viscoelastic(1e8, 1e3, exponent=2.8)), [0.0], [0.0], 1.0, tangent=True)
-    for law in (WaltonBraun(1e6, 2e6), Jenkins(1e6, 10.0)):
-        beside = Contact([1.0], law + Viscoelastic.tsuji(2e7, 0.6, 0.3), always=True)
+    for memory_law in (WaltonBraun(1e6, 2e6), Jenkins(1e6, 10.0)):
+        beside = Contact([1.0], memory_law + Viscoelastic.tsuji(2e7, 0.6, 0.3), always=True)
         with pytest.raises(ValueError, match="its slope is infinite"):
             integrate(System.modal([1.0], [0.0], [beside]), [0.0], [0.0], 1.0, tangent=True)
     with pytest.raises(ValueError, match="differ in coordinates"):

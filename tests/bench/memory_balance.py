@@ -31,7 +31,8 @@ class Integrals:
     """Of every element over a run; of what is not known nan."""
 
     work: Any
-    impulse: Any
+    history: Any  # (elements, samples) work and impulse up to the samples
+    impulses: Any
     loss: Any
     slip: Any
     force: Any  # largest of the run, as δ and the slopes ∂F/∂δ and ∂F/∂δ̇
@@ -49,7 +50,7 @@ def integrate_at(scene: Scene, method: Any, dt: Any) -> Any:
 def nodes(scene: Scene, known: Any, pace: float) -> tuple[Any, Any]:
     """Times and weights of Gauss' rule on short pieces between all that a run has met."""
     T = scene.duration
-    met = np.concatenate((known.transitions.t, known.contacts.t_in, known.contacts.t_out, [0.0, T]))
+    met = np.concatenate((known.transitions.t, known.contacts.t_in, known.contacts.t_out, known.t, [0.0, T]))
     ends = np.unique(np.clip(met[np.isfinite(met)], 0.0, T))
     ends = ends[np.append(True, np.diff(ends) > 1e-11 * T)]
     counts = np.ceil(np.diff(ends) * pace).astype(int)
@@ -72,8 +73,9 @@ def integrals(scene: Scene, method: Any, known: Any, pace: float) -> Integrals:
     """Those of a run of its own, sampled at the nodes."""
     t, weights = nodes(scene, known, pace)
     dense = integrate_at(scene, method, t)
-    found = [_of_element(s, scene, dense, weights) for s in range(len(scene.system.contacts))]
-    work, *others = np.transpose(found)
+    up_to = np.where(dense.t < known.t[:, None] * (1.0 + 1e-12), weights, 0.0)  # (samples, nodes)
+    found = [_of_element(s, scene, dense, weights, up_to) for s in range(len(scene.system.contacts))]
+    work, *others = (np.array(column) for column in zip(*found, strict=True))
     return Integrals(work, *others, _unbalanced(scene, dense, weights, work))
 
 
@@ -88,14 +90,16 @@ def _unbalanced(scene: Scene, dense: Any, weights: Any, work: Any) -> float:
     return float(last - first - taken + work.sum())
 
 
-def _of_element(s: int, scene: Scene, dense: Any, weights: Any) -> tuple[float, ...]:
-    """Work, impulse, loss, slip and largest force; nan of a stop without memory, which its log tells."""
+def _of_element(s: int, scene: Scene, dense: Any, weights: Any, up_to: Any) -> tuple[Any, ...]:
+    """What `Integrals` holds of an element; nan of a stop without memory, which its log tells."""
     contact: Contact = scene.system.contacts[s]
     law: Any = contact.law
     d, v = -dense.q @ contact.direction - contact.gap, -dense.q_dot @ contact.direction
     if not contact.always:
         own = np.abs(dense.contacts.peak_force[dense.contacts.stop == s])
-        return dense.losses.work[s], np.nan, np.nan, np.nan, own.max(initial=0.0), np.abs(d).max(), np.nan, np.nan
+        unknown = np.full(len(up_to), np.nan)
+        told = dense.losses.work[s], unknown, unknown, np.nan, np.nan
+        return *told, own.max(initial=0.0), np.abs(d).max(), np.nan, np.nan
     latched, since, shed = latched_over(s, scene, dense)
     force, heat, slipping, slopes = np.empty(len(d)), np.empty(len(d)), np.zeros(len(d)), np.zeros(2)
     which = np.searchsorted(since, dense.t, side="right")
@@ -105,8 +109,9 @@ def _of_element(s: int, scene: Scene, dense: Any, weights: Any) -> tuple[float, 
         slopes = np.maximum(slopes, _slopes(law.batch(1.0, row), d[i], v[i]))
         heat[i] = sum(_heat(part, own, d[i], v[i]) for part, own in _parts(law, row))
         slipping[i] = sum(np.count_nonzero(_sliders(own)[4]) for part, own in _parts(law, row) if _slides(part))
-    work, impulse, loss, slip = ((weights * x).sum() for x in (force * v, force, heat, slipping * np.abs(v)))
-    return work, impulse, loss + shed, slip, np.abs(force).max(), np.abs(d).max(), *slopes
+    work, loss, slip = (weights @ x for x in (force * v, heat, slipping * np.abs(v)))
+    sizes = np.abs(force).max(), np.abs(d).max(), *slopes
+    return work, up_to @ (force * v), up_to @ force, loss + shed, slip, *sizes
 
 
 def _slopes(force: Any, d: Any, v: Any) -> Any:
@@ -206,14 +211,17 @@ def accounts(scene: Scene, method: Any, rtol: float, reach: Any) -> str:
     pace = pace_of(scene, integrals(scene, method, known, pace_of(scene)))
     coarse, fine = (integrals(scene, method, known, finer * pace) for finer in (1, 2))
     allowed, losses, way = ALLOWED * (rtol + 1e-11), known.losses, reach[:, 0] + reach[:, 1] * scene.duration
-    units = {"work": fine.force * way, "loss": fine.force * way, "slip": way}
-    units["impulse"] = fine.force * scene.duration * reach[:, 0] / np.maximum(fine.delta, 1e-300)
-    found = {"work": losses.work, "loss": losses.loss, "slip": losses.slip, "impulse": losses.impulses[-1]}
+    force = np.maximum(fine.force, 1e-12 * fine.force.max() + 1e-300)  # of one that touched within rounding
+    units = {"work": force * way, "loss": force * way, "slip": way, "history": (force * way)[:, None]}
+    units["impulses"] = (force * scene.duration * reach[:, 0] / np.maximum(fine.delta, 1e-300))[:, None]
+    found = {"work": losses.work, "loss": losses.loss, "slip": losses.slip}
+    found |= {"history": losses.history.T, "impulses": losses.impulses.T}
     wrong = []
     for name, unit in units.items():
         exact = getattr(fine, name)
         doubt = np.abs(getattr(coarse, name) - exact)
         off = np.where(np.isnan(exact), 0.0, np.abs(found[name] - exact) / (allowed * unit + doubt + 1e-300))
+        off = off.reshape(len(off), -1).max(axis=1)
         wrong += [f"{name} of {s}: {off[s]:.3g} allowed" for s in np.flatnonzero(~(off <= 1.0))]
     energy = handled(known) + float(fine.force @ reach[:, 0])
     bound = BALANCE * (rtol + 1e-11) * energy + abs(fine.balance - coarse.balance)

@@ -6,8 +6,11 @@ A system has one to ten modes and one to four elements: sliders, dry friction wi
 Bouc and Wen's hysteresis, yielding with hardening or without and yielding stops, alone or summed with one another and
 with springs and dashpots, on coordinates of their own, on a shared one or between two, beside other stops; it is free,
 or driven by tones, sampled noise, pulses and base motion, from a start at any place or one that is under way; see
-`drawn_memory`. Compared at rtol 1e-4 to 1e-10 are the motion, the log of contacts, the transitions (which, when, at
-which place and force), the work of every element and the energy balance. What a difference is worth is told as in
+`drawn_memory`. Seeds from 100 000 on have dashpots and laws of stops beside yielding stops and sliders, sums of several
+laws with memory, laws of a user's own, full matrices, and starts far beyond limits, with other rates than those under
+way, or with what another run has latched; see `drawn_wider`. Compared at rtol 1e-4 to 1e-10 are the motion, the log of
+contacts, the transitions (which, when, at which place and force, after which work and impulse), work, stored energy,
+loss, slip and impulse of every element and the energy balance. What a difference is worth is told as in
 `random_scenes`, with three bounds besides, of what the motion itself does not determine better:
 
 - Where the motion is off by e, a border with the margin b is met at a time off by |∂b/∂(δ, δ̇)| e / |db/dt|. After the
@@ -16,6 +19,10 @@ which place and force), the work of every element and the energy balance. What a
   (`widened`).
 - Two transitions between which the motion goes beyond a border and back by less than e may be there or not. They are
   left out of both runs only if the runs differ in them; e is the difference of the two motions (`without_pairs`).
+
+Work, loss, slip and impulse of every element, and the energy balance, are also compared with quadratures over the same
+run, sampled densely, of the method and of the reference; no passive law gives energy, and what a slider takes is its
+limit times its slip (`memory_balance`).
 
 Of every tenth system also the derivative of the end by the start is compared with differences of the reference, and
 those free or under tones are run in two parts, the second from what the first has latched; of some also `Newmark` with
