@@ -11,9 +11,10 @@ step of a law with broken powers of δ uses t = h σ^κ and F = σ^λ g(σ), whi
 Error estimate: let A₁ be the larger of the last two Jacobi coefficients of the force, in size, and A₂ the larger of the
 two before them. The part of the force that the polynomial leaves out is estimated by A₁ max((A₁/A₂)^{S/2}, A₁/F_max).
 Its effect on the indentation rate of every stop, in contact or not, is compared with rtol × the reference speed of that
-stop. Added to it are the oscillation of modes too fast for the nodes, and the part of the sampled signals, whose cells
-may be shorter than the step, that their polynomials leave out. A kink of the law between an end of the step and the
-nearest node does not show in the coefficients; there the law is compared with the polynomial.
+stop. The stop's own dashpot damps it on the way to the end of the step, less if the stop is being left. Added to it
+are the oscillation of modes too fast for the nodes, and the part of the sampled signals, whose cells may be shorter
+than the step, that their polynomials leave out. A kink of the law between an end of the step and the nearest node does
+not show in the coefficients; there the law is compared with the polynomial.
 """
 
 from __future__ import annotations
@@ -199,11 +200,11 @@ def step_error(problem, tables, state, scratch, node_set, level, is_new, rtol):
 
 @merged
 def _undamped_part(tables, scratch, node_set, h, u):
-    """Part of a step from which errors of a rate reach its end, d = h × accelerance × slope of the law by the rate:
+    """Part of a step from which errors of a rate reach its end past the stop's dashpot.
 
-        ∫ exp(-∫ d dσ') dσ, the inner integral from σ to 1, with d constant around each node.
+        ∫ exp(-∫ d dσ') dσ, the inner integral from σ to 1, d = h × accelerance × slope of the law by the rate,
 
-    The dashpot of the last nodes counts: that of a stop which is left is weaker than before.
+    d constant around each node. The last nodes decide: the dashpot of a stop that is left fades.
     """
     part, left = 0.0, 1.0
     for k in range(S):
