@@ -315,21 +315,3 @@ def finish_step(problem, tables, state, scratch, node_set, level):
                 state.active[s, PEAK_FORCE] = max(state.active[s, PEAK_FORCE], largest_size(scratch.force[s]))
     copy(scratch.x_new, state.x, size)
     state.now[T] += h
-
-
-@merged
-def contact_time(problem, tables, scratch, s, speed):
-    """Duration, s, of an impact at this speed on one stop alone, from the law's energy: T = 3.2 δ_m/v."""
-    speed = max(speed, 1e-12)
-    accelerance = max(tables.accelerance[s, s], 1e-300)
-    target = 0.5 * speed * speed / accelerance
-    p = tables.exponent[s]
-    deepest = 1e-3 * speed
-    for _ in range(4):  # one is enough for a power law
-        scratch.clipped[0], scratch.trial[0] = deepest, 0.0
-        contact_forces(problem, s, scratch.clipped[0:1], scratch.trial[0:1], speed, scratch.trial[1:2])
-        energy = scratch.trial[1] * deepest / (p + 1.0)
-        if not energy > 0.0 or abs(target - energy) < 0.1 * target:
-            break
-        deepest *= (target / energy) ** (1.0 / (p + 1.0))
-    return 3.2 * deepest / speed
