@@ -1,6 +1,6 @@
 """Many starts of one system at once: checked, shared out among threads, collected in arrays.
 
-A start counts as one piece of work: its numbers do not depend on the others, on their order, or on the threads.
+The results of a start do not depend on the other starts, on their order, or on the threads.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
+from itertools import pairwise
 from threading import Event
 from typing import TYPE_CHECKING, Any
 
@@ -223,10 +224,9 @@ def _check_status(found: ManySolutions, duration: float) -> None:
 
 def _to_the_end(workers: list[Worker], count: int, progress: Callable[[int], None] | None) -> None:
     """Let the workers share the starts; after Ctrl-C they stop where they are."""
-    size = max(1, min(_STRETCH, math.ceil(count / (4 * len(workers)))))
-    stretches, stop, done = iter(range(0, count, size)), Event(), [0] * len(workers)
+    stretches, stop, done = iter(_shared_out(count, len(workers))), Event(), [0] * len(workers)
     tell = (lambda: progress(sum(done))) if progress else (lambda: None)
-    tasks = [_stretches(worker, stretches, size, count, stop, done, i) for i, worker in enumerate(workers)]
+    tasks = [_stretches(worker, stretches, stop, done, i) for i, worker in enumerate(workers)]
     try:
         if len(tasks) == 1:
             for _ in tasks[0]:
@@ -238,12 +238,19 @@ def _to_the_end(workers: list[Worker], count: int, progress: Callable[[int], Non
     tell()
 
 
+def _shared_out(count: int, threads: int) -> list[tuple[int, int]]:
+    """First start of each stretch and the one after its last; they get shorter, so that all threads end together."""
+    places = [0]
+    while places[-1] < count:
+        places.append(places[-1] + min(_STRETCH, math.ceil((count - places[-1]) / (2 * threads))))
+    return list(pairwise(places))
+
+
 def _stretches(
-    worker: Worker, stretches: Iterator[int], size: int, count: int, stop: Event, done: list[int], i: int
+    worker: Worker, stretches: Iterator[tuple[int, int]], stop: Event, done: list[int], i: int
 ) -> Iterator[None]:
     """The work of one thread, with a look at the world outside in between."""
-    for first in stretches:
-        beyond = min(first + size, count)
+    for first, beyond in stretches:
         worker.assign(first, beyond)
         while not worker.march():
             if stop.is_set():

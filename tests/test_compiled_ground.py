@@ -12,7 +12,7 @@ from scipy.special import eval_jacobi, roots_jacobi
 
 from contacts import Hertz, KelvinVoigt, Viscoelastic
 from solvers.compiled import decorators, dop853_tableau
-from solvers.compiled.packed import Layout, Packed, PackedTemplate, unpacker
+from solvers.compiled.packed import Layout, Packed, PackedTemplate, aligned, unpacker
 from solvers.compiled.simd import bit_pattern, load8, positive8, splat8, sqrt8, store8, sum8
 from solvers.compiled.sums import combine, padded
 from solvers.exponential.contact.nodes import LOCAL, S, gauss_jacobi, node_sets_of, series_of
@@ -127,6 +127,17 @@ def test_attributes_of_packed_arguments_are_those_of_the_tuple():
 def test_what_does_not_fit_the_declared_kind_is_refused_by_name(name, value):
     with pytest.raises(TypeError, match=f"{name} must be a contiguous"):
         Packed.of(things()._replace(**{name: value}), KIND)
+
+
+def test_aligned_arrays_begin_at_lines_of_the_cache_and_are_equal():
+    one = things()._replace(vector=np.arange(9.0)[1:6])
+    found = aligned(one)
+    for before, after in zip(one, found, strict=True):
+        np.testing.assert_array_equal(after, before)
+    for array in (found.vector, found.cube, found.count):
+        assert array.ctypes.data % 64 == 0
+    found.vector[0] = -1.0
+    assert one.vector[0] == 1.0
 
 
 def test_copies_of_a_template_have_own_arrays_and_share_the_rest():

@@ -15,6 +15,7 @@ from fembeam import cli
 from fembeam.study.settling.basins import _Known, _labels, _settled
 from fembeam.study.settling.plane import axis_of, starts_of
 from solvers import Contact, Exponential, SolverError, Status, System, integrate, integrate_many
+from solvers.many import _shared_out
 
 LAWS = Hysteretic.lankarani_nikravesh(1e7, 0.6), PiecewiseLinear([1e5, 4e5], [2e-4]), KelvinVoigt(3e5, 20.0), Hertz(2e7)
 
@@ -148,6 +149,16 @@ def test_results_do_not_depend_on_threads_order_or_company():
 def broken(delta, delta_dot, entry_rate, limit):
     """A linear force that is not a number beyond a limit."""
     return 1e6 * delta if delta < limit else math.nan
+
+
+@pytest.mark.parametrize(("count", "threads"), [(1, 1), (5, 3), (300, 1), (1200, 2), (160_000, 7)])
+def test_threads_end_together_with_short_stretches(count, threads):
+    """What one thread may still have to do when the others find nothing left is the last stretches only."""
+    stretches = _shared_out(count, threads)
+    assert [i for first, beyond in stretches for i in range(first, beyond)] == list(range(count))
+    for i, (first, beyond) in enumerate(stretches):
+        assert beyond - first <= max(1, math.ceil((count - first) / (2 * threads)))
+        assert i == 0 or beyond - first <= np.diff(stretches[i - 1])
 
 
 def test_a_run_that_fails_is_named_and_keeps_the_others():

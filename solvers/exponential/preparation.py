@@ -9,7 +9,7 @@ import numpy as np
 from numba import types
 
 from solvers.compiled.kernels import INTEGERS, MATRIX, PROBLEM, REAL, VECTOR, Problem
-from solvers.compiled.packed import Layout, Packed, PackedTemplate
+from solvers.compiled.packed import Layout, Packed, PackedTemplate, aligned
 from solvers.compiled.parts import BORDERS, ENERGY, MANY_STOPS, TWO_STOPS, load
 from solvers.compiled.state import STATE, State, begin_state, most_borders, problem_of, state_shapes
 from solvers.compiled.sums import padded
@@ -32,7 +32,7 @@ TABLES = types.NamedTuple(
     [
         *_arrays(1, 3, 5, 2, 4, 2, 3, 3, 2, 3, 2, 2, 2, 2, 0, 0, 2, 1, 2),
         *(*_arrays(1, 3, 1, 1, 2, 2, 2, 2, 3, 3, 3, 4, 3), INTEGERS, INTEGERS),
-        *_arrays(5, 6, 5, 5, 5, 5, 3, 2, 2, 2, 2, 2, 4),
+        *_arrays(5, 6, 5, 5, 5, 5, 3, 2, 2, 2, 2, 2, 2, 4),
         *(VECTOR, INTEGERS, INTEGERS, MATRIX),
     ],
     Tables,
@@ -185,7 +185,7 @@ class _SharedTables:
         self.layout = _layout(*sizes, POOL if tables.node_propagator.size else 0)
         self.kept = Memo()
         self.problem = PackedTemplate(problem, PROBLEM, ("gap", "k", "read", "read_rate", "power"))
-        self.tables = PackedTemplate(tables, TABLES, TONE_TABLES)
+        self.tables = PackedTemplate(aligned(tables), TABLES, TONE_TABLES)
 
     @property
     def nbytes(self) -> int:
@@ -208,7 +208,7 @@ class _SharedTables:
         p, v = columns[self.places[0]].transpose(1, 0, 2)
         rate = _of_tones(problem.value.read_rate, n)
         rate[:, 0], rate[:, 1] = -v * problem.value.k[n:], p
-        tables.value.power_rows[:] = problem.value.power
+        tables.value.power_rows[:], tables.value.steady_rate[:, :n] = problem.value.power, steady[n:].T
         fill_tones(tables.value, problem.value, self.tones, self.series)
         rest = among_tones(-response.real.sum(axis=0), self.tones)
         rest[n : n + self.tones] = 1.0

@@ -29,6 +29,7 @@ from solvers.exponential.energy.flight_balance import (
     account_output,
     account_state,
     account_step,
+    book,
     copy_split,
     fly_within,
     start_account,
@@ -98,8 +99,8 @@ def _target(tables, t, first, second, t_end):
 
 
 @inner
-def _sample(problem, tables, energy_tables, state, scratch, x, t, out, due):
-    """Write the outputs that are due within the step that began at t with the blocks' p and v in x, which is moved.
+def _sample(problem, tables, energy_tables, state, scratch, t, out, due):
+    """Write the outputs due within the step that began at t with the blocks' p and v in x = split_state[2], moved on.
 
     With sampled signals the balance of the state is that at t, and goes with x; else it follows from the mark.
     """
@@ -108,8 +109,8 @@ def _sample(problem, tables, energy_tables, state, scratch, x, t, out, due):
     while due[state.count[SAMPLED]] < state.now[T]:
         wanted, row = due[state.count[SAMPLED]], out[state.count[SAMPLED]]
         copy(before[size:], row[size:], state.x.size - size)
-        fly_within(problem, tables, scratch, x, t, wanted - t, accounted, energy_tables, row)
-        join(problem, x, row)
+        fly_within(problem, tables, scratch, 2, t, wanted - t, accounted, energy_tables, row)
+        join(problem, scratch.split_state[2], row)
         if accounted:
             before = row
         elif with_energy:
@@ -186,10 +187,11 @@ def _cross_cells(problem, tables, energy_tables, state, scratch, t_end, most, ou
             if due[state.count[SAMPLED]] < cell * h:
                 now[T] = min(cell * h, t_end)
                 copy_split(x[at], x[2])
-                _sample(problem, tables, energy_tables, state, scratch, x[2], (cell - 1) * h, out, due)
+                _sample(problem, tables, energy_tables, state, scratch, (cell - 1) * h, out, due)
             if with_energy:
                 whole, begin_of_cell = tables.flight_step.size, (cell - 1) * h
-                account_step(problem, tables, energy_tables, scratch, whole, begin_of_cell, x[at], state.x)
+                exchanged = account_step(problem, tables, energy_tables, scratch, whole, begin_of_cell, at)
+                book(problem, state.x, exchanged)
             at = 1 - at
         if cell > begin:
             join(problem, x[at], state.x)
@@ -293,7 +295,7 @@ def fly(problem, tables, energy_tables, state, scratch, t_end, budget, out, due)
         state.count[STEPS] += 1
         count += 1
         if first < now[T]:
-            _sample(problem, tables, energy_tables, state, scratch, scratch.split_state[2], begin, out, due)
+            _sample(problem, tables, energy_tables, state, scratch, begin, out, due)
         if with_energy and sampled and cell_of(problem, now[T])[0] != cell:
             account_state(problem, tables, energy_tables, state, scratch)
         if stop >= 0:

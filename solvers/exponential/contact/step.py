@@ -183,7 +183,7 @@ def _accept(problem, tables, energy_tables, state, scratch, node_set, level, wan
         if state.segment[s] > 0:
             copy(scratch.force[s], scratch.previous[s], S)
     if energy_tables.active > 0.0:
-        account_contact(problem, tables, energy_tables, state, scratch, node_set, level, h, state.x)
+        account_contact(problem, tables, energy_tables, state, scratch, node_set, level, h)
     if state.event_record.shape[0]:
         record_forces(problem, state, scratch, STEP, end, node_set, level)
     finish_step(problem, tables, state, scratch, node_set, level)

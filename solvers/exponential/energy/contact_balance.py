@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from numba import types
 
-from solvers.compiled.kernels import REAL, VECTOR, copy, inlined, inner, merged, reordered
+from solvers.compiled.kernels import REAL, copy, inlined, inner, merged, reordered
 from solvers.compiled.parts import ACCOUNT_CONTACT, part
 from solvers.compiled.simd import load8, splat8, store8, sum8
 from solvers.compiled.sums import combine
@@ -21,15 +21,15 @@ from solvers.exponential.energy.quadrature import state_within
 _UNSEEN = 10.0  # times what a polynomial leaves out: aliases of fast blocks need not look like the end of a series
 
 
-@part(ACCOUNT_CONTACT, types.void, types.int64, types.int64, REAL, VECTOR)
-def account_contact(problem, tables, energy_tables, state, scratch, node_set, level, h, row):
-    """Add to the ledger of ``row`` what loads and damping do over the contact step of length h just found."""
+@part(ACCOUNT_CONTACT, types.void, types.int64, types.int64, REAL)
+def account_contact(problem, tables, energy_tables, state, scratch, node_set, level, h):
+    """Add to the state's balance what loads and damping do over the contact step of length h just found."""
     if level >= energy_tables.first and h <= energy_tables.longest[energy_tables.kind[node_set]]:
         place = level - int(energy_tables.first)
         if energy_tables.sums.shape[0]:
-            _account_sums(problem, tables, energy_tables, state, scratch, node_set, place, h, row)
+            _account_sums(problem, tables, energy_tables, state, scratch, node_set, place, h)
         else:
-            _account_nodes(problem, tables, energy_tables, state, scratch, node_set, place, h, row)
+            _account_nodes(problem, tables, energy_tables, state, scratch, node_set, place, h)
         return
     x, size = scratch.stages[WITHIN], 2 * problem.k.size
     copy(state.x, x, state.x.size)
@@ -37,9 +37,9 @@ def account_contact(problem, tables, energy_tables, state, scratch, node_set, le
     for s in range(problem.gap.size):
         if state.segment[s] > 0:
             _add_unseen(
-                tables, scratch, node_set, h, s, x[size + 2 + 2 * s] - state.x[size + 2 + 2 * s], row[size + 2 :]
+                tables, scratch, node_set, h, s, x[size + 2 + 2 * s] - state.x[size + 2 + 2 * s], state.x[size + 2 :]
             )
-    copy(x[size:], row[size:], 2)
+    copy(x[size:], state.x[size:], 2)
 
 
 @inner
@@ -68,7 +68,7 @@ def _free_loss(plain, x, n):
 
 
 @merged
-def _account_sums(problem, tables, energy_tables, state, scratch, node_set, place, h, row):
+def _account_sums(problem, tables, energy_tables, state, scratch, node_set, place, h):
     """The same by the forms that are summed over the blocks, for a whole step."""
     size, stops, heads = 2 * problem.k.size, problem.gap.size, energy_tables.head
     y, sums, tones = scratch.energy_sums[0], scratch.energy_sums[1], problem.k.size - int(tables.own_blocks)
@@ -85,14 +85,14 @@ def _account_sums(problem, tables, energy_tables, state, scratch, node_set, plac
         if heads[i] >= stops:
             gains += works
         elif state.segment[heads[i]] > 0 and not _enters(tables, node_set, heads[i]):
-            _add_unseen(tables, scratch, node_set, h, heads[i], sum8(works), row[size + 2 :])
+            _add_unseen(tables, scratch, node_set, h, heads[i], sum8(works), state.x[size + 2 :])
     gain, loss = sum8(gains), sum8(losses)
     loss += _free_loss(energy_tables.free_loss[energy_tables.kind[node_set], place], state.x, problem.k.size)
     of_tones = sums[2 * S * heads.size :]
     for k in range(2 * tones):
         value = state.x[int(tables.own_blocks) + (k if k < tones else k + problem.k.size - tones)]
         loss, gain = loss + value * of_tones[k], gain + value * of_tones[2 * tones + k]
-    row[size], row[size + 1] = row[size] + gain, row[size + 1] + loss
+    state.x[size], state.x[size + 1] = state.x[size] + gain, state.x[size + 1] + loss
 
 
 @merged
@@ -154,7 +154,7 @@ def _enters(tables, node_set, u):
 
 
 @merged
-def _account_nodes(problem, tables, energy_tables, state, scratch, node_set, place, h, row):
+def _account_nodes(problem, tables, energy_tables, state, scratch, node_set, place, h):
     """The same by the tables, for a whole step."""
     n, size, kind, weights = (
         int(tables.own_blocks),
@@ -186,11 +186,11 @@ def _account_nodes(problem, tables, energy_tables, state, scratch, node_set, pla
             steady = _of_tones(tables.loss_rows[b], scratch, n, size)
             losses += splat8(2.0 * tables.loss_rows[b, size + b]) * steady * moments
             losses += splat8(h) * weights * steady * steady
-    row[2 * size] += gain + sum8(gains)
-    row[2 * size + 1] += loss + sum8(losses)
+    state.x[2 * size] += gain + sum8(gains)
+    state.x[2 * size + 1] += loss + sum8(losses)
     for s in range(problem.gap.size):
         if state.segment[s] > 0 and not _enters(tables, node_set, s):
             combine(scratch.along, problem.read_rate[s, size:], n, None, scratch.trial)
             steady = splat8(h) * weights * _of_tones(problem.read_rate[s], scratch, n, size)
             work = sum8(load8(scratch.force[s], 0) * (load8(scratch.trial, 0) + steady))
-            _add_unseen(tables, scratch, node_set, h, s, work, row[2 * size + 2 :])
+            _add_unseen(tables, scratch, node_set, h, s, work, state.x[2 * size + 2 :])

@@ -20,7 +20,7 @@ import numpy as np
 from numba import types
 
 from solvers.compiled.kernels import INTEGERS, MATRIX, REAL, VECTOR, Problem
-from solvers.compiled.packed import Packed
+from solvers.compiled.packed import Packed, aligned
 from solvers.compiled.sums import padded
 from solvers.exponential.contact.nodes import S, gauss
 from solvers.exponential.energy.contact_sums import Steps, Sums, free_loss, tones_at_nodes
@@ -111,7 +111,7 @@ def energy_tables_for(problem: Problem, tables: Tables, spacing: float) -> Packe
     size, signals = 2 * len(problem.k), len(problem.table_dt)
     if (len(tables.flight_step) + 1) * (len(driver) + 6 * signals) * 2 * padded(size) <= _MOST_NUMBERS:
         energy_tables = _flight_part(energy_tables, problem, tables, driver, spacing)
-    return Packed.of(energy_tables, ENERGY_TABLES)
+    return Packed.of(aligned(energy_tables), ENERGY_TABLES)
 
 
 def _coupled(tables: Tables) -> bool:
