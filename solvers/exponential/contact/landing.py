@@ -9,7 +9,8 @@ It is a step of DOP853 with t among the unknowns, in a variable in which the mot
 The unknowns are [p, v, energy balance, t, u]. The fastest block moves by less than `landing_reach` radians, within
 which the step of every block is exact to the tolerance. The error by the forces is estimated by a tenth of the embedded
 fifth-order difference, for every stop in units of its own tolerance: in these variables this is a few times the true
-error, while DOP853's own mixed estimate is below it.
+error, while DOP853's own mixed estimate is below it. All of it counts where the stop's dashpot is too strong for an
+explicit step. A landing stays within a cell of sampled signals, whose kinks the difference does not see.
 """
 
 from __future__ import annotations
@@ -43,7 +44,8 @@ from solvers.exponential.contact.peaks import state_peaks
 _MOST_TRIES = 8  # to find the step that ends at an output time, or on a bend
 _PART = 0.1  # of the embedded difference that counts as the error
 _PART_OF_FOURTH = 1e-2  # with u = δ^{1/4}: terms t² = u⁸ are exact in the step, and all of the difference
-_LAST, _MOST = 0.2, 0.4  # indentation / (deepest × reach²) from which the last step is tried, and / deepest at most
+_LAST = 0.09  # indentation, in units of the deepest, from which the last step is tried
+_LAST_ROOT, _MOST_ROOT = 0.2, 0.25  # the same of u = δ^{1/2}, / reach², and at most: its error grows like u⁹
 
 
 def landing_reach(rtol: float) -> float:
@@ -191,17 +193,19 @@ def land(problem, tables, state, scratch, stop, direction, near, rtol, t_end, ou
     rate = dot(problem.read_rate[stop], state.x, 2 * problem.k.size)
     if near > furthest or abs(rate) <= rate_tolerance(problem, stop, state.x):
         return -1
-    last = min(_LAST * scratch.landing_reach[0] ** 2, _MOST)  # the error grows like (δ/deepest)^{9/2}
+    last, kappa = _LAST, tables.time_exponent[1 + stop]
+    if kappa == 2.0:
+        last = min(_LAST_ROOT * scratch.landing_reach[0] ** 2, _MOST_ROOT)
     if leaving and delta > last * state.active[stop, PEAK_DELTA]:
         return -1
     if not leaving and state.segment[stop] > 0 and abs(level - delta) > 0.2 * max(level, delta):
         return -1
     start_landing(problem, tables, state, scratch, stop)
     w, x = scratch.stages[START], scratch.stages[LANDED]
-    variable = ROOT if leaving and tables.time_exponent[1 + stop] > 1.0 else INDENTATION
+    variable = ROOT if leaving and kappa > 1.0 else INDENTATION
     span = -w[size + 1] if variable == ROOT else level - delta
     _step(problem, tables, state, scratch, variable, stop, span, with_energy)
-    landed, part = x[size], _PART_OF_FOURTH if variable == ROOT and tables.time_exponent[1 + stop] == 4.0 else _PART
+    landed, part = x[size], _PART_OF_FOURTH if variable == ROOT and kappa == 4.0 else _PART
     if scratch.viscous[stop] > 0.0:  # too strong a dashpot for an explicit step
         part = 1.0
     width = surface_tolerance(problem, stop, state.x) / abs(rate)  # a distance may be that much rounding
