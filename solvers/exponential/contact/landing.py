@@ -44,6 +44,7 @@ from solvers.exponential.contact.peaks import state_peaks
 _MOST_TRIES = 8  # to find the step that ends at an output time, or on a bend
 _PART = 0.1  # of the embedded difference that counts as the error
 _PART_OF_FOURTH = 1e-2  # with u = δ^{1/4}: terms t² = u⁸ are exact in the step, and all of the difference
+_OF_SLOPES, _MOST_SLOPE = 0.01, 1e4  # the derivative of a run may err by a hundred tolerances of the motion
 _LAST = 0.09  # indentation, in units of the deepest, from which the last step is tried
 _LAST_ROOT, _MOST_ROOT = 0.2, 0.25  # the same of u = δ^{1/2}, / reach², and at most: its error grows like u⁹
 
@@ -181,6 +182,20 @@ def _furthest(problem, tables, scratch):
 
 
 @merged
+def _slopes_by_forces(problem, tables, state, stop, w, x):
+    """Error of the derivative by that of the motion: a force like δ^{3/2} that errs by e has a slope that errs by e/δ.
+
+    With derivatives in units of the largest motion of a stop's place, another stop counts that was entered just now.
+    """
+    most = 0.0
+    for s in range(problem.gap.size):
+        if s != stop and state.segment[s] > 0 and tables.time_exponent[1 + s] > 1.0:
+            deepest = max(indentation(problem, s, w), indentation(problem, s, x))
+            most = max(most, abs_dot(problem.read[s], w, 2 * problem.k.size) / max(deepest, 1e-300))
+    return min(most, _MOST_SLOPE)
+
+
+@merged
 def land(problem, tables, state, scratch, stop, direction, near, rtol, t_end, out, due, with_energy):
     """Try to land on a border of ``stop``, about ``near`` s ahead.
 
@@ -208,6 +223,8 @@ def land(problem, tables, state, scratch, stop, direction, near, rtol, t_end, ou
     landed, part = x[size], _PART_OF_FOURTH if variable == ROOT and kappa == 4.0 else _PART
     if scratch.viscous[stop] > 0.0:  # too strong a dashpot for an explicit step
         part = 1.0
+    if state.event_record.shape[0]:
+        part = max(part, _OF_SLOPES * _slopes_by_forces(problem, tables, state, stop, w, x))
     width = surface_tolerance(problem, stop, state.x) / abs(rate)  # a distance may be that much rounding
     if not t <= landed <= t + min(4.0 * near, furthest) + width:
         return -1
