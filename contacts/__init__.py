@@ -6,8 +6,8 @@ The force acts while ``delta > 0`` and is positive when it pushes the bodies apa
 `ElastoPlastic`, `BoucWen`, `WaltonBraun`, and with `memory_law` one's own (`contacts.memory`). Laws add: ``a + b``.
 
 `law` holds what every law offers, `kernels` and `sum_kernels` the forces as compiled functions; `restitution` bounces a
-free mass off a law, `path` leads one along given indentations, `contacts.identification` finds laws from measurements.
-Imports: numpy, scipy, numba. Begin with `law`, then `power_laws`.
+free mass off a law, `path` evaluates one along given indentations, `contacts.identification` finds laws from
+measurements. Imports: numpy, scipy, numba. Begin with `law`, then `power_laws`.
 """
 
 from contacts.curves import PiecewiseLinear, Tabulated

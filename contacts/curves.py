@@ -1,7 +1,7 @@
 """Laws given by a curve: piecewise linear, and a table of measured forces.
 
 A clearance belongs to the stop (its ``gap``), and so does a preload (a negative ``gap``: the stop is compressed at
-rest). A stop acts on one side; what moves between two sides has two stops, one below and one above, each with its law.
+rest). A stop acts on one side; a body that moves between two sides has two stops, one below and one above.
 """
 
 from __future__ import annotations
@@ -122,7 +122,7 @@ class Tabulated(Law):
     Notes
     -----
     Between points the force is monotone and its slope continuous; the curvature jumps at the points, so integrators
-    locate each. Thin a dense table out before: every point costs two located events per contact.
+    locate each. Thin out a dense table first: every point costs two located events per contact.
 
     References
     ----------

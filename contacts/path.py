@@ -1,4 +1,4 @@
-"""A law led along a given path of δ, slowly: exact between borders, which are found to rounding.
+"""Quasi-static force of a law along a given path of δ: exact between borders, which are found to rounding.
 
 The rate enters by its sign alone, so that dashpots give nothing. A path is cut into runs at its turning points
 and runs into stretches at the borders: all borders that are below zero, and stay so, are renewed together.

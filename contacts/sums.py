@@ -92,7 +92,7 @@ class Sum(Law):
 
     @property
     def one_sided(self) -> bool:  # type: ignore[override]
-        """Whether any part is; with memory, whether all that remember are."""
+        """Whether any part is; of laws with memory, whether all of these are."""
         remembering = [part.one_sided for part in self.parts if part.memory]
         return all(remembering) if remembering else any(part.one_sided for part in self.parts)
 

@@ -79,7 +79,8 @@ def integrate(
     method : `Exponential`, `DormandPrince`, `HenonRK2`, `RK4`, `CentralDifference`, `Newmark` or `GeneralizedAlpha`;
         None takes ``Exponential(rtol=1e-8)``.
     tangent : True adds the derivative of the final [q, q̇] with respect to [q0, q_dot0], (2n, 2n), to the solution; a
-        `Parameter` adds one more column, with respect to that parameter at fixed duration. `Exponential` only.
+        `Parameter` adds one more column, with respect to that parameter at fixed duration. `Exponential` only. Of laws
+        like δ^{3/2} it may err by some hundred rtol in units of the largest motion: slopes are less smooth than forces.
     progress : called with the simulated time now and then.
     check : raise when the run fails; False returns the partial solution with its status instead.
     memory : what the laws have latched at the start, one entry per contact as `Solution.memory` has it, None for what

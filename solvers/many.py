@@ -1,6 +1,6 @@
 """Many starts of one system at once: checked, shared out among threads, collected in arrays.
 
-A start counts as one piece of work: its numbers do not depend on the others, on their order, or on the threads.
+The results of a start do not depend on the other starts, on their order, or on the threads.
 """
 
 from __future__ import annotations

@@ -58,7 +58,7 @@ def test_tones_are_the_signal(signal, order):
     np.testing.assert_allclose(summed(omega, amplitude, t), signal.derivative(order)(t), atol=1e-13 * scale)
     first = signal.tones()
     np.testing.assert_allclose(summed(*first, t, order), signal.derivative(order)(t), atol=1e-13 * scale)
-    assert signal.lasting(1e9) is signal
+    assert signal.for_duration(1e9) is signal
 
 
 def test_multisine_is_a_value_and_leaves_the_arrays_alone():
@@ -166,7 +166,7 @@ def test_long_sums_are_chunked_without_a_seam():
 
 @pytest.mark.parametrize("order", [0, 2])
 def test_many_equal_steps_are_summed_as_any_instants_are(order):
-    signal = BandNoise(1e-3, (100.0, 1000.0), seed=4).lasting(60.0)
+    signal = BandNoise(1e-3, (100.0, 1000.0), seed=4).for_duration(60.0)
     signal = signal.derivative(order) if order else signal
     mixed = np.random.default_rng(1).permutation(20001)
     for t in (1.7 + 2e-3 * np.arange(20001), np.linspace(50.0, 0.0, 20001)):
@@ -247,7 +247,7 @@ def test_the_grid_does_not_depend_on_the_phases():
 
 
 def test_nodes_of_a_long_run_are_lean():
-    noise = BandNoise(1e-3, BROAD, seed=1).derivative(2).lasting(600.0)
+    noise = BandNoise(1e-3, BROAD, seed=1).derivative(2).for_duration(600.0)
     dt, values = noise.nodes(600.0, 1e-6)
     assert values.nbytes < 4e7
     t = np.array([0.1, 299.97, 599.9])
@@ -267,23 +267,23 @@ def test_an_automatic_period_can_be_lengthened():
     noise = BandNoise(1e-3, BROAD, seed=6)
     assert noise.period == pytest.approx(4096 * 2 * np.pi / 1226.6)
     assert noise.omega.size == 4096
-    assert noise.lasting(10.0) is noise
-    longer = noise.lasting(50.0)
+    assert noise.for_duration(10.0) is noise
+    longer = noise.for_duration(50.0)
     assert longer.period == 50.0
     assert longer.rms == pytest.approx(1e-3, rel=1e-12)
-    assert noise.derivative(2).lasting(50.0) == longer.derivative(2)
-    assert dataclasses.replace(noise, seed=9).lasting(50.0).period == 50.0
+    assert noise.derivative(2).for_duration(50.0) == longer.derivative(2)
+    assert dataclasses.replace(noise, seed=9).for_duration(50.0).period == 50.0
     assert dataclasses.replace(noise, band=NARROW).omega.size == 4096
 
 
 def test_a_period_asked_for_is_kept():
     noise = BandNoise(1e-3, BROAD, seed=6, period=30.0)
-    assert noise.lasting(30.0) is noise
-    for call in (lambda: noise.lasting(31.0), lambda: noise.nodes(31.0, 1e-6)):
+    assert noise.for_duration(30.0) is noise
+    for call in (lambda: noise.for_duration(31.0), lambda: noise.nodes(31.0, 1e-6)):
         with pytest.raises(ValueError, match=r"would repeat after its period of 30 s, got a duration of 31 s"):
             call()
     with pytest.raises(ValueError, match="would repeat after its period of 50 s"):
-        BandNoise(1e-3, BROAD).lasting(50.0).lasting(60.0)
+        BandNoise(1e-3, BROAD).for_duration(50.0).for_duration(60.0)
 
 
 def test_repr_makes_the_same_signal():
@@ -339,7 +339,7 @@ def test_a_mean_is_added_and_has_no_derivative(psd):
     assert np.array_equal(moved.derivative(2)(t), plain.derivative(2)(t))
     assert np.array_equal(moved.derivative(1).nodes(1.0, 1e-8)[1], plain.derivative(1).nodes(1.0, 1e-8)[1])
     assert moved.rms == plain.rms
-    assert moved.lasting(1000.0).mean == -2.0
+    assert moved.for_duration(1000.0).mean == -2.0
 
 
 def test_a_table_is_its_interpolant():
@@ -357,7 +357,7 @@ def test_a_constant_density_is_flat_noise():
     flat = BandNoise(1e-3, NARROW, seed=2)
     same = BandNoise.of_psd(lambda w: float(flat.psd_at(200.0)), NARROW, seed=2)
     np.testing.assert_allclose(same.amplitude, flat.amplitude, rtol=1e-12)
-    assert same.lasting(1000.0).std == pytest.approx(1e-3, rel=1e-3)
+    assert same.for_duration(1000.0).std == pytest.approx(1e-3, rel=1e-3)
     assert dataclasses.replace(same, seed=3).std == same.std
 
 
@@ -620,7 +620,7 @@ def times(**changed):
         ),
         (lambda: Record(times(), np.ones(10), kind="jerk"), "'acceleration' or 'force', got 'jerk'"),
         (
-            lambda: Record(times(), np.ones(10)).lasting(1.0),
+            lambda: Record(times(), np.ones(10)).for_duration(1.0),
             "Record is 0.9 s long and shorter than the duration of 1 s",
         ),
         (lambda: Record(times(), np.ones(10)).nodes(1.0, 1e-6), "Record is 0.9 s long and shorter"),

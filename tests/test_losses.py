@@ -85,6 +85,68 @@ def test_a_slip_that_lasts_a_whole_run_counts(method):
 
 
 @METHODS
+@pytest.mark.parametrize("kind", ["kept", "forgotten"])
+def test_a_slider_beside_a_yielding_stop(kind, method):
+    """What each takes alone, also while the stop is open."""
+    stop, slider = WaltonBraun(1e4, 4e4, kind), Iwan([2e4, 1e4], [4.0, 9.0])
+    for part in (0.1, 0.4, 0.9):
+        both, other, one, two = swing([stop + slider, slider + stop, stop, slider], part, method).losses.loss
+        assert both == pytest.approx(one + two, rel=1e-8)
+        assert other == pytest.approx(both, rel=1e-10)
+    taken = swing([slider + stop, slider], 0.9, method).losses.slip
+    assert taken[0] == pytest.approx(taken[1], rel=1e-12)
+
+
+def spring(delta, delta_dot, way, slider, stiffness, limit):
+    return stiffness * (delta - slider)
+
+
+def left_up(delta, delta_dot, way, slider, stiffness, limit):
+    return limit - stiffness * (delta - slider)
+
+
+def left_down(delta, delta_dot, way, slider, stiffness, limit):
+    return limit + stiffness * (delta - slider)
+
+
+def up(delta, delta_dot, way, slider, stiffness, limit):
+    return 1.0, slider
+
+
+def down(delta, delta_dot, way, slider, stiffness, limit):
+    return -1.0, slider
+
+
+def drag(delta, delta_dot, way, slider, stiffness, limit):
+    return way * limit
+
+
+def onwards(delta, delta_dot, way, slider, stiffness, limit):
+    return way * delta_dot
+
+
+def hold(delta, delta_dot, way, slider, stiffness, limit):
+    return 0.0, delta - way * limit / stiffness
+
+
+def own_slider(slip):
+    """Jenkins' element with a border for each direction; its second segment by name."""
+    stick = Segment(spring, (Border(left_up, slip, up), Border(left_down, slip, down)))
+    segments = {"stick": stick, slip: Segment(drag, Border(onwards, "stick", hold))}
+    return memory_law("own slider", segments, {"way": 0.0, "slider": 0.0}, reach=2e-3)(stiffness=2e4, limit=10.0)
+
+
+@METHODS
+def test_slip_of_a_law_of_ones_own(method):
+    """That of the built-in law whichever border a slip begins at; none of a law without a segment of this name."""
+    slider, stop = Jenkins(2e4, 10.0), WaltonBraun(1e4, 4e4)
+    laws = [slider, own_slider("slip"), stop + own_slider("slip"), own_slider("creep")]
+    for part in (0.3, 0.9, 2.2):
+        slip = swing(laws, part, method).losses.slip
+        np.testing.assert_allclose(slip[1:], [slip[0], slip[0], 0.0], rtol=1e-9)
+
+
+@METHODS
 def test_losses_wherever_the_run_ends(method):
     """Less what is stored then; smooth hysteresis along the same path."""
     wen, slider = BoucWen(2e4, 0.1, 1.0, 900.0, 300.0), Jenkins(2e4, 10.0)

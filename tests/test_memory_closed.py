@@ -250,6 +250,20 @@ def test_a_pull_is_no_peak_force_of_a_yielding_stop():
     np.testing.assert_allclose(log.peak_force, exact.peak_force, rtol=1e-5)
 
 
+@pytest.mark.parametrize("rate", [-0.5, 0.5])
+@pytest.mark.parametrize("method", [FINE, DormandPrince(1e-12)], ids=["main", "stepping"])
+def test_smooth_hysteresis_begun_beyond_its_zero(method, rate):
+    """z' = A - (β sgn z + γ)|z| from z₀ < 0: e^(γ₋y) to zero at y₀, 1 - e^(-γ₊(y - y₀)) beyond; F is continuous."""
+    law, beta, gamma, before = BoucWen(1.0, 0.26, 1.0, 0.9, 0.4), 0.9, 0.4, -0.3
+    zero = -math.log1p((gamma - beta) * before) / (gamma - beta)  # y at z = 0
+    z = (1.0 - math.exp(-(beta + gamma) * (1.0 - zero))) / (beta + gamma)
+    begun = [integrate(oscillator(law), [1.0], [rate], 2.0, method=method, memory=[latched])
+             for latched in ([0.0, 0.0, before], [math.copysign(1.0, rate), 1.0, z])]  # fmt: skip
+    assert begun[0].transitions.force[0] == pytest.approx(0.26 + 0.74 * z, rel=1e-12)
+    assert begun[0].q[-1, 0] == pytest.approx(begun[1].q[-1, 0], abs=1e-9)
+    assert begun[0].losses.loss[0] == pytest.approx(begun[1].losses.loss[0], abs=1e-9)
+
+
 # --- tangents --------------------------------------------------------------------------------------------------------
 
 

@@ -253,7 +253,7 @@ def interrupted(model, monkeypatch):
     def fake_bar(duration, wanted):
         yield report
 
-    monkeypatch.setattr("fembeam.support.bar", fake_bar)
+    monkeypatch.setattr("fembeam.model.model.bar", fake_bar)
     return model.simulate(1000.0, 1e-3, solver=solvers.HenonRK2(2e-5, 2e-6))
 
 
@@ -348,16 +348,40 @@ def test_files_of_earlier_versions_are_read(run, tmp_path):
     with np.load(run.save(tmp_path / "run.npz")) as data:
         arrays = {key: data[key] for key in data.files}
     arrays["contact_floored"] = arrays.pop("contact_entry_rate_clipped")
+    arrays["strikers"], arrays["striker_places"] = arrays.pop("impactor_masses"), arrays.pop("impactor_places")
     np.savez(tmp_path / "run.npz", **arrays)
     again = fb.load(tmp_path / "run.npz")
     assert np.array_equal(again.contacts.entry_rate_clipped, run.contacts.entry_rate_clipped)
+    assert np.array_equal(again.impactor_masses, run.impactor_masses)
+    assert np.array_equal(again.readout.impactor_places, run.readout.impactor_places)
 
 
 def test_old_names_work_and_name_the_new(run):
     with pytest.warns(DeprecationWarning, match="entry_rate_clipped"):
         assert run.contacts.floored is run.contacts.entry_rate_clipped
-    with pytest.warns(DeprecationWarning, match="contact_rows"):
+    with pytest.warns(DeprecationWarning, match=r"Model\.touches is now Model\.contact_rows"):
         assert run.model.touches is run.model.contact_rows
+    with pytest.warns(DeprecationWarning, match=r"Run\.strikers is now Run\.impactor_masses"):
+        assert run.strikers is run.impactor_masses
+    with pytest.warns(DeprecationWarning, match=r"Readout\.striker_places is now Readout\.impactor_places"):
+        assert run.readout.striker_places is run.readout.impactor_places
+    with pytest.warns(DeprecationWarning, match=r"Model\.way is now Model\.reduction_options"):
+        assert run.model.way is run.model.reduction_options
+    with pytest.warns(DeprecationWarning, match=r"Model\.lasting is now Model\.for_duration"):
+        assert run.model.lasting(1.0) is run.model
+
+
+@pytest.mark.parametrize(
+    "signal",
+    [
+        *(fb.Harmonic(1.0, 2.0), fb.Pulse(1.0, 1.0), fb.SineSweep(1.0, 1.0, 2.0, 9.0)),
+        *(fb.BandNoise(1.0, (1.0, 9.0), period=50.0), fb.Record(np.arange(9.0), np.zeros(9))),
+    ],
+)
+def test_lasting_of_signals_works_and_names_for_duration(signal):
+    for one in (signal, signal.derivative(1)):
+        with pytest.warns(DeprecationWarning, match=r"\.lasting is now \w+\.for_duration"):
+            assert one.lasting(1.0) is one.for_duration(1.0)
 
 
 @pytest.mark.parametrize(
@@ -374,7 +398,7 @@ def test_old_names_work_and_name_the_new(run):
         ("stops", lambda s: np.vstack([s, s]), "force must have shape"),
         ("stops", lambda s: s * np.nan, "stops must be finite"),
         ("directions", lambda w: w[:, :1], "directions must have shape"),
-        ("strikers", lambda m: np.ones(9), "strikers must have shape"),
+        ("impactor_masses", lambda m: np.ones(9), "impactor_masses must have shape"),
         ("nodes", lambda z: z[1:], "shapes must have shape"),
         ("nodes", lambda z: z[::-1], "nodes must be finite and increase"),
         ("contact_stop", lambda s: s + 1, "contact_stop must hold numbers of stops, 0 to 0"),

@@ -166,8 +166,8 @@ def test_a_law_of_segments_alone():
 
 
 def test_segments_may_be_passed_at_one_place():
-    segments = {f"s{i}": Segment(soft, Border(below, f"s{i + 1}")) for i in range(12)}
-    law = memory_law("row", {**segments, "s12": Segment(hard, Border(above, "s0"))})(k=1e3)
+    segments = {f"s{i}": Segment(soft, Border(below, f"s{i + 1}")) for i in range(6)}
+    law = memory_law("row", {**segments, "s6": Segment(hard, Border(above, "s0"))})(k=1e3)
     np.testing.assert_allclose(law.along([-1.0, 1.0, -0.5]), [-1e3, 3e3, -500.0], rtol=1e-14)
 
 

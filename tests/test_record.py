@@ -96,7 +96,7 @@ def test_padding_lets_a_run_outlast_its_record(interpolation):
     run = scene.reduce(modes=1).simulate(5.5, 1e-3)
     assert run.complete
     with pytest.raises(ValueError, match=r"Record is 3\.99 s long .* or give padding"):
-        replace(record, padding=0.0).lasting(5.5)
+        replace(record, padding=0.0).for_duration(5.5)
     with pytest.warns(UserWarning, match="padding with zeros lets it jump"):
         fb.Record(TIMES, QUAKE + 1.0, quantity="acceleration", padding=1.0)
 

@@ -69,7 +69,7 @@ def readings(run):
     for stop in range(len(run.stops)):
         found |= {f"force {stop}": run.force(stop), f"indentation {stop}": run.indentation(stop)}
         found[f"mean force {stop}"] = run.force(stop, mean=True)
-    for i in range(len(run.strikers)):
+    for i in range(len(run.impactor_masses)):
         found["impactor"] = run.impactor_displacement(i)
     found |= {"loss": run.losses.loss, "work": run.losses.history, "slip": run.losses.slip, "end": run.end}
     found["extremes"] = run.extremes("stress").highest

@@ -11,7 +11,16 @@ from contacts import Hertz
 from fembeam.cli.check import highest_driven
 from fembeam.cli.unit_checks import doubts
 from fembeam.model import load_period
-from fembeam.scene import FEATURES, Scene, changes_structure, path_of, signals_of, with_signals, with_value
+from fembeam.scene import (
+    FEATURES,
+    Scene,
+    changes_structure,
+    for_duration,
+    path_of,
+    signals_of,
+    with_signals,
+    with_value,
+)
 from fembeam.scene.signals import is_of_signal
 from fembeam.scene_file import read
 from fembeam.study import ensemble
@@ -122,8 +131,19 @@ def test_every_signal_goes_on_in_the_next_segment_and_lasts(path, scene_with):
     plan = Segments.of(model, 10.0, 1e-3, 0.0, None, None, 256)
     plan.time = 0.3
     assert signals_of(plan._run(0.05).model.scene)[path](0.1) == pytest.approx(TONE(0.4), abs=1e-17)
-    long = scene_with(NOISE).reduce(modes=1).lasting(1e3)
+    long = scene_with(NOISE).reduce(modes=1).for_duration(1e3)
     assert signals_of(long.scene)[path].period == 1e3
+
+
+def test_for_duration_asks_signals_under_its_new_name_and_its_old_one():
+    class Old:
+        def lasting(self, duration):
+            return duration
+
+    with pytest.warns(DeprecationWarning, match="offer for_duration, not lasting: rename it in Old"):
+        assert for_duration(Old(), 2.0) == 2.0
+    assert for_duration(abs, 2.0) is abs
+    assert for_duration(NOISE, 1e3).period == 1e3
 
 
 def test_two_noises_renewed_for_a_study_stay_apart_or_together():

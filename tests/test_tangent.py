@@ -7,7 +7,7 @@ import pytest
 from oscillators import Tone
 from scipy.linalg import expm
 
-from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, Viscoelastic, law
+from contacts import Hertz, Hysteretic, Jenkins, KelvinVoigt, PiecewiseLinear, Viscoelastic, WaltonBraun, law
 from solvers import Contact, DormandPrince, Exponential, Parameter, SolverError, System, integrate, lyapunov
 
 OMEGA, ZETA = np.array([109.13, 790.6, 2303.7, 4700.0, 7800.0]), np.array([0.02, 0.01, 0.01, 0.01, 0.01])
@@ -200,6 +200,10 @@ def test_bad_input():
         integrate(beam(1, Viscoelastic.tsuji(2e7, 0.6, 0.3)), [0.0], [0.0], 1.0, tangent=True)
     with pytest.raises(ValueError, match="its slope is infinite"):
         integrate(beam(1, Viscoelastic(1e8, 1e3, exponent=2.8)), [0.0], [0.0], 1.0, tangent=True)
+    for memory_law in (WaltonBraun(1e6, 2e6), Jenkins(1e6, 10.0)):
+        beside = Contact([1.0], memory_law + Viscoelastic.tsuji(2e7, 0.6, 0.3), always=True)
+        with pytest.raises(ValueError, match="its slope is infinite"):
+            integrate(System.modal([1.0], [0.0], [beside]), [0.0], [0.0], 1.0, tangent=True)
     with pytest.raises(ValueError, match="differ in coordinates"):
         Parameter(beam(1), beam(2), 1.0)
     with pytest.raises(ValueError, match="step"):

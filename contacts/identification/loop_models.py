@@ -77,7 +77,7 @@ class Sliders:
 
     @property
     def ends(self) -> NDArray[np.float64]:
-        """(2, main) bounds, beyond which no record can see."""
+        """(2, main) bounds of what the records can determine."""
         stiffness, width, spring = (
             [[-20.0, 8.0]] * self.count,
             [[0.0 if j == self.wide else -8.0, 1.0] for j in range(self.count)],
@@ -112,7 +112,7 @@ class Sliders:
         return {**named, "spring": theta[-1] * strength / depth}
 
     def law(self, values: dict[str, float]) -> Law:
-        """The law; a spring below zero, by chance, counts as none."""
+        """The law; a spring stiffness fitted below zero counts as 0."""
         if not self.spring:
             return Jenkins(**values)
         k, f = np.array(list(values.values())[:-1]).reshape(2, -1).tolist()
@@ -163,7 +163,7 @@ class Smooth:
         return {"stiffness": k, "alpha": elastic / (c + elastic), "beta": shape[0], "gamma": shape[1]}
 
     def law(self, values: dict[str, float]) -> Law:
-        """The law; an α below zero, by chance, counts as none."""
+        """The law; an α fitted below zero counts as 0."""
         alpha = max(values["alpha"], 0.0)
         return BoucWen(**{**values, "alpha": alpha}, A=1.0, n=self.n)  # type: ignore[arg-type]
 

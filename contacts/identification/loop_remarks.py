@@ -1,4 +1,4 @@
-"""What makes the numbers found from loops doubtful, in words."""
+"""Remarks on the parameters found from loops: why they may be unreliable."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What measured loops say of a law with memory."""
+"""The result of an identification from measured loops."""
 
 from __future__ import annotations
 

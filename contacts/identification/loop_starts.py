@@ -1,4 +1,4 @@
-"""Where least squares begin: sliders one by one, where each explains most, while it explains more than noise."""
+"""Starting values for least squares: sliders added one by one while each reduces the residual more than noise."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _UNLIKELY = 1e-5  # chance that noise alone explains as much as a further slider
 
 
 def fit_sliders(measured: Measured, most: int, spring: bool) -> Fit:
-    """Slider after slider, as long as one explains more than noise would."""
+    """Add sliders as long as one reduces the residual more than noise would."""
     slope, squares, numbers = _line(measured)
     tried, chosen = _Tried(measured, spring), list[int]()
     best: Fit | None = None
@@ -89,7 +89,7 @@ class _Tried:
         return np.asarray(np.linalg.lstsq(self.products[np.ix_(rows, rows)], self.target[rows], rcond=1e-12)[0])
 
     def explained(self, chosen: list[int]) -> float:
-        """Squares that sliders explain together; nothing where one would push."""
+        """Sum of squares explained by sliders together; 0 where the fit gives one a negative stiffness."""
         weights = self.weights(chosen)
         return float(weights @ self.target[[*chosen, *self.fixed]]) if np.all(weights[: len(chosen)] > 0.0) else 0.0
 

@@ -33,7 +33,7 @@ def identify_loop(
     delta, force : (k,) m and N of a record, in order, or lists of such records; no times. Between two samples the path
         is straight: sample turning points densely.
     law : `Jenkins`, `Iwan` (with a spring beside) or `BoucWen`.
-    parts : of Iwan, how many sliders at most; None is 4. There are fewer where the records do not tell more apart.
+    parts : of Iwan, how many sliders at most; None is 4. There are fewer where the records cannot distinguish more.
     n : of Bouc and Wen, 1 or 2; None takes the one that fits better.
     offset : fit the zero of the force too.
     confidence : of the intervals, in (0, 1).
@@ -46,7 +46,7 @@ def identify_loop(
     ------
     TypeError for another law; ValueError for arrays that do not fit together or are not finite, for too few samples,
     and for records in which nothing slips: a straight line tells the stiffness alone. Warns of residuals that are
-    correlated, of parameters that the records do not tell, or only in combination, and of noise in delta.
+    correlated, of parameters that the records do not determine, or only in combination, and of noise in delta.
 
     Notes
     -----

@@ -1,4 +1,4 @@
-"""Indentation, its rate and the entry rate of one measured collision, with what their noise does."""
+"""Indentation, its rate and the entry rate of one measured collision, and the effect of their noise."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What measurements say of a stop: numbers with intervals, each collision, remarks."""
+"""The result of an identification: parameters with intervals, each collision, remarks."""
 
 from __future__ import annotations
 

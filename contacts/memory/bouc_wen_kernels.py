@@ -114,9 +114,10 @@ def bouc_wen_borders(n, delta, delta_dot, entry_rate, parameters, values):
 
 @compiled(cfunc, RENEW)
 def bouc_wen_renew(j, delta, delta_dot, entry_rate, parameters):
-    """Latch the point of reversal, or that at which z is zero."""
+    """Latch the point of reversal, or that at which z is zero; a start may lie beyond it, and keeps its z."""
     z, sign = _response(parameters, delta, delta_dot)[0], _sign(parameters, delta, delta_dot)
-    parameters[6], parameters[7], parameters[8] = -sign if j == 0 else sign, delta, z if j == 0 else 0.0
+    kept = j == 0 or sign * z > 0.0
+    parameters[6], parameters[7], parameters[8] = -sign if j == 0 else sign, delta, z if kept else 0.0
     return j
 
 
@@ -138,6 +139,6 @@ def bouc_wen_renew_gradient(j, delta, delta_dot, entry_rate, parameters, out):
         out[8], out[14] = 1.0, 1.0
         return
     out[5] = 1.0
-    if j == 0:
-        _, slope, by_start = _response(parameters, delta, delta_dot)
+    z, slope, by_start = _response(parameters, delta, delta_dot)
+    if j == 0 or _sign(parameters, delta, delta_dot) * z > 0.0:  # z is kept; where it is zero the time of it says so
         out[10], out[13], out[14] = slope, -slope, by_start

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
@@ -38,7 +38,7 @@ def _kernels(pieces: Pieces, latched: int, count: int) -> dict[str, tuple[Any, F
     from contacts.kernels import GRADIENT, SIGNATURE
     from contacts.sum_kernels import RENEW, RENEW_GRADIENT
 
-    scalar, several = njit(error_model="numpy"), 2 + latched
+    scalar, several = cache(njit(error_model="numpy")), 2 + latched  # what serves several segments is compiled once
     width = max(1, *(len(borders) for *_, borders in pieces))
     padded = [border for *_, borders in pieces for border in (*borders, *[None] * width)[:width]]
     force = _chosen([_read(scalar(f)) for f, *_ in pieces])
@@ -86,6 +86,7 @@ def _chosen(functions: Sequence[Function]) -> Function:
     return chain
 
 
+@lru_cache(maxsize=256)
 def _read(function: Function) -> Function:
     """A user's function of a tuple."""
     from numba import njit
@@ -93,6 +94,7 @@ def _read(function: Function) -> Function:
     return njit(lambda given: function(*given))
 
 
+@lru_cache(maxsize=256)
 def _nowhere() -> Function:
     """A border that does not exist."""
     from numba import njit
@@ -100,6 +102,7 @@ def _nowhere() -> Function:
     return njit(lambda given: 1.0)
 
 
+@lru_cache(maxsize=256)
 def _kept(latched: int) -> Function:
     """A renewal that changes nothing but the segment."""
     from numba import njit
@@ -111,6 +114,7 @@ def _kept(latched: int) -> Function:
     return njit(keep)
 
 
+@lru_cache(maxsize=256)
 def _written(function: Function, count: int) -> Function:
     """A function that writes what another returns, one number or a tuple of several, of any types."""
     from numba import njit
@@ -141,6 +145,7 @@ def _written(function: Function, count: int) -> Function:
     return njit(several)
 
 
+@lru_cache(maxsize=256)
 def _jacobian(write: Function, rows: int, columns: int, count: int) -> Function:
     """Derivatives of what `write` writes by its first arguments, (rows, columns), by central differences."""
     from numba import njit
@@ -163,6 +168,7 @@ def _jacobian(write: Function, rows: int, columns: int, count: int) -> Function:
     return njit(fill, error_model="numpy")
 
 
+@lru_cache(maxsize=256)
 def _written_slopes(force: Function, columns: int, count: int) -> Function:
     """Derivatives of a force by differences, written like given ones."""
     from numba import njit

@@ -126,7 +126,8 @@ class Coulomb(Sliders):
     -----
     With tangential stiffness as in J.H. Griffin, J. Eng. Power 102 (1980) 329-333. Rigid Coulomb friction, where stick
     has no motion at all, is approached like k^(-1/2) only, and the closer the shorter the steps. With f_s > f and c = 0
-    the mass rings on k after every stop and may slide for ever: choose c near 2 √(k m).
+    the mass rings on k after every stop and may slide for ever: choose c near 2 √(k m). With c > 0 slip begins while k
+    holds less than f, and ends with k holding f: a slip shorter than (f² - (f_s - c |δ̇|)²)/(2 k f) may give energy.
 
     Examples
     --------

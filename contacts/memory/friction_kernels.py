@@ -61,7 +61,7 @@ def sliders_borders(n, delta, delta_dot, entry_rate, parameters, values):
 
 @compiled(cfunc, RENEW)
 def sliders_renew(j, delta, delta_dot, entry_rate, parameters):
-    """Let slider j go, or hold it where it is."""
+    """Begin the slip of slider j, or let it stick where it is."""
     at = 2 + SLIDER_SIZE * j
     code = parameters[at + CODE]
     if code == 0.0:

@@ -1,4 +1,4 @@
-"""A stop that yields: a softer line in, a steeper one out."""
+"""A yielding stop: it loads along one line and unloads along a steeper one."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ def walton_braun_gradient(n, delta, delta_dot, entry_rate, parameters, by_delta,
 
 @compiled(cfunc, SIGNATURE)
 def walton_braun_borders(n, delta, delta_dot, entry_rate, parameters, values):
-    """Touching and forgetting; turning; opening and meeting the first loading again."""
+    """Open: contact, loss of the set. Loading: reversal. Unloading: opening, return to the first loading."""
     code, rest, forgets = parameters[CODE], _set(parameters), parameters[2] == 0.0 and parameters[YIELDED] > 0.0
     for i in range(n):
         d = delta[i]

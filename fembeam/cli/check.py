@@ -1,7 +1,7 @@
 """What a scene is before it is run: modes, contacts to expect, steps and modes to take, and what looks wrong.
 
 Contacts are those of a short trial and of one strike at its usual speed. A contact of length T excites what lies below
-3π/T, where the spectrum of a half-sine pulse first vanishes: modes above it hardly know of it.
+3π/T, where the spectrum of a half-sine pulse first vanishes: modes above it are hardly excited.
 """
 
 from __future__ import annotations

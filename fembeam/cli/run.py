@@ -215,7 +215,7 @@ def _simulated(file: SceneFile, model: Model, progress: bool) -> tuple[Run, int]
         code = 0 if run.complete else interrupted()
     except solvers.SolverError as error:
         say(f"error: {one_line(error)}")
-        run, code = Run.of(model.lasting(study.duration), error.solution), FAILED
+        run, code = Run.of(model.for_duration(study.duration), error.solution), FAILED
     return replace(run, source=file.source), code
 
 

@@ -19,7 +19,7 @@ STEEP = 0.35  # rad; the slope of a beam
 
 
 def doubts(file: SceneFile, model: Model) -> list[str]:
-    """What to look at twice, sentences."""
+    """Warnings about a scene's numbers, as sentences."""
     scene = file.scene
     return [*of_beam(scene.beam), *of_features(scene), *of_loads(scene, model), *of_study(file, model)]
 

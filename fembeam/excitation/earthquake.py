@@ -1,7 +1,7 @@
 """Earthquake records: two columns, PEER (AT2) and COSMOS files, units, baseline.
 
 Of PEER files the header's NPTS and DT are read, of COSMOS ones the real header (sampling interval) and the line above
-the data (number, unit, Fortran format). What a header contradicts itself in is an error.
+the data (number, unit, Fortran format). A header that contradicts itself is an error.
 """
 
 from __future__ import annotations

@@ -140,8 +140,8 @@ class LineSpectrum:
             rms(error)² = ½ Σ |a_k|² ∫|e_k|² dx,    |e_k(x)| <= (ω_k h)^6 (x(1-x))³/720,    ∫(x(1-x))⁶ dx = 6!²/13!
 
         Errors of different lines are orthogonal, because no two of them look alike on a grid of n > 2 top points.
-        Lines are raised beforehand by what the interpolant takes off them, (ω_k h)^6/100800: what is left of the error
-        lies beyond the grid's own frequency, where no structure follows.
+        The interpolant reduces a line by (ω_k h)^6/100800; its amplitude is raised by that beforehand. The remaining
+        error lies above the grid's own frequency, where structures hardly respond.
         """
         if not FINEST_RTOL <= rtol < 1:
             raise ValueError(f"rtol must lie in [{FINEST_RTOL:g}, 1), got {rtol!r}")

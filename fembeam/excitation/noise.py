@@ -18,7 +18,7 @@ import numpy as np
 from fembeam.excitation.line_spectrum import checked_band, checked_order
 from fembeam.excitation.noise_lines import NoiseLines
 from fembeam.excitation.psd import Psd, RollOff, Table, checked_table
-from fembeam.support import is_whole, number
+from fembeam.support import OldName, is_whole, number
 
 AUTOMATIC_LINES = 4096  # kurtosis 3 - 1.5/4096: Gaussian to far below any sampling error
 FEWEST_LINES = 8  # below this a sum of cosines is visibly not Gaussian (kurtosis under 2.8)
@@ -40,7 +40,7 @@ class BandNoise(NoiseLines):
         Seed of the phases φ_k, uniform in [0, 2π): the same seed gives the same bits.
     period : float, optional
         Time in s after which the realisation repeats. Left out, it is 4096 * 2π/(hi - lo), that is 4096
-        lines, and `lasting` may take a longer one. The attribute is always a number.
+        lines, and `for_duration` may take a longer one. The attribute is always a number.
     mean : float
         Constant added to y, 0 unless given; derivatives do not see it.
     psd, order : keyword only
@@ -192,14 +192,14 @@ class BandNoise(NoiseLines):
 
     @property
     def period_was_given(self) -> bool:
-        """Whether the period was asked for; otherwise `lasting` may take a longer one."""
+        """Whether the period was asked for; otherwise `for_duration` may take a longer one."""
         return self._computed[1] is None
 
     def derivative(self, order: int) -> BandNoise:
         """The signal d^order s/dt^order: the same lines times (i ω)^order."""
         return replace(self, order=self.order + checked_order(order))
 
-    def lasting(self, duration: float) -> BandNoise:
+    def for_duration(self, duration: float) -> BandNoise:
         """A signal that does not repeat within `duration` (s).
 
         It is this one when its period is long enough. When the period was left out it is another realisation,
@@ -210,6 +210,8 @@ class BandNoise(NoiseLines):
             return replace(self, period=duration)
         self._check_lasts(duration)
         return self
+
+    lasting = OldName("for_duration")
 
 
 def _checked_seed(seed: Any) -> int | np.random.SeedSequence:

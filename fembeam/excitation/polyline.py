@@ -3,12 +3,12 @@
     s(t) = s_j + (s_{j+1} - s_j) (t - t_j)/h,        t_j = j h
 
 Integrators take a load as quintics through values, slopes and curvatures on a uniform grid, which cannot bend sharply.
-A kink is rounded within one cell of that grid on either side, and so that the error has no moment of order 0 to 3: with
-a jump Δ of the slope and cells of h',
+A kink is rounded within one cell of that grid on either side, such that moments of order 0 to 3 of the error vanish:
+with a jump Δ of the slope and cells of h',
 
     s = s_j + 3/80 Δ h',   s' = mean of both sides,   s'' = 15/4 Δ/h',        error/kink = (ω h')⁶/151200 at frequency ω
 
-A response is off by what a kink does within h' while it passes, and right again behind it.
+A response errs within h' of a kink, and is exact again after it.
 Of the first integral, whose curvature jumps by Δ, only the slope is moved, by 3/64 Δ h': (ω h')⁶/60480. The second one
 is a spline of cubics, which quintics hold exactly.
 """

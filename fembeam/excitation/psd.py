@@ -15,7 +15,7 @@ Psd = Callable[[NDArray[np.float64]], ArrayLike]
 
 @dataclass(frozen=True)
 class RollOff:
-    """What a first-order low-pass filter leaves of a flat density: S(ω) = level/(1 + (ω/corner)²).
+    """A flat density behind a first-order low-pass filter: S(ω) = level/(1 + (ω/corner)²).
 
     Parameters
     ----------

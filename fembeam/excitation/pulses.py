@@ -17,6 +17,7 @@ from numpy.polynomial import Polynomial
 from numpy.typing import ArrayLike, NDArray
 
 from fembeam.excitation.line_spectrum import HERMITE_CONSTANT, checked_order
+from fembeam.excitation.unlimited import Unlimited
 from fembeam.support import number
 
 MOST_NODES = 20_000_000
@@ -24,7 +25,7 @@ BELL = Polynomial([1.0, 0.0, -1.0])  # 1 - s²
 
 
 @dataclass(frozen=True)
-class _Wave:
+class _Wave(Unlimited):
     """size p(s) while s in [-1, 1], 0 before, size `after` afterwards; `coefficients` of p."""
 
     coefficients: tuple[float, ...]
@@ -46,10 +47,6 @@ class _Wave:
         p = Polynomial(self.coefficients).deriv(order)
         return replace(self, coefficients=tuple(p.coef), size=self.size * (2 / self.length) ** order, after=0.0)
 
-    def lasting(self, duration: float) -> _Wave:
-        """Return the signal itself: it lasts for ever."""
-        return self
-
     def nodes(self, duration: float, rtol: float) -> tuple[float, NDArray[np.float64]]:
         """Rows [s, s', s''] so dense that quintic Hermite interpolation errs by at most rtol of the peak."""
         fine = np.linspace(-1, 1, 2001)
@@ -65,7 +62,7 @@ class _Wave:
 
 
 @dataclass(frozen=True)
-class _Once:
+class _Once(Unlimited):
     """What pulse and step share: they are called, derived and tabulated as their wave."""
 
     @property
@@ -80,10 +77,6 @@ class _Once:
     def derivative(self, order: int) -> _Wave:
         """The signal d^order y/dt^order."""
         return self.wave.derivative(order)
-
-    def lasting(self, duration: float) -> Any:
-        """Return the signal itself: it lasts for ever."""
-        return self
 
     def nodes(self, duration: float, rtol: float) -> tuple[float, NDArray[np.float64]]:
         """Rows [s, s', s''] for quintic Hermite interpolation within rtol of the peak."""

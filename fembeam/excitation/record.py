@@ -28,7 +28,7 @@ from fembeam.excitation.samples import (
     padded,
     read_rows,
 )
-from fembeam.support import number
+from fembeam.support import OldName, number
 
 Quantity = Literal["displacement", "acceleration", "force"]
 Interpolation = Literal["spectral", "linear"]
@@ -87,7 +87,7 @@ class Record:
     samples per shortest period then (error of y'' 0.2 % of its rms; 20 samples: 0.03 %). Nothing is
     extrapolated at the ends: y'' is zero there and wrong by its own size within the first two samples. For 40
     tones up to half the Nyquist frequency the error of y'' is below 1 % of its rms 10 samples from an end,
-    0.05 % at 50 and 1e-6 at 1000. With a `band` the same loss reaches farther: 7 % at 3 periods of hi from an
+    0.05 % at 50 and 1e-6 at 1000. With a `band` the error extends farther: 7 % at 3 periods of hi from an
     end, 0.1 % at 10; stay as many periods of lo away from the ends when lo > 0.
 
     Examples
@@ -255,7 +255,7 @@ class Record:
         Arguments and results are those of `BandNoise.nodes`; the duration is at most the length of the record, and with
         linear interpolation the error is that of its spectrum, see `polyline`.
         """
-        self.lasting(duration)
+        self.for_duration(duration)
         lines, c_0, c_1 = self._spectrum
         dt, values = lines.nodes(duration, rtol)
         values[:, 0] += c_0 + c_1 * dt * np.arange(len(values))
@@ -266,7 +266,7 @@ class Record:
         """The signal d^order s/dt^order."""
         return replace(self, order=self.order + checked_order(order))
 
-    def lasting(self, duration: float) -> Record:
+    def for_duration(self, duration: float) -> Record:
         """Return the signal itself, when the record is at least `duration` (s) long; an error otherwise."""
         if number("duration (s)", duration, least=0.0) > self.duration * (1 + 1e-9):
             raise ValueError(
@@ -275,9 +275,11 @@ class Record:
             )
         return self
 
+    lasting = OldName("for_duration")
+
     @cached_property
     def doubt(self) -> str:
-        """What a scene says of the record as its base motion, "" where there is nothing to say."""
+        """Warning for a record as base motion of a scene; "" for none."""
         if self.quantity != "displacement" or self.order or not isinstance(self._spectrum[0], LineSpectrum):
             return ""
         h, y = self._samples

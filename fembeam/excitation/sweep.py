@@ -17,7 +17,7 @@ from numpy.polynomial import Polynomial
 from numpy.typing import ArrayLike, NDArray
 
 from fembeam.excitation.line_spectrum import HERMITE_CONSTANT, checked_order
-from fembeam.support import number
+from fembeam.support import OldName, number
 
 MOST_NODES = 20_000_000
 Vector = NDArray[np.float64]
@@ -43,7 +43,7 @@ class SineSweep:
 
     Notes
     -----
-    A linear mode answers nearly as to steady motion while |ω̇| is well below (ζω)²; a faster sweep finds lower maxima
+    A linear mode responds nearly as to a steady tone while |ω̇| is well below (ζω)²; a faster sweep gives lower maxima
     at shifted frequencies.
 
     References
@@ -111,12 +111,14 @@ class SineSweep:
         """The signal d^order y/dt^order."""
         return SweepDerivative(self, checked_order(order))
 
-    def lasting(self, duration: float) -> SineSweep:
+    def for_duration(self, duration: float) -> SineSweep:
         """Return the signal itself; an error for a run longer than the sweep."""
         if duration > self.duration * (1 + 1e-9):
             raise ValueError(f"SineSweep is {self.duration:.6g} s long and shorter than the duration of {duration:.6g} "
                              "s; shorten the run, or sweep longer")  # fmt: skip
         return self
+
+    lasting = OldName("for_duration")
 
     def nodes(self, duration: float, rtol: float) -> tuple[float, Vector]:
         """Rows [s, s', s''] so dense that quintic Hermite interpolation errs by at most rtol of the largest value."""
@@ -147,14 +149,16 @@ class SweepDerivative:
         """The signal d^order s/dt^order."""
         return replace(self, order=self.order + checked_order(order))
 
-    def lasting(self, duration: float) -> SweepDerivative:
+    def for_duration(self, duration: float) -> SweepDerivative:
         """Return the signal itself; an error for a run longer than the sweep."""
-        self.sweep.lasting(duration)
+        self.sweep.for_duration(duration)
         return self
+
+    lasting = OldName("for_duration")
 
     def nodes(self, duration: float, rtol: float) -> tuple[float, Vector]:
         """Rows [s, s', s''] for quintic Hermite interpolation: |error| <= h⁶/46080 max|s⁽⁶⁾| <= rtol max|s|."""
-        self.lasting(duration)
+        self.for_duration(duration)
         passed = self.sweep.omega(np.linspace(0.0, duration, 2001))
         sixth, size = (np.abs(self.derivative(order).factor(passed)).max() for order in (6, 0))
         cells = max(1, math.ceil(duration / (HERMITE_CONSTANT * rtol * size / sixth) ** (1 / 6)))

@@ -5,7 +5,7 @@
     y(t) = c_0 + c_1 t + Σ_k b_k sin(k π t/T)          Record
 
 Units are SI (m, s, rad/s). Every signal is called with t of any shape; `derivative(order)` is exact, and
-`lasting(duration)` is the signal to use for a run of that length. The load of base motion y on mode i is
+`for_duration(duration)` is the signal for a run of that length. The load of base motion y on mode i is
 -participation[i] times y.derivative(2).
 """
 
@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fembeam.excitation.line_spectrum import checked_order
+from fembeam.excitation.unlimited import Unlimited
 from fembeam.support import frozen, number
 
 Tones = tuple[NDArray[np.float64], NDArray[np.complex128]]
@@ -28,7 +29,7 @@ MOST_SHOWN = 8  # numbers of a kind in a repr
 
 
 @dataclass(frozen=True)
-class Harmonic:
+class Harmonic(Unlimited):
     """One cosine: y(t) = amplitude cos(omega t + phase).
 
     Parameters
@@ -75,13 +76,9 @@ class Harmonic:
         scaled = sign * self.amplitude * self.omega**order
         return replace(self, amplitude=scaled, phase=self.phase + turn)
 
-    def lasting(self, duration: float) -> Harmonic:
-        """Return the signal itself: it lasts for ever."""
-        return self
-
 
 @dataclass(frozen=True, eq=False)
-class Multisine:
+class Multisine(Unlimited):
     """A sum of cosines: y(t) = Σ_k amplitude_k cos(omega_k t + phase_k).
 
     Parameters
@@ -157,10 +154,6 @@ class Multisine:
         """The signal d^order y/dt^order."""
         sign, turn = _quarter_turns(checked_order(order))
         return Multisine(sign * self.amplitude * self.omega**order, self.omega, self._phase + turn)
-
-    def lasting(self, duration: float) -> Multisine:
-        """Return the signal itself: it lasts for ever."""
-        return self
 
 
 def _quarter_turns(order: int) -> tuple[float, float]:

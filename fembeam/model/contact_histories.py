@@ -1,4 +1,4 @@
-"""What a run tells of its stops, elements and impactors: indentation, rate, motion, names, units."""
+"""Histories of the stops, elements and impactors of a run: indentation, rate, motion; their names and units."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ class ContactHistories:
     q_dot: Vector
     stops: Vector
     directions: Vector
-    strikers: Vector
+    impactor_masses: Vector
     kinds: NDArray[np.bool_]
 
     def impactor_displacement(self, impactor: int = 0) -> Vector:
         """x(t) (k,) of an impactor from its place at the start, relative to the frame, m."""
-        return self._striker(self.q, impactor)
+        return self._of_impactor(self.q, impactor)
 
     def impactor_velocity(self, impactor: int = 0) -> Vector:
         """ẋ(t) (k,) of an impactor relative to the frame, m/s."""
-        return self._striker(self.q_dot, impactor)
+        return self._of_impactor(self.q_dot, impactor)
 
-    def _striker(self, coordinates: Vector, impactor: int) -> Vector:
+    def _of_impactor(self, coordinates: Vector, impactor: int) -> Vector:
         """One of the last columns, without its √m."""
-        count = len(self.strikers)
+        count = len(self.impactor_masses)
         require(0 <= impactor < count, f"impactor must be below {count}, the number of impactors", impactor, "Run",
                 "count from 0")  # fmt: skip
-        return coordinates[:, coordinates.shape[1] - count + impactor] / np.sqrt(self.strikers[impactor])
+        return coordinates[:, coordinates.shape[1] - count + impactor] / np.sqrt(self.impactor_masses[impactor])
 
     def unit(self, quantity: str, stop: int | None = None) -> str:
         """Unit of "indentation", "speed", "force" or "impulse" of a stop; None: of a column that all of them share."""

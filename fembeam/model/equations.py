@@ -6,7 +6,6 @@ q_i'' + 2 ζ_i ω_i q_i' + ω_i² q_i = -Γ_i (ÿ + g) + Σ φ_i(z_f) f + Σ_s w
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable
 from dataclasses import fields
 from fractions import Fraction
@@ -18,10 +17,11 @@ from numpy.typing import ArrayLike
 
 import reduction
 import solvers
+from fembeam.model import initial_states
 from fembeam.model.shapes import Shapes, Vector
 from fembeam.scene import contact_rows, loads, signals_of, static_rows, tangent, weight
 from fembeam.scene.contact_rows import ContactRow
-from fembeam.support import require
+from fembeam.support import OldName, require
 
 if TYPE_CHECKING:
     from fembeam.response import SectionForces
@@ -170,16 +170,10 @@ class ModalEquations:
         W = np.array([w for w, _ in always]).reshape(-1, len(self.omega))
         return (W.T * slopes[:, 0]) @ W, (W.T * slopes[:, 1]) @ W
 
-    @property
-    def touches(self) -> list[ContactRow]:
-        """Old name of `contact_rows`."""
-        warnings.warn("Model.touches is now Model.contact_rows", DeprecationWarning, stacklevel=2)
-        return self.contact_rows
+    touches = OldName("contact_rows")
 
     def rest(self) -> Vector:
         """The start [q, q_dot] (2n,) of everything undeflected and at rest but the impactors, at their velocity."""
-        from fembeam.model import initial_states
-
         return initial_states.rest(self)
 
 

@@ -8,7 +8,6 @@ every impactor.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
@@ -18,10 +17,11 @@ from numpy.typing import ArrayLike
 
 import reduction
 import solvers
+from fembeam.model import initial_states
 from fembeam.model.equations import ModalEquations
 from fembeam.model.shapes import Shapes, Vector
-from fembeam.scene import with_signals
-from fembeam.support import Part, Printed, note, require, require_no_text, require_positive
+from fembeam.scene import for_duration, with_signals, with_value
+from fembeam.support import OldName, Part, Printed, bar, note, require, require_no_text, require_positive
 from solvers.problem import counted
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ class Model(Printed, ModalEquations):
         numbered on; 0 for an impactor.
     shapes : φ(z) of the scene's own beam; call ``model.phi(z)``. others : the same for its `bodies`.
     counts : of modes and of static shapes, (modes, static), of each beam.
-    way : arguments of `Scene.reduce` that make it again, with mode numbers instead of criteria.
+    reduction_options : arguments of `Scene.reduce` that make it again, with mode numbers instead of criteria.
     static_share : part of the static compliance that the model keeps at every stop, every element, then at every
         force; 1 is all.
     """
@@ -63,7 +63,8 @@ class Model(Printed, ModalEquations):
     shapes: Shapes
     counts: tuple[tuple[int, int], ...]
     others: tuple[Shapes, ...] = ()
-    way: dict[str, Any] = field(default_factory=dict)
+    reduction_options: dict[str, Any] = field(default_factory=dict)
+    way = OldName("reduction_options")
 
     def __repr__(self) -> str:
         size = f"{counted(len(self.omega), 'coordinate')}, {self.omega.min():.6g} to {self.omega.max():.6g} rad/s"
@@ -76,7 +77,7 @@ class Model(Printed, ModalEquations):
 
     def again(self, scene: Scene) -> Model:
         """Another scene reduced in the same way: the same mode numbers, mesh size and kind of static shapes."""
-        return scene.reduce(**self.way)
+        return scene.reduce(**self.reduction_options)
 
     def strike(self, speed: float, stop: int = 0) -> solvers.ContactLog:
         """Contacts with one stop when the model swings into it in its first mode, nothing else acting.
@@ -122,14 +123,10 @@ class Model(Printed, ModalEquations):
         ------
         ValueError : a field is not finite; a free impactor would start inside the beam.
         """
-        from fembeam.model import initial_states
-
         return initial_states.state(self, displacement, velocity)
 
     def missed(self, field: Field | Sequence[Field]) -> float:
         """The part of a field of displacement or velocity that the kept modes cannot represent: ‖u - Φq‖/‖u‖ in M."""
-        from fembeam.model import initial_states
-
         return initial_states.missed(self, field)
 
     def equilibrium(self, loads: Mapping[float, float] | None = None) -> Vector:
@@ -142,20 +139,20 @@ class Model(Printed, ModalEquations):
 
         Returns
         -------
-        (2n,) : impactors with a velocity keep their place meanwhile, and have it.
+        (2n,) : impactors with a velocity are held in place while the rest settles, and start with it.
 
         Raises
         ------
         reduction.AccuracyError : nothing carries the loads, so that no equilibrium is found.
         """
-        from fembeam.model import initial_states
-
         return initial_states.equilibrium(self, loads or {})
 
-    def lasting(self, duration: float) -> Model:
-        """The same model with every signal good for ``duration``; noise without a period gets one."""
-        scene = with_signals(self.scene, lambda s: s.lasting(duration) if hasattr(s, "lasting") else s)
+    def for_duration(self, duration: float) -> Model:
+        """The same model with every signal valid for a run of ``duration`` s; noise without a period gets one."""
+        scene = with_signals(self.scene, lambda signal: for_duration(signal, duration))
         return self if scene is self.scene else self.under(scene)
+
+    lasting = OldName("for_duration")
 
     def simulate(
         self,
@@ -186,18 +183,16 @@ class Model(Printed, ModalEquations):
         ------
         ValueError for bad input before computing; solvers.SolverError when the method fails.
         """
-        from fembeam.model import initial_states
         from fembeam.model.run import Run
-        from fembeam.support import bar
 
         require_no_text("Model.simulate", duration=duration, dt=dt, start=start)
         q, q_dot, memory = initial_states.split_start(self, self.rest() if start is None else start)
-        lasting = self.lasting(duration) if 0.0 < duration < np.inf else self
+        model = self.for_duration(duration) if 0.0 < duration < np.inf else self
         with bar(duration, progress) as report:
             solution = solvers.integrate(
-                lasting.system, q, q_dot, duration, dt, solver, progress=report, memory=memory or None
+                model.system, q, q_dot, duration, dt, solver, progress=report, memory=memory or None
             )
-        run = Run.of(lasting, solution, memory)
+        run = Run.of(model, solution, memory)
         note("%r, integrated in %.3g s", run, run.cost.seconds)
         return run
 
@@ -278,9 +273,8 @@ class Model(Printed, ModalEquations):
         list of Attractor : orbit (None when not periodic), period, impacts, count, state, name.
         """
         from fembeam.model.orbit import attractors
-        from fembeam.scene import with_value
 
-        model = self if omega is None else dataclasses.replace(self, scene=with_value(self.scene, "omega", omega))
+        model = self if omega is None else replace(self, scene=with_value(self.scene, "omega", omega))
         return attractors(model, starts, longest, seed)
 
     def branch(

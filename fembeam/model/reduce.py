@@ -50,16 +50,16 @@ def reduced(
     ]
     if elements is not None and not isinstance(modes, str):
         _warn_of_the_mesh(matrices, max(basis.omega[min(len(chosen), basis.count) - 1] for basis in bases))
-    way: dict[str, Any] = {"modes": chosen, "elements": elements, "residual": residual}
+    options: dict[str, Any] = {"modes": chosen, "elements": elements, "residual": residual}
     if interface:
-        way = {"modes": len(chosen), "elements": elements, "interface": True}
+        options = {"modes": len(chosen), "elements": elements, "interface": True}
     kept = [basis.count if interface else len(chosen) for basis in bases]
     counts = tuple((count, basis.count - count) for count, basis in zip(kept, bases, strict=True))
     numbers = [tuple(range(basis.count)) if interface else _continued(chosen, basis.count) for basis in bases]
     basis = _joined(bases, matrices)
     own, *others = _shapes_of_each(matrices, basis)
     modes_of_all = sum(numbers, ()) + (0,) * len(matrices.impactors)
-    return Model(scene, matrices, basis, modes_of_all, own, counts, tuple(others), way)
+    return Model(scene, matrices, basis, modes_of_all, own, counts, tuple(others), options)
 
 
 def _of_beam(

@@ -16,7 +16,7 @@ import solvers
 from fembeam.model.contact_histories import ContactHistories
 from fembeam.model.shapes import Shapes
 from fembeam.scene import ON, Source
-from fembeam.support import Part, Printed, require
+from fembeam.support import OldName, Part, Printed, require
 from solvers.problem import Losses, counted
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ class Run(ContactHistories, Printed):
     shapes: Shapes
     stops: Vector  # (m, 3): z, push, gap of every contact
     directions: Vector  # (m, n): δ = -directions·q - gap
-    strikers: Vector  # (i,): masses of the impactors, whose coordinates √m x are the last ones
+    impactor_masses: Vector  # (i,) of the impactors, whose coordinates √m x are the last ones
     scene: str
     model: Model | None = None
     stored_forces: Vector | None = None  # (m, k) of a run read from a file
@@ -68,6 +68,8 @@ class Run(ContactHistories, Printed):
     end: Vector | None = None  # (2n + l,) [q, q̇] and what the laws have latched, at the time reached
     on: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 3), dtype=int))  # (m, 3): body, of ON, number
     kinds: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 2), dtype=bool))  # of rotation, always acting
+
+    strikers = OldName("impactor_masses")
 
     def __repr__(self) -> str:
         reached = f"to t = {self.t[-1]:g} s" if len(self.t) else "without samples"
@@ -85,7 +87,7 @@ class Run(ContactHistories, Printed):
 
     @cached_property
     def readout(self) -> Readout:
-        """What it is read with: loads, section forces, reactions; of the model, else of the file."""
+        """Loads, damping, section forces and reactions, from the model or from the file."""
         from fembeam.response import Readout
 
         return self.stored if self.stored is not None and self.model is None else Readout(self.model, self.t)
@@ -99,7 +101,7 @@ class Run(ContactHistories, Printed):
 
     @cached_property
     def losses(self) -> Losses:
-        """What each stop and element took, see `solvers.problem.Losses`; ValueError for old files."""
+        """Energy that each stop and element dissipated, see `solvers.problem.Losses`; ValueError for old files."""
         if self.lost is None:
             raise ValueError("this run's file is of an earlier version, without losses; simulate again")
         return self.lost()
@@ -115,16 +117,16 @@ class Run(ContactHistories, Printed):
 
     @classmethod
     def of(cls, model: Model, solution: solvers.Solution, began: tuple[Vector, ...] = ()) -> Run:
-        """A model's solution with what it takes to read it."""
+        """The run of a model from its solution."""
         rows = model.contact_rows
         stops = np.array([(one.z, one.push, one.gap) for one in rows], dtype=float).reshape(-1, 3)
-        strikers = np.array([impactor.mass for impactor in model.matrices.impactors], dtype=float)
+        masses = np.array([impactor.mass for impactor in model.matrices.impactors], dtype=float)
         status = solution.status.value
         if not solution.status.good:
             status += f" (t = {solution.t[-1]:g} s)" if len(solution.t) else " (before the first sample)"
         return cls(
             *(solution.t, solution.q, solution.q_dot, solution.contacts, solution.ledger, status, solution.cost),
-            *(model.shapes, stops, model.directions, strikers, repr(model.scene), model),
+            *(model.shapes, stops, model.directions, masses, repr(model.scene), model),
             others=model.others,
             **{name: getattr(solution, name) for name in ("borders", "lost", "end")},
             began=began,
@@ -187,7 +189,7 @@ class Run(ContactHistories, Printed):
         return reactions(self)
 
     def floor_spectrum(self, z: float, omega: ArrayLike | None = None, zeta: ArrayLike = 0.05, **options: Any) -> Any:
-        """`fembeam.response_spectrum` of the absolute acceleration at z: what equipment there has to stand.
+        """`fembeam.response_spectrum` of the absolute acceleration at z: the load on equipment mounted there.
 
         omega or ``periods=``, zeta : as there; ``body=`` another beam. Warns where samples do not resolve contacts.
         """
@@ -289,8 +291,8 @@ class Run(ContactHistories, Printed):
 
         ``mean``: over each sample (halfway to its neighbours) instead of at it, so that contacts shorter than a sample
         are seen: the trapezoidal rule over the samples gives impulses as exactly as the run has them, those of the log
-        up to the last sample and, from sample to sample, of what always acts. How they fall to both sides of the middle
-        between two samples is found by the law on a cubic. ValueError for a run without samples, or of an earlier
+        up to the last sample and, from sample to sample, of what always acts. Between two samples the law is evaluated
+        on a cubic to divide the impulse at their middle. ValueError for a run without samples, or of an earlier
         version's file.
         """
         if mean:

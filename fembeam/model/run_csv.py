@@ -1,4 +1,4 @@
-"""A run as tables: CSV for spreadsheets, pandas, xarray, what print shows; units in the head of every column."""
+"""A run as tables: CSV for spreadsheets, pandas, xarray, printed tables; units in the head of every column."""
 
 from __future__ import annotations
 

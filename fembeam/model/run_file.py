@@ -20,7 +20,11 @@ from fembeam.scene import Source
 from fembeam.support import versions, written_whole
 from solvers.problem import Losses, Transitions, optional
 
-OLD_NAMES = {"contact_floored": "contact_entry_rate_clipped"}  # in files of earlier versions
+OLD_NAMES = {  # in files of earlier versions
+    "contact_floored": "contact_entry_rate_clipped",
+    "strikers": "impactor_masses",
+    "striker_places": "impactor_places",
+}
 
 FORMAT = 2
 HDF5 = (".h5", ".hdf5")
@@ -36,7 +40,7 @@ UNITS = {
     "contact_energy_loss, energy_*, work": "J",
     "losses": "of each contact: work / J, stored / J, slip / m",
     "shapes, directions": "1/√kg",
-    "strikers": "kg",
+    "impactor_masses": "kg",
     **READOUT_UNITS,
     "on": "of each contact: the beam it pushes, whether from frame 0, body 1 or impactor 2, the number of that",
     "transitions": "rows of contact, t / s, border, number in events, δ / m, δ̇ / m/s, F / N, impulse / N s, work / J",
@@ -76,7 +80,7 @@ def _contents(run: Run) -> tuple[str, dict[str, Any]]:
     arrays = {
         **{"t": run.t, "q": run.q, "q_dot": run.q_dot, "force": run._forces},
         **{"stops": run.stops, "on": run.on, "kinds": run.kinds},
-        **{"directions": run.directions, "strikers": run.strikers},
+        **{"directions": run.directions, "impactor_masses": run.impactor_masses},
         **{"nodes": run.shapes.nodes, "shapes": run.shapes.values},
         **{f"nodes_{i}": shapes.nodes for i, shapes in enumerate(run.others, 1)},
         **{f"shapes_{i}": shapes.values for i, shapes in enumerate(run.others, 1)},
@@ -193,7 +197,7 @@ def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run
         shapes=shapes[0],
         stops=arrays["stops"],
         directions=arrays["directions"],
-        strikers=arrays["strikers"],
+        impactor_masses=arrays["impactor_masses"],
         scene=about["scene"],
         stored_forces=arrays["force"],
         stored_means=arrays.get("mean_force"),

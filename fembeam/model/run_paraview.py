@@ -104,7 +104,7 @@ def _geometry(run: Run) -> tuple[Vector, list[tuple[str, Any]]]:
         parts.append(np.column_stack([shapes.nodes, np.full(size, height), np.zeros(size)]))
         lines.append(np.column_stack([np.arange(size - 1), np.arange(1, size)]) + count)
         count += size
-    places = run.readout.striker_places
+    places = run.readout.impactor_places
     parts.append(np.column_stack([places, np.zeros(len(places))]))
     lines.append(np.repeat(count + np.arange(len(places))[:, None], 2, axis=1))
     return np.concatenate(parts), [("line", np.concatenate(lines))]
@@ -128,9 +128,9 @@ def _fields(run: Run) -> Callable[[int], dict[str, Vector]]:
 def _rows(run: Run, quantity: str) -> tuple[Vector, Vector]:
     """What turns q into a field at the points: shapes (p, n) and a constant part (p,); impactors have displacement."""
     parts = [rows_of(run, quantity, one.nodes, body) for body, one in enumerate((run.shapes, *run.others))]
-    count = len(run.strikers)
-    strikers = np.eye(run.q.shape[1])[run.q.shape[1] - count :] / np.sqrt(run.strikers)[:, None]
-    last = strikers if quantity == "displacement" else np.zeros_like(strikers)
+    count = len(run.impactor_masses)
+    impactors = np.eye(run.q.shape[1])[run.q.shape[1] - count :] / np.sqrt(run.impactor_masses)[:, None]
+    last = impactors if quantity == "displacement" else np.zeros_like(impactors)
     return np.vstack([*(shapes for shapes, _, _ in parts), last]), np.concatenate(
         [*(constant for _, _, constant in parts), np.zeros(count)]
     )

@@ -1,7 +1,7 @@
 """Consistency of the arrays of a saved run; a truncated or edited file is refused with the reason.
 
 k samples, n coordinates, m contacts, b nodes of a beam, c entries of the log:
-t (k,), q, q_dot (k, n), force (m, k), stops (m, 3), kinds (m, 2), on (m, 3), directions (m, n), strikers (i,),
+t (k,), q, q_dot (k, n), force (m, k), stops (m, 3), kinds (m, 2), on (m, 3), directions (m, n), impactor_masses (i,),
 nodes (b,), shapes (2b, n), contact_* (c,), energy_* (k,) but energy_initial; what `fembeam.response.readout` reads a
 run with; not of earlier versions mean_force (m, k), zeta (n,), transitions (r, 9), losses (m, 3), work (k, m) and
 end (2n + l,).
@@ -21,7 +21,7 @@ from solvers.problem import Transitions
 
 Shape = tuple[int, ...]
 TRANSITION_COLUMNS = len(fields(Transitions))
-FINITE = {"transitions", "end", "shapes", "stops", "directions", "strikers", *READOUT_FINITE}
+FINITE = {"transitions", "end", "shapes", "stops", "directions", "impactor_masses", *READOUT_FINITE}
 
 
 def check(arrays: Mapping[str, Any]) -> None:
@@ -36,9 +36,9 @@ def check(arrays: Mapping[str, Any]) -> None:
         _need(np.isfinite(arrays[name]).all() and np.all(steps > 0), f"{name} must be finite and increase")
     for name in (name for name in arrays if name.rstrip("_0123456789") in FINITE):
         _need(np.isfinite(arrays[name]).all(), f"{name} must be finite")
-    _need(np.all(arrays["strikers"] > 0), "strikers must be positive masses")
+    _need(np.all(arrays["impactor_masses"] > 0), "impactor_masses must be positive")
     beams = sum(name.split("_")[0] == "nodes" for name in arrays)
-    most = [beams, len(ON), max(beams, len(arrays["strikers"]))]
+    most = [beams, len(ON), max(beams, len(arrays["impactor_masses"]))]
     whole = arrays["on"].dtype.kind in "iu" and np.all((arrays["on"] >= 0) & (arrays["on"] < most))
     _need(whole, f"on must hold whole numbers from 0, below {most}")
     if "transitions" in arrays:
@@ -56,7 +56,7 @@ def expected(arrays: Mapping[str, Any]) -> dict[str, Shape]:
     later["transitions"] = len(arrays.get("transitions", ())), TRANSITION_COLUMNS
     later["end"] = (max(2 * n, len(arrays.get("end", ()))),)
     shapes |= {name: shape for name, shape in later.items() if name in arrays}
-    shapes["strikers"] = (min(arrays["strikers"].size, n),)
+    shapes["impactor_masses"] = (min(arrays["impactor_masses"].size, n),)
     shapes |= {name: (entries,) for name in arrays if name.startswith("contact_")}
     shapes |= {name: () if name == "energy_initial" else (k,) for name in arrays if name.startswith("energy_")}
     for name in arrays:

@@ -1,4 +1,4 @@
-"""Places worth watching on a beam."""
+"""Places on a beam that tables and figures show by default."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def places(shapes: Shapes) -> dict[str, float]:
-    """Coordinates worth watching, those that move: "tip" (a free end, the far one first) and "mid-beam"."""
+    """Default coordinates, those that move: "tip" (a free end, the far one first) and "mid-beam"."""
     start, end = float(shapes.nodes[0]), float(shapes.nodes[-1])
     mid = (start + end) / 2
     size = {z: float(np.abs(shapes(z)).max()) for z in (end, start, mid)}
@@ -21,6 +21,6 @@ def places(shapes: Shapes) -> dict[str, float]:
 
 
 def observed(model: Model) -> float:
-    """The place to watch: the first stop or element of displacement, else the tip."""
+    """The default place: the first stop or element of displacement, else the tip."""
     acting = [part.z for part in model.scene.acting if not part.coordinate.rotation]
     return acting[0] if acting else next(iter(places(model.shapes).values()))

@@ -173,7 +173,7 @@ class _Stage:
 
     def __init__(self, run: Run, samples: NDArray[np.int64], fps: float | None) -> None:
         self.run, self.samples, self.contact_rows = run, samples, _contacts(run)
-        self.beams, self.impactor_places = run.readout.heights, run.readout.striker_places
+        self.beams, self.impactor_places = run.readout.heights, run.readout.impactor_places
         self.forces = [
             run.force(i)[samples] if one.always else _peaks(run, i, samples) for i, one in enumerate(self.contact_rows)
         ]

@@ -43,7 +43,7 @@ class Figure(of_matplotlib.Figure):
 
         Parameters
         ----------
-        warn : as matplotlib does, when its backend has no windows; without a display there is no picture and no word.
+        warn : as matplotlib does, when its backend has no windows; without a display nothing is shown, silently.
         """
         import warnings
 

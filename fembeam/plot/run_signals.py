@@ -1,4 +1,4 @@
-"""The signals of a run that its figures show, and what may be said of them: how long they last, in how many parts."""
+"""The signals of a run that its figures show, whether they are stationary, and in how many independent parts."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ STEADY = 0.1  # of the largest mean square over a quarter of the time: below it 
 
 
 def responses(run: Run, discard: float = 0.0) -> dict[str, Vector]:
-    """Signals worth a density, m: δ of the first stop of displacement (the tip when there is none) and mid-beam."""
+    """Signals shown with density, m: δ of the first stop of displacement (the tip when there is none) and mid-beam."""
     kept = run.t >= discard
     named, stop = places(run.shapes), first_stop(run)
     first = {} if stop is None else {"δ": run.indentation(stop)}

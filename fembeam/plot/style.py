@@ -74,7 +74,7 @@ def drawable(line: Spectrum, top: float) -> tuple[Vector, Vector]:
 def fit_levels(axis: Axes, lines: list[Spectrum], top: float, behind: list[Spectrum] | None = None) -> None:
     """Limits from the responses, so that a band-limited input does not stretch the axis to rounding errors.
 
-    What lies `behind` shows its peaks, not its valleys.
+    Of curves `behind` only the peaks count.
     """
     levels = np.concatenate([drawable(line, top)[1] for line in lines])
     if len(levels):

@@ -1,9 +1,9 @@
-"""What engineers read off a run or a model: accelerations, section forces, support reactions, mean forces, spectra,
+"""What is evaluated from a run or a model: accelerations, section forces, support reactions, mean forces, spectra,
 transfer functions.
 
-Each file answers one question with functions of a `Run` or a `Model`, which offer them as methods; they know neither.
-`readout` is what a run keeps for them in its file. Imports: `scene`, `beams`, `support`, `reduction`. Begin with
-`readout`.
+Each file answers one question with functions of a `Run` or a `Model`, which offer them as methods. `readout`
+holds what they need of a run besides its coordinates, and what its file keeps. Imports: `scene`, `beams`, `support`,
+`reduction`. Begin with `readout`.
 """
 
 from fembeam.response.backbone import backbone

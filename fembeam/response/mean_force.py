@@ -4,8 +4,8 @@
 
 Impulses are those of the contact log, to the last sample. Of a contact over several cells the law says how its impulse
 is shared, on the cubics through δ and δ̇ at entry, samples and exit, by Gauss-Legendre quadrature of each part within
-one cell. Of what always acts the impulse from sample to sample is that of the run; its halves are found likewise and
-share what misses.
+one cell. Of what always acts the impulse from sample to sample is that of the run; it is divided at the middle by the
+same quadrature.
 """
 
 from __future__ import annotations

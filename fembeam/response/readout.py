@@ -1,8 +1,8 @@
-"""What a run is read with besides its coordinates: made of its model when asked for, or read from its file.
+"""What it takes besides coordinates to evaluate a run: computed from its model when asked for, or read from its file.
 
     q'' = Σ_l v_l s_l(t) + Σ_s w_s F_s - C q' - K q,    reactions = R [F; s; q''; q']
 
-k samples, n coordinates, m contacts, l loads, r reactions. No scene, law or signal is needed to read it.
+k samples, n coordinates, m contacts, l loads, r reactions. Neither scene nor laws nor signals are needed then.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fembeam.scene import heights, loads
-from fembeam.support import require
+from fembeam.support import OldName, require
 
 if TYPE_CHECKING:
     from fembeam.model import Model, Run
@@ -111,10 +111,12 @@ class Readout:
         return np.array(heights(self.model.scene)[0])
 
     @cached_property
-    def striker_places(self) -> Vector:
+    def impactor_places(self) -> Vector:
         """Place z and height of each impactor (i, 2), m."""
         along = [impactor.z for impactor in self.model.matrices.impactors]
         return np.array([along, heights(self.model.scene)[1]]).T.reshape(-1, 2)
+
+    striker_places = OldName("impactor_places")
 
 
 def _sampled(signal: Any, t: Vector) -> Vector:

@@ -1,4 +1,4 @@
-"""What a run is read with as plain arrays and words, so that a file of it can be read without its scene or code."""
+"""The `Readout` of a run as arrays and JSON, so that its file can be read without its scene."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fembeam.response.readout import Readout, Vector
 from fembeam.response.section_forces import SectionForces
 from fembeam.scene import FEATURES
 
-PLAIN = ("stiffness", "damping", "load_vectors", "loads", "frame", "heights", "striker_places")
+PLAIN = ("stiffness", "damping", "load_vectors", "loads", "frame", "heights", "impactor_places")
 READOUT_FINITE = {*PLAIN, "zeta", "reactions", "moments", "shears"}
 READOUT_UNITS = {
     "stiffness": "1/s²",
@@ -22,7 +22,7 @@ READOUT_UNITS = {
     "frame": "m, m/s",
     "moments": "N m/(m √kg)",
     "shears": "N/(m √kg)",
-    "heights, striker_places": "m",
+    "heights, impactor_places": "m",
 }
 HOLDING = {part.__name__: part for name in ("supports", "springs", "dashpots") for part in FEATURES[name]}
 
@@ -74,7 +74,7 @@ def expected_readout(arrays: Mapping[str, Any]) -> dict[str, Shape]:
         **{"stiffness": (n, n), "damping": (n, n), "load_vectors": (loads, n), "loads": (loads, k)},
         **{"frame": (2 if len(arrays["frame"]) else 0, k), "reactions": (r, 2, m + loads + 2 * n)},
         **({"zeta": (n,)} if "zeta" in arrays else {}),
-        **{"heights": (bodies,), "striker_places": (len(arrays["strikers"]), 2)},
+        **{"heights": (bodies,), "impactor_places": (len(arrays["impactor_masses"]), 2)},
     }
     for i in range(bodies):
         elements = arrays[f"nodes_{i}" if i else "nodes"].size - 1

@@ -1,4 +1,4 @@
-"""What there is: supports, masses, springs, stops, elements, impactors, loads; full matrices, contact rows, signals.
+"""The scene: supports, masses, springs, stops, elements, impactors, loads; full matrices, contact rows, signals.
 
 Imports: `beams`, `excitation`, `support`, `reduction`; inside the method `Scene.reduce` also `fembeam.model`.
 Begin with `scene`, then `assembly`.
@@ -12,5 +12,5 @@ from fembeam.scene.local_coordinate import LocalCoordinate, unit_of
 from fembeam.scene.parameters import changes_structure, path_of, replaced, value_of, with_value
 from fembeam.scene.parts import Clamped, Dashpot, Guided, LumpedMass, Pinned, PointForce, PointMoment, Spring, Stop
 from fembeam.scene.scene import FEATURES, Scene
-from fembeam.scene.signals import PLACES, persistent_drive, signals_of, with_signals
+from fembeam.scene.signals import PLACES, for_duration, persistent_drive, signals_of, with_signals
 from fembeam.scene.source import Source

@@ -1,4 +1,4 @@
-"""Who touches whom in a scene: contacts and loads as rows on all dofs, beams, bodies and impactors alike.
+"""Contacts and loads of a scene as rows on all dofs, of beams, bodies and impactors alike.
 
 δ = -w·u - gap, and the contact pushes with +w F:  w = ±(row of one body - row of the other)
 

@@ -1,4 +1,4 @@
-"""The text behind a scene: parsed with overrides, searched by line, carried by runs that can so be repeated."""
+"""The text of a scene file: parsed with overrides, searched for lines, saved with runs so that they can be repeated."""
 
 from __future__ import annotations
 

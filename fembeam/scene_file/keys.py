@@ -1,4 +1,4 @@
-"""What a table of a scene file may hold, read from a constructor's signature: its keys, their types, words for both.
+"""What a table of a scene file may hold, read from a constructor's signature: keys, types, and their names in messages.
 
 The values of TOML are few (whole numbers, numbers, true and false, text, lists); annotations say which one is meant.
 The check itself and its messages are in `tables.TableReader.check_keys`.

@@ -93,7 +93,7 @@ def _source(path: Path) -> Source:
 
 
 def built(source: Source, asked: Sequence[str] = ()) -> SceneFile:
-    """What a text says; the files that it names are taken from it where it carries them, and carried from then on.
+    """The scene file of a source. Files that it names are read from copies saved with a run, if any, else from disk.
 
     `asked`: those of its overrides that are asked for now, and are not the text's own.
     """

@@ -3,9 +3,9 @@
     θ = g(Σ_i r_i),    s.e.² = (n-1)/n Σ_i (θ_(i) - θ̄)²,    θ_(i) = g(Σ_{j≠i} r_j)        (jackknife)
 
 Whatever is a function of sums (means, variances, spectra, rates, ratios) is estimated by one rule. Batches must be
-independent: parts of one record must be much longer than the memory of the signal. Parts of one realisation of a sum of
-lines are not, however long: over its period the power of every line is fixed, whatever its phase. There each batch
-needs a realisation of its own.
+independent: parts of one record must be much longer than the correlation time of the signal. Parts of one realisation
+of a sum of lines are not, however long: over its period the power of every line is fixed, whatever its phase. There
+each batch needs a realisation of its own.
 """
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ class Impacts:
     Notes
     -----
     Entries count where they fall, time in contact where it passes, so neither is biased by where batches end. A contact
-    counts for the means in the batch it began in; the one under way when a stretch ends is left out of them.
+    counts for the means in the batch it began in, unless it has not ended when a segment of the run ends.
     """
 
     def __init__(self) -> None:

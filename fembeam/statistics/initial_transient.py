@@ -40,13 +40,13 @@ class Settling:
 
 
 def settling(x: ArrayLike, dt: float, memory: float) -> Settling:
-    """Find how long the start of a signal is remembered.
+    """Find the end of the initial transient of a signal.
 
     Parameters
     ----------
-    x : (k,) samples, spanning at least 32 memory times.
+    x : (k,) samples, spanning at least 32 correlation times.
     dt : sampling step, s.
-    memory : s in which the linear structure forgets, 1/min(ζω); the length of a batch.
+    memory : correlation time of the linear structure, 1/min(ζω), s; the length of a batch.
 
     References
     ----------

@@ -150,7 +150,7 @@ def _henon(omega: float, t: float, gap: float) -> float:
 
 
 def two_entries_in_a_step() -> Failure:
-    """A quick ripple dips twice into the stop within one step, whose ends see nothing."""
+    """A fast oscillation enters the stop twice within one step; both ends of the step are in flight."""
     omega, ripple = 10.0, 800.0
     system = System.modal([omega, ripple], 0.0, [_stop([1.0, 1.0], contacts.Hertz(1e4), 1.0055)])
     bottom, dt = np.pi / omega, 4.05 * np.pi / ripple
@@ -212,7 +212,7 @@ def newmark_gains_energy() -> Failure:
 
 
 def aliased_high_modes(scene: Scene) -> Failure:
-    """A step that does not resolve the tenth mode is stable by Newmark's rule, but the mode rings at a wrong pitch."""
+    """A step that does not resolve the tenth mode is stable by Newmark's rule, but its frequency is wrong."""
     model, dt = scene.reduce(modes=10), 1e-4
     first = solvers.integrate(*_at_rest(model.system), 0.1, method=_best()).contacts.t_in[0]
     duration = float(first) + 2e-3

@@ -7,7 +7,7 @@ have in common cancels. The uncertainty of an error is the 95 % half-width of th
 error below it is noise and is marked so.
 
 A single transient has no scatter. There the reference is run a second time at ten times the tolerance: errors not well
-above the change this makes may be chance, as in a chaotic motion, and the study says so.
+above the resulting change may be due to rounding, as in chaotic motion, and the study says so.
 """
 
 from __future__ import annotations
@@ -122,7 +122,7 @@ class ModeCount(Printed):
 
     @property
     def doubt(self) -> str:
-        """Which errors are chance; "" when all stand."""
+        """Which errors are within the sensitivity to the tolerance; "" for none."""
         if self.sensitivity is None or self.sensitivity <= NEGLIGIBLE:
             return ""
         errors = [row.error for row in self.rows if not row.reference and np.isfinite(row.error)]

@@ -10,7 +10,7 @@ import numpy as np
 
 from fembeam.excitation import Multisine
 from fembeam.model import Model
-from fembeam.scene import signals_of, with_signals
+from fembeam.scene import for_duration, signals_of, with_signals
 
 Seed = int | np.random.SeedSequence
 
@@ -25,7 +25,7 @@ def noises(model: Model) -> list[Seed]:
 
 
 def seed_key(seed: Seed) -> str:
-    """What tells one seed from another, as text."""
+    """A seed as text, to compare seeds by."""
     if isinstance(seed, np.random.SeedSequence):
         return f"{seed.entropy}{''.join(f'/{i}' for i in seed.spawn_key)}"
     return str(int(seed))
@@ -57,8 +57,8 @@ def realisation(model: Model, seed: Seed) -> Model:
 
 
 def continued(signal: Any, time: float, duration: float) -> Any:
-    """The signal from a later time on, for sums of tones, good for the duration; noise is not moved."""
+    """The signal from a later time on, for sums of tones, for a run of a duration; noise is not moved."""
     if hasattr(signal, "tones") and time > 0.0:
         omega, amplitude = signal.tones()
         signal = Multisine(np.abs(amplitude), omega, np.angle(amplitude) + omega * time)
-    return signal.lasting(duration) if hasattr(signal, "lasting") else signal
+    return for_duration(signal, duration)

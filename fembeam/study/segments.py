@@ -60,7 +60,7 @@ class Segment:
 
 @dataclass
 class Segments:
-    """Where the long run stands."""
+    """State of a long run: time, plan of the segments, sums."""
 
     model: Model
     duration: float
@@ -146,13 +146,13 @@ class Segments:
         return last
 
     def drop(self, piece: Segment) -> None:
-        """Leave the whole segment to the transient."""
+        """Count a whole segment as transient."""
         self.dropped += 1
         self._go_on(piece)
         self.discarded += self.dt * piece.end
 
     def keep(self, piece: Segment, kept: float) -> None:
-        """Count what the statistics took."""
+        """Count a segment that the statistics use."""
         self.index += 1
         self.kept += kept
         self._go_on(piece)

@@ -1,4 +1,4 @@
-"""The smallest model found, and what speaks for it: a table of every model tried."""
+"""The smallest model found, with its evidence: a table of every model tried."""
 
 from __future__ import annotations
 

@@ -80,7 +80,7 @@ class SpeedAccuracy(Printed):
     quantity: str = "displacement at the end"
 
     def front(self, modes: int) -> list[Point]:
-        """Points no other beats in both median time and error, the coarsest first; errors below the floor are alike."""
+        """Points that no other beats in median time and error, the coarsest first; errors below the floor are equal."""
         best: list[Point] = []
         floor = self.floor.get(modes, 0.0)
         for point in sorted((p for p in self.points if p.modes == modes and p.seconds.size), key=lambda p: p.time):
@@ -89,7 +89,7 @@ class SpeedAccuracy(Printed):
         return best
 
     def beaten(self, method: str, better_than: float = 1e-4) -> list[Point]:
-        """Points of the fronts that are more accurate than so and are not of this method: where it is not the front."""
+        """Points of the fronts, more accurate than a limit, that belong to other methods."""
         return [
             point
             for modes in self.reduction
@@ -98,7 +98,7 @@ class SpeedAccuracy(Printed):
         ]
 
     def claim(self, method: str = "Exponential", better_than: float = 1e-4) -> str:
-        """Whether a method is the front below an error, or who is not; "" where there is nothing to compare with."""
+        """A sentence: whether a method is the front below an error, or which others are; "" without others."""
         methods = {point.method for point in self.points}
         reached = any(point.error < better_than for point in self.points)
         if method not in methods or len(methods) < 2 or not reached:

@@ -24,7 +24,7 @@ Watch = Callable[[Run], Any]
 
 @dataclass
 class Sums:
-    """The statistics under way."""
+    """Sums over the segments taken so far."""
 
     watched: Mapping[str, Watch]
     dt: float
@@ -132,7 +132,7 @@ class Response(Printed):
     def power(self, contact: int | None = None) -> Estimate:
         """Mean power (W) that a stop or element takes, numbered as in a `Run`; None: all of them together.
 
-        By the work done on it: what is stored meanwhile has no mean.
+        From the work done on it; the change of the energy stored averages to zero.
         """
         count = len(self.names)
         if contact is not None and not -count <= contact < count:

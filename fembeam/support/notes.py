@@ -1,10 +1,10 @@
-"""What the library tells of its work: `logging` under the name fembeam, at level INFO, silent unless asked for."""
+"""Messages about the work done: `logging` under the name fembeam, at level INFO, silent unless asked for."""
 
 from __future__ import annotations
 
 
 def note(message: str, *values: object) -> None:
-    """Tell whoever listens; values are formatted only then."""
+    """Log a message; its values are formatted only if somebody listens."""
     import logging
 
     logging.getLogger("fembeam").info(message, *values)

@@ -32,9 +32,15 @@ from solvers.orbits import Chain, Orbit, OrbitError, orbit_of
 from solvers.problem import Array
 
 ROUNDING = 1e-9  # of the test functions: what is at a special point all along is marked nowhere
-_SHARP = 1e-10  # of the parameter, or of the way between the points: how sharply a point is located
+_SHARP = 1e-10  # of the parameter, or of the arclength between the points: how sharply a point is located
 _AT = 1e-4  # distance from the unit circle of the multiplier at what passes for a special point
-_NUDGES = 0.0, 1e-7, -1e-7, 1e-6, -1e-6  # of the way: at some guesses rounding keeps the residual over its tolerance
+_NUDGES = (
+    0.0,
+    1e-7,
+    -1e-7,
+    1e-6,
+    -1e-6,
+)  # of the arclength: at some guesses rounding keeps the residual over its tolerance
 
 
 def indicators(orbit: Orbit, tangent: Array) -> dict[str, float]:
@@ -80,12 +86,12 @@ def _is_at(orbit: Orbit, name: str) -> bool:
 class Arc:
     """The part of a branch between two neighbouring points; every orbit found on it improves the next guess.
 
-    Branch minus the cubic through both points and tangents is s² (way - s)² times a smooth function, interpolated here.
+    Branch minus the cubic through both points and tangents is s² (length - s)² times an interpolated function.
     """
 
     a: Point
     b: Point
-    way: float
+    length: float
     straight: bool = field(init=False)
     known: list[tuple[float, Array]] = field(default_factory=list)  # (arclength, the smooth function there)
     trials: dict[float, tuple[Chain, Orbit]] = field(default_factory=dict)
@@ -96,12 +102,12 @@ class Arc:
     def at(self, s: float) -> tuple[Chain, Orbit]:
         """The branch at an arclength from a; raises OrbitError."""
         if s not in self.trials:
-            guess, bend = cubic(self.a, self.b, self.way, s), (s * (self.way - s)) ** 2
+            guess, bend = cubic(self.a, self.b, self.length, s), (s * (self.length - s)) ** 2
             if self.known:
                 places, off = [place for place, _ in self.known], np.array([rest for _, rest in self.known])
                 guess += bend * np.array([np.interp(s, places, column) for column in off.T])
             chain, error, iterations = corrected(self.a, guess, self.straight, not self.straight)
-            rest = np.append(chain.x.ravel(), chain.parameter) - cubic(self.a, self.b, self.way, s)
+            rest = np.append(chain.x.ravel(), chain.parameter) - cubic(self.a, self.b, self.length, s)
             if bend > 0.0:
                 self.known = sorted([*self.known, (s, rest / bend)], key=lambda pair: pair[0])
             orbit = orbit_of(self.a.problem, chain, error, iterations, parameter=chain.parameter)
@@ -110,10 +116,10 @@ class Arc:
 
     def orbit(self, s: float) -> Orbit:
         """The orbit at an arclength from a; raises OrbitError."""
-        return self.a.orbit if s == 0.0 else self.b.orbit if s == self.way else self.at(s)[1]
+        return self.a.orbit if s == 0.0 else self.b.orbit if s == self.length else self.at(s)[1]
 
     def near(self, s: float, width: float) -> tuple[float, Orbit]:
-        """(arclength, orbit) at s, or hardly aside if none is found there; raises OrbitError."""
+        """(arclength, orbit) at s, or very near it if none is found there; raises OrbitError."""
         for place in (s + share * width for share in _NUDGES):
             try:
                 return place, self.orbit(place)
@@ -123,7 +129,7 @@ class Arc:
 
     def indicators(self, s: float) -> dict[str, float]:
         """Test functions at an arclength from a."""
-        for place, point in ((0.0, self.a), (self.way, self.b)):
+        for place, point in ((0.0, self.a), (self.length, self.b)):
             if s == place:
                 return indicators_at(point)
         chain, orbit = self.at(s)
@@ -132,19 +138,19 @@ class Arc:
 
     def sharpness(self) -> float:
         """Arclength to which a special point is to be located."""
-        pace = abs(self.b.chain.parameter - self.a.chain.parameter) / self.way
-        fine = abs(self.a.chain.parameter) / pace if self.straight else self.way
-        return _SHARP * min(fine, self.way)
+        pace = abs(self.b.chain.parameter - self.a.chain.parameter) / self.length
+        fine = abs(self.a.chain.parameter) / pace if self.straight else self.length
+        return _SHARP * min(fine, self.length)
 
 
-def between(a: Point, b: Point, way: float, before: tuple[Point, float] | None = None) -> list[Orbit]:
-    """Marked orbits at the special points between two points ``way`` apart, in their order.
+def between(a: Point, b: Point, length: float, before: tuple[Point, float] | None = None) -> list[Orbit]:
+    """Marked orbits at the special points between two points ``length`` apart, in their order.
 
-    ``before`` is the point before a and the way from it: the three together may tell of two special points on the way.
+    ``before`` is the point before a and the arclength from it: all three may reveal two special points between.
     """
-    arc = Arc(a, b, way)
+    arc = Arc(a, b, length)
     found = list(nonsmooth_points(arc))
-    places = [0.0, *sorted(place for place, _ in found or _dips(arc, before)), way]
+    places = [0.0, *sorted(place for place, _ in found or _dips(arc, before)), length]
     for begin, end in pairwise(places):
         found += _roots(arc, begin, end)
     return [orbit for _, orbit in sorted(found, key=lambda pair: pair[0])]
@@ -164,17 +170,17 @@ def _roots(arc: Arc, begin: float, end: float) -> Iterator[tuple[float, Orbit]]:
 
 
 def _dips(arc: Arc, before: tuple[Point, float] | None) -> Iterator[tuple[float, Orbit]]:
-    """(arclength, orbit) where a test function changes its sign twice on the way, by a parabola through three."""
+    """(arclength, orbit) where a test function changes its sign twice between two points, by a parabola."""
     if before is None:
         return
     first, begin, end = (indicators_at(point) for point in (before[0], arc.a, arc.b))
     for name in ("flip", "neimark-sacker"):
         f = begin[name]
-        back, ahead = (f - first[name]) / before[1], (end[name] - f) / arc.way  # slopes on both sides
-        bend = (ahead - back) / (before[1] + arc.way)
-        slope = ahead - bend * arc.way
+        back, ahead = (f - first[name]) / before[1], (end[name] - f) / arc.length  # slopes on both sides
+        bend = (ahead - back) / (before[1] + arc.length)
+        slope = ahead - bend * arc.length
         place = -0.5 * slope / bend if bend else 0.0
-        if f * end[name] > 0.0 > f * (f + 0.5 * slope * place) and 0.0 < place < arc.way:
+        if f * end[name] > 0.0 > f * (f + 0.5 * slope * place) and 0.0 < place < arc.length:
             try:
                 yield place, arc.at(place)[1]
             except OrbitError:

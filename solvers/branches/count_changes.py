@@ -54,7 +54,7 @@ def nonsmooth_points(arc: Arc) -> Iterator[tuple[float, Orbit]]:
         yield from _floors(arc, begin, near)
         yield place, replace(grazed, mark="grazing")
         begin, first = behind, last
-    yield from _floors(arc, begin, arc.way)
+    yield from _floors(arc, begin, arc.length)
     if len(arc.a.orbit.contacts) == len(arc.b.orbit.contacts):
         yield from _sticks(arc)
 
@@ -103,7 +103,7 @@ def _grazing(
     There the shallowest contact's indentation goes to zero, or the flight between two contacts that become one; of
     "transitions" the time between two.
     """
-    last, behind = arc.b.orbit, arc.way
+    last, behind = arc.b.orbit, arc.length
     more = _count(last, log) > _count(first, log)  # whether contacts are added on the way
     distance: Callable[[Orbit], float] = _shortest_phase
     if log == "contacts":

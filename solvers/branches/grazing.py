@@ -150,11 +150,11 @@ def solved(
         chain = meeting.evaluate(states.reshape(len(stops), size), parameter)
         matrix, right = _linear(meeting, chain, speed)
         step: Array = np.linalg.lstsq(matrix, right, rcond=None)[0].astype(float)
-        unknowns, way = unknowns + step, _length(point, step[:size], step[len(stops) * size])
+        unknowns, distance = unknowns + step, _length(point, step[:size], step[len(stops) * size])
         at_once = np.abs(matrix @ step - right).max() < _AT_ONCE * np.abs(states).max()
-        if not way < within:
+        if not distance < within:
             break
-        if way < _CLOSE and at_once:
+        if distance < _CLOSE and at_once:
             return Grazing(stops, speed, floor, _with_meetings(fractions, stops, unknowns), unknowns, chain)
     met = ", ".join(str(stop) for stop in stops if stop is not None)
     raise OrbitError(f"no orbit that meets stop {met} at {speed:g} m/s was found in {_MOST} iterations")

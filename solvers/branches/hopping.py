@@ -1,8 +1,8 @@
-"""Over points where laws with memory begin or cease to latch, and the branch has a corner that steps do not find.
+"""Continuation past corners of a branch where a law with memory begins or ceases to latch.
 
-What is never latched stays where it is, that is one orbit of a family. Where its border is met it begins to move: with
-the parameter as slowly as the orbit asks for, or to another branch of orbits. The motion itself tells how: it is
-continued from the last orbit for some periods at a parameter hardly farther, and Newton's method goes on from there.
+A number that is never latched within the period keeps its value: the orbit is one of a family. Where its border is met
+it begins to change, gradually with the parameter or by a jump to another branch. The motion itself tells which: it is
+simulated from the last orbit for some periods at a slightly larger parameter, and Newton's method starts from there.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ def hopped(a: Point, span: tuple[float, float], last: float) -> Point | None:
 
 def _behind(a: Point, share: float, span: tuple[float, float]) -> Point:
     """The point at a parameter farther by a share of the span; raises OrbitError among others."""
-    way = math.copysign(share * (span[1] - span[0]), a.share)
-    parameter = min(max(a.chain.parameter + way, span[0]), span[1])
+    shift = math.copysign(share * (span[1] - span[0]), a.share)
+    parameter = min(max(a.chain.parameter + shift, span[0]), span[1])
     point, distance = _point_at(a, parameter)
     near = a.chain.parameter + _PART * (parameter - a.chain.parameter)
     if not 0.0 < _point_at(a, near)[1] < _MOST * distance:

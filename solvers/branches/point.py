@@ -1,8 +1,8 @@
-"""Points of a branch and the way from one to the next.
+"""Points of a branch, and the step from one to the next.
 
 The unknowns y = [states of the shots, parameter] move along the branch's unit tangent t; lengths are measured with
 states relative to the first orbit's size and the parameter relative to the span. Newton's method returns to the branch
-at a fixed parameter, which asks for one system only, or, near folds, at right angles to the tangent.
+at a fixed parameter, which needs one system only, or, near folds, at right angles to the tangent.
 """
 
 from __future__ import annotations
@@ -85,11 +85,11 @@ def point_of(
     return Point(orbit, problem, chain, tangent, metric)
 
 
-def cubic(a: Point, b: Point, way: float, s: float) -> Array:
-    """Unknowns at arclength s from a, on the cubic through two points ``way`` apart and their tangents."""
-    r = s / way
+def cubic(a: Point, b: Point, length: float, s: float) -> Array:
+    """Unknowns at arclength s from a, on the cubic through two points ``length`` apart and their tangents."""
+    r = s / length
     whole = (1.0 + 2.0 * r) * (1.0 - r) ** 2 * a.unknowns + r * r * (3.0 - 2.0 * r) * b.unknowns
-    slopes: Array = way * (r * (1.0 - r) ** 2 * a.tangent + r * r * (r - 1.0) * b.tangent)
+    slopes: Array = length * (r * (1.0 - r) ** 2 * a.tangent + r * r * (r - 1.0) * b.tangent)
     return whole + slopes
 
 

@@ -21,7 +21,7 @@ _SHARP = 1e-10  # of the parameter
 
 @dataclass(frozen=True)
 class Scaled:
-    """A family seen over a multiple of its periods."""
+    """A family with a multiple of its period."""
 
     make: Callable[[float], tuple[System, float]]
     factor: float

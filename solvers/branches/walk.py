@@ -59,7 +59,7 @@ class Walk:
     orbits: list[Orbit] = field(default_factory=list)
     status: BranchStatus = BranchStatus.RUNNING
     step: float = 0.0
-    before: tuple[Point, float] | None = None  # the point before and the way from it
+    before: tuple[Point, float] | None = None  # the point before and the arclength from it
     tried: float = math.inf  # step after whose failure nonsmooth points were looked for
     hop: float = 0.0  # share of the span of the last hop, 0 after a longer step
     at_jump: bool = False  # whether one of them is a jump that could not be crossed
@@ -99,11 +99,11 @@ class Walk:
     def _taken(self, following: Point) -> bool:
         """Whether the next orbit is good; it and the special points before it are kept, up to a subharmonic end."""
         a = self.point
-        way = float(a.tangent @ a.metric @ (following.unknowns - a.unknowns))
-        special = between(a, following, way, self.before)
+        distance = float(a.tangent @ a.metric @ (following.unknowns - a.unknowns))
+        special = between(a, following, distance, self.before)
         marks = [orbit.mark for orbit in special]
-        if way > _THERE and _jumped(a, following, marks):
-            self.status, self.step = BranchStatus.RUNNING, 0.2 * way
+        if distance > _THERE and _jumped(a, following, marks):
+            self.status, self.step = BranchStatus.RUNNING, 0.2 * distance
             return False
         for place, fold in enumerate(special):
             ending = subharmonic_end(a, following, fold) if fold.mark == "fold" else None
@@ -113,7 +113,7 @@ class Walk:
                 return False
         self.orbits += [*special, following.orbit]
         self.before = (
-            None if {"grazing", "stick", "floor"} & {*marks} else (a, way)
+            None if {"grazing", "stick", "floor"} & {*marks} else (a, distance)
         )  # no cubic across a nonsmooth point
         return True
 
@@ -137,16 +137,16 @@ class Walk:
         """The last point before a nonsmooth point if it lies on the way within reach; raises one of ERRORS."""
         a = self.point
         off = unknowns_at(a, grazing) - a.unknowns
-        way, whole = float(a.tangent @ a.metric @ off), math.sqrt(off @ a.metric @ off)
-        if not -_THERE < way < reach or whole > 2.0 * abs(way) + _THERE:
+        distance, whole = float(a.tangent @ a.metric @ off), math.sqrt(off @ a.metric @ off)
+        if not -_THERE < distance < reach or whole > 2.0 * abs(distance) + _THERE:
             return None
         try:
             last = before(a, nonsmooth, grazing)
         except ERRORS:
-            return a if 0.0 < way <= _LAST else None  # a itself is near enough
+            return a if 0.0 < distance <= _LAST else None  # a itself is near enough
         if not a.tangent @ a.metric @ last.tangent > 0.0:
             return None
-        return last if way > _SMALLEST else a
+        return last if distance > _SMALLEST else a
 
     def _cross(self, last: Point | None, point: Point, found: list[Orbit]) -> None:
         """Go on behind a nonsmooth point."""
@@ -164,9 +164,9 @@ class Walk:
     def _hop(self, point: Point) -> None:
         """Go on behind a corner of laws with memory, marked if the number of transitions changes there."""
         same = len(point.orbit.transitions) == len(self.point.orbit.transitions)
-        way = abs(point.chain.parameter - self.point.chain.parameter)
+        distance = abs(point.chain.parameter - self.point.chain.parameter)
         self._cross(None, point, [point.orbit if same else replace(point.orbit, mark="stick")])
-        self.hop = way / (self.span[1] - self.span[0])
+        self.hop = distance / (self.span[1] - self.span[0])
         if point.chain.parameter in self.span:
             self.status = BranchStatus.END
 
@@ -181,11 +181,11 @@ class Walk:
             self.step *= 0.3
             return None
         off, miss = b.unknowns - a.unknowns, b.unknowns - guess
-        way, aligned = float(a.tangent @ a.metric @ off), float(a.tangent @ a.metric @ b.tangent)
-        strayed = math.sqrt(max(float(off @ a.metric @ off) - way**2, 0.0))
-        sharp = aligned < _SHARPEST or strayed > 0.5 * way
+        distance, aligned = float(a.tangent @ a.metric @ off), float(a.tangent @ a.metric @ b.tangent)
+        strayed = math.sqrt(max(float(off @ a.metric @ off) - distance**2, 0.0))
+        sharp = aligned < _SHARPEST or strayed > 0.5 * distance
         across = signature(a.orbit) != signature(b.orbit) or len(a.orbit.transitions) != len(b.orbit.transitions)
-        hops = h < (_THERE if across else _LAST) and way > 0.0 and strayed < _FARTHEST * h
+        hops = h < (_THERE if across else _LAST) and distance > 0.0 and strayed < _FARTHEST * h
         if (sharp and not hops) or is_cut(b.chain, b.orbit.system):  # one not located is stepped over
             self.step *= 0.2 if len(a.orbit.contacts) != len(b.orbit.contacts) else 0.5
             return None
@@ -204,11 +204,11 @@ class Walk:
         if self.before is None or self.before[0].problem is not a.problem:
             self.before = None
             return a.unknowns + self.step * a.tangent
-        last, way = self.before
-        return cubic(last, a, way, way + self.step)
+        last, distance = self.before
+        return cubic(last, a, distance, distance + self.step)
 
     def _near(self, guess: Array) -> Point:
-        """The point near a guess, in the cheaper way if that will do."""
+        """The point near a guess, by the cheaper condition if that suffices."""
         straight = self._is_straight(guess)
         try:
             return moved(self.point, guess, straight)
@@ -222,8 +222,8 @@ class Walk:
         a = self.point
         if self.before is None:
             return abs(a.share) > 0.2
-        last, way = self.before
-        ahead = a.share + (a.share - last.share) * self.step / way
+        last, distance = self.before
+        ahead = a.share + (a.share - last.share) * self.step / distance
         moved_on = (guess[-1] - a.chain.parameter) * a.tangent[-1] > 0.0
         return moved_on and is_straight(last.share, a.share, ahead)
 
@@ -272,11 +272,11 @@ class Walk:
         known = [i for i in among if self.passed[i].problem.fractions == a.problem.fractions]
         if not known:
             return None
-        way = point.unknowns - a.unknowns
-        length = float(way @ point.metric @ way)
+        chord = point.unknowns - a.unknowns
+        length = float(chord @ point.metric @ chord)
         off = np.array([self.passed[i].unknowns for i in known]) - a.unknowns
-        share = off @ (point.metric @ way) / length
-        off -= np.outer(share, way)
+        share = off @ (point.metric @ chord) / length
+        off -= np.outer(share, chord)
         aligned = np.array([self.passed[i].tangent for i in known]) @ (point.metric @ point.tangent)
         distance = np.einsum("ki,ij,kj->k", off, point.metric, off)
         near = (share > 0.0) & (share <= 1.0) & (np.abs(aligned) > 0.5) & (distance < 1e-2 * length)
@@ -306,12 +306,12 @@ def _same_contacts(a: Orbit, b: Orbit) -> bool:
 
 def _is_passed(known: Point, a: Point, b: Point) -> bool:
     """Whether an orbit lies on the branch between two points, which others near it do not."""
-    way = float(a.tangent @ a.metric @ (b.unknowns - a.unknowns))
+    distance = float(a.tangent @ a.metric @ (b.unknowns - a.unknowns))
     share = (known.chain.parameter - a.chain.parameter) / (b.chain.parameter - a.chain.parameter)
     alike = _same_contacts(known.orbit, a.orbit) or _same_contacts(known.orbit, b.orbit)
-    if not (alike and way > 0.0 and 0.0 <= share <= 1.0):
+    if not (alike and distance > 0.0 and 0.0 <= share <= 1.0):
         return False
-    guess = np.append(cubic(a, b, way, share * way)[:-1], known.chain.parameter)
+    guess = np.append(cubic(a, b, distance, share * distance)[:-1], known.chain.parameter)
     try:
         chain, *_ = corrected(a, guess, True)
     except (OrbitError, np.linalg.LinAlgError):

@@ -165,7 +165,7 @@ def lock_folder(waiting: Callable[[], None]) -> IO[bytes] | None:
 
 @contextmanager
 def kept(function: Callable[..., Any]) -> Iterator[bool]:
-    """Whether to keep a function's machine code; numba does so in our folder meanwhile, that of others stays theirs."""
+    """Whether to keep a function's machine code; within the context numba's cache is our folder."""
     with _LOCK:
         before, keep = config.CACHE_DIR, _is_current(function)
         if keep:

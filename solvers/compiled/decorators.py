@@ -1,20 +1,22 @@
 """The decorators of compiled functions: which options of numba they use, what each is worth, what to do without it.
 
-Times without an option over times with it, of runs of the paper's scene (rtol 1e-8) with 2, 10 and 30 modes and of one
-under noise, by turns on one machine; ``python tests/bench/compiler_options.py NAME`` repeats those that have a name:
+Processor times without an option over those with it, of runs of the paper's scene (rtol 1e-8) with 2, 10 and 30 modes
+and of one under noise, by turns on one machine, good to 0.03; ``python tests/bench/compiler_options.py NAME`` repeats
+those that have a name:
 
 | name       | option                              | 2    | 10   | 30   | noise | where numba drops it            |
 |------------|-------------------------------------|------|------|------|-------|---------------------------------|
-| nrt        | ``_nrt=False``, no reference counts | 1.56 | 1.74 | 1.85 | 1.81  | leave it out                    |
-| force      | ``forceinline``                     | 1.05 | 1.04 | 1.01 | 1.15  | `inlined` becomes `inner`       |
-| merged     | ``inline="always"`` (documented)    | 1.07 | 1.07 | 1.05 | 1.04  | `merged` becomes `inner`        |
-| alias      | the mark in `packed._attribute`     | 1.20 | 1.10 | 1.08 | 0.98  | leave the mark out              |
-|            | arrays by address, `packed`         | 1.73 | 1.82 | 1.82 | 1.46  | hand over the named tuples      |
-|            | eight numbers as one, `simd`        | 1.47 | 1.64 | 1.79 | 1.27  | plain loops in `sums`, `flight` |
-|            | called at an address, `parts`       | 0.99 | 1.03 | 1.01 | 1.07  | `part` becomes `inner`          |
+| nrt        | ``_nrt=False``, no reference counts | 1.61 | 1.74 | 1.90 | 1.31  | leave it out                    |
+| force      | ``forceinline``                     | 1.04 | 1.03 | 1.05 | 1.04  | `inlined` becomes `inner`       |
+| merged     | ``inline="always"`` (documented)    | 1.06 | 1.08 | 1.07 | 1.03  | `merged` becomes `inner`        |
+| alias      | the mark in `packed._attribute`     | 1.00 | 1.03 | 1.06 | 1.03  | leave the mark out              |
+| tuples     | arrays by address, `packed`         | 3.13 | 3.20 | 3.68 | 1.89  | hand over the named tuples      |
+|            | eight numbers as one, `simd`        | 1.50 | 1.49 | 2.47 | 1.17  | plain loops in `sums`, `flight` |
+| parts      | called at an address, `parts`       | 0.99 | 1.02 | 0.99 | 1.12  | `part` becomes `inner`          |
 
-The last row was measured together with more merged functions. `parts` halve the time of compiling: the first run took
-67 s of processor without, 33 s with them, by turns on a busy machine; ``python tests/bench/start_up.py`` measures it.
+Without `packed` parts cannot be called at addresses either: that row is of both. `pair_response` returns an array,
+which only a merged function may: without merging it has to fill one. `parts` halve the time of compiling: the first run
+took 67 s of processor without, 33 s with them, by turns; ``python tests/bench/start_up.py`` measures it.
 ``no_cpython_wrapper`` and ``no_cfunc_wrapper`` save most of the compile time of inner functions and no run time.
 ``_nrt``, ``forceinline`` and these two are not documented by numba, nor is what is imported of ``numba.core``: hence
 the upper bound of its version in pyproject.toml. With a new version: raise the bound, run the tests and the bench; what
@@ -146,7 +148,7 @@ def entry(signature: Any) -> Callable[[Any], Any]:
 
 
 def c_function(signature: Any) -> Callable[[Any], Any]:
-    """The same of a function that is called at its ``address``."""
+    """Decorator of a C function, called at its ``address``, likewise."""
 
     def compiled(function: Any) -> Any:
         with _compiling(), kept(function) as keep:

@@ -60,7 +60,7 @@ from solvers.compiled.state import (
 from solvers.compiled.sums import combine
 from solvers.exponential.contact.crossings import FORCE, side_at
 from solvers.exponential.contact.landing_step import landing_step, start_landing
-from solvers.exponential.contact.node_response import START
+from solvers.exponential.contact.node_response import LANDED, START
 from solvers.exponential.linearised_border import pass_border
 from solvers.exponential.linearised_step import (
     DERIVATIVES,
@@ -152,12 +152,21 @@ def _inside_segment(problem, past, s, x):
     return min(max(indentation(problem, s, x), lower * (1.0 + _OFF)), upper * (1.0 - _OFF))
 
 
-@merged
-def _note_sides(problem, tables, past, scratch):
-    """Force before its cut at the start of a landing, for laws cut at zero force, into ``scratch.unresolved``."""
+@inner
+def _note_sides(problem, tables, past, scratch, x):
+    """Force before its cut in a state of a landing, for laws cut at zero force, into ``scratch.unresolved``.
+
+    Where a landing begins or ends the force may be zero, or rounding: the larger one tells. Returns whether the side of
+    a law is another one now.
+    """
+    changed = False
     for s in range(problem.gap.size):
         if past.segment[s] > 0 and tables.bend[s] == FORCE:
-            scratch.unresolved[s] = side_at(problem, tables, past, s, past.x, scratch.trial)
+            force, before = side_at(problem, tables, past, s, x, scratch.trial), scratch.unresolved[s]
+            if abs(force) > abs(before):
+                changed |= (force > 0.0) != (before > 0.0)
+                scratch.unresolved[s] = force
+    return changed
 
 
 @merged
@@ -213,11 +222,16 @@ def _land(problem, ahead, behind, tables, past, scratch, derivatives, variation,
     variable, stop, size = int(row[FIRST]), int(row[SECOND]), 2 * problem.k.size
     w, width, span = scratch.stages[START], past.x.size, row[SPAN]
     start_landing(problem, tables, past, scratch, stop)
-    _note_sides(problem, tables, past, scratch)
-    landing_step(
-        *(problem, tables, False, variable, stop, span, w, past.segment, past.entry_rate),
-        *(scratch.unresolved, scratch.stages),
-    )
+    for s in range(problem.gap.size):
+        scratch.unresolved[s] = 0.0
+    _note_sides(problem, tables, past, scratch, past.x)
+    while True:
+        landing_step(
+            *(problem, tables, False, variable, stop, span, w, past.segment, past.entry_rate),
+            *(scratch.unresolved, scratch.stages),
+        )
+        if not _note_sides(problem, tables, past, scratch, scratch.stages[LANDED]):
+            break
     trial = scratch.stages[STAGES + 1]
     for i in range(STAGES + 1):
         combine(scratch.stages, A[i], i, w, trial)

@@ -110,7 +110,7 @@ def advance_many(
     run, problem_at, tables_at, state_at, scratch_at, energy_tables_at, numbers, rest, parameters, starts, gaps, cursor,
     t_end, budget, rtol, landing_reach, log, out, due, x, count, number, peak,
 ):  # fmt: skip
-    """Integrate the starts of a stretch to ``t_end`` one after the other, for about ``budget`` steps altogether.
+    """Integrate a group of starts to ``t_end`` one after the other, for about ``budget`` steps altogether.
 
     ``run`` is `method.advance`; ``numbers`` is a workspace's memory and ``rest`` what it holds before a start is added,
     ``parameters`` what the laws have latched then, ``starts`` (k, 2N) and ``gaps`` (k, m) those of each run; without
@@ -159,7 +159,7 @@ def whole_starts(engine: Engine, z: Array, factors: Any) -> Array:
 
 
 class Worker:
-    """An engine that integrates stretches of the starts; each thread has one of its own."""
+    """An engine that integrates groups of the starts; each thread has one of its own."""
 
     def __init__(self, engine: Engine, starts: Array, gaps: Array, outcomes: Outcomes, budget: int) -> None:
         self.engine, self.cursor, problem_at = engine, np.zeros(3, dtype=np.int64), engine.addresses[0]
@@ -175,11 +175,11 @@ class Worker:
         )
 
     def assign(self, first: int, beyond: int) -> None:
-        """Set the stretch of starts to integrate."""
+        """Set the group of starts to integrate."""
         self.cursor[:] = first, beyond, 0
 
     def march(self) -> bool:
-        """Continue with the stretch for about a budget of steps; whether it is done."""
+        """Continue with the group for about a budget of steps; whether it is done."""
         advance_many(*self.arguments)
         return bool(self.cursor[NEXT] == self.cursor[BEYOND])
 

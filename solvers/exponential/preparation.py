@@ -32,7 +32,7 @@ TABLES = types.NamedTuple(
     [
         *_arrays(1, 3, 5, 2, 4, 2, 3, 3, 2, 3, 2, 2, 2, 2, 0, 0, 2, 1, 2),
         *(*_arrays(1, 3, 1, 1, 2, 2, 2, 2, 3, 3, 3, 4, 3), INTEGERS, INTEGERS),
-        *_arrays(5, 6, 5, 5, 5, 5, 3, 2, 2, 2, 2, 2, 4),
+        *_arrays(5, 6, 5, 5, 5, 5, 3, 2, 2, 2, 2, 2, 2, 4),
         *(VECTOR, INTEGERS, INTEGERS, MATRIX),
     ],
     Tables,
@@ -208,7 +208,7 @@ class _SharedTables:
         p, v = columns[self.places[0]].transpose(1, 0, 2)
         rate = _of_tones(problem.value.read_rate, n)
         rate[:, 0], rate[:, 1] = -v * problem.value.k[n:], p
-        tables.value.power_rows[:] = problem.value.power
+        tables.value.power_rows[:], tables.value.steady_rate[:, :n] = problem.value.power, steady[n:].T
         fill_tones(tables.value, problem.value, self.tones, self.series)
         rest = among_tones(-response.real.sum(axis=0), self.tones)
         rest[n : n + self.tones] = 1.0

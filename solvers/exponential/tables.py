@@ -88,6 +88,7 @@ class Tables(NamedTuple):
     signal_rows: Any  # (L, 2N): a load's tones from the state
     power_rows: Any  # (L, 2N): input power = signal × power row
     loss_rows: Any  # (r, 2N): damping power = Σ (row·z)²
+    steady_rate: Any  # (2 tones, own padded): rate of the blocks' steady motion from p, then v, of the tones
     gauss: Any  # (2 + S, S): points and weights on (0, 1), then to all points the integrals of each one's polynomial
     extrapolation: (
         Any  # (f, 5, S, S): the force on the next smooth step, 2^{(i-2)/2} times shorter, from that of the last
@@ -139,7 +140,7 @@ TONE_TABLES = (
         "acceleration_weight",
         "rate_weight",
     ),
-    *("signal_rows", "power_rows", "loss_rows", "cell", "cell_error"),
+    *("signal_rows", "power_rows", "loss_rows", "steady_rate", "cell", "cell_error"),
 )
 
 
@@ -204,9 +205,16 @@ def build(
         signal_rows=energy_rows[0],
         power_rows=energy_rows[1],
         loss_rows=energy_rows[2],
-        gauss=np.concatenate((gauss(S), so_far(gauss(S)[0]).T)),
+        steady_rate=np.zeros((2 * tones, padded(size - tones))),
+        gauss=_gauss_rule(),
         extrapolation=node_sets.extrapolation,
     )
+
+
+@lru_cache(maxsize=1)
+def _gauss_rule() -> Any:
+    """Points and weights of Gauss's rule on (0, 1), and the weights of integrals from 0 to each point; only read."""
+    return np.concatenate((gauss(S), so_far(gauss(S)[0]).T))
 
 
 def fill_tones(tables: Tables, problem: Problem, tones: int, series: tuple[tuple[float, float], ...]) -> None:

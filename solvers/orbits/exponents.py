@@ -1,4 +1,4 @@
-"""Largest Lyapunov exponent of a motion: how fast neighbouring ones part."""
+"""Largest Lyapunov exponent of a motion: how fast neighbouring motions diverge."""
 
 from __future__ import annotations
 

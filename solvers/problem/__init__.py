@@ -4,8 +4,7 @@ M q'' + C q' + K q = Σ v_l s_l(t) + Σ w_c F_c(-w_c·q - gap_c, ...)
 
 `system` holds matrices, contacts and loads and decouples them into blocks, `signals` samples loads for compiled code,
 `memo` keeps what was computed once, `result` is the solution with its log of contacts and its energies,
-`losses` what contacts took for good.
-Imports: numpy, scipy. Begin with `system.System`.
+`losses` the energy that contacts dissipated. Imports: numpy, scipy. Begin with `system.System`.
 """
 
 from solvers.problem.decoupling import decouple

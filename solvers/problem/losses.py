@@ -29,7 +29,8 @@ class Losses:
     ----------
     work : (m,) J done on each. stored : (m,) J that its law holds more at the end than at the start; NaN where a law
         cannot tell.
-    slip : (m,) m (rad of rotation), distance that δ went while sliders slipped, summed over the sliders of a law.
+    slip : (m,) m (rad of rotation), distance that δ went while sliders slipped, summed over the sliders of a law; of a
+        user's law in its segment "slip" if it has that and one "stick".
     history : (k, m) J, work done on each up to the samples. impulses : (k, m) N s (N m s), of each force likewise;
         None of a run read from a file.
 
@@ -135,27 +136,31 @@ def _slipped(
     contacts: Sequence[Contact], memory: Sequence[Array], passed: Transitions, begin: Array, end: Array
 ) -> Array:
     """(m,) way of δ while sliders slipped, of those also that slip at the start or at the end of the run."""
-    path, since = np.zeros(len(begin)), _slipping(contacts, memory, begin)
-    for contact, border, event, delta in zip(passed.contact, passed.border, passed.event, passed.delta, strict=True):
-        if event == "slip":
-            since[contact, border] = delta
-        elif event == "stick":
-            path[contact] += abs(delta - since.pop((contact, border), begin[contact]))
-    for (contact, _), delta in since.items():
-        path[contact] += abs(end[contact] - delta)
+    path = np.zeros(len(begin))
+    for number, (contact, latched) in enumerate(zip(contacts, memory, strict=True)):
+        mine = passed.contact == number
+        for borders, place, slip in _sliders(contact.law):
+            since = float(begin[number]) if abs(latched[place]) == slip else math.nan
+            way = 0.0
+            for row in np.flatnonzero(mine & np.isin(passed.border, borders)).tolist():
+                delta = float(passed.delta[row])
+                way += 0.0 if math.isnan(since) else abs(delta - since)
+                since = delta if passed.event[row] == "slip" else math.nan
+            path[number] += way + (0.0 if math.isnan(since) else abs(float(end[number]) - since))
     return path
 
 
-def _slipping(contacts: Sequence[Contact], memory: Sequence[Array], deltas: Array) -> dict[tuple[int, int], float]:
-    """δ of every slider, by contact and border, that slips with what is latched: it may stick next."""
-    found: dict[tuple[int, int], float] = {}
-    for number, (contact, latched) in enumerate(zip(contacts, memory, strict=True)):
-        law: Any = contact.law
-        for border in range(law.borders) if {"stick", "slip"} <= {*getattr(law, "events", ())} else ():
-            row = np.array(law.parameters, dtype=float)
-            row[list(law.memory)] = latched
-            if renew(law, row, border, float(deltas[number]), 0.0) == "stick":
-                found[number, border] = float(deltas[number])
+def _sliders(law: Any) -> list[tuple[list[int], int, int]]:
+    """Of all that sticks and slips in a law: borders, the place of its code in what is latched, the code in slip."""
+    found, border, place = [], 0, 0
+    for part in getattr(law, "acting", (law,)):
+        events = getattr(part, "events", ())
+        coded = [i for i, codes in enumerate(getattr(part, "segment_codes", ())) if codes]
+        for j, i in enumerate(coded if {"stick", "slip"} <= {*events} else ()):
+            each = part.borders // len(coded)
+            own = list(range(border + j * each, border + (j + 1) * each))
+            found.append((own, place + i, events.index("slip")))
+        border, place = border + getattr(part, "borders", 0), place + len(getattr(part, "memory", ()))
     return found
 
 

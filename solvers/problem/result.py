@@ -65,8 +65,8 @@ class ContactLog(Columns):
     ----------
     stop : index of the stop. t_in, t_out : s. speed_in, speed_out : m/s, both positive.
     peak_indentation : m. peak_force : N. impulse : N s. energy_loss : J taken out of the beam.
-    entry_rate_clipped : whether the entry speed was below the law's floor (also for a contact that began at t = 0); every
-        law has one, 1e-3 m/s where none was given, whether or not its force depends on that speed.
+    entry_rate_clipped : whether the entry speed was below the law's floor (also for a contact that began at t = 0);
+        every law has one, 1e-3 m/s where none was given, whether or not its force depends on that speed.
     """
 
     stop: Any

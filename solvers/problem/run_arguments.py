@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from solvers.problem import Array, Parameter, System
+from solvers.problem import Array, Contact, Parameter, System
 
 _MOST_SAMPLES = 500_000_000
 
@@ -35,11 +35,18 @@ def _finite_slopes(system: System) -> bool:
     """True, or ValueError."""
     delta = np.array([1e-12, 1e-10])
     for i, contact in enumerate(system.contacts):
-        viscous = contact.law.force(delta, 1.0, 1.0) - contact.law.force(delta, 0.0, 1.0)
-        if not (contact.law.jump or contact.always) and 0.0 < abs(viscous[1]) < 95.0 * abs(viscous[0]):
-            trouble = f"its slope is infinite at the surface: {contact.law!r}"
-            raise ValueError(f"tangent is not offered for the law of contact {i}: {trouble}")
+        for law in _laws_of_stops(contact):
+            viscous = law.force(delta, 1.0, 1.0) - law.force(delta, 0.0, 1.0)
+            if not law.jump and 0.0 < abs(viscous[1]) < 95.0 * abs(viscous[0]):
+                trouble = f"its slope is infinite at the surface: {contact.law!r}"
+                raise ValueError(f"tangent is not offered for the law of contact {i}: {trouble}")
     return True
+
+
+def _laws_of_stops(contact: Contact) -> list[Any]:
+    """The laws of a contact that act from the surface on: those a sum keeps behind gates beside laws with memory."""
+    gated = [part.law for part in getattr(contact.law, "acting", ()) if hasattr(part, "law")]
+    return gated or ([] if contact.always else [contact.law])
 
 
 def checked_start(system: System, q0: ArrayLike, q_dot0: ArrayLike, method: Any) -> Array:

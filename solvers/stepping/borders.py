@@ -164,7 +164,10 @@ def renew_together(problem, state, space, h, element, border, log):
 
 @inner
 def renew_passed(problem, state, space, log):
-    """Renew every border whose margin is below zero in the present state; whether there was any."""
+    """Renew every border whose margin is below zero in the present state; whether there was any.
+
+    After each the margins are read again: another border of the same segment is none of the next one.
+    """
     found = False
     for s in range(problem.gap.size):
         if problem.border_count[s] == 0:
@@ -173,6 +176,7 @@ def renew_passed(problem, state, space, log):
         for j in range(problem.border_count[s]):
             if space.present[s, j] < -space.rounding[s, j]:
                 renew(problem, state, s, j, delta, rate, log)
+                _present(problem, state, space, s, state.x)
                 found = True
     if found:
         note_event(state)

@@ -1,4 +1,4 @@
-"""One run of a stepping method: its problem, its state, its share of the loop, and words for what went wrong."""
+"""One run of a stepping method: its problem, its state, its share of the loop, and explanations of failures."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Engine:
             self.state.now[[H_FLIGHT, H_CONTACT]] = method.steps
 
     def start(self) -> None:
-        """Put every stop on its piece and evaluate the first rate."""
+        """Find the segment of every stop and evaluate the first rate."""
         state = self.state
         begin_contacts(self.problem, state)
         state.count[CALLS] += rhs(

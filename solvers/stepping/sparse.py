@@ -1,6 +1,6 @@
 """Stepping on the matrices themselves: sparse, of any size, with any damping. The loop is Python, the solves SciPy's.
 
-The state is x = [q, q̇, ledger]; events, log and samples are those of `loop`. The step is constant, so an
+The state is x = [q, q̇, energy balance]; events, log and samples are those of `loop`. The step is constant, so an
 implicit method factorises its matrix once, and a few times more where it lands on an event.
 """
 
@@ -59,7 +59,7 @@ class MatrixEngine:
         return negligible_energy(self.problem, np.array([v @ solve(v) for v in vectors]), self.method.dt)
 
     def start(self) -> None:
-        """Put every stop on its piece and evaluate the first rate."""
+        """Find the segment of every stop and evaluate the first rate."""
         self.space.watch[LEAST] = self._negligible()
         begin_contacts(self.problem, self.state)
         self.refresh()
@@ -73,7 +73,7 @@ class MatrixEngine:
         return True
 
     def march(self, budget: int, log: Array, out: Array, due: Array) -> int:
-        """Go on for a stretch; the loop of `loop.march` for a constant step."""
+        """Advance by at most ``budget`` steps; the loop of `loop.march` for a constant step."""
         state, space, method, t_end = self.state, self.space, self.method, self.duration
         for _ in range(budget):
             code = look(self.problem, state, space, t_end, log, method.events)
@@ -147,7 +147,7 @@ class MatrixEngine:
     # --- what steps are made of
 
     def forces(self, t: float, x: Array, segment: Any, out: Array) -> None:
-        """Loads and contacts on [q, q̇]: out = [q̇, force, ledger rates]."""
+        """Loads and contacts on [q, q̇]: out = [q̇, force, rates of the energy balance]."""
         calls = rhs(self.problem, t, x, segment, self.state.entry_rate, out, self.space.work[3])
         self.state.count[CALLS] += calls
 

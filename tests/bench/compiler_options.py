@@ -1,11 +1,12 @@
 """What each option of the compiler is worth: run times without it over those with it, by turns.
 
-    python tests/bench/compiler_options.py merged force nrt alias [--against TREE]
+    nice -n 5 python tests/bench/compiler_options.py merged force nrt alias parts tuples [--against TREE]
 
 A copy of the packages with one option switched off and this tree each get a process of their own, compile for a
-minute, and then run the twelve starts of `reference` in turns, with 2, 10 and 30 modes, and three modes under noise.
-Printed are medians over the starts of the ratios of shortest times, and whether all ends are the same bit for bit.
-``--against`` compares this tree with another one instead.
+minute, one after the other, and then run the twelve starts of `reference` in turns, with 2, 10 and 30 modes, and three
+modes under noise. Printed are medians over the starts of the ratios of shortest processor times, so that other work on
+the machine matters little, and whether all ends are the same bit for bit. ``--against`` compares this tree with
+another one instead. Without packed arguments (``tuples``) parts cannot be called at addresses: compare with ``parts``.
 """
 
 from __future__ import annotations
@@ -26,12 +27,28 @@ from typing import Any
 HOME = Path(__file__).resolve().parent.parent.parent
 PACKAGES = "fembeam", "contacts", "reduction", "solvers"
 CASES = ["2", "10", "30", "noise"]
-ROUNDS = 40
+ROUNDS = 200
+_NO_PARTS = (
+    ("parts.py", "import c_function", "import c_function, inner"),
+    ("parts.py", "return _call_at(place, result, plain)", "return inner(function)"),
+    ("parts.py", "for place in places:", "for place in ():"),
+)
+_MOSTLY_NOT_MERGED = """
+def merged(function):  # an array can be returned by what is merged only
+    return njit(**_INNER, inline="always" if function.__name__ == "pair_response" else "never")(function)
+"""
 OPTIONS = {  # file, what is there, what is there instead
-    "merged": ("decorators.py", ', inline="always"', ""),
-    "force": ("decorators.py", "forceinline=True", "forceinline=False"),
-    "nrt": ("decorators.py", ', "_nrt": False', ""),
-    "alias": ("packed.py", '    loaded.set_metadata("tbaa", _constant(builder.module))\n', ""),
+    "merged": (("decorators.py", 'merged = njit(**_INNER, inline="always")', _MOSTLY_NOT_MERGED),),
+    "force": (("decorators.py", "forceinline=True", "forceinline=False"),),
+    "nrt": (("decorators.py", ', "_nrt": False', ""),),
+    "alias": (("packed.py", '    loaded.set_metadata("tbaa", _constant(builder.module))\n', ""),),
+    "parts": _NO_PARTS,
+    "tuples": (
+        *_NO_PARTS,
+        ("packed.py", "builder.inttoptr(arguments[0], ", "builder.load(builder.inttoptr(arguments[0], "),
+        ("packed.py", "value_type(signature.return_type))", "value_type(kind).as_pointer()))"),
+        ("packed.py", "return PackedType(kind)(", "return kind("),
+    ),
 }
 
 
@@ -39,12 +56,12 @@ def without(option: str, place: str) -> Path:
     """A copy of the packages without an option."""
     for package in PACKAGES:
         shutil.copytree(HOME / package, Path(place, package), ignore=shutil.ignore_patterns("__pycache__"))
-    name, there, instead = OPTIONS[option]
-    path = Path(place, "solvers", "compiled", name)
-    text = path.read_text(encoding="utf-8")
-    if there not in text:
-        raise LookupError(f"{path.name} has no {there!r} any more: change OPTIONS")
-    path.write_text(text.replace(there, instead), encoding="utf-8")
+    for name, there, instead in OPTIONS[option]:
+        path = Path(place, "solvers", "compiled", name)
+        text = path.read_text(encoding="utf-8")
+        if there not in text:
+            raise LookupError(f"{path.name} has no {there!r} any more: change OPTIONS")
+        path.write_text(text.replace(there, instead), encoding="utf-8")
     return Path(place)
 
 
@@ -78,9 +95,9 @@ def serve() -> None:
             known[case] = runs_of(case)
         seconds, ends = [], []
         for run in known[case]:
-            started = time.perf_counter()
+            started = time.process_time()
             ends.append(float(run()))
-            seconds.append(time.perf_counter() - started)
+            seconds.append(time.process_time() - started)
         print(json.dumps([seconds, ends]), flush=True)
 
 
@@ -88,6 +105,7 @@ class Worker:
     """A process that runs the code of one tree."""
 
     def __init__(self, tree: Path) -> None:
+        self.tree = tree
         command = [sys.executable, __file__, "--serve"]
         paths = {**os.environ, "PYTHONPATH": str(tree)}
         self.process = subprocess.Popen(
@@ -99,7 +117,10 @@ class Worker:
         assert self.process.stdin
         assert self.process.stdout
         print(case, file=self.process.stdin, flush=True)
-        found: list[list[float]] = json.loads(self.process.stdout.readline())
+        answer = self.process.stdout.readline()
+        if not answer:
+            raise RuntimeError(f"the code of {self.tree} does not run: see the traceback above")
+        found: list[list[float]] = json.loads(answer)
         return found
 
 

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 from drawn import Scene, draw_law, draw_signal
+from drawn_wider import reached, widened
 
 import fembeam as fb
 from contacts import KelvinVoigt, Polynomial
 from contacts.memory import BoucWen, Coulomb, ElastoPlastic, Iwan, Jenkins, WaltonBraun
-from solvers import Contact, DormandPrince, System, integrate
+from solvers import Contact, System
 
 RTOLS = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
 
@@ -128,24 +129,19 @@ def draw(seed: int) -> tuple[Scene, float]:
         q0, q_dot0 = np.zeros(n), np.zeros(n)
     rtol = float(rng.choice(RTOLS))
     kinds = " ".join(kind for _, kind in loads)
-    laws = ", ".join(told(contact) for contact in contacts)
-    words = f"rtol {rtol:g} n={n} ω=[{omega[0]:.3g}..{omega[-1]:.3g}] {kinds}; {laws}"
+    words = f"rtol {rtol:g} n={n} ω=[{omega[0]:.3g}..{omega[-1]:.3g}] {kinds}"
     system = System(np.eye(n), C, np.diag(omega**2), contacts, [load for load, _ in loads])
-    scene = Scene(system, q0, q_dot0, rng.uniform(3.0, 15.0) / low, words)
-    return (under_way(scene, rng.uniform(0.5, 8.0) / low) if rng.random() < 0.25 else scene), rtol
-
-
-def under_way(scene: Scene, time: float) -> Scene:
-    """The system begun where a run has come to after a time: stuck, slipping, yielded or pressed."""
-    found = integrate(scene.system, scene.q0, scene.q_dot0, time, method=DormandPrince(1e-10), check=False)
-    memory = [numbers if numbers.size else None for numbers in found.memory]
-    return replace(scene, q0=found.q[-1], q_dot0=found.q_dot[-1], memory=memory, words=scene.words + " under way")
+    scene = widened(seed, Scene(system, q0, q_dot0, rng.uniform(3.0, 15.0) / low, words), speed, low, draw_memory)
+    if rng.random() < 0.25:
+        scene = replace(reached(scene, rng.uniform(0.5, 8.0) / low), words=scene.words + " under way")
+    laws = ", ".join(told(contact) for contact in scene.system.contacts)
+    return replace(scene, words=f"{scene.words}; {laws}"), rtol
 
 
 def told(contact: Contact) -> str:
     """A contact in words."""
     law: Any = contact.law
-    return "+".join(type(part).__name__ for part in getattr(law, "parts", (law,)))
+    return "+".join(getattr(part, "name", type(part).__name__) for part in getattr(law, "parts", (law,)))
 
 
 def disturbed(scene: Scene, rng: np.random.Generator, by: float) -> Scene:

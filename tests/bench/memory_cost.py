@@ -34,7 +34,7 @@ def system_of(part: dict[str, object], base: object, modes: int) -> System:
         PAPER_BEAM, [fb.Clamped(0.0)], damping=fb.ModalDamping(0.02), base=base,
         masses=[fb.LumpedMass(TIP, mass=25.4e-3, inertia=3.0e-6)], **part,
     )  # fmt: skip
-    return scene.reduce(modes).lasting(DURATION).system
+    return scene.reduce(modes).for_duration(DURATION).system
 
 
 def per_event(system: System, rtol: float) -> tuple[float, int]:

@@ -49,8 +49,9 @@ def _end(scene: Scene, method: Any, move: Any = 0.0, **more: Any) -> tuple[Any, 
 def derivative(scene: Scene, reference: Any) -> str:
     """`memory_tangent` by the start against central differences of the reference, with two steps.
 
-    Two steps differ by their errors of the second order, three times that of the shorter one, and by rounding; the
-    derivative by rtol × its own size × the amplification it is. Rows are compared in units of their largest entry.
+    Two steps differ by their errors of the second order, three times that of the shorter one; ends of the reference are
+    off by 1e-13 of the largest of the run × the amplification, the derivative by rtol likewise. Rows are compared in
+    units of their largest entry.
     """
     n = scene.system.size
     scale = np.repeat([np.abs(reference.q).max(), np.abs(reference.q_dot).max()], n)
@@ -69,7 +70,8 @@ def derivative(scene: Scene, reference: Any) -> str:
     size = np.maximum(np.abs(one[0]).max(axis=1, keepdims=True), 1e-4 * np.abs(one[0]).max())
     doubt = np.abs(one[1] - one[0]) / size
     amplification = max(1.0, np.abs(found[: 2 * n] / scale[:, None]).max())
-    off = np.abs(found - one[0]) / size - doubt - 1e-13 / STEP * amplification - ALLOWED * 1e-11 * amplification
+    largest = np.append(scale, np.abs(np.concatenate((np.zeros(0), *run.memory))))[:, None]
+    off = np.abs(found - one[0]) / size - doubt - (1e-13 / STEP + ALLOWED * 1e-11) * amplification * largest / size
     return f"derivative off by {off.max():.2g}" if off.max() > 1e-6 else ""
 
 

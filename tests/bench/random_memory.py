@@ -6,8 +6,11 @@ A system has one to ten modes and one to four elements: sliders, dry friction wi
 Bouc and Wen's hysteresis, yielding with hardening or without and yielding stops, alone or summed with one another and
 with springs and dashpots, on coordinates of their own, on a shared one or between two, beside other stops; it is free,
 or driven by tones, sampled noise, pulses and base motion, from a start at any place or one that is under way; see
-`drawn_memory`. Compared at rtol 1e-4 to 1e-10 are the motion, the log of contacts, the transitions (which, when, at
-which place and force), the work of every element and the energy balance. What a difference is worth is told as in
+`drawn_memory`. Seeds from 100 000 on have dashpots and laws of stops beside yielding stops and sliders, sums of several
+laws with memory, laws of a user's own, full matrices, and starts far beyond limits, with other rates than those under
+way, or with what another run has latched; see `drawn_wider`. Compared at rtol 1e-4 to 1e-10 are the motion, the log of
+contacts, the transitions (which, when, at which place and force, after which work and impulse), work, stored energy,
+loss, slip and impulse of every element and the energy balance. What a difference is worth is told as in
 `random_scenes`, with three bounds besides, of what the motion itself does not determine better:
 
 - Where the motion is off by e, a border with the margin b is met at a time off by |∂b/∂(δ, δ̇)| e / |db/dt|. After the
@@ -16,6 +19,10 @@ which place and force), the work of every element and the energy balance. What a
   (`widened`).
 - Two transitions between which the motion goes beyond a border and back by less than e may be there or not. They are
   left out of both runs only if the runs differ in them; e is the difference of the two motions (`without_pairs`).
+
+Work, loss, slip and impulse of every element, and the energy balance, are also compared with quadratures over the same
+run, sampled densely, of the method and of the reference; no passive law gives energy, and what a slider takes is its
+limit times its slip (`memory_balance`).
 
 Of every tenth system also the derivative of the end by the start is compared with differences of the reference, and
 those free or under tones are run in two parts, the second from what the first has latched; of some also `Newmark` with
@@ -33,13 +40,32 @@ from typing import Any
 import numpy as np
 from drawn import Scene
 from drawn_memory import disturbed, draw
+from memory_balance import Integrals, accounts, integrals, pace_of
 from more_memory_checks import more_checks
-from random_scenes import COARSER, TooStiffError, Verdict, against, numbers_of, references, report, run
+from random_scenes import (
+    ALLOWED,
+    COARSER,
+    REFERENCE,
+    TooStiffError,
+    Verdict,
+    against,
+    numbers_of,
+    references,
+    report,
+    run,
+)
 
 from solvers import DormandPrince, Exponential, SolverError, integrate
 
 MOST_TRANSITIONS = 40
-BY_RATE = ("stick", "reversal", "unload")  # events where δ̇ falls to zero; others come at a certain δ or force
+VALVES = ("throttled", "relieved upwards", "relieved downwards")
+BY_RATE = (
+    "stick",
+    "reversal",
+    "unload",
+    *VALVES,
+)  # events at a certain δ̇, most at zero; others at a δ or force
+BETWEEN = 1e-5 / ALLOWED  # rtol of the reference between its steps
 WIDER = (1.5, 3.0, 6.0)  # a pair on one side of a bound in one run may be on the other side in the other, once
 
 
@@ -74,8 +100,8 @@ def without_pairs(rows: Any, shown: Any, least: Any) -> Any:
             by_rate = int(rows.event[j] in BY_RATE)
             apart = abs(rows.delta[i] - rows.delta[j])
             if by_rate:  # the mean of a parabola between two zeros is 2/3 of its vertex
-                mean = apart / max(rows.t[i] - rows.t[j], 1e-300)
-                apart = max(1.5 * mean, abs(rows.delta_dot[i]))
+                mean = (rows.delta[i] - rows.delta[j]) / max(rows.t[i] - rows.t[j], 1e-300)
+                apart = max(1.5 * abs(mean - rows.delta_dot[j]), abs(rows.delta_dot[i] - rows.delta_dot[j]))
             if apart <= least[rows.contact[i], by_rate]:
                 kept.pop()
                 continue
@@ -83,54 +109,48 @@ def without_pairs(rows: Any, shown: Any, least: Any) -> Any:
     return np.array(kept, dtype=int)
 
 
-def widened(found: dict[str, Any], scene: Scene, solution: Any) -> None:
+def widened(found: dict[str, Any], scene: Scene, solution: Any, along: Integrals) -> None:
     """Put the numbers of contacts of laws with memory, which always act, in units of the whole run.
 
     A step's error is rtol of the largest rate that the element has had since the run began, so a small contact late in
     a run is off by (e_δ, e_v) of the whole: its ends by e_δ/δ̇, its peaks by e_δ and k e_δ, the impulse by k e_δ times
-    its length, the loss by F e_δ.
+    its length, the loss by F e_δ; beside a damper c by c e_v more.
     """
     stops, scale = found["stop"], found["scale"]
     i = [s for s, stop in enumerate(stops) if scene.system.contacts[stop].always]
     if not i:
         return
     stop = np.asarray(stops, dtype=int)[i]
-    stiffness = np.array([_steepest(scene.system.contacts[s].law) for s in stop])
     delta, rate = reach(scene, solution)[stop].T
+    steep = along.stiffness[stop] * delta + along.damping[stop] * rate
     length, force = scale["t_in"][i], scale["peak_force"][i]
     for name, fast in (("t_in", "speed_in"), ("t_out", "speed_out")):
         scale[name] = scale[name].copy()
         scale[name][i] = np.maximum(length, delta / np.maximum(np.nan_to_num(np.abs(found[fast][i])), 1e-300))
-    wide = {"speed_in": rate, "speed_out": rate, "peak_indentation": delta, "peak_force": stiffness * delta}
-    wide |= {"impulse": stiffness * delta * length, "energy_loss": force * delta}
+    wide = {"speed_in": rate, "speed_out": rate, "peak_indentation": delta, "peak_force": steep}
+    wide |= {"impulse": steep * length, "energy_loss": force * delta}
     for name, value in wide.items():
         scale[name] = scale[name].copy()
         scale[name][i] = np.maximum(scale[name][i], value)
 
 
-def _steepest(law: Any) -> float:
-    """Stiffness on the line of unloading, N/m, of the yielding parts of a law."""
-    return sum(float(part.unloading) for part in getattr(law, "parts", (law,)) if hasattr(part, "unloading"))
-
-
-def numbers(solution: Any, scene: Scene, size: float, duration: float, patience: Any, least: Any) -> dict[str, Any]:
-    """What `numbers_of` compares, with the transitions, element by element and border by border."""
+def numbers(
+    solution: Any, scene: Scene, size: float, duration: float, patience: Any, along: Integrals, least: Any = None
+) -> dict[str, Any]:
+    """What `numbers_of` compares, with losses, and with transitions, element by element and border by border."""
     found, rows = numbers_of(solution, scene, size, duration), solution.transitions
-    widened(found, scene, solution)
+    way = reach(scene, solution)[:, 0]
+    widened(found, scene, solution, along)
+    taken(found, solution.losses, along, way, duration)
     i = shown(rows, duration, least)
     contact = rows.contact[i].astype(int)
     found["order"] = [
         *found["order"],
         *zip(contact.tolist(), rows.border[i].tolist(), rows.event[i].tolist(), strict=True),
     ]
-    values = {"t": rows.t[i], "delta": rows.delta[i], "force": rows.force[i], "work": rows.work[i]}
-    largest = {name: np.zeros(len(scene.system.contacts)) for name in values}
-    for name, row in values.items():
-        np.maximum.at(largest[name], contact, np.abs(row))
-    log = solution.contacts
-    np.maximum.at(largest["force"], np.asarray(log.stop, dtype=int), np.abs(log.peak_force))  # it opens at zero
-    largest["delta"] = np.maximum(largest["delta"], reach(scene, solution)[:, 0])  # one that only touches is at zero
-    largest["work"] = np.maximum(largest["work"], largest["force"] * largest["delta"])
+    values = {"t": rows.t[i], "delta": rows.delta[i], "force": rows.force[i]}
+    values |= {"work": rows.work[i], "impulse": rows.impulse[i]}
+    largest = {"delta": way, "force": along.force, "work": along.force * way, "impulse": along.force * duration}
     spacing = duration / (1.0 + np.bincount(contact, minlength=len(scene.system.contacts)))
     for name, row in values.items():
         found[f"border {name}"] = row
@@ -139,6 +159,15 @@ def numbers(solution: Any, scene: Scene, size: float, duration: float, patience:
             scale = np.maximum(scale, patience[i])
         found["scale"][f"border {name}"] = np.maximum(scale, 1e-300)
     return found
+
+
+def taken(found: dict[str, Any], losses: Any, along: Integrals, way: Any, duration: float) -> None:
+    """Put in what the elements have taken, in units of force × reach of the motion; an impulse of force × time."""
+    work, impulse = along.force * way + 1e-300, along.force * duration + 1e-300
+    units = {"work": work, "stored": work, "loss": work, "slip": way}
+    for name, unit in units.items():
+        found[f"losses {name}"], found["scale"][f"losses {name}"] = getattr(losses, name), unit
+    found["losses impulse"], found["scale"]["losses impulse"] = losses.impulses[-1], impulse
 
 
 def patience(scene: Scene, reference: Any) -> Any:
@@ -181,15 +210,17 @@ def _damping_share(law: Any) -> float:
 
 def judged(scene: Scene, rtol: float, seed: int, known: Any) -> Verdict:
     """How the method does on a system of known references."""
-    wait = np.zeros(0) if known[0] is None else patience(scene, known[0])
-    verdict = against(scene, *known, rtol, seed, partial(numbers, patience=wait, least=None), disturbed)
+    if known[0] is None:
+        return against(scene, *known, rtol, seed)
+    along = integrals(scene, REFERENCE, known[0], pace_of(scene))
+    look = partial(numbers, patience=patience(scene, known[0]), along=along)
+    verdict = against(scene, *known, rtol, seed, look, disturbed)
     if not verdict.kind.startswith("events"):
         return verdict
     ours = run(scene, Exponential(rtol))
     apart = reach(scene, type("Apart", (), {"q": ours.q - known[0].q, "q_dot": ours.q_dot - known[0].q_dot}))
     for wider in WIDER:
-        look = partial(numbers, patience=wait, least=wider * apart)
-        again = against(scene, *known, rtol, seed, look, disturbed)
+        again = against(scene, *known, rtol, seed, partial(look, least=wider * apart), disturbed)
         if not again.kind.startswith("events"):
             return again
     return verdict
@@ -205,6 +236,11 @@ def judge(seed: int) -> list[tuple[str, Verdict]]:
         except (TooStiffError, SolverError):
             known = None, None
         verdict = judged(scene, rtol, seed, known)
+        if verdict.kind in ("fine", "ill-conditioned") and known[0] is not None:
+            size = reach(scene, known[0])
+            methods = (Exponential(rtol), rtol), (REFERENCE, BETWEEN)
+            wrong = [words for method, off in methods if (words := accounts(scene, method, off, size))]
+            verdict.kind = "; ".join(wrong) or verdict.kind
         if verdict.kind == "fine":
             verdict.kind = more_checks(scene, rtol, seed, known[0]) or "fine"
         return [(f"seed {seed}: {scene.words}", verdict)]

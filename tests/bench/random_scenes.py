@@ -147,11 +147,16 @@ def differences(a: dict[str, Any], b: dict[str, Any], measure: dict[str, Any], p
 
 
 def imbalance(solution: Any) -> float:
-    """Energy a run does not account for, in units of all the energy it handled, that within its stops included."""
+    """Energy a run does not account for, in units of all the energy it handled."""
+    return float(np.abs(solution.energy.residual).max() / handled(solution))
+
+
+def handled(solution: Any) -> float:
+    """All the energy of a run, J, that within its stops included."""
     e, log = solution.energy, solution.contacts
-    handled = e.initial + np.abs(e.input).max() + np.abs(e.stored).max() + np.abs(log.energy_loss).sum()
-    handled += np.abs(log.peak_force * log.peak_indentation).max(initial=0.0)
-    return float(np.abs(e.residual).max() / max(handled, 1e-300))
+    total = e.initial + np.abs(e.input).max() + np.abs(e.stored).max() + np.abs(log.energy_loss).sum()
+    total += np.abs(log.peak_force * log.peak_indentation).max(initial=0.0)
+    return max(float(total), 1e-300)
 
 
 def judge(seed: int) -> tuple[str, Verdict]:

@@ -104,7 +104,7 @@ def single():
             f"wall; {share:.0%} of the time without the GIL"
         )
     noise, run = model.scene.base.derivative(2), partial(model.simulate, seconds, solver=METHOD)
-    made, whole = (best(call)[0] for call in (lambda: noise.lasting(seconds).nodes(seconds, METHOD.rtol), run))
+    made, whole = (best(call)[0] for call in (lambda: noise.for_duration(seconds).nodes(seconds, METHOD.rtol), run))
     print(f"making the noise: {made / whole:.0%} of a run with the contact log only")
 
 

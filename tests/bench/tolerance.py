@@ -5,8 +5,9 @@ python tests/bench/tolerance.py [--chart FILE.png] [--starts 12]
 The paper's beam, harmonic base motion, two drive periods (two or three contacts): error of δ at the end in units of
 1 mm against `DormandPrince(1e-13)`, median over the starts and the largest; hysteretic and elastic stop, 2, 10 and 30
 modes. The slope is that of a line through log median error over log rtol, above the rounding. The largest errors belong
-to starts whose contacts multiply any error: the last column is the largest factor by which a start multiplies a
-displacement, found by differences.
+to starts whose contacts multiply any error. The third line is the tail of the control itself: the largest error in
+units of rtol times the factor by which that start multiplies a displacement, found by differences. It should stay
+below one. Last come the sums of steps, rejected ones included, and of law calls.
 """
 
 import argparse
@@ -23,11 +24,12 @@ from problems import PAPER_LAW, paper_scene
 from contacts import Hertz
 from solvers import DormandPrince, Exponential, integrate
 
-RTOLS = tuple(10.0**-k for k in range(4, 13))
+RTOLS = tuple(float(f"1e-{k}") for k in range(4, 13))
 STOPS = {"hysteretic": PAPER_LAW, "elastic": Hertz(2.1e8)}
 LENGTH = 1e-3  # m, the unit of the errors
 DURATION = 2.2 * 2.0 * math.pi / 195.0
-FLOOR = 1e-11  # of the reference and of rounding, in units of 1 mm
+SHOWN = RTOLS.index(1e-10) + 1  # of the tail; beyond it rounding decides
+FLOOR = 1e-11  # of the reference and of rounding, in units of 1 mm; contacts multiply it, too
 
 
 def scene(law, n):
@@ -43,29 +45,37 @@ def starts_of(n, count):
 
 
 def end(system, q0, method):
-    """δ at the end of a run from rest at q0, in units of 1 mm."""
+    """δ at the end of a run from rest at q0, in units of 1 mm, and what it cost."""
     run = integrate(system, q0, np.zeros(len(q0)), DURATION, method=method)
-    return -system.contacts[0].direction @ run.q[-1] / LENGTH
+    return -system.contacts[0].direction @ run.q[-1] / LENGTH, run.cost
 
 
 def errors(law, n, rtols=RTOLS, starts=12):
-    """(starts, tolerances) error of δ at the end."""
-    system, found = scene(law, n), np.empty((starts, len(rtols)))
+    """(starts, tolerances) error of δ at the end; (tolerances, 2) steps and law calls of all starts."""
+    system, found, work = scene(law, n), np.empty((starts, len(rtols))), np.zeros((len(rtols), 2), dtype=int)
     for row, q0 in zip(found, starts_of(n, starts), strict=True):
-        exact = end(system, q0, DormandPrince(1e-13, 1e-17))
-        row[:] = [abs(end(system, q0, Exponential(r)) - exact) for r in rtols]
-    return found
+        exact = end(system, q0, DormandPrince(1e-13, 1e-17))[0]
+        for i, rtol in enumerate(rtols):
+            reached, cost = end(system, q0, Exponential(rtol))
+            row[i], work[i] = abs(reached - exact), work[i] + [cost.steps + cost.rejections, cost.law_calls]
+    return found, work
 
 
 def amplification(law, n, starts, size=1e-8):
-    """Largest growth of a displacement of the stop's place by ``size`` (1 mm) in mode 1 or 2, over the starts."""
+    """(starts,) largest growth of a displacement of the stop's place by ``size`` (1 mm) in mode 1 or 2."""
     system, method = scene(law, n), Exponential(1e-12)
     moved = np.eye(2, n) * size * LENGTH / np.abs(system.contacts[0].direction[:2, None])
-    return max(
-        abs(end(system, q0 + by, method) - end(system, q0, method)) / size
-        for q0 in starts_of(n, starts)
-        for by in moved
+    return np.array(
+        [
+            max(abs(end(system, q0 + by, method)[0] - end(system, q0, method)[0]) / size for by in moved)
+            for q0 in starts_of(n, starts)
+        ]
     )
+
+
+def normalised(found, factors, rtols=RTOLS):
+    """Errors in units of rtol times the factor of their start; what may be rounding counts as none."""
+    return np.maximum(found - FLOOR * np.maximum(factors, 1.0)[:, None], 0.0) / (factors[:, None] * rtols)
 
 
 def slope(rtols, found):
@@ -92,9 +102,9 @@ def chart(curves):
     return figure
 
 
-def line(head, values):
+def line(head, values, form=".1e"):
     """One row of the table."""
-    return f"{head:>21s}  " + " ".join(f"{value:8.1e}" for value in values)
+    return f"{head:>21s}  " + " ".join(f"{value:8{form}}" for value in values)
 
 
 def main():
@@ -106,12 +116,13 @@ def main():
     print("stop, modes            " + " ".join(f"{r:8.0e}" for r in RTOLS))
     for name, law in STOPS.items():
         for n in (2, 10, 30):
-            found = errors(law, n, starts=given.starts)
+            found, work = errors(law, n, starts=given.starts)
+            factors = amplification(law, n, given.starts)
             median = curves[name, n] = np.median(found, axis=0)
             print(line(f"{name:11s} {n:2d} median", median) + f"  slope {slope(RTOLS, median):.2f}")
-            print(
-                line("largest", found.max(axis=0)) + f"  factor {amplification(law, n, given.starts):.0f}", flush=True
-            )
+            print(line("largest", found.max(axis=0)) + f"  factors {factors.min():.1f} to {factors.max():.0f}")
+            print(line("over rtol and factor", normalised(found, factors).max(axis=0)[:SHOWN]))
+            print(line("steps", work[:, 0], "d"), line("law calls", work[:, 1], "d"), sep="\n", flush=True)
     if given.chart:
         chart(curves).savefig(given.chart, dpi=100)
 

@@ -1,4 +1,4 @@
-"""How many runs are done: in which processes (`executors`), kept where when interrupted (`checkpoint`).
+"""How many runs are carried out: in which processes (`executors`), and saved as they finish (`checkpoint`).
 
 Runs are told apart by what they compute (`fingerprint`). Imports: `model`, `support`. Begin with `executors.spread`.
 """

@@ -1,4 +1,4 @@
-"""A digest of everything a value or a function consists of, equal between processes: what it would compute with.
+"""A digest of everything a value or a function consists of, equal between processes.
 
 Of a function: byte code, constants, defaults, closure, and the globals it reads, each followed in the same way; of a
 class its methods, of an object its class and state. Code of the standard library and of installed packages counts as

@@ -1,4 +1,7 @@
-"""Where motion settles: diagrams over a parameter by brute force, basins of attraction over starts."""
+"""Where motion settles: bifurcation diagrams by simulation, basins of attraction over starts.
+
+Imports: `model`, `scene`, `support`, `execution`. Begin with `bifurcation`.
+"""
 
 from fembeam.study.settling.basins import Basins, basins
 from fembeam.study.settling.bifurcation import Bifurcation, bifurcation

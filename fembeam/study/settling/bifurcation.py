@@ -1,6 +1,6 @@
-"""Bifurcation diagrams by brute force: simulate, let it settle, look T per period of the load.
+"""Bifurcation diagrams by brute force: simulate, let the motion settle, sample it once per period of the load.
 
-Slow and blind to unstable motion, but independent of shooting and continuation: the check on a branch.
+Slow, and without the unstable motions, but independent of shooting and continuation: the check on a branch.
 """
 
 from __future__ import annotations

@@ -11,9 +11,10 @@ step of a law with broken powers of δ uses t = h σ^κ and F = σ^λ g(σ), whi
 Error estimate: let A₁ be the larger of the last two Jacobi coefficients of the force, in size, and A₂ the larger of the
 two before them. The part of the force that the polynomial leaves out is estimated by A₁ max((A₁/A₂)^{S/2}, A₁/F_max).
 Its effect on the indentation rate of every stop, in contact or not, is compared with rtol × the reference speed of that
-stop. Added to it are the oscillation of modes too fast for the nodes, and the part of the sampled signals, whose cells
-may be shorter than the step, that their polynomials leave out. A kink of the law between an end of the step and the
-nearest node does not show in the coefficients; there the law is compared with the polynomial.
+stop. The stop's own dashpot damps it on the way to the end of the step, less if the stop is being left. Added to it
+are the oscillation of modes too fast for the nodes, and the part of the sampled signals, whose cells may be shorter
+than the step, that their polynomials leave out. A kink of the law between an end of the step and the nearest node does
+not show in the coefficients; there the law is compared with the polynomial.
 """
 
 from __future__ import annotations
@@ -184,8 +185,8 @@ def step_error(problem, tables, state, scratch, node_set, level, is_new, rtol):
         if unresolved == 0.0:
             continue
         ripple = ripple_of(tables.ripple_weight[u], tables.alias[tables.kind[node_set], level], state.x, n)
-        span = h / max(1.0, h * tables.accelerance[u, u] * scratch.viscous[u])  # a strong dashpot damps such errors
-        scratch.unresolved[u] = span * (unresolved + 0.1 * stiffness * ripple)
+        span = h * _undamped_part(tables, scratch, node_set, h, u) if scratch.viscous[u] > 0.0 else h
+        scratch.unresolved[u] = span * (unresolved + 0.03 * stiffness * ripple)
     _sum_errors(problem, tables, scratch, node_set, h)
     worst = 0.0
     for s in range(stops):
@@ -195,6 +196,25 @@ def step_error(problem, tables, state, scratch, node_set, level, is_new, rtol):
             if error != error:
                 break
     return worst
+
+
+@merged
+def _undamped_part(tables, scratch, node_set, h, u):
+    """Part of a step from which errors of a rate reach its end past the stop's dashpot.
+
+        ∫ exp(-∫ d dσ') dσ, the inner integral from σ to 1, d = h × accelerance × slope of the law by the rate,
+
+    d constant around each node. The last nodes decide: the dashpot of a stop that is left fades.
+    """
+    part, left = 0.0, 1.0
+    for k in range(S):
+        i = S - 1 - k
+        share = tables.plain[node_set, i]
+        damped = share * h * tables.accelerance[u, u] * max(scratch.slope[u, 1, i], 0.0)
+        stays = math.exp(-damped)
+        part += left * share * ((1.0 - stays) / damped if damped > 1e-6 else 1.0)
+        left *= stays
+    return part
 
 
 @merged
@@ -295,21 +315,3 @@ def finish_step(problem, tables, state, scratch, node_set, level):
                 state.active[s, PEAK_FORCE] = max(state.active[s, PEAK_FORCE], largest_size(scratch.force[s]))
     copy(scratch.x_new, state.x, size)
     state.now[T] += h
-
-
-@merged
-def contact_time(problem, tables, scratch, s, speed):
-    """Duration, s, of an impact at this speed on one stop alone, from the law's energy: T = 3.2 δ_m/v."""
-    speed = max(speed, 1e-12)
-    accelerance = max(tables.accelerance[s, s], 1e-300)
-    target = 0.5 * speed * speed / accelerance
-    p = tables.exponent[s]
-    deepest = 1e-3 * speed
-    for _ in range(4):  # one is enough for a power law
-        scratch.clipped[0], scratch.trial[0] = deepest, 0.0
-        contact_forces(problem, s, scratch.clipped[0:1], scratch.trial[0:1], speed, scratch.trial[1:2])
-        energy = scratch.trial[1] * deepest / (p + 1.0)
-        if not energy > 0.0 or abs(target - energy) < 0.1 * target:
-            break
-        deepest *= (target / energy) ** (1.0 / (p + 1.0))
-    return 3.2 * deepest / speed

@@ -7,10 +7,9 @@ import math
 import numpy as np
 from numba import types
 
-from solvers.compiled.kernels import dot, indentation, inlined, inner, merged
+from solvers.compiled.kernels import contact_forces, dot, indentation, inlined, inner, merged
 from solvers.compiled.parts import BEGIN, part
 from solvers.compiled.state import T_IN, T, surface_tolerance
-from solvers.exponential.contact.collocation import contact_time
 from solvers.exponential.contact.crossings import choose_sides
 from solvers.exponential.contact.peaks import pressed_speed, state_peaks
 from solvers.exponential.flight import energy_norms
@@ -46,10 +45,28 @@ def begin_steps(problem, tables, state, scratch, stop):
 
 
 @merged
+def _contact_time(problem, tables, scratch, s, speed):
+    """Duration, s, of an impact at this speed on one stop alone, from the law's energy: T = 3.2 δ_m/v."""
+    speed = max(speed, 1e-12)
+    accelerance = max(tables.accelerance[s, s], 1e-300)
+    target = 0.5 * speed * speed / accelerance
+    p = tables.exponent[s]
+    deepest = 1e-3 * speed
+    for _ in range(4):  # one is enough for a power law
+        scratch.clipped[0], scratch.trial[0] = deepest, 0.0
+        contact_forces(problem, s, scratch.clipped[0:1], scratch.trial[0:1], speed, scratch.trial[1:2])
+        energy = scratch.trial[1] * deepest / (p + 1.0)
+        if not energy > 0.0 or abs(target - energy) < 0.1 * target:
+            break
+        deepest *= (target / energy) ** (1.0 / (p + 1.0))
+    return 3.2 * deepest / speed
+
+
+@merged
 def _first_step(problem, tables, state, scratch, stop):
     """Level of the first step of a contact, a share of the duration of an impact on this stop alone."""
     speed = abs(dot(problem.read_rate[stop], state.x, 2 * problem.k.size))
-    duration = contact_time(problem, tables, scratch, stop, max(speed, 1e-3 * scratch.reference_speed[stop]))
+    duration = _contact_time(problem, tables, scratch, stop, max(speed, 1e-3 * scratch.reference_speed[stop]))
     if scratch.first_step_share[stop] == 0.0:
         scratch.first_step_share[stop] = min(0.1, 4.0 / (tables.fastest * duration))
     scratch.duration[0] = duration

@@ -9,7 +9,8 @@ It is a step of DOP853 with t among the unknowns, in a variable in which the mot
 The unknowns are [p, v, energy balance, t, u]. The fastest block moves by less than `landing_reach` radians, within
 which the step of every block is exact to the tolerance. The error by the forces is estimated by a tenth of the embedded
 fifth-order difference, for every stop in units of its own tolerance: in these variables this is a few times the true
-error, while DOP853's own mixed estimate is below it.
+error, while DOP853's own mixed estimate is below it. All of it counts where the stop's dashpot is too strong for an
+explicit step. A landing stays within a cell of sampled signals, whose kinks the difference does not see.
 """
 
 from __future__ import annotations
@@ -43,7 +44,9 @@ from solvers.exponential.contact.peaks import state_peaks
 _MOST_TRIES = 8  # to find the step that ends at an output time, or on a bend
 _PART = 0.1  # of the embedded difference that counts as the error
 _PART_OF_FOURTH = 1e-2  # with u = δ^{1/4}: terms t² = u⁸ are exact in the step, and all of the difference
+_OF_SLOPES, _MOST_SLOPE = 0.01, 1e4  # the derivative of a run may err by a hundred tolerances of the motion
 _LAST = 0.09  # indentation, in units of the deepest, from which the last step is tried
+_LAST_ROOT, _MOST_ROOT = 0.2, 0.25  # the same of u = δ^{1/2}, / reach², and at most: its error grows like u⁹
 
 
 def landing_reach(rtol: float) -> float:
@@ -171,6 +174,27 @@ def _accept(problem, tables, state, scratch, variable, stop, span, t_end, out, d
     return True
 
 
+@inlined
+def _furthest(problem, tables, scratch):
+    """Longest landing, s: within the reach of the fastest block, and within a cell of the sampled signals."""
+    furthest = scratch.landing_reach[0] / tables.fastest
+    return min(furthest, problem.table_dt[0]) if problem.table_dt.size else furthest
+
+
+@merged
+def _slopes_by_forces(problem, tables, state, stop, w, x):
+    """Error of the derivative by that of the motion: a force like δ^{3/2} that errs by e has a slope that errs by e/δ.
+
+    With derivatives in units of the largest motion of a stop's place, another stop counts that was entered just now.
+    """
+    most = 0.0
+    for s in range(problem.gap.size):
+        if s != stop and state.segment[s] > 0 and tables.time_exponent[1 + s] > 1.0:
+            deepest = max(indentation(problem, s, w), indentation(problem, s, x))
+            most = max(most, abs_dot(problem.read[s], w, 2 * problem.k.size) / max(deepest, 1e-300))
+    return min(most, _MOST_SLOPE)
+
+
 @merged
 def land(problem, tables, state, scratch, stop, direction, near, rtol, t_end, out, due, with_energy):
     """Try to land on a border of ``stop``, about ``near`` s ahead.
@@ -178,22 +202,29 @@ def land(problem, tables, state, scratch, stop, direction, near, rtol, t_end, ou
     Returns ``stop`` if it succeeded, another stop whose border is crossed before, or -1.
     """
     size, t = state.x.size, state.now[T]
-    delta, furthest = indentation(problem, stop, state.x), scratch.landing_reach[0] / tables.fastest
+    delta, furthest = indentation(problem, stop, state.x), _furthest(problem, tables, scratch)
     level = problem.knots[stop, state.segment[stop] - (1 if direction < 0 else 0)]
     leaving = direction < 0 and state.segment[stop] == 1
     rate = dot(problem.read_rate[stop], state.x, 2 * problem.k.size)
     if near > furthest or abs(rate) <= rate_tolerance(problem, stop, state.x):
         return -1
-    if leaving and delta > _LAST * state.active[stop, PEAK_DELTA]:
+    last, kappa = _LAST, tables.time_exponent[1 + stop]
+    if kappa == 2.0:
+        last = min(_LAST_ROOT * scratch.landing_reach[0] ** 2, _MOST_ROOT)
+    if leaving and delta > last * state.active[stop, PEAK_DELTA]:
         return -1
     if not leaving and state.segment[stop] > 0 and abs(level - delta) > 0.2 * max(level, delta):
         return -1
     start_landing(problem, tables, state, scratch, stop)
     w, x = scratch.stages[START], scratch.stages[LANDED]
-    variable = ROOT if leaving and tables.time_exponent[1 + stop] > 1.0 else INDENTATION
+    variable = ROOT if leaving and kappa > 1.0 else INDENTATION
     span = -w[size + 1] if variable == ROOT else level - delta
     _step(problem, tables, state, scratch, variable, stop, span, with_energy)
-    landed, part = x[size], _PART_OF_FOURTH if variable == ROOT and tables.time_exponent[1 + stop] == 4.0 else _PART
+    landed, part = x[size], _PART_OF_FOURTH if variable == ROOT and kappa == 4.0 else _PART
+    if scratch.viscous[stop] > 0.0:  # too strong a dashpot for an explicit step
+        part = 1.0
+    if state.event_record.shape[0]:
+        part = max(part, _OF_SLOPES * _slopes_by_forces(problem, tables, state, stop, w, x))
     width = surface_tolerance(problem, stop, state.x) / abs(rate)  # a distance may be that much rounding
     if not t <= landed <= t + min(4.0 * near, furthest) + width:
         return -1
@@ -239,7 +270,7 @@ def land_on_bend(problem, tables, state, scratch, stop, border, near, rtol, t_en
 
     A border that is passed before is noted in ``scratch.landed``: -1 if none is, and less if that cannot be told.
     """
-    furthest, largest = scratch.landing_reach[0] / tables.fastest, scratch.bend_values[scratch.bend_values.size - 1]
+    furthest, largest = _furthest(problem, tables, scratch), scratch.bend_values[scratch.bend_values.size - 1]
     enough = 1e-10 * largest
     if border >= 0:  # one that is missed by more may seem to be passed the other way by the next step
         largest, enough = scratch.largest[stop, border], 0.1 * scratch.noise[stop, border]

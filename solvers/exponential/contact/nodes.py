@@ -151,7 +151,7 @@ def node_sets_of(series: tuple[tuple[float, float], ...]) -> NodeSets:
         plain=each(_plain_weights),
         summary=each(_summary),
         tail=each(lambda f: _tail(f.nodes)),
-        local_interpolation=each(lambda f: [_zoom(f, *bracket) for bracket in _brackets(f)]),
+        local_interpolation=each(lambda f: [_interpolate_locally(f, *bracket) for bracket in _brackets(f)]),
         local_interval=each(_brackets),
         extrapolation=each(lambda f: _extensions(f, found[0])),
         lagrange=each(lambda f: _weights(f.nodes) * [np.ones(S), f.nodes ** (-f.weight_exponent)]),
@@ -184,8 +184,8 @@ def _brackets(node_set: _NodeSet) -> Any:
     return np.column_stack((ends[:-2], ends[2:]))
 
 
-def _zoom(node_set: _NodeSet, begin: float, end: float) -> Any:
-    """(2S + 2, 2S): δ and h δ̇ at the points `LOCAL` of [begin, end] from those at the nodes and at the step's start.
+def _interpolate_locally(node_set: _NodeSet, begin: float, end: float) -> Any:
+    """(2S + 2, 2S): δ and h δ̇ at the points `LOCAL` of a bracket [begin, end] of σ, from those at nodes and start.
 
     δ is Hermite's polynomial in σ. δ̇ of a smooth step is the polynomial through its values; in a short one the slope of
     the former is rounding over h. On an entry step it is that slope over dt/dσ, and where that vanishes, beside

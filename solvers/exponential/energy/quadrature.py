@@ -12,7 +12,7 @@ from numba import types
 
 from solvers.compiled.kernels import REAL, VECTOR, dot, inlined, inner, merged, reordered, table_value
 from solvers.compiled.parts import WITHIN_STEP, part
-from solvers.compiled.simd import load8, splat8, store8, sum8
+from solvers.compiled.simd import WIDTH, load8, splat8, store8, sum8
 from solvers.compiled.sums import combine
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.responses import propagate
@@ -34,24 +34,27 @@ def powers(problem, tables, t, x):
         for r in range(tables.loss_rows.shape[0]):
             loss += dot(tables.loss_rows[r], x, size) ** 2
     else:
-        loss = _plain_loss(problem.k.size, own, problem.c, tables.loss_rows, x)
+        loss = _plain_loss(problem.k.size, own, problem.c, tables.steady_rate, x)
     return gain, loss
 
 
 @reordered
-def _plain_loss(n, own, c, rows, x):
-    """Power of damping, W, of blocks with c, or with tones by rows with entries for the block's own rate and these."""
-    loss = 0.0
-    if own == n:
-        for b in range(n):
-            loss += c[b] * x[n + b] * x[n + b]
-        return loss
-    for b in range(own):
-        value = rows[b, n + b] * x[n + b]
-        for k in range(own, n):
-            value += rows[b, k] * x[k] + rows[b, n + k] * x[n + k]
-        loss += value * value
-    return loss
+def _plain_loss(n, own, c, steady_rate, x):
+    """Power of damping, W, of blocks with c whose rate is that of x and of the steady motion under tones."""
+    loss, whole, tones = 0.0, own - own % WIDTH, n - own
+    losses = splat8(0.0)
+    for first in range(0, whole, WIDTH):
+        rate = load8(x, n + first)
+        for k in range(tones):
+            rate += splat8(x[own + k]) * load8(steady_rate[k], first)
+            rate += splat8(x[n + own + k]) * load8(steady_rate[tones + k], first)
+        losses += load8(c, first) * rate * rate
+    for b in range(whole, own):
+        rate = x[n + b]
+        for k in range(tones):
+            rate += x[own + k] * steady_rate[k, b] + x[n + own + k] * steady_rate[tones + k, b]
+        loss += c[b] * rate * rate
+    return loss + sum8(losses)
 
 
 @inlined

@@ -1,0 +1,17 @@
+"""What signals without an end share."""
+
+from __future__ import annotations
+
+from typing import Self
+
+from fembeam.support import OldName
+
+
+class Unlimited:
+    """A signal defined for all times."""
+
+    def for_duration(self, duration: float) -> Self:
+        """The signal itself, which serves a run of any length."""
+        return self
+
+    lasting = OldName("for_duration")

@@ -1,0 +1,109 @@
+"""What else a user may build with laws with memory, for `drawn_memory.py`: sums with dashpots and stops, any start.
+
+Drawn by a generator of its own, so that what a seed below `WIDER_FROM` stands for has stayed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from drawn import Scene, draw_law
+from own_memory_laws import draw_own
+
+from contacts import Iwan, KelvinVoigt, Polynomial, WaltonBraun
+from contacts.custom import CustomLaw
+from solvers import Contact, DormandPrince, System, integrate
+
+WIDER_FROM = 100_000  # the first seed
+
+
+def reached(scene: Scene, time: float) -> Scene:
+    """The system begun where a run has come to after a time: stuck, slipping, yielded or pressed."""
+    found = integrate(
+        *(scene.system, scene.q0, scene.q_dot0, time), method=DormandPrince(1e-10), memory=scene.memory, check=False
+    )
+    memory = [numbers if numbers.size else None for numbers in found.memory]
+    return replace(scene, q0=found.q[-1], q_dot0=found.q_dot[-1], memory=memory)
+
+
+def widened_contact(rng: np.random.Generator, contact: Contact, speed: float, low: float, laws: Any) -> Contact:
+    """A contact of other laws: one of a user's own, or with dashpots, stops and further laws with memory beside it."""
+    mass = 1.0 / float(contact.direction @ contact.direction)
+    k = mass * (low * 10.0 ** rng.uniform(-0.3, 1.2)) ** 2
+    limit = k * speed / low * 10.0 ** rng.uniform(-1.5, 0.0) * min(1.0, mass * low**2 / k) ** 0.5
+    if not contact.always:
+        return contact
+    law: Any = draw_own(rng, k, limit, speed) if rng.random() < 0.2 else contact.law
+    others: list[Callable[[], Any]] = [
+        lambda: KelvinVoigt(1e-6 * k, rng.uniform(0.02, 0.8) * np.sqrt(k * mass)),
+        lambda: KelvinVoigt(rng.uniform(0.0, 2.0) * k, 10.0 ** rng.uniform(-3.0, 0.0) * np.sqrt(k * mass)),
+        lambda: Polynomial([0.1 * k, 0.0, k * (low / speed) ** 2]),
+        lambda: laws(rng, mass, speed, low),
+        lambda: WaltonBraun(k, k * (1.0 + 10.0 ** rng.uniform(-1.0, 1.0)), str(rng.choice(["kept", "forgotten"]))),
+        lambda: _law_of_stops(rng, mass, speed, low) if law.memory else laws(rng, mass, speed, low),
+        lambda: Iwan([k, 0.3 * k], [limit, np.inf]),
+        lambda: draw_own(rng, k, limit, speed),
+    ]
+    opens = bool(getattr(law, "opens", False))
+    while rng.random() < (0.8 if opens else 0.4):
+        law, opens = law + others[rng.integers(2 if opens and rng.random() < 0.6 else len(others))](), False
+    return Contact(contact.direction, law, contact.gap, always=True)
+
+
+def _law_of_stops(rng: np.random.Generator, mass: float, speed: float, low: float) -> Any:
+    """A law of stops; none of a user's own without memory, which would act at both signs of δ and be refused."""
+    law: Any = draw_law(rng, mass, speed, 10.0 ** rng.uniform(-1.5, -0.3) / low)
+    return _law_of_stops(rng, mass, speed, low) if isinstance(law, CustomLaw) else law
+
+
+def in_other_coordinates(rng: np.random.Generator, scene: Scene) -> Scene:
+    """The same system in other coordinates x = T q: full matrices."""
+    n, system = scene.system.size, scene.system
+    turned = [np.linalg.qr(rng.standard_normal((n, n)))[0] for _ in range(2)]
+    T = turned[0] * 10.0 ** rng.uniform(-0.3, 0.3, n) @ turned[1]
+    M, C, K = (T.T @ matrix @ T for matrix in (system.M, system.C, system.K))
+    contacts = [replace(contact, direction=T.T @ contact.direction) for contact in system.contacts]
+    loads = [(T.T @ vector, signal) for vector, signal in system.loads]
+    q0, q_dot0 = np.linalg.solve(T, scene.q0), np.linalg.solve(T, scene.q_dot0)
+    M, C, K = (0.5 * (matrix + matrix.T) for matrix in (M, C, K))
+    return replace(scene, system=System(M, C, K, contacts, loads), q0=q0, q_dot0=q_dot0)
+
+
+def with_other_start(rng: np.random.Generator, scene: Scene, time: float) -> Scene:
+    """Far beyond limits, with what another run has latched, or with other rates than those under way."""
+    kind = rng.random()
+    if kind < 0.25:
+        far = 10.0 ** rng.uniform(0.3, 1.2)
+        return replace(scene, q0=far * scene.q0, q_dot0=scene.q_dot0, words=scene.words + " far")
+    if kind < 0.5:
+        kicked = reached(scene, time)
+        return replace(kicked, q_dot0=rng.choice([-1.0, 0.0, 2.0]) * scene.q_dot0, words=scene.words + " kicked")
+    if kind < 0.75:
+        return replace(scene, memory=_begun_again(scene, reached(scene, time).memory), words=scene.words + " latched")
+    return scene
+
+
+def _begun_again(scene: Scene, memory: list[Any]) -> list[Any]:
+    """What was latched with the codes of a start: sliders stick where they were held, stops are open and dented."""
+    found = [None if numbers is None else numbers.copy() for numbers in memory]
+    for contact, numbers in zip(scene.system.contacts, found, strict=True):
+        law: Any = contact.law
+        if numbers is not None:
+            coded = [bool(codes) for codes in law.segment_codes]
+            numbers[coded] = law.parameters[list(law.memory)][coded]
+    return found
+
+
+def widened(seed: int, scene: Scene, speed: float, low: float, laws: Any) -> Scene:
+    """The system of a seed with other laws, start and coordinates; as it is for seeds before."""
+    if seed < WIDER_FROM:
+        return scene
+    rng, system = np.random.default_rng([seed, 23]), scene.system
+    contacts = [widened_contact(rng, contact, speed, low, laws) for contact in system.contacts]
+    C = 0.0 * system.C if rng.random() < 0.1 else system.C
+    scene = replace(scene, system=System(system.M, C, system.K, contacts, system.loads))
+    scene = with_other_start(rng, scene, rng.uniform(0.5, 8.0) / low)
+    return in_other_coordinates(rng, scene) if rng.random() < 0.2 else scene
