@@ -291,9 +291,8 @@ class Run(ContactHistories, Printed):
 
         ``mean``: over each sample (halfway to its neighbours) instead of at it, so that contacts shorter than a sample
         are seen: the trapezoidal rule over the samples gives impulses as exactly as the run has them, those of the log
-        up to the last sample and, from sample to sample, of what always acts. Between two samples the law is evaluated
-        on a cubic to divide the impulse at their middle. ValueError for a run without samples, or of an earlier
-        version's file.
+        to the last sample and, from sample to sample, of what always acts. Between two samples the law is evaluated on
+        a cubic to divide the impulse at their middle. ValueError for a run without samples, or an earlier version's.
         """
         if mean:
             from fembeam.response import mean_force
