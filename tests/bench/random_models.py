@@ -36,7 +36,7 @@ import fembeam as fb
 from solvers import Exponential, SolverError
 
 ALLOWED = 300.0
-WORST_ROUNDING = 1e-5  # of the lowest frequency in the second implementation: places very near each other
+WORST_ROUNDING = 1e-5  # of the lowest frequency in the second implementation: two places very near each other
 MOVE = 1e-7  # of the start, relative
 
 
