@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -68,15 +69,25 @@ def test_compiling_is_told_in_one_line_and_loading_is_not(package):
 @pytest.mark.skipif(sys.platform == "win32", reason="no such locks")
 def test_processes_compile_one_after_the_other(package):
     """Two at a time may give the files of two signatures one number, and the wrong code would be loaded ever after."""
-    held = "import solvers.compiled.cache as c, time\nfile = c.lock_folder(print)\nprint(1, flush=True)\n"
+    held = "import solvers.compiled.cache as c, time\nfile = c.lock_folder(print)\nprint(1, flush=True)\ninput()\n"
     entry = "from numba import float64\nfrom solvers.compiled.decorators import entry\n"
     (package / "one.py").write_text(entry + "@entry(float64(float64))\ndef one(x): return 2.0 * x\n")
+    tell = "print(time.time(), flush=True)"
     environment = {**os.environ, "PYTHONPATH": str(package.parent), "NUMBA_CACHE_DIR": ""}
-    command = [sys.executable, "-c", held + "time.sleep(4.0)\nprint(time.time())"]
-    with subprocess.Popen(command, cwd=package.parent, env=environment, stdout=subprocess.PIPE, text=True) as first:
+    pipes: Any = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    first, second = (
+        subprocess.Popen([sys.executable, "-c", code + tell], cwd=package.parent, env=environment, **pipes)
+        for code in (held, "import time; input(); import solvers.one; ")
+    )
+    with first, second:
         assert first.stdout.readline() == "1\n"  # it has the lock
-        (end,), _ = ran("import solvers.one, time; print(time.time())", package.parent, NUMBA_CACHE_DIR="")
-        assert float(end) > float(first.stdout.read())
+        own = "import solvers.compiled.decorators; from numba import njit; print(njit(lambda x: x)(1.0))"
+        assert ran(own, package.parent, NUMBA_CACHE_DIR="")[0] == ["1.0"]  # code of others does not wait
+        second.stdin.write("\n")
+        second.stdin.flush()
+        time.sleep(2.0)
+        end = first.communicate("\n")[0]
+        assert float(second.communicate()[0]) > float(end)
 
 
 def test_what_changes_while_a_process_runs_is_not_kept(package):

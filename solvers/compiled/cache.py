@@ -128,8 +128,8 @@ _STAMPS = _stamps()
 FOLDER = _folder(PREFIX + _digest(list(_STAMPS)))
 
 
-def _is_current(function: Callable[..., Any]) -> bool:
-    """Whether the digest is that of a function's sources.
+def is_current(function: Callable[..., Any]) -> bool:
+    """Whether a function is one of these sources, as they were when the digest was made.
 
     It is not where a file was changed since: what is defined from then on may call what is in it.
     """
@@ -167,7 +167,7 @@ def lock_folder(waiting: Callable[[], None]) -> IO[bytes] | None:
 def kept(function: Callable[..., Any]) -> Iterator[bool]:
     """Whether to keep a function's machine code; within the context numba's cache is our folder."""
     with _LOCK:
-        before, keep = config.CACHE_DIR, _is_current(function)
+        before, keep = config.CACHE_DIR, is_current(function)
         if keep:
             config.CACHE_DIR = str(FOLDER)
         try:

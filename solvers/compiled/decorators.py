@@ -36,7 +36,7 @@ from typing import IO, Any
 from numba import cfunc, config, njit
 from numba.core import event
 
-from solvers.compiled.cache import kept, lock_folder
+from solvers.compiled.cache import is_current, kept, lock_folder
 
 if config.DISABLE_JIT:
     raise RuntimeError("NUMBA_DISABLE_JIT is set, but time integration runs as machine code only: unset it")
@@ -89,36 +89,62 @@ _NOTICE = _CompilerNotice()
 
 
 class _OneProcess(event.Listener):
-    """Lets one process at a time compile, from the look into the cache until the code is stored.
+    """Lets one process at a time compile what is kept, until its code is stored.
 
     numba counts the files of a function's signatures: two processes that compile one each at the same time may give
-    both the same number, and every later one would load the wrong code. Those that wait need not compile, too.
+    both the same number, and every later one would load the wrong code. What modules compile when imported is looked
+    for in the cache only then, so that those that waited need not compile, too.
     """
 
     def __init__(self) -> None:
         self._guard, self._depth = threading.RLock(), 0
         self._file: IO[bytes] | None = None
 
-    def on_start(self, _: Any) -> None:
-        """A thread asks for numba's compiler lock."""
+    def on_start(self, found: Any) -> None:
+        """A thread asks for numba's compiler lock, or compiles within it."""
         with self._guard:
-            if self._depth == 0:
-                self._file = lock_folder(self._tell)
-            self._depth += 1
+            if found.kind == "numba:compiler_lock":
+                self._depth += 1
+            elif is_current(found.data["dispatcher"].py_func):
+                self.lock()
 
-    def on_end(self, _: Any) -> None:
-        """It has given it back."""
+    def on_end(self, found: Any) -> None:
+        """Compiled; given back: all is stored."""
+        if found.kind == "numba:compiler_lock":
+            self.release()
+
+    def lock(self) -> None:
+        """Wait for other processes; released with the last of numba's locks."""
+        with self._guard:
+            self._file = self._file or lock_folder(self._tell)
+
+    def release(self) -> None:
+        """One lock less."""
         with self._guard:
             self._depth -= 1
             if self._depth == 0 and self._file is not None:
                 self._file.close()
+                self._file = None
+
+    @contextmanager
+    def alone(self) -> Iterator[None]:
+        """Compile or load within, with no other process at it."""
+        with self._guard:
+            self._depth += 1
+            self.lock()
+        try:
+            yield
+        finally:
+            self.release()
 
     def _tell(self) -> None:
         """Say why nothing happens."""
         logging.getLogger("fembeam.solvers").warning("waiting for another process that compiles the integrator")
 
 
-event.register("numba:compiler_lock", _OneProcess())
+_ONE_PROCESS = _OneProcess()
+event.register("numba:compiler_lock", _ONE_PROCESS)
+event.register("numba:compile", _ONE_PROCESS)
 
 
 @contextmanager
@@ -130,7 +156,7 @@ def _compiling() -> Iterator[None]:
     collects = gc.isenabled()
     gc.disable()
     try:
-        with event.install_listener("numba:compile", _NOTICE):
+        with _ONE_PROCESS.alone(), event.install_listener("numba:compile", _NOTICE):
             yield
     finally:
         if collects:
