@@ -163,7 +163,8 @@ def numbers(
 
 def taken(found: dict[str, Any], losses: Any, along: Integrals, way: Any, duration: float) -> None:
     """Put in what the elements have taken, in units of force × reach of the motion; an impulse of force × time."""
-    work, impulse = along.force * way + 1e-300, along.force * duration + 1e-300
+    force = np.maximum(along.force, np.finfo(float).eps * along.force.max() + 1e-300)  # what rests has rounding's
+    work, impulse = force * way, force * duration
     units = {"work": work, "stored": work, "loss": work, "slip": way}
     for name, unit in units.items():
         found[f"losses {name}"], found["scale"][f"losses {name}"] = getattr(losses, name), unit
