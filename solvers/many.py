@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from solvers.exponential.many_starts import Worker
     from solvers.exponential.method import Engine
 
-_STRETCH = 64  # starts a thread takes at once, at most
+_GROUP = 64  # starts a thread takes at once, at most
 _LOOK = 0.1  # s between two looks at the threads
 
 
@@ -224,9 +224,9 @@ def _check_status(found: ManySolutions, duration: float) -> None:
 
 def _to_the_end(workers: list[Worker], count: int, progress: Callable[[int], None] | None) -> None:
     """Let the workers share the starts; after Ctrl-C they stop where they are."""
-    stretches, stop, done = iter(_shared_out(count, len(workers))), Event(), [0] * len(workers)
+    groups, stop, done = iter(_shared_out(count, len(workers))), Event(), [0] * len(workers)
     tell = (lambda: progress(sum(done))) if progress else (lambda: None)
-    tasks = [_stretches(worker, stretches, stop, done, i) for i, worker in enumerate(workers)]
+    tasks = [_groups(worker, groups, stop, done, i) for i, worker in enumerate(workers)]
     try:
         if len(tasks) == 1:
             for _ in tasks[0]:
@@ -239,18 +239,16 @@ def _to_the_end(workers: list[Worker], count: int, progress: Callable[[int], Non
 
 
 def _shared_out(count: int, threads: int) -> list[tuple[int, int]]:
-    """First start of each stretch and the one after its last; they get shorter, so that all threads end together."""
+    """First start of each group and the one after its last; they get shorter, so that all threads end together."""
     places = [0]
     while places[-1] < count:
-        places.append(places[-1] + min(_STRETCH, math.ceil((count - places[-1]) / (2 * threads))))
+        places.append(places[-1] + min(_GROUP, math.ceil((count - places[-1]) / (2 * threads))))
     return list(pairwise(places))
 
 
-def _stretches(
-    worker: Worker, stretches: Iterator[tuple[int, int]], stop: Event, done: list[int], i: int
-) -> Iterator[None]:
+def _groups(worker: Worker, groups: Iterator[tuple[int, int]], stop: Event, done: list[int], i: int) -> Iterator[None]:
     """The work of one thread, with a look at the world outside in between."""
-    for first, beyond in stretches:
+    for first, beyond in groups:
         worker.assign(first, beyond)
         while not worker.march():
             if stop.is_set():

@@ -6,12 +6,14 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 import contacts.kernels as laws
 import solvers.compiled.cache as cache
+import solvers.compiled.decorators as decorators
 
 CALL = "import solvers.outer as o; print(o.outer(1.0), sum(o.outer.stats.cache_hits.values()))"
 INNER = "from solvers.compiled.decorators import inner\n@inner\ndef times(x): return {} * x\n"
@@ -88,6 +90,16 @@ def test_processes_compile_one_after_the_other(package):
         time.sleep(2.0)
         end = first.communicate("\n")[0]
         assert float(second.communicate()[0]) > float(end)
+
+
+def test_a_lock_taken_before_the_import_does_not_keep_other_processes_waiting(monkeypatch, tmp_path):
+    """Another thread compiled when this module was imported: its lock is given back unasked."""
+    monkeypatch.setattr(cache, "FOLDER", tmp_path)
+    one = decorators._OneProcess()
+    one.on_end(SimpleNamespace(kind="numba:compiler_lock"))
+    with one.alone():
+        assert (one._file is None) == (sys.platform == "win32")
+    assert one._file is None
 
 
 def test_what_changes_while_a_process_runs_is_not_kept(package):

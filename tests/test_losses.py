@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from test_own_memory import LATCHED, SLIP, pull
 
 import fembeam as fb
 from contacts import (
@@ -97,10 +98,6 @@ def test_a_slider_beside_a_yielding_stop(kind, method):
     assert taken[0] == pytest.approx(taken[1], rel=1e-12)
 
 
-def spring(delta, delta_dot, way, slider, stiffness, limit):
-    return stiffness * (delta - slider)
-
-
 def left_up(delta, delta_dot, way, slider, stiffness, limit):
     return limit - stiffness * (delta - slider)
 
@@ -117,23 +114,10 @@ def down(delta, delta_dot, way, slider, stiffness, limit):
     return -1.0, slider
 
 
-def drag(delta, delta_dot, way, slider, stiffness, limit):
-    return way * limit
-
-
-def onwards(delta, delta_dot, way, slider, stiffness, limit):
-    return way * delta_dot
-
-
-def hold(delta, delta_dot, way, slider, stiffness, limit):
-    return 0.0, delta - way * limit / stiffness
-
-
 def own_slider(slip):
     """Jenkins' element with a border for each direction; its second segment by name."""
-    stick = Segment(spring, (Border(left_up, slip, up), Border(left_down, slip, down)))
-    segments = {"stick": stick, slip: Segment(drag, Border(onwards, "stick", hold))}
-    return memory_law("own slider", segments, {"way": 0.0, "slider": 0.0}, reach=2e-3)(stiffness=2e4, limit=10.0)
+    stick = Segment(pull, (Border(left_up, slip, up), Border(left_down, slip, down)))
+    return memory_law("own slider", {"stick": stick, slip: SLIP}, LATCHED, reach=2e-3)(stiffness=2e4, limit=10.0)
 
 
 @METHODS

@@ -152,13 +152,13 @@ def broken(delta, delta_dot, entry_rate, limit):
 
 
 @pytest.mark.parametrize(("count", "threads"), [(1, 1), (5, 3), (300, 1), (1200, 2), (160_000, 7)])
-def test_threads_end_together_with_short_stretches(count, threads):
-    """What one thread may still have to do when the others find nothing left is the last stretches only."""
-    stretches = _shared_out(count, threads)
-    assert [i for first, beyond in stretches for i in range(first, beyond)] == list(range(count))
-    for i, (first, beyond) in enumerate(stretches):
+def test_threads_end_together_with_short_groups(count, threads):
+    """What one thread may still have to do when the others find nothing left is the last groups only."""
+    groups = _shared_out(count, threads)
+    assert [i for first, beyond in groups for i in range(first, beyond)] == list(range(count))
+    for i, (first, beyond) in enumerate(groups):
         assert beyond - first <= max(1, math.ceil((count - first) / (2 * threads)))
-        assert i == 0 or beyond - first <= np.diff(stretches[i - 1])
+        assert i == 0 or beyond - first <= np.diff(groups[i - 1])
 
 
 def test_a_run_that_fails_is_named_and_keeps_the_others():

@@ -34,13 +34,7 @@ from solvers.problem import Array
 ROUNDING = 1e-9  # of the test functions: what is at a special point all along is marked nowhere
 _SHARP = 1e-10  # of the parameter, or of the arclength between the points: how sharply a point is located
 _AT = 1e-4  # distance from the unit circle of the multiplier at what passes for a special point
-_NUDGES = (
-    0.0,
-    1e-7,
-    -1e-7,
-    1e-6,
-    -1e-6,
-)  # of the arclength: at some guesses rounding keeps the residual over its tolerance
+_NUDGES = 0.0, 1e-7, -1e-7, 1e-6, -1e-6  # of the arclength: at some guesses rounding keeps the residual too large
 
 
 def indicators(orbit: Orbit, tangent: Array) -> dict[str, float]:

@@ -112,9 +112,8 @@ class Walk:
                 self.orbits += [*special[:place], ending]
                 return False
         self.orbits += [*special, following.orbit]
-        self.before = (
-            None if {"grazing", "stick", "floor"} & {*marks} else (a, distance)
-        )  # no cubic across a nonsmooth point
+        nonsmooth = {"grazing", "stick", "floor"} & {*marks}
+        self.before = None if nonsmooth else (a, distance)  # no cubic across such a point
         return True
 
     def _nonsmooth_ahead(self, reach: float) -> tuple[Point | None, Point, list[Orbit]] | None:

@@ -1,8 +1,8 @@
 """The decorators of compiled functions: which options of numba they use, what each is worth, what to do without it.
 
 Processor times without an option over those with it, of runs of the paper's scene (rtol 1e-8) with 2, 10 and 30 modes
-and of one under noise, by turns on one machine, good to 0.03; ``python tests/bench/compiler_options.py NAME`` repeats
-those that have a name:
+and of one under noise, by turns on one machine, off by up to 0.07; ``python tests/bench/compiler_options.py NAME``
+repeats those that have a name:
 
 | name       | option                              | 2    | 10   | 30   | noise | where numba drops it            |
 |------------|-------------------------------------|------|------|------|-------|---------------------------------|
@@ -14,9 +14,10 @@ those that have a name:
 |            | eight numbers as one, `simd`        | 1.50 | 1.49 | 2.47 | 1.17  | plain loops in `sums`, `flight` |
 | parts      | called at an address, `parts`       | 0.99 | 1.02 | 0.99 | 1.12  | `part` becomes `inner`          |
 
-Without `packed` parts cannot be called at addresses either: that row is of both. `pair_response` returns an array,
-which only a merged function may: without merging it has to fill one. `parts` halve the time of compiling: the first run
-took 67 s of processor without, 33 s with them, by turns; ``python tests/bench/start_up.py`` measures it.
+The row of `simd` is of a copy changed by hand. Without `packed` parts cannot be called at addresses either: that row is
+of both. `pair_response` returns an array, which only a merged function may: without merging it has to fill one. `parts`
+halve the time of compiling: the first run took 67 s of processor without, 33 s with them, by turns;
+``python tests/bench/start_up.py`` measures it.
 ``no_cpython_wrapper`` and ``no_cfunc_wrapper`` save most of the compile time of inner functions and no run time.
 ``_nrt``, ``forceinline`` and these two are not documented by numba, nor is what is imported of ``numba.core``: hence
 the upper bound of its version in pyproject.toml. With a new version: raise the bound, run the tests and the bench; what
@@ -121,7 +122,7 @@ class _OneProcess(event.Listener):
     def release(self) -> None:
         """One lock less."""
         with self._guard:
-            self._depth -= 1
+            self._depth = max(self._depth - 1, 0)  # a lock taken before this module was imported is given back now
             if self._depth == 0 and self._file is not None:
                 self._file.close()
                 self._file = None

@@ -36,7 +36,7 @@ from solvers.exponential.method import Engine, advance
 from solvers.exponential.preparation import SCRATCH
 from solvers.problem import COLUMNS, Array, ContactLog, Status
 
-NEXT, BEYOND, BEGUN = range(3)  # places in a cursor: present start, end of the stretch, whether the start has begun
+NEXT, BEYOND, BEGUN = range(3)  # places in a cursor: present start, end of the group, whether the start has begun
 CODE, CONTACTS = range(2)  # columns of Outcomes.count
 REACHED, EXCHANGED, ENERGY = range(3)  # columns of Outcomes.number; three of energy, as in Scratch.energy
 _STOP, _DELTA, _FORCE = (

@@ -29,7 +29,7 @@ from solvers.exponential.energy.flight_balance import (
     account_output,
     account_state,
     account_step,
-    book,
+    add_to_balance,
     copy_split,
     fly_within,
     start_account,
@@ -191,7 +191,7 @@ def _cross_cells(problem, tables, energy_tables, state, scratch, t_end, most, ou
             if with_energy:
                 whole, begin_of_cell = tables.flight_step.size, (cell - 1) * h
                 exchanged = account_step(problem, tables, energy_tables, scratch, whole, begin_of_cell, at)
-                book(problem, state.x, exchanged)
+                add_to_balance(problem, state.x, exchanged)
             at = 1 - at
         if cell > begin:
             join(problem, x[at], state.x)

@@ -88,7 +88,7 @@ class Tables(NamedTuple):
     signal_rows: Any  # (L, 2N): a load's tones from the state
     power_rows: Any  # (L, 2N): input power = signal × power row
     loss_rows: Any  # (r, 2N): damping power = Σ (row·z)²
-    steady_rate: Any  # (2 tones, own padded): rate of the blocks' steady motion from p, then v, of the tones
+    steady_rate: Any  # (2 tones, own padded): blocks' rate in steady motion by p, then v, of the tones; loss_rows: × √c
     gauss: Any  # (2 + S, S): points and weights on (0, 1), then to all points the integrals of each one's polynomial
     extrapolation: (
         Any  # (f, 5, S, S): the force on the next smooth step, 2^{(i-2)/2} times shorter, from that of the last

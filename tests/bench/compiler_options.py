@@ -1,6 +1,6 @@
 """What each option of the compiler is worth: run times without it over those with it, by turns.
 
-    nice -n 5 python tests/bench/compiler_options.py merged force nrt alias parts tuples [--against TREE]
+    nice -n 5 python tests/bench/compiler_options.py merged force nrt alias align parts tuples [--against TREE]
 
 A copy of the packages with one option switched off and this tree each get a process of their own, compile for a
 minute, one after the other, and then run the twelve starts of `reference` in turns, with 2, 10 and 30 modes, and three
@@ -42,6 +42,7 @@ OPTIONS = {  # file, what is there, what is there instead
     "force": (("decorators.py", "forceinline=True", "forceinline=False"),),
     "nrt": (("decorators.py", ', "_nrt": False', ""),),
     "alias": (("packed.py", '    loaded.set_metadata("tbaa", _constant(builder.module))\n', ""),),
+    "align": (("packed.py", "if 1 < np.size(item) < _SLOW", "if False"),),
     "parts": _NO_PARTS,
     "tuples": (
         *_NO_PARTS,

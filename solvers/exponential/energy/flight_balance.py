@@ -36,7 +36,7 @@ _MARK, _MOVING, _WITHIN = 3, 4, 5  # of Scratch.split_state: the state at the ma
 _MARKED, _JOINED, _SPLIT = 9, 10, 11  # rows of Scratch.stages: time of the mark; a state within a series, twice
 _EXACT = 1e-17  # share of the last term of a series
 _EXCHANGED = types.UniTuple(REAL, 2)
-"""Work and damping: returned, and states told by their place, since an array passed to a part costs 6 ns."""
+"""Work and damping: returned, and states told by their place, since a part that is passed an array waits for it."""
 
 
 @inner
@@ -54,16 +54,16 @@ def fly_within(problem, tables, scratch, place, t, span, accounted, energy_table
         level = level_within(tables, span)
         derive_signals(problem, t, scratch.signal_terms)
         if accounted:
-            book(problem, row, account_step(problem, tables, energy_tables, scratch, level, t, place))
+            add_to_balance(problem, row, account_step(problem, tables, energy_tables, scratch, level, t, place))
         fly_tabulated(problem, tables, level, x, scratch.signal_terms)
         t, span = t + tables.flight_step[level], span - tables.flight_step[level]
     fly_series(problem, tables, x, t, span, scratch.signal_terms, scratch.terms)
     if accounted:
-        book(problem, row, account_series(problem, tables, energy_tables, scratch, t, span))
+        add_to_balance(problem, row, account_series(problem, tables, energy_tables, scratch, t, span))
 
 
 @inlined
-def book(problem, row, exchanged):
+def add_to_balance(problem, row, exchanged):
     """Add work and damping to the balance of ``row``."""
     row[2 * problem.k.size] += exchanged[0]
     row[2 * problem.k.size + 1] += exchanged[1]
@@ -77,7 +77,7 @@ def account_until(problem, tables, energy_tables, scratch, t, row):
     span = t - begin
     if energy_tables.closed > 0.0 and abs(span - energy_tables.spacing) <= _rounding(problem, energy_tables, t):
         whole = tables.flight_step.size
-        book(problem, row, account_step(problem, tables, energy_tables, scratch, whole, begin, _MOVING))
+        add_to_balance(problem, row, account_step(problem, tables, energy_tables, scratch, whole, begin, _MOVING))
     elif span > 0.0:
         accounted = np.bool_(1)  # a literal would be compiled for itself
         fly_within(problem, tables, scratch, _MOVING, begin, span, accounted, energy_tables, row)
