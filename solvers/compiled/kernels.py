@@ -166,6 +166,15 @@ def copy(source, target, n):
         target[i] = source[i]
 
 
+@inlined
+def raised(x, exponent):
+    """x to the power of a whole number that is given as a real one, 0 to 4 as a rule."""
+    result = 1.0
+    for _ in range(int(exponent)):
+        result *= x
+    return result
+
+
 @reordered
 def dot(a, b, n):
     """Sum of the first n products."""

@@ -133,18 +133,40 @@ def positive8(typingctx, numbers):
 
 
 @intrinsic
-def sum8(typingctx, numbers):
-    """Sum of eight numbers, by halves."""
+def size8(typingctx, numbers):
+    """Absolute values."""
 
     def codegen(context, builder, signature, arguments):
-        vector = arguments[0]
-        for half in (4, 2, 1):
-            nothing = ir.Constant(vector.type, ir.Undefined)
-            low, high = (
-                builder.shuffle_vector(vector, nothing, _places(places))
-                for places in (range(half), range(half, 2 * half))
-            )
-            vector = builder.fadd(low, high)
-        return builder.extract_element(vector, ir.IntType(32)(0))
+        kind = ir.FunctionType(_VECTOR, [_VECTOR])
+        return builder.call(cgutils.get_or_insert_function(builder.module, kind, f"llvm.fabs.v{WIDTH}f64"), arguments)
 
-    return types.float64(VECTOR8), codegen
+    return VECTOR8(VECTOR8), codegen
+
+
+def _by_halves(pair):
+    """An intrinsic that joins eight numbers to one: four and four, two and two, one and one."""
+
+    @intrinsic
+    def joined(typingctx, numbers):
+        def codegen(context, builder, signature, arguments):
+            vector = arguments[0]
+            for half in (4, 2, 1):
+                nothing = ir.Constant(vector.type, ir.Undefined)
+                low, high = (
+                    builder.shuffle_vector(vector, nothing, _places(places))
+                    for places in (range(half), range(half, 2 * half))
+                )
+                vector = pair(builder, low, high)
+            return builder.extract_element(vector, ir.IntType(32)(0))
+
+        return types.float64(VECTOR8), codegen
+
+    return joined
+
+
+sum8 = _by_halves(lambda builder, low, high: builder.fadd(low, high))
+"""Sum of eight numbers."""
+largest8 = _by_halves(lambda builder, low, high: builder.select(builder.fcmp_ordered(">", low, high), low, high))
+"""Largest of eight numbers; any of them if one is NaN."""
+least8 = _by_halves(lambda builder, low, high: builder.select(builder.fcmp_ordered("<", low, high), low, high))
+"""Least of eight numbers; any of them if one is NaN."""

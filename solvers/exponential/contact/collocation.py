@@ -36,7 +36,7 @@ from solvers.compiled.kernels import (
     merged,
 )
 from solvers.compiled.parts import ERROR, SOLVE, part
-from solvers.compiled.simd import load8, sum8
+from solvers.compiled.simd import largest8, load8, size8, sum8
 from solvers.compiled.state import CALLS, PEAK_DELTA, PEAK_FORCE, T, is_open
 from solvers.compiled.sums import combine, iterate_power_law, replace_values
 from solvers.exponential.contact.many_stops import add_end_response, pair_response, uses_blocks, weighting_of
@@ -93,7 +93,7 @@ def _set_accuracy(problem, tables, state, scratch, h, rtol):
     return stiff
 
 
-@part(SOLVE, types.boolean, types.int64, types.int64, types.float64)
+@inner
 def solve_forces(problem, tables, state, scratch, node_set, level, rtol):
     """Solve for the forces by fixed-point iteration, else by Newton's method; returns whether a solution was found."""
     if _set_accuracy(problem, tables, state, scratch, tables.contact_step[level], rtol):
@@ -130,29 +130,17 @@ def solve_forces(problem, tables, state, scratch, node_set, level, rtol):
 
 
 @inlined
-def _top(values):
-    """The largest of node values, or 0."""
-    best = 0.0
-    for i in range(S):
-        best = max(best, values[i])
-    return best
-
-
-@inlined
 def largest_size(values):
     """Largest size of node values."""
-    best = 0.0
-    for i in range(S):
-        best = max(best, abs(values[i]))
-    return best
+    return largest8(size8(load8(values, 0)))
 
 
 @merged
 def _largest(problem, tables, state, scratch, u):
     """Largest force of a stop on the step, N, and its stiffness there, N/m."""
     if problem.knots[u, 0] == 0.0:
-        largest = _top(scratch.force[u])
-        return largest, tables.exponent[u] * largest / max(_top(scratch.motion[u, 0]), 1e-300)
+        largest = max(largest8(load8(scratch.force[u], 0)), 0.0)
+        return largest, tables.exponent[u] * largest / max(largest8(load8(scratch.motion[u, 0], 0)), 1e-300)
     copy(scratch.motion[u, 0], scratch.clipped, S)
     slope = scratch.slope[u]
     contact_gradient(
@@ -161,7 +149,7 @@ def _largest(problem, tables, state, scratch, u):
     return largest_size(scratch.force[u]), largest_size(slope[0])
 
 
-@part(ERROR, REAL, types.int64, types.int64, types.boolean, REAL)
+@inner
 def step_error(problem, tables, state, scratch, node_set, level, is_new, rtol):
     """Largest error of an indentation rate by the unresolved part of the forces, in units of the stop's tolerance.
 
@@ -264,9 +252,8 @@ def unresolved_part(coefficients, largest, power):
 @merged
 def _unresolved_signal(problem, tables, scratch, node_set, j):
     """The same for a sampled signal; an entry step integrates it at half the order."""
-    values, largest = scratch.force[problem.gap.size + problem.table_load[j]], 0.0
-    for i in range(S):
-        largest = max(largest, abs(values[i]))
+    values = scratch.force[problem.gap.size + problem.table_load[j]]
+    largest = largest_size(values)
     combine(tables.tail[node_set], values, S, None, scratch.trial)
     return unresolved_part(scratch.trial, largest, S // 2 if node_set == 0 else 1)
 

@@ -20,7 +20,7 @@ from numba import types
 from solvers.compiled.dop853_tableau import STAGES, C
 from solvers.compiled.kernels import REAL, VECTOR, call_force, copy, dot, indentation, inlined, inner, merged
 from solvers.compiled.parts import BOUNDS, LEAVES, SIDE, part
-from solvers.compiled.simd import splat8, store8
+from solvers.compiled.simd import largest8, least8, load8, splat8, store8
 from solvers.compiled.state import PEAK_FORCE, T_IN, T, is_open, surface_tolerance
 from solvers.compiled.sums import above
 from solvers.exponential.contact.many_stops import CONTINUING, ENTERING, add_block_motion, motion_at_nodes, uses_blocks
@@ -63,8 +63,9 @@ def _passes(d, a, slope_a, b, slope_b, lower, upper):
 @merged
 def _turns(rates, begin, end, up, down):
     """Whether the rate changes its sign between two points of a step, upwards if ``up`` or downwards if ``down``."""
-    before, found = begin, False
-    for i in range(S + 1):
+    before, found, rest = begin, False, load8(rates, 0)
+    least, largest = min(begin, end, least8(rest)), max(begin, end, largest8(rest))
+    for i in range(S + 1 if least < 0.0 < largest else 0):
         after = rates[i] if i < S else end
         found |= (up and before < 0.0 < after) or (down and before > 0.0 > after)
         before = after
@@ -132,7 +133,7 @@ def _watch(problem, tables, state, scratch, node_set, level, s, carried):
     return True
 
 
-@part(LEAVES, types.boolean, types.int64, types.int64)
+@inner
 def leaves_segment(problem, tables, state, scratch, node_set, level):
     """Whether any stop may cross a border of its segment on the step."""
     size, h, through = 2 * problem.k.size, tables.contact_step[level], uses_blocks(tables)
@@ -153,9 +154,8 @@ def leaves_segment(problem, tables, state, scratch, node_set, level):
             )
         else:
             lower = problem.knots[s, segment - 1]
-        lowest = highest = indentation(problem, s, scratch.x_new)
-        for i in range(S):
-            lowest, highest = min(lowest, scratch.motion[s, 0, i]), max(highest, scratch.motion[s, 0, i])
+        delta, within = indentation(problem, s, scratch.x_new), load8(scratch.motion[s, 0], 0)
+        lowest, highest = min(delta, least8(within)), max(delta, largest8(within))
         begin, end = scratch.start_motion[s, 1], dot(problem.read_rate[s], scratch.x_new, size)
         turns = _turns(scratch.motion[s, 1], begin, end, segment > 0, upper < np.inf)
         if not turns and lower <= lowest and highest + ripple <= upper:

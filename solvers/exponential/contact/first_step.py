@@ -13,6 +13,7 @@ from solvers.compiled.state import T_IN, T, surface_tolerance
 from solvers.exponential.contact.crossings import choose_sides
 from solvers.exponential.contact.peaks import pressed_speed, state_peaks
 from solvers.exponential.flight import energy_norms
+from solvers.exponential.tables import EXPONENT, STIFFNESS
 
 LEVEL, NODE_SET, NEW, STOP, NEXT_LEVEL, BEGUN = range(6)  # places in Scratch.control
 ENTRY, SEGMENT = 1, 2  # values of NEW: the first step of a contact, or of a segment of its law; 0 for other steps
@@ -50,9 +51,11 @@ def _contact_time(problem, tables, scratch, s, speed):
     speed = max(speed, 1e-12)
     accelerance = max(tables.accelerance[s, s], 1e-300)
     target = 0.5 * speed * speed / accelerance
-    p = tables.exponent[s]
+    law, p = tables.power_law[s], tables.exponent[s]
+    if law[EXPONENT] > 0.0 and law[STIFFNESS] > 0.0:
+        return 3.2 * (target * (p + 1.0) / law[STIFFNESS]) ** (1.0 / (p + 1.0)) / speed
     deepest = 1e-3 * speed
-    for _ in range(4):  # one is enough for a power law
+    for _ in range(4):
         scratch.clipped[0], scratch.trial[0] = deepest, 0.0
         contact_forces(problem, s, scratch.clipped[0:1], scratch.trial[0:1], speed, scratch.trial[1:2])
         energy = scratch.trial[1] * deepest / (p + 1.0)

@@ -20,7 +20,7 @@ import math
 import numpy as np
 
 from solvers.compiled.dop853_tableau import E3, E5, STAGES
-from solvers.compiled.kernels import abs_dot, copy, dot, indentation, inlined, inner, merged, rhs
+from solvers.compiled.kernels import abs_dot, copy, dot, indentation, inlined, inner, merged, raised, rhs
 from solvers.compiled.parts import PASSED
 from solvers.compiled.renewals import margins_before, margins_in
 from solvers.compiled.state import (
@@ -128,7 +128,7 @@ def _length_to(problem, tables, state, scratch, variable, stop, span, landed, ti
         late, tries = x[size] - time, tries + 1
         pace = 1.0 if variable == TIME else dot(problem.read_rate[stop], x, 2 * problem.k.size)  # d(variable)/dt
         if variable == ROOT:
-            pace /= kappa * x[size + 1] ** (kappa - 1.0)
+            pace /= kappa * raised(x[size + 1], kappa - 1.0)
         if not abs(late) > 1e-15 * landed or not abs(pace) < np.inf or tries == _MOST_TRIES:
             return length if abs(late) <= 1e-6 * (landed - t) + 1e-15 * landed else np.inf
         length -= late * pace
@@ -195,30 +195,45 @@ def _slopes_by_forces(problem, tables, state, stop, w, x):
     return min(most, _MOST_SLOPE)
 
 
+@inlined
+def _level(problem, state, stop, direction):
+    """Indentation at the border of the stop's segment in a direction."""
+    return problem.knots[stop, state.segment[stop] - (1 if direction < 0 else 0)]
+
+
+@inlined
+def may_land(problem, tables, state, scratch, stop, direction, near):
+    """Whether a border of ``stop``, about ``near`` s ahead, is so near that one step may land on it.
+
+    δ and δ̇ of the stops at the start of the step are in ``scratch.start_motion``.
+    """
+    delta, rate = scratch.start_motion[stop, 0], scratch.start_motion[stop, 1]
+    if near > _furthest(problem, tables, scratch) or abs(rate) <= rate_tolerance(problem, stop, state.x):
+        return False
+    if direction < 0 and state.segment[stop] == 1:
+        last = _LAST
+        if tables.time_exponent[1 + stop] == 2.0:
+            last = min(_LAST_ROOT * scratch.landing_reach[0] ** 2, _MOST_ROOT)
+        return delta <= last * state.active[stop, PEAK_DELTA]
+    level = _level(problem, state, stop, direction)
+    return state.segment[stop] == 0 or abs(level - delta) <= 0.2 * max(level, delta)
+
+
 @merged
 def land(problem, tables, state, scratch, stop, direction, near, rtol, t_end, out, due, with_energy):
     """Try to land on a border of ``stop``, about ``near`` s ahead.
 
     Returns ``stop`` if it succeeded, another stop whose border is crossed before, or -1.
     """
-    size, t = state.x.size, state.now[T]
-    delta, furthest = indentation(problem, stop, state.x), _furthest(problem, tables, scratch)
-    level = problem.knots[stop, state.segment[stop] - (1 if direction < 0 else 0)]
+    size, t, rate = state.x.size, state.now[T], scratch.start_motion[stop, 1]
+    if not may_land(problem, tables, state, scratch, stop, direction, near):
+        return -1
+    furthest, kappa = _furthest(problem, tables, scratch), tables.time_exponent[1 + stop]
     leaving = direction < 0 and state.segment[stop] == 1
-    rate = dot(problem.read_rate[stop], state.x, 2 * problem.k.size)
-    if near > furthest or abs(rate) <= rate_tolerance(problem, stop, state.x):
-        return -1
-    last, kappa = _LAST, tables.time_exponent[1 + stop]
-    if kappa == 2.0:
-        last = min(_LAST_ROOT * scratch.landing_reach[0] ** 2, _MOST_ROOT)
-    if leaving and delta > last * state.active[stop, PEAK_DELTA]:
-        return -1
-    if not leaving and state.segment[stop] > 0 and abs(level - delta) > 0.2 * max(level, delta):
-        return -1
     start_landing(problem, tables, state, scratch, stop)
     w, x = scratch.stages[START], scratch.stages[LANDED]
     variable = ROOT if leaving and kappa > 1.0 else INDENTATION
-    span = -w[size + 1] if variable == ROOT else level - delta
+    span = -w[size + 1] if variable == ROOT else _level(problem, state, stop, direction) - scratch.start_motion[stop, 0]
     _step(problem, tables, state, scratch, variable, stop, span, with_energy)
     landed, part = x[size], _PART_OF_FOURTH if variable == ROOT and kappa == 4.0 else _PART
     if scratch.viscous[stop] > 0.0:  # too strong a dashpot for an explicit step

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from numba import types
 
 from solvers.compiled.dop853_tableau import STAGES, A
@@ -17,6 +19,7 @@ from solvers.compiled.kernels import (
     inner,
     law_forces,
     merged,
+    raised,
     table_value,
 )
 from solvers.compiled.parts import LANDING_STEP, part
@@ -25,6 +28,7 @@ from solvers.compiled.sums import combine
 from solvers.exponential.contact.crossings import FORCE
 from solvers.exponential.contact.node_response import BATCH, LANDED, START
 from solvers.exponential.energy.quadrature import powers
+from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR, STIFFNESS
 
 INDENTATION, ROOT, TIME = range(3)
 _CHOICE = types.boolean, types.int64, types.int64  # types of with_energy, variable, stop
@@ -33,6 +37,11 @@ _CHOICE = types.boolean, types.int64, types.int64  # types of with_energy, varia
 @merged
 def _force(problem, tables, s, delta, delta_dot, side, entry_rate, batch):
     """Force of stop s; a law cut at zero force is continued as on the side of the cut where the step began."""
+    law = tables.power_law[s]
+    if law[EXPONENT] > 0.0:
+        deep = max(delta, 0.0)
+        deep = law[STIFFNESS] * (deep * math.sqrt(deep) if law[EXPONENT] == 1.5 else deep)
+        return deep * (1.0 + law[FACTOR] / entry_rate * delta_dot) + law[DAMPING] * delta_dot
     batch[0], batch[1], batch[2] = max(delta, problem.knots[s, 0]), delta_dot, 0.0
     if tables.bend[s] != FORCE:
         law_forces(problem, s, 1, batch[0:1], batch[1:2], entry_rate, batch[2:3])
@@ -70,7 +79,7 @@ def _rate(problem, tables, with_energy, variable, stop, span, w, segment, entry_
         factor = span / delta_dot
     elif variable == ROOT:
         kappa = tables.time_exponent[1 + stop]
-        factor = span * kappa * w[t + 1] ** (kappa - 1.0) / delta_dot
+        factor = span * kappa * raised(w[t + 1], kappa - 1.0) / delta_dot
     for e in range(t):
         out[e] *= factor
     out[t] = factor

@@ -10,12 +10,14 @@ from __future__ import annotations
 import math
 
 from solvers.compiled.kernels import contact_forces, copy, dot, indentation, inlined, inner, merged
-from solvers.compiled.state import PEAK_DELTA, PEAK_FORCE, is_open
+from solvers.compiled.simd import largest8, load8
+from solvers.compiled.state import PEAK_DELTA, PEAK_FORCE, is_open, surface_tolerance
 from solvers.compiled.sums import combine
 from solvers.exponential.contact.node_response import DELTAS, FORCES, KNOWN, RATES
 from solvers.exponential.contact.nodes import LOCAL, MONOMIALS, S
 
 _MOST = 6  # Newton steps to a maximum
+_LOWER = 0.95  # share of a peak below which node values have no higher one between them
 
 
 @inlined
@@ -102,18 +104,26 @@ def largest_indentation(problem, tables, state, scratch, node_set, h, s):
     return local_maximum(scratch.local_motion[DELTAS], 1.0, scratch.trial)
 
 
+@inlined
+def _below(state, s, column, values):
+    """Whether all node values are so far below a peak that there is no higher one between them."""
+    return largest8(load8(values, 0)) < _LOWER * state.active[s, column]
+
+
 @inner
 def step_peaks(problem, tables, state, scratch, node_set, h, s, limit):
     """Raise the peaks of stop s by a converged step of length h, up to σ = limit, from ``state.x`` on."""
-    combine(tables.summary[node_set], scratch.motion[s, 0], S, None, scratch.summary[s, 1])
-    seen = -1
-    for column, values, d in ((PEAK_FORCE, scratch.force[s], 0), (PEAK_DELTA, scratch.motion[s, 0], 1)):
+    seen, motion = -1, scratch.motion[s, 0]
+    if limit >= 1.0 and _below(state, s, PEAK_FORCE, scratch.force[s]) and _below(state, s, PEAK_DELTA, motion):
+        return
+    combine(tables.summary[node_set], motion, S, None, scratch.summary[s, 1])
+    for column, values, d in ((PEAK_FORCE, scratch.force[s], 0), (PEAK_DELTA, motion, 1)):
         known, slopes = state.active[s, column], scratch.summary[s, d]
         place = _highest(tables, values, node_set, limit)
         if place >= 0:
             state.active[s, column] = max(known, values[place])
         if limit >= 1.0:
-            if values[place] < 0.95 * known or (place == S - 1 and slopes[7] >= 0.0):
+            if values[place] < _LOWER * known or (place == S - 1 and slopes[7] >= 0.0):
                 continue  # lower, or still rising at the end, where the next step begins
             if node_set == 0 and place == 0 and slopes[6] <= 0.0 and known >= slopes[4]:
                 continue  # falling from its start
@@ -156,9 +166,9 @@ def state_peaks(problem, state, scratch, x):
 @inner
 def pressed_speed(problem, tables, state, s, batch):
     """Speed, m/s, that the force of a stop in contact would give on a way as long as its indentation, √(|F δ|/m)."""
-    if state.segment[s] == 0:
-        return 0.0
     batch[0] = indentation(problem, s, state.x)
+    if state.segment[s] == 0 or abs(batch[0]) <= surface_tolerance(problem, s, state.x):
+        return 0.0
     batch[1] = dot(problem.read_rate[s], state.x, 2 * problem.k.size)
     contact_forces(problem, s, batch[0:1], batch[1:2], state.entry_rate[s], batch[2:3])
     return math.sqrt(abs(batch[0] * batch[2] * tables.accelerance[s, s]))

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from numba import types
 
-from solvers.compiled.kernels import REAL, VECTOR, dot, inlined, inner, merged, reordered, table_value
+from solvers.compiled.kernels import REAL, VECTOR, dot, inlined, inner, merged, raised, reordered, table_value
 from solvers.compiled.parts import WITHIN_STEP, part
 from solvers.compiled.simd import WIDTH, load8, splat8, store8, sum8
 from solvers.compiled.sums import combine
@@ -57,23 +57,14 @@ def _plain_loss(n, own, c, steady_rate, x):
     return loss + sum8(losses)
 
 
-@inlined
-def _raised(sigma, time_exponent):
-    """σ^power for a whole number."""
-    value = 1.0
-    for _ in range(int(time_exponent)):
-        value *= sigma
-    return value
-
-
 @merged
 def _places(tables, scratch, node_set, h, begin, width):
     """Points of a panel of σ: σ, times after its start, dt per unit of the panel, and the nodes' polynomials there."""
     time_exponent, between, nodes = tables.time_exponent[node_set], scratch.between, tables.nodes[node_set]
-    start = h * _raised(begin, time_exponent)
+    start = h * raised(begin, time_exponent)
     for q in range(S):
         sigma = begin + width * tables.gauss[0, q]
-        pace = h * _raised(sigma, time_exponent - 1.0)
+        pace = h * raised(sigma, time_exponent - 1.0)
         scratch.trial[q], scratch.clipped[q], between[_PACE, q] = (
             sigma,
             pace * sigma - start,
@@ -202,7 +193,7 @@ def state_within(problem, tables, state, scratch, node_set, h, begin, end, row, 
     for i in range(panels):
         _places(tables, scratch, node_set, h, sigma, width)
         if i == 0 or time_exponent > 1.0:
-            _moves(problem, scratch, h * (_raised(sigma + width, time_exponent) - _raised(sigma, time_exponent)))
+            _moves(problem, scratch, h * (raised(sigma + width, time_exponent) - raised(sigma, time_exponent)))
         _forces(problem, tables, state, scratch, node_set)
         _move(problem, tables, state, scratch, row)
         _add_works(problem, tables, state, scratch, row)
