@@ -168,7 +168,7 @@ def copy(source, target, n):
 
 @inlined
 def raised(x, exponent):
-    """x to the power of a whole number that is given as a real one, 0 to 4 as a rule."""
+    """X to the power of a whole number that is given as a real one, 0 to 4 as a rule."""
     result = 1.0
     for _ in range(int(exponent)):
         result *= x

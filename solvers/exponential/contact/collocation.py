@@ -93,7 +93,7 @@ def _set_accuracy(problem, tables, state, scratch, h, rtol):
     return stiff
 
 
-@inner
+@part(SOLVE, types.boolean, types.int64, types.int64, types.float64)
 def solve_forces(problem, tables, state, scratch, node_set, level, rtol):
     """Solve for the forces by fixed-point iteration, else by Newton's method; returns whether a solution was found."""
     if _set_accuracy(problem, tables, state, scratch, tables.contact_step[level], rtol):
@@ -149,7 +149,7 @@ def _largest(problem, tables, state, scratch, u):
     return largest_size(scratch.force[u]), largest_size(slope[0])
 
 
-@inner
+@part(ERROR, REAL, types.int64, types.int64, types.boolean, REAL)
 def step_error(problem, tables, state, scratch, node_set, level, is_new, rtol):
     """Largest error of an indentation rate by the unresolved part of the forces, in units of the stop's tolerance.
 

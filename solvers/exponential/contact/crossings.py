@@ -133,7 +133,7 @@ def _watch(problem, tables, state, scratch, node_set, level, s, carried):
     return True
 
 
-@inner
+@part(LEAVES, types.boolean, types.int64, types.int64)
 def leaves_segment(problem, tables, state, scratch, node_set, level):
     """Whether any stop may cross a border of its segment on the step."""
     size, h, through = 2 * problem.k.size, tables.contact_step[level], uses_blocks(tables)

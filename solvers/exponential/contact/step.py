@@ -170,7 +170,7 @@ def _try_landing(problem, tables, state, scratch, stop, direction, near, rtol, t
     return True
 
 
-@inner
+@part(ACCEPT, types.void, *[types.int64] * 3, REAL, types.int64, REAL, MATRIX, MATRIX, VECTOR)
 def _accept(problem, tables, energy_tables, state, scratch, node_set, level, wanted, error, bent, t_end, log, out, due):
     """Complete the step found: samples, the end of the run if it is within, energy, event record, next step."""
     h = tables.contact_step[level]
@@ -207,11 +207,14 @@ def advance_contact(problem, tables, energy_tables, state, scratch, t_end, rtol,
     if control[NEW] == ENTRY and problem.parts[PRESSED] and _switch_pressed(problem, state, log):
         begin_steps(problem, tables, state, scratch, latest_entered(state))
         return RUNNING
-    if stop >= 0 and may_land(problem, tables, state, scratch, stop, direction, near):
-        if _try_landing(
+    if (
+        stop >= 0
+        and may_land(problem, tables, state, scratch, stop, direction, near)
+        and _try_landing(
             problem, tables, state, scratch, stop, direction, near, rtol, t_end, log, out, due, with_energy
-        ):
-            return RUNNING
+        )
+    ):
+        return RUNNING
     node_set = control[NODE_SET] if control[NEW] else 0
     longest = 0.8 * near
     if problem.table_dt.size:

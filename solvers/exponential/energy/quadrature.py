@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from numba import types
 
-from solvers.compiled.kernels import REAL, VECTOR, dot, inlined, inner, merged, raised, reordered, table_value
+from solvers.compiled.kernels import REAL, VECTOR, dot, inner, merged, raised, reordered, table_value
 from solvers.compiled.parts import WITHIN_STEP, part
 from solvers.compiled.simd import WIDTH, load8, splat8, store8, sum8
 from solvers.compiled.sums import combine
