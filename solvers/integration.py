@@ -52,6 +52,7 @@ from solvers.problem.run_arguments import check_laws, check_tangent, checked_sta
 BLOCK_STEPS = 20_000  # steps in a block: between two checks for signals and calls of `progress`
 _DEPTH, _FORCE = (list(ContactLog.__dataclass_fields__).index(name) for name in ("peak_indentation", "peak_force"))
 _NEVER, _NOWHERE = np.array([math.inf]), np.empty((0, 0))  # no output is due
+_NOTHING = np.empty(0)  # latched by a law without memory
 
 
 def integrate(
@@ -192,8 +193,8 @@ class _Run:
     @property
     def memory(self) -> tuple[Array, ...]:
         """What the laws have latched by now, one array per contact."""
-        if not self.engine.problem.border_count.any():
-            return tuple(np.empty(0) for _ in self.system.contacts)
+        if not self.system.latches:
+            return (_NOTHING,) * len(self.system.contacts)
         rows = zip(self.system.contacts, self.engine.problem.parameters, strict=True)
         return tuple(row[list(getattr(contact.law, "memory", ()))] for contact, row in rows)
 
@@ -229,9 +230,10 @@ class _Run:
         """Collect outputs, log and energy balance."""
         size, n = self.initial.size, self.system.size
         back = self.engine.back
+        state, latched = self.state.x.copy(), self.memory
+        end = back.dot(state[:size])
         if self.times is None:
-            x, t = self.state.x.copy()[None, :], self.state.now[T : T + 1].copy()
-            motion = back.dot(x[0, :size]).reshape(1, -1)
+            x, t, motion = state[None, :], self.state.now[T : T + 1].copy(), end[None, :]
         else:
             x = self.out[: self._sampled(status)]
             t, motion = self.times[: len(x)], product(x[:, :size], back.T)
@@ -241,7 +243,7 @@ class _Run:
         rows = self._rows()
         log = partial(ContactLog.of_rows, self._of_stops(rows))
         transitions = partial(Transitions.of_rows, rows, self.system.contacts)
-        first, last = (self.initial, self.latched), (self.state.x.copy(), self.memory)
+        first, last = (self.initial, self.latched), (state, latched)
         lost = partial(Losses.of_run, self.system.contacts, back, first, last, works, transitions)
         if status is Status.DONE and not self._balances(works, complete, motion, rows):
             status = Status.UNBALANCED
@@ -249,8 +251,8 @@ class _Run:
         cost = Cost(count[STEPS], count[REJECTED], count[CALLS], count[EVENTS], seconds)
         known = self.tangent is not None and status is Status.DONE
         more: dict[str, Any] = {**self._derivatives()} if known else {}
-        end = np.concatenate((back.dot(last[0][:size]), *last[1]))
-        more |= {"borders": transitions, "lost": lost, "memory": last[1], "end": end}
+        end = np.concatenate((end, *latched)) if self.system.latches else end.copy()
+        more |= {"borders": transitions, "lost": lost, "memory": latched, "end": end}
         return Solution(t, motion[:, :n], motion[:, n:], log, ledger, status, cost, **more)
 
     def _balances(self, works: Array, complete: bool, motion: Array, rows: Array) -> bool:

@@ -171,7 +171,7 @@ class Engine:
         own: dict[str, Array] = {}
         if forcing.table.size:
             own = {"table": forcing.table, "table_start": forcing.table_start}
-        if prepared.problem.value.border_count.any():  # laws latch numbers among their parameters
+        if system.latches:  # laws latch numbers among their parameters
             own["parameters"] = prepared.problem.value.parameters.copy()
         if own:
             packed = Packed.of(packed.value._replace(**own), PROBLEM)

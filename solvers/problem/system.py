@@ -167,6 +167,7 @@ class System:
         """The same structure with other contacts or loads; its matrices are neither checked nor decoupled again."""
         other = object.__new__(System)
         other.__dict__.update(self.__getstate__(), blocks=self.blocks, push=self.push)
+        other.__dict__.pop("latches", None)  # of the contacts
         for name, value in (("contacts", contacts), ("loads", loads)):
             if value is not None:
                 other.__dict__[name] = value
@@ -234,6 +235,11 @@ class System:
         if not (np.all(np.isfinite(zeta)) and np.all(zeta >= 0.0)):
             raise ValueError(f"zeta must be finite and >= 0, got {zeta}")
         return cls(np.eye(omega.size), np.diag(2.0 * zeta * omega), np.diag(omega**2), contacts, loads)
+
+    @cached_property
+    def latches(self) -> bool:
+        """Whether any law latches numbers on borders."""
+        return any(getattr(contact.law, "borders", 0) for contact in self.contacts)
 
     @cached_property
     def blocks(self) -> Blocks:

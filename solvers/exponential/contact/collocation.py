@@ -93,6 +93,14 @@ def _set_accuracy(problem, tables, state, scratch, h, rtol):
     return stiff
 
 
+@inlined
+def _is_last(change, before):
+    """Whether the changes still to come add up to less than the tolerance, by the last two: with r their ratio, within
+    [1/20, 0.9], the sum is change r/(1 - r).
+    """
+    return change * change <= max(before - change, change / 9.0)
+
+
 @part(SOLVE, types.boolean, types.int64, types.int64, types.float64)
 def solve_forces(problem, tables, state, scratch, node_set, level, rtol):
     """Solve for the forces by fixed-point iteration, else by Newton's method; returns whether a solution was found."""
@@ -115,13 +123,11 @@ def solve_forces(problem, tables, state, scratch, node_set, level, rtol):
             change, largest = _iterate(problem, tables, state, scratch, node_set, level)
         if not change < np.inf:
             break
-        settled, change = change <= 1e-27 * largest, math.sqrt(change)
         if iteration == 0:
-            before = change / 0.3  # the usual ratio of two changes
-        # with r = change/before, within [1/20, 0.9], the changes still to come add up to change r/(1 - r)
-        if settled or (change <= 20.0 and change * change <= max(before - change, change / 9.0)):
+            before = change / 0.09  # the usual ratio of two changes is 0.3
+        if change <= 1e-27 * largest or (change <= 400.0 and _is_last(math.sqrt(change), math.sqrt(before))):
             return True
-        if iteration > 2 and change > 0.6 * before:
+        if iteration > 2 and change > 0.36 * before:
             break
         before = change
     for u in range(problem.gap.size):

@@ -106,4 +106,5 @@ def start_landing(problem, tables, state, scratch, stop):
     """Put the state at the start of a landing of ``stop``, with t and δ^{1/κ}, into ``scratch.stages[START]``."""
     w, size, delta = scratch.stages[START], state.x.size, max(indentation(problem, stop, state.x), 0.0)
     copy(state.x, w, size)
-    w[size], w[size + 1] = state.now[T], delta ** (1.0 / tables.time_exponent[1 + stop])
+    kappa, root = tables.time_exponent[1 + stop], math.sqrt(delta)
+    w[size], w[size + 1] = state.now[T], root if kappa == 2.0 else delta ** (1.0 / kappa)

@@ -19,6 +19,7 @@ from solvers.compiled.kernels import (
     copy,
     dot,
     indentation,
+    inlined,
     merged,
     rhs,
 )
@@ -64,6 +65,7 @@ from solvers.exponential.energy.contact_balance import account_contact
 
 _GOAL = 0.3  # error aimed at, in units of the tolerance
 _ORDER = 15.0  # the error estimate falls like h^15
+_ONE_LEVEL = 2.0 ** (-0.5 * _ORDER)  # an error with steps √2 times shorter, over that before
 
 
 @part(PRESSED, types.boolean, MATRIX)
@@ -260,15 +262,25 @@ def _law_fails(state, scratch):
     return False
 
 
+@inlined
+def _longer(error):
+    """Levels, whole and at most 2, by which a step with such an error may be longer: 2/15 log₂(goal/error)."""
+    if error > _GOAL:
+        return -1
+    if error > _GOAL * _ONE_LEVEL:
+        return 0
+    return 1 if error > _GOAL * _ONE_LEVEL * _ONE_LEVEL else 2
+
+
 @merged
 def _adapt(tables, scratch, level, node_set, wanted, error):
-    """Size of the next step from the error of this one."""
-    control, longer = scratch.control, 2.0 / _ORDER * math.log2(_GOAL / max(error, 1e-30))  # in levels
+    """Size of the next step from the error of this one, which is at most 1."""
+    control = scratch.control
     if control[NEW] == ENTRY:  # the next contact of this stop begins with the step that was right here
-        s = control[STOP]
+        s, longer = control[STOP], 2.0 / _ORDER * math.log2(_GOAL / max(error, 1e-30))
         if level != control[NEXT_LEVEL]:
             scratch.first_step_share[s] = tables.contact_step[level] / scratch.duration[0]
         scratch.first_step_share[s] *= 2.0 ** (0.5 * min(max(longer, -1.0), 0.5))
-    suggested = min(max(level - int(min(math.floor(longer), 2.0)), 0), tables.contact_step.size - 1)
+    suggested = min(max(level - _longer(error), 0), tables.contact_step.size - 1)
     control[NEXT_LEVEL] = suggested if level == wanted else min(suggested, wanted)
     control[LEVEL], control[NODE_SET], control[NEW] = level, node_set, 0
