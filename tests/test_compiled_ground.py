@@ -1,8 +1,9 @@
 """SIMD vectors, sums and packed arguments against numpy and the tuples they stand for."""
 
 import ast
+import re
 from pathlib import Path
-from typing import NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -11,13 +12,18 @@ from scipy.integrate import DOP853
 from scipy.special import eval_jacobi, roots_jacobi
 
 from contacts import Hertz, KelvinVoigt, Viscoelastic
+from fembeam import Harmonic
+from solvers import Contact, Exponential, System
 from solvers.compiled import decorators, dop853_tableau
+from solvers.compiled.fields import dimensions_of, packed_type, shapes_of
 from solvers.compiled.packed import Layout, Packed, PackedTemplate, aligned, unpacker
 from solvers.compiled.simd import bit_pattern, load8, positive8, splat8, sqrt8, store8, sum8
 from solvers.compiled.sums import combine, padded
 from solvers.exponential.contact.nodes import LOCAL, S, gauss_jacobi, node_sets_of, series_of
 from solvers.exponential.contact.peaks import local_maximum
 from solvers.exponential.flight import level_within
+from solvers.exponential.preparation import prepare_run
+from solvers.integration import kept_forcing
 
 OPTIONS = {"error_model": "numpy", "_nrt": False}
 
@@ -351,3 +357,42 @@ def test_only_named_files_stand_on_what_numba_does_not_promise():
     assert {name for name, used in found.items() if used} == USERS
     assert {name for name, used in found.items() if used & OPTION_NAMES} == {"solvers/compiled/decorators.py"}
     assert found["solvers/compiled/decorators.py"] == OPTION_NAMES | {"numba.core"}
+
+
+class Declared(NamedTuple):
+    k: Annotated[Any, "N"]
+    rows: Annotated[Any, "int m, 2*N+1"]
+    size: Annotated[float, "number"]
+
+
+def test_a_declaration_gives_type_and_shapes():
+    assert packed_type(Declared) == types.NamedTuple(
+        [types.Array(types.float64, 1, "C"), types.Array(types.int64, 2, "C"), types.float64], Declared
+    )
+    assert shapes_of(Declared, {"N": 3, "m": 4}) == [(3,), (4, 7), ()]
+
+
+@pytest.mark.parametrize(("stops", "tones"), [(0, 0), (1, 1), (2, 3), (14, 1)])
+def test_arrays_have_the_shapes_they_are_declared_with(stops, tones):
+    """Every name among the dimensions has one size in all fields, or none where a table is not needed."""
+    rows = np.random.default_rng(1).normal(size=(stops + 1, 5))
+    contacts = [Contact(row, Hertz(1e5), 0.1) for row in rows[1:]]
+    loads = [(rows[0], Harmonic(1.0, 3.0 + i)) for i in range(tones)]
+    system = System.modal([1.0, 2.0, 3.0, 5.0, 8.0], 0.01, contacts, loads)
+    method = Exponential(1e-8)
+    _, prepared = prepare_run(system, kept_forcing(system, 10.0, method.rtol), 10.0, method.rtol)
+    for value in (prepared.problem.value, prepared.tables.value):
+        sizes = {}
+        for name, shape in dimensions_of(type(value)).items():
+            array = np.asarray(getattr(value, name))
+            assert array.ndim == len(shape), name
+            for part, size in zip(shape, array.shape, strict=True):
+                if array.size and part.isidentifier():
+                    assert sizes.setdefault(part, size) == size, (name, part)
+            for part, size in zip(shape, array.shape, strict=True):
+                if array.size and {*re.findall("[A-Za-z]+[0-9]*", part)} <= {*sizes, "S"}:
+                    assert shapes_of(tuple_of(part), {**sizes, "S": S}) == [(size,)], (name, part)
+
+
+def tuple_of(dimension):
+    return NamedTuple("tuple_of", [("field", Annotated[Any, dimension])])

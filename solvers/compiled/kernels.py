@@ -10,7 +10,7 @@ indentation rate (work done on the stop, J) and of force (impulse, N s).
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from llvmlite import ir
@@ -20,6 +20,7 @@ from numba.extending import intrinsic
 from solvers.compiled.decorators import entry as entry  # re-exported for files of kernels
 from solvers.compiled.decorators import inlined, inner, kernel, reordered
 from solvers.compiled.decorators import merged as merged
+from solvers.compiled.fields import packed_type
 
 
 class Problem(NamedTuple):
@@ -28,50 +29,42 @@ class Problem(NamedTuple):
     z = [p, v] are block coordinates, for mass-normalised modes in √kg m and √kg m/s.
     """
 
-    k: Any  # (n,) block stiffness, 1/s²
-    c: Any  # (n,) block damping, 1/s
-    loss: Any  # (2n, 2n) damping power zᵀ loss z in W, or (0, 0): then Σ c v²
-    push: Any  # (m, 2n) state rate per newton of stop s
-    read: Any  # (m, 2n) indentation = read·z - gap, m
-    read_rate: Any  # (m, 2n) indentation rate = read_rate·z, m/s
-    knots: Any  # (m, J) ascending indentations, m, between two segments: 0 (-inf if it always acts), knots, then inf
-    gap: Any  # (m,) m
-    law: Any  # (m,) addresses of the compiled forces
-    gradient: Any  # (m,) addresses of their derivatives
-    parameters: Any  # (m, P) their parameters; of laws with memory the run's own, numbers latched among them
-    floor: Any  # (m,) smallest entry rates, m/s
-    borders: Any  # (m,) addresses of the margins of laws with memory, 0 for others
-    renewal: Any  # (m,) addresses of what they latch on a border
-    border_count: Any  # (m,) how many borders
-    latched: Any  # (m, l) places of the latched numbers among the parameters, padded by -1
-    by_latched: Any  # (m,) addresses of the forces' derivatives by them
-    by_renewal: Any  # (m,) addresses of the derivatives of what is latched on a border
-    opening: Any  # (m,) place among the parameters of a segment code that is 0 while the law is open, or -1
-    load: Any  # (L, 2n) state rate per unit of signal l
-    power: Any  # (L, 2n) input power = signal × power·z, W
-    tone_omega: Any  # (K,) rad/s
-    tone_amplitude: Any  # (K,) complex, a of Re a e^{iωt}
-    tone_load: Any  # (K,) the load each drives
-    table: Any  # (rows, 3) [s, s', s''] at the nodes of all sampled signals
-    table_dt: Any  # (J,) s
-    table_start: Any  # (J + 1,) first row of each, and the end
-    table_load: Any  # (J,) the load each drives
-    parts: Any  # addresses of what is compiled by itself, 0 where it is not; see `parts`
+    k: Annotated[Any, "N"]  # block stiffness, 1/s²
+    c: Annotated[Any, "N"]  # block damping, 1/s
+    loss: Annotated[Any, "2*N, 2*N"]  # damping power zᵀ loss z in W, or (0, 0): then Σ c v²
+    push: Annotated[Any, "m, 2*N"]  # state rate per newton of stop s
+    read: Annotated[Any, "m, 2*N"]  # indentation = read·z - gap, m
+    read_rate: Annotated[Any, "m, 2*N"]  # indentation rate = read_rate·z, m/s
+    knots: Annotated[Any, "m, J"]  # m, between two segments, ascending: 0 (-inf if it always acts), knots, inf
+    gap: Annotated[Any, "m"]  # m
+    law: Annotated[Any, "int m"]  # addresses of the compiled forces
+    gradient: Annotated[Any, "int m"]  # addresses of their derivatives
+    parameters: Annotated[Any, "m, P"]  # of the laws; the run's own if numbers latched are among them
+    floor: Annotated[Any, "m"]  # smallest entry rates, m/s
+    borders: Annotated[Any, "int m"]  # addresses of the margins of laws with memory, 0 for others
+    renewal: Annotated[Any, "int m"]  # addresses of what they latch on a border
+    border_count: Annotated[Any, "int m"]  # how many borders
+    latched: Annotated[Any, "int m, l"]  # places of the latched numbers among the parameters, padded by -1
+    by_latched: Annotated[Any, "int m"]  # addresses of the forces' derivatives by them
+    by_renewal: Annotated[Any, "int m"]  # addresses of the derivatives of what is latched on a border
+    opening: Annotated[Any, "int m"]  # place in parameters of a segment's code, 0 while the law is open; or -1
+    load: Annotated[Any, "L, 2*N"]  # state rate per unit of signal l
+    power: Annotated[Any, "L, 2*N"]  # input power = signal × power·z, W
+    tone_omega: Annotated[Any, "K"]  # rad/s
+    tone_amplitude: Annotated[Any, "complex K"]  # complex, a of Re a e^{iωt}
+    tone_load: Annotated[Any, "int K"]  # the load each drives
+    table: Annotated[Any, "rows, 3"]  # [s, s', s''] at the nodes of all sampled signals
+    table_dt: Annotated[Any, "tables"]  # s
+    table_start: Annotated[Any, "int tables+1"]  # first row of each, and the end
+    table_load: Annotated[Any, "int tables"]  # the load each drives
+    parts: Annotated[Any, "int parts"]  # addresses of what is compiled by itself, 0 where it is not; see `parts`
 
 
 REAL = types.float64
 VECTOR = types.Array(REAL, 1, "C")
 MATRIX = types.Array(REAL, 2, "C")
 INTEGERS = types.Array(types.int64, 1, "C")
-_COMPLEX = types.Array(types.complex128, 1, "C")
-PROBLEM = types.NamedTuple(
-    [
-        *[VECTOR, VECTOR, MATRIX, MATRIX, MATRIX, MATRIX, MATRIX, VECTOR, INTEGERS, INTEGERS],
-        *[MATRIX, VECTOR, *[INTEGERS] * 3, types.Array(types.int64, 2, "C"), *[INTEGERS] * 3],
-        *[MATRIX, MATRIX, VECTOR, _COMPLEX, INTEGERS, MATRIX, VECTOR, *[INTEGERS] * 3],
-    ],
-    Problem,
-)
+PROBLEM = packed_type(Problem)
 
 
 def _c_function(outputs):

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from numba import types
 
+from solvers.compiled.fields import packed_type, shapes_of
 from solvers.compiled.kernels import (
-    INTEGERS,
-    MATRIX,
-    VECTOR,
     Problem,
     abs_dot,
     dot,
@@ -47,20 +44,17 @@ class State(NamedTuple):
     `begin_state` fills it; from then on kernels alone write to it. Units as in `kernels.Problem`.
     """
 
-    now: Any  # (4,) s: time, flight step, contact step, time of the last event
-    x: Any  # (2n + 2 + 2m,) of the blocks, then the energy balance in J (impulses in N s), see `kernels`
-    rate: Any  # of x, per s; stepping methods only
-    segment: Any  # (m,) of the law: 0 in flight, j > 0 between the stop's knots j-1 and j
-    entry_rate: Any  # (m,) m/s, latched
-    active: Any  # (m, 7) contacts under way, SI units, columns named above
-    count: Any  # (8,) steps, rejected steps, law calls, ..., as named above
-    event_record: Any  # (rows, HEAD + x.size + forces) contact steps and events, for the tangent; else no rows
+    now: Annotated[Any, "4"]  # s: time, flight step, contact step, time of the last event
+    x: Annotated[Any, "X"]  # of the blocks, then the energy balance in J (impulses in N s), see `kernels`
+    rate: Annotated[Any, "X"]  # of x, per s; stepping methods only
+    segment: Annotated[Any, "int m"]  # of the law: 0 in flight, j > 0 between the stop's knots j-1 and j
+    entry_rate: Annotated[Any, "m"]  # m/s, latched
+    active: Annotated[Any, "m, 7"]  # contacts under way, SI units, columns named above
+    count: Annotated[Any, "int 8"]  # steps, rejected steps, law calls, ..., as named above
+    event_record: Annotated[Any, "rows, record"]  # contact steps and events, for the tangent; else no rows
 
 
-STATE = types.NamedTuple(
-    [VECTOR, VECTOR, VECTOR, INTEGERS, VECTOR, MATRIX, INTEGERS, MATRIX],
-    State,
-)
+STATE = packed_type(State)
 
 
 @inner
@@ -187,7 +181,7 @@ def in_contact(state):
 
 def state_shapes(width: int, stops: int) -> list[tuple[int, ...]]:
     """Shapes of the arrays of `State`."""
-    return [(4,), (width,), (width,), (stops,), (stops,), (stops, 7), (8,), (0, 0)]
+    return shapes_of(State, {"X": width, "m": stops, "rows": 0, "record": 0})
 
 
 def begin_state(state: State, z: Any) -> None:

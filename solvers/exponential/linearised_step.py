@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from numba import types
 
-from solvers.compiled.kernels import MATRIX, REAL, VECTOR, call_force, contact_forces, copy, dot, inlined, merged, rhs
+from solvers.compiled.fields import packed_type
+from solvers.compiled.kernels import call_force, contact_forces, copy, dot, inlined, merged, rhs
 from solvers.compiled.state import BEGAN, ENDED, FIRST, HEAD, KIND, PART, SECOND, SPAN, T
 from solvers.compiled.sums import combine
 from solvers.exponential.contact.collocation import end_state
@@ -32,37 +32,33 @@ class Derivatives(NamedTuple):
     `Tangent` fills y, from then on `linearise_run` alone writes to them.
     """
 
-    y: Any  # (columns, x.size) of the state at fixed time
-    entry: Any  # (columns, m) of the latched entry rates
-    shift: Any  # (columns, m + 1) of the entry times, and of the time of the last border
-    force: Any  # (m + L, S) of one column: forces, then signals, at the nodes of a step
-    signal: Any  # (L, S) slopes of the sampled signals there
-    response: Any  # (m, 2, S) of δ and δ̇ to these slopes
-    by_parameter: Any  # (m, S) ∂F/∂parameter there
-    rate: Any  # (2, x.size) of the state at both ends of a step; after a call the first is that at the time reached
-    stages: Any  # (STAGES, columns, x.size) of a landing
-    trial: Any  # (columns, x.size)
-    batch: Any  # (8,)
-    latched: Any  # (columns, m l) of what laws with memory have latched, see Problem.latched
-    by_latched: Any  # (m, l S) derivatives of their forces by it, row by row
-    renewed: Any  # (l (2 + l) + 4 P + 2 B,) working space
+    y: Annotated[Any, "columns, X"]  # of the state at fixed time
+    entry: Annotated[Any, "columns, m"]  # of the latched entry rates
+    shift: Annotated[Any, "columns, m+1"]  # of the entry times, and of the time of the last border
+    force: Annotated[Any, "m+L, S"]  # of one column: forces, then signals, at the nodes of a step
+    signal: Annotated[Any, "L, S"]  # slopes of the sampled signals there
+    response: Annotated[Any, "m, 2, S"]  # of δ and δ̇ to these slopes
+    by_parameter: Annotated[Any, "m, S"]  # ∂F/∂parameter there
+    rate: Annotated[Any, "2, X"]  # of the state at both ends of a step; after a call first that at the end
+    stages: Annotated[Any, "STAGES, columns, X"]  # of a landing
+    trial: Annotated[Any, "columns, X"]
+    batch: Annotated[Any, "8"]
+    latched: Annotated[Any, "columns, m*l"]  # of what laws with memory have latched, see Problem.latched
+    by_latched: Annotated[Any, "m, l*S"]  # derivatives of their forces by it, row by row
+    renewed: Annotated[Any, "renewed"]  # working space of l (5 + l) + 4 P + 2 B numbers
 
 
 class Variation(NamedTuple):
     """Changes by a parameter, per unit, besides that of the state; ``step`` is zero without a parameter."""
 
-    step: float  # half the distance between the two systems of the difference
-    law_step: float  # the same; zero where their laws are the same
-    omega: Any  # (K,) tones
-    steady: Any  # (K, m, 2, 4): (Re a, Im a, Re b, Im b) of δ and δ̇ = Re (a + t b) e^{iωt}
-    gap: Any  # (m,)
+    step: Annotated[float, "number"]  # half the distance between the two systems of the difference
+    law_step: Annotated[float, "number"]  # the same; zero where their laws are the same
+    omega: Annotated[Any, "K"]  # tones
+    steady: Annotated[Any, "K, m, 2, 4"]  # (Re a, Im a, Re b, Im b) of δ and δ̇ = Re (a + t b) e^{iωt}
+    gap: Annotated[Any, "m"]
 
 
-_CUBE = types.Array(REAL, 3, "C")
-DERIVATIVES = types.NamedTuple(
-    [*[MATRIX] * 5, _CUBE, MATRIX, MATRIX, _CUBE, MATRIX, VECTOR, MATRIX, MATRIX, VECTOR], Derivatives
-)
-VARIATION = types.NamedTuple([REAL, REAL, VECTOR, types.Array(REAL, 4, "C"), VECTOR], Variation)
+DERIVATIVES, VARIATION = packed_type(Derivatives), packed_type(Variation)
 
 
 @inlined

@@ -6,9 +6,9 @@ from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import types
 
-from solvers.compiled.kernels import INTEGERS, MATRIX, PROBLEM, REAL, VECTOR, Problem
+from solvers.compiled.fields import packed_type, shapes_of
+from solvers.compiled.kernels import PROBLEM, Problem
 from solvers.compiled.packed import Layout, Packed, PackedTemplate, aligned
 from solvers.compiled.parts import BORDERS, ENERGY, MANY_STOPS, TWO_STOPS, load
 from solvers.compiled.state import STATE, State, begin_state, most_borders, problem_of, state_shapes
@@ -17,36 +17,11 @@ from solvers.exponential.contact.many_stops import POOL
 from solvers.exponential.contact.node_response import START, Scratch
 from solvers.exponential.contact.nodes import S, series_of
 from solvers.exponential.energy.flight_tables import ENERGY_TABLES, energy_tables_for
-from solvers.exponential.flight import SERIES_TERMS
 from solvers.exponential.steady_response import steady_response, without_resonance
 from solvers.exponential.tables import TONE_TABLES, Tables, build, doublings, fill_tones, law_tables_of
 from solvers.problem import Array, Forcing, Memo, System, on_one_grid
 
-
-def _arrays(*dimensions: int) -> list[Any]:
-    """Types of contiguous float arrays with so many dimensions; a plain number for none."""
-    return [types.Array(REAL, d, "C") if d else REAL for d in dimensions]
-
-
-TABLES = types.NamedTuple(
-    [
-        *_arrays(1, 3, 5, 2, 4, 2, 3, 3, 2, 3, 2, 2, 2, 2, 0, 0, 2, 1, 2),
-        *(*_arrays(1, 3, 1, 1, 2, 2, 2, 2, 3, 3, 3, 4, 3), INTEGERS, INTEGERS),
-        *_arrays(5, 6, 5, 5, 5, 5, 3, 2, 2, 2, 2, 2, 2, 4),
-        *(VECTOR, INTEGERS, INTEGERS, MATRIX),
-    ],
-    Tables,
-)
-SCRATCH = types.NamedTuple(
-    [
-        *(*_arrays(1, 2, 2, 1, 1, 1, 1, 3, 3, 1, 3, 2, 1, 3, 2, 3, 1), INTEGERS, MATRIX),
-        *(*_arrays(1, 1, 1, 1, 2, 1, 2, 1, 1, 1, 1, 1, 2, 1), INTEGERS),
-        *(*_arrays(2, 1, 1, 1, 2, 2), INTEGERS, INTEGERS),
-        *(*_arrays(2, 2, 1, 2, 3), INTEGERS, *_arrays(2, 3, 2)),
-    ],
-    Scratch,
-)
-
+TABLES, SCRATCH = packed_type(Tables), packed_type(Scratch)
 _KINDS = {"problem": PROBLEM, "tables": TABLES, "state": STATE, "scratch": SCRATCH, "energy_tables": ENERGY_TABLES}
 load_parts = partial(load, _KINDS)
 """Compile functions that are called at their addresses, or load their machine code; see `compiled.parts`."""
@@ -247,29 +222,14 @@ def _check_passive(system: System) -> bool:
 @lru_cache(maxsize=64)
 def _layout(stops: int, loads: int, blocks: int, signals: int, borders: int, pool: int) -> Layout:
     """Shapes and places of the arrays of `State` and `Scratch`; ``pool`` pairs of stops, 0 for a few stops."""
-    size, width = 2 * blocks, 2 * blocks + 2 + 2 * stops
-    rows = size if pool else 0
-    scratch = [
-        *(
-            (padded(width),),
-            (SERIES_TERMS, 2 * padded(blocks)),
-            (signals, 6),
-            (SERIES_TERMS,),
-            (blocks,),
-            (loads,),
-            (stops,),
-        ),
-        (6, 2, padded(blocks)),
-        *((stops, 2, S), (S,), (stops, 2, S), (stops + loads, S), (S,), (stops, 2, 8), (stops, S), (stops, 3, S)),
-        *((stops * S,), (stops * S,), (START + 1, max(padded(width + 2), 2 * padded(blocks)))),
-        *([(stops,)] * 4),
-        *((stops, S), (stops,), (4, 3 * S), (stops,), (stops,), (S + 2,), (1,), (1,)),
-        *((2 + loads, padded(2 * size + 2 * S * (stops + loads + 2)) + 16 * signals), (3,), (6,)),
-        *((stops, 2), (borders * S,), (6 * borders,), (borders,), (stops, borders), (stops, borders), (1,), (2,)),
-        *((rows, S), (rows, S), (padded(rows),), (stops * S, stops * S), (pool, S, 2 * S), (pool,)),
-        *((size, S), (blocks, 5, S), (S + 1 + stops + loads, S)),
-    ]
-    return Layout([STATE, SCRATCH], [state_shapes(width, stops), scratch])
+    width, own, many = 2 * blocks + 2 + 2 * stops, padded(blocks), blocks if pool else 0
+    sizes = {
+        **{"m": stops, "L": loads, "N": blocks, "N8": own, "S": S, "B": borders, "tables": signals},
+        **{"X8": padded(width), "W8": max(padded(width + 2), 2 * own), "stages": START + 1},
+        **{"M": many, "M8": padded(2 * many), "pool": pool},
+        "numbers": padded(4 * blocks + 2 * S * (stops + loads + 2)) + 16 * signals,
+    }
+    return Layout([STATE, SCRATCH], [state_shapes(width, stops), shapes_of(Scratch, sizes)])
 
 
 def _loss_rows(problem: Problem) -> Array:

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
@@ -41,62 +41,60 @@ class Tables(NamedTuple):
     loads, N blocks with those of the tones.
     """
 
-    flight_step: Any  # (l,) s, falling
-    flight_propagator: Any  # (l, 2, N padded): α, β of every block
-    signal: Any  # (l, L, 6, 2, N padded): state change by a signal t^k/k!
-    cell: Any  # (2, N padded): α, β over a whole cell of the sampled signals
-    cell_signal: Any  # (L, 6, 2, N padded): state change over a cell by s, s', s'' at its start, then at its end
-    cell_error: Any  # (m, N padded): see `cell_errors`
-    cell_error_signal: Any  # (m, L, 2)
-    load_rows: Any  # (L, 2, N padded): state rate of p and v per unit of a signal
-    block_k_c: Any  # (2, N padded): k in 1/s², c in 1/s
-    stop_rows: Any  # (m, 4, N padded): the first two rows give δ + gap from p and v, the others δ̇
-    acceleration_weight: Any  # (m, N padded): |δ̈| <= Σ weight × energy norm
-    rate_weight: Any  # (m, N): |δ̇| <= Σ weight × energy norm
-    load_acceleration: Any  # (m, L): δ̈ per unit of a signal
-    load_norm: Any  # (L, N): energy norm of a load per block
-    fastest: float  # |λ|max, rad/s
-    own_blocks: float  # number of the structure's blocks; those behind them are tones
-    accelerance: Any  # (m, m): -δ̈ of stop s per newton at stop u, positive where the force opens the contact
-    exponent: Any  # (m,) leading exponents p of the laws
-    power_law: Any  # (m, 4): K, p, a, c of a force K δ^p (1 + a δ̇/δ̇⁻) + c δ̇; p = 0 for laws that are called
-    contact_step: Any  # (j,) s, falling
-    contact_propagator: Any  # (j, 2, N): α, β of every block
-    time_exponent: Any  # (f,) κ
-    weight_exponent: Any  # (f,) λ
-    nodes: Any  # (f, S) σ
-    times: Any  # (f, S) σ^κ
-    weights: Any  # (f, S): ∫F dt = h Σ weights F
-    plain: Any  # (f, S): the same of a force without the weight σ^λ
-    summary: Any  # (f, S, 8): from node values, the last four Jacobi coefficients, both ends' values, both slopes
-    lagrange: Any  # (f, 2, S): 1/Π (σ_j - σ_i) of the nodes' polynomials, and the same over σ_j^λ
-    tail: Any  # (f, S, 8): from node values of a signal, the last four Legendre coefficients in σ
-    local_interpolation: (
-        Any  # (f, S, 2S + 2, 2S): δ and h δ̇ at points around a node from those at all nodes and at the start
-    )
-    local_interval: Any  # (f, S, 2): the interval of σ these points span
-    kind: Any  # (f,) index of the kinds, and of the weightings of plain forces, below; see `contact.nodes.NodeSets`
-    entering: Any  # (f,) index of the weighting of the force of the stop that enters
-    free: Any  # (kinds, j, m, 2N, 2S): δ and δ̇ at the nodes from the state; for a few stops, as the next two
-    forced: Any  # (weightings, j, m + L, m, S, 2S): the same from the forces and signals at the nodes
-    end_response: Any  # (weightings, j, m + L, S, 2N padded): state change at the end
-    node_propagator: Any  # (kinds, j, 2, N, S): α, β of every block at the nodes; for many stops, as the next two
-    block_response: Any  # (weightings, j, S, 2 own, S): α, then β, of the blocks at the nodes per node value
-    block_end_response: Any  # (weightings, j, 2, own, S): the same at the end
-    alias: Any  # (kinds, j, 2N): error of δ between the nodes <= Σ ripple_weight (alias |p| + alias |v|)
-    ripple_weight: Any  # (m, N): amplitude of δ per unit of an oscillating block's rate
-    signal_rows: Any  # (L, 2N): a load's tones from the state
-    power_rows: Any  # (L, 2N): input power = signal × power row
-    loss_rows: Any  # (r, 2N): damping power = Σ (row·z)²
-    steady_rate: Any  # (2 tones, own padded): blocks' rate in steady motion by p, then v, of the tones; loss_rows: × √c
-    gauss: Any  # (2 + S, S): points and weights on (0, 1), then to all points the integrals of each one's polynomial
-    extrapolation: (
-        Any  # (f, 5, S, S): the force on the next smooth step, 2^{(i-2)/2} times shorter, from that of the last
-    )
-    bend: Any  # (m,) kind of the law's bend: 0 for none, else as named in `contact.crossings`
-    uncut: Any  # (m,) addresses of the laws without their cut at F = 0
-    uncut_gradient: Any  # (m,) and of their derivatives
-    uncut_parameters: Any  # (m, P)
+    flight_step: Annotated[Any, "l"]  # s, falling
+    flight_propagator: Annotated[Any, "l, 2, N8"]  # α, β of every block
+    signal: Annotated[Any, "l, L, 6, 2, N8"]  # state change by a signal t^k/k!
+    cell: Annotated[Any, "2, N8"]  # α, β over a whole cell of the sampled signals
+    cell_signal: Annotated[Any, "L, 6, 2, N8"]  # state change over a cell by s, s', s'' at its start, then at its end
+    cell_error: Annotated[Any, "m, N8"]  # see `cell_errors`
+    cell_error_signal: Annotated[Any, "m, L, 2"]
+    load_rows: Annotated[Any, "L, 2, N8"]  # state rate of p and v per unit of a signal
+    block_k_c: Annotated[Any, "2, N8"]  # k in 1/s², c in 1/s
+    stop_rows: Annotated[Any, "m, 4, N8"]  # the first two rows give δ + gap from p and v, the others δ̇
+    acceleration_weight: Annotated[Any, "m, N8"]  # |δ̈| <= Σ weight × energy norm
+    rate_weight: Annotated[Any, "m, N"]  # |δ̇| <= Σ weight × energy norm
+    load_acceleration: Annotated[Any, "m, L"]  # δ̈ per unit of a signal
+    load_norm: Annotated[Any, "L, N"]  # energy norm of a load per block
+    fastest: Annotated[float, "number"]  # |λ|max, rad/s
+    own_blocks: Annotated[float, "number"]  # number of the structure's blocks; those behind them are tones
+    accelerance: Annotated[Any, "m, m"]  # -δ̈ of stop s per newton at stop u, > 0 where the force opens the contact
+    exponent: Annotated[Any, "m"]  # leading exponents p of the laws
+    power_law: Annotated[Any, "m, 4"]  # K, p, a, c of a force K δ^p (1 + a δ̇/δ̇⁻) + c δ̇; p = 0 for laws that are called
+    contact_step: Annotated[Any, "j"]  # s, falling
+    contact_propagator: Annotated[Any, "j, 2, N"]  # α, β of every block
+    time_exponent: Annotated[Any, "f"]  # κ
+    weight_exponent: Annotated[Any, "f"]  # λ
+    nodes: Annotated[Any, "f, S"]  # σ
+    times: Annotated[Any, "f, S"]  # σ^κ
+    weights: Annotated[Any, "f, S"]  # ∫F dt = h Σ weights F
+    plain: Annotated[Any, "f, S"]  # the same of a force without the weight σ^λ
+    summary: Annotated[Any, "f, S, 8"]  # from node values: last four Jacobi coefficients, ends' values, slopes
+    lagrange: Annotated[Any, "f, 2, S"]  # 1/Π (σ_j - σ_i) of the nodes' polynomials, and the same over σ_j^λ
+    tail: Annotated[Any, "f, S, 8"]  # from node values of a signal, the last four Legendre coefficients in σ
+    local_interpolation: Annotated[Any, "f, S, 2*S+2, 2*S"]  # δ, h δ̇ around a node from those at all and the start
+    local_interval: Annotated[Any, "f, S, 2"]  # the interval of σ these points span
+    kind: Annotated[Any, "int f"]  # of kinds, and of weightings of plain forces; see `contact.nodes.NodeSets`
+    entering: Annotated[Any, "int f"]  # index of the weighting of the force of the stop that enters
+    free: Annotated[Any, "kinds, j, m, 2*N, 2*S"]  # δ and δ̇ at nodes from the state; for a few stops, as the next two
+    forced: Annotated[Any, "weightings, j, m+L, m, S, 2*S"]  # the same from the forces and signals at the nodes
+    end_response: Annotated[Any, "weightings, j, m+L, S, 2*N8"]  # state change at the end
+    node_propagator: Annotated[
+        Any, "kinds, j, 2, N, S"
+    ]  # α, β of every block at the nodes; as the next two for many stops
+    block_response: Annotated[Any, "weightings, j, S, 2*own, S"]  # α, then β, of the blocks at the nodes per node value
+    block_end_response: Annotated[Any, "weightings, j, 2, own, S"]  # the same at the end
+    alias: Annotated[Any, "kinds, j, 2*N"]  # error of δ between the nodes <= Σ ripple_weight (alias |p| + alias |v|)
+    ripple_weight: Annotated[Any, "m, N"]  # amplitude of δ per unit of an oscillating block's rate
+    signal_rows: Annotated[Any, "L, 2*N"]  # a load's tones from the state
+    power_rows: Annotated[Any, "L, 2*N"]  # input power = signal × power row
+    loss_rows: Annotated[Any, "r, 2*N"]  # damping power = Σ (row·z)²
+    steady_rate: Annotated[Any, "2*tones, own8"]  # blocks' steady rate by p, then v, of the tones; loss_rows: × √c
+    gauss: Annotated[Any, "2+S, S"]  # points, weights on (0, 1); integrals to all points of each one's polynomial
+    extrapolation: Annotated[Any, "f, 5, S, S"]  # force on the next smooth step, 2^{(i-2)/2} times shorter
+    bend: Annotated[Any, "m"]  # kind of the law's bend: 0 for none, else as named in `contact.crossings`
+    uncut: Annotated[Any, "int m"]  # addresses of the laws without their cut at F = 0
+    uncut_gradient: Annotated[Any, "int m"]  # and of their derivatives
+    uncut_parameters: Annotated[Any, "m, P"]
 
 
 class LawTables(NamedTuple):

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solvers.compiled.dop853_tableau import STAGES
+from solvers.compiled.fields import shapes_of
 from solvers.compiled.kernels import PROBLEM, Problem
 from solvers.compiled.packed import Layout, Packed
 from solvers.compiled.state import HEAD, STATE, State, T, begin_state, law_parameters, most_borders, state_shapes
@@ -100,17 +101,11 @@ class Tangent:
 @lru_cache(maxsize=64)
 def _layout(stops: int, loads: int, width: int, columns: int, latched: int, others: int) -> Layout:
     """Shapes and places of the arrays of `Derivatives` and of the past `State`."""
-    derivatives = [
-        (columns, width),
-        (columns, stops),
-        (columns, stops + 1),
-        (stops + loads, S),
-        (loads, S),
-        (stops, 2, S),
-    ]
-    derivatives += [(stops, S), (2, width), (STAGES, columns, width), (columns, width), (8,)]
-    derivatives += [(columns, stops * latched), (stops, latched * S), (latched * (5 + latched) + 2 + others,)]
-    return Layout([DERIVATIVES, STATE], [derivatives, state_shapes(width, stops)])
+    sizes = {
+        **{"columns": columns, "X": width, "m": stops, "L": loads, "S": S, "STAGES": STAGES, "l": latched},
+        "renewed": latched * (5 + latched) + 2 + others,
+    }
+    return Layout([DERIVATIVES, STATE], [shapes_of(Derivatives, sizes), state_shapes(width, stops)])
 
 
 def _size(y: Array) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 from solvers.compiled.dop853_tableau import STAGES
 from solvers.compiled.kernels import inlined, inner, law_forces, merged, reordered, table_value
@@ -38,59 +38,57 @@ class Scratch(NamedTuple):
     signals in their own units.
     """
 
-    x_new: Any  # (x.size padded,) state at the end of the step tried
-    terms: Any  # (14, 2 × N padded) derivatives of the state
-    signal_terms: Any  # (tables, 6) value and derivatives of every sampled signal
-    values: Any  # (14,) coefficients of a polynomial
-    norms: Any  # (N,) energy norms of the blocks, √J
-    signal_bounds: Any  # (L,) bounds of the sampled signals on some cells
-    per_stop: Any  # (m,) bounds of |δ̈| in m/s², errors of δ in m, or of δ̇ in m/s
-    split_state: Any  # (6, 2, N padded) p and v of the blocks, of several states; see `energy.flight_balance`
-    motion: Any  # (m, 2, S) indentations and their rates at the nodes
-    clipped: Any  # (S,) indentations of one stop at the nodes, not below 0
-    free: Any  # (m, 2, S) indentations and rates at the nodes without contact forces
-    force: Any  # (m + L, S) forces of the stops, then values of the signals
-    trial: Any  # (S,) new forces of one stop, or other numbers of one moment
-    summary: Any  # (m, 2, 8) of the forces and the indentations, see Tables.summary
-    previous: Any  # (m, S) forces of the last accepted step
-    slope: Any  # (m, 3, S) derivatives of the laws at the nodes by δ, δ̇ and entry rate
-    residual: Any  # (m S,) N, then the changes of the forces
-    pivots: Any  # (m S,) of the LU factors
-    stages: Any  # (START + 1, x.size + 2 padded) states and rates, rows as named above
-    reference_speed: Any  # (m,) m/s: an error of an indentation rate is measured in rtol × reference speed
-    first_step_share: (
-        Any  # (m,) of the duration of a contact of each stop that its first step may take; 0: not known yet
-    )
-    force_tolerance: Any  # (m,) N: change of a force within which it counts as found
-    unresolved: Any  # (m,) N s: impulse that the polynomials of a step leave out
-    guess: Any  # (m, S) forces the iterations begin with
-    viscous: Any  # (m,) N s/m: slope of a force by its rate, where Newton's method has found it; else 0
-    local_motion: Any  # (4, 3S) rows as named above, see `peaks`
-    side: Any  # (m,) +1 or -1: side of its law's bend on which each stop is, see `crossings`
-    side_at_begin: Any  # (m,) the same at the start of the step tried
-    bend_values: Any  # (S + 2,) of one stop at the nodes and at the end, then the largest, see `crossings`
-    landing_reach: Any  # (1,) radians of the fastest block that a landing may take
-    duration: Any  # (1,) s: estimate for the contact begun last, as if nothing else acted on the body
-    energy_sums: Any  # (2 + L, numbers) see `energy.flight_balance` and `contact_balance`
-    energy: Any  # (3,) J, see `energy.check`
-    control: Any  # (6,) of the step control, places named in `step`
-    start_motion: Any  # (m, 2) δ and δ̇ at the start of the step
-    margin: Any  # (B S,) margins of an element's borders at points, row by row, B the most of any; see `borders`
-    ends: Any  # (6 B,)
-    fired: Any  # (B,)
-    largest: Any  # (m, B) largest margins on the step tried last
-    noise: Any  # (m, B) their rounding
-    border: Any  # (1,) border that ends the step tried last, -1 for a bend
-    landed: Any  # (2,) element and border that a landing in time has found to lie before its own, or -1
-    block_motion: Any  # (2N, S) p and v at the nodes; for many stops only, as the next two, see `many_stops`
-    block_force: Any  # (2N, S) state rates of the blocks by the forces at the nodes
-    pair_weights: Any  # (2N,) products of a stop's read row with the push of another
-    jacobian: Any  # (m S, m S) used for the stops in contact; this and the next two are not cleared between runs
-    pair_pool: Any  # (POOL, S, 2S) responses of pairs of stops
-    pool_keys: Any  # (POOL,) which pair of stops and step length each of them belongs to
-    along: Any  # (2N, S) p and v of the blocks at a panel's points, as the next two of any number of stops
-    moves: Any  # (N, 5, S), see `energy.quadrature`
-    between: Any  # (S + 1 + m + L, S)
+    x_new: Annotated[Any, "X8"]  # state at the end of the step tried
+    terms: Annotated[Any, "14, 2*N8"]  # derivatives of the state
+    signal_terms: Annotated[Any, "tables, 6"]  # value and derivatives of every sampled signal
+    values: Annotated[Any, "14"]  # coefficients of a polynomial
+    norms: Annotated[Any, "N"]  # energy norms of the blocks, √J
+    signal_bounds: Annotated[Any, "L"]  # bounds of the sampled signals on some cells
+    per_stop: Annotated[Any, "m"]  # bounds of |δ̈| in m/s², errors of δ in m, or of δ̇ in m/s
+    split_state: Annotated[Any, "6, 2, N8"]  # p and v of the blocks, of several states; see `energy.flight_balance`
+    motion: Annotated[Any, "m, 2, S"]  # indentations and their rates at the nodes
+    clipped: Annotated[Any, "S"]  # indentations of one stop at the nodes, not below 0
+    free: Annotated[Any, "m, 2, S"]  # indentations and rates at the nodes without contact forces
+    force: Annotated[Any, "m+L, S"]  # forces of the stops, then values of the signals
+    trial: Annotated[Any, "S"]  # new forces of one stop, or other numbers of one moment
+    summary: Annotated[Any, "m, 2, 8"]  # of the forces and the indentations, see Tables.summary
+    previous: Annotated[Any, "m, S"]  # forces of the last accepted step
+    slope: Annotated[Any, "m, 3, S"]  # derivatives of the laws at the nodes by δ, δ̇ and entry rate
+    residual: Annotated[Any, "m*S"]  # N, then the changes of the forces
+    pivots: Annotated[Any, "int m*S"]  # of the LU factors
+    stages: Annotated[Any, "stages, W8"]  # states and rates, rows as named above
+    reference_speed: Annotated[Any, "m"]  # m/s: an error of an indentation rate is measured in rtol × reference speed
+    first_step_share: Annotated[Any, "m"]  # of a contact's duration that its first step may take; 0: unknown
+    force_tolerance: Annotated[Any, "m"]  # N: change of a force within which it counts as found
+    unresolved: Annotated[Any, "m"]  # N s: impulse that the polynomials of a step leave out
+    guess: Annotated[Any, "m, S"]  # forces the iterations begin with
+    viscous: Annotated[Any, "m"]  # N s/m: slope of a force by its rate, where Newton's method has found it; else 0
+    local_motion: Annotated[Any, "4, 3*S"]  # rows as named above, see `peaks`
+    side: Annotated[Any, "m"]  # +1 or -1: side of its law's bend on which each stop is, see `crossings`
+    side_at_begin: Annotated[Any, "m"]  # the same at the start of the step tried
+    bend_values: Annotated[Any, "S+2"]  # of one stop at the nodes and at the end, then the largest, see `crossings`
+    landing_reach: Annotated[Any, "1"]  # radians of the fastest block that a landing may take
+    duration: Annotated[Any, "1"]  # s: estimate for the contact begun last, as if nothing else acted on the body
+    energy_sums: Annotated[Any, "2+L, numbers"]  # see `energy.flight_balance` and `contact_balance`
+    energy: Annotated[Any, "3"]  # J, see `energy.check`
+    control: Annotated[Any, "int 6"]  # of the step control, places named in `step`
+    start_motion: Annotated[Any, "m, 2"]  # δ and δ̇ at the start of the step
+    margin: Annotated[Any, "B*S"]  # margins of an element's borders at points, row by row; see `borders`
+    ends: Annotated[Any, "6*B"]
+    fired: Annotated[Any, "B"]
+    largest: Annotated[Any, "m, B"]  # largest margins on the step tried last
+    noise: Annotated[Any, "m, B"]  # their rounding
+    border: Annotated[Any, "int 1"]  # border that ends the step tried last, -1 for a bend
+    landed: Annotated[Any, "int 2"]  # element and border that a landing in time has found to lie before its own, or -1
+    block_motion: Annotated[Any, "2*M, S"]  # p and v at the nodes; as the next two see `many_stops`
+    block_force: Annotated[Any, "2*M, S"]  # state rates of the blocks by the forces at the nodes
+    pair_weights: Annotated[Any, "M8"]  # products of a stop's read row with the push of another
+    jacobian: Annotated[Any, "m*S, m*S"]  # of the stops in contact; as the next two not cleared between runs
+    pair_pool: Annotated[Any, "pool, S, 2*S"]  # responses of pairs of stops
+    pool_keys: Annotated[Any, "int pool"]  # which pair of stops and step length each of them belongs to
+    along: Annotated[Any, "2*N, S"]  # p and v of the blocks at a panel's points, as the next two of any number of stops
+    moves: Annotated[Any, "N, 5, S"]  # see `energy.quadrature`
+    between: Annotated[Any, "S+1+m+L, S"]
 
 
 @merged

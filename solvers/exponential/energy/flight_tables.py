@@ -14,12 +14,12 @@ Tables of contact steps are those of `contact_tables`.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from numba import types
 
-from solvers.compiled.kernels import INTEGERS, MATRIX, REAL, VECTOR, Problem
+from solvers.compiled.fields import packed_type
+from solvers.compiled.kernels import Problem
 from solvers.compiled.packed import Packed, aligned
 from solvers.compiled.sums import padded
 from solvers.exponential.contact.nodes import S, gauss
@@ -40,46 +40,27 @@ _REACH = 200.0  # radians of the fastest block up to which a contact step has ta
 class EnergyTables(NamedTuple):
     """Numbers of the energy balance, read by kernels only; l counts flight steps and one more, j contact steps."""
 
-    active: float  # whether there is a balance
-    closed: float  # whether there are rows for flight
-    spacing: float  # s, of the last step in the tables
-    driver: Any  # (d,) columns of the state that drive
-    power: Any  # (L, N padded) input power = signal × power row, from v
-    plain: Any  # (l, 3, N padded): damping = Σ rows × (p², p v, v²)
-    rows: Any  # (l, 6J + d, 4 × N padded): work, then damping, from p, then v, per unit of a signal or driver
-    pairs: Any  # (l, 6J, 2 × 6J padded): the same from the signals
-    gauss: Any  # (2, 5)
-    series: Any  # (6, LONG): weights of a series' terms at Gauss's points and at the end
-    kind: Any  # (f,) contact table of every node set
-    first: float  # contact step at which the tables begin
-    longest: Any  # (kinds,) s: contact step up to which they may be used
-    steady: Any  # (kinds, j, K, 2, S): α, β of every tone at the nodes
-    contact: Any  # (kinds, j, n, 3S + 5, 2S), or none where the next three are
-    head: Any  # (H,) rows of `Scratch.force` that are heads, see `contact_sums`
-    sums: Any  # (f, j, 2N + S H, 2 S H padded with 4K) forms summed over the blocks
-    free_loss: Any  # (kinds, j, 3, n) damping of free motion = Σ rows × (p², p v, v²)
+    active: Annotated[float, "number"]  # whether there is a balance
+    closed: Annotated[float, "number"]  # whether there are rows for flight
+    spacing: Annotated[float, "number"]  # s, of the last step in the tables
+    driver: Annotated[Any, "int d"]  # columns of the state that drive
+    power: Annotated[Any, "L, N8"]  # input power = signal × power row, from v
+    plain: Annotated[Any, "l, 3, N8"]  # damping = Σ rows × (p², p v, v²)
+    rows: Annotated[Any, "l, 6*J+d, 4*N8"]  # work, then damping, from p, then v, per unit of a signal or driver
+    pairs: Annotated[Any, "l, 6*J, pairs"]  # the same from the signals, 2 × 6J padded
+    gauss: Annotated[Any, "2, 5"]
+    series: Annotated[Any, "6, LONG"]  # weights of a series' terms at Gauss's points and at the end
+    kind: Annotated[Any, "int f"]  # contact table of every node set
+    first: Annotated[float, "number"]  # contact step at which the tables begin
+    longest: Annotated[Any, "kinds"]  # s: contact step up to which they may be used
+    steady: Annotated[Any, "kinds, j, K, 2, S"]  # α, β of every tone at the nodes
+    contact: Annotated[Any, "kinds, j, N, 3*S+5, 2*S"]  # or none where the next three are
+    head: Annotated[Any, "int H"]  # rows of `Scratch.force` that are heads, see `contact_sums`
+    sums: Annotated[Any, "f, j, heads, sums"]  # forms summed over the blocks
+    free_loss: Annotated[Any, "kinds, j, 3, N"]  # damping of free motion = Σ rows × (p², p v, v²)
 
 
-ENERGY_TABLES = types.NamedTuple(
-    [
-        *(
-            REAL,
-            REAL,
-            REAL,
-            INTEGERS,
-            MATRIX,
-            *(types.Array(REAL, 3, "C"),) * 3,
-            MATRIX,
-            MATRIX,
-            INTEGERS,
-            REAL,
-            VECTOR,
-        ),
-        *(types.Array(REAL, 5, "C"),) * 2,
-        *(INTEGERS, *(types.Array(REAL, 4, "C"),) * 2),
-    ],
-    EnergyTables,
-)
+ENERGY_TABLES = packed_type(EnergyTables)
 
 
 def _empty(kept: float, node_sets: int) -> EnergyTables:
