@@ -68,6 +68,8 @@ class Tables(NamedTuple):
     times: Any  # (f, S) σ^κ
     weights: Any  # (f, S): ∫F dt = h Σ weights F
     plain: Any  # (f, S): the same of a force without the weight σ^λ
+    work: Any  # (f, S, S): ∫ F dδ = Σ F_i (Σ work_ij (δ_j - δ₀) + work_end_i (δ - δ₀ at the end)) for plain forces
+    work_end: Any  # (f, S)
     summary: Any  # (f, S, 8): from node values, the last four Jacobi coefficients, both ends' values, both slopes
     lagrange: Any  # (f, 2, S): 1/Π (σ_j - σ_i) of the nodes' polynomials, and the same over σ_j^λ
     tail: Any  # (f, S, 8): from node values of a signal, the last four Legendre coefficients in σ
@@ -187,6 +189,8 @@ def build(
         times=node_sets.times,
         weights=node_sets.weights,
         plain=node_sets.plain,
+        work=node_sets.work,
+        work_end=node_sets.work_end,
         summary=node_sets.summary,
         lagrange=node_sets.lagrange,
         tail=node_sets.tail,
