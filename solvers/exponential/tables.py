@@ -68,6 +68,8 @@ class Tables(NamedTuple):
     times: Annotated[Any, "f, S"]  # σ^κ
     weights: Annotated[Any, "f, S"]  # ∫F dt = h Σ weights F
     plain: Annotated[Any, "f, S"]  # the same of a force without the weight σ^λ
+    work: Annotated[Any, "f, S, S"]  # ∫ F dδ = Σ F_i (Σ work_ij (δ_j - δ₀) + work_end_i (δ - δ₀ at the end)), plain F
+    work_end: Annotated[Any, "f, S"]
     summary: Annotated[Any, "f, S, 8"]  # from node values: last four Jacobi coefficients, ends' values, slopes
     lagrange: Annotated[Any, "f, 2, S"]  # 1/Π (σ_j - σ_i) of the nodes' polynomials, and the same over σ_j^λ
     tail: Annotated[Any, "f, S, 8"]  # from node values of a signal, the last four Legendre coefficients in σ
@@ -78,9 +80,7 @@ class Tables(NamedTuple):
     free: Annotated[Any, "kinds, j, m, 2*N, 2*S"]  # δ and δ̇ at nodes from the state; for a few stops, as the next two
     forced: Annotated[Any, "weightings, j, m+L, m, S, 2*S"]  # the same from the forces and signals at the nodes
     end_response: Annotated[Any, "weightings, j, m+L, S, 2*N8"]  # state change at the end
-    node_propagator: Annotated[
-        Any, "kinds, j, 2, N, S"
-    ]  # α, β of every block at the nodes; as the next two for many stops
+    node_propagator: Annotated[Any, "kinds, j, 2, N, S"]  # α, β of blocks at nodes; for many stops, as the next two
     block_response: Annotated[Any, "weightings, j, S, 2*own, S"]  # α, then β, of the blocks at the nodes per node value
     block_end_response: Annotated[Any, "weightings, j, 2, own, S"]  # the same at the end
     alias: Annotated[Any, "kinds, j, 2*N"]  # error of δ between the nodes <= Σ ripple_weight (alias |p| + alias |v|)
@@ -185,6 +185,8 @@ def build(
         times=node_sets.times,
         weights=node_sets.weights,
         plain=node_sets.plain,
+        work=node_sets.work,
+        work_end=node_sets.work_end,
         summary=node_sets.summary,
         lagrange=node_sets.lagrange,
         tail=node_sets.tail,

@@ -36,7 +36,7 @@ from solvers.compiled.kernels import (
     merged,
 )
 from solvers.compiled.parts import ERROR, SOLVE, part
-from solvers.compiled.simd import largest8, load8, size8, sum8
+from solvers.compiled.simd import largest8, load8, size8, splat8, sum8
 from solvers.compiled.state import CALLS, PEAK_DELTA, PEAK_FORCE, T, is_open
 from solvers.compiled.sums import combine, iterate_power_law, replace_values
 from solvers.exponential.contact.many_stops import add_end_response, pair_response, uses_blocks, weighting_of
@@ -288,6 +288,20 @@ def end_state(problem, tables, state, scratch, node_set, level):
         x[n + b] += alpha[b] * v - beta[b] * (problem.k[b] * p + problem.c[b] * v)
 
 
+@inlined
+def _work(problem, tables, scratch, node_set, s):
+    """Work, J, of a contact over the step: ∫ F dδ of the polynomials through F at the nodes, δ there and at both ends.
+
+    Not Σ F δ̇ at the nodes: where the force hardly changes steps grow until fast blocks oscillate between the nodes,
+    and what oscillates with ω is ω times larger in δ̇.
+    """
+    begin, force = scratch.start_motion[s, 0], scratch.force[s]
+    combine(tables.work[node_set], force, S, None, scratch.trial)
+    end = sum8(load8(tables.work_end[node_set], 0) * load8(force, 0))
+    within = sum8(load8(scratch.trial, 0) * (load8(scratch.motion[s, 0], 0) - splat8(begin)))
+    return within + end * (indentation(problem, s, scratch.x_new) - begin)
+
+
 @merged
 def finish_step(problem, tables, state, scratch, node_set, level):
     """Move the state to the end of the step; update the energy balance and the peaks of the contacts."""
@@ -295,9 +309,13 @@ def finish_step(problem, tables, state, scratch, node_set, level):
     h = tables.contact_step[level]
     for s in range(stops):
         if state.segment[s] > 0:
-            weights = tables.weights[node_set] if node_set == 0 or s == node_set - 1 else tables.plain[node_set]
+            enters = s == node_set - 1
+            weights = tables.weights[node_set] if node_set == 0 or enters else tables.plain[node_set]
             impulses = load8(weights, 0) * load8(scratch.force[s], 0)
-            state.x[size + 2 + 2 * s] += h * sum8(impulses * load8(scratch.motion[s, 1], 0))
+            if enters:
+                state.x[size + 2 + 2 * s] += h * sum8(impulses * load8(scratch.motion[s, 1], 0))
+            else:
+                state.x[size + 2 + 2 * s] += _work(problem, tables, scratch, node_set, s)
             state.x[size + 3 + 2 * s] += h * sum8(impulses)
             if is_open(problem, s):
                 continue

@@ -56,7 +56,7 @@ class EnergyTables(NamedTuple):
     steady: Annotated[Any, "kinds, j, K, 2, S"]  # α, β of every tone at the nodes
     contact: Annotated[Any, "kinds, j, N, 3*S+5, 2*S"]  # or none where the next three are
     head: Annotated[Any, "int H"]  # rows of `Scratch.force` that are heads, see `contact_sums`
-    sums: Annotated[Any, "f, j, heads, sums"]  # forms summed over the blocks
+    sums: Annotated[Any, "f, j, heads, sums"]  # forms of 2N + S H rows summed over the blocks
     free_loss: Annotated[Any, "kinds, j, 3, N"]  # damping of free motion = Σ rows × (p², p v, v²)
 
 
