@@ -55,6 +55,24 @@ def test_histories_are_those_of_the_run(run):
     assert np.interp(1.1, t, u) == pytest.approx(1e3 * run.displacement(0.1)[1100], rel=1e-9)
 
 
+def test_the_window_holds_the_largest_force_where_contacts_end_before_the_motion():
+    """A quake whose weaker end touches nothing: the last periods, an empty window, were shown."""
+    t = 1e-3 * np.arange(4001)
+    quake = 8.0 * np.sin(60.0 * t) * np.where(t < 1.0, 1.0, 0.6)
+    base = fb.Record(t, quake, quantity="acceleration")
+    scene = fb.Scene(PAPER_BEAM, [fb.Clamped(0.0)], damping=fb.ModalDamping(0.05), base=base)
+    calm = scene.reduce(1).simulate(3.9, 1e-3)
+    assert plot.stationary(calm)
+    gap = 0.9 * np.abs(calm.displacement(0.2599)).max()
+    run = dataclasses.replace(scene, stops=[fb.Stop(0.2599, Hertz(2.1e8), gap)]).reduce(1).simulate(3.9, 1e-3)
+    peak = run.contacts.t_in[np.argmax(run.contacts.peak_force)]
+    assert peak < 1.5
+    lo, hi = plot.time_history(run).axes[1].get_xlim()
+    assert lo < peak < hi < 3.0
+    assert "no contact in this window" not in texts(plot.time_history(run))
+    assert plot.time_history(calm).axes[0].get_xlim()[1] >= calm.t[-1]
+
+
 def shaded(axis):
     """Times (k, 2) at which the bands of an axis begin and end."""
     return np.array([[band.get_x(), band.get_x() + band.get_width()] for band in axis.patches]).reshape(-1, 2)
