@@ -233,6 +233,22 @@ def test_indentation_rate_of_a_stop_between_two_beams_is_that_of_both():
     np.testing.assert_array_equal(rate, indentation(run, 0)[1])
 
 
+def test_all_modes_of_several_bodies_are_the_finite_elements_themselves():
+    """The dofs of all bodies together were counted, and every beam asked for so many modes."""
+    short = fb.Scene(fb.Beam(0.3, STEEL), [fb.Pinned(0.0), fb.Pinned(0.3)])
+    scene = fb.Scene(fb.Beam(0.5, STEEL), [fb.Clamped(0.0)], bodies=[short],
+                     stops=[fb.Stop(0.28, HERTZ, gap=1e-3, on=(1, 0.15))],
+                     impactors=[fb.Impactor(0.5, 0.1, -1.0, HERTZ, gap=1e-3)])  # fmt: skip
+    model, full = scene.reduce("all", elements=4), scene.matrices(4)
+    assert model.counts == tuple((beam.M.shape[0], 0) for beam in full.beams)
+    assert model.basis.vectors.shape == full.M.shape
+    start = np.linspace(0.1, 1.0, len(model.omega))
+    u = model.basis.expand(start)
+    np.testing.assert_allclose(model.basis.project(full.K @ u), model.omega**2 * start, rtol=1e-6, atol=1e-3)
+    again = model.again(fb.Scene(scene.beam, scene.supports, bodies=[short]))  # other nodes
+    assert again.counts == ((8, 0), (8, 0))
+
+
 # --- free flight --------------------------------------------------------------------------------------------------
 
 
