@@ -137,7 +137,7 @@ def test_ball_on_beam_against_an_independent_integration(ratio, contacts):
     mass = ratio * STEEL.line_mass * L
     scene = fb.Scene(fb.Beam(L, STEEL), [fb.Pinned(0.0), fb.Pinned(L)],
                      impactors=[fb.Impactor(L / 2, mass, -1.0, HERTZ)])  # fmt: skip
-    run = scene.reduce(modes).simulate(4e-3)
+    run = scene.reduce(modes).simulate(4e-3, [4e-3])
     crossings, peak, speed = independent_ball(L, STEEL, L / 2, mass, 1.0, HERTZ, modes, 4e-3)
     log = run.contacts
     switched = np.sort(np.concatenate([log.t_in, log.t_out]))
@@ -183,7 +183,7 @@ def test_two_beams_against_the_same_problem_at_the_matrix_level():
     long, short = (fb.Scene(fb.Beam(length, STEEL), [fb.Clamped(0.0)]) for length in (0.5, 0.3))
     scene = fb.Scene(fb.Beam(0.5, STEEL), [fb.Clamped(0.0)], bodies=[short], damping=fb.ModalDamping(0.01),
                      stops=[fb.Stop(0.28, law, side="below", on=(1, 0.28))], base=fb.Harmonic(1e-3, 150.0))  # fmt: skip
-    run = scene.reduce(3).simulate(0.1)
+    run = scene.reduce(3).simulate(0.1, [0.1])
     a, b = long.reduce(3), short.reduce(3)
     w = np.concatenate([a.phi(0.28), -b.phi(0.28)])
     omega = np.concatenate([a.omega, b.omega])
@@ -233,13 +233,29 @@ def test_indentation_rate_of_a_stop_between_two_beams_is_that_of_both():
     np.testing.assert_array_equal(rate, indentation(run, 0)[1])
 
 
+def test_all_modes_of_several_bodies_are_the_finite_elements_themselves():
+    """The dofs of all bodies together were counted, and every beam asked for so many modes."""
+    short = fb.Scene(fb.Beam(0.3, STEEL), [fb.Pinned(0.0), fb.Pinned(0.3)])
+    scene = fb.Scene(fb.Beam(0.5, STEEL), [fb.Clamped(0.0)], bodies=[short],
+                     stops=[fb.Stop(0.28, HERTZ, gap=1e-3, on=(1, 0.15))],
+                     impactors=[fb.Impactor(0.5, 0.1, -1.0, HERTZ, gap=1e-3)])  # fmt: skip
+    model, full = scene.reduce("all", elements=4), scene.matrices(4)
+    assert model.counts == tuple((beam.M.shape[0], 0) for beam in full.beams)
+    assert model.basis.vectors.shape == full.M.shape
+    start = np.linspace(0.1, 1.0, len(model.omega))
+    u = model.basis.expand(start)
+    np.testing.assert_allclose(model.basis.project(full.K @ u), model.omega**2 * start, rtol=1e-6, atol=1e-3)
+    again = model.again(fb.Scene(scene.beam, scene.supports, bodies=[short]))  # other nodes
+    assert again.counts == ((8, 0), (8, 0))
+
+
 # --- free flight --------------------------------------------------------------------------------------------------
 
 
 def test_free_flight_is_exact_for_hours():
     model = fb.Scene(fb.Beam(0.4, STEEL)).reduce(4)
     start = model.state(velocity=lambda z: 2.0 - 3.0 * z)
-    run = model.simulate(7200.0, start=start)
+    run = model.simulate(7200.0, [7200.0], start)
     z = np.array([0.0, 0.25, 0.4])
     np.testing.assert_allclose(run.displacement(z)[-1], 7200.0 * (2.0 - 3.0 * z), rtol=1e-10)
     np.testing.assert_allclose(run.velocity(z)[-1], 2.0 - 3.0 * z, rtol=1e-10)
@@ -247,7 +263,7 @@ def test_free_flight_is_exact_for_hours():
 
 def test_pinned_beam_turns_exactly_for_hours():
     model = fb.Scene(fb.Beam(0.4, STEEL), [fb.Pinned(0.1)]).reduce(3)
-    run = model.simulate(7200.0, start=model.state(velocity=lambda z: 0.01 * (z - 0.1)))
+    run = model.simulate(7200.0, [7200.0], model.state(velocity=lambda z: 0.01 * (z - 0.1)))
     assert run.displacement(0.4)[-1] == pytest.approx(7200.0 * 0.01 * 0.3, rel=1e-10)
 
 

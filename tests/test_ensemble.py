@@ -117,9 +117,9 @@ def test_statistics_by_threads_are_those_computed_here(threads, tmp_path):
 
 def test_a_model_that_was_run_can_be_sent_to_another_process():
     model = small_model(base=fb.Harmonic(1e-4, 200.0))
-    here = model.simulate(0.5)
+    here = model.simulate(0.5, 0.1)
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
-        assert np.array_equal(pool.submit(model.simulate, 0.5).result().q, here.q)
+        assert np.array_equal(pool.submit(model.simulate, 0.5, 0.1).result().q, here.q)
         assert np.array_equal(pool.submit(displaced, model, here).result(), here.displacement(0.5))
 
 

@@ -86,6 +86,26 @@ def test_static_moment_line_is_exact_with_the_residual_shape():
     np.testing.assert_allclose(run.shear(z + 1e-6 * (z < L))[0], 10.0 * (z < 0.2999), atol=1e-5)
 
 
+STATIC_LOADS = {
+    "force": ({"forces": [fb.PointForce(L, fb.Harmonic(3.0, 0.0))]}, 3.0, 0.0),
+    "moment": ({"forces": [fb.PointMoment(L, fb.Harmonic(3.0, 0.0))]}, 0.0, 3.0),
+    "foot": ({"springs": [fb.Spring(L, 1e3, foot=fb.Harmonic(2e-3, 0.0))]}, 2.0 / (1 + 1e3 * L**3 / (3 * EI)), 0.0),
+    "two places": ({"forces": [fb.PointForce(z, fb.Harmonic(1.5, 0.0)) for z in (L, L - 1e-3)]}, 3.0, -1.5e-3),
+}
+
+
+@pytest.mark.parametrize("given", STATIC_LOADS)
+def test_static_shapes_of_loads_give_exact_moments_and_shears(given):
+    """A tip load gives V = -F and M = F (L - z) + M₀; with one mode the shear was up to 4 % off."""
+    parts, force, moment = STATIC_LOADS[given]
+    model = fb.Scene(fb.Beam(L, SQUARE), CLAMPED, **parts).reduce(1, residual=True)
+    q = sum(vector * float(signal(0.0)) for vector, signal in model.system.loads) / model.omega**2
+    z, found = np.linspace(0.0, 0.9 * L, 33), model.section_forces[0]
+    size = force * L + abs(moment)
+    np.testing.assert_allclose(found.moment(z) @ q, force * (L - z) + moment, atol=1e-8 * size)
+    np.testing.assert_allclose(found.shear(z) @ q, -force, atol=1e-7 * size / L)
+
+
 def test_stress_is_moment_over_section_modulus_plus_tension():
     beam = fb.Beam(L, SQUARE, axial_force=500.0)
     model = fb.Scene(beam, CLAMPED).reduce(3)

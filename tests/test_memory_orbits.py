@@ -351,10 +351,8 @@ def test_branch_of_a_beam_with_friction_is_saved_and_gone_on_with(tmp_path):
     start = model.orbit()
     assert "forgets" in str(start)
     assert len(start.transitions) >= 4
-    run = model.simulate(400 * start.found.period)
-    assert (
-        abs(run.displacement(0.2)[-1] - start.run.displacement(0.2)[0]) < 1e-6 * abs(start.run.displacement(0.2)).max()
-    )
+    end = model.simulate(400 * start.found.period).q[-1] @ model.phi(0.2)
+    assert abs(end - start.run.displacement(0.2)[0]) < 1e-6 * abs(start.run.displacement(0.2)).max()
     first = model.branch("omega", (245.0, 255.0), start=start, at=250.0)
     for _, one in zip(range(3), first, strict=False):
         assert one.stable

@@ -5,13 +5,16 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from matplotlib.text import Text
 from problems import PAPER_BEAM
 
 import fembeam as fb
-from contacts import PUBLISHED, Hertz, Hysteretic, bounce, identify
+from contacts import PUBLISHED, Hertz, Hysteretic, Jenkins, bounce, identify
 from fembeam import plot, statistics
 from fembeam.plot.axis_names import axis_name
+from fembeam.plot.orbits import _widen
+from fembeam.plot.style import GREY
 from fembeam.response import backbone
 from fembeam.results import files as report
 
@@ -53,6 +56,24 @@ def test_histories_are_those_of_the_run(run):
     assert np.interp(1.1, t, u) == pytest.approx(1e3 * run.displacement(run.stops[shown, 0])[1100], rel=1e-9)
     t, u = plot.time_history(run, window, z=0.1).axes[0].lines[0].get_data()
     assert np.interp(1.1, t, u) == pytest.approx(1e3 * run.displacement(0.1)[1100], rel=1e-9)
+
+
+def test_the_window_holds_the_largest_force_where_contacts_end_before_the_motion():
+    """A quake whose weaker end touches nothing: the last periods, an empty window, were shown."""
+    t = 1e-3 * np.arange(4001)
+    quake = 8.0 * np.sin(60.0 * t) * np.where(t < 1.0, 1.0, 0.6)
+    base = fb.Record(t, quake, quantity="acceleration")
+    scene = fb.Scene(PAPER_BEAM, [fb.Clamped(0.0)], damping=fb.ModalDamping(0.05), base=base)
+    calm = scene.reduce(1).simulate(3.9, 1e-3)
+    assert plot.stationary(calm)
+    gap = 0.9 * np.abs(calm.displacement(0.2599)).max()
+    run = dataclasses.replace(scene, stops=[fb.Stop(0.2599, Hertz(2.1e8), gap)]).reduce(1).simulate(3.9, 1e-3)
+    peak = run.contacts.t_in[np.argmax(run.contacts.peak_force)]
+    assert peak < 1.5
+    lo, hi = plot.time_history(run).axes[1].get_xlim()
+    assert lo < peak < hi < 3.0
+    assert "no contact in this window" not in texts(plot.time_history(run))
+    assert plot.time_history(calm).axes[0].get_xlim()[1] >= calm.t[-1]
 
 
 def shaded(axis):
@@ -406,11 +427,52 @@ def test_linear_response_and_backbone_lie_behind_a_branch(run):
     H = branch.family.model.frequency_response(omega, "forces[0]", 0.24445)
     assert height == pytest.approx(1e3 * 0.05 * H.amplitude)
     peaks = 1e3 * np.array([plot.peak(orbit, 0.24445) for orbit in branch.orbits])
-    assert axis.dataLim.y1 == pytest.approx(peaks.max())  # what lies behind does not widen the limits
+    assert axis.dataLim.y1 == pytest.approx(peaks.max())
+    assert axis.get_ylim()[1] > height.max() > 1.2 * peaks.max()  # it was cut at the height of the branch
+    given = Figure().subplots()
+    plot.branch(branch, axes=given)
+    assert given.get_ylim()[1] < 1.2 * peaks.max()  # axes of others keep the limits of the branch
+    for high, scale in ((1.2, "linear"), (50.0, "log")):
+        axis = Figure().subplots()
+        axis.plot([0.0, 1.0], [0.5, 1.0])
+        _widen(axis, np.array([0.2, high]))
+        assert axis.get_yscale() == scale
+        assert axis.get_ylim()[0] < 0.2
+        assert axis.get_ylim()[1] > high
     omega, height = drawn["backbone of the lowest mode"].get_data()
     seen = np.isfinite(omega)
     assert omega[seen] == pytest.approx(backbone(branch.family.model, 0.24445, 1e-3 * height[seen]))
     assert "backbone" not in texts(plot.branch(scene.reduce(1).branch("amplitude", (0.04, 0.06)).run()))
+
+
+def test_the_linear_response_of_a_slider_is_that_of_a_stuck_one_for_every_level(run):
+    """One level only was drawn, as "linear, no contact"."""
+    slider = fb.Element(0.24445, Jenkins(300.0, 1.0))
+    found = []
+    for amplitude in (1e-6, 3e-6):
+        base = fb.Harmonic(amplitude, 125.0)
+        model = dataclasses.replace(run.model.scene, stops=(), elements=[slider], base=base).reduce(1)
+        found.append(model.branch("omega", (120.0, 126.0), step=0.3).run())
+    axis = plot.branch(found, labels=["low", "high"]).axes[0]
+    drawn = [line for line in axis.lines if line.get_linestyle() == ":"]
+    assert [line.get_color() for line in drawn] == ["C0", "C1", GREY]
+    assert drawn[-1].get_label() == "linear, elements stuck"
+    for line, one in zip(drawn, found, strict=False):  # neither slips
+        heights = [1e3 * plot.peak(orbit, 0.24445) for orbit in one.orbits]
+        np.testing.assert_allclose(np.interp(one.parameter, *line.get_data()), heights, rtol=1e-3)
+    assert "linear, no contact, elements stuck" in {  # a stop beside the slider
+        line.get_label() for line in plot.branch(replaced_stops(found[0], run.model.scene.stops)).axes[0].lines
+    }
+
+
+def replaced_stops(branch, stops):
+    """The same orbits, said to be of a scene with stops, too."""
+    model = branch.family.model
+    other = dataclasses.replace(model.scene, stops=stops).reduce(1)
+    return SimpleNamespace(
+        **{name: getattr(branch, name) for name in ("parameter", "stable", "orbits", "special", "ends")},
+        family=dataclasses.replace(branch.family, model=other),
+    )
 
 
 def test_shaded_bands_are_the_intervals_of_the_estimates():

@@ -63,7 +63,7 @@ def test_a_slow_step_ends_in_equilibrium():
 def test_a_moment_bends_the_beam():
     model = fb.Scene(fb.Beam(1.0, UNIT), [fb.Clamped(0.0)], damping=fb.ModalDamping(0.7),
                      forces=[fb.PointMoment(0.6, fb.Harmonic(0.01, 0.0))]).reduce(20)  # fmt: skip
-    run = model.simulate(30.0)
+    run = model.simulate(30.0, [30.0])
     assert run.displacement(0.6)[-1] == pytest.approx(0.01 * 0.6**2 / 2, rel=2e-3)
 
 

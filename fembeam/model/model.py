@@ -169,7 +169,7 @@ class Model(Printed, ModalEquations):
         duration : s.
         dt : output sampling in s (0, dt, 2 dt, …; what is left of a duration that dt does not divide is run, and in
             the log, but has no sample), or the output times themselves, increasing; None keeps the final state and
-            the contact log only.
+            the contact log only, no histories.
         start : (2n,) as made by `rest`, `state` or `equilibrium`; None is rest. Or the (2n + l,) of `Run.end`, with
             what the laws have latched, from which the run goes on.
         solver : one of the methods in `solvers`; None is the library's best.
@@ -192,7 +192,7 @@ class Model(Printed, ModalEquations):
             solution = solvers.integrate(
                 model.system, q, q_dot, duration, dt, solver, progress=report, memory=memory or None
             )
-        run = Run.of(model, solution, memory)
+        run = Run.of(model, solution, memory, dt is not None)
         note("%r, integrated in %.3g s", run, run.cost.seconds)
         return run
 

@@ -12,7 +12,7 @@ from scipy import sparse
 import reduction
 from fembeam.model.model import Model
 from fembeam.model.shapes import Shapes
-from fembeam.scene import LocalCoordinate, Matrices, loaded, watched
+from fembeam.scene import MOST_DENSE, LocalCoordinate, Matrices, loaded, watched
 from fembeam.support import is_whole, require
 
 if TYPE_CHECKING:
@@ -42,20 +42,21 @@ def reduced(
     _check_static(scene, residual, interface)
     if omega_max is not None or mass_share is not None:
         modes = _enough(scene, elements, omega_max, mass_share)
-    chosen = _numbers(scene, DEFAULT_MODES if modes is None else modes, elements, interface)
-    matrices = scene.matrices(elements, max(chosen, default=0) + 1)
+    matrices, chosen = _chosen(scene, DEFAULT_MODES if modes is None else modes, elements, interface)
     bases = [
-        _oriented(_of_beam(beam, loaded(scene, body), chosen, residual, interface), beam, watched(scene, body))
-        for body, beam in enumerate(matrices.beams)
+        _oriented(_of_beam(beam, loaded(scene, body), own, residual, interface), beam, watched(scene, body))
+        for body, (beam, own) in enumerate(zip(matrices.beams, chosen, strict=True))
     ]
     if elements is not None and not isinstance(modes, str):
-        _warn_of_the_mesh(matrices, max(basis.omega[min(len(chosen), basis.count) - 1] for basis in bases))
-    options: dict[str, Any] = {"modes": chosen, "elements": elements, "residual": residual}
-    if interface:
-        options = {"modes": len(chosen), "elements": elements, "interface": True}
-    kept = [basis.count if interface else len(chosen) for basis in bases]
+        _warn_of_the_mesh(matrices, max(basis.omega[min(len(chosen[0]), basis.count) - 1] for basis in bases))
+    again = "all" if isinstance(modes, str) else len(chosen[0]) if interface else chosen[0]
+    options = {"modes": again, "elements": elements, **({"interface": True} if interface else {"residual": residual})}
+    kept = [basis.count if interface else len(own) for basis, own in zip(bases, chosen, strict=True)]
     counts = tuple((count, basis.count - count) for count, basis in zip(kept, bases, strict=True))
-    numbers = [tuple(range(basis.count)) if interface else _continued(chosen, basis.count) for basis in bases]
+    numbers = [
+        tuple(range(basis.count)) if interface else _continued(own, basis.count)
+        for basis, own in zip(bases, chosen, strict=True)
+    ]
     basis = _joined(bases, matrices)
     own, *others = _shapes_of_each(matrices, basis)
     modes_of_all = sum(numbers, ()) + (0,) * len(matrices.impactors)
@@ -127,12 +128,24 @@ def _warn_of_the_mesh(matrices: Matrices, omega: float) -> None:
             warnings.warn(f"elements are {trouble}; {advice}", UserWarning, stacklevel=4)
 
 
-def _numbers(scene: Scene, modes: Any, elements: int | None, interface: bool) -> tuple[int, ...]:
+def _chosen(scene: Scene, modes: Any, elements: int | None, interface: bool) -> tuple[Matrices, list[tuple[int, ...]]]:
+    """The mesh, and the mode numbers of each beam: the same, or all that it has."""
+    if not isinstance(modes, str):
+        listed = _numbers(modes, interface)
+        matrices = scene.matrices(elements, max(listed, default=0) + 1)
+        return matrices, [listed] * len(matrices.beams)
+    require(modes == "all" and elements is not None, "modes must be a count, a list, or 'all' with elements given",
+            modes, "Scene.reduce", "say how many elements the mesh shall have")  # fmt: skip
+    require(not interface, "modes must be a count with interface=True", modes, "Scene.reduce", "ask for modes=2")
+    matrices = scene.matrices(elements)
+    sizes = [beam.M.shape[0] for beam in matrices.beams]
+    require(max(sizes) <= MOST_DENSE, f"modes='all' is for beams of at most {MOST_DENSE} free dofs", sizes,
+            "Scene.reduce", "ask for fewer elements, or a count of modes")  # fmt: skip
+    return matrices, [tuple(range(size)) for size in sizes]
+
+
+def _numbers(modes: Any, interface: bool) -> tuple[int, ...]:
     """Mode numbers, ascending; the basis checks them."""
-    if isinstance(modes, str):
-        require(modes == "all" and elements is not None, "modes must be a count, a list, or 'all' with elements given",
-                modes, "Scene.reduce", "say how many elements the mesh shall have")  # fmt: skip
-        return tuple(range(scene.matrices(elements).M.shape[0]))
     whole = is_whole(modes)
     require(whole or np.ndim(modes) == 1, "modes must be a whole number or a list of them", modes, "Scene.reduce",
             "ask for modes=2, or modes=[0, 2]")  # fmt: skip

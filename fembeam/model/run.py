@@ -13,22 +13,22 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import solvers
-from fembeam.model.contact_histories import ContactHistories
+from fembeam.model.histories import Histories
 from fembeam.model.shapes import Shapes
 from fembeam.scene import ON, Source
-from fembeam.support import OldName, Part, Printed, require
+from fembeam.support import OldName, Part, Printed
 from solvers.problem import Losses, counted
 
 if TYPE_CHECKING:
     from fembeam.model.model import Model
-    from fembeam.response import Extremes, Reactions, Readout
+    from fembeam.response import Reactions, Readout
     from fembeam.scene_file import SceneFile
 
 Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Run(ContactHistories, Printed):
+class Run(Histories, Printed):
     """A simulated motion of a reduced model.
 
     Attributes
@@ -68,6 +68,7 @@ class Run(ContactHistories, Printed):
     end: Vector | None = None  # (2n + l,) [q, q̇] and what the laws have latched, at the time reached
     on: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 3), dtype=int))  # (m, 3): body, of ON, number
     kinds: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 2), dtype=bool))  # of rotation, always acting
+    sampled: bool = True  # else t, q, q_dot are the final state alone, and no history
 
     strikers = OldName("impactor_masses")
 
@@ -116,7 +117,7 @@ class Run(ContactHistories, Printed):
         return built(self.source)
 
     @classmethod
-    def of(cls, model: Model, solution: solvers.Solution, began: tuple[Vector, ...] = ()) -> Run:
+    def of(cls, model: Model, solution: solvers.Solution, began: tuple[Vector, ...] = (), sampled: bool = True) -> Run:
         """The run of a model from its solution."""
         rows = model.contact_rows
         stops = np.array([(one.z, one.push, one.gap) for one in rows], dtype=float).reshape(-1, 3)
@@ -132,41 +133,13 @@ class Run(ContactHistories, Printed):
             began=began,
             on=np.array([(one.body, ON.index(one.on[0]), one.on[1]) for one in rows], dtype=int).reshape(-1, 3),
             kinds=np.array([(one.rotation, one.always) for one in rows], dtype=bool).reshape(-1, 2),
+            sampled=sampled,
         )
 
     @property
     def complete(self) -> bool:
         """Whether the run reached its end."""
         return self.status == solvers.Status.DONE.value
-
-    def displacement(self, z: ArrayLike, body: int = 0, absolute: bool = False) -> Vector:
-        """u(z, t) of a beam (0 the scene's own), m: (k,) at one z, (k, j) at z (j,).
-
-        Relative to the frame, or ``absolute``: u + y.
-        """
-        return self._motion(self.q, z, body, absolute, 0)
-
-    def velocity(self, z: ArrayLike, body: int = 0, absolute: bool = False) -> Vector:
-        """u̇(z, t) relative to the frame, m/s, or ``absolute``: u̇ + ẏ; shapes as for `displacement`."""
-        return self._motion(self.q_dot, z, body, absolute, 1)
-
-    def acceleration(self, z: ArrayLike, body: int = 0, absolute: bool = False) -> Vector:
-        """ü(z, t) relative to the frame, m/s², or ``absolute``: ü + ÿ; shapes as for `displacement`.
-
-        ü = φ(z)·q'' with q'' of the equations of motion at the samples, the contact forces of the laws included: the
-        instant's value, not a mean over the sample. Under a short contact it holds what the kept modes carry of the
-        force, Σ φ_i(z) φ_i(z_s) F, and grows with their number.
-        """
-        from fembeam.response import coordinates
-
-        return self._motion(coordinates(self), z, body, absolute, 2)
-
-    def _motion(self, rates: Vector, z: ArrayLike, body: int, absolute: bool, order: int) -> Vector:
-        """A derivative of u at z (k,) or (k, j), with that of the frame's motion if absolute."""
-        from fembeam.response import frame_motion
-
-        values = rates @ self._beam(body)(z).T
-        return (values.T + frame_motion(self, order)).T if absolute else values
 
     def reactions(self) -> Reactions:
         """Forces (N) and moments (N m) of supports, springs and dashpots on the beams, at the samples.
@@ -196,52 +169,6 @@ class Run(ContactHistories, Printed):
         from fembeam.response import floor_spectrum
 
         return floor_spectrum(self, z, omega, zeta, **options)
-
-    def slope(self, z: ArrayLike, body: int = 0) -> Vector:
-        """u_z(z, t), rad."""
-        return self._field("slope", z, body)
-
-    def moment(self, z: ArrayLike, body: int = 0) -> Vector:
-        """Bending moment EI u_zz, N m: positive where it stretches the lower fibre."""
-        return self._field("moment", z, body)
-
-    def shear(self, z: ArrayLike, body: int = 0) -> Vector:
-        """Shear force dM/dz, N; at a point load that of the side ahead."""
-        return self._field("shear", z, body)
-
-    def stress(self, z: ArrayLike, body: int = 0) -> Vector:
-        """Stress at the lower outer fibre, N/m²: M c/I + N/A. ValueError where a section has no `fibre`."""
-        return self._field("stress", z, body)
-
-    def extremes(self, quantity: str = "displacement", z: ArrayLike | None = None, body: int = 0) -> Extremes:
-        """Least and greatest values over the samples, place by place, with their times.
-
-        Parameters
-        ----------
-        quantity : "displacement", "slope", "moment", "shear" or "stress".
-        z : places (j,) in m; None: all nodes of the mesh.
-        """
-        from fembeam.response import extremes, rows_of
-
-        places = self._beam(body).nodes if z is None else np.atleast_1d(np.asarray(z, dtype=float))
-        return extremes(self.t, self.q, *rows_of(self, quantity, places, body))
-
-    def _beam(self, body: int) -> Shapes:
-        """A beam's shapes; ValueError unless there is one of that number."""
-        beams = (self.shapes, *self.others)
-        require(body in range(len(beams)), f"body must be below {len(beams)}, the number of beams", body, "Run",
-                "0 is the scene's own")  # fmt: skip
-        return beams[body]
-
-    def _field(self, quantity: str, z: ArrayLike, body: int) -> Vector:
-        """A field over time: (k,) at one z, (k, j) at z (j,)."""
-        from fembeam.response import rows_of
-
-        self._beam(body)
-        places = np.asarray(z, dtype=float)
-        shapes, _, offset = rows_of(self, quantity, np.atleast_1d(places), body)
-        values = self.q @ shapes.T + offset
-        return values if places.ndim else values[:, 0]
 
     def to_xdmf(self, path: str | os.PathLike[str], stride: int = 1, hdf5: bool = False) -> Path:
         """Write every `stride`-th sample for ParaView: displacement, velocity, slope, moment, shear, stress.
@@ -298,7 +225,7 @@ class Run(ContactHistories, Printed):
             from fembeam.response import mean_force
 
             return mean_force(self, self._stop(stop))
-        return self._forces[self._stop(stop)]
+        return self._at_samples(self._forces[self._stop(stop)])
 
     @cached_property
     def _forces(self) -> Vector:

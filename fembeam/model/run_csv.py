@@ -142,8 +142,10 @@ def _write(target: Path, columns: Mapping[str, Vector]) -> Path:
 
 def parts(run: Run) -> list[Part]:
     """What print shows of a run: how it ended, its signals, the contacts of each stop."""
-    signals = {f"displacement, {name}": run.displacement(z) for name, z in usual_places(run.shapes).items()}
-    signals |= {f"indentation, {run.name(i)}": run.indentation(i) for i in range(len(run.stops))}
+    signals = {}
+    if run.sampled:
+        signals = {f"displacement, {name}": run.displacement(z) for name, z in usual_places(run.shapes).items()}
+        signals |= {f"indentation, {run.name(i)}": run.indentation(i) for i in range(len(run.stops))}
     moved = [(name, *map(float, (x.mean(), x.std(), x.min(), x.max()))) for name, x in signals.items() if len(x)]
     log, rows = run.contacts, []
     for stop in range(len(run.stops)):

@@ -68,6 +68,7 @@ def _contents(run: Run) -> tuple[str, dict[str, Any]]:
     about = {
         "format": FORMAT,
         "status": run.status,
+        "sampled": run.sampled,
         "scene": run.scene,
         "cost": {f.name: getattr(run.cost, f.name) for f in fields(run.cost)},
         "units": UNITS,
@@ -210,4 +211,5 @@ def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run
         versions=about.get("versions", {}),
         on=arrays["on"],
         kinds=arrays["kinds"].astype(bool),
+        sampled=bool(about.get("sampled", True)),  # earlier versions do not tell
     )

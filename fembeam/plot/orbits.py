@@ -10,7 +10,7 @@ import numpy as np
 from fembeam.model import observed
 from fembeam.plot.axis_names import axis_name
 from fembeam.plot.linear import frequencies
-from fembeam.plot.style import GREEN, GREY, ORANGE, RED, Vector, styled
+from fembeam.plot.style import GREEN, GREY, ORANGE, RED, Vector, plain_decades, styled
 from fembeam.scene import signals_of
 from fembeam.support import require
 from solvers.problem import counted
@@ -27,6 +27,7 @@ MARKS = {"fold": ("o", GREY), "flip": ("s", RED), "neimark-sacker": ("D", GREEN)
 SPAN, CLOSED = "reached the end of the span", "closed"  # ends that are no surprise
 ENDS = "*Xhd8"  # marks of the others, one for each reason
 BEHIND = 400  # points of the linear response
+FAR = 3.0  # times the branches: so high a linear response would press them down
 
 
 @styled
@@ -40,15 +41,17 @@ def branch(
     """Response diagram: largest |u| at z over a period against the parameter, dashed where unstable.
 
     Special orbits are marked, and where and why each direction ended: by a bar at an end of the span. Along the
-    frequency of the only load the linear response (all contacts open) lies behind, and for each period the backbone of
-    the lowest mode: its free vibration against the stops, at the frequency of the load that it answers in that period.
+    frequency of the only load the linear response of every level lies behind (all contacts open, elements stuck or
+    elastic), and for each period the backbone of the lowest mode: its free vibration against the stops, at the
+    frequency of the load that it answers in that period. Where the linear response reaches far above the branches a
+    figure of its own has a logarithmic axis.
 
     Parameters
     ----------
     branches : one or several along the same parameter.
     z : m; None is the first stop.
     cloud : (parameter, |u|) of runs to draw beneath, the check by brute force.
-    axes : to draw into; None makes a figure.
+    axes : to draw into, whose limits are those of the branches; None makes a figure.
     labels : of the branches; None tells their period.
     """
     from fembeam.plot.figure import legend, sheet
@@ -62,11 +65,15 @@ def branch(
         axis.plot(cloud[0], 1e3 * cloud[1], ".", color=GREY, markersize=2.0, label="simulated", rasterized=True)
     periods = [one.family.period for one in several]
     same = labels is None and len(set(periods)) == len(periods)  # colours: a period has the same on every figure
+    colours = [f"C{periods[i] - 1 if same else i}" for i in range(len(several))]
     for i, one in enumerate(several):
         label = f"period {periods[i]}" if labels is None else labels[i]
-        _draw_branch(axis, one, place, f"C{periods[i] - 1 if same else i}", label)
+        _draw_branch(axis, one, place, colours[i], label)
     _draw_ends(axis, several, place)
-    _draw_behind(axis, several, place)
+    linear = _draw_linear(axis, several, place, colours)
+    _draw_backbones(axis, several, place)
+    if axes is None and len(linear):
+        _widen(axis, linear)
     name = several[0].family.name
     axis.set_xlabel(axis_name(name, model.scene))
     axis.set_ylabel(f"max |u({place:.4g} m)| / mm")
@@ -114,31 +121,76 @@ def _draw_ends(axis: Axes, several: list[Branch], z: float) -> None:
             labelled.add(why)
 
 
-def _draw_behind(axis: Axes, several: list[Branch], z: float) -> None:
-    """Linear response and backbones along the frequency of the only load; the axes keep the limits of the branches."""
+def _along_the_load(one: Branch) -> str:
+    """The path of a scene's only load, if its frequency is what varies; else nothing."""
+    path = one.family.name.removesuffix(".omega")
+    return path if path != one.family.name and list(signals_of(one.family.model.scene)) == [path] else ""
+
+
+def _span(several: list[Branch]) -> tuple[float, float]:
+    """Lowest and highest parameter."""
+    return min(min(one.parameter) for one in several), max(max(one.parameter) for one in several)
+
+
+def _draw_linear(axis: Axes, several: list[Branch], z: float, colours: list[str]) -> Vector:
+    """The linear response of every level along the frequency of the only load; all its heights (k,)."""
+    curves: list[tuple[Vector, Vector, str]] = []
+    for one, colour in zip(several, colours, strict=True):
+        model, path = one.family.model, _along_the_load(one)
+        if path:
+            omega = frequencies(model, *_span(several), BEHIND)
+            linear = model.frequency_response(omega, path, z).amplitude * abs(signals_of(model.scene)[path].amplitude)
+            if not any(len(y) == len(linear) and np.allclose(1e3 * linear, y) for _, y, _ in curves):
+                curves.append((omega, 1e3 * linear, colour))
+    if len(curves) == 1:
+        _behind(axis, *curves[0][:2], "-", _linear_name(several))
+    elif curves:
+        for omega, heights, colour in curves:
+            _behind(axis, omega, heights, ":", None, colour)
+        _behind(axis, np.empty(0), np.empty(0), ":", _linear_name(several))
+    return np.concatenate([np.empty(0), *(heights for _, heights, _ in curves)])
+
+
+def _linear_name(several: list[Branch]) -> str:
+    """What the linear response leaves out: contacts are open, sliders stick, other elements with memory are elastic."""
+    rows = [row for one in several for row in one.family.model.contact_rows]
+    held = {"stuck" if "slip" in row.law.events else "elastic" for row in rows if row.always and row.remembers}
+    said = ["no contact"] * any(not row.always for row in rows) + [f"elements {' or '.join(sorted(held))}"] * bool(held)
+    return ", ".join(["linear", *said])
+
+
+def _draw_backbones(axis: Axes, several: list[Branch], z: float) -> None:
+    """The backbone of the lowest mode for each period, as high as the branches."""
     from fembeam.response import backbone
 
-    family = several[0].family
-    path, signals = family.name.removesuffix(".omega"), signals_of(family.model.scene)
-    if list(signals) != [path] or path == family.name:
+    model, (low, high) = several[0].family.model, _span(several)
+    if not (_along_the_load(several[0]) and model.contact_rows):
         return
-    model, (low, high) = family.model, (f(f(one.parameter) for one in several) for f in (min, max))
-    omega = frequencies(model, low, high, BEHIND)
-    linear = model.frequency_response(omega, path, z).amplitude * abs(signals[path].amplitude)
-    _behind(axis, omega, 1e3 * linear, "-", "linear, no contact")
     heights = np.linspace(0.0, axis.dataLim.y1, BEHIND // 2)[1:]
     for i, period in enumerate(sorted({one.family.period for one in several})):
         along = period * backbone(model, z, 1e-3 * heights)
         shown = (along >= low) & (along <= high)
-        if shown.any() and model.contact_rows:
+        if shown.any():
             _behind(axis, np.where(shown, along, np.nan), heights, "-.", None if i else "backbone of the lowest mode")
 
 
-def _behind(axis: Axes, x: Vector, y: Vector, style: Any, label: str | None) -> None:
-    """A thin grey line that does not widen the limits."""
+def _behind(axis: Axes, x: Vector, y: Vector, style: Any, label: str | None, colour: str = GREY) -> None:
+    """A thin line that does not widen the limits."""
     from matplotlib.lines import Line2D
 
-    axis.add_artist(Line2D(x, y, color=GREY, linestyle=style, linewidth=0.8, zorder=1, label=label))
+    axis.add_artist(Line2D(x, y, color=colour, linestyle=style, linewidth=0.8, zorder=1, label=label))
+
+
+def _widen(axis: Axes, heights: Vector) -> None:
+    """Limits that hold curves behind, too; a logarithmic axis where they reach far above the branches."""
+    low, high = axis.get_ylim()
+    least, most = (f(axis.dataLim.intervaly[i], f(heights)) for i, f in enumerate((min, max)))
+    if most > FAR * axis.dataLim.y1 and axis.dataLim.minposy > 0.0:
+        axis.set_yscale("log")
+        axis.set_ylim(0.8 * max(least, axis.dataLim.minposy * 1e-3), 1.25 * most)
+        plain_decades(axis.yaxis, *axis.get_ylim())
+    else:
+        axis.set_ylim(min(low, 0.95 * least), max(high, 1.05 * most))
 
 
 def _entries(axis: Axes, several: list[Branch]) -> tuple[list[Any], list[str]]:

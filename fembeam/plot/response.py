@@ -33,7 +33,7 @@ from fembeam.plot.random import density_panels
 from fembeam.plot.run_signals import estimated, first_stop, natural, sampling_of, stationary
 from fembeam.plot.spectra import segment_for
 from fembeam.plot.style import BLUE, GREY, ORANGE, Vector, place_name, styled
-from fembeam.scene import unit_of
+from fembeam.scene import persistent_drive, unit_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -60,8 +60,9 @@ def time_history(
     Parameters
     ----------
     run : with at least 2 samples.
-    window : (from, to) in s; None: eight periods of the lowest mode (or 400 samples), the last ones of a motion that
-        lasts, of a transient those about the largest contact force, else the largest displacement.
+    window : (from, to) in s; None: eight periods of the lowest mode (or 400 samples), about the largest contact force,
+        without contacts the largest displacement. Of motion that tones and noise drive the last ones, if they hold
+        contacts; without any, of all that lasts.
     z : where, in m; None: the stop of the largest force in the window, on its beam; without contacts the tip.
     axes : to draw into, two where there are stops; None makes a figure.
 
@@ -72,6 +73,7 @@ def time_history(
     """
     from fembeam.plot.figure import heading, sheet
 
+    step = sampling_of(run)
     lo, hi = window or _window(run)
     body, place = _watched(run, lo, hi) if z is None else (0, z)
     figure, drawn = sheet(2 if len(run.stops) else 1, 1, (7.0, 4.2), axes, sharex=True)
@@ -82,7 +84,7 @@ def time_history(
     if len(run.stops):
         stops = _stops_at(run, body, place)
         _shade_contacts(drawn, run, stops, lo, hi)
-        _draw_forces(drawn[1], run, lo, hi)
+        _draw_forces(drawn[1], run, lo, hi, FEW * step)
         seen = np.isin(run.contacts.stop, stops) & _within(run, lo, hi)
         title += f", contacts of {_listed(stops, run)} shaded" if seen.any() else ""
     drawn[-1].set_xlabel("time / s")
@@ -137,11 +139,12 @@ def mode_shapes(model: Model, axes: Axes | None = None) -> Figure:
 
 
 def _window(run: Run) -> tuple[float, float]:
-    """Eight periods of the lowest mode that swings (or 400 samples): the last ones, of a transient about its peak."""
+    """Eight periods of the lowest mode that swings (or 400 samples): about the peak, or the last ones."""
     first, end = float(run.t[0]), float(run.t[-1])
     swinging = [omega for omega in natural(run) if omega > 0]
     length = min(PERIODS * 2 * np.pi / min(swinging) if swinging else 400 * sampling_of(run), end - first)
-    if stationary(run):
+    driven = run.model is not None and persistent_drive(run.model.scene)
+    if (driven and _within(run, end - length, end).any()) or (not len(run.contacts) and stationary(run)):
         return end - length, end
     if len(run.contacts):
         about = float(run.contacts.t_in[np.argmax(run.contacts.peak_force)])
@@ -210,10 +213,10 @@ def _shade_contacts(axes: list[Axes], run: Run, stops: NDArray[np.int64], lo: fl
             axis.axvspan(left[index], right[index], color=ORANGE, alpha=0.4, linewidth=0.8)
 
 
-def _draw_forces(axis: Axes, run: Run, lo: float, hi: float) -> None:
-    """The force of every element and stop touched in the window: sampled, and peaks of contacts too short for that."""
+def _draw_forces(axis: Axes, run: Run, lo: float, hi: float, least: float) -> None:
+    """The force of every element and stop touched in the window: sampled, peaks of contacts below `least` s."""
     log, inside = run.contacts, _within(run, lo, hi)
-    short = inside & (log.t_out - log.t_in < FEW * sampling_of(run))
+    short = inside & (log.t_out - log.t_in < least)
     kept = (run.t >= lo) & (run.t <= hi)
     always = np.flatnonzero(run.kinds[:, 1])
     drawn = np.union1d(always, log.stop[inside])

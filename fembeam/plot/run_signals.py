@@ -10,6 +10,7 @@ from fembeam.model import places
 from fembeam.plot.style import Vector
 from fembeam.scene import persistent_drive
 from fembeam.statistics import Signal, pdf
+from fembeam.support import require
 
 if TYPE_CHECKING:
     from fembeam.model import Run
@@ -48,6 +49,8 @@ def natural(run: Run) -> Vector:
 
 def sampling_of(run: Run) -> float:
     """Output sampling, s."""
+    require(len(run.t) > 1, "figures and spectra of a run need output samples", len(run.t), "plot",
+            "give simulate a dt")  # fmt: skip
     return float(run.t[1] - run.t[0])
 
 

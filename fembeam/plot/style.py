@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.axis import XAxis
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
     from fembeam.statistics import Spectrum
@@ -82,7 +82,7 @@ def fit_levels(axis: Axes, lines: list[Spectrum], top: float, behind: list[Spect
         axis.set_ylim(max(levels.min(), 1e-9 * highest) / 3, 10 * highest)
 
 
-def plain_decades(axis: XAxis, low: float, high: float) -> None:
+def plain_decades(axis: Axis, low: float, high: float) -> None:
     """Ticks of a logarithmic axis as plain numbers: 1, 2, 5 in every decade while they have room."""
     from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 

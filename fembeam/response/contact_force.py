@@ -30,7 +30,7 @@ def forces(run: Run) -> Vector:
 def _force_of(run: Run, stop: int, contact: ContactRow) -> Vector:
     """Force (k,) of one stop or element at the samples."""
     if contact.always or contact.remembers:
-        return force_at(run, stop, contact, run.t, run.indentation(stop), run.indentation_rate(stop))
+        return force_at(run, stop, contact, run.t, run._deformation(stop), run._deformation_rate(stop))
     mine = run.contacts.stop == stop
     entered, speed = run.contacts.t_in[mine], run.contacts.speed_in[mine]
     if not len(entered):
@@ -38,8 +38,8 @@ def _force_of(run: Run, stop: int, contact: ContactRow) -> Vector:
     order = np.argsort(entered)
     last = np.searchsorted(entered[order], run.t, side="right") - 1
     entry_rate = np.maximum(np.abs(speed[order])[np.maximum(last, 0)], contact.law.entry_rate_floor)
-    delta = np.where(last >= 0, run.indentation(stop), -1.0)
-    return np.asarray(contact.force(delta, run.indentation_rate(stop), entry_rate))
+    delta = np.where(last >= 0, run._deformation(stop), -1.0)
+    return np.asarray(contact.force(delta, run._deformation_rate(stop), entry_rate))
 
 
 def force_at(run: Run, stop: int, contact: ContactRow, t: Vector, delta: Vector, rate: Vector) -> Vector:

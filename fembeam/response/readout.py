@@ -17,7 +17,8 @@ from fembeam.scene import heights, loads
 from fembeam.support import OldName, require
 
 if TYPE_CHECKING:
-    from fembeam.model import Model, Run
+    from fembeam.model import Model
+    from fembeam.model.histories import Histories
 
 Vector = NDArray[np.float64]
 
@@ -124,7 +125,7 @@ def _sampled(signal: Any, t: Vector) -> Vector:
     return np.broadcast_to(np.asarray(signal(t), dtype=float), t.shape)
 
 
-def coordinates(run: Run) -> Vector:
+def coordinates(run: Histories) -> Vector:
     """Modal accelerations q'' (k, n) at the samples, m √kg/s², with the contact forces of the laws there.
 
     Not from differences of the samples: contacts shorter than a sample would be lost, and digits with them.
@@ -134,7 +135,7 @@ def coordinates(run: Run) -> Vector:
     return np.asarray(driven - run.q_dot @ read.damping.T - run.q @ read.stiffness.T)
 
 
-def frame_motion(run: Run, order: int = 0) -> Vector:
+def frame_motion(run: Histories, order: int = 0) -> Vector:
     """The frame's displacement y (k,) at the samples, or a derivative up to the second; zeros for a frame at rest."""
     base = run.readout.base
     if base is None:

@@ -5,9 +5,14 @@ at both ends of every element,
 
     f_e = K_e u_e - M_e a_e,
 
-balance its stiffness against its inertia a (ω² φ for a mode; in general what solves K v = M a + point loads at the
-contacts). They are as accurate as the frequencies, and exact for a static shape. Between them M is the cubic with those
-values and slopes: right to 3e-6, its slope V to 5e-5 of the highest mode kept. Positive M stretches the lower fibre.
+balance its stiffness against its inertia a (ω² φ for a mode; in general what solves K v = M a + point loads where
+contacts, forces, feet and dashpots act). They are as accurate as the frequencies, and exact for a static shape.
+Between them M is the cubic with those values and slopes: right to 3e-6, its slope V to 5e-5 of the highest mode kept.
+Positive M stretches the lower fibre.
+
+The sum over n modes converges slowly for a load that no static shape carries. The weight of a cantilever (base motion
+likewise) leaves 0.13/n² of the moment and 0.4/n of the shear at the clamp; a point force without ``residual`` 1/n of
+the moment and, next to it, all of the shear.
 """
 
 from __future__ import annotations
@@ -20,11 +25,12 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from fembeam.beams import Beam, element_matrices, joining, on_beam
+from fembeam.scene import loaded
 from fembeam.support import require
 
 if TYPE_CHECKING:
-    from fembeam.model import Run
     from fembeam.model.equations import ModalEquations
+    from fembeam.model.histories import Histories
     from fembeam.scene import Matrices
 
 Vector = NDArray[np.float64]
@@ -82,18 +88,18 @@ def section_forces(model: ModalEquations, body: int = 0) -> SectionForces:
     first = sum(before.M.shape[0] for before in model.matrices.beams[:body])
     mine = slice(first, first + beam.M.shape[0])
     vectors = model.basis.vectors[mine]
-    rows = sparse.vstack([one.row for one in model.contact_rows] or [sparse.csr_matrix((0, len(model.basis.vectors)))])
-    inertia = _inertia(beam, vectors, model.omega, rows.tocsc()[:, mine].toarray().T)
+    rows = sparse.vstack([sparse.csr_matrix((0, beam.M.shape[0])), *(at.row(beam) for at in loaded(model.scene, body))])
+    inertia = _inertia(beam, vectors, model.omega, rows.toarray().T)
     return _of_vectors(beam, vectors, inertia)
 
 
 def _inertia(beam: Matrices, vectors: Vector, omega: Vector, rows: Vector) -> Vector:
-    """The inertia a (N, n) with K v = M a + point loads along the contacts' rows (N, m)."""
+    """The inertia a (N, n) with K v = M a + point loads along rows (N, m), where static shapes are loaded."""
     a = vectors * omega**2
     load = beam.K @ vectors
     left = np.linalg.norm(load - beam.M @ a, axis=0)
     others = left > BALANCED * np.linalg.norm(load, axis=0)
-    if np.any(others):  # static shapes, orthogonal to modes or not: loads at the contacts beside inertia of the basis
+    if np.any(others):  # static shapes, orthogonal to modes or not: point loads beside inertia of the basis
         terms = np.hstack([beam.M @ vectors, rows])
         size = np.linalg.norm(terms, axis=0)
         scale = np.where(size > 0, size, 1.0)
@@ -165,7 +171,7 @@ def extremes(t: Vector, q: Vector, shapes: Vector, z: Vector, offset: Vector) ->
     return Extremes(z, *found)
 
 
-def rows_of(run: Run, quantity: str, z: Vector, body: int) -> tuple[Vector, Vector, Vector]:
+def rows_of(run: Histories, quantity: str, z: Vector, body: int) -> tuple[Vector, Vector, Vector]:
     """What turns q into a field: shapes (j, n), the places themselves, a constant part (j,)."""
     known = ("displacement", "slope", "moment", "shear", "stress")
     require(quantity in known, f"quantity must be one of {', '.join(known)}", quantity, "Run", "choose one")

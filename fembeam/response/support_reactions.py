@@ -109,7 +109,8 @@ class Reactions(Printed):
 def reactions(run: Run) -> Reactions:
     """The reactions at the samples; `Run.reactions` explains them."""
     parts, rows = run.readout.reactions
-    histories = np.vstack([run._forces, run.readout.loads, coordinates(run).T, run.q_dot.T])
+    q_dot = run._at_samples(run.q_dot)
+    histories = np.vstack([run._forces, run.readout.loads, coordinates(run).T, q_dot.T])
     pairs = zip(parts, rows, strict=True)
     return Reactions(tuple(Reaction(part, body, run.t, *(row @ histories)) for (part, body), row in pairs))
 

@@ -4,7 +4,7 @@ Imports: `beams`, `excitation`, `support`, `reduction`; inside the method `Scene
 Begin with `scene`, then `assembly`.
 """
 
-from fembeam.scene.assembly import Matrices, unsupported
+from fembeam.scene.assembly import MOST_DENSE, Matrices, unsupported
 from fembeam.scene.contact_rows import ON, contact_rows, heights, loaded, loads, static_rows, watched, weight
 from fembeam.scene.element import Element, tangent
 from fembeam.scene.impactor import Impactor

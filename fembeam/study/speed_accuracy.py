@@ -34,8 +34,8 @@ def end_displacement(run: Run) -> Vector:
     δ of a first stop of rotation.
     """
     if len(run.stops) and run.kinds[0, 0]:
-        return np.asarray(run.indentation(0)[-1])
-    return np.asarray(run.displacement(run.stops[0][0] if len(run.stops) else run.shapes.nodes[-1])[-1])
+        return np.asarray(-run.directions[0] @ run.q[-1] - run.stops[0, 2])
+    return np.asarray(run.shapes(run.stops[0, 0] if len(run.stops) else run.shapes.nodes[-1]) @ run.q[-1])
 
 
 def speed_accuracy(

@@ -178,7 +178,7 @@ def main() -> None:
     full = of.reduce(modes="all", elements=given.elements)
     models = [of.reduce(modes=n, elements=given.elements) for n in (2, 5, 10)] + [full]
     found = fb.study.speed_accuracy(models, METHODS, np.zeros((1, 4)), DURATION, rounds=5)
-    truth = float(full.simulate(DURATION, solver=Exponential(1e-12, ledger=False)).displacement(TIP)[-1])
+    truth = float(full.phi(TIP) @ full.simulate(DURATION, solver=Exponential(1e-12, ledger=False)).q[-1])
     mine = [
         replace(p, errors=p.errors * found.unit / LENGTH, totals=p.totals * found.unit / LENGTH) for p in found.points
     ]

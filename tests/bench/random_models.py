@@ -21,6 +21,7 @@ import sys
 import warnings
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -153,6 +154,7 @@ def compared(drawn: Drawn, model: fb.Model, seed: int) -> tuple[list[str], int]:
     start = start_of(drawn, model, seed)
     try:
         run = model.simulate(drawn.duration, drawn.dt, start, Exponential(drawn.rtol))
+        run = replace(run, sampled=True)  # without samples its end is compared
     except (SolverError, ValueError) as error:
         return [f"{'refused' if isinstance(error, ValueError) else 'failed'}: {error}"], 0
     own_start = same_start(whole, model, start)

@@ -1,0 +1,180 @@
+"""Histories of a run: motion, section forces, extremes of its beams; stops, elements, impactors, with units."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fembeam.model.shapes import Shapes
+from fembeam.scene import unit_of
+from fembeam.support import require
+
+if TYPE_CHECKING:
+    from fembeam.response import Extremes, Readout
+
+Vector = NDArray[np.float64]
+
+
+class Histories:
+    """Histories of the beams, contacts and impactors of a `Run`, whose fields these are."""
+
+    t: Vector
+    q: Vector
+    q_dot: Vector
+    stops: Vector
+    directions: Vector
+    impactor_masses: Vector
+    kinds: NDArray[np.bool_]
+    shapes: Shapes
+    others: tuple[Shapes, ...]
+    sampled: bool
+
+    if TYPE_CHECKING:  # made by the run when first read
+
+        @property
+        def readout(self) -> Readout:
+            """As in `Run`."""
+
+        @property
+        def _forces(self) -> Vector:
+            """As in `Run`."""
+
+    def _at_samples(self, values: Vector) -> Vector:
+        """Values (k, …) at the samples; ValueError for a run without any, whose q and q̇ are the final state."""
+        require(self.sampled, "histories and extremes need output samples", "the final state alone", "Run",
+                "give simulate a dt, or dt=[duration] for the end alone")  # fmt: skip
+        return values
+
+    def displacement(self, z: ArrayLike, body: int = 0, absolute: bool = False) -> Vector:
+        """u(z, t) of a beam (0 the scene's own), m: (k,) at one z, (k, j) at z (j,).
+
+        Relative to the frame, or ``absolute``: u + y.
+        """
+        return self._motion(self.q, z, body, absolute, 0)
+
+    def velocity(self, z: ArrayLike, body: int = 0, absolute: bool = False) -> Vector:
+        """u̇(z, t) relative to the frame, m/s, or ``absolute``: u̇ + ẏ; shapes as for `displacement`."""
+        return self._motion(self.q_dot, z, body, absolute, 1)
+
+    def acceleration(self, z: ArrayLike, body: int = 0, absolute: bool = False) -> Vector:
+        """ü(z, t) relative to the frame, m/s², or ``absolute``: ü + ÿ; shapes as for `displacement`.
+
+        ü = φ(z)·q'' with q'' of the equations of motion at the samples, the contact forces of the laws included: the
+        instant's value, not a mean over the sample. Under a short contact it holds what the kept modes carry of the
+        force, Σ φ_i(z) φ_i(z_s) F, and grows with their number.
+        """
+        from fembeam.response import coordinates
+
+        return self._motion(coordinates(self), z, body, absolute, 2)
+
+    def _motion(self, rates: Vector, z: ArrayLike, body: int, absolute: bool, order: int) -> Vector:
+        """A derivative of u at z (k,) or (k, j), with that of the frame's motion if absolute."""
+        from fembeam.response import frame_motion
+
+        values = self._at_samples(rates) @ self._beam(body)(z).T
+        return (values.T + frame_motion(self, order)).T if absolute else values
+
+    def slope(self, z: ArrayLike, body: int = 0) -> Vector:
+        """u_z(z, t), rad."""
+        return self._field("slope", z, body)
+
+    def moment(self, z: ArrayLike, body: int = 0) -> Vector:
+        """Bending moment EI u_zz, N m: positive where it stretches the lower fibre.
+
+        Of the kept coordinates: exact for slow point loads with ``residual=True``. What n modes miss of weight and base
+        motion is about 0.13/n² of the moment and 0.4/n of the shear at a clamp, of a point force without residual 1/n
+        of the moment and, next to it, all of the shear. (`reactions` miss nothing of slow loads.)
+        """
+        return self._field("moment", z, body)
+
+    def shear(self, z: ArrayLike, body: int = 0) -> Vector:
+        """Shear force dM/dz, N; at a point load that of the side ahead. Accuracy: see `moment`."""
+        return self._field("shear", z, body)
+
+    def stress(self, z: ArrayLike, body: int = 0) -> Vector:
+        """Stress at the lower outer fibre, N/m²: M c/I + N/A. ValueError where a section has no `fibre`."""
+        return self._field("stress", z, body)
+
+    def extremes(self, quantity: str = "displacement", z: ArrayLike | None = None, body: int = 0) -> Extremes:
+        """Least and greatest values over the samples, place by place, with their times.
+
+        Parameters
+        ----------
+        quantity : "displacement", "slope", "moment", "shear" or "stress".
+        z : places (j,) in m; None: all nodes of the mesh.
+        """
+        from fembeam.response import extremes, rows_of
+
+        places = self._beam(body).nodes if z is None else np.atleast_1d(np.asarray(z, dtype=float))
+        return extremes(self.t, self._at_samples(self.q), *rows_of(self, quantity, places, body))
+
+    def _beam(self, body: int) -> Shapes:
+        """A beam's shapes; ValueError unless there is one of that number."""
+        beams = (self.shapes, *self.others)
+        require(body in range(len(beams)), f"body must be below {len(beams)}, the number of beams", body, "Run",
+                "0 is the scene's own")  # fmt: skip
+        return beams[body]
+
+    def _field(self, quantity: str, z: ArrayLike, body: int) -> Vector:
+        """A field over time: (k,) at one z, (k, j) at z (j,)."""
+        from fembeam.response import rows_of
+
+        self._beam(body)
+        places = np.asarray(z, dtype=float)
+        shapes, _, offset = rows_of(self, quantity, np.atleast_1d(places), body)
+        values = self._at_samples(self.q) @ shapes.T + offset
+        return values if places.ndim else values[:, 0]
+
+    def impactor_displacement(self, impactor: int = 0) -> Vector:
+        """x(t) (k,) of an impactor from its place at the start, relative to the frame, m."""
+        return self._of_impactor(self.q, impactor)
+
+    def impactor_velocity(self, impactor: int = 0) -> Vector:
+        """ẋ(t) (k,) of an impactor relative to the frame, m/s."""
+        return self._of_impactor(self.q_dot, impactor)
+
+    def _of_impactor(self, coordinates: Vector, impactor: int) -> Vector:
+        """One of the last columns, without its √m."""
+        count = len(self.impactor_masses)
+        require(0 <= impactor < count, f"impactor must be below {count}, the number of impactors", impactor, "Run",
+                "count from 0")  # fmt: skip
+        column = coordinates.shape[1] - count + impactor
+        return self._at_samples(coordinates)[:, column] / np.sqrt(self.impactor_masses[impactor])
+
+    def unit(self, quantity: str, stop: int | None = None) -> str:
+        """Unit of "indentation", "speed", "force" or "impulse" of a stop; None: of a column that all of them share."""
+        return unit_of(quantity, self.kinds[:, 0] if stop is None else self.kinds[[self._stop(stop)], 0])
+
+    def name(self, stop: int) -> str:
+        """What tables call a stop or element: "stop 0", "element 1", "stop 2 (rotation)"."""
+        rotation, always = self.kinds[self._stop(stop)]
+        return f"{'element' if always else 'stop'} {stop}" + " (rotation)" * bool(rotation)
+
+    def indentation(self, stop: int = 0) -> Vector:
+        """δ(t) (k,) of a stop, m or rad; negative while it is open. Elements, then impactors, count on after the stops.
+
+        Of an element its deformation d(t).
+        """
+        return self._at_samples(self._deformation(self._stop(stop)))
+
+    def _deformation(self, stop: int) -> Vector:
+        """δ (k,), of the last state without samples."""
+        return -self.q @ self.directions[stop] - self.stops[stop, 2]
+
+    def indentation_rate(self, stop: int = 0) -> Vector:
+        """δ̇(t) (k,) of a stop or element, m/s or rad/s: of both bodies where the stop moves."""
+        return self._at_samples(self._deformation_rate(self._stop(stop)))
+
+    def _deformation_rate(self, stop: int) -> Vector:
+        """δ̇ (k,), likewise."""
+        return -self.q_dot @ self.directions[stop]
+
+    def _stop(self, stop: int) -> int:
+        """The number of a contact, checked."""
+        count = len(self.stops)
+        whole = isinstance(stop, (int, np.integer))
+        require(whole and -count <= stop < count, f"stop must be below {count}, the number of stops", stop, "Run",
+                "count from 0")  # fmt: skip
+        return stop
