@@ -253,31 +253,3 @@ class Law(ABC):
         from contacts.describe import describe
 
         return describe(self, entry_rate, mass)
-
-
-def number(owner: object, name: str, low: float = 0.0, *, strict: bool = False) -> None:
-    """Check one finite parameter of a law against its lower bound."""
-    check_number(getattr(owner, name), f"{name} of {type(owner).__name__}", low, strict=strict)
-
-
-def check_number(value: Any, what: str, low: float = 0.0, *, strict: bool = False) -> None:
-    """Check one finite number against its lower bound."""
-    fine = isinstance(value, (int, float, np.number)) and not isinstance(value, bool) and math.isfinite(value)
-    if not fine or value < low or (strict and value == low):
-        bound = f" and {'>' if strict else '>='} {low:g}" if low > -math.inf else ""
-        raise ValueError(f"{what} must be finite{bound}, got {value!r}")
-
-
-def switch(owner: object, name: str) -> None:
-    """Check one parameter of a law that is either on or off."""
-    value = getattr(owner, name)
-    if not isinstance(value, (bool, np.bool_)):
-        raise ValueError(f"{name} of {type(owner).__name__} must be True or False, got {value!r}")
-
-
-def check_restitution(value: Any, who: str, low_open: bool, why: str = "") -> None:
-    """Check a nominal restitution against (0, 1] or [0, 1], and say why the range is what it is."""
-    fine = isinstance(value, (int, float, np.number)) and not isinstance(value, bool) and 0.0 <= value <= 1.0
-    if not fine or (low_open and value == 0.0):
-        span = "(0, 1]" if low_open else "[0, 1]"
-        raise ValueError(f"restitution of {who} must lie in {span}, got {value!r}{'; ' + why if why else ''}")

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from contacts.identification.motion import motion_of
 from contacts.identification.records import Samples, Vector, collisions_of
 from contacts.identification.result import EXACT, Collision, Estimate, Identified, inflation_of
-from contacts.law import check_number
+from contacts.numbers import check_number
 from contacts.restitution import achieved_restitution
 
 _UNLIKELY = 1e-3  # chance below which collisions that agree would differ so much

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contacts.columns import read_columns
+from contacts.numbers import read_columns
 
 Vector = NDArray[np.float64]
 FEWEST = 8

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contacts.custom import bound_values
-from contacts.law import Law, check_number
+from contacts.law import Law
 from contacts.memory.custom_kernels import Function, Pieces, compiled
+from contacts.numbers import check_number
 from contacts.path import walk
 
 PROBES = 0.01, 0.1, 1.0  # parts of its reach at which a law is led through a cycle when its parameters are bound
