@@ -16,8 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contacts.law import Law
+from contacts.numbers import LARGEST_IN_TABLE, LARGEST_PARAMETER, finite_row, read_columns
 
 MOST_SHOWN = 8  # numbers of a kind in a repr
+ROUNDING = 1e-12  # of the largest force: below zero by as much is zero, where slopes soften to nothing
 
 
 @dataclass(frozen=True)
@@ -49,23 +51,28 @@ class PiecewiseLinear(Law):
     units: ClassVar[dict[str, str]] = {"slopes": "N/m", "knots": "m", "damping": "N s/m"}
 
     def __post_init__(self) -> None:
-        slopes, knots, damping = (_numbers(getattr(self, name), name) for name in ("slopes", "knots", "damping"))
+        slopes, knots, damping = (self._row(name) for name in ("slopes", "knots", "damping"))
         damping = damping * len(slopes) if len(damping) == 1 else damping
         for name, values in (("slopes", slopes), ("knots", knots), ("damping", damping)):
             object.__setattr__(self, name, values)
-        if not np.all(np.isfinite(slopes)) or slopes[0] <= 0.0:
-            raise ValueError(f"slopes of PiecewiseLinear must be finite, the first positive, got {slopes}")
+        if not slopes or slopes[0] <= 0.0:
+            raise ValueError(f"slopes of PiecewiseLinear must be at least one, the first positive, got {slopes}")
         if len(knots) != len(slopes) - 1:
             raise ValueError(f"PiecewiseLinear with {len(slopes)} slopes needs {len(slopes) - 1} knots, got {knots}")
-        if not (np.all(np.isfinite(knots)) and np.all(np.diff(knots, prepend=0.0) > 0.0)):
+        if not np.all(np.diff(knots, prepend=0.0) > 0.0):
             raise ValueError(f"knots of PiecewiseLinear must be finite, positive and ascending, got {knots}")
-        if len(damping) != len(slopes) or not (np.all(np.isfinite(damping)) and min(damping) >= 0.0):
+        if len(damping) != len(slopes) or min(damping) < 0.0:
             raise ValueError(
                 f"damping of PiecewiseLinear must be finite and >= 0, one for all or {len(slopes)} (one per slope), "
                 f"got {damping}"
             )
-        if np.any(self._corner_forces() < 0.0) or (len(slopes) > 1 and slopes[-1] < 0.0):
+        corners = self._corner_forces()
+        if np.any(corners < -ROUNDING * corners.max()) or (len(slopes) > 1 and slopes[-1] < 0.0):
             raise ValueError(f"slopes {slopes} of PiecewiseLinear soften to a negative force")
+
+    def _row(self, name: str) -> tuple[float, ...]:
+        """Numbers of one field."""
+        return tuple(finite_row(getattr(self, name), f"{name} of PiecewiseLinear", LARGEST_PARAMETER).tolist())
 
     def _corner_forces(self) -> NDArray[np.float64]:
         """Elastic force at (0, knots...)."""
@@ -75,7 +82,7 @@ class PiecewiseLinear(Law):
     @property
     def jump(self) -> bool:  # type: ignore[override]
         """The first branch's dashpot acts at once."""
-        return _numbers(self.damping, "damping")[0] > 0.0
+        return bool(np.atleast_1d(self.damping)[0] > 0.0)
 
     @property
     def parameters(self) -> NDArray[np.float64]:
@@ -94,14 +101,6 @@ class PiecewiseLinear(Law):
     def exact_restitution(self, entry_rate: float, mass: float) -> float | None:
         """Elastic without damping: 1."""
         return None if any(np.atleast_1d(self.damping)) else 1.0
-
-
-def _numbers(values: Sequence[float] | float, name: str) -> tuple[float, ...]:
-    """A number or a sequence of them as a tuple."""
-    try:
-        return tuple(float(x) for x in np.atleast_1d(np.asarray(values, dtype=float)).ravel())
-    except (TypeError, ValueError):
-        raise ValueError(f"{name} must be a number or a list of numbers, got {values!r}") from None
 
 
 @dataclass(frozen=True)
@@ -156,13 +155,14 @@ class Tabulated(Law):
         return f"Tabulated({len(self.indentation)} points, {last}, digest {digest:08x})"
 
     def __post_init__(self) -> None:
-        points = _numbers(self.indentation, "indentation"), _numbers(self.measured, "measured")
+        points = tuple(
+            tuple(finite_row(values, f"{name} of Tabulated", LARGEST_IN_TABLE, 1.0 / LARGEST_IN_TABLE).tolist())
+            for name, values in (("indentation", self.indentation), ("measured", self.measured))
+        )
         if len(points[0]) != len(points[1]):
             raise ValueError(
                 f"Tabulated needs as many forces as indentations, got {len(points[1])} and {len(points[0])}"
             )
-        if not np.all(np.isfinite(points)):
-            raise ValueError("indentation and measured of Tabulated must be finite")
         if not points[0] or points[0][0] > 0.0:
             points = (0.0, *points[0]), (0.0, *points[1])
         steps, rises = np.diff(points[0]), np.diff(points[1])
@@ -189,8 +189,6 @@ class Tabulated(Law):
     @classmethod
     def from_csv(cls, path: str | Path) -> Tabulated:
         """A table from a text file with columns ``delta`` (m) and ``force`` (N), named in its first line."""
-        from contacts.columns import read_columns
-
         columns = read_columns(path, ("delta", "force"))
         return cls(tuple(columns["delta"]), tuple(columns["force"]))
 

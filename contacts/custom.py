@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contacts.custom_kernels import Function, compiled
-from contacts.law import ENTRY_RATE_FLOOR, Law, check_number
+from contacts.law import ENTRY_RATE_FLOOR, Law
+from contacts.numbers import LARGEST_EXPONENT, check_number, reals
 
 _ARGUMENTS = ("delta", "delta_dot", "entry_rate")
 _PROBES = np.array([1e-9, 1e-6, 1e-3])
@@ -122,22 +123,23 @@ def law(
     names = _checked_names(function, f"law {who!r}")
     if derivative is not None and _checked_names(derivative, f"derivative of law {who!r}") != names:
         raise TypeError(f"derivative of law {who!r} must take the law's arguments, ({', '.join(names)})")
-    _check_knots(who, knots)
-    check_number(entry_rate_floor, f"entry_rate_floor of law {who!r}")
-    if exponent is not None:
-        check_number(exponent, f"exponent of law {who!r}", strict=True)
-    options = tuple(map(float, knots)), jump
+    if not isinstance(jump, bool):
+        raise ValueError(f"jump of law {who!r} must be True or False, got {jump!r}")
+    options = _checked_knots(who, knots), jump
+    floor = check_number(entry_rate_floor, f"entry_rate_floor of law {who!r}")
+    given = 1.0 if exponent is None else exponent
+    power = check_number(given, f"exponent of law {who!r}", strict=True, most=LARGEST_EXPONENT)
     probe = inspect.Signature(list(inspect.signature(function).parameters.values())[3:])
 
     def bind(**values: float) -> CustomLaw:
         pairs = bound_values(who, probe, values)
-        made = CustomLaw(who, function, pairs, *options, exponent or 1.0, entry_rate_floor, derivative)
+        made = CustomLaw(who, function, pairs, *options, power, floor, derivative)
         _check_force(made)
         _check_jump(made)
         if derivative is not None:
             _check_derivative(made)
         if exponent is None and not jump:
-            made = CustomLaw(who, function, pairs, *options, _leading_exponent(made), entry_rate_floor, derivative)
+            made = CustomLaw(who, function, pairs, *options, _leading_exponent(made), floor, derivative)
         return made
 
     bind.__name__, bind.__qualname__ = function.__name__, function.__qualname__
@@ -173,19 +175,16 @@ def bound_values(who: str, probe: inspect.Signature, values: dict[str, Any]) -> 
     except TypeError as error:
         raise TypeError(f"law {who!r}: {error}; its parameters are {names}") from None
     bound.apply_defaults()
-    for key, value in bound.arguments.items():
-        if not isinstance(value, (int, float, np.number)) or isinstance(value, bool):
-            raise TypeError(f"parameter {key} of law {who!r} must be a number, got {value!r}")
-        if not math.isfinite(value):
-            raise ValueError(f"parameter {key} of law {who!r} must be finite, got {value}")
-    return tuple((key, float(value)) for key, value in bound.arguments.items())
+    checked = {key: check_number(x, f"parameter {key} of law {who!r}", -math.inf) for key, x in bound.arguments.items()}
+    return tuple(checked.items())
 
 
-def _check_knots(name: str, knots: tuple[float, ...]) -> None:
+def _checked_knots(name: str, knots: Any) -> tuple[float, ...]:
     """Knots ascend and are positive."""
-    values = np.asarray(knots, dtype=float)
-    if not (np.all(np.isfinite(values)) and np.all(np.diff(values, prepend=0.0) > 0.0)):
+    values = reals(knots, f"knots of law {name!r}")
+    if values.ndim != 1 or not (np.all(np.isfinite(values)) and np.all(np.diff(values, prepend=0.0) > 0.0)):
         raise ValueError(f"knots of law {name!r} must be positive, finite and ascending, got {knots}")
+    return tuple(values.tolist())
 
 
 def _check_force(made: CustomLaw) -> None:
@@ -218,7 +217,7 @@ def _check_jump(made: CustomLaw) -> None:
 def _leading_exponent(made: CustomLaw) -> float:
     """Local exponent at rest near first touch; one that still changes is rounded to the nearest quarter."""
     force = made.force([1e-12, 2e-12, 1e-8, 2e-8], 0.0, 1.0)
-    if not np.all(force > 1e-290):
+    if not np.all((force > 1e-290) & (force < 1e290)):
         return 1.0
     near, far = np.log2(force[1::2] / force[::2])
     settled = abs(near - far) < 1e-6

@@ -11,12 +11,13 @@ import numpy as np
 from contacts.custom import CustomLaw
 from contacts.law import Law
 from contacts.path import name_of, work
-from contacts.restitution import bounce, restitution
+from contacts.restitution import bounce, checked_throw, restitution
 from contacts.sums import Sum, parts_of
 
 
 def describe(law: Law, entry_rate: float = 1.0, mass: float = 1.0) -> str:
     """Text of `Law.describe`."""
+    entry_rate, mass = checked_throw(law, entry_rate, mass)
     lines = [f"{name_of(law)}: {law.equation}"]
     if isinstance(law, Sum):
         lines += [f"  {name_of(part)}: {part.equation}; {_values(part)}" for part in law.parts]

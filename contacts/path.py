@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from contacts.law import Law
+from contacts.numbers import reals
 
 Vector = NDArray[np.float64]
 SLOW = 1e-100  # m/s: a sign, hardly a force
@@ -76,7 +77,7 @@ def name_of(law: Law) -> str:
 
 
 def _checked(law: Law, delta: ArrayLike) -> Vector:
-    path = np.asarray(delta, dtype=float)
+    path = reals(delta, f"path of {name_of(law)}")
     if path.ndim != 1 or not path.size or not np.all(np.isfinite(path)):
         raise ValueError(
             f"path of {name_of(law)} must be a row of finite indentations in m, got an array of shape "

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contacts.law import Law
+from contacts.numbers import LARGEST_PARAMETER, finite_row
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,7 @@ class Polynomial(Law):
     -----
     With all c_j >= 0 the force never pulls and the restitution is 1. A negative c_j may let it pull over a range of
     indentation, as a snap-through spring does; `describe` gives the range. If the last c_j is negative, a fast mass
-    may never come back: `restitution` raises RuntimeError there.
+    may never come back: `restitution` raises ValueError there.
 
     Examples
     --------
@@ -46,12 +47,8 @@ class Polynomial(Law):
     one_sided: ClassVar[bool] = False  # type: ignore[misc]
 
     def __post_init__(self) -> None:
-        try:
-            values = np.atleast_1d(np.asarray(self.coefficients, dtype=float))
-        except (TypeError, ValueError):
-            raise ValueError(f"coefficients of Polynomial must be numbers, got {self.coefficients!r}") from None
-        leading = next(iter(values[values != 0.0]), 0.0) if values.ndim == 1 else 0.0
-        if not np.all(np.isfinite(values)) or not leading > 0.0:
+        values = finite_row(self.coefficients, "coefficients of Polynomial", LARGEST_PARAMETER)
+        if not next(iter(values[values != 0.0]), 0.0) > 0.0:
             raise ValueError(
                 "coefficients of Polynomial must be finite, the first non-zero one positive, got "
                 f"{self.coefficients!r}; give c_1, c_2, ... of F = c_1 δ + c_2 δ² + ..."

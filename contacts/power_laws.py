@@ -28,7 +28,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from contacts.law import ENTRY_RATE_FLOOR, Law, check_restitution, number, switch
+from contacts.law import ENTRY_RATE_FLOOR, Law
+from contacts.numbers import LARGEST_EXPONENT, LARGEST_PARAMETER, check_number, check_restitution, number, switch
 from contacts.restitution import achieved_restitution, damping_factor_for
 
 PUBLISHED = (
@@ -53,7 +54,7 @@ class Hysteretic(Law):
     ----------
     stiffness : K > 0, N/m^p.
     damping_factor : a >= 0; 0 is elastic. See the constructors for values from a restitution.
-    exponent : p >= 1; 1.5 for spheres.
+    exponent : 1 <= p <= 100; 1.5 for spheres.
     clamp : cut the force at zero, so that the stop never pulls (it would where delta_dot < -entry_rate/a).
     entry_rate_floor : entry rates below it (m/s) count as it; a contact log says where the floor acted.
 
@@ -90,7 +91,7 @@ class Hysteretic(Law):
     def __post_init__(self) -> None:
         number(self, "stiffness", strict=True)
         number(self, "damping_factor")
-        number(self, "exponent", 1.0)
+        number(self, "exponent", 1.0, most=LARGEST_EXPONENT)
         number(self, "entry_rate_floor", strict=True)
         switch(self, "clamp")
 
@@ -187,9 +188,9 @@ class Hysteretic(Law):
         low_open: bool = False,
     ) -> Hysteretic:
         """The law of one published factor, remembering what it was asked for."""
-        check_restitution(restitution, who, low_open, "its factor is infinite at 0")
-        law = cls(stiffness, factor(restitution), **options)
-        object.__setattr__(law, "nominal", (who, float(restitution)))
+        e = check_restitution(restitution, who, low_open, "its factor is infinite at 0")
+        law = cls(stiffness, factor(e), **options)
+        object.__setattr__(law, "nominal", (who, e))
         return law
 
     @property
@@ -226,7 +227,7 @@ class Hertz(Law):
     Parameters
     ----------
     stiffness : K > 0, N/m^p.
-    exponent : p >= 1.
+    exponent : 1 <= p <= 100.
 
     References
     ----------
@@ -249,7 +250,7 @@ class Hertz(Law):
 
     def __post_init__(self) -> None:
         number(self, "stiffness", strict=True)
-        number(self, "exponent", 1.0)
+        number(self, "exponent", 1.0, most=LARGEST_EXPONENT)
 
     @classmethod
     def of_spheres(cls, E1: float, nu1: float, R1: float, E2: float, nu2: float, R2: float) -> Hertz:
@@ -257,17 +258,11 @@ class Hertz(Law):
 
         Moduli in Pa, radii in m (``inf`` for a flat), Poisson's ratios in (-1, 0.5].
         """
-        for name, value in {"E1": E1, "R1": R1, "E2": E2, "R2": R2}.items():
-            if not value > 0.0 or (name[0] == "E" and not math.isfinite(value)):
-                raise ValueError(f"{name} of Hertz.of_spheres must be positive, got {value!r}")
-        for name, value in {"nu1": nu1, "nu2": nu2}.items():
-            if not -1.0 < value <= 0.5:
-                raise ValueError(f"{name} of Hertz.of_spheres must lie in (-1, 0.5], got {value!r}")
-        if math.isinf(R1) and math.isinf(R2):
+        compliance = sum(_compliance(*one) for one in (("E1", E1, "nu1", nu1), ("E2", E2, "nu2", nu2)))
+        curvature = sum(_curvature(*one) for one in (("R1", R1), ("R2", R2)))
+        if curvature == 0.0:
             raise ValueError("R1 and R2 of Hertz.of_spheres are both infinite; two flats are no Hertz contact")
-        modulus = 2.0 / ((1.0 - nu1**2) / E1 + (1.0 - nu2**2) / E2)
-        radius = 1.0 / (1.0 / R1 + 1.0 / R2)
-        return cls(2.0 / 3.0 * modulus * math.sqrt(radius))
+        return cls(4.0 / 3.0 / compliance / math.sqrt(curvature))
 
     @property
     def parameters(self) -> NDArray[np.float64]:
@@ -277,3 +272,19 @@ class Hertz(Law):
     def exact_restitution(self, entry_rate: float, mass: float) -> float:
         """Elastic: 1."""
         return 1.0
+
+
+def _compliance(stiff: str, E: Any, lateral: str, nu: Any) -> float:
+    """(1 - ν²)/E of one of two bodies."""
+    modulus = check_number(E, f"{stiff} of Hertz.of_spheres", strict=True, most=LARGEST_PARAMETER)
+    ratio = check_number(nu, f"{lateral} of Hertz.of_spheres", -math.inf)
+    if not -1.0 < ratio <= 0.5:
+        raise ValueError(f"{lateral} of Hertz.of_spheres must lie in (-1, 0.5], got {nu!r}")
+    return (1.0 - ratio) * (1.0 + ratio) / modulus
+
+
+def _curvature(name: str, R: Any) -> float:
+    """1/R of one of two bodies, 0 of a flat."""
+    if isinstance(R, float) and math.isinf(R) and R > 0.0:
+        return 0.0
+    return 1.0 / check_number(R, f"{name} of Hertz.of_spheres", strict=True, most=LARGEST_PARAMETER)

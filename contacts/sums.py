@@ -37,7 +37,11 @@ class Sum(Law):
     parts: tuple[Law, ...]
 
     def __post_init__(self) -> None:
-        wrong = [part for part in self.parts if not isinstance(part, Law)]
+        wrong = (
+            [part for part in self.parts if not isinstance(part, Law)]
+            if isinstance(self.parts, (tuple, list))
+            else [self.parts]
+        )
         if wrong or not self.parts:
             raise ValueError(f"parts of Sum must be contact laws, at least one, got {wrong[0] if wrong else ()!r}")
 
@@ -213,6 +217,6 @@ def parallel(laws: list[Law]) -> Law:
     >>> float(parallel([Hertz(1e9), KelvinVoigt(1e6, 0.0)]).force(1e-4))
     1100.0
     """
-    if not laws:
-        raise ValueError("laws must name at least one law")
+    if not isinstance(laws, (list, tuple)) or not laws or not all(isinstance(one, Law) for one in laws):
+        raise ValueError(f"laws must be a list of contact laws, at least one, got {laws!r}")
     return reduce(lambda a, b: a + b, laws)

@@ -11,14 +11,16 @@ so the restitution depends on the mass but not on the speed.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from contacts.law import Law, check_number, check_restitution, number, switch
+from contacts.law import Law
+from contacts.numbers import LARGEST_EXPONENT, check_number, check_restitution, number, switch
 from contacts.power_laws import power_parameters
+from contacts.restitution import LARGEST_THROW
 
 PULLS = "pulls at the end of every rebound, where the dashpot outweighs the spring; clamp=True forbids it"
 CLAMPED = "clamp=True: the kink where the force is cut moves with the rate"
@@ -26,22 +28,30 @@ CLAMPED = "clamp=True: the kink where the force is cut moves with the rate"
 
 def damping_ratio_for(restitution: float) -> float:
     """Damping ratio β of a linear oscillator that leaves after half a period at e = exp(-πβ/√(1-β²))."""
-    decay = math.log(1.0 / restitution)
+    decay = -math.log(restitution)
     return decay / math.hypot(math.pi, decay)
 
 
 def rebound(ratio: float, *, clamp: bool = False, approach: bool = False) -> float:
     """Restitution of v dv/dw = -w - 2βv: to w = 0, to the end of compression (clamp), or damped on the way in only."""
-    if ratio == 0.0:
+    if approach or clamp:  # the force vanishes at twice the phase of the turning point
+        return math.exp(-_decay_to_turn(ratio) * (1.0 if approach else 2.0))
+    return math.exp(-ratio * math.pi / math.sqrt((1.0 - ratio) * (1.0 + ratio))) if ratio < 1.0 else 0.0
+
+
+def _decay_to_turn(ratio: float) -> float:
+    """Phase of the oscillation at the turning point, times β/√|1 - β²|."""
+    if ratio == 1.0:
         return 1.0
-    root = abs(1.0 - ratio**2) ** 0.5
-    if approach or clamp:  # phase of the oscillation at the turning point; the force vanishes at twice that phase
-        if ratio < 1.0:
-            phase = math.atan2(root, ratio) / root
-        else:
-            phase = math.atanh(root / ratio) / root if root > 1e-8 else 1.0
-        return math.exp(-ratio * phase * (1.0 if approach else 2.0))
-    return math.exp(-ratio * math.pi / root) if ratio < 1.0 else 0.0
+    if ratio > 1.0:
+        return ratio * math.acosh(ratio) / (math.sqrt(ratio - 1.0) * math.sqrt(ratio + 1.0))
+    root = math.sqrt((1.0 - ratio) * (1.0 + ratio))
+    return ratio * math.atan2(root, ratio) / root
+
+
+def _root(mass: Any, who: str) -> float:
+    """Square root of a mass that is checked; apart from that of a stiffness, whose product may be beyond the floats."""
+    return math.sqrt(check_number(mass, f"mass of {who}", strict=True, most=LARGEST_THROW))
 
 
 @dataclass(frozen=True)
@@ -82,11 +92,12 @@ class KelvinVoigt(Law):
         c = 2β√(k m), β = -ln e/√(π² + ln² e): S.A. Anagnostopoulos, Earthq. Eng. Struct. Dyn. 16 (1988) 443. Valid
         for the pulling law; with ``clamp=True`` the mass leaves faster than asked.
         """
-        check_number(stiffness, f"stiffness of {cls.__name__}", strict=True)
-        check_restitution(restitution, "anagnostopoulos", True, "an overdamped mass never leaves")
-        check_number(mass, "mass of anagnostopoulos", strict=True)
-        law = cls(stiffness, 2.0 * damping_ratio_for(restitution) * math.sqrt(stiffness * mass), **options)
-        object.__setattr__(law, "nominal", ("anagnostopoulos", float(restitution)))
+        e = check_restitution(restitution, "anagnostopoulos", True, "an overdamped mass never leaves")
+        law = cls(stiffness, 0.0, **options)
+        law = replace(
+            law, damping=2.0 * damping_ratio_for(e) * math.sqrt(law.stiffness) * _root(mass, "anagnostopoulos")
+        )
+        object.__setattr__(law, "nominal", ("anagnostopoulos", e))
         return law
 
     @property
@@ -113,7 +124,7 @@ class KelvinVoigt(Law):
 
     def exact_restitution(self, entry_rate: float, mass: float) -> float:
         """Of the damped half wave, or, with clamp, up to the zero of its force."""
-        return rebound(self.damping / (2.0 * math.sqrt(self.stiffness * mass)), clamp=self.clamp)
+        return rebound(self.damping / (2.0 * math.sqrt(self.stiffness) * math.sqrt(mass)), clamp=self.clamp)
 
 
 @dataclass(frozen=True)
@@ -124,7 +135,7 @@ class Viscoelastic(Law):
     ----------
     stiffness : K > 0, N/m^p.
     damping : c >= 0, N s/m^((p+1)/2).
-    exponent : p > 1; 1.5 for spheres (`KelvinVoigt` is p = 1).
+    exponent : 1 < p <= 100; 1.5 for spheres (`KelvinVoigt` is p = 1).
     clamp : cut the force at zero, so that the stop never pulls.
     approach_only : damp only while δ̇ > 0.
 
@@ -155,7 +166,7 @@ class Viscoelastic(Law):
     def __post_init__(self) -> None:
         number(self, "stiffness", strict=True)
         number(self, "damping")
-        number(self, "exponent", 1.0, strict=True)
+        number(self, "exponent", 1.0, strict=True, most=LARGEST_EXPONENT)
         switch(self, "clamp")
         switch(self, "approach_only")
 
@@ -166,8 +177,8 @@ class Viscoelastic(Law):
         c = α√(K m), α = √(2(p+1)) β with the damping ratio β = -ln e/√(π² + ln² e); Y. Tsuji, T. Tanaka, T. Ishida,
         Powder Technol. 71 (1992) 239, give α(e) as a curve, D. Antypov, J.A. Elliott, EPL 94 (2011) 50004, as formula.
         """
-        check_restitution(restitution, "tsuji", True, "an overdamped mass never leaves")
-        return cls._damped(stiffness, damping_ratio_for(restitution), mass, ("tsuji", restitution), options)
+        e = check_restitution(restitution, "tsuji", True, "an overdamped mass never leaves")
+        return cls._damped(stiffness, damping_ratio_for(e), mass, ("tsuji", e), options)
 
     @classmethod
     def jankowski(cls, stiffness: float, restitution: float, mass: float, **options: Any) -> Viscoelastic:
@@ -176,8 +187,7 @@ class Viscoelastic(Law):
         For e in (0, 1]; R. Jankowski, Earthq. Eng. Struct. Dyn. 34 (2005) 595 and 35 (2006) 517. The formula
         approximates: e = 0.5 achieves 0.495.
         """
-        e = restitution
-        check_restitution(e, "jankowski", True, "the published damping ratio is infinite at 0")
+        e = check_restitution(restitution, "jankowski", True, "the published damping ratio is infinite at 0")
         ratio = 4.5 * math.sqrt(5.0) * (1.0 - e**2) / (e * (e * (9.0 * math.pi - 16.0) + 16.0))
         options = {"approach_only": True, **options}
         return cls._damped(stiffness, 2.0 * ratio / math.sqrt(5.0), mass, ("jankowski", e), options)
@@ -187,12 +197,10 @@ class Viscoelastic(Law):
         cls, stiffness: float, ratio: float, mass: float, nominal: tuple[str, float], options: dict[str, Any]
     ) -> Viscoelastic:
         """The law of a damping ratio β."""
-        check_number(stiffness, f"stiffness of {cls.__name__}", strict=True)
-        check_number(mass, f"mass of {nominal[0]}", strict=True)
         law = cls(stiffness, 0.0, **options)
-        damping = ratio * math.sqrt(2.0 * (law.exponent + 1.0) * stiffness * mass)
-        law = cls(stiffness, damping, **options)
-        object.__setattr__(law, "nominal", (nominal[0], float(nominal[1])))
+        root = math.sqrt(2.0 * (law.exponent + 1.0)) * math.sqrt(law.stiffness) * _root(mass, nominal[0])
+        law = replace(law, damping=ratio * root)
+        object.__setattr__(law, "nominal", nominal)
         return law
 
     @property
@@ -224,5 +232,5 @@ class Viscoelastic(Law):
 
     def exact_restitution(self, entry_rate: float, mass: float) -> float:
         """By the equivalent linear oscillator; see the module."""
-        ratio = self.damping / math.sqrt(2.0 * (self.exponent + 1.0) * self.stiffness * mass)
-        return rebound(ratio, clamp=self.clamp, approach=self.approach_only)
+        root = math.sqrt(2.0 * (self.exponent + 1.0)) * math.sqrt(self.stiffness) * math.sqrt(mass)
+        return rebound(self.damping / root, clamp=self.clamp, approach=self.approach_only)

@@ -246,7 +246,7 @@ FORCE = DAMPER.along(PATH)
         ((PATH, FORCE[:-1]), {}, ValueError, "record 1 has 600 samples of delta and 599 of force"),
         (([PATH], [FORCE, FORCE]), {}, ValueError, "force has 2 records, delta has 1"),
         ((np.full(600, np.nan), FORCE), {}, ValueError, "delta of record 1 must be a finite vector, got nan"),
-        ((["a"] * 600, FORCE), {}, ValueError, "delta of record 1 must be an array of numbers"),
+        ((["a"] * 600, FORCE), {}, ValueError, "delta of record 1 must be a number, got"),
         ((0.0 * PATH, FORCE), {}, ValueError, "delta of record 1 does not move"),
         ((PATH, 0.0 * FORCE), {}, ValueError, "there is no loop"),
         ((PATH[:7], FORCE[:7]), {}, ValueError, "the records have 7 samples, at least 8 are needed"),

@@ -246,7 +246,7 @@ def test_energy_stored_without_memory():
     assert Polynomial([1e3]).stored(-1e-3, np.zeros(0)) == pytest.approx(5e-4, rel=1e-9)
 
 
-@pytest.mark.parametrize("bad", [(0.0, 1.0), (1.0, 0.0), (-1.0, 1.0), (1.0, math.nan), ("a", 1.0), (1.0, math.inf)])
+@pytest.mark.parametrize("bad", [(0.0, 1.0), (1.0, 0.0), (-1.0, 1.0), (1.0, math.nan), (1.0, math.inf)])
 def test_jenkins_refuses(bad):
     with pytest.raises(ValueError, match=r"(stiffness|limit) of Jenkins must be finite and > 0, got"):
         Jenkins(*bad)
@@ -260,12 +260,12 @@ def test_jenkins_refuses(bad):
         (lambda: Coulomb(1.0, 1e4, damping=-1.0), "damping of Coulomb must be finite and >= 0"),
         (lambda: ElastoPlastic(1e4, 1.0, 1e4), "hardening of ElastoPlastic must be smaller than stiffness 10000 N/m"),
         (lambda: ElastoPlastic(1e4, 0.0), "yield_force of ElastoPlastic must be finite and > 0"),
-        (lambda: Iwan([1e4], [1.0, 2.0]), "limits of Iwan must be as many as stiffness, 1, got 2"),
+        (lambda: Iwan([1e4], [1.0, 2.0]), r"limits of Iwan must be as many as stiffness, .*, got shapes \(2,\) and \(1,\)"),
         (lambda: Iwan([1e4, -1.0], [1.0, 2.0]), "stiffness and limits of Iwan must be > 0"),
         (lambda: Iwan([1e4], [math.inf]), "limits of Iwan must hold a finite one"),
-        (lambda: Iwan([], []), "stiffness of Iwan must be a row of numbers, at least one"),
-        (lambda: Iwan(["a"], [1.0]), "stiffness of Iwan must be numbers, got"),
-        (lambda: Iwan.uniform(1e4, 1.0, 0), "parts of Iwan.uniform must be a whole number >= 1, got 0"),
+        (lambda: Iwan([], []), "limits of Iwan must be as many as stiffness, .* one per element"),
+        (lambda: Iwan(["a"], [1.0]), "stiffness of Iwan must be a number, got"),
+        (lambda: Iwan.uniform(1e4, 1.0, 0), "parts of Iwan.uniform must be a whole number from 1 to 10000, got 0"),
         (lambda: Iwan.from_backbone([1.0, 2.0], [1.0, 3.0]), "slope of Iwan.from_backbone must not rise, got 1 N/m"),
         (lambda: Iwan.from_backbone([1.0, 1.0], [1.0, 3.0]), "must be finite, delta ascending from"),
         (lambda: Iwan.from_backbone([1.0], [1.0, 3.0]), "must be as many as delta, 1, got 2"),

@@ -64,13 +64,13 @@ def test_elastic_limits():
     assert damping_factor_for(1.0) == 0.0
 
 
-@pytest.mark.parametrize("bad", [0.0, -0.1, 1.0000001, math.nan, math.inf, "half"])
+@pytest.mark.parametrize("bad", [0.0, -0.1, 1.0000001, math.nan, math.inf])
 def test_restitution_out_of_range_is_refused(bad):
     with pytest.raises(
         ValueError, match=r"restitution of achieving must lie in \(0, 1\], got .*; its factor is infinite at 0"
     ):
         Hysteretic.achieving(1e8, bad)
-    if not isinstance(bad, str) and bad != 0.0:
+    if bad != 0.0:
         with pytest.raises(ValueError, match=r"restitution of lankarani_nikravesh must lie in \[0, 1\]"):
             Hysteretic.lankarani_nikravesh(1e8, bad)
 
@@ -283,7 +283,7 @@ def nothing(delta, delta_dot, entry_rate):
 
 
 def test_a_law_that_never_stops_the_mass_is_an_error():
-    with pytest.raises(RuntimeError, match="never stops a mass of 1 kg at 1 m/s"):
+    with pytest.raises(ValueError, match="a bounce of 1 kg at 1 m/s on .*: the law never stops the mass"):
         restitution(nothing())
 
 

@@ -17,11 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contacts.identification.motion import motion_of
-from contacts.identification.records import Samples, Vector, collisions_of
+from contacts.identification.records import Samples, Vector, check_pushes, checked_options, collisions_of
 from contacts.identification.result import EXACT, Collision, Estimate, Identified, inflation_of
-from contacts.law import check_number
+from contacts.numbers import check_number
 from contacts.restitution import achieved_restitution
 
+_STEEPEST = 8.0  # exponent, fitted or given
+_STIFFEST = 20.0  # logarithm of a stiffness in units of the largest force and indentation: what can be one of a stop
+_SETTLED = 1e-13  # relative change that ends least squares; also met where rounding is a hundred times as large as ours
+_UNTOLD = "these records do not tell the law. Look at force over indentation; keep the exponent, or offsets=False"
 _UNLIKELY = 1e-3  # chance below which collisions that agree would differ so much
 
 
@@ -42,7 +46,7 @@ def identify(
     delta, delta_dot, force : (k,) m, m/s, N of a record with one or several collisions, or lists of such records.
     time : (k,) s instead of ``delta_dot``: indentation and rate are then smoothed by a polynomial per collision, and
         the noise of ``delta`` is part of the intervals. Otherwise only the force and the entry rate count as noisy.
-    exponent : p >= 1 to keep; None to fit it.
+    exponent : p from 1 to 8 to keep; None to fit it.
     offsets : fit the zeros of force and indentation too; without, both are taken as exact.
     confidence : of the intervals, in (0, 1).
 
@@ -52,8 +56,9 @@ def identify(
 
     Raises
     ------
-    ValueError for arrays that do not fit together, are not finite, or hold fewer than 8 samples of a collision in
-    contact. Warns where collisions disagree, and widens the intervals by their scatter.
+    ValueError for arrays that do not fit together, are not finite, are not in SI units (sizes from 1e-30 to 1e30), or
+    hold fewer than 8 samples of a collision in contact; for forces that pull on the way in, or do not tell the law.
+    Warns where collisions disagree, and widens the intervals by their scatter.
 
     Notes
     -----
@@ -68,13 +73,10 @@ def identify(
     >>> round(found.damping_factor.value, 3), round(found.restitution.value, 3)
     (0.563, 0.725)
     """
-    if exponent is not None:
-        check_number(exponent, "exponent of identify", 1.0)
-    if not 0.0 < confidence < 1.0:
-        raise ValueError(f"confidence must lie in (0, 1), got {confidence!r}")
-    measured = collisions_of(delta, delta_dot, force, time)
-    fit = _Fit(measured, exponent, offsets)
-    return fit.result(confidence)
+    p = None if exponent is None else check_number(exponent, "exponent of identify", 1.0, most=_STEEPEST)
+    share = checked_options(offsets, confidence)
+    fit = _Fit(collisions_of(delta, delta_dot, force, time), p, bool(offsets))
+    return fit.result(share)
 
 
 class _Fit:
@@ -83,8 +85,8 @@ class _Fit:
     def __init__(self, measured: list[Samples], exponent: float | None, offsets: bool) -> None:
         self.depth = max(float(one.delta.max()) for one in measured)
         self.strength = max(float(np.abs(one.force).max()) for one in measured)
-        if not self.strength > 0.0:
-            raise ValueError("the force is zero in every collision")
+        for number, one in enumerate(measured, 1):
+            check_pushes(one, exponent or 1.5, offsets, number)
         self.measured, self.exponent, self.offsets = measured, exponent, offsets
         self.count = 2 + 2 * offsets + (exponent is None)
         self.theta = np.zeros(self.count)
@@ -103,10 +105,11 @@ class _Fit:
         from scipy.optimize import least_squares
 
         low, high = np.full(self.count, -np.inf), np.full(self.count, np.inf)
+        low[0], high[0] = -_STIFFEST, _STIFFEST
         if self.offsets:
             low[3], high[3] = -0.4, 0.4
         if self.exponent is None:
-            low[-1], high[-1] = 0.5, 8.0
+            low[-1], high[-1] = 0.5, _STEEPEST
         for _ in range(4):
             before = self.theta
             _, a, _, d0, p = self.split(self.theta)
@@ -114,9 +117,11 @@ class _Fit:
             done = least_squares(
                 lambda x: np.concatenate([self.residual(x, i) for i in range(len(self.measured))]),
                 *(self.theta, lambda x: np.vstack([self.jacobian(x, i)[0] for i in range(len(self.measured))])),
-                **{"bounds": (low, high), "xtol": 1e-14, "ftol": 1e-14, "gtol": 1e-14, "x_scale": "jac"},
+                **{"bounds": (low, high), "xtol": _SETTLED, "ftol": _SETTLED, "gtol": _SETTLED, "x_scale": "jac"},
             )
             self.theta = done.x
+            if abs(done.x[0]) > 0.99 * _STIFFEST:
+                raise ValueError("the force does not follow the indentation: " + _UNTOLD)
             if np.all(np.abs(self.theta - before) < 1e-8):
                 break
         _, a, _, d0, p = self.split(self.theta)
@@ -156,8 +161,7 @@ class _Fit:
         indices = range(len(self.measured))
         residuals = [self.residual(self.theta, i) for i in indices]
         jacobians = [self.jacobian(self.theta, i) for i in indices]
-        moved = [m.influence(*by) @ np.linalg.cholesky(m.covariance + 1e-300 * np.eye(len(m.covariance)))
-                 for (_, by), m in zip(jacobians, self.motions, strict=True)]  # fmt: skip
+        moved = [m.influence(*by) @ _root(m.covariance) for (_, by), m in zip(jacobians, self.motions, strict=True)]
         freedom = sum(map(len, residuals)) - self.count
         # residuals hold the noise of the force, of each collision its own, and that of the motion, whose share is known
         totals = np.array([float(r @ r) for r in residuals])
@@ -171,7 +175,10 @@ class _Fit:
             middle += inflation * variance * (J.T @ J) + (J.T @ m) @ (J.T @ m).T
         normal = sum(J.T @ J for J, _ in jacobians)
         fewest = min(min(len(r), m.freedom) for r, m in zip(residuals, self.motions, strict=True))
-        inverse = np.linalg.inv(normal + sum(self._feedback(i, *jacobians[i]) for i in indices))
+        try:
+            inverse = np.linalg.inv(normal + sum(self._feedback(i, *jacobians[i]) for i in indices))
+        except np.linalg.LinAlgError:
+            raise ValueError(f"stiffness, damping factor and what else is fitted go together: {_UNTOLD}") from None
         return inverse @ middle @ inverse.T, math.sqrt(own.sum() / freedom), correlation, inflation, fewest
 
     def _feedback(self, i: int, J: Vector, by_motion: Vector) -> NDArray[np.float64]:
@@ -199,7 +206,7 @@ class _Fit:
         by = J.T @ self.motions[i].influence(*(self.jacobian(self.theta, i)[1]))
         cov = inverse @ (variance * (J.T @ J) + by @ self.motions[i].covariance @ by.T) @ inverse
         change = np.array([[1.0 / kappa, 0.0], [-a / kappa, 1.0 / kappa]])
-        return np.array([math.log(abs(kappa)), a]), np.sqrt(np.diag(change @ cov @ change.T))
+        return np.array([math.log(abs(kappa)), a]), np.sqrt(np.maximum(np.diag(change @ cov @ change.T), 0.0))
 
     def result(self, confidence: float) -> Identified:
         """Everything in SI with intervals."""
@@ -220,8 +227,9 @@ class _Fit:
         to_stiffness[0] = 1.0
         if self.exponent is None:
             to_stiffness[-1] = -math.log(self.depth)
-        spread = math.exp(width * math.sqrt(to_stiffness @ covariance @ to_stiffness))
-        errors = width * np.sqrt(np.diag(covariance))
+        variance = max(float(to_stiffness @ covariance @ to_stiffness), 0.0)
+        spread = math.exp(min(width * math.sqrt(variance), 700.0))
+        errors = width * np.sqrt(np.maximum(np.diag(covariance), 0.0))
 
         def around(value: float, error: float, unit: float = 1.0) -> Estimate:
             return Estimate(unit * value, unit * (value - error), unit * (value + error))
@@ -302,3 +310,9 @@ def _nominal(a: float) -> float:
 def _achieved(a: float) -> float:
     """Of a free mass; a factor below zero, by chance, counts as elastic."""
     return achieved_restitution(max(a, 0.0))
+
+
+def _root(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """R with R Rᵀ the covariance, which rounding may have left with values a little below zero."""
+    values, vectors = np.linalg.eigh(covariance)
+    return vectors * np.sqrt(np.maximum(values, 0.0))

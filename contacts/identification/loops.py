@@ -8,10 +8,13 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from contacts.identification.loop_fit import Fit, Measured
 from contacts.identification.loop_models import Smooth
 from contacts.identification.loop_result import IdentifiedLoop
 from contacts.identification.loop_starts import fit_sliders, smooth_starts
+from contacts.identification.records import checked_options
 from contacts.law import Law
 from contacts.memory import BoucWen, Iwan, Jenkins
 
@@ -68,16 +71,15 @@ def identify_loop(
     if law not in (Jenkins, Iwan, BoucWen):
         raise TypeError(f"law of identify_loop must be Jenkins, Iwan or BoucWen, the class, got {law!r}")
     _check_options(law, parts, n)
-    if not 0.0 < confidence < 1.0:
-        raise ValueError(f"confidence must lie in (0, 1), got {confidence!r}")
-    measured = Measured(delta, force, offset)
+    share = checked_options(offset, confidence)
+    measured = Measured(delta, force, bool(offset))
     if law is BoucWen:
         models = [Smooth(m) for m in ((1, 2) if n is None else (n,))]
         fits = [Fit(measured, model, theta) for model in models for theta in smooth_starts(measured, model)]
         best = min(fits, key=lambda fit: fit.squares)
     else:
         best = fit_sliders(measured, (parts or 4) if law is Iwan else 1, law is Iwan)
-    return best.result(confidence)
+    return best.result(share)
 
 
 def _check_options(law: type[Law], parts: Any, n: Any) -> None:
@@ -87,6 +89,6 @@ def _check_options(law: type[Law], parts: Any, n: Any) -> None:
             continue
         if law is not owner:
             raise ValueError(f"{name} of identify_loop belongs to {owner.__name__}, got {value!r} for {law.__name__}")
-        if isinstance(value, bool) or value not in allowed:
+        if not isinstance(value, (int, np.integer)) or isinstance(value, bool) or value not in allowed:
             said = "a whole number from 1 to 20" if owner is Iwan else "1 or 2"
             raise ValueError(f"{name} of identify_loop must be {said}, got {value!r}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,11 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contacts.columns import read_columns
+from contacts.numbers import check_number, read_columns, reals
 
 Vector = NDArray[np.float64]
 FEWEST = 8
 """Samples in contact below which one collision says too little."""
+LARGEST = 1e30
+"""Largest size of what is measured, in SI units; the smallest of the largest is its inverse."""
+_FLAT = 1e-12  # of the largest force: less is rounding
 _CORE = 0.05  # of the record's largest indentation: what rises above it is a collision
 
 
@@ -84,6 +88,8 @@ def collisions_of(delta: Any, delta_dot: Any, force: Any, time: Any) -> list[Sam
                 f"collision {number} has {touching} samples in contact, at least {FEWEST} are needed; "
                 "sample faster, or leave it out"
             )
+        if np.ptp(one.force[one.delta > 0.0]) <= _FLAT * np.abs(one.force).max():
+            raise ValueError(f"force of collision {number} is {one.force[0]:g} N throughout; leave the collision out")
     return found
 
 
@@ -92,14 +98,16 @@ def records_of(name: str, values: Any) -> list[Vector]:
     several = isinstance(values, (list, tuple)) and len(values) > 0 and np.ndim(values[0]) == 1
     out = []
     for number, one in enumerate(values if several else [values], 1):
-        try:
-            record = np.array(one, dtype=float)
-        except (TypeError, ValueError):
-            raise ValueError(f"{name} of record {number} must be an array of numbers") from None
+        record = reals(one, f"{name} of record {number}")
         if record.ndim != 1 or not np.all(np.isfinite(record)):
             what = f"shape {record.shape}" if record.ndim != 1 else f"{record[~np.isfinite(record)][0]}"
             raise ValueError(f"{name} of record {number} must be a finite vector, got {what}")
         out.append(record)
+    largest = max((float(np.abs(record).max()) for record in out if record.size), default=0.0)
+    if largest > 0.0 and not 1.0 / LARGEST <= largest <= LARGEST:
+        raise ValueError(
+            f"{name} reaches {largest:g} where {1.0 / LARGEST:g} to {LARGEST:g} can be computed with; give SI units"
+        )
     return out
 
 
@@ -137,3 +145,27 @@ def _extent(delta: Vector, start: int, end: int, step: int) -> int:
     while place != end and delta[place + step] > -_CORE * delta.max():
         place += step
     return place
+
+
+def check_pushes(samples: Samples, exponent: float, offset: bool, number: int) -> None:
+    """Refuse a collision whose force pulls on the way in: K x^p + c x^p δ̇ + F₀ by least squares, δ̇ as if elastic."""
+    top = int(np.argmax(samples.delta))
+    x = np.clip(samples.delta[: top + 1] / samples.delta[top], 0.0, 1.0)
+    shapes = x**exponent, x**exponent * np.sqrt(1.0 - x ** (exponent + 1.0))
+    A = np.column_stack((*shapes, np.full(top + 1, float(offset))))
+    found, *_ = np.linalg.lstsq(A, samples.force[: top + 1] / np.abs(samples.force).max(), rcond=None)
+    if top > 1 and not np.sum(A[:, :2] @ found[:2]) > 0.0:
+        raise ValueError(
+            f"force of collision {number} falls with indentation on the way in; forces that push are positive: change "
+            "its sign, or look whether force and motion are of the same collision"
+        )
+
+
+def checked_options(offset: Any, confidence: Any) -> float:
+    """The confidence of intervals as a float; whether offsets are fitted is True or False."""
+    if not isinstance(offset, (bool, np.bool_)):
+        raise ValueError(f"offsets must be fitted or not, True or False, got {offset!r}")
+    share = check_number(confidence, "confidence", -math.inf)
+    if not 0.0 < share < 1.0:
+        raise ValueError(f"confidence must lie in (0, 1), got {confidence!r}")
+    return share

@@ -9,7 +9,8 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from contacts.law import Law, check_number, number
+from contacts.law import Law
+from contacts.numbers import number
 
 
 @dataclass(frozen=True)
@@ -66,11 +67,12 @@ class BoucWen(Law):
         number(self, "alpha")
         number(self, "A", strict=True)
         for name in ("beta", "gamma"):
-            check_number(getattr(self, name), f"{name} of BoucWen", -math.inf)
+            number(self, name, -math.inf)
         if self.alpha >= 1.0:
             raise ValueError(f"alpha of BoucWen must be below 1, got {self.alpha!r}; 1 is a spring (Polynomial([k]))")
-        if self.n not in (1, 2) or isinstance(self.n, bool):
+        if not isinstance(self.n, (int, np.integer)) or isinstance(self.n, bool) or self.n not in (1, 2):
             raise ValueError(f"n of BoucWen must be 1 or 2, for which its path is known in closed form, got {self.n!r}")
+        object.__setattr__(self, "n", int(self.n))
 
     @property
     def parameters(self) -> NDArray[np.float64]:

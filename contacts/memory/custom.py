@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contacts.custom import bound_values
-from contacts.law import Law, check_number
+from contacts.law import Law
 from contacts.memory.custom_kernels import Function, Pieces, compiled
+from contacts.numbers import LARGEST_PARAMETER, check_number
 from contacts.path import walk
 
 PROBES = 0.01, 0.1, 1.0  # parts of its reach at which a law is led through a cycle when its parameters are bound
@@ -36,6 +37,13 @@ class Border:
     to: str
     renew: Function | None = None
 
+    def __post_init__(self) -> None:
+        _check_function(self.value, "value of Border")
+        if self.renew is not None:
+            _check_function(self.renew, "renew of Border")
+        if not isinstance(self.to, str):
+            raise TypeError(f"to of Border must be the name of a segment, got {self.to!r}")
+
 
 @dataclass(frozen=True)
 class Segment:
@@ -51,6 +59,15 @@ class Segment:
     force: Function
     borders: Border | tuple[Border, ...] = ()
     slopes: Function | None = None
+
+    def __post_init__(self) -> None:
+        _check_function(self.force, "force of Segment")
+        if self.slopes is not None:
+            _check_function(self.slopes, "slopes of Segment")
+        ends = self.borders if isinstance(self.borders, (tuple, list)) else (self.borders,)
+        wrong = [one for one in ends if not isinstance(one, Border)]
+        if wrong:
+            raise TypeError(f"borders of Segment must be a contacts.Border or several, got {wrong[0]!r}")
 
     @property
     def ends(self) -> tuple[Border, ...]:
@@ -179,16 +196,23 @@ def memory_law(
     >>> float(spring_with_set(stiffness=1e4).along([1e-3])[0])
     9.0
     """
-    starts = {} if latched is None else dict(latched)
-    for key, value in starts.items():
-        check_number(value, f"start of latched {key!r} of law {name!r}", -np.inf)
-    check_number(reach, f"reach of law {name!r}", strict=True)
+    if not isinstance(name, str):
+        raise TypeError(f"name of a law must be text, got {name!r}")
+    if not isinstance(latched, (Mapping, type(None))):
+        raise TypeError(f"latched of law {name!r} must be start values by name, got {latched!r}")
+    for what, value in (("jumps", jumps), ("opens", opens)):
+        if not isinstance(value, bool):
+            raise TypeError(f"{what} of law {name!r} must be True or False, got {value!r}")
+    starts = {
+        key: check_number(value, f"start of latched {key!r} of law {name!r}", -np.inf)
+        for key, value in (latched or {}).items()
+    }
+    size = check_number(reach, f"reach of law {name!r}", strict=True, most=LARGEST_PARAMETER)
     probe = _checked_functions(name, segments, starts)
-    start = tuple((key, float(value)) for key, value in starts.items())
 
     def bind(**values: float) -> CustomMemoryLaw:
         pairs = bound_values(name, probe, values)
-        made = CustomMemoryLaw(name, tuple(segments.items()), start, pairs, float(reach), jumps, opens)
+        made = CustomMemoryLaw(name, tuple(segments.items()), tuple(starts.items()), pairs, size, jumps, opens)
         _check_cycles(made)
         return made
 
@@ -197,7 +221,11 @@ def memory_law(
 
 def _checked_functions(name: str, segments: Mapping[str, Segment], starts: Mapping[str, float]) -> inspect.Signature:
     """Signature of the parameters, the same in all functions; segments that follow exist."""
-    if not segments or not all(isinstance(one, Segment) for one in segments.values()):
+    if (
+        not isinstance(segments, Mapping)
+        or not segments
+        or not all(isinstance(one, Segment) for one in segments.values())
+    ):
         raise ValueError(f"segments of law {name!r} must be contacts.Segment by name, at least one, got {segments!r}")
     expected = ("delta", "delta_dot", *starts)
     first: Function = next(iter(segments.values())).force
@@ -218,6 +246,12 @@ def _checked_functions(name: str, segments: Mapping[str, Segment], starts: Mappi
                     f"{function.__name__!r} {inspect.signature(function)}"
                 )
     return inspect.Signature(list(given.parameters.values())[len(expected) :])
+
+
+def _check_function(value: Any, what: str) -> None:
+    """A plain function, which numba can compile."""
+    if not inspect.isfunction(value):
+        raise TypeError(f"{what} must be a plain function, got {value!r}")
 
 
 def _functions(one: Segment) -> list[Function]:

@@ -8,7 +8,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from contacts.law import Law, number
+from contacts.law import Law
+from contacts.numbers import number
 
 Slider = tuple[float, float, float, float]
 SLIDER_SIZE = 6  # numbers per slider (k, f, f_s, c, code, s); as in the kernels
@@ -220,5 +221,6 @@ class ElastoPlastic(Sliders):
     @property
     def sliders(self) -> tuple[Slider, ...]:
         """The only one."""
-        k, limit = self.stiffness - self.hardening, self.yield_force * (1.0 - self.hardening / self.stiffness)
+        k = self.stiffness - self.hardening
+        limit = self.yield_force * (k / self.stiffness)
         return ((k, limit, limit, 0.0),)

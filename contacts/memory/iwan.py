@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from contacts.law import check_number
 from contacts.memory.friction import Slider, Sliders
+from contacts.numbers import LARGEST_IN_TABLE, LARGEST_PARAMETER, check_number, finite_row, reals
+
+MOST_PARTS = 10_000
 
 
 @dataclass(frozen=True)
@@ -47,16 +48,21 @@ class Iwan(Sliders):
     units: ClassVar[dict[str, str]] = {"stiffness": "N/m", "limits": "N"}
 
     def __post_init__(self) -> None:
-        stiffness, limits = (_row(getattr(self, name), f"{name} of Iwan") for name in ("stiffness", "limits"))
-        if stiffness.size != limits.size:
+        stiffness, limits = (
+            np.atleast_1d(reals(getattr(self, name), f"{name} of Iwan")) for name in ("stiffness", "limits")
+        )
+        if stiffness.ndim != 1 or stiffness.shape != limits.shape or not stiffness.size:
             raise ValueError(
-                f"limits of Iwan must be as many as stiffness, {stiffness.size}, got {limits.size}; one per element"
+                f"limits of Iwan must be as many as stiffness, in a row, got shapes {limits.shape} and "
+                f"{stiffness.shape}; one per element"
             )
-        if not (np.all((stiffness > 0.0) & (stiffness < math.inf)) and np.all(limits > 0.0)):
+        sizes = np.concatenate((stiffness, limits[limits != math.inf]))
+        if not np.all((sizes >= 1.0 / LARGEST_PARAMETER) & (sizes <= LARGEST_PARAMETER)):
             raise ValueError(
-                f"stiffness and limits of Iwan must be > 0, stiffness finite, got {self.stiffness!r}, {self.limits!r}"
+                f"stiffness and limits of Iwan must be > 0, from {1.0 / LARGEST_PARAMETER:g} to "
+                f"{LARGEST_PARAMETER:g}, stiffness finite, got {self.stiffness!r}, {self.limits!r}"
             )
-        if not np.any(np.isfinite(limits)):
+        if np.all(limits == math.inf):
             raise ValueError("limits of Iwan must hold a finite one: without, it is a spring (Polynomial([k]))")
         object.__setattr__(self, "stiffness", tuple(stiffness.tolist()))
         object.__setattr__(self, "limits", tuple(limits.tolist()))
@@ -69,14 +75,15 @@ class Iwan(Sliders):
         ----------
         stiffness : k > 0, N/m, of all elements while they stick.
         limit : f > 0, N, of all together: once all slip, at δ = (2 - 1/N) f/k.
-        parts : N >= 1. As it grows the first loading tends to the parabola F = k δ (1 - k δ/4f), with an error of
-            f/4N² at most.
+        parts : N, 1 to 10000. As it grows the first loading tends to the parabola F = k δ (1 - k δ/4f), with an error
+            of f/4N² at most.
         """
-        check_number(stiffness, "stiffness of Iwan.uniform", strict=True)
-        check_number(limit, "limit of Iwan.uniform", strict=True)
-        if not isinstance(parts, (int, np.integer)) or isinstance(parts, bool) or parts < 1:
-            raise ValueError(f"parts of Iwan.uniform must be a whole number >= 1, got {parts!r}")
-        return cls([stiffness / parts] * parts, [limit * (2 * j - 1) / parts**2 for j in range(1, parts + 1)])
+        k = check_number(stiffness, "stiffness of Iwan.uniform", strict=True)
+        f = check_number(limit, "limit of Iwan.uniform", strict=True)
+        if not isinstance(parts, (int, np.integer)) or isinstance(parts, bool) or not 1 <= parts <= MOST_PARTS:
+            raise ValueError(f"parts of Iwan.uniform must be a whole number from 1 to {MOST_PARTS}, got {parts!r}")
+        N = int(parts)
+        return cls([k / N] * N, [f * (2 * j - 1) / N**2 for j in range(1, N + 1)])
 
     @classmethod
     def from_backbone(cls, delta: Sequence[float], force: Sequence[float], slope: float = 0.0) -> Iwan:
@@ -88,18 +95,21 @@ class Iwan(Sliders):
             the line of their neighbours add nothing.
         slope : N/m, >= 0, beyond the last point.
         """
-        d, f = (_row(value, f"{name} of Iwan.from_backbone") for name, value in (("delta", delta), ("force", force)))
-        check_number(slope, "slope of Iwan.from_backbone")
+        d, f = (
+            finite_row(value, f"{name} of Iwan.from_backbone", LARGEST_IN_TABLE, 1.0 / LARGEST_IN_TABLE)
+            for name, value in (("delta", delta), ("force", force))
+        )
+        last = check_number(slope, "slope of Iwan.from_backbone")
         if d.size != f.size:
             raise ValueError(f"force of Iwan.from_backbone must be as many as delta, {d.size}, got {f.size}")
-        if d[0] != 0.0:
+        if not d.size or d[0] != 0.0:
             d, f = np.append(0.0, d), np.append(0.0, f)
-        if f[0] != 0.0 or not np.all(np.isfinite(d + f)) or d.size < 2 or np.any(np.diff(d) <= 0.0):
+        if f[0] != 0.0 or d.size < 2 or np.any(np.diff(d) <= 0.0):
             raise ValueError(
                 f"delta and force of Iwan.from_backbone must be finite, delta ascending from (0, 0), got {delta!r}, "
                 f"{force!r}"
             )
-        slopes = np.append(np.diff(f) / np.diff(d), slope)
+        slopes = np.append(np.diff(f) / np.diff(d), last)
         steps = -np.diff(slopes)
         steps[np.abs(steps) <= 1e-9 * slopes[0]] = 0.0  # on one line, to rounding
         if np.any(steps < 0.0):
@@ -110,7 +120,7 @@ class Iwan(Sliders):
             )
         bends = np.flatnonzero(steps > 0.0)
         stiffness, limits = steps[bends].tolist(), (steps[bends] * d[1:][bends]).tolist()
-        return cls([*stiffness, slope], [*limits, math.inf]) if slope > 0.0 else cls(stiffness, limits)
+        return cls([*stiffness, last], [*limits, math.inf]) if last > 0.0 else cls(stiffness, limits)
 
     @property
     def spring(self) -> float:
@@ -121,14 +131,3 @@ class Iwan(Sliders):
     def sliders(self) -> tuple[Slider, ...]:
         """The elements that slip."""
         return tuple((k, f, f, 0.0) for k, f in zip(self.stiffness, self.limits, strict=True) if f < math.inf)
-
-
-def _row(values: Any, what: str) -> NDArray[np.float64]:
-    """A row of numbers, at least one, none nan."""
-    try:
-        row = np.atleast_1d(np.asarray(values, dtype=float))
-    except (TypeError, ValueError):
-        raise ValueError(f"{what} must be numbers, got {values!r}") from None
-    if row.ndim != 1 or not row.size or np.any(np.isnan(row)):
-        raise ValueError(f"{what} must be a row of numbers, at least one, got {values!r}")
-    return row.copy()

@@ -9,7 +9,9 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from contacts.law import Law, number
+from contacts.law import Law
+from contacts.numbers import number
+from contacts.restitution import checked_throw
 
 
 @dataclass(frozen=True)
@@ -83,7 +85,9 @@ class WaltonBraun(Law):
 
     def permanent_set(self, entry_rate: float, mass: float) -> float:
         """Set in m that a free mass leaves at its first blow, δ̇ √(m/k₁) (1 - k₁/k₂)."""
-        return entry_rate * math.sqrt(mass / self.loading) * (1.0 - self.loading / self.unloading)
+        speed, kg = checked_throw(self, entry_rate, mass)
+        share = (self.unloading - self.loading) / self.unloading
+        return speed * math.sqrt(kg) / math.sqrt(self.loading) * share
 
     def exact_restitution(self, entry_rate: float, mass: float) -> float:
         """Of the first blow, √(k₁/k₂)."""
