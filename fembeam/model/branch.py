@@ -187,7 +187,7 @@ class Branch(Printed):
         record = {
             **{"name": self.family.name, "period": self.family.period, "scene": repr(self.family.model.scene)},
             **{"modes": list(self.family.model.modes), "span": self.found.walks[0].span},
-            **{"step": self.found.walks[0].largest, "status": [s.name for s in self.found.status], "arms": walks},
+            **{"step": self.found.walks[0].largest, "status": [s.name for s in self.found.status], "walks": walks},
         }
         with written_whole(Path(path)) as file:
             np.savez_compressed(file, branch=np.array(json.dumps(record)))
@@ -225,4 +225,4 @@ def resumed(model: Model, path: str | Path) -> Branch:
     require(same, f"{path} belongs to another scene or other modes", record["modes"], "Model.resume",
             f"use the model of {record['scene']}")  # fmt: skip
     family = Family(model, record["name"], record["period"])
-    return Branch(family, restarted(family, tuple(record["span"]), record["arms"], record["status"], record["step"]))
+    return Branch(family, restarted(family, tuple(record["span"]), record["walks"], record["status"], record["step"]))

@@ -122,21 +122,20 @@ def summary(
     run: Run, discard: float = 0.0, seconds: float | None = None, outputs: dict[str, Any] | None = None
 ) -> dict[str, Any]:
     """What a run says in numbers: modes, moments, contacts, outputs asked for, energy, cost, status, versions."""
-    zeta = run.readout.zeta
     return {
         "status": run.status,
         "complete": run.complete,
         "simulated_seconds": float(run.t[-1]) if len(run.t) else 0.0,
         "discarded_seconds": discard,
         "wall_seconds": run.cost.seconds if seconds is None else seconds,
-        "omega": plot.natural(run).tolist() or None,
-        "zeta": None if zeta is None else zeta.tolist(),
+        "omega": plot.natural(run).tolist(),
+        "zeta": run.readout.zeta.tolist(),
         "moments": _moments(run, discard),
         "confidence": _confidence(run, discard),
         "contacts": _contacts(run, discard),
         **({"outputs": extremes_table(histories(run, **outputs), discard)} if outputs else {}),
         "energy": _energy(run),
-        **({} if run.lost is None else {"losses": {k: x.tolist() for k, x in run.losses.arrays().items()}}),
+        "losses": {k: x.tolist() for k, x in run.losses.arrays().items()},
         "cost": asdict(run.cost),
         "dt": float(run.t[1] - run.t[0]) if len(run.t) > 1 else None,
         "scene": run.scene,

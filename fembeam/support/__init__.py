@@ -16,7 +16,6 @@ from fembeam.support.checks import (
 )
 from fembeam.support.files import written_whole
 from fembeam.support.notes import note
-from fembeam.support.old_names import OldName
 from fembeam.support.printed import Part, Printed, html_table
 from fembeam.support.progress import bar, counting
 from fembeam.support.text_tables import aligned
