@@ -12,7 +12,7 @@ from fembeam.plot.basins import basins
 from fembeam.plot.contact_histograms import contacts
 from fembeam.plot.laws import hysteresis, identification, loops, restitutions
 from fembeam.plot.linear import floor_spectrum, frequency_response, response_spectrum
-from fembeam.plot.methods import failures, speed_accuracy, stability_map
+from fembeam.plot.methods import speed_accuracy, stability_map
 from fembeam.plot.mode_count import mode_count, smallest_model
 from fembeam.plot.orbits import branch, orbit, peak
 from fembeam.plot.random import random_densities, random_spectra
@@ -28,7 +28,6 @@ __all__ = [
     "branch",
     "contacts",
     "densities",
-    "failures",
     "floor_spectrum",
     "frame",
     "frequency_response",

@@ -1,15 +1,14 @@
 """Studies: questions asked of a scene or a model by many runs, each answered by a table and a figure.
 
-How many modes (`mode_count`, `smallest_model`), which method and step (`speed_accuracy`, `stability_map`,
-`failure_gallery`), what random motion looks like (`ensemble` of realisations, `stationary` for one long run in
-`segments`), where motion settles (`settling`). A study is a function and its result; `quantities` are the numbers
-that it can ask for, `measure` takes them, `realisations` gives every run its own noise, `execution` spreads runs over
-processes and keeps what was computed. Imports: `plot`, `model`, `statistics` and what they import.
+How many modes (`mode_count`, `smallest_model`), which method and step (`speed_accuracy`, `stability_map`), what random
+motion looks like (`ensemble` of realisations, `stationary` for one long run in `segments`), where motion settles
+(`settling`). A study is a function and its result; `quantities` are the numbers that it can ask for, `measure` takes
+them, `realisations` gives every run its own noise, `execution` spreads runs over processes and keeps what was computed.
+Imports: `plot`, `model`, `statistics` and what they import.
 Begin with `measure`, then `ensemble`.
 """
 
 from fembeam.study.ensemble import Ensemble, ensemble
-from fembeam.study.failure_gallery import Failure, gallery
 from fembeam.study.mode_count import ModeCount, mode_count
 from fembeam.study.settling import Basins, Bifurcation, basins, bifurcation
 from fembeam.study.smallest_model import smallest_model
@@ -24,7 +23,6 @@ __all__ = [
     "Basins",
     "Bifurcation",
     "Ensemble",
-    "Failure",
     "ModeCount",
     "NoReferenceError",
     "NotMetError",
@@ -38,7 +36,6 @@ __all__ = [
     "bifurcation",
     "characteristics",
     "ensemble",
-    "gallery",
     "mode_count",
     "smallest_model",
     "speed_accuracy",
