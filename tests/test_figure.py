@@ -89,7 +89,6 @@ def spectrum():
         (lambda model, axes: plot.floor_spectrum(model.simulate(0.3, 1e-3), axes=axes), 2),
         (lambda model, axes: plot.response_spectrum(spectrum(), axes=axes), 2),
         (lambda model, axes: plot.frequency_response(model.frequency_response([1.0, 2.0]), axes=axes), 2),
-        (lambda model, axes: plot.failures([fb.study.failure_gallery.jumped_contact()], axes=axes[0]), 1),
     ],
     ids=[
         "loops",
@@ -104,7 +103,6 @@ def spectrum():
         "floor",
         "response spectrum",
         "frequency response",
-        "failures",
     ],
 )
 def test_axes_that_are_given_are_drawn_into_and_nothing_else_is_changed(model, given, draw, panels):

@@ -1,10 +1,12 @@
-"""Studies of methods: speed against accuracy, maps of stability, the gallery of failures; their figures."""
+"""Studies of methods: speed against accuracy, maps of stability; their figures; the example of failures."""
 
 import csv
 import re
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from runpy import run_path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,12 +15,12 @@ from problems import TIP, paper_scene
 import fembeam as fb
 from contacts import PiecewiseLinear
 from fembeam.cli import main
-from fembeam.study import NoReferenceError, Verdict, gallery, speed_accuracy, stability_map
+from fembeam.study import NoReferenceError, Point, SpeedAccuracy, Verdict, speed_accuracy, stability_map
 from fembeam.study.measure import cut
 from fembeam.study.quantities import Amplitude, Psd
-from fembeam.study.speed_accuracy_result import Point, SpeedAccuracy
 from solvers import RK4, CentralDifference, DormandPrince, Exponential, HenonRK2, Newmark
 
+EXAMPLES = Path(__file__).parent.parent / "examples"
 METHODS = [Exponential(1e-4), Exponential(1e-8), DormandPrince(1e-8), RK4(4e-5), RK4(1e-5), HenonRK2(1.0, 1.0)]
 
 
@@ -149,7 +151,7 @@ def test_table_and_figure(found, tmp_path):
 
 
 def test_command_line(tmp_path, capsys):
-    text = (Path(__file__).parent.parent / "examples" / "beam_stop.toml").read_text().split("[simulate]")[0]
+    text = (EXAMPLES / "beam_stop.toml").read_text().split("[simulate]")[0]
     base = '[base]\nkind = "harmonic"\namplitude = 1e-3\nomega = 195.0\n\n'
     text = re.sub(r"(?ms)^\[base\].*?(?=^\[)", base, text)
     scene = tmp_path / "scene.toml"
@@ -238,12 +240,12 @@ def test_bad_maps_are_refused(change, message):
         stability_map(**given)
 
 
-# --- the gallery -----------------------------------------------------------------------------------------------------
+# --- the example of failures -----------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
-def cases():
-    return {case.title: case for case in gallery(paper_scene())}
+def gallery():
+    return SimpleNamespace(**run_path(str(EXAMPLES / "failure_gallery.py")))
 
 
 @pytest.mark.parametrize(
@@ -261,14 +263,14 @@ def cases():
         ("Latched damping at grazing", 1e5, ("without bound", "clipped")),
     ],
 )
-def test_naive_methods_fail_and_ours_does_not(cases, title, naive, says):
-    case = cases[title]
+def test_naive_methods_fail_and_ours_does_not(gallery, title, naive, says):
+    (case,) = [case for case in gallery.cases if case.title == title]
     assert case.naive_error >= naive
     assert case.our_error < 1e-3
     assert all(part in said for part, said in zip(says, case.said, strict=True))
 
 
-def test_gallery_is_drawn(cases, tmp_path):
-    figure = fb.plot.failures(list(cases.values()))
-    assert sum(ax.axison for ax in figure.axes) == len(cases)
-    figure.savefig(tmp_path / "gallery.png")
+def test_failures_are_drawn(gallery):
+    figure = gallery.drawn(gallery.cases)
+    assert [axis.get_title(loc="left") for axis in figure.axes] == [case.title for case in gallery.cases]
+    figure.canvas.draw()

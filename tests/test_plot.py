@@ -367,7 +367,7 @@ def test_figures_of_laws():
 
 @pytest.mark.parametrize(
     "draw",
-    [lambda: fb.plot.branch([]), lambda: fb.plot.loops({}), lambda: fb.plot.failures([]), fb.plot.stability_map],
+    [lambda: fb.plot.branch([]), lambda: fb.plot.loops({}), fb.plot.stability_map],
 )
 def test_figures_of_nothing_are_refused(draw):
     with pytest.raises(ValueError, match=r"nothing to draw, got .* in plot\.\w+; give "):

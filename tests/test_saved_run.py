@@ -1,4 +1,4 @@
-"""A run read from its file gives what the run gave: fields, reactions, spectra, ParaView; npz and HDF5, old files."""
+"""A run read from its file gives what the run gave: fields, reactions, spectra, ParaView; npz and HDF5."""
 
 import json
 import subprocess
@@ -11,7 +11,6 @@ from problems import STEEL
 
 import fembeam as fb
 from contacts import Hertz, Jenkins, law
-from fembeam.response.saved_readout import PLAIN
 from fembeam.results.files import summary
 
 SQUARE = fb.Section.rectangle(2.1e11, 7850.0, 0.01, 0.01)
@@ -179,28 +178,6 @@ def changed(path, change):
     about = json.loads(str(arrays["about"]))
     change(about, arrays)
     np.savez(path, **arrays | {"about": json.dumps(about)})
-
-
-def test_a_file_of_an_earlier_version_says_what_it_lacks(run, tmp_path):
-    path = run.save(tmp_path / "run.npz")
-
-    def older(about, arrays):
-        del about["readout"], about["events"]
-        for name in (*PLAIN, "reactions", "mean_force", "transitions", "zeta"):
-            del arrays[name]
-
-    changed(path, older)
-    again = fb.load(path)
-    np.testing.assert_array_equal(again.displacement(0.3), run.displacement(0.3))
-    for ask in (lambda: again.moment(0.1), again.reactions, lambda: again.acceleration(0.1),
-                lambda: again.displacement(0.1, absolute=True), lambda: again.to_vtu(tmp_path / "x"),
-                lambda: again.force(mean=True)):  # fmt: skip
-        with pytest.raises(ValueError, match="a run read from a file that does not keep it"):
-            ask()
-    with pytest.raises(ValueError, match="file is of an earlier version, without transitions; simulate again"):
-        again.transitions  # noqa: B018
-    assert (summary(again)["omega"], summary(again)["zeta"]) == (None, None)
-    np.testing.assert_array_equal(fb.load(again.save(tmp_path / "again")).q, run.q)
 
 
 @pytest.mark.parametrize(

@@ -135,13 +135,7 @@ def test_every_signal_goes_on_in_the_next_segment_and_lasts(path, scene_with):
     assert signals_of(long.scene)[path].period == 1e3
 
 
-def test_for_duration_asks_signals_under_its_new_name_and_its_old_one():
-    class Old:
-        def lasting(self, duration):
-            return duration
-
-    with pytest.warns(DeprecationWarning, match="offer for_duration, not lasting: rename it in Old"):
-        assert for_duration(Old(), 2.0) == 2.0
+def test_for_duration_asks_signals_that_offer_it():
     assert for_duration(abs, 2.0) is abs
     assert for_duration(NOISE, 1e3).period == 1e3
 

@@ -79,9 +79,6 @@ def test_subharmonic_branch_ends_at_a_flip():
     problem = Bilinear(0.88, zeta=0.05)  # doubles its period between 0.83 and 0.93 rad/s
     found = branch(over(problem, periods=2), (0.86, 1.0), problem.settled(), at=0.88, step=0.3).run()
     assert found.status == (BranchStatus.SUBHARMONIC_END, BranchStatus.END)
-    assert BranchStatus["BORN"] is BranchStatus.SUBHARMONIC_END  # its name in saved branches of earlier versions
-    with pytest.warns(DeprecationWarning, match="walks"):
-        assert found.arms is found.walks
     ending = found.orbits[-1]
     assert ending.mark == "flip"
     there = replace(problem, omega=ending.parameter)

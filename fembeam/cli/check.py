@@ -88,7 +88,6 @@ class Check:
         return {
             "modes": mode_rows(self.model),
             "correlation_time": self.correlation_time,
-            "memory": self.correlation_time,  # its old name, for one release
             "stops": [asdict(one) for one in self.touched],
             "suggested_modes": self.modes,
             "suggested_steps": self.steps,

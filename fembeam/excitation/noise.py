@@ -18,7 +18,7 @@ import numpy as np
 from fembeam.excitation.line_spectrum import checked_band, checked_order
 from fembeam.excitation.noise_lines import NoiseLines
 from fembeam.excitation.psd import Psd, RollOff, Table, checked_table
-from fembeam.support import OldName, is_whole, number
+from fembeam.support import is_whole, number
 
 AUTOMATIC_LINES = 4096  # kurtosis 3 - 1.5/4096: Gaussian to far below any sampling error
 FEWEST_LINES = 8  # below this a sum of cosines is visibly not Gaussian (kurtosis under 2.8)
@@ -210,8 +210,6 @@ class BandNoise(NoiseLines):
             return replace(self, period=duration)
         self._check_lasts(duration)
         return self
-
-    lasting = OldName("for_duration")
 
 
 def _checked_seed(seed: Any) -> int | np.random.SeedSequence:

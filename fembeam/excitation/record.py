@@ -28,7 +28,7 @@ from fembeam.excitation.samples import (
     padded,
     read_rows,
 )
-from fembeam.support import OldName, number
+from fembeam.support import number
 
 Quantity = Literal["displacement", "acceleration", "force"]
 Interpolation = Literal["spectral", "linear"]
@@ -274,8 +274,6 @@ class Record:
                 f"shorten the run, bring a longer record, or give padding (s of zeros behind it)"
             )
         return self
-
-    lasting = OldName("for_duration")
 
     @cached_property
     def doubt(self) -> str:

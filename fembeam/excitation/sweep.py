@@ -17,7 +17,7 @@ from numpy.polynomial import Polynomial
 from numpy.typing import ArrayLike, NDArray
 
 from fembeam.excitation.line_spectrum import HERMITE_CONSTANT, checked_order
-from fembeam.support import OldName, number
+from fembeam.support import number
 
 MOST_NODES = 20_000_000
 Vector = NDArray[np.float64]
@@ -118,8 +118,6 @@ class SineSweep:
                              "s; shorten the run, or sweep longer")  # fmt: skip
         return self
 
-    lasting = OldName("for_duration")
-
     def nodes(self, duration: float, rtol: float) -> tuple[float, Vector]:
         """Rows [s, s', s''] so dense that quintic Hermite interpolation errs by at most rtol of the largest value."""
         return self.derivative(0).nodes(duration, rtol)
@@ -153,8 +151,6 @@ class SweepDerivative:
         """Return the signal itself; an error for a run longer than the sweep."""
         self.sweep.for_duration(duration)
         return self
-
-    lasting = OldName("for_duration")
 
     def nodes(self, duration: float, rtol: float) -> tuple[float, Vector]:
         """Rows [s, s', s''] for quintic Hermite interpolation: |error| <= h⁶/46080 max|s⁽⁶⁾| <= rtol max|s|."""

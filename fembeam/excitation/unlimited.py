@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Self
 
-from fembeam.support import OldName
-
 
 class Unlimited:
     """A signal defined for all times."""
@@ -13,5 +11,3 @@ class Unlimited:
     def for_duration(self, duration: float) -> Self:
         """The signal itself, which serves a run of any length."""
         return self
-
-    lasting = OldName("for_duration")

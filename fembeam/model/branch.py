@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -17,7 +15,7 @@ import solvers
 from fembeam.model.equations import load_period
 from fembeam.model.orbit import Orbit, checked_period, orbit
 from fembeam.scene import changes_structure, path_of, replaced, value_of
-from fembeam.support import Part, Printed, counting, note, require, written_whole
+from fembeam.support import Part, Printed, counting, note, require, write_rows, written_whole
 from solvers.branches import restarted
 from solvers.problem import counted, dataframe
 
@@ -154,12 +152,7 @@ class Branch(Printed):
 
     def to_csv(self, path: str | Path) -> None:
         """Write the table; the file is written whole or not at all."""
-        rows, text = self.table(), io.StringIO()
-        writer = csv.DictWriter(text, fieldnames=list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
-        with written_whole(Path(path)) as file:
-            file.write(text.getvalue().encode())
+        write_rows(Path(path), self.table())
 
     def __repr__(self) -> str:
         known = self.parameter
@@ -187,7 +180,7 @@ class Branch(Printed):
         record = {
             **{"name": self.family.name, "period": self.family.period, "scene": repr(self.family.model.scene)},
             **{"modes": list(self.family.model.modes), "span": self.found.walks[0].span},
-            **{"step": self.found.walks[0].largest, "status": [s.name for s in self.found.status], "arms": walks},
+            **{"step": self.found.walks[0].largest, "status": [s.name for s in self.found.status], "walks": walks},
         }
         with written_whole(Path(path)) as file:
             np.savez_compressed(file, branch=np.array(json.dumps(record)))
@@ -225,4 +218,4 @@ def resumed(model: Model, path: str | Path) -> Branch:
     require(same, f"{path} belongs to another scene or other modes", record["modes"], "Model.resume",
             f"use the model of {record['scene']}")  # fmt: skip
     family = Family(model, record["name"], record["period"])
-    return Branch(family, restarted(family, tuple(record["span"]), record["arms"], record["status"], record["step"]))
+    return Branch(family, restarted(family, tuple(record["span"]), record["walks"], record["status"], record["step"]))

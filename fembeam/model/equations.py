@@ -21,7 +21,7 @@ from fembeam.model import initial_states
 from fembeam.model.shapes import Shapes, Vector
 from fembeam.scene import contact_rows, loads, signals_of, static_rows, tangent, weight
 from fembeam.scene.contact_rows import ContactRow
-from fembeam.support import OldName, require
+from fembeam.support import require
 
 if TYPE_CHECKING:
     from fembeam.response import SectionForces
@@ -169,8 +169,6 @@ class ModalEquations:
         slopes = np.array([tangent(one.law, -one.gap) for _, one in always]).reshape(-1, 2)
         W = np.array([w for w, _ in always]).reshape(-1, len(self.omega))
         return (W.T * slopes[:, 0]) @ W, (W.T * slopes[:, 1]) @ W
-
-    touches = OldName("contact_rows")
 
     def rest(self) -> Vector:
         """The start [q, q_dot] (2n,) of everything undeflected and at rest but the impactors, at their velocity."""

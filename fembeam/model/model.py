@@ -21,7 +21,7 @@ from fembeam.model import initial_states
 from fembeam.model.equations import ModalEquations
 from fembeam.model.shapes import Shapes, Vector
 from fembeam.scene import for_duration, with_signals, with_value
-from fembeam.support import OldName, Part, Printed, bar, note, require, require_no_text, require_positive
+from fembeam.support import Part, Printed, bar, note, require, require_no_text, require_positive
 from solvers.problem import counted
 
 if TYPE_CHECKING:
@@ -64,7 +64,6 @@ class Model(Printed, ModalEquations):
     counts: tuple[tuple[int, int], ...]
     others: tuple[Shapes, ...] = ()
     reduction_options: dict[str, Any] = field(default_factory=dict)
-    way = OldName("reduction_options")
 
     def __repr__(self) -> str:
         size = f"{counted(len(self.omega), 'coordinate')}, {self.omega.min():.6g} to {self.omega.max():.6g} rad/s"
@@ -151,8 +150,6 @@ class Model(Printed, ModalEquations):
         """The same model with every signal valid for a run of ``duration`` s; noise without a period gets one."""
         scene = with_signals(self.scene, lambda signal: for_duration(signal, duration))
         return self if scene is self.scene else self.under(scene)
-
-    lasting = OldName("for_duration")
 
     def simulate(
         self,

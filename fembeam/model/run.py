@@ -16,7 +16,7 @@ import solvers
 from fembeam.model.histories import Histories
 from fembeam.model.shapes import Shapes
 from fembeam.scene import ON, Source
-from fembeam.support import OldName, Part, Printed
+from fembeam.support import Part, Printed
 from solvers.problem import Losses, counted
 
 if TYPE_CHECKING:
@@ -37,8 +37,7 @@ class Run(Histories, Printed):
     contacts : log of contacts: stop, t_in, t_out, speed_in, speed_out, peak_indentation, peak_force, impulse,
         energy_loss, entry_rate_clipped (arrays).
     energy : energy balance at t: input, damping, contact, stored, residual in J; made by ``ledger`` when first read.
-    end : (2n + l,) [q, q̇] at the time reached and what laws have latched: a start from which another run goes on; None
-        for a run read from a file that does not tell.
+    end : (2n + l,) [q, q̇] at the time reached and what laws have latched: a start from which another run goes on.
     status : how it ended, a sentence.
     cost : steps, rejections, law_calls, events, seconds.
     """
@@ -55,6 +54,8 @@ class Run(Histories, Printed):
     directions: Vector  # (m, n): δ = -directions·q - gap
     impactor_masses: Vector  # (i,) of the impactors, whose coordinates √m x are the last ones
     scene: str
+    borders: Callable[[], Any] = field(repr=False)  # what `transitions` are made by
+    lost: Callable[[], Losses] = field(repr=False)  # and `losses`
     model: Model | None = None
     stored_forces: Vector | None = None  # (m, k) of a run read from a file
     stored_means: Vector | None = None  # (m, k) likewise, over each sample
@@ -62,15 +63,11 @@ class Run(Histories, Printed):
     others: tuple[Shapes, ...] = ()  # of the further beams
     source: Source | None = None  # of a run made from a scene file
     versions: dict[str, str] = field(default_factory=dict)  # that made a run read from a file
-    borders: Callable[[], Any] | None = field(default=None, repr=False)  # what `transitions` are made by
-    lost: Callable[[], Losses] | None = field(default=None, repr=False)  # and `losses`
     began: tuple[Vector, ...] = ()  # what the laws had latched at the start, a row per contact, where it was given
     end: Vector | None = None  # (2n + l,) [q, q̇] and what the laws have latched, at the time reached
     on: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 3), dtype=int))  # (m, 3): body, of ON, number
     kinds: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 2), dtype=bool))  # of rotation, always acting
     sampled: bool = True  # else t, q, q_dot are the final state alone, and no history
-
-    strikers = OldName("impactor_masses")
 
     def __repr__(self) -> str:
         reached = f"to t = {self.t[-1]:g} s" if len(self.t) else "without samples"
@@ -95,16 +92,12 @@ class Run(Histories, Printed):
 
     @cached_property
     def transitions(self) -> Any:
-        """Borders that laws with memory passed, see `solvers.problem.Transitions`; ValueError for old files."""
-        if self.borders is None:
-            raise ValueError("this run's file is of an earlier version, without transitions; simulate again")
+        """Borders that laws with memory passed, see `solvers.problem.Transitions`."""
         return self.borders()
 
     @cached_property
     def losses(self) -> Losses:
-        """Energy that each stop and element dissipated, see `solvers.problem.Losses`; ValueError for old files."""
-        if self.lost is None:
-            raise ValueError("this run's file is of an earlier version, without losses; simulate again")
+        """Energy that each stop and element dissipated, see `solvers.problem.Losses`."""
         return self.lost()
 
     @property
@@ -127,10 +120,11 @@ class Run(Histories, Printed):
             status += f" (t = {solution.t[-1]:g} s)" if len(solution.t) else " (before the first sample)"
         return cls(
             *(solution.t, solution.q, solution.q_dot, solution.contacts, solution.ledger, status, solution.cost),
-            *(model.shapes, stops, model.directions, masses, repr(model.scene), model),
+            *(model.shapes, stops, model.directions, masses, repr(model.scene)),
+            *(solution.borders, solution.lost, model),
             others=model.others,
-            **{name: getattr(solution, name) for name in ("borders", "lost", "end")},
             began=began,
+            end=solution.end,
             on=np.array([(one.body, ON.index(one.on[0]), one.on[1]) for one in rows], dtype=int).reshape(-1, 3),
             kinds=np.array([(one.rotation, one.always) for one in rows], dtype=bool).reshape(-1, 2),
             sampled=sampled,
@@ -219,7 +213,7 @@ class Run(Histories, Printed):
         ``mean``: over each sample (halfway to its neighbours) instead of at it, so that contacts shorter than a sample
         are seen: the trapezoidal rule over the samples gives impulses as exactly as the run has them, those of the log
         to the last sample and, from sample to sample, of what always acts. Between two samples the law is evaluated on
-        a cubic to divide the impulse at their middle. ValueError for a run without samples, or an earlier version's.
+        a cubic to divide the impulse at their middle. ValueError for a run without samples.
         """
         if mean:
             from fembeam.response import mean_force

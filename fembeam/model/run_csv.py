@@ -162,7 +162,7 @@ def parts(run: Run) -> list[Part]:
 
 def _elements(run: Run) -> list[Part]:
     """Work on every element, what it took for good, and the path of its sliders."""
-    acting = np.flatnonzero(run.kinds[:, 1]).tolist() if run.lost is not None else []
+    acting = np.flatnonzero(run.kinds[:, 1]).tolist()
     rows = [(run.name(i), *(float(x[i]) for x in (run.losses.work, run.losses.loss, run.losses.slip))) for i in acting]
     length = unit_of("indentation", run.kinds[acting, 0])
     return [(("", "work / J", "loss / J", f"slip / {length}"), rows)] if rows else []

@@ -20,13 +20,7 @@ from fembeam.scene import Source
 from fembeam.support import versions, written_whole
 from solvers.problem import Losses, Transitions, optional
 
-OLD_NAMES = {  # in files of earlier versions
-    "contact_floored": "contact_entry_rate_clipped",
-    "strikers": "impactor_masses",
-    "striker_places": "impactor_places",
-}
-
-FORMAT = 2
+FORMAT = 3
 HDF5 = (".h5", ".hdf5")
 SIGNATURE, ZIPPED = b"\x89HDF\r\n\x1a\n", b"PK"  # of HDF5 and npz
 UNITS = {
@@ -77,9 +71,10 @@ def _contents(run: Run) -> tuple[str, dict[str, Any]]:
     if run.source is not None:
         about["scene_file"] = {"name": run.source.path.name, "text": run.source.text,
                                "overrides": run.source.overrides, "files": list(run.source.files)}  # fmt: skip
-    carried = run.source.files.values() if run.source else ()
+    carried, lost = run.source.files.values() if run.source else (), run.losses
     arrays = {
-        **{"t": run.t, "q": run.q, "q_dot": run.q_dot, "force": run._forces},
+        **{"t": run.t, "q": run.q, "q_dot": run.q_dot, "force": run._forces, "mean_force": _means(run)},
+        **{"losses": np.stack((lost.work, lost.stored, lost.slip), axis=1), "work": lost.history, "end": run.end},
         **{"stops": run.stops, "on": run.on, "kinds": run.kinds},
         **{"directions": run.directions, "impactor_masses": run.impactor_masses},
         **{"nodes": run.shapes.nodes, "shapes": run.shapes.values},
@@ -89,19 +84,9 @@ def _contents(run: Run) -> tuple[str, dict[str, Any]]:
         **{f"energy_{f.name}": getattr(run.energy, f.name) for f in fields(run.energy)},
         **{f"file_{i}": np.frombuffer(content, dtype=np.uint8) for i, content in enumerate(carried)},
     }
-    if run.model is not None or run.stored is not None:  # else from a file of an earlier version
-        about["readout"], read = packed(run.readout)
-        arrays |= read
-    if run.model is not None or run.stored_means is not None:
-        arrays["mean_force"] = _means(run)
-    if run.borders is not None:
-        about["events"], arrays["transitions"] = _packed(run.transitions)
-    if run.lost is not None:
-        lost = run.losses
-        arrays["losses"], arrays["work"] = np.stack((lost.work, lost.stored, lost.slip), axis=1), lost.history
-    if run.end is not None:
-        arrays["end"] = run.end
-    return json.dumps(about, default=float), arrays
+    about["readout"], read = packed(run.readout)
+    about["events"], arrays["transitions"] = _packed(run.transitions)
+    return json.dumps(about, default=float), arrays | read
 
 
 def _means(run: Run) -> Any:
@@ -124,6 +109,10 @@ def _unpacked(events: list[str], table: Any) -> list[Any]:
     """The columns of the log of that table."""
     contact, t, border, event, *others = table.T.copy()
     return [contact.astype(int), t, border.astype(int), np.array(events, dtype=object)[event.astype(int)], *others]
+
+
+class _OtherFormatError(ValueError):
+    """A run saved by another version."""
 
 
 def load(path: str | os.PathLike[str]) -> Run:
@@ -149,9 +138,9 @@ def load(path: str | os.PathLike[str]) -> Run:
         arrays = _read(Path(path))
         about = json.loads(str(arrays.pop("about")))
         if about["format"] != FORMAT:
-            raise ValueError(f"it has format {about['format']}, this version reads {FORMAT}")
-        return _of_arrays(about, {OLD_NAMES.get(name, name): array for name, array in arrays.items()}, Path(path))
-    except (FileNotFoundError, ImportError):
+            raise _OtherFormatError(f"{path} has format {about['format']}, this version reads {FORMAT}; simulate again")
+        return _of_arrays(about, arrays, Path(path))
+    except (FileNotFoundError, ImportError, _OtherFormatError):
         raise
     except Exception as error:
         raise ValueError(f"{path} is not a saved run, or is damaged: {error}") from error
@@ -172,8 +161,6 @@ def _read(path: Path) -> dict[str, Any]:
 
 def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run:
     """A run from the contents of its file."""
-    arrays.setdefault("on", np.zeros((len(arrays["stops"]), 3), dtype=int))  # of earlier versions
-    arrays.setdefault("kinds", np.zeros((len(arrays["stops"]), 2), dtype=bool))
     saved_arrays.check({name: array for name, array in arrays.items() if not name.startswith("file_")})
     source = None
     if given := about.get("scene_file"):
@@ -182,13 +169,7 @@ def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run
         source = Source(path.with_name(name), given["text"], tuple(given["overrides"]), files, of_run=True)
     bodies = sum(name.split("_")[0] == "nodes" for name in arrays)
     shapes = [Shapes(arrays[f"nodes{i}"], arrays[f"shapes{i}"]) for i in ("", *(f"_{j}" for j in range(1, bodies)))]
-    nodes = [one.nodes for one in shapes]
-    transitions = losses = None
-    if "losses" in arrays:
-        work, stored, slip = arrays["losses"].T
-        losses = partial(Losses, work, stored, slip, arrays["work"])
-    if "transitions" in arrays:
-        transitions = partial(Transitions, *_unpacked(about["events"], arrays["transitions"]))
+    work, stored, slip = arrays["losses"].T
     return Run(
         *(arrays["t"], arrays["q"], arrays["q_dot"]),
         contacts=solvers.ContactLog(*(arrays[f"contact_{f.name}"] for f in fields(solvers.ContactLog))),
@@ -201,14 +182,14 @@ def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run
         impactor_masses=arrays["impactor_masses"],
         scene=about["scene"],
         stored_forces=arrays["force"],
-        stored_means=arrays.get("mean_force"),
-        borders=transitions,
-        lost=losses,
-        end=arrays.get("end"),
-        stored=unpacked(about["readout"], arrays, nodes) if "readout" in about else None,
+        stored_means=arrays["mean_force"],
+        borders=partial(Transitions, *_unpacked(about["events"], arrays["transitions"])),
+        lost=partial(Losses, work, stored, slip, arrays["work"]),
+        end=arrays["end"],
+        stored=unpacked(about["readout"], arrays, [one.nodes for one in shapes]),
         others=tuple(shapes[1:]),
         source=source,
-        versions=about.get("versions", {}),
+        versions=about["versions"],
         on=arrays["on"],
         kinds=arrays["kinds"].astype(bool),
         sampled=bool(about.get("sampled", True)),  # earlier versions do not tell

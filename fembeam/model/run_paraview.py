@@ -40,7 +40,7 @@ def to_xdmf(run: Run, path: str | os.PathLike[str], stride: int = 1, hdf5: bool 
 
     Raises
     ------
-    ValueError : the run was read from a file of an earlier version, stride below 1, a path without folder.
+    ValueError : stride below 1, a path without folder.
     ImportError : HDF5 without h5py.
     """
     from meshio.xdmf import TimeSeriesWriter

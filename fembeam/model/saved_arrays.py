@@ -3,8 +3,7 @@
 k samples, n coordinates, m contacts, b nodes of a beam, c entries of the log:
 t (k,), q, q_dot (k, n), force (m, k), stops (m, 3), kinds (m, 2), on (m, 3), directions (m, n), impactor_masses (i,),
 nodes (b,), shapes (2b, n), contact_* (c,), energy_* (k,) but energy_initial; what `fembeam.response.readout` reads a
-run with; not of earlier versions mean_force (m, k), zeta (n,), transitions (r, 9), losses (m, 3), work (k, m) and
-end (2n + l,).
+run with; mean_force (m, k), transitions (r, 9), losses (m, 3), work (k, m) and end (2n + l,).
 """
 
 from __future__ import annotations
@@ -41,9 +40,8 @@ def check(arrays: Mapping[str, Any]) -> None:
     most = [beams, len(ON), max(beams, len(arrays["impactor_masses"]))]
     whole = arrays["on"].dtype.kind in "iu" and np.all((arrays["on"] >= 0) & (arrays["on"] < most))
     _need(whole, f"on must hold whole numbers from 0, below {most}")
-    if "transitions" in arrays:
-        contact, m = arrays["transitions"][:, 0], len(arrays["stops"])
-        _need(np.all((contact >= 0) & (contact < m)), f"transitions must name contacts, 0 to {m - 1}")
+    contact, m = arrays["transitions"][:, 0], len(arrays["stops"])
+    _need(np.all((contact >= 0) & (contact < m)), f"transitions must name contacts, 0 to {m - 1}")
     _check_log(arrays)
 
 
@@ -51,11 +49,9 @@ def expected(arrays: Mapping[str, Any]) -> dict[str, Shape]:
     """{name: shape} that follow from q, stops, the nodes and the entries of the log."""
     (k, n), m, entries = arrays["q"].shape, len(arrays["stops"]), arrays["contact_stop"].size
     shapes: dict[str, Shape] = {"t": (k,), "q_dot": (k, n), "force": (m, k), "stops": (m, 3), "directions": (m, n)}
-    shapes |= {"kinds": (m, 2), "on": (m, 3)}
-    later: dict[str, Shape] = {"mean_force": (m, k), "losses": (m, 3), "work": (k, m)}
-    later["transitions"] = len(arrays.get("transitions", ())), TRANSITION_COLUMNS
-    later["end"] = (max(2 * n, len(arrays.get("end", ()))),)
-    shapes |= {name: shape for name, shape in later.items() if name in arrays}
+    shapes |= {"kinds": (m, 2), "on": (m, 3), "mean_force": (m, k), "losses": (m, 3), "work": (k, m)}
+    shapes["transitions"] = len(arrays["transitions"]), TRANSITION_COLUMNS
+    shapes["end"] = (max(2 * n, arrays["end"].size),)
     shapes["impactor_masses"] = (min(arrays["impactor_masses"].size, n),)
     shapes |= {name: (entries,) for name in arrays if name.startswith("contact_")}
     shapes |= {name: () if name == "energy_initial" else (k,) for name in arrays if name.startswith("energy_")}
@@ -63,7 +59,7 @@ def expected(arrays: Mapping[str, Any]) -> dict[str, Shape]:
         if name.split("_")[0] == "nodes":
             b = arrays[name].size
             shapes |= {name: (b,), name.replace("nodes", "shapes"): (2 * b, n)}
-    return shapes | (expected_readout(arrays) if "reactions" in arrays else {})
+    return shapes | expected_readout(arrays)
 
 
 def _check_log(arrays: Mapping[str, Any]) -> None:

@@ -12,9 +12,9 @@ from fembeam.plot.basins import basins
 from fembeam.plot.contact_histograms import contacts
 from fembeam.plot.laws import hysteresis, identification, loops, restitutions
 from fembeam.plot.linear import floor_spectrum, frequency_response, response_spectrum
-from fembeam.plot.methods import failures, speed_accuracy, stability_map
+from fembeam.plot.methods import speed_accuracy, stability_map
 from fembeam.plot.mode_count import mode_count, smallest_model
-from fembeam.plot.orbits import branch, orbit, peak
+from fembeam.plot.orbits import bifurcation, branch, orbit, peak
 from fembeam.plot.random import random_densities, random_spectra
 from fembeam.plot.response import densities, mode_shapes, time_history
 from fembeam.plot.run_signals import batches, natural, responses, sampling_of, stationary
@@ -25,10 +25,10 @@ __all__ = [
     "animate",
     "basins",
     "batches",
+    "bifurcation",
     "branch",
     "contacts",
     "densities",
-    "failures",
     "floor_spectrum",
     "frame",
     "frequency_response",

@@ -53,8 +53,7 @@ def animate(
 
     Raises
     ------
-    ValueError : another suffix, no ffmpeg, fewer than 2 samples in the window, a run read from a file of an
-        earlier version, which does not hold heights and supports.
+    ValueError : another suffix, no ffmpeg, fewer than 2 samples in the window.
     """
     from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
 

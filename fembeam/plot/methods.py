@@ -1,4 +1,4 @@
-"""Charts of methods: speed against accuracy, where they are stable, and how they fail."""
+"""Charts of methods: speed against accuracy, where they are stable."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fembeam.plot.style import BLUE, RED, styled
+from fembeam.plot.style import styled
 from fembeam.support import require
 
 if TYPE_CHECKING:
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from fembeam.study import Failure, Point, SpeedAccuracy, StabilityMap
+    from fembeam.study import Point, SpeedAccuracy, StabilityMap
 
 MARKERS = "osD^v<>PX*hpd8H1234"
 _SMALLEST = 1e-16
@@ -114,7 +114,7 @@ def stability_map(*maps: StabilityMap, axes: Axes | Sequence[Axes] | None = None
     require(bool(maps), "nothing to draw", maps, "plot.stability_map", "give one map or more of fb.study.stability_map")
     colours = dict(zip(maps[0].VERDICTS, ("#8fd0b5", "#f6d58a", "#b7c9e8", "#eba07a"), strict=True))
     columns = min(len(maps), 2)
-    figure, drawn = _gallery(len(maps), columns, (4.6 * columns + 0.2, 3.0, 0.7), axes)
+    figure, drawn = _panels(len(maps), columns, axes)
     for ax, found in zip(drawn, maps, strict=True):
         places = np.arange(len(found.rows) + 1) - 0.5
         ax.pcolormesh(_edges(found.steps), places, found.verdict, cmap=ListedColormap(list(colours.values())),
@@ -136,16 +136,14 @@ def stability_map(*maps: StabilityMap, axes: Axes | Sequence[Axes] | None = None
     return figure
 
 
-def _gallery(
-    count: int, columns: int, size: tuple[float, float, float], axes: Axes | Sequence[Axes] | None
-) -> tuple[Figure, list[Axes]]:
-    """That many panels in columns, the rest of the last row empty; size: width, height of a row, height to spare."""
+def _panels(count: int, columns: int, axes: Axes | Sequence[Axes] | None) -> tuple[Figure, list[Axes]]:
+    """That many panels in columns, the rest of the last row empty."""
     from fembeam.plot.figure import sheet
 
     if axes is not None:
         return sheet(count, 1, (0.0, 0.0), axes)
     rows = -(-count // columns)
-    figure, made = sheet(rows, columns, (size[0], size[1] * rows + size[2]), squeeze=False)
+    figure, made = sheet(rows, columns, (4.6 * columns + 0.2, 3.0 * rows + 0.7), squeeze=False)
     for unused in made[count:]:
         unused.set_axis_off()
     return figure, made[:count]
@@ -157,35 +155,3 @@ def _edges(steps: np.ndarray) -> np.ndarray:
         return np.array([steps[0] / 1.5, steps[0] * 1.5])
     middle = np.sqrt(steps[1:] * steps[:-1])
     return np.concatenate(([steps[0] ** 2 / middle[0]], middle, [steps[-1] ** 2 / middle[-1]]))
-
-
-@styled
-def failures(cases: Sequence[Failure], axes: Axes | Sequence[Axes] | None = None) -> Figure:
-    """A gallery: each case with what the naive method gives (red) and what this library gives or says (blue).
-
-    Parameters
-    ----------
-    cases : to show. axes : to draw into, one per case; None makes a figure.
-
-    Examples
-    --------
-    >>> from fembeam.study.failure_gallery import jumped_contact
-    >>> failures([jumped_contact()]).axes[0].get_ylabel()
-    'displacement / mm'
-    """
-    require(bool(cases), "nothing to draw", cases, "plot.failures", "give fb.study.gallery()")
-    figure, drawn = _gallery(len(cases), 2, (9.6, 2.75, 0.0), axes)
-    for ax, case in zip(drawn, cases, strict=True):
-        few = len(case.naive[0]) < 40
-        ax.plot(*case.ours, color=BLUE, lw=1.3)
-        ax.plot(*case.naive, color=RED, lw=0.9, marker="o" if few else "", ms=3)
-        if case.scale != "linear":
-            ax.set_yscale("log")
-        if case.scale == "loglog":
-            ax.set_xscale("log")
-        ax.set(xlabel=case.x_label, ylabel=case.y_label)
-        ax.set_title(case.title, fontweight="bold", pad=29)
-        for height, colour, words in zip((25, 14), (RED, BLUE), case.said, strict=True):
-            ax.annotate(words, (0.0, 1.0), (0, height), "axes fraction", "offset points", color=colour, fontsize=7.5,
-                        va="top")  # fmt: skip
-    return figure

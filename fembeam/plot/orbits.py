@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from fembeam.model import Branch, Orbit
+    from fembeam.study import Bifurcation
 
 MARKS = {"fold": ("o", GREY), "flip": ("s", RED), "neimark-sacker": ("D", GREEN), "branch point": ("P", "black"),
          "grazing": ("x", "black"), "stick": ("d", GREEN), "floor": ("+", "black"),
@@ -62,7 +63,7 @@ def branch(
     place = observed(model) if z is None else z
     figure, (axis,) = sheet(1, 1, (8.4, 3.8), axes)
     if cloud is not None:
-        axis.plot(cloud[0], 1e3 * cloud[1], ".", color=GREY, markersize=2.0, label="simulated", rasterized=True)
+        _draw_cloud(axis, cloud)
     periods = [one.family.period for one in several]
     same = labels is None and len(set(periods)) == len(periods)  # colours: a period has the same on every figure
     colours = [f"C{periods[i] - 1 if same else i}" for i in range(len(several))]
@@ -82,10 +83,26 @@ def branch(
     return figure
 
 
+@styled
+def bifurcation(found: Bifurcation, axes: Axes | None = None) -> Figure:
+    """Largest |u| of every settled period against the parameter; `axes` to draw into, None makes a figure."""
+    from fembeam.plot.figure import sheet
+
+    figure, (axis,) = sheet(1, 1, (8.4, 3.8), axes)
+    _draw_cloud(axis, found.cloud())
+    axis.set(xlabel=found.name, ylabel=f"max |u({found.z:.4g} m)| / mm")
+    return figure
+
+
 def peak(orbit: Orbit, z: float) -> float:
     """Largest |u| at z over a period, m."""
     lowest, highest = orbit.extremes(z)
     return max(-lowest, highest)
+
+
+def _draw_cloud(axis: Axes, cloud: tuple[Vector, Vector]) -> None:
+    """(parameter, |u|) of runs."""
+    axis.plot(cloud[0], 1e3 * cloud[1], ".", color=GREY, markersize=2.0, label="simulated", rasterized=True)
 
 
 def _draw_branch(axis: Axes, one: Branch, z: float, color: str, label: str) -> None:

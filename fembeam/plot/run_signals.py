@@ -43,8 +43,8 @@ def watched(run: Run) -> float:
 
 
 def natural(run: Run) -> Vector:
-    """Natural frequencies, rad/s; none of a run read from a file of an earlier version, which does not hold them."""
-    return run.readout.omega if run.model is not None or run.stored is not None else np.zeros(0)
+    """Natural frequencies, rad/s."""
+    return run.readout.omega
 
 
 def sampling_of(run: Run) -> float:
@@ -71,8 +71,8 @@ def stationary(run: Run, discard: float = 0.0) -> bool:
 
 
 def batches(run: Run, discard: float) -> int:
-    """How many nearly independent parts the samples make, at most `MOST_BATCHES`; 0 when too few or not known."""
-    if not len(natural(run)) or len(run.t) < 2:
+    """How many nearly independent parts the samples make, at most `MOST_BATCHES`; 0 when too few."""
+    if len(run.t) < 2:
         return 0
     decay = np.diag(run.readout.damping).min() / 2  # ζω
     count = min(MOST_BATCHES, int(max(float(run.t[-1]) - discard, 0.0) * decay / MEMORIES))

@@ -88,7 +88,6 @@ def _about(run: Run, discard: float, line: Spectrum) -> str:
 def spectra_of(run: Run, discard: float = 0.0) -> Mapping[str, Spectrum]:
     """Spectra of the base motion (where the run knows it) and of `responses`, these with their confidence."""
     base = None if run.model is None else run.model.scene.base
-    shaken = run.model is None and len(natural(run)) > 0 and run.readout.base is not None
     samples, dt = int(np.count_nonzero(run.t >= discard)), sampling_of(run)
     found = {name: signal.psd for name, signal in estimated(run, discard, segment_for(samples, dt)).items()}
     if base is not None and hasattr(base, "nodes"):  # a sum of many lines: by FFT on its own grid
@@ -96,7 +95,7 @@ def spectra_of(run: Run, discard: float = 0.0) -> Mapping[str, Spectrum]:
         found["base y"] = psd(values[:, 0], dt, segment_for(len(values), dt))
     elif base is not None:
         found["base y"] = psd(np.asarray(base(run.t)), dt, segment_for(len(run.t), dt))
-    elif shaken:  # of a run read from a file: its samples
+    elif run.model is None and run.readout.base is not None:  # of a run read from a file: its samples
         found["base y"] = psd(frame_motion(run), dt, segment_for(len(run.t), dt))
     return found
 

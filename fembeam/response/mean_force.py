@@ -52,7 +52,7 @@ def mean_force(run: Run, stop: int) -> Vector:
 
 def _missed(run: Run, stop: int, found: Vector) -> Vector:
     """What impulses found from sample to sample (k - 1,) lack of those of the run; 0 where it does not tell."""
-    kept = None if run.lost is None else run.losses.impulses
+    kept = run.losses.impulses
     return 0.0 * found if kept is None else np.diff(kept[:, stop]) - found
 
 
@@ -85,7 +85,7 @@ def _to_the_last_sample(run: Run, stop: int, motion: Vector) -> tuple[Vector, Ve
     mine, ended = log.stop == stop, log.t_out <= t[-1]
     lasts = mine & ~ended & (log.t_in < t[-1])
     whole = delta[0] <= 0.0 or np.any(mine & (log.t_in <= t[0]))  # else a part of a run: a contact began before it
-    kept = run.losses.impulses if whole and run.lost is not None and lasts.any() else None
+    kept = run.losses.impulses if whole and lasts.any() else None
     if kept is None:
         return np.where(np.isnan(log.t_out), t[-1], log.t_out), log.impulse
     return np.fmin(log.t_out, t[-1]), np.where(lasts, kept[-1, stop] - log.impulse[mine & ended].sum(), log.impulse)

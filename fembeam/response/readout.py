@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fembeam.scene import heights, loads
-from fembeam.support import OldName, require
+from fembeam.support import require
 
 if TYPE_CHECKING:
     from fembeam.model import Model
@@ -53,9 +53,9 @@ class Readout:
         return np.sqrt(np.diag(self.stiffness))
 
     @cached_property
-    def zeta(self) -> Vector | None:
-        """Damping ratios (n,) of the structure without dashpots; None where an earlier version's file lacks them."""
-        return None if self._model is None else self._model.zeta
+    def zeta(self) -> Vector:
+        """Damping ratios (n,) of the structure without dashpots."""
+        return self.model.zeta
 
     @cached_property
     def damping(self) -> Vector:
@@ -116,8 +116,6 @@ class Readout:
         """Place z and height of each impactor (i, 2), m."""
         along = [impactor.z for impactor in self.model.matrices.impactors]
         return np.array([along, heights(self.model.scene)[1]]).T.reshape(-1, 2)
-
-    striker_places = OldName("impactor_places")
 
 
 def _sampled(signal: Any, t: Vector) -> Vector:

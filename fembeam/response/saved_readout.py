@@ -13,8 +13,8 @@ from fembeam.response.readout import Readout, Vector
 from fembeam.response.section_forces import SectionForces
 from fembeam.scene import FEATURES
 
-PLAIN = ("stiffness", "damping", "load_vectors", "loads", "frame", "heights", "impactor_places")
-READOUT_FINITE = {*PLAIN, "zeta", "reactions", "moments", "shears"}
+PLAIN = ("stiffness", "damping", "zeta", "load_vectors", "loads", "frame", "heights", "impactor_places")
+READOUT_FINITE = {*PLAIN, "reactions", "moments", "shears"}
 READOUT_UNITS = {
     "stiffness": "1/s²",
     "damping": "1/s",
@@ -39,8 +39,6 @@ def packed(read: Readout) -> tuple[dict[str, Any], Arrays]:
         "parts": [{"kind": type(part).__name__, "body": body, **_numbers(part)} for part, body in parts],
     }
     arrays = {name: getattr(read, name) for name in PLAIN} | {"reactions": rows}
-    if read.zeta is not None:
-        arrays["zeta"] = read.zeta
     for i, one in enumerate(read.section_forces):
         arrays |= {f"moments_{i}": one.moments, f"shears_{i}": one.shears}
     return about, arrays
@@ -59,7 +57,7 @@ def unpacked(about: Mapping[str, Any], arrays: Mapping[str, Any], nodes: list[Ve
         for i, beam in enumerate(about["beams"])
     )
     parts: Any = [_part(dict(words)) for words in about["parts"]]
-    kept: dict[str, Any] = {name: arrays[name] for name in (*PLAIN, "zeta") if name in arrays}
+    kept: dict[str, Any] = {name: arrays[name] for name in PLAIN}
     held = [(part.z, body) for part, body in parts if type(part) in FEATURES["supports"]]
     kept["supports"] = np.array(held, dtype=float).reshape(-1, 2)
     kept |= {"base": about["base"], "section_forces": forces, "reactions": (parts, arrays["reactions"])}
@@ -73,8 +71,7 @@ def expected_readout(arrays: Mapping[str, Any]) -> dict[str, Shape]:
     shapes: dict[str, Shape] = {
         **{"stiffness": (n, n), "damping": (n, n), "load_vectors": (loads, n), "loads": (loads, k)},
         **{"frame": (2 if len(arrays["frame"]) else 0, k), "reactions": (r, 2, m + loads + 2 * n)},
-        **({"zeta": (n,)} if "zeta" in arrays else {}),
-        **{"heights": (bodies,), "impactor_places": (len(arrays["impactor_masses"]), 2)},
+        **{"zeta": (n,), "heights": (bodies,), "impactor_places": (len(arrays["impactor_masses"]), 2)},
     }
     for i in range(bodies):
         elements = arrays[f"nodes_{i}" if i else "nodes"].size - 1

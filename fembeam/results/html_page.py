@@ -146,12 +146,11 @@ def _text(content: str) -> Iterator[str]:
 def _simulation(found: dict[str, Any]) -> Iterator[str]:
     """Tables of [simulate], in the units of the figures."""
     rotations = found.get("rotations", [])
-    if found["omega"] and found["zeta"]:
-        rows = [
-            [i + 1, _rounded(w, 5), _rounded(w / 6.283185307179586, 5), f"{z:.4g}"]
-            for i, (w, z) in enumerate(zip(found["omega"], found["zeta"], strict=True))
-        ]
-        yield "<h2>Model</h2>" + html_table(["coordinate", "ω / rad s⁻¹", "Hz", "ζ"], rows)
+    rows: list[list[Any]] = [
+        [i, _rounded(w, 5), _rounded(w / math.tau, 5), f"{z:.4g}"]
+        for i, (w, z) in enumerate(zip(found["omega"], found["zeta"], strict=True), start=1)
+    ]
+    yield "<h2>Model</h2>" + html_table(["coordinate", "ω / rad s⁻¹", "Hz", "ζ"], rows)
     if found["moments"]:
         signals = found["moments"].values()
         length = " or ".join(f"m{unit}" for unit in unit_of("indentation", [False, *rotations]).split(" or "))

@@ -165,11 +165,6 @@ class Stop:
         acts_always = getattr(self.law, "memory", ()) and not getattr(self.law, "one_sided", False)
         require(not acts_always, "law must be one that opens", self.law, where, "make it an Element, which always acts")
 
-    def __repr__(self) -> str:
-        """As it was called; `of` only where it is not the usual one, as in saved branches of earlier versions."""
-        kind = "" if self.of == "displacement" else f", of={self.of!r}"
-        return f"Stop(z={self.z!r}, law={self.law!r}, gap={self.gap!r}, side={self.side!r}, on={self.on!r}{kind})"
-
     @property
     def push(self) -> float:
         """Direction in which the stop pushes the beam: +1 (up) from below, -1 from above."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -98,11 +98,6 @@ class Scene:
     bodies: Sequence[Scene] = ()
     gravity: float = 0.0
     elements: Sequence[Element] = ()
-
-    def __repr__(self) -> str:
-        """As it was called; `elements` only where there are any, as in saved branches of earlier versions."""
-        shown = [f.name for f in fields(self) if f.name != "elements" or self.elements]
-        return f"Scene({', '.join(f'{name}={getattr(self, name)!r}' for name in shown)})"
 
     def __post_init__(self) -> None:
         if not isinstance(self.beam, Beam):

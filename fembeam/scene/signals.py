@@ -75,13 +75,7 @@ def with_signals(scene: Scene, change: Callable[[Any], Any]) -> Scene:
 
 def for_duration(signal: Any, duration: float) -> Any:
     """The signal for a run of that length, s: what its own `for_duration` returns, itself if it has none."""
-    if hasattr(signal, "for_duration"):
-        return signal.for_duration(duration)
-    if not hasattr(signal, "lasting"):
-        return signal
-    advice = f"signals offer for_duration, not lasting: rename it in {type(signal).__name__}"
-    warnings.warn(advice, DeprecationWarning, stacklevel=2)
-    return signal.lasting(duration)
+    return signal.for_duration(duration) if hasattr(signal, "for_duration") else signal
 
 
 def is_of_signal(path: str) -> bool:

@@ -104,6 +104,12 @@ class Measured:
         """Over the independent values."""
         return np.asarray(self.values.mean(axis=0))
 
+    @property
+    def value(self) -> float:
+        """The mean as one number: of an array its norm over the root of its size."""
+        mean = self.mean
+        return float(np.linalg.norm(mean) / np.sqrt(mean.size)) if mean.size > 1 else float(mean)
+
 
 @dataclass(frozen=True)
 class Case:

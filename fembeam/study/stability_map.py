@@ -11,11 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import solvers
+from fembeam import plot
+from fembeam.study.result import Result
 from fembeam.study.speed_accuracy import method_name
-from fembeam.support import Part, Printed, require
-from solvers.problem import dataframe
+from fembeam.support import Part, require
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from fembeam.model import Model
     from fembeam.scene import Scene
 
@@ -38,7 +41,7 @@ class Verdict(IntEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class StabilityMap(Printed):
+class StabilityMap(Result):
     """A grid of verdicts.
 
     Attributes
@@ -71,12 +74,17 @@ class StabilityMap(Printed):
         ]
         return [(head, rows), ". accurate, w wrong, M missed contacts, U unstable"]
 
-    def to_dataframe(self) -> Any:
-        """A table of pandas, one run a row; ImportError without pandas."""
-        row, column = np.indices(self.verdict.shape).reshape(2, -1)
-        words = [Verdict(int(one)).words for one in self.verdict.ravel()]
-        return dataframe({self.axis: self.rows[row], "step": self.steps[column], "verdict": words,
-                          "error": self.error.ravel()})  # fmt: skip
+    def table(self) -> list[dict[str, Any]]:
+        """One run a row."""
+        return [
+            {self.axis: row, "step": step, "verdict": Verdict(int(self.verdict[i, j])).words, "error": self.error[i, j]}
+            for i, row in enumerate(self.rows)
+            for j, step in enumerate(self.steps)
+        ]
+
+    def figure(self) -> Figure:
+        """The map, with the predicted limits."""
+        return plot.stability_map(self)
 
 
 def stability_map(

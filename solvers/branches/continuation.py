@@ -10,7 +10,6 @@ corners and jumps.
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -49,12 +48,6 @@ class Branch:
 
     def __repr__(self) -> str:
         return f"<branch of {counted(len(self.orbits), 'orbit')}: {'; '.join(self.endings)}>"
-
-    @property
-    def arms(self) -> list[Walk]:
-        """Old name of `walks`."""
-        warnings.warn("Branch.arms is now Branch.walks", DeprecationWarning, stacklevel=2)
-        return self.walks
 
     @property
     def orbits(self) -> list[Orbit]:

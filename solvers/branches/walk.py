@@ -43,7 +43,6 @@ class BranchStatus(Enum):
     CLOSED = "closed: came back to its first orbit"
     RETURNED = "came back to an orbit it had passed: it turned round or went over to another branch"
     SUBHARMONIC_END = "reached its subharmonic end: a flip of the branch of half the period"
-    BORN = SUBHARMONIC_END  # its name in files of earlier versions
     JUMP = "ended where two contacts of a stop become one, or one two: no orbits were found that lead over the jump"
     LOST = "lost: no orbit was found however small the step; where multipliers are large, more shots may help"
     LIMIT = f"stopped after {MOST_ORBITS} orbits"

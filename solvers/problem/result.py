@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
 from enum import Enum
@@ -79,12 +78,6 @@ class ContactLog(Columns):
     impulse: Array
     energy_loss: Array
     entry_rate_clipped: Any
-
-    @property
-    def floored(self) -> Any:
-        """Old name of `entry_rate_clipped`."""
-        warnings.warn("ContactLog.floored is now entry_rate_clipped", DeprecationWarning, stacklevel=2)
-        return self.entry_rate_clipped
 
     def __len__(self) -> int:
         return len(self.stop)
