@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contacts.law import Law
-from contacts.numbers import LARGEST_IN_TABLE, LARGEST_PARAMETER, finite_row, read_columns
+from contacts.numbers import LARGEST_PARAMETER, finite_row, read_columns
 
 MOST_SHOWN = 8  # numbers of a kind in a repr
 ROUNDING = 1e-12  # of the largest force: below zero by as much is zero, where slopes soften to nothing
@@ -156,7 +156,7 @@ class Tabulated(Law):
 
     def __post_init__(self) -> None:
         points = tuple(
-            tuple(finite_row(values, f"{name} of Tabulated", LARGEST_IN_TABLE, 1.0 / LARGEST_IN_TABLE).tolist())
+            tuple(finite_row(values, f"{name} of Tabulated", LARGEST_PARAMETER, 1.0 / LARGEST_PARAMETER).tolist())
             for name, values in (("indentation", self.indentation), ("measured", self.measured))
         )
         if len(points[0]) != len(points[1]):

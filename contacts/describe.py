@@ -67,7 +67,10 @@ def _restitution(law: Law, entry_rate: float, mass: float) -> str:
     """Nominal and achieved."""
     how = "by integration" if law.exact_restitution(entry_rate, mass) is None else "exactly"
     achieved = f"a free mass of {mass:g} kg entering at {entry_rate:g} m/s achieves"
-    value = f"{restitution(law, entry_rate, mass):.6f} ({how})"
+    try:
+        value = f"{restitution(law, entry_rate, mass):.6f} ({how})"
+    except ValueError as error:
+        return f"{achieved} none: {error}"
     if law.nominal is None:
         return f"{achieved} {value}"
     return f"nominal {law.nominal[1]:g} by {law.nominal[0]}; {achieved} {value}"
@@ -75,7 +78,10 @@ def _restitution(law: Law, entry_rate: float, mass: float) -> str:
 
 def _observed(law: Law, entry_rate: float, mass: float) -> list[str]:
     """Where a law without `remarks` pulls and jumps, from samples of its force."""
-    deepest = bounce(law, entry_rate, mass).delta.max()
+    try:
+        deepest = bounce(law, entry_rate, mass).delta.max()
+    except ValueError:  # told as restitution
+        return []
     delta, delta_dot = np.meshgrid(deepest * np.linspace(0.02, 1.0, 50), entry_rate * np.linspace(-1.0, 1.0, 41))
     force = law.force(delta, delta_dot, entry_rate)
     worst = np.unravel_index(np.argmin(force), force.shape)

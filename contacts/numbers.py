@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 Vector = NDArray[np.float64]
-LARGEST_PARAMETER = 1e100
-"""Largest size of a law's parameter; those that must be positive are at least its inverse. Products stay floats."""
-LARGEST_IN_TABLE = 1e50
-"""Largest size of a number in a table of measured forces; those that are not 0 are at least its inverse."""
+LARGEST_PARAMETER = 1e50
+"""Largest size of a law's parameter; those that must be positive are at least its inverse: works stay floats."""
+LARGEST_OF_POWERS = 1e100
+"""The same of factors of powers of the indentation, N/m^p, and of a damping factor."""
 LARGEST_EXPONENT = 100.0
 """Of a power law: beyond it a stop is rigid, and powers of small indentations vanish."""
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contacts.law import Law
-from contacts.numbers import LARGEST_PARAMETER, finite_row
+from contacts.numbers import LARGEST_OF_POWERS, finite_row
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Polynomial(Law):
     one_sided: ClassVar[bool] = False  # type: ignore[misc]
 
     def __post_init__(self) -> None:
-        values = finite_row(self.coefficients, "coefficients of Polynomial", LARGEST_PARAMETER)
+        values = finite_row(self.coefficients, "coefficients of Polynomial", LARGEST_OF_POWERS, 1.0 / LARGEST_OF_POWERS)
         if not next(iter(values[values != 0.0]), 0.0) > 0.0:
             raise ValueError(
                 "coefficients of Polynomial must be finite, the first non-zero one positive, got "

@@ -29,7 +29,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contacts.law import ENTRY_RATE_FLOOR, Law
-from contacts.numbers import LARGEST_EXPONENT, LARGEST_PARAMETER, check_number, check_restitution, number, switch
+from contacts.numbers import (
+    LARGEST_EXPONENT,
+    LARGEST_OF_POWERS,
+    LARGEST_PARAMETER,
+    check_number,
+    check_restitution,
+    number,
+    switch,
+)
 from contacts.restitution import achieved_restitution, damping_factor_for
 
 PUBLISHED = (
@@ -89,8 +97,8 @@ class Hysteretic(Law):
     units: ClassVar[dict[str, str]] = {"stiffness": "N/m^p", "entry_rate_floor": "m/s"}
 
     def __post_init__(self) -> None:
-        number(self, "stiffness", strict=True)
-        number(self, "damping_factor")
+        number(self, "stiffness", strict=True, most=LARGEST_OF_POWERS)
+        number(self, "damping_factor", most=LARGEST_OF_POWERS)
         number(self, "exponent", 1.0, most=LARGEST_EXPONENT)
         number(self, "entry_rate_floor", strict=True)
         switch(self, "clamp")
@@ -249,7 +257,7 @@ class Hertz(Law):
     remarks: ClassVar[tuple[str, ...]] = ("never pulls; smooth",)  # type: ignore[misc]
 
     def __post_init__(self) -> None:
-        number(self, "stiffness", strict=True)
+        number(self, "stiffness", strict=True, most=LARGEST_OF_POWERS)
         number(self, "exponent", 1.0, most=LARGEST_EXPONENT)
 
     @classmethod

@@ -188,7 +188,8 @@ def bounce(law: Law, entry_rate: float = 1.0, mass: float = 1.0) -> Bounce:
             piece -= 1
     y[0, -1] = 0.0 if reached else y[0, -1]
     delta, rate = throw.depth * np.maximum(y[0], 0.0), throw.entry_rate * y[1]
-    return Bounce(throw.duration * t, throw.depth * y[0], rate, throw.force(delta, rate), bool(reached))
+    left = bool(reached and y[1, -1] < -STOPPED)
+    return Bounce(throw.duration * t, throw.depth * y[0], rate, throw.force(delta, rate), left)
 
 
 class _Throw:
@@ -204,7 +205,7 @@ class _Throw:
         self.depth = self._depth()
         self.duration = self.depth / entry_rate
         self.strength = mass * entry_rate / self.duration
-        if not sys.float_info.min <= self.strength < math.inf:
+        if not sys.float_info.min <= self.strength < math.inf or not sys.float_info.min <= self.duration < math.inf:
             raise ValueError(f"forces of {self}, about {self.strength:g} N, are beyond the floats; are these SI units?")
 
     def __str__(self) -> str:
@@ -212,7 +213,7 @@ class _Throw:
 
     def _depth(self) -> float:
         """Where force times indentation reaches twice the energy first, else where it is largest."""
-        delta = np.geomspace(1.0 / LARGEST_THROW, LARGEST_THROW, 1201)
+        delta = np.geomspace(1e-300, 1e300, 2401)
         with np.errstate(all="ignore"):
             force = np.fmax(*(self.force(delta, np.full(delta.size, rate)) for rate in (self.entry_rate, 0.0)))
             share = force / (self.mass * self.entry_rate) * (delta / self.entry_rate)
@@ -252,7 +253,8 @@ def _stretch(
         )
     if done.status == -1 or not np.all(np.isfinite(done.y)):
         force = throw.strength * -throw.motion(done.t[-1], done.y[:, -1])[1]
-        raise ValueError(f"{throw} cannot be followed beyond t = {done.t[-1] * throw.duration:g} s, F = {force:g} N")
+        until = f"t = {done.t[-1] * throw.duration:g} s, where F = {force:g} N"
+        raise ValueError(f"{throw} cannot be followed beyond {until}: steps fall below the rounding of t")
     if direction > 0 and done.status == 0:
         raise ValueError(f"{throw}: the law never stops the mass, at δ = {throw.depth * done.y[0, -1]:g} m it moves on")
     reached = not math.isinf(level) and len(done.t_events[0]) > 0

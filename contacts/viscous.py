@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contacts.law import Law
-from contacts.numbers import LARGEST_EXPONENT, check_number, check_restitution, number, switch
+from contacts.numbers import LARGEST_EXPONENT, LARGEST_OF_POWERS, check_number, check_restitution, number, switch
 from contacts.power_laws import power_parameters
 from contacts.restitution import LARGEST_THROW
 
@@ -28,7 +28,7 @@ CLAMPED = "clamp=True: the kink where the force is cut moves with the rate"
 
 def damping_ratio_for(restitution: float) -> float:
     """Damping ratio β of a linear oscillator that leaves after half a period at e = exp(-πβ/√(1-β²))."""
-    decay = -math.log(restitution)
+    decay = abs(math.log(restitution))
     return decay / math.hypot(math.pi, decay)
 
 
@@ -164,8 +164,8 @@ class Viscoelastic(Law):
     units: ClassVar[dict[str, str]] = {"stiffness": "N/m^p", "damping": "N s/m^((p+1)/2)"}
 
     def __post_init__(self) -> None:
-        number(self, "stiffness", strict=True)
-        number(self, "damping")
+        number(self, "stiffness", strict=True, most=LARGEST_OF_POWERS)
+        number(self, "damping", most=LARGEST_OF_POWERS)
         number(self, "exponent", 1.0, strict=True, most=LARGEST_EXPONENT)
         switch(self, "clamp")
         switch(self, "approach_only")

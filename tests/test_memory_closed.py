@@ -105,6 +105,19 @@ def test_dry_friction_decays_along_a_line_and_rests_for_ever():
     assert later.losses.slip[0] == 0.0
 
 
+@pytest.mark.parametrize(("ratio", "percent"), [(1.0, 13.5), (1.5, 7.6), (2.0, 4.8)])
+def test_the_force_of_stick_passes_the_load_by_what_the_damping_leaves(ratio, percent):
+    """c = 2β√k, β = 1, 3/2, 2: where a slip ends at the load -f, F passes it by η 2f; beyond f_s it slips once more."""
+    k, f, q = 1e6, 0.1, 0.0999
+    angle = math.acosh(ratio) / math.sqrt(ratio**2 - 1.0) if ratio > 1.0 else 1.0
+    passed = math.exp(-2.0 * ratio * angle)
+    assert abs(100.0 * passed - percent) < 0.1
+    for share, events in ((1.01, ["slip", "stick"]), (0.99, ["slip", "stick", "slip"])):
+        law = Coulomb(f, k, (1.0 + 2.0 * share * passed) * f, 2.0 * ratio * math.sqrt(k))
+        run = integrate(oscillator(law), [q], [math.sqrt(0.2**2 - (0.1 + q) ** 2)], 0.05, method=FINE)
+        assert run.transitions.event.tolist()[:3] == events
+
+
 @pytest.mark.parametrize(("spring", "stiffness", "limit"), [(1.0, 50.0, 0.05), (4.0, 4.0, 0.3), (1.0, 2000.0, 0.02)])
 def test_decay_of_a_slider_is_that_of_its_exact_pieces(spring, stiffness, limit):
     q, v, events = Slider(spring, stiffness, limit).run(0.0, 1.7, 10.0)

@@ -72,6 +72,25 @@ def test_against_scipy_on_a_grid_of_its_own(omega, zeta):
         assert most[0, 0] == pytest.approx(np.abs(values).max(), rel=3e-5)
 
 
+@pytest.mark.parametrize("zeta", [0.0, 0.05, 0.9])
+@pytest.mark.parametrize("turns", [7.5, 20.0, 100.0, 1000.0])
+def test_many_periods_between_two_samples(turns, zeta):
+    """At ω h = 20 the error was 4e-4, at 100 the velocity 33 % too low: periods between samples were not seen."""
+    t, a = record(samples=60)
+    omega, parts = turns / t[1], int(100 * turns)
+    decay = omega * complex(-zeta, np.sqrt(1 - zeta**2))
+    tau, z, largest = np.linspace(0.0, t[1], parts + 1), 0j, np.zeros(3)
+    free = np.exp(decay * tau)
+    for now, rate in zip(a, np.diff(a) / t[1], strict=False):
+        steady = (now + rate * tau) / decay + rate / decay**2
+        motion = steady + (z - steady[0]) * free
+        z = motion[-1]
+        largest = np.maximum(largest, [np.abs((decay**k * motion).imag).max() / decay.imag for k in range(3)])
+    found = fb.response_spectrum(t, a, omega, zeta)
+    values = (found.displacement[0, 0], found.velocity[0, 0], found.acceleration[0, 0])
+    np.testing.assert_allclose(values, largest, rtol=3e-5)
+
+
 def test_blocks_of_a_long_record_join():
     t = 1e-3 * np.arange(150_001)
     a = np.sin(3.0 * t) + np.sin(0.2 * t**1.2)

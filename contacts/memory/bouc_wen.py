@@ -32,9 +32,9 @@ class BoucWen(Law):
     -----
     R. Bouc, Proc. 4th Conf. Nonlinear Oscillations, Prague (1967) 315; Y.-K. Wen, J. Eng. Mech. Div. ASCE 102 (1976)
     249-263. With β + γ > 0 and β >= 0 |z| stays below (A/(β + γ))^(1/n). With β + γ < 0 it grows without bound, for
-    n = 2 to infinity at a finite δ, where the force is nan. Loops within a loop do not close, and drift (no
-    return-point memory): a property of the model, not of materials. At z = 0 the force has a weak kink where β ≠ 0;
-    steps end there.
+    n = 2 to infinity at a finite δ; beyond the largest float the force is nan. Loops within a loop do not close, and
+    drift (no return-point memory): a property of the model, not of materials. At z = 0 the force has a weak kink where
+    β ≠ 0; steps end there.
 
     Examples
     --------

@@ -127,8 +127,11 @@ class Coulomb(Sliders):
     -----
     With tangential stiffness as in J.H. Griffin, J. Eng. Power 102 (1980) 329-333. Rigid Coulomb friction, where stick
     has no motion at all, is approached like k^(-1/2) only, and the closer the shorter the steps. With f_s > f and c = 0
-    the mass rings on k after every stop and may slide for ever: choose c near 2 √(k m). With c > 0 slip begins while k
-    holds less than f, and ends with k holding f: a slip shorter than (f² - (f_s - c |δ̇|)²)/(2 k f) may give energy.
+    the mass m rings on k after every stop and may slide for ever. Where a slip ends and a load p is to be held, F goes
+    from f to p and passes it by η (f - p), η = exp(-2β acosh β/√(β² - 1)), β = c/(2 √(k m)): by 13.5 % with
+    c = 2 √(k m), so that loads down to -f slip once more unless f_s >= 1.27 f; by 7.6 % with 3 √(k m), which holds them
+    from f_s = 1.16 f on. With c > 0 slip begins while k holds less than f, and ends with k holding f: a slip shorter
+    than (f² - (f_s - c |δ̇|)²)/(2 k f) may give energy.
 
     Examples
     --------

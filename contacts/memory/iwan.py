@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from contacts.memory.friction import Slider, Sliders
-from contacts.numbers import LARGEST_IN_TABLE, LARGEST_PARAMETER, check_number, finite_row, reals
+from contacts.numbers import LARGEST_PARAMETER, check_number, finite_row, reals
 
 MOST_PARTS = 10_000
 
@@ -96,7 +96,7 @@ class Iwan(Sliders):
         slope : N/m, >= 0, beyond the last point.
         """
         d, f = (
-            finite_row(value, f"{name} of Iwan.from_backbone", LARGEST_IN_TABLE, 1.0 / LARGEST_IN_TABLE)
+            finite_row(value, f"{name} of Iwan.from_backbone", LARGEST_PARAMETER, 1.0 / LARGEST_PARAMETER)
             for name, value in (("delta", delta), ("force", force))
         )
         last = check_number(slope, "slope of Iwan.from_backbone")

@@ -23,9 +23,12 @@ if TYPE_CHECKING:
     from fembeam.model import Run
 
 Vector = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 UNIFORM = 1e-6  # of a step, that times may be off a uniform grid
-FINE = 0.1  # ω h up to which the cubic through values and slopes keeps maxima to 1e-5, mostly (ω h)⁴/384
-MOST_PARTS = 32  # of a step, reached at its Nyquist frequency: above it the oscillator all but follows the record
+FINE = 0.05  # ω τ up to which the cubic through values and slopes keeps maxima to 1e-5, mostly (ω τ)⁴/384
+ENOUGH = 1e-6  # relative: bounds on a maximum that exceed it by less
+GONE = 40.0  # ζ ω τ after which free vibration is below rounding
+FIRST_LOOK, MOST_AT_ONCE = 16, 1 << 12  # intervals looked into at once
 BLOCK = 1 << 16  # steps of the record at once, so that memory stays small
 SERIES = 18  # terms of φ_2 for |x| < 1, right to rounding
 FEW = 10  # samples in a contact, below which its acceleration is not resolved
@@ -98,9 +101,9 @@ def response_spectrum(
 
     Notes
     -----
-    Maxima are those between samples too, right to 1e-5 for the piecewise-linear record; for one that is smooth between
-    its samples the error is about (ω_a h)²/12 of its part at ω_a. What comes after the last sample does not count:
-    append zeros to see the free vibration, above all for periods longer than the record.
+    Maxima are those between samples too, right to 1e-5 for the piecewise-linear record at any ω; for one that is smooth
+    between its samples the error is about (ω_a h)²/12 of its part at ω_a. What comes after the last sample does not
+    count: append zeros to see the free vibration, above all for periods longer than the record.
 
     References
     ----------
@@ -176,37 +179,65 @@ def _checked_damping(zeta: ArrayLike) -> Vector:
 
 
 def _largest(step: float, record: Vector, omega: float, zeta: float) -> Vector:
-    """Max |x|, |x'|, |x'' + a| of one oscillator."""
-    largest = np.zeros(3)
-    for a, x, v, h in _motion(step, record, omega, zeta):
-        absolute = -2 * zeta * omega * v - omega**2 * x
-        rate = absolute - a
-        for i, (value, slope) in enumerate(
-            ((x, v), (v, rate), (absolute, -2 * zeta * omega * rate - omega**2 * v)),
-        ):
-            largest[i] = max(largest[i], _peak(value, slope, h))
+    """Max |x|, |x'|, |x'' + a| of one oscillator: f_k = Im(λᵏ z)/Im λ, f_k' = f_{k+1} - a Im(λᵏ)/Im λ."""
+    decay, largest = complex(-zeta * omega, omega * np.sqrt(1 - zeta**2)), np.zeros(3)
+    for a, z in _motion(step, record, decay):
+        for k in range(3):
+            value, slope = _quantity(k, decay, a, z)
+            if omega * step <= FINE:
+                largest[k] = max(largest[k], _peak(value, slope, step))
+            else:
+                largest[k] = _between(k, decay, step, a, z, max(largest[k], float(np.abs(value).max())))
     return largest
 
 
-def _motion(step: float, record: Vector, omega: float, zeta: float) -> Iterator[tuple[Vector, Vector, Vector, float]]:
-    """Record a, motion x and x' of an oscillator on a grid fine enough for its maxima, block by block, and its step."""
+def _quantity(k: int, decay: complex, a: Vector, z: Complex) -> tuple[Vector, Vector]:
+    """f_k and its derivative."""
+    first, second = (np.imag(decay**power * z) / decay.imag for power in (k, k + 1))
+    return first, second - a * ((decay**k).imag / decay.imag)
+
+
+def _motion(step: float, record: Vector, decay: complex) -> Iterator[tuple[Vector, Complex]]:
+    """The record a and z at its samples, block by block."""
     from scipy.signal import lfilter
 
-    parts = int(np.clip(np.ceil(omega * step / FINE), 1, MOST_PARTS))
-    h, damped = step / parts, omega * np.sqrt(1 - zeta**2)
-    exponent = complex(-zeta * omega, damped) * h
-    late = h * _phi2(exponent)
-    early = h * np.expm1(exponent) / exponent - late
+    exponent = decay * step
+    late = step * _phi2(exponent)
+    early = step * np.expm1(exponent) / exponent - late
     state, last = np.array([late * record[0]]), np.empty(0)  # so that z = 0 at the first sample
     for first in range(0, len(record) - 1, BLOCK):
-        samples = record[first : first + BLOCK + 1]
-        a = np.interp(np.arange(parts * (len(samples) - 1) + 1) / parts, np.arange(len(samples)), samples)
+        a = record[first : first + BLOCK + 1]
         fresh = a if first == 0 else a[1:]
         z, state = lfilter([-late, -early], [1.0, -np.exp(exponent)], fresh.astype(complex), zi=state)
         z = np.concatenate([last, z])
         last = z[-1:]
-        x = z.imag / damped
-        yield a, x, z.real - zeta * omega * x, h
+        yield a, z
+
+
+def _between(k: int, decay: complex, step: float, a: Vector, z: Complex, known: float) -> float:
+    """Max |f_k| between samples, too, at least ``known``: z = c + d τ + (z_0 - c) exp(λτ), d = a'/λ, c = (a_0 + d)/λ.
+
+    Only intervals that may exceed what is known are looked into, those of the highest bounds first, and in each the
+    first and the last period T. With f = b τ + s, s its free part, and q = exp(-ζωT), f changes by b T - (1 - q) s one
+    period later and by (1/q - 1) s - b T one period earlier. Where s > 0 one of them is no fall; where s < 0 f is
+    higher at the zero of s before or behind. So no τ with a period on both sides is a maximum; likewise for -f.
+    """
+    rate = np.diff(a) / step
+    d = rate / decay
+    c = (a[:-1] + d) / decay
+    free, power = z[:-1] - c, decay**k / decay.imag
+    bound = np.maximum(*(np.abs(np.imag(power * end)) for end in (c, c + step * d))) + np.abs(power * free)
+    omega = abs(decay)
+    lead = min(step, 2 * np.pi / decay.imag, GONE / max(-decay.real, 1e-300))
+    tau = np.linspace(0.0, lead, int(np.ceil(lead * omega / FINE)) + 1)
+    order, first, count = np.argsort(-bound), 0, FIRST_LOOK
+    while first < len(order) and bound[order[first]] > (1 + ENOUGH) * known:
+        at = order[first : first + count, None]
+        for t in (tau, tau + (step - lead)):
+            inner = c[at] + d[at] * t + free[at] * np.exp(decay * t)
+            known = max(known, _peak(*_quantity(k, decay, a[at] + rate[at] * t, inner), float(tau[1])))
+        first, count = first + count, min(2 * count, MOST_AT_ONCE)
+    return known
 
 
 def _phi2(x: complex) -> complex:
@@ -221,10 +252,11 @@ def _phi2(x: complex) -> complex:
 
 
 def _peak(value: Vector, slope: Vector, h: float) -> float:
-    """Max |f| of the cubic pieces through values and slopes (k,) on a grid of step h."""
+    """Max |f| of the cubic pieces through values and slopes (…, k) on a grid of step h."""
     size = np.abs(value)
-    turning = np.flatnonzero((slope[:-1] * slope[1:] < 0) & (np.maximum(size[:-1], size[1:]) > 0.5 * size.max()))
-    f0, f1, d0, d1 = value[turning], value[turning + 1], h * slope[turning], h * slope[turning + 1]
+    f0, f1, d0, d1 = value[..., :-1], value[..., 1:], h * slope[..., :-1], h * slope[..., 1:]
+    turning = (d0 * d1 < 0) & (np.maximum(np.abs(f0), np.abs(f1)) > 0.5 * size.max())
+    f0, f1, d0, d1 = (column[turning] for column in (f0, f1, d0, d1))
     # f' = d0 + 2 b s + 3 c s²: the root between 0 and 1, where d0 and d1 differ in sign
     b, c = 3 * (f1 - f0) - 2 * d0 - d1, d0 + d1 - 2 * (f1 - f0)
     root = np.sqrt(np.maximum(b**2 - 3 * c * d0, 0.0))
