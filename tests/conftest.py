@@ -5,6 +5,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
+REALISATION = int(os.environ.get("FEMBEAM_REALISATION", "0"))  # 0 is the test's own
+
 KERNELS = [
     "import solvers.exponential.method as m, solvers.compiled.parts as p; m.load_parts(range(len(p.ADDRESSES)))",
     "import solvers.exponential.linearised, solvers.stepping.loop",
@@ -23,3 +27,14 @@ def pytest_sessionstart(session):
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the processors are taken
     for process in [subprocess.Popen([sys.executable, "-c", code]) for code in KERNELS]:
         process.wait()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item):
+    """What must hold for any realisation is given another one, if the environment asks for it."""
+    if not REALISATION or not (item.get_closest_marker("chaotic") or item.get_closest_marker("drawn")):
+        return (yield)
+    from realisation import taken
+
+    with taken(REALISATION):
+        return (yield)

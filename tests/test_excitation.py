@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import BPoly
 
 from fembeam.excitation import BandNoise, Harmonic, Multisine, Record, RollOff
-from fembeam.statistics import moments
+from fembeam.statistics import Estimate, moments
 
 BROAD = (0.0, 1226.6)
 NARROW = (144.5, 270.2)
@@ -176,9 +176,9 @@ def test_many_equal_steps_are_summed_as_any_instants_are(order):
 
 def test_kurtosis_is_gaussian():
     found = np.array([moments(BandNoise(1.0, BROAD, seed=s).series()[1]).kurtosis for s in range(40)])
-    error = found.std(ddof=1) / math.sqrt(found.size)
-    assert error < 0.01
-    assert abs(found.mean() - 3) < 4 * error
+    lo, hi = Estimate.of_mean(found).interval(0.9999)
+    assert hi - lo < 0.1
+    assert lo < 3.0 < hi
 
 
 def test_zero_crossings_come_at_rices_rate():
@@ -187,10 +187,11 @@ def test_zero_crossings_come_at_rices_rate():
         noise = BandNoise(1.0, BROAD, seed=seed)
         _, y = noise.series(dt=2 * np.pi / BROAD[1] / 40)
         rates.append(np.count_nonzero((y < 0) & (np.roll(y, -1) >= 0)) / noise.period)
-    error = np.std(rates, ddof=1) / math.sqrt(len(rates))
     exact = BROAD[1] / (2 * np.pi * math.sqrt(3))  # √(m2/m0)/2π of a flat band from 0
-    assert error < 2e-3 * exact
-    assert abs(np.mean(rates) - exact) < 4 * error
+    found = Estimate.of_mean(rates)
+    lo, hi = found.interval(0.9999)
+    assert found.relative < 2e-3
+    assert lo < exact < hi
 
 
 def test_the_seed_is_the_realisation():

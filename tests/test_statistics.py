@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fembeam.excitation import BandNoise
-from fembeam.statistics import Moments, moments, pdf, psd
+from fembeam.statistics import Estimate, Moments, moments, pdf, psd
 
 
 def white(seed, n=65_536):
@@ -17,10 +17,11 @@ def white(seed, n=65_536):
 def test_level_of_white_noise():
     dt = 0.01
     levels = np.array([psd(2.0 * white(s), dt).density[5:-5].mean() for s in range(20)])
-    error = levels.std(ddof=1) / math.sqrt(levels.size)
     exact = 4.0 * dt / math.pi  # variance over the band from 0 to π/dt
-    assert error < 5e-3 * exact
-    assert abs(levels.mean() - exact) < 4 * error
+    found = Estimate.of_mean(levels)
+    lo, hi = found.interval(0.9999)
+    assert found.relative < 5e-3
+    assert lo < exact < hi
 
 
 def test_sine_on_a_bin():
@@ -51,9 +52,10 @@ def test_variance_of_the_spectrum_is_that_of_the_signal():
     for seed in range(20):
         t, y = BandNoise(2e-3, (0.0, 500.0), seed).series()
         ratios.append(psd(y, t[1]).variance / 4e-6)
-    error = np.std(ratios, ddof=1) / math.sqrt(len(ratios))
-    assert error < 0.01
-    assert abs(np.mean(ratios) - 1) < 4 * error
+    found = Estimate.of_mean(ratios)
+    lo, hi = found.interval(0.9999)
+    assert found.relative < 0.01
+    assert lo < 1.0 < hi
 
 
 def test_band_noise_is_flat_in_its_band():

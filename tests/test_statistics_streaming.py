@@ -73,9 +73,10 @@ def test_the_spectrum_carries_the_variance():
         found.append(signal.psd.variance / signal.variance.value)
         hz, density = signal.psd.per_hz
         assert np.sum(density) * hz[1] == pytest.approx(signal.psd.variance)
-    error = np.std(found, ddof=1) / math.sqrt(len(found))
-    assert error < 0.01
-    assert abs(np.mean(found) - 1.0) < 4 * error
+    ratio = Estimate.of_mean(found)
+    lo, hi = ratio.interval(0.9999)
+    assert ratio.relative < 0.01
+    assert lo < 1.0 < hi
 
 
 def test_the_jackknife_is_the_standard_error_of_a_mean():

@@ -157,7 +157,7 @@ def test_half_width_of_paired_differences():
         )
         error, width = difference(one, other)
         covered += abs(error - 0.1 / x.mean()) < width
-    assert 0.92 < covered / 400 < 0.98
+    assert abs(covered / 400 - 0.95) < 4 * np.sqrt(0.95 * 0.05 / 400)
 
 
 def test_executor_gives_the_same_study():
@@ -269,8 +269,9 @@ CASES = {
 }
 
 
-@pytest.mark.chaotic
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.chaotic] * ("chaotic" in name)) for name in CASES]
+)
 def test_smallest_model_is_right_afterwards(name):
     """The chaotic case has bounds of 0.12 ± 0.04 and 0.10 ± 0.02 in twelve realisations, far below its tolerance."""
     scene, quantity, tolerance, how = CASES[name]
