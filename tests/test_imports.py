@@ -5,6 +5,7 @@ import importlib.util
 import os
 import subprocess
 import sys
+import tomllib
 from collections import Counter
 from pathlib import Path
 
@@ -131,3 +132,9 @@ def test_a_shadowed_package_is_named(tmp_path, name):
     last = done.stderr.strip().splitlines()[-1]
     assert last.startswith(f"ImportError: fembeam needs its own package {name!r}")
     assert f"{name}.py" in last
+
+
+def test_a_clone_is_installed_as_a_path():
+    """Else a finder comes last of all, and to a script beside a clone its folder `fembeam` is an empty package."""
+    settings = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text(encoding="utf-8"))
+    assert settings["tool"]["setuptools"]["package-dir"] == {"": "."}

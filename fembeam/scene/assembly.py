@@ -308,12 +308,12 @@ def borders_of(scene: Scene, probes: Sequence[float]) -> Vector:
         require_finite(f"probes[{index}]", z, "Scene.matrices", "give coordinates in m")
     asked = on_beam(np.asarray(list(probes), dtype=float), scene.beam, "probes of Scene.matrices")
     shortest = SHORTEST * scene.beam.length
-    needed = np.sort([*scene.beam.borders, *(support.z for support in scene.supports)])
+    needed = np.sort(np.array([*scene.beam.borders, *(support.z for support in scene.supports)], dtype=float))
     nodes = needed[np.diff(needed, prepend=-np.inf) > SAME_PLACE * scene.beam.length]
     gaps = np.diff(nodes)
     rule = f"supports and span ends must be {shortest:.3g} m apart or at one place"
     require(bool(np.all(gaps >= shortest)), rule, float(gaps.min()), "Scene", "move or merge them")
     for z in [*scene.places, *asked]:
         if np.min(np.abs(nodes - z)) >= shortest:  # nearer ones are interpolated inside their element
-            nodes = np.append(nodes, z)
+            nodes = np.append(nodes, float(z))
     return np.sort(nodes)

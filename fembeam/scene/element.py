@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from fembeam.scene.impactor import check_law
 from fembeam.scene.local_coordinate import LocalCoordinate, Of, local_coordinate
-from fembeam.support import require, require_finite
+from fembeam.support import require, require_finite, require_place
 
 TRIED = np.array([1e-6, 1e-4, 1e-3])  # deformations, m or rad, of both signs, at which a law is tried out
 
@@ -56,6 +56,7 @@ class Element:
     always = True
 
     def __post_init__(self) -> None:
+        require_place(self.z, self)
         where = f"Element at z = {self.z}"
         require_finite("gap", self.gap, where, "give the offset in m, or rad of a rotation")
         local_coordinate(self.z, self.of, self.to, where, "to")

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from fembeam.support import require, require_finite, require_non_negative, require_positive
+from fembeam.support import require, require_finite, require_non_negative, require_place, require_positive
 
 SIDES = {"above": (-1.0,), "below": (1.0,), "both": (1.0, -1.0)}
 
@@ -49,6 +49,7 @@ class Impactor:
     damping: float = 0.0
 
     def __post_init__(self) -> None:
+        require_place(self.z, self)
         where = f"Impactor at z = {self.z}"
         require_positive("mass", self.mass, where, "give kg")
         require_finite("velocity", self.velocity, where, "give m/s, below 0 for a strike from above")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from scipy import sparse
 
-from fembeam.support import is_finite, require
+from fembeam.support import is_finite, is_whole, require
 
 if TYPE_CHECKING:
     from fembeam.scene.assembly import Matrices
@@ -77,7 +77,7 @@ def local_coordinate(z: float, of: str, to: Any, where: str, key: str) -> LocalC
     """The coordinate that `of` and a second place (a number, a pair, None) name; ValueError for others."""
     require(of in KINDS, "of must be 'displacement' or 'rotation'", of, where, "choose one")
     pair = (0, to) if is_finite(to) else to
-    require(pair is None or (isinstance(pair, (tuple, list)) and len(pair) == 2),
-            f"{key} must be a place z, (body, z) or None", to, where,
+    two = isinstance(pair, (tuple, list)) and len(pair) == 2 and is_whole(pair[0]) and is_finite(pair[1])
+    require(pair is None or two, f"{key} must be a place z, (body, z) or None", to, where,
             "give z on the same beam, or name a beam of bodies, 1 the first, and a place")  # fmt: skip
     return LocalCoordinate(z, KINDS.index(of), None if pair is None else (pair[0], pair[1]))

@@ -7,7 +7,7 @@ from typing import Any
 
 from fembeam.scene.impactor import check_law
 from fembeam.scene.local_coordinate import LocalCoordinate, Of, local_coordinate
-from fembeam.support import require, require_finite, require_non_negative
+from fembeam.support import require, require_finite, require_non_negative, require_place
 
 
 @dataclass(frozen=True)
@@ -23,6 +23,9 @@ class Clamped:
     z: float
     fixed = (True, True)
 
+    def __post_init__(self) -> None:
+        require_place(self.z, self)
+
 
 @dataclass(frozen=True)
 class Pinned:
@@ -37,6 +40,9 @@ class Pinned:
     z: float
     fixed = (True, False)
 
+    def __post_init__(self) -> None:
+        require_place(self.z, self)
+
 
 @dataclass(frozen=True)
 class Guided:
@@ -50,6 +56,9 @@ class Guided:
 
     z: float
     fixed = (False, True)
+
+    def __post_init__(self) -> None:
+        require_place(self.z, self)
 
 
 Support = Clamped | Pinned | Guided
@@ -75,6 +84,7 @@ class LumpedMass:
     offset: float = 0.0
 
     def __post_init__(self) -> None:
+        require_place(self.z, self)
         require_non_negative("mass", self.mass, f"LumpedMass at z = {self.z}", "give kg")
         require_non_negative("inertia", self.inertia, f"LumpedMass at z = {self.z}", "give kg m²")
         require_finite("offset", self.offset, f"LumpedMass at z = {self.z}", "give m")
@@ -101,6 +111,7 @@ class Spring:
     foot: Any = None
 
     def __post_init__(self) -> None:
+        require_place(self.z, self)
         require_non_negative("stiffness", self.stiffness, f"Spring at z = {self.z}", "give N/m")
         require_non_negative("rotational", self.rotational, f"Spring at z = {self.z}", "give N m/rad")
         require(self.foot is None or callable(self.foot), "foot must be a signal or None", self.foot,
@@ -124,6 +135,7 @@ class Dashpot:
     rotational: float = 0.0
 
     def __post_init__(self) -> None:
+        require_place(self.z, self)
         require_non_negative("damping", self.damping, f"Dashpot at z = {self.z}", "give N s/m")
         require_non_negative("rotational", self.rotational, f"Dashpot at z = {self.z}", "give N m s/rad")
 
@@ -157,6 +169,7 @@ class Stop:
     always = False
 
     def __post_init__(self) -> None:
+        require_place(self.z, self)
         where = f"Stop at z = {self.z}"
         require_finite("gap", self.gap, where, "give the clearance in m (rad of a rotation), negative for a preload")
         require(self.side in ("below", "above"), "side must be 'below' or 'above'", self.side, where, "choose one")
@@ -191,6 +204,7 @@ class PointForce:
     signal: Any
 
     def __post_init__(self) -> None:
+        require_place(self.z, self)
         require(callable(self.signal), "signal must be a function of t", self.signal, f"PointForce at z = {self.z}",
                 "give a signal such as Harmonic(amplitude, omega); Harmonic(size, 0.0) is a constant")  # fmt: skip
 
@@ -210,5 +224,6 @@ class PointMoment:
     signal: Any
 
     def __post_init__(self) -> None:
+        require_place(self.z, self)
         require(callable(self.signal), "signal must be a function of t", self.signal, f"PointMoment at z = {self.z}",
                 "give a signal such as Harmonic(amplitude, omega); Harmonic(size, 0.0) is a constant")  # fmt: skip

@@ -211,7 +211,6 @@ class Scene:
         """Raise ValueError unless every feature of one list sits on the beam."""
         for index, feature in enumerate(getattr(self, name)):
             where = f"{name}[{index}] ({type(feature).__name__}) of Scene"
-            require_finite("z", feature.z, where, "give the coordinate along the beam in m")
             require(0 <= feature.z <= self.beam.length, f"z must lie on the beam, 0 to {self.beam.length} m",
                     feature.z, where, "move it, or lengthen the beam")  # fmt: skip
 
@@ -262,14 +261,13 @@ class Scene:
         require(not all(held), f"the beam must be free to {move} at z", [one for end in held for one in end], where,
                 "support it by Pinned there" if place.rotation else "act away from the support")  # fmt: skip
 
-    def _check_exists(self, number: Any, z: Any, first: float, key: str, where: str) -> None:
+    def _check_exists(self, number: int, z: float, first: float, key: str, where: str) -> None:
         """Raise ValueError unless a second place lies on a beam of the scene, and is not the first one."""
-        known = isinstance(number, int) and 0 <= number <= len(self.bodies)
+        known = 0 <= number <= len(self.bodies)
         among = f"1 to {len(self.bodies)}" if self.bodies else "and there is none"
         require(known, f"{key} must name a body, {among}", number, where, "add the beam to bodies")
         length = self.bodies[number - 1].beam.length if number else self.beam.length
         named = f"body {number}" if number else "the beam"
-        require_finite(f"z of {key}", z, where, "give the coordinate along that beam in m")
         require(0 <= z <= length, f"z of {key} must lie on {named}, 0 to {length} m", z, where, "move it")
         apart = number > 0 or abs(z - first) > 1e-9 * length
         require(apart, f"z of {key} must be another place", z, where, "leave it out for an end on the frame")

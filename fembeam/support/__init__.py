@@ -12,6 +12,7 @@ from fembeam.support.checks import (
     require_finite,
     require_no_text,
     require_non_negative,
+    require_place,
     require_positive,
 )
 from fembeam.support.files import write_rows, written_whole

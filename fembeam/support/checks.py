@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
-from numbers import Real
 from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 
+def is_number(value: object) -> TypeGuard[float]:
+    """Whether value is a real number of Python or NumPy, finite or not (booleans are not numbers here)."""
+    return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+
+
 def is_finite(value: object) -> bool:
-    """Whether value is a real, finite number (booleans are not numbers here)."""
-    return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
+    """Whether value is a real, finite number."""
+    return is_number(value) and math.isfinite(value)
 
 
 def is_whole(value: object) -> TypeGuard[int]:
@@ -27,21 +31,25 @@ def require(valid: bool, rule: str, got: object, where: str, advice: str) -> Non
         raise ValueError(f"{rule}, got {shown} in {where}; {advice}")
 
 
-def require_finite(name: str, value: object, where: str, advice: str) -> None:
-    """Raise ValueError unless value is a finite number."""
-    require(is_finite(value), f"{name} must be finite", value, where, advice)
+def require_finite(name: str, value: Any, where: str, advice: str, bound: str = "", valid: bool = True) -> None:
+    """Raise ValueError unless value is a number, finite, and valid by a bound told in words."""
+    require(is_number(value), f"{name} must be a number", value, where, advice)
+    require(math.isfinite(value) and valid, f"{name} must be finite{bound}", value, where, advice)
 
 
-def require_positive(name: str, value: object, where: str, advice: str) -> None:
+def require_positive(name: str, value: Any, where: str, advice: str) -> None:
     """Raise ValueError unless value is finite and > 0."""
-    valid = is_finite(value) and value > 0  # type: ignore[operator]
-    require(valid, f"{name} must be finite and positive", value, where, advice)
+    require_finite(name, value, where, advice, " and positive", is_finite(value) and value > 0)
 
 
-def require_non_negative(name: str, value: object, where: str, advice: str) -> None:
+def require_non_negative(name: str, value: Any, where: str, advice: str) -> None:
     """Raise ValueError unless value is finite and >= 0."""
-    valid = is_finite(value) and value >= 0  # type: ignore[operator]
-    require(valid, f"{name} must be finite and not negative", value, where, advice)
+    require_finite(name, value, where, advice, " and not negative", is_finite(value) and value >= 0)
+
+
+def require_place(z: Any, part: object) -> None:
+    """Raise ValueError unless z is a coordinate along a beam for a part of a scene."""
+    require_finite("z", z, type(part).__name__, "give the coordinate along the beam in m")
 
 
 def require_no_text(where: str, **values: object) -> None:
@@ -53,7 +61,7 @@ def require_no_text(where: str, **values: object) -> None:
 def number(name: str, value: Any, above: float = -math.inf, least: float = -math.inf) -> float:
     """The value as a finite float above one bound and not below another, or a clear error."""
     try:
-        if isinstance(value, (str, bytes)):
+        if isinstance(value, (str, bytes, bool, np.bool_)):
             raise TypeError
         result = float(value)
     except (TypeError, ValueError):
