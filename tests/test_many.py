@@ -12,8 +12,7 @@ import fembeam as fb
 import solvers
 from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, law
 from fembeam import cli
-from fembeam.study.settling.basins import _Known, _labels, _settled
-from fembeam.study.settling.plane import axis_of, starts_of
+from fembeam.study.basins import _Known, _labels, _settled, axis_of, starts_of
 from solvers import Contact, Exponential, SolverError, Status, System, integrate, integrate_many
 from solvers.many import _shared_out
 

@@ -15,10 +15,9 @@ from problems import TIP, paper_scene
 import fembeam as fb
 from contacts import PiecewiseLinear
 from fembeam.cli import main
-from fembeam.study import NoReferenceError, Verdict, speed_accuracy, stability_map
+from fembeam.study import NoReferenceError, Point, SpeedAccuracy, Verdict, speed_accuracy, stability_map
 from fembeam.study.measure import cut
 from fembeam.study.quantities import Amplitude, Psd
-from fembeam.study.speed_accuracy_result import Point, SpeedAccuracy
 from solvers import RK4, CentralDifference, DormandPrince, Exponential, HenonRK2, Newmark
 
 EXAMPLES = Path(__file__).parent.parent / "examples"

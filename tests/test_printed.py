@@ -1,7 +1,9 @@
 """What objects say of themselves: a line as repr, tables in print and in notebooks, tables of pandas and xarray."""
 
+import csv
 import dataclasses
 import io
+import json
 import logging
 import re
 import subprocess
@@ -15,6 +17,8 @@ import fembeam as fb
 import solvers
 from contacts import Hertz, Tabulated, bounce, identify
 from fembeam import study
+from fembeam.results.files import json_text
+from fembeam.study.result import Result
 from fembeam.support import Printed, counting, html_table
 
 
@@ -43,6 +47,7 @@ def things():
         "response": (response := study.stationary(noisy, 60.0, 2e-3)),
         "signal": response["tip u"],
         "bifurcation": study.bifurcation(model, "omega", [150.0, 151.0], settle=5, keep=3),
+        "basins": study.basins(model, points=2, settle=30),
         "modes": study.mode_count(scene, [1, 2], "amplitude", duration=0.1, dt=1e-3),
         "map": study.stability_map(scene, solvers.RK4, [1e-6, 1e-5], modes=(1, 2), duration=0.01),
         "smallest": study.smallest_model(scene, "amplitude", 0.5, duration=0.1, dt=1e-3),
@@ -66,7 +71,8 @@ def test_reprs_of_many_numbers_tell_one_from_another():
     assert eval(repr(few), {"Multisine": fb.Multisine}) == few
 
 
-TABLES = ["model", "run", "orbit", "branch", "ensemble", "response", "bifurcation", "modes", "map", "smallest", "speed"]
+STUDIES = ["ensemble", "response", "bifurcation", "basins", "modes", "map", "smallest", "speed"]
+TABLES = ["model", "run", "orbit", "branch", *STUDIES]
 
 
 @pytest.mark.parametrize("name", TABLES)
@@ -77,6 +83,22 @@ def test_notebooks_show_what_print_gives(things, name):
     assert html.count("<table>") == html.count("</table>") >= 1
     words = re.sub(r"<[^>]*>", " ", html).replace("&lt;", "<").replace("&gt;", ">").replace("–", "").split()
     assert words == str(thing).split()
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_studies_have_one_kind_of_result(things, tmp_path, name):
+    found = things[name]
+    assert isinstance(found, Result)
+    found.save(tmp_path / "table.csv")
+    with open(tmp_path / "table.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert rows == [{key: "" if one is None else str(one) for key, one in row.items()} for row in found.table()]
+    assert json.loads(json_text(found.plain()))
+    if name == "ensemble":
+        with pytest.raises(ValueError, match=r"the values must hold spectra, got \['tip'\] in Ensemble\.figure; use"):
+            found.figure()
+    else:
+        assert found.figure().axes[0].get_ylabel()
 
 
 def test_the_table_of_a_model_holds_frequency_damping_and_participation(things):

@@ -140,10 +140,10 @@ def _results_commands(commands: Any) -> None:
 
 def _new(arguments: argparse.Namespace) -> int:
     """The command `new`."""
-    from fembeam.scene_file import TEMPLATE
+    from fembeam.scene_file import template
 
     with arguments.path.open("x", encoding="utf-8") as file:  # x: what exists is kept
-        file.write(TEMPLATE.format(name=arguments.path.name))
+        file.write(template(arguments.path.name))
     say(f"wrote {arguments.path}; next: fembeam check {arguments.path}")
     return 0
 
@@ -171,10 +171,9 @@ def _completion(arguments: argparse.Namespace) -> int:
 def _check(arguments: argparse.Namespace) -> int:
     """The command `check`."""
     from fembeam.cli.check import check
-    from fembeam.cli.run import reduced
 
     file = _read(arguments)
-    found = check(file, reduced(file, **_wanted(file, arguments.modes)))
+    found = check(file, file.model(**_counted(arguments.modes)))
     for doubt in found.warnings:
         show_warning(doubt)
     _print(found.plain() | {"warnings": warned} if arguments.json else found, arguments.json)
@@ -183,14 +182,11 @@ def _check(arguments: argparse.Namespace) -> int:
 
 def _modes(arguments: argparse.Namespace) -> int:
     """The command `modes`."""
-    from fembeam.cli.run import reduced
     from fembeam.model.mode_table import mode_rows, mode_table
 
     file = _read(arguments)
-    wanted = dict(file.reduce)
-    if arguments.modes is None and not {"modes", "omega_max", "mass_share"} & set(wanted):
-        wanted["modes"] = MODES_SHOWN
-    model = reduced(file, **(wanted if arguments.modes is None else _wanted(file, arguments.modes)))
+    usual = None if {"modes", "omega_max", "mass_share"} & set(file.reduce) else MODES_SHOWN
+    model = file.model(**_counted(usual if arguments.modes is None else arguments.modes))
     _print(mode_rows(model) if arguments.json else mode_table(model), arguments.json)
     return 0
 
@@ -238,11 +234,9 @@ def _read(arguments: argparse.Namespace) -> SceneFile:
     return scene_file.read(arguments.scene, arguments.set)
 
 
-def _wanted(file: SceneFile, modes: int | None) -> dict[str, Any]:
-    """The arguments of [reduce], with another number of modes if one is given."""
-    return (
-        dict(file.reduce) if modes is None else {**file.reduce, "modes": modes, "omega_max": None, "mass_share": None}
-    )
+def _counted(modes: int | None) -> dict[str, Any]:
+    """Arguments of [reduce] for a number of modes; none for what the file says."""
+    return {} if modes is None else {"modes": modes, "omega_max": None, "mass_share": None}
 
 
 def _print(found: Any, as_json: bool) -> None:

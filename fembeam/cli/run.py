@@ -76,7 +76,7 @@ def _check_checkpoints(job: Job, studies: list[str]) -> None:
     """Refuse to overwrite checkpoints, which hold hours of work."""
     for name in studies:
         path = job.folder / f"{name}.npz"
-        if hasattr(job.file.studies[name], "write") and path.exists():
+        if path.exists():
             raise ValueError(f"{path} holds results of [{name}]: add --resume to continue, delete it to started "
                              "anew, or choose another folder")  # fmt: skip
 
@@ -140,12 +140,9 @@ def _computed(job: Job, name: str) -> Outcome:
     import solvers
     from fembeam.study import NotMetError
 
-    study, code = job.file.studies[name], 0
+    code = 0
     try:
-        if hasattr(study, "write"):  # goes on where an interrupted one left its files
-            result = study.run(reduced(job.file, **job.file.reduce), job.folder, progress=not job.quiet)
-        else:
-            result = study.run(job.file.scene)
+        result = job.file.studies[name].run(job.file, job.folder, progress=not job.quiet)
         code = FAILED if getattr(result, "failures", None) else 0
     except NotMetError as error:
         result, code = error.evidence, FAILED
@@ -156,17 +153,12 @@ def _computed(job: Job, name: str) -> Outcome:
         say(f"error: [{name}]: {one_line(error)}")
         return Outcome(FAILED)
     except (ValueError, TypeError, ArithmeticError, MemoryError) as error:
-        say(f"error: {_placed(job.file, f'[{name}]', error)}")
+        say(f"error: {job.file.placed(f'[{name}]', error)}")
         return Outcome(BAD_INPUT)
-    outcome = Outcome(code, None if hasattr(study, "write") else report.plain(result), str(result))
+    outcome = Outcome(code, result.plain(), str(result))
     try:
         with interrupts.deferred():
-            outcome.files = [report.write_text(job.folder / f"{name}.txt", outcome.text)]
-            if hasattr(study, "write"):
-                outcome.files += study.write(result, job.folder)
-            else:
-                outcome.files += report.write_study(result, job.folder, name)
-            outcome.found = json.loads((job.folder / f"{name}.json").read_text(encoding="utf-8"))
+            outcome.files = report.write_study(result, job.folder, name)
     except OSError as error:
         outcome.code, outcome.last = _unwritten(error).code, True
     _wrote(job, outcome.files)
@@ -176,14 +168,14 @@ def _computed(job: Job, name: str) -> Outcome:
 def _simulation(job: Job) -> Outcome:
     """The study [simulate]."""
     started, study = time.perf_counter(), job.file.studies["simulate"]
-    model = reduced(job.file, **job.file.reduce)
+    model = job.file.model()
     if not job.quiet:
         say(f"{len(model.omega)} modes: " + ", ".join(f"{w:.6g}" for w in model.omega) + " rad/s")
     with interrupts.deferred():
         try:
             done, code = _simulated(job.file, model, not job.quiet)
         except (ValueError, TypeError, ArithmeticError, MemoryError) as error:
-            say(f"error: {_placed(job.file, '[simulate]', error)}")
+            say(f"error: {job.file.placed('[simulate]', error)}")
             return Outcome(BAD_INPUT)
         found = report.summary(done, study.discard, time.perf_counter() - started, study.outputs)
         outcome = Outcome(code, found, report.text(found))
@@ -217,20 +209,6 @@ def _simulated(file: SceneFile, model: Model, progress: bool) -> tuple[Run, int]
         say(f"error: {one_line(error)}")
         run, code = Run.of(model.for_duration(study.duration), error.solution), FAILED
     return replace(run, source=file.source), code
-
-
-def reduced(file: SceneFile, **arguments: Any) -> Model:
-    """The reduced model; errors name the file."""
-    try:
-        return file.scene.reduce(**arguments)
-    except (ValueError, TypeError, RuntimeError) as error:  # RuntimeError: modes that cannot be computed
-        raise ValueError(_placed(file, "[reduce]", error)) from error
-
-
-def _placed(file: SceneFile, where: str, error: Exception) -> str:
-    """An error with its line in the file, unless it says so already."""
-    said = one_line(error)
-    return said if said.startswith(str(file.path)) else f"{file.source.place(where, said)}: {said}"
 
 
 def _wrote(job: Job, files: list[Path]) -> None:

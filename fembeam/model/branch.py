@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -17,7 +15,7 @@ import solvers
 from fembeam.model.equations import load_period
 from fembeam.model.orbit import Orbit, checked_period, orbit
 from fembeam.scene import changes_structure, path_of, replaced, value_of
-from fembeam.support import Part, Printed, counting, note, require, written_whole
+from fembeam.support import Part, Printed, counting, note, require, write_rows, written_whole
 from solvers.branches import restarted
 from solvers.problem import counted, dataframe
 
@@ -154,12 +152,7 @@ class Branch(Printed):
 
     def to_csv(self, path: str | Path) -> None:
         """Write the table; the file is written whole or not at all."""
-        rows, text = self.table(), io.StringIO()
-        writer = csv.DictWriter(text, fieldnames=list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
-        with written_whole(Path(path)) as file:
-            file.write(text.getvalue().encode())
+        write_rows(Path(path), self.table())
 
     def __repr__(self) -> str:
         known = self.parameter

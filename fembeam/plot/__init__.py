@@ -14,7 +14,7 @@ from fembeam.plot.laws import hysteresis, identification, loops, restitutions
 from fembeam.plot.linear import floor_spectrum, frequency_response, response_spectrum
 from fembeam.plot.methods import speed_accuracy, stability_map
 from fembeam.plot.mode_count import mode_count, smallest_model
-from fembeam.plot.orbits import branch, orbit, peak
+from fembeam.plot.orbits import bifurcation, branch, orbit, peak
 from fembeam.plot.random import random_densities, random_spectra
 from fembeam.plot.response import densities, mode_shapes, time_history
 from fembeam.plot.run_signals import batches, natural, responses, sampling_of, stationary
@@ -22,39 +22,9 @@ from fembeam.plot.spectra import peaks, segment_for, spectra_of, spectrum
 from fembeam.plot.style import one_legend, styled
 
 __all__ = [
-    "animate",
-    "basins",
-    "batches",
-    "branch",
-    "contacts",
-    "densities",
-    "floor_spectrum",
-    "frame",
-    "frequency_response",
-    "hysteresis",
-    "identification",
-    "loops",
-    "mode_count",
-    "mode_shapes",
-    "natural",
-    "one_legend",
-    "orbit",
-    "peak",
-    "peaks",
-    "places",
-    "random_densities",
-    "random_spectra",
-    "response_spectrum",
-    "responses",
-    "restitutions",
-    "sampling_of",
-    "segment_for",
-    "smallest_model",
-    "spectra_of",
-    "spectrum",
-    "speed_accuracy",
-    "stability_map",
-    "stationary",
-    "styled",
-    "time_history",
-]
+    "animate", "basins", "batches", "bifurcation", "branch", "contacts", "densities", "floor_spectrum", "frame",
+    "frequency_response", "hysteresis", "identification", "loops", "mode_count", "mode_shapes", "natural",
+    "one_legend", "orbit", "peak", "peaks", "places", "random_densities", "random_spectra", "response_spectrum",
+    "responses", "restitutions", "sampling_of", "segment_for", "smallest_model", "spectra_of", "spectrum",
+    "speed_accuracy", "stability_map", "stationary", "styled", "time_history",
+]  # fmt: skip

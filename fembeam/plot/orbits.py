@@ -9,6 +9,7 @@ import numpy as np
 
 from fembeam.model import observed
 from fembeam.plot.axis_names import axis_name
+from fembeam.plot.figure import heading, legend, sheet
 from fembeam.plot.linear import frequencies
 from fembeam.plot.style import GREEN, GREY, ORANGE, RED, Vector, styled
 from fembeam.scene import signals_of
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from fembeam.model import Branch, Orbit
+    from fembeam.study import Bifurcation
 
 MARKS = {"fold": ("o", GREY), "flip": ("s", RED), "neimark-sacker": ("D", GREEN), "branch point": ("P", "black"),
          "grazing": ("x", "black"), "stick": ("d", GREEN), "floor": ("+", "black"),
@@ -51,15 +53,13 @@ def branch(
     axes : to draw into; None makes a figure.
     labels : of the branches; None tells their period.
     """
-    from fembeam.plot.figure import legend, sheet
-
     several = [branches] if not isinstance(branches, Sequence) else list(branches)
     require(bool(several), "nothing to draw", branches, "plot.branch", "give one branch or more")
     model = several[0].family.model
     place = observed(model) if z is None else z
     figure, (axis,) = sheet(1, 1, (8.4, 3.8), axes)
     if cloud is not None:
-        axis.plot(cloud[0], 1e3 * cloud[1], ".", color=GREY, markersize=2.0, label="simulated", rasterized=True)
+        _draw_cloud(axis, cloud)
     periods = [one.family.period for one in several]
     same = labels is None and len(set(periods)) == len(periods)  # colours: a period has the same on every figure
     for i, one in enumerate(several):
@@ -75,10 +75,24 @@ def branch(
     return figure
 
 
+@styled
+def bifurcation(found: Bifurcation, axes: Axes | None = None) -> Figure:
+    """Largest |u| of every settled period against the parameter; `axes` to draw into, None makes a figure."""
+    figure, (axis,) = sheet(1, 1, (8.4, 3.8), axes)
+    _draw_cloud(axis, found.cloud())
+    axis.set(xlabel=found.name, ylabel=f"max |u({found.z:.4g} m)| / mm")
+    return figure
+
+
 def peak(orbit: Orbit, z: float) -> float:
     """Largest |u| at z over a period, m."""
     lowest, highest = orbit.extremes(z)
     return max(-lowest, highest)
+
+
+def _draw_cloud(axis: Axes, cloud: tuple[Vector, Vector]) -> None:
+    """(parameter, |u|) of runs."""
+    axis.plot(cloud[0], 1e3 * cloud[1], ".", color=GREY, markersize=2.0, label="simulated", rasterized=True)
 
 
 def _draw_branch(axis: Axes, one: Branch, z: float, color: str, label: str) -> None:
@@ -179,8 +193,6 @@ def orbit(one: Orbit, z: float | None = None, axes: Sequence[Axes] | None = None
     >>> [axis.get_xlabel() for axis in orbit(model.orbit()).axes]
     ['t / ms', 'u / mm']
     """
-    from fembeam.plot.figure import heading, sheet
-
     place = observed(one.model) if z is None else z
     figure, (left, right) = sheet(1, 2, (6.4, 2.8), axes, width_ratios=[3, 2])
     t, u, v = one.run.t, 1e3 * one.run.displacement(place), one.run.velocity(place)

@@ -7,7 +7,7 @@ import math
 import sys
 import tempfile
 from collections.abc import Callable
-from dataclasses import asdict, fields, is_dataclass
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -74,14 +74,13 @@ def write(
     return written
 
 
-def write_study(result: Any, folder: str | Path, name: str) -> list[Path]:
-    """Write a study's numbers as `name.json` and, if it saves itself, `name.csv`; its figure as PNG."""
-    written = [write_json(Path(folder) / f"{name}.json", plain(result))]
-    written += [write_figure(Path(folder) / f"{name}.png", result.figure())]
-    if hasattr(result, "save"):
-        written.append(Path(folder) / f"{name}.csv")
-        result.save(written[-1])
-    return written
+def write_study(result: Any, folder: Path, name: str) -> list[Path]:
+    """Write what a study found, a `Result`: text, JSON, CSV and PNG; returns them and the checkpoint it has left."""
+    checkpoint, table = folder / f"{name}.npz", folder / f"{name}.csv"
+    written = [write_text(folder / f"{name}.txt", str(result)), *([checkpoint] if checkpoint.exists() else [])]
+    written += [write_json(folder / f"{name}.json", result.plain()), table]
+    result.save(table)
+    return [*written, write_figure(folder / f"{name}.png", result.figure())]
 
 
 def write_text(target: Path, text: str) -> Path:
@@ -239,26 +238,6 @@ def _outputs(found: dict[str, Any]) -> str:
     """The table of the outputs asked for."""
     head = ("output", "mean", "std", "min", "at t/s", "max", "at t/s")
     return aligned(head, [[name, *row.values()] for name, row in found["outputs"].items()])
-
-
-def plain(result: Any) -> Any:
-    """What a study found, without its models, runs and functions, as JSON has it."""
-    if is_dataclass(result) and not isinstance(result, type):
-        named = {f.name: getattr(result, f.name) for f in fields(result) if f.init}
-        return {name: plain(value) for name, value in named.items() if _telling(value)}
-    if isinstance(result, dict):
-        return {str(key): plain(value) for key, value in result.items() if _telling(value)}
-    if isinstance(result, (list, tuple)):
-        return [plain(value) for value in result if _telling(value)]
-    return result.tolist() if isinstance(result, (np.ndarray, np.generic)) else result
-
-
-def _telling(value: Any) -> bool:
-    """Whether a value belongs into a table of results."""
-    from fembeam.model import Model
-
-    known = (str, int, float, list, tuple, dict, np.ndarray, np.generic, type(None))
-    return isinstance(value, known) or (is_dataclass(value) and not isinstance(value, (Run, Model)))
 
 
 def json_text(content: Any, escaped: bool = False) -> str:

@@ -15,11 +15,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fembeam.scene import Scene, Source
 from fembeam.scene_file.study_tables import STUDIES
 from fembeam.scene_file.tables import SceneFileError, TableReader
+
+if TYPE_CHECKING:
+    from fembeam.model import Model
 
 
 @dataclass(frozen=True)
@@ -35,6 +38,18 @@ class SceneFile:
     def path(self) -> Path:
         """The file."""
         return self.source.path
+
+    def model(self, **others: Any) -> Model:
+        """The scene reduced as [reduce] says, or with other arguments; ValueError names the file."""
+        try:
+            return self.scene.reduce(**{**self.reduce, **others})
+        except (ValueError, TypeError, RuntimeError) as error:  # RuntimeError: modes that cannot be computed
+            raise ValueError(self.placed("[reduce]", error)) from error
+
+    def placed(self, where: str, error: Exception) -> str:
+        """What an error says, with its line in the file, unless it says so already."""
+        said = " ".join(str(error).split()) or type(error).__name__
+        return said if said.startswith(str(self.path)) else f"{self.source.place(where, said)}: {said}"
 
 
 def read(path: str | Path, overrides: Sequence[str] = ()) -> SceneFile:
@@ -106,3 +121,8 @@ def built(source: Source, asked: Sequence[str] = ()) -> SceneFile:
         file = SceneFile(source, *reader.contents(tables, STUDIES))
         carried = {name: place.read_bytes() for name, place in places.items()}
         return replace(file, source=replace(source, files=carried))
+
+
+def template(name: str = "scene.toml") -> str:
+    """The annotated file that `fembeam new` writes: it runs as it is, and shows what else a file may hold."""
+    return Path(__file__).with_name("template.toml").read_text(encoding="utf-8").replace("scene.toml", name)

@@ -1,4 +1,4 @@
-"""Studies as tables of a scene file: what to ask, checked when read, run on the file's scene."""
+"""Studies as tables of a scene file: what to ask, checked when read; `run` answers it, with files in a folder."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import inspect
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,25 +14,26 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import solvers
+from fembeam import plot
 from fembeam.beams import on_beam
+from fembeam.model import Branch, Orbit
 from fembeam.model.run_csv import Output
-from fembeam.scene_file.basins_table import BasinsTable
+from fembeam.scene import path_of
 from fembeam.scene_file.keys import Constructors, parameters
-from fembeam.scene_file.orbit_tables import BranchTable, OrbitTable
-from fembeam.study.ensemble import Ensemble, ensemble
+from fembeam.study import Basins, Ensemble, SpeedAccuracy, basins, characteristics, ensemble, speed_accuracy
 from fembeam.study.measure import Plan
 from fembeam.study.mode_count import ModeCount, checked_counts, mode_count
 from fembeam.study.quantities import named
-from fembeam.study.smallest_model import MOST, check_goal, smallest_model
-from fembeam.study.smallest_model_result import SmallestModel
-from fembeam.study.speed_accuracy import speed_accuracy
-from fembeam.study.speed_accuracy_result import SpeedAccuracy
-from fembeam.study.stationary import characteristics
-from fembeam.support import require, require_non_negative, require_positive
+from fembeam.study.result import Result, plain
+from fembeam.study.smallest_model import MOST, SmallestModel, check_goal, smallest_model
+from fembeam.support import Part, require, require_non_negative, require_positive
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from fembeam.model import Model
     from fembeam.scene import Scene
+    from fembeam.scene_file.reader import SceneFile
 
 NOT_IN_A_FILE = "scene", "start", "solver", "executor"  # arguments of studies that are Python objects
 MOST_SEEDS = 100_000
@@ -62,9 +63,9 @@ class ModeStudy:
         runs = {name: asked[name] for name in ("duration", "dt", "discard") if name in asked}
         Plan(**runs, seeds=self.seeds).check(scene, named(asked["quantity"]))
 
-    def run(self, scene: Scene) -> ModeCount | SmallestModel:
+    def run(self, file: SceneFile, folder: Path, progress: bool = False) -> ModeCount | SmallestModel:
         """The study; NotMetError when there is no such model."""
-        found: ModeCount | SmallestModel = self.study(scene, **{**self.arguments, "seeds": self.seeds})
+        found: ModeCount | SmallestModel = self.study(file.scene, **{**self.arguments, "seeds": self.seeds})
         return found
 
 
@@ -112,12 +113,12 @@ class SpeedAccuracyTable:
         if self.duration is not None:
             require_positive("duration", self.duration, where, "give s")
 
-    def run(self, scene: Scene) -> SpeedAccuracy:
+    def run(self, file: SceneFile, folder: Path, progress: bool = False) -> SpeedAccuracy:
         """The study."""
         methods: list[Any] = [solvers.Exponential(rtol) for rtol in self.rtols]
         methods += [solvers.DormandPrince(rtol) for rtol in self.rtols] + [solvers.RK4(step) for step in self.steps]
-        models = [scene.reduce(modes=n) for n in sorted(set(self.modes))]
-        return speed_accuracy(models, methods, self.starts, self.duration, rounds=self.rounds, progress=True)
+        models = [file.scene.reduce(modes=n) for n in sorted(set(self.modes))]
+        return speed_accuracy(models, methods, self.starts, self.duration, rounds=self.rounds, progress=progress)
 
 
 @dataclass(frozen=True)
@@ -151,40 +152,15 @@ class EnsembleTable:
             if getattr(self, name) < least:
                 raise ValueError(f"{name} must be at least {least}, got {getattr(self, name)}")
 
-    def run(self, model: Model, folder: Path, progress: bool = False) -> Ensemble:
+    def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Ensemble:
         """The ensemble, with its checkpoint ``ensemble.npz`` in the folder."""
         options = {"discard": self.discard, "segment": self.segment, "solver": self.solver}
         quantity = partial(characteristics, duration=self.duration, dt=self.dt, **options)
+        model, path = file.model(), folder / "ensemble.npz"
         with ExitStack() as stack:
             pool = stack.enter_context(ProcessPoolExecutor(self.workers)) if self.workers > 1 else None
-            path = folder / "ensemble.npz"
-            return ensemble(model, self.realisations, quantity, pool, path, until=self.until, progress=progress)
-
-    def write(self, result: Ensemble, folder: Path) -> list[Path]:
-        """Write means with standard errors as JSON and the spectra as a figure; returns the files, checkpoint first."""
-        from fembeam.plot import random_spectra
-        from fembeam.results.files import write_json
-        from fembeam.statistics import Spectrum
-        from fembeam.support import written_whole
-
-        numbers = {name: result[name] for name, values in result.values.items() if values.ndim == 1}
-        content = {
-            name: {"mean": float(e.value), "standard_error": float(e.standard_error)} for name, e in numbers.items()
-        }
-        failures = [{"seed": str(f.seed), "reason": f.reason} for f in result.failures]
-        about = {
-            "realisations": len(result),
-            "enough": result.enough,
-            "failures": failures,
-            "units": "SI: m, s, N, rad/s",
-        }
-        written = [folder / "ensemble.npz", write_json(folder / "ensemble.json", {**about, "numbers": content})]
-        omega, lines = result.values["omega"][0], [name for name in result.values if name.endswith(" psd")]
-        spectra = {n: Spectrum(omega, result[n].value, 0, np.asarray(result[n].standard_error)) for n in lines}
-        figure = random_spectra({f"{len(result)} realisations of {self.duration:g} s": spectra}, float(omega[-1]))
-        with written_whole(folder / "ensemble.png") as file:
-            figure.savefig(file, format="png", dpi=150, metadata={"Software": None})
-        return [*written, folder / "ensemble.png"]
+            found = ensemble(model, self.realisations, quantity, pool, path, until=self.until, progress=progress)
+        return replace(found, title=f"{len(found)} realisations of {self.duration:g} s")
 
 
 @dataclass(frozen=True)
@@ -232,6 +208,172 @@ class Simulate:
         """What is asked for, as `Run.to_csv` takes it; empty where nothing is."""
         chosen = {"places": self.places, "quantities": self.quantities}
         return {name: value for name, value in chosen.items() if value is not None}
+
+
+@dataclass(frozen=True)
+class OrbitTable:
+    """The table [orbit]: one periodic motion by shooting; `Model.orbit` explains more.
+
+    Parameters
+    ----------
+    period : in periods of the load; 2 is a 1/2 subharmonic.
+    """
+
+    period: int = 1
+
+    def __post_init__(self) -> None:
+        _check_period(self.period, "[orbit]")
+
+    def run(self, file: SceneFile, folder: Path, progress: bool = False) -> FoundOrbit:
+        """The orbit."""
+        return FoundOrbit(file.model().orbit(self.period))
+
+
+@dataclass(frozen=True, eq=False)
+class FoundOrbit(Result):
+    """An orbit as the answer of a study."""
+
+    orbit: Orbit
+
+    def table(self) -> list[dict[str, Any]]:
+        """Extremes, m, at the usual places."""
+        extremes = {name: self.orbit.extremes(z) for name, z in plot.places(self.orbit.model.shapes).items()}
+        return [{"": f"displacement, {name}", "min": low, "max": high} for name, (low, high) in extremes.items()]
+
+    def plain(self) -> dict[str, Any]:
+        """For JSON: period, stability, multipliers, extremes, contacts, state."""
+        one, log = self.orbit, self.orbit.contacts
+        return {
+            "period": one.period,
+            "seconds": one.found.period,
+            "stable": bool(one.stable),
+            "residual": one.found.residual,
+            "multipliers": [{"size": float(abs(m)), "angle": float(np.angle(m))} for m in one.multipliers],
+            "extremes": {row[""].removeprefix("displacement, "): {"min": row["min"], "max": row["max"]}
+                         for row in self.table()},
+            "contacts": [{name: float(column[i]) for name, column in log.arrays().items()} for i in range(len(log))],
+            "phase": one.found.phase,
+            "state": one.state.tolist(),
+            "units": "SI: m, s, N, J, rad",
+        }  # fmt: skip
+
+    def _parts(self) -> list[Part]:
+        """The kind of orbit, its extremes, its contacts."""
+        one, log = self.orbit, self.orbit.contacts
+        kind, sizes = "stable" if one.stable else "unstable", ", ".join(f"{abs(m):.4g}" for m in one.multipliers)
+        head = f"{kind} orbit of period {one.period}, {one.found.period:.6g} s, |μ| = {sizes}"
+        extremes = [list(row.values()) for row in self.table()]
+        columns = {"t_in": "begins/s", "t_out": "ends/s", "speed_in": "entry speed/(m/s)", "peak_force": "peak force/N"}
+        values = [getattr(log, name).tolist() for name in columns]
+        rows = [(f"stop {stop}", *row) for stop, *row in zip(log.stop, *values, strict=True)]
+        contacts: list[Part] = ["", (("", *columns.values()), rows)]
+        return [head, "", (("", "min/m", "max/m"), extremes), *(contacts if rows else [])]
+
+    def figure(self) -> Figure:
+        """History and phase portrait."""
+        return plot.orbit(self.orbit)
+
+
+@dataclass(frozen=True)
+class BranchTable:
+    """The table [branch]: periodic motion along one number of the scene; `Model.branch` explains the keys.
+
+    Parameters
+    ----------
+    span : (lowest, highest) value of the parameter.
+    parameter : such as "omega", "amplitude", "stops[0].gap".
+    period : in periods of the load.
+    at : value of the parameter to start at; None: the scene's, if it lies in the span.
+    step : largest step along the branch, in units of the span and the first orbit's size.
+    """
+
+    span: tuple[float, float]
+    parameter: str = "omega"
+    period: int = 1
+    at: float | None = None
+    step: float = 0.04
+
+    def __post_init__(self) -> None:
+        low, high = self.span
+        require(low < high, "span must be two values, ascending", self.span, "[branch]", "give [lowest, highest]")
+        _check_period(self.period, "[branch]")
+
+    def run(self, file: SceneFile, folder: Path, progress: bool = False) -> FoundBranch:
+        """The branch, saved as ``branch.npz`` in the folder; continues where an interrupted one left that.
+
+        Raises
+        ------
+        ValueError : that branch belongs to another table, scene or number of modes.
+        """
+        model, kept = file.model(), folder / "branch.npz"
+        if kept.exists():
+            branch = model.resume(kept)
+            self._check(branch, model, kept)
+        else:
+            branch = model.branch(self.parameter, self.span, self.period, at=self.at, step=self.step)
+        try:
+            branch.run(progress)
+        except KeyboardInterrupt:
+            branch.save(kept)
+            raise
+        branch.save(kept)
+        return FoundBranch(branch)
+
+    def _check(self, branch: Branch, model: Model, path: Path) -> None:
+        """A saved branch answers this table."""
+        walk = branch.found.walks[0]
+        theirs = branch.family.name, branch.family.period, *map(float, walk.span), walk.largest
+        mine = path_of(model.scene, self.parameter), self.period, *map(float, self.span), self.step
+        require(theirs == mine, f"{path} belongs to another branch", theirs, "[branch]",
+                f"parameter, period, span, step are {mine} here; choose another folder or delete it")  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class FoundBranch(Result):
+    """A branch as the answer of a study."""
+
+    branch: Branch
+
+    def table(self) -> list[dict[str, Any]]:
+        """One orbit a row."""
+        return self.branch.table()
+
+    def plain(self) -> dict[str, Any]:
+        """Orbits and how each direction ended, as JSON has them."""
+        return {"orbits": plain(self.table()), "status": self.branch.status}
+
+    def _parts(self) -> list[Part]:
+        return self.branch._parts()
+
+    def figure(self) -> Figure:
+        """The response diagram."""
+        return plot.branch(self.branch)
+
+
+def _check_period(period: int, where: str) -> None:
+    """A whole number of load periods."""
+    require(period >= 1, "period must be at least 1", period, where, "2 is a 1/2 subharmonic")
+
+
+@dataclass(frozen=True)
+class BasinsTable:
+    """The table [basins]: which periodic orbit each start of a plane comes to; `fb.study.basins` explains the keys."""
+
+    x_span: Sequence[float]
+    y_span: Sequence[float]
+    x: str | int = "displacement"
+    y: str | int = "velocity"
+    points: int | Sequence[int] = 100
+    z: float | None = None
+    start: Sequence[float] | None = None
+    settle: int = 200
+    longest: int = 8
+    threads: int = 1
+
+    def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Basins:
+        """The basins, with their checkpoint ``basins.npz`` in the folder."""
+        keys = {field.name: getattr(self, field.name) for field in fields(self)}
+        return basins(file.model(), **keys, checkpoint=folder / "basins.npz", progress=progress)
 
 
 STUDIES: Constructors = {

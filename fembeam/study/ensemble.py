@@ -11,18 +11,23 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fembeam import plot
 from fembeam.model import Model
-from fembeam.statistics import Estimate
+from fembeam.statistics import Estimate, Spectrum
 from fembeam.study.execution.checkpoint import Checkpoint, Values, identity
 from fembeam.study.execution.executors import spread
 from fembeam.study.realisations import Seed, child, noises, realisation, seed_key
-from fembeam.support import Part, Printed, is_whole, note, number
-from solvers.problem import counted, dataframe
+from fembeam.study.result import Result
+from fembeam.support import Part, is_whole, note, number, require
+from solvers.problem import counted
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 FIRST_ROUND = 8  # realisations before `until` is asked for the first time
 
@@ -36,7 +41,7 @@ class Failure:
 
 
 @dataclass(frozen=True, eq=False)
-class Ensemble(Printed):
+class Ensemble(Result):
     """Values of a quantity over independent realisations.
 
     Attributes
@@ -51,6 +56,8 @@ class Ensemble(Printed):
     values: dict[str, NDArray[Any]]
     failures: tuple[Failure, ...] = ()
     enough: bool | None = None
+    title: str = ""  # of the figure
+    INDEX: ClassVar[str] = "seed"
 
     def __len__(self) -> int:
         return len(self.seeds)
@@ -65,16 +72,44 @@ class Ensemble(Printed):
         failed = f", {len(self.failures)} failed" if self.failures else ""
         return f"<ensemble of {counted(len(self), 'realisation')}{failed}>"
 
+    @property
+    def _numbers(self) -> list[str]:
+        """Names of what is one number in each realisation."""
+        return [name for name, values in self.values.items() if values.ndim == 1]
+
     def _parts(self) -> list[Part]:
         """Means and standard errors of the named numbers, one a line."""
-        numbers = {name: self[name] for name, values in self.values.items() if values.ndim == 1}
         head = f"{len(self)} realisations" + (f", {len(self.failures)} failed" if self.failures else "")
-        return [head, (("", "mean ± standard error"), [(name, repr(found)) for name, found in numbers.items()])]
+        return [head, (("", "mean ± standard error"), [(name, repr(self[name])) for name in self._numbers])]
 
-    def to_dataframe(self) -> Any:
-        """A table of pandas: one realisation a row, the named numbers as columns; ImportError without pandas."""
-        numbers = {name or "value": values for name, values in self.values.items() if values.ndim == 1}
-        return dataframe(numbers, index=[seed_key(seed) for seed in self.seeds])
+    def table(self) -> list[dict[str, Any]]:
+        """One realisation a row: its seed and the named numbers."""
+        rows = zip(self.seeds, *(self.values[name] for name in self._numbers), strict=True)
+        columns = "seed", *(name or "value" for name in self._numbers)
+        return [dict(zip(columns, (seed_key(seed), *row), strict=True)) for seed, *row in rows]
+
+    def plain(self) -> dict[str, Any]:
+        """Means with their standard errors, and what failed, as JSON has it."""
+        means = {name: self[name] for name in self._numbers}
+        return {
+            "realisations": len(self),
+            "enough": self.enough,
+            "failures": [{"seed": str(one.seed), "reason": one.reason} for one in self.failures],
+            "units": "SI: m, s, N, rad/s",
+            "numbers": {
+                name: {"mean": float(one.value), "standard_error": float(one.standard_error)}
+                for name, one in means.items()
+            },
+        }
+
+    def figure(self) -> Figure:
+        """Mean spectra with their confidence, of an ensemble of `characteristics`; ValueError without spectra."""
+        lines = [name for name in self.values if name.endswith(" psd")]
+        require(bool(lines), "the values must hold spectra", list(self.values), "Ensemble.figure",
+                "use characteristics as the quantity")  # fmt: skip
+        omega = self.values["omega"][0]
+        spectra = {n: Spectrum(omega, self[n].value, 0, np.asarray(self[n].standard_error)) for n in lines}
+        return plot.random_spectra({self.title or f"{len(self)} realisations": spectra}, float(omega[-1]))
 
     @property
     def mean(self) -> Estimate:

@@ -13,24 +13,21 @@ above the resulting change may be due to rounding, as in chaotic motion, and the
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
 import solvers
+from fembeam import plot
+from fembeam.scene import Scene
 from fembeam.study.execution.executors import spread
 from fembeam.study.measure import Case, Measured, Plan, Start, measure
 from fembeam.study.quantities import Quantity, label, named
-from fembeam.support import Part, Printed, is_whole, require
-from solvers.problem import dataframe
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from fembeam.scene import Scene
+from fembeam.study.result import Result
+from fembeam.support import Part, is_whole, require
 
 LOOSER = 10.0  # times the tolerance, in the second run of the reference
 LOOSEST = 1e-2  # the largest tolerance that methods take
@@ -85,7 +82,7 @@ class Row:
 
 
 @dataclass(frozen=True, eq=False)
-class ModeCount(Printed):
+class ModeCount(Result):
     """A convergence study; print it for the table.
 
     Attributes
@@ -140,7 +137,8 @@ class ModeCount(Printed):
         for row in self.rows:
             if (row.modes, row.residual) == (modes, residual):
                 return row
-        raise ValueError(f"no row with {modes} modes, residual={residual}, in this study; rows are {self._names}")
+        names = [(row.modes, row.residual) for row in self.rows]
+        raise ValueError(f"no row with {modes} modes, residual={residual}, in this study; rows are {names}")
 
     def __repr__(self) -> str:
         return f"<convergence of {self.quantity} with modes, {len(self.rows)} models>"
@@ -150,24 +148,16 @@ class ModeCount(Printed):
         doubt: list[Part] = [f"IN DOUBT: {self.doubt}"] if self.doubt else []
         return [self.quantity, (HEAD, [row.cells() for row in self.rows]), rates, *doubt]
 
-    def to_dataframe(self) -> Any:
-        """The rows as a table of pandas; ImportError without pandas."""
+    def table(self) -> list[dict[str, Any]]:
+        """The rows."""
         names = "modes", "residual", "value", "error", "uncertainty", "reference"
         measured = "coordinates", "share", "periods", "seconds"
-        return dataframe([
+        return [
             {name: getattr(row, name) for name in names} | {name: getattr(row.measured, name) for name in measured}
             for row in self.rows
-        ])  # fmt: skip
+        ]
 
-    def figure(self) -> Figure:
-        """Error and time against the number of coordinates."""
-        from fembeam import plot
-
-        return plot.mode_count(self)
-
-    @property
-    def _names(self) -> list[tuple[int | None, bool]]:
-        return [(row.modes, row.residual) for row in self.rows]
+    figure = plot.mode_count
 
 
 def mode_count(
@@ -233,7 +223,7 @@ def mode_count(
     kept, chosen = named(quantity), checked_counts(counts)
     plan = Plan(duration, dt, discard, tuple(seeds), start, solver)
     plan.check(scene, kept)
-    kinds = (residual,) if residual is not None else (False, True) if scene.loaded_places else (False,)
+    kinds = kinds_of(scene, residual)
     arguments: list[dict[str, Any]] = [{"modes": n, "residual": kind} for kind in kinds for n in chosen]
     if reference == "full":
         elements = scene.matrices(modes=max(chosen)).elements
@@ -250,7 +240,7 @@ def mode_count(
     ]
     found = spread(measure, items, executor, f"modes for {label(kept)}")
     exact, *loose = found[arguments.index(finest)]
-    rows = rows_of(arguments, [first for first, *_ in found], exact)
+    rows = _rows(arguments, [first for first, *_ in found], exact)
     study = ModeCount(label(kept), rows, _change(loose[0], exact) if loose else None)
     if study.doubt:
         warnings.warn(study.doubt, UserWarning, stacklevel=2)
@@ -271,21 +261,29 @@ def _change(one: Measured, other: Measured) -> float:
     return error if np.isfinite(error) else np.inf
 
 
-def rows_of(arguments: Sequence[dict[str, Any]], measured: Sequence[Measured], reference: Measured) -> tuple[Row, ...]:
-    """Rows with errors against the reference; all values must have its shape."""
-    scale = float(np.linalg.norm(reference.mean))
-    require(0 < scale < np.inf, "the reference value must be finite and not zero", reference.mean, "study",
+def _rows(arguments: Sequence[dict[str, Any]], measured: Sequence[Measured], reference: Measured) -> tuple[Row, ...]:
+    """Rows with errors against the reference."""
+    check_comparable({f"study of {given}": each for given, each in zip(arguments, measured, strict=True)}, reference)
+    return tuple(
+        Row(None if given["modes"] == "all" else given["modes"], bool(given.get("residual")), each.value,
+            *difference(each, reference), each is reference, each)
+        for given, each in zip(arguments, measured, strict=True)
+    )  # fmt: skip
+
+
+def check_comparable(measured: Mapping[str, Measured], reference: Measured) -> None:
+    """ValueError unless the reference has a size that errors are relative to, and all, by name, have its shape."""
+    size, shape = float(np.linalg.norm(reference.mean)), reference.values.shape
+    require(0 < size < np.inf, "the reference value must be finite and not zero", reference.mean, "study",
             "does anything happen in this run? is there contact?")  # fmt: skip
-    rows = []
-    for given, each in zip(arguments, measured, strict=True):
-        same = each.values.shape == reference.values.shape
-        require(same, f"quantity must return one shape, {reference.values.shape[1:]} for the reference",
-                each.values.shape[1:], f"study of {given}", "return a fixed number of values")  # fmt: skip
-        error, uncertainty = difference(each, reference)
-        modes = None if given["modes"] == "all" else given["modes"]
-        value = float(np.linalg.norm(each.mean) / np.sqrt(each.mean.size)) if each.mean.size > 1 else float(each.mean)
-        rows.append(Row(modes, bool(given.get("residual")), value, error, uncertainty, each is reference, each))
-    return tuple(rows)
+    for where, each in measured.items():
+        require(each.values.shape == shape, f"quantity must return one shape, {shape[1:]} for the reference",
+                each.values.shape[1:], where, "return a fixed number of values")  # fmt: skip
+
+
+def kinds_of(scene: Scene, residual: bool | None) -> tuple[bool, ...]:
+    """With static shapes or without; both if neither is asked for and the scene has any."""
+    return (residual,) if residual is not None else (False, True) if scene.loaded_places else (False,)
 
 
 def difference(one: Measured, other: Measured) -> tuple[float, float]:

@@ -5,20 +5,18 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import MISSING, dataclass, field, fields
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import solvers
-from fembeam.model import Run
-from fembeam.study.speed_accuracy_result import Point, SpeedAccuracy, median
-from fembeam.support import counting, require, require_positive
-
-if TYPE_CHECKING:
-    from fembeam.model import Model
+from fembeam import plot
+from fembeam.model import Model, Run
+from fembeam.study.result import Result
+from fembeam.support import Part, counting, require, require_positive
 
 Vector = NDArray[np.float64]
 PATIENCE, MORE_PATIENCE = 20.0, 0.2  # s one setting may take per model for its first round, and for further ones
@@ -26,6 +24,120 @@ PATIENCE, MORE_PATIENCE = 20.0, 0.2  # s one setting may take per model for its 
 
 class NoReferenceError(solvers.SolverError):
     """The reference methods do not agree, so no error can be stated."""
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """One method at one setting on one model, over several starts.
+
+    Attributes
+    ----------
+    method, setting : names. modes : number of coordinates of the model.
+    seconds : (s,) fastest of the rounds for each start. errors : (s,) of integration, against the model's own
+        reference. totals : (s,) against the reference of the largest model: integration and reduction together.
+    law_calls, steps : median over the starts. failure : why there are no numbers, else "".
+    """
+
+    method: str
+    setting: str
+    modes: int
+    seconds: Vector
+    errors: Vector
+    totals: Vector
+    law_calls: float
+    steps: float
+    failure: str = ""
+
+    @property
+    def time(self) -> float:
+        """Median over the starts, s."""
+        return median(self.seconds)
+
+    @property
+    def error(self) -> float:
+        """Median over the starts."""
+        return median(self.errors)
+
+    @property
+    def total(self) -> float:
+        """Median over the starts."""
+        return median(self.totals)
+
+    def spread(self, values: Vector) -> tuple[float, float]:
+        """Quartiles of ``seconds``, ``errors`` or ``totals``."""
+        return (math.nan, math.nan) if not len(values) else tuple(np.quantile(values, [0.25, 0.75]))  # type: ignore[return-value]
+
+
+@dataclass(frozen=True, eq=False)
+class SpeedAccuracy(Result):
+    """The answer of `speed_accuracy`.
+
+    Attributes
+    ----------
+    points : all of them. unit : what an error of 1 is, in the quantity's unit. floor : {modes: disagreement of the two
+        references}; errors below it are not known. reduction : {modes: error of the exact model against the largest}.
+    """
+
+    points: list[Point]
+    unit: float
+    floor: dict[int, float]
+    reduction: dict[int, float]
+    quantity: str = "displacement at the end"
+
+    def front(self, modes: int) -> list[Point]:
+        """Points that no other beats in median time and error, the coarsest first; errors below the floor are equal."""
+        best: list[Point] = []
+        floor = self.floor.get(modes, 0.0)
+        for point in sorted((p for p in self.points if p.modes == modes and p.seconds.size), key=lambda p: p.time):
+            if not best or max(point.error, floor) < max(best[-1].error, floor):
+                best.append(point)
+        return best
+
+    def beaten(self, method: str, better_than: float = 1e-4) -> list[Point]:
+        """Points of the fronts, more accurate than a limit, that belong to other methods."""
+        return [
+            point
+            for modes in self.reduction
+            for point in self.front(modes)
+            if point.error < better_than and point.method != method
+        ]
+
+    def claim(self, method: str = "Exponential", better_than: float = 1e-4) -> str:
+        """A sentence: whether a method is the front below an error, or which others are; "" without others."""
+        methods = {point.method for point in self.points}
+        reached = any(point.error < better_than for point in self.points)
+        if method not in methods or len(methods) < 2 or not reached:
+            return ""
+        others = sorted({f"{p.method} with {p.modes} modes" for p in self.beaten(method, better_than)})
+        claim = f"below {better_than:g} {method} is the front"
+        return claim + (", but for " + ", ".join(others) if others else " everywhere")
+
+    def table(self) -> list[dict[str, Any]]:
+        """The points, medians over their starts with quartiles."""
+        fronts = {id(point) for modes in self.reduction for point in self.front(modes)}
+        return [
+            {
+                **{"method": p.method, "setting": p.setting, "modes": p.modes, "starts": len(p.errors)},
+                **{"seconds": p.time, "seconds_q1": p.spread(p.seconds)[0], "seconds_q3": p.spread(p.seconds)[1]},
+                **{"error": p.error, "error_q1": p.spread(p.errors)[0], "error_q3": p.spread(p.errors)[1]},
+                **{"total_error": p.total, "law_calls": p.law_calls, "steps": p.steps},
+                **{"front": id(p) in fronts, "failure": p.failure},
+            }
+            for p in self.points
+        ]
+
+    def __repr__(self) -> str:
+        return f"<speed against accuracy of {len(self.points)} points, {self.quantity}>"
+
+    def _parts(self) -> list[Part]:
+        head = "method", "setting", "modes", "µs", "error", "total", "law calls", ""
+        known = [f"{n} modes: reduction error {self.reduction[n]:.1e}, reference known to {self.floor[n]:.0e}"
+                 for n in self.reduction]  # fmt: skip
+        return [(head, [_cells(row) for row in self.table()]), *known, *filter(None, [self.claim()])]
+
+    rows = table
+
+    figure = plot.speed_accuracy
 
 
 def end_displacement(run: Run) -> Vector:
@@ -89,8 +201,6 @@ def speed_accuracy(
     >>> tight.error < 1e-7 and tight.error < loose.error < 1e-3
     True
     """
-    from fembeam.model import Model
-
     models = [model] if isinstance(model, Model) else sorted(model, key=lambda m: len(m.omega))
     _check(models, list(methods), rounds)
     duration = 10 * math.pi / float(models[0].omega[0]) if duration is None else duration
@@ -251,8 +361,6 @@ def method_name(method: Any) -> str:
 
 def _setting(method: Any) -> str:
     """What distinguishes a method from its default."""
-    from dataclasses import MISSING, fields
-
     shown = []
     for f in fields(method):
         if f.name in ("locate", "force_unstable", "ledger"):
@@ -261,3 +369,18 @@ def _setting(method: Any) -> str:
         if f.name in ("dt", "rtol") or f.default is MISSING or value != f.default:
             shown.append(f"{f.name}={value:g}" if isinstance(value, float) else f"{f.name}={value}")
     return ", ".join(shown)
+
+
+def _cells(row: dict[str, Any]) -> tuple[str, ...]:
+    """A line of the printed table; a failure stands in its last column."""
+    named = row["method"], row["setting"], str(row["modes"])
+    if row["failure"]:
+        return *named, "", "", "", "", row["failure"]
+    error, total = f"{row['error']:.1e}", f"{row['total_error']:.1e}"
+    numbers = f"{1e6 * row['seconds']:.0f}", error, total, f"{row['law_calls']:.0f}"
+    return *named, *numbers, "front" if row["front"] else ""
+
+
+def median(values: Vector) -> float:
+    """NaN of nothing."""
+    return float(np.median(values)) if len(values) else math.nan

@@ -5,19 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import solvers
+from fembeam import plot
+from fembeam.model import Model
+from fembeam.scene import Scene
+from fembeam.study.result import Result
 from fembeam.study.speed_accuracy import method_name
-from fembeam.support import Part, Printed, require
-from solvers.problem import dataframe
-
-if TYPE_CHECKING:
-    from fembeam.model import Model
-    from fembeam.scene import Scene
+from fembeam.support import Part, require
 
 Vector = NDArray[np.float64]
 SAMPLES = 400  # per run, for the error
@@ -38,7 +37,7 @@ class Verdict(IntEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class StabilityMap(Printed):
+class StabilityMap(Result):
     """A grid of verdicts.
 
     Attributes
@@ -71,12 +70,15 @@ class StabilityMap(Printed):
         ]
         return [(head, rows), ". accurate, w wrong, M missed contacts, U unstable"]
 
-    def to_dataframe(self) -> Any:
-        """A table of pandas, one run a row; ImportError without pandas."""
-        row, column = np.indices(self.verdict.shape).reshape(2, -1)
-        words = [Verdict(int(one)).words for one in self.verdict.ravel()]
-        return dataframe({self.axis: self.rows[row], "step": self.steps[column], "verdict": words,
-                          "error": self.error.ravel()})  # fmt: skip
+    def table(self) -> list[dict[str, Any]]:
+        """One run a row."""
+        return [
+            {self.axis: row, "step": step, "verdict": Verdict(int(self.verdict[i, j])).words, "error": self.error[i, j]}
+            for i, row in enumerate(self.rows)
+            for j, step in enumerate(self.steps)
+        ]
+
+    figure = plot.stability_map
 
 
 def stability_map(

@@ -14,7 +14,7 @@ from fembeam.support.checks import (
     require_non_negative,
     require_positive,
 )
-from fembeam.support.files import written_whole
+from fembeam.support.files import write_rows, written_whole
 from fembeam.support.notes import note
 from fembeam.support.printed import Part, Printed, html_table
 from fembeam.support.progress import bar, counting

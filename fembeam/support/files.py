@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from errno import ENOENT
 from pathlib import Path
@@ -27,3 +29,13 @@ def written_whole(target: Path) -> Iterator[Any]:
     except BaseException:
         os.unlink(name)
         raise
+
+
+def write_rows(target: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Rows with the same keys as a CSV file that appears whole or not at all."""
+    text = io.StringIO()
+    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    with written_whole(target) as file:
+        file.write(text.getvalue().encode())

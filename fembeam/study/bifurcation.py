@@ -9,26 +9,25 @@ from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import solvers
-from fembeam.model import load_period
+from fembeam import plot
+from fembeam.model import Model, load_period, observed
 from fembeam.scene import changes_structure, path_of, with_value
-from fembeam.support import Part, Printed, require
-from solvers.problem import dataframe
-
-if TYPE_CHECKING:
-    from fembeam.model import Model
+from fembeam.study.execution.executors import spread
+from fembeam.study.result import Result
+from fembeam.support import Part, require
 
 Vector = NDArray[np.float64]
 LOOKS = 128  # samples per period for the peaks
 
 
 @dataclass(frozen=True, eq=False)
-class Bifurcation(Printed):
+class Bifurcation(Result):
     """What settled motion does at each value of a parameter.
 
     Attributes
@@ -52,10 +51,11 @@ class Bifurcation(Printed):
         rows = list(zip(self.parameter.tolist(), lowest.tolist(), highest.tolist(), strict=True))
         return [repr(self), ((self.name, "smallest peak / mm", "largest peak / mm"), rows)]
 
-    def to_dataframe(self) -> Any:
-        """A table of pandas, one period a row, the peak in m; ImportError without pandas."""
-        parameter, peaks = self.cloud()
-        return dataframe({self.name: parameter, "peak": peaks})
+    def table(self) -> list[dict[str, Any]]:
+        """One period a row, the peak in m."""
+        return [{self.name: parameter, "peak": peak} for parameter, peak in zip(*self.cloud(), strict=True)]
+
+    figure = plot.bifurcation
 
     def cloud(self) -> tuple[Vector, Vector]:
         """(parameter, peak) of every period, flat, as `fembeam.plot.branch` takes it."""
@@ -96,9 +96,6 @@ def bifurcation(
     >>> bifurcation(scene.reduce(modes=1), "omega", [150.0, 160.0], settle=20, keep=4).peaks.shape
     (2, 4)
     """
-    from fembeam.model import observed
-    from fembeam.study.execution.executors import spread
-
     path = path_of(model.scene, parameter)
     values = np.atleast_1d(np.asarray(values, dtype=float))
     require(values.size > 0 and bool(np.all(np.isfinite(values))), "values must be finite numbers", values,

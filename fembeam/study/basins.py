@@ -12,35 +12,42 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import solvers
-from fembeam.model import Attractor, Orbit, load_period
+from fembeam import plot
+from fembeam.model import Attractor, Model, Orbit, load_period, observed
 from fembeam.study.execution.checkpoint import Checkpoint, identity
 from fembeam.study.execution.executors import spread
-from fembeam.study.settling.plane import WHERE, Axis, axis_of, checked_plane, checked_points, starts_of
-from fembeam.support import aligned, is_whole, require
+from fembeam.study.result import Result
+from fembeam.support import Part, is_finite, is_whole, require
 from solvers.orbits import delayed
 from solvers.orbits import run as run_from
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from fembeam.model import Model
-
 Vector = NDArray[np.float64]
+WHERE = "basins"
 NEAR = 1e-3
 FIRST = 25  # periods of the shortest runs
 COARSE = 5  # starts along each axis that are settled to find orbits
 TRIES = 12  # starts left over that are settled to find more
 UNSETTLED, FAILED = -1, -2  # labels of starts that came to no orbit, and of runs that failed
+OTHERS = {"not settled": UNSETTLED, "run failed": FAILED}
 
 
 @dataclass(frozen=True, eq=False)
-class Basins:
+class Axis:
+    """One direction of a plane: (2n,) change of [q, q̇] per unit, the values (k,) along it, its name."""
+
+    direction: Vector
+    values: Vector
+    name: str
+
+
+@dataclass(frozen=True, eq=False)
+class Basins(Result):
     """Where the starts of a grid settle.
 
     Attributes
@@ -61,23 +68,31 @@ class Basins:
         """(a,) part of the starts that comes to each attractor."""
         return np.array([one.count for one in self.attractors]) / self.label.size
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
+        return f"<what {self.label.size} starts come to: {', '.join(one.name for one in self.attractors)}>"
+
+    def _parts(self) -> list[Part]:
         """Attractors with their shares of the starts."""
-        others = (("not settled", UNSETTLED), ("run failed", FAILED))
-        rows = [(one.name, one.count) for one in self.attractors]
-        rows += [(name, count) for name, kind in others if (count := int(np.sum(self.label == kind)))]
-        table = [(name, count, f"{count / self.label.size:.2%}") for name, count in rows]
         size = " x ".join(map(str, self.label.shape[::-1]))
-        head = f"{size} starts: " + ", ".join(
-            f"{axis.name} from {axis.values[0]:g} to {axis.values[-1]:g}" for axis in (self.x, self.y)
-        )
-        return f"{head}\n{aligned(('comes to', 'starts', 'share'), table)}"
+        spans = [f"{axis.name} from {axis.values[0]:g} to {axis.values[-1]:g}" for axis in (self.x, self.y)]
+        shares = [(row["name"], row["starts"], f"{row['share']:.2%}") for row in self.table()]
+        return [f"{size} starts: {', '.join(spans)}", (("comes to", "starts", "share"), shares)]
 
-    def figure(self) -> Figure:
-        """The map, a colour for each attractor."""
-        from fembeam.plot import basins as drawn
+    def table(self) -> list[dict[str, Any]]:
+        """One attractor a row, then starts that came to none and runs that failed, if any."""
+        others = [(name, int(np.sum(self.label == kind))) for name, kind in OTHERS.items()]
+        rows = [(one.name, one.period, one.impacts, one.count, one.state.tolist()) for one in self.attractors]
+        rows += [(name, None, None, count, None) for name, count in others if count]
+        names = "name", "period", "impacts", "starts", "state"
+        return [dict(zip(names, row, strict=True)) | {"share": row[3] / self.label.size} for row in rows]
 
-        return drawn(self)
+    def plain(self) -> dict[str, Any]:
+        """Attractors, axes and the label of every start, as JSON has them."""
+        axes = {k: {"name": one.name, "values": one.values.tolist()} for k, one in (("x", self.x), ("y", self.y))}
+        found = [row for row in self.table() if row["name"] not in OTHERS]
+        return {"attractors": found, **axes, "label": self.label.tolist(), "units": "SI: m, s, N, rad/s"}
+
+    figure = plot.basins
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,8 +172,6 @@ def basins(
     comes to                 starts    share
     period 1 with 0 impacts      16  100.00%
     """
-    from fembeam.model import observed
-
     columns, rows = checked_points(points)
     place = observed(model) if z is None else z
     across, up = axis_of(model, x, x_span, columns, place), axis_of(model, y, y_span, rows, place)
@@ -244,3 +257,75 @@ def _sorted(x: Axis, y: Axis, origin: Vector, label: NDArray[np.int64], known: l
         renumbered[label == old] = new
     attractors = tuple(Attractor(known[i].orbit, int(counts[i]), known[i].states[0]) for i in order)
     return Basins(x, y, origin, renumbered, attractors)
+
+
+def axis_of(model: Model, kind: Any, span: Any, points: int, z: float) -> Axis:
+    """An axis from what `basins` takes for it, checked."""
+    ends = np.asarray(span, dtype=float)
+    valid = ends.shape == (2,) and bool(np.isfinite(ends).all()) and ends[0] < ends[1]
+    require(valid, "a span must be two finite values, ascending", span, WHERE, "give (lowest, highest)")
+    direction, name = _direction(model, kind, z)
+    return Axis(direction, np.linspace(ends[0], ends[1], points), name)
+
+
+def _direction(model: Model, kind: Any, z: float) -> tuple[Vector, str]:
+    """The direction an axis goes, and its name."""
+    n = len(model.omega)
+    if isinstance(kind, str) and kind == "displacement":
+        return np.concatenate((_pulled(model, z), np.zeros(n))), f"displacement at {z:g} m / m"
+    if isinstance(kind, str) and kind == "velocity":
+        return np.concatenate((np.zeros(n), _shape(model, z, np.ones(n)))), f"velocity at {z:g} m / (m/s)"
+    if is_whole(kind):
+        require(
+            bool(0 <= kind < 2 * n), f"the number of a state must lie in [0, {2 * n})", kind, WHERE, "q first, then q̇"
+        )
+        return np.eye(2 * n)[kind], f"q[{kind}]" if kind < n else f"q_dot[{kind - n}]"
+    advice = f'give "displacement", "velocity", the number of a state, or a vector of {2 * n} numbers'
+    require(not isinstance(kind, (str, bool)) and kind is not None, "an axis is not known", kind, WHERE, advice)
+    vector = np.array(kind, dtype=float)
+    fine = vector.shape == (2 * n,) and bool(np.isfinite(vector).all())
+    require(fine, f"an axis must be {2 * n} finite numbers", kind, WHERE, advice)
+    return vector, "along the given vector"
+
+
+def _pulled(model: Model, z: float) -> Vector:
+    """Q of the shape a force at z bends the beam to, per metre there."""
+    loose = (model.omega <= 0.0) & (model.phi(z) != 0.0)
+    require(not loose.any(), "a force at z moves the beam without end", z, WHERE, "use velocity, or numbers of states")
+    return _shape(model, z, 1.0 / np.where(model.omega > 0.0, model.omega, np.inf) ** 2)
+
+
+def _shape(model: Model, z: float, compliance: Vector) -> Vector:
+    """Coordinates that a push at z brings about, per unit of motion there."""
+    phi = model.phi(z)
+    moved = float(phi @ (compliance * phi))
+    require(moved > 0.0, "the modes kept do not move at z", z, WHERE, "choose another place")
+    found: Vector = compliance * phi / moved
+    return found
+
+
+def checked_points(points: Any) -> tuple[int, int]:
+    """Numbers of values along x and y."""
+    both = (points, points) if isinstance(points, (int, np.integer)) else tuple(np.ravel(points).tolist())
+    whole = len(both) == 2 and all(is_finite(k) and k == int(k) and k >= 2 for k in both)
+    require(whole, "points must be one or two whole numbers of at least 2", points, WHERE, "e.g. (100, 100)")
+    return int(both[0]), int(both[1])
+
+
+def starts_of(origin: Vector, x: Axis, y: Axis) -> Vector:
+    """(ny, nx, 2n) all the starts."""
+    along = x.values[:, None] * x.direction
+    starts: Vector = origin + (y.values[:, None] * y.direction)[:, None, :] + along
+    return starts
+
+
+def checked_plane(model: Model, start: ArrayLike | None, x: Axis, y: Axis) -> Vector:
+    """The state at the plane's origin, after a check that x and y span a plane."""
+    size = 2 * len(model.omega)
+    origin = model.rest() if start is None else np.array(start, dtype=float)
+    fine = origin.shape == (size,) and bool(np.isfinite(origin).all())
+    require(fine, f"start must be {size} finite numbers", start, WHERE, "use model.state(displacement, velocity)")
+    units = [axis.direction / max(float(np.linalg.norm(axis.direction)), 1e-300) for axis in (x, y)]
+    flat = np.linalg.svd(np.array(units), compute_uv=False)[-1] < 1e-9
+    require(not flat, "x and y must be two directions", (x.name, y.name), WHERE, "choose another one")
+    return origin

@@ -1,0 +1,64 @@
+"""What all studies find: numbers in a table, which prints, goes to pandas, CSV and JSON, and is drawn."""
+
+from __future__ import annotations
+
+import os
+from abc import ABC, abstractmethod
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from fembeam.model import Model, Run
+from fembeam.support import Printed, write_rows
+from solvers.problem import dataframe
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+NUMBERS = (str, int, float, list, tuple, dict, np.ndarray, np.generic, type(None))
+
+
+class Result(Printed, ABC):
+    """What a study found; print it, or let a notebook show it."""
+
+    INDEX: ClassVar[str] = ""  # the column that names the rows of a data frame
+
+    @abstractmethod
+    def table(self) -> list[dict[str, Any]]:
+        """The numbers in SI units, a dictionary for each row."""
+
+    @abstractmethod
+    def figure(self) -> Figure:
+        """A figure of it, made by `fembeam.plot`."""
+
+    def to_dataframe(self) -> Any:
+        """The table as one of pandas; ImportError without pandas."""
+        frame = dataframe(self.table())
+        return frame.set_index(self.INDEX) if self.INDEX else frame
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the table as CSV, whole or not at all."""
+        write_rows(Path(path), self.table())
+
+    def plain(self) -> dict[str, Any]:
+        """What was found as JSON has it, without models, runs and functions."""
+        found: dict[str, Any] = plain(self)
+        return found
+
+
+def plain(value: Any) -> Any:
+    """Dataclasses as dictionaries, arrays as lists."""
+    if is_dataclass(value) and not isinstance(value, type):
+        value = {f.name: getattr(value, f.name) for f in fields(value) if f.init}
+    if isinstance(value, dict):
+        return {str(key): plain(one) for key, one in value.items() if _telling(one)}
+    if isinstance(value, (list, tuple)):
+        return [plain(one) for one in value if _telling(one)]
+    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
+
+
+def _telling(value: Any) -> bool:
+    """Whether a value belongs into a table of results."""
+    return isinstance(value, NUMBERS) or (is_dataclass(value) and not isinstance(value, (Run, Model)))
