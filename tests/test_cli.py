@@ -21,7 +21,7 @@ from fembeam.cli import main
 from fembeam.cli.unit_checks import doubts
 from fembeam.results import html_page as html
 from fembeam.scene import Source
-from fembeam.scene_file import TEMPLATE, built, kinds, read
+from fembeam.scene_file import built, kinds, read, template
 
 EXAMPLE = Path(__file__).parent.parent / "examples" / "beam_stop.toml"
 FIGURES = ["time_history.png", "psd.png", "densities.png", "contacts.png", "modes.png"]
@@ -248,7 +248,7 @@ def test_an_ensemble_is_written_and_goes_on(tmp_path, capsys):
     table = capsys.readouterr().out
     assert table.startswith("3 realisations\n")
     assert re.search(r"stop 0 rate +4\d\.\d+ ± \d", table)
-    named = ["ensemble.json", "ensemble.npz", "ensemble.png", "ensemble.txt", "report.html", "studies.json"]
+    named = [*(f"ensemble.{kind}" for kind in ("csv", "json", "npz", "png", "txt")), "report.html", "studies.json"]
     assert sorted(p.name for p in out.iterdir()) == named
     found = json.loads((out / "ensemble.json").read_text())
     assert found["numbers"]["δ skewness"]["mean"] < -0.7
@@ -323,7 +323,7 @@ def test_every_study_is_run_and_kept(tmp_path, capsys):
     again = "run", path, "--out", out, "--resume", "--quiet"
     printed(capsys, *again, "--set", "mode_count.counts=[1, 3]")
     changed = [p.name for p in written if p.stat().st_mtime_ns != written[p]]
-    assert sorted(changed) == ["mode_count.json", "mode_count.png", "mode_count.txt", "studies.json"]
+    assert sorted(changed) == [*(f"mode_count.{kind}" for kind in ("csv", "json", "png", "txt")), "studies.json"]
     other = "--set", "mode_count.counts=[1, 3]", "--set", "branch.span=[150.0, 200.0]"
     assert "belongs to another branch" in said_on_failure(capsys, 2, *again, *other)
     (out / "studies.json").write_text("{")
@@ -393,11 +393,11 @@ def test_the_new_scene_is_checked_and_runs(tmp_path, capsys):
 
 @pytest.mark.parametrize("number", range(6))
 def test_every_example_in_the_new_scene_is_right(tmp_path, number):
-    blocks = re.findall(r"^# \[(?:.|\n)*?(?=\n\n|\n*\Z)", TEMPLATE, re.MULTILINE)
+    blocks = re.findall(r"^# \[(?:.|\n)*?(?=\n\n|\n*\Z)", template(), re.MULTILINE)
     assert len(blocks) == 6
-    text = TEMPLATE.replace(blocks[number], re.sub(r"^# ", "", blocks[number], flags=re.MULTILINE))
+    text = template().replace(blocks[number], re.sub(r"^# ", "", blocks[number], flags=re.MULTILINE))
     path = tmp_path / "scene.toml"
-    path.write_text(text.format(name="scene.toml"), encoding="utf-8")
+    path.write_text(text, encoding="utf-8")
     read(path).scene.reduce(modes=3)
 
 
@@ -655,7 +655,7 @@ def test_the_schema_knows_what_the_reader_knows(capsys):
     assert masses["required"] == ["z", "mass"]
     assert masses["properties"]["mass"] == {"type": "number"}
     assert check_against(schema, tomllib.loads(EXAMPLE.read_text(encoding="utf-8")), schema) is None
-    assert check_against(schema, tomllib.loads(TEMPLATE.format(name="x")), schema) is None
+    assert check_against(schema, tomllib.loads(template()), schema) is None
     for old, new in (("mass =", "mas ="), ('"clamped"', '"clampd"'), ("= 600", '= "600"'), ("length =", "# ")):
         changed = tomllib.loads(EXAMPLE.read_text(encoding="utf-8").replace(old, new))
         assert check_against(schema, changed, schema), new

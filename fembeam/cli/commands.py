@@ -140,10 +140,10 @@ def _results_commands(commands: Any) -> None:
 
 def _new(arguments: argparse.Namespace) -> int:
     """The command `new`."""
-    from fembeam.scene_file import TEMPLATE
+    from fembeam.scene_file import template
 
     with arguments.path.open("x", encoding="utf-8") as file:  # x: what exists is kept
-        file.write(TEMPLATE.format(name=arguments.path.name))
+        file.write(template(arguments.path.name))
     say(f"wrote {arguments.path}; next: fembeam check {arguments.path}")
     return 0
 

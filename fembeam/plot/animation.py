@@ -193,7 +193,7 @@ class _Stage:
     @styled
     def _build(self) -> Figure:
         """Axes, fixed things, and empty artists for what moves."""
-        from fembeam.plot.figure import Figure
+        from fembeam.plot.window import Figure
 
         self.figure = Figure(figsize=(7.0, 4.4), layout="constrained")
         self.beam_axis, self.force_axis = self.figure.subplots(2, 1, height_ratios=[2.2, 1])

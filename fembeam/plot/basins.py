@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fembeam.plot.figure import heading, legend, sheet
 from fembeam.plot.style import BLUE, GREEN, GREY, ORANGE, RED, styled
 
 if TYPE_CHECKING:
@@ -33,8 +34,6 @@ def basins(found: Basins, axes: Axes | None = None) -> Figure:
     """
     from matplotlib.colors import to_rgb
     from matplotlib.patches import Patch
-
-    from fembeam.plot.figure import heading, legend, sheet
 
     figure, (axis,) = sheet(1, 1, (6.4, 4.8), axes)
     names = {i: (one.name, COLOURS[i % len(COLOURS)]) for i, one in enumerate(found.attractors)}

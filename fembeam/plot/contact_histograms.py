@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fembeam.plot.figure import heading, sheet
 from fembeam.plot.style import BLUE, GREEN, RED, Vector, plain_decades, styled
 from fembeam.scene import unit_of
 from solvers.problem import counted
@@ -33,8 +34,6 @@ def contacts(run: Run, discard: float = 0.0, axes: Sequence[Axes] | None = None)
     Only contacts that began after `discard` and ended count. `axes` to draw into are four; None makes a figure. Raises
     ValueError when there is no contact.
     """
-    from fembeam.plot.figure import heading, sheet
-
     log = run.contacts
     kept = np.isfinite(log.t_out) & (log.t_in >= discard)
     if not np.any(kept):

@@ -1,12 +1,10 @@
-"""The figures of this library: made without pyplot, shown by notebooks as they are and by `show` in a window."""
+"""What figures begin and end with: a sheet of axes, a heading, a legend."""
 
 from __future__ import annotations
 
-import io
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib import figure as of_matplotlib
 
 from fembeam.plot.style import RED
 from fembeam.support import require
@@ -15,52 +13,16 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from fembeam.model import Run
 
 MANY_ROOM = "the axes must be as many as the figure has panels"
 
 
-class Figure(of_matplotlib.Figure):
-    """A matplotlib Figure that pyplot learns of when it is shown, and not before.
-
-    Examples
-    --------
-    >>> import matplotlib.pyplot as plt
-    >>> figure = Figure()
-    >>> figure._repr_png_()[1:4], plt.get_fignums()
-    (b'PNG', [])
-    """
-
-    def _repr_png_(self) -> bytes:
-        """The picture a notebook shows."""
-        file = io.BytesIO()
-        self.savefig(file, format="png", dpi=self.dpi)
-        return file.getvalue()
-
-    def show(self, warn: bool = True) -> None:
-        """Open a window and, in a script, wait until it is closed; in a notebook the picture appears.
-
-        Parameters
-        ----------
-        warn : as matplotlib does, when its backend has no windows; without a display nothing is shown, silently.
-        """
-        import warnings
-
-        from matplotlib import pyplot as plt
-
-        manager = self.canvas.manager
-        if manager is None or not plt.fignum_exists(manager.num):
-            plt.figure(FigureClass=lambda **_: self)  # type: ignore[arg-type]  # makes a window for this very figure
-        with warnings.catch_warnings():
-            if not warn:
-                warnings.simplefilter("ignore", UserWarning)
-            plt.show()
-
-
 def sheet(
     rows: int, columns: int, size: tuple[float, float], axes: Axes | Sequence[Axes] | None = None, **options: Any
-) -> tuple[of_matplotlib.Figure, list[Axes]]:
+) -> tuple[Figure, list[Axes]]:
     """A new figure with its axes as a flat list, or the axes that are given and their figure.
 
     Parameters
@@ -74,6 +36,8 @@ def sheet(
     ValueError : another number of axes.
     """
     if axes is None:
+        from fembeam.plot.window import Figure
+
         made = Figure(figsize=size, layout="constrained")
         return made, list(np.atleast_1d(made.subplots(rows, columns, **options)).ravel())
     given: list[Axes] = list(np.ravel(np.asarray(axes, dtype=object)))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from contacts import PUBLISHED, Bounce, Hysteretic, Identified, KelvinVoigt, Law, Viscoelastic, bounce, restitution
+from fembeam.plot.figure import heading, legend, sheet
 from fembeam.plot.style import BLUE, GREY, RED, Vector, styled
 from fembeam.support import require
 
@@ -42,21 +43,11 @@ def loops(laws: Mapping[str, Law], entry_rate: float = 1.0, mass: float = 1.0, a
     >>> figure.axes[0].get_ylabel()
     'contact force / N'
     """
-    from fembeam.plot.figure import heading, legend, sheet
-
     require(bool(laws), "nothing to draw", laws, "plot.loops", "give laws by name, {name: law}")
-    figure, (axis,) = sheet(1, 1, (7.0, 4.2), axes)
     thrown = {name: bounce(law, entry_rate, mass) for name, law in laws.items()}
-    scale, unit = _force_unit(max(float(one.force.max()) for one in thrown.values()))
-    for number, (name, one) in enumerate(thrown.items()):
-        delta, force = _traced(laws[name], one, mass)
-        axis.plot(1e3 * delta, scale * force, _line(number), label=f"{name}: e = {one.restitution:.3f}")
-    axis.axhline(0.0, color=GREY, linewidth=0.6)
-    axis.set_xlabel("indentation δ / mm")
-    axis.set_ylabel(f"contact force / {unit}")
-    legend(axis, axes is None, "outside right center")
-    heading([axis], f"Bounce of {mass:g} kg at {entry_rate:g} m/s, achieved restitution e", axes is None)
-    return figure
+    curves = {f"{name}: e = {one.restitution:.3f}": _traced(laws[name], one, mass) for name, one in thrown.items()}
+    title = f"Bounce of {mass:g} kg at {entry_rate:g} m/s, achieved restitution e"
+    return _drawn(curves, ("indentation δ / mm", "contact force"), title, axes)
 
 
 @styled
@@ -81,21 +72,10 @@ def hysteresis(laws: Mapping[str, Law], path: ArrayLike | None = None, axes: Axe
     >>> figure.axes[0].get_xlabel()
     'δ / mm'
     """
-    from fembeam.plot.figure import heading, legend, sheet
-
     require(bool(laws), "nothing to draw", laws, "plot.hysteresis", "give laws by name, {name: law}")
-    figure, (axis,) = sheet(1, 1, (7.0, 4.2), axes)
     paths = {name: _turns(name, law, path) for name, law in laws.items()}
-    forces = {name: law.along(paths[name]) for name, law in laws.items()}
-    scale, unit = _force_unit(max(float(np.abs(force).max()) for force in forces.values()))
-    for number, name in enumerate(laws):
-        axis.plot(1e3 * paths[name], scale * forces[name], _line(number), label=name)
-    axis.axhline(0.0, color=GREY, linewidth=0.6)
-    axis.set_xlabel("δ / mm")
-    axis.set_ylabel(f"force / {unit}")
-    legend(axis, axes is None, "outside right center")
-    heading([axis], "Force along a slow path", axes is None)
-    return figure
+    curves = {name: (paths[name], law.along(paths[name])) for name, law in laws.items()}
+    return _drawn(curves, ("δ / mm", "force"), "Force along a slow path", axes)
 
 
 @styled
@@ -110,8 +90,6 @@ def restitutions(axes: Sequence[Axes] | None = None) -> Figure:
     -----
     `KelvinVoigt.anagnostopoulos` does as `Viscoelastic.tsuji`: exact, and on the same line with ``clamp=True``.
     """
-    from fembeam.plot.figure import legend, sheet
-
     figure, (whole, near) = sheet(1, 2, (7.0, 5.0), axes)
     nominal = np.linspace(0.02, 1.0, 99)
     makers = {name: getattr(Hysteretic, name) for name in PUBLISHED if name not in ("zhang_sharf", "achieving")}
@@ -134,8 +112,6 @@ def restitutions(axes: Sequence[Axes] | None = None) -> Figure:
 @styled
 def identification(found: Identified, axes: Sequence[Axes] | None = None) -> Figure:
     """Measured and fitted loops of every collision, and the residuals; into two `axes` where they are given."""
-    from fembeam.plot.figure import heading, sheet
-
     figure, (above, below) = sheet(2, 1, (7.0, 4.8), axes, sharex=True, height_ratios=[2, 1])
     scale, unit = _force_unit(max(float(np.abs(one.force).max()) for one in found.collisions))
     for number, one in enumerate(found.collisions):
@@ -155,6 +131,21 @@ def identification(found: Identified, axes: Sequence[Axes] | None = None) -> Fig
     title = f"K = {found.stiffness.value:.4g} N/m^{p:.3g}, a = {a.value:.3g} ({a.low:.3g} to {a.high:.3g}), "
     title += f"restitution {r.value:.3g} ({r.low:.3g} to {r.high:.3g})"
     heading([above], title, axes is None)
+    return figure
+
+
+def _drawn(
+    curves: Mapping[str, tuple[Vector, Vector]], words: tuple[str, str], title: str, axes: Axes | None
+) -> Figure:
+    """Curves (δ, F) by name, under two names of the axes."""
+    figure, (axis,) = sheet(1, 1, (7.0, 4.2), axes)
+    scale, unit = _force_unit(max(float(np.abs(force).max()) for _, force in curves.values()))
+    for number, (name, (delta, force)) in enumerate(curves.items()):
+        axis.plot(1e3 * delta, scale * force, _line(number), label=name)
+    axis.axhline(0.0, color=GREY, linewidth=0.6)
+    axis.set(xlabel=words[0], ylabel=f"{words[1]} / {unit}")
+    legend(axis, axes is None, "outside right center")
+    heading([axis], title, axes is None)
     return figure
 
 

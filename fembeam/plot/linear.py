@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fembeam.plot.figure import heading, sheet
 from fembeam.plot.style import Vector, place_name, plain_decades, styled
 from fembeam.support import require
 
@@ -44,8 +45,6 @@ def response_spectrum(
     >>> [axis.get_ylabel() for axis in response_spectrum(found).axes]
     ['largest acceleration / m s⁻²', 'largest displacement / mm']
     """
-    from fembeam.plot.figure import sheet
-
     figure, (upper, lower) = sheet(2, 1, (7.0, 5.2), axes, sharex=True)
     several = spectrum if isinstance(spectrum, Mapping) else {"": spectrum}
     require(bool(several), "nothing to draw", spectrum, "plot.response_spectrum", "give one spectrum or more")
@@ -82,7 +81,6 @@ def floor_spectrum(run: Run, z: float | None = None, zeta: float = 0.05, axes: S
     Periods from that of the highest mode kept to four times that of the lowest, and at least twelve samples. Where the
     samples do not resolve the contacts the figure says so.
     """
-    from fembeam.plot.figure import heading
     from fembeam.plot.run_signals import sampling_of, watched
     from fembeam.response import frame_motion
     from fembeam.response import response_spectrum as computed
@@ -127,8 +125,6 @@ def frequency_response(found: FrequencyResponse, axes: Sequence[Axes] | None = N
     ['|H| / m/m', 'phase / °']
     """
     from matplotlib.ticker import MultipleLocator
-
-    from fembeam.plot.figure import sheet
 
     figure, (upper, lower) = sheet(2, 1, (7.0, 4.8), axes, sharex=True, height_ratios=(2, 1))
     amplitude, phase = (values.reshape(len(found.omega), -1).T for values in (found.amplitude, found.phase))

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fembeam.plot.figure import legend, sheet
 from fembeam.plot.style import styled
 from fembeam.support import require
 
@@ -30,8 +31,6 @@ def speed_accuracy(result: SpeedAccuracy, axes: Axes | Sequence[Axes] | None = N
     modes) is wasted. What lies below the disagreement of the references is drawn there: it is not known. `axes` to draw
     into are one, or two where there are several models.
     """
-    from fembeam.plot.figure import sheet
-
     sizes = sorted(result.reduction)
     panels = 2 if max(result.reduction.values()) > 0.0 else 1
     figure, drawn = sheet(1, panels, (5.2 * panels + 2.1, 4.8), axes, sharey=True)
@@ -87,8 +86,6 @@ def _legends(axis: Axes, sizes: Sequence[int], methods: Sequence[str], own: bool
     """Markers for methods, colours for modes, beside the axes."""
     from matplotlib.lines import Line2D
 
-    from fembeam.plot.figure import legend
-
     entries = [Line2D([], [], color=c, lw=3, label=f"{n} mode{'s' if n > 1 else ''}")
                for n, c in zip(sizes, _colours(len(sizes)), strict=True)]  # fmt: skip
     entries += [
@@ -108,8 +105,6 @@ def stability_map(*maps: StabilityMap, axes: Axes | Sequence[Axes] | None = None
     from matplotlib.colors import ListedColormap
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
-
-    from fembeam.plot.figure import legend
 
     require(bool(maps), "nothing to draw", maps, "plot.stability_map", "give one map or more of fb.study.stability_map")
     colours = dict(zip(maps[0].VERDICTS, ("#8fd0b5", "#f6d58a", "#b7c9e8", "#eba07a"), strict=True))
@@ -138,8 +133,6 @@ def stability_map(*maps: StabilityMap, axes: Axes | Sequence[Axes] | None = None
 
 def _panels(count: int, columns: int, axes: Axes | Sequence[Axes] | None) -> tuple[Figure, list[Axes]]:
     """That many panels in columns, the rest of the last row empty."""
-    from fembeam.plot.figure import sheet
-
     if axes is not None:
         return sheet(count, 1, (0.0, 0.0), axes)
     rows = -(-count // columns)

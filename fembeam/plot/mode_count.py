@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fembeam.plot.figure import heading, sheet
 from fembeam.plot.style import BLUE, GREY, ORANGE, RED, styled
 
 if TYPE_CHECKING:
@@ -35,8 +36,6 @@ def mode_count(study: ModeCount, axes: Sequence[Axes] | None = None) -> Figure:
     >>> [axis.get_ylabel() for axis in figure.axes]
     ['relative error', 'integration / s']
     """
-    from fembeam.plot.figure import heading, sheet
-
     figure, (left, right) = sheet(1, 2, (8.0, 3.6), axes)
     for kind, colour, mark, name in KINDS:
         rows = [row for row in study.rows if row.residual == kind and np.isfinite(row.error)]
@@ -64,8 +63,6 @@ def smallest_model(result: SmallestModel, axes: Axes | Sequence[Axes] | None = N
 
     `axes` to draw into are one, or two once integration was reached; None makes a figure.
     """
-    from fembeam.plot.figure import heading, sheet
-
     reached = bool(result.integration)
     figure, drawn = sheet(1, 1 + reached, (8.0 if reached else 4.4, 3.6), axes)
     _reduction(drawn[0], result)

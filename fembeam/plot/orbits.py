@@ -9,6 +9,7 @@ import numpy as np
 
 from fembeam.model import observed
 from fembeam.plot.axis_names import axis_name
+from fembeam.plot.figure import heading, legend, sheet
 from fembeam.plot.linear import frequencies
 from fembeam.plot.style import GREEN, GREY, ORANGE, RED, Vector, plain_decades, styled
 from fembeam.scene import signals_of
@@ -55,8 +56,6 @@ def branch(
     axes : to draw into, whose limits are those of the branches; None makes a figure.
     labels : of the branches; None tells their period.
     """
-    from fembeam.plot.figure import legend, sheet
-
     several = [branches] if not isinstance(branches, Sequence) else list(branches)
     require(bool(several), "nothing to draw", branches, "plot.branch", "give one branch or more")
     model = several[0].family.model
@@ -86,8 +85,6 @@ def branch(
 @styled
 def bifurcation(found: Bifurcation, axes: Axes | None = None) -> Figure:
     """Largest |u| of every settled period against the parameter; `axes` to draw into, None makes a figure."""
-    from fembeam.plot.figure import sheet
-
     figure, (axis,) = sheet(1, 1, (8.4, 3.8), axes)
     _draw_cloud(axis, found.cloud())
     axis.set(xlabel=found.name, ylabel=f"max |u({found.z:.4g} m)| / mm")
@@ -248,8 +245,6 @@ def orbit(one: Orbit, z: float | None = None, axes: Sequence[Axes] | None = None
     >>> [axis.get_xlabel() for axis in orbit(model.orbit()).axes]
     ['t / ms', 'u / mm']
     """
-    from fembeam.plot.figure import heading, sheet
-
     place = observed(one.model) if z is None else z
     figure, (left, right) = sheet(1, 2, (6.4, 2.8), axes, width_ratios=[3, 2])
     t, u, v = one.run.t, 1e3 * one.run.displacement(place), one.run.velocity(place)

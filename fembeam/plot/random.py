@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fembeam.plot.figure import sheet
 from fembeam.plot.orbits import branch
 from fembeam.plot.style import BLUE, GREY, RED, curve, fit_levels, one_legend, ribbon, styled
 from fembeam.statistics import Spectrum
@@ -40,8 +41,6 @@ def random_spectra(
     branches : title -> branches of periodic motion along ω, drawn beside the panel of that title.
     axes : to draw into, one per panel, with branches two, the spectrum's first; None makes a figure.
     """
-    from fembeam.plot.figure import sheet
-
     columns = 2 if branches else 1
     size = 4.6 * columns + 2.4, 2.1 * len(panels) + 0.5
     figure, drawn = sheet(len(panels), columns, size, axes, squeeze=False)
@@ -84,8 +83,6 @@ def random_densities(signals: Mapping[str, Signal], axes: Axes | Sequence[Axes] 
     >>> random_densities({"tip": found["tip u"]}).axes[0].get_xlabel()
     'tip / mm'
     """
-    from fembeam.plot.figure import sheet
-
     figure, drawn = sheet(1, len(signals), (3.5 * len(signals), 3.1), axes)
     density_panels(drawn, signals)
     return figure

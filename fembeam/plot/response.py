@@ -29,6 +29,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fembeam.model import places
+from fembeam.plot.figure import heading, sheet
 from fembeam.plot.random import density_panels
 from fembeam.plot.run_signals import estimated, first_stop, natural, sampling_of, stationary
 from fembeam.plot.spectra import segment_for
@@ -71,8 +72,6 @@ def time_history(
     Shaded are the contacts of the stops at z, of all stops where there is none. Between samples the displacement is the
     cubic through values and rates. Contacts shorter than ten samples are drawn as their logged peak.
     """
-    from fembeam.plot.figure import heading, sheet
-
     step = sampling_of(run)
     lo, hi = window or _window(run)
     body, place = _watched(run, lo, hi) if z is None else (0, z)
@@ -100,8 +99,6 @@ def densities(run: Run, discard: float = 0.0, axes: Axes | Sequence[Axes] | None
 
     Shaded: 95 % confidence, where the run holds at least four independent parts. `axes` to draw into: one each.
     """
-    from fembeam.plot.figure import heading, sheet
-
     signals = estimated(run, discard, segment_for(int(np.count_nonzero(run.t >= discard)), sampling_of(run)))
     figure, drawn = sheet(1, len(signals), (7.0, 3.1), axes)
     density_panels(drawn, signals)
@@ -116,8 +113,6 @@ def mode_shapes(model: Model, axes: Axes | None = None) -> Figure:
 
     `axes` to draw into; None makes a figure.
     """
-    from fembeam.plot.figure import heading, sheet
-
     figure, (axis,) = sheet(1, 1, (7.0, 3.8), axes)
     z = np.linspace(0.0, model.scene.beam.length, 401)
     unit = 1e3 if z[-1] <= 1.0 else 1.0

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fembeam.model import places
+from fembeam.plot.figure import heading, sheet
 from fembeam.plot.linear import frequencies
 from fembeam.plot.run_signals import estimated, first_stop, natural, responses, sampling_of
 from fembeam.plot.style import BLUE, GREEN, GREY, Vector, curve, drawable, fit_levels, styled
@@ -53,8 +54,6 @@ def spectrum(
     model, named at the top; numbers are the peaks of the first curve. Of a transient the levels hold for this stretch
     of time only: see `floor_spectrum`.
     """
-    from fembeam.plot.figure import heading, sheet
-
     figure, (upper, lower) = sheet(2, 1, (7.0, 5.6), axes, sharex=True)
     spectra, linear = spectra_of(run, discard), _linear(run)
     response = {name: s for name, s in spectra.items() if name != "base y"}

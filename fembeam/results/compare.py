@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fembeam import plot
+from fembeam.plot.figure import sheet
 from fembeam.results.files import prepared, write_figure
+from fembeam.statistics import pdf, psd
 from fembeam.support import aligned
 
 if TYPE_CHECKING:
@@ -124,22 +126,17 @@ def write_figures(a: Path, b: Path, out: Path) -> list[Path]:
 @plot.styled
 def overlaid(runs: dict[str, Run]) -> Figure:
     """Indentation of the first stop (else the tip): the end of the history, its spectrum, its density."""
-    from matplotlib.figure import Figure
-
-    from fembeam.statistics import pdf, psd
-
-    figure = Figure(figsize=(7.0, 7.0), layout="constrained")
-    axes, highest = figure.subplots(3, 1), 0.0
+    (figure, axes), highest = sheet(3, 1, (7.0, 7.0)), 0.0
     for i, (name, run) in enumerate(runs.items()):
         what, signal = next(iter(plot.responses(run).items()))
-        dt, style = float(run.t[1] - run.t[0]), {"label": name, "linestyle": "-" if i == 0 else "--"}
+        dt, style = float(run.t[1] - run.t[0]), "-" if i == 0 else "--"
         last = min(len(run.t), 600)
-        axes[0].plot(run.t[-last:], 1e3 * signal[-last:], **style)
+        axes[0].plot(run.t[-last:], 1e3 * signal[-last:], style, label=name)
         omega, level = psd(signal - signal.mean(), dt, plot.segment_for(len(signal), dt))
-        axes[1].semilogy(omega[1:], np.maximum(level[1:], 1e-300), **style)
+        axes[1].semilogy(omega[1:], np.maximum(level[1:], 1e-300), style)
         highest = max(highest, float(level.max()))
         x, density = pdf(signal, 50)
-        axes[2].plot(1e3 * x, 1e-3 * density, **style)
+        axes[2].plot(1e3 * x, 1e-3 * density, style)
     axes[0].set(xlabel="time / s", ylabel=f"{what} / mm")
     axes[1].set(xlabel="ω / rad s⁻¹", ylabel="PSD / m² s rad⁻¹")
     axes[2].set(xlabel=f"{what} / mm", ylabel="density / mm⁻¹")

@@ -20,32 +20,7 @@ from fembeam.support import html_table, written_whole
 if TYPE_CHECKING:
     from fembeam.scene import Source
 
-STYLE = """
-body { font: 16px/1.5 system-ui, sans-serif; color: #222; background: #fff; max-width: 60rem; margin: auto;
-  padding: 1rem }
-h1, h2, p, li { overflow-wrap: anywhere }
-h1 { font-size: 1.5rem; margin: 0 } h2 { font-size: 1.15rem; margin: 2rem 0 .5rem; border-bottom: 1px solid #ccc }
-.wide, pre { overflow-x: auto; background: linear-gradient(to right, var(--ground) 40%, transparent) 0 0 / 2.5rem 100%,
-  linear-gradient(to left, var(--ground) 40%, transparent) 100% 0 / 2.5rem 100%,
-  linear-gradient(to right, #0003, transparent) 0 0 / .8rem 100%,
-  linear-gradient(to left, #0003, transparent) 100% 0 / .8rem 100%; background-repeat: no-repeat;
-  background-attachment: local, local, scroll, scroll; background-color: var(--ground) }
-body { --ground: #fff } pre { --ground: #f6f6f6; padding: .75rem; font-size: .85rem; line-height: 1.4 }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums }
-td + td { white-space: nowrap } td:first-child { min-width: 5.5rem } th { vertical-align: bottom }
-th, td { text-align: right; padding: .15rem .6rem; border-bottom: 1px solid #eee }
-th:first-child, td:first-child { text-align: left; padding-left: 0 } th { font-weight: 600 }
-img { max-width: 100%; height: auto; display: block } figure { margin: 1.5rem 0 }
-figcaption { color: #555; font-size: .9rem }
-@media (max-width: 40rem) { body { padding: .75rem } table, pre { font-size: .8rem } th, td { padding: .15rem .4rem }
-  figure { position: relative } figure img { max-width: none; width: 38rem }
-  figure::after { content: ""; position: absolute; inset: 1.5rem 0 0 auto; width: 1.2rem; pointer-events: none;
-    background: linear-gradient(to left, #0004, transparent) } figcaption::after { content: " (scrolls sideways →)" } }
-.good { color: #00664a } .bad { color: #a83c00; font-weight: 600 } .note { color: #555; font-size: .9rem }
-"""
-CONTACT_ROWS: tuple[
-    tuple[str, float, str, str], ...
-] = (  # words, unit of the figures per SI unit, place in the summary
+CONTACT_ROWS = (  # words, unit of the figures per SI unit, place in the summary
     ("at z / mm", 1e3, "z", ""),
     ("number", 1.0, "number", ""),
     ("per second", 1.0, "rate", ""),
@@ -96,10 +71,9 @@ def write_page(
 def page(title: str, body: str) -> str:
     """A whole document."""
     phone = '<meta name="viewport" content="width=device-width, initial-scale=1">'
-    head = f'<meta charset="utf-8">{phone}<title>{escape(title)}</title>'
-    return (
-        f'<!DOCTYPE html>\n<html lang="en"><head>{head}<style>{STYLE}</style></head>\n<body>\n{body}\n</body></html>\n'
-    )
+    style = "\n" + Path(__file__).with_name("page.css").read_text(encoding="utf-8")
+    head = f'<meta charset="utf-8">{phone}<title>{escape(title)}</title><style>{style}</style>'
+    return f'<!DOCTYPE html>\n<html lang="en"><head>{head}</head>\n<body>\n{body}\n</body></html>\n'
 
 
 def _sections(files: Sequence[Path], source: Source | None, warnings: Sequence[str]) -> Iterator[str]:

@@ -8,12 +8,11 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from pathlib import Path
-from types import NoneType, UnionType
-from typing import Any, Literal, Union, get_args, get_origin
+from typing import Any, Literal, get_args, get_origin
 
 from fembeam.beams import ModalDamping, Rayleigh
 from fembeam.scene import FEATURES, Scene
-from fembeam.scene_file.keys import entry_type, parameters, required
+from fembeam.scene_file.keys import entries_of, options, parameters, required
 from fembeam.scene_file.kinds import SECTION, SIGNAL, Nested, nested
 from fembeam.scene_file.study_tables import STUDIES
 from fembeam.scene_file.tables import beam_of_section, snake
@@ -119,17 +118,19 @@ def of_type(hint: Any) -> Schema:
     >>> of_type(tuple[float, float] | None)
     {'type': 'array', 'items': {'type': 'number'}, 'minItems': 2, 'maxItems': 2}
     """
-    origin, inner = get_origin(hint), get_args(hint)
-    if origin in (Union, UnionType):
-        options = [of_type(option) for option in inner if option is not NoneType]
-        distinct = [option for i, option in enumerate(options) if option not in options[:i]]
-        return distinct[0] if len(distinct) == 1 else {"anyOf": distinct}
-    if origin is Literal:
-        return {"enum": list(inner)}
+    found = [_of_option(option) for option in options(hint)]
+    distinct = [one for i, one in enumerate(found) if one not in found[:i]]
+    return distinct[0] if len(distinct) == 1 else {"anyOf": distinct}
+
+
+def _of_option(hint: Any) -> Schema:
+    """One of the types allowed."""
+    if get_origin(hint) is Literal:
+        return {"enum": list(get_args(hint))}
     if hint in SIMPLE:
         return {"type": SIMPLE[hint]}
-    entry = entry_type(hint)
+    entry, count = entries_of(hint)
     if entry is None:
         return {}
-    count = {"minItems": len(inner), "maxItems": len(inner)} if origin is tuple and Ellipsis not in inner else {}
-    return {"type": "array", "items": of_type(entry), **count}
+    fixed = {} if count is None else {"minItems": count, "maxItems": count}
+    return {"type": "array", "items": of_type(entry), **fixed}

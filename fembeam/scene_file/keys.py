@@ -19,13 +19,8 @@ from numpy.typing import NDArray
 Constructors = Mapping[str, Callable[..., Any]]
 
 ARRAYS = np.ndarray, get_origin(NDArray[np.float64])  # from numpy 2.5 on, Python 3.12, an alias is not its meaning
-UNSEEN = {
-    "Model": Any,
-    "Scene": Any,
-    "Executor": Any,
-    "Sequence": Sequence,
-    "Iterable": Iterable,
-}  # names in annotations that exist only for type checkers
+SIMPLE = {float: "a number", int: "a whole number", bool: "true or false", str: "text", Path: "text"}
+UNSEEN = {"Model": Any}  # a name in annotations that exists only for type checkers
 
 
 def parameters(constructor: Callable[..., Any]) -> dict[str, inspect.Parameter]:
@@ -43,70 +38,68 @@ def required(parameters: Mapping[str, inspect.Parameter]) -> list[str]:
     return [key for key, parameter in parameters.items() if parameter.default is inspect.Parameter.empty]
 
 
+def options(hint: Any) -> list[Any]:
+    """The types that an annotation allows, None left out: TOML has none."""
+    if get_origin(hint) not in (Union, UnionType):
+        return [] if hint is NoneType else [hint]
+    return [one for option in get_args(hint) for one in options(option)]
+
+
+def entries_of(hint: Any) -> tuple[Any, int | None]:
+    """Type of the entries of an annotated sequence and their number, None for any; None and None for no sequence."""
+    origin, inner = get_origin(hint), get_args(hint)
+    if origin in ARRAYS:
+        return float, None
+    if origin not in (list, tuple, Sequence, Iterable) or not inner:
+        return None, None
+    count = len(inner) if origin is tuple and Ellipsis not in inner else None
+    return float if float in inner else inner[0], count  # (number of a body, place) are numbers
+
+
 def fits(value: Any, hint: Any) -> bool:
     """Whether a TOML value has the annotated type; whole numbers pass as numbers, true and false do not."""
-    origin, inner = get_origin(hint), get_args(hint)
-    if origin in (Union, UnionType):
-        return any(fits(value, option) for option in inner)
-    if origin is Literal:
-        return value in inner
+    return any(_fits(value, option) for option in options(hint))
+
+
+def _fits(value: Any, hint: Any) -> bool:
+    """Whether a value has one of the types allowed."""
+    if get_origin(hint) is Literal:
+        return value in get_args(hint)
     if hint in (float, int):
         too_long = isinstance(value, int) and value.bit_length() > 1000
         return isinstance(value, (int, hint)) and not isinstance(value, bool) and not too_long
-    if hint in (bool, str):
-        return isinstance(value, hint)
-    if hint is Path:
-        return isinstance(value, str)
-    entry = entry_type(hint)
-    if entry is None or not isinstance(value, list):
-        return False
-    fixed = origin is tuple and Ellipsis not in inner
-    return all(fits(item, entry) for item in value) and (not fixed or len(value) == len(inner))
-
-
-def entry_type(hint: Any) -> Any:
-    """Type of the entries of an annotated sequence; None when it is none."""
-    origin = get_origin(hint)
-    if origin in ARRAYS:
-        return float
-    if origin in (list, tuple, Sequence, Iterable) and get_args(hint):
-        return float if float in get_args(hint) else get_args(hint)[0]  # (number of a body, place) are numbers
-    return None
+    if hint in SIMPLE:
+        return isinstance(value, str if hint is Path else hint)
+    entry, count = entries_of(hint)
+    right = entry is not None and isinstance(value, list) and len(value) == (len(value) if count is None else count)
+    return right and all(fits(item, entry) for item in value)
 
 
 def wanted(hint: Any) -> str:
     """The annotated type as text."""
-    return " or ".join(dict.fromkeys(_words(hint)))
+    return " or ".join(dict.fromkeys(word for option in options(hint) for word in _words(option)))
 
 
 def _words(hint: Any) -> list[str]:
-    """The words of each type an annotation allows."""
-    words = {float: "a number", int: "a whole number", bool: "true or false", str: "text", Path: "text"}
-    origin, inner = get_origin(hint), get_args(hint)
-    if origin in (Union, UnionType):
-        return [word for option in inner if option is not NoneType for word in _words(option)]
-    if origin is Literal:
-        return [repr(option) for option in inner]
-    if hint in words:
-        return [words[hint]]
-    entry = entry_type(hint)
-    if entry is None:
-        return []
+    """The words of one of the types allowed."""
+    if get_origin(hint) is Literal:
+        return [repr(option) for option in get_args(hint)]
+    if hint in SIMPLE:
+        return [SIMPLE[hint]]
+    entry, count = entries_of(hint)
     if get_origin(entry) is Literal:
         return [f"a list of {', '.join(map(repr, get_args(entry)))}"]
-    count = f"{len(inner)} " if origin is tuple and Ellipsis not in inner else ""
-    return [f"a list of {count}{'whole ' if entry is int else ''}numbers"]
+    number = "" if count is None else f"{count} "
+    return [] if entry is None else [f"a list of {number}{'whole ' if entry is int else ''}numbers"]
 
 
 def converted(value: Any, hint: Any) -> Any:
     """Whole numbers as floats where a number is wanted, lists as tuples where a tuple is."""
-    options = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
-    if isinstance(value, list):
-        pair = any(get_origin(option) is tuple for option in options)
-        return tuple(value) if pair else value
-    if isinstance(value, int) and not isinstance(value, bool) and float in options and int not in options:
-        return float(value)
-    return value
+    allowed = options(hint)
+    if isinstance(value, list) and any(get_origin(option) is tuple for option in allowed):
+        return tuple(value)
+    whole = isinstance(value, int) and not isinstance(value, bool)
+    return float(value) if whole and float in allowed and int not in allowed else value
 
 
 def nearest(key: Any, valid: Sequence[str] | Constructors) -> str:

@@ -121,3 +121,8 @@ def built(source: Source, asked: Sequence[str] = ()) -> SceneFile:
         file = SceneFile(source, *reader.contents(tables, STUDIES))
         carried = {name: place.read_bytes() for name, place in places.items()}
         return replace(file, source=replace(source, files=carried))
+
+
+def template(name: str = "scene.toml") -> str:
+    """The annotated file that `fembeam new` writes: it runs as it is, and shows what else a file may hold."""
+    return Path(__file__).with_name("template.toml").read_text(encoding="utf-8").replace("scene.toml", name)

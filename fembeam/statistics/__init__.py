@@ -16,15 +16,6 @@ from fembeam.statistics.spectra import Spectrum, psd
 from fembeam.statistics.streaming import Signal
 
 __all__ = [
-    "Batches",
-    "Density",
-    "Estimate",
-    "Impacts",
-    "Moments",
-    "Signal",
-    "Spectrum",
-    "moments",
-    "pdf",
-    "psd",
+    "Batches", "Density", "Estimate", "Impacts", "Moments", "Signal", "Spectrum", "moments", "pdf", "psd",
     "settling",
-]
+]  # fmt: skip

@@ -18,25 +18,7 @@ from fembeam.study.stability_map import StabilityMap, Verdict, stability_map
 from fembeam.study.stationary import Response, characteristics, stationary
 
 __all__ = [
-    "Basins",
-    "Bifurcation",
-    "Ensemble",
-    "ModeCount",
-    "NoReferenceError",
-    "NotMetError",
-    "Point",
-    "Response",
-    "SmallestModel",
-    "SpeedAccuracy",
-    "StabilityMap",
-    "Verdict",
-    "basins",
-    "bifurcation",
-    "characteristics",
-    "ensemble",
-    "mode_count",
-    "smallest_model",
-    "speed_accuracy",
-    "stability_map",
-    "stationary",
-]
+    "Basins", "Bifurcation", "Ensemble", "ModeCount", "NoReferenceError", "NotMetError", "Point", "Response",
+    "SmallestModel", "SpeedAccuracy", "StabilityMap", "Verdict", "basins", "bifurcation", "characteristics",
+    "ensemble", "mode_count", "smallest_model", "speed_accuracy", "stability_map", "stationary",
+]  # fmt: skip

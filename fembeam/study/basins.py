@@ -12,25 +12,20 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import solvers
 from fembeam import plot
-from fembeam.model import Attractor, Orbit, load_period, observed
+from fembeam.model import Attractor, Model, Orbit, load_period, observed
 from fembeam.study.execution.checkpoint import Checkpoint, identity
 from fembeam.study.execution.executors import spread
 from fembeam.study.result import Result
 from fembeam.support import Part, is_finite, is_whole, require
 from solvers.orbits import delayed
 from solvers.orbits import run as run_from
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from fembeam.model import Model
 
 Vector = NDArray[np.float64]
 WHERE = "basins"
@@ -39,6 +34,7 @@ FIRST = 25  # periods of the shortest runs
 COARSE = 5  # starts along each axis that are settled to find orbits
 TRIES = 12  # starts left over that are settled to find more
 UNSETTLED, FAILED = -1, -2  # labels of starts that came to no orbit, and of runs that failed
+OTHERS = {"not settled": UNSETTLED, "run failed": FAILED}
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,30 +73,26 @@ class Basins(Result):
 
     def _parts(self) -> list[Part]:
         """Attractors with their shares of the starts."""
-        others = (("not settled", UNSETTLED), ("run failed", FAILED))
-        rows = [(one.name, one.count) for one in self.attractors]
-        rows += [(name, count) for name, kind in others if (count := int(np.sum(self.label == kind)))]
-        shares = [(name, count, f"{count / self.label.size:.2%}") for name, count in rows]
         size = " x ".join(map(str, self.label.shape[::-1]))
         spans = [f"{axis.name} from {axis.values[0]:g} to {axis.values[-1]:g}" for axis in (self.x, self.y)]
+        shares = [(row["name"], row["starts"], f"{row['share']:.2%}") for row in self.table()]
         return [f"{size} starts: {', '.join(spans)}", (("comes to", "starts", "share"), shares)]
 
     def table(self) -> list[dict[str, Any]]:
-        """One attractor a row."""
-        return [
-            {"name": one.name, "period": one.period, "impacts": one.impacts, "starts": one.count, "share": share,
-             "state": one.state.tolist()}
-            for one, share in zip(self.attractors, self.shares.tolist(), strict=True)
-        ]  # fmt: skip
+        """One attractor a row, then starts that came to none and runs that failed, if any."""
+        others = [(name, int(np.sum(self.label == kind))) for name, kind in OTHERS.items()]
+        rows = [(one.name, one.period, one.impacts, one.count, one.state.tolist()) for one in self.attractors]
+        rows += [(name, None, None, count, None) for name, count in others if count]
+        names = "name", "period", "impacts", "starts", "state"
+        return [dict(zip(names, row, strict=True)) | {"share": row[3] / self.label.size} for row in rows]
 
     def plain(self) -> dict[str, Any]:
         """Attractors, axes and the label of every start, as JSON has them."""
         axes = {k: {"name": one.name, "values": one.values.tolist()} for k, one in (("x", self.x), ("y", self.y))}
-        return {"attractors": self.table(), **axes, "label": self.label.tolist(), "units": "SI: m, s, N, rad/s"}
+        found = [row for row in self.table() if row["name"] not in OTHERS]
+        return {"attractors": found, **axes, "label": self.label.tolist(), "units": "SI: m, s, N, rad/s"}
 
-    def figure(self) -> Figure:
-        """The map, a colour for each attractor."""
-        return plot.basins(self)
+    figure = plot.basins
 
 
 @dataclass(frozen=True, eq=False)

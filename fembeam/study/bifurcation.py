@@ -9,23 +9,18 @@ from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import solvers
 from fembeam import plot
-from fembeam.model import load_period, observed
+from fembeam.model import Model, load_period, observed
 from fembeam.scene import changes_structure, path_of, with_value
 from fembeam.study.execution.executors import spread
 from fembeam.study.result import Result
 from fembeam.support import Part, require
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from fembeam.model import Model
 
 Vector = NDArray[np.float64]
 LOOKS = 128  # samples per period for the peaks
@@ -60,9 +55,7 @@ class Bifurcation(Result):
         """One period a row, the peak in m."""
         return [{self.name: parameter, "peak": peak} for parameter, peak in zip(*self.cloud(), strict=True)]
 
-    def figure(self) -> Figure:
-        """The peaks of all periods over the parameter."""
-        return plot.bifurcation(self)
+    figure = plot.bifurcation
 
     def cloud(self) -> tuple[Vector, Vector]:
         """(parameter, peak) of every period, flat, as `fembeam.plot.branch` takes it."""

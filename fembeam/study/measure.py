@@ -15,26 +15,21 @@ from dataclasses import dataclass, fields, replace
 from functools import partial
 from itertools import pairwise
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 import solvers
-from fembeam.model import load_period
+from fembeam.model import Model, Run, load_period
 from fembeam.response import Readout, latched_before
-from fembeam.scene import signals_of
+from fembeam.scene import Scene, signals_of
 from fembeam.study.quantities import Quantity, label
 from fembeam.study.realisations import child, renewed
 from fembeam.support import require, require_non_negative, require_positive
 
-if TYPE_CHECKING:
-    import fembeam
-    from fembeam.model import Model, Run
-    from fembeam.scene import Scene
-
 Vector = NDArray[np.float64]
-Start = Callable[["fembeam.Model"], Any]
+Start = Callable[[Model], Any]
 
 SETTLING, GROUPS, GROUP = 240, 10, 12  # drive periods before, number of groups, periods in each
 SAMPLES = 128  # per drive period

@@ -16,22 +16,18 @@ import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
 import solvers
 from fembeam import plot
+from fembeam.scene import Scene
 from fembeam.study.execution.executors import spread
 from fembeam.study.measure import Case, Measured, Plan, Start, measure
 from fembeam.study.quantities import Quantity, label, named
 from fembeam.study.result import Result
 from fembeam.support import Part, is_whole, require
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from fembeam.scene import Scene
 
 LOOSER = 10.0  # times the tolerance, in the second run of the reference
 LOOSEST = 1e-2  # the largest tolerance that methods take
@@ -161,9 +157,7 @@ class ModeCount(Result):
             for row in self.rows
         ]
 
-    def figure(self) -> Figure:
-        """Error and time against the number of coordinates."""
-        return plot.mode_count(self)
+    figure = plot.mode_count
 
 
 def mode_count(

@@ -10,87 +10,87 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fembeam.model import Run, extremes_of
+from fembeam.statistics import psd
 from fembeam.support import require
 
-if TYPE_CHECKING:
-    import fembeam
-    from fembeam.model import Run
-
 Vector = NDArray[np.float64]
-Quantity = Callable[["fembeam.Run"], Any]
+Quantity = Callable[[Run], Any]
 
 PROBABILITIES = np.arange(1, 20) / 20
 
 
 @dataclass(frozen=True)
-class Amplitude:
-    """Half the range of δ (or u at `z`), m; extremes between samples by cubics."""
+class OfSignal:
+    """What is read off δ of a stop, or u at `z`."""
 
     stop: int = 0
     z: float | None = None
     sampled: ClassVar[bool] = True
 
+    def signal(self, run: Run) -> tuple[Vector, Vector]:
+        """The signal and its rate."""
+        return signal(run, self.stop, self.z)
+
+
+@dataclass(frozen=True)
+class OfContacts:
+    """What is read off the log of one stop's contacts."""
+
+    stop: int = 0
+    sampled: ClassVar[bool] = False
+
+    def mine(self, run: Run) -> Any:
+        """(c,) which contacts of the log are those of the stop."""
+        return run.contacts.stop == self.stop
+
+
+class Amplitude(OfSignal):
+    """Half the range of δ (or u at `z`), m; extremes between samples by cubics."""
+
     def __call__(self, run: Run) -> float:
         """Value of a run."""
-        from fembeam.model import extremes_of
-
-        lowest, highest = extremes_of(run.t, *signal(run, self.stop, self.z))
+        lowest, highest = extremes_of(run.t, *self.signal(run))
         return (highest - lowest) / 2
 
 
-@dataclass(frozen=True)
-class PeakForce:
+class PeakForce(OfContacts):
     """Largest contact force of one stop, N; 0 without contact."""
 
-    stop: int = 0
-    sampled: ClassVar[bool] = False
-
     def __call__(self, run: Run) -> float:
         """Value of a run."""
-        return float(run.contacts.peak_force[run.contacts.stop == self.stop].max(initial=0.0))
+        return float(run.contacts.peak_force[self.mine(run)].max(initial=0.0))
 
 
-@dataclass(frozen=True)
-class MeanForce:
+class MeanForce(OfContacts):
     """Mean of the peak forces of one stop's contacts, N; NaN without contact. Random response: far less scatter."""
 
-    stop: int = 0
-    sampled: ClassVar[bool] = False
-
     def __call__(self, run: Run) -> float:
         """Value of a run."""
-        return _mean(run.contacts.peak_force[run.contacts.stop == self.stop])
+        return _mean(run.contacts.peak_force[self.mine(run)])
 
 
-@dataclass(frozen=True)
-class ContactTime:
+class ContactTime(OfContacts):
     """Mean duration of one stop's contacts that ended, s; NaN without contact."""
-
-    stop: int = 0
-    sampled: ClassVar[bool] = False
 
     def __call__(self, run: Run) -> float:
         """Value of a run."""
         log = run.contacts
-        durations = (log.t_out - log.t_in)[log.stop == self.stop]
+        durations = (log.t_out - log.t_in)[self.mine(run)]
         return _mean(durations[np.isfinite(durations)])
 
 
-@dataclass(frozen=True)
-class ImpactRate:
+class ImpactRate(OfContacts):
     """Contacts of one stop per second."""
-
-    stop: int = 0
-    sampled: ClassVar[bool] = False
 
     def __call__(self, run: Run) -> float:
         """Value of a run."""
-        return float(np.sum(run.contacts.stop == self.stop)) / float(run.t[-1])
+        return float(np.sum(self.mine(run))) / float(run.t[-1])
 
 
 @dataclass(frozen=True)
@@ -113,8 +113,6 @@ class Psd:
 
     def __call__(self, run: Run) -> Vector:
         """Value of a run."""
-        from fembeam.statistics import psd
-
         dt = float(run.t[1] - run.t[0])
         fits = self.band[1] * dt < np.pi
         require(fits, f"dt must be below {np.pi / self.band[1]:.3g} s for a band to {self.band[1]:g} rad/s", dt, "Psd",
@@ -129,17 +127,12 @@ class Psd:
         return np.array([spectrum.variance_in(lo, hi) for lo, hi in pairwise(edges)]) / width
 
 
-@dataclass(frozen=True)
-class Density:
+class Density(OfSignal):
     """The density of δ (or u at `z`) as its quantiles at 5, 10, … 95 %, m: (19,); needs no bins."""
-
-    stop: int = 0
-    z: float | None = None
-    sampled: ClassVar[bool] = True
 
     def __call__(self, run: Run) -> Vector:
         """Value of a run."""
-        return np.asarray(np.quantile(signal(run, self.stop, self.z)[0], PROBABILITIES))
+        return np.asarray(np.quantile(self.signal(run)[0], PROBABILITIES))
 
 
 @dataclass(frozen=True)

@@ -13,28 +13,23 @@ against twice the modes and a hundredth of rtol.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 import solvers
 from fembeam import plot
+from fembeam.model import Model
+from fembeam.scene import Scene
 from fembeam.study.execution.executors import spread
 from fembeam.study.measure import Case, Measured, Plan, Start, measure
 from fembeam.study.mode_count import check_comparable, difference, kinds_of
 from fembeam.study.quantities import Quantity, label, named
 from fembeam.study.result import Result
 from fembeam.support import Part, is_finite, is_whole, require
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from matplotlib.figure import Figure
-
-    from fembeam.model import Model
-    from fembeam.scene import Scene
 
 HEAD = "modes", "static", "rtol", "value", "error", "± (95 %)", "seconds", ""
 MOST = 64  # modes offered as an answer; the ladder goes twice as far
@@ -143,9 +138,7 @@ class SmallestModel(Result):
             for line in getattr(self, part)
         ]  # fmt: skip
 
-    def figure(self) -> Figure:
-        """Errors against coordinates and against rtol, with the tolerance."""
-        return plot.smallest_model(self)
+    figure = plot.smallest_model
 
 
 class NotMetError(RuntimeError):

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import MISSING, dataclass, field, fields
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,9 +17,6 @@ from fembeam import plot
 from fembeam.model import Model, Run
 from fembeam.study.result import Result
 from fembeam.support import Part, counting, require, require_positive
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 Vector = NDArray[np.float64]
 PATIENCE, MORE_PATIENCE = 20.0, 0.2  # s one setting may take per model for its first round, and for further ones
@@ -140,9 +137,7 @@ class SpeedAccuracy(Result):
 
     rows = table
 
-    def figure(self) -> Figure:
-        """Error against time, a point each."""
-        return plot.speed_accuracy(self)
+    figure = plot.speed_accuracy
 
 
 def end_displacement(run: Run) -> Vector:

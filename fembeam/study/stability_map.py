@@ -5,22 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import solvers
 from fembeam import plot
+from fembeam.model import Model
+from fembeam.scene import Scene
 from fembeam.study.result import Result
 from fembeam.study.speed_accuracy import method_name
 from fembeam.support import Part, require
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from fembeam.model import Model
-    from fembeam.scene import Scene
 
 Vector = NDArray[np.float64]
 SAMPLES = 400  # per run, for the error
@@ -82,9 +78,7 @@ class StabilityMap(Result):
             for j, step in enumerate(self.steps)
         ]
 
-    def figure(self) -> Figure:
-        """The map, with the predicted limits."""
-        return plot.stability_map(self)
+    figure = plot.stability_map
 
 
 def stability_map(

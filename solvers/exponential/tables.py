@@ -158,9 +158,11 @@ def build(
     node_sets = node_sets_of(series)
     blocks = blocks_of(problem, tones, h, contact_h, node_sets)
     cell_error, cell_error_signal = cell_errors(problem, dt_cell)
+    ready = {**node_sets._asdict(), **blocks._asdict(), **laws._asdict()}  # `alias` is that of the blocks
+    signal_rows, power_rows, loss_rows = energy_rows
     return Tables(
+        **{name: ready[name] for name in Tables._fields if name in ready},
         flight_step=h,
-        flight_propagator=blocks.flight_propagator,
         signal=_in_eights(signal_responses(problem, h).reshape(len(h), len(problem.load), 6, 2, size)),
         cell=_in_eights(_cell(problem, dt_cell)),
         cell_signal=_in_eights(quintic_responses(problem, dt_cell)),
@@ -176,38 +178,13 @@ def build(
         fastest=fastest,
         own_blocks=float(size - tones),
         accelerance=-problem.read_rate @ problem.push.T,
-        **laws._asdict(),
         contact_step=contact_h,
-        contact_propagator=blocks.contact_propagator,
-        time_exponent=node_sets.time_exponent,
-        weight_exponent=node_sets.weight_exponent,
-        nodes=node_sets.nodes,
-        times=node_sets.times,
-        weights=node_sets.weights,
-        plain=node_sets.plain,
-        work=node_sets.work,
-        work_end=node_sets.work_end,
-        summary=node_sets.summary,
-        lagrange=node_sets.lagrange,
-        tail=node_sets.tail,
-        local_interpolation=node_sets.local_interpolation,
-        local_interval=node_sets.local_interval,
-        kind=node_sets.kind,
-        entering=node_sets.entering,
-        free=blocks.free,
-        forced=blocks.forced,
-        end_response=blocks.end_response,
-        node_propagator=blocks.node_propagator,
-        block_response=blocks.block_response,
-        block_end_response=blocks.block_end_response,
-        alias=blocks.alias,
         ripple_weight=_ripple_weight(problem.read, omega),
-        signal_rows=energy_rows[0],
-        power_rows=energy_rows[1],
-        loss_rows=energy_rows[2],
+        signal_rows=signal_rows,
+        power_rows=power_rows,
+        loss_rows=loss_rows,
         steady_rate=np.zeros((2 * tones, padded(size - tones))),
         gauss=_gauss_rule(),
-        extrapolation=node_sets.extrapolation,
     )
 
 

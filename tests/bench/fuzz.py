@@ -30,7 +30,7 @@ import numpy as np
 import solvers
 from fembeam.cli import commands as cli
 from fembeam.scene import Source
-from fembeam.scene_file import TEMPLATE, SceneFile, SceneFileError, built
+from fembeam.scene_file import SceneFile, SceneFileError, built, template
 
 HOME = Path(__file__).resolve().parent.parent.parent
 sys.path.insert(0, str(HOME / "tests" / "bench"))
@@ -103,10 +103,8 @@ class HangError(BaseException):
 def seeds() -> list[str]:
     """The files that are mutated."""
     example = (HOME / "examples" / "beam_stop.toml").read_text(encoding="utf-8")
-    full = re.sub(
-        r"^# (?=\[\[|(?!solver)\w+ = )", "", TEMPLATE.split("# [mode")[0].format(name="x"), flags=re.MULTILINE
-    )
-    texts = [example, TEMPLATE.format(name="x"), full, example + STUDIES]
+    full = re.sub(r"^# (?=\[\[|(?!solver)\w+ = )", "", template().split("# [mode")[0], flags=re.MULTILINE)
+    texts = [example, template(), full, example + STUDIES]
     for text in texts:
         built(Source(Path("scene.toml"), text))
     return texts
