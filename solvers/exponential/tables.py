@@ -31,6 +31,7 @@ STIFFNESS, EXPONENT, FACTOR, DAMPING = range(4)  # of an inlined law
 TAYLOR_REACH = 0.02  # |λ| x up to which a Taylor step of order 6 is exact to rounding
 _MOST_RADIANS = 2000.0  # largest contact step in units of 1/|λ|
 _CONTACT_REACH = 1e-6  # smallest one in the same units, and not above
+_SLOWEST = 1e-9  # of the fastest rate: with slower ones the tables would only grow
 _SHORT = 1e-9  # s: a stop may be far stiffer than the structure
 
 
@@ -70,7 +71,7 @@ class Tables(NamedTuple):
     plain: Any  # (f, S): the same of a force without the weight σ^λ
     summary: Any  # (f, S, 8): from node values, the last four Jacobi coefficients, both ends' values, both slopes
     lagrange: Any  # (f, 2, S): 1/Π (σ_j - σ_i) of the nodes' polynomials, and the same over σ_j^λ
-    tail: Any  # (f, S, 8): from node values of a signal, the last four Legendre coefficients in σ
+    tail: Any  # (f, S, 8): from node values of a signal, its Legendre coefficients in σ, the last four first
     local_interpolation: (
         Any  # (f, S, 2S + 2, 2S): δ and h δ̇ at points around a node from those at all nodes and at the start
     )
@@ -256,7 +257,8 @@ def _steps_of(omegas: bytes, dampings: bytes, doublings: int) -> tuple[Any, Any]
     """Steps for the frequencies and dampings of a structure, and for tones faster by some octaves."""
     omega, damping = np.frombuffer(omegas), np.frombuffer(dampings)
     fastest = max(float((omega + damping).max()), 1e-3)
-    moving = np.concatenate((omega[omega > 0], damping[damping > 0]))
+    rates = np.concatenate((omega, damping))
+    moving = rates[rates > _SLOWEST * fastest]
     fastest *= 2.0**doublings
     longest = 4.0 * math.pi / (moving.min() if moving.size else fastest)
     levels = 2 + math.ceil(4.0 * math.log2(longest * fastest / TAYLOR_REACH))
