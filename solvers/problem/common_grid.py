@@ -4,7 +4,8 @@ The quintics of a table join with continuous curvature; their third to fifth der
 do where the signal is smooth on its grid, and much where kinks of a record are rounded or a user's table is coarse. A
 quintic of another grid that goes across a node cannot jump there. So the grid divides that of the roughest table, and
 the others are carried over such that their moments ∫ s tᵏ dt, k = 0 ... 5, stay around each of their nodes. Of the
-response to a jump of the third derivative, at the frequency ω, a part of (ω dt)^10/10⁸ is then wrong.
+response to a jump of the third derivative, at the frequency ω, a part of (ω dt)^10/10⁸ is then wrong, and within a cell
+of the node more. Two coarse tables of unequal steps are therefore cut finely.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from solvers.problem.matrices import Array
 from solvers.problem.signals import Forcing
 
 _ROUGH = 1e-2  # jump of the third derivative in units of max|s|/dt³; of a smooth signal at most 1e-3 (rtol <= 1e-6)
+_FEWEST_CELLS = 4096  # where two tables are rough: what is left falls with the fourth power of the step
 
 
 def on_one_grid(forcing: Forcing, duration: float) -> Forcing:
@@ -25,7 +27,7 @@ def on_one_grid(forcing: Forcing, duration: float) -> Forcing:
     if not forcing.table_dt.size or np.ptp(forcing.table_dt) == 0.0:
         return forcing
     given, steps = np.split(forcing.table, forcing.table_start[1:-1]), forcing.table_dt.tolist()
-    dt = _common_step(given, steps)
+    dt = _common_step(given, steps, duration)
     cells = math.ceil(duration / dt * (1.0 - 1e-12))
     tables = [
         rows[: cells + 1] if own == dt else _carried_over(rows, own, dt, cells)
@@ -39,12 +41,16 @@ def on_one_grid(forcing: Forcing, duration: float) -> Forcing:
     )
 
 
-def _common_step(tables: list[Array], steps: list[float]) -> float:
-    """The finest step, or not above it a part of the step of the roughest table."""
-    sizes = [np.abs(_jumps(rows, own)[:, 0]).max(initial=0.0) * own**3 for rows, own in zip(tables, steps, strict=True)]
-    rough = [size / max(np.abs(rows[:, 0]).max(), 1e-300) for size, rows in zip(sizes, tables, strict=True)]
-    worst, finest = int(np.argmax(rough)), min(steps)
-    return steps[worst] / math.ceil(steps[worst] / finest * (1.0 - 1e-12)) if rough[worst] > _ROUGH else finest
+def _common_step(tables: list[Array], steps: list[float], duration: float) -> float:
+    """The finest step, or not above it a part of the step of the roughest table; shorter where others are rough too."""
+    jumps = [np.abs(_jumps(rows, own)[:, 0]).max(initial=0.0) * own**3 for rows, own in zip(tables, steps, strict=True)]
+    rough = [jump / max(np.abs(rows[:, 0]).max(), 1e-300) for jump, rows in zip(jumps, tables, strict=True)]
+    worst, most = int(np.argmax(rough)), min(steps)
+    if rough[worst] <= _ROUGH:
+        return most
+    if np.count_nonzero(np.array(rough) > _ROUGH) > 1:
+        most = min(most, duration / _FEWEST_CELLS)
+    return steps[worst] / math.ceil(steps[worst] / most * (1.0 - 1e-12))
 
 
 def _carried_over(rows: Array, own: float, dt: float, cells: int) -> Array:
