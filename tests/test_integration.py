@@ -212,8 +212,13 @@ def test_sampling_interval_that_does_not_divide_the_duration():
     run = integrate(System.modal([2.0], 0.0), [1.0], [0.0], 1.0, dt=0.3)
     np.testing.assert_allclose(run.t, [0.0, 0.3, 0.6, 0.9], rtol=1e-15)
     np.testing.assert_allclose(run.q[:, 0], np.cos(2 * run.t), atol=1e-7)
-    longer = integrate(System.modal([2.0], 0.0), [1.0], [0.0], 1.0, dt=1.5)
-    assert longer.t.tolist() == [0.0]
+    whole = integrate(System.modal([2.0], 0.0), [1.0], [0.0], 1.0, dt=1.0)
+    assert whole.t.tolist() == [0.0, 1.0]
+
+
+def test_sampling_interval_longer_than_the_duration_is_refused():
+    with pytest.raises(ValueError, match=r"dt = 1\.5 s is longer than the duration of 1 s.*or leave dt out"):
+        integrate(System.modal([2.0], 0.0), [1.0], [0.0], 1.0, dt=1.5)
 
 
 @pytest.mark.parametrize(

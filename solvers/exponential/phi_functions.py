@@ -59,9 +59,13 @@ def _polynomial_responses(stiffnesses: bytes, dampings: bytes, load: bytes, step
 
 
 def _phi(Z: Any) -> list[Any]:
-    """φ_0(Z) ... φ_6(Z) of a stack of 2x2 matrices, φ_k(Z) = Σ_i Z^i/(i + k)!."""
-    halvings = max(0, math.ceil(math.log2(max(np.abs(Z).sum(axis=-1).max(), 1e-300))) + 1)
-    small = Z / 2.0**halvings
+    """φ_0(Z) ... φ_6(Z) of a stack of 2x2 matrices, φ_k(Z) = Σ_i Z^i/(i + k)!.
+
+    Each matrix is halved as often as it needs: every further halving would lose a bit of Z beside I.
+    """
+    sizes = np.maximum(np.abs(Z).sum(axis=-1).max(axis=-1), 1e-300)
+    halvings = np.maximum(np.ceil(np.log2(sizes)) + 1.0, 0.0)
+    small = Z * 2.0 ** -halvings[..., None, None]
     phi = []
     for k in range(7):
         term = np.broadcast_to(np.eye(2), Z.shape) / math.factorial(k)
@@ -70,10 +74,10 @@ def _phi(Z: Any) -> list[Any]:
             term = term @ small / (i + k)
             total = total + term
         phi.append(total)
-    for _ in range(halvings):
-        doubled = [phi[0] @ phi[0]]
-        for k in range(1, 7):
-            rest = sum(phi[j] / math.factorial(k - j) for j in range(1, k + 1))
-            doubled.append((phi[0] @ phi[k] + rest) / 2.0**k)
-        phi = doubled
+    for i in range(int(halvings.max())):
+        some = halvings > i
+        halves = [part[some] for part in phi]
+        for k in range(7):
+            rest = sum(halves[j] / math.factorial(k - j) for j in range(1, k + 1))
+            phi[k][some] = (halves[0] @ halves[k] + rest) / 2.0**k
     return phi

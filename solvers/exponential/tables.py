@@ -31,6 +31,7 @@ STIFFNESS, EXPONENT, FACTOR, DAMPING = range(4)  # of an inlined law
 TAYLOR_REACH = 0.02  # |λ| x up to which a Taylor step of order 6 is exact to rounding
 _MOST_RADIANS = 2000.0  # largest contact step in units of 1/|λ|
 _CONTACT_REACH = 1e-6  # smallest one in the same units, and not above
+_SLOWEST = 1e-9  # of the fastest rate: with slower ones the tables would only grow
 _SHORT = 1e-9  # s: a stop may be far stiffer than the structure
 
 
@@ -72,7 +73,7 @@ class Tables(NamedTuple):
     work_end: Annotated[Any, "f, S"]
     summary: Annotated[Any, "f, S, 8"]  # from node values: last four Jacobi coefficients, ends' values, slopes
     lagrange: Annotated[Any, "f, 2, S"]  # 1/Π (σ_j - σ_i) of the nodes' polynomials, and the same over σ_j^λ
-    tail: Annotated[Any, "f, S, 8"]  # from node values of a signal, the last four Legendre coefficients in σ
+    tail: Annotated[Any, "f, S, 8"]  # from node values of a signal, its Legendre coefficients in σ, the last four first
     local_interpolation: Annotated[Any, "f, S, 2*S+2, 2*S"]  # δ, h δ̇ around a node from those at all and the start
     local_interval: Annotated[Any, "f, S, 2"]  # the interval of σ these points span
     kind: Annotated[Any, "int f"]  # of kinds, and of weightings of plain forces; see `contact.nodes.NodeSets`
@@ -233,7 +234,8 @@ def _steps_of(omegas: bytes, dampings: bytes, doublings: int) -> tuple[Any, Any]
     """Steps for the frequencies and dampings of a structure, and for tones faster by some octaves."""
     omega, damping = np.frombuffer(omegas), np.frombuffer(dampings)
     fastest = max(float((omega + damping).max()), 1e-3)
-    moving = np.concatenate((omega[omega > 0], damping[damping > 0]))
+    rates = np.concatenate((omega, damping))
+    moving = rates[rates > _SLOWEST * fastest]
     fastest *= 2.0**doublings
     longest = 4.0 * math.pi / (moving.min() if moving.size else fastest)
     levels = 2 + math.ceil(4.0 * math.log2(longest * fastest / TAYLOR_REACH))

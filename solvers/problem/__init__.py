@@ -3,10 +3,12 @@
 M q'' + C q' + K q = Σ v_l s_l(t) + Σ w_c F_c(-w_c·q - gap_c, ...)
 
 `system` holds matrices, contacts and loads and decouples them into blocks, `signals` samples loads for compiled code,
-`memo` keeps what was computed once, `result` is the solution with its log of contacts and its energies,
-`losses` the energy that contacts dissipated. Imports: numpy, scipy. Begin with `system.System`.
+`common_grid` puts the samples of several on one grid, `memo` keeps what was computed once, `result` is the solution
+with its log of contacts and its energies, `losses` the energy that contacts dissipated. Imports: numpy, scipy. Begin
+with `system.System`.
 """
 
+from solvers.problem.common_grid import on_one_grid
 from solvers.problem.decoupling import decouple
 from solvers.problem.frames import dataframe, optional
 from solvers.problem.losses import Losses, renew
@@ -23,5 +25,5 @@ from solvers.problem.result import (
     Transitions,
     counted,
 )
-from solvers.problem.signals import Forcing, forcing_of, on_one_grid, tones_as_nodes
+from solvers.problem.signals import Forcing, forcing_of, tones_as_nodes
 from solvers.problem.system import Contact, Law, Parameter, System, require_step

@@ -36,14 +36,15 @@ def decouple(M: Array, C: Array, K: Array) -> Blocks:
     if np.abs(spread).max(initial=0.0) <= 1e-12 * np.abs(damping).max(initial=0.0):
         zero = np.zeros((n, n))
         inverse = phi.T @ M
+        terms = np.sqrt(np.abs(k)) + np.diag(_terms(phi, C))
         return Blocks(
             k,
-            np.diag(damping).copy(),
+            _without_rounding(np.diag(damping), terms),
             np.block([[phi, zero], [zero, phi]]),
             np.block([[inverse, zero], [zero, inverse]]),
             np.empty((0, 0)),
         )
-    return _state_blocks(phi, k, damping)
+    return _state_blocks(phi, k, damping, C)
 
 
 def _is_diagonal(matrix: Array) -> bool:
@@ -60,7 +61,21 @@ def _modes(M: Array, K: Array) -> tuple[Array, Array]:
     return phi, k
 
 
-def _state_blocks(phi: Array, k: Array, damping: Array) -> Blocks:
+def _terms(phi: Array, C: Array) -> Array:
+    """Sums of the sizes of all terms of φᵀ C φ: eps times them is its rounding."""
+    sizes: Array = np.abs(phi).T @ np.abs(C) @ np.abs(phi)
+    return sizes
+
+
+def _without_rounding(c: Array, terms: Array) -> Array:
+    """Dampings, those set to zero that are no more than the rounding of the terms they are sums of.
+
+    A dashpot on a node of a mode leaves such a c, of either sign, instead of none.
+    """
+    return np.where(np.abs(c) <= 4 * c.size * np.finfo(float).eps * terms, 0.0, c)
+
+
+def _state_blocks(phi: Array, k: Array, damping: Array, C: Array) -> Blocks:
     """Blocks of the state matrix [[0, I], [-diag(k), -damping]] whose damping couples the modes."""
     order = np.argsort(k != 0.0, kind="stable")  # rigid-body modes first
     phi, k, damping = phi[:, order], k[order], damping[np.ix_(order, order)]
@@ -100,10 +115,12 @@ def _state_blocks(phi: Array, k: Array, damping: Array) -> Blocks:
     loss = np.zeros((2 * (free + n), 2 * (free + n)))
     places = np.concatenate((free + np.arange(n), 2 * free + n + np.arange(n)))
     loss[np.ix_(places, places)] = columns[n:].T @ damping @ columns[n:]
+    sizes = np.block([[np.zeros((n, n)), np.eye(n)], [np.diag(np.abs(k)), _terms(phi, C)]])
+    errors = np.sum(np.abs(np.linalg.inv(vectors)) @ sizes * np.abs(vectors).T, axis=1)  # of λ, in units of eps
+    terms = np.concatenate((np.zeros(free), errors[complex_ones], np.zeros(half)))
     none = [0.0] * free
-    return Blocks(
-        np.array(none + [p[0] for p in pairs]), np.array(none + [p[1] for p in pairs]), T, np.linalg.inv(T), loss
-    )
+    c = _without_rounding(np.array(none + [p[1] for p in pairs]), terms)
+    return Blocks(np.array(none + [p[0] for p in pairs]), c, T, np.linalg.inv(T), loss)
 
 
 def _floating(phi: Array, k: Array, damping: Array) -> tuple[Array, Array, int]:

@@ -78,6 +78,11 @@ def output_times(duration: float, dt: Any) -> Array | None:
         return _given_times(duration, dt)
     if not 0.0 < dt < math.inf:
         raise ValueError(f"dt must be positive and finite (s), got {dt!r}")
+    if dt > duration * (1.0 + 1e-12):
+        raise ValueError(
+            f"dt = {dt:g} s is longer than the duration of {duration:g} s, so that only the start would be sampled; "
+            "choose a smaller dt, give output times, or leave dt out for the end alone"
+        )
     count = math.floor(duration / dt * (1.0 + 1e-12)) + 1
     if count > _MOST_SAMPLES:
         raise ValueError(f"dt = {dt:g} s over {duration:g} s asks for {count} samples; choose a larger dt")

@@ -6,13 +6,19 @@ A signal is any callable t -> value that broadcasts. It becomes exactly one of
 * *nodes*: ``signal.nodes(duration, rtol) -> (dt, (N, 3))``, rows [s, s', s''] at t = 0, dt, ...; between them the
   quintic through both ends' values, slopes and curvatures, within ``rtol`` times the signal's size, in the mean
   square at least;
-* nothing of either: sampled here by a quintic spline, refined until it agrees between its nodes. The first grid has 64
-  cells: what is shorter than duration/64, such as a pulse, may hide between them and needs ``nodes``.
+* nothing of either: sampled here by a quintic spline, refined until it agrees between its nodes at 4096 places or more.
+  What is shorter than duration/4096, such as a pulse, may hide between these and needs ``nodes``. Where the signal or
+  its slope jumps, no spline agrees to a small tolerance, and the signal is refused.
+
+A node table declares all that a signal does. Flight of `Exponential` crosses it cell by cell, its contact steps are
+compared with every node they pass, and `DormandPrince` keeps its steps to a few nodes or to where the signal is
+constant: so neither passes over a part of it, however short, even at rest. Methods of constant step know a signal only
+where their steps evaluate it.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,6 +27,7 @@ from solvers.problem.matrices import Array
 from solvers.problem.system import Signal
 
 _MOST_NODES = 20_000_000
+_FEWEST_PLACES = 4096  # where a plain callable is compared with its spline
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,38 +98,6 @@ def tones_as_nodes(forcing: Forcing, chosen: list[int], duration: float, rtol: f
     )
 
 
-def on_one_grid(forcing: Forcing, duration: float) -> Forcing:
-    """The same forcing with every node table on the finest table's grid; coarser quintics are evaluated there."""
-    if not forcing.table_dt.size or np.ptp(forcing.table_dt) == 0.0:
-        return forcing
-    dt = forcing.table_dt.min()
-    cells = int(np.ceil(duration / dt * (1.0 - 1e-12)))
-    tables = []
-    for j, own in enumerate(forcing.table_dt):
-        rows = forcing.table[forcing.table_start[j] : forcing.table_start[j + 1]]
-        tables.append(rows[: cells + 1] if own == dt else _quintic(rows, own, np.arange(cells + 1) * dt))
-    starts = np.cumsum([0] + [len(table) for table in tables]).astype(np.int64)
-    return replace(
-        forcing,
-        table=np.ascontiguousarray(np.concatenate(tables)),
-        table_dt=np.full(len(tables), dt),
-        table_start=starts,
-    )
-
-
-def _quintic(rows: Array, dt: float, t: Array) -> Array:
-    """s, s', s'' of a node table's quintics at times t; SciPy's BPoly takes 50 times as long, cell by cell."""
-    cell = np.clip((t / dt).astype(np.int64), 0, len(rows) - 2)
-    x = t / dt - cell
-    (a0, a1, a2), (b0, b1, b2) = ((rows[i] * (1.0, dt, 0.5 * dt**2)).T for i in (cell, cell + 1))
-    e0, e1, e2 = b0 - a0 - a1 - a2, b1 - a1 - 2.0 * a2, b2 - a2
-    c3, c4, c5 = 10.0 * e0 - 4.0 * e1 + e2, -15.0 * e0 + 7.0 * e1 - 2.0 * e2, 6.0 * e0 - 3.0 * e1 + e2
-    value = a0 + x * (a1 + x * (a2 + x * (c3 + x * (c4 + x * c5))))
-    slope = a1 + x * (2.0 * a2 + x * (3.0 * c3 + x * (4.0 * c4 + x * 5.0 * c5)))
-    bend = 2.0 * a2 + x * (6.0 * c3 + x * (12.0 * c4 + x * 20.0 * c5))
-    return np.stack([value, slope / dt, bend / dt**2], axis=1)
-
-
 def _check_nodes(rows: Array, dt: float, duration: float, load: int) -> None:
     """A node table is finite and covers the run."""
     if not np.all(np.isfinite(rows)):
@@ -146,7 +121,8 @@ def _sample(signal: Signal, duration: float, rtol: float, load: int) -> tuple[fl
             raise ValueError(f"the signal of load {load} is {values[~np.isfinite(values)][0]} on [0, {duration:g}] s")
         spline = make_interp_spline(t, values, k=5)
         # thirds rather than midpoints, so that no period of the signal hides between the samples
-        between = t[:-1] + duration / cells * np.where(np.arange(cells) % 2, 1 / 3, 0.58)
+        places = np.arange(max(cells, _FEWEST_PLACES))
+        between = (places + np.where(places % 2, 1 / 3, 0.58)) * (duration / len(places))
         error = np.abs(spline(between) - signal(between)).max()
         if error <= rtol * np.abs(values).max():
             return duration / cells, np.stack([values, spline(t, 1), spline(t, 2)], axis=1)

@@ -17,6 +17,7 @@ from solvers.compiled.kernels import (
     REAL,
     VECTOR,
     entry,
+    inlined,
     inner,
     merged,
     rhs,
@@ -48,6 +49,8 @@ from solvers.stepping.events import (
 from solvers.stepping.henon import hermite
 from solvers.stepping.henon import land as henon_landing
 from solvers.stepping.located import NEAR_END, SWITCHED, accept, find, first_kink, land, look
+
+_MOST_NODES = 16.0  # of a signal on a step: a period of its fastest part has ten and more
 
 STEP_FUNCTION = types.FunctionType(
     types.Tuple([REAL, types.int64])(
@@ -99,6 +102,31 @@ def _first_event(problem, state, space, adaptive):
         if place == 0.0 or place < theta:
             return place, element, direction, level, border
     return theta, stop, direction, level, -1
+
+
+@inner
+def _span_seen(problem, t, longest):
+    """The longest step up to ``longest`` that passes over no part of a sampled signal.
+
+    It ends where a signal ceases to be constant, or has a few of its nodes.
+    """
+    for j in range(problem.table_dt.size):
+        dt, start, last = problem.table_dt[j], problem.table_start[j], problem.table_start[j + 1] - 1
+        first = min(start + int(t / dt + 1e-9), last)
+        node = first
+        while node < last and (node - start) * dt < t + longest and _constant(problem.table, node):
+            node += 1
+        longest = min(longest, (node - start) * dt - t if node > first else _MOST_NODES * dt)
+    return longest
+
+
+@inlined
+def _constant(table, node):
+    """Whether a signal is constant from a node to the next one."""
+    still = table[node, 0] == table[node + 1, 0]
+    for order in range(1, 3):
+        still &= table[node, order] == 0.0 and table[node + 1, order] == 0.0
+    return still
 
 
 @merged
@@ -161,6 +189,8 @@ def march(
         phase = H_CONTACT if in_contact(state) else H_FLIGHT
         nearest = nearest if phase == H_CONTACT else 0.0
         h = min(now[phase], dt_contact if phase == H_CONTACT else dt_flight, t_end - now[T])
+        if adaptive:
+            h = _span_seen(problem, now[T], h)
         if h < 4e-15 * now[T] and h < t_end - now[T]:
             return LAW_NOT_FINITE if not_finite else STEP_TOO_SMALL
         error, calls = step(

@@ -8,16 +8,32 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.optimize import brentq
 
 import fembeam as fb
 from contacts import PUBLISHED, Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, Tabulated, Viscoelastic, law
 from solvers import Contact, System
+
+SAMPLED_FROM = 100_000  # the first seed of `draw_sampled`; what one below stands for has stayed
 
 
 @law(exponent=1.5)
 def softening(delta, delta_dot, entry_rate, stiffness, loss, scale):
     """A user's law: Hertz with a loss, softening with depth."""
     return stiffness * delta * math.sqrt(delta) * (1.0 + loss * delta_dot / entry_rate) / (1.0 + delta / scale)
+
+
+class Table:
+    """A load that is a node table."""
+
+    def __init__(self, dt: float, rows: Any) -> None:
+        self.dt, self.rows = dt, rows
+
+    def __call__(self, t: Any) -> Any:
+        raise NotImplementedError
+
+    def nodes(self, duration: float, rtol: float) -> tuple[float, Any]:
+        return self.dt, self.rows
 
 
 @dataclass
@@ -192,10 +208,57 @@ def draw_pair(rng: np.random.Generator) -> Scene:
     return Scene(system, q0, q_dot0, rng.uniform(2.0, 10.0) / low, f"pair n={n} uneven {even.min():.2g}")
 
 
+def draw_sampled_signal(rng: np.random.Generator, size: float, omega: float, duration: float) -> tuple[Any, str]:
+    """A load that is sampled: a record with kinks, a pulse, a step, noise, or a table whose nodes are kinks."""
+    kind, h = rng.integers(5), 10.0 ** rng.uniform(-1.5, 0.0) / omega
+    if kind == 0:
+        count = max(8, math.ceil(duration / h) + 1)
+        values = size * rng.standard_normal(count)
+        return fb.Record(h * np.arange(count), values, quantity="force", interpolation="linear"), "record"
+    if kind == 1:
+        return fb.Pulse(10.0 * size, 0.3 * h, rng.uniform(0.0, 0.8) * duration), "pulse"
+    if kind == 2:
+        return fb.Step(size, h, rng.uniform(0.0, 0.8) * duration), "step"
+    if kind == 3:
+        return fb.BandNoise(size, (0.0, 1.0 / h), seed=int(rng.integers(1 << 30))), "noise"
+    return Table(h, size * rng.standard_normal((math.ceil(duration / h) + 1, 3)) * 0.3 / h ** np.arange(3.0)), "table"
+
+
+def draw_sampled(rng: np.random.Generator) -> Scene:
+    """A beam on two pins under one to three sampled loads: dashpots on nodes of modes, a stop pressed at rest, others.
+
+    Modes k = 1 ... n with ω ~ k² and shapes sin(kπz): the middle is a node of the even ones, a third that of others.
+    """
+    n, low = int(rng.integers(2, 7)), 10.0 ** rng.uniform(0.5, 2.5)
+    number = np.arange(1, n + 1)
+    omega, speed = low * number**2.0, 10.0 ** rng.uniform(-2.0, 0.5)
+    size, duration = speed / low, rng.uniform(2.0, 8.0) / low
+    C, words = np.diag(2.0 * rng.choice([0.0, 1e-17, 1e-12, 0.01]) * omega), f"pinned n={n} ω=[{low:.3g}..]"
+    for z in (1 / 2, 1 / 3):
+        if rng.random() < 0.6:
+            row = np.sin(number * math.pi * z)
+            C = C + np.outer(row, row) * low * 10.0 ** rng.uniform(-2.0, 0.5)
+            words += f" dashpot at {z:.2g}"
+    row = np.sin(number * math.pi * rng.choice([0.5, rng.uniform(0.1, 0.9)]))
+    made = draw_law(rng, 1.0 / (row @ row), speed, 10.0 ** rng.uniform(-2.0, -0.3) / low)
+    loads = []
+    for _ in range(rng.integers(1, 4)):
+        signal, kind = draw_sampled_signal(rng, speed * low * 10.0 ** rng.uniform(-1.0, 0.3), low, duration)
+        loads.append((np.sin(number * math.pi * rng.uniform(0.1, 0.9)), signal))
+        words += " " + kind
+    q0, q_dot0, gap = size * rng.standard_normal(n) / number**2, speed * rng.standard_normal(n), _gap(rng, size)
+    if rng.random() < 0.5:
+        gap, share = -0.3 * size, row / omega**2
+        depth = brentq(lambda d: d + gap + row @ share * float(made.force(d, 0.0, speed)), 0.0, -gap)
+        q0, q_dot0, words = share * float(made.force(depth, 0.0, speed)), np.zeros(n), words + " at rest"
+    return Scene(System(np.eye(n), C, np.diag(omega**2), [Contact(row, made, gap)], loads), q0, q_dot0, duration, words)
+
+
 def draw(seed: int) -> tuple[Scene, float]:
-    """The scene of a seed and the tolerance to run it with."""
+    """The scene of a seed and the tolerance to run it with; all loads are sampled from `SAMPLED_FROM` on."""
     rng = np.random.default_rng(seed)
     kind = (draw_structure, draw_structure, draw_parts, draw_pair)[rng.integers(4)]
+    kind = draw_sampled if seed >= SAMPLED_FROM else kind
     rtol = float(rng.choice([1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-8, 1e-9, 1e-10, 1e-11]))
     scene = kind(rng)
     laws = ", ".join(_told(c) for c in scene.system.contacts)

@@ -12,9 +12,9 @@ Error estimate: let A₁ be the larger of the last two Jacobi coefficients of th
 two before them. The part of the force that the polynomial leaves out is estimated by A₁ max((A₁/A₂)^{S/2}, A₁/F_max).
 Its effect on the indentation rate of every stop, in contact or not, is compared with rtol × the reference speed of that
 stop. The stop's own dashpot damps it on the way to the end of the step, less if the stop is being left. Added to it
-are the oscillation of modes too fast for the nodes, and the part of the sampled signals, whose cells may be shorter
-than the step, that their polynomials leave out. A kink of the law between an end of the step and the nearest node does
-not show in the coefficients; there the law is compared with the polynomial.
+are the oscillation of modes too fast for the nodes, and the part of the sampled signals that their polynomials leave
+out; all nodes of their tables are looked at, which may be more than those of the step. A kink of the law between an end
+of the step and the nearest node does not show in the coefficients; there the law is compared with the polynomial.
 """
 
 from __future__ import annotations
@@ -36,12 +36,19 @@ from solvers.compiled.kernels import (
     merged,
 )
 from solvers.compiled.parts import ERROR, SOLVE, part
-from solvers.compiled.simd import largest8, load8, size8, splat8, sum8
+from solvers.compiled.simd import largest8, load8, splat8, sum8
 from solvers.compiled.state import CALLS, PEAK_DELTA, PEAK_FORCE, T, is_open
 from solvers.compiled.sums import combine, iterate_power_law, replace_values
 from solvers.exponential.contact.many_stops import add_end_response, pair_response, uses_blocks, weighting_of
 from solvers.exponential.contact.node_newton import MOST_ITERATIONS, newton
-from solvers.exponential.contact.node_response import node_forces, respond, ripple_of
+from solvers.exponential.contact.node_response import (
+    largest_size,
+    node_forces,
+    respond,
+    ripple_of,
+    unresolved_part,
+    unresolved_signal,
+)
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.peaks import step_peaks
 from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR, STIFFNESS
@@ -135,12 +142,6 @@ def solve_forces(problem, tables, state, scratch, node_set, level, rtol):
     return newton(problem, tables, state, scratch, node_set, level)
 
 
-@inlined
-def largest_size(values):
-    """Largest size of node values."""
-    return largest8(size8(load8(values, 0)))
-
-
 @merged
 def _largest(problem, tables, state, scratch, u):
     """Largest force of a stop on the step, N, and its stiffness there, N/m."""
@@ -181,7 +182,7 @@ def step_error(problem, tables, state, scratch, node_set, level, is_new, rtol):
         ripple = ripple_of(tables.ripple_weight[u], tables.alias[tables.kind[node_set], level], state.x, n)
         span = h * _undamped_part(tables, scratch, node_set, h, u) if scratch.viscous[u] > 0.0 else h
         scratch.unresolved[u] = span * (unresolved + 0.03 * stiffness * ripple)
-    _sum_errors(problem, tables, scratch, node_set, h)
+    _sum_errors(problem, tables, scratch, node_set, state.now[T], h)
     worst = 0.0
     for s in range(stops):
         error = scratch.per_stop[s] / (rtol * max(scratch.reference_speed[s], largest_size(scratch.motion[s, 1])))
@@ -212,13 +213,13 @@ def _undamped_part(tables, scratch, node_set, h, u):
 
 
 @merged
-def _sum_errors(problem, tables, scratch, node_set, h):
+def _sum_errors(problem, tables, scratch, node_set, t, h):
     """Errors of all indentation rates, m/s, by the unresolved parts of forces and signals, into ``per_stop``."""
     stops, error = problem.gap.size, scratch.per_stop
     for s in range(stops):
         error[s] = 0.0
     for j in range(problem.table_dt.size):
-        unresolved = h * _unresolved_signal(problem, tables, scratch, node_set, j)
+        unresolved = h * unresolved_signal(problem, tables, scratch, node_set, j, t, h)
         for s in range(stops):
             error[s] += abs(tables.load_acceleration[s, problem.table_load[j]]) * unresolved
     for u in range(stops):
@@ -242,26 +243,6 @@ def _hidden_kink(problem, state, scratch, u, largest, is_new):
     if not is_new:  # one that begins on a knot may begin with a jump
         apart = max(apart, abs(scratch.trial[3] - c[4]))
     return apart if apart > 2.0 * max(abs(c[2]), abs(c[3])) + 1e-12 * largest else 0.0
-
-
-@inlined
-def unresolved_part(coefficients, largest, power):
-    """Estimate of the part that a polynomial leaves out, from its last four coefficients."""
-    before = max(abs(coefficients[0]), abs(coefficients[1]))
-    last = max(abs(coefficients[2]), abs(coefficients[3]))
-    if last <= 1e-14 * largest:
-        return 0.0
-    decay = min(last / before, 1.0) if before > 0.0 else 1.0
-    return last * max(decay**power, min(last / largest, 1.0))
-
-
-@merged
-def _unresolved_signal(problem, tables, scratch, node_set, j):
-    """The same for a sampled signal; an entry step integrates it at half the order."""
-    values = scratch.force[problem.gap.size + problem.table_load[j]]
-    largest = largest_size(values)
-    combine(tables.tail[node_set], values, S, None, scratch.trial)
-    return unresolved_part(scratch.trial, largest, S // 2 if node_set == 0 else 1)
 
 
 @inner

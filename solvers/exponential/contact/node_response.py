@@ -7,7 +7,7 @@ from typing import Annotated, Any, NamedTuple
 
 from solvers.compiled.dop853_tableau import STAGES
 from solvers.compiled.kernels import inlined, inner, law_forces, merged, reordered, table_value
-from solvers.compiled.simd import splat8, store8
+from solvers.compiled.simd import largest8, load8, size8, splat8, store8
 from solvers.compiled.state import CALLS, T
 from solvers.compiled.sums import above, combine
 from solvers.exponential.contact.many_stops import (
@@ -27,6 +27,9 @@ balance; the state at the start of a landing, or at the end of a run within a st
 DELTAS, RATES, FORCES, KNOWN = range(
     4
 )  # rows of `Scratch.local_motion`: m, m/s, N at points around a node; the values they are interpolated from
+
+
+_SEEN = 4.0  # times the last two coefficients of a signal: a difference up to this is what they stand for
 
 
 class Scratch(NamedTuple):
@@ -99,6 +102,66 @@ def sample_signals(problem, tables, scratch, node_set, t, h):
             scratch.force[problem.gap.size + problem.table_load[j], i] = table_value(
                 problem, j, t + h * tables.times[node_set, i]
             )
+
+
+@inlined
+def largest_size(values):
+    """Largest size of node values."""
+    return largest8(size8(load8(values, 0)))
+
+
+@inlined
+def unresolved_part(coefficients, largest, power):
+    """Estimate of the part that a polynomial leaves out, from its last four coefficients."""
+    before = max(abs(coefficients[0]), abs(coefficients[1]))
+    last = max(abs(coefficients[2]), abs(coefficients[3]))
+    if last <= 1e-14 * largest:
+        return 0.0
+    decay = min(last / before, 1.0) if before > 0.0 else 1.0
+    return last * max(decay**power, min(last / largest, 1.0))
+
+
+@inner
+def unresolved_signal(problem, tables, scratch, node_set, j, t, h):
+    """The same of a sampled signal on a step from t on; an entry step integrates it at half the order.
+
+    What lies between the nodes, such as a short pulse, does not show in the coefficients: there the table is compared.
+    """
+    values, c = scratch.force[problem.gap.size + problem.table_load[j]], scratch.trial
+    largest = largest_size(values)
+    combine(tables.tail[node_set], values, S, None, c)
+    found = unresolved_part(c, largest, S // 2 if node_set == 0 else 1)
+    apart, mean = _between_nodes(problem, c, tables.time_exponent[node_set], j, t, h)
+    hidden = apart > _SEEN * max(abs(c[2]), abs(c[3])) + 1e-12 * largest
+    return max(found, mean) if hidden else found
+
+
+@inner
+def _between_nodes(problem, coefficients, time_exponent, j, t, h):
+    """Largest and mean difference of a signal's table from its polynomial; 0 for no more nodes than the step has."""
+    dt, start = problem.table_dt[j], problem.table_start[j]
+    first, beyond = int(t / dt) + 1, min(int((t + h) / dt) + 1, problem.table_start[j + 1] - start)
+    largest, total, power = 0.0, 0.0, 1.0 / time_exponent
+    if beyond - first <= S:
+        return largest, total
+    for node in range(first, beyond):
+        place = (node * dt - t) / h
+        if power < 1.0:
+            place = place**power
+        apart = abs(problem.table[start + node, 0] - _legendre(coefficients, 2.0 * place - 1.0))
+        largest, total = max(largest, apart), total + apart
+    return largest, total / (beyond - first)
+
+
+@inlined
+def _legendre(coefficients, x):
+    """A polynomial from its Legendre coefficients, in the order of `Tables.tail`."""
+    before, now, half = 1.0, x, S // 2
+    total = coefficients[half] + x * coefficients[half + 1]
+    for k in range(2, S):
+        before, now = now, ((2.0 * k - 1.0) * x * now - (k - 1.0) * before) / k
+        total += coefficients[(k + half) % S] * now
+    return total
 
 
 @inner

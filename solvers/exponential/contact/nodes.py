@@ -223,10 +223,8 @@ def _interpolate_locally(node_set: _NodeSet, begin: float, end: float) -> Any:
 
 
 def _tail(nodes: Any) -> Any:
-    """(S, 8): last four Legendre coefficients of the polynomial through node values."""
-    out = np.zeros((S, 8))
-    out[:, :4] = np.linalg.inv(np.polynomial.legendre.legvander(2.0 * nodes - 1.0, S - 1))[-4:].T
-    return out
+    """(S, 8): last four Legendre coefficients of the polynomial through node values, then the first four."""
+    return np.roll(np.linalg.inv(np.polynomial.legendre.legvander(2.0 * nodes - 1.0, S - 1)), 4, axis=0).T
 
 
 def _differentiation(nodes: Any) -> Any:

@@ -1,0 +1,116 @@
+"""Node tables of several signals on one grid, which the exponential method crosses cell by cell.
+
+The quintics of a table join with continuous curvature; their third to fifth derivatives jump at the nodes. They hardly
+do where the signal is smooth on its grid, and much where kinks of a record are rounded or a user's table is coarse. A
+quintic of another grid that goes across a node cannot jump there. So the grid divides that of the roughest table, and
+the others are carried over such that their moments ∫ s tᵏ dt, k = 0 ... 5, stay around each of their nodes. Of the
+response to a jump of the third derivative, at the frequency ω, a part of (ω dt)^10/10⁸ is then wrong, and within a cell
+of the node more. Two coarse tables of unequal steps are therefore cut finely.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from solvers.problem.matrices import Array
+from solvers.problem.signals import Forcing
+
+_ROUGH = 1e-2  # jump of the third derivative in units of max|s|/dt³; of a smooth signal at most 1e-3 (rtol <= 1e-6)
+_FEWEST_CELLS = 4096  # where two tables are rough: what is left falls with the fourth power of the step
+
+
+def on_one_grid(forcing: Forcing, duration: float) -> Forcing:
+    """The same forcing with all node tables on one grid."""
+    if not forcing.table_dt.size or np.ptp(forcing.table_dt) == 0.0:
+        return forcing
+    given, steps = np.split(forcing.table, forcing.table_start[1:-1]), forcing.table_dt.tolist()
+    dt = _common_step(given, steps, duration)
+    cells = math.ceil(duration / dt * (1.0 - 1e-12))
+    tables = [
+        rows[: cells + 1] if own == dt else _carried_over(rows, own, dt, cells)
+        for rows, own in zip(given, steps, strict=True)
+    ]
+    return replace(
+        forcing,
+        table=np.ascontiguousarray(np.concatenate(tables)),
+        table_dt=np.full(len(tables), dt),
+        table_start=(cells + 1) * np.arange(len(tables) + 1, dtype=np.int64),
+    )
+
+
+def _common_step(tables: list[Array], steps: list[float], duration: float) -> float:
+    """The finest step, or not above it a part of the step of the roughest table; shorter where others are rough too."""
+    jumps = [np.abs(_jumps(rows, own)[:, 0]).max(initial=0.0) * own**3 for rows, own in zip(tables, steps, strict=True)]
+    rough = [jump / max(np.abs(rows[:, 0]).max(), 1e-300) for jump, rows in zip(jumps, tables, strict=True)]
+    worst, most = int(np.argmax(rough)), min(steps)
+    if rough[worst] <= _ROUGH:
+        return most
+    if np.count_nonzero(np.array(rough) > _ROUGH) > 1:
+        most = min(most, duration / _FEWEST_CELLS)
+    return steps[worst] / math.ceil(steps[worst] / most * (1.0 - 1e-12))
+
+
+def _carried_over(rows: Array, own: float, dt: float, cells: int) -> Array:
+    """A node table on a grid not coarser than its own."""
+    pieces, t = _derivatives(rows, own), np.arange(cells + 1) * dt
+    piece = np.clip((t / own).astype(np.int64), 0, len(pieces) - 1)
+    out = _moved(pieces[piece], t - piece * own)[:, :3]
+    place = np.arange(1.0, len(pieces)) * own / dt
+    within = place < cells
+    place, cell = place[within], place[within].astype(np.int64)
+    changes = _moments_kept(place - cell, _jumps(rows, own)[within] * dt ** np.arange(3.0, 6.0))
+    for end in range(2):
+        np.add.at(out, cell + end, changes[:, end] / dt ** np.arange(3.0))
+    return out
+
+
+def _derivatives(rows: Array, dt: float) -> Array:
+    """(cells, 6) s, s', ..., s⁽⁵⁾ at the start of every cell of a node table."""
+    a, b = (part * (1.0, dt, 0.5 * dt**2) for part in (rows[:-1], rows[1:]))
+    e0, e1, e2 = b[:, 0] - a.sum(axis=1), b[:, 1] - a[:, 1] - 2.0 * a[:, 2], b[:, 2] - a[:, 2]
+    rest = 10.0 * e0 - 4.0 * e1 + e2, -15.0 * e0 + 7.0 * e1 - 2.0 * e2, 6.0 * e0 - 3.0 * e1 + e2
+    derivatives: Array = np.column_stack((a, *rest)) * [math.factorial(k) / dt**k for k in range(6)]
+    return derivatives
+
+
+def _moved(derivatives: Array, span: Array) -> Array:
+    """The derivatives of quintics after a time each."""
+    out, weight = derivatives.copy(), np.ones((len(derivatives), 1))
+    for i in range(1, 6):
+        weight = weight * span[:, None] / i
+        out[:, :-i] += weight * derivatives[:, i:]
+    return out
+
+
+def _jumps(rows: Array, dt: float) -> Array:
+    """(nodes within, 3) jumps of the third to fifth derivative of a node table."""
+    pieces = _derivatives(rows, dt)
+    return (pieces[1:] - _moved(pieces[:-1], np.full(len(pieces) - 1, dt)))[:, 3:]
+
+
+def _moments_kept(x: Array, jumps: Array) -> Array:
+    """(n, 2, 3) changes of [s, s', s''] at 0 and 1 where s = Σ jump_p (u - x)ᵖ/p! from u = x on, p = 3, 4, 5.
+
+    The quintic through the rows at 0 and 1 takes the place of s in between. By the changes, which act from -1 to 2, it
+    has the first six moments of s about the middle.
+    """
+    points, weights = np.polynomial.legendre.leggauss(6)  # exact up to the power 11
+    u, weights, powers = 0.5 * (1.0 + points), 0.5 * weights, np.arange(6)
+    rising, falling = _quintics(u), _quintics(1.0 - u) * np.array([[1.0], [-1.0], [1.0]])
+    before, within, behind = ((weights * (u - middle) ** powers[:, None]).T for middle in (1.5, 0.5, -0.5))
+    basis = np.concatenate((rising @ before + falling @ within, rising @ within + falling @ behind))
+    rest = 1.0 - x[:, None]
+    later, about = rest * u, ((x[:, None] + rest * u - 0.5)[..., None]) ** powers  # than x; the middle
+    values = sum(jump[:, None] * later**p / math.factorial(p) for p, jump in zip((3, 4, 5), jumps.T, strict=True))
+    wanted = np.einsum("nu,nuk->nk", values * rest * weights, about)
+    ends = [sum(jumps[:, [p - 3]] * rest ** (p - k) / math.factorial(p - k) for p in (3, 4, 5)) for k in range(3)]
+    changes: Array = np.linalg.solve(basis.T, (wanted - np.hstack(ends) @ rising @ within).T).T
+    return changes.reshape(-1, 2, 3)
+
+
+def _quintics(u: Array) -> Array:
+    """(3, len(u)) the quintics whose value, slope or curvature is 1 at u = 1, all else being 0 there and at u = 0."""
+    return u**3 * np.stack((10.0 - 15.0 * u + 6.0 * u**2, -4.0 + 7.0 * u - 3.0 * u**2, 0.5 - u + 0.5 * u**2))

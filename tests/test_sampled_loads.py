@@ -1,0 +1,183 @@
+"""Loads given as node tables: their responses, several on unequal grids, and none passed over where all is at rest."""
+
+import math
+from itertools import combinations
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import fembeam as fb
+from contacts import Hertz, KelvinVoigt, Polynomial
+from solvers import RK4, Contact, DormandPrince, Exponential, System, integrate, integrate_many
+from solvers.exponential.phi_functions import signal_responses
+
+REST = np.zeros(2)
+STEEL = fb.Section(E=2.1e11, rho=7800.0, A=1e-4, I=8.3e-10)
+
+
+class Table:
+    """A node table as it is."""
+
+    def __init__(self, dt, rows):
+        self.dt, self.rows = dt, rows
+
+    def __call__(self, t):
+        raise AssertionError("its nodes say all")
+
+    def nodes(self, duration, rtol):
+        return self.dt, self.rows
+
+
+def rough(dt, count, seed):
+    """A table whose every node is a kink of the third derivative."""
+    return Table(dt, np.random.default_rng(seed).standard_normal((count, 3)) / dt ** np.arange(3))
+
+
+def record(h, count, quantity="force"):
+    """Samples joined by straight lines."""
+    values = np.random.default_rng(count).standard_normal(count)
+    return fb.Record(h * np.arange(count), values, quantity=quantity, interpolation="linear", detrend=True)
+
+
+# --- responses ----------------------------------------------------------------------------------------------------
+
+
+def responses(k, c, steps):
+    """State changes by loads on the rate of a block."""
+    problem = SimpleNamespace(k=np.array([k]), c=np.array([c]), load=np.array([[0.0, 1.0]]))
+    return signal_responses(problem, np.array(steps))[:, 0]
+
+
+@pytest.mark.parametrize(("k", "c"), [(0.0, 0.0), (1.0, 1e-9), (1e6, 0.0), (1e4, 300.0)])
+def test_responses_of_short_steps_do_not_depend_on_long_ones_beside_them(k, c):
+    """A load t^j/j! moves a block by h^(j+2)/(j+2)! and gives it h^(j+1)/(j+1)!, to the first order in ωh and ch."""
+    short = 1e-6 / max(math.sqrt(k), c, 1.0)
+    found = responses(k, c, [1e12, 1.0, short])
+    for order, (place, rate) in enumerate(found[2]):
+        assert place == pytest.approx(short ** (order + 2) / math.factorial(order + 2), rel=2e-6)
+        assert rate == pytest.approx(short ** (order + 1) / math.factorial(order + 1), rel=2e-6)
+    for row, step in zip(found[1:], (1.0, short), strict=True):
+        np.testing.assert_allclose(row, responses(k, c, [step])[0], rtol=1e-13)
+
+
+# --- damping that is rounding -------------------------------------------------------------------------------------
+
+
+def on_pins(load, damping=0.0, dashpot=5.0):
+    """Four modes of a beam on two pins with a dashpot in its middle, a node of every even mode."""
+    return fb.Scene(
+        fb.Beam(1.0, STEEL),
+        [fb.Pinned(0.0), fb.Pinned(1.0)],
+        dashpots=[fb.Dashpot(0.5, dashpot)] if dashpot else [],
+        forces=[fb.PointForce(0.3, load)],
+        damping=fb.ModalDamping(damping),
+    ).reduce(modes=4)
+
+
+LOADS = {"pulse": fb.Pulse(10.0, 0.02, 0.01), "noise": fb.BandNoise(10.0, (0.0, 1000.0), seed=1)}
+
+
+@pytest.mark.parametrize("load", LOADS)
+def test_a_dashpot_on_a_node_of_modes_leaves_them_undamped(load):
+    system, rest = on_pins(LOADS[load]).system, np.zeros(4)
+    assert np.count_nonzero(system.blocks.c == 0.0) == 2
+    exact = integrate(system, rest, rest, 0.3, 1e-2, DormandPrince(1e-12))
+    for rtol in (1e-6, 1e-8):
+        method = Exponential(rtol)
+        sampled = integrate(system, rest, rest, 0.3, 1e-2, method)
+        plain = integrate_many(system, rest[None], rest[None], 0.3, method)
+        assert np.abs(sampled.q - exact.q).max() < rtol * np.abs(exact.q).max()
+        assert np.abs(plain.q[0] - exact.q[-1]).max() < rtol * np.abs(exact.q).max()
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+@pytest.mark.parametrize("zeta", [1e-20, 1e-300, 5e-324, 1e-13, 1e-10])
+def test_damping_of_any_size(zeta):
+    rest = np.zeros(4)
+    ours, undamped = (
+        integrate(on_pins(LOADS["noise"], z, 0.0).system, rest, rest, 0.1, 1e-2, Exponential(1e-8)) for z in (zeta, 0.0)
+    )
+    assert np.abs(ours.q - undamped.q).max() <= 1e-8 * np.abs(undamped.q).max()
+
+
+# --- several on one grid ------------------------------------------------------------------------------------------
+
+SAMPLED = {
+    "record": record(0.01, 130),
+    "another record": record(0.0137, 90),
+    "foot of a spring": record(0.0171, 80, "acceleration"),
+    "pulse": fb.Pulse(3.0, 0.0111, 0.503),
+    "noise": fb.BandNoise(1.0, (0.0, 300.0), seed=2),
+    "coarse table": rough(0.05, 30, 1),
+    "table": rough(0.003, 400, 2),
+}
+
+
+def under(*loads):
+    """Motion of three modes under loads, one after the other along the same vectors."""
+    vectors = [1.0, 0.7, 0.4], [0.5, -1.0, 0.6]
+    system = System.modal([20.0, 130.0, 400.0], 0.02, [], [(v, s) for v, s in zip(vectors, loads, strict=True) if s])
+    return integrate(system, np.zeros(3), np.zeros(3), 1.0, 0.01, Exponential(1e-8)).q
+
+
+def test_sampled_loads_together_move_as_the_sum_of_each_alone():
+    first, second = ({name: under(*place(load)) for name, load in SAMPLED.items()} for place in (
+        lambda load: (load, None), lambda load: (None, load)))  # fmt: skip
+    for one, other in combinations(SAMPLED, 2):
+        both, alone = under(SAMPLED[one], SAMPLED[other]), first[one] + second[other]
+        size = max(np.abs(first[one]).max(), np.abs(second[other]).max())
+        assert np.abs(both - alone).max() < 1e-9 * size, (one, other)
+
+
+# --- nothing is passed over ---------------------------------------------------------------------------------------
+
+STOPS = {"polynomial": Polynomial([2e4, 0.0, 1e9]), "Kelvin-Voigt": KelvinVoigt(2e4, 5.0), "Hertz": Hertz(1e6)}
+METHODS = [Exponential(1e-3), Exponential(1e-4), Exponential(1e-8), DormandPrince(1e-4), DormandPrince(1e-8)]
+
+
+def pressed(stop, load):
+    """Two modes at rest on a preloaded stop, under a load, and their place."""
+    contact = Contact([1.0, 0.6], stop, -1e-4)
+    system = System.modal([60.0, 380.0], 0.02, [contact], [([-1.0, 0.5], load)])
+    share = contact.direction / np.diag(system.K)
+    mobility = contact.direction @ share
+    depth = brentq(lambda d: 1e-4 - mobility * float(stop.force(d, 0.0, 1.0)) - d, 0.0, 1e-3)
+    return system, share * float(stop.force(depth, 0.0, 1.0))
+
+
+@pytest.mark.parametrize("method", METHODS, ids=repr)
+@pytest.mark.parametrize("name", STOPS)
+def test_no_pulse_is_passed_over_at_rest_in_contact(name, method):
+    for length, at in ((1e-3, 0.11), (1e-3, 0.273), (3e-3, 0.31), (1e-2, 0.2)):
+        system, q = pressed(STOPS[name], fb.Pulse(30.0, length, at))
+        exact = integrate(system, q, REST, 0.35, method=RK4(2e-5))
+        ours = integrate(system, q, REST, 0.35, method=method)
+        size = np.abs(exact.q_dot).max()
+        assert size > 1e-3
+        assert np.abs(ours.q_dot - exact.q_dot).max() < (20.0 * method.rtol + 1e-5) * size, (length, at)
+
+
+@pytest.mark.parametrize("method", [Exponential(1e-3), DormandPrince(1e-8)], ids=repr)
+def test_a_single_node_of_a_table_is_not_passed_over(method):
+    """One value of 3000 is not zero: at rest on a stop, and a free mass in flight."""
+    rows = np.zeros((3001, 3))
+    rows[1713, 0] = 1.0
+    system, q = pressed(STOPS["Kelvin-Voigt"], Table(1e-4, rows))
+    system = system.like(loads=[([-30.0, 15.0], Table(1e-4, rows))])
+    exact = integrate(system, q, REST, 0.2, method=RK4(1e-5))
+    ours = integrate(system, q, REST, 0.2, method=method)
+    assert np.abs(ours.q_dot - exact.q_dot).max() < 5e-3 * np.abs(exact.q_dot).max() < 1e-3
+    free = integrate(System([[1.0]], [[0.0]], [[0.0]], loads=[([1.0], Table(1e-4, rows))]), [0.0], [0.0], 0.3,
+                     method=method)  # fmt: skip
+    assert free.q_dot[0, 0] == pytest.approx(1e-4, rel=1e-3)
+
+
+def test_a_short_pulse_of_a_plain_function_is_sampled():
+    """A thousandth of the run, between any of 64 cells: it gives a free mass its impulse."""
+    for at in np.linspace(0.3, 0.32, 7):
+        pulse = fb.Pulse(1.0, 1e-3, at)
+        system = System([[1.0]], [[0.0]], [[0.0]], loads=[([1.0], lambda t, pulse=pulse: pulse(t))])
+        end = integrate(system, [0.0], [0.0], 1.0, method=Exponential(1e-6))
+        assert end.q_dot[0, 0] == pytest.approx(pulse.impulse, rel=1e-6)
