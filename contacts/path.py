@@ -21,8 +21,8 @@ from contacts.numbers import reals
 Vector = NDArray[np.float64]
 SLOW = 1e-100  # m/s: a sign, hardly a force
 SAMPLES = np.linspace(0.0, 1.0, 17)  # of the borders over a run; one that dips below zero between two is not seen
-NEAR = 2.0**-20  # part of a run over which a border that is zero to rounding is seen to rise or fall
-ROUNDING = 64.0  # spacings of numbers as large as the path, the least such distance
+NEAR = 2.0**-20  # part of a run over which a border that is zero to rounding is seen to rise or fall, ...
+ROUNDING = 64.0  # ... or spacings of numbers as large as the path, over which one that soon falls again is seen to rise
 _REALS = ctypes.POINTER(ctypes.c_double)
 
 
@@ -101,35 +101,36 @@ def _pieces(law: Law, row: Vector, at: float, goal: float, rate: float, tiny: fl
     while True:
         if abs(at - since) > near:
             since, met = at, []
-        points = at + (goal - at) * SAMPLES
-        probe = at + math.copysign(min(max(NEAR * abs(goal - at), tiny), abs(goal - at)), goal - at)
-        points = np.concatenate(([at, probe], points[1:-1], [goal]))
+        length = abs(goal - at)
+        ahead = np.unique(np.minimum([tiny, NEAR * length, *length * SAMPLES[1:-1]], length))
+        points = np.concatenate(([at], at + math.copysign(1.0, goal - at) * ahead, [goal]))
         values = borders(law, points, rate, row)
-        fired = np.flatnonzero(np.all(values[:, :2] < 0.0, axis=1))
+        fired = np.flatnonzero(np.all(values[:, :3] < 0.0, axis=1))
         if fired.size and at != goal:
             met += [law.border_name(int(j), row) for j in fired]
             _check_met(law, met, at, rate)
             for j in fired:
                 renew(law, int(j), at, rate, row)
             continue
-        fallen = np.any(values[:, 1:] < 0.0, axis=0)
+        floor = np.minimum(values[:, :1], 0.0)  # a border may begin a little below zero, by rounding, and rise
+        fallen = np.any(values[:, 1:] < floor, axis=0)
         if at == goal or not np.any(fallen):
             yield at, goal
             return
         k = int(np.argmax(fallen))
-        end = _first_fallen(law, row, points[k], points[k + 1], rate)
+        end = _first_fallen(law, row, points[k], points[k + 1], rate, floor)
         yield at, end
         at = end
         met.append(law.border_name(int(np.argmin(borders(law, np.array([at]), rate, row))), row))
         _check_met(law, met, at, rate)
 
 
-def _first_fallen(law: Law, row: Vector, low: float, high: float, rate: float) -> float:
-    """Where the first border falls below zero between two points, to rounding."""
+def _first_fallen(law: Law, row: Vector, low: float, high: float, rate: float, floor: Vector) -> float:
+    """Where the first border falls below its floor between two points, to rounding: at ``high`` it has."""
     while True:
         points = low + (high - low) * SAMPLES
         points[-1] = high
-        k = int(np.argmax(np.any(borders(law, points[1:], rate, row) < 0.0, axis=0)))
+        k = int(np.argmax(np.any(borders(law, points[1:], rate, row) < floor, axis=0)))
         if points[k] == low and points[k + 1] == high:
             return high
         if abs(high - low) <= 2.0 * np.spacing(max(abs(high), abs(low))):

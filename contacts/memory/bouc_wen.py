@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contacts.law import Law
-from contacts.numbers import number
+from contacts.numbers import LARGEST_PARAMETER, finite_row, number
 
 
 @dataclass(frozen=True)
@@ -68,6 +68,7 @@ class BoucWen(Law):
         number(self, "A", strict=True)
         for name in ("beta", "gamma"):
             number(self, name, -math.inf)
+            finite_row(getattr(self, name), f"{name} of BoucWen", LARGEST_PARAMETER, 1.0 / LARGEST_PARAMETER)
         if self.alpha >= 1.0:
             raise ValueError(f"alpha of BoucWen must be below 1, got {self.alpha!r}; 1 is a spring (Polynomial([k]))")
         if not isinstance(self.n, (int, np.integer)) or isinstance(self.n, bool) or self.n not in (1, 2):
