@@ -457,7 +457,8 @@ def test_a_scene_is_printed_as_it_is_called():
     """Saved branches and runs know their scene by this text."""
     scene = beam([fb.Clamped(0.0)], stops=[fb.Stop(1.0, Hertz(1.0))])
     assert repr(scene).endswith("gravity=0.0, elements=())")
-    assert repr(scene.stops[0]) == (f"Stop(z=1.0, law={Hertz(1.0)!r}, gap=0.0, side='below', on=None)")
+    shown = f"Stop(z=1.0, law={Hertz(1.0)!r}, gap=0.0, side='below', on=None, of='displacement')"
+    assert repr(scene.stops[0]) == shown
 
 
 FILE = """
