@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+import zipfile
 from importlib.util import find_spec
 
 import numpy as np
@@ -201,6 +202,21 @@ def test_contradictions_are_refused(run, tmp_path, change, message):
     path = run.save(tmp_path / "run.npz")
     changed(path, change)
     with pytest.raises(ValueError, match=rf"is not a saved run, or is damaged.*{message}"):
+        fb.load(path)
+
+
+def test_only_what_a_run_is_made_of_is_read(run, tmp_path):
+    """A small file whose further members unpacked to gigabytes took these, and shapes were looked at afterwards."""
+    path = run.save(tmp_path / "run.npz")
+    others = {"bomb": np.array([{}]), "contact": np.zeros(3), "moments_77": np.zeros(2), "file_0": np.zeros(2)}
+    changed(path, lambda about, arrays: arrays.update(others))  # the first cannot be read at all
+    np.testing.assert_array_equal(fb.load(path).q, run.q)
+    with np.load(path, allow_pickle=True) as data:
+        arrays = {name: data[name] for name in data.files if name != "q_dot"}
+    np.savez(path, **arrays)
+    with zipfile.ZipFile(path, "a") as archive, archive.open("q_dot.npy", "w") as file:
+        np.lib.format.write_array_header_1_0(file, {"shape": (10**11, 2), "fortran_order": False, "descr": "<f8"})
+    with pytest.raises(ValueError, match=r"q_dot must have shape \(\d+, \d+\), it has \(100000000000, 2\)"):
         fb.load(path)
 
 

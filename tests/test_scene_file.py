@@ -310,6 +310,18 @@ def test_overrides(tmp_path):
     assert file.scene.gravity == 9.81
 
 
+def test_the_mark_some_editors_begin_a_file_with_is_passed_over(tmp_path):
+    plain = read(tmp_path, SIMPLE)
+    (tmp_path / "marked.toml").write_bytes(SIMPLE.encode("utf-8-sig"))
+    marked = scene_file.read(tmp_path / "marked.toml")
+    assert marked.scene == plain.scene
+    assert marked.source.text == plain.source.text
+    for encoding in ("utf-16", "utf-16-le"):  # with a mark and without
+        (tmp_path / "wide.toml").write_bytes(SIMPLE.encode(encoding))
+        with pytest.raises(SceneFileError, match=r"not a text file in UTF-8 \(zero bytes, as in UTF-16\); save it as"):
+            scene_file.read(tmp_path / "wide.toml")
+
+
 def test_files_that_are_none(tmp_path):
     with pytest.raises(SceneFileError, match="cannot be read"):
         scene_file.read(tmp_path / "nothing.toml")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Callable
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
@@ -22,6 +23,7 @@ from solvers.problem import Losses, Transitions, optional
 
 FORMAT = 3
 HDF5 = (".h5", ".hdf5")
+MOST_WORDS = 1 << 28  # bytes
 SIGNATURE, ZIPPED = b"\x89HDF\r\n\x1a\n", b"PK"  # of HDF5 and npz
 UNITS = {
     "t, contact_t_in, contact_t_out": "s",
@@ -135,28 +137,50 @@ def load(path: str | os.PathLike[str]) -> Run:
     ('finished', 11)
     """
     try:
-        arrays = _read(Path(path))
-        about = json.loads(str(arrays.pop("about")))
-        if about["format"] != FORMAT:
-            raise _OtherFormatError(f"{path} has format {about['format']}, this version reads {FORMAT}; simulate again")
-        return _of_arrays(about, arrays, Path(path))
-    except (FileNotFoundError, ImportError, _OtherFormatError):
+        return _of_arrays(*_read(Path(path)), Path(path))
+    except _OtherFormatError as error:
+        raise ValueError(f"{path} {error}") from None
+    except (FileNotFoundError, ImportError):
         raise
     except Exception as error:
         raise ValueError(f"{path} is not a saved run, or is damaged: {error}") from error
 
 
-def _read(path: Path) -> dict[str, Any]:
-    """Arrays by name, and the words."""
+def _read(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The words, and arrays by name."""
     with path.open("rb") as file:
         first_bytes = file.read(len(SIGNATURE))
     if not first_bytes.startswith((SIGNATURE, ZIPPED)):
         raise ValueError("it is neither npz nor HDF5; give a file of Run.save")
     if first_bytes != SIGNATURE:
         with np.load(path, allow_pickle=False) as data:
-            return {name: data[name] for name in data.files}
+            names = [name.removesuffix(".npy") for name in data.zip.namelist() if name.endswith(".npy")]
+            return _known({name: _header(data.zip, name) for name in names}, data.__getitem__)
     with optional("h5py", "a run in HDF5").File(path, "r") as group:
-        return {name: entry.asstr()[()] if name == "about" else entry[()] for name, entry in group.items()}
+        headers = {name: (entry.shape, entry.dtype) for name, entry in group.items() if hasattr(entry, "shape")}
+        return _known(headers, lambda name: group[name].asstr()[()] if name == "about" else group[name][()])
+
+
+def _header(archive: Any, name: str) -> tuple[tuple[int, ...], Any]:
+    """Shape and type of an array in an npz, which is not read."""
+    with archive.open(f"{name}.npy") as file:
+        old = np.lib.format.read_magic(file) == (1, 0)
+        shape, _, dtype = (np.lib.format.read_array_header_1_0 if old else np.lib.format.read_array_header_2_0)(file)
+    return shape, dtype
+
+
+def _known(
+    headers: dict[str, tuple[tuple[int, ...], Any]], read: Callable[[str], Any]
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The words, and what a run is read from: types and shapes are checked before any array is read, others never."""
+    if headers["about"][1].itemsize > MOST_WORDS:
+        raise ValueError("its words are too long")
+    about = json.loads(str(read("about")))
+    if about["format"] != FORMAT:
+        raise _OtherFormatError(f"has format {about['format']}, this version reads {FORMAT}; simulate again")
+    outlines = {name: saved_arrays.outline(*headers[name]) for name in headers}
+    names = saved_arrays.known(outlines, len((about.get("scene_file") or {"files": ()})["files"]))
+    return about, {name: read(name) for name in names}
 
 
 def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run:
@@ -191,6 +215,6 @@ def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run
         source=source,
         versions=about["versions"],
         on=arrays["on"],
-        kinds=arrays["kinds"].astype(bool),
-        sampled=bool(about.get("sampled", True)),  # earlier versions do not tell
+        kinds=arrays["kinds"],
+        sampled=about["sampled"],
     )

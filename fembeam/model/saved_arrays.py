@@ -20,16 +20,31 @@ from solvers.problem import Transitions
 
 Shape = tuple[int, ...]
 TRANSITION_COLUMNS = len(fields(Transitions))
+BOOLEAN = ("kinds", "contact_entry_rate_clipped")
 FINITE = {"transitions", "end", "shapes", "stops", "directions", "impactor_masses", *READOUT_FINITE}
 
 
-def check(arrays: Mapping[str, Any]) -> None:
-    """Raise ValueError unless shapes, times and numbers of stops agree; names the array."""
-    for name, array in arrays.items():
-        _need(array.dtype.kind in "biuf", f"{name} must hold numbers, it has type {array.dtype}")
+def outline(shape: Shape, dtype: np.dtype[Any]) -> Any:
+    """An array of that shape and type that takes no memory."""
+    return np.broadcast_to(np.zeros((), dtype), shape)
+
+
+def known(arrays: Mapping[str, Any], files: int) -> list[str]:
+    """Names of what a run is read from, of arrays or their outlines; ValueError unless types and shapes agree."""
     _need(arrays["q"].ndim == 2, f"q must have two dimensions, it has shape {arrays['q'].shape}")
-    for name, shape in expected(arrays).items():
+    shapes = {"q": arrays["q"].shape, **expected(arrays)}
+    for name, shape in shapes.items():
+        dtype, meant = arrays[name].dtype, ("b", "truth values") if name in BOOLEAN else ("iuf", "numbers")
+        _need(dtype.kind in meant[0], f"{name} must hold {meant[1]}, it has type {dtype}")
         _need(arrays[name].shape == shape, f"{name} must have shape {shape}, it has {arrays[name].shape}")
+    carried = [f"file_{i}" for i in range(files)]
+    for name in carried:
+        _need(arrays[name].dtype == np.uint8 and arrays[name].ndim == 1, f"{name} must hold the bytes of a file")
+    return [*shapes, *carried]
+
+
+def check(arrays: Mapping[str, Any]) -> None:
+    """Raise ValueError unless times, numbers of stops and all else that shapes do not tell agree; names the array."""
     for name in ("t", *(name for name in arrays if name.split("_")[0] == "nodes")):
         steps = np.diff(arrays[name])
         _need(np.isfinite(arrays[name]).all() and np.all(steps > 0), f"{name} must be finite and increase")

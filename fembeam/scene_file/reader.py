@@ -100,11 +100,14 @@ def _source(path: Path) -> Source:
             raise SceneFileError(f"{path}: holds no scene file; this run was made in Python, so repeat it there")
         return source
     try:
-        return Source(path, path.read_bytes().decode("utf-8"))
+        content = path.read_bytes()
+        if b"\0" in content:
+            raise SceneFileError(f"{path}: is not a text file in UTF-8 (zero bytes, as in UTF-16); save it as UTF-8")
+        return Source(path, content.decode("utf-8-sig"))  # some editors begin a file with a mark
     except OSError as error:
         raise SceneFileError(f"{path}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:
-        raise SceneFileError(f"{path}: is not a text file in UTF-8") from None
+        raise SceneFileError(f"{path}: is not a text file in UTF-8; save it as UTF-8") from None
 
 
 def built(source: Source, asked: Sequence[str] = ()) -> SceneFile:
