@@ -11,10 +11,11 @@ from scipy.linalg import expm
 
 import fembeam as fb
 from contacts import Hertz, Hysteretic, Jenkins, KelvinVoigt, PiecewiseLinear, Viscoelastic
-from solvers import Contact, Exponential, System, integrate
+from solvers import Contact, Exponential, SolverError, System, integrate
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.energy.contact_tables import BEGAN, ENTERING, SQUARES, contact_table
 from solvers.exponential.preparation import prepare_run
+from solvers.integration import prepared_run
 from solvers.problem import forcing_of
 
 FREE = [Contact([1.0, 1.0, 1.0, 0.5], Hertz(1e6), gap=1e9)]
@@ -341,3 +342,23 @@ def test_a_slider_with_its_static_shape_balances():
     assert unaccounted(run) < 1e-11
     for losses in (run.losses, model.simulate(0.4, solver=Exponential(1e-12)).losses):
         assert losses.loss[0] == pytest.approx(limit * losses.slip[0], rel=1e-10)
+
+
+@pytest.mark.parametrize("broken", ["end_response", "contact_propagator"])
+def test_runs_in_broken_steps_are_refused(broken):
+    """Wrong by 1e-4 in what forces do by the end of a contact step, or in the free motion until then."""
+    law = Hysteretic(1e6, 0.4)
+    system = System.modal(
+        [11.0, 67.0], 0.01, [Contact([-1.0, 1.2], law, 0.01)], [([1.0, -1.2], fb.Harmonic(30.0, 14.0))]
+    )
+    arguments = system, [0.0, 0.0], [-0.8, 0.9], 1.0, 0.01, Exponential(1e-8)
+    assert len(integrate(*arguments).contacts) >= 3
+    table = getattr(prepared_run(*arguments, False).engine.prepared.tables.value, broken)
+    kept = table.copy()
+    table *= 1.0 + 1e-4
+    try:
+        with pytest.raises(SolverError, match="energy does not balance"):
+            integrate(*arguments)
+    finally:
+        table[:] = kept
+    integrate(*arguments)

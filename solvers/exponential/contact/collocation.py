@@ -36,8 +36,8 @@ from solvers.compiled.kernels import (
     merged,
 )
 from solvers.compiled.parts import ERROR, SOLVE, part
-from solvers.compiled.simd import largest8, load8, splat8, sum8
-from solvers.compiled.state import CALLS, PEAK_DELTA, PEAK_FORCE, T, is_open
+from solvers.compiled.simd import largest8, load8
+from solvers.compiled.state import CALLS
 from solvers.compiled.sums import combine, iterate_power_law, replace_values
 from solvers.exponential.contact.many_stops import add_end_response, pair_response, uses_blocks, weighting_of
 from solvers.exponential.contact.node_newton import MOST_ITERATIONS, newton
@@ -50,7 +50,6 @@ from solvers.exponential.contact.node_response import (
     unresolved_signal,
 )
 from solvers.exponential.contact.nodes import S
-from solvers.exponential.contact.peaks import step_peaks
 from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR, STIFFNESS
 
 
@@ -267,43 +266,3 @@ def end_state(problem, tables, state, scratch, node_set, level):
         p, v = state.x[b], state.x[n + b]
         x[b] += alpha[b] * p + beta[b] * v
         x[n + b] += alpha[b] * v - beta[b] * (problem.k[b] * p + problem.c[b] * v)
-
-
-@inlined
-def _work(problem, tables, scratch, node_set, s):
-    """Work, J, of a contact over the step: ∫ F dδ of the polynomials through F at the nodes, δ there and at both ends.
-
-    Not Σ F δ̇ at the nodes: where the force hardly changes steps grow until fast blocks oscillate between the nodes,
-    and what oscillates with ω is ω times larger in δ̇.
-    """
-    begin, force = scratch.start_motion[s, 0], scratch.force[s]
-    combine(tables.work[node_set], force, S, None, scratch.trial)
-    end = sum8(load8(tables.work_end[node_set], 0) * load8(force, 0))
-    within = sum8(load8(scratch.trial, 0) * (load8(scratch.motion[s, 0], 0) - splat8(begin)))
-    return within + end * (indentation(problem, s, scratch.x_new) - begin)
-
-
-@merged
-def finish_step(problem, tables, state, scratch, node_set, level):
-    """Move the state to the end of the step; update the energy balance and the peaks of the contacts."""
-    stops, size = problem.gap.size, 2 * problem.k.size
-    h = tables.contact_step[level]
-    for s in range(stops):
-        if state.segment[s] > 0:
-            enters = s == node_set - 1
-            weights = tables.weights[node_set] if node_set == 0 or enters else tables.plain[node_set]
-            impulses = load8(weights, 0) * load8(scratch.force[s], 0)
-            if enters:
-                state.x[size + 2 + 2 * s] += h * sum8(impulses * load8(scratch.motion[s, 1], 0))
-            else:
-                state.x[size + 2 + 2 * s] += _work(problem, tables, scratch, node_set, s)
-            state.x[size + 3 + 2 * s] += h * sum8(impulses)
-            if is_open(problem, s):
-                continue
-            if problem.knots[s, 0] == 0.0 or problem.opening[s] >= 0:
-                step_peaks(problem, tables, state, scratch, node_set, h, s, 1.0)
-            else:
-                state.active[s, PEAK_DELTA] = max(state.active[s, PEAK_DELTA], largest_size(scratch.motion[s, 0]))
-                state.active[s, PEAK_FORCE] = max(state.active[s, PEAK_FORCE], largest_size(scratch.force[s]))
-    copy(scratch.x_new, state.x, size)
-    state.now[T] += h
