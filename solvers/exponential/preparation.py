@@ -31,7 +31,7 @@ def _arrays(*dimensions: int) -> list[Any]:
 TABLES = types.NamedTuple(
     [
         *_arrays(1, 3, 5, 2, 4, 2, 3, 3, 2, 3, 2, 2, 2, 2, 0, 0, 2, 1, 2),
-        *(*_arrays(1, 3, 1, 1, 2, 2, 2, 2, 3, 3, 3, 4, 3), INTEGERS, INTEGERS),
+        *(*_arrays(1, 3, 1, 1, 2, 2, 2, 2, 3, 2, 3, 3, 3, 4, 3), INTEGERS, INTEGERS),
         *_arrays(5, 6, 5, 5, 5, 5, 3, 2, 2, 2, 2, 2, 2, 4),
         *(VECTOR, INTEGERS, INTEGERS, MATRIX),
     ],

@@ -68,12 +68,12 @@ class Tables(NamedTuple):
     times: Any  # (f, S) σ^κ
     weights: Any  # (f, S): ∫F dt = h Σ weights F
     plain: Any  # (f, S): the same of a force without the weight σ^λ
+    work: Any  # (f, S, S): ∫ F dδ = Σ_i F_i (Σ_j work_ij (δ_j - δ₀) + work_end_i (δ_end - δ₀)) of plain forces
+    work_end: Any  # (f, S)
     summary: Any  # (f, S, 8): from node values, the last four Jacobi coefficients, both ends' values, both slopes
     lagrange: Any  # (f, 2, S): 1/Π (σ_j - σ_i) of the nodes' polynomials, and the same over σ_j^λ
     tail: Any  # (f, S, 8): from node values of a signal, the last four Legendre coefficients in σ
-    local_interpolation: (
-        Any  # (f, S, 2S + 2, 2S): δ and h δ̇ at points around a node from those at all nodes and at the start
-    )
+    local_interpolation: Any  # (f, S, 2S + 2, 2S): δ, h δ̇ at points around a node from those at all nodes, at the start
     local_interval: Any  # (f, S, 2): the interval of σ these points span
     kind: Any  # (f,) index of the kinds, and of the weightings of plain forces, below; see `contact.nodes.NodeSets`
     entering: Any  # (f,) index of the weighting of the force of the stop that enters
@@ -90,9 +90,7 @@ class Tables(NamedTuple):
     loss_rows: Any  # (r, 2N): damping power = Σ (row·z)²
     steady_rate: Any  # (2 tones, own padded): blocks' rate in steady motion by p, then v, of the tones; loss_rows: × √c
     gauss: Any  # (2 + S, S): points and weights on (0, 1), then to all points the integrals of each one's polynomial
-    extrapolation: (
-        Any  # (f, 5, S, S): the force on the next smooth step, 2^{(i-2)/2} times shorter, from that of the last
-    )
+    extrapolation: Any  # (f, 5, S, S): force on the next smooth step, 2^{(i-2)/2} times shorter, from that of the last
     bend: Any  # (m,) kind of the law's bend: 0 for none, else as named in `contact.crossings`
     uncut: Any  # (m,) addresses of the laws without their cut at F = 0
     uncut_gradient: Any  # (m,) and of their derivatives
@@ -187,6 +185,8 @@ def build(
         times=node_sets.times,
         weights=node_sets.weights,
         plain=node_sets.plain,
+        work=node_sets.work,
+        work_end=node_sets.work_end,
         summary=node_sets.summary,
         lagrange=node_sets.lagrange,
         tail=node_sets.tail,

@@ -36,14 +36,12 @@ from solvers.compiled.kernels import (
     merged,
 )
 from solvers.compiled.parts import ERROR, SOLVE, part
-from solvers.compiled.simd import load8, sum8
-from solvers.compiled.state import CALLS, PEAK_DELTA, PEAK_FORCE, T, is_open
+from solvers.compiled.state import CALLS
 from solvers.compiled.sums import combine, iterate_power_law, replace_values
 from solvers.exponential.contact.many_stops import add_end_response, pair_response, uses_blocks, weighting_of
 from solvers.exponential.contact.node_newton import MOST_ITERATIONS, newton
 from solvers.exponential.contact.node_response import node_forces, respond, ripple_of
 from solvers.exponential.contact.nodes import S
-from solvers.exponential.contact.peaks import step_peaks
 from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR, STIFFNESS
 
 
@@ -293,25 +291,3 @@ def end_state(problem, tables, state, scratch, node_set, level):
         p, v = state.x[b], state.x[n + b]
         x[b] += alpha[b] * p + beta[b] * v
         x[n + b] += alpha[b] * v - beta[b] * (problem.k[b] * p + problem.c[b] * v)
-
-
-@merged
-def finish_step(problem, tables, state, scratch, node_set, level):
-    """Move the state to the end of the step; update the energy balance and the peaks of the contacts."""
-    stops, size = problem.gap.size, 2 * problem.k.size
-    h = tables.contact_step[level]
-    for s in range(stops):
-        if state.segment[s] > 0:
-            weights = tables.weights[node_set] if node_set == 0 or s == node_set - 1 else tables.plain[node_set]
-            impulses = load8(weights, 0) * load8(scratch.force[s], 0)
-            state.x[size + 2 + 2 * s] += h * sum8(impulses * load8(scratch.motion[s, 1], 0))
-            state.x[size + 3 + 2 * s] += h * sum8(impulses)
-            if is_open(problem, s):
-                continue
-            if problem.knots[s, 0] == 0.0 or problem.opening[s] >= 0:
-                step_peaks(problem, tables, state, scratch, node_set, h, s, 1.0)
-            else:
-                state.active[s, PEAK_DELTA] = max(state.active[s, PEAK_DELTA], largest_size(scratch.motion[s, 0]))
-                state.active[s, PEAK_FORCE] = max(state.active[s, PEAK_FORCE], largest_size(scratch.force[s]))
-    copy(scratch.x_new, state.x, size)
-    state.now[T] += h

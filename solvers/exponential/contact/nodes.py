@@ -107,6 +107,8 @@ class NodeSets(NamedTuple):
     times: Any
     weights: Any
     plain: Any
+    work: Any
+    work_end: Any
     summary: Any
     tail: Any
     local_interpolation: Any
@@ -149,6 +151,8 @@ def node_sets_of(series: tuple[tuple[float, float], ...]) -> NodeSets:
         times=each(lambda f: f.nodes**f.time_exponent),
         weights=each(lambda f: f.weights),
         plain=each(_plain_weights),
+        work=each(lambda f: _work_weights(f.nodes)[:, :S]),
+        work_end=each(lambda f: _work_weights(f.nodes)[:, S]),
         summary=each(_summary),
         tail=each(lambda f: _tail(f.nodes)),
         local_interpolation=each(lambda f: [_interpolate_locally(f, *bracket) for bracket in _brackets(f)]),
@@ -176,6 +180,14 @@ def _plain_weights(node_set: _NodeSet) -> Any:
     return (weights * node_set.time_exponent * points ** (node_set.time_exponent - 1.0)) @ _interpolation(
         node_set.nodes, points
     )
+
+
+def _work_weights(nodes: Any) -> Any:
+    """(S, S + 1): ∫ F dδ = Σ F_i weight_ij (δ_j - δ₀) of polynomials, F through the nodes, δ through ends and nodes."""
+    points, weights = gauss(S)
+    places = np.append(nodes, [1.0, 0.0])
+    slopes = _interpolation(places, points) @ _differentiation(places)
+    return (weights * _interpolation(nodes, points).T) @ slopes[:, :-1]
 
 
 def _brackets(node_set: _NodeSet) -> Any:

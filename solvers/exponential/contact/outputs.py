@@ -1,9 +1,12 @@
-"""Outputs of a contact step: samples inside it, the state at the end of a run, a row of the event record."""
+"""Outputs of a contact step: works, peaks and state at its end, samples inside it, a row of the event record."""
 
 from __future__ import annotations
 
-from solvers.compiled.kernels import copy, inner, merged
-from solvers.compiled.state import HEAD, PART, RECORDED, SAMPLED, STEPS, T, is_open, write_event
+from solvers.compiled.kernels import copy, indentation, inlined, inner, merged
+from solvers.compiled.simd import load8, splat8, sum8
+from solvers.compiled.state import HEAD, PART, PEAK_DELTA, PEAK_FORCE, RECORDED, SAMPLED, STEPS, T, is_open, write_event
+from solvers.compiled.sums import combine
+from solvers.exponential.contact.collocation import largest_size
 from solvers.exponential.contact.node_response import START
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.peaks import state_peaks, step_peaks
@@ -52,3 +55,43 @@ def record_forces(problem, state, scratch, kind, ended, node_set, level):
     for s in range(problem.gap.size):
         copy(scratch.force[s], forces[s * S : (s + 1) * S], S)
     write_event(state, kind, state.now[T], ended, ended - state.now[T], node_set, level, state.x)
+
+
+@inlined
+def _work(problem, tables, scratch, node_set, s):
+    """Work, J, of a plain force over the step: ∫ F dδ, F a polynomial through the nodes, δ one through ends and nodes.
+
+    By δ̇ at the nodes it would be wrong where the force hardly changes: there steps grow until fast blocks oscillate
+    between the nodes. A force that is constant does F times the way between the ends, whatever lies between.
+    """
+    begin, force = scratch.start_motion[s, 0], scratch.force[s]
+    combine(tables.work[node_set], force, S, None, scratch.trial)
+    end = sum8(load8(tables.work_end[node_set], 0) * load8(force, 0))
+    within = sum8(load8(scratch.trial, 0) * (load8(scratch.motion[s, 0], 0) - splat8(begin)))
+    return within + end * (indentation(problem, s, scratch.x_new) - begin)
+
+
+@merged
+def finish_step(problem, tables, state, scratch, node_set, level):
+    """Move the state to the end of the step; update works, impulses and peaks of the contacts."""
+    stops, size = problem.gap.size, 2 * problem.k.size
+    h = tables.contact_step[level]
+    for s in range(stops):
+        if state.segment[s] > 0:
+            weighted = s == node_set - 1 and tables.weight_exponent[node_set] > 0.0
+            weights = tables.weights[node_set] if weighted else tables.plain[node_set]
+            impulses = load8(weights, 0) * load8(scratch.force[s], 0)
+            if weighted:
+                state.x[size + 2 + 2 * s] += h * sum8(impulses * load8(scratch.motion[s, 1], 0))
+            else:
+                state.x[size + 2 + 2 * s] += _work(problem, tables, scratch, node_set, s)
+            state.x[size + 3 + 2 * s] += h * sum8(impulses)
+            if is_open(problem, s):
+                continue
+            if problem.knots[s, 0] == 0.0 or problem.opening[s] >= 0:
+                step_peaks(problem, tables, state, scratch, node_set, h, s, 1.0)
+            else:
+                state.active[s, PEAK_DELTA] = max(state.active[s, PEAK_DELTA], largest_size(scratch.motion[s, 0]))
+                state.active[s, PEAK_FORCE] = max(state.active[s, PEAK_FORCE], largest_size(scratch.force[s]))
+    copy(scratch.x_new, state.x, size)
+    state.now[T] += h

@@ -41,7 +41,7 @@ from solvers.compiled.state import (
 )
 from solvers.compiled.sums import combine
 from solvers.exponential.contact.borders import UNRESOLVED
-from solvers.exponential.contact.collocation import end_state, finish_step, solve_forces, step_error
+from solvers.exponential.contact.collocation import end_state, solve_forces, step_error
 from solvers.exponential.contact.crossings import leaves_segment
 from solvers.exponential.contact.first_step import (
     ENTRY,
@@ -57,7 +57,7 @@ from solvers.exponential.contact.first_step import (
 )
 from solvers.exponential.contact.node_response import free_response
 from solvers.exponential.contact.nodes import S
-from solvers.exponential.contact.outputs import end_run, record_forces, sample_step
+from solvers.exponential.contact.outputs import end_run, finish_step, record_forces, sample_step
 from solvers.exponential.contact.segment_ends import first_end, go_beyond, land_first, land_in_time
 from solvers.exponential.energy.contact_balance import account_contact
 

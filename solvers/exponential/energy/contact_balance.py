@@ -8,17 +8,14 @@ from __future__ import annotations
 
 from numba import types
 
-from solvers.compiled.kernels import REAL, copy, inlined, inner, merged, reordered
+from solvers.compiled.kernels import REAL, copy, inlined, merged, reordered
 from solvers.compiled.parts import ACCOUNT_CONTACT, part
 from solvers.compiled.simd import load8, splat8, store8, sum8
 from solvers.compiled.sums import combine
-from solvers.exponential.contact.collocation import largest_size, unresolved_part
 from solvers.exponential.contact.node_response import WITHIN
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.energy.contact_tables import BEGAN, ENTERING, SQUARES
 from solvers.exponential.energy.quadrature import state_within
-
-_UNSEEN = 10.0  # times what a polynomial leaves out: aliases of fast blocks need not look like the end of a series
 
 
 @part(ACCOUNT_CONTACT, types.void, types.int64, types.int64, REAL)
@@ -27,34 +24,14 @@ def account_contact(problem, tables, energy_tables, state, scratch, node_set, le
     if level >= energy_tables.first and h <= energy_tables.longest[energy_tables.kind[node_set]]:
         place = level - int(energy_tables.first)
         if energy_tables.sums.shape[0]:
-            _account_sums(problem, tables, energy_tables, state, scratch, node_set, place, h)
+            _account_sums(problem, tables, energy_tables, state, scratch, node_set, place)
         else:
             _account_nodes(problem, tables, energy_tables, state, scratch, node_set, place, h)
         return
     x, size = scratch.stages[WITHIN], 2 * problem.k.size
     copy(state.x, x, state.x.size)
     state_within(problem, tables, state, scratch, node_set, h, 0.0, h, x, energy_tables.active > 0.0)
-    for s in range(problem.gap.size):
-        if state.segment[s] > 0:
-            _add_unseen(
-                tables, scratch, node_set, h, s, x[size + 2 + 2 * s] - state.x[size + 2 + 2 * s], state.x[size + 2 :]
-            )
     copy(x[size:], state.x[size:], 2)
-
-
-@inner
-def _add_unseen(tables, scratch, node_set, h, s, work, works):
-    """Add of a contact's work what `finish_step` leaves out, which sums at the nodes.
-
-    That is no more than the polynomial through the powers at the nodes may be wrong: so the sum still tests the rest. A
-    force that is constant lets steps grow until the velocity oscillates between the nodes.
-    """
-    weights = tables.weights[node_set] if node_set == 0 or s == node_set - 1 else tables.plain[node_set]
-    powers = load8(scratch.force[s], 0) * load8(scratch.motion[s, 1], 0)
-    store8(scratch.trial, 0, powers)
-    combine(tables.tail[node_set], scratch.trial, S, None, scratch.clipped)
-    most = _UNSEEN * h * unresolved_part(scratch.clipped, largest_size(scratch.trial), 1)
-    works[2 * s] += min(max(work - h * sum8(load8(weights, 0) * powers), -most), most)
 
 
 @reordered
@@ -68,7 +45,7 @@ def _free_loss(plain, x, n):
 
 
 @merged
-def _account_sums(problem, tables, energy_tables, state, scratch, node_set, place, h):
+def _account_sums(problem, tables, energy_tables, state, scratch, node_set, place):
     """The same by the forms that are summed over the blocks, for a whole step."""
     size, stops, heads = 2 * problem.k.size, problem.gap.size, energy_tables.head
     y, sums, tones = scratch.energy_sums[0], scratch.energy_sums[1], problem.k.size - int(tables.own_blocks)
@@ -80,15 +57,12 @@ def _account_sums(problem, tables, energy_tables, state, scratch, node_set, plac
     losses, gains = splat8(0.0), splat8(0.0)
     for i in range(heads.size):
         values = load8(y, size + S * i)
-        losses += values * load8(sums, 2 * S * i)
-        works = values * load8(sums, 2 * S * i + S)
+        losses += values * load8(sums, S * i)
         if heads[i] >= stops:
-            gains += works
-        elif state.segment[heads[i]] > 0 and not _enters(tables, node_set, heads[i]):
-            _add_unseen(tables, scratch, node_set, h, heads[i], sum8(works), state.x[size + 2 :])
+            gains += values * load8(sums, S * (heads.size + i - stops))
     gain, loss = sum8(gains), sum8(losses)
     loss += _free_loss(energy_tables.free_loss[energy_tables.kind[node_set], place], state.x, problem.k.size)
-    of_tones = sums[2 * S * heads.size :]
+    of_tones = sums[S * (2 * heads.size - stops) :]
     for k in range(2 * tones):
         value = state.x[int(tables.own_blocks) + (k if k < tones else k + problem.k.size - tones)]
         loss, gain = loss + value * of_tones[k], gain + value * of_tones[2 * tones + k]
@@ -178,7 +152,6 @@ def _account_nodes(problem, tables, energy_tables, state, scratch, node_set, pla
         if entering:
             combine(table[SQUARES:], y[2 * S :], S + 2, None, sums)
             squares += load8(sums, 0) * load8(y, 2 * S)
-        store8(scratch.along[b], 0, moments)
         gains += signal * moments
         losses += splat8(c) * squares
         loss += c * (table[BEGAN, 0] * p * p + table[BEGAN, 1] * p * v + table[BEGAN, 2] * v * v)
@@ -188,9 +161,3 @@ def _account_nodes(problem, tables, energy_tables, state, scratch, node_set, pla
             losses += splat8(h) * weights * steady * steady
     state.x[2 * size] += gain + sum8(gains)
     state.x[2 * size + 1] += loss + sum8(losses)
-    for s in range(problem.gap.size):
-        if state.segment[s] > 0 and not _enters(tables, node_set, s):
-            combine(scratch.along, problem.read_rate[s, size:], n, None, scratch.trial)
-            steady = splat8(h) * weights * _of_tones(problem.read_rate[s], scratch, n, size)
-            work = sum8(load8(scratch.force[s], 0) * (load8(scratch.trial, 0) + steady))
-            _add_unseen(tables, scratch, node_set, h, s, work, state.x[2 * size + 2 :])

@@ -1,10 +1,10 @@
 """Work and damping over contact steps summed over the blocks: tables for a few stops.
 
 The velocities of the blocks are linear in y = (x, f), see `contact_tables`: x is the state of blocks and tones, f the
-values at the nodes of every *head*, a force or a sampled signal. So the work of a head on its own velocity, δ̇ of a stop
-or the power row of a load, is f^T W y, and that of the tones' loads x^T W y. Damping is a quadratic form of y. Summed
-over the blocks here, once per length of step, they cost a step no more than its free response. What is left of every
-block is the damping of its free motion: three numbers.
+values at the nodes of every *head*, a force or a sampled signal. So the work of a signal on the velocity of its power
+row is f^T W y, and that of the tones' loads x^T W y. Damping is a quadratic form of y. Summed over the blocks, once per
+length of step, they cost a step no more than its free response. What is left of every block is the damping of its free
+motion: three numbers.
 """
 
 from __future__ import annotations
@@ -74,38 +74,39 @@ class Sums:
         self.p, self.v = b[:n], blocks + b[:n]
         self.tone = np.append(b[n:], blocks + b[n:])
         self.push = np.concatenate((problem.push, problem.load))[:, self.v]
-        self.power, self.signal = np.concatenate((problem.read_rate, tables.power_rows)), tables.signal_rows
+        self.power, self.signal = tables.power_rows, tables.signal_rows
         self.c, self.loss = problem.c[:n], tables.loss_rows[:, self.tone]
-        self.shape = self.first + S * len(self.heads), 2 * S * len(self.heads) + padded(2 * len(self.tone))
+        self.works = S * len(self.heads)  # column at which the works of loads begin, then come those of the tones
+        self.of_tones = 2 * self.works - S * stops
+        self.shape = self.first + self.works, self.of_tones + padded(2 * len(self.tone))
 
     def rows(self, head: int) -> slice:
         """Where the node values of a head are in y."""
         return slice(self.first + S * head, self.first + S * (head + 1))
 
     def of(self, steps: Steps) -> Any:
-        """(j, y, 2S per head, damping and work, then those of the tones) forms of all steps."""
+        """(j, y, S per head, damping, S per load, work, then those of the tones) forms of all steps."""
         out = np.zeros((len(steps.weights), *self.shape))
-        work = [self._work(steps, u) for u in range(len(self.push))]
+        work = [self._work(steps, load) for load in range(len(self.power))]
         for i, u in enumerate(self.heads.tolist()):
-            out[..., 2 * S * i : 2 * S * i + S], out[..., 2 * S * i + S : 2 * S * (i + 1)] = (
-                self._damping(steps, u),
-                work[u],
-            )
-        first, count = 2 * S * len(self.heads), len(self.tone)
+            out[..., S * i : S * (i + 1)] = self._damping(steps, u)
+        for i, u in enumerate(self.heads[self.stops :].tolist()):
+            out[..., self.works + S * i : self.works + S * (i + 1)] = work[u - self.stops]
+        first, count = self.of_tones, len(self.tone)
         out[..., first : first + count] = self._damping_of_tones(steps)
-        for row, of_load in zip(self.signal[:, self.tone], work[self.stops :], strict=True):
+        for row, of_load in zip(self.signal[:, self.tone], work, strict=True):
             signal = np.einsum("c,jzci->jzi", row, steps.tones)
             out[..., first + count : first + 2 * count] += of_load @ signal.swapaxes(1, 2)
         return out
 
-    def _work(self, steps: Steps, u: int) -> Any:
-        """(j, y, S) ∫ L_i P_u dt with the velocity P_u of a force or load."""
+    def _work(self, steps: Steps, load: int) -> Any:
+        """(j, y, S) ∫ L_i P dt with the velocity P of a load."""
         out = np.zeros((len(steps.weights), self.shape[0], S))
         for part, rows in enumerate((self.p, self.v)):
-            out[:, rows] = self.power[u, self.v, None] * steps.table[:, :, S + part, :S]
+            out[:, rows] = self.power[load, self.v, None] * steps.table[:, :, S + part, :S]
         for i, w in enumerate(self.heads.tolist()):
-            out[:, self.rows(i)] = _over_blocks(self.power[u, self.v] * self.push[w], steps.moments(w))
-        out[:, self.tone] = steps.weights[:, None] * np.einsum("c,jzci->jzi", self.power[u, self.tone], steps.tones)
+            out[:, self.rows(i)] = _over_blocks(self.power[load, self.v] * self.push[w], steps.moments(w))
+        out[:, self.tone] = steps.weights[:, None] * np.einsum("c,jzci->jzi", self.power[load, self.tone], steps.tones)
         return out
 
     def _damping(self, steps: Steps, u: int) -> Any:

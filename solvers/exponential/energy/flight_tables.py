@@ -56,7 +56,7 @@ class EnergyTables(NamedTuple):
     steady: Any  # (kinds, j, K, 2, S): α, β of every tone at the nodes
     contact: Any  # (kinds, j, n, 3S + 5, 2S), or none where the next three are
     head: Any  # (H,) rows of `Scratch.force` that are heads, see `contact_sums`
-    sums: Any  # (f, j, 2N + S H, 2 S H padded with 4K) forms summed over the blocks
+    sums: Any  # (f, j, 2N + S H, S (2 H - m) padded with 4K) forms summed over the blocks
     free_loss: Any  # (kinds, j, 3, n) damping of free motion = Σ rows × (p², p v, v²)
 
 
