@@ -283,7 +283,7 @@ def nothing(delta, delta_dot, entry_rate):
 
 
 def test_a_law_that_never_stops_the_mass_is_an_error():
-    with pytest.raises(ValueError, match="a bounce of 1 kg at 1 m/s on .*: the law never stops the mass"):
+    with pytest.raises(ValueError, match=r"a bounce of 1 kg at 1 m/s on .*: the law never stops the mass"):
         restitution(nothing())
 
 
