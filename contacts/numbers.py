@@ -53,7 +53,7 @@ def reals(values: Any, what: str) -> NDArray[np.float64]:
     with np.errstate(over="ignore"):  # beyond the largest float: inf, which is refused where it may not be
         if given.dtype.kind in "iuf":
             return given.astype(float)
-        return np.array([_float(value, what) for value in given.flat]).reshape(given.shape)
+        return np.array([_float(value, what) for value in given.ravel().tolist()]).reshape(given.shape)
 
 
 def finite_row(values: Any, what: str, most: float, least: float = 0.0) -> NDArray[np.float64]:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from contacts import Hysteretic, achieved_restitution, identify, read_collisions
+from contacts import Hysteretic, achieved_restitution, bounce, identify, read_collisions
 
 sys.path.insert(0, str(Path(__file__).parent / "bench"))
 from collisions import KINDS, LAW, collisions, coverage
@@ -161,3 +161,81 @@ def test_too_few_samples_are_refused():
     data = exact(samples=40, timed=True)
     with pytest.raises(ValueError, match="time of record 1 must increase, it does not at sample 1"):
         identify(**{**data, "time": [t[::-1] for t in data["time"]]})
+
+
+def loops_of(law, speeds=(0.2, 0.4), timed=False):
+    """Measurements of bounces, as arguments of identify."""
+    hits = [bounce(law, speed, mass=0.03) for speed in speeds]
+    motion = {"time": [h.t for h in hits]} if timed else {"delta_dot": [h.delta_dot for h in hits]}
+    return {"delta": [h.delta for h in hits], "force": [h.force for h in hits], **motion}
+
+
+@pytest.mark.parametrize("timed", [False, True])
+@pytest.mark.parametrize("factor", [0.0, 1e-17, 1e-12, 1e-6])
+def test_nearly_elastic_collisions_are_found_whatever_the_rounding(timed, factor):
+    found = identify(**loops_of(Hysteretic(2.1e8, factor), timed=timed))
+    assert found.damping_factor.value == pytest.approx(factor, abs=1e-6 if timed else 1e-11)
+    assert found.restitution.value == pytest.approx(1.0, abs=2e-6)
+    assert found.stiffness.value == pytest.approx(2.1e8, rel=1e-4)
+
+
+@pytest.mark.parametrize("timed", [False, True])
+@pytest.mark.parametrize("exponent", [1.5, None])
+def test_a_force_that_pulls_is_refused(timed, exponent):
+    data = loops_of(Hysteretic(2.1e8, 0.5625), timed=timed)
+    negated = data | {"force": [-force for force in data["force"]]}
+    with pytest.raises(ValueError, match=r"force of collision 1 falls with indentation .* change its sign"):
+        identify(**negated, exponent=exponent)
+    second = data | {"force": [data["force"][0], -data["force"][1]]}
+    with pytest.raises(ValueError, match="force of collision 2 falls with indentation"):
+        identify(**second, exponent=exponent)
+
+
+@pytest.mark.parametrize("factor", [0.05, 5.0, 50.0, 1e3])
+def test_a_force_that_is_mostly_damping_is_no_force_that_pulls(factor):
+    found = identify(**loops_of(Hysteretic(2.1e8, factor)))
+    assert found.damping_factor.value == pytest.approx(factor, rel=1e-2)
+    identify(
+        **loops_of(Hysteretic(2.1e8, min(factor, 50.0)), timed=True)
+    )  # the smoothed motion may be poor, not refused
+
+
+@pytest.mark.parametrize("timed", [False, True])
+@pytest.mark.parametrize("size", [1e300, 1e150, 1e-150, 1e-300])
+@pytest.mark.parametrize("what", ["delta", "force", "motion"])
+def test_sizes_that_no_record_has_are_refused(timed, size, what):
+    data = loops_of(Hysteretic(2.1e8, 0.5625), timed=timed)
+    name = what if what != "motion" else "time" if timed else "delta_dot"
+    data[name] = [size * one for one in data[name]]
+    with pytest.raises(
+        ValueError, match=rf"{name} reaches .* where 1e-30 to 1e\+30 can be computed with; give SI units"
+    ):
+        identify(**data)
+
+
+def test_any_units_within_these_give_the_same_law():
+    data = loops_of(Hysteretic(2.1e8, 0.5625))
+    for size in (1e-20, 1e20):
+        found = identify(data["delta"], data["delta_dot"], [size * force for force in data["force"]])
+        assert found.stiffness.value == pytest.approx(2.1e8 * size, rel=1e-6)
+        found = identify([size * one for one in data["delta"]], data["delta_dot"], data["force"])
+        assert found.stiffness.value == pytest.approx(2.1e8 / size**1.5, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"force": np.full(60, 5.0)}, "force of collision 1 is 5 N throughout; leave the collision out"),
+        ({"exponent": 9.0}, "exponent of identify must be at most 8 in size, got 9.0"),
+        ({"exponent": "1.5"}, "exponent of identify must be a number, got '1.5'"),
+        ({"confidence": "high"}, "confidence must be a number, got 'high'"),
+        ({"offsets": None}, "offsets must be fitted or not, True or False, got None"),
+        ({"force": np.full(60, 1j)}, r"force of record 1 must be a number, got 1j"),
+        ({"force": ["5"] * 60}, "force of record 1 must be a number, got '5'"),
+    ],
+)
+def test_options_and_records_that_are_none_are_refused(change, said):
+    t = np.linspace(0.0, np.pi, 60)
+    data = {"delta": np.sin(t), "delta_dot": np.cos(t), "force": np.sin(t) ** 1.5}
+    with pytest.raises(ValueError, match=said):
+        identify(**(data | change))

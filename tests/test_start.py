@@ -110,3 +110,16 @@ def test_a_flying_mass_waits_while_the_beam_settles():
 def test_a_falling_beam_has_no_equilibrium():
     with pytest.raises(reduction.AccuracyError, match=r"no static equilibrium found.*does anything carry the loads"):
         fb.Scene(fb.Beam(L, STEEL), gravity=9.81).reduce(3).equilibrium()
+
+
+@pytest.mark.parametrize("gap", [1e-4, 0.1, 10.0])
+@pytest.mark.parametrize("stiffness", [1e7, 1e11])
+def test_a_body_comes_to_rest_on_the_beam_however_far_it_falls(gap, stiffness):
+    """Its indentation is the difference of numbers as large as the gap: forces are in balance to that rounding."""
+    mass, law = 0.01, Hertz(stiffness)
+    fallen = fb.Impactor(0.2, mass, 0.0, law, gap)
+    model = fb.Scene(fb.Beam(L, STEEL), CLAMPED, impactors=[fallen], gravity=9.81).reduce(2)
+    q = model.equilibrium()[:3]
+    delta = float(-model.directions[0] @ q) - gap
+    expected = (mass * 9.81 / stiffness) ** (2.0 / 3.0)
+    assert delta == pytest.approx(expected, rel=1e-9, abs=50.0 * np.spacing(gap))

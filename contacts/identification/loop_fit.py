@@ -34,11 +34,11 @@ class Measured:
                     f"record {number} has {len(d)} samples of delta and {len(f)} of force; give two or more of each"
                 )
             if np.ptp(d) == 0.0:
-                raise ValueError(f"delta of record {number} does not move from {d[0]!r} m; leave the record out")
+                raise ValueError(f"delta of record {number} does not move from {d[0]:g} m; leave the record out")
         together = [np.concatenate(x) for x in (self.delta, self.force)]
         self.depth, self.strength = (0.5 * float(np.ptp(x)) for x in together)
         if not self.strength > 0.0:
-            raise ValueError(f"force is {together[1][0]!r} N in all records; there is no loop")
+            raise ValueError(f"force is {together[1][0]:g} N in all records; there is no loop")
         self.loops = [Loop(d / self.depth, f / self.strength) for d, f in zip(self.delta, self.force, strict=True)]
         self.offset, self.count = offset, together[0].size
         self.target = np.concatenate([loop.force for loop in self.loops])

@@ -13,6 +13,7 @@ from contacts.identification.records import Vector
 _WIDTHS = np.geomspace(0.01, 1.9, 30)  # half ranges of the displacement at which a further slider is tried
 _LOADS_AT_START = (-0.7, 0.0, 0.7)  # shares of its limit that it may carry at the start of a record
 _WIDER = 0.2  # logarithm of the widths' ratio of further starts
+_FALLS = 0.2  # slope in units of the half ranges from which on a force that falls is none by noise
 _UNLIKELY = 1e-5  # chance that noise alone explains as much as a further slider
 
 
@@ -61,6 +62,11 @@ def _line(measured: Measured) -> tuple[float, float, int]:
 def _no_slip(measured: Measured, slope: float, squares: float) -> str:
     """What to say of straight lines."""
     stiffness, noise = slope * measured.strength / measured.depth, math.sqrt(squares / measured.count)
+    if slope < -_FALLS:
+        return (
+            f"the force falls as delta rises, by {-stiffness:.6g} N/m: an element's force is positive where delta is: "
+            "change the sign of one"
+        )
     return (
         f"nothing slips in these records: the force is a line of slope {stiffness:.6g} N/m to within "
         f"{noise * measured.strength:.3g} N, which tells of the limit only that half the range of force, "

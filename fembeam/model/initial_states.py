@@ -27,6 +27,7 @@ Vector = NDArray[np.float64]
 
 MISSED = 0.01  # of a field in the mass norm; more gets a warning
 SETTLED = 1e-12  # of the forces at work: an equilibrium
+ROUNDED = 8.0 * np.finfo(float).eps  # of what an indentation is the difference of: as near as it can be told
 MOST_STEPS = 2000
 
 
@@ -138,7 +139,8 @@ def _settled(model: Model, load: Vector, free: NDArray[np.bool_]) -> Vector:
     tau = 1e-3 / max(K.max(initial=0.0), 1e-6)
     for _ in range(MOST_STEPS):
         scale = np.abs(f).max(initial=0.0) + np.abs(forces[:, None] * W).max(initial=0.0) + np.abs(K * q).max(initial=0)
-        if np.abs(residual).max(initial=0.0) <= SETTLED * scale:
+        rounding = (slopes * (np.abs(W) @ np.abs(q) + np.abs(gaps))) @ np.abs(W)  # of δ, which stiff contacts multiply
+        if np.abs(residual).max(initial=0.0) <= SETTLED * scale + ROUNDED * rounding.max(initial=0.0):
             _check_memory(rows, -W @ q - gaps)
             return q
         J = np.diag(1 / tau + K) + (W.T * slopes) @ W
