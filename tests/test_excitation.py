@@ -174,6 +174,7 @@ def test_many_equal_steps_are_summed_as_any_instants_are(order):
         np.testing.assert_allclose(values[mixed], signal(t[mixed]), atol=1e-9 * values.std())
 
 
+@pytest.mark.drawn
 def test_kurtosis_is_gaussian():
     found = np.array([moments(BandNoise(1.0, BROAD, seed=s).series()[1]).kurtosis for s in range(40)])
     lo, hi = Estimate.of_mean(found).interval(0.9999)
@@ -181,6 +182,7 @@ def test_kurtosis_is_gaussian():
     assert lo < 3.0 < hi
 
 
+@pytest.mark.drawn
 def test_zero_crossings_come_at_rices_rate():
     rates = []
     for seed in range(40):
@@ -194,6 +196,7 @@ def test_zero_crossings_come_at_rices_rate():
     assert lo < exact < hi
 
 
+@pytest.mark.drawn
 def test_the_seed_is_the_realisation():
     a, b = BandNoise(1.0, BROAD, seed=7), BandNoise(1.0, BROAD, seed=7)
     assert a == b
@@ -431,13 +434,14 @@ def error_beyond(record, signal, order, samples):
     return np.abs(record.derivative(order)(t) - signal.derivative(order)(t)).max()
 
 
+@pytest.mark.drawn
 @pytest.mark.parametrize("fraction", [0.1, 0.33, 0.5])
 def test_record_derivative_of_uniform_samples(fraction):
     signal, rms = tones_below(fraction)
     t = STEP * np.arange(SAMPLES)
     record = Record(t, signal(t))
     np.testing.assert_allclose(record(t), signal(t), atol=1e-10)
-    for samples, bound in ((2, 0.2), (10, 1e-2), (50, 5e-4), (1000, 1e-6)):
+    for samples, bound in ((2, 0.6), (10, 3e-2), (50, 1.5e-3), (1000, 3e-6)):  # in 30 draws at most 0.42 of these
         assert error_beyond(record, signal, 2, samples) < bound * rms
 
 
@@ -480,6 +484,7 @@ def test_record_band_removes_what_is_outside():
     np.testing.assert_allclose(low(middle), 5.0 + 3.0 * middle + np.sin(20 * np.pi * middle), atol=1e-9)
 
 
+@pytest.mark.drawn
 def test_record_band_tames_the_noise_of_the_second_derivative():
     signal, rms = tones_below(0.1)
     t = STEP * np.arange(SAMPLES)
@@ -490,6 +495,7 @@ def test_record_band_tames_the_noise_of_the_second_derivative():
     assert error_beyond(Record(t, signal(t), band=banded.band), signal, 2, 200) < 2e-3 * rms
 
 
+@pytest.mark.drawn
 @pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-9])
 @pytest.mark.parametrize("order", [0, 2])
 def test_record_nodes_keep_their_promise(order, rtol):
@@ -499,7 +505,7 @@ def test_record_nodes_keep_their_promise(order, rtol):
     dt, values = record.nodes(1.0, rtol)
     assert (len(values) - 1) * dt >= 1.0 - 1e-12
     at = np.random.default_rng(3).uniform(0.0, 1.0, 3000)
-    assert np.std(hermite(dt, values)(at) - record(at)) < (1.1 * rtol + 1e-11) * np.std(record(at))
+    assert np.std(hermite(dt, values)(at) - record(at)) < (1.5 * rtol + 1e-11) * np.std(record(at))
 
 
 def test_acceleration_record_is_its_own_second_derivative():

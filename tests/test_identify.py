@@ -60,6 +60,7 @@ def test_zeros_are_found():
     assert ignored.stiffness.value > 1.01 * LAW.stiffness
 
 
+@pytest.mark.drawn
 @pytest.mark.parametrize("kind", ["force noise 2 %", "time, noise 1 % on both"])
 def test_intervals_hold_the_truth_as_often_as_they_say(kind):
     # tests/bench/collisions.py does more experiments and kinds; here what 95 % rejects once in a million
@@ -92,6 +93,7 @@ def test_a_record_is_cut_into_its_collisions():
         np.testing.assert_array_equal(column, kept[name])
 
 
+@pytest.mark.drawn
 def test_collisions_that_disagree_are_told():
     rng = np.random.default_rng(5)
     soft = collisions(rng, law=Hysteretic(1.8e8, 0.5625), speeds=(0.2, 0.3), noise_force=0.01)
@@ -107,6 +109,7 @@ def test_collisions_that_disagree_are_told():
     assert (alone.stiffness.high - alone.stiffness.low) < 0.5 * (found.stiffness.high - found.stiffness.low)
 
 
+@pytest.mark.drawn
 def test_a_filtered_channel_is_told_and_widens():
     rng = np.random.default_rng(6)
     data = collisions(rng, samples=200)

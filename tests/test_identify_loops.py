@@ -75,6 +75,7 @@ def test_several_records_with_one_zero_of_force():
         identify_loop(PATH, whole, offset=False)
 
 
+@pytest.mark.drawn
 @pytest.mark.parametrize(
     ("law", "level", "count"),
     [(DAMPER, 0.02, 80), (Iwan([2e4, 1e4, 3e3], [4.0, 9.0, np.inf]), 0.02, 50), (WEN, 0.02, 50), (SHARP, 0.02, 50)],
@@ -101,6 +102,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say(law, level, count):
     assert abs(np.mean(left**2) - 1.0) < 5.0 * np.sqrt(2.0 / 290.0 / count)
 
 
+@pytest.mark.drawn
 @pytest.mark.parametrize(
     ("law", "other"), [(WEN, Jenkins), (DAMPER, BoucWen), (JOINT, Jenkins), (SHARP, Jenkins)], ids=str
 )
@@ -115,6 +117,7 @@ def test_residuals_tell_a_wrong_law(law, other):
     assert right.noise < 0.006 * np.abs(force).max()
 
 
+@pytest.mark.drawn
 @pytest.mark.parametrize("law", [Jenkins, Iwan, BoucWen])
 @pytest.mark.parametrize("level", [0.0, 0.02])
 def test_what_never_slips_tells_nothing_of_the_limit(law, level):
@@ -123,6 +126,7 @@ def test_what_never_slips_tells_nothing_of_the_limit(law, level):
         identify_loop(PATH, force, law)
 
 
+@pytest.mark.drawn
 def test_a_first_loading_tells_the_limit_only_with_the_zero():
     path = np.linspace(0.0, 2e-3, 200)
     force = noisy(DAMPER, path, 0.01, np.random.default_rng(6))
@@ -132,6 +136,7 @@ def test_a_first_loading_tells_the_limit_only_with_the_zero():
     assert 10.0 in identify_loop(path, force, offset=False, confidence=0.9999).estimates["limit"]
 
 
+@pytest.mark.drawn
 @pytest.mark.parametrize(
     ("law", "way"),
     [(Jenkins(3e4, 28.0), 1.0), (Jenkins(3e4, 28.0), -1.0), (Iwan([2e4, 3e4, 5e3], [4.0, 28.0, np.inf]), 1.0)],
@@ -161,6 +166,7 @@ def test_slip_in_one_direction_bounds_the_limit_from_below_only(law, way):
     assert known.estimates[name].high < np.inf
 
 
+@pytest.mark.drawn
 def test_a_first_loading_tells_the_sum_of_beta_and_gamma():
     path = np.linspace(0.0, 2e-3, 400)
     force = noisy(WEN, path, 0.001, np.random.default_rng(7))
@@ -169,6 +175,7 @@ def test_a_first_loading_tells_the_sum_of_beta_and_gamma():
     assert found.law.beta + found.law.gamma == pytest.approx(2000.0, rel=0.05)
 
 
+@pytest.mark.drawn
 def test_no_more_sliders_than_there_are():
     for law in (DAMPER, Iwan([2e4, 1e4], [4.0, 9.0])):
         for level in (0.0, 0.01):
@@ -176,6 +183,7 @@ def test_no_more_sliders_than_there_are():
             assert len(found.law.sliders) == len(law.sliders)
 
 
+@pytest.mark.drawn
 def test_a_smooth_loop_by_many_sliders():
     """What a law misses becomes small with their number."""
     force = noisy(WEN, PATH, 0.002, np.random.default_rng(9))
@@ -186,6 +194,7 @@ def test_a_smooth_loop_by_many_sliders():
     assert left[1] > 1.3 * left[2]
 
 
+@pytest.mark.drawn
 def test_a_filtered_channel_widens():
     rng = np.random.default_rng(10)
     white = 0.3 * rng.standard_normal(619)
@@ -197,6 +206,7 @@ def test_a_filtered_channel_widens():
     assert wide.high - wide.low > 2.0 * (narrow.high - narrow.low)
 
 
+@pytest.mark.drawn
 def test_noise_in_the_displacement_is_told():
     """Every turn of the noise is one of the slider's in the model: the limit comes out too large."""
     rough = PATH + 1e-5 * np.random.default_rng(11).standard_normal(PATH.size)

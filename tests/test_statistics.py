@@ -14,6 +14,7 @@ def white(seed, n=65_536):
     return np.random.default_rng(seed).standard_normal(n)
 
 
+@pytest.mark.drawn
 def test_level_of_white_noise():
     dt = 0.01
     levels = np.array([psd(2.0 * white(s), dt).density[5:-5].mean() for s in range(20)])
@@ -47,6 +48,7 @@ def test_variance_is_the_windowed_power_of_the_signal():
     assert spectrum.n_segments == len(starts)
 
 
+@pytest.mark.drawn
 def test_variance_of_the_spectrum_is_that_of_the_signal():
     ratios = []
     for seed in range(20):
@@ -58,6 +60,7 @@ def test_variance_of_the_spectrum_is_that_of_the_signal():
     assert lo < 1.0 < hi
 
 
+@pytest.mark.drawn
 def test_band_noise_is_flat_in_its_band():
     noise = BandNoise(1e-3, (100.0, 300.0), seed=2, period=600.0)
     t, y = noise.series()
@@ -104,6 +107,7 @@ def test_density_integrates_to_one(samples):
     assert x[-1] < max(samples)
 
 
+@pytest.mark.drawn
 def test_density_of_a_gaussian():
     samples = white(5)
     x, density = pdf(samples, bins=40)
@@ -121,6 +125,7 @@ def test_density_on_given_edges():
     np.testing.assert_allclose(density, [4 / 3, 2 / 3])
 
 
+@pytest.mark.drawn
 def test_moments_of_known_samples():
     assert moments([1.0, -1.0]) == Moments(0.0, 1.0, 0.0, 1.0)
     found = moments(np.random.default_rng(0).exponential(2.0, (1000, 400)))
@@ -130,6 +135,7 @@ def test_moments_of_known_samples():
     assert found.kurtosis == pytest.approx(9.0, rel=0.1)
 
 
+@pytest.mark.drawn
 def test_kurtosis_of_a_gaussian_is_three():
     found = moments(white(6))
     assert abs(found.kurtosis - 3) < 4 * math.sqrt(24 / 65_536)

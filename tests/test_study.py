@@ -148,6 +148,7 @@ def test_random_response_is_paired_and_knows_its_noise():
     assert study.row(3).measured.values.shape == (5,)
 
 
+@pytest.mark.drawn
 def test_half_width_of_paired_differences():
     rng = np.random.default_rng(1)
     common, covered = rng.normal(10.0, 3.0, (400, 8)), 0
@@ -262,7 +263,7 @@ TWO_STOPS = fb.Scene(
 )
 CASES = {
     "amplitude, periodic": (SCENE, Amplitude(z=0.13), 0.05, {"residual": False}),
-    "contact time, chaotic": (replace(SCENE, base=fb.Harmonic(1e-3, 120.0)), "contact_time", 0.5, {"residual": True}),
+    "contact time, chaotic": (replace(SCENE, base=fb.Harmonic(1e-3, 100.0)), "contact_time", 0.5, {"residual": True}),
     "amplitude, no stops": (FREE, Amplitude(z=0.2), 0.001, {}),
     "energy, two stops": (TWO_STOPS, "energy", 0.05, {"duration": 0.1, "dt": 1e-4}),
     "peak force, struck": (STIFF, "peak_force", 0.1, {"duration": 0.05, "start": swing}),
@@ -273,7 +274,10 @@ CASES = {
     "name", [pytest.param(name, marks=[pytest.mark.chaotic] * ("chaotic" in name)) for name in CASES]
 )
 def test_smallest_model_is_right_afterwards(name):
-    """The chaotic case has bounds of 0.12 ± 0.04 and 0.10 ± 0.02 in twelve realisations, far below its tolerance."""
+    """The chaotic case has one attractor: its deviation is 0.03 ± 0.02 in 28 realisations, its tolerance 0.5.
+
+    At 120 rad/s two modes have a second one with contacts 1.6 times as long, which a sixth of the realisations came to.
+    """
     scene, quantity, tolerance, how = CASES[name]
     found = smallest_model(scene, quantity, tolerance, **how)
     assert found.met

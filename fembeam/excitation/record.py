@@ -86,8 +86,8 @@ class Record:
     Samples off a uniform grid by more than 1e-4 of a step are carried over by a quintic spline; keep ten
     samples per shortest period then (error of y'' 0.2 % of its rms; 20 samples: 0.03 %). Nothing is
     extrapolated at the ends: y'' is zero there and wrong by its own size within the first two samples. For 40
-    tones up to half the Nyquist frequency the error of y'' is below 1 % of its rms 10 samples from an end,
-    0.05 % at 50 and 1e-6 at 1000. With a `band` the error extends farther: 7 % at 3 periods of hi from an
+    tones up to half the Nyquist frequency the error of y'' is below 3 % of its rms 10 samples from an end,
+    0.15 % at 50 and 3e-6 at 1000. With a `band` the error extends farther: 7 % at 3 periods of hi from an
     end, 0.1 % at 10; stay as many periods of lo away from the ends when lo > 0.
 
     Examples

@@ -49,10 +49,9 @@ test, statements = "", []  # under way: the test that runs; [test, where, text, 
 
 def margin(kind, left, right):
     """By how much a comparison holds, of arrays the least; None where it is none of numbers."""
-    if kind == "Eq":
-        of_numbers = hasattr(right, "tolerance") and not isinstance(left, bool)  # pytest.approx of a number
-        return float(right.tolerance - abs(left - right.expected)) if of_numbers else None
     try:
+        if kind == "Eq":  # of pytest.approx of a number
+            return float(right.tolerance - abs(left - right.expected)) if hasattr(right, "tolerance") else None
         gap = np.asarray(right, dtype=float) - np.asarray(left, dtype=float)
     except (TypeError, ValueError):
         return None
