@@ -37,7 +37,7 @@ from solvers.compiled.kernels import (
 )
 from solvers.compiled.parts import ERROR, SOLVE, part
 from solvers.compiled.simd import largest8, load8
-from solvers.compiled.state import CALLS
+from solvers.compiled.state import CALLS, T
 from solvers.compiled.sums import combine, iterate_power_law, replace_values
 from solvers.exponential.contact.many_stops import add_end_response, pair_response, uses_blocks, weighting_of
 from solvers.exponential.contact.node_newton import MOST_ITERATIONS, newton
