@@ -115,7 +115,7 @@ class CustomMemoryLaw(Law):
 
     @property
     def kernel(self) -> Any:
-        """The force, compiled once per process."""
+        """The compiled force."""
         return self.memory_kernel("")
 
     @property
