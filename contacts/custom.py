@@ -42,7 +42,7 @@ class CustomLaw(Law):
 
     @property
     def kernel(self) -> Any:
-        """The function compiled once per process."""
+        """The compiled function."""
         return compiled(self.function, self.derivative, len(self.values))[0]
 
     @property
@@ -81,7 +81,7 @@ def law(
     """Turn a plain function into a contact law.
 
     The function gives the force for ``delta > 0``. It is compiled by numba, once, and no integrator is
-    recompiled for it.
+    recompiled for it; later processes load it, unless it uses lists, objects or other modules than math and numpy.
 
     Parameters
     ----------

@@ -1,24 +1,37 @@
-"""Compiling a user's law: its scalar function into the kernels of `contacts.law`, errors with the line they are on."""
+"""Compiling a user's law: its scalar function into the kernels of `contacts.law`, errors with the line they are on.
+
+Machine code is kept under a digest of all that it is made of, so a law that is defined again, wherever, is loaded.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import inspect
 import math
-from collections.abc import Callable
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import lru_cache
+from importlib import import_module
+from pathlib import Path
+from types import CellType, CodeType, FunctionType, ModuleType
 from typing import Any
 
+import numpy as np
+
 Function = Callable[..., Any]
+KEPT = 300  # kernels of users' laws that stay in a folder, the last used; a law has two, one with memory six
+LARGEST = 10**6  # bytes of an array that becomes a part of machine code
+KNOWN = {"builtins", "cmath", "math", "numba", "numpy"}  # told by their names and versions
 
 
 @lru_cache(maxsize=256)
 def compiled(function: Function, derivative: Function | None, count: int) -> tuple[Any, Any]:
     """Compile a scalar force and its derivatives into the batch kernels; what raises gives NaN, which stops a run."""
-    from numba import cfunc, njit
-
     from contacts.kernels import GRADIENT, SIGNATURE
 
-    scalar = njit(error_model="numpy")(function)
+    scalar = inner(function)
 
     def forces(n, delta, delta_dot, entry_rate, values, force):
         for i in range(n):
@@ -37,16 +50,17 @@ def compiled(function: Function, derivative: Function | None, count: int) -> tup
 
     slopes, source = differences, function
     if derivative is not None:
-        given, source = njit(error_model="numpy")(derivative), derivative
+        given, source = inner(derivative), derivative
 
         def slopes(n, delta, delta_dot, entry_rate, values, by_delta, by_rate, by_entry):  # type: ignore[no-untyped-def]
             for i in range(n):
                 by_delta[i], by_rate[i], by_entry[i] = given(delta[i], delta_dot[i], entry_rate, *values)
 
-    forces, slopes = njit(error_model="numpy")(forces), njit(error_model="numpy")(slopes)
-    forces_kernel = or_say_where(lambda: cfunc(SIGNATURE)(batch_of(forces, count)), function, "law")
     kind = "law" if derivative is None else "derivative"
-    return forces_kernel, or_say_where(lambda: cfunc(GRADIENT)(gradient_batch(slopes, count)), source, kind)
+    return (
+        or_say_where(lambda: kept(SIGNATURE, batch_of(inner(forces), count)), function, "law"),
+        or_say_where(lambda: kept(GRADIENT, gradient_batch(inner(slopes), count)), source, kind),
+    )
 
 
 def batch_of(forces: Any, count: int) -> Function:
@@ -81,6 +95,144 @@ def gradient_batch(slopes: Any, count: int) -> Function:
             return
 
     return batch
+
+
+def inner(function: Function) -> Any:
+    """A function that kernels call, compiled without the wrappers that Python would need."""
+    from numba import njit
+
+    return njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)(_named(function))
+
+
+def kept(signature: Any, function: Function) -> Any:
+    """A kernel of a user's law: loaded if the same has been compiled before, by any process, else compiled."""
+    from contacts.kernels import c_function
+
+    named = _named(function)
+    return c_function(signature, named, _store() if named is not function else None)
+
+
+@lru_cache(maxsize=1)
+def _store() -> Any:
+    """The cache of machine code of users' laws."""
+    from contacts.kernels import Store
+
+    class Laws(Store):
+        """Machine code of users' laws, each in files of its own, named after its content; the last used stay."""
+
+        def _index_key(self, sig: Any, codegen: Any) -> Any:
+            return sig, codegen.magic_tuple()
+
+        def load_overload(self, sig: Any, target_context: Any) -> Any:
+            """What was kept, marked as used just now."""
+            with suppress(OSError):
+                os.utime(self.index)
+            return super().load_overload(sig, target_context)
+
+        def save_overload(self, sig: Any, data: Any) -> None:
+            """Keep what was compiled, and drop what was not used for longest."""
+            if not data.library.has_dynamic_globals:
+                super().save_overload(sig, data)
+                _drop_oldest(Path(self.index).parent)
+
+    return Laws
+
+
+def _drop_oldest(folder: Path) -> None:
+    """Remove the kernels beyond the last used."""
+    with suppress(OSError):  # another process does so, too
+        for index in sorted(folder.glob("custom_kernels.*.nbi"), key=os.path.getmtime)[:-KEPT]:
+            for path in folder.glob(f"{index.stem}.*"):
+                path.unlink()
+
+
+def _named(function: Function) -> Function:
+    """The function under a name that tells its content, with all it calls; itself where that is not known.
+
+    Two functions of one name are taken for each other when machine code from several processes is loaded.
+    """
+    digest = _digest(function)
+    if digest is None:
+        return function
+    found = function.__globals__
+    used = {name: _renamed(found[name]) for name in _names(function.__code__) if name in found}
+    cells = tuple(CellType(_renamed(cell.cell_contents)) for cell in function.__closure__ or ())
+    named = FunctionType(function.__code__, {**found, **used}, function.__name__, function.__defaults__, cells)
+    named.__qualname__, named.__module__ = f"{function.__name__.strip('<>')}_{digest}", __name__
+    return named
+
+
+def _renamed(value: Any) -> Any:
+    """What a function uses, compiled anew under such a name if it is a function that the user has compiled."""
+    from numba import jit
+    from numba.core.dispatcher import Dispatcher
+
+    if isinstance(value, Dispatcher) and value.py_func.__module__ != __name__:
+        return jit(**value.targetoptions)(_named(value.py_func))
+    return value
+
+
+@lru_cache(maxsize=1024)
+def _digest(function: Function) -> str | None:
+    """Of what a function is made of, and of the versions that make machine code of it; None where it is not known."""
+    import llvmlite
+    import numba
+
+    versions = sys.version, numba.__version__, llvmlite.__version__, np.__version__
+    try:
+        content = "".join(_content(function, ()))
+    except (TypeError, ValueError):  # ValueError: of a variable that has no value yet
+        return None
+    return hashlib.sha256(f"{versions} {content}".encode()).hexdigest()[:20]
+
+
+def _content(value: Any, above: tuple[Any, ...]) -> Iterator[str]:
+    """All that machine code takes from a function or a value, as text; TypeError where that is not known."""
+    from numba.core.dispatcher import Dispatcher
+
+    yield f"({type(value).__name__} "
+    if value is None or type(value) in (bool, int, float, complex, str, bytes):
+        yield repr(value)
+    elif type(value) is tuple:
+        for item in value:
+            yield from _content(item, above)
+    elif isinstance(value, np.generic | np.ndarray) and value.dtype.kind in "biufc" and value.nbytes < LARGEST:
+        yield f"{value.dtype.str} {value.shape} {value.tobytes().hex()}"
+    elif isinstance(value, CodeType):
+        yield f"{value.co_code.hex()} {value.co_exceptiontable.hex()} {value.co_flags} {value.co_argcount} "
+        yield f"{value.co_names} {value.co_varnames} {value.co_freevars} {value.co_cellvars} "
+        yield from _content(value.co_consts, above)
+    elif isinstance(value, Dispatcher) and getattr(value, "_can_compile", False) and not value.locals:
+        yield repr(sorted(value.targetoptions.items()))
+        yield from _content(value.py_func, above)
+    elif _is_known(value):
+        yield f"{getattr(value, '__module__', '')} {value.__name__}"
+    elif isinstance(value, FunctionType) and value not in above:  # none that calls itself
+        cells = tuple(cell.cell_contents for cell in value.__closure__ or ())
+        used = [value.__globals__[name] for name in _names(value.__code__) if name in value.__globals__]
+        for part in (value.__code__, value.__defaults__, cells, *used):
+            yield from _content(part, (*above, value))
+    else:
+        raise TypeError(f"{value!r} may change")
+    yield ")"
+
+
+def _names(code: CodeType) -> Iterator[str]:
+    """Names that a function looks up, those of the functions within it among them."""
+    yield from code.co_names
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _names(constant)
+
+
+def _is_known(value: Any) -> bool:
+    """Whether a value is a module of those known, or what one of their names stands for."""
+    name = value.__name__ if isinstance(value, ModuleType) else getattr(value, "__module__", None)
+    if not isinstance(name, str) or name.partition(".")[0] not in KNOWN:
+        return False
+    if isinstance(value, ModuleType):
+        return True
+    return getattr(import_module(name), getattr(value, "__name__", ""), None) is value
 
 
 def or_say_where(compile_it: Callable[[], Any], function: Function, kind: str) -> Any:

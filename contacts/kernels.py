@@ -1,11 +1,17 @@
 """Compiled forces of the built-in laws and their derivatives, cached; see `contacts.law` for the C signature."""
 
+import logging
 import math
+import os
 import threading
+from contextlib import suppress
 from functools import partial
 
 from llvmlite import ir
 from numba import carray, cfunc, config, njit, types
+from numba.core.caching import FunctionCache
+from numba.core.ccallback import CFunc
+from numba.core.sigutils import normalize_signature
 from numba.extending import intrinsic
 
 REALS = types.CPointer(types.float64)
@@ -29,19 +35,62 @@ class Kernel:
         return getattr(self._made, name)
 
 
-def compiled(decorator, *signature):
-    """The decorator with our options; machine code is kept where numba finds a folder it may write to.
+class Store(FunctionCache):
+    """numba's cache of one function; what cannot be kept or read is compiled, and that nothing is kept is said once."""
 
-    It looks whether this file has changed: that is enough, since all that these functions call is in it.
-    """
+    told = False
 
-    def made(function):
+    def load_overload(self, sig, target_context):
+        """What was kept, or None; a file that is damaged is written anew."""
         try:
-            return decorator(*signature, error_model="numpy", cache=True)(function)
-        except RuntimeError:  # no folder: then each process compiles for a second
-            return decorator(*signature, error_model="numpy")(function)
+            return super().load_overload(sig, target_context)
+        except Exception:  # of whatever a damaged file is taken for
+            self._forget()
 
-    return (lambda function: Kernel(partial(made, function))) if decorator is cfunc else made
+    def save_overload(self, sig, data):
+        """Keep what was compiled."""
+        try:
+            super().save_overload(sig, data)
+        except OSError as error:
+            self._forget()  # the index may name a file that was not written, but is there from other sources
+            if not Store.told:
+                Store.told = True
+                logging.getLogger("fembeam.contacts").warning("contact laws are compiled but not kept: %s", error)
+
+    def _forget(self):
+        with suppress(OSError):
+            os.unlink(self.index)
+
+    @property
+    def index(self):
+        """The file that tells what is kept."""
+        return os.path.join(self.cache_path, f"{self._impl.filename_base}.nbi")
+
+
+def stored(made, store, function):
+    """Have a function of numba's keep its machine code, where there is a folder that can be written to."""
+    with suppress(RuntimeError):  # none: then each process compiles for a second
+        made._cache = store(function)
+    return made
+
+
+def c_function(signature, function, store=Store):
+    """A C function, compiled or loaded; ``store`` is the class of its cache, None for none."""
+    made = CFunc(function, normalize_signature(signature), {}, {"error_model": "numpy"})
+    if store is not None:
+        stored(made, store, function)
+    made.compile()
+    return made
+
+
+def compiled(decorator, *signature):
+    """The decorator with our options; machine code is kept.
+
+    numba looks whether this file has changed: that is enough, since all that these functions call is in it.
+    """
+    if decorator is cfunc:
+        return lambda function: Kernel(partial(c_function, *signature, function))
+    return lambda function: stored(njit(error_model="numpy")(function), Store, function)
 
 
 _force = compiled(cfunc, SIGNATURE)

@@ -1,6 +1,9 @@
 """Machine code is that of the sources, wherever it can be kept: a small package, changed on disk."""
 
+import cmath
+import math
 import os
+import pickle
 import shutil
 import subprocess
 import sys
@@ -9,8 +12,12 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import every_method
+import numpy as np
 import pytest
+from numba import njit
 
+import contacts.custom_kernels as own
 import contacts.kernels as laws
 import solvers.compiled.cache as cache
 import solvers.compiled.decorators as decorators
@@ -157,6 +164,137 @@ def test_laws_are_compiled_where_nothing_can_be_written(package, tmp_path):
     environment = closed(package, tmp_path)
     shutil.copy(laws.__file__, package / "laws.py")
     assert ran("import solvers.laws as k; print(k.power.address > 0)", package.parent, **environment)[0] == ["True"]
+
+
+FULL = """
+from numba.core.caching import IndexDataCacheFile
+def full(*_):
+    raise OSError(28, "No space left on device")
+IndexDataCacheFile._open_for_write = full
+"""
+REMOVED = "import solvers.compiled.decorators, solvers.compiled.cache as c, shutil; shutil.rmtree(c.FOLDER)\n"
+
+
+def test_a_full_disk_is_told_once_and_code_runs_all_the_same(package):
+    said, warned = ran(FULL + CALL, package.parent)
+    assert said == ["2.0", "0"]
+    assert warned.count("\n") == warned.count("not kept") == warned.count("No space left on device") == 1
+    shutil.copy(laws.__file__, package / "laws.py")
+    said, warned = ran(FULL + "import solvers.laws as k; print(k.polynomial.address > 0)", package.parent)
+    assert said == ["True"]
+    assert warned.count("\n") == warned.count("not kept") == warned.count("No space left on device") == 1
+
+
+def test_a_folder_removed_while_a_process_runs_is_made_again(package):
+    assert ran(REMOVED + CALL, package.parent) == (["2.0", "0"], "")
+    assert ran(CALL, package.parent) == (["2.0", "1"], "")
+
+
+def test_a_place_that_is_lost_while_a_process_runs_is_not_replaced_by_one_where_old_code_may_lie(package):
+    """numba would take the folder beside the source, where a function is known by its own file alone."""
+    assert ran(REMOVED + "open(c.FOLDER, 'w').close()\n" + CALL, package.parent) == (["2.0", "0"], "")
+    assert not list(package.rglob("*.nb[ic]"))
+
+
+def test_damaged_files_are_written_anew(package):
+    ran(CALL, package.parent)
+    damaged = [*package.rglob("inner*.nbi"), *package.rglob("outer*.nbc")]
+    assert len(damaged) == 2
+    for path in damaged:
+        path.write_bytes(path.read_bytes()[:-7])
+    assert ran(CALL, package.parent) == (["2.0", "0"], "")
+    assert ran(CALL, package.parent) == (["2.0", "1"], "")
+
+
+def test_a_later_process_compiles_nothing():
+    """Every method on every kind of own law; what no process has kept yet is compiled here first."""
+    every_method.run_all()
+    code = [sys.executable, "-W", "error", every_method.__file__]
+    done = subprocess.run(code, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+def test_no_function_takes_a_function():
+    """numba keeps no machine code that holds an address; the processor decides whether one is left out."""
+    every_method.run_all()
+    taken = []
+    for path in (cache.FOLDER or Path()).rglob("*.nbi"):
+        with path.open("rb") as file:
+            pickle.load(file)  # numba's version
+            taken += [str(key[0]) for key in pickle.load(file)[1]]
+    assert taken or cache.FOLDER is None
+    assert [signature for signature in taken if "Dispatcher" in signature] == []
+
+
+FACTORY = """
+import sys
+from contacts import law
+from numba import njit
+def made(stiffness):
+    @njit
+    def spring(delta):
+        return stiffness * delta
+    @law
+    def linear(delta, delta_dot, entry_rate):
+        return spring(delta)
+    return linear()
+laws = [made(float(value)) for value in sys.argv[1:]]
+print(*(float(one.force(1.0)) for one in laws), *(one.kernel._cache_hits for one in laws))
+"""
+
+
+def test_own_laws_of_one_name_are_kept_apart(tmp_path):
+    """Machine code that two processes made of two functions of one name would be one function to a third."""
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    for values, said in ((("2",), "2.0 0"), (("3", "2"), "3.0 2.0 0 1")):
+        command = [sys.executable, "-c", FACTORY, *values]
+        assert (
+            subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.strip() == said
+        )
+
+
+GIVEN = np.array([1.0, 2.0])
+
+
+def digest_of(constant, helper=None):
+    """Of a function with this constant and this function within."""
+
+    def force(delta):
+        return constant * delta + GIVEN[0] + (helper(delta) if helper else 0.0)
+
+    return own._digest(force)
+
+
+def test_a_digest_tells_all_that_a_law_is_made_of(monkeypatch):
+    def twice(x):
+        return 2.0 * x
+
+    def thrice(x):
+        return 3.0 * x
+
+    found = [digest_of(2.0), digest_of(2), digest_of(3.0), digest_of(np.float32(2.0)), digest_of((2.0, 3.0))]
+    found += [digest_of(math.sqrt), digest_of(cmath.sqrt)]
+    found += [digest_of(2.0, njit(f, **options)) for f in (twice, thrice) for options in ({}, {"fastmath": True})]
+    monkeypatch.setitem(globals(), "GIVEN", np.array([1.0, 3.0]))
+    found.append(digest_of(2.0))
+    assert None not in found
+    assert len(set(found)) == len(found)
+    assert digest_of(2.0) == found[-1]
+
+
+@pytest.mark.parametrize("constant", [[2.0], {"K": 2.0}, SimpleNamespace(K=2.0), shutil, np.zeros(200000)])
+def test_what_may_change_unseen_has_no_digest(constant):
+    assert digest_of(constant) is None
+
+
+def test_the_last_used_laws_stay(tmp_path, monkeypatch):
+    monkeypatch.setattr(own, "KEPT", 2)
+    for i, name in enumerate("abcd"):
+        for path in (tmp_path / f"custom_kernels.{name}.nbi", tmp_path / f"custom_kernels.{name}.1.nbc"):
+            path.touch()
+            os.utime(path, (i, i))
+    own._drop_oldest(tmp_path)
+    assert sorted({path.name.split(".")[1] for path in tmp_path.iterdir()}) == ["c", "d"]
 
 
 @pytest.mark.parametrize("module", ["contacts.kernels", "solvers.compiled.decorators"])

@@ -132,7 +132,7 @@ class CustomMemoryLaw(Law):
 
     @property
     def kernel(self) -> Any:
-        """The force, compiled once per process."""
+        """The compiled force."""
         return self.memory_kernel("")
 
     @property

@@ -6,13 +6,14 @@ Every function takes (δ, δ̇, latched numbers, parameters); a row of parameter
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
 
-Function = Callable[..., Any]
+from contacts.custom_kernels import Function, batch_of, gradient_batch, inner, kept, or_say_where
+
 Pieces = tuple[tuple[Function, Function | None, tuple[tuple[Function, Function | None, int], ...]], ...]
 LEAST = 1e-11, 1e-8, 1e-9  # steps of differences at zero: δ in m, its rate in m/s, a latched number of any unit
 RELATIVE = 1e-5
@@ -21,24 +22,17 @@ RELATIVE = 1e-5
 @lru_cache(maxsize=256)
 def compiled(pieces: Pieces, latched: int, count: int, name: str) -> Any:
     """One kernel of segments (force, slopes, borders (value, renewal, next)) with ``count`` numbers in a row."""
-    from numba import cfunc
-
-    from contacts.custom_kernels import or_say_where
-
     signature, function = _kernels(pieces, latched, count)[name]
-    return or_say_where(lambda: cfunc(signature)(function), pieces[0][0], "law with memory")
+    return or_say_where(lambda: kept(signature, function), pieces[0][0], "law with memory")
 
 
 @lru_cache(maxsize=256)
 def _kernels(pieces: Pieces, latched: int, count: int) -> dict[str, tuple[Any, Function]]:
     """Signature and function of every kernel by name; nothing is compiled yet."""
-    from numba import njit
-
-    from contacts.custom_kernels import batch_of, gradient_batch
     from contacts.kernels import GRADIENT, SIGNATURE
     from contacts.sum_kernels import RENEW, RENEW_GRADIENT
 
-    scalar, several = cache(njit(error_model="numpy")), 2 + latched  # what serves several segments is compiled once
+    scalar, several = cache(inner), 2 + latched  # what serves several segments is compiled once
     width = max(1, *(len(borders) for *_, borders in pieces))
     padded = [border for *_, borders in pieces for border in (*borders, *[None] * width)[:width]]
     force = _chosen([_read(scalar(f)) for f, *_ in pieces])
@@ -66,18 +60,17 @@ def _given(delta: float, delta_dot: float, row: tuple[float, ...]) -> tuple[floa
 
 def _chosen(functions: Sequence[Function]) -> Function:
     """The function of a number, called with a tuple: a chain of branches, as compiled code holds no such list."""
-    from numba import njit
 
     def either(k: int, function: Function, rest: Function | None) -> Function:
         if rest is None:
-            return njit(lambda s, given: function(*given))
+            return inner(lambda s, given: function(*given))
 
         def pick(s, given):  # type: ignore[no-untyped-def]
             if s == k:
                 return function(*given)
             return rest(s, given)
 
-        return njit(pick)
+        return inner(pick)
 
     chain = None
     for k in range(len(functions) - 1, -1, -1):
@@ -89,35 +82,29 @@ def _chosen(functions: Sequence[Function]) -> Function:
 @lru_cache(maxsize=256)
 def _read(function: Function) -> Function:
     """A user's function of a tuple."""
-    from numba import njit
-
-    return njit(lambda given: function(*given))
+    return inner(lambda given: function(*given))
 
 
 @lru_cache(maxsize=256)
 def _nowhere() -> Function:
     """A border that does not exist."""
-    from numba import njit
-
-    return njit(lambda given: 1.0)
+    return inner(lambda given: 1.0)
 
 
 @lru_cache(maxsize=256)
 def _kept(latched: int) -> Function:
     """A renewal that changes nothing but the segment."""
-    from numba import njit
 
     def keep(out, given):  # type: ignore[no-untyped-def]
         for i in range(latched):
             out[i] = given[2 + i]
 
-    return njit(keep)
+    return inner(keep)
 
 
 @lru_cache(maxsize=256)
 def _written(function: Function, count: int) -> Function:
     """A function that writes what another returns, one number or a tuple of several, of any types."""
-    from numba import njit
 
     def entry(i: int, rest: Function | None) -> Function:
         def last(new, out):  # type: ignore[no-untyped-def]
@@ -127,14 +114,14 @@ def _written(function: Function, count: int) -> Function:
             out[i] = float(new[i])
             rest(new, out)
 
-        return njit(last if rest is None else write)
+        return inner(last if rest is None else write)
 
     if count == 1:
 
         def one(out, given):  # type: ignore[no-untyped-def]
             out[0] = float(function(*given))
 
-        return njit(one)
+        return inner(one)
     fill = None
     for i in range(count - 1, -1, -1):
         fill = entry(i, fill)
@@ -142,13 +129,12 @@ def _written(function: Function, count: int) -> Function:
     def several(out, given):  # type: ignore[no-untyped-def]
         fill(function(*given), out)
 
-    return njit(several)
+    return inner(several)
 
 
 @lru_cache(maxsize=256)
 def _jacobian(write: Function, rows: int, columns: int, count: int) -> Function:
     """Derivatives of what `write` writes by its first arguments, (rows, columns), by central differences."""
-    from numba import njit
     from numba.np.unsafe.ndarray import to_fixed_tuple
 
     size = count + 1  # δ, its rate and a row without its segment
@@ -165,27 +151,23 @@ def _jacobian(write: Function, rows: int, columns: int, count: int) -> Function:
             for i in range(rows):
                 table[i, c] = (ends[1, i] - ends[0, i]) / (2.0 * h)
 
-    return njit(fill, error_model="numpy")
+    return inner(fill)
 
 
 @lru_cache(maxsize=256)
 def _written_slopes(force: Function, columns: int, count: int) -> Function:
     """Derivatives of a force by differences, written like given ones."""
-    from numba import njit
-
     jacobian = _jacobian(_written(force, 1), 1, columns, count)
 
     def slopes(out, given):  # type: ignore[no-untyped-def]
         jacobian(out.reshape((1, columns)), given)
 
-    return njit(slopes)
+    return inner(slopes)
 
 
 def _points(force: Function, slopes: Function, value: Function, latched: int, width: int) -> tuple[Function, ...]:
     """Force, its derivatives by the motion and by the latched numbers, and borders, at n points."""
-    from numba import njit
-
-    room, given = 2 + latched, njit(_given)
+    room, given = 2 + latched, inner(_given)
 
     def forces(n, delta, delta_dot, entry_rate, row, out):  # type: ignore[no-untyped-def]
         for i in range(n):
@@ -210,15 +192,15 @@ def _points(force: Function, slopes: Function, value: Function, latched: int, wi
             for i in range(n):
                 values[j * n + i] = value(row[0] * width + j, (given(delta[i], delta_dot[i], row),))
 
-    return tuple(njit(f, error_model="numpy") for f in (forces, by_point, by_memory, borders))
+    return tuple(inner(f) for f in (forces, by_point, by_memory, borders))
 
 
 def _renew(renewal: Function, following: tuple[float, ...], width: int, latched: int, count: int) -> Function:
     """The renewal of the latched numbers, nan where it raises, and of the segment, whose place is the event."""
-    from numba import carray, njit
+    from numba import carray
     from numba.np.unsafe.ndarray import to_fixed_tuple
 
-    given = njit(_given)
+    given = inner(_given)
 
     def renew(j, delta, delta_dot, entry_rate, parameters):  # type: ignore[no-untyped-def]
         row, out = to_fixed_tuple(carray(parameters, (count,)), count), np.full(latched, math.nan)
@@ -237,10 +219,10 @@ def _renew(renewal: Function, following: tuple[float, ...], width: int, latched:
 
 def _renew_gradient(slopes: Function, width: int, latched: int, count: int) -> Function:
     """Derivatives of the renewal, nan where it raises; those by and of the segment are zero."""
-    from numba import carray, njit
+    from numba import carray
     from numba.np.unsafe.ndarray import to_fixed_tuple
 
-    columns, given = 3 + latched, njit(_given)
+    columns, given = 3 + latched, inner(_given)
 
     def renew_gradient(j, delta, delta_dot, entry_rate, parameters, out):  # type: ignore[no-untyped-def]
         row, table = to_fixed_tuple(carray(parameters, (count,)), count), np.zeros((latched, 2 + latched))

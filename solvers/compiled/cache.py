@@ -7,6 +7,7 @@ may be new all the same. With a folder for each state of the sources no old mach
 from __future__ import annotations
 
 import hashlib
+import logging
 import os
 import shutil
 import sys
@@ -15,7 +16,7 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any
 
@@ -23,6 +24,7 @@ import llvmlite
 import numba
 import numpy as np
 from numba import config
+from numba.core.caching import FunctionCache
 
 HOME = Path(__file__).parent.parent
 PREFIX = "fembeam-kernels-"
@@ -163,14 +165,42 @@ def lock_folder(waiting: Callable[[], None]) -> IO[bytes] | None:
         return None
 
 
-@contextmanager
-def kept(function: Callable[..., Any]) -> Iterator[bool]:
-    """Whether to keep a function's machine code; within the context numba's cache is our folder."""
-    with _LOCK:
-        before, keep = config.CACHE_DIR, is_current(function)
-        if keep:
-            config.CACHE_DIR = str(FOLDER)
+class _Store(FunctionCache):
+    """numba's cache of one function; what cannot be kept or read is compiled, and that nothing is kept is said once."""
+
+    told = False
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """What was kept, or None; a file that is damaged is written anew."""
         try:
-            yield keep
+            return super().load_overload(sig, target_context)
+        except Exception:  # of whatever a damaged file is taken for
+            with suppress(OSError):
+                self.flush()
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep what was compiled."""
+        try:
+            super().save_overload(sig, data)
+        except OSError as error:
+            if not _Store.told:
+                _Store.told = True
+                logging.getLogger("fembeam.solvers").warning(
+                    f"the integrator is compiled but not kept, every start takes half a minute: {error}"
+                )
+
+
+def store(function: Callable[..., Any]) -> FunctionCache | None:
+    """The cache of a function in our folder; None where its machine code is not to be kept."""
+    with _LOCK:
+        before = config.CACHE_DIR
+        if not is_current(function):
+            return None
+        config.CACHE_DIR = str(FOLDER)
+        try:
+            found = _Store(function)
+        except RuntimeError:  # numba finds no place to write to
+            return None
         finally:
             config.CACHE_DIR = before
+        return found if Path(found.cache_path).parent == FOLDER else None  # elsewhere old code may lie

@@ -19,9 +19,9 @@ of both. `pair_response` returns an array, which only a merged function may: wit
 halve the time of compiling: the first run took 67 s of processor without, 33 s with them, by turns;
 ``python tests/bench/start_up.py`` measures it.
 ``no_cpython_wrapper`` and ``no_cfunc_wrapper`` save most of the compile time of inner functions and no run time.
-``_nrt``, ``forceinline`` and these two are not documented by numba, nor is what is imported of ``numba.core``: hence
-the upper bound of its version in pyproject.toml. With a new version: raise the bound, run the tests and the bench; what
-fails is left out as the table says.
+``_nrt``, ``forceinline`` and these two are not documented by numba, nor are a function's ``_cache`` and what is
+imported of ``numba.core``: hence the upper bound of its version in pyproject.toml. With a new version: raise the bound,
+run the tests and the bench; what fails is left out as the table says.
 """
 
 from __future__ import annotations
@@ -34,19 +34,28 @@ from contextlib import contextmanager
 from functools import partial
 from typing import IO, Any
 
-from numba import cfunc, config, njit
+from numba import config, njit
 from numba.core import event
+from numba.core.ccallback import CFunc
+from numba.core.sigutils import normalize_signature
 
-from solvers.compiled.cache import is_current, kept, lock_folder
+from solvers.compiled.cache import is_current, lock_folder, store
 
 if config.DISABLE_JIT:
     raise RuntimeError("NUMBA_DISABLE_JIT is set, but time integration runs as machine code only: unset it")
 
 
-def _compiled(function: Any, *signature: Any, **options: Any) -> Any:
-    """A function compiled by numba, its machine code kept in the folder of these sources."""
-    with kept(function) as keep:
-        return njit(*signature, cache=keep, **options)(function)
+def _compiled(function: Any, **options: Any) -> Any:
+    """A function compiled by numba when first called, its machine code kept in the folder of these sources."""
+    return _stored(njit(**options)(function), function)
+
+
+def _stored(made: Any, function: Any) -> Any:
+    """Have what numba made of a function keep its machine code, where that can be."""
+    found = store(function)
+    if found is not None:
+        made._cache = found
+    return made
 
 
 def _decorator(**options: Any) -> Callable[[Any], Any]:
@@ -168,8 +177,11 @@ def entry(signature: Any) -> Callable[[Any], Any]:
     """Decorator of a kernel that is compiled, or loaded, when its module is imported."""
 
     def compiled(function: Any) -> Any:
+        made = _compiled(function, **_OPTIONS)
         with _compiling():
-            return _compiled(function, signature, **_OPTIONS)
+            made.compile(signature)
+        made.disable_compile()
+        return made
 
     return compiled
 
@@ -178,7 +190,9 @@ def c_function(signature: Any) -> Callable[[Any], Any]:
     """Decorator of a C function, called at its ``address``, likewise."""
 
     def compiled(function: Any) -> Any:
-        with _compiling(), kept(function) as keep:
-            return cfunc(signature, cache=keep, **_OPTIONS)(function)
+        made = _stored(CFunc(function, normalize_signature(signature), {}, _OPTIONS), function)
+        with _compiling():
+            made.compile()
+        return made
 
     return compiled

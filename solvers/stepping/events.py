@@ -6,7 +6,7 @@ Inside a step the indentation is the polynomial of the method's dense output,
 
 import numpy as np
 
-from solvers.compiled.kernels import dot, indentation, inner, kernel
+from solvers.compiled.kernels import dot, indentation, inner, kernel, merged
 from solvers.compiled.state import surface_tolerance
 
 # finer near 0, where a contact just left may come back
@@ -37,7 +37,7 @@ def coefficients_of(row, offset, x, dense, out):
         out[1 + i] = dot(row, dense[i], size)
 
 
-@inner
+@merged  # as a call would hand over the address of ``value``, with which numba keeps no caller's machine code
 def golden_section(value, known, a, b):
     """Place of the largest ``value(known, θ)`` on [a, b], and the largest value met."""
     best = -np.inf
@@ -59,7 +59,7 @@ def _signed(known, theta):
     return sign * polynomial(coefficients, theta)
 
 
-@inner
+@merged
 def bisection(value, known, a, b):
     """Where ``value(known, θ)`` becomes positive in [a, b]."""
     for _ in range(50):
