@@ -11,6 +11,8 @@ from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.peaks import state_peaks, step_peaks
 from solvers.exponential.energy.quadrature import state_within
 
+_BRIEF = 1.0  # radians of the fastest block in which nodes miss nothing of δ̇, and δ - δ₀ may be lost in the digits of δ
+
 
 @merged
 def sample_step(problem, tables, energy_tables, state, scratch, node_set, level, t_end, out, due):
@@ -60,8 +62,8 @@ def record_forces(problem, state, scratch, kind, ended, node_set, level):
 def _work(problem, tables, scratch, node_set, s):
     """Work, J, of a plain force over the step: ∫ F dδ, F a polynomial through the nodes, δ one through ends and nodes.
 
-    By δ̇ at the nodes it would be wrong where the force hardly changes: there steps grow until fast blocks oscillate
-    between the nodes. A force that is constant does F times the way between the ends, whatever lies between.
+    The sum of F δ̇ at the nodes would be wrong where the force hardly changes: there steps grow until fast blocks
+    oscillate between the nodes. A constant force does F times the way between the ends, whatever lies between.
     """
     begin, force = scratch.start_motion[s, 0], scratch.force[s]
     combine(tables.work[node_set], force, S, None, scratch.trial)
@@ -73,14 +75,14 @@ def _work(problem, tables, scratch, node_set, s):
 @merged
 def finish_step(problem, tables, state, scratch, node_set, level):
     """Move the state to the end of the step; update works, impulses and peaks of the contacts."""
-    stops, size = problem.gap.size, 2 * problem.k.size
-    h = tables.contact_step[level]
+    stops, size, h = problem.gap.size, 2 * problem.k.size, tables.contact_step[level]
+    brief = h * tables.fastest <= _BRIEF
     for s in range(stops):
         if state.segment[s] > 0:
             weighted = s == node_set - 1 and tables.weight_exponent[node_set] > 0.0
             weights = tables.weights[node_set] if weighted else tables.plain[node_set]
             impulses = load8(weights, 0) * load8(scratch.force[s], 0)
-            if weighted:
+            if weighted or brief:
                 state.x[size + 2 + 2 * s] += h * sum8(impulses * load8(scratch.motion[s, 1], 0))
             else:
                 state.x[size + 2 + 2 * s] += _work(problem, tables, scratch, node_set, s)
