@@ -103,9 +103,9 @@ def _checked(omega: ArrayLike, model: Model) -> Vector:
 
 
 def _linear(model: Model) -> tuple[Vector, Vector]:
-    """C and K with the tangents of the elements."""
+    """C + G and K with the tangents of the elements."""
     K, C = model.linear_elements
-    return model.system.C + C, model.system.K + K
+    return model.system.by_rate + C, model.system.K + K
 
 
 def _solved(model: Model, omega: Vector, vector: Vector) -> NDArray[np.complex128]:

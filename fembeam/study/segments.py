@@ -39,7 +39,7 @@ def correlation_time(model: Model) -> float:
 
     system = model.system
     square, shapes = eigh(system.K, system.M)
-    omega, damping = np.diag(np.sqrt(np.abs(square))), shapes.T @ system.C @ shapes
+    omega, damping = np.diag(np.sqrt(np.abs(square))), shapes.T @ system.by_rate @ shapes
     A = np.block([[np.zeros_like(omega), omega], [-omega * np.sign(square), -damping]])
     decay = -np.linalg.eigvals(A).real
     if not decay.min() > 10.0 * len(A) * np.finfo(float).eps * np.abs(A).max():

@@ -202,7 +202,7 @@ def _same_structure(one: System, other: System) -> bool:
     """Whether two systems differ in signals, gaps and laws' parameters only."""
     if one.size != other.size or len(one.contacts) != len(other.contacts):
         return False
-    pairs = [(one.M, other.M), (one.C, other.C), (one.K, other.K)]
+    pairs = [(one.M, other.M), (one.C, other.C), (one.K, other.K), (one.gyroscopic, other.gyroscopic)]
     pairs += [(a.direction, b.direction) for a, b in zip(one.contacts, other.contacts, strict=True)]
     pairs += [(a, b) for (a, _), (b, _) in zip(one.loads, other.loads, strict=True)]
     laws = [(a.law, b.law) for a, b in zip(one.contacts, other.contacts, strict=True)]

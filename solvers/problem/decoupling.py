@@ -14,7 +14,7 @@ from solvers.problem.matrices import Array
 class Blocks:
     """Decoupled form: stiffness k (n,), damping c (n,), transformation T and its inverse (2n, 2n).
 
-    ``loss`` (2n, 2n) gives the damping power zᵀ loss z where damping couples modes, and is empty otherwise.
+    ``loss`` (2n, 2n) gives the damping power zᵀ loss z where C or G couples modes, and is empty otherwise.
     """
 
     k: Array
@@ -24,14 +24,17 @@ class Blocks:
     loss: Array
 
 
-def decouple(M: Array, C: Array, K: Array) -> Blocks:
-    """Find the decoupled form of (M, C, K)."""
+def decouple(M: Array, C: Array, K: Array, G: Array | None = None) -> Blocks:
+    """Find the decoupled form of M q'' + (C + G) q' + K q = 0, where G is skew."""
     n = M.shape[0]
     if _is_diagonal(M) and _is_diagonal(K):
         phi, k = np.diag(1.0 / np.sqrt(np.diag(M))), np.diag(K) / np.diag(M)
     else:
         phi, k = _modes(M, K)
     damping = phi.T @ C @ phi
+    if G is not None and np.any(G):
+        turning = phi.T @ G @ phi
+        return _state_blocks(phi, k, damping, np.abs(C) + np.abs(G), 0.5 * (turning - turning.T))
     spread = damping - np.diag(np.diag(damping))
     if np.abs(spread).max(initial=0.0) <= 1e-12 * np.abs(damping).max(initial=0.0):
         zero = np.zeros((n, n))
@@ -44,7 +47,7 @@ def decouple(M: Array, C: Array, K: Array) -> Blocks:
             np.block([[inverse, zero], [zero, inverse]]),
             np.empty((0, 0)),
         )
-    return _state_blocks(phi, k, damping, C)
+    return _state_blocks(phi, k, damping, np.abs(C))
 
 
 def _is_diagonal(matrix: Array) -> bool:
@@ -75,33 +78,42 @@ def _without_rounding(c: Array, terms: Array) -> Array:
     return np.where(np.abs(c) <= 4 * c.size * np.finfo(float).eps * terms, 0.0, c)
 
 
-def _state_blocks(phi: Array, k: Array, damping: Array, C: Array) -> Blocks:
-    """Blocks of the state matrix [[0, I], [-diag(k), -damping]] whose damping couples the modes."""
+def _state_blocks(phi: Array, k: Array, damping: Array, size: Array, turning: Array | None = None) -> Blocks:
+    """Blocks of the state matrix [[0, I], [-diag(k), -damping - turning]], whose last part couples the modes.
+
+    ``turning`` is the skew one; ``size`` (n, n) are |C| + |G| in the system's own coordinates.
+    """
     order = np.argsort(k != 0.0, kind="stable")  # rigid-body modes first
     phi, k, damping = phi[:, order], k[order], damping[np.ix_(order, order)]
-    phi, damping, free = _floating(phi, k, damping)
+    turning = turning if turning is None else turning[np.ix_(order, order)]
+    rotation, free = _floating(k, damping, turning)
+    phi, damping = phi @ rotation, rotation.T @ damping @ rotation
     k, n = k[free:], k.size - free
     rigid, damping = phi[:, :free], damping[free:, free:]
-    phi = phi[:, free:]
-    A = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(k), -damping]])
+    phi, by_rate = phi[:, free:], damping
+    if turning is not None:
+        by_rate = damping + (rotation.T @ turning @ rotation)[free:, free:]
+    A = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(k), -by_rate]])
     values, vectors = np.linalg.eig(A)
     order = np.argsort(np.abs(values))
     values, vectors = values[order], vectors[:, order]
     scale = np.abs(values).max()
+    if turning is not None:  # of rigid-body modes: two zeros are one mode that drifts, and not to be told apart
+        values[np.abs(values) <= 10 * values.size * np.finfo(float).eps * scale] = 0.0
     complex_ones = np.flatnonzero(values.imag > 1e-12 * scale)
     real_ones = np.flatnonzero(np.abs(values.imag) <= 1e-12 * scale)
     half = real_ones.size // 2
     pairs = [_complex_pair(values[i], vectors[:, i], n) for i in complex_ones]
+    if turning is not None:
+        shares = [_dissipation(vectors[:, i], k, damping) for i in complex_ones]
+        pairs = [(pair[0], share, *pair[2:]) for pair, share in zip(pairs, shares, strict=True)]
     pairs += [
         _real_pair(values[i].real, values[j].real, vectors[:, i].real, vectors[:, j].real)
         for i, j in zip(real_ones[:half], real_ones[half:], strict=True)
     ]
     columns = np.array([p[2] for p in pairs] + [p[3] for p in pairs]).T
     if len(pairs) != n or np.linalg.cond(columns) > 1e12:
-        raise ValueError(
-            "the damped modes cannot be separated (two coincide, as for a dashpot on a body that can float, or a "
-            "critically damped mode); change a dashpot by one part in 10^6"
-        )
+        raise ValueError(_INSEPARABLE if turning is None else _INSEPARABLE_TURNING)
     zero = np.zeros((phi.shape[0], free))
     T = np.hstack(
         (
@@ -115,7 +127,7 @@ def _state_blocks(phi: Array, k: Array, damping: Array, C: Array) -> Blocks:
     loss = np.zeros((2 * (free + n), 2 * (free + n)))
     places = np.concatenate((free + np.arange(n), 2 * free + n + np.arange(n)))
     loss[np.ix_(places, places)] = columns[n:].T @ damping @ columns[n:]
-    sizes = np.block([[np.zeros((n, n)), np.eye(n)], [np.diag(np.abs(k)), _terms(phi, C)]])
+    sizes = np.block([[np.zeros((n, n)), np.eye(n)], [np.diag(np.abs(k)), _terms(phi, size)]])
     errors = np.sum(np.abs(np.linalg.inv(vectors)) @ sizes * np.abs(vectors).T, axis=1)  # of λ, in units of eps
     terms = np.concatenate((np.zeros(free), errors[complex_ones], np.zeros(half)))
     none = [0.0] * free
@@ -123,14 +135,38 @@ def _state_blocks(phi: Array, k: Array, damping: Array, C: Array) -> Blocks:
     return Blocks(np.array(none + [p[0] for p in pairs]), c, T, np.linalg.inv(T), loss)
 
 
-def _floating(phi: Array, k: Array, damping: Array) -> tuple[Array, Array, int]:
-    """Turn the rigid-body modes so that those no dashpot resists come first; they are blocks of their own."""
-    rigid = int(np.sum(k == 0.0))
-    values, turn = np.linalg.eigh(damping[:rigid, :rigid])
-    values[np.abs(values) < 1e-12 * np.abs(damping).max()] = 0.0
+_INSEPARABLE = (
+    "the damped modes cannot be separated (two coincide, as for a dashpot on a body that can float, or a critically "
+    "damped mode); change a dashpot by one part in 10^6"
+)
+_INSEPARABLE_TURNING = (
+    "the modes of C + G cannot be separated: a body with gyroscopic terms can float, or two damped modes coincide; hold "
+    "it by a spring, however soft, or change a dashpot by one part in 10^6"
+)
+
+
+def _floating(k: Array, damping: Array, turning: Array | None) -> tuple[Array, int]:
+    """A rotation of the rigid-body modes after which those neither damped nor turned come first, and their number.
+
+    They are blocks of their own.
+    """
+    rigid, by_rate = int(np.sum(k == 0.0)), damping if turning is None else damping + turning
     rotation = np.eye(k.size)
+    if turning is None:
+        values, turn = np.linalg.eigh(damping[:rigid, :rigid])
+    else:
+        _, values, rows = np.linalg.svd(by_rate[:, :rigid])
+        values, turn = values[::-1].copy(), rows[::-1].T
+    values[np.abs(values) < 1e-12 * np.abs(by_rate).max()] = 0.0
     rotation[:rigid, :rigid] = turn
-    return phi @ rotation, rotation.T @ damping @ rotation, int(np.sum(values == 0.0))
+    return rotation, int(np.sum(values == 0.0))
+
+
+def _dissipation(vector: NDArray, k: Array, damping: Array) -> float:
+    """c of a complex pair, from its energy: -2 Re λ = 2 v*Dv / (v*v + x*kx), with the rounding of D, not of λ."""
+    x, v = np.split(vector, 2)
+    energy = np.vdot(v, v).real + np.vdot(x, k * x).real
+    return float(2.0 * np.vdot(v, damping @ v).real / energy)
 
 
 def _complex_pair(value: complex, vector: NDArray, n: int) -> tuple[float, float, Array, Array]:

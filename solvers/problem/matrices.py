@@ -30,8 +30,8 @@ def dense(matrix: Any) -> Array:
     return array
 
 
-def square_matrix(name: str, matrix: Any) -> Any:
-    """A finite, symmetric copy of a matrix: sparse by columns if it was sparse, else dense."""
+def square_matrix(name: str, matrix: Any, skew: bool = False) -> Any:
+    """A finite copy of a symmetric or a ``skew`` matrix: sparse by columns if it was sparse, else dense."""
     if hasattr(matrix, "toarray"):
         from scipy.sparse import csc_array
 
@@ -44,9 +44,11 @@ def square_matrix(name: str, matrix: Any) -> Any:
     if not np.all(np.isfinite(values)):
         row, column = np.argwhere(~np.isfinite(dense(copied)))[0]
         raise ValueError(f"{name} must be finite, got {copied[row, column]} at row {row}, column {column}")
-    asymmetry = abs(copied - copied.T).max()
-    if asymmetry > 1e-9 * abs(copied).max():
-        raise ValueError(f"{name} must be symmetric; its largest asymmetry is {asymmetry:g}")
+    wrong = abs(copied + copied.T if skew else copied - copied.T).max()
+    if wrong > 1e-9 * abs(copied).max():
+        if skew:
+            raise ValueError(f"{name} must be skew, G = -Gᵀ; its largest |G + Gᵀ| is {wrong:g}")
+        raise ValueError(f"{name} must be symmetric; its largest asymmetry is {wrong:g}")
     values.setflags(write=False)
     return copied
 

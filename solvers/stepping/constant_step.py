@@ -70,14 +70,14 @@ class ConstantStep(ABC):
         """
         return limit(self, system, indentation, duration)
 
-    def critical(self, M: Any, C: Any, K: Any) -> tuple[Array, Array]:
+    def critical(self, M: Any, C: Any, K: Any, G: Any = None) -> tuple[Array, Array]:
         """Stiffness k and damping c (j,) of the oscillators that decide on matrices."""
-        return eigen_oscillators(M, C, K)
+        return eigen_oscillators(M, C, K, G)
 
     def oscillators(self, system: System) -> tuple[Array, Array]:
         """The same of a system in flight: its decoupled modes, or what decides on its matrices."""
         if system.sparse or self.takes_matrices(system):
-            return self.critical(system.M, system.C, system.K)
+            return self.critical(system.M, system.C, system.K, system.gyroscopic)
         return system.blocks.k, system.blocks.c
 
     def engine(self, system: System, z: Array, forcing: Forcing, duration: float) -> Any:

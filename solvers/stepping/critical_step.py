@@ -1,6 +1,6 @@
 r"""The oscillators p'' + c p' + k p = 0 that decide how long a constant step on M q'' + C q' + K q = 0 may be.
 
-A Runge–Kutta method is judged by the eigenvalues of λ² M + λ C + K: (k, c) = (|λ|², -2 Re λ), (0, -λ) where λ is real.
+A Runge–Kutta method is judged by the eigenvalues of λ² M + λ (C + G) + K: (k, c) = (|λ|², -2 Re λ), (0, -λ) where λ is real.
 
 Newmark's method on the matrices multiplies a motion x μ^j by μ where
 
@@ -12,7 +12,9 @@ For γ >= ½ and semidefinite C, K it can only lose its stability at μ = -1, wh
 .. math:: Q(h) = 4 M + (4γ-2) h C - (2γ-4β) h^2 K,
 
 so that the step is stable as long as Q is positive definite, whatever couples the modes. The vector x that makes Q
-singular first gives (k, c) = (xᵀK x, xᵀC x) with xᵀM x = 1.
+singular first gives (k, c) = (xᵀK x, xᵀC x) with xᵀM x = 1. With a skew G beside C the step is stable while Q without its
+C is positive definite: multiply the difference of the equations of two steps by Δv; as Δvᵀ G Δv = 0, the energy
+aᵀ(M + (β-½γ) h² K) a + vᵀK v does not grow.
 """
 
 from __future__ import annotations
@@ -30,18 +32,18 @@ _EXTREMES = (("LM", 6), ("SR", 3), ("LI", 3))  # eigenvalues of sparse matrices 
 _NOTHING = 1e-6  # share of the largest eigenvalue below which one is that of a body that floats, or rounding
 
 
-def eigen_oscillators(M: Any, C: Any, K: Any) -> tuple[Array, Array]:
-    """(k, c) of the eigenvalues of λ² M + λ C + K; of large sparse matrices those of the extreme ones alone."""
+def eigen_oscillators(M: Any, C: Any, K: Any, G: Any = None) -> tuple[Array, Array]:
+    """(k, c) of the eigenvalues of λ² M + λ (C + G) + K; of large sparse matrices those of the extreme ones alone."""
     if hasattr(M, "toarray") and M.shape[0] > _DENSE:
-        values = _extreme_eigenvalues(M, C, K)
+        values = _extreme_eigenvalues(M, C if G is None else C + G, K)
     else:
-        M, C, K = (matrix.toarray() if hasattr(matrix, "toarray") else matrix for matrix in (M, C, K))
+        M, C, K, G = (matrix.toarray() if hasattr(matrix, "toarray") else matrix for matrix in (M, C, K, G))
         try:
-            blocks = decouple(M, C, K)
+            blocks = decouple(M, C, K, G)
             return blocks.k, blocks.c
         except ValueError:  # two damped modes coincide: their eigenvalues need not be told apart
-            n = M.shape[0]
-            A = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]])
+            n, by_rate = M.shape[0], C if G is None else C + G
+            A = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, K), -np.linalg.solve(M, by_rate)]])
             values = np.linalg.eigvals(A)
     return _oscillators_of(values)
 
@@ -90,9 +92,10 @@ def _fastest(M: Any, K: Any) -> tuple[float, Array]:
     return float(k[0]), phi[:, 0]
 
 
-def newmark_oscillator(beta: float, gamma: float, M: Any, C: Any, K: Any) -> tuple[Array, Array]:
+def newmark_oscillator(beta: float, gamma: float, M: Any, C: Any, K: Any, G: Any = None) -> tuple[Array, Array]:
     """(k, c) of the vector that makes Q(h) singular first, by iteration on its Rayleigh quotient."""
     a, b, h = 2.0 * gamma - 4.0 * beta, 4.0 * gamma - 2.0, 0.0
+    C = C if G is None else 0.0 * C
     k = c = 0.0
     for _ in range(20):
         _, x = _fastest(M + 0.25 * b * h * C, K)

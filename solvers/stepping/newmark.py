@@ -148,13 +148,13 @@ class _Family(ConstantStep):
         return step
 
     def takes_matrices(self, system: System) -> bool:
-        """Sparse matrices, and damping that couples the modes, are stepped on as they are."""
+        """Sparse matrices, and damping or gyroscopic terms that couple the modes, are stepped on as they are."""
         return system.sparse or system.blocks.loss.size > 0
 
-    def critical(self, M: Any, C: Any, K: Any) -> tuple[Array, Array]:
+    def critical(self, M: Any, C: Any, K: Any, G: Any = None) -> tuple[Array, Array]:
         """A contact couples the modes even where they are stepped one by one."""
         _, _, beta, gamma = self.constants
-        return newmark_oscillator(beta, gamma, M, C, K)
+        return newmark_oscillator(beta, gamma, M, C, K, G)
 
     @property
     def matrix_step(self) -> Any:

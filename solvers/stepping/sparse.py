@@ -43,6 +43,7 @@ class MatrixEngine:
 
         self.method, self.system, self.duration = method, system, duration
         self.M, self.C, self.K = (csc_array(matrix) for matrix in (system.M, system.C, system.K))
+        self.by_rate = self.C if system.gyroscopic is None else csc_array(system.by_rate)
         self.problem = matrix_problem_of(system, forcing)
         self.back = eye_array(2 * system.size, format="csc")
         self.state: State = new_state(z, len(system.contacts))
@@ -156,15 +157,14 @@ class MatrixEngine:
         n = self.system.size
         q, q_dot = x[:n], x[n : 2 * n]
         self.forces(t, x, self.state.segment, out)
-        damping = self.C @ q_dot
-        out[2 * n + 1] = q_dot @ damping
-        out[n : 2 * n] = self.solver("mass", lambda: self.M)(out[n : 2 * n] - damping - self.K @ q)
+        out[2 * n + 1] = q_dot @ (self.C @ q_dot)
+        out[n : 2 * n] = self.solver("mass", lambda: self.M)(out[n : 2 * n] - self.by_rate @ q_dot - self.K @ q)
 
     def solver(self, key: Any, matrix: Callable[[], Any]) -> Any:
         """Solver of a matrix, kept for the mass and for the constant step; a diagonal one only divides."""
         if key in self.solvers:
             return self.solvers[key]
-        solve = _factorised(matrix())
+        solve = _factorised(matrix(), key == "mass" or self.by_rate is self.C)
         if key in ("mass", self.method.dt):
             self.solvers[key] = solve
         return solve
@@ -184,8 +184,8 @@ def _interpolate(h, state, space):
     hermite(h, state.x, state.rate, space.x_new, space.rate_new, space.dense)
 
 
-def _factorised(matrix: Any) -> Callable[[Array], Array]:
-    """Solver of a symmetric positive definite sparse matrix."""
+def _factorised(matrix: Any, symmetric: bool) -> Callable[[Array], Array]:
+    """Solver of a sparse matrix, positive definite where it is ``symmetric``."""
     from scipy.sparse import csc_array
     from scipy.sparse.linalg import splu
 
@@ -193,10 +193,10 @@ def _factorised(matrix: Any) -> Callable[[Array], Array]:
     diagonal = matrix.diagonal()
     if matrix.count_nonzero() == np.count_nonzero(diagonal):
         return lambda vector: vector / diagonal
-    options = {"SymmetricMode": True}
-    solve: Callable[[Array], Array] = splu(
-        matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options
-    ).solve
+    options: dict[str, Any] = {}
+    if symmetric:
+        options = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
+    solve: Callable[[Array], Array] = splu(matrix, **options).solve
     return solve
 
 
@@ -218,7 +218,7 @@ def newmark_step(engine: MatrixEngine, h: float) -> None:
     x_new, rate_new, kept = engine.space.x_new, engine.space.rate_new, 1.0 - alpha_f
     q, v, a = x_new[:n], x_new[n : 2 * n], rate[n : 2 * n]
     solve = engine.solver(
-        h, lambda: (1.0 - alpha_m) * engine.M + kept * (gamma * h * engine.C + beta * h * h * engine.K)
+        h, lambda: (1.0 - alpha_m) * engine.M + kept * (gamma * h * engine.by_rate + beta * h * h * engine.K)
     )
     old = np.zeros_like(a)
     if alpha_f != 0.0:
@@ -228,7 +228,7 @@ def newmark_step(engine: MatrixEngine, h: float) -> None:
     v[:] = x[n : 2 * n] + h * (1.0 - gamma) * a
     engine.forces(state.now[T] + h, x_new, np.zeros_like(state.segment), rate_new)
     inertia = alpha_m * (engine.M @ a) if alpha_m != 0.0 else 0.0
-    a_new = solve(kept * (rate_new[n : 2 * n] - engine.C @ v - engine.K @ q) + old - inertia)
+    a_new = solve(kept * (rate_new[n : 2 * n] - engine.by_rate @ v - engine.K @ q) + old - inertia)
     q += beta * h * h * a_new
     v += gamma * h * a_new
     if state.segment.any():

@@ -119,7 +119,8 @@ def limit(method: ConstantStep, system: System, indentation: float | None, durat
     C, K, half_period = with_tangents(system, indentation)
     if any(contact.always or contact.gap < 0.0 for contact in system.contacts) or duration == math.inf:
         half_period = duration  # a preloaded contact may last for ever
-    contact, contact_mode = _shortest(method, system, *method.critical(system.M, C, K), min(duration, half_period))
+    decisive = method.critical(system.M, C, K, system.gyroscopic)
+    contact, contact_mode = _shortest(method, system, *decisive, min(duration, half_period))
     return Limit(flight, contact, mode, contact_mode)
 
 
