@@ -1,7 +1,8 @@
 """Reduction of M u'' + C u' + K u = f to few coordinates: matrices in, basis and reduced matrices out.
 
 `basis` holds a basis, the reduced matrices and their checks; `modal` finds modes, `truncation` tells how many are
-enough, `interface` adds the static shapes of loaded places, `whirl` has the modes of rotors. Nothing is known of beams, contacts or time.
+enough, `interface` adds the static shapes of loaded places, `whirl` has the modes of rotors. Nothing is known of beams,
+contacts or time.
 Imports: numpy, scipy. Begin with `modal.modal_basis`.
 """
 

@@ -140,8 +140,8 @@ _INSEPARABLE = (
     "damped mode); change a dashpot by one part in 10^6"
 )
 _INSEPARABLE_TURNING = (
-    "the modes of C + G cannot be separated: a body with gyroscopic terms can float, or two damped modes coincide; hold "
-    "it by a spring, however soft, or change a dashpot by one part in 10^6"
+    "the modes of C + G cannot be separated: a body with gyroscopic terms can float, or two damped modes coincide; "
+    "hold it by a spring, however soft, or change a dashpot by one part in 10^6"
 )
 
 
@@ -163,7 +163,7 @@ def _floating(k: Array, damping: Array, turning: Array | None) -> tuple[Array, i
 
 
 def _dissipation(vector: NDArray, k: Array, damping: Array) -> float:
-    """c of a complex pair, from its energy: -2 Re λ = 2 v*Dv / (v*v + x*kx), with the rounding of D, not of λ."""
+    """C of a complex pair, from its energy: -2 Re λ = 2 v*Dv / (v*v + x*kx), with the rounding of D, not of λ."""
     x, v = np.split(vector, 2)
     energy = np.vdot(v, v).real + np.vdot(x, k * x).real
     return float(2.0 * np.vdot(v, damping @ v).real / energy)

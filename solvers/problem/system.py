@@ -1,6 +1,7 @@
 r"""The mechanical problem an integrator is handed, and its decoupled form.
 
-.. math:: M \ddot q + (C + G) \dot q + K q = \sum_l v_l s_l(t) + \sum_s w_s F_s(δ_s, \dot δ_s),\qquad δ_s = -w_s^T q - g_s
+.. math:: M \ddot q + (C + G) \dot q + K q = \sum_l v_l s_l(t) + \sum_s w_s F_s(δ_s, \dot δ_s),\qquad
+          δ_s = -w_s^T q - g_s
 
 Every method here integrates the same decoupled form: n blocks (p_j, v_j) with
 

@@ -1,6 +1,7 @@
 r"""The oscillators p'' + c p' + k p = 0 that decide how long a constant step on M q'' + C q' + K q = 0 may be.
 
-A Runge–Kutta method is judged by the eigenvalues of λ² M + λ (C + G) + K: (k, c) = (|λ|², -2 Re λ), (0, -λ) where λ is real.
+A Runge–Kutta method is judged by the eigenvalues of λ² M + λ (C + G) + K: (k, c) = (|λ|², -2 Re λ), (0, -λ) where λ is
+real.
 
 Newmark's method on the matrices multiplies a motion x μ^j by μ where
 
@@ -12,8 +13,8 @@ For γ >= ½ and semidefinite C, K it can only lose its stability at μ = -1, wh
 .. math:: Q(h) = 4 M + (4γ-2) h C - (2γ-4β) h^2 K,
 
 so that the step is stable as long as Q is positive definite, whatever couples the modes. The vector x that makes Q
-singular first gives (k, c) = (xᵀK x, xᵀC x) with xᵀM x = 1. With a skew G beside C the step is stable while Q without its
-C is positive definite: multiply the difference of the equations of two steps by Δv; as Δvᵀ G Δv = 0, the energy
+singular first gives (k, c) = (xᵀK x, xᵀC x) with xᵀM x = 1. With a skew G beside C the step is stable while Q without
+its C is positive definite: multiply the difference of the equations of two steps by Δv; as Δvᵀ G Δv = 0, the energy
 aᵀ(M + (β-½γ) h² K) a + vᵀK v does not grow.
 """
 
