@@ -96,8 +96,8 @@ def test_the_overhung_disk_whirls_as_the_exact_shaft(sense):
     expected = [-208.8577927993087, 223.8720794147543, -1790.270791832366, 2183.894511988107]
     np.testing.assert_allclose(sense * found.signed[:4], expected, rtol=2e-9)
     np.testing.assert_allclose(np.abs(found.sense), 1.0, rtol=1e-9)
-    for value in expected:
-        exact = frequency(lambda w, way=np.sign(value): DIAMETRAL * w**2 - POLAR * 300.0 * way * w, abs(value))
+    for value, spin in zip(expected, (-300.0, 300.0, -300.0, 300.0), strict=True):
+        exact = frequency(lambda w, spin=spin: DIAMETRAL * w**2 - POLAR * spin * w, abs(value))
         assert exact == pytest.approx(abs(value), rel=1e-10)
 
 
