@@ -24,9 +24,8 @@ class Assembled:
     ----------
     M, K : (N, N) sparse CSR, symmetric; kg and N/m for displacements.
     labels : (node, component) of every dof, (N,).
-    rows : place -> sparse CSR (c, N): displacement and rotation components at a place, along the global axes.
+    rows : place -> sparse CSR (c, N): a row for each of the body's `components` at a place, along the global axes.
     translations : (N, d): the rigid unit translations along those of x, y, z that the body has.
-    components : those of `COMPONENTS` that a place has, (c,): the rows of `rows`.
     root : sparse R with RᵀR = K, or None.
     C : (N, N) damping of the body itself, or None.
     gyroscopic : (N, N) skew-symmetric G, or None.
@@ -36,7 +35,7 @@ class Assembled:
     --------
     >>> from scipy import sparse
     >>> one = sparse.eye(1, format="csr")
-    >>> Assembled(one, 4.0 * one, ((7, "x"),), lambda place: one, np.ones((1, 1)), ("x",)).labels
+    >>> Assembled(one, 4.0 * one, ((7, "x"),), lambda place: one, np.ones((1, 1))).labels
     ((7, 'x'),)
     """
 
@@ -45,7 +44,6 @@ class Assembled:
     labels: tuple[tuple[Hashable, str], ...]
     rows: Callable[[Any], sparse.csr_matrix]
     translations: NDArray[np.float64]
-    components: tuple[str, ...]
     root: sparse.csr_matrix | None = None
     C: sparse.csr_matrix | None = None
     gyroscopic: sparse.csr_matrix | None = None
