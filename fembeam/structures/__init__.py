@@ -5,3 +5,17 @@ Imports: `support`, `beams`, `reduction`. Begin with `assembled`.
 """
 
 from fembeam.structures.assembled import COMPONENTS, Assembled
+from fembeam.structures.directions import (
+    TURN,
+    UP,
+    Direction,
+    Six,
+    direction_of,
+    named,
+    nearest,
+    require_components,
+    turns,
+)
+from fembeam.structures.massless import following
+from fembeam.structures.scale import Scale
+from fembeam.structures.structure import Structure
