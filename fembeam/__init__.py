@@ -37,10 +37,10 @@ _HOME = {name: folder for folder, names in _OFFERED.items() for name in names.sp
 _MODULES = ["plot", "study"]
 
 __all__ = [
-    "Attractor", "BandNoise", "Beam", "Branch", "Clamped", "Dashpot", "Element", "Frame", "Guided", "Harmonic", "Impactor",
-    "LumpedMass", "Member", "ModalDamping", "Model", "Multisine", "Orbit", "Pinned", "PointForce", "PointMoment", "Pulse",
-    "Rayleigh", "Record", "RollOff", "Run", "Scene", "Section", "SineSweep", "Spring", "Step", "Stop", "Taper",
-    "load", "moments", "pdf", "plot", "psd", "response_spectrum", "study",
+    "Attractor", "BandNoise", "Beam", "Branch", "Clamped", "Dashpot", "Element", "Frame", "Guided", "Harmonic",
+    "Impactor", "LumpedMass", "Member", "ModalDamping", "Model", "Multisine", "Orbit", "Pinned", "PointForce",
+    "PointMoment", "Pulse", "Rayleigh", "Record", "RollOff", "Run", "Scene", "Section", "SineSweep", "Spring", "Step",
+    "Stop", "Taper", "load", "moments", "pdf", "plot", "psd", "response_spectrum", "study",
 ]  # fmt: skip
 
 if TYPE_CHECKING:

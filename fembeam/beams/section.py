@@ -77,8 +77,8 @@ class Section:
                 require_positive(name, getattr(self, name), "Section", f"give it in {unit}, or None")
         require_finite("I12", self.I12, "Section", "give the product of area in m⁴")
         most = math.sqrt(self.I * self.I2) if self.I2 is not None else 0.0
-        require(abs(self.I12) < most or self.I12 == 0, f"I12 must stay below √(I I2) = {most:g} m⁴", self.I12, "Section",
-                "give I2 with it, and compute all three about one centroid")  # fmt: skip
+        require(abs(self.I12) < most or self.I12 == 0, f"I12 must stay below √(I I2) = {most:g} m⁴", self.I12,
+                "Section", "give I2 with it, and compute all three about one centroid")  # fmt: skip
         require_finite("nu", self.nu, "Section", "give Poisson's ratio", ", above -1 and at most 0.5",
                        is_finite(self.nu) and -1 < self.nu <= 0.5)  # fmt: skip
 

@@ -17,7 +17,7 @@ References: J.S. Przemieniecki, Theory of Matrix Structural Analysis (1968), 11;
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -56,6 +56,12 @@ class Elements:
     def count(self) -> int:
         """How many."""
         return len(self.h)
+
+    def only(self, which: Indices) -> Elements:
+        """Some of them, in the order asked for."""
+        rows = (14 * which[:, None] + np.arange(14)).ravel()
+        properties = {name: values[which] for name, values in self.properties.items()}
+        return replace(self, h=self.h[which], axes=self.axes[which], properties=properties, join=self.join[rows])
 
     def bending(self, element: Indices, x: Vector, plane: int, derivative: int = 0) -> sparse.csr_matrix:
         """Rows (k, 14 e) of v, w or their derivatives along the member at x in [0, 1] of elements (k,)."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -34,8 +34,8 @@ class Frame:
 
     Parameters
     ----------
-    nodes : {name: coordinates} in m. Two numbers a node make a plane frame, which moves along "x", "y", "rz"; three make
-        one in space, with all of "x", "y", "z", "rx", "ry", "rz".
+    nodes : {name: coordinates} in m. Two numbers a node make a plane frame, which moves along "x", "y", "rz"; three
+        make one in space, with all of "x", "y", "z", "rx", "ry", "rz".
     members : list of `Member`.
     spin : Ω in rad/s, of a straight shaft of round section about its axis, from its first member's first node to the
         second: gyroscopic moments, and rotary inertia.
@@ -44,14 +44,14 @@ class Frame:
     Raises
     ------
     ValueError : nodes at one place, a node that does not exist (the nearest is named), a member of no length or with
-        `up` along it, parts that are not connected, a release that frees a node or a member, a section that does not
+        `up` along it, parts that are not connected, releases that free a member, a section that does not
         know I2 or J where they are needed, spin of what is no round straight shaft.
 
     Notes
     -----
     Slender members: no shear deformation, and rotary inertia of bending only with spin; torsion of Saint-Venant without
-    warping; centroid and shear centre are one. Loads and stops act between nodes as well: a place is the name of a node,
-    (member, distance in m from its first end), or, of a straight frame, the distance z in m from its first node.
+    warping; centroid and shear centre are one. Loads and stops act between nodes as well: a place is the name of a
+    node, (member, distance in m from its first end), or, of a straight frame, the distance z in m from its first node.
 
     Examples
     --------
@@ -190,13 +190,12 @@ class Frame:
     def site(self, place: Any, where: str) -> Site:
         """The node a place is, or the member and the distance from its first end."""
         if isinstance(place, str):
-            close = nearest(place, list(self.nodes))
             inside = any(one.name == place for one in self.members)
             advice = f"write ({place!r}, s) for a place s along the member" if inside else "use one of the names"
-            require(place in self.nodes, f"a place must be a node of the frame; {close}", place, where, advice)
+            _require_name("be a node", place, list(self.nodes), where, advice)
             return place
         if isinstance(place, (tuple, list)) and len(place) == 2 and isinstance(place[0], str):
-            return self._inside(*place, where)
+            return self._inside(place[0], place[1], where)
         require(is_finite(place), "a place must be the name of a node, or (member, distance in m)", place, where,
                 f"write {next(iter(self.nodes))!r}, or ({self.members[0].name!r}, 0.0)")  # fmt: skip
         return self._on_axis(float(place), where)
@@ -204,8 +203,7 @@ class Frame:
     def _inside(self, name: str, s: Any, where: str) -> Site:
         """A place along a member."""
         names = [one.name for one in self.members]
-        require(name in names, f"a place must lie on a member of the frame; {nearest(name, names)}", name, where,
-                "use one of the names")  # fmt: skip
+        _require_name("lie on a member", name, names, where, "use one of the names")
         index = names.index(name)
         length = float(self.lengths[index])
         close = SAME_PLACE * length
@@ -216,19 +214,26 @@ class Frame:
 
     def _on_axis(self, z: float, where: str) -> Site:
         """A place along a straight frame."""
-        first = next(iter(self.nodes))
-        require(self.axis is not None, "a place must be a name, or (member, distance), for the frame is not straight",
-                z, where, f"write {first!r}, or ({self.members[0].name!r}, 0.0)")  # fmt: skip
-        at = {name: float((point - self.points[first]) @ self.axis) for name, point in self.points.items()}
+        first, axis = next(iter(self.nodes)), self.axis
+        if axis is None:
+            raise ValueError(f"a place must be a name, or (member, distance), for the frame is not straight, got {z} "
+                             f"in {where}; write {first!r}, or ({self.members[0].name!r}, 0.0)")  # fmt: skip
+        at = {name: float((point - self.points[first]) @ axis) for name, point in self.points.items()}
         for name, other in at.items():
             if abs(z - other) <= SAME_PLACE * self.size:
                 return name
         for index, start in enumerate(self.starts):
-            s = (z - float((start - self.points[first]) @ self.axis)) * np.sign(self.spans[index] @ self.axis)
+            s = (z - float((start - self.points[first]) @ axis)) * np.sign(self.spans[index] @ axis)
             if 0 <= s <= self.lengths[index]:
                 return index, float(s)
         least, most = min(at.values()), max(at.values())
         raise ValueError(f"z must lie on the frame, {least:g} to {most:g} m, got {z} in {where}; move it")
+
+    def check_held(self, held: Mapping[str, Collection[str]], where: str) -> None:
+        """Raise ValueError where releases free a node: `held` are its components that supports or inertia hold."""
+        from fembeam.structures.frame_checks import check_held
+
+        check_held(self, held, where)
 
     def position(self, place: Any) -> Vector:
         """Where a place is (3,), m."""
@@ -270,6 +275,12 @@ class Frame:
         from fembeam.structures.frame_mesh import assemble
 
         return assemble(self, elements, modes, places, omega)
+
+
+def _require_name(what: str, name: str, names: list[str], where: str, advice: str) -> None:
+    """Raise ValueError, with the nearest name, unless a place is one of these."""
+    close = "" if name in names else nearest(name, names)
+    require(name in names, f"a place must {what} of the frame; {close}", name, where, advice)
 
 
 def total_mass(frame: Frame) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -55,8 +55,6 @@ def check_frame(frame: Frame) -> None:
     _ = frame.axes  # checks `up`
     for member in range(len(frame.members)):
         _carries(frame, member)
-    for node in frame.nodes:
-        _held(frame, node)
     _spinning(frame)
 
 
@@ -76,8 +74,9 @@ def _joined(frame: Frame) -> None:
     seen: set[str] = set()
     for one in frame.members:
         for end in (one.a, one.b):
-            require(end in frame.nodes, f"member {one.name!r} must join nodes of the frame; "
-                    f"{nearest(end, list(frame.nodes))}", end, "Frame", "use that, or add the node")  # fmt: skip
+            close = "" if end in frame.nodes else nearest(end, list(frame.nodes))
+            require(end in frame.nodes, f"member {one.name!r} must join nodes of the frame; {close}", end, "Frame",
+                    "use that, or add the node")  # fmt: skip
         require(one.name not in seen and one.name not in frame.nodes,
                 "names of members must differ from each other and from those of nodes", one.name, "Frame",
                 "give Member(..., name=)")  # fmt: skip
@@ -127,7 +126,7 @@ def _moves(frame: Frame, text: str, motion: Vector) -> bool:
     return not frame.in_plane and not (frame.bending_only and text.endswith("along"))
 
 
-def arm_matrix(arm: Sequence[float]) -> Vector:
+def arm_matrix(arm: Sequence[float] | Vector) -> Vector:
     """(6, 6): displacement and rotation of the end of a rigid arm, from those of its root: u + θ × a."""
     x, y, z = arm
     T = np.eye(6)
@@ -152,15 +151,20 @@ def _free_motion(frame: Frame, carried: list[Vector]) -> str | None:
     return frame.components[int(np.argmax(np.abs(motion)))]
 
 
-def _held(frame: Frame, node: str) -> None:
-    """Releases leave no node free."""
+def check_held(frame: Frame, held: Mapping[str, Collection[str]], where: str) -> None:
+    """Raise ValueError if releases leave a node free: `held` are the components that supports or inertia there hold."""
+    for node in dict.fromkeys(end for one in frame.members if one.release for end in (one.a, one.b)):
+        _held(frame, node, held.get(node, ()), where)
+
+
+def _held(frame: Frame, node: str, components: Collection[str], where: str) -> None:
+    """The same of one node."""
     ends = [(i, end) for i, one in enumerate(frame.members) for end in range(2) if node == (one.a, one.b)[end]]
-    if any(frame.members[i].release for i, _ in ends):
-        carried = [_kept(frame, i, end) @ arm_matrix(frame.members[i].offset[end]) for i, end in ends]
-        free = _free_motion(frame, carried)
-        names = [frame.members[i].name for i, _ in ends]
-        require(free is None, f"releases must not free a node; {node!r} moves along {free!r} without any resistance",
-                names, "Frame", "leave one of these members unreleased there")  # fmt: skip
+    carried = [_kept(frame, i, end) @ arm_matrix(frame.members[i].offset[end]) for i, end in ends]
+    free = _free_motion(frame, [*carried, *(np.eye(6)[[COMPONENTS.index(name)]] for name in components)])
+    names = [frame.members[i].name for i, _ in ends]
+    require(free is None, f"releases must not free a node; {node!r} moves along {free!r} without any resistance", names,
+            where, "leave one of these members unreleased there, or hold the node")  # fmt: skip
 
 
 def _carries(frame: Frame, member: int) -> None:

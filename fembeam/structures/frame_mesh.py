@@ -119,16 +119,15 @@ class FrameMesh:
 
     def _inside(self, element: NDArray[np.int64], x: Vector) -> sparse.csr_matrix:
         """Rows between mesh nodes by the elements' fields, turned to global axes."""
-        known = self.frame.components
-        fields = self.elements.motion(element, x)
-        axes = self.elements.axes[element]
-        blank = sparse.csr_matrix((len(x), 14 * self.elements.count))
+        known, own = self.frame.components, self.elements.only(element)
+        fields = own.motion(np.arange(len(x)), x)
+        blank = sparse.csr_matrix((len(x), 14 * len(x)))
         turned = []
         for name in known:
             kind, c = divmod(COMPONENTS.index(name), 3)
-            parts = [sparse.diags(axes[:, a, c]) @ f for a, f in enumerate(fields[kind]) if f is not None]
+            parts = [sparse.diags(own.axes[:, a, c]) @ f for a, f in enumerate(fields[kind]) if f is not None]
             turned.append(sum(parts, blank))
-        stacked = sparse.vstack(turned, format="csr") @ self.elements.join
+        stacked = sparse.vstack(turned, format="csr") @ own.join
         order = np.arange(len(x))[:, None] + len(x) * np.arange(len(known))
         return stacked[order.ravel()]
 
@@ -175,8 +174,8 @@ def _waves(frame: Frame, omega: float) -> Iterator[float]:
         waves = [wavenumber(one.beam(float(length), frame.in_plane), np.array([0.0, length]), omega)[0]]
         if not frame.bending_only:
             waves.append(omega * np.sqrt(own.rho / own.E))
-            if not frame.in_plane:
-                waves.append(omega * np.sqrt(own.rho * (own.I + own.I2) / own.torsion_stiffness))
+        if own.I2 is not None and "rz" in frame.components and not frame.in_plane:
+            waves.append(omega * np.sqrt(own.rho * (own.I + own.I2) / own.torsion_stiffness))
         yield float(max(waves))
 
 
@@ -271,7 +270,8 @@ def _with_parabolas(
 ) -> tuple[list[tuple[Any, str]], sparse.csr_matrix]:
     """The interior number of stretch and of twist of every element, where it is there, after all else."""
     count = sum(len(s) - 1 for s in borders)
-    middles = [(one.name, float(m)) for one, s in zip(frame.members, borders, strict=True) for m in (s[:-1] + s[1:]) / 2]
+    pairs = zip(frame.members, borders, strict=True)
+    middles = [(one.name, float(middle)) for one, s in pairs for middle in (s[:-1] + s[1:]) / 2]
     there = (not frame.bending_only, not (frame.in_plane or frame.bending_only))
     for kind, name in enumerate(("along", "twist")):
         if there[kind]:

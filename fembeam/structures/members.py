@@ -34,8 +34,8 @@ class Member:
     ----------
     a, b : names of its nodes.
     section : Section; in space it must know I2 and J.
-    up : way of the section's height, bent with I: a direction ("z", "-y") or a vector, not along the member. None: y, and
-        z for a member along y; in the plane a quarter turn from `along` anticlockwise.
+    up : way of the section's height, bent with I: a direction ("z", "-y") or a vector, not along the member. None: y,
+        and z for a member along y; in the plane a quarter turn from `along` anticlockwise.
     name : "A-B" by default, from the names of its nodes.
     release : what its ends do not carry to the nodes, one text or several: "end rz" is a hinge about the global axis z
         at b, "start x" a slide along x at a; "end up", "end across" and "end along" are hinges about its own axes.
