@@ -28,6 +28,7 @@ from fembeam.structures.element_matrices import (
     stiffness_parts,
 )
 from fembeam.structures.frame_checks import arm_matrix
+from fembeam.structures.frame_forces import FrameForces, frame_forces
 from fembeam.structures.members import release_axes
 from fembeam.support import is_whole, require
 
@@ -137,6 +138,10 @@ class FrameMatrices(Assembled):
     """Matrices of a frame, and the mesh they stand on."""
 
     mesh: FrameMesh
+
+    def section_forces(self, vectors: Vector, inertia: Vector) -> FrameForces:
+        """Section forces of displacements (N, n) and of the inertia (N, n) that their stiffness balances."""
+        return frame_forces(self, vectors, inertia)
 
 
 def assemble(
