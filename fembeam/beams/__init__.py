@@ -28,4 +28,5 @@ from fembeam.beams.mesh import (
     spread,
     wavenumber,
 )
+from fembeam.beams.mesh_files import chosen_names, lines_of, named_nodes, read_mesh, shown
 from fembeam.beams.section import Section, Taper

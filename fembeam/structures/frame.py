@@ -98,22 +98,31 @@ class Frame:
 
     @classmethod
     def from_mesh(
-        cls, path: str | os.PathLike[str], sections: Mapping[Any, Section], data: str | None = None, **options: Any
+        cls,
+        path: str | os.PathLike[str],
+        sections: Section | Mapping[Any, Section],
+        data: str | None = None,
+        up: Any = None,
+        plane: bool | None = None,
+        **options: Any,
     ) -> Frame:
         """A frame from a file of line elements, by all that meshio reads; groups of lines become members.
 
         Parameters
         ----------
         path : the file.
-        sections : a Section for every name of a group (physical group, element set) or number in the cell data.
+        sections : a Section, or one for every name of a group (physical group, element set) or number in the cell
+            data.
         data : name of the cell data that number the sections, where a file has several.
+        up : that of all members, or {group: direction}; see `Member`.
+        plane : whether to make a plane frame of x and y; None: where z is 0 everywhere, but for `bending_only`.
         options : `bending_only` and `spin` of the frame.
 
         Returns
         -------
         Frame : a straight chain of lines of one group is one member, "group" where it is the only one of its group,
             else "group 1", "group 2", …; nodes go by the names of node sets and groups of points, else "n" and their
-            number in the file. It lies in the plane where all z are equal and `bending_only` is False.
+            number in the file, from 0.
 
         Raises
         ------
@@ -121,7 +130,7 @@ class Frame:
         """
         from fembeam.structures.frame_files import frame_of
 
-        return frame_of(path, sections, data, options)
+        return frame_of(path, sections, data, up, plane, options)
 
     @property
     def in_plane(self) -> bool:
