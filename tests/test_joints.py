@@ -96,7 +96,7 @@ def test_refused_alone():
         Joint("A", to=(0, "B"))
     with pytest.raises(ValueError, match="each once"):
         Joint("A", to=(1, "B"), dofs="xx")
+    bodies = [legs()[0], fb.Frame({"A": (0, 0), "B": (1.0, 0)}, [fb.Member("A", "B", FLAT)])]
+    made = [body.assembled(elements=1) for body in bodies]
     with pytest.raises(ValueError, match=r"they share x, y, rz, got .'z'. in joints.0."):
-        plane = fb.Frame({"A": (0, 0), "B": (1.0, 0)}, [fb.Member("A", "B", FLAT)])
-        bodies = [legs()[0], plane]
-        joined(bodies, [body.assembled(elements=1) for body in bodies], [Joint("B", to=(1, "A"), dofs="xyz")])
+        joined(bodies, made, [Joint("B", to=(1, "A"), dofs="xyz")])
