@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from oscillators import Bilinear, Duffing, Tone
 
+import solvers.branches.count_changes
 import solvers.branches.walk
 from contacts import law
 from solvers import Contact, Exponential, OrbitError, System, branch, integrate, orbit
@@ -300,3 +301,16 @@ def test_an_orbit_without_parameter_needs_one():
     with pytest.raises(ValueError, match="at"):
         branch(over(DAMPED), (1.0, 1.2), found)
     assert branch(over(DAMPED), (1.0, 1.2), found, at=1.1).orbits[0].parameter == 1.1
+
+
+def test_a_change_of_sign_that_rounding_takes_away_is_no_point():
+    class Arc:
+        def near(self, place, way):
+            return place, None
+
+        def sharpness(self):
+            return 1e-9
+
+    zero = solvers.branches.count_changes.zero
+    assert zero(Arc(), 0.0, 1.0, lambda s: s - 0.25) == (pytest.approx(0.25), None)
+    assert zero(Arc(), 0.0, 1.0, lambda s: s + 1e-300) is None

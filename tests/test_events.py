@@ -20,7 +20,7 @@ from scipy.optimize import brentq
 
 import fembeam as fb
 from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, achieved_restitution
-from solvers import Contact, DormandPrince, HenonRK2, SolverError, Status, System, integrate
+from solvers import Contact, DormandPrince, Exponential, HenonRK2, SolverError, Status, System, integrate
 
 FINE = DormandPrince(rtol=1e-13)
 PERIOD = 2 * math.pi / 195.0
@@ -448,6 +448,35 @@ def test_peak_force_of_a_dashpot_is_at_entry():
     # heavily damped: the force is largest at the instant of entry, c v
     log = bounce(KelvinVoigt(1e4, 150.0), speed=2.0, duration=0.1).contacts
     assert log.peak_force[0] == pytest.approx(300.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("method", [Exponential(1e-4), Exponential(1e-12), DormandPrince(1e-6), DormandPrince(1e-12)])
+@pytest.mark.parametrize("mass", [1.4, 0.35, 0.02])
+def test_peak_force_where_a_dashpot_begins(mass, method):
+    """The force jumps to F + c v at the knot, which is its largest: F alone acts until there, and both fall beyond."""
+    stiffness, knot, damping = 400.0, 0.02, 8.0
+    law = PiecewiseLinear([stiffness, 500.0], (knot,), [0.0, damping])
+    rate = 1.02 * knot * math.sqrt(stiffness / mass)
+    log = integrate(free_mass(law, mass), [0.0], [-rate], 0.1, method=method).contacts
+    beyond = math.sqrt(rate**2 - stiffness * knot**2 / mass)
+    assert log.peak_force[0] == pytest.approx(stiffness * knot + damping * beyond, rel=10.0 * method.rtol + 1e-9)
+
+
+@pytest.mark.parametrize("method", [Exponential(1e-4), Exponential(1e-12), DormandPrince(1e-12)])
+def test_peak_force_where_a_dashpot_ends(method):
+    """The largest is that just before the knot, F + c v; beyond it there is F alone."""
+    law, mass, knot = PiecewiseLinear([400.0, 20.0], (0.02,), [8.0, 0.0]), 0.7, 0.02
+    gamma = 0.5 * 8.0 / mass
+    omega = math.sqrt(400.0 / mass - gamma**2)
+
+    def motion(t):
+        decay = 1.5 * math.exp(-gamma * t)
+        delta = decay * math.sin(omega * t) / omega
+        return delta, decay * math.cos(omega * t) - gamma * delta
+
+    t = brentq(lambda t: motion(t)[0] - knot, 0.0, 1.0 / omega)
+    log = integrate(free_mass(law, mass), [0.0], [-1.5], 0.1, method=method).contacts
+    assert log.peak_force[0] == pytest.approx(400.0 * knot + 8.0 * motion(t)[1], rel=10.0 * method.rtol + 1e-9)
 
 
 def test_first_contact_of_two_in_one_step_is_taken_first():

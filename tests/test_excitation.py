@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import BPoly
 
+from fembeam import LumpedMass
 from fembeam.excitation import BandNoise, Harmonic, Multisine, Record, RollOff
 from fembeam.statistics import Estimate, moments
 
@@ -640,3 +641,14 @@ def times(**changed):
 def test_bad_record(make, message):
     with pytest.raises(ValueError, match=message):
         make()
+
+
+NO_NUMBERS = [True, np.True_, "1", None, 1j, np.complex64(1), np.complex128(1), [1.0, 2.0], 10**400]
+
+
+@pytest.mark.parametrize("bad", NO_NUMBERS, ids=lambda bad: type(bad).__name__)
+def test_what_is_no_number_is_refused_in_words(bad):
+    with pytest.raises(ValueError, match=r"amplitude must be (a number|finite), got"):
+        Harmonic(bad, 100.0)
+    with pytest.raises(ValueError, match=r"mass must be (a number|finite and not negative), got"):
+        LumpedMass(0.1, bad)

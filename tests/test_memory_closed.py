@@ -263,6 +263,20 @@ def test_a_pull_is_no_peak_force_of_a_yielding_stop():
     np.testing.assert_allclose(log.peak_force, exact.peak_force, rtol=1e-5)
 
 
+@pytest.mark.parametrize("method", [Exponential(1e-6), FINE, DormandPrince(1e-8)], ids=["1e-6", "1e-12", "dop853"])
+@pytest.mark.parametrize("kind", ["kept", "forgotten"])
+def test_a_yielding_stop_is_entered_at_once_by_a_start_on_its_surface(kind, method):
+    """Moving in, or at rest under a load: t = 0, not a shortest step later."""
+    stop = Contact([-1.0], WaltonBraun(400.0, 900.0, kind), 0.3)
+    for rate, force in ((0.5, 0.0), (0.0, 2.0)):
+        system = System([[2.0]], [[0.0]], [[0.0]], [stop], [([1.0], Harmonic(force, 0.0))])
+        run = integrate(system, [0.3], [rate], 0.3, method=method)
+        assert run.contacts.t_in[0] == run.transitions.t[0] == 0.0
+        assert run.contacts.speed_in[0] == pytest.approx(rate, abs=1e-14)
+        deepest = rate * math.sqrt(2.0 / 400.0) if rate else 2.0 * force / 400.0
+        assert run.contacts.peak_indentation[0] == pytest.approx(deepest, rel=1e3 * method.rtol)
+
+
 @pytest.mark.parametrize("rate", [-0.5, 0.5])
 @pytest.mark.parametrize("method", [FINE, DormandPrince(1e-12)], ids=["main", "stepping"])
 def test_smooth_hysteresis_begun_beyond_its_zero(method, rate):
@@ -278,6 +292,35 @@ def test_smooth_hysteresis_begun_beyond_its_zero(method, rate):
 
 
 # --- tangents --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("method", [Exponential(1e-4), Exponential(1e-8), FINE, DormandPrince(1e-8)])
+@pytest.mark.parametrize("rate", [-1e-3, -1e-2, 1e-2, -0.1])
+def test_smooth_hysteresis_begun_at_zero_force_turns_where_its_energy_is_spent(rate, method):
+    """At δ = 0 the side on which the law is loaded is that of the motion, which a load of 1 N soon turns.
+
+    There ½ v² = W + δ with W = ∫ F dδ, F = α k δ + (1 - α) k (1 - e^{-cδ})/c; after it z falls to zero.
+    """
+    stiffness, alpha, c, side = 4.0, 0.2, 1.0, math.copysign(1.0, rate)
+
+    def spent(delta):
+        smooth = (delta + math.expm1(-c * delta) / c) / c
+        return 0.5 * alpha * stiffness * delta**2 + (1.0 - alpha) * stiffness * smooth + delta - 0.5 * rate**2
+
+    law = BoucWen(stiffness, alpha, 1.0, 0.7 * c, 0.3 * c)
+    system = oscillator(law, spring=0.0, loads=[([1.0], Harmonic(-side, 0.0))])
+    run = integrate(system, [0.0], [rate], 1.5, method=method)
+    assert run.transitions.event[:2].tolist() == ["reversal", "zero"]
+    assert run.transitions.delta[0] == pytest.approx(side * brentq(spent, 0.0, 0.5 * rate**2, xtol=1e-20), rel=1e-8)
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9])
+def test_a_knee_that_is_small_beside_the_motion_is_resolved(rtol):
+    """Within a fiftieth of a step from z = 0 on the force saturates: all nodes lie beyond."""
+    knee = 2e-4
+    system = oscillator(BoucWen(160.0, 0.1, 1.0, 1.1 / knee**2, -0.1 / knee**2, 2), spring=20.0)
+    runs = [integrate(system, [0.7], [0.0], 1.5, method=method) for method in (Exponential(rtol), DormandPrince(1e-12))]
+    assert np.abs(runs[0].end[:2] - runs[1].end[:2]).max() < 20.0 * rtol
 
 
 @pytest.mark.parametrize(

@@ -332,11 +332,12 @@ def test_phases_that_come_and_go_are_located():
     born = [one for one in found.special if one.mark == "stick"]
     assert born
     assert abs(born[-1].parameter - 0.445505) < 1e-5
-    one = max((one for one in found.orbits if one.parameter < born[-1].parameter), key=lambda one: one.parameter)
-    assert len(one.transitions) == 8
+    for one in found.orbits:  # at the very point the phase has no length: rounding decides how often it is entered
+        if 0.4345 < one.parameter < 0.4455:
+            assert len(one.transitions) == 8
     assert {len(o.transitions) for o in found.orbits if o.parameter > 0.446} == {4}
     phases = np.diff(np.sort(born[-1].transitions.t))
-    assert phases.min() < 1e-3 * one.period
+    assert phases.min() < 1e-3 * born[-1].period
 
 
 def test_branch_of_a_beam_with_friction_is_saved_and_gone_on_with(tmp_path):

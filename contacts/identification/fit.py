@@ -24,7 +24,7 @@ from contacts.restitution import achieved_restitution
 
 _STEEPEST = 8.0  # exponent, fitted or given
 _STIFFEST = 20.0  # logarithm of a stiffness in units of the largest force and indentation: what can be one of a stop
-_SETTLED = 1e-13  # relative change that ends least squares; also met where rounding is a hundred times as large as ours
+_SETTLED = 1e-13  # relative change that ends least squares, hundreds of roundings; if not met, evaluations are limited
 _UNTOLD = "these records do not tell the law. Look at force over indentation; keep the exponent, or offsets=False"
 _UNLIKELY = 1e-3  # chance below which collisions that agree would differ so much
 

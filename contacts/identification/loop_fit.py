@@ -18,7 +18,7 @@ from contacts.identification.result import Estimate, inflation_of
 
 ROUNDING = 1e-10
 """Share of the force's half range below which nothing is left to explain."""
-_TIGHT: dict[str, Any] = {"ftol": 1e-13, "xtol": 1e-13, "gtol": 1e-13}
+_TIGHT: dict[str, Any] = {"ftol": 1e-13, "xtol": 1e-13, "gtol": 1e-13}  # not met by every rounding: `most` ends it too
 
 
 class Measured:

@@ -1,7 +1,8 @@
 """What a scene is before it is run: modes, contacts to expect, steps and modes to take, and what looks wrong.
 
-Contacts are those of a short trial and of one strike at its usual speed. A contact of length T excites what lies below
-3π/T, where the spectrum of a half-sine pulse first vanishes: modes above it are hardly excited.
+Contacts are those of a short trial and of one strike at its usual speed; where stops are many, the most touched ones
+are struck, of the others the trial alone tells. A contact of length T excites what lies below 3π/T, where the spectrum
+of a half-sine pulse first vanishes: modes above it are hardly excited.
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ PERIODS = 20.0  # of the lowest mode that the trial lasts
 MOST_PERIODS = 3000.0  # of the highest mode that it may take
 MOST_RECORDED = 30_000.0  # likewise where records or sweeps drive, whose strongest part may come late
 NOMINAL_SPEED = 0.1  # m/s, where the trial tells none
+MOST_STRUCK = 40  # stops; each takes a fiftieth of a second
+NAMED = 6  # stops in a warning
 MOST_MODES = 40  # considered when counting those a contact excites
 
 
@@ -36,7 +39,8 @@ class Touched:
     Attributes
     ----------
     contacts : in the trial. speed : m/s (rad/s of rotation), the trial's median, else nominal. time : s that such a
-        contact lasts. peak_force : N or N m. periods : contact time over the shortest period kept.
+        contact lasts, and peak_force : N or N m, of a strike, else the trial's medians. periods : contact time over the
+        shortest period kept.
     """
 
     stop: int
@@ -104,7 +108,7 @@ def check(file: SceneFile, model: Model) -> Check:
     file : what was read. model : its reduced model.
     """
     log = _trial(model)
-    touched = [one for stop in range(len(model.scene.stops)) if (one := _touched(model, log, stop))]
+    touched = _all_touched(model, log)
     shortest = min((one.time for one in touched), default=math.inf)
     moving = bool(np.any(model.omega > 0))  # rigid-body modes alone have no period
     steps = {"output step dt, 20 in the shortest period kept": 2 * math.pi / (20 * _fastest(model))} if moving else {}
@@ -135,39 +139,61 @@ def _trial(model: Model) -> solvers.ContactLog | None:
         return None
 
 
-def _touched(model: Model, log: solvers.ContactLog | None, stop: int) -> Touched | None:
-    """One stop struck at its usual speed; None when the first mode does not move there."""
-    speeds = np.abs(log.speed_in[log.stop == stop]) if log is not None else np.zeros(0)
-    speeds = speeds[speeds > 0]
-    speed = float(np.median(speeds)) if len(speeds) else NOMINAL_SPEED
+def _all_touched(model: Model, log: solvers.ContactLog | None) -> list[Touched]:
+    """What to expect of the stops; nothing of one of which neither a strike nor the trial tells."""
+    counts = np.bincount(np.zeros(0, dtype=int) if log is None else log.stop, minlength=len(model.contact_rows))
+    stops = range(len(model.scene.stops))
+    struck = sorted(stops, key=lambda stop: -counts[stop])[:MOST_STRUCK]
+    return [one for stop in stops if (one := _touched(model, log, stop, stop in struck))]
+
+
+def _touched(model: Model, log: solvers.ContactLog | None, stop: int, struck: bool) -> Touched | None:
+    """One stop in the trial, and struck at its usual speed."""
+    mine = np.zeros(0, dtype=int) if log is None else np.flatnonzero((log.stop == stop) & (log.speed_in != 0.0))
+    speed = float(np.median(np.abs(log.speed_in[mine]))) if log is not None and len(mine) else NOMINAL_SPEED
+    hit, of_hit = (_strike(model, speed, stop), slice(1)) if struck else (log, mine)
+    if hit is None or not len(hit.stop[of_hit]):
+        return None
+    time, force = float(np.median((hit.t_out - hit.t_in)[of_hit])), float(np.median(hit.peak_force[of_hit]))
+    time = time if math.isfinite(time) else math.inf  # longer than it was watched
+    return Touched(stop, len(mine), speed, time, force, time * _fastest(model) / (2 * math.pi))
+
+
+def _strike(model: Model, speed: float, stop: int) -> solvers.ContactLog | None:
+    """Contacts with a stop struck by the first mode; None when that does not move there."""
     if abs(model.directions[stop, 0]) < 1e-9 * np.abs(model.directions[stop]).max():
         return None
     try:
-        hit = model.strike(speed, stop)
+        return model.strike(speed, stop)
     except (ValueError, ArithmeticError, solvers.SolverError):
         return None
-    if not len(hit):
-        return None
-    time = float(hit.t_out[0] - hit.t_in[0])
-    time = time if math.isfinite(time) else math.inf  # longer than the strike was watched
-    periods = time * _fastest(model) / (2 * math.pi)
-    return Touched(stop, len(speeds), speed, time, float(hit.peak_force[0]), periods)
 
 
 def _of_trial(model: Model, touched: list[Touched]) -> list[str]:
     """What contacts make doubtful."""
+    slowest = 2 * math.pi / max(float(model.omega.min()), 1e-12)
+    soft = [one.stop for one in touched if one.time > 0.5 * slowest]
+    short = [one.stop for one in touched if one.periods <= 3 and one.time * _fastest(model) < 3 * math.pi]
     found = []
-    for one in touched:
-        slowest = 2 * math.pi / max(float(model.omega.min()), 1e-12)
-        if one.time > 0.5 * slowest:
-            found.append(f"stop {one.stop} is so soft that a contact lasts half the lowest period or more: "
-                         "is its stiffness in N/m (Hertz: N/m^1.5)?")  # fmt: skip
-        if one.periods > 3:
-            continue
-        if one.time * _fastest(model) < 3 * math.pi:
-            found.append(f"contacts with stop {one.stop} excite modes above the {len(model.omega)} kept: forces and "
-                         "contact times are this model's only; see suggested modes, or ask [mode_count]")  # fmt: skip
+    if soft:
+        found.append(f"{_listed(soft)}: so soft that a contact lasts half the lowest period or more: "
+                     "is the stiffness in N/m (Hertz: N/m^1.5)?")  # fmt: skip
+    if short:
+        found.append(f"contacts with {_listed(short)} excite modes above the {len(model.omega)} kept: forces and "
+                     "contact times are this model's only; see suggested modes, or ask [mode_count]")  # fmt: skip
     return found
+
+
+def _listed(stops: list[int]) -> str:
+    """Stops in words, the first ones of many.
+
+    Examples
+    --------
+    >>> _listed([3]), _listed([0, 2]), _listed(list(range(5, 200)))
+    ('stop 3', 'stops 0, 2', 'stops 5, 6, 7, 8, 9, 10 and 189 more')
+    """
+    more = f" and {len(stops) - NAMED} more" if len(stops) > NAMED else ""
+    return f"stop{'s' * (len(stops) > 1)} {', '.join(map(str, stops[:NAMED]))}{more}"
 
 
 def _suggested_modes(file: SceneFile, shortest: float) -> dict[str, int]:

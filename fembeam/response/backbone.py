@@ -48,7 +48,7 @@ def _frequency(model: Model, furthest: float) -> float:
     near = float(ends[1 - far])
     if energies[1 - far] - energies[far] > 1e-13 * energies[far]:  # else the well is even, and this the turning point
         near = brentq(lambda q: float(_potential(model, np.array([q]))[0] - energies[far]), 0.0, near,
-                      xtol=1e-15 * furthest, rtol=1e-15)  # fmt: skip
+                      xtol=1e-15 * furthest, rtol=1e-15, maxiter=1000)  # fmt: skip  # met at any rounding, in time
     low, high = sorted((float(ends[far]), near))
     rows = zip(model.directions[:, 0], model.contact_rows, strict=True)
     met = [-row.gap / w for w, row in rows if w != 0.0]

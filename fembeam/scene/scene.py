@@ -233,12 +233,13 @@ class Scene:
         for first, second in pairwise(ordered):
             apart = second.z - first.z > near
             require(apart, "supports must not share one place", (first, second), "Scene", "keep one")
-        for j, stop in enumerate(self.stops):
-            for i, other in enumerate(self.stops[:j]):
-                alike = (stop.side, stop.on, stop.of) == (other.side, other.on, other.of)
-                same = abs(stop.z - other.z) <= near and alike
-                require(not same, f"stops must not share one place and side (z = {stop.z} m, {stop.side})", (i, j),
-                        "stops of Scene", "make them one stop with one law, such as PiecewiseLinear")  # fmt: skip
+        kinds = [(stop.side, stop.of, stop.coordinate.to or (-1, 0.0)) for stop in self.stops]
+        for i, j in pairwise(sorted(range(len(kinds)), key=lambda i: (kinds[i], self.stops[i].z, i))):
+            stop, other = self.stops[i], self.stops[j]
+            same = kinds[i] == kinds[j] and other.z - stop.z <= near
+            require(not same, f"stops must not share one place and side (z = {stop.z} m, {stop.side})",
+                    tuple(sorted((i, j))), "stops of Scene",
+                    "make them one stop with one law, such as PiecewiseLinear")  # fmt: skip
 
     def _check_bodies(self) -> None:
         """Raise ValueError for what a body cannot carry, and for stops on bodies or places that do not exist."""

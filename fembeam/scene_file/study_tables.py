@@ -235,10 +235,14 @@ class FoundOrbit(Result):
 
     orbit: Orbit
 
+    @property
+    def _extremes(self) -> dict[str, tuple[float, float]]:
+        """Lowest and highest displacement, m, at the usual places."""
+        return {name: self.orbit.extremes(z) for name, z in plot.places(self.orbit.model.shapes).items()}
+
     def table(self) -> list[dict[str, Any]]:
-        """Extremes, m, at the usual places."""
-        extremes = {name: self.orbit.extremes(z) for name, z in plot.places(self.orbit.model.shapes).items()}
-        return [{"": f"displacement, {name}", "min": low, "max": high} for name, (low, high) in extremes.items()]
+        """Extremes of the displacement, a place a row."""
+        return [{"displacement": name, "min": low, "max": high} for name, (low, high) in self._extremes.items()]
 
     def plain(self) -> dict[str, Any]:
         """For JSON: period, stability, multipliers, extremes, contacts, state."""
@@ -249,20 +253,19 @@ class FoundOrbit(Result):
             "stable": bool(one.stable),
             "residual": one.found.residual,
             "multipliers": [{"size": float(abs(m)), "angle": float(np.angle(m))} for m in one.multipliers],
-            "extremes": {row[""].removeprefix("displacement, "): {"min": row["min"], "max": row["max"]}
-                         for row in self.table()},
+            "extremes": {name: {"min": low, "max": high} for name, (low, high) in self._extremes.items()},
             "contacts": [{name: float(column[i]) for name, column in log.arrays().items()} for i in range(len(log))],
             "phase": one.found.phase,
             "state": one.state.tolist(),
             "units": "SI: m, s, N, J, rad",
-        }  # fmt: skip
+        }
 
     def _parts(self) -> list[Part]:
         """The kind of orbit, its extremes, its contacts."""
         one, log = self.orbit, self.orbit.contacts
         kind, sizes = "stable" if one.stable else "unstable", ", ".join(f"{abs(m):.4g}" for m in one.multipliers)
         head = f"{kind} orbit of period {one.period}, {one.found.period:.6g} s, |μ| = {sizes}"
-        extremes = [list(row.values()) for row in self.table()]
+        extremes = [(f"displacement, {name}", *both) for name, both in self._extremes.items()]
         columns = {"t_in": "begins/s", "t_out": "ends/s", "speed_in": "entry speed/(m/s)", "peak_force": "peak force/N"}
         values = [getattr(log, name).tolist() for name in columns]
         rows = [(f"stop {stop}", *row) for stop, *row in zip(log.stop, *values, strict=True)]

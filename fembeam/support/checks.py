@@ -16,7 +16,10 @@ def is_number(value: object) -> TypeGuard[float]:
 
 def is_finite(value: object) -> bool:
     """Whether value is a real, finite number."""
-    return is_number(value) and math.isfinite(value)
+    try:
+        return is_number(value) and math.isfinite(value)
+    except OverflowError:  # a whole number beyond the floats
+        return False
 
 
 def is_whole(value: object) -> TypeGuard[int]:
@@ -34,7 +37,7 @@ def require(valid: bool, rule: str, got: object, where: str, advice: str) -> Non
 def require_finite(name: str, value: Any, where: str, advice: str, bound: str = "", valid: bool = True) -> None:
     """Raise ValueError unless value is a number, finite, and valid by a bound told in words."""
     require(is_number(value), f"{name} must be a number", value, where, advice)
-    require(math.isfinite(value) and valid, f"{name} must be finite{bound}", value, where, advice)
+    require(is_finite(value) and valid, f"{name} must be finite{bound}", value, where, advice)
 
 
 def require_positive(name: str, value: Any, where: str, advice: str) -> None:
@@ -61,11 +64,13 @@ def require_no_text(where: str, **values: object) -> None:
 def number(name: str, value: Any, above: float = -math.inf, least: float = -math.inf) -> float:
     """The value as a finite float above one bound and not below another, or a clear error."""
     try:
-        if isinstance(value, (str, bytes, bool, np.bool_)):
+        if isinstance(value, (str, bytes, bool, np.bool_, complex, np.complexfloating)):
             raise TypeError
         result = float(value)
     except (TypeError, ValueError):
         raise ValueError(f"{name} must be a number, got {value!r}") from None
+    except OverflowError:
+        result = math.inf
     if not (math.isfinite(result) and result > above and result >= least):
         bound = f" above {above:g}" if above > -math.inf else f" of at least {least:g}"
         raise ValueError(f"{name} must be finite{bound if max(above, least) > -math.inf else ''}, got {value!r}")

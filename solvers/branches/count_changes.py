@@ -37,7 +37,7 @@ def zero(arc: Arc, begin: float, end: float, value: Callable[[float], float]) ->
             **{"xtol": arc.sharpness(), "maxiter": _MOST_TRIALS, "full_output": True, "disp": False},
         )
         return found[place]
-    except (OrbitError, np.linalg.LinAlgError, IndexError, KeyError):
+    except (OrbitError, ValueError, IndexError, KeyError):  # ValueError: rounding has taken the change of sign away
         return None
 
 

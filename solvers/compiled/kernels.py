@@ -125,6 +125,9 @@ def call_renewal_gradient(typingctx, address, border, delta, delta_dot, entry_ra
     return signature, codegen
 
 
+_ROUNDING = 1e-14  # of an indentation, in units of the gap it is measured from
+_ON_KNOT = 1e-11  # share of a knot within which laws take the motion for on it, see `contacts.kernels`
+
 call_force = _c_function(1)
 call_gradient = _c_function(3)
 
@@ -135,6 +138,18 @@ def contact_forces(problem, stop, delta, delta_dot, entry_rate, force):
     for i in range(delta.size):
         delta[i] = max(delta[i], problem.knots[stop, 0])
     law_forces(problem, stop, delta.size, delta, delta_dot, entry_rate, force)
+
+
+@inlined
+def off_knots(problem, stop, segment, delta):
+    """δ; where that is a knot to rounding, a point of the segment beside it: the force may jump at the knot."""
+    lower, upper = problem.knots[stop, segment - 1], problem.knots[stop, segment]
+    near = _ROUNDING * abs(problem.gap[stop])
+    if lower > 0.0 and abs(delta - lower) <= near + _ON_KNOT * lower:
+        return lower * (1.0 + 2.0 * _ON_KNOT)
+    if upper < np.inf and abs(delta - upper) <= near + _ON_KNOT * upper:
+        return upper * (1.0 - 2.0 * _ON_KNOT)
+    return delta
 
 
 @inlined
@@ -256,7 +271,7 @@ def rhs(problem, t, x, segment, entry_rate, rate, batch):
         rate[size + 3 + 2 * s] = 0.0
         if segment[s] > 0:
             delta_dot = dot(problem.read_rate[s], x, size)
-            batch[0] = indentation(problem, s, x)
+            batch[0] = off_knots(problem, s, segment[s], indentation(problem, s, x))
             batch[1] = delta_dot
             contact_forces(problem, s, batch[0:1], batch[1:2], entry_rate[s], batch[2:3])
             calls += 1

@@ -39,9 +39,10 @@ def margins_in(problem, state, s, x, batch, out):
 
 @inner
 def margins_before(problem, state, s, delta, rate, time, batch, out):
-    """Margins a time before the present state, whose rates are known, from where it is now."""
-    batch[0] = delta - time * rate
-    batch[1] = rate - time * dot(problem.read_rate[s], state.rate, 2 * problem.k.size)
+    """Margins a time before the present state, whose rates are known, from where it is now; after it if negative."""
+    acceleration = dot(problem.read_rate[s], state.rate, 2 * problem.k.size)
+    batch[0] = delta - time * (rate - 0.5 * time * acceleration)
+    batch[1] = rate - time * acceleration
     margins(problem, state, s, 1, batch[0:1], batch[1:2], out)
 
 

@@ -95,15 +95,16 @@ def open_contact(problem, state, s, t, delta_dot):
 
 @kernel
 def begin_contacts(problem, state):
-    """Find the segment of every stop at the start of a run and begin the contacts under way."""
+    """Find the segment of every stop at the start, on a knot that into which it moves, and begin contacts under way."""
     for s in range(problem.gap.size):
-        delta = indentation(problem, s, state.x)
-        segment = 0
-        while delta > problem.knots[s, segment] + surface_tolerance(problem, s, state.x):
+        delta, rate = indentation(problem, s, state.x), dot(problem.read_rate[s], state.x, 2 * problem.k.size)
+        segment, near = 0, surface_tolerance(problem, s, state.x)
+        while delta > problem.knots[s, segment] + near:
             segment += 1
+            near = -abs(near) if rate > rate_tolerance(problem, s, state.x) else near
         state.segment[s] = segment
         if segment > 0:
-            open_contact(problem, state, s, state.now[T], dot(problem.read_rate[s], state.x, 2 * problem.k.size))
+            open_contact(problem, state, s, state.now[T], rate)
             state.active[s, PEAK_DELTA] = delta
 
 

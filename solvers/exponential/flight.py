@@ -43,7 +43,7 @@ def cell_of(problem, t):
 
 
 @inlined
-def _quintic(problem, j, cell):
+def quintic(problem, j, cell):
     """Coefficients of the quintic of node table j on a cell, in powers of (t - start)/dt."""
     dt = problem.table_dt[j]
     row = problem.table_start[j] + cell
@@ -60,7 +60,7 @@ def signal_derivatives(problem, j, t, out):
     """s, s', ..., s⁽⁵⁾ of node table j at time t."""
     dt = problem.table_dt[j]
     cell, offset = cell_of(problem, t)
-    s0, s1, s2, c3, c4, c5 = _quintic(problem, j, cell)
+    s0, s1, s2, c3, c4, c5 = quintic(problem, j, cell)
     x, r = offset / dt, 1.0 / dt
     out[0] = s0 + x * (s1 + x * (s2 + x * (c3 + x * (c4 + x * c5))))
     out[1] = r * (s1 + x * (2.0 * s2 + x * (3.0 * c3 + x * (4.0 * c4 + x * 5.0 * c5))))

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from solvers.compiled.kernels import dot, inner, kernel
+from solvers.compiled.kernels import dot, indentation, inner, kernel
 from solvers.compiled.renewals import margins, margins_before, margins_in, note_event, renew
 from solvers.compiled.state import LAST_EVENT, T, most_borders, rate_tolerance, surface_tolerance
 from solvers.stepping.events import NONE, bisection, coefficients_of, golden_section, polynomial
@@ -35,19 +35,22 @@ def border_space(problem: Any) -> list[Any]:
 
 @inner
 def _present(problem, state, space, s, x):
-    """Margins of element s in a state, and by moved δ and δ̇ what rounding may make of them; returns δ and δ̇."""
-    delta, rate = margins_in(problem, state, s, x, space.trial, space.margin)
+    """Margins of element s a rounding ahead of a state, and what rounding may make of them; returns δ and δ̇.
+
+    Ahead is where the motion goes: a law that has not moved yet may look at the sign of δ.
+    """
+    delta, rate = indentation(problem, s, x), dot(problem.read_rate[s], x, 2 * problem.k.size)
     scale, count = space.scale[s], problem.border_count[s]
     scale[0] = max(scale[0], 4.0 * surface_tolerance(problem, s, x))
     scale[1] = max(scale[1], rate_tolerance(problem, s, x))
-    for j in range(count):
-        space.present[s, j] = space.margin[j]
-        space.rounding[s, j] = 1e-15 * abs(space.margin[j])
-    for i in range(2):  # moved the way the motion goes: a law that has not moved yet may look at the sign of δ
-        space.trial[0] = delta + (1 - i) * math.copysign(scale[0], rate)
-        space.trial[1] = rate + i * math.copysign(scale[1], rate)
+    ahead = math.copysign(1.0, rate)
+    for i in range(3):  # ahead, with δ moved by twice as much, with δ̇ moved
+        space.trial[0] = delta + ahead * scale[0] * (3.0 if i == 1 else 1.0)
+        space.trial[1] = rate + ahead * scale[1] * (1.0 if i == 2 else 0.0)
         margins(problem, state, s, 1, space.trial[0:1], space.trial[1:2], space.margin)
         for j in range(count):
+            if i == 0:
+                space.present[s, j], space.rounding[s, j] = space.margin[j], 1e-15 * abs(space.margin[j])
             space.rounding[s, j] += abs(space.margin[j] - space.present[s, j])
     return delta, rate
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from solvers.compiled.kernels import contact_forces, copy, dot, indentation, inner, kernel
+from solvers.compiled.kernels import contact_forces, copy, dot, indentation, inner, kernel, off_knots
 from solvers.compiled.renewals import most_rows
 from solvers.compiled.state import (
     AT_ONCE,
@@ -77,7 +77,7 @@ def _peak_value(known, theta):
     batch[0] = polynomial(delta_of, theta)
     if column == PEAK_DELTA:
         return batch[0]
-    batch[1] = polynomial(rate_of, theta)
+    batch[0], batch[1] = off_knots(problem, s, state.segment[s], batch[0]), polynomial(rate_of, theta)
     contact_forces(problem, s, batch[0:1], batch[1:2], state.entry_rate[s], batch[2:3])
     return batch[2]
 

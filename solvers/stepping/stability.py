@@ -132,8 +132,7 @@ def _shortest(method: ConstantStep, system: System, k: Array, c: Array, duration
 def with_tangents(system: System, indentation: float | None) -> tuple[Any, Any, float]:
     """C and K with every stop's tangent, and how long a contact lasts."""
     C, K, longest = system.C, system.K, 0.0
-    for contact in system.contacts:
-        stiffness, damping, mass = tangent(system, contact, indentation)
+    for contact, (stiffness, damping, mass) in zip(system.contacts, tangents(system, indentation), strict=True):
         if system.sparse:
             from scipy.sparse import csc_array
 
@@ -149,10 +148,17 @@ def with_tangents(system: System, indentation: float | None) -> tuple[Any, Any, 
 
 def shortest_contact(system: System) -> float:
     """Half a period on the stiffest stop's tangent, hit at 1 m/s; inf without stops."""
-    found = [tangent(system, contact, None) for contact in system.contacts]
+    found = tangents(system, None)
     return min(
         (math.pi * math.sqrt(mass / stiffness) for stiffness, _, mass in found if stiffness > 0.0), default=math.inf
     )
+
+
+def tangents(system: System, indentation: float | None) -> list[tuple[float, float, float]]:
+    """The `tangent` of every stop; found once per system."""
+    key = "tangents", indentation
+    found: Any = system.kept.get(key, lambda: [tangent(system, contact, indentation) for contact in system.contacts])
+    return found  # type: ignore[no-any-return]
 
 
 def tangent(system: System, contact: Contact, indentation: float | None) -> tuple[float, float, float]:
@@ -223,7 +229,10 @@ def _depth(law: Any, mass: float, speed: float) -> float:
     """Indentation at which a stop has taken the energy of a mass."""
     low, high = -15.0, 3.0  # powers of ten, m
     while high - low > 1e-6:
-        middle = 0.5 * (low + high)
-        enough = work_of(law, 10.0**middle) >= 0.5 * mass * speed**2
-        low, high = (low, middle) if enough else (middle, high)
+        powers = np.linspace(low, high, 65)
+        delta = 10.0 ** powers[:, None]
+        works = 0.5 * delta[:, 0] * (law.force(0.5 * delta * (1.0 + _NODES), 0.0, 1.0) @ _WEIGHTS)
+        enough = np.append(works >= 0.5 * mass * speed**2, True)
+        at = min(max(int(enough.argmax()), 1), 64)
+        low, high = powers[at - 1], powers[at]
     return float(10.0**low)

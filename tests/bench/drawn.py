@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from drawn_starts import on_a_border
 from scipy.optimize import brentq
 
 import fembeam as fb
@@ -47,6 +48,7 @@ class Scene:
     words: str
     parts: int = 1  # groups of as many coordinates each that may influence each other little
     memory: Any = None  # what the laws have latched at the start, as `integrate` takes it
+    kept: Any = None  # (rows, 2n) of what a start moved a little keeps, as δ of one that is on a border
 
 
 def draw_law(rng: np.random.Generator, mass: float, speed: float, time: float) -> Any:
@@ -260,7 +262,7 @@ def draw(seed: int) -> tuple[Scene, float]:
     kind = (draw_structure, draw_structure, draw_parts, draw_pair)[rng.integers(4)]
     kind = draw_sampled if seed >= SAMPLED_FROM else kind
     rtol = float(rng.choice([1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-8, 1e-9, 1e-10, 1e-11]))
-    scene = kind(rng)
+    scene = on_a_border(seed, kind(rng))
     laws = ", ".join(_told(c) for c in scene.system.contacts)
     scene.words = f"rtol {rtol:g} {scene.words}; stops {laws}"
     return scene, rtol

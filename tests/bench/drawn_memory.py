@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from drawn import Scene, draw_law, draw_signal
+from drawn_starts import on_a_border
 from drawn_wider import reached, widened
 
 import fembeam as fb
@@ -134,6 +135,7 @@ def draw(seed: int) -> tuple[Scene, float]:
     scene = widened(seed, Scene(system, q0, q_dot0, rng.uniform(3.0, 15.0) / low, words), speed, low, draw_memory)
     if rng.random() < 0.25:
         scene = replace(reached(scene, rng.uniform(0.5, 8.0) / low), words=scene.words + " under way")
+    scene = on_a_border(seed, scene)
     laws = ", ".join(told(contact) for contact in scene.system.contacts)
     return replace(scene, words=f"{scene.words}; {laws}"), rtol
 

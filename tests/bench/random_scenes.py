@@ -250,6 +250,8 @@ def amplified(
     for _ in range(3):
         try:
             other_start = move * sizes * rng.choice([-1.0, 1.0], 2 * n)
+            if scene.kept is not None:
+                other_start -= np.linalg.pinv(scene.kept) @ (scene.kept @ other_start)
             moved = run(disturbed(scene, rng, move), DormandPrince(max(1e-12, 1e-3 * move)), other_start)
         except (TooStiffError, SolverError):
             return None

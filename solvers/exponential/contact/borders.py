@@ -9,6 +9,8 @@ do not resolve the fast blocks keeps a distance of what these may add.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import types
 
@@ -28,6 +30,7 @@ _SAME = 1e-11  # the same for the sign of a node
 _TOGETHER = 1e-9  # part of its way at which a border counts as reached when another is landed on
 _MISSED = 1e-3  # margin, in units of the largest of the step, by which a landing may have missed its border
 _BEFORE = 1e-3  # part of a landing before its end
+_EARLY = 1e-3, 0.1  # parts of the time to the first node, over which the start is extrapolated
 _REST = 1e-14  # rate, in units of the reference speed, at which what has come to rest turns no more
 _NEAR = 0.2  # lowest node, in units of the largest margin, below which the motion between nodes is looked at
 _ENDS_NEAR = 0.5  # lower end of a landing, in the same units, below which what lies between its ends is looked at
@@ -38,18 +41,20 @@ _CLEAR = 0.03  # the lowest margin between them, in the same units, that counts 
 def _margins_on_step(problem, tables, state, scratch, s, node_set, level):
     """Margins at the nodes and at both ends of the step that has just been tried, their largest and their rounding.
 
-    The start is looked at once more with rounding added to δ and to δ̇, and with their ripple.
+    The start is taken a rounding ahead of where it is, on the side to which the motion goes: a law that has not moved
+    yet may look at the sign of δ. It is looked at once more with rounding added to δ and to δ̇, and with their ripple.
     """
     n, delta, rate = problem.k.size, scratch.start_motion[s, 0], scratch.start_motion[s, 1]
     weight, alias = tables.ripple_weight[s], tables.alias[tables.kind[node_set], level]
     deltas, rates = scratch.local_motion[KNOWN, :ENDS], scratch.local_motion[KNOWN, ENDS : 2 * ENDS]
+    ahead, rounding = math.copysign(1.0, rate), surface_tolerance(problem, s, state.x)
     for i in range(ENDS):
-        deltas[i], rates[i] = delta, rate
+        deltas[i], rates[i] = delta + ahead * rounding, rate
     deltas[1], rates[1] = indentation(problem, s, scratch.x_new), dot(problem.read_rate[s], scratch.x_new, 2 * n)
-    deltas[2] += surface_tolerance(problem, s, state.x)
-    rates[3] += max(rate_tolerance(problem, s, state.x), _REST * scratch.reference_speed[s])
-    deltas[4] += ripple_of(weight, alias, state.x, n)
-    rates[5] += rate_ripple_of(weight, problem.k, alias, state.x, n)
+    deltas[2] += ahead * rounding
+    rates[3] += ahead * max(rate_tolerance(problem, s, state.x), _REST * scratch.reference_speed[s])
+    deltas[4] += ahead * ripple_of(weight, alias, state.x, n)
+    rates[5] += ahead * rate_ripple_of(weight, problem.k, alias, state.x, n)
     margins(problem, state, s, ENDS, deltas, rates, scratch.ends)
     margins(problem, state, s, S, scratch.motion[s, 0], scratch.motion[s, 1], scratch.margin)
     for j in range(problem.border_count[s]):
@@ -61,8 +66,38 @@ def _margins_on_step(problem, tables, state, scratch, s, node_set, level):
         scratch.noise[s, j] = max(_SAME * largest, 2.0 * (abs(ends[2] - ends[0]) + abs(ends[3] - ends[0])))
 
 
+@merged
+def _soon(problem, state, scratch, s, j, time):
+    """A margin so long after the start of the step, by the rates there."""
+    rhs(problem, state.now[T], state.x, state.segment, state.entry_rate, state.rate, scratch.trial)
+    delta, rate = scratch.start_motion[s, 0], scratch.start_motion[s, 1]
+    margins_before(problem, state, s, delta, rate, -time, scratch.trial, scratch.fired)
+    return scratch.fired[j]
+
+
 @inlined
-def _crossing(tables, state, scratch, s, j, node_set, h):
+def _falls_at_once(problem, state, scratch, s, j, time):
+    """Whether a margin that begins at zero, and is below it after a time, has not been above it before."""
+    above = False
+    for share in _EARLY:
+        above |= _soon(problem, state, scratch, s, j, share * time) > scratch.noise[s, j]
+    return not above
+
+
+@inlined
+def _before_first_node(problem, state, scratch, s, j, before, time):
+    """Time at which a margin that goes on as the run begins falls to zero, if that is before the first node, or inf.
+
+    A law that has not moved yet has a margin by the sign of δ: it would not know of a motion to and fro.
+    """
+    if state.now[T] > 0.0 or before <= scratch.noise[s, j]:
+        return np.inf
+    fall = before - _soon(problem, state, scratch, s, j, _BEFORE * time)
+    return _BEFORE * time * before / fall if fall > _BEFORE * before else np.inf
+
+
+@inlined
+def _crossing(problem, tables, state, scratch, s, j, node_set, h):
     """Time after the start of the step at which a margin falls below zero by its values at the nodes, or inf.
 
     It is 0 where the margin is negative from the start on. One that begins at zero may have risen before the first
@@ -81,9 +116,12 @@ def _crossing(tables, state, scratch, s, j, node_set, h):
         value = scratch.margin[S * j + i] if i < S else scratch.ends[ENDS * j + 1]
         after = h * tables.times[node_set, i] if i < S else h
         if value < -noise and not (missed and before < -noise and value > before):
+            if i == 0 and before <= noise and _falls_at_once(problem, state, scratch, s, j, after):
+                return 0.0
             return t + (after - t) * (0.5 if on and i == 0 else max(before, 0.0) / (max(before, 0.0) - value))
         before, t = value, after
-    return np.inf
+    first = h * tables.times[node_set, 0]
+    return _before_first_node(problem, state, scratch, s, j, scratch.ends[ENDS * j], first)
 
 
 @inlined
@@ -160,7 +198,7 @@ def border_ahead(problem, tables, state, scratch, node_set, level):
         for j in range(count):
             if scratch.largest[s, j] <= scratch.noise[s, j]:
                 continue
-            time = _crossing(tables, state, scratch, s, j, node_set, h)
+            time = _crossing(problem, tables, state, scratch, s, j, node_set, h)
             if time == np.inf:
                 time = _between_nodes(problem, tables, state, scratch, s, j, node_set, h)
             if time == np.inf and _hides(scratch, s, j):

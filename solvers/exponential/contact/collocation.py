@@ -34,6 +34,7 @@ from solvers.compiled.kernels import (
     inlined,
     inner,
     merged,
+    off_knots,
 )
 from solvers.compiled.parts import ERROR, SOLVE, part
 from solvers.compiled.simd import largest8, load8
@@ -155,8 +156,8 @@ def _largest(problem, tables, state, scratch, u):
     return largest_size(scratch.force[u]), largest_size(slope[0])
 
 
-@part(ERROR, REAL, types.int64, types.int64, types.boolean, REAL)
-def step_error(problem, tables, state, scratch, node_set, level, is_new, rtol):
+@part(ERROR, REAL, types.int64, types.int64, REAL)
+def step_error(problem, tables, state, scratch, node_set, level, rtol):
     """Largest error of an indentation rate by the unresolved part of the forces, in units of the stop's tolerance.
 
     On an entry step the nodes are those of Gauss's rule for the stop that enters, not for the others.
@@ -175,7 +176,7 @@ def step_error(problem, tables, state, scratch, node_set, level, is_new, rtol):
             combine(tables.tail[node_set], scratch.force[u], S, None, scratch.trial)
             unresolved = unresolved_part(scratch.trial, largest, 1)
         if node_set == 0 and tables.power_law[u, EXPONENT] == 0.0:
-            unresolved += 0.01 * _hidden_kink(problem, state, scratch, u, largest, is_new)
+            unresolved += 0.01 * _hidden_kink(problem, state, scratch, u, largest)
         if unresolved == 0.0:
             continue
         ripple = ripple_of(tables.ripple_weight[u], tables.alias[tables.kind[node_set], level], state.x, n)
@@ -228,19 +229,19 @@ def _sum_errors(problem, tables, scratch, node_set, t, h):
 
 
 @merged
-def _hidden_kink(problem, state, scratch, u, largest, is_new):
+def _hidden_kink(problem, state, scratch, u, largest):
     """Difference, N, of law and polynomial at an end of a smooth step, where the last coefficients are smaller.
 
-    Then the law has a kink between that end and the next node, within a fiftieth of the step, as with clamp=True.
+    Then the law has a kink between that end and the next node, within a fiftieth of the step, as with clamp=True; or it
+    saturates within that time, as hysteresis of a knee that is small beside the motion does after a border.
     """
     size, delta, rate = 2 * problem.k.size, scratch.clipped[0:2], scratch.trial[0:2]
     delta[0], rate[0] = indentation(problem, u, scratch.x_new), dot(problem.read_rate[u], scratch.x_new, size)
-    delta[1], rate[1] = indentation(problem, u, state.x), dot(problem.read_rate[u], state.x, size)
+    delta[1] = off_knots(problem, u, state.segment[u], indentation(problem, u, state.x))
+    rate[1] = dot(problem.read_rate[u], state.x, size)
     contact_forces(problem, u, delta, rate, state.entry_rate[u], scratch.trial[2:4])
     c = scratch.summary[u, 0]
-    apart = abs(scratch.trial[2] - c[5])
-    if not is_new:  # one that begins on a knot may begin with a jump
-        apart = max(apart, abs(scratch.trial[3] - c[4]))
+    apart = max(abs(scratch.trial[2] - c[5]), abs(scratch.trial[3] - c[4]))
     return apart if apart > 2.0 * max(abs(c[2]), abs(c[3])) + 1e-12 * largest else 0.0
 
 

@@ -169,7 +169,7 @@ def _accept(problem, tables, state, scratch, variable, stop, span, t_end, out, d
     if state.event_record.shape[0]:
         write_event(state, LANDING, t, landed, span, variable, stop, w)
     state.now[T] = landed
-    if variable == TIME or landed == t_end:
+    if variable != ROOT or landed == t_end:  # at a knot the force may fall
         state_peaks(problem, state, scratch, state.x)
     return True
 
@@ -295,7 +295,7 @@ def land_on_bend(problem, tables, state, scratch, stop, border, near, rtol, t_en
     start_landing(problem, tables, state, scratch, stop)
     w, x = scratch.stages[START], scratch.stages[LANDED]
     before, apart, span = 0.0, _apart(problem, tables, state, scratch, stop, border, w), near
-    if abs(apart) <= 1e-6 * largest:  # it begins on a bend: the secant needs another point
+    if (apart if border >= 0 else abs(apart)) <= 1e-6 * largest:  # it begins there: the secant needs another point
         before = 0.9 * near
         _step(problem, tables, state, scratch, np.int64(TIME), stop, before, with_energy)
         apart = _apart(problem, tables, state, scratch, stop, border, x)

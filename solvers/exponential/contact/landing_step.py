@@ -19,6 +19,7 @@ from solvers.compiled.kernels import (
     inner,
     law_forces,
     merged,
+    off_knots,
     raised,
     table_value,
 )
@@ -34,20 +35,26 @@ INDENTATION, ROOT, TIME = range(3)
 _CHOICE = types.boolean, types.int64, types.int64  # types of with_energy, variable, stop
 
 
+@inner
+def _force_of_law(problem, tables, s, segment, delta, delta_dot, side, entry_rate, batch):
+    """The same by the law's own function, on its side of a knot."""
+    batch[0], batch[1], batch[2] = off_knots(problem, s, segment, max(delta, problem.knots[s, 0])), delta_dot, 0.0
+    if tables.bend[s] != FORCE:
+        law_forces(problem, s, 1, batch[0:1], batch[1:2], entry_rate, batch[2:3])
+    elif side > 0.0:
+        call_force(tables.uncut[s], 1, batch[0:1], batch[1:2], entry_rate, tables.uncut_parameters[s], (batch[2:3],))
+    return batch[2]
+
+
 @merged
-def _force(problem, tables, s, delta, delta_dot, side, entry_rate, batch):
+def _force(problem, tables, s, segment, delta, delta_dot, side, entry_rate, batch):
     """Force of stop s; a law cut at zero force is continued as on the side of the cut where the step began."""
     law = tables.power_law[s]
     if law[EXPONENT] > 0.0:
         deep = max(delta, 0.0)
         deep = law[STIFFNESS] * (deep * math.sqrt(deep) if law[EXPONENT] == 1.5 else deep)
         return deep * (1.0 + law[FACTOR] / entry_rate * delta_dot) + law[DAMPING] * delta_dot
-    batch[0], batch[1], batch[2] = max(delta, problem.knots[s, 0]), delta_dot, 0.0
-    if tables.bend[s] != FORCE:
-        law_forces(problem, s, 1, batch[0:1], batch[1:2], entry_rate, batch[2:3])
-    elif side > 0.0:
-        call_force(tables.uncut[s], 1, batch[0:1], batch[1:2], entry_rate, tables.uncut_parameters[s], (batch[2:3],))
-    return batch[2]
+    return _force_of_law(problem, tables, s, segment, delta, delta_dot, side, entry_rate, batch)
 
 
 @merged
@@ -67,7 +74,8 @@ def _rate(problem, tables, with_energy, variable, stop, span, w, segment, entry_
         force, rate = 0.0, 0.0
         if segment[s] > 0:
             rate = dot(problem.read_rate[s], w, size)
-            force = _force(problem, tables, s, indentation(problem, s, w), rate, side[s], entry_rate[s], batch)
+            delta = indentation(problem, s, w)
+            force = _force(problem, tables, s, segment[s], delta, rate, side[s], entry_rate[s], batch)
             calls += 1
             for e in range(size):
                 out[e] += problem.push[s, e] * force

@@ -19,6 +19,7 @@ from solvers.exponential.contact.many_stops import (
     uses_blocks,
 )
 from solvers.exponential.contact.nodes import S
+from solvers.exponential.flight import quintic
 
 DIFFERENCE, BATCH, LANDED, WITHIN, START = range(STAGES + 1, STAGES + 6)
 """Rows of `Scratch.stages` behind the stages of a landing's Runge–Kutta step and the rate at its end: the embedded
@@ -29,6 +30,7 @@ DELTAS, RATES, FORCES, KNOWN = range(
 )  # rows of `Scratch.local_motion`: m, m/s, N at points around a node; the values they are interpolated from
 
 
+_KINK = 1e-2  # of a smooth signal the jumps are a tenth of this or less, see `solvers.problem.common_grid`
 _SEEN = 4.0  # times the last two coefficients of a signal: a difference up to this is what they stand for
 
 
@@ -126,31 +128,75 @@ def unresolved_signal(problem, tables, scratch, node_set, j, t, h):
     """The same of a sampled signal on a step from t on; an entry step integrates it at half the order.
 
     What lies between the nodes, such as a short pulse, does not show in the coefficients: there the table is compared.
+    Where the table has kinks the coefficients fall too slowly to tell what they leave out: it is integrated.
     """
     values, c = scratch.force[problem.gap.size + problem.table_load[j]], scratch.trial
-    largest = largest_size(values)
+    largest, dt, start = largest_size(values), problem.table_dt[j], problem.table_start[j]
     combine(tables.tail[node_set], values, S, None, c)
     found = unresolved_part(c, largest, S // 2 if node_set == 0 else 1)
-    apart, mean = _between_nodes(problem, c, tables.time_exponent[node_set], j, t, h)
-    hidden = apart > _SEEN * max(abs(c[2]), abs(c[3])) + 1e-12 * largest
-    return max(found, mean) if hidden else found
+    first, beyond = start + int(t / dt) + 1, min(start + int((t + h) / dt) + 1, problem.table_start[j + 1])
+    if beyond - first > S:
+        apart, mean = _between_nodes(problem, c, tables.time_exponent[node_set], j, first, beyond, t, h)
+        if apart > _SEEN * max(abs(c[2]), abs(c[3])) + 1e-12 * largest:
+            found = max(found, mean)
+    if _has_kinks(problem, j, first, beyond, largest):
+        found = max(found, _missed_impulse(problem, tables, values, node_set, j, t, h))
+    return found
 
 
 @inner
-def _between_nodes(problem, coefficients, time_exponent, j, t, h):
-    """Largest and mean difference of a signal's table from its polynomial; 0 for no more nodes than the step has."""
-    dt, start = problem.table_dt[j], problem.table_start[j]
-    first, beyond = int(t / dt) + 1, min(int((t + h) / dt) + 1, problem.table_start[j + 1] - start)
-    largest, total, power = 0.0, 0.0, 1.0 / time_exponent
-    if beyond - first <= S:
-        return largest, total
+def _between_nodes(problem, coefficients, time_exponent, j, first, beyond, t, h):
+    """Largest and mean difference of a signal from its polynomial at the nodes of its table."""
+    dt, start, largest, total, power = problem.table_dt[j], problem.table_start[j], 0.0, 0.0, 1.0 / time_exponent
     for node in range(first, beyond):
-        place = (node * dt - t) / h
+        place = ((node - start) * dt - t) / h
         if power < 1.0:
             place = place**power
-        apart = abs(problem.table[start + node, 0] - _legendre(coefficients, 2.0 * place - 1.0))
+        apart = abs(problem.table[node, 0] - _legendre(coefficients, 2.0 * place - 1.0))
         largest, total = max(largest, apart), total + apart
     return largest, total / (beyond - first)
+
+
+@inner
+def _has_kinks(problem, j, first, beyond, largest):
+    """Whether the third derivative jumps by much at a node: by more than `_KINK` of the signal over dt³."""
+    dt, table, most = problem.table_dt[j], problem.table, 0.0
+    last = problem.table_start[j + 1] - 1
+    for node in range(max(first, problem.table_start[j] + 1), min(beyond, last)):
+        a, b, c = table[node - 1], table[node], table[node + 1]
+        jump = (
+            60.0 * (a[0] - 2.0 * b[0] + c[0]) + 24.0 * dt * (a[1] - c[1]) + 3.0 * dt * dt * (a[2] - 6.0 * b[2] + c[2])
+        )
+        most = max(most, abs(jump))
+    return most > _KINK * largest
+
+
+@inner
+def _missed_impulse(problem, tables, values, node_set, j, t, h):
+    """Mean of the signal less its polynomial on the step, and the same of their products with 2 τ/h - 1, in size."""
+    dt, impulse, moment = problem.table_dt[j], 0.0, 0.0
+    last = min(int((t + h) / dt), problem.table_start[j + 1] - problem.table_start[j] - 2)
+    for cell in range(min(int(t / dt), last), last + 1):
+        begin, end = max(t / dt - cell, 0.0), (t + h) / dt - cell if cell == last else 1.0
+        a = _moments(problem, j, cell, begin)
+        b = _moments(problem, j, cell, end)
+        impulse += b[0] - a[0]
+        moment += (b[1] - a[1]) + (cell - (t + 0.5 * h) / dt) * (b[0] - a[0])
+    impulse, moment = impulse * dt / h, moment * 2.0 * dt * dt / (h * h)
+    for i in range(S):
+        weight = tables.plain[node_set, i]
+        impulse -= weight * values[i]
+        moment -= weight * (2.0 * tables.times[node_set, i] - 1.0) * values[i]
+    return abs(impulse) + (abs(moment) if node_set == 0 else 0.0)
+
+
+@inlined
+def _moments(problem, j, cell, x):
+    """∫ s and ∫ s u from the start of a cell to u = x, in units of its length."""
+    s0, s1, s2, c3, c4, c5 = quintic(problem, j, cell)
+    plain = s0 + x * (s1 / 2.0 + x * (s2 / 3.0 + x * (c3 / 4.0 + x * (c4 / 5.0 + x * c5 / 6.0))))
+    first = s0 / 2.0 + x * (s1 / 3.0 + x * (s2 / 4.0 + x * (c3 / 5.0 + x * (c4 / 6.0 + x * c5 / 7.0))))
+    return x * plain, x * x * first
 
 
 @inlined

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from solvers.compiled.kernels import contact_forces, copy, dot, indentation, inlined, inner, merged
+from solvers.compiled.kernels import contact_forces, copy, dot, indentation, inlined, inner, merged, off_knots
 from solvers.compiled.simd import largest8, load8
 from solvers.compiled.state import PEAK_DELTA, PEAK_FORCE, is_open, surface_tolerance
 from solvers.compiled.sums import combine
@@ -131,6 +131,8 @@ def step_peaks(problem, tables, state, scratch, node_set, h, s, limit):
         if seen != place:
             motion_around(problem, tables, state, scratch, node_set, h, s, place)
             local_motion, seen = scratch.local_motion, place
+            for i in range(S):
+                local_motion[DELTAS, i] = off_knots(problem, s, state.segment[s], local_motion[DELTAS, i])
             contact_forces(
                 problem,
                 s,
@@ -154,7 +156,7 @@ def state_peaks(problem, state, scratch, x):
     batch = scratch.trial
     for s in range(problem.gap.size):
         if state.segment[s] > 0 and not is_open(problem, s):
-            batch[0] = indentation(problem, s, x)
+            batch[0] = off_knots(problem, s, state.segment[s], indentation(problem, s, x))
             batch[1] = dot(problem.read_rate[s], x, 2 * problem.k.size)
             contact_forces(problem, s, batch[0:1], batch[1:2], state.entry_rate[s], batch[2:3])
             if problem.knots[s, 0] < 0.0 and problem.opening[s] < 0:  # of both signs

@@ -152,7 +152,7 @@ def _attempt(problem, tables, state, scratch, node_set, level, rtol):
         return np.inf, np.inf, -1
     if bent >= 0:
         return 1.0 if bottom else np.inf, first, bent
-    error = step_error(problem, tables, state, scratch, node_set, level, scratch.control[NEW] > 0, rtol)
+    error = step_error(problem, tables, state, scratch, node_set, level, rtol)
     return min(error, 1.0) if bottom else error, first, bent
 
 
