@@ -27,6 +27,7 @@ __version__ = "0.1.0"
 _OFFERED = {
     "beams": "Section Taper Beam ModalDamping Rayleigh",
     "scene": "Clamped Dashpot Element Guided LumpedMass Pinned PointForce PointMoment Scene Spring Stop Impactor",
+    "structures": "Frame Member",
     "excitation": "Harmonic Multisine BandNoise RollOff Record Pulse SineSweep Step",
     "model": "Model Attractor Orbit Branch Run load",
     "response": "response_spectrum",
@@ -36,10 +37,10 @@ _HOME = {name: folder for folder, names in _OFFERED.items() for name in names.sp
 _MODULES = ["plot", "study"]
 
 __all__ = [
-    "Attractor", "BandNoise", "Beam", "Branch", "Clamped", "Dashpot", "Element", "Guided", "Harmonic", "Impactor",
-    "LumpedMass", "ModalDamping", "Model", "Multisine", "Orbit", "Pinned", "PointForce", "PointMoment", "Pulse",
-    "Rayleigh", "Record", "RollOff", "Run", "Scene", "Section", "SineSweep", "Spring", "Step", "Stop", "Taper",
-    "load", "moments", "pdf", "plot", "psd", "response_spectrum", "study",
+    "Attractor", "BandNoise", "Beam", "Branch", "Clamped", "Dashpot", "Element", "Frame", "Guided", "Harmonic",
+    "Impactor", "LumpedMass", "Member", "ModalDamping", "Model", "Multisine", "Orbit", "Pinned", "PointForce",
+    "PointMoment", "Pulse", "Rayleigh", "Record", "RollOff", "Run", "Scene", "Section", "SineSweep", "Spring", "Step",
+    "Stop", "Taper", "load", "moments", "pdf", "plot", "psd", "response_spectrum", "study",
 ]  # fmt: skip
 
 if TYPE_CHECKING:
@@ -63,6 +64,7 @@ if TYPE_CHECKING:
         Stop,
     )
     from fembeam.statistics import moments, pdf, psd
+    from fembeam.structures import Frame, Member
 
 
 def _check_neighbours() -> None:
