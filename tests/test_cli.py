@@ -18,7 +18,6 @@ import pytest
 import fembeam as fb
 import reduction
 from fembeam.cli import main
-from fembeam.cli.unit_checks import doubts
 from fembeam.results import html_page as html
 from fembeam.scene import Source
 from fembeam.scene_file import built, kinds, read, template
@@ -399,39 +398,6 @@ def test_every_example_in_the_new_scene_is_right(tmp_path, number):
     path = tmp_path / "scene.toml"
     path.write_text(text, encoding="utf-8")
     read(path).scene.reduce(modes=3)
-
-
-@pytest.mark.parametrize(
-    ("override", "message"),
-    [
-        ("beam.section.E=1.9e5", "looks like N/mm²"),
-        ("beam.section.rho=8", "looks like g/cm³"),
-        ("beam.section.rho=8e4", "heavier than osmium"),
-        ("beam.section.E=1.9e13", "stiffer than diamond"),
-        ("beam.section.A=58.3", "is one of them in mm²"),
-        ("damping.zeta=[2.0]", "looks like per cent"),
-        ("masses[0].mass=25.4e3", "is it in grams"),
-        ("stops[0].gap=10.0", "is it in mm"),
-        ("base.std=25", "is it in mm"),
-        ("base.band=[0, 1e5]", "loads reach 100000 rad/s"),
-        ("base={kind = 'harmonic', amplitude = 1e-3, omega = 17.37}", "looks like Hz"),
-        ("simulate.dt=0.1", "spectra are folded"),
-        ("simulate.discard=0.0", "keeps the transient"),
-    ],
-)
-def test_doubtful_numbers(override, message):
-    def said(*overrides):
-        file = read(EXAMPLE, overrides)
-        return doubts(file, file.scene.reduce(**file.reduce))
-
-    assert not any(message in one for one in said())
-    assert any(message in one for one in said(override))
-
-
-def test_a_transient_is_kept_in_whole():
-    sweep = "base={kind = 'sine_sweep', amplitude = 1e-3, omega0 = 60.0, omega1 = 300.0, duration = 600.0}"
-    file = read(EXAMPLE, (sweep, "simulate.discard=0.0"))
-    assert not any("keeps the transient" in one for one in doubts(file, file.scene.reduce(**file.reduce)))
 
 
 def test_a_stop_that_is_too_soft(capsys):

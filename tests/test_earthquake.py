@@ -122,7 +122,7 @@ def test_what_is_wrong_is_said_with_the_file(tmp_path, text, options, message):
 
 def test_check_follows_a_record_to_its_end(tmp_path, recwarn):
     """Shaken late, and not for twenty periods of the beam: the trial is as long as the record."""
-    from fembeam.cli.check import check
+    from fembeam.inspection import check
 
     (tmp_path / "quake.AT2").write_text(peer())
     beam = '[beam]\nlength = 2.0\nsection = { shape = "circle", E = 2e11, rho = 7800, diameter = 0.01 }\n'
@@ -133,5 +133,5 @@ def test_check_follows_a_record_to_its_end(tmp_path, recwarn):
     file = read(tmp_path / "scene.toml")
     model = file.scene.reduce(2)
     assert 20 * 2 * np.pi / model.omega[0] > T[-1]
-    assert check(file, model).touched[0].contacts > 0
+    assert check(model).touched[0].contacts > 0
     assert not [str(w.message) for w in recwarn if "a trial" in str(w.message)]

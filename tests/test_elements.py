@@ -498,7 +498,7 @@ residual = true
 
 
 def test_scene_files(tmp_path):
-    from fembeam.cli.check import check
+    from fembeam.inspection import check
 
     path = tmp_path / "hinge.toml"
     path.write_text(FILE)
@@ -506,7 +506,7 @@ def test_scene_files(tmp_path):
     assert file.scene.elements[0] == fb.Element(0.3, Polynomial([1.0, 0.0, 1e3]), to=0.8)
     assert file.scene.stops[0].of == "rotation"
     model = file.scene.reduce(**file.reduce)
-    said = str(check(file, model))
+    said = str(check(model))
     assert re.search(r"stop 0: \d+ contacts in a trial; at [\d.]+ rad/s .* peak force [\d.]+ N m", said)
     assert "elements: with their stiffness at u = 0 the lowest frequencies are" in said
     for change, message in (

@@ -40,7 +40,11 @@ def test_arrows(path):
     assert foreign <= MAY[package]
 
 
-DOORS = {("fembeam.scene", "fembeam.model"), ("fembeam.model", "fembeam.scene_file")}  # methods that open what is above
+DOORS = {  # methods that open what is above
+    ("fembeam.scene", "fembeam.model"),
+    ("fembeam.scene", "fembeam.inspection"),
+    ("fembeam.model", "fembeam.scene_file"),
+}
 
 
 def room_of(module):

@@ -8,8 +8,7 @@ from problems import ROD_FILE
 
 import fembeam as fb
 from contacts import Hertz
-from fembeam.cli.check import highest_driven
-from fembeam.cli.unit_checks import doubts
+from fembeam.inspection.units import doubts, highest_driven
 from fembeam.model import load_period
 from fembeam.scene import (
     FEATURES,
@@ -177,6 +176,6 @@ foot = { kind = "harmonic", amplitude = 2.0, omega = 1e5 }
 """
     )
     file = read(path)
-    said = doubts(file, file.scene.reduce(modes=2))
+    said = doubts(file.scene.reduce(modes=2))
     assert any("springs[0].foot moves by 2 m" in one for one in said)
     assert any("loads reach 100000 rad/s" in one for one in said)

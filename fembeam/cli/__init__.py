@@ -1,9 +1,8 @@
 """The command line: `fembeam new`, `check`, `modes`, `run`, `compare`, `export`, `schema`, `completion`.
 
 `commands` has the parser and a short function per command; `run` computes a scene file and writes its results folder;
-`check` tries a scene file, `unit_checks` warns of numbers that look like a wrong unit; `messages` prints errors and
-warnings in one line. Imports: `scene_file`, `results` and what they import, inside functions, so that help is quick
-and Ctrl-C is handled from the start. Begin with `commands`.
+`messages` prints errors and warnings in one line. Imports: `scene_file`, `results`, `inspection` and what they import,
+inside functions, so that help is quick and Ctrl-C is handled from the start. Begin with `commands`.
 """
 
 from fembeam.cli.commands import main

@@ -169,14 +169,18 @@ def _completion(arguments: argparse.Namespace) -> int:
 
 
 def _check(arguments: argparse.Namespace) -> int:
-    """The command `check`."""
-    from fembeam.cli.check import check
+    """The command `check`: what `Scene.check` finds, its sentences on stderr."""
+    from dataclasses import replace
+
+    from fembeam.inspection import check
 
     file = _read(arguments)
-    found = check(file, file.model(**_counted(arguments.modes)))
-    for doubt in found.warnings:
+    study: Any = file.studies.get("simulate")
+    of_run = {} if study is None else {"duration": study.duration, "dt": study.dt, "discard": study.discard}
+    found = check(file.model(**_counted(arguments.modes)), **of_run)
+    for doubt in (one for one in found if one not in warned):  # the scene itself warned when it was made
         show_warning(doubt)
-    _print(found.plain() | {"warnings": warned} if arguments.json else found, arguments.json)
+    _print(found.plain() | {"warnings": warned} if arguments.json else replace(found, warnings=[]), arguments.json)
     return 0
 
 

@@ -27,9 +27,10 @@ from fembeam.scene.parts import (
     Support,
 )
 from fembeam.scene.rigid_motions import drifting, rigid_body_modes
-from fembeam.support import require, require_finite
+from fembeam.support import require, require_finite, require_non_negative, require_positive
 
 if TYPE_CHECKING:
+    from fembeam.inspection import Check
     from fembeam.model import Model
 
 
@@ -113,7 +114,7 @@ class Scene:
         self._check_base()
         self._check_conflicts()
         self._check_bodies()
-        for said in [*drifting(self), *([doubt] if (doubt := getattr(self.base, "doubt", "")) else [])]:
+        for said in self.doubts:
             warnings.warn(said, UserWarning, stacklevel=3)
 
     def matrices(self, elements: int | None = None, modes: int | None = None, probes: Sequence[float] = ()) -> Matrices:
@@ -178,6 +179,53 @@ class Scene:
         from fembeam.model.reduce import reduced
 
         return reduced(self, modes, elements, omega_max, mass_share, residual, interface)
+
+    def check(
+        self, duration: float | None = None, dt: float | None = None, discard: float = 0.0, **reduction: Any
+    ) -> Check:
+        """Look at the scene before it is run: modes, contacts to expect, steps and modes to take, what looks wrong.
+
+        It costs about what a run of twenty periods of the lowest mode does. `fembeam check` prints the same.
+
+        Parameters
+        ----------
+        duration, dt, discard : s, of the run that is meant: its length, its output step, the transient that statistics
+            leave out; None: not known.
+        reduction : arguments of `reduce`, such as ``modes=3``.
+
+        Returns
+        -------
+        Check : ``print(check)`` shows all of it; iterate over it for what looks wrong, in sentences: numbers in other
+            units, per cent for a damping ratio, a coarse mesh, a run too short for the lowest mode, a step too long for
+            the highest one, contacts that excite modes left out.
+
+        Raises
+        ------
+        ValueError : arguments that `reduce` refuses, a duration, dt or discard that is not a positive number.
+
+        Examples
+        --------
+        >>> from fembeam import Clamped, Section
+        >>> scene = Scene(Beam(0.5, Section.circle(2.1e11, 7800.0, 0.01)), [Clamped(0.0)])
+        >>> list(scene.check(duration=0.01, modes=1))
+        ['duration = 0.01 s is 0.29 periods of the lowest mode, 0.0344 s each: is it long enough?']
+        """
+        from fembeam.inspection import check
+
+        for name, value in (("duration", duration), ("dt", dt)):
+            if value is not None:
+                require_positive(name, value, "Scene.check", "give s")
+        require_non_negative("discard", discard, "Scene.check", "give s")
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always", UserWarning)
+            model = self.reduce(**reduction)
+        return check(model, duration, dt, discard, [str(one.message) for one in said])
+
+    @property
+    def doubts(self) -> list[str]:
+        """What was warned of when the scene was made, as sentences."""
+        of_base = getattr(self.base, "doubt", "")
+        return [*drifting(self), *([of_base] if of_base else [])]
 
     @property
     def acting(self) -> list[Stop | Element]:

@@ -3,25 +3,27 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fembeam.scene import persistent_drive, signals_of
+from fembeam.scene import signals_of
 
 if TYPE_CHECKING:
     from fembeam.beams import Beam
     from fembeam.model import Model
     from fembeam.scene import Element, Scene, Stop
-    from fembeam.scene_file import SceneFile
 
 STEEP = 0.35  # rad; the slope of a beam
 
 
-def doubts(file: SceneFile, model: Model) -> list[str]:
-    """Warnings about a scene's numbers, as sentences."""
-    scene = file.scene
-    return [*of_beam(scene.beam), *of_features(scene), *of_loads(scene, model), *of_study(file, model)]
+def doubts(model: Model) -> list[str]:
+    """Warnings about the numbers of a model's scene, as sentences; of its bodies, too."""
+    scene = model.scene
+    found = [*of_beam(scene.beam), *of_features(scene)]
+    for i, body in enumerate(scene.bodies):
+        found += [f"bodies[{i}]: {said}" for said in (*of_beam(body.beam), *of_features(body))]
+    return [*found, *of_loads(scene, model)]
 
 
 def of_beam(beam: Beam) -> list[str]:
@@ -84,8 +86,6 @@ def _of_gap(part: Stop | Element, length: float) -> str:
 
 def of_loads(scene: Scene, model: Model) -> list[str]:
     """Amplitudes and frequencies of what drives the scene."""
-    from fembeam.cli.check import highest_driven
-
     found = []
     for path, signal in signals_of(scene).items():
         size = getattr(signal, "std", getattr(signal, "amplitude", 0.0))
@@ -103,20 +103,16 @@ def of_loads(scene: Scene, model: Model) -> list[str]:
     return found
 
 
-def of_study(file: SceneFile, model: Model) -> list[str]:
-    """Sampling and length of [simulate]."""
-    study: Any = file.studies.get("simulate")
-    if study is None:
-        return []
-    found = []
-    fastest = float(model.omega.max())
-    if study.dt * fastest > math.pi:
-        found.append(f"dt = {study.dt:g} s samples the highest mode kept less than twice a period, spectra are folded: "
-                     f"take {math.pi / (2 * fastest):.1g} s or less")  # fmt: skip
-    decay = model.zeta * model.omega
-    slowest = float(decay[decay > 0].min()) if np.any(decay > 0) else math.inf
-    if study.discard < 3 / slowest < 0.5 * study.duration and persistent_drive(file.scene):
-        found.append(
-            f"discard = {study.discard:g} s keeps the transient in statistics: it lasts about {3 / slowest:.2g} s"
-        )
-    return found
+def highest_driven(scene: Scene) -> float:
+    """Highest frequency in the loads, rad/s; 0 without loads, inf when they have none."""
+    tops = []
+    for signal in signals_of(scene).values():
+        if getattr(signal, "band", None) is not None:
+            tops.append(float(np.max(signal.band)))
+        elif hasattr(signal, "omega1"):
+            tops.append(max(signal.omega0, signal.omega1))
+        elif hasattr(signal, "omega"):
+            tops.append(float(np.max(signal.omega)))
+        else:
+            tops.append(math.inf)
+    return max(tops, default=0.0)

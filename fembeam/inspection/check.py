@@ -1,0 +1,170 @@
+"""What a scene is before it is run: modes, contacts to expect, steps and modes to take, and what looks wrong.
+
+A contact of length T excites what lies below 3π/T, where the spectrum of a half-sine pulse first vanishes: modes above
+it are hardly excited.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import solvers
+from fembeam.inspection import sampling, units
+from fembeam.inspection.trial import Touched, expected, fastest, of_contacts
+from fembeam.model.mode_table import mode_part, mode_rows
+from fembeam.scene import unit_of
+from fembeam.study.segments import correlation_time
+from fembeam.support import Part, Printed
+
+if TYPE_CHECKING:
+    from fembeam.model import Model
+    from fembeam.scene import Scene
+
+MOST_MODES = 40  # considered when counting those a contact excites
+
+
+@dataclass(frozen=True)
+class Check(Printed):
+    """What was found: print it, or go through its sentences on what looks wrong.
+
+    Attributes
+    ----------
+    model : the reduced model that was looked at. touched : what to expect of the stops.
+    steps, modes : suggested output steps and largest stable steps in s, numbers of modes, by what they are for.
+    correlation_time : 1/min(ζω) in s, infinite without damping.
+    warnings : the sentences; none where nothing looks wrong.
+
+    Examples
+    --------
+    >>> import fembeam as fb
+    >>> steel = fb.Section.circle(E=2.1e5, rho=7800.0, diameter=0.01)
+    >>> found = fb.Scene(fb.Beam(0.5, steel), [fb.Clamped(0.0)], damping=fb.ModalDamping(2.0)).check()
+    >>> for sentence in found:
+    ...     print(sentence)
+    E = 210000 N/m² looks like N/mm²: steel has 2.1e11 N/m²
+    zeta = 2 looks like per cent: 1 is critical damping
+    """
+
+    model: Model
+    touched: list[Touched]
+    steps: dict[str, float]
+    modes: dict[str, int]
+    correlation_time: float
+    warnings: list[str]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.warnings)
+
+    def __len__(self) -> int:
+        return len(self.warnings)
+
+    def __bool__(self) -> bool:
+        return True  # also where nothing looks wrong
+
+    def __repr__(self) -> str:
+        return f"<check of {self.model!r}: {solvers.problem.counted(len(self), 'warning')}>"
+
+    def _parts(self) -> list[Part]:
+        found: list[Part] = [mode_part(self.model), ""]
+        found.append(f"mesh: {self.model.matrices.accuracy}")
+        found.append(f"correlation time of the structure 1/min(ζω): {self.correlation_time:.3g} s")
+        found += [self._contacts_with(one) for one in self.touched]
+        if self.stiffened:
+            lowest = ", ".join(f"{omega:.6g}" for omega in self.stiffened[:3])
+            found.append(f"elements: with their stiffness at u = 0 the lowest frequencies are {lowest} rad/s")
+        found += [f"suggested {what}: {count}" for what, count in self.modes.items()]
+        found += [f"suggested {what}: {step:.2g} s" for what, step in self.steps.items()]
+        return [*found, *(f"warning: {sentence}" for sentence in self)]
+
+    def _contacts_with(self, one: Touched) -> str:
+        """What to expect of a stop, in a sentence."""
+        seen = f"{one.contacts} contacts in a trial" if one.contacts else "no contact in a trial"
+        speed, force = (unit_of(of, [self.model.contact_rows[one.stop].rotation]) for of in ("speed", "force"))
+        return (
+            f"stop {one.stop}: {seen}; at {one.speed:.3g} {speed} a contact lasts {one.time:.3g} s "
+            f"({one.periods:.2g} periods of the highest mode kept), peak force {one.peak_force:.3g} {force}"
+        )
+
+    @property
+    def stiffened(self) -> list[float]:
+        """Frequencies with the stiffness of the elements, rad/s; empty without elements."""
+        if not any(one.always for one in self.model.contact_rows):
+            return []
+        squares = np.linalg.eigvalsh(self.model.system.K + self.model.linear_elements[0])
+        return np.sqrt(np.maximum(squares, 0.0)).tolist()  # type: ignore[no-any-return]
+
+    def plain(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "modes": mode_rows(self.model),
+            "correlation_time": self.correlation_time,
+            "stops": [asdict(one) for one in self.touched],
+            "suggested_modes": self.modes,
+            "suggested_steps": self.steps,
+            "warnings": self.warnings,
+            **({"omega_with_elements": self.stiffened} if self.stiffened else {}),
+        }
+
+
+def check(
+    model: Model,
+    duration: float | None = None,
+    dt: float | None = None,
+    discard: float = 0.0,
+    said: Sequence[str] = (),
+) -> Check:
+    """Look at a scene and its model; `Scene.check` explains it. `said`: what was warned of when the model was made."""
+    touched, failed = expected(model)
+    shortest = min((one.time for one in touched), default=math.inf)
+    steps = {}
+    if np.any(model.omega > 0):  # rigid-body modes alone have no period
+        steps["output step dt, 20 in the shortest period kept"] = 2 * math.pi / (20 * fastest(model))
+    if shortest < math.inf:
+        steps["output step dt to see the force, 20 in a contact"] = shortest / 20
+    found = [*model.scene.doubts, *said, *units.doubts(model), *sampling.of_run(model, duration, dt, discard)]
+    found += [*failed, *of_contacts(model, touched)]
+    modes = _suggested_modes(model.scene, shortest)
+    return Check(model, touched, steps | _limits(model), modes, _correlation_time(model), found)
+
+
+def _suggested_modes(scene: Scene, shortest: float) -> dict[str, int]:
+    """Numbers of modes for what drives the beam and for its contacts."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        try:
+            omega = scene.reduce(modes=MOST_MODES).omega
+        except (ValueError, RuntimeError):
+            return {}
+    wanted = {}
+    top = units.highest_driven(scene)
+    if 0 < top < math.inf:
+        wanted["modes for the motion, up to 1.5 times the highest frequency that drives it"] = 1.5 * top
+    if shortest < math.inf:
+        wanted["modes for contact forces, up to 3π over the contact time"] = 3 * math.pi / shortest
+    counts = {name: max(1, int(np.count_nonzero(omega <= w))) for name, w in wanted.items()}
+    return {name if n < MOST_MODES else f"{name} (at least)": n for name, n in counts.items()}
+
+
+def _limits(model: Model) -> dict[str, float]:
+    """Largest stable steps of methods with constant steps."""
+    found: dict[str, float] = {}
+    for method in (solvers.RK4(1e-6), solvers.HenonRK2(1e-6, 1e-6)):
+        limit = method.stable_dt(model.system)
+        name = type(method).__name__
+        steps = {"flight": limit.flight, **({"contact": limit.contact} if model.scene.stops else {})}
+        found |= {f"step of {name} in {where}, at most": step for where, step in steps.items() if 0 < step < math.inf}
+    return found
+
+
+def _correlation_time(model: Model) -> float:
+    """Time constant of the slowest decay, s; infinite without damping."""
+    try:
+        return correlation_time(model)
+    except ValueError:
+        return math.inf

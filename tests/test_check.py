@@ -1,0 +1,154 @@
+"""What a scene is told before it is run: `Scene.check`, and `fembeam check`, which prints it."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fembeam as fb
+from contacts import Hertz
+from fembeam.cli import main
+from fembeam.inspection import check
+from fembeam.inspection.sampling import of_run
+from fembeam.inspection.units import doubts
+from fembeam.scene_file import read
+
+EXAMPLE = Path(__file__).parent.parent / "examples" / "beam_stop.toml"
+STEEL = fb.Section.rectangle(E=2.1e11, rho=7800.0, width=0.02, height=0.002)
+
+
+def cantilever(**parts):
+    return fb.Scene(fb.Beam(0.26, STEEL), [fb.Clamped(0.0)], **{"damping": fb.ModalDamping(0.02), **parts})
+
+
+def doubts_of_example(*overrides):
+    file = read(EXAMPLE, overrides)
+    model, study = file.model(), file.studies["simulate"]
+    return [*doubts(model), *of_run(model, study.duration, study.dt, study.discard)]
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("beam.section.E=1.9e5", "looks like N/mm²"),
+        ("beam.section.rho=8", "looks like g/cm³"),
+        ("beam.section.rho=8e4", "heavier than osmium"),
+        ("beam.section.E=1.9e13", "stiffer than diamond"),
+        ("beam.section.A=58.3", "is one of them in mm²"),
+        ("damping.zeta=[2.0]", "looks like per cent"),
+        ("masses[0].mass=25.4e3", "is it in grams"),
+        ("stops[0].gap=10.0", "is it in mm"),
+        ("base.std=25", "is it in mm"),
+        ("base.band=[0, 1e5]", "loads reach 100000 rad/s"),
+        ("base={kind = 'harmonic', amplitude = 1e-3, omega = 17.37}", "looks like Hz"),
+        ("simulate.dt=0.1", "spectra are folded"),
+        ("simulate.discard=0.0", "keeps the transient"),
+    ],
+)
+def test_doubtful_numbers(override, message):
+    assert not any(message in one for one in doubts_of_example())
+    assert any(message in one for one in doubts_of_example(override))
+
+
+def test_a_transient_is_kept_in_whole():
+    sweep = "base={kind = 'sine_sweep', amplitude = 1e-3, omega0 = 60.0, omega1 = 300.0, duration = 600.0}"
+    assert not any("keeps the transient" in one for one in doubts_of_example(sweep, "simulate.discard=0.0"))
+
+
+def test_a_good_scene_has_no_sentences():
+    found = cantilever(base=fb.Harmonic(1e-3, 120.0)).check(duration=20.0, dt=1e-3, discard=5.0)
+    assert list(found) == []
+    assert len(found) == 0
+    assert found  # it is there all the same
+    assert "warning" not in str(found)
+
+
+def test_what_is_printed_are_tables_and_sentences():
+    found = cantilever(stops=[fb.Stop(0.26, Hertz(1e8), gap=0.5)], base=fb.Harmonic(1e-3, 120.0)).check(modes=3)
+    (gap, *rest) = found
+    assert gap == "stops[0]: a gap of 0.5 m on a beam of 0.26 m: is it in mm?"
+    text = str(found)
+    assert [line.removeprefix("warning: ") for line in text.splitlines() if line.startswith("warning: ")] == [
+        gap,
+        *rest,
+    ]
+    for part in ("rad/s", "mesh: ", "suggested output step dt", "correlation time"):
+        assert part in text
+    assert f"<p>warning: {gap}</p>" in found._repr_html_()
+
+
+def test_the_command_prints_what_the_method_finds(capsys):
+    """The same tables on stdout, the same sentences as warnings on stderr, the same numbers as JSON."""
+    options = ["--set", "damping.zeta=[2.0]", "--set", "simulate.duration=0.05", "--set", "simulate.discard=0.0"]
+    options += ["--set", "reduce.elements=4", "--set", "reduce.modes=3"]
+    file = read(EXAMPLE, options[1::2])
+    study = file.studies["simulate"]
+    found = file.scene.check(study.duration, study.dt, study.discard, **file.reduce)
+    assert all(word in str(found) for word in ("coarse", "per cent", "is it long enough"))
+    assert main(["check", str(EXAMPLE), *options]) == 0
+    said = capsys.readouterr()
+    head, _, _ = str(found).partition("\nwarning: ")
+    assert said.out == f"{head}\n"
+    assert said.err == "".join(f"fembeam: warning: {one}\n" for one in found)
+    assert main(["check", str(EXAMPLE), "--json", *options]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["warnings"] == list(found)
+    assert printed["suggested_modes"] == found.modes
+
+
+def test_contacts_to_expect_scale_with_the_law():
+    """Hertz, strike of a mode: F ~ k^(2/5) v^(6/5) and T ~ k^(-2/5) v^(-1/5) of a mass alone; a beam stays near it."""
+    soft, stiff = (cantilever(stops=[fb.Stop(0.26, Hertz(k))]).check(modes=1).touched[0] for k in (1e7, 1e9))
+    assert soft.speed == stiff.speed == 0.1
+    assert stiff.peak_force / soft.peak_force == pytest.approx(100**0.4, rel=0.05)
+    assert soft.time / stiff.time == pytest.approx(100**0.4, rel=0.05)
+
+
+def test_doubts_of_other_bodies_say_which():
+    body = fb.Scene(fb.Beam(0.3, fb.Section.circle(E=2.1e5, rho=7800.0, diameter=0.01)), [fb.Clamped(0.0)])
+    said = list(cantilever(bodies=[body], stops=[fb.Stop(0.26, Hertz(1e8), gap=1e-3, on=(1, 0.3))]).check())
+    assert "bodies[0]: E = 210000 N/m² looks like N/mm²: steel has 2.1e11 N/m²" in said
+
+
+def test_what_scene_and_model_warn_of_is_among_the_sentences(recwarn):
+    """Said once: when they are made, and by the check."""
+    with pytest.warns(UserWarning, match="rigid-body") as warned:
+        scene = fb.Scene(fb.Beam(0.26, STEEL), forces=[fb.PointForce(0.1, fb.Harmonic(1.0, 50.0))])
+    recwarn.clear()
+    found = list(scene.check(modes=4, elements=3))
+    assert found[0] == str(warned[0].message)
+    assert "elements are too coarse for the highest mode" in found[1]
+    assert not recwarn.list
+    assert not any("coarse" in one for one in scene.check(modes=4))
+
+
+def test_a_run_is_as_long_as_it_says():
+    """Three periods of the lowest mode are enough, a rounding less is not; rigid motion has no period."""
+    model = cantilever().reduce(2)
+    period = 2 * np.pi / model.omega[0]
+    assert not list(of_run(model, 3.001 * period, None, 0.0))
+    assert ["periods of the lowest mode" in one for one in of_run(model, 2.999 * period, None, 0.0)] == [True]
+    free = fb.Scene(fb.Beam(0.26, STEEL)).reduce(2)
+    assert not list(of_run(free, 1e-6, None, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"duration": -1.0}, "duration must be finite and positive, got -1.0 in Scene.check"),
+        ({"dt": "1"}, "dt must be a number, got '1' in Scene.check"),
+        ({"discard": float("nan")}, "discard must be finite and not negative, got nan in Scene.check"),
+        ({"modes": 0}, "modes"),
+    ],
+)
+def test_what_is_refused(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        cantilever().check(**arguments)
+
+
+def test_checking_changes_nothing():
+    scene = cantilever(stops=[fb.Stop(0.26, Hertz(1e8))])
+    before = repr(scene)
+    assert str(scene.check()) == str(check(scene.reduce()))
+    assert repr(scene) == before
