@@ -35,6 +35,7 @@ def packed(read: Readout) -> tuple[dict[str, Any], Arrays]:
     parts, rows = read.reactions
     about = {
         "base": read.base,
+        "moved": read.moved,
         "beams": [_beam_as_words(one.beam) for one in read.section_forces],
         "parts": [{"kind": type(part).__name__, "body": body, **_numbers(part)} for part, body in parts],
     }
@@ -60,7 +61,12 @@ def unpacked(about: Mapping[str, Any], arrays: Mapping[str, Any], nodes: list[Ve
     kept: dict[str, Any] = {name: arrays[name] for name in PLAIN}
     held = [(part.z, body) for part, body in parts if type(part) in FEATURES["supports"]]
     kept["supports"] = np.array(held, dtype=float).reshape(-1, 2)
-    kept |= {"base": about["base"], "section_forces": forces, "reactions": (parts, arrays["reactions"])}
+    kept |= {
+        "base": about["base"],
+        "moved": tuple(about["moved"]),
+        "section_forces": forces,
+        "reactions": (parts, arrays["reactions"]),
+    }
     return Readout(None, arrays["t"], kept)
 
 
