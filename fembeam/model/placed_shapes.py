@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -40,6 +40,25 @@ class PlacedShapes:
     def __repr__(self) -> str:
         return f"<{self.values.shape[2]} shapes at {len(self.known)} places>"
 
+    @property
+    def words(self) -> dict[str, Any]:
+        """All but the values, for JSON."""
+        positions = [None if np.isnan(at).any() else at.tolist() for at in self.positions]
+        return {"components": self.components, "places": self.known, "usual": list(self.usual.items()),
+                "positions": positions, "lines": self.lines.tolist()}  # fmt: skip
+
+    @classmethod
+    def of_words(cls, words: Mapping[str, Any], values: Vector) -> PlacedShapes:
+        """The same of a file, with the values (p c, n)."""
+        known, components = tuple(_tuples(place) for place in words["places"]), tuple(words["components"])
+        positions = [3 * [np.nan] if at is None else at for at in words["positions"]]
+        lines = np.array(words["lines"], dtype=int).reshape(-1, 2)
+        if len(positions) != len(known) or (lines.size and not 0 <= lines.min() <= lines.max() < len(known)):
+            raise ValueError("positions and lines must be of its places")
+        usual = {str(name): _tuples(at) for name, at in words["usual"]}
+        whole = values.reshape(len(known), len(components), values.shape[1])
+        return cls(components, known, whole, usual, np.array(positions, dtype=float).reshape(-1, 3), lines)
+
     def motion(self, place: Any) -> Vector:
         """All components (c, n) of a place; ValueError for one that does not exist."""
         place = tuple(place) if isinstance(place, list) else place
@@ -65,6 +84,11 @@ class PlacedShapes:
         require_components(along, self.components, f"the place {told(place)}", "phi")
         part = np.array([along[COMPONENTS.index(component)] for component in self.components])
         return np.asarray(part @ self.motion(place))
+
+
+def _tuples(value: Any) -> Any:
+    """Lists of JSON as tuples."""
+    return tuple(_tuples(one) for one in value) if isinstance(value, list) else value
 
 
 def placed_shapes(body: BodyMatrices, vectors: Vector, loaded: Sequence[LocalCoordinate]) -> PlacedShapes:
