@@ -14,14 +14,14 @@ from numpy.typing import ArrayLike, NDArray
 
 import solvers
 from fembeam.model.histories import Histories
-from fembeam.model.shapes import Shapes
-from fembeam.scene import ON, Source
-from fembeam.support import Part, Printed
+from fembeam.scene import ON, Source, said
+from fembeam.support import Part, Printed, is_finite
 from solvers.problem import Losses, counted
 
 if TYPE_CHECKING:
     from fembeam.model.model import Model
     from fembeam.response import Reactions, Readout
+    from fembeam.scene.contact_rows import ContactRow
     from fembeam.scene_file import SceneFile
 
 Vector = NDArray[np.float64]
@@ -49,8 +49,8 @@ class Run(Histories, Printed):
     ledger: Callable[[], solvers.Energy] = field(repr=False)
     status: str
     cost: solvers.Cost
-    shapes: Shapes
-    stops: Vector  # (m, 3): z, push, gap of every contact
+    shapes: Any  # Shapes, of a body with places by name PlacedShapes
+    stops: Vector  # (m, 3): z (NaN of a place by name), push, gap of every contact
     directions: Vector  # (m, n): δ = -directions·q - gap
     impactor_masses: Vector  # (i,) of the impactors, whose coordinates √m x are the last ones
     scene: str
@@ -60,13 +60,14 @@ class Run(Histories, Printed):
     stored_forces: Vector | None = None  # (m, k) of a run read from a file
     stored_means: Vector | None = None  # (m, k) likewise, over each sample
     stored: Readout | None = None  # likewise
-    others: tuple[Shapes, ...] = ()  # of the further beams
+    others: tuple[Any, ...] = ()  # of the further beams
     source: Source | None = None  # of a run made from a scene file
     versions: dict[str, str] = field(default_factory=dict)  # that made a run read from a file
     began: tuple[Vector, ...] = ()  # what the laws had latched at the start, a row per contact, where it was given
     end: Vector | None = None  # (2n + l,) [q, q̇] and what the laws have latched, at the time reached
     on: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 3), dtype=int))  # (m, 3): body, of ON, number
     kinds: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 2), dtype=bool))  # of rotation, always acting
+    titles: tuple[str, ...] = ()  # (m,) what tables call each contact, "" for its number
     sampled: bool = True  # else t, q, q_dot are the final state alone, and no history
 
     def __repr__(self) -> str:
@@ -113,20 +114,22 @@ class Run(Histories, Printed):
     def of(cls, model: Model, solution: solvers.Solution, began: tuple[Vector, ...] = (), sampled: bool = True) -> Run:
         """The run of a model from its solution."""
         rows = model.contact_rows
-        stops = np.array([(one.z, one.push, one.gap) for one in rows], dtype=float).reshape(-1, 3)
+        along = [one.z if is_finite(one.z) and one.direction is None else np.nan for one in rows]
+        stops = np.array([(z, one.push, one.gap) for z, one in zip(along, rows, strict=True)], dtype=float)
         masses = np.array([impactor.mass for impactor in model.matrices.impactors], dtype=float)
         status = solution.status.value
         if not solution.status.good:
             status += f" (t = {solution.t[-1]:g} s)" if len(solution.t) else " (before the first sample)"
         return cls(
             *(solution.t, solution.q, solution.q_dot, solution.contacts, solution.ledger, status, solution.cost),
-            *(model.shapes, stops, model.directions, masses, repr(model.scene)),
+            *(model.shapes, stops.reshape(-1, 3), model.directions, masses, repr(model.scene)),
             *(solution.borders, solution.lost, model),
             others=model.others,
             began=began,
             end=solution.end,
             on=np.array([(one.body, ON.index(one.on[0]), one.on[1]) for one in rows], dtype=int).reshape(-1, 3),
             kinds=np.array([(one.rotation, one.always) for one in rows], dtype=bool).reshape(-1, 2),
+            titles=tuple(title(one, number) for number, one in enumerate(rows)),
             sampled=sampled,
         )
 
@@ -155,10 +158,11 @@ class Run(Histories, Printed):
 
         return reactions(self)
 
-    def floor_spectrum(self, z: float, omega: ArrayLike | None = None, zeta: ArrayLike = 0.05, **options: Any) -> Any:
+    def floor_spectrum(self, z: Any, omega: ArrayLike | None = None, zeta: ArrayLike = 0.05, **options: Any) -> Any:
         """`fembeam.response_spectrum` of the absolute acceleration at z: the load on equipment mounted there.
 
-        omega or ``periods=``, zeta : as there; ``body=`` another beam. Warns where samples do not resolve contacts.
+        omega or ``periods=``, zeta : as there; ``body=`` another beam; z (place, direction) of others.
+        Warns where samples do not resolve contacts.
         """
         from fembeam.response import floor_spectrum
 
@@ -239,3 +243,12 @@ class Run(Histories, Printed):
         from fembeam.model.run_file import save
 
         return save(self, Path(path))
+
+
+def title(row: ContactRow, number: int) -> str:
+    """What tables call a contact: its name, or where it acts by names; "" where its number will do."""
+    if row.name is not None:
+        return row.name
+    if row.direction is None:
+        return ""
+    return f"{'element' if row.always else 'stop'} {number} at {said((row.z, row.direction))}"

@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
+from fembeam.model.placed_shapes import PlacedShapes
 from fembeam.model.watched_places import places as usual_places
-from fembeam.scene import unit_of
+from fembeam.response import BodyReaction
+from fembeam.scene import said, unit_of
 from fembeam.support import require
 from solvers.problem import dataframe, optional
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from numpy.typing import ArrayLike
 
@@ -54,7 +56,9 @@ def write(run: Run, folder: Path, stride: int = 1, **chosen: Any) -> list[Path]:
     kept = histories(run, stride, **chosen)
     folder.mkdir(parents=True, exist_ok=True)
     units = ((name, _unit_of_column(run, name), column) for name, column in run.contacts.arrays().items())
-    log = {f"{name} [{unit}]" if unit else name: column for name, unit, column in units}
+    log: dict[str, Any] = {f"{name} [{unit}]" if unit else name: column for name, unit, column in units}
+    if any(run.titles):
+        log["name"] = [run.name(stop) for stop in run.contacts.stop]
     return [_write(folder / "histories.csv", kept), _write(folder / "contacts.csv", log)]
 
 
@@ -64,30 +68,52 @@ def _unit_of_column(run: Run, name: str) -> str:
 
 
 def histories(
-    run: Run, stride: int = 1, places: Sequence[float] | None = None, quantities: Sequence[str] | None = None
+    run: Run, stride: int = 1, places: Sequence[Any] | None = None, quantities: Sequence[str] | None = None
 ) -> dict[str, Vector]:
     """Columns of every `stride`-th sample, by name and unit: quantities at places, of stops, of supports."""
     require(stride >= 1, "stride must be at least 1", stride, "Run", "1 keeps every sample")
     require(not isinstance(quantities, str), "quantities must be a list", quantities, "Run", "put it in brackets")
-    require(places is None or np.ndim(places) == 1, "places must be a list", places, "Run", "put it in brackets")
+    named = isinstance(run.shapes, PlacedShapes)
+    listed = isinstance(places, (list, tuple)) if named else np.ndim(places) == 1  # type: ignore[arg-type]
+    require(places is None or listed, "places must be a list", places, "Run", "put it in brackets")
     asked = USUAL if quantities is None else quantities
     unknown = [name for name in asked if name not in UNITS]
     require(not unknown, f"quantities must be among {', '.join(UNITS)}", unknown, "Run", "choose from these")
-    where = usual_places(run.shapes) if places is None else {f"at {z:.12g} m": z for z in places}
+    where: dict[str, Any] = usual_places(run.shapes)
+    if places is not None and named:
+        where = {f"at {said(at)}": at for at in map(_pair, places)}
+    elif places is not None:
+        where = {f"at {z:.12g} m": z for z in places}
     columns = {"t [s]": run.t}
     for name, z in where.items():
-        columns |= {f"{what} {name} [{UNITS[what]}]": _at(run, what, z) for what in asked if what not in ELSEWHERE}
+        columns |= {f"{what} {name} [{_unit(what, z)}]": _at(run, what, z) for what in asked if what not in ELSEWHERE}
     for stop in range(len(run.stops)):
         of_stops = (what for what in asked if what in ("indentation", "force"))
-        columns |= {f"{what} {stop} [{run.unit(what, stop)}]": getattr(run, what)(stop) for what in of_stops}
-        columns |= {f"work {stop} [J]": run.losses.history[:, stop]} if "work" in asked else {}
+        called = run.titles[stop] if run.titles and run.titles[stop] else str(stop)
+        columns |= {f"{what} {called} [{run.unit(what, stop)}]": getattr(run, what)(stop) for what in of_stops}
+        columns |= {f"work {called} [J]": run.losses.history[:, stop]} if "work" in asked else {}
     for i, one in enumerate(run.reactions() if "reactions" in asked else ()):
         about = f"{i} ({one.name})"
+        if isinstance(one, BodyReaction):
+            have = run.shapes.components if one.body == 0 else run.others[one.body - 1].components
+            columns |= {f"reaction {c} {about} [{'N m' if c[0] == 'r' else 'N'}]": one[c] for c in have}
+            continue
         columns |= {f"reaction force {about} [N]": one.force, f"reaction moment {about} [N m]": one.moment}
     return {name: column[::stride] for name, column in columns.items()}
 
 
-def _at(run: Run, quantity: str, z: float) -> Vector:
+def _pair(at: Any) -> Any:
+    """A place and its direction, as a scene file lists them too."""
+    return tuple(tuple(one) if isinstance(one, list) else one for one in at) if isinstance(at, list) else at
+
+
+def _unit(quantity: str, at: Any) -> str:
+    """Unit of a quantity at a place: rad for m where the direction is a rotation."""
+    turning = isinstance(at, tuple) and isinstance(at[1], str) and at[1].lstrip("-").startswith("r")
+    return UNITS[quantity].replace("m", "rad", 1) if turning else UNITS[quantity]
+
+
+def _at(run: Run, quantity: str, z: Any) -> Vector:
     """A quantity (k,) at a place."""
     name = quantity.removeprefix("absolute ")
     return getattr(run, name)(z) if name == quantity else getattr(run, name)(z, absolute=True)
@@ -112,7 +138,17 @@ def to_dataframe(run: Run, stride: int = 1, **chosen: Any) -> Any:
 
 def to_xarray(run: Run, z: ArrayLike | None = None) -> Any:
     """See `Run.to_xarray`."""
-    place = run.shapes.nodes if z is None else np.atleast_1d(np.asarray(z, dtype=float))
+    named = isinstance(run.shapes, PlacedShapes)
+    given = list(usual_places(run.shapes).values()) if z is None and named else z
+    place: Any = (
+        [given]
+        if isinstance(given, tuple)
+        else list(given)  # type: ignore[arg-type]
+        if named
+        else run.shapes.nodes
+        if z is None
+        else np.atleast_1d(np.asarray(z, dtype=float))
+    )
     variables = {
         "displacement": (("t", "z"), run.displacement(place), {"units": "m"}),
         "velocity": (("t", "z"), run.velocity(place), {"units": "m/s"}),
@@ -121,7 +157,11 @@ def to_xarray(run: Run, z: ArrayLike | None = None) -> Any:
         "q": (("t", "coordinate"), run.q, {"units": "m √kg"}),
         "q_dot": (("t", "coordinate"), run.q_dot, {"units": "m √kg/s"}),
     }
-    axes = {"t": ("t", run.t, {"units": "s"}), "z": ("z", place, {"units": "m"}), "stop": np.arange(len(run.stops))}
+    axes = {
+        "t": ("t", run.t, {"units": "s"}),
+        "z": ("z", [said(at) for at in place], {}) if named else ("z", place, {"units": "m"}),
+        "stop": np.arange(len(run.stops)),
+    }
     return optional("xarray", "a data set").Dataset(variables, axes, {"status": run.status, "scene": run.scene})
 
 
@@ -135,9 +175,19 @@ def _write(target: Path, columns: Mapping[str, Vector]) -> Path:
     from fembeam.support import written_whole
 
     with written_whole(target) as file:
-        rows = np.column_stack([np.asarray(column, dtype=float) for column in columns.values()])
-        np.savetxt(file, rows, fmt=DIGITS, delimiter=",", header=",".join(columns), comments="", encoding="utf-8")
+        if all(np.asarray(column).dtype.kind != "U" for column in columns.values()):
+            rows = np.column_stack([np.asarray(column, dtype=float) for column in columns.values()])
+            np.savetxt(file, rows, fmt=DIGITS, delimiter=",", header=_line(columns), comments="", encoding="utf-8")
+        else:
+            each = zip(*columns.values(), strict=True)
+            lines = (_line([one if isinstance(one, str) else DIGITS % one for one in row]) for row in each)
+            file.write("".join(f"{line}\n" for line in (_line(columns), *lines)).encode())
     return target
+
+
+def _line(fields: Iterable[str]) -> str:
+    """Fields of a CSV line, in quotes where they hold a comma."""
+    return ",".join(f'"{one}"' if "," in one else one for one in fields)
 
 
 def parts(run: Run) -> list[Part]:

@@ -7,21 +7,23 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fembeam.scene.impactor import check_law
+from fembeam.scene.impactor import check_law, check_name
 from fembeam.scene.local_coordinate import LocalCoordinate, Of, local_coordinate
+from fembeam.scene.places import Place, Second, Shown, told
+from fembeam.structures import Direction, direction_of
 from fembeam.support import require, require_finite, require_place
 
 TRIED = np.array([1e-6, 1e-4, 1e-3])  # deformations, m or rad, of both signs, at which a law is tried out
 
 
-@dataclass(frozen=True)
-class Element:
+@dataclass(frozen=True, repr=False)
+class Element(Shown):
     """A local element that always acts: force F(d, ḋ) against its deformation d = u(z) - gap, or that of u_z.
 
     Parameters
@@ -32,6 +34,8 @@ class Element:
     to : its other end; None: the frame, a number: that place on the same beam, (body, z): on a beam of
         `Scene.bodies`, 1 the first. d is then the difference, u(z) - u_to - gap.
     gap : d = 0 at u = gap, m or rad: an offset, since the law acts on both sides.
+    direction : on other bodies than a `Beam`: along what d is measured, "x", "-y", "rz" or a vector.
+    name : what tables call it.
 
     Raises
     ------
@@ -47,19 +51,24 @@ class Element:
     True
     """
 
-    z: float
+    z: Place
     law: Any
     of: Of = "displacement"
-    to: float | tuple[int, float] | None = None
+    to: Second | None = None
     gap: float = 0.0
+    direction: Direction | None = None
+    name: str | None = None
     push = -1.0  # δ = d: direction -W
     always = True
 
     def __post_init__(self) -> None:
         require_place(self.z, self)
-        where = f"Element at z = {self.z}"
+        where = f"Element at {told(self.z)}"
         require_finite("gap", self.gap, where, "give the offset in m, or rad of a rotation")
-        local_coordinate(self.z, self.of, self.to, where, "to")
+        if isinstance(self.direction, list):
+            object.__setattr__(self, "direction", tuple(self.direction))
+        check_name(self.name, where)
+        _ = self.coordinate
         check_law(self.law, where)
         why = next(one_sided(self.law), "")
         require(not why, f"law must act at both signs of d: {why}", self.law, where,
@@ -68,7 +77,10 @@ class Element:
     @property
     def coordinate(self) -> LocalCoordinate:
         """What it acts on."""
-        return local_coordinate(self.z, self.of, self.to, f"Element at z = {self.z}", "to")
+        found = local_coordinate(self.z, self.of, self.to, f"Element at {told(self.z)}", "to", self.direction)
+        if self.direction is None:
+            return found
+        return replace(found, direction=direction_of(self.direction, f"Element at {told(self.z)}"))
 
 
 def one_sided(law: Any) -> Iterator[str]:

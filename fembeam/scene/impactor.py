@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from fembeam.scene.places import Place
 from fembeam.support import require, require_finite, require_non_negative, require_place, require_positive
 
 SIDES = {"above": (-1.0,), "below": (1.0,), "both": (1.0, -1.0)}
@@ -39,7 +40,7 @@ class Impactor:
     (-1.0,)
     """
 
-    z: float
+    z: Place
     mass: float
     velocity: float
     law: Any
@@ -67,6 +68,12 @@ class Impactor:
     def pushes(self) -> tuple[float, ...]:
         """Directions in which its contacts push the beam: +1 up (it sits below), -1 down."""
         return SIDES[self.side or ("below" if self.velocity > 0 else "above")]
+
+
+def check_name(name: Any, where: str) -> None:
+    """Raise ValueError unless a name is text, or left out."""
+    require(name is None or (isinstance(name, str) and bool(name.strip())), "name must be text", name, where,
+            "leave it out, or write name='valve'")  # fmt: skip
 
 
 def check_law(law: Any, where: str) -> None:

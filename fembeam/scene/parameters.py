@@ -40,6 +40,8 @@ def _numbers(path: str, item: Any) -> dict[str, float]:
         return {path: item}
     if isinstance(item, tuple) and all(isinstance(entry, float) for entry in item):
         return {f"{path}[{i}]": entry for i, entry in enumerate(item)}
+    if isinstance(item, dict):
+        return {name: value for key, part in item.items() for name, value in _numbers(f"{path}.{key}", part).items()}
     if not is_dataclass(item):
         return {}
     found: dict[str, float] = {}
@@ -85,6 +87,8 @@ def _replaced(item: Any, path: list[str], value: float) -> Any:
         changed = list(item)
         changed[int(path[0])] = _replaced(item[int(path[0])], path[1:], value)
         return type(item)(changed)
+    if isinstance(item, dict):
+        return {**item, path[0]: _replaced(item[path[0]], path[1:], value)}
     changed = _replaced(getattr(item, path[0]), path[1:], value)
     if path[0] != "base":
         return replace(item, **{path[0]: changed})

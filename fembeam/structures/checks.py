@@ -79,7 +79,7 @@ def positive_mass(M: sparse.csr_matrix, labels: Sequence[Label], where: str) -> 
     low = int(np.argmin(diagonal))
     require(bool(diagonal[low] >= 0), f"M must be positive semidefinite; the mass of {_of(labels[low])} is negative",
             float(diagonal[low]), where, "check signs and the order of the matrices")  # fmt: skip
-    bare = np.flatnonzero(diagonal == 0)
+    bare = np.flatnonzero(diagonal == 0).tolist()
     loose = [i for i in bare if M[i].nnz]
     require(not loose, f"M must be positive semidefinite; {_of(labels[loose[0]]) if loose else ''} has no mass of its "
             "own but coupling to others", float(abs(M[loose[0]]).max()) if loose else 0.0, where,
@@ -139,7 +139,8 @@ def sentences(structure: Structure) -> Iterator[str]:
 
 def _rigid(structure: Structure) -> Iterator[str]:
     """Whether K r = 0 for the rigid motions."""
-    free, held = [], []
+    free: list[tuple[str, float]] = []
+    held: list[tuple[str, float]] = []
     for name, r in rigid_motions(structure).items():
         force, size = structure.K @ r, abs(structure.K) @ np.abs(r)
         left = float(np.abs(force).max() / size.max()) if size.max() > 0 else 0.0

@@ -56,7 +56,7 @@ class GivenModes(NamedBody):
         require(right, f"shapes must be finite and have a row for each dof and {w.size} columns, one for each omega",
                 phi.shape, WHERE, "transpose them if need be")  # fmt: skip
         names = labelled(labels, len(phi), WHERE)
-        gamma = {}
+        gamma: dict[str, Vector] = {}
         for direction, given in (participation or {}).items():
             value = np.array(given, dtype=float)
             require(direction in COMPONENTS[:3], "participation must be named 'x', 'y' or 'z'", direction, WHERE,
@@ -64,11 +64,23 @@ class GivenModes(NamedBody):
             fits = value.shape == w.shape and bool(np.isfinite(value).all())
             require(fits, f"participation along {direction} must be {w.size} finite numbers", value.shape, WHERE,
                     "give Γ of every mode in √kg")  # fmt: skip
-            gamma[direction] = value
+            gamma[str(direction)] = value
         at, named = placed(nodes, points, names, WHERE)
-        values = {"omega": w, "shapes": phi, "labels": names, "participation": gamma, "nodes": at, "points": named}
+        values: dict[str, Any] = {
+            "omega": w,
+            "shapes": phi,
+            "labels": names,
+            "participation": gamma,
+            "nodes": at,
+            "points": named,
+        }
         for name, value in {**values, "edges": checked_edges(lines, at, WHERE)}.items():
             object.__setattr__(self, name, value)
+
+    @property
+    def base_directions(self) -> tuple[str, ...]:
+        """Directions in which the base can move: those whose participation is known."""
+        return tuple(c for c in COMPONENTS[:3] if c in self.participation)
 
     @cached_property
     def digest(self) -> str:
@@ -104,7 +116,9 @@ class GivenModes(NamedBody):
         moved = np.array([self.participation[c] for c in along]).reshape(len(along), n).T
         return Assembled(
             *(sparse.eye(n, format="csr"), sparse.diags(self.omega**2).tocsr()),
-            *(tuple((i, "mode") for i in range(n)), self.rows, moved),
+            tuple((i, "mode") for i in range(n)),
+            self.rows,
+            moved,
             root=sparse.diags(self.omega).tocsr(),
             accuracy=f"{n} modes as they were given",
         )
