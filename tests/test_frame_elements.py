@@ -8,6 +8,7 @@ from frames import frequencies, portal, space_l, static, turned, whirl
 from scipy import linalg
 
 import fembeam as fb
+import reduction
 
 STEEL = fb.Section.rectangle(2.1e11, 7850.0, width=0.02, height=0.01)
 L_OMEGA = [104.6333966779874, 206.1055544860273, 329.4079614082485, 724.2568216310866, 1104.731296032686]
@@ -209,3 +210,53 @@ def test_mesh_follows_the_modes():
     coarse = frequencies(space_l().assembled(elements=made.mesh.elements.count // 3), 5, "A")
     assert coarse[-1] / fine[-1] - 1 > 1e-6
     assert "1e-06" in made.accuracy
+
+
+DEEP = replace(fb.Section.rectangle(2.1e11, 7850.0, width=0.1, height=0.2), shear=5 / 6)
+
+
+def timoshenko(section, wave):
+    """ω of a wave along a beam: EI κ⁴ - ρA ω² - ρI (1 + E/κG) κ² ω² + ρ² I ω⁴/κG = 0."""
+    G = section.shear[0] * section.E / (2 * (1 + section.nu))
+    rotary = section.rho * section.I
+    terms = [rotary * section.rho / G, -section.line_mass - rotary * (1 + section.E / G) * wave**2]
+    return np.sqrt(np.roots([*terms, section.E * section.I * wave**4]).min())
+
+
+@pytest.mark.parametrize("mode", [1, 3])
+def test_shear_order_and_constant(mode):
+    """Pinned at both ends, height 0.13 and 0.4 of half a wave: still fourth order, with 1.0 to 1.15 of the constant."""
+    frame = fb.Frame({"A": (0, 0), "B": (1.5, 0)}, [fb.Member("A", "B", DEEP)])
+    wave = mode * np.pi / 1.5
+    for elements in (8, 16, 32):
+        made = frame.assembled(elements=elements)
+        held = [made.labels.index(one) for one in (("A", "x"), ("A", "y"), ("B", "y"))]
+        free = np.setdiff1d(np.arange(len(made.labels)), held)
+        omega = reduction.modal_basis(made.M[free][:, free], made.K[free][:, free], 8, root=made.root[:, free]).omega
+        error = np.min(np.abs(omega / timoshenko(DEEP, wave) - 1))
+        assert 1.0 < error / ((wave * 1.5 / elements) ** 4 / 1440) < 1.15
+
+
+def test_shear_in_space():
+    """Static tip P L³/3EI + P L/κGA in both ways of bending on one element; meshes for modes are right to 1e-6."""
+    own = replace(DEEP, shear=(0.85, 0.6))
+    frame = fb.Frame.straight(0.8, own)
+    made = frame.assembled(elements=1)
+    G = own.E / 2.6
+    for component, I, shear in ((1, own.I, 0.85), (0, own.I2, 0.6)):
+        row = made.rows("B").toarray()[component]
+        assert row @ static(made, row, "A") == pytest.approx(
+            0.8**3 / (3 * own.E * I) + 0.8 / (shear * G * own.A), rel=1e-9
+        )
+    fine = frequencies(frame.assembled(elements=120), 6, "A")
+    assert np.all(np.abs(frequencies(frame.assembled(modes=6, places=["A"]), 6, "A") / fine - 1) < 1e-6)
+
+
+def test_shear_is_refused_where_it_is_not_meant():
+    """A `Beam` has no shear; coefficients are positive; I12 must be turned away."""
+    with pytest.raises(ValueError, match=r"without shear deformation.* use Frame.straight"):
+        fb.Beam(1.0, DEEP)
+    with pytest.raises(ValueError, match="one or two coefficients"):
+        replace(STEEL, shear=(0.8, 0.0))
+    with pytest.raises(ValueError, match="I12 must be 0 with shear"):
+        replace(STEEL, shear=0.8, I12=1e-10)

@@ -69,6 +69,9 @@ class Beam:
             require_positive(f"length of span {index}", length, "Beam", "give the length in m")
             if not isinstance(section, (Section, Taper)):
                 raise TypeError(f"section of span {index} must be a Section, got {section!r} in Beam; make one first")
+            ends = (section.start, section.end) if isinstance(section, Taper) else (section,)
+            require(all(one.shear is None for one in ends), "a Beam must be without shear deformation", section,
+                    f"span {index} of Beam", "use Frame.straight")  # fmt: skip
         total = sum(length for length, _ in self.spans)
         require(abs(total - self.length) <= 1e-12 * total, f"length must be {total}", self.length, "Beam",
                 "use Beam.of_spans")  # fmt: skip

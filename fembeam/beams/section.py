@@ -34,6 +34,8 @@ class Section:
     J : torsion constant of Saint-Venant, m⁴, > 0, for frames in space.
     nu : Poisson's ratio, -1 < ν ≤ 0.5, for torsion.
     fibre2 : distance of the outer fibre across, m, > 0.
+    shear : shear coefficients κ for bending with I and with I2, in (0, 1.5], or one for both, such as 5/6 of a
+        rectangle: frames then deform in shear and have rotary inertia (Timoshenko). None: neither.
 
     Raises
     ------
@@ -41,7 +43,7 @@ class Section:
 
     Notes
     -----
-    Slender beams: shear deformation and the section's own rotary inertia are neglected.
+    Slender beams: shear deformation and the section's own rotary inertia are neglected but in frames with `shear`.
 
     Examples
     --------
@@ -59,6 +61,7 @@ class Section:
     J: float | None = field(default=None, repr=False)
     nu: float = field(default=0.3, repr=False)
     fibre2: float | None = field(default=None, repr=False)
+    shear: float | tuple[float, float] | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         require_positive("E", self.E, "Section", "give Young's modulus in N/m²")
@@ -81,6 +84,13 @@ class Section:
                 "Section", "give I2 with it, and compute all three about one centroid")  # fmt: skip
         require_finite("nu", self.nu, "Section", "give Poisson's ratio", ", above -1 and at most 0.5",
                        is_finite(self.nu) and -1 < self.nu <= 0.5)  # fmt: skip
+        if self.shear is not None:
+            both = tuple(np.broadcast_to(self.shear, 2).tolist()) if np.shape(self.shear) in ((), (2,)) else ()
+            right = len(both) == 2 and all(is_finite(k) and 0 < k <= 1.5 for k in both)
+            require(right, "shear must be one or two coefficients above 0, at most 1.5", self.shear, "Section",
+                    "give 5/6 for a rectangle, 0.9 for a circle")  # fmt: skip
+            object.__setattr__(self, "shear", both)
+            require(self.I12 == 0, "I12 must be 0 with shear", self.I12, "Section", "turn it to principal axes")
 
     @classmethod
     def rectangle(cls, E: float, rho: float, width: float, height: float, nu: float = 0.3) -> Section:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 Label = tuple[Hashable, str]
+KINDS = (*COMPONENTS, "mode")  # the last of a generalised coordinate, such as a mode between fixed interfaces
 SYMMETRIC = 1e-8  # of the largest entry: files with nine digits pass
 NEGATIVE = -1e-9  # pivot of M over its diagonal, below which M is indefinite
 STIFF = 1e-6  # of |K| |r|: below it K r = 0, a rigid motion meets no resistance
@@ -62,8 +63,8 @@ def labelled(labels: Any, size: int, where: str) -> tuple[Label, ...]:
             "give (node, 'x'), (node, 'y'), … in the order of the rows")  # fmt: skip
     found: dict[Label, int] = {}
     for i, label in enumerate(listed):
-        right = len(label) == 2 and label[1] in COMPONENTS and isinstance(label[0], (str, int, np.integer))
-        require(right, f"labels[{i}] must be a node and one of {', '.join(COMPONENTS)}", listed[i], where,
+        right = len(label) == 2 and label[1] in KINDS and isinstance(label[0], (str, int, np.integer))
+        require(right, f"labels[{i}] must be a node and one of {', '.join(KINDS)}", listed[i], where,
                 "write (20, 'x')")  # fmt: skip
         node = label[0] if isinstance(label[0], str) else int(label[0])
         require((node, label[1]) not in found, f"labels must not repeat: dof {found.get((node, label[1]))} and dof {i}",

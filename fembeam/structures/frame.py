@@ -49,9 +49,10 @@ class Frame:
 
     Notes
     -----
-    Slender members: no shear deformation, and rotary inertia of bending only with spin; torsion of Saint-Venant without
-    warping; centroid and shear centre are one. Loads and stops act between nodes as well: a place is the name of a
-    node, (member, distance in m from its first end), or, of a straight frame, the distance z in m from its first node.
+    Shear deformation only with `shear` of the section, rotary inertia of bending with that or with spin; torsion of
+    Saint-Venant without warping; centroid and shear centre are one. Loads and stops act between nodes as well: a place
+    is the name of a node, (member, distance in m from its first end), or, of a straight frame, the distance z in m from
+    its first node.
 
     Examples
     --------

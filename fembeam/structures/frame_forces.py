@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fembeam.beams import hermite_shapes
-from fembeam.structures.element_matrices import ACROSS, ALONG, UP, inertia_root, stiffness_parts
+from fembeam.structures.element_matrices import ACROSS, ALONG, UP, WIDTH, Elements, inertia_root, stiffness_parts
 from fembeam.support import is_finite, require
 
 if TYPE_CHECKING:
@@ -111,9 +111,9 @@ def frame_forces(made: FrameMatrices, vectors: Vector, inertia: Vector) -> Frame
     """
     elements = made.mesh.elements
     u, a = elements.join @ vectors, elements.join @ inertia
-    P = inertia_root(elements, made.mesh.frame.spin != 0)
+    P = inertia_root(elements)
     forces = sum(sign * (R.T @ (R @ u)) for sign, R in stiffness_parts(elements)) - P.T @ (P @ a)
-    (push, turn), (shift, tilt), (_, rotation) = (_at_ends(values, vectors.shape[1]) for values in (forces, a, u))
+    (push, turn), (shift, tilt) = (_at_ends(values, vectors.shape[1]) for values in (forces, a))
     side, p = np.array([-1.0, 1.0])[None, :, None], elements.properties
 
     def along(values: Vector, axis: int) -> Vector:
@@ -125,7 +125,7 @@ def frame_forces(made: FrameMatrices, vectors: Vector, inertia: Vector) -> Frame
     for plane in elements.planes:
         turning, sign, suffix = (ACROSS, -1.0, "") if plane == UP else (UP, 1.0, "2")  # v' = -φ, w' = ψ
         moment, tension = side * sign * along(turn, turning), p["N"][:, None, None]
-        shear = -side * along(push, plane) + tension * sign * along(rotation, turning)
+        shear = -side * along(push, plane) + tension * _slopes(elements, plane, u)
         ends["M" + suffix], slopes["M" + suffix] = moment, shear
         ends["Q" + suffix], slopes["Q" + suffix] = shear, _bend(moment, shear, elements.h[:, None])
     if elements.twists:
@@ -135,9 +135,15 @@ def frame_forces(made: FrameMatrices, vectors: Vector, inertia: Vector) -> Frame
 
 
 def _at_ends(values: Vector, n: int) -> tuple[Vector, Vector]:
-    """Displacements and rotations, or their forces, (e, 2, 3, n) of (14 e, n)."""
-    both = values.reshape(-1, 14, n)[:, :12].reshape(-1, 2, 2, 3, n)
+    """Displacements and rotations, or their forces, (e, 2, 3, n) of (18 e, n)."""
+    both = values.reshape(-1, WIDTH, n)[:, :12].reshape(-1, 2, 2, 3, n)
     return both[:, :, 0], both[:, :, 1]
+
+
+def _slopes(elements: Elements, plane: int, u: Vector) -> Vector:
+    """(e, 2, n): v' or w' at both ends."""
+    every = np.arange(elements.count)
+    return np.stack([elements.bending(every, np.full(len(every), x), plane, 1) @ u for x in (0.0, 1.0)], axis=1)
 
 
 def _bend(value: Vector, slope: Vector, h: Vector) -> Vector:

@@ -16,10 +16,20 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 import reduction
-from fembeam.beams import FREQUENCY_TOLERANCE, SAME_PLACE, SHORTEST, WAVE_STEP, divided, shares, wavenumber
+from fembeam.beams import (
+    FREQUENCY_TOLERANCE,
+    SAME_PLACE,
+    SHORTEST,
+    WAVE_STEP,
+    Section,
+    divided,
+    shares,
+    wavenumber,
+)
 from fembeam.structures.assembled import COMPONENTS, Assembled
 from fembeam.structures.element_matrices import (
     ACROSS,
+    PARABOLAS,
     UP,
     Elements,
     gyroscopic,
@@ -50,7 +60,7 @@ class FrameMesh:
     ----------
     frame : the frame. borders : for every member the distances s (k,) of its mesh nodes from its first end, m.
     labels : (place, component) of every dof: nodes of the frame; then (member, "end rz") for releases; (member, s) for
-        mesh nodes within members, and for the parabola of stretch, "along", and of twist, "twist", of an element.
+        mesh nodes within members, and for the parabolas of an element: ((member, s), "along") and PARABOLAS.
     join : (6 p + parabolas, N) from the dofs to displacement and rotation of all p points, ends of members apart.
     """
 
@@ -73,11 +83,12 @@ class FrameMesh:
         point = np.arange(count) + member
         points = count + len(counts)
         rows = np.hstack([6 * (point[:, None] + end) + np.arange(6) for end in range(2)])
-        rows = np.hstack([rows, 6 * points + np.arange(count)[:, None] + [0, count]])
+        rows = np.hstack([rows, 6 * points + np.arange(count)[:, None] + count * np.arange(len(PARABOLAS))])
         per_member = properties_of(
             [one.section for one in frame.members],
             np.array([one.axial_force for one in frame.members], dtype=float),
             np.array([one.foundation for one in frame.members], dtype=float),
+            frame.spin != 0,
         )
         return Elements(
             h=np.concatenate([np.diff(s) for s in self.borders]),
@@ -122,7 +133,7 @@ class FrameMesh:
         """Rows between mesh nodes by the elements' fields, turned to global axes."""
         known, own = self.frame.components, self.elements.only(element)
         fields = own.motion(np.arange(len(x)), x)
-        blank = sparse.csr_matrix((len(x), 14 * len(x)))
+        blank = sparse.csr_matrix((len(x), own.join.shape[0]))
         turned = []
         for name in known:
             kind, c = divmod(COMPONENTS.index(name), 3)
@@ -176,12 +187,26 @@ def _waves(frame: Frame, omega: float) -> Iterator[float]:
     """The largest wavenumber γ (1/m) of every member at omega."""
     for one, length in zip(frame.members, frame.lengths, strict=True):
         own = one.section
-        waves = [wavenumber(one.beam(float(length), frame.in_plane), np.array([0.0, length]), omega)[0]]
+        beam = one.beam(float(length), frame.in_plane)
+        waves = [
+            wavenumber(beam, np.array([0.0, length]), omega)[0],
+            _sheared_wave(beam.profile(0.0).I.item(), own, omega),
+        ]
         if not frame.bending_only:
             waves.append(omega * np.sqrt(own.rho / own.E))
         if own.I2 is not None and "rz" in frame.components and not frame.in_plane:
             waves.append(omega * np.sqrt(own.rho * (own.I + own.I2) / own.torsion_stiffness))
         yield float(max(waves))
+
+
+def _sheared_wave(I: float, own: Section, omega: float) -> float:
+    """κ in 1/m of bending with shear and rotary inertia, EI κ⁴ - ρI ω² (1 + E/κG) κ² = ρA ω² (1 - ρI ω²/κGA)."""
+    if own.shear is None:
+        return 0.0
+    G = float(np.min(own.shear)) * own.E / (2 * (1 + own.nu))
+    half = own.rho * omega**2 * (1 / own.E + 1 / G) / 2
+    static = own.line_mass * omega**2 / (own.E * I) * (1 - own.rho * I * omega**2 / (G * own.A))
+    return float(np.sqrt(half + np.sqrt(max(half**2 + static, 0.0))))
 
 
 def _spread(frame: Frame, stops: list[Vector], elements: int) -> list[Vector]:
@@ -225,7 +250,7 @@ def _on(frame: Frame, borders: list[Vector], promise: str) -> FrameMatrices:
     mesh = FrameMesh(frame, tuple(borders), tuple(labels), join)
     elements = mesh.elements
     parts = [(sign, (R @ elements.join).tocsr()) for sign, R in stiffness_parts(elements)]
-    P = inertia_root(elements, frame.spin != 0) @ elements.join
+    P = inertia_root(elements) @ elements.join
     moved = [name for name in frame.components if name in COMPONENTS[:3]]
     translations = [[float(component == name) for name in moved] for _, component in labels]
     return FrameMatrices(
@@ -273,14 +298,15 @@ def _numbered(frame: Frame, borders: list[Vector]) -> tuple[list[tuple[Any, str]
 def _with_parabolas(
     frame: Frame, borders: list[Vector], labels: list[tuple[Any, str]], entries: list[tuple[Any, Any, Any]], row: int
 ) -> tuple[list[tuple[Any, str]], sparse.csr_matrix]:
-    """The interior number of stretch and of twist of every element, where it is there, after all else."""
-    count = sum(len(s) - 1 for s in borders)
-    pairs = zip(frame.members, borders, strict=True)
+    """The interior numbers of every element, where they are there, after all else."""
+    pairs = list(zip(frame.members, borders, strict=True))
     middles = [(one.name, float(middle)) for one, s in pairs for middle in (s[:-1] + s[1:]) / 2]
-    there = (not frame.bending_only, not (frame.in_plane or frame.bending_only))
-    for kind, name in enumerate(("along", "twist")):
-        if there[kind]:
-            entries.append((row + kind * count + np.arange(count), len(labels) + np.arange(count), np.ones(count)))
-            labels += [(place, name) for place in middles]
+    sheared = np.array([one.section.shear is not None for one, s in pairs for _ in s[1:]])
+    count, twists = len(middles), not (frame.in_plane or frame.bending_only)
+    across = sheared & (not frame.in_plane)
+    there = (np.full(count, not frame.bending_only), np.full(count, twists), across, sheared, across, sheared)
+    for kind, (name, mine) in enumerate(zip(PARABOLAS, map(np.flatnonzero, there), strict=True)):
+        entries.append((row + kind * count + mine, len(labels) + np.arange(len(mine)), np.ones(len(mine))))
+        labels += [(middles[i], name) for i in mine]
     rows, columns, values = (np.concatenate(one) for one in zip(*entries, strict=True))
-    return labels, sparse.csr_matrix((values, (rows, columns)), shape=(row + 2 * count, len(labels)))
+    return labels, sparse.csr_matrix((values, (rows, columns)), shape=(row + len(PARABOLAS) * count, len(labels)))

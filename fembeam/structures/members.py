@@ -87,7 +87,7 @@ class Member:
         own = self.section
         I2 = own.I if own.I2 is None else own.I2
         least = own.I if plane else (own.I + I2) / 2 - np.hypot((own.I - I2) / 2, own.I12)
-        return Beam(length, replace(own, I=float(least), I12=0.0), (), self.foundation, self.axial_force)
+        return Beam(length, replace(own, I=float(least), I12=0.0, shear=None), (), self.foundation, self.axial_force)
 
 
 def _releases(given: Any, where: str) -> tuple[str, ...]:

@@ -76,8 +76,8 @@ class NamedBody:
         """A row (c, N) for each of the components, of zeros for those the place has not."""
         self.check_place(place, "rows")
         mine, size = self.dofs[self.node(place)], len(self.labels)
-        pairs = [(i, mine[component]) for i, component in enumerate(self.components) if component in mine]
-        i, j = zip(*pairs, strict=True)
+        pairs = np.array([(i, mine[component]) for i, component in enumerate(self.components) if component in mine])
+        i, j = pairs.reshape(-1, 2).astype(int).T
         return sparse.csr_matrix((np.ones(len(pairs)), (i, j)), shape=(len(self.components), size))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,6 +18,8 @@ from fembeam.structures.checks import Label, labelled, matrix, placed, positive_
 from fembeam.structures.massless import following
 from fembeam.structures.modes_given import GivenModes
 from fembeam.structures.named_body import NamedBody, checked_edges
+from fembeam.structures.readers import structure_arguments
+from fembeam.structures.readers.reading import Source
 from fembeam.structures.scale import Scale
 from fembeam.support import require
 
@@ -130,6 +133,46 @@ class Structure(NamedBody):
         return Structure(T.T @ self.K @ T, T.T @ self.M @ T, C, kept, self.nodes, points)
 
     @staticmethod
+    def read(
+        stiffness: Source,
+        mass: Source,
+        damping: Source | None = None,
+        labels: str | os.PathLike[str] | Iterable[Any] | None = None,
+        nodes: str | os.PathLike[str] | Mapping[Any, ArrayLike] | None = None,
+        points: Mapping[str, Any] | None = None,
+        lines: Iterable[Sequence[Any]] = (),
+        scale: Scale | None = None,
+    ) -> Structure:
+        """A structure from files of another program; `readers.read_matrices` lists the formats.
+
+        Parameters
+        ----------
+        stiffness, mass, damping : a path, or (path, name) where a file has several matrices; of K and KAA, M and MAA in
+            one file each takes the one whose name begins with its letter.
+        labels : where the format has none (op4, Matrix Market, .npz without them): (node, component) of every row, or
+            the path of a .dof, a .mapping or lines "node component". None: six of each of the nodes, ascending, if
+            there are so many.
+        nodes : {node: (x, y, z)}, or the path of a .bdf, .inp or a table "node x y z".
+        points, lines, scale : as for a `Structure`; the scale holds for nodes too.
+
+        Raises
+        ------
+        ValueError : a truncated or foreign file (what was expected at which line or byte), dofs that do not match.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import numpy as np
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     np.savez(folder + "/two.npz", K=np.eye(2) * 4e3, M=np.eye(2), labels=[(7, "x"), (8, "x")])
+        ...     body = Structure.read(folder + "/two.npz", folder + "/two.npz", points={"tip": 8})
+        >>> body.labels
+        ((7, 'x'), (8, 'x'))
+        """
+        given = structure_arguments(stiffness, mass, damping, labels, nodes)
+        return Structure(**given, points=points, lines=lines, scale=scale)
+
+    @staticmethod
     def of_modes(
         omega: ArrayLike,
         shapes: ArrayLike,
@@ -176,6 +219,9 @@ class Structure(NamedBody):
 
 def _in_si(given: dict[str, sparse.csr_matrix], labels: tuple[Label, ...], scale: Scale) -> dict[str, Any]:
     """M, C, K in SI: mass · timeᵏ, times a length for every rotation of an entry."""
+    modes = [label for label in labels if label[1] == "mode"]
+    require(not modes, "a scale needs displacements and rotations, no generalised coordinates", modes[:1], WHERE,
+            "export in SI")  # fmt: skip
     turning = sparse.diags([float(scale.length) if component[0] == "r" else 1.0 for _, component in labels])
     units = {"M": float(scale.mass), "C": scale.damping, "K": scale.stiffness}
     return {name: (units[name] * (turning @ one @ turning)).tocsr() for name, one in given.items()}

@@ -1,0 +1,74 @@
+"""Where nodes are: GRID cards of Nastran, *NODE of Abaqus and CalculiX, or lines "node x y z"."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from fembeam.structures.readers.given import real, wrong
+
+Place = tuple[float, float, float]
+
+
+def read_nodes(path: Path) -> dict[int, Place]:
+    """{node: (x, y, z)} of a .bdf, .dat, .nas, .pch, .inp or a table of four columns, in the units of the file."""
+    lines = path.read_text(encoding="latin-1").splitlines()
+    if any(line.upper().startswith("GRID") for line in lines):
+        found = _grids(path, lines)
+    elif any(line.strip().upper().replace(" ", "").startswith("*NODE") for line in lines):
+        found = _below_keyword(path, lines)
+    else:
+        found = dict(_entry(path, i, line) for i, line in enumerate(lines, 1) if line.strip() and line[0] not in "#$*")
+    if not found:
+        raise wrong(path, "as a whole", "GRID cards, *NODE, or lines of node x y z", "none")
+    return found
+
+
+def _entry(path: Path, number: int, line: str) -> tuple[int, Place]:
+    """Node and coordinates of a line; those left out are 0."""
+    words = [word.strip() for word in line.split(",")] if "," in line else line.split()
+    try:
+        at = [real(word) if word else 0.0 for word in words[1:4]]
+        return int(words[0]), (*at, *[0.0] * (3 - len(at)))  # type: ignore[return-value]
+    except ValueError:
+        raise wrong(path, f"line {number}", "node, x, y, z", repr(line[:60])) from None
+
+
+def _below_keyword(path: Path, lines: list[str]) -> dict[int, Place]:
+    """The lines below *NODE, up to the next keyword."""
+    found: dict[int, Place] = {}
+    inside = False
+    for number, line in enumerate(lines, 1):
+        if line.startswith("**") or not line.strip():
+            continue
+        if line.startswith("*"):
+            word = line.upper().replace(" ", "").split(",")[0].strip()
+            inside = word == "*NODE"
+        elif inside:
+            node, place = _entry(path, number, line)
+            found[node] = place
+    return found
+
+
+def _grids(path: Path, lines: list[str]) -> dict[int, Place]:
+    """GRID cards: id, system of the place, x, y, z, system of the displacements; only the basic system (0) is known."""
+    found: dict[int, Place] = {}
+    for number, line in enumerate(lines, 1):
+        if line[:8].split(",")[0].strip().upper().rstrip("*") != "GRID":
+            continue
+        if "," in line:
+            words = [word.strip() for word in line.split(",")[1:]]
+        elif "*" in line[:8]:
+            more = lines[number] if number < len(lines) else ""
+            words = [part[i : i + 16].strip() for part in (line, more) for i in range(8, 72, 16)]
+        else:
+            words = [line[i : i + 8].strip() for i in range(8, 72, 8)]
+        words += [""] * (6 - len(words))
+        try:
+            node, at = int(words[0]), [real(word) if word else 0.0 for word in words[2:5]]
+        except ValueError:
+            raise wrong(path, f"line {number}", "GRID, id, system, x, y, z", repr(line[:60])) from None
+        if words[1] not in ("", "0") or words[5] not in ("", "0"):
+            raise wrong(path, f"line {number}", f"GRID {node} in the basic system for place and displacements",
+                        f"systems {words[1] or 0} and {words[5] or 0}: turn them before the export")  # fmt: skip
+        found[node] = (at[0], at[1], at[2])
+    return found
