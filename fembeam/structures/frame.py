@@ -272,7 +272,7 @@ class Frame:
         modes : how many frequencies that shall hold for, whatever holds the frame at `places`; None: 10.
         places : that shall be nodes, those of supports first. One closer than 1e-4 of a member's length to another is
             interpolated inside its element instead, for rounding.
-        omega : rad/s: the highest frequency kept, where it is known, instead of `modes`.
+        omega : rad/s: the highest frequency kept, where it is known: fewer elements than whatever may hold it needs.
 
         Returns
         -------
@@ -285,6 +285,12 @@ class Frame:
         from fembeam.structures.frame_mesh import assemble
 
         return assemble(self, elements, modes, places, omega)
+
+    def coarse(self, modes: int, places: Sequence[Any] = ()) -> FrameMatrices:
+        """The same on few elements, to find out with supports which `omega` the mesh has to resolve."""
+        from fembeam.structures.frame_mesh import coarse
+
+        return coarse(self, modes, places)
 
 
 def _require_name(what: str, name: str, names: list[str], where: str, advice: str) -> None:
