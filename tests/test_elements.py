@@ -520,7 +520,7 @@ def test_scene_files(tmp_path):
     steep = read(path, ["stops[0].gap=2.0"])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        assert any("is it in degrees?" in said for said in check(steep, model).warnings)
+        assert any("is it in degrees?" in said for said in check(steep.model()))
 
 
 def test_schema_names_the_tables():

@@ -89,8 +89,8 @@ class Histories:
         """A derivative of u at z (k,) or (k, j), with that of the frame's motion if absolute."""
         from fembeam.response import frame_motion
 
-        if is_whole(direction):  # a body by its position, as where places are numbers
-            direction, body = None, direction
+        if is_whole(direction):  # (z, body, absolute) by position, as where places are numbers
+            direction, body, absolute = None, direction, absolute or body is True
         shapes, at = self._beam(body), z
         if isinstance(shapes, PlacedShapes):
             at = directed(z, direction)

@@ -29,7 +29,8 @@ def places(shapes: Shapes | PlacedShapes) -> dict[str, Any]:
 
 def observed(model: Model) -> Any:
     """The default place: the first stop or element of displacement, else the tip."""
-    if isinstance(model.shapes, PlacedShapes):
-        return next(iter(model.shapes.usual.values()))
     acting = [part.z for part in model.scene.acting if not part.coordinate.rotation]
-    return acting[0] if acting else next(iter(places(model.shapes).values()))
+    if acting and not model.scene.named:
+        return acting[0]
+    known = model.shapes.usual if isinstance(model.shapes, PlacedShapes) else places(model.shapes)
+    return next(iter(known.values()))

@@ -217,5 +217,5 @@ def frame_forces_of(run: Histories, body: int) -> FrameForces:
     forces = run.readout.section_forces[body]
     if isinstance(forces, FrameForces):
         return forces
-    raise ValueError(f"section forces must be of a Beam, or of a Frame in the session that ran it, got body {body} in "
+    raise ValueError(f"section forces must be of a Beam, or of a Frame in the process that ran it, got body {body} in "
                      "Run; ask for displacement(place, direction), rotations included, or for reactions")  # fmt: skip

@@ -99,7 +99,7 @@ def body_matrices(scene: Scene, elements: int | None, modes: int | None, probes:
 def _made(scene: Scene, elements: int | None, modes: int | None, places: tuple[Any, ...]) -> Assembled:
     """The body's matrices, of a frame on a mesh for the frequencies that it has with all that is on it."""
     if elements is not None or not isinstance(scene.beam, Frame):
-        return scene.beam.assembled(elements, modes, places)
+        return scene.beam.assembled(elements if getattr(scene.beam, "meshed", True) else None, modes, places)
     count = DEFAULT_MODES if modes is None else int(modes)
     coarse = scene.beam.coarse(count, places)
     own = _of(scene, coarse, count, _held(scene, coarse), condense=True)
@@ -113,7 +113,9 @@ def _holding(scene: Scene) -> dict[Any, list[str]]:
     for part in scene.supports:
         found.setdefault(part.z, []).extend(dof for dof in part.dofs if dof in scene.beam.components)
     for spring in scene.springs:
-        found.setdefault(spring.z, []).extend(c for c, n in zip(COMPONENTS, spring.along, strict=True) if n)
+        found.setdefault(spring.z, []).extend(
+            c for c, n in zip(COMPONENTS, spring.along or (0.0,) * 6, strict=True) if n
+        )
     for mass in scene.masses:
         turning = [c for c in COMPONENTS[3:] if c in scene.beam.components and np.any(mass.inertia)]
         found.setdefault(mass.z, []).extend([*COMPONENTS[:3], *turning])

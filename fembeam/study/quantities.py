@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fembeam.model import Run, extremes_of
+from fembeam.model import Run, extremes_of, places
 from fembeam.statistics import psd
 from fembeam.support import require
 
@@ -218,7 +218,8 @@ def signal(run: Run, stop: int = 0, z: float | None = None) -> tuple[Vector, Vec
     require(len(run.t) > 1, "the run must have samples", len(run.t), "quantity", "give dt")
     if z is None and len(run.stops):
         return run.indentation(stop), run.indentation_rate(stop)
-    place = float(run.shapes.nodes[-1]) if z is None else z
+    last = getattr(run.shapes, "nodes", None)
+    place = z if z is not None else next(iter(places(run.shapes).values())) if last is None else float(last[-1])
     return run.displacement(place), run.velocity(place)
 
 
