@@ -22,7 +22,7 @@ def doubts(file: SceneFile, model: Model) -> list[str]:
     """Warnings about a scene's numbers, as sentences."""
     scene = file.scene
     if scene.named:
-        return [*scene.beam.check(), *of_damping(scene), *of_loads(scene, model), *of_study(file, model)]
+        return [*of_damping(scene), *of_loads(scene, model), *of_study(file, model)]
     return [*of_beam(scene.beam), *of_features(scene), *of_loads(scene, model), *of_study(file, model)]
 
 

@@ -18,7 +18,7 @@ from fembeam import plot
 from fembeam.beams import on_beam
 from fembeam.model import Branch, Orbit
 from fembeam.model.run_csv import Output
-from fembeam.scene import path_of, split
+from fembeam.scene import Place, path_of, split
 from fembeam.scene_file.keys import Constructors, parameters
 from fembeam.study import Basins, Ensemble, SpeedAccuracy, basins, characteristics, ensemble, speed_accuracy
 from fembeam.study.measure import Plan
@@ -373,7 +373,7 @@ class BasinsTable:
     x: str | int = "displacement"
     y: str | int = "velocity"
     points: int | Sequence[int] = 100
-    z: float | None = None
+    z: Place | None = None
     start: Sequence[float] | None = None
     settle: int = 200
     longest: int = 8
