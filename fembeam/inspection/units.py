@@ -21,7 +21,7 @@ def doubts(model: Model) -> list[str]:
     """Warnings about the numbers of a model's scene, as sentences; of its bodies, too."""
     scene = model.scene
     if scene.named:
-        return [*scene.beam.check(), *of_damping(scene), *of_loads(scene, model)]
+        return [*of_damping(scene), *of_loads(scene, model)]
     found = [*of_beam(scene.beam), *of_features(scene)]
     for i, body in enumerate(scene.bodies):
         found += [f"bodies[{i}]: {said}" for said in (*of_beam(body.beam), *of_features(body))]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -50,12 +50,12 @@ class PlacedShapes:
     @classmethod
     def of_words(cls, words: Mapping[str, Any], values: Vector) -> PlacedShapes:
         """The same of a file, with the values (p c, n)."""
-        known, components = tuple(_tuples(place) for place in words["places"]), tuple(words["components"])
+        known, components = tuple(tuples(place) for place in words["places"]), tuple(words["components"])
         positions = [3 * [np.nan] if at is None else at for at in words["positions"]]
         lines = np.array(words["lines"], dtype=int).reshape(-1, 2)
         if len(positions) != len(known) or (lines.size and not 0 <= lines.min() <= lines.max() < len(known)):
             raise ValueError("positions and lines must be of its places")
-        usual = {str(name): _tuples(at) for name, at in words["usual"]}
+        usual = {str(name): tuples(at) for name, at in words["usual"]}
         whole = values.reshape(len(known), len(components), values.shape[1])
         return cls(components, known, whole, usual, np.array(positions, dtype=float).reshape(-1, 3), lines)
 
@@ -86,9 +86,9 @@ class PlacedShapes:
         return np.asarray(part @ self.motion(place))
 
 
-def _tuples(value: Any) -> Any:
+def tuples(value: Any) -> Any:
     """Lists of JSON as tuples."""
-    return tuple(_tuples(one) for one in value) if isinstance(value, list) else value
+    return tuple(tuples(one) for one in value) if isinstance(value, list) else value
 
 
 def placed_shapes(body: BodyMatrices, vectors: Vector, loaded: Sequence[LocalCoordinate]) -> PlacedShapes:
@@ -106,7 +106,7 @@ def placed_shapes(body: BodyMatrices, vectors: Vector, loaded: Sequence[LocalCoo
     at = [body.beam.position(place) for place in names]
     positions = np.array([3 * [np.nan] if x is None else x for x in at], dtype=float).reshape(-1, 3)
     edges = [(names.index(a), names.index(b)) for a, b in getattr(body.beam, "edges", ())]
-    return PlacedShapes(
+    made = PlacedShapes(
         tuple(body.beam.components),
         tuple(names),
         np.array(values).reshape(shape),
@@ -115,6 +115,8 @@ def placed_shapes(body: BodyMatrices, vectors: Vector, loaded: Sequence[LocalCoo
         np.array(edges, dtype=int).reshape(-1, 2),
         more,
     )
+    moving = {name: at for name, at in made.usual.items() if np.any(made(at))}
+    return replace(made, usual=dict(list((moving or made.usual).items())[:USUAL]))
 
 
 def _places(body: BodyMatrices) -> list[Any]:
@@ -132,4 +134,4 @@ def _usual(body: BodyMatrices, loaded: Sequence[LocalCoordinate]) -> dict[str, A
     ask = getattr(body.beam, "components_at", lambda place: body.beam.components)
     points = getattr(body.beam, "points", {}) or _places(body)[-1:]
     found += [(place, c) for place in points for c in ask(place) if c in COMPONENTS[:3]]
-    return {said(at): at for at in list(dict.fromkeys(found))[:USUAL]}
+    return {said(at): at for at in dict.fromkeys(found)}

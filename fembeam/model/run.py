@@ -14,14 +14,13 @@ from numpy.typing import ArrayLike, NDArray
 
 import solvers
 from fembeam.model.histories import Histories
-from fembeam.scene import ON, Source, said
+from fembeam.scene import ON, Source, title
 from fembeam.support import Part, Printed, is_finite
 from solvers.problem import Losses, counted
 
 if TYPE_CHECKING:
     from fembeam.model.model import Model
     from fembeam.response import Reactions, Readout
-    from fembeam.scene.contact_rows import ContactRow
     from fembeam.scene_file import SceneFile
 
 Vector = NDArray[np.float64]
@@ -68,6 +67,7 @@ class Run(Histories, Printed):
     on: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 3), dtype=int))  # (m, 3): body, of ON, number
     kinds: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 2), dtype=bool))  # of rotation, always acting
     titles: tuple[str, ...] = ()  # (m,) what tables call each contact, "" for its number
+    acting: tuple[Any, ...] = ()  # (m,) of each contact z, or (place, direction)
     sampled: bool = True  # else t, q, q_dot are the final state alone, and no history
 
     def __repr__(self) -> str:
@@ -130,6 +130,7 @@ class Run(Histories, Printed):
             on=np.array([(one.body, ON.index(one.on[0]), one.on[1]) for one in rows], dtype=int).reshape(-1, 3),
             kinds=np.array([(one.rotation, one.always) for one in rows], dtype=bool).reshape(-1, 2),
             titles=tuple(title(one, number) for number, one in enumerate(rows)),
+            acting=tuple(one.z if one.direction is None else (one.z, one.direction) for one in rows),
             sampled=sampled,
         )
 
@@ -243,12 +244,3 @@ class Run(Histories, Printed):
         from fembeam.model.run_file import save
 
         return save(self, Path(path))
-
-
-def title(row: ContactRow, number: int) -> str:
-    """What tables call a contact: its name, or where it acts by names; "" where its number will do."""
-    if row.name is not None:
-        return row.name
-    if row.direction is None:
-        return ""
-    return f"{'element' if row.always else 'stop'} {number} at {said((row.z, row.direction))}"

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fembeam.model import Run, extremes_of, places
+from fembeam.scene import Place
 from fembeam.statistics import psd
 from fembeam.support import require
 
@@ -30,7 +31,7 @@ class OfSignal:
     """What is read off δ of a stop, or u at `z`."""
 
     stop: int = 0
-    z: float | None = None
+    z: Place | None = None
     sampled: ClassVar[bool] = True
 
     def signal(self, run: Run) -> tuple[Vector, Vector]:
@@ -103,7 +104,7 @@ class Psd:
     band: tuple[float, float] = (1.0, 1200.0)
     parts: int = 12
     stop: int = 0
-    z: float | None = None
+    z: Place | None = None
     sampled: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
@@ -213,7 +214,7 @@ def label(quantity: Quantity) -> str:
     return f"{name}({changed})" if changed else name
 
 
-def signal(run: Run, stop: int = 0, z: float | None = None) -> tuple[Vector, Vector]:
+def signal(run: Run, stop: int = 0, z: Place | None = None) -> tuple[Vector, Vector]:
     """δ and its rate at a stop, or u and u̇ at z, or at the tip of a scene without stops."""
     require(len(run.t) > 1, "the run must have samples", len(run.t), "quantity", "give dt")
     if z is None and len(run.stops):
