@@ -99,7 +99,7 @@ def body_matrices(scene: Scene, elements: int | None, modes: int | None, probes:
 def _made(scene: Scene, elements: int | None, modes: int | None, places: tuple[Any, ...]) -> Assembled:
     """The body's matrices, of a frame on a mesh for the frequencies that it has with all that is on it."""
     if elements is not None or not isinstance(scene.beam, Frame):
-        return scene.beam.assembled(elements, modes, places)
+        return scene.beam.assembled(elements if getattr(scene.beam, "meshed", True) else None, modes, places)
     count = DEFAULT_MODES if modes is None else int(modes)
     coarse = scene.beam.coarse(count, places)
     own = _of(scene, coarse, count, _held(scene, coarse), condense=True)
