@@ -100,6 +100,9 @@ def frame(run: Run, t: float, window: tuple[float, float] | None = None) -> Figu
 def _stage(run: Run, samples: NDArray[np.int64], fps: float | None) -> _Stage | BodyStage:
     """What is shown: a beam with its contacts, or the lines of another body."""
     if not isinstance(run.shapes, PlacedShapes):
+        straight = not any(isinstance(shapes, PlacedShapes) for shapes in run.others)
+        require(straight, "moving pictures of a Beam must be of Beams alone", run.others, "animate",
+                "draw plot.time_history or plot.mode_shapes")  # fmt: skip
         return _Stage(run, samples, fps)
     return BodyStage(run, samples, "" if fps is None else _pace(fps * float(np.median(np.diff(run.t[samples])))))
 

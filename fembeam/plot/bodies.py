@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fembeam.plot.figure import heading
 from fembeam.plot.style import BLUE, GREY, RED
 from fembeam.support import is_finite, require
 
@@ -94,6 +95,7 @@ def mode_figure(model: Model) -> Figure:
         draw(axis, shapes, moved, BLUE, 1.8)
         axis.set_title(f"mode {model.names[mode]}: {model.omega[mode]:.5g} rad/s", fontsize=8)
         finish(axis, shapes)
+    heading(axes, "Mode shapes of the linear structure", True)
     return figure
 
 

@@ -6,6 +6,7 @@ from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import sha256
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from scipy import sparse
 from fembeam.structures.assembled import COMPONENTS, Assembled
 from fembeam.structures.checks import Label, labelled, matrix, placed, positive_mass, sentences, symmetric
 from fembeam.structures.massless import following
+from fembeam.structures.matrix_files import read_labels, read_matrix, read_nodes
 from fembeam.structures.modes_given import GivenModes
 from fembeam.structures.named_body import NamedBody, checked_edges
 from fembeam.structures.scale import Scale
@@ -128,6 +130,36 @@ class Structure(NamedBody):
         C = None if self.C is None else T.T @ self.C @ T
         points = {name: node for name, node in self.points.items() if node in {one for one, _ in kept}}
         return Structure(T.T @ self.K @ T, T.T @ self.M @ T, C, kept, self.nodes, points)
+
+    @staticmethod
+    def read(
+        stiffness: str | Path,
+        mass: str | Path,
+        damping: str | Path | None = None,
+        labels: str | Path | Iterable[Any] | None = None,
+        nodes: str | Path | Mapping[Any, ArrayLike] | None = None,
+        points: Mapping[str, Any] | None = None,
+        lines: Iterable[Sequence[Any]] = (),
+        scale: Scale | None = None,
+    ) -> Structure:
+        """A structure whose matrices are in files: Matrix Market (.mtx), .npz (of scipy or one array), .npy.
+
+        Parameters
+        ----------
+        stiffness, mass, damping : paths.
+        labels : as for `Structure`, or the path of a table with two columns, `20, x`. nodes : likewise, or a table with
+            four columns, `20, 0.1, 0, 0.5`.
+        points, lines, scale : as for `Structure`.
+
+        Raises
+        ------
+        ValueError : a damaged file or one of another kind (says what was expected, tables with the line).
+        OSError : a file that cannot be opened.
+        """
+        K, M, C = (None if path is None else read_matrix(path) for path in (stiffness, mass, damping))
+        names = read_labels(labels) if isinstance(labels, (str, Path)) else labels
+        at = read_nodes(nodes) if isinstance(nodes, (str, Path)) else nodes
+        return Structure(K, M, C, names, at, points, lines, scale)
 
     @staticmethod
     def of_modes(
