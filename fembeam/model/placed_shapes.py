@@ -99,17 +99,19 @@ def placed_shapes(body: BodyMatrices, vectors: Vector, loaded: Sequence[LocalCoo
         return np.asarray(body.rows_at(place) @ vectors)
 
     extra = [at.z for at in loaded] + [at.to[1] for at in loaded if at.to is not None and at.to[0] == 0]
-    names = list(dict.fromkeys([*_places(body), *(tuple(z) if isinstance(z, list) else z for z in extra)]))
-    rows = body.assembled.rows
-    values = [np.asarray(rows(place) @ (body.spread @ vectors)) for place in names]
+    joined = list(getattr(body.beam, "edges", ()))
+    drawn = [place for pair in joined for place in pair]
+    names = list(dict.fromkeys([*_places(body), *(tuple(z) if isinstance(z, list) else z for z in extra), *drawn]))
+    number = {name: i for i, name in enumerate(names)}
+    values = np.asarray(body.assembled.rows_of(names) @ (body.spread @ vectors))
     shape = (len(names), len(body.beam.components), vectors.shape[1])
     at = [body.beam.position(place) for place in names]
     positions = np.array([3 * [np.nan] if x is None else x for x in at], dtype=float).reshape(-1, 3)
-    edges = [(names.index(a), names.index(b)) for a, b in getattr(body.beam, "edges", ())]
+    edges = [(number[a], number[b]) for a, b in joined]
     made = PlacedShapes(
         tuple(body.beam.components),
         tuple(names),
-        np.array(values).reshape(shape),
+        values.reshape(shape),
         _usual(body, loaded),
         positions,
         np.array(edges, dtype=int).reshape(-1, 2),

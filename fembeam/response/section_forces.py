@@ -203,7 +203,7 @@ def rows_of(run: Histories, quantity: str, z: Any, body: int) -> tuple[Vector, A
 
 def _rows_of_frame(run: Histories, quantity: str, places: list[Any], body: int) -> tuple[Vector, Any, Vector]:
     """The same of section forces and stress along the members of a frame."""
-    forces = frame_forces_of(run, body)
+    forces = frame_forces_of(run, body, quantity)
     known = (*forces.names, "stress")
     quantity = {"moment": "M", "shear": "Q"}.get(quantity, quantity)
     require(quantity in known, f"quantity must be displacement or one of {', '.join(known)}", quantity, "Run",
@@ -212,10 +212,11 @@ def _rows_of_frame(run: Histories, quantity: str, places: list[Any], body: int) 
     return np.array(rows), places, np.array([forces.preload(z, quantity) for z in places])
 
 
-def frame_forces_of(run: Histories, body: int) -> FrameForces:
+def frame_forces_of(run: Histories, body: int, quantity: str = "a section force") -> FrameForces:
     """The section forces of a frame; ValueError for bodies without sections, and runs that do not keep them."""
     forces = run.readout.section_forces[body]
     if isinstance(forces, FrameForces):
         return forces
-    raise ValueError(f"section forces must be of a Beam, or of a Frame in the process that ran it, got body {body} in "
-                     "Run; ask for displacement(place, direction), rotations included, or for reactions")  # fmt: skip
+    raise ValueError(f"{quantity} is of a Beam, which has sections, or of a Frame whose run was not read from a file, "
+                     f"got body {body} in Run; ask for displacement(place, direction), rotations included, or for "
+                     "reactions")  # fmt: skip

@@ -113,9 +113,7 @@ def _holding(scene: Scene) -> dict[Any, list[str]]:
     for part in scene.supports:
         found.setdefault(part.z, []).extend(dof for dof in part.dofs if dof in scene.beam.components)
     for spring in scene.springs:
-        found.setdefault(spring.z, []).extend(
-            c for c, n in zip(COMPONENTS, spring.along or (0.0,) * 6, strict=True) if n
-        )
+        found.setdefault(spring.z, []).extend(c for c, n in zip(COMPONENTS, spring.along or (), strict=False) if n)
     for mass in scene.masses:
         turning = [c for c in COMPONENTS[3:] if c in scene.beam.components and np.any(mass.inertia)]
         found.setdefault(mass.z, []).extend([*COMPONENTS[:3], *turning])

@@ -26,6 +26,8 @@ Site = str | tuple[int, float]  # a node, or the number of a member and the dist
 
 PLANE = ("x", "y", "rz")
 BENDING = ("x", "y", "rx", "ry")
+DRAWN = 12  # straight pieces of a member in figures
+MOST_DRAWN = 600  # of all members, but two each
 
 
 @dataclass(frozen=True)
@@ -188,6 +190,14 @@ class Frame:
         off = [np.linalg.norm(away - np.outer(away @ axis, axis), axis=1).max()]
         off += [np.linalg.norm(np.cross(start - points[0], axis)) for start in self.starts]
         return axis if max(off) <= SAME_PLACE * self.size else None
+
+    @property
+    def edges(self) -> list[tuple[Any, Any]]:
+        """Pairs of places along the members, which figures join: enough of them for a smooth curve."""
+        steps = max(MOST_DRAWN // len(self.members), 2) if len(self.members) > MOST_DRAWN // DRAWN else DRAWN
+        pairs = zip(self.members, self.lengths, strict=True)
+        chains = [[(one.name, float(s)) for s in np.linspace(0.0, length, steps + 1)] for one, length in pairs]
+        return [pair for chain in chains for pair in pairwise(chain)]
 
     def places(self) -> list[Any]:
         """Names of the nodes."""

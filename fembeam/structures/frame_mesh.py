@@ -155,6 +155,20 @@ class FrameMatrices(Assembled):
 
     mesh: FrameMesh
 
+    def rows_of(self, places: Sequence[Any]) -> sparse.csr_matrix:
+        """`rows` of several places, one below the other, each member at once."""
+        sites = [self.mesh.frame.site(place, "rows") for place in places]
+        count = len(self.mesh.frame.components)
+        pieces, order = [sparse.csr_matrix((0, len(self.labels)))], []
+        for member in {site[0] for site in sites if not isinstance(site, str)}:
+            mine = [(i, site[1]) for i, site in enumerate(sites) if not isinstance(site, str) and site[0] == member]
+            pieces.append(self.mesh.along(member, np.array([s for _, s in mine])))
+            order += [i for i, _ in mine]
+        nodes = [i for i, site in enumerate(sites) if isinstance(site, str)]
+        pieces += [self.rows(places[i]) for i in nodes]
+        back = np.argsort(np.array(order + nodes, dtype=int))
+        return sparse.vstack(pieces, format="csr")[(count * back[:, None] + np.arange(count)).ravel()]
+
     def section_forces(self, vectors: Vector, inertia: Vector) -> FrameForces:
         """Section forces of displacements (N, n) and of the inertia (N, n) that their stiffness balances."""
         return frame_forces(self, vectors, inertia)
