@@ -28,6 +28,7 @@ from fembeam.scene.parts import (
     Support,
 )
 from fembeam.scene.rigid_motions import drifting, rigid_body_modes
+from fembeam.scene.rotors import Disk, Unbalance, driven
 from fembeam.structures import COMPONENTS
 from fembeam.support import is_finite, require, require_finite
 
@@ -37,12 +38,12 @@ if TYPE_CHECKING:
 
 FEATURES: dict[str, tuple[type, ...]] = {
     "supports": get_args(Support),
-    "masses": (LumpedMass,),
+    "masses": (LumpedMass, Disk),
     "springs": (Spring,),
     "dashpots": (Dashpot,),
     "stops": (Stop,),
     "elements": (Element,),
-    "forces": (PointForce, PointMoment),
+    "forces": (PointForce, PointMoment, Unbalance),
     "impactors": (Impactor,),
 }
 
@@ -90,13 +91,13 @@ class Scene:
 
     beam: Any
     supports: Sequence[Support] = ()
-    masses: Sequence[LumpedMass] = ()
+    masses: Sequence[LumpedMass | Disk] = ()
     springs: Sequence[Spring] = ()
     dashpots: Sequence[Dashpot] = ()
     stops: Sequence[Stop] = ()
     damping: ModalDamping | Rayleigh = ModalDamping(0.0)  # noqa: RUF009 (frozen)
     base: Any = None
-    forces: Sequence[PointForce | PointMoment] = ()
+    forces: Sequence[PointForce | PointMoment | Unbalance] = ()
     impactors: Sequence[Impactor] = ()
     bodies: Sequence[Scene] = ()
     gravity: float = 0.0
@@ -107,6 +108,8 @@ class Scene:
             raise TypeError(f"beam must be a Beam, got {self.beam!r} in Scene; make one: Beam(length, section)")
         for name, kinds in FEATURES.items():
             object.__setattr__(self, name, _listed(name, getattr(self, name), kinds))
+            if name == "forces":
+                object.__setattr__(self, name, driven(self.beam, self.forces))
             self._check_places(name)
         if not callable(getattr(self.damping, "modal_coefficients", None)):
             raise TypeError(f"damping must be ModalDamping or Rayleigh, got {self.damping!r} in Scene; "
