@@ -40,7 +40,11 @@ def test_arrows(path):
     assert foreign <= MAY[package]
 
 
-DOORS = {("fembeam.scene", "fembeam.model"), ("fembeam.model", "fembeam.scene_file")}  # methods that open what is above
+DOORS = {
+    ("fembeam.scene", "fembeam.model"),
+    ("fembeam.scene", "fembeam.study"),
+    ("fembeam.model", "fembeam.scene_file"),
+}  # methods that open what is above
 
 
 def room_of(module):

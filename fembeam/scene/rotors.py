@@ -55,8 +55,8 @@ class Disk:
         require_non_negative("mass", self.mass, where, "give kg")
         require_non_negative("diametral", self.diametral, where, "give kg m²")
         require_non_negative("polar", self.polar, where, "give kg m²")
-        require(self.polar <= (2.0 + SLACK) * self.diametral, f"polar must be at most 2 × diametral, "
-                f"{2.0 * self.diametral:g} kg m², as for a thin disk", self.polar, where, "are they exchanged?")  # fmt: skip
+        most = f"polar must be at most 2 × diametral, {2.0 * self.diametral:g} kg m², as of a thin disk"
+        require(self.polar <= (2.0 + SLACK) * self.diametral, most, self.polar, where, "are they exchanged?")
 
     @property
     def inertia(self) -> tuple[float, float, float]:

@@ -33,7 +33,10 @@ from fembeam.structures import COMPONENTS
 from fembeam.support import is_finite, require, require_finite
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from fembeam.model import Model
+    from fembeam.study import Campbell
 
 
 FEATURES: dict[str, tuple[type, ...]] = {
@@ -109,7 +112,7 @@ class Scene:
         for name, kinds in FEATURES.items():
             object.__setattr__(self, name, _listed(name, getattr(self, name), kinds))
             if name == "forces":
-                object.__setattr__(self, name, driven(self.beam, self.forces))
+                object.__setattr__(self, name, driven(self.beam, tuple(self.forces)))
             self._check_places(name)
         if not callable(getattr(self.damping, "modal_coefficients", None)):
             raise TypeError(f"damping must be ModalDamping or Rayleigh, got {self.damping!r} in Scene; "
@@ -192,6 +195,20 @@ class Scene:
         from fembeam.model.reduce import reduced
 
         return reduced(self, modes, elements, omega_max, mass_share, residual, interface)
+
+    def campbell(self, spins: ArrayLike, modes: int = 4, elements: int | None = None) -> Campbell:
+        """Frequencies of a rotor over its spin with the sense of its whirl, and critical speeds; see `study.campbell`.
+
+        Examples
+        --------
+        >>> import fembeam as fb
+        >>> shaft = fb.Frame.straight(0.6, fb.Section.circle(2.1e11, 7850.0, 0.04), bending_only=True)
+        >>> fb.Scene(shaft, [fb.Clamped("A")]).campbell([500.0], modes=2).signed.round(2).tolist()
+        [[-504.18, 505.47]]
+        """
+        from fembeam.study import campbell
+
+        return campbell(self, spins, modes, elements)
 
     @property
     def named(self) -> bool:
