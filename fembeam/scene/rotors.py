@@ -7,7 +7,7 @@ I_d θ₁'' + I_p Ω θ₂' = M₁,   I_d θ₂'' - I_p Ω θ₁' = M₂
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -87,8 +87,8 @@ class Unbalance(Shown):
     z: Place
     moment: float
     phase: float = 0.0
-    direction: Direction | None = None
-    signal: Any = None
+    direction: Direction | None = field(default=None, kw_only=True)
+    signal: Any = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         require_place(self.z, self)

@@ -15,7 +15,7 @@ from fembeam.scene import FEATURES, Scene
 from fembeam.scene_file.keys import entries_of, options, parameters, required
 from fembeam.scene_file.kinds import SECTION, SIGNAL, Nested, nested
 from fembeam.scene_file.study_tables import STUDIES
-from fembeam.scene_file.tables import beam_of_section, snake
+from fembeam.scene_file.tables import USUAL, beam_of_section, snake
 
 Schema = dict[str, Any]
 SIMPLE = {float: "number", int: "integer", bool: "boolean", str: "string", Path: "string"}
@@ -87,7 +87,7 @@ class _Kinds:
         """One entry of [[supports]], [[masses]], ..."""
         if len(features) == 1:
             return self.table(features[0])
-        return {"anyOf": [self.table(f, "kind", snake(f.__name__), f.__name__ == "PointForce") for f in features]}
+        return {"anyOf": [self.table(f, "kind", snake(f.__name__), snake(f.__name__) in USUAL) for f in features]}
 
     def beam(self) -> Schema:
         """A beam of one section, of spans, or of a mesh."""
