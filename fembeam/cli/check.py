@@ -17,6 +17,7 @@ import numpy as np
 import solvers
 from fembeam.cli.unit_checks import doubts
 from fembeam.model.mode_table import mode_rows, mode_table
+from fembeam.model.run import title
 from fembeam.scene import signals_of, unit_of
 
 if TYPE_CHECKING:
@@ -63,13 +64,15 @@ class Check:
     warnings: list[str]
 
     def __str__(self) -> str:
-        lines = [mode_table(self.model)]
+        lines = [*self.structure, mode_table(self.model)]
         lines.append(f"\ncorrelation time of the structure 1/min(ζω): {self.correlation_time:.3g} s")
         for one in self.touched:
             seen = f"{one.contacts} contacts in a trial" if one.contacts else "no contact in a trial"
             speed, force = (unit_of(of, [self.model.contact_rows[one.stop].rotation]) for of in ("speed", "force"))
+            row = self.model.contact_rows[one.stop]
+            called = title(row, one.stop) or f"stop {one.stop}"
             lines.append(
-                f"stop {one.stop}: {seen}; at {one.speed:.3g} {speed} a contact lasts {one.time:.3g} s "
+                f"{called}: {seen}; at {one.speed:.3g} {speed} a contact lasts {one.time:.3g} s "
                 f"({one.periods:.2g} periods of the highest mode kept), peak force {one.peak_force:.3g} {force}"
             )
         if self.stiffened:
@@ -78,6 +81,11 @@ class Check:
         lines += [f"suggested {what}: {count}" for what, count in self.modes.items()]
         lines += [f"suggested {what}: {step:.2g} s" for what, step in self.steps.items()]
         return "\n".join(lines)
+
+    @property
+    def structure(self) -> list[str]:
+        """What the matrices of a structure say."""
+        return self.model.scene.beam.check() if hasattr(self.model.scene.beam, "check") else []
 
     @property
     def stiffened(self) -> list[float]:
@@ -90,6 +98,7 @@ class Check:
     def plain(self) -> dict[str, Any]:
         """For JSON."""
         return {
+            **({"structure": self.structure} if self.structure else {}),
             "modes": mode_rows(self.model),
             "correlation_time": self.correlation_time,
             "stops": [asdict(one) for one in self.touched],

@@ -21,6 +21,8 @@ STEEP = 0.35  # rad; the slope of a beam
 def doubts(file: SceneFile, model: Model) -> list[str]:
     """Warnings about a scene's numbers, as sentences."""
     scene = file.scene
+    if scene.named:
+        return [*of_damping(scene), *of_loads(scene, model), *of_study(file, model)]
     return [*of_beam(scene.beam), *of_features(scene), *of_loads(scene, model), *of_study(file, model)]
 
 
@@ -69,10 +71,13 @@ def of_features(scene: Scene) -> list[str]:
     for i, part in enumerate(scene.acting):
         at = f"stops[{i}]" if i < len(scene.stops) else f"elements[{i - len(scene.stops)}]"
         found += [f"{at}: {said}" for said in [_of_gap(part, scene.beam.length)] if said]
+    return found + of_damping(scene)
+
+
+def of_damping(scene: Scene) -> list[str]:
+    """Ratios that look like per cent."""
     ratios = np.atleast_1d(np.asarray(getattr(scene.damping, "zeta", 0.0), dtype=float))
-    if ratios.max() >= 0.5:
-        found.append(f"zeta = {ratios.max():g} looks like per cent: 1 is critical damping")
-    return found
+    return [f"zeta = {ratios.max():g} looks like per cent: 1 is critical damping"] if ratios.max() >= 0.5 else []
 
 
 def _of_gap(part: Stop | Element, length: float) -> str:
@@ -89,7 +94,8 @@ def of_loads(scene: Scene, model: Model) -> list[str]:
     found = []
     for path, signal in signals_of(scene).items():
         size = getattr(signal, "std", getattr(signal, "amplitude", 0.0))
-        if path.endswith(("base", "foot")) and not callable(size) and np.max(np.abs(size)) > scene.beam.length:
+        long = math.inf if scene.named else scene.beam.length
+        if path.endswith(("base", "foot")) and not callable(size) and np.max(np.abs(size)) > long:
             found.append(f"{path} moves by {np.max(np.abs(size)):g} m, more than the beam is long: is it in mm?")
     top = highest_driven(scene)
     if 0 < top < math.inf:

@@ -50,12 +50,12 @@ class PlacedShapes:
     @classmethod
     def of_words(cls, words: Mapping[str, Any], values: Vector) -> PlacedShapes:
         """The same of a file, with the values (p c, n)."""
-        known, components = tuple(_tuples(place) for place in words["places"]), tuple(words["components"])
+        known, components = tuple(tuples(place) for place in words["places"]), tuple(words["components"])
         positions = [3 * [np.nan] if at is None else at for at in words["positions"]]
         lines = np.array(words["lines"], dtype=int).reshape(-1, 2)
         if len(positions) != len(known) or (lines.size and not 0 <= lines.min() <= lines.max() < len(known)):
             raise ValueError("positions and lines must be of its places")
-        usual = {str(name): _tuples(at) for name, at in words["usual"]}
+        usual = {str(name): tuples(at) for name, at in words["usual"]}
         whole = values.reshape(len(known), len(components), values.shape[1])
         return cls(components, known, whole, usual, np.array(positions, dtype=float).reshape(-1, 3), lines)
 
@@ -86,9 +86,9 @@ class PlacedShapes:
         return np.asarray(part @ self.motion(place))
 
 
-def _tuples(value: Any) -> Any:
+def tuples(value: Any) -> Any:
     """Lists of JSON as tuples."""
-    return tuple(_tuples(one) for one in value) if isinstance(value, list) else value
+    return tuple(tuples(one) for one in value) if isinstance(value, list) else value
 
 
 def placed_shapes(body: BodyMatrices, vectors: Vector, loaded: Sequence[LocalCoordinate]) -> PlacedShapes:

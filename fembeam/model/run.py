@@ -68,6 +68,7 @@ class Run(Histories, Printed):
     on: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 3), dtype=int))  # (m, 3): body, of ON, number
     kinds: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 2), dtype=bool))  # of rotation, always acting
     titles: tuple[str, ...] = ()  # (m,) what tables call each contact, "" for its number
+    acting: tuple[Any, ...] = ()  # (m,) of each contact z, or (place, direction)
     sampled: bool = True  # else t, q, q_dot are the final state alone, and no history
 
     def __repr__(self) -> str:
@@ -130,6 +131,7 @@ class Run(Histories, Printed):
             on=np.array([(one.body, ON.index(one.on[0]), one.on[1]) for one in rows], dtype=int).reshape(-1, 3),
             kinds=np.array([(one.rotation, one.always) for one in rows], dtype=bool).reshape(-1, 2),
             titles=tuple(title(one, number) for number, one in enumerate(rows)),
+            acting=tuple(one.z if one.direction is None else (one.z, one.direction) for one in rows),
             sampled=sampled,
         )
 

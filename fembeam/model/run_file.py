@@ -14,7 +14,7 @@ import numpy as np
 
 import solvers
 from fembeam.model import saved_arrays
-from fembeam.model.placed_shapes import PlacedShapes
+from fembeam.model.placed_shapes import PlacedShapes, tuples
 from fembeam.model.run import Run
 from fembeam.model.shapes import Shapes
 from fembeam.response import READOUT_UNITS, packed, unpacked
@@ -71,6 +71,7 @@ def _contents(run: Run) -> tuple[str, dict[str, Any]]:
         "units": UNITS,
         "versions": versions(),
         "titles": run.titles,
+        "acting": run.acting,
         "bodies": [shapes.words if isinstance(shapes, PlacedShapes) else None for shapes in (run.shapes, *run.others)],
     }
     if run.source is not None:
@@ -210,8 +211,8 @@ def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run
         name = Path(given["name"]).name
         source = Source(path.with_name(name), given["text"], tuple(given["overrides"]), files, of_run=True)
     bodies = sum(name.split("_")[0] == "nodes" for name in arrays)
-    if len(about["bodies"]) != bodies or len(about["titles"]) not in (0, len(arrays["stops"])):
-        raise ValueError(f"its words are of {len(about['bodies'])} bodies, its arrays of {bodies}")
+    if len(about["bodies"]) != bodies or not len(about["titles"]) == len(about["acting"]) == len(arrays["stops"]):
+        raise ValueError("its words and its arrays are of other bodies and stops")
     numbered = zip(about["bodies"], ("", *(f"_{j}" for j in range(1, bodies))), strict=True)
     shapes = [_shapes_of(words, arrays[f"nodes{i}"], arrays[f"shapes{i}"]) for words, i in numbered]
     work, stored, slip = arrays["losses"].T
@@ -238,5 +239,6 @@ def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run
         on=arrays["on"],
         kinds=arrays["kinds"],
         titles=tuple(about["titles"]),
+        acting=tuples(about["acting"]),
         sampled=about["sampled"],
     )

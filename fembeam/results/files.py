@@ -190,8 +190,9 @@ def _contacts(run: Run, discard: float) -> list[dict[str, Any]]:
     rows, parts = [], plot.batches(run, discard)
     for stop in np.flatnonzero(run.kinds[:, 1] == 0).tolist():
         kept = (log.stop == stop) & (log.t_in >= discard) & np.isfinite(log.t_out)
-        row: dict[str, Any] = {"stop": stop, "z": float(run.stops[stop, 0]), "number": int(kept.sum())}
-        row |= {"name": run.name(stop)} if run.kinds[stop, 0] else {}
+        z = float(run.stops[stop, 0])
+        row: dict[str, Any] = {"stop": stop, "z": None if np.isnan(z) else z, "number": int(kept.sum())}
+        row |= {"name": run.name(stop)} if run.kinds[stop, 0] or run.titles[stop] else {}
         row["rate"] = row["number"] / span if span > 0 else None
         row["rate_error"] = _error_of_rate(log.t_in[kept], discard, discard + span, parts)
         columns = {"duration": log.t_out - log.t_in, "peak_force": log.peak_force, "entry_speed": log.speed_in}

@@ -86,7 +86,8 @@ def body_matrices(scene: Scene, elements: int | None, modes: int | None, probes:
     """The matrices of the scene's own body; of one without a mesh of its own `modes` does not matter."""
     for index, place in enumerate(probes):
         scene.beam.check_place(place, f"probes[{index}] of Scene.matrices")
-    assembled = scene.beam.assembled(elements, modes, (*scene.places, *probes))
+    count = elements if getattr(scene.beam, "meshed", True) else None
+    assembled = scene.beam.assembled(count, modes, (*scene.places, *probes))
     held = _held(scene, assembled)
     require(len(held) < assembled.M.shape[0], "supports must leave dofs free", len(held), "Scene", "remove one")
     return _of(scene, assembled, modes, held, condense=True)

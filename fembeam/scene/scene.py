@@ -294,11 +294,13 @@ class Scene:
         for first, second in pairwise(ordered):
             apart = second.z - first.z > near
             require(apart, "supports must not share one place", (first, second), "Scene", "keep one")
-        kinds = [(stop.side, stop.of, stop.coordinate.to or (-1, 0.0)) for stop in self.stops]
+        ways = [tuple(stop.push * part for part in stop.coordinate.along) for stop in self.stops]
+        kinds = [(way, repr(stop.coordinate.to)) for way, stop in zip(ways, self.stops, strict=True)]
         for i, j in pairwise(sorted(range(len(kinds)), key=lambda i: (kinds[i], self.stops[i].z, i))):
             stop, other = self.stops[i], self.stops[j]
             same = kinds[i] == kinds[j] and other.z - stop.z <= near
-            require(not same, f"stops must not share one place and side (z = {stop.z} m, {stop.side})",
+            told_side = stop.side or stop.direction
+            require(not same, f"stops must not share one place and side (z = {stop.z} m, {told_side})",
                     tuple(sorted((i, j))), "stops of Scene",
                     "make them one stop with one law, such as PiecewiseLinear")  # fmt: skip
 
