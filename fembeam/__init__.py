@@ -27,7 +27,8 @@ __version__ = "0.1.0"
 _OFFERED = {
     "beams": "Section Taper Beam ModalDamping Rayleigh",
     "structures": "Frame Joint Member Scale Structure",
-    "scene": "Clamped Dashpot Element Fixed Guided LumpedMass Pinned PointForce PointMoment Scene Spring Stop Impactor",
+    "scene": "Clamped Dashpot Disk Element Fixed Guided LumpedMass Pinned PointForce PointMoment Scene Spring Stop "
+    "Unbalance Impactor",
     "excitation": "Harmonic Multisine BandNoise RollOff Record Pulse SineSweep Step",
     "model": "Model Attractor Orbit Branch Run load",
     "response": "response_spectrum",
@@ -37,10 +38,10 @@ _HOME = {name: folder for folder, names in _OFFERED.items() for name in names.sp
 _MODULES = ["plot", "study"]
 
 __all__ = [
-    "Attractor", "BandNoise", "Beam", "Branch", "Clamped", "Dashpot", "Element", "Fixed", "Frame", "Guided",
+    "Attractor", "BandNoise", "Beam", "Branch", "Clamped", "Dashpot", "Disk", "Element", "Fixed", "Frame", "Guided",
     "Harmonic", "Impactor", "Joint", "LumpedMass", "Member", "ModalDamping", "Model", "Multisine", "Orbit", "Pinned",
     "PointForce", "PointMoment", "Pulse", "Rayleigh", "Record", "RollOff", "Run", "Scale", "Scene", "Section",
-    "SineSweep", "Spring", "Step", "Stop", "Structure", "Taper", "load", "moments", "pdf", "plot", "psd",
+    "SineSweep", "Spring", "Step", "Stop", "Structure", "Taper", "Unbalance", "load", "moments", "pdf", "plot", "psd",
     "response_spectrum", "study",
 ]  # fmt: skip
 
@@ -53,6 +54,7 @@ if TYPE_CHECKING:
     from fembeam.scene import (
         Clamped,
         Dashpot,
+        Disk,
         Element,
         Fixed,
         Guided,
@@ -64,6 +66,7 @@ if TYPE_CHECKING:
         Scene,
         Spring,
         Stop,
+        Unbalance,
     )
     from fembeam.statistics import moments, pdf, psd
     from fembeam.structures import Frame, Joint, Member, Scale, Structure

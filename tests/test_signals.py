@@ -40,7 +40,7 @@ TONE, NOISE = fb.Harmonic(1e-5, 300.0), fb.BandNoise(1e-5, (0.0, 600.0), seed=3)
 
 def signal_fields(kind):
     """Fields that can hold a signal: all whose annotation or name does not say that they hold something else."""
-    return [f.name for f in fields(kind) if f.type not in PLAIN and f.name not in STRUCTURE]
+    return [f.name for f in fields(kind) if f.type not in PLAIN and f.name not in STRUCTURE and not f.kw_only]
 
 
 def made(kind, key, signal):

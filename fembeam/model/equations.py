@@ -161,7 +161,16 @@ class ModalEquations:
         pairs = zip(self.directions, same, strict=True)
         contacts = [solvers.Contact(direction, one.law, one.gap, one.always) for direction, one in pairs]
         rows = [(self.basis.project(row.T)[:, 0], signal) for row, signal in loads(scene, self.matrices)]
-        return solvers.System(np.eye(n), C, np.diag(self.omega**2), contacts, [*rows, *self._frame_loads(scene)])
+        pushed = [*rows, *self._frame_loads(scene)]
+        return solvers.System(np.eye(n), C, np.diag(self.omega**2), contacts, pushed, self.turning)
+
+    @cached_property
+    def turning(self) -> Vector | None:
+        """ΦᵀGΦ (n, n) of what spins, skew-symmetric; None where nothing does."""
+        if self.matrices.gyroscopic is None:
+            return None
+        G = self.basis.project_matrix(self.matrices.gyroscopic)
+        return 0.5 * (G - G.T)
 
     def _frame_loads(self, scene: Scene) -> list[tuple[Vector, Any]]:
         """Loads of base motion and gravity."""

@@ -1,14 +1,15 @@
 """Figures: one function per question, each returns a matplotlib Figure; all but moving pictures draw into your `axes`.
 
 `response`, `bodies`, `spectra`, `contact_histograms` and `animation` hold those of one run, `laws` those of contact
-laws, `orbits` those of periodic motion, `basins` maps of starts, `random` those of random motion, `linear` spectra and
-frequency response, `mode_count` and `methods` those of studies; `run_signals`, `style` and `figure` are what they
-share. Imports: `statistics`, `model` and what they import. Begin with `response`.
+laws, `orbits` those of periodic motion, `campbell` that of rotors, `basins` maps of starts, `random` those of random
+motion, `linear` spectra and frequency response, `mode_count` and `methods` those of studies; `run_signals`, `style` and
+`figure` are what they share. Imports: `statistics`, `model` and what they import. Begin with `response`.
 """
 
 from fembeam.model import places
 from fembeam.plot.animation import animate, frame
 from fembeam.plot.basins import basins
+from fembeam.plot.campbell import campbell
 from fembeam.plot.contact_histograms import contacts
 from fembeam.plot.laws import hysteresis, identification, loops, restitutions
 from fembeam.plot.linear import floor_spectrum, frequency_response, response_spectrum
@@ -22,7 +23,8 @@ from fembeam.plot.spectra import peaks, segment_for, spectra_of, spectrum
 from fembeam.plot.style import one_legend, styled
 
 __all__ = [
-    "animate", "basins", "batches", "bifurcation", "branch", "contacts", "deflected", "densities", "floor_spectrum",
+    "animate", "basins", "batches", "bifurcation", "branch", "campbell", "contacts", "deflected", "densities",
+    "floor_spectrum",
     "frame", "frequency_response", "hysteresis", "identification", "loops", "mode_count", "mode_shapes", "natural",
     "one_legend", "orbit", "peak", "peaks", "places", "random_densities", "random_spectra", "response_spectrum",
     "responses", "restitutions", "sampling_of", "segment_for", "smallest_model", "spectra_of", "spectrum",

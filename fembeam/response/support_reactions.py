@@ -231,6 +231,8 @@ def _acting(model: Model, full: Matrices) -> Vector:
             continue
         for derivative in (0, 1):
             damped += full.interpolation(part.z, derivative, body).T @ rates[[derivative]]
+    if full.gyroscopic is not None:
+        damped -= full.gyroscopic @ vectors
     return np.hstack([pushed, frame, -(full.M @ vectors), damped])
 
 

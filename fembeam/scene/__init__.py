@@ -24,6 +24,7 @@ from fembeam.scene.parts import (
     Stop,
 )
 from fembeam.scene.places import At, Place, is_place, said, split, told
+from fembeam.scene.rotors import Disk, Unbalance
 from fembeam.scene.scene import FEATURES, Scene
 from fembeam.scene.signals import PLACES, for_duration, persistent_drive, signals_of, with_signals
 from fembeam.scene.source import Source

@@ -70,6 +70,7 @@ class Matrices:
     nodes : (m,) coordinates in m.
     dofs : (m, 2) free dof of (u, u_z) at each node, -1 where supported.
     modes : number of modes the mesh was made for, None if the elements were given.
+    gyroscopic : (N, N) skew-symmetric G of what spins, or None.
     bodies : where there are several beams or impactors, the matrices of each beam by itself; else empty. `nodes` and
         `dofs` are those of the scene's own beam.
     impactors : of all bodies, one dof each, the last ones.
@@ -86,6 +87,7 @@ class Matrices:
     nodes: Vector
     dofs: NDArray[np.int64]
     modes: int | None = None
+    gyroscopic: sparse.csr_matrix | None = None
     bodies: tuple[Matrices, ...] = ()
     impactors: tuple[Impactor, ...] = ()
     named = False  # whether its places have names and directions, see `BodyMatrices`
@@ -223,6 +225,8 @@ def _joined(beams: tuple[Matrices, ...], impactors: tuple[Impactor, ...]) -> Mat
         return sparse.block_diag([*blocks, *([sparse.diags(last)] if len(last) else [])], format="csr")
 
     roots = [beam.root for beam in beams if beam.root is not None]
+    turning = [sparse.csr_matrix(beam.M.shape) if beam.gyroscopic is None else beam.gyroscopic for beam in beams]
+    spins = any(beam.gyroscopic is not None for beam in beams)
     along = _base_loads(beams, mass)
     named: dict[str, Any] = {"along": along} if own.named else {}
     return replace(
@@ -232,6 +236,7 @@ def _joined(beams: tuple[Matrices, ...], impactors: tuple[Impactor, ...]) -> Mat
         K=stacked([beam.K for beam in beams], stiffness),
         root=stacked(roots, np.sqrt(stiffness)) if len(roots) == len(beams) else None,
         dashpots=stacked([beam.dashpots for beam in beams], damping),
+        gyroscopic=stacked(turning, 0.0 * mass) if spins else None,
         influence=np.concatenate([*(beam.influence for beam in beams), np.ones(len(mass))]),
         base_load=along.get("y", next(iter(along.values()), np.zeros(0))),
         bodies=beams,

@@ -17,6 +17,7 @@ from scipy import sparse
 import reduction
 from fembeam.scene.assembly import DEFAULT_MODES, Matrices, Vector
 from fembeam.scene.places import told
+from fembeam.scene.rotors import Disk, gyroscopic, turned
 from fembeam.structures import COMPONENTS, Assembled, Frame, Six, following
 from fembeam.support import require
 
@@ -35,14 +36,12 @@ class BodyMatrices(Matrices):
     beam : the body. assembled : what it gave, on all its dofs.
     spread : S (N_all, N) sparse: free dofs to all.
     along : {direction: base load (N,)}. massless : labels of dofs that follow the others statically.
-    gyroscopic : (N, N) skew-symmetric, or None.
     """
 
     assembled: Assembled = None  # type: ignore[assignment]
     spread: sparse.csr_matrix = None
     along: dict[str, Vector] = field(default_factory=dict)
     massless: tuple[Any, ...] = ()
-    gyroscopic: sparse.csr_matrix | None = None
     named = True
 
     @property
@@ -131,7 +130,7 @@ def _of(scene: Scene, assembled: Assembled, modes: int | None, held: Any, conden
     S = S if T is None else (S @ T).tocsr()
     directions = [c for c in COMPONENTS[:3] if c in getattr(scene.beam, "base_directions", scene.beam.components)]
     moved = {c: S.T @ (M @ r) for c, r in zip(directions, assembled.translations.T, strict=True)}
-    G = assembled.gyroscopic
+    G = gyroscopic(scene, assembled)
     M, K, C = ((S.T @ A @ S).tocsr() for A in (M, K, C))
     return BodyMatrices(
         scene.beam,
@@ -180,13 +179,14 @@ def _arms(assembled: Assembled, scene: Scene, mass: Any) -> sparse.csr_matrix:
                 for group in (COMPONENTS[:3], COMPONENTS[3:]))  # fmt: skip
     ex, ey, ez = mass.offset if isinstance(mass.offset, tuple) else (0.0, 0.0, float(mass.offset))
     J = mass.inertia if isinstance(mass.inertia, tuple) else 3 * (mass.inertia,)
+    about = turned(mass, scene.beam, assembled) if isinstance(mass, Disk) else theta
     arm = [
         u[0] + ez * theta[1] - ey * theta[2],
         u[1] + ex * theta[2] - ez * theta[0],
         u[2] + ey * theta[0] - ex * theta[1],
     ]
-    turned = [np.sqrt(j) * t for j, t in zip(J, theta, strict=True)]
-    return sparse.vstack([*(np.sqrt(mass.mass) * row for row in arm), *turned], format="csr")
+    spun = [np.sqrt(j) * t for j, t in zip(J, about, strict=True)]
+    return sparse.vstack([*(np.sqrt(mass.mass) * row for row in arm), *spun], format="csr")
 
 
 def _held(scene: Scene, assembled: Assembled) -> Any:

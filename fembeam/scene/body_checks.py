@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from fembeam.scene.parts import Guided, PointMoment
 from fembeam.scene.places import told
+from fembeam.scene.rotors import Disk, check_shaft
 from fembeam.structures import COMPONENTS, direction_of, named, require_components
 from fembeam.support import is_finite, require
 
@@ -39,6 +40,8 @@ def check_feature(body: Any, feature: Any, name: str, where: str) -> None:
         require_components(direction_of(feature.direction, where), have, what, where)
     require(name != "impactors", "impactors must strike a Beam", feature, where,
             "make the mass a body of its own: Scene(Structure(...)) in bodies")  # fmt: skip
+    if isinstance(feature, Disk):
+        check_shaft(body, feature, where)
     if name == "masses":
         require(any(c in COMPONENTS[:3] for c in have), f"{what} must move to carry a mass", have, where, "move it")
 
@@ -107,6 +110,8 @@ def check_conflicts(scene: Scene) -> None:
 def check_plain(feature: Any, name: str, where: str) -> None:
     """Raise ValueError for what a part on a Beam cannot say: a place by name, a direction out of its plane."""
     require(is_finite(feature.z), "z must be a number on a Beam, which has no names", feature.z, where, "in m")
+    require(not isinstance(feature, Disk), "a Disk needs a shaft: a straight Frame in space", feature, where,
+            "use Frame.straight, or a LumpedMass")  # fmt: skip
     for key in ("offset", "inertia"):
         require(not isinstance(getattr(feature, key, 0.0), tuple), f"{key} must be one number on a Beam",
                 getattr(feature, key, 0.0), where, "give kg m², m")  # fmt: skip

@@ -28,22 +28,26 @@ from fembeam.scene.parts import (
     Support,
 )
 from fembeam.scene.rigid_motions import drifting, rigid_body_modes
+from fembeam.scene.rotors import Disk, Unbalance, driven
 from fembeam.structures import COMPONENTS
 from fembeam.support import is_finite, require, require_finite, require_non_negative, require_positive
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from fembeam.inspection import Check
     from fembeam.model import Model
+    from fembeam.study import Campbell
 
 
 FEATURES: dict[str, tuple[type, ...]] = {
     "supports": get_args(Support),
-    "masses": (LumpedMass,),
+    "masses": (LumpedMass, Disk),
     "springs": (Spring,),
     "dashpots": (Dashpot,),
     "stops": (Stop,),
     "elements": (Element,),
-    "forces": (PointForce, PointMoment),
+    "forces": (PointForce, PointMoment, Unbalance),
     "impactors": (Impactor,),
 }
 
@@ -91,13 +95,13 @@ class Scene:
 
     beam: Any
     supports: Sequence[Support] = ()
-    masses: Sequence[LumpedMass] = ()
+    masses: Sequence[LumpedMass | Disk] = ()
     springs: Sequence[Spring] = ()
     dashpots: Sequence[Dashpot] = ()
     stops: Sequence[Stop] = ()
     damping: ModalDamping | Rayleigh = ModalDamping(0.0)  # noqa: RUF009 (frozen)
     base: Any = None
-    forces: Sequence[PointForce | PointMoment] = ()
+    forces: Sequence[PointForce | PointMoment | Unbalance] = ()
     impactors: Sequence[Impactor] = ()
     bodies: Sequence[Scene] = ()
     gravity: float = 0.0
@@ -108,6 +112,8 @@ class Scene:
             raise TypeError(f"beam must be a Beam, got {self.beam!r} in Scene; make one: Beam(length, section)")
         for name, kinds in FEATURES.items():
             object.__setattr__(self, name, _listed(name, getattr(self, name), kinds))
+            if name == "forces":
+                object.__setattr__(self, name, driven(self.beam, tuple(self.forces)))
             self._check_places(name)
         if not callable(getattr(self.damping, "modal_coefficients", None)):
             raise TypeError(f"damping must be ModalDamping or Rayleigh, got {self.damping!r} in Scene; "
@@ -187,6 +193,20 @@ class Scene:
         from fembeam.model.reduce import reduced
 
         return reduced(self, modes, elements, omega_max, mass_share, residual, interface)
+
+    def campbell(self, spins: ArrayLike, modes: int = 4, elements: int | None = None) -> Campbell:
+        """Frequencies of a rotor over its spin with the sense of its whirl, and critical speeds; see `study.campbell`.
+
+        Examples
+        --------
+        >>> import fembeam as fb
+        >>> shaft = fb.Frame.straight(0.6, fb.Section.circle(2.1e11, 7850.0, 0.04), bending_only=True)
+        >>> fb.Scene(shaft, [fb.Clamped("A")]).campbell([500.0], modes=2).signed.round(2).tolist()
+        [[-504.18, 505.47]]
+        """
+        from fembeam.study import campbell
+
+        return campbell(self, spins, modes, elements)
 
     def check(
         self, duration: float | None = None, dt: float | None = None, discard: float = 0.0, **reduction: Any

@@ -15,7 +15,7 @@ from fembeam.scene import FEATURES, Scene
 from fembeam.scene_file.keys import entries_of, options, parameters, required
 from fembeam.scene_file.kinds import MAKERS, SECTION, SIGNAL, Nested, nested
 from fembeam.scene_file.study_tables import STUDIES
-from fembeam.scene_file.tables import beam_of_section, snake
+from fembeam.scene_file.tables import USUAL, beam_of_section, snake
 
 Schema = dict[str, Any]
 SIMPLE = {float: "number", int: "integer", bool: "boolean", str: "string", Path: "string"}
@@ -87,8 +87,8 @@ class _Kinds:
         """One entry of [[supports]], [[masses]], ..."""
         if len(features) == 1:
             return self.table(features[0])
-        makers = [(MAKERS.get(one, one), one.__name__) for one in features]
-        return {"anyOf": [self.table(make, "kind", snake(name), name == "PointForce") for make, name in makers]}
+        makers = [(MAKERS.get(one, one), snake(one.__name__)) for one in features]
+        return {"anyOf": [self.table(make, "kind", name, name in USUAL) for make, name in makers]}
 
     def beam(self) -> Schema:
         """A beam of one section, of spans, or of a mesh."""

@@ -27,14 +27,17 @@ def structure(reader: TableReader, table: Mapping[str, Any]) -> Structure:
     reader.check_keys(table, KEYS, where, "key")
     for key in FILES[:2]:
         if key not in table:
-            reader.fail(where, f"the key {key!r} is missing (the path of a .mtx or .npz file)")
+            reader.fail(where, f"the key {key!r} is missing (a path, or path and name of one of several matrices)")
     given: dict[str, Any] = {}
     for key in (*FILES, "labels", "nodes"):
         if key in table:
-            named = isinstance(table[key], str)
+            named, value = isinstance(table[key], str), table[key]
+            if key in FILES and isinstance(value, list) and len(value) == 2 and all(isinstance(v, str) for v in value):
+                given[key] = reader.file(value[0], where), value[1]
+                continue
             if key in FILES and not named:
-                reader.fail(where, f"{key} must be the path of a file, got {table[key]!r}")
-            given[key] = reader.file(table[key], where) if named else _inline(key, table[key])
+                reader.fail(where, f"{key} must be the path of a file, got {value!r}")
+            given[key] = reader.file(value, where) if named else _inline(key, value)
     given |= {key: table[key] for key in ("points", "lines") if key in table}
     if "scale" in table:
         units = table["scale"]

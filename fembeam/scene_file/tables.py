@@ -18,6 +18,8 @@ from fembeam.scene_file.structures import PLACES, is_place, place, structure
 
 Table = Mapping[str, Any]
 
+USUAL = ("lumped_mass", "point_force")  # kinds that need not be named
+
 
 class SceneFileError(ValueError):
     """A scene file that cannot be read; the message names file, table, key, and what would be valid."""
@@ -107,7 +109,7 @@ class TableReader:
         for number, table in enumerate(value):
             where = f"[[{name}]] number {number + 1}"
             only = next(iter(kinds.values())) if len(kinds) == 1 else None
-            usual = "point_force" if name == "forces" else ""
+            usual = next((kind for kind in kinds if kind in USUAL), "")
             made.append(self.build(only, table, where) if only else self.choose(kinds, table, where, default=usual))
         return made
 

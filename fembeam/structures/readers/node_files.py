@@ -9,7 +9,7 @@ from fembeam.structures.readers.given import real, wrong
 Place = tuple[float, float, float]
 
 
-def read_nodes(path: Path) -> dict[int, Place]:
+def read_nodes(path: Path) -> dict[int | str, Place]:
     """{node: (x, y, z)} of a .bdf, .dat, .nas, .pch, .inp or a table of four columns, in the units of the file."""
     lines = path.read_text(encoding="latin-1").splitlines()
     if any(line.upper().startswith("GRID") for line in lines):
@@ -17,10 +17,20 @@ def read_nodes(path: Path) -> dict[int, Place]:
     elif any(line.strip().upper().replace(" ", "").startswith("*NODE") for line in lines):
         found = _below_keyword(path, lines)
     else:
-        found = dict(_entry(path, i, line) for i, line in enumerate(lines, 1) if line.strip() and line[0] not in "#$*")
+        found = dict(_named(path, i, line) for i, line in enumerate(lines, 1) if line.strip() and line[0] not in "#$*")
     if not found:
         raise wrong(path, "as a whole", "GRID cards, *NODE, or lines of node x y z", "none")
     return found
+
+
+def _named(path: Path, number: int, line: str) -> tuple[int | str, Place]:
+    """Node, by number or name, and three coordinates."""
+    words = line.replace(",", " ").replace(";", " ").split()
+    try:
+        x, y, z = (real(word) for word in words[1:])
+        return (int(words[0]) if words[0].lstrip("+-").isdigit() else words[0]), (x, y, z)
+    except ValueError:
+        raise wrong(path, f"line {number}", "node, x, y, z", repr(line[:60])) from None
 
 
 def _entry(path: Path, number: int, line: str) -> tuple[int, Place]:
@@ -33,9 +43,9 @@ def _entry(path: Path, number: int, line: str) -> tuple[int, Place]:
         raise wrong(path, f"line {number}", "node, x, y, z", repr(line[:60])) from None
 
 
-def _below_keyword(path: Path, lines: list[str]) -> dict[int, Place]:
+def _below_keyword(path: Path, lines: list[str]) -> dict[int | str, Place]:
     """The lines below *NODE, up to the next keyword."""
-    found: dict[int, Place] = {}
+    found: dict[int | str, Place] = {}
     inside = False
     for number, line in enumerate(lines, 1):
         if line.startswith("**") or not line.strip():
@@ -49,9 +59,9 @@ def _below_keyword(path: Path, lines: list[str]) -> dict[int, Place]:
     return found
 
 
-def _grids(path: Path, lines: list[str]) -> dict[int, Place]:
+def _grids(path: Path, lines: list[str]) -> dict[int | str, Place]:
     """GRID cards: id, system of the place, x, y, z, system of the displacements; only the basic system (0) is known."""
-    found: dict[int, Place] = {}
+    found: dict[int | str, Place] = {}
     for number, line in enumerate(lines, 1):
         if line[:8].split(",")[0].strip().upper().rstrip("*") != "GRID":
             continue

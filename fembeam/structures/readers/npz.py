@@ -43,6 +43,15 @@ def read_npz(path: Path) -> Given:
     return Given(path, tuple(found.items()), labels)
 
 
+def read_npy(path: Path) -> Given:
+    """The one matrix of a .npy."""
+    try:
+        found = np.load(path, allow_pickle=False)
+        return Given(path, ((path.stem, sparse.csr_matrix(found, dtype=float)),))
+    except (ValueError, TypeError, OSError, EOFError) as error:
+        raise wrong(path, "as a whole", "a square array of numbers in a .npy", error) from None
+
+
 def _sparse(path: Path, name: str, size: int, entries: list[Any]) -> sparse.csr_matrix:
     """A matrix from its values, rows and columns, numbered from 0."""
     data, row, column = entries

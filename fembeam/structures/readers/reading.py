@@ -17,12 +17,12 @@ from fembeam.structures.readers.given import COMPONENT, Given, Label, wrong
 from fembeam.structures.readers.harwell_boeing import read_harwell_boeing, read_mapping
 from fembeam.structures.readers.matrix_market import HEAD, read_matrix_market
 from fembeam.structures.readers.node_files import read_nodes
-from fembeam.structures.readers.npz import label_of, read_npz
+from fembeam.structures.readers.npz import label_of, read_npy, read_npz
 from fembeam.structures.readers.op4 import HEADS, read_op4
 
 Source: TypeAlias = str | os.PathLike[str] | tuple[str | os.PathLike[str], str]
 SUFFIXES: dict[str, Callable[[Path], Given]] = {
-    **{".npz": read_npz, ".op4": read_op4, ".mm": read_matrix_market, ".mtx": read_abaqus},
+    **{".npz": read_npz, ".npy": read_npy, ".op4": read_op4, ".mm": read_matrix_market, ".mtx": read_abaqus},
     **{".pch": read_dmig, ".dmig": read_dmig, ".sti": read_calculix, ".mas": read_calculix},
     **{suffix: read_harwell_boeing for suffix in (".matrix", ".hb", ".rsa", ".rua", ".hbmat")},
 }
@@ -33,7 +33,7 @@ def read_matrices(path: str | os.PathLike[str]) -> Given:
 
     Parameters
     ----------
-    path : .npz, .mtx of Matrix Market or Abaqus, .op4, .pch (DMIG), .sti or .mas with the .dof beside it, .matrix
+    path : .npz, .npy, .mtx of Matrix Market or Abaqus, .op4, .pch (DMIG), .sti or .mas with the .dof beside it, .matrix
         (Harwell–Boeing) with its .mapping; a file of another suffix is judged by how it begins.
 
     Returns
@@ -161,7 +161,7 @@ def _of_file(path: Path) -> tuple[Label, ...]:
         return read_mapping(path)
     found = []
     for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
-        words = line.replace(",", " ").split()
+        words = line.replace(",", " ").replace(";", " ").split()
         if words and words[0][0] != "#":
             if len(words) != 2:
                 raise wrong(path, f"line {number}", "a node and a component", repr(line[:60]))

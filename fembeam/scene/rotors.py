@@ -1,0 +1,160 @@
+"""What turns with a shaft: disks and unbalances, on a straight `Frame` that spins.
+
+With the axes e₁ × e₂ = n of the shaft, which turns with Ω about n:
+I_d θ₁'' + I_p Ω θ₂' = M₁,   I_d θ₂'' - I_p Ω θ₁' = M₂
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from fembeam.excitation import Harmonic
+from fembeam.scene.local_coordinate import LocalCoordinate
+from fembeam.scene.places import Place, Shown, told
+from fembeam.structures import COMPONENTS, Assembled, Direction, Six, direction_of
+from fembeam.support import require, require_finite, require_non_negative, require_place
+
+SLACK = 1e-9  # of the polar moment of a thin disk
+
+
+@dataclass(frozen=True)
+class Disk:
+    """A rigid disk across a straight shaft in space; it spins with the shaft, whose `spin` is that of its `Frame`.
+
+    Parameters
+    ----------
+    z : place on the shaft.
+    mass : kg. diametral, polar : I_d across and I_p along the axis, about its centre, kg m²; I_p ≤ 2 I_d of any body.
+
+    Raises
+    ------
+    ValueError : numbers below 0, I_p > 2 I_d; in a scene, a body that is no straight frame in space.
+
+    Examples
+    --------
+    >>> rim = Disk("B", mass=12.0, diametral=0.04, polar=0.075)
+    >>> rim.inertia  # about two axes across the shaft and along it
+    (0.04, 0.04, 0.075)
+    """
+
+    z: Place
+    mass: float
+    diametral: float
+    polar: float
+    offset = 0.0
+
+    def __post_init__(self) -> None:
+        require_place(self.z, self)
+        where = f"Disk at {told(self.z)}"
+        require_non_negative("mass", self.mass, where, "give kg")
+        require_non_negative("diametral", self.diametral, where, "give kg m²")
+        require_non_negative("polar", self.polar, where, "give kg m²")
+        most = f"polar must be at most 2 × diametral, {2.0 * self.diametral:g} kg m², as of a thin disk"
+        require(self.polar <= (2.0 + SLACK) * self.diametral, most, self.polar, where, "are they exchanged?")
+
+    @property
+    def inertia(self) -> tuple[float, float, float]:
+        """About the axes of the shaft, the last one along it."""
+        return self.diametral, self.diametral, self.polar
+
+
+@dataclass(frozen=True, repr=False)
+class Unbalance(Shown):
+    """An eccentric mass on a shaft that spins with Ω: a force m e Ω² that turns with it.
+
+    f = m e Ω² (e₁ cos(Ωt + phase) + e₂ sin(Ωt + phase))
+
+    Parameters
+    ----------
+    z : place on the shaft. moment : m e in kg m, ≥ 0. phase : rad, at t = 0 from e₁ to e₂; of a shaft along z x to y.
+    direction, signal : left to the scene, which makes two forces of it, along e₁ and e₂, and lets them follow the spin.
+
+    Examples
+    --------
+    >>> import fembeam as fb
+    >>> shaft = fb.Frame.straight(0.5, fb.Section.circle(2.1e11, 7850.0, 0.04), spin=100.0)
+    >>> scene = fb.Scene(shaft, [fb.Clamped("A")], forces=[Unbalance("B", 1e-4)])
+    >>> [round(float(force.signal(0.0)), 12) for force in scene.forces]
+    [1.0, 0.0]
+    """
+
+    z: Place
+    moment: float
+    phase: float = 0.0
+    direction: Direction | None = field(default=None, kw_only=True)
+    signal: Any = field(default=None, kw_only=True)
+
+    def __post_init__(self) -> None:
+        require_place(self.z, self)
+        where = f"Unbalance at {told(self.z)}"
+        require_non_negative("moment", self.moment, where, "give m e in kg m")
+        require_finite("phase", self.phase, where, "give rad")
+
+    @property
+    def along(self) -> Six | None:
+        """Its direction on the six components."""
+        return None if self.direction is None else direction_of(self.direction, f"Unbalance at {told(self.z)}")
+
+    @property
+    def coordinate(self) -> LocalCoordinate:
+        """What it acts on."""
+        return LocalCoordinate(self.z, 0, None, self.along)
+
+    def pair(self, axes: NDArray[np.float64]) -> tuple[Unbalance, ...]:
+        """The forces along both axes across the shaft; itself if it is one of them."""
+        if self.direction is not None:
+            return (self,)
+        first, second = (tuple(float(x) for x in axis) for axis in axes[:2])
+        return replace(self, direction=first), replace(self, direction=second, phase=self.phase - 0.5 * math.pi)
+
+    def spun(self, spin: float) -> Unbalance:
+        """The same with the signal of a spin; what was made of that signal stays."""
+        size, known = self.moment * spin**2, self.signal
+        if known is not None and (getattr(known, "omega", abs(spin)), getattr(known, "amplitude", size)) == (
+            abs(spin), size):  # fmt: skip
+            return self
+        return replace(self, signal=Harmonic(size, abs(spin), math.copysign(1.0, spin) * self.phase))
+
+
+def check_shaft(body: Any, part: Any, where: str) -> None:
+    """Raise ValueError unless a body is a shaft: a straight frame in space; for an unbalance, one that spins."""
+    name = type(part).__name__
+    straight = getattr(body, "axis", None) is not None and {"rx", "ry"} <= set(getattr(body, "components", ()))
+    require(straight, f"{name} needs a shaft: a straight Frame in space", body, where, "use Frame.straight")
+    spins = not isinstance(part, Unbalance) or body.spin != 0.0
+    require(spins, f"{name} needs a shaft that spins", 0.0, where, "give the Frame a spin in rad/s")
+
+
+def driven(body: Any, forces: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Forces with each unbalance as two, of the shaft's spin."""
+    found: list[Any] = []
+    for index, force in enumerate(forces):
+        if isinstance(force, Unbalance):
+            check_shaft(body, force, f"forces[{index}] (Unbalance) of Scene")
+            found += [one.spun(body.spin) for one in force.pair(body.axes[0])]
+        else:
+            found.append(force)
+    return tuple(found)
+
+
+def turned(disk: Disk, body: Any, assembled: Assembled) -> list[sparse.csr_matrix]:
+    """Rows (1, N_all) of a disk's rotations about the three axes of the shaft."""
+    rows = assembled.rows(disk.z).tocsr()
+    theta = [rows[body.components.index(c)] if c in body.components else 0.0 * rows[0] for c in COMPONENTS[3:]]
+    return [sum(axis[j] * theta[j] for j in range(3)).tocsr() for axis in body.axes[0]]
+
+
+def gyroscopic(scene: Any, assembled: Assembled) -> sparse.csr_matrix | None:
+    """G (N_all, N_all) of the body and of the disks on it; None where nothing spins."""
+    G, spin = assembled.gyroscopic, getattr(scene.beam, "spin", 0.0)
+    for disk in (mass for mass in scene.masses if isinstance(mass, Disk) and spin != 0.0):
+        first, second, _ = turned(disk, scene.beam, assembled)
+        half = disk.polar * spin * (first.T @ second)
+        G = half - half.T if G is None else G + half - half.T
+    return None if G is None else sparse.csr_matrix(G)

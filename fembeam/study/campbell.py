@@ -1,0 +1,155 @@
+"""Campbell diagram: frequencies of a rotor over its spin, with the sense in which it whirls, and critical speeds.
+
+M q'' + Ω G q' + K q = 0 on real modes at standstill; stops, elements, damping and loads are left out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+
+import reduction
+from fembeam import plot
+from fembeam.scene import Scene
+from fembeam.structures import COMPONENTS, Frame
+from fembeam.study.result import Result
+from fembeam.support import Part, is_whole, require
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Vector = NDArray[np.float64]
+WHERE = "campbell"
+SPARE = 12  # modes at standstill besides twice those shown: errors below 1e-7 of the lowest
+STILL = 1e-9  # of |G|: a rigid motion that does not turn the shaft's axis, such as its own rotation
+SENSES = {1: "forward", -1: "backward", 0: "straight"}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Campbell(Result):
+    """Frequencies over spin.
+
+    Attributes
+    ----------
+    spins : Ω (k,), rad/s.
+    omega : (k, n) rad/s, ascending for each spin.
+    turning : (k, n) 1 for forward whirl (the way of a positive spin), -1 backward, 0 for motion on a line.
+    critical : (c,) spins at which a whirl has the frequency of the spin, up to the largest spin; negative for backward
+        ones, which an unbalance of a round rotor does not excite.
+    """
+
+    INDEX: ClassVar[str] = "spin"
+
+    spins: Vector
+    omega: Vector
+    turning: NDArray[np.int64]
+    critical: Vector
+
+    def __repr__(self) -> str:
+        return f"<Campbell diagram of {self.omega.shape[1]} modes over {len(self.spins)} spins>"
+
+    @property
+    def signed(self) -> Vector:
+        """(k, n) rad/s, negative for backward whirl."""
+        return np.where(self.turning < 0, -self.omega, self.omega)
+
+    def table(self) -> list[dict[str, Any]]:
+        """A row for each spin: the frequencies in rad/s, negative for backward whirl."""
+        names = [f"mode {i + 1}" for i in range(self.omega.shape[1])]
+        return [
+            {"spin": float(spin), **dict(zip(names, row.tolist(), strict=True))}
+            for spin, row in zip(self.spins, self.signed, strict=True)
+        ]
+
+    def figure(self) -> Figure:
+        """Frequencies over spin, forward and backward; see `plot.campbell`."""
+        return plot.campbell(self)
+
+    def _parts(self) -> list[Part]:
+        found = ", ".join(f"{abs(w):.6g} rad/s ({SENSES[int(np.sign(w))]})" for w in self.critical)
+        head = ["spin / rad/s", *(f"ω{i + 1}" for i in range(self.omega.shape[1]))]
+        rows = [[float(spin), *row.tolist()] for spin, row in zip(self.spins, self.signed, strict=True)]
+        return [repr(self), f"critical speeds: {found or 'none in this range'}", (head, rows)]
+
+
+def campbell(scene: Scene, spins: ArrayLike, modes: int = 4, elements: int | None = None) -> Campbell:
+    """Frequencies of a rotor over its spin, and its critical speeds.
+
+    Parameters
+    ----------
+    scene : with a straight `Frame` in space, whatever its own spin; its disks, masses, springs and supports count.
+    spins : (k,) rad/s, ascending.
+    modes : how many frequencies of each spin.
+    elements : of the mesh; None: as few as make the frequencies right to 1e-6.
+
+    Returns
+    -------
+    Campbell : print it, `table()`, `figure()`, `critical`.
+
+    Raises
+    ------
+    ValueError : a body that is no shaft, spins that are not ascending numbers, modes that is no count.
+
+    References
+    ----------
+    W. Campbell, Protection of steam turbine disk wheels from axial vibration, Trans. ASME 46 (1924) 31.
+
+    Examples
+    --------
+    >>> import fembeam as fb
+    >>> shaft = fb.Frame.straight(0.5, fb.Section.circle(2.1e11, 7850.0, 0.04), bending_only=True)
+    >>> scene = fb.Scene(shaft, [fb.Clamped("A")], masses=[fb.Disk("B", 12.0, diametral=0.04, polar=0.075)])
+    >>> found = campbell(scene, [0.0, 300.0], modes=2)
+    >>> found.signed[1].round(1).tolist(), found.critical.round(1).tolist()
+    ([-208.8, 223.9], [-211.1, 221.9])
+    """
+    speeds = np.atleast_1d(np.array(spins, dtype=float))
+    valid = speeds.ndim == 1 and speeds.size > 0 and bool(np.isfinite(speeds).all() and np.all(np.diff(speeds) > 0))
+    require(valid, "spins must be finite and ascending, (k,)", spins, WHERE, "give rad/s, such as np.linspace(0, 600)")
+    require(is_whole(modes) and modes > 0, "modes must be a whole number above 0", modes, WHERE, "give a count")
+    basis, G, across = _at_unit_spin(scene, int(modes), elements)
+    found = [reduction.whirl(basis, spin * G, *across) for spin in speeds]
+    critical = reduction.critical_speeds(basis, G, *across).signed
+    return Campbell(
+        speeds,
+        np.array([one.omega[:modes] for one in found]),
+        np.array([one.turning[:modes] for one in found]),
+        critical[np.abs(critical) <= np.abs(speeds).max()],
+    )
+
+
+def _at_unit_spin(scene: Scene, modes: int, elements: int | None) -> tuple[reduction.Basis, Any, tuple[Any, Any]]:
+    """Modes at standstill without rigid motions that do not tilt the shaft, G per rad/s, rows across the shaft."""
+    body = scene.beam
+    shaft = isinstance(body, Frame) and body.axis is not None and not body.in_plane and not scene.bodies
+    require(shaft, "a Campbell diagram needs one shaft: a straight Frame in space", body, WHERE, "use Frame.straight")
+    spun = replace(scene, beam=replace(body, spin=1.0), stops=(), elements=(), forces=(), base=None, gravity=0.0)
+    wanted = 2 * modes + SPARE
+    matrices: Any = spun.matrices(elements, wanted)
+    count = min(wanted, matrices.M.shape[0])
+    require(modes <= count, f"modes must be at most {count} (free dofs)", modes, WHERE, "ask for fewer")
+    basis, G = reduction.modal_basis(matrices.M, matrices.K, count, root=matrices.root), matrices.gyroscopic
+    tilts = np.linalg.norm(G @ basis.vectors, axis=0) > STILL * abs(G).max() * np.linalg.norm(basis.vectors, axis=0)
+    kept = (basis.omega > 0.0) | tilts
+    return reduction.Basis(basis.vectors[:, kept], basis.omega[kept]), G, _across(matrices, spun.beam)
+
+
+def _across(matrices: Any, body: Frame) -> tuple[Any, Any]:
+    """Rows (nodes, N) of the displacements of all nodes along both axes across the shaft."""
+    rows: list[list[Any]] = [[], []]
+    for axis, entries in zip(body.axes[0][:2], rows, strict=True):
+        part = dict(zip(COMPONENTS[:3], axis, strict=True))
+        nodes: dict[Any, int] = {}
+        for dof, (node, component) in enumerate(matrices.assembled.labels):
+            if component in part:
+                entries.append((nodes.setdefault(node, len(nodes)), dof, part[component]))
+    size = len(matrices.assembled.labels)
+    made = []
+    for entries in rows:
+        i, j, values = zip(*entries, strict=True)
+        made.append((sparse.csr_matrix((values, (i, j)), shape=(max(i) + 1, size)) @ matrices.spread).toarray())
+    return made[0], made[1]

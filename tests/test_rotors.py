@@ -1,0 +1,222 @@
+"""Rotors of scenes: whirl of the exact shaft, Campbell diagrams, unbalance, identities of turned shafts, bad input."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import fembeam as fb
+from contacts import Hertz
+from fembeam import plot
+
+SECTION = fb.Section.circle(2.1e11, 7850.0, 0.04)
+LENGTH, DISK = 0.5, fb.Disk("B", mass=12.0, diametral=0.04, polar=0.075)
+SPEEDS = np.array([0.0, 150.0, 300.0])
+
+
+def rotor(spin=300.0, **parts):
+    shaft = fb.Frame.straight(LENGTH, SECTION, spin=spin, bending_only=True)
+    return fb.Scene(shaft, [fb.Clamped("A")], masses=[DISK], **parts)
+
+
+def determinant(omega, spin, disk=DISK):
+    """Of the exact Rayleigh shaft, u = u_x + i u_y, and the disk: zero at a forward whirl ω > 0 or a backward one < 0.
+
+    EI u'''' + ρI (ω² - 2Ωω) u'' = ρA ω² u;  EI u'' = (I_d ω² - I_p Ω ω) u', EI u''' + ρI (ω² - 2Ωω) u' = -m ω² u.
+    """
+    EI, rho_A, turn = SECTION.bending_stiffness, SECTION.line_mass, 7850.0 * SECTION.I * (omega**2 - 2.0 * spin * omega)
+    squares = np.roots([EI, turn, -rho_A * omega**2])
+    roots = np.concatenate([s * np.sqrt(squares.astype(complex)) for s in (1.0, -1.0)])
+    at_end = np.exp(roots * LENGTH)
+    rows = [
+        np.ones(4),
+        roots,
+        (EI * roots**2 - (disk.diametral * omega**2 - disk.polar * spin * omega) * roots) * at_end,
+        (EI * roots**3 + turn * roots + disk.mass * omega**2) * at_end,
+    ]
+    scaled = np.array([row / np.abs(row).max() for row in rows])
+    return np.linalg.det(scaled) / np.prod(roots[:2]) / (squares[0] - squares[1])
+
+
+def exact(near, spin):
+    """The root of the real or imaginary part next to a value; spin None: that of the frequency itself."""
+
+    def value(omega):
+        found = determinant(omega, omega if spin is None else spin)
+        return found.imag if abs(found.imag) > abs(found.real) else found.real
+
+    return brentq(value, *sorted((0.9999 * near, 1.0001 * near)), xtol=1e-12 * abs(near))
+
+
+# --- Campbell diagrams ------------------------------------------------------------------------------------------------
+
+
+def test_frequencies_are_those_of_the_exact_shaft():
+    found = rotor().campbell(SPEEDS, modes=4)
+    assert found.signed.shape == (3, 4)
+    for spin, row in zip(SPEEDS, found.signed, strict=True):
+        for omega in row:
+            assert omega == pytest.approx(exact(omega, spin), rel=2e-6)
+
+
+def test_critical_speeds_are_where_the_whirl_has_the_spin():
+    found = rotor().campbell([0.0, 6000.0], modes=4)
+    assert len(found.critical) >= 4
+    for speed in found.critical:
+        assert speed == pytest.approx(exact(speed, abs(speed)), rel=2e-6)
+    forward = found.critical[found.critical > 0.0]
+    at_speed = rotor().campbell([forward[0]], modes=2)
+    assert at_speed.signed.max() == pytest.approx(forward[0], rel=1e-9)
+
+
+def test_table_text_and_figure():
+    found = rotor().campbell(np.linspace(0.0, 400.0, 5), modes=2)
+    rows = found.table()
+    assert [row["spin"] for row in rows] == [0.0, 100.0, 200.0, 300.0, 400.0]
+    assert rows[3]["mode 1"] < 0.0 < rows[3]["mode 2"]
+    assert "critical speeds: 211.048 rad/s (backward), 221.961 rad/s (forward)" in str(found)
+    axis = found.figure().axes[0]
+    assert [text.get_text() for text in axis.get_legend().get_texts()] == [
+        "forward",
+        "backward",
+        "ω = Ω",
+        "critical speeds",
+    ]
+    assert plot.campbell(found).axes[0].get_ylabel() == "frequency ω / rad s⁻¹"
+
+
+def test_motion_on_a_line_has_no_sense():
+    """Bearings of two stiffnesses: at standstill the modes move on lines; stretch and twist of a full frame too."""
+    springs = [fb.Spring("B", k, direction=way) for k, way in ((4e5, "x"), (9e5, "y"))]
+    found = replace(rotor(), springs=springs).campbell([0.0, 300.0], modes=2)
+    assert found.turning[0].tolist() == [0, 0]
+    assert sorted(found.turning[1].tolist()) == [-1, 1]
+    full = fb.Scene(fb.Frame.straight(LENGTH, SECTION), [fb.Fixed("A", "x", "y", "z", "rx", "ry")], masses=[DISK])
+    lines = full.campbell([300.0], modes=4)  # its own rotation is a rigid motion and no mode
+    np.testing.assert_allclose(lines.signed[0, :2], rotor().campbell([300.0], modes=2).signed[0], rtol=1e-6)
+    assert lines.omega.min() > 100.0
+
+
+@pytest.mark.parametrize("way", [(0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (0.36, 0.48, -0.8)])
+def test_a_shaft_turned_in_space_whirls_the_same(way):
+    nodes = {"A": (0.1, 0.2, 0.3), "B": tuple(np.array([0.1, 0.2, 0.3]) + LENGTH * np.array(way))}
+    shaft = fb.Frame.polyline(nodes, SECTION)
+    scene = fb.Scene(shaft, [fb.Clamped("A")], masses=[DISK])
+    expected = rotor().campbell(SPEEDS, modes=2)
+    found = scene.campbell(SPEEDS, modes=2)
+    np.testing.assert_allclose(found.signed, expected.signed, rtol=1e-6)
+    np.testing.assert_allclose(found.critical, expected.critical, rtol=1e-6)
+
+
+# --- unbalance --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("spin", [150.0, -150.0, 300.0])
+def test_an_unbalance_whirls_the_shaft_on_a_circle(spin):
+    """Its radius is that of one plane's disk of inertia I_d - I_p, driven by m e Ω²."""
+    scene = rotor(spin, forces=[fb.Unbalance("B", 1e-4)], damping=fb.ModalDamping(0.02))
+    model = scene.reduce(6)
+    n = len(model.omega)
+    Z = np.zeros(n, dtype=complex)
+    for vector, signal in model.system.loads:
+        Z += np.asarray(vector) * signal.tones()[1][0]
+    A = np.diag(model.omega**2 - spin**2) + 1j * abs(spin) * model.system.by_rate
+    q = np.linalg.solve(A, Z)
+    start = np.concatenate([q.real, (1j * abs(spin) * q).real])
+    run = model.simulate(0.2, 1e-3, start)
+    x, y = run.displacement("B", "x"), run.displacement("B", "y")
+    np.testing.assert_allclose(np.hypot(x, y), np.hypot(x, y)[0], rtol=1e-9)
+    turned = x[:-1] * np.diff(y) - y[:-1] * np.diff(x)
+    assert np.all(np.sign(turned) == np.sign(spin))
+
+
+def test_an_unbalance_follows_the_spin():
+    scene = rotor(forces=[fb.Unbalance("B", 1e-4, phase=0.3)])
+    assert [force.signal.amplitude for force in scene.forces] == [9.0, 9.0]
+    faster = replace(scene, beam=replace(scene.beam, spin=600.0))
+    assert [force.signal.amplitude for force in faster.forces] == [36.0, 36.0]
+    assert [force.signal.omega for force in faster.forces] == [600.0, 600.0]
+    again = replace(faster, beam=scene.beam)
+    assert again.forces == scene.forces
+    t = np.linspace(0.0, 0.1, 7)
+    np.testing.assert_allclose(scene.forces[0].signal(t), 9.0 * np.cos(300.0 * t + 0.3), atol=1e-12)
+    np.testing.assert_allclose(scene.forces[1].signal(t), 9.0 * np.sin(300.0 * t + 0.3), atol=1e-12)
+
+
+# --- runs -------------------------------------------------------------------------------------------------------------
+
+
+def test_reactions_hold_what_the_unbalance_does():
+    """Over all: reactions + unbalance = change of momentum, in each direction; gyroscopic moments at the clamp."""
+    scene = rotor(forces=[fb.Unbalance("B", 1e-4)], damping=fb.ModalDamping(0.0))
+    model = scene.reduce(10)
+    run = model.simulate(0.05, 5e-4)
+    at_clamp = run.reactions()[0]
+    matrices = model.matrices
+    loose = matrices.loosened(scene)
+    whole = matrices.spread @ model.basis.vectors  # all dofs per coordinate
+    a = run.q_ddot if hasattr(run, "q_ddot") else None
+    if a is None:
+        system = model.system
+        pushed = sum(np.outer(signal(run.t), vector) for vector, signal in system.loads)
+        a = pushed - run.q @ system.K - run.q_dot @ system.by_rate.T
+    r = loose.assembled.translations[:, 0]
+    momentum = a @ (whole.T @ (loose.M @ r))
+    force = scene.forces[0].signal(run.t)
+    np.testing.assert_allclose(at_clamp["x"] + force, momentum, atol=2e-3 * np.abs(momentum).max())
+
+
+def test_a_stop_on_the_housing_is_met_as_by_another_method():
+    from solvers import DormandPrince
+
+    stop = fb.Stop("B", Hertz(1e9), gap=1e-5, direction="x", name="housing")
+    model = rotor(200.0, forces=[fb.Unbalance("B", 1e-4)], stops=[stop], damping=fb.ModalDamping(0.02)).reduce(4)
+    run = model.simulate(0.15, 1e-3)
+    other = model.simulate(0.15, 1e-3, solver=DormandPrince(1e-11, 1e-16))
+    assert len(run.contacts) == len(other.contacts) >= 3
+    np.testing.assert_allclose(run.q, other.q, atol=1e-5 * np.abs(run.q).max())
+    assert np.abs(run.energy.residual).max() < 1e-7 * np.abs(run.energy.input).max()
+
+
+def test_frequency_response_of_a_rotor_is_that_of_its_matrices():
+    model = rotor(300.0, damping=fb.ModalDamping(0.01)).reduce(4)
+    omega = np.array([100.0, 208.8, 223.9])
+    found = model.frequency_response(omega, ("B", "x"), ("B", "y"))
+    b, c = model.phi(("B", "x")), model.phi(("B", "y"))
+    exact = [c @ np.linalg.solve(np.diag(model.omega**2 - w**2) + 1j * w * model.system.by_rate, b) for w in omega]
+    np.testing.assert_allclose(found.values, exact, rtol=1e-10)
+    assert abs(exact[1]) > 1e-6  # spin couples the planes
+
+
+# --- bad input --------------------------------------------------------------------------------------------------------
+
+
+def test_disks_and_unbalances_are_refused_in_words():
+    with pytest.raises(
+        ValueError, match=r"polar must be at most 2 × diametral, 0.08 kg m², as of a thin disk, got 0.09"
+    ):
+        fb.Disk("B", 1.0, diametral=0.04, polar=0.09)
+    with pytest.raises(ValueError, match=r"diametral"):
+        fb.Disk("B", 1.0, diametral=-0.04, polar=0.0)
+    with pytest.raises(ValueError, match=r"moment"):
+        fb.Unbalance("B", math.nan)
+    with pytest.raises(ValueError, match=r"a Disk needs a shaft: a straight Frame in space"):
+        fb.Scene(fb.Beam(1.0, SECTION), [fb.Clamped(0.0)], masses=[fb.Disk(1.0, 1.0, 0.1, 0.1)])
+    plane = fb.Frame.polyline({"A": (0, 0), "B": (1, 0)}, SECTION)
+    with pytest.raises(ValueError, match=r"Disk needs a shaft: a straight Frame in space"):
+        fb.Scene(plane, [fb.Clamped("A")], masses=[DISK])
+    with pytest.raises(ValueError, match=r"Unbalance needs a shaft that spins"):
+        rotor(0.0, forces=[fb.Unbalance("B", 1e-4)])
+    with pytest.raises(ValueError, match=r"Unbalance needs a shaft"):
+        fb.Scene(fb.Beam(1.0, SECTION), [fb.Clamped(0.0)], forces=[fb.Unbalance(1.0, 1e-4)])
+
+
+def test_campbell_arguments_are_refused():
+    with pytest.raises(ValueError, match=r"a Campbell diagram needs one shaft: a straight Frame in space"):
+        fb.Scene(fb.Beam(1.0, SECTION), [fb.Clamped(0.0)]).campbell([0.0])
+    with pytest.raises(ValueError, match=r"spins must be finite and ascending"):
+        rotor().campbell([100.0, 0.0])
+    with pytest.raises(ValueError, match=r"modes must be a whole number above 0"):
+        rotor().campbell([100.0], modes=0)
