@@ -21,7 +21,16 @@ from matplotlib.figure import Figure
 
 HOME = Path(__file__).parent.parent.parent
 PAGES = HOME / "docs" / "verification"
-SHEETS = ("natural_frequencies",)
+SHEETS = (
+    "natural_frequencies",
+    "tip_mass",
+    "axial_load",
+    "hertz",
+    "restitution",
+    "bouc_wen",
+    "iwan",
+    "masing",
+)
 COMMAND = "python tests/verification"
 MADE = f"<!-- made by `{COMMAND} --write` from tests/verification -->\n"
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
