@@ -1,0 +1,167 @@
+"""Verification sheets: a benchmark each, from its problem to the page that shows it.
+
+A sheet is a module of this folder, named in `SHEETS`. It offers
+
+    __doc__            title, then the problem in words and numbers, in Markdown
+    SOURCE             who published it, in Markdown
+    rows()             what is compared, a list of `Row`
+    draw(rig, plot)    a drawing of the problem and one of the result, into two axes
+
+All of `docs/verification` is made from these, by `python tests/verification --write`.
+"""
+
+import re
+import runpy
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+HOME = Path(__file__).parent.parent.parent
+PAGES = HOME / "docs" / "verification"
+SHEETS = (
+    "natural_frequencies",
+    "tip_mass",
+    "axial_load",
+    "hertz",
+    "restitution",
+    "bouc_wen",
+    "iwan",
+    "masing",
+)
+COMMAND = "python tests/verification"
+MADE = f"<!-- made by `{COMMAND} --write` from tests/verification -->\n"
+NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+UNSEEN = 1e-9  # errors below it are rounding, other processors have others
+
+
+@dataclass(frozen=True)
+class Row:
+    """One number: as the published formula gives it, evaluated here, and as fembeam finds it.
+
+    ``printed`` is the number as it stands in the source, or what the source claims, where there is one. ``allowed`` is
+    the largest relative error; above 1e-2 it is one of chance or of an approximation.
+    """
+
+    quantity: str
+    formula: float
+    ours: float
+    allowed: float
+    printed: str = ""
+
+    @property
+    def error(self):
+        """Of ours, relative."""
+        return abs(self.ours / self.formula - 1.0)
+
+
+def sheet(name):
+    """The module of a sheet."""
+    return import_module(name)
+
+
+@cache
+def rows(name):
+    """What a sheet compares, computed once."""
+    return sheet(name).rows()
+
+
+@cache
+def example(name):
+    """What a script of the course computes, by name."""
+    return runpy.run_path(str(HOME / "examples" / f"{name}.py"))
+
+
+def title(name):
+    """The heading of a sheet."""
+    return sheet(name).__doc__.splitlines()[0]
+
+
+def size(error):
+    """An error as text."""
+    return f"{error:.1e}" if error >= UNSEEN else f"< {UNSEEN:.0e}"
+
+
+def cells(row, printed):
+    """Text of one line of a table."""
+    claimed = [row.printed] * printed
+    off = [size(abs(float(row.printed) / row.formula - 1.0)) if row.printed else ""] * printed
+    return [row.quantity, *claimed, f"{row.formula:.8g}", f"{row.ours:.8g}", *off, size(row.error), f"{row.allowed:.0e}"]
+
+
+def table(name):
+    """Lines of text: the numbers of a sheet."""
+    found = rows(name)
+    printed = any(row.printed for row in found)
+    heads = ["", *["published"] * printed, "formula", "fembeam", *["error of published"] * printed]
+    return lines([[*heads, "error of fembeam", "allowed"], *(cells(row, printed) for row in found)])
+
+
+def lines(entries):
+    """A table in Markdown; the first entry holds the headings."""
+    heads, *others = entries
+    return "\n".join(f"| {' | '.join(entry)} |" for entry in [heads, ["---"] * len(heads), *others])
+
+
+def page(name):
+    """Text of the page of a sheet."""
+    parts = [
+        MADE + f"# {title(name)}",
+        sheet(name).__doc__.split("\n", 1)[1].strip(),
+        f"**Source.** {sheet(name).SOURCE}",
+        f"![The problem, and the result]({name}.png)",
+        "Relative errors against the formula:",
+        table(name),
+        f"`{COMMAND} {name}` computes this table.",
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def overview():
+    """Lines of the table of all sheets: title, source, how many numbers, the largest error."""
+    entries = [["", "sheet", "source", "numbers", "largest error", "allowed there"]]
+    for count, name in enumerate(SHEETS, start=1):
+        worst = max(rows(name), key=lambda row: row.error)
+        source = re.split(r"(?<=\d{4})[a-z]?\b", sheet(name).SOURCE)[0].replace("*", "")
+        link = f"[{title(name)}]({name}.md)"
+        entries.append([str(count), link, source, str(len(rows(name))), size(worst.error), f"{worst.allowed:.0e}"])
+    return lines(entries)
+
+
+def index():
+    """Text of the page that lists all sheets: that of `index.txt`, with their table and their menu."""
+    text = Path(__file__).with_name("index.txt").read_text(encoding="utf-8")
+    return MADE + text.format(table=overview(), sheets="\n".join(SHEETS))
+
+
+def figure(name):
+    """Drawing of the problem beside that of the result."""
+    found = Figure(figsize=(8.4, 3.2), layout="constrained")
+    rig, plot = found.subplots(1, 2, width_ratios=(1.0, 1.25))
+    rig.set_aspect("equal")
+    rig.axis("off")
+    sheet(name).draw(rig, plot)
+    return found
+
+
+def current(written, made):
+    """Whether a written page says what is made now: the same words, and numbers up to another processor's rounding.
+
+    Numbers agree to 1e-6, small ones (errors) to half their size; where more than 1 % is allowed, to what is allowed.
+    """
+    if NUMBER.split(written) != NUMBER.split(made):
+        return False
+    for old, new in zip(written.splitlines(), made.splitlines(), strict=True):
+        before, after = ([float(one) for one in NUMBER.findall(line)] for line in (old, new))
+        loose = after[-1] if old.startswith("|") and after and 1e-2 < after[-1] < 1.0 else 0.0
+        if not all(same(a, b, loose) for a, b in zip(before, after, strict=True)):
+            return False
+    return True
+
+
+def same(old, new, loose):
+    """Whether two numbers of a page are one, but for rounding or, in loose lines, for chance."""
+    within = 0.5 * abs(new) + 2.0 * UNSEEN if abs(new) < 1e-2 else 1e-6 * abs(new)
+    return abs(old - new) <= within + loose * max(abs(new), 1.0)
