@@ -1,8 +1,12 @@
 """Arrays of a problem, calls of contact laws, signals, and the right-hand side of the equations of motion.
 
-The state is x = [p (n), v (n), energy balance (2 + 2m)], with b the push and r the read row of a stop:
+The state is x = [p (n), v (n), energy balance (2 + 2E)], with b the push and r the read row of a stop:
 
     p' = v + b^p·F,   v' = -k p - c v + b^v·F + l·s(t),   δ_s = r_s·[p, v] - g_s
+
+Two ranges of indices: *elements* s, the stops and what else exerts forces, E in number, have laws and what these know;
+*rows* r, R in number, the coordinates on which they act, have vectors and motion. Element s has the rows from
+``first[s]`` to before ``first[s + 1]``; its indentation is the displacement on the first of them, and there it pushes.
 
 The entries of the energy balance are the integrals of input power and damping power, then for every stop of force ×
 indentation rate (work done on the stop, J) and of force (impulse, N s).
@@ -32,22 +36,24 @@ class Problem(NamedTuple):
     k: Annotated[Any, "N"]  # block stiffness, 1/s²
     c: Annotated[Any, "N"]  # block damping, 1/s
     loss: Annotated[Any, "2*N, 2*N"]  # damping power zᵀ loss z in W, or (0, 0): then Σ c v²
-    push: Annotated[Any, "m, 2*N"]  # state rate per newton of stop s
-    read: Annotated[Any, "m, 2*N"]  # indentation = read·z - gap, m
-    read_rate: Annotated[Any, "m, 2*N"]  # indentation rate = read_rate·z, m/s
-    knots: Annotated[Any, "m, J"]  # m, between two segments, ascending: 0 (-inf if it always acts), knots, inf
-    gap: Annotated[Any, "m"]  # m
-    law: Annotated[Any, "int m"]  # addresses of the compiled forces
-    gradient: Annotated[Any, "int m"]  # addresses of their derivatives
-    parameters: Annotated[Any, "m, P"]  # of the laws; the run's own if numbers latched are among them
-    floor: Annotated[Any, "m"]  # smallest entry rates, m/s
-    borders: Annotated[Any, "int m"]  # addresses of the margins of laws with memory, 0 for others
-    renewal: Annotated[Any, "int m"]  # addresses of what they latch on a border
-    border_count: Annotated[Any, "int m"]  # how many borders
-    latched: Annotated[Any, "int m, l"]  # places of the latched numbers among the parameters, padded by -1
-    by_latched: Annotated[Any, "int m"]  # addresses of the forces' derivatives by them
-    by_renewal: Annotated[Any, "int m"]  # addresses of the derivatives of what is latched on a border
-    opening: Annotated[Any, "int m"]  # place in parameters of a segment's code, 0 while the law is open; or -1
+    push: Annotated[Any, "R, 2*N"]  # state rate per newton on a row
+    read: Annotated[Any, "R, 2*N"]  # displacement = read·z - gap, m
+    read_rate: Annotated[Any, "R, 2*N"]  # its rate = read_rate·z, m/s
+    gap: Annotated[Any, "R"]  # m
+    first: Annotated[Any, "int E+1"]  # first row of each element, and the end
+    element: Annotated[Any, "int R"]  # that each row belongs to
+    knots: Annotated[Any, "E, J"]  # m, between two segments, ascending: 0 (-inf if it always acts), knots, inf
+    law: Annotated[Any, "int E"]  # addresses of the compiled forces
+    gradient: Annotated[Any, "int E"]  # addresses of their derivatives
+    parameters: Annotated[Any, "E, P"]  # of the laws; the run's own if numbers latched are among them
+    floor: Annotated[Any, "E"]  # smallest entry rates, m/s
+    borders: Annotated[Any, "int E"]  # addresses of the margins of laws with memory, 0 for others
+    renewal: Annotated[Any, "int E"]  # addresses of what they latch on a border
+    border_count: Annotated[Any, "int E"]  # how many borders
+    latched: Annotated[Any, "int E, l"]  # places of the latched numbers among the parameters, padded by -1
+    by_latched: Annotated[Any, "int E"]  # addresses of the forces' derivatives by them
+    by_renewal: Annotated[Any, "int E"]  # addresses of the derivatives of what is latched on a border
+    opening: Annotated[Any, "int E"]  # place in parameters of a segment's code, 0 while the law is open; or -1
     load: Annotated[Any, "L, 2*N"]  # state rate per unit of signal l
     power: Annotated[Any, "L, 2*N"]  # input power = signal × power·z, W
     tone_omega: Annotated[Any, "K"]  # rad/s
@@ -144,7 +150,7 @@ def contact_forces(problem, stop, delta, delta_dot, entry_rate, force):
 def off_knots(problem, stop, segment, delta):
     """δ; where that is a knot to rounding, a point of the segment beside it: the force may jump at the knot."""
     lower, upper = problem.knots[stop, segment - 1], problem.knots[stop, segment]
-    near = _ROUNDING * abs(problem.gap[stop])
+    near = _ROUNDING * abs(problem.gap[problem.first[stop]])
     if lower > 0.0 and abs(delta - lower) <= near + _ON_KNOT * lower:
         return lower * (1.0 + 2.0 * _ON_KNOT)
     if upper < np.inf and abs(delta - upper) <= near + _ON_KNOT * upper:
@@ -266,17 +272,16 @@ def rhs(problem, t, x, segment, entry_rate, rate, batch):
     rate[size] = 0.0
     rate[size + 1] = _damping_power(problem, x)
     add_loads(problem, t, x, rate)
-    for s in range(problem.gap.size):
+    for s in range(problem.law.size):
         rate[size + 2 + 2 * s] = 0.0
         rate[size + 3 + 2 * s] = 0.0
         if segment[s] > 0:
-            delta_dot = dot(problem.read_rate[s], x, size)
+            delta_dot = indentation_rate(problem, s, x)
             batch[0] = off_knots(problem, s, segment[s], indentation(problem, s, x))
             batch[1] = delta_dot
             contact_forces(problem, s, batch[0:1], batch[1:2], entry_rate[s], batch[2:3])
             calls += 1
-            for i in range(size):
-                rate[i] += problem.push[s, i] * batch[2]
+            add_push(problem, s, batch[2], rate)
             rate[size + 2 + 2 * s] = batch[2] * delta_dot
             rate[size + 3 + 2 * s] = batch[2]
     return calls
@@ -285,4 +290,31 @@ def rhs(problem, t, x, segment, entry_rate, rate, batch):
 @inlined
 def indentation(problem, s, x):
     """Indentation of stop s, m."""
-    return dot(problem.read[s], x, 2 * problem.k.size) - problem.gap[s]
+    row = problem.first[s]
+    return dot(problem.read[row], x, 2 * problem.k.size) - problem.gap[row]
+
+
+@inlined
+def indentation_rate(problem, s, x):
+    """Its rate, m/s."""
+    return dot(problem.read_rate[problem.first[s]], x, 2 * problem.k.size)
+
+
+@inlined
+def acceleration_of(problem, s, rate):
+    """Second derivative of the indentation by time, m/s², from the state's rate."""
+    return dot(problem.read_rate[problem.first[s]], rate, 2 * problem.k.size)
+
+
+@inlined
+def add_push(problem, s, force, rate):
+    """Add what a force of stop s does to the state's rate."""
+    push = problem.push[problem.first[s]]
+    for i in range(2 * problem.k.size):
+        rate[i] += push[i] * force
+
+
+@merged
+def push_of(problem, u):
+    """State rate per unit of an input: of a row, or behind the rows of a load."""
+    return problem.push[u] if u < problem.gap.size else problem.load[u - problem.gap.size]

@@ -187,7 +187,10 @@ def _descriptor(shape: tuple[int, ...], data: int) -> list[int]:
 
 
 class Layout:
-    """Named tuples whose arrays lie in one block of memory: all that a run writes to is one allocation."""
+    """Named tuples whose arrays lie in one block of memory, each from a line of the cache on.
+
+    All that a run writes to is one allocation.
+    """
 
     def __init__(self, kinds: list[types.NamedTuple], shapes: list[list[tuple[int, ...]]]) -> None:
         words: list[int] = []
@@ -206,14 +209,15 @@ class Layout:
                 words += _descriptor(shape, 8 * self.size)
                 end = self.size + math.prod(shape)
                 self.slices[-1].append((slice(self.size, end), str(array.dtype), shape))
-                self.size = end
+                self.size = -(-end // _LINE) * _LINE
         self.words = np.array(words, dtype=np.int64)
         self.data = np.zeros_like(self.words)
         self.data[data] = 1
 
     def block(self) -> tuple[Any, int]:
         """A new block of zeros, with the descriptors of its arrays behind them, and the address of the descriptors."""
-        block = np.zeros(self.size + self.words.size)
+        room = np.zeros(self.size + self.words.size + _LINE)
+        block = room[-(address_of(room) // 8) % _LINE :][: self.size + self.words.size]
         address = address_of(block)
         block[self.size :].view(np.int64)[:] = address * self.data + self.words
         return block, address + 8 * self.size

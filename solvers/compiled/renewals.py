@@ -6,7 +6,15 @@ zero the law renews the numbers it latches, which stand among its parameters, an
 
 from __future__ import annotations
 
-from solvers.compiled.kernels import call_force, call_renewal, dot, indentation, inlined, inner
+from solvers.compiled.kernels import (
+    acceleration_of,
+    call_force,
+    call_renewal,
+    indentation,
+    indentation_rate,
+    inlined,
+    inner,
+)
 from solvers.compiled.state import (
     AT_ONCE,
     EVENTS,
@@ -32,7 +40,7 @@ def margins(problem, state, s, n, delta, rate, out):
 def margins_in(problem, state, s, x, batch, out):
     """The same in one state; returns δ and δ̇."""
     batch[0] = indentation(problem, s, x)
-    batch[1] = dot(problem.read_rate[s], x, 2 * problem.k.size)
+    batch[1] = indentation_rate(problem, s, x)
     margins(problem, state, s, 1, batch[0:1], batch[1:2], out)
     return batch[0], batch[1]
 
@@ -40,7 +48,7 @@ def margins_in(problem, state, s, x, batch, out):
 @inner
 def margins_before(problem, state, s, delta, rate, time, batch, out):
     """Margins a time before the present state, whose rates are known, from where it is now; after it if negative."""
-    acceleration = dot(problem.read_rate[s], state.rate, 2 * problem.k.size)
+    acceleration = acceleration_of(problem, s, state.rate)
     batch[0] = delta - time * (rate - 0.5 * time * acceleration)
     batch[1] = rate - time * acceleration
     margins(problem, state, s, 1, batch[0:1], batch[1:2], out)
@@ -80,7 +88,7 @@ def note_event(state):
 @inlined
 def most_rows(problem):
     """How many rows of the log the events of one instant may take."""
-    rows = problem.gap.size
+    rows = problem.law.size
     for count in problem.border_count:
         rows += 2 * count
     return rows

@@ -12,14 +12,14 @@ from solvers.compiled.fields import packed_type, shapes_of
 from solvers.compiled.kernels import (
     Problem,
     abs_dot,
-    dot,
     indentation,
+    indentation_rate,
     inlined,
     inner,
     kernel,
 )
 from solvers.compiled.parts import ADDRESSES
-from solvers.problem import Array, Forcing, Law, Status, System
+from solvers.problem import Array, Contact, Forcing, Law, Status, System
 
 STATUSES = list(Status)
 DONE, RUNNING, STEP_TOO_SMALL, DIVERGED, CHATTER, LOG_FULL, LAW_NOT_FINITE, GAINED = (
@@ -47,9 +47,9 @@ class State(NamedTuple):
     now: Annotated[Any, "4"]  # s: time, flight step, contact step, time of the last event
     x: Annotated[Any, "X"]  # of the blocks, then the energy balance in J (impulses in N s), see `kernels`
     rate: Annotated[Any, "X"]  # of x, per s; stepping methods only
-    segment: Annotated[Any, "int m"]  # of the law: 0 in flight, j > 0 between the stop's knots j-1 and j
-    entry_rate: Annotated[Any, "m"]  # m/s, latched
-    active: Annotated[Any, "m, 7"]  # contacts under way, SI units, columns named above
+    segment: Annotated[Any, "int E"]  # of the law: 0 in flight, j > 0 between the stop's knots j-1 and j
+    entry_rate: Annotated[Any, "E"]  # m/s, latched
+    active: Annotated[Any, "E, 7"]  # contacts under way, SI units, columns named above
     count: Annotated[Any, "int 8"]  # steps, rejected steps, law calls, ..., as named above
     event_record: Annotated[Any, "rows, record"]  # contact steps and events, for the tangent; else no rows
 
@@ -60,13 +60,14 @@ STATE = packed_type(State)
 @inner
 def surface_tolerance(problem, s, x):
     """Distance, m, within which a stop counts as on a knot: rounding of δ."""
-    return 1e-15 * (abs(problem.gap[s]) + abs_dot(problem.read[s], x, 2 * problem.k.size)) + 1e-20
+    row = problem.first[s]
+    return 1e-15 * (abs(problem.gap[row]) + abs_dot(problem.read[row], x, 2 * problem.k.size)) + 1e-20
 
 
 @inner
 def rate_tolerance(problem, s, x):
     """Indentation rate, m/s, below which a stop counts as at rest: rounding of δ̇, which coupled blocks amplify."""
-    return 1e-13 * abs_dot(problem.read_rate[s], x, 2 * problem.k.size)
+    return 1e-13 * abs_dot(problem.read_rate[problem.first[s]], x, 2 * problem.k.size)
 
 
 @inner
@@ -96,8 +97,8 @@ def open_contact(problem, state, s, t, delta_dot):
 @kernel
 def begin_contacts(problem, state):
     """Find the segment of every stop at the start, on a knot that into which it moves, and begin contacts under way."""
-    for s in range(problem.gap.size):
-        delta, rate = indentation(problem, s, state.x), dot(problem.read_rate[s], state.x, 2 * problem.k.size)
+    for s in range(problem.law.size):
+        delta, rate = indentation(problem, s, state.x), indentation_rate(problem, s, state.x)
         segment, near = 0, surface_tolerance(problem, s, state.x)
         while delta > problem.knots[s, segment] + near:
             segment += 1
@@ -128,7 +129,7 @@ def contact_row(problem, state, s, t_out, speed_out, row):
 def switch(problem, state, s, direction, log):
     """Move stop s one segment up or down; begin its contact, or end it and log it."""
     t = state.now[T]
-    delta_dot = dot(problem.read_rate[s], state.x, 2 * problem.k.size)
+    delta_dot = indentation_rate(problem, s, state.x)
     if state.event_record.shape[0]:
         write_event(state, EVENT, t, t, 0.0, s, direction, state.x)
     if direction > 0 and state.segment[s] == 0:
@@ -146,9 +147,9 @@ def switch(problem, state, s, direction, log):
 def switch_on_surface(problem, state, log, locates):
     """Switch every stop that is on an end of its segment and moves out of it; returns whether any did."""
     switched = False
-    for s in range(problem.gap.size):
+    for s in range(problem.law.size):
         delta = indentation(problem, s, state.x)
-        delta_dot = dot(problem.read_rate[s], state.x, 2 * problem.k.size)
+        delta_dot = indentation_rate(problem, s, state.x)
         tolerance = surface_tolerance(problem, s, state.x) if locates else 0.0
         still = rate_tolerance(problem, s, state.x)
         direction = 0
@@ -172,17 +173,18 @@ def is_open(problem, s):
 
 
 @inlined
+def acts(problem, state, row):
+    """Whether the element that a row belongs to is in contact."""
+    return state.segment[problem.element[row]] > 0
+
+
+@inlined
 def in_contact(state):
     """Whether any stop is in contact."""
     most = 0
     for segment in state.segment:
         most = max(most, segment)
     return most > 0
-
-
-def state_shapes(width: int, stops: int) -> list[tuple[int, ...]]:
-    """Shapes of the arrays of `State`."""
-    return shapes_of(State, {"X": width, "m": stops, "rows": 0, "record": 0})
 
 
 def begin_state(state: State, z: Any) -> None:
@@ -195,7 +197,7 @@ def begin_state(state: State, z: Any) -> None:
 def new_state(z: Any, stops: int) -> State:
     """State of a run at t = 0 from block coordinates."""
     kinds = [np.dtype(str(kind.dtype)) for kind in STATE.types]
-    shapes = state_shapes(len(z) + 2 + 2 * stops, stops)
+    shapes = shapes_of(State, {"X": len(z) + 2 + 2 * stops, "E": stops, "rows": 0, "record": 0})
     state = State._make(np.zeros(shape, kind) for shape, kind in zip(shapes, kinds, strict=True))
     begin_state(state, z)
     return state
@@ -234,8 +236,20 @@ def matrix_problem_of(system: System, forcing: Forcing) -> Problem:
 
 
 def directions_of(system: System) -> Array:
-    """Directions of the stops (m, n)."""
-    return np.array([c.direction for c in system.contacts]).reshape(len(system.contacts), system.size)
+    """Directions of all rows (R, n)."""
+    return np.concatenate([np.empty((0, system.size)), *(c.rows for c in system.contacts)])
+
+
+def first_rows(contacts: Sequence[Contact]) -> Array:
+    """(E + 1,) first row of each contact, and the end."""
+    return np.cumsum([0, *(len(c.rows) for c in contacts)], dtype=np.int64)
+
+
+def gaps_of(contacts: Sequence[Contact]) -> Array:
+    """(R,) gaps of all rows; that of a contact is the one of its first row."""
+    gaps = np.zeros(sum(len(c.rows) for c in contacts))
+    gaps[first_rows(contacts)[:-1]] = [c.gap for c in contacts]
+    return gaps
 
 
 def _vectors(system: System) -> Array:
@@ -253,7 +267,9 @@ def _problem(system: System, forcing: Forcing, linear: dict[str, Array]) -> Prob
     return Problem(
         **linear,
         knots=knots,
-        gap=np.array([c.gap for c in contacts], dtype=float),
+        gap=gaps_of(contacts),
+        first=first_rows(contacts),
+        element=np.repeat(np.arange(m), [len(c.rows) for c in contacts]).astype(np.int64),
         law=np.array([c.law.address for c in contacts], dtype=np.int64),
         gradient=np.array([c.law.gradient_address for c in contacts], dtype=np.int64),
         parameters=law_parameters(system),
@@ -276,12 +292,12 @@ def most_borders(problem: Problem) -> int:
 
 
 def _integers(contacts: Sequence[Any], name: str) -> Array:
-    """(m,) whole numbers of the laws, 0 where a law does not know of them."""
+    """(E,) whole numbers of the laws, 0 where a law does not know of them."""
     return np.array([getattr(contact.law, name, 0) for contact in contacts], dtype=np.int64)
 
 
 def _latched(contacts: Sequence[Any]) -> Any:
-    """(m, l) places of the latched numbers among the parameters, padded by -1."""
+    """(E, l) places of the latched numbers among the parameters, padded by -1."""
     places = [getattr(contact.law, "memory", ()) for contact in contacts]
     table = np.full((len(contacts), max([len(row) for row in places], default=0)), -1, dtype=np.int64)
     for row, own in zip(table, places, strict=True):
@@ -295,12 +311,12 @@ def _opening(law: Any) -> int:
 
 
 def law_parameters(system: System) -> Array:
-    """Parameters of the laws (m, P), padded by zeros."""
+    """Parameters of the laws (E, P), padded by zeros."""
     return parameters_of([contact.law for contact in system.contacts])
 
 
 def parameters_of(laws: Sequence[Law]) -> Array:
-    """Parameters of laws (m, P), padded by zeros."""
+    """Parameters of laws (E, P), padded by zeros."""
     parameters = [np.asarray(law.parameters, dtype=float) for law in laws]
     table = np.zeros((len(parameters), max([p.size for p in parameters], default=1)))
     for row, own in zip(table, parameters, strict=True):

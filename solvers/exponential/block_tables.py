@@ -17,7 +17,7 @@ from solvers.exponential.contact.nodes import PHASES, NodeSets, S, gauss
 from solvers.exponential.responses import fill_free, fill_node_propagators, fill_propagators, fill_weighting
 from solvers.problem import Memo
 
-FEW = 2  # stops up to which each has tables of its own: with three both ways take the same time
+FEW = 2  # rows up to which each has tables of its own: with three both ways take the same time
 MOST_BYTES = 4e9
 
 
@@ -63,30 +63,28 @@ def blocks_of(problem: Problem, tones: int, h: Any, contact_h: Any, node_sets: N
     return known
 
 
-def _shapes(
-    stops: int, loads: int, size: int, own: int, levels: int, node_sets: NodeSets
-) -> dict[str, tuple[int, ...]]:
+def _shapes(rows: int, loads: int, size: int, own: int, levels: int, node_sets: NodeSets) -> dict[str, tuple[int, ...]]:
     """Shapes of the tables for a few stops and of those for many; one of the two groups is empty."""
-    kinds, weightings, inputs, few = len(node_sets.kinds), len(node_sets.weightings), stops + loads, stops <= FEW
+    kinds, weightings, inputs, few = len(node_sets.kinds), len(node_sets.weightings), rows + loads, rows <= FEW
     many = 0 if few else levels
     levels = levels if few else 0
     return {
-        "free": (kinds, levels, stops, 2 * size, 2 * S),
+        "free": (kinds, levels, rows, 2 * size, 2 * S),
         "node_propagator": (kinds, many, 2, size, S),
-        "forced": (weightings, levels, inputs, stops, S, 2 * S),
+        "forced": (weightings, levels, inputs, rows, S, 2 * S),
         "end_response": (weightings, levels, inputs, S, padded(2 * size)),
         "block_response": (weightings, many, S, 2 * own, S),
         "block_end_response": (weightings, many, 2, own, S),
     }
 
 
-def _require_room(stops: int, loads: int, size: int, levels: int, node_sets: NodeSets) -> None:
+def _require_room(rows: int, loads: int, size: int, levels: int, node_sets: NodeSets) -> None:
     """Refuse tables and matrices of simultaneous contacts that need more than `MOST_BYTES`."""
-    numbers = sum(math.prod(shape) for shape in _shapes(stops, loads, size, size, levels, node_sets).values())
-    wanted = 8 * (numbers + (S * stops) ** 2)
+    numbers = sum(math.prod(shape) for shape in _shapes(rows, loads, size, size, levels, node_sets).values())
+    wanted = 8 * (numbers + (S * rows) ** 2)
     if wanted > MOST_BYTES:
         raise ValueError(
-            f"Exponential would need {wanted / 1e9:.1f} GB for {stops} stops and {size} modes, more than "
+            f"Exponential would need {wanted / 1e9:.1f} GB for {rows} stops and {size} modes, more than "
             f"{MOST_BYTES / 1e9:g} GB; use DormandPrince, or fewer modes or stops"
         )
 

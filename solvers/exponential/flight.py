@@ -210,14 +210,15 @@ def propagate_split(tables, level, x):
 
 
 @inlined
-def motion_of_stop(tables, s, x):
-    """δ + gap and δ̇ of a stop from the blocks' p and v."""
-    rows, delta, rate = tables.stop_rows[s], splat8(0.0), splat8(0.0)
+def motion_of_stop(problem, tables, s, x):
+    """δ and δ̇ of a stop from the blocks' p and v."""
+    row = problem.first[s]
+    rows, delta, rate = tables.stop_rows[row], splat8(0.0), splat8(0.0)
     for i in range(0, x.shape[1], WIDTH):
         p, v = load8(x[0], i), load8(x[1], i)
         delta += load8(rows[0], i) * p + load8(rows[1], i) * v
         rate += load8(rows[2], i) * p + load8(rows[3], i) * v
-    return sum8(delta), sum8(rate)
+    return sum8(delta) - problem.gap[row], sum8(rate)
 
 
 @inlined
@@ -244,11 +245,11 @@ def first_root(problem, terms, s, x, longest, values, slopes):
 
     ``values`` and ``slopes`` are scratch for the coefficients of the polynomial and of its derivative.
     """
-    factorial = 1.0
+    row, factorial = problem.first[s], 1.0
     for i in range(ORDER + 1):
-        values[i] = dot(problem.read[s], terms[i], 2 * problem.k.size) / factorial
+        values[i] = dot(problem.read[row], terms[i], 2 * problem.k.size) / factorial
         factorial *= i + 1.0
-    values[0] -= problem.gap[s]
+    values[0] -= problem.gap[row]
     if abs(values[0]) <= surface_tolerance(problem, s, x):
         values[0] = 0.0
         if abs(values[1]) <= rate_tolerance(problem, s, x):

@@ -28,6 +28,8 @@ from numba import types
 from solvers.compiled.dop853_tableau import STAGES, A
 from solvers.compiled.kernels import (
     PROBLEM,
+    acceleration_of,
+    add_push,
     call_gradient,
     contact_forces,
     contact_gradient,
@@ -35,6 +37,7 @@ from solvers.compiled.kernels import (
     dot,
     entry,
     indentation,
+    indentation_rate,
     inner,
     merged,
     rhs,
@@ -106,9 +109,9 @@ def _force(problem, past, s, delta, delta_dot, batch):
 def _begin(problem, past, derivatives, variation):
     """Find the segments of the stops as the run does at its start, and latch the derivatives of their rates."""
     begin_contacts(problem, past)
-    for s in range(problem.gap.size):
+    for s in range(problem.law.size):
         if past.segment[s] > 0:
-            rate = dot(problem.read_rate[s], past.x, 2 * problem.k.size)
+            rate = indentation_rate(problem, s, past.x)
             for c in range(derivatives.y.shape[0]):
                 change = change_of(problem, variation, derivatives, c, s, 1, 0.0)
                 derivatives.entry[c, s] = 0.0 if abs(rate) < problem.floor[s] else np.sign(rate) * change
@@ -117,13 +120,13 @@ def _begin(problem, past, derivatives, variation):
 @merged
 def _cross_knot(problem, past, derivatives, variation, s, direction):
     """A stop passes a border of its segment."""
-    size, t = 2 * problem.k.size, past.now[T]
-    rate = dot(problem.read_rate[s], past.x, size)
+    t = past.now[T]
+    rate = indentation_rate(problem, s, past.x)
     segment = past.segment[s]
     entering = segment == 0
     border = segment if direction > 0 else segment - 1
     rhs(problem, t, past.x, past.segment, past.entry_rate, derivatives.rate[0], derivatives.batch)
-    acceleration = dot(problem.read_rate[s], derivatives.rate[0], size)
+    acceleration = acceleration_of(problem, s, derivatives.rate[0])
     still = rate_tolerance(problem, s, past.x)
     if entering:
         past.entry_rate[s] = max(abs(rate), problem.floor[s])
@@ -140,8 +143,7 @@ def _cross_knot(problem, past, derivatives, variation, s, direction):
             change = change_of(problem, variation, derivatives, c, s, 1, t) + acceleration * shift
             derivatives.shift[c, s] = shift
             derivatives.entry[c, s] = 0.0 if floored else change
-        for e in range(size):
-            derivatives.y[c, e] -= problem.push[s, e] * jump * shift
+        add_push(problem, s, -jump * shift, derivatives.y[c])
     past.segment[s] += direction
 
 
@@ -160,7 +162,7 @@ def _note_sides(problem, tables, past, scratch, x):
     a law is another one now.
     """
     changed = False
-    for s in range(problem.gap.size):
+    for s in range(problem.law.size):
         if past.segment[s] > 0 and tables.bend[s] == FORCE:
             force, before = side_at(problem, tables, past, s, x, scratch.trial), scratch.unresolved[s]
             if abs(force) > abs(before):
@@ -192,10 +194,10 @@ def _stage_rates(problem, ahead, behind, tables, past, scratch, derivatives, var
         for b in range(n):
             out[c, b] = factor * y[n + b]
             out[c, n + b] = factor * (-problem.k[b] * y[b] - problem.c[b] * y[n + b])
-    for s in range(problem.gap.size):
+    for s in range(problem.law.size):
         if past.segment[s] == 0:
             continue
-        batch[0], batch[1] = _inside_segment(problem, past, s, w), dot(problem.read_rate[s], w, size)
+        batch[0], batch[1] = _inside_segment(problem, past, s, w), indentation_rate(problem, s, w)
         rate = past.entry_rate[s]
         _gradient(problem, tables, past, scratch, s, batch)
         by_latched(problem, past, derivatives, s, 1, batch[0:1], batch[1:2])
@@ -205,15 +207,15 @@ def _stage_rates(problem, ahead, behind, tables, past, scratch, derivatives, var
         for c in range(derivatives.y.shape[0]):
             y = derivatives.trial[c]
             change = batch[4] * derivatives.entry[c, s] + change_by_latched(problem, derivatives, c, s, 1, 0)
+            row = problem.first[s]
             for d in range(2):
-                value = dot(problem.read[s] if d == 0 else problem.read_rate[s], y, size)
+                value = dot(problem.read[row] if d == 0 else problem.read_rate[row], y, size)
                 if is_parameter(variation, derivatives, c):
-                    value += explicit_change(variation, s, d, t)
+                    value += explicit_change(variation, row, d, t)
                 change += batch[2 + d] * value
             if variation.law_step > 0.0 and is_parameter(variation, derivatives, c):
                 change += (batch[5] - batch[6]) / (2.0 * variation.law_step)
-            for e in range(size):
-                out[c, e] += factor * problem.push[s, e] * change
+            add_push(problem, s, factor * change, out[c])
 
 
 @merged
@@ -222,7 +224,7 @@ def _land(problem, ahead, behind, tables, past, scratch, derivatives, variation,
     variable, stop, size = int(row[FIRST]), int(row[SECOND]), 2 * problem.k.size
     w, width, span = scratch.stages[START], past.x.size, row[SPAN]
     start_landing(problem, tables, past, scratch, stop)
-    for s in range(problem.gap.size):
+    for s in range(problem.law.size):
         scratch.unresolved[s] = 0.0
     _note_sides(problem, tables, past, scratch, past.x)
     while True:

@@ -9,12 +9,14 @@ those of m the law's own.
 from __future__ import annotations
 
 from solvers.compiled.kernels import (
+    acceleration_of,
+    add_push,
     call_force,
     call_renewal,
     call_renewal_gradient,
     copy,
-    dot,
     indentation,
+    indentation_rate,
     inner,
     merged,
     rhs,
@@ -100,11 +102,11 @@ def _explicit(problem, ahead, behind, past, s, j, delta, rate, derivatives, vari
 @merged
 def pass_border(problem, ahead, behind, past, derivatives, variation, s, j):
     """A law with memory passes its border j: derivatives of what it latches, and of the motion if its force jumps."""
-    size, t, most, width = 2 * problem.k.size, past.now[T], problem.latched.shape[1], problem.parameters.shape[1]
-    stops = problem.gap.size
-    delta, rate = indentation(problem, s, past.x), dot(problem.read_rate[s], past.x, size)
+    t, most, width = past.now[T], problem.latched.shape[1], problem.parameters.shape[1]
+    stops = problem.law.size
+    delta, rate = indentation(problem, s, past.x), indentation_rate(problem, s, past.x)
     rhs(problem, t, past.x, past.segment, past.entry_rate, derivatives.rate[0], derivatives.batch)
-    acceleration = dot(problem.read_rate[s], derivatives.rate[0], size)
+    acceleration = acceleration_of(problem, s, derivatives.rate[0])
     first = most * (2 + most) + width
     by, explicit = (
         derivatives.renewed[first : first + 2 + most],
@@ -143,5 +145,4 @@ def pass_border(problem, ahead, behind, past, derivatives, variation, s, j):
                 latched[i] += of[2 + k] * known[k]
             latched[i] += explicit[i] if by_law else 0.0
         copy(latched, known, own)
-        for e in range(size):
-            derivatives.y[c, e] -= problem.push[s, e] * jump * shift
+        add_push(problem, s, -jump * shift, derivatives.y[c])

@@ -8,7 +8,7 @@ import numpy as np
 
 from solvers.compiled.fields import packed_type
 from solvers.compiled.kernels import call_force, contact_forces, copy, dot, inlined, merged, rhs
-from solvers.compiled.state import BEGAN, ENDED, FIRST, HEAD, KIND, PART, SECOND, SPAN, T
+from solvers.compiled.state import BEGAN, ENDED, FIRST, HEAD, KIND, PART, SECOND, SPAN, T, acts
 from solvers.compiled.sums import combine
 from solvers.exponential.contact.collocation import end_state
 from solvers.exponential.contact.many_stops import (
@@ -20,7 +20,7 @@ from solvers.exponential.contact.many_stops import (
     weighting_of,
 )
 from solvers.exponential.contact.node_newton import factorise, linearise, substitute
-from solvers.exponential.contact.node_response import free_response, respond
+from solvers.exponential.contact.node_response import free_response, motion_of, respond
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.energy.quadrature import state_within
 from solvers.exponential.flight import propagate_blocks, signal_derivatives
@@ -33,18 +33,18 @@ class Derivatives(NamedTuple):
     """
 
     y: Annotated[Any, "columns, X"]  # of the state at fixed time
-    entry: Annotated[Any, "columns, m"]  # of the latched entry rates
-    shift: Annotated[Any, "columns, m+1"]  # of the entry times, and of the time of the last border
-    force: Annotated[Any, "m+L, S"]  # of one column: forces, then signals, at the nodes of a step
+    entry: Annotated[Any, "columns, E"]  # of the latched entry rates
+    shift: Annotated[Any, "columns, E+1"]  # of the entry times, and of the time of the last border
+    force: Annotated[Any, "R+L, S"]  # of one column: forces, then signals, at the nodes of a step
     signal: Annotated[Any, "L, S"]  # slopes of the sampled signals there
-    response: Annotated[Any, "m, 2, S"]  # of δ and δ̇ to these slopes
-    by_parameter: Annotated[Any, "m, S"]  # ∂F/∂parameter there
+    response: Annotated[Any, "R, 2, S"]  # of δ and δ̇ to these slopes
+    by_parameter: Annotated[Any, "E, S"]  # ∂F/∂parameter there
     rate: Annotated[Any, "2, X"]  # of the state at both ends of a step; after a call first that at the end
     stages: Annotated[Any, "STAGES, columns, X"]  # of a landing
     trial: Annotated[Any, "columns, X"]
     batch: Annotated[Any, "8"]
-    latched: Annotated[Any, "columns, m*l"]  # of what laws with memory have latched, see Problem.latched
-    by_latched: Annotated[Any, "m, l*S"]  # derivatives of their forces by it, row by row
+    latched: Annotated[Any, "columns, E*l"]  # of what laws with memory have latched, see Problem.latched
+    by_latched: Annotated[Any, "E, l*S"]  # derivatives of their forces by it, row by row
     renewed: Annotated[Any, "renewed"]  # working space of l (5 + l) + 4 P + 2 B numbers
 
 
@@ -54,19 +54,19 @@ class Variation(NamedTuple):
     step: Annotated[float, "number"]  # half the distance between the two systems of the difference
     law_step: Annotated[float, "number"]  # the same; zero where their laws are the same
     omega: Annotated[Any, "K"]  # tones
-    steady: Annotated[Any, "K, m, 2, 4"]  # (Re a, Im a, Re b, Im b) of δ and δ̇ = Re (a + t b) e^{iωt}
-    gap: Annotated[Any, "m"]
+    steady: Annotated[Any, "K, R, 2, 4"]  # (Re a, Im a, Re b, Im b) of δ and δ̇ = Re (a + t b) e^{iωt}
+    gap: Annotated[Any, "R"]
 
 
 DERIVATIVES, VARIATION = packed_type(Derivatives), packed_type(Variation)
 
 
 @inlined
-def explicit_change(variation, s, d, t):
-    """Explicit change of δ (d = 0) or δ̇ by the parameter at time t: the state is held fixed."""
-    total = -variation.gap[s] if d == 0 else 0.0
+def explicit_change(variation, r, d, t):
+    """Explicit change of the displacement (d = 0) or rate of a row by the parameter: the state is held fixed."""
+    total = -variation.gap[r] if d == 0 else 0.0
     for j in range(variation.omega.size):
-        a = variation.steady[j, s, d]
+        a = variation.steady[j, r, d]
         angle = variation.omega[j] * t
         total += (a[0] + t * a[2]) * np.cos(angle) - (a[1] + t * a[3]) * np.sin(angle)
     return total
@@ -75,9 +75,10 @@ def explicit_change(variation, s, d, t):
 @inlined
 def change_of(problem, variation, derivatives, column, s, d, t):
     """Change of δ (d = 0) or δ̇ of a stop at fixed time, in one column."""
-    row = problem.read[s] if d == 0 else problem.read_rate[s]
+    r = problem.first[s]
+    row = problem.read[r] if d == 0 else problem.read_rate[r]
     value = dot(row, derivatives.y[column], 2 * problem.k.size)
-    return value + explicit_change(variation, s, d, t) if is_parameter(variation, derivatives, column) else value
+    return value + explicit_change(variation, r, d, t) if is_parameter(variation, derivatives, column) else value
 
 
 @inlined
@@ -111,10 +112,10 @@ def _by_parameter(ahead, behind, past, scratch, variation, derivatives, s):
         derivatives.by_parameter[s, i] = 0.0
     if variation.law_step == 0.0:
         return
-    delta, rate = scratch.motion[s, 0], scratch.motion[s, 1]
-    copy(delta, scratch.clipped, S)
-    contact_forces(ahead, s, scratch.clipped, rate, past.entry_rate[s], derivatives.by_parameter[s])
-    contact_forces(behind, s, scratch.clipped, rate, past.entry_rate[s], scratch.trial)
+    motion = motion_of(ahead, scratch, s)
+    copy(motion[0], scratch.clipped, S)
+    contact_forces(ahead, s, scratch.clipped, motion[1], past.entry_rate[s], derivatives.by_parameter[s])
+    contact_forces(behind, s, scratch.clipped, motion[1], past.entry_rate[s], scratch.trial)
     for i in range(S):
         derivatives.by_parameter[s, i] = (derivatives.by_parameter[s, i] - scratch.trial[i]) / (
             2.0 * variation.law_step
@@ -123,67 +124,67 @@ def _by_parameter(ahead, behind, past, scratch, variation, derivatives, s):
 
 @merged
 def _signal_slopes(problem, tables, past, scratch, derivatives, node_set, level, t):
-    """Slopes of the sampled signals at the nodes, and the response of the stops in contact to them."""
-    stops, h = problem.gap.size, tables.contact_step[level]
+    """Slopes of the sampled signals at the nodes, and the response of the rows in contact to them."""
+    rows, h = problem.gap.size, tables.contact_step[level]
     for j in range(problem.table_dt.size):
         for i in range(S):
             signal_derivatives(problem, j, t + h * tables.times[node_set, i], scratch.signal_terms[j])
             derivatives.signal[problem.table_load[j], i] = scratch.signal_terms[j, 1]
-    for s in range(stops):
-        if past.segment[s] == 0:
+    for r in range(rows):
+        if not acts(problem, past, r):
             continue
-        response = derivatives.response[s]
+        response = derivatives.response[r]
         for i in range(S):
             response[0, i], response[1, i] = 0.0, 0.0
         for load in problem.table_load:
-            matrix = pair_response(problem, tables, scratch, node_set, level, s, stops + load)
+            matrix = pair_response(problem, tables, scratch, node_set, level, r, rows + load)
             combine(matrix, derivatives.signal[load], S, response, response)
 
 
 @merged
 def _solve(problem, tables, past, scratch, derivatives, variation, node_set, level, column, shift):
     """Changes of all forces (and, in a moving frame, signals) at the nodes, one column."""
-    row, size, stops, through = 0, 2 * problem.k.size, problem.gap.size, uses_blocks(tables)
+    place, size, rows, through = 0, 2 * problem.k.size, problem.gap.size, uses_blocks(tables)
     if through:
         free_block_motion(problem, tables, scratch, node_set, level, derivatives.y[column])
-    for s in range(stops):
+    for r in range(rows):
+        s, motion = problem.element[r], scratch.motion[r]
         if past.segment[s] == 0:
             continue
         if through:
-            motion_at_nodes(problem, scratch, s, 0.0, scratch.motion[s])
+            motion_at_nodes(problem, scratch, r, 0.0, motion)
         else:
-            combine(tables.free[tables.kind[node_set], level, s], derivatives.y[column], size, None, scratch.motion[s])
+            combine(tables.free[tables.kind[node_set], level, r], derivatives.y[column], size, None, motion)
         for i in range(S):
-            change = derivatives.entry[column, s] * scratch.slope[s, 2, i]
-            change += change_by_latched(problem, derivatives, column, s, S, i)
-            if is_parameter(variation, derivatives, column):
-                change += derivatives.by_parameter[s, i]
-            for d in range(2):
-                value = scratch.motion[s, d, i]
-                if shift != 0.0:
-                    value += shift * derivatives.response[s, d, i]
+            change, t = 0.0, past.now[T] + tables.contact_step[level] * tables.times[node_set, i]
+            if r == problem.first[s]:
+                change = derivatives.entry[column, s] * scratch.slope[s, 2, i]
+                change += change_by_latched(problem, derivatives, column, s, S, i)
                 if is_parameter(variation, derivatives, column):
-                    value += explicit_change(
-                        variation, s, d, past.now[T] + tables.contact_step[level] * tables.times[node_set, i]
-                    )
-                change += scratch.slope[s, d, i] * value
-            scratch.residual[row + i] = change
-        row += S
-    substitute(scratch.jacobian, scratch.pivots, row, scratch.residual)
-    row = 0
-    for s in range(stops):
-        if past.segment[s] > 0:
-            copy(scratch.residual[row : row + S], derivatives.force[s], S)
-            row += S
+                    change += derivatives.by_parameter[s, i]
+                for d in range(2):
+                    value = motion[d, i]
+                    if shift != 0.0:
+                        value += shift * derivatives.response[r, d, i]
+                    if is_parameter(variation, derivatives, column):
+                        value += explicit_change(variation, r, d, t)
+                    change += scratch.slope[s, d, i] * value
+            scratch.residual[place + i] = change
+        place += S
+    substitute(scratch.jacobian, scratch.pivots, place, scratch.residual)
+    place = 0
+    for r in range(rows):
+        if acts(problem, past, r):
+            copy(scratch.residual[place : place + S], derivatives.force[r], S)
+            place += S
     for load in problem.table_load:
         for i in range(S):
-            derivatives.force[stops + load, i] = shift * derivatives.signal[load, i]
+            derivatives.force[rows + load, i] = shift * derivatives.signal[load, i]
 
 
 @merged
 def _move(problem, tables, past, scratch, derivatives, node_set, level, y, part):
     """Take one column to the end of the step, or to the ``part`` of it that lies within the run."""
-    size, stops = 2 * problem.k.size, problem.gap.size
     if part < np.inf:
         for u in range(scratch.force.shape[0]):
             copy(derivatives.force[u], scratch.force[u], S)
@@ -193,11 +194,11 @@ def _move(problem, tables, past, scratch, derivatives, node_set, level, y, part)
     if uses_blocks(tables):
         add_end_response(problem, tables, past, scratch, derivatives.force, node_set, level, y)
     for u in range(0 if uses_blocks(tables) else scratch.force.shape[0]):
-        if u < stops and past.segment[u] == 0:
+        if u < problem.gap.size and not acts(problem, past, u):
             continue
         for j in range(S):
-            row = tables.end_response[weighting_of(tables, node_set, u), level, u, j]
-            for e in range(size):
+            row = tables.end_response[weighting_of(problem, tables, node_set, u), level, u, j]
+            for e in range(2 * problem.k.size):
                 y[e] += row[e] * derivatives.force[u, j]
 
 
@@ -205,15 +206,19 @@ def _move(problem, tables, past, scratch, derivatives, node_set, level, y, part)
 def linearise_step(problem, ahead, behind, tables, past, scratch, derivatives, variation, row, modes):
     """A collocated step, linearised as it was taken."""
     node_set, level, t = int(row[FIRST]), int(row[SECOND]), row[BEGAN]
-    size, stops = 2 * problem.k.size, problem.gap.size
+    size = 2 * problem.k.size
     free_response(problem, tables, past, scratch, node_set, level)
-    for s in range(stops):
-        copy(row[HEAD + past.x.size + s * S : HEAD + past.x.size + (s + 1) * S], scratch.force[s], S)
-    for s in range(stops):
+    forces = row[HEAD + past.x.size :]
+    for r in range(problem.gap.size):
+        copy(forces[r * S : (r + 1) * S], scratch.force[r], S)
+    for r in range(problem.gap.size):
+        if acts(problem, past, r):
+            respond(problem, tables, past, scratch, node_set, level, r)
+    for s in range(problem.law.size):
         if past.segment[s] > 0:
-            respond(problem, tables, past, scratch, node_set, level, s)
+            motion = motion_of(problem, scratch, s)
             _by_parameter(ahead, behind, past, scratch, variation, derivatives, s)
-            by_latched(problem, past, derivatives, s, S, scratch.motion[s, 0], scratch.motion[s, 1])
+            by_latched(problem, past, derivatives, s, S, motion[0], motion[1])
     factorise(scratch.jacobian, scratch.pivots, linearise(problem, tables, past, scratch, node_set, level))
     moving = tables.time_exponent[node_set] > 1.0
     part = row[SPAN] if row[KIND] == PART else np.inf

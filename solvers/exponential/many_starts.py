@@ -76,7 +76,7 @@ def _note(stop, delta, force, count, number, peak):
 @inner
 def _begin(problem, state, numbers, rest, parameters, start):
     """The state of a run at t = 0, as `Workspace.begin` makes it, and what its laws have latched."""
-    for s in range(problem.gap.size if problem.border_count.any() else 0):
+    for s in range(problem.law.size if problem.border_count.any() else 0):
         copy(parameters[s], problem.parameters[s], parameters.shape[1])
     for i in range(rest.size):
         numbers[i] = rest[i]
@@ -91,7 +91,7 @@ def _end(problem, state, scratch, code, x, count, number, peak):
         x[e] = state.x[e]
     for value in state.x:
         finite &= np.isfinite(value)
-    for s in range(problem.gap.size):
+    for s in range(problem.law.size):
         if state.segment[s] > 0 and (problem.knots[s, 0] == 0.0 or problem.opening[s] >= 0) and not is_open(problem, s):
             _note(s, state.active[s, PEAK_DELTA], state.active[s, PEAK_FORCE], count, number, peak)
     count[CODE] = DIVERGED if code == DONE and not finite else code
@@ -122,8 +122,8 @@ def advance_many(
         i = cursor[NEXT]
         if not cursor[BEGUN]:
             _begin(problem, state, numbers, rest, parameters, starts[i])
-            if gaps.size:
-                copy(gaps[i], problem.gap, gaps.shape[1])
+            for s in range(gaps.shape[1] if gaps.size else 0):
+                problem.gap[problem.first[s]] = gaps[i, s]
             cursor[BEGUN] = 1
         spent -= state.count[STEPS] + state.count[REJECTED]
         code = run(
@@ -167,7 +167,7 @@ class Worker:
             self.own = Packed.of(engine.problem._replace(gap=engine.problem.gap.copy()), PROBLEM)
             problem_at = self.own.address
         workspace, parameters = engine.workspace, engine.prepared.problem.value.parameters
-        log = np.empty((max(256, 2 * len(engine.problem.gap)), COLUMNS))
+        log = np.empty((max(256, 2 * len(engine.problem.law)), COLUMNS))
         self.arguments = (
             *(advance, problem_at, *engine.addresses[1:], NO_ENERGY_TABLES.address),
             *(workspace.numbers, workspace.rest, parameters, starts, gaps, self.cursor),

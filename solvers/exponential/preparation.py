@@ -11,7 +11,7 @@ from solvers.compiled.fields import packed_type, shapes_of
 from solvers.compiled.kernels import PROBLEM, Problem
 from solvers.compiled.packed import Layout, Packed, PackedTemplate, aligned
 from solvers.compiled.parts import BORDERS, ENERGY, MANY_STOPS, TWO_STOPS, load
-from solvers.compiled.state import STATE, State, begin_state, most_borders, problem_of, state_shapes
+from solvers.compiled.state import STATE, State, begin_state, gaps_of, most_borders, problem_of
 from solvers.compiled.sums import padded
 from solvers.exponential.contact.many_stops import POOL
 from solvers.exponential.contact.node_response import START, Scratch
@@ -108,8 +108,7 @@ def prepare_system(system: System, forcing: Forcing) -> Prepared:
     tones = forcing.tone_omega, forcing.tone_amplitude, forcing.tone_load
 
     def make() -> Prepared:
-        gaps = [contact.gap for contact in system.contacts]
-        return _shared_tables_for(system, forcing, dt_cell).with_tones(forcing, gaps)
+        return _shared_tables_for(system, forcing, dt_cell).with_tones(forcing, gaps_of(system.contacts))
 
     key = "tables", dt_cell, forcing.table_load.tobytes(), *(part.tobytes() for part in tones)
     prepared: Prepared = system.kept.get(key, make)
@@ -150,14 +149,17 @@ class _SharedTables:
         self.back, self.fastest = among_tones(system.blocks.T, self.tones), max(float(_speeds(system).max()), 1e-3)
         energy_rows = np.zeros_like(problem.load), problem.power, among_tones(loss, self.tones)
         tables = build(problem, self.tones, self.series, law_tables_of(contacts), dt_cell, energy_rows)
-        sizes = len(problem.gap), len(problem.load), len(problem.k), len(forcing.table_dt), most_borders(problem)
+        sizes = {
+            **{"E": len(contacts), "R": len(problem.gap), "L": len(problem.load), "N": len(problem.k)},
+            **{"tables": len(forcing.table_dt), "B": most_borders(problem)},
+        }
         if tables.bend.any() or problem.border_count.any():
             load_parts(BORDERS)
         if len(contacts) > 1:
             load_parts(TWO_STOPS)
         if tables.node_propagator.size:
             load_parts(MANY_STOPS)
-        self.layout = _layout(*sizes, POOL if tables.node_propagator.size else 0)
+        self.layout = _layout(pool=POOL if tables.node_propagator.size else 0, **sizes)
         self.kept = Memo()
         self.problem = PackedTemplate(problem, PROBLEM, ("gap", "k", "read", "read_rate", "power"))
         self.tables = PackedTemplate(aligned(tables), TABLES, TONE_TABLES)
@@ -167,7 +169,7 @@ class _SharedTables:
         """Of problem and tables."""
         return sum(getattr(array, "nbytes", 8) for part in (self.problem, self.tables) for array in part.value)
 
-    def with_tones(self, forcing: Forcing, gaps: list[float]) -> Prepared:
+    def with_tones(self, forcing: Forcing, gaps: Array) -> Prepared:
         """A copy with the columns of given tones, and with given gaps."""
         omega, amplitude, n = forcing.tone_omega, forcing.tone_amplitude, len(self.k)
         load = self.load[forcing.tone_load] * amplitude[:, None]
@@ -220,16 +222,17 @@ def _check_passive(system: System) -> bool:
 
 
 @lru_cache(maxsize=64)
-def _layout(stops: int, loads: int, blocks: int, signals: int, borders: int, pool: int) -> Layout:
-    """Shapes and places of the arrays of `State` and `Scratch`; ``pool`` pairs of stops, 0 for a few stops."""
-    width, own, many = 2 * blocks + 2 + 2 * stops, padded(blocks), blocks if pool else 0
+def _layout(**known: int) -> Layout:
+    """Shapes and places of the arrays of `State` and `Scratch`; ``pool`` pairs of rows, 0 for a few of them."""
+    blocks, pool, inputs = known["N"], known["pool"], known["R"] + known["L"]
+    width, own, many = 2 * blocks + 2 + 2 * known["E"], padded(blocks), blocks if pool else 0
     sizes = {
-        **{"m": stops, "L": loads, "N": blocks, "N8": own, "S": S, "B": borders, "tables": signals},
-        **{"X8": padded(width), "W8": max(padded(width + 2), 2 * own), "stages": START + 1},
-        **{"M": many, "M8": padded(2 * many), "pool": pool},
-        "numbers": padded(4 * blocks + 2 * S * (stops + loads + 2)) + 16 * signals,
+        **{"X": width, "X8": padded(width), "W8": max(padded(width + 2), 2 * own), "N8": own, "stages": START + 1},
+        **{"S": S, "M": many, "M8": padded(2 * many), "rows": 0, "record": 0},
+        "numbers": padded(4 * blocks + 2 * S * (inputs + 2)) + 16 * known["tables"],
+        **known,
     }
-    return Layout([STATE, SCRATCH], [state_shapes(width, stops), shapes_of(Scratch, sizes)])
+    return Layout([STATE, SCRATCH], [shapes_of(State, sizes), shapes_of(Scratch, sizes)])
 
 
 def _loss_rows(problem: Problem) -> Array:

@@ -23,7 +23,7 @@ import math
 
 import numpy as np
 
-from solvers.compiled.kernels import copy, dot, indentation, inlined, inner, merged
+from solvers.compiled.kernels import copy, dot, indentation, indentation_rate, inlined, inner, merged
 from solvers.compiled.state import SAMPLED, STEPS, T
 from solvers.exponential.energy.flight_balance import (
     account_output,
@@ -70,14 +70,14 @@ def _bound_signals(problem, cell, count, bounds):
 
 
 @inlined
-def _acceleration_bound(problem, tables, s, norms, signal_bounds, horizon):
-    """M: bound of |δ̈| of stop s over the horizon, signals included."""
+def _acceleration_bound(problem, tables, r, norms, signal_bounds, horizon):
+    """M: bound of the acceleration of row r over the horizon, signals included."""
     n = problem.k.size
-    total = dot(tables.acceleration_weight[s], norms, n)
+    total = dot(tables.acceleration_weight[r], norms, n)
     for j in range(problem.table_dt.size):
         load = problem.table_load[j]
-        growth = dot(tables.acceleration_weight[s], tables.load_norm[load], n)
-        total += signal_bounds[j] * (horizon * growth + abs(tables.load_acceleration[s, load]))
+        growth = dot(tables.acceleration_weight[r], tables.load_norm[load], n)
+        total += signal_bounds[j] * (horizon * growth + abs(tables.load_acceleration[r, load]))
     return total
 
 
@@ -128,11 +128,11 @@ def _fly_unsampled(problem, tables, state, scratch, most, budget):
     split(problem, state.x, x)
     while True:
         span = most - flown
-        for s in range(problem.gap.size):
-            if count % _REFRESH == 0:
-                scratch.per_stop[s] = weighted_norms(tables.acceleration_weight[s], tables, x)
-            delta, rate = motion_of_stop(tables, s, x)
-            span = min(span, _safe(problem.gap[s] - delta, -rate, scratch.per_stop[s]))
+        for r in range(problem.gap.size if count % _REFRESH == 0 else 0):
+            scratch.per_row[r] = weighted_norms(tables.acceleration_weight[r], tables, x)
+        for s in range(problem.law.size):
+            delta, rate = motion_of_stop(problem, tables, s, x)
+            span = min(span, _safe(-delta, -rate, scratch.per_row[problem.first[s]]))
         if span < tables.flight_step[tables.flight_step.size - 1] or count >= budget:
             break
         level = level_within(tables, span)
@@ -146,12 +146,12 @@ def _fly_unsampled(problem, tables, state, scratch, most, budget):
 def _bound_cells(problem, tables, scratch, x, cell, count):
     """Set the errors e of all stops for some cells from here; returns whether a stop may be that near already."""
     _bound_signals(problem, cell, count, scratch.signal_bounds)
-    for s in range(problem.gap.size):
-        error = weighted_norms(tables.cell_error[s], tables, x)
+    for r in range(problem.gap.size):
+        error = weighted_norms(tables.cell_error[r], tables, x)
         for j in range(problem.table_dt.size):
-            by_signal = tables.cell_error_signal[s, problem.table_load[j]]
+            by_signal = tables.cell_error_signal[r, problem.table_load[j]]
             error += scratch.signal_bounds[j] * (by_signal[0] + count * by_signal[1])
-        scratch.per_stop[s] = error
+        scratch.per_row[r] = error
     return _near(problem, tables, scratch, x)
 
 
@@ -159,8 +159,8 @@ def _bound_cells(problem, tables, scratch, x, cell, count):
 def _near(problem, tables, scratch, x):
     """Whether any stop is nearer than its error e, or the state is not finite."""
     near = False
-    for s in range(problem.gap.size):
-        near |= not motion_of_stop(tables, s, x)[0] + scratch.per_stop[s] < problem.gap[s]
+    for s in range(problem.law.size):
+        near |= not motion_of_stop(problem, tables, s, x)[0] + scratch.per_row[problem.first[s]] < 0.0
     return near
 
 
@@ -207,11 +207,11 @@ def _safe_span(problem, tables, state, scratch, span, rest, renew):
     """``span``, or the time within which no stop can be reached; ``renew`` the bounds of |δ̈| for the time ``rest``."""
     if renew:
         energy_norms(problem, state.x, scratch.norms)
-        for s in range(problem.gap.size):
-            scratch.per_stop[s] = _acceleration_bound(problem, tables, s, scratch.norms, scratch.signal_bounds, rest)
-    for s in range(problem.gap.size):
-        g, v = -indentation(problem, s, state.x), -dot(problem.read_rate[s], state.x, 2 * problem.k.size)
-        span = min(span, _safe(g, v, scratch.per_stop[s]))
+        for r in range(problem.gap.size):
+            scratch.per_row[r] = _acceleration_bound(problem, tables, r, scratch.norms, scratch.signal_bounds, rest)
+    for s in range(problem.law.size):
+        g, v = -indentation(problem, s, state.x), -indentation_rate(problem, s, state.x)
+        span = min(span, _safe(g, v, scratch.per_row[problem.first[s]]))
     return span
 
 
@@ -223,7 +223,7 @@ def _fly_step(problem, tables, state, scratch, span, target, rest, offset, cell,
     if span < shortest:
         taylor_terms(problem, state.x, now[T], scratch.terms, scratch.signal_terms)
         h = min(shortest, target - now[T], rest)
-        for s in range(problem.gap.size):
+        for s in range(problem.law.size):
             root = first_root(problem, scratch.terms, s, state.x, h, scratch.values, scratch.trial)
             if root >= 0.0:
                 h, stop = root, s

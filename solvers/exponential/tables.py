@@ -38,8 +38,8 @@ _SHORT = 1e-9  # s: a stop may be far stiffer than the structure
 class Tables(NamedTuple):
     """Numbers per step size, read by kernels only; `build` and `fill_tones` write them.
 
-    l counts flight steps, j contact steps, f node sets (the smooth one, then one per stop that enters), m stops, L
-    loads, N blocks with those of the tones.
+    l counts flight steps, j contact steps, f node sets (the smooth one, then one per element that enters), E elements,
+    R rows, L loads, N blocks with those of the tones.
     """
 
     flight_step: Annotated[Any, "l"]  # s, falling
@@ -47,20 +47,20 @@ class Tables(NamedTuple):
     signal: Annotated[Any, "l, L, 6, 2, N8"]  # state change by a signal t^k/k!
     cell: Annotated[Any, "2, N8"]  # α, β over a whole cell of the sampled signals
     cell_signal: Annotated[Any, "L, 6, 2, N8"]  # state change over a cell by s, s', s'' at its start, then at its end
-    cell_error: Annotated[Any, "m, N8"]  # see `cell_errors`
-    cell_error_signal: Annotated[Any, "m, L, 2"]
+    cell_error: Annotated[Any, "R, N8"]  # see `cell_errors`
+    cell_error_signal: Annotated[Any, "R, L, 2"]
     load_rows: Annotated[Any, "L, 2, N8"]  # state rate of p and v per unit of a signal
     block_k_c: Annotated[Any, "2, N8"]  # k in 1/s², c in 1/s
-    stop_rows: Annotated[Any, "m, 4, N8"]  # the first two rows give δ + gap from p and v, the others δ̇
-    acceleration_weight: Annotated[Any, "m, N8"]  # |δ̈| <= Σ weight × energy norm
-    rate_weight: Annotated[Any, "m, N"]  # |δ̇| <= Σ weight × energy norm
-    load_acceleration: Annotated[Any, "m, L"]  # δ̈ per unit of a signal
+    stop_rows: Annotated[Any, "R, 4, N8"]  # the first two rows give δ + gap from p and v, the others δ̇
+    acceleration_weight: Annotated[Any, "R, N8"]  # |δ̈| <= Σ weight × energy norm
+    rate_weight: Annotated[Any, "R, N"]  # |δ̇| <= Σ weight × energy norm
+    load_acceleration: Annotated[Any, "R, L"]  # δ̈ per unit of a signal
     load_norm: Annotated[Any, "L, N"]  # energy norm of a load per block
     fastest: Annotated[float, "number"]  # |λ|max, rad/s
     own_blocks: Annotated[float, "number"]  # number of the structure's blocks; those behind them are tones
-    accelerance: Annotated[Any, "m, m"]  # -δ̈ of stop s per newton at stop u, > 0 where the force opens the contact
-    exponent: Annotated[Any, "m"]  # leading exponents p of the laws
-    power_law: Annotated[Any, "m, 4"]  # K, p, a, c of a force K δ^p (1 + a δ̇/δ̇⁻) + c δ̇; p = 0 for laws that are called
+    accelerance: Annotated[Any, "R, R"]  # -δ̈ of row r per newton at row u, > 0 where the force opens the contact
+    exponent: Annotated[Any, "E"]  # leading exponents p of the laws
+    power_law: Annotated[Any, "E, 4"]  # K, p, a, c of a force K δ^p (1 + a δ̇/δ̇⁻) + c δ̇; p = 0 for laws that are called
     contact_step: Annotated[Any, "j"]  # s, falling
     contact_propagator: Annotated[Any, "j, 2, N"]  # α, β of every block
     time_exponent: Annotated[Any, "f"]  # κ
@@ -78,24 +78,24 @@ class Tables(NamedTuple):
     local_interval: Annotated[Any, "f, S, 2"]  # the interval of σ these points span
     kind: Annotated[Any, "int f"]  # of kinds, and of weightings of plain forces; see `contact.nodes.NodeSets`
     entering: Annotated[Any, "int f"]  # index of the weighting of the force of the stop that enters
-    free: Annotated[Any, "kinds, j, m, 2*N, 2*S"]  # δ and δ̇ at nodes from the state; for a few stops, as the next two
-    forced: Annotated[Any, "weightings, j, m+L, m, S, 2*S"]  # the same from the forces and signals at the nodes
-    end_response: Annotated[Any, "weightings, j, m+L, S, 2*N8"]  # state change at the end
+    free: Annotated[Any, "kinds, j, R, 2*N, 2*S"]  # δ and δ̇ at nodes from the state; for a few stops, as the next two
+    forced: Annotated[Any, "weightings, j, R+L, R, S, 2*S"]  # the same from the forces and signals at the nodes
+    end_response: Annotated[Any, "weightings, j, R+L, S, 2*N8"]  # state change at the end
     node_propagator: Annotated[Any, "kinds, j, 2, N, S"]  # α, β of blocks at nodes; for many stops, as the next two
     block_response: Annotated[Any, "weightings, j, S, 2*own, S"]  # α, then β, of the blocks at the nodes per node value
     block_end_response: Annotated[Any, "weightings, j, 2, own, S"]  # the same at the end
     alias: Annotated[Any, "kinds, j, 2*N"]  # error of δ between the nodes <= Σ ripple_weight (alias |p| + alias |v|)
-    ripple_weight: Annotated[Any, "m, N"]  # amplitude of δ per unit of an oscillating block's rate
+    ripple_weight: Annotated[Any, "R, N"]  # amplitude of δ per unit of an oscillating block's rate
     signal_rows: Annotated[Any, "L, 2*N"]  # a load's tones from the state
     power_rows: Annotated[Any, "L, 2*N"]  # input power = signal × power row
     loss_rows: Annotated[Any, "r, 2*N"]  # damping power = Σ (row·z)²
     steady_rate: Annotated[Any, "2*tones, own8"]  # blocks' steady rate by p, then v, of the tones; loss_rows: × √c
     gauss: Annotated[Any, "2+S, S"]  # points, weights on (0, 1); integrals to all points of each one's polynomial
     extrapolation: Annotated[Any, "f, 5, S, S"]  # force on the next smooth step, 2^{(i-2)/2} times shorter
-    bend: Annotated[Any, "m"]  # kind of the law's bend: 0 for none, else as named in `contact.crossings`
-    uncut: Annotated[Any, "int m"]  # addresses of the laws without their cut at F = 0
-    uncut_gradient: Annotated[Any, "int m"]  # and of their derivatives
-    uncut_parameters: Annotated[Any, "m, P"]
+    bend: Annotated[Any, "E"]  # kind of the law's bend: 0 for none, else as named in `contact.crossings`
+    uncut: Annotated[Any, "int E"]  # addresses of the laws without their cut at F = 0
+    uncut_gradient: Annotated[Any, "int E"]  # and of their derivatives
+    uncut_parameters: Annotated[Any, "E, P"]
 
 
 class LawTables(NamedTuple):
@@ -246,13 +246,13 @@ def _steps_of(omegas: bytes, dampings: bytes, doublings: int) -> tuple[Any, Any]
 
 
 def _ripple_weight(read: Any, omega: Any) -> Any:
-    """(m, N): amplitude of δ per unit of an oscillating block's rate."""
+    """(R, N): amplitude of δ per unit of an oscillating block's rate."""
     p, v = np.abs(read[:, : omega.size]), np.abs(read[:, omega.size :])
     return np.ascontiguousarray(p / np.where(omega > 0.0, omega, np.inf) + v)
 
 
 def _acceleration_weight(problem: Problem) -> Any:
-    """(m, N): amplitude of δ̈ per unit of a block's energy norm."""
+    """(R, N): amplitude of δ̈ per unit of a block's energy norm."""
     size, omega, c = len(problem.k), np.sqrt(problem.k), problem.c
     p, v = np.abs(problem.read[:, :size]), np.abs(problem.read[:, size:])
     return p * (omega + c) + v * (problem.k + c * (omega + c))
@@ -265,7 +265,7 @@ def _load_norm(problem: Problem) -> Any:
 
 
 def cell_errors(problem: Problem, h: float) -> tuple[Any, Any]:
-    """Weights (m, N) and (m, L, 2) of a bound of how far δ is from its linear interpolant between the ends of a cell.
+    """Weights (R, N) and (R, L, 2) of a bound of how far δ is from its linear interpolant between the ends of a cell.
 
     A block's share of δ differs from its interpolant by at most h²/8 max|δ̈_b|, and by at most twice its amplitude
     r_b E_b, whichever is smaller. With E_b the largest energy norm, |δ̈_b| <= w_b E_b + |a_b s|, so that

@@ -13,7 +13,7 @@ from solvers.compiled.dop853_tableau import STAGES
 from solvers.compiled.fields import shapes_of
 from solvers.compiled.kernels import PROBLEM, Problem
 from solvers.compiled.packed import Layout, Packed
-from solvers.compiled.state import HEAD, STATE, State, T, begin_state, law_parameters, most_borders, state_shapes
+from solvers.compiled.state import HEAD, STATE, State, T, begin_state, gaps_of, law_parameters, most_borders
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.linearised import linearise_run
 from solvers.exponential.linearised_step import DERIVATIVES, VARIATION, Derivatives, Variation
@@ -32,7 +32,7 @@ class Tangent:
     def __init__(self, system: System, engine: Any, parameter: Parameter | None, latched: bool = False) -> None:
         self.engine, self.blocks = engine, system.blocks
         problem, state = engine.problem, engine.state
-        stops, loads, size = len(problem.gap), len(problem.load), 2 * len(problem.k)
+        stops, rows, size = len(problem.law), len(problem.gap), 2 * len(problem.k)
         if problem.border_count.any():  # the record is followed with what was latched then
             problem = problem._replace(parameters=problem.parameters.copy())
         width, n = state.x.size, system.size
@@ -41,8 +41,10 @@ class Tangent:
         self.places_latched = np.flatnonzero(problem.latched.ravel() >= 0)  # among those of all contacts
         own = len(self.places_latched) if latched else 0
         self.change, columns = change or _Change.none(problem, n), 2 * n + own + self.exact
-        places, parameters = problem.latched.shape[1], problem.parameters.shape[1]
-        layout = _layout(stops, loads, width, columns, places, parameters + most_borders(problem))
+        layout = _layout(
+            **{"columns": columns, "X": width, "E": stops, "R": rows, "L": len(problem.load)},
+            **{"l": problem.latched.shape[1], "P": problem.parameters.shape[1], "B": most_borders(problem)},
+        )
         self.block, words = layout.block()
         self.y, self.entry, self.shift, self.end_rate, self.latched = (layout.array(self.block, 0, i) for i in _CARRIED)
         begin_state(State._make(layout.arrays(self.block, 1)), state.x[:size])
@@ -51,7 +53,7 @@ class Tangent:
         if self.exact:
             self.y[-1, self.places] = -self.change.steady(0.0)
         self.latched[2 * n : 2 * n + own, self.places_latched[:own]] = np.eye(own)
-        engine.record_events(np.empty((_ROWS, HEAD + width + stops * S)))
+        engine.record_events(np.empty((_ROWS, HEAD + width + rows * S)))
         self.packed = [
             *(engine.packed if same is engine.problem else Packed.of(same, PROBLEM) for same in self.change.problems),
             Packed.of(self.change.variation, VARIATION),
@@ -99,13 +101,12 @@ class Tangent:
 
 
 @lru_cache(maxsize=64)
-def _layout(stops: int, loads: int, width: int, columns: int, latched: int, others: int) -> Layout:
+def _layout(**known: int) -> Layout:
     """Shapes and places of the arrays of `Derivatives` and of the past `State`."""
-    sizes = {
-        **{"columns": columns, "X": width, "m": stops, "L": loads, "S": S, "STAGES": STAGES, "l": latched},
-        "renewed": latched * (5 + latched) + 2 + others,
-    }
-    return Layout([DERIVATIVES, STATE], [shapes_of(Derivatives, sizes), state_shapes(width, stops)])
+    latched = known["l"]
+    working = latched * (5 + latched) + 2 + known["P"] + known["B"]
+    sizes = {**known, "S": S, "STAGES": STAGES, "renewed": working, "rows": 0, "record": 0}
+    return Layout([DERIVATIVES, STATE], [shapes_of(Derivatives, sizes), shapes_of(State, sizes)])
 
 
 def _size(y: Array) -> float:
@@ -131,8 +132,8 @@ class _Change:
     @classmethod
     def none(cls, problem: Problem, n: int) -> _Change:
         """No parameter."""
-        stops = len(problem.gap)
-        variation = Variation(0.0, 0.0, np.zeros(0), np.zeros((0, stops, 2, 4)), np.zeros(stops))
+        rows = len(problem.gap)
+        variation = Variation(0.0, 0.0, np.zeros(0), np.zeros((0, rows, 2, 4)), np.zeros(rows))
         none = np.zeros((0, 2 * n), dtype=complex)
         return cls(variation, [problem] * 2, none, none)
 
@@ -148,11 +149,11 @@ class _Change:
             return None
         width = 2.0 * parameter.step
         own = places_among_tones(system.size, len(tones.omega))
-        rows = np.stack([engine.problem.read[:, own], engine.problem.read_rate[:, own]], axis=1)  # (m, 2, 2n)
+        rows = np.stack([engine.problem.read[:, own], engine.problem.read_rate[:, own]], axis=1)  # (R, 2, 2n)
         a, b = tones.change / width, 1j * (tones.turn / width)[:, None] * tones.response
         parts = np.array([a.real, a.imag, b.real, b.imag])
         steady = (rows @ parts.reshape(-1, own.size).T).reshape(len(rows), 2, 4, len(a)).transpose(3, 0, 1, 2)
-        gaps = [np.array([contact.gap for contact in side.contacts]) for side in sides]
+        gaps = [gaps_of(side.contacts) for side in sides]
         shift = (gaps[1] - gaps[0]) / width
         variation = Variation(parameter.step, parameter.step, tones.omega, np.ascontiguousarray(steady), shift)
         if all(one.law is other.law for one, other in zip(*(side.contacts for side in sides), strict=True)):

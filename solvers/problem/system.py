@@ -104,6 +104,11 @@ class Contact:
         object.__setattr__(self, "direction", direction)
         object.__setattr__(self, "gap", float(self.gap))
 
+    @property
+    def rows(self) -> Array:
+        """(m, n) the coordinates it acts on, one row each."""
+        return self.direction[None]
+
 
 @dataclass(frozen=True, eq=False)
 class System:

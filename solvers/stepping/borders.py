@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from solvers.compiled.kernels import dot, indentation, inner, kernel
+from solvers.compiled.kernels import acceleration_of, dot, indentation, indentation_rate, inner, kernel
 from solvers.compiled.renewals import margins, margins_before, margins_in, note_event, renew
 from solvers.compiled.state import LAST_EVENT, T, most_borders, rate_tolerance, surface_tolerance
-from solvers.stepping.events import NONE, bisection, coefficients_of, golden_section, polynomial
+from solvers.stepping.events import NONE, bisection, golden_section, motion_of, polynomial
 
 _MISSED = 1e-3  # margin, in units of the largest of the step, by which a landing may have missed its border
 _NODES = np.array([0.0, *(2.0**i for i in (-20, -15, -11, -8, -7, -6, -5, -4, -3, -2)), *(np.arange(3, 9) / 8.0)])
@@ -27,7 +27,7 @@ _AHEAD = 1e-4  # part of a step over which the rate of a margin is differenced
 
 def border_space(problem: Any) -> list[Any]:
     """Working arrays: those of the borders among the fields of `loop.Space`, in order."""
-    stops, most, n = problem.gap.size, most_borders(problem), _NODES.size
+    stops, most, n = problem.law.size, most_borders(problem), _NODES.size
     return [np.empty(n * most), np.empty((2, n)), np.empty(2), np.empty(most), np.zeros((stops, 2))] + [
         np.zeros((stops, most)) for _ in range(3)
     ]
@@ -39,7 +39,7 @@ def _present(problem, state, space, s, x):
 
     Ahead is where the motion goes: a law that has not moved yet may look at the sign of δ.
     """
-    delta, rate = indentation(problem, s, x), dot(problem.read_rate[s], x, 2 * problem.k.size)
+    delta, rate = indentation(problem, s, x), indentation_rate(problem, s, x)
     scale, count = space.scale[s], problem.border_count[s]
     scale[0] = max(scale[0], 4.0 * surface_tolerance(problem, s, x))
     scale[1] = max(scale[1], rate_tolerance(problem, s, x))
@@ -58,8 +58,7 @@ def _present(problem, state, space, s, x):
 @inner
 def _watch(problem, state, space, s):
     """Margins of element s at the nodes of the step just tried."""
-    coefficients_of(problem.read[s], problem.gap[s], state.x, space.dense, space.coefficients[0])
-    coefficients_of(problem.read_rate[s], 0.0, state.x, space.dense, space.coefficients[1])
+    motion_of(problem, s, state.x, space.dense, space.coefficients)
     for i in range(_NODES.size):
         space.points[0, i] = polynomial(space.coefficients[0], _NODES[i])
         space.points[1, i] = polynomial(space.coefficients[1], _NODES[i])
@@ -112,7 +111,7 @@ def _crossing(problem, state, space, s, j):
 def border_ahead(problem, state, space):
     """(θ, element, border) of the first border on the step just tried; θ = NONE without one."""
     theta, element, border = NONE, -1, -1
-    for s in range(problem.gap.size):
+    for s in range(problem.law.size):
         if problem.border_count[s] == 0:
             continue
         _present(problem, state, space, s, state.x)
@@ -129,9 +128,9 @@ def border_ahead(problem, state, space):
 def border_apart(problem, state, space, h, s, j):
     """(distance beyond a border, its rate, its rounding) at the end of the step of duration h just tried."""
     delta, rate = _present(problem, state, space, s, space.x_new)
-    time, size = _AHEAD * h, 2 * problem.k.size
-    space.trial[0] = delta + time * dot(problem.read[s], space.rate_new, size)
-    space.trial[1] = rate + time * dot(problem.read_rate[s], space.rate_new, size)
+    time = _AHEAD * h
+    space.trial[0] = delta + time * dot(problem.read[problem.first[s]], space.rate_new, 2 * problem.k.size)
+    space.trial[1] = rate + time * acceleration_of(problem, s, space.rate_new)
     margins(problem, state, s, 1, space.trial[0:1], space.trial[1:2], space.one)
     present = space.present[s, j]
     return -present, (present - space.one[j]) / time, space.rounding[s, j]
@@ -152,7 +151,7 @@ def renew_together(problem, state, space, h, element, border, log):
     Which ones is judged from the state alone, before any is renewed. One that began at zero, as after its own renewal,
     has risen and come back if its margin was above zero just before.
     """
-    for s in range(problem.gap.size):
+    for s in range(problem.law.size):
         if problem.border_count[s] == 0:
             continue
         delta, rate = _present(problem, state, space, s, state.x)
@@ -172,7 +171,7 @@ def renew_passed(problem, state, space, log):
     After each the margins are read again: another border of the same segment is none of the next one.
     """
     found = False
-    for s in range(problem.gap.size):
+    for s in range(problem.law.size):
         if problem.border_count[s] == 0:
             continue
         delta, rate = _present(problem, state, space, s, state.x)

@@ -27,7 +27,7 @@ def gains(problem, state, space):
     watch = space.watch
     watch[MOST_INPUT] = max(watch[MOST_INPUT], state.x[ledger])
     given = watch[BEGAN] + watch[MOST_INPUT]
-    for s in range(problem.gap.size):  # a stop returns at most what it stored
+    for s in range(problem.law.size):  # a stop returns at most what it stored
         given += min(max(-state.x[ledger + 2 + 2 * s], 0.0), watch[HELD + s])
     more = watch[NOW] > 2.0 * given + watch[LEAST]
     watch[IN_A_ROW] = watch[IN_A_ROW] + 1.0 if more else 0.0

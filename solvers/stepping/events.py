@@ -29,7 +29,15 @@ def polynomial(coefficients, theta):
 
 
 @inner
-def coefficients_of(row, offset, x, dense, out):
+def motion_of(problem, s, x, dense, coefficients):
+    """Nested coefficients of a stop's indentation and, in the second row, of its rate."""
+    row = problem.first[s]
+    _coefficients_of(problem.read[row], problem.gap[row], x, dense, coefficients[0])
+    _coefficients_of(problem.read_rate[row], 0.0, x, dense, coefficients[1])
+
+
+@inner
+def _coefficients_of(row, offset, x, dense, out):
     """Nested coefficients of ``row·z - offset``."""
     size = row.size
     out[0] = dot(row, x, size) - offset
@@ -122,9 +130,8 @@ def nearer(h, distance, rate, before, beyond, longest):
 def first_event(problem, x, dense, segment, coefficients):
     """(θ, stop, direction ±1) of the earliest crossing of the step by any stop."""
     theta, stop, direction = NONE, -1, 0
-    for s in range(problem.gap.size):
-        coefficients_of(problem.read[s], problem.gap[s], x, dense, coefficients[0])
-        coefficients_of(problem.read_rate[s], 0.0, x, dense, coefficients[1])
+    for s in range(problem.law.size):
+        motion_of(problem, s, x, dense, coefficients)
         tolerance = surface_tolerance(problem, s, x)
         found = crossing(coefficients[0], coefficients[1], problem.knots[s, segment[s]], 1.0, tolerance)
         if found < theta:
@@ -140,7 +147,7 @@ def first_event(problem, x, dense, segment, coefficients):
 def entry_by_sign(problem, x, x_new, segment):
     """(θ, stop) of the stop that is inside at the end of a step but was not at its start; the paper's test."""
     theta, stop = NONE, -1
-    for s in range(problem.gap.size):
+    for s in range(problem.law.size):
         if segment[s] == 0:
             after = indentation(problem, s, x_new)
             if after > 0.0:

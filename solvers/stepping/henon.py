@@ -20,7 +20,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from solvers.compiled.kernels import dot, inner, kernel, rhs
+from solvers.compiled.kernels import indentation, indentation_rate, inner, kernel, rhs
 from solvers.problem import require_step
 from solvers.stepping.constant_step import ConstantStep
 from solvers.stepping.events import HENON
@@ -57,16 +57,15 @@ def step(problem, t, h, x, rate, segment, entry_rate, x_new, rate_new, dense, wo
 @inner
 def land(problem, t, h, x, rate, segment, entry_rate, stop, level, x_new, work):
     """Hénon's step of stop ``stop`` onto ``level``; returns its duration, or -1 where it fails (δ̇ near 0)."""
-    size = 2 * problem.k.size
     trial, second, batch = work[0], work[1], work[2]
-    delta_dot = dot(problem.read_rate[stop], x, size)
-    distance = level - (dot(problem.read[stop], x, size) - problem.gap[stop])
+    delta_dot = indentation_rate(problem, stop, x)
+    distance = level - indentation(problem, stop, x)
     if not delta_dot > 0.0:
         return -1.0
     for i in range(x.size):
         trial[i] = x[i] + distance * rate[i] / delta_dot
     rhs(problem, t + distance / delta_dot, trial, segment, entry_rate, second, batch)
-    second_delta_dot = dot(problem.read_rate[stop], trial, size)
+    second_delta_dot = indentation_rate(problem, stop, trial)
     duration = 0.5 * distance * (1.0 / delta_dot + 1.0 / second_delta_dot)
     if not (second_delta_dot > 0.0 and 0.0 <= duration <= 2.0 * h):
         return -1.0

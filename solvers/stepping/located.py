@@ -4,7 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from solvers.compiled.kernels import contact_forces, copy, dot, indentation, inner, kernel, off_knots
+from solvers.compiled.kernels import (
+    contact_forces,
+    copy,
+    dot,
+    indentation,
+    indentation_rate,
+    inner,
+    kernel,
+    off_knots,
+)
 from solvers.compiled.renewals import most_rows
 from solvers.compiled.state import (
     AT_ONCE,
@@ -33,9 +42,9 @@ from solvers.stepping.events import (
     LOCATED,
     MOST_LANDINGS,
     NONE,
-    coefficients_of,
     first_event,
     golden_section,
+    motion_of,
     nearer,
     polynomial,
 )
@@ -51,12 +60,11 @@ NEAR_END = 1e-6  # share of a step: a kink as near to an end as that counts as r
 def _peaks(problem, state, space):
     """Largest indentation and force of the step just accepted, for every stop in contact."""
     delta_of, rate_of = space.coefficients[0], space.coefficients[1]
-    for s in range(problem.gap.size):
+    for s in range(problem.law.size):
         always = problem.knots[s, 0] == -np.inf and problem.opening[s] < 0  # no contact of the log
         if state.segment[s] == 0 or always or is_open(problem, s):
             continue
-        coefficients_of(problem.read[s], problem.gap[s], state.x, space.dense, delta_of)
-        coefficients_of(problem.read_rate[s], 0.0, state.x, space.dense, rate_of)
+        motion_of(problem, s, state.x, space.dense, space.coefficients)
         for column in (PEAK_DELTA, PEAK_FORCE):
             known = (problem, state, s, column, delta_of, rate_of, space.work[0])
             best, place = -np.inf, 0
@@ -86,11 +94,10 @@ def _peak_value(known, theta):
 def first_kink(problem, state, space):
     """θ of the first place inside the step where a clamped force begins or ends, or a damper of approach; else NONE."""
     first, batch = NONE, space.work[0]
-    for s in range(problem.gap.size):
+    for s in range(problem.law.size):
         if state.segment[s] == 0 or space.kinks[s] == 0:
             continue
-        coefficients_of(problem.read[s], problem.gap[s], state.x, space.dense, space.coefficients[0])
-        coefficients_of(problem.read_rate[s], 0.0, state.x, space.dense, space.coefficients[1])
+        motion_of(problem, s, state.x, space.dense, space.coefficients)
         lowest = landing_tolerance(problem, state, s)
         for i in range(1, _KINK_NODES.size):
             a, b = _KINK_NODES[i - 1], _KINK_NODES[i]
@@ -155,7 +162,7 @@ def land(step, problem, state, space, h, longest, stop, direction, level, border
         )
         state.count[CALLS] += calls
         distance = direction * (indentation(problem, stop, space.x_new) - level)
-        slope = direction * dot(problem.read_rate[stop], space.x_new, 2 * problem.k.size)
+        slope = direction * indentation_rate(problem, stop, space.x_new)
         if border >= 0:
             distance, slope, tolerance = border_apart(problem, state, space, h, stop, border)
         if abs(distance) <= tolerance:
@@ -178,7 +185,7 @@ def _if_accurate(h, error):
 def _switch_by_sign(problem, state, log):
     """Put every stop on the piece its indentation lies in, one border at a time; returns whether any moved."""
     switched = False
-    for s in range(problem.gap.size):
+    for s in range(problem.law.size):
         delta = indentation(problem, s, state.x)
         if delta > problem.knots[s, state.segment[s]]:
             switch(problem, state, s, 1, log)
@@ -235,9 +242,11 @@ def accept(problem, state, space, h, stop, direction, at_end, t_end, log, out, d
 def _law_fails(problem, state, space, h):
     """Whether a law is not finite where an Euler step would take its stop."""
     batch = space.work[0]
-    for s in range(problem.gap.size):
-        batch[0] = indentation(problem, s, state.x) + h * dot(problem.read[s], state.rate, 2 * problem.k.size)
-        batch[1] = dot(problem.read_rate[s], state.x, 2 * problem.k.size)
+    for s in range(problem.law.size):
+        batch[0] = indentation(problem, s, state.x) + h * dot(
+            problem.read[problem.first[s]], state.rate, 2 * problem.k.size
+        )
+        batch[1] = indentation_rate(problem, s, state.x)
         if state.segment[s] > 0 and np.isfinite(batch[0]):
             contact_forces(problem, s, batch[0:1], batch[1:2], state.entry_rate[s], batch[2:3])
             if not np.isfinite(batch[2]):

@@ -23,8 +23,17 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from solvers.compiled.kernels import add_loads, contact_forces, contact_gradient, copy, indentation, inner, kernel, rhs
-from solvers.compiled.kernels import dot as product
+from solvers.compiled.kernels import (
+    add_loads,
+    contact_forces,
+    contact_gradient,
+    copy,
+    indentation,
+    indentation_rate,
+    inner,
+    kernel,
+    rhs,
+)
 from solvers.problem import Array, System, require_step
 from solvers.stepping.constant_step import ConstantStep
 from solvers.stepping.critical_step import newmark_oscillator
@@ -66,7 +75,7 @@ def _accelerate(n, i, a, h, beta, gamma, x):
 @inner
 def _touch(problem, h, segment, entry_rate, x_new, rate_new, work):
     """Add what the stops in contact do to the end of a step, by turns until their forces agree; law calls."""
-    n, stops, active, calls = problem.k.size, problem.gap.size, 0, 0
+    n, stops, active, calls = problem.k.size, problem.law.size, 0, 0
     force, effective, batch = work[0], work[1], work[2]
     kept, beta, gamma = 1.0 - work[3][1], work[3][2], work[3][3]
     for s in range(stops):
@@ -77,17 +86,17 @@ def _touch(problem, h, segment, entry_rate, x_new, rate_new, work):
         for s in range(stops):
             if segment[s] == 0:
                 continue
-            compliance = 0.0
+            row, compliance = problem.first[s], 0.0
             for i in range(n):
-                compliance -= problem.read[s, i] * kept * problem.push[s, n + i] / effective[i]
+                compliance -= problem.read[row, i] * kept * problem.push[row, n + i] / effective[i]
             F, used = contact_force(
                 *(problem, s, entry_rate[s], indentation(problem, s, x_new)),
-                *(product(problem.read_rate[s], x_new, 2 * n), beta * h * h * compliance, gamma * h * compliance),
+                *(indentation_rate(problem, s, x_new), beta * h * h * compliance, gamma * h * compliance),
                 *(force[s], batch),
             )
             calls += used
             for i in range(n):
-                a = kept * problem.push[s, n + i] * (F - force[s]) / effective[i]
+                a = kept * problem.push[row, n + i] * (F - force[s]) / effective[i]
                 _accelerate(n, i, a, h, beta, gamma, x_new)
                 rate_new[n + i] += a
             largest, change = max(largest, abs(F)), max(change, abs(F - force[s]))

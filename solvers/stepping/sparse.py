@@ -116,16 +116,16 @@ class MatrixEngine:
             return -longest / 32.0
         if theta >= NONE:
             return longest
-        tolerance = landing_tolerance(self.problem, self.state, stop)
+        tolerance, row = landing_tolerance(self.problem, self.state, stop), self.problem.first[stop]
         h, before, beyond = theta * longest, 0.0, longest
         for _ in range(MOST_LANDINGS):
             self.attempt(h)
             x = self.space.x_new[: 2 * self.system.size]
-            distance = direction * (self.problem.read[stop] @ x - self.problem.gap[stop] - level)
+            distance = direction * (self.problem.read[row] @ x - self.problem.gap[row] - level)
             if abs(distance) <= tolerance:
                 return h
             before, beyond = (h, beyond) if distance < 0.0 else (before, h)
-            rate = direction * (self.problem.read_rate[stop] @ x)
+            rate = direction * (self.problem.read_rate[row] @ x)
             corrected = nearer(h, distance, rate, before, beyond, longest)
             if not corrected > 0.0:
                 return h if abs(distance) <= 100.0 * tolerance else -0.5 * longest
@@ -171,10 +171,11 @@ class MatrixEngine:
 
     def reply(self, h: float, stop: int, solve: Any) -> Array:
         """S⁻¹w of a stop, kept for the constant step."""
+        direction = self.directions[self.problem.first[stop]]
         if h != self.method.dt:
-            return np.asarray(solve(self.directions[stop]))
+            return np.asarray(solve(direction))
         if stop not in self.replies:
-            self.replies[stop] = solve(self.directions[stop])
+            self.replies[stop] = solve(direction)
         return self.replies[stop]
 
 
@@ -249,9 +250,10 @@ def _contact_accelerations(engine: MatrixEngine, h: float, solve: Any, kept: flo
     for _ in range(MOST_SWEEPS):
         before = force.copy()
         for i, s in enumerate(active):
-            w = engine.directions[s]
+            row = problem.first[s]
+            w = engine.directions[row]
             compliance = w @ reply[i]
-            delta, delta_dot = -w @ x_new[:n] - problem.gap[s], -w @ x_new[n : 2 * n]
+            delta, delta_dot = -w @ x_new[:n] - problem.gap[row], -w @ x_new[n : 2 * n]
             F, calls = contact_force(
                 *(problem, s, state.entry_rate[s], delta, delta_dot),
                 *(beta * h * h * compliance, gamma * h * compliance, force[i], engine.space.work[3]),

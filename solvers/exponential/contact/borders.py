@@ -14,12 +14,20 @@ import math
 import numpy as np
 from numba import types
 
-from solvers.compiled.kernels import VECTOR, dot, indentation, inlined, inner, merged, rhs
+from solvers.compiled.kernels import VECTOR, indentation, indentation_rate, inlined, inner, merged, rhs
 from solvers.compiled.parts import PASSED, part
 from solvers.compiled.renewals import margins, margins_before, margins_in, note_event, renew
 from solvers.compiled.state import LAST_EVENT, T, rate_tolerance, surface_tolerance
 from solvers.exponential.contact.crossings import extremum
-from solvers.exponential.contact.node_response import DELTAS, KNOWN, RATES, START, rate_ripple_of, ripple_of
+from solvers.exponential.contact.node_response import (
+    DELTAS,
+    KNOWN,
+    RATES,
+    START,
+    motion_of,
+    rate_ripple_of,
+    ripple_of,
+)
 from solvers.exponential.contact.nodes import LOCAL, S
 from solvers.exponential.contact.peaks import local_maximum, motion_around
 
@@ -37,6 +45,13 @@ _ENDS_NEAR = 0.5  # lower end of a landing, in the same units, below which what 
 _CLEAR = 0.03  # the lowest margin between them, in the same units, that counts as above zero
 
 
+@inlined
+def _margins_at_nodes(problem, state, scratch, s):
+    """Margins at the nodes, into ``scratch.margin``."""
+    motion = motion_of(problem, scratch, s)
+    margins(problem, state, s, S, motion[0], motion[1], scratch.margin)
+
+
 @inner
 def _margins_on_step(problem, tables, state, scratch, s, node_set, level):
     """Margins at the nodes and at both ends of the step that has just been tried, their largest and their rounding.
@@ -45,18 +60,18 @@ def _margins_on_step(problem, tables, state, scratch, s, node_set, level):
     yet may look at the sign of δ. It is looked at once more with rounding added to δ and to δ̇, and with their ripple.
     """
     n, delta, rate = problem.k.size, scratch.start_motion[s, 0], scratch.start_motion[s, 1]
-    weight, alias = tables.ripple_weight[s], tables.alias[tables.kind[node_set], level]
+    weight, alias = tables.ripple_weight[problem.first[s]], tables.alias[tables.kind[node_set], level]
     deltas, rates = scratch.local_motion[KNOWN, :ENDS], scratch.local_motion[KNOWN, ENDS : 2 * ENDS]
     ahead, rounding = math.copysign(1.0, rate), surface_tolerance(problem, s, state.x)
     for i in range(ENDS):
         deltas[i], rates[i] = delta + ahead * rounding, rate
-    deltas[1], rates[1] = indentation(problem, s, scratch.x_new), dot(problem.read_rate[s], scratch.x_new, 2 * n)
+    deltas[1], rates[1] = indentation(problem, s, scratch.x_new), indentation_rate(problem, s, scratch.x_new)
     deltas[2] += ahead * rounding
     rates[3] += ahead * max(rate_tolerance(problem, s, state.x), _REST * scratch.reference_speed[s])
     deltas[4] += ahead * ripple_of(weight, alias, state.x, n)
     rates[5] += ahead * rate_ripple_of(weight, problem.k, alias, state.x, n)
     margins(problem, state, s, ENDS, deltas, rates, scratch.ends)
-    margins(problem, state, s, S, scratch.motion[s, 0], scratch.motion[s, 1], scratch.margin)
+    _margins_at_nodes(problem, state, scratch, s)
     for j in range(problem.border_count[s]):
         ends = scratch.ends[ENDS * j : ENDS * (j + 1)]
         largest = max(abs(ends[0]), abs(ends[1]))
@@ -165,7 +180,7 @@ def _dip(problem, tables, state, scratch, s, j, node_set, h, lowest):
         if below[deepest] <= 0.0 and below[i] > below[deepest]:
             deepest = i
     deep = local_maximum(below, 1.0, scratch.clipped)
-    margins(problem, state, s, S, scratch.motion[s, 0], scratch.motion[s, 1], scratch.margin)
+    _margins_at_nodes(problem, state, scratch, s)
     if deep <= scratch.noise[s, j]:
         return np.inf
     begin, end = tables.local_interval[node_set, lowest, 0], tables.local_interval[node_set, lowest, 1]
@@ -190,7 +205,7 @@ def border_ahead(problem, tables, state, scratch, node_set, level):
     The element is -1 if there is none, and `UNRESOLVED` if the step is too long to tell.
     """
     first, element, border, h = np.inf, -1, -1, tables.contact_step[level]
-    for s in range(problem.gap.size):
+    for s in range(problem.law.size):
         count = problem.border_count[s]
         if count == 0:
             continue
@@ -238,7 +253,7 @@ def passed(problem, state, scratch, element, border, w, x):
     margin may have been below zero in between.
     """
     worst, found, which, dips = -_TOGETHER, -1, -1, False
-    for s in range(problem.gap.size):
+    for s in range(problem.law.size):
         count = problem.border_count[s]
         if count == 0:
             continue
@@ -277,7 +292,7 @@ def renew_all(problem, state, scratch, element, border, log):
     missed = 2.0 * abs(scratch.margin[border]) / scratch.largest[element, border]
     time = _BEFORE * (state.now[T] - scratch.stages[START, state.x.size])
     rhs(problem, state.now[T], state.x, state.segment, state.entry_rate, state.rate, scratch.trial)
-    for s in range(problem.gap.size):
+    for s in range(problem.law.size):
         count = problem.border_count[s]
         if count == 0:
             continue

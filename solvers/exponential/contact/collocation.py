@@ -29,8 +29,8 @@ from solvers.compiled.kernels import (
     contact_forces,
     contact_gradient,
     copy,
-    dot,
     indentation,
+    indentation_rate,
     inlined,
     inner,
     merged,
@@ -38,13 +38,16 @@ from solvers.compiled.kernels import (
 )
 from solvers.compiled.parts import ERROR, SOLVE, part
 from solvers.compiled.simd import largest8, load8
-from solvers.compiled.state import CALLS, T
+from solvers.compiled.state import CALLS, T, acts
 from solvers.compiled.sums import combine, iterate_power_law, replace_values
 from solvers.exponential.contact.many_stops import add_end_response, pair_response, uses_blocks, weighting_of
 from solvers.exponential.contact.node_newton import MOST_ITERATIONS, newton
 from solvers.exponential.contact.node_response import (
+    force_of,
     largest_size,
+    motion_of,
     node_forces,
+    own_accelerance,
     respond,
     ripple_of,
     unresolved_part,
@@ -68,15 +71,16 @@ def _alone(tables, state):
 def _iterate(problem, tables, state, scratch, node_set, level):
     """One iteration for the forces of all stops in contact; Σ change² and Σ force² in units of their tolerance."""
     change, largest = 0.0, 0.0
-    for s in range(problem.gap.size):
-        if state.segment[s] > 0:
-            respond(problem, tables, state, scratch, node_set, level, s)
-    for s in range(problem.gap.size):
+    for r in range(problem.gap.size):
+        if acts(problem, state, r):
+            respond(problem, tables, state, scratch, node_set, level, r)
+    for s in range(problem.law.size):
         if state.segment[s] > 0:
             node_forces(problem, state, scratch, s)
-            moved, size = replace_values(scratch.force[s], scratch.trial)
             unit = 1.0 / scratch.force_tolerance[s] ** 2
-            change, largest = change + moved * unit, largest + size * unit
+            for r in range(problem.first[s], problem.first[s + 1]):
+                moved, size = replace_values(scratch.force[r], scratch.law_force[r])
+                change, largest = change + moved * unit, largest + size * unit
     return change, largest
 
 
@@ -87,16 +91,17 @@ def _set_accuracy(problem, tables, state, scratch, h, rtol):
     Returns whether a dashpot is so strong that iterations would diverge, by its slope in the last Newton iteration.
     """
     stiff = False
-    for u in range(problem.gap.size):
-        if state.segment[u] > 0:
+    for s in range(problem.law.size):
+        if state.segment[s] > 0:
             most = 1e-300
-            for s in range(problem.gap.size):
-                most = max(most, abs(tables.accelerance[s, u]) / scratch.reference_speed[s])
-            scratch.force_tolerance[u] = 0.05 * rtol / (h * most)
-            stiff |= h * tables.accelerance[u, u] * scratch.viscous[u] > 1.0
-            copy(scratch.force[u], scratch.guess[u], S)
-    for u in range(problem.gap.size if not stiff else 0):
-        scratch.viscous[u] = 0.0
+            for u in range(problem.first[s], problem.first[s + 1]):
+                for r in range(problem.gap.size):
+                    most = max(most, abs(tables.accelerance[r, u]) / scratch.reference_speed[problem.element[r]])
+                copy(scratch.force[u], scratch.guess[u], S)
+            scratch.force_tolerance[s] = 0.05 * rtol / (h * most)
+            stiff |= h * own_accelerance(problem, tables, s) * scratch.viscous[s] > 1.0
+    for s in range(problem.law.size if not stiff else 0):
+        scratch.viscous[s] = 0.0
     return stiff
 
 
@@ -115,13 +120,14 @@ def solve_forces(problem, tables, state, scratch, node_set, level, rtol):
         return newton(problem, tables, state, scratch, node_set, level)
     before, alone = 0.0, _alone(tables, state)
     law, unit = tables.power_law[max(alone, 0)], 1.0 / scratch.force_tolerance[max(alone, 0)] ** 2
-    own = pair_response(problem, tables, scratch, node_set, level, max(alone, 0), max(alone, 0))
+    row = problem.first[max(alone, 0)]
+    own = pair_response(problem, tables, scratch, node_set, level, row, row)
     stiffness, rooted, damping = law[STIFFNESS], law[EXPONENT] == 1.5, law[DAMPING]
     factor = law[FACTOR] / state.entry_rate[max(alone, 0)]
     for iteration in range(MOST_ITERATIONS):
         if alone >= 0:
             change, largest = iterate_power_law(
-                *(own, scratch.free[alone], scratch.force[alone], scratch.motion[alone]),
+                *(own, scratch.free[row], scratch.force[row], scratch.motion[row]),
                 *(stiffness, rooted, factor, damping),
             )
             change, largest = change * unit, largest * unit
@@ -137,23 +143,22 @@ def solve_forces(problem, tables, state, scratch, node_set, level, rtol):
         if iteration > 2 and change > 0.36 * before:
             break
         before = change
-    for u in range(problem.gap.size):
-        copy(scratch.guess[u], scratch.force[u], S)
+    for r in range(problem.gap.size):
+        copy(scratch.guess[r], scratch.force[r], S)
     return newton(problem, tables, state, scratch, node_set, level)
 
 
 @merged
-def _largest(problem, tables, state, scratch, u):
+def _largest(problem, tables, state, scratch, s):
     """Largest force of a stop on the step, N, and its stiffness there, N/m."""
-    if problem.knots[u, 0] == 0.0:
-        largest = max(largest8(load8(scratch.force[u], 0)), 0.0)
-        return largest, tables.exponent[u] * largest / max(largest8(load8(scratch.motion[u, 0], 0)), 1e-300)
-    copy(scratch.motion[u, 0], scratch.clipped, S)
-    slope = scratch.slope[u]
-    contact_gradient(
-        problem, u, scratch.clipped, scratch.motion[u, 1], state.entry_rate[u], slope[0], slope[1], slope[2]
-    )
-    return largest_size(scratch.force[u]), largest_size(slope[0])
+    force, motion = force_of(problem, scratch, s), motion_of(problem, scratch, s)
+    if problem.knots[s, 0] == 0.0:
+        largest = max(largest8(load8(force, 0)), 0.0)
+        return largest, tables.exponent[s] * largest / max(largest8(load8(motion[0], 0)), 1e-300)
+    copy(motion[0], scratch.clipped, S)
+    slope = scratch.slope[s]
+    contact_gradient(problem, s, scratch.clipped, motion[1], state.entry_rate[s], slope[0], slope[1], slope[2])
+    return largest_size(force), largest_size(slope[0])
 
 
 @part(ERROR, REAL, types.int64, types.int64, REAL)
@@ -162,30 +167,30 @@ def step_error(problem, tables, state, scratch, node_set, level, rtol):
 
     On an entry step the nodes are those of Gauss's rule for the stop that enters, not for the others.
     """
-    n, stops, h = problem.k.size, problem.gap.size, tables.contact_step[level]
-    for u in range(stops):
-        scratch.unresolved[u] = 0.0
-        if state.segment[u] == 0:
+    n, h = problem.k.size, tables.contact_step[level]
+    for u in range(problem.gap.size):
+        scratch.unresolved[u], s = 0.0, problem.element[u]
+        if state.segment[s] == 0:
             continue
-        gauss = node_set == 0 or u == node_set - 1
         combine(tables.summary[node_set], scratch.force[u], S, None, scratch.summary[u, 0])
-        largest, stiffness = _largest(problem, tables, state, scratch, u)
-        if gauss:
+        largest, stiffness = _largest(problem, tables, state, scratch, s)
+        if node_set == 0 or s == node_set - 1:
             unresolved = unresolved_part(scratch.summary[u, 0], largest, S // 2)
         else:
             combine(tables.tail[node_set], scratch.force[u], S, None, scratch.trial)
             unresolved = unresolved_part(scratch.trial, largest, 1)
-        if node_set == 0 and tables.power_law[u, EXPONENT] == 0.0:
-            unresolved += 0.01 * _hidden_kink(problem, state, scratch, u, largest)
+        if node_set == 0 and u == problem.first[s] and tables.power_law[s, EXPONENT] == 0.0:
+            unresolved += 0.01 * _hidden_kink(problem, state, scratch, s, largest)
         if unresolved == 0.0:
             continue
         ripple = ripple_of(tables.ripple_weight[u], tables.alias[tables.kind[node_set], level], state.x, n)
-        span = h * _undamped_part(tables, scratch, node_set, h, u) if scratch.viscous[u] > 0.0 else h
+        span = h * _undamped_part(problem, tables, scratch, node_set, h, s) if scratch.viscous[s] > 0.0 else h
         scratch.unresolved[u] = span * (unresolved + 0.03 * stiffness * ripple)
     _sum_errors(problem, tables, scratch, node_set, state.now[T], h)
     worst = 0.0
-    for s in range(stops):
-        error = scratch.per_stop[s] / (rtol * max(scratch.reference_speed[s], largest_size(scratch.motion[s, 1])))
+    for r in range(problem.gap.size):
+        speed = max(scratch.reference_speed[problem.element[r]], largest_size(scratch.motion[r, 1]))
+        error = scratch.per_row[r] / (rtol * speed)
         if not error <= worst:
             worst = error
             if error != error:
@@ -194,18 +199,18 @@ def step_error(problem, tables, state, scratch, node_set, level, rtol):
 
 
 @merged
-def _undamped_part(tables, scratch, node_set, h, u):
+def _undamped_part(problem, tables, scratch, node_set, h, s):
     """Part of a step from which errors of a rate reach its end past the stop's dashpot.
 
         ∫ exp(-∫ d dσ') dσ, the inner integral from σ to 1, d = h × accelerance × slope of the law by the rate,
 
     d constant around each node. The last nodes decide: the dashpot of a stop that is left fades.
     """
-    part, left = 0.0, 1.0
+    part, left, accelerance = 0.0, 1.0, own_accelerance(problem, tables, s)
     for k in range(S):
         i = S - 1 - k
         share = tables.plain[node_set, i]
-        damped = share * h * tables.accelerance[u, u] * max(scratch.slope[u, 1, i], 0.0)
+        damped = share * h * accelerance * max(scratch.slope[s, 1, i], 0.0)
         stays = math.exp(-damped)
         part += left * share * ((1.0 - stays) / damped if damped > 1e-6 else 1.0)
         left *= stays
@@ -214,33 +219,33 @@ def _undamped_part(tables, scratch, node_set, h, u):
 
 @merged
 def _sum_errors(problem, tables, scratch, node_set, t, h):
-    """Errors of all indentation rates, m/s, by the unresolved parts of forces and signals, into ``per_stop``."""
-    stops, error = problem.gap.size, scratch.per_stop
-    for s in range(stops):
-        error[s] = 0.0
+    """Errors of the rates of all rows, m/s, by the unresolved parts of forces and signals, into ``per_row``."""
+    rows, error = problem.gap.size, scratch.per_row
+    for r in range(rows):
+        error[r] = 0.0
     for j in range(problem.table_dt.size):
         unresolved = h * unresolved_signal(problem, tables, scratch, node_set, j, t, h)
-        for s in range(stops):
-            error[s] += abs(tables.load_acceleration[s, problem.table_load[j]]) * unresolved
-    for u in range(stops):
+        for r in range(rows):
+            error[r] += abs(tables.load_acceleration[r, problem.table_load[j]]) * unresolved
+    for u in range(rows):
         if scratch.unresolved[u] != 0.0:
-            for s in range(stops):
-                error[s] += abs(tables.accelerance[s, u]) * scratch.unresolved[u]
+            for r in range(rows):
+                error[r] += abs(tables.accelerance[r, u]) * scratch.unresolved[u]
 
 
 @merged
-def _hidden_kink(problem, state, scratch, u, largest):
+def _hidden_kink(problem, state, scratch, s, largest):
     """Difference, N, of law and polynomial at an end of a smooth step, where the last coefficients are smaller.
 
     Then the law has a kink between that end and the next node, within a fiftieth of the step, as with clamp=True; or it
     saturates within that time, as hysteresis of a knee that is small beside the motion does after a border.
     """
-    size, delta, rate = 2 * problem.k.size, scratch.clipped[0:2], scratch.trial[0:2]
-    delta[0], rate[0] = indentation(problem, u, scratch.x_new), dot(problem.read_rate[u], scratch.x_new, size)
-    delta[1] = off_knots(problem, u, state.segment[u], indentation(problem, u, state.x))
-    rate[1] = dot(problem.read_rate[u], state.x, size)
-    contact_forces(problem, u, delta, rate, state.entry_rate[u], scratch.trial[2:4])
-    c = scratch.summary[u, 0]
+    delta, rate = scratch.clipped[0:2], scratch.trial[0:2]
+    delta[0], rate[0] = indentation(problem, s, scratch.x_new), indentation_rate(problem, s, scratch.x_new)
+    delta[1] = off_knots(problem, s, state.segment[s], indentation(problem, s, state.x))
+    rate[1] = indentation_rate(problem, s, state.x)
+    contact_forces(problem, s, delta, rate, state.entry_rate[s], scratch.trial[2:4])
+    c = scratch.summary[problem.first[s], 0]
     apart = max(abs(scratch.trial[2] - c[5]), abs(scratch.trial[3] - c[4]))
     return apart if apart > 2.0 * max(abs(c[2]), abs(c[3])) + 1e-12 * largest else 0.0
 
@@ -255,8 +260,8 @@ def end_state(problem, tables, state, scratch, node_set, level):
         add_end_response(problem, tables, state, scratch, scratch.force, node_set, level, x)
     first = True
     for u in range(0 if uses_blocks(tables) else scratch.force.shape[0]):
-        if u >= problem.gap.size or state.segment[u] > 0:
-            rows = tables.end_response[weighting_of(tables, node_set, u), level, u]
+        if u >= problem.gap.size or acts(problem, state, u):
+            rows = tables.end_response[weighting_of(problem, tables, node_set, u), level, u]
             if first:
                 combine(rows, scratch.force[u], S, None, x)
             else:

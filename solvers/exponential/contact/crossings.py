@@ -18,13 +18,25 @@ import numpy as np
 from numba import types
 
 from solvers.compiled.dop853_tableau import STAGES, C
-from solvers.compiled.kernels import REAL, VECTOR, call_force, copy, dot, indentation, inlined, inner, merged
+from solvers.compiled.kernels import (
+    REAL,
+    VECTOR,
+    call_force,
+    copy,
+    dot,
+    indentation,
+    indentation_rate,
+    inlined,
+    inner,
+    merged,
+    push_of,
+)
 from solvers.compiled.parts import BOUNDS, LEAVES, SIDE, part
 from solvers.compiled.simd import largest8, least8, load8, splat8, store8
-from solvers.compiled.state import PEAK_FORCE, T_IN, T, is_open, surface_tolerance
+from solvers.compiled.state import PEAK_FORCE, T_IN, T, acts, is_open, surface_tolerance
 from solvers.compiled.sums import above
 from solvers.exponential.contact.many_stops import CONTINUING, ENTERING, add_block_motion, motion_at_nodes, uses_blocks
-from solvers.exponential.contact.node_response import respond, ripple_of
+from solvers.exponential.contact.node_response import motion_of, respond, ripple_of
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.peaks import largest_indentation
 from solvers.exponential.flight import energy_norms
@@ -75,14 +87,14 @@ def _turns(rates, begin, end, up, down):
 @merged
 def _passes_between(problem, tables, state, scratch, node_set, h, s, lower, upper):
     """Whether δ leaves [lower, upper] between two points of the step or at one."""
-    size = 2 * problem.k.size
+    motion = motion_of(problem, scratch, s)
     t, delta, rate = 0.0, scratch.start_motion[s, 0], scratch.start_motion[s, 1]
     for i in range(S + 1):
         if i < S:
-            after, delta_new, rate_new = h * tables.times[node_set, i], scratch.motion[s, 0, i], scratch.motion[s, 1, i]
+            after, delta_new, rate_new = h * tables.times[node_set, i], motion[0, i], motion[1, i]
         else:
             after, delta_new = h, indentation(problem, s, scratch.x_new)
-            rate_new = dot(problem.read_rate[s], scratch.x_new, size)
+            rate_new = indentation_rate(problem, s, scratch.x_new)
         if _passes(after - t, delta, rate, delta_new, rate_new, lower, upper):
             return True
         t, delta, rate = after, delta_new, rate_new
@@ -91,73 +103,75 @@ def _passes_between(problem, tables, state, scratch, node_set, h, s, lower, uppe
 
 @part(BOUNDS, types.void, REAL)
 def _bound_rates(problem, tables, state, scratch, h):
-    """Bounds of |δ̈| of all stops into ``scratch.per_stop``; forces are taken as twice their largest node value."""
-    n, stops = problem.k.size, problem.gap.size
+    """Bounds of all rows' accelerations into ``per_row``; forces are taken as twice their largest node value."""
+    n, rows = problem.k.size, problem.gap.size
     energy_norms(problem, state.x, scratch.norms)
-    for s in range(stops):
-        scratch.per_stop[s] = 0.0
-    for u in range(scratch.force.shape[0] if problem.table_dt.size else stops):
-        if u < stops and state.segment[u] == 0:
+    for r in range(rows):
+        scratch.per_row[r] = 0.0
+    for u in range(scratch.force.shape[0] if problem.table_dt.size else rows):
+        if u < rows and not acts(problem, state, u):
             continue
-        largest, push = 0.0, problem.push[u] if u < stops else problem.load[u - stops]
+        largest, push = 0.0, push_of(problem, u)
         for i in range(S):
             largest = max(largest, 2.0 * abs(scratch.force[u, i]))
         for b in range(n):
             scratch.norms[b] += h * largest * math.sqrt(push[n + b] ** 2 + problem.k[b] * push[b] ** 2)
-        for s in range(stops):
-            direct = tables.accelerance[s, u] if u < stops else tables.load_acceleration[s, u - stops]
-            scratch.per_stop[s] += largest * abs(direct)
-    for s in range(stops):
-        scratch.per_stop[s] += dot(tables.acceleration_weight[s], scratch.norms, n)
+        for r in range(rows):
+            direct = tables.accelerance[r, u] if u < rows else tables.load_acceleration[r, u - rows]
+            scratch.per_row[r] += largest * abs(direct)
+    for r in range(rows):
+        scratch.per_row[r] += dot(tables.acceleration_weight[r], scratch.norms, n)
 
 
 @merged
-def _stays_away(scratch, s, h):
+def _stays_away(problem, scratch, s, h):
     """Whether a stop out of contact cannot be reached on the step; its motion is set to that at the start."""
-    delta, rate = scratch.start_motion[s, 0], scratch.start_motion[s, 1]
-    store8(scratch.motion[s, 0], 0, splat8(delta))
-    store8(scratch.motion[s, 1], 0, splat8(rate))
-    return delta + h * max(rate, 0.0) + 0.5 * h * h * scratch.per_stop[s] < 0.0
+    delta, rate, row = scratch.start_motion[s, 0], scratch.start_motion[s, 1], problem.first[s]
+    store8(scratch.motion[row, 0], 0, splat8(delta))
+    store8(scratch.motion[row, 1], 0, splat8(rate))
+    return delta + h * max(rate, 0.0) + 0.5 * h * h * scratch.per_row[row] < 0.0
 
 
 @merged
 def _watch(problem, tables, state, scratch, node_set, level, s, carried):
     """Motion at the nodes of a stop out of contact; returns whether the motion of the blocks has been computed."""
-    if not uses_blocks(tables):
-        respond(problem, tables, state, scratch, node_set, level, s)
-        return carried
-    if not carried:
+    through = uses_blocks(tables)
+    if through and not carried:
         add_block_motion(problem, tables, state, scratch, node_set, level, CONTINUING)
         add_block_motion(problem, tables, state, scratch, node_set, level, ENTERING)
-    motion_at_nodes(problem, scratch, s, problem.gap[s], scratch.motion[s])
-    return True
+    for r in range(problem.first[s], problem.first[s + 1]):
+        if through:
+            motion_at_nodes(problem, scratch, r, problem.gap[r], scratch.motion[r])
+        else:
+            respond(problem, tables, state, scratch, node_set, level, r)
+    return carried or through
 
 
 @part(LEAVES, types.boolean, types.int64, types.int64)
 def leaves_segment(problem, tables, state, scratch, node_set, level):
     """Whether any stop may cross a border of its segment on the step."""
-    size, h, through = 2 * problem.k.size, tables.contact_step[level], uses_blocks(tables)
+    h, through = tables.contact_step[level], uses_blocks(tables)
     carried = np.bool_(0)  # a literal would be compiled for itself
     if through:
         _bound_rates(problem, tables, state, scratch, h)
-    for s in range(problem.gap.size):
+    for s in range(problem.law.size):
         segment, ripple = state.segment[s], 0.0
         upper, lower = problem.knots[s, segment], -np.inf
         if segment > 0 and problem.knots[s, segment - 1] == -np.inf and upper == np.inf:
             continue
         if segment == 0:
-            if through and _stays_away(scratch, s, h):
+            if through and _stays_away(problem, scratch, s, h):
                 continue
             carried = _watch(problem, tables, state, scratch, node_set, level, s, carried)
-            ripple = ripple_of(
-                tables.ripple_weight[s], tables.alias[tables.kind[node_set], level], state.x, problem.k.size
-            )
+            alias = tables.alias[tables.kind[node_set], level]
+            ripple = ripple_of(tables.ripple_weight[problem.first[s]], alias, state.x, problem.k.size)
         else:
             lower = problem.knots[s, segment - 1]
-        delta, within = indentation(problem, s, scratch.x_new), load8(scratch.motion[s, 0], 0)
+        motion = motion_of(problem, scratch, s)
+        delta, within = indentation(problem, s, scratch.x_new), load8(motion[0], 0)
         lowest, highest = min(delta, least8(within)), max(delta, largest8(within))
-        begin, end = scratch.start_motion[s, 1], dot(problem.read_rate[s], scratch.x_new, size)
-        turns = _turns(scratch.motion[s, 1], begin, end, segment > 0, upper < np.inf)
+        begin, end = scratch.start_motion[s, 1], indentation_rate(problem, s, scratch.x_new)
+        turns = _turns(motion[1], begin, end, segment > 0, upper < np.inf)
         if not turns and lower <= lowest and highest + ripple <= upper:
             continue
         tolerance = 8.0 * surface_tolerance(problem, s, state.x)
@@ -183,7 +197,7 @@ def _sides(problem, tables, state, s, n, delta, rate, out):
 def side_at(problem, tables, state, s, x, batch):
     """The same in the state x."""
     batch[0] = max(indentation(problem, s, x), problem.knots[s, 0])
-    batch[1] = dot(problem.read_rate[s], x, 2 * problem.k.size)
+    batch[1] = indentation_rate(problem, s, x)
     _sides(problem, tables, state, s, 1, batch[0:1], batch[1:2], batch[2:3])
     return batch[2]
 
@@ -191,7 +205,7 @@ def side_at(problem, tables, state, s, x, batch):
 @inner
 def choose_sides(problem, tables, state, scratch):
     """Find the side of its bend for every contact that begins now."""
-    for s in range(problem.gap.size):
+    for s in range(problem.law.size):
         if tables.bend[s] > 0.0 and state.segment[s] > 0 and state.active[s, T_IN] == state.now[T]:
             scratch.side[s] = -1.0 if side_at(problem, tables, state, s, state.x, scratch.trial) < 0.0 else 1.0
 
@@ -204,12 +218,13 @@ def first_bend(problem, tables, state, scratch, node_set, level, is_new, rtol):
     the first node. A bend of a rate, or force, within the tolerance is not an event.
     """
     first, stop, h = np.inf, -1, tables.contact_step[level]
-    for s in range(problem.gap.size):
+    for s in range(problem.law.size):
         if tables.bend[s] == 0.0 or state.segment[s] == 0:
             continue
         values, begin = scratch.bend_values, side_at(problem, tables, state, s, state.x, scratch.trial)
-        above(scratch.motion[s, 0], problem.knots[s, 0], scratch.clipped)
-        _sides(problem, tables, state, s, S, scratch.clipped, scratch.motion[s, 1], values)
+        motion = motion_of(problem, scratch, s)
+        above(motion[0], problem.knots[s, 0], scratch.clipped)
+        _sides(problem, tables, state, s, S, scratch.clipped, motion[1], values)
         values[S] = side_at(problem, tables, state, s, scratch.x_new, scratch.trial)
         largest = abs(begin)
         for i in range(S + 1):
@@ -243,10 +258,10 @@ def before_landing(problem, tables, state, scratch, stop, bends, w, x):
     size, width = 2 * problem.k.size, state.x.size
     d = x[width] - w[width]
     long = d > 4.0 * tables.contact_step[tables.contact_step.size - 1]
-    for s in range(problem.gap.size):
+    for s in range(problem.law.size):
         segment, slope_a, slope_b = state.segment[s], 0.0, 0.0
         if s != stop or bends:
-            slope_a, slope_b = dot(problem.read_rate[s], w, size), dot(problem.read_rate[s], x, size)
+            slope_a, slope_b = indentation_rate(problem, s, w), indentation_rate(problem, s, x)
         if s != stop:
             a, b = indentation(problem, s, w), indentation(problem, s, x)
             tolerance = surface_tolerance(problem, s, x)

@@ -7,10 +7,11 @@ import math
 import numpy as np
 from numba import types
 
-from solvers.compiled.kernels import contact_forces, dot, indentation, inlined, inner, merged
+from solvers.compiled.kernels import contact_forces, dot, indentation, indentation_rate, inlined, inner, merged
 from solvers.compiled.parts import BEGIN, part
 from solvers.compiled.state import T_IN, T, surface_tolerance
 from solvers.exponential.contact.crossings import choose_sides
+from solvers.exponential.contact.node_response import own_accelerance
 from solvers.exponential.contact.peaks import pressed_speed, state_peaks
 from solvers.exponential.flight import energy_norms
 from solvers.exponential.tables import EXPONENT, STIFFNESS
@@ -24,15 +25,15 @@ _PRESSED = 1e-3  # the least in units of the speed which the force would give: w
 @part(BEGIN, types.void, types.int64)
 def begin_steps(problem, tables, state, scratch, stop):
     """Reference speeds, first step and nodes after ``stop`` has entered, changed its segment, or left."""
-    control, size, others = scratch.control, 2 * problem.k.size, False
+    control, others = scratch.control, False
     energy_norms(problem, state.x, scratch.norms)
-    for s in range(problem.gap.size):
-        speed = abs(dot(problem.read_rate[s], state.x, size))
+    for s in range(problem.law.size):
+        speed = abs(indentation_rate(problem, s, state.x))
         before = state.segment[s] > 0 and state.active[s, T_IN] < state.now[T]
         if before:
             scratch.reference_speed[s] = max(scratch.reference_speed[s], speed)
         else:
-            reached = 0.1 * dot(tables.rate_weight[s], scratch.norms, problem.k.size)
+            reached = 0.1 * dot(tables.rate_weight[problem.first[s]], scratch.norms, problem.k.size)
             pressed = _PRESSED * pressed_speed(problem, tables, state, s, scratch.trial)
             scratch.reference_speed[s] = max(speed, reached, pressed, _LEAST)
         others |= before
@@ -49,7 +50,7 @@ def begin_steps(problem, tables, state, scratch, stop):
 def _contact_time(problem, tables, scratch, s, speed):
     """Duration, s, of an impact at this speed on one stop alone, from the law's energy: T = 3.2 δ_m/v."""
     speed = max(speed, 1e-12)
-    accelerance = max(tables.accelerance[s, s], 1e-300)
+    accelerance = max(own_accelerance(problem, tables, s), 1e-300)
     target = 0.5 * speed * speed / accelerance
     law, p = tables.power_law[s], tables.exponent[s]
     if law[EXPONENT] > 0.0 and law[STIFFNESS] > 0.0:
@@ -68,7 +69,7 @@ def _contact_time(problem, tables, scratch, s, speed):
 @merged
 def _first_step(problem, tables, state, scratch, stop):
     """Level of the first step of a contact, a share of the duration of an impact on this stop alone."""
-    speed = abs(dot(problem.read_rate[stop], state.x, 2 * problem.k.size))
+    speed = abs(indentation_rate(problem, stop, state.x))
     duration = _contact_time(problem, tables, scratch, stop, max(speed, 1e-3 * scratch.reference_speed[stop]))
     if scratch.first_step_share[stop] == 0.0:
         scratch.first_step_share[stop] = min(0.1, 4.0 / (tables.fastest * duration))
@@ -82,7 +83,7 @@ def _entry_nodes(problem, tables, state, stop, level):
     found, while_ago = 0, 1e-6 * tables.contact_step[level]
     for s in range(state.segment.size):
         if state.segment[s] == 1 and tables.time_exponent[1 + s] > 1.0 and (found == 0 or s == stop):
-            rate = dot(problem.read_rate[s], state.x, 2 * problem.k.size)
+            rate = indentation_rate(problem, s, state.x)
             if indentation(problem, s, state.x) <= while_ago * rate + 4.0 * surface_tolerance(problem, s, state.x):
                 found = 1 + s
     return found

@@ -20,7 +20,17 @@ import math
 import numpy as np
 
 from solvers.compiled.dop853_tableau import E3, E5, STAGES
-from solvers.compiled.kernels import abs_dot, copy, dot, indentation, inlined, inner, merged, raised, rhs
+from solvers.compiled.kernels import (
+    abs_dot,
+    copy,
+    indentation,
+    indentation_rate,
+    inlined,
+    inner,
+    merged,
+    raised,
+    rhs,
+)
 from solvers.compiled.parts import PASSED
 from solvers.compiled.renewals import margins_before, margins_in
 from solvers.compiled.state import (
@@ -62,19 +72,19 @@ def _error(problem, scratch, part, rtol):
     """
     worst = 0.0
     combine(scratch.stages, E5, STAGES, None, scratch.stages[DIFFERENCE])
-    for s in range(problem.gap.size):
-        error = part * abs_dot(problem.read_rate[s], scratch.stages[DIFFERENCE], 2 * problem.k.size)
-        error /= rtol * scratch.reference_speed[s]
+    for r in range(problem.gap.size):
+        error = part * abs_dot(problem.read_rate[r], scratch.stages[DIFFERENCE], 2 * problem.k.size)
+        error /= rtol * scratch.reference_speed[problem.element[r]]
         if not error <= worst:
             worst = error
     return worst
 
 
 @inlined
-def _difference(problem, s, d, span):
-    """An embedded difference of δ̇ and δ of a stop, as a rate, m/s."""
+def _difference(problem, r, d, span):
+    """An embedded difference of rate and displacement of a row, as a rate, m/s."""
     size = 2 * problem.k.size
-    return abs_dot(problem.read_rate[s], d, size) + abs_dot(problem.read[s], d, size) / span
+    return abs_dot(problem.read_rate[r], d, size) + abs_dot(problem.read[r], d, size) / span
 
 
 @inner
@@ -83,11 +93,11 @@ def _error_in_time(problem, scratch, span, rtol):
     fifth, third, worst = scratch.stages[DIFFERENCE], scratch.stages[BATCH], 0.0
     combine(scratch.stages, E5, STAGES, None, fifth)
     combine(scratch.stages, E3, STAGES, None, third)
-    for s in range(problem.gap.size):
-        error = _difference(problem, s, fifth, span)
+    for r in range(problem.gap.size):
+        error = _difference(problem, r, fifth, span)
         if error > 0.0:
-            error *= error / math.hypot(error, 0.1 * _difference(problem, s, third, span))
-        error /= rtol * scratch.reference_speed[s]
+            error *= error / math.hypot(error, 0.1 * _difference(problem, r, third, span))
+        error /= rtol * scratch.reference_speed[problem.element[r]]
         if not error <= worst:
             worst = error
     return worst
@@ -126,7 +136,7 @@ def _length_to(problem, tables, state, scratch, variable, stop, span, landed, ti
     while True:
         _step(problem, tables, state, scratch, variable, stop, length, with_energy)
         late, tries = x[size] - time, tries + 1
-        pace = 1.0 if variable == TIME else dot(problem.read_rate[stop], x, 2 * problem.k.size)  # d(variable)/dt
+        pace = 1.0 if variable == TIME else indentation_rate(problem, stop, x)  # d(variable)/dt
         if variable == ROOT:
             pace /= kappa * raised(x[size + 1], kappa - 1.0)
         if not abs(late) > 1e-15 * landed or not abs(pace) < np.inf or tries == _MOST_TRIES:
@@ -188,10 +198,10 @@ def _slopes_by_forces(problem, tables, state, stop, w, x):
     With derivatives in units of the largest motion of a stop's place, another stop counts that was entered just now.
     """
     most = 0.0
-    for s in range(problem.gap.size):
+    for s in range(problem.law.size):
         if s != stop and state.segment[s] > 0 and tables.time_exponent[1 + s] > 1.0:
             deepest = max(indentation(problem, s, w), indentation(problem, s, x))
-            most = max(most, abs_dot(problem.read[s], w, 2 * problem.k.size) / max(deepest, 1e-300))
+            most = max(most, abs_dot(problem.read[problem.first[s]], w, 2 * problem.k.size) / max(deepest, 1e-300))
     return min(most, _MOST_SLOPE)
 
 
@@ -246,7 +256,7 @@ def land(problem, tables, state, scratch, stop, direction, near, rtol, t_end, ou
     if not (
         _goes_ahead(scratch, size)
         and _error(problem, scratch, part, rtol) <= 1.0
-        and direction * dot(problem.read_rate[stop], x, 2 * problem.k.size) >= 0.0  # it has not turned back
+        and direction * indentation_rate(problem, stop, x) >= 0.0  # it has not turned back
     ):
         return -1
     other = before_landing(problem, tables, state, scratch, stop, np.bool_(0), w, x)

@@ -12,10 +12,11 @@ from solvers.compiled.kernels import (
     MATRIX,
     REAL,
     VECTOR,
+    add_push,
     call_force,
     copy,
-    dot,
     indentation,
+    indentation_rate,
     inner,
     law_forces,
     merged,
@@ -61,7 +62,7 @@ def _force(problem, tables, s, segment, delta, delta_dot, side, entry_rate, batc
 def _rate(problem, tables, with_energy, variable, stop, span, w, segment, entry_rate, side, out, batch):
     """Derivative of the unknowns ``w`` = [state, t, u] by the chosen variable, times its span; number of law calls."""
     n, calls = problem.k.size, 0
-    size, t = 2 * n, 2 * n + 2 + 2 * problem.gap.size
+    size, t = 2 * n, 2 * n + 2 + 2 * problem.law.size
     for b in range(n):
         out[b] = w[n + b]
         out[n + b] = -problem.k[b] * w[b] - problem.c[b] * w[n + b]
@@ -70,18 +71,17 @@ def _rate(problem, tables, with_energy, variable, stop, span, w, segment, entry_
         for e in range(size):
             out[e] += load[e] * value
     out[size], out[size + 1] = powers(problem, tables, w[t], w) if with_energy else (0.0, 0.0)
-    for s in range(problem.gap.size):
+    for s in range(problem.law.size):
         force, rate = 0.0, 0.0
         if segment[s] > 0:
-            rate = dot(problem.read_rate[s], w, size)
+            rate = indentation_rate(problem, s, w)
             delta = indentation(problem, s, w)
             force = _force(problem, tables, s, segment[s], delta, rate, side[s], entry_rate[s], batch)
             calls += 1
-            for e in range(size):
-                out[e] += problem.push[s, e] * force
+            add_push(problem, s, force, out)
         out[size + 2 + 2 * s] = force * rate
         out[size + 3 + 2 * s] = force
-    delta_dot = dot(problem.read_rate[stop], w, size)
+    delta_dot = indentation_rate(problem, stop, w)
     factor = span
     if variable == INDENTATION:
         factor = span / delta_dot

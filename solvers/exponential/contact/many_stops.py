@@ -10,51 +10,56 @@ from __future__ import annotations
 
 from numba import types
 
-from solvers.compiled.kernels import MATRIX, REAL, VECTOR, inlined, inner, merged
+from solvers.compiled.kernels import MATRIX, REAL, VECTOR, inlined, inner, merged, push_of
 from solvers.compiled.parts import FREE_BLOCKS, PAIR, PUSHED_BLOCKS, PUSHED_END, STOP_AT_NODES, part
 from solvers.compiled.simd import load8, splat8, store8, sum8
+from solvers.compiled.state import acts
 from solvers.compiled.sums import combine
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.responses import fill_pair
 
 SIGNALS, CONTINUING, ENTERING = range(3)  # groups of inputs: signals, forces without and with the weight σ^λ
-POOL = 4093  # pairs of stops and step lengths, a kilobyte each; prime, so that few of one step share a place
+POOL = 4093  # pairs of rows and step lengths, a kilobyte each; prime, so that few of one step share a place
 
 
 @inlined
 def uses_blocks(tables):
-    """Whether there are more stops than have tables of their own."""
+    """Whether there are more rows than have tables of their own."""
     return tables.node_propagator.shape[1] > 0
 
 
 @inlined
-def weighting_of(tables, node_set, u):
+def enters(problem, node_set, u):
+    """Whether input u is a force of the element that enters on a step with given nodes."""
+    return u < problem.gap.size and problem.element[u] == node_set - 1
+
+
+@inlined
+def weighting_of(problem, tables, node_set, u):
     """Index of the weighting of input u on a step with given nodes."""
-    return tables.entering[node_set] if u == node_set - 1 else tables.kind[node_set]
+    return tables.entering[node_set] if enters(problem, node_set, u) else tables.kind[node_set]
 
 
 @merged
-def pair_response(problem, tables, scratch, node_set, level, s, u):
-    """(S, 2S): δ and δ̇ of stop s at the nodes from the node values of input u."""
-    weighting = weighting_of(tables, node_set, u)
+def pair_response(problem, tables, scratch, node_set, level, r, u):
+    """(S, 2S): displacement and rate of row r at the nodes from the node values of input u."""
+    weighting = weighting_of(problem, tables, node_set, u)
     if uses_blocks(tables):
-        matrix = scratch.pair_pool[_in_pool(problem, tables, scratch, weighting, level, s, u)]
+        matrix = scratch.pair_pool[_in_pool(problem, tables, scratch, weighting, level, r, u)]
     else:
-        matrix = tables.forced[weighting, level, u, s]
+        matrix = tables.forced[weighting, level, u, r]
     return matrix
 
 
 @part(PAIR, types.int64, *[types.int64] * 4)
-def _in_pool(problem, tables, scratch, weighting, level, s, u):
-    """Index of that response in the pool, for many stops; it is summed up if another pair has its place."""
-    stops, inputs = problem.gap.size, scratch.force.shape[0]
-    key = ((weighting * tables.contact_step.size + level) * stops + s) * inputs + u + 1
+def _in_pool(problem, tables, scratch, weighting, level, r, u):
+    """Index of that response in the pool, for many rows; it is summed up if another pair has its place."""
+    key = ((weighting * tables.contact_step.size + level) * problem.gap.size + r) * scratch.force.shape[0] + u + 1
     place = key % scratch.pool_keys.size
     if scratch.pool_keys[place] != key:
-        push = problem.push[u] if u < stops else problem.load[u - stops]
         rows = tables.block_response[weighting, level]
         fill_pair(
-            *(problem.k, problem.c, push, problem.read[s], problem.read_rate[s]),
+            *(problem.k, problem.c, push_of(problem, u), problem.read[r], problem.read_rate[r]),
             *(rows, scratch.pair_weights, scratch.pair_pool[place]),
         )
         scratch.pool_keys[place] = key
@@ -76,13 +81,13 @@ def free_block_motion(problem, tables, scratch, node_set, level, x):
 @inner
 def _sum_pushes(problem, tables, state, scratch, force, node_set, group):
     """State rates of the blocks by one group of inputs, at the nodes, into ``scratch.block_force``; whether any act."""
-    stops, size, own, found = problem.gap.size, problem.k.size, tables.block_response.shape[3] // 2, False
+    rows, size, own, found = problem.gap.size, problem.k.size, tables.block_response.shape[3] // 2, False
     for u in range(force.shape[0]):
-        if (u >= stops) != (group == SIGNALS) or (u < stops and state.segment[u] == 0):
+        if (u >= rows) != (group == SIGNALS) or (u < rows and not acts(problem, state, u)):
             continue
-        if u < stops and (u == node_set - 1) != (group == ENTERING):
+        if enters(problem, node_set, u) != (group == ENTERING):
             continue
-        push = problem.push[u] if u < stops else problem.load[u - stops]
+        push = push_of(problem, u)
         values = load8(force[u], 0)
         for e in range(2 * own):
             before = load8(scratch.block_force[e], 0) if found else splat8(0.0)
@@ -130,9 +135,9 @@ def add_end_response(problem, tables, state, scratch, force, node_set, level, x)
 
 
 @part(STOP_AT_NODES, types.void, types.int64, REAL, MATRIX)
-def motion_at_nodes(problem, scratch, s, gap, out):
-    """δ + gap and δ̇ of stop s at the nodes from the blocks, less ``gap``."""
+def motion_at_nodes(problem, scratch, r, gap, out):
+    """Displacement + gap and rate of row r at the nodes from the blocks, less ``gap``."""
     size = 2 * problem.k.size
     store8(out[0], 0, splat8(-gap))
-    combine(scratch.block_motion, problem.read[s], size, out[0], out[0])
-    combine(scratch.block_motion, problem.read_rate[s], size, None, out[1])
+    combine(scratch.block_motion, problem.read[r], size, out[0], out[0])
+    combine(scratch.block_motion, problem.read_rate[r], size, None, out[1])

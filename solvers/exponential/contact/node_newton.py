@@ -7,9 +7,9 @@ from numba import types
 
 from solvers.compiled.kernels import contact_gradient, copy, inner, merged
 from solvers.compiled.parts import NEWTON, part
-from solvers.compiled.state import CALLS, rate_tolerance
+from solvers.compiled.state import CALLS, acts, rate_tolerance
 from solvers.exponential.contact.many_stops import pair_response
-from solvers.exponential.contact.node_response import node_forces, respond
+from solvers.exponential.contact.node_response import motion_of, node_forces, respond
 from solvers.exponential.contact.nodes import S
 
 MOST_ITERATIONS = 16
@@ -17,29 +17,34 @@ MOST_ITERATIONS = 16
 
 @inner
 def linearise(problem, tables, state, scratch, node_set, level):
-    """J = 1 - ∂law/∂(δ, δ̇) ∂(δ, δ̇)/∂F of all nodes of all stops in contact, row by row; returns its size."""
-    stops, row = problem.gap.size, 0
-    for s in range(stops):
-        if state.segment[s] == 0:
+    """J = 1 - ∂law/∂(δ, δ̇) ∂(δ, δ̇)/∂F at the nodes of all rows in contact, one after the other; returns its size."""
+    for s in range(problem.law.size):
+        if state.segment[s] > 0:
+            motion, slope = motion_of(problem, scratch, s), scratch.slope[s]
+            copy(motion[0], scratch.clipped, S)
+            contact_gradient(problem, s, scratch.clipped, motion[1], state.entry_rate[s], slope[0], slope[1], slope[2])
+            state.count[CALLS] += S
+    size = 0
+    for r in range(problem.gap.size):
+        if acts(problem, state, r):
+            _linearise_row(problem, tables, state, scratch, node_set, level, r, size)
+            size += S
+    return size
+
+
+@inner
+def _linearise_row(problem, tables, state, scratch, node_set, level, r, begin):
+    """Write what row r adds to J, from its row ``begin`` on."""
+    slope, pushes, column = scratch.slope[problem.element[r]], r == problem.first[problem.element[r]], 0
+    for u in range(problem.gap.size):
+        if not acts(problem, state, u):
             continue
-        copy(scratch.motion[s, 0], scratch.clipped, S)
-        contact_gradient(
-            *(problem, s, scratch.clipped, scratch.motion[s, 1], state.entry_rate[s]),
-            *(scratch.slope[s, 0], scratch.slope[s, 1], scratch.slope[s, 2]),
-        )
-        state.count[CALLS] += S
+        matrix = pair_response(problem, tables, scratch, node_set, level, r, u)
         for i in range(S):
-            column = 0
-            for u in range(stops):
-                if state.segment[u] == 0:
-                    continue
-                matrix = pair_response(problem, tables, scratch, node_set, level, s, u)
-                for j in range(S):
-                    value = scratch.slope[s, 0, i] * matrix[j, i] + scratch.slope[s, 1, i] * matrix[j, S + i]
-                    scratch.jacobian[row + i, column + j] = (1.0 if s == u and i == j else 0.0) - value
-                column += S
-        row += S
-    return row
+            for j in range(S):
+                value = slope[0, i] * matrix[j, i] + slope[1, i] * matrix[j, S + i] if pushes else 0.0
+                scratch.jacobian[begin + i, column + j] = (1.0 if r == u and i == j else 0.0) - value
+        column += S
 
 
 @inner
@@ -87,35 +92,37 @@ def _note_viscosity(state, scratch):
 @part(NEWTON, types.boolean, types.int64, types.int64)
 def newton(problem, tables, state, scratch, node_set, level):
     """Solve for the forces by Newton's method, where the fixed-point iteration diverges; whether it converged."""
-    stops = problem.gap.size
     for _ in range(MOST_ITERATIONS):
-        row = 0
-        for s in range(stops):
+        place = 0
+        for s in range(problem.law.size):
             if state.segment[s] == 0:
                 continue
-            respond(problem, tables, state, scratch, node_set, level, s)
+            for r in range(problem.first[s], problem.first[s + 1]):
+                respond(problem, tables, state, scratch, node_set, level, r)
             node_forces(problem, state, scratch, s)
-            for i in range(S):
-                scratch.residual[row + i] = scratch.trial[i] - scratch.force[s, i]
-            row += S
+            for r in range(problem.first[s], problem.first[s + 1]):
+                for i in range(S):
+                    scratch.residual[place + i] = scratch.law_force[r, i] - scratch.force[r, i]
+                place += S
         n = linearise(problem, tables, state, scratch, node_set, level)
         factorise(scratch.jacobian, scratch.pivots, n)
         substitute(scratch.jacobian, scratch.pivots, n, scratch.residual)
-        found, row = True, 0
+        found, place = True, 0
         _note_viscosity(state, scratch)
-        for s in range(stops):
+        for r in range(problem.gap.size):
+            s = problem.element[r]
             if state.segment[s] == 0:
                 continue
             change, largest = 0.0, 0.0
             for i in range(S):
-                scratch.force[s, i] += scratch.residual[row + i]
-                change += abs(scratch.residual[row + i])
-                largest = max(largest, abs(scratch.force[s, i]))
+                scratch.force[r, i] += scratch.residual[place + i]
+                change += abs(scratch.residual[place + i])
+                largest = max(largest, abs(scratch.force[r, i]))
             if not change < np.inf:
                 return False
             noise = max(3e-14 * largest, 0.1 * scratch.viscous[s] * rate_tolerance(problem, s, state.x))
             found &= change <= max(scratch.force_tolerance[s], noise)
-            row += S
+            place += S
         if found:
             return True
     return False

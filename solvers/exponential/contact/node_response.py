@@ -8,7 +8,7 @@ from typing import Annotated, Any, NamedTuple
 from solvers.compiled.dop853_tableau import STAGES
 from solvers.compiled.kernels import inlined, inner, law_forces, merged, reordered, table_value
 from solvers.compiled.simd import largest8, load8, size8, splat8, store8
-from solvers.compiled.state import CALLS, T
+from solvers.compiled.state import CALLS, T, acts
 from solvers.compiled.sums import above, combine
 from solvers.exponential.contact.many_stops import (
     SIGNALS,
@@ -35,7 +35,7 @@ _SEEN = 4.0  # times the last two coefficients of a signal: a difference up to t
 
 
 class Scratch(NamedTuple):
-    """Working arrays of the exponential integrator; the arrays of contacts have the stop as first index.
+    """Working arrays of the exponential integrator; the first index of many arrays is the row or element.
 
     Only kernels write to them. `previous`, `control` and arrays with one number per stop may last from step to step;
     values at the nodes are new in each step. States are block coordinates (for mass-normalised modes in √kg m and
@@ -49,51 +49,52 @@ class Scratch(NamedTuple):
     values: Annotated[Any, "14"]  # coefficients of a polynomial
     norms: Annotated[Any, "N"]  # energy norms of the blocks, √J
     signal_bounds: Annotated[Any, "L"]  # bounds of the sampled signals on some cells
-    per_stop: Annotated[Any, "m"]  # bounds of |δ̈| in m/s², errors of δ in m, or of δ̇ in m/s
+    per_row: Annotated[Any, "R"]  # bounds of |δ̈| in m/s², errors of δ in m, or of δ̇ in m/s
     split_state: Annotated[Any, "6, 2, N8"]  # p and v of the blocks, of several states; see `energy.flight_balance`
-    motion: Annotated[Any, "m, 2, S"]  # indentations and their rates at the nodes
+    motion: Annotated[Any, "R, 2, S"]  # displacements and their rates at the nodes
     clipped: Annotated[Any, "S"]  # indentations of one stop at the nodes, not below 0
-    free: Annotated[Any, "m, 2, S"]  # indentations and rates at the nodes without contact forces
-    force: Annotated[Any, "m+L, S"]  # forces of the stops, then values of the signals
-    trial: Annotated[Any, "S"]  # new forces of one stop, or other numbers of one moment
-    summary: Annotated[Any, "m, 2, 8"]  # of the forces and the indentations, see Tables.summary
-    previous: Annotated[Any, "m, S"]  # forces of the last accepted step
-    slope: Annotated[Any, "m, 3, S"]  # derivatives of the laws at the nodes by δ, δ̇ and entry rate
-    residual: Annotated[Any, "m*S"]  # N, then the changes of the forces
-    pivots: Annotated[Any, "int m*S"]  # of the LU factors
+    free: Annotated[Any, "R, 2, S"]  # the same without contact forces
+    force: Annotated[Any, "R+L, S"]  # forces on the rows, then values of the signals
+    law_force: Annotated[Any, "R, S"]  # forces on the rows by the laws, for the motion at hand
+    trial: Annotated[Any, "S"]  # numbers of one moment
+    summary: Annotated[Any, "R, 2, 8"]  # of forces and displacements, see Tables.summary
+    previous: Annotated[Any, "R, S"]  # forces of the last accepted step
+    slope: Annotated[Any, "E, 3, S"]  # derivatives of the laws at the nodes by δ, δ̇ and entry rate
+    residual: Annotated[Any, "R*S"]  # N, then the changes of the forces
+    pivots: Annotated[Any, "int R*S"]  # of the LU factors
     stages: Annotated[Any, "stages, W8"]  # states and rates, rows as named above
-    reference_speed: Annotated[Any, "m"]  # m/s: an error of an indentation rate is measured in rtol × reference speed
-    first_step_share: Annotated[Any, "m"]  # of a contact's duration that its first step may take; 0: unknown
-    force_tolerance: Annotated[Any, "m"]  # N: change of a force within which it counts as found
-    unresolved: Annotated[Any, "m"]  # N s: impulse that the polynomials of a step leave out
-    guess: Annotated[Any, "m, S"]  # forces the iterations begin with
-    viscous: Annotated[Any, "m"]  # N s/m: slope of a force by its rate, where Newton's method has found it; else 0
+    reference_speed: Annotated[Any, "E"]  # m/s: an error of an indentation rate is measured in rtol × reference speed
+    first_step_share: Annotated[Any, "E"]  # of a contact's duration that its first step may take; 0: unknown
+    force_tolerance: Annotated[Any, "E"]  # N: change of a force within which it counts as found
+    unresolved: Annotated[Any, "R"]  # N s: impulse that the polynomials of a step leave out
+    guess: Annotated[Any, "R, S"]  # forces the iterations begin with
+    viscous: Annotated[Any, "E"]  # N s/m: slope of a force by its rate, where Newton's method has found it; else 0
     local_motion: Annotated[Any, "4, 3*S"]  # rows as named above, see `peaks`
-    side: Annotated[Any, "m"]  # +1 or -1: side of its law's bend on which each stop is, see `crossings`
-    side_at_begin: Annotated[Any, "m"]  # the same at the start of the step tried
+    side: Annotated[Any, "E"]  # +1 or -1: side of its law's bend on which each stop is, see `crossings`
+    side_at_begin: Annotated[Any, "E"]  # the same at the start of the step tried
     bend_values: Annotated[Any, "S+2"]  # of one stop at the nodes and at the end, then the largest, see `crossings`
     landing_reach: Annotated[Any, "1"]  # radians of the fastest block that a landing may take
     duration: Annotated[Any, "1"]  # s: estimate for the contact begun last, as if nothing else acted on the body
     energy_sums: Annotated[Any, "2+L, numbers"]  # see `energy.flight_balance` and `contact_balance`
     energy: Annotated[Any, "3"]  # J, see `energy.check`
     control: Annotated[Any, "int 6"]  # of the step control, places named in `step`
-    start_motion: Annotated[Any, "m, 2"]  # δ and δ̇ at the start of the step
+    start_motion: Annotated[Any, "E, 2"]  # δ and δ̇ at the start of the step
     margin: Annotated[Any, "B*S"]  # margins of an element's borders at points, row by row; see `borders`
     ends: Annotated[Any, "6*B"]
     fired: Annotated[Any, "B"]
-    largest: Annotated[Any, "m, B"]  # largest margins on the step tried last
-    noise: Annotated[Any, "m, B"]  # their rounding
+    largest: Annotated[Any, "E, B"]  # largest margins on the step tried last
+    noise: Annotated[Any, "E, B"]  # their rounding
     border: Annotated[Any, "int 1"]  # border that ends the step tried last, -1 for a bend
     landed: Annotated[Any, "int 2"]  # element and border that a landing in time has found to lie before its own, or -1
     block_motion: Annotated[Any, "2*M, S"]  # p and v at the nodes; as the next two see `many_stops`
     block_force: Annotated[Any, "2*M, S"]  # state rates of the blocks by the forces at the nodes
-    pair_weights: Annotated[Any, "M8"]  # products of a stop's read row with the push of another
-    jacobian: Annotated[Any, "m*S, m*S"]  # of the stops in contact; as the next two not cleared between runs
-    pair_pool: Annotated[Any, "pool, S, 2*S"]  # responses of pairs of stops
-    pool_keys: Annotated[Any, "int pool"]  # which pair of stops and step length each of them belongs to
+    pair_weights: Annotated[Any, "M8"]  # products of a read row with the push of another row
+    jacobian: Annotated[Any, "R*S, R*S"]  # of the rows in contact; as the next two not cleared between runs
+    pair_pool: Annotated[Any, "pool, S, 2*S"]  # responses of pairs of rows
+    pool_keys: Annotated[Any, "int pool"]  # which pair of rows and step length each of them belongs to
     along: Annotated[Any, "2*N, S"]  # p and v of the blocks at a panel's points, as the next two of any number of stops
     moves: Annotated[Any, "N, 5, S"]  # see `energy.quadrature`
-    between: Annotated[Any, "S+1+m+L, S"]
+    between: Annotated[Any, "S+1+R+L, S"]
 
 
 @merged
@@ -212,44 +213,63 @@ def _legendre(coefficients, x):
 
 @inner
 def free_response(problem, tables, state, scratch, node_set, level):
-    """Indentations and rates at the nodes without contact forces, signals included, into ``scratch.free``.
+    """Motion of the rows at the nodes without contact forces, signals included, into ``scratch.free``.
 
-    With many stops it is done for those in contact only.
+    With many rows it is done for those in contact only.
     """
-    stops, size, through = problem.gap.size, 2 * problem.k.size, uses_blocks(tables)
+    rows, size, through = problem.gap.size, 2 * problem.k.size, uses_blocks(tables)
     if problem.table_dt.size:
         sample_signals(problem, tables, scratch, node_set, state.now[T], tables.contact_step[level])
     if through:
         free_block_motion(problem, tables, scratch, node_set, level, state.x)
         if problem.table_dt.size:
             add_block_motion(problem, tables, state, scratch, node_set, level, SIGNALS)
-    for s in range(stops):
-        free = scratch.free[s]
+    for r in range(rows):
+        free = scratch.free[r]
         if through:
-            if state.segment[s] > 0:
-                motion_at_nodes(problem, scratch, s, problem.gap[s], free)
+            if acts(problem, state, r):
+                motion_at_nodes(problem, scratch, r, problem.gap[r], free)
             continue
-        store8(free[0], 0, splat8(-problem.gap[s]))
+        store8(free[0], 0, splat8(-problem.gap[r]))
         store8(free[1], 0, splat8(0.0))
-        combine(tables.free[tables.kind[node_set], level, s], state.x, size, free, free)
+        combine(tables.free[tables.kind[node_set], level, r], state.x, size, free, free)
         for j in range(problem.table_dt.size):
-            u = stops + problem.table_load[j]
-            combine(tables.forced[tables.kind[node_set], level, u, s], scratch.force[u], S, free, free)
+            u = rows + problem.table_load[j]
+            combine(tables.forced[tables.kind[node_set], level, u, r], scratch.force[u], S, free, free)
 
 
 @inlined
-def respond(problem, tables, state, scratch, node_set, level, s):
-    """Indentation and rate of stop s at the nodes under the present forces, into ``scratch.motion``."""
-    motion, start = scratch.motion[s], scratch.free[s]
+def respond(problem, tables, state, scratch, node_set, level, r):
+    """Displacement and rate of row r at the nodes under the present forces, into ``scratch.motion``."""
+    motion, start = scratch.motion[r], scratch.free[r]
     for u in range(problem.gap.size):
-        if state.segment[u] > 0:
-            combine(pair_response(problem, tables, scratch, node_set, level, s, u), scratch.force[u], S, start, motion)
+        if acts(problem, state, u):
+            combine(pair_response(problem, tables, scratch, node_set, level, r, u), scratch.force[u], S, start, motion)
             start = motion
+
+
+@inlined
+def own_accelerance(problem, tables, s):
+    """-δ̈ of a stop per newton of its own, 1/kg."""
+    row = problem.first[s]
+    return tables.accelerance[row, row]
+
+
+@merged
+def motion_of(problem, scratch, s):
+    """(2, S) indentation and rate of stop s at the nodes."""
+    return scratch.motion[problem.first[s]]
+
+
+@merged
+def force_of(problem, scratch, s):
+    """(S,) force of stop s at the nodes."""
+    return scratch.force[problem.first[s]]
 
 
 @reordered
 def ripple_of(ripple_weight, alias, x, n):
-    """Error, m, of a stop's indentation between the nodes, by blocks that oscillate faster than the nodes resolve."""
+    """Error, m, of a row's displacement between the nodes, by blocks that oscillate faster than the nodes resolve."""
     error = 0.0
     for b in range(n):
         error += ripple_weight[b] * (alias[b] * abs(x[b]) + alias[n + b] * abs(x[n + b]))
@@ -267,7 +287,8 @@ def rate_ripple_of(ripple_weight, k, alias, x, n):
 
 @inlined
 def node_forces(problem, state, scratch, s):
-    """Forces of stop s at the nodes by its law, into ``scratch.trial``."""
-    above(scratch.motion[s, 0], problem.knots[s, 0], scratch.clipped)
-    law_forces(problem, s, S, scratch.clipped, scratch.motion[s, 1], state.entry_rate[s], scratch.trial)
+    """Forces of stop s on its rows at the nodes by its law, into ``scratch.law_force``."""
+    motion, force = motion_of(problem, scratch, s), scratch.law_force[problem.first[s]]
+    above(motion[0], problem.knots[s, 0], scratch.clipped)
+    law_forces(problem, s, S, scratch.clipped, motion[1], state.entry_rate[s], force)
     state.count[CALLS] += S

@@ -6,7 +6,7 @@ from solvers.compiled.kernels import copy, indentation, inlined, inner, merged
 from solvers.compiled.simd import load8, splat8, sum8
 from solvers.compiled.state import HEAD, PART, PEAK_DELTA, PEAK_FORCE, RECORDED, SAMPLED, STEPS, T, is_open, write_event
 from solvers.compiled.sums import combine
-from solvers.exponential.contact.node_response import START, largest_size
+from solvers.exponential.contact.node_response import START, force_of, largest_size, motion_of
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.peaks import state_peaks, step_peaks
 from solvers.exponential.energy.quadrature import state_within
@@ -37,7 +37,7 @@ def end_run(problem, tables, state, scratch, node_set, level, t_end):
     """End the run within the step, in the state that `sample_step` has put into ``scratch.stages[START]``."""
     x, share = scratch.stages[START], (t_end - state.now[T]) / tables.contact_step[level]
     place = share ** (1.0 / tables.time_exponent[node_set])
-    for s in range(problem.gap.size):
+    for s in range(problem.law.size):
         logged = problem.knots[s, 0] == 0.0 or (problem.opening[s] >= 0 and not is_open(problem, s))
         if state.segment[s] > 0 and logged:
             step_peaks(problem, tables, state, scratch, node_set, tables.contact_step[level], s, min(place, 1.0))
@@ -53,8 +53,8 @@ def end_run(problem, tables, state, scratch, node_set, level, t_end):
 def record_forces(problem, state, scratch, kind, ended, node_set, level):
     """Append a row with the forces at the nodes to the event record."""
     forces = state.event_record[state.count[RECORDED], HEAD + state.x.size :]
-    for s in range(problem.gap.size):
-        copy(scratch.force[s], forces[s * S : (s + 1) * S], S)
+    for r in range(problem.gap.size):
+        copy(scratch.force[r], forces[r * S : (r + 1) * S], S)
     write_event(state, kind, state.now[T], ended, ended - state.now[T], node_set, level, state.x)
 
 
@@ -65,25 +65,26 @@ def _work(problem, tables, scratch, node_set, s):
     The sum of F δ̇ at the nodes would be wrong where the force hardly changes: there steps grow until fast blocks
     oscillate between the nodes. A constant force does F times the way between the ends, whatever lies between.
     """
-    begin, force = scratch.start_motion[s, 0], scratch.force[s]
+    begin, force = scratch.start_motion[s, 0], force_of(problem, scratch, s)
     combine(tables.work[node_set], force, S, None, scratch.trial)
     end = sum8(load8(tables.work_end[node_set], 0) * load8(force, 0))
-    within = sum8(load8(scratch.trial, 0) * (load8(scratch.motion[s, 0], 0) - splat8(begin)))
+    within = sum8(load8(scratch.trial, 0) * (load8(motion_of(problem, scratch, s)[0], 0) - splat8(begin)))
     return within + end * (indentation(problem, s, scratch.x_new) - begin)
 
 
 @merged
 def finish_step(problem, tables, state, scratch, node_set, level):
     """Move the state to the end of the step; update works, impulses and peaks of the contacts."""
-    stops, size, h = problem.gap.size, 2 * problem.k.size, tables.contact_step[level]
+    size, h = 2 * problem.k.size, tables.contact_step[level]
     brief = h * tables.fastest <= _BRIEF
-    for s in range(stops):
+    for s in range(problem.law.size):
         if state.segment[s] > 0:
+            motion, force = motion_of(problem, scratch, s), force_of(problem, scratch, s)
             weighted = s == node_set - 1 and tables.weight_exponent[node_set] > 0.0
             weights = tables.weights[node_set] if weighted else tables.plain[node_set]
-            impulses = load8(weights, 0) * load8(scratch.force[s], 0)
+            impulses = load8(weights, 0) * load8(force, 0)
             if weighted or brief:
-                state.x[size + 2 + 2 * s] += h * sum8(impulses * load8(scratch.motion[s, 1], 0))
+                state.x[size + 2 + 2 * s] += h * sum8(impulses * load8(motion[1], 0))
             else:
                 state.x[size + 2 + 2 * s] += _work(problem, tables, scratch, node_set, s)
             state.x[size + 3 + 2 * s] += h * sum8(impulses)
@@ -92,7 +93,7 @@ def finish_step(problem, tables, state, scratch, node_set, level):
             if problem.knots[s, 0] == 0.0 or problem.opening[s] >= 0:
                 step_peaks(problem, tables, state, scratch, node_set, h, s, 1.0)
             else:
-                state.active[s, PEAK_DELTA] = max(state.active[s, PEAK_DELTA], largest_size(scratch.motion[s, 0]))
-                state.active[s, PEAK_FORCE] = max(state.active[s, PEAK_FORCE], largest_size(scratch.force[s]))
+                state.active[s, PEAK_DELTA] = max(state.active[s, PEAK_DELTA], largest_size(motion[0]))
+                state.active[s, PEAK_FORCE] = max(state.active[s, PEAK_FORCE], largest_size(force))
     copy(scratch.x_new, state.x, size)
     state.now[T] += h

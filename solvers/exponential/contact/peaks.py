@@ -9,11 +9,28 @@ from __future__ import annotations
 
 import math
 
-from solvers.compiled.kernels import contact_forces, copy, dot, indentation, inlined, inner, merged, off_knots
+from solvers.compiled.kernels import (
+    contact_forces,
+    copy,
+    indentation,
+    indentation_rate,
+    inlined,
+    inner,
+    merged,
+    off_knots,
+)
 from solvers.compiled.simd import largest8, load8
 from solvers.compiled.state import PEAK_DELTA, PEAK_FORCE, is_open, surface_tolerance
 from solvers.compiled.sums import combine
-from solvers.exponential.contact.node_response import DELTAS, FORCES, KNOWN, RATES
+from solvers.exponential.contact.node_response import (
+    DELTAS,
+    FORCES,
+    KNOWN,
+    RATES,
+    force_of,
+    motion_of,
+    own_accelerance,
+)
 from solvers.exponential.contact.nodes import LOCAL, MONOMIALS, S
 
 _MOST = 6  # Newton steps to a maximum
@@ -85,12 +102,12 @@ def _highest(tables, values, node_set, limit):
 @inner
 def motion_around(problem, tables, state, scratch, node_set, h, s, place):
     """Indentations and rates of stop s around a node of the step from the state, into ``scratch.local_motion``."""
-    local_motion, motion, known = scratch.local_motion, scratch.motion[s], scratch.local_motion[KNOWN]
+    local_motion, motion, known = scratch.local_motion, motion_of(problem, scratch, s), scratch.local_motion[KNOWN]
     copy(motion[0], known, S)
     for i in range(S):
         known[S + i] = h * motion[1, i]
     known[2 * S] = indentation(problem, s, state.x)
-    known[2 * S + 1] = h * dot(problem.read_rate[s], state.x, 2 * problem.k.size)
+    known[2 * S + 1] = h * indentation_rate(problem, s, state.x)
     combine(tables.local_interpolation[node_set, place], known, 2 * S + 2, None, local_motion[DELTAS])
     for i in range(S):
         local_motion[RATES, i] = local_motion[DELTAS, S + i] / h
@@ -99,7 +116,7 @@ def motion_around(problem, tables, state, scratch, node_set, h, s, place):
 @merged
 def largest_indentation(problem, tables, state, scratch, node_set, h, s):
     """Largest indentation of stop s around its highest node of a step."""
-    place = _highest(tables, scratch.motion[s, 0], node_set, 1.0)
+    place = _highest(tables, motion_of(problem, scratch, s)[0], node_set, 1.0)
     motion_around(problem, tables, state, scratch, node_set, h, s, place)
     return local_maximum(scratch.local_motion[DELTAS], 1.0, scratch.trial)
 
@@ -113,12 +130,13 @@ def _below(state, s, column, values):
 @inner
 def step_peaks(problem, tables, state, scratch, node_set, h, s, limit):
     """Raise the peaks of stop s by a converged step of length h, up to σ = limit, from ``state.x`` on."""
-    seen, motion = -1, scratch.motion[s, 0]
-    if limit >= 1.0 and _below(state, s, PEAK_FORCE, scratch.force[s]) and _below(state, s, PEAK_DELTA, motion):
+    seen, motion, force = -1, motion_of(problem, scratch, s)[0], force_of(problem, scratch, s)
+    if limit >= 1.0 and _below(state, s, PEAK_FORCE, force) and _below(state, s, PEAK_DELTA, motion):
         return
-    combine(tables.summary[node_set], motion, S, None, scratch.summary[s, 1])
-    for column, values, d in ((PEAK_FORCE, scratch.force[s], 0), (PEAK_DELTA, motion, 1)):
-        known, slopes = state.active[s, column], scratch.summary[s, d]
+    summary = scratch.summary[problem.first[s]]
+    combine(tables.summary[node_set], motion, S, None, summary[1])
+    for column, values, d in ((PEAK_FORCE, force, 0), (PEAK_DELTA, motion, 1)):
+        known, slopes = state.active[s, column], summary[d]
         place = _highest(tables, values, node_set, limit)
         if place >= 0:
             state.active[s, column] = max(known, values[place])
@@ -154,10 +172,10 @@ def step_peaks(problem, tables, state, scratch, node_set, h, s, limit):
 def state_peaks(problem, state, scratch, x):
     """Raise the peaks of all stops in contact by their indentations and forces in the state x."""
     batch = scratch.trial
-    for s in range(problem.gap.size):
+    for s in range(problem.law.size):
         if state.segment[s] > 0 and not is_open(problem, s):
             batch[0] = off_knots(problem, s, state.segment[s], indentation(problem, s, x))
-            batch[1] = dot(problem.read_rate[s], x, 2 * problem.k.size)
+            batch[1] = indentation_rate(problem, s, x)
             contact_forces(problem, s, batch[0:1], batch[1:2], state.entry_rate[s], batch[2:3])
             if problem.knots[s, 0] < 0.0 and problem.opening[s] < 0:  # of both signs
                 batch[0], batch[2] = abs(batch[0]), abs(batch[2])
@@ -171,6 +189,6 @@ def pressed_speed(problem, tables, state, s, batch):
     batch[0] = indentation(problem, s, state.x)
     if state.segment[s] == 0 or abs(batch[0]) <= surface_tolerance(problem, s, state.x):
         return 0.0
-    batch[1] = dot(problem.read_rate[s], state.x, 2 * problem.k.size)
+    batch[1] = indentation_rate(problem, s, state.x)
     contact_forces(problem, s, batch[0:1], batch[1:2], state.entry_rate[s], batch[2:3])
-    return math.sqrt(abs(batch[0] * batch[2] * tables.accelerance[s, s]))
+    return math.sqrt(abs(batch[0] * batch[2] * own_accelerance(problem, tables, s)))

@@ -22,7 +22,7 @@ _OUTPUT = REAL, REAL, MATRIX, VECTOR, types.boolean  # types of rtol, t_end, out
 @part(LAND, types.UniTuple(types.int64, 2), types.int64, types.int64, REAL, *_OUTPUT)
 def land_first(problem, tables, state, scratch, stop, direction, near, rtol, t_end, out, due, with_energy):
     """Land on the border met first, be it that of another stop; (stop, direction), or (-1, 0) if not possible."""
-    for _ in range(problem.gap.size + 1):
+    for _ in range(problem.law.size + 1):
         landed = land(problem, tables, state, scratch, stop, direction, near, rtol, t_end, out, due, with_energy)
         if landed == stop or landed < 0:
             return landed, direction
@@ -49,7 +49,7 @@ def first_end(problem, tables, state, scratch, node_set, level, is_new, rtol):
 def land_in_time(problem, tables, state, scratch, stop, first, rtol, t_end, out, due, with_energy):
     """Land on a bend or border of ``stop``, or on a border met before; (stop, whether it succeeded)."""
     border, near = scratch.border[0], first
-    for _ in range(problem.gap.size + 1):
+    for _ in range(problem.law.size + 1):
         if land_on_bend(problem, tables, state, scratch, stop, border, near, rtol, t_end, out, due, with_energy):
             scratch.border[0] = border
             return stop, True

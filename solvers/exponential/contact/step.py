@@ -15,10 +15,11 @@ from solvers.compiled.kernels import (
     MATRIX,
     REAL,
     VECTOR,
+    acceleration_of,
     contact_forces,
     copy,
-    dot,
     indentation,
+    indentation_rate,
     inlined,
     merged,
     rhs,
@@ -34,6 +35,7 @@ from solvers.compiled.state import (
     STEP_TOO_SMALL,
     STEPS,
     T,
+    acts,
     in_contact,
     rate_tolerance,
     surface_tolerance,
@@ -57,7 +59,7 @@ from solvers.exponential.contact.first_step import (
     level_of,
 )
 from solvers.exponential.contact.landing import may_land
-from solvers.exponential.contact.node_response import free_response
+from solvers.exponential.contact.node_response import force_of, free_response
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.outputs import end_run, finish_step, record_forces, sample_step
 from solvers.exponential.contact.segment_ends import first_end, go_beyond, land_first, land_in_time
@@ -72,14 +74,14 @@ _ONE_LEVEL = 2.0 ** (-0.5 * _ORDER)  # an error with steps √2 times shorter, o
 def _switch_pressed(problem, state, log):
     """Switch every stop at rest on its surface that other stops' forces press into it; returns whether any did."""
     switched = False
-    for s in range(problem.gap.size):
+    for s in range(problem.law.size):
         if state.segment[s] > 0 or abs(indentation(problem, s, state.x)) > surface_tolerance(problem, s, state.x):
             continue
-        if abs(dot(problem.read_rate[s], state.x, 2 * problem.k.size)) > rate_tolerance(problem, s, state.x):
+        if abs(indentation_rate(problem, s, state.x)) > rate_tolerance(problem, s, state.x):
             continue
         batch = state.active[s, :3]  # of a contact not begun yet
         rhs(problem, state.now[T], state.x, state.segment, state.entry_rate, state.rate, batch)
-        if dot(problem.read_rate[s], state.rate, 2 * problem.k.size) > 0.0:
+        if acceleration_of(problem, s, state.rate) > 0.0:
             switch(problem, state, s, np.int64(1), log)
             switched = True
     return switched
@@ -91,11 +93,10 @@ def _nearest_surface(problem, state, scratch):
 
     Raises the reference speeds to these rates, which may exceed those at entry.
     """
-    size = 2 * problem.k.size
     near, stop, direction = np.inf, -1, 0
-    for s in range(problem.gap.size):
+    for s in range(problem.law.size):
         delta = indentation(problem, s, state.x)
-        rate = dot(problem.read_rate[s], state.x, size)
+        rate = indentation_rate(problem, s, state.x)
         scratch.start_motion[s, 0], scratch.start_motion[s, 1] = delta, rate
         scratch.reference_speed[s] = max(scratch.reference_speed[s], abs(rate))
         segment = state.segment[s]
@@ -114,20 +115,22 @@ def _nearest_surface(problem, state, scratch):
 def _predict(problem, tables, state, scratch, level):
     """First guess of the forces: the polynomial of the last step, or the law for the free response."""
     control = scratch.control
-    for s in range(problem.gap.size):
+    shift = level - control[LEVEL] + 2
+    for s in range(problem.law.size):
         if state.segment[s] == 0:
             continue
         if control[NEW]:
-            copy(scratch.free[s, 0], scratch.clipped, S)
-            contact_forces(problem, s, scratch.clipped, scratch.free[s, 1], state.entry_rate[s], scratch.force[s])
+            free, force = scratch.free[problem.first[s]], force_of(problem, scratch, s)
+            copy(free[0], scratch.clipped, S)
+            contact_forces(problem, s, scratch.clipped, free[1], state.entry_rate[s], force)
             state.count[CALLS] += S
             continue
-        shift = level - control[LEVEL] + 2
-        if 0 <= shift < tables.extrapolation.shape[1]:
-            combine(tables.extrapolation[control[NODE_SET], shift], scratch.previous[s], S, None, scratch.force[s])
-        else:
-            for i in range(S):
-                scratch.force[s, i] = scratch.previous[s, S - 1]
+        for r in range(problem.first[s], problem.first[s + 1]):
+            if 0 <= shift < tables.extrapolation.shape[1]:
+                combine(tables.extrapolation[control[NODE_SET], shift], scratch.previous[r], S, None, scratch.force[r])
+            else:
+                for i in range(S):
+                    scratch.force[r, i] = scratch.previous[r, S - 1]
 
 
 @merged
@@ -182,9 +185,9 @@ def _accept(problem, tables, energy_tables, state, scratch, node_set, level, wan
     if end >= t_end:
         end_run(problem, tables, state, scratch, node_set, level, t_end)
         return
-    for s in range(problem.gap.size):
-        if state.segment[s] > 0:
-            copy(scratch.force[s], scratch.previous[s], S)
+    for r in range(problem.gap.size):
+        if acts(problem, state, r):
+            copy(scratch.force[r], scratch.previous[r], S)
     if energy_tables.active > 0.0:
         account_contact(problem, tables, energy_tables, state, scratch, node_set, level, h)
     if state.event_record.shape[0]:
@@ -240,7 +243,7 @@ def advance_contact(problem, tables, energy_tables, state, scratch, t_end, rtol,
             control[NEW], control[NODE_SET], control[NEXT_LEVEL] = SEGMENT, 0, max(level, wanted)
             return RUNNING
         if level == bottom:
-            return LAW_NOT_FINITE if _law_fails(state, scratch) else STEP_TOO_SMALL
+            return LAW_NOT_FINITE if _law_fails(problem, state, scratch) else STEP_TOO_SMALL
         copy(scratch.side_at_begin, scratch.side, scratch.side.size)
         state.count[REJECTED] += 1
         if bent >= 0:  # a step that ends near the bend, so that the next one can land on it
@@ -253,11 +256,11 @@ def advance_contact(problem, tables, energy_tables, state, scratch, t_end, rtol,
 
 
 @merged
-def _law_fails(state, scratch):
+def _law_fails(problem, state, scratch):
     """Whether a force is not finite."""
-    for s in range(state.segment.size):
+    for r in range(problem.gap.size):
         for i in range(S):
-            if state.segment[s] > 0 and not abs(scratch.force[s, i]) < np.inf:
+            if acts(problem, state, r) and not abs(scratch.force[r, i]) < np.inf:
                 return True
     return False
 

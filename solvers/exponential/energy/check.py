@@ -45,10 +45,10 @@ def note_energy(problem, tables, state, scratch):
     """At the end of a run: its energy, and the bound E_c, into ``scratch.energy``."""
     n = problem.k.size
     allowed = scratch.energy[FIRST]
-    for s in range(problem.gap.size):
-        steady = 0.0
+    for s in range(problem.law.size):
+        steady, row = 0.0, problem.read_rate[problem.first[s]]
         for b in range(int(tables.own_blocks), n):
-            speed = np.hypot(problem.read_rate[s, b], problem.read_rate[s, n + b] * np.sqrt(problem.k[b]))
+            speed = np.hypot(row[b], row[n + b] * np.sqrt(problem.k[b]))
             steady += speed * np.hypot(
                 state.x[b], state.x[n + b] / np.sqrt(problem.k[b]) if problem.k[b] > 0.0 else 0.0
             )

@@ -11,7 +11,9 @@ from numba import types
 from solvers.compiled.kernels import REAL, copy, inlined, merged, reordered
 from solvers.compiled.parts import ACCOUNT_CONTACT, part
 from solvers.compiled.simd import load8, splat8, store8, sum8
+from solvers.compiled.state import acts
 from solvers.compiled.sums import combine
+from solvers.exponential.contact.many_stops import enters
 from solvers.exponential.contact.node_response import WITHIN
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.energy.contact_tables import BEGAN, ENTERING, SQUARES
@@ -47,22 +49,22 @@ def _free_loss(plain, x, n):
 @merged
 def _account_sums(problem, tables, energy_tables, state, scratch, node_set, place):
     """The same by the forms that are summed over the blocks, for a whole step."""
-    size, stops, heads = 2 * problem.k.size, problem.gap.size, energy_tables.head
+    size, rows, heads = 2 * problem.k.size, problem.gap.size, energy_tables.head
     y, sums, tones = scratch.energy_sums[0], scratch.energy_sums[1], problem.k.size - int(tables.own_blocks)
     copy(state.x, y, size)
     for i in range(heads.size):
-        used = heads[i] >= stops or state.segment[heads[i]] > 0
+        used = heads[i] >= rows or acts(problem, state, heads[i])
         store8(y, size + S * i, load8(scratch.force[heads[i]], 0) if used else splat8(0.0))
     combine(energy_tables.sums[node_set, place], y, size + S * heads.size, None, sums)
     losses, gains = splat8(0.0), splat8(0.0)
     for i in range(heads.size):
         values = load8(y, size + S * i)
         losses += values * load8(sums, S * i)
-        if heads[i] >= stops:
-            gains += values * load8(sums, S * (heads.size + i - stops))
+        if heads[i] >= rows:
+            gains += values * load8(sums, S * (heads.size + i - rows))
     gain, loss = sum8(gains), sum8(losses)
     loss += _free_loss(energy_tables.free_loss[energy_tables.kind[node_set], place], state.x, problem.k.size)
-    of_tones = sums[S * (2 * heads.size - stops) :]
+    of_tones = sums[S * (2 * heads.size - rows) :]
     for k in range(2 * tones):
         value = state.x[int(tables.own_blocks) + (k if k < tones else k + problem.k.size - tones)]
         loss, gain = loss + value * of_tones[k], gain + value * of_tones[2 * tones + k]
@@ -105,9 +107,9 @@ def _block_forces(problem, tables, state, scratch, node_set, b, y):
     """Forces on a block at the nodes and its state, for plain forces and for that of the stop that enters; signals."""
     size, signal, plain, entering = problem.k.size, splat8(0.0), splat8(0.0), splat8(0.0)
     for u in range(problem.gap.size):
-        if state.segment[u] > 0:
+        if acts(problem, state, u):
             force = splat8(problem.push[u, size + b]) * load8(scratch.force[u], 0)
-            if _enters(tables, node_set, u):
+            if enters(problem, node_set, u) and tables.weight_exponent[node_set] > 0.0:
                 entering += force
             else:
                 plain += force
@@ -119,12 +121,6 @@ def _block_forces(problem, tables, state, scratch, node_set, b, y):
     y[S], y[S + 1] = state.x[b], state.x[size + b]
     y[3 * S], y[3 * S + 1] = y[S], y[S + 1]
     return signal
-
-
-@inlined
-def _enters(tables, node_set, u):
-    """Whether the force of a stop has a weight on a step."""
-    return u == node_set - 1 and tables.weight_exponent[node_set] > 0.0
 
 
 @merged

@@ -9,6 +9,7 @@ motion: three numbers.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,31 +28,31 @@ _FREE = slice(S, BEGAN)  # rows of `contact_table` of p₀ and v₀
 class Steps:
     """Integrals over the steps of a node set, block by block.
 
-    ``table`` (j, n, 3S + 5, 2S) is that of `contact_table`, ``entering`` the stop whose force has a weight, or -1,
+    ``table`` (j, n, 3S + 5, 2S) is that of `contact_table`, ``entering`` the heads whose force has a weight,
     ``weights`` (j, S) those of the nodes, s, ``tones`` (j, 2K, 2K, S) the motion of the tones at the nodes from that at
     the start.
     """
 
     table: Any
-    entering: int
+    entering: Sequence[int]
     weights: Any
     tones: Any
 
     def moments(self, u: int) -> Any:
         """(j, n, S, S) ∫ L_i v dt per node value of a head."""
-        return self.table[:, :, ENTERING:SQUARES, :S] if u == self.entering else self.table[:, :, :S, :S]
+        return self.table[:, :, ENTERING:SQUARES, :S] if u in self.entering else self.table[:, :, :S, :S]
 
     def squares(self, u: int, w: int) -> Any:
         """(j, n, S, S) ∫ v_w v_u dt per node values of two heads."""
-        if u == w == self.entering:
+        if u in self.entering and w in self.entering:
             return self.table[:, :, SQUARES : SQUARES + S, :S]
-        if w == self.entering:
+        if w in self.entering:
             return 0.5 * self.table[:, :, ENTERING:SQUARES, S:]
-        return self.squares(w, u).swapaxes(2, 3) if u == self.entering else self.table[:, :, :S, S:]
+        return self.squares(w, u).swapaxes(2, 3) if u in self.entering else self.table[:, :, :S, S:]
 
     def free(self, u: int) -> Any:
         """(j, n, 2, S) twice the same of p₀, v₀ and a head."""
-        return self.table[:, :, SQUARES + S :, :S] if u == self.entering else self.table[:, :, _FREE, S:]
+        return self.table[:, :, SQUARES + S :, :S] if u in self.entering else self.table[:, :, _FREE, S:]
 
 
 def tones_at_nodes(steady: Any, k: Any) -> Any:
@@ -68,16 +69,16 @@ class Sums:
     """The forms of one system; `of` makes those of a node set."""
 
     def __init__(self, problem: Problem, tables: Tables) -> None:
-        stops, n, blocks = len(problem.gap), int(tables.own_blocks), len(problem.k)
-        self.heads = np.append(np.arange(stops), stops + np.unique(problem.table_load)).astype(np.int64)
-        self.first, self.stops, b = 2 * blocks, stops, np.arange(blocks)
+        forces, n, blocks = len(problem.gap), int(tables.own_blocks), len(problem.k)
+        self.heads = np.append(np.arange(forces), forces + np.unique(problem.table_load)).astype(np.int64)
+        self.first, self.forces, b = 2 * blocks, forces, np.arange(blocks)
         self.p, self.v = b[:n], blocks + b[:n]
         self.tone = np.append(b[n:], blocks + b[n:])
         self.push = np.concatenate((problem.push, problem.load))[:, self.v]
         self.power, self.signal = tables.power_rows, tables.signal_rows
         self.c, self.loss = problem.c[:n], tables.loss_rows[:, self.tone]
         self.works = S * len(self.heads)  # column at which the works of loads begin, then come those of the tones
-        self.of_tones = 2 * self.works - S * stops
+        self.of_tones = 2 * self.works - S * forces
         self.shape = self.first + self.works, self.of_tones + padded(2 * len(self.tone))
 
     def rows(self, head: int) -> slice:
@@ -90,8 +91,8 @@ class Sums:
         work = [self._work(steps, load) for load in range(len(self.power))]
         for i, u in enumerate(self.heads.tolist()):
             out[..., S * i : S * (i + 1)] = self._damping(steps, u)
-        for i, u in enumerate(self.heads[self.stops :].tolist()):
-            out[..., self.works + S * i : self.works + S * (i + 1)] = work[u - self.stops]
+        for i, u in enumerate(self.heads[self.forces :].tolist()):
+            out[..., self.works + S * i : self.works + S * (i + 1)] = work[u - self.forces]
         first, count = self.of_tones, len(self.tone)
         out[..., first : first + count] = self._damping_of_tones(steps)
         for row, of_load in zip(self.signal[:, self.tone], work, strict=True):

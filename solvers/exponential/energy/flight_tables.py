@@ -272,10 +272,11 @@ def _contact_part(energy_tables: EnergyTables, problem: Problem, tables: Tables)
     if tables.node_propagator.size or math.prod(sums.shape) > _MOST_PER_BLOCK * own:
         return energy_tables._replace(steady=steady, contact=np.stack(of_kinds))
     tones, weights = [tones_at_nodes(part, problem.k[own:]) for part in steady], h[:, None] * tables.plain[:, None]
-    steps = [
-        Steps(of_kinds[kind], f - 1 if tables.weight_exponent[f] > 0.0 else -1, weights[f], tones[kind])
-        for f, kind in enumerate(energy_tables.kind)
+    entering = [
+        np.flatnonzero((problem.element == f - 1) & (weight > 0.0)).tolist()
+        for f, weight in enumerate(tables.weight_exponent)
     ]
+    steps = [Steps(of_kinds[kind], entering[f], weights[f], tones[kind]) for f, kind in enumerate(energy_tables.kind)]
     return energy_tables._replace(
         head=sums.heads,
         sums=np.stack([sums.of(part) for part in steps]),

@@ -10,10 +10,12 @@ from __future__ import annotations
 
 from numba import types
 
-from solvers.compiled.kernels import REAL, VECTOR, dot, inner, merged, raised, reordered, table_value
+from solvers.compiled.kernels import REAL, VECTOR, dot, inner, merged, push_of, raised, reordered, table_value
 from solvers.compiled.parts import WITHIN_STEP, part
 from solvers.compiled.simd import WIDTH, load8, splat8, store8, sum8
+from solvers.compiled.state import acts
 from solvers.compiled.sums import combine
+from solvers.exponential.contact.many_stops import enters
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.responses import propagate
 
@@ -82,16 +84,16 @@ def _places(tables, scratch, node_set, h, begin, width):
 @merged
 def _forces(problem, tables, state, scratch, node_set):
     """Forces and signals at these points, times dt."""
-    stops, between = problem.gap.size, scratch.between
+    between = scratch.between
     for u in range(scratch.force.shape[0]):
-        if u < stops and state.segment[u] == 0:
+        if u < problem.gap.size and not acts(problem, state, u):
             continue
-        enters, row = u == node_set - 1 and tables.weight_exponent[node_set] > 0.0, between[_PACE + 1 + u]
-        scales, value = tables.lagrange[node_set, 1 if enters else 0], splat8(0.0)
+        weighted, row = enters(problem, node_set, u) and tables.weight_exponent[node_set] > 0.0, between[_PACE + 1 + u]
+        scales, value = tables.lagrange[node_set, 1 if weighted else 0], splat8(0.0)
         for j in range(S):
             value += splat8(scales[j] * scratch.force[u, j]) * load8(between[j], 0)
         store8(row, 0, value * load8(between[_PACE], 0))
-        for q in range(S if enters else 0):
+        for q in range(S if weighted else 0):
             row[q] *= scratch.trial[q] ** tables.weight_exponent[node_set]
 
 
@@ -111,10 +113,10 @@ def _moves(problem, scratch, length):
 @merged
 def _pushed(problem, state, scratch, b, moves):
     """Into ``scratch.trial`` and ``.clipped`` what moves a block at the points, p and v as of the panel's start."""
-    n, stops, p, v = problem.k.size, problem.gap.size, splat8(0.0), splat8(0.0)
+    n, p, v = problem.k.size, splat8(0.0), splat8(0.0)
     for u in range(scratch.force.shape[0]):
-        if u >= stops or state.segment[u] > 0:
-            push = problem.push[u] if u < stops else problem.load[u - stops]
+        if u >= problem.gap.size or acts(problem, state, u):
+            push = push_of(problem, u)
             force = load8(scratch.between[_PACE + 1 + u], 0)
             p += splat8(push[b]) * force
             v += splat8(push[n + b]) * force
@@ -149,10 +151,11 @@ def _move(problem, tables, state, scratch, row):
 def _add_works(problem, tables, state, scratch, row):
     """Works and impulses of the contacts on the panel."""
     size = 2 * problem.k.size
-    for s in range(problem.gap.size):
+    for s in range(problem.law.size):
         if state.segment[s] > 0:
-            combine(scratch.along, problem.read_rate[s], size, None, scratch.trial)
-            impulses = load8(tables.gauss[1], 0) * load8(scratch.between[_PACE + 1 + s], 0)
+            row_of = problem.first[s]
+            combine(scratch.along, problem.read_rate[row_of], size, None, scratch.trial)
+            impulses = load8(tables.gauss[1], 0) * load8(scratch.between[_PACE + 1 + row_of], 0)
             row[size + 2 + 2 * s] += sum8(impulses * load8(scratch.trial, 0))
             row[size + 3 + 2 * s] += sum8(impulses)
 
