@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -108,7 +108,7 @@ def placed_shapes(body: BodyMatrices, vectors: Vector, loaded: Sequence[LocalCoo
     at = [body.beam.position(place) for place in names]
     positions = np.array([3 * [np.nan] if x is None else x for x in at], dtype=float).reshape(-1, 3)
     edges = [(number[a], number[b]) for a, b in joined]
-    return PlacedShapes(
+    made = PlacedShapes(
         tuple(body.beam.components),
         tuple(names),
         values.reshape(shape),
@@ -117,6 +117,8 @@ def placed_shapes(body: BodyMatrices, vectors: Vector, loaded: Sequence[LocalCoo
         np.array(edges, dtype=int).reshape(-1, 2),
         more,
     )
+    moving = {name: at for name, at in made.usual.items() if np.any(made(at))}
+    return replace(made, usual=dict(list((moving or made.usual).items())[:USUAL]))
 
 
 def _places(body: BodyMatrices) -> list[Any]:
@@ -134,4 +136,4 @@ def _usual(body: BodyMatrices, loaded: Sequence[LocalCoordinate]) -> dict[str, A
     ask = getattr(body.beam, "components_at", lambda place: body.beam.components)
     points = getattr(body.beam, "points", {}) or _places(body)[-1:]
     found += [(place, c) for place in points for c in ask(place) if c in COMPONENTS[:3]]
-    return {said(at): at for at in list(dict.fromkeys(found))[:USUAL]}
+    return {said(at): at for at in dict.fromkeys(found)}

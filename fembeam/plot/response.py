@@ -209,6 +209,8 @@ def _listed(stops: NDArray[np.int64], run: Run) -> str:
     """Numbers of stops as words."""
     if len(stops) == np.count_nonzero(~run.kinds[:, 1]) > 1:
         return "all stops"
+    if any(run.titles[stop] for stop in stops):
+        return ", ".join(run.name(stop) for stop in stops)
     return f"stop{'s' * (len(stops) > 1)} " + ", ".join(map(str, stops))
 
 

@@ -101,6 +101,8 @@ class TableReader:
                 return {direction: self.chosen(SIGNAL, one, f"[base.{direction}]") for direction, one in value.items()}
             return self.chosen(SIGNAL, value, "[base]")
         kinds: Constructors = {snake(kind.__name__): MAKERS.get(kind, kind) for kind in FEATURES[name]}
+        if not self.named:  # a straight beam has Clamped, Pinned and Guided
+            kinds = {key: kind for key, kind in kinds.items() if kind not in MAKERS.values()}
         made = []
         for number, table in enumerate(value):
             where = f"[[{name}]] number {number + 1}"
