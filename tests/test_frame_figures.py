@@ -1,5 +1,6 @@
 """Figures of frames: where the drawn lines lie, how much they are magnified, in the plane and in space."""
 
+import meshio
 import numpy as np
 import pytest
 from frames import portal, space_l
@@ -56,6 +57,20 @@ def test_moving_pictures(plane, space, tmp_path):
         assert fb.plot.animate(run, tmp_path / name, frames=3).stat().st_size > 1000
     title = fb.plot.frame(plane, t=0.3).axes[0].get_title()
     assert title.startswith("t = 0.3000 s, displacements x ")
+
+
+def test_paraview(space, tmp_path):
+    """The points of the members, where they are, with displacements and section forces."""
+    found = meshio.read(space.to_vtu(tmp_path / "l.vtu"))
+    corner = np.flatnonzero(np.linalg.norm(found.points - [0.5, 0.3, 0.0], axis=1) < 1e-12)
+    assert len(corner) == 1
+    moved = found.point_data["displacement"][corner[0]]
+    assert np.allclose(moved, [space.displacement("C", c)[-1] for c in "xyz"], rtol=0, atol=1e-15)
+    root = np.flatnonzero(np.linalg.norm(found.points, axis=1) == 0)[0]
+    forces = space.section_forces(("A-B", 0.0))
+    for name, values in forces.items():
+        assert found.point_data[name][root] == pytest.approx(values[-1], rel=1e-9, abs=1e-9)
+    assert space.to_xdmf(tmp_path / "l.xdmf").exists()
 
 
 def test_refused(plane):

@@ -2,6 +2,7 @@
 
 import json
 
+import meshio
 import numpy as np
 import pytest
 from scipy import io, sparse
@@ -233,9 +234,19 @@ def test_figures_are_drawn(lines):
     assert "u(tip, y)" in plot.bifurcation(found).axes[0].get_ylabel()
 
 
-def test_what_cannot_be_drawn_says_so(tmp_path):
+def test_lines_are_shown_in_pictures_and_in_paraview(tmp_path):
     run = pair(fb.Harmonic(1e-3, 180.0))[1].reduce(modes=2).simulate(0.1, 1e-3)
-    with pytest.raises(ValueError, match="moving pictures must be of straight beams"):
+    assert plot.animate(run, tmp_path / "run.gif", frames=3).stat().st_size > 1000
+    found = meshio.read(run.to_vtu(tmp_path / "run.vtu"))
+    tip = int(np.argmax(found.points[:, 2]))
+    assert found.point_data["displacement"][tip, 1] == pytest.approx(run.displacement("tip", "y")[-1], rel=1e-12)
+
+
+def test_what_cannot_be_drawn_says_so(tmp_path):
+    body = beam_structure(lines=(), nodes=None)
+    scene = fb.Scene(body, [fb.Fixed("root")], base={"y": fb.Harmonic(1e-3, 180.0)})
+    run = scene.reduce(modes=2).simulate(0.1, 1e-3)
+    with pytest.raises(ValueError, match="the body must know where its nodes are"):
         plot.animate(run, tmp_path / "run.gif")
-    with pytest.raises(ValueError, match="files for ParaView must be of straight beams"):
+    with pytest.raises(ValueError, match="bodies with lines"):
         run.to_xdmf(tmp_path / "run.xdmf")

@@ -26,10 +26,15 @@ COLUMNS = 3
 
 def in_space(shapes: PlacedShapes) -> bool:
     """Whether a body moves or extends along z; else it is drawn in its plane."""
+    return "z" in shapes.components or bool(np.ptp(_known(shapes)[:, 2]) > 0)
+
+
+def _known(shapes: PlacedShapes) -> Vector:
+    """Positions (k, 3) of the places whose position is known; ValueError if there are none."""
     known = shapes.positions[np.isfinite(shapes.positions).all(axis=1)]
     require(len(known) > 0, "the body must know where its nodes are", "none", "fembeam.plot",
             "give Structure(..., nodes=, lines=)")  # fmt: skip
-    return "z" in shapes.components or bool(np.ptp(known[:, 2]) > 0)
+    return known
 
 
 def displacements(shapes: PlacedShapes, q: Vector) -> Vector:
@@ -43,8 +48,7 @@ def displacements(shapes: PlacedShapes, q: Vector) -> Vector:
 
 def size_of(shapes: PlacedShapes) -> float:
     """Diagonal of the box around the body, m."""
-    known = shapes.positions[np.isfinite(shapes.positions).all(axis=1)]
-    return float(np.linalg.norm(np.ptp(known, axis=0))) or 1.0
+    return float(np.linalg.norm(np.ptp(_known(shapes), axis=0))) or 1.0
 
 
 def panels(shapes: PlacedShapes, count: int) -> tuple[Figure, list[Any]]:
@@ -122,16 +126,15 @@ class BodyStage:
 
     def __init__(self, run: Run, samples: NDArray[np.int64], pace: str) -> None:
         self.run, self.samples, self.pace, shapes = run, samples, pace, run.shapes
-        self.q = run._at_samples(run.q)[samples]
+        self.q, size = run._at_samples(run.q)[samples], size_of(shapes)
         largest = max(float(np.linalg.norm(displacements(shapes, q), axis=1).max()) for q in self.q)
-        self.factor = _round(SHOWN * size_of(shapes) / largest) if largest > 0 else 1.0
+        self.factor = _round(SHOWN * size / largest) if largest > 0 else 1.0
         self.figure, (self.axis,) = panels(shapes, 1)
         draw(self.axis, shapes, None, GREY, 0.8)
         finish(self.axis, shapes)
-        spare = SHOWN * size_of(shapes)
         for name in "xyz" if in_space(shapes) else "xy":
             low, high = getattr(self.axis, f"get_{name}lim")()
-            getattr(self.axis, f"set_{name}lim")(low - spare, high + spare)
+            getattr(self.axis, f"set_{name}lim")(low - SHOWN * size, high + SHOWN * size)
         self.curves: list[Any] = []
 
     def show(self, number: int) -> list[Any]:
