@@ -30,6 +30,13 @@ SHEETS = (
     "bouc_wen",
     "iwan",
     "masing",
+    "bilinear",
+    "duffing",
+    "spring_shock",
+    "ball_on_beam",
+    "rod_wall",
+    "den_hartog",
+    "stick_slip",
 )
 COMMAND = "python tests/verification"
 MADE = f"<!-- made by `{COMMAND} --write` from tests/verification -->\n"
