@@ -66,6 +66,7 @@ assert abs(product / np.exp(-2 * np.sum(model.zeta * model.omega) * 2 * np.pi / 
 noisy = forked(fb.BandNoise(0.3, (100.0, 400.0), seed=1)).reduce(modes=2).simulate(duration=40.0, dt=1e-3)
 opening = noisy.displacement("left tip", "y") - noisy.displacement("right tip", "y")
 estimate = fb.moments(opening[2000:])
+assert estimate.skewness < -0.3, "a stop on one side leaves a longer tail on the other"
 
 if __name__ == "__main__":
     print("\n".join(checks), run, counts, orbit, sep="\n\n")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -91,13 +92,14 @@ def tuples(value: Any) -> Any:
     return tuple(tuples(one) for one in value) if isinstance(value, list) else value
 
 
+def _motion_at(body: BodyMatrices, vectors: Vector, place: Any) -> Vector:
+    """All components (c, n) of any place of a body."""
+    body.beam.check_place(place, "phi")
+    return np.asarray(body.rows_at(place) @ vectors)
+
+
 def placed_shapes(body: BodyMatrices, vectors: Vector, loaded: Sequence[LocalCoordinate]) -> PlacedShapes:
     """The shapes of a body from its part of the basis, (N, n)."""
-
-    def more(place: Any) -> Vector:
-        body.beam.check_place(place, "phi")
-        return np.asarray(body.rows_at(place) @ vectors)
-
     extra = [at.z for at in loaded] + [at.to[1] for at in loaded if at.to is not None and at.to[0] == 0]
     joined = list(getattr(body.beam, "edges", ()))
     drawn = [place for pair in joined for place in pair]
@@ -115,7 +117,7 @@ def placed_shapes(body: BodyMatrices, vectors: Vector, loaded: Sequence[LocalCoo
         _usual(body, loaded),
         positions,
         np.array(edges, dtype=int).reshape(-1, 2),
-        more,
+        partial(_motion_at, body, vectors),
     )
     moving = {name: at for name, at in made.usual.items() if np.any(made(at))}
     return replace(made, usual=dict(list((moving or made.usual).items())[:USUAL]))
