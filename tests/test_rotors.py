@@ -254,3 +254,8 @@ def test_campbell_arguments_are_refused():
         rotor().campbell([100.0, 0.0])
     with pytest.raises(ValueError, match=r"modes must be a whole number above 0"):
         rotor().campbell([100.0], modes=0)
+
+
+def test_half_a_pair_is_told():
+    with pytest.warns(UserWarning, match=r"3 modes cut a pair of one frequency, 1976.34 rad/s, .* ask for one more"):
+        rotor().reduce(3)
