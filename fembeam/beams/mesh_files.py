@@ -131,7 +131,7 @@ def _along(points: Vector, lines: NDArray[np.int64], where: str) -> Vector:
     off = np.linalg.norm(points - first - z[:, None] * axis, axis=1)
     bent = np.unique(lines)[off[np.unique(lines)] > STRAIGHT * length]
     require(not bent.size, "the lines must lie on one straight axis", shown(points[bent[:1]]), where,
-            "a node is off it there; this library bends straight beams only")  # fmt: skip
+            "a node is off it there; bent ones are read by Frame.from_mesh")  # fmt: skip
     return z
 
 

@@ -17,8 +17,7 @@ import numpy as np
 import solvers
 from fembeam.cli.unit_checks import doubts
 from fembeam.model.mode_table import mode_rows, mode_table
-from fembeam.model.run import title
-from fembeam.scene import signals_of, unit_of
+from fembeam.scene import signals_of, title, unit_of
 
 if TYPE_CHECKING:
     from fembeam.model import Model

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -99,22 +99,26 @@ def placed_shapes(body: BodyMatrices, vectors: Vector, loaded: Sequence[LocalCoo
         return np.asarray(body.rows_at(place) @ vectors)
 
     extra = [at.z for at in loaded] + [at.to[1] for at in loaded if at.to is not None and at.to[0] == 0]
-    names = list(dict.fromkeys([*_places(body), *(tuple(z) if isinstance(z, list) else z for z in extra)]))
-    rows = body.assembled.rows
-    values = [np.asarray(rows(place) @ (body.spread @ vectors)) for place in names]
+    joined = list(getattr(body.beam, "edges", ()))
+    drawn = [place for pair in joined for place in pair]
+    names = list(dict.fromkeys([*_places(body), *(tuple(z) if isinstance(z, list) else z for z in extra), *drawn]))
+    number = {name: i for i, name in enumerate(names)}
+    values = np.asarray(body.assembled.rows_of(names) @ (body.spread @ vectors))
     shape = (len(names), len(body.beam.components), vectors.shape[1])
     at = [body.beam.position(place) for place in names]
     positions = np.array([3 * [np.nan] if x is None else x for x in at], dtype=float).reshape(-1, 3)
-    edges = [(names.index(a), names.index(b)) for a, b in getattr(body.beam, "edges", ())]
-    return PlacedShapes(
+    edges = [(number[a], number[b]) for a, b in joined]
+    made = PlacedShapes(
         tuple(body.beam.components),
         tuple(names),
-        np.array(values).reshape(shape),
+        values.reshape(shape),
         _usual(body, loaded),
         positions,
         np.array(edges, dtype=int).reshape(-1, 2),
         more,
     )
+    moving = {name: at for name, at in made.usual.items() if np.any(made(at))}
+    return replace(made, usual=dict(list((moving or made.usual).items())[:USUAL]))
 
 
 def _places(body: BodyMatrices) -> list[Any]:
@@ -132,4 +136,4 @@ def _usual(body: BodyMatrices, loaded: Sequence[LocalCoordinate]) -> dict[str, A
     ask = getattr(body.beam, "components_at", lambda place: body.beam.components)
     points = getattr(body.beam, "points", {}) or _places(body)[-1:]
     found += [(place, c) for place in points for c in ask(place) if c in COMPONENTS[:3]]
-    return {said(at): at for at in list(dict.fromkeys(found))[:USUAL]}
+    return {said(at): at for at in dict.fromkeys(found)}

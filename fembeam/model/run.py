@@ -14,14 +14,13 @@ from numpy.typing import ArrayLike, NDArray
 
 import solvers
 from fembeam.model.histories import Histories
-from fembeam.scene import ON, Source, said
+from fembeam.scene import ON, Source, title
 from fembeam.support import Part, Printed, is_finite
 from solvers.problem import Losses, counted
 
 if TYPE_CHECKING:
     from fembeam.model.model import Model
     from fembeam.response import Reactions, Readout
-    from fembeam.scene.contact_rows import ContactRow
     from fembeam.scene_file import SceneFile
 
 Vector = NDArray[np.float64]
@@ -245,12 +244,3 @@ class Run(Histories, Printed):
         from fembeam.model.run_file import save
 
         return save(self, Path(path))
-
-
-def title(row: ContactRow, number: int) -> str:
-    """What tables call a contact: its name, or where it acts by names; "" where its number will do."""
-    if row.name is not None:
-        return row.name
-    if row.direction is None:
-        return ""
-    return f"{'element' if row.always else 'stop'} {number} at {said((row.z, row.direction))}"

@@ -131,7 +131,9 @@ def frequency_response(found: FrequencyResponse, axes: Sequence[Axes] | None = N
 
     figure, (upper, lower) = sheet(2, 1, (7.0, 4.8), axes, sharex=True, height_ratios=(2, 1))
     amplitude, phase = (values.reshape(len(found.omega), -1).T for values in (found.amplitude, found.phase))
-    for size, angle, z in zip(amplitude, phase, np.atleast_1d(found.output), strict=True):
+    named = isinstance(found.output, (tuple, list))
+    places: Any = found.output if isinstance(found.output, list) else [found.output]
+    for size, angle, z in zip(amplitude, phase, places if named else np.atleast_1d(found.output), strict=True):
         upper.semilogy(found.omega, size, label=place_name(z) if isinstance(z, tuple) else f"z = {z:.4g} m")
         lower.plot(found.omega, np.degrees(angle))
     for natural in found.natural[found.natural < found.omega[-1]]:

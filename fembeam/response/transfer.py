@@ -44,7 +44,8 @@ class FrequencyResponse:
 
     def __repr__(self) -> str:
         span = f"{self.omega[0]:.4g} to {self.omega[-1]:.4g} rad/s"
-        return f"<frequency response at z = {self.output} m to {self.input}, {span}>"
+        at = self.output if isinstance(self.output, (tuple, list)) else f"z = {self.output} m"
+        return f"<frequency response at {at} to {self.input}, {span}>"
 
     @property
     def amplitude(self) -> Vector:

@@ -16,6 +16,7 @@ from scipy import sparse
 from fembeam.excitation import Harmonic
 from fembeam.scene.element import force_both_ways
 from fembeam.scene.local_coordinate import LocalCoordinate
+from fembeam.scene.places import said
 
 if TYPE_CHECKING:
     from fembeam.scene.assembly import Matrices
@@ -150,3 +151,12 @@ def heights(scene: Scene) -> tuple[list[float], list[float]]:
         for impactor in part.impactors
     ]
     return beams, on_impactors
+
+
+def title(row: ContactRow, number: int) -> str:
+    """What tables call a contact: its name, or where it acts by names; "" where its number will do."""
+    if row.name is not None:
+        return row.name
+    if row.direction is None:
+        return ""
+    return f"{'element' if row.always else 'stop'} {number} at {said((row.z, row.direction))}"

@@ -26,6 +26,8 @@ Site = str | tuple[int, float]  # a node, or the number of a member and the dist
 
 PLANE = ("x", "y", "rz")
 BENDING = ("x", "y", "rx", "ry")
+DRAWN = 12  # straight pieces of a member in figures
+MOST_DRAWN = 600  # of all members, but two each
 
 
 @dataclass(frozen=True)
@@ -189,6 +191,14 @@ class Frame:
         off += [np.linalg.norm(np.cross(start - points[0], axis)) for start in self.starts]
         return axis if max(off) <= SAME_PLACE * self.size else None
 
+    @property
+    def edges(self) -> list[tuple[Any, Any]]:
+        """Pairs of places along the members, which figures join: enough of them for a smooth curve."""
+        steps = max(MOST_DRAWN // len(self.members), 2) if len(self.members) > MOST_DRAWN // DRAWN else DRAWN
+        pairs = zip(self.members, self.lengths, strict=True)
+        chains = [[(one.name, float(s)) for s in np.linspace(0.0, length, steps + 1)] for one, length in pairs]
+        return [pair for chain in chains for pair in pairwise(chain)]
+
     def places(self) -> list[Any]:
         """Names of the nodes."""
         return list(self.nodes)
@@ -272,7 +282,7 @@ class Frame:
         modes : how many frequencies that shall hold for, whatever holds the frame at `places`; None: 10.
         places : that shall be nodes, those of supports first. One closer than 1e-4 of a member's length to another is
             interpolated inside its element instead, for rounding.
-        omega : rad/s: the highest frequency kept, where it is known, instead of `modes`.
+        omega : rad/s: the highest frequency kept, where it is known: fewer elements than whatever may hold it needs.
 
         Returns
         -------
@@ -285,6 +295,12 @@ class Frame:
         from fembeam.structures.frame_mesh import assemble
 
         return assemble(self, elements, modes, places, omega)
+
+    def coarse(self, modes: int, places: Sequence[Any] = ()) -> FrameMatrices:
+        """The same on few elements, to find out with supports which `omega` the mesh has to resolve."""
+        from fembeam.structures.frame_mesh import coarse
+
+        return coarse(self, modes, places)
 
 
 def _require_name(what: str, name: str, names: list[str], where: str, advice: str) -> None:

@@ -90,6 +90,11 @@ class FrameForces:
         curved = np.linalg.solve([[own.I, own.I12], [own.I12, own.I2]], np.array([M, M2]))
         return np.asarray(N / own.A - y * curved[0] - x * curved[1])
 
+    def preload(self, place: Any, quantity: str) -> float:
+        """What the given axial force of the member adds to "N" or to "stress", nothing to others."""
+        member = self.mesh.frame.members[self._on_member(place)[0]]
+        return float(member.axial_force * {"N": 1.0, "stress": 1 / member.section.A}.get(quantity, 0.0))
+
     def _on_member(self, place: Any) -> tuple[int, float]:
         """The member and the distance; a node with one member is the end of that."""
         frame = self.mesh.frame

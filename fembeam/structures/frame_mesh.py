@@ -110,6 +110,11 @@ class FrameMesh:
             return sparse.csr_matrix((np.ones(count), (np.arange(count), columns)), shape=(count, len(self.labels)))
         return self.along(site[0], np.array([site[1]]))
 
+    def sections(self) -> list[tuple[str, float]]:
+        """All mesh nodes as (member, distance), member by member."""
+        pairs = zip(self.frame.members, self.borders, strict=True)
+        return [(one.name, float(s)) for one, borders in pairs for s in borders]
+
     def along(self, member: int, s: Vector) -> sparse.csr_matrix:
         """The same (c k, N) at distances s (k,) along a member, all components of one place after another."""
         element, x, node = self.located(member, s)
@@ -150,6 +155,20 @@ class FrameMatrices(Assembled):
 
     mesh: FrameMesh
 
+    def rows_of(self, places: Sequence[Any]) -> sparse.csr_matrix:
+        """`rows` of several places, one below the other, each member at once."""
+        sites = [self.mesh.frame.site(place, "rows") for place in places]
+        count = len(self.mesh.frame.components)
+        pieces, order = [sparse.csr_matrix((0, len(self.labels)))], []
+        for member in {site[0] for site in sites if not isinstance(site, str)}:
+            mine = [(i, site[1]) for i, site in enumerate(sites) if not isinstance(site, str) and site[0] == member]
+            pieces.append(self.mesh.along(member, np.array([s for _, s in mine])))
+            order += [i for i, _ in mine]
+        nodes = [i for i, site in enumerate(sites) if isinstance(site, str)]
+        pieces += [self.rows(places[i]) for i in nodes]
+        back = np.argsort(np.array(order + nodes, dtype=int))
+        return sparse.vstack(pieces, format="csr")[(count * back[:, None] + np.arange(count)).ravel()]
+
     def section_forces(self, vectors: Vector, inertia: Vector) -> FrameForces:
         """Section forces of displacements (N, n) and of the inertia (N, n) that their stiffness balances."""
         return frame_forces(self, vectors, inertia)
@@ -166,8 +185,12 @@ def assemble(
     if elements is not None:
         return _on(frame, _spread(frame, stops, elements), "elements as asked")
     count = DEFAULT_MODES if modes is None else int(modes)
-    highest = _highest(frame, stops, places, count) if omega is None else float(omega)
-    kept = f"the lowest {count} frequencies" if omega is None else f"frequencies to {highest:.6g} rad/s"
+    highest = _highest(frame, places, count) if omega is None else float(omega)
+    kept = (
+        f"frequencies to {highest:.6g} rad/s"
+        if modes is None and omega is not None
+        else f"the lowest {count} frequencies"
+    )
     return _on(frame, _resolving(frame, stops, highest), f"{kept} are right to {FREQUENCY_TOLERANCE:g} relative")
 
 
@@ -233,10 +256,16 @@ def _divided(stops: list[Vector], counts: NDArray[np.int64]) -> list[Vector]:
     return [divided(s, mine) for s, mine in zip(stops, np.split(counts, bounds), strict=True)]
 
 
-def _highest(frame: Frame, stops: list[Vector], places: Sequence[Any], modes: int) -> float:
-    """A bound on frequency number `modes`, whatever holds the frame at the places: that with all of them clamped."""
+def coarse(frame: Frame, modes: int, places: Sequence[Any]) -> FrameMatrices:
+    """Matrices good enough to know about which frequency number `modes` has, from above."""
+    stops = _stops(frame, places)
     intervals = sum(len(s) - 1 for s in stops)
-    mesh = _on(frame, _spread(frame, stops, min(2 * modes + 4 + 2 * intervals, MOST_ELEMENTS)), "")
+    return _on(frame, _spread(frame, stops, min(2 * modes + 4 + 2 * intervals, MOST_ELEMENTS)), "a first estimate")
+
+
+def _highest(frame: Frame, places: Sequence[Any], modes: int) -> float:
+    """A bound on frequency number `modes`, whatever holds the frame at the places: that with all of them clamped."""
+    mesh = coarse(frame, modes, places)
     held = sparse.vstack([sparse.csr_matrix((0, len(mesh.labels))), *(mesh.rows(place) for place in places)]).tocsc()
     free = np.flatnonzero(np.diff(held.indptr) == 0)
     root = None if mesh.root is None else mesh.root[:, free]
