@@ -440,6 +440,18 @@ def test_structure_from_op4_and_a_bulk_file(tmp_path):
         Structure.read(path, path, nodes={10: (0, 0, 0)})
 
 
+def test_units_that_look_wrong_are_told(tmp_path):
+    """A steel rod of 1 m: 7.85e-3 t over 1000 mm, read as kg and m, and with its scale."""
+    lumped, labels = np.diag([3.925e-3] * 2), [(1, "x"), (2, "x")]
+    np.savez(tmp_path / "rod.npz", K=2.1e4 * np.array([[1.0, -1.0], [-1.0, 1.0]]), M=lumped, labels=labels)
+    read = tmp_path / "rod.npz", tmp_path / "rod.npz"
+    nodes = {1: (0.0, 0.0, 0.0), 2: (1000.5, 0.0, 0.0)}
+    wrong, right = (Structure.read(*read, nodes=nodes, scale=scale).check() for scale in (None, Scale("mm", "t", "s")))
+    assert any("the nodes span 1000.5 m: is it in other units? give scale=" in one for one in wrong)
+    assert any("a mass of 0.00785 kg over 1000.5 m: is it in other units?" in one for one in wrong)
+    assert not any("units" in one for one in right)
+
+
 def test_mass_follows_the_order_of_the_stiffness(tmp_path):
     """A mass of other order without the massless dof; a foreign one is refused."""
     massless = M.copy()

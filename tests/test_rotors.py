@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import brentq
 
 import fembeam as fb
-from contacts import Hertz
+from contacts import Hertz, KelvinVoigt
 from fembeam import plot
 
 SECTION = fb.Section.circle(2.1e11, 7850.0, 0.04)
@@ -180,6 +180,40 @@ def test_a_stop_on_the_housing_is_met_as_by_another_method():
     assert np.abs(run.energy.residual).max() < 1e-7 * np.abs(run.energy.input).max()
 
 
+HOUSING = fb.Stop("B", KelvinVoigt(2e6, 300.0), gap=1e-4, direction="x", name="housing")
+
+
+def test_a_model_at_another_spin_is_that_of_its_scene():
+    """Nothing but G and the unbalance changes: the modes at standstill are kept."""
+    scene = rotor(200.0, forces=[fb.Unbalance("B", 1e-4)], stops=[HOUSING])
+    other = replace(scene, beam=replace(scene.beam, spin=-260.0))
+    kept, fresh = scene.reduce(4).again(other), other.reduce(4)
+    np.testing.assert_array_equal(kept.basis.vectors, scene.reduce(4).basis.vectors)
+    np.testing.assert_allclose(np.sqrt(kept.system.blocks.k), np.sqrt(fresh.system.blocks.k), rtol=1e-9)
+    assert kept.scene.beam.spin == kept.matrices.beam.spin == -260.0
+    ends = [model.simulate(0.02, 1e-3).displacement("B", "y") for model in (kept, fresh)]
+    np.testing.assert_allclose(*ends, atol=1e-9 * np.abs(ends[0]).max())
+    stiffer = replace(other, springs=[fb.Spring("B", 1e5, direction="x")])
+    assert scene.reduce(4).again(stiffer).omega[1] > 1.001 * kept.omega[1]
+
+
+def test_a_branch_over_the_spin_finds_where_the_stop_is_met():
+    """It begins where the whirl without contact, known in closed form, has the amplitude of the gap."""
+    scene = rotor(213.5, forces=[fb.Unbalance("B", 1e-4)], stops=[HOUSING], damping=fb.ModalDamping(0.02))
+    model = scene.reduce(2)
+
+    def amplitude(spin):
+        system = model.again(replace(scene, beam=replace(scene.beam, spin=spin))).system
+        pushed = sum(np.asarray(vector) * signal.tones()[1][0] for vector, signal in system.loads)
+        resisting = np.diag(np.diag(system.K) - spin**2) + 1j * spin * system.by_rate
+        return abs(model.phi(("B", "x")) @ np.linalg.solve(resisting, pushed))
+
+    met = brentq(lambda spin: amplitude(spin) - HOUSING.gap, 210.0, 220.0)
+    branch = model.branch("beam.spin", (213.5, 216.0), at=213.5, step=0.2).run()
+    grazings = [one.parameter for one in branch.found.special if one.mark == "grazing"]
+    assert grazings[0] == pytest.approx(met, rel=1e-7)
+
+
 def test_frequency_response_of_a_rotor_is_that_of_its_matrices():
     model = rotor(300.0, damping=fb.ModalDamping(0.01)).reduce(4)
     omega = np.array([100.0, 208.8, 223.9])
@@ -220,3 +254,8 @@ def test_campbell_arguments_are_refused():
         rotor().campbell([100.0, 0.0])
     with pytest.raises(ValueError, match=r"modes must be a whole number above 0"):
         rotor().campbell([100.0], modes=0)
+
+
+def test_half_a_pair_is_told():
+    with pytest.warns(UserWarning, match=r"3 modes cut a pair of one frequency, 1976.34 rad/s, .* ask for one more"):
+        rotor().reduce(3)

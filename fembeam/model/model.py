@@ -20,7 +20,7 @@ import solvers
 from fembeam.model import initial_states
 from fembeam.model.equations import ModalEquations
 from fembeam.model.shapes import Vector
-from fembeam.scene import for_duration, with_signals, with_value
+from fembeam.scene import for_duration, respun, with_signals, with_value
 from fembeam.support import Part, Printed, bar, note, require, require_no_text, require_positive
 from solvers.problem import counted
 
@@ -76,7 +76,8 @@ class Model(Printed, ModalEquations):
 
     def again(self, scene: Scene) -> Model:
         """Another scene reduced in the same way: the same mode numbers, mesh size and kind of static shapes."""
-        return scene.reduce(**self.reduction_options)
+        spun = respun(self.matrices, self.scene, scene)
+        return replace(self, scene=scene, matrices=spun) if spun else scene.reduce(**self.reduction_options)
 
     def strike(self, speed: float, stop: int = 0) -> solvers.ContactLog:
         """Contacts with one stop when the model swings into it in its first mode, nothing else acting.

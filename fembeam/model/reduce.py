@@ -24,6 +24,7 @@ COARSE = 0.01  # estimated relative error of the highest kept frequency, above w
 FINE = 1e-6  # estimated rounding of the lowest frequency, likewise
 FIRST_TRY = 8  # modes, doubled until a frequency or share of mass is reached
 MOST_DOFS = 20_000  # of the finest mesh
+PAIR = 1e-6  # relative distance of two frequencies that are one
 MOST_TRIED = 128  # modes; a few seconds
 
 
@@ -60,6 +61,7 @@ def reduced(
     ]
     basis = _joined(bases, matrices)
     _warn_of_drift(scene, matrices, bases)
+    _warn_of_cut_pairs(matrices, chosen)
     own, *others = _shapes_of_each(scene, matrices, basis)
     modes_of_all = sum(numbers, ()) + (0,) * len(matrices.impactors)
     return Model(scene, matrices, basis, modes_of_all, own, counts, tuple(others), options)
@@ -133,6 +135,18 @@ def _warn_of_drift(scene: Scene, matrices: Matrices, bases: list[reduction.Basis
             where = f"bodies[{number - 1}] of Scene" if number else "Scene"
             what = "1 rigid-body mode appears" if count == 1 else f"{count} rigid-body modes appear"
             said = f"{what} in {where}: supports and springs do not hold the structure, its loads may carry it away"
+            warnings.warn(said, UserWarning, stacklevel=4)
+
+
+def _warn_of_cut_pairs(matrices: Matrices, chosen: list[tuple[int, ...]]) -> None:
+    """Warn when of two modes of a rotor with one frequency, in planes across each other, one is kept."""
+    for beam, own in zip(matrices.beams, chosen, strict=True):
+        if beam.gyroscopic is None or not own or own[-1] + 2 > beam.M.shape[0]:
+            continue
+        last, after = reduction.modal_basis(beam.M, beam.K, own[-1] + 2, root=beam.root).omega[-2:]
+        if after - last < PAIR * after:
+            whirl = f"{last:.6g} rad/s, which whirl together"
+            said = f"{len(own)} modes cut a pair of one frequency, {whirl}; ask for one more"
             warnings.warn(said, UserWarning, stacklevel=4)
 
 

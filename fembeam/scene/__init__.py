@@ -5,7 +5,7 @@ Imports: `beams`, `structures`, `excitation`, `support`, `reduction`; inside the
 """
 
 from fembeam.scene.assembly import MOST_DENSE, Matrices, unsupported
-from fembeam.scene.body_assembly import BodyMatrices
+from fembeam.scene.body_assembly import BodyMatrices, respun
 from fembeam.scene.contact_rows import ON, contact_rows, heights, loaded, loads, static_rows, title, watched, weight
 from fembeam.scene.element import Element, tangent
 from fembeam.scene.impactor import Impactor

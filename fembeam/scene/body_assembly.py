@@ -7,7 +7,7 @@ u_all = S u: zero where supports hold, static (Guyan) where there is no mass.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -75,6 +75,21 @@ class BodyMatrices(Matrices):
         """What the body says of its matrices, and what became of them."""
         static = f", {len(self.massless)} of them without mass follow statically" if self.massless else ""
         return f"{self.assembled.accuracy}{static}; {self.M.shape[0]} free"
+
+
+def respun(matrices: Matrices, before: Scene, after: Scene) -> BodyMatrices | None:
+    """The matrices of a scene that differs in the spin of its shaft alone, where only G does; None of any other."""
+    spins = [getattr(scene.beam, "spin", 0.0) for scene in (before, after)]
+    if not isinstance(matrices, BodyMatrices) or matrices.bodies or 0.0 in spins:
+        return None
+    if replace(after, beam=replace(after.beam, spin=spins[0])) != before:
+        return None
+    own, both = matrices.assembled.gyroscopic, matrices.gyroscopic
+    if own is None or both is None:
+        return None
+    ratio = spins[1] / spins[0]
+    body = replace(matrices.assembled, gyroscopic=ratio * own)
+    return replace(matrices, beam=after.beam, assembled=body, gyroscopic=ratio * both)
 
 
 def row_of(body: Any, assembled: Assembled, place: Any, along: Six) -> sparse.csr_matrix:

@@ -24,6 +24,8 @@ SYMMETRIC = 1e-8  # of the largest entry: files with nine digits pass
 NEGATIVE = -1e-9  # pivot of M over its diagonal, below which M is indefinite
 STIFF = 1e-6  # of |K| |r|: below it K r = 0, a rigid motion meets no resistance
 FEW = 6  # frequencies shown
+LARGE = 1000.0  # m: a longer structure looks like one in millimetres
+THIN, DENSE = 1e-5, 1e5  # kg/m³ of mass over the cube of the size: outside, units are mixed
 ENTRIES = 8  # names shown of a long list
 
 
@@ -135,6 +137,7 @@ def sentences(structure: Structure) -> Iterator[str]:
         yield f"{len(structure.massless)} dofs have no mass and follow the others statically (Guyan): {some}{more}"
     yield from _rigid(structure)
     yield from _mass(structure)
+    yield from _units(structure)
     yield from _frequencies(structure)
 
 
@@ -180,6 +183,19 @@ def _mass(structure: Structure) -> Iterator[str]:
         yield f"rᵀMr: {', '.join(f'{mass:.6g} kg along {c}' for c, mass in moved.items())}"
     if moved and max(moved.values()) > 1.001 * min(moved.values()):
         yield "the mass is not the same along all axes: dofs are missing, or in another order than the labels"
+
+
+def _units(structure: Structure) -> Iterator[str]:
+    """Size and mass that no structure has in metres and kilograms."""
+    motions = rigid_motions(structure)
+    mass = max((float(motions[c] @ structure.M @ motions[c]) for c in COMPONENTS[:3] if c in motions), default=0.0)
+    places = np.array(list(structure.nodes.values())).reshape(-1, 3)
+    size = float(np.linalg.norm(np.ptp(places, axis=0))) if len(places) else 0.0
+    advice = "is it in other units? give scale=Scale('mm', 't', 's') or what they are"
+    if size > LARGE:
+        yield f"the nodes span {size:.6g} m: {advice}"
+    if mass > 0.0 and size > 0.0 and not THIN <= mass / size**3 <= DENSE:
+        yield f"a mass of {mass:.6g} kg over {size:.6g} m: {advice}"
 
 
 def _frequencies(structure: Structure) -> Iterator[str]:
