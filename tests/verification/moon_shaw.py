@@ -1,16 +1,17 @@
 """A beam against a stop on one side: period doubling and chaos
 
-Moon and Shaw shook a cantilever whose tip was held beyond a fixed displacement, so that its stiffness had two slopes, and
-saw subharmonics, then chaos with power near the subharmonic frequencies; a model of one mode did the same. In part only:
-their parameters are not used here, and their figures are compared in kind. One mode, in units of its mass and frequency,
+Moon and Shaw shook a cantilever whose tip was held beyond a fixed displacement, so that its stiffness had two slopes,
+and saw subharmonics, then chaos with power near the subharmonic frequencies; a model of one mode did the same. In
+part only: their parameters are not used here, and their figures are compared in kind. One mode, in units of its mass
+and frequency,
 
     q'' + 2ζ q' + q = cos Ωt + k max(-q - g, 0)
 
-Each piece is solved in closed form, and the derivative of a run is the product of the pieces' matrix exponentials. From these
-the sheet finds where the harmonic motion doubles its period (multiplier -1; k = 4, g = 0, ζ = 0.05), where it decays to a
-stable subharmonic (exponent -ζ), and the exponent of a chaotic one (k = 18.2, as between a free and a pinned tip: g = -0.3,
-ζ = 0.03). fembeam follows a branch of orbits, and the growth of the tangent of a run. Of a chaotic motion two runs share the
-mean only: four standard errors of the shorter one, 40 %, are allowed.
+Each piece is solved in closed form, and the derivative of a run is the product of the pieces' matrix exponentials.
+From these the sheet finds where the harmonic motion doubles its period (multiplier -1; k = 4, g = 0, ζ = 0.05), where
+it decays to a stable subharmonic (exponent -ζ), and the exponent of a chaotic one (k = 18.2, as between a free and a
+pinned tip: g = -0.3, ζ = 0.03). fembeam follows a branch of orbits, and the growth of the tangent of a run. Of a
+chaotic motion two runs share the mean only: four standard errors of the shorter one, 40 %, are allowed.
 """
 
 import math
@@ -25,8 +26,8 @@ from sheets import Row
 import solvers
 
 SOURCE = (
-    "F.C. Moon, S.W. Shaw, *Chaotic vibrations of a beam with non-linear boundary conditions*, Int. J. Non-Linear Mech. 18 "
-    "(1983) 465; S.W. Shaw, P.J. Holmes, *J. Sound Vib.* 90 (1983) 129"
+    "F.C. Moon, S.W. Shaw, *Chaotic vibrations of a beam with non-linear boundary conditions*, Int. J. Non-Linear "
+    "Mech. 18 (1983) 465; S.W. Shaw, P.J. Holmes, *J. Sound Vib.* 90 (1983) 129"
 )
 DOUBLING = Bilinear(1.1, zeta=0.05)
 CHAOTIC, REGULAR = (Bilinear(omega, stiffness=18.2, zeta=0.03, gap=-0.3) for omega in (1.05, 1.1))

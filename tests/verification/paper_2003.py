@@ -1,27 +1,31 @@
 """A beam-impact system under noise, the paper of 2003
 
-A cantilever of 259.9 mm with a mass of 25.4 g (half-sphere and accelerometer) near its end hits a half-sphere; the base moves.
-E = 190 GPa, ρ = 8000 kg/m³, A = 58.3 mm², I = 18.5 mm⁴, K = 2.1e8 N/m^1.5, e = 0.5, the mass at 244.45 mm, with a rotary
-inertia of 3e-6 kg m² (ours: the paper gives none). The table compares eigenfrequencies with the paper's model of four
-degrees of freedom and with exact transfer matrices of the beam; its measured ones are 101.5 and 781.6 rad/s.
+A cantilever of 259.9 mm with a mass of 25.4 g (half-sphere and accelerometer) near its end hits a half-sphere; the
+base moves. E = 190 GPa, ρ = 8000 kg/m³, A = 58.3 mm², I = 18.5 mm⁴, K = 2.1e8 N/m^1.5, e = 0.5, the mass at 244.45
+mm, with a rotary inertia of 3e-6 kg m² (ours: the paper gives none). The table compares eigenfrequencies with the
+paper's model of four degrees of freedom and with exact transfer matrices of the beam; its measured ones are 101.5 and
+781.6 rad/s.
 
 The figures are compared by scripts of the course, every statement with 99.99 % confidence where it is random. Damping
 ratios and noise levels are our choices, as the text gives neither.
 
-| figures | statement | holds | shown by |
-| --- | --- | --- | --- |
-| 2 | two modes below 1000 rad/s | yes | table below |
-| 3 | force over indentation of measured collisions | the law, not the measurement | [contact_laws.py](../../examples/contact_laws.py) |
-| 4 | harmonic, 1/2 and 1/3 resonances, each higher than the one before; the first two have dents | yes | [paper_periodic.py](../../examples/paper_periodic.py) |
-| 5 | no dents with one mode | yes | [paper_periodic.py](../../examples/paper_periodic.py) |
-| 6, 7 | peaks near 195, 390 and 780 rad/s, much power below 50 rad/s | yes | [paper_random.py](../../examples/paper_random.py) |
-| 8 | mid-beam: the second mode and multiples of 195 rad/s | yes | [paper_random.py](../../examples/paper_random.py) |
-| 9, 10 | δ is far from Gaussian, mid-beam near to it | in part: in skewness, not in kurtosis | [paper_random.py](../../examples/paper_random.py) |
-| 11 to 13 | narrow bands: stochastic 1/2 and 1/3 subharmonics, with rising power | yes | [paper_random.py](../../examples/paper_random.py) |
-| 14, 15 | the experiment | not compared | |
-| 16, 17 | a rolled-off band gives the same peaks | yes, of the model; the measured curve is not compared | [paper_random.py](../../examples/paper_random.py) |
-| 18 to 22 | a second mode changes low frequencies too; 1/2 subharmonic as strong as the harmonic at less input | yes, likewise | [paper_random.py](../../examples/paper_random.py) |
-| | a third mode changes little | in part: it takes 17.5 % of the variance | [paper_random.py](../../examples/paper_random.py) |
+| figure | statement | holds |
+| --- | --- | --- |
+| 2 | two modes below 1000 rad/s | yes |
+| 3 | force over indentation of measured collisions | the law; the measurement is not compared |
+| 4 | harmonic, 1/2 and 1/3 resonances, each higher than the one before; dents in the first two | yes |
+| 5 | no dents with one mode | yes |
+| 6, 7 | peaks near 195, 390 and 780 rad/s, much power below 50 rad/s | yes |
+| 8 | mid-beam: the second mode, multiples of 195 rad/s | yes |
+| 9, 10 | δ is far from Gaussian, mid-beam near to it | in part: in skewness, not in kurtosis |
+| 11 to 13 | narrow bands: stochastic 1/2 and 1/3 subharmonics of rising power | yes |
+| 14, 15 | the experiment | not compared |
+| 16, 17 | a band that rolls off gives the same peaks | yes, of the model; measured curves are not compared |
+| 18 to 22 | a second mode changes low frequencies too; the 1/2 subharmonic needs less input | yes, likewise |
+| text | a third mode changes little | in part: it takes 17.5 % of the variance |
+
+Figures 4 and 5 are those of [paper_periodic.py](../../examples/paper_periodic.py), 6 to 22 those of
+[paper_random.py](../../examples/paper_random.py), the law that of [contact_laws.py](../../examples/contact_laws.py).
 
 The numbers stand in [The paper's beam](../explanation/paper_beam.md).
 """
@@ -35,8 +39,8 @@ from sheets import Row
 import fembeam as fb
 
 SOURCE = (
-    "N. van de Wouw, A. de Kraker, D.H. van Campen et al., *Non-linear dynamics of a stochastically excited beam system with "
-    "impact*, Int. J. Non-Linear Mech. 38 (2003) 767, table 1; \"approximately 2300 rad/s\" in section 8"
+    "N. van de Wouw, A. de Kraker, D.H. van Campen et al., *Non-linear dynamics of a stochastically excited beam "
+    'system with impact*, Int. J. Non-Linear Mech. 38 (2003) 767, table 1; "approximately 2300 rad/s" in section 8'
 )
 LENGTH, TIP, MASS, INERTIA = 0.2599, 0.24445, 25.4e-3, 3.0e-6
 STEEL = fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)

@@ -101,7 +101,8 @@ def cells(row, printed):
     """Text of one line of a table."""
     claimed = [row.printed] * printed
     off = [size(abs(float(row.printed) / row.formula - 1.0)) if row.printed else ""] * printed
-    return [row.quantity, *claimed, f"{row.formula:.8g}", f"{row.ours:.8g}", *off, size(row.error), f"{row.allowed:.0e}"]
+    values = [f"{row.formula:.8g}", f"{row.ours:.8g}"]
+    return [row.quantity, *claimed, *values, *off, size(row.error), f"{row.allowed:.0e}"]
 
 
 def table(name):

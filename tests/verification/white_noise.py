@@ -4,9 +4,10 @@ One mode ω of a cantilever, damping ratio ζ, under a random force at its tip o
 
     E[q²] = π φ² S/4ζω³,    E[q'²] = π φ² S/4ζω
 
-and the second holds with any spring or elastic stop beside it (equipartition, from the Fokker–Planck equation). fembeam's
-noise ends at 20 ω: what is missing above, φ² S/20ω of E[q'²], is left out in the formula. Without a stop one period of the
-noise gives the variance of every seed; with a Hertzian stop it is estimated from a run, and 4 standard errors are allowed.
+and the second holds with any spring or elastic stop beside it (equipartition, from the Fokker–Planck equation).
+fembeam's noise ends at 20 ω: what is missing above, φ² S/20ω of E[q'²], is left out in the formula. Without a stop
+one period of the noise gives the variance of every seed; with a Hertzian stop it is estimated from a run, and 4
+standard errors are allowed.
 """
 
 import math
@@ -20,9 +21,9 @@ import fembeam as fb
 from contacts import Hertz
 
 SOURCE = (
-    "S.H. Crandall, W.D. Mark, *Random Vibration in Mechanical Systems*, Academic Press 1963; T.K. Caughey, *Derivation and "
-    "application of the Fokker–Planck equation to discrete nonlinear dynamic systems subjected to white random "
-    "excitation*, J. Acoust. Soc. Am. 35 (1963) 1683"
+    "S.H. Crandall, W.D. Mark, *Random Vibration in Mechanical Systems*, Academic Press 1963; T.K. Caughey, "
+    "*Derivation and application of the Fokker–Planck equation to discrete nonlinear dynamic systems subjected to "
+    "white random excitation*, J. Acoust. Soc. Am. 35 (1963) 1683"
 )
 TIP, ZETA, STD, BAND, LINES = 0.26, 0.05, 0.5, 20.0, 2000
 STEEL = fb.Section.rectangle(E=2.1e11, rho=7850.0, width=0.02, height=0.003)
