@@ -4,6 +4,9 @@ python tests/verification [SHEET …] [--write]        all sheets, or those name
 """
 
 import sys
+from pathlib import Path
+
+sys.path.append(str(Path(__file__).parent.parent))  # for `oscillators`
 
 from sheets import PAGES, SHEETS, figure, index, page, table, title
 

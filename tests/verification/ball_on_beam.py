@@ -1,12 +1,12 @@
 """A steel ball falls on a steel beam
 
-A ball of 1 cm radius hits the middle of a bar of 1 cm × 1 cm at 1 cm/s. Timoshenko joined Hertz's law to the motion of the
-beam in an integral equation; until waves come back from the supports, the beam is as good as infinite:
+A ball of 1 cm radius hits the middle of a bar of 1 cm × 1 cm at 1 cm/s. Timoshenko joined Hertz's law to the motion
+of the beam in an integral equation; until waves come back from the supports, the beam is as good as infinite:
 
     δ = v t - 1/m ∫₀ᵗ (t - τ) F dτ - 1/(ρA √(2πa)) ∫₀ᵗ √(t - τ) F dτ,    F = K δ^1.5,  a = √(EI/ρA)
 
-The sheet solves it by the trapezoidal rule with 4000 steps; fembeam takes 45 modes of a beam of 60 cm. The numbers are those
-of [ball_on_beam.py](../../examples/ball_on_beam.py) of the course.
+The sheet solves it by the trapezoidal rule with 4000 steps; fembeam takes 45 modes of a beam of 60 cm. The numbers
+are those of [ball_on_beam.py](../../examples/ball_on_beam.py) of the course.
 """
 
 import sketch

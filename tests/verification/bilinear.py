@@ -1,7 +1,7 @@
 """A beam that just touches a stop: the bilinear oscillator
 
-One mode of a cantilever and a linear stop k under its tip, without a gap. Free vibration spends half a period without the
-stop and half with it,
+One mode of a cantilever and a linear stop k under its tip, without a gap. Free vibration spends half a period without
+the stop and half with it,
 
     ω = 2 ω₁ω₂/(ω₁ + ω₂),    ω₂ = √(ω₁² + φ² k)
 
@@ -28,7 +28,7 @@ def draw(rig, plot):
     sketch.view(rig, -0.3, 2.6, -0.75, 0.5)
     results = example("bilinear")["results"]
     free = next(iter(results.values()))[2]
-    ratios = np.geomspace(0.1, 1e3, 200)  # φ² k over ω₁²
+    ratios = np.geomspace(0.03, 1e3, 200)  # φ² k over ω₁²
     stiff = np.sqrt(1.0 + ratios)
     plot.semilogx(ratios, 2.0 * stiff / (1.0 + stiff), color="0.6", lw=3.0, label="formula")
     for ours, formula, _ in results.values():

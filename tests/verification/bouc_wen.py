@@ -2,14 +2,14 @@
 
     F = α k δ + (1 - α) k z,    z' = A δ' - β |δ'| z - γ δ' |z|        (n = 1)
 
-While δ rises, dz/dδ = A - s z for z > 0, with s = β + γ, and A + d z for z < 0, with d = γ - β. So the branch from -z_m
-to z_m is a pair of exponentials that meet at z = 0:
+While δ rises, dz/dδ = A - s z for z > 0, with s = β + γ, and A + d z for z < 0, with d = γ - β. So the branch from
+-z_m to z_m is a pair of exponentials that meet at z = 0:
 
     z < 0:  z = -A/d + (A/d - z_m) e^(d (δ + X)),     z > 0:  z = A/s (1 - e^(-s (δ - δ₀)))
 
-Both give z_m by 2X = ln[(A/d)/(A/d - z_m)]/d - ln(1 - s z_m/A)/s. The loss per cycle is the area 2 (1 - α) k ∫ z dδ over
-that branch. Here k = 1, α = 0.1, A = 1, β = 0.6, γ = 0.3, amplitudes X = 0.5, 1.5 and 4; the path is run through until
-the cycle has closed.
+Both give z_m by 2X = ln[(A/d)/(A/d - z_m)]/d - ln(1 - s z_m/A)/s. The loss per cycle is the area 2 (1 - α) k ∫ z dδ
+over that branch. Here k = 1, α = 0.1, A = 1, β = 0.6, γ = 0.3, amplitudes X = 0.5, 1.5 and 4; the path is run through
+until the cycle has closed.
 """
 
 import math

@@ -1,12 +1,13 @@
 """Forced vibration with dry friction
 
-A mass on a spring k slides against a force F of dry friction, driven by P cos ωt. Steady motion without standstill has the
-amplitude, with r = ω over the natural frequency,
+A mass on a spring k slides against a force F of dry friction, driven by P cos ωt. Steady motion without standstill
+has the amplitude, with r = ω over the natural frequency,
 
     x k/P = √(V² - U² (F/P)²),    V = 1/(1 - r²),    U = sin(π/r)/(r (1 + cos(π/r)))
 
-fembeam has no rigid friction: the slider sits behind a tangential stiffness, here 1e8 k, and the formula is approached like
-the inverse root of it (factor 10 in the error for 100 in the stiffness). The motion is found as a periodic orbit.
+fembeam has no rigid friction: the slider sits behind a tangential stiffness, here 1e8 k, and the formula is
+approached like the inverse root of it (factor 10 in the error for 100 in the stiffness). The motion is found as a
+periodic orbit.
 """
 
 import math
@@ -21,8 +22,8 @@ import solvers
 from contacts import Coulomb
 
 SOURCE = (
-    "J.P. Den Hartog, *Forced vibrations with combined viscous and Coulomb damping*, Phil. Mag. (7) 9 (1930) 801, and "
-    "*Trans. ASME* 53 (1931) APM-53-9"
+    "J.P. Den Hartog, *Forced vibrations with combined viscous and Coulomb damping*, Phil. Mag. (7) 9 (1930) 801, and"
+    " *Trans. ASME* 53 (1931) APM-53-9"
 )
 CASES = ((0.6, 0.3), (0.8, 0.5), (1.25, 0.5), (2.0, 0.3))  # frequency ratio, F/P
 

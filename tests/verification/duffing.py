@@ -2,8 +2,8 @@
 
     q'' + q + β q³ = 0,    ω = π √(1 + β X²)/2K(m),    m = β X²/(2 (1 + β X²))
 
-with the complete elliptic integral K of parameter m; for large amplitudes ω tends to 0.8472 √β X. Here β = 1. fembeam runs
-ten periods of the formula and is asked by how much the phase is off then.
+with the complete elliptic integral K of parameter m; for large amplitudes ω tends to 0.8472 √β X. Here β = 1. fembeam
+runs ten periods of the formula and is asked by how much the phase is off then.
 """
 
 import math
@@ -16,8 +16,10 @@ from sheets import Row
 import solvers
 from contacts import Polynomial
 
-SOURCE = "A.H. Nayfeh, D.T. Mook, *Nonlinear Oscillations*, Wiley 1979, chapter 2; I. Kovacic, M.J. Brennan (eds), *The "
-SOURCE += "Duffing Equation*, Wiley 2011, chapter 2"
+SOURCE = (
+    "A.H. Nayfeh, D.T. Mook, *Nonlinear Oscillations*, Wiley 1979, chapter 2; I. Kovacic, M.J. Brennan (eds), *The "
+    "Duffing Equation*, Wiley 2011, chapter 2"
+)
 AMPLITUDES = (0.1, 1.0, 3.0, 10.0)
 
 

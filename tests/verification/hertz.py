@@ -5,8 +5,8 @@ A sphere of radius R and mass m hits a half-space at speed V. With F = K δ^1.5,
     δ_max = (15 m V²/16 E* √R)^(2/5),    F_max = K δ_max^1.5
     T = 2 δ_max/V ∫₀¹ dx/√(1 - x^(5/2)) = (4/5) B(2/5, 1/2) δ_max/V
 
-Here a steel ball of 10 mm radius, 0.1 and 3 m/s, E = 210 GPa, ν = 0.3, ρ = 7850 kg/m³ on the same steel. The published
-factors are those of δ_max/V and of (m²/(R E*² V))^(1/5).
+Here a steel ball of 10 mm radius, 0.1 and 3 m/s, E = 210 GPa, ν = 0.3, ρ = 7850 kg/m³ on the same steel. The
+published factors are those of δ_max/V and of (m²/(R E*² V))^(1/5).
 """
 
 import math
@@ -19,7 +19,9 @@ from sheets import Row
 import solvers
 from contacts import Hertz
 
-SOURCE = "K.L. Johnson, *Contact Mechanics*, Cambridge University Press 1985, section 11.4, T = 2.94 δ/V = 2.87 (…)^(1/5)"
+SOURCE = (
+    "K.L. Johnson, *Contact Mechanics*, Cambridge University Press 1985, section 11.4, T = 2.94 δ/V = 2.87 (…)^(1/5)"
+)
 E, NU, RHO, R = 2.1e11, 0.3, 7850.0, 0.01
 MASS, MODULUS = 4.0 / 3.0 * math.pi * R**3 * RHO, 0.5 * E / (1.0 - NU**2)
 LAW = Hertz.of_spheres(E, NU, R, E, NU, math.inf)
@@ -63,7 +65,7 @@ def draw(rig, plot):
     sketch.view(rig, -1.2, 1.3, -0.3, 1.3)
     run = thrown(3.0, dt=1e-6)
     delta = np.maximum(-run.q[:, 0], 0.0)
-    depth, force, time = exact(3.0)
+    _, force, time = exact(3.0)
     plot.plot(1e6 * run.t, LAW.stiffness * delta**1.5, "k-", label="fembeam")
     plot.plot([0.0, 1e6 * time], [0.0, 0.0], "o", color="0.6", ms=8, zorder=0, label="formula")
     plot.plot([5e5 * time], [force], "o", color="0.6", ms=8, zorder=0)

@@ -1,7 +1,7 @@
 """Iwan's distributed elements: uniform limits of slip
 
-Infinitely many springs with sliders in parallel, whose limits are spread evenly from 0, stiffness k and limit f of all
-together. The first loading is a parabola, and a cycle of amplitude X loses the area between two of its halves:
+Infinitely many springs with sliders in parallel, whose limits are spread evenly from 0, stiffness k and limit f of
+all together. The first loading is a parabola, and a cycle of amplitude X loses the area between two of its halves:
 
     F = k δ (1 - k δ/4f) up to δ = 2f/k,    W = k² X³/3f,    4 f (X - 4f/3k) beyond
 

@@ -4,7 +4,8 @@ A material of sliders in parallel follows, after each reversal, its first loadin
 
     (δ_r - δ)/2 = δ_b((F_r - F)/2),    δ_b(F) = F + α F^r
 
-where δ_b is the first loading, here that of Ramberg and Osgood with α = 0.5, r = 5. The loss per cycle between ±F_m is then
+where δ_b is the first loading, here that of Ramberg and Osgood with α = 0.5, r = 5. The loss per cycle between ±F_m
+is then
 
     W = 4 α (r - 1)/(r + 1) F_m^(r + 1)
 
@@ -19,8 +20,8 @@ from contacts import Iwan
 from contacts.path import work
 
 SOURCE = (
-    "G. Masing, *Proc. 2nd Int. Congr. Appl. Mech.*, Zürich 1926, p. 332; P.C. Jennings, *J. Eng. Mech. Div. ASCE* 90 "
-    "EM2 (1964) 131 (the loss)"
+    "G. Masing, *Proc. 2nd Int. Congr. Appl. Mech.*, Zürich 1926, p. 332; P.C. Jennings, *J. Eng. Mech. Div. ASCE* 90"
+    " EM2 (1964) 131 (the loss)"
 )
 ALPHA, POWER, TOP = 0.5, 5, 1.5
 
@@ -56,8 +57,9 @@ def draw(rig, plot):
     sketch.arrow(rig, (1.6, 0.35), (2.0, 0.35), "δ", shift=(0.1, 0.0))
     sketch.view(rig, -0.3, 2.5, -0.6, 0.7)
     down = np.linspace(X, -X, 80)
-    plot.plot([0.0, *down, *down[::-1]], LAW.along([0.0, X, *down, *down[::-1]])[[0, *range(2, 162)]], label="fembeam")
     forces = np.linspace(0.0, TOP, 13)
+    path = [*first(np.linspace(0.0, TOP, 40)), *down, *down[::-1]]
+    plot.plot(path, LAW.along(path), label="fembeam")
     plot.plot(first(forces), forces, "k.", label="first loading")
     plot.plot(X - 2.0 * first(forces), TOP - 2.0 * forces, "x", color="0.4", label="twice as large")
     plot.set(xlabel="δ", ylabel="F")

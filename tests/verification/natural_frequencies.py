@@ -85,5 +85,5 @@ def draw(rig, plot):
     for ends in ENDS:
         shape = model(ends).phi(z)[:, 1]
         plot.plot(z / LENGTH, shape / np.abs(shape).max(), label=ends)
-    plot.set(xlabel="z/L", ylabel="second mode")
-    plot.legend(fontsize="small")
+    plot.set(xlabel="z/L", ylabel="second mode", ylim=(-1.1, 1.75))
+    plot.legend(fontsize="small", ncols=2, loc="upper center")

@@ -1,7 +1,7 @@
 """Restitution of dissipative contact laws
 
-A free mass m enters a stop at speed v and leaves it at r v. Published damping factors ask for a nominal restitution e;
-what the equation of motion then gives is another number, in closed form:
+A free mass m enters a stop at speed v and leaves it at r v. Published damping factors ask for a nominal restitution
+e; what the equation of motion then gives is another number, in closed form:
 
     Hunt–Crossley, Lankarani–Nikravesh: F = K δ^1.5 (1 + a δ'/v),     a (1 + r) = ln[(1 + a)/(1 - a r)]
     Jankowski: F = K δ^1.5 + c δ^¼ δ' on approach only,               r = exp(-ζ arccos ζ/√(1 - ζ²)), ζ = 2ξ/√5

@@ -1,12 +1,12 @@
 """A rod flies against a wall
 
-A rod of length L and wave speed c = √(E/ρ) hits a rigid wall at speed v. A wave runs to its free end and back, after which
-it leaves with the speed it had:
+A rod of length L and wave speed c = √(E/ρ) hits a rigid wall at speed v. A wave runs to its free end and back, after
+which it leaves with the speed it had:
 
     T = 2L/c,    ∫F dt = 2 m v,    F = v A √(Eρ)
 
-Here 80 finite elements and a wall ten times as stiff as one of them, see [matrices.py](../../examples/matrices.py) of the
-course: a front is as steep as the elements allow, so that 2 % are missed.
+Here 80 finite elements and a wall ten times as stiff as one of them, see [matrices.py](../../examples/matrices.py) of
+the course: a front is as steep as the elements allow, so that 2 % are missed.
 """
 
 import math

@@ -1,7 +1,7 @@
 """Shock spectra of a half sine and of a step
 
-A base accelerates by a sin(πt/d) for 0 < t < d, or by a from t = 0 on. With β = π/ωd the relative displacement x of an
-undamped oscillator ω is, times ω²/a,
+A base accelerates by a sin(πt/d) for 0 < t < d, or by a from t = 0 on. With β = π/ωd the relative displacement x of
+an undamped oscillator ω is, times ω²/a,
 
     half sine, t < d:    [sin(πt/d) - β sin ωt]/(1 - β²), largest at one of t = 2πn/(ω ± π/d)
     afterwards:          amplitude 2β |cos(π/2β)|/|1 - β²|

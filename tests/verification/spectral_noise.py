@@ -1,25 +1,25 @@
 """Gaussian noise by spectral representation
 
-Noise with a one-sided spectrum S is a sum of N cosines at equal distances Δω with amplitudes √(2 S Δω) and random phases.
-Over its period 2π/Δω, and for every seed, a band from ω₁ to ω₂ of standard deviation σ has
+Noise with a one-sided spectrum S is a sum of N cosines at equal distances Δω with amplitudes √(2 S Δω) and random
+phases. Over its period 2π/Δω, and for every seed, a band from ω₁ to ω₂ of standard deviation σ has
 
     variance σ²,    of the rate σ² (ω₂³ - ω₁³)/3(ω₂ - ω₁),    correlation σ² [sin ω₂τ - sin ω₁τ]/((ω₂ - ω₁)τ)
 
-the latter two up to the rectangles of a sum, 1/N; averaged over seeds its kurtosis is 3 - 3/2N. Here 0 to 1226.6 rad/s
-(the band of the paper of 2003), 4096 lines, σ = 0.25 mm; the kurtosis is that of 40 seeds.
+the latter two up to the rectangles of a sum, 1/N; averaged over seeds its kurtosis is 3 - 3/2N. Here 0 to 1226.6
+rad/s (the band of the paper of 2003), 4096 lines, σ = 0.25 mm; the kurtosis is that of 40 seeds.
 """
 
 from functools import cache
 
 import numpy as np
-import sketch
 from sheets import Row
 
 import fembeam as fb
 
 SOURCE = (
-    "M. Shinozuka, C.-M. Jan, *Digital simulation of random processes and its applications*, J. Sound Vib. 25 (1972) 111; "
-    "M. Shinozuka, G. Deodatis, *Simulation of stochastic processes by spectral representation*, Appl. Mech. Rev. 44 (1991) 191"
+    "M. Shinozuka, C.-M. Jan, *Digital simulation of random processes and its applications*, J. Sound Vib. 25 (1972) "
+    "111; M. Shinozuka, G. Deodatis, *Simulation of stochastic processes by spectral representation*, Appl. Mech. "
+    "Rev. 44 (1991) 191"
 )
 STD, BAND, LINES = 2.5e-4, (0.0, 1226.6), 4096
 LAGS = (1e-3, 2e-3, 4e-3)  # s

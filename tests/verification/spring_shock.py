@@ -1,7 +1,7 @@
 """A mass on a spring thrown onto a stop
 
-A mass of 100 kg on a spring of 1e4 N/m leaves its rest position at 1 m/s and meets a stop of 1e6 N/m there. While it is in
-contact it swings with ω = √((k + K)/m), so that
+A mass of 100 kg on a spring of 1e4 N/m leaves its rest position at 1 m/s and meets a stop of 1e6 N/m there. While it
+is in contact it swings with ω = √((k + K)/m), so that
 
     T = π/ω,    F_max = K v/ω,    ∫F dt = 2 K v/ω²
 
@@ -58,5 +58,5 @@ def draw(rig, plot):
     plot.plot(0.5 * math.pi / OMEGA, 1e3 * SPEED / OMEGA, "o", color="0.6", ms=9, zorder=0, label="formula")
     low = -1e3 * SPEED / math.sqrt(SPRING / MASS)
     plot.plot(math.pi / OMEGA + 0.05 * np.pi, low, "o", color="0.6", ms=9, zorder=0)
-    plot.set(xlabel="t / s", ylabel="way into the stop / mm")
-    plot.legend()
+    plot.set(xlabel="t / s", ylabel="way into the stop / mm", ylim=(-110.0, 50.0))
+    plot.legend(ncols=2, loc="upper right")

@@ -1,12 +1,12 @@
 """Two masses, one on dry friction with a larger static limit
 
-Two masses of 5 kg are joined by a spring of 1e4 N/m. The first is pressed on a plane by 1e4 N, with coefficients of friction
-0.3 in stick and 0.2 in slip; the second is pulled by 3000 N until 0.2 s. The first sticks, slips from t₁ on, and sticks
-again at t₃. Each phase is a sum of a straight or parabolic motion and a cosine, which the sheet joins.
+Two masses of 5 kg are joined by a spring of 1e4 N/m. The first is pressed on a plane by 1e4 N, with coefficients of
+friction 0.3 in stick and 0.2 in slip; the second is pulled by 3000 N until 0.2 s. The first sticks, slips from t₁ on,
+and sticks again at t₃. Each phase is a sum of a straight or parabolic motion and a cosine, which the sheet joins.
 
-The published numbers are the analytical ones of code_aster's validation manual; its own results there differ by 0.0 to
-0.2 %. In fembeam the contact has a tangential stiffness of 1e9 N/m and a critical dashpot in stick, so that the first mass
-moves by micrometres before it slips.
+The published numbers are the analytical ones of code_aster's validation manual; its own results there differ by 0.0
+to 0.2 %. In fembeam the contact has a tangential stiffness of 1e9 N/m and a critical dashpot in stick, so that the
+first mass moves by micrometres before it slips.
 """
 
 import math

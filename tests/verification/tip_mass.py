@@ -1,7 +1,7 @@
 """Cantilever with a mass of rotary inertia at its tip
 
-A body of mass μ ρAL and rotary inertia κ ρAL³ sits at the free end of a clamped beam. With u'' = κ λ⁴ u' and
-u''' = -μ λ⁴ u there, in units of L, the frequencies ω_n = (λ_n/L)² √(EI/ρA) are the zeros of the determinant
+A body of mass μ ρAL and rotary inertia κ ρAL³ sits at the free end of a clamped beam. With u'' = κ λ⁴ u' and u''' =
+-μ λ⁴ u there, in units of L, the frequencies ω_n = (λ_n/L)² √(EI/ρA) are the zeros of the determinant
 
     | -(c + C) + κ λ³ (s + S)    -(s + S) - κ λ³ (c - C) |
     |   s - S + μ λ (c - C)      -(c + C) + μ λ (s - S)  |      c = cos λ, s = sin λ, C = cosh λ, S = sinh λ

@@ -4,9 +4,10 @@ One mode ω of a cantilever, damping ratio ζ, under a random force at its tip o
 
     E[q²] = π φ² S/4ζω³,    E[q'²] = π φ² S/4ζω
 
-and the second holds with any spring or elastic stop beside it (equipartition, from the Fokker–Planck equation). fembeam's
-noise ends at 20 ω: what is missing above, φ² S/20ω of E[q'²], is left out in the formula. Without a stop one period of the
-noise gives the variance of every seed; with a Hertzian stop it is estimated from a run, and 4 standard errors are allowed.
+and the second holds with any spring or elastic stop beside it (equipartition, from the Fokker–Planck equation).
+fembeam's noise ends at 20 ω: what is missing above, φ² S/20ω of E[q'²], is left out in the formula. Without a stop
+one period of the noise gives the variance of every seed; with a Hertzian stop it is estimated from a run, and 4
+standard errors are allowed.
 """
 
 import math
@@ -20,11 +21,11 @@ import fembeam as fb
 from contacts import Hertz
 
 SOURCE = (
-    "S.H. Crandall, W.D. Mark, *Random Vibration in Mechanical Systems*, Academic Press 1963; T.K. Caughey, *Derivation and "
-    "application of the Fokker–Planck equation to discrete nonlinear dynamic systems subjected to white random "
-    "excitation*, J. Acoust. Soc. Am. 35 (1963) 1683"
+    "S.H. Crandall, W.D. Mark, *Random Vibration in Mechanical Systems*, Academic Press 1963; T.K. Caughey, "
+    "*Derivation and application of the Fokker–Planck equation to discrete nonlinear dynamic systems subjected to "
+    "white random excitation*, J. Acoust. Soc. Am. 35 (1963) 1683"
 )
-TIP, ZETA, STD, BAND = 0.26, 0.05, 0.5, 20.0
+TIP, ZETA, STD, BAND, LINES = 0.26, 0.05, 0.5, 20.0, 2000
 STEEL = fb.Section.rectangle(E=2.1e11, rho=7850.0, width=0.02, height=0.003)
 
 
@@ -33,7 +34,8 @@ def model(stop=False):
     """One mode of the beam under the noise."""
     plain = fb.Scene(fb.Beam(TIP, STEEL), [fb.Clamped(0.0)]).reduce(1)
     omega = float(plain.omega[0])
-    noise = fb.BandNoise(STD, (0.0, BAND * omega), seed=1, period=2.0 * math.pi * 2000 / (BAND * omega))
+    period = None if stop else 2.0 * math.pi * LINES / (BAND * omega)
+    noise = fb.BandNoise(STD, (0.0, BAND * omega), seed=1, period=period)
     stops = [fb.Stop(TIP, Hertz(1e6))] if stop else []
     force = fb.PointForce(TIP, noise)
     scene = fb.Scene(plain.scene.beam, plain.scene.supports, stops=stops, forces=[force], damping=fb.ModalDamping(ZETA))
@@ -51,11 +53,11 @@ def exact():
 @cache
 def response():
     """(q, q') over one period of the noise, after the start is forgotten."""
-    period, omega = model().scene.forces[0].signal.period, float(model().omega[0])
-    lead, samples = 20.0 / (ZETA * omega), 8192
-    start = model().simulate(lead, lead).end
-    run = model(False).simulate(period, period / samples, start=start)
-    return run.q[:-1, 0], run.q_dot[:-1, 0]
+    omega, samples = float(model().omega[0]), 8192
+    period = 2.0 * math.pi * LINES / (BAND * omega)
+    start = model().simulate(period, period).end  # the noise repeats, so does the motion
+    run = model().simulate(period, period / samples, start=start)
+    return run.q[1:, 0], run.q_dot[1:, 0]
 
 
 @cache
