@@ -27,11 +27,10 @@ from solvers.compiled.state import (
     STATUSES,
     STEPS,
     T,
-    contact_row,
+    event_row,
 )
 from solvers.exponential.energy.check import unbalanced
 from solvers.problem import (
-    COLUMNS,
     Array,
     ContactLog,
     Cost,
@@ -47,10 +46,10 @@ from solvers.problem import (
     forcing_of,
     product,
 )
+from solvers.problem import event_list as at
 from solvers.problem.run_arguments import check_laws, check_tangent, checked_start, latched_at_start, output_times
 
 BLOCK_STEPS = 20_000  # steps in a block: between two checks for signals and calls of `progress`
-_DEPTH, _FORCE = (list(ContactLog.__dataclass_fields__).index(name) for name in ("peak_indentation", "peak_force"))
 _NEVER, _NOWHERE = np.array([math.inf]), np.empty((0, 0))  # no output is due
 _NOTHING = np.empty(0)  # latched by a law without memory
 
@@ -177,7 +176,7 @@ class _Run:
 
             self.tangent = Tangent(system, engine, tangent if isinstance(tangent, Parameter) else None, True)
             self.state = engine.state  # with the event record
-        self.log = np.empty((max(256, 2 * len(system.contacts)), COLUMNS))
+        self.log = np.empty((max(256, 2 * len(system.contacts)), at.CODE + 1))
         self.initial, self.latched = self.state.x[: 2 * engine.problem.k.size].copy(), self.memory
         if times is not None and self.due[0] == 0.0:
             self.out[0] = self.state.x
@@ -211,7 +210,7 @@ class _Run:
         """Block after block until done, failed or interrupted."""
         code = RUNNING
         try:
-            self.engine.start()
+            self.engine.start(self.log)
             while code in (RUNNING, LOG_FULL):
                 if code == LOG_FULL:
                     self.log = np.concatenate((self.log, np.empty_like(self.log)))
@@ -241,8 +240,8 @@ class _Run:
         complete = self.engine.keeps_ledger(self.times is not None)
         ledger = partial(_energy, self.system, works, complete, motion, back, self.initial)
         rows = self._rows()
-        log = partial(ContactLog.of_rows, self._of_stops(rows))
-        transitions = partial(Transitions.of_rows, rows, self.system.contacts)
+        log = partial(ContactLog.of_events, self._of_stops(rows))
+        transitions = partial(Transitions.of_events, rows, self.system.contacts)
         first, last = (self.initial, self.latched), (state, latched)
         lost = partial(Losses.of_run, self.system.contacts, back, first, last, works, transitions)
         if status is Status.DONE and not self._balances(works, complete, motion, rows):
@@ -265,15 +264,9 @@ class _Run:
         return not unbalanced(self.system, works, motion, start, _exchanged(rows), self.engine.method.rtol)
 
     def _of_stops(self, rows: Array) -> Array:
-        """The rows of contacts that begin and end; one with memory under way is none while its law is open."""
-        if not any(contact.always for contact in self.system.contacts):
-            return rows
-        always = np.array([c.always and not getattr(c.law, "opens", False) for c in self.system.contacts])
-        opening, parameters = self.engine.problem.opening, self.engine.problem.parameters
-        shut = np.array([place < 0 or parameters[s, place] != 0.0 for s, place in enumerate(opening)])
-        stop = rows[:, 0].astype(int)
-        kept: Array = rows[(stop >= 0) & ~always[stop] & (shut[stop] | ~np.isnan(rows[:, 2]))] if len(rows) else rows
-        return kept
+        """The events of elements whose contacts begin and end."""
+        always = np.array([c.always and not getattr(c.law, "opens", False) for c in self.system.contacts], dtype=bool)
+        return rows[~always[rows[:, at.ELEMENT].astype(int)]] if always.any() else rows
 
     def release(self) -> None:
         """Return working arrays for use by other runs."""
@@ -289,20 +282,21 @@ class _Run:
         return written
 
     def _rows(self) -> Array:
-        """The log, contacts under way last."""
+        """The event list; contacts under way end last, at no time."""
         logged = self.log[: self.state.count[LOGGED]].copy()
         under_way = [s for s, segment in enumerate(self.state.segment.tolist()) if segment > 0]
         if not under_way:
             return logged
-        rows = np.empty((len(under_way), COLUMNS))
+        rows = np.empty((len(under_way), at.CODE + 1))
         for s, row in zip(under_way, rows, strict=True):
-            contact_row(self.engine.problem, self.state, s, math.nan, math.nan, row)
+            event_row(self.engine.problem, self.state, s, math.nan, at.KNOT, math.nan, math.nan, row)
         return np.concatenate((logged, rows))
 
 
 def _exchanged(rows: Array) -> Array:
     """(k,) peak force times peak indentation of every contact of a log, J."""
-    return (rows[:, _DEPTH] * rows[:, _FORCE])[rows[:, 0] >= 0.0]
+    ends = at.ends_of(rows)
+    return ends[:, at.DEEPEST] * ends[:, at.LARGEST]
 
 
 def _energy(system: System, works: Array, complete: bool, motion: Array, back: Array, initial: Array) -> Energy:

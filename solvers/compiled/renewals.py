@@ -17,17 +17,16 @@ from solvers.compiled.kernels import (
 )
 from solvers.compiled.state import (
     AT_ONCE,
-    EVENTS,
     LAST_EVENT,
     LOGGED,
     PEAK_DELTA,
     RENEWAL,
     T,
-    contact_row,
-    is_open,
-    open_contact,
+    end_event,
+    event_row,
     write_event,
 )
+from solvers.problem import event_list as at
 
 
 @inlined
@@ -57,24 +56,16 @@ def margins_before(problem, state, s, delta, rate, time, batch, out):
 @inner
 def renew(problem, state, s, j, delta, rate, log):
     """Renew what element s latches on its border j; a row of the log tells of it."""
-    size, t = 2 * problem.k.size, state.now[T]
+    t, row = state.now[T], log[state.count[LOGGED]]
     if state.event_record.shape[0]:
         write_event(state, RENEWAL, t, t, 0.0, s, j, state.x)
-    was_open = is_open(problem, s)
-    row = log[state.count[LOGGED]]
-    row[0], row[1], row[2], row[4], row[5] = -1.0 - s, t, j, delta, rate
-    batch = row[4:7]
+    event_row(problem, state, s, t, j, delta, rate, row)
+    batch = row[at.DELTA : at.FORCE + 1]
     call_force(problem.law[s], 1, batch[0:1], batch[1:2], state.entry_rate[s], problem.parameters[s], (batch[2:3],))
-    row[7], row[8], row[9] = state.x[size + 3 + 2 * s], state.x[size + 2 + 2 * s], 0.0
-    row[3] = call_renewal(problem.renewal[s], j, delta, rate, state.entry_rate[s], problem.parameters[s])
-    state.count[LOGGED] += 1
-    state.count[EVENTS] += 1
-    if was_open and not is_open(problem, s):
-        open_contact(problem, state, s, t, rate)
+    row[at.CODE] = call_renewal(problem.renewal[s], j, delta, rate, state.entry_rate[s], problem.parameters[s])
+    end_event(problem, state, s, row)
+    if row[at.FROM] == 0.0 and row[at.TO] > 0.0:
         state.active[s, PEAK_DELTA] = delta
-    if is_open(problem, s) and not was_open:
-        contact_row(problem, state, s, t, -rate, log[state.count[LOGGED]])
-        state.count[LOGGED] += 1
 
 
 @inlined
@@ -90,5 +81,5 @@ def most_rows(problem):
     """How many rows of the log the events of one instant may take."""
     rows = problem.law.size
     for count in problem.border_count:
-        rows += 2 * count
+        rows += count
     return rows

@@ -1,4 +1,4 @@
-"""The arrays a run changes, the change of a stop's segment with its latched rate, and the contact log."""
+"""The arrays a run changes, the change of a stop's segment with its latched rate, and the event list."""
 
 from __future__ import annotations
 
@@ -9,17 +9,10 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from solvers.compiled.fields import packed_type, shapes_of
-from solvers.compiled.kernels import (
-    Problem,
-    abs_dot,
-    indentation,
-    indentation_rate,
-    inlined,
-    inner,
-    kernel,
-)
+from solvers.compiled.kernels import Problem, abs_dot, indentation, indentation_rate, inlined, inner, kernel
 from solvers.compiled.parts import ADDRESSES
 from solvers.problem import Array, Contact, Forcing, Law, Status, System
+from solvers.problem import event_list as at
 
 STATUSES = list(Status)
 DONE, RUNNING, STEP_TOO_SMALL, DIVERGED, CHATTER, LOG_FULL, LAW_NOT_FINITE, GAINED = (
@@ -31,7 +24,7 @@ DONE, RUNNING, STEP_TOO_SMALL, DIVERGED, CHATTER, LOG_FULL, LAW_NOT_FINITE, GAIN
 )
 T, H_FLIGHT, H_CONTACT, LAST_EVENT = range(4)  # places in State.now
 STEPS, REJECTED, CALLS, EVENTS, LOGGED, SAMPLED, AT_ONCE, RECORDED = range(8)  # places in State.count
-T_IN, SPEED_IN, PEAK_DELTA, PEAK_FORCE, WORK_IN, IMPULSE_IN, RATE_CLIPPED = range(7)  # columns of State.active
+T_IN, PEAK_DELTA, PEAK_FORCE = range(3)  # columns of State.active
 MOST_EVENTS_AT_ONCE = 100
 STEP, PART, LANDING, EVENT, RENEWAL = 0.0, 1.0, 2.0, 3.0, 4.0  # kinds of rows of State.event_record
 KIND, BEGAN, ENDED, SPAN, FIRST, SECOND, HEAD = range(7)  # columns of State.event_record: FIRST and SECOND are two
@@ -49,7 +42,7 @@ class State(NamedTuple):
     rate: Annotated[Any, "X"]  # of x, per s; stepping methods only
     segment: Annotated[Any, "int E"]  # of the law: 0 in flight, j > 0 between the stop's knots j-1 and j
     entry_rate: Annotated[Any, "E"]  # m/s, latched
-    active: Annotated[Any, "E, 7"]  # contacts under way, SI units, columns named above
+    active: Annotated[Any, "E, 3"]  # contacts under way, SI units, columns named above
     count: Annotated[Any, "int 8"]  # steps, rejected steps, law calls, ..., as named above
     event_record: Annotated[Any, "rows, record"]  # contact steps and events, for the tangent; else no rows
 
@@ -82,16 +75,9 @@ def write_event(state, kind, began, ended, span, first, second, x):
 
 @inner
 def open_contact(problem, state, s, t, delta_dot):
-    """Latch the entry rate and begin the row of a contact under way."""
-    balance = 2 * problem.k.size + 2 + 2 * s
+    """Latch the entry rate and begin a contact."""
     state.entry_rate[s] = max(abs(delta_dot), problem.floor[s])
-    state.active[s, T_IN] = t
-    state.active[s, SPEED_IN] = abs(delta_dot)
-    state.active[s, PEAK_DELTA] = 0.0
-    state.active[s, PEAK_FORCE] = 0.0
-    state.active[s, WORK_IN] = state.x[balance]
-    state.active[s, IMPULSE_IN] = state.x[balance + 1]
-    state.active[s, RATE_CLIPPED] = 1.0 if abs(delta_dot) < problem.floor[s] else 0.0
+    state.active[s, T_IN], state.active[s, PEAK_DELTA], state.active[s, PEAK_FORCE] = t, 0.0, 0.0
 
 
 @kernel
@@ -109,36 +95,68 @@ def begin_contacts(problem, state):
             state.active[s, PEAK_DELTA] = delta
 
 
+@inlined
+def is_open(problem, s):
+    """Whether a law with memory is open, so that no force acts at any indentation at hand."""
+    place = problem.opening[s]
+    return place >= 0 and problem.parameters[s, place] == 0.0
+
+
+@inlined
+def begins_and_ends(problem, s):
+    """Whether the contacts of an element begin and end; the others always act, at both signs of the indentation."""
+    return problem.knots[s, 0] == 0.0 or problem.opening[s] >= 0
+
+
+@inlined
+def acting_segment(problem, state, s):
+    """Segment of the law, 0 while no force acts."""
+    return 0 if is_open(problem, s) else state.segment[s]
+
+
 @kernel
-def contact_row(problem, state, s, t_out, speed_out, row):
-    """Write the log row of the contact under way at stop s."""
+def event_row(problem, state, s, t, guard, delta, delta_dot, row):
+    """Write into a row of the log what stop s meets, and what it is like just before."""
     balance = 2 * problem.k.size + 2 + 2 * s
-    row[0] = s
-    row[1] = state.active[s, T_IN]
-    row[2] = t_out
-    row[3] = state.active[s, SPEED_IN]
-    row[4] = speed_out
-    row[5] = state.active[s, PEAK_DELTA]
-    row[6] = state.active[s, PEAK_FORCE]
-    row[7] = state.x[balance + 1] - state.active[s, IMPULSE_IN]
-    row[8] = state.x[balance] - state.active[s, WORK_IN]
-    row[9] = state.active[s, RATE_CLIPPED]
+    row[at.ELEMENT], row[at.TIME], row[at.GUARD] = s, t, guard
+    row[at.FROM], row[at.TO] = acting_segment(problem, state, s), 0.0
+    row[at.DELTA], row[at.RATE], row[at.FORCE], row[at.CODE] = delta, delta_dot, np.nan, -1.0
+    row[at.IMPULSE], row[at.WORK] = state.x[balance + 1], state.x[balance]
+    row[at.DEEPEST], row[at.LARGEST] = state.active[s, PEAK_DELTA], state.active[s, PEAK_FORCE]
+    row[at.CLIPPED] = 1.0 if abs(delta_dot) < problem.floor[s] else 0.0
+
+
+@inner
+def end_event(problem, state, s, row):
+    """Complete the row of an event by what stop s is like after it; its contact may begin."""
+    row[at.TO] = acting_segment(problem, state, s)
+    if row[at.FROM] == 0.0 and row[at.TO] > 0.0:
+        open_contact(problem, state, s, row[at.TIME], row[at.RATE])
+    state.count[LOGGED] += 1
+    state.count[EVENTS] += 1
+
+
+@kernel
+def log_begin(problem, state, log):
+    """Log all contacts that are under way as the run begins."""
+    for s in range(problem.law.size):
+        if acting_segment(problem, state, s) > 0:
+            row, delta = log[state.count[LOGGED]], state.active[s, PEAK_DELTA]
+            event_row(problem, state, s, state.now[T], at.BEGIN, delta, indentation_rate(problem, s, state.x), row)
+            row[at.FROM], row[at.TO] = 0.0, row[at.FROM]
+            state.count[LOGGED] += 1
 
 
 @inner
 def switch(problem, state, s, direction, log):
-    """Move stop s one segment up or down; begin its contact, or end it and log it."""
-    t = state.now[T]
-    delta_dot = indentation_rate(problem, s, state.x)
+    """Move stop s one segment up or down."""
+    t, row = state.now[T], log[state.count[LOGGED]]
     if state.event_record.shape[0]:
         write_event(state, EVENT, t, t, 0.0, s, direction, state.x)
-    if direction > 0 and state.segment[s] == 0:
-        open_contact(problem, state, s, t, delta_dot)
-    if direction < 0 and state.segment[s] == 1:
-        contact_row(problem, state, s, t, -delta_dot, log[state.count[LOGGED]])
-        state.count[LOGGED] += 1
+    level = problem.knots[s, state.segment[s] - (1 if direction < 0 else 0)]
+    event_row(problem, state, s, t, at.KNOT, level, indentation_rate(problem, s, state.x), row)
     state.segment[s] += direction
-    state.count[EVENTS] += 1
+    end_event(problem, state, s, row)
     state.count[AT_ONCE] = state.count[AT_ONCE] + 1 if t == state.now[LAST_EVENT] else 0
     state.now[LAST_EVENT] = t
 
@@ -163,13 +181,6 @@ def switch_on_surface(problem, state, log, locates):
             switch(problem, state, s, direction, log)
             switched = True
     return switched
-
-
-@inlined
-def is_open(problem, s):
-    """Whether a law with memory is open, so that no force acts at any indentation at hand."""
-    place = problem.opening[s]
-    return place >= 0 and problem.parameters[s, place] == 0.0
 
 
 @inlined

@@ -28,20 +28,19 @@ from solvers.compiled.state import (
     STATUSES,
     STEPS,
     T,
-    is_open,
+    acting_segment,
+    begins_and_ends,
 )
 from solvers.exponential.energy.check import ALLOWED, FACTOR, LAST, has_gained
 from solvers.exponential.energy.flight_tables import NO_ENERGY_TABLES
 from solvers.exponential.method import Engine, advance
 from solvers.exponential.preparation import SCRATCH
-from solvers.problem import COLUMNS, Array, ContactLog, Status
+from solvers.problem import Array, Status
+from solvers.problem import event_list as at
 
 NEXT, BEYOND, BEGUN = range(3)  # places in a cursor: present start, end of the group, whether the start has begun
 CODE, CONTACTS = range(2)  # columns of Outcomes.count
 REACHED, EXCHANGED, ENERGY = range(3)  # columns of Outcomes.number; three of energy, as in Scratch.energy
-_STOP, _DELTA, _FORCE = (
-    list(ContactLog.__dataclass_fields__).index(n) for n in ("stop", "peak_indentation", "peak_force")
-)
 _CUBE = types.Array(REAL, 3, "C")
 _RUN = types.FunctionType(advance.nopython_signatures[0])
 _NEVER, _NOWHERE = np.array([np.inf]), np.empty((0, 0))
@@ -92,7 +91,7 @@ def _end(problem, state, scratch, code, x, count, number, peak):
     for value in state.x:
         finite &= np.isfinite(value)
     for s in range(problem.law.size):
-        if state.segment[s] > 0 and (problem.knots[s, 0] == 0.0 or problem.opening[s] >= 0) and not is_open(problem, s):
+        if acting_segment(problem, state, s) > 0 and begins_and_ends(problem, s):
             _note(s, state.active[s, PEAK_DELTA], state.active[s, PEAK_FORCE], count, number, peak)
     count[CODE] = DIVERGED if code == DONE and not finite else code
     number[REACHED] = state.now[T]
@@ -131,10 +130,9 @@ def advance_many(
             *(t_end, budget, rtol, landing_reach, log, out, due),
         )
         spent += state.count[STEPS] + state.count[REJECTED] + 1
-        for row in range(state.count[LOGGED]):
-            if log[row, _STOP] < 0.0:  # a border of a law with memory
-                continue
-            _note(np.int64(log[row, _STOP]), log[row, _DELTA], log[row, _FORCE], count[i], number[i], peak[i])
+        for row in log[: state.count[LOGGED]]:
+            if row[at.FROM] > 0.0 and row[at.TO] == 0.0:  # a contact ends
+                _note(np.int64(row[at.ELEMENT]), row[at.DEEPEST], row[at.LARGEST], count[i], number[i], peak[i])
         state.count[LOGGED] = 0
         if code != RUNNING and code != LOG_FULL:
             _end(problem, state, scratch, code, x[i], count[i], number[i], peak[i])
@@ -167,7 +165,7 @@ class Worker:
             self.own = Packed.of(engine.problem._replace(gap=engine.problem.gap.copy()), PROBLEM)
             problem_at = self.own.address
         workspace, parameters = engine.workspace, engine.prepared.problem.value.parameters
-        log = np.empty((max(256, 2 * len(engine.problem.law)), COLUMNS))
+        log = np.empty((max(256, 2 * len(engine.problem.law)), at.CODE + 1))
         self.arguments = (
             *(advance, problem_at, *engine.addresses[1:], NO_ENERGY_TABLES.address),
             *(workspace.numbers, workspace.rest, parameters, starts, gaps, self.cursor),

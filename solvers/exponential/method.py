@@ -46,6 +46,7 @@ from solvers.compiled.state import (
     T,
     begin_contacts,
     in_contact,
+    log_begin,
     switch,
     switch_on_surface,
 )
@@ -71,7 +72,7 @@ def advance(
     """Advance the state to ``t_end`` or for about ``budget`` steps; returns a status code.
 
     Row i of ``out`` gets the state at the time ``due[i]``; the last of these times is infinite. ``log`` gets a row per
-    finished contact. ``landing_reach`` is that of `landing.landing_reach`.
+    event. ``landing_reach`` is that of `landing.landing_reach`.
     """
     problem, tables, state, scratch = _problem(problem_at), _tables(tables_at), _state(state_at), _scratch(scratch_at)
     energy_tables, control = _energy_tables(energy_tables_at), scratch.control
@@ -79,6 +80,7 @@ def advance(
         control[BEGUN], scratch.landing_reach[0] = 1, landing_reach
         scratch.energy[FIRST] = own_energy(problem, tables, state.x)
         begin_contacts(problem, state)
+        log_begin(problem, state, log)
         if in_contact(state):
             begin_steps(problem, tables, state, scratch, latest_entered(state))
     begun, rows = state.count[STEPS] + state.count[REJECTED], most_rows(problem)
@@ -194,7 +196,7 @@ class Engine:
         if not self.workspace.state.event_record.size:
             self.prepared.spare_workspaces.append(self.workspace)
 
-    def start(self) -> None:
+    def start(self, log: Array) -> None:
         """Nothing to do: the compiled loop starts by itself."""
 
     def keeps_ledger(self, sampled: bool) -> bool:

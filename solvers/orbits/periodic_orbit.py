@@ -14,6 +14,7 @@ from solvers.exponential.method import Exponential
 from solvers.orbits.shots import Chain, PeriodicProblem, delayed
 from solvers.orbits.whole_state import codes, counts, derivatives, memory_of, run, state_after, transitions_of
 from solvers.problem import Array, ContactLog, Solution, SolverError, System, Transitions, counted
+from solvers.problem.event_list import NO_EVENTS
 
 _LOST = 1e-13  # size of a direction after one period, in units of the largest, below which it is forgotten
 _NEAR_ONE = 0.01  # | |μ| - 1 | below which a verdict on stability is doubtful
@@ -72,7 +73,7 @@ class Orbit:
     mark: str = ""
     memory: tuple[Array, ...] = ()
     family: tuple[tuple[int, int], ...] = ()
-    transitions: Transitions = field(default_factory=lambda: Transitions.of_rows(np.empty((0, 10)), ()))
+    transitions: Transitions = field(default_factory=lambda: Transitions.of_events(NO_EVENTS, ()))
 
     def __repr__(self) -> str:
         kind = "stable" if self.stable else "unstable"

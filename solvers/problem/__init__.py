@@ -14,16 +14,6 @@ from solvers.problem.frames import dataframe, optional
 from solvers.problem.losses import Losses, renew
 from solvers.problem.matrices import Array, dense, product
 from solvers.problem.memo import Memo
-from solvers.problem.result import (
-    COLUMNS,
-    ContactLog,
-    Cost,
-    Energy,
-    Solution,
-    SolverError,
-    Status,
-    Transitions,
-    counted,
-)
+from solvers.problem.result import ContactLog, Cost, Energy, Solution, SolverError, Status, Transitions, counted
 from solvers.problem.signals import Forcing, forcing_of, tones_as_nodes
 from solvers.problem.system import Contact, Law, Parameter, System, require_step

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from solvers.problem import event_list as at
 from solvers.problem.frames import Columns
 from solvers.problem.matrices import Array
 from solvers.problem.system import stored_energy
@@ -87,8 +88,27 @@ class ContactLog(Columns):
         return f"<{counted(len(self), 'contact')}, {open_ones} of them not ended>"
 
     @classmethod
+    def of_events(cls, rows: Array) -> ContactLog:
+        """From an event list in which every contact begins and ends."""
+        ends, begins = at.ends_of(rows), at.begins_of(rows)
+        first = np.empty_like(ends)
+        first[np.argsort(ends[:, at.ELEMENT], kind="stable")] = begins[np.argsort(begins[:, at.ELEMENT], kind="stable")]
+        return cls(
+            stop=ends[:, at.ELEMENT].astype(int),
+            t_in=first[:, at.TIME].copy(),
+            t_out=ends[:, at.TIME].copy(),
+            speed_in=np.abs(first[:, at.RATE]),
+            speed_out=-ends[:, at.RATE],
+            peak_indentation=ends[:, at.DEEPEST].copy(),
+            peak_force=ends[:, at.LARGEST].copy(),
+            impulse=ends[:, at.IMPULSE] - first[:, at.IMPULSE],
+            energy_loss=ends[:, at.WORK] - first[:, at.WORK],
+            entry_rate_clipped=first[:, at.CLIPPED].astype(bool),
+        )
+
+    @classmethod
     def of_rows(cls, rows: Array) -> ContactLog:
-        """From the kernels' table, one contact a row."""
+        """From a table with one contact a row."""
         columns: list[Any] = [*rows.T.copy()]
         columns[0], columns[-1] = columns[0].astype(int), columns[-1].astype(bool)
         return cls(*columns)
@@ -110,13 +130,10 @@ class ContactLog(Columns):
                     rows[i][(rows[i][:, 0] == row[0]) & np.isnan(rows[i][:, 2])] = row
                     rows[(i + 1) % len(rows)] = np.delete(rest, found[0], axis=0)
         moved = [
-            part + np.array([0.0, start, start] + [0.0] * (COLUMNS - 3))
+            part + np.array([0.0, start, start] + [0.0] * (part.shape[1] - 3))
             for part, start in zip(rows, starts, strict=True)
         ]
         return cls.of_rows(np.concatenate(moved))
-
-
-COLUMNS = len(fields(ContactLog))
 
 
 def _make_whole(row: Array, rest: Array, later: float) -> None:
@@ -155,14 +172,13 @@ class Transitions(Columns):
         return f"<{counted(len(self), 'transition')} of laws with memory>"
 
     @classmethod
-    def of_rows(cls, rows: Array, contacts: Sequence[Any]) -> Transitions:
-        """From the kernels' table."""
-        rows = rows[rows[:, 0] < 0.0]
-        columns: list[Any] = [*rows[:, :9].T.copy()]
-        contact, border, code = (column.astype(int) for column in (-1.0 - rows[:, 0], rows[:, 2], rows[:, 3]))
+    def of_events(cls, rows: Array, contacts: Sequence[Any]) -> Transitions:
+        """From the event list."""
+        rows = rows[rows[:, at.GUARD] >= 0.0]
+        contact, border, code = rows[:, [at.ELEMENT, at.GUARD, at.CODE]].T.astype(int)
         names = [contacts[c].law.events[i] for c, i in zip(contact, code, strict=True)]
-        columns[0], columns[2], columns[3] = contact, border, np.array(names, dtype=object)
-        return cls(*columns)
+        known: list[Any] = [*rows[:, at.DELTA : at.WORK + 1].T.copy()]
+        return cls(contact, rows[:, at.TIME].copy(), border, np.array(names, dtype=object), *known)
 
     def slid(self) -> Array:
         """(k,) m: path of the slip that each "stick" ends, 0 for other rows."""
@@ -257,7 +273,7 @@ class Solution:
     rate: Array | None = None
     memory: tuple[Array, ...] = ()
     memory_tangent: Array | None = None
-    borders: Callable[[], Transitions] = field(default=lambda: Transitions.of_rows(np.empty((0, 10)), ()), repr=False)
+    borders: Callable[[], Transitions] = field(default=lambda: Transitions.of_events(at.NO_EVENTS, ()), repr=False)
     lost: Callable[[], Any] = field(default=lambda: None, repr=False)
     end: Array | None = field(default=None, repr=False)
 

@@ -181,9 +181,7 @@ class System:
                 raise ValueError(f"contact {i} has a direction of {contact.direction.size}, the system {self.size}")
 
     def like(
-        self,
-        contacts: Sequence[Contact] | None = None,
-        loads: Sequence[tuple[ArrayLike, Signal]] | None = None,
+        self, contacts: Sequence[Contact] | None = None, loads: Sequence[tuple[ArrayLike, Signal]] | None = None
     ) -> System:
         """The same structure with other contacts or loads; its matrices are neither checked nor decoupled again."""
         other = object.__new__(System)

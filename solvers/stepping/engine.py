@@ -17,6 +17,7 @@ from solvers.compiled.state import (
     RUNNING,
     State,
     begin_contacts,
+    log_begin,
     new_state,
     problem_of,
 )
@@ -55,10 +56,11 @@ class Engine:
         if not method.adaptive:
             self.state.now[[H_FLIGHT, H_CONTACT]] = method.steps
 
-    def start(self) -> None:
+    def start(self, log: Array) -> None:
         """Find the segment of every stop and evaluate the first rate."""
         state = self.state
         begin_contacts(self.problem, state)
+        log_begin(self.problem, state, log)
         state.count[CALLS] += rhs(
             *(self.problem, 0.0, state.x, state.segment, state.entry_rate, state.rate, self.space.work[0])
         )

@@ -4,16 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from solvers.compiled.kernels import (
-    contact_forces,
-    copy,
-    dot,
-    indentation,
-    indentation_rate,
-    inner,
-    kernel,
-    off_knots,
-)
+from solvers.compiled.kernels import contact_forces, copy, dot, indentation, indentation_rate, inner, kernel, off_knots
 from solvers.compiled.renewals import most_rows
 from solvers.compiled.state import (
     AT_ONCE,
@@ -31,7 +22,8 @@ from solvers.compiled.state import (
     SAMPLED,
     STEPS,
     T,
-    is_open,
+    acting_segment,
+    begins_and_ends,
     surface_tolerance,
     switch,
     switch_on_surface,
@@ -61,8 +53,7 @@ def _peaks(problem, state, space):
     """Largest indentation and force of the step just accepted, for every stop in contact."""
     delta_of, rate_of = space.coefficients[0], space.coefficients[1]
     for s in range(problem.law.size):
-        always = problem.knots[s, 0] == -np.inf and problem.opening[s] < 0  # no contact of the log
-        if state.segment[s] == 0 or always or is_open(problem, s):
+        if acting_segment(problem, state, s) == 0 or not begins_and_ends(problem, s):
             continue
         motion_of(problem, s, state.x, space.dense, space.coefficients)
         for column in (PEAK_DELTA, PEAK_FORCE):

@@ -22,6 +22,7 @@ from solvers.compiled.state import (
     T,
     begin_contacts,
     directions_of,
+    log_begin,
     matrix_problem_of,
     new_state,
 )
@@ -59,10 +60,11 @@ class MatrixEngine:
         solve = self.solver("mass", lambda: self.M)
         return negligible_energy(self.problem, np.array([v @ solve(v) for v in vectors]), self.method.dt)
 
-    def start(self) -> None:
+    def start(self, log: Array) -> None:
         """Find the segment of every stop and evaluate the first rate."""
         self.space.watch[LEAST] = self._negligible()
         begin_contacts(self.problem, self.state)
+        log_begin(self.problem, self.state, log)
         self.refresh()
 
     def refresh(self) -> None:

@@ -19,15 +19,7 @@ from solvers.compiled.parts import PASSED, part
 from solvers.compiled.renewals import margins, margins_before, margins_in, note_event, renew
 from solvers.compiled.state import LAST_EVENT, T, rate_tolerance, surface_tolerance
 from solvers.exponential.contact.crossings import extremum
-from solvers.exponential.contact.node_response import (
-    DELTAS,
-    KNOWN,
-    RATES,
-    START,
-    motion_of,
-    rate_ripple_of,
-    ripple_of,
-)
+from solvers.exponential.contact.node_response import DELTAS, KNOWN, RATES, START, motion_of, rate_ripple_of, ripple_of
 from solvers.exponential.contact.nodes import LOCAL, S
 from solvers.exponential.contact.peaks import local_maximum, motion_around
 

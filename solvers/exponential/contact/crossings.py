@@ -33,7 +33,7 @@ from solvers.compiled.kernels import (
 )
 from solvers.compiled.parts import BOUNDS, LEAVES, SIDE, part
 from solvers.compiled.simd import largest8, least8, load8, splat8, store8
-from solvers.compiled.state import PEAK_FORCE, T_IN, T, acts, is_open, surface_tolerance
+from solvers.compiled.state import PEAK_FORCE, T_IN, T, acts, begins_and_ends, is_open, surface_tolerance
 from solvers.compiled.sums import above
 from solvers.exponential.contact.many_stops import CONTINUING, ENTERING, add_block_motion, motion_at_nodes, uses_blocks
 from solvers.exponential.contact.node_response import motion_of, respond, ripple_of
@@ -273,10 +273,11 @@ def before_landing(problem, tables, state, scratch, stop, bends, w, x):
                 return TOO_LONG
         if not long or segment == 0 or is_open(problem, s):
             continue
-        opens = problem.opening[s] >= 0
-        if problem.knots[s, 0] < 0.0 and not opens:  # no contact of the log
+        if not begins_and_ends(problem, s):
             continue
-        rest = -_TOGETHER * slope_a if opens else 0.0  # a law that opens may have a border where δ̇ falls to zero
+        rest = (
+            -_TOGETHER * slope_a if problem.opening[s] >= 0 else 0.0
+        )  # a law that opens may have a border where δ̇ falls to zero
         if slope_a > 0.0 and slope_b < rest and (s != stop or tables.bend[s] != RATE):
             return TOO_LONG
         if s != stop and tables.bend[s] > 0.0:

@@ -20,17 +20,7 @@ import math
 import numpy as np
 
 from solvers.compiled.dop853_tableau import E3, E5, STAGES
-from solvers.compiled.kernels import (
-    abs_dot,
-    copy,
-    indentation,
-    indentation_rate,
-    inlined,
-    inner,
-    merged,
-    raised,
-    rhs,
-)
+from solvers.compiled.kernels import abs_dot, copy, indentation, indentation_rate, inlined, inner, merged, raised, rhs
 from solvers.compiled.parts import PASSED
 from solvers.compiled.renewals import margins_before, margins_in
 from solvers.compiled.state import (

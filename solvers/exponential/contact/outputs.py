@@ -4,7 +4,20 @@ from __future__ import annotations
 
 from solvers.compiled.kernels import copy, indentation, inlined, inner, merged
 from solvers.compiled.simd import load8, splat8, sum8
-from solvers.compiled.state import HEAD, PART, PEAK_DELTA, PEAK_FORCE, RECORDED, SAMPLED, STEPS, T, is_open, write_event
+from solvers.compiled.state import (
+    HEAD,
+    PART,
+    PEAK_DELTA,
+    PEAK_FORCE,
+    RECORDED,
+    SAMPLED,
+    STEPS,
+    T,
+    acting_segment,
+    begins_and_ends,
+    is_open,
+    write_event,
+)
 from solvers.compiled.sums import combine
 from solvers.exponential.contact.node_response import START, force_of, largest_size, motion_of
 from solvers.exponential.contact.nodes import S
@@ -38,8 +51,7 @@ def end_run(problem, tables, state, scratch, node_set, level, t_end):
     x, share = scratch.stages[START], (t_end - state.now[T]) / tables.contact_step[level]
     place = share ** (1.0 / tables.time_exponent[node_set])
     for s in range(problem.law.size):
-        logged = problem.knots[s, 0] == 0.0 or (problem.opening[s] >= 0 and not is_open(problem, s))
-        if state.segment[s] > 0 and logged:
+        if acting_segment(problem, state, s) > 0 and begins_and_ends(problem, s):
             step_peaks(problem, tables, state, scratch, node_set, tables.contact_step[level], s, min(place, 1.0))
     if state.event_record.shape[0]:
         record_forces(problem, state, scratch, PART, t_end, node_set, level)
@@ -90,7 +102,7 @@ def finish_step(problem, tables, state, scratch, node_set, level):
             state.x[size + 3 + 2 * s] += h * sum8(impulses)
             if is_open(problem, s):
                 continue
-            if problem.knots[s, 0] == 0.0 or problem.opening[s] >= 0:
+            if begins_and_ends(problem, s):
                 step_peaks(problem, tables, state, scratch, node_set, h, s, 1.0)
             else:
                 state.active[s, PEAK_DELTA] = max(state.active[s, PEAK_DELTA], largest_size(motion[0]))

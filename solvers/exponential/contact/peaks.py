@@ -20,17 +20,9 @@ from solvers.compiled.kernels import (
     off_knots,
 )
 from solvers.compiled.simd import largest8, load8
-from solvers.compiled.state import PEAK_DELTA, PEAK_FORCE, is_open, surface_tolerance
+from solvers.compiled.state import PEAK_DELTA, PEAK_FORCE, acting_segment, begins_and_ends, surface_tolerance
 from solvers.compiled.sums import combine
-from solvers.exponential.contact.node_response import (
-    DELTAS,
-    FORCES,
-    KNOWN,
-    RATES,
-    force_of,
-    motion_of,
-    own_accelerance,
-)
+from solvers.exponential.contact.node_response import DELTAS, FORCES, KNOWN, RATES, force_of, motion_of, own_accelerance
 from solvers.exponential.contact.nodes import LOCAL, MONOMIALS, S
 
 _MOST = 6  # Newton steps to a maximum
@@ -173,11 +165,11 @@ def state_peaks(problem, state, scratch, x):
     """Raise the peaks of all stops in contact by their indentations and forces in the state x."""
     batch = scratch.trial
     for s in range(problem.law.size):
-        if state.segment[s] > 0 and not is_open(problem, s):
+        if acting_segment(problem, state, s) > 0:
             batch[0] = off_knots(problem, s, state.segment[s], indentation(problem, s, x))
             batch[1] = indentation_rate(problem, s, x)
             contact_forces(problem, s, batch[0:1], batch[1:2], state.entry_rate[s], batch[2:3])
-            if problem.knots[s, 0] < 0.0 and problem.opening[s] < 0:  # of both signs
+            if not begins_and_ends(problem, s):
                 batch[0], batch[2] = abs(batch[0]), abs(batch[2])
             state.active[s, PEAK_DELTA] = max(state.active[s, PEAK_DELTA], batch[0])
             state.active[s, PEAK_FORCE] = max(state.active[s, PEAK_FORCE], batch[2])

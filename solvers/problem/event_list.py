@@ -1,0 +1,27 @@
+"""Columns of the event list, the table that a run writes: one row an event; the contact log is read off it.
+
+At an event an element passes to another segment of its law, by an entry, an exit, a knot, or a border of its memory.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solvers.problem.matrices import Array
+
+(ELEMENT, TIME, GUARD, FROM, TO, DELTA, RATE, FORCE, IMPULSE, WORK, DEEPEST, LARGEST, CLIPPED, CODE) = range(14)
+"""The element; s; what it met, a border of its law or else as named below; its segment before and after, 0 while no
+force acts; m, m/s and N as it was met; N s and J since the run began; largest m and N of the contact; whether the entry
+rate is the floor; the law's code of what it did."""
+KNOT, BEGIN = -1.0, -2.0  # in GUARD: a knot or the surface; a contact that is under way as the run begins
+NO_EVENTS = np.empty((0, CODE + 1))
+
+
+def ends_of(rows: Array) -> Array:
+    """Events by which contacts end."""
+    return rows[(rows[:, FROM] > 0.0) & (rows[:, TO] == 0.0)]
+
+
+def begins_of(rows: Array) -> Array:
+    """Events by which they begin."""
+    return rows[(rows[:, FROM] == 0.0) & (rows[:, TO] > 0.0)]
