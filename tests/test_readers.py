@@ -52,7 +52,7 @@ def test_npz_is_refused_in_words(tmp_path):
     with pytest.raises(ValueError, match=r"cut.npz, as a whole: expected arrays of numbers in a .npz"):
         read_matrices(written(tmp_path, "cut.npz", whole[: len(whole) // 2]))
     np.savez(tmp_path / "objects.npz", K=np.array([{}], dtype=object))
-    with pytest.raises(ValueError, match=r"expected arrays of numbers in a .npz, got .*allow_pickle"):
+    with pytest.raises(ValueError, match=r"expected arrays of numbers in a .npz, got something else"):
         read_matrices(tmp_path / "objects.npz")
     np.savez(tmp_path / "name.npz", K=K, labels=np.array([(1, "x"), (2, "x"), (3, "u"), (4, "x")]))
     with pytest.raises(

@@ -232,7 +232,7 @@ def test_solvers_by_name(tmp_path):
         (
             'kind = "clamped"',
             "",
-            r"\[\[supports\]\] number 1: kind must be one of clamped, pinned, guided, fixed; it is missing",
+            r"\[\[supports\]\] number 1: kind must be one of clamped, pinned, guided; it is missing",
         ),
         ("[damping]", "[dampning]", r"unknown table 'dampning'; did you mean 'damping'"),
         ("[[stops]]", "[stops]", r"write \[\[stops\]\]"),

@@ -12,6 +12,7 @@ from typing import Any, Literal, get_args, get_origin
 
 from fembeam.beams import ModalDamping, Rayleigh
 from fembeam.scene import FEATURES, Scene
+from fembeam.scene_file.frames import DRAWN, OPTIONS, READ
 from fembeam.scene_file.keys import entries_of, options, parameters, required
 from fembeam.scene_file.kinds import MAKERS, SECTION, SIGNAL, Nested, nested
 from fembeam.scene_file.structures import FILES, KEYS
@@ -37,6 +38,7 @@ def json_schema() -> Schema:
     tables["damping"] = {"anyOf": [kinds.table(ModalDamping), kinds.table(Rayleigh)]}
     tables["base"] = kinds.reference(SIGNAL)
     tables["structure"] = _object({key: {} for key in KEYS}, list(FILES[:2]))
+    tables["frame"] = _object({key: {} for key in (*DRAWN, *READ, *OPTIONS)}, [])
     tables["reduce"] = kinds.table(Scene.reduce)
     tables |= {name: kinds.table(study) for name, study in STUDIES.items()}
     return {
