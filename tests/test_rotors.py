@@ -299,3 +299,14 @@ def test_a_rotor_in_a_scene_file(tmp_path):
     path = tmp_path / "rotor.toml"
     path.write_text(ROTOR, encoding="utf-8")
     assert scene_file.read(path).scene == rotor(forces=[fb.Unbalance("B", 1e-4)])
+
+
+def test_the_table_campbell_writes_its_answer(tmp_path):
+    path = tmp_path / "rotor.toml"
+    path.write_text(f"{ROTOR}[campbell]\nspins = [0, 300]\npoints = 3\nmodes = 2\n", encoding="utf-8")
+    study = scene_file.read(path).studies["campbell"]
+    found = study.run(scene_file.read(path), tmp_path)
+    np.testing.assert_allclose(found.signed, rotor().campbell(SPEEDS, modes=2).signed, rtol=1e-12)
+    path.write_text(f"{ROTOR}[campbell]\nspins = [300, 0]\n", encoding="utf-8")
+    with pytest.raises(scene_file.SceneFileError, match=r"spins must be two values, ascending"):
+        scene_file.read(path)
