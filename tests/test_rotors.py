@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 
 import fembeam as fb
 from contacts import Hertz, KelvinVoigt
-from fembeam import plot
+from fembeam import plot, scene_file
 
 SECTION = fb.Section.circle(2.1e11, 7850.0, 0.04)
 LENGTH, DISK = 0.5, fb.Disk("B", mass=12.0, diametral=0.04, polar=0.075)
@@ -259,3 +259,54 @@ def test_campbell_arguments_are_refused():
 def test_half_a_pair_is_told():
     with pytest.warns(UserWarning, match=r"3 modes cut a pair of one frequency, 1976.34 rad/s, .* ask for one more"):
         rotor().reduce(3)
+
+
+def test_pairs_of_a_round_shaft_lie_along_x_and_y():
+    model = rotor().reduce(6)
+    mass = model.effective_mass
+    np.testing.assert_allclose(mass[1::2, 0], 0.0, atol=1e-12 * mass.max())
+    np.testing.assert_allclose(mass[::2, 1], 0.0, atol=1e-12 * mass.max())
+    vectors = model.basis.vectors
+    np.testing.assert_allclose(vectors.T @ (model.matrices.M @ vectors), np.eye(6), atol=1e-9)
+    np.testing.assert_array_equal(model.omega[::2], model.omega[1::2])
+
+
+ROTOR = """
+[frame]
+nodes = { A = [0, 0, 0], B = [0, 0, 0.5] }
+spin = 300.0
+bending_only = true
+[[frame.members]]
+nodes = ["A", "B"]
+section = { shape = "circle", E = 2.1e11, rho = 7850, diameter = 0.04 }
+[[supports]]
+kind = "clamped"
+at = "A"
+[[masses]]
+kind = "disk"
+at = "B"
+mass = 12.0
+diametral = 0.04
+polar = 0.075
+[[forces]]
+kind = "unbalance"
+at = "B"
+moment = 1e-4
+"""
+
+
+def test_a_rotor_in_a_scene_file(tmp_path):
+    path = tmp_path / "rotor.toml"
+    path.write_text(ROTOR, encoding="utf-8")
+    assert scene_file.read(path).scene == rotor(forces=[fb.Unbalance("B", 1e-4)])
+
+
+def test_the_table_campbell_writes_its_answer(tmp_path):
+    path = tmp_path / "rotor.toml"
+    path.write_text(f"{ROTOR}[campbell]\nspins = [0, 300]\npoints = 3\nmodes = 2\n", encoding="utf-8")
+    study = scene_file.read(path).studies["campbell"]
+    found = study.run(scene_file.read(path), tmp_path)
+    np.testing.assert_allclose(found.signed, rotor().campbell(SPEEDS, modes=2).signed, rtol=1e-12)
+    path.write_text(f"{ROTOR}[campbell]\nspins = [300, 0]\n", encoding="utf-8")
+    with pytest.raises(scene_file.SceneFileError, match=r"spins must be two values, ascending"):
+        scene_file.read(path)

@@ -14,6 +14,7 @@ from fembeam.model.model import Model
 from fembeam.model.placed_shapes import PlacedShapes, placed_shapes
 from fembeam.model.shapes import Shapes
 from fembeam.scene import MOST_DENSE, BodyMatrices, LocalCoordinate, Matrices, loaded, watched
+from fembeam.structures import COMPONENTS
 from fembeam.support import is_whole, require
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ COARSE = 0.01  # estimated relative error of the highest kept frequency, above w
 FINE = 1e-6  # estimated rounding of the lowest frequency, likewise
 FIRST_TRY = 8  # modes, doubled until a frequency or share of mass is reached
 MOST_DOFS = 20_000  # of the finest mesh
+EQUAL = 1e-9  # relative distance of frequencies whose shapes are arbitrary among themselves
 PAIR = 1e-6  # relative distance of two frequencies that are one
 MOST_TRIED = 128  # modes; a few seconds
 
@@ -90,10 +92,32 @@ def _continued(chosen: tuple[int, ...], count: int) -> tuple[int, ...]:
 
 
 def _oriented(basis: reduction.Basis, beam: Matrices, place: LocalCoordinate | None) -> reduction.Basis:
-    """Positive at a place, or where each mode moves most."""
+    """Positive at a place, or where each mode moves most; of equal frequencies the first along x, the next along y."""
+    if isinstance(beam, BodyMatrices):
+        basis = _along_axes(basis, beam)
     if place is None:
         return reduction.oriented(basis, None if beam.named else beam.interpolation(beam.nodes))
     return reduction.oriented(basis, place.row(beam))
+
+
+def _along_axes(basis: reduction.Basis, beam: BodyMatrices) -> reduction.Basis:
+    """Shapes of equal frequencies, turned: where they move most, the second is at rest along x, the third along y too.
+
+    An arbitrary choice among them, as of the two planes of a round shaft, would be another one on another computer.
+    """
+    vectors, omega = basis.vectors.copy(), basis.omega.copy()
+    components = np.array([component for _, component in beam.assembled.labels])
+    kinds = [np.flatnonzero(components == one) for one in COMPONENTS if np.any(components == one)]
+    for first in range(len(omega)):
+        group = np.flatnonzero(np.abs(omega - omega[first]) <= EQUAL * omega[first])
+        if group[0] < first or len(group) < 2 or omega[first] == 0.0 or not kinds:
+            continue
+        moved = np.asarray(beam.spread @ vectors[:, group])
+        rows = [moved[own[np.argmax(np.linalg.norm(moved[own], axis=1))]] for own in kinds]
+        size = max(np.linalg.norm(row) for row in rows)
+        turn = np.linalg.qr(np.array([row for row in rows if np.linalg.norm(row) > EQUAL * size]).T, mode="complete")[0]
+        vectors[:, group], omega[group] = vectors[:, group] @ turn, omega[group].mean()
+    return reduction.Basis(vectors, omega)
 
 
 def _joined(bases: list[reduction.Basis], matrices: Matrices) -> reduction.Basis:

@@ -20,7 +20,17 @@ from fembeam.model import Branch, Orbit
 from fembeam.model.run_csv import Output
 from fembeam.scene import Place, path_of, split, title
 from fembeam.scene_file.keys import Constructors, parameters
-from fembeam.study import Basins, Ensemble, SpeedAccuracy, basins, characteristics, ensemble, speed_accuracy
+from fembeam.study import (
+    Basins,
+    Campbell,
+    Ensemble,
+    SpeedAccuracy,
+    basins,
+    campbell,
+    characteristics,
+    ensemble,
+    speed_accuracy,
+)
 from fembeam.study.measure import Plan
 from fembeam.study.mode_count import ModeCount, checked_counts, mode_count
 from fembeam.study.quantities import named
@@ -386,11 +396,36 @@ class BasinsTable:
         return basins(file.model(), **keys, checkpoint=folder / "basins.npz", progress=progress)
 
 
+@dataclass(frozen=True)
+class CampbellTable:
+    """The table [campbell]: frequencies of a rotor over its spin, and critical speeds.
+
+    Parameters
+    ----------
+    spins : lowest and highest spin, rad/s. points : how many spins. modes : frequencies of each.
+    """
+
+    spins: tuple[float, float]
+    points: int = 41
+    modes: int = 4
+
+    def __post_init__(self) -> None:
+        low, high = self.spins
+        require(low < high, "spins must be two values, ascending", self.spins, "[campbell]", "give [lowest, highest]")
+        require(self.points > 1, "points must be at least 2", self.points, "[campbell]", "e.g. 41")
+        require(self.modes > 0, "modes must be at least 1", self.modes, "[campbell]", "e.g. 4")
+
+    def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Campbell:
+        """The diagram."""
+        return campbell(file.scene, np.linspace(*self.spins, self.points), self.modes)
+
+
 STUDIES: Constructors = {
     "simulate": Simulate,
     "orbit": OrbitTable,
     "branch": BranchTable,
     "basins": BasinsTable,
+    "campbell": CampbellTable,
     "ensemble": EnsembleTable,
     "mode_count": _table_of(mode_count),
     "smallest_model": _table_of(smallest_model),
