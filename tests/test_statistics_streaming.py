@@ -383,6 +383,16 @@ def test_a_slow_start_leaves_the_number_of_batches_as_it_is():
     assert slow.duration == pytest.approx(80.0, abs=0.1)
 
 
+@pytest.mark.parametrize("rest", [0.0, 0.3, 0.6, 0.9])
+def test_a_duration_of_a_broken_number_of_samples(rest):
+    """What is left of it after the last realisation, less than a sample, is no batch of its own."""
+    model, dt = cantilever(1, base=fb.BandNoise(1e-4, (0.0, 1500.0))), 2e-3
+    found = stationary(model, (8000 + rest) * dt, dt, solver=QUICK)
+    rows = found["tip u"].batches.filled
+    assert np.ptp(rows[:, 0]) <= 16  # samples, one a realisation
+    assert found.duration == pytest.approx(8000 * dt, abs=1.5 * dt)
+
+
 def test_a_run_too_short_for_errors_says_so():
     model = cantilever(1, base=fb.BandNoise(1e-4, (0.0, 1500.0)))
     with pytest.warns(UserWarning, match=r"5 s hold one realisation of the noise, .* simulate at least 9.6"):

@@ -113,7 +113,7 @@ class Segments:
             run = self._run(self.duration)
             yield Segment(run, self.first_lead, self._border(run))
             return
-        while self.kept < self.duration - 0.5 * self.dt:
+        while self.duration - self.kept > (1.0 + 1e-9) * self.dt:  # less may hold no sample
             lead = self.first_lead if self.index == 0 else RENEWAL * self.correlation_time * self.random
             wanted = min(self.longest, self.duration - self.kept)
             run = self._run(math.ceil((lead + wanted) / self.dt - 1e-9) * self.dt)

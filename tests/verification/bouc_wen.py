@@ -30,7 +30,7 @@ ALPHA, A, BETA, GAMMA = 0.1, 1.0, 0.6, 0.3
 LAW = BoucWen(1.0, ALPHA, A, BETA, GAMMA)
 S, D = BETA + GAMMA, GAMMA - BETA
 AMPLITUDES = (0.5, 1.5, 4.0)
-SETTLING = 40  # cycles until it has closed
+SETTLING = 30  # cycles until it has closed
 
 
 def parts(z):
