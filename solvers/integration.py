@@ -241,7 +241,7 @@ class _Run:
         complete = self.engine.keeps_ledger(self.times is not None)
         ledger = partial(_energy, self.system, works, complete, motion, back, self.initial)
         rows = self._rows()
-        log = partial(ContactLog.of_rows, self._of_stops(rows))
+        log = partial(ContactLog.of_rows, self._of_stops(rows), [contact.name for contact in self.system.contacts])
         transitions = partial(Transitions.of_rows, rows, self.system.contacts)
         first, last = (self.initial, self.latched), (state, latched)
         lost = partial(Losses.of_run, self.system.contacts, back, first, last, works, transitions)

@@ -50,7 +50,7 @@ def test_run_writes_run_summary_and_figures(tmp_path, capsys):
     assert main(["run", str(scene(tmp_path)), "--out", str(out), "--quiet"]) == 0
     said = capsys.readouterr()
     assert said.err == ""
-    assert re.search(r"^stop 0 +\d+ ", said.out, re.MULTILINE)
+    assert re.search(r"^stop at 0.24445 m, below +\d+ ", said.out, re.MULTILINE)
     named = ["run.npz", "summary.json", "report.html", "studies.json"]
     assert sorted(p.name for p in out.iterdir()) == sorted([*named, *FIGURES])
     for name in FIGURES:

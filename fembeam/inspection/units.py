@@ -67,9 +67,11 @@ def of_features(scene: Scene) -> list[str]:
     weight = float(np.mean(scene.beam.line_mass(z)) * scene.beam.length)
     for i, mass in enumerate(scene.masses):
         if mass.mass > 1000 * weight:
-            found.append(f"masses[{i}] = {mass.mass:g} kg is {mass.mass / weight:.2g} times the beam: is it in grams?")
+            found.append(f"masses[{i}]{mass.quoted} = {mass.mass:g} kg is {mass.mass / weight:.2g} times the beam: "
+                         "is it in grams?")  # fmt: skip
     for i, part in enumerate(scene.acting):
-        at = f"stops[{i}]" if i < len(scene.stops) else f"elements[{i - len(scene.stops)}]"
+        count = len(scene.stops)
+        at = f"stops[{i}]{part.quoted}" if i < count else f"elements[{i - count}]{part.quoted}"
         found += [f"{at}: {said}" for said in [_of_gap(part, scene.beam.length)] if said]
     ratios = np.atleast_1d(np.asarray(getattr(scene.damping, "zeta", 0.0), dtype=float))
     if ratios.max() >= 0.5:

@@ -107,7 +107,7 @@ class Orbit(Printed):
         table: Part = ("multiplier |μ|", "angle / rad"), multipliers
         names = "t_in", "t_out", "speed_in", "peak_force"
         columns = [getattr(self.contacts, name).tolist() for name in names]
-        rows = [(f"stop {stop}", *row) for stop, *row in zip(self.contacts.stop, *columns, strict=True)]
+        rows = list(zip(self.contacts.name, *columns, strict=True))
         speed, force = (unit_of(of, [one.rotation for one in self.model.contact_rows]) for of in ("speed", "force"))
         log: list[Part] = [
             (("contact", "t_in / s", "t_out / s", f"entry speed / {speed}", f"peak force / {force}"), rows)

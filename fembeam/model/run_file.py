@@ -19,9 +19,9 @@ from fembeam.model.shapes import Shapes
 from fembeam.response import READOUT_UNITS, packed, unpacked
 from fembeam.scene import Source
 from fembeam.support import versions, written_whole
-from solvers.problem import Losses, Transitions, optional
+from solvers.problem import Losses, Transitions, columns_of, optional
 
-FORMAT = 3
+FORMAT = 4
 HDF5 = (".h5", ".hdf5")
 MOST_WORDS = 1 << 28  # bytes
 SIGNATURE, ZIPPED = b"\x89HDF\r\n\x1a\n", b"PK"  # of HDF5 and npz
@@ -65,6 +65,8 @@ def _contents(run: Run) -> tuple[str, dict[str, Any]]:
         "format": FORMAT,
         "status": run.status,
         "sampled": run.sampled,
+        "names": run.names,
+        "given": run.given,
         "scene": run.scene,
         "cost": {f.name: getattr(run.cost, f.name) for f in fields(run.cost)},
         "units": UNITS,
@@ -101,7 +103,7 @@ def _means(run: Run) -> Any:
 
 def _packed(log: Transitions) -> tuple[list[str], Any]:
     """Names of events, and the log as a table (k, 9) that numbers them."""
-    columns = {f.name: getattr(log, f.name) for f in fields(log)}
+    columns = log.arrays()
     events = sorted(set(log.event))
     columns["event"] = [events.index(event) for event in log.event]
     return events, np.array(list(columns.values()), dtype=float).T
@@ -194,9 +196,11 @@ def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run
     bodies = sum(name.split("_")[0] == "nodes" for name in arrays)
     shapes = [Shapes(arrays[f"nodes{i}"], arrays[f"shapes{i}"]) for i in ("", *(f"_{j}" for j in range(1, bodies)))]
     work, stored, slip = arrays["losses"].T
+    names = _names(about, len(arrays["stops"]))
+    log = (arrays[f"contact_{name}"] for name in columns_of(solvers.ContactLog))
     return Run(
         *(arrays["t"], arrays["q"], arrays["q_dot"]),
-        contacts=solvers.ContactLog(*(arrays[f"contact_{f.name}"] for f in fields(solvers.ContactLog))),
+        contacts=solvers.ContactLog(*log, names=names),
         ledger=partial(solvers.Energy, *(arrays[f"energy_{f.name}"] for f in fields(solvers.Energy))),
         status=about["status"],
         cost=solvers.Cost(**about["cost"]),
@@ -207,8 +211,8 @@ def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run
         scene=about["scene"],
         stored_forces=arrays["force"],
         stored_means=arrays["mean_force"],
-        borders=partial(Transitions, *_unpacked(about["events"], arrays["transitions"])),
-        lost=partial(Losses, work, stored, slip, arrays["work"]),
+        borders=partial(Transitions, *_unpacked(about["events"], arrays["transitions"]), names=names),
+        lost=partial(Losses, work, stored, slip, arrays["work"], names=names),
         end=arrays["end"],
         stored=unpacked(about["readout"], arrays, [one.nodes for one in shapes]),
         others=tuple(shapes[1:]),
@@ -217,4 +221,14 @@ def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run
         on=arrays["on"],
         kinds=arrays["kinds"],
         sampled=about["sampled"],
+        names=names,
+        given=tuple(map(bool, about["given"])),
     )
+
+
+def _names(about: dict[str, Any], contacts: int) -> tuple[str, ...]:
+    """What the contacts are called; ValueError unless each has one name and says whether it was given."""
+    names = about["names"]
+    if not len(names) == len(about["given"]) == contacts or not all(isinstance(name, str) for name in names):
+        raise ValueError(f"its words contradict its arrays: {contacts} contacts need as many names, it has {names}")
+    return tuple(names)

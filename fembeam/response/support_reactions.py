@@ -55,7 +55,9 @@ class Reaction:
 
     @property
     def name(self) -> str:
-        """Such as "Clamped at z = 0 m"."""
+        """The name of the part, else such as "Clamped at z = 0 m"."""
+        if self.part.name is not None:
+            return str(self.part.name)
         return f"{type(self.part).__name__} at z = {self.part.z:g} m" + (f" of beam {self.body}" if self.body else "")
 
     def __repr__(self) -> str:

@@ -150,7 +150,7 @@ def _moments(run: Run, discard: float) -> dict[str, dict[str, float]]:
     if np.count_nonzero(kept) < 2:
         return {}
     signals = {f"displacement, {name}": run.displacement(z)[kept] for name, z in plot.places(run.shapes).items()}
-    signals |= {f"indentation, {run.name(i)}": run.indentation(i)[kept] for i in range(len(run.stops))}
+    signals |= {f"indentation, {run.key(i)}": run.indentation(i)[kept] for i in range(len(run.stops))}
     extremes = {name: {"min": float(x.min()), "max": float(x.max())} for name, x in signals.items()}
     error = partial(_error_of_std, parts=plot.batches(run, discard))
     return {name: asdict(moments(x)) | {"std_error": error(x)} | extremes[name] for name, x in signals.items()}
@@ -190,8 +190,8 @@ def _contacts(run: Run, discard: float) -> list[dict[str, Any]]:
     rows, parts = [], plot.batches(run, discard)
     for stop in np.flatnonzero(run.kinds[:, 1] == 0).tolist():
         kept = (log.stop == stop) & (log.t_in >= discard) & np.isfinite(log.t_out)
-        row: dict[str, Any] = {"stop": stop, "z": float(run.stops[stop, 0]), "number": int(kept.sum())}
-        row |= {"name": run.name(stop)} if run.kinds[stop, 0] else {}
+        row: dict[str, Any] = {"stop": stop, "name": run.name(stop), "z": float(run.stops[stop, 0])}
+        row["number"] = int(kept.sum())
         row["rate"] = row["number"] / span if span > 0 else None
         row["rate_error"] = _error_of_rate(log.t_in[kept], discard, discard + span, parts)
         columns = {"duration": log.t_out - log.t_in, "peak_force": log.peak_force, "entry_speed": log.speed_in}
@@ -226,8 +226,7 @@ def text(found: dict[str, Any]) -> str:
     columns = {"mean time/s": "duration", f"mean peak force/{force}": "peak_force",
                f"mean entry speed/({speed})": "entry_speed"}  # fmt: skip
     rows = [
-        [row.get("name", f"stop {row['stop']}"), row["number"], row["rate"]]
-        + [row.get(column, {}).get("mean") for column in columns.values()]
+        [row["name"], row["number"], row["rate"]] + [row.get(column, {}).get("mean") for column in columns.values()]
         for row in found["contacts"]
     ]
     tables += [aligned(("", "contacts", "per second", *columns), rows)] if rows else []

@@ -143,7 +143,7 @@ def _simulation(found: dict[str, Any]) -> Iterator[str]:
             ]
             for words, unit, *keys in CONTACT_ROWS
         ]
-        stops = [row.get("name", f"stop {row['stop']}") for row in found["contacts"]]
+        stops = [row["name"] for row in found["contacts"]]
         yield "<h2>Contacts</h2>" + html_table(["", *stops], rows)
     if found.get("outputs"):
         rows = [[name, *map(_number, row.values())] for name, row in found["outputs"].items()]

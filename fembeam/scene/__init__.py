@@ -11,6 +11,7 @@ from fembeam.scene.element import Element, tangent
 from fembeam.scene.impactor import Impactor
 from fembeam.scene.local_coordinate import LocalCoordinate, unit_of
 from fembeam.scene.parameters import changes_structure, path_of, replaced, value_of, with_value
+from fembeam.scene.part import ScenePart
 from fembeam.scene.parts import Clamped, Dashpot, Guided, LumpedMass, Pinned, PointForce, PointMoment, Spring, Stop
 from fembeam.scene.scene import FEATURES, Scene
 from fembeam.scene.signals import PLACES, for_duration, persistent_drive, signals_of, with_signals

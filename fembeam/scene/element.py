@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 
 from fembeam.scene.impactor import check_law
 from fembeam.scene.local_coordinate import LocalCoordinate, Of, local_coordinate
-from fembeam.support import require, require_finite, require_place
+from fembeam.scene.part import ScenePart
+from fembeam.support import require, require_finite
 
 TRIED = np.array([1e-6, 1e-4, 1e-3])  # deformations, m or rad, of both signs, at which a law is tried out
 
 
-@dataclass(frozen=True)
-class Element:
+@dataclass(frozen=True, repr=False)
+class Element(ScenePart):
     """A local element that always acts: force F(d, ḋ) against its deformation d = u(z) - gap, or that of u_z.
 
     Parameters
@@ -32,6 +33,7 @@ class Element:
     to : its other end; None: the frame, a number: that place on the same beam, (body, z): on a beam of
         `Scene.bodies`, 1 the first. d is then the difference, u(z) - u_to - gap.
     gap : d = 0 at u = gap, m or rad: an offset, since the law acts on both sides.
+    name : keyword, what tables and figures call it, unique in a scene.
 
     Raises
     ------
@@ -47,17 +49,17 @@ class Element:
     True
     """
 
-    z: float
     law: Any
     of: Of = "displacement"
     to: float | tuple[int, float] | None = None
     gap: float = 0.0
     push = -1.0  # δ = d: direction -W
     always = True
+    word = "element"
 
     def __post_init__(self) -> None:
-        require_place(self.z, self)
-        where = f"Element at z = {self.z}"
+        super().__post_init__()
+        where = self.where
         require_finite("gap", self.gap, where, "give the offset in m, or rad of a rotation")
         local_coordinate(self.z, self.of, self.to, where, "to")
         check_law(self.law, where)
@@ -68,7 +70,11 @@ class Element:
     @property
     def coordinate(self) -> LocalCoordinate:
         """What it acts on."""
-        return local_coordinate(self.z, self.of, self.to, f"Element at z = {self.z}", "to")
+        return local_coordinate(self.z, self.of, self.to, self.where, "to")
+
+    def _made(self, at: str) -> str:
+        of, to = " of rotation" * self.coordinate.rotation, self.coordinate.to_words
+        return f"{self.word}{of} " + (f"from {at} to {to}" if to else f"at {at}")
 
 
 def one_sided(law: Any) -> Iterator[str]:

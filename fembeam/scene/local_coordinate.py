@@ -57,6 +57,13 @@ class LocalCoordinate:
         """Whether it is a rotation: rad and N m, not m and N."""
         return self.derivative == 1
 
+    @property
+    def to_words(self) -> str:
+        """The second place: "0.8 m", "0.2 m of beam 1"; empty without one."""
+        if self.to is None:
+            return ""
+        return f"{self.to[1]:.6g} m" + (f" of beam {self.to[0]}" if self.to[0] else "")
+
     def row(self, matrices: Matrices, body: int = 0) -> sparse.csr_matrix:
         """W (1, N) on the free dofs, for a first place on `body`."""
         row = matrices.interpolation(self.z, self.derivative, body)

@@ -7,11 +7,12 @@ from typing import Any
 
 from fembeam.scene.impactor import check_law
 from fembeam.scene.local_coordinate import LocalCoordinate, Of, local_coordinate
-from fembeam.support import require, require_finite, require_non_negative, require_place
+from fembeam.scene.part import ScenePart
+from fembeam.support import require, require_finite, require_non_negative
 
 
-@dataclass(frozen=True)
-class Clamped:
+@dataclass(frozen=True, repr=False)
+class Clamped(ScenePart):
     """u = 0 and u_z = 0 at z (m).
 
     Examples
@@ -20,15 +21,12 @@ class Clamped:
     (True, True)
     """
 
-    z: float
+    word = "clamp"
     fixed = (True, True)
 
-    def __post_init__(self) -> None:
-        require_place(self.z, self)
 
-
-@dataclass(frozen=True)
-class Pinned:
+@dataclass(frozen=True, repr=False)
+class Pinned(ScenePart):
     """u = 0 at z (m), free to turn.
 
     Examples
@@ -37,15 +35,12 @@ class Pinned:
     (True, False)
     """
 
-    z: float
+    word = "pin"
     fixed = (True, False)
 
-    def __post_init__(self) -> None:
-        require_place(self.z, self)
 
-
-@dataclass(frozen=True)
-class Guided:
+@dataclass(frozen=True, repr=False)
+class Guided(ScenePart):
     """u_z = 0 at z (m), free to move.
 
     Examples
@@ -54,18 +49,15 @@ class Guided:
     (False, True)
     """
 
-    z: float
+    word = "guide"
     fixed = (False, True)
-
-    def __post_init__(self) -> None:
-        require_place(self.z, self)
 
 
 Support = Clamped | Pinned | Guided
 
 
-@dataclass(frozen=True)
-class LumpedMass:
+@dataclass(frozen=True, repr=False)
+class LumpedMass(ScenePart):
     """A rigid body fixed to the beam at z: T = ½ m (u̇ + e u̇_z)² + ½ J u̇_z².
 
     `mass` m in kg, `inertia` J about its own centre in kg m², both ≥ 0; `offset` e in m: the centre sits
@@ -78,20 +70,20 @@ class LumpedMass:
     6.667e-06
     """
 
-    z: float
     mass: float
     inertia: float = 0.0
     offset: float = 0.0
+    word = "mass"
 
     def __post_init__(self) -> None:
-        require_place(self.z, self)
-        require_non_negative("mass", self.mass, f"LumpedMass at z = {self.z}", "give kg")
-        require_non_negative("inertia", self.inertia, f"LumpedMass at z = {self.z}", "give kg m²")
-        require_finite("offset", self.offset, f"LumpedMass at z = {self.z}", "give m")
+        super().__post_init__()
+        require_non_negative("mass", self.mass, self.where, "give kg")
+        require_non_negative("inertia", self.inertia, self.where, "give kg m²")
+        require_finite("offset", self.offset, self.where, "give m")
 
 
-@dataclass(frozen=True)
-class Spring:
+@dataclass(frozen=True, repr=False)
+class Spring(ScenePart):
     """A spring to the frame: force -k (u - foot) (`stiffness`, N/m), moment -κ u_z (`rotational`, N m/rad); ≥ 0.
 
     `foot` is a signal, the motion of its far end relative to the frame in m (a shaken support); None: at rest.
@@ -105,21 +97,21 @@ class Spring:
     10.0
     """
 
-    z: float
     stiffness: float
     rotational: float = 0.0
     foot: Any = None
+    word = "spring"
 
     def __post_init__(self) -> None:
-        require_place(self.z, self)
-        require_non_negative("stiffness", self.stiffness, f"Spring at z = {self.z}", "give N/m")
-        require_non_negative("rotational", self.rotational, f"Spring at z = {self.z}", "give N m/rad")
+        super().__post_init__()
+        require_non_negative("stiffness", self.stiffness, self.where, "give N/m")
+        require_non_negative("rotational", self.rotational, self.where, "give N m/rad")
         require(self.foot is None or callable(self.foot), "foot must be a signal or None", self.foot,
-                f"Spring at z = {self.z}", "give a motion such as Harmonic(amplitude, omega)")  # fmt: skip
+                self.where, "give a motion such as Harmonic(amplitude, omega)")  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Dashpot:
+@dataclass(frozen=True, repr=False)
+class Dashpot(ScenePart):
     """A dashpot to the frame: force -c u̇ (`damping`, N s/m), moment -γ u̇_z (`rotational`, N m s); ≥ 0.
 
     ValueError for a negative one.
@@ -130,24 +122,25 @@ class Dashpot:
     Dashpot(z=0.3, damping=2.0, rotational=0.0)
     """
 
-    z: float
     damping: float
     rotational: float = 0.0
+    word = "dashpot"
 
     def __post_init__(self) -> None:
-        require_place(self.z, self)
-        require_non_negative("damping", self.damping, f"Dashpot at z = {self.z}", "give N s/m")
-        require_non_negative("rotational", self.rotational, f"Dashpot at z = {self.z}", "give N m s/rad")
+        super().__post_init__()
+        require_non_negative("damping", self.damping, self.where, "give N s/m")
+        require_non_negative("rotational", self.rotational, self.where, "give N m s/rad")
 
 
-@dataclass(frozen=True)
-class Stop:
+@dataclass(frozen=True, repr=False)
+class Stop(ScenePart):
     """A one-sided stop: δ = -u - gap below the beam, δ = u - gap above it; of rotation δ = ∓u_z - gap.
 
     `law` gives the repulsive force for δ > 0; `gap` in m, negative = preload. It sits on the frame, or `on` another
     beam of the scene: `on=(body, z)`, body 1 the first of `Scene.bodies`; u is then the difference, u - u_body(z). A
     number for `on` is a second place on the same beam. With `of="rotation"` it limits the slope u_z, a hinge with
     freeplay: gap in rad, force a moment in N m, "below" stops u_z < 0, "above" u_z > 0.
+    `name` (keyword, as of all parts): what the contact log, tables and figures call it, unique in a scene.
     ValueError for a side that is neither "below" nor "above", an `of` that is neither, a gap that is not finite.
 
     Examples
@@ -158,19 +151,21 @@ class Stop:
     ['below', 'above']
     >>> Stop(0.0, KelvinVoigt(500.0, 0.1), gap=0.02, side="above", of="rotation").coordinate.rotation
     True
+    >>> both[0].label, Stop(0.2, Hertz(1e9), name="valve").label
+    ('stop at 0.2 m, below', 'valve')
     """
 
-    z: float
     law: Any
     gap: float = 0.0
     side: str = "below"
     on: float | tuple[int, float] | None = None
     of: Of = "displacement"
     always = False
+    word = "stop"
 
     def __post_init__(self) -> None:
-        require_place(self.z, self)
-        where = f"Stop at z = {self.z}"
+        super().__post_init__()
+        where = self.where
         require_finite("gap", self.gap, where, "give the clearance in m (rad of a rotation), negative for a preload")
         require(self.side in ("below", "above"), "side must be 'below' or 'above'", self.side, where, "choose one")
         local_coordinate(self.z, self.of, self.on, where, "on")
@@ -186,11 +181,15 @@ class Stop:
     @property
     def coordinate(self) -> LocalCoordinate:
         """What it acts on."""
-        return local_coordinate(self.z, self.of, self.on, f"Stop at z = {self.z}", "on")
+        return local_coordinate(self.z, self.of, self.on, self.where, "on")
+
+    def _made(self, at: str) -> str:
+        of, on = " of rotation" * self.coordinate.rotation, self.coordinate.to_words
+        return f"{self.word}{of} at {at}, {self.side}" + (f", on {on}" if on else "")
 
 
-@dataclass(frozen=True)
-class PointForce:
+@dataclass(frozen=True, repr=False)
+class PointForce(ScenePart):
     """A force on the beam at z: signal(t) in N, positive up.
 
     Examples
@@ -200,17 +199,17 @@ class PointForce:
     100.0
     """
 
-    z: float
     signal: Any
+    word = "force"
 
     def __post_init__(self) -> None:
-        require_place(self.z, self)
-        require(callable(self.signal), "signal must be a function of t", self.signal, f"PointForce at z = {self.z}",
+        super().__post_init__()
+        require(callable(self.signal), "signal must be a function of t", self.signal, self.where,
                 "give a signal such as Harmonic(amplitude, omega); Harmonic(size, 0.0) is a constant")  # fmt: skip
 
 
-@dataclass(frozen=True)
-class PointMoment:
+@dataclass(frozen=True, repr=False)
+class PointMoment(ScenePart):
     """A moment on the beam at z: signal(t) in N m, positive where it turns u_z up.
 
     Examples
@@ -220,10 +219,10 @@ class PointMoment:
     1.5
     """
 
-    z: float
     signal: Any
+    word = "moment"
 
     def __post_init__(self) -> None:
-        require_place(self.z, self)
-        require(callable(self.signal), "signal must be a function of t", self.signal, f"PointMoment at z = {self.z}",
+        super().__post_init__()
+        require(callable(self.signal), "signal must be a function of t", self.signal, self.where,
                 "give a signal such as Harmonic(amplitude, omega); Harmonic(size, 0.0) is a constant")  # fmt: skip

@@ -66,6 +66,9 @@ class Scene:
     gravity : g in m/s², pulls everything down; for all bodies.
     elements : of Element, local elements that always act, numbered on after the stops.
 
+    Every part takes a keyword ``name``, unique among all parts, those of bodies included: logs, tables, figures and
+    messages use it. Without one a name is made, such as "stop at 3 m, below".
+
     Raises
     ------
     ValueError : anything outside the beam, not finite, or in conflict; the message names it.
@@ -114,6 +117,7 @@ class Scene:
         self._check_base()
         self._check_conflicts()
         self._check_bodies()
+        self._check_names()
         for said in self.doubts:
             warnings.warn(said, UserWarning, stacklevel=3)
 
@@ -245,6 +249,13 @@ class Scene:
         return buckling_load(self, elements)
 
     @property
+    def named(self) -> dict[str, Any]:
+        """The parts that were given a name, those of bodies too, by their paths, such as "bodies[0].stops[1]"."""
+        own = ((name, i, part) for name in FEATURES for i, part in enumerate(getattr(self, name)))
+        inner = {f"bodies[{i}].{path}": part for i, body in enumerate(self.bodies) for path, part in body.named.items()}
+        return {f"{name}[{i}]": part for name, i, part in own if part.name is not None} | inner
+
+    @property
     def places(self) -> list[float]:
         """Coordinates of all features, second places of stops and elements included, in no order."""
         second = [place.to[1] for place in (one.coordinate for one in self.acting) if place.to and place.to[0] == 0]
@@ -258,7 +269,7 @@ class Scene:
     def _check_places(self, name: str) -> None:
         """Raise ValueError unless every feature of one list sits on the beam."""
         for index, feature in enumerate(getattr(self, name)):
-            where = f"{name}[{index}] ({type(feature).__name__}) of Scene"
+            where = f"{name}[{index}] ({feature.titled}) of Scene"
             require(0 <= feature.z <= self.beam.length, f"z must lie on the beam, 0 to {self.beam.length} m",
                     feature.z, where, "move it, or lengthen the beam")  # fmt: skip
 
@@ -296,9 +307,17 @@ class Scene:
             require(plain, "a body must not have base, gravity or bodies of its own", body,
                     f"bodies[{index}] of Scene", "give them to the outer scene")  # fmt: skip
         for index, stop in enumerate(self.stops):
-            self._check_second(stop.coordinate, "on", f"stops[{index}] of Scene")
+            self._check_second(stop.coordinate, "on", f"stops[{index}]{stop.quoted} of Scene")
         for index, element in enumerate(self.elements):
-            self._check_second(element.coordinate, "to", f"elements[{index}] of Scene")
+            self._check_second(element.coordinate, "to", f"elements[{index}]{element.quoted} of Scene")
+
+    def _check_names(self) -> None:
+        """Raise ValueError if two parts have one name, those of bodies included."""
+        known: dict[str, str] = {}
+        for path, part in self.named.items():
+            other = known.setdefault(part.name, path)
+            require(other == path, "names must be unique", part.name, f"{other} and {path} of Scene",
+                    "give each part its own, or none")  # fmt: skip
 
     def _check_second(self, place: LocalCoordinate, key: str, where: str) -> None:
         """Raise ValueError unless what a stop or element acts on exists and can move."""

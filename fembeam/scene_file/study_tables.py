@@ -268,7 +268,7 @@ class FoundOrbit(Result):
         extremes = [(f"displacement, {name}", *both) for name, both in self._extremes.items()]
         columns = {"t_in": "begins/s", "t_out": "ends/s", "speed_in": "entry speed/(m/s)", "peak_force": "peak force/N"}
         values = [getattr(log, name).tolist() for name in columns]
-        rows = [(f"stop {stop}", *row) for stop, *row in zip(log.stop, *values, strict=True)]
+        rows = list(zip(log.name, *values, strict=True))
         contacts: list[Part] = ["", (("", *columns.values()), rows)]
         return [head, "", (("", "min/m", "max/m"), extremes), *(contacts if rows else [])]
 

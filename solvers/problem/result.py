@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from solvers.problem.frames import Columns
+from solvers.problem.frames import Columns, columns_of
 from solvers.problem.matrices import Array
 from solvers.problem.system import stored_energy
 
@@ -62,7 +62,7 @@ class ContactLog(Columns):
 
     Attributes
     ----------
-    stop : index of the stop. t_in, t_out : s. speed_in, speed_out : m/s, both positive.
+    stop : index of the stop. name : what it is called. t_in, t_out : s. speed_in, speed_out : m/s, both positive.
     peak_indentation : m. peak_force : N. impulse : N s. energy_loss : J taken out of the beam.
     entry_rate_clipped : whether the entry speed was below the law's floor (also for a contact that began at t = 0);
         every law has one, 1e-3 m/s where none was given, whether or not its force depends on that speed.
@@ -78,6 +78,7 @@ class ContactLog(Columns):
     impulse: Array
     energy_loss: Array
     entry_rate_clipped: Any
+    names: tuple[str, ...] = field(default=(), kw_only=True)
 
     def __len__(self) -> int:
         return len(self.stop)
@@ -87,11 +88,11 @@ class ContactLog(Columns):
         return f"<{counted(len(self), 'contact')}, {open_ones} of them not ended>"
 
     @classmethod
-    def of_rows(cls, rows: Array) -> ContactLog:
-        """From the kernels' table, one contact a row."""
+    def of_rows(cls, rows: Array, names: Sequence[str] = ()) -> ContactLog:
+        """From the kernels' table, one contact a row, with names of all stops."""
         columns: list[Any] = [*rows.T.copy()]
         columns[0], columns[-1] = columns[0].astype(int), columns[-1].astype(bool)
-        return cls(*columns)
+        return cls(*columns, names=tuple(names))
 
     @classmethod
     def of_period(cls, logs: Sequence[ContactLog], starts: Sequence[float], period: float) -> ContactLog:
@@ -113,10 +114,10 @@ class ContactLog(Columns):
             part + np.array([0.0, start, start] + [0.0] * (COLUMNS - 3))
             for part, start in zip(rows, starts, strict=True)
         ]
-        return cls.of_rows(np.concatenate(moved))
+        return cls.of_rows(np.concatenate(moved), logs[0].names)
 
 
-COLUMNS = len(fields(ContactLog))
+COLUMNS = len(columns_of(ContactLog))
 
 
 def _make_whole(row: Array, rest: Array, later: float) -> None:
@@ -132,7 +133,7 @@ class Transitions(Columns):
 
     Attributes
     ----------
-    contact : index of the contact. t : s. border : index of the border among those of its law.
+    contact : index of the contact. name : what it is called. t : s. border : its index among those of the law.
     event : what it was, by the law's names, such as "stick" and "slip".
     delta, delta_dot, force : m, m/s and N as the border was met.
     impulse : N s, and work : J, done by the law's force since the run began, before the border.
@@ -147,6 +148,7 @@ class Transitions(Columns):
     force: Array
     impulse: Array
     work: Array
+    names: tuple[str, ...] = field(default=(), kw_only=True)
 
     def __len__(self) -> int:
         return len(self.t)
@@ -162,7 +164,7 @@ class Transitions(Columns):
         contact, border, code = (column.astype(int) for column in (-1.0 - rows[:, 0], rows[:, 2], rows[:, 3]))
         names = [contacts[c].law.events[i] for c, i in zip(contact, code, strict=True)]
         columns[0], columns[2], columns[3] = contact, border, np.array(names, dtype=object)
-        return cls(*columns)
+        return cls(*columns, names=tuple(one.name for one in contacts))
 
     def slid(self) -> Array:
         """(k,) m: path of the slip that each "stick" ends, 0 for other rows."""
