@@ -1,5 +1,6 @@
 """The command line: results, tables, exit codes."""
 
+import csv
 import json
 import os
 import re
@@ -507,8 +508,10 @@ def test_a_run_as_csv(tmp_path, capsys):
     rows = np.loadtxt(tmp_path / "csv" / "histories.csv", delimiter=",", skiprows=1)
     assert rows[:, head.index("force 0 [N]")] == pytest.approx(run.force()[::10], rel=1e-11)
     assert rows[:, head.index("displacement tip [m]")] == pytest.approx(run.displacement(0.2599)[::10], rel=1e-11)
-    log = np.loadtxt(tmp_path / "csv" / "contacts.csv", delimiter=",", skiprows=1)
-    assert log[:, 1] == pytest.approx(run.contacts.t_in, rel=1e-11)
+    with (tmp_path / "csv" / "contacts.csv").open(newline="", encoding="utf-8") as file:
+        log = list(csv.DictReader(file))
+    assert [float(row["t_in [s]"]) for row in log] == pytest.approx(run.contacts.t_in, rel=1e-11)
+    assert {row["name"] for row in log} == {"stop at 0.24445 m, below"}
 
 
 class Page(HTMLParser):

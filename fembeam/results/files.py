@@ -20,11 +20,12 @@ from fembeam.model import Run
 from fembeam.model.run_csv import extremes_table, histories
 from fembeam.scene import unit_of
 from fembeam.statistics import Batches, Estimate, moments
-from fembeam.support import aligned, versions, written_whole
+from fembeam.support import aligned, require, versions, written_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+UNDATED: dict[str, dict[str, Any]] = {"png": {"Software": None}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
 FEWEST_SAMPLES = 64  # below this neither a spectrum nor a density says anything
 
 
@@ -91,9 +92,11 @@ def write_text(target: Path, text: str) -> Path:
 
 
 def write_figure(target: Path, figure: Figure) -> Path:
-    """One PNG; the same figure gives the same bytes."""
+    """One PNG, or SVG or PDF by the name; the same figure gives the same bytes."""
+    kind = target.suffix.lower().removeprefix(".")
+    require(kind in UNDATED, "a figure must end in .png, .svg or .pdf", target.name, "its file name", "choose one")
     with written_whole(target) as file:
-        figure.savefig(file, format="png", dpi=150, metadata={"Software": None})
+        figure.savefig(file, format=kind, dpi=150, metadata=UNDATED[kind])
     return target
 
 

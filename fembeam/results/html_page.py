@@ -42,7 +42,7 @@ MOMENT_ROWS = (
 OUTPUT_COLUMNS = ("mean", "std", "min", "at t / s", "max", "at t / s")
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 PREFIXES = ("p", "n", "µ", "m", "", "k", "M", "G", "T")
-ORDER = ("time_history", "psd", "densities", "response_spectrum", "contacts", "modes")
+ORDER = ("rig", "time_history", "psd", "densities", "response_spectrum", "contacts", "modes")
 
 
 def write_page(

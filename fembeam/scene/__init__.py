@@ -1,8 +1,7 @@
 """The scene: supports, masses, springs, stops, elements, impactors, loads; full matrices, contact rows, signals.
 
 Imports: `beams`, `excitation`, `support`, `reduction`; inside the methods `Scene.reduce` also `fembeam.model`,
-`Scene.check` `fembeam.inspection`.
-Begin with `scene`, then `assembly`.
+`Scene.figure` `fembeam.plot`, `Scene.check` `fembeam.inspection`. Begin with `scene`, then `assembly`.
 """
 
 from fembeam.scene.assembly import MOST_DENSE, Matrices, unsupported

@@ -30,6 +30,9 @@ from fembeam.scene.rigid_motions import drifting, rigid_body_modes
 from fembeam.support import require, require_finite, require_non_negative, require_positive
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
     from fembeam.inspection import Check
     from fembeam.model import Model
 
@@ -183,6 +186,12 @@ class Scene:
         from fembeam.model.reduce import reduced
 
         return reduced(self, modes, elements, omega_max, mass_share, residual, interface)
+
+    def figure(self, axes: Axes | None = None) -> Figure:
+        """The rig drawn, `fembeam.plot.rig`: beams to scale along z, all parts with names, gaps enlarged."""
+        from fembeam.plot import rig
+
+        return rig(self, axes)
 
     def check(
         self, duration: float | None = None, dt: float | None = None, discard: float = 0.0, **reduction: Any
