@@ -447,11 +447,7 @@ def _items(view: _View, scene: Scene, body: int) -> Iterator[Item]:
     """All that stands on one beam."""
     for support in scene.supports:
         yield from _support(support, scene.beam.length, body)
-    for mass in scene.masses:
-        arm = mass.offset / view.per_inch
-        yield _item(mass, body, 1, 0.24, partial(symbols.mass, arm=arm), fixed=bool(arm), tall=0.3 if arm else 0.2)
-        if arm:
-            yield Item(mass.z + mass.offset, 1, 0.24, _nothing, "", mass.label_on(body), mute=True, tall=0.3)
+    yield from _masses(view, scene, body)
     for spring in scene.springs:
         yield _item(spring, body, -1, 0.24, partial(_spring, spring=spring))
     for dashpot in scene.dashpots:
@@ -468,6 +464,22 @@ def _items(view: _View, scene: Scene, body: int) -> Iterator[Item]:
         yield _item(force, body, 1, width, partial(_load, force=force), tall=tall)
     for impactor in scene.impactors:
         yield from _impactors(view, impactor, body)
+
+
+def _masses(view: _View, scene: Scene, body: int) -> Iterator[Item]:
+    """Lumped masses; an arm passes over what stands on its way, and over other arms."""
+    others = [*scene.masses, *scene.acting, *scene.forces, *scene.impactors]
+    over = 0
+    for mass in scene.masses:
+        arm = mass.offset / view.per_inch
+        if not arm:
+            yield _item(mass, body, 1, 0.24, symbols.mass, tall=0.2)
+            continue
+        low, high = sorted((mass.z, mass.z + mass.offset))
+        met = any(low - 0.2 * view.per_inch < one.z < high + 0.2 * view.per_inch for one in others if one is not mass)
+        foot, over = (0.56 + 0.22 * over, over + 1) if met else (0.12, over)
+        yield _item(mass, body, 1, 0.24, partial(symbols.mass, arm=arm, foot=foot), fixed=True, tall=foot + 0.18)
+        yield Item(mass.z + mass.offset, 1, 0.24, _nothing, "", mass.label_on(body), mute=True, tall=foot + 0.18)
 
 
 def _impactors(view: _View, impactor: Any, body: int) -> Iterator[Item]:

@@ -115,10 +115,9 @@ def guide(pen: Pen, thickness: float) -> None:
         ground(rail, 2 * half + 0.1)
 
 
-def mass(pen: Pen, arm: float = 0.0, clear: float = 0.02) -> None:
-    """A rigid body on the beam, `arm` inches ahead of its place on a rigid arm."""
+def mass(pen: Pen, arm: float = 0.0, foot: float = 0.02) -> None:
+    """A rigid body `foot` inches off the beam, `arm` inches ahead of its place on a rigid arm."""
     half, s = 0.085 * pen.size, pen.size
-    foot = 0.12 * s if arm else clear
     if arm:
         pen.line([(0.0, 0.0), (0.0, foot + half), (arm, foot + half)], width=2.0)
     left, right, high = arm - half, arm + half, foot + 2 * half
