@@ -26,7 +26,8 @@ __version__ = "0.1.0"
 
 _OFFERED = {
     "beams": "Section Taper Beam ModalDamping Rayleigh",
-    "scene": "Clamped Dashpot Element Guided LumpedMass Pinned PointForce PointMoment Scene Spring Stop Impactor",
+    "structures": "Scale Structure",
+    "scene": "Clamped Dashpot Element Fixed Guided LumpedMass Pinned PointForce PointMoment Scene Spring Stop Impactor",
     "excitation": "Harmonic Multisine BandNoise RollOff Record Pulse SineSweep Step",
     "model": "Model Attractor Orbit Branch Run load",
     "response": "response_spectrum",
@@ -36,10 +37,10 @@ _HOME = {name: folder for folder, names in _OFFERED.items() for name in names.sp
 _MODULES = ["plot", "study"]
 
 __all__ = [
-    "Attractor", "BandNoise", "Beam", "Branch", "Clamped", "Dashpot", "Element", "Guided", "Harmonic", "Impactor",
-    "LumpedMass", "ModalDamping", "Model", "Multisine", "Orbit", "Pinned", "PointForce", "PointMoment", "Pulse",
-    "Rayleigh", "Record", "RollOff", "Run", "Scene", "Section", "SineSweep", "Spring", "Step", "Stop", "Taper",
-    "load", "moments", "pdf", "plot", "psd", "response_spectrum", "study",
+    "Attractor", "BandNoise", "Beam", "Branch", "Clamped", "Dashpot", "Element", "Fixed", "Guided", "Harmonic",
+    "Impactor", "LumpedMass", "ModalDamping", "Model", "Multisine", "Orbit", "Pinned", "PointForce", "PointMoment",
+    "Pulse", "Rayleigh", "Record", "RollOff", "Run", "Scale", "Scene", "Section", "SineSweep", "Spring", "Step",
+    "Stop", "Structure", "Taper", "load", "moments", "pdf", "plot", "psd", "response_spectrum", "study",
 ]  # fmt: skip
 
 if TYPE_CHECKING:
@@ -52,6 +53,7 @@ if TYPE_CHECKING:
         Clamped,
         Dashpot,
         Element,
+        Fixed,
         Guided,
         Impactor,
         LumpedMass,
@@ -63,6 +65,7 @@ if TYPE_CHECKING:
         Stop,
     )
     from fembeam.statistics import moments, pdf, psd
+    from fembeam.structures import Scale, Structure
 
 
 def _check_neighbours() -> None:

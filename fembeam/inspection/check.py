@@ -71,7 +71,7 @@ class Check(Printed):
         return f"<check of {self.model!r}: {solvers.problem.counted(len(self), 'warning')}>"
 
     def _parts(self) -> list[Part]:
-        found: list[Part] = [mode_part(self.model), ""]
+        found: list[Part] = [*self.structure, mode_part(self.model), ""]
         found.append(f"mesh: {self.model.matrices.accuracy}")
         found.append(f"correlation time of the structure 1/min(ζω): {self.correlation_time:.3g} s")
         found += [self._contacts_with(one) for one in self.touched]
@@ -93,6 +93,11 @@ class Check(Printed):
         )
 
     @property
+    def structure(self) -> list[str]:
+        """What the matrices of a structure say."""
+        return self.model.scene.beam.check() if hasattr(self.model.scene.beam, "check") else []
+
+    @property
     def stiffened(self) -> list[float]:
         """Frequencies with the stiffness of the elements, rad/s; empty without elements."""
         if not any(one.always for one in self.model.contact_rows):
@@ -103,6 +108,7 @@ class Check(Printed):
     def plain(self) -> dict[str, Any]:
         """For JSON."""
         return {
+            **({"structure": self.structure} if self.structure else {}),
             "modes": mode_rows(self.model),
             "correlation_time": self.correlation_time,
             "stops": [asdict(one) | {"name": self.model.contact_rows[one.stop].name} for one in self.touched],

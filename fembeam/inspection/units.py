@@ -20,10 +20,15 @@ STEEP = 0.35  # rad; the slope of a beam
 def doubts(model: Model) -> list[str]:
     """Warnings about the numbers of a model's scene, as sentences; of its bodies, too."""
     scene = model.scene
-    found = [*of_beam(scene.beam), *of_features(scene)]
+    found = _of_body(scene)
     for i, body in enumerate(scene.bodies):
-        found += [f"bodies[{i}]: {said}" for said in (*of_beam(body.beam), *of_features(body))]
+        found += [f"bodies[{i}]: {said}" for said in _of_body(body)]
     return [*found, *of_loads(scene, model)]
+
+
+def _of_body(scene: Scene) -> list[str]:
+    """Those about one beam and what stands on it; of a structure, about its damping."""
+    return of_damping(scene) if scene.named else [*of_beam(scene.beam), *of_features(scene)]
 
 
 def of_beam(beam: Beam) -> list[str]:
@@ -73,10 +78,13 @@ def of_features(scene: Scene) -> list[str]:
         count = len(scene.stops)
         at = f"stops[{i}]{part.quoted}" if i < count else f"elements[{i - count}]{part.quoted}"
         found += [f"{at}: {said}" for said in [_of_gap(part, scene.beam.length)] if said]
+    return found + of_damping(scene)
+
+
+def of_damping(scene: Scene) -> list[str]:
+    """Ratios that look like per cent."""
     ratios = np.atleast_1d(np.asarray(getattr(scene.damping, "zeta", 0.0), dtype=float))
-    if ratios.max() >= 0.5:
-        found.append(f"zeta = {ratios.max():g} looks like per cent: 1 is critical damping")
-    return found
+    return [f"zeta = {ratios.max():g} looks like per cent: 1 is critical damping"] if ratios.max() >= 0.5 else []
 
 
 def _of_gap(part: Stop | Element, length: float) -> str:
@@ -91,7 +99,8 @@ def of_loads(scene: Scene, model: Model) -> list[str]:
     found = []
     for path, signal in signals_of(scene).items():
         size = getattr(signal, "std", getattr(signal, "amplitude", 0.0))
-        if path.endswith(("base", "foot")) and not callable(size) and np.max(np.abs(size)) > scene.beam.length:
+        long = math.inf if scene.named else scene.beam.length
+        if path.endswith(("base", "foot")) and not callable(size) and np.max(np.abs(size)) > long:
             found.append(f"{path} moves by {np.max(np.abs(size)):g} m, more than the beam is long: is it in mm?")
     top = highest_driven(scene)
     if 0 < top < math.inf:

@@ -13,12 +13,11 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 import reduction
 import solvers
 from fembeam.model import initial_states
-from fembeam.model.shapes import Shapes, Vector
+from fembeam.model.shapes import Vector
 from fembeam.scene import contact_rows, loads, signals_of, static_rows, tangent, weight
 from fembeam.scene.contact_rows import ContactRow
 from fembeam.support import require
@@ -42,9 +41,9 @@ class ModalEquations:
     matrices: Matrices
     basis: reduction.Basis
     modes: tuple[int, ...]
-    shapes: Shapes
+    shapes: Any  # Shapes, of a body with places by name PlacedShapes
     counts: tuple[tuple[int, int], ...]
-    others: tuple[Shapes, ...]
+    others: tuple[Any, ...]
 
     @property
     def omega(self) -> Vector:
@@ -67,8 +66,27 @@ class ModalEquations:
 
     @cached_property
     def participation(self) -> Vector:
-        """Γ (n,) in √kg."""
-        return self.basis.participation(self.matrices.base_load)
+        """Γ (n,) in √kg; of bodies that are no `Beam` (n, d), a column for each of `moved_along`."""
+        if not self.matrices.beams[0].named:
+            return self.basis.participation(self.matrices.base_load)
+        loads = self.matrices.base_loads.values()
+        return np.array([self.basis.participation(load) for load in loads]).reshape(-1, len(self.omega)).T
+
+    @property
+    def moved_along(self) -> tuple[str, ...]:
+        """Directions in which the frame may move: of a beam "y"."""
+        return tuple(self.matrices.base_loads)
+
+    def participation_along(self, direction: str) -> Vector:
+        """Γ (n,) of a motion of the frame in one direction."""
+        return self.participation if self.participation.ndim == 1 else self.participation[:, self._column(direction)]
+
+    def _column(self, direction: str) -> int:
+        """Of a direction among those in which the frame may move."""
+        known = self.moved_along
+        require(direction in known, f"the frame must move along {', '.join(known) or 'nothing'}", direction, "Model",
+                "gravity pulls along -y")  # fmt: skip
+        return known.index(direction)
 
     @property
     def names(self) -> list[str]:
@@ -86,9 +104,11 @@ class ModalEquations:
         return self.participation**2
 
     @cached_property
-    def moving_mass(self) -> float:
-        """Sum of the effective masses over all modes, b·M⁻¹ b in kg: what a base motion sets moving."""
-        return reduction.moved_mass(self.matrices.M, self.matrices.base_load)
+    def moving_mass(self) -> Any:
+        """Sum of the effective masses over all modes, b·M⁻¹ b in kg: what a base motion sets moving; (d,) likewise."""
+        if not self.matrices.beams[0].named:
+            return reduction.moved_mass(self.matrices.M, self.matrices.base_load)
+        return np.array([reduction.moved_mass(self.matrices.M, load) for load in self.matrices.base_loads.values()])
 
     @property
     def static(self) -> int:
@@ -101,12 +121,15 @@ class ModalEquations:
         rows, full = static_rows(self.scene, self.matrices), self.matrices
         return reduction.static_share(self.basis, full.M, full.K, rows.T, full.root) if rows.shape[0] else np.zeros(0)
 
-    def phi(self, z: ArrayLike, derivative: int = 0, body: int = 0) -> Vector:
-        """Mass-normalised mode shapes in 1/√kg of a beam (0 the scene's own): (n,) at one z, (k, n) at z (k,)."""
+    def phi(self, z: Any, derivative: int = 0, body: int = 0) -> Vector:
+        """Mass-normalised mode shapes in 1/√kg of a beam (0 the scene's own): (n,) at one z, (k, n) at z (k,).
+
+        Of other bodies at (place, direction), or a list of such pairs.
+        """
         return (self.shapes, *self.others)[body](z, derivative)
 
     @cached_property
-    def section_forces(self) -> tuple[SectionForces, ...]:
+    def section_forces(self) -> tuple[SectionForces | None, ...]:
         """Bending moment and shear force per unit of each coordinate, on each beam."""
         from fembeam.response import section_forces
 
@@ -141,8 +164,8 @@ class ModalEquations:
 
     def _frame_loads(self, scene: Scene) -> list[tuple[Vector, Any]]:
         """Loads of base motion and gravity."""
-        moved = [] if scene.base is None else [(-self.participation, scene.base.derivative(2))]
-        return moved + ([] if scene.gravity == 0.0 else [(-self.participation, weight(scene))])
+        moved = [(-self.participation_along(one), motion.derivative(2)) for one, motion in scene.motions.items()]
+        return moved + ([] if scene.gravity == 0.0 else [(-self.participation_along("y"), weight(scene))])
 
     def system_like(self, scene: Scene) -> solvers.System:
         """The same as `system_of`, quicker where only base motion, gaps and laws of its stops and elements differ."""
@@ -151,7 +174,7 @@ class ModalEquations:
         if (
             any(_placed(new) != _placed(old) for new, old in zip(parts, known, strict=True))
             or any(getattr(scene, name) != getattr(self.scene, name) for name in SEEN)
-            or (scene.base is None, scene.gravity == 0.0) != (self.scene.base is None, self.scene.gravity == 0.0)
+            or (*scene.motions, scene.gravity == 0.0) != (*self.scene.motions, self.scene.gravity == 0.0)
         ):
             return self.system_of(scene)
         contacts = [

@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 from difflib import get_close_matches
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fembeam.model.shapes import Shapes
-from fembeam.scene import unit_of
-from fembeam.support import require
+from fembeam.model.placed_shapes import PlacedShapes
+from fembeam.scene import split, unit_of
+from fembeam.support import is_whole, require
 
 if TYPE_CHECKING:
     from fembeam.response import Extremes, Readout
 
 Vector = NDArray[np.float64]
+
+
+def directed(z: Any, direction: Any) -> Any:
+    """Places with a direction as pairs: of one place a pair, of a list of places or pairs a list."""
+    if isinstance(z, list):
+        return z if direction is None else [(place, direction) for place in z]
+    return z if direction is None else (z, direction)
 
 
 class Histories:
@@ -28,10 +35,10 @@ class Histories:
     directions: Vector
     impactor_masses: Vector
     kinds: NDArray[np.bool_]
+    shapes: Any  # Shapes, of a body with places by name PlacedShapes
+    others: tuple[Any, ...]
     names: tuple[str, ...]
     given: tuple[bool, ...]
-    shapes: Shapes
-    others: tuple[Shapes, ...]
     sampled: bool
 
     if TYPE_CHECKING:  # made by the run when first read
@@ -50,18 +57,19 @@ class Histories:
                 "give simulate a dt, or dt=[duration] for the end alone")  # fmt: skip
         return values
 
-    def displacement(self, z: ArrayLike, body: int = 0, absolute: bool = False) -> Vector:
+    def displacement(self, z: Any, direction: Any = None, body: int = 0, absolute: bool = False) -> Vector:
         """u(z, t) of a beam (0 the scene's own), m: (k,) at one z, (k, j) at z (j,).
 
-        Relative to the frame, or ``absolute``: u + y.
+        Relative to the frame, or ``absolute``: u + y. Of other bodies along a direction, "x", "-y", "rz" or a vector,
+        of a place or a list of places: ``displacement("lever", "z")``.
         """
-        return self._motion(self.q, z, body, absolute, 0)
+        return self._motion(self.q, z, direction, body, absolute, 0)
 
-    def velocity(self, z: ArrayLike, body: int = 0, absolute: bool = False) -> Vector:
-        """u̇(z, t) relative to the frame, m/s, or ``absolute``: u̇ + ẏ; shapes as for `displacement`."""
-        return self._motion(self.q_dot, z, body, absolute, 1)
+    def velocity(self, z: Any, direction: Any = None, body: int = 0, absolute: bool = False) -> Vector:
+        """u̇(z, t) relative to the frame, m/s, or ``absolute``: u̇ + ẏ; places and shapes as for `displacement`."""
+        return self._motion(self.q_dot, z, direction, body, absolute, 1)
 
-    def acceleration(self, z: ArrayLike, body: int = 0, absolute: bool = False) -> Vector:
+    def acceleration(self, z: Any, direction: Any = None, body: int = 0, absolute: bool = False) -> Vector:
         """ü(z, t) relative to the frame, m/s², or ``absolute``: ü + ÿ; shapes as for `displacement`.
 
         ü = φ(z)·q'' with q'' of the equations of motion at the samples, the contact forces of the laws included: the
@@ -70,14 +78,34 @@ class Histories:
         """
         from fembeam.response import coordinates
 
-        return self._motion(coordinates(self), z, body, absolute, 2)
+        return self._motion(coordinates(self), z, direction, body, absolute, 2)
 
-    def _motion(self, rates: Vector, z: ArrayLike, body: int, absolute: bool, order: int) -> Vector:
+    def motion(self, place: Any, body: int = 0) -> Vector:
+        """All components (k, c) of a place, m and rad: those of `shapes.components`; of a beam u and u_z."""
+        shapes = self._beam(body)
+        if isinstance(shapes, PlacedShapes):
+            return self._at_samples(self.q) @ shapes.motion(place).T
+        return self._at_samples(self.q) @ np.array([shapes(place), shapes(place, 1)]).T
+
+    def _motion(self, rates: Vector, z: Any, direction: Any, body: int, absolute: bool, order: int) -> Vector:
         """A derivative of u at z (k,) or (k, j), with that of the frame's motion if absolute."""
         from fembeam.response import frame_motion
 
-        values = self._at_samples(rates) @ self._beam(body)(z).T
-        return (values.T + frame_motion(self, order)).T if absolute else values
+        if is_whole(direction):  # a body by its position, as where places are numbers
+            direction, body = None, direction
+        shapes, at = self._beam(body), z
+        if isinstance(shapes, PlacedShapes):
+            at = directed(z, direction)
+        else:
+            require(direction in (None, "y"), "a Beam moves along y", direction, "Run", "leave the direction out")
+        values = self._at_samples(rates) @ shapes(at).T
+        if not absolute:
+            return values
+        if not isinstance(shapes, PlacedShapes):
+            return (values.T + frame_motion(self, order)).T
+        ways = [split(one, shapes.components)[1] for one in (at if isinstance(at, list) else [at])]
+        moved = np.array([frame_motion(self, order, way) for way in ways]).T
+        return values + (moved if isinstance(at, list) else moved[:, 0])
 
     def slope(self, z: ArrayLike, body: int = 0) -> Vector:
         """u_z(z, t), rad."""
@@ -106,14 +134,19 @@ class Histories:
         Parameters
         ----------
         quantity : "displacement", "slope", "moment", "shear" or "stress".
-        z : places (j,) in m; None: all nodes of the mesh.
+        z : places (j,) in m; None: all nodes of the mesh. Of other bodies a list of (place, direction).
         """
         from fembeam.response import extremes, rows_of
 
-        places = self._beam(body).nodes if z is None else np.atleast_1d(np.asarray(z, dtype=float))
+        shapes = self._beam(body)
+        if isinstance(shapes, PlacedShapes):
+            given: Any = list(shapes.usual.values()) if z is None else z
+            at = [given] if isinstance(given, tuple) else list(given)
+            return extremes(self.t, self._at_samples(self.q), *rows_of(self, quantity, at, body))
+        places = shapes.nodes if z is None else np.atleast_1d(np.asarray(z, dtype=float))
         return extremes(self.t, self._at_samples(self.q), *rows_of(self, quantity, places, body))
 
-    def _beam(self, body: int) -> Shapes:
+    def _beam(self, body: int) -> Any:
         """A beam's shapes; ValueError unless there is one of that number."""
         beams = (self.shapes, *self.others)
         require(body in range(len(beams)), f"body must be below {len(beams)}, the number of beams", body, "Run",
@@ -124,7 +157,9 @@ class Histories:
         """A field over time: (k,) at one z, (k, j) at z (j,)."""
         from fembeam.response import rows_of
 
-        self._beam(body)
+        straight = not isinstance(self._beam(body), PlacedShapes)
+        require(straight, f"{quantity} is of a Beam, which has sections", z, "Run",
+                "ask for displacement(place, direction), rotations included, or for reactions")  # fmt: skip
         places = np.asarray(z, dtype=float)
         shapes, _, offset = rows_of(self, quantity, np.atleast_1d(places), body)
         values = self._at_samples(self.q) @ shapes.T + offset

@@ -7,14 +7,15 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import linalg as sparse_linalg
 
 import reduction
 from contacts.path import borders
-from fembeam.scene import tangent
+from fembeam.scene import BodyMatrices, tangent
 from fembeam.support import require, require_finite
 
 if TYPE_CHECKING:
@@ -90,6 +91,8 @@ def _on_nodes(beam: Matrices, field: Field) -> Vector:
     """A field's values and slopes, those of a cubic spline through the nodes, on a beam's free dofs."""
     if field is None:
         return np.zeros(beam.M.shape[0])
+    if isinstance(beam, BodyMatrices):
+        return _on_labels(beam, field)
     from scipy.interpolate import CubicSpline
 
     values = np.broadcast_to(np.asarray(field(beam.nodes), dtype=float), beam.nodes.shape)
@@ -97,6 +100,18 @@ def _on_nodes(beam: Matrices, field: Field) -> Vector:
     require(not bad.size, "the field must be finite on the beam", bad[:1], "Model.state", "check the function")
     both = np.stack([values, CubicSpline(beam.nodes, values)(beam.nodes, 1)], axis=1)
     return both[beam.dofs >= 0]
+
+
+def _on_labels(body: BodyMatrices, field: Any) -> Vector:
+    """Values (N,) on free dofs of {(node, component): value}; others are 0, supported ones must be."""
+    labels = body.assembled.labels
+    require(isinstance(field, Mapping), "the field of a structure must be {(node, component): value}", field,
+            "Model.state", "name the dofs that move")  # fmt: skip
+    unknown = [label for label in field if label not in labels]
+    require(not unknown, "the field must be of dofs that exist", unknown[:1], "Model.state", "see labels")
+    values = np.array([float(field.get(label, 0.0)) for label in labels])
+    require(bool(np.isfinite(values).all()), "the field must be finite", "NaN or infinite", "Model.state", "check it")
+    return np.asarray(sparse_linalg.lsqr(body.spread, values, atol=1e-15, btol=1e-15)[0])
 
 
 def _check_impactors(model: Model, q: Vector) -> None:
@@ -113,7 +128,9 @@ def _check_impactors(model: Model, q: Vector) -> None:
 def equilibrium(model: Model, loads: Mapping[float, float]) -> Vector:
     """Start from static equilibrium; `Model.equilibrium` explains it."""
     start, n = rest(model), len(model.omega)
-    load = -model.participation * model.scene.gravity
+    load = np.zeros(n)
+    if model.scene.gravity or not model.scene.named:
+        load = -model.participation_along("y") * model.scene.gravity
     for z, force in loads.items():
         require_finite(f"force at z = {z} m", force, "Model.equilibrium", "give N, positive up")
         load = load + force * model.phi(z)

@@ -19,7 +19,7 @@ import reduction
 import solvers
 from fembeam.model import initial_states
 from fembeam.model.equations import ModalEquations
-from fembeam.model.shapes import Shapes, Vector
+from fembeam.model.shapes import Vector
 from fembeam.scene import for_duration, with_signals, with_value
 from fembeam.support import Part, Printed, bar, note, require, require_no_text, require_positive
 from solvers.problem import counted
@@ -60,9 +60,9 @@ class Model(Printed, ModalEquations):
     matrices: Matrices
     basis: reduction.Basis
     modes: tuple[int, ...]
-    shapes: Shapes
+    shapes: Any  # Shapes, of a body with places by name PlacedShapes
     counts: tuple[tuple[int, int], ...]
-    others: tuple[Shapes, ...] = ()
+    others: tuple[Any, ...] = ()
     reduction_options: dict[str, Any] = field(default_factory=dict)
 
     def __repr__(self) -> str:
@@ -128,13 +128,14 @@ class Model(Printed, ModalEquations):
         """The part of a field of displacement or velocity that the kept modes cannot represent: ‖u - Φq‖/‖u‖ in M."""
         return initial_states.missed(self, field)
 
-    def equilibrium(self, loads: Mapping[float, float] | None = None) -> Vector:
+    def equilibrium(self, loads: Mapping[Any, float] | None = None) -> Vector:
         """The start at rest under gravity, preloads and given dead loads, contacts included.
 
         Parameters
         ----------
-        loads : {z in m: force in N, positive up} on the scene's own beam, for as long as it settles; signals of forces
-            and base do not act. Simulate from it to see what follows when the loads go (release from a pull).
+        loads : {z in m: force in N, positive up} on the scene's own beam, of other bodies {(place, direction): force},
+            for as long as it settles; signals of forces and base do not act. Simulate from it to see what follows when
+            the loads go (release from a pull).
 
         Returns
         -------
@@ -196,8 +197,8 @@ class Model(Printed, ModalEquations):
     def frequency_response(
         self,
         omega: ArrayLike,
-        input: str | float = "base",
-        output: ArrayLike | None = None,
+        input: Any = "base",
+        output: Any = None,
         absolute: bool = False,
         body: int = 0,
     ) -> FrequencyResponse:
@@ -209,9 +210,10 @@ class Model(Printed, ModalEquations):
         Parameters
         ----------
         omega : (k,) rad/s, ≥ 0.
-        input : "base", a displacement of the frame; a place z in m, where a force acts; or a signal of the scene,
-            such as "forces[0]" or "springs[0].foot".
-        output : z in m, or (j,); None: the first stop, else the tip. body : the beam it is on.
+        input : "base", a displacement of the frame (of bodies with several directions "base.x"); a place z in m, or
+            (place, direction), where a force acts; or a signal of the scene, such as "forces[0]" or "springs[0].foot".
+        output : z in m, or (j,), or (place, direction), or a list;
+            None: the first stop, else the tip. body : the beam it is on.
         absolute : add the frame's own motion (transmissibility); only for "base".
 
         Returns

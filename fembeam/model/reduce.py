@@ -11,8 +11,9 @@ from scipy import sparse
 
 import reduction
 from fembeam.model.model import Model
+from fembeam.model.placed_shapes import PlacedShapes, placed_shapes
 from fembeam.model.shapes import Shapes
-from fembeam.scene import MOST_DENSE, LocalCoordinate, Matrices, loaded, watched
+from fembeam.scene import MOST_DENSE, BodyMatrices, LocalCoordinate, Matrices, loaded, watched
 from fembeam.support import is_whole, require
 
 if TYPE_CHECKING:
@@ -58,7 +59,8 @@ def reduced(
         for basis, own in zip(bases, chosen, strict=True)
     ]
     basis = _joined(bases, matrices)
-    own, *others = _shapes_of_each(matrices, basis)
+    _warn_of_drift(scene, matrices, bases)
+    own, *others = _shapes_of_each(scene, matrices, basis)
     modes_of_all = sum(numbers, ()) + (0,) * len(matrices.impactors)
     return Model(scene, matrices, basis, modes_of_all, own, counts, tuple(others), options)
 
@@ -87,7 +89,9 @@ def _continued(chosen: tuple[int, ...], count: int) -> tuple[int, ...]:
 
 def _oriented(basis: reduction.Basis, beam: Matrices, place: LocalCoordinate | None) -> reduction.Basis:
     """Positive at a place, or where each mode moves most."""
-    return reduction.oriented(basis, beam.interpolation(beam.nodes) if place is None else place.row(beam))
+    if place is None:
+        return reduction.oriented(basis, None if beam.named else beam.interpolation(beam.nodes))
+    return reduction.oriented(basis, place.row(beam))
 
 
 def _joined(bases: list[reduction.Basis], matrices: Matrices) -> reduction.Basis:
@@ -102,16 +106,34 @@ def _joined(bases: list[reduction.Basis], matrices: Matrices) -> reduction.Basis
     return reduction.Basis(vectors, np.concatenate([*(basis.omega for basis in bases), np.sqrt(stiffness / mass)]))
 
 
-def _shapes_of_each(matrices: Matrices, basis: reduction.Basis) -> list[Shapes]:
+def _shapes_of_each(scene: Scene, matrices: Matrices, basis: reduction.Basis) -> list[Shapes | PlacedShapes]:
     """The shapes of each beam on all coordinates: zero on those of other bodies."""
-    shapes, done = [], 0
-    for beam in matrices.beams:
-        values = np.zeros((beam.dofs.size, basis.count))
+    shapes: list[Shapes | PlacedShapes] = []
+    done = 0
+    for number, beam in enumerate(matrices.beams):
         size = beam.M.shape[0]
-        values[beam.dofs.ravel() >= 0] = basis.vectors[done : done + size]
-        shapes.append(Shapes(beam.nodes, values))
+        mine = basis.vectors[done : done + size]
+        if isinstance(beam, BodyMatrices):
+            shapes.append(placed_shapes(beam, mine, loaded(scene, number)))
+        else:
+            values = np.zeros((beam.dofs.size, basis.count))
+            values[beam.dofs.ravel() >= 0] = mine
+            shapes.append(Shapes(beam.nodes, values))
         done += size
     return shapes
+
+
+def _warn_of_drift(scene: Scene, matrices: Matrices, bases: list[reduction.Basis]) -> None:
+    """Warn when loads may carry a structure away that neither supports nor stops from several sides hold."""
+    for number, (part, beam, basis) in enumerate(zip((scene, *scene.bodies), matrices.beams, bases, strict=True)):
+        count = int(np.sum(basis.omega == 0.0))
+        loads = bool(part.forces) or bool(scene.motions) or scene.gravity != 0.0
+        acting = [*part.stops, *(one for one in scene.acting if number and (one.coordinate.to or (0,))[0] == number)]
+        if beam.named and count and loads and not part.elements and len(acting) < 2:
+            where = f"bodies[{number - 1}] of Scene" if number else "Scene"
+            what = "1 rigid-body mode appears" if count == 1 else f"{count} rigid-body modes appear"
+            said = f"{what} in {where}: supports and springs do not hold the structure, its loads may carry it away"
+            warnings.warn(said, UserWarning, stacklevel=4)
 
 
 def _warn_of_the_mesh(matrices: Matrices, omega: float) -> None:
@@ -133,8 +155,14 @@ def _chosen(scene: Scene, modes: Any, elements: int | None, interface: bool) -> 
     if not isinstance(modes, str):
         listed = _numbers(modes, interface)
         matrices = scene.matrices(elements, max(listed, default=0) + 1)
+        for beam in matrices.beams:
+            most = beam.M.shape[0]
+            require(not beam.named or max(listed, default=0) < most, f"modes must be at most {most} (free dofs)", modes,
+                    "Scene.reduce", "ask for fewer modes, or 'all'")  # fmt: skip
         return matrices, [listed] * len(matrices.beams)
-    require(modes == "all" and elements is not None, "modes must be a count, a list, or 'all' with elements given",
+    meshed = any(getattr(part.beam, "meshed", True) for part in (scene, *scene.bodies))
+    given = elements is not None or not meshed
+    require(modes == "all" and given, "modes must be a count, a list, or 'all' with elements given",
             modes, "Scene.reduce", "say how many elements the mesh shall have")  # fmt: skip
     require(not interface, "modes must be a count with interface=True", modes, "Scene.reduce", "ask for modes=2")
     matrices = scene.matrices(elements)
@@ -182,6 +210,12 @@ def _enough(scene: Scene, elements: int | None, omega_max: float | None, mass_sh
     raise ValueError(f"{goal} must be reached by {MOST_TRIED} modes in Scene.reduce, got less; lower it, or give modes")
 
 
+def _carrying(basis: reduction.Basis, beam: Matrices, load: Any, share: float) -> int | None:
+    """How many modes carry a share of the mass that a motion of the frame moves; 1 if it moves none."""
+    mass = reduction.moved_mass(beam.M, load)
+    return reduction.carrying(share, load, mass)(basis) if mass > 0.0 or not beam.named else 1
+
+
 def _enough_of(beam: Matrices, tried: int, omega_max: float | None, mass_share: float | None) -> int | None:
     """How many of a beam's modes are enough; None if those tried are not."""
     tried = min(tried, beam.M.shape[0])
@@ -189,8 +223,8 @@ def _enough_of(beam: Matrices, tried: int, omega_max: float | None, mass_share: 
     if omega_max is not None:
         enough = reduction.below(omega_max)
     else:
-        mass = reduction.moved_mass(beam.M, beam.base_load)
-        enough = reduction.carrying(float(mass_share or 0.0), beam.base_load, mass)
+        counts = [_carrying(basis, beam, load, float(mass_share or 0.0)) for load in beam.base_loads.values()]
+        return None if None in counts and tried < beam.M.shape[0] else max((c or tried for c in counts), default=1)
     count = enough(basis)
     if count is None and tried == beam.M.shape[0]:
         return tried

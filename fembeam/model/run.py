@@ -14,9 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 import solvers
 from fembeam.model.histories import Histories
-from fembeam.model.shapes import Shapes
 from fembeam.scene import ON, Source
-from fembeam.support import Part, Printed
+from fembeam.support import Part, Printed, is_finite
 from solvers.problem import Losses, counted
 
 if TYPE_CHECKING:
@@ -50,8 +49,8 @@ class Run(Histories, Printed):
     ledger: Callable[[], solvers.Energy] = field(repr=False)
     status: str
     cost: solvers.Cost
-    shapes: Shapes
-    stops: Vector  # (m, 3): z, push, gap of every contact
+    shapes: Any  # Shapes, of a body with places by name PlacedShapes
+    stops: Vector  # (m, 3): z (NaN of a place by name), push, gap of every contact
     directions: Vector  # (m, n): δ = -directions·q - gap
     impactor_masses: Vector  # (i,) of the impactors, whose coordinates √m x are the last ones
     scene: str
@@ -61,7 +60,7 @@ class Run(Histories, Printed):
     stored_forces: Vector | None = None  # (m, k) of a run read from a file
     stored_means: Vector | None = None  # (m, k) likewise, over each sample
     stored: Readout | None = None  # likewise
-    others: tuple[Shapes, ...] = ()  # of the further beams
+    others: tuple[Any, ...] = ()  # of the further beams
     source: Source | None = None  # of a run made from a scene file
     versions: dict[str, str] = field(default_factory=dict)  # that made a run read from a file
     began: tuple[Vector, ...] = ()  # what the laws had latched at the start, a row per contact, where it was given
@@ -70,6 +69,7 @@ class Run(Histories, Printed):
     kinds: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 2), dtype=bool))  # of rotation, always acting
     names: tuple[str, ...] = ()  # (m,) what every contact is called
     given: tuple[bool, ...] = ()  # (m,) whether it was given that name, or it was made
+    acting: tuple[Any, ...] = ()  # (m,) of each contact z, or (place, direction)
     sampled: bool = True  # else t, q, q_dot are the final state alone, and no history
 
     def __repr__(self) -> str:
@@ -116,14 +116,15 @@ class Run(Histories, Printed):
     def of(cls, model: Model, solution: solvers.Solution, began: tuple[Vector, ...] = (), sampled: bool = True) -> Run:
         """The run of a model from its solution."""
         rows = model.contact_rows
-        stops = np.array([(one.z, one.push, one.gap) for one in rows], dtype=float).reshape(-1, 3)
+        along = [one.z if is_finite(one.z) and one.direction is None else np.nan for one in rows]
+        stops = np.array([(z, one.push, one.gap) for z, one in zip(along, rows, strict=True)], dtype=float)
         masses = np.array([impactor.mass for impactor in model.matrices.impactors], dtype=float)
         status = solution.status.value
         if not solution.status.good:
             status += f" (t = {solution.t[-1]:g} s)" if len(solution.t) else " (before the first sample)"
         return cls(
             *(solution.t, solution.q, solution.q_dot, solution.contacts, solution.ledger, status, solution.cost),
-            *(model.shapes, stops, model.directions, masses, repr(model.scene)),
+            *(model.shapes, stops.reshape(-1, 3), model.directions, masses, repr(model.scene)),
             *(solution.borders, solution.lost, model),
             others=model.others,
             began=began,
@@ -132,6 +133,7 @@ class Run(Histories, Printed):
             kinds=np.array([(one.rotation, one.always) for one in rows], dtype=bool).reshape(-1, 2),
             names=tuple(one.name for one in rows),
             given=tuple(one.given for one in rows),
+            acting=tuple(one.z if one.direction is None else (one.z, one.direction) for one in rows),
             sampled=sampled,
         )
 
@@ -160,10 +162,11 @@ class Run(Histories, Printed):
 
         return reactions(self)
 
-    def floor_spectrum(self, z: float, omega: ArrayLike | None = None, zeta: ArrayLike = 0.05, **options: Any) -> Any:
+    def floor_spectrum(self, z: Any, omega: ArrayLike | None = None, zeta: ArrayLike = 0.05, **options: Any) -> Any:
         """`fembeam.response_spectrum` of the absolute acceleration at z: the load on equipment mounted there.
 
-        omega or ``periods=``, zeta : as there; ``body=`` another beam. Warns where samples do not resolve contacts.
+        omega or ``periods=``, zeta : as there; ``body=`` another beam; z (place, direction) of others.
+        Warns where samples do not resolve contacts.
         """
         from fembeam.response import floor_spectrum
 

@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
+from fembeam.model.placed_shapes import PlacedShapes
 from fembeam.model.watched_places import places as usual_places
-from fembeam.scene import unit_of
+from fembeam.response import BodyReaction
+from fembeam.scene import said, unit_of
 from fembeam.support import require
 from solvers.problem import dataframe, optional
 
@@ -66,19 +68,25 @@ def _unit_of_column(run: Run, name: str) -> str:
 
 
 def histories(
-    run: Run, stride: int = 1, places: Sequence[float] | None = None, quantities: Sequence[str] | None = None
+    run: Run, stride: int = 1, places: Sequence[Any] | None = None, quantities: Sequence[str] | None = None
 ) -> dict[str, Vector]:
     """Columns of every `stride`-th sample, by name and unit: quantities at places, of stops, of supports."""
     require(stride >= 1, "stride must be at least 1", stride, "Run", "1 keeps every sample")
     require(not isinstance(quantities, str), "quantities must be a list", quantities, "Run", "put it in brackets")
-    require(places is None or np.ndim(places) == 1, "places must be a list", places, "Run", "put it in brackets")
+    named = isinstance(run.shapes, PlacedShapes)
+    listed = isinstance(places, (list, tuple)) if named else np.ndim(places) == 1  # type: ignore[arg-type]
+    require(places is None or listed, "places must be a list", places, "Run", "put it in brackets")
     asked = USUAL if quantities is None else quantities
     unknown = [name for name in asked if name not in UNITS]
     require(not unknown, f"quantities must be among {', '.join(UNITS)}", unknown, "Run", "choose from these")
-    where = usual_places(run.shapes) if places is None else {f"at {z:.12g} m": z for z in places}
+    where: dict[str, Any] = usual_places(run.shapes)
+    if places is not None and named:
+        where = {f"at {said(at)}": at for at in map(_pair, places)}
+    elif places is not None:
+        where = {f"at {z:.12g} m": z for z in places}
     columns = {"t [s]": run.t}
     for name, z in where.items():
-        columns |= {f"{what} {name} [{UNITS[what]}]": _at(run, what, z) for what in asked if what not in ELSEWHERE}
+        columns |= {f"{what} {name} [{_unit(what, z)}]": _at(run, what, z) for what in asked if what not in ELSEWHERE}
     for stop in range(len(run.stops)):
         of_stops = (what for what in asked if what in ("indentation", "force"))
         key = run.key(stop, alone=True)
@@ -86,11 +94,26 @@ def histories(
         columns |= {f"work {key} [J]": run.losses.history[:, stop]} if "work" in asked else {}
     for i, one in enumerate(run.reactions() if "reactions" in asked else ()):
         about = one.name if one.part.name is not None else f"{i} ({one.name})"
+        if isinstance(one, BodyReaction):
+            have = run.shapes.components if one.body == 0 else run.others[one.body - 1].components
+            columns |= {f"reaction {c} {about} [{'N m' if c[0] == 'r' else 'N'}]": one[c] for c in have}
+            continue
         columns |= {f"reaction force {about} [N]": one.force, f"reaction moment {about} [N m]": one.moment}
     return {name: column[::stride] for name, column in columns.items()}
 
 
-def _at(run: Run, quantity: str, z: float) -> Vector:
+def _pair(at: Any) -> Any:
+    """A place and its direction, as a scene file lists them too."""
+    return tuple(tuple(one) if isinstance(one, list) else one for one in at) if isinstance(at, list) else at
+
+
+def _unit(quantity: str, at: Any) -> str:
+    """Unit of a quantity at a place: rad for m where the direction is a rotation."""
+    turning = isinstance(at, tuple) and isinstance(at[1], str) and at[1].lstrip("-").startswith("r")
+    return UNITS[quantity].replace("m", "rad", 1) if turning else UNITS[quantity]
+
+
+def _at(run: Run, quantity: str, z: Any) -> Vector:
     """A quantity (k,) at a place."""
     name = quantity.removeprefix("absolute ")
     return getattr(run, name)(z) if name == quantity else getattr(run, name)(z, absolute=True)
@@ -115,7 +138,17 @@ def to_dataframe(run: Run, stride: int = 1, **chosen: Any) -> Any:
 
 def to_xarray(run: Run, z: ArrayLike | None = None) -> Any:
     """See `Run.to_xarray`."""
-    place = run.shapes.nodes if z is None else np.atleast_1d(np.asarray(z, dtype=float))
+    named = isinstance(run.shapes, PlacedShapes)
+    given = list(usual_places(run.shapes).values()) if z is None and named else z
+    place: Any = (
+        [given]
+        if isinstance(given, tuple)
+        else list(given)  # type: ignore[arg-type]
+        if named
+        else run.shapes.nodes
+        if z is None
+        else np.atleast_1d(np.asarray(z, dtype=float))
+    )
     variables = {
         "displacement": (("t", "z"), run.displacement(place), {"units": "m"}),
         "velocity": (("t", "z"), run.velocity(place), {"units": "m/s"}),
@@ -124,7 +157,11 @@ def to_xarray(run: Run, z: ArrayLike | None = None) -> Any:
         "q": (("t", "coordinate"), run.q, {"units": "m √kg"}),
         "q_dot": (("t", "coordinate"), run.q_dot, {"units": "m √kg/s"}),
     }
-    axes = {"t": ("t", run.t, {"units": "s"}), "z": ("z", place, {"units": "m"}), "stop": np.arange(len(run.stops))}
+    axes = {
+        "t": ("t", run.t, {"units": "s"}),
+        "z": ("z", [said(at) for at in place], {}) if named else ("z", place, {"units": "m"}),
+        "stop": np.arange(len(run.stops)),
+    }
     axes["name"] = "stop", list(run.names)
     return optional("xarray", "a data set").Dataset(variables, axes, {"status": run.status, "scene": run.scene})
 

@@ -14,6 +14,7 @@ import numpy as np
 
 import solvers
 from fembeam.model import saved_arrays
+from fembeam.model.placed_shapes import PlacedShapes, tuples
 from fembeam.model.run import Run
 from fembeam.model.shapes import Shapes
 from fembeam.response import READOUT_UNITS, packed, unpacked
@@ -71,6 +72,8 @@ def _contents(run: Run) -> tuple[str, dict[str, Any]]:
         "cost": {f.name: getattr(run.cost, f.name) for f in fields(run.cost)},
         "units": UNITS,
         "versions": versions(),
+        "acting": run.acting,
+        "bodies": [shapes.words if isinstance(shapes, PlacedShapes) else None for shapes in (run.shapes, *run.others)],
     }
     if run.source is not None:
         about["scene_file"] = {"name": run.source.path.name, "text": run.source.text,
@@ -81,9 +84,9 @@ def _contents(run: Run) -> tuple[str, dict[str, Any]]:
         **{"losses": np.stack((lost.work, lost.stored, lost.slip), axis=1), "work": lost.history, "end": run.end},
         **{"stops": run.stops, "on": run.on, "kinds": run.kinds},
         **{"directions": run.directions, "impactor_masses": run.impactor_masses},
-        **{"nodes": run.shapes.nodes, "shapes": run.shapes.values},
-        **{f"nodes_{i}": shapes.nodes for i, shapes in enumerate(run.others, 1)},
-        **{f"shapes_{i}": shapes.values for i, shapes in enumerate(run.others, 1)},
+        **dict(zip(("nodes", "shapes"), _arrays_of(run.shapes), strict=True)),
+        **{f"nodes_{i}": _arrays_of(shapes)[0] for i, shapes in enumerate(run.others, 1)},
+        **{f"shapes_{i}": _arrays_of(shapes)[1] for i, shapes in enumerate(run.others, 1)},
         **{f"contact_{name}": column for name, column in run.contacts.arrays().items()},
         **{f"energy_{f.name}": getattr(run.energy, f.name) for f in fields(run.energy)},
         **{f"file_{i}": np.frombuffer(content, dtype=np.uint8) for i, content in enumerate(carried)},
@@ -91,6 +94,21 @@ def _contents(run: Run) -> tuple[str, dict[str, Any]]:
     about["readout"], read = packed(run.readout)
     about["events"], arrays["transitions"] = _packed(run.transitions)
     return json.dumps(about, default=float), arrays | read
+
+
+def _arrays_of(shapes: Any) -> tuple[Any, Any]:
+    """Nodes and values of a beam's shapes; of a body numbers of its places, and the values one place after another."""
+    if isinstance(shapes, PlacedShapes):
+        return np.arange(len(shapes.known), dtype=float), shapes.values.reshape(-1, shapes.values.shape[2])
+    return shapes.nodes, shapes.values
+
+
+def _shapes_of(words: Any, nodes: Any, values: Any) -> Any:
+    """The shapes that these are of."""
+    count = 2 if words is None else len(words["components"])
+    if len(values) != count * len(nodes):
+        raise ValueError(f"shapes must have {count} rows for each of {len(nodes)} places, there are {len(values)}")
+    return Shapes(nodes, values) if words is None else PlacedShapes.of_words(words, values)
 
 
 def _means(run: Run) -> Any:
@@ -194,7 +212,10 @@ def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run
         name = Path(given["name"]).name
         source = Source(path.with_name(name), given["text"], tuple(given["overrides"]), files, of_run=True)
     bodies = sum(name.split("_")[0] == "nodes" for name in arrays)
-    shapes = [Shapes(arrays[f"nodes{i}"], arrays[f"shapes{i}"]) for i in ("", *(f"_{j}" for j in range(1, bodies)))]
+    if len(about["bodies"]) != bodies or len(about["acting"]) != len(arrays["stops"]):
+        raise ValueError("its words and its arrays are of other bodies and stops")
+    numbered = zip(about["bodies"], ("", *(f"_{j}" for j in range(1, bodies))), strict=True)
+    shapes = [_shapes_of(words, arrays[f"nodes{i}"], arrays[f"shapes{i}"]) for words, i in numbered]
     work, stored, slip = arrays["losses"].T
     names = _names(about, len(arrays["stops"]))
     log = (arrays[f"contact_{name}"] for name in columns_of(solvers.ContactLog))
@@ -214,12 +235,13 @@ def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run
         borders=partial(Transitions, *_unpacked(about["events"], arrays["transitions"]), names=names),
         lost=partial(Losses, work, stored, slip, arrays["work"], names=names),
         end=arrays["end"],
-        stored=unpacked(about["readout"], arrays, [one.nodes for one in shapes]),
+        stored=unpacked(about["readout"], arrays, [getattr(one, "nodes", None) for one in shapes]),
         others=tuple(shapes[1:]),
         source=source,
         versions=about["versions"],
         on=arrays["on"],
         kinds=arrays["kinds"],
+        acting=tuples(about["acting"]),
         sampled=about["sampled"],
         names=names,
         given=tuple(map(bool, about["given"])),

@@ -98,6 +98,9 @@ def _samples(run: Run, stride: int) -> range:
 
 def _geometry(run: Run) -> tuple[Vector, list[tuple[str, Any]]]:
     """Points (p, 3) of all beams, then impactors; lines, of zero length for impactors, as XDMF has one kind of cell."""
+    straight = all(hasattr(shapes, "nodes") for shapes in (run.shapes, *run.others))
+    require(straight, "files for ParaView must be of straight beams", run.shapes, "Run",
+            "write histories of its places with to_csv")  # fmt: skip
     parts, lines, count = [], [], 0
     for shapes, height in zip((run.shapes, *run.others), run.readout.heights, strict=True):
         size = len(shapes.nodes)

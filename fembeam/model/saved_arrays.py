@@ -20,7 +20,7 @@ from solvers.problem import Transitions, columns_of
 Shape = tuple[int, ...]
 TRANSITION_COLUMNS = len(columns_of(Transitions))
 BOOLEAN = ("kinds", "contact_entry_rate_clipped")
-FINITE = {"transitions", "end", "shapes", "stops", "directions", "impactor_masses", *READOUT_FINITE}
+FINITE = {"transitions", "end", "shapes", "directions", "impactor_masses", *READOUT_FINITE}
 
 
 def outline(shape: Shape, dtype: np.dtype[Any]) -> Any:
@@ -49,6 +49,7 @@ def check(arrays: Mapping[str, Any]) -> None:
         _need(np.isfinite(arrays[name]).all() and np.all(steps > 0), f"{name} must be finite and increase")
     for name in (name for name in arrays if name.rstrip("_0123456789") in FINITE):
         _need(np.isfinite(arrays[name]).all(), f"{name} must be finite")
+    _need(np.isfinite(arrays["stops"][:, 1:]).all(), "stops must be finite but for places by name")
     _need(np.all(arrays["impactor_masses"] > 0), "impactor_masses must be positive")
     beams = sum(name.split("_")[0] == "nodes" for name in arrays)
     most = [beams, len(ON), max(beams, len(arrays["impactor_masses"]))]
@@ -72,7 +73,9 @@ def expected(arrays: Mapping[str, Any]) -> dict[str, Shape]:
     for name in arrays:
         if name.split("_")[0] == "nodes":
             b = arrays[name].size
-            shapes |= {name: (b,), name.replace("nodes", "shapes"): (2 * b, n)}
+            of_body = name.replace("nodes", "shapes")
+            rows = arrays[of_body].shape[0] if arrays[of_body].ndim == 2 and b else 2 * b
+            shapes |= {name: (b,), of_body: (max(rows // max(b, 1), 1) * b, n)}  # 2 of a beam, else a body's components
     return shapes | expected_readout(arrays)
 
 

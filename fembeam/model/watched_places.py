@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from fembeam.model.placed_shapes import PlacedShapes
 
 if TYPE_CHECKING:
     from fembeam.model.model import Model
     from fembeam.model.shapes import Shapes
 
 
-def places(shapes: Shapes) -> dict[str, float]:
-    """Default coordinates, those that move: "tip" (a free end, the far one first) and "mid-beam"."""
+def places(shapes: Shapes | PlacedShapes) -> dict[str, Any]:
+    """Default coordinates, those that move: "tip" (a free end, the far one first) and "mid-beam".
+
+    Of other bodies pairs (place, direction): where something acts, then named points.
+    """
+    if isinstance(shapes, PlacedShapes):
+        return shapes.usual
     start, end = float(shapes.nodes[0]), float(shapes.nodes[-1])
     mid = (start + end) / 2
     size = {z: float(np.abs(shapes(z)).max()) for z in (end, start, mid)}
@@ -20,7 +27,9 @@ def places(shapes: Shapes) -> dict[str, float]:
     return {**({"tip": moving[0]} if moving else {}), "mid-beam": mid}
 
 
-def observed(model: Model) -> float:
+def observed(model: Model) -> Any:
     """The default place: the first stop or element of displacement, else the tip."""
+    if isinstance(model.shapes, PlacedShapes):
+        return next(iter(model.shapes.usual.values()))
     acting = [part.z for part in model.scene.acting if not part.coordinate.rotation]
     return acting[0] if acting else next(iter(places(model.shapes).values()))

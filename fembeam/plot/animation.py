@@ -171,6 +171,9 @@ class _Stage:
     figure: Figure
 
     def __init__(self, run: Run, samples: NDArray[np.int64], fps: float | None) -> None:
+        straight = all(hasattr(shapes, "nodes") for shapes in (run.shapes, *run.others))
+        require(straight, "moving pictures must be of straight beams", run.shapes, "animate",
+                "draw plot.time_history or plot.mode_shapes")  # fmt: skip
         self.run, self.samples, self.contact_rows = run, samples, _contacts(run)
         self.beams, self.impactor_places = run.readout.heights, run.readout.impactor_places
         self.forces = [

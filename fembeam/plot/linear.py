@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fembeam.plot.figure import heading, sheet
 from fembeam.plot.style import Vector, place_name, plain_decades, styled
+from fembeam.scene import split
+from fembeam.structures import UP
 from fembeam.support import require
 
 if TYPE_CHECKING:
@@ -68,7 +70,7 @@ def response_spectrum(
 
 
 @styled
-def floor_spectrum(run: Run, z: float | None = None, zeta: float = 0.05, axes: Sequence[Axes] | None = None) -> Figure:
+def floor_spectrum(run: Run, z: Any = None, zeta: float = 0.05, axes: Sequence[Axes] | None = None) -> Figure:
     """Response spectra of a transient: of the absolute motion at z and of the frame's.
 
     Parameters
@@ -93,7 +95,8 @@ def floor_spectrum(run: Run, z: float | None = None, zeta: float = 0.05, axes: S
         warnings.simplefilter("always")
         found = {place_name(place): run.floor_spectrum(place, omega, zeta)}
     if run.readout.base is not None:
-        found["frame"] = computed(run.t, frame_motion(run, 2), omega, zeta)
+        along = split(place)[1] if isinstance(place, tuple) else UP
+        found["frame"] = computed(run.t, frame_motion(run, 2, along), omega, zeta)
     figure = response_spectrum(found, axes)
     if said:
         (axes or figure.axes)[0].set_title("Contacts are shorter than ten samples: levels are rough; lower dt")
@@ -128,8 +131,10 @@ def frequency_response(found: FrequencyResponse, axes: Sequence[Axes] | None = N
 
     figure, (upper, lower) = sheet(2, 1, (7.0, 4.8), axes, sharex=True, height_ratios=(2, 1))
     amplitude, phase = (values.reshape(len(found.omega), -1).T for values in (found.amplitude, found.phase))
-    for size, angle, z in zip(amplitude, phase, np.atleast_1d(found.output), strict=True):
-        upper.semilogy(found.omega, size, label=f"z = {z:.4g} m")
+    named = isinstance(found.output, (tuple, list))
+    places: Any = found.output if isinstance(found.output, list) else [found.output]
+    for size, angle, z in zip(amplitude, phase, places if named else np.atleast_1d(found.output), strict=True):
+        upper.semilogy(found.omega, size, label=place_name(z) if isinstance(z, tuple) else f"z = {z:.4g} m")
         lower.plot(found.omega, np.degrees(angle))
     for natural in found.natural[found.natural < found.omega[-1]]:
         for axis in (upper, lower):

@@ -11,7 +11,7 @@ from fembeam.model import observed
 from fembeam.plot.axis_names import axis_name
 from fembeam.plot.figure import heading, legend, sheet
 from fembeam.plot.linear import frequencies
-from fembeam.plot.style import GREEN, GREY, ORANGE, RED, Vector, plain_decades, styled
+from fembeam.plot.style import GREEN, GREY, ORANGE, RED, Vector, displacement_name, plain_decades, styled
 from fembeam.scene import signals_of
 from fembeam.support import require
 from solvers.problem import counted
@@ -35,7 +35,7 @@ FAR = 3.0  # times the branches: so high a linear response would press them down
 @styled
 def branch(
     branches: Branch | Sequence[Branch],
-    z: float | None = None,
+    z: Any = None,
     cloud: tuple[Vector, Vector] | None = None,
     axes: Axes | None = None,
     labels: Sequence[str] | None = None,
@@ -76,7 +76,7 @@ def branch(
         _widen(axis, linear)
     name = several[0].family.name
     axis.set_xlabel(axis_name(name, model.scene))
-    axis.set_ylabel(f"max |u({place:.4g} m)| / mm")
+    axis.set_ylabel(f"max |{displacement_name(place)}| / mm")
     handles, words = _entries(axis, several)
     legend(axis, axes is None, "outside right upper", handles=handles, labels=words, fontsize=8)
     return figure
@@ -87,11 +87,11 @@ def bifurcation(found: Bifurcation, axes: Axes | None = None) -> Figure:
     """Largest |u| of every settled period against the parameter; `axes` to draw into, None makes a figure."""
     figure, (axis,) = sheet(1, 1, (8.4, 3.8), axes)
     _draw_cloud(axis, found.cloud())
-    axis.set(xlabel=found.name, ylabel=f"max |u({found.z:.4g} m)| / mm")
+    axis.set(xlabel=found.name, ylabel=f"max |{displacement_name(found.z)}| / mm")
     return figure
 
 
-def peak(orbit: Orbit, z: float) -> float:
+def peak(orbit: Orbit, z: Any) -> float:
     """Largest |u| at z over a period, m."""
     lowest, highest = orbit.extremes(z)
     return max(-lowest, highest)
@@ -102,7 +102,7 @@ def _draw_cloud(axis: Axes, cloud: tuple[Vector, Vector]) -> None:
     axis.plot(cloud[0], 1e3 * cloud[1], ".", color=GREY, markersize=2.0, label="simulated", rasterized=True)
 
 
-def _draw_branch(axis: Axes, one: Branch, z: float, color: str, label: str) -> None:
+def _draw_branch(axis: Axes, one: Branch, z: Any, color: str, label: str) -> None:
     """Solid and dashed pieces of a branch, and its marks."""
     parameter, stable = one.parameter, one.stable
     peaks = 1e3 * np.array([peak(orbit, z) for orbit in one.orbits])
@@ -121,7 +121,7 @@ def _draw_branch(axis: Axes, one: Branch, z: float, color: str, label: str) -> N
             axis.plot(orbit.parameter, height, marker, color=edge, markerfacecolor=face, markersize=3.5, linewidth=0.8)
 
 
-def _draw_ends(axis: Axes, several: list[Branch], z: float) -> None:
+def _draw_ends(axis: Axes, several: list[Branch], z: Any) -> None:
     """A bar at the end of the span, elsewhere a mark for each reason; a closed branch has no end."""
     ends = [(orbit, why.split(":")[0]) for one in several for orbit, why in one.ends]
     reasons = [why for why in dict.fromkeys(why for _, why in ends) if why not in (SPAN, CLOSED)]
@@ -146,7 +146,7 @@ def _span(several: list[Branch]) -> tuple[float, float]:
     return min(min(one.parameter) for one in several), max(max(one.parameter) for one in several)
 
 
-def _draw_linear(axis: Axes, several: list[Branch], z: float, colours: list[str]) -> Vector:
+def _draw_linear(axis: Axes, several: list[Branch], z: Any, colours: list[str]) -> Vector:
     """The linear response of every level along the frequency of the only load; all its heights (k,)."""
     curves: list[tuple[Vector, Vector, str]] = []
     for one, colour in zip(several, colours, strict=True):
@@ -173,7 +173,7 @@ def _linear_name(several: list[Branch]) -> str:
     return ", ".join(["linear", *said])
 
 
-def _draw_backbones(axis: Axes, several: list[Branch], z: float) -> None:
+def _draw_backbones(axis: Axes, several: list[Branch], z: Any) -> None:
     """The backbone of the lowest mode for each period, as high as the branches."""
     from fembeam.response import backbone
 
@@ -228,7 +228,7 @@ def _entries(axis: Axes, several: list[Branch]) -> tuple[list[Any], list[str]]:
 
 
 @styled
-def orbit(one: Orbit, z: float | None = None, axes: Sequence[Axes] | None = None) -> Figure:
+def orbit(one: Orbit, z: Any = None, axes: Sequence[Axes] | None = None) -> Figure:
     """One orbit at z (m; None: the first stop): time history with its contacts shaded, and phase portrait.
 
     Parameters
@@ -252,7 +252,7 @@ def orbit(one: Orbit, z: float | None = None, axes: Sequence[Axes] | None = None
     for t_in, t_out in zip(one.contacts.t_in, one.contacts.t_out, strict=True):
         left.axvspan(1e3 * t_in, 1e3 * (t_out if np.isfinite(t_out) else t[-1]), color=ORANGE, alpha=0.4, linewidth=0.8)
     left.set_xlabel("t / ms")
-    left.set_ylabel(f"u({place:.4g} m) / mm")
+    left.set_ylabel(f"{displacement_name(place)} / mm")
     right.plot(u, v)
     right.plot(u[:1], v[:1], "o", color=RED, markersize=3)
     right.set_xlabel("u / mm")

@@ -29,9 +29,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fembeam.model import places
+from fembeam.plot.body_shapes import body_mode_shapes
 from fembeam.plot.figure import heading, sheet
 from fembeam.plot.random import density_panels
-from fembeam.plot.run_signals import estimated, first_stop, natural, sampling_of, stationary
+from fembeam.plot.run_signals import estimated, first_stop, natural, place_of, sampling_of, stationary
 from fembeam.plot.spectra import segment_for
 from fembeam.plot.style import BLUE, GREY, ORANGE, Vector, place_name, styled
 from fembeam.scene import persistent_drive, unit_of
@@ -53,7 +54,7 @@ LEGEND_COLUMNS, LEGEND_ROW = 2, 0.2  # of mode shapes; a row's height in units o
 def time_history(
     run: Run,
     window: tuple[float, float] | None = None,
-    z: float | None = None,
+    z: Any = None,
     axes: Axes | Sequence[Axes] | None = None,
 ) -> Figure:
     """Displacement and contact force over a readable window, contacts shaded.
@@ -113,6 +114,8 @@ def mode_shapes(model: Model, axes: Axes | None = None) -> Figure:
 
     `axes` to draw into; None makes a figure.
     """
+    if model.scene.named:
+        return body_mode_shapes(model, axes)
     figure, (axis,) = sheet(1, 1, (7.0, 3.8), axes)
     z = np.linspace(0.0, model.scene.beam.length, 401)
     unit = 1e3 if z[-1] <= 1.0 else 1.0
@@ -149,25 +152,29 @@ def _window(run: Run) -> tuple[float, float]:
     return start, start + length
 
 
-def _resting_place(run: Run) -> float:
+def _resting_place(run: Run) -> Any:
     """Where to look when nothing touches: the tip, else mid-beam."""
     return next(iter(places(run.shapes).values()))
 
 
-def _watched(run: Run, lo: float, hi: float) -> tuple[int, float]:
+def _watched(run: Run, lo: float, hi: float) -> tuple[int, Any]:
     """Beam and z of the stop of displacement with the largest force between two times; of the first one; of the tip."""
     log, first = run.contacts, first_stop(run)
     if first is None:
         return 0, _resting_place(run)
     inside = np.flatnonzero(_within(run, lo, hi) & ~run.kinds[log.stop, 0])
     stop = int(log.stop[inside[np.argmax(log.peak_force[inside])]]) if len(inside) else first
-    return int(run.on[stop, 0]), float(run.stops[stop, 0])
+    return int(run.on[stop, 0]), place_of(run, stop)
 
 
-def _stops_at(run: Run, body: int, z: float) -> NDArray[np.int64]:
+def _stops_at(run: Run, body: int, z: Any) -> NDArray[np.int64]:
     """Numbers of the stops at a place, or of all where there is none; elements have no contacts."""
     stops = ~run.kinds[:, 1]
-    near = stops & np.isclose(run.stops[:, 0], z) & (run.on[:, 0] == body)
+    if isinstance(z, tuple):
+        here = np.array([place_of(run, stop) == z for stop in range(len(run.stops))], dtype=bool)
+    else:
+        here = np.isclose(run.stops[:, 0], z)
+    near = stops & here & (run.on[:, 0] == body)
     return np.flatnonzero(near if near.any() else stops)
 
 
@@ -178,8 +185,10 @@ def _listed(stops: NDArray[np.int64], run: Run) -> str:
     return " and ".join(run.key(stop) for stop in stops.tolist())
 
 
-def _name(run: Run, body: int, z: float) -> str:
+def _name(run: Run, body: int, z: Any) -> str:
     """A place as words."""
+    if isinstance(z, tuple):
+        return place_name(z) + (f" of body {body}" if body else "")
     known = (name for name, at in places(run.shapes).items() if body == 0 and np.isclose(at, z))
     return next(known, place_name(z)) + (f" of beam {body}" if body else "")
 
@@ -189,7 +198,7 @@ def _within(run: Run, lo: float, hi: float) -> NDArray[np.bool_]:
     return (run.contacts.t_in < hi) & ~(run.contacts.t_out <= lo)  # NaN: not ended yet
 
 
-def _between_samples(run: Run, z: float, body: int, lo: float, hi: float) -> tuple[Vector, Vector]:
+def _between_samples(run: Run, z: Any, body: int, lo: float, hi: float) -> tuple[Vector, Vector]:
     """(t, u) on a grid eight times finer than the samples, by cubics through values and rates."""
     from scipy.interpolate import CubicHermiteSpline
 

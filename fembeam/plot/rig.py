@@ -23,6 +23,7 @@ from fembeam.plot.rig_symbols import COLOURS, Pen
 from fembeam.plot.rig_words import gap_words, label, law_words, length, signal_words
 from fembeam.plot.style import GREY, styled
 from fembeam.scene import Guided, Pinned, PointMoment
+from fembeam.support import require
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -116,6 +117,8 @@ def rig(scene: Scene, axes: Axes | None = None) -> Figure:
     >>> figure.get_suptitle()
     'Rig, to scale along z; gaps × 10 across'
     """
+    straight = not any(part.named for part in (scene, *scene.bodies))
+    require(straight, "a rig is drawn of scenes of Beams", scene.beam, "Scene.figure", "draw plot.mode_shapes(model)")
     view = _View(scene, WIDTH if axes is None else _inches(axes))
     lanes = [view.lane(body) for body in range(1 + len(scene.bodies))]
     top = _stacked(scene, lanes, bool(view.heads))

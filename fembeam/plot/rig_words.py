@@ -51,7 +51,8 @@ def _facts(part: Any) -> Iterator[str]:
         case LumpedMass():
             yield f"{part.mass:.4g} kg"
             yield f"J = {part.inertia:.3g} kg m²" if part.inertia else ""
-            yield f"{length(abs(part.offset))} {'ahead' if part.offset > 0 else 'behind'}" if part.offset else ""
+            offset: Any = part.offset
+            yield f"{length(abs(offset))} {'ahead' if offset > 0 else 'behind'}" if offset else ""
         case Spring():
             yield f"{part.stiffness:.6g} N/m" if part.stiffness else ""
             yield f"{part.rotational:.6g} N m/rad" if part.rotational else ""

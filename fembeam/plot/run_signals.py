@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -27,7 +27,13 @@ def responses(run: Run, discard: float = 0.0) -> dict[str, Vector]:
     first = {} if stop is None else {"δ": run.indentation(stop)}
     if not first and "tip" in named:
         first = {"tip u": run.displacement(named["tip"])}
-    return {name: x[kept] for name, x in {**first, "mid-beam u": run.displacement(named["mid-beam"])}.items()}
+    if "mid-beam" in named:
+        second = {"mid-beam u": run.displacement(named["mid-beam"])}
+    else:  # of other bodies the first usual place that moves and is not that of the stop
+        at = None if stop is None else place_of(run, stop)
+        moving = {f"{name} u": run.displacement(one) for name, one in named.items() if not (first and one == at)}
+        second = dict([next((pair for pair in moving.items() if np.ptp(pair[1]) > 0), ("", np.zeros(0)))])
+    return {name: x[kept] for name, x in {**first, **second}.items() if len(x)}
 
 
 def first_stop(run: Run) -> int | None:
@@ -36,10 +42,19 @@ def first_stop(run: Run) -> int | None:
     return int(found[0]) if len(found) else None
 
 
-def watched(run: Run) -> float:
+def watched(run: Run) -> Any:
     """The place to watch, m: of the first stop of displacement, else the tip, else mid-beam."""
     stop = first_stop(run)
-    return next(iter(places(run.shapes).values())) if stop is None else float(run.stops[stop, 0])
+    return next(iter(places(run.shapes).values())) if stop is None else place_of(run, stop)
+
+
+def place_of(run: Run, stop: int) -> Any:
+    """Where a stop or element acts: z in m, or (place, direction) as displacements are asked for."""
+    z = float(run.stops[stop, 0])
+    if not np.isnan(z):
+        return z
+    place, direction = run.acting[stop]
+    return place, direction.removeprefix("-") if isinstance(direction, str) else direction
 
 
 def natural(run: Run) -> Vector:

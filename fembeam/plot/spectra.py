@@ -10,12 +10,13 @@ import numpy as np
 from fembeam.model import places
 from fembeam.plot.figure import heading, sheet
 from fembeam.plot.linear import frequencies
-from fembeam.plot.run_signals import estimated, first_stop, natural, responses, sampling_of
+from fembeam.plot.run_signals import estimated, first_stop, natural, place_of, responses, sampling_of
 from fembeam.plot.style import BLUE, GREEN, GREY, Vector, curve, drawable, fit_levels, styled
 from fembeam.response import frame_motion
 from fembeam.scene import signals_of
 from fembeam.statistics import Spectrum, psd
 from fembeam.statistics.spectra import FINEST_RESOLUTION
+from fembeam.structures import direction_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -86,16 +87,19 @@ def _about(run: Run, discard: float, line: Spectrum) -> str:
 
 def spectra_of(run: Run, discard: float = 0.0) -> Mapping[str, Spectrum]:
     """Spectra of the base motion (where the run knows it) and of `responses`, these with their confidence."""
-    base = None if run.model is None else run.model.scene.base
+    motions = {} if run.model is None else run.model.scene.motions
     samples, dt = int(np.count_nonzero(run.t >= discard)), sampling_of(run)
     found = {name: signal.psd for name, signal in estimated(run, discard, segment_for(samples, dt)).items()}
-    if base is not None and hasattr(base, "nodes"):  # a sum of many lines: by FFT on its own grid
-        dt, values = base.nodes(float(run.t[-1]), 1e-3)
-        found["base y"] = psd(values[:, 0], dt, segment_for(len(values), dt))
-    elif base is not None:
-        found["base y"] = psd(np.asarray(base(run.t)), dt, segment_for(len(run.t), dt))
-    elif run.model is None and run.readout.base is not None:  # of a run read from a file: its samples
-        found["base y"] = psd(frame_motion(run), dt, segment_for(len(run.t), dt))
+    for direction, base in motions.items():
+        if hasattr(base, "nodes"):  # a sum of many lines: by FFT on its own grid
+            step, values = base.nodes(float(run.t[-1]), 1e-3)
+            found[f"base {direction}"] = psd(values[:, 0], step, segment_for(len(values), step))
+        else:
+            found[f"base {direction}"] = psd(np.asarray(base(run.t)), dt, segment_for(len(run.t), dt))
+    if run.model is None and run.readout.base is not None:  # of a run read from a file: its samples
+        for direction in run.readout.moved:
+            along = direction_of(direction, "base")
+            found[f"base {direction}"] = psd(frame_motion(run, 0, along), dt, segment_for(len(run.t), dt))
     return found
 
 
@@ -114,7 +118,9 @@ def _linear(run: Run) -> dict[str, Spectrum]:
     if not len(omega):  # rigid-body modes alone
         return {}
     for name in responses(run):
-        z, body = (row.z, row.body) if name == "δ" and row is not None else (watched[name.removesuffix(" u")], 0)
+        z, body = watched.get(name.removesuffix(" u")), 0
+        if name == "δ" and row is not None and stop is not None:
+            z, body = place_of(run, stop), row.body
         H = run.model.frequency_response(omega, path, z, body=body)
         found[name] = Spectrum(omega, H.amplitude**2 * noise.psd_at(omega), 0)
     return found

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, ParamSpec
 import numpy as np
 from numpy.typing import NDArray
 
+from fembeam.scene import said
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
@@ -60,9 +62,22 @@ def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
     return inside
 
 
-def place_name(z: float) -> str:
-    """A place in mm, beyond 1 m in m."""
+def place_name(z: Any) -> str:
+    """A place in mm, beyond 1 m in m; one by name with its direction."""
+    if isinstance(z, tuple):
+        return said(z)
     return f"z = {z:.5g} m" if abs(z) > 1.0 else f"z = {1e3 * z:.5g} mm"
+
+
+def displacement_name(z: Any) -> str:
+    """What an axis of displacements at a place is called, without unit.
+
+    Examples
+    --------
+    >>> displacement_name(0.25), displacement_name(("lever", "x"))
+    ('u(0.25 m)', 'u(lever, x)')
+    """
+    return f"u({said(z) if isinstance(z, tuple) else f'{z:.4g} m'})"
 
 
 def drawable(line: Spectrum, top: float) -> tuple[Vector, Vector]:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fembeam.scene import heights, loads
+from fembeam.structures import COMPONENTS, UP, Six
 from fembeam.support import require
 
 if TYPE_CHECKING:
@@ -76,20 +77,24 @@ class Readout:
 
     @cached_property
     def base(self) -> int | None:
-        """Number of ÿ among the loads; None for a frame at rest."""
+        """Number of ÿ (the first of several) among the loads; None for a frame at rest."""
         scene = self.model.scene
-        return None if scene.base is None else len(loads(scene, self.model.matrices))
+        return None if not scene.motions else len(loads(scene, self.model.matrices))
+
+    @cached_property
+    def moved(self) -> tuple[str, ...]:
+        """Directions (b,) in which the frame moves."""
+        return tuple(self.model.scene.motions)
 
     @cached_property
     def frame(self) -> Vector:
-        """Its motion y and ẏ (2, k), m and m/s; (0, k) for a frame at rest."""
-        base = self.model.scene.base
-        motions = () if base is None else (base, base.derivative(1))
+        """Its motion y and ẏ (2 b, k), m and m/s, one direction after the other; (0, k) for a frame at rest."""
+        motions = [part for base in self.model.scene.motions.values() for part in (base, base.derivative(1))]
         return np.array([_sampled(motion, self.t) for motion in motions]).reshape(len(motions), len(self.t))
 
     @cached_property
     def section_forces(self) -> Any:
-        """`SectionForces` of each beam."""
+        """`SectionForces` of each beam; None of bodies without sections."""
         return self.model.section_forces
 
     @cached_property
@@ -103,7 +108,8 @@ class Readout:
     def supports(self) -> Vector:
         """Place z and body of each support (s, 2)."""
         scene = self.model.scene
-        found = [(support.z, body) for body, one in enumerate((scene, *scene.bodies)) for support in one.supports]
+        beams = [(body, one) for body, one in enumerate((scene, *scene.bodies)) if not one.named]
+        found = [(support.z, body) for body, one in beams for support in one.supports]
         return np.array(found, dtype=float).reshape(-1, 2)
 
     @cached_property
@@ -133,9 +139,16 @@ def coordinates(run: Histories) -> Vector:
     return np.asarray(driven - run.q_dot @ read.damping.T - run.q @ read.stiffness.T)
 
 
-def frame_motion(run: Histories, order: int = 0) -> Vector:
-    """The frame's displacement y (k,) at the samples, or a derivative up to the second; zeros for a frame at rest."""
-    base = run.readout.base
+def frame_motion(run: Histories, order: int = 0, along: Six = UP) -> Vector:
+    """The frame's displacement y (k,) at the samples, or a derivative up to the second; zeros for a frame at rest.
+
+    ``along`` a direction: Σ n_i y_i.
+    """
+    base, found = run.readout.base, np.zeros(len(run.t))
     if base is None:
-        return np.zeros(len(run.t))
-    return np.array(run.readout.loads[base] if order == 2 else run.readout.frame[order])
+        return found
+    for number, direction in enumerate(run.readout.moved):
+        part = along[COMPONENTS.index(direction)]
+        motion = run.readout.loads[base + number] if order == 2 else run.readout.frame[2 * number + order]
+        found = found + part * np.array(motion) if part else found
+    return found

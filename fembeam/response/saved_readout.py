@@ -35,16 +35,19 @@ def packed(read: Readout) -> tuple[dict[str, Any], Arrays]:
     parts, rows = read.reactions
     about = {
         "base": read.base,
-        "beams": [_beam_as_words(one.beam) for one in read.section_forces],
+        "moved": read.moved,
+        "beams": [None if one is None else _beam_as_words(one.beam) for one in read.section_forces],
         "parts": [{"kind": type(part).__name__, "body": body, **_numbers(part)} for part, body in parts],
     }
     arrays = {name: getattr(read, name) for name in PLAIN} | {"reactions": rows}
     for i, one in enumerate(read.section_forces):
+        if one is None:
+            continue
         arrays |= {f"moments_{i}": one.moments, f"shears_{i}": one.shears}
     return about, arrays
 
 
-def unpacked(about: Mapping[str, Any], arrays: Mapping[str, Any], nodes: list[Vector]) -> Readout:
+def unpacked(about: Mapping[str, Any], arrays: Mapping[str, Any], nodes: list[Any]) -> Readout:
     """The same from a file, with the nodes of its beams; ValueError where words and arrays contradict each other."""
     counts = {"bodies": ("beams", len(nodes)), "reactions": ("parts", len(arrays["reactions"]))}
     for what, (name, count) in counts.items():
@@ -53,27 +56,38 @@ def unpacked(about: Mapping[str, Any], arrays: Mapping[str, Any], nodes: list[Ve
     if about["base"] is not None and not 0 <= about["base"] < len(arrays["loads"]):
         raise ValueError(f"base must be the number of a load, it is {about['base']}")
     forces = tuple(
-        SectionForces(_beam_of_words(beam), nodes[i], arrays[f"moments_{i}"], arrays[f"shears_{i}"])
+        None
+        if beam is None
+        else SectionForces(_beam_of_words(beam), nodes[i], arrays[f"moments_{i}"], arrays[f"shears_{i}"])
         for i, beam in enumerate(about["beams"])
     )
     parts: Any = [_part(dict(words)) for words in about["parts"]]
     kept: dict[str, Any] = {name: arrays[name] for name in PLAIN}
-    held = [(part.z, body) for part, body in parts if type(part) in FEATURES["supports"]]
+    straight = [(part, body) for part, body in parts if about["beams"][body] is not None]
+    held = [(part.z, body) for part, body in straight if type(part) in FEATURES["supports"]]
     kept["supports"] = np.array(held, dtype=float).reshape(-1, 2)
-    kept |= {"base": about["base"], "section_forces": forces, "reactions": (parts, arrays["reactions"])}
+    kept |= {
+        "base": about["base"],
+        "moved": tuple(about["moved"]),
+        "section_forces": forces,
+        "reactions": (parts, arrays["reactions"]),
+    }
     return Readout(None, arrays["t"], kept)
 
 
 def expected_readout(arrays: Mapping[str, Any]) -> dict[str, Shape]:
     """{name: shape} of what is there, as follow from q, the loads, stops, reactions and nodes."""
     (k, n), m, loads, r = arrays["q"].shape, len(arrays["stops"]), len(arrays["loads"]), len(arrays["reactions"])
+    components = 6 if arrays["reactions"].ndim == 3 and arrays["reactions"].shape[1] == 6 else 2
     bodies = sum(name.split("_")[0] == "nodes" for name in arrays)
     shapes: dict[str, Shape] = {
         **{"stiffness": (n, n), "damping": (n, n), "load_vectors": (loads, n), "loads": (loads, k)},
-        **{"frame": (2 if len(arrays["frame"]) else 0, k), "reactions": (r, 2, m + loads + 2 * n)},
+        **{"frame": (2 * (len(arrays["frame"]) // 2), k), "reactions": (r, components, m + loads + 2 * n)},
         **{"zeta": (n,), "heights": (bodies,), "impactor_places": (len(arrays["impactor_masses"]), 2)},
     }
     for i in range(bodies):
+        if f"moments_{i}" not in arrays:  # a body without sections
+            continue
         elements = arrays[f"nodes_{i}" if i else "nodes"].size - 1
         shapes |= {f"{name}_{i}": (elements, 2, n) for name in ("moments", "shears")}
     return shapes

@@ -18,7 +18,7 @@ the moment and, next to it, all of the shear.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -82,9 +82,11 @@ class SectionForces:
         return element, ((z - self.nodes[element]) / h)[:, None], h[:, None]
 
 
-def section_forces(model: ModalEquations, body: int = 0) -> SectionForces:
-    """The section forces of every coordinate of a model on one of its beams."""
+def section_forces(model: ModalEquations, body: int = 0) -> SectionForces | None:
+    """The section forces of every coordinate of a model on one of its beams; None of bodies without sections."""
     beam = model.matrices.beams[body]
+    if beam.named:
+        return None
     first = sum(before.M.shape[0] for before in model.matrices.beams[:body])
     mine = slice(first, first + beam.M.shape[0])
     vectors = model.basis.vectors[mine]
@@ -137,10 +139,10 @@ class Extremes:
 
     Attributes
     ----------
-    z : (j,) m. lowest, highest : (j,). t_lowest, t_highest : (j,) s, when.
+    z : (j,) m, or pairs (place, direction). lowest, highest : (j,). t_lowest, t_highest : (j,) s, when.
     """
 
-    z: Vector
+    z: Any
     lowest: Vector
     highest: Vector
     t_lowest: Vector
@@ -150,15 +152,20 @@ class Extremes:
         return f"<extremes at {len(self.z)} places, {self.lowest.min():.4g} to {self.highest.max():.4g}>"
 
     @property
-    def largest(self) -> tuple[float, float, float]:
+    def largest(self) -> tuple[float, Any, float]:
         """The value largest in size, its place z and its time t."""
         low, high = int(np.nanargmin(self.lowest)), int(np.nanargmax(self.highest))
         if abs(self.lowest[low]) > abs(self.highest[high]):
-            return float(self.lowest[low]), float(self.z[low]), float(self.t_lowest[low])
-        return float(self.highest[high]), float(self.z[high]), float(self.t_highest[high])
+            return float(self.lowest[low]), _place(self.z[low]), float(self.t_lowest[low])
+        return float(self.highest[high]), _place(self.z[high]), float(self.t_highest[high])
 
 
-def extremes(t: Vector, q: Vector, shapes: Vector, z: Vector, offset: Vector) -> Extremes:
+def _place(z: Any) -> Any:
+    """A place as a number, or as it was named."""
+    return z if isinstance(z, tuple) else float(z)
+
+
+def extremes(t: Vector, q: Vector, shapes: Vector, z: Any, offset: Vector) -> Extremes:
     """Extremes of q (k, n) @ shapes (j, n).T + offset (j,), some places at a time."""
     found = np.empty((4, len(z)))
     step = max(1, 2_000_000 // max(len(t), 1))
@@ -171,8 +178,12 @@ def extremes(t: Vector, q: Vector, shapes: Vector, z: Vector, offset: Vector) ->
     return Extremes(z, *found)
 
 
-def rows_of(run: Histories, quantity: str, z: Vector, body: int) -> tuple[Vector, Vector, Vector]:
+def rows_of(run: Histories, quantity: str, z: Any, body: int) -> tuple[Vector, Any, Vector]:
     """What turns q into a field: shapes (j, n), the places themselves, a constant part (j,)."""
+    if isinstance(z, list):  # of a body with places by name
+        require(quantity == "displacement", f"{quantity} is of a Beam, which has sections", z[:1], "Run",
+                "ask for displacement, rotations included")  # fmt: skip
+        return (run.shapes, *run.others)[body](z), z, np.zeros(len(z))
     known = ("displacement", "slope", "moment", "shear", "stress")
     require(quantity in known, f"quantity must be one of {', '.join(known)}", quantity, "Run", "choose one")
     if quantity in known[:2]:

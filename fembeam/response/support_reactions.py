@@ -21,9 +21,11 @@ from scipy.sparse import linalg as sparse_linalg
 
 import reduction
 from fembeam.beams import bending_root, hermite_rows
+from fembeam.response.body_reactions import BodyHeld
 from fembeam.response.readout import coordinates
-from fembeam.scene import Spring, contact_rows, loads, unsupported
-from fembeam.support import Part, Printed, require
+from fembeam.scene import BodyMatrices, Spring, contact_rows, loads, told, unsupported
+from fembeam.structures import COMPONENTS
+from fembeam.support import Part, Printed, is_finite, require
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -58,10 +60,16 @@ class Reaction:
         """The name of the part, else such as "Clamped at z = 0 m"."""
         if self.part.name is not None:
             return str(self.part.name)
-        return f"{type(self.part).__name__} at z = {self.part.z:g} m" + (f" of beam {self.body}" if self.body else "")
+        at = f"z = {self.part.z:g} m" if is_finite(self.part.z) else told(self.part.z)
+        return f"{type(self.part).__name__} at {at}" + (f" of beam {self.body}" if self.body else "")
 
     def __repr__(self) -> str:
         return f"<reaction of {self.name}, largest force {self.largest()[0]:.5g} N>"
+
+    def __getitem__(self, component: str) -> Vector:
+        """One component (k,) along the global axes: "y" the force, "rx" the moment, turned round."""
+        zeros = np.zeros_like(self.force)
+        return {"y": self.force, "rx": -self.moment}.get(component, zeros)
 
     def extremes(self, quantity: str = "force") -> tuple[tuple[float, float], tuple[float, float]]:
         """((least, its time), (greatest, its time)) over the samples of the "force" or the "moment"."""
@@ -74,6 +82,33 @@ class Reaction:
     def largest(self, quantity: str = "force") -> tuple[float, float]:
         """The value largest in size, and its time."""
         return max(self.extremes(quantity), key=lambda found: abs(found[0]))
+
+
+@dataclass(frozen=True, eq=False)
+class BodyReaction(Reaction):
+    """What one support, spring or dashpot exerts at a place of a body, by components: ``reaction["x"]`` (k,).
+
+    Attributes
+    ----------
+    part, body, t : as for a beam. force : (k, 3) N along x, y, z. moment : (k, 3) N m about the axes through the place.
+    """
+
+    def __repr__(self) -> str:
+        return f"<reaction of {self.name}, largest force {self.largest()[0]:.5g} N>"
+
+    def __getitem__(self, component: str) -> Vector:
+        """One of x, y, z, rx, ry, rz (k,)."""
+        require(component in COMPONENTS, f"component must be one of {', '.join(COMPONENTS)}", component, "Reaction",
+                "choose one")  # fmt: skip
+        number = COMPONENTS.index(component)
+        return self.force[:, number] if number < 3 else self.moment[:, number - 3]
+
+    def extremes(self, quantity: str = "force") -> tuple[tuple[float, float], tuple[float, float]]:
+        """((least, its time), (greatest, its time)) of a component, or of the size of the "force" or the "moment"."""
+        whole = quantity in ("force", "moment")
+        values = np.linalg.norm(getattr(self, quantity), axis=1) if whole else self[quantity]
+        low, high = int(np.argmin(values)), int(np.argmax(values))
+        return (float(values[low]), float(self.t[low])), (float(values[high]), float(self.t[high]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,13 +133,19 @@ class Reactions(Printed):
         return f"<{len(self)} reactions: {', '.join(one.name for one in self)}>"
 
     def _parts(self) -> list[Part]:
+        if any(isinstance(one, BodyReaction) for one in self):
+            head = ["reaction", "component", "least / N, N m", "greatest / N, N m"]
+            each = ((one.name, c, one[c]) for one in self for c in COMPONENTS if one[c].any())
+            return [(head, [[name, c, float(x.min()), float(x.max())] for name, c, x in each])]
         head = ["reaction", "least force / N", "greatest / N", "least moment / N m", "greatest / N m"]
         rows = [[one.name, *(found[0] for q in ("force", "moment") for found in one.extremes(q))] for one in self]
         return [(head, rows)]
 
     @property
     def force(self) -> Vector:
-        """Sum of all forces (k,), N."""
+        """Sum of all forces (k,), N; (k, 3) along x, y, z where a body is no `Beam`."""
+        if any(isinstance(one, BodyReaction) for one in self):
+            return np.asarray(sum(np.array([one[c] for c in COMPONENTS[:3]]).T for one in self))
         return np.asarray(sum(one.force for one in self))
 
 
@@ -114,37 +155,65 @@ def reactions(run: Run) -> Reactions:
     q_dot = run._at_samples(run.q_dot)
     histories = np.vstack([run._forces, run.readout.loads, coordinates(run).T, q_dot.T])
     pairs = zip(parts, rows, strict=True)
-    return Reactions(tuple(Reaction(part, body, run.t, *(row @ histories)) for (part, body), row in pairs))
+    beams = (run.shapes, *run.others)
+    found: list[Reaction] = []
+    for (part, body), row in pairs:
+        values = row @ histories
+        if hasattr(beams[body], "components"):
+            found.append(BodyReaction(part, body, run.t, values[:3].T, values[3:].T))
+        else:
+            found.append(Reaction(part, body, run.t, *(values if len(values) == 2 else (values[1], -values[3]))))
+    return Reactions(tuple(found))
 
 
 def reaction_rows(model: Model) -> tuple[list[tuple[Any, int]], Vector]:
-    """(part, body) of each reaction, and its force and moment (r, 2, c) per unit of [F; s; q''; q']."""
+    """(part, body) of each reaction, and its force and moment (r, 2, c) per unit of [F; s; q''; q'].
+
+    Of scenes with a body that is no `Beam` all six components (r, 6, c).
+    """
     full = unsupported(model.scene, model.matrices)
     columns = _acting(model, full)
     parts, rows, done = [], [], 0
+    named = any(beam.named for beam in full.beams)
     feet = len(model.contact_rows)  # where the loads begin
     for body, scene in enumerate((model.scene, *model.scene.bodies)):
         size = full.beams[body].M.shape[0]
-        held = _Held(scene, model.matrices.beams[body], columns[done : done + size])
+        mine, known, loose = columns[done : done + size], model.matrices.beams[body], full.beams[body]
+        held: Any = (
+            BodyHeld(scene, known, loose, mine)
+            if isinstance(known, BodyMatrices) and isinstance(loose, BodyMatrices)
+            else _Held(scene, known, mine)
+        )
         feet += len(scene.forces)
         for part in (*scene.supports, *scene.springs):
             row = np.array(held.by(part))
             if isinstance(part, Spring) and part.foot is not None:  # a moving foot adds to the force of its spring
-                row[0, feet] += part.stiffness
+                row[:, feet] += part.stiffness * np.array(part.along or (1.0, 0.0))
                 feet += 1
             parts.append((part, body))
-            rows.append(row)
+            rows.append(_six(row) if named and len(row) == 2 else row)
         done += size
     for part, body, rates in _dashpots(model):
         parts.append((part, body))
-        rows.append(np.hstack([np.zeros((2, columns.shape[1] - rates.shape[1])), rates]))
-    return parts, np.array(rows).reshape(len(rows), 2, columns.shape[1])
+        one = np.outer(part.along, rates[0]) if part.along is not None else _six(rates) if named else rates
+        rows.append(np.hstack([np.zeros((len(one), columns.shape[1] - one.shape[1])), one]))
+    return parts, np.array(rows).reshape(len(rows), 6 if named else 2, columns.shape[1])
+
+
+def _six(row: Vector) -> Vector:
+    """Force and moment (2, c) on a beam as components (6, c)."""
+    out = np.zeros((6, row.shape[1]))
+    out[1], out[3] = row[0], -row[1]
+    return out
 
 
 def _dashpots(model: Model) -> Iterator[tuple[Any, int, Vector]]:
     """The dashpots with their bodies, and force and moment (2, n) per unit of q': -c φ and -γ φ_z."""
     for body, scene in enumerate((model.scene, *model.scene.bodies)):
         for part in scene.dashpots:
+            if part.along is not None:
+                yield part, body, -part.damping * model.phi((part.z, part.direction), 0, body)[None]
+                continue
             rates = (-part.damping * model.phi(part.z, 0, body), -part.rotational * model.phi(part.z, 1, body))
             yield part, body, np.array(rates)
 
@@ -154,19 +223,29 @@ def _acting(model: Model, full: Matrices) -> Vector:
     scene, size = model.scene, full.M.shape[0]
     rows = [one.row for one in contact_rows(scene, full)] + [row for row, _ in loads(scene, full)]
     pushed = sparse.vstack([sparse.csr_matrix((0, size)), *rows]).toarray().T
-    frame = -full.base_load[:, None].repeat(len(model.contact_rows) + len(model.system.loads) - len(rows), axis=1)
+    moved = [*scene.motions, *(["y"] if scene.gravity else [])]
+    frame = -np.array([full.base_loads[direction] for direction in moved]).reshape(-1, size).T
     vectors, damped = np.zeros((size, len(model.omega))), np.zeros((size, len(model.omega)))
-    vectors[_kept(model.matrices, full)] = model.basis.vectors
+    vectors[:] = _on_all(model.matrices, full) @ model.basis.vectors
     for part, body, rates in _dashpots(model):
+        if part.along is not None:
+            damped += full.row(part.z, part.along, body).T @ rates
+            continue
         for derivative in (0, 1):
             damped += full.interpolation(part.z, derivative, body).T @ rates[[derivative]]
     return np.hstack([pushed, frame, -(full.M @ vectors), damped])
 
 
-def _kept(matrices: Matrices, full: Matrices) -> NDArray[np.int64]:
-    """Numbers of the free dofs among all."""
-    free = [np.ravel(beam.dofs) >= 0 for beam in matrices.beams]
-    return np.flatnonzero(np.concatenate([*free, np.ones(len(full.impactors), dtype=bool)]))
+def _on_all(matrices: Matrices, full: Matrices) -> sparse.csr_matrix:
+    """(N_all, N): the free dofs of all bodies among all; of massless ones what they follow."""
+    parts = []
+    for beam in matrices.beams:
+        if isinstance(beam, BodyMatrices):
+            parts.append(beam.spread)
+        else:
+            kept = np.flatnonzero(np.ravel(beam.dofs) >= 0)
+            parts.append(sparse.eye(beam.dofs.size, format="csr")[:, kept])
+    return sparse.block_diag([*parts, sparse.eye(len(full.impactors))], format="csr")
 
 
 class _Held:

@@ -6,12 +6,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fembeam.scene import signals_of
+from fembeam.scene import signals_of, split
+from fembeam.structures import COMPONENTS
 from fembeam.support import is_finite, require
 
 if TYPE_CHECKING:
@@ -43,7 +44,8 @@ class FrequencyResponse:
 
     def __repr__(self) -> str:
         span = f"{self.omega[0]:.4g} to {self.omega[-1]:.4g} rad/s"
-        return f"<frequency response at z = {self.output} m to {self.input}, {span}>"
+        at = self.output if isinstance(self.output, (tuple, list)) else f"z = {self.output} m"
+        return f"<frequency response at {at} to {self.input}, {span}>"
 
     @property
     def amplitude(self) -> Vector:
@@ -66,21 +68,51 @@ def frequency_response(
     model: Model, omega: ArrayLike, driven: str | float, output: ArrayLike, absolute: bool, body: int
 ) -> FrequencyResponse:
     """The response of a model without its contacts; `Model.frequency_response` explains it."""
-    require(not absolute or driven == "base", "absolute is for the input 'base'", driven, WHERE, "leave it out")
+    driven = _named_base(model, driven)
+    moved = isinstance(driven, str) and driven.split(".")[0] == "base"
+    require(not absolute or moved, "absolute is for the input 'base'", driven, WHERE, "leave it out")
+    if model.scene.named and isinstance(output, np.ndarray):
+        output = output.tolist()
     frequencies, places = _checked(omega, model), model.phi(output, 0, body)
     vector, power, said, unit = _driving(model, driven)
     values = _solved(model, frequencies, vector) @ places.T
-    values = (values.T * frequencies**power + float(absolute)).T
-    return FrequencyResponse(frequencies, values, said, np.array(output, dtype=float)[()], absolute, unit, model.omega)
+    values = (values.T * frequencies**power).T + (_carried_along(model, driven, output) if absolute else 0.0)
+    shown: Any = output if model.scene.named else np.array(output, dtype=float)[()]
+    return FrequencyResponse(frequencies, values, said, shown, absolute, unit, model.omega)
 
 
-def _driving(model: Model, driven: str | float) -> tuple[Vector, int, str, str]:
+def _carried_along(model: Model, driven: str | float, output: Any) -> Any:
+    """What a unit motion of the frame adds at the places: 1 on a beam, n_x along x."""
+    if not model.scene.named:
+        return 1.0
+    direction, components = COMPONENTS.index(str(driven).removeprefix("base.")), model.scene.beam.components
+    ways = [split(one, components)[1] for one in (output if isinstance(output, list) else [output])]
+    parts = np.array([way[direction] for way in ways])
+    return parts if isinstance(output, list) else parts[0]
+
+
+def _named_base(model: Model, driven: Any) -> Any:
+    """The input "base" with its direction, where there is but one of a structure."""
+    if driven != "base" or not model.scene.named:
+        return driven
+    known = tuple(model.scene.motions) or model.moved_along
+    require(len(known) == 1, "input must name the direction of the base", driven, WHERE,
+            f"write {' or '.join(f'base.{one}' for one in known)}")  # fmt: skip
+    return f"base.{known[0]}"
+
+
+def _driving(model: Model, driven: Any) -> tuple[Vector, int, str, str]:
     """Vector (n,) and power of ω of an input of size 1, what it is in words, the unit of the response to it."""
     if driven == "base":
         return model.participation, 2, "displacement of the frame", "m/m"
+    if isinstance(driven, str) and driven.startswith("base."):
+        direction = driven.removeprefix("base.")
+        return model.participation_along(direction), 2, f"displacement of the frame along {direction}", "m/m"
+    if isinstance(driven, tuple):
+        return model.phi(driven), 0, f"force at {driven[0]} along {driven[1]}", "m/N"
     if is_finite(driven):
         return model.phi(float(driven)), 0, f"force at z = {driven} m", "m/N"
-    names = [path for path in signals_of(model.scene) if path != "base"]  # in the order of the loads
+    names = [path for path in signals_of(model.scene) if path.split(".")[0] != "base"]  # in the order of the loads
     inputs = [name.removesuffix(".signal") for name in names]
     known = isinstance(driven, str) and driven.removesuffix(".signal") in inputs
     require(known, f"input must be a place z in m, or one of {', '.join(['base', *inputs])}", driven, WHERE, "use one")

@@ -37,6 +37,8 @@ from fembeam.beams import (
     spread,
     wavenumber,
 )
+from fembeam.scene.places import told
+from fembeam.structures import Six, require_components
 from fembeam.support import is_whole, require, require_finite
 
 if TYPE_CHECKING:
@@ -73,7 +75,7 @@ class Matrices:
     impactors : of all bodies, one dof each, the last ones.
     """
 
-    beam: Beam
+    beam: Any
     M: sparse.csr_matrix
     K: sparse.csr_matrix
     root: sparse.csr_matrix | None
@@ -86,6 +88,12 @@ class Matrices:
     modes: int | None = None
     bodies: tuple[Matrices, ...] = ()
     impactors: tuple[Impactor, ...] = ()
+    named = False  # whether its places have names and directions, see `BodyMatrices`
+
+    @property
+    def base_loads(self) -> dict[str, Vector]:
+        """The load (N,) of every direction in which the frame may move: of a beam "y" alone."""
+        return {"y": self.base_load}
 
     @cached_property
     def C(self) -> sparse.csr_matrix:
@@ -94,6 +102,10 @@ class Matrices:
             dashpots = sparse.diags([impactor.damping for impactor in self.impactors])
             return sparse.block_diag([*(body.C for body in self.bodies), dashpots], format="csr")
         return (self.damping.matrix(self.M, self.K, self.root) + self.dashpots).tocsr()
+
+    def loosened(self, scene: Scene) -> Matrices:
+        """The matrices of the scene's own body without its supports, on all dofs of the same mesh."""
+        return _on_nodes(scene, self.nodes, self.modes)
 
     @property
     def elements(self) -> int:
@@ -114,9 +126,22 @@ class Matrices:
         own = self.beams[body]
         places = on_beam(np.atleast_1d(np.asarray(z, dtype=float)), own.beam, "interpolation")
         rows = hermite_rows(own.nodes, places, derivative)[:, np.flatnonzero(own.dofs.ravel() >= 0)]
+        return self._among_all(rows, body)
+
+    def row(self, place: Any, along: Six, body: int = 0) -> sparse.csr_matrix:
+        """Row (1, N): the motion of a body's place along a direction, six numbers."""
+        return self._among_all(self.beams[body].own_row(place, along), body)
+
+    def own_row(self, place: Any, along: Six) -> sparse.csr_matrix:
+        """The same on the body's own dofs: of a beam u along y and -u_z about x."""
+        require_components(along, ("y", "rx"), "a Beam bends in one plane: its places", f"{told(place)} of a Beam")
+        return along[1] * self.interpolation(place) - along[3] * self.interpolation(place, 1)
+
+    def _among_all(self, rows: sparse.csr_matrix, body: int) -> sparse.csr_matrix:
+        """Rows on a body's own dofs as rows on all."""
         before = sum(beam.M.shape[0] for beam in self.beams[:body])
         after = self.M.shape[0] - before - rows.shape[1]
-        blank = [sparse.csr_matrix((len(places), count)) for count in (before, after)]
+        blank = [sparse.csr_matrix((rows.shape[0], count)) for count in (before, after)]
         return sparse.hstack([blank[0], rows, blank[1]], format="csr") if before or after else rows
 
     def impactor_row(self, index: int) -> sparse.csr_matrix:
@@ -153,10 +178,13 @@ class Matrices:
 def assemble(scene: Scene, elements: int | None, modes: int | None, probes: Sequence[float]) -> Matrices:
     """Matrices of the scene; `Scene.matrices` explains the arguments."""
     _check_counts(elements, modes)
+    meshed = any(getattr(part.beam, "meshed", True) for part in (scene, *scene.bodies))
+    require(elements is None or meshed, "elements must be left out: a structure has its own matrices", elements,
+            "Scene.matrices", "ask for modes, or modes='all'")  # fmt: skip
     own = _one_beam(scene, elements, modes, probes)
     if not scene.bodies and not scene.impactors:
         return own
-    second = [part.coordinate.to or (0, 0.0) for part in scene.acting]
+    second: list[tuple[int, Any]] = [part.coordinate.to or (0, 0.0) for part in scene.acting]
     met = [[z for number, z in second if number == b + 1] for b in range(len(scene.bodies))]
     others = [_one_beam(body, elements, modes, at) for body, at in zip(scene.bodies, met, strict=True)]
     return _joined((own, *others), tuple(i for body in (scene, *scene.bodies) for i in body.impactors))
@@ -164,6 +192,10 @@ def assemble(scene: Scene, elements: int | None, modes: int | None, probes: Sequ
 
 def _one_beam(scene: Scene, elements: int | None, modes: int | None, probes: Sequence[float]) -> Matrices:
     """Matrices of the scene's own beam."""
+    if not isinstance(scene.beam, Beam):
+        from fembeam.scene.body_assembly import body_matrices
+
+        return body_matrices(scene, elements, modes, probes)
     _check_buckling(scene)
     borders = borders_of(scene, probes)
     if elements is None:
@@ -191,17 +223,30 @@ def _joined(beams: tuple[Matrices, ...], impactors: tuple[Impactor, ...]) -> Mat
         return sparse.block_diag([*blocks, *([sparse.diags(last)] if len(last) else [])], format="csr")
 
     roots = [beam.root for beam in beams if beam.root is not None]
+    along = _base_loads(beams, mass)
+    named: dict[str, Any] = {"along": along} if own.named else {}
     return replace(
         own,
+        **named,
         M=stacked([beam.M for beam in beams], mass),
         K=stacked([beam.K for beam in beams], stiffness),
         root=stacked(roots, np.sqrt(stiffness)) if len(roots) == len(beams) else None,
         dashpots=stacked([beam.dashpots for beam in beams], damping),
         influence=np.concatenate([*(beam.influence for beam in beams), np.ones(len(mass))]),
-        base_load=np.concatenate([*(beam.base_load for beam in beams), mass]),
+        base_load=along.get("y", next(iter(along.values()), np.zeros(0))),
         bodies=beams,
         impactors=impactors,
     )
+
+
+def _base_loads(beams: tuple[Matrices, ...], mass: Vector) -> dict[str, Vector]:
+    """The load of the frame's motion on all bodies; impactors move along y."""
+    known = list(dict.fromkeys(direction for beam in beams for direction in beam.base_loads))
+    found = {}
+    for direction in known:
+        parts = [beam.base_loads.get(direction, np.zeros(beam.M.shape[0])) for beam in beams]
+        found[direction] = np.concatenate([*parts, mass if direction == "y" else 0.0 * mass])
+    return found
 
 
 def _check_counts(elements: int | None, modes: int | None) -> None:
@@ -290,11 +335,11 @@ def unsupported(scene: Scene, matrices: Matrices) -> Matrices:
     for part, known in zip((scene, *scene.bodies), matrices.beams, strict=True):
         loose = copy(part)  # not a scene to be simulated, hence without its checks
         object.__setattr__(loose, "supports", ())
-        beams.append(_on_nodes(loose, known.nodes, known.modes))
+        beams.append(known.loosened(loose))
     return _joined(tuple(beams), matrices.impactors)
 
 
-def _lumped(nodes: Vector, items: Sequence[tuple[float, float, float, float]]) -> sparse.csr_matrix:
+def _lumped(nodes: Vector, items: Sequence[tuple[Any, ...]]) -> sparse.csr_matrix:
     """Rows √a (u + e u_z) and √b u_z for items (z, a, b, e): their square is the quadratic form."""
     z, a, b, e = np.array(items, dtype=float).reshape(-1, 4).T
     u, slope = hermite_rows(nodes, z, 0), hermite_rows(nodes, z, 1)

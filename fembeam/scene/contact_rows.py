@@ -16,7 +16,6 @@ from scipy import sparse
 from fembeam.excitation import Harmonic
 from fembeam.scene.element import force_both_ways
 from fembeam.scene.local_coordinate import LocalCoordinate
-from fembeam.scene.parts import PointMoment
 
 if TYPE_CHECKING:
     from fembeam.scene.assembly import Matrices
@@ -40,6 +39,7 @@ class ContactRow:
     on : ("frame", 0), ("body", b) or ("impactor", i): what it pushes from.
     rotation : whether it acts on the slope: rad and N m. always : whether it acts at both signs of δ, an element.
     name : of the part, given or made; of an impactor on both sides with its side. given : whether it was given.
+    direction : as given, of places by name.
     """
 
     row: sparse.csr_matrix
@@ -47,12 +47,13 @@ class ContactRow:
     gap: float
     push: float
     body: int
-    z: float
+    z: Any
     on: tuple[str, int]
     rotation: bool = False
     always: bool = False
     name: str = ""
     given: bool = False
+    direction: Any = None
 
     @property
     def remembers(self) -> bool:
@@ -80,7 +81,8 @@ def _contact_rows(scene: Scene, matrices: Matrices) -> Iterator[ContactRow]:
             place = one.coordinate
             on = ("frame", 0) if place.to is None else ("body", place.to[0] or body)
             row, name = one.push * place.row(matrices, body), _name(one, body)
-            yield ContactRow(row, one.law, one.gap, one.push, body, one.z, on, place.rotation, one.always, *name)
+            kind = place.rotation, one.always, *name, one.direction
+            yield ContactRow(row, one.law, one.gap, one.push, body, one.z, on, *kind)
         for impactor in part.impactors:
             row = matrices.interpolation(impactor.z, body=body) - matrices.impactor_row(count)
             label, given = _name(impactor, body)
@@ -115,10 +117,11 @@ def loads(scene: Scene, matrices: Matrices) -> list[tuple[sparse.csr_matrix, Any
     rows = []
     for body, part in enumerate((scene, *scene.bodies)):
         for force in part.forces:
-            rows.append((matrices.interpolation(force.z, _derivative(force), body), force.signal))
+            rows.append((force.coordinate.row(matrices, body), force.signal))
         for spring in part.springs:
             if spring.foot is not None:
-                rows.append((spring.stiffness * matrices.interpolation(spring.z, body=body), spring.foot))
+                at = LocalCoordinate(spring.z, direction=spring.along)
+                rows.append((spring.stiffness * at.row(matrices, body), spring.foot))
     return rows
 
 
@@ -132,16 +135,17 @@ def watched(scene: Scene, body: int) -> LocalCoordinate | None:
     part = (scene, *scene.bodies)[body]
     places = [one.coordinate for one in part.acting] + [LocalCoordinate(impactor.z) for impactor in part.impactors]
     places += _from_the_first(scene, body)
-    return LocalCoordinate(places[0].z, places[0].derivative) if places else None
+    return replace(places[0], to=None) if places else None
 
 
 def loaded(scene: Scene, body: int) -> list[LocalCoordinate]:
     """Where a force or moment acts on a beam, or a pair of them: of stops, elements, loads, dashpots, impactors."""
     part = (scene, *scene.bodies)[body]
     places = [own for one in part.acting for own in one.coordinate.on_body(body, body)]
-    places += [LocalCoordinate(force.z, _derivative(force)) for force in part.forces]
-    places += [LocalCoordinate(spring.z) for spring in part.springs if spring.foot is not None]
-    places += [LocalCoordinate(dashpot.z) for dashpot in part.dashpots if dashpot.damping]
+    places += [force.coordinate for force in part.forces]
+    feet = (spring for spring in part.springs if spring.foot is not None)
+    places += [LocalCoordinate(spring.z, direction=spring.along) for spring in feet]
+    places += [LocalCoordinate(d.z, direction=d.along) for d in part.dashpots if d.damping]
     places += [LocalCoordinate(dashpot.z, 1) for dashpot in part.dashpots if dashpot.rotational]
     places += [LocalCoordinate(impactor.z) for impactor in part.impactors]
     return places + _from_the_first(scene, body)
@@ -154,17 +158,9 @@ def _from_the_first(scene: Scene, body: int) -> list[LocalCoordinate]:
 
 def static_rows(scene: Scene, matrices: Matrices) -> sparse.csr_matrix:
     """Rows (m, N) of the scene's own stops, elements, then forces: where the model may miss static compliance."""
-    places = [
-        *(one.coordinate for one in scene.acting),
-        *(LocalCoordinate(force.z, _derivative(force)) for force in scene.forces),
-    ]
+    places = [one.coordinate for one in (*scene.acting, *scene.forces)]
     blank = sparse.csr_matrix((0, matrices.M.shape[0]))
     return sparse.vstack([blank, *(place.row(matrices) for place in places)], format="csr")
-
-
-def _derivative(force: Any) -> int:
-    """1 of a moment, 0 of a force."""
-    return int(isinstance(force, PointMoment))
 
 
 def heights(scene: Scene) -> tuple[list[float], list[float]]:

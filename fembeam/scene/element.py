@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from fembeam.scene.impactor import check_law
 from fembeam.scene.local_coordinate import LocalCoordinate, Of, local_coordinate
 from fembeam.scene.part import ScenePart
+from fembeam.scene.places import Second
+from fembeam.structures import Direction, direction_of
 from fembeam.support import require, require_finite
 
 TRIED = np.array([1e-6, 1e-4, 1e-3])  # deformations, m or rad, of both signs, at which a law is tried out
@@ -33,6 +35,7 @@ class Element(ScenePart):
     to : its other end; None: the frame, a number: that place on the same beam, (body, z): on a beam of
         `Scene.bodies`, 1 the first. d is then the difference, u(z) - u_to - gap.
     gap : d = 0 at u = gap, m or rad: an offset, since the law acts on both sides.
+    direction : on other bodies than a `Beam`: along what d is measured, "x", "-y", "rz" or a vector.
     name : keyword, what tables and figures call it, unique in a scene.
 
     Raises
@@ -51,8 +54,9 @@ class Element(ScenePart):
 
     law: Any
     of: Of = "displacement"
-    to: float | tuple[int, float] | None = None
+    to: Second | None = None
     gap: float = 0.0
+    direction: Direction | None = None
     push = -1.0  # δ = d: direction -W
     always = True
     word = "element"
@@ -61,7 +65,9 @@ class Element(ScenePart):
         super().__post_init__()
         where = self.where
         require_finite("gap", self.gap, where, "give the offset in m, or rad of a rotation")
-        local_coordinate(self.z, self.of, self.to, where, "to")
+        if isinstance(self.direction, list):
+            object.__setattr__(self, "direction", tuple(self.direction))
+        _ = self.coordinate
         check_law(self.law, where)
         why = next(one_sided(self.law), "")
         require(not why, f"law must act at both signs of d: {why}", self.law, where,
@@ -70,10 +76,13 @@ class Element(ScenePart):
     @property
     def coordinate(self) -> LocalCoordinate:
         """What it acts on."""
-        return local_coordinate(self.z, self.of, self.to, self.where, "to")
+        found = local_coordinate(self.z, self.of, self.to, self.where, "to", self.direction)
+        if self.direction is None:
+            return found
+        return replace(found, direction=direction_of(self.direction, self.where))
 
     def _made(self, at: str) -> str:
-        of, to = " of rotation" * self.coordinate.rotation, self.coordinate.to_words
+        of, to = " of rotation" * (self.direction is None and self.coordinate.rotation), self.coordinate.to_words
         return f"{self.word}{of} " + (f"from {at} to {to}" if to else f"at {at}")
 
 

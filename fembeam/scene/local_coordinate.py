@@ -1,16 +1,20 @@
 """The coordinate a stop or an element acts on: u or u_z at one place, or its difference to a second place.
 
 d = W u - gap,    W = row of u(z) or u_z(z), less that of the second place
+
+On bodies that are not a `Beam` a place has a name and a direction n: W = n · (displacement, rotation).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 from scipy import sparse
 
+from fembeam.scene.places import is_pair, is_place, place_words, unsigned
+from fembeam.structures import TURN, UP, Six, direction_of, turns
 from fembeam.support import is_finite, is_whole, require
 
 if TYPE_CHECKING:
@@ -42,49 +46,70 @@ def unit_of(quantity: str, rotations: Iterable[Any]) -> str:
 class LocalCoordinate:
     """u (derivative 0) or u_z (1) of a beam at z, less that of a second place `to`, (body, z); body 0: the same beam.
 
+    With a direction z is a place of any body, and the coordinate the motion along the direction there.
+
     Examples
     --------
     >>> LocalCoordinate(0.2, 1).rotation
     True
     """
 
-    z: float
+    z: Any
     derivative: int = 0
-    to: tuple[int, float] | None = None
+    to: tuple[int, Any] | None = None
+    direction: Six | None = None
 
     @property
     def rotation(self) -> bool:
         """Whether it is a rotation: rad and N m, not m and N."""
-        return self.derivative == 1
+        return self.derivative == 1 if self.direction is None else turns(self.direction)
+
+    @property
+    def along(self) -> Six:
+        """Its direction on the six components."""
+        return (UP, TURN)[self.derivative] if self.direction is None else self.direction
 
     @property
     def to_words(self) -> str:
         """The second place: "0.8 m", "0.2 m of beam 1"; empty without one."""
         if self.to is None:
             return ""
-        return f"{self.to[1]:.6g} m" + (f" of beam {self.to[0]}" if self.to[0] else "")
+        place = (
+            self.to[1] if self.direction is None or is_pair(self.to[1]) else str(self.to[1])
+        )  # a number names a node
+        return place_words(place) + (f" of beam {self.to[0]}" if self.to[0] else "")
 
     def row(self, matrices: Matrices, body: int = 0) -> sparse.csr_matrix:
         """W (1, N) on the free dofs, for a first place on `body`."""
-        row = matrices.interpolation(self.z, self.derivative, body)
+        row = self._end(matrices, self.z, body)
         if self.to is None:
             return row
         other, z = self.to
-        return row - matrices.interpolation(z, self.derivative, other or body)
+        return row - self._end(matrices, z, other or body)
+
+    def _end(self, matrices: Matrices, place: Any, body: int) -> sparse.csr_matrix:
+        """The row of one of its places."""
+        if self.direction is None and not matrices.beams[body].named:
+            return matrices.interpolation(place, self.derivative, body)
+        return matrices.row(place, self.along, body)
 
     def on_body(self, body: int, number: int) -> list[LocalCoordinate]:
         """What of it lies on beam `number`, given that its first place is on `body`: a load on that beam alone."""
         second = None if self.to is None else (self.to[0] or body)
         if body == number:
-            return [self if second == body else LocalCoordinate(self.z, self.derivative)]
-        return [LocalCoordinate(self.to[1], self.derivative)] if self.to is not None and second == number else []
+            return [self if second == body else replace(self, to=None)]
+        return [replace(self, z=self.to[1], to=None)] if self.to is not None and second == number else []
 
 
-def local_coordinate(z: float, of: str, to: Any, where: str, key: str) -> LocalCoordinate:
-    """The coordinate that `of` and a second place (a number, a pair, None) name; ValueError for others."""
+def local_coordinate(z: Any, of: str, to: Any, where: str, key: str, direction: Any = None) -> LocalCoordinate:
+    """The coordinate that `of` or a direction and a second place (or pair, None) name; ValueError for others."""
     require(of in KINDS, "of must be 'displacement' or 'rotation'", of, where, "choose one")
-    pair = (0, to) if is_finite(to) else to
-    two = isinstance(pair, (tuple, list)) and len(pair) == 2 and is_whole(pair[0]) and is_finite(pair[1])
-    require(pair is None or two, f"{key} must be a place z, (body, z) or None", to, where,
+    pair = to if to is None or (is_pair(to) and is_whole(to[0])) else (0, to)
+    valid = is_finite if direction is None else is_place  # names come with directions
+    require(pair is None or valid(pair[1]), f"{key} must be a place z, (body, z) or None", to, where,
             "give z on the same beam, or name a beam of bodies, 1 the first, and a place")  # fmt: skip
-    return LocalCoordinate(z, KINDS.index(of), None if pair is None else (pair[0], pair[1]))
+    second = None if pair is None else (pair[0], pair[1])
+    if direction is None:
+        return LocalCoordinate(z, KINDS.index(of), second)
+    require(of == KINDS[0], "of must be left out where a direction is given", of, where, "write direction='rz' or so")
+    return LocalCoordinate(z, 0, second, direction_of(unsigned(direction), where))

@@ -41,6 +41,8 @@ def _numbers(path: str, item: Any) -> dict[str, float]:
         return {path: item}
     if isinstance(item, tuple) and all(isinstance(entry, float) for entry in item):
         return {f"{path}[{i}]": entry for i, entry in enumerate(item)}
+    if isinstance(item, dict):
+        return {name: value for key, part in item.items() for name, value in _numbers(f"{path}.{key}", part).items()}
     if not is_dataclass(item):
         return {}
     found: dict[str, float] = {}
@@ -68,7 +70,7 @@ def path_of(scene: Scene, name: str) -> str:
 
 def numbered(scene: Scene, path: str) -> str:
     """A path with numbers for the names of parts: "stops[0].gap" for "stops[valve].gap"."""
-    for numbers, part in scene.named.items():
+    for numbers, part in scene.named_parts.items():
         called = f"{numbers.rpartition('[')[0]}[{part.name}]."
         if path.startswith(called):
             return f"{numbers}.{path.removeprefix(called)}"
@@ -98,6 +100,8 @@ def _replaced(item: Any, path: list[str], value: float) -> Any:
         changed = list(item)
         changed[int(path[0])] = _replaced(item[int(path[0])], path[1:], value)
         return type(item)(changed)
+    if isinstance(item, dict):
+        return {**item, path[0]: _replaced(item[path[0]], path[1:], value)}
     changed = _replaced(getattr(item, path[0]), path[1:], value)
     if path[0] != "base":
         return replace(item, **{path[0]: changed})

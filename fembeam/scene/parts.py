@@ -1,4 +1,8 @@
-"""What stands on a beam: supports, masses, springs, dashpots, stops, forces and moments."""
+"""What stands on a beam: supports, masses, springs, dashpots, stops, forces and moments.
+
+A place `z` is a coordinate along a `Beam`; of other bodies the name of a node or point, or (member, distance in m).
+There `direction` says along what a part acts: "x", "-y", "rz" (a rotation), or a vector.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +12,14 @@ from typing import Any
 from fembeam.scene.impactor import check_law
 from fembeam.scene.local_coordinate import LocalCoordinate, Of, local_coordinate
 from fembeam.scene.part import ScenePart
+from fembeam.scene.places import Place, Second, sign_of
+from fembeam.structures import COMPONENTS, Direction, Six, direction_of, turns
 from fembeam.support import require, require_finite, require_non_negative
 
 
 @dataclass(frozen=True, repr=False)
 class Clamped(ScenePart):
-    """u = 0 and u_z = 0 at z (m).
+    """u = 0 and u_z = 0 at z (m); of other bodies than a `Beam` no component of a place moves.
 
     Examples
     --------
@@ -23,11 +29,12 @@ class Clamped(ScenePart):
 
     word = "clamp"
     fixed = (True, True)
+    dofs = COMPONENTS
 
 
 @dataclass(frozen=True, repr=False)
 class Pinned(ScenePart):
-    """u = 0 at z (m), free to turn.
+    """u = 0 at z (m), free to turn; of other bodies than a `Beam` no displacement of a place.
 
     Examples
     --------
@@ -37,11 +44,12 @@ class Pinned(ScenePart):
 
     word = "pin"
     fixed = (True, False)
+    dofs = COMPONENTS[:3]
 
 
 @dataclass(frozen=True, repr=False)
 class Guided(ScenePart):
-    """u_z = 0 at z (m), free to move.
+    """u_z = 0 at z (m), free to move; for a `Beam` only, elsewhere `Fixed` names the rotations.
 
     Examples
     --------
@@ -51,9 +59,43 @@ class Guided(ScenePart):
 
     word = "guide"
     fixed = (False, True)
+    dofs = ()
 
 
-Support = Clamped | Pinned | Guided
+@dataclass(frozen=True, repr=False, init=False)
+class Fixed(ScenePart):
+    """Chosen components of a place do not move: Fixed(place, "x", "rz"); none named: all that it has.
+
+    `dofs` are of "x", "y", "z", "rx", "ry", "rz"; of a `Beam` "y" is u and "rx" is -u_z. ValueError for another name,
+    or one twice.
+
+    Examples
+    --------
+    >>> Fixed("flange", "x", "y").dofs, Fixed("flange").dofs == Clamped("flange").dofs
+    (('x', 'y'), True)
+    """
+
+    dofs: tuple[str, ...] = ()
+    word = "fixing"
+
+    def __init__(self, z: Place, *named: str, dofs: tuple[str, ...] = (), name: str | None = None) -> None:
+        chosen = tuple(named) + tuple(dofs)
+        object.__setattr__(self, "z", z)
+        object.__setattr__(self, "name", name)
+        super().__post_init__()
+        for dof in chosen:
+            require(dof in COMPONENTS, f"dofs must be of {', '.join(COMPONENTS)}", dof, self.where,
+                    "choose from these, or name none to fix all")  # fmt: skip
+        require(len(set(chosen)) == len(chosen), "dofs must be named once", chosen, self.where, "keep one")
+        object.__setattr__(self, "dofs", chosen or COMPONENTS)
+
+    @property
+    def fixed(self) -> tuple[bool, bool]:
+        """Of a beam: displacement and slope."""
+        return "y" in self.dofs, "rx" in self.dofs
+
+
+Support = Clamped | Pinned | Guided | Fixed
 
 
 @dataclass(frozen=True, repr=False)
@@ -61,7 +103,9 @@ class LumpedMass(ScenePart):
     """A rigid body fixed to the beam at z: T = ½ m (u̇ + e u̇_z)² + ½ J u̇_z².
 
     `mass` m in kg, `inertia` J about its own centre in kg m², both ≥ 0; `offset` e in m: the centre sits
-    ahead of z by e on a rigid arm, which may reach beyond the beam's end. ValueError for a negative mass or inertia.
+    ahead of z by e on a rigid arm, which may reach beyond the beam's end. On other bodies than a `Beam` the inertia is
+    that about every axis, or three numbers, about x, y and z, and the offset a vector. ValueError for a negative mass
+    or inertia.
 
     Examples
     --------
@@ -71,23 +115,29 @@ class LumpedMass(ScenePart):
     """
 
     mass: float
-    inertia: float = 0.0
-    offset: float = 0.0
+    inertia: float | tuple[float, float, float] = 0.0
+    offset: float | tuple[float, float, float] = 0.0
     word = "mass"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require_non_negative("mass", self.mass, self.where, "give kg")
-        require_non_negative("inertia", self.inertia, self.where, "give kg m²")
-        require_finite("offset", self.offset, self.where, "give m")
+        where = self.where
+        require_non_negative("mass", self.mass, where, "give kg")
+        for name, check in (("inertia", require_non_negative), ("offset", require_finite)):
+            value = getattr(self, name)
+            if isinstance(value, (list, tuple)):
+                require(len(value) == 3, f"{name} must be one number, or three", value, where, "along x, y and z")
+                object.__setattr__(self, name, tuple(value))
+            for one in value if isinstance(value, (list, tuple)) else (value,):
+                check(name, one, where, "give kg m²" if name == "inertia" else "give m")
 
 
 @dataclass(frozen=True, repr=False)
 class Spring(ScenePart):
     """A spring to the frame: force -k (u - foot) (`stiffness`, N/m), moment -κ u_z (`rotational`, N m/rad); ≥ 0.
 
-    `foot` is a signal, the motion of its far end relative to the frame in m (a shaken support); None: at rest.
-    ValueError for a negative stiffness.
+    `foot` is a signal, the motion of its far end relative to the frame in m (a shaken support); None: at rest. On other
+    bodies than a `Beam` it acts along `direction`, in N m/rad if that is a rotation. ValueError for one below 0.
 
     Examples
     --------
@@ -100,21 +150,29 @@ class Spring(ScenePart):
     stiffness: float
     rotational: float = 0.0
     foot: Any = None
+    direction: Direction | None = None
     word = "spring"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require_non_negative("stiffness", self.stiffness, self.where, "give N/m")
-        require_non_negative("rotational", self.rotational, self.where, "give N m/rad")
-        require(self.foot is None or callable(self.foot), "foot must be a signal or None", self.foot,
-                self.where, "give a motion such as Harmonic(amplitude, omega)")  # fmt: skip
+        where = self.where
+        require_non_negative("stiffness", self.stiffness, where, "give N/m")
+        require_non_negative("rotational", self.rotational, where, "give N m/rad")
+        require(self.foot is None or callable(self.foot), "foot must be a signal or None", self.foot, where,
+                "give a motion such as Harmonic(amplitude, omega)")  # fmt: skip
+        _check_direction(self, where)
+
+    @property
+    def along(self) -> Six | None:
+        """Its direction on the six components; None on a beam, where it acts on u and u_z."""
+        return _along(self)
 
 
 @dataclass(frozen=True, repr=False)
 class Dashpot(ScenePart):
     """A dashpot to the frame: force -c u̇ (`damping`, N s/m), moment -γ u̇_z (`rotational`, N m s); ≥ 0.
 
-    ValueError for a negative one.
+    On other bodies than a `Beam` it acts along `direction`, in N m s if that is a rotation. ValueError for one below 0.
 
     Examples
     --------
@@ -124,24 +182,35 @@ class Dashpot(ScenePart):
 
     damping: float
     rotational: float = 0.0
+    direction: Direction | None = None
     word = "dashpot"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require_non_negative("damping", self.damping, self.where, "give N s/m")
-        require_non_negative("rotational", self.rotational, self.where, "give N m s/rad")
+        where = self.where
+        require_non_negative("damping", self.damping, where, "give N s/m")
+        require_non_negative("rotational", self.rotational, where, "give N m s/rad")
+        _check_direction(self, where)
+
+    @property
+    def along(self) -> Six | None:
+        """Its direction on the six components; None on a beam, where it acts on u and u_z."""
+        return _along(self)
 
 
 @dataclass(frozen=True, repr=False)
 class Stop(ScenePart):
     """A one-sided stop: δ = -u - gap below the beam, δ = u - gap above it; of rotation δ = ∓u_z - gap.
 
+    On any body `direction` n is the way the place moves when the gap closes, δ = n·u - gap: "y" is above a beam, "-y"
+    below it, "rz" stops a rotation. `on` is then a place of the same body, (body, place), or None: the frame.
     `law` gives the repulsive force for δ > 0; `gap` in m, negative = preload. It sits on the frame, or `on` another
     beam of the scene: `on=(body, z)`, body 1 the first of `Scene.bodies`; u is then the difference, u - u_body(z). A
     number for `on` is a second place on the same beam. With `of="rotation"` it limits the slope u_z, a hinge with
     freeplay: gap in rad, force a moment in N m, "below" stops u_z < 0, "above" u_z > 0.
     `name` (keyword, as of all parts): what the contact log, tables and figures call it, unique in a scene.
-    ValueError for a side that is neither "below" nor "above", an `of` that is neither, a gap that is not finite.
+    ValueError for a side that is neither "below" nor "above", a side beside a direction, an `of` that is neither, a gap
+    that is not finite.
 
     Examples
     --------
@@ -151,15 +220,18 @@ class Stop(ScenePart):
     ['below', 'above']
     >>> Stop(0.0, KelvinVoigt(500.0, 0.1), gap=0.02, side="above", of="rotation").coordinate.rotation
     True
-    >>> both[0].label, Stop(0.2, Hertz(1e9), name="valve").label
-    ('stop at 0.2 m, below', 'valve')
+    >>> Stop("lever", Hertz(1e9), gap=1e-3, direction="-x", name="lift").coordinate.direction
+    (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    >>> both[0].label, Stop("lever", Hertz(1e9), direction="-x").label
+    ('stop at 0.2 m, below', 'stop at lever, -x')
     """
 
     law: Any
     gap: float = 0.0
-    side: str = "below"
-    on: float | tuple[int, float] | None = None
+    side: str | None = None
+    on: Second | None = None
     of: Of = "displacement"
+    direction: Direction | None = None
     always = False
     word = "stop"
 
@@ -167,30 +239,39 @@ class Stop(ScenePart):
         super().__post_init__()
         where = self.where
         require_finite("gap", self.gap, where, "give the clearance in m (rad of a rotation), negative for a preload")
-        require(self.side in ("below", "above"), "side must be 'below' or 'above'", self.side, where, "choose one")
-        local_coordinate(self.z, self.of, self.on, where, "on")
+        require(self.direction is None or self.side is None, "side and direction exclude each other",
+                (self.side, self.direction), where, "keep the direction: 'y' is above, '-y' below")  # fmt: skip
+        if self.side is None and self.direction is None:
+            object.__setattr__(self, "side", "below")
+        require(self.side in ("below", "above", None), "side must be 'below' or 'above'", self.side, where,
+                "choose one")  # fmt: skip
+        _check_direction(self, where)
+        local_coordinate(self.z, self.of, self.on, where, "on", self.direction)
         check_law(self.law, where)
         acts_always = getattr(self.law, "memory", ()) and not getattr(self.law, "one_sided", False)
         require(not acts_always, "law must be one that opens", self.law, where, "make it an Element, which always acts")
 
     @property
     def push(self) -> float:
-        """Direction in which the stop pushes the beam: +1 (up) from below, -1 from above."""
+        """Direction in which the stop pushes: +1 (up) from below, -1 from above; against its direction."""
+        if self.direction is not None:
+            return -sign_of(self.direction)
         return 1.0 if self.side == "below" else -1.0
 
     @property
     def coordinate(self) -> LocalCoordinate:
         """What it acts on."""
-        return local_coordinate(self.z, self.of, self.on, self.where, "on")
+        return local_coordinate(self.z, self.of, self.on, self.where, "on", self.direction)
 
     def _made(self, at: str) -> str:
-        of, on = " of rotation" * self.coordinate.rotation, self.coordinate.to_words
-        return f"{self.word}{of} at {at}, {self.side}" + (f", on {on}" if on else "")
+        of, on = " of rotation" * (self.direction is None and self.coordinate.rotation), self.coordinate.to_words
+        side = f", {self.side}" if self.direction is None else ""
+        return f"{self.word}{of} at {at}{side}" + (f", on {on}" if on else "")
 
 
 @dataclass(frozen=True, repr=False)
 class PointForce(ScenePart):
-    """A force on the beam at z: signal(t) in N, positive up.
+    """A force on the beam at z: signal(t) in N, positive up; on other bodies along `direction`.
 
     Examples
     --------
@@ -200,17 +281,32 @@ class PointForce(ScenePart):
     """
 
     signal: Any
+    direction: Direction | None = None
     word = "force"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require(callable(self.signal), "signal must be a function of t", self.signal, self.where,
+        where = self.where
+        require(callable(self.signal), "signal must be a function of t", self.signal, where,
                 "give a signal such as Harmonic(amplitude, omega); Harmonic(size, 0.0) is a constant")  # fmt: skip
+        _check_direction(self, where)
+        pushes = self.along is None or not turns(self.along)
+        require(pushes, "direction of a force must be no rotation", self.direction, where, "make it a PointMoment")
+
+    @property
+    def along(self) -> Six | None:
+        """Its direction on the six components; None on a beam, where it is up."""
+        return _along(self)
+
+    @property
+    def coordinate(self) -> LocalCoordinate:
+        """What it acts on."""
+        return LocalCoordinate(self.z, 0, None, self.along)
 
 
 @dataclass(frozen=True, repr=False)
 class PointMoment(ScenePart):
-    """A moment on the beam at z: signal(t) in N m, positive where it turns u_z up.
+    """A moment on the beam at z: signal(t) in N m, positive where it turns u_z up; elsewhere about "rx", "ry", "rz".
 
     Examples
     --------
@@ -220,9 +316,40 @@ class PointMoment(ScenePart):
     """
 
     signal: Any
+    direction: Direction | None = None
     word = "moment"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require(callable(self.signal), "signal must be a function of t", self.signal, self.where,
+        where = self.where
+        require(callable(self.signal), "signal must be a function of t", self.signal, where,
                 "give a signal such as Harmonic(amplitude, omega); Harmonic(size, 0.0) is a constant")  # fmt: skip
+        _check_direction(self, where)
+        require(self.along is None or turns(self.along), "direction of a moment must be a rotation", self.direction,
+                where, "write 'rx', 'ry' or 'rz'")  # fmt: skip
+
+    @property
+    def along(self) -> Six | None:
+        """Its direction on the six components; None on a beam, where it turns u_z."""
+        return _along(self)
+
+    @property
+    def coordinate(self) -> LocalCoordinate:
+        """What it acts on."""
+        return LocalCoordinate(self.z, 1, None, self.along)
+
+
+def _along(part: Any) -> Six | None:
+    """The direction of a part on the six components, None without one."""
+    return None if part.direction is None else direction_of(part.direction, part.where)
+
+
+def _check_direction(part: Any, where: str) -> None:
+    """Raise ValueError for a direction that is none; a list becomes a tuple."""
+    if isinstance(part.direction, list):
+        object.__setattr__(part, "direction", tuple(part.direction))
+    if part.direction is not None:
+        direction_of(part.direction, where)
+    if getattr(part, "rotational", 0.0):
+        require(part.direction is None, "rotational is for parts without a direction", part.rotational, where,
+                "add one with direction='rx' or so, whose numbers are those of a rotation")  # fmt: skip

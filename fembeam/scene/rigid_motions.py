@@ -9,6 +9,7 @@ import numpy as np
 from fembeam.scene.signals import signals_of
 
 if TYPE_CHECKING:
+    from fembeam.scene.assembly import Matrices
     from fembeam.scene.scene import Scene
 
 
@@ -17,6 +18,10 @@ def rigid_body_modes(scene: Scene, turning: bool = True) -> int:
 
     Without `turning` the slope is held as well.
     """
+    if scene.named:
+        from fembeam.scene.assembly import assemble
+
+        return rigid_of(assemble(scene, None, None, ()))
     rows = [row for s in scene.supports for row, fixed in zip(_rigid_rows(s.z), s.fixed, strict=True) if fixed]
     for spring in scene.springs:
         translation, rotation = _rigid_rows(spring.z)
@@ -27,12 +32,22 @@ def rigid_body_modes(scene: Scene, turning: bool = True) -> int:
     return 2 - int(np.linalg.matrix_rank(scaled, tol=1e-9))
 
 
+def rigid_of(matrices: Matrices) -> int:
+    """How many modes of frequency 0 the matrices of a body have."""
+    import reduction
+
+    size = matrices.M.shape[0]
+    return int(np.sum(reduction.modal_basis(matrices.M, matrices.K, min(6, size), root=matrices.root).omega == 0.0))
+
+
 def drifting(scene: Scene) -> list[str]:
     """What to warn of: beams with rigid-body modes that are loaded and that no stops hold."""
     found = []
     for index, beam in enumerate((scene, *scene.bodies)):
         own = [path for path in signals_of(beam) if not path.startswith("bodies")]
         loaded = bool(own) or scene.base is not None or scene.gravity != 0.0
+        if beam.named:
+            continue  # known when its matrices are: see `fembeam.model.reduce`
         if loaded and not _held(scene, index) and (count := rigid_body_modes(beam)):
             what = "1 rigid-body mode appears" if count == 1 else f"{count} rigid-body modes appear"
             where = f"bodies[{index - 1}] of Scene" if index else "Scene"

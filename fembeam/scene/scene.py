@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from fembeam.beams import Beam, ModalDamping, Rayleigh
 from fembeam.scene.assembly import Matrices, assemble, buckling_load
+from fembeam.scene.body_checks import check_conflicts, check_end, check_ends, check_feature, check_plain, is_body
 from fembeam.scene.element import Element
 from fembeam.scene.impactor import Impactor
 from fembeam.scene.local_coordinate import LocalCoordinate
@@ -27,7 +28,8 @@ from fembeam.scene.parts import (
     Support,
 )
 from fembeam.scene.rigid_motions import drifting, rigid_body_modes
-from fembeam.support import require, require_finite, require_non_negative, require_positive
+from fembeam.structures import COMPONENTS
+from fembeam.support import is_finite, require, require_finite, require_non_negative, require_positive
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -57,16 +59,17 @@ class Scene:
 
     Parameters
     ----------
-    beam : Beam.
-    supports : of Clamped, Pinned, Guided; at most one per place. None at all is allowed (free body).
+    beam : Beam, or another body: a `Structure` by its matrices. Places are then names, and parts have a `direction`.
+    supports : of Clamped, Pinned, Guided, Fixed; at most one per place. None at all is allowed (free body).
     masses, springs, dashpots, stops, forces : lists, any length; kept as tuples.
     damping : ModalDamping or Rayleigh, of the structure without dashpots.
-    base : frame motion y(t) that knows its derivatives, `derivative(order)`, or None.
+    base : frame motion y(t) that knows its derivatives, `derivative(order)`, or None; of other bodies one for each
+        direction, {"x": signal, "z": signal}.
     impactors : rigid masses beside the beam. Their contacts are numbered after those of the stops and elements.
     bodies : further beams, each a Scene of its own with its supports, stops, forces, damping; a `Stop` with `on`, or an
         `Element` with `to`, lets the beam of this scene meet them. Their contacts are numbered after those of this
         scene.
-    gravity : g in m/s², pulls everything down; for all bodies.
+    gravity : g in m/s², pulls everything down, along -y; for all bodies.
     elements : of Element, local elements that always act, numbered on after the stops.
 
     Every part takes a keyword ``name``, unique among all parts, those of bodies included: logs, tables, figures and
@@ -92,7 +95,7 @@ class Scene:
     44
     """
 
-    beam: Beam
+    beam: Any
     supports: Sequence[Support] = ()
     masses: Sequence[LumpedMass] = ()
     springs: Sequence[Spring] = ()
@@ -107,7 +110,7 @@ class Scene:
     elements: Sequence[Element] = ()
 
     def __post_init__(self) -> None:
-        if not isinstance(self.beam, Beam):
+        if not isinstance(self.beam, Beam) and not is_body(self.beam):
             raise TypeError(f"beam must be a Beam, got {self.beam!r} in Scene; make one: Beam(length, section)")
         for name, kinds in FEATURES.items():
             object.__setattr__(self, name, _listed(name, getattr(self, name), kinds))
@@ -118,9 +121,14 @@ class Scene:
         require_finite("gravity", self.gravity, "Scene", "give m/s², 9.81 on the ground")
         object.__setattr__(self, "bodies", _listed("bodies", self.bodies, (Scene,)))
         self._check_base()
-        self._check_conflicts()
         self._check_bodies()
         self._check_names()
+        if self.named:
+            check_conflicts(self)
+            check_ends(self)
+        else:
+            self._check_conflicts()
+            self._check_places_of_acting()
         for said in self.doubts:
             warnings.warn(said, UserWarning, stacklevel=3)
 
@@ -237,8 +245,20 @@ class Scene:
     @property
     def doubts(self) -> list[str]:
         """What was warned of when the scene was made, as sentences."""
-        of_base = getattr(self.base, "doubt", "")
-        return [*drifting(self), *([of_base] if of_base else [])]
+        of_base = (getattr(one, "doubt", "") for one in self.motions.values())
+        return [*drifting(self), *(doubt for doubt in of_base if doubt)]
+
+    @property
+    def named(self) -> bool:
+        """Whether its body is no `Beam`: places have names and directions."""
+        return not isinstance(self.beam, Beam)
+
+    @property
+    def motions(self) -> dict[str, Any]:
+        """Motion of the frame by its direction; of a beam along y."""
+        if self.base is None:
+            return {}
+        return self.base if isinstance(self.base, dict) else {"y": self.base}
 
     @property
     def acting(self) -> list[Stop | Element]:
@@ -255,13 +275,18 @@ class Scene:
 
         Lowest P of (K - P G) φ = 0 with G = ∫ u_z v_z dz. ValueError when supports and springs do not hold the beam.
         """
+        require(
+            not self.named, "buckling_load is for a Beam", self.beam, "Scene.buckling_load", "ask a scene of a Beam"
+        )
         return buckling_load(self, elements)
 
     @property
-    def named(self) -> dict[str, Any]:
+    def named_parts(self) -> dict[str, Any]:
         """The parts that were given a name, those of bodies too, by their paths, such as "bodies[0].stops[1]"."""
         own = ((name, i, part) for name in FEATURES for i, part in enumerate(getattr(self, name)))
-        inner = {f"bodies[{i}].{path}": part for i, body in enumerate(self.bodies) for path, part in body.named.items()}
+        inner = {
+            f"bodies[{i}].{path}": part for i, body in enumerate(self.bodies) for path, part in body.named_parts.items()
+        }
         return {f"{name}[{i}]": part for name, i, part in own if part.name is not None} | inner
 
     @property
@@ -279,6 +304,10 @@ class Scene:
         """Raise ValueError unless every feature of one list sits on the beam."""
         for index, feature in enumerate(getattr(self, name)):
             where = f"{name}[{index}] ({feature.titled}) of Scene"
+            if self.named:
+                check_feature(self.beam, feature, name, where)
+                continue
+            check_plain(feature, name, where)
             require(0 <= feature.z <= self.beam.length, f"z must lie on the beam, 0 to {self.beam.length} m",
                     feature.z, where, "move it, or lengthen the beam")  # fmt: skip
 
@@ -286,13 +315,24 @@ class Scene:
         """Raise TypeError for a base motion without derivatives, ValueError where its second one does not exist."""
         if self.base is None:
             return
-        missing = [name for name in ("__call__", "derivative") if not callable(getattr(self.base, name, None))]
-        if missing or isinstance(self.base, type):
-            raise TypeError(f"base must be a motion y(t) that knows its derivatives, got {self.base!r} without "
-                            f"{' and '.join(missing) or 'values'} in Scene; use Harmonic, Multisine, BandNoise, "
-                            "Record, Pulse, Step, SineSweep, or an object with __call__(t) and "
-                            "derivative(order)")  # fmt: skip
-        self.base.derivative(2)
+        if self.named:
+            known = [c for c in COMPONENTS[:3] if c in getattr(self.beam, "base_directions", self.beam.components)]
+            write = f"write base={{{known[0]!r}: signal}}" if known else "leave it out"
+            require(isinstance(self.base, dict), "base must name its directions", self.base, "Scene", write)
+            for direction in self.base:
+                require(direction in known, f"base must move along {', '.join(known) or 'nothing'}", direction, "Scene",
+                        write)  # fmt: skip
+            object.__setattr__(self, "base", dict(self.base))
+        require(self.named or not isinstance(self.base, dict), "base of a Beam must be one signal, its motion along y",
+                self.base, "Scene", "drop the directions")  # fmt: skip
+        for motion in self.motions.values():
+            missing = [name for name in ("__call__", "derivative") if not callable(getattr(motion, name, None))]
+            if missing or isinstance(motion, type):
+                raise TypeError(f"base must be a motion y(t) that knows its derivatives, got {motion!r} without "
+                                f"{' and '.join(missing) or 'values'} in Scene; use Harmonic, Multisine, BandNoise, "
+                                "Record, Pulse, Step, SineSweep, or an object with __call__(t) and "
+                                "derivative(order)")  # fmt: skip
+            motion.derivative(2)
 
     def _check_conflicts(self) -> None:
         """Raise ValueError if two supports share one place, or two stops one place, side and carrier."""
@@ -301,11 +341,13 @@ class Scene:
         for first, second in pairwise(ordered):
             apart = second.z - first.z > near
             require(apart, "supports must not share one place", (first, second), "Scene", "keep one")
-        kinds = [(stop.side, stop.of, stop.coordinate.to or (-1, 0.0)) for stop in self.stops]
+        ways = [tuple(stop.push * part for part in stop.coordinate.along) for stop in self.stops]
+        kinds = [(way, repr(stop.coordinate.to)) for way, stop in zip(ways, self.stops, strict=True)]
         for i, j in pairwise(sorted(range(len(kinds)), key=lambda i: (kinds[i], self.stops[i].z, i))):
             stop, other = self.stops[i], self.stops[j]
             same = kinds[i] == kinds[j] and other.z - stop.z <= near
-            require(not same, f"stops must not share one place and side (z = {stop.z} m, {stop.side})",
+            told_side = stop.side or stop.direction
+            require(not same, f"stops must not share one place and side (z = {stop.z} m, {told_side})",
                     tuple(sorted((i, j))), "stops of Scene",
                     "make them one stop with one law, such as PiecewiseLinear")  # fmt: skip
 
@@ -315,6 +357,9 @@ class Scene:
             plain = body.base is None and body.gravity == 0 and not body.bodies
             require(plain, "a body must not have base, gravity or bodies of its own", body,
                     f"bodies[{index}] of Scene", "give them to the outer scene")  # fmt: skip
+
+    def _check_places_of_acting(self) -> None:
+        """Raise ValueError unless stops and elements of a beam act on what exists and can move."""
         for index, stop in enumerate(self.stops):
             self._check_second(stop.coordinate, "on", f"stops[{index}]{stop.quoted} of Scene")
         for index, element in enumerate(self.elements):
@@ -323,13 +368,16 @@ class Scene:
     def _check_names(self) -> None:
         """Raise ValueError if two parts have one name, those of bodies included."""
         known: dict[str, str] = {}
-        for path, part in self.named.items():
+        for path, part in self.named_parts.items():
             other = known.setdefault(part.name, path)
             require(other == path, "names must be unique", part.name, f"{other} and {path} of Scene",
                     "give each part its own, or none")  # fmt: skip
 
     def _check_second(self, place: LocalCoordinate, key: str, where: str) -> None:
         """Raise ValueError unless what a stop or element acts on exists and can move."""
+        number = 0 if place.to is None else place.to[0]
+        if place.to is not None and 0 < number <= len(self.bodies) and self.bodies[number - 1].named:
+            return check_end(self.bodies[number - 1].beam, place.to[1], place.along, key, where)
         if place.to is not None:
             self._check_exists(*place.to, place.z, key, where)
         ends = [(0, place.z), *([] if place.to is None else [place.to])]
@@ -338,14 +386,15 @@ class Scene:
         require(not all(held), f"the beam must be free to {move} at z", [one for end in held for one in end], where,
                 "support it by Pinned there" if place.rotation else "act away from the support")  # fmt: skip
 
-    def _check_exists(self, number: int, z: float, first: float, key: str, where: str) -> None:
+    def _check_exists(self, number: int, z: Any, first: float, key: str, where: str) -> None:
         """Raise ValueError unless a second place lies on a beam of the scene, and is not the first one."""
         known = 0 <= number <= len(self.bodies)
         among = f"1 to {len(self.bodies)}" if self.bodies else "and there is none"
         require(known, f"{key} must name a body, {among}", number, where, "add the beam to bodies")
         length = self.bodies[number - 1].beam.length if number else self.beam.length
         named = f"body {number}" if number else "the beam"
-        require(0 <= z <= length, f"z of {key} must lie on {named}, 0 to {length} m", z, where, "move it")
+        inside = is_finite(z) and 0 <= z <= length
+        require(inside, f"z of {key} must lie on {named}, 0 to {length} m", z, where, "move it")
         apart = number > 0 or abs(z - first) > 1e-9 * length
         require(apart, f"z of {key} must be another place", z, where, "leave it out for an end on the frame")
 

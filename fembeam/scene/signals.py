@@ -43,7 +43,9 @@ def persistent_drive(scene: Scene) -> bool | None:
 
 def _listed(scene: Scene) -> Iterator[tuple[str, Any]]:
     """The same, one by one."""
-    if scene.base is not None:
+    if isinstance(scene.base, dict):
+        yield from ((f"base.{direction}", motion) for direction, motion in scene.base.items())
+    elif scene.base is not None:
         yield "base", scene.base
     for name, key in PLACES.items():
         for i, part in enumerate(getattr(scene, name)):
@@ -64,7 +66,9 @@ def with_signals(scene: Scene, change: Callable[[Any], Any]) -> Scene:
 
     parts: dict[str, Any] = {n: [changed(part, key) for part in getattr(scene, n)] for n, key in PLACES.items()}
     parts["bodies"] = [with_signals(body, change) for body in scene.bodies]
-    base = None if scene.base is None else change(scene.base)
+    moved = {direction: change(motion) for direction, motion in scene.motions.items()}
+    still = all(new is scene.motions[direction] for direction, new in moved.items())
+    base = scene.base if still else moved if isinstance(scene.base, dict) else moved["y"]
     pairs = [pair for name, new in parts.items() for pair in zip(getattr(scene, name), new, strict=True)]
     if base is scene.base and all(old is new for old, new in pairs):
         return scene

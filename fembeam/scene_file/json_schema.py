@@ -13,7 +13,7 @@ from typing import Any, Literal, get_args, get_origin
 from fembeam.beams import ModalDamping, Rayleigh
 from fembeam.scene import FEATURES, Scene
 from fembeam.scene_file.keys import entries_of, options, parameters, required
-from fembeam.scene_file.kinds import SECTION, SIGNAL, Nested, nested
+from fembeam.scene_file.kinds import MAKERS, SECTION, SIGNAL, Nested, nested
 from fembeam.scene_file.study_tables import STUDIES
 from fembeam.scene_file.tables import beam_of_section, snake
 
@@ -87,7 +87,8 @@ class _Kinds:
         """One entry of [[supports]], [[masses]], ..."""
         if len(features) == 1:
             return self.table(features[0])
-        return {"anyOf": [self.table(f, "kind", snake(f.__name__), f.__name__ == "PointForce") for f in features]}
+        makers = [(MAKERS.get(one, one), one.__name__) for one in features]
+        return {"anyOf": [self.table(make, "kind", snake(name), name == "PointForce") for make, name in makers]}
 
     def beam(self) -> Schema:
         """A beam of one section, of spans, or of a mesh."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, get_origin
@@ -13,8 +13,9 @@ import solvers
 from fembeam.beams import Section, Taper
 from fembeam.excitation import BandNoise, Harmonic, Interpolation, Multisine, Pulse, Quantity, Record, SineSweep, Step
 from fembeam.excitation.earthquake import earthquake
-from fembeam.scene import PLACES
+from fembeam.scene import PLACES, Fixed
 from fembeam.scene_file.keys import Constructors
+from fembeam.scene_file.structures import fixed
 from fembeam.study.quantities import QUANTITIES
 
 SHAPES: Constructors = {
@@ -101,6 +102,7 @@ def _methods() -> Constructors:
     return {name: getattr(solvers, method) for name, method in SOLVERS.items() if method in solvers.__all__}
 
 
+MAKERS: Mapping[Any, Callable[..., Any]] = {Fixed: fixed}  # parts that a file makes otherwise
 SECTION = Nested(lambda: SHAPES, "shape", "general")
 SIGNAL = Nested(lambda: SIGNALS)
 KEYS = {

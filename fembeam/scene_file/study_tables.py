@@ -18,7 +18,7 @@ from fembeam import plot
 from fembeam.beams import on_beam
 from fembeam.model import Branch, Orbit
 from fembeam.model.run_csv import Output
-from fembeam.scene import path_of
+from fembeam.scene import Place, path_of, split
 from fembeam.scene_file.keys import Constructors, parameters
 from fembeam.study import Basins, Ensemble, SpeedAccuracy, basins, characteristics, ensemble, speed_accuracy
 from fembeam.study.measure import Plan
@@ -198,6 +198,12 @@ class Simulate:
     def check(self, scene: Scene) -> None:
         """Places lie on the beam, sections know their fibre where stress is asked for."""
         beam = scene.beam
+        if scene.named:
+            for at in self.places or ():
+                beam.check_place(split(at)[0], "places")
+            sections = [name for name in self.quantities or () if name in ("slope", "moment", "shear", "stress")]
+            require(not sections, "quantities of sections are of a Beam", sections, "simulate", "leave them out")
+            return
         places = (0.0, beam.length / 2, beam.length) if self.places is None else self.places
         z = on_beam(np.array(places, dtype=float), beam, "places")
         if "stress" in (self.quantities or ()) and not np.isfinite(beam.profile(z).fibre).all():
@@ -367,7 +373,7 @@ class BasinsTable:
     x: str | int = "displacement"
     y: str | int = "velocity"
     points: int | Sequence[int] = 100
-    z: float | None = None
+    z: Place | None = None
     start: Sequence[float] | None = None
     settle: int = 200
     longest: int = 8

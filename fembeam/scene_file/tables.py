@@ -6,13 +6,15 @@ import inspect
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NoReturn
 
 from fembeam.beams import Beam, ModalDamping, Rayleigh, Section, Taper
 from fembeam.scene import FEATURES, Scene, Source
 from fembeam.scene_file.keys import Constructors, converted, fits, listed, nearest, parameters, required, shown, wanted
-from fembeam.scene_file.kinds import SECTION, SIGNAL, Nested, nested
+from fembeam.scene_file.kinds import MAKERS, SECTION, SIGNAL, Nested, nested
+from fembeam.scene_file.structures import PLACES, is_place, place, structure
 
 Table = Mapping[str, Any]
 
@@ -44,12 +46,16 @@ class TableReader:
     def contents(self, tables: Table, known: Constructors) -> tuple[Scene, dict[str, Any], dict[str, Any]]:
         """The scene, the arguments of `Scene.reduce`, and the study tables among those known."""
         parts = [name for name in inspect.signature(Scene).parameters if name != "bodies"]  # one beam per file
-        self.check_keys(tables, [*parts, "reduce", *known], "the file", "table")
-        if "beam" not in tables:
+        self.check_keys(tables, [*parts, "structure", "reduce", *known], "the file", "table")
+        if "beam" not in tables and "structure" not in tables:
             self.fail("the file", "needs a table [beam]")
+        if "beam" in tables and "structure" in tables:
+            self.fail("the file", "needs one of the tables [beam] and [structure], not both")
         for name in tables:
             self.check_form(name, tables[name])
         built = {name: self.part(name, tables[name]) for name in parts if name in tables}
+        if "structure" in tables:
+            built["beam"] = structure(self, tables["structure"])
         try:
             scene = Scene(**built)
         except (ValueError, TypeError, ArithmeticError) as error:
@@ -62,6 +68,11 @@ class TableReader:
             if hasattr(study, "check"):
                 self.made(study.check, {"scene": scene}, f"[{name}]")
         return scene, reduce, studies
+
+    @cached_property
+    def named(self) -> bool:
+        """Whether the file is of a body whose places have names."""
+        return "structure" in self.source.tables()
 
     def check_form(self, name: str, value: Any) -> None:
         """Features come as [[name]], gravity as a number, everything else as [name]."""
@@ -86,8 +97,12 @@ class TableReader:
                 return self.build(Rayleigh, value, "[damping]")
             return self.build(ModalDamping, value, "[damping]", "alpha", "beta")
         if name == "base":
+            if self.named and all(isinstance(one, dict) for one in value.values()):
+                return {direction: self.chosen(SIGNAL, one, f"[base.{direction}]") for direction, one in value.items()}
             return self.chosen(SIGNAL, value, "[base]")
-        kinds = {snake(kind.__name__): kind for kind in FEATURES[name]}
+        kinds: Constructors = {snake(kind.__name__): MAKERS.get(kind, kind) for kind in FEATURES[name]}
+        if not self.named:  # a straight beam has Clamped, Pinned and Guided
+            kinds = {key: kind for key, kind in kinds.items() if kind not in MAKERS.values()}
         made = []
         for number, table in enumerate(value):
             where = f"[[{name}]] number {number + 1}"
@@ -156,6 +171,8 @@ class TableReader:
         if not isinstance(table, dict):
             self.fail(where, f"must be a table, got {table!r}")
         keys = parameters(constructor)
+        if self.named and "z" in keys:
+            return self._placed(constructor, keys, table, where, *also, chosen_by=chosen_by)
         self.check_keys(table, [chosen_by, *keys, *also] if chosen_by else [*keys, *also], where, "key")
         for key, parameter in keys.items():
             if key not in table and parameter.default is inspect.Parameter.empty:
@@ -167,6 +184,27 @@ class TableReader:
             if key in table
         }
 
+    def _placed(
+        self, constructor: Callable[..., Any], keys: Mapping[str, inspect.Parameter], table: Table, where: str,
+        *also: str, chosen_by: str,
+    ) -> dict[str, Any]:  # fmt: skip
+        """The same of what has a place by name: `at` for z; `on` and `to` hold such places too."""
+        known = ["at" if key == "z" else key for key in keys]
+        self.check_keys(table, [*([chosen_by] if chosen_by else []), *known, *also], where, "key")
+        found = {key: place(table[key]) for key in PLACES if key in table and is_place(table[key])}
+        wrong = [key for key in PLACES if key in table and key not in found]
+        if wrong:
+            self.fail(where, f"{wrong[0]} must be the name of a point or node, got {shown(table[wrong[0]])}")
+        if "at" not in found and keys["z"].default is inspect.Parameter.empty:
+            self.fail(where, f"the key 'at' is missing (the name of a point or node); it needs {listed(known)}")
+        rest = {key: value for key, value in table.items() if key not in PLACES}
+        plain = [key for key in keys if key not in ("z", "on", "to")]
+        for key in plain:
+            if key not in rest and keys[key].default is inspect.Parameter.empty:
+                self.fail(where, f"the key {key!r} is missing; it needs {listed(required(keys))}")
+        values = {keys[key].name: self.value(rest[key], key, keys[key], where) for key in plain if key in rest}
+        return {**values, **{"z" if key == "at" else key: one for key, one in found.items()}}
+
     def value(self, value: Any, key: str, parameter: inspect.Parameter, where: str) -> Any:
         """One value: a table for what has its own constructor, else checked by the annotation."""
         inner = f"{where} {key}"
@@ -176,6 +214,8 @@ class TableReader:
             if kind.listed:
                 return [self.chosen(kind, one, f"{inner} number {i}") for i, one in enumerate(value, start=1)]
             return self.chosen(kind, value, inner)
+        if self.named and key == "places" and isinstance(value, list) and all(map(is_place, value)):
+            return [place(one) for one in value]
         if not fits(value, parameter.annotation):
             self.fail(where, f"{key} must be {wanted(parameter.annotation)}, got {shown(value)}")
         if key == "path":

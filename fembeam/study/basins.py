@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 import solvers
 from fembeam import plot
 from fembeam.model import Attractor, Model, Orbit, load_period, observed
+from fembeam.scene import Place, said
 from fembeam.study.execution.checkpoint import Checkpoint, identity
 from fembeam.study.execution.executors import spread
 from fembeam.study.result import Result
@@ -127,7 +128,7 @@ def basins(
     y_span: tuple[float, float] = (-1.0, 1.0),
     points: int | tuple[int, int] = 100,
     *,
-    z: float | None = None,
+    z: Place | None = None,
     start: ArrayLike | None = None,
     settle: int = 200,
     longest: int = 8,
@@ -259,7 +260,7 @@ def _sorted(x: Axis, y: Axis, origin: Vector, label: NDArray[np.int64], known: l
     return Basins(x, y, origin, renumbered, attractors)
 
 
-def axis_of(model: Model, kind: Any, span: Any, points: int, z: float) -> Axis:
+def axis_of(model: Model, kind: Any, span: Any, points: int, z: Any) -> Axis:
     """An axis from what `basins` takes for it, checked."""
     ends = np.asarray(span, dtype=float)
     valid = ends.shape == (2,) and bool(np.isfinite(ends).all()) and ends[0] < ends[1]
@@ -268,13 +269,13 @@ def axis_of(model: Model, kind: Any, span: Any, points: int, z: float) -> Axis:
     return Axis(direction, np.linspace(ends[0], ends[1], points), name)
 
 
-def _direction(model: Model, kind: Any, z: float) -> tuple[Vector, str]:
+def _direction(model: Model, kind: Any, z: Any) -> tuple[Vector, str]:
     """The direction an axis goes, and its name."""
     n = len(model.omega)
     if isinstance(kind, str) and kind == "displacement":
-        return np.concatenate((_pulled(model, z), np.zeros(n))), f"displacement at {z:g} m / m"
+        return np.concatenate((_pulled(model, z), np.zeros(n))), f"displacement at {_told(z)} / m"
     if isinstance(kind, str) and kind == "velocity":
-        return np.concatenate((np.zeros(n), _shape(model, z, np.ones(n)))), f"velocity at {z:g} m / (m/s)"
+        return np.concatenate((np.zeros(n), _shape(model, z, np.ones(n)))), f"velocity at {_told(z)} / (m/s)"
     if is_whole(kind):
         require(
             bool(0 <= kind < 2 * n), f"the number of a state must lie in [0, {2 * n})", kind, WHERE, "q first, then q̇"
@@ -288,14 +289,19 @@ def _direction(model: Model, kind: Any, z: float) -> tuple[Vector, str]:
     return vector, "along the given vector"
 
 
-def _pulled(model: Model, z: float) -> Vector:
+def _told(z: Any) -> str:
+    """A place in words."""
+    return said(z) if isinstance(z, tuple) else f"{z:g} m"
+
+
+def _pulled(model: Model, z: Any) -> Vector:
     """Q of the shape a force at z bends the beam to, per metre there."""
     loose = (model.omega <= 0.0) & (model.phi(z) != 0.0)
     require(not loose.any(), "a force at z moves the beam without end", z, WHERE, "use velocity, or numbers of states")
     return _shape(model, z, 1.0 / np.where(model.omega > 0.0, model.omega, np.inf) ** 2)
 
 
-def _shape(model: Model, z: float, compliance: Vector) -> Vector:
+def _shape(model: Model, z: Any, compliance: Vector) -> Vector:
     """Coordinates that a push at z brings about, per unit of motion there."""
     phi = model.phi(z)
     moved = float(phi @ (compliance * phi))

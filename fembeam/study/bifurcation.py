@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 import solvers
 from fembeam import plot
 from fembeam.model import Model, load_period, observed
-from fembeam.scene import changes_structure, path_of, with_value
+from fembeam.scene import Place, changes_structure, path_of, with_value
 from fembeam.study.execution.executors import spread
 from fembeam.study.result import Result
 from fembeam.support import Part, require
@@ -37,7 +37,7 @@ class Bifurcation(Result):
     """
 
     name: str
-    z: float
+    z: Any
     parameter: Vector
     strobes: Vector
     peaks: Vector
@@ -66,7 +66,7 @@ def bifurcation(
     model: Model,
     parameter: str,
     values: Sequence[float] | Vector,
-    z: float | None = None,
+    z: Place | None = None,
     settle: int = 200,
     keep: int = 24,
     start: ArrayLike | None = None,
@@ -111,7 +111,7 @@ def bifurcation(
 
 
 def _settled(
-    model: Model, path: str, z: float, settle: int, keep: int, start: Vector, value: float
+    model: Model, path: str, z: Any, settle: int, keep: int, start: Vector, value: float
 ) -> tuple[Vector, Vector]:
     """States and peaks of the periods kept."""
     scene = with_value(model.scene, path, value)

@@ -15,7 +15,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fembeam.model import Run, extremes_of
+from fembeam.model import Run, extremes_of, places
+from fembeam.scene import Place
 from fembeam.statistics import psd
 from fembeam.support import require
 
@@ -30,7 +31,7 @@ class OfSignal:
     """What is read off δ of a stop, or u at `z`."""
 
     stop: int = 0
-    z: float | None = None
+    z: Place | None = None
     sampled: ClassVar[bool] = True
 
     def signal(self, run: Run) -> tuple[Vector, Vector]:
@@ -103,7 +104,7 @@ class Psd:
     band: tuple[float, float] = (1.0, 1200.0)
     parts: int = 12
     stop: int = 0
-    z: float | None = None
+    z: Place | None = None
     sampled: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
@@ -213,12 +214,13 @@ def label(quantity: Quantity) -> str:
     return f"{name}({changed})" if changed else name
 
 
-def signal(run: Run, stop: int = 0, z: float | None = None) -> tuple[Vector, Vector]:
+def signal(run: Run, stop: int = 0, z: Place | None = None) -> tuple[Vector, Vector]:
     """δ and its rate at a stop, or u and u̇ at z, or at the tip of a scene without stops."""
     require(len(run.t) > 1, "the run must have samples", len(run.t), "quantity", "give dt")
     if z is None and len(run.stops):
         return run.indentation(stop), run.indentation_rate(stop)
-    place = float(run.shapes.nodes[-1]) if z is None else z
+    last = getattr(run.shapes, "nodes", None)
+    place = z if z is not None else next(iter(places(run.shapes).values())) if last is None else float(last[-1])
     return run.displacement(place), run.velocity(place)
 
 

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import solvers
 from fembeam import plot
-from fembeam.model import Model, Run
+from fembeam.model import Model, Run, places
 from fembeam.study.result import Result
 from fembeam.support import Part, counting, require, require_positive
 
@@ -143,10 +143,12 @@ class SpeedAccuracy(Result):
 def end_displacement(run: Run) -> Vector:
     """The displacement u at the first stop, or at the far end, at the end of the run: the default quantity.
 
-    δ of a first stop of rotation.
+    δ of a first stop of rotation, or at a place by name.
     """
-    if len(run.stops) and run.kinds[0, 0]:
+    if len(run.stops) and (run.kinds[0, 0] or np.isnan(run.stops[0, 0])):
         return np.asarray(-run.directions[0] @ run.q[-1] - run.stops[0, 2])
+    if not hasattr(run.shapes, "nodes"):
+        return np.asarray(run.shapes(next(iter(places(run.shapes).values()))) @ run.q[-1])
     return np.asarray(run.shapes(run.stops[0, 0] if len(run.stops) else run.shapes.nodes[-1]) @ run.q[-1])
 
 

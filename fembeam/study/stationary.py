@@ -232,10 +232,13 @@ def characteristics(model: Model, duration: float, dt: float, **options: Any) ->
 def watched_by_default(model: Model) -> dict[str, Watch]:
     """δ of every stop (the tip when there is none) and mid-beam, with rates."""
     count, at = len(model.scene.stops), places(model.shapes)
-    names = ["δ"] if count == 1 else [f"δ {i}" for i in range(count)]
+    names = ["δ"] if count == 1 else [f"δ {stop.name or i}" for i, stop in enumerate(model.scene.stops)]
     found: dict[str, Watch] = {name: partial(indentation, stop=i) for i, name in enumerate(names)}
     if not count and "tip" in at:
         found["tip u"] = partial(displacement, shape=model.shapes(at["tip"]))
+    if model.scene.named:
+        beside = [(name, z) for name, z in at.items() if np.any(model.shapes(z))]
+        return found or {f"{name} u": partial(displacement, shape=model.shapes(z)) for name, z in beside[:1]}
     found["mid-beam u"] = partial(displacement, shape=model.shapes(at["mid-beam"]))
     return found
 

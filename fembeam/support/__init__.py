@@ -6,6 +6,7 @@ Imports nothing of ours.
 from fembeam.support.checks import (
     frozen,
     is_finite,
+    is_name,
     is_whole,
     number,
     require,

@@ -50,8 +50,22 @@ def require_non_negative(name: str, value: Any, where: str, advice: str) -> None
     require_finite(name, value, where, advice, " and not negative", is_finite(value) and value >= 0)
 
 
+def is_name(value: object) -> TypeGuard[str]:
+    """Whether value is text that names something: neither empty nor a number in quotes."""
+    try:
+        float(value)  # type: ignore[arg-type]
+    except ValueError:
+        return isinstance(value, str) and bool(value.strip())
+    except TypeError:
+        return False
+    return False
+
+
 def require_place(z: Any, part: object) -> None:
-    """Raise ValueError unless z is a coordinate along a beam for a part of a scene."""
+    """Raise ValueError unless z is a place for a part of a scene: a coordinate along a beam, or a name."""
+    pair = isinstance(z, (tuple, list)) and len(z) == 2 and is_name(z[0]) and is_finite(z[1])
+    if pair or is_name(z):
+        return
     require_finite("z", z, type(part).__name__, "give the coordinate along the beam in m")
 
 

@@ -14,6 +14,7 @@ Tables of contact steps are those of `contact_tables`.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -25,6 +26,7 @@ from solvers.compiled.sums import padded
 from solvers.exponential.contact.nodes import S, gauss
 from solvers.exponential.energy.contact_sums import Steps, Sums, free_loss, tones_at_nodes
 from solvers.exponential.energy.contact_tables import contact_table
+from solvers.exponential.energy.quadratic_forms import Forms, carried, entries_of, forms_of, rows_of, taylor
 from solvers.exponential.flight import SERIES_TERMS
 from solvers.exponential.phi_functions import derivatives_of_ends, signal_responses
 from solvers.exponential.responses import propagate
@@ -120,20 +122,28 @@ def _flight_part(
     levels = -(-len(tables.flight_step) // _OCTAVE) * _OCTAVE
     h = tables.flight_step[0] * 2.0 ** (-np.arange(levels) / _OCTAVE)
     signal = tables.signal[..., :n].reshape(*tables.signal.shape[:3], size)
-    forms = _doubled(problem, powers, h, _OCTAVE, tables.flight_propagator, signal)[: len(tables.flight_step)]
     spacing = problem.table_dt[0] if len(problem.table_dt) else spacing
-    last, ends = _forms_of(problem, powers, spacing), np.eye(powers.shape[-1])
+    last, ends = _last(_doubled(problem, powers, *_halved(problem, spacing))), np.eye(powers.shape[-1])
     for first in range(size, len(ends), 6):
         ends[first : first + 6, first : first + 6] = derivatives_of_ends(spacing)
-    forms = np.concatenate((forms, ends.T @ last @ ends))
-    rows = 2.0 * forms[:, :, np.append(np.arange(size, len(ends)), driver), :size]
-    rows[:, :, len(ends) - size :][..., driver] *= 0.5
+    kept = np.append(np.arange(size, len(ends)), driver)
     b = np.arange(0 if _coupled(tables) else int(tables.own_blocks))
-    plain = np.zeros((len(forms), 3, padded(n)))
-    plain[..., b] = np.stack((forms[:, 1, b, b], 2.0 * forms[:, 1, b, n + b], forms[:, 1, n + b, n + b]), axis=1)
+
+    def read(forms: Forms) -> tuple[Any, Any, Any]:
+        """What is kept of the forms of some steps: rows, those of the blocks' own damping, pairs of signals."""
+        rows = rows_of(forms, len(ends), kept)
+        pairs, rows = rows[:, :, : len(ends) - size, size:].copy(), 2.0 * rows[..., :size]
+        rows[:, :, len(ends) - size :][..., driver] *= 0.5
+        plain = np.zeros((len(rows), 3, padded(n)))
+        plain[..., b] = entries_of(forms, len(ends), n, b) * np.array([1.0, 2.0, 1.0])[:, None]
+        return rows, plain, pairs
+
+    groups = [read(forms) for forms in _doubled(problem, powers, h, _OCTAVE, tables.flight_propagator, signal)][::-1]
+    steps = [np.concatenate(parts)[: len(tables.flight_step)] for parts in zip(*groups, strict=True)]
+    rows, plain, pairs = (np.concatenate(both) for both in zip(steps, read(carried(last, ends[None])), strict=True))
     return energy_tables._replace(
         **{"closed": 1.0, "spacing": spacing, "driver": driver.astype(np.int64), "plain": plain},
-        **{"rows": _beside(rows.reshape(*rows.shape[:-1], 2, n)), "pairs": _beside(forms[:, :, size:, None, size:])},
+        **{"rows": _beside(rows.reshape(*rows.shape[:-1], 2, n)), "pairs": _beside(pairs[:, :, :, None])},
     )
 
 
@@ -169,43 +179,36 @@ def _generator(problem: Problem) -> Any:
     return out
 
 
-def _brief_forms(problem: Problem, powers: Any, h: Any) -> Any:
+def _brief_forms(problem: Problem, powers: Any, h: Any) -> Forms:
     """(len(h), 2, Y, Y) forms of steps of at most `_BRIEF`, by Gauss's rule on the Taylor series of Φ."""
     generator, (points, weights) = _generator(problem), gauss(8)
-    out = np.zeros((len(h), *powers.shape))
-    for point, weight in zip(points, weights, strict=True):
-        term = np.broadcast_to(np.eye(len(generator)), (len(h), *generator.shape))
-        flow = term.copy()
-        for i in range(1, 12):
-            term = (point * h / i)[:, None, None] * (term @ generator)
-            flow += term
-        flow = flow[:, None]
-        out += (weight * h)[:, None, None, None] * (flow.transpose(0, 1, 3, 2) @ powers @ flow)
-    return out
+    flows = [taylor(generator, point * h, 12) for point in points]
+    start = forms_of(powers, len(h))
+    parts = (
+        carried(start, np.sqrt(weight * h)[:, None, None] * flow) for weight, flow in zip(weights, flows, strict=True)
+    )
+    return sum(parts, start=0.0 * start)
 
 
-def _doubled(problem: Problem, powers: Any, h: Any, octave: int, propagator: Any, signal: Any) -> Any:
-    """(len(h), 2, Y, Y) forms of falling steps, each twice as long as that ``octave`` places behind."""
+def _doubled(problem: Problem, powers: Any, h: Any, octave: int, propagator: Any, signal: Any) -> Iterator[Forms]:
+    """(octave, 2, Y, Y) forms of falling steps, each twice as long as that ``octave`` places behind; the last first."""
     shorter = 0
     fastest = float((np.sqrt(problem.k) + problem.c).max())
     brief = h[-octave:]
     while brief[0] * fastest > _BRIEF:
         brief, shorter = 0.5 * brief, shorter + 1
-    form, forms = _brief_forms(problem, powers, brief), []
+    form = _brief_forms(problem, powers, brief)
     for _ in range(shorter):
-        flow = _flow(problem, brief, *_moves(problem, brief))[:, None]
-        form, brief = form + flow.transpose(0, 1, 3, 2) @ form @ flow, 2.0 * brief
-    forms.append(form)
+        form, brief = form + carried(form, _flow(problem, brief, *_moves(problem, brief))), 2.0 * brief
+    yield form
     for end in range(len(h), octave, -octave):
         which = slice(end - octave, end)
         if end > len(propagator):
             moves = _moves(problem, h[which])
         else:
             moves = propagator[which], signal[which]
-        flow = _flow(problem, h[which], *moves)[:, None]
-        form = form + flow.transpose(0, 1, 3, 2) @ form @ flow
-        forms.append(form)
-    return np.concatenate(forms[::-1])
+        form = form + carried(form, _flow(problem, h[which], *moves))
+        yield form
 
 
 def _moves(problem: Problem, h: Any) -> tuple[Any, Any]:
@@ -214,11 +217,17 @@ def _moves(problem: Problem, h: Any) -> tuple[Any, Any]:
     return np.array(moves).transpose(0, 2, 1), signal_responses(problem, np.ascontiguousarray(h))
 
 
-def _forms_of(problem: Problem, powers: Any, h: float) -> Any:
-    """(1, 2, Y, Y) forms of one step of any length."""
+def _halved(problem: Problem, h: float) -> tuple[Any, int, Any, Any]:
+    """Steps from h down to a brief one, each half of the one before, with their moves."""
     fastest = float((np.sqrt(problem.k) + problem.c).max())
     steps = h * 2.0 ** -np.arange(1 + max(0, math.ceil(math.log2(max(h * fastest, 1e-300) / _BRIEF))))
-    return _doubled(problem, powers, steps, 1, *_moves(problem, steps))[:1]
+    return steps, 1, *_moves(problem, steps)
+
+
+def _last(forms: Iterator[Forms]) -> Forms:
+    """The forms of the longest step."""
+    *_, last = forms
+    return last
 
 
 def _flow(problem: Problem, h: Any, propagator: Any, signal: Any) -> Any:

@@ -1,0 +1,137 @@
+"""Mode shapes of a body with places by name: all components of a place, or the motion along a direction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fembeam.scene import At, BodyMatrices, LocalCoordinate, said, split, told
+from fembeam.structures import COMPONENTS, named, nearest, require_components
+from fembeam.support import require
+
+Vector = NDArray[np.float64]
+USUAL = 6  # places that tables and figures show unasked
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedShapes:
+    """Shapes of a body: values (p, c, n) at its places, c components each, n coordinates.
+
+    Attributes
+    ----------
+    components : what a place has, of x, y, z, rx, ry, rz. known : the places (p,).
+    usual : {name: (place, direction)} that tables and figures show unasked.
+    positions : (p, 3) m, NaN where unknown. lines : (k, 2) numbers of places that figures join.
+    more : what gives (c, n) at places that are not among them, None of a run read from a file.
+    """
+
+    components: tuple[str, ...]
+    known: tuple[Any, ...]
+    values: Vector
+    usual: dict[str, At]
+    positions: Vector
+    lines: NDArray[np.int64]
+    more: Callable[[Any], Vector] | None = field(default=None, repr=False)
+
+    def __repr__(self) -> str:
+        return f"<{self.values.shape[2]} shapes at {len(self.known)} places>"
+
+    @property
+    def words(self) -> dict[str, Any]:
+        """All but the values, for JSON."""
+        positions = [None if np.isnan(at).any() else at.tolist() for at in self.positions]
+        return {"components": self.components, "places": self.known, "usual": list(self.usual.items()),
+                "positions": positions, "lines": self.lines.tolist()}  # fmt: skip
+
+    @classmethod
+    def of_words(cls, words: Mapping[str, Any], values: Vector) -> PlacedShapes:
+        """The same of a file, with the values (p c, n)."""
+        known, components = tuple(tuples(place) for place in words["places"]), tuple(words["components"])
+        positions = [3 * [np.nan] if at is None else at for at in words["positions"]]
+        lines = np.array(words["lines"], dtype=int).reshape(-1, 2)
+        if len(positions) != len(known) or (lines.size and not 0 <= lines.min() <= lines.max() < len(known)):
+            raise ValueError("positions and lines must be of its places")
+        usual = {str(name): tuples(at) for name, at in words["usual"]}
+        whole = values.reshape(len(known), len(components), values.shape[1])
+        return cls(components, known, whole, usual, np.array(positions, dtype=float).reshape(-1, 3), lines)
+
+    def motion(self, place: Any) -> Vector:
+        """All components (c, n) of a place; ValueError for one that does not exist."""
+        place = tuple(place) if isinstance(place, list) else place
+        if place in self.known:
+            return np.asarray(self.values[self.known.index(place)])
+        if self.more is not None:
+            return self.more(place)
+        require(
+            False, f"a place must be one that the run keeps; {nearest(place, self.known)}", place, "Run", "use that"
+        )
+        raise AssertionError
+
+    def __call__(self, at: Any, derivative: int = 0) -> Vector:
+        """φ at (place, direction): (n,), or (k, n) for a list of such pairs."""
+        require(derivative == 0, "slopes are of a Beam", derivative, "phi", "ask for a rotation, (place, 'rz')")
+        if isinstance(at, list):
+            return np.array([self.row(one) for one in at]).reshape(len(at), self.values.shape[2])
+        return self.row(at)
+
+    def row(self, at: Any) -> Vector:
+        """(n,) of one (place, direction)."""
+        place, along = split(at, self.components)
+        require_components(along, self.components, f"the place {told(place)}", "phi")
+        part = np.array([along[COMPONENTS.index(component)] for component in self.components])
+        return np.asarray(part @ self.motion(place))
+
+
+def tuples(value: Any) -> Any:
+    """Lists of JSON as tuples."""
+    return tuple(tuples(one) for one in value) if isinstance(value, list) else value
+
+
+def placed_shapes(body: BodyMatrices, vectors: Vector, loaded: Sequence[LocalCoordinate]) -> PlacedShapes:
+    """The shapes of a body from its part of the basis, (N, n)."""
+
+    def more(place: Any) -> Vector:
+        body.beam.check_place(place, "phi")
+        return np.asarray(body.rows_at(place) @ vectors)
+
+    extra = [at.z for at in loaded] + [at.to[1] for at in loaded if at.to is not None and at.to[0] == 0]
+    names = list(dict.fromkeys([*_places(body), *(tuple(z) if isinstance(z, list) else z for z in extra)]))
+    rows = body.assembled.rows
+    values = [np.asarray(rows(place) @ (body.spread @ vectors)) for place in names]
+    shape = (len(names), len(body.beam.components), vectors.shape[1])
+    at = [body.beam.position(place) for place in names]
+    positions = np.array([3 * [np.nan] if x is None else x for x in at], dtype=float).reshape(-1, 3)
+    edges = [(names.index(a), names.index(b)) for a, b in getattr(body.beam, "edges", ())]
+    made = PlacedShapes(
+        tuple(body.beam.components),
+        tuple(names),
+        np.array(values).reshape(shape),
+        _usual(body, loaded),
+        positions,
+        np.array(edges, dtype=int).reshape(-1, 2),
+        more,
+    )
+    moving = {name: at for name, at in made.usual.items() if np.any(made(at))}
+    return replace(made, usual=dict(list((moving or made.usual).items())[:USUAL]))
+
+
+def _places(body: BodyMatrices) -> list[Any]:
+    """Names of a body: those it offers, else the owners of its dofs that are places."""
+    offered = getattr(body.beam, "places", None)
+    if offered is not None:
+        return list(offered() if callable(offered) else offered)
+    return list(dict.fromkeys(node for node, _ in body.assembled.labels))
+
+
+def _usual(body: BodyMatrices, loaded: Sequence[LocalCoordinate]) -> dict[str, At]:
+    """Where something acts, then displacements of named points, a few."""
+    found: list[At] = [(at.z, named(at.along) if sum(map(bool, at.along)) == 1 else at.along[:3]) for at in loaded]
+    found = [(place, along.removeprefix("-") if isinstance(along, str) else along) for place, along in found]
+    ask = getattr(body.beam, "components_at", lambda place: body.beam.components)
+    points = getattr(body.beam, "points", {}) or _places(body)[-1:]
+    found += [(place, c) for place in points for c in ask(place) if c in COMPONENTS[:3]]
+    return {said(at): at for at in dict.fromkeys(found)}

@@ -1,0 +1,179 @@
+"""From a scene whose body is not a `Beam` to M, C, K on its free dofs: what the body gives, and what sits on it.
+
+M = M_body + Σ masses,  K = K_body + Σ k n nᵀ,  C = C_body + Σ c n nᵀ  with n the row of a place and direction,
+u_all = S u: zero where supports hold, static (Guyan) where there is no mass.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import sparse
+
+from fembeam.scene.assembly import Matrices, Vector
+from fembeam.scene.places import told
+from fembeam.structures import COMPONENTS, Assembled, Six, following
+from fembeam.support import require
+
+if TYPE_CHECKING:
+    from fembeam.scene.scene import Scene
+
+UNIT = 1e-12  # of 1: entries of a row that stands for one dof
+
+
+@dataclass(frozen=True, eq=False)
+class BodyMatrices(Matrices):
+    """Full matrices of a scene whose body has places by name; see `Matrices` for M, C, K, root, dashpots, damping.
+
+    Attributes
+    ----------
+    beam : the body. assembled : what it gave, on all its dofs.
+    spread : S (N_all, N) sparse: free dofs to all.
+    along : {direction: base load (N,)}. massless : labels of dofs that follow the others statically.
+    gyroscopic : (N, N) skew-symmetric, or None.
+    """
+
+    assembled: Assembled = None  # type: ignore[assignment]
+    spread: sparse.csr_matrix = None
+    along: dict[str, Vector] = field(default_factory=dict)
+    massless: tuple[Any, ...] = ()
+    gyroscopic: sparse.csr_matrix | None = None
+    named = True
+
+    @property
+    def base_loads(self) -> dict[str, Vector]:
+        """The load (N,) of every direction in which the frame may move."""
+        return self.along
+
+    def own_row(self, place: Any, along: Six) -> sparse.csr_matrix:
+        """The motion (1, N) of a place along a direction, on the body's own free dofs."""
+        return (row_of(self.beam, self.assembled, place, along) @ self.spread).tocsr()
+
+    def rows_at(self, place: Any) -> sparse.csr_matrix:
+        """All components (c, N) of a place, on the body's own free dofs."""
+        return (self.assembled.rows(place) @ self.spread).tocsr()
+
+    def loosened(self, scene: Scene) -> Matrices:
+        """The matrices without supports, on all dofs, those without mass too."""
+        return _of(scene, self.assembled, self.modes, held=np.zeros(0, dtype=int), condense=False)
+
+    def frequency_error(self, omega: ArrayLike) -> Vector:
+        """Zeros: the matrices are what the structure is."""
+        return 0.0 * np.asarray(omega, dtype=float)
+
+    @property
+    def rounding(self) -> float:
+        """0: it is not told."""
+        return 0.0
+
+    @property
+    def accuracy(self) -> str:
+        """What the body says of its matrices, and what became of them."""
+        static = f", {len(self.massless)} of them without mass follow statically" if self.massless else ""
+        return f"{self.assembled.accuracy}{static}; {self.M.shape[0]} free"
+
+
+def row_of(body: Any, assembled: Assembled, place: Any, along: Six) -> sparse.csr_matrix:
+    """The motion (1, N_all) of a place along a direction, on all dofs."""
+    part = [along[COMPONENTS.index(component)] for component in body.components]
+    return (sparse.csr_matrix([part]) @ assembled.rows(place)).tocsr()
+
+
+def body_matrices(scene: Scene, elements: int | None, modes: int | None, probes: Sequence[Any]) -> BodyMatrices:
+    """The matrices of the scene's own body; of one without a mesh of its own `modes` does not matter."""
+    for index, place in enumerate(probes):
+        scene.beam.check_place(place, f"probes[{index}] of Scene.matrices")
+    count = elements if getattr(scene.beam, "meshed", True) else None
+    assembled = scene.beam.assembled(count, modes, (*scene.places, *probes))
+    held = _held(scene, assembled)
+    require(len(held) < assembled.M.shape[0], "supports must leave dofs free", len(held), "Scene", "remove one")
+    return _of(scene, assembled, modes, held, condense=True)
+
+
+def _of(scene: Scene, assembled: Assembled, modes: int | None, held: Any, condense: bool) -> BodyMatrices:
+    """The assembly itself."""
+    M, K, C, root = _with_parts(scene, assembled)
+    free = np.setdiff1d(np.arange(M.shape[0]), held)
+    labels = [assembled.labels[i] for i in free]
+    bare = [label for label, mass in zip(labels, M.diagonal()[free], strict=True) if mass == 0.0]
+    T = following(M[free][:, free], K[free][:, free], labels, "Scene") if condense else None
+    S = sparse.eye(M.shape[0], format="csr")[:, free]
+    S = S if T is None else (S @ T).tocsr()
+    directions = [c for c in COMPONENTS[:3] if c in getattr(scene.beam, "base_directions", scene.beam.components)]
+    moved = {c: S.T @ (M @ r) for c, r in zip(directions, assembled.translations.T, strict=True)}
+    G = assembled.gyroscopic
+    M, K, C = ((S.T @ A @ S).tocsr() for A in (M, K, C))
+    return BodyMatrices(
+        scene.beam,
+        M,
+        K,
+        None if root is None else (root @ S).tocsr(),
+        C,
+        scene.damping,
+        influence=np.zeros(S.shape[1]),
+        base_load=np.zeros(S.shape[1]),
+        nodes=np.zeros(0),
+        dofs=np.zeros((0, 2), dtype=int),
+        modes=modes,
+        assembled=assembled,
+        spread=S,
+        along=moved,
+        massless=tuple(bare) if condense else (),
+        gyroscopic=None if G is None else (S.T @ G @ S).tocsr(),
+    )
+
+
+def _with_parts(scene: Scene, assembled: Assembled) -> tuple[Any, Any, Any, Any]:
+    """M, K, C on all dofs with masses, springs and dashpots, and R with RᵀR = K or None."""
+    size = assembled.M.shape[0]
+    C = sparse.csr_matrix((size, size)) if assembled.C is None else assembled.C
+    springs = _strengthened(scene, assembled, [(s, s.stiffness) for s in scene.springs])
+    dashpots = _strengthened(scene, assembled, [(d, d.damping) for d in scene.dashpots])
+    masses = sparse.vstack([sparse.csr_matrix((0, size)), *(_arms(assembled, scene, m) for m in scene.masses)])
+    root = assembled.root
+    root = None if root is None else sparse.vstack([root, springs], format="csr")
+    M = (assembled.M + masses.T @ masses).tocsr()
+    return M, (assembled.K + springs.T @ springs).tocsr(), (C + dashpots.T @ dashpots).tocsr(), root
+
+
+def _strengthened(scene: Scene, assembled: Assembled, parts: list[tuple[Any, float]]) -> sparse.csr_matrix:
+    """Rows √k n of springs or dashpots, so that rowsᵀ rows is their matrix."""
+    rows = [np.sqrt(size) * row_of(scene.beam, assembled, part.z, part.along) for part, size in parts]
+    return sparse.vstack([sparse.csr_matrix((0, assembled.M.shape[0])), *rows], format="csr")
+
+
+def _arms(assembled: Assembled, scene: Scene, mass: Any) -> sparse.csr_matrix:
+    """Rows A of a rigid body on a place, AᵀA its mass matrix: √m (u + θ × e), then √J θ."""
+    at, components = assembled.rows(mass.z).tocsr(), scene.beam.components
+    none = sparse.csr_matrix((1, at.shape[1]))
+    u, theta = ([at[components.index(c)] if c in components else none for c in group]
+                for group in (COMPONENTS[:3], COMPONENTS[3:]))  # fmt: skip
+    ex, ey, ez = mass.offset if isinstance(mass.offset, tuple) else (0.0, 0.0, float(mass.offset))
+    J = mass.inertia if isinstance(mass.inertia, tuple) else 3 * (mass.inertia,)
+    arm = [
+        u[0] + ez * theta[1] - ey * theta[2],
+        u[1] + ex * theta[2] - ez * theta[0],
+        u[2] + ey * theta[0] - ex * theta[1],
+    ]
+    turned = [np.sqrt(j) * t for j, t in zip(J, theta, strict=True)]
+    return sparse.vstack([*(np.sqrt(mass.mass) * row for row in arm), *turned], format="csr")
+
+
+def _held(scene: Scene, assembled: Assembled) -> Any:
+    """Numbers of the dofs that supports hold."""
+    found: set[int] = set()
+    for index, support in enumerate(scene.supports):
+        rows, components = assembled.rows(support.z).tocsr(), scene.beam.components
+        for dof in support.dofs:
+            row = rows[components.index(dof)] if dof in components else None
+            if row is None or not row.nnz:
+                continue
+            single = row.nnz == 1 and abs(row.data[0] - 1.0) < UNIT
+            require(single, "a support must hold a node of the body", f"{dof} at {told(support.z)}",
+                    f"supports[{index}] of Scene", "given modes have theirs")  # fmt: skip
+            found.add(int(row.indices[0]))
+    return np.array(sorted(found), dtype=int)

@@ -1,0 +1,122 @@
+"""Checks of a scene whose body is not a `Beam`: places by name, directions, and what has no meaning there."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from fembeam.scene.parts import Guided, PointMoment
+from fembeam.scene.places import told
+from fembeam.structures import COMPONENTS, direction_of, named, require_components
+from fembeam.support import is_finite, require
+
+if TYPE_CHECKING:
+    from fembeam.scene.scene import Scene
+
+DIRECTED = ("springs", "dashpots", "stops", "elements", "forces")
+
+
+def is_body(value: Any) -> bool:
+    """Whether a value can stand where a Beam does: it gives matrices and knows places by name."""
+    return all(callable(getattr(value, name, None)) for name in ("assembled", "check_place", "position", "lines"))
+
+
+def components_at(body: Any, place: Any) -> tuple[str, ...]:
+    """The components that a place of a body has."""
+    ask = getattr(body, "components_at", None)
+    return tuple(ask(place)) if ask else tuple(body.components)
+
+
+def check_feature(body: Any, feature: Any, name: str, where: str) -> None:
+    """Raise ValueError unless a part of a scene has a place on the body and says along what it acts."""
+    body.check_place(feature.z, where)
+    have, what = components_at(body, feature.z), f"the place {told(feature.z)}"
+    if name == "supports":
+        _check_support(feature, have, where)
+    if name in DIRECTED:
+        turn = isinstance(feature, PointMoment)
+        write = f"add direction={'rz' if turn else 'x'!r} or so; {what} has {', '.join(have)}"
+        require(feature.direction is not None, "a place by name needs a direction", None, where, write)
+        require_components(direction_of(feature.direction, where), have, what, where)
+    require(name != "impactors", "impactors must strike a Beam", feature, where,
+            "make the mass a body of its own: Scene(Structure(...)) in bodies")  # fmt: skip
+    if name == "masses":
+        require(any(c in COMPONENTS[:3] for c in have), f"{what} must move to carry a mass", have, where, "move it")
+
+
+def _check_support(support: Any, have: tuple[str, ...], where: str) -> None:
+    """Raise ValueError unless a support holds what the place has."""
+    require(not isinstance(support, Guided), "Guided is for a Beam", support, where,
+            "write Fixed(place, 'rx') or so, with the rotations it holds")  # fmt: skip
+    every = support.dofs in (COMPONENTS, COMPONENTS[:3])
+    missing = [dof for dof in support.dofs if dof not in have]
+    told_at = f"the place {told(support.z)} has {', '.join(have)}"
+    require(
+        every or not missing, f"a support must hold dofs that exist; {told_at}", missing, where, "name some of these"
+    )
+    require(len(missing) < len(support.dofs), f"a support must hold something; {told_at}", support, where, "use Fixed")
+
+
+def check_ends(scene: Scene) -> None:
+    """Raise ValueError for second places of stops and elements that do not exist, or are the first one."""
+    bodies = [scene.beam, *(one.beam for one in scene.bodies)]
+    for name, key in (("stops", "on"), ("elements", "to")):
+        for index, part in enumerate(getattr(scene, name)):
+            second, where = part.coordinate.to, f"{name}[{index}] of Scene"
+            if second is None:
+                continue
+            number, place = second
+            known = 0 <= number < len(bodies)
+            among = f"1 to {len(scene.bodies)}" if scene.bodies else "and there is none"
+            require(known, f"{key} must name a body, {among}", number, where, "add it to bodies")
+            require(number > 0 or place != part.z, f"{key} must be another place", place, where,
+                    "leave it out for an end on the frame")  # fmt: skip
+            check_end(bodies[number], place, part.coordinate.along, key, where)
+
+
+def check_end(body: Any, place: Any, along: Any, key: str, where: str) -> None:
+    """Raise ValueError unless a second place exists on a body and moves along a direction."""
+    if is_body(body):
+        body.check_place(place, f"{key} of {where}")
+        require_components(along, components_at(body, place), f"the place {told(place)} of {key}", where)
+        return
+    inside = is_finite(place) and 0 <= place <= body.length
+    require(inside, f"z of {key} must lie on the beam, 0 to {body.length} m", place, where, "move it")
+    require_components(along, ("y", "rx"), f"a Beam bends in one plane: the place {told(place)} of {key}", where)
+
+
+def check_conflicts(scene: Scene) -> None:
+    """Raise ValueError where two supports hold one dof, or two stops are one."""
+    held: dict[Any, int] = {}
+    for index, support in enumerate(scene.supports):
+        for dof in support.dofs:
+            if dof not in components_at(scene.beam, support.z):
+                continue
+            key = (scene.beam.node(support.z) if hasattr(scene.beam, "node") else support.z), dof
+            require(key not in held, f"supports must not hold one dof twice ({dof} at {told(support.z)})",
+                    (held.get(key), index), "supports of Scene", "keep one")  # fmt: skip
+            held[key] = index
+    known: dict[Any, int] = {}
+    for index, stop in enumerate(scene.stops):
+        one: Any = (stop.z, stop.push, stop.coordinate.along, stop.coordinate.to)
+        at = f"{told(stop.z)}, {named(direction_of(stop.direction, 'Stop'))}"
+        require(one not in known, f"stops must not share one place and direction ({at})", (known.get(one), index),
+                "stops of Scene", "make them one stop with one law, such as PiecewiseLinear")  # fmt: skip
+        known[one] = index
+
+
+def check_plain(feature: Any, name: str, where: str) -> None:
+    """Raise ValueError for what a part on a Beam cannot say: a place by name, a direction out of its plane."""
+    require(is_finite(feature.z), "z must be a number on a Beam, which has no names", feature.z, where, "in m")
+    for key in ("offset", "inertia"):
+        require(not isinstance(getattr(feature, key, 0.0), tuple), f"{key} must be one number on a Beam",
+                getattr(feature, key, 0.0), where, "give kg m², m")  # fmt: skip
+    direction = getattr(feature, "direction", None)
+    if direction is not None:
+        along = direction_of(direction, where)
+        require_components(along, ("y", "rx"), "a Beam bends in one plane: its places", where)
+        require(name in ("stops", "elements"), "direction is for bodies that are not a Beam", direction, where,
+                "leave it out: u is along y")  # fmt: skip
+    if name == "supports":
+        beyond = [dof for dof in feature.dofs if dof not in ("y", "rx")]
+        whole = feature.dofs in ((), COMPONENTS, COMPONENTS[:3])
+        require(whole or not beyond, "a Beam bends in one plane: it has y and rx", beyond, where, "leave them out")

@@ -1,0 +1,109 @@
+"""Places and directions as they are written: z of a beam, the name of a node or point, (member, distance).
+
+Where a quantity is asked for at a place by name, the place and its direction stand together: ("lever", "z").
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from fembeam.structures import COMPONENTS, Six, direction_of, named
+from fembeam.support import is_finite, is_name, require
+
+if TYPE_CHECKING:
+    Place: TypeAlias = Any
+    Second: TypeAlias = Any
+else:  # as a scene file on a beam gives them
+    Place = float
+    Second = float | tuple[int, float]
+At: TypeAlias = tuple[Any, Any]  # (place, direction)
+
+
+def unsigned(direction: Any) -> Any:
+    """A direction by name without the "-" before it, which is the sign of `sign_of`.
+
+    Examples
+    --------
+    >>> unsigned("-rz"), sign_of("-rz"), sign_of((0.0, -1.0))
+    ('rz', -1.0, 1.0)
+    """
+    return direction.removeprefix("-") if isinstance(direction, str) else direction
+
+
+def sign_of(direction: Any) -> float:
+    """-1 of a name that begins with "-", else 1."""
+    return -1.0 if isinstance(direction, str) and direction.startswith("-") else 1.0
+
+
+def is_place(value: Any) -> bool:
+    """Whether a value can name a place: a finite number, a name, (member, distance).
+
+    Examples
+    --------
+    >>> [is_place(value) for value in (0.3, "lever", ("A-B", 0.4), None, (1, 2, 3))]
+    [True, True, True, False, False]
+    """
+    if is_pair(value):
+        return is_name(value[0]) and is_finite(value[1])
+    return is_finite(value) or is_name(value)
+
+
+def is_pair(value: Any) -> bool:
+    """Whether a value is two things in a row."""
+    return isinstance(value, (tuple, list)) and len(value) == 2
+
+
+def told(place: Any) -> str:
+    """Where something is, in words.
+
+    Examples
+    --------
+    >>> told(0.25), told("lever"), told(("A-B", 0.4))
+    ('z = 0.25', "'lever'", "0.4 m along 'A-B'")
+    """
+    if is_pair(place):
+        return f"{place[1]} m along {place[0]!r}"
+    return f"{place!r}" if isinstance(place, str) else f"z = {place}"
+
+
+def place_words(place: Any) -> str:
+    """A place as names have it: a number is z in m.
+
+    Examples
+    --------
+    >>> place_words(0.25), place_words("lever"), place_words(("A-B", 0.4))
+    ('0.25 m', 'lever', 'A-B + 0.4 m')
+    """
+    if is_pair(place):
+        return f"{place[0]} + {place[1]:g} m"
+    return f"{place:.6g} m" if is_finite(place) else str(place)
+
+
+def split(at: Any, components: Sequence[str] = COMPONENTS) -> tuple[Any, Six]:
+    """Place and direction of a pair; ValueError for a place alone, unless it has but one way to move.
+
+    Examples
+    --------
+    >>> split((("A-B", 0.4), "x"))[0], split(("lever", (0, 1, 0)))[0]
+    (('A-B', 0.4), 'lever')
+    """
+    pair = isinstance(at, (tuple, list)) and len(at) == 2 and not is_finite(at[1])
+    if not pair and len(components) == 1:
+        return at, direction_of(components[0], "a place")
+    require(pair, f"a place of a structure needs a direction of {', '.join(components)}", at, "a place",
+            "write ('lever', 'x'), or displacement('lever', 'x')")  # fmt: skip
+    return at[0], direction_of(at[1], f"the place {told(at[0])}")
+
+
+def said(at: At) -> str:
+    """A place and its direction in words.
+
+    Examples
+    --------
+    >>> said(("lever", "-z"))
+    'lever, -z'
+    """
+    place, along = at
+    words = f"{place[0]} + {place[1]:g} m" if isinstance(place, (tuple, list)) else str(place)
+    return f"{words}, {along if isinstance(along, str) else named(direction_of(along, 'a place'))}"

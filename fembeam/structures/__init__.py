@@ -1,0 +1,21 @@
+"""Bodies that are not one straight beam: structures by their matrices, places and directions by name.
+
+A body gives matrices with named dofs and rows for a place (`Assembled`); a scene adds supports and all else.
+Imports: `support`, `beams`, `reduction`. Begin with `assembled`.
+"""
+
+from fembeam.structures.assembled import COMPONENTS, Assembled
+from fembeam.structures.directions import (
+    TURN,
+    UP,
+    Direction,
+    Six,
+    direction_of,
+    named,
+    nearest,
+    require_components,
+    turns,
+)
+from fembeam.structures.massless import following
+from fembeam.structures.scale import Scale
+from fembeam.structures.structure import Structure

@@ -1,0 +1,213 @@
+"""A structure given by its matrices: M ü + C u̇ + K u = f, a name for every dof."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+
+from fembeam.structures.assembled import COMPONENTS, Assembled
+from fembeam.structures.checks import Label, labelled, matrix, placed, positive_mass, sentences, symmetric
+from fembeam.structures.massless import following
+from fembeam.structures.matrix_files import read_labels, read_matrix, read_nodes
+from fembeam.structures.modes_given import GivenModes
+from fembeam.structures.named_body import NamedBody, checked_edges
+from fembeam.structures.scale import Scale
+from fembeam.support import require
+
+Vector = NDArray[np.float64]
+WHERE = "Structure"
+
+
+@dataclass(frozen=True, eq=False, repr=False, init=False)
+class Structure(NamedBody):
+    """A body by its matrices, such as another program exports: M ü + C u̇ + K u = f.
+
+    Parameters
+    ----------
+    K, M : (N, N) stiffness and mass, dense or sparse, symmetric; M positive semidefinite. N/m and kg for displacements.
+        Dofs without mass follow the others statically (Guyan).
+    C : (N, N) its own viscous damping, N s/m; added to the damping of the scene.
+    labels : (node, component) of every dof, in the order of the rows; a node is a number or a name, a component one of
+        "x", "y", "z", "rx", "ry", "rz" along global axes. None: dof i is (i, "x").
+    nodes : {node: (x, y, z)} in m, of some or all of them: for figures, rigid motions and offsets.
+    points : {name: node}: places that a scene speaks of.
+    lines : pairs or chains of nodes, drawn in figures.
+    scale : `Scale` of the units in which K, M, C and nodes are given; None: SI.
+
+    Raises
+    ------
+    ValueError : matrices that are not square, finite, symmetric or of one size, M indefinite, labels or points
+        that do not fit; the message has the number or the nearest name.
+
+    Notes
+    -----
+    Supports, masses, springs, stops and loads come with the `Scene`. `check` tells in sentences what was read.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> K = 1e4 * np.array([[2.0, -1.0], [-1.0, 1.0]])
+    >>> mast = Structure(K, np.eye(2), labels=[(1, "x"), (2, "x")], points={"top": 2})
+    >>> mast.components_at("top")
+    ('x',)
+    """
+
+    K: sparse.csr_matrix
+    M: sparse.csr_matrix
+    C: sparse.csr_matrix | None
+    labels: tuple[Label, ...]
+    nodes: dict[Hashable, Vector]
+    points: dict[str, Hashable]
+    edges: tuple[tuple[Hashable, Hashable], ...]
+
+    def __init__(
+        self,
+        K: Any,
+        M: Any,
+        C: Any = None,
+        labels: Iterable[Any] | None = None,
+        nodes: Mapping[Any, ArrayLike] | None = None,
+        points: Mapping[str, Any] | None = None,
+        lines: Iterable[Sequence[Any]] = (),
+        scale: Scale | None = None,
+    ) -> None:
+        given = {"K": matrix("K", K, WHERE), "M": matrix("M", M, WHERE)}
+        given |= {} if C is None else {"C": matrix("C", C, WHERE)}
+        for name, one in given.items():
+            require(one.shape == given["K"].shape, f"{name} must have the shape of K, {given['K'].shape}", one.shape,
+                    WHERE, "match the exports")  # fmt: skip
+        names = labelled(labels, given["K"].shape[0], WHERE)
+        given = {name: symmetric(name, one, names, WHERE) for name, one in given.items()}
+        positive_mass(given["M"], names, WHERE)
+        at, named = placed(nodes, points, names, WHERE)
+        length = 1.0
+        if scale is not None:
+            length, given = float(scale.length), _in_si(given, names, scale)
+        values = {
+            **{"K": given["K"], "M": given["M"], "C": given.get("C"), "labels": names},
+            **{"nodes": {node: length * place for node, place in at.items()}, "points": named},
+            "edges": checked_edges(lines, at, WHERE),
+        }
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    @cached_property
+    def digest(self) -> str:
+        """Twelve characters that tell structures of other numbers or names apart."""
+        made = sha256(repr((self.labels, self.points, self.edges)).encode())
+        for one in (self.K, self.M, self.C):
+            if one is not None:
+                made.update(one.indptr.astype(np.int64).tobytes() + one.indices.astype(np.int64).tobytes())
+                made.update(one.data.tobytes())
+        return made.hexdigest()[:12]
+
+    def __repr__(self) -> str:
+        return f"<structure of {len(self.labels)} dofs at {len(self.dofs)} nodes, {self.digest}>"
+
+    @property
+    def massless(self) -> list[Label]:
+        """The dofs without mass."""
+        return [self.labels[i] for i in np.flatnonzero(self.M.diagonal() == 0)]
+
+    def check(self) -> list[str]:
+        """What the matrices say, in sentences with numbers: rigid motions, mass, dofs without mass, frequencies."""
+        return list(sentences(self))
+
+    def condensed(self) -> Structure:
+        """The same without its massless dofs, which follow the others statically; their names are gone."""
+        T = following(self.M, self.K, self.labels, "Structure.condensed")
+        if T is None:
+            return self
+        kept = [label for label, bare in zip(self.labels, self.M.diagonal() == 0, strict=True) if not bare]
+        C = None if self.C is None else T.T @ self.C @ T
+        points = {name: node for name, node in self.points.items() if node in {one for one, _ in kept}}
+        return Structure(T.T @ self.K @ T, T.T @ self.M @ T, C, kept, self.nodes, points)
+
+    @staticmethod
+    def read(
+        stiffness: str | Path,
+        mass: str | Path,
+        damping: str | Path | None = None,
+        labels: str | Path | Iterable[Any] | None = None,
+        nodes: str | Path | Mapping[Any, ArrayLike] | None = None,
+        points: Mapping[str, Any] | None = None,
+        lines: Iterable[Sequence[Any]] = (),
+        scale: Scale | None = None,
+    ) -> Structure:
+        """A structure whose matrices are in files: Matrix Market (.mtx), .npz (of scipy or one array), .npy.
+
+        Parameters
+        ----------
+        stiffness, mass, damping : paths.
+        labels : as for `Structure`, or the path of a table with two columns, `20, x`. nodes : likewise, or a table with
+            four columns, `20, 0.1, 0, 0.5`.
+        points, lines, scale : as for `Structure`.
+
+        Raises
+        ------
+        ValueError : a damaged file or one of another kind (says what was expected, tables with the line).
+        OSError : a file that cannot be opened.
+        """
+        K, M, C = (None if path is None else read_matrix(path) for path in (stiffness, mass, damping))
+        names = read_labels(labels) if isinstance(labels, (str, Path)) else labels
+        at = read_nodes(nodes) if isinstance(nodes, (str, Path)) else nodes
+        return Structure(K, M, C, names, at, points, lines, scale)
+
+    @staticmethod
+    def of_modes(
+        omega: ArrayLike,
+        shapes: ArrayLike,
+        labels: Iterable[Any] | None,
+        participation: Mapping[str, ArrayLike] | None = None,
+        nodes: Mapping[Any, ArrayLike] | None = None,
+        points: Mapping[str, Any] | None = None,
+        lines: Iterable[Sequence[Any]] = (),
+    ) -> GivenModes:
+        """A body by its modes, computed with its supports by another program: q'' + ω² q = φᵀ f - Γ ẍ.
+
+        Parameters
+        ----------
+        omega : (n,) rad/s, ascending.
+        shapes : (d, n) mass-normalised, 1/√kg (rotations rad/(m √kg)), at the dofs of labels.
+        labels, nodes, points, lines : as for a `Structure`.
+        participation : {"x": Γ (n,)} in √kg for every direction in which the base may move.
+
+        Notes
+        -----
+        It has no static compliance but that of the given modes: contact forces depend on their number. Supports, masses
+        and springs act through the shapes; supports cannot be added.
+
+        Examples
+        --------
+        >>> body = Structure.of_modes([30.0, 190.0], [[0.5, -0.4]], [("tip", "y")], {"y": [1.2, 0.7]})
+        >>> body.components_at("tip")
+        ('y',)
+        """
+        return GivenModes(omega, shapes, labels, participation, nodes, points, lines)
+
+    def assembled(self, elements: int | None = None, modes: int | None = None, places: Sequence[Any] = ()) -> Assembled:
+        """The matrices, with rows for places; ValueError for a number of elements, which it does not have."""
+        require(elements is None, "elements must be left out: a structure has the matrices it was given", elements,
+                "Scene.matrices", "ask for modes, or modes='all'")  # fmt: skip
+        along = [c for c in COMPONENTS[:3] if c in self.components]
+        moved = np.array([[float(component == c) for c in along] for _, component in self.labels])
+        return Assembled(
+            *(self.M, self.K, self.labels, self.rows, moved.reshape(len(self.labels), len(along))),
+            C=self.C,
+            accuracy=f"{len(self.labels)} dofs as they were given",
+        )
+
+
+def _in_si(given: dict[str, sparse.csr_matrix], labels: tuple[Label, ...], scale: Scale) -> dict[str, Any]:
+    """M, C, K in SI: mass · timeᵏ, times a length for every rotation of an entry."""
+    turning = sparse.diags([float(scale.length) if component[0] == "r" else 1.0 for _, component in labels])
+    units = {"M": float(scale.mass), "C": scale.damping, "K": scale.stiffness}
+    return {name: (units[name] * (turning @ one @ turning)).tocsr() for name, one in given.items()}

@@ -1,0 +1,241 @@
+"""Structures in scene files and from matrix files; what the command line, studies and figures make of them."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy import io, sparse
+from structures import BEAM, ELEMENTS, LAW, LENGTH, beam_labels, beam_matrices, beam_structure
+
+import fembeam as fb
+from fembeam import plot, study
+from fembeam.cli import main
+from fembeam.scene_file import json_schema, read
+
+FILE = """
+[structure]
+stiffness = "K.mtx"
+mass = "M.npz"
+labels = "dofs.csv"
+nodes = "nodes.csv"
+points = { root = 0, tip = 8 }
+lines = [[0, 1, 2, 3, 4, 5, 6, 7, 8]]
+
+[[supports]]
+kind = "fixed"
+at = "root"
+
+[[masses]]
+at = 4
+mass = 0.1
+
+[[stops]]
+at = "tip"
+direction = "y"
+name = "upper"
+gap = 1e-3
+law = { kind = "kelvin_voigt", stiffness = 1e6, damping = 10.0 }
+
+[[stops]]
+at = "tip"
+on = 2
+direction = [0, -1, 0]
+gap = 3e-3
+law = { kind = "kelvin_voigt", stiffness = 1e6, damping = 10.0 }
+
+[damping]
+zeta = 0.01
+
+[base.y]
+kind = "harmonic"
+amplitude = 1e-3
+omega = 180.0
+
+[reduce]
+modes = 3
+
+[simulate]
+duration = 0.2
+dt = 2e-4
+places = [["tip", "y"], [2, "rx"]]
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A folder with the matrices of a beam in other programs' files, and the scene file."""
+    K, M = beam_matrices()
+    io.mmwrite(tmp_path / "K.mtx", sparse.csr_matrix(K), precision=17, symmetry="symmetric")
+    sparse.save_npz(tmp_path / "M.npz", sparse.csr_matrix(M))
+    (tmp_path / "dofs.csv").write_text("# node, component\n" + "".join(f"{n}, {c}\n" for n, c in beam_labels()))
+    (tmp_path / "nodes.csv").write_text("".join(f"{n} 0 0 {n * LENGTH / ELEMENTS}\n" for n in range(ELEMENTS + 1)))
+    (tmp_path / "s.toml").write_text(FILE)
+    return tmp_path
+
+
+def test_matrices_of_files_are_the_structure(folder):
+    body = fb.Structure.read(folder / "K.mtx", folder / "M.npz", None, folder / "dofs.csv", folder / "nodes.csv")
+    same = beam_structure()
+    np.testing.assert_allclose(body.K.toarray(), same.K.toarray(), rtol=1e-15)
+    np.testing.assert_array_equal(body.M.toarray(), same.M.toarray())
+    assert body.labels == same.labels
+    np.testing.assert_allclose(body.nodes[8], same.nodes[8])
+    np.savez(folder / "dense.npz", K=same.K.toarray())
+    np.save(folder / "dense.npy", same.M.toarray())
+    assert fb.Structure.read(folder / "dense.npz", folder / "dense.npy", labels=beam_labels()).labels == same.labels
+
+
+def test_a_scene_file_is_the_scene_in_python(folder):
+    file = read(folder / "s.toml")
+    scene = fb.Scene(
+        beam_structure(points={"root": 0, "tip": 8}),
+        [fb.Fixed("root")],
+        masses=[fb.LumpedMass(4, 0.1)],
+        stops=[
+            fb.Stop("tip", LAW, 1e-3, direction="y", name="upper"),
+            fb.Stop("tip", LAW, 3e-3, direction=(0, -1, 0), on=2),
+        ],
+        damping=fb.ModalDamping(0.01),
+        base={"y": fb.Harmonic(1e-3, 180.0)},
+    )
+    one, other = file.model().simulate(0.2, 1e-3), scene.reduce(modes=3).simulate(0.2, 1e-3)
+    assert len(one.contacts) > 4
+    np.testing.assert_allclose(one.contacts.t_in, other.contacts.t_in, atol=1e-12)
+    np.testing.assert_allclose(one.displacement(2, "rx"), other.displacement(2, "rx"), atol=1e-13)
+    assert [one.name(i) for i in (0, 1)] == ["upper", "stop at tip, -y, on 2"]
+
+
+def test_the_command_line_runs_and_checks_it(folder, capsys):
+    assert main(["check", str(folder / "s.toml"), "--json"]) in (0, None)
+    told = json.loads(capsys.readouterr().out)
+    assert any("rᵀMr: 0.785 kg along y" in line for line in told["structure"])
+    assert "share y" in told["modes"][0]
+    out = folder / "out"
+    assert main(["run", str(folder / "s.toml"), "--out", str(out)]) == 0
+    head = (out / "histories.csv").read_text(encoding="utf-8").splitlines()[0]
+    assert '"displacement at 2, rx [rad]"' in head
+    assert "force upper [N]" in head
+    assert (out / "modes.png").stat().st_size > 0
+    again = fb.load(out / "run.npz")
+    assert again.scene_file.scene.stops[0].name == "upper"  # its files travel with it
+    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    assert "upper" in json.dumps(summary)
+    assert "NaN" not in json.dumps(summary)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('at = "tip"\ndirection = "y"', 'z = "tip"\ndirection = "y"', "unknown key 'z'"),
+        ('at = "tip"\ndirection = "y"', 'at = "tipp"\ndirection = "y"', "'tip' is the nearest there is"),
+        ('direction = "y"\n', "", "a place by name needs a direction.* has y, rx"),
+        ('direction = "y"\n', 'direction = "x"\n', "must move along x; it has y, rx"),
+        ("[base.y]", "[base.x]", "base must move along y, got 'x'"),
+        ("[base.y]", "[base]", "base must name its directions"),
+        ('stiffness = "K.mtx"\n', "", r"\[structure\]: the key 'stiffness' is missing"),
+        ('mass = "M.npz"', 'mass = "gone.npz"', "gone.npz: No such file"),
+        ('mass = "M.npz"', 'mass = "dofs.csv"', "a matrix must be a file of .mtx"),
+        ('mass = "M.npz"', 'mas = "M.npz"', "unknown key 'mas'; did you mean 'mass'"),
+        ("[structure]", '[structure]\nscale = ["mm"]', "scale must be a list of three units"),
+        ("[structure]", '[structure]\nscale = ["mm", "stone", "s"]', "mass must be one of kg"),
+        ("[structure]", "[beam]\nlength = 1.0\n[structure]", r"needs one of the tables \[beam\] and \[structure\]"),
+        ('["tip", "y"], [2, "rx"]', '["tp", "y"]', "'tip' is the nearest there is"),
+        ("dt = 2e-4", 'dt = 2e-4\nquantities = ["moment"]', "quantities of sections are of a Beam"),
+        ('kind = "fixed"\nat = "root"', 'kind = "fixed"\nat = "root"\ndofs = ["x"]', "must hold dofs that exist"),
+    ],
+)
+def test_mistakes_are_told_with_their_table(folder, old, new, message):
+    text = FILE.replace(old, new, 1)
+    assert text != FILE
+    (folder / "s.toml").write_text(text)
+    with pytest.raises(ValueError, match=message):
+        read(folder / "s.toml").model()
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        (
+            "K.mtx",
+            "%%MatrixMarket matrix coordinate real general\n3 3",
+            "K.mtx is no matrix of kind .mtx, or is damaged",
+        ),
+        ("M.npz", "nothing", "M.npz is no matrix of kind .npz, or is damaged"),
+        ("dofs.csv", "1, x\n2\n", "dofs.csv:2: expected 2 columns, node, component, got '2'"),
+        ("nodes.csv", "1 0 0 0\n2 0 0 up\n", "nodes.csv: coordinates must be numbers"),
+    ],
+)
+def test_damaged_files_are_named(folder, name, content, message):
+    (folder / name).write_text(content)
+    with pytest.raises(ValueError, match=message):
+        read(folder / "s.toml")
+
+
+def test_the_schema_still_describes_beams():
+    assert json_schema()["properties"]["beam"]
+
+
+# --- studies and figures --------------------------------------------------------------------------------------------
+
+
+def pair(base):
+    """The beam and the structure that it is, under the same motion."""
+    damping = fb.ModalDamping(0.02)
+    beam = fb.Scene(BEAM, [fb.Clamped(0.0)], stops=[fb.Stop(LENGTH, LAW, 1e-3, "above")], damping=damping, base=base)
+    body = fb.Scene(beam_structure(), [fb.Fixed("root")], stops=[fb.Stop("tip", LAW, 1e-3, direction="y")],
+                    damping=damping, base={"y": base})  # fmt: skip
+    return beam, body
+
+
+def test_random_response_is_that_of_the_beam():
+    """The same noise: the same realisation, hence the same estimates, over few impacts."""
+    noise = fb.BandNoise(5e-4, (50.0, 400.0), seed=3)
+    beam, body = (scene for scene in pair(noise))
+    runs = beam.reduce(modes=2, elements=ELEMENTS).simulate(0.4, 1e-3), body.reduce(modes=2).simulate(0.4, 1e-3)
+    np.testing.assert_allclose(runs[1].displacement("tip", "y"), runs[0].displacement(LENGTH), rtol=0,
+                               atol=1e-6 * np.abs(runs[0].displacement(LENGTH)).max())  # fmt: skip
+    assert set(plot.spectra_of(runs[1])) >= {"base y", "δ"}
+
+
+def test_studies_are_those_of_the_beam():
+    beam, body = pair(fb.Harmonic(1e-3, 180.0))
+    plan = {"duration": 0.3, "dt": 1e-3}
+    one = study.mode_count(beam, [1, 2], "peak_force", residual=False, reference=3, **plan)
+    other = study.mode_count(body, [1, 2], "peak_force", residual=False, reference=3, **plan)
+    first, second = ([row["value"] for row in found.table() if row.get("value") is not None] for found in (one, other))
+    np.testing.assert_allclose(second, first, rtol=5e-3)  # the beam has its own mesh, right to 1e-6
+
+
+def test_amplitude_at_a_place(folder):
+    model = pair(fb.Harmonic(1e-3, 180.0))[1].reduce(modes=2)
+    run = model.simulate(0.3, 1e-4)
+    u = run.displacement(4, "y")
+    assert study.quantities.Amplitude(z=(4, "y"))(run) == pytest.approx((u.max() - u.min()) / 2, rel=1e-3)
+
+
+@pytest.mark.parametrize("lines", [True, False])
+def test_figures_are_drawn(lines):
+    body = beam_structure(**({} if lines else {"lines": (), "nodes": None}))
+    scene = fb.Scene(body, [fb.Fixed("root")], stops=[fb.Stop("tip", LAW, 1e-3, direction="y", name="upper")],
+                     damping=fb.ModalDamping(0.02), base={"y": fb.Harmonic(1e-3, 180.0)})  # fmt: skip
+    model = scene.reduce(modes=2)
+    run = model.simulate(0.4, 2e-4)
+    titles = [axis.get_title() or axis.get_title("left") for axis in plot.mode_shapes(model).axes]
+    assert any(title.startswith("mode 1: 2") for title in titles)
+    assert "tip, y" in plot.time_history(run).get_suptitle()
+    assert plot.densities(run).axes
+    assert plot.spectrum(run).axes
+    assert plot.frequency_response(model.frequency_response(np.linspace(50.0, 900.0, 60))).axes
+    assert plot.floor_spectrum(run).axes
+    orbit = model.orbit()
+    assert "u(tip, y)" in plot.orbit(orbit).axes[0].get_ylabel()
+    found = study.bifurcation(model, "omega", [179.0, 181.0], settle=3, keep=2)
+    assert "u(tip, y)" in plot.bifurcation(found).axes[0].get_ylabel()
+
+
+def test_what_cannot_be_drawn_says_so(tmp_path):
+    run = pair(fb.Harmonic(1e-3, 180.0))[1].reduce(modes=2).simulate(0.1, 1e-3)
+    with pytest.raises(ValueError, match="moving pictures must be of straight beams"):
+        plot.animate(run, tmp_path / "run.gif")
+    with pytest.raises(ValueError, match="files for ParaView must be of straight beams"):
+        run.to_xdmf(tmp_path / "run.xdmf")
