@@ -26,7 +26,7 @@ __version__ = "0.1.0"
 
 _OFFERED = {
     "beams": "Section Taper Beam ModalDamping Rayleigh",
-    "structures": "Scale Structure",
+    "structures": "Frame Joint Member Scale Structure",
     "scene": "Clamped Dashpot Element Fixed Guided LumpedMass Pinned PointForce PointMoment Scene Spring Stop Impactor",
     "excitation": "Harmonic Multisine BandNoise RollOff Record Pulse SineSweep Step",
     "model": "Model Attractor Orbit Branch Run load",
@@ -37,10 +37,11 @@ _HOME = {name: folder for folder, names in _OFFERED.items() for name in names.sp
 _MODULES = ["plot", "study"]
 
 __all__ = [
-    "Attractor", "BandNoise", "Beam", "Branch", "Clamped", "Dashpot", "Element", "Fixed", "Guided", "Harmonic",
-    "Impactor", "LumpedMass", "ModalDamping", "Model", "Multisine", "Orbit", "Pinned", "PointForce", "PointMoment",
-    "Pulse", "Rayleigh", "Record", "RollOff", "Run", "Scale", "Scene", "Section", "SineSweep", "Spring", "Step",
-    "Stop", "Structure", "Taper", "load", "moments", "pdf", "plot", "psd", "response_spectrum", "study",
+    "Attractor", "BandNoise", "Beam", "Branch", "Clamped", "Dashpot", "Element", "Fixed", "Frame", "Guided",
+    "Harmonic", "Impactor", "Joint", "LumpedMass", "Member", "ModalDamping", "Model", "Multisine", "Orbit", "Pinned",
+    "PointForce", "PointMoment", "Pulse", "Rayleigh", "Record", "RollOff", "Run", "Scale", "Scene", "Section",
+    "SineSweep", "Spring", "Step", "Stop", "Structure", "Taper", "load", "moments", "pdf", "plot", "psd",
+    "response_spectrum", "study",
 ]  # fmt: skip
 
 if TYPE_CHECKING:
@@ -65,7 +66,7 @@ if TYPE_CHECKING:
         Stop,
     )
     from fembeam.statistics import moments, pdf, psd
-    from fembeam.structures import Scale, Structure
+    from fembeam.structures import Frame, Joint, Member, Scale, Structure
 
 
 def _check_neighbours() -> None:

@@ -1,7 +1,11 @@
 """Structures in scene files and from matrix files; what the command line, studies and figures make of them."""
 
 import json
+import pickle
+from dataclasses import replace
+from functools import partial
 
+import meshio
 import numpy as np
 import pytest
 from scipy import io, sparse
@@ -11,6 +15,7 @@ import fembeam as fb
 from fembeam import plot, study
 from fembeam.cli import main
 from fembeam.scene_file import json_schema, read
+from fembeam.study.execution.fingerprint import fingerprint
 
 FILE = """
 [structure]
@@ -233,9 +238,59 @@ def test_figures_are_drawn(lines):
     assert "u(tip, y)" in plot.bifurcation(found).axes[0].get_ylabel()
 
 
-def test_what_cannot_be_drawn_says_so(tmp_path):
+def test_lines_are_shown_in_pictures_and_in_paraview(tmp_path):
     run = pair(fb.Harmonic(1e-3, 180.0))[1].reduce(modes=2).simulate(0.1, 1e-3)
-    with pytest.raises(ValueError, match="moving pictures must be of straight beams"):
+    assert plot.animate(run, tmp_path / "run.gif", frames=3).stat().st_size > 1000
+    found = meshio.read(run.to_vtu(tmp_path / "run.vtu"))
+    tip = int(np.argmax(found.points[:, 2]))
+    assert found.point_data["displacement"][tip, 1] == pytest.approx(run.displacement("tip", "y")[-1], rel=1e-12)
+
+
+def test_what_cannot_be_drawn_says_so(tmp_path):
+    body = beam_structure(lines=(), nodes=None)
+    scene = fb.Scene(body, [fb.Fixed("root")], base={"y": fb.Harmonic(1e-3, 180.0)})
+    run = scene.reduce(modes=2).simulate(0.1, 1e-3)
+    with pytest.raises(ValueError, match="the body must know where its nodes are"):
         plot.animate(run, tmp_path / "run.gif")
-    with pytest.raises(ValueError, match="files for ParaView must be of straight beams"):
+    with pytest.raises(ValueError, match="bodies with lines"):
         run.to_xdmf(tmp_path / "run.xdmf")
+
+
+def noisy_scene():
+    """The structure under noise."""
+    return pair(fb.BandNoise(3e-4, (50.0, 400.0), seed=1))[1]
+
+
+def test_a_scene_is_told_by_what_it_was_made_of():
+    """The same before and after its matrices were used, and in another process; another entry of K is another scene."""
+    scene = noisy_scene()
+    before = fingerprint(scene)
+    model = scene.reduce(modes=2)
+    model.simulate(0.05, 1e-3)
+    scene.beam.check()
+    assert fingerprint(scene) == before == fingerprint(noisy_scene())
+    K = scene.beam.K.toarray()
+    K[0, 0] *= 1.0 + 1e-9
+    other = fb.Structure(K, scene.beam.M, labels=scene.beam.labels)
+    assert fingerprint(other) != fingerprint(scene.beam)
+    assert repr(other) != repr(scene.beam)
+    again = pickle.loads(pickle.dumps(model))
+    np.testing.assert_array_equal(again.phi((4, "rx")), model.phi((4, "rx")))
+
+
+def test_statistics_with_standard_errors():
+    response = study.stationary(noisy_scene().reduce(modes=2), duration=8.0, dt=1e-3)
+    assert {"δ std", "stop 0 rate"} <= set(response.numbers())
+    free = replace(noisy_scene(), stops=())
+    assert any(name.startswith("middle, y u") for name in study.stationary(free.reduce(modes=2), 8.0, 1e-3).numbers())
+
+
+def test_an_ensemble_resumes_from_its_checkpoint(tmp_path):
+    quantity = partial(study.characteristics, duration=0.5, dt=1e-3, discard=0.1)
+    model, path = noisy_scene().reduce(modes=2), tmp_path / "ensemble.npz"
+    first = study.ensemble(model, 2, quantity, checkpoint=path)
+    both = study.ensemble(noisy_scene().reduce(modes=2), 3, quantity, checkpoint=path)
+    assert len(first) == 2
+    assert len(both) == 3
+    with pytest.raises(ValueError, match="another"):
+        study.ensemble(pair(fb.BandNoise(3e-4, (50.0, 300.0), seed=1))[1].reduce(modes=2), 3, quantity, checkpoint=path)

@@ -8,8 +8,10 @@ from fembeam.beams.beam import (
     bending_matrices,
     bending_root,
     element_matrices,
+    gauss_points,
     geometric_stiffness,
     hermite_rows,
+    hermite_shapes,
     joining,
 )
 from fembeam.beams.damping import ModalDamping, Rayleigh
@@ -21,8 +23,10 @@ from fembeam.beams.mesh import (
     WAVE_STEP,
     divided,
     on_beam,
+    shares,
     slowness,
     spread,
     wavenumber,
 )
+from fembeam.beams.mesh_files import chosen_names, lines_of, named_nodes, read_mesh, shown
 from fembeam.beams.section import Section, Taper

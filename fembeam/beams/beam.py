@@ -69,6 +69,9 @@ class Beam:
             require_positive(f"length of span {index}", length, "Beam", "give the length in m")
             if not isinstance(section, (Section, Taper)):
                 raise TypeError(f"section of span {index} must be a Section, got {section!r} in Beam; make one first")
+            ends = (section.start, section.end) if isinstance(section, Taper) else (section,)
+            require(all(one.shear is None for one in ends), "a Beam must be without shear deformation", section,
+                    f"span {index} of Beam", "use Frame.straight")  # fmt: skip
         total = sum(length for length, _ in self.spans)
         require(abs(total - self.length) <= 1e-12 * total, f"length must be {total}", self.length, "Beam",
                 "use Beam.of_spans")  # fmt: skip
@@ -247,14 +250,20 @@ def geometric_stiffness(nodes: Vector) -> sparse.csr_matrix:
 
 def _at_gauss_points(nodes: Vector, points: int, derivative: int) -> tuple[Callable[[Vector], Any], Vector]:
     """(coefficient -> rows √(coefficient weight) u^(derivative)) and the points (e points,) they belong to."""
+    x, weight = gauss_points(points)
+    h = np.repeat(np.diff(nodes), points)
+    element = np.repeat(np.arange(len(nodes) - 1), points)
+    x, weight = np.tile(x, len(nodes) - 1), np.tile(weight, len(nodes) - 1)
+    rows = _rows(nodes, element, x, derivative)
+    return (lambda coefficient: sparse.diags(np.sqrt(coefficient * weight * h)) @ rows), nodes[element] + h * x
+
+
+def gauss_points(points: int) -> tuple[Vector, Vector]:
+    """Gauss–Legendre points in [0, 1] and their weights, exact to degree 2 points - 1."""
     x, weight = np.polynomial.legendre.leggauss(points)
     if points == 2:
         x = np.array([-1.0, 1.0]) / np.sqrt(3)  # by hand: the table is off in its last digit
-    h = np.repeat(np.diff(nodes), points)
-    element = np.repeat(np.arange(len(nodes) - 1), points)
-    x, weight = np.tile(0.5 + x / 2, len(nodes) - 1), np.tile(weight / 2, len(nodes) - 1)
-    rows = _rows(nodes, element, x, derivative)
-    return (lambda coefficient: sparse.diags(np.sqrt(coefficient * weight * h)) @ rows), nodes[element] + h * x
+    return 0.5 + x / 2, weight / 2
 
 
 def hermite_rows(nodes: Vector, z: ArrayLike, derivative: int = 0) -> sparse.csr_matrix:
@@ -268,14 +277,14 @@ def hermite_rows(nodes: Vector, z: ArrayLike, derivative: int = 0) -> sparse.csr
 def _rows(nodes: Vector, element: NDArray[np.int64], x: Vector, derivative: int) -> sparse.csr_matrix:
     """The same at x in [0, 1] of given elements."""
     h = nodes[element + 1] - nodes[element]
-    shapes = _shapes(x, derivative) / h**derivative
+    shapes = hermite_shapes(x, derivative) / h**derivative
     shapes[1::2] *= h
     columns = (2 * element + np.arange(4)[:, None]).T
     rows = np.repeat(np.arange(len(x)), 4)
     return sparse.csr_matrix((shapes.T.ravel(), (rows, columns.ravel())), shape=(len(x), 2 * len(nodes)))
 
 
-def _shapes(x: Vector, derivative: int) -> Vector:
+def hermite_shapes(x: Vector, derivative: int) -> Vector:
     """The four cubic Hermite shapes, or their derivatives, at x in [0, 1]: (4, k)."""
     zero = np.zeros_like(x)
     if derivative == 0:

@@ -58,8 +58,12 @@ def divided(borders: Vector, counts: NDArray[np.int64]) -> Vector:
 
 def spread(beam: Beam, borders: Vector, elements: int) -> Vector:
     """Nodes with `elements` elements in all (at least one per interval), short where waves are short."""
-    waves = np.diff(borders) * slowness(beam, borders)
+    return divided(borders, shares(np.diff(borders) * slowness(beam, borders), elements))
+
+
+def shares(waves: Vector, elements: int) -> NDArray[np.int64]:
+    """How many of `elements` elements each interval gets, at least one: the more, the more waves it holds."""
     counts = np.ones(len(waves), dtype=int)
     for _ in range(elements - len(waves)):
         counts[np.argmax(waves / counts)] += 1
-    return divided(borders, counts)
+    return counts

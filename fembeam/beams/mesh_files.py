@@ -10,7 +10,7 @@ import os
 import tempfile
 import warnings
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby, pairwise
 from pathlib import Path
 from typing import Any
@@ -45,8 +45,8 @@ def beam_of(
 ) -> Beam:
     """The beam in a file; `Beam.from_mesh` explains it."""
     where = f"{path}"
-    mesh = _read(path)
-    lines, names = _lines(mesh, data, where)
+    mesh = read_mesh(path)
+    lines, names = lines_of(mesh, data, where)
     z = _along(np.asarray(mesh.points, dtype=float), lines, where)
     chain, order = _chained(z, lines, mesh.points, where)
     chosen = _chosen(sections, [names[i] for i in order], chain, where)
@@ -58,11 +58,11 @@ def beam_of(
         spans.append((float(chain[after] - chain[index]), table[name]))
         index = after
     beam = Beam.of_spans(spans, foundation, axial_force)
-    places = [(name, float(np.clip(z[node] - chain[0], 0.0, beam.length))) for name, node in _named_nodes(mesh)]
+    places = [(name, float(np.clip(z[node] - chain[0], 0.0, beam.length))) for name, node in named_nodes(mesh)]
     return Beam(beam.length, beam.section, beam.spans, foundation, axial_force, tuple(sorted(places)))
 
 
-def _read(path: str | os.PathLike[str]) -> Any:
+def read_mesh(path: str | os.PathLike[str]) -> Any:
     """The file, or a ValueError that says why not."""
     import meshio
 
@@ -74,12 +74,12 @@ def _read(path: str | os.PathLike[str]) -> Any:
         raise ValueError(f"{path} cannot be read as a mesh: {error or 'unknown format'}") from error
 
 
-def _lines(mesh: Any, data: str | None, where: str) -> tuple[NDArray[np.int64], Names]:
+def lines_of(mesh: Any, data: str | None, where: str) -> tuple[NDArray[np.int64], Names]:
     """Ends (e, 2) of all line elements and the names each goes by."""
     others = Counter({block.type: len(block.data) for block in mesh.cells if block.type not in (*LINES, "vertex")})
-    require(not others, "cells must be lines", dict(others), where, "mesh the axis of the beam only")
+    require(not others, "cells must be lines", dict(others), where, "mesh the axes only")
     blocks = [i for i, block in enumerate(mesh.cells) if block.type in LINES and len(block.data)]
-    require(bool(blocks), "the mesh must hold lines", [b.type for b in mesh.cells], where, "mesh the beam's axis")
+    require(bool(blocks), "the mesh must hold lines", [b.type for b in mesh.cells], where, "mesh the axis")
     lines = np.concatenate([np.asarray(mesh.cells[i].data)[:, :2] for i in blocks]).astype(np.int64)
     names = [name for i in blocks for name in _names(mesh, i, data, where)]
     return lines, names
@@ -130,8 +130,8 @@ def _along(points: Vector, lines: NDArray[np.int64], where: str) -> Vector:
     z = (points - first) @ axis
     off = np.linalg.norm(points - first - z[:, None] * axis, axis=1)
     bent = np.unique(lines)[off[np.unique(lines)] > STRAIGHT * length]
-    require(not bent.size, "the lines must lie on one straight axis", _shown(points[bent[:1]]), where,
-            "a node is off it there; this library bends straight beams only")  # fmt: skip
+    require(not bent.size, "the lines must lie on one straight axis", shown(points[bent[:1]]), where,
+            "a node is off it there; bent ones are read by Frame.from_mesh")  # fmt: skip
     return z
 
 
@@ -141,13 +141,13 @@ def _chained(z: Vector, lines: NDArray[np.int64], points: Vector, where: str) ->
     order = np.argsort(ends.mean(axis=1))
     nodes, counts = np.unique(lines, return_counts=True)
     many = nodes[counts > 2]
-    require(not many.size, "lines must not branch: at most two meet in a node", _shown(points[many[:1]]), where,
+    require(not many.size, "lines must not branch: at most two meet in a node", shown(points[many[:1]]), where,
             "remove the branch, or elements that lie on each other")  # fmt: skip
     for before, after in pairwise(order):
         shared = len(set(lines[before]) & set(lines[after])) == 1
         joined = shared and ends[before, 1] <= ends[after, 0] + 1e-12 * np.ptp(z)
         at = points[lines[after][np.argmin(z[lines[after]])]]
-        require(joined, "lines must be connected end to end", _shown([at]), where,
+        require(joined, "lines must be connected end to end", shown([at]), where,
                 "a part begins there that does not share a node with the one before; merge double nodes")  # fmt: skip
     chain = np.append(ends[order, 0], ends[order[-1], 1])
     thin = np.flatnonzero(np.diff(chain) <= 0)
@@ -156,13 +156,18 @@ def _chained(z: Vector, lines: NDArray[np.int64], points: Vector, where: str) ->
     return chain, order
 
 
-def _shown(points: Any) -> tuple[float, ...] | None:
+def shown(points: Any) -> tuple[float, ...] | None:
     """One point for a message."""
     return tuple(float(f"{x:.6g}") for x in points[0]) if len(points) else None
 
 
 def _chosen(sections: Any, names: Names, chain: Vector, where: str) -> list[str]:
     """The one name of every element that has a section."""
+    return chosen_names(sections, names, [f"z = {z:.6g} m" for z in chain], where)
+
+
+def chosen_names(sections: Any, names: Names, places: Sequence[str], where: str) -> list[str]:
+    """The one name of every element that has a section; `places` tell where it begins."""
     if isinstance(sections, (Section, Taper)):
         return [""] * len(names)
     wanted = {str(key) for key in sections}
@@ -171,11 +176,10 @@ def _chosen(sections: Any, names: Names, chain: Vector, where: str) -> list[str]
     listed = ", ".join(sorted(there)) or "none"
     require(not missing, f"sections must name groups of the file (it has {listed})", missing, where, "rename them")
     chosen = []
-    for i, found in enumerate(names):
+    for found, at in zip(names, places, strict=False):
         mine = sorted(found & wanted)
-        place = f"{where} at z = {chain[i]:.6g} m"
         has = ", ".join(sorted(found)) or "no group"
-        require(len(mine) == 1, "every element must have one section", mine or f"none for {has}", place,
+        require(len(mine) == 1, "every element must have one section", mine or f"none for {has}", f"{where} at {at}",
                 f"give a section for one of its groups; the file has {listed}")  # fmt: skip
         chosen.append(mine[0])
     return chosen
@@ -192,7 +196,7 @@ def _warn_of_size(chain: Vector, where: str) -> None:
                       UserWarning, stacklevel=4)  # fmt: skip
 
 
-def _named_nodes(mesh: Any) -> Iterator[tuple[str, int]]:
+def named_nodes(mesh: Any) -> Iterator[tuple[str, int]]:
     """(name, node) of every point set and every group of vertices."""
     for name, nodes in mesh.point_sets.items():
         yield from ((name, int(node)) for node in np.asarray(nodes).ravel())

@@ -112,7 +112,7 @@ class Histories:
         return self._field("slope", z, body)
 
     def moment(self, z: ArrayLike, body: int = 0) -> Vector:
-        """Bending moment EI u_zz, N m: positive where it stretches the lower fibre.
+        """Bending moment EI u_zz, N m: positive where it stretches the lower fibre. Of a frame M of `section_forces`.
 
         Of the kept coordinates: exact for slow point loads with ``residual=True``. What n modes miss of weight and base
         motion is about 0.13/n² of the moment and 0.4/n of the shear at a clamp, of a point force without residual 1/n
@@ -121,30 +121,53 @@ class Histories:
         return self._field("moment", z, body)
 
     def shear(self, z: ArrayLike, body: int = 0) -> Vector:
-        """Shear force dM/dz, N; at a point load that of the side ahead. Accuracy: see `moment`."""
+        """Shear force dM/dz, N; at a point load that of the side ahead; of a frame Q. Accuracy: see `moment`."""
         return self._field("shear", z, body)
 
     def stress(self, z: ArrayLike, body: int = 0) -> Vector:
         """Stress at the lower outer fibre, N/m²: M c/I + N/A. ValueError where a section has no `fibre`."""
         return self._field("stress", z, body)
 
+    def section_forces(self, place: Any, body: int = 0) -> dict[str, Vector]:
+        """All section forces (k,) at a place on a member of a frame, such as ("A-B", 0.4), by name.
+
+        N in N (tension, the given axial force included); Q in N and M in N m of bending along `up` of the member, M
+        positive where it stretches the lower fibre, Q = M'; Q2 and M2 of bending across; T in N m. In the plane N, Q
+        and M. At a point load those of the side ahead. Accuracy: see `moment`.
+        """
+        from fembeam.response import frame_forces_of
+
+        self._beam(body)
+        forces = frame_forces_of(self, body)
+        values = self._at_samples(self.q) @ forces.rows(place).T
+        return {name: values[:, i] + forces.preload(place, name) for i, name in enumerate(forces.names)}
+
     def extremes(self, quantity: str = "displacement", z: ArrayLike | None = None, body: int = 0) -> Extremes:
         """Least and greatest values over the samples, place by place, with their times.
 
         Parameters
         ----------
-        quantity : "displacement", "slope", "moment", "shear" or "stress".
-        z : places (j,) in m; None: all nodes of the mesh. Of other bodies a list of (place, direction).
+        quantity : "displacement", "slope", "moment", "shear" or "stress"; of a frame also those of `section_forces`.
+        z : places (j,) in m; None: all nodes of the mesh. Of other bodies a list of (place, direction) for
+            displacement, of (member, distance) for section forces.
         """
         from fembeam.response import extremes, rows_of
 
         shapes = self._beam(body)
         if isinstance(shapes, PlacedShapes):
-            given: Any = list(shapes.usual.values()) if z is None else z
+            given: Any = z
+            if given is None:
+                given = list(shapes.usual.values()) if quantity == "displacement" else self._sections(body)
             at = [given] if isinstance(given, tuple) else list(given)
             return extremes(self.t, self._at_samples(self.q), *rows_of(self, quantity, at, body))
         places = shapes.nodes if z is None else np.atleast_1d(np.asarray(z, dtype=float))
         return extremes(self.t, self._at_samples(self.q), *rows_of(self, quantity, places, body))
+
+    def _sections(self, body: int) -> list[Any]:
+        """All nodes of the mesh of a frame, as (member, distance)."""
+        from fembeam.response import frame_forces_of
+
+        return frame_forces_of(self, body).mesh.sections()
 
     def _beam(self, body: int) -> Any:
         """A beam's shapes; ValueError unless there is one of that number."""
@@ -157,9 +180,10 @@ class Histories:
         """A field over time: (k,) at one z, (k, j) at z (j,)."""
         from fembeam.response import rows_of
 
-        straight = not isinstance(self._beam(body), PlacedShapes)
-        require(straight, f"{quantity} is of a Beam, which has sections", z, "Run",
-                "ask for displacement(place, direction), rotations included, or for reactions")  # fmt: skip
+        if isinstance(self._beam(body), PlacedShapes):
+            shapes, _, offset = rows_of(self, quantity, z if isinstance(z, list) else [z], body)
+            along = self._at_samples(self.q) @ shapes.T + offset
+            return along if isinstance(z, list) else along[:, 0]
         places = np.asarray(z, dtype=float)
         shapes, _, offset = rows_of(self, quantity, np.atleast_1d(places), body)
         values = self._at_samples(self.q) @ shapes.T + offset

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -91,29 +92,32 @@ def tuples(value: Any) -> Any:
     return tuple(tuples(one) for one in value) if isinstance(value, list) else value
 
 
+def _motion_at(body: BodyMatrices, vectors: Vector, place: Any) -> Vector:
+    """All components (c, n) of any place of a body."""
+    body.beam.check_place(place, "phi")
+    return np.asarray(body.rows_at(place) @ vectors)
+
+
 def placed_shapes(body: BodyMatrices, vectors: Vector, loaded: Sequence[LocalCoordinate]) -> PlacedShapes:
     """The shapes of a body from its part of the basis, (N, n)."""
-
-    def more(place: Any) -> Vector:
-        body.beam.check_place(place, "phi")
-        return np.asarray(body.rows_at(place) @ vectors)
-
     extra = [at.z for at in loaded] + [at.to[1] for at in loaded if at.to is not None and at.to[0] == 0]
-    names = list(dict.fromkeys([*_places(body), *(tuple(z) if isinstance(z, list) else z for z in extra)]))
-    rows = body.assembled.rows
-    values = [np.asarray(rows(place) @ (body.spread @ vectors)) for place in names]
+    joined = list(getattr(body.beam, "edges", ()))
+    drawn = [place for pair in joined for place in pair]
+    names = list(dict.fromkeys([*_places(body), *(tuple(z) if isinstance(z, list) else z for z in extra), *drawn]))
+    number = {name: i for i, name in enumerate(names)}
+    values = np.asarray(body.assembled.rows_of(names) @ (body.spread @ vectors))
     shape = (len(names), len(body.beam.components), vectors.shape[1])
     at = [body.beam.position(place) for place in names]
     positions = np.array([3 * [np.nan] if x is None else x for x in at], dtype=float).reshape(-1, 3)
-    edges = [(names.index(a), names.index(b)) for a, b in getattr(body.beam, "edges", ())]
+    edges = [(number[a], number[b]) for a, b in joined]
     made = PlacedShapes(
         tuple(body.beam.components),
         tuple(names),
-        np.array(values).reshape(shape),
+        values.reshape(shape),
         _usual(body, loaded),
         positions,
         np.array(edges, dtype=int).reshape(-1, 2),
-        more,
+        partial(_motion_at, body, vectors),
     )
     moving = {name: at for name, at in made.usual.items() if np.any(made(at))}
     return replace(made, usual=dict(list((moving or made.usual).items())[:USUAL]))

@@ -2,6 +2,7 @@
 
 Beams lie along x, deflect along y; bodies and impactors at their distance from the scene's beam. `displacement` and
 `velocity` are vectors (use the filter Warp By Vector), `slope`, `moment`, `shear`, `stress` numbers at the nodes.
+Frames and structures lie where they are, on the lines that figures show; a frame by itself has its section forces.
 """
 
 from __future__ import annotations
@@ -16,7 +17,9 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import NDArray
 
+from fembeam.model.placed_shapes import PlacedShapes
 from fembeam.response import rows_of
+from fembeam.structures import FrameForces
 from fembeam.support import require
 from solvers.problem import optional
 
@@ -98,9 +101,11 @@ def _samples(run: Run, stride: int) -> range:
 
 def _geometry(run: Run) -> tuple[Vector, list[tuple[str, Any]]]:
     """Points (p, 3) of all beams, then impactors; lines, of zero length for impactors, as XDMF has one kind of cell."""
-    straight = all(hasattr(shapes, "nodes") for shapes in (run.shapes, *run.others))
-    require(straight, "files for ParaView must be of straight beams", run.shapes, "Run",
-            "write histories of its places with to_csv")  # fmt: skip
+    placed = [isinstance(shapes, PlacedShapes) for shapes in (run.shapes, *run.others)]
+    if all(placed):
+        return _lines(run)
+    require(not any(placed), "files for ParaView must be of beams alone, or of bodies with lines alone", run.others,
+            "Run", "write histories with to_csv")  # fmt: skip
     parts, lines, count = [], [], 0
     for shapes, height in zip((run.shapes, *run.others), run.readout.heights, strict=True):
         size = len(shapes.nodes)
@@ -113,8 +118,49 @@ def _geometry(run: Run) -> tuple[Vector, list[tuple[str, Any]]]:
     return np.concatenate(parts), [("line", np.concatenate(lines))]
 
 
+def _lines(run: Run) -> tuple[Vector, list[tuple[str, Any]]]:
+    """Places and lines of frames and structures."""
+    points, lines, count = [], [], 0
+    for shapes in (run.shapes, *run.others):
+        used = np.unique(shapes.lines)
+        known = len(used) > 0 and bool(np.isfinite(shapes.positions[used]).all())
+        require(known, "files for ParaView must be of beams, or of bodies with lines", shapes, "Run",
+                "give Structure(..., nodes=, lines=), or write histories with to_csv")  # fmt: skip
+        points.append(shapes.positions[used])
+        lines.append(np.searchsorted(used, shapes.lines) + count)
+        count += len(used)
+    return np.concatenate(points), [("line", np.concatenate(lines))]
+
+
+def _moved(run: Run) -> Callable[[int], dict[str, Vector]]:
+    """Displacement and velocity of these places; section forces of a frame by itself."""
+    rows = []
+    for shapes in (run.shapes, *run.others):
+        values = np.zeros((len(shapes.known), 3, shapes.values.shape[2]))
+        for axis, name in enumerate("xyz"):
+            if name in shapes.components:
+                values[:, axis] = shapes.values[:, shapes.components.index(name)]
+        rows.append(values[np.unique(shapes.lines)])
+    moved = np.concatenate(rows)
+    forces = run.readout.section_forces[0] if not run.others else None
+    carried = {}
+    if isinstance(forces, FrameForces):
+        places = [run.shapes.known[i] for i in np.unique(run.shapes.lines)]
+        preload = {name: np.array([forces.preload(place, name) for place in places]) for name in forces.names}
+        per_unit = np.array([forces.rows(place) for place in places])
+        carried = {name: (per_unit[:, i], preload[name]) for i, name in enumerate(forces.names)}
+
+    def at(sample: int) -> dict[str, Vector]:
+        vectors = {"displacement": moved @ run.q[sample], "velocity": moved @ run.q_dot[sample]}
+        return vectors | {name: shapes @ run.q[sample] + constant for name, (shapes, constant) in carried.items()}
+
+    return at
+
+
 def _fields(run: Run) -> Callable[[int], dict[str, Vector]]:
     """The fields at the points as a function of the sample; stress only where every section knows its fibre."""
+    if isinstance(run.shapes, PlacedShapes):
+        return _moved(run)
     known = all(np.isfinite(f.beam.profile(f.nodes).fibre).all() for f in run.readout.section_forces)
     rows = {name: _rows(run, name) for name in ("displacement", *SECTION_FIELDS[: None if known else -1])}
     moved, _ = rows.pop("displacement")

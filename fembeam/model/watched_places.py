@@ -29,7 +29,7 @@ def places(shapes: Shapes | PlacedShapes) -> dict[str, Any]:
 
 def observed(model: Model) -> Any:
     """The default place: the first stop or element of displacement, else the tip."""
-    if isinstance(model.shapes, PlacedShapes):
+    if getattr(model.scene, "named", False):
         return next(iter(model.shapes.usual.values()))
     acting = [part.z for part in model.scene.acting if not part.coordinate.rotation]
     return acting[0] if acting else next(iter(places(model.shapes).values()))

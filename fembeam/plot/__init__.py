@@ -1,7 +1,7 @@
 """Figures: one function per question, each returns a matplotlib Figure; all but moving pictures draw into your `axes`.
 
-`response`, `spectra`, `contact_histograms` and `animation` hold those of one run, `laws` those of contact laws,
-`orbits` those of periodic motion, `basins` maps of starts, `random` those of random motion, `linear` spectra and
+`response`, `bodies`, `spectra`, `contact_histograms` and `animation` hold those of one run, `laws` those of contact
+laws, `orbits` those of periodic motion, `basins` maps of starts, `random` those of random motion, `linear` spectra and
 frequency response, `rig` that of a scene, `mode_count` and `methods` those of studies; `run_signals`, `style` and
 `figure` are what they share. Imports: `statistics`, `model` and what they import. Begin with `response`.
 """
@@ -16,15 +16,15 @@ from fembeam.plot.methods import speed_accuracy, stability_map
 from fembeam.plot.mode_count import mode_count, smallest_model
 from fembeam.plot.orbits import bifurcation, branch, orbit, peak
 from fembeam.plot.random import random_densities, random_spectra
-from fembeam.plot.response import densities, mode_shapes, time_history
+from fembeam.plot.response import deflected, densities, mode_shapes, time_history
 from fembeam.plot.rig import rig
 from fembeam.plot.run_signals import batches, natural, responses, sampling_of, stationary
 from fembeam.plot.spectra import peaks, segment_for, spectra_of, spectrum
 from fembeam.plot.style import one_legend, styled
 
 __all__ = [
-    "animate", "basins", "batches", "bifurcation", "branch", "contacts", "densities", "floor_spectrum", "frame",
-    "frequency_response", "hysteresis", "identification", "loops", "mode_count", "mode_shapes", "natural",
+    "animate", "basins", "batches", "bifurcation", "branch", "contacts", "deflected", "densities", "floor_spectrum",
+    "frame", "frequency_response", "hysteresis", "identification", "loops", "mode_count", "mode_shapes", "natural",
     "one_legend", "orbit", "peak", "peaks", "places", "random_densities", "random_spectra", "response_spectrum",
     "responses", "restitutions", "rig", "sampling_of", "segment_for", "smallest_model", "spectra_of", "spectrum",
     "speed_accuracy", "stability_map", "stationary", "styled", "time_history",

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fembeam.model import PlacedShapes
+from fembeam.plot.bodies import BodyStage
 from fembeam.plot.style import BLUE, GREY, ORANGE, RED, styled
 from fembeam.scene import ON
 from fembeam.support import require
@@ -37,7 +39,8 @@ def animate(
 ) -> Path:
     """Write a run as a moving picture: deflected beams, stops, impactors, an arrow for every contact force.
 
-    The arrow is the largest force in the time nearest to its picture, so that no contact is lost between pictures.
+    The arrow is the largest force in the time nearest to its picture, so that no contact is lost between pictures. Of
+    a frame or structure the deflected lines are shown, magnified as the title says.
 
     Parameters
     ----------
@@ -64,7 +67,7 @@ def animate(
     require(able, "an .mp4 needs the program ffmpeg", "none", "animate", "install it, or write a .gif")
     require(target.parent.is_dir(), "the folder must exist", str(target.parent), "animate", "make it first")
     samples = _samples(run, window, frames)
-    stage = _Stage(run, samples, fps)
+    stage = _stage(run, samples, fps)
     film = FuncAnimation(stage.figure, stage.show, frames=len(samples), init_func=lambda: [], blit=False)
     writer = (PillowWriter if target.suffix == ".gif" else FFMpegWriter)(fps=fps)  # type: ignore[arg-type]
     with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}.") as folder:
@@ -89,9 +92,19 @@ def frame(run: Run, t: float, window: tuple[float, float] | None = None) -> Figu
     'z / mm'
     """
     samples = _samples(run, window, MOST_FRAMES)
-    stage = _Stage(run, samples, None)
+    stage = _stage(run, samples, None)
     stage.show(int(np.argmin(np.abs(run.t[samples] - t))))
     return stage.figure
+
+
+def _stage(run: Run, samples: NDArray[np.int64], fps: float | None) -> _Stage | BodyStage:
+    """What is shown: a beam with its contacts, or the lines of another body."""
+    if not isinstance(run.shapes, PlacedShapes):
+        straight = not any(isinstance(shapes, PlacedShapes) for shapes in run.others)
+        require(straight, "moving pictures of a Beam must be of Beams alone", run.others, "animate",
+                "draw plot.time_history or plot.mode_shapes")  # fmt: skip
+        return _Stage(run, samples, fps)
+    return BodyStage(run, samples, "" if fps is None else _pace(fps * float(np.median(np.diff(run.t[samples])))))
 
 
 def _samples(run: Run, window: tuple[float, float] | None, frames: int) -> NDArray[np.int64]:
@@ -171,9 +184,6 @@ class _Stage:
     figure: Figure
 
     def __init__(self, run: Run, samples: NDArray[np.int64], fps: float | None) -> None:
-        straight = all(hasattr(shapes, "nodes") for shapes in (run.shapes, *run.others))
-        require(straight, "moving pictures must be of straight beams", run.shapes, "animate",
-                "draw plot.time_history or plot.mode_shapes")  # fmt: skip
         self.run, self.samples, self.contact_rows = run, samples, _contacts(run)
         self.beams, self.impactor_places = run.readout.heights, run.readout.impactor_places
         self.forces = [

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fembeam.plot.bodies import SHOWN, mode_figure
 from fembeam.plot.figure import heading, sheet
 from fembeam.plot.style import BLUE, GREY, Vector
 from fembeam.structures import COMPONENTS
@@ -17,18 +18,19 @@ if TYPE_CHECKING:
     from fembeam.model import Model
 
 MOST = 6  # modes
-DEFLECTED = 0.12  # of the size of the structure: the largest displacement as it is drawn
 FLAT = 1e-9  # of its size: extent along an axis below which a body lies in a plane
 
 
 def body_mode_shapes(model: Model, axes: Axes | None) -> Figure:
     """The first modes, at most six, of a scene whose body is no `Beam`; into one axis the lowest that moves."""
     shapes = model.shapes
+    drawable = len(shapes.lines) and np.isfinite(shapes.positions[shapes.lines.ravel()]).all()
+    if axes is None and drawable:
+        return mode_figure(model)
     moving = np.flatnonzero(np.abs(shapes.values).max(axis=(0, 1)) > 0)[: 1 if axes is not None else MOST]
     columns = min(len(moving), 3)
     rows = -(-len(moving) // max(columns, 1))
     figure, drawn = sheet(max(rows, 1), max(columns, 1), (7.0, 0.6 + 2.4 * rows), axes)
-    drawable = len(shapes.lines) and np.isfinite(shapes.positions[shapes.lines.ravel()]).all()
     view = _view(shapes.positions[np.unique(shapes.lines)]) if drawable else np.zeros((0, 3))
     for axis, mode in zip(drawn, moving, strict=False):
         if drawable:
@@ -63,7 +65,7 @@ def _deflected(axis: Axes, shapes: Any, mode: int, view: Vector) -> None:
     used = np.unique(shapes.lines)
     size = float(np.linalg.norm(np.ptp(at[used], axis=0)))
     largest = float(np.linalg.norm(moved[used], axis=1).max()) or 1.0
-    bent = at + DEFLECTED * size / largest * moved
+    bent = at + SHOWN * size / largest * moved
     looks: Any = ((at, {"color": GREY, "linewidth": 0.7}), (bent, {"color": BLUE, "linewidth": 1.6}))
     for points, look in looks:
         flat = points @ view.T

@@ -28,7 +28,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fembeam.model import places
+from fembeam.model import PlacedShapes, places
+from fembeam.plot.bodies import deflected_figure
 from fembeam.plot.body_shapes import body_mode_shapes
 from fembeam.plot.figure import heading, sheet
 from fembeam.plot.random import density_panels
@@ -36,6 +37,7 @@ from fembeam.plot.run_signals import estimated, first_stop, natural, place_of, s
 from fembeam.plot.spectra import segment_for
 from fembeam.plot.style import BLUE, GREY, ORANGE, Vector, place_name, styled
 from fembeam.scene import persistent_drive, unit_of
+from fembeam.support import require
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -112,7 +114,8 @@ def densities(run: Run, discard: float = 0.0, axes: Axes | Sequence[Axes] | None
 def mode_shapes(model: Model, axes: Axes | None = None) -> Figure:
     """The first modes (at most six), scaled to 1, with supports, stops and masses at their places.
 
-    `axes` to draw into; None makes a figure.
+    `axes` to draw into; None makes a figure. Of a frame or structure with lines each mode has a panel of its own, drawn
+    over the body at rest.
     """
     if model.scene.named:
         return body_mode_shapes(model, axes)
@@ -134,6 +137,30 @@ def mode_shapes(model: Model, axes: Axes | None = None) -> Figure:
     axis.legend(loc="upper center", ncols=LEGEND_COLUMNS, fontsize=8)
     heading([axis], "Mode shapes of the linear beam", axes is None)
     return figure
+
+
+@styled
+def deflected(run: Run, t: float | None = None, scale: float | None = None, axes: Axes | None = None) -> Figure:
+    """A frame or structure as it is deflected at one time, over itself at rest.
+
+    Parameters
+    ----------
+    run : of a body whose nodes are known. t : s; None: when it is displaced most.
+    scale : what displacements are multiplied by; None: so that they show, the title says how much.
+    axes : to draw into, of three dimensions for a body in space; None makes a figure.
+
+    Examples
+    --------
+    >>> import fembeam as fb
+    >>> frame = fb.Frame.polyline({"A": (0, 0), "B": (0, 1), "C": (1, 1)}, fb.Section.circle(2.1e11, 7800.0, 0.02))
+    >>> scene = fb.Scene(frame, [fb.Clamped("A")], base={"x": fb.Harmonic(1e-3, 20.0)})
+    >>> figure = deflected(scene.reduce(modes=2).simulate(duration=0.5, dt=1e-2), t=0.4)
+    >>> len(figure.axes[0].lines)
+    2
+    """
+    named = isinstance(run.shapes, PlacedShapes)
+    require(named, "the body must be a frame or a structure", "a Beam", "deflected", "use time_history or animate")
+    return deflected_figure(run, t, scale, axes)
 
 
 def _window(run: Run) -> tuple[float, float]:

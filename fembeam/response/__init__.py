@@ -11,7 +11,7 @@ from fembeam.response.contact_force import forces, latched_before
 from fembeam.response.mean_force import mean_force
 from fembeam.response.readout import Readout, coordinates, frame_motion
 from fembeam.response.saved_readout import READOUT_FINITE, READOUT_UNITS, expected_readout, packed, unpacked
-from fembeam.response.section_forces import Extremes, SectionForces, extremes, rows_of, section_forces
+from fembeam.response.section_forces import Extremes, SectionForces, extremes, frame_forces_of, rows_of, section_forces
 from fembeam.response.spectra import ResponseSpectrum, floor_spectrum, response_spectrum
 from fembeam.response.support_reactions import BodyReaction, Reaction, Reactions, reactions
 from fembeam.response.transfer import FrequencyResponse, frequency_response

@@ -36,14 +36,13 @@ def packed(read: Readout) -> tuple[dict[str, Any], Arrays]:
     about = {
         "base": read.base,
         "moved": read.moved,
-        "beams": [None if one is None else _beam_as_words(one.beam) for one in read.section_forces],
+        "beams": [_beam_as_words(one.beam) if isinstance(one, SectionForces) else None for one in read.section_forces],
         "parts": [{"kind": type(part).__name__, "body": body, **_numbers(part)} for part, body in parts],
     }
     arrays = {name: getattr(read, name) for name in PLAIN} | {"reactions": rows}
     for i, one in enumerate(read.section_forces):
-        if one is None:
-            continue
-        arrays |= {f"moments_{i}": one.moments, f"shears_{i}": one.shears}
+        if isinstance(one, SectionForces):
+            arrays |= {f"moments_{i}": one.moments, f"shears_{i}": one.shears}
     return about, arrays
 
 

@@ -25,7 +25,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from fembeam.beams import Beam, element_matrices, joining, on_beam
-from fembeam.scene import loaded
+from fembeam.scene import BodyMatrices, loaded
+from fembeam.structures import FrameForces, FrameMatrices
 from fembeam.support import require
 
 if TYPE_CHECKING:
@@ -82,16 +83,18 @@ class SectionForces:
         return element, ((z - self.nodes[element]) / h)[:, None], h[:, None]
 
 
-def section_forces(model: ModalEquations, body: int = 0) -> SectionForces | None:
+def section_forces(model: ModalEquations, body: int = 0) -> SectionForces | FrameForces | None:
     """The section forces of every coordinate of a model on one of its beams; None of bodies without sections."""
     beam = model.matrices.beams[body]
-    if beam.named:
+    if isinstance(beam, BodyMatrices) and not isinstance(beam.assembled, FrameMatrices):
         return None
     first = sum(before.M.shape[0] for before in model.matrices.beams[:body])
     mine = slice(first, first + beam.M.shape[0])
     vectors = model.basis.vectors[mine]
     rows = sparse.vstack([sparse.csr_matrix((0, beam.M.shape[0])), *(at.row(beam) for at in loaded(model.scene, body))])
     inertia = _inertia(beam, vectors, model.omega, rows.toarray().T)
+    if isinstance(beam, BodyMatrices) and isinstance(beam.assembled, FrameMatrices):
+        return beam.assembled.section_forces(beam.spread @ vectors, beam.spread @ inertia)
     return _of_vectors(beam, vectors, inertia)
 
 
@@ -181,8 +184,8 @@ def extremes(t: Vector, q: Vector, shapes: Vector, z: Any, offset: Vector) -> Ex
 def rows_of(run: Histories, quantity: str, z: Any, body: int) -> tuple[Vector, Any, Vector]:
     """What turns q into a field: shapes (j, n), the places themselves, a constant part (j,)."""
     if isinstance(z, list):  # of a body with places by name
-        require(quantity == "displacement", f"{quantity} is of a Beam, which has sections", z[:1], "Run",
-                "ask for displacement, rotations included")  # fmt: skip
+        if quantity != "displacement":
+            return _rows_of_frame(run, quantity, z, body)
         return (run.shapes, *run.others)[body](z), z, np.zeros(len(z))
     known = ("displacement", "slope", "moment", "shear", "stress")
     require(quantity in known, f"quantity must be one of {', '.join(known)}", quantity, "Run", "choose one")
@@ -196,3 +199,24 @@ def rows_of(run: Histories, quantity: str, z: Any, body: int) -> tuple[Vector, A
     require(not bare.any(), "every section must know its outer fibre", z[bare][:1].tolist(), "Run.stress",
             "give Section(..., fibre=)")  # fmt: skip
     return rows, z, forces.beam.axial_force / forces.beam.profile(z).A
+
+
+def _rows_of_frame(run: Histories, quantity: str, places: list[Any], body: int) -> tuple[Vector, Any, Vector]:
+    """The same of section forces and stress along the members of a frame."""
+    forces = frame_forces_of(run, body, quantity)
+    known = (*forces.names, "stress")
+    quantity = {"moment": "M", "shear": "Q"}.get(quantity, quantity)
+    require(quantity in known, f"quantity must be displacement or one of {', '.join(known)}", quantity, "Run",
+            "choose one")  # fmt: skip
+    rows = [forces.stress(z) if quantity == "stress" else forces.rows(z, (quantity,))[0] for z in places]
+    return np.array(rows), places, np.array([forces.preload(z, quantity) for z in places])
+
+
+def frame_forces_of(run: Histories, body: int, quantity: str = "a section force") -> FrameForces:
+    """The section forces of a frame; ValueError for bodies without sections, and runs that do not keep them."""
+    forces = run.readout.section_forces[body]
+    if isinstance(forces, FrameForces):
+        return forces
+    raise ValueError(f"{quantity} is of a Beam, which has sections, or of a Frame whose run was not read from a file, "
+                     f"got body {body} in Run; ask for displacement(place, direction), rotations included, or for "
+                     "reactions")  # fmt: skip

@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from fembeam.scene.assembly import Matrices, Vector
+import reduction
+from fembeam.scene.assembly import DEFAULT_MODES, Matrices, Vector
 from fembeam.scene.places import told
-from fembeam.structures import COMPONENTS, Assembled, Six, following
+from fembeam.structures import COMPONENTS, Assembled, Frame, Six, following
 from fembeam.support import require
 
 if TYPE_CHECKING:
@@ -87,11 +88,36 @@ def body_matrices(scene: Scene, elements: int | None, modes: int | None, probes:
     """The matrices of the scene's own body; of one without a mesh of its own `modes` does not matter."""
     for index, place in enumerate(probes):
         scene.beam.check_place(place, f"probes[{index}] of Scene.matrices")
-    count = elements if getattr(scene.beam, "meshed", True) else None
-    assembled = scene.beam.assembled(count, modes, (*scene.places, *probes))
+    if isinstance(scene.beam, Frame):
+        scene.beam.check_held(_holding(scene), "Scene")
+    assembled = _made(scene, elements, modes, (*scene.places, *probes))
     held = _held(scene, assembled)
     require(len(held) < assembled.M.shape[0], "supports must leave dofs free", len(held), "Scene", "remove one")
     return _of(scene, assembled, modes, held, condense=True)
+
+
+def _made(scene: Scene, elements: int | None, modes: int | None, places: tuple[Any, ...]) -> Assembled:
+    """The body's matrices, of a frame on a mesh for the frequencies that it has with all that is on it."""
+    if elements is not None or not isinstance(scene.beam, Frame):
+        return scene.beam.assembled(elements if getattr(scene.beam, "meshed", True) else None, modes, places)
+    count = DEFAULT_MODES if modes is None else int(modes)
+    coarse = scene.beam.coarse(count, places)
+    own = _of(scene, coarse, count, _held(scene, coarse), condense=True)
+    basis = reduction.modal_basis(own.M, own.K, min(count, own.M.shape[0]), root=own.root)
+    return scene.beam.assembled(None, count, places, float(basis.omega[-1]))
+
+
+def _holding(scene: Scene) -> dict[Any, list[str]]:
+    """{place: components} that supports, springs or inertia hold."""
+    found: dict[Any, list[str]] = {}
+    for part in scene.supports:
+        found.setdefault(part.z, []).extend(dof for dof in part.dofs if dof in scene.beam.components)
+    for spring in scene.springs:
+        found.setdefault(spring.z, []).extend(c for c, n in zip(COMPONENTS, spring.along or (), strict=False) if n)
+    for mass in scene.masses:
+        turning = [c for c in COMPONENTS[3:] if c in scene.beam.components and np.any(mass.inertia)]
+        found.setdefault(mass.z, []).extend([*COMPONENTS[:3], *turning])
+    return found
 
 
 def _of(scene: Scene, assembled: Assembled, modes: int | None, held: Any, condense: bool) -> BodyMatrices:

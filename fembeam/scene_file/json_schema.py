@@ -14,6 +14,7 @@ from fembeam.beams import ModalDamping, Rayleigh
 from fembeam.scene import FEATURES, Scene
 from fembeam.scene_file.keys import entries_of, options, parameters, required
 from fembeam.scene_file.kinds import MAKERS, SECTION, SIGNAL, Nested, nested
+from fembeam.scene_file.structures import FILES, KEYS
 from fembeam.scene_file.study_tables import STUDIES
 from fembeam.scene_file.tables import beam_of_section, snake
 
@@ -22,7 +23,7 @@ SIMPLE = {float: "number", int: "integer", bool: "boolean", str: "string", Path:
 
 
 def json_schema() -> Schema:
-    """The schema of a scene file, a JSON object (draft 2020-12).
+    """The schema of a scene file of a beam, a JSON object (draft 2020-12).
 
     Examples
     --------
@@ -35,6 +36,7 @@ def json_schema() -> Schema:
         tables[name] = {"type": "array", "items": kinds.feature(features)}
     tables["damping"] = {"anyOf": [kinds.table(ModalDamping), kinds.table(Rayleigh)]}
     tables["base"] = kinds.reference(SIGNAL)
+    tables["structure"] = _object({key: {} for key in KEYS}, list(FILES[:2]))
     tables["reduce"] = kinds.table(Scene.reduce)
     tables |= {name: kinds.table(study) for name, study in STUDIES.items()}
     return {

@@ -12,11 +12,13 @@ from typing import Any, NoReturn
 
 from fembeam.beams import Beam, ModalDamping, Rayleigh, Section, Taper
 from fembeam.scene import FEATURES, Scene, Source
+from fembeam.scene_file.frames import frame
 from fembeam.scene_file.keys import Constructors, converted, fits, listed, nearest, parameters, required, shown, wanted
 from fembeam.scene_file.kinds import MAKERS, SECTION, SIGNAL, Nested, nested
 from fembeam.scene_file.structures import PLACES, is_place, place, structure
 
 Table = Mapping[str, Any]
+BODIES: dict[str, Callable[..., Any]] = {"structure": structure, "frame": frame}  # tables beside [beam]
 
 
 class SceneFileError(ValueError):
@@ -46,16 +48,18 @@ class TableReader:
     def contents(self, tables: Table, known: Constructors) -> tuple[Scene, dict[str, Any], dict[str, Any]]:
         """The scene, the arguments of `Scene.reduce`, and the study tables among those known."""
         parts = [name for name in inspect.signature(Scene).parameters if name != "bodies"]  # one beam per file
-        self.check_keys(tables, [*parts, "structure", "reduce", *known], "the file", "table")
-        if "beam" not in tables and "structure" not in tables:
+        self.check_keys(tables, [*parts, *BODIES, "reduce", *known], "the file", "table")
+        bodies = [name for name in ("beam", *BODIES) if name in tables]
+        if not bodies:
             self.fail("the file", "needs a table [beam]")
-        if "beam" in tables and "structure" in tables:
-            self.fail("the file", "needs one of the tables [beam] and [structure], not both")
+        if len(bodies) > 1:
+            self.fail("the file", f"needs one of the tables [{'] and ['.join(bodies)}], not both")
         for name in tables:
             self.check_form(name, tables[name])
         built = {name: self.part(name, tables[name]) for name in parts if name in tables}
-        if "structure" in tables:
-            built["beam"] = structure(self, tables["structure"])
+        for name, maker in BODIES.items():
+            if name in tables:
+                built["beam"] = maker(self, tables[name])
         try:
             scene = Scene(**built)
         except (ValueError, TypeError, ArithmeticError) as error:
@@ -72,7 +76,7 @@ class TableReader:
     @cached_property
     def named(self) -> bool:
         """Whether the file is of a body whose places have names."""
-        return "structure" in self.source.tables()
+        return any(name in self.source.tables() for name in BODIES)
 
     def check_form(self, name: str, value: Any) -> None:
         """Features come as [[name]], gravity as a number, everything else as [name]."""

@@ -5,7 +5,7 @@ M ü + (C + G) u̇ + K u = f,    u(place) = R u,    a base motion y(t) along x l
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -48,6 +48,10 @@ class Assembled:
     C: sparse.csr_matrix | None = None
     gyroscopic: sparse.csr_matrix | None = None
     accuracy: str = ""
+
+    def rows_of(self, places: Sequence[Any]) -> sparse.csr_matrix:
+        """`rows` of several places, one below the other."""
+        return sparse.vstack([self.rows(place) for place in places], format="csr")
 
     def __repr__(self) -> str:
         return f"<{len(self.labels)} dofs: {self.accuracy}>"

@@ -50,6 +50,7 @@ def symmetric(name: str, given: sparse.csr_matrix, labels: Sequence[Label], wher
                          f" between {pair} in {where}; was one triangle exported?")  # fmt: skip
     result = ((given + given.T) / 2).tocsr()
     result.eliminate_zeros()
+    result.sum_duplicates()
     return result
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Sequence
+from dataclasses import fields
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -30,6 +31,14 @@ class NamedBody:
     points: dict[str, Hashable]  # the node of each
     edges: tuple[tuple[Hashable, Hashable], ...]  # lines of figures
     meshed = False  # its matrices are what they are: no elements to choose
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields alone, for copies and digests: what was made from them when first asked for is made again."""
+        return {one.name: getattr(self, one.name) for one in fields(self)}  # type: ignore[arg-type]
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        for name, value in state.items():
+            object.__setattr__(self, name, value)
 
     @cached_property
     def components(self) -> tuple[str, ...]:

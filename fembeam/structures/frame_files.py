@@ -1,0 +1,120 @@
+"""Frames from mesh files: groups of lines become members, through meshio.
+
+Of a file only corners, branches, named nodes and changes of section are taken; elements are made anew, as few as the
+modes need.
+"""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fembeam.beams import Section, chosen_names, lines_of, named_nodes, read_mesh, shown
+from fembeam.structures.frame import Frame
+from fembeam.structures.members import Member
+from fembeam.support import require
+
+Vector = NDArray[np.float64]
+STRAIGHT = 1e-6  # sine of the angle below which two lines are one
+
+
+def frame_of(
+    path: str | os.PathLike[str],
+    sections: Section | Mapping[Any, Section],
+    data: str | None,
+    up: Any,
+    plane: bool | None,
+    options: dict[str, Any],
+) -> Frame:
+    """The frame in a file; `Frame.from_mesh` explains it."""
+    where = f"{path}"
+    mesh = read_mesh(path)
+    lines, groups = lines_of(mesh, data, where)
+    points = np.zeros((len(mesh.points), 3))
+    points[:, : np.shape(mesh.points)[1]] = mesh.points
+    middles = [f"{shown(points[line].mean(axis=0, keepdims=True))} m" for line in lines]
+    chosen = chosen_names(sections, groups, middles, where)
+    table = {"": sections} if isinstance(sections, Section) else {str(key): one for key, one in sections.items()}
+    named = _names(mesh)
+    chains = list(_chains(points, lines, chosen, set(named), where))
+    names = {node: named.get(node, f"n{node}") for chain, _ in chains for node in (chain[0], chain[-1])}
+    flat = not np.any(points[np.unique(lines), 2]) and not options.get("bending_only") if plane is None else plane
+    members = [
+        Member(names[chain[0]], names[chain[-1]], table[group], _up_of(up, group), name)
+        for (chain, group), name in zip(chains, _member_names(chains), strict=True)
+    ]
+    nodes = {name: tuple(float(x) for x in points[node, : 2 if flat else 3]) for node, name in names.items()}
+    return Frame(nodes, members, **options)
+
+
+def _up_of(up: Any, group: str) -> Any:
+    """The direction of one group."""
+    return up.get(group) if isinstance(up, Mapping) else up
+
+
+def _names(mesh: Any) -> dict[int, str]:
+    """Names of nodes; those of a set of several are numbered."""
+    found = list(named_nodes(mesh))
+    sizes, seen = Counter(name for name, _ in found), Counter[str]()
+    names: dict[int, str] = {}
+    for name, node in found:
+        seen[name] += 1
+        names.setdefault(node, name if sizes[name] == 1 else f"{name} {seen[name]}")
+    return names
+
+
+def _member_names(chains: list[tuple[list[int], str]]) -> list[str]:
+    """The group, and a number where it has several members; "" for the names of the nodes where there is no group."""
+    sizes, seen = Counter(group for _, group in chains), Counter[str]()
+    names = []
+    for _, group in chains:
+        seen[group] += 1
+        names.append(group if sizes[group] == 1 or not group else f"{group} {seen[group]}")
+    return names
+
+
+def _chains(
+    points: Vector, lines: NDArray[np.int64], groups: list[str], named: set[int], where: str
+) -> Iterator[tuple[list[int], str]]:
+    """Straight chains of lines of one group, from corner to corner, in the order of the file."""
+    meeting: dict[int, list[int]] = {}
+    for i, line in enumerate(lines):
+        for node in line.tolist():
+            meeting.setdefault(node, []).append(i)
+    spans = points[lines[:, 1]] - points[lines[:, 0]]
+    lengths = np.linalg.norm(spans, axis=1)
+    thin = np.flatnonzero(lengths == 0)
+    at = shown(points[lines[thin, 0]])
+    require(not thin.size, "lines must have a length", at, where, "remove the line there")
+    along = spans / lengths[:, None]
+
+    def passes(node: int) -> bool:
+        first, *rest = meeting[node]
+        alike = len(rest) == 1 and node not in named and groups[first] == groups[rest[0]]
+        return alike and bool(np.linalg.norm(np.cross(along[first], along[rest[0]])) < STRAIGHT)
+
+    used = np.zeros(len(lines), dtype=bool)
+    for i, line in enumerate(lines):
+        if not used[i]:
+            back = _walk(lines, meeting, used, i, int(line[0]), passes)
+            ahead = _walk(lines, meeting, used, i, int(line[1]), passes)
+            yield [*reversed(back), *ahead], groups[i]
+
+
+def _walk(lines: Any, meeting: dict[int, list[int]], used: Any, line: int, node: int, passes: Any) -> list[int]:
+    """Nodes from one end of a line on to the next corner."""
+    used[line] = True
+    nodes = [node]
+    while passes(node):
+        line = next(other for other in meeting[node] if other != line)
+        if used[line]:
+            break
+        used[line] = True
+        node = int(sum(lines[line]) - node)
+        nodes.append(node)
+    return nodes

@@ -1,0 +1,250 @@
+"""Bodies joined at places: equal displacements and rotations, B q = 0, which leave q = T q̂.
+
+    M̂ = Tᵀ M T,    K̂ = Tᵀ K T
+
+with M and K of all bodies as blocks. Of every condition one unknown is eliminated, the one with the largest factor; so
+equal dofs of two nodes become one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg, sparse
+
+import reduction
+from fembeam.structures.assembled import COMPONENTS, Assembled
+from fembeam.support import is_whole, require
+
+Vector = NDArray[np.float64]
+
+DEPENDENT = 1e-9  # relative: a condition that others imply
+
+
+class Body(Protocol):
+    """What has places that move along components."""
+
+    components: Any
+
+    def check_place(self, place: Any, where: str) -> None:
+        """Raise ValueError unless the place exists."""
+
+    def components_at(self, place: Any) -> tuple[str, ...]:
+        """How a place moves."""
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A place of the first body joined to a place of another one.
+
+    Parameters
+    ----------
+    place : on the first body, number 0.
+    to : (number of the other body, from 1, its place).
+    dofs : components made equal, such as "xyz" for a ball hinge or ("x", "y", "rz"); None: all that both places have.
+    body : number of the body that `place` is on.
+
+    Raises
+    ------
+    ValueError : no numbers of bodies, components that do not exist.
+
+    Examples
+    --------
+    >>> Joint("D", to=(1, "flange"), dofs="xyz").dofs
+    ('x', 'y', 'z')
+    """
+
+    place: Any
+    to: tuple[int, Any]
+    dofs: str | Sequence[str] | None = None
+    body: int = 0
+
+    def __post_init__(self) -> None:
+        paired = isinstance(self.to, (tuple, list)) and len(self.to) == 2 and is_whole(self.to[0])
+        require(paired, "to must be (number of a body, its place)", self.to, "Joint", "write to=(1, 'flange')")
+        for number in (self.body, self.to[0]):
+            require(is_whole(number) and number >= 0, "bodies must be counted from 0, the first", number, "Joint",
+                    "write to=(1, 'flange')")  # fmt: skip
+        require(self.body != self.to[0], "a joint must join two bodies", self.to, "Joint", "name another body")
+        object.__setattr__(self, "to", tuple(self.to))
+        if self.dofs is not None:
+            listed = tuple(self.dofs)
+            right = bool(listed) and len(set(listed)) == len(listed) and set(listed) <= set(COMPONENTS)
+            require(right, f"dofs must be some of {', '.join(COMPONENTS)}, each once", self.dofs, "Joint",
+                    "write 'xyz' for a ball hinge, or ('x', 'y', 'rz')")  # fmt: skip
+            object.__setattr__(self, "dofs", listed)
+
+
+def joined(bodies: Sequence[Body], made: Sequence[Assembled], joints: Sequence[Joint]) -> Assembled:
+    """One body of several, on the unknowns that joints leave.
+
+    Parameters
+    ----------
+    bodies, made : the bodies and their matrices, in the order that joints count.
+    joints : list of `Joint`.
+
+    Returns
+    -------
+    Assembled : labels are ((number of the body, name), component); a place is (number of the body, its place).
+
+    Raises
+    ------
+    ValueError : a body, place or component that does not exist, two joints that fix one motion twice.
+    """
+    T, free = joining(bodies, made, joints)
+    labels = [((number, name), component) for number, one in enumerate(made) for name, component in one.labels]
+    roots = [one.root for one in made if one.root is not None]
+    root = sparse.block_diag(roots, format="csr") @ T if len(roots) == len(made) else None
+    first = np.cumsum([0, *(one.M.shape[0] for one in made)])
+    return Assembled(
+        (T.T @ sparse.block_diag([one.M for one in made], format="csr") @ T).tocsr(),
+        (T.T @ sparse.block_diag([one.K for one in made], format="csr") @ T).tocsr(),
+        tuple(labels[i] for i in free),
+        partial(_rows, tuple(made), tuple(first), T),
+        _translations(bodies, made)[free],
+        root=None if root is None else root.tocsr(),
+        C=_optional(made, "C", T),
+        gyroscopic=_optional(made, "gyroscopic", T),
+        accuracy="; ".join(one.accuracy for one in made if one.accuracy),
+    )
+
+
+def superelement(made: Assembled, places: Sequence[Any], modes: int, held: Sequence[Any] = ()) -> Assembled:
+    """A body in few unknowns, by Craig and Bampton: static shapes of the places and modes with these held.
+
+    Parameters
+    ----------
+    made : matrices of the body. places : where joints, stops and supports will be. held : places clamped for good.
+    modes : how many with all of `places` held; 0 is Guyan's condensation.
+
+    Returns
+    -------
+    Assembled : M = 1, K = diag(ω²) on its own modes; rows of any place.
+
+    References
+    ----------
+    R.R. Craig, M.C.C. Bampton, AIAA J. 6 (1968) 1313.
+    """
+    clamped = sparse.vstack([sparse.csr_matrix((0, len(made.labels))), *(made.rows(place) for place in held)])
+    free = np.flatnonzero(np.diff(clamped.tocsc().indptr) == 0)
+    M, K = (A[free][:, free] for A in (made.M, made.K))
+    loads = sparse.vstack([made.rows(place)[:, free] for place in places], format="csr")
+    loads = loads[np.diff(loads.indptr) > 0]
+    basis = reduction.craig_bampton(M, K, loads.T, modes, None if made.root is None else made.root[:, free])
+    vectors = np.zeros((len(made.labels), basis.count))
+    vectors[free] = basis.vectors
+    C, gyroscopic = (
+        None if A is None else sparse.csr_matrix(vectors.T @ (A @ vectors)) for A in (made.C, made.gyroscopic)
+    )
+    return Assembled(
+        sparse.eye(basis.count, format="csr"),
+        sparse.diags(basis.omega**2).tocsr(),
+        tuple((i, "mode") for i in range(basis.count)),
+        partial(_projected_rows, made.rows, vectors),
+        vectors.T @ (made.M @ made.translations),
+        root=sparse.diags(basis.omega).tocsr(),
+        C=C,
+        gyroscopic=gyroscopic,
+        accuracy=f"{basis.count} unknowns, {modes} of them modes with the places held, of {made.accuracy}",
+    )
+
+
+def _projected_rows(rows: Callable[[Any], sparse.csr_matrix], vectors: Vector, place: Any) -> sparse.csr_matrix:
+    """Rows of a place on reduced unknowns."""
+    return sparse.csr_matrix(rows(place) @ vectors)
+
+
+def joining(
+    bodies: Sequence[Body], made: Sequence[Assembled], joints: Sequence[Joint]
+) -> tuple[sparse.csr_matrix, NDArray[np.int64]]:
+    """T (N, N̂) with q = T q̂, and which unknowns of all bodies, in their order, the q̂ are."""
+    first = np.cumsum([0, *(one.M.shape[0] for one in made)])
+    size = int(first[-1])
+    B, names = sparse.csr_matrix((0, size)), []
+    for index, joint in enumerate(joints):
+        where = f"joints[{index}]"
+        B = sparse.vstack([B, _conditions(bodies, made, first, joint, where)], format="csr")
+        names += [f"{component!r} of {where}" for component in _shared(bodies, joint, where)]
+    if not names:
+        return sparse.eye(size, format="csr"), np.arange(size)
+    columns = np.flatnonzero(np.diff(B.tocsc().indptr))
+    dense = B[:, columns].toarray()
+    _independent(dense, names)
+    _, _, order = linalg.qr(dense, mode="economic", pivoting=True)
+    gone, stay = order[: len(names)], np.sort(order[len(names) :])
+    follow = -np.linalg.solve(dense[:, gone], dense[:, stay])
+    follow[np.abs(follow) < DEPENDENT] = 0.0
+    free = np.setdiff1d(np.arange(size), columns[gone])
+    T = sparse.lil_matrix((size, len(free)))
+    T[free, np.arange(len(free))] = 1.0
+    T[np.ix_(columns[gone], np.searchsorted(free, columns[stay]))] = follow
+    return T.tocsr(), free
+
+
+def _conditions(
+    bodies: Sequence[Body], made: Sequence[Assembled], first: Any, joint: Joint, where: str
+) -> sparse.csr_matrix:
+    """Rows of one joint on the unknowns of all bodies: motion here less motion there."""
+    shared = _shared(bodies, joint, where)
+    parts = []
+    for sign, (number, place) in ((1.0, (joint.body, joint.place)), (-1.0, joint.to)):
+        known = list(bodies[number].components)
+        rows = made[number].rows(place)[[known.index(name) for name in shared]]
+        before, after = int(first[number]), int(first[-1] - first[number + 1])
+        blank = [sparse.csr_matrix((len(shared), count)) for count in (before, after)]
+        parts.append(sign * sparse.hstack([blank[0], rows, blank[1]], format="csr"))
+    return parts[0] + parts[1]
+
+
+def _shared(bodies: Sequence[Body], joint: Joint, where: str) -> list[str]:
+    """The components a joint makes equal; ValueError for bodies, places, components that do not exist."""
+    there = []
+    for number, place in ((joint.body, joint.place), joint.to):
+        require(number < len(bodies), f"a joint must name bodies below {len(bodies)}", number, where, "add the body")
+        bodies[number].check_place(place, where)
+        there.append(bodies[number].components_at(place))
+    common = [name for name in COMPONENTS if all(name in known for known in there)]
+    wanted = common if joint.dofs is None else list(joint.dofs)
+    missing = [name for name in wanted if name not in common]
+    require(not missing and bool(wanted), f"both places of a joint must move along its dofs; they share "
+            f"{', '.join(common) or 'none'}", missing or joint.dofs, where, "choose among these")  # fmt: skip
+    return wanted
+
+
+def _independent(B: Vector, names: list[str]) -> None:
+    """Raise ValueError, with the names, for the first condition that those before it imply."""
+    Q = np.zeros((0, B.shape[1]))
+    for row, name in zip(B, names, strict=True):
+        left = row - Q.T @ (Q @ row)
+        left -= Q.T @ (Q @ left)  # twice is enough
+        size = float(np.linalg.norm(left))
+        require(size > DEPENDENT * float(np.linalg.norm(row)), "joints must not fix one motion twice", name, "joints",
+                "leave it out of one of them")  # fmt: skip
+        Q = np.vstack([Q, left / size])
+
+
+def _rows(made: tuple[Assembled, ...], first: tuple[int, ...], T: sparse.csr_matrix, place: Any) -> sparse.csr_matrix:
+    """Rows of a place (number of the body, its place)."""
+    number, at = place
+    return made[number].rows(at) @ T[first[number] : first[number + 1]]
+
+
+def _translations(bodies: Sequence[Body], made: Sequence[Assembled]) -> Vector:
+    """Unit translations (N, d) of all bodies, along the axes that all of them have."""
+    axes = [[name for name in COMPONENTS[:3] if name in one.components] for one in bodies]
+    shared = [name for name in COMPONENTS[:3] if all(name in known for known in axes)]
+    pairs = zip(made, axes, strict=True)
+    return np.vstack([one.translations[:, [known.index(name) for name in shared]] for one, known in pairs])
+
+
+def _optional(made: Sequence[Assembled], name: str, T: sparse.csr_matrix) -> sparse.csr_matrix | None:
+    """A matrix that some bodies have, or None."""
+    if all(getattr(one, name) is None for one in made):
+        return None
+    blocks = [sparse.csr_matrix(one.M.shape) if (own := getattr(one, name)) is None else own for one in made]
+    return (T.T @ sparse.block_diag(blocks, format="csr") @ T).tocsr()

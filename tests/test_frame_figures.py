@@ -1,0 +1,83 @@
+"""Figures of frames: where the drawn lines lie, how much they are magnified, in the plane and in space."""
+
+import meshio
+import numpy as np
+import pytest
+from frames import portal, space_l
+
+import fembeam as fb
+from contacts import KelvinVoigt
+
+
+@pytest.fixture(scope="module")
+def plane():
+    """The portal, shaken against a stop."""
+    stop = fb.Stop("C", KelvinVoigt(1e6, 50.0), gap=1e-3, direction="x")
+    held = [fb.Clamped("A"), fb.Clamped("D")]
+    scene = fb.Scene(portal(), held, stops=[stop], base={"x": fb.Harmonic(1e-3, 40.0)}, damping=fb.ModalDamping(0.02))
+    return scene.reduce(modes=3, elements=12).simulate(duration=1.0, dt=1e-2)
+
+
+@pytest.fixture(scope="module")
+def space():
+    """The space L, shaken along z."""
+    scene = fb.Scene(space_l(), [fb.Clamped("A")], base={"z": fb.Harmonic(1e-3, 80.0)})
+    return scene.reduce(modes=3, elements=8).simulate(duration=0.2, dt=1e-2)
+
+
+def test_deflected(plane):
+    """The red line goes through the node where scale times its displacement says, and rests at the supports."""
+    figure = fb.plot.deflected(plane, t=0.5, scale=100.0)
+    rest, moved = figure.axes[0].lines
+    x, y = (np.asarray(values) for values in moved.get_data())
+    at_c = np.array([4.0, 3.0]) + 100 * np.array([plane.displacement("C", c)[50] for c in "xy"])
+    assert np.nanmin(np.hypot(x - at_c[0], y - at_c[1])) < 1e-9
+    assert np.nanmin(np.hypot(x, y)) == 0
+    assert np.nanmax(rest.get_xdata()) == 4.0
+    title = fb.plot.deflected(plane).axes[0].get_title(loc="left")
+    most = max(np.hypot(*(plane.displacement(name, c) for c in "xy")).max() for name in "BC")
+    assert most <= 1.001 * float(title.split()[-2]) < 1.05 * most
+
+
+def test_in_space(space):
+    """Three axes; the shapes are magnified to an eighth of the body."""
+    figure = fb.plot.mode_shapes(space.model)
+    assert [axis.name for axis in figure.axes] == ["3d"] * 3
+    assert "mode 1: 104.63 rad/s" in figure.axes[0].get_title()
+    _, moved = figure.axes[0].lines
+    x, y, z = (np.asarray(values, dtype=float) for values in moved.get_data_3d())
+    assert np.nanmax(np.abs(z)) == pytest.approx(0.12 * np.hypot(0.5, 0.3), rel=0.1)
+    assert np.nanmin(np.abs(x) + np.abs(y) + np.abs(z)) == 0
+    assert fb.plot.deflected(space).axes[0].name == "3d"
+
+
+def test_moving_pictures(plane, space, tmp_path):
+    """Both are written, and a picture shows its time and scale."""
+    for name, run in (("plane.gif", plane), ("space.gif", space)):
+        assert fb.plot.animate(run, tmp_path / name, frames=3).stat().st_size > 1000
+    title = fb.plot.frame(plane, t=0.3).axes[0].get_title()
+    assert title.startswith("t = 0.3000 s, displacements x ")
+
+
+def test_paraview(space, tmp_path):
+    """The points of the members, where they are, with displacements and section forces."""
+    found = meshio.read(space.to_vtu(tmp_path / "l.vtu"))
+    corner = np.flatnonzero(np.linalg.norm(found.points - [0.5, 0.3, 0.0], axis=1) < 1e-12)
+    assert len(corner) == 1
+    moved = found.point_data["displacement"][corner[0]]
+    assert np.allclose(moved, [space.displacement("C", c)[-1] for c in "xyz"], rtol=0, atol=1e-15)
+    root = np.flatnonzero(np.linalg.norm(found.points, axis=1) == 0)[0]
+    forces = space.section_forces(("A-B", 0.0))
+    for name, values in forces.items():
+        assert found.point_data[name][root] == pytest.approx(values[-1], rel=1e-9, abs=1e-9)
+    assert space.to_xdmf(tmp_path / "l.xdmf").exists()
+
+
+def test_refused(plane):
+    """Times outside the run, scales that are none, beams."""
+    for options, says in ({"t": 2.0}, "within the run, 0 to 1 s"), ({"scale": 0.0}, "scale must be above 0"):
+        with pytest.raises(ValueError, match=says):
+            fb.plot.deflected(plane, **options)
+    beam = fb.Scene(fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01)), [fb.Clamped(0.0)]).reduce(modes=1)
+    with pytest.raises(ValueError, match="must be a frame or a structure"):
+        fb.plot.deflected(beam.simulate(duration=0.1, dt=1e-2))

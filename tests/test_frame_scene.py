@@ -1,0 +1,171 @@
+"""Frames in scenes: the one-plane beam's own motion, balance of reactions, section forces, releases, meshes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from frames import portal, space_l, turned
+
+import fembeam as fb
+from contacts import Hysteretic, KelvinVoigt
+from fembeam.response import coordinates
+
+STEEL = fb.Section.rectangle(2.1e11, 7850.0, width=0.02, height=0.01)
+LAW = Hysteretic.lankarani_nikravesh(2.1e8, restitution=0.6)
+PARTS = {"damping": fb.ModalDamping(0.01)}
+DRIVE = fb.Harmonic(amplitude=2e-3, omega=60.0)
+
+
+def one_plane(**options):
+    """A cantilever on a plane with a stop below its middle."""
+    return fb.Scene(fb.Beam(0.6, STEEL), [fb.Clamped(0.0)], base=DRIVE, **PARTS,
+                    stops=[fb.Stop(0.4, LAW, gap=1e-4, side="below")], **options)  # fmt: skip
+
+
+def as_frame(kind):
+    """The same as a plane frame, as one in space turned anyhow, and as one of two planes; and which way is up."""
+    Q = {"plane": np.eye(3), "turned": turned(8), "bending": np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])}[kind]
+    end, up = Q @ [0.6, 0.0, 0.0], Q[:, 1]
+    if kind == "plane":
+        frame = fb.Frame({"A": (0, 0), "B": (0.6, 0)}, [fb.Member("A", "B", STEEL)])
+    elif kind == "turned":
+        frame = fb.Frame({"A": (0, 0, 0), "B": tuple(end)}, [fb.Member("A", "B", STEEL, up=tuple(up))])
+    else:
+        frame = fb.Frame.straight(0.6, STEEL, bending_only=True)
+        up = np.array([0.0, 1.0, 0.0])
+    base = dict(zip("xyz", (fb.Harmonic(2e-3 * n, 60.0) if n else None for n in up), strict=True))
+    stop = fb.Stop(("A-B", 0.4), LAW, gap=1e-4, direction=tuple(-up))
+    base = {name: signal for name, signal in base.items() if signal is not None}
+    return fb.Scene(frame, [fb.Clamped("A")], stops=[stop], base=base, **PARTS), tuple(up)
+
+
+@pytest.mark.parametrize("kind", ["plane", "turned", "bending"])
+def test_the_motion_of_a_beam(kind):
+    """Motion, contact log and spectrum of a frame on one line are those of the `Beam`, to rounding of its modes."""
+    beam = one_plane().reduce(modes=3, elements=12)
+    scene, up = as_frame(kind)
+    whole = scene.reduce(modes=8, elements=12)
+    mine = [i for i, w in enumerate(whole.omega) if np.min(np.abs(w / beam.omega - 1)) < 1e-8]
+    frame = scene.reduce(modes=mine, elements=12)
+    assert np.allclose(frame.omega, beam.omega, rtol=1e-9)
+    runs = [model.simulate(duration=0.3, dt=1e-4) for model in (beam, frame)]
+    places = (0.55, ("A-B", 0.55))
+    u, v = runs[0].displacement(places[0]), runs[1].displacement(places[1], up)
+    logs = [run.contacts for run in runs]
+    assert len(logs[0].t_in) == len(logs[1].t_in) > 3
+    assert np.allclose(logs[0].t_in, logs[1].t_in, rtol=0, atol=1e-8)
+    assert np.allclose(logs[0].peak_force, logs[1].peak_force, rtol=1e-5)
+    assert np.allclose(u, v, rtol=0, atol=1e-7 * np.abs(u).max())
+    omega = [100.0, 400.0]
+    spectra = [run.floor_spectrum(at, omega).acceleration for run, at in zip(runs, (0.6, ("B", up)), strict=True)]
+    assert np.allclose(*spectra, rtol=1e-5)
+
+
+def test_section_forces_of_a_run():
+    """Moment and shear of the frame are those of the beam; N of a plane frame in bending is 0."""
+    scene, _ = as_frame("plane")
+    runs = [one.reduce(modes=3, elements=12).simulate(duration=0.05, dt=1e-3) for one in (one_plane(), scene)]
+    found = runs[1].section_forces(("A-B", 0.13))
+    assert list(found) == ["N", "Q", "M"]
+    assert np.allclose(found["M"], runs[0].moment(0.13), rtol=0, atol=1e-6 * np.abs(found["M"]).max())
+    assert np.allclose(found["Q"], runs[0].shear(0.13), rtol=0, atol=1e-6 * np.abs(found["Q"]).max())
+    assert np.abs(found["N"]).max() < 1e-6 * np.abs(found["Q"]).max()
+    assert np.allclose(runs[1].stress(("A-B", 0.0)), runs[0].stress(0.0), rtol=0, atol=1e-6 * 1e8)
+    value, place, _ = runs[1].extremes("moment").largest
+    assert place == ("A-B", 0.0)
+    assert abs(value) == pytest.approx(np.abs(runs[0].moment(0.0)).max(), rel=1e-6)
+
+
+def shaken(damping=0.01):
+    """The space L, held at A, with stops on both sides of the corner and a mass on an arm, shaken along three axes."""
+    signals = {c: fb.Harmonic(1e-3, 70.0 + 10 * i) for i, c in enumerate("xyz")}
+    stops = [fb.Stop("B", KelvinVoigt(1e6, 50.0), gap=2e-4, direction=n) for n in ("z", "-z", "y", "-y")]
+    masses = [fb.LumpedMass("C", mass=0.2, inertia=(1e-4, 2e-4, 3e-4), offset=(0.01, 0.0, 0.02))]
+    return fb.Scene(space_l(), [fb.Clamped("A")], masses, stops=stops, base=signals, damping=fb.ModalDamping(damping))
+
+
+def rigid_motions(made, position):
+    """Translations along x, y, z and rotations about them through the origin, (N, 6)."""
+    names = ("x", "y", "z", "rx", "ry", "rz")
+    at = np.array([position(place) for place, _ in made.labels])
+    turning = [np.hstack([np.cross(axis, at), np.tile(axis, (len(at), 1))]) for axis in np.eye(3)]
+    turned_ = [
+        [one[i, names.index(c)] if c in names else 0.0 for i, (_, c) in enumerate(made.labels)] for one in turning
+    ]
+    return np.column_stack([made.translations, np.array(turned_).T])
+
+
+def test_reactions_balance_inertia():
+    """Reactions and contact forces, in six components, are the rate of momentum; in contact, too."""
+    model = shaken(0.0).reduce(modes=6, elements=6)
+    run = model.simulate(duration=0.2, dt=5e-4)
+    made, position = model.matrices.assembled, model.scene.beam.position
+    r = rigid_motions(made, position)
+    M = model.matrices.loosened(replace(model.scene, supports=())).M
+    motion = model.matrices.spread @ model.basis.vectors @ coordinates(run).T
+    for i, signal in enumerate(model.scene.base.values()):
+        motion += np.outer(made.translations[:, i], signal.derivative(2)(run.t))
+    reaction = run.reactions()[0]
+    given = np.array([reaction[c] for c in ("x", "y", "z", "rx", "ry", "rz")])
+    for i, way in enumerate([(0, 0, 1), (0, 0, -1), (0, 1, 0), (0, -1, 0)]):
+        push = -np.outer(way, run.force(i))  # on the frame, against the way it closes
+        given += np.vstack([push, np.cross(position("B"), push.T).T])
+    assert sum(np.any(run.force(i) > 0) for i in range(4)) >= 2
+    rate = r.T @ M @ motion
+    assert np.allclose(given, rate, rtol=0, atol=1e-8 * np.abs(rate).max())
+
+
+def test_section_forces_meet_the_reaction():
+    """With all modes of the mesh the section forces at the clamp are the reaction, turned to the member's axes."""
+    push = fb.PointForce("C", fb.Harmonic(30.0, 300.0), direction=(1.0, 2.0, -1.0))
+    scene = fb.Scene(space_l(), [fb.Clamped("A")], forces=[push])
+    run = scene.reduce(modes="all", elements=14).simulate(duration=0.02, dt=5e-4)
+    found, reaction = run.section_forces(("A-B", 0.0)), run.reactions()[0]
+    across, up, along = scene.beam.axes[0]
+    force = np.array([reaction[c] for c in "xyz"])
+    moment = np.array([reaction[c] for c in ("rx", "ry", "rz")])
+    expected = {"N": -along @ force, "Q": up @ force, "Q2": across @ force}
+    expected |= {"M": across @ moment, "M2": -up @ moment, "T": -along @ moment}
+    for name, values in expected.items():
+        assert np.allclose(found[name], values, rtol=0, atol=1e-6 * np.abs(values).max()), name
+
+
+def test_effective_masses():
+    """Those of all modes sum to the mass that the base moves, along each axis."""
+    model = replace(shaken(), stops=()).reduce(modes="all", elements=4)
+    for c in "xyz":
+        moved = model.participation_along(c)
+        free = model.matrices.along[c]
+        M = model.matrices.M
+        assert moved @ moved == pytest.approx(free @ np.linalg.solve(M.toarray(), free), rel=1e-9)
+
+
+def test_mesh_of_a_scene():
+    """As few elements as its frequencies with supports ask: right to 1e-6, and fewer than whatever may hold it."""
+    model = portal_scene().reduce(modes=4)
+    exact = [46.79676568080308, 137.6560947561103, 306.7971337148636, 327.2072572248291]
+    assert np.allclose(model.omega, exact, rtol=1e-6)
+    places = portal_scene().places
+    bound = portal().assembled(modes=4, places=places).mesh.elements.count
+    assert model.matrices.assembled.mesh.elements.count < bound
+
+
+def portal_scene():
+    stop = fb.Stop("C", LAW, gap=1e-3, direction="x")
+    return fb.Scene(portal(), [fb.Clamped("A"), fb.Clamped("D")], stops=[stop], base={"x": DRIVE})
+
+
+def test_released_nodes():
+    """A hinge at a clamped foot is one; all members released at a free node are refused, but for an inertia there."""
+    hinged = replace(portal(), members=[replace(one, release="start rz") if one.a in "AD" else one
+                                        for one in portal().members])  # fmt: skip
+    pinned = fb.Scene(portal(), [fb.Pinned("A"), fb.Pinned("D")]).reduce(modes=3, elements=30)
+    found = fb.Scene(hinged, [fb.Clamped("A"), fb.Clamped("D")]).reduce(modes=3, elements=30)
+    assert np.allclose(found.omega, pinned.omega, rtol=1e-9)
+    loose = replace(portal(), members=[replace(one, release="end rz") if one.a == "A" else
+                                       replace(one, release="start rz") if one.a == "B" else one
+                                       for one in portal().members])  # fmt: skip
+    with pytest.raises(ValueError, match="releases must not free a node; 'B' moves along 'rz'"):
+        fb.Scene(loose, [fb.Clamped("A"), fb.Clamped("D")]).reduce(modes=2)
+    wheel = fb.LumpedMass("B", mass=0.1, inertia=1.0)
+    fb.Scene(loose, [fb.Clamped("A"), fb.Clamped("D")], [wheel], springs=[]).reduce(modes=2, elements=9)

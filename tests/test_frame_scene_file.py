@@ -1,0 +1,104 @@
+"""Frames in scene files: the scene made in Python, meshes, and what is refused with the table it stands in."""
+
+from pathlib import Path
+
+import pytest
+from test_frame_files import written
+
+import fembeam as fb
+from contacts import KelvinVoigt
+from fembeam import scene_file
+
+STEEL = '{ shape = "rectangle", E = 2.1e11, rho = 7850.0, width = 0.05, height = 0.1 }'
+PORTAL = f"""
+[frame]
+nodes = {{ A = [0, 0], B = [0, 3], C = [4, 3], D = [4, 0] }}
+[[frame.members]]
+nodes = ["A", "B", "C"]
+section = {STEEL}
+[[frame.members]]
+nodes = ["D", "C"]
+section = {STEEL}
+release = "end rz"
+axial_force = -100.0
+[[supports]]
+kind = "clamped"
+at = "A"
+[[supports]]
+kind = "fixed"
+at = "D"
+dofs = ["x", "y"]
+[[stops]]
+at = ["B-C", 1.5]
+direction = "-y"
+gap = 2e-3
+law = {{ kind = "kelvin_voigt", stiffness = 2e6, damping = 2e3 }}
+[base.x]
+kind = "harmonic"
+amplitude = 1e-3
+omega = 25.0
+"""
+
+
+def read(tmp_path, text):
+    """The scene of a file's text."""
+    path = tmp_path / "scene.toml"
+    path.write_text(text, encoding="utf-8")
+    return scene_file.read(path).scene
+
+
+def test_the_same_as_in_python(tmp_path):
+    """Members along chains, supports, a stop within a member, motion along one axis."""
+    steel = fb.Section.rectangle(2.1e11, 7850.0, width=0.05, height=0.1)
+    members = [fb.Member("A", "B", steel), fb.Member("B", "C", steel),
+               fb.Member("D", "C", steel, release="end rz", axial_force=-100.0)]  # fmt: skip
+    frame = fb.Frame({"A": (0, 0), "B": (0, 3), "C": (4, 3), "D": (4, 0)}, members)
+    scene = fb.Scene(
+        frame,
+        [fb.Clamped("A"), fb.Fixed("D", "x", "y")],
+        stops=[fb.Stop(("B-C", 1.5), KelvinVoigt(2e6, 2e3), gap=2e-3, direction="-y")],
+        base={"x": fb.Harmonic(1e-3, 25.0)},
+    )
+    found = read(tmp_path, PORTAL)
+    assert repr(found) == repr(scene)
+    assert found.beam == frame
+
+
+def test_a_mesh(tmp_path):
+    """Groups of lines with their sections."""
+    written(tmp_path / "l.msh")
+    text = f"""
+[frame]
+mesh = "l.msh"
+plane = false
+up = "z"
+sections = {{ run = {STEEL}, drop = {STEEL} }}
+[[supports]]
+kind = "clamped"
+at = "foot"
+"""
+    scene = read(tmp_path, text)
+    assert [one.name for one in scene.beam.members] == ["run", "drop"]
+    assert len(scene.reduce(modes=2, elements=6).omega) == 2
+
+
+def test_the_pipe_of_the_examples():
+    """The file of the course has the pipe of its script."""
+    scene = scene_file.read(Path(__file__).parent.parent / "examples" / "pipe.toml").scene
+    assert scene.beam.components == ("x", "y", "z", "rx", "ry", "rz")
+    assert list(scene.motions) == ["x", "y", "z"]
+
+
+@pytest.mark.parametrize(("old", "new", "says"), [
+    ("nodes = { A = [0, 0]", "nods = { A = [0, 0]", r"\[frame\].*nods"),
+    ('nodes = ["D", "C"]', 'nodes = ["D", "E"]', r"\[frame\]: member 'D-E' must join nodes of the frame; 'D' is"),
+    ('nodes = ["D", "C"]', 'nodes = ["D"]', r"\[\[frame.members\]\] number 2.*a chain of more"),
+    ('release = "end rz"', 'release = "rz"', r"\[\[frame.members\]\] number 2.*release must be"),
+    ('release = "end rz"', 'relase = "end rz"', r"number 2.*relase"),
+    ('at = "A"', 'at = "F"', "must be a node of the frame"),
+    ("[frame]", "[beam]\nlength = 1.0\n[frame]", r"one of the tables \[beam\] and \[frame\]"),
+])  # fmt: skip
+def test_refused(tmp_path, old, new, says):
+    """What is wrong, in which table."""
+    with pytest.raises(ValueError, match=says):
+        read(tmp_path, PORTAL.replace(old, new, 1))

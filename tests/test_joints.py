@@ -1,0 +1,102 @@
+"""Joined bodies: the whole from its parts, hinges, Craig–Bampton halves with their known errors, what is refused."""
+
+import numpy as np
+import pytest
+from frames import PORTAL, SPACE_L, frequencies, portal, static
+
+import fembeam as fb
+import reduction
+from fembeam.structures import Joint, Structure, joined, superelement
+
+FLAT = fb.Section.rectangle(2.1e11, 7850.0, width=0.02, height=0.01)
+UNIT = fb.Section(E=1.0, rho=1.0, A=1.0, I=1.0, I2=1.0)
+
+
+def legs():
+    """The two legs of the space L, each a frame of its own."""
+    return [fb.Frame.polyline({name: SPACE_L[name] for name in leg}, FLAT, up="z") for leg in ("AB", "BC")]
+
+
+def test_two_legs_are_the_l():
+    """Joined at B they have the frequencies of the frame in one piece, on the same elements."""
+    bodies = legs()
+    whole = joined(bodies, [body.assembled(elements=5) for body in bodies], [Joint("B", to=(1, "B"))])
+    places = [("A-B", 0.1 * i) for i in range(1, 5)] + [("B-C", 0.06 * i) for i in range(1, 5)]
+    one = fb.Frame.polyline(SPACE_L, FLAT, up="z").assembled(elements=10, places=places)
+    assert len(whole.labels) == len(one.labels)
+    assert np.allclose(frequencies(whole, 5, (0, "A")), frequencies(one, 5, "A"), rtol=1e-10)
+    mass = whole.translations.T @ whole.M @ whole.translations
+    assert np.allclose(mass, 7850 * 2e-4 * 0.8 * np.eye(3), atol=1e-12)
+    at_joint = [whole.rows((0, "B")) - whole.rows((1, "B")), whole.rows((1, ("B-C", 0.0))) - whole.rows((0, "B"))]
+    assert all(abs(rows).max() < 1e-12 for rows in at_joint)
+
+
+def test_hinge_is_a_release():
+    """A joint of displacements alone is a hinge."""
+    left = fb.Frame({name: PORTAL[name] for name in "ABC"}, portal().members[:2])
+    right = fb.Frame({name: PORTAL[name] for name in "CD"}, portal().members[2:])
+    made = [left.assembled(elements=14), right.assembled(elements=6)]
+    hinged = joined((left, right), made, [Joint("C", to=(1, "C"), dofs="xy")])
+    hinge = fb.Member("D", "C", portal().members[2].section, release="end rz")
+    whole = fb.Frame(PORTAL, [*portal().members[:2], hinge]).assembled(elements=20)
+    assert np.allclose(frequencies(hinged, 4, (0, "A"), (1, "D")), frequencies(whole, 4, "A", "D"), rtol=1e-10)
+
+
+def test_joint_between_nodes():
+    """A spring under a place of a beam, by formula; within an element both still move as one."""
+    beam = fb.Frame({"A": (0, 0), "B": (1.0, 0)}, [fb.Member("A", "B", FLAT)])
+    prop = Structure([[3e4]], [[1.0]], labels=[("top", "y")])
+    middle = ("A-B", 0.5)
+    made, coarse = (
+        joined((beam, prop), [one, prop.assembled()], [Joint(middle, to=(1, "top"))])
+        for one in (beam.assembled(elements=2, places=[middle]), beam.assembled(elements=1))
+    )
+    assert abs(coarse.rows((0, middle))[1] - coarse.rows((1, "top"))[0]).max() < 1e-15
+    load = made.rows((0, "B")).toarray()[1]
+    EI, k = FLAT.bending_stiffness, 3e4
+    reaction = (5 / (48 * EI)) / (1 / (24 * EI) + 1 / k)
+    row = made.rows((1, "top")).toarray()[0]
+    assert row @ static(made, load, (0, "A")) * k == pytest.approx(reaction, rel=1e-9)
+
+
+@pytest.mark.parametrize(("modes", "known"), [
+    (0, [22.73594240235, 81.97560612768]),
+    (1, [22.3912041074231, 61.74881100982636]),
+    (2, [22.37595524830725, 61.67814371298982]),
+])  # fmt: skip
+def test_craig_bampton_halves(modes, known):
+    """A clamped–clamped beam of two superelements, k fixed modes each and plane: the error of the method itself."""
+    ends = ({"A": (0, 0, 0), "B": (0, 0, 0.5)}, {"B": (0, 0, 0.5), "C": (0, 0, 1.0)})
+    halves = [fb.Frame(nodes, [fb.Member(*nodes, UNIT)], bending_only=True) for nodes in ends]
+    reduced = [
+        superelement(half.assembled(elements=30), ["B"], 2 * modes, held=[end])
+        for half, end in zip(halves, "AC", strict=True)
+    ]
+    whole = joined(halves, reduced, [Joint("B", to=(1, "B"))])
+    omega = reduction.modal_basis(whole.M, whole.K, root=whole.root).omega
+    assert len(omega) == 4 * modes + 4
+    assert np.allclose(omega[:4:2], known[: len(omega) // 2], rtol=1e-6)
+
+
+@pytest.mark.parametrize(("joints", "says"), [
+    ([Joint("B", to=(1, "B")), Joint("B", to=(1, ("B-C", 0.0)), dofs="x")], "twice, got \"'x' of joints.1.\""),
+    ([Joint("E", to=(1, "B"))], "'B' is the nearest there is, got 'E' in joints.0."),
+    ([Joint("B", to=(2, "B"))], "bodies below 2, got 2"),
+])  # fmt: skip
+def test_refused(joints, says):
+    """A motion fixed twice, places and bodies that do not exist."""
+    bodies = legs()
+    with pytest.raises(ValueError, match=says):
+        joined(bodies, [body.assembled(elements=2) for body in bodies], joints)
+
+
+def test_refused_alone():
+    """What no joint can be."""
+    with pytest.raises(ValueError, match="two bodies"):
+        Joint("A", to=(0, "B"))
+    with pytest.raises(ValueError, match="each once"):
+        Joint("A", to=(1, "B"), dofs="xx")
+    bodies = [legs()[0], fb.Frame({"A": (0, 0), "B": (1.0, 0)}, [fb.Member("A", "B", FLAT)])]
+    made = [body.assembled(elements=1) for body in bodies]
+    with pytest.raises(ValueError, match=r"they share x, y, rz, got .'z'. in joints.0."):
+        joined(bodies, made, [Joint("B", to=(1, "A"), dofs="xyz")])
