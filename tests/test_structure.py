@@ -102,6 +102,12 @@ def test_massless_dofs_follow_statically():
     assert "8 of them without mass follow statically" in scene.matrices().accuracy
 
 
+def test_loads_on_massless_dofs_are_told():
+    body = fb.Structure(K, np.diag([1.0, 0.0]), labels=[("a", "x"), ("b", "x")])
+    with pytest.warns(UserWarning, match=r"forces\[0\] acts on \('b', 'x'\), a dof without mass"):
+        fb.Scene(body, forces=[fb.PointForce("b", fb.Harmonic(1.0, 1.0), "x")]).matrices()
+
+
 def test_a_massless_dof_that_nothing_holds_is_named():
     with pytest.raises(ValueError, match=r"a dof without mass must be held by stiffness, got \('b', 'x'\)"):
         following(np.diag([1.0, 0.0]), np.diag([1.0, 0.0]), [("a", "x"), ("b", "x")], "Scene")

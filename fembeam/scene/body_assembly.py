@@ -6,6 +6,7 @@ u_all = S u: zero where supports hold, static (Guyan) where there is no mass.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -93,7 +94,21 @@ def body_matrices(scene: Scene, elements: int | None, modes: int | None, probes:
     assembled = _made(scene, elements, modes, (*scene.places, *probes))
     held = _held(scene, assembled)
     require(len(held) < assembled.M.shape[0], "supports must leave dofs free", len(held), "Scene", "remove one")
-    return _of(scene, assembled, modes, held, condense=True)
+    found = _of(scene, assembled, modes, held, condense=True)
+    _warn_of_massless(scene, found)
+    return found
+
+
+def _warn_of_massless(scene: Scene, matrices: BodyMatrices) -> None:
+    """Warn where something acts on dofs without mass, whose own compliance no mode has."""
+    bare = {matrices.assembled.labels.index(label) for label in matrices.massless}
+    for name in ("stops", "elements", "forces") if bare else ():
+        for index, part in enumerate(getattr(scene, name)):
+            row = row_of(scene.beam, matrices.assembled, part.z, part.coordinate.along)
+            if hit := bare & set(row.indices.tolist()):
+                label = matrices.assembled.labels[min(hit)]
+                warnings.warn(f"{name}[{index}] acts on {label}, a dof without mass that follows the others: its own "
+                              "compliance is left out; give the place a mass", UserWarning, stacklevel=5)  # fmt: skip
 
 
 def _made(scene: Scene, elements: int | None, modes: int | None, places: tuple[Any, ...]) -> Assembled:

@@ -33,7 +33,8 @@ def carried(forms: Forms, flow: Any) -> Forms:
     """
     if isinstance(forms, np.ndarray):
         return flow[:, None].transpose(0, 1, 3, 2) @ forms @ flow[:, None]
-    moves = csr_array(block_diag([csr_array(one) for one in flow for _ in range(2)], format="csr"))
+    each = [csr_array(one) for one in flow]
+    moves = csr_array(block_diag([one for one in each for _ in range(2)], format="csr"))
     return csr_array(moves.T @ forms @ moves)
 
 
