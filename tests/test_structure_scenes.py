@@ -362,7 +362,7 @@ def test_stops_of_a_beam_have_names_too():
     scene = fb.Scene(BEAM, [fb.Clamped(0.0)], stops=[fb.Stop(0.5, LAW, 1e-3, name="snubber"), fb.Stop(0.4, LAW, 1e-3)],
                      forces=[fb.PointForce(0.5, drive())])  # fmt: skip
     run = scene.reduce(modes=1).simulate(0.01, 1e-3)
-    assert [run.name(0), run.name(1)] == ["snubber", "stop 1"]
+    assert [run.name(0), run.name(1)] == ["snubber", "stop at 0.4 m, below"]
     assert "snubber" in str(run)
 
 

@@ -22,7 +22,7 @@ from fembeam.plot.rig_labels import SIZE, Placed, extent, rows_of, spread
 from fembeam.plot.rig_symbols import COLOURS, Pen
 from fembeam.plot.rig_words import gap_words, label, law_words, length, signal_words
 from fembeam.plot.style import GREY, styled
-from fembeam.scene import Guided, Pinned, PointMoment
+from fembeam.scene import PointMoment
 from fembeam.support import require
 
 if TYPE_CHECKING:
@@ -504,15 +504,15 @@ def _item(part: Any, body: int, side: int, width: float, draw: Callable[[Pen], N
 
 def _support(support: Any, beam: float, body: int) -> Iterator[Item]:
     """A support; of a clamp at an end the wall stands beside the beam."""
-    if isinstance(support, Pinned):
+    moves, turns = (not held for held in support.fixed)
+    if turns:
         yield _item(support, body, -1, 0.26, symbols.pin, fixed=True, tall=0.23)
         return
     near, far = support.z <= 1e-9 * beam, support.z >= (1 - 1e-9) * beam
-    guided = isinstance(support, Guided)
-    draw = _guided if guided else partial(_clamped, end=far - near)
-    width, tall = (0.4, 0.2) if guided else (0.1, 0.14) if near or far else (0.24, 0.08)
+    draw = _guided if moves else partial(_clamped, end=far - near)
+    width, tall = (0.4, 0.2) if moves else (0.1, 0.14) if near or far else (0.24, 0.08)
     yield _item(support, body, -1, width, draw, fixed=True, tall=tall)
-    if guided or not (near or far):
+    if moves or not (near or far):
         yield Item(support.z, 1, width, _nothing, "", support.label_on(body), fixed=True, mute=True, tall=tall)
 
 

@@ -10,6 +10,7 @@ from fembeam.scene import (
     Clamped,
     Dashpot,
     Element,
+    Fixed,
     Guided,
     Impactor,
     LumpedMass,
@@ -46,7 +47,7 @@ def label(part: ScenePart) -> str:
 def _facts(part: Any) -> Iterator[str]:
     """The numbers of one part."""
     match part:
-        case Clamped() | Pinned() | Guided():
+        case Clamped() | Pinned() | Guided() | Fixed():
             return
         case LumpedMass():
             yield f"{part.mass:.4g} kg"
