@@ -240,7 +240,8 @@ class _Run:
         complete = self.engine.keeps_ledger(self.times is not None)
         ledger = partial(_energy, self.system, works, complete, motion, back, self.initial)
         rows = self._rows()
-        log = partial(ContactLog.of_events, self._of_stops(rows))
+        names = [contact.name for contact in self.system.contacts]
+        log = partial(ContactLog.of_events, self._of_stops(rows), names)
         transitions = partial(Transitions.of_events, rows, self.system.contacts)
         first, last = (self.initial, self.latched), (state, latched)
         lost = partial(Losses.of_run, self.system.contacts, back, first, last, works, transitions)

@@ -1,5 +1,6 @@
 """The command line: results, tables, exit codes."""
 
+import csv
 import json
 import os
 import re
@@ -50,7 +51,7 @@ def test_run_writes_run_summary_and_figures(tmp_path, capsys):
     assert main(["run", str(scene(tmp_path)), "--out", str(out), "--quiet"]) == 0
     said = capsys.readouterr()
     assert said.err == ""
-    assert re.search(r"^stop 0 +\d+ ", said.out, re.MULTILINE)
+    assert re.search(r"^stop at 0.24445 m, below +\d+ ", said.out, re.MULTILINE)
     named = ["run.npz", "summary.json", "report.html", "studies.json"]
     assert sorted(p.name for p in out.iterdir()) == sorted([*named, *FIGURES])
     for name in FIGURES:
@@ -507,8 +508,10 @@ def test_a_run_as_csv(tmp_path, capsys):
     rows = np.loadtxt(tmp_path / "csv" / "histories.csv", delimiter=",", skiprows=1)
     assert rows[:, head.index("force 0 [N]")] == pytest.approx(run.force()[::10], rel=1e-11)
     assert rows[:, head.index("displacement tip [m]")] == pytest.approx(run.displacement(0.2599)[::10], rel=1e-11)
-    log = np.loadtxt(tmp_path / "csv" / "contacts.csv", delimiter=",", skiprows=1)
-    assert log[:, 1] == pytest.approx(run.contacts.t_in, rel=1e-11)
+    with (tmp_path / "csv" / "contacts.csv").open(newline="", encoding="utf-8") as file:
+        log = list(csv.DictReader(file))
+    assert [float(row["t_in [s]"]) for row in log] == pytest.approx(run.contacts.t_in, rel=1e-11)
+    assert {row["name"] for row in log} == {"stop at 0.24445 m, below"}
 
 
 class Page(HTMLParser):

@@ -403,13 +403,15 @@ def mixed():
 
 def test_units_in_tables(mixed, tmp_path):
     assert set(mixed.contacts.stop.tolist()) == {0, 1}
-    assert [mixed.name(i) for i in range(3)] == ["stop 0 (rotation)", "stop 1", "element 2 (rotation)"]
+    names = ["stop of rotation at 0 m, above", "stop at 0.5 m, below", "element of rotation at 1 m"]
+    assert [mixed.name(i) for i in range(3)] == names
+    assert [mixed.key(i) for i in range(3)] == ["stop 0 (rotation)", "stop 1", "element 2 (rotation)"]
     assert [mixed.unit("force", i) for i in range(3)] == ["N m", "N", "N m"]
     histories, log = (path.read_text().splitlines()[0].split(",") for path in mixed.to_csv(tmp_path))
     assert {"indentation 0 [rad]", "force 0 [N m]", "indentation 1 [m]", "force 2 [N m]"} <= set(histories)
     assert {"speed_in [m/s or rad/s]", "peak_force [N or N m]", "impulse [N s or N m s]", "t_in [s]"} <= set(log)
     printed = str(mixed)
-    assert "indentation, stop 0 (rotation)" in printed
+    assert "indentation, stop of rotation at 0 m, above" in printed
     assert "mean / m or rad" in printed
     assert "largest force / N or N m" in printed
     assert fb.plot.contacts(mixed).axes[1].get_xlabel().startswith("peak force / N or N m")
@@ -420,7 +422,7 @@ def test_units_in_reports(mixed, tmp_path):
 
     found = files.summary(mixed)
     assert found["rotations"] == [True, False, True]
-    assert [row.get("name") for row in found["contacts"]] == ["stop 0 (rotation)", None]
+    assert [row["name"] for row in found["contacts"]] == ["stop of rotation at 0 m, above", "stop at 0.5 m, below"]
     assert "mean peak force/N or N m" in files.text(found)
     (tmp_path / "summary.json").write_text(json.dumps(found))
     page = html_page.write_page(tmp_path).read_text()
@@ -434,13 +436,14 @@ def test_a_time_history_names_what_acts(mixed):
     _, lower = figure.axes
     assert figure.get_suptitle().startswith("Displacement at mid-beam relative to the frame, contacts of stop 1 shaded")
     assert lower.get_ylabel() == "force / N or N m"
-    names = {"stop 0 (rotation), z = 0 mm", "stop 1, below, z = 500 mm", "element 2 (rotation), z = 1000 mm"}
+    names = {"stop of rotation at 0 m, above", "stop at 0.5 m, below", "element of rotation at 1 m"}
     assert names == {text.get_text() for text in lower.get_legend().get_texts()}
 
 
 def test_a_saved_run_keeps_its_kinds(mixed, tmp_path):
     again = fb.load(mixed.save(tmp_path / "run"))
-    assert again.name(2) == "element 2 (rotation)"
+    assert again.name(2) == "element of rotation at 1 m"
+    assert again.key(2) == "element 2 (rotation)"
     np.testing.assert_array_equal(again.force(2), mixed.force(2))
 
 
@@ -507,7 +510,7 @@ def test_scene_files(tmp_path):
     assert file.scene.stops[0].of == "rotation"
     model = file.scene.reduce(**file.reduce)
     said = str(check(model))
-    assert re.search(r"stop 0: \d+ contacts in a trial; at [\d.]+ rad/s .* peak force [\d.]+ N m", said)
+    assert re.search(r"above: \d+ contacts in a trial; at [\d.]+ rad/s .* peak force [\d.]+ N m", said)
     assert "elements: with their stiffness at u = 0 the lowest frequencies are" in said
     for change, message in (
         ('elements[1].of="slope"', r"\[\[elements\]\] number 2: of must be 'displacement' or 'rotation', got 'slope'"),

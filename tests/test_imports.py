@@ -42,6 +42,7 @@ def test_arrows(path):
 
 DOORS = {  # methods that open what is above
     ("fembeam.scene", "fembeam.model"),
+    ("fembeam.scene", "fembeam.plot"),
     ("fembeam.scene", "fembeam.inspection"),
     ("fembeam.scene", "fembeam.study"),
     ("fembeam.model", "fembeam.scene_file"),

@@ -33,7 +33,7 @@ PLAIN = {  # annotations of what is no signal
     *("float", "str", "str | None", "float | tuple[float, float, float]", "tuple[str, ...]"),
     *("Of", "Place", "Second | None", "Direction | None"),
 }
-STRUCTURE = {"beam", "damping", "bodies", "law", *FEATURES}  # fields of other annotations that are none either
+STRUCTURE = {"z", "beam", "damping", "bodies", "law", *FEATURES}  # fields of other annotations that are none either
 VALUES = {"z": 0.3, "stiffness": 1e3, "mass": 0.1, "velocity": 0.0, "damping": 0.1, "law": Hertz(1e8)}
 TONE, NOISE = fb.Harmonic(1e-5, 300.0), fb.BandNoise(1e-5, (0.0, 600.0), seed=3)
 

@@ -107,7 +107,7 @@ def test_a_scene_file_is_the_scene_in_python(folder):
     assert len(one.contacts) > 4
     np.testing.assert_allclose(one.contacts.t_in, other.contacts.t_in, atol=1e-12)
     np.testing.assert_allclose(one.displacement(2, "rx"), other.displacement(2, "rx"), atol=1e-13)
-    assert [one.name(i) for i in (0, 1)] == ["upper", "stop 1 at tip, -y"]
+    assert [one.name(i) for i in (0, 1)] == ["upper", "stop at tip, -y, on 2"]
 
 
 def test_the_command_line_runs_and_checks_it(folder, capsys):

@@ -175,8 +175,8 @@ def test_a_saved_run_is_the_run(runs, tmp_path):
         lambda r: r.energy.stored,
     ):
         np.testing.assert_array_equal(ask(again), ask(run))
-    assert [again.name(i) for i in range(4)] == ["upper", "stop 1 at 5, -y", "stop 2 at middle, -rx",
-                                                 "element 3 at 2, y"]  # fmt: skip
+    assert [again.name(i) for i in range(4)] == ["upper", "stop at 5, -y", "stop at middle, -rx",
+                                                 "element from 2, y to 6"]  # fmt: skip
     assert str(again) == str(run)
     with pytest.raises(ValueError, match="a place must be one that the run keeps; 'tip' is the nearest there is"):
         again.displacement("tipp", "y")
@@ -190,9 +190,9 @@ def test_tables_have_names(runs, tmp_path):
                  "reaction rx 0 (Fixed at 'root') [N m]"):  # fmt: skip
         assert word in head
     first, *rest = contacts.read_text(encoding="utf-8").splitlines()
-    assert first.endswith(",name")
+    assert first.startswith("stop,name,t_in")
     assert len(rest) == len(runs[1].contacts)
-    assert sum(row.endswith(",upper") for row in rest) == np.sum(runs[1].contacts.stop == 0)
+    assert sum(row.startswith("0,upper,") for row in rest) == np.sum(runs[1].contacts.stop == 0)
 
 
 def test_orbit_and_branch_are_those_of_the_beam():
@@ -362,7 +362,7 @@ def test_stops_of_a_beam_have_names_too():
     scene = fb.Scene(BEAM, [fb.Clamped(0.0)], stops=[fb.Stop(0.5, LAW, 1e-3, name="snubber"), fb.Stop(0.4, LAW, 1e-3)],
                      forces=[fb.PointForce(0.5, drive())])  # fmt: skip
     run = scene.reduce(modes=1).simulate(0.01, 1e-3)
-    assert [run.name(0), run.name(1)] == ["snubber", "stop 1"]
+    assert [run.name(0), run.name(1)] == ["snubber", "stop at 0.4 m, below"]
     assert "snubber" in str(run)
 
 

@@ -1,4 +1,4 @@
-"""The command line: `fembeam new`, `check`, `modes`, `run`, `compare`, `export`, `schema`, `completion`.
+"""The command line: `fembeam new`, `check`, `draw`, `modes`, `run`, `compare`, `export`, `schema`, `completion`.
 
 Tables (with --json: JSON) go to stdout, everything else to stderr; exit codes are those of `messages`.
 """
@@ -107,12 +107,18 @@ def _scene_commands(commands: Any) -> None:
     check = _command(commands, "check", _check,
                      "tell what a scene is: modes, contacts to expect, steps to take, doubtful units")  # fmt: skip
     modes = _command(commands, "modes", _modes, "print natural frequencies, damping, participation")
+    draw = _command(
+        commands, "draw", _draw, "draw the rig: beams, supports, masses, stops with their gaps, loads, names"
+    )
     about = "run the file's studies; write tables, figures, report.html and, for [simulate], run.npz"
     run = _command(commands, "run", _run, about)
-    for each in (check, modes, run):
+    for each in (check, draw, modes, run):
         each.add_argument("scene", metavar="SCENE", type=Path, help="scene file, or a run.npz that came from one")
         each.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], help="change one value, "
-                          "such as simulate.duration=10 or stops[0].gap=1e-3; may be repeated")  # fmt: skip
+                          "such as simulate.duration=10 or stops[valve].gap=1e-3; may be repeated")  # fmt: skip
+    draw.add_argument("--out", metavar="FILE", type=Path, help="PNG, SVG or PDF; default: the scene's name with .png, "
+                      "in the present folder")  # fmt: skip
+    for each in (check, modes, run):
         each.add_argument("--json", action="store_true", help="print JSON instead of tables")
     for each in (check, modes):
         each.add_argument("--modes", metavar="N", type=int, help=f"how many; default: [reduce], else {MODES_SHOWN}")
@@ -181,6 +187,15 @@ def _check(arguments: argparse.Namespace) -> int:
     for doubt in (one for one in found if one not in warned):  # the scene itself warned when it was made
         show_warning(doubt)
     _print(found.plain() | {"warnings": warned} if arguments.json else replace(found, warnings=[]), arguments.json)
+    return 0
+
+
+def _draw(arguments: argparse.Namespace) -> int:
+    """The command `draw`."""
+    from fembeam.results import files as report
+
+    out = arguments.out or Path(f"{arguments.scene.stem}.png")
+    say(f"wrote {report.write_figure(out, _read(arguments).scene.figure())}")
     return 0
 
 

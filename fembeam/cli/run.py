@@ -82,12 +82,14 @@ def _check_checkpoints(job: Job, studies: list[str]) -> None:
 
 
 def _report(job: Job, files: list[Path]) -> int:
-    """Write the page."""
+    """Draw the rig and write the page."""
     from fembeam.results import html_page as html
 
     try:
         with interrupts.deferred():
-            html.write_page(job.folder, job.file.source, _warnings(job, files), files)
+            straight = not job.file.scene.named
+            rig = [report.write_figure(job.folder / "rig.png", job.file.scene.figure())] if straight else []
+            html.write_page(job.folder, job.file.source, _warnings(job, files), [*rig, *files])
     except OSError as error:
         return _unwritten(error).code
     return 0

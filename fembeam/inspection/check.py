@@ -85,9 +85,10 @@ class Check(Printed):
     def _contacts_with(self, one: Touched) -> str:
         """What to expect of a stop, in a sentence."""
         seen = f"{one.contacts} contacts in a trial" if one.contacts else "no contact in a trial"
-        speed, force = (unit_of(of, [self.model.contact_rows[one.stop].rotation]) for of in ("speed", "force"))
+        row = self.model.contact_rows[one.stop]
+        speed, force = (unit_of(of, [row.rotation]) for of in ("speed", "force"))
         return (
-            f"stop {one.stop}: {seen}; at {one.speed:.3g} {speed} a contact lasts {one.time:.3g} s "
+            f"{row.name}: {seen}; at {one.speed:.3g} {speed} a contact lasts {one.time:.3g} s "
             f"({one.periods:.2g} periods of the highest mode kept), peak force {one.peak_force:.3g} {force}"
         )
 
@@ -110,7 +111,7 @@ class Check(Printed):
             **({"structure": self.structure} if self.structure else {}),
             "modes": mode_rows(self.model),
             "correlation_time": self.correlation_time,
-            "stops": [asdict(one) for one in self.touched],
+            "stops": [asdict(one) | {"name": self.model.contact_rows[one.stop].name} for one in self.touched],
             "suggested_modes": self.modes,
             "suggested_steps": self.steps,
             "warnings": self.warnings,

@@ -106,21 +106,15 @@ def of_contacts(model: Model, touched: list[Touched]) -> list[str]:
     short = [one.stop for one in touched if one.periods <= 3 and one.time * fastest(model) < 3 * math.pi]
     found = []
     if soft:
-        found.append(f"{_listed(soft)}: so soft that a contact lasts half the lowest period or more: "
+        found.append(f"{_listed(model, soft)}: so soft that a contact lasts half the lowest period or more: "
                      "is the stiffness in N/m (Hertz: N/m^1.5)?")  # fmt: skip
     if short:
-        found.append(f"contacts with {_listed(short)} excite modes above the {len(model.omega)} kept: forces and "
-                     "contact times are this model's only; see suggested modes, or ask [mode_count]")  # fmt: skip
+        found.append(f"contacts with {_listed(model, short)} excite modes above the {len(model.omega)} kept: forces "
+                     "and contact times are this model's only; see suggested modes, or ask [mode_count]")  # fmt: skip
     return found
 
 
-def _listed(stops: list[int]) -> str:
-    """Stops in words, the first ones of many.
-
-    Examples
-    --------
-    >>> _listed([3]), _listed([0, 2]), _listed(list(range(5, 200)))
-    ('stop 3', 'stops 0, 2', 'stops 5, 6, 7, 8, 9, 10 and 189 more')
-    """
+def _listed(model: Model, stops: list[int]) -> str:
+    """Names of stops, the first ones of many."""
     more = f" and {len(stops) - NAMED} more" if len(stops) > NAMED else ""
-    return f"stop{'s' * (len(stops) > 1)} {', '.join(map(str, stops[:NAMED]))}{more}"
+    return "; ".join(model.contact_rows[stop].name for stop in stops[:NAMED]) + more

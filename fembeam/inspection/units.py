@@ -20,12 +20,15 @@ STEEP = 0.35  # rad; the slope of a beam
 def doubts(model: Model) -> list[str]:
     """Warnings about the numbers of a model's scene, as sentences; of its bodies, too."""
     scene = model.scene
-    if scene.named:
-        return [*of_damping(scene), *of_loads(scene, model)]
-    found = [*of_beam(scene.beam), *of_features(scene)]
+    found = _of_body(scene)
     for i, body in enumerate(scene.bodies):
-        found += [f"bodies[{i}]: {said}" for said in (*of_beam(body.beam), *of_features(body))]
+        found += [f"bodies[{i}]: {said}" for said in _of_body(body)]
     return [*found, *of_loads(scene, model)]
+
+
+def _of_body(scene: Scene) -> list[str]:
+    """Those about one beam and what stands on it; of a structure, about its damping."""
+    return of_damping(scene) if scene.named else [*of_beam(scene.beam), *of_features(scene)]
 
 
 def of_beam(beam: Beam) -> list[str]:
@@ -69,9 +72,11 @@ def of_features(scene: Scene) -> list[str]:
     weight = float(np.mean(scene.beam.line_mass(z)) * scene.beam.length)
     for i, mass in enumerate(scene.masses):
         if mass.mass > 1000 * weight:
-            found.append(f"masses[{i}] = {mass.mass:g} kg is {mass.mass / weight:.2g} times the beam: is it in grams?")
+            found.append(f"masses[{i}]{mass.quoted} = {mass.mass:g} kg is {mass.mass / weight:.2g} times the beam: "
+                         "is it in grams?")  # fmt: skip
     for i, part in enumerate(scene.acting):
-        at = f"stops[{i}]" if i < len(scene.stops) else f"elements[{i - len(scene.stops)}]"
+        count = len(scene.stops)
+        at = f"stops[{i}]{part.quoted}" if i < count else f"elements[{i - count}]{part.quoted}"
         found += [f"{at}: {said}" for said in [_of_gap(part, scene.beam.length)] if said]
     return found + of_damping(scene)
 

@@ -159,7 +159,7 @@ class ModalEquations:
         C = C + self.basis.project_matrix(self.matrices.dashpots)
         same = self.contact_rows if scene is self.scene else contact_rows(scene, self.matrices)
         pairs = zip(self.directions, same, strict=True)
-        contacts = [solvers.Contact(direction, one.law, one.gap, one.always) for direction, one in pairs]
+        contacts = [solvers.Contact(direction, one.law, one.gap, one.always, one.name) for direction, one in pairs]
         rows = [(self.basis.project(row.T)[:, 0], signal) for row, signal in loads(scene, self.matrices)]
         pushed = [*rows, *self._frame_loads(scene)]
         return solvers.System(np.eye(n), C, np.diag(self.omega**2), contacts, pushed, self.turning)
@@ -188,7 +188,7 @@ class ModalEquations:
         ):
             return self.system_of(scene)
         contacts = [
-            contact if new is old else solvers.Contact(contact.direction, new.law, new.gap, new.always)
+            contact if new is old else solvers.Contact(contact.direction, new.law, new.gap, new.always, contact.name)
             for contact, new, old in zip(own.contacts, parts, known, strict=False)
         ]
         kept = own.loads[: len(own.loads) - len(frame)]

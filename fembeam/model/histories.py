@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -36,7 +37,8 @@ class Histories:
     kinds: NDArray[np.bool_]
     shapes: Any  # Shapes, of a body with places by name PlacedShapes
     others: tuple[Any, ...]
-    titles: tuple[str, ...]
+    names: tuple[str, ...]
+    given: tuple[bool, ...]
     sampled: bool
 
     if TYPE_CHECKING:  # made by the run when first read
@@ -203,21 +205,29 @@ class Histories:
         column = coordinates.shape[1] - count + impactor
         return self._at_samples(coordinates)[:, column] / np.sqrt(self.impactor_masses[impactor])
 
-    def unit(self, quantity: str, stop: int | None = None) -> str:
+    def unit(self, quantity: str, stop: int | str | None = None) -> str:
         """Unit of "indentation", "speed", "force" or "impulse" of a stop; None: of a column that all of them share."""
         return unit_of(quantity, self.kinds[:, 0] if stop is None else self.kinds[[self._stop(stop)], 0])
 
     def name(self, stop: int) -> str:
-        """What tables call a stop or element: its name, else "stop 0", "element 1", "stop 2 (rotation)"."""
-        if self.titles and self.titles[stop]:
-            return self.titles[stop]
-        rotation, always = self.kinds[self._stop(stop)]
-        return f"{'element' if always else 'stop'} {stop}" + " (rotation)" * bool(rotation)
+        """What tables call a stop or element: its given name, else a made one such as "stop at 3 m, below"."""
+        return self.names[self._stop(stop)]
 
-    def indentation(self, stop: int = 0) -> Vector:
+    def key(self, stop: int, alone: bool = False) -> str:
+        """A name that other places and gaps leave as it is: the given one, else "stop 0", "element 2 (rotation)".
+
+        ``alone``: the number alone where none was given, as in columns that say what they hold.
+        """
+        stop = self._stop(stop) % len(self.stops)
+        rotation, always = self.kinds[stop]
+        if self.given[stop]:
+            return self.names[stop]
+        return str(stop) if alone else f"{'element' if always else 'stop'} {stop}" + " (rotation)" * bool(rotation)
+
+    def indentation(self, stop: int | str = 0) -> Vector:
         """δ(t) (k,) of a stop, m or rad; negative while it is open. Elements, then impactors, count on after the stops.
 
-        Of an element its deformation d(t).
+        Of an element its deformation d(t). ``stop`` may be a name: ``run.indentation("valve")``.
         """
         return self._at_samples(self._deformation(self._stop(stop)))
 
@@ -225,7 +235,7 @@ class Histories:
         """δ (k,), of the last state without samples."""
         return -self.q @ self.directions[stop] - self.stops[stop, 2]
 
-    def indentation_rate(self, stop: int = 0) -> Vector:
+    def indentation_rate(self, stop: int | str = 0) -> Vector:
         """δ̇(t) (k,) of a stop or element, m/s or rad/s: of both bodies where the stop moves."""
         return self._at_samples(self._deformation_rate(self._stop(stop)))
 
@@ -233,8 +243,13 @@ class Histories:
         """δ̇ (k,), likewise."""
         return -self.q_dot @ self.directions[stop]
 
-    def _stop(self, stop: int) -> int:
-        """The number of a contact, checked."""
+    def _stop(self, stop: int | str) -> int:
+        """The number of a contact, checked, of one called by its name too."""
+        if isinstance(stop, str):
+            near = get_close_matches(stop, self.names, 1, 0.0)
+            require(stop in self.names, "no contact has this name", stop, "Run", f"the nearest is {near[0]!r}"
+                    if near else "there is none at all")  # fmt: skip
+            return self.names.index(stop)
         count = len(self.stops)
         whole = isinstance(stop, (int, np.integer))
         require(whole and -count <= stop < count, f"stop must be below {count}, the number of stops", stop, "Run",

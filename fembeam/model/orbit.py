@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import solvers
 from fembeam.model.equations import load_period
-from fembeam.scene import title, unit_of
+from fembeam.scene import unit_of
 from fembeam.support import Part, Printed, is_whole, require
 from solvers.orbits import at_zero, delayed, periods_of_decay, settled, state_after, with_initial_memory
 from solvers.orbits import run as run_from
@@ -107,8 +107,7 @@ class Orbit(Printed):
         table: Part = ("multiplier |μ|", "angle / rad"), multipliers
         names = "t_in", "t_out", "speed_in", "peak_force"
         columns = [getattr(self.contacts, name).tolist() for name in names]
-        called = [title(row, i) or f"stop {i}" for i, row in enumerate(self.model.contact_rows)]
-        rows = [(called[stop], *row) for stop, *row in zip(self.contacts.stop, *columns, strict=True)]
+        rows = list(zip(self.contacts.name, *columns, strict=True))
         speed, force = (unit_of(of, [one.rotation for one in self.model.contact_rows]) for of in ("speed", "force"))
         log: list[Part] = [
             (("contact", "t_in / s", "t_out / s", f"entry speed / {speed}", f"peak force / {force}"), rows)

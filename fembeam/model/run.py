@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import solvers
 from fembeam.model.histories import Histories
-from fembeam.scene import ON, Source, title
+from fembeam.scene import ON, Source
 from fembeam.support import Part, Printed, is_finite
 from solvers.problem import Losses, counted
 
@@ -33,12 +33,13 @@ class Run(Histories, Printed):
     Attributes
     ----------
     t, q, q_dot : (k,) s, (k, n) and (k, n) modal coordinates and rates.
-    contacts : log of contacts: stop, t_in, t_out, speed_in, speed_out, peak_indentation, peak_force, impulse,
+    contacts : log of contacts: stop, name, t_in, t_out, speed_in, speed_out, peak_indentation, peak_force, impulse,
         energy_loss, entry_rate_clipped (arrays).
     energy : energy balance at t: input, damping, contact, stored, residual in J; made by ``ledger`` when first read.
     end : (2n + l,) [q, q̇] at the time reached and what laws have latched: a start from which another run goes on.
     status : how it ended, a sentence.
     cost : steps, rejections, law_calls, events, seconds.
+    names : what every contact is called: as its part was named, else such as "stop at 3 m, below".
     """
 
     t: Vector
@@ -66,7 +67,8 @@ class Run(Histories, Printed):
     end: Vector | None = None  # (2n + l,) [q, q̇] and what the laws have latched, at the time reached
     on: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 3), dtype=int))  # (m, 3): body, of ON, number
     kinds: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 2), dtype=bool))  # of rotation, always acting
-    titles: tuple[str, ...] = ()  # (m,) what tables call each contact, "" for its number
+    names: tuple[str, ...] = ()  # (m,) what every contact is called
+    given: tuple[bool, ...] = ()  # (m,) whether it was given that name, or it was made
     acting: tuple[Any, ...] = ()  # (m,) of each contact z, or (place, direction)
     sampled: bool = True  # else t, q, q_dot are the final state alone, and no history
 
@@ -129,7 +131,8 @@ class Run(Histories, Printed):
             end=solution.end,
             on=np.array([(one.body, ON.index(one.on[0]), one.on[1]) for one in rows], dtype=int).reshape(-1, 3),
             kinds=np.array([(one.rotation, one.always) for one in rows], dtype=bool).reshape(-1, 2),
-            titles=tuple(title(one, number) for number, one in enumerate(rows)),
+            names=tuple(one.name for one in rows),
+            given=tuple(one.given for one in rows),
             acting=tuple(one.z if one.direction is None else (one.z, one.direction) for one in rows),
             sampled=sampled,
         )
@@ -212,8 +215,10 @@ class Run(Histories, Printed):
 
         return to_xarray(self, z)
 
-    def force(self, stop: int = 0, mean: bool = False) -> Vector:
+    def force(self, stop: int | str = 0, mean: bool = False) -> Vector:
         """Contact force (k,) of a stop, N or N m, from its law and the entry rate latched at the time; of an element F.
+
+        ``stop``: its number, or its name as in ``run.force("valve")``.
 
         ``mean``: over each sample (halfway to its neighbours) instead of at it, so that contacts shorter than a sample
         are seen: the trapezoidal rule over the samples gives impulses as exactly as the run has them, those of the log

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -15,7 +17,7 @@ from fembeam.support import require
 from solvers.problem import dataframe, optional
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import ArrayLike
 
@@ -55,10 +57,8 @@ def write(run: Run, folder: Path, stride: int = 1, **chosen: Any) -> list[Path]:
     """Write `histories.csv` and `contacts.csv`; see `Run.to_csv`."""
     kept = histories(run, stride, **chosen)
     folder.mkdir(parents=True, exist_ok=True)
-    units = ((name, _unit_of_column(run, name), column) for name, column in run.contacts.arrays().items())
-    log: dict[str, Any] = {f"{name} [{unit}]" if unit else name: column for name, unit, column in units}
-    if any(run.titles):
-        log["name"] = [run.name(stop) for stop in run.contacts.stop]
+    units = ((name, _unit_of_column(run, name), column) for name, column in run.contacts.named_arrays().items())
+    log = {f"{name} [{unit}]" if unit else name: column for name, unit, column in units}
     return [_write(folder / "histories.csv", kept), _write(folder / "contacts.csv", log)]
 
 
@@ -89,11 +89,11 @@ def histories(
         columns |= {f"{what} {name} [{_unit(what, z)}]": _at(run, what, z) for what in asked if what not in ELSEWHERE}
     for stop in range(len(run.stops)):
         of_stops = (what for what in asked if what in ("indentation", "force"))
-        called = run.titles[stop] if run.titles and run.titles[stop] else str(stop)
-        columns |= {f"{what} {called} [{run.unit(what, stop)}]": getattr(run, what)(stop) for what in of_stops}
-        columns |= {f"work {called} [J]": run.losses.history[:, stop]} if "work" in asked else {}
+        key = run.key(stop, alone=True)
+        columns |= {f"{what} {key} [{run.unit(what, stop)}]": getattr(run, what)(stop) for what in of_stops}
+        columns |= {f"work {key} [J]": run.losses.history[:, stop]} if "work" in asked else {}
     for i, one in enumerate(run.reactions() if "reactions" in asked else ()):
-        about = f"{i} ({one.name})"
+        about = one.name if one.part.name is not None else f"{i} ({one.name})"
         if isinstance(one, BodyReaction):
             have = run.shapes.components if one.body == 0 else run.others[one.body - 1].components
             columns |= {f"reaction {c} {about} [{'N m' if c[0] == 'r' else 'N'}]": one[c] for c in have}
@@ -162,6 +162,7 @@ def to_xarray(run: Run, z: ArrayLike | None = None) -> Any:
         "z": ("z", [said(at) for at in place], {}) if named else ("z", place, {"units": "m"}),
         "stop": np.arange(len(run.stops)),
     }
+    axes["name"] = "stop", list(run.names)
     return optional("xarray", "a data set").Dataset(variables, axes, {"status": run.status, "scene": run.scene})
 
 
@@ -170,24 +171,30 @@ def _side_by_side(run: Run, history: Callable[[int], Vector]) -> Vector:
     return np.array([history(stop) for stop in range(len(run.stops))]).reshape(len(run.stops), len(run.t)).T
 
 
-def _write(target: Path, columns: Mapping[str, Vector]) -> Path:
-    """One file with a column each."""
+def _write(target: Path, columns: Mapping[str, Any]) -> Path:
+    """One file with a column each, numbers to twelve digits; text with a comma in it stands in quotes."""
     from fembeam.support import written_whole
 
+    texts = [np.asarray(column).dtype == object for column in columns.values()]
     with written_whole(target) as file:
-        if all(np.asarray(column).dtype.kind != "U" for column in columns.values()):
-            rows = np.column_stack([np.asarray(column, dtype=float) for column in columns.values()])
-            np.savetxt(file, rows, fmt=DIGITS, delimiter=",", header=_line(columns), comments="", encoding="utf-8")
+        wrapped = io.TextIOWrapper(file, encoding="utf-8", newline="", write_through=True)
+        writer = csv.writer(wrapped, lineterminator="\n")
+        writer.writerow(columns)
+        if any(texts):
+            kinds = [str if text else _digits for text in texts]
+            writer.writerows(
+                [kind(x) for kind, x in zip(kinds, row, strict=True)] for row in zip(*columns.values(), strict=True)
+            )
         else:
-            each = zip(*columns.values(), strict=True)
-            lines = (_line([one if isinstance(one, str) else DIGITS % one for one in row]) for row in each)
-            file.write("".join(f"{line}\n" for line in (_line(columns), *lines)).encode())
+            rows = np.column_stack([np.asarray(column, dtype=float) for column in columns.values()])
+            np.savetxt(wrapped, rows, fmt=DIGITS, delimiter=",")
+        wrapped.detach()
     return target
 
 
-def _line(fields: Iterable[str]) -> str:
-    """Fields of a CSV line, in quotes where they hold a comma."""
-    return ",".join(f'"{one}"' if "," in one else one for one in fields)
+def _digits(x: float) -> str:
+    """A number of a table."""
+    return DIGITS % x
 
 
 def parts(run: Run) -> list[Part]:

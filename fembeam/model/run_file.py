@@ -20,7 +20,7 @@ from fembeam.model.shapes import Shapes
 from fembeam.response import READOUT_UNITS, packed, unpacked
 from fembeam.scene import Source
 from fembeam.support import versions, written_whole
-from solvers.problem import Losses, Transitions, optional
+from solvers.problem import Losses, Transitions, columns_of, optional
 
 FORMAT = 4
 HDF5 = (".h5", ".hdf5")
@@ -66,11 +66,12 @@ def _contents(run: Run) -> tuple[str, dict[str, Any]]:
         "format": FORMAT,
         "status": run.status,
         "sampled": run.sampled,
+        "names": run.names,
+        "given": run.given,
         "scene": run.scene,
         "cost": {f.name: getattr(run.cost, f.name) for f in fields(run.cost)},
         "units": UNITS,
         "versions": versions(),
-        "titles": run.titles,
         "acting": run.acting,
         "bodies": [shapes.words if isinstance(shapes, PlacedShapes) else None for shapes in (run.shapes, *run.others)],
     }
@@ -120,7 +121,7 @@ def _means(run: Run) -> Any:
 
 def _packed(log: Transitions) -> tuple[list[str], Any]:
     """Names of events, and the log as a table (k, 9) that numbers them."""
-    columns = {f.name: getattr(log, f.name) for f in fields(log)}
+    columns = log.arrays()
     events = sorted(set(log.event))
     columns["event"] = [events.index(event) for event in log.event]
     return events, np.array(list(columns.values()), dtype=float).T
@@ -211,14 +212,16 @@ def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run
         name = Path(given["name"]).name
         source = Source(path.with_name(name), given["text"], tuple(given["overrides"]), files, of_run=True)
     bodies = sum(name.split("_")[0] == "nodes" for name in arrays)
-    if len(about["bodies"]) != bodies or not len(about["titles"]) == len(about["acting"]) == len(arrays["stops"]):
+    if len(about["bodies"]) != bodies or len(about["acting"]) != len(arrays["stops"]):
         raise ValueError("its words and its arrays are of other bodies and stops")
     numbered = zip(about["bodies"], ("", *(f"_{j}" for j in range(1, bodies))), strict=True)
     shapes = [_shapes_of(words, arrays[f"nodes{i}"], arrays[f"shapes{i}"]) for words, i in numbered]
     work, stored, slip = arrays["losses"].T
+    names = _names(about, len(arrays["stops"]))
+    log = (arrays[f"contact_{name}"] for name in columns_of(solvers.ContactLog))
     return Run(
         *(arrays["t"], arrays["q"], arrays["q_dot"]),
-        contacts=solvers.ContactLog(*(arrays[f"contact_{f.name}"] for f in fields(solvers.ContactLog))),
+        contacts=solvers.ContactLog(*log, names=names),
         ledger=partial(solvers.Energy, *(arrays[f"energy_{f.name}"] for f in fields(solvers.Energy))),
         status=about["status"],
         cost=solvers.Cost(**about["cost"]),
@@ -229,8 +232,8 @@ def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run
         scene=about["scene"],
         stored_forces=arrays["force"],
         stored_means=arrays["mean_force"],
-        borders=partial(Transitions, *_unpacked(about["events"], arrays["transitions"])),
-        lost=partial(Losses, work, stored, slip, arrays["work"]),
+        borders=partial(Transitions, *_unpacked(about["events"], arrays["transitions"]), names=names),
+        lost=partial(Losses, work, stored, slip, arrays["work"], names=names),
         end=arrays["end"],
         stored=unpacked(about["readout"], arrays, [getattr(one, "nodes", None) for one in shapes]),
         others=tuple(shapes[1:]),
@@ -238,7 +241,16 @@ def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run
         versions=about["versions"],
         on=arrays["on"],
         kinds=arrays["kinds"],
-        titles=tuple(about["titles"]),
         acting=tuples(about["acting"]),
         sampled=about["sampled"],
+        names=names,
+        given=tuple(map(bool, about["given"])),
     )
+
+
+def _names(about: dict[str, Any], contacts: int) -> tuple[str, ...]:
+    """What the contacts are called; ValueError unless each has one name and says whether it was given."""
+    names = about["names"]
+    if not len(names) == len(about["given"]) == contacts or not all(isinstance(name, str) for name in names):
+        raise ValueError(f"its words contradict its arrays: {contacts} contacts need as many names, it has {names}")
+    return tuple(names)

@@ -9,17 +9,16 @@ run with; mean_force (m, k), transitions (r, 9), losses (m, 3), work (k, m) and 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
 from fembeam.response import READOUT_FINITE, expected_readout
 from fembeam.scene import ON
-from solvers.problem import Transitions
+from solvers.problem import Transitions, columns_of
 
 Shape = tuple[int, ...]
-TRANSITION_COLUMNS = len(fields(Transitions))
+TRANSITION_COLUMNS = len(columns_of(Transitions))
 BOOLEAN = ("kinds", "contact_entry_rate_clipped")
 FINITE = {"transitions", "end", "shapes", "directions", "impactor_masses", *READOUT_FINITE}
 

@@ -221,7 +221,7 @@ class _Stage:
         self.title = self.beam_axis.set_title(" ")
         self._fixed(self.beam_axis)
         for i, force in enumerate(self.forces):
-            self.force_axis.step(self.run.t[self.samples], force, color=f"C{i}", where="mid", label=self._name(i))
+            self.force_axis.step(self.run.t[self.samples], force, color=f"C{i}", where="mid", label=self.run.name(i))
         self.cursor = self.force_axis.axvline(self.run.t[self.samples[0]], color=ORANGE)
         self.force_axis.set_xlabel("time / s")
         self.force_axis.set_ylabel(f"peak contact\nforce / {self.run.unit('force')}")
@@ -231,12 +231,6 @@ class _Stage:
         self.figure.draw_without_rendering()
         self.figure.set_layout_engine("none")  # once is enough, and takes longer than a picture
         return self.figure
-
-    def _name(self, number: int) -> str:
-        """A contact as text."""
-        one = self.contact_rows[number]
-        named = {"frame": "stop", "body": "beams", "impactor": f"impactor {one.number}"}[one.on]
-        return f"{'element' if one.always else named}, z = {1e3 * one.z:.4g} mm"
 
     def _limits(self, axis: Axes) -> float:
         """Set the view, on the beams: an impactor may leave it; returns its height in mm."""

@@ -45,16 +45,23 @@ def axis_name(path: str, scene: Scene) -> str:
         turns = kind == "forces" and _turns(scene, beam, int(number))
         name, unit = _of_signal(kind, signal, last, turns)
     elif kind == "dashpots" and last == "rotational":
-        name, unit = f"rotational damping of dashpot {number}", "N m s/rad"
+        name, unit = f"rotational damping of {_owner(scene, beam, kind, int(number))}", "N m s/rad"
     else:
         name, unit = (LAWS if ".law." in path else PARTS).get(last, ("", ""))
         if kind in ("stops", "elements") and last not in ("z", "on", "to") and _rotates(scene, beam, kind, int(number)):
             unit = TURNED.get(unit, unit)
-        name += f" of {OWNERS[kind]} {number}" if name and kind in OWNERS else ""
+        name += f" of {_owner(scene, beam, kind, int(number or 0))}" if name and kind in OWNERS else ""
     if not name:
         return path
     name += f" of beam {int(beam) + 1}" if beam else ""
     return f"{name} / {unit}" if unit else name
+
+
+def _owner(scene: Scene, beam: str | None, kind: str, number: int) -> str:
+    """What a part is called: its name, else its kind and number."""
+    parts = getattr(scene if beam is None else scene.bodies[int(beam)], kind)
+    named = number < len(parts) and parts[number].name is not None
+    return str(parts[number].name) if named else f"{OWNERS[kind]} {number}"
 
 
 def _rotates(scene: Scene, beam: str | None, kind: str, number: int) -> bool:

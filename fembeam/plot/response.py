@@ -206,12 +206,10 @@ def _stops_at(run: Run, body: int, z: Any) -> NDArray[np.int64]:
 
 
 def _listed(stops: NDArray[np.int64], run: Run) -> str:
-    """Numbers of stops as words."""
+    """Stops as words."""
     if len(stops) == np.count_nonzero(~run.kinds[:, 1]) > 1:
         return "all stops"
-    if any(run.titles[stop] for stop in stops):
-        return ", ".join(run.name(stop) for stop in stops)
-    return f"stop{'s' * (len(stops) > 1)} " + ", ".join(map(str, stops))
+    return " and ".join(run.key(stop) for stop in stops.tolist())
 
 
 def _name(run: Run, body: int, z: Any) -> str:
@@ -255,7 +253,7 @@ def _draw_forces(axis: Axes, run: Run, lo: float, hi: float, least: float) -> No
     drawn = np.union1d(always, log.stop[inside])
     for stop in drawn:
         mine = log.stop == stop
-        look: dict[str, Any] = {"color": f"C{stop}", "label": _stop_name(run, int(stop))}
+        look: dict[str, Any] = {"color": f"C{stop}", "label": run.name(int(stop))}
         if stop in always or np.any(mine & inside & ~short):
             axis.plot(run.t[kept], run.force(int(stop))[kept], **look)
             look.pop("label")
@@ -270,15 +268,6 @@ def _draw_forces(axis: Axes, run: Run, lo: float, hi: float, least: float) -> No
     else:
         axis.set(ylim=(0.0, 1.0), yticks=[0.0])
         axis.text(0.5, 0.5, "no contact in this window", transform=axis.transAxes, ha="center", color=GREY)
-
-
-def _stop_name(run: Run, stop: int) -> str:
-    """A contact as words."""
-    (z, push, _), one_sided = run.stops[stop], not run.kinds[stop].any()
-    if np.isnan(z):
-        return run.name(stop)
-    side = f", {'below' if push > 0 else 'above'}" if one_sided else ""
-    return f"{run.name(stop)}{side}, {place_name(z)}"
 
 
 def _mark_features(axis: Axes, model: Model, unit: float) -> None:

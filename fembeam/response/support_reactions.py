@@ -57,7 +57,9 @@ class Reaction:
 
     @property
     def name(self) -> str:
-        """Such as "Clamped at z = 0 m"."""
+        """The name of the part, else such as "Clamped at z = 0 m"."""
+        if self.part.name is not None:
+            return str(self.part.name)
         at = f"z = {self.part.z:g} m" if is_finite(self.part.z) else told(self.part.z)
         return f"{type(self.part).__name__} at {at}" + (f" of beam {self.body}" if self.body else "")
 

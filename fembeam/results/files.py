@@ -20,11 +20,12 @@ from fembeam.model import Run
 from fembeam.model.run_csv import extremes_table, histories
 from fembeam.scene import unit_of
 from fembeam.statistics import Batches, Estimate, moments
-from fembeam.support import aligned, versions, written_whole
+from fembeam.support import aligned, require, versions, written_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+UNDATED: dict[str, dict[str, Any]] = {"png": {"Software": None}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
 FEWEST_SAMPLES = 64  # below this neither a spectrum nor a density says anything
 
 
@@ -91,9 +92,11 @@ def write_text(target: Path, text: str) -> Path:
 
 
 def write_figure(target: Path, figure: Figure) -> Path:
-    """One PNG; the same figure gives the same bytes."""
+    """One PNG, or SVG or PDF by the name; the same figure gives the same bytes."""
+    kind = target.suffix.lower().removeprefix(".")
+    require(kind in UNDATED, "a figure must end in .png, .svg or .pdf", target.name, "its file name", "choose one")
     with written_whole(target) as file:
-        figure.savefig(file, format="png", dpi=150, metadata={"Software": None})
+        figure.savefig(file, format=kind, dpi=150, metadata=UNDATED[kind])
     return target
 
 
@@ -150,7 +153,7 @@ def _moments(run: Run, discard: float) -> dict[str, dict[str, float]]:
     if np.count_nonzero(kept) < 2:
         return {}
     signals = {f"displacement, {name}": run.displacement(z)[kept] for name, z in plot.places(run.shapes).items()}
-    signals |= {f"indentation, {run.name(i)}": run.indentation(i)[kept] for i in range(len(run.stops))}
+    signals |= {f"indentation, {run.key(i)}": run.indentation(i)[kept] for i in range(len(run.stops))}
     extremes = {name: {"min": float(x.min()), "max": float(x.max())} for name, x in signals.items()}
     error = partial(_error_of_std, parts=plot.batches(run, discard))
     return {name: asdict(moments(x)) | {"std_error": error(x)} | extremes[name] for name, x in signals.items()}
@@ -191,8 +194,8 @@ def _contacts(run: Run, discard: float) -> list[dict[str, Any]]:
     for stop in np.flatnonzero(run.kinds[:, 1] == 0).tolist():
         kept = (log.stop == stop) & (log.t_in >= discard) & np.isfinite(log.t_out)
         z = float(run.stops[stop, 0])
-        row: dict[str, Any] = {"stop": stop, "z": None if np.isnan(z) else z, "number": int(kept.sum())}
-        row |= {"name": run.name(stop)} if run.kinds[stop, 0] or run.titles[stop] else {}
+        row: dict[str, Any] = {"stop": stop, "name": run.name(stop), "z": None if np.isnan(z) else z}
+        row["number"] = int(kept.sum())
         row["rate"] = row["number"] / span if span > 0 else None
         row["rate_error"] = _error_of_rate(log.t_in[kept], discard, discard + span, parts)
         columns = {"duration": log.t_out - log.t_in, "peak_force": log.peak_force, "entry_speed": log.speed_in}
@@ -227,8 +230,7 @@ def text(found: dict[str, Any]) -> str:
     columns = {"mean time/s": "duration", f"mean peak force/{force}": "peak_force",
                f"mean entry speed/({speed})": "entry_speed"}  # fmt: skip
     rows = [
-        [row.get("name", f"stop {row['stop']}"), row["number"], row["rate"]]
-        + [row.get(column, {}).get("mean") for column in columns.values()]
+        [row["name"], row["number"], row["rate"]] + [row.get(column, {}).get("mean") for column in columns.values()]
         for row in found["contacts"]
     ]
     tables += [aligned(("", "contacts", "per second", *columns), rows)] if rows else []

@@ -42,7 +42,7 @@ MOMENT_ROWS = (
 OUTPUT_COLUMNS = ("mean", "std", "min", "at t / s", "max", "at t / s")
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 PREFIXES = ("p", "n", "µ", "m", "", "k", "M", "G", "T")
-ORDER = ("time_history", "psd", "densities", "response_spectrum", "contacts", "modes")
+ORDER = ("rig", "time_history", "psd", "densities", "response_spectrum", "contacts", "modes")
 
 
 def write_page(
@@ -143,7 +143,7 @@ def _simulation(found: dict[str, Any]) -> Iterator[str]:
             ]
             for words, unit, *keys in CONTACT_ROWS
         ]
-        stops = [row.get("name", f"stop {row['stop']}") for row in found["contacts"]]
+        stops = [row["name"] for row in found["contacts"]]
         yield "<h2>Contacts</h2>" + html_table(["", *stops], rows)
     if found.get("outputs"):
         rows = [[name, *map(_number, row.values())] for name, row in found["outputs"].items()]

@@ -1,16 +1,17 @@
 """The scene: supports, masses, springs, stops, elements, impactors, loads; full matrices, contact rows, signals.
 
 Imports: `beams`, `structures`, `excitation`, `support`, `reduction`; inside the methods `Scene.reduce` also
-`fembeam.model`, `Scene.check` `fembeam.inspection`. Begin with `scene`, then `assembly`.
+`fembeam.model`, `Scene.figure` `fembeam.plot`, `Scene.check` `fembeam.inspection`. Begin with `scene`, then `assembly`.
 """
 
 from fembeam.scene.assembly import MOST_DENSE, Matrices, unsupported
 from fembeam.scene.body_assembly import BodyMatrices, respun
-from fembeam.scene.contact_rows import ON, contact_rows, heights, loaded, loads, static_rows, title, watched, weight
+from fembeam.scene.contact_rows import ON, contact_rows, heights, loaded, loads, static_rows, watched, weight
 from fembeam.scene.element import Element, tangent
 from fembeam.scene.impactor import Impactor
 from fembeam.scene.local_coordinate import LocalCoordinate, unit_of
 from fembeam.scene.parameters import changes_structure, path_of, replaced, value_of, with_value
+from fembeam.scene.part import ScenePart
 from fembeam.scene.parts import (
     Clamped,
     Dashpot,

@@ -16,10 +16,10 @@ from scipy import sparse
 from fembeam.excitation import Harmonic
 from fembeam.scene.element import force_both_ways
 from fembeam.scene.local_coordinate import LocalCoordinate
-from fembeam.scene.places import said
 
 if TYPE_CHECKING:
     from fembeam.scene.assembly import Matrices
+    from fembeam.scene.part import ScenePart
     from fembeam.scene.scene import Scene
 
 
@@ -38,7 +38,8 @@ class ContactRow:
     body, z : the beam it pushes (0 the scene's own) and where.
     on : ("frame", 0), ("body", b) or ("impactor", i): what it pushes from.
     rotation : whether it acts on the slope: rad and N m. always : whether it acts at both signs of δ, an element.
-    name : as given. direction : as given, of places by name.
+    name : of the part, given or made; of an impactor on both sides with its side. given : whether it was given.
+    direction : as given, of places by name.
     """
 
     row: sparse.csr_matrix
@@ -50,7 +51,8 @@ class ContactRow:
     on: tuple[str, int]
     rotation: bool = False
     always: bool = False
-    name: str | None = None
+    name: str = ""
+    given: bool = False
     direction: Any = None
 
     @property
@@ -67,7 +69,8 @@ class ContactRow:
 
 def contact_rows(scene: Scene, matrices: Matrices) -> list[ContactRow]:
     """All contacts in the order of the log: for each beam its stops, then its elements, then its impactors."""
-    return list(_contact_rows(scene, matrices))
+    rows = list(_contact_rows(scene, matrices))
+    return [replace(row, name=name) for row, name in zip(rows, _distinct(rows), strict=True)]
 
 
 def _contact_rows(scene: Scene, matrices: Matrices) -> Iterator[ContactRow]:
@@ -77,14 +80,36 @@ def _contact_rows(scene: Scene, matrices: Matrices) -> Iterator[ContactRow]:
         for one in part.acting:
             place = one.coordinate
             on = ("frame", 0) if place.to is None else ("body", place.to[0] or body)
-            row = one.push * place.row(matrices, body)
-            kind = place.rotation, one.always, one.name, one.direction
+            row, name = one.push * place.row(matrices, body), _name(one, body)
+            kind = place.rotation, one.always, *name, one.direction
             yield ContactRow(row, one.law, one.gap, one.push, body, one.z, on, *kind)
         for impactor in part.impactors:
             row = matrices.interpolation(impactor.z, body=body) - matrices.impactor_row(count)
+            label, given = _name(impactor, body)
             for push in impactor.pushes:
-                yield ContactRow(push * row, impactor.law, impactor.gap, push, body, impactor.z, ("impactor", count))
+                side = {1.0: ", below", -1.0: ", above"}[push] if len(impactor.pushes) > 1 else ""
+                facing = body, impactor.z, ("impactor", count)
+                yield ContactRow(push * row, impactor.law, impactor.gap, push, *facing, name=label + side, given=given)
             count += 1
+
+
+def _name(part: ScenePart, body: int) -> tuple[str, bool]:
+    """What a part of a beam is called, and whether the name was given."""
+    return part.label_on(body), part.name is not None
+
+
+def _distinct(rows: list[ContactRow]) -> list[str]:
+    """Names of contacts; made ones that are taken already are numbered: "element at 0.3 m (2)"."""
+    found: list[str] = []
+    taken = {row.name for row in rows if row.given}
+    for row in rows:
+        name, number = row.name, 1
+        while not row.given and name in taken:
+            number += 1
+            name = f"{row.name} ({number})"
+        taken.add(name)
+        found.append(name)
+    return found
 
 
 def loads(scene: Scene, matrices: Matrices) -> list[tuple[sparse.csr_matrix, Any]]:
@@ -151,12 +176,3 @@ def heights(scene: Scene) -> tuple[list[float], list[float]]:
         for impactor in part.impactors
     ]
     return beams, on_impactors
-
-
-def title(row: ContactRow, number: int) -> str:
-    """What tables call a contact: its name, or where it acts by names; "" where its number will do."""
-    if row.name is not None:
-        return row.name
-    if row.direction is None:
-        return ""
-    return f"{'element' if row.always else 'stop'} {number} at {said((row.z, row.direction))}"

@@ -13,17 +13,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fembeam.scene.impactor import check_law, check_name
+from fembeam.scene.impactor import check_law
 from fembeam.scene.local_coordinate import LocalCoordinate, Of, local_coordinate
-from fembeam.scene.places import Place, Second, Shown, told
+from fembeam.scene.part import ScenePart
+from fembeam.scene.places import Second
 from fembeam.structures import Direction, direction_of
-from fembeam.support import require, require_finite, require_place
+from fembeam.support import require, require_finite
 
 TRIED = np.array([1e-6, 1e-4, 1e-3])  # deformations, m or rad, of both signs, at which a law is tried out
 
 
 @dataclass(frozen=True, repr=False)
-class Element(Shown):
+class Element(ScenePart):
     """A local element that always acts: force F(d, ḋ) against its deformation d = u(z) - gap, or that of u_z.
 
     Parameters
@@ -35,7 +36,7 @@ class Element(Shown):
         `Scene.bodies`, 1 the first. d is then the difference, u(z) - u_to - gap.
     gap : d = 0 at u = gap, m or rad: an offset, since the law acts on both sides.
     direction : on other bodies than a `Beam`: along what d is measured, "x", "-y", "rz" or a vector.
-    name : what tables call it.
+    name : keyword, what tables and figures call it, unique in a scene.
 
     Raises
     ------
@@ -51,23 +52,21 @@ class Element(Shown):
     True
     """
 
-    z: Place
     law: Any
     of: Of = "displacement"
     to: Second | None = None
     gap: float = 0.0
     direction: Direction | None = None
-    name: str | None = None
     push = -1.0  # δ = d: direction -W
     always = True
+    word = "element"
 
     def __post_init__(self) -> None:
-        require_place(self.z, self)
-        where = f"Element at {told(self.z)}"
+        super().__post_init__()
+        where = self.where
         require_finite("gap", self.gap, where, "give the offset in m, or rad of a rotation")
         if isinstance(self.direction, list):
             object.__setattr__(self, "direction", tuple(self.direction))
-        check_name(self.name, where)
         _ = self.coordinate
         check_law(self.law, where)
         why = next(one_sided(self.law), "")
@@ -77,10 +76,14 @@ class Element(Shown):
     @property
     def coordinate(self) -> LocalCoordinate:
         """What it acts on."""
-        found = local_coordinate(self.z, self.of, self.to, f"Element at {told(self.z)}", "to", self.direction)
+        found = local_coordinate(self.z, self.of, self.to, self.where, "to", self.direction)
         if self.direction is None:
             return found
-        return replace(found, direction=direction_of(self.direction, f"Element at {told(self.z)}"))
+        return replace(found, direction=direction_of(self.direction, self.where))
+
+    def _made(self, at: str) -> str:
+        of, to = " of rotation" * (self.direction is None and self.coordinate.rotation), self.coordinate.to_words
+        return f"{self.word}{of} " + (f"from {at} to {to}" if to else f"at {at}")
 
 
 def one_sided(law: Any) -> Iterator[str]:

@@ -8,14 +8,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from fembeam.scene.places import Place
-from fembeam.support import require, require_finite, require_non_negative, require_place, require_positive
+from fembeam.scene.part import ScenePart
+from fembeam.support import require, require_finite, require_non_negative, require_positive
 
 SIDES = {"above": (-1.0,), "below": (1.0,), "both": (1.0, -1.0)}
 
 
-@dataclass(frozen=True)
-class Impactor:
+@dataclass(frozen=True, repr=False)
+class Impactor(ScenePart):
     """A rigid mass over or under the beam that moves across it and strikes it at z.
 
     Parameters
@@ -28,6 +28,7 @@ class Impactor:
     side : "above", "below", or "both" (it embraces the beam with clearance `gap` on each side; two contacts, the
         one below first); None: above, unless it starts upwards.
     stiffness, damping : of its own spring (N/m) and dashpot (N s/m) to the frame, ≥ 0; 0 and 0: a free mass.
+    name : keyword, what the contact log, tables and figures call it, unique in a scene.
 
     Raises
     ------
@@ -40,7 +41,6 @@ class Impactor:
     (-1.0,)
     """
 
-    z: Place
     mass: float
     velocity: float
     law: Any
@@ -48,10 +48,11 @@ class Impactor:
     side: str | None = None
     stiffness: float = 0.0
     damping: float = 0.0
+    word = "impactor"
 
     def __post_init__(self) -> None:
-        require_place(self.z, self)
-        where = f"Impactor at z = {self.z}"
+        super().__post_init__()
+        where = self.where
         require_positive("mass", self.mass, where, "give kg")
         require_finite("velocity", self.velocity, where, "give m/s, below 0 for a strike from above")
         require_finite("gap", self.gap, where, "give the distance to the beam in m")
@@ -69,11 +70,9 @@ class Impactor:
         """Directions in which its contacts push the beam: +1 up (it sits below), -1 down."""
         return SIDES[self.side or ("below" if self.velocity > 0 else "above")]
 
-
-def check_name(name: Any, where: str) -> None:
-    """Raise ValueError unless a name is text, or left out."""
-    require(name is None or (isinstance(name, str) and bool(name.strip())), "name must be text", name, where,
-            "leave it out, or write name='valve'")  # fmt: skip
+    def _made(self, at: str) -> str:
+        side = "" if len(self.pushes) > 1 else ", below" if self.pushes[0] > 0 else ", above"
+        return f"{super()._made(at)}{side}"
 
 
 def check_law(law: Any, where: str) -> None:

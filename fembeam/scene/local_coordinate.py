@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from scipy import sparse
 
-from fembeam.scene.places import is_pair, is_place, unsigned
+from fembeam.scene.places import is_pair, is_place, place_words, unsigned
 from fembeam.structures import TURN, UP, Six, direction_of, turns
 from fembeam.support import is_finite, is_whole, require
 
@@ -68,6 +68,16 @@ class LocalCoordinate:
     def along(self) -> Six:
         """Its direction on the six components."""
         return (UP, TURN)[self.derivative] if self.direction is None else self.direction
+
+    @property
+    def to_words(self) -> str:
+        """The second place: "0.8 m", "0.2 m of beam 1"; empty without one."""
+        if self.to is None:
+            return ""
+        place = (
+            self.to[1] if self.direction is None or is_pair(self.to[1]) else str(self.to[1])
+        )  # a number names a node
+        return place_words(place) + (f" of beam {self.to[0]}" if self.to[0] else "")
 
     def row(self, matrices: Matrices, body: int = 0) -> sparse.csr_matrix:
         """W (1, N) on the free dofs, for a first place on `body`."""

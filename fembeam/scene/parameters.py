@@ -1,8 +1,9 @@
 """The scalars of a scene by name: read them, and make the same scene with another value.
 
-A name is a path such as ``base.omega``, ``stops[0].gap``, ``stops[0].law.stiffness`` or ``masses[1].mass``. Its last
-part alone will do where no other path ends so; ``omega`` and ``amplitude`` mean the base motion's first, and every name
-the scene's own part before that of a body, ``bodies[0].stops[0].gap``.
+A name is a path such as ``base.omega``, ``stops[0].gap``, ``stops[0].law.stiffness`` or ``masses[1].mass``; a part that
+has a name may be called by it, ``stops[valve].gap``. Its last part alone will do where no other path ends so; ``omega``
+and ``amplitude`` mean the base motion's first, and every name the scene's own part before that of a body,
+``bodies[0].stops[0].gap``.
 """
 
 from __future__ import annotations
@@ -52,8 +53,11 @@ def _numbers(path: str, item: Any) -> dict[str, float]:
 
 
 def path_of(scene: Scene, name: str) -> str:
-    """The full path a name means; an unknown or ambiguous one is an error that lists what there is."""
-    known = scalars(scene)
+    """The full path a name means; an unknown or ambiguous one is an error that lists what there is.
+
+    A part may be called by its name: ``stops[valve].gap``.
+    """
+    known, name = scalars(scene), numbered(scene, name)
     if name in known:
         return name
     ends = [path for path in known if path.endswith(f".{name}")]
@@ -62,6 +66,15 @@ def path_of(scene: Scene, name: str) -> str:
     require(bool(ends), f"no such parameter; the scene has {', '.join(known)}", name, "parameter", "use one of these")
     require(len(first) == 1, f"ambiguous parameter: {', '.join(ends)}", name, "parameter", "give the whole path")
     return first[0]
+
+
+def numbered(scene: Scene, path: str) -> str:
+    """A path with numbers for the names of parts: "stops[0].gap" for "stops[valve].gap"."""
+    for numbers, part in scene.named_parts.items():
+        called = f"{numbers.rpartition('[')[0]}[{part.name}]."
+        if path.startswith(called):
+            return f"{numbers}.{path.removeprefix(called)}"
+    return path
 
 
 def value_of(scene: Scene, name: str) -> float:

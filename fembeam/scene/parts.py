@@ -9,15 +9,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from fembeam.scene.impactor import check_law, check_name
+from fembeam.scene.impactor import check_law
 from fembeam.scene.local_coordinate import LocalCoordinate, Of, local_coordinate
-from fembeam.scene.places import Place, Second, Shown, sign_of, told
+from fembeam.scene.part import ScenePart
+from fembeam.scene.places import Place, Second, sign_of
 from fembeam.structures import COMPONENTS, Direction, Six, direction_of, turns
-from fembeam.support import require, require_finite, require_non_negative, require_place
+from fembeam.support import require, require_finite, require_non_negative
 
 
-@dataclass(frozen=True)
-class Clamped:
+@dataclass(frozen=True, repr=False)
+class Clamped(ScenePart):
     """u = 0 and u_z = 0 at z (m); of other bodies than a `Beam` no component of a place moves.
 
     Examples
@@ -26,16 +27,13 @@ class Clamped:
     (True, True)
     """
 
-    z: Place
+    word = "clamp"
     fixed = (True, True)
     dofs = COMPONENTS
 
-    def __post_init__(self) -> None:
-        require_place(self.z, self)
 
-
-@dataclass(frozen=True)
-class Pinned:
+@dataclass(frozen=True, repr=False)
+class Pinned(ScenePart):
     """u = 0 at z (m), free to turn; of other bodies than a `Beam` no displacement of a place.
 
     Examples
@@ -44,16 +42,13 @@ class Pinned:
     (True, False)
     """
 
-    z: Place
+    word = "pin"
     fixed = (True, False)
     dofs = COMPONENTS[:3]
 
-    def __post_init__(self) -> None:
-        require_place(self.z, self)
 
-
-@dataclass(frozen=True)
-class Guided:
+@dataclass(frozen=True, repr=False)
+class Guided(ScenePart):
     """u_z = 0 at z (m), free to move; for a `Beam` only, elsewhere `Fixed` names the rotations.
 
     Examples
@@ -62,16 +57,13 @@ class Guided:
     (False, True)
     """
 
-    z: Place
+    word = "guide"
     fixed = (False, True)
     dofs = ()
 
-    def __post_init__(self) -> None:
-        require_place(self.z, self)
 
-
-@dataclass(frozen=True, init=False)
-class Fixed:
+@dataclass(frozen=True, repr=False, init=False)
+class Fixed(ScenePart):
     """Chosen components of a place do not move: Fixed(place, "x", "rz"); none named: all that it has.
 
     `dofs` are of "x", "y", "z", "rx", "ry", "rz"; of a `Beam` "y" is u and "rx" is -u_z. ValueError for another name,
@@ -83,17 +75,18 @@ class Fixed:
     (('x', 'y'), True)
     """
 
-    z: Place
     dofs: tuple[str, ...] = ()
+    word = "fixing"
 
-    def __init__(self, z: Place, *named: str, dofs: tuple[str, ...] = ()) -> None:
+    def __init__(self, z: Place, *named: str, dofs: tuple[str, ...] = (), name: str | None = None) -> None:
         chosen = tuple(named) + tuple(dofs)
-        require_place(z, self)
-        for dof in chosen:
-            require(dof in COMPONENTS, f"dofs must be of {', '.join(COMPONENTS)}", dof, f"Fixed at {told(z)}",
-                    "choose from these, or name none to fix all")  # fmt: skip
-        require(len(set(chosen)) == len(chosen), "dofs must be named once", chosen, f"Fixed at {told(z)}", "keep one")
         object.__setattr__(self, "z", z)
+        object.__setattr__(self, "name", name)
+        super().__post_init__()
+        for dof in chosen:
+            require(dof in COMPONENTS, f"dofs must be of {', '.join(COMPONENTS)}", dof, self.where,
+                    "choose from these, or name none to fix all")  # fmt: skip
+        require(len(set(chosen)) == len(chosen), "dofs must be named once", chosen, self.where, "keep one")
         object.__setattr__(self, "dofs", chosen or COMPONENTS)
 
     @property
@@ -105,8 +98,8 @@ class Fixed:
 Support = Clamped | Pinned | Guided | Fixed
 
 
-@dataclass(frozen=True)
-class LumpedMass:
+@dataclass(frozen=True, repr=False)
+class LumpedMass(ScenePart):
     """A rigid body fixed to the beam at z: T = ½ m (u̇ + e u̇_z)² + ½ J u̇_z².
 
     `mass` m in kg, `inertia` J about its own centre in kg m², both ≥ 0; `offset` e in m: the centre sits
@@ -121,14 +114,14 @@ class LumpedMass:
     6.667e-06
     """
 
-    z: Place
     mass: float
     inertia: float | tuple[float, float, float] = 0.0
     offset: float | tuple[float, float, float] = 0.0
+    word = "mass"
 
     def __post_init__(self) -> None:
-        require_place(self.z, self)
-        where = f"LumpedMass at {told(self.z)}"
+        super().__post_init__()
+        where = self.where
         require_non_negative("mass", self.mass, where, "give kg")
         for name, check in (("inertia", require_non_negative), ("offset", require_finite)):
             value = getattr(self, name)
@@ -140,7 +133,7 @@ class LumpedMass:
 
 
 @dataclass(frozen=True, repr=False)
-class Spring(Shown):
+class Spring(ScenePart):
     """A spring to the frame: force -k (u - foot) (`stiffness`, N/m), moment -κ u_z (`rotational`, N m/rad); ≥ 0.
 
     `foot` is a signal, the motion of its far end relative to the frame in m (a shaken support); None: at rest. On other
@@ -154,15 +147,15 @@ class Spring(Shown):
     10.0
     """
 
-    z: Place
     stiffness: float
     rotational: float = 0.0
     foot: Any = None
     direction: Direction | None = None
+    word = "spring"
 
     def __post_init__(self) -> None:
-        require_place(self.z, self)
-        where = f"Spring at {told(self.z)}"
+        super().__post_init__()
+        where = self.where
         require_non_negative("stiffness", self.stiffness, where, "give N/m")
         require_non_negative("rotational", self.rotational, where, "give N m/rad")
         require(self.foot is None or callable(self.foot), "foot must be a signal or None", self.foot, where,
@@ -176,7 +169,7 @@ class Spring(Shown):
 
 
 @dataclass(frozen=True, repr=False)
-class Dashpot(Shown):
+class Dashpot(ScenePart):
     """A dashpot to the frame: force -c u̇ (`damping`, N s/m), moment -γ u̇_z (`rotational`, N m s); ≥ 0.
 
     On other bodies than a `Beam` it acts along `direction`, in N m s if that is a rotation. ValueError for one below 0.
@@ -187,14 +180,14 @@ class Dashpot(Shown):
     Dashpot(z=0.3, damping=2.0, rotational=0.0)
     """
 
-    z: Place
     damping: float
     rotational: float = 0.0
     direction: Direction | None = None
+    word = "dashpot"
 
     def __post_init__(self) -> None:
-        require_place(self.z, self)
-        where = f"Dashpot at {told(self.z)}"
+        super().__post_init__()
+        where = self.where
         require_non_negative("damping", self.damping, where, "give N s/m")
         require_non_negative("rotational", self.rotational, where, "give N m s/rad")
         _check_direction(self, where)
@@ -206,7 +199,7 @@ class Dashpot(Shown):
 
 
 @dataclass(frozen=True, repr=False)
-class Stop(Shown):
+class Stop(ScenePart):
     """A one-sided stop: δ = -u - gap below the beam, δ = u - gap above it; of rotation δ = ∓u_z - gap.
 
     On any body `direction` n is the way the place moves when the gap closes, δ = n·u - gap: "y" is above a beam, "-y"
@@ -214,7 +207,8 @@ class Stop(Shown):
     `law` gives the repulsive force for δ > 0; `gap` in m, negative = preload. It sits on the frame, or `on` another
     beam of the scene: `on=(body, z)`, body 1 the first of `Scene.bodies`; u is then the difference, u - u_body(z). A
     number for `on` is a second place on the same beam. With `of="rotation"` it limits the slope u_z, a hinge with
-    freeplay: gap in rad, force a moment in N m, "below" stops u_z < 0, "above" u_z > 0. `name` is what tables call it.
+    freeplay: gap in rad, force a moment in N m, "below" stops u_z < 0, "above" u_z > 0.
+    `name` (keyword, as of all parts): what the contact log, tables and figures call it, unique in a scene.
     ValueError for a side that is neither "below" nor "above", a side beside a direction, an `of` that is neither, a gap
     that is not finite.
 
@@ -228,21 +222,22 @@ class Stop(Shown):
     True
     >>> Stop("lever", Hertz(1e9), gap=1e-3, direction="-x", name="lift").coordinate.direction
     (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    >>> both[0].label, Stop("lever", Hertz(1e9), direction="-x").label
+    ('stop at 0.2 m, below', 'stop at lever, -x')
     """
 
-    z: Place
     law: Any
     gap: float = 0.0
     side: str | None = None
     on: Second | None = None
     of: Of = "displacement"
     direction: Direction | None = None
-    name: str | None = None
     always = False
+    word = "stop"
 
     def __post_init__(self) -> None:
-        require_place(self.z, self)
-        where = f"Stop at {told(self.z)}"
+        super().__post_init__()
+        where = self.where
         require_finite("gap", self.gap, where, "give the clearance in m (rad of a rotation), negative for a preload")
         require(self.direction is None or self.side is None, "side and direction exclude each other",
                 (self.side, self.direction), where, "keep the direction: 'y' is above, '-y' below")  # fmt: skip
@@ -252,7 +247,6 @@ class Stop(Shown):
                 "choose one")  # fmt: skip
         _check_direction(self, where)
         local_coordinate(self.z, self.of, self.on, where, "on", self.direction)
-        check_name(self.name, where)
         check_law(self.law, where)
         acts_always = getattr(self.law, "memory", ()) and not getattr(self.law, "one_sided", False)
         require(not acts_always, "law must be one that opens", self.law, where, "make it an Element, which always acts")
@@ -267,11 +261,16 @@ class Stop(Shown):
     @property
     def coordinate(self) -> LocalCoordinate:
         """What it acts on."""
-        return local_coordinate(self.z, self.of, self.on, f"Stop at {told(self.z)}", "on", self.direction)
+        return local_coordinate(self.z, self.of, self.on, self.where, "on", self.direction)
+
+    def _made(self, at: str) -> str:
+        of, on = " of rotation" * (self.direction is None and self.coordinate.rotation), self.coordinate.to_words
+        side = f", {self.side}" if self.direction is None else ""
+        return f"{self.word}{of} at {at}{side}" + (f", on {on}" if on else "")
 
 
 @dataclass(frozen=True, repr=False)
-class PointForce(Shown):
+class PointForce(ScenePart):
     """A force on the beam at z: signal(t) in N, positive up; on other bodies along `direction`.
 
     Examples
@@ -281,13 +280,13 @@ class PointForce(Shown):
     100.0
     """
 
-    z: Place
     signal: Any
     direction: Direction | None = None
+    word = "force"
 
     def __post_init__(self) -> None:
-        require_place(self.z, self)
-        where = f"PointForce at {told(self.z)}"
+        super().__post_init__()
+        where = self.where
         require(callable(self.signal), "signal must be a function of t", self.signal, where,
                 "give a signal such as Harmonic(amplitude, omega); Harmonic(size, 0.0) is a constant")  # fmt: skip
         _check_direction(self, where)
@@ -306,7 +305,7 @@ class PointForce(Shown):
 
 
 @dataclass(frozen=True, repr=False)
-class PointMoment(Shown):
+class PointMoment(ScenePart):
     """A moment on the beam at z: signal(t) in N m, positive where it turns u_z up; elsewhere about "rx", "ry", "rz".
 
     Examples
@@ -316,13 +315,13 @@ class PointMoment(Shown):
     1.5
     """
 
-    z: Place
     signal: Any
     direction: Direction | None = None
+    word = "moment"
 
     def __post_init__(self) -> None:
-        require_place(self.z, self)
-        where = f"PointMoment at {told(self.z)}"
+        super().__post_init__()
+        where = self.where
         require(callable(self.signal), "signal must be a function of t", self.signal, where,
                 "give a signal such as Harmonic(amplitude, omega); Harmonic(size, 0.0) is a constant")  # fmt: skip
         _check_direction(self, where)
@@ -342,7 +341,7 @@ class PointMoment(Shown):
 
 def _along(part: Any) -> Six | None:
     """The direction of a part on the six components, None without one."""
-    return None if part.direction is None else direction_of(part.direction, f"{type(part).__name__} at {told(part.z)}")
+    return None if part.direction is None else direction_of(part.direction, part.where)
 
 
 def _check_direction(part: Any, where: str) -> None:

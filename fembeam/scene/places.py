@@ -6,7 +6,6 @@ Where a quantity is asked for at a place by name, the place and its direction st
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from fembeam.structures import COMPONENTS, Six, direction_of, named
@@ -19,16 +18,6 @@ else:  # as a scene file on a beam gives them
     Place = float
     Second = float | tuple[int, float]
 At: TypeAlias = tuple[Any, Any]  # (place, direction)
-UNSAID = ("direction", "name")  # of a part, when they are None: as in scenes of a straight beam
-
-
-class Shown:
-    """Parts printed as they are called, without a direction and a name that they do not have."""
-
-    def __repr__(self) -> str:
-        values = {one.name: getattr(self, one.name) for one in fields(self)}  # type: ignore[arg-type]
-        kept = (f"{key}={value!r}" for key, value in values.items() if key not in UNSAID or value is not None)
-        return f"{type(self).__name__}({', '.join(kept)})"
 
 
 def unsigned(direction: Any) -> Any:
@@ -76,6 +65,19 @@ def told(place: Any) -> str:
     if is_pair(place):
         return f"{place[1]} m along {place[0]!r}"
     return f"{place!r}" if isinstance(place, str) else f"z = {place}"
+
+
+def place_words(place: Any) -> str:
+    """A place as names have it: a number is z in m.
+
+    Examples
+    --------
+    >>> place_words(0.25), place_words("lever"), place_words(("A-B", 0.4))
+    ('0.25 m', 'lever', 'A-B + 0.4 m')
+    """
+    if is_pair(place):
+        return f"{place[0]} + {place[1]:g} m"
+    return f"{place:.6g} m" if is_finite(place) else str(place)
 
 
 def split(at: Any, components: Sequence[str] = COMPONENTS) -> tuple[Any, Six]:

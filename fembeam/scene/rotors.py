@@ -16,15 +16,15 @@ from scipy import sparse
 
 from fembeam.excitation import Harmonic
 from fembeam.scene.local_coordinate import LocalCoordinate
-from fembeam.scene.places import Place, Shown, told
+from fembeam.scene.part import ScenePart
 from fembeam.structures import COMPONENTS, Assembled, Direction, Six, direction_of
-from fembeam.support import require, require_finite, require_non_negative, require_place
+from fembeam.support import require, require_finite, require_non_negative
 
 SLACK = 1e-9  # of the polar moment of a thin disk
 
 
-@dataclass(frozen=True)
-class Disk:
+@dataclass(frozen=True, repr=False)
+class Disk(ScenePart):
     """A rigid disk across a straight shaft in space; it spins with the shaft, whose `spin` is that of its `Frame`.
 
     Parameters
@@ -43,15 +43,15 @@ class Disk:
     (0.04, 0.04, 0.075)
     """
 
-    z: Place
     mass: float
     diametral: float
     polar: float
     offset = 0.0
+    word = "disk"
 
     def __post_init__(self) -> None:
-        require_place(self.z, self)
-        where = f"Disk at {told(self.z)}"
+        super().__post_init__()
+        where = self.where
         require_non_negative("mass", self.mass, where, "give kg")
         require_non_negative("diametral", self.diametral, where, "give kg m²")
         require_non_negative("polar", self.polar, where, "give kg m²")
@@ -65,7 +65,7 @@ class Disk:
 
 
 @dataclass(frozen=True, repr=False)
-class Unbalance(Shown):
+class Unbalance(ScenePart):
     """An eccentric mass on a shaft that spins with Ω: a force m e Ω² that turns with it.
 
     f = m e Ω² (e₁ cos(Ωt + phase) + e₂ sin(Ωt + phase))
@@ -84,22 +84,21 @@ class Unbalance(Shown):
     [1.0, 0.0]
     """
 
-    z: Place
     moment: float
     phase: float = 0.0
     direction: Direction | None = field(default=None, kw_only=True)
     signal: Any = field(default=None, kw_only=True)
+    word = "unbalance"
 
     def __post_init__(self) -> None:
-        require_place(self.z, self)
-        where = f"Unbalance at {told(self.z)}"
-        require_non_negative("moment", self.moment, where, "give m e in kg m")
-        require_finite("phase", self.phase, where, "give rad")
+        super().__post_init__()
+        require_non_negative("moment", self.moment, self.where, "give m e in kg m")
+        require_finite("phase", self.phase, self.where, "give rad")
 
     @property
     def along(self) -> Six | None:
         """Its direction on the six components."""
-        return None if self.direction is None else direction_of(self.direction, f"Unbalance at {told(self.z)}")
+        return None if self.direction is None else direction_of(self.direction, self.where)
 
     @property
     def coordinate(self) -> LocalCoordinate:
@@ -111,7 +110,9 @@ class Unbalance(Shown):
         if self.direction is not None:
             return (self,)
         first, second = (tuple(float(x) for x in axis) for axis in axes[:2])
-        return replace(self, direction=first), replace(self, direction=second, phase=self.phase - 0.5 * math.pi)
+        later = self.name if self.name is None else f"{self.name}, across"
+        across = replace(self, direction=second, phase=self.phase - 0.5 * math.pi, name=later)
+        return replace(self, direction=first), across
 
     def spun(self, spin: float) -> Unbalance:
         """The same with the signal of a spin; what was made of that signal stays."""

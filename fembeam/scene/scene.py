@@ -33,6 +33,8 @@ from fembeam.structures import COMPONENTS
 from fembeam.support import is_finite, require, require_finite, require_non_negative, require_positive
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from numpy.typing import ArrayLike
 
     from fembeam.inspection import Check
@@ -72,6 +74,9 @@ class Scene:
         scene.
     gravity : g in m/s², pulls everything down, along -y; for all bodies.
     elements : of Element, local elements that always act, numbered on after the stops.
+
+    Every part takes a keyword ``name``, unique among all parts, those of bodies included: logs, tables, figures and
+    messages use it. Without one a name is made, such as "stop at 3 m, below".
 
     Raises
     ------
@@ -122,6 +127,7 @@ class Scene:
         object.__setattr__(self, "bodies", _listed("bodies", self.bodies, (Scene,)))
         self._check_base()
         self._check_bodies()
+        self._check_names()
         if self.named:
             check_conflicts(self)
             check_ends(self)
@@ -208,6 +214,12 @@ class Scene:
 
         return campbell(self, spins, modes, elements)
 
+    def figure(self, axes: Axes | None = None) -> Figure:
+        """The rig drawn, `fembeam.plot.rig`: beams to scale along z, all parts with names, gaps enlarged."""
+        from fembeam.plot import rig
+
+        return rig(self, axes)
+
     def check(
         self, duration: float | None = None, dt: float | None = None, discard: float = 0.0, **reduction: Any
     ) -> Check:
@@ -288,6 +300,15 @@ class Scene:
         return buckling_load(self, elements)
 
     @property
+    def named_parts(self) -> dict[str, Any]:
+        """The parts that were given a name, those of bodies too, by their paths, such as "bodies[0].stops[1]"."""
+        own = ((name, i, part) for name in FEATURES for i, part in enumerate(getattr(self, name)))
+        inner = {
+            f"bodies[{i}].{path}": part for i, body in enumerate(self.bodies) for path, part in body.named_parts.items()
+        }
+        return {f"{name}[{i}]": part for name, i, part in own if part.name is not None} | inner
+
+    @property
     def places(self) -> list[float]:
         """Coordinates of all features, second places of stops and elements included, in no order."""
         second = [place.to[1] for place in (one.coordinate for one in self.acting) if place.to and place.to[0] == 0]
@@ -301,7 +322,7 @@ class Scene:
     def _check_places(self, name: str) -> None:
         """Raise ValueError unless every feature of one list sits on the beam."""
         for index, feature in enumerate(getattr(self, name)):
-            where = f"{name}[{index}] ({type(feature).__name__}) of Scene"
+            where = f"{name}[{index}] ({feature.titled}) of Scene"
             if self.named:
                 check_feature(self.beam, feature, name, where)
                 continue
@@ -359,9 +380,17 @@ class Scene:
     def _check_places_of_acting(self) -> None:
         """Raise ValueError unless stops and elements of a beam act on what exists and can move."""
         for index, stop in enumerate(self.stops):
-            self._check_second(stop.coordinate, "on", f"stops[{index}] of Scene")
+            self._check_second(stop.coordinate, "on", f"stops[{index}]{stop.quoted} of Scene")
         for index, element in enumerate(self.elements):
-            self._check_second(element.coordinate, "to", f"elements[{index}] of Scene")
+            self._check_second(element.coordinate, "to", f"elements[{index}]{element.quoted} of Scene")
+
+    def _check_names(self) -> None:
+        """Raise ValueError if two parts have one name, those of bodies included."""
+        known: dict[str, str] = {}
+        for path, part in self.named_parts.items():
+            other = known.setdefault(part.name, path)
+            require(other == path, "names must be unique", part.name, f"{other} and {path} of Scene",
+                    "give each part its own, or none")  # fmt: skip
 
     def _check_second(self, place: LocalCoordinate, key: str, where: str) -> None:
         """Raise ValueError unless what a stop or element acts on exists and can move."""

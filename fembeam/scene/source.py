@@ -72,9 +72,9 @@ class Source:
 
 
 def _override(tables: dict[str, Any], text: str) -> None:
-    """Set one value, such as `stops[0].law.stiffness=1e9` or `stops.0.gap = 1e-3`; missing tables are made."""
+    """Set one value: `stops[0].gap=1e-3`, `stops.0.gap = 1e-3`, `stops[valve].gap=0`; missing tables are made."""
     key, equals, value = text.partition("=")
-    path = re.findall(r"[^.\[\]\s]+", key)
+    path = [inside or part for inside, part in re.findall(r"\[\s*([^\]]+?)\s*\]|([^.\[\]\s]+)", key)]
     if not (equals and path):
         raise ValueError(f"--set {text}: write table.key=value, such as simulate.duration=10 or stops[0].gap=1e-3")
     try:
@@ -84,9 +84,11 @@ def _override(tables: dict[str, Any], text: str) -> None:
     item: Any = tables
     for i, (name, after) in enumerate(pairwise([*path, ""])):
         if isinstance(item, list):
-            if not (name.isdecimal() and int(name) < len(item)):
-                raise ValueError(f"--set {text}: {'.'.join(path[:i])} has {len(item)} entries, counted from 0")
-            name = int(name)  # type: ignore[assignment]
+            called = [number for number, one in enumerate(item) if isinstance(one, dict) and one.get("name") == name]
+            if not called and not (name.isdecimal() and int(name) < len(item)):
+                raise ValueError(f"--set {text}: {'.'.join(path[:i])} has {len(item)} entries, counted from 0, "
+                                 f"none of the name {name!r}")  # fmt: skip
+            name = called[0] if called else int(name)  # type: ignore[assignment]
         elif not isinstance(item, dict):
             raise ValueError(f"--set {text}: {'.'.join(path[:i])} is no table")
         if not after:

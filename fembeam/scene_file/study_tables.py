@@ -18,7 +18,7 @@ from fembeam import plot
 from fembeam.beams import on_beam
 from fembeam.model import Branch, Orbit
 from fembeam.model.run_csv import Output
-from fembeam.scene import Place, path_of, split, title
+from fembeam.scene import Place, path_of, split
 from fembeam.scene_file.keys import Constructors, parameters
 from fembeam.study import (
     Basins,
@@ -284,8 +284,7 @@ class FoundOrbit(Result):
         extremes = [(f"displacement, {name}", *both) for name, both in self._extremes.items()]
         columns = {"t_in": "begins/s", "t_out": "ends/s", "speed_in": "entry speed/(m/s)", "peak_force": "peak force/N"}
         values = [getattr(log, name).tolist() for name in columns]
-        called = [title(row, i) or f"stop {i}" for i, row in enumerate(one.model.contact_rows)]
-        rows = [(called[stop], *row) for stop, *row in zip(log.stop, *values, strict=True)]
+        rows = list(zip(log.name, *values, strict=True))
         contacts: list[Part] = ["", (("", *columns.values()), rows)]
         return [head, "", (("", "min/m", "max/m"), extremes), *(contacts if rows else [])]
 

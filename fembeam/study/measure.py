@@ -179,7 +179,7 @@ def cut(run: Run, start: float, end: float) -> Run:
         t = run.t[kept] - start
     part = replace(
         run, t=t, q=run.q[kept], q_dot=run.q_dot[kept],
-        contacts=solvers.ContactLog(**columns), ledger=partial(_ledger_of, run, kept),
+        contacts=solvers.ContactLog(**columns, names=log.names), ledger=partial(_ledger_of, run, kept),
         lost=lambda: run.losses.part(kept), borders=partial(_passed, run, start, end),
         began=latched_before(run, start), stored_forces=run._forces[:, kept],
     )  # fmt: skip
@@ -190,7 +190,7 @@ def cut(run: Run, start: float, end: float) -> Run:
 def _passed(run: Run, start: float, end: float) -> Any:
     """The borders that laws with memory passed from start to end, times counted from start."""
     log = run.transitions
-    columns = {f.name: getattr(log, f.name)[(log.t >= start) & (log.t < end)] for f in fields(log)}
+    columns = {name: column[(log.t >= start) & (log.t < end)] for name, column in log.arrays().items()}
     return replace(log, **columns | {"t": columns["t"] - start})
 
 

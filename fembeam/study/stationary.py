@@ -105,12 +105,12 @@ class Response(Result):
         return self.work.estimate(lambda sums: sums[mine].sum() / sums[0])
 
     def numbers(self) -> dict[str, Estimate]:
-        """Every number with its standard error, by names such as "δ std" and "stop 0 rate"."""
+        """Every number with its standard error, by names such as "δ std", "stop 0 rate" or "valve rate"."""
         names = ("mean", "std", "skewness", "kurtosis", "crossing_rate")
         found = {f"{key} {name}": getattr(s, name) for key, s in self.signals.items() for name in names}
-        for i, impacts in enumerate(self.impacts):
-            found |= {f"stop {i} {name}": getattr(impacts, name) for name in ("rate", "probability")}
-            found |= {f"stop {i} {name}": impacts.mean(name) for name in impacts.largest}
+        for stop, impacts in zip(self.names, self.impacts, strict=False):
+            found |= {f"{stop} {name}": getattr(impacts, name) for name in ("rate", "probability")}
+            found |= {f"{stop} {name}": impacts.mean(name) for name in impacts.largest}
         return found | {f"{name} power": self.power(i) for i, name in enumerate(self.names)}
 
 
@@ -360,7 +360,7 @@ class Sums:
     def _add_work(self, run: Run, borders: Any) -> None:
         """Take in what each contact took between samples."""
         if not self.names:
-            self.names = tuple(run.name(i) for i in range(len(run.stops)))
+            self.names = tuple(run.key(i) for i in range(len(run.stops)))
             self.work = Batches(1 + len(self.names))
         for a, b in pairwise(borders) if self.names else ():
             self.work.add([(b - a) * self.dt, *(run.losses.history[b] - run.losses.history[a])])

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from solvers.integration import integrate
-from solvers.problem import Array, Parameter, Solution, System, Transitions, renew
+from solvers.problem import Array, Parameter, Solution, System, Transitions, columns_of, renew
 
 _REALS = ctypes.POINTER(ctypes.c_double)
 _AT = ctypes.c_int64, ctypes.c_double, ctypes.c_double, ctypes.c_double, _REALS  # border, δ, δ̇, entry rate, parameters
@@ -115,6 +115,6 @@ def _slopes(law: Any, row: Array, border: int = -1, delta: float = 0.0, rate: fl
 def transitions_of(solutions: Sequence[Solution], starts: Sequence[float]) -> Transitions:
     """One log of the runs that make up a period, each of whose times counts from its own start."""
     logs = [solution.transitions for solution in solutions]
-    columns = {name: [getattr(log, name) for log in logs] for name in Transitions.__dataclass_fields__}
+    columns = {name: [getattr(log, name) for log in logs] for name in columns_of(Transitions)}
     columns["t"] = [t + start for t, start in zip(columns["t"], starts, strict=True)]
-    return Transitions(*(np.concatenate(column) for column in columns.values()))
+    return Transitions(*(np.concatenate(column) for column in columns.values()), names=logs[0].names)

@@ -10,7 +10,7 @@ with `system.System`.
 
 from solvers.problem.common_grid import on_one_grid
 from solvers.problem.decoupling import decouple
-from solvers.problem.frames import dataframe, optional
+from solvers.problem.frames import columns_of, dataframe, optional
 from solvers.problem.losses import Losses, renew
 from solvers.problem.matrices import Array, dense, product
 from solvers.problem.memo import Memo

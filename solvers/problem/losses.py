@@ -5,12 +5,12 @@ from __future__ import annotations
 import ctypes
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from solvers.problem.frames import dataframe
+from solvers.problem.frames import dataframe, named
 from solvers.problem.matrices import Array
 from solvers.problem.result import Transitions, counted
 from solvers.problem.system import Contact
@@ -32,7 +32,7 @@ class Losses:
     slip : (m,) m (rad of rotation), distance that δ went while sliders slipped, summed over the sliders of a law; of a
         user's law in its segment "slip" if it has that and one "stick".
     history : (k, m) J, work done on each up to the samples. impulses : (k, m) N s (N m s), of each force likewise;
-        None of a run read from a file.
+        None of a run read from a file. names : what each is called.
 
     Notes
     -----
@@ -45,6 +45,7 @@ class Losses:
     slip: Array
     history: Array
     impulses: Array | None = None
+    names: tuple[str, ...] = field(default=(), kw_only=True)
 
     def __len__(self) -> int:
         return len(self.work)
@@ -63,7 +64,7 @@ class Losses:
 
     def to_dataframe(self) -> Any:
         """A table of pandas, one contact a row, in SI units; ImportError where pandas is missing."""
-        return dataframe(self.arrays())
+        return dataframe({"name": named(self.names, np.arange(len(self)))} | self.arrays())
 
     @classmethod
     def of_run(
@@ -84,14 +85,16 @@ class Losses:
         memories = _renewed_at_once(contacts, begin[1], passed), end[1]
         first, last = (_stored(contacts, *one) for one in zip(deltas, memories, strict=True))
         slip = _slipped(contacts, begin[1], passed, *deltas)
-        return cls(end[0][size + 2 :: 2], last - first, slip, powers[:, 2::2], powers[:, 3::2])
+        names = tuple(contact.name for contact in contacts)
+        return cls(end[0][size + 2 :: 2], last - first, slip, powers[:, 2::2], powers[:, 3::2], names=names)
 
     def part(self, kept: slice) -> Losses:
         """Of some of the samples: their work and impulses; what was stored and slip are not known there."""
         history = self.history[kept] - self.history[kept][:1]
         impulses = None if self.impulses is None else self.impulses[kept] - self.impulses[kept][:1]
         unknown = np.full(len(self), math.nan)
-        return Losses(history[-1] if len(history) else unknown, unknown, unknown, history, impulses)
+        work = history[-1] if len(history) else unknown
+        return Losses(work, unknown, unknown, history, impulses, names=self.names)
 
 
 def _renewed_at_once(contacts: Sequence[Contact], memory: Sequence[Array], passed: Transitions) -> list[Array]:

@@ -63,7 +63,7 @@ class ContactLog(Columns):
 
     Attributes
     ----------
-    stop : index of the stop. t_in, t_out : s. speed_in, speed_out : m/s, both positive.
+    stop : index of the stop. name : what it is called. t_in, t_out : s. speed_in, speed_out : m/s, both positive.
     peak_indentation : m. peak_force : N. impulse : N s. energy_loss : J taken out of the beam.
     entry_rate_clipped : whether the entry speed was below the law's floor (also for a contact that began at t = 0);
         every law has one, 1e-3 m/s where none was given, whether or not its force depends on that speed.
@@ -79,6 +79,7 @@ class ContactLog(Columns):
     impulse: Array
     energy_loss: Array
     entry_rate_clipped: Any
+    names: tuple[str, ...] = field(default=(), kw_only=True)
 
     def __len__(self) -> int:
         return len(self.stop)
@@ -88,8 +89,8 @@ class ContactLog(Columns):
         return f"<{counted(len(self), 'contact')}, {open_ones} of them not ended>"
 
     @classmethod
-    def of_events(cls, rows: Array) -> ContactLog:
-        """From an event list in which every contact begins and ends."""
+    def of_events(cls, rows: Array, names: Sequence[str] = ()) -> ContactLog:
+        """From an event list in which every contact begins and ends, with names of all stops."""
         ends, begins = at.ends_of(rows), at.begins_of(rows)
         first = np.empty_like(ends)
         first[np.argsort(ends[:, at.ELEMENT], kind="stable")] = begins[np.argsort(begins[:, at.ELEMENT], kind="stable")]
@@ -104,14 +105,15 @@ class ContactLog(Columns):
             impulse=ends[:, at.IMPULSE] - first[:, at.IMPULSE],
             energy_loss=ends[:, at.WORK] - first[:, at.WORK],
             entry_rate_clipped=first[:, at.CLIPPED].astype(bool),
+            names=tuple(names),
         )
 
     @classmethod
-    def of_rows(cls, rows: Array) -> ContactLog:
-        """From a table with one contact a row."""
+    def of_rows(cls, rows: Array, names: Sequence[str] = ()) -> ContactLog:
+        """From a table with one contact a row, with names of all stops."""
         columns: list[Any] = [*rows.T.copy()]
         columns[0], columns[-1] = columns[0].astype(int), columns[-1].astype(bool)
-        return cls(*columns)
+        return cls(*columns, names=tuple(names))
 
     @classmethod
     def of_period(cls, logs: Sequence[ContactLog], starts: Sequence[float], period: float) -> ContactLog:
@@ -133,7 +135,7 @@ class ContactLog(Columns):
             part + np.array([0.0, start, start] + [0.0] * (part.shape[1] - 3))
             for part, start in zip(rows, starts, strict=True)
         ]
-        return cls.of_rows(np.concatenate(moved))
+        return cls.of_rows(np.concatenate(moved), logs[0].names)
 
 
 def _make_whole(row: Array, rest: Array, later: float) -> None:
@@ -149,7 +151,7 @@ class Transitions(Columns):
 
     Attributes
     ----------
-    contact : index of the contact. t : s. border : index of the border among those of its law.
+    contact : index of the contact. name : what it is called. t : s. border : its index among those of the law.
     event : what it was, by the law's names, such as "stick" and "slip".
     delta, delta_dot, force : m, m/s and N as the border was met.
     impulse : N s, and work : J, done by the law's force since the run began, before the border.
@@ -164,6 +166,7 @@ class Transitions(Columns):
     force: Array
     impulse: Array
     work: Array
+    names: tuple[str, ...] = field(default=(), kw_only=True)
 
     def __len__(self) -> int:
         return len(self.t)
@@ -178,7 +181,14 @@ class Transitions(Columns):
         contact, border, code = rows[:, [at.ELEMENT, at.GUARD, at.CODE]].T.astype(int)
         names = [contacts[c].law.events[i] for c, i in zip(contact, code, strict=True)]
         known: list[Any] = [*rows[:, at.DELTA : at.WORK + 1].T.copy()]
-        return cls(contact, rows[:, at.TIME].copy(), border, np.array(names, dtype=object), *known)
+        return cls(
+            contact,
+            rows[:, at.TIME].copy(),
+            border,
+            np.array(names, dtype=object),
+            *known,
+            names=tuple(one.name for one in contacts),
+        )
 
     def slid(self) -> Array:
         """(k,) m: path of the slip that each "stick" ends, 0 for other rows."""

@@ -74,6 +74,7 @@ class Contact:
     gap : clearance in m; negative for a preload.
     always : whether the law acts at both signs of ``delta``; its knots still count from ``delta = 0``. Of a
         law with memory for δ > 0 only, such as `contacts.WaltonBraun`, it is set: the law says where it is open.
+    name : what logs call it; empty: "stop 0", "stop 1", … by its index.
 
     Examples
     --------
@@ -86,6 +87,7 @@ class Contact:
     law: Law
     gap: float = 0.0
     always: bool = False
+    name: str = ""
 
     def __post_init__(self) -> None:
         direction = np.array(self.direction, dtype=float, ndmin=1)

@@ -1,0 +1,121 @@
+"""What the labels of a rig say: the name of a part, then its numbers with units, its law, its signal."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from fembeam.scene import (
+    Clamped,
+    Dashpot,
+    Element,
+    Fixed,
+    Guided,
+    Impactor,
+    LumpedMass,
+    Pinned,
+    PointForce,
+    PointMoment,
+    Spring,
+    Stop,
+)
+from fembeam.support import is_finite
+
+if TYPE_CHECKING:
+    from fembeam.scene import ScenePart
+
+WIDE = 22  # characters of a line
+
+
+def label(part: ScenePart) -> str:
+    """The name of a part and what there is to say about it, in lines.
+
+    Examples
+    --------
+    >>> from contacts import Hertz
+    >>> print(label(Stop(0.25, Hertz(1e9), gap=5e-4, name="valve")))
+    valve
+    gap 0.5 mm
+    Hertz
+    """
+    joined = part.label.replace(" m", "\u00a0m").replace(" at ", " at\u00a0")  # a place keeps its unit
+    lines = [line.replace("\u00a0", " ") for line in textwrap.wrap(joined, WIDE)]
+    return "\n".join([*lines, *(line for line in _facts(part) if line)])
+
+
+def _facts(part: Any) -> Iterator[str]:
+    """The numbers of one part."""
+    match part:
+        case Clamped() | Pinned() | Guided() | Fixed():
+            return
+        case LumpedMass():
+            yield f"{part.mass:.4g} kg"
+            yield f"J = {part.inertia:.3g} kg m²" if part.inertia else ""
+            offset: Any = part.offset
+            yield f"{length(abs(offset))} {'ahead' if offset > 0 else 'behind'}" if offset else ""
+        case Spring():
+            yield f"{part.stiffness:.6g} N/m" if part.stiffness else ""
+            yield f"{part.rotational:.6g} N m/rad" if part.rotational else ""
+            yield f"foot: {signal_words(part.foot, 'm')}" if part.foot is not None else ""
+        case Dashpot():
+            yield f"{part.damping:.6g} N s/m" if part.damping else ""
+            yield f"{part.rotational:.6g} N m s/rad" if part.rotational else ""
+        case Stop() | Element():
+            yield gap_words(part.gap, part.coordinate.rotation) if part.gap or not part.always else ""
+            yield law_words(part.law)
+            yield f"to {part.coordinate.to_words}" if part.name and part.coordinate.to else ""
+        case PointForce() | PointMoment():
+            yield signal_words(part.signal, "N m" if isinstance(part, PointMoment) else "N")
+        case Impactor():
+            yield f"{part.mass:.4g} kg" + (f", {part.velocity:.3g} m/s" if part.velocity else "")
+            yield gap_words(part.gap, False)
+            yield law_words(part.law)
+            yield f"own spring {part.stiffness:.6g} N/m" if part.stiffness else ""
+
+
+def gap_words(gap: float, rotation: bool) -> str:
+    """A clearance or a preload.
+
+    Examples
+    --------
+    >>> gap_words(5e-4, False), gap_words(0.0, False), gap_words(-2e-5, False), gap_words(0.02, True)
+    ('gap 0.5 mm', 'no gap', 'pressed on by 0.02 mm', 'gap 0.02 rad')
+    """
+    if gap == 0.0:
+        return "no gap"
+    size = f"{abs(gap):.4g} rad" if rotation else length(abs(gap))
+    return f"gap {size}" if gap > 0.0 else f"pressed on by {size}"
+
+
+def length(value: float) -> str:
+    """A length in mm, from 1 m on in m."""
+    return f"{value:.4g} m" if abs(value) >= 1.0 else f"{1e3 * value:.4g} mm"
+
+
+def law_words(law: Any) -> str:
+    """The kind of a law, of a sum those of its parts, of one's own its name."""
+    parts = getattr(law, "parts", (law,))
+    name = " + ".join(getattr(part, "name", None) or type(part).__name__ for part in parts)
+    return "\n".join(textwrap.wrap(name, WIDE))
+
+
+def signal_words(signal: Any, unit: str) -> str:
+    """The kind of a signal, its size and frequency where it is one tone.
+
+    Examples
+    --------
+    >>> from fembeam import Harmonic, Pulse
+    >>> print(signal_words(Harmonic(1.5, 300.0), "N"))
+    Harmonic, 1.5 N,
+    300 rad/s
+    >>> signal_words(Pulse(10.0, 1e-3), "N"), signal_words(Harmonic(9.81, 0.0), "N")
+    ('Pulse', 'constant 9.81 N')
+    """
+    size: Any = getattr(signal, "amplitude", None)
+    omega: Any = getattr(signal, "omega", None)
+    if is_finite(omega) and is_finite(size):
+        amount = length(size) if unit == "m" else f"{size:.4g} {unit}"
+        return f"Harmonic, {amount},\n{omega:.4g} rad/s" if omega else f"constant {amount}"
+    name = getattr(signal, "__name__", None) or type(signal).__name__
+    return "function of t" if name == "<lambda>" else str(name)

@@ -1,0 +1,70 @@
+"""What all parts of a scene have in common: a place, and a name, given or made.
+
+Annotations are evaluated here: the classes derived from this one stand in files that need not know them.
+"""
+
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+from fembeam.scene.places import Place, place_words, said, told
+from fembeam.support import require, require_place
+
+UNSAID = ("direction", "name")  # of a part, when they are None: as in scenes of a straight beam
+
+
+@dataclass(frozen=True, repr=False)
+class ScenePart:
+    """What stands at a place z. `name`: what logs, tables, figures and messages call it.
+
+    ValueError for a z that is no place, a name that is no text of one line or empty.
+    """
+
+    z: Place
+    name: str | None = field(default=None, kw_only=True)
+    word = "part"  # that a made name begins with
+
+    def __post_init__(self) -> None:
+        require_place(self.z, self)
+        name: object = self.name
+        text = isinstance(name, str) and bool(name.strip()) and name.isprintable()
+        where = f"{type(self).__name__} at {told(self.z)}"
+        require(name is None or text, "name must be text of one line, not empty", name, where,
+                "give one such as 'valve', or leave it out")  # fmt: skip
+
+    def __repr__(self) -> str:
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        values["name"] = values.pop("name")  # the last one
+        shown = (f"{key}={value!r}" for key, value in values.items() if key not in UNSAID or value is not None)
+        return f"{type(self).__name__}({', '.join(shown)})"
+
+    @property
+    def where(self) -> str:
+        """For messages: "Stop at z = 0.2", "Stop 'valve' at z = 0.2"."""
+        return f"{self.titled} at {told(self.z)}"
+
+    @property
+    def titled(self) -> str:
+        """Its class, with its name if it was given one: "Stop", "Stop 'valve'"."""
+        return type(self).__name__ + self.quoted
+
+    @property
+    def quoted(self) -> str:
+        """For messages, behind what else tells it: " 'valve'"; empty without a name."""
+        return "" if self.name is None else f" {self.name!r}"
+
+    @property
+    def label(self) -> str:
+        """Its name, else a made one, such as "clamp at 0 m", "stop at 3 m, below", "stop at lever, -y"."""
+        return self.label_on(0)
+
+    def label_on(self, body: int) -> str:
+        """The same of a part of a further beam: "stop at 3 m of beam 1, below"."""
+        if self.name is not None:
+            return self.name
+        direction: Any = getattr(self, "direction", None)
+        at = place_words(self.z) if direction is None else said((self.z, direction))
+        return self._made(at + (f" of beam {body}" if body else ""))
+
+    def _made(self, at: str) -> str:
+        """A name that says what it is and where."""
+        return f"{self.word} at {at}"
