@@ -138,18 +138,24 @@ def page(name):
     return "\n\n".join(parts) + "\n"
 
 
+def brief(source):
+    """Authors and year of what a source names first."""
+    first = source.split(";")[0]
+    year = re.search(r"\b(?:1[89]|20)\d\d\b", first)
+    return " ".join([first.split("*")[0].strip(", "), *([year[0]] if year else [])])
+
+
 def summary(name):
     """One entry of the table of all sheets."""
     worst = max(rows(name), key=lambda row: row.error / row.allowed)
-    source = sheet(name).SOURCE.split(";")[0]
     link = f"[{title(name)}]({name}.md)"
-    return [link, source, str(len(rows(name))), size(worst.error), f"{worst.allowed:.0e}"]
+    return [link, brief(sheet(name).SOURCE), str(len(rows(name))), size(worst.error), f"{worst.allowed:.0e}"]
 
 
 def index():
     """Text of the page that lists all sheets: that of `index.txt`, with their table and their menu."""
     text = Path(__file__).with_name("index.txt").read_text(encoding="utf-8")
-    heads = ["sheet", "first source", "numbers", "largest error", "allowed there"]
+    heads = ["sheet", "first source", "numbers", "error nearest to its limit", "limit"]
     made = lines([heads, *(summary(name) for name in SHEETS)])
     return MADE + text.format(table=made, sheets="\n".join(SHEETS))
 

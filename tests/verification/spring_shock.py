@@ -18,7 +18,7 @@ from sheets import Row
 import solvers
 from contacts import PiecewiseLinear
 
-SOURCE = "*SDND101*, code_aster validation manual, document V5.01.101, EDF R&D"
+SOURCE = "EDF R&D, code_aster validation manual, *SDND101*, document V5.01.101"
 MASS, SPRING, STOP, SPEED = 100.0, 1e4, 1e6, 1.0
 OMEGA = math.sqrt((SPRING + STOP) / MASS)
 

@@ -21,9 +21,9 @@ from sheets import Row
 import fembeam as fb
 
 SOURCE = (
-    "*Frequency Equation of Flexural Vibrating Cantilever Beam Considering the Rotary Inertial Moment of an Attached "
-    "Mass*, Mathematical Problems in Engineering 2017, article 1568019, table 1 (last columns); the equation without "
-    "inertia is that of P.A.A. Laura, J.L. Pombo and E.A. Susemihl, *J. Sound Vib.* 37 (1974) 161"
+    "P.A.A. Laura, J.L. Pombo, E.A. Susemihl, *J. Sound Vib.* 37 (1974) 161 (the equation without inertia); published "
+    "numbers: *Frequency Equation of Flexural Vibrating Cantilever Beam Considering the Rotary Inertial Moment of an "
+    "Attached Mass*, Math. Probl. Eng. 2017, article 1568019, table 1, last columns"
 )
 BODIES = ((1.0, 0.0), (1.0, 0.01), (1.0, 1.0))
 PRINTED = {(1.0, 0.0): ("1.557298", "16.25009", "50.89584", "105.1983")}
