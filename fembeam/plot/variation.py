@@ -33,7 +33,7 @@ def variation(found: Variation, axes: Axes | Sequence[Axes] | None = None, best:
     ...                  base=fb.Harmonic(1e-3, 100.0), damping=fb.ModalDamping(0.05))
     >>> found = fb.study.vary(scene, {"base.amplitude": [1e-3, 2e-3]}, "amplitude", 0.5, 1e-3, modes=1)
     >>> variation(found).axes[0].get_xlabel()
-    'base.amplitude'
+    'base amplitude / m'
     """
     d, q = found.points.shape[1], len(found.quantities)
     columns = 1 if d <= 2 else d
@@ -73,7 +73,7 @@ def _line(axis: Axes, found: Variation, i: int, j: int) -> None:
     x, error = found.points[:, j], found.standard_error[:, i]
     bars: dict[str, Any] = {"yerr": TWO_ERRORS * error} if np.isfinite(error).any() else {}
     axis.errorbar(x, found.values[:, i], fmt="o-" if len(found.axes) == 1 else "o", color=BLUE, markersize=3, **bars)
-    axis.set_xlabel(found.names[j])
+    axis.set_xlabel(found.titles[j])
 
 
 def _map(axis: Axes, found: Variation, i: int) -> None:
@@ -84,7 +84,7 @@ def _map(axis: Axes, found: Variation, i: int) -> None:
     else:
         image = axis.scatter(found.points[:, 0], found.points[:, 1], c=found.values[:, i], s=12)
     figure.colorbar(image, ax=axis, label=found.quantities[i])
-    axis.set(xlabel=found.names[0], ylabel=found.names[1])
+    axis.set(xlabel=found.titles[0], ylabel=found.titles[1])
 
 
 def _star(axis: Axes, points: np.ndarray, best: int | None, j: int, height: np.ndarray) -> None:

@@ -103,7 +103,7 @@ def minimise(
     scene: Scene | Maker,
     parameters: Mapping[str, tuple[float, float]],
     quantity: str | Quantity,
-    constraints: Mapping[str | Quantity, float] | None = None,
+    constraints: Mapping[Any, float] | None = None,
     duration: float | None = None,
     dt: float | None = None,
     discard: float = 0.0,
@@ -158,7 +158,7 @@ def minimise(
     >>> found.active
     ('damping.zeta[0]',)
     """
-    box, limits = _box(parameters), _limits(constraints or {})
+    box, limits = box_of(parameters), _limits(constraints or {})
     require(0.0 < number("tolerance", tolerance) < 0.1, "tolerance must lie in (0, 0.1)", tolerance, WHERE, "e.g. 1e-4")
     looks = LOOKS * len(box)
     require(is_whole(most) and most > looks, f"most must be above the {looks} first points", most, WHERE, "e.g. 200")
@@ -173,7 +173,7 @@ def minimise(
     return _found(search, tolerance, converged)
 
 
-def _box(parameters: Mapping[str, Any]) -> Vector:
+def box_of(parameters: Mapping[str, Any]) -> Vector:
     """(d, 2) lowest and highest values, checked."""
     require(isinstance(parameters, Mapping) and bool(parameters), "parameters must be {path: (low, high)}", parameters,
             WHERE, "e.g. {'stops[0].gap': (0.0, 1e-3)}")  # fmt: skip
@@ -184,7 +184,7 @@ def _box(parameters: Mapping[str, Any]) -> Vector:
     return np.array([list(ends) for ends in parameters.values()], dtype=float)
 
 
-def _limits(constraints: Mapping[str | Quantity, float]) -> list[tuple[Quantity, float]]:
+def _limits(constraints: Mapping[Any, float]) -> list[tuple[Quantity, float]]:
     """Constrained quantities with their bounds, checked."""
     made = [(named(asked), bound) for asked, bound in constraints.items()]
     for one, bound in made:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 import solvers
 from fembeam.model import Model, Run
+from fembeam.plot.axis_names import axis_name
 from fembeam.scene import Scene, changes_structure, path_of, with_value
 from fembeam.study.measure import Plan, runs, values_of
 from fembeam.study.quantities import Quantity, label, named
@@ -38,7 +39,7 @@ class Together:
         if isinstance(asked, Mapping):
             parts = [(str(name), named(one)) for name, one in asked.items()]
         else:
-            each = [asked] if isinstance(asked, str) or callable(asked) else list(asked)
+            each = list(asked) if isinstance(asked, (list, tuple)) else [asked]
             parts = [(label(one), one) for one in map(named, each)]
         names = [name for name, _ in parts]
         require(bool(names), "quantity must name at least one", asked, "study", "e.g. 'peak_force'")
@@ -95,6 +96,13 @@ class Trial:
         method = solvers.Exponential(ledger=False) if plan.solver is None else plan.solver
         return cls(scene, tuple(names), Together.of(asked), plan, method, reduction)
 
+    @property
+    def titles(self) -> tuple[str, ...]:
+        """Of the parameters, for axes."""
+        if not isinstance(self.scene, Scene):
+            return self.names
+        return tuple(axis_name(name, self.scene) for name in self.names)
+
     def told(self, point: Sequence[float]) -> str:
         """A point as text."""
         return ", ".join(f"{name} = {value:.6g}" for name, value in zip(self.names, point, strict=True))
@@ -110,12 +118,16 @@ class Trial:
                 scene = with_value(scene, name, value)
             return scene
 
-    def prepared(self, points: Sequence[Sequence[float]] | Vector) -> Trial:
-        """Ready for these points, after all their scenes have been made and checked."""
+    def check(self, points: Vector) -> list[Scene]:
+        """The scenes at these points; ValueError when one cannot be made, or not run as planned."""
         scenes = [self.at(point) for point in points]
-        for name, one in self.asked.parts:
-            require(callable(one), "a quantity must be a function", name, "study", "give a name")
+        for _, one in self.asked.parts:
             self.plan.check(scenes[0], one)
+        return scenes
+
+    def prepared(self, points: Vector) -> Trial:
+        """Ready for these points, after all their scenes have been made and checked."""
+        scenes = self.check(points)
         if not isinstance(self.scene, Scene) or any(map(changes_structure, self.names)):
             return self
         return replace(self, model=scenes[0].reduce(**self.reduction))

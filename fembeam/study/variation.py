@@ -40,6 +40,7 @@ class Variation(Result):
     standard_error : (n, q) of the values over seeds, or over groups of periods; NaN of single runs.
     axes : (d,) values along each parameter of a grid, the last one running fastest; empty of samples.
     failures : (number of the point, reason) of runs that failed.
+    titles : (d,) names of the parameters for axes, with units.
     """
 
     names: tuple[str, ...]
@@ -49,6 +50,7 @@ class Variation(Result):
     standard_error: Vector
     axes: tuple[Vector, ...] = ()
     failures: tuple[tuple[int, str], ...] = ()
+    titles: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.points)
@@ -217,7 +219,7 @@ def collected(
         if (one := kept.values.get(_key(point))) is not None:
             estimate = Estimate.of_mean(one["values"])
             values[i], errors[i] = estimate.value, estimate.standard_error
-    return Variation(trial.names, points, trial.asked.names, values, errors, axes, failures)
+    return Variation(trial.names, points, trial.asked.names, values, errors, axes, failures, trial.titles)
 
 
 def _key(point: Vector) -> str:
