@@ -86,7 +86,7 @@ def collision(damping_factor, speed):
     """A free mass that strikes a beam far heavier than itself."""
     law = Hysteretic(1e6, damping_factor)
     heavy = fb.Section(E=1e15, rho=1e9, A=1.0, I=1.0)
-    ball = fb.Impactor(0.25, 1e-3, law, velocity=-speed)
+    ball = fb.Impactor(0.25, 1e-3, -speed, law)
     return fb.Scene(fb.Beam(0.5, heavy), [fb.Pinned(0.0), fb.Pinned(0.5)], impactors=[ball])
 
 
@@ -97,7 +97,7 @@ def restitution(run):
 def test_restitution_of_one_impact():
     """a (1 + r) = ln[(1 + a)/(1 - a r)] whatever the speed; the scenes come from a function."""
     factors, speeds = [0.1, 0.5, 1.5], [0.5, 2.0]
-    found = fb.study.vary(collision, {"damping_factor": factors, "speed": speeds}, restitution, 0.01, modes=1)
+    found = fb.study.vary(collision, {"damping_factor": factors, "speed": speeds}, restitution, 0.01, 1e-3, modes=1)
     r = np.abs(found["restitution"])
     a = np.array(factors)[:, None]
     np.testing.assert_allclose(a * (1.0 + r), np.log((1.0 + a) / (1.0 - a * r)), rtol=1e-5)
