@@ -2,9 +2,9 @@
 
 `response`, `bodies`, `spectra`, `contact_histograms` and `animation` hold those of one run, `laws` those of contact
 laws, `orbits` those of periodic motion, `campbell` that of rotors, `basins` maps of starts, `random` those of random
-motion, `linear` spectra and frequency response, `rig` that of a scene, `mode_count` and `methods` those of studies;
-`run_signals`, `style` and `figure` are what they share. Imports: `statistics`, `model` and what they import. Begin with
-`response`.
+motion, `linear` spectra and frequency response, `rig` that of a scene, `mode_count`, `methods` and `variation` those of
+studies; `run_signals`, `style` and `figure` are what they share. Imports: `statistics`, `model` and what they import.
+Begin with `response`.
 """
 
 from fembeam.model import places
@@ -23,12 +23,12 @@ from fembeam.plot.rig import rig
 from fembeam.plot.run_signals import batches, natural, responses, sampling_of, stationary
 from fembeam.plot.spectra import peaks, segment_for, spectra_of, spectrum
 from fembeam.plot.style import one_legend, styled
+from fembeam.plot.variation import minimum, variation
 
 __all__ = [
     "animate", "basins", "batches", "bifurcation", "branch", "campbell", "contacts", "deflected", "densities",
-    "floor_spectrum",
-    "frame", "frequency_response", "hysteresis", "identification", "loops", "mode_count", "mode_shapes", "natural",
-    "one_legend", "orbit", "peak", "peaks", "places", "random_densities", "random_spectra", "response_spectrum",
-    "responses", "restitutions", "rig", "sampling_of", "segment_for", "smallest_model", "spectra_of", "spectrum",
-    "speed_accuracy", "stability_map", "stationary", "styled", "time_history",
+    "floor_spectrum", "frame", "frequency_response", "hysteresis", "identification", "loops", "minimum", "mode_count",
+    "mode_shapes", "natural", "one_legend", "orbit", "peak", "peaks", "places", "random_densities", "random_spectra",
+    "response_spectrum", "responses", "restitutions", "rig", "sampling_of", "segment_for", "smallest_model",
+    "spectra_of", "spectrum", "speed_accuracy", "stability_map", "stationary", "styled", "time_history", "variation",
 ]  # fmt: skip

@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 from copy import copy
 from dataclasses import fields, is_dataclass, replace
+from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
 from fembeam.scene.signals import is_of_signal
@@ -63,7 +64,9 @@ def path_of(scene: Scene, name: str) -> str:
     ends = [path for path in known if path.endswith(f".{name}")]
     own = [path for path in ends if not path.startswith("bodies")]
     first = [path for path in ends if path.startswith("base.")] or own or ends
-    require(bool(ends), f"no such parameter; the scene has {', '.join(known)}", name, "parameter", "use one of these")
+    near = get_close_matches(name, known, n=1, cutoff=0.5)
+    advice = f"did you mean {near[0]}?" if near else "use one of these"
+    require(bool(ends), f"no such parameter; the scene has {', '.join(known)}", name, "parameter", advice)
     require(len(first) == 1, f"ambiguous parameter: {', '.join(ends)}", name, "parameter", "give the whole path")
     return first[0]
 

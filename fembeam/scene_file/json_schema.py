@@ -6,14 +6,14 @@ Put `#:schema scene.schema.json` in the first line of a scene file; editors with
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
 
 from fembeam.beams import ModalDamping, Rayleigh
 from fembeam.scene import FEATURES, Scene
 from fembeam.scene_file.frames import DRAWN, OPTIONS, READ
-from fembeam.scene_file.keys import entries_of, options, parameters, required
+from fembeam.scene_file.keys import entries_of, options, parameters, required, takes_list
 from fembeam.scene_file.kinds import MAKERS, SECTION, SIGNAL, Nested, nested
 from fembeam.scene_file.structures import FILES, KEYS
 from fembeam.scene_file.study_tables import STUDIES
@@ -71,7 +71,8 @@ class _Kinds:
         """One key."""
         if kind := nested(key, parameter):
             one = self.reference(kind)
-            found = {"type": "array", "items": one} if kind.listed else one
+            several = {"type": "array", "items": one}
+            found = several if kind.listed else {"anyOf": [one, several]} if takes_list(parameter) else one
         else:
             found = of_type(parameter.annotation)
         default = parameter.default
@@ -134,6 +135,8 @@ def _of_option(hint: Any) -> Schema:
         return {"enum": list(get_args(hint))}
     if hint in SIMPLE:
         return {"type": SIMPLE[hint]}
+    if get_origin(hint) is Mapping:
+        return {"type": "object", "additionalProperties": of_type(get_args(hint)[1])}
     entry, count = entries_of(hint)
     if entry is None:
         return {}

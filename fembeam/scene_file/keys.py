@@ -45,6 +45,11 @@ def options(hint: Any) -> list[Any]:
     return [one for option in get_args(hint) for one in options(option)]
 
 
+def takes_list(parameter: inspect.Parameter) -> bool:
+    """Whether a key allows a list beside a single thing."""
+    return any(get_origin(option) is Sequence for option in options(parameter.annotation))
+
+
 def entries_of(hint: Any) -> tuple[Any, int | None]:
     """Type of the entries of an annotated sequence and their number, None for any; None and None for no sequence."""
     origin, inner = get_origin(hint), get_args(hint)
@@ -70,6 +75,8 @@ def _fits(value: Any, hint: Any) -> bool:
         return isinstance(value, (int, hint)) and not isinstance(value, bool) and not too_long
     if hint in SIMPLE:
         return isinstance(value, str if hint is Path else hint)
+    if get_origin(hint) is Mapping:
+        return isinstance(value, dict) and all(fits(one, get_args(hint)[1]) for one in value.values())
     entry, count = entries_of(hint)
     right = entry is not None and isinstance(value, list) and len(value) == (len(value) if count is None else count)
     return right and all(fits(item, entry) for item in value)
@@ -86,6 +93,8 @@ def _words(hint: Any) -> list[str]:
         return [repr(option) for option in get_args(hint)]
     if hint in SIMPLE:
         return [SIMPLE[hint]]
+    if get_origin(hint) is Mapping:
+        return [f"a table of names, each with {wanted(get_args(hint)[1])}"]
     entry, count = entries_of(hint)
     if get_origin(entry) is Literal:
         return [f"a list of {', '.join(map(repr, get_args(entry)))}"]

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
@@ -24,18 +24,25 @@ from fembeam.study import (
     Basins,
     Campbell,
     Ensemble,
+    Minimum,
     SpeedAccuracy,
+    Variation,
     basins,
     campbell,
     characteristics,
     ensemble,
+    minimise,
     speed_accuracy,
+    vary,
 )
 from fembeam.study.measure import Plan
+from fembeam.study.minimum import box_of
 from fembeam.study.mode_count import ModeCount, checked_counts, mode_count
-from fembeam.study.quantities import named
+from fembeam.study.quantities import Quantity, named
 from fembeam.study.result import Result, plain
 from fembeam.study.smallest_model import MOST, SmallestModel, check_goal, smallest_model
+from fembeam.study.trial import Trial
+from fembeam.study.variation import points_of
 from fembeam.support import Part, require, require_non_negative, require_positive
 
 if TYPE_CHECKING:
@@ -167,8 +174,7 @@ class EnsembleTable:
         options = {"discard": self.discard, "segment": self.segment, "solver": self.solver}
         quantity = partial(characteristics, duration=self.duration, dt=self.dt, **options)
         model, path = file.model(), folder / "ensemble.npz"
-        with ExitStack() as stack:
-            pool = stack.enter_context(ProcessPoolExecutor(self.workers)) if self.workers > 1 else None
+        with _pool(self.workers) as pool:
             found = ensemble(model, self.realisations, quantity, pool, path, until=self.until, progress=progress)
         return replace(found, title=f"{len(found)} realisations of {self.duration:g} s")
 
@@ -419,6 +425,111 @@ class CampbellTable:
         return campbell(file.scene, np.linspace(*self.spins, self.points), self.modes)
 
 
+Draw = Mapping[str, str | float]  # a distribution of `scipy.stats` by its kind, with its numbers
+
+
+@dataclass(frozen=True)
+class VaryTable:
+    """The table [vary]: quantities over values of parameters; `fb.study.vary` explains the keys.
+
+    Parameters
+    ----------
+    parameters : { "stops[0].gap" = [values], … }, or of distributions { kind = "norm", loc = 1e-3, scale = 1e-5 }.
+    quantity : one or a list. seeds : how many (0, 1, …). workers : processes to share the work.
+    """
+
+    parameters: Mapping[str, Sequence[float] | Draw]
+    quantity: Quantity | Sequence[Quantity]
+    duration: float | None = None
+    dt: float | None = None
+    discard: float = 0.0
+    seeds: int = 0
+    samples: int | None = None
+    seed: int = 0
+    workers: int = 1
+    solver: Any = None
+
+    @property
+    def points(self) -> dict[str, Any]:
+        """The parameters as `vary` takes them."""
+        return {path: _drawn(path, one) if isinstance(one, dict) else one for path, one in self.parameters.items()}
+
+    def check(self, scene: Scene) -> None:
+        """Raise ValueError when the scene cannot be varied like this."""
+        names, points, _ = points_of(self.points, self.samples, self.seed)
+        _check_trials(self, scene, names, self.quantity, points)
+
+    def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Variation:
+        """The study, with its checkpoint ``vary.npz`` in the folder."""
+        keys = _plan_of(self) | {"samples": self.samples, "seed": self.seed, "checkpoint": folder / "vary.npz"}
+        with _pool(self.workers) as pool:
+            return vary(file.scene, self.points, self.quantity, **keys, **file.reduce, executor=pool, progress=progress)
+
+
+@dataclass(frozen=True)
+class MinimiseTable:
+    """The table [minimise]: where a quantity is least; `fb.study.minimise` explains the keys.
+
+    Parameters
+    ----------
+    parameters : { "stops[0].gap" = [low, high], … }. constraints : { peak_force = 20.0, … }, largest values.
+    seeds : how many (0, 1, …). workers : processes to share the first points.
+    """
+
+    parameters: Mapping[str, tuple[float, float]]
+    quantity: Quantity
+    constraints: Mapping[str, float] | None = None
+    duration: float | None = None
+    dt: float | None = None
+    discard: float = 0.0
+    seeds: int = 0
+    tolerance: float = 1e-4
+    most: int = 200
+    workers: int = 1
+    solver: Any = None
+
+    def check(self, scene: Scene) -> None:
+        """Raise ValueError when the scene cannot be varied like this."""
+        ends = box_of(self.parameters).T
+        _check_trials(self, scene, list(self.parameters), [self.quantity, *(self.constraints or {})], ends)
+
+    def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Minimum:
+        """The search, with its checkpoint ``minimise.npz`` in the folder."""
+        keys = _plan_of(self) | {name: getattr(self, name) for name in ("constraints", "tolerance", "most")}
+        keys |= {"checkpoint": folder / "minimise.npz", "progress": progress, **file.reduce}
+        with _pool(self.workers) as pool:
+            return minimise(file.scene, self.parameters, self.quantity, executor=pool, **keys)
+
+
+def _drawn(path: str, table: Mapping[str, Any]) -> Any:
+    """A distribution of `scipy.stats` from its kind and numbers."""
+    from scipy import stats
+
+    kind: Any = getattr(stats, str(table.get("kind", "")), None)
+    known = isinstance(kind, stats.rv_continuous)
+    require(known, f"the kind of {path} must be a distribution of scipy.stats", table.get("kind"), "[vary]",
+            'e.g. { kind = "norm", loc = 1e-3, scale = 1e-5 }')  # fmt: skip
+    return kind(**{key: value for key, value in table.items() if key != "kind"})
+
+
+def _plan_of(table: VaryTable | MinimiseTable) -> dict[str, Any]:
+    """The arguments of a table that say how points are run."""
+    require(0 <= table.seeds <= MOST_SEEDS, f"seeds must be 0 to {MOST_SEEDS}", table.seeds, "study", "e.g. 8")
+    require(table.workers >= 1, "workers must be at least 1", table.workers, "study", "e.g. 2")
+    names = "duration", "dt", "discard", "solver"
+    return {name: getattr(table, name) for name in names} | {"seeds": tuple(range(table.seeds))}
+
+
+def _check_trials(table: VaryTable | MinimiseTable, scene: Scene, names: list[str], asked: Any, points: Any) -> None:
+    """Raise ValueError unless the scene can be made and run at these points."""
+    Trial.of(scene, names, asked, Plan(**_plan_of(table)), {}).check(points)
+
+
+def _pool(workers: int) -> AbstractContextManager[ProcessPoolExecutor | None]:
+    """So many processes, None of one."""
+    return ProcessPoolExecutor(workers) if workers > 1 else nullcontext()
+
+
 STUDIES: Constructors = {
     "simulate": Simulate,
     "orbit": OrbitTable,
@@ -429,4 +540,6 @@ STUDIES: Constructors = {
     "mode_count": _table_of(mode_count),
     "smallest_model": _table_of(smallest_model),
     "speed_accuracy": SpeedAccuracyTable,
+    "vary": VaryTable,
+    "minimise": MinimiseTable,
 }

@@ -13,7 +13,18 @@ from typing import Any, NoReturn
 from fembeam.beams import Beam, ModalDamping, Rayleigh, Section, Taper
 from fembeam.scene import FEATURES, Scene, Source
 from fembeam.scene_file.frames import frame
-from fembeam.scene_file.keys import Constructors, converted, fits, listed, nearest, parameters, required, shown, wanted
+from fembeam.scene_file.keys import (
+    Constructors,
+    converted,
+    fits,
+    listed,
+    nearest,
+    parameters,
+    required,
+    shown,
+    takes_list,
+    wanted,
+)
 from fembeam.scene_file.kinds import MAKERS, SECTION, SIGNAL, Nested, nested
 from fembeam.scene_file.structures import PLACES, is_place, place, structure
 
@@ -217,7 +228,7 @@ class TableReader:
         if kind := nested(key, parameter):
             if kind.listed and not isinstance(value, list):
                 self.fail(inner, f"must be a list of {key}, got {shown(value)}")
-            if kind.listed:
+            if kind.listed or (isinstance(value, list) and takes_list(parameter)):
                 return [self.chosen(kind, one, f"{inner} number {i}") for i, one in enumerate(value, start=1)]
             return self.chosen(kind, value, inner)
         if self.named and key == "places" and isinstance(value, list) and all(map(is_place, value)):

@@ -2,7 +2,8 @@
 
 How many modes (`mode_count`, `smallest_model`), which method and step (`speed_accuracy`, `stability_map`), what random
 motion looks like (`ensemble` of realisations, `stationary` for one long run in `segments`), where motion settles
-(`basins`, `bifurcation`), how a rotor whirls (`campbell`). A study is a function and its `Result`; `quantities` are the
+(`basins`, `bifurcation`), how a rotor whirls (`campbell`), what parameters change (`vary`) and where a quantity is
+least (`minimise`). A study is a function and its `Result`; `quantities` are the
 numbers that it can ask for, `measure` takes them, `realisations` gives every run its own noise, `execution` spreads
 runs over processes and keeps what was computed. Imports: `plot`, `model`, `statistics` and what they import.
 Begin with `measure`, then `ensemble`.
@@ -12,14 +13,17 @@ from fembeam.study.basins import Basins, basins
 from fembeam.study.bifurcation import Bifurcation, bifurcation
 from fembeam.study.campbell import Campbell, campbell
 from fembeam.study.ensemble import Ensemble, ensemble
+from fembeam.study.minimum import Limit, Minimum, minimise
 from fembeam.study.mode_count import ModeCount, mode_count
 from fembeam.study.smallest_model import NotMetError, SmallestModel, smallest_model
 from fembeam.study.speed_accuracy import NoReferenceError, Point, SpeedAccuracy, speed_accuracy
 from fembeam.study.stability_map import StabilityMap, Verdict, stability_map
 from fembeam.study.stationary import Response, characteristics, stationary
+from fembeam.study.variation import Variation, vary
 
 __all__ = [
-    "Basins", "Bifurcation", "Campbell", "Ensemble", "ModeCount", "NoReferenceError", "NotMetError", "Point",
-    "Response", "SmallestModel", "SpeedAccuracy", "StabilityMap", "Verdict", "basins", "bifurcation", "campbell",
-    "characteristics", "ensemble", "mode_count", "smallest_model", "speed_accuracy", "stability_map", "stationary",
+    "Basins", "Bifurcation", "Campbell", "Ensemble", "Limit", "Minimum", "ModeCount", "NoReferenceError", "NotMetError",
+    "Point", "Response", "SmallestModel", "SpeedAccuracy", "StabilityMap", "Variation", "Verdict", "basins",
+    "bifurcation", "campbell", "characteristics", "ensemble", "minimise", "mode_count", "smallest_model",
+    "speed_accuracy", "stability_map", "stationary", "vary",
 ]  # fmt: skip

@@ -132,14 +132,12 @@ def measure(case: Case) -> list[Measured]:
 def _measured(case: Case, model: Model, solver: Any, preparation: float) -> Measured:
     """One model with one solver."""
     parts = runs(model, case.plan, case.quantity, solver)
-    values = [_value(case.quantity, run, case) for run in parts]
-    shapes = {np.shape(value) for value in values}
-    require(len(shapes) == 1, "quantity must return one shape", sorted(shapes), repr(case), "return a fixed number")
+    values = values_of(case.quantity, parts, repr(case))
     times = np.concatenate([run.contacts.t_out - run.contacts.t_in for run in parts])
     contact = float(np.median(times[np.isfinite(times)])) if np.any(np.isfinite(times)) else float("nan")
     highest, share = float(model.omega.max()), float(model.static_share.min(initial=1.0))
     seconds = sum(run.cost.seconds for run in parts)
-    return Measured(np.array(values), len(model.omega), seconds, preparation, share, highest * contact / (2 * np.pi))
+    return Measured(values, len(model.omega), seconds, preparation, share, highest * contact / (2 * np.pi))
 
 
 def runs(model: Model, plan: Plan, quantity: Quantity, solver: Any) -> list[Run]:
@@ -205,9 +203,17 @@ def _seeded(model: Model, seed: int) -> Model:
     return renewed(model, lambda j, _: child(seed, j) if j else seed)
 
 
-def _value(quantity: Quantity, run: Run, case: Case) -> Any:
+def values_of(quantity: Quantity, parts: list[Run], where: str) -> Vector:
+    """(k, …) the quantity of every run, of one shape; `where` names them in messages."""
+    values = [_value(quantity, run, where) for run in parts]
+    shapes = {np.shape(value) for value in values}
+    require(len(shapes) == 1, "quantity must return one shape", sorted(shapes), where, "return a fixed number")
+    return np.array(values)
+
+
+def _value(quantity: Quantity, run: Run, where: str) -> Any:
     """The quantity of one run, checked."""
-    require(run.complete, "every run of a study must reach its end", run.status, repr(case), "run again")
+    require(run.complete, "every run of a study must reach its end", run.status, where, "run again")
     value = np.asarray(quantity(run), dtype=float)
-    require(value.size > 0, "quantity must return a number or an array", value, repr(case), "check the function")
+    require(value.size > 0, "quantity must return a number or an array", value, where, "check the function")
     return value

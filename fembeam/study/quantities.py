@@ -60,6 +60,14 @@ class Amplitude(OfSignal):
         return (highest - lowest) / 2
 
 
+class Rms(OfSignal):
+    """Root mean square of δ (or u at `z`) about its mean, m; over the samples, so that their times matter."""
+
+    def __call__(self, run: Run) -> float:
+        """Value of a run."""
+        return float(np.std(self.signal(run)[0]))
+
+
 class PeakForce(OfContacts):
     """Largest contact force of one stop, N; 0 without contact."""
 
@@ -164,6 +172,7 @@ class Power:
 
 QUANTITIES: dict[str, Callable[..., Quantity]] = {
     "amplitude": Amplitude,
+    "rms": Rms,
     "peak_force": PeakForce,
     "mean_force": MeanForce,
     "contact_time": ContactTime,

@@ -6,7 +6,7 @@ import json
 import os
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import fields
+from dataclasses import fields, is_dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fembeam.model import Model
+from fembeam.scene import Scene
 from fembeam.study.execution.fingerprint import fingerprint
 from fembeam.study.realisations import renewed
 from fembeam.support import written_whole
@@ -86,12 +87,18 @@ def identity(model: Model, quantity: Callable[..., Any]) -> dict[str, str]:
     ------
     ValueError : something the quantity or the scene reads cannot be told from another of its kind.
     """
+    about = scene_identity(renewed(model, lambda j, _: j).scene)
+    about |= {"modes": repr(model.modes), "frequencies": fingerprint(model.omega)}
+    return about | {"quantity": f"{_name(quantity)} #{fingerprint(quantity, 'the quantity')}"}
+
+
+def scene_identity(scene: Scene | Callable[..., Scene]) -> dict[str, str]:
+    """All that a scene, or a function that makes scenes, consists of, and fembeam's version, as `identity` has them."""
     from fembeam import __version__
 
-    scene = renewed(model, lambda j, _: j).scene
-    about = {f.name: _told(getattr(scene, f.name), f.name) for f in fields(scene)}
-    about |= {"modes": repr(model.modes), "frequencies": fingerprint(model.omega), "fembeam": __version__}
-    return about | {"quantity": f"{_name(quantity)} #{fingerprint(quantity, 'the quantity')}"}
+    parts = [f.name for f in fields(scene)] if is_dataclass(scene) else []
+    about = {name: _told(getattr(scene, name), name) for name in parts} or {"scene": _told(scene, "scene")}
+    return about | {"fembeam": __version__}
 
 
 def _told(value: Any, name: str) -> str:

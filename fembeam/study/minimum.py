@@ -1,0 +1,279 @@
+"""The least value of a quantity within bounds of parameters, and of other quantities.
+
+    minimise f(x)    low <= x <= high,    g(x) <= bound
+
+The box is first looked over at points spread evenly (Halton's sequence), then searched from the best of them by
+Powell's COBYLA, which needs no derivatives. Noise has the same seeds at every point: f is a function
+of x alone.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+from scipy.stats import qmc
+
+from fembeam import plot
+from fembeam.scene import Scene
+from fembeam.statistics import Estimate
+from fembeam.study.execution.checkpoint import Checkpoint
+from fembeam.study.measure import Plan, Start
+from fembeam.study.quantities import Quantity, label, named
+from fembeam.study.result import Result
+from fembeam.study.trial import Maker, Trial
+from fembeam.study.variation import Variation, collected, computed, identity_of
+from fembeam.support import Part, is_finite, is_whole, number, require
+
+Vector = NDArray[np.float64]
+WHERE = "minimise"
+LOOKS = 8  # points looked at first, for each parameter
+NEAR = 10.0  # tolerances: a bound so near to the minimum is active
+
+
+@dataclass(frozen=True)
+class Limit:
+    """An upper bound of a quantity, its value at the minimum, and whether it keeps the minimum from moving on."""
+
+    name: str
+    bound: float
+    value: float
+    active: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Minimum(Result):
+    """The least value found.
+
+    Attributes
+    ----------
+    at : {path: value} of the parameters. value, standard_error : of the quantity there; NaN error of a single run.
+    limits : of other quantities, each with name, bound, value, active.
+    active : paths of parameters at an end of their bounds, and names of limits that are active.
+    converged : False where `most` evaluations were too few.
+    tried : all points, in the order of their evaluation. number : that of the minimum among them.
+    """
+
+    at: dict[str, float]
+    value: float
+    standard_error: float
+    limits: tuple[Limit, ...]
+    active: tuple[str, ...]
+    converged: bool
+    tried: Variation
+    number: int
+
+    @property
+    def evaluations(self) -> int:
+        """How many points were computed."""
+        return len(self.tried)
+
+    def __repr__(self) -> str:
+        at = ", ".join(f"{name} = {value:.6g}" for name, value in self.at.items())
+        return f"<least {self.tried.quantities[0]} {self.value:.6g} at {at}, {self.evaluations} evaluations>"
+
+    def _parts(self) -> list[Part]:
+        """What was found, which bounds are active, how many evaluations it took."""
+        name = self.tried.quantities[0]
+        value = self.value if np.isnan(self.standard_error) else repr(Estimate(self.value, self.standard_error, 2))
+        ends = [(path, x, "at its bound" if path in self.active else "") for path, x in self.at.items()]
+        limits = [(one.name, one.value, f"at most {one.bound:g}{', active' * one.active}") for one in self.limits]
+        done = "converged" if self.converged else "NOT CONVERGED: allow more evaluations"
+        return [(("", "least", ""), [(name, value, ""), *ends, *limits]), f"{self.evaluations} evaluations, {done}"]
+
+    def table(self) -> list[dict[str, Any]]:
+        """All points tried, one a row."""
+        return self.tried.table()
+
+    def plain(self) -> dict[str, Any]:
+        """What was found, and all points, as JSON has them."""
+        found: dict[str, Any] = super().plain()
+        return {**found, "evaluations": self.evaluations, "tried": self.table()}
+
+    figure = plot.minimum
+
+
+def minimise(
+    scene: Scene | Maker,
+    parameters: Mapping[str, tuple[float, float]],
+    quantity: str | Quantity,
+    constraints: Mapping[Any, float] | None = None,
+    duration: float | None = None,
+    dt: float | None = None,
+    discard: float = 0.0,
+    seeds: Sequence[int] = (),
+    tolerance: float = 1e-4,
+    most: int = 200,
+    start: Start | None = None,
+    solver: Any = None,
+    executor: Executor | None = None,
+    checkpoint: str | os.PathLike[str] | None = None,
+    progress: bool = False,
+    **reduction: Any,
+) -> Minimum:
+    """Find the parameters within bounds at which a quantity is least.
+
+    Parameters
+    ----------
+    scene, duration, dt, discard, start, solver, reduction : as for `vary`.
+    parameters : {path: (low, high)}.
+    quantity : a name of `quantities`, or a function of a run that gives a number.
+    constraints : {quantity: largest value allowed}, such as ``{"peak_force": 20.0}``.
+    seeds : of the noise, three or more, the same at every point: the minimum is that of these realisations.
+    tolerance : of the parameters, relative to high - low, in (0, 0.1).
+    most : evaluations allowed.
+    executor : any `concurrent.futures.Executor`, for the first look over the box; the search is one after the other.
+    checkpoint : file written whole after each point; what it holds is not computed again.
+
+    Returns
+    -------
+    Minimum : the best of all points computed that keep the constraints.
+
+    Raises
+    ------
+    ValueError : bad bounds, and all that `vary` refuses; a quantity that is NaN somewhere.
+    RuntimeError : no point that keeps the constraints was found (with the nearest), or a run failed.
+
+    Notes
+    -----
+    The search is local: of several valleys it takes the one with the best of the first points. Where contacts begin or
+    orbits change, quantities jump, and so may the minimum; look at `vary` over the same bounds.
+
+    References
+    ----------
+    M.J.D. Powell, in Advances in Optimization and Numerical Analysis (1994), 51–67.
+
+    Examples
+    --------
+    >>> import fembeam as fb
+    >>> scene = fb.Scene(fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01)), [fb.Clamped(0.0)],
+    ...                  base=fb.Harmonic(1e-3, 100.0), damping=fb.ModalDamping(0.05))
+    >>> found = minimise(scene, {"damping.zeta[0]": (0.01, 0.1)}, "amplitude", duration=0.5, dt=1e-3, modes=1)
+    >>> found.active
+    ('damping.zeta[0]',)
+    """
+    box, limits = box_of(parameters), _limits(constraints or {})
+    require(0.0 < number("tolerance", tolerance) < 0.1, "tolerance must lie in (0, 0.1)", tolerance, WHERE, "e.g. 1e-4")
+    looks = LOOKS * len(box)
+    require(is_whole(most) and most > looks, f"most must be above the {looks} first points", most, WHERE, "e.g. 200")
+    plan = Plan(duration, dt, discard, tuple(seeds), start, solver)
+    asked = [quantity, *(one for one, _ in limits)]
+    first = qmc.Halton(len(box), scramble=False).random(looks + 1)[1:]  # the sequence begins in a corner
+    trial = Trial.of(scene, list(parameters), asked, plan, reduction).prepared(_within(box, first))
+    kept = Checkpoint(checkpoint, {} if checkpoint is None else identity_of(trial))
+    search = _Search(trial, box, np.array([bound for _, bound in limits]), kept)
+    search.look(first, executor, WHERE if progress else None)
+    converged = search.descend(tolerance, most)
+    return _found(search, tolerance, converged)
+
+
+def box_of(parameters: Mapping[str, Any]) -> Vector:
+    """(d, 2) lowest and highest values, checked."""
+    require(isinstance(parameters, Mapping) and bool(parameters), "parameters must be {path: (low, high)}", parameters,
+            WHERE, "e.g. {'stops[0].gap': (0.0, 1e-3)}")  # fmt: skip
+    for name, ends in parameters.items():
+        pair = isinstance(ends, (tuple, list, np.ndarray)) and len(ends) == 2 and all(map(is_finite, ends))
+        require(pair and bool(ends[0] < ends[1]), f"bounds of {name} must be two finite values, ascending", ends, WHERE,
+                "give (low, high)")  # fmt: skip
+    return np.array([list(ends) for ends in parameters.values()], dtype=float)
+
+
+def _limits(constraints: Mapping[Any, float]) -> list[tuple[Quantity, float]]:
+    """Constrained quantities with their bounds, checked."""
+    made = [(named(asked), bound) for asked, bound in constraints.items()]
+    for one, bound in made:
+        require(
+            is_finite(bound), f"the bound of {label(one)} must be a finite number", bound, WHERE, "give the largest"
+        )
+    return made
+
+
+def _within(box: Vector, share: Vector) -> Vector:
+    """Values of the parameters from shares of the box in [0, 1]."""
+    return np.asarray(box[:, 0] + share * (box[:, 1] - box[:, 0]))
+
+
+@dataclass
+class _Search:
+    """The points computed so far, as shares of the box, each once."""
+
+    trial: Trial
+    box: Vector
+    bounds: Vector  # (c,)
+    kept: Checkpoint
+    shares: list[Vector] = field(default_factory=list)
+    values: list[Vector] = field(default_factory=list)  # (1 + c,) each
+
+    def look(self, shares: Vector, executor: Executor | None = None, progress: str | None = None) -> None:
+        """Compute these points."""
+        points = _within(self.box, shares)
+        failures = computed(self.trial, points, self.kept, executor, progress)
+        if failures:
+            i, reason = failures[0]
+            raise RuntimeError(f"a run failed at {self.trial.told(points[i])}: {reason}; narrow the bounds")
+        new = collected(self.trial, points, self.kept, (), ()).values
+        for point, value in zip(points, new, strict=True):
+            missing = [n for n, v in zip(self.trial.asked.names, value, strict=True) if not np.isfinite(v)]
+            require(not missing, f"{', '.join(missing)} must have a value at every point", float("nan"),
+                    self.trial.told(point), "take one that has, such as peak_force, 0 without contact")  # fmt: skip
+        self.shares += list(shares)
+        self.values += list(new)
+
+    def value(self, x: Vector) -> Vector:
+        """(1 + c,) quantity and constrained quantities at shares x, brought into the box."""
+        share = np.clip(x, 0.0, 1.0)
+        for known, value in zip(self.shares, self.values, strict=True):
+            if np.array_equal(known, share):
+                return value
+        self.look(share[None])
+        return self.values[-1]
+
+    def best(self) -> int:
+        """Number of the least value among points that keep the constraints, else of the least excess."""
+        values = np.array(self.values)
+        excess = ((values[:, 1:] - self.bounds) / self._sizes()[1:]).max(axis=1, initial=0.0)
+        return int(np.lexsort((values[:, 0], np.maximum(excess, 0.0)))[0])
+
+    def _sizes(self) -> Vector:
+        """(1 + c,) sizes of the values, to make them comparable."""
+        values = np.array(self.values)
+        spread, size = np.ptp(values, axis=0), np.abs(values).max(axis=0)
+        return np.where(spread > 0.0, spread, np.where(size > 0.0, size, 1.0))
+
+    def descend(self, tolerance: float, most: int) -> bool:
+        """Search from the best point; whether it converged."""
+        size, d = self._sizes(), len(self.box)
+        rules: list[dict[str, Any]] = [{"type": "ineq", "fun": lambda x: np.concatenate((x, 1.0 - x))}]
+        if len(self.bounds):
+            rules.append({"type": "ineq", "fun": lambda x: (self.bounds - self.value(x)[1:]) / size[1:]})
+        radius = max(0.5 * len(self.values) ** (-1.0 / d), 2.0 * tolerance)
+        options = {"rhobeg": radius, "tol": tolerance, "maxiter": most - len(self.values)}
+        goal: Callable[[Vector], float] = lambda x: float(self.value(x)[0] / size[0])  # noqa: E731
+        found = minimize(goal, self.shares[self.best()], method="COBYLA", constraints=rules, options=options)
+        return bool(found.success)
+
+
+def _found(search: _Search, tolerance: float, converged: bool) -> Minimum:
+    """The best point, and what holds it there."""
+    best, shares, values = search.best(), np.array(search.shares), np.array(search.values)
+    tried = collected(search.trial, _within(search.box, shares), search.kept, (), ())
+    limited = list(zip(tried.quantities[1:], search.bounds.tolist(), values[best, 1:].tolist(), strict=True))
+    if any(value > bound for _, bound, value in limited):
+        told = ", ".join(f"{name} = {value:.6g} (at most {bound:g})" for name, bound, value in limited)
+        where = search.trial.told(tried.points[best])
+        raise RuntimeError(f"no point keeps the constraints; the nearest is {where} with {told}")
+    around = np.abs(shares - shares[best]).max(axis=1) <= NEAR * tolerance
+    pressing = np.atleast_1d((values[around, 1:] > search.bounds).any(axis=0))
+    limits = tuple(Limit(*one, bool(near)) for one, near in zip(limited, pressing, strict=True))
+    ends = np.minimum(shares[best], 1.0 - shares[best]) <= NEAR * tolerance
+    active = [name for name, end in zip(tried.names, ends, strict=True) if end]
+    active += [one.name for one in limits if one.active]
+    at = dict(zip(tried.names, tried.points[best].tolist(), strict=True))
+    value, error = float(tried.values[best, 0]), float(tried.standard_error[best, 0])
+    return Minimum(at, value, error, limits, tuple(active), converged, tried, best)
