@@ -81,3 +81,41 @@ def test_refused(plane):
     beam = fb.Scene(fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01)), [fb.Clamped(0.0)]).reduce(modes=1)
     with pytest.raises(ValueError, match="must be a frame or a structure"):
         fb.plot.deflected(beam.simulate(duration=0.1, dt=1e-2))
+
+
+def test_rig_of_a_frame():
+    """The arrow of a stop points the way its gap closes, names stand in the figure, the frame is where it is."""
+    law = KelvinVoigt(1e6, 50.0)
+    scene = fb.Scene(
+        portal(), [fb.Clamped("A"), fb.Fixed("D", "x", "y", name="hinge")],
+        stops=[fb.Stop(("B-C", 0.7), law, gap=1e-3, direction="-y")], masses=[fb.LumpedMass("C", 2.0, name="box")],
+        base={"x": fb.Harmonic(1e-3, 40.0)},
+    )  # fmt: skip
+    axis = scene.figure().axes[0]
+    body, arrow = axis.lines[1], axis.lines[-1]  # of three members, the beam; supports, mass, stop
+    np.testing.assert_allclose(np.transpose(body.get_data()), [[0, 3], [4, 3]], atol=1e-12)
+    (x, tip, *_), (y, low, *_) = arrow.get_data()
+    assert (x, tip) == pytest.approx((0.7, 0.7))
+    assert low < y < 3.0
+    texts = " ".join(text.get_text().replace("\n", " ") for text in axis.texts)
+    for word in ("clamp at A", "hinge", "box, 2 kg", "stop at 0.7 m along B- C, -y, gap 1 mm"):
+        assert word.replace("- ", "-") in texts.replace("- ", "-")
+    assert "base motion along x" in axis.get_title(loc="left")
+
+
+def test_rigs_in_space_of_unknown_places_and_of_several_bodies():
+    space = fb.Scene(space_l(), [fb.Clamped("A")], stops=[fb.Stop("B", KelvinVoigt(1e6, 50.0), direction="-z")])
+    axis = space.figure().axes[0]
+    z = axis.lines[-1].get_data_3d()[2]
+    assert z[1] < z[0] < 0.0
+    chain = fb.Structure([[2.0, -1.0], [-1.0, 2.0]], np.eye(2), labels=[(20, "x"), (40, "x")])
+    body = fb.Scene(fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01)), [fb.Clamped(0.0)])
+    both = fb.Scene(chain, masses=[fb.LumpedMass(40, 1.0)], bodies=[body])
+    first, second = both.figure().axes
+    assert "places are not known" in first.get_title(loc="left")
+    assert [text.get_text() for text in first.texts] == ["mass at 40, 1 kg"]
+    assert second.get_xlabel() == "z / m"
+    with pytest.raises(ValueError, match="a rig of several bodies needs a figure of its own"):
+        both.figure(second)
+    with pytest.raises(ValueError, match="the axes must be of three dimensions"):
+        space.figure(second)

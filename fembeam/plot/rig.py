@@ -18,12 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fembeam.plot import rig_symbols as symbols
+from fembeam.plot.rig_bodies import rig_of_bodies
 from fembeam.plot.rig_labels import SIZE, Placed, extent, rows_of, spread
 from fembeam.plot.rig_symbols import COLOURS, Pen
 from fembeam.plot.rig_words import gap_words, label, law_words, length, signal_words
 from fembeam.plot.style import GREY, styled
-from fembeam.scene import PointMoment
-from fembeam.support import require
+from fembeam.scene import Guided, Pinned, PointMoment
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -117,8 +117,8 @@ def rig(scene: Scene, axes: Axes | None = None) -> Figure:
     >>> figure.get_suptitle()
     'Rig, to scale along z; gaps × 10 across'
     """
-    straight = not any(part.named for part in (scene, *scene.bodies))
-    require(straight, "a rig is drawn of scenes of Beams", scene.beam, "Scene.figure", "draw plot.mode_shapes(model)")
+    if any(part.named for part in (scene, *scene.bodies)):
+        return rig_of_bodies(scene, axes)
     view = _View(scene, WIDTH if axes is None else _inches(axes))
     lanes = [view.lane(body) for body in range(1 + len(scene.bodies))]
     top = _stacked(scene, lanes, bool(view.heads))
@@ -504,15 +504,15 @@ def _item(part: Any, body: int, side: int, width: float, draw: Callable[[Pen], N
 
 def _support(support: Any, beam: float, body: int) -> Iterator[Item]:
     """A support; of a clamp at an end the wall stands beside the beam."""
-    moves, turns = (not held for held in support.fixed)
-    if turns:
+    if support.fixed == Pinned.fixed:
         yield _item(support, body, -1, 0.26, symbols.pin, fixed=True, tall=0.23)
         return
     near, far = support.z <= 1e-9 * beam, support.z >= (1 - 1e-9) * beam
-    draw = _guided if moves else partial(_clamped, end=far - near)
-    width, tall = (0.4, 0.2) if moves else (0.1, 0.14) if near or far else (0.24, 0.08)
+    guided = support.fixed == Guided.fixed
+    draw = _guided if guided else partial(_clamped, end=far - near)
+    width, tall = (0.4, 0.2) if guided else (0.1, 0.14) if near or far else (0.24, 0.08)
     yield _item(support, body, -1, width, draw, fixed=True, tall=tall)
-    if moves or not (near or far):
+    if guided or not (near or far):
         yield Item(support.z, 1, width, _nothing, "", support.label_on(body), fixed=True, mute=True, tall=tall)
 
 

@@ -51,8 +51,8 @@ def _facts(part: Any) -> Iterator[str]:
             return
         case LumpedMass():
             yield f"{part.mass:.4g} kg"
-            yield f"J = {part.inertia:.3g} kg m²" if part.inertia else ""
-            offset: Any = part.offset
+            yield f"J = {part.inertia:.3g} kg m²" if is_finite(part.inertia) and part.inertia else ""
+            offset: Any = part.offset if is_finite(part.offset) else 0.0
             yield f"{length(abs(offset))} {'ahead' if offset > 0 else 'behind'}" if offset else ""
         case Spring():
             yield f"{part.stiffness:.6g} N/m" if part.stiffness else ""

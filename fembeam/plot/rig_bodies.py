@@ -1,0 +1,227 @@
+"""The rig of frames and structures: their lines, supports, masses, springs, stops and loads along their directions.
+
+A panel for each body, in the plane or in space; of a body that does not know where its nodes are they stand in a row.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections import defaultdict
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fembeam.plot.figure import heading
+from fembeam.plot.rig_symbols import BLACK, COLOURS, circle
+from fembeam.plot.rig_words import WIDE, gap_words, signal_words
+from fembeam.plot.style import BLUE, GREEN
+from fembeam.scene import Pinned
+from fembeam.support import require
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from fembeam.scene import Scene
+
+Vector = NDArray[np.float64]
+REACH = 0.12  # of the body's size, length of springs and arrows
+FREE = 0.03  # the same, between a place and the arrow of a stop
+ZIGZAG = np.array([0, 0, 1, -1, 1, -1, 1, 0, 0]) * 0.12  # of the length of a spring
+HEAD = np.array([[0.0, 0.0], [1.0, 0.0], [0.7, 0.12], [1.0, 0.0], [0.7, -0.12]])  # an arrow of length 1
+
+
+def rig_of_bodies(scene: Scene, axes: Axes | None) -> Figure:
+    """`rig` of `fembeam.plot` of a scene whose bodies are not all Beams."""
+    parts = (scene, *scene.bodies)
+    panels = [_Panel(part, number) for number, part in enumerate(parts)]
+    if axes is None:
+        from fembeam.plot.window import Figure
+
+        figure: Any = Figure(figsize=(8.0, 4.5 * len(parts)), layout="constrained")
+        options = [{"projection": "3d"} if panel.space else {} for panel in panels]
+        drawn = [figure.add_subplot(len(parts), 1, i, **one) for i, one in enumerate(options, 1)]
+    else:
+        require(len(parts) == 1, "a rig of several bodies needs a figure of its own", len(parts), "rig", "drop axes")
+        space = "of three dimensions" if panels[0].space else "flat"
+        require(hasattr(axes, "set_zlabel") == panels[0].space, f"the axes must be {space}", axes, "rig", "drop axes")
+        figure, drawn = axes.figure, [axes]
+    for panel, axis in zip(panels, drawn, strict=True):
+        panel.draw(axis)
+    heading(drawn, "Rig, bodies to scale", axes is None)
+    whole: Figure = figure
+    return whole
+
+
+@dataclass(frozen=True)
+class _Panel:
+    """One body with what stands on it."""
+
+    scene: Scene
+    number: int
+
+    @cached_property
+    def lines(self) -> list[Vector]:
+        """The body's lines, (k, 3); a Beam lies along the first axis."""
+        beam: Any = self.scene.beam
+        return beam.lines() if self.scene.named else [np.array([[0.0, 0.0, 0.0], [beam.length, 0.0, 0.0]])]
+
+    @cached_property
+    def places(self) -> dict[str, Vector]:
+        """Where everything stands, by `repr` of the place; in a row if that is not known of all."""
+        wanted = {repr(place): place for place in self.scene.places}
+        ask: Any = self.scene.beam.position if self.scene.named else (lambda z: np.array([z, 0.0, 0.0]))
+        found = {key: ask(place) for key, place in wanted.items()}
+        if all(at is not None for at in found.values()):
+            return found
+        return {key: np.array([float(i), 0.0, 0.0]) for i, key in enumerate(wanted)}
+
+    @cached_property
+    def row(self) -> bool:
+        """Whether the places stand in a row."""
+        return self.scene.named and any(self.scene.beam.position(place) is None for place in self.scene.places)
+
+    @cached_property
+    def points(self) -> Vector:
+        """All points of the panel (k, 3)."""
+        return np.vstack([np.zeros((0, 3)), *([] if self.row else self.lines), *self.places.values()])
+
+    @cached_property
+    def space(self) -> bool:
+        """Whether the body extends or moves along z; else it is drawn in its plane."""
+        if not self.scene.named or self.row:
+            return False
+        return "z" in self.scene.beam.components or bool(len(self.points) and np.ptp(self.points[:, 2]) > 0)
+
+    @cached_property
+    def size(self) -> float:
+        """Diagonal of the box around the body, m."""
+        return float(np.linalg.norm(np.ptp(self.points, axis=0))) if len(self.points) > 1 else 1.0
+
+    def draw(self, axis: Any) -> None:
+        """The body, its parts, their names."""
+        for line in () if self.row else self.lines:
+            self._plot(axis, line, BLUE, 2.0)
+        if self.row:
+            axis.plot(*self.points.T[:2], "o", color=BLUE, markersize=3)
+        words: dict[str, list[str]] = defaultdict(list)
+        for part, word in self._parts(axis):
+            words[repr(part.z)].append(word)
+        self._texts(axis, words)
+        self._finish(axis)
+
+    def _texts(self, axis: Any, words: dict[str, list[str]]) -> None:
+        """One text for each place, above it, or below where another one is near."""
+        above: list[Vector] = []
+        for key, texts in words.items():
+            at = self.places[key]
+            free = all(np.linalg.norm(at - other) > 0.25 * self.size for other in above)
+            above += [at] if free else []
+            shift, va = REACH * self.size * np.array([0.15, 0.3, 0.0]), "bottom" if free else "top"
+            at = at + shift * (1.0, 1.0 if free else -1.0, 1.0)
+            lines = [line for text in texts for line in textwrap.wrap(text, WIDE)]
+            axis.text(*at[: 3 if self.space else 2], "\n".join(lines), fontsize=7, va=va, parse_math=False)
+
+    def _parts(self, axis: Any) -> Any:
+        """Draw every part; yields it with its label."""
+        scene = self.scene
+        for support in scene.supports:
+            self._mark(axis, support, "^" if support.dofs == Pinned.dofs else "s", BLACK)
+            yield support, self._label(support)
+        for mass in scene.masses:
+            self._mark(axis, mass, "o", COLOURS["mass"])
+            yield mass, f"{self._label(mass)}, {mass.mass:.4g} kg"
+        for spring in scene.springs:
+            self._to_frame(axis, spring, GREEN, ZIGZAG)
+            yield spring, self._label(spring)
+        for dashpot in scene.dashpots:
+            self._to_frame(axis, dashpot, GREEN, 0.0 * ZIGZAG)
+            yield dashpot, self._label(dashpot)
+        for one in scene.acting:
+            yield one, self._acting(axis, one)
+        for force in scene.forces:
+            self._arrow(axis, force, self._way(force), COLOURS["load"])
+            yield force, self._label(force)
+        for impactor in scene.impactors:
+            self._mark(axis, impactor, "o", COLOURS["impactor"])
+            yield impactor, self._label(impactor)
+
+    def _acting(self, axis: Any, one: Any) -> str:
+        """A stop as an arrow the way its gap closes, an element as a spring; a line to the second place."""
+        to, colour = one.coordinate.to, COLOURS["element" if one.always else "stop"]
+        if to is not None and (to[0] or self.number) == self.number:
+            self._plot(axis, np.array([self.places[repr(one.z)], self.places[repr(to[1])]]), colour, 1.0, "--")
+        if not one.always:
+            self._arrow(axis, one, -one.push * np.array(one.coordinate.along), colour)
+            return f"{self._label(one)}, {gap_words(one.gap, one.coordinate.rotation)}"
+        if to is None:
+            self._to_frame(axis, one, colour, ZIGZAG)
+        return self._label(one)
+
+    def _label(self, part: Any) -> str:
+        """What a part is called."""
+        return str(part.label_on(self.number))
+
+    def _way(self, part: Any) -> Vector:
+        """The direction of a part on the six components."""
+        along = part.coordinate.along if hasattr(part, "coordinate") else part.along
+        return np.array((0.0, 1.0, 0.0, 0.0, 0.0, 0.0) if along is None else along)
+
+    def _plot(self, axis: Any, points: Vector, colour: str, width: float, style: str = "-") -> None:
+        """A line through points (k, 3)."""
+        axis.plot(*points.T[: 3 if self.space else 2], color=colour, linewidth=width, linestyle=style)
+
+    def _mark(self, axis: Any, part: Any, marker: str, colour: str) -> None:
+        """A part as a point."""
+        at = self.places[repr(part.z)][: 3 if self.space else 2, None]
+        axis.plot(*at, marker, color=colour, markersize=8, gid=part.label)
+
+    def _shape(self, axis: Any, part: Any, way: Vector, shape: Vector, start: float, colour: str) -> None:
+        """A shape (k, 2), along and across a direction; of a rotation out of the plane a circle, else dashed."""
+        turns = bool(np.any(way[3:]))
+        along = way[3:] if turns else way[:3]
+        flat = along if self.space else along * (1.0, 1.0, 0.0)
+        at, length = self.places[repr(part.z)], REACH * self.size
+        if np.linalg.norm(flat) < 1e-9:
+            ring = np.column_stack([circle(0.4 * length, turn=(0.0, 1.7 * np.pi)), np.zeros(40)])
+            return self._plot(axis, at + ring, colour, 1.2)
+        along = flat / np.linalg.norm(flat)
+        across = np.cross(along, (0.0, 0.0, 1.0) if abs(along[2]) < 0.9 else (1.0, 0.0, 0.0))
+        xi, eta = shape.T[:, :, None]
+        points = at + length * (start + xi) * along + length * eta * across / np.linalg.norm(across)
+        self._plot(axis, points, colour, 1.2, "--" if turns else "-")
+        return None
+
+    def _arrow(self, axis: Any, part: Any, way: Vector, colour: str) -> None:
+        """An arrow along a direction, beginning a little away from the place."""
+        self._shape(axis, part, way, HEAD, FREE / REACH, colour)
+
+    def _to_frame(self, axis: Any, part: Any, colour: str, zigzag: Vector) -> None:
+        """A spring or dashpot against its direction, to a bar that is the frame."""
+        xi = -np.linspace(0.0, 1.0, len(zigzag))
+        bar = np.array([[-1.0, 0.25], [-1.0, -0.25]])
+        self._shape(axis, part, self._way(part), np.vstack([np.column_stack([xi, zigzag]), bar]), 0.0, colour)
+
+    def _finish(self, axis: Any) -> None:
+        """Equal scales, names of the axes, what moves and pulls the whole."""
+        scene, beam = self.scene, not self.scene.named
+        words = [f"base motion along {c}: {signal_words(s, 'm')}".replace("\n", " ") for c, s in scene.motions.items()]
+        words += [f"gravity {scene.gravity:.4g} m/s²"] if scene.gravity else []
+        words += ["places are not known: nodes in a row"] if self.row else []
+        axis.set_title("; ".join([*([f"body {self.number}"] if self.number else []), *words]), fontsize=8)
+        axis.margins(0.25)
+        if self.row:
+            axis.set_aspect("equal", adjustable="datalim")
+            axis.set_axis_off()
+            return
+        axis.set_xlabel("z / m" if beam else "x / m")
+        axis.set_ylabel("y / m")
+        axis.locator_params(nbins=5)
+        if self.space:
+            axis.set_aspect("equal")
+            axis.set_zlabel("z / m")
+        else:
+            axis.set_aspect("equal", adjustable="datalim")
