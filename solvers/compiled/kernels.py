@@ -147,6 +147,14 @@ def contact_forces(problem, stop, delta, delta_dot, entry_rate, force):
 
 
 @inlined
+def force_at(problem, s, delta, delta_dot, entry_rate, batch):
+    """Force of one stop, N; ``batch`` is left with δ, raised to the surface, δ̇ and the force."""
+    batch[0], batch[1] = delta, delta_dot
+    contact_forces(problem, s, batch[0:1], batch[1:2], entry_rate, batch[2:3])
+    return batch[2]
+
+
+@inlined
 def off_knots(problem, stop, segment, delta):
     """δ; where that is a knot to rounding, a point of the segment beside it: the force may jump at the knot."""
     lower, upper = problem.knots[stop, segment - 1], problem.knots[stop, segment]
@@ -277,13 +285,12 @@ def rhs(problem, t, x, segment, entry_rate, rate, batch):
         rate[size + 3 + 2 * s] = 0.0
         if segment[s] > 0:
             delta_dot = indentation_rate(problem, s, x)
-            batch[0] = off_knots(problem, s, segment[s], indentation(problem, s, x))
-            batch[1] = delta_dot
-            contact_forces(problem, s, batch[0:1], batch[1:2], entry_rate[s], batch[2:3])
+            delta = off_knots(problem, s, segment[s], indentation(problem, s, x))
+            force = force_at(problem, s, delta, delta_dot, entry_rate[s], batch)
+            add_push(problem, s, force, rate)
+            rate[size + 2 + 2 * s] = force * delta_dot
+            rate[size + 3 + 2 * s] = force
             calls += 1
-            add_push(problem, s, batch[2], rate)
-            rate[size + 2 + 2 * s] = batch[2] * delta_dot
-            rate[size + 3 + 2 * s] = batch[2]
     return calls
 
 

@@ -10,6 +10,7 @@ from solvers.compiled.kernels import (
     acceleration_of,
     call_force,
     call_renewal,
+    force_at,
     indentation,
     indentation_rate,
     inlined,
@@ -60,8 +61,7 @@ def renew(problem, state, s, j, delta, rate, log):
     if state.event_record.shape[0]:
         write_event(state, RENEWAL, t, t, 0.0, s, j, state.x)
     event_row(problem, state, s, t, j, delta, rate, row)
-    batch = row[at.DELTA : at.FORCE + 1]
-    call_force(problem.law[s], 1, batch[0:1], batch[1:2], state.entry_rate[s], problem.parameters[s], (batch[2:3],))
+    force_at(problem, s, delta, rate, state.entry_rate[s], row[at.DELTA : at.FORCE + 1])
     row[at.CODE] = call_renewal(problem.renewal[s], j, delta, rate, state.entry_rate[s], problem.parameters[s])
     end_event(problem, state, s, row)
     if row[at.FROM] == 0.0 and row[at.TO] > 0.0:

@@ -36,6 +36,7 @@ from solvers.compiled.kernels import (
     copy,
     dot,
     entry,
+    force_at,
     indentation,
     indentation_rate,
     inner,
@@ -97,14 +98,6 @@ def _fly(problem, duration, y):
             y[c, n + b] = alpha * v - beta * (problem.k[b] * p + problem.c[b] * v)
 
 
-@inner
-def _force(problem, past, s, delta, delta_dot, batch):
-    """Force of one stop."""
-    batch[0], batch[1] = delta, delta_dot
-    contact_forces(problem, s, batch[0:1], batch[1:2], past.entry_rate[s], batch[2:3])
-    return batch[2]
-
-
 @merged
 def _begin(problem, past, derivatives, variation):
     """Find the segments of the stops as the run does at its start, and latch the derivatives of their rates."""
@@ -131,9 +124,9 @@ def _cross_knot(problem, past, derivatives, variation, s, direction):
     if entering:
         past.entry_rate[s] = max(abs(rate), problem.floor[s])
     below, above = problem.knots[s, border] * (1.0 - _OFF), problem.knots[s, border] * (1.0 + _OFF) + 1e-300
-    jump = _force(problem, past, s, above, rate, derivatives.batch)
+    jump = force_at(problem, s, above, rate, past.entry_rate[s], derivatives.batch)
     if border > 0:
-        jump -= _force(problem, past, s, below, rate, derivatives.batch)
+        jump -= force_at(problem, s, below, rate, past.entry_rate[s], derivatives.batch)
     jump *= direction
     for c in range(derivatives.y.shape[0]):
         moved = change_of(problem, variation, derivatives, c, s, 0, t)

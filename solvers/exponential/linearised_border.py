@@ -15,6 +15,7 @@ from solvers.compiled.kernels import (
     call_renewal,
     call_renewal_gradient,
     copy,
+    force_at,
     indentation,
     indentation_rate,
     inner,
@@ -36,17 +37,6 @@ def _margin(problem, past, s, j, delta, rate, row, derivatives):
     values = derivatives.renewed[derivatives.renewed.size - problem.border_count[s] :]
     call_force(problem.borders[s], 1, batch[3:4], batch[4:5], past.entry_rate[s], row, (values,))
     return values[j]
-
-
-@inner
-def _force(problem, past, s, delta, rate, derivatives):
-    """Force of the law with memory."""
-    batch = derivatives.batch
-    batch[3], batch[4] = delta, rate
-    call_force(
-        problem.law[s], 1, batch[3:4], batch[4:5], past.entry_rate[s], problem.parameters[s], (batch[5:6],)
-    )  # fmt: skip
-    return batch[5]
 
 
 @merged
@@ -121,9 +111,9 @@ def pass_border(problem, ahead, behind, past, derivatives, variation, s, j):
         own += 1 if problem.latched[s, i] >= 0 else 0
     entry, row = past.entry_rate[s], problem.parameters[s]
     call_renewal_gradient(problem.by_renewal[s], j, delta, rate, entry, row, maps)
-    jump = _force(problem, past, s, delta, rate, derivatives)
+    jump = force_at(problem, s, delta, rate, entry, derivatives.batch)
     call_renewal(problem.renewal[s], j, delta, rate, entry, row)
-    jump = _force(problem, past, s, delta, rate, derivatives) - jump
+    jump = force_at(problem, s, delta, rate, entry, derivatives.batch) - jump
     moved = 0.0
     if variation.law_step > 0.0:
         moved = _explicit(problem, ahead, behind, past, s, j, delta, rate, derivatives, variation, explicit)

@@ -77,8 +77,7 @@ def _begin(problem, state, numbers, rest, parameters, start):
     """The state of a run at t = 0, as `Workspace.begin` makes it, and what its laws have latched."""
     for s in range(problem.law.size if problem.border_count.any() else 0):
         copy(parameters[s], problem.parameters[s], parameters.shape[1])
-    for i in range(rest.size):
-        numbers[i] = rest[i]
+    copy(rest, numbers, rest.size)
     copy(start, state.x, start.size)
 
 
@@ -86,8 +85,7 @@ def _begin(problem, state, numbers, rest, parameters, start):
 def _end(problem, state, scratch, code, x, count, number, peak):
     """Write the outcome of a finished run."""
     finite = True
-    for e in range(x.size):
-        x[e] = state.x[e]
+    copy(state.x, x, x.size)
     for value in state.x:
         finite &= np.isfinite(value)
     for s in range(problem.law.size):
@@ -95,8 +93,7 @@ def _end(problem, state, scratch, code, x, count, number, peak):
             _note(s, state.active[s, PEAK_DELTA], state.active[s, PEAK_FORCE], count, number, peak)
     count[CODE] = DIVERGED if code == DONE and not finite else code
     number[REACHED] = state.now[T]
-    for i in range(3):
-        number[ENERGY + i] = scratch.energy[i]
+    copy(scratch.energy, number[ENERGY:], 3)
 
 
 @entry(

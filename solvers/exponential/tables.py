@@ -98,31 +98,20 @@ class Tables(NamedTuple):
     uncut_parameters: Annotated[Any, "E, P"]
 
 
-class LawTables(NamedTuple):
-    """Entries of `Tables` that come from the laws."""
-
-    exponent: Any
-    power_law: Any
-    bend: Any
-    uncut: Any
-    uncut_gradient: Any
-    uncut_parameters: Any
-
-
-def law_tables_of(contacts: Sequence[Any]) -> LawTables:
-    """The same of the laws of contacts; see `solvers.problem.system.Law`. Those that always act are called."""
+def law_tables_of(contacts: Sequence[Any]) -> dict[str, Any]:
+    """Entries of `Tables` from the laws of contacts, see `problem.system.Law`. Those that always act are called."""
     laws = [contact.law for contact in contacts]
     inlined = [None if contact.always else getattr(contact.law, "inlined", None) for contact in contacts]
     bends = [getattr(law, "bend", None) for law in laws]
     uncut = [law.uncut if bend == "force" else law for law, bend in zip(laws, bends, strict=True)]
-    return LawTables(
-        np.array([law.exponent for law in laws], dtype=float),
-        np.array([own or (0.0,) * 4 for own in inlined]).reshape(-1, 4),
-        np.array([(None, "rate", "force").index(bend) for bend in bends], dtype=float),
-        np.array([law.address for law in uncut], dtype=np.int64),
-        np.array([law.gradient_address for law in uncut], dtype=np.int64),
-        parameters_of(uncut),
-    )
+    return {
+        "exponent": np.array([law.exponent for law in laws], dtype=float),
+        "power_law": np.array([own or (0.0,) * 4 for own in inlined]).reshape(-1, 4),
+        "bend": np.array([(None, "rate", "force").index(bend) for bend in bends], dtype=float),
+        "uncut": np.array([law.address for law in uncut], dtype=np.int64),
+        "uncut_gradient": np.array([law.gradient_address for law in uncut], dtype=np.int64),
+        "uncut_parameters": parameters_of(uncut),
+    }
 
 
 # tables with columns for the tones
@@ -147,7 +136,7 @@ def build(
     problem: Problem,
     tones: int,
     series: tuple[tuple[float, float], ...],
-    laws: LawTables,
+    laws: dict[str, Any],
     dt_cell: float,
     energy_rows: tuple[Any, Any, Any],
 ) -> Tables:
@@ -159,7 +148,7 @@ def build(
     node_sets = node_sets_of(series)
     blocks = blocks_of(problem, tones, h, contact_h, node_sets)
     cell_error, cell_error_signal = cell_errors(problem, dt_cell)
-    ready = {**node_sets._asdict(), **blocks._asdict(), **laws._asdict()}  # `alias` is that of the blocks
+    ready = {**node_sets._asdict(), **blocks._asdict(), **laws}  # `alias` is that of the blocks
     signal_rows, power_rows, loss_rows = energy_rows
     return Tables(
         **{name: ready[name] for name in Tables._fields if name in ready},

@@ -23,12 +23,7 @@ class Exponent(NamedTuple):
 
 
 def lyapunov(
-    system: System,
-    q0: ArrayLike,
-    q_dot0: ArrayLike,
-    duration: float,
-    discard: float = 0.0,
-    method: Any = None,
+    system: System, q0: ArrayLike, q_dot0: ArrayLike, duration: float, discard: float = 0.0, method: Any = None
 ) -> Exponent:
     """Mean rate at which the tangent grows, λ = lim ln‖∂x(t)/∂x(0)‖ / t.
 

@@ -42,11 +42,7 @@ _MOST_SETTLINGS = 4  # starts taken from a run from rest, a hundred periods apar
 
 
 def orbit(
-    system: System,
-    period: float,
-    start: ArrayLike | None = None,
-    method: Any = None,
-    shots: int | None = None,
+    system: System, period: float, start: ArrayLike | None = None, method: Any = None, shots: int | None = None
 ) -> Orbit:
     """Find the periodic motion Φ(x) = x of a system near a start; Φ carries the state over one period.
 

@@ -3,9 +3,9 @@
 M q'' + C q' + K q = Σ v_l s_l(t) + Σ w_c F_c(-w_c·q - gap_c, ...)
 
 `system` holds matrices, contacts and loads and decouples them into blocks, `signals` samples loads for compiled code,
-`common_grid` puts the samples of several on one grid, `memo` keeps what was computed once, `result` is the solution
-with its log of contacts and its energies, `losses` the energy that contacts dissipated. Imports: numpy, scipy. Begin
-with `system.System`.
+`common_grid` puts the samples of several on one grid, `memo` keeps what was computed once, `event_list` names the
+columns of what a run logs, `result` is the solution with its log of contacts and its energies, `losses` the energy that
+contacts dissipated. Imports: numpy, scipy. Begin with `system.System`.
 """
 
 from solvers.problem.common_grid import on_one_grid

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from solvers.compiled.kernels import contact_forces, copy, dot, indentation, indentation_rate, inner, kernel, off_knots
+from solvers.compiled.kernels import copy, dot, force_at, indentation, indentation_rate, inner, kernel, off_knots
 from solvers.compiled.renewals import most_rows
 from solvers.compiled.state import (
     AT_ONCE,
@@ -73,12 +73,11 @@ def _peaks(problem, state, space):
 def _peak_value(known, theta):
     """Indentation or force at θ of the step."""
     problem, state, s, column, delta_of, rate_of, batch = known
-    batch[0] = polynomial(delta_of, theta)
+    delta = polynomial(delta_of, theta)
     if column == PEAK_DELTA:
-        return batch[0]
-    batch[0], batch[1] = off_knots(problem, s, state.segment[s], batch[0]), polynomial(rate_of, theta)
-    contact_forces(problem, s, batch[0:1], batch[1:2], state.entry_rate[s], batch[2:3])
-    return batch[2]
+        return delta
+    delta = off_knots(problem, s, state.segment[s], delta)
+    return force_at(problem, s, delta, polynomial(rate_of, theta), state.entry_rate[s], batch)
 
 
 @inner
@@ -111,9 +110,7 @@ def _side(problem, state, space, s, theta, lowest, batch):
     delta, rate = polynomial(space.coefficients[0], theta), polynomial(space.coefficients[1], theta)
     side = 2 if space.kinks[s] & 2 and rate > 0.0 else 0
     if space.kinks[s] & 1 and delta > lowest:
-        batch[0], batch[1] = delta, rate
-        contact_forces(problem, s, batch[0:1], batch[1:2], state.entry_rate[s], batch[2:3])
-        side += 1 if batch[2] == 0.0 else 0
+        side += 1 if force_at(problem, s, delta, rate, state.entry_rate[s], batch) == 0.0 else 0
     return side
 
 
@@ -232,14 +229,11 @@ def accept(problem, state, space, h, stop, direction, at_end, t_end, log, out, d
 @inner
 def _law_fails(problem, state, space, h):
     """Whether a law is not finite where an Euler step would take its stop."""
-    batch = space.work[0]
     for s in range(problem.law.size):
-        batch[0] = indentation(problem, s, state.x) + h * dot(
-            problem.read[problem.first[s]], state.rate, 2 * problem.k.size
-        )
-        batch[1] = indentation_rate(problem, s, state.x)
-        if state.segment[s] > 0 and np.isfinite(batch[0]):
-            contact_forces(problem, s, batch[0:1], batch[1:2], state.entry_rate[s], batch[2:3])
-            if not np.isfinite(batch[2]):
+        read = problem.read[problem.first[s]]
+        delta = indentation(problem, s, state.x) + h * dot(read, state.rate, 2 * problem.k.size)
+        if state.segment[s] > 0 and np.isfinite(delta):
+            rate = indentation_rate(problem, s, state.x)
+            if not np.isfinite(force_at(problem, s, delta, rate, state.entry_rate[s], space.work[0])):
                 return True
     return False

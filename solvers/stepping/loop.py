@@ -10,18 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from solvers.compiled.kernels import (
-    INTEGERS,
-    MATRIX,
-    PROBLEM,
-    REAL,
-    VECTOR,
-    entry,
-    inlined,
-    inner,
-    merged,
-    rhs,
-)
+from solvers.compiled.kernels import INTEGERS, MATRIX, PROBLEM, REAL, VECTOR, entry, inlined, inner, merged, rhs
 from solvers.compiled.state import (
     CALLS,
     GAINED,
@@ -39,13 +28,7 @@ from solvers.compiled.state import (
 from solvers.problem import Array
 from solvers.stepping.borders import border_ahead, border_space, renew_border, renew_together
 from solvers.stepping.energy_gain import modal_gains
-from solvers.stepping.events import (
-    HENON,
-    LOCATED,
-    NONE,
-    UNRESOLVED,
-    entry_by_sign,
-)
+from solvers.stepping.events import HENON, LOCATED, NONE, UNRESOLVED, entry_by_sign
 from solvers.stepping.henon import hermite
 from solvers.stepping.henon import land as henon_landing
 from solvers.stepping.located import NEAR_END, SWITCHED, accept, find, first_kink, land, look
@@ -54,8 +37,7 @@ _MOST_NODES = 16.0  # of a signal on a step: a period of its fastest part has te
 
 STEP_FUNCTION = types.FunctionType(
     types.Tuple([REAL, types.int64])(
-        *[PROBLEM, REAL, REAL, VECTOR, VECTOR, INTEGERS, VECTOR],
-        *[VECTOR, VECTOR, MATRIX, MATRIX, REAL, REAL],
+        *[PROBLEM, REAL, REAL, VECTOR, VECTOR, INTEGERS, VECTOR], *[VECTOR, VECTOR, MATRIX, MATRIX, REAL, REAL]
     )
 )
 
@@ -156,21 +138,7 @@ def _entry_by_henon(problem, state, space, h):
     )
 )
 def march(
-    step,
-    problem,
-    state,
-    space,
-    t_end,
-    budget,
-    dt_flight,
-    dt_contact,
-    rtol,
-    atol,
-    adaptive,
-    events,
-    log,
-    out,
-    due,
+    step, problem, state, space, t_end, budget, dt_flight, dt_contact, rtol, atol, adaptive, events, log, out, due
 ):
     """Advance the state to ``t_end`` or for ``budget`` steps; returns a status code."""
     now, count = state.now, state.count

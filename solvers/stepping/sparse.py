@@ -26,9 +26,9 @@ from solvers.compiled.state import (
     matrix_problem_of,
     new_state,
 )
-from solvers.problem import Array, Forcing, Status, System
+from solvers.problem import Array, Forcing, System
 from solvers.stepping.energy_gain import LEAST, NOW, gains, negligible_energy, watched
-from solvers.stepping.engine import explanation
+from solvers.stepping.engine import Engine
 from solvers.stepping.events import LOCATED, MOST_LANDINGS, NONE, UNRESOLVED, nearer
 from solvers.stepping.henon import hermite
 from solvers.stepping.located import SWITCHED, accept, find, landing_tolerance, look
@@ -36,8 +36,8 @@ from solvers.stepping.loop import new_space
 from solvers.stepping.newmark import MOST_SWEEPS, contact_force
 
 
-class MatrixEngine:
-    """One run of a method on matrices; offers what `engine.Engine` does."""
+class MatrixEngine(Engine):
+    """One run of a method on matrices."""
 
     def __init__(self, method: Any, system: System, z: Array, forcing: Forcing, duration: float) -> None:
         from scipy.sparse import csc_array, eye_array
@@ -70,10 +70,6 @@ class MatrixEngine:
     def refresh(self) -> None:
         """Evaluate the rate anew."""
         self.rate(self.state.now[T], self.state.x, self.state.rate)
-
-    def keeps_ledger(self, sampled: bool) -> bool:
-        """The energy balance is integrated along, always."""
-        return True
 
     def march(self, budget: int, log: Array, out: Array, due: Array) -> int:
         """Advance by at most ``budget`` steps; the loop of `loop.march` for a constant step."""
@@ -139,13 +135,6 @@ class MatrixEngine:
         q, q_dot = np.split(self.state.x[: 2 * self.system.size], 2)
         self.space.watch[NOW] = self.system.energy(q, q_dot)
         return bool(gains(self.problem, self.state, self.space))
-
-    def explain(self, code: Status) -> str:
-        """What grew, and the step to try."""
-        if code not in (Status.GAINED, Status.DIVERGED):
-            return ""
-        q, q_dot = np.split(self.state.x[: 2 * self.system.size], 2)
-        return explanation(self.method, self.system, q, q_dot, self.duration)
 
     # --- what steps are made of
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numba import types
 
-from solvers.compiled.kernels import contact_forces, dot, indentation, indentation_rate, inlined, inner, merged
+from solvers.compiled.kernels import dot, force_at, indentation, indentation_rate, inlined, inner, merged
 from solvers.compiled.parts import BEGIN, part
 from solvers.compiled.state import T_IN, T, surface_tolerance
 from solvers.exponential.contact.crossings import choose_sides
@@ -57,9 +57,7 @@ def _contact_time(problem, tables, scratch, s, speed):
         return 3.2 * (target * (p + 1.0) / law[STIFFNESS]) ** (1.0 / (p + 1.0)) / speed
     deepest = 1e-3 * speed
     for _ in range(4):
-        scratch.clipped[0], scratch.trial[0] = deepest, 0.0
-        contact_forces(problem, s, scratch.clipped[0:1], scratch.trial[0:1], speed, scratch.trial[1:2])
-        energy = scratch.trial[1] * deepest / (p + 1.0)
+        energy = force_at(problem, s, deepest, 0.0, speed, scratch.trial) * deepest / (p + 1.0)
         if not energy > 0.0 or abs(target - energy) < 0.1 * target:
             break
         deepest *= (target / energy) ** (1.0 / (p + 1.0))

@@ -12,6 +12,7 @@ import math
 from solvers.compiled.kernels import (
     contact_forces,
     copy,
+    force_at,
     indentation,
     indentation_rate,
     inlined,
@@ -166,9 +167,8 @@ def state_peaks(problem, state, scratch, x):
     batch = scratch.trial
     for s in range(problem.law.size):
         if acting_segment(problem, state, s) > 0:
-            batch[0] = off_knots(problem, s, state.segment[s], indentation(problem, s, x))
-            batch[1] = indentation_rate(problem, s, x)
-            contact_forces(problem, s, batch[0:1], batch[1:2], state.entry_rate[s], batch[2:3])
+            delta = off_knots(problem, s, state.segment[s], indentation(problem, s, x))
+            force_at(problem, s, delta, indentation_rate(problem, s, x), state.entry_rate[s], batch)
             if not begins_and_ends(problem, s):
                 batch[0], batch[2] = abs(batch[0]), abs(batch[2])
             state.active[s, PEAK_DELTA] = max(state.active[s, PEAK_DELTA], batch[0])
@@ -178,9 +178,8 @@ def state_peaks(problem, state, scratch, x):
 @inner
 def pressed_speed(problem, tables, state, s, batch):
     """Speed, m/s, that the force of a stop in contact would give on a way as long as its indentation, √(|F δ|/m)."""
-    batch[0] = indentation(problem, s, state.x)
-    if state.segment[s] == 0 or abs(batch[0]) <= surface_tolerance(problem, s, state.x):
+    delta = indentation(problem, s, state.x)
+    if state.segment[s] == 0 or abs(delta) <= surface_tolerance(problem, s, state.x):
         return 0.0
-    batch[1] = indentation_rate(problem, s, state.x)
-    contact_forces(problem, s, batch[0:1], batch[1:2], state.entry_rate[s], batch[2:3])
+    force_at(problem, s, delta, indentation_rate(problem, s, state.x), state.entry_rate[s], batch)
     return math.sqrt(abs(batch[0] * batch[2] * own_accelerance(problem, tables, s)))
