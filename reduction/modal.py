@@ -24,6 +24,7 @@ ORTHONORMALITY_TOLERANCE = 1e-9
 RESIDUAL_TOLERANCE = 1e-9  # of the largest terms in K φ - ω² M φ
 SYMMETRY_TOLERANCE = 1e-9
 SHIFT = 1e-12  # of the median of K_ii/M_ii: above rounding of K, not far above the lowest elastic ω²
+WIDER = (1.0, 1e3, 1e4)  # times that shift, where the modes do not settle
 MOST_RAISED = 8  # times by ten
 ELASTIC = 1e3  # of that shift, above which ω² is not that of a rigid-body mode
 RIGID = 1e-7  # of max √(K_ii/M_ii): rounding of K, a few √eps, hides lower frequencies
@@ -88,20 +89,20 @@ def modal_basis(
     _check_mass(M)
     highest = int(wanted[-1]) + 1
     guards = GUARDS if root is not None and M.shape[0] > FINE else 0
-    omega_squared, vectors = _solve(M, K, min(highest + guards, M.shape[0]))
+    wider = min(highest + guards, M.shape[0])
     if root is None:
-        basis = _without_root(M, K, omega_squared, vectors)
+        basis = _without_root(M, K, *_solve(M, K, wider))
+        _verify(basis, M, K)
     else:
-        basis = _with_root(M, K, sparse.csr_matrix(root), vectors)
-    _verify(basis, M, K)
+        basis = _settled(M, K, sparse.csr_matrix(root), wider)
     return oriented(Basis(basis.vectors[:, wanted], basis.omega[wanted]))
 
 
-def _solve(M: sparse.csc_matrix, K: sparse.csc_matrix, count: int) -> tuple[Vector, Vector]:
+def _solve(M: sparse.csc_matrix, K: sparse.csc_matrix, count: int, factor: float = 1.0) -> tuple[Vector, Vector]:
     """The lowest `count` pairs (ω², φ), dense when the problem is small or most modes are wanted."""
     size = M.shape[0]
     if 2 * count <= size <= DENSE_LIMIT:  # the inverse problem keeps low modes clean beside stiff springs
-        shift = _regular(M, K)
+        shift = factor * _regular(M, K)
         omega_squared, vectors = _inverse(M, K, shift, count)
         elastic = omega_squared > ELASTIC * shift
         if elastic.any() and not elastic.all():  # rounding there is eps/shift: too much for the highest modes
@@ -110,7 +111,7 @@ def _solve(M: sparse.csc_matrix, K: sparse.csc_matrix, count: int) -> tuple[Vect
     if size <= DENSE_LIMIT or 4 * count > size:
         return linalg.eigh(K.toarray(), M.toarray(), subset_by_index=(0, count - 1))
     start = np.random.default_rng(0).standard_normal(size)  # fixed: the same basis every time
-    pairs = sparse_linalg.eigsh(K, count, M, sigma=-_shift(M, K), which="LM", v0=start)
+    pairs = sparse_linalg.eigsh(K, count, M, sigma=-factor * _shift(M, K), which="LM", v0=start)
     order = np.argsort(pairs[0])
     return pairs[0][order], pairs[1][:, order]
 
@@ -156,12 +157,29 @@ def _without_root(M: sparse.csc_matrix, K: sparse.csc_matrix, omega_squared: Vec
     return Basis(vectors, np.where(omega <= rigid, 0.0, omega))
 
 
-def _with_root(M: sparse.csc_matrix, K: sparse.csc_matrix, R: sparse.csr_matrix, vectors: Vector) -> Basis:
+def _settled(M: sparse.csc_matrix, K: sparse.csc_matrix, R: sparse.csr_matrix, count: int) -> Basis:
+    """The verified basis in R, where need be with a larger shift: rounding may hide several rigid motions in space."""
+    failure = None
+    for factor in WIDER:
+        try:
+            basis = _with_root(M, K, R, _solve(M, K, count, factor)[1], factor * _shift(M, K))
+            _verify(basis, M, K)
+        except AccuracyError as error:
+            failure = failure or error
+        else:
+            return basis
+    assert failure is not None
+    raise failure
+
+
+def _with_root(
+    M: sparse.csc_matrix, K: sparse.csc_matrix, R: sparse.csr_matrix, vectors: Vector, shift: float
+) -> Basis:
     """Rayleigh–Ritz in R, then corrections by the residual in R until the frequencies settle."""
     mismatch = abs(R.T @ R - K).max() if R.shape[1] == K.shape[0] else np.inf
     if not mismatch <= SYMMETRY_TOLERANCE * abs(K).max():
         raise ValueError(f"root must satisfy rootᵀ root = K, got a difference of {mismatch} in modal_basis; fix it")
-    solve: Callable[[Vector], Vector] = sparse_linalg.splu((K + _shift(M, K) * M).tocsc()).solve
+    solve: Callable[[Vector], Vector] = sparse_linalg.splu((K + shift * M).tocsc()).solve
     rigid = RIGID_WITH_ROOT * _scale(M, K)
     omega, vectors = _ritz(M, R, vectors)
     change, turn, before, corrections = np.inf, np.inf, np.inf, 0

@@ -260,3 +260,15 @@ def test_shear_is_refused_where_it_is_not_meant():
         replace(STEEL, shear=(0.8, 0.0))
     with pytest.raises(ValueError, match="I12 must be 0 with shear"):
         replace(STEEL, shear=0.8, I12=1e-10)
+
+
+@pytest.mark.parametrize("elements", [8, 20])
+@pytest.mark.parametrize("seed", [3, 5])
+def test_rigid_motions_in_space_do_not_hide_modes(seed, elements):
+    """Held at one point by its displacements alone, a frame turns three ways at any angle, whatever number of modes."""
+    made = space_l(turned(seed)).assembled(elements=elements)
+    free = np.setdiff1d(np.arange(len(made.labels)), made.rows("A")[:3].indices)
+    M, K = (A[free][:, free] for A in (made.M, made.K))
+    found = [reduction.modal_basis(M, K, count, root=made.root[:, free]).omega for count in (4, 7, 10)]
+    assert all(np.array_equal(omega[:3], np.zeros(3)) for omega in found)
+    assert np.allclose([omega[3] for omega in found], found[0][3], rtol=1e-9)

@@ -167,5 +167,19 @@ def test_released_nodes():
                                        for one in portal().members])  # fmt: skip
     with pytest.raises(ValueError, match="releases must not free a node; 'B' moves along 'rz'"):
         fb.Scene(loose, [fb.Clamped("A"), fb.Clamped("D")]).reduce(modes=2)
-    wheel = fb.LumpedMass("B", mass=0.1, inertia=1.0)
-    fb.Scene(loose, [fb.Clamped("A"), fb.Clamped("D")], [wheel], springs=[]).reduce(modes=2, elements=9)
+    wheel, spring = fb.LumpedMass("B", mass=0.1, inertia=1.0), fb.Spring("B", 1e3, direction="rz")
+    found = fb.Scene(loose, [fb.Clamped("A"), fb.Clamped("D")], [wheel], [spring]).reduce(modes=3, elements=9).omega
+    assert np.min(np.abs(found / np.sqrt(1e3) - 1)) < 1e-9
+
+
+def test_mechanisms():
+    """Hinges that let a frame collapse are refused, with the motion; a frame that moves as a whole is not."""
+    hinged = replace(portal(), members=[replace(one, release=("start rz", "end rz")) if one.name == "B-C" else one
+                                        for one in portal().members])  # fmt: skip
+    with pytest.raises(ValueError, match=r"must not be a mechanism; '[BC]' moves along 'x' .*, got \['B-C'\] in Scene"):
+        fb.Scene(hinged, [fb.Pinned("A"), fb.Pinned("D")]).reduce(modes=2)
+    assert fb.Scene(hinged, [fb.Clamped("A"), fb.Pinned("D")]).reduce(modes=2, elements=9).omega[0] > 1.0
+    free = fb.Scene(portal()).reduce(modes=4, elements=9)
+    assert np.count_nonzero(free.omega == 0.0) == 3
+    turning = fb.Scene(space_l(turned(3)), [fb.Pinned("A")]).reduce(modes=4, elements=4)
+    assert np.count_nonzero(turning.omega == 0.0) == 3

@@ -25,6 +25,7 @@ from fembeam.support import require
 if TYPE_CHECKING:
     from fembeam.scene.scene import Scene
 
+MOST_RIGID = 6
 UNIT = 1e-12  # of 1: entries of a row that stands for one dof
 
 
@@ -127,13 +128,18 @@ def _warn_of_massless(scene: Scene, matrices: BodyMatrices) -> None:
 
 def _made(scene: Scene, elements: int | None, modes: int | None, places: tuple[Any, ...]) -> Assembled:
     """The body's matrices, of a frame on a mesh for the frequencies that it has with all that is on it."""
-    if elements is not None or not isinstance(scene.beam, Frame):
+    if not isinstance(scene.beam, Frame):
         return scene.beam.assembled(elements if getattr(scene.beam, "meshed", True) else None, modes, places)
     count = DEFAULT_MODES if modes is None else int(modes)
     coarse = scene.beam.coarse(count, places)
     own = _of(scene, coarse, count, _held(scene, coarse), condense=True)
     basis = reduction.modal_basis(own.M, own.K, min(count, own.M.shape[0]), root=own.root)
-    return scene.beam.assembled(None, count, places, float(basis.omega[-1]))
+    if not np.any(basis.omega):  # all of them rigid-body modes
+        basis = reduction.modal_basis(own.M, own.K, min(MOST_RIGID + count, own.M.shape[0]), root=own.root)
+    coarse.check_mechanism(own.spread @ basis.vectors[:, basis.omega == 0.0], "Scene")
+    if elements is not None:
+        return scene.beam.assembled(elements, modes, places)
+    return scene.beam.assembled(None, count, places, float(basis.omega[:count][-1]))
 
 
 def _holding(scene: Scene) -> dict[Any, list[str]]:

@@ -50,6 +50,7 @@ Counts = list[NDArray[np.int64]]
 
 DEFAULT_MODES = 10
 MOST_ELEMENTS = 10_000
+MECHANISM = 1e-4  # of a motion without resistance: what is left of it without the rigid part, where there is any
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,6 +169,33 @@ class FrameMatrices(Assembled):
         pieces += [self.rows(places[i]) for i in nodes]
         back = np.argsort(np.array(order + nodes, dtype=int))
         return sparse.vstack(pieces, format="csr")[(count * back[:, None] + np.arange(count)).ravel()]
+
+    @cached_property
+    def rigid_motions(self) -> Vector:
+        """Unit translations along and rotations about x, y, z through the origin (N, 6), of what the frame has."""
+        frame = self.mesh.frame
+        points = np.array([frame.position(place if name in COMPONENTS else frame.members[0].a)
+                           for place, name in self.labels])  # fmt: skip
+        moved = np.zeros((len(self.labels), 6))
+        for dof, ((_, name), at) in enumerate(zip(self.labels, points, strict=True)):
+            if name in COMPONENTS:
+                moved[dof] = arm_matrix(at)[COMPONENTS.index(name)]
+        return moved
+
+    def check_mechanism(self, loose: Vector, where: str) -> None:
+        """Raise ValueError, naming the motion, if motions (N, n) without resistance are not of the frame as a whole."""
+        if loose.shape[1] == 0:
+            return
+        left = loose - self.rigid_motions @ np.linalg.lstsq(self.rigid_motions, loose, rcond=None)[0]
+        most, mix = np.linalg.svd(left, full_matrices=False)[1:]
+        rigid = bool(most[0] <= MECHANISM * np.linalg.norm(loose, axis=0).max())
+        motion = np.abs(loose @ mix[0])
+        shift = np.array([name in COMPONENTS[:3] for _, name in self.labels])
+        moving = motion * shift if np.any(motion[shift] > MECHANISM * motion.max()) else motion
+        place, name = self.labels[int(np.argmax(moving > 0.999 * moving.max()))]  # nodes come first
+        require(rigid, f"the frame must not be a mechanism; {place!r} moves along {name!r} without resistance",
+                [one.name for one in self.mesh.frame.members if one.release], where,
+                "release less, or support it there")  # fmt: skip
 
     def section_forces(self, vectors: Vector, inertia: Vector) -> FrameForces:
         """Section forces of displacements (N, n) and of the inertia (N, n) that their stiffness balances."""
