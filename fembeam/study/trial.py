@@ -39,7 +39,7 @@ class Together:
         if isinstance(asked, Mapping):
             parts = [(str(name), named(one)) for name, one in asked.items()]
         else:
-            each = list(asked) if isinstance(asked, (list, tuple)) else [asked]
+            each: list[Any] = list(asked) if isinstance(asked, (list, tuple)) else [asked]
             parts = [(label(one), one) for one in map(named, each)]
         names = [name for name, _ in parts]
         require(bool(names), "quantity must name at least one", asked, "study", "e.g. 'peak_force'")
