@@ -2,22 +2,22 @@
 
     minimise f(x)    low <= x <= high,    g(x) <= bound
 
-The box is first looked over at points spread evenly (Halton's sequence), then searched from the best of them by
-Powell's COBYLA, which needs no derivatives. Noise has the same seeds at every point: f is a function
-of x alone.
+The box is first looked over at points spread evenly (Halton's sequence), then searched from the best of them by COBYQA,
+a trust-region method with quadratic models that needs no derivatives. Noise has the same seeds at every point, so that
+f is a function of x alone.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
+from scipy.optimize import Bounds, NonlinearConstraint, minimize
 from scipy.stats import qmc
 
 from fembeam import plot
@@ -147,7 +147,8 @@ def minimise(
 
     References
     ----------
-    M.J.D. Powell, in Advances in Optimization and Numerical Analysis (1994), 51–67.
+    T.M. Ragonneau, Model-based derivative-free optimization methods and software, PhD thesis, Hong Kong Polytechnic
+    University (2022), chapters 5 to 7: COBYQA.
 
     Examples
     --------
@@ -248,14 +249,20 @@ class _Search:
 
     def descend(self, tolerance: float, most: int) -> bool:
         """Search from the best point; whether it converged."""
-        size, d = self._sizes(), len(self.box)
-        rules: list[dict[str, Any]] = [{"type": "ineq", "fun": lambda x: np.concatenate((x, 1.0 - x))}]
+        size, d, allowed = self._sizes(), len(self.box), list[NonlinearConstraint]()
         if len(self.bounds):
-            rules.append({"type": "ineq", "fun": lambda x: (self.bounds - self.value(x)[1:]) / size[1:]})
-        radius = max(0.5 * len(self.values) ** (-1.0 / d), 2.0 * tolerance)
-        options = {"rhobeg": radius, "tol": tolerance, "maxiter": most - len(self.values)}
-        goal: Callable[[Vector], float] = lambda x: float(self.value(x)[0] / size[0])  # noqa: E731
-        found = minimize(goal, self.shares[self.best()], method="COBYLA", constraints=rules, options=options)
+            limits = self.bounds / size[1:]
+            allowed.append(NonlinearConstraint(lambda x: self.value(x)[1:] / size[1:], -np.inf, limits))
+        radius = max(0.5 * len(self.values) ** (-1.0 / d), 2.0 * tolerance)  # half the distance of the first points
+        radii = {"initial_tr_radius": radius, "final_tr_radius": tolerance}
+        found = minimize(
+            lambda x: self.value(x)[0] / size[0],
+            self.shares[self.best()],
+            method="COBYQA",
+            bounds=Bounds(np.zeros(d), np.ones(d)),
+            constraints=allowed,
+            options={**radii, "maxfev": most - len(self.values)},
+        )
         return bool(found.success)
 
 

@@ -40,7 +40,7 @@ class Together:
             parts = [(str(name), named(one)) for name, one in asked.items()]
         else:
             each: list[Any] = list(asked) if isinstance(asked, (list, tuple)) else [asked]
-            parts = [(label(one), one) for one in (named(item) for item in each)]
+            parts = [(label(one), one) for one in map(named, each)]
         names = [name for name, _ in parts]
         require(bool(names), "quantity must name at least one", asked, "study", "e.g. 'peak_force'")
         require(len({*names}) == len(names), "quantities must have different names", names, "study",
