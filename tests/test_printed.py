@@ -51,6 +51,8 @@ def things():
         "modes": study.mode_count(scene, [1, 2], "amplitude", duration=0.1, dt=1e-3),
         "map": study.stability_map(scene, solvers.RK4, [1e-6, 1e-5], modes=(1, 2), duration=0.01),
         "smallest": study.smallest_model(scene, "amplitude", 0.5, duration=0.1, dt=1e-3),
+        "vary": study.vary(scene, {"gap": [0.0, 1e-4]}, "peak_force", 0.1),
+        "least": study.minimise(scene, {"gap": (0.0, 1e-4)}, "peak_force", {}, 0.1, tolerance=1e-2),
         "speed": study.speed_accuracy(model, rough, starts=2, duration=0.05, rounds=1),
     }
 
@@ -71,7 +73,7 @@ def test_reprs_of_many_numbers_tell_one_from_another():
     assert eval(repr(few), {"Multisine": fb.Multisine}) == few
 
 
-STUDIES = ["ensemble", "response", "bifurcation", "basins", "modes", "map", "smallest", "speed"]
+STUDIES = ["ensemble", "response", "bifurcation", "basins", "modes", "map", "smallest", "speed", "vary", "least"]
 TABLES = ["model", "run", "orbit", "branch", *STUDIES]
 
 
