@@ -24,7 +24,7 @@ from fembeam.scene import Source
 from fembeam.scene_file import built, kinds, read, template
 
 EXAMPLE = Path(__file__).parent.parent / "examples" / "beam_stop.toml"
-FIGURES = ["time_history.png", "psd.png", "densities.png", "contacts.png", "modes.png"]
+FIGURES = ["rig.png", "time_history.png", "psd.png", "densities.png", "contacts.png", "modes.png"]
 
 
 def scene(tmp_path, *changes, duration="3"):
@@ -248,7 +248,7 @@ def test_an_ensemble_is_written_and_goes_on(tmp_path, capsys):
     table = capsys.readouterr().out
     assert table.startswith("3 realisations\n")
     assert re.search(r"stop 0 rate +4\d\.\d+ ± \d", table)
-    named = [*(f"ensemble.{kind}" for kind in ("csv", "json", "npz", "png", "txt")), "report.html", "studies.json"]
+    named = [*(f"ensemble.{kind}" for kind in ("csv", "json", "npz", "png", "txt")), "report.html", "rig.png", "studies.json"]
     assert sorted(p.name for p in out.iterdir()) == named
     found = json.loads((out / "ensemble.json").read_text())
     assert found["numbers"]["δ skewness"]["mean"] < -0.7
@@ -313,7 +313,7 @@ def test_every_study_is_run_and_kept(tmp_path, capsys):
     text = (out / "report.html").read_text(encoding="utf-8")
     Page(text)
     assert all(f"<h2>{title}</h2>" in text for title in ("Orbit", "Branch", "Mode count", "Contacts"))
-    written = {p: p.stat().st_mtime_ns for p in out.iterdir() if p.name != "report.html"}
+    written = {p: p.stat().st_mtime_ns for p in out.iterdir() if p.name not in ("report.html", "rig.png")}
     assert main(["run", str(path), "--out", str(out), "--resume", "--json"]) == 0
     said = capsys.readouterr()
     assert said.err.count("is done already; its results are kept") == 4

@@ -98,7 +98,7 @@ def test_rig_of_a_frame():
     assert (x, tip) == pytest.approx((0.7, 0.7))
     assert low < y < 3.0
     texts = " ".join(text.get_text().replace("\n", " ") for text in axis.texts)
-    for word in ("clamp at A", "hinge", "box, 2 kg", "stop at 0.7 m along B- C, -y, gap 1 mm"):
+    for word in ("clamp at A", "hinge", "box, 2 kg", "stop at B- C + 0.7 m, -y, gap 1 mm"):
         assert word.replace("- ", "-") in texts.replace("- ", "-")
     assert "base motion along x" in axis.get_title(loc="left")
 

@@ -483,7 +483,7 @@ def test_model_survives_pickling(model):
     [
         (lambda run: run.displacement(0.1, body=1), "body must be below 1, the number of beams, got 1"),
         (lambda run: run.stress(0.1, body="tip"), "body must be below 1, the number of beams, got 'tip'"),
-        (lambda run: run.force("below"), "stop must be below 1, the number of stops, got 'below'"),
+        (lambda run: run.force("below"), "no contact has this name, got 'below' in Run"),
         (lambda run: run.to_csv("x", quantities="stress"), "quantities must be a list, got 'stress'"),
         (lambda run: run.to_csv("x", places=0.1), "places must be a list, got 0.1"),
         (lambda run: run.model.simulate("1", 1e-3), "duration must not be text, got '1'"),

@@ -227,7 +227,7 @@ def growing(run):
         ((SCENE, [0], "amplitude"), "counts must be whole numbers above 0, got 0"),
         ((SCENE, [1.5], "amplitude"), "counts must be whole numbers above 0, got 1.5"),
         ((SCENE, [301], "amplitude"), "modes must be at most 300"),
-        ((SCENE, [1], "amplitud"), "quantity must be one of amplitude, peak_force"),
+        ((SCENE, [1], "amplitud"), "quantity must be one of amplitude, rms, peak_force"),
         ((SCENE, [1, 2], growing, 0.01, 1e-3), r"quantity must return one shape, \(3,\) for the reference, got"),
         ((SCENE, [1], lambda run: [], 0.01, 1e-3), "quantity must return a number or an array"),
         ((SCENE, [1], "amplitude", 1.0), "amplitude needs samples"),

@@ -87,9 +87,8 @@ def _report(job: Job, files: list[Path]) -> int:
 
     try:
         with interrupts.deferred():
-            straight = not job.file.scene.named
-            rig = [report.write_figure(job.folder / "rig.png", job.file.scene.figure())] if straight else []
-            html.write_page(job.folder, job.file.source, _warnings(job, files), [*rig, *files])
+            rig = report.write_figure(job.folder / "rig.png", job.file.scene.figure())
+            html.write_page(job.folder, job.file.source, _warnings(job, files), [rig, *files])
     except OSError as error:
         return _unwritten(error).code
     return 0

@@ -163,7 +163,7 @@ class _Panel:
 
     def _label(self, part: Any) -> str:
         """What a part is called."""
-        return str(part.label_on(self.number))
+        return str(part.label_on(self.number, self.scene.named))
 
     def _way(self, part: Any) -> Vector:
         """The direction of a part on the six components."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from fembeam.scene.places import Place, place_words, said, told
-from fembeam.support import require, require_place
+from fembeam.support import is_whole, require, require_place
 
 UNSAID = ("direction", "name")  # of a part, when they are None: as in scenes of a straight beam
 
@@ -57,12 +57,13 @@ class ScenePart:
         """Its name, else a made one, such as "clamp at 0 m", "stop at 3 m, below", "stop at lever, -y"."""
         return self.label_on(0)
 
-    def label_on(self, body: int) -> str:
-        """The same of a part of a further beam: "stop at 3 m of beam 1, below"."""
+    def label_on(self, body: int, named: bool = False) -> str:
+        """The same of a part of a further beam: "stop at 3 m of beam 1, below"; ``named``: 3 is a node, not m."""
         if self.name is not None:
             return self.name
         direction: Any = getattr(self, "direction", None)
-        at = place_words(self.z) if direction is None else said((self.z, direction))
+        place = str(self.z) if named and is_whole(self.z) else place_words(self.z)
+        at = place if direction is None else said((self.z, direction))
         return self._made(at + (f" of beam {body}" if body else ""))
 
     def _made(self, at: str) -> str:
