@@ -248,7 +248,8 @@ def test_an_ensemble_is_written_and_goes_on(tmp_path, capsys):
     table = capsys.readouterr().out
     assert table.startswith("3 realisations\n")
     assert re.search(r"stop 0 rate +4\d\.\d+ ± \d", table)
-    named = [*(f"ensemble.{kind}" for kind in ("csv", "json", "npz", "png", "txt")), "report.html", "rig.png", "studies.json"]
+    suffixes = "csv", "json", "npz", "png", "txt"
+    named = [*(f"ensemble.{kind}" for kind in suffixes), "report.html", "rig.png", "studies.json"]
     assert sorted(p.name for p in out.iterdir()) == named
     found = json.loads((out / "ensemble.json").read_text())
     assert found["numbers"]["δ skewness"]["mean"] < -0.7
