@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from fembeam.model import Model
 
 PERIODS = 20.0  # of the lowest mode that the trial lasts
+FEW_STOPS, LEAST_PERIODS = 100, 4.0  # with more stops it is shorter in proportion, down to these periods
 MOST_PERIODS = 3000.0  # of the highest mode that it may take
 MOST_RECORDED = 30_000.0  # likewise where records or sweeps drive, whose strongest part may come late
 NOMINAL_SPEED = 0.1  # m/s, where the trial tells none
@@ -61,7 +62,8 @@ def _trial(model: Model) -> tuple[solvers.ContactLog | None, list[str]]:
     if not len(moving):
         return None, []
     lengths = [signal.duration for signal in signals_of(model.scene).values() if hasattr(signal, "duration")]
-    usual = min(PERIODS / float(moving.min()), MOST_PERIODS / fastest(model))
+    share = min(1.0, FEW_STOPS / max(len(model.scene.stops), 1))
+    usual = min(max(PERIODS * share, LEAST_PERIODS) / float(moving.min()), MOST_PERIODS / fastest(model))
     duration = min([2 * math.pi * (MOST_RECORDED / fastest(model) if lengths else usual), *lengths])
     try:
         return model.simulate(duration, solver=solvers.Exponential(1e-6, ledger=False)).contacts, []
