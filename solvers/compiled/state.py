@@ -59,8 +59,16 @@ def surface_tolerance(problem, s, x):
 
 @inner
 def rate_tolerance(problem, s, x):
-    """Indentation rate, m/s, below which a stop counts as at rest: rounding of δ̇, which coupled blocks amplify."""
-    return 1e-13 * abs_dot(problem.read_rate[problem.first[s]], x, 2 * problem.k.size)
+    """Indentation rate, m/s, below which a stop counts as at rest: rounding of δ̇, which coupled blocks amplify.
+
+    A start at rest has velocities v of the blocks that are rounding themselves, up to 2e-15 √k |p| where dashpots
+    couple the modes; without their share a stop pressed at rest would enter and leave its surface forever.
+    """
+    row, n = problem.read_rate[problem.first[s]], problem.k.size
+    transformed = 0.0
+    for b in range(n):
+        transformed += abs(row[n + b] * x[b]) * math.sqrt(problem.k[b])
+    return 1e-13 * abs_dot(row, x, 2 * n) + 4e-15 * transformed
 
 
 @inner

@@ -30,7 +30,7 @@ _SAME = 1e-11  # the same for the sign of a node
 _TOGETHER = 1e-9  # part of its way at which a border counts as reached when another is landed on
 _MISSED = 1e-3  # margin, in units of the largest of the step, by which a landing may have missed its border
 _BEFORE = 1e-3  # part of a landing before its end
-_EARLY = 1e-3, 0.1  # parts of the time to the first node, over which the start is extrapolated
+_EARLY, _EARLIER, _LOOKS = 0.1, 1e-2, 6  # part of the time to the first node, next to it, and how often it is shortened
 _REST = 1e-14  # rate, in units of the reference speed, at which what has come to rest turns no more
 _NEAR = 0.2  # lowest node, in units of the largest margin, below which the motion between nodes is looked at
 _ENDS_NEAR = 0.5  # lower end of a landing, in the same units, below which what lies between its ends is looked at
@@ -84,11 +84,20 @@ def _soon(problem, state, scratch, s, j, time):
 
 @inlined
 def _falls_at_once(problem, state, scratch, s, j, time):
-    """Whether a margin that begins at zero, and is below it after a time, has not been above it before."""
-    above = False
-    for share in _EARLY:
-        above |= _soon(problem, state, scratch, s, j, share * time) > scratch.noise[s, j]
-    return not above
+    """Whether a margin that begins at zero, and is below it after a time, has not been above it before.
+
+    The start is extrapolated over shorter and shorter times until the margin cannot be told from zero: a slider with a
+    strong dashpot slips one way, sticks, and slips the other way within a small part of a step.
+    """
+    noise, share = scratch.noise[s, j], _EARLY
+    for _ in range(_LOOKS):
+        value = _soon(problem, state, scratch, s, j, share * time)
+        if value > noise:
+            return False
+        if value >= -noise:
+            break
+        share *= _EARLIER
+    return True
 
 
 @inlined
