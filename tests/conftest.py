@@ -29,6 +29,15 @@ def pytest_sessionstart(session):
         process.wait()
 
 
+def pytest_collection_modifyitems(config, items):
+    """Examples and pages, a third of all the time, run only when asked for: by a mark, or by a file or folder."""
+    if config.option.markexpr or config.args_source != pytest.Config.ArgsSource.TESTPATHS:
+        return
+    examples = [item for item in items if item.get_closest_marker("example")]
+    config.hook.pytest_deselected(items=examples)
+    items[:] = [item for item in items if not item.get_closest_marker("example")]
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item):
     """What must hold for any realisation is given another one, if the environment asks for it."""

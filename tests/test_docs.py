@@ -48,6 +48,7 @@ def text_of(page):
 WITH_CODE = [page for page in ["README.md", *SITE] if BLOCK.search(text_of(page))]
 
 
+@pytest.mark.example
 @pytest.mark.parametrize("page", WITH_CODE)
 def test_code_of_a_page(page, tmp_path):
     """Blocks run from top to bottom as one script; those that begin with `# name.py` are files of their own."""

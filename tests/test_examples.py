@@ -12,6 +12,7 @@ from fembeam import scene_file
 FOLDER = Path(__file__).parent.parent / "examples"
 
 
+@pytest.mark.example
 @pytest.mark.chaotic
 @pytest.mark.parametrize("path", sorted(FOLDER.glob("*.py")), ids=lambda path: path.name)
 def test_example(path, tmp_path):

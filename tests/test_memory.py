@@ -328,8 +328,8 @@ def test_codes_that_are_no_segment_of_the_law_are_refused(law, numbers, place, c
 def test_random_systems_against_the_reference(monkeypatch, seed):
     """Slips that begin against their force, that would have come back within a step, or did within a landing.
 
-    In the two after a landing was wrong by what the stiffness of contacts does within it. Then sliders beside a yielding
-    stop, whose losses were refused, and a slider whose dashpot turns its slip round within 1e-5 of a step.
+    In the two after a landing was wrong by what the stiffness of contacts does within it. Then sliders beside a
+    yielding stop, whose losses were refused, and one whose dashpot turns its slip round within a small part of a step.
     """
     monkeypatch.syspath_prepend(str(Path(__file__).parent / "bench"))
     from random_memory import judge
