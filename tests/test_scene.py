@@ -374,7 +374,7 @@ def test_the_finest_meshes_keep_their_digits(elements):
 def test_a_mesh_too_fine_is_noticed(monkeypatch):
     monkeypatch.setattr(reduction.modal, "MOST_CORRECTIONS", 1)
     with pytest.raises(reduction.AccuracyError, match="frequencies must settle to 1e-09, got a change of"):
-        paper().reduce(2, elements=10_000)
+        paper().reduce(2, elements=4_000)
 
 
 def test_matrices_reject():
