@@ -47,7 +47,14 @@ from solvers.problem import (
     product,
 )
 from solvers.problem import event_list as at
-from solvers.problem.run_arguments import check_laws, check_tangent, checked_start, latched_at_start, output_times
+from solvers.problem.run_arguments import (
+    check_laws,
+    check_maps,
+    check_tangent,
+    checked_start,
+    latched_at_start,
+    output_times,
+)
 
 BLOCK_STEPS = 20_000  # steps in a block: between two checks for signals and calls of `progress`
 _NEVER, _NOWHERE = np.array([math.inf]), np.empty((0, 0))  # no output is due
@@ -136,6 +143,7 @@ def prepared_run(
     """A run ready to start, everything checked."""
     if not hasattr(method, "engine") or isinstance(method, type):
         raise TypeError(f"method must be one of solvers, made with its settings, such as Exponential(), got {method!r}")
+    check_maps(system, method)
     check_tangent(tangent, method, system)
     z = checked_start(system, q0, q_dot0, method)
     times = output_times(duration, dt)

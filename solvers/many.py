@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from solvers.integration import BLOCK_STEPS, kept_forcing
 from solvers.problem import Array, SolverError, Status, System, counted
-from solvers.problem.run_arguments import check_laws, output_times
+from solvers.problem.run_arguments import check_laws, check_maps, output_times
 
 if TYPE_CHECKING:
     from solvers.exponential.many_starts import Worker
@@ -120,6 +120,7 @@ def integrate_many(
     starts = _starts(system, q0, q_dot0)
     output_times(duration, None)
     _check_threads(threads)
+    check_maps(system, method)
     check_laws(system)
     own_gaps, scaled = _gaps(system, gaps, len(starts)), _factors(system, factors, len(starts))
     started = time.perf_counter()

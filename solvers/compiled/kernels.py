@@ -6,7 +6,11 @@ The state is x = [p (n), v (n), energy balance (2 + 2E)], with b the push and r 
 
 Two ranges of indices: *elements* s, the stops and what else exerts forces, E in number, have laws and what these know;
 *rows* r, R in number, the coordinates on which they act, have vectors and motion. Element s has the rows from
-``first[s]`` to before ``first[s + 1]``; its indentation is the displacement on the first of them, and there it pushes.
+``first[s]`` to before ``first[s + 1]``. Of a stop on a line the indentation is the displacement on the first of them,
+and there it pushes. The two rows of a circular clearance, which has a ``radius`` c, read the vector u from the place to
+the centre, r = |u|:
+
+    δ = r - c,  δ̇ = u·u̇/r,  force on the rows N u/r;    of an outer one, where c is kept negative: δ = |c| - r, -N u/r
 
 The entries of the energy balance are the integrals of input power and damping power, then for every stop of force ×
 indentation rate (work done on the stop, J) and of force (impulse, N s).
@@ -14,6 +18,7 @@ indentation rate (work done on the stop, J) and of force (impulse, N s).
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -39,7 +44,8 @@ class Problem(NamedTuple):
     push: Annotated[Any, "R, 2*N"]  # state rate per newton on a row
     read: Annotated[Any, "R, 2*N"]  # displacement = read·z - gap, m
     read_rate: Annotated[Any, "R, 2*N"]  # its rate = read_rate·z, m/s
-    gap: Annotated[Any, "R"]  # m
+    gap: Annotated[Any, "R"]  # m; minus the centre's coordinates on the rows of a circle
+    radius: Annotated[Any, "E"]  # m, of a circular clearance, negative of an outer one; 0 of a stop on a line
     first: Annotated[Any, "int E+1"]  # first row of each element, and the end
     element: Annotated[Any, "int R"]  # that each row belongs to
     knots: Annotated[Any, "E, J"]  # m, between two segments, ascending: 0 (-inf if it always acts), knots, inf
@@ -287,7 +293,7 @@ def rhs(problem, t, x, segment, entry_rate, rate, batch):
             delta_dot = indentation_rate(problem, s, x)
             delta = off_knots(problem, s, segment[s], indentation(problem, s, x))
             force = force_at(problem, s, delta, delta_dot, entry_rate[s], batch)
-            add_push(problem, s, force, rate)
+            add_push(problem, s, force, x, rate)
             rate[size + 2 + 2 * s] = force * delta_dot
             rate[size + 3 + 2 * s] = force
             calls += 1
@@ -297,6 +303,8 @@ def rhs(problem, t, x, segment, entry_rate, rate, batch):
 @inlined
 def indentation(problem, s, x):
     """Indentation of stop s, m."""
+    if problem.radius[s] != 0.0:
+        return radial_motion(problem, s, x)[0]
     row = problem.first[s]
     return dot(problem.read[row], x, 2 * problem.k.size) - problem.gap[row]
 
@@ -304,18 +312,69 @@ def indentation(problem, s, x):
 @inlined
 def indentation_rate(problem, s, x):
     """Its rate, m/s."""
+    if problem.radius[s] != 0.0:
+        return radial_motion(problem, s, x)[1]
     return dot(problem.read_rate[problem.first[s]], x, 2 * problem.k.size)
 
 
+@inner
+def radial_motion(problem, s, x):
+    """Indentation, m, and its rate, m/s, of a circular clearance; at the centre the rate is that of going outward."""
+    square, product, speed, size = 0.0, 0.0, 0.0, 2 * problem.k.size
+    for r in range(problem.first[s], problem.first[s + 1]):
+        u = dot(problem.read[r], x, size) - problem.gap[r]
+        v = dot(problem.read_rate[r], x, size)
+        square, product, speed = square + u * u, product + u * v, speed + v * v
+    return radial(square, product, speed, problem.radius[s])
+
+
 @inlined
-def acceleration_of(problem, s, rate):
-    """Second derivative of the indentation by time, m/s², from the state's rate."""
+def radial(square, product, speed, radius):
+    """δ and δ̇ of a circle from u·u, u·u̇ and u̇·u̇."""
+    distance = math.sqrt(square)
+    rate = product / distance if distance > 0.0 else math.sqrt(speed)
+    return (distance - radius, rate) if radius > 0.0 else (-radius - distance, -rate)
+
+
+@inner
+def _radial_acceleration(problem, s, x, rate):
+    """δ̈ = ±(u̇·u̇ + u·ü - ṙ²)/r of a circular clearance."""
+    square, product, along, size = 0.0, 0.0, 0.0, 2 * problem.k.size
+    for r in range(problem.first[s], problem.first[s + 1]):
+        u, v = dot(problem.read[r], x, size) - problem.gap[r], dot(problem.read_rate[r], x, size)
+        square, product = square + u * u, product + u * v
+        along += v * v + u * dot(problem.read_rate[r], rate, size)
+    found = (along - product * product / square) / math.sqrt(square)
+    return found if problem.radius[s] > 0.0 else -found
+
+
+@inner
+def _add_radial_push(problem, s, force, x, rate):
+    """Add what a radial force does to the state's rate."""
+    square, first, size = 0.0, problem.first[s], 2 * problem.k.size
+    for r in range(first, problem.first[s + 1]):
+        square += (dot(problem.read[r], x, size) - problem.gap[r]) ** 2
+    share = (force if problem.radius[s] > 0.0 else -force) / math.sqrt(square)
+    for r in range(first, problem.first[s + 1]):
+        part = share * (dot(problem.read[r], x, size) - problem.gap[r])
+        for i in range(size):
+            rate[i] += problem.push[r, i] * part
+
+
+@inlined
+def acceleration_of(problem, s, x, rate):
+    """Second derivative of the indentation by time, m/s², from the state and its rate."""
+    if problem.radius[s] != 0.0:
+        return _radial_acceleration(problem, s, x, rate)
     return dot(problem.read_rate[problem.first[s]], rate, 2 * problem.k.size)
 
 
 @inlined
-def add_push(problem, s, force, rate):
+def add_push(problem, s, force, x, rate):
     """Add what a force of stop s does to the state's rate."""
+    if problem.radius[s] != 0.0:
+        _add_radial_push(problem, s, force, x, rate)
+        return
     push = problem.push[problem.first[s]]
     for i in range(2 * problem.k.size):
         rate[i] += push[i] * force

@@ -48,7 +48,7 @@ def margins_in(problem, state, s, x, batch, out):
 @inner
 def margins_before(problem, state, s, delta, rate, time, batch, out):
     """Margins a time before the present state, whose rates are known, from where it is now; after it if negative."""
-    acceleration = acceleration_of(problem, s, state.rate)
+    acceleration = acceleration_of(problem, s, state.x, state.rate)
     batch[0] = delta - time * (rate - 0.5 * time * acceleration)
     batch[1] = rate - time * acceleration
     margins(problem, state, s, 1, batch[0:1], batch[1:2], out)

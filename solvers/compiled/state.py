@@ -54,7 +54,11 @@ STATE = packed_type(State)
 def surface_tolerance(problem, s, x):
     """Distance, m, within which a stop counts as on a knot: rounding of δ."""
     row = problem.first[s]
-    return 1e-15 * (abs(problem.gap[row]) + abs_dot(problem.read[row], x, 2 * problem.k.size)) + 1e-20
+    size = abs(problem.gap[row]) + abs_dot(problem.read[row], x, 2 * problem.k.size)
+    if problem.radius[s] != 0.0:
+        size += abs(problem.radius[s]) + abs(problem.gap[row + 1])
+        size += abs_dot(problem.read[row + 1], x, 2 * problem.k.size)
+    return 1e-15 * size + 1e-20
 
 
 @inner
@@ -64,7 +68,16 @@ def rate_tolerance(problem, s, x):
     A start at rest has velocities v of the blocks that are rounding themselves, up to 2e-15 √k |p| where dashpots
     couple the modes; without their share a stop pressed at rest would enter and leave its surface forever.
     """
-    row, n = problem.read_rate[problem.first[s]], problem.k.size
+    found = _rounding_of_rate(problem, problem.first[s], x)
+    if problem.radius[s] != 0.0:
+        found += _rounding_of_rate(problem, problem.first[s] + 1, x)
+    return found
+
+
+@inner
+def _rounding_of_rate(problem, r, x):
+    """The same of one row."""
+    row, n = problem.read_rate[r], problem.k.size
     transformed = 0.0
     for b in range(n):
         transformed += abs(row[n + b] * x[b]) * math.sqrt(problem.k[b])
@@ -265,10 +278,13 @@ def first_rows(contacts: Sequence[Contact]) -> Array:
 
 
 def gaps_of(contacts: Sequence[Contact]) -> Array:
-    """(R,) gaps of all rows; that of a contact is the one of its first row."""
-    gaps = np.zeros(sum(len(c.rows) for c in contacts))
-    gaps[first_rows(contacts)[:-1]] = [c.gap for c in contacts]
-    return gaps
+    """(R,) gaps of all rows."""
+    return np.concatenate([np.empty(0), *(c.row_gaps for c in contacts)])
+
+
+def radii_of(contacts: Sequence[Contact]) -> Array:
+    """(E,) radii of circular clearances, see `Problem`; 0 of stops on a line."""
+    return np.array([c.radius for c in contacts], dtype=float)
 
 
 def _vectors(system: System) -> Array:
@@ -287,6 +303,7 @@ def _problem(system: System, forcing: Forcing, linear: dict[str, Array]) -> Prob
         **linear,
         knots=knots,
         gap=gaps_of(contacts),
+        radius=radii_of(contacts),
         first=first_rows(contacts),
         element=np.repeat(np.arange(m), [len(c.rows) for c in contacts]).astype(np.int64),
         law=np.array([c.law.address for c in contacts], dtype=np.int64),

@@ -119,7 +119,7 @@ def _cross_knot(problem, past, derivatives, variation, s, direction):
     entering = segment == 0
     border = segment if direction > 0 else segment - 1
     rhs(problem, t, past.x, past.segment, past.entry_rate, derivatives.rate[0], derivatives.batch)
-    acceleration = acceleration_of(problem, s, derivatives.rate[0])
+    acceleration = acceleration_of(problem, s, past.x, derivatives.rate[0])
     still = rate_tolerance(problem, s, past.x)
     if entering:
         past.entry_rate[s] = max(abs(rate), problem.floor[s])
@@ -136,7 +136,7 @@ def _cross_knot(problem, past, derivatives, variation, s, direction):
             change = change_of(problem, variation, derivatives, c, s, 1, t) + acceleration * shift
             derivatives.shift[c, s] = shift
             derivatives.entry[c, s] = 0.0 if floored else change
-        add_push(problem, s, -jump * shift, derivatives.y[c])
+        add_push(problem, s, -jump * shift, past.x, derivatives.y[c])
     past.segment[s] += direction
 
 
@@ -208,7 +208,7 @@ def _stage_rates(problem, ahead, behind, tables, past, scratch, derivatives, var
                 change += batch[2 + d] * value
             if variation.law_step > 0.0 and is_parameter(variation, derivatives, c):
                 change += (batch[5] - batch[6]) / (2.0 * variation.law_step)
-            add_push(problem, s, factor * change, out[c])
+            add_push(problem, s, factor * change, w, out[c])
 
 
 @merged

@@ -96,7 +96,7 @@ def pass_border(problem, ahead, behind, past, derivatives, variation, s, j):
     stops = problem.law.size
     delta, rate = indentation(problem, s, past.x), indentation_rate(problem, s, past.x)
     rhs(problem, t, past.x, past.segment, past.entry_rate, derivatives.rate[0], derivatives.batch)
-    acceleration = acceleration_of(problem, s, derivatives.rate[0])
+    acceleration = acceleration_of(problem, s, past.x, derivatives.rate[0])
     first = most * (2 + most) + width
     by, explicit = (
         derivatives.renewed[first : first + 2 + most],
@@ -135,4 +135,4 @@ def pass_border(problem, ahead, behind, past, derivatives, variation, s, j):
                 latched[i] += of[2 + k] * known[k]
             latched[i] += explicit[i] if by_law else 0.0
         copy(latched, known, own)
-        add_push(problem, s, -jump * shift, derivatives.y[c])
+        add_push(problem, s, -jump * shift, past.x, derivatives.y[c])

@@ -113,7 +113,7 @@ def _renewed_at_once(contacts: Sequence[Contact], memory: Sequence[Array], passe
 def _indentations(contacts: Sequence[Contact], motion: Array) -> Array:
     """δ (m,) of each contact in a state [q, q̇]."""
     q = motion[: motion.size // 2]
-    return np.array([float(-contact.direction @ q) - contact.gap for contact in contacts])
+    return np.array([float(contact.indentation(q)) for contact in contacts])
 
 
 def _stored(contacts: Sequence[Contact], deltas: Array, memory: Sequence[Array]) -> Array:

@@ -26,6 +26,18 @@ def check_tangent(tangent: Any, method: Any, system: System) -> None:
         check_slopes(system)
 
 
+def check_maps(system: System, method: Any) -> None:
+    """A method that does not follow circular clearances is not asked to."""
+    if getattr(method, "takes_annuli", False):
+        return
+    for i, contact in enumerate(system.contacts):
+        if contact.map != "line":
+            name = type(method).__name__
+            raise ValueError(
+                f"{name} takes scalar stops, and contact {i} is an annulus; use Exponential or DormandPrince"
+            )
+
+
 def check_slopes(system: System) -> None:
     """No law has an infinite slope at its surface, F ~ δ^r with r < 1 but for a declared jump or where it has none."""
     system.about_laws.get("finite slopes", lambda: _finite_slopes(system))

@@ -67,20 +67,34 @@ Signal = Callable[[Any], Any]
 class Contact:
     """One stop: ``delta = -direction @ q - gap``; it pushes with ``+direction * force`` while ``delta > 0``, or always.
 
+    With ``map="annulus"`` the stop is a circular clearance of radius c, the gap. A place d = direction @ q - centre of
+    two coordinates moves in it, r = |d|, and is pushed along the line to the centre, without friction:
+
+        δ = r - c,  δ̇ = d·ḋ/r,  force on the place -N(δ, δ̇) d/r;    outer: δ = c - r, the force +N d/r
+
     Parameters
     ----------
-    direction : (n,), the way the stop pushes.
-    law : a contact law, such as those of the package `contacts`.
-    gap : clearance in m; negative for a preload.
+    direction : (n,), the way the stop pushes; (2, n) of an annulus, whose rows read the two coordinates of the place.
+    law : a contact law, such as those of the package `contacts`; in an annulus one without memory.
+    gap : clearance in m; negative for a preload. The radius c > 0 of an annulus.
     always : whether the law acts at both signs of ``delta``; its knots still count from ``delta = 0``. Of a
         law with memory for δ > 0 only, such as `contacts.WaltonBraun`, it is set: the law says where it is open.
     name : what logs call it; empty: "stop 0", "stop 1", … by its index.
+    map : "line", or "annulus" for a circular clearance.
+    centre : (2,) m, of an annulus: where direction @ q is at its centre.
+    outer : of an annulus, whether the place is outside: a ring around a post of radius c.
 
     Examples
     --------
     >>> from contacts import Hertz
     >>> Contact([0.0, 1.0], Hertz(1e9), gap=1e-3).gap
     0.001
+
+    The two coordinates of a place in a hole of radius 1 mm, in contact at (0.9, 0.6) mm:
+
+    >>> hole = Contact([[1.0, 0.0], [0.0, 1.0]], Hertz(1e9), gap=1e-3, map="annulus")
+    >>> round(float(hole.indentation([0.9e-3, 0.6e-3])), 9)
+    8.1665e-05
     """
 
     direction: Array
@@ -88,11 +102,13 @@ class Contact:
     gap: float = 0.0
     always: bool = False
     name: str = ""
+    map: str = "line"
+    centre: tuple[float, float] = (0.0, 0.0)
+    outer: bool = False
 
     def __post_init__(self) -> None:
         direction = np.array(self.direction, dtype=float, ndmin=1)
-        if direction.ndim != 1 or not np.all(np.isfinite(direction)):
-            raise ValueError(f"direction of a Contact must be a finite vector, got {self.direction!r}")
+        self._check_map(direction)
         if getattr(self.law, "memory", ()) and getattr(self.law, "one_sided", False):
             object.__setattr__(self, "always", True)  # its law itself says where it is open
         elif getattr(self.law, "memory", ()) and not self.always:
@@ -106,10 +122,58 @@ class Contact:
         object.__setattr__(self, "direction", direction)
         object.__setattr__(self, "gap", float(self.gap))
 
+    def _check_map(self, direction: Array) -> None:
+        """Directions, clearance and centre fit the map."""
+        if self.map not in ("line", "annulus"):
+            raise ValueError(f'map of a Contact must be "line" or "annulus", got {self.map!r}')
+        if self.map == "line":
+            if direction.ndim != 1 or not np.all(np.isfinite(direction)):
+                raise ValueError(f"direction of a Contact must be a finite vector, got {self.direction!r}")
+            if self.outer or np.any(self.centre):
+                raise ValueError('centre and outer belong to an annulus: give map="annulus", or leave them out')
+            return
+        if direction.ndim != 2 or len(direction) != 2 or not np.all(np.isfinite(direction)):
+            raise ValueError(f"direction of an annulus must be two finite rows (2, n), got {self.direction!r}")
+        if np.linalg.matrix_rank(direction) < 2:
+            raise ValueError(f"the two rows of an annulus's direction must differ, got {self.direction!r}")
+        if not 0.0 < self.gap < math.inf:
+            raise ValueError(
+                f"gap of an annulus, its clearance, must be positive and finite (m), got {self.gap!r}; "
+                "without a clearance it is a spring in each direction"
+            )
+        law: Any = self.law
+        if self.always or getattr(law, "memory", ()):
+            raise ValueError(f"an annulus takes laws without memory that act for delta > 0, got {self.law!r}")
+        centre = np.array(self.centre, dtype=float)
+        if centre.shape != (2,) or not np.all(np.isfinite(centre)):
+            raise ValueError(f"centre of an annulus must be two finite numbers (m), got {self.centre!r}")
+        object.__setattr__(self, "centre", tuple(centre.tolist()))
+
     @property
     def rows(self) -> Array:
         """(m, n) the coordinates it acts on, one row each."""
-        return self.direction[None]
+        return np.atleast_2d(self.direction)
+
+    @property
+    def row_gaps(self) -> Array:
+        """(m,) of each row, in m, by which ``-rows @ q - row_gaps`` is δ, or -d of an annulus."""
+        if self.map == "annulus":
+            return -np.array(self.centre)
+        return np.append(self.gap, np.zeros(len(self.rows) - 1))
+
+    @property
+    def radius(self) -> float:
+        """Clearance of an annulus in m, negative of an outer one; 0 of a stop on a line."""
+        if self.map == "line":
+            return 0.0
+        return -self.gap if self.outer else self.gap
+
+    def indentation(self, q: ArrayLike) -> Array:
+        """δ (...) in m at coordinates (..., n)."""
+        if self.map == "line":
+            return -np.asarray(q) @ self.direction - self.gap
+        distance = np.linalg.norm(np.asarray(q) @ self.direction.T - self.centre, axis=-1)
+        return self.gap - distance if self.outer else distance - self.gap
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,8 +243,8 @@ class System:
         object.__setattr__(self, "contacts", tuple(self.contacts))
         object.__setattr__(self, "loads", tuple(self._load(i, pair, known) for i, pair in enumerate(self.loads)))
         for i, contact in enumerate(self.contacts):
-            if contact.direction.size != self.size:
-                raise ValueError(f"contact {i} has a direction of {contact.direction.size}, the system {self.size}")
+            if contact.rows.shape[1] != self.size:
+                raise ValueError(f"contact {i} has a direction of {contact.rows.shape[1]}, the system {self.size}")
 
     def like(
         self, contacts: Sequence[Contact] | None = None, loads: Sequence[tuple[ArrayLike, Signal]] | None = None

@@ -130,7 +130,7 @@ def border_apart(problem, state, space, h, s, j):
     delta, rate = _present(problem, state, space, s, space.x_new)
     time = _AHEAD * h
     space.trial[0] = delta + time * dot(problem.read[problem.first[s]], space.rate_new, 2 * problem.k.size)
-    space.trial[1] = rate + time * acceleration_of(problem, s, space.rate_new)
+    space.trial[1] = rate + time * acceleration_of(problem, s, space.x_new, space.rate_new)
     margins(problem, state, s, 1, space.trial[0:1], space.trial[1:2], space.one)
     present = space.present[s, j]
     return -present, (present - space.one[j]) / time, space.rounding[s, j]

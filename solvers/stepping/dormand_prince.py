@@ -112,6 +112,7 @@ class DormandPrince:
     atol: float = 1e-14
 
     adaptive: ClassVar[bool] = True
+    takes_annuli: ClassVar[bool] = True
     events: ClassVar[int] = LOCATED
     work_rows: ClassVar[int] = EXTENDED + 2
     constants: ClassVar[tuple[float, ...]] = ()

@@ -53,7 +53,7 @@ def watched(system: System, motion: Array, least: float) -> Array:
     stored = abs(float(system.energy(q, q_dot)))
     known = system.about_laws.get("dissipative", lambda: [is_dissipative(contact.law) for contact in system.contacts])
     held = [
-        _held(contact, -float(contact.direction @ q) - contact.gap) if dissipative else math.inf
+        _held(contact, float(contact.indentation(q))) if dissipative else math.inf
         for contact, dissipative in zip(system.contacts, known, strict=True)
     ]
     return np.array([stored, stored, least, 0.0, 0.0, *held])

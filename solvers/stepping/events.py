@@ -1,12 +1,13 @@
 """Where, within one step, a stop leaves its segment of the law: free flight, or the range between two knots.
 
-Inside a step the indentation is the polynomial of the method's dense output,
-``δ(θ) = δ₀ + θ(r₀ + (1-θ)(r₁ + θ(r₂ + (1-θ)(r₃ + ...))))``, θ in [0, 1].
+Inside a step the displacement of every row is the polynomial of the method's dense output,
+``u(θ) = u₀ + θ(r₀ + (1-θ)(r₁ + θ(r₂ + (1-θ)(r₃ + ...))))``, θ in [0, 1]. The indentation is that of one row, or of a
+circular clearance ±(|u| - c) of two.
 """
 
 import numpy as np
 
-from solvers.compiled.kernels import dot, indentation, inner, kernel, merged
+from solvers.compiled.kernels import dot, indentation, inlined, inner, kernel, merged, radial
 from solvers.compiled.state import surface_tolerance
 
 # finer near 0, where a contact just left may come back
@@ -30,10 +31,35 @@ def polynomial(coefficients, theta):
 
 @inner
 def motion_of(problem, s, x, dense, coefficients):
-    """Nested coefficients of a stop's indentation and, in the second row, of its rate."""
+    """Nested coefficients of the displacement on a stop's row and, in the second row, of its rate; of a circle's other
+    row behind them.
+    """
     row = problem.first[s]
     _coefficients_of(problem.read[row], problem.gap[row], x, dense, coefficients[0])
     _coefficients_of(problem.read_rate[row], 0.0, x, dense, coefficients[1])
+    if problem.radius[s] != 0.0:
+        _coefficients_of(problem.read[row + 1], problem.gap[row + 1], x, dense, coefficients[2])
+        _coefficients_of(problem.read_rate[row + 1], 0.0, x, dense, coefficients[3])
+
+
+@inner
+def _radial_at(coefficients, radius, theta):
+    """δ and δ̇ of a circle at θ."""
+    u, u_dot = polynomial(coefficients[0], theta), polynomial(coefficients[1], theta)
+    w, w_dot = polynomial(coefficients[2], theta), polynomial(coefficients[3], theta)
+    return radial(u * u + w * w, u * u_dot + w * w_dot, u_dot * u_dot + w_dot * w_dot, radius)
+
+
+@inlined
+def delta_at(coefficients, radius, theta):
+    """Indentation at θ."""
+    return polynomial(coefficients[0], theta) if radius == 0.0 else _radial_at(coefficients, radius, theta)[0]
+
+
+@inlined
+def rate_at(coefficients, radius, theta):
+    """Its rate at θ."""
+    return polynomial(coefficients[1], theta) if radius == 0.0 else _radial_at(coefficients, radius, theta)[1]
 
 
 @inner
@@ -63,8 +89,8 @@ def golden_section(value, known, a, b):
 @inner
 def _signed(known, theta):
     """sign·δ at θ."""
-    coefficients, sign = known
-    return sign * polynomial(coefficients, theta)
+    coefficients, radius, sign = known
+    return sign * delta_at(coefficients, radius, theta)
 
 
 @merged
@@ -82,32 +108,32 @@ def bisection(value, known, a, b):
 @inner
 def _beyond(known, theta):
     """sign·(δ - level) at θ."""
-    coefficients, level, sign = known
-    return sign * (polynomial(coefficients, theta) - level)
+    coefficients, radius, level, sign = known
+    return sign * (delta_at(coefficients, radius, theta) - level)
 
 
 @inner
-def crossing(coefficients, rates, level, sign, tolerance):
+def crossing(coefficients, radius, level, sign, tolerance):
     """First θ at which sign·(δ - level) becomes positive; NONE, or UNRESOLVED when it does so at once.
 
-    Between two nodes δ may rise and fall again; that it does is seen by its rate, the polynomial ``rates``.
+    Between two nodes δ may rise and fall again; that it does is seen by its rate.
     """
     if abs(level) == np.inf:
         return NONE
-    last = sign * (coefficients[0] - level)
+    last = sign * (delta_at(coefficients, radius, 0.0) - level)
     tolerance = max(tolerance, 2.0 * last)  # a start a little outside, after a graze, is no crossing yet
-    rising = sign * rates[0] > 0.0
+    rising = sign * rate_at(coefficients, radius, 0.0) > 0.0
     for i in range(1, _NODES.size):
-        value = sign * (polynomial(coefficients, _NODES[i]) - level)
+        value = sign * (delta_at(coefficients, radius, _NODES[i]) - level)
         if value > tolerance:
             if i == 1 and last >= -tolerance:
                 return UNRESOLVED
-            return bisection(_beyond, (coefficients, level, sign), _NODES[i - 1], _NODES[i])
-        rises = sign * polynomial(rates, _NODES[i]) > 0.0
+            return bisection(_beyond, (coefficients, radius, level, sign), _NODES[i - 1], _NODES[i])
+        rises = sign * rate_at(coefficients, radius, _NODES[i]) > 0.0
         if rising and not rises:
-            top = golden_section(_signed, (coefficients, sign), _NODES[i - 1], _NODES[i])[0]
-            if sign * (polynomial(coefficients, top) - level) > tolerance:
-                return bisection(_beyond, (coefficients, level, sign), _NODES[i - 1], top)
+            top = golden_section(_signed, (coefficients, radius, sign), _NODES[i - 1], _NODES[i])[0]
+            if sign * (delta_at(coefficients, radius, top) - level) > tolerance:
+                return bisection(_beyond, (coefficients, radius, level, sign), _NODES[i - 1], top)
         last, rising = value, rises
     return NONE
 
@@ -133,11 +159,12 @@ def first_event(problem, x, dense, segment, coefficients):
     for s in range(problem.law.size):
         motion_of(problem, s, x, dense, coefficients)
         tolerance = surface_tolerance(problem, s, x)
-        found = crossing(coefficients[0], coefficients[1], problem.knots[s, segment[s]], 1.0, tolerance)
+        radius = problem.radius[s]
+        found = crossing(coefficients, radius, problem.knots[s, segment[s]], 1.0, tolerance)
         if found < theta:
             theta, stop, direction = found, s, 1
         if segment[s] > 0:
-            found = crossing(coefficients[0], coefficients[1], problem.knots[s, segment[s] - 1], -1.0, tolerance)
+            found = crossing(coefficients, radius, problem.knots[s, segment[s] - 1], -1.0, tolerance)
             if found < theta:
                 theta, stop, direction = found, s, -1
     return theta, stop, direction

@@ -34,11 +34,12 @@ from solvers.stepping.events import (
     LOCATED,
     MOST_LANDINGS,
     NONE,
+    delta_at,
     first_event,
     golden_section,
     motion_of,
     nearer,
-    polynomial,
+    rate_at,
 )
 
 SWITCHED = -1  # beside the status codes: an event has changed the right-hand side
@@ -51,13 +52,12 @@ NEAR_END = 1e-6  # share of a step: a kink as near to an end as that counts as r
 @inner
 def _peaks(problem, state, space):
     """Largest indentation and force of the step just accepted, for every stop in contact."""
-    delta_of, rate_of = space.coefficients[0], space.coefficients[1]
     for s in range(problem.law.size):
         if acting_segment(problem, state, s) == 0 or not begins_and_ends(problem, s):
             continue
         motion_of(problem, s, state.x, space.dense, space.coefficients)
         for column in (PEAK_DELTA, PEAK_FORCE):
-            known = (problem, state, s, column, delta_of, rate_of, space.work[0])
+            known = (problem, state, s, column, space.coefficients, space.work[0])
             best, place = -np.inf, 0
             for i in range(_PEAK_NODES.size):
                 value = _peak_value(known, _PEAK_NODES[i])
@@ -72,12 +72,13 @@ def _peaks(problem, state, space):
 @inner
 def _peak_value(known, theta):
     """Indentation or force at θ of the step."""
-    problem, state, s, column, delta_of, rate_of, batch = known
-    delta = polynomial(delta_of, theta)
+    problem, state, s, column, coefficients, batch = known
+    delta = delta_at(coefficients, problem.radius[s], theta)
     if column == PEAK_DELTA:
         return delta
     delta = off_knots(problem, s, state.segment[s], delta)
-    return force_at(problem, s, delta, polynomial(rate_of, theta), state.entry_rate[s], batch)
+    rate = rate_at(coefficients, problem.radius[s], theta)
+    return force_at(problem, s, delta, rate, state.entry_rate[s], batch)
 
 
 @inner
@@ -107,7 +108,8 @@ def first_kink(problem, state, space):
 @inner
 def _side(problem, state, space, s, theta, lowest, batch):
     """On which side of its kinks a law is at θ of the step; beyond the surface on that of the surface."""
-    delta, rate = polynomial(space.coefficients[0], theta), polynomial(space.coefficients[1], theta)
+    radius = problem.radius[s]
+    delta, rate = delta_at(space.coefficients, radius, theta), rate_at(space.coefficients, radius, theta)
     side = 2 if space.kinks[s] & 2 and rate > 0.0 else 0
     if space.kinks[s] & 1 and delta > lowest:
         side += 1 if force_at(problem, s, delta, rate, state.entry_rate[s], batch) == 0.0 else 0

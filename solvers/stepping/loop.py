@@ -49,7 +49,7 @@ class Space(NamedTuple):
     rate_new: Any  # (x.size,)
     dense: Any  # (7, x.size) rows r of the interpolant, see `events`
     work: Any  # (rows, x.size) of the method
-    coefficients: Any  # (2, 8)
+    coefficients: Any  # (4, 8), see `events.motion_of`
     watch: Any  # see `watched`
     kinks: Any  # (m,) where laws have kinks inside a segment, see `stability.kinks_of`; used under error control
     margin: Any  # (nodes × B,) margins of an element's borders, row by row, B the most of any; see `borders`
@@ -238,7 +238,7 @@ def new_space(
         np.empty(size),
         np.zeros((7, size)),
         work,
-        np.empty((2, 8)),
+        np.empty((4, 8)),
         watch,
         np.array(kinks, dtype=np.int64),
         *border_space(problem),

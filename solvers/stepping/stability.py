@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from solvers.problem import Array, Contact, System
+from solvers.problem.run_arguments import check_maps
 
 if TYPE_CHECKING:
     from solvers.stepping.constant_step import ConstantStep
@@ -113,6 +114,7 @@ def _below(stable: Callable[[float], bool], h: float) -> float:
 
 def limit(method: ConstantStep, system: System, indentation: float | None, duration: float) -> Limit:
     """Predicted limits of a method; see `ConstantStep.stable_dt`."""
+    check_maps(system, method)
     flight, mode = _shortest(method, system, *method.oscillators(system), duration)
     if not system.contacts:
         return Limit(flight, math.inf, mode, -1)

@@ -78,7 +78,7 @@ def _rate(problem, tables, with_energy, variable, stop, span, w, segment, entry_
             delta = indentation(problem, s, w)
             force = _force(problem, tables, s, segment[s], delta, rate, side[s], entry_rate[s], batch)
             calls += 1
-            add_push(problem, s, force, out)
+            add_push(problem, s, force, w, out)
         out[size + 2 + 2 * s] = force * rate
         out[size + 3 + 2 * s] = force
     delta_dot = indentation_rate(problem, stop, w)

@@ -81,7 +81,7 @@ def _switch_pressed(problem, state, log):
             continue
         batch = state.active[s, :3]  # of a contact not begun yet
         rhs(problem, state.now[T], state.x, state.segment, state.entry_rate, state.rate, batch)
-        if acceleration_of(problem, s, state.rate) > 0.0:
+        if acceleration_of(problem, s, state.x, state.rate) > 0.0:
             switch(problem, state, s, np.int64(1), log)
             switched = True
     return switched

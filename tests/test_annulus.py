@@ -1,0 +1,147 @@
+"""Circular clearances: identities, closed forms, SciPy's DOP853, and the methods against each other."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from contacts import Hertz, KelvinVoigt, WaltonBraun
+from solvers import CentralDifference, Contact, DormandPrince, HenonRK2, Newmark, System, integrate
+
+PLANE = np.eye(2)
+NOTHING = np.zeros((2, 2))
+SHARP = DormandPrince(1e-12)
+
+
+def hole(law, clearance=1.0, **options):
+    return Contact(PLANE, law, clearance, map="annulus", **options)
+
+
+def free_mass(law, *contacts, **options):
+    """A mass of 1 kg in the plane, in a hole of 1 m."""
+    return System(PLANE, NOTHING, NOTHING, [hole(law, **options), *contacts])
+
+
+def angular_momentum(run):
+    return run.q[:, 0] * run.q_dot[:, 1] - run.q[:, 1] * run.q_dot[:, 0]
+
+
+def by_scipy(force, start, duration):
+    """[q, q̇] of the free mass under a radial force of r - 1, every border met by an event."""
+
+    def rate(_, y):
+        r = np.hypot(y[0], y[1])
+        return [y[2], y[3], *(-force(max(r - 1.0, 0.0)) * y[:2] / r)]
+
+    def apart(_, y):
+        return np.hypot(y[0], y[1]) - 1.0
+
+    apart.terminal, apart.direction = True, 1.0
+    t, y = 0.0, np.array(start)
+    while t < duration:
+        run = solve_ivp(rate, (t, duration), y, method="DOP853", rtol=1e-13, atol=1e-15, events=apart)
+        t, y, apart.direction = run.t[-1], run.y[:, -1], -apart.direction
+    return y
+
+
+@pytest.mark.parametrize("method", [DormandPrince(1e-13)], ids=["dormand"])
+@pytest.mark.parametrize("law", [KelvinVoigt(1e4, 0.0), Hertz(1e4)], ids=["linear", "hertz"])
+def test_a_free_mass_moves_as_scipy_says(method, law):
+    start = [0.5, 0.0, 0.2, 0.8]
+    run = integrate(free_mass(law), start[:2], start[2:], 4.0, method=method)
+    assert len(run.contacts.t_in) == 2
+    expected = by_scipy(lambda delta: float(law.force(delta, 0.0, 1.0)), start, 4.0)
+    np.testing.assert_allclose(run.end, expected, rtol=0.0, atol=3e-11)
+
+
+@pytest.mark.parametrize("method", [SHARP], ids=["dormand"])
+def test_angular_momentum_and_energy_are_kept(method):
+    run = integrate(free_mass(KelvinVoigt(1e4, 0.0)), [0.5, 0.0], [0.2, 0.8], 220.0, 1.0, method)
+    assert len(run.contacts.t_in) >= 100
+    assert np.ptp(angular_momentum(run)) < 1e-12
+    assert np.ptp(np.sum(run.q_dot**2, axis=1)[np.linalg.norm(run.q, axis=1) < 1.0]) < 1e-9
+    np.testing.assert_allclose(run.contacts.speed_in, run.contacts.speed_in[0], rtol=1e-8)
+
+
+def test_a_fast_bounce_reflects_the_speed():
+    """With c against the indentation large, the wall is a plane: the time of contact is that of half an oscillation."""
+    stiffness = 1e8
+    run = integrate(free_mass(KelvinVoigt(stiffness, 0.0)), [0.6, 0.0], [0.0, 1.0], 1.0, method=SHARP)
+    assert run.contacts.t_in[0] == pytest.approx(0.8, rel=1e-13)
+    assert run.contacts.speed_in[0] == pytest.approx(0.8, rel=1e-13)
+    assert run.contacts.t_out[0] - run.contacts.t_in[0] == pytest.approx(np.pi / np.sqrt(stiffness), rel=1e-4)
+    assert run.contacts.peak_indentation[0] == pytest.approx(0.8 / np.sqrt(stiffness), rel=1e-4)
+    np.testing.assert_allclose(run.q_dot[-1], [-0.96, -0.28], atol=1e-3)  # (0, 1) less twice its part along (0.6, 0.8)
+
+
+@pytest.mark.parametrize("method", [SHARP], ids=["dormand"])
+def test_a_planar_start_meets_two_one_sided_stops(method):
+    """A start in one line through the centre stays on it."""
+    law, along = KelvinVoigt(2e3, 5.0), np.array([0.6, 0.8])
+    K, C = np.diag([4.0, 9.0]), 0.1 * PLANE
+    turn = np.array([[0.6, -0.8], [0.8, 0.6]])
+    matrices = PLANE, C, turn @ K @ turn.T
+    one = System(*matrices, [hole(law, 0.3)], [(along, np.cos)])
+    two = System(*matrices, [Contact(-along, law, 0.3), Contact(along, law, 0.3)], [(along, np.cos)])
+    runs = [integrate(system, 0.1 * along, 2.0 * along, 5.0, method=method) for system in (one, two)]
+    assert len(runs[0].contacts.t_in) > 3
+    np.testing.assert_allclose(runs[0].contacts.t_in, runs[1].contacts.t_in, rtol=1e-9)
+    np.testing.assert_allclose(runs[0].contacts.peak_force, runs[1].contacts.peak_force, rtol=1e-8)
+    np.testing.assert_allclose(runs[0].end, runs[1].end, rtol=0.0, atol=1e-8)
+
+
+@pytest.mark.parametrize("outer", [False, True])
+@pytest.mark.parametrize("method", [SHARP], ids=["dormand"])
+def test_turning_everything_turns_everything(method, outer):
+    law, turn = KelvinVoigt(2e3, 5.0), np.array([[0.8, -0.6], [0.6, 0.8]])
+    K, C = np.diag([4.0, 9.0]), np.array([[0.2, 0.05], [0.05, 0.1]])
+    q, v, push = np.array([0.6, 0.1]), np.array([-2.0, 1.2]), np.array([5.0, 3.0])
+    centre = np.array([0.05, 0.1])
+    options = {"outer": outer}
+    plain = System(PLANE, C, K, [hole(law, 0.4 if outer else 0.8, centre=centre, **options)], [(push, np.cos)])
+    turned = System(
+        *(PLANE, turn @ C @ turn.T, turn @ K @ turn.T),
+        *([hole(law, plain.contacts[0].gap, centre=turn @ centre, **options)], [(turn @ push, np.cos)]),
+    )
+    one = integrate(plain, q, v, 6.0, method=method)
+    other = integrate(turned, turn @ q, turn @ v, 6.0, method=method)
+    assert len(one.contacts.t_in) > 1
+    np.testing.assert_allclose(other.q[-1], turn @ one.q[-1], rtol=0.0, atol=1e-8)
+    np.testing.assert_allclose(other.contacts.t_out, one.contacts.t_out, rtol=0.0, atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"gap": 0.0}, "clearance, must be positive"),
+        ({"gap": -1e-3}, "clearance, must be positive"),
+        ({"gap": np.inf}, "clearance, must be positive"),
+        ({"direction": [1.0, 0.0]}, "two finite rows"),
+        ({"direction": [[1.0, 0.0], [2.0, 0.0]]}, "must differ"),
+        ({"direction": [[1.0, np.nan], [0.0, 1.0]]}, "two finite rows"),
+        ({"centre": (0.0, 0.0, 0.0)}, "two finite numbers"),
+        ({"centre": (0.0, np.nan)}, "two finite numbers"),
+        ({"map": "circle"}, 'must be "line" or "annulus"'),
+        ({"always": True}, "without memory"),
+        ({"law": WaltonBraun(1e3, 2e3, "kept")}, "without memory"),
+        ({"map": "line", "direction": [1.0, 0.0], "outer": True}, "belong to an annulus"),
+        ({"map": "line", "direction": [1.0, 0.0], "centre": (1.0, 0.0)}, "belong to an annulus"),
+    ],
+)
+def test_bad_contacts_are_refused(options, message):
+    given = {"direction": PLANE, "law": Hertz(1e6), "gap": 1e-3, "map": "annulus", **options}
+    with pytest.raises(ValueError, match=message):
+        Contact(**given)
+
+
+def test_an_annulus_of_another_size_is_refused():
+    with pytest.raises(ValueError, match="direction of 2, the system 3"):
+        System(np.eye(3), np.eye(3), np.eye(3), [hole(Hertz(1e6))])
+
+
+@pytest.mark.parametrize("method", [Newmark(1e-4), CentralDifference(1e-4), HenonRK2(1e-4, 1e-5)])
+def test_methods_of_constant_step_refuse(method):
+    system = free_mass(Hertz(1e6))
+    with pytest.raises(ValueError, match="takes scalar stops, and contact 0 is an annulus; use Exponential"):
+        integrate(system, [0.0, 0.0], [1.0, 0.0], 1.0, method=method)
+    with pytest.raises(ValueError, match="takes scalar stops"):
+        method.stable_dt(system)
