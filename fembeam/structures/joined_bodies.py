@@ -103,8 +103,9 @@ class JoinedBodies:
         if known:
             gap = float(np.linalg.norm(at[0] + found[ends[0][0]] - at[1] - found[ends[1][0]]))
             size = max(float(np.linalg.norm(np.ptp(np.array(points), axis=0))) for points in self._points)
-            require(gap <= APART * size, "the places of a joint must meet where the joints before it put the bodies",
-                    f"{gap:.4g} m between them", f"joints[{index}] of Scene", "correct the coordinates, or turn the body")  # fmt: skip
+            rule = "the places of a joint must meet where the joints before it put the bodies"
+            require(gap <= APART * size, rule, f"{gap:.4g} m between them", f"joints[{index}] of Scene",
+                    "correct the coordinates, or turn the body")  # fmt: skip
 
     @cached_property
     def _points(self) -> list[list[Vector]]:
@@ -210,9 +211,9 @@ class JoinedBodies:
         for number, body in enumerate(self.bodies):
             if hasattr(body, "check_held"):
                 mine: dict[Any, list[str]] = {}
-                for (on, place), dofs in at:
+                for (on, place), components in at:
                     if on == number:
-                        mine.setdefault(place, []).extend(dofs)
+                        mine.setdefault(place, []).extend(components)
                 body.check_held(mine, where)
 
     def assembled(
