@@ -654,9 +654,10 @@ def check_against(schema, value, whole):
         return next((fault for entry in value if (fault := check_against(schema["items"], entry, whole))), None)
     if not isinstance(value, dict):
         return None
-    if missing := set(schema["required"]) - set(value):
+    if missing := set(schema.get("required", ())) - set(value):
         return f"{missing} missing"
-    pairs = ((key, schema["properties"].get(key)) for key in value)
+    others = schema.get("additionalProperties", {}) or None
+    pairs = ((key, schema.get("properties", {}).get(key, others)) for key in value)
     return next(
         (f"{k}: {fault}" for k, s in pairs if (fault := "unknown" if s is None else check_against(s, value[k], whole))),
         None,

@@ -1,15 +1,13 @@
-"""Joined bodies: the whole from its parts, hinges, Craig–Bampton halves with their known errors, what is refused."""
+"""Matrices of joined bodies: the whole from its parts, hinges, places within elements, what is refused."""
 
 import numpy as np
 import pytest
 from frames import PORTAL, SPACE_L, frequencies, portal, static
 
 import fembeam as fb
-import reduction
-from fembeam.structures import Joint, Structure, joined, superelement
+from fembeam.structures import Joint, Structure, joined
 
 FLAT = fb.Section.rectangle(2.1e11, 7850.0, width=0.02, height=0.01)
-UNIT = fb.Section(E=1.0, rho=1.0, A=1.0, I=1.0, I2=1.0)
 
 
 def legs():
@@ -57,25 +55,6 @@ def test_joint_between_nodes():
     reaction = (5 / (48 * EI)) / (1 / (24 * EI) + 1 / k)
     row = made.rows((1, "top")).toarray()[0]
     assert row @ static(made, load, (0, "A")) * k == pytest.approx(reaction, rel=1e-9)
-
-
-@pytest.mark.parametrize(("modes", "known"), [
-    (0, [22.73594240235, 81.97560612768]),
-    (1, [22.3912041074231, 61.74881100982636]),
-    (2, [22.37595524830725, 61.67814371298982]),
-])  # fmt: skip
-def test_craig_bampton_halves(modes, known):
-    """A clamped–clamped beam of two superelements, k fixed modes each and plane: the error of the method itself."""
-    ends = ({"A": (0, 0, 0), "B": (0, 0, 0.5)}, {"B": (0, 0, 0.5), "C": (0, 0, 1.0)})
-    halves = [fb.Frame(nodes, [fb.Member(*nodes, UNIT)], bending_only=True) for nodes in ends]
-    reduced = [
-        superelement(half.assembled(elements=30), ["B"], 2 * modes, held=[end])
-        for half, end in zip(halves, "AC", strict=True)
-    ]
-    whole = joined(halves, reduced, [Joint("B", to=(1, "B"))])
-    omega = reduction.modal_basis(whole.M, whole.K, root=whole.root).omega
-    assert len(omega) == 4 * modes + 4
-    assert np.allclose(omega[:4:2], known[: len(omega) // 2], rtol=1e-6)
 
 
 @pytest.mark.parametrize(("joints", "says"), [

@@ -25,7 +25,7 @@ from fembeam.support import require
 if TYPE_CHECKING:
     from fembeam.response import SectionForces
     from fembeam.scene import Matrices, Scene
-    from fembeam.structures import FrameForces
+    from fembeam.structures import FrameForces, JoinedForces
 
 SEEN = ("forces", "springs", "bodies", "impactors")  # parts of a scene besides those with laws that make a system
 
@@ -130,7 +130,7 @@ class ModalEquations:
         return (self.shapes, *self.others)[body](z, derivative)
 
     @cached_property
-    def section_forces(self) -> tuple[SectionForces | FrameForces | None, ...]:
+    def section_forces(self) -> tuple[SectionForces | FrameForces | JoinedForces | None, ...]:
         """Bending moment and shear force per unit of each coordinate, on each beam."""
         from fembeam.response import section_forces
 

@@ -140,7 +140,7 @@ class Histories:
         self._beam(body)
         forces = frame_forces_of(self, body)
         values = self._at_samples(self.q) @ forces.rows(place).T
-        return {name: values[:, i] + forces.preload(place, name) for i, name in enumerate(forces.names)}
+        return {name: values[:, i] + forces.preload(place, name) for i, name in enumerate(forces.names_at(place))}
 
     def extremes(self, quantity: str = "displacement", z: ArrayLike | None = None, body: int = 0) -> Extremes:
         """Least and greatest values over the samples, place by place, with their times.
@@ -167,7 +167,7 @@ class Histories:
         """All nodes of the mesh of a frame, as (member, distance)."""
         from fembeam.response import frame_forces_of
 
-        return frame_forces_of(self, body).mesh.sections()
+        return frame_forces_of(self, body).sections()
 
     def _beam(self, body: int) -> Any:
         """A beam's shapes; ValueError unless there is one of that number."""

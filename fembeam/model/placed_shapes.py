@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fembeam.scene import At, BodyMatrices, LocalCoordinate, said, split, told
+from fembeam.scene import At, BodyMatrices, LocalCoordinate, is_pair, said, split, told
 from fembeam.structures import COMPONENTS, named, nearest, require_components
-from fembeam.support import require
+from fembeam.support import is_whole, require
 
 Vector = NDArray[np.float64]
 USUAL = 6  # places that tables and figures show unasked
@@ -67,6 +67,9 @@ class PlacedShapes:
             return np.asarray(self.values[self.known.index(place)])
         if self.more is not None:
             return self.more(place)
+        of_others = [one for one in self.known if is_pair(one) and is_whole(one[0]) and one[1] == place]
+        if len(of_others) == 1:  # of joined bodies the one that has this name
+            return self.motion(of_others[0])
         require(
             False, f"a place must be one that the run keeps; {nearest(place, self.known)}", place, "Run", "use that"
         )

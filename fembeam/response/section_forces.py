@@ -26,7 +26,7 @@ from scipy import sparse
 
 from fembeam.beams import Beam, element_matrices, joining, on_beam
 from fembeam.scene import BodyMatrices, loaded
-from fembeam.structures import FrameForces, FrameMatrices
+from fembeam.structures import FrameForces, JoinedForces
 from fembeam.support import require
 
 if TYPE_CHECKING:
@@ -83,18 +83,20 @@ class SectionForces:
         return element, ((z - self.nodes[element]) / h)[:, None], h[:, None]
 
 
-def section_forces(model: ModalEquations, body: int = 0) -> SectionForces | FrameForces | None:
+def section_forces(model: ModalEquations, body: int = 0) -> SectionForces | FrameForces | JoinedForces | None:
     """The section forces of every coordinate of a model on one of its beams; None of bodies without sections."""
     beam = model.matrices.beams[body]
-    if isinstance(beam, BodyMatrices) and not isinstance(beam.assembled, FrameMatrices):
+    if isinstance(beam, BodyMatrices) and not hasattr(beam.assembled, "section_forces"):
         return None
     first = sum(before.M.shape[0] for before in model.matrices.beams[:body])
     mine = slice(first, first + beam.M.shape[0])
     vectors = model.basis.vectors[mine]
     rows = sparse.vstack([sparse.csr_matrix((0, beam.M.shape[0])), *(at.row(beam) for at in loaded(model.scene, body))])
     inertia = _inertia(beam, vectors, model.omega, rows.toarray().T)
-    if isinstance(beam, BodyMatrices) and isinstance(beam.assembled, FrameMatrices):
-        return beam.assembled.section_forces(beam.spread @ vectors, beam.spread @ inertia)
+    if isinstance(beam, BodyMatrices):
+        made: Any = beam.assembled
+        forces: FrameForces | JoinedForces | None = made.section_forces(beam.spread @ vectors, beam.spread @ inertia)
+        return forces
     return _of_vectors(beam, vectors, inertia)
 
 
@@ -212,10 +214,10 @@ def _rows_of_frame(run: Histories, quantity: str, places: list[Any], body: int) 
     return np.array(rows), places, np.array([forces.preload(z, quantity) for z in places])
 
 
-def frame_forces_of(run: Histories, body: int, quantity: str = "a section force") -> FrameForces:
+def frame_forces_of(run: Histories, body: int, quantity: str = "a section force") -> FrameForces | JoinedForces:
     """The section forces of a frame; ValueError for bodies without sections, and runs that do not keep them."""
     forces = run.readout.section_forces[body]
-    if isinstance(forces, FrameForces):
+    if isinstance(forces, (FrameForces, JoinedForces)):
         return forces
     raise ValueError(f"{quantity} is of a Beam, which has sections, or of a Frame whose run was not read from a file, "
                      f"got body {body} in Run; ask for displacement(place, direction), rotations included, or for "

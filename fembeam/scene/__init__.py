@@ -24,7 +24,7 @@ from fembeam.scene.parts import (
     Spring,
     Stop,
 )
-from fembeam.scene.places import At, Place, is_place, said, split, told
+from fembeam.scene.places import At, Place, is_pair, is_place, said, split, told
 from fembeam.scene.rotors import Disk, Unbalance
 from fembeam.scene.scene import FEATURES, Scene
 from fembeam.scene.signals import PLACES, for_duration, persistent_drive, signals_of, with_signals

@@ -19,7 +19,7 @@ import reduction
 from fembeam.scene.assembly import DEFAULT_MODES, Matrices, Vector
 from fembeam.scene.places import told
 from fembeam.scene.rotors import Disk, gyroscopic, turned
-from fembeam.structures import COMPONENTS, Assembled, Frame, Six, following
+from fembeam.structures import COMPONENTS, Assembled, Six, following
 from fembeam.support import require
 
 if TYPE_CHECKING:
@@ -104,7 +104,7 @@ def body_matrices(scene: Scene, elements: int | None, modes: int | None, probes:
     """The matrices of the scene's own body; of one without a mesh of its own `modes` does not matter."""
     for index, place in enumerate(probes):
         scene.beam.check_place(place, f"probes[{index}] of Scene.matrices")
-    if isinstance(scene.beam, Frame):
+    if hasattr(scene.beam, "check_held"):
         scene.beam.check_held(_holding(scene), "Scene")
     assembled = _made(scene, elements, modes, (*scene.places, *probes))
     held = _held(scene, assembled)
@@ -128,8 +128,9 @@ def _warn_of_massless(scene: Scene, matrices: BodyMatrices) -> None:
 
 def _made(scene: Scene, elements: int | None, modes: int | None, places: tuple[Any, ...]) -> Assembled:
     """The body's matrices, of a frame on a mesh for the frequencies that it has with all that is on it."""
-    if not isinstance(scene.beam, Frame):
-        return scene.beam.assembled(elements if getattr(scene.beam, "meshed", True) else None, modes, places)
+    meshed = getattr(scene.beam, "meshed", True)
+    if not meshed or not hasattr(scene.beam, "coarse"):
+        return scene.beam.assembled(elements if meshed else None, modes, places)
     count = DEFAULT_MODES if modes is None else int(modes)
     coarse = scene.beam.coarse(count, places)
     own = _of(scene, coarse, count, _held(scene, coarse), condense=True)
@@ -237,5 +238,8 @@ def _held(scene: Scene, assembled: Assembled) -> Any:
             single = row.nnz == 1 and abs(row.data[0] - 1.0) < UNIT
             require(single, "a support must hold a node of the body", f"{dof} at {told(support.z)}",
                     f"supports[{index}] of Scene", "given modes have theirs")  # fmt: skip
-            found.add(int(row.indices[0]))
+            number = int(row.indices[0])
+            require(number not in found, f"supports must not hold one dof twice ({dof} at {told(support.z)}, which a "
+                    "joint makes equal to another)", index, f"supports[{index}] of Scene", "keep one")  # fmt: skip
+            found.add(number)
     return np.array(sorted(found), dtype=int)

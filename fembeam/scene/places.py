@@ -1,5 +1,7 @@
 """Places and directions as they are written: z of a beam, the name of a node or point, (member, distance).
 
+A place of a joined body is (number of the body, its place).
+
 Where a quantity is asked for at a place by name, the place and its direction stand together: ("lever", "z").
 """
 
@@ -9,7 +11,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from fembeam.structures import COMPONENTS, Six, direction_of, named
-from fembeam.support import is_finite, is_name, require
+from fembeam.support import is_finite, is_name, is_whole, require
 
 if TYPE_CHECKING:
     Place: TypeAlias = Any
@@ -37,15 +39,15 @@ def sign_of(direction: Any) -> float:
 
 
 def is_place(value: Any) -> bool:
-    """Whether a value can name a place: a finite number, a name, (member, distance).
+    """Whether a value can name a place: a finite number, a name, (member, distance), (body, place).
 
     Examples
     --------
-    >>> [is_place(value) for value in (0.3, "lever", ("A-B", 0.4), None, (1, 2, 3))]
-    [True, True, True, False, False]
+    >>> [is_place(value) for value in (0.3, "lever", ("A-B", 0.4), None, (1, 2, 3), (1, "lever"))]
+    [True, True, True, False, False, True]
     """
     if is_pair(value):
-        return is_name(value[0]) and is_finite(value[1])
+        return is_place(value[1]) if is_whole(value[0]) else is_name(value[0]) and is_finite(value[1])
     return is_finite(value) or is_name(value)
 
 
@@ -59,9 +61,11 @@ def told(place: Any) -> str:
 
     Examples
     --------
-    >>> told(0.25), told("lever"), told(("A-B", 0.4))
-    ('z = 0.25', "'lever'", "0.4 m along 'A-B'")
+    >>> told(0.25), told("lever"), told(("A-B", 0.4)), told((1, "lever"))
+    ('z = 0.25', "'lever'", "0.4 m along 'A-B'", "'lever' of body 1")
     """
+    if is_pair(place) and is_whole(place[0]):
+        return f"{told(place[1]).removeprefix('z = ')} of body {place[0]}"
     if is_pair(place):
         return f"{place[1]} m along {place[0]!r}"
     return f"{place!r}" if isinstance(place, str) else f"z = {place}"
@@ -72,9 +76,12 @@ def place_words(place: Any) -> str:
 
     Examples
     --------
-    >>> place_words(0.25), place_words("lever"), place_words(("A-B", 0.4))
-    ('0.25 m', 'lever', 'A-B + 0.4 m')
+    >>> place_words(0.25), place_words("lever"), place_words(("A-B", 0.4)), place_words((1, "lever"))
+    ('0.25 m', 'lever', 'A-B + 0.4 m', 'lever of body 1')
     """
+    if is_pair(place) and is_whole(place[0]):
+        inner = place[1]
+        return f"{inner if is_whole(inner) else place_words(inner)} of body {place[0]}"
     if is_pair(place):
         return f"{place[0]} + {place[1]:g} m"
     return f"{place:.6g} m" if is_finite(place) else str(place)
@@ -105,5 +112,5 @@ def said(at: At) -> str:
     'lever, -z'
     """
     place, along = at
-    words = f"{place[0]} + {place[1]:g} m" if isinstance(place, (tuple, list)) else str(place)
+    words = place_words(place) if is_pair(place) else str(place)
     return f"{words}, {along if isinstance(along, str) else named(direction_of(along, 'a place'))}"

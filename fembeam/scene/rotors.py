@@ -123,9 +123,14 @@ class Unbalance(ScenePart):
         return replace(self, signal=Harmonic(size, abs(spin), math.copysign(1.0, spin) * self.phase))
 
 
+def carrier(body: Any, place: Any) -> Any:
+    """The body that a place is on: of joined ones that which has it."""
+    return body.carrier(place) if hasattr(body, "carrier") else body
+
+
 def check_shaft(body: Any, part: Any, where: str) -> None:
     """Raise ValueError unless a body is a shaft: a straight frame in space; for an unbalance, one that spins."""
-    name = type(part).__name__
+    name, body = type(part).__name__, carrier(body, part.z)
     straight = getattr(body, "axis", None) is not None and {"rx", "ry"} <= set(getattr(body, "components", ()))
     require(straight, f"{name} needs a shaft: a straight Frame in space", body, where, "use Frame.straight")
     spins = not isinstance(part, Unbalance) or body.spin != 0.0
@@ -138,7 +143,8 @@ def driven(body: Any, forces: tuple[Any, ...]) -> tuple[Any, ...]:
     for index, force in enumerate(forces):
         if isinstance(force, Unbalance):
             check_shaft(body, force, f"forces[{index}] (Unbalance) of Scene")
-            found += [one.spun(body.spin) for one in force.pair(body.axes[0])]
+            shaft = carrier(body, force.z)
+            found += [one.spun(shaft.spin) for one in force.pair(shaft.axes[0])]
         else:
             found.append(force)
     return tuple(found)
@@ -148,13 +154,16 @@ def turned(disk: Disk, body: Any, assembled: Assembled) -> list[sparse.csr_matri
     """Rows (1, N_all) of a disk's rotations about the three axes of the shaft."""
     rows = assembled.rows(disk.z).tocsr()
     theta = [rows[body.components.index(c)] if c in body.components else 0.0 * rows[0] for c in COMPONENTS[3:]]
-    return [sum(axis[j] * theta[j] for j in range(3)).tocsr() for axis in body.axes[0]]
+    return [sum(axis[j] * theta[j] for j in range(3)).tocsr() for axis in carrier(body, disk.z).axes[0]]
 
 
 def gyroscopic(scene: Any, assembled: Assembled) -> sparse.csr_matrix | None:
     """G (N_all, N_all) of the body and of the disks on it; None where nothing spins."""
-    G, spin = assembled.gyroscopic, getattr(scene.beam, "spin", 0.0)
-    for disk in (mass for mass in scene.masses if isinstance(mass, Disk) and spin != 0.0):
+    G = assembled.gyroscopic
+    for disk in (mass for mass in scene.masses if isinstance(mass, Disk)):
+        spin = carrier(scene.beam, disk.z).spin
+        if spin == 0.0:
+            continue
         first, second, _ = turned(disk, scene.beam, assembled)
         half = disk.polar * spin * (first.T @ second)
         G = half - half.T if G is None else G + half - half.T

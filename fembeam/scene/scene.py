@@ -17,6 +17,7 @@ from fembeam.scene.assembly import Matrices, assemble, buckling_load
 from fembeam.scene.body_checks import check_conflicts, check_end, check_ends, check_feature, check_plain, is_body
 from fembeam.scene.element import Element
 from fembeam.scene.impactor import Impactor
+from fembeam.scene.joined_scene import merged
 from fembeam.scene.local_coordinate import LocalCoordinate
 from fembeam.scene.parts import (
     Dashpot,
@@ -29,7 +30,7 @@ from fembeam.scene.parts import (
 )
 from fembeam.scene.rigid_motions import drifting, rigid_body_modes
 from fembeam.scene.rotors import Disk, Unbalance, driven
-from fembeam.structures import COMPONENTS
+from fembeam.structures import COMPONENTS, Joint
 from fembeam.support import is_finite, require, require_finite, require_non_negative, require_positive
 
 if TYPE_CHECKING:
@@ -72,6 +73,10 @@ class Scene:
     bodies : further beams, each a Scene of its own with its supports, stops, forces, damping; a `Stop` with `on`, or an
         `Element` with `to`, lets the beam of this scene meet them. Their contacts are numbered after those of this
         scene.
+    joints : of `Joint`, between frames and structures, this scene's own body being number 0, the first of `bodies`
+        number 1. Joined bodies become one, `JoinedBodies`, with one M and K, modes of the whole and all their parts:
+        the scene has no `bodies` then but those without joints, and a place of a joined one is (1, "lever"), or
+        "lever" where no other has that name.
     gravity : g in m/s², pulls everything down, along -y; for all bodies.
     elements : of Element, local elements that always act, numbered on after the stops.
 
@@ -111,6 +116,7 @@ class Scene:
     bodies: Sequence[Scene] = ()
     gravity: float = 0.0
     elements: Sequence[Element] = ()
+    joints: Sequence[Joint] = ()
 
     def __post_init__(self) -> None:
         if not isinstance(self.beam, Beam) and not is_body(self.beam):
@@ -125,8 +131,12 @@ class Scene:
                             "write ModalDamping(0.01)")  # fmt: skip
         require_finite("gravity", self.gravity, "Scene", "give m/s², 9.81 on the ground")
         object.__setattr__(self, "bodies", _listed("bodies", self.bodies, (Scene,)))
-        self._check_base()
+        object.__setattr__(self, "joints", _listed("joints", self.joints, (Joint,)))
         self._check_bodies()
+        if self.joints:
+            for name, value in merged(self, [*FEATURES]).items():
+                object.__setattr__(self, name, value)
+        self._check_base()
         self._check_names()
         if self.named:
             check_conflicts(self)

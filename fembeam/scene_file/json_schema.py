@@ -12,40 +12,71 @@ from typing import Any, Literal, get_args, get_origin
 
 from fembeam.beams import ModalDamping, Rayleigh
 from fembeam.scene import FEATURES, Scene
-from fembeam.scene_file.frames import DRAWN, OPTIONS, READ
+from fembeam.scene_file import bodies
+from fembeam.scene_file.frames import MEMBER
 from fembeam.scene_file.keys import entries_of, options, parameters, required, takes_list
 from fembeam.scene_file.kinds import MAKERS, SECTION, SIGNAL, Nested, nested
-from fembeam.scene_file.structures import FILES, KEYS
+from fembeam.scene_file.structures import FILES, KEYS, PLACES
 from fembeam.scene_file.study_tables import STUDIES
 from fembeam.scene_file.tables import USUAL, beam_of_section, snake
+from fembeam.structures import COMPONENTS
 
 Schema = dict[str, Any]
+NUMBERS: Schema = {"type": "array", "items": {"type": "number"}}
+THREE = {**NUMBERS, "minItems": 3, "maxItems": 3}
+PLACE: Schema = {
+    "description": "a name, a number, [member, distance in m], or [number of a body, place]",
+    "anyOf": [{"type": "string"}, {"type": "number"}, {"type": "array", "items": {}, "minItems": 2, "maxItems": 2}],
+}
+DIRECTION: Schema = {
+    "description": "the way a place moves: x, -y, rz, or a vector",
+    "anyOf": [
+        {"enum": [sign + c for c in COMPONENTS for sign in ("", "-")]},
+        {**NUMBERS, "minItems": 2, "maxItems": 3},
+    ],
+}
+REDUCED: Schema = {
+    "type": "object",
+    "description": "a superelement: nodes of joints, supports, stops; modes with these held",
+    "properties": {
+        "nodes": {"type": "array", "items": {}},
+        "modes": {"type": "integer"},
+        "elements": {"type": "integer"},
+    },
+    "required": ["nodes", "modes"],
+    "additionalProperties": False,
+}
 SIMPLE = {float: "number", int: "integer", bool: "boolean", str: "string", Path: "string"}
 
 
 def json_schema() -> Schema:
-    """The schema of a scene file of a beam, a JSON object (draft 2020-12).
+    """The schema of a scene file, a JSON object (draft 2020-12).
 
     Examples
     --------
-    >>> json_schema()["required"]
-    ['beam']
+    >>> [one["required"] for one in json_schema()["oneOf"]]
+    [['beam'], ['structure'], ['frame']]
     """
     kinds = _Kinds()
     tables: Schema = {"beam": kinds.beam(), "gravity": {"type": "number", "description": "m/s², 9.81 on the ground"}}
     for name, features in FEATURES.items():
         tables[name] = {"type": "array", "items": kinds.feature(features)}
     tables["damping"] = {"anyOf": [kinds.table(ModalDamping), kinds.table(Rayleigh)]}
-    tables["base"] = kinds.reference(SIGNAL)
-    tables["structure"] = _object({key: {} for key in KEYS}, list(FILES[:2]))
-    tables["frame"] = _object({key: {} for key in (*DRAWN, *READ, *OPTIONS)}, [])
+    along = _object({direction: kinds.reference(SIGNAL) for direction in COMPONENTS[:3]}, [])
+    tables["base"] = {"anyOf": [kinds.reference(SIGNAL), along]}
+    known = {"structure": kinds.structure(), "frame": kinds.frame()}
+    like = _object({"body": {"type": "integer"}, "turned": THREE}, ["body"])
+    parts = {name: tables[name] for name in bodies.PARTS}
+    body = _object({"beam": tables["beam"], **known, "like": like, **parts}, [])
+    tables |= {**known, "bodies": {"type": "array", "items": body}, "joints": {"type": "array", "items": kinds.joint()}}
     tables["reduce"] = kinds.table(Scene.reduce)
     tables |= {name: kinds.table(study) for name, study in STUDIES.items()}
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "fembeam scene",
-        "description": "A beam that meets stops. SI units: m, kg, s, N, rad/s.",
-        **_object(tables, ["beam"]),
+        "description": "A beam, frame or structure that meets stops. SI units: m, kg, s, N, rad/s.",
+        **_object(tables, []),
+        "oneOf": [{"required": [name]} for name in ("beam", *bodies.MAKERS)],
         "$defs": kinds.definitions,
     }
 
@@ -89,11 +120,37 @@ class _Kinds:
         return {"$ref": f"#/$defs/{name.replace(' ', '%20')}"}
 
     def feature(self, features: tuple[type, ...]) -> Schema:
-        """One entry of [[supports]], [[masses]], ..."""
-        if len(features) == 1:
-            return self.table(features[0])
+        """One entry of [[supports]], [[masses]], ...: on a beam at z, then at a place by name."""
         makers = [(MAKERS.get(one, one), snake(one.__name__)) for one in features]
-        return {"anyOf": [self.table(make, "kind", name, name in USUAL) for make, name in makers]}
+        alone = len(features) == 1
+        tables = [self.table(m) if alone else self.table(m, "kind", name, name in USUAL) for m, name in makers]
+        return {"anyOf": [*tables, *(_named(one) for one in tables)]}
+
+    def structure(self) -> Schema:
+        """[structure]."""
+        return _object({**{key: {} for key in KEYS}, "turned": THREE, "reduced": REDUCED}, list(FILES[:2]))
+
+    def frame(self) -> Schema:
+        """[frame]: nodes and members, or the lines of a mesh."""
+        section, name = self.reference(SECTION), {"type": "string"}
+        more = {"spin": {"type": "number"}, "bending_only": {"type": "boolean"}, "turned": THREE, "reduced": REDUCED}
+        chain = {"type": "array", "items": name, "minItems": 2}
+        of_member: Schema = {key: {} for key in MEMBER} | {"up": DIRECTION, "name": name}
+        of_member |= {"axial_force": {"type": "number"}, "foundation": {"type": "number"}}
+        members = {
+            "type": "array",
+            "items": _object({"nodes": chain, "section": section, **of_member}, ["nodes", "section"]),
+        }
+        nodes = {"type": "object", "additionalProperties": {**NUMBERS, "minItems": 2, "maxItems": 3}}
+        sections = {"type": "object", "additionalProperties": section}
+        mesh = {"mesh": name, "sections": sections, "data": name, "up": {}, "plane": {"type": "boolean"}}
+        drawn = _object({"nodes": nodes, "members": members, **more}, ["nodes", "members"])
+        return {"anyOf": [drawn, _object({**mesh, **more}, ["mesh", "sections"])]}
+
+    def joint(self) -> Schema:
+        """[[joints]]."""
+        dofs = {"anyOf": [{"type": "string"}, {"type": "array", "items": {"enum": list(COMPONENTS)}}]}
+        return _object({"at": PLACE, "to": PLACE, "dofs": dofs, "body": {"type": "integer"}}, ["at", "to"])
 
     def beam(self) -> Schema:
         """A beam of one section, of spans, or of a mesh."""
@@ -104,6 +161,14 @@ class _Kinds:
         mesh = {"mesh": {"type": "string"}, "sections": sections, "data": {"type": "string"}, **common}
         spans = {"spans": {"type": "array", "items": span, "minItems": 1}, **common}
         return {"anyOf": [plain, _object(spans, ["spans"]), _object(mesh, ["mesh", "sections"])]}
+
+
+def _named(table: Schema) -> Schema:
+    """A part at a place by name: `at` for z, a direction."""
+    places = {key: PLACE for key in PLACES if key in table["properties"] or key == "at"}
+    properties = {key: value for key, value in table["properties"].items() if key != "z"} | places
+    properties |= {"direction": DIRECTION} if "direction" in properties else {}
+    return {**table, "properties": properties, "required": [{"z": "at"}.get(key, key) for key in table["required"]]}
 
 
 def _split(properties: Schema) -> tuple[Schema, Schema, Schema]:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NoReturn
 
 from fembeam.beams import Beam, ModalDamping, Rayleigh, Section, Taper
 from fembeam.scene import FEATURES, Scene, Source
-from fembeam.scene_file.frames import frame
+from fembeam.scene_file import bodies as further
 from fembeam.scene_file.keys import (
     Constructors,
     converted,
@@ -26,10 +26,12 @@ from fembeam.scene_file.keys import (
     wanted,
 )
 from fembeam.scene_file.kinds import MAKERS, SECTION, SIGNAL, Nested, nested
-from fembeam.scene_file.structures import PLACES, is_place, place, structure
+from fembeam.scene_file.structures import PLACES, is_place, place
+from fembeam.support import is_whole
 
 Table = Mapping[str, Any]
-BODIES: dict[str, Callable[..., Any]] = {"structure": structure, "frame": frame}  # tables beside [beam]
+BODIES = tuple(further.MAKERS)  # tables beside [beam]
+LISTS = (*FEATURES, "bodies", "joints")
 
 USUAL = ("lumped_mass", "point_force")  # kinds that need not be named
 
@@ -45,6 +47,12 @@ class TableReader:
     source: Source
     places: dict[str, Path]
     asked: Sequence[str] = ()
+    within: str = ""  # the further body whose tables are read, for messages
+    kind: bool | None = None  # whether its places have names
+
+    def inside(self, within: str, named: bool) -> TableReader:
+        """The reader of a further body's tables."""
+        return replace(self, within=within, kind=named)
 
     def file(self, name: str, where: str) -> Path:
         """A file that the scene names: an ordinary one, and within the folder if a saved run names it."""
@@ -60,7 +68,7 @@ class TableReader:
 
     def contents(self, tables: Table, known: Constructors) -> tuple[Scene, dict[str, Any], dict[str, Any]]:
         """The scene, the arguments of `Scene.reduce`, and the study tables among those known."""
-        parts = [name for name in inspect.signature(Scene).parameters if name != "bodies"]  # one beam per file
+        parts = list(inspect.signature(Scene).parameters)
         self.check_keys(tables, [*parts, *BODIES, "reduce", *known], "the file", "table")
         bodies = [name for name in ("beam", *BODIES) if name in tables]
         if not bodies:
@@ -69,10 +77,11 @@ class TableReader:
             self.fail("the file", f"needs one of the tables [{'] and ['.join(bodies)}], not both")
         for name in tables:
             self.check_form(name, tables[name])
-        built = {name: self.part(name, tables[name]) for name in parts if name in tables}
-        for name, maker in BODIES.items():
-            if name in tables:
-                built["beam"] = maker(self, tables[name])
+        built = {name: self.part(name, tables[name]) for name in parts if name in tables and name not in LISTS[-2:]}
+        if bodies[0] != "beam":
+            built["beam"] = further.named_body(self, bodies[0], tables[bodies[0]])
+        built["bodies"] = further.bodies(self, tables.get("bodies", []), built["beam"])
+        built["joints"] = [further.joint(self, one, i) for i, one in enumerate(tables.get("joints", []), start=1)]
         try:
             scene = Scene(**built)
         except (ValueError, TypeError, ArithmeticError) as error:
@@ -88,14 +97,14 @@ class TableReader:
 
     @cached_property
     def named(self) -> bool:
-        """Whether the file is of a body whose places have names."""
-        return any(name in self.source.tables() for name in BODIES)
+        """Whether the file, or the further body that is read, is one whose places have names."""
+        return any(name in self.source.tables() for name in BODIES) if self.kind is None else self.kind
 
     def check_form(self, name: str, value: Any) -> None:
         """Features come as [[name]], gravity as a number, everything else as [name]."""
         if name == "gravity":
             return
-        if name in FEATURES:
+        if name in LISTS:
             if not (isinstance(value, list) and all(isinstance(entry, dict) for entry in value)):
                 self.fail(name, f"must be a list of tables; write [[{name}]]")
         elif not isinstance(value, dict):
@@ -231,6 +240,8 @@ class TableReader:
             if kind.listed or (isinstance(value, list) and takes_list(parameter)):
                 return [self.chosen(kind, one, f"{inner} number {i}") for i, one in enumerate(value, start=1)]
             return self.chosen(kind, value, inner)
+        if key in PLACES and isinstance(value, list) and len(value) == 2 and is_place(value) and is_whole(value[0]):
+            return place(value)  # of another body
         if self.named and key == "places" and isinstance(value, list) and all(map(is_place, value)):
             return [place(one) for one in value]
         if not fits(value, parameter.annotation):
@@ -252,7 +263,7 @@ class TableReader:
 
     def fail(self, where: str, message: str, cause: Exception | None = None) -> NoReturn:
         """Raise with file and table in front."""
-        raise SceneFileError(f"{self.source.place(where, message)}: {message}") from cause
+        raise SceneFileError(f"{self.source.place(self.within + where, message)}: {message}") from cause
 
 
 def _span(length: float, section: Section) -> tuple[float, Section]:

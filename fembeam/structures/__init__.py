@@ -19,7 +19,8 @@ from fembeam.structures.directions import (
 from fembeam.structures.frame import Frame, total_mass
 from fembeam.structures.frame_forces import FORCES, FrameForces
 from fembeam.structures.frame_mesh import FrameMatrices
-from fembeam.structures.joints import Joint, joined, joining, superelement
+from fembeam.structures.joined_bodies import JoinedBodies, JoinedForces
+from fembeam.structures.joints import Joint, joined, joining
 from fembeam.structures.massless import following
 from fembeam.structures.members import Member
 from fembeam.structures.scale import Scale

@@ -20,6 +20,7 @@ from fembeam.support import is_finite, require, require_finite, require_positive
 
 if TYPE_CHECKING:
     from fembeam.structures.frame_mesh import FrameMatrices
+    from fembeam.structures.structure import Structure
 
 Vector = NDArray[np.float64]
 Site = str | tuple[int, float]  # a node, or the number of a member and the distance from its first end
@@ -265,6 +266,46 @@ class Frame:
     def lines(self) -> list[Vector]:
         """The members as (2, 3) arrays, m."""
         return [np.array([start, start + span]) for start, span in zip(self.starts, self.spans, strict=True)]
+
+    def turned(self, rotation: Sequence[float]) -> Frame:
+        """The same frame turned about the origin, its sections with it.
+
+        Parameters
+        ----------
+        rotation : (3,) rad, a rotation vector: about its direction by its length. A plane frame turns about z.
+
+        Raises
+        ------
+        ValueError : numbers that are none; a plane frame out of its plane; releases about global axes that turn.
+
+        Examples
+        --------
+        >>> leg = Frame.polyline({"A": (0, 0), "B": (1, 0)}, Section.rectangle(2e11, 7800.0, 0.01, 0.02))
+        >>> leg.turned((0, 0, np.pi / 2)).nodes["B"]
+        (0.0, 1.0)
+        """
+        from fembeam.structures.turning import turned_frame
+
+        return turned_frame(self, rotation)
+
+    def reduced(self, nodes: Sequence[str], modes: int, elements: int | None = None) -> Structure:
+        """The frame as a superelement on some of its nodes, by Craig and Bampton; see `Structure.reduced`.
+
+        Parameters
+        ----------
+        nodes : where joints, supports, loads and stops will be. modes : of the frame with these held.
+        elements : of its mesh; None: as few as make these modes right to 1e-6.
+
+        Examples
+        --------
+        >>> beam = Frame.straight(1.0, Section.circle(2e11, 7800.0, 0.02))
+        >>> [node for node, component in beam.reduced(["A", "B"], modes=2).labels if component in ("x", "mode")]
+        ['A', 'B', 'mode 1', 'mode 2']
+        """
+        from fembeam.structures.superelement import reduced
+
+        made = self.assembled(elements, max(int(modes), 1) if is_finite(modes) else None, tuple(nodes))
+        return reduced(self, made, nodes, modes, "Frame.reduced")
 
     def assembled(
         self,

@@ -56,6 +56,14 @@ class FrameForces:
         count = next(iter(self.ends.values())).shape[2]
         return f"<section forces {', '.join(self.names)} of {count} coordinates in {self.mesh.elements.count} elements>"
 
+    def names_at(self, place: Any) -> tuple[str, ...]:
+        """The same at a place: all of them."""
+        return self.names
+
+    def sections(self) -> list[tuple[str, float]]:
+        """All mesh nodes as (member, distance), member by member."""
+        return self.mesh.sections()
+
     def rows(self, place: Any, names: tuple[str, ...] | None = None) -> Vector:
         """(len(names), n) at a place on a member; at a point load that of the element ahead. None: all of `names`."""
         member, s = self._on_member(place)

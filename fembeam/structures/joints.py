@@ -8,7 +8,7 @@ equal dofs of two nodes become one.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol
@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg, sparse
 
-import reduction
 from fembeam.structures.assembled import COMPONENTS, Assembled
 from fembeam.support import is_whole, require
 
@@ -71,13 +70,19 @@ class Joint:
             require(is_whole(number) and number >= 0, "bodies must be counted from 0, the first", number, "Joint",
                     "write to=(1, 'flange')")  # fmt: skip
         require(self.body != self.to[0], "a joint must join two bodies", self.to, "Joint", "name another body")
-        object.__setattr__(self, "to", tuple(self.to))
+        object.__setattr__(self, "to", (int(self.to[0]), _tuples(self.to[1])))
+        object.__setattr__(self, "place", _tuples(self.place))
         if self.dofs is not None:
             listed = tuple(self.dofs)
             right = bool(listed) and len(set(listed)) == len(listed) and set(listed) <= set(COMPONENTS)
             require(right, f"dofs must be some of {', '.join(COMPONENTS)}, each once", self.dofs, "Joint",
                     "write 'xyz' for a ball hinge, or ('x', 'y', 'rz')")  # fmt: skip
             object.__setattr__(self, "dofs", listed)
+
+
+def _tuples(place: Any) -> Any:
+    """A place with tuples for lists."""
+    return tuple(_tuples(one) for one in place) if isinstance(place, list) else place
 
 
 def joined(bodies: Sequence[Body], made: Sequence[Assembled], joints: Sequence[Joint]) -> Assembled:
@@ -96,7 +101,11 @@ def joined(bodies: Sequence[Body], made: Sequence[Assembled], joints: Sequence[J
     ------
     ValueError : a body, place or component that does not exist, two joints that fix one motion twice.
     """
-    T, free = joining(bodies, made, joints)
+    return blocks_joined(bodies, made, *joining(bodies, made, joints))
+
+
+def blocks_joined(bodies: Sequence[Body], made: Sequence[Assembled], T: sparse.csr_matrix, free: Any) -> Assembled:
+    """The same by a T that `joining` made."""
     labels = [((number, name), component) for number, one in enumerate(made) for name, component in one.labels]
     roots = [one.root for one in made if one.root is not None]
     root = sparse.block_diag(roots, format="csr") @ T if len(roots) == len(made) else None
@@ -114,51 +123,6 @@ def joined(bodies: Sequence[Body], made: Sequence[Assembled], joints: Sequence[J
     )
 
 
-def superelement(made: Assembled, places: Sequence[Any], modes: int, held: Sequence[Any] = ()) -> Assembled:
-    """A body in few unknowns, by Craig and Bampton: static shapes of the places and modes with these held.
-
-    Parameters
-    ----------
-    made : matrices of the body. places : where joints, stops and supports will be. held : places clamped for good.
-    modes : how many with all of `places` held; 0 is Guyan's condensation.
-
-    Returns
-    -------
-    Assembled : M = 1, K = diag(ω²) on its own modes; rows of any place.
-
-    References
-    ----------
-    R.R. Craig, M.C.C. Bampton, AIAA J. 6 (1968) 1313.
-    """
-    clamped = sparse.vstack([sparse.csr_matrix((0, len(made.labels))), *(made.rows(place) for place in held)])
-    free = np.flatnonzero(np.diff(clamped.tocsc().indptr) == 0)
-    M, K = (A[free][:, free] for A in (made.M, made.K))
-    loads = sparse.vstack([made.rows(place)[:, free] for place in places], format="csr")
-    loads = loads[np.diff(loads.indptr) > 0]
-    basis = reduction.craig_bampton(M, K, loads.T, modes, None if made.root is None else made.root[:, free])
-    vectors = np.zeros((len(made.labels), basis.count))
-    vectors[free] = basis.vectors
-    C, gyroscopic = (
-        None if A is None else sparse.csr_matrix(vectors.T @ (A @ vectors)) for A in (made.C, made.gyroscopic)
-    )
-    return Assembled(
-        sparse.eye(basis.count, format="csr"),
-        sparse.diags(basis.omega**2).tocsr(),
-        tuple((i, "mode") for i in range(basis.count)),
-        partial(_projected_rows, made.rows, vectors),
-        vectors.T @ (made.M @ made.translations),
-        root=sparse.diags(basis.omega).tocsr(),
-        C=C,
-        gyroscopic=gyroscopic,
-        accuracy=f"{basis.count} unknowns, {modes} of them modes with the places held, of {made.accuracy}",
-    )
-
-
-def _projected_rows(rows: Callable[[Any], sparse.csr_matrix], vectors: Vector, place: Any) -> sparse.csr_matrix:
-    """Rows of a place on reduced unknowns."""
-    return sparse.csr_matrix(rows(place) @ vectors)
-
-
 def joining(
     bodies: Sequence[Body], made: Sequence[Assembled], joints: Sequence[Joint]
 ) -> tuple[sparse.csr_matrix, NDArray[np.int64]]:
@@ -169,7 +133,7 @@ def joining(
     for index, joint in enumerate(joints):
         where = f"joints[{index}]"
         B = sparse.vstack([B, _conditions(bodies, made, first, joint, where)], format="csr")
-        names += [f"{component!r} of {where}" for component in _shared(bodies, joint, where)]
+        names += [f"{component!r} of {where}" for component in shared_dofs(bodies, joint, where)]
     if not names:
         return sparse.eye(size, format="csr"), np.arange(size)
     columns = np.flatnonzero(np.diff(B.tocsc().indptr))
@@ -190,7 +154,7 @@ def _conditions(
     bodies: Sequence[Body], made: Sequence[Assembled], first: Any, joint: Joint, where: str
 ) -> sparse.csr_matrix:
     """Rows of one joint on the unknowns of all bodies: motion here less motion there."""
-    shared = _shared(bodies, joint, where)
+    shared = shared_dofs(bodies, joint, where)
     parts = []
     for sign, (number, place) in ((1.0, (joint.body, joint.place)), (-1.0, joint.to)):
         known = list(bodies[number].components)
@@ -201,7 +165,7 @@ def _conditions(
     return parts[0] + parts[1]
 
 
-def _shared(bodies: Sequence[Body], joint: Joint, where: str) -> list[str]:
+def shared_dofs(bodies: Sequence[Body], joint: Joint, where: str) -> list[str]:
     """The components a joint makes equal; ValueError for bodies, places, components that do not exist."""
     there = []
     for number, place in ((joint.body, joint.place), joint.to):
@@ -236,10 +200,15 @@ def _rows(made: tuple[Assembled, ...], first: tuple[int, ...], T: sparse.csr_mat
 
 def _translations(bodies: Sequence[Body], made: Sequence[Assembled]) -> Vector:
     """Unit translations (N, d) of all bodies, along the axes that all of them have."""
-    axes = [[name for name in COMPONENTS[:3] if name in one.components] for one in bodies]
+    axes = [translations_of(one) for one in bodies]
     shared = [name for name in COMPONENTS[:3] if all(name in known for known in axes)]
     pairs = zip(made, axes, strict=True)
     return np.vstack([one.translations[:, [known.index(name) for name in shared]] for one, known in pairs])
+
+
+def translations_of(body: Any) -> list[str]:
+    """Along which of x, y, z a body moves with the frame."""
+    return [name for name in COMPONENTS[:3] if name in getattr(body, "base_directions", body.components)]
 
 
 def _optional(made: Sequence[Assembled], name: str, T: sparse.csr_matrix) -> sparse.csr_matrix | None:

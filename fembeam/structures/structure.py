@@ -132,6 +132,61 @@ class Structure(NamedBody):
         points = {name: node for name, node in self.points.items() if node in {one for one, _ in kept}}
         return Structure(T.T @ self.K @ T, T.T @ self.M @ T, C, kept, self.nodes, points)
 
+    def turned(self, rotation: Sequence[float]) -> Structure:
+        """The same structure turned about the origin: dofs stay along the global axes.
+
+        Parameters
+        ----------
+        rotation : (3,) rad, a rotation vector: about its direction by its length.
+
+        Raises
+        ------
+        ValueError : numbers that are none; a node without the dofs that its motion turns into.
+
+        Examples
+        --------
+        >>> post = Structure([[8.0, 0.0], [0.0, 2.0]], [[1.0, 0.0], [0.0, 1.0]], labels=[("top", "x"), ("top", "y")])
+        >>> post.turned((0.0, 0.0, 0.5 * 3.141592653589793)).K.toarray().tolist()
+        [[2.0, 0.0], [0.0, 8.0]]
+        """
+        from fembeam.structures.turning import turned_structure
+
+        return turned_structure(self, rotation)
+
+    def reduced(self, nodes: Sequence[Any], modes: int) -> Structure:
+        """The structure as a superelement on some of its nodes, by Craig and Bampton.
+
+        u = Ψ u_b + Φ η: static shapes of the nodes, and modes of the rest with these held.
+
+        Parameters
+        ----------
+        nodes : nodes or points where joints, supports, loads and stops will be; together they hold the structure.
+        modes : of the structure with these held, the lowest; 0 is Guyan's condensation.
+
+        Returns
+        -------
+        Structure : with dofs of these nodes, then ("mode 1", "mode"), …; used as often as wanted, turned too.
+
+        Raises
+        ------
+        ValueError : a node that does not exist, modes that are no count or too many, nodes that do not hold it.
+
+        References
+        ----------
+        R.R. Craig, M.C.C. Bampton, AIAA Journal 6 (1968) 1313.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> chain = Structure([[1, -1, 0], [-1, 2, -1], [0, -1, 1]], np.eye(3), labels=[(i, "x") for i in (1, 2, 3)])
+        >>> chain.reduced([1, 3], modes=0).K.toarray().tolist()
+        [[0.5, -0.5], [-0.5, 0.5]]
+        """
+        from fembeam.structures.superelement import reduced
+
+        own = self.condensed()
+        return reduced(own, own.assembled(), [self.node(node) for node in nodes], modes, "Structure.reduced")
+
     @staticmethod
     def read(
         stiffness: Source,

@@ -63,8 +63,12 @@ def is_name(value: object) -> TypeGuard[str]:
 
 def require_place(z: Any, part: object) -> None:
     """Raise ValueError unless z is a place for a part of a scene: a coordinate along a beam, or a name."""
-    pair = isinstance(z, (tuple, list)) and len(z) == 2 and is_name(z[0]) and is_finite(z[1])
-    if pair or is_name(z):
+    if isinstance(z, (tuple, list)) and len(z) == 2:
+        if is_name(z[0]) and is_finite(z[1]):
+            return
+        if is_whole(z[0]) and z[0] >= 0:  # (number of a joined body, its place)
+            return require_place(z[1], part)
+    if is_name(z):
         return
     require_finite("z", z, type(part).__name__, "give the coordinate along the beam in m")
 

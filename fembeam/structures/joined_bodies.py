@@ -1,0 +1,356 @@
+"""Several bodies joined to one: its matrices on the unknowns that joints leave, its places by body and name.
+
+q_all = T q̂,    M̂ = Tᵀ M T,    K̂ = Tᵀ K T;    see `joints`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from fembeam.structures.assembled import COMPONENTS, Assembled
+from fembeam.structures.directions import nearest
+from fembeam.structures.frame_forces import FrameForces
+from fembeam.structures.frame_mesh import FrameMatrices
+from fembeam.structures.joints import Joint, blocks_joined, joining, shared_dofs, translations_of
+from fembeam.support import is_whole, require
+
+Vector = NDArray[np.float64]
+APART = 1e-6  # of the size of the bodies: two places that a joint makes one
+STILL = 1e-6  # of the motion of all bodies: one that stands still but for rounding
+
+
+@dataclass(frozen=True)
+class JoinedBodies:
+    """Bodies made one by joints; a scene with `joints` makes it of its own body and those of its `bodies`.
+
+    A place is one of the first body as it is, of another one (number, place), number 1 the next body; a name that only
+    one body has needs no number. Every body lies where its first joint puts it.
+
+    Parameters
+    ----------
+    bodies : frames, structures. joints : list of `Joint`.
+
+    Raises
+    ------
+    ValueError : a body that no joint leads to from the first one, bodies and places that do not exist, a motion fixed
+        twice by the same places, places of a joint that do not meet.
+
+    Examples
+    --------
+    >>> from fembeam.structures import Structure
+    >>> mass, spring = Structure([[0.0]], [[2.0]]), Structure([[8.0]], [[1.0]], points={"top": 0})
+    >>> both = JoinedBodies((mass, spring), (Joint(0, to=(1, "top")),))
+    >>> made = both.assembled()
+    >>> made.M.toarray(), made.K.toarray(), both.located("top", "")
+    (array([[3.]]), array([[8.]]), (1, 'top'))
+    """
+
+    bodies: Sequence[Any]
+    joints: Sequence[Joint]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "bodies", tuple(self.bodies))
+        object.__setattr__(self, "joints", tuple(self.joints))
+        for index, joint in enumerate(self.joints):
+            shared_dofs(self.bodies, joint, f"joints[{index}] of Scene")
+        self._check_once()
+        _ = self.shifts
+
+    def _check_once(self) -> None:
+        """Raise ValueError where two joints make one dof of two places equal."""
+        known: dict[Any, int] = {}
+        for index, joint in enumerate(self.joints):
+            ends = frozenset([(joint.body, _node(self.bodies[joint.body], joint.place)), self._end(joint)])
+            for dof in shared_dofs(self.bodies, joint, f"joints[{index}] of Scene"):
+                first = known.setdefault((ends, dof), index)
+                require(first == index, f"joints must not fix one dof twice ({dof})", (first, index),
+                        "joints of Scene", "leave it out of one of them")  # fmt: skip
+
+    def _end(self, joint: Joint) -> tuple[int, Any]:
+        """The second place of a joint."""
+        return joint.to[0], _node(self.bodies[joint.to[0]], joint.to[1])
+
+    @cached_property
+    def shifts(self) -> tuple[Vector, ...]:
+        """(3,) for each body, m: what moves it to its first joint."""
+        found: dict[int, Vector] = {0: np.zeros(3)}
+        waiting = list(enumerate(self.joints))
+        while ready := [(i, one) for i, one in waiting if one.body in found or one.to[0] in found]:
+            index, joint = ready[0]
+            waiting.remove(ready[0])
+            self._placed(index, joint, found)
+        loose = [number for number in range(len(self.bodies)) if number not in found]
+        require(not loose, "every joined body must be joined to the first one, or to one that is", loose,
+                "joints of Scene", "add a joint, or leave the body out")  # fmt: skip
+        return tuple(found[number] for number in range(len(self.bodies)))
+
+    def _placed(self, index: int, joint: Joint, found: dict[int, Vector]) -> None:
+        """Move a body to one that is in its place, or check that both places of a joint meet."""
+        ends = [(joint.body, joint.place), joint.to]
+        at = [self.bodies[number].position(place) for number, place in ends]
+        known = all(one is not None for one in at)
+        for (here, there), sign in (((0, 1), 1.0), ((1, 0), -1.0)):
+            number = ends[there][0]
+            if number not in found and ends[here][0] in found:
+                found[number] = found[ends[here][0]] + (sign * (at[0] - at[1]) if known else 0.0)
+        if known:
+            gap = float(np.linalg.norm(at[0] + found[ends[0][0]] - at[1] - found[ends[1][0]]))
+            size = max(float(np.linalg.norm(np.ptp(np.array(points), axis=0))) for points in self._points)
+            rule = "the places of a joint must meet where the joints before it put the bodies"
+            require(gap <= APART * size, rule, f"{gap:.4g} m between them", f"joints[{index}] of Scene",
+                    "correct the coordinates, or turn the body")  # fmt: skip
+
+    @cached_property
+    def _points(self) -> list[list[Vector]]:
+        """Where the named places of every body are, as far as it is known."""
+        each = [[body.position(place) for place in body.places()] for body in self.bodies]
+        return [[at for at in points if at is not None] or [np.zeros(3)] for points in each]
+
+    @property
+    def meshed(self) -> bool:
+        """Whether elements can be chosen in any of them."""
+        return any(getattr(body, "meshed", True) for body in self.bodies)
+
+    @cached_property
+    def components(self) -> tuple[str, ...]:
+        """Those that any of the bodies has."""
+        return tuple(name for name in COMPONENTS if any(name in body.components for body in self.bodies))
+
+    @property
+    def base_directions(self) -> tuple[str, ...]:
+        """Directions in which the frame may move: those that all bodies have."""
+        return tuple(name for name in COMPONENTS[:3] if all(name in translations_of(body) for body in self.bodies))
+
+    def located(self, place: Any, where: str) -> tuple[int, Any]:
+        """Number of the body that a place is on, and the place there; ValueError for one that does not exist."""
+        if isinstance(place, (tuple, list)) and len(place) == 2 and is_whole(place[0]):
+            number, own = int(place[0]), place[1]
+            require(0 <= number < len(self.bodies), f"the number of a body must be below {len(self.bodies)}", number,
+                    where, "0 is the scene's own")  # fmt: skip
+            self.bodies[number].check_place(own, where)
+            return number, own
+        if _has(self.bodies[0], place):
+            return 0, place
+        others = [number for number, body in enumerate(self.bodies) if _has(body, place)]
+        if not others:
+            known = list(dict.fromkeys(name for body in self.bodies for name in body.places()))
+            require(False, f"a place must be one of the joined bodies; {nearest(place, known)}", place, where,
+                    "use that, or (number of the body, place)")  # fmt: skip
+        require(len(others) == 1, f"a place must be of one body; bodies {', '.join(map(str, others))} have it", place,
+                where, f"write ({others[0]}, {place!r})")  # fmt: skip
+        return others[0], place
+
+    def check_place(self, place: Any, where: str) -> None:
+        """Raise ValueError unless the place exists; the message names the nearest."""
+        self.located(place, where)
+
+    def carrier(self, place: Any) -> Any:
+        """The body that a place is on."""
+        return self.bodies[self.located(place, "carrier")[0]]
+
+    def node(self, place: Any) -> Any:
+        """What tells places apart: the body, and the node there."""
+        number, own = self.located(place, "node")
+        return number, _node(self.bodies[number], own)
+
+    def components_at(self, place: Any) -> tuple[str, ...]:
+        """How a place moves."""
+        number, own = self.located(place, "components_at")
+        return tuple(self.bodies[number].components_at(own))
+
+    def places(self) -> list[Any]:
+        """Names of all places: of the first body as they are, of others with the number of the body."""
+        return [self._told(number, place) for number, body in enumerate(self.bodies) for place in body.places()]
+
+    @property
+    def points(self) -> list[Any]:
+        """Named points, likewise, without the second places of joints; of a body without any its last place."""
+        named = [(n, getattr(body, "points", None) or body.places()[-1:]) for n, body in enumerate(self.bodies)]
+        ends = {self._end(joint) for joint in self.joints}
+        each = [(number, place) for number, points in named for place in points]
+        return [self._told(n, place) for n, place in each if (n, _node(self.bodies[n], place)) not in ends]
+
+    @staticmethod
+    def _told(number: int, place: Any) -> Any:
+        return (number, place) if number else place
+
+    def position(self, place: Any) -> Vector | None:
+        """Where a place is (3,), m; None if it is not known."""
+        number, own = self.located(place, "position")
+        at = self.bodies[number].position(own)
+        return None if at is None else at + self.shifts[number]
+
+    def lines(self) -> list[Vector]:
+        """All lines, (2, 3) m."""
+        return [line + shift for body, shift in zip(self.bodies, self.shifts, strict=True) for line in body.lines()]
+
+    @property
+    def edges(self) -> list[tuple[Any, Any]]:
+        """Pairs of places that figures join."""
+        each = [(number, getattr(body, "edges", ())) for number, body in enumerate(self.bodies)]
+        return [(self._told(number, a), self._told(number, b)) for number, edges in each for a, b in edges]
+
+    def check(self) -> list[str]:
+        """What the bodies given by matrices say."""
+        each = [(number, body.check()) for number, body in enumerate(self.bodies) if hasattr(body, "check")]
+        return [f"body {number}: {said}" for number, sentences in each for said in sentences]
+
+    def check_held(self, held: Mapping[Any, Collection[str]], where: str) -> None:
+        """Raise ValueError where releases free a node of a frame that neither supports nor joints hold."""
+        at: list[tuple[Any, Collection[str]]] = [(self.located(place, where), dofs) for place, dofs in held.items()]
+        for joint in self.joints:
+            dofs = shared_dofs(self.bodies, joint, where)
+            at += [((joint.body, joint.place), dofs), (joint.to, dofs)]
+        for number, body in enumerate(self.bodies):
+            if hasattr(body, "check_held"):
+                mine: dict[Any, list[str]] = {}
+                for (on, place), components in at:
+                    if on == number:
+                        mine.setdefault(place, []).extend(components)
+                body.check_held(mine, where)
+
+    def assembled(
+        self,
+        elements: int | None = None,
+        modes: int | None = None,
+        places: Sequence[Any] = (),
+        omega: float | None = None,
+    ) -> JoinedMatrices:
+        """M, K and the like of all bodies on the unknowns that joints leave; arguments as for each body."""
+        made = []
+        for body, own in zip(self.bodies, self._places_of_each(places), strict=True):
+            count = elements if getattr(body, "meshed", True) else None
+            frequency = {"omega": omega} if hasattr(body, "coarse") else {}
+            made.append(body.assembled(count, modes, own, **frequency))
+        return self._joined(made)
+
+    def coarse(self, modes: int, places: Sequence[Any] = ()) -> JoinedMatrices:
+        """The same of frames on few elements, to find out which frequencies their meshes have to resolve."""
+        pairs = zip(self.bodies, self._places_of_each(places), strict=True)
+        return self._joined([
+            body.coarse(modes, own) if hasattr(body, "coarse") else body.assembled(None, modes, own)
+            for body, own in pairs
+        ])  # fmt: skip
+
+    def _places_of_each(self, places: Sequence[Any]) -> list[list[Any]]:
+        """Places by their bodies, those of joints too."""
+        located = [self.located(place, "places") for place in places]
+        located += [end for joint in self.joints for end in ((joint.body, joint.place), joint.to)]
+        return [[place for number, place in located if number == own] for own in range(len(self.bodies))]
+
+    def _joined(self, made: list[Assembled]) -> JoinedMatrices:
+        T, free = joining(self.bodies, made, self.joints)
+        whole = blocks_joined(self.bodies, made, T, free)
+        first = tuple(int(i) for i in np.cumsum([0, *(one.M.shape[0] for one in made)]))
+        mine = {name: getattr(whole, name) for name in Assembled.__dataclass_fields__}
+        joined = JoinedMatrices(**mine, body=self, made=tuple(made), first=first, T=T)
+        object.__setattr__(joined, "rows", joined.rows_at)
+        return joined
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class JoinedMatrices(Assembled):
+    """Matrices of joined bodies; `made` those of each, `first` where its dofs begin, T from q̂ to all dofs."""
+
+    body: JoinedBodies
+    made: tuple[Assembled, ...]
+    first: tuple[int, ...]
+    T: sparse.csr_matrix
+
+    def rows_at(self, place: Any) -> sparse.csr_matrix:
+        """A row (c, N) for each of the components that any body has, of zeros for those that this one has not."""
+        number, own = self.body.located(place, "rows")
+        rows = (self.made[number].rows(own) @ self.of_body(number)).tocoo()
+        known = [self.body.components.index(name) for name in self.body.bodies[number].components]
+        shape = (len(self.body.components), rows.shape[1])
+        return sparse.csr_matrix((rows.data, (np.array(known, dtype=int)[rows.row], rows.col)), shape=shape)
+
+    def of_body(self, number: int) -> sparse.csr_matrix:
+        """T of one body's dofs."""
+        return self.T[self.first[number] : self.first[number + 1]]
+
+    def check_mechanism(self, loose: Vector, where: str) -> None:
+        """Raise ValueError if motions (N, n) without resistance deform a frame; hinges may let bodies move."""
+        for number, one in enumerate(self.made):
+            mine = np.asarray(self.of_body(number) @ loose)
+            moving = np.linalg.norm(mine) > STILL * np.linalg.norm(self.T @ loose)
+            if isinstance(one, (FrameMatrices, JoinedMatrices)) and moving:
+                one.check_mechanism(mine, where)
+
+    def section_forces(self, vectors: Vector, inertia: Vector) -> JoinedForces | None:
+        """Section forces of the frames among the bodies; None if there are none."""
+        found: dict[int, Any] = {}
+        for number, one in enumerate(self.made):
+            if isinstance(one, (FrameMatrices, JoinedMatrices)):
+                T = self.of_body(number)
+                forces = one.section_forces(np.asarray(T @ vectors), np.asarray(T @ inertia))
+                found |= {} if forces is None else {number: forces}
+        return JoinedForces(self.body, found) if found else None
+
+
+@dataclass(frozen=True, eq=False)
+class JoinedForces:
+    """Section forces of the frames among joined bodies; see `FrameForces`."""
+
+    body: JoinedBodies
+    each: Mapping[int, FrameForces]
+
+    def __repr__(self) -> str:
+        return f"<section forces of bodies {', '.join(map(str, self.each))}>"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Those that any of the frames has."""
+        return tuple(dict.fromkeys(name for forces in self.each.values() for name in forces.names))
+
+    def names_at(self, place: Any) -> tuple[str, ...]:
+        """Those at a place."""
+        forces, own = self._of(place)
+        return forces.names_at(own)
+
+    def rows(self, place: Any, names: tuple[str, ...] | None = None) -> Vector:
+        """(len(names), n) at a place on a member."""
+        forces, own = self._of(place)
+        return forces.rows(own, names)
+
+    def stress(self, place: Any, x: float = 0.0, y: float | None = None) -> Vector:
+        """Normal stress (n,) at a point of the section."""
+        forces, own = self._of(place)
+        return forces.stress(own, x, y)
+
+    def preload(self, place: Any, quantity: str) -> float:
+        """What the given axial force of the member adds."""
+        forces, own = self._of(place)
+        return forces.preload(own, quantity)
+
+    def sections(self) -> list[Any]:
+        """All mesh nodes of the frames, member by member."""
+        return [(n, at) if n else at for n, forces in self.each.items() for at in forces.sections()]
+
+    def _of(self, place: Any) -> tuple[FrameForces, Any]:
+        """The section forces of the body that a place is on."""
+        number, own = self.body.located(place, "section forces")
+        require(number in self.each, "a place of section forces must lie on a frame; this one is on a structure", place,
+                "section forces", "ask for displacement(place, direction), or for reactions")  # fmt: skip
+        return self.each[number], own
+
+
+def _has(body: Any, place: Any) -> bool:
+    """Whether a place is one of a body."""
+    try:
+        body.check_place(place, "")
+    except (ValueError, TypeError):
+        return False
+    return True
+
+
+def _node(body: Any, place: Any) -> Any:
+    """The node of a place, or the place itself."""
+    return body.node(place) if hasattr(body, "node") else place

@@ -1,0 +1,104 @@
+"""Superelements: a body in few unknowns, by Craig and Bampton.
+
+u = T q̂,    T = [1 0; Ψ Φ],    Ψ = -K_ii⁻¹ K_ib
+
+q̂ are the motions u_b of the interface nodes, then the modes Φ of the rest with these held. K̂ = TᵀKT has no coupling
+between the two; a rigid motion of the body is one of the interface alone, and M̂ keeps its mass.
+
+R.R. Craig, M.C.C. Bampton, AIAA Journal 6 (1968) 1313.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import linalg as sparse_linalg
+
+import reduction
+from fembeam.structures.assembled import COMPONENTS, Assembled
+from fembeam.support import is_whole, require
+
+if TYPE_CHECKING:
+    from fembeam.structures.structure import Structure
+
+Vector = NDArray[np.float64]
+UNIT = 1e-12  # of 1: entries of a row that stands for one dof
+
+
+def reduced(body: Any, made: Assembled, nodes: Sequence[Any], modes: int, where: str) -> Structure:
+    """The superelement of a body's matrices, on some of its nodes; `Structure.reduced` explains the arguments."""
+    from fembeam.structures.structure import Structure
+
+    whole = is_whole(modes) and modes >= 0
+    require(whole, "modes must be a whole number, at least 0", modes, where, "0 keeps static shapes alone")
+    listed = list(dict.fromkeys(nodes))
+    require(bool(listed), "nodes must name the places of joints, supports and stops", nodes, where, "give one or more")
+    require(made.gyroscopic is None, "a body that spins must stay as it is", body, where, "leave its spin out")
+    interface = {(node, c): dof for node in listed for c, dof in _dofs(body, made, node, where).items()}
+    kept = np.array(list(interface.values()), dtype=int)
+    rest = np.setdiff1d(np.arange(made.M.shape[0]), kept)
+    require(modes <= len(rest), f"modes must be at most {len(rest)}, the dofs between the nodes", modes, where,
+            "ask for fewer")  # fmt: skip
+    T = _shapes(made, kept, rest, int(modes), where)
+    labels = [*interface, *((f"mode {i + 1}", "mode") for i in range(int(modes)))]
+    K, M = _stiffness(made, T, len(kept)), T.T @ (made.M @ T)
+    C = None if made.C is None else T.T @ (made.C @ T)
+    at = {node: body.position(node) for node in listed}
+    known = {node: place for node, place in at.items() if place is not None}
+    points = {name: node for name, node in getattr(body, "points", {}).items() if hasattr(body, "node") and node in at}
+    lines = [pair for pair in _lines(body) if set(pair) <= set(known)]
+    return Structure(K, (M + M.T) / 2, C, labels, known, points, lines)
+
+
+def _dofs(body: Any, made: Assembled, node: Any, where: str) -> dict[str, int]:
+    """{component: number of the dof} of a node."""
+    body.check_place(node, where)
+    rows = made.rows(node).tocsr()
+    found = {}
+    for component, row in zip(body.components, rows, strict=True):
+        if row.nnz:
+            single = row.nnz == 1 and abs(row.data[0] - 1.0) < UNIT
+            require(single, "an interface must be at nodes of the body", node, where, "make a node of the place")
+            found[component] = int(row.indices[0])
+    ordered = {component: found[component] for component in COMPONENTS if component in found}
+    require(bool(ordered), "an interface must move", node, where, "name another node")
+    return ordered
+
+
+def _shapes(made: Assembled, kept: NDArray[np.int64], rest: NDArray[np.int64], modes: int, where: str) -> Vector:
+    """T (N, n): static shapes of the interface, then modes with it held."""
+    size, count = made.M.shape[0], len(kept)
+    T = np.zeros((size, count + modes))
+    T[kept, np.arange(count)] = 1.0
+    if not len(rest):
+        return T
+    M, K = (A[rest][:, rest] for A in (made.M, made.K))
+    root = None if made.root is None else made.root[:, rest]
+    basis = reduction.modal_basis(M, K, max(modes, 1), root=root)
+    loose = int(np.sum(basis.omega == 0.0))
+    require(loose == 0, "the nodes together must hold the body", f"{loose} motions without resistance", where,
+            "name more of them")  # fmt: skip
+    T[rest, :count] = -sparse_linalg.splu(K.tocsc()).solve(made.K[rest][:, kept].toarray())
+    T[rest, count:] = basis.vectors[:, :modes]
+    return T
+
+
+def _stiffness(made: Assembled, T: Vector, count: int) -> Vector:
+    """TᵀKT, by its root where that is known; interface and modes are not coupled."""
+    if made.root is not None:
+        strain = made.root @ T
+        K = np.asarray(strain.T @ strain)
+    else:
+        K = np.asarray(T.T @ (made.K @ T))
+    K[:count, count:], K[count:, :count] = 0.0, 0.0
+    K[count:, count:] = np.diag(np.diag(K)[count:])
+    return (K + K.T) / 2
+
+
+def _lines(body: Any) -> list[tuple[Any, Any]]:
+    """Pairs of nodes that figures may join: of a frame the ends of its members."""
+    members = getattr(body, "members", None)
+    return list(getattr(body, "edges", ())) if members is None else [(one.a, one.b) for one in members]
