@@ -142,7 +142,7 @@ class Contact:
                 "without a clearance it is a spring in each direction"
             )
         law: Any = self.law
-        if self.always or getattr(law, "memory", ()):
+        if self.always or bool(getattr(law, "memory", ())):
             raise ValueError(f"an annulus takes laws without memory that act for delta > 0, got {self.law!r}")
         centre = np.array(self.centre, dtype=float)
         if centre.shape != (2,) or not np.all(np.isfinite(centre)):
