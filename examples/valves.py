@@ -50,7 +50,8 @@ assert np.array_equal(read.model().omega, model.omega)
 
 run, other = (one.simulate(duration=0.4, dt=1e-3) for one in (model, reference))
 first = [one.contacts.t_in[:3] for one in (run, other)]
-assert len(first[0]) == 3 and np.allclose(*first, atol=1e-5), first
+assert len(first[0]) == 3, run
+assert np.allclose(*first, atol=1e-5), first
 
 if __name__ == "__main__":
     print(model)
