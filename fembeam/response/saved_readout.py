@@ -95,7 +95,7 @@ def expected_readout(arrays: Mapping[str, Any]) -> dict[str, Shape]:
 def _numbers(part: Any) -> dict[str, Any]:
     """The fields of a support, spring or dashpot but its signals."""
     values = {field.name: getattr(part, field.name) for field in fields(part)}
-    return {name: value for name, value in values.items() if not callable(value)}
+    return {name: value for name, value in values.items() if not callable(value) and name != "motion"}
 
 
 def _part(words: dict[str, Any]) -> tuple[Any, int]:

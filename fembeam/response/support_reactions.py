@@ -23,7 +23,7 @@ import reduction
 from fembeam.beams import bending_root, hermite_rows
 from fembeam.response.body_reactions import BodyHeld
 from fembeam.response.readout import coordinates
-from fembeam.scene import BodyMatrices, Spring, contact_rows, loads, told, unsupported
+from fembeam.scene import BodyMatrices, Spring, contact_rows, loads, support_loads, told, unsupported
 from fembeam.structures import COMPONENTS
 from fembeam.support import Part, Printed, is_finite, require
 
@@ -175,7 +175,7 @@ def reaction_rows(model: Model) -> tuple[list[tuple[Any, int]], Vector]:
     columns = _acting(model, full)
     parts, rows, done = [], [], 0
     named = any(beam.named for beam in full.beams)
-    feet = len(model.contact_rows)  # where the loads begin
+    feet = len(model.contact_rows) + len(support_loads(model.scene, full))  # where the loads of feet begin
     for body, scene in enumerate((model.scene, *model.scene.bodies)):
         size = full.beams[body].M.shape[0]
         mine, known, loose = columns[done : done + size], model.matrices.beams[body], full.beams[body]

@@ -100,6 +100,8 @@ class _Kinds:
 
     def value(self, key: str, parameter: inspect.Parameter) -> Schema:
         """One key."""
+        if key == "motion":
+            return _object({dof: self.reference(SIGNAL) for dof in COMPONENTS}, [])
         if kind := nested(key, parameter):
             one = self.reference(kind)
             several = {"type": "array", "items": one}
