@@ -195,7 +195,7 @@ class ModalEquations:
     def _frame_loads(self, scene: Scene) -> list[tuple[Vector, Any]]:
         """Loads of base motion and gravity."""
         moved = [(-self.participation_along(one), motion.derivative(2)) for one, motion in scene.motions.items()]
-        return moved + ([] if scene.gravity == 0.0 else [(-self.participation_along("y"), weight(scene))])
+        return moved + [(-self.participation_along(one), g) for one, g in weight(scene).items()]
 
     def system_like(self, scene: Scene) -> solvers.System:
         """The same as `system_of`, quicker where only base motion, gaps and laws of its stops and elements differ."""
@@ -204,7 +204,7 @@ class ModalEquations:
         if (
             any(_placed(new) != _placed(old) for new, old in zip(parts, known, strict=True))
             or any(getattr(scene, name) != getattr(self.scene, name) for name in SEEN)
-            or (*scene.motions, scene.gravity == 0.0) != (*self.scene.motions, self.scene.gravity == 0.0)
+            or ([*scene.motions], [*scene.pulls]) != ([*self.scene.motions], [*self.scene.pulls])
         ):
             return self.system_of(scene)
         contacts = [

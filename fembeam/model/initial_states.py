@@ -133,9 +133,9 @@ def _check_impactors(model: Model, q: Vector) -> None:
 def equilibrium(model: Model, loads: Mapping[float, float]) -> Vector:
     """Start from static equilibrium; `Model.equilibrium` explains it."""
     start, n = rest(model), len(model.omega)
-    load = np.zeros(n)
-    if model.scene.gravity or not model.scene.named:
-        load = -model.participation_along("y") * model.scene.gravity
+    load = model.omega**2 * start[:n] if len(model.following) else np.zeros(n)
+    for direction, g in model.scene.pulls.items():
+        load = load - model.participation_along(direction) * g
     for z, force in loads.items():
         require_finite(f"force at z = {z} m", force, "Model.equilibrium", "give N, positive up")
         load = load + force * model.phi(z)

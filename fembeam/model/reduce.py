@@ -160,7 +160,7 @@ def _warn_of_drift(scene: Scene, matrices: Matrices, bases: list[reduction.Basis
     """Warn when loads may carry a structure away that neither supports nor stops from several sides hold."""
     for number, (part, beam, basis) in enumerate(zip((scene, *scene.bodies), matrices.beams, bases, strict=True)):
         count = int(np.sum(basis.omega == 0.0))
-        loads = bool(part.forces) or bool(scene.motions) or scene.gravity != 0.0
+        loads = bool(part.forces) or bool(scene.motions) or bool(scene.pulls)
         acting = [*part.stops, *(one for one in scene.acting if number and (one.coordinate.to or (0,))[0] == number)]
         if beam.named and count and loads and not part.elements and len(acting) < 2:
             where = f"bodies[{number - 1}] of Scene" if number else "Scene"

@@ -223,7 +223,7 @@ def _acting(model: Model, full: Matrices) -> Vector:
     scene, size = model.scene, full.M.shape[0]
     rows = [one.row for one in contact_rows(scene, full)] + [row for row, _ in loads(scene, full)]
     pushed = sparse.vstack([sparse.csr_matrix((0, size)), *rows]).toarray().T
-    moved = [*scene.motions, *(["y"] if scene.gravity else [])]
+    moved = [*scene.motions, *scene.pulls]
     frame = -np.array([full.base_loads[direction] for direction in moved]).reshape(-1, size).T
     vectors, damped = np.zeros((size, len(model.omega))), np.zeros((size, len(model.omega)))
     vectors[:] = _on_all(model.matrices, full) @ model.basis.vectors

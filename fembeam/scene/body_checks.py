@@ -140,7 +140,8 @@ def check_plain(feature: Any, name: str, where: str) -> None:
         require(name in ("stops", "elements"), "direction is for bodies that are not a Beam", direction, where,
                 "leave it out: u is along y")  # fmt: skip
     if name == "supports":
-        require(feature.motion is None, "motion of a support needs a Frame or Structure", feature.motion, where,
+        motion = getattr(feature, "motion", None)
+        require(motion is None, "motion of a support needs a Frame or Structure", motion, where,
                 "make the Beam a Frame.straight, or use a stiff Spring(..., foot=signal)")  # fmt: skip
         beyond = [dof for dof in feature.dofs if dof not in ("y", "rx")]
         whole = feature.dofs in ((), COMPONENTS, COMPONENTS[:3])

@@ -145,9 +145,9 @@ def carried_by(scene: Scene, body: int) -> tuple[int, int]:
     return sum(counts[:body]), sum(counts[: body + 1])
 
 
-def weight(scene: Scene) -> Harmonic:
-    """The constant signal g, to go with -M r."""
-    return Harmonic(scene.gravity, 0.0)
+def weight(scene: Scene) -> dict[str, Harmonic]:
+    """The constant signals g by direction, each to go with -M r."""
+    return {direction: Harmonic(g, 0.0) for direction, g in scene.pulls.items()}
 
 
 def watched(scene: Scene, body: int) -> LocalCoordinate | None:
