@@ -235,6 +235,5 @@ def frame_forces_of(run: Histories, body: int, quantity: str = "a section force"
     forces = run.readout.section_forces[body]
     if isinstance(forces, (FrameForces, JoinedForces)):
         return forces
-    raise ValueError(f"{quantity} is of a Beam, which has sections, or of a Frame whose run was not read from a file, "
-                     f"got body {body} in Run; ask for displacement(place, direction), rotations included, or for "
-                     "reactions")  # fmt: skip
+    raise ValueError(f"{quantity} is of a Beam or a Frame, which have sections, got body {body} in Run; ask for "
+                     "displacement(place, direction), rotations included, or for reactions")  # fmt: skip

@@ -25,7 +25,7 @@ from fembeam.response.body_reactions import BodyHeld
 from fembeam.response.readout import coordinates
 from fembeam.scene import BodyMatrices, Spring, contact_rows, loads, support_loads, told, unsupported
 from fembeam.structures import COMPONENTS
-from fembeam.support import Part, Printed, is_finite, require
+from fembeam.support import Part, Printed, is_finite, is_whole, require
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -92,6 +92,13 @@ class BodyReaction(Reaction):
     ----------
     part, body, t : as for a beam. force : (k, 3) N along x, y, z. moment : (k, 3) N m about the axes through the place.
     """
+
+    @property
+    def name(self) -> str:
+        """The name of the part, else such as "Clamped at 'A'", "Fixed at node 7"."""
+        if self.part.name is None and is_whole(self.part.z):
+            return f"{type(self.part).__name__} at node {self.part.z}" + (f" of body {self.body}" if self.body else "")
+        return super().name
 
     def __repr__(self) -> str:
         return f"<reaction of {self.name}, largest force {self.largest()[0]:.5g} N>"
