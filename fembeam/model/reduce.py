@@ -13,7 +13,7 @@ import reduction
 from fembeam.model.model import Model
 from fembeam.model.placed_shapes import PlacedShapes, placed_shapes
 from fembeam.model.shapes import Shapes
-from fembeam.scene import MOST_DENSE, BodyMatrices, LocalCoordinate, Matrices, loaded, watched
+from fembeam.scene import MOST_DENSE, BodyMatrices, LocalCoordinate, Matrices, carried_by, loaded, watched
 from fembeam.structures import COMPONENTS
 from fembeam.support import is_whole, require
 
@@ -74,10 +74,16 @@ def _of_beam(
 ) -> reduction.Basis:
     """The basis of one beam by itself, static shapes where it is loaded included."""
     if interface:
-        return reduction.craig_bampton(beam.M, beam.K, _rows(beam, places).T, len(chosen), beam.root)
+        basis = reduction.craig_bampton(beam.M, beam.K, _rows(beam, places).T, len(chosen), beam.root)
+        if beam.coupling is None:
+            return basis
+        return reduction.with_residual(basis, beam.M, beam.K, beam.coupling[::3].T, beam.root)
     basis = reduction.modal_basis(beam.M, beam.K, indices=chosen, root=beam.root)
-    if residual and places:
-        basis = reduction.with_residual(basis, beam.M, beam.K, _rows(beam, places).T, beam.root)
+    rows = [_rows(beam, places)] if residual and places else []
+    if beam.coupling is not None:  # the static shapes of supports that move
+        rows.append(beam.coupling[::3])
+    if rows:
+        basis = reduction.with_residual(basis, beam.M, beam.K, sparse.vstack(rows).T, beam.root)
     return basis
 
 
@@ -140,7 +146,8 @@ def _shapes_of_each(scene: Scene, matrices: Matrices, basis: reduction.Basis) ->
         size = beam.M.shape[0]
         mine = basis.vectors[done : done + size]
         if isinstance(beam, BodyMatrices):
-            shapes.append(placed_shapes(beam, mine, loaded(scene, number)))
+            every = carried_by(scene, len(scene.bodies))[1]
+            shapes.append(placed_shapes(beam, mine, loaded(scene, number), (every, *carried_by(scene, number))))
         else:
             values = np.zeros((beam.dofs.size, basis.count))
             values[beam.dofs.ravel() >= 0] = mine
@@ -153,7 +160,7 @@ def _warn_of_drift(scene: Scene, matrices: Matrices, bases: list[reduction.Basis
     """Warn when loads may carry a structure away that neither supports nor stops from several sides hold."""
     for number, (part, beam, basis) in enumerate(zip((scene, *scene.bodies), matrices.beams, bases, strict=True)):
         count = int(np.sum(basis.omega == 0.0))
-        loads = bool(part.forces) or bool(scene.motions) or scene.gravity != 0.0
+        loads = bool(part.forces) or bool(scene.motions) or bool(scene.pulls)
         acting = [*part.stops, *(one for one in scene.acting if number and (one.coordinate.to or (0,))[0] == number)]
         if beam.named and count and loads and not part.elements and len(acting) < 2:
             where = f"bodies[{number - 1}] of Scene" if number else "Scene"
