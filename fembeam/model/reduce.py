@@ -67,9 +67,9 @@ def reduced(
     ]
     basis = _joined(bases, matrices)
     _warn_of_drift(scene, matrices, bases)
-    own, *others = _shapes_of_each(scene, matrices, basis)
+    shapes, *others = _shapes_of_each(scene, matrices, basis)
     modes_of_all = sum(numbers, ()) + (0,) * len(matrices.impactors)
-    return Model(scene, matrices, basis, modes_of_all, own, counts, tuple(others), options)
+    return Model(scene, matrices, basis, modes_of_all, shapes, counts, tuple(others), options)
 
 
 def _of_beam(
@@ -91,7 +91,7 @@ def _of_beam(
 
 
 def _modes(beam: Matrices, chosen: tuple[int, ...]) -> reduction.Basis:
-    """Modes by their numbers; of a body one more is computed, so that of a pair that is cut always the same one stays."""
+    """Modes by their numbers; of a body one more is computed, so that of a cut pair always the same one stays."""
     size = beam.M.shape[0]
     if not isinstance(beam, BodyMatrices) or chosen[-1] >= size:
         return reduction.modal_basis(beam.M, beam.K, indices=chosen, root=beam.root)
