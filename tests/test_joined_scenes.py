@@ -168,6 +168,26 @@ def test_hinge_between_bodies():
     assert np.allclose(joined.reduce(3).omega, whole.reduce(3).omega, rtol=2e-6)
 
 
+def test_shaft_in_two_pieces():
+    """Disks and unbalances on a joined shaft that spins: G and the loads of the shaft in one piece."""
+    section = fb.Section.circle(2.1e11, 7850.0, 0.04)
+    disk, unbalance = fb.Disk("B", mass=12.0, diametral=0.04, polar=0.075), fb.Unbalance("B", 1e-4)
+    whole = fb.Frame.straight(0.5, section, spin=300.0, bending_only=True)
+    half = fb.Frame.straight(0.25, section, spin=300.0, bending_only=True)
+    one = fb.Scene(whole, [fb.Clamped("A")], masses=[disk], forces=[unbalance])
+    bodies = [fb.Scene(half, masses=[disk], forces=[unbalance])]
+    two = fb.Scene(half, [fb.Clamped("A")], bodies=bodies, joints=[fb.Joint("B", to=(1, "A"))])
+    models = one.reduce(4, elements=8), two.reduce(4, elements=4)
+    sizes = [np.linalg.svd(model.turning, compute_uv=False) for model in models]
+    assert sizes[0][0] > 1.0
+    assert np.allclose(*sizes, rtol=1e-3)
+    pushes = [np.linalg.norm([vector for vector, _ in model.system.loads]) for model in models]  # of both planes
+    assert pushes[0] == pytest.approx(pushes[1], rel=1e-3)
+    assert [signal(0.1) for _, signal in models[0].system.loads] == [
+        signal(0.1) for _, signal in models[1].system.loads
+    ]
+
+
 def test_free_bodies_beside_joined_ones():
     """A body without a joint stays one of its own, met by stops."""
     free = fb.Scene(leg("AB"), [fb.Clamped("A")])
