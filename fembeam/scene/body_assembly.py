@@ -17,7 +17,7 @@ from scipy import sparse
 
 import reduction
 from fembeam.scene.assembly import DEFAULT_MODES, Matrices, Vector
-from fembeam.scene.places import told
+from fembeam.scene.places import place_words, told
 from fembeam.scene.rotors import Disk, gyroscopic, turned
 from fembeam.structures import COMPONENTS, Assembled, Six, following
 from fembeam.support import require
@@ -111,7 +111,21 @@ def body_matrices(scene: Scene, elements: int | None, modes: int | None, probes:
     require(len(held) < assembled.M.shape[0], "supports must leave dofs free", len(held), "Scene", "remove one")
     found = _of(scene, assembled, modes, held, condense=True)
     _warn_of_massless(scene, found)
+    _check_moving(scene, found)
     return found
+
+
+def _check_moving(scene: Scene, matrices: BodyMatrices) -> None:
+    """Raise ValueError where a stop or element acts on nothing that can move against something else."""
+    for name in ("stops", "elements"):
+        for index, part in enumerate(getattr(scene, name)):
+            place = part.coordinate
+            if place.to is None or place.to[0] == 0:
+                moves = abs(place.row(matrices)).max() > UNIT
+                rule = "what stops and elements act on must be free to move"
+                at = place_words(part.z) + (f" on {place.to_words}" if place.to else "")
+                advice = "supports or joints hold it, or both ends are one; move it"
+                require(moves, rule, at, f"{name}[{index}]{part.quoted} of Scene", advice)
 
 
 def _warn_of_massless(scene: Scene, matrices: BodyMatrices) -> None:

@@ -31,7 +31,7 @@ def read_matrix_market(path: Path) -> Given:
     data = [(i, line) for i, line in enumerate(lines, 1) if line.strip() and not line.startswith("%")]
     sizes = _sizes(path, data, layout, len(lines))
     values = table(path, data[1:], 3 if layout == "coordinate" else 1, ENTRIES[layout])
-    count = sizes[2] if layout == "coordinate" else _kept(*sizes[:2], symmetry)
+    count = sizes[2] if layout == "coordinate" else _kept(sizes[0], sizes[1], symmetry)
     if len(values) != count:
         raise wrong(path, f"line {data[-1][0]}", f"the last of {count} entries", f"the last of {len(values)}")
     made = _of_entries if layout == "coordinate" else _of_columns
