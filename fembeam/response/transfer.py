@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fembeam.scene import signals_of, split
-from fembeam.structures import COMPONENTS
+from fembeam.scene import signals_of, split, unit_of
+from fembeam.structures import COMPONENTS, turns
 from fembeam.support import is_finite, require
 
 if TYPE_CHECKING:
@@ -79,6 +79,10 @@ def frequency_response(
     vector, power, said, unit = _driving(model, driven)
     values = _solved(model, frequencies, vector) @ places.T
     values = (values.T * frequencies**power).T + (_carried_along(model, driven, output) if absolute else 0.0)
+    shapes: Any = (model.shapes, *model.others)[body]
+    if hasattr(shapes, "components"):
+        at = output if isinstance(output, list) else [output]
+        unit = unit.replace("m", unit_of("indentation", [turns(split(one, shapes.components)[1]) for one in at]), 1)
     shown: Any = output if model.scene.named else np.array(output, dtype=float)[()]
     return FrequencyResponse(frequencies, values, said, shown, absolute, unit, model.omega)
 
@@ -114,8 +118,8 @@ def _named_base(model: Model, driven: Any) -> Any:
     if driven != "base" or not model.scene.named:
         return driven
     known = tuple(model.scene.motions) or model.moved_along
-    require(len(known) == 1, "input must name the direction of the base", driven, WHERE,
-            f"write {' or '.join(f'base.{one}' for one in known)}")  # fmt: skip
+    write = " or ".join(f"base.{one}" for one in known) or "a place where a force acts, as no base moves this structure"
+    require(len(known) == 1, "input must name the direction of the base", driven, WHERE, f"write {write}")
     return f"base.{known[0]}"
 
 
@@ -127,7 +131,9 @@ def _driving(model: Model, driven: Any) -> tuple[Vector, int, str, str]:
         direction = driven.removeprefix("base.")
         return model.participation_along(direction), 2, f"displacement of the frame along {direction}", "m/m"
     if isinstance(driven, tuple):
-        return model.phi(driven), 0, f"force at {driven[0]} along {driven[1]}", "m/N"
+        turned = turns(split(driven, model.scene.beam.components)[1])
+        said, unit = ("moment at {} about {}", "m/(N m)") if turned else ("force at {} along {}", "m/N")
+        return model.phi(driven), 0, said.format(*driven), unit
     if is_finite(driven):
         return model.phi(float(driven)), 0, f"force at z = {driven} m", "m/N"
     names = [path for path in signals_of(model.scene) if path.split(".")[0] != "base"]  # in the order of the loads
