@@ -202,6 +202,7 @@ class Model(Printed, ModalEquations):
         output: Any = None,
         absolute: bool = False,
         body: int = 0,
+        slipping: bool = False,
     ) -> FrequencyResponse:
         """Steady displacement per unit of a harmonic input, complex, of the linear scene: its contacts stay open.
 
@@ -216,6 +217,8 @@ class Model(Printed, ModalEquations):
         output : z in m, or (j,), or (place, direction), or a list;
             None: the first stop, else the tip. body : the beam it is on.
         absolute : add the frame's own motion (transmissibility); only for "base".
+        slipping : elements with sliders, and those that yield, act with the stiffness that is left once all of them
+            slip; False: with that at u = 0, stuck.
 
         Returns
         -------
@@ -233,7 +236,7 @@ class Model(Printed, ModalEquations):
         from fembeam.response import frequency_response
 
         places = observed(self) if output is None else output
-        return frequency_response(self, omega, input, places, absolute, body)
+        return frequency_response(self, omega, input, places, absolute, body, slipping)
 
     def orbit(self, period: int = 1, start: ArrayLike | Orbit | None = None, shots: int | None = None) -> Orbit:
         """Find a periodic motion by shooting.

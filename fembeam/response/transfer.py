@@ -65,7 +65,13 @@ class FrequencyResponse:
 
 
 def frequency_response(
-    model: Model, omega: ArrayLike, driven: str | float, output: ArrayLike, absolute: bool, body: int
+    model: Model,
+    omega: ArrayLike,
+    driven: str | float,
+    output: ArrayLike,
+    absolute: bool,
+    body: int,
+    slipping: bool = False,
 ) -> FrequencyResponse:
     """The response of a model without its contacts; `Model.frequency_response` explains it."""
     driven = _named_base(model, driven)
@@ -73,11 +79,11 @@ def frequency_response(
     require(not absolute or moved, "absolute is for the input 'base'", driven, WHERE, "leave it out")
     if model.scene.named and isinstance(output, np.ndarray):
         output = output.tolist()
-    frequencies, places = _checked(omega, model), model.phi(output, 0, body)
+    frequencies, places = _checked(omega, model, slipping), model.phi(output, 0, body)
     if isinstance(driven, str) and driven.startswith("supports["):
         return _of_support(model, frequencies, driven, output, body)
     vector, power, said, unit = _driving(model, driven)
-    values = _solved(model, frequencies, vector) @ places.T
+    values = _solved(model, frequencies, vector, slipping) @ places.T
     values = (values.T * frequencies**power).T + (_carried_along(model, driven, output) if absolute else 0.0)
     shapes: Any = (model.shapes, *model.others)[body]
     if hasattr(shapes, "components"):
@@ -146,12 +152,12 @@ def _driving(model: Model, driven: Any) -> tuple[Vector, int, str, str]:
     return vector, 0, inputs[number], "m/m" if inputs[number].endswith("foot") else "m per unit"
 
 
-def _checked(omega: ArrayLike, model: Model) -> Vector:
+def _checked(omega: ArrayLike, model: Model, slipping: bool) -> Vector:
     """Frequencies (k,) at which the system is not singular."""
     values = np.atleast_1d(np.array(omega, dtype=float))
     valid = values.ndim == 1 and values.size > 0 and bool(np.all(np.isfinite(values) & (values >= 0)))
     require(valid, "omega must be at least 0 and finite, (k,)", omega, WHERE, "give frequencies in rad/s")
-    C, K = _linear(model)
+    C, K = _linear(model, slipping)
     natural = np.sqrt(np.maximum(np.linalg.eigvalsh(K), 0.0)) if model.scene.elements else model.omega
     singular = np.isin(values, natural[natural == 0.0] if np.any(C) else natural)
     require(not singular.any(), "omega must not be an undamped natural frequency", values[singular][:1].tolist(),
@@ -159,15 +165,15 @@ def _checked(omega: ArrayLike, model: Model) -> Vector:
     return values
 
 
-def _linear(model: Model) -> tuple[Vector, Vector]:
-    """C + G and K with the tangents of the elements."""
-    K, C = model.linear_elements
+def _linear(model: Model, slipping: bool) -> tuple[Vector, Vector]:
+    """C + G and K with the tangents of the elements, stuck or slipping."""
+    K, C = model.slipping_elements if slipping else model.linear_elements
     return model.system.by_rate + C, model.system.K + K
 
 
-def _solved(model: Model, omega: Vector, vector: Vector) -> NDArray[np.complex128]:
+def _solved(model: Model, omega: Vector, vector: Vector, slipping: bool) -> NDArray[np.complex128]:
     """Coordinates (k, n) of (K + iωC - ω²) q = vector, some frequencies at a time."""
-    C, K, one = *_linear(model), np.eye(len(vector))
+    C, K, one = *_linear(model, slipping), np.eye(len(vector))
     answers = []
     for part in np.array_split(omega, len(omega) * len(vector) ** 2 // AT_ONCE + 1):
         w = part[:, None, None]
