@@ -48,6 +48,7 @@ class Problem(NamedTuple):
     radius: Annotated[Any, "E"]  # m, of a circular clearance, negative of an outer one; 0 of a stop on a line
     first: Annotated[Any, "int E+1"]  # first row of each element, and the end
     element: Annotated[Any, "int R"]  # that each row belongs to
+    own: Annotated[Any, "int E"]  # place of an element's δ: its first row, or behind all rows that of a circle
     knots: Annotated[Any, "E, J"]  # m, between two segments, ascending: 0 (-inf if it always acts), knots, inf
     law: Annotated[Any, "int E"]  # addresses of the compiled forces
     gradient: Annotated[Any, "int E"]  # addresses of their derivatives

@@ -306,6 +306,7 @@ def _problem(system: System, forcing: Forcing, linear: dict[str, Array]) -> Prob
         radius=radii_of(contacts),
         first=first_rows(contacts),
         element=np.repeat(np.arange(m), [len(c.rows) for c in contacts]).astype(np.int64),
+        own=_own_places(contacts),
         law=np.array([c.law.address for c in contacts], dtype=np.int64),
         gradient=np.array([c.law.gradient_address for c in contacts], dtype=np.int64),
         parameters=law_parameters(system),
@@ -320,6 +321,13 @@ def _problem(system: System, forcing: Forcing, linear: dict[str, Array]) -> Prob
         parts=ADDRESSES,
         **vars(forcing),
     )
+
+
+def _own_places(contacts: Sequence[Contact]) -> Array:
+    """(E,) see `Problem.own`."""
+    first, circle = first_rows(contacts), radii_of(contacts) != 0.0
+    places: Array = np.where(circle, first[-1] + np.cumsum(circle) - 1, first[:-1]).astype(np.int64)
+    return places
 
 
 def most_borders(problem: Problem) -> int:

@@ -34,6 +34,9 @@ def begin_steps(problem, tables, state, scratch, stop):
             scratch.reference_speed[s] = max(scratch.reference_speed[s], speed)
         else:
             reached = 0.1 * dot(tables.rate_weight[problem.first[s]], scratch.norms, problem.k.size)
+            if problem.radius[s] != 0.0:
+                across = dot(tables.rate_weight[problem.first[s] + 1], scratch.norms, problem.k.size)
+                reached = math.hypot(reached, 0.1 * across)
             pressed = _PRESSED * pressed_speed(problem, tables, state, s, scratch.trial)
             scratch.reference_speed[s] = max(speed, reached, pressed, _LEAST)
         others |= before
