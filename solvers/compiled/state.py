@@ -9,7 +9,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from solvers.compiled.fields import packed_type, shapes_of
-from solvers.compiled.kernels import Problem, abs_dot, indentation, indentation_rate, inlined, inner, kernel
+from solvers.compiled.kernels import Problem, abs_dot, indentation, indentation_rate, inlined, inner, is_circle, kernel
 from solvers.compiled.parts import ADDRESSES
 from solvers.problem import Array, Contact, Forcing, Law, Status, System
 from solvers.problem import event_list as at
@@ -55,7 +55,7 @@ def surface_tolerance(problem, s, x):
     """Distance, m, within which a stop counts as on a knot: rounding of δ."""
     row = problem.first[s]
     size = abs(problem.gap[row]) + abs_dot(problem.read[row], x, 2 * problem.k.size)
-    if problem.radius[s] != 0.0:
+    if is_circle(problem, s):
         size += abs(problem.radius[s]) + abs(problem.gap[row + 1])
         size += abs_dot(problem.read[row + 1], x, 2 * problem.k.size)
     return 1e-15 * size + 1e-20
@@ -69,7 +69,7 @@ def rate_tolerance(problem, s, x):
     couple the modes; without their share a stop pressed at rest would enter and leave its surface forever.
     """
     found = _rounding_of_rate(problem, problem.first[s], x)
-    if problem.radius[s] != 0.0:
+    if is_circle(problem, s):
         found += _rounding_of_rate(problem, problem.first[s] + 1, x)
     return found
 
@@ -283,8 +283,9 @@ def gaps_of(contacts: Sequence[Contact]) -> Array:
 
 
 def radii_of(contacts: Sequence[Contact]) -> Array:
-    """(E,) radii of circular clearances, see `Problem`; 0 of stops on a line."""
-    return np.array([c.radius for c in contacts], dtype=float)
+    """(E,) radii of circular clearances, see `Problem`; (0,) if there is none."""
+    radii = np.array([c.radius for c in contacts], dtype=float)
+    return radii if radii.any() else np.empty(0)
 
 
 def _vectors(system: System) -> Array:
@@ -325,7 +326,7 @@ def _problem(system: System, forcing: Forcing, linear: dict[str, Array]) -> Prob
 
 def _own_places(contacts: Sequence[Contact]) -> Array:
     """(E,) see `Problem.own`."""
-    first, circle = first_rows(contacts), radii_of(contacts) != 0.0
+    first, circle = first_rows(contacts), np.array([c.radius != 0.0 for c in contacts], dtype=bool)
     places: Array = np.where(circle, first[-1] + np.cumsum(circle) - 1, first[:-1]).astype(np.int64)
     return places
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from solvers.compiled.kernels import dot, inlined, inner
+from solvers.compiled.kernels import dot, inlined, inner, is_circle
 from solvers.compiled.state import rate_tolerance, surface_tolerance
 from solvers.exponential.circles.flight import radial_polynomial
 from solvers.exponential.flight import ORDER
@@ -28,7 +28,7 @@ def first_root(problem, terms, s, x, longest, values, slopes):
 
     ``values`` and ``slopes`` are scratch for the coefficients of the polynomial and of its derivative.
     """
-    if problem.radius[s] != 0.0:
+    if is_circle(problem, s):
         radial_polynomial(problem, s, terms, values)
     else:
         _polynomial(problem, s, terms, values)

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from solvers.compiled.kernels import INTEGERS, MATRIX, PROBLEM, REAL, VECTOR, copy, entry, inner
+from solvers.compiled.kernels import INTEGERS, MATRIX, PROBLEM, REAL, VECTOR, copy, entry, inner, is_circle
 from solvers.compiled.packed import Packed, unpacker
 from solvers.compiled.state import (
     DIVERGED,
@@ -120,7 +120,7 @@ def advance_many(
         if not cursor[BEGUN]:
             _begin(problem, state, numbers, rest, parameters, starts[i])
             for s in range(gaps.shape[1] if gaps.size else 0):
-                if problem.radius[s] == 0.0:
+                if not is_circle(problem, s):
                     problem.gap[problem.first[s]] = gaps[i, s]
                 else:
                     problem.radius[s] = math.copysign(gaps[i, s], problem.radius[s])

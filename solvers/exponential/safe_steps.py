@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from solvers.compiled.kernels import copy, dot, indentation, indentation_rate, inlined, inner, merged
+from solvers.compiled.kernels import copy, dot, indentation, indentation_rate, inlined, inner, is_circle, merged
 from solvers.compiled.state import SAMPLED, STEPS, T
 from solvers.exponential.circles.flight import circle_is_near, span_of_circle, span_of_circle_at
 from solvers.exponential.energy.flight_balance import (
@@ -122,7 +122,7 @@ def _fly_unsampled(problem, tables, state, scratch, most, budget):
         for r in range(problem.gap.size if count % _REFRESH == 0 else 0):
             scratch.per_row[r] = weighted_norms(tables.acceleration_weight[r], tables, x)
         for s in range(problem.law.size):
-            if problem.radius[s] != 0.0:
+            if is_circle(problem, s):
                 span = min(span, span_of_circle(problem, tables, scratch, s, x))
                 continue
             row = problem.first[s]
@@ -156,7 +156,7 @@ def _near(problem, tables, scratch, x):
     near = False
     for s in range(problem.law.size):
         row = problem.first[s]
-        if problem.radius[s] != 0.0:
+        if is_circle(problem, s):
             near |= circle_is_near(problem, tables, scratch, s, x)
         else:
             near |= not motion_of_row(problem, tables, row, x)[0] + scratch.per_row[row] < 0.0
@@ -209,7 +209,7 @@ def _safe_span(problem, tables, state, scratch, span, rest, renew):
         for r in range(problem.gap.size):
             scratch.per_row[r] = _acceleration_bound(problem, tables, r, scratch.norms, scratch.signal_bounds, rest)
     for s in range(problem.law.size):
-        if problem.radius[s] != 0.0:
+        if is_circle(problem, s):
             span = min(span, span_of_circle_at(problem, state, scratch, s))
             continue
         g, v = -indentation(problem, s, state.x), -indentation_rate(problem, s, state.x)

@@ -33,6 +33,7 @@ from solvers.compiled.kernels import (
     indentation_rate,
     inlined,
     inner,
+    is_circle,
     merged,
     off_knots,
 )
@@ -64,7 +65,7 @@ def _alone(problem, tables, state):
     for s in range(state.segment.size):
         if state.segment[s] > 0:
             alone, count = s, count + 1
-    inlined_law = count == 1 and tables.power_law[alone, EXPONENT] > 0.0 and problem.radius[alone] == 0.0
+    inlined_law = count == 1 and tables.power_law[alone, EXPONENT] > 0.0 and not is_circle(problem, alone)
     return alone if inlined_law else -1
 
 
@@ -174,7 +175,7 @@ def step_error(problem, tables, state, scratch, node_set, level, rtol):
         if state.segment[s] == 0:
             continue
         combine(tables.summary[node_set], scratch.force[u], S, None, scratch.summary[u, 0])
-        if problem.radius[s] != 0.0 and u == problem.first[s]:
+        if is_circle(problem, s) and u == problem.first[s]:
             own = problem.own[s]
             combine(tables.summary[node_set], scratch.law_force[own], S, None, scratch.summary[own, 0])
         largest, stiffness = _largest(problem, tables, state, scratch, s)
@@ -188,7 +189,7 @@ def step_error(problem, tables, state, scratch, node_set, level, rtol):
         if unresolved == 0.0:
             continue
         ripple = ripple_of(tables.ripple_weight[u], tables.alias[tables.kind[node_set], level], state.x, n)
-        damped = scratch.viscous[s] > 0.0 and problem.radius[s] == 0.0  # across a circle's radius nothing damps
+        damped = scratch.viscous[s] > 0.0 and not is_circle(problem, s)  # across a circle's radius nothing damps
         span = h * _undamped_part(problem, tables, scratch, node_set, h, s) if damped else h
         scratch.unresolved[u] = span * (unresolved + 0.03 * stiffness * ripple)
     _sum_errors(problem, tables, scratch, node_set, state.now[T], h)

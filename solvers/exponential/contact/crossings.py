@@ -28,6 +28,7 @@ from solvers.compiled.kernels import (
     indentation_rate,
     inlined,
     inner,
+    is_circle,
     merged,
     push_of,
 )
@@ -127,7 +128,7 @@ def _bound_rates(problem, tables, state, scratch, h):
 @merged
 def _stays_away(problem, state, scratch, s, h):
     """Whether a stop out of contact cannot be reached on the step; its motion is set to that at the start."""
-    if problem.radius[s] != 0.0:
+    if is_circle(problem, s):
         return stays_in_circle(problem, state, scratch, s, h)
     delta, rate, row = scratch.start_motion[s, 0], scratch.start_motion[s, 1], problem.first[s]
     store8(scratch.motion[row, 0], 0, splat8(delta))
@@ -147,7 +148,7 @@ def _watch(problem, tables, state, scratch, node_set, level, s, carried):
             motion_at_nodes(problem, scratch, r, problem.gap[r], scratch.motion[r])
         else:
             respond(problem, tables, state, scratch, node_set, level, r)
-    if problem.radius[s] != 0.0:
+    if is_circle(problem, s):
         radial_nodes(problem, scratch, s)
     return carried or through
 

@@ -20,7 +20,18 @@ import math
 import numpy as np
 
 from solvers.compiled.dop853_tableau import E3, E5, STAGES
-from solvers.compiled.kernels import abs_dot, copy, indentation, indentation_rate, inlined, inner, merged, raised, rhs
+from solvers.compiled.kernels import (
+    abs_dot,
+    copy,
+    indentation,
+    indentation_rate,
+    inlined,
+    inner,
+    is_circle,
+    merged,
+    raised,
+    rhs,
+)
 from solvers.compiled.parts import PASSED
 from solvers.compiled.renewals import margins_before, margins_in
 from solvers.compiled.state import (
@@ -170,7 +181,7 @@ def _accept(problem, tables, state, scratch, variable, stop, level, span, t_end,
     if state.event_record.shape[0]:
         write_event(state, LANDING, t, landed, span, variable, stop, w)
     state.now[T] = landed
-    if problem.radius[stop] != 0.0 and variable != TIME and landed < t_end:
+    if is_circle(problem, stop) and variable != TIME and landed < t_end:
         land_on_circle(problem, state, scratch, stop, level)
     if variable != ROOT or landed == t_end:  # at a knot the force may fall
         state_peaks(problem, state, scratch, state.x)

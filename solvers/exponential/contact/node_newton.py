@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import types
 
-from solvers.compiled.kernels import contact_gradient, copy, inner, merged
+from solvers.compiled.kernels import contact_gradient, copy, inner, is_circle, merged
 from solvers.compiled.parts import NEWTON, part
 from solvers.compiled.state import CALLS, acts, rate_tolerance
 from solvers.exponential.circles.contact import linearise_circle
@@ -29,7 +29,7 @@ def linearise(problem, tables, state, scratch, node_set, level):
     for r in range(problem.gap.size):
         if acts(problem, state, r):
             s = problem.element[r]
-            if problem.radius[s] == 0.0:
+            if not is_circle(problem, s):
                 _linearise_row(problem, tables, state, scratch, node_set, level, r, size)
             elif r == problem.first[s]:
                 linearise_circle(problem, tables, state, scratch, node_set, level, s, size)

@@ -6,7 +6,7 @@ import math
 from typing import Annotated, Any, NamedTuple
 
 from solvers.compiled.dop853_tableau import STAGES
-from solvers.compiled.kernels import inlined, inner, law_forces, merged, reordered, table_value
+from solvers.compiled.kernels import inlined, inner, is_circle, law_forces, merged, reordered, table_value
 from solvers.compiled.simd import largest8, load8, size8, splat8, store8
 from solvers.compiled.state import CALLS, T, acts
 from solvers.compiled.sums import above, combine
@@ -254,7 +254,7 @@ def respond(problem, tables, state, scratch, node_set, level, r):
 def own_accelerance(problem, tables, s):
     """-δ̈ of a stop per newton of its own, 1/kg; of a circle the larger one of its rows."""
     row = problem.first[s]
-    if problem.radius[s] != 0.0:
+    if is_circle(problem, s):
         return max(tables.accelerance[row, row], tables.accelerance[row + 1, row + 1])
     return tables.accelerance[row, row]
 
@@ -268,7 +268,7 @@ def motion_of(problem, scratch, s):
 @merged
 def force_of(problem, scratch, s):
     """(S,) force of stop s at the nodes."""
-    return scratch.force[problem.first[s]] if problem.radius[s] == 0.0 else scratch.law_force[problem.own[s]]
+    return scratch.force[problem.first[s]] if not is_circle(problem, s) else scratch.law_force[problem.own[s]]
 
 
 @inlined
@@ -276,7 +276,7 @@ def ripple_of_stop(problem, tables, s, alias, x):
     """The error of `ripple_of` of a stop's indentation."""
     row, n = problem.first[s], problem.k.size
     ripple = ripple_of(tables.ripple_weight[row], alias, x, n)
-    if problem.radius[s] != 0.0:
+    if is_circle(problem, s):
         ripple += ripple_of(tables.ripple_weight[row + 1], alias, x, n)
     return ripple
 
@@ -302,7 +302,7 @@ def rate_ripple_of(ripple_weight, k, alias, x, n):
 @inlined
 def node_forces(problem, state, scratch, s):
     """Forces of stop s on its rows at the nodes by its law, into ``scratch.law_force``."""
-    if problem.radius[s] != 0.0:
+    if is_circle(problem, s):
         radial_forces(problem, state, scratch, s)
         return
     motion, force = motion_of(problem, scratch, s), scratch.law_force[problem.first[s]]

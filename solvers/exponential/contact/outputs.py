@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from solvers.compiled.kernels import copy, indentation, inlined, inner, merged
+from solvers.compiled.kernels import copy, indentation, inlined, inner, is_circle, merged
 from solvers.compiled.simd import load8, splat8, sum8
 from solvers.compiled.state import (
     HEAD,
@@ -96,7 +96,7 @@ def finish_step(problem, tables, state, scratch, node_set, level):
             weighted = s == node_set - 1 and tables.weight_exponent[node_set] > 0.0
             weights = tables.weights[node_set] if weighted else tables.plain[node_set]
             impulses = load8(weights, 0) * load8(force, 0)
-            if problem.radius[s] != 0.0:
+            if is_circle(problem, s):
                 state.x[size + 2 + 2 * s] += work_in_circle(problem, tables, state, scratch, node_set, level, s)
             elif weighted or brief:
                 state.x[size + 2 + 2 * s] += h * sum8(impulses * load8(motion[1], 0))

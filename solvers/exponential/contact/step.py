@@ -21,6 +21,7 @@ from solvers.compiled.kernels import (
     indentation,
     indentation_rate,
     inlined,
+    is_circle,
     merged,
     rhs,
 )
@@ -120,7 +121,7 @@ def _predict(problem, tables, state, scratch, level):
     for s in range(problem.law.size):
         if state.segment[s] == 0:
             continue
-        if control[NEW] and problem.radius[s] != 0.0:
+        if control[NEW] and is_circle(problem, s):
             guess_radial_forces(problem, state, scratch, s)
             continue
         if control[NEW]:

@@ -10,7 +10,18 @@ from __future__ import annotations
 
 from numba import types
 
-from solvers.compiled.kernels import REAL, VECTOR, dot, inner, merged, push_of, raised, reordered, table_value
+from solvers.compiled.kernels import (
+    REAL,
+    VECTOR,
+    dot,
+    inner,
+    is_circle,
+    merged,
+    push_of,
+    raised,
+    reordered,
+    table_value,
+)
 from solvers.compiled.parts import WITHIN_STEP, part
 from solvers.compiled.simd import WIDTH, load8, splat8, store8, sum8
 from solvers.compiled.state import acts
@@ -155,7 +166,7 @@ def _add_works(problem, tables, state, scratch, row):
     for s in range(problem.law.size):
         if state.segment[s] > 0:
             row_of = problem.first[s]
-            if problem.radius[s] != 0.0:
+            if is_circle(problem, s):
                 work, impulse = work_within_circle(problem, tables, scratch, s, _PACE + 1)
                 row[size + 2 + 2 * s] += work
                 row[size + 3 + 2 * s] += impulse
