@@ -62,7 +62,7 @@ def _moved(part: Any, number: int, count: int) -> Any:
     changes: dict[str, Any] = {"z": (number, part.z)} if number else {}
     known = {one.name for one in fields(part)}
     for key in SECOND:
-        to = part.coordinate.to if key in known else None
+        to = part.coordinates[0].to if key in known else None
         if to is not None:
             body, place = to
             if number:
