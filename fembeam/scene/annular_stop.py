@@ -5,7 +5,6 @@ d = (W_1 u, W_2 u) - centre,    r = |d|,    δ = r - c,    force on the place -N
 Annotations are evaluated here, as in `part`.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -61,7 +60,7 @@ class AnnularStop(ScenePart):
     centre: tuple[float, float] = (0.0, 0.0)
     outer: bool = False
     on: Second | None = None
-    directions: Sequence[Any] | None = None
+    directions: tuple[Direction, Direction] | None = None
     always = False
     push = 0.0  # it has no one side
     word = "annular stop"
@@ -116,7 +115,7 @@ class AnnularStop(ScenePart):
     @property
     def coordinates(self) -> tuple[LocalCoordinate, ...]:
         """The two displacements it acts on."""
-        along: Sequence[Direction] = USUAL if self.directions is None else self.directions
+        along = USUAL if self.directions is None else self.directions
         found = local_coordinate(self.z, "displacement", self.on, self.where, "on", "x")
         return tuple(replace(found, direction=direction_of(one, self.where)) for one in along)
 
