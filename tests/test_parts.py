@@ -79,7 +79,7 @@ def test_two_threads_compile_a_part_once(problem, monkeypatch):
 
 def test_every_place_has_a_function():
     importlib.import_module("solvers.exponential.method")
-    groups = parts.EVERY_RUN, parts.ENERGY, parts.BORDERS, parts.TWO_STOPS, parts.MANY_STOPS
+    groups = parts.EVERY_RUN, parts.ENERGY, parts.BORDERS, parts.TWO_STOPS, parts.MANY_STOPS, parts.CIRCLES
     assert sorted(place for group in groups for place in group) == list(range(len(parts.ADDRESSES)))
     assert sorted(parts._DECLARED) == list(range(len(parts.ADDRESSES)))
 

@@ -141,8 +141,8 @@ class Contact:
                 f"gap of an annulus, its clearance, must be positive and finite (m), got {self.gap!r}; "
                 "without a clearance it is a spring in each direction"
             )
-        law: Any = self.law
-        if self.always or bool(getattr(law, "memory", ())):
+        memory: Any = getattr(self.law, "memory", ())
+        if self.always or memory:
             raise ValueError(f"an annulus takes laws without memory that act for delta > 0, got {self.law!r}")
         centre = np.array(self.centre, dtype=float)
         if centre.shape != (2,) or not np.all(np.isfinite(centre)):
@@ -174,6 +174,19 @@ class Contact:
             return -np.asarray(q) @ self.direction - self.gap
         distance = np.linalg.norm(np.asarray(q) @ self.direction.T - self.centre, axis=-1)
         return self.gap - distance if self.outer else distance - self.gap
+
+    def slopes(self, q: Array, q_dot: Array) -> tuple[float, Array, Array]:
+        """δ̇ in m/s, and the gradients (n,) of δ by q and of δ̇ by q; that of δ̇ by q_dot is the first one.
+
+        Of an annulus ∇δ = Wᵀe, e = d/r, and ∇δ̇ = Wᵀ(ḋ - (e·ḋ) e)/r; of an outer one minus that.
+        """
+        if self.map == "line":
+            return float(-q_dot @ self.direction), -self.direction, np.zeros(self.direction.size)
+        d, d_dot = self.direction @ q - self.centre, self.direction @ q_dot
+        distance, sign = float(np.linalg.norm(d)), -1.0 if self.outer else 1.0
+        outward = d / distance
+        across = d_dot - (outward @ d_dot) * outward
+        return sign * float(outward @ d_dot), sign * outward @ self.direction, sign / distance * across @ self.direction
 
 
 @dataclass(frozen=True, eq=False)

@@ -150,7 +150,7 @@ def _rounding_of_surfaces(scene: Scene) -> Any:
     """Way, m, of every stop from its start that is rounding of its gap and of what is read."""
     contacts = scene.system.contacts
     sizes = [abs(c.gap) + np.abs(c.direction) @ np.abs(scene.q0) for c in contacts]
-    return 1e-14 * np.array(sizes)
+    return 1e-13 * np.array(sizes)
 
 
 def differences(a: dict[str, Any], b: dict[str, Any], measure: dict[str, Any], parts: int) -> dict[str, Any]:
