@@ -41,6 +41,9 @@ def _contact(directions: Vector, one: ContactRow) -> solvers.Contact:
     if not one.is_circle:
         return solvers.Contact(directions[0], one.law, one.gap, one.always, one.name)
     radius, *centre = one.circle
+    both = np.linalg.matrix_rank(directions) == 2
+    require(both, f"the modes must move the place of {one.name!r} along both directions", len(directions[0]), "Model",
+            "keep more modes: of a round section two for each shape")  # fmt: skip
     round_about: Any = {"map": "annulus", "centre": centre, "outer": radius < 0.0}
     return solvers.Contact(directions, one.law, one.gap, one.always, one.name, **round_about)
 
