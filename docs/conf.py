@@ -17,13 +17,25 @@ extensions = [
     "sphinx_gallery.gen_gallery",
     "docstrings",
     "course",
+    "mathml",
+    "formulas",
 ]
-exclude_patterns = ["_build", "_templates", "gallery/*.md5", "gallery/*.ipynb", "gallery/*.py"]
+exclude_patterns = [
+    "_build",
+    "_templates",
+    "gallery/*.md5",
+    "gallery/*.ipynb",
+    "gallery/*.py",
+    "**sg_execution_times.rst",
+]
 templates_path = ["_templates"]
 default_role = "py:obj"
 highlight_language = "none"  # indented blocks are formulas; code says its language
 suppress_warnings = ["config.cache"]  # the order of examples is a class of ours
 myst_heading_anchors = 3
+
+html_math_renderer = "mathml"
+myst_enable_extensions = ["dollarmath"]
 
 html_theme = "pydata_sphinx_theme"
 html_title = f"fembeam {version}"
@@ -63,5 +75,6 @@ sphinx_gallery_conf = {
     "show_memory": False,
     "show_signature": False,
     "min_reported_time": 1,
+    "write_computation_times": False,  # their table loads scripts from elsewhere
     "log_level": {"backreference_missing": "debug"},
 }

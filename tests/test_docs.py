@@ -153,7 +153,56 @@ def test_the_course_is_complete():
         assert not long or path.name == "failure_gallery.py", f"{path.name} is too long for one idea"
 
 
-@pytest.mark.skipif(not find_spec("sphinx_gallery"), reason="the extra 'docs' is not installed")
+WITH_SPHINX = pytest.mark.skipif(not find_spec("sphinx_gallery"), reason="the extra 'docs' is not installed")
+
+
+@pytest.fixture
+def formulas(monkeypatch):
+    monkeypatch.syspath_prepend(HOME / "docs" / "_ext")
+    return pytest.importorskip("formulas", exc_type=ImportError)
+
+
+@WITH_SPHINX
+@pytest.mark.parametrize(
+    ("plain", "latex"),
+    [
+        ("F = K δ^p (1 + a δ̇/δ̇⁻)", r"F = K δ^{p} (1 + a \dot{δ}/\dot{δ}^{-})"),
+        ("τ = √(v² + 2 B g)/B", r"τ = \sqrt{v^{2} + 2 B g}/B"),
+        ("Σ_{j≠i} r_j <= θ_(i)", r"\sum _{j\ne i} r_{j} \le  θ_{(i)}"),
+        ("δ_max = EI,    F = ∫₀¹ x dx", r"δ_{\mathrm{max}} = E I, \quad F = \int _{0}^{1} x d x"),
+        ("y = √Δω Re a_k", r"y = \sqrt{Δω} \mathrm{Re}\, a_{k}"),
+        ("r = a/(1 + a),    at all speeds", r"r = a/(1 + a), \quad \text{ at all speeds }"),
+    ],
+)
+def test_plain_formulas_are_typeset(formulas, plain, latex):
+    assert formulas.formula(plain) == latex
+    assert formulas.readable(latex)
+
+
+@WITH_SPHINX
+@pytest.mark.parametrize(
+    "text",
+    [
+        "model = scene.reduce(modes=2)",
+        'name = "stop"',
+        "grazing   a contact comes to touch",
+        "the rate = the speed of entry",
+        "F = √(1 + a",
+    ],
+)
+def test_what_is_no_formula_stays(formulas, text):
+    assert formulas.formula(text) is None or not formulas.readable(formulas.formula(text))
+
+
+@WITH_SPHINX
+def test_an_equation_that_cannot_be_read_is_named(formulas):
+    from mathml import converted
+
+    with pytest.raises(ValueError, match=r"no MathML can be made of the formula '.*unheard"):
+        converted(r"a = \unheard{b}", display=True)
+
+
+@WITH_SPHINX
 def test_site(tmp_path):
     """Without running the examples, which have a test of their own; links within the site hold."""
     shutil.copytree(HOME, tmp_path / "here", ignore=shutil.ignore_patterns(".*", "_build", "gallery", "generated"))
@@ -164,3 +213,9 @@ def test_site(tmp_path):
         for name in {*package.__all__} - {"plot", "study"}:
             page = tmp_path / "site" / "reference" / "generated" / f"{package.__name__}.{name}.html"
             assert f'id="{package.__name__}.{name}"' in page.read_text(encoding="utf-8")
+    pages = {path: path.read_text(encoding="utf-8") for path in (tmp_path / "site").rglob("*.html")}
+    loaded = r'<(?:script|img|iframe)[^>]+src="(?:https?:)?//|<link[^>]+rel="stylesheet"[^>]+href="(?:https?:)?//'
+    assert [path for path, page in pages.items() if re.search(loaded, page)] == []
+    typeset = (tmp_path / "site" / "explanation" / "equations.html").read_text(encoding="utf-8")
+    assert typeset.count("<math ") == len(re.findall(r"^\$\$$", text_of("docs/explanation/equations.md"), re.M)) / 2
+    assert "$$" not in typeset

@@ -249,6 +249,27 @@ def test_coupled_damping_balances():
         assert np.abs(run.energy.residual).max() < 1e-8 * handled
 
 
+class RoughNodes(Nodes):
+    """A signal whose values, slopes and curvatures at the nodes have nothing to do with one another."""
+
+    def nodes(self, duration, rtol):
+        """Rows [s, s', s'']."""
+        rows = np.random.default_rng(5).normal(size=(int(duration / 0.02) + 3, 3))
+        return 0.02, 20.0 * rows / np.array([1.0, 0.02, 0.02**2])
+
+
+@pytest.mark.parametrize("dashpot", [0.0, 4.0])
+def test_parts_of_cells_of_a_rough_signal_balance(dashpot):
+    """Flights that begin and end within a cell: the power of a quintic there is of the eleventh power of the time."""
+    direction = np.array([1.0, 0.5])
+    C = np.diag([0.4, 0.9]) + dashpot * np.outer(direction, direction)
+    system = System(np.eye(2), C, np.diag([20.0, 45.0]) ** 2, [Contact(direction, Hertz(1e5))],
+                    [([1.0, 0.4], RoughNodes())])  # fmt: skip
+    run = integrate(system, [0.0, 0.0], [0.0, 0.0], 1.0, 0.0173, Exponential(1e-11))
+    assert len(run.contacts) > 5
+    assert unaccounted(run) < 1e-12
+
+
 @pytest.mark.parametrize("law", [Hertz(1e6), PiecewiseLinear([1e4, 5e4], [1e-3])])
 @pytest.mark.parametrize("signal", [fb.Harmonic(30.0, 17.0), Nodes()])
 def test_the_ledger_leaves_the_motion_alone(law, signal):

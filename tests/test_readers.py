@@ -1,5 +1,6 @@
 """Files of other programs, made here from the description of each format: whole, truncated and foreign ones."""
 
+import contextlib
 import struct
 
 import numpy as np
@@ -51,6 +52,13 @@ def test_npz_is_refused_in_words(tmp_path):
     whole = good.read_bytes()
     with pytest.raises(ValueError, match=r"cut.npz, as a whole: expected arrays of numbers in a .npz"):
         read_matrices(written(tmp_path, "cut.npz", whole[: len(whole) // 2]))
+    one = tmp_path / "one.npz"
+    sparse.save_npz(one, sparse.csc_matrix(K))
+    for at in range(40, len(one.read_bytes()), 7):  # damaged anywhere: refused, or read as it was
+        damaged = bytearray(one.read_bytes())
+        damaged[at] ^= 0xFF
+        with contextlib.suppress(ValueError):
+            check(read_matrices(written(tmp_path, "damaged.npz", bytes(damaged))), labels=None)
     np.savez(tmp_path / "objects.npz", K=np.array([{}], dtype=object))
     with pytest.raises(ValueError, match=r"expected arrays of numbers in a .npz, got something else"):
         read_matrices(tmp_path / "objects.npz")
@@ -69,8 +77,14 @@ def test_matrix_market(tmp_path, suffix):
     lines = ["%%MatrixMarket matrix coordinate real symmetric", "% a comment", "4 4 8"]
     lines += [f"{i + 1} {j + 1} {value!r}" for i, j, value in entries(K)]
     check(read_matrices(written(tmp_path, f"K{suffix}", "\n".join(lines))), labels=None)
-    with pytest.raises(ValueError, match=rf"cut{suffix}, its entries: expected as many as the sizes say"):
+    with pytest.raises(ValueError, match=rf"cut{suffix}, line 9: expected the last of 8 entries, got the last of 6"):
         read_matrices(written(tmp_path, f"cut{suffix}", "\n".join(lines[:-2])))
+    with pytest.raises(ValueError, match=rf"cut{suffix}, line 5: expected row, column, value, got '2 1 '"):
+        read_matrices(written(tmp_path, f"cut{suffix}", "\n".join([*lines[:4], "2 1 "])))
+    with pytest.raises(ValueError, match=r"line 4: expected a row from 1 to 4 and a column from 1 to 4, got '5 1 1.0'"):
+        read_matrices(written(tmp_path, f"out{suffix}", "\n".join([*lines[:3], "5 1 1.0", *lines[4:]])))
+    with pytest.raises(ValueError, match=r"line 2: expected rows, columns, entries, got '4 4'"):
+        read_matrices(written(tmp_path, f"out{suffix}", f"{lines[0]}\n4 4\n"))
     with pytest.raises(ValueError, match=r"line 1: expected a real matrix, general or symmetric, got complex"):
         read_matrices(
             written(tmp_path, f"c{suffix}", "%%MatrixMarket matrix coordinate complex hermitian\n1 1 1\n1 1 1 0")
@@ -251,6 +265,8 @@ def test_dmig_names_scalar_points_modes(tmp_path):
 
 
 def test_dmig_is_refused_in_words(tmp_path):
+    with pytest.raises(ValueError, match=r"expected columns of KAAX after its head, got none; is the file truncated"):
+        read_matrices(written(tmp_path, "k.pch", "DMIG    KAAX           0       6       2       0\n"))
     good = dmig([("K", K)]).splitlines()
     with pytest.raises(
         ValueError, match=r"k.pch, line 3: expected a head DMIG, name, 0, form, type before the columns, got K"
@@ -382,6 +398,11 @@ def test_harwell_boeing(tmp_path, kind, part):
     check(read_matrices(path))
 
 
+def test_harwell_boeing_of_scipy(tmp_path):
+    io.hb_write(tmp_path / "K.hb", sparse.csc_matrix(K / 3.0))  # fields narrower than its head says
+    check(read_matrices(tmp_path / "K.hb"), K / 3.0, labels=None)
+
+
 def test_harwell_boeing_is_refused_in_words(tmp_path):
     lines = harwell_boeing(K).splitlines()
     for end in (2, 4, 5, len(lines) - 1):
@@ -468,6 +489,12 @@ def test_mass_follows_the_order_of_the_stiffness(tmp_path):
     io.mmwrite(tmp_path / "I.mtx", np.eye(3))
     with pytest.raises(ValueError, match=r"I.mtx, its matrix: expected the size of K.mtx, 4 dofs, got 3"):
         Structure.read(stiff, tmp_path / "I.mtx")
+
+
+def test_one_matrix_is_not_stiffness_and_mass(tmp_path):
+    np.savez(tmp_path / "cut.npz", K=K, labels=np.array(LABELS))
+    with pytest.raises(ValueError, match=r"cut.npz, as a whole: expected a stiffness and a mass, got K for both"):
+        Structure.read(tmp_path / "cut.npz", tmp_path / "cut.npz")
 
 
 def test_labels_from_files(tmp_path):

@@ -310,3 +310,12 @@ def test_the_table_campbell_writes_its_answer(tmp_path):
     path.write_text(f"{ROTOR}[campbell]\nspins = [300, 0]\n", encoding="utf-8")
     with pytest.raises(scene_file.SceneFileError, match=r"spins must be two values, ascending"):
         scene_file.read(path)
+
+
+def test_half_a_pair_of_a_shaft_at_rest_is_told_and_moves_along_x():
+    straight = fb.Frame.straight(1.0, fb.Section.circle(2.1e11, 7850.0, 0.02))
+    with pytest.warns(UserWarning, match=r"3 modes cut a pair of one frequency, 569.834 rad/s, that move") as said:
+        model = fb.Scene(straight, [fb.Clamped("A")]).reduce(3)
+    assert said[0].filename == __file__
+    np.testing.assert_allclose(model.phi(("B", "y"))[[0, 2]], 0.0, atol=1e-8)
+    assert np.all(np.abs(model.phi(("B", "x"))[[0, 2]]) > 1.0)

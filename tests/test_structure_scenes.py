@@ -347,9 +347,9 @@ def test_bad_input_is_refused_in_a_sentence(make, message):
 def test_what_has_no_meaning_says_so(runs, tmp_path):
     run = runs[1]
     for ask in (run.moment, run.shear, run.stress, run.slope):
-        with pytest.raises(ValueError, match="is of a Beam, which has sections"):
+        with pytest.raises(ValueError, match="is of a Beam or a Frame, which have sections"):
             ask("tip")
-    with pytest.raises(ValueError, match="is of a Beam, which has sections"):
+    with pytest.raises(ValueError, match="is of a Beam or a Frame, which have sections"):
         run.extremes("moment")
 
 

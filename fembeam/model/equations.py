@@ -19,7 +19,7 @@ import reduction
 import solvers
 from fembeam.model import initial_states
 from fembeam.model.shapes import Vector
-from fembeam.scene import contact_rows, loads, signals_of, static_rows, tangent, weight
+from fembeam.scene import contact_rows, loads, signals_of, static_rows, support_loads, tangent, weight
 from fembeam.scene.contact_rows import ContactRow
 from fembeam.support import require
 
@@ -28,7 +28,13 @@ if TYPE_CHECKING:
     from fembeam.scene import Matrices, Scene
     from fembeam.structures import FrameForces, JoinedForces
 
-SEEN = ("forces", "springs", "bodies", "impactors")  # parts of a scene besides those with laws that make a system
+SEEN = (
+    "supports",
+    "forces",
+    "springs",
+    "bodies",
+    "impactors",
+)  # parts of a scene besides those with laws that make a system
 
 
 def _placed(part: Any) -> tuple[Any, ...]:
@@ -177,13 +183,27 @@ class ModalEquations:
     def system_of(self, scene: Scene) -> solvers.System:
         """The problem of a scene that differs from the model's in loads, gaps and laws only."""
         n = len(self.omega)
-        C = np.diag(self._of_each_beam(lambda damping, omega, modes: damping.modal_coefficients(omega, modes), scene))
-        C = C + self.basis.project_matrix(self.matrices.dashpots)
+        C = np.diag(self._damping_of(scene)) + self.basis.project_matrix(self.matrices.dashpots)
         same = self.contact_rows if scene is self.scene else contact_rows(scene, self.matrices)
         contacts = [_contact(self.directions[own], one) for own, one in zip(self.rows_of, same, strict=True)]
         rows = [(self.basis.project(row.T)[:, 0], signal) for row, signal in loads(scene, self.matrices)]
+        for i, q in enumerate(self.following):  # damping acts on what does not follow the supports
+            vector, signal = rows[3 * i + 1]
+            rows[3 * i + 1] = vector + self._damping_of(scene) * q, signal
         pushed = [*rows, *self._frame_loads(scene)]
         return solvers.System(np.eye(n), C, np.diag(self.omega**2), contacts, pushed, self.turning)
+
+    def _damping_of(self, scene: Scene) -> Vector:
+        """2 ζ ω (n,) of the structure without dashpots."""
+        return self._of_each_beam(lambda damping, omega, modes: damping.modal_coefficients(omega, modes), scene)
+
+    @cached_property
+    def following(self) -> Vector:
+        """(k, n): coordinates of the shapes by which the structure follows a unit motion of each moving support dof."""
+        rows = [row for row, _ in support_loads(self.scene, self.matrices)[::3]]
+        projected = np.array([self.basis.project(row.T)[:, 0] for row in rows]).reshape(len(rows), len(self.omega))
+        square = np.where(self.omega > 0.0, self.omega**2, np.inf)
+        return np.asarray(projected / square)
 
     @cached_property
     def turning(self) -> Vector | None:
@@ -196,7 +216,7 @@ class ModalEquations:
     def _frame_loads(self, scene: Scene) -> list[tuple[Vector, Any]]:
         """Loads of base motion and gravity."""
         moved = [(-self.participation_along(one), motion.derivative(2)) for one, motion in scene.motions.items()]
-        return moved + ([] if scene.gravity == 0.0 else [(-self.participation_along("y"), weight(scene))])
+        return moved + [(-self.participation_along(one), g) for one, g in weight(scene).items()]
 
     def system_like(self, scene: Scene) -> solvers.System:
         """The same as `system_of`, quicker where only base motion, gaps and laws of its stops and elements differ."""
@@ -205,7 +225,7 @@ class ModalEquations:
         if (
             any(_placed(new) != _placed(old) for new, old in zip(parts, known, strict=True))
             or any(getattr(scene, name) != getattr(self.scene, name) for name in SEEN)
-            or (*scene.motions, scene.gravity == 0.0) != (*self.scene.motions, self.scene.gravity == 0.0)
+            or ([*scene.motions], [*scene.pulls]) != ([*self.scene.motions], [*self.scene.pulls])
         ):
             return self.system_of(scene)
         contacts = [

@@ -87,7 +87,7 @@ class Histories:
         """All components (k, c) of a place, m and rad: those of `shapes.components`; of a beam u and u_z."""
         shapes = self._beam(body)
         if isinstance(shapes, PlacedShapes):
-            return self._at_samples(self.q) @ shapes.motion(place).T
+            return self.with_supports(self.q, shapes.moving) @ shapes.motion_with_supports(place).T
         return self._at_samples(self.q) @ np.array([shapes(place), shapes(place, 1)]).T
 
     def _motion(self, rates: Vector, z: Any, direction: Any, body: int, absolute: bool, order: int) -> Vector:
@@ -101,7 +101,11 @@ class Histories:
             at = directed(z, direction)
         else:
             require(direction in (None, "y"), "a Beam moves along y", direction, "Run", "leave the direction out")
-        values = self._at_samples(rates) @ shapes(at).T
+        if isinstance(shapes, PlacedShapes):
+            rows = shapes.rows_with_supports(at if isinstance(at, list) else [at])
+            values = self.with_supports(rates, shapes.moving, order) @ (rows if isinstance(at, list) else rows[0]).T
+        else:
+            values = self._at_samples(rates) @ shapes(at).T
         if not absolute:
             return values
         if not isinstance(shapes, PlacedShapes):
@@ -109,6 +113,11 @@ class Histories:
         ways = [split(one, shapes.components)[1] for one in (at if isinstance(at, list) else [at])]
         moved = np.array([frame_motion(self, order, way) for way in ways]).T
         return values + (moved if isinstance(at, list) else moved[:, 0])
+
+    def with_supports(self, rates: Vector, moving: int, order: int = 0) -> Vector:
+        """Coordinates (k, n) or derivatives of them, then the same derivative of each support dof that moves."""
+        values = self._at_samples(rates)
+        return np.hstack([values, self.readout.loads[order : 3 * moving : 3].T]) if moving else values
 
     def slope(self, z: ArrayLike, body: int = 0) -> Vector:
         """u_z(z, t), rad."""
@@ -142,7 +151,7 @@ class Histories:
 
         self._beam(body)
         forces = frame_forces_of(self, body)
-        values = self._at_samples(self.q) @ forces.rows(place).T
+        values = self._q_of(body) @ forces.rows(place).T
         return {name: values[:, i] + forces.preload(place, name) for i, name in enumerate(forces.names_at(place))}
 
     def extremes(self, quantity: str = "displacement", z: ArrayLike | None = None, body: int = 0) -> Extremes:
@@ -162,9 +171,13 @@ class Histories:
             if given is None:
                 given = list(shapes.usual.values()) if quantity == "displacement" else self._sections(body)
             at = [given] if isinstance(given, tuple) else list(given)
-            return extremes(self.t, self._at_samples(self.q), *rows_of(self, quantity, at, body))
+            return extremes(self.t, self._q_of(body), *rows_of(self, quantity, at, body))
         places = shapes.nodes if z is None else np.atleast_1d(np.asarray(z, dtype=float))
         return extremes(self.t, self._at_samples(self.q), *rows_of(self, quantity, places, body))
+
+    def _q_of(self, body: int) -> Vector:
+        """Coordinates at the samples, with the support dofs that move where a body has places by name."""
+        return self.with_supports(self.q, getattr(self._beam(body), "moving", 0))
 
     def _sections(self, body: int) -> list[Any]:
         """All nodes of the mesh of a frame, as (member, distance)."""
@@ -185,7 +198,7 @@ class Histories:
 
         if isinstance(self._beam(body), PlacedShapes):
             shapes, _, offset = rows_of(self, quantity, z if isinstance(z, list) else [z], body)
-            along = self._at_samples(self.q) @ shapes.T + offset
+            along = self._q_of(body) @ shapes.T + offset
             return along if isinstance(z, list) else along[:, 0]
         places = np.asarray(z, dtype=float)
         shapes, _, offset = rows_of(self, quantity, np.atleast_1d(places), body)

@@ -15,7 +15,7 @@ from scipy.sparse import linalg as sparse_linalg
 
 import reduction
 from contacts.path import borders
-from fembeam.scene import BodyMatrices, tangent
+from fembeam.scene import BodyMatrices, support_loads, tangent
 from fembeam.support import require, require_finite
 
 if TYPE_CHECKING:
@@ -33,8 +33,13 @@ MOST_STEPS = 2000
 
 
 def rest(model: ModalEquations) -> Vector:
-    """[q, q_dot] (2n,): zero but for the impactors' velocities."""
-    start = np.zeros(2 * len(model.omega))
+    """[q, q_dot] (2n,): zero but for the impactors' velocities, and for supports that move, which all follow."""
+    n = len(model.omega)
+    start = np.zeros(2 * n)
+    for i, shape in enumerate(model.following):
+        displacement, speed, _ = (signal for _, signal in support_loads(model.scene, model.matrices)[3 * i : 3 * i + 3])
+        start[:n] += float(np.squeeze(displacement(np.zeros(1)))) * shape
+        start[n:] += float(np.squeeze(speed(np.zeros(1)))) * shape
     if impactors := model.matrices.impactors:
         start[-len(impactors) :] = [np.sqrt(impactor.mass) * impactor.velocity for impactor in impactors]
     return start
@@ -128,9 +133,9 @@ def _check_impactors(model: Model, q: Vector) -> None:
 def equilibrium(model: Model, loads: Mapping[float, float]) -> Vector:
     """Start from static equilibrium; `Model.equilibrium` explains it."""
     start, n = rest(model), len(model.omega)
-    load = np.zeros(n)
-    if model.scene.gravity or not model.scene.named:
-        load = -model.participation_along("y") * model.scene.gravity
+    load = model.omega**2 * start[:n] if len(model.following) else np.zeros(n)
+    for direction, g in model.scene.pulls.items():
+        load = load - model.participation_along(direction) * g
     for z, force in loads.items():
         require_finite(f"force at z = {z} m", force, "Model.equilibrium", "give N, positive up")
         load = load + force * model.phi(z)

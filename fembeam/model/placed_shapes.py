@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -27,7 +27,8 @@ class PlacedShapes:
     components : what a place has, of x, y, z, rx, ry, rz. known : the places (p,).
     usual : {name: (place, direction)} that tables and figures show unasked.
     positions : (p, 3) m, NaN where unknown. lines : (k, 2) numbers of places that figures join.
-    more : what gives (c, n) at places that are not among them, None of a run read from a file.
+    more : what gives (c, n + k) at places that are not among them, None of a run read from a file.
+    carried : (p, c, k) what supports that move carry along by themselves, per unit of each of their k dofs.
     """
 
     components: tuple[str, ...]
@@ -37,16 +38,34 @@ class PlacedShapes:
     positions: Vector
     lines: NDArray[np.int64]
     more: Callable[[Any], Vector] | None = field(default=None, repr=False)
+    carried: Vector = field(default_factory=lambda: np.zeros((0, 0, 0)), repr=False)
 
     def __repr__(self) -> str:
         return f"<{self.values.shape[2]} shapes at {len(self.known)} places>"
 
     @property
+    def moving(self) -> int:
+        """Number k of the dofs of supports that move, of all bodies."""
+        return int(self.carried.shape[2])
+
+    @cached_property
+    def whole(self) -> Vector:
+        """(p, c, n + k): the values, then what supports carry."""
+        return np.concatenate([self.values, self.carried], axis=2) if self.moving else self.values
+
+    @property
     def words(self) -> dict[str, Any]:
         """All but the values, for JSON."""
         positions = [None if np.isnan(at).any() else at.tolist() for at in self.positions]
-        return {"components": self.components, "places": self.known, "usual": list(self.usual.items()),
-                "positions": positions, "lines": self.lines.tolist()}  # fmt: skip
+        carried = [[*map(int, at), float(self.carried[tuple(at)])] for at in np.argwhere(self.carried)]
+        words = {"components": self.components, "places": self.known, "usual": list(self.usual.items())}
+        return {
+            **words,
+            "positions": positions,
+            "lines": self.lines.tolist(),
+            "moving": self.moving,
+            "carried": carried,
+        }
 
     @classmethod
     def of_words(cls, words: Mapping[str, Any], values: Vector) -> PlacedShapes:
@@ -58,18 +77,26 @@ class PlacedShapes:
             raise ValueError("positions and lines must be of its places")
         usual = {str(name): tuples(at) for name, at in words["usual"]}
         whole = values.reshape(len(known), len(components), values.shape[1])
-        return cls(components, known, whole, usual, np.array(positions, dtype=float).reshape(-1, 3), lines)
+        carried = np.zeros((len(known), len(components), int(words.get("moving", 0))))
+        for *at, value in words.get("carried", ()):
+            carried[tuple(at)] = value
+        placed_at = np.array(positions, dtype=float).reshape(-1, 3)
+        return cls(components, known, whole, usual, placed_at, lines, carried=carried)
 
     def motion(self, place: Any) -> Vector:
         """All components (c, n) of a place; ValueError for one that does not exist."""
+        return self.motion_with_supports(place)[:, : self.values.shape[2]]
+
+    def motion_with_supports(self, place: Any) -> Vector:
+        """The same (c, n + k), with what supports that move carry."""
         place = tuple(place) if isinstance(place, list) else place
         if place in self.known:
-            return np.asarray(self.values[self.known.index(place)])
+            return np.asarray(self.whole[self.known.index(place)])
         if self.more is not None:
             return self.more(place)
         of_others = [one for one in self.known if is_pair(one) and is_whole(one[0]) and one[1] == place]
         if len(of_others) == 1:  # of joined bodies the one that has this name
-            return self.motion(of_others[0])
+            return self.motion_with_supports(of_others[0])
         require(
             False, f"a place must be one that the run keeps; {nearest(place, self.known)}", place, "Run", "use that"
         )
@@ -84,10 +111,18 @@ class PlacedShapes:
 
     def row(self, at: Any) -> Vector:
         """(n,) of one (place, direction)."""
+        return self.rows_with_supports([at])[0, : self.values.shape[2]]
+
+    def rows_with_supports(self, at: list[Any]) -> Vector:
+        """(j, n + k) of such pairs, with what supports that move carry."""
+        return np.array([self._row(one) for one in at]).reshape(len(at), self.whole.shape[2])
+
+    def _row(self, at: Any) -> Vector:
+        """(n + k,) of one."""
         place, along = split(at, self.components)
         require_components(along, self.components, f"the place {told(place)}", "phi")
         part = np.array([along[COMPONENTS.index(component)] for component in self.components])
-        return np.asarray(part @ self.motion(place))
+        return np.asarray(part @ self.motion_with_supports(place))
 
 
 def tuples(value: Any) -> Any:
@@ -96,34 +131,42 @@ def tuples(value: Any) -> Any:
 
 
 def _motion_at(body: BodyMatrices, vectors: Vector, place: Any) -> Vector:
-    """All components (c, n) of any place of a body."""
+    """All components (c, n + k) of any place of a body, of vectors (N_all, n + k)."""
     body.beam.check_place(place, "phi")
-    return np.asarray(body.rows_at(place) @ vectors)
+    return np.asarray(body.assembled.rows(place) @ vectors)
 
 
-def placed_shapes(body: BodyMatrices, vectors: Vector, loaded: Sequence[LocalCoordinate]) -> PlacedShapes:
-    """The shapes of a body from its part of the basis, (N, n)."""
+def placed_shapes(
+    body: BodyMatrices, vectors: Vector, loaded: Sequence[LocalCoordinate], moving: tuple[int, int, int] = (0, 0, 0)
+) -> PlacedShapes:
+    """The shapes of a body from its part of the basis, (N, n); `moving` of all support dofs which are its own."""
     extra = [at.z for at in loaded] + [at.to[1] for at in loaded if at.to is not None and at.to[0] == 0]
     joined = list(getattr(body.beam, "edges", ()))
     drawn = [place for pair in joined for place in pair]
     names = list(dict.fromkeys([*_places(body), *(tuple(z) if isinstance(z, list) else z for z in extra), *drawn]))
     number = {name: i for i, name in enumerate(names)}
-    values = np.asarray(body.assembled.rows_of(names) @ (body.spread @ vectors))
-    shape = (len(names), len(body.beam.components), vectors.shape[1])
+    n, (count, first, last) = vectors.shape[1], moving
+    full = np.zeros((body.spread.shape[0], n + count))
+    full[:, :n] = body.spread @ vectors
+    if last > first:
+        full[:, n + first : n + last] = body.carried.toarray()
+    shape = (len(names), len(body.beam.components), n + count)
+    values = np.asarray(body.assembled.rows_of(names) @ full).reshape(shape)
     at = [body.beam.position(place) for place in names]
     positions = np.array([3 * [np.nan] if x is None else x for x in at], dtype=float).reshape(-1, 3)
     edges = [(number[a], number[b]) for a, b in joined]
     made = PlacedShapes(
         tuple(body.beam.components),
         tuple(names),
-        values.reshape(shape),
+        values[:, :, :n],
         _usual(body, loaded),
         positions,
         np.array(edges, dtype=int).reshape(-1, 2),
-        partial(_motion_at, body, vectors),
+        partial(_motion_at, body, full),
+        values[:, :, n:],
     )
-    moving = {name: at for name, at in made.usual.items() if np.any(made(at))}
-    return replace(made, usual=dict(list((moving or made.usual).items())[:USUAL]))
+    seen = {name: at for name, at in made.usual.items() if np.any(made(at))}
+    return replace(made, usual=dict(list((seen or made.usual).items())[:USUAL]))
 
 
 def _places(body: BodyMatrices) -> list[Any]:

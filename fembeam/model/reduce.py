@@ -7,18 +7,22 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 import reduction
 from fembeam.model.model import Model
 from fembeam.model.placed_shapes import PlacedShapes, placed_shapes
 from fembeam.model.shapes import Shapes
-from fembeam.scene import MOST_DENSE, BodyMatrices, LocalCoordinate, Matrices, loaded, watched
+from fembeam.scene import MOST_DENSE, BodyMatrices, LocalCoordinate, Matrices, carried_by, loaded, watched
 from fembeam.structures import COMPONENTS
 from fembeam.support import is_whole, require
+from solvers.problem import counted
 
 if TYPE_CHECKING:
     from fembeam.scene import Scene
+
+Vector = NDArray[np.float64]
 
 DEFAULT_MODES = 2
 COARSE = 0.01  # estimated relative error of the highest kept frequency, above which elements as asked get a warning
@@ -47,10 +51,10 @@ def reduced(
     if omega_max is not None or mass_share is not None:
         modes = _enough(scene, elements, omega_max, mass_share)
     matrices, chosen = _chosen(scene, DEFAULT_MODES if modes is None else modes, elements, interface)
-    bases = [
-        _oriented(_of_beam(beam, loaded(scene, body), own, residual, interface), beam, watched(scene, body))
-        for body, (beam, own) in enumerate(zip(matrices.beams, chosen, strict=True))
-    ]
+    bases = []
+    for body, (beam, own) in enumerate(zip(matrices.beams, chosen, strict=True)):
+        basis = _of_beam(beam, loaded(scene, body), own, residual, interface)
+        bases.append(_oriented(basis, beam, watched(scene, body)))
     if elements is not None and not isinstance(modes, str):
         _warn_of_the_mesh(matrices, max(basis.omega[min(len(chosen[0]), basis.count) - 1] for basis in bases))
     again = "all" if isinstance(modes, str) else len(chosen[0]) if interface else chosen[0]
@@ -63,10 +67,9 @@ def reduced(
     ]
     basis = _joined(bases, matrices)
     _warn_of_drift(scene, matrices, bases)
-    _warn_of_cut_pairs(matrices, chosen)
-    own, *others = _shapes_of_each(scene, matrices, basis)
+    shapes, *others = _shapes_of_each(scene, matrices, basis)
     modes_of_all = sum(numbers, ()) + (0,) * len(matrices.impactors)
-    return Model(scene, matrices, basis, modes_of_all, own, counts, tuple(others), options)
+    return Model(scene, matrices, basis, modes_of_all, shapes, counts, tuple(others), options)
 
 
 def _of_beam(
@@ -74,11 +77,27 @@ def _of_beam(
 ) -> reduction.Basis:
     """The basis of one beam by itself, static shapes where it is loaded included."""
     if interface:
-        return reduction.craig_bampton(beam.M, beam.K, _rows(beam, places).T, len(chosen), beam.root)
-    basis = reduction.modal_basis(beam.M, beam.K, indices=chosen, root=beam.root)
-    if residual and places:
-        basis = reduction.with_residual(basis, beam.M, beam.K, _rows(beam, places).T, beam.root)
+        basis = reduction.craig_bampton(beam.M, beam.K, _rows(beam, places).T, len(chosen), beam.root)
+        if beam.coupling is None:
+            return basis
+        return reduction.with_residual(basis, beam.M, beam.K, beam.coupling[::3].T, beam.root)
+    basis = _modes(beam, chosen)
+    rows = [_rows(beam, places)] if residual and places else []
+    if beam.coupling is not None:  # the static shapes of supports that move
+        rows.append(beam.coupling[::3])
+    if rows:
+        basis = reduction.with_residual(basis, beam.M, beam.K, sparse.vstack(rows).T, beam.root)
     return basis
+
+
+def _modes(beam: Matrices, chosen: tuple[int, ...]) -> reduction.Basis:
+    """Modes by their numbers; of a body one more is computed, so that of a cut pair always the same one stays."""
+    size = beam.M.shape[0]
+    if not isinstance(beam, BodyMatrices) or chosen[-1] >= size:
+        return reduction.modal_basis(beam.M, beam.K, indices=chosen, root=beam.root)
+    wide = _along_axes(reduction.modal_basis(beam.M, beam.K, min(chosen[-1] + 2, size), root=beam.root), beam)
+    _warn_of_cut_pairs(beam, wide.omega, chosen)
+    return reduction.Basis(wide.vectors[:, list(chosen)], wide.omega[list(chosen)])
 
 
 def _rows(beam: Matrices, places: list[LocalCoordinate]) -> sparse.csr_matrix:
@@ -140,7 +159,8 @@ def _shapes_of_each(scene: Scene, matrices: Matrices, basis: reduction.Basis) ->
         size = beam.M.shape[0]
         mine = basis.vectors[done : done + size]
         if isinstance(beam, BodyMatrices):
-            shapes.append(placed_shapes(beam, mine, loaded(scene, number)))
+            every = carried_by(scene, len(scene.bodies))[1]
+            shapes.append(placed_shapes(beam, mine, loaded(scene, number), (every, *carried_by(scene, number))))
         else:
             values = np.zeros((beam.dofs.size, basis.count))
             values[beam.dofs.ravel() >= 0] = mine
@@ -153,7 +173,7 @@ def _warn_of_drift(scene: Scene, matrices: Matrices, bases: list[reduction.Basis
     """Warn when loads may carry a structure away that neither supports nor stops from several sides hold."""
     for number, (part, beam, basis) in enumerate(zip((scene, *scene.bodies), matrices.beams, bases, strict=True)):
         count = int(np.sum(basis.omega == 0.0))
-        loads = bool(part.forces) or bool(scene.motions) or scene.gravity != 0.0
+        loads = bool(part.forces) or bool(scene.motions) or bool(scene.pulls)
         acting = [*part.stops, *(one for one in scene.acting if number and (one.coordinate.to or (0,))[0] == number)]
         if beam.named and count and loads and not part.elements and sum(len(one.coordinates) for one in acting) < 2:
             where = f"bodies[{number - 1}] of Scene" if number else "Scene"
@@ -162,16 +182,17 @@ def _warn_of_drift(scene: Scene, matrices: Matrices, bases: list[reduction.Basis
             warnings.warn(said, UserWarning, stacklevel=4)
 
 
-def _warn_of_cut_pairs(matrices: Matrices, chosen: list[tuple[int, ...]]) -> None:
-    """Warn when of two modes of a rotor with one frequency, in planes across each other, one is kept."""
-    for beam, own in zip(matrices.beams, chosen, strict=True):
-        if beam.gyroscopic is None or not own or own[-1] + 2 > beam.M.shape[0]:
+def _warn_of_cut_pairs(beam: Matrices, omega: Vector, chosen: tuple[int, ...]) -> None:
+    """Warn when of two modes of one frequency, such as those of a round section's two planes, one is kept."""
+    for i in chosen:
+        near = np.flatnonzero(np.abs(omega - omega[i]) < PAIR * omega[i])
+        if set(near.tolist()) <= set(chosen):
             continue
-        last, after = reduction.modal_basis(beam.M, beam.K, own[-1] + 2, root=beam.root).omega[-2:]
-        if after - last < PAIR * after:
-            whirl = f"{last:.6g} rad/s, which whirl together"
-            said = f"{len(own)} modes cut a pair of one frequency, {whirl}; ask for one more"
-            warnings.warn(said, UserWarning, stacklevel=4)
+        what = "which whirl together" if beam.gyroscopic is not None else "that move across each other"
+        cut = f"{counted(len(chosen), 'mode')} cut{'s' * (len(chosen) == 1)} a pair of one frequency"
+        said = f"{cut}, {omega[i]:.6g} rad/s, {what}; ask for one more"
+        warnings.warn(said, UserWarning, stacklevel=6)
+        return
 
 
 def _warn_of_the_mesh(matrices: Matrices, omega: float) -> None:

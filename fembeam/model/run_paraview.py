@@ -136,23 +136,25 @@ def _moved(run: Run) -> Callable[[int], dict[str, Vector]]:
     """Displacement and velocity of these places; section forces of a frame by itself."""
     rows = []
     for shapes in (run.shapes, *run.others):
-        values = np.zeros((len(shapes.known), 3, shapes.values.shape[2]))
+        values = np.zeros((len(shapes.known), 3, shapes.whole.shape[2]))
         for axis, name in enumerate("xyz"):
             if name in shapes.components:
-                values[:, axis] = shapes.values[:, shapes.components.index(name)]
+                values[:, axis] = shapes.whole[:, shapes.components.index(name)]
         rows.append(values[np.unique(shapes.lines)])
     moved = np.concatenate(rows)
     forces = run.readout.section_forces[0] if not run.others else None
     carried = {}
-    if isinstance(forces, FrameForces):
+    if isinstance(forces, FrameForces):  # of joined bodies places of structures have none
         places = [run.shapes.known[i] for i in np.unique(run.shapes.lines)]
         preload = {name: np.array([forces.preload(place, name) for place in places]) for name in forces.names}
         per_unit = np.array([forces.rows(place) for place in places])
         carried = {name: (per_unit[:, i], preload[name]) for i, name in enumerate(forces.names)}
 
+    q, q_dot = (run.with_supports(rates, run.shapes.moving, order) for order, rates in enumerate((run.q, run.q_dot)))
+
     def at(sample: int) -> dict[str, Vector]:
-        vectors = {"displacement": moved @ run.q[sample], "velocity": moved @ run.q_dot[sample]}
-        return vectors | {name: shapes @ run.q[sample] + constant for name, (shapes, constant) in carried.items()}
+        vectors = {"displacement": moved @ q[sample], "velocity": moved @ q_dot[sample]}
+        return vectors | {name: shapes @ q[sample] + constant for name, (shapes, constant) in carried.items()}
 
     return at
 

@@ -38,11 +38,11 @@ def _known(shapes: PlacedShapes) -> Vector:
 
 
 def displacements(shapes: PlacedShapes, q: Vector) -> Vector:
-    """(p, 3) of all places for coordinates q (n,), m."""
+    """(p, 3) of all places for coordinates q (n,), or (n + k,) with the support dofs that move, m."""
     moved = np.zeros((len(shapes.known), 3))
     for axis, name in enumerate("xyz"):
         if name in shapes.components:
-            moved[:, axis] = shapes.values[:, shapes.components.index(name)] @ q
+            moved[:, axis] = shapes.whole[:, shapes.components.index(name), : len(q)] @ q
     return moved
 
 
@@ -107,7 +107,7 @@ def deflected_figure(run: Run, t: float | None, scale: float | None, axes: Axes 
     """`deflected` of `fembeam.plot` explains it."""
     shapes = run.shapes
     sample = _sample(run, t)
-    moved = displacements(shapes, run._at_samples(run.q)[sample])
+    moved = displacements(shapes, run.with_supports(run.q, shapes.moving)[sample])
     largest = float(np.linalg.norm(moved, axis=1).max())
     require(scale is None or (is_finite(scale) and scale > 0), "scale must be above 0", scale, "deflected",
             "leave it out for one that shows well")  # fmt: skip
@@ -126,7 +126,7 @@ class BodyStage:
 
     def __init__(self, run: Run, samples: NDArray[np.int64], pace: str) -> None:
         self.run, self.samples, self.pace, shapes = run, samples, pace, run.shapes
-        self.q, size = run._at_samples(run.q)[samples], size_of(shapes)
+        self.q, size = run.with_supports(run.q, shapes.moving)[samples], size_of(shapes)
         largest = max(float(np.linalg.norm(displacements(shapes, q), axis=1).max()) for q in self.q)
         self.factor = _round(SHOWN * size / largest) if largest > 0 else 1.0
         self.figure, (self.axis,) = panels(shapes, 1)
@@ -150,13 +150,13 @@ class BodyStage:
 
 def _sample(run: Run, t: float | None) -> int:
     """The sample next to t, or that of the largest displacement."""
-    q = run._at_samples(run.q)
+    q = run.with_supports(run.q, run.shapes.moving)
     if t is not None:
         inside = is_finite(t) and run.t[0] <= t <= run.t[-1]
         require(inside, f"t must lie within the run, {run.t[0]:g} to {run.t[-1]:g} s", t, "deflected", "choose one")
         return int(np.argmin(np.abs(run.t - t)))
     shapes = run.shapes
-    rows = [shapes.values[:, shapes.components.index(name)] for name in "xyz" if name in shapes.components]
+    rows = [shapes.whole[:, shapes.components.index(name)] for name in "xyz" if name in shapes.components]
     squares = np.zeros(len(run.t))
     for place in range(len(shapes.known)):
         squares = np.maximum(squares, sum((q @ row[place]) ** 2 for row in rows))

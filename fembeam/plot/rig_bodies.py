@@ -221,7 +221,9 @@ class _Panel:
         """Equal scales, names of the axes, what moves and pulls the whole."""
         scene, beam = self.scene, not self.scene.named
         words = [f"base motion along {c}: {signal_words(s, 'm')}".replace("\n", " ") for c, s in scene.motions.items()]
-        words += [f"gravity {scene.gravity:.4g} m/s²"] if scene.gravity else []
+        if scene.pulls:
+            size = ", ".join(f"{g:.4g}" for g in np.atleast_1d(np.asarray(scene.gravity, dtype=float)))
+            words.append(f"gravity ({size}) m/s²" if "," in size else f"gravity {size} m/s²")
         words += ["places are not known: nodes in a row"] if self.row else []
         axis.set_title("; ".join([*([f"body {self.number}"] if self.number else []), *words]), fontsize=8)
         axis.margins(0.25)

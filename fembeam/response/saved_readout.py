@@ -10,11 +10,12 @@ import numpy as np
 
 from fembeam.beams import Beam, Section, Taper
 from fembeam.response.readout import Readout, Vector
+from fembeam.response.saved_frames import frames_packed, frames_unpacked
 from fembeam.response.section_forces import SectionForces
 from fembeam.scene import FEATURES
 
 PLAIN = ("stiffness", "damping", "zeta", "load_vectors", "loads", "frame", "heights", "impactor_places")
-READOUT_FINITE = {*PLAIN, "reactions", "moments", "shears"}
+READOUT_FINITE = {*PLAIN, "reactions", "moments", "shears", "members"}
 READOUT_UNITS = {
     "stiffness": "1/s²",
     "damping": "1/s",
@@ -22,6 +23,7 @@ READOUT_UNITS = {
     "frame": "m, m/s",
     "moments": "N m/(m √kg)",
     "shears": "N/(m √kg)",
+    "members": "of frames, values and slopes along: N, N m and these per m, each per m √kg",
     "heights, impactor_places": "m",
 }
 HOLDING = {part.__name__: part for name in ("supports", "springs", "dashpots") for part in FEATURES[name]}
@@ -33,16 +35,22 @@ Shape = tuple[int, ...]
 def packed(read: Readout) -> tuple[dict[str, Any], Arrays]:
     """Words for JSON, and arrays by name."""
     parts, rows = read.reactions
-    about = {
+    about: dict[str, Any] = {
         "base": read.base,
         "moved": read.moved,
-        "beams": [_beam_as_words(one.beam) if isinstance(one, SectionForces) else None for one in read.section_forces],
+        "beams": [],
         "parts": [{"kind": type(part).__name__, "body": body, **_numbers(part)} for part, body in parts],
     }
     arrays = {name: getattr(read, name) for name in PLAIN} | {"reactions": rows}
     for i, one in enumerate(read.section_forces):
+        words: Any = None
         if isinstance(one, SectionForces):
+            words = _beam_as_words(one.beam)
             arrays |= {f"moments_{i}": one.moments, f"shears_{i}": one.shears}
+        elif one is not None:
+            words, of_frames = frames_packed(one, i)
+            arrays |= of_frames
+        about["beams"].append(words)
     return about, arrays
 
 
@@ -57,12 +65,14 @@ def unpacked(about: Mapping[str, Any], arrays: Mapping[str, Any], nodes: list[An
     forces = tuple(
         None
         if beam is None
+        else frames_unpacked(beam, arrays, i)
+        if "frames" in beam
         else SectionForces(_beam_of_words(beam), nodes[i], arrays[f"moments_{i}"], arrays[f"shears_{i}"])
         for i, beam in enumerate(about["beams"])
     )
     parts: Any = [_part(dict(words)) for words in about["parts"]]
     kept: dict[str, Any] = {name: arrays[name] for name in PLAIN}
-    straight = [(part, body) for part, body in parts if about["beams"][body] is not None]
+    straight = [(part, body) for part, body in parts if "spans" in (about["beams"][body] or ())]
     held = [(part.z, body) for part, body in straight if type(part) in FEATURES["supports"]]
     kept["supports"] = np.array(held, dtype=float).reshape(-1, 2)
     kept |= {
@@ -85,6 +95,10 @@ def expected_readout(arrays: Mapping[str, Any]) -> dict[str, Shape]:
         **{"frame": (2 * (len(arrays["frame"]) // 2), k), "reactions": (r, components, rows + loads + 2 * n)},
         **{"zeta": (n,), "heights": (bodies,), "impactor_places": (len(arrays["impactor_masses"]), 2)},
     }
+    for name in arrays:
+        if name.startswith("members_"):
+            names, elements, _, columns = arrays[name].shape[1:]
+            shapes[name] = (2, names, elements, 2, max(columns, n))
     for i in range(bodies):
         if f"moments_{i}" not in arrays:  # a body without sections
             continue
@@ -96,7 +110,7 @@ def expected_readout(arrays: Mapping[str, Any]) -> dict[str, Shape]:
 def _numbers(part: Any) -> dict[str, Any]:
     """The fields of a support, spring or dashpot but its signals."""
     values = {field.name: getattr(part, field.name) for field in fields(part)}
-    return {name: value for name, value in values.items() if not callable(value)}
+    return {name: value for name, value in values.items() if not callable(value) and name != "motion"}
 
 
 def _part(words: dict[str, Any]) -> tuple[Any, int]:

@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from fembeam.beams import Beam, element_matrices, joining, on_beam
-from fembeam.scene import BodyMatrices, loaded
+from fembeam.scene import BodyMatrices, carried_by, loaded
 from fembeam.structures import FrameForces, JoinedForces
 from fembeam.support import require
 
@@ -92,12 +92,28 @@ def section_forces(model: ModalEquations, body: int = 0) -> SectionForces | Fram
     mine = slice(first, first + beam.M.shape[0])
     vectors = model.basis.vectors[mine]
     rows = sparse.vstack([sparse.csr_matrix((0, beam.M.shape[0])), *(at.row(beam) for at in loaded(model.scene, body))])
+    if beam.coupling is not None:
+        rows = sparse.vstack([rows, beam.coupling[::3]])
     inertia = _inertia(beam, vectors, model.omega, rows.toarray().T)
     if isinstance(beam, BodyMatrices):
         made: Any = beam.assembled
-        forces: FrameForces | JoinedForces | None = made.section_forces(beam.spread @ vectors, beam.spread @ inertia)
+        moved = _carried(model, beam, body)
+        own = beam.spread @ inertia  # less that of the shapes which follow supports: they have none
+        following = -own @ model.following.T
+        forces: FrameForces | JoinedForces | None = made.section_forces(
+            np.hstack([beam.spread @ vectors, moved]), np.hstack([own, following])
+        )
         return forces
     return _of_vectors(beam, vectors, inertia)
+
+
+def _carried(model: ModalEquations, beam: BodyMatrices, body: int) -> Vector:
+    """(N_all, k): what each of the k support dofs that move, of all bodies, carries on this one."""
+    every, (first, last) = carried_by(model.scene, len(model.scene.bodies))[1], carried_by(model.scene, body)
+    found = np.zeros((beam.spread.shape[0], every))
+    if last > first:
+        found[:, first:last] = beam.carried.toarray()
+    return found
 
 
 def _inertia(beam: Matrices, vectors: Vector, omega: Vector, rows: Vector) -> Vector:
@@ -188,7 +204,7 @@ def rows_of(run: Histories, quantity: str, z: Any, body: int) -> tuple[Vector, A
     if isinstance(z, list):  # of a body with places by name
         if quantity != "displacement":
             return _rows_of_frame(run, quantity, z, body)
-        return (run.shapes, *run.others)[body](z), z, np.zeros(len(z))
+        return (run.shapes, *run.others)[body].rows_with_supports(z), z, np.zeros(len(z))
     known = ("displacement", "slope", "moment", "shear", "stress")
     require(quantity in known, f"quantity must be one of {', '.join(known)}", quantity, "Run", "choose one")
     if quantity in known[:2]:
@@ -219,6 +235,5 @@ def frame_forces_of(run: Histories, body: int, quantity: str = "a section force"
     forces = run.readout.section_forces[body]
     if isinstance(forces, (FrameForces, JoinedForces)):
         return forces
-    raise ValueError(f"{quantity} is of a Beam, which has sections, or of a Frame whose run was not read from a file, "
-                     f"got body {body} in Run; ask for displacement(place, direction), rotations included, or for "
-                     "reactions")  # fmt: skip
+    raise ValueError(f"{quantity} is of a Beam or a Frame, which have sections, got body {body} in Run; ask for "
+                     "displacement(place, direction), rotations included, or for reactions")  # fmt: skip

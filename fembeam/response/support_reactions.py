@@ -23,9 +23,9 @@ import reduction
 from fembeam.beams import bending_root, hermite_rows
 from fembeam.response.body_reactions import BodyHeld
 from fembeam.response.readout import coordinates
-from fembeam.scene import BodyMatrices, Spring, contact_rows, loads, told, unsupported
+from fembeam.scene import BodyMatrices, Spring, contact_rows, loads, support_loads, told, unsupported
 from fembeam.structures import COMPONENTS
-from fembeam.support import Part, Printed, is_finite, require
+from fembeam.support import Part, Printed, is_finite, is_whole, require
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -92,6 +92,13 @@ class BodyReaction(Reaction):
     ----------
     part, body, t : as for a beam. force : (k, 3) N along x, y, z. moment : (k, 3) N m about the axes through the place.
     """
+
+    @property
+    def name(self) -> str:
+        """The name of the part, else such as "Clamped at 'A'", "Fixed at node 7"."""
+        if self.part.name is None and is_whole(self.part.z):
+            return f"{type(self.part).__name__} at node {self.part.z}" + (f" of body {self.body}" if self.body else "")
+        return super().name
 
     def __repr__(self) -> str:
         return f"<reaction of {self.name}, largest force {self.largest()[0]:.5g} N>"
@@ -175,7 +182,7 @@ def reaction_rows(model: Model) -> tuple[list[tuple[Any, int]], Vector]:
     columns = _acting(model, full)
     parts, rows, done = [], [], 0
     named = any(beam.named for beam in full.beams)
-    feet = len(model.directions)  # where the loads begin
+    feet = len(model.directions) + len(support_loads(model.scene, full))  # where the loads of feet begin
     for body, scene in enumerate((model.scene, *model.scene.bodies)):
         size = full.beams[body].M.shape[0]
         mine, known, loose = columns[done : done + size], model.matrices.beams[body], full.beams[body]
@@ -223,7 +230,7 @@ def _acting(model: Model, full: Matrices) -> Vector:
     scene, size = model.scene, full.M.shape[0]
     rows = [one.row for one in contact_rows(scene, full)] + [row for row, _ in loads(scene, full)]
     pushed = sparse.vstack([sparse.csr_matrix((0, size)), *rows]).toarray().T
-    moved = [*scene.motions, *(["y"] if scene.gravity else [])]
+    moved = [*scene.motions, *scene.pulls]
     frame = -np.array([full.base_loads[direction] for direction in moved]).reshape(-1, size).T
     vectors, damped = np.zeros((size, len(model.omega))), np.zeros((size, len(model.omega)))
     vectors[:] = _on_all(model.matrices, full) @ model.basis.vectors

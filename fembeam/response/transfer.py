@@ -74,11 +74,29 @@ def frequency_response(
     if model.scene.named and isinstance(output, np.ndarray):
         output = output.tolist()
     frequencies, places = _checked(omega, model), model.phi(output, 0, body)
+    if isinstance(driven, str) and driven.startswith("supports["):
+        return _of_support(model, frequencies, driven, output, body)
     vector, power, said, unit = _driving(model, driven)
     values = _solved(model, frequencies, vector) @ places.T
     values = (values.T * frequencies**power).T + (_carried_along(model, driven, output) if absolute else 0.0)
     shown: Any = output if model.scene.named else np.array(output, dtype=float)[()]
     return FrequencyResponse(frequencies, values, said, shown, absolute, unit, model.omega)
+
+
+def _of_support(model: Model, omega: Vector, driven: str, output: Any, body: int) -> FrequencyResponse:
+    """The response to a unit motion of one dof of a support that moves: (v₀ + iω v₁ - ω² v₂) of its three loads."""
+    names = [path for path in signals_of(model.scene) if ".motion." in path]
+    require(driven in names, f"input must be one of {', '.join(names) or 'none, as no support moves'}", driven, WHERE,
+            "use one")  # fmt: skip
+    number = names.index(driven)
+    shapes = (model.shapes, *model.others)[body]
+    rows = shapes.rows_with_supports(output if isinstance(output, list) else [output])
+    n, k = len(model.omega), names.index(driven)
+    answers = [_solved(model, omega, np.asarray(model.system.loads[3 * number + order][0])) for order in range(3)]
+    q = sum((1j * omega[:, None]) ** order * one for order, one in enumerate(answers))
+    values = q @ rows[:, :n].T + rows[:, n + k]
+    values = values if isinstance(output, list) else values[:, 0]
+    return FrequencyResponse(omega, values, f"motion of {driven}", output, False, "m/m", model.omega)
 
 
 def _carried_along(model: Model, driven: str | float, output: Any) -> Any:
@@ -116,7 +134,8 @@ def _driving(model: Model, driven: Any) -> tuple[Vector, int, str, str]:
     inputs = [name.removesuffix(".signal") for name in names]
     known = isinstance(driven, str) and driven.removesuffix(".signal") in inputs
     require(known, f"input must be a place z in m, or one of {', '.join(['base', *inputs])}", driven, WHERE, "use one")
-    number = inputs.index(str(driven).removesuffix(".signal"))
+    first = sum(".motion." in name for name in names)  # supports that move come first, with three loads each
+    number = 2 * first + inputs.index(str(driven).removesuffix(".signal"))
     vector = np.asarray(model.system.loads[number][0], dtype=float)
     return vector, 0, inputs[number], "m/m" if inputs[number].endswith("foot") else "m per unit"
 

@@ -7,7 +7,18 @@ Imports: `beams`, `structures`, `excitation`, `support`, `reduction`; inside the
 from fembeam.scene.annular_stop import AnnularStop
 from fembeam.scene.assembly import MOST_DENSE, Matrices, unsupported
 from fembeam.scene.body_assembly import BodyMatrices, respun
-from fembeam.scene.contact_rows import ON, contact_rows, heights, loaded, loads, static_rows, watched, weight
+from fembeam.scene.contact_rows import (
+    ON,
+    carried_by,
+    contact_rows,
+    heights,
+    loaded,
+    loads,
+    static_rows,
+    support_loads,
+    watched,
+    weight,
+)
 from fembeam.scene.element import Element, tangent
 from fembeam.scene.impactor import Impactor
 from fembeam.scene.local_coordinate import LocalCoordinate, unit_of
@@ -28,5 +39,5 @@ from fembeam.scene.parts import (
 from fembeam.scene.places import At, Place, is_pair, is_place, said, split, told
 from fembeam.scene.rotors import Disk, Unbalance
 from fembeam.scene.scene import FEATURES, Scene
-from fembeam.scene.signals import PLACES, for_duration, persistent_drive, signals_of, with_signals
+from fembeam.scene.signals import PLACES, for_duration, persistent_drive, signals_of, support_motion, with_signals
 from fembeam.scene.source import Source

@@ -91,6 +91,7 @@ class Matrices:
     bodies: tuple[Matrices, ...] = ()
     impactors: tuple[Impactor, ...] = ()
     named = False  # whether its places have names and directions, see `BodyMatrices`
+    coupling: Any = None  # of supports that move, see `BodyMatrices`
 
     @property
     def base_loads(self) -> dict[str, Vector]:
@@ -128,18 +129,18 @@ class Matrices:
         own = self.beams[body]
         places = on_beam(np.atleast_1d(np.asarray(z, dtype=float)), own.beam, "interpolation")
         rows = hermite_rows(own.nodes, places, derivative)[:, np.flatnonzero(own.dofs.ravel() >= 0)]
-        return self._among_all(rows, body)
+        return self.among_all(rows, body)
 
     def row(self, place: Any, along: Six, body: int = 0) -> sparse.csr_matrix:
         """Row (1, N): the motion of a body's place along a direction, six numbers."""
-        return self._among_all(self.beams[body].own_row(place, along), body)
+        return self.among_all(self.beams[body].own_row(place, along), body)
 
     def own_row(self, place: Any, along: Six) -> sparse.csr_matrix:
         """The same on the body's own dofs: of a beam u along y and -u_z about x."""
         require_components(along, ("y", "rx"), "a Beam bends in one plane: its places", f"{told(place)} of a Beam")
         return along[1] * self.interpolation(place) - along[3] * self.interpolation(place, 1)
 
-    def _among_all(self, rows: sparse.csr_matrix, body: int) -> sparse.csr_matrix:
+    def among_all(self, rows: sparse.csr_matrix, body: int) -> sparse.csr_matrix:
         """Rows on a body's own dofs as rows on all."""
         before = sum(beam.M.shape[0] for beam in self.beams[:body])
         after = self.M.shape[0] - before - rows.shape[1]

@@ -19,6 +19,7 @@ import reduction
 from fembeam.scene.assembly import DEFAULT_MODES, Matrices, Vector
 from fembeam.scene.places import told
 from fembeam.scene.rotors import Disk, gyroscopic, turned
+from fembeam.scene.signals import support_motion
 from fembeam.structures import COMPONENTS, Assembled, Six, following
 from fembeam.support import require
 
@@ -37,11 +38,15 @@ class BodyMatrices(Matrices):
     ----------
     beam : the body. assembled : what it gave, on all its dofs.
     spread : S (N_all, N) sparse: free dofs to all.
+    carried : (N_all, k) what the k dofs of supports that move carry along by themselves.
+    coupling : (3 k, N): for each of these dofs the loads of its displacement, speed and acceleration.
     along : {direction: base load (N,)}. massless : labels of dofs that follow the others statically.
     """
 
     assembled: Assembled = None  # type: ignore[assignment]
     spread: sparse.csr_matrix = None
+    carried: sparse.csr_matrix = None
+    coupling: sparse.csr_matrix = None
     along: dict[str, Vector] = field(default_factory=dict)
     massless: tuple[Any, ...] = ()
     named = True
@@ -61,7 +66,9 @@ class BodyMatrices(Matrices):
 
     def loosened(self, scene: Scene) -> Matrices:
         """The matrices without supports, on all dofs, those without mass too."""
-        return _of(scene, self.assembled, self.modes, held=np.zeros(0, dtype=int), condense=False)
+        found = _of(scene, self.assembled, self.modes, held=np.zeros(0, dtype=int), condense=False)
+        moving = {} if self.carried is None else _moving(found.M, found.K, None, found.spread, self.carried)
+        return replace(found, **moving)
 
     def frequency_error(self, omega: ArrayLike) -> Vector:
         """Zeros: the matrices are what the structure is."""
@@ -110,8 +117,29 @@ def body_matrices(scene: Scene, elements: int | None, modes: int | None, probes:
     held = _held(scene, assembled)
     require(len(held) < assembled.M.shape[0], "supports must leave dofs free", len(held), "Scene", "remove one")
     found = _of(scene, assembled, modes, held, condense=True)
+    moved = [_dof(scene, assembled, support, dof) for support in scene.supports for dof in support_motion(support)]
+    if moved:
+        require(not found.massless, "a support that moves needs mass on all dofs", found.massless[:3], "Scene",
+                "condense the structure first")  # fmt: skip
+        M, K, _, _ = _with_parts(scene, assembled)
+        carried = sparse.eye(M.shape[0], format="csr")[:, moved]
+        found = replace(found, **_moving(M, K, assembled.C, found.spread, carried))
     _warn_of_massless(scene, found)
     return found
+
+
+def _moving(M: Any, K: Any, C: Any, spread: Any, carried: Any) -> dict[str, Any]:
+    """What dofs of supports that move carry, and their loads -K e, -C e, -M e of displacement, speed, acceleration."""
+    blank = sparse.csr_matrix(M.shape)
+    each = [-(carried.T @ (blank if A is None else A) @ spread).tocsr() for A in (K, C, M)]
+    order = np.arange(3 * carried.shape[1]).reshape(3, -1).T.ravel()
+    return {"carried": carried, "coupling": sparse.vstack(each, format="csr")[order]}
+
+
+def _dof(scene: Scene, assembled: Assembled, support: Any, component: str) -> int:
+    """Number of the dof that a support holds."""
+    row = assembled.rows(support.z).tocsr()[scene.beam.components.index(component)]
+    return int(row.indices[0])
 
 
 def _warn_of_massless(scene: Scene, matrices: BodyMatrices) -> None:

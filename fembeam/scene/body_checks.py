@@ -8,6 +8,7 @@ from fembeam.scene.annular_stop import AnnularStop
 from fembeam.scene.parts import Guided, PointMoment
 from fembeam.scene.places import told
 from fembeam.scene.rotors import Disk, check_shaft
+from fembeam.scene.signals import support_motion
 from fembeam.structures import COMPONENTS, direction_of, named, require_components
 from fembeam.support import is_finite, require
 
@@ -61,6 +62,8 @@ def _check_support(support: Any, have: tuple[str, ...], where: str) -> None:
         every or not missing, f"a support must hold dofs that exist; {told_at}", missing, where, "name some of these"
     )
     require(len(missing) < len(support.dofs), f"a support must hold something; {told_at}", support, where, "use Fixed")
+    astray = [dof for dof in support_motion(support) if dof not in have]
+    require(not astray, f"motion must be of dofs that exist; {told_at}", astray, where, "name some of these")
 
 
 def check_ends(scene: Scene) -> None:
@@ -103,6 +106,7 @@ def check_conflicts(scene: Scene) -> None:
             require(key not in held, f"supports must not hold one dof twice ({dof} at {told(support.z)})",
                     (held.get(key), index), "supports of Scene", "keep one")  # fmt: skip
             held[key] = index
+    _check_moved(scene)
     known: dict[Any, int] = {}
     for index, stop in enumerate(scene.stops):
         round_about = isinstance(stop, AnnularStop)
@@ -113,6 +117,20 @@ def check_conflicts(scene: Scene) -> None:
         require(one not in known, f"stops must not share one place and direction ({at})", (known.get(one), index),
                 "stops of Scene", "make them one stop with one law, such as PiecewiseLinear")  # fmt: skip
         known[one] = index
+
+
+def _check_moved(scene: Scene) -> None:
+    """Raise ValueError for stops and elements on a support that moves, of whose motion their δ would not know."""
+    node: Any = getattr(scene.beam, "node", lambda place: place)
+    moved = {(node(one.z), dof) for one in scene.supports for dof in support_motion(one)}
+    for name in ("stops", "elements") if moved else ():
+        for index, part in enumerate(getattr(scene, name)):
+            to = part.coordinate.to
+            for place in (part.z, *([to[1]] if to is not None and to[0] == 0 else [])):
+                along = zip(COMPONENTS, part.coordinate.along, strict=True)
+                met = [dof for dof, size in along if size and (node(place), dof) in moved]
+                require(not met, f"a {part.word} must not act where a support moves along {', '.join(met)}", place,
+                        f"{name}[{index}] of Scene", "put it at a place beside the support")  # fmt: skip
 
 
 def check_plain(feature: Any, name: str, where: str) -> None:
@@ -132,6 +150,9 @@ def check_plain(feature: Any, name: str, where: str) -> None:
         require(name in ("stops", "elements"), "direction is for bodies that are not a Beam", direction, where,
                 "leave it out: u is along y")  # fmt: skip
     if name == "supports":
+        motion = getattr(feature, "motion", None)
+        require(motion is None, "motion of a support needs a Frame or Structure", motion, where,
+                "make the Beam a Frame.straight, or use a stiff Spring(..., foot=signal)")  # fmt: skip
         beyond = [dof for dof in feature.dofs if dof not in ("y", "rx")]
         whole = feature.dofs in ((), COMPONENTS, COMPONENTS[:3])
         require(whole or not beyond, "a Beam bends in one plane: it has y and rx", beyond, where, "leave them out")

@@ -19,6 +19,7 @@ from fembeam.excitation import Harmonic
 from fembeam.scene.annular_stop import AnnularStop
 from fembeam.scene.element import force_both_ways
 from fembeam.scene.local_coordinate import LocalCoordinate
+from fembeam.scene.signals import support_motion
 
 if TYPE_CHECKING:
     from fembeam.scene.assembly import Matrices
@@ -141,8 +142,8 @@ def _distinct(rows: list[ContactRow]) -> list[str]:
 
 
 def loads(scene: Scene, matrices: Matrices) -> list[tuple[sparse.csr_matrix, Any]]:
-    """(row (1, N), signal) of every point force, moment and moving foot."""
-    rows = []
+    """(row (1, N), signal) of supports that move, three for each dof, then every point force, moment, moving foot."""
+    rows = support_loads(scene, matrices)
     for body, part in enumerate((scene, *scene.bodies)):
         for force in part.forces:
             rows.append((force.coordinate.row(matrices, body), force.signal))
@@ -153,9 +154,28 @@ def loads(scene: Scene, matrices: Matrices) -> list[tuple[sparse.csr_matrix, Any
     return rows
 
 
-def weight(scene: Scene) -> Harmonic:
-    """The constant signal g, to go with -M r."""
-    return Harmonic(scene.gravity, 0.0)
+def support_loads(scene: Scene, matrices: Matrices) -> list[tuple[sparse.csr_matrix, Any]]:
+    """(row (1, N), signal) of displacement, speed and acceleration of every dof of supports that move."""
+    rows = []
+    for body, part in enumerate((scene, *scene.bodies)):
+        motions = [motion for support in part.supports for motion in support_motion(support).values()]
+        coupling: Any = matrices.beams[body].coupling
+        for number, motion in enumerate(motions):
+            signals = motion, motion.derivative(1), motion.derivative(2)
+            each = (coupling[3 * number + order] for order in range(3))
+            rows += [(matrices.among_all(row, body), signal) for row, signal in zip(each, signals, strict=True)]
+    return rows
+
+
+def carried_by(scene: Scene, body: int) -> tuple[int, int]:
+    """Which of the dofs of supports that move, counted over all bodies, are of one: first and last + 1."""
+    counts = [sum(len(support_motion(s)) for s in part.supports) for part in (scene, *scene.bodies)]
+    return sum(counts[:body]), sum(counts[: body + 1])
+
+
+def weight(scene: Scene) -> dict[str, Harmonic]:
+    """The constant signals g by direction, each to go with -M r."""
+    return {direction: Harmonic(g, 0.0) for direction, g in scene.pulls.items()}
 
 
 def watched(scene: Scene, body: int) -> LocalCoordinate | None:

@@ -14,7 +14,7 @@ from dataclasses import fields, is_dataclass, replace
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
-from fembeam.scene.signals import is_of_signal
+from fembeam.scene.signals import is_of_signal, support_motion
 from fembeam.support import require
 
 if TYPE_CHECKING:
@@ -31,6 +31,8 @@ def scalars(scene: Scene, within: str = "") -> dict[str, float]:
         items = [(f"{part.name}[{i}]", item) for i, item in enumerate(value)] if part.name in LISTS else []
         for path, item in items or [(part.name, value)]:
             found.update(_numbers(f"{within}{path}", item))
+    for i, support in enumerate(scene.supports):
+        found.update(_numbers(f"{within}supports[{i}].motion", support_motion(support)))
     for i, body in enumerate(scene.bodies):
         found.update(scalars(body, f"{within}bodies[{i}]."))
     return found

@@ -6,8 +6,9 @@ There `direction` says along what a part acts: "x", "-y", "rz" (a rotation), or 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from fembeam.scene.impactor import check_law
 from fembeam.scene.local_coordinate import LocalCoordinate, Of, local_coordinate
@@ -18,8 +19,40 @@ from fembeam.support import require, require_finite, require_non_negative
 
 
 @dataclass(frozen=True, repr=False)
-class Clamped(ScenePart):
+class _Holding(ScenePart):
+    """What holds a place, at rest or in a given motion relative to the frame."""
+
+    motion: Any = None
+    dofs: ClassVar[tuple[str, ...]] = ()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.motion is not None:
+            object.__setattr__(self, "motion", _checked_motion(self.motion, self.dofs, self.where))
+
+
+def _checked_motion(motion: Any, dofs: tuple[str, ...], where: str) -> dict[str, Any]:
+    """{dof: signal} of a support; ValueError for others."""
+    named = isinstance(motion, Mapping) and bool(motion)
+    require(named, "motion must name its dofs", motion, where, "write motion={'y': signal}")
+    for dof, signal in motion.items():
+        held = ", ".join(dofs) or "none"
+        require(dof in dofs, f"motion must be of dofs that the support holds, {held}", dof, where, "hold it too")
+        known = callable(signal) and callable(getattr(signal, "derivative", None)) and not isinstance(signal, type)
+        require(known, "motion must be signals that know their derivatives", signal, where,
+                "use Harmonic, Multisine, BandNoise, Record, Pulse, Step or SineSweep")  # fmt: skip
+        for order in (1, 2):
+            signal.derivative(order)
+    return {dof: motion[dof] for dof in COMPONENTS if dof in motion}
+
+
+@dataclass(frozen=True, repr=False)
+class Clamped(_Holding):
     """u = 0 and u_z = 0 at z (m); of other bodies than a `Beam` no component of a place moves.
+
+    There `motion` makes components follow signals, in m and rad relative to the frame: {"y": signal}, so that supports
+    move apart. A structure starts as it follows them statically at t = 0, in place and speed, and damping ratios act on
+    the motion beside the one that follows them statically.
 
     Examples
     --------
@@ -33,8 +66,8 @@ class Clamped(ScenePart):
 
 
 @dataclass(frozen=True, repr=False)
-class Pinned(ScenePart):
-    """u = 0 at z (m), free to turn; of other bodies than a `Beam` no displacement of a place.
+class Pinned(_Holding):
+    """u = 0 at z (m), free to turn; of other bodies than a `Beam` no displacement of a place; `motion` as of `Clamped`.
 
     Examples
     --------
@@ -63,11 +96,11 @@ class Guided(ScenePart):
 
 
 @dataclass(frozen=True, repr=False, init=False)
-class Fixed(ScenePart):
+class Fixed(_Holding):
     """Chosen components of a place do not move: Fixed(place, "x", "rz"); none named: all that it has.
 
-    `dofs` are of "x", "y", "z", "rx", "ry", "rz"; of a `Beam` "y" is u and "rx" is -u_z. ValueError for another name,
-    or one twice.
+    `dofs` are of "x", "y", "z", "rx", "ry", "rz"; of a `Beam` "y" is u and "rx" is -u_z; `motion` as of `Clamped`.
+    ValueError for another name, or one twice.
 
     Examples
     --------
@@ -75,19 +108,24 @@ class Fixed(ScenePart):
     (('x', 'y'), True)
     """
 
-    dofs: tuple[str, ...] = ()
+    dofs: tuple[str, ...] = ()  # type: ignore[misc]
     word = "fixing"
 
-    def __init__(self, z: Place, *named: str, dofs: tuple[str, ...] = (), name: str | None = None) -> None:
+    def __init__(
+        self, z: Place, *named: str, dofs: tuple[str, ...] = (), motion: Any = None, name: str | None = None
+    ) -> None:
         chosen = tuple(named) + tuple(dofs)
         object.__setattr__(self, "z", z)
         object.__setattr__(self, "name", name)
+        object.__setattr__(self, "motion", None)
         super().__post_init__()
         for dof in chosen:
             require(dof in COMPONENTS, f"dofs must be of {', '.join(COMPONENTS)}", dof, self.where,
                     "choose from these, or name none to fix all")  # fmt: skip
         require(len(set(chosen)) == len(chosen), "dofs must be named once", chosen, self.where, "keep one")
         object.__setattr__(self, "dofs", chosen or COMPONENTS)
+        object.__setattr__(self, "motion", motion)
+        super().__post_init__()
 
     @property
     def fixed(self) -> tuple[bool, bool]:

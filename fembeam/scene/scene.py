@@ -78,7 +78,8 @@ class Scene:
         number 1. Joined bodies become one, `JoinedBodies`, with one M and K, modes of the whole and all their parts:
         the scene has no `bodies` then but those without joints, and a place of a joined one is (1, "lever"), or
         "lever" where no other has that name.
-    gravity : g in m/s², pulls everything down, along -y; for all bodies.
+    gravity : g in m/s², pulls everything down, along -y; for all bodies. Of frames and structures also a vector, the
+        acceleration of free fall, (0, 0, -9.81).
     elements : of Element, local elements that always act, numbered on after the stops.
 
     Every part takes a keyword ``name``, unique among all parts, those of bodies included: logs, tables, figures and
@@ -115,7 +116,7 @@ class Scene:
     forces: Sequence[PointForce | PointMoment | Unbalance] = ()
     impactors: Sequence[Impactor] = ()
     bodies: Sequence[Scene] = ()
-    gravity: float = 0.0
+    gravity: float | Sequence[float] = 0.0
     elements: Sequence[Element] = ()
     joints: Sequence[Joint] = ()
 
@@ -132,7 +133,7 @@ class Scene:
         if not callable(getattr(self.damping, "modal_coefficients", None)):
             raise TypeError(f"damping must be ModalDamping or Rayleigh, got {self.damping!r} in Scene; "
                             "write ModalDamping(0.01)")  # fmt: skip
-        require_finite("gravity", self.gravity, "Scene", "give m/s², 9.81 on the ground")
+        object.__setattr__(self, "gravity", _fall(self.gravity, self.named))
         object.__setattr__(self, "bodies", _listed("bodies", self.bodies, (Scene,)))
         object.__setattr__(self, "joints", _listed("joints", self.joints, (Joint,)))
         self._check_bodies()
@@ -140,6 +141,7 @@ class Scene:
             for name, value in merged(self, [*FEATURES]).items():
                 object.__setattr__(self, name, value)
         self._check_base()
+        self._check_gravity()
         self._check_names()
         if self.named:
             check_conflicts(self)
@@ -294,6 +296,13 @@ class Scene:
         return self.base if isinstance(self.base, dict) else {"y": self.base}
 
     @property
+    def pulls(self) -> dict[str, float]:
+        """Gravity by directions, m/s² against each: the load of everything along y is -M r g."""
+        if isinstance(self.gravity, tuple):
+            return {name: -g for name, g in zip(COMPONENTS[:3], self.gravity, strict=True) if g}
+        return {"y": float(self.gravity)} if self.gravity else {}  # type: ignore[arg-type]
+
+    @property
     def acting(self) -> list[Stop | AnnularStop | Element]:
         """Stops, then elements: what acts on the scene's own beam by a law."""
         return [*self.stops, *self.elements]
@@ -367,6 +376,15 @@ class Scene:
                                 "derivative(order)")  # fmt: skip
             motion.derivative(2)
 
+    def _check_gravity(self) -> None:
+        """Raise ValueError for gravity along what the bodies have not."""
+        if self.named:
+            bodies = [part.beam for part in (self, *self.bodies) if part.named]
+            known = {c for one in bodies for c in getattr(one, "base_directions", one.components)}
+            astray = [name for name in self.pulls if name not in known]
+            require(not astray, f"gravity must pull along {', '.join(c for c in COMPONENTS[:3] if c in known)}", astray,
+                    "Scene", "leave the others 0")  # fmt: skip
+
     def _check_conflicts(self) -> None:
         """Raise ValueError if two supports share one place, or two stops one place, side and carrier."""
         near = 1e-9 * self.beam.length
@@ -436,6 +454,17 @@ def _holding(beam: Scene, z: float, derivative: int) -> list[Support]:
     """The supports that hold u (derivative 0) or u_z (1) of a beam at z."""
     near = 1e-9 * beam.beam.length
     return [support for support in beam.supports if abs(support.z - z) <= near and support.fixed[derivative]]
+
+
+def _fall(gravity: Any, named: bool) -> Any:
+    """Checked gravity: a number, or a tuple of three; of none the number 0."""
+    if not isinstance(gravity, (list, tuple)):
+        require_finite("gravity", gravity, "Scene", "give m/s², 9.81 on the ground")
+        return gravity
+    right = len(gravity) == 3 and all(is_finite(one) for one in gravity)
+    require(right, "gravity must be a number, or three", gravity, "Scene", "write (0, 0, -9.81)")
+    require(named, "gravity of a Beam must be one number, along -y", gravity, "Scene", "write 9.81")
+    return tuple(float(one) for one in gravity) if any(gravity) else 0.0
 
 
 def _listed(name: str, value: Any, kinds: tuple[type, ...]) -> tuple[Any, ...]:

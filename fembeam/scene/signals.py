@@ -15,7 +15,16 @@ if TYPE_CHECKING:
     from fembeam.scene.scene import Scene
 
 PLACES = {"forces": "signal", "springs": "foot"}  # lists of a scene whose entries carry a signal, and their field
-_PATH = re.compile(r"(bodies\[\d+\]\.)*(base|" + "|".join(rf"{n}\[\d+\]\.{key}" for n, key in PLACES.items()) + r")\b")
+_PATH = re.compile(
+    r"(bodies\[\d+\]\.)*(base|supports\[\d+\]\.motion|"
+    + "|".join(rf"{n}\[\d+\]\.{key}" for n, key in PLACES.items())
+    + r")\b"
+)
+
+
+def support_motion(support: Any) -> dict[str, Any]:
+    """The signals of a support by its dofs; none of one at rest."""
+    return getattr(support, "motion", None) or {}
 
 
 def signals_of(scene: Scene) -> dict[str, Any]:
@@ -47,6 +56,8 @@ def _listed(scene: Scene) -> Iterator[tuple[str, Any]]:
         yield from ((f"base.{direction}", motion) for direction, motion in scene.base.items())
     elif scene.base is not None:
         yield "base", scene.base
+    for i, support in enumerate(scene.supports):
+        yield from ((f"supports[{i}].motion.{dof}", motion) for dof, motion in support_motion(support).items())
     for name, key in PLACES.items():
         for i, part in enumerate(getattr(scene, name)):
             if getattr(part, key) is not None:
@@ -64,7 +75,13 @@ def with_signals(scene: Scene, change: Callable[[Any], Any]) -> Scene:
         new = None if old is None else change(old)
         return part if new is old else replace(part, **{key: new})
 
-    parts: dict[str, Any] = {n: [changed(part, key) for part in getattr(scene, n)] for n, key in PLACES.items()}
+    def moved_on(support: Any) -> Any:
+        old = support_motion(support)
+        new = {dof: change(motion) for dof, motion in old.items()}
+        return support if all(new[dof] is old[dof] for dof in old) else replace(support, motion=new)
+
+    parts: dict[str, Any] = {"supports": [moved_on(support) for support in scene.supports]}
+    parts |= {n: [changed(part, key) for part in getattr(scene, n)] for n, key in PLACES.items()}
     parts["bodies"] = [with_signals(body, change) for body in scene.bodies]
     moved = {direction: change(motion) for direction, motion in scene.motions.items()}
     still = all(new is scene.motions[direction] for direction, new in moved.items())

@@ -35,6 +35,7 @@ DIRECTION: Schema = {
         {**NUMBERS, "minItems": 2, "maxItems": 3},
     ],
 }
+GRAVITY: Schema = {"description": "m/s², 9.81 on the ground, or [0, 0, -9.81]", "anyOf": [{"type": "number"}, THREE]}
 REDUCED: Schema = {
     "type": "object",
     "description": "a superelement: nodes of joints, supports, stops; modes with these held",
@@ -58,7 +59,7 @@ def json_schema() -> Schema:
     [['beam'], ['structure'], ['frame']]
     """
     kinds = _Kinds()
-    tables: Schema = {"beam": kinds.beam(), "gravity": {"type": "number", "description": "m/s², 9.81 on the ground"}}
+    tables: Schema = {"beam": kinds.beam(), "gravity": GRAVITY}
     for name, features in FEATURES.items():
         tables[name] = {"type": "array", "items": kinds.feature(features)}
     tables["damping"] = {"anyOf": [kinds.table(ModalDamping), kinds.table(Rayleigh)]}
@@ -100,6 +101,8 @@ class _Kinds:
 
     def value(self, key: str, parameter: inspect.Parameter) -> Schema:
         """One key."""
+        if key == "motion":
+            return _object({dof: self.reference(SIGNAL) for dof in COMPONENTS}, [])
         if kind := nested(key, parameter):
             one = self.reference(kind)
             several = {"type": "array", "items": one}

@@ -16,9 +16,9 @@ FILES = ("stiffness", "mass", "damping")
 KEYS = (*FILES, "labels", "nodes", "points", "lines", "scale")
 
 
-def fixed(z: float, dofs: Sequence[str] = ()) -> Fixed:
+def fixed(z: float, dofs: Sequence[str] = (), motion: Any = None, name: str | None = None) -> Fixed:
     """`Fixed` for a scene file: none of dofs named: all."""
-    return Fixed(z, *dofs)
+    return Fixed(z, *dofs, motion=motion, name=name)
 
 
 def structure(reader: TableReader, table: Mapping[str, Any]) -> Structure:

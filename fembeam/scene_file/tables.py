@@ -116,7 +116,9 @@ class TableReader:
         if name == "beam":
             return self.beam(value)
         if name == "gravity":
-            return value
+            if isinstance(value, list) or (isinstance(value, (int, float)) and not isinstance(value, bool)):
+                return value
+            self.fail("gravity", f"must be a number, or three, got {shown(value)}")
         if name == "damping":
             if "zeta" in value and {"alpha", "beta"} & set(value):
                 self.fail("[damping]", "give either zeta, or alpha and beta, not both")
@@ -235,6 +237,10 @@ class TableReader:
     def value(self, value: Any, key: str, parameter: inspect.Parameter, where: str) -> Any:
         """One value: a table for what has its own constructor, else checked by the annotation."""
         inner = f"{where} {key}"
+        if key == "motion":
+            if not isinstance(value, dict):
+                self.fail(inner, f"must be a table of signals by their dofs, got {shown(value)}")
+            return {dof: self.chosen(SIGNAL, one, f"{inner} {dof}") for dof, one in value.items()}
         if kind := nested(key, parameter):
             if kind.listed and not isinstance(value, list):
                 self.fail(inner, f"must be a list of {key}, got {shown(value)}")

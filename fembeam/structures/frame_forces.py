@@ -54,7 +54,7 @@ class FrameForces:
 
     def __repr__(self) -> str:
         count = next(iter(self.ends.values())).shape[2]
-        return f"<section forces {', '.join(self.names)} of {count} coordinates in {self.mesh.elements.count} elements>"
+        return f"<section forces {', '.join(self.names)} of {count} coordinates in {len(self.mesh.h)} elements>"
 
     def names_at(self, place: Any) -> tuple[str, ...]:
         """The same at a place: all of them."""
@@ -68,7 +68,7 @@ class FrameForces:
         """(len(names), n) at a place on a member; at a point load that of the element ahead. None: all of `names`."""
         member, s = self._on_member(place)
         element, x, _ = self.mesh.located(member, np.array([s]))
-        h = self.mesh.elements.h[element]
+        h = self.mesh.h[element]
         value, slope = hermite_shapes(x, 0)[[0, 2]], hermite_shapes(x, 0)[[1, 3]] * h
         chosen = self.names if names is None else names
         unknown = [name for name in chosen if name not in self.ends]

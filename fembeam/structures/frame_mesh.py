@@ -76,6 +76,11 @@ class FrameMesh:
         return np.concatenate([[0], np.cumsum([len(s) - 1 for s in self.borders])])
 
     @cached_property
+    def h(self) -> Vector:
+        """Lengths (e,) of all elements, m."""
+        return np.concatenate([np.diff(s) for s in self.borders])
+
+    @cached_property
     def elements(self) -> Elements:
         """All elements."""
         frame, counts = self.frame, np.diff(self.first)
@@ -92,7 +97,7 @@ class FrameMesh:
             frame.spin != 0,
         )
         return Elements(
-            h=np.concatenate([np.diff(s) for s in self.borders]),
+            h=self.h,
             axes=frame.axes[member],
             properties={name: values[member] for name, values in per_member.items()},
             join=self.join[rows.ravel()],

@@ -130,22 +130,7 @@ class JoinedBodies:
 
     def located(self, place: Any, where: str) -> tuple[int, Any]:
         """Number of the body that a place is on, and the place there; ValueError for one that does not exist."""
-        if isinstance(place, (tuple, list)) and len(place) == 2 and is_whole(place[0]):
-            number, own = int(place[0]), place[1]
-            require(0 <= number < len(self.bodies), f"the number of a body must be below {len(self.bodies)}", number,
-                    where, "0 is the scene's own")  # fmt: skip
-            self.bodies[number].check_place(own, where)
-            return number, own
-        if _has(self.bodies[0], place):
-            return 0, place
-        others = [number for number, body in enumerate(self.bodies) if _has(body, place)]
-        if not others:
-            known = list(dict.fromkeys(name for body in self.bodies for name in body.places()))
-            require(False, f"a place must be one of the joined bodies; {nearest(place, known)}", place, where,
-                    "use that, or (number of the body, place)")  # fmt: skip
-        require(len(others) == 1, f"a place must be of one body; bodies {', '.join(map(str, others))} have it", place,
-                where, f"write ({others[0]}, {place!r})")  # fmt: skip
-        return others[0], place
+        return located_among(dict(enumerate(self.bodies)), place, where)
 
     def check_place(self, place: Any, where: str) -> None:
         """Raise ValueError unless the place exists; the message names the nearest."""
@@ -299,7 +284,7 @@ class JoinedMatrices(Assembled):
 class JoinedForces:
     """Section forces of the frames among joined bodies; see `FrameForces`."""
 
-    body: JoinedBodies
+    body: Any  # JoinedBodies, or what of them a file keeps
     each: Mapping[int, FrameForces]
 
     def __repr__(self) -> str:
@@ -340,6 +325,30 @@ class JoinedForces:
         require(number in self.each, "a place of section forces must lie on a frame; this one is on a structure", place,
                 "section forces", "ask for displacement(place, direction), or for reactions")  # fmt: skip
         return self.each[number], own
+
+
+def located_among(bodies: Mapping[int, Any], place: Any, where: str) -> tuple[int, Any]:
+    """Number of the body that a place is on, and the place there: (number, place), or a place of the first that has it.
+
+    ValueError for one that does not exist, or that several bodies have and not number 0.
+    """
+    if isinstance(place, (tuple, list)) and len(place) == 2 and is_whole(place[0]):
+        number, own = int(place[0]), place[1]
+        listed = ", ".join(map(str, bodies))
+        require(
+            number in bodies, f"the number of a body must be one of {listed}", number, where, "0 is the scene's own"
+        )
+        bodies[number].check_place(own, where)
+        return number, own
+    having = [number for number, body in bodies.items() if _has(body, place)]
+    if not having:
+        known = list(dict.fromkeys(name for body in bodies.values() for name in body.places()))
+        require(False, f"a place must be one of the joined bodies; {nearest(place, known)}", place, where,
+                "use that, or (number of the body, place)")  # fmt: skip
+    alone = len(having) == 1 or having[0] == 0
+    require(alone, f"a place must be of one body; bodies {', '.join(map(str, having))} have it", place, where,
+            f"write ({having[0]}, {place!r})")  # fmt: skip
+    return having[0], place
 
 
 def _has(body: Any, place: Any) -> bool:

@@ -78,7 +78,7 @@ def shortened(scene: Scene, seed: int) -> Scene:
     t_in = np.sort(log.t_in)
     if len(t_in) > MOST_CONTACTS:
         scene.duration = t_in[MOST_CONTACTS - 1] + rng.random() * (t_in[MOST_CONTACTS] - t_in[MOST_CONTACTS - 1])
-        if scene.duration <= 0.0:  # stops loaded from the start
+        if scene.duration <= 1e-9 * t_in[-1]:  # stops loaded from the start
             scene.duration = 0.1 * t_in[-1]
     ended = np.flatnonzero((log.t_out < scene.duration) & (log.t_in < log.t_out))
     if ended.size and rng.random() < 0.3:
@@ -90,7 +90,7 @@ def shortened(scene: Scene, seed: int) -> Scene:
 def significant(solution: Any, size: float) -> Any:
     """Contacts that are not rounding, in order of stop and time: a start at rest on the surface may count or not."""
     log = solution.contacts
-    real = np.flatnonzero(log.peak_indentation > 1e-9 * size)
+    real = np.flatnonzero(log.peak_indentation > 1e-7 * size)
     return real[np.lexsort((log.t_in[real], log.stop[real]))]
 
 

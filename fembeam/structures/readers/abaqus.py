@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from fembeam.structures.readers.given import COMPONENT, Given, assembled, component, numbered, wrong
+from fembeam.structures.readers.given import COMPONENT, Given, assembled, component, numbered, table, wrong
 
 HELD = 1e35  # and above: what Abaqus writes for a held dof is 1e36
 WIDTHS = {3: "row, column, value", 5: "node, dof, node, dof, value"}
@@ -66,20 +66,4 @@ def _table(path: Path) -> tuple[Any, bool, int]:
     if width not in WIDTHS:
         hint = "; element by element? export the assembled matrix" if width == 6 else ""
         raise wrong(path, f"line {data[0][0]}", " or ".join(WIDTHS.values()), f"{width} words{hint}")
-    try:
-        flat = np.array(" ".join(line for _, line in data).replace(",", " ").upper().replace("D", "E").split(), float)
-        if flat.size == width * len(data):
-            return flat.reshape(-1, width), "UNSYMMETRIC" not in heads, data[0][0]
-    except ValueError:
-        pass
-    number, line = next((i, line) for i, line in data if not _fits(line, width))
-    raise wrong(path, f"line {number}", WIDTHS[width], repr(line[:60]))
-
-
-def _fits(line: str, width: int) -> bool:
-    """Whether a line has as many numbers as the first one."""
-    words = line.replace(",", " ").upper().replace("D", "E").split()
-    try:
-        return len(words) == width and all(np.isfinite(float(word)) for word in words)
-    except ValueError:
-        return False
+    return table(path, data, width, WIDTHS[width]), "UNSYMMETRIC" not in heads, data[0][0]

@@ -54,6 +54,9 @@ def read_dmig(path: Path) -> Given:
     if not square:
         listed = ", ".join(f"{name} (form {card.form}, type {card.kind})" for name, card in cards.items()) or "none"
         raise wrong(path, "as a whole", "DMIG cards of a real matrix of form 1 or 6", listed)
+    for name, card in square.items():
+        if not card.rows:
+            raise wrong(path, "as a whole", f"columns of {name} after its head", "none; is the file truncated?")
     order = numbered({label for card in square.values() for label in (*card.rows, *card.columns)})
     found = [
         (

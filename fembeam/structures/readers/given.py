@@ -67,6 +67,26 @@ def component(path: Path, where: str, number: int, node: Any) -> str:
     return COMPONENT[number]
 
 
+def table(path: Path, lines: Sequence[tuple[int, str]], width: int, expected: str) -> Any:
+    """Numbers (k, width) of lines, given with their numbers in the file; ValueError for the first that has others."""
+    words = [line.replace(",", " ").upper().replace("D", "E").split() for _, line in lines]
+    try:
+        if all(len(one) == width for one in words):
+            return np.array(words, dtype=float).reshape(-1, width)
+    except ValueError:
+        pass
+    number, line = next(given for given, one in zip(lines, words, strict=True) if not _are_numbers(one, width))
+    raise wrong(path, f"line {number}", expected, repr(line[:60]))
+
+
+def _are_numbers(words: list[str], count: int) -> bool:
+    """Whether words are that many numbers."""
+    try:
+        return len(words) == count and all(float(word) is not None for word in words)
+    except ValueError:
+        return False
+
+
 def assembled(rows: Any, columns: Any, values: Any, size: int, symmetric: bool = True) -> sparse.csr_matrix:
     """A square matrix from entries; where they are of one triangle only, the other is its mirror image."""
     rows, columns, values = np.asarray(rows, dtype=int), np.asarray(columns, dtype=int), np.asarray(values, dtype=float)

@@ -91,8 +91,10 @@ def _numbers(path: Path, lines: list[str], at: int, count: int, each: int, width
         if number >= len(lines):
             raise wrong(path, f"line {number + 1}", f"{count - len(found)} more of {count} numbers", "the end")
         line = lines[number].rstrip()
-        fields = [line[i : i + width] for i in range(0, min(len(line), each * width), width)]
         wanted = min(each, count - len(found))
+        fields = line.split()  # not all programs, SciPy for one, keep to the widths they write
+        if len(fields) != wanted:
+            fields = [line[i : i + width] for i in range(0, min(len(line), each * width), width)]
         try:
             found += [real(field) for field in fields[:wanted]]
         except ValueError:

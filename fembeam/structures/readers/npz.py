@@ -7,6 +7,7 @@ np.savez("valve.npz", K_data=K.data, K_row=K.row, K_col=K.col, ...)     entries 
 from __future__ import annotations
 
 import zipfile
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,19 @@ from scipy import sparse
 from fembeam.structures.readers.given import COMPONENT, SCALAR, Given, Label, wrong
 
 PARTS = ("data", "row", "col")
+BROKEN = (
+    ValueError,
+    TypeError,
+    KeyError,
+    IndexError,
+    OSError,
+    EOFError,
+    NotImplementedError,
+    SyntaxError,
+    MemoryError,
+    zipfile.BadZipFile,
+    zlib.error,
+)  # what NumPy and zipfile say of damaged files
 
 
 def read_npz(path: Path) -> Given:
@@ -23,11 +37,11 @@ def read_npz(path: Path) -> Given:
     try:
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
-    except (ValueError, OSError, zipfile.BadZipFile, EOFError) as error:
+        if {"format", "shape", "data"} <= set(arrays):
+            return Given(path, ((path.stem, sparse.csr_matrix(sparse.load_npz(path), dtype=float)),))
+    except BROKEN as error:
         told = "something else" if "pickle" in str(error) else error  # NumPy's advice is to trust the file
         raise wrong(path, "as a whole", "arrays of numbers in a .npz", told) from None
-    if {"format", "shape", "data"} <= set(arrays):
-        return Given(path, ((path.stem, sparse.csr_matrix(sparse.load_npz(path))),))
     labels = _labels(path, arrays.pop("labels")) if "labels" in arrays else None
     size = 0 if labels is None else len(labels)
     found: dict[str, Any] = {}

@@ -93,7 +93,10 @@ def structure_arguments(
     K = _chosen(stiffness, "K")
     places = read_nodes(Path(nodes)) if isinstance(nodes, (str, os.PathLike)) else nodes
     names = _labels(labels, K, places)
-    found = {"K": K[1], "M": _like(K, _chosen(mass, "M"))}
+    M = _chosen(mass, "M")
+    if _which(M) == _which(K):
+        raise wrong(K[0].path, "as a whole", "a stiffness and a mass", f"{K[0].matrices[_which(K)[1]][0]} for both")
+    found = {"K": K[1], "M": _like(K, M)}
     found |= {} if damping is None else {"C": _like(K, _chosen(damping, "C", "B", "D"))}
     known = None if places is None or names is None else {node for node, _ in names}
     kept = places if known is None else {node: at for node, at in (places or {}).items() if node in known}
@@ -112,6 +115,12 @@ def _chosen(source: Source, *letters: str) -> tuple[Given, sparse.csr_matrix]:
     if matrix.shape[0] != matrix.shape[1]:
         raise wrong(given.path, "its matrix", "a square one", f"{matrix.shape[0]} × {matrix.shape[1]}")
     return given, matrix
+
+
+def _which(chosen: tuple[Given, sparse.csr_matrix]) -> tuple[Path, int]:
+    """The file and the number of a matrix in it."""
+    given, matrix = chosen
+    return given.path.resolve(), next(i for i, (_, one) in enumerate(given.matrices) if one is matrix)
 
 
 def _like(first: tuple[Given, sparse.csr_matrix], second: tuple[Given, sparse.csr_matrix]) -> sparse.csr_matrix:

@@ -4,7 +4,8 @@ A flight is accounted for from a *mark* on: the start of the flight, the last ou
 of the present cell. Between marks, one form covers the time, whatever steps the flight has taken.
 
 A series reaches `SERIES_REACH` radians of the fastest block. The powers of the motion it gives are integrated by
-Gauss's rule with five points, with an error of 2e-12 at most.
+Gauss's rule with seven points, exact up to the power 13 of the time: within a cell signals are of the fifth, and what
+they do to p of the seventh, however rough they are.
 """
 
 from __future__ import annotations
@@ -230,7 +231,8 @@ def _of_rates(problem, tables, energy_tables, scratch, count, span):
                 signal += series[q, i] * scratch.values[i] * scratch.signal_terms[j, i]
             signals[points * j + q] = weights[q] * signal
     for i in range(0, width, WIDTH):
-        a, b, c, d, e = splat8(0.0), splat8(0.0), splat8(0.0), splat8(0.0), splat8(0.0)
+        a, b, c, d = splat8(0.0), splat8(0.0), splat8(0.0), splat8(0.0)
+        e, f, g = splat8(0.0), splat8(0.0), splat8(0.0)
         for k in range(count):
             term = splat8(scratch.values[k]) * load8(scratch.terms[k], width + i)
             a += splat8(series[0, k]) * term
@@ -238,19 +240,23 @@ def _of_rates(problem, tables, energy_tables, scratch, count, span):
             c += splat8(series[2, k]) * term
             d += splat8(series[3, k]) * term
             e += splat8(series[4, k]) * term
-        losses += load8(tables.block_k_c[1], i) * _sum_of_five(weights, 0, a * a, b * b, c * c, d * d, e * e)
+            f += splat8(series[5, k]) * term
+            g += splat8(series[6, k]) * term
+        damped = _sum_of_seven(weights, 0, a * a, b * b, c * c, d * d, e * e, f * f, g * g)
+        losses += load8(tables.block_k_c[1], i) * damped
         for j in range(problem.table_dt.size):
             power = load8(energy_tables.power[problem.table_load[j]], i)
-            gains += power * _sum_of_five(signals, points * j, a, b, c, d, e)
+            gains += power * _sum_of_seven(signals, points * j, a, b, c, d, e, f, g)
     return sum8(gains), sum8(losses)
 
 
 @inlined
-def _sum_of_five(weights, first, a, b, c, d, e):
+def _sum_of_seven(weights, first, a, b, c, d, e, f, g):
     """Weighted sum of a block's numbers at Gauss's points."""
-    outer = splat8(weights[first]) * a + splat8(weights[first + 4]) * e
-    inner_ones = splat8(weights[first + 1]) * b + splat8(weights[first + 3]) * d
-    return outer + inner_ones + splat8(weights[first + 2]) * c
+    outer = splat8(weights[first]) * a + splat8(weights[first + 6]) * g
+    between = splat8(weights[first + 1]) * b + splat8(weights[first + 5]) * f
+    inner_ones = splat8(weights[first + 2]) * c + splat8(weights[first + 4]) * e
+    return outer + between + inner_ones + splat8(weights[first + 3]) * d
 
 
 @merged

@@ -36,6 +36,7 @@ _OCTAVE = 4  # flight steps of which each is twice as long as the last
 _BRIEF = 0.04  # |λ| h up to which twelve terms of a Taylor series are exact
 _MOST_NUMBERS = 10_000_000  # in the rows: with more drivers the work is computed by series
 _MOST_PER_BLOCK = 1000  # numbers of a form summed over the blocks: with more, of many tones, blocks take less time
+_POINTS = 7  # of Gauss's rule on a series, see `flight_balance`
 _REACH = 200.0  # radians of the fastest block up to which a contact step has tables
 
 
@@ -50,8 +51,8 @@ class EnergyTables(NamedTuple):
     plain: Annotated[Any, "l, 3, N8"]  # damping = Σ rows × (p², p v, v²)
     rows: Annotated[Any, "l, 6*J+d, 4*N8"]  # work, then damping, from p, then v, per unit of a signal or driver
     pairs: Annotated[Any, "l, 6*J, pairs"]  # the same from the signals, 2 × 6J padded
-    gauss: Annotated[Any, "2, 5"]
-    series: Annotated[Any, "6, LONG"]  # weights of a series' terms at Gauss's points and at the end
+    gauss: Annotated[Any, "2, points"]
+    series: Annotated[Any, "points+1, LONG"]  # weights of a series' terms at Gauss's points and at the end
     kind: Annotated[Any, "int f"]  # contact table of every node set
     first: Annotated[float, "number"]  # contact step at which the tables begin
     longest: Annotated[Any, "kinds"]  # s: contact step up to which they may be used
@@ -70,12 +71,12 @@ def _empty(kept: float, node_sets: int) -> EnergyTables:
     none, nothing, contact = np.zeros(0, dtype=np.int64), np.zeros((0, 0, 0)), np.zeros((0, 0, 0, 0, 0))
     flight = kept, 0.0, 0.0, none, np.zeros((0, 0)), nothing, nothing, nothing
     kind, longest, sums = np.zeros(node_sets, dtype=np.int64), np.zeros(1), np.zeros((0, 0, 0, 0))
-    return EnergyTables(*flight, gauss(5), _series(), kind, 0.0, longest, contact, contact, none, sums, sums)
+    return EnergyTables(*flight, gauss(_POINTS), _series(), kind, 0.0, longest, contact, contact, none, sums, sums)
 
 
 def _series() -> Any:
-    """(6, LONG) x^i/i! at Gauss's points and at 1."""
-    points = np.append(gauss(5)[0], 1.0)
+    """(points + 1, LONG) x^i/i! at Gauss's points and at 1."""
+    points = np.append(gauss(_POINTS)[0], 1.0)
     return np.array([[x**i / math.factorial(i) for i in range(SERIES_TERMS)] for x in points])
 
 

@@ -1,0 +1,80 @@
+"""Gravity in any direction: a turned frame under turned gravity hangs as it did, reactions carry the weight."""
+
+import numpy as np
+import pytest
+from frames import portal, space_l, turned
+
+import fembeam as fb
+from fembeam import scene_file
+
+DOWN = np.array([0.0, 0.0, -9.81])
+WEIGHT = 7850 * 2e-4 * 0.8 * 9.81
+
+
+def hanging(frame, gravity):
+    """A run at rest under gravity."""
+    model = fb.Scene(frame, [fb.Clamped("A")], gravity=gravity).reduce(modes=10)
+    return model.simulate(0.01, [0.01], start=model.equilibrium())
+
+
+def test_turned_with_the_frame():
+    """Deflections turn with both; the clamp carries the weight and nothing else."""
+    turn = turned(4)
+    one, two = hanging(space_l(), tuple(DOWN)), hanging(space_l(turn), tuple(turn @ DOWN))
+    sag = one.motion("C")[0, :3]
+    assert sag[2] < -1e-3
+    assert np.allclose(turn.T @ two.motion("C")[0, :3], sag, atol=1e-6 * abs(sag[2]))
+    assert np.allclose(one.reactions()[0].force[0], [0, 0, WEIGHT], atol=1e-6)
+    assert np.allclose(turn.T @ two.reactions()[0].force[0], [0, 0, WEIGHT], atol=1e-6)
+
+
+def test_a_number_is_along_minus_y():
+    """The same run to the bit; nothing is nothing."""
+    one, two = hanging(space_l(), 9.81), hanging(space_l(), (0.0, -9.81, 0.0))
+    assert np.array_equal(one.q, two.q)
+    assert fb.Scene(portal(), gravity=(0, 0, 0)).pulls == fb.Scene(portal()).pulls == {}
+
+
+def test_free_fall():
+    """A free frame falls along the vector, after signals and a base motion are listed."""
+    frame = fb.Frame.polyline({"A": (0, 0), "B": (1.0, 0)}, fb.Section.rectangle(2.1e11, 7850.0, 0.02, 0.01))
+    with pytest.warns(UserWarning, match="rigid-body modes appear"):
+        run = (
+            fb.Scene(frame, gravity=(3.0, -9.81, 0.0), base={"x": fb.Harmonic(0.0, 1.0)}).reduce(3).simulate(0.2, [0.2])
+        )
+    assert run.displacement("B", "x")[0] == pytest.approx(0.5 * 3.0 * 0.04, rel=1e-9)
+    assert run.displacement("B", "y")[0] == pytest.approx(-0.5 * 9.81 * 0.04, rel=1e-9)
+
+
+def test_in_a_file_and_drawn(tmp_path):
+    """A list of three numbers; the rig says it."""
+    text = """
+gravity = [0, 0, -9.81]
+[frame]
+nodes = { A = [0, 0, 0], B = [1, 0, 0] }
+[[frame.members]]
+nodes = ["A", "B"]
+section = { shape = "circle", E = 2.1e11, rho = 7850.0, diameter = 0.02 }
+"""
+    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
+    scene = scene_file.read(tmp_path / "scene.toml").scene
+    assert scene.gravity == (0.0, 0.0, -9.81)
+    texts = [text.get_text() for axes in scene.figure().axes for text in axes.texts] + [
+        a.get_title() for a in scene.figure().axes
+    ]
+    assert any("gravity (0, 0, -9.81) m/s²" in text for text in texts)
+    (tmp_path / "scene.toml").write_text(text.replace("[0, 0, -9.81]", '"down"'), encoding="utf-8")
+    with pytest.raises(ValueError, match="must be a number, or three"):
+        scene_file.read(tmp_path / "scene.toml")
+
+
+@pytest.mark.parametrize(("make", "says"), [
+    (lambda: fb.Scene(portal(), gravity=(0, 0, 1)), r"must pull along x, y, got .'z'. in Scene"),
+    (lambda: fb.Scene(portal(), gravity=(0, 1)), "must be a number, or three"),
+    (lambda: fb.Scene(portal(), gravity=(0, np.nan, 0)), "must be a number, or three"),
+    (lambda: fb.Scene(fb.Beam(1.0, fb.Section.circle(2e11, 7800.0, 0.01)), gravity=(0, 1, 0)), "of a Beam must be one"),
+])  # fmt: skip
+def test_refused(make, says):
+    """What is no gravity."""
+    with pytest.raises(ValueError, match=says):
+        make()

@@ -1,0 +1,156 @@
+"""Supports with motions of their own: equal ones are a base motion, one end that moves by formula, what is refused."""
+
+import numpy as np
+import pytest
+from frames import PORTAL, portal
+
+import fembeam as fb
+from contacts import Hertz, KelvinVoigt
+from fembeam import scene_file
+
+WAVE = fb.Harmonic(1e-3, 46.0, phase=0.7)
+DAMPED = {"damping": fb.ModalDamping(0.02)}
+SPAN = fb.Section(E=1e4, rho=1.0, A=1.0, I=1e-4)
+
+
+def feet(wave_a, wave_d, **options):
+    """The portal with feet that move along x."""
+    supports = [fb.Clamped("A", motion={"x": wave_a}), fb.Clamped("D", motion={"x": wave_d})]
+    return fb.Scene(portal(), supports, **DAMPED, **options)
+
+
+def based(**options):
+    """The portal on a frame that moves."""
+    return fb.Scene(portal(), [fb.Clamped("A"), fb.Clamped("D")], base={"x": WAVE}, **DAMPED, **options)
+
+
+def equal(one, two, tolerance):
+    """Whether two histories are one to a share of their size."""
+    return np.abs(one - two).max() <= tolerance * np.abs(one).max()
+
+
+def test_equal_motions_are_a_base_motion():
+    """On all coordinates to rounding: motion, reactions, section forces; energy balances; the saved run as well."""
+    one, two = (scene.reduce("all", elements=6).simulate(0.3, 5e-3) for scene in (based(), feet(WAVE, WAVE)))
+    for place in ("A", "C", ("B-C", 1.3)):
+        for quantity in ("displacement", "velocity", "acceleration"):
+            known = getattr(one, quantity)(place, "x", absolute=True)
+            assert equal(known, getattr(two, quantity)(place, "x"), 1e-10), (place, quantity)
+    for mine, other in zip(one.reactions(), two.reactions(), strict=True):
+        assert all(equal(mine[c], other[c], 1e-10) for c in ("x", "y", "rz"))
+    for place in (("A-B", 0.0), ("A-B", 1.5), ("B-C", 4.0)):
+        forces = two.section_forces(place)
+        assert all(equal(known, forces[name], 1e-10) for name, known in one.section_forces(place).items())
+    assert abs(two.energy.residual).max() < 1e-9 * abs(two.energy.input).max()
+
+
+def test_kept_by_a_file(tmp_path):
+    """Places on and beside moving supports, from the file alone."""
+    run = feet(WAVE, fb.Harmonic(2e-3, 30.0)).reduce(2).simulate(0.1, 5e-3)
+    run.save(tmp_path / "run.npz")
+    read = fb.load(tmp_path / "run.npz")
+    for place, signal in (("A", WAVE), ("D", fb.Harmonic(2e-3, 30.0))):
+        assert np.allclose(run.displacement(place, "x"), signal(run.t), rtol=0, atol=1e-15)
+        assert np.array_equal(run.displacement(place, "x"), read.displacement(place, "x"))
+        assert np.array_equal(run.velocity(place, "x"), read.velocity(place, "x"))
+    assert np.allclose(read.reactions()[1]["x"], run.reactions()[1]["x"], rtol=1e-12)
+    assert run.motion("D")[:, 0].max() == run.extremes(z=[("D", "x")]).highest[0]
+
+
+def test_few_modes_with_the_shapes_of_the_supports():
+    """Two modes and the static shapes of both feet are as good as two modes under a base motion."""
+    one, two = (scene.reduce(modes=2) for scene in (based(), feet(WAVE, WAVE)))
+    assert (len(one.omega), len(two.omega)) == (2, 4)
+    w = np.array([5.0, 30.0, 60.0])
+    both = [two.frequency_response(w, f"supports[{i}].motion.x", ("C", "x")).values for i in range(2)]
+    assert np.allclose(sum(both), one.frequency_response(w, "base.x", ("C", "x"), absolute=True).values, rtol=1e-4)
+
+
+@pytest.mark.parametrize("omega", [3.0, 20.0, 55.0])
+def test_one_end_moves(omega):
+    """A beam on two pins, one of which moves: u = Y/2 (sin κz/sin κL + sinh κz/sinh κL)."""
+    frame = fb.Frame({"A": (0, 0), "B": (1.0, 0)}, [fb.Member("A", "B", SPAN)])
+    wave = fb.Harmonic(1.0, omega)
+    scene = fb.Scene(frame, [fb.Pinned("A"), fb.Fixed("B", "y", motion={"y": wave})])
+    kappa, at = np.sqrt(omega), np.array([0.25, 0.5, 0.9])
+    exact = 0.5 * (np.sin(kappa * at) / np.sin(kappa) + np.sinh(kappa * at) / np.sinh(kappa))
+    places, errors = [(("A-B", float(z)), "y") for z in at], []
+    for modes in (8, 24):
+        response = scene.reduce(modes).frequency_response([omega], "supports[1].motion.y", places)
+        errors.append(np.abs(response.values[0] - exact).max())
+    assert errors[1] < 5e-5
+    assert errors[1] < 0.2 * errors[0]  # what the modes left out had of the inertia
+
+
+def test_settlement():
+    """A slow settlement by y of a propped end: 3 EI y/L² in the clamp, 3 EI y/L³ in the prop, nothing else moves."""
+    frame = fb.Frame({"A": (0, 0), "B": (2.0, 0)}, [fb.Member("A", "B", SPAN)])
+    slow = fb.Harmonic(1.0, 1e-4, phase=0.5)
+    scene = fb.Scene(frame, [fb.Clamped("A"), fb.Fixed("B", "y", motion={"y": slow})])
+    run = scene.reduce(modes=1).simulate(1.0, 0.25)
+    assert np.allclose(np.abs(run.section_forces(("A-B", 0.0))["M"]), 0.75 * slow(run.t), rtol=1e-6)
+    assert np.allclose(run.reactions()[1]["y"], 3 / 8 * slow(run.t), rtol=1e-6)
+    assert np.allclose(run.displacement(("A-B", 1.0), "y"), 5 / 16 * slow(run.t), rtol=1e-6)
+
+
+def test_contacts():
+    """Stops between places of the structure do not know which way its feet were said to move."""
+    stops = [fb.Stop("C", KelvinVoigt(1e6, 1e3), gap=1e-4, direction="x", on=("A-B", 1.5))]
+    one, two = (s.reduce("all", elements=6).simulate(0.2) for s in (based(stops=stops), feet(WAVE, WAVE, stops=stops)))
+    assert len(one.contacts) == len(two.contacts) > 1
+    assert np.allclose(one.contacts.t_in[:3], two.contacts.t_in[:3], rtol=1e-7)
+
+
+def test_names_of_signals():
+    """Studies vary the motions by their paths; noise without a period gets one of the run."""
+    scene = feet(WAVE, fb.Harmonic(1e-3, 20.0))
+    assert list(fb.scene.signals_of(scene)) == ["supports[0].motion.x", "supports[1].motion.x"]
+    other = fb.scene.with_value(scene, "supports[1].motion.x.amplitude", 3e-3)
+    assert other.supports[1].motion["x"].amplitude == 3e-3
+    assert other.supports[0] == scene.supports[0]
+    assert not fb.scene.changes_structure("supports[1].motion.x.omega")
+    assert repr(fb.Clamped("A")) == "Clamped(z='A')"
+
+
+def test_in_a_file(tmp_path):
+    """A table of signals by dof."""
+    nodes = ", ".join(f"{name} = {list(at)}" for name, at in PORTAL.items())
+    text = f"""
+[frame]
+nodes = {{ {nodes} }}
+[[frame.members]]
+nodes = ["A", "B", "C", "D"]
+section = {{ shape = "rectangle", E = 2.1e11, rho = 7850.0, width = 0.05, height = 0.1 }}
+[[supports]]
+kind = "clamped"
+at = "A"
+motion = {{ x = {{ kind = "harmonic", amplitude = 1e-3, omega = 46.0, phase = 0.7 }} }}
+[[supports]]
+kind = "fixed"
+at = "D"
+dofs = ["x", "y"]
+[supports.motion.x]
+kind = "harmonic"
+amplitude = 2e-3
+omega = 30.0
+"""
+    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
+    scene = scene_file.read(tmp_path / "scene.toml").scene
+    assert scene.supports == (
+        fb.Clamped("A", motion={"x": WAVE}),
+        fb.Fixed("D", "x", "y", motion={"x": fb.Harmonic(2e-3, 30.0)}),
+    )
+
+
+@pytest.mark.parametrize(("make", "says"), [
+    (lambda: fb.Pinned("A", motion={"rz": WAVE}), r"of dofs that the support holds, x, y, z, got 'rz' in Pinned"),
+    (lambda: fb.Clamped("A", motion=WAVE), "motion must name its dofs"),
+    (lambda: fb.Clamped("A", motion={"x": np.sin}), "signals that know their derivatives"),
+    (lambda: fb.Scene(portal(), [fb.Clamped("A", motion={"z": WAVE})]), r"has x, y, rz, got .'z'. in supports.0."),
+    (lambda: fb.Scene(fb.Beam(1.0, SPAN), [fb.Clamped(0.0, motion={"y": WAVE})]), "needs a Frame or Structure"),
+    (lambda: feet(WAVE, WAVE, stops=[fb.Stop("D", Hertz(1e8), direction="x")]), r"moves along x, got 'D' in stops"),
+])  # fmt: skip
+def test_refused(make, says):
+    """What no support can do."""
+    with pytest.raises(ValueError, match=says):
+        make()
