@@ -27,8 +27,8 @@ __version__ = "0.1.0"
 _OFFERED = {
     "beams": "Section Taper Beam ModalDamping Rayleigh",
     "structures": "Frame Joint Member Scale Structure",
-    "scene": "Clamped Dashpot Disk Element Fixed Guided LumpedMass Pinned PointForce PointMoment Scene Spring Stop "
-    "Unbalance Impactor",
+    "scene": "AnnularStop Clamped Dashpot Disk Element Fixed Guided Impactor LumpedMass Pinned PointForce PointMoment "
+    "Scene Spring Stop Unbalance",
     "excitation": "Harmonic Multisine BandNoise RollOff Record Pulse SineSweep Step",
     "model": "Model Attractor Orbit Branch Run load",
     "response": "response_spectrum",
@@ -38,11 +38,11 @@ _HOME = {name: folder for folder, names in _OFFERED.items() for name in names.sp
 _MODULES = ["plot", "study"]
 
 __all__ = [
-    "Attractor", "BandNoise", "Beam", "Branch", "Clamped", "Dashpot", "Disk", "Element", "Fixed", "Frame", "Guided",
-    "Harmonic", "Impactor", "Joint", "LumpedMass", "Member", "ModalDamping", "Model", "Multisine", "Orbit", "Pinned",
-    "PointForce", "PointMoment", "Pulse", "Rayleigh", "Record", "RollOff", "Run", "Scale", "Scene", "Section",
-    "SineSweep", "Spring", "Step", "Stop", "Structure", "Taper", "Unbalance", "load", "moments", "pdf", "plot", "psd",
-    "response_spectrum", "study",
+    "AnnularStop", "Attractor", "BandNoise", "Beam", "Branch", "Clamped", "Dashpot", "Disk", "Element", "Fixed",
+    "Frame", "Guided", "Harmonic", "Impactor", "Joint", "LumpedMass", "Member", "ModalDamping", "Model", "Multisine",
+    "Orbit", "Pinned", "PointForce", "PointMoment", "Pulse", "Rayleigh", "Record", "RollOff", "Run", "Scale", "Scene",
+    "Section", "SineSweep", "Spring", "Step", "Stop", "Structure", "Taper", "Unbalance", "load", "moments", "pdf",
+    "plot", "psd", "response_spectrum", "study",
 ]  # fmt: skip
 
 if TYPE_CHECKING:
@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from fembeam.model import Attractor, Branch, Model, Orbit, Run, load
     from fembeam.response import response_spectrum
     from fembeam.scene import (
+        AnnularStop,
         Clamped,
         Dashpot,
         Disk,

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import fields
+from dataclasses import fields, replace
 from fractions import Fraction
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -38,7 +39,19 @@ SEEN = (
 
 def _placed(part: Any) -> tuple[Any, ...]:
     """Where and how a stop or element acts: all of it but its law and gap."""
-    return tuple(getattr(part, f.name) for f in fields(part) if f.name not in ("law", "gap"))
+    return tuple(getattr(part, f.name) for f in fields(part) if f.name not in ("law", "gap", "clearance"))
+
+
+def _contact(directions: Vector, one: ContactRow) -> solvers.Contact:
+    """A contact of a scene on its rows of coordinates."""
+    if not one.is_circle:
+        return solvers.Contact(directions[0], one.law, one.gap, one.always, one.name)
+    radius, *centre = one.circle
+    both = np.linalg.matrix_rank(directions) == 2
+    require(both, f"the modes must move the place of {one.name!r} along both directions", len(directions[0]), "Model",
+            "keep more modes: of a round section two for each shape")  # fmt: skip
+    round_about: Any = {"map": "annulus", "centre": centre, "outer": radius < 0.0}
+    return solvers.Contact(directions, one.law, one.gap, one.always, one.name, **round_about)
 
 
 class ModalEquations:
@@ -149,9 +162,18 @@ class ModalEquations:
 
     @cached_property
     def directions(self) -> Vector:
-        """(m, n): w of every contact on the coordinates, δ = -w·q - gap."""
-        rows = [self.basis.project(one.row.T)[:, 0] for one in self.contact_rows]
+        """(r, n): rows of all contacts on the coordinates: w of each, δ = -w·q - gap; of a circular clearance W (2, n).
+
+        `rows_of` says which rows are those of a contact.
+        """
+        rows = [row for one in self.contact_rows for row in self.basis.project(one.row.T).T]
         return np.array(rows).reshape(len(rows), len(self.omega))
+
+    @cached_property
+    def rows_of(self) -> list[slice]:
+        """Which of the rows of `directions` are those of each contact."""
+        ends = np.cumsum([0, *(one.row.shape[0] for one in self.contact_rows)]).tolist()
+        return [slice(a, b) for a, b in pairwise(ends)]
 
     @cached_property
     def system(self) -> solvers.System:
@@ -163,8 +185,7 @@ class ModalEquations:
         n = len(self.omega)
         C = np.diag(self._damping_of(scene)) + self.basis.project_matrix(self.matrices.dashpots)
         same = self.contact_rows if scene is self.scene else contact_rows(scene, self.matrices)
-        pairs = zip(self.directions, same, strict=True)
-        contacts = [solvers.Contact(direction, one.law, one.gap, one.always, one.name) for direction, one in pairs]
+        contacts = [_contact(self.directions[own], one) for own, one in zip(self.rows_of, same, strict=True)]
         rows = [(self.basis.project(row.T)[:, 0], signal) for row, signal in loads(scene, self.matrices)]
         for i, q in enumerate(self.following):  # damping acts on what does not follow the supports
             vector, signal = rows[3 * i + 1]
@@ -208,7 +229,7 @@ class ModalEquations:
         ):
             return self.system_of(scene)
         contacts = [
-            contact if new is old else solvers.Contact(contact.direction, new.law, new.gap, new.always, contact.name)
+            contact if new is old else replace(contact, law=new.law, gap=new.gap)
             for contact, new, old in zip(own.contacts, parts, known, strict=False)
         ]
         kept = own.loads[: len(own.loads) - len(frame)]
@@ -228,7 +249,8 @@ class ModalEquations:
 
     def _elements_with(self, slopes: list[tuple[float, float]]) -> tuple[Vector, Vector]:
         """Stiffness and damping (n, n) of the elements from those of each."""
-        W = np.array([w for w, one in zip(self.directions, self.contact_rows, strict=True) if one.always])
+        pairs = zip(self.rows_of, self.contact_rows, strict=True)
+        W = np.array([self.directions[own][0] for own, one in pairs if one.always])
         W, each = W.reshape(-1, len(self.omega)), np.array(slopes).reshape(-1, 2)
         return (W.T * each[:, 0]) @ W, (W.T * each[:, 1]) @ W
 

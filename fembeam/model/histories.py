@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from difflib import get_close_matches
+from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,6 +35,7 @@ class Histories:
     q_dot: Vector
     stops: Vector
     directions: Vector
+    circles: Vector
     impactor_masses: Vector
     kinds: NDArray[np.bool_]
     shapes: Any  # Shapes, of a body with places by name PlacedShapes
@@ -244,13 +247,16 @@ class Histories:
     def indentation(self, stop: int | str = 0) -> Vector:
         """δ(t) (k,) of a stop, m or rad; negative while it is open. Elements, then impactors, count on after the stops.
 
-        Of an element its deformation d(t). ``stop`` may be a name: ``run.indentation("valve")``.
+        Of an element its deformation d(t), of an annular stop r - c, or c - r of an outer one. ``stop`` may be a name:
+        ``run.indentation("valve")``.
         """
         return self._at_samples(self._deformation(self._stop(stop)))
 
     def _deformation(self, stop: int) -> Vector:
         """δ (k,), of the last state without samples."""
-        return -self.q @ self.directions[stop] - self.stops[stop, 2]
+        if radius := self.circles[stop, 0]:
+            return np.asarray(np.sign(radius) * np.linalg.norm(self._in_circle(stop), axis=1) - radius)
+        return -self.q @ self.directions[self._rows[stop].start] - self.stops[stop, 2]
 
     def indentation_rate(self, stop: int | str = 0) -> Vector:
         """δ̇(t) (k,) of a stop or element, m/s or rad/s: of both bodies where the stop moves."""
@@ -258,7 +264,38 @@ class Histories:
 
     def _deformation_rate(self, stop: int) -> Vector:
         """δ̇ (k,), likewise."""
-        return -self.q_dot @ self.directions[stop]
+        if self.circles[stop, 0]:
+            rates = self.q_dot @ self.directions[self._rows[stop]].T
+            return np.asarray(np.sum(self._outward(stop) * rates, axis=1))
+        return -self.q_dot @ self.directions[self._rows[stop].start]
+
+    def place_in_clearance(self, stop: int | str = 0) -> Vector:
+        """d(t) (k, 2) of an annular stop, m: where the place is in its circle, from the centre along both directions."""
+        number = self._stop(stop)
+        require(self.circles[number, 0] != 0.0, "the stop must be an annular one", stop, "Run",
+                "ask for its indentation")  # fmt: skip
+        return self._at_samples(self._in_circle(number))
+
+    @cached_property
+    def _rows(self) -> list[slice]:
+        """Which rows of `directions` are those of each contact: two of a circular clearance."""
+        ends = np.cumsum([0, *np.where(self.circles[:, 0] != 0.0, 2, 1)]).tolist()
+        return [slice(a, b) for a, b in pairwise(ends)]
+
+    def _in_circle(self, stop: int) -> Vector:
+        """d (k, 2) of a circular clearance."""
+        return np.asarray(self.q @ self.directions[self._rows[stop]].T - self.circles[stop, 1:])
+
+    def _outward(self, stop: int) -> Vector:
+        """Unit vectors (k, 2) along which δ of a circular clearance grows: ± d/r; zeros at the centre."""
+        d = self._in_circle(stop)
+        r = np.linalg.norm(d, axis=1)[:, None]
+        return np.asarray(np.sign(self.circles[stop, 0]) * d / np.where(r > 0.0, r, 1.0))
+
+    def _normal_force(self, stop: int) -> Vector:
+        """Contact force (k,) along which δ shrinks: of any stop, N of a circular clearance."""
+        forces = self._forces[self._rows[stop]]
+        return -np.sum(self._outward(stop).T * forces, axis=0) if self.circles[stop, 0] else forces[0]
 
     def _stop(self, stop: int | str) -> int:
         """The number of a contact, checked, of one called by its name too."""

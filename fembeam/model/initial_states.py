@@ -121,8 +121,8 @@ def _on_labels(body: BodyMatrices, field: Any) -> Vector:
 
 def _check_impactors(model: Model, q: Vector) -> None:
     """Raise ValueError when a field puts a free impactor inside the beam."""
-    for contact, direction in zip(model.contact_rows, model.directions, strict=True):
-        kind, number = contact.on
+    for contact, own in zip(model.contact_rows, model.rows_of, strict=True):
+        direction, (kind, number) = model.directions[own.start], contact.on
         if kind == "impactor" and model.matrices.impactors[number].stiffness == 0:
             delta = float(-direction @ q - contact.gap)
             scale = float(np.abs(direction) @ np.abs(q)) + contact.gap
@@ -147,6 +147,19 @@ def equilibrium(model: Model, loads: Mapping[float, float]) -> Vector:
     return start
 
 
+def onto_circle(contact: Any, speed: float) -> tuple[float, float]:
+    """Value and rate of the first coordinate that bring a place onto its circle with δ̇ = speed, all others at rest.
+
+    |t w - o| = c,  δ̇ = ± (t w - o)·w ṫ/c;  of two such values the larger, of an outer circle that nearer to rest.
+    """
+    w, o, sign = contact.direction[:, 0], np.array(contact.centre), np.sign(contact.radius)
+    a, b = w @ w, w @ o
+    root = b * b - a * (o @ o - contact.gap**2)
+    require(a > 0.0 and root > 0.0, "the first mode must reach the circle", root, "Model.strike", "simulate instead")
+    t = (b + sign * np.copysign(np.sqrt(root), 1.0 if sign > 0 else b)) / a
+    return t, speed * contact.gap / (sign * ((t * w - o) @ w))
+
+
 def _settled(model: Model, load: Vector, free: NDArray[np.bool_]) -> Vector:
     """Solve r(q) = f + Σ w F - ω² q = 0 by Newton steps damped like time: (1/τ + J) Δq = r.
 
@@ -154,23 +167,29 @@ def _settled(model: Model, load: Vector, free: NDArray[np.bool_]) -> Vector:
     """
     K, f, W = model.omega[free] ** 2, load[free], model.directions[:, free]
     rows = model.contact_rows
-    gaps = np.array([contact.gap for contact in rows])
+    gaps = np.array([gap for contact in rows for gap in contact.gaps])
     q = np.zeros(len(f))
-    forces, slopes = _pushed(rows, -W @ q - gaps)
+    forces, slopes, circles = _pushed(model, -W @ q - gaps)
     residual = f + forces @ W - K * q
     tau = 1e-3 / max(K.max(initial=0.0), 1e-6)
     for _ in range(MOST_STEPS):
         scale = np.abs(f).max(initial=0.0) + np.abs(forces[:, None] * W).max(initial=0.0) + np.abs(K * q).max(initial=0)
-        rounding = (slopes * (np.abs(W) @ np.abs(q) + np.abs(gaps))) @ np.abs(W)  # of δ, which stiff contacts multiply
+        stiff = slopes.copy()
+        for own, block in circles:
+            stiff[own] = np.abs(block).max()
+        rounding = (stiff * (np.abs(W) @ np.abs(q) + np.abs(gaps))) @ np.abs(W)  # of δ, which stiff contacts multiply
         if np.abs(residual).max(initial=0.0) <= SETTLED * scale + ROUNDED * rounding.max(initial=0.0):
-            _check_memory(rows, -W @ q - gaps)
+            _check_memory(model, -W @ q - gaps)
             return q
         J = np.diag(1 / tau + K) + (W.T * slopes) @ W
+        for own, block in circles:
+            J += W[own].T @ block @ W[own]
         trial = q + np.linalg.solve(J, residual)
-        trial_forces, trial_slopes = _pushed(rows, -W @ trial - gaps)
+        trial_forces, *trial_slopes = _pushed(model, -W @ trial - gaps)
         after = f + trial_forces @ W - K * trial
         if np.linalg.norm(after) <= (1 + 1e-12) * np.linalg.norm(residual):
-            q, forces, slopes, residual, tau = trial, trial_forces, trial_slopes, after, min(2 * tau, 1e300)
+            q, forces, residual, tau = trial, trial_forces, after, min(2 * tau, 1e300)
+            slopes, circles = trial_slopes
         elif not tau > 1e-30:
             break
         else:
@@ -181,9 +200,10 @@ def _settled(model: Model, load: Vector, free: NDArray[np.bool_]) -> Vector:
     )
 
 
-def _check_memory(rows: list[ContactRow], delta: Vector) -> None:
+def _check_memory(model: Model, delta: Vector) -> None:
     """Raise AccuracyError when a law with memory would pass a border, such as slip, on the way."""
-    for row, d in zip(rows, delta, strict=True):
+    for row, own in zip(model.contact_rows, model.rows_of, strict=True):
+        d = delta[own.start]
         if row.remembers and np.any(borders(row.law, np.array([d]), 0.0, row.law.parameters) < 0):
             kind = "impactor" if row.on[0] == "impactor" else "element" if row.always else "stop"
             way = "is touched" if getattr(row.law, "opens", False) else "slips or yields"
@@ -193,14 +213,34 @@ def _check_memory(rows: list[ContactRow], delta: Vector) -> None:
             )
 
 
-def _pushed(rows: list[ContactRow], delta: Vector) -> tuple[Vector, Vector]:
-    """Static forces (m,) and their slopes ∂F/∂δ (m,), of stops by differences."""
-    force, slope = np.zeros(len(rows)), np.zeros(len(rows))
-    for i, (row, d) in enumerate(zip(rows, delta, strict=True)):
-        if row.always:
-            force[i], slope[i] = float(row.force(d)), max(tangent(row.law, d)[0], 0.0)
-        elif d > 0:
-            step = 1e-6 * d
-            low, force[i], high = (float(f) for f in row.force(np.array([d - step, d, d + step])))
-            slope[i] = max((high - low) / (2 * step), 0.0)
-    return force, slope
+def _pushed(model: Model, delta: Vector) -> tuple[Vector, Vector, list[tuple[slice, Vector]]]:
+    """Static forces (r,) on all rows and their slopes ∂F/∂δ (r,), of stops by differences; of circles 2 by 2."""
+    force, slope, circles = np.zeros(len(delta)), np.zeros(len(delta)), []
+    for row, own in zip(model.contact_rows, model.rows_of, strict=True):
+        i = own.start
+        if row.is_circle:
+            force[own], block = _round(row, -delta[own])
+            circles += [(own, block)] if block.any() else []
+        elif row.always:
+            force[i], slope[i] = float(row.force(delta[i])), max(tangent(row.law, delta[i])[0], 0.0)
+        elif delta[i] > 0:
+            force[i], slope[i] = _one_sided(row, delta[i])
+    return force, slope, circles
+
+
+def _one_sided(row: ContactRow, d: float) -> tuple[float, float]:
+    """Static force of a stop at δ > 0, and its slope."""
+    step = 1e-6 * d
+    low, force, high = (float(f) for f in row.force(np.array([d - step, d, d + step])))
+    return force, max((high - low) / (2 * step), 0.0)
+
+
+def _round(row: ContactRow, d: Vector) -> tuple[Vector, Vector]:
+    """Static force (2,) of a circular clearance on a place at d, and -∂F/∂d = N' e eᵀ + N/r (1 - e eᵀ), e = ± d/r."""
+    radius, r = row.circle[0], float(np.hypot(*d))
+    delta = np.sign(radius) * r - radius
+    if delta <= 0 or r == 0.0:
+        return np.zeros(2), np.zeros((2, 2))
+    force, slope = _one_sided(row, delta)
+    e = np.sign(radius) * d / r
+    return -force * e, slope * np.outer(e, e) + np.sign(radius) * force / r * (np.eye(2) - np.outer(e, e))

@@ -34,7 +34,16 @@ if TYPE_CHECKING:
     from fembeam.scene import Matrices, Scene
 
 Field = Callable[[Vector], Any] | None  # of displacement in m or velocity in m/s, over z (k,)
-UNDRIVEN = ("zeta", "participation", "moving_mass", "section_forces", "contact_rows", "directions", "turning")
+UNDRIVEN = (
+    "zeta",
+    "participation",
+    "moving_mass",
+    "section_forces",
+    "contact_rows",
+    "directions",
+    "rows_of",
+    "turning",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +104,10 @@ class Model(Printed, ModalEquations):
                 "count from 0")  # fmt: skip
         contact = self.system.contacts[stop]
         start = np.zeros((2, len(self.omega)))
-        start[:, 0] = np.array([-contact.gap, -speed]) / contact.direction[0]
+        if contact.map == "annulus":
+            start[:, 0] = initial_states.onto_circle(contact, speed)
+        else:
+            start[:, 0] = np.array([-contact.gap, -speed]) / contact.direction[0]
         system = solvers.System(self.system.M, self.system.C, self.system.K, [contact], gyroscopic=self.turning)
         slowest = max(float(self.omega[0]), 1.0)
         return solvers.integrate(system, *start, np.pi / slowest).contacts

@@ -175,7 +175,7 @@ def _warn_of_drift(scene: Scene, matrices: Matrices, bases: list[reduction.Basis
         count = int(np.sum(basis.omega == 0.0))
         loads = bool(part.forces) or bool(scene.motions) or bool(scene.pulls)
         acting = [*part.stops, *(one for one in scene.acting if number and (one.coordinate.to or (0,))[0] == number)]
-        if beam.named and count and loads and not part.elements and len(acting) < 2:
+        if beam.named and count and loads and not part.elements and sum(len(one.coordinates) for one in acting) < 2:
             where = f"bodies[{number - 1}] of Scene" if number else "Scene"
             what = "1 rigid-body mode appears" if count == 1 else f"{count} rigid-body modes appear"
             said = f"{what} in {where}: supports and springs do not hold the structure, its loads may carry it away"

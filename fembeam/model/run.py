@@ -51,13 +51,13 @@ class Run(Histories, Printed):
     cost: solvers.Cost
     shapes: Any  # Shapes, of a body with places by name PlacedShapes
     stops: Vector  # (m, 3): z (NaN of a place by name), push, gap of every contact
-    directions: Vector  # (m, n): δ = -directions·q - gap
+    directions: Vector  # (r, n), rows of contacts: δ = -directions·q - gap; two of a circular clearance: d + centre
     impactor_masses: Vector  # (i,) of the impactors, whose coordinates √m x are the last ones
     scene: str
     borders: Callable[[], Any] = field(repr=False)  # what `transitions` are made by
     lost: Callable[[], Losses] = field(repr=False)  # and `losses`
     model: Model | None = None
-    stored_forces: Vector | None = None  # (m, k) of a run read from a file
+    stored_forces: Vector | None = None  # (r, k) of a run read from a file
     stored_means: Vector | None = None  # (m, k) likewise, over each sample
     stored: Readout | None = None  # likewise
     others: tuple[Any, ...] = ()  # of the further beams
@@ -69,7 +69,8 @@ class Run(Histories, Printed):
     kinds: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 2), dtype=bool))  # of rotation, always acting
     names: tuple[str, ...] = ()  # (m,) what every contact is called
     given: tuple[bool, ...] = ()  # (m,) whether it was given that name, or it was made
-    acting: tuple[Any, ...] = ()  # (m,) of each contact z, or (place, direction)
+    acting: tuple[Any, ...] = ()  # (m,) of each contact z, or (place, direction); both directions of an annular stop
+    circles: Vector = field(default_factory=lambda: np.zeros((0, 3)))  # (m, 3): radius, < 0 outer; centre; else zeros
     sampled: bool = True  # else t, q, q_dot are the final state alone, and no history
 
     def __repr__(self) -> str:
@@ -135,6 +136,7 @@ class Run(Histories, Printed):
             given=tuple(one.given for one in rows),
             acting=tuple(one.z if one.direction is None else (one.z, one.direction) for one in rows),
             sampled=sampled,
+            circles=np.array([one.circle for one in rows], dtype=float).reshape(-1, 3),
         )
 
     @property
@@ -218,7 +220,8 @@ class Run(Histories, Printed):
     def force(self, stop: int | str = 0, mean: bool = False) -> Vector:
         """Contact force (k,) of a stop, N or N m, from its law and the entry rate latched at the time; of an element F.
 
-        ``stop``: its number, or its name as in ``run.force("valve")``.
+        ``stop``: its number, or its name as in ``run.force("valve")``. Of an annular stop (k, 2), its components on the
+        place along both directions; with ``mean`` the size N (k,).
 
         ``mean``: over each sample (halfway to its neighbours) instead of at it, so that contacts shorter than a sample
         are seen: the trapezoidal rule over the samples gives impulses as exactly as the run has them, those of the log
@@ -229,11 +232,13 @@ class Run(Histories, Printed):
             from fembeam.response import mean_force
 
             return mean_force(self, self._stop(stop))
-        return self._at_samples(self._forces[self._stop(stop)])
+        number = self._stop(stop)
+        forces = self._forces[self._rows[number]]
+        return self._at_samples(forces.T if self.circles[number, 0] else forces[0])
 
     @cached_property
     def _forces(self) -> Vector:
-        """Forces (m, k)."""
+        """Forces (r, k) on all rows of contacts."""
         if self.stored_forces is not None:
             return self.stored_forces
         from fembeam.response import forces

@@ -90,7 +90,8 @@ def histories(
     for stop in range(len(run.stops)):
         of_stops = (what for what in asked if what in ("indentation", "force"))
         key = run.key(stop, alone=True)
-        columns |= {f"{what} {key} [{run.unit(what, stop)}]": getattr(run, what)(stop) for what in of_stops}
+        for what in of_stops:
+            columns |= _of_stop(run, what, stop, key)
         columns |= {f"work {key} [J]": run.losses.history[:, stop]} if "work" in asked else {}
     for i, one in enumerate(run.reactions() if "reactions" in asked else ()):
         about = one.name if one.part.name is not None else f"{i} ({one.name})"
@@ -100,6 +101,20 @@ def histories(
             continue
         columns |= {f"reaction force {about} [N]": one.force, f"reaction moment {about} [N m]": one.moment}
     return {name: column[::stride] for name, column in columns.items()}
+
+
+def _of_stop(run: Run, what: str, stop: int, key: str) -> dict[str, Vector]:
+    """The indentation or force of a stop; of an annular one both components of the force."""
+    values, unit = getattr(run, what)(stop), run.unit(what, stop)
+    if values.ndim == 1:
+        return {f"{what} {key} [{unit}]": values}
+    ways = [direction if isinstance(direction, str) else _vector(direction) for direction in run.acting[stop][1]]
+    return {f"{what} {key} {way} [{unit}]": values[:, i] for i, way in enumerate(ways)}
+
+
+def _vector(direction: Any) -> str:
+    """A direction as the file writes it, without commas."""
+    return f"({' '.join(f'{number:.4g}' for number in direction)})"
 
 
 def _pair(at: Any) -> Any:
@@ -157,7 +172,7 @@ def to_xarray(run: Run, z: ArrayLike | None = None) -> Any:
         "displacement": (("t", "z"), run.displacement(place), {"units": "m"}),
         "velocity": (("t", "z"), run.velocity(place), {"units": "m/s"}),
         "indentation": (("t", "stop"), _side_by_side(run, run.indentation), {"units": run.unit("indentation")}),
-        "force": (("t", "stop"), _side_by_side(run, run.force), {"units": run.unit("force")}),
+        "force": (("t", "stop"), _side_by_side(run, run._normal_force), {"units": run.unit("force")}),
         "q": (("t", "coordinate"), run.q, {"units": "m √kg"}),
         "q_dot": (("t", "coordinate"), run.q_dot, {"units": "m √kg/s"}),
     }

@@ -44,6 +44,8 @@ UNITS = {
     "kinds": "(of rotation, always acting) of each contact: rad for m, N m for N where it is of rotation",
 }
 
+CIRCLES = "m, of each contact: radius of a circular clearance, negative of an outer one, and its centre; or zeros"
+
 
 def save(run: Run, path: Path) -> Path:
     """Write everything to one file, whole or not at all: HDF5 if it ends in .h5 or .hdf5, else ``.npz``."""
@@ -70,7 +72,7 @@ def _contents(run: Run) -> tuple[str, dict[str, Any]]:
         "given": run.given,
         "scene": run.scene,
         "cost": {f.name: getattr(run.cost, f.name) for f in fields(run.cost)},
-        "units": UNITS,
+        "units": UNITS | ({"circles": CIRCLES} if run.circles.any() else {}),
         "versions": versions(),
         "acting": run.acting,
         "bodies": [shapes.words if isinstance(shapes, PlacedShapes) else None for shapes in (run.shapes, *run.others)],
@@ -91,6 +93,7 @@ def _contents(run: Run) -> tuple[str, dict[str, Any]]:
         **{f"energy_{f.name}": getattr(run.energy, f.name) for f in fields(run.energy)},
         **{f"file_{i}": np.frombuffer(content, dtype=np.uint8) for i, content in enumerate(carried)},
     }
+    arrays |= {"circles": run.circles} if run.circles.any() else {}
     about["readout"], read = packed(run.readout)
     about["events"], arrays["transitions"] = _packed(run.transitions)
     return json.dumps(about, default=float), arrays | read
@@ -241,6 +244,7 @@ def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run
         versions=about["versions"],
         on=arrays["on"],
         kinds=arrays["kinds"],
+        circles=arrays.get("circles", np.zeros((len(arrays["stops"]), 3))),
         acting=tuples(about["acting"]),
         sampled=about["sampled"],
         names=names,

@@ -1,7 +1,8 @@
 """Consistency of the arrays of a saved run; a truncated or edited file is refused with the reason.
 
-k samples, n coordinates, m contacts, b nodes of a beam, c entries of the log:
-t (k,), q, q_dot (k, n), force (m, k), stops (m, 3), kinds (m, 2), on (m, 3), directions (m, n), impactor_masses (i,),
+k samples, n coordinates, m contacts, r rows of them (two of a circular clearance), b nodes of a beam, c entries of the
+log: t (k,), q, q_dot (k, n), force (r, k), stops (m, 3), kinds (m, 2), on (m, 3), directions (r, n), impactor_masses (i,),
+circles (m, 3) where there are any,
 nodes (b,), shapes (2b, n), contact_* (c,), energy_* (k,) but energy_initial; what `fembeam.response.readout` reads a
 run with; mean_force (m, k), transitions (r, 9), losses (m, 3), work (k, m) and end (2n + l,).
 """
@@ -20,7 +21,7 @@ from solvers.problem import Transitions, columns_of
 Shape = tuple[int, ...]
 TRANSITION_COLUMNS = len(columns_of(Transitions))
 BOOLEAN = ("kinds", "contact_entry_rate_clipped")
-FINITE = {"transitions", "end", "shapes", "directions", "impactor_masses", *READOUT_FINITE}
+FINITE = {"transitions", "end", "shapes", "directions", "impactor_masses", "circles", *READOUT_FINITE}
 
 
 def outline(shape: Shape, dtype: np.dtype[Any]) -> Any:
@@ -51,6 +52,8 @@ def check(arrays: Mapping[str, Any]) -> None:
         _need(np.isfinite(arrays[name]).all(), f"{name} must be finite")
     _need(np.isfinite(arrays["stops"][:, 1:]).all(), "stops must be finite but for places by name")
     _need(np.all(arrays["impactor_masses"] > 0), "impactor_masses must be positive")
+    rows = len(arrays["stops"]) + np.count_nonzero(arrays["circles"][:, 0] if "circles" in arrays else ())
+    _need(len(arrays["directions"]) == rows, f"directions must have {rows} rows, there are {len(arrays['directions'])}")
     beams = sum(name.split("_")[0] == "nodes" for name in arrays)
     most = [beams, len(ON), max(beams, len(arrays["impactor_masses"]))]
     whole = arrays["on"].dtype.kind in "iu" and np.all((arrays["on"] >= 0) & (arrays["on"] < most))
@@ -63,7 +66,9 @@ def check(arrays: Mapping[str, Any]) -> None:
 def expected(arrays: Mapping[str, Any]) -> dict[str, Shape]:
     """{name: shape} that follow from q, stops, the nodes and the entries of the log."""
     (k, n), m, entries = arrays["q"].shape, len(arrays["stops"]), arrays["contact_stop"].size
-    shapes: dict[str, Shape] = {"t": (k,), "q_dot": (k, n), "force": (m, k), "stops": (m, 3), "directions": (m, n)}
+    r = arrays["directions"].shape[0] if "circles" in arrays else m
+    shapes: dict[str, Shape] = {"t": (k,), "q_dot": (k, n), "force": (r, k), "stops": (m, 3), "directions": (r, n)}
+    shapes |= {"circles": (m, 3)} if "circles" in arrays else {}
     shapes |= {"kinds": (m, 2), "on": (m, 3), "mean_force": (m, k), "losses": (m, 3), "work": (k, m)}
     shapes["transitions"] = len(arrays["transitions"]), TRANSITION_COLUMNS
     shapes["end"] = (max(2 * n, arrays["end"].size),)

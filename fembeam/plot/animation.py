@@ -122,7 +122,7 @@ def _peaks(run: Run, stop: int, samples: NDArray[np.int64]) -> Vector:
 
     A logged peak counts where the samples of its contact are highest; without any, in its middle.
     """
-    force, log, t = np.abs(run.force(stop)), run.contacts, run.t
+    force, log, t = np.abs(run._normal_force(stop)), run.contacts, run.t
     shown, found = t[samples], np.zeros(len(samples))
     between = (shown[1:] + shown[:-1]) / 2
     inside = slice(samples[0], samples[-1] + 1)

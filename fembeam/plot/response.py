@@ -255,7 +255,7 @@ def _draw_forces(axis: Axes, run: Run, lo: float, hi: float, least: float) -> No
         mine = log.stop == stop
         look: dict[str, Any] = {"color": f"C{stop}", "label": run.name(int(stop))}
         if stop in always or np.any(mine & inside & ~short):
-            axis.plot(run.t[kept], run.force(int(stop))[kept], **look)
+            axis.plot(run.t[kept], run._normal_force(int(stop))[kept], **look)
             look.pop("label")
         axis.vlines(log.t_in[mine & short], 0.0, log.peak_force[mine & short], linewidth=1.2, **look)
     kind = "peak contact force" if len(drawn) > len(always) and np.all(short[inside]) else "contact force"

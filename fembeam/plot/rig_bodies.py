@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from fembeam.plot.figure import heading
 from fembeam.plot.rig_symbols import BLACK, COLOURS, circle
-from fembeam.plot.rig_words import WIDE, gap_words, signal_words
+from fembeam.plot.rig_words import WIDE, gap_words, length, signal_words
 from fembeam.plot.style import BLUE, GREEN
-from fembeam.scene import Pinned, support_motion
+from fembeam.scene import AnnularStop, Pinned, support_motion
 from fembeam.support import require
 
 if TYPE_CHECKING:
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 REACH = 0.12  # of the body's size, length of springs and arrows
+RING = 0.4  # of that, radius of a circular clearance
 FREE = 0.03  # the same, between a place and the arrow of a stop
 ZIGZAG = np.array([0, 0, 1, -1, 1, -1, 1, 0, 0]) * 0.12  # of the length of a spring
 HEAD = np.array([[0.0, 0.0], [1.0, 0.0], [0.7, 0.12], [1.0, 0.0], [0.7, -0.12]])  # an arrow of length 1
@@ -163,6 +164,9 @@ class _Panel:
         to, colour = one.coordinate.to, COLOURS["element" if one.always else "stop"]
         if to is not None and (to[0] or self.number) == self.number:
             self._plot(axis, np.array([self.places[repr(one.z)], self.places[repr(to[1])]]), colour, 1.0, "--")
+        if isinstance(one, AnnularStop):
+            self._ring(axis, one, colour)
+            return f"{self._label(one)}, clearance {length(one.clearance)}"
         if not one.always:
             self._arrow(axis, one, -one.push * np.array(one.coordinate.along), colour)
             return f"{self._label(one)}, {gap_words(one.gap, one.coordinate.rotation)}"
@@ -207,6 +211,14 @@ class _Panel:
     def _arrow(self, axis: Any, part: Any, way: Vector, colour: str) -> None:
         """An arrow along a direction, beginning a little away from the place."""
         self._shape(axis, part, way, HEAD, FREE / REACH, colour)
+
+    def _ring(self, axis: Any, stop: AnnularStop, colour: str) -> None:
+        """A circle around the place across its directions, enlarged; of an outer one the post beside it."""
+        across = np.array([place.along[:3] for place in stop.coordinates])
+        size = RING * REACH * self.size
+        middle = size * np.array(stop.centre) / np.hypot(*stop.centre) if stop.outer else np.zeros(2)
+        points = self.places[repr(stop.z)] + (middle + circle(0.6 * size if stop.outer else size)) @ across
+        self._plot(axis, points, colour, 1.5)
 
     def _to_frame(self, axis: Any, part: Any, colour: str, zigzag: Vector) -> None:
         """A spring or dashpot against its direction, to a bar that is the frame."""

@@ -49,11 +49,12 @@ def watched(run: Run) -> Any:
 
 
 def place_of(run: Run, stop: int) -> Any:
-    """Where a stop or element acts: z in m, or (place, direction) as displacements are asked for."""
+    """Where a stop or element acts: z in m, or (place, direction), of an annular stop the first of both."""
     z = float(run.stops[stop, 0])
     if not np.isnan(z):
         return z
     place, direction = run.acting[stop]
+    direction = direction[0] if run.circles[stop, 0] else direction
     return place, direction.removeprefix("-") if isinstance(direction, str) else direction
 
 

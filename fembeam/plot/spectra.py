@@ -111,7 +111,7 @@ def _linear(run: Run) -> dict[str, Spectrum]:
     ((path, noise),) = signals.items()
     stop = first_stop(run)
     row = None if stop is None else run.model.contact_rows[stop]
-    if row is not None and row.on[0] != "frame":  # δ is of two bodies
+    if row is not None and (row.on[0] != "frame" or row.is_circle):  # δ is of two bodies, or a distance
         return {}
     watched, found = places(run.shapes), {}
     omega = frequencies(run.model, 0.0, 2.5 * float(run.model.omega.max()), LINEAR_POINTS)

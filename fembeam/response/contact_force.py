@@ -22,8 +22,11 @@ Vector = NDArray[np.float64]
 
 
 def forces(run: Run) -> Vector:
-    """Forces (m, k) of all stops and elements of a run at its samples, N or N m."""
-    found = [_force_of(run, stop, contact) for stop, contact in enumerate(run.readout.model.contact_rows)]
+    """Forces (r, k) of all stops and elements of a run at its samples on their rows of coordinates, N or N m."""
+    found: list[Vector] = []
+    for stop, contact in enumerate(run.readout.model.contact_rows):
+        force = _force_of(run, stop, contact)
+        found += [-force * along for along in run._outward(stop).T] if contact.is_circle else [force]
     return np.array(found).reshape(len(found), len(run.t))
 
 

@@ -2,7 +2,7 @@
 
     q'' = Σ_l v_l s_l(t) + Σ_s w_s F_s - C q' - K q,    reactions = R [F; s; q''; q']
 
-k samples, n coordinates, m contacts, l loads, r reactions. Neither scene nor laws nor signals are needed then.
+k samples, n coordinates, m rows of contacts, l loads, r reactions. Neither scene nor laws nor signals are needed then.
 """
 
 from __future__ import annotations

@@ -85,13 +85,14 @@ def unpacked(about: Mapping[str, Any], arrays: Mapping[str, Any], nodes: list[An
 
 
 def expected_readout(arrays: Mapping[str, Any]) -> dict[str, Shape]:
-    """{name: shape} of what is there, as follow from q, the loads, stops, reactions and nodes."""
-    (k, n), m, loads, r = arrays["q"].shape, len(arrays["stops"]), len(arrays["loads"]), len(arrays["reactions"])
+    """{name: shape} of what is there, as follow from q, the loads, rows of stops, reactions and nodes."""
+    (k, n), loads, r = arrays["q"].shape, len(arrays["loads"]), len(arrays["reactions"])
+    rows = len(arrays["directions"])
     components = 6 if arrays["reactions"].ndim == 3 and arrays["reactions"].shape[1] == 6 else 2
     bodies = sum(name.split("_")[0] == "nodes" for name in arrays)
     shapes: dict[str, Shape] = {
         **{"stiffness": (n, n), "damping": (n, n), "load_vectors": (loads, n), "loads": (loads, k)},
-        **{"frame": (2 * (len(arrays["frame"]) // 2), k), "reactions": (r, components, m + loads + 2 * n)},
+        **{"frame": (2 * (len(arrays["frame"]) // 2), k), "reactions": (r, components, rows + loads + 2 * n)},
         **{"zeta": (n,), "heights": (bodies,), "impactor_places": (len(arrays["impactor_masses"]), 2)},
     }
     for name in arrays:

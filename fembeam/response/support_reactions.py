@@ -182,7 +182,7 @@ def reaction_rows(model: Model) -> tuple[list[tuple[Any, int]], Vector]:
     columns = _acting(model, full)
     parts, rows, done = [], [], 0
     named = any(beam.named for beam in full.beams)
-    feet = len(model.contact_rows) + len(support_loads(model.scene, full))  # where the loads of feet begin
+    feet = len(model.directions) + len(support_loads(model.scene, full))  # where the loads of feet begin
     for body, scene in enumerate((model.scene, *model.scene.bodies)):
         size = full.beams[body].M.shape[0]
         mine, known, loose = columns[done : done + size], model.matrices.beams[body], full.beams[body]

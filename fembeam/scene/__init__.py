@@ -4,6 +4,7 @@ Imports: `beams`, `structures`, `excitation`, `support`, `reduction`; inside the
 `fembeam.model`, `Scene.figure` `fembeam.plot`, `Scene.check` `fembeam.inspection`. Begin with `scene`, then `assembly`.
 """
 
+from fembeam.scene.annular_stop import AnnularStop
 from fembeam.scene.assembly import MOST_DENSE, Matrices, unsupported
 from fembeam.scene.body_assembly import BodyMatrices, respun
 from fembeam.scene.contact_rows import (

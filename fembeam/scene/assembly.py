@@ -187,7 +187,7 @@ def assemble(scene: Scene, elements: int | None, modes: int | None, probes: Sequ
     own = _one_beam(scene, elements, modes, probes)
     if not scene.bodies and not scene.impactors:
         return own
-    second: list[tuple[int, Any]] = [part.coordinate.to or (0, 0.0) for part in scene.acting]
+    second: list[tuple[int, Any]] = [part.coordinates[0].to or (0, 0.0) for part in scene.acting]
     met = [[z for number, z in second if number == b + 1] for b in range(len(scene.bodies))]
     others = [_one_beam(body, elements, modes, at) for body, at in zip(scene.bodies, met, strict=True)]
     return _joined((own, *others), tuple(i for body in (scene, *scene.bodies) for i in body.impactors))

@@ -161,8 +161,8 @@ def _warn_of_massless(scene: Scene, matrices: BodyMatrices) -> None:
     bare = {matrices.assembled.labels.index(label) for label in matrices.massless}
     for name in ("stops", "elements", "forces") if bare else ():
         for index, part in enumerate(getattr(scene, name)):
-            row = row_of(scene.beam, matrices.assembled, part.z, part.coordinate.along)
-            if hit := bare & set(row.indices.tolist()):
+            rows = [row_of(scene.beam, matrices.assembled, part.z, place.along) for place in part.coordinates]
+            if hit := bare & {dof for row in rows for dof in row.indices.tolist()}:
                 label = matrices.assembled.labels[min(hit)]
                 warnings.warn(f"{name}[{index}] acts on {label}, a dof without mass that follows the others: its own "
                               "compliance is left out; give the place a mass", UserWarning, stacklevel=5)  # fmt: skip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from fembeam.scene.annular_stop import AnnularStop
 from fembeam.scene.parts import Guided, PointMoment
 from fembeam.scene.places import told
 from fembeam.scene.rotors import Disk, check_shaft
@@ -34,7 +35,10 @@ def check_feature(body: Any, feature: Any, name: str, where: str) -> None:
     have, what = components_at(body, feature.z), f"the place {told(feature.z)}"
     if name == "supports":
         _check_support(feature, have, where)
-    if name in DIRECTED:
+    if isinstance(feature, AnnularStop):
+        for place in feature.coordinates:
+            require_components(place.along, have, what, where)
+    elif name in DIRECTED:
         turn = isinstance(feature, PointMoment)
         write = f"add direction={'rz' if turn else 'x'!r} or so; {what} has {', '.join(have)}"
         require(feature.direction is not None, "a place by name needs a direction", None, where, write)
@@ -71,7 +75,7 @@ def check_ends(scene: Scene) -> None:
     bodies = [scene.beam, *(one.beam for one in scene.bodies)]
     for name, key in (("stops", "on"), ("elements", "to")):
         for index, part in enumerate(getattr(scene, name)):
-            second, where = part.coordinate.to, f"{name}[{index}] of Scene"
+            second, where = part.coordinates[0].to, f"{name}[{index}] of Scene"
             if second is None:
                 continue
             number, place = second
@@ -80,7 +84,8 @@ def check_ends(scene: Scene) -> None:
             require(known, f"{key} must name a body, {among}", number, where, "add it to bodies")
             require(number > 0 or place != part.z, f"{key} must be another place", place, where,
                     "leave it out for an end on the frame")  # fmt: skip
-            check_end(bodies[number], place, part.coordinate.along, key, where)
+            for one in part.coordinates:
+                check_end(bodies[number], place, one.along, key, where)
 
 
 def check_end(body: Any, place: Any, along: Any, key: str, where: str) -> None:
@@ -108,8 +113,11 @@ def check_conflicts(scene: Scene) -> None:
     _check_moved(scene)
     known: dict[Any, int] = {}
     for index, stop in enumerate(scene.stops):
-        one: Any = (stop.z, stop.push, stop.coordinate.along, stop.coordinate.to)
-        at = f"{told(stop.z)}, {named(direction_of(stop.direction, 'Stop'))}"
+        round_about = isinstance(stop, AnnularStop)
+        ways = stop.directions if round_about else (stop.direction,)
+        one: Any = (stop.z, stop.push, *((place.along, place.to) for place in stop.coordinates))
+        one += (stop.centre, stop.outer) if round_about else ()
+        at = f"{told(stop.z)}, {' and '.join(named(direction_of(way, 'Stop')) for way in ways)}"
         require(one not in known, f"stops must not share one place and direction ({at})", (known.get(one), index),
                 "stops of Scene", "make them one stop with one law, such as PiecewiseLinear")  # fmt: skip
         known[one] = index
@@ -131,6 +139,8 @@ def _check_moved(scene: Scene) -> None:
 
 def check_plain(feature: Any, name: str, where: str) -> None:
     """Raise ValueError for what a part on a Beam cannot say: a place by name, a direction out of its plane."""
+    require(not isinstance(feature, AnnularStop), "an AnnularStop needs a body in space, a Beam bends in one plane",
+            feature, where, "use two stops of this gap, side='below' and side='above'")  # fmt: skip
     require(is_finite(feature.z), "z must be a number on a Beam, which has no names", feature.z, where, "in m")
     require(not isinstance(feature, Disk), "a Disk needs a shaft: a straight Frame in space", feature, where,
             "use Frame.straight, or a LumpedMass")  # fmt: skip

@@ -2,7 +2,9 @@
 
 δ = -w·u - gap, and the contact pushes with +w F:  w = ±(row of one body - row of the other)
 
-Elements, which always act, are contacts with w = -W.
+Elements, which always act, are contacts with w = -W. A circular clearance has two rows, the coordinates of its place:
+
+d = W·u - centre, δ = |d| - c, and it pushes with -Wᵀ F d/|d|
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from scipy import sparse
 
 from fembeam.excitation import Harmonic
+from fembeam.scene.annular_stop import AnnularStop
 from fembeam.scene.element import force_both_ways
 from fembeam.scene.local_coordinate import LocalCoordinate
 from fembeam.scene.signals import support_motion
@@ -24,6 +27,7 @@ if TYPE_CHECKING:
     from fembeam.scene.scene import Scene
 
 
+LINE = (0.0, 0.0, 0.0)  # no circle
 ON = ("frame", "body", "impactor")  # what a contact pushes from
 
 
@@ -33,14 +37,15 @@ class ContactRow:
 
     Attributes
     ----------
-    row : w (1, N) sparse, on all free dofs.
+    row : w (1, N) sparse, on all free dofs; of a circular clearance W (2, N).
     law, gap : as in `Stop`.
     push : +1 when it pushes its beam up, -1 down.
     body, z : the beam it pushes (0 the scene's own) and where.
     on : ("frame", 0), ("body", b) or ("impactor", i): what it pushes from.
     rotation : whether it acts on the slope: rad and N m. always : whether it acts at both signs of δ, an element.
     name : of the part, given or made; of an impactor on both sides with its side. given : whether it was given.
-    direction : as given, of places by name.
+    direction : as given, of places by name; of a circular clearance both.
+    circle : (radius, x, y) of a circular clearance, m: the radius negative where the place is outside; else zeros.
     """
 
     row: sparse.csr_matrix
@@ -55,6 +60,17 @@ class ContactRow:
     name: str = ""
     given: bool = False
     direction: Any = None
+    circle: tuple[float, float, float] = LINE
+
+    @property
+    def is_circle(self) -> bool:
+        """Whether it is a circular clearance."""
+        return self.circle[0] != 0.0
+
+    @property
+    def gaps(self) -> tuple[float, ...]:
+        """Of each row: -row·u - gap is δ; of a circular clearance -d."""
+        return (self.gap,) if not self.is_circle else (-self.circle[1], -self.circle[2])
 
     @property
     def remembers(self) -> bool:
@@ -81,6 +97,9 @@ def _contact_rows(scene: Scene, matrices: Matrices) -> Iterator[ContactRow]:
         for one in part.acting:
             place = one.coordinate
             on = ("frame", 0) if place.to is None else ("body", place.to[0] or body)
+            if isinstance(one, AnnularStop):
+                yield _circle(one, matrices, body, on)
+                continue
             row, name = one.push * place.row(matrices, body), _name(one, body)
             kind = place.rotation, one.always, *name, one.direction
             yield ContactRow(row, one.law, one.gap, one.push, body, one.z, on, *kind)
@@ -92,6 +111,15 @@ def _contact_rows(scene: Scene, matrices: Matrices) -> Iterator[ContactRow]:
                 facing = body, impactor.z, ("impactor", count)
                 yield ContactRow(push * row, impactor.law, impactor.gap, push, *facing, name=label + side, given=given)
             count += 1
+
+
+def _circle(stop: AnnularStop, matrices: Matrices, body: int, on: tuple[str, int]) -> ContactRow:
+    """One circular clearance."""
+    rows = sparse.vstack([place.row(matrices, body) for place in stop.coordinates], format="csr")
+    circle = -stop.clearance if stop.outer else stop.clearance, *stop.centre
+    numbered = not getattr(matrices.beams[body].beam, "meshed", True)  # a number is a node, not m
+    kind = False, False, stop.label_on(body, numbered), stop.name is not None, stop.directions, circle
+    return ContactRow(rows, stop.law, stop.clearance, stop.push, body, stop.z, on, *kind)
 
 
 def _name(part: ScenePart, body: int) -> tuple[str, bool]:
@@ -153,7 +181,9 @@ def weight(scene: Scene) -> dict[str, Harmonic]:
 def watched(scene: Scene, body: int) -> LocalCoordinate | None:
     """Where the modes of a beam shall be positive: at its first stop, element, impactor, or where another meets it."""
     part = (scene, *scene.bodies)[body]
-    places = [one.coordinate for one in part.acting] + [LocalCoordinate(impactor.z) for impactor in part.impactors]
+    places = [place for one in part.acting for place in one.coordinates] + [
+        LocalCoordinate(impactor.z) for impactor in part.impactors
+    ]
     places += _from_the_first(scene, body)
     return replace(places[0], to=None) if places else None
 
@@ -161,7 +191,7 @@ def watched(scene: Scene, body: int) -> LocalCoordinate | None:
 def loaded(scene: Scene, body: int) -> list[LocalCoordinate]:
     """Where a force or moment acts on a beam, or a pair of them: of stops, elements, loads, dashpots, impactors."""
     part = (scene, *scene.bodies)[body]
-    places = [own for one in part.acting for own in one.coordinate.on_body(body, body)]
+    places = [own for one in part.acting for place in one.coordinates for own in place.on_body(body, body)]
     places += [force.coordinate for force in part.forces]
     feet = (spring for spring in part.springs if spring.foot is not None)
     places += [LocalCoordinate(spring.z, direction=spring.along) for spring in feet]
@@ -173,12 +203,13 @@ def loaded(scene: Scene, body: int) -> list[LocalCoordinate]:
 
 def _from_the_first(scene: Scene, body: int) -> list[LocalCoordinate]:
     """Where stops and elements of the scene's own beam meet another."""
-    return [own for one in scene.acting for own in one.coordinate.on_body(0, body)] if body else []
+    met = (place.on_body(0, body) for one in scene.acting for place in one.coordinates)
+    return [own for places in met for own in places] if body else []
 
 
 def static_rows(scene: Scene, matrices: Matrices) -> sparse.csr_matrix:
     """Rows (m, N) of the scene's own stops, elements, then forces: where the model may miss static compliance."""
-    places = [one.coordinate for one in (*scene.acting, *scene.forces)]
+    places = [place for one in (*scene.acting, *scene.forces) for place in one.coordinates]
     blank = sparse.csr_matrix((0, matrices.M.shape[0]))
     return sparse.vstack([blank, *(place.row(matrices) for place in places)], format="csr")
 

@@ -302,6 +302,11 @@ class Stop(ScenePart):
         """What it acts on."""
         return local_coordinate(self.z, self.of, self.on, self.where, "on", self.direction)
 
+    @property
+    def coordinates(self) -> tuple[LocalCoordinate, ...]:
+        """All that it acts on: the one."""
+        return (self.coordinate,)
+
     def _made(self, at: str) -> str:
         of, on = " of rotation" * (self.direction is None and self.coordinate.rotation), self.coordinate.to_words
         side = f", {self.side}" if self.direction is None else ""
@@ -342,6 +347,11 @@ class PointForce(ScenePart):
         """What it acts on."""
         return LocalCoordinate(self.z, 0, None, self.along)
 
+    @property
+    def coordinates(self) -> tuple[LocalCoordinate, ...]:
+        """All that it acts on: the one."""
+        return (self.coordinate,)
+
 
 @dataclass(frozen=True, repr=False)
 class PointMoment(ScenePart):
@@ -376,6 +386,11 @@ class PointMoment(ScenePart):
     def coordinate(self) -> LocalCoordinate:
         """What it acts on."""
         return LocalCoordinate(self.z, 1, None, self.along)
+
+    @property
+    def coordinates(self) -> tuple[LocalCoordinate, ...]:
+        """All that it acts on: the one."""
+        return (self.coordinate,)
 
 
 def _along(part: Any) -> Six | None:

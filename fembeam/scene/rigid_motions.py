@@ -76,7 +76,7 @@ def _sides(scene: Scene, rotation: bool, to: int | None = None) -> set[float]:
     for part in scene.acting:
         place = part.coordinate
         leads = None if place.to is None else place.to[0]
-        if place.rotation == rotation and leads != 0 and to in (None, leads):
+        if part.push and place.rotation == rotation and leads != 0 and to in (None, leads):
             found |= {part.push, -part.push} if part.always else {part.push}
     return found
 

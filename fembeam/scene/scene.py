@@ -13,6 +13,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from fembeam.beams import Beam, ModalDamping, Rayleigh
+from fembeam.scene.annular_stop import AnnularStop, round_clearances
 from fembeam.scene.assembly import Matrices, assemble, buckling_load
 from fembeam.scene.body_checks import check_conflicts, check_end, check_ends, check_feature, check_plain, is_body
 from fembeam.scene.element import Element
@@ -48,7 +49,7 @@ FEATURES: dict[str, tuple[type, ...]] = {
     "masses": (LumpedMass, Disk),
     "springs": (Spring,),
     "dashpots": (Dashpot,),
-    "stops": (Stop,),
+    "stops": (Stop, AnnularStop),
     "elements": (Element,),
     "forces": (PointForce, PointMoment, Unbalance),
     "impactors": (Impactor,),
@@ -109,7 +110,7 @@ class Scene:
     masses: Sequence[LumpedMass | Disk] = ()
     springs: Sequence[Spring] = ()
     dashpots: Sequence[Dashpot] = ()
-    stops: Sequence[Stop] = ()
+    stops: Sequence[Stop | AnnularStop] = ()
     damping: ModalDamping | Rayleigh = ModalDamping(0.0)  # noqa: RUF009 (frozen)
     base: Any = None
     forces: Sequence[PointForce | PointMoment | Unbalance] = ()
@@ -126,6 +127,8 @@ class Scene:
             object.__setattr__(self, name, _listed(name, getattr(self, name), kinds))
             if name == "forces":
                 object.__setattr__(self, name, driven(self.beam, tuple(self.forces)))
+            if name == "stops" and self.named:
+                object.__setattr__(self, name, round_clearances(self.beam, tuple(self.stops)))
             self._check_places(name)
         if not callable(getattr(self.damping, "modal_coefficients", None)):
             raise TypeError(f"damping must be ModalDamping or Rayleigh, got {self.damping!r} in Scene; "
@@ -300,7 +303,7 @@ class Scene:
         return {"y": float(self.gravity)} if self.gravity else {}  # type: ignore[arg-type]
 
     @property
-    def acting(self) -> list[Stop | Element]:
+    def acting(self) -> list[Stop | AnnularStop | Element]:
         """Stops, then elements: what acts on the scene's own beam by a law."""
         return [*self.stops, *self.elements]
 

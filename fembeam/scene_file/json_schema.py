@@ -18,7 +18,7 @@ from fembeam.scene_file.keys import entries_of, options, parameters, required, t
 from fembeam.scene_file.kinds import MAKERS, SECTION, SIGNAL, Nested, nested
 from fembeam.scene_file.structures import FILES, KEYS, PLACES
 from fembeam.scene_file.study_tables import STUDIES
-from fembeam.scene_file.tables import USUAL, beam_of_section, snake
+from fembeam.scene_file.tables import USUAL, beam_of_section, kind_name
 from fembeam.structures import COMPONENTS
 
 Schema = dict[str, Any]
@@ -124,7 +124,7 @@ class _Kinds:
 
     def feature(self, features: tuple[type, ...]) -> Schema:
         """One entry of [[supports]], [[masses]], ...: on a beam at z, then at a place by name."""
-        makers = [(MAKERS.get(one, one), snake(one.__name__)) for one in features]
+        makers = [(MAKERS.get(one, one), kind_name(one.__name__)) for one in features]
         alone = len(features) == 1
         tables = [self.table(m) if alone else self.table(m, "kind", name, name in USUAL) for m, name in makers]
         return {"anyOf": [*tables, *(_named(one) for one in tables)]}

@@ -33,7 +33,8 @@ Table = Mapping[str, Any]
 BODIES = tuple(further.MAKERS)  # tables beside [beam]
 LISTS = (*FEATURES, "bodies", "joints")
 
-USUAL = ("lumped_mass", "point_force")  # kinds that need not be named
+USUAL = ("lumped_mass", "point_force", "stop")  # kinds that need not be named
+SHORT = {"annular_stop": "annular"}
 
 
 class SceneFileError(ValueError):
@@ -128,7 +129,7 @@ class TableReader:
             if self.named and all(isinstance(one, dict) for one in value.values()):
                 return {direction: self.chosen(SIGNAL, one, f"[base.{direction}]") for direction, one in value.items()}
             return self.chosen(SIGNAL, value, "[base]")
-        kinds: Constructors = {snake(kind.__name__): MAKERS.get(kind, kind) for kind in FEATURES[name]}
+        kinds: Constructors = {kind_name(kind.__name__): MAKERS.get(kind, kind) for kind in FEATURES[name]}
         if not self.named:  # a straight beam has Clamped, Pinned and Guided
             kinds = {key: kind for key, kind in kinds.items() if kind not in MAKERS.values()}
         made = []
@@ -282,6 +283,13 @@ def beam_of_section(length: float, section: Section, foundation: float = 0.0, ax
     return Beam(length, section, foundation=foundation, axial_force=axial_force)
 
 
-def snake(name: str) -> str:
-    """LumpedMass -> lumped_mass."""
-    return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
+def kind_name(name: str) -> str:
+    """What a file calls a class of parts.
+
+    Examples
+    --------
+    >>> kind_name("LumpedMass"), kind_name("AnnularStop")
+    ('lumped_mass', 'annular')
+    """
+    found = re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
+    return SHORT.get(found, found)

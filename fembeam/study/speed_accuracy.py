@@ -143,8 +143,10 @@ class SpeedAccuracy(Result):
 def end_displacement(run: Run) -> Vector:
     """The displacement u at the first stop, or at the far end, at the end of the run: the default quantity.
 
-    δ of a first stop of rotation, or at a place by name.
+    δ of a first stop of rotation, of an annular one, or at a place by name.
     """
+    if len(run.stops) and run.circles[0, 0]:
+        return np.asarray(run._deformation(0)[-1])
     if len(run.stops) and (run.kinds[0, 0] or np.isnan(run.stops[0, 0])):
         return np.asarray(-run.directions[0] @ run.q[-1] - run.stops[0, 2])
     if not hasattr(run.shapes, "nodes"):

@@ -1,0 +1,165 @@
+"""A circular clearance: a place in a hole, or a ring around a post; its force acts along two directions.
+
+d = (W_1 u, W_2 u) - centre,    r = |d|,    δ = r - c,    force on the place -N(δ, δ̇) d/r
+
+Annotations are evaluated here, as in `part`.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from fembeam.scene.impactor import check_law
+from fembeam.scene.local_coordinate import LocalCoordinate, local_coordinate
+from fembeam.scene.part import ScenePart
+from fembeam.scene.places import Second, told
+from fembeam.scene.rotors import carrier
+from fembeam.structures import COMPONENTS, Direction, Frame, direction_of, turns
+from fembeam.support import is_finite, require, require_positive
+
+ACROSS = 1e-9  # of 1: products of directions that are at right angles, axes that lie along a global one
+USUAL = ("x", "y")
+
+
+@dataclass(frozen=True, repr=False)
+class AnnularStop(ScenePart):
+    """A circular clearance without friction: the place moves freely within a circle of radius c, `clearance`.
+
+    With d the two displacements of the place less `centre`, and r = |d|:
+
+        δ = r - c,    δ̇ = d·ḋ/r,    force on the place -N(δ, δ̇) d/r;    outer: δ = c - r, the force +N d/r
+
+    Parameters
+    ----------
+    z : place, of a body that moves in space: a `Frame` of three coordinates a node, a `Structure`.
+    law : of the force N for δ > 0, any of `contacts` without memory.
+    clearance : c in m, > 0: the hole's radius less that of a round tube or shaft in it.
+    centre : of the circle, m along both directions, from the undeflected place.
+    outer : the place stays outside of the circle: a ring around a post.
+    on : what the circle sits on, (body, place) or a place of the same body; None: the frame. d is then the difference.
+    directions : two displacements at right angles, names or vectors; None: the two global axes across the member that
+        the place is on, where that lies along the third.
+    name : keyword, as of all parts.
+
+    Raises
+    ------
+    ValueError : a clearance that is not positive, a place that begins outside the circle (outer: inside), a law with
+        memory, directions that are rotations or not at right angles; in a scene of one plane.
+
+    Examples
+    --------
+    >>> from contacts import Hertz
+    >>> hole = AnnularStop(0.6, Hertz(1e9), clearance=2e-4, directions=("x", "y"))
+    >>> hole.label, [one.along.index(1.0) for one in hole.coordinates]
+    ('annular stop at 0.6 m', [0, 1])
+    """
+
+    law: Any
+    clearance: float
+    centre: tuple[float, float] = (0.0, 0.0)
+    outer: bool = False
+    on: Second | None = None
+    directions: tuple[Direction, Direction] | None = None
+    always = False
+    push = 0.0  # it has no one side
+    word = "annular stop"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        where = self.where
+        require_positive("clearance", self.clearance, where,
+                         "give the radius of the circle in m; without play it is a spring along each direction")  # fmt: skip
+        pair = isinstance(self.centre, (list, tuple)) and len(self.centre) == 2 and all(map(is_finite, self.centre))
+        require(pair, "centre must be two finite numbers", self.centre, where, "give m along the two directions")
+        object.__setattr__(self, "centre", (float(self.centre[0]), float(self.centre[1])))
+        local_coordinate(self.z, "displacement", self.on, where, "on", "x")
+        check_law(self.law, where)
+        require(not getattr(self.law, "memory", ()), "law must have no memory", self.law, where,
+                "choose another one, or put Elements or two Stops there")  # fmt: skip
+        self._check_directions(where)
+        self._check_place(where)
+
+    def _check_directions(self, where: str) -> None:
+        """Raise ValueError unless the directions are two displacements at right angles; lists become tuples."""
+        if self.directions is None:
+            return
+        given = self.directions
+        two = isinstance(given, (list, tuple)) and len(given) == 2
+        require(two, "directions must be two", given, where, "write ('x', 'y'), or two vectors")
+        kept = tuple(tuple(one) if isinstance(one, list) else one for one in given)
+        object.__setattr__(self, "directions", kept)
+        first, second = (direction_of(one, where) for one in kept)
+        require(not (turns(first) or turns(second)), "directions must be displacements", given, where,
+                "of a rotation there is Stop(…, direction='rz')")  # fmt: skip
+        require(abs(np.dot(first, second)) < ACROSS, "directions must be at right angles", given, where,
+                "write ('x', 'y'), or two vectors")  # fmt: skip
+
+    def _check_place(self, where: str) -> None:
+        """Raise ValueError unless the undeflected place is on its side of the circle."""
+        off = float(np.hypot(*self.centre))
+        if self.outer:
+            require(off >= self.clearance, "the place must begin outside the circle; it lies inside by",
+                    f"{self.clearance - off:.6g} m", where, "move the centre")  # fmt: skip
+            return
+        x, y = (-number / max(off, 1e-300) for number in self.centre)
+        require(off <= self.clearance, "the place must begin inside the circle; it lies outside by",
+                f"{off - self.clearance:.6g} m, towards ({x:.3g}, {y:.3g})", where,
+                "move the centre, or widen the clearance")  # fmt: skip
+
+    @property
+    def gap(self) -> float:
+        """The clearance."""
+        return self.clearance
+
+    @property
+    def coordinates(self) -> tuple[LocalCoordinate, ...]:
+        """The two displacements it acts on."""
+        along = USUAL if self.directions is None else self.directions
+        found = local_coordinate(self.z, "displacement", self.on, self.where, "on", "x")
+        return tuple(replace(found, direction=direction_of(one, self.where)) for one in along)
+
+    @property
+    def coordinate(self) -> LocalCoordinate:
+        """The first of them."""
+        return self.coordinates[0]
+
+    def _made(self, at: str) -> str:
+        return f"{self.word} at {at}" + (f", on {to}" if (to := self.coordinate.to_words) else "")
+
+
+def round_clearances(body: Any, stops: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Stops with the directions of annular ones filled in; ValueError where the body has none for them."""
+    places = [f"stops[{i}] ({one.titled}) of Scene" for i, one in enumerate(stops)]
+    return tuple(
+        _directed(body, one, where) if isinstance(one, AnnularStop) else one
+        for one, where in zip(stops, places, strict=True)
+    )
+
+
+def _directed(body: Any, stop: AnnularStop, where: str) -> AnnularStop:
+    """One with its directions, across the member that its place is on."""
+    body.check_place(stop.z, where)
+    own = carrier(body, stop.z)
+    require(not getattr(own, "in_plane", False), "an AnnularStop needs a body in space, this frame lies in one plane",
+            stop, where, "use two stops of this gap, direction='y' and direction='-y' or so")  # fmt: skip
+    if stop.directions is not None:
+        return stop
+    axes = _axes_at(own, stop.z)
+    lies = axes is not None and bool(np.all(np.abs(np.abs(axes).max(axis=1) - 1.0) < ACROSS))
+    one = lies and len({int(np.argmax(axis)) for axis in np.abs(axes)}) == 1
+    require(one, f"directions must be given where no one member along a global axis is ({told(stop.z)})", None, where,
+            "write directions=('x', 'y'), or two vectors")  # fmt: skip
+    across = [c for c, part in zip(COMPONENTS[:3], np.abs(axes[0]), strict=True) if part < 0.5]  # type: ignore[index]
+    return replace(stop, directions=tuple(across))
+
+
+def _axes_at(body: Any, place: Any) -> Any:
+    """Unit vectors (k, 3) along the members that a place is on; None of bodies without members."""
+    if not isinstance(body, Frame):
+        return None
+    site = body.site(place, "AnnularStop")
+    numbers = [site[0]] if not isinstance(site, str) else [
+        number for number, one in enumerate(body.members) if site in (one.a, one.b)
+    ]  # fmt: skip
+    return np.asarray(body.axes)[numbers, 2]
