@@ -209,6 +209,19 @@ def test_a_graze_has_no_derivative(gap, words):
     assert len(sensitivity(swinging(0.999), [-1.0], [0.0], 5.0, method=FINE).contacts) == 1
 
 
+def test_a_start_on_the_surface():
+    """By the gap it differs on both sides, by the stiffness it does not."""
+
+    def pushed(gap=0.0, stiffness=9.0):
+        stop = Contact([-1.0], PiecewiseLinear([stiffness]), gap)
+        return System([[1.0]], [[0.0]], [[1.0]], [stop], [([1.0], lambda t: -1.0 + 0.0 * t)])
+
+    with pytest.raises(NoDerivativeError, match="touched at the start"):
+        sensitivity(pushed(), [0.0], [0.0], 8.0, nearby=Nearby.of(pushed, 0.0, 1e-6), method=FINE)
+    by_stiffness = Nearby.of(lambda k: pushed(stiffness=k), 9.0, 1e-3)
+    assert np.all(sensitivity(pushed(), [0.0], [-0.1], 5.0, nearby=by_stiffness, method=FINE).peak_force > 0.0)
+
+
 def test_refusals_of_systems():
     with pytest.raises(ValueError, match="slope is infinite"):
         sensitivity(ball(law=Viscoelastic.tsuji(2e7, 0.6, 0.3)), [0.0], [SPEED], 0.5)

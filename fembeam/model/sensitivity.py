@@ -34,7 +34,8 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 STRUCTURE, SIGNAL, OTHER = 1e-3, 1e-6, 1e-4  # steps of the data, in units of the value: modes are known less exactly
-UNIT = 1e-3  # what stands for a value that is zero
+UNIT = 1.0  # what stands for a value that is zero, of a load, a gap or a law
+FELT = 1e-6  # relative change of frequencies or shapes by which a step of a number that is zero is felt
 ROUGH = 1e-2  # by which differences of one and of two steps may differ, relatively
 CHAOS = 1e6  # growth of small changes above which a derivative says little
 LONGEST = 60  # contacts that are printed
@@ -201,7 +202,8 @@ class _Varied:
         """Models near the present one, where modes change."""
         if not changes_structure(self.path):
             return None
-        found = self._near(lambda value: self.model.again(self._scene(value)), STRUCTURE)
+        step = STRUCTURE * abs(self.value) or self._felt()
+        found = self._near(lambda value: self.model.again(self._scene(value)), step)
         sizes = {len(one.omega) for one in found.systems}
         require(sizes == {len(self.model.omega)}, "the number of coordinates must not change", sizes, self.path,
                 "name the modes by number, modes=3")  # fmt: skip
@@ -213,7 +215,7 @@ class _Varied:
         """Systems near the present one."""
         if self.models is not None:
             return self.models.map(lambda one: one.system)
-        step = SIGNAL if is_of_signal(self.path) else OTHER
+        step = (SIGNAL if is_of_signal(self.path) else OTHER) * (abs(self.value) or UNIT)
         return self._near(lambda value: self.model.system_like(self._scene(value)), step)
 
     @cached_property
@@ -221,14 +223,25 @@ class _Varied:
         """Change of the loads' period, s per unit."""
         if not is_of_signal(self.path):
             return 0.0
-        return float(self._near(lambda value: load_period(self._scene(value)), SIGNAL).derivative(lambda one: one))
+        step = SIGNAL * (abs(self.value) or UNIT)
+        return float(self._near(lambda value: load_period(self._scene(value)), step).derivative(lambda one: one))
 
     def _scene(self, value: float) -> Any:
         return replaced(self.model.scene, self.path, value)
 
-    def _near(self, make: Any, share: float) -> Nearby:
+    def _felt(self) -> float:
+        """A step of a number that is zero and changes modes, which they feel."""
+        step, here = FELT, self.model
+        while step < 1.0 / FELT:
+            there = here.again(self._scene(step))
+            pairs = ((here.omega**2, there.omega**2), (here.directions, there.directions), (here.zeta, there.zeta))
+            if any(np.abs(b - a).max(initial=0.0) > FELT * np.abs(a).max(initial=0.0) for a, b in pairs):
+                break
+            step *= 10.0
+        return step
+
+    def _near(self, make: Any, step: float) -> Nearby:
         """What is made at five-point formulas' values."""
-        step = share * (abs(self.value) or UNIT)
         try:
             return Nearby.of(make, self.value, step)
         except ValueError as error:

@@ -277,6 +277,8 @@ class _Walk:
         self._keep(0.0)
         for stretch in self.stretches:
             self._pass_events(stretch.start)
+            if stretch.start == 0.0:
+                self._check_start()
             self._pass(stretch)
         self._pass_events(self.asked.duration)
         flow, log = self.flow, self.solution.contacts
@@ -289,6 +291,16 @@ class _Walk:
         columns = self._of_contacts(log)
         about = self._growth(), flow.roughness, self.solution
         return Sensitivity(self.asked.times, self.states, log, *columns, end[:, -1], rate, end[:, :-1], *about)
+
+    def _check_start(self) -> None:
+        """NoDerivativeError for a stop that begins on its surface without contact, if the parameter moves it."""
+        for s, span in enumerate(self.asked.span):
+            near = abs(self.flow.motion_of(0.0, s)[0]) <= GRAZING * span
+            if near and not self.acting.segment[s] and self.flow.change(0.0, s)[0][-1] != 0.0:
+                raise NoDerivativeError(
+                    f"no derivative: contact {s} is touched at the start, so that it differs on both sides; "
+                    "begin off the surface"
+                )
 
     def _keep(self, t: float) -> None:
         """Keep the derivative of the state where a sample is at the time reached."""
