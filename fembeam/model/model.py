@@ -194,7 +194,7 @@ class Model(Printed, ModalEquations):
         ------
         ValueError for bad input before computing; solvers.SolverError when the method fails.
         """
-        from fembeam.model.run import Run
+        from fembeam.model.run import Made, Run
 
         require_no_text("Model.simulate", duration=duration, dt=dt, start=start)
         q, q_dot, memory = initial_states.split_start(self, self.rest() if start is None else start)
@@ -203,7 +203,7 @@ class Model(Printed, ModalEquations):
             solution = solvers.integrate(
                 model.system, q, q_dot, duration, dt, solver, progress=report, memory=memory or None
             )
-        run = Run.of(model, solution, memory, dt is not None)
+        run = Run.of(model, solution, memory, dt is not None, Made(np.concatenate((q, q_dot)), duration, solver))
         note("%r, integrated in %.3g s", run, run.cost.seconds)
         return run
 

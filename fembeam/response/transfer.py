@@ -81,7 +81,7 @@ def frequency_response(
         output = output.tolist()
     frequencies, places = _checked(omega, model, slipping), model.phi(output, 0, body)
     if isinstance(driven, str) and driven.startswith("supports["):
-        return _of_support(model, frequencies, driven, output, body)
+        return _of_support(model, frequencies, driven, output, body, slipping)
     vector, power, said, unit = _driving(model, driven)
     values = _solved(model, frequencies, vector, slipping) @ places.T
     values = (values.T * frequencies**power).T + (_carried_along(model, driven, output) if absolute else 0.0)
@@ -93,7 +93,7 @@ def frequency_response(
     return FrequencyResponse(frequencies, values, said, shown, absolute, unit, model.omega)
 
 
-def _of_support(model: Model, omega: Vector, driven: str, output: Any, body: int) -> FrequencyResponse:
+def _of_support(model: Model, omega: Vector, driven: str, output: Any, body: int, slipping: bool) -> FrequencyResponse:
     """The response to a unit motion of one dof of a support that moves: (v₀ + iω v₁ - ω² v₂) of its three loads."""
     names = [path for path in signals_of(model.scene) if ".motion." in path]
     require(driven in names, f"input must be one of {', '.join(names) or 'none, as no support moves'}", driven, WHERE,
@@ -102,7 +102,8 @@ def _of_support(model: Model, omega: Vector, driven: str, output: Any, body: int
     shapes = (model.shapes, *model.others)[body]
     rows = shapes.rows_with_supports(output if isinstance(output, list) else [output])
     n, k = len(model.omega), names.index(driven)
-    answers = [_solved(model, omega, np.asarray(model.system.loads[3 * number + order][0])) for order in range(3)]
+    vectors = [np.asarray(model.system.loads[3 * number + order][0]) for order in range(3)]
+    answers = [_solved(model, omega, vector, slipping) for vector in vectors]
     q = sum((1j * omega[:, None]) ** order * one for order, one in enumerate(answers))
     values = q @ rows[:, :n].T + rows[:, n + k]
     values = values if isinstance(output, list) else values[:, 0]
