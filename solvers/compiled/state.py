@@ -9,7 +9,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from solvers.compiled.fields import packed_type, shapes_of
-from solvers.compiled.kernels import Problem, abs_dot, indentation, indentation_rate, inlined, inner, kernel
+from solvers.compiled.kernels import Problem, abs_dot, indentation, indentation_rate, inlined, inner, is_circle, kernel
 from solvers.compiled.parts import ADDRESSES
 from solvers.problem import Array, Contact, Forcing, Law, Status, System
 from solvers.problem import event_list as at
@@ -55,7 +55,7 @@ def surface_tolerance(problem, s, x):
     """Distance, m, within which a stop counts as on a knot: rounding of δ."""
     row = problem.first[s]
     size = abs(problem.gap[row]) + abs_dot(problem.read[row], x, 2 * problem.k.size)
-    if problem.radius[s] != 0.0:
+    if is_circle(problem, s):
         size += abs(problem.radius[s]) + abs(problem.gap[row + 1])
         size += abs_dot(problem.read[row + 1], x, 2 * problem.k.size)
     return 1e-15 * size + 1e-20
@@ -69,7 +69,7 @@ def rate_tolerance(problem, s, x):
     couple the modes; without their share a stop pressed at rest would enter and leave its surface forever.
     """
     found = _rounding_of_rate(problem, problem.first[s], x)
-    if problem.radius[s] != 0.0:
+    if is_circle(problem, s):
         found += _rounding_of_rate(problem, problem.first[s] + 1, x)
     return found
 
@@ -226,10 +226,10 @@ def begin_state(state: State, z: Any) -> None:
     state.entry_rate[:] = 1.0
 
 
-def new_state(z: Any, stops: int) -> State:
-    """State of a run at t = 0 from block coordinates."""
+def new_state(z: Any, stops: int, rubbing: int = 0) -> State:
+    """State of a run at t = 0 from block coordinates, with so many stops, some of them with friction."""
     kinds = [np.dtype(str(kind.dtype)) for kind in STATE.types]
-    shapes = shapes_of(State, {"X": len(z) + 2 + 2 * stops, "E": stops, "rows": 0, "record": 0})
+    shapes = shapes_of(State, {"X": len(z) + 2 + 2 * (stops + rubbing), "E": stops, "rows": 0, "record": 0})
     state = State._make(np.zeros(shape, kind) for shape, kind in zip(shapes, kinds, strict=True))
     begin_state(state, z)
     return state
@@ -283,8 +283,18 @@ def gaps_of(contacts: Sequence[Contact]) -> Array:
 
 
 def radii_of(contacts: Sequence[Contact]) -> Array:
-    """(E,) radii of circular clearances, see `Problem`; 0 of stops on a line."""
-    return np.array([c.radius for c in contacts], dtype=float)
+    """(E,) radii of circular clearances, see `Problem`; (0,) if there is none."""
+    radii = np.array([c.circle for c in contacts], dtype=float)
+    return radii if radii.any() else np.empty(0)
+
+
+def frictions_of(contacts: Sequence[Contact], size: int) -> Array:
+    """(E, 2) see `Problem.friction`, behind a state of 2n = ``size``; (0, 2) if no contact has any."""
+    rubs = np.array([c.friction is not None for c in contacts], dtype=bool)
+    first = size + 2 + 2 * len(contacts)
+    place = [getattr(c.law, "place", 0) if c.friction else 0 for c in contacts]
+    table = np.column_stack((place, np.where(rubs, first + 2 * (np.cumsum(rubs) - 1), 0))).astype(np.int64)
+    return table if rubs.any() else np.empty((0, 2), dtype=np.int64)
 
 
 def _vectors(system: System) -> Array:
@@ -304,6 +314,7 @@ def _problem(system: System, forcing: Forcing, linear: dict[str, Array]) -> Prob
         knots=knots,
         gap=gaps_of(contacts),
         radius=radii_of(contacts),
+        friction=frictions_of(contacts, 2 * len(linear["k"])),
         first=first_rows(contacts),
         element=np.repeat(np.arange(m), [len(c.rows) for c in contacts]).astype(np.int64),
         law=np.array([c.law.address for c in contacts], dtype=np.int64),
