@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from contacts import Hertz, KelvinVoigt, WaltonBraun
-from solvers import CentralDifference, Contact, DormandPrince, HenonRK2, Newmark, System, integrate
+from solvers import CentralDifference, Contact, DormandPrince, Exponential, HenonRK2, Newmark, System, integrate
 
 PLANE = np.eye(2)
 NOTHING = np.zeros((2, 2))
@@ -43,7 +43,7 @@ def by_scipy(force, start, duration):
     return y
 
 
-@pytest.mark.parametrize("method", [DormandPrince(1e-13)], ids=["dormand"])
+@pytest.mark.parametrize("method", [DormandPrince(1e-13), Exponential(1e-12)], ids=["dormand", "exponential"])
 @pytest.mark.parametrize("law", [KelvinVoigt(1e4, 0.0), Hertz(1e4)], ids=["linear", "hertz"])
 def test_a_free_mass_moves_as_scipy_says(method, law):
     start = [0.5, 0.0, 0.2, 0.8]
@@ -53,7 +53,7 @@ def test_a_free_mass_moves_as_scipy_says(method, law):
     np.testing.assert_allclose(run.end, expected, rtol=0.0, atol=3e-11)
 
 
-@pytest.mark.parametrize("method", [SHARP], ids=["dormand"])
+@pytest.mark.parametrize("method", [SHARP, Exponential(1e-11)], ids=["dormand", "exponential"])
 def test_angular_momentum_and_energy_are_kept(method):
     run = integrate(free_mass(KelvinVoigt(1e4, 0.0)), [0.5, 0.0], [0.2, 0.8], 220.0, 1.0, method)
     assert len(run.contacts.t_in) >= 100
@@ -73,7 +73,7 @@ def test_a_fast_bounce_reflects_the_speed():
     np.testing.assert_allclose(run.q_dot[-1], [-0.96, -0.28], atol=1e-3)  # (0, 1) less twice its part along (0.6, 0.8)
 
 
-@pytest.mark.parametrize("method", [SHARP], ids=["dormand"])
+@pytest.mark.parametrize("method", [SHARP, Exponential(1e-11)], ids=["dormand", "exponential"])
 def test_a_planar_start_meets_two_one_sided_stops(method):
     """A start in one line through the centre stays on it."""
     law, along = KelvinVoigt(2e3, 5.0), np.array([0.6, 0.8])
@@ -90,7 +90,7 @@ def test_a_planar_start_meets_two_one_sided_stops(method):
 
 
 @pytest.mark.parametrize("outer", [False, True])
-@pytest.mark.parametrize("method", [SHARP], ids=["dormand"])
+@pytest.mark.parametrize("method", [SHARP, Exponential(1e-11)], ids=["dormand", "exponential"])
 def test_turning_everything_turns_everything(method, outer):
     law, turn = KelvinVoigt(2e3, 5.0), np.array([[0.8, -0.6], [0.6, 0.8]])
     K, C = np.diag([4.0, 9.0]), np.array([[0.2, 0.05], [0.05, 0.1]])

@@ -45,9 +45,10 @@ class Problem(NamedTuple):
     read: Annotated[Any, "R, 2*N"]  # displacement = read·z - gap, m
     read_rate: Annotated[Any, "R, 2*N"]  # its rate = read_rate·z, m/s
     gap: Annotated[Any, "R"]  # m; minus the centre's coordinates on the rows of a circle
-    radius: Annotated[Any, "E"]  # m, of a circular clearance, negative of an outer one; 0 of a stop on a line
+    radius: Annotated[Any, "C"]  # m, (E,) of circular clearances, negative of outer ones, 0 on lines; or none at all
     first: Annotated[Any, "int E+1"]  # first row of each element, and the end
     element: Annotated[Any, "int R"]  # that each row belongs to
+    own: Annotated[Any, "int E"]  # place of an element's δ: its first row, or behind all rows that of a circle
     knots: Annotated[Any, "E, J"]  # m, between two segments, ascending: 0 (-inf if it always acts), knots, inf
     law: Annotated[Any, "int E"]  # addresses of the compiled forces
     gradient: Annotated[Any, "int E"]  # addresses of their derivatives
@@ -301,9 +302,21 @@ def rhs(problem, t, x, segment, entry_rate, rate, batch):
 
 
 @inlined
+def is_circle(problem, s):
+    """Whether a stop is a circular clearance; where there is none, this costs nothing."""
+    return problem.radius.size > 0 and problem.radius[s] != 0.0
+
+
+@inlined
+def radius_of(problem, s):
+    """Its radius, as in `Problem`; 0 of a stop on a line."""
+    return problem.radius[s] if problem.radius.size > 0 else 0.0
+
+
+@inlined
 def indentation(problem, s, x):
     """Indentation of stop s, m."""
-    if problem.radius[s] != 0.0:
+    if is_circle(problem, s):
         return radial_motion(problem, s, x)[0]
     row = problem.first[s]
     return dot(problem.read[row], x, 2 * problem.k.size) - problem.gap[row]
@@ -312,7 +325,7 @@ def indentation(problem, s, x):
 @inlined
 def indentation_rate(problem, s, x):
     """Its rate, m/s."""
-    if problem.radius[s] != 0.0:
+    if is_circle(problem, s):
         return radial_motion(problem, s, x)[1]
     return dot(problem.read_rate[problem.first[s]], x, 2 * problem.k.size)
 
@@ -364,7 +377,7 @@ def _add_radial_push(problem, s, force, x, rate):
 @inlined
 def acceleration_of(problem, s, x, rate):
     """Second derivative of the indentation by time, m/s², from the state and its rate."""
-    if problem.radius[s] != 0.0:
+    if is_circle(problem, s):
         return _radial_acceleration(problem, s, x, rate)
     return dot(problem.read_rate[problem.first[s]], rate, 2 * problem.k.size)
 
@@ -372,7 +385,7 @@ def acceleration_of(problem, s, x, rate):
 @inlined
 def add_push(problem, s, force, x, rate):
     """Add what a force of stop s does to the state's rate."""
-    if problem.radius[s] != 0.0:
+    if is_circle(problem, s):
         _add_radial_push(problem, s, force, x, rate)
         return
     push = problem.push[problem.first[s]]

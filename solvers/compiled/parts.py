@@ -27,10 +27,13 @@ from solvers.compiled.packed import PackedType
 (SIDE, FIRST_END, LAND_IN_TIME, GO_BEYOND, PASSED) = range(14, 19)
 (PRESSED,) = range(19, 20)
 (PAIR, FREE_BLOCKS, PUSHED_BLOCKS, PUSHED_END, STOP_AT_NODES, BOUNDS) = range(20, 26)
+(CIRCLE_SPAN, CIRCLE_SPAN_AT, CIRCLE_NEAR, CIRCLE_ROOT, CIRCLE_MOTION, CIRCLE_FORCES, CIRCLE_GUESS) = range(26, 33)
+(CIRCLE_AWAY, CIRCLE_NEWTON, CIRCLE_WORK, CIRCLE_WITHIN, CIRCLE_LANDED) = range(33, 38)
 EVERY_RUN, ENERGY = range(10), range(10, 14)
-BORDERS, TWO_STOPS, MANY_STOPS = range(14, 19), range(19, 20), range(20, 26)
-"""What needs them: every run, those with an energy balance, with bends or memory in a law, with two or many stops."""
-ADDRESSES = np.zeros(26, dtype=np.int64)
+BORDERS, TWO_STOPS, MANY_STOPS, CIRCLES = range(14, 19), range(19, 20), range(20, 26), range(26, 38)
+"""What needs them: every run, those with an energy balance, with bends or memory in a law, with two or many stops, with
+circular clearances."""
+ADDRESSES = np.zeros(38, dtype=np.int64)
 
 _DECLARED: dict[int, tuple[Any, Any, tuple[Any, ...]]] = {}
 _LOADED: dict[int, Any] = {}

@@ -317,6 +317,7 @@ def _problem(system: System, forcing: Forcing, linear: dict[str, Array]) -> Prob
         friction=frictions_of(contacts, 2 * len(linear["k"])),
         first=first_rows(contacts),
         element=np.repeat(np.arange(m), [len(c.rows) for c in contacts]).astype(np.int64),
+        own=_own_places(contacts),
         law=np.array([c.law.address for c in contacts], dtype=np.int64),
         gradient=np.array([c.law.gradient_address for c in contacts], dtype=np.int64),
         parameters=law_parameters(system),
@@ -331,6 +332,13 @@ def _problem(system: System, forcing: Forcing, linear: dict[str, Array]) -> Prob
         parts=ADDRESSES,
         **vars(forcing),
     )
+
+
+def _own_places(contacts: Sequence[Contact]) -> Array:
+    """(E,) see `Problem.own`."""
+    first, circle = first_rows(contacts), np.array([c.circle != 0.0 for c in contacts], dtype=bool)
+    places: Array = np.where(circle, first[-1] + np.cumsum(circle) - 1, first[:-1]).astype(np.int64)
+    return places
 
 
 def most_borders(problem: Problem) -> int:

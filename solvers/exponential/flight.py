@@ -10,9 +10,8 @@ import math
 
 import numpy as np
 
-from solvers.compiled.kernels import copy, dot, inlined, inner
+from solvers.compiled.kernels import copy, inlined, inner
 from solvers.compiled.simd import WIDTH, bit_pattern, load8, splat8, sqrt8, store8, sum8
-from solvers.compiled.state import rate_tolerance, surface_tolerance
 from solvers.compiled.sums import combine
 
 ORDER = 6
@@ -210,9 +209,17 @@ def propagate_split(tables, level, x):
 
 
 @inlined
-def motion_of_stop(problem, tables, s, x):
-    """δ and δ̇ of a stop from the blocks' p and v."""
-    row = problem.first[s]
+def safe_time(g, v, bound):
+    """Time before which a stop at distance g, opening at v, cannot be reached; ``bound`` is that of |δ̈|."""
+    if bound <= 0.0:
+        return g / -v if v < 0.0 else np.inf
+    root = math.sqrt(v * v + 2.0 * bound * max(g, 0.0))
+    return (v + root) / bound if v >= 0.0 else 2.0 * max(g, 0.0) / (root - v)
+
+
+@inlined
+def motion_of_row(problem, tables, row, x):
+    """Displacement and rate of a row from the blocks' p and v."""
     rows, delta, rate = tables.stop_rows[row], splat8(0.0), splat8(0.0)
     for i in range(0, x.shape[1], WIDTH):
         p, v = load8(x[0], i), load8(x[1], i)
@@ -237,64 +244,3 @@ def energy_norms(problem, x, out):
     n = problem.k.size
     for b in range(n):
         out[b] = math.sqrt(x[n + b] * x[n + b] + problem.k[b] * x[b] * x[b])
-
-
-@inner
-def first_root(problem, terms, s, x, longest, values, slopes):
-    """First time in [0, longest] at which δ becomes positive on the Taylor polynomial; -1 if it does not.
-
-    ``values`` and ``slopes`` are scratch for the coefficients of the polynomial and of its derivative.
-    """
-    row, factorial = problem.first[s], 1.0
-    for i in range(ORDER + 1):
-        values[i] = dot(problem.read[row], terms[i], 2 * problem.k.size) / factorial
-        factorial *= i + 1.0
-    values[0] -= problem.gap[row]
-    if abs(values[0]) <= surface_tolerance(problem, s, x):
-        values[0] = 0.0
-        if abs(values[1]) <= rate_tolerance(problem, s, x):
-            values[1] = 0.0  # at rest on the surface: the acceleration decides
-    if values[0] >= 0.0 and (values[1] > 0.0 or (values[1] == 0.0 and values[2] > 0.0)):
-        return 0.0
-    end = longest
-    if values[1] > 0.0 and _horner(values, longest)[1] < 0.0:  # δ has its maximum inside
-        for i in range(ORDER):
-            slopes[i] = (i + 1.0) * values[i + 1]
-        slopes[ORDER] = 0.0
-        end = _bisect(slopes, -1.0, longest, -0.5 * values[1] / values[2])
-    if not _horner(values, end)[0] > 0.0:
-        return -1.0
-    square = values[1] * values[1] - 4.0 * values[0] * values[2]
-    return _bisect(values, 1.0, end, -2.0 * values[0] / (values[1] + math.sqrt(max(square, 0.0))))
-
-
-@inlined
-def _horner(coefficients, x):
-    """Value and slope of a polynomial at x."""
-    value, slope = coefficients[ORDER], 0.0
-    for i in range(ORDER - 1, -1, -1):
-        slope = slope * x + value
-        value = value * x + coefficients[i]
-    return value, slope
-
-
-@inner
-def _bisect(coefficients, sign, b, guess):
-    """Sign change of a polynomial in [0, b], to rounding, by Newton's method with bisection as safeguard.
-
-    A step doubles the digits, so after one of 1e-11 the error is rounding. A double root is found to 1e-8 at best.
-    """
-    a, x = 0.0, guess if 0.0 < guess < b else b
-    for _ in range(60):
-        f, slope = _horner(coefficients, x)
-        if sign * f > 0.0:
-            b = x
-        else:
-            a = x
-        following = x - (f / slope if slope != 0.0 else np.inf)
-        if not a < following < b:
-            following = 0.5 * (a + b)
-        if abs(following - x) <= 1e-11 * x:
-            return following
-        x = following
-    return x

@@ -7,13 +7,14 @@ tones' blocks at t = 0: neither changes a table.
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
 
-from solvers.compiled.kernels import INTEGERS, MATRIX, PROBLEM, REAL, VECTOR, copy, entry, inner
+from solvers.compiled.kernels import INTEGERS, MATRIX, PROBLEM, REAL, VECTOR, copy, entry, inner, is_circle
 from solvers.compiled.packed import Packed, unpacker
 from solvers.compiled.state import (
     DIVERGED,
@@ -119,7 +120,10 @@ def advance_many(
         if not cursor[BEGUN]:
             _begin(problem, state, numbers, rest, parameters, starts[i])
             for s in range(gaps.shape[1] if gaps.size else 0):
-                problem.gap[problem.first[s]] = gaps[i, s]
+                if not is_circle(problem, s):
+                    problem.gap[problem.first[s]] = gaps[i, s]
+                else:
+                    problem.radius[s] = math.copysign(gaps[i, s], problem.radius[s])
             cursor[BEGUN] = 1
         spent -= state.count[STEPS] + state.count[REJECTED]
         code = run(
@@ -159,7 +163,9 @@ class Worker:
     def __init__(self, engine: Engine, starts: Array, gaps: Array, outcomes: Outcomes, budget: int) -> None:
         self.engine, self.cursor, problem_at = engine, np.zeros(3, dtype=np.int64), engine.addresses[0]
         if gaps.size:  # those of the problem are shared with other runs
-            self.own = Packed.of(engine.problem._replace(gap=engine.problem.gap.copy()), PROBLEM)
+            self.own = Packed.of(
+                engine.problem._replace(gap=engine.problem.gap.copy(), radius=engine.problem.radius.copy()), PROBLEM
+            )
             problem_at = self.own.address
         workspace, parameters = engine.workspace, engine.prepared.problem.value.parameters
         log = np.empty((max(256, 2 * len(engine.problem.law)), at.CODE + 1))

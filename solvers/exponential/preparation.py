@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
@@ -10,8 +11,8 @@ import numpy as np
 from solvers.compiled.fields import packed_type, shapes_of
 from solvers.compiled.kernels import PROBLEM, Problem
 from solvers.compiled.packed import Layout, Packed, PackedTemplate, aligned
-from solvers.compiled.parts import BORDERS, ENERGY, MANY_STOPS, TWO_STOPS, load
-from solvers.compiled.state import STATE, State, begin_state, gaps_of, most_borders, problem_of
+from solvers.compiled.parts import BORDERS, CIRCLES, ENERGY, MANY_STOPS, TWO_STOPS, load
+from solvers.compiled.state import STATE, State, begin_state, gaps_of, most_borders, problem_of, radii_of
 from solvers.compiled.sums import padded
 from solvers.exponential.contact.many_stops import POOL
 from solvers.exponential.contact.node_response import START, Scratch
@@ -19,7 +20,7 @@ from solvers.exponential.contact.nodes import S, series_of
 from solvers.exponential.energy.flight_tables import ENERGY_TABLES, energy_tables_for
 from solvers.exponential.steady_response import steady_response, without_resonance
 from solvers.exponential.tables import TONE_TABLES, Tables, build, doublings, fill_tones, law_tables_of
-from solvers.problem import Array, Forcing, Memo, System, on_one_grid
+from solvers.problem import Array, Contact, Forcing, Memo, System, on_one_grid
 
 TABLES, SCRATCH = packed_type(Tables), packed_type(Scratch)
 _KINDS = {"problem": PROBLEM, "tables": TABLES, "state": STATE, "scratch": SCRATCH, "energy_tables": ENERGY_TABLES}
@@ -108,7 +109,7 @@ def prepare_system(system: System, forcing: Forcing) -> Prepared:
     tones = forcing.tone_omega, forcing.tone_amplitude, forcing.tone_load
 
     def make() -> Prepared:
-        return _shared_tables_for(system, forcing, dt_cell).with_tones(forcing, gaps_of(system.contacts))
+        return _shared_tables_for(system, forcing, dt_cell).with_tones(forcing, system.contacts)
 
     key = "tables", dt_cell, forcing.table_load.tobytes(), *(part.tobytes() for part in tones)
     prepared: Prepared = system.kept.get(key, make)
@@ -151,7 +152,7 @@ class _SharedTables:
         tables = build(problem, self.tones, self.series, law_tables_of(contacts), dt_cell, energy_rows)
         sizes = {
             **{"E": len(contacts), "R": len(problem.gap), "L": len(problem.load), "N": len(problem.k)},
-            **{"tables": len(forcing.table_dt), "B": most_borders(problem)},
+            **{"tables": len(forcing.table_dt), "B": most_borders(problem), "A": int(np.count_nonzero(problem.radius))},
         }
         if tables.bend.any() or problem.border_count.any():
             load_parts(BORDERS)
@@ -159,9 +160,11 @@ class _SharedTables:
             load_parts(TWO_STOPS)
         if tables.node_propagator.size:
             load_parts(MANY_STOPS)
+        if problem.radius.any():
+            load_parts(CIRCLES)
         self.layout = _layout(pool=POOL if tables.node_propagator.size else 0, **sizes)
         self.kept = Memo()
-        self.problem = PackedTemplate(problem, PROBLEM, ("gap", "k", "read", "read_rate", "power"))
+        self.problem = PackedTemplate(problem, PROBLEM, ("gap", "radius", "k", "read", "read_rate", "power"))
         self.tables = PackedTemplate(aligned(tables), TABLES, TONE_TABLES)
 
     @property
@@ -169,8 +172,8 @@ class _SharedTables:
         """Of problem and tables."""
         return sum(getattr(array, "nbytes", 8) for part in (self.problem, self.tables) for array in part.value)
 
-    def with_tones(self, forcing: Forcing, gaps: Array) -> Prepared:
-        """A copy with the columns of given tones, and with given gaps."""
+    def with_tones(self, forcing: Forcing, contacts: Sequence[Contact]) -> Prepared:
+        """A copy with the columns of given tones, and with the gaps of given contacts."""
         omega, amplitude, n = forcing.tone_omega, forcing.tone_amplitude, len(self.k)
         load = self.load[forcing.tone_load] * amplitude[:, None]
         response = steady_response(self.k, self.c, load, omega[:, None])
@@ -181,7 +184,8 @@ class _SharedTables:
         read_by = problem.value.read, problem.value.power, tables.value.loss_rows, back
         for rows, place in zip(read_by, self.places, strict=True):
             _of_tones(rows, n)[:] = columns[place]
-        problem.value.gap[:], problem.value.k[n:] = gaps, omega**2
+        problem.value.gap[:], problem.value.radius[:] = gaps_of(contacts), radii_of(contacts)
+        problem.value.k[n:] = omega**2
         p, v = columns[self.places[0]].transpose(1, 0, 2)
         rate = _of_tones(problem.value.read_rate, n)
         rate[:, 0], rate[:, 1] = -v * problem.value.k[n:], p

@@ -19,12 +19,11 @@ reached on a cell at whose ends δ + e < 0. Only where this does not hold are st
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from solvers.compiled.kernels import copy, dot, indentation, indentation_rate, inlined, inner, merged
+from solvers.compiled.kernels import copy, dot, indentation, indentation_rate, inlined, inner, is_circle, merged
 from solvers.compiled.state import SAMPLED, STEPS, T
+from solvers.exponential.circles.flight import circle_is_near, span_of_circle, span_of_circle_at
 from solvers.exponential.energy.flight_balance import (
     account_output,
     account_state,
@@ -34,20 +33,21 @@ from solvers.exponential.energy.flight_balance import (
     fly_within,
     start_account,
 )
+from solvers.exponential.first_contact import first_root
 from solvers.exponential.flight import (
     SERIES_REACH,
     cell_of,
     cross_cell,
     derive_signals,
     energy_norms,
-    first_root,
     fly_series,
     fly_tabulated,
     join,
     level_within,
-    motion_of_stop,
+    motion_of_row,
     propagate_blocks,
     propagate_split,
+    safe_time,
     split,
     taylor_step,
     taylor_terms,
@@ -79,15 +79,6 @@ def _acceleration_bound(problem, tables, r, norms, signal_bounds, horizon):
         growth = dot(tables.acceleration_weight[r], tables.load_norm[load], n)
         total += signal_bounds[j] * (horizon * growth + abs(tables.load_acceleration[r, load]))
     return total
-
-
-@inlined
-def _safe(g, v, bound):
-    """Time before which a stop at distance g, opening at v, cannot be reached."""
-    if bound <= 0.0:
-        return g / -v if v < 0.0 else np.inf
-    root = math.sqrt(v * v + 2.0 * bound * max(g, 0.0))
-    return (v + root) / bound if v >= 0.0 else 2.0 * max(g, 0.0) / (root - v)
 
 
 @inlined
@@ -131,8 +122,12 @@ def _fly_unsampled(problem, tables, state, scratch, most, budget):
         for r in range(problem.gap.size if count % _REFRESH == 0 else 0):
             scratch.per_row[r] = weighted_norms(tables.acceleration_weight[r], tables, x)
         for s in range(problem.law.size):
-            delta, rate = motion_of_stop(problem, tables, s, x)
-            span = min(span, _safe(-delta, -rate, scratch.per_row[problem.first[s]]))
+            if is_circle(problem, s):
+                span = min(span, span_of_circle(problem, tables, scratch, s, x))
+                continue
+            row = problem.first[s]
+            delta, rate = motion_of_row(problem, tables, row, x)
+            span = min(span, safe_time(-delta, -rate, scratch.per_row[row]))
         if span < tables.flight_step[tables.flight_step.size - 1] or count >= budget:
             break
         level = level_within(tables, span)
@@ -160,7 +155,11 @@ def _near(problem, tables, scratch, x):
     """Whether any stop is nearer than its error e, or the state is not finite."""
     near = False
     for s in range(problem.law.size):
-        near |= not motion_of_stop(problem, tables, s, x)[0] + scratch.per_row[problem.first[s]] < 0.0
+        row = problem.first[s]
+        if is_circle(problem, s):
+            near |= circle_is_near(problem, tables, scratch, s, x)
+        else:
+            near |= not motion_of_row(problem, tables, row, x)[0] + scratch.per_row[row] < 0.0
     return near
 
 
@@ -210,8 +209,11 @@ def _safe_span(problem, tables, state, scratch, span, rest, renew):
         for r in range(problem.gap.size):
             scratch.per_row[r] = _acceleration_bound(problem, tables, r, scratch.norms, scratch.signal_bounds, rest)
     for s in range(problem.law.size):
+        if is_circle(problem, s):
+            span = min(span, span_of_circle_at(problem, state, scratch, s))
+            continue
         g, v = -indentation(problem, s, state.x), -indentation_rate(problem, s, state.x)
-        span = min(span, _safe(g, v, scratch.per_row[problem.first[s]]))
+        span = min(span, safe_time(g, v, scratch.per_row[problem.first[s]]))
     return span
 
 

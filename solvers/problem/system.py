@@ -166,8 +166,8 @@ class Contact:
                 f"gap of an annulus, its clearance, must be positive and finite (m), got {self.gap!r}; "
                 "without a clearance it is a spring in each direction"
             )
-        law: Any = self.law
-        if self.always or bool(getattr(law, "memory", ())):
+        memory: Any = getattr(self.law, "memory", ())
+        if self.always or memory:
             raise ValueError(f"an annulus takes laws without memory that act for delta > 0, got {self.law!r}")
         centre = np.array(self.centre, dtype=float)
         if centre.shape != (2,) or not np.all(np.isfinite(centre)):

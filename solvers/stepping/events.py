@@ -7,7 +7,7 @@ circular clearance ±(|u| - c) of two.
 
 import numpy as np
 
-from solvers.compiled.kernels import dot, indentation, inlined, inner, kernel, merged, radial
+from solvers.compiled.kernels import dot, indentation, inlined, inner, is_circle, kernel, merged, radial, radius_of
 from solvers.compiled.state import surface_tolerance
 
 # finer near 0, where a contact just left may come back
@@ -37,7 +37,7 @@ def motion_of(problem, s, x, dense, coefficients):
     row = problem.first[s]
     _coefficients_of(problem.read[row], problem.gap[row], x, dense, coefficients[0])
     _coefficients_of(problem.read_rate[row], 0.0, x, dense, coefficients[1])
-    if problem.radius[s] != 0.0:
+    if is_circle(problem, s):
         _coefficients_of(problem.read[row + 1], problem.gap[row + 1], x, dense, coefficients[2])
         _coefficients_of(problem.read_rate[row + 1], 0.0, x, dense, coefficients[3])
 
@@ -159,7 +159,7 @@ def first_event(problem, x, dense, segment, coefficients):
     for s in range(problem.law.size):
         motion_of(problem, s, x, dense, coefficients)
         tolerance = surface_tolerance(problem, s, x)
-        radius = problem.radius[s]
+        radius = radius_of(problem, s)
         found = crossing(coefficients, radius, problem.knots[s, segment[s]], 1.0, tolerance)
         if found < theta:
             theta, stop, direction = found, s, 1

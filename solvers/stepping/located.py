@@ -4,7 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from solvers.compiled.kernels import copy, dot, force_at, indentation, indentation_rate, inner, kernel, off_knots
+from solvers.compiled.kernels import (
+    copy,
+    dot,
+    force_at,
+    indentation,
+    indentation_rate,
+    inner,
+    kernel,
+    off_knots,
+    radius_of,
+)
 from solvers.compiled.renewals import most_rows
 from solvers.compiled.state import (
     AT_ONCE,
@@ -73,11 +83,11 @@ def _peaks(problem, state, space):
 def _peak_value(known, theta):
     """Indentation or force at θ of the step."""
     problem, state, s, column, coefficients, batch = known
-    delta = delta_at(coefficients, problem.radius[s], theta)
+    delta = delta_at(coefficients, radius_of(problem, s), theta)
     if column == PEAK_DELTA:
         return delta
     delta = off_knots(problem, s, state.segment[s], delta)
-    rate = rate_at(coefficients, problem.radius[s], theta)
+    rate = rate_at(coefficients, radius_of(problem, s), theta)
     return force_at(problem, s, delta, rate, state.entry_rate[s], batch)
 
 
@@ -108,7 +118,7 @@ def first_kink(problem, state, space):
 @inner
 def _side(problem, state, space, s, theta, lowest, batch):
     """On which side of its kinks a law is at θ of the step; beyond the surface on that of the surface."""
-    radius = problem.radius[s]
+    radius = radius_of(problem, s)
     delta, rate = delta_at(space.coefficients, radius, theta), rate_at(space.coefficients, radius, theta)
     side = 2 if space.kinks[s] & 2 and rate > 0.0 else 0
     if space.kinks[s] & 1 and delta > lowest:

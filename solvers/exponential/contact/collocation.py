@@ -33,6 +33,7 @@ from solvers.compiled.kernels import (
     indentation_rate,
     inlined,
     inner,
+    is_circle,
     merged,
     off_knots,
 )
@@ -58,13 +59,14 @@ from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR, STIFFNESS
 
 
 @merged
-def _alone(tables, state):
-    """The stop in contact if it is the only one and its law is a power law of the tables, else -1."""
+def _alone(problem, tables, state):
+    """The stop in contact if it is the only one, on a line, and its law is a power law of the tables, else -1."""
     alone, count = -1, 0
     for s in range(state.segment.size):
         if state.segment[s] > 0:
             alone, count = s, count + 1
-    return alone if count == 1 and tables.power_law[alone, EXPONENT] > 0.0 else -1
+    inlined_law = count == 1 and tables.power_law[alone, EXPONENT] > 0.0 and not is_circle(problem, alone)
+    return alone if inlined_law else -1
 
 
 @merged
@@ -118,7 +120,7 @@ def solve_forces(problem, tables, state, scratch, node_set, level, rtol):
     """Solve for the forces by fixed-point iteration, else by Newton's method; returns whether a solution was found."""
     if _set_accuracy(problem, tables, state, scratch, tables.contact_step[level], rtol):
         return newton(problem, tables, state, scratch, node_set, level)
-    before, alone = 0.0, _alone(tables, state)
+    before, alone = 0.0, _alone(problem, tables, state)
     law, unit = tables.power_law[max(alone, 0)], 1.0 / scratch.force_tolerance[max(alone, 0)] ** 2
     row = problem.first[max(alone, 0)]
     own = pair_response(problem, tables, scratch, node_set, level, row, row)
@@ -173,6 +175,9 @@ def step_error(problem, tables, state, scratch, node_set, level, rtol):
         if state.segment[s] == 0:
             continue
         combine(tables.summary[node_set], scratch.force[u], S, None, scratch.summary[u, 0])
+        if is_circle(problem, s) and u == problem.first[s]:
+            own = problem.own[s]
+            combine(tables.summary[node_set], scratch.law_force[own], S, None, scratch.summary[own, 0])
         largest, stiffness = _largest(problem, tables, state, scratch, s)
         if node_set == 0 or s == node_set - 1:
             unresolved = unresolved_part(scratch.summary[u, 0], largest, S // 2)
@@ -184,7 +189,8 @@ def step_error(problem, tables, state, scratch, node_set, level, rtol):
         if unresolved == 0.0:
             continue
         ripple = ripple_of(tables.ripple_weight[u], tables.alias[tables.kind[node_set], level], state.x, n)
-        span = h * _undamped_part(problem, tables, scratch, node_set, h, s) if scratch.viscous[s] > 0.0 else h
+        damped = scratch.viscous[s] > 0.0 and not is_circle(problem, s)  # across a circle's radius nothing damps
+        span = h * _undamped_part(problem, tables, scratch, node_set, h, s) if damped else h
         scratch.unresolved[u] = span * (unresolved + 0.03 * stiffness * ripple)
     _sum_errors(problem, tables, scratch, node_set, state.now[T], h)
     worst = 0.0
@@ -245,7 +251,7 @@ def _hidden_kink(problem, state, scratch, s, largest):
     delta[1] = off_knots(problem, s, state.segment[s], indentation(problem, s, state.x))
     rate[1] = indentation_rate(problem, s, state.x)
     contact_forces(problem, s, delta, rate, state.entry_rate[s], scratch.trial[2:4])
-    c = scratch.summary[problem.first[s], 0]
+    c = scratch.summary[problem.own[s], 0]
     apart = max(abs(scratch.trial[2] - c[5]), abs(scratch.trial[3] - c[4]))
     return apart if apart > 2.0 * max(abs(c[2]), abs(c[3])) + 1e-12 * largest else 0.0
 

@@ -28,6 +28,7 @@ from solvers.compiled.kernels import (
     indentation_rate,
     inlined,
     inner,
+    is_circle,
     merged,
     push_of,
 )
@@ -35,8 +36,9 @@ from solvers.compiled.parts import BOUNDS, LEAVES, SIDE, part
 from solvers.compiled.simd import largest8, least8, load8, splat8, store8
 from solvers.compiled.state import PEAK_FORCE, T_IN, T, acts, begins_and_ends, is_open, surface_tolerance
 from solvers.compiled.sums import above
+from solvers.exponential.circles.contact import radial_nodes, stays_in_circle
 from solvers.exponential.contact.many_stops import CONTINUING, ENTERING, add_block_motion, motion_at_nodes, uses_blocks
-from solvers.exponential.contact.node_response import motion_of, respond, ripple_of
+from solvers.exponential.contact.node_response import motion_of, respond, ripple_of_stop
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.peaks import largest_indentation
 from solvers.exponential.flight import energy_norms
@@ -124,8 +126,10 @@ def _bound_rates(problem, tables, state, scratch, h):
 
 
 @merged
-def _stays_away(problem, scratch, s, h):
+def _stays_away(problem, state, scratch, s, h):
     """Whether a stop out of contact cannot be reached on the step; its motion is set to that at the start."""
+    if is_circle(problem, s):
+        return stays_in_circle(problem, state, scratch, s, h)
     delta, rate, row = scratch.start_motion[s, 0], scratch.start_motion[s, 1], problem.first[s]
     store8(scratch.motion[row, 0], 0, splat8(delta))
     store8(scratch.motion[row, 1], 0, splat8(rate))
@@ -144,6 +148,8 @@ def _watch(problem, tables, state, scratch, node_set, level, s, carried):
             motion_at_nodes(problem, scratch, r, problem.gap[r], scratch.motion[r])
         else:
             respond(problem, tables, state, scratch, node_set, level, r)
+    if is_circle(problem, s):
+        radial_nodes(problem, scratch, s)
     return carried or through
 
 
@@ -160,11 +166,11 @@ def leaves_segment(problem, tables, state, scratch, node_set, level):
         if segment > 0 and problem.knots[s, segment - 1] == -np.inf and upper == np.inf:
             continue
         if segment == 0:
-            if through and _stays_away(problem, scratch, s, h):
+            if through and _stays_away(problem, state, scratch, s, h):
                 continue
             carried = _watch(problem, tables, state, scratch, node_set, level, s, carried)
             alias = tables.alias[tables.kind[node_set], level]
-            ripple = ripple_of(tables.ripple_weight[problem.first[s]], alias, state.x, problem.k.size)
+            ripple = ripple_of_stop(problem, tables, s, alias, state.x)
         else:
             lower = problem.knots[s, segment - 1]
         motion = motion_of(problem, scratch, s)

@@ -20,7 +20,18 @@ import math
 import numpy as np
 
 from solvers.compiled.dop853_tableau import E3, E5, STAGES
-from solvers.compiled.kernels import abs_dot, copy, indentation, indentation_rate, inlined, inner, merged, raised, rhs
+from solvers.compiled.kernels import (
+    abs_dot,
+    copy,
+    indentation,
+    indentation_rate,
+    inlined,
+    inner,
+    is_circle,
+    merged,
+    raised,
+    rhs,
+)
 from solvers.compiled.parts import PASSED
 from solvers.compiled.renewals import margins_before, margins_in
 from solvers.compiled.state import (
@@ -35,6 +46,7 @@ from solvers.compiled.state import (
     write_event,
 )
 from solvers.compiled.sums import combine
+from solvers.exponential.circles.contact import land_on_circle
 from solvers.exponential.contact.borders import passed
 from solvers.exponential.contact.crossings import CLEAR, TOO_LONG, before_landing, side_at
 from solvers.exponential.contact.landing_step import INDENTATION, ROOT, TIME, landing_step, start_landing
@@ -145,7 +157,7 @@ def _begin_peaks(state, scratch):
 
 
 @inner
-def _accept(problem, tables, state, scratch, variable, stop, span, t_end, out, due, with_energy):
+def _accept(problem, tables, state, scratch, variable, stop, level, span, t_end, out, due, with_energy):
     """Move the state to the landing in ``scratch.stages[LANDED]``, or to the end of the run; write samples between."""
     w, x, size = scratch.stages[START], scratch.stages[LANDED], state.x.size
     landed, t = x[size], state.now[T]
@@ -169,6 +181,8 @@ def _accept(problem, tables, state, scratch, variable, stop, span, t_end, out, d
     if state.event_record.shape[0]:
         write_event(state, LANDING, t, landed, span, variable, stop, w)
     state.now[T] = landed
+    if is_circle(problem, stop) and variable != TIME and landed < t_end:
+        land_on_circle(problem, state, scratch, stop, level)
     if variable != ROOT or landed == t_end:  # at a knot the force may fall
         state_peaks(problem, state, scratch, state.x)
     return True
@@ -254,7 +268,8 @@ def land(problem, tables, state, scratch, stop, direction, near, rtol, t_end, ou
         other = TOO_LONG
     if other != CLEAR:
         return max(other, -1)
-    done = _accept(problem, tables, state, scratch, variable, stop, span, t_end, out, due, with_energy)
+    level = _level(problem, state, stop, direction)
+    done = _accept(problem, tables, state, scratch, variable, stop, level, span, t_end, out, due, with_energy)
     return stop if done else -1
 
 
@@ -323,4 +338,4 @@ def land_on_bend(problem, tables, state, scratch, stop, border, near, rtol, t_en
     if not lower < indentation(problem, stop, x) < upper:
         return False
     variable = np.int64(TIME)  # a literal would be compiled for itself
-    return _accept(problem, tables, state, scratch, variable, stop, span, t_end, out, due, with_energy)
+    return _accept(problem, tables, state, scratch, variable, stop, 0.0, span, t_end, out, due, with_energy)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numba import types
 
-from solvers.compiled.kernels import contact_gradient, copy, inner, merged
+from solvers.compiled.kernels import contact_gradient, copy, inner, is_circle, merged
 from solvers.compiled.parts import NEWTON, part
 from solvers.compiled.state import CALLS, acts, rate_tolerance
+from solvers.exponential.circles.contact import linearise_circle
 from solvers.exponential.contact.many_stops import pair_response
 from solvers.exponential.contact.node_response import motion_of, node_forces, respond
 from solvers.exponential.contact.nodes import S
@@ -27,7 +28,11 @@ def linearise(problem, tables, state, scratch, node_set, level):
     size = 0
     for r in range(problem.gap.size):
         if acts(problem, state, r):
-            _linearise_row(problem, tables, state, scratch, node_set, level, r, size)
+            s = problem.element[r]
+            if not is_circle(problem, s):
+                _linearise_row(problem, tables, state, scratch, node_set, level, r, size)
+            elif r == problem.first[s]:
+                linearise_circle(problem, tables, state, scratch, node_set, level, s, size)
             size += S
     return size
 

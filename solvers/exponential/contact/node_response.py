@@ -6,10 +6,11 @@ import math
 from typing import Annotated, Any, NamedTuple
 
 from solvers.compiled.dop853_tableau import STAGES
-from solvers.compiled.kernels import inlined, inner, law_forces, merged, reordered, table_value
+from solvers.compiled.kernels import inlined, inner, is_circle, law_forces, merged, reordered, table_value
 from solvers.compiled.simd import largest8, load8, size8, splat8, store8
 from solvers.compiled.state import CALLS, T, acts
 from solvers.compiled.sums import above, combine
+from solvers.exponential.circles.contact import radial_forces
 from solvers.exponential.contact.many_stops import (
     SIGNALS,
     add_block_motion,
@@ -51,15 +52,16 @@ class Scratch(NamedTuple):
     signal_bounds: Annotated[Any, "L"]  # bounds of the sampled signals on some cells
     per_row: Annotated[Any, "R"]  # bounds of |δ̈| in m/s², errors of δ in m, or of δ̇ in m/s
     split_state: Annotated[Any, "6, 2, N8"]  # p and v of the blocks, of several states; see `energy.flight_balance`
-    motion: Annotated[Any, "R, 2, S"]  # displacements and their rates at the nodes
+    motion: Annotated[Any, "R+A, 2, S"]  # displacements of the rows and their rates at the nodes, δ and δ̇ of circles
     clipped: Annotated[Any, "S"]  # indentations of one stop at the nodes, not below 0
     free: Annotated[Any, "R, 2, S"]  # the same without contact forces
     force: Annotated[Any, "R+L, S"]  # forces on the rows, then values of the signals
-    law_force: Annotated[Any, "R, S"]  # forces on the rows by the laws, for the motion at hand
+    law_force: Annotated[Any, "R+A, S"]  # forces on the rows by the laws, for the motion at hand, those of circles
     trial: Annotated[Any, "S"]  # numbers of one moment
-    summary: Annotated[Any, "R, 2, 8"]  # of forces and displacements, see Tables.summary
+    summary: Annotated[Any, "R+A, 2, 8"]  # of forces and displacements, see Tables.summary
     previous: Annotated[Any, "R, S"]  # forces of the last accepted step
     slope: Annotated[Any, "E, 3, S"]  # derivatives of the laws at the nodes by δ, δ̇ and entry rate
+    turned: Annotated[Any, "4*A, 2, S"]  # slopes of the components of circles' forces, see `circles.contact`
     residual: Annotated[Any, "R*S"]  # N, then the changes of the forces
     pivots: Annotated[Any, "int R*S"]  # of the LU factors
     stages: Annotated[Any, "stages, W8"]  # states and rates, rows as named above
@@ -250,21 +252,33 @@ def respond(problem, tables, state, scratch, node_set, level, r):
 
 @inlined
 def own_accelerance(problem, tables, s):
-    """-δ̈ of a stop per newton of its own, 1/kg."""
+    """-δ̈ of a stop per newton of its own, 1/kg; of a circle the larger one of its rows."""
     row = problem.first[s]
+    if is_circle(problem, s):
+        return max(tables.accelerance[row, row], tables.accelerance[row + 1, row + 1])
     return tables.accelerance[row, row]
 
 
 @merged
 def motion_of(problem, scratch, s):
     """(2, S) indentation and rate of stop s at the nodes."""
-    return scratch.motion[problem.first[s]]
+    return scratch.motion[problem.own[s]]
 
 
 @merged
 def force_of(problem, scratch, s):
     """(S,) force of stop s at the nodes."""
-    return scratch.force[problem.first[s]]
+    return scratch.force[problem.first[s]] if not is_circle(problem, s) else scratch.law_force[problem.own[s]]
+
+
+@inlined
+def ripple_of_stop(problem, tables, s, alias, x):
+    """The error of `ripple_of` of a stop's indentation."""
+    row, n = problem.first[s], problem.k.size
+    ripple = ripple_of(tables.ripple_weight[row], alias, x, n)
+    if is_circle(problem, s):
+        ripple += ripple_of(tables.ripple_weight[row + 1], alias, x, n)
+    return ripple
 
 
 @reordered
@@ -288,6 +302,9 @@ def rate_ripple_of(ripple_weight, k, alias, x, n):
 @inlined
 def node_forces(problem, state, scratch, s):
     """Forces of stop s on its rows at the nodes by its law, into ``scratch.law_force``."""
+    if is_circle(problem, s):
+        radial_forces(problem, state, scratch, s)
+        return
     motion, force = motion_of(problem, scratch, s), scratch.law_force[problem.first[s]]
     above(motion[0], problem.knots[s, 0], scratch.clipped)
     law_forces(problem, s, S, scratch.clipped, motion[1], state.entry_rate[s], force)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from solvers.compiled.kernels import copy, indentation, inlined, inner, merged
+from solvers.compiled.kernels import copy, indentation, inlined, inner, is_circle, merged
 from solvers.compiled.simd import load8, splat8, sum8
 from solvers.compiled.state import (
     HEAD,
@@ -19,6 +19,7 @@ from solvers.compiled.state import (
     write_event,
 )
 from solvers.compiled.sums import combine
+from solvers.exponential.circles.contact import work_in_circle
 from solvers.exponential.contact.node_response import START, force_of, largest_size, motion_of
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.peaks import state_peaks, step_peaks
@@ -95,7 +96,9 @@ def finish_step(problem, tables, state, scratch, node_set, level):
             weighted = s == node_set - 1 and tables.weight_exponent[node_set] > 0.0
             weights = tables.weights[node_set] if weighted else tables.plain[node_set]
             impulses = load8(weights, 0) * load8(force, 0)
-            if weighted or brief:
+            if is_circle(problem, s):
+                state.x[size + 2 + 2 * s] += work_in_circle(problem, tables, state, scratch, node_set, level, s)
+            elif weighted or brief:
                 state.x[size + 2 + 2 * s] += h * sum8(impulses * load8(motion[1], 0))
             else:
                 state.x[size + 2 + 2 * s] += _work(problem, tables, scratch, node_set, s)

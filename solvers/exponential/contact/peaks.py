@@ -126,7 +126,7 @@ def step_peaks(problem, tables, state, scratch, node_set, h, s, limit):
     seen, motion, force = -1, motion_of(problem, scratch, s)[0], force_of(problem, scratch, s)
     if limit >= 1.0 and _below(state, s, PEAK_FORCE, force) and _below(state, s, PEAK_DELTA, motion):
         return
-    summary = scratch.summary[problem.first[s]]
+    summary = scratch.summary[problem.own[s]]
     combine(tables.summary[node_set], motion, S, None, summary[1])
     for column, values, d in ((PEAK_FORCE, force, 0), (PEAK_DELTA, motion, 1)):
         known, slopes = state.active[s, column], summary[d]

@@ -21,6 +21,7 @@ from solvers.compiled.kernels import (
     indentation,
     indentation_rate,
     inlined,
+    is_circle,
     merged,
     rhs,
 )
@@ -43,6 +44,7 @@ from solvers.compiled.state import (
     switch_on_surface,
 )
 from solvers.compiled.sums import combine
+from solvers.exponential.circles.contact import guess_radial_forces
 from solvers.exponential.contact.borders import UNRESOLVED
 from solvers.exponential.contact.collocation import end_state, solve_forces, step_error
 from solvers.exponential.contact.crossings import leaves_segment
@@ -118,6 +120,9 @@ def _predict(problem, tables, state, scratch, level):
     shift = level - control[LEVEL] + 2
     for s in range(problem.law.size):
         if state.segment[s] == 0:
+            continue
+        if control[NEW] and is_circle(problem, s):
+            guess_radial_forces(problem, state, scratch, s)
             continue
         if control[NEW]:
             free, force = scratch.free[problem.first[s]], force_of(problem, scratch, s)

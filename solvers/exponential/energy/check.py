@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from solvers.compiled.kernels import inner, merged
+from solvers.compiled.kernels import inner, is_circle, merged
 from solvers.compiled.state import PEAK_FORCE, T
 from solvers.problem import Array, Energy, System, dense
 
@@ -46,12 +46,14 @@ def note_energy(problem, tables, state, scratch):
     n = problem.k.size
     allowed = scratch.energy[FIRST]
     for s in range(problem.law.size):
-        steady, row = 0.0, problem.read_rate[problem.first[s]]
-        for b in range(int(tables.own_blocks), n):
-            speed = np.hypot(row[b], row[n + b] * np.sqrt(problem.k[b]))
-            steady += speed * np.hypot(
-                state.x[b], state.x[n + b] / np.sqrt(problem.k[b]) if problem.k[b] > 0.0 else 0.0
-            )
+        steady = 0.0
+        for r in range(problem.first[s], problem.first[s] + (1 if not is_circle(problem, s) else 2)):
+            row = problem.read_rate[r]
+            for b in range(int(tables.own_blocks), n):
+                speed = np.hypot(row[b], row[n + b] * np.sqrt(problem.k[b]))
+                steady += speed * np.hypot(
+                    state.x[b], state.x[n + b] / np.sqrt(problem.k[b]) if problem.k[b] > 0.0 else 0.0
+                )
         work, impulse = state.x[2 * n + 2 + 2 * s], abs(state.x[2 * n + 3 + 2 * s])
         if problem.knots[s, 0] < 0.0:  # a force of both signs
             impulse = state.active[s, PEAK_FORCE] * state.now[T]

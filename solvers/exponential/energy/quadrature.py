@@ -10,11 +10,23 @@ from __future__ import annotations
 
 from numba import types
 
-from solvers.compiled.kernels import REAL, VECTOR, dot, inner, merged, push_of, raised, reordered, table_value
+from solvers.compiled.kernels import (
+    REAL,
+    VECTOR,
+    dot,
+    inner,
+    is_circle,
+    merged,
+    push_of,
+    raised,
+    reordered,
+    table_value,
+)
 from solvers.compiled.parts import WITHIN_STEP, part
 from solvers.compiled.simd import WIDTH, load8, splat8, store8, sum8
 from solvers.compiled.state import acts
 from solvers.compiled.sums import combine
+from solvers.exponential.circles.contact import work_within_circle
 from solvers.exponential.contact.many_stops import enters
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.responses import propagate
@@ -154,6 +166,11 @@ def _add_works(problem, tables, state, scratch, row):
     for s in range(problem.law.size):
         if state.segment[s] > 0:
             row_of = problem.first[s]
+            if is_circle(problem, s):
+                work, impulse = work_within_circle(problem, tables, scratch, s, _PACE + 1)
+                row[size + 2 + 2 * s] += work
+                row[size + 3 + 2 * s] += impulse
+                continue
             combine(scratch.along, problem.read_rate[row_of], size, None, scratch.trial)
             impulses = load8(tables.gauss[1], 0) * load8(scratch.between[_PACE + 1 + row_of], 0)
             row[size + 2 + 2 * s] += sum8(impulses * load8(scratch.trial, 0))

@@ -1,0 +1,235 @@
+"""Steps in contact with a circular clearance: its unknowns are the components of the force at the nodes, of both rows.
+
+δ, δ̇ and N stand behind the rows, at the place ``problem.own`` of `Scratch.motion` and `Scratch.law_force`, where
+whatever looks at the indentation of an element finds them.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import types
+
+from solvers.compiled.kernels import (
+    REAL,
+    copy,
+    dot,
+    inlined,
+    inner,
+    law_forces,
+    radial,
+    radial_motion,
+    rhs,
+)
+from solvers.compiled.parts import (
+    CIRCLE_AWAY,
+    CIRCLE_FORCES,
+    CIRCLE_GUESS,
+    CIRCLE_LANDED,
+    CIRCLE_MOTION,
+    CIRCLE_NEWTON,
+    CIRCLE_WITHIN,
+    CIRCLE_WORK,
+    part,
+)
+from solvers.compiled.simd import load8, sum8
+from solvers.compiled.state import CALLS, T, acts, surface_tolerance
+from solvers.compiled.sums import above, combine
+from solvers.exponential.contact.many_stops import pair_response
+from solvers.exponential.contact.nodes import S
+
+
+@inner
+def _radial_nodes(problem, scratch, s):
+    """δ and δ̇ at the nodes from the motion of both rows."""
+    u, w, own = scratch.motion[problem.first[s]], scratch.motion[problem.first[s] + 1], scratch.motion[problem.own[s]]
+    for i in range(S):
+        square, product = u[0, i] * u[0, i] + w[0, i] * w[0, i], u[0, i] * u[1, i] + w[0, i] * w[1, i]
+        speed = u[1, i] * u[1, i] + w[1, i] * w[1, i]
+        own[0, i], own[1, i] = radial(square, product, speed, problem.radius[s])
+
+
+@inlined
+def _signed(problem, s, value):
+    """σ times a value."""
+    return value if problem.radius[s] > 0.0 else -value
+
+
+@part(CIRCLE_MOTION, types.void, types.int64)
+def radial_nodes(problem, scratch, s):
+    """The same at an address."""
+    _radial_nodes(problem, scratch, s)
+
+
+@inner
+def _radial_forces(problem, state, scratch, s):
+    """Force at the nodes for the motion of both rows, and its components, into ``scratch.law_force``."""
+    _radial_nodes(problem, scratch, s)
+    row, own = problem.first[s], problem.own[s]
+    motion, force, along, across = (
+        scratch.motion[own],
+        scratch.law_force[own],
+        scratch.motion[row],
+        scratch.motion[row + 1],
+    )
+    above(motion[0], problem.knots[s, 0], scratch.clipped)
+    law_forces(problem, s, S, scratch.clipped, motion[1], state.entry_rate[s], force)
+    state.count[CALLS] += S
+    for i in range(S):
+        r = math.sqrt(along[0, i] * along[0, i] + across[0, i] * across[0, i])
+        share = _signed(problem, s, force[i]) / r
+        scratch.law_force[row, i], scratch.law_force[row + 1, i] = share * along[0, i], share * across[0, i]
+
+
+@part(CIRCLE_FORCES, types.void, types.int64)
+def radial_forces(problem, state, scratch, s):
+    """The same at an address."""
+    _radial_forces(problem, state, scratch, s)
+
+
+@part(CIRCLE_GUESS, types.void, types.int64)
+def guess_radial_forces(problem, state, scratch, s):
+    """First guess of the components: the law for the free response."""
+    for r in range(problem.first[s], problem.first[s] + 2):
+        copy(scratch.free[r, 0], scratch.motion[r, 0], S)
+        copy(scratch.free[r, 1], scratch.motion[r, 1], S)
+    _radial_forces(problem, state, scratch, s)
+    for r in range(problem.first[s], problem.first[s] + 2):
+        copy(scratch.law_force[r], scratch.force[r], S)
+
+
+@part(CIRCLE_AWAY, types.boolean, types.int64, REAL)
+def stays_in_circle(problem, state, scratch, s, h):
+    """Whether a circle cannot be met on the step; the motion at the nodes is set to that at the start.
+
+    ``scratch.per_row`` bounds the rows' accelerations. In a disc the way there is no further out than its ends.
+    """
+    row, size = problem.first[s], 2 * problem.k.size
+    bound, ahead = 0.5 * h * h * math.hypot(scratch.per_row[row], scratch.per_row[row + 1]), 0.0
+    for r in range(row, row + 2):
+        u = dot(problem.read[r], state.x, size) - problem.gap[r]
+        v = dot(problem.read_rate[r], state.x, size)
+        ahead += (u + h * v) ** 2
+        for i in range(S):
+            scratch.motion[r, 0, i], scratch.motion[r, 1, i] = u, v
+    delta, rate = scratch.start_motion[s, 0], scratch.start_motion[s, 1]
+    for i in range(S):
+        scratch.motion[problem.own[s], 0, i], scratch.motion[problem.own[s], 1, i] = delta, rate
+    if problem.radius[s] < 0.0:
+        return delta + h * max(rate, 0.0) + bound < 0.0
+    return max(delta, math.sqrt(ahead) - problem.radius[s]) + bound < 0.0
+
+
+@inlined
+def turn_slopes(u, w, u_dot, w_dot, force, by_delta, by_rate, radius, i, out):
+    """Slopes of a force's components at point i, rows 2a + b of ``out``: of a by u_b, then by u̇_b; u is (u, w).
+
+    ∂F_a/∂u_b = N_δ e_a e_b + N_δ̇ e_a (u̇_b - ṙ e_b)/r + σ (N/r) (1 if a = b - e_a e_b),   ∂F_a/∂u̇_b = N_δ̇ e_a e_b
+    """
+    r = math.sqrt(u * u + w * w)
+    e_u, e_w = u / r, w / r
+    along, sideways = e_u * u_dot + e_w * w_dot, (force if radius > 0.0 else -force) / r
+    for a in range(2):
+        e_a = e_u if a == 0 else e_w
+        for b in range(2):
+            e_b, faster = (e_u, u_dot) if b == 0 else (e_w, w_dot)
+            turning = by_rate * e_a * (faster - along * e_b) / r + sideways * ((1.0 if a == b else 0.0) - e_a * e_b)
+            out[2 * a + b, 0, i], out[2 * a + b, 1, i] = by_delta * e_a * e_b + turning, by_rate * e_a * e_b
+
+
+@inner
+def slopes_at_nodes(problem, scratch, s):
+    """Slopes of the components at the nodes, into ``scratch.turned``, from those of the law."""
+    u, w, own = scratch.motion[problem.first[s]], scratch.motion[problem.first[s] + 1], problem.own[s]
+    slope, force, circle = scratch.slope[s], scratch.law_force[own], 4 * (own - problem.gap.size)
+    out, radius = scratch.turned[circle : circle + 4], problem.radius[s]
+    for i in range(S):
+        turn_slopes(u[0, i], w[0, i], u[1, i], w[1, i], force[i], slope[0, i], slope[1, i], radius, i, out)
+
+
+@part(CIRCLE_NEWTON, types.void, *[types.int64] * 4)
+def linearise_circle(problem, tables, state, scratch, node_set, level, s, begin):
+    """Write what both rows of a circle add to the matrix of Newton's method, from its row ``begin`` on."""
+    slopes_at_nodes(problem, scratch, s)
+    row, circle, column = problem.first[s], 4 * (problem.own[s] - problem.gap.size), 0
+    for u in range(problem.gap.size):
+        if not acts(problem, state, u):
+            continue
+        for a in range(2):
+            for i in range(S):
+                for j in range(S):
+                    own = u == row + a and i == j
+                    scratch.jacobian[begin + a * S + i, column + j] = 1.0 if own else 0.0
+        for b in range(2):
+            matrix = pair_response(problem, tables, scratch, node_set, level, row + b, u)
+            for a in range(2):
+                slope = scratch.turned[circle + 2 * a + b]
+                for i in range(S):
+                    for j in range(S):
+                        scratch.jacobian[begin + a * S + i, column + j] -= (
+                            slope[0, i] * matrix[j, i] + slope[1, i] * matrix[j, S + i]
+                        )
+        column += S
+
+
+@part(CIRCLE_WORK, REAL, *[types.int64] * 3)
+def work_in_circle(problem, tables, state, scratch, node_set, level, s):
+    """Work, J, of the components over the step just found, each as that of a plain force; see `contact.outputs`."""
+    size, h, work = 2 * problem.k.size, tables.contact_step[level], 0.0
+    weighted = s == node_set - 1 and tables.weight_exponent[node_set] > 0.0
+    weights = tables.weights[node_set] if weighted else tables.plain[node_set]
+    for r in range(problem.first[s], problem.first[s] + 2):
+        force, motion = scratch.force[r], scratch.motion[r]
+        if weighted or h * tables.fastest <= 1.0:
+            work += h * sum8(load8(weights, 0) * load8(force, 0) * load8(motion[1], 0))
+            continue
+        begin = dot(problem.read[r], state.x, size) - problem.gap[r]
+        end = dot(problem.read[r], scratch.x_new, size) - problem.gap[r]
+        combine(tables.work[node_set], force, S, None, scratch.trial)
+        for i in range(S):
+            work += scratch.trial[i] * (motion[0, i] - begin)
+        work += sum8(load8(tables.work_end[node_set], 0) * load8(force, 0)) * (end - begin)
+    return work
+
+
+@part(CIRCLE_WITHIN, types.UniTuple(REAL, 2), types.int64, types.int64)
+def work_within_circle(problem, tables, scratch, s, first):
+    """(work, impulse) on a panel within a step; the rows' forces are in ``scratch.between`` from row ``first`` on."""
+    size, work, row = 2 * problem.k.size, 0.0, problem.first[s]
+    weights = tables.gauss[1]
+    product, square = scratch.trial, scratch.clipped
+    for i in range(S):
+        product[i], square[i] = 0.0, 0.0
+    for r in range(row, row + 2):
+        force = scratch.between[first + r]
+        for i in range(S):
+            u, v = -problem.gap[r], 0.0
+            for e in range(size):
+                u += problem.read[r, e] * scratch.along[e, i]
+                v += problem.read_rate[r, e] * scratch.along[e, i]
+            work += weights[i] * force[i] * v
+            product[i] += force[i] * u
+            square[i] += u * u
+    impulse = 0.0
+    for i in range(S):
+        impulse += weights[i] * _signed(problem, s, product[i]) / math.sqrt(square[i])
+    return work, impulse
+
+
+@part(CIRCLE_LANDED, types.void, types.int64, REAL)
+def land_on_circle(problem, state, scratch, s, level):
+    """Move a state that has landed near |u| = c onto it, along its motion: dt = (level - δ)/δ̇.
+
+    A landing ends there to its own tolerance, as the indentation is not linear in the state; this leaves rounding.
+    """
+    size = 2 * problem.k.size
+    for _ in range(2):
+        delta, rate = radial_motion(problem, s, state.x)
+        if abs(delta - level) <= 0.5 * surface_tolerance(problem, s, state.x) or rate == 0.0:
+            break
+        rhs(problem, state.now[T], state.x, state.segment, state.entry_rate, state.rate, scratch.trial)
+        shift = (level - delta) / rate
+        for e in range(state.x.size):
+            if e < size or e > size + 1:
+                state.x[e] += shift * state.rate[e]
+        state.now[T] += shift

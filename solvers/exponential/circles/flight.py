@@ -1,0 +1,98 @@
+"""Flight in a circular clearance: certified spans, and the first contact on the Taylor polynomials.
+
+With M a bound of |ü|, |u(τ)| <= |u + u̇τ| + Mτ²/2, and (c - Mτ²/2)² >= c² - cMτ². So an inner circle is not met before
+
+    τ = (-b + √(b² + a (c² - r²)))/a,   a = |u̇|² + cM,   b = u·u̇.
+
+An outer one is a line: r(τ) >= r + ṙτ - Mτ²/2. On a cell of sampled signals u differs from the straight line between
+its ends by at most e, and a disc is convex: an inner circle is not met if |u| + e < c at both ends.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import types
+
+from solvers.compiled.kernels import MATRIX, REAL, VECTOR, dot, inlined, inner
+from solvers.compiled.parts import CIRCLE_NEAR, CIRCLE_ROOT, CIRCLE_SPAN, CIRCLE_SPAN_AT, part
+from solvers.exponential.flight import ORDER, motion_of_row, safe_time
+
+
+@inlined
+def _safe_in_circle(radius, uu, uv, vv, bound):
+    """Time before which a circle cannot be met, from u·u, u·u̇ and u̇·u̇."""
+    r = math.sqrt(uu)
+    if radius < 0.0:
+        return safe_time(r + radius, uv / r if r > 0.0 else 0.0, bound)
+    left, a = (radius - r) * (radius + r), vv + radius * bound
+    if left <= 0.0 and uv >= 0.0:
+        return 0.0
+    if a <= 0.0:
+        return math.inf
+    left = max(left, 0.0)
+    root = math.sqrt(uv * uv + a * left)
+    return left / (uv + root) if uv > 0.0 else (root - uv) / a
+
+
+@part(CIRCLE_SPAN, REAL, types.int64, MATRIX)
+def span_of_circle(problem, tables, scratch, s, x):
+    """The time from the blocks' p and v; ``scratch.per_row`` bounds the rows' accelerations."""
+    row = problem.first[s]
+    u, u_dot = motion_of_row(problem, tables, row, x)
+    w, w_dot = motion_of_row(problem, tables, row + 1, x)
+    bound = math.hypot(scratch.per_row[row], scratch.per_row[row + 1])
+    uu, uv, vv = u * u + w * w, u * u_dot + w * w_dot, u_dot * u_dot + w_dot * w_dot
+    return _safe_in_circle(problem.radius[s], uu, uv, vv, bound)
+
+
+@part(CIRCLE_SPAN_AT, REAL, types.int64)
+def span_of_circle_at(problem, state, scratch, s):
+    """The time from the state."""
+    row, size = problem.first[s], 2 * problem.k.size
+    uu, uv, vv, bound = 0.0, 0.0, 0.0, math.hypot(scratch.per_row[row], scratch.per_row[row + 1])
+    for r in range(row, row + 2):
+        u = dot(problem.read[r], state.x, size) - problem.gap[r]
+        v = dot(problem.read_rate[r], state.x, size)
+        uu, uv, vv = uu + u * u, uv + u * v, vv + v * v
+    return _safe_in_circle(problem.radius[s], uu, uv, vv, bound)
+
+
+@part(CIRCLE_NEAR, types.boolean, types.int64, MATRIX)
+def circle_is_near(problem, tables, scratch, s, x):
+    """Whether a circle may be met on a cell that ends here; ``scratch.per_row`` bounds what the rows deviate by.
+
+    Outside an outer circle the line between two places may cross it: there cells are not crossed whole.
+    """
+    row = problem.first[s]
+    u, w = motion_of_row(problem, tables, row, x)[0], motion_of_row(problem, tables, row + 1, x)[0]
+    reach = math.hypot(u, w) + math.hypot(scratch.per_row[row], scratch.per_row[row + 1])
+    return not reach < problem.radius[s]
+
+
+@part(CIRCLE_ROOT, types.void, types.int64, MATRIX, VECTOR)
+def radial_polynomial(problem, s, terms, values):
+    """Coefficients of σ (|u|² - c²)/2c in time from the state's derivatives; near c it is δ to first order."""
+    row, radius, size = problem.first[s], problem.radius[s], 2 * problem.k.size
+    for i in range(ORDER + 1):
+        values[i] = 0.0
+    square = 0.0
+    for r in range(row, row + 2):
+        for i in range(ORDER + 1):
+            a = _coefficient(problem, r, terms, i, size)
+            for j in range(ORDER + 1 - i):
+                values[i + j] += a * _coefficient(problem, r, terms, j, size)
+        square += _coefficient(problem, r, terms, 0, size) ** 2
+    r, c = math.sqrt(square), abs(radius)
+    values[0] = (r - c) * (r + c)
+    for i in range(ORDER + 1):
+        values[i] /= 2.0 * radius
+
+
+@inner
+def _coefficient(problem, r, terms, i, size):
+    """Coefficient i of a row's displacement."""
+    value = dot(problem.read[r], terms[i], size)
+    for k in range(i):
+        value /= k + 1.0
+    return value - problem.gap[r] if i == 0 else value
