@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike
 
 from solvers.problem.matrices import Array
 
-(MU, STIFFNESS, ARM, SPIN, ADHERES, CODE, SLIDER, PEAK) = range(8)
+(MU, STIFFNESS, ARM, SPIN, CODE, SLIDER, PEAK, BEGUN, SCRATCH) = range(9)
 """Places of a contact's friction behind its law's parameters: μ; k_t, N/m; R, m, negative where the place runs around a
-post; Ω, rad/s; whether N may be negative; code of the segment; s, m; largest |F_t| of the contact under way, N."""
+post; Ω, rad/s; code of the segment; s, m; largest |F_t| of the contact under way and F_t as the run began, N."""
 SIZE = 16  # the rest is scratch
+ACCOUNTS = 3  # numbers in the state behind the energy balance: ∫F_t ξ̇ dt, ∫F_t dt, and the way of the slider
 STICK, FREE = 0.0, 2.0  # codes; those of slip are -1 and 1, FREE is that of an open contact
-OWN_ROW = ("tangent", "rotation")
 
 
 @dataclass(frozen=True)
@@ -105,18 +105,12 @@ class Rubbing:
         numbers = np.zeros(self.place + SIZE)
         own = np.asarray(self.law.parameters, dtype=float)
         numbers[: own.size] = own
-        known = self.friction.mu, self.friction.stiffness, self.arm, self.spin, float(self._adheres()), FREE
+        known = self.friction.mu, self.friction.stiffness, self.arm, self.spin, FREE
         numbers[self.place : self.place + SLIDER] = known
         return numbers
 
-    def _adheres(self) -> bool:
-        """Whether the force is negative anywhere as the contact ends."""
-        delta, rate = np.meshgrid([1e-9, 1e-6, 1e-3], [-1e-3, -0.1, -10.0])
-        force = self.law.batch(1.0)(delta.ravel(), rate.ravel())
-        return bool(np.any(force < 0.0))
-
     def stored(self, delta: float, parameters: Array) -> float:
-        """Energy of the law alone, J; that of the slider's spring needs ξ, see `stored_in_slider`."""
+        """Energy of the law alone, J; that of the slider's spring is F_t²/2k_t."""
         return float(self.law.stored(delta, np.asarray(self.law.parameters, dtype=float)))
 
 
@@ -124,6 +118,8 @@ def row_of(name: str, given: ArrayLike, size: int) -> Array:
     """A checked row of coordinates of a contact."""
     row = np.array(given, dtype=float, ndmin=1)
     if row.shape != (size,) or not np.all(np.isfinite(row)) or not row.any():
-        raise ValueError(f"{name} of a Contact must be a finite row of {size} numbers that are not all 0, got {given!r}")
+        raise ValueError(
+            f"{name} of a Contact must be a finite row of {size} numbers that are not all 0, got {given!r}"
+        )
     row.setflags(write=False)
     return row

@@ -74,8 +74,8 @@ class Contact:
         δ = r - c,  δ̇ = d·ḋ/r,  force on the place -N(δ, δ̇) d/r;    outer: δ = c - r, the force +N d/r
 
     `friction` acts along the tangential displacement ξ, by a force F_t against it whose power is F_t ξ̇. With
-    ``map="oblique"``, a stop on a line with a tangential row, ξ = tangent @ q. In an annulus, with d at the angle θ, the
-    place turned by φ = rotation @ q about its own axis and by the spin Ω beside, and touching at the radius R,
+    ``map="oblique"``, a stop on a line with a tangential row, ξ = tangent @ q. In an annulus, with d at the angle θ,
+    the place turned by φ = rotation @ q about its own axis and by the spin Ω beside, and touching at the radius R,
 
         ξ = c θ + R (φ + Ω t),    force on the place -F_t (c/r) e_θ, torque -R F_t on φ;    outer: with -R for R
 
@@ -150,7 +150,9 @@ class Contact:
     def _check_map(self, direction: Array) -> None:
         """Directions, clearance and centre fit the map."""
         if self.map not in ("line", "annulus", "oblique"):
-            raise ValueError(f'map of a Contact must be "line" or "annulus", or "oblique" with friction, got {self.map!r}')
+            raise ValueError(
+                f'map of a Contact must be "line" or "annulus", or "oblique" with friction, got {self.map!r}'
+            )
         if self.map != "annulus":
             if direction.ndim != 1 or not np.all(np.isfinite(direction)):
                 raise ValueError(f"direction of a Contact must be a finite vector, got {self.direction!r}")
@@ -177,6 +179,8 @@ class Contact:
     def _check_friction(self, direction: Array) -> None:
         """Friction has what it needs, and nothing is given for it where there is none."""
         size = direction.shape[-1]
+        if self.friction is None and self.map == "oblique":
+            raise ValueError('map="oblique" is that of friction: give friction=Friction(mu, stiffness)')
         wanted = {"tangent": "oblique", "rotation": "annulus", "radius": "annulus", "spin": "annulus"}
         for name, of in wanted.items():
             given: Any = getattr(self, name)
@@ -190,8 +194,6 @@ class Contact:
                 least = "positive and finite (m)" if name == "radius" else "finite (rad/s)"
                 raise ValueError(f"{name} of a Contact must be {least}, got {given!r}")
         if self.friction is None:
-            if self.map == "oblique":
-                raise ValueError('map="oblique" is that of friction: give friction=Friction(mu, stiffness)')
             return
         if not isinstance(self.friction, Friction):
             raise TypeError(f"friction of a Contact must be a Friction(mu, stiffness), got {self.friction!r}")
