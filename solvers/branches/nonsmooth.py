@@ -105,7 +105,7 @@ def _new_grazings(orbit: Orbit, stop: int) -> Iterator[tuple[float, NonsmoothPoi
     times = np.linspace(0.0, orbit.period, _SAMPLES + 1)
     method = replace(orbit.method, ledger=False)
     later = delayed(orbit.system, orbit.phase)
-    delta = -run(later, orbit.whole, orbit.period, times, method).q @ contact.direction - contact.gap
+    delta = contact.indentation(run(later, orbit.whole, orbit.period, times, method).q)
     scale = _SHALLOW * max(float(log.peak_indentation.max(initial=0.0)), 1e-3 * float(np.abs(delta).max()))
     inner = np.arange(1, _SAMPLES)
     rising, falling = delta[inner] - delta[inner - 1], delta[inner + 1] - delta[inner]

@@ -32,6 +32,7 @@ from solvers.compiled.decorators import inlined, inner, kernel, reordered
 from solvers.compiled.decorators import merged as merged
 from solvers.compiled.fields import packed_type
 from solvers.compiled.friction import friction_force, slide, slide_acceleration
+from solvers.compiled.parts import RADIAL_ACCELERATION, RADIAL_MOTION, RADIAL_PUSH, part
 from solvers.problem.friction import ARM, CODE
 
 
@@ -417,7 +418,7 @@ def indentation_rate(problem, s, x):
     return dot(problem.read_rate[problem.first[s]], x, 2 * problem.k.size)
 
 
-@inner
+@part(RADIAL_MOTION, types.UniTuple(REAL, 2), types.int64, VECTOR)
 def radial_motion(problem, s, x):
     """Indentation, m, and its rate, m/s, of a circular clearance; at the centre the rate is that of going outward."""
     square, product, speed, size = 0.0, 0.0, 0.0, 2 * problem.k.size
@@ -436,7 +437,7 @@ def radial(square, product, speed, radius):
     return (distance - radius, rate) if radius > 0.0 else (-radius - distance, -rate)
 
 
-@inner
+@part(RADIAL_ACCELERATION, REAL, types.int64, VECTOR, VECTOR)
 def _radial_acceleration(problem, s, x, rate):
     """δ̈ = ±(u̇·u̇ + u·ü - ṙ²)/r of a circular clearance."""
     square, product, along, size = 0.0, 0.0, 0.0, 2 * problem.k.size
@@ -448,7 +449,7 @@ def _radial_acceleration(problem, s, x, rate):
     return found if problem.radius[s] > 0.0 else -found
 
 
-@inner
+@part(RADIAL_PUSH, types.void, types.int64, REAL, VECTOR, VECTOR)
 def _add_radial_push(problem, s, force, x, rate):
     """Add what a radial force does to the state's rate."""
     square, first, size = 0.0, problem.first[s], 2 * problem.k.size

@@ -19,7 +19,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from solvers.compiled.decorators import c_function
+from solvers.compiled.decorators import c_function, inner
 from solvers.compiled.packed import PackedType
 
 (BEGIN, CONTACT, SOLVE, NEWTON, LEAVES, ERROR, ACCEPT, LAND, LANDING_STEP, WITHIN_STEP) = range(10)
@@ -29,11 +29,12 @@ from solvers.compiled.packed import PackedType
 (PAIR, FREE_BLOCKS, PUSHED_BLOCKS, PUSHED_END, STOP_AT_NODES, BOUNDS) = range(20, 26)
 (CIRCLE_SPAN, CIRCLE_SPAN_AT, CIRCLE_NEAR, CIRCLE_ROOT, CIRCLE_MOTION, CIRCLE_FORCES, CIRCLE_GUESS) = range(26, 33)
 (CIRCLE_AWAY, CIRCLE_NEWTON, CIRCLE_WORK, CIRCLE_WITHIN, CIRCLE_LANDED) = range(33, 38)
+(RADIAL_MOTION, RADIAL_ACCELERATION, RADIAL_PUSH) = range(38, 41)
 EVERY_RUN, ENERGY = range(10), range(10, 14)
-BORDERS, TWO_STOPS, MANY_STOPS, CIRCLES = range(14, 19), range(19, 20), range(20, 26), range(26, 38)
+BORDERS, TWO_STOPS, MANY_STOPS, CIRCLES = range(14, 19), range(19, 20), range(20, 26), range(26, 41)
 """What needs them: every run, those with an energy balance, with bends or memory in a law, with two or many stops, with
 circular clearances."""
-ADDRESSES = np.zeros(38, dtype=np.int64)
+ADDRESSES = np.zeros(41, dtype=np.int64)
 
 _DECLARED: dict[int, tuple[Any, Any, tuple[Any, ...]]] = {}
 _LOADED: dict[int, Any] = {}
@@ -43,12 +44,13 @@ _LOCK = threading.Lock()
 def part(place: int, result: Any, *plain: Any) -> Callable[[Any], Any]:
     """Decorator of the function called at ``problem.parts[place]``.
 
-    Its first argument is the problem, others that are packed come next, then those of the types ``plain``.
+    Its first argument is the problem, others that are packed come next, then those of the types ``plain``. With a
+    problem that is not packed, as stepping methods have it, the function is called as one of `inner`.
     """
 
     def declared(function: Any) -> Any:
         _DECLARED[place] = function, result, plain
-        return _call_at(place, result, plain)
+        return _call_at(place, result, plain, inner(function))
 
     return declared
 
@@ -69,11 +71,13 @@ def _compiled(kinds: Mapping[str, types.NamedTuple], function: Any, result: Any,
     return c_function(result(*(PackedType(kinds[name]) for name in names), *plain))(function)
 
 
-def _call_at(place: int, result: Any, plain: tuple[Any, ...]) -> Any:
+def _call_at(place: int, result: Any, plain: tuple[Any, ...], unpacked: Any) -> Any:
     """An intrinsic that calls a part with its arguments."""
 
     @intrinsic
     def call(typingctx, problem, *others):
+        if not isinstance(problem, PackedType):
+            return _call_inner(typingctx, unpacked, problem, others)
         rest = types.Tuple((*others[: len(others) - len(plain)], *plain))
 
         def codegen(context, builder, signature, arguments):
@@ -90,3 +94,15 @@ def _call_at(place: int, result: Any, plain: tuple[Any, ...]) -> Any:
         return result(problem, rest), codegen
 
     return call
+
+
+def _call_inner(typingctx: Any, function: Any, problem: Any, others: tuple[Any, ...]) -> Any:
+    """Signature and code of a call of a compiled function itself."""
+    kind = typingctx.resolve_value_type(function)
+    own = kind.get_call_type(typingctx, (problem, *others), {})
+
+    def codegen(context, builder, signature, arguments):
+        values = [builder.extract_value(arguments[1], i) for i in range(len(others))]
+        return context.get_function(kind, own)(builder, [arguments[0], *values])
+
+    return own.return_type(problem, types.Tuple(others)), codegen

@@ -40,6 +40,7 @@ from solvers.compiled.kernels import (
     indentation,
     indentation_rate,
     inner,
+    is_circle,
     merged,
     rhs,
 )
@@ -62,6 +63,7 @@ from solvers.compiled.state import (
     rate_tolerance,
 )
 from solvers.compiled.sums import combine
+from solvers.exponential.circles.derivative import add_radial_change, explicit_change, is_parameter
 from solvers.exponential.contact.crossings import FORCE, side_at
 from solvers.exponential.contact.landing_step import landing_step, start_landing
 from solvers.exponential.contact.node_response import LANDED, START
@@ -72,8 +74,6 @@ from solvers.exponential.linearised_step import (
     by_latched,
     change_by_latched,
     change_of,
-    explicit_change,
-    is_parameter,
     linearise_step,
 )
 from solvers.exponential.preparation import SCRATCH, TABLES
@@ -106,7 +106,7 @@ def _begin(problem, past, derivatives, variation):
         if past.segment[s] > 0:
             rate = indentation_rate(problem, s, past.x)
             for c in range(derivatives.y.shape[0]):
-                change = change_of(problem, variation, derivatives, c, s, 1, 0.0)
+                change = change_of(problem, variation, derivatives, past.x, c, s, 1, 0.0)
                 derivatives.entry[c, s] = 0.0 if abs(rate) < problem.floor[s] else np.sign(rate) * change
 
 
@@ -129,11 +129,11 @@ def _cross_knot(problem, past, derivatives, variation, s, direction):
         jump -= force_at(problem, s, below, rate, past.entry_rate[s], derivatives.batch)
     jump *= direction
     for c in range(derivatives.y.shape[0]):
-        moved = change_of(problem, variation, derivatives, c, s, 0, t)
+        moved = change_of(problem, variation, derivatives, past.x, c, s, 0, t)
         shift = -moved / rate if abs(rate) > still else 0.0
         if entering:
             floored = abs(rate) < problem.floor[s]
-            change = change_of(problem, variation, derivatives, c, s, 1, t) + acceleration * shift
+            change = change_of(problem, variation, derivatives, past.x, c, s, 1, t) + acceleration * shift
             derivatives.shift[c, s] = shift
             derivatives.entry[c, s] = 0.0 if floored else change
         add_push(problem, s, -jump * shift, past.x, derivatives.y[c])
@@ -190,13 +190,20 @@ def _stage_rates(problem, ahead, behind, tables, past, scratch, derivatives, var
     for s in range(problem.law.size):
         if past.segment[s] == 0:
             continue
+        rate, force = past.entry_rate[s], 0.0
+        if is_circle(problem, s):
+            delta = _inside_segment(problem, past, s, w)
+            force = force_at(problem, s, delta, indentation_rate(problem, s, w), rate, batch)
         batch[0], batch[1] = _inside_segment(problem, past, s, w), indentation_rate(problem, s, w)
-        rate = past.entry_rate[s]
         _gradient(problem, tables, past, scratch, s, batch)
         by_latched(problem, past, derivatives, s, 1, batch[0:1], batch[1:2])
         if variation.law_step > 0.0:
             contact_forces(ahead, s, batch[0:1], batch[1:2], rate, batch[5:6])
             contact_forces(behind, s, batch[0:1], batch[1:2], rate, batch[6:7])
+        if is_circle(problem, s):
+            by_law = (batch[5] - batch[6]) / (2.0 * variation.law_step) if variation.law_step > 0.0 else 0.0
+            add_radial_change(problem, derivatives, variation, s, w, t, factor, force, by_law, out)
+            continue
         for c in range(derivatives.y.shape[0]):
             y = derivatives.trial[c]
             change = batch[4] * derivatives.entry[c, s] + change_by_latched(problem, derivatives, c, s, 1, 0)

@@ -23,7 +23,8 @@ from solvers.compiled.kernels import (
     rhs,
 )
 from solvers.compiled.state import LAST_EVENT, T
-from solvers.exponential.linearised_step import change_of, is_parameter
+from solvers.exponential.circles.derivative import is_parameter
+from solvers.exponential.linearised_step import change_of
 
 _BEHIND = 1e-6  # part of what a margin is made of, by which it is negative where it is not met but left behind
 _SHARE, _LEAST = 1e-7, 1e-10  # of differences: part of a number, and at least this in its unit; margins may bend
@@ -118,8 +119,8 @@ def pass_border(problem, ahead, behind, past, derivatives, variation, s, j):
     if variation.law_step > 0.0:
         moved = _explicit(problem, ahead, behind, past, s, j, delta, rate, derivatives, variation, explicit)
     for c in range(derivatives.y.shape[0]):
-        d_delta = change_of(problem, variation, derivatives, c, s, 0, t)
-        d_rate = change_of(problem, variation, derivatives, c, s, 1, t)
+        d_delta = change_of(problem, variation, derivatives, past.x, c, s, 0, t)
+        d_rate = change_of(problem, variation, derivatives, past.x, c, s, 1, t)
         change, known = by[0] * d_delta + by[1] * d_rate, derivatives.latched[c, s * most : (s + 1) * most]
         for i in range(own):
             change += by[2 + i] * known[i]

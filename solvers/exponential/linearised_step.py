@@ -7,9 +7,11 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from solvers.compiled.fields import packed_type
-from solvers.compiled.kernels import call_force, contact_forces, copy, dot, inlined, merged, rhs
+from solvers.compiled.kernels import call_force, contact_forces, copy, dot, inlined, is_circle, merged, rhs
 from solvers.compiled.state import BEGAN, ENDED, FIRST, HEAD, KIND, PART, SECOND, SPAN, T, acts
 from solvers.compiled.sums import combine
+from solvers.exponential.circles.contact import radial_forces
+from solvers.exponential.circles.derivative import explicit_change, is_parameter, radial_change, radial_residual
 from solvers.exponential.contact.collocation import end_state
 from solvers.exponential.contact.many_stops import (
     add_end_response,
@@ -46,6 +48,7 @@ class Derivatives(NamedTuple):
     latched: Annotated[Any, "columns, E*l"]  # of what laws with memory have latched, see Problem.latched
     by_latched: Annotated[Any, "E, l*S"]  # derivatives of their forces by it, row by row
     renewed: Annotated[Any, "renewed"]  # working space of l (5 + l) + 4 P + 2 B numbers
+    turned: Annotated[Any, "5, 2, 1"]  # slopes of a circle's force at one moment, see `circles.contact.turn_slopes`
 
 
 class Variation(NamedTuple):
@@ -56,35 +59,21 @@ class Variation(NamedTuple):
     omega: Annotated[Any, "K"]  # tones
     steady: Annotated[Any, "K, R, 2, 4"]  # (Re a, Im a, Re b, Im b) of δ and δ̇ = Re (a + t b) e^{iωt}
     gap: Annotated[Any, "R"]
+    radius: Annotated[Any, "C"]  # of circular clearances, as in `Problem`
 
 
 DERIVATIVES, VARIATION = packed_type(Derivatives), packed_type(Variation)
 
 
 @inlined
-def explicit_change(variation, r, d, t):
-    """Explicit change of the displacement (d = 0) or rate of a row by the parameter: the state is held fixed."""
-    total = -variation.gap[r] if d == 0 else 0.0
-    for j in range(variation.omega.size):
-        a = variation.steady[j, r, d]
-        angle = variation.omega[j] * t
-        total += (a[0] + t * a[2]) * np.cos(angle) - (a[1] + t * a[3]) * np.sin(angle)
-    return total
-
-
-@inlined
-def change_of(problem, variation, derivatives, column, s, d, t):
-    """Change of δ (d = 0) or δ̇ of a stop at fixed time, in one column."""
+def change_of(problem, variation, derivatives, x, column, s, d, t):
+    """Change of δ (d = 0) or δ̇ of a stop in the state x at fixed time, in one column."""
+    if is_circle(problem, s):
+        return radial_change(problem, variation, derivatives, x, column, s, d, t)
     r = problem.first[s]
     row = problem.read[r] if d == 0 else problem.read_rate[r]
     value = dot(row, derivatives.y[column], 2 * problem.k.size)
     return value + explicit_change(variation, r, d, t) if is_parameter(variation, derivatives, column) else value
-
-
-@inlined
-def is_parameter(variation, derivatives, column):
-    """Whether a column is the parameter's."""
-    return variation.step > 0.0 and column == derivatives.y.shape[0] - 1
 
 
 @inlined
@@ -155,6 +144,15 @@ def _solve(problem, tables, past, scratch, derivatives, variation, node_set, lev
             motion_at_nodes(problem, scratch, r, 0.0, motion)
         else:
             combine(tables.free[tables.kind[node_set], level, r], derivatives.y[column], size, None, motion)
+        if is_circle(problem, s):
+            if r > problem.first[s]:  # both rows have moved
+                begin, both = past.now[T], place - S
+                radial_residual(
+                    *(problem, tables, scratch, derivatives, variation),
+                    *(node_set, level, begin, column, s, shift, both),
+                )
+            place += S
+            continue
         for i in range(S):
             change, t = 0.0, past.now[T] + tables.contact_step[level] * tables.times[node_set, i]
             if r == problem.first[s]:
@@ -216,6 +214,8 @@ def linearise_step(problem, ahead, behind, tables, past, scratch, derivatives, v
             respond(problem, tables, past, scratch, node_set, level, r)
     for s in range(problem.law.size):
         if past.segment[s] > 0:
+            if is_circle(problem, s):
+                radial_forces(problem, past, scratch, s)
             motion = motion_of(problem, scratch, s)
             _by_parameter(ahead, behind, past, scratch, variation, derivatives, s)
             by_latched(problem, past, derivatives, s, S, motion[0], motion[1])

@@ -13,7 +13,7 @@ from solvers.compiled.dop853_tableau import STAGES
 from solvers.compiled.fields import shapes_of
 from solvers.compiled.kernels import PROBLEM, Problem
 from solvers.compiled.packed import Layout, Packed
-from solvers.compiled.state import HEAD, STATE, State, T, begin_state, gaps_of, law_parameters, most_borders
+from solvers.compiled.state import HEAD, STATE, State, T, begin_state, gaps_of, law_parameters, most_borders, radii_of
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.linearised import linearise_run
 from solvers.exponential.linearised_step import DERIVATIVES, VARIATION, Derivatives, Variation
@@ -133,7 +133,9 @@ class _Change:
     def none(cls, problem: Problem, n: int) -> _Change:
         """No parameter."""
         rows = len(problem.gap)
-        variation = Variation(0.0, 0.0, np.zeros(0), np.zeros((0, rows, 2, 4)), np.zeros(rows))
+        variation = Variation(
+            0.0, 0.0, np.zeros(0), np.zeros((0, rows, 2, 4)), np.zeros(rows), np.zeros(problem.radius.size)
+        )
         none = np.zeros((0, 2 * n), dtype=complex)
         return cls(variation, [problem] * 2, none, none)
 
@@ -155,7 +157,11 @@ class _Change:
         steady = (rows @ parts.reshape(-1, own.size).T).reshape(len(rows), 2, 4, len(a)).transpose(3, 0, 1, 2)
         gaps = [gaps_of(side.contacts) for side in sides]
         shift = (gaps[1] - gaps[0]) / width
-        variation = Variation(parameter.step, parameter.step, tones.omega, np.ascontiguousarray(steady), shift)
+        radii = [radii_of(side.contacts) for side in sides]
+        variation = Variation(
+            *(parameter.step, parameter.step, tones.omega, np.ascontiguousarray(steady), shift),
+            (radii[1] - radii[0]) / width,
+        )
         if all(one.law is other.law for one, other in zip(*(side.contacts for side in sides), strict=True)):
             return cls(variation._replace(law_step=0.0), [engine.problem] * 2, a, b)
         problems = [engine.problem._replace(parameters=_parameters(side, engine.problem)) for side in reversed(sides)]
@@ -202,6 +208,8 @@ def _tones(here: System, behind: System, ahead: System) -> _Tones | None:
 def _same_structure(one: System, other: System) -> bool:
     """Whether two systems differ in signals, gaps and laws' parameters only."""
     if one.size != other.size or len(one.contacts) != len(other.contacts):
+        return False
+    if any((a.map, a.outer) != (b.map, b.outer) for a, b in zip(one.contacts, other.contacts, strict=True)):
         return False
     pairs = [(one.M, other.M), (one.C, other.C), (one.K, other.K), (one.gyroscopic, other.gyroscopic)]
     pairs += [(a.direction, b.direction) for a, b in zip(one.contacts, other.contacts, strict=True)]

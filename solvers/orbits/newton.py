@@ -138,7 +138,7 @@ class _Measure:
         for contact in system.contacts:
             if getattr(contact.law, "memory", ()):
                 continue
-            delta = float((-x[:, : system.size] @ contact.direction).max()) - contact.gap
+            delta = float(contact.indentation(x[:, : system.size]).max())
             most = max(most, abs(float(contact.law.force(delta, 0.0, 1.0))) * delta if delta > 0.0 else 0.0)
         return most
 

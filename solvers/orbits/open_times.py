@@ -70,7 +70,7 @@ def open_starts(
 def closed(system: System, x: Array, stops: Sequence[int]) -> bool:
     """Whether any of these stops is closed in a state; what always acts is no stop."""
     contacts = [system.contacts[s] for s in stops if not system.contacts[s].always]
-    return any(contact.direction @ x[: system.size] + contact.gap < 0.0 for contact in contacts)
+    return any(contact.indentation(x[: system.size]) > 0.0 for contact in contacts)
 
 
 def is_cut(chain: Chain, system: System) -> bool:

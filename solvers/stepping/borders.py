@@ -38,10 +38,8 @@ _AHEAD = 1e-4  # part of a step over which the rate of a margin is differenced
 def border_space(problem: Any) -> list[Any]:
     """Working arrays: those of the borders among the fields of `loop.Space`, in order."""
     stops, most, n = problem.law.size, most_borders(problem), _NODES.size
-    return [np.empty(n * most), np.empty((2, n)), np.empty(2), np.empty(most), np.zeros((stops, 4))] + [
-        *(np.zeros((stops, most)) for _ in range(3)),
-        np.empty((2, POINT)),
-    ]
+    first = [np.empty(n * most), np.empty((2, n)), np.empty(2), np.empty(most), np.zeros((stops, 4))]
+    return [*first, *(np.zeros((stops, most)) for _ in range(3)), np.empty((2, POINT))]
 
 
 @inner

@@ -78,7 +78,7 @@ def _renew_rate(problem, state, space):
 
 @merged
 def _first_event(problem, state, space, h, adaptive):
-    """(θ, stop, direction, level, border) of what comes first in a step of duration h; border -1: an event of a stop."""
+    """(θ, stop, direction, level, border) of what comes first in a step of duration h; no border: -1."""
     theta, stop, direction, level = find(problem, state, space)
     if adaptive and theta != UNRESOLVED:
         place, element, border = border_ahead(problem, state, space, h)

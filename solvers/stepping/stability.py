@@ -212,7 +212,7 @@ def is_dissipative(law: Any) -> bool:
 
 
 def kinks_of(system: System) -> list[int]:
-    """Per stop: 1 where the law, or its friction, is cut at zero while δ > 0, plus 2 where it bends at δ̇ = 0; found once."""
+    """Per stop: 1 where the law, or its friction, is cut at zero while δ > 0, plus 2 where it bends at δ̇ = 0."""
     found: list[int] = system.about_laws.get("kinks", lambda: [_kinks(contact.law) for contact in system.contacts])
     return found
 

@@ -17,6 +17,7 @@ from solvers.compiled.kernels import (
     inlined,
     inner,
     law_forces,
+    merged,
     radial,
     radial_motion,
     rhs,
@@ -124,6 +125,8 @@ def stays_in_circle(problem, state, scratch, s, h):
 def turn_slopes(u, w, u_dot, w_dot, force, by_delta, by_rate, radius, i, out):
     """Slopes of a force's components at point i, rows 2a + b of ``out``: of a by u_b, then by u̇_b; u is (u, w).
 
+    Row 4 gets the direction of the force, σ e.
+
     ∂F_a/∂u_b = N_δ e_a e_b + N_δ̇ e_a (u̇_b - ṙ e_b)/r + σ (N/r) (1 if a = b - e_a e_b),   ∂F_a/∂u̇_b = N_δ̇ e_a e_b
     """
     r = math.sqrt(u * u + w * w)
@@ -135,14 +138,21 @@ def turn_slopes(u, w, u_dot, w_dot, force, by_delta, by_rate, radius, i, out):
             e_b, faster = (e_u, u_dot) if b == 0 else (e_w, w_dot)
             turning = by_rate * e_a * (faster - along * e_b) / r + sideways * ((1.0 if a == b else 0.0) - e_a * e_b)
             out[2 * a + b, 0, i], out[2 * a + b, 1, i] = by_delta * e_a * e_b + turning, by_rate * e_a * e_b
+        out[4, a, i] = e_a if radius > 0.0 else -e_a
+
+
+@merged
+def turned_of(problem, scratch, s):
+    """(5, 2, S) slopes and directions of the components at the nodes."""
+    return scratch.turned[5 * (problem.own[s] - problem.gap.size) : 5 * (problem.own[s] - problem.gap.size) + 5]
 
 
 @inner
 def slopes_at_nodes(problem, scratch, s):
     """Slopes of the components at the nodes, into ``scratch.turned``, from those of the law."""
     u, w, own = scratch.motion[problem.first[s]], scratch.motion[problem.first[s] + 1], problem.own[s]
-    slope, force, circle = scratch.slope[s], scratch.law_force[own], 4 * (own - problem.gap.size)
-    out, radius = scratch.turned[circle : circle + 4], problem.radius[s]
+    slope, force, out = scratch.slope[s], scratch.law_force[own], turned_of(problem, scratch, s)
+    radius = problem.radius[s]
     for i in range(S):
         turn_slopes(u[0, i], w[0, i], u[1, i], w[1, i], force[i], slope[0, i], slope[1, i], radius, i, out)
 
@@ -151,7 +161,7 @@ def slopes_at_nodes(problem, scratch, s):
 def linearise_circle(problem, tables, state, scratch, node_set, level, s, begin):
     """Write what both rows of a circle add to the matrix of Newton's method, from its row ``begin`` on."""
     slopes_at_nodes(problem, scratch, s)
-    row, circle, column = problem.first[s], 4 * (problem.own[s] - problem.gap.size), 0
+    row, turned, column = problem.first[s], turned_of(problem, scratch, s), 0
     for u in range(problem.gap.size):
         if not acts(problem, state, u):
             continue
@@ -163,7 +173,7 @@ def linearise_circle(problem, tables, state, scratch, node_set, level, s, begin)
         for b in range(2):
             matrix = pair_response(problem, tables, scratch, node_set, level, row + b, u)
             for a in range(2):
-                slope = scratch.turned[circle + 2 * a + b]
+                slope = turned[2 * a + b]
                 for i in range(S):
                     for j in range(S):
                         scratch.jacobian[begin + a * S + i, column + j] -= (

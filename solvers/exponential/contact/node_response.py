@@ -61,7 +61,7 @@ class Scratch(NamedTuple):
     summary: Annotated[Any, "R+A, 2, 8"]  # of forces and displacements, see Tables.summary
     previous: Annotated[Any, "R, S"]  # forces of the last accepted step
     slope: Annotated[Any, "E, 3, S"]  # derivatives of the laws at the nodes by δ, δ̇ and entry rate
-    turned: Annotated[Any, "4*A, 2, S"]  # slopes of the components of circles' forces, see `circles.contact`
+    turned: Annotated[Any, "5*A, 2, S"]  # slopes of the components of circles' forces, see `circles.contact`
     residual: Annotated[Any, "R*S"]  # N, then the changes of the forces
     pivots: Annotated[Any, "int R*S"]  # of the LU factors
     stages: Annotated[Any, "stages, W8"]  # states and rates, rows as named above

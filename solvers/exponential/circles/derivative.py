@@ -1,0 +1,118 @@
+"""Derivative of a run through contacts with circular clearances; see `linearised`.
+
+With δ = σ|u| - c' (c' = c, or -c of an outer circle) and e = u/|u|, at fixed time
+
+    dδ = σ e·du - dc',   dδ̇ = σ (e·du̇ + (u̇ - ṙe)·du/r),
+
+and the components change by their slopes, which `contact.turn_slopes` has, and by what changes N at fixed u and u̇.
+"""
+
+from __future__ import annotations
+
+import math
+
+from solvers.compiled.kernels import dot, inlined, inner
+from solvers.exponential.circles.contact import turn_slopes, turned_of
+from solvers.exponential.contact.nodes import S
+
+
+@inlined
+def explicit_change(variation, r, d, t):
+    """Explicit change of the displacement (d = 0) or rate of a row by the parameter: the state is held fixed."""
+    total = -variation.gap[r] if d == 0 else 0.0
+    for j in range(variation.omega.size):
+        a = variation.steady[j, r, d]
+        angle = variation.omega[j] * t
+        total += (a[0] + t * a[2]) * math.cos(angle) - (a[1] + t * a[3]) * math.sin(angle)
+    return total
+
+
+@inlined
+def is_parameter(variation, derivatives, column):
+    """Whether a column is the parameter's."""
+    return variation.step > 0.0 and column == derivatives.y.shape[0] - 1
+
+
+@inner
+def _row_change(problem, variation, derivatives, y, c, r, d, t):
+    """Change of a row's displacement (d = 0) or rate at fixed time, in column c, whose state is y."""
+    value = dot(problem.read[r] if d == 0 else problem.read_rate[r], y, 2 * problem.k.size)
+    return value + explicit_change(variation, r, d, t) if is_parameter(variation, derivatives, c) else value
+
+
+@inner
+def radial_change(problem, variation, derivatives, x, c, s, d, t):
+    """Change of δ (d = 0) or δ̇ of a circle in the state x at fixed time, in column c."""
+    row, size, y = problem.first[s], 2 * problem.k.size, derivatives.y[c]
+    u, w = (
+        dot(problem.read[row], x, size) - problem.gap[row],
+        dot(problem.read[row + 1], x, size) - problem.gap[row + 1],
+    )
+    r = math.sqrt(u * u + w * w)
+    u, w = u / r, w / r
+    change = u * _row_change(problem, variation, derivatives, y, c, row, d, t)
+    change += w * _row_change(problem, variation, derivatives, y, c, row + 1, d, t)
+    if d == 1:
+        u_dot, w_dot = dot(problem.read_rate[row], x, size), dot(problem.read_rate[row + 1], x, size)
+        along = u * u_dot + w * w_dot
+        change += (u_dot - along * u) / r * _row_change(problem, variation, derivatives, y, c, row, 0, t)
+        change += (w_dot - along * w) / r * _row_change(problem, variation, derivatives, y, c, row + 1, 0, t)
+    change = change if problem.radius[s] > 0.0 else -change
+    return change - _moved_radius(variation, derivatives, c, s) if d == 0 else change
+
+
+@inlined
+def _moved_radius(variation, derivatives, c, s):
+    """Change of c'."""
+    return variation.radius[s] if is_parameter(variation, derivatives, c) else 0.0
+
+
+@inner
+def radial_residual(problem, tables, scratch, derivatives, variation, node_set, level, begin, c, s, shift, place):
+    """Right-hand sides for the components' changes at the nodes, in column c, into ``scratch.residual``.
+
+    The motion of both rows without the changes of forces is in ``scratch.motion``.
+    """
+    row, turned, parameter = problem.first[s], turned_of(problem, scratch, s), is_parameter(variation, derivatives, c)
+    for i in range(S):
+        t = begin + tables.contact_step[level] * tables.times[node_set, i]
+        along = derivatives.entry[c, s] * scratch.slope[s, 2, i]
+        if parameter:
+            along += derivatives.by_parameter[s, i]
+            along -= scratch.slope[s, 0, i] * variation.radius[s]
+        for a in range(2):
+            change = along * turned[4, a, i]
+            for b in range(2):
+                for d in range(2):
+                    value = scratch.motion[row + b, d, i]
+                    if shift != 0.0:
+                        value += shift * derivatives.response[row + b, d, i]
+                    if parameter:
+                        value += explicit_change(variation, row + b, d, t)
+                    change += turned[2 * a + b, d, i] * value
+            scratch.residual[place + a * S + i] = change
+
+
+@inner
+def add_radial_change(problem, derivatives, variation, s, w, t, factor, force, by_law, out):
+    """Add to the rates of all columns what the changes of a circle's force do in the state w of a landing.
+
+    The slopes of the law are in ``derivatives.batch[2:5]``, its derivative by the parameter is ``by_law``.
+    """
+    row, size, batch, turned = problem.first[s], 2 * problem.k.size, derivatives.batch, derivatives.turned
+    read, rate = problem.read, problem.read_rate
+    u, u_dot = dot(read[row], w, size) - problem.gap[row], dot(rate[row], w, size)
+    v, v_dot = dot(read[row + 1], w, size) - problem.gap[row + 1], dot(rate[row + 1], w, size)
+    turn_slopes(u, v, u_dot, v_dot, force, batch[2], batch[3], problem.radius[s], 0, turned)
+    for c in range(derivatives.y.shape[0]):
+        y, along = derivatives.trial[c], batch[4] * derivatives.entry[c, s]
+        if is_parameter(variation, derivatives, c):
+            along += by_law - batch[2] * variation.radius[s]
+        for a in range(2):
+            change = along * turned[4, a, 0]
+            for b in range(2):
+                for d in range(2):
+                    moved = _row_change(problem, variation, derivatives, y, c, row + b, d, t)
+                    change += turned[2 * a + b, d, 0] * moved
+            for e in range(size):
+                out[c, e] += factor * change * problem.push[row + a, e]

@@ -1,0 +1,71 @@
+"""Periodic motions in circular clearances: synchronous rub in closed form, bouncing orbits against another method."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from test_annulus_tangent import Tone
+
+from contacts import KelvinVoigt
+from solvers import Contact, DormandPrince, System, integrate, orbit
+
+MASS, DAMPING, STIFFNESS, WALL, CLEARANCE, ECCENTRICITY = 2.0, 60.0, 8e4, 3e5, 2e-4, 1e-4
+PLANE = np.eye(2)
+QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])
+
+
+class Quadrature(Tone):
+    """A sin ωt."""
+
+    def __call__(self, t):
+        return self.amplitude * np.sin(self.omega * t)
+
+    def tones(self):
+        return np.array([self.omega]), np.array([-1j * self.amplitude])
+
+
+def rotor(omega, across=1.0, centre=(0.0, 0.0)):
+    """A disk on a flexible shaft, unbalanced, in a smooth hole; the force across is a multiple of that of a rotor."""
+    push = MASS * ECCENTRICITY * omega**2
+    loads = [(PLANE[0], Tone(push, omega)), (PLANE[1], Quadrature(across * push, omega))]
+    hole = Contact(PLANE, KelvinVoigt(WALL, 0.0), CLEARANCE, map="annulus", centre=centre)
+    return System(MASS * PLANE, DAMPING * PLANE, STIFFNESS * PLANE, [hole], loads)
+
+
+def whirl(omega):
+    """Radius of the whirl in full contact, and its eigenvalues in the frame that turns with the shaft.
+
+    |k - mΩ² + k_c (1 - g/r) + i c Ω| r = m e Ω²;  the wall is k_c along the radius, k_c (1 - g/r) across it.
+    """
+
+    def apart(r):
+        stiffness = STIFFNESS - MASS * omega**2 + WALL * (1.0 - CLEARANCE / r)
+        return abs(stiffness + 1j * DAMPING * omega) * r - MASS * ECCENTRICITY * omega**2
+
+    r = brentq(apart, CLEARANCE, 10.0 * CLEARANCE, xtol=1e-18)
+    damping = DAMPING * PLANE + 2.0 * MASS * omega * QUARTER
+    stiffness = (STIFFNESS - MASS * omega**2) * PLANE + DAMPING * omega * QUARTER
+    stiffness += np.diag([WALL, WALL * (1.0 - CLEARANCE / r)])
+    matrix = np.block([[np.zeros((2, 2)), PLANE], [-stiffness / MASS, -damping / MASS]])
+    return r, np.linalg.eigvals(matrix)
+
+
+@pytest.mark.parametrize("omega", [180.0, 220.0])
+def test_synchronous_rub_is_an_equilibrium_of_the_turning_frame(omega):
+    """A contact that never opens: radius, and multipliers exp(λT)."""
+    r, values = whirl(omega)
+    found = orbit(rotor(omega), 2.0 * np.pi / omega)
+    assert np.linalg.norm(found.state[:2]) == pytest.approx(r, rel=1e-9)
+    assert np.linalg.norm(found.state[2:]) == pytest.approx(omega * r, rel=1e-9)
+    expected = np.exp(2.0 * np.pi / omega * values)
+    for value in expected:
+        assert np.abs(found.multipliers - value).min() < 1e-7
+    assert found.stable == bool(np.abs(expected).max() < 1.0)
+
+
+def test_a_bouncing_orbit_closes_for_another_method():
+    """An elliptic force and a hole off the centre, so that the contact opens."""
+    system, period = rotor(170.0, across=0.3, centre=(1e-4, 0.0)), 2.0 * np.pi / 170.0
+    found = orbit(system, period)
+    run = integrate(system, *np.split(found.state, 2), period, method=DormandPrince(1e-13, 1e-20))
+    assert len(run.contacts.t_in) > 0
+    np.testing.assert_allclose(run.end, found.state, rtol=0.0, atol=1e-8 * np.abs(found.state).max())
