@@ -12,7 +12,18 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
-from solvers.problem import Contact, ContactLog, Cost, Energy, Parameter, Solution, SolverError, Status, System
+from solvers.problem import (
+    Contact,
+    ContactLog,
+    Cost,
+    Energy,
+    Friction,
+    Parameter,
+    Solution,
+    SolverError,
+    Status,
+    System,
+)
 
 _LATER = {
     "integrate": "integration",
@@ -48,6 +59,7 @@ __all__ = [
     "DormandPrince",
     "Energy",
     "Exponential",
+    "Friction",
     "GeneralizedAlpha",
     "HenonRK2",
     "ManySolutions",
