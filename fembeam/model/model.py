@@ -34,7 +34,16 @@ if TYPE_CHECKING:
     from fembeam.scene import Matrices, Scene
 
 Field = Callable[[Vector], Any] | None  # of displacement in m or velocity in m/s, over z (k,)
-UNDRIVEN = ("zeta", "participation", "moving_mass", "section_forces", "contact_rows", "directions", "rows_of", "turning")
+UNDRIVEN = (
+    "zeta",
+    "participation",
+    "moving_mass",
+    "section_forces",
+    "contact_rows",
+    "directions",
+    "rows_of",
+    "turning",
+)
 
 
 @dataclass(frozen=True, eq=False)

@@ -181,7 +181,9 @@ def weight(scene: Scene) -> dict[str, Harmonic]:
 def watched(scene: Scene, body: int) -> LocalCoordinate | None:
     """Where the modes of a beam shall be positive: at its first stop, element, impactor, or where another meets it."""
     part = (scene, *scene.bodies)[body]
-    places = [place for one in part.acting for place in one.coordinates] + [LocalCoordinate(impactor.z) for impactor in part.impactors]
+    places = [place for one in part.acting for place in one.coordinates] + [
+        LocalCoordinate(impactor.z) for impactor in part.impactors
+    ]
     places += _from_the_first(scene, body)
     return replace(places[0], to=None) if places else None
 
@@ -207,7 +209,8 @@ def _from_the_first(scene: Scene, body: int) -> list[LocalCoordinate]:
 
 def static_rows(scene: Scene, matrices: Matrices) -> sparse.csr_matrix:
     """Rows (m, N) of the scene's own stops, elements, then forces: where the model may miss static compliance."""
-    places = [place for one in (*scene.acting, *scene.forces) for place in one.coordinates]
+    acting: list[Any] = [*scene.acting, *scene.forces]
+    places = [place for one in acting for place in one.coordinates]
     blank = sparse.csr_matrix((0, matrices.M.shape[0]))
     return sparse.vstack([blank, *(place.row(matrices) for place in places)], format="csr")
 
