@@ -12,7 +12,7 @@ from fembeam.scene import signals_of
 if TYPE_CHECKING:
     from fembeam.beams import Beam
     from fembeam.model import Model
-    from fembeam.scene import Element, Scene, Stop
+    from fembeam.scene import AnnularStop, Element, Scene, Stop
 
 STEEP = 0.35  # rad; the slope of a beam
 
@@ -87,7 +87,7 @@ def of_damping(scene: Scene) -> list[str]:
     return [f"zeta = {ratios.max():g} looks like per cent: 1 is critical damping"] if ratios.max() >= 0.5 else []
 
 
-def _of_gap(part: Stop | Element, length: float) -> str:
+def _of_gap(part: Stop | AnnularStop | Element, length: float) -> str:
     """What is wrong with a gap; small slopes are assumed up to about 20 degrees."""
     if part.coordinate.rotation:
         return f"a gap of {part.gap:g} rad is no small slope: is it in degrees?" if abs(part.gap) > STEEP else ""

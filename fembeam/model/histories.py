@@ -270,7 +270,7 @@ class Histories:
         return -self.q_dot @ self.directions[self._rows[stop].start]
 
     def place_in_clearance(self, stop: int | str = 0) -> Vector:
-        """d(t) (k, 2) of an annular stop, m: where the place is in its circle, from the centre along both directions."""
+        """d(t) (k, 2) of an annular stop, m: the place from the centre of its circle, along both directions."""
         number = self._stop(stop)
         require(self.circles[number, 0] != 0.0, "the stop must be an annular one", stop, "Run",
                 "ask for its indentation")  # fmt: skip
@@ -283,7 +283,7 @@ class Histories:
         return [slice(a, b) for a, b in pairwise(ends)]
 
     def _in_circle(self, stop: int) -> Vector:
-        """d (k, 2) of a circular clearance."""
+        """D (k, 2) of a circular clearance."""
         return np.asarray(self.q @ self.directions[self._rows[stop]].T - self.circles[stop, 1:])
 
     def _outward(self, stop: int) -> Vector:

@@ -185,11 +185,11 @@ def _settled(model: Model, load: Vector, free: NDArray[np.bool_]) -> Vector:
         for own, block in circles:
             J += W[own].T @ block @ W[own]
         trial = q + np.linalg.solve(J, residual)
-        trial_forces, *trial_slopes = _pushed(model, -W @ trial - gaps)
+        trial_forces, trial_slopes, trial_circles = _pushed(model, -W @ trial - gaps)
         after = f + trial_forces @ W - K * trial
         if np.linalg.norm(after) <= (1 + 1e-12) * np.linalg.norm(residual):
             q, forces, residual, tau = trial, trial_forces, after, min(2 * tau, 1e300)
-            slopes, circles = trial_slopes
+            slopes, circles = trial_slopes, trial_circles
         elif not tau > 1e-30:
             break
         else:

@@ -1,8 +1,8 @@
 """Consistency of the arrays of a saved run; a truncated or edited file is refused with the reason.
 
 k samples, n coordinates, m contacts, r rows of them (two of a circular clearance), b nodes of a beam, c entries of the
-log: t (k,), q, q_dot (k, n), force (r, k), stops (m, 3), kinds (m, 2), on (m, 3), directions (r, n), impactor_masses (i,),
-circles (m, 3) where there are any,
+log: t (k,), q, q_dot (k, n), force (r, k), stops (m, 3), circles (m, 3) if there are any, kinds (m, 2), on (m, 3),
+directions (r, n), impactor_masses (i,),
 nodes (b,), shapes (2b, n), contact_* (c,), energy_* (k,) but energy_initial; what `fembeam.response.readout` reads a
 run with; mean_force (m, k), transitions (r, 9), losses (m, 3), work (k, m) and end (2n + l,).
 """

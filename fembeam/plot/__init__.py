@@ -1,16 +1,17 @@
 """Figures: one function per question, each returns a matplotlib Figure; all but moving pictures draw into your `axes`.
 
-`response`, `bodies`, `spectra`, `contact_histograms` and `animation` hold those of one run, `laws` those of contact
-laws, `orbits` those of periodic motion, `campbell` that of rotors, `basins` maps of starts, `random` those of random
-motion, `linear` spectra and frequency response, `rig` that of a scene, `mode_count`, `methods` and `variation` those of
-studies; `run_signals`, `style` and `figure` are what they share. Imports: `statistics`, `model` and what they import.
-Begin with `response`.
+`response`, `bodies`, `clearance`, `spectra`, `contact_histograms` and `animation` hold those of one run, `laws` those
+of contact laws, `orbits` those of periodic motion, `campbell` that of rotors, `basins` maps of starts, `random` those
+of random motion, `linear` spectra and frequency response, `rig` that of a scene, `mode_count`, `methods` and
+`variation` those of studies; `run_signals`, `style` and `figure` are what they share. Imports: `statistics`, `model`
+and what they import. Begin with `response`.
 """
 
 from fembeam.model import places
 from fembeam.plot.animation import animate, frame
 from fembeam.plot.basins import basins
 from fembeam.plot.campbell import campbell
+from fembeam.plot.clearance import orbit_in_clearance
 from fembeam.plot.contact_histograms import contacts
 from fembeam.plot.laws import equivalent, hysteresis, identification, loops, restitutions
 from fembeam.plot.linear import floor_spectrum, frequency_response, response_spectrum
@@ -28,8 +29,8 @@ from fembeam.plot.variation import minimum, variation
 __all__ = [
     "animate", "basins", "batches", "bifurcation", "branch", "campbell", "contacts", "deflected", "densities",
     "equivalent", "floor_spectrum", "frame", "frequency_response", "hysteresis", "identification", "loops", "minimum",
-    "mode_count", "mode_shapes", "natural", "one_legend", "orbit", "peak", "peaks", "places", "random_densities",
-    "random_spectra", "response_spectrum", "responses", "restitutions", "rig", "sampling_of", "segment_for",
-    "smallest_model", "spectra_of", "spectrum", "speed_accuracy", "stability_map", "stationary", "styled",
-    "time_history", "variation",
+    "mode_count", "mode_shapes", "natural", "one_legend", "orbit", "orbit_in_clearance", "peak", "peaks", "places",
+    "random_densities", "random_spectra", "response_spectrum", "responses", "restitutions", "rig", "sampling_of",
+    "segment_for", "smallest_model", "spectra_of", "spectrum", "speed_accuracy", "stability_map", "stationary",
+    "styled", "time_history", "variation",
 ]  # fmt: skip

@@ -12,7 +12,8 @@ SIGNALS = {"base": "base", "foot": "foot", "signal": "drive"}
 LAWS = {"stiffness": ("contact stiffness", "N/m^p"), "exponent": ("exponent of the contact law", ""),
         "damping_factor": ("hysteresis factor", "s/m"), "damping": ("contact damping", "N s/m^p")}  # fmt: skip
 PARTS = {
-    "gap": ("gap", "m"), "clearance": ("clearance", "m"), "centre": ("centre of the circle", "m"), "z": ("place z", "m"), "mass": ("mass", "kg"), "inertia": ("rotary inertia", "kg m²"),
+    "gap": ("gap", "m"), "clearance": ("clearance", "m"), "centre": ("centre of the circle", "m"),
+    "z": ("place z", "m"), "mass": ("mass", "kg"), "inertia": ("rotary inertia", "kg m²"),
     "stiffness": ("stiffness", "N/m"), "rotational": ("rotational stiffness", "N m/rad"),
     "damping": ("damping", "N s/m"), "length": ("length", "m"), "E": ("Young's modulus", "N/m²"),
     "rho": ("density", "kg/m³"), "A": ("area", "m²"), "I": ("second moment of area", "m⁴"),

@@ -22,9 +22,9 @@ NODES = 48  # of Gauss and Legendre on each piece between the places where stops
 def backbone(model: Model, z: float, amplitudes: Vector) -> Vector:
     """Ω (k,) in rad/s at which the lowest mode vibrates freely with max |u(z)| of so many m (k,), > 0.
 
-    NaN where this does not hold: gravity or preload, bodies that touch each other, annular stops, a mode at rest at z, forces that
-    attract, laws with memory. Errors below 1e-6 for smooth laws; where other modes take part the backbone of the
-    structure lies beside.
+    NaN where this does not hold: gravity or preload, bodies that touch each other, annular stops, a mode at rest at z,
+    forces that attract, laws with memory. Errors below 1e-6 for smooth laws; where other modes take part the backbone
+    of the structure lies beside.
 
     References
     ----------

@@ -68,8 +68,8 @@ class AnnularStop(ScenePart):
     def __post_init__(self) -> None:
         super().__post_init__()
         where = self.where
-        require_positive("clearance", self.clearance, where,
-                         "give the radius of the circle in m; without play it is a spring along each direction")  # fmt: skip
+        advice = "give the radius of the circle in m; without play it is a spring along each direction"
+        require_positive("clearance", self.clearance, where, advice)
         pair = isinstance(self.centre, (list, tuple)) and len(self.centre) == 2 and all(map(is_finite, self.centre))
         require(pair, "centre must be two finite numbers", self.centre, where, "give m along the two directions")
         object.__setattr__(self, "centre", (float(self.centre[0]), float(self.centre[1])))
@@ -150,8 +150,8 @@ def _directed(body: Any, stop: AnnularStop, where: str) -> AnnularStop:
     one = lies and len({int(np.argmax(axis)) for axis in np.abs(axes)}) == 1
     require(one, f"directions must be given where no one member along a global axis is ({told(stop.z)})", None, where,
             "write directions=('x', 'y'), or two vectors")  # fmt: skip
-    across = [c for c, part in zip(COMPONENTS[:3], np.abs(axes[0]), strict=True) if part < 0.5]  # type: ignore[index]
-    return replace(stop, directions=tuple(across))
+    first, second = (c for c, part in zip(COMPONENTS[:3], np.abs(axes[0]), strict=True) if part < 0.5)
+    return replace(stop, directions=(first, second))
 
 
 def _axes_at(body: Any, place: Any) -> Any:

@@ -113,11 +113,12 @@ def check_conflicts(scene: Scene) -> None:
     _check_moved(scene)
     known: dict[Any, int] = {}
     for index, stop in enumerate(scene.stops):
-        round_about = isinstance(stop, AnnularStop)
-        ways = stop.directions if round_about else (stop.direction,)
         one: Any = (stop.z, stop.push, *((place.along, place.to) for place in stop.coordinates))
-        one += (stop.centre, stop.outer) if round_about else ()
-        at = f"{told(stop.z)}, {' and '.join(named(direction_of(way, 'Stop')) for way in ways)}"
+        if isinstance(stop, AnnularStop):
+            one, ways = (*one, stop.centre, stop.outer), [named(place.along) for place in stop.coordinates]
+        else:
+            ways = [named(direction_of(stop.direction, "Stop"))]
+        at = f"{told(stop.z)}, {' and '.join(ways)}"
         require(one not in known, f"stops must not share one place and direction ({at})", (known.get(one), index),
                 "stops of Scene", "make them one stop with one law, such as PiecewiseLinear")  # fmt: skip
         known[one] = index

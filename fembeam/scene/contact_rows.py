@@ -209,7 +209,8 @@ def _from_the_first(scene: Scene, body: int) -> list[LocalCoordinate]:
 
 def static_rows(scene: Scene, matrices: Matrices) -> sparse.csr_matrix:
     """Rows (m, N) of the scene's own stops, elements, then forces: where the model may miss static compliance."""
-    places = [place for one in (*scene.acting, *scene.forces) for place in one.coordinates]
+    acting: list[Any] = [*scene.acting, *scene.forces]
+    places = [place for one in acting for place in one.coordinates]
     blank = sparse.csr_matrix((0, matrices.M.shape[0]))
     return sparse.vstack([blank, *(place.row(matrices) for place in places)], format="csr")
 

@@ -395,6 +395,7 @@ class Scene:
         kinds = [(way, repr(stop.coordinate.to)) for way, stop in zip(ways, self.stops, strict=True)]
         for i, j in pairwise(sorted(range(len(kinds)), key=lambda i: (kinds[i], self.stops[i].z, i))):
             stop, other = self.stops[i], self.stops[j]
+            assert isinstance(stop, Stop)  # annular ones are not of a Beam
             same = kinds[i] == kinds[j] and other.z - stop.z <= near
             told_side = stop.side or stop.direction
             require(not same, f"stops must not share one place and side (z = {stop.z} m, {told_side})",

@@ -1,0 +1,83 @@
+"""The path of a place in its clearance circle."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fembeam.plot.figure import heading, legend, sheet
+from fembeam.plot.rig_words import length
+from fembeam.plot.run_signals import sampling_of
+from fembeam.plot.style import BLUE, GREY, RED, styled
+from fembeam.structures import direction_of, named
+from fembeam.support import require
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from fembeam.model import Run
+
+FINER = 8  # times the samples
+ROUND = np.linspace(0.0, 2.0 * np.pi, 361)
+
+
+@styled
+def orbit_in_clearance(
+    run: Run, stop: int | str = 0, window: tuple[float, float] | None = None, axes: Axes | None = None
+) -> Figure:
+    """The path of a place in the circle of its annular stop, red while it is in contact.
+
+    Parameters
+    ----------
+    run : with at least 2 samples. stop : number or name of an annular stop.
+    window : (from, to) in s; None: all of the run. Between samples the path is the cubic through values and rates.
+    axes : to draw into; None makes a figure.
+
+    Raises
+    ------
+    ValueError : a stop on a line, a window without samples.
+
+    Examples
+    --------
+    >>> import fembeam as fb
+    >>> from contacts import Hertz
+    >>> tube = fb.Frame.straight(1.0, fb.Section.circle(2.1e11, 7800.0, 0.01), bending_only=True)
+    >>> loads = [fb.PointForce("B", fb.Harmonic(2.0, 40.0, phase), direction=n) for n, phase in [("x", 0.0), ("y", 1)]]
+    >>> scene = fb.Scene(tube, [fb.Clamped("A")], stops=[fb.AnnularStop("B", Hertz(1e8), 1e-3)], forces=loads)
+    >>> run = scene.reduce(modes=2).simulate(duration=1.0, dt=1e-3)
+    >>> [line.get_label() for line in orbit_in_clearance(run).axes[0].lines]
+    ['clearance 1 mm', 'free', 'in contact']
+    """
+    from scipy.interpolate import CubicHermiteSpline
+
+    sampling_of(run)
+    number = run._stop(stop)
+    radius, *centre = run.circles[number].tolist()
+    lo, hi = (float(run.t[0]), float(run.t[-1])) if window is None else window
+    d = run.place_in_clearance(number)
+    kept = np.flatnonzero((run.t >= lo) & (run.t <= hi))
+    require(len(kept) > 1, "the window must hold at least 2 samples", (lo, hi), "orbit_in_clearance", "widen it")
+    t, rates = run.t[kept], run.q_dot[kept] @ run.directions[run._rows[number]].T
+    fine = np.linspace(t[0], t[-1], FINER * (len(t) - 1) + 1)
+    path = 1e3 * CubicHermiteSpline(t, d[kept], rates)(fine)
+    size = 1e3 * abs(radius)
+    touching = np.sign(radius) * (np.linalg.norm(path, axis=1) - size) > 0.0
+    figure, (axis,) = sheet(1, 1, (5.0, 5.0), axes)
+    axis.plot(size * np.cos(ROUND), size * np.sin(ROUND), "--", color=GREY, label=f"clearance {length(abs(radius))}")
+    for colour, label, shown in ((BLUE, "free", ~touching), (RED, "in contact", touching)):
+        own = np.where((shown | np.append(shown[1:], False))[:, None], path, np.nan)
+        axis.plot(*own.T, color=colour, linewidth=0.9, label=label)
+    x, y = (_way(direction) for direction in run.acting[number][1])
+    of_centre = " from the centre" if any(centre) else ""
+    axis.set(xlabel=f"{x}{of_centre} / mm", ylabel=f"{y}{of_centre} / mm")
+    axis.set_aspect("equal", adjustable="datalim")
+    legend(axis, axes is None, "outside lower center", **({"ncols": 3} if axes is None else {}))
+    heading([axis], f"Path at {run.name(number)}", axes is None, run=run)
+    return figure
+
+
+def _way(direction: Any) -> str:
+    """A direction in words."""
+    return direction if isinstance(direction, str) else named(direction_of(direction, "orbit_in_clearance"))
