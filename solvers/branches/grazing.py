@@ -177,11 +177,12 @@ def _linear(problem: _Meeting, chain: Chain, speed: float) -> tuple[Array, Array
         rate, stop = _rate(chain, place) * period, problem.stops[place] or 0  # of the state there, per period
         later[k, place - 1] += rate
         later[k, place] -= chain.tangents[place] @ rate
-        n, begin, w = system.size, place * size, system.contacts[stop].direction
-        rows[k, 0, begin : begin + n] = rows[k, 1, begin + n : begin + 2 * n] = -w
+        n, begin = system.size, place * size
+        delta, pace, by_q, pace_by_q = system.contacts[stop].motion(*np.split(chain.x[place, : 2 * n], 2))
+        rows[k, 0, begin : begin + n] = rows[k, 1, begin + n : begin + 2 * n] = by_q
+        rows[k, 1, begin : begin + n] = pace_by_q
         rows[k, 0, m * size] = -_gap_slope(problem, chain.parameter, stop)
-        q, q_dot = np.split(chain.x[place, : 2 * n], 2)
-        misses += [-q @ w - system.contacts[stop].gap, -q_dot @ w - speed]
+        misses += [delta, pace - speed]
     changes = later.reshape(len(places), -1).T
     matrix = np.vstack((np.column_stack((chain.jacobian(), chain.by_parameter.ravel(), changes)), *rows))
     return matrix, -np.concatenate((chain.residual.ravel(), misses))
@@ -189,8 +190,9 @@ def _linear(problem: _Meeting, chain: Chain, speed: float) -> tuple[Array, Array
 
 def _gap_slope(problem: PeriodicProblem, parameter: float, stop: int) -> float:
     """Derivative of a stop's gap by the parameter."""
-    behind, ahead = (problem.make(parameter + s * problem.step)[0].contacts[stop].gap for s in (-1.0, 1.0))
-    return (ahead - behind) / (2.0 * problem.step)
+    behind, ahead = (problem.make(parameter + s * problem.step)[0].contacts[stop] for s in (-1.0, 1.0))
+    change = (ahead.gap - behind.gap) / (2.0 * problem.step)
+    return -change if ahead.outer else change
 
 
 def _rate(chain: Chain, place: int) -> Array:
@@ -269,11 +271,13 @@ def _indicators(point: Point, grazing: Grazing) -> tuple[Array, Array, float]:
         columns[:, -1] += chain.by_parameter[place - 1]
         stop = grazing.stops[place]
         if stop is not None:
-            w, rate = -point.orbit.system.contacts[stop].direction, _rate(chain, place)
+            rate, state = _rate(chain, place), np.split(chain.x[place, : 2 * n], 2)
+            _, _, w, turning = point.orbit.system.contacts[stop].motion(*state)
             row = w @ columns[:n]
             row[-1] -= _gap_slope(point.problem, grazing.parameter, stop)
-            by_rate = w @ columns[n : 2 * n]
-            rows.append(by_rate - (w @ rate[n : 2 * n]) / grazing.speed * row if grazing.speed else row)
+            by_rate = w @ columns[n : 2 * n] + turning @ columns[:n]
+            acceleration = w @ rate[n : 2 * n] + turning @ rate[:n]
+            rows.append(by_rate - acceleration / grazing.speed * row if grazing.speed else row)
     aside = _ASIDE[1] * grazing.speed or aside or _ASIDE[0] * float(np.abs(chain.x[0, :n]).max())
     return np.array(rows)[:, :-1], np.array(rows)[:, -1], aside
 

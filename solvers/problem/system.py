@@ -175,6 +175,18 @@ class Contact:
         distance = np.linalg.norm(np.asarray(q) @ self.direction.T - self.centre, axis=-1)
         return self.gap - distance if self.outer else distance - self.gap
 
+    def motion(self, q: Array, q_dot: Array) -> tuple[float, float, Array, Array]:
+        """δ in m and δ̇ in m/s of a state, and their derivatives ∂δ/∂q and ∂δ̇/∂q, both (n,); ∂δ̇/∂q̇ is ∂δ/∂q."""
+        delta = float(self.indentation(q))
+        if self.map == "line":
+            return delta, float(-q_dot @ self.direction), -self.direction, np.zeros(self.direction.size)
+        place, speed = self.direction @ q - self.centre, self.direction @ q_dot
+        distance = np.linalg.norm(place)
+        along = (-place if self.outer else place) / distance
+        rate = along @ speed
+        turning = (speed if not self.outer else -speed) / distance - rate * place / distance**2
+        return delta, float(rate), along @ self.direction, turning @ self.direction
+
 
 @dataclass(frozen=True, eq=False)
 class System:
