@@ -6,7 +6,7 @@ from scipy.optimize import brentq
 from test_annulus_tangent import Tone
 
 from contacts import KelvinVoigt
-from solvers import Contact, DormandPrince, System, integrate, orbit
+from solvers import Contact, DormandPrince, System, branch, integrate, orbit
 
 MASS, DAMPING, STIFFNESS, WALL, CLEARANCE, ECCENTRICITY = 2.0, 60.0, 8e4, 3e5, 2e-4, 1e-4
 PLANE = np.eye(2)
@@ -69,6 +69,24 @@ def test_a_bouncing_orbit_closes_for_another_method():
     run = integrate(system, *np.split(found.state, 2), period, method=DormandPrince(1e-13, 1e-20))
     assert len(run.contacts.t_in) > 0
     np.testing.assert_allclose(run.end, found.state, rtol=0.0, atol=1e-8 * np.abs(found.state).max())
+
+
+def test_grazing_of_the_circle_against_the_linear_amplitude():
+    """The place moves on an ellipse of half-axes a X and 0.3 a X about a point beside the centre: a X = c - offset."""
+    omega, offset = 170.0, 5e-5
+    period, push = 2.0 * np.pi / omega, MASS * ECCENTRICITY * omega**2
+    response = push / (STIFFNESS - MASS * omega**2 + 1j * DAMPING * omega)
+    exact = (CLEARANCE - offset) / abs(response)
+    x, y = 0.8 * exact * response * np.array([1.0, -0.3j])
+    start = np.array([x, y, 1j * omega * x, 1j * omega * y]).real
+
+    def make(share):
+        return rotor(omega, 0.3, (offset, 0.0), share), period
+
+    found = branch(make, (0.7 * exact, 1.2 * exact), start, at=0.8 * exact, step=0.25).run()
+    grazings = [one.parameter for one in found.special if one.mark == "grazing"]
+    assert grazings == pytest.approx([exact], rel=1e-9)
+    assert sorted(len(one.contacts) for one in (found.orbits[0], found.orbits[-1])) == [0, 1]
 
 
 @pytest.mark.parametrize("outer", [False, True])
