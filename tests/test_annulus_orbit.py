@@ -6,7 +6,7 @@ from scipy.optimize import brentq
 from test_annulus_tangent import Tone
 
 from contacts import KelvinVoigt
-from solvers import Contact, DormandPrince, System, integrate, orbit
+from solvers import Contact, DormandPrince, System, branch, integrate, orbit
 
 MASS, DAMPING, STIFFNESS, WALL, CLEARANCE, ECCENTRICITY = 2.0, 60.0, 8e4, 3e5, 2e-4, 1e-4
 PLANE = np.eye(2)
@@ -23,9 +23,9 @@ class Quadrature(Tone):
         return np.array([self.omega]), np.array([-1j * self.amplitude])
 
 
-def rotor(omega, across=1.0, centre=(0.0, 0.0)):
+def rotor(omega, across=1.0, centre=(0.0, 0.0), share=1.0):
     """A disk on a flexible shaft, unbalanced, in a smooth hole; the force across is a multiple of that of a rotor."""
-    push = MASS * ECCENTRICITY * omega**2
+    push = share * MASS * ECCENTRICITY * omega**2
     loads = [(PLANE[0], Tone(push, omega)), (PLANE[1], Quadrature(across * push, omega))]
     hole = Contact(PLANE, KelvinVoigt(WALL, 0.0), CLEARANCE, map="annulus", centre=centre)
     return System(MASS * PLANE, DAMPING * PLANE, STIFFNESS * PLANE, [hole], loads)
@@ -69,3 +69,39 @@ def test_a_bouncing_orbit_closes_for_another_method():
     run = integrate(system, *np.split(found.state, 2), period, method=DormandPrince(1e-13, 1e-20))
     assert len(run.contacts.t_in) > 0
     np.testing.assert_allclose(run.end, found.state, rtol=0.0, atol=1e-8 * np.abs(found.state).max())
+
+
+def test_grazing_of_the_circle_against_the_linear_amplitude():
+    """The place moves on an ellipse of half-axes a X and 0.3 a X about a point beside the centre: a X = c - offset."""
+    omega, offset = 170.0, 5e-5
+    period, push = 2.0 * np.pi / omega, MASS * ECCENTRICITY * omega**2
+    response = push / (STIFFNESS - MASS * omega**2 + 1j * DAMPING * omega)
+    exact = (CLEARANCE - offset) / abs(response)
+    x, y = 0.8 * exact * response * np.array([1.0, -0.3j])
+    start = np.array([x, y, 1j * omega * x, 1j * omega * y]).real
+
+    def make(share):
+        return rotor(omega, 0.3, (offset, 0.0), share), period
+
+    found = branch(make, (0.7 * exact, 1.2 * exact), start, at=0.8 * exact, step=0.25).run()
+    grazings = [one.parameter for one in found.special if one.mark == "grazing"]
+    assert grazings == pytest.approx([exact], rel=1e-9)
+    assert sorted(len(one.contacts) for one in (found.orbits[0], found.orbits[-1])) == [0, 1]
+
+
+@pytest.mark.parametrize("outer", [False, True])
+def test_derivatives_of_an_indentation_are_those_of_differences(outer):
+    contact = Contact(
+        [[1.0, 0.2], [-0.3, 0.8]], KelvinVoigt(1e3, 0.0), 0.5, map="annulus", centre=(0.1, 0.2), outer=outer
+    )
+    q, v, step = np.array([0.7, -0.4]), np.array([0.3, 1.1]), 1e-6
+    delta, rate, by_q, rate_by_q = contact.motion(q, v)
+    assert delta == contact.indentation(q)
+    ahead, behind = (contact.indentation(q + h * v) for h in (step, -step))
+    assert rate == pytest.approx((ahead - behind) / (2.0 * step), rel=1e-8)
+    for i, unit in enumerate(np.eye(2)):
+        ahead, behind = (contact.motion(q + h * unit, v)[:2] for h in (step, -step))
+        assert by_q[i] == pytest.approx((ahead[0] - behind[0]) / (2.0 * step), rel=1e-8)
+        assert rate_by_q[i] == pytest.approx((ahead[1] - behind[1]) / (2.0 * step), rel=1e-7)
+        faster, slower = (contact.motion(q, v + h * unit)[1] for h in (step, -step))
+        assert by_q[i] == pytest.approx((faster - slower) / (2.0 * step), rel=1e-8)

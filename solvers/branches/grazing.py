@@ -177,22 +177,22 @@ def _linear(problem: _Meeting, chain: Chain, speed: float) -> tuple[Array, Array
         rate, stop = _rate(chain, place) * period, problem.stops[place] or 0  # of the state there, per period
         later[k, place - 1] += rate
         later[k, place] -= chain.tangents[place] @ rate
-        n, begin, contact = system.size, place * size, system.contacts[stop]
-        q, q_dot = np.split(chain.x[place, : 2 * n], 2)
-        delta_dot, by_q, turned = contact.slopes(q, q_dot)
+        n, begin = system.size, place * size
+        delta, pace, by_q, pace_by_q = system.contacts[stop].motion(*np.split(chain.x[place, : 2 * n], 2))
         rows[k, 0, begin : begin + n] = rows[k, 1, begin + n : begin + 2 * n] = by_q
-        rows[k, 1, begin : begin + n] = turned
+        rows[k, 1, begin : begin + n] = pace_by_q
         rows[k, 0, m * size] = -_gap_slope(problem, chain.parameter, stop)
-        misses += [float(contact.indentation(q)), delta_dot - speed]
+        misses += [delta, pace - speed]
     changes = later.reshape(len(places), -1).T
     matrix = np.vstack((np.column_stack((chain.jacobian(), chain.by_parameter.ravel(), changes)), *rows))
     return matrix, -np.concatenate((chain.residual.ravel(), misses))
 
 
 def _gap_slope(problem: PeriodicProblem, parameter: float, stop: int) -> float:
-    """Derivative of -δ of a stop by the parameter: that of its gap, of an outer annulus of minus its clearance."""
+    """Derivative of a stop's gap by the parameter."""
     behind, ahead = (problem.make(parameter + s * problem.step)[0].contacts[stop] for s in (-1.0, 1.0))
-    return (-1.0 if ahead.outer else 1.0) * (ahead.gap - behind.gap) / (2.0 * problem.step)
+    change = (ahead.gap - behind.gap) / (2.0 * problem.step)
+    return -change if ahead.outer else change
 
 
 def _rate(chain: Chain, place: int) -> Array:
@@ -271,13 +271,13 @@ def _indicators(point: Point, grazing: Grazing) -> tuple[Array, Array, float]:
         columns[:, -1] += chain.by_parameter[place - 1]
         stop = grazing.stops[place]
         if stop is not None:
-            _, by_q, turned = point.orbit.system.contacts[stop].slopes(*np.split(chain.x[place, : 2 * n], 2))
-            rate = _rate(chain, place)
-            row = by_q @ columns[:n]
+            rate, state = _rate(chain, place), np.split(chain.x[place, : 2 * n], 2)
+            _, _, w, turning = point.orbit.system.contacts[stop].motion(*state)
+            row = w @ columns[:n]
             row[-1] -= _gap_slope(point.problem, grazing.parameter, stop)
-            by_rate = by_q @ columns[n : 2 * n] + turned @ columns[:n]
-            faster = by_q @ rate[n : 2 * n] + turned @ rate[:n]  # δ̈
-            rows.append(by_rate - faster / grazing.speed * row if grazing.speed else row)
+            by_rate = w @ columns[n : 2 * n] + turning @ columns[:n]
+            acceleration = w @ rate[n : 2 * n] + turning @ rate[:n]
+            rows.append(by_rate - acceleration / grazing.speed * row if grazing.speed else row)
     aside = _ASIDE[1] * grazing.speed or aside or _ASIDE[0] * float(np.abs(chain.x[0, :n]).max())
     return np.array(rows)[:, :-1], np.array(rows)[:, -1], aside
 

@@ -237,18 +237,17 @@ class Contact:
         distance = np.linalg.norm(np.asarray(q) @ self.direction.T - self.centre, axis=-1)
         return self.gap - distance if self.outer else distance - self.gap
 
-    def slopes(self, q: Array, q_dot: Array) -> tuple[float, Array, Array]:
-        """δ̇ in m/s, and the gradients (n,) of δ by q and of δ̇ by q; that of δ̇ by q_dot is the first one.
-
-        Of an annulus ∇δ = Wᵀe, e = d/r, and ∇δ̇ = Wᵀ(ḋ - (e·ḋ) e)/r; of an outer one minus that.
-        """
+    def motion(self, q: Array, q_dot: Array) -> tuple[float, float, Array, Array]:
+        """δ in m and δ̇ in m/s of a state, and their derivatives ∂δ/∂q and ∂δ̇/∂q, both (n,); ∂δ̇/∂q̇ is ∂δ/∂q."""
+        delta = float(self.indentation(q))
         if self.map == "line":
-            return float(-q_dot @ self.direction), -self.direction, np.zeros(self.direction.size)
-        d, d_dot = self.direction @ q - self.centre, self.direction @ q_dot
-        distance, sign = float(np.linalg.norm(d)), -1.0 if self.outer else 1.0
-        outward = d / distance
-        across = d_dot - (outward @ d_dot) * outward
-        return sign * float(outward @ d_dot), sign * outward @ self.direction, sign / distance * across @ self.direction
+            return delta, float(-q_dot @ self.direction), -self.direction, np.zeros(self.direction.size)
+        place, speed = self.direction @ q - self.centre, self.direction @ q_dot
+        distance = np.linalg.norm(place)
+        along = (-place if self.outer else place) / distance
+        rate = along @ speed
+        turning = (speed if not self.outer else -speed) / distance - rate * place / distance**2
+        return delta, float(rate), along @ self.direction, turning @ self.direction
 
     def slide(self, q: ArrayLike, t: ArrayLike = 0.0) -> Array:
         """ξ (...) in m at coordinates (..., n) and times; of an annulus with its angle in (-π, π]."""
