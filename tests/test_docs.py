@@ -216,6 +216,15 @@ def test_an_index_stands_beside_an_accented_letter(formulas):
 
 
 @WITH_SPHINX
+def test_a_line_of_equations_breaks_between_them(formulas):
+    from mathml import parts
+
+    assert parts(r"a = b, \quad c = d \qquad e") == ["a = b, ", " c = d ", " e"]
+    aligned = r"\begin{matrix} a & b \\ c \quad d & e \end{matrix}"
+    assert parts(aligned) == [aligned]
+
+
+@WITH_SPHINX
 def test_site(tmp_path):
     """Without running the examples, which have a test of their own; links within the site hold."""
     shutil.copytree(HOME, tmp_path / "here", ignore=shutil.ignore_patterns(".*", "_build", "gallery", "generated"))
@@ -230,5 +239,8 @@ def test_site(tmp_path):
     loaded = r'<(?:script|img|iframe)[^>]+src="(?:https?:)?//|<link[^>]+rel="stylesheet"[^>]+href="(?:https?:)?//'
     assert [path for path, page in pages.items() if re.search(loaded, page)] == []
     typeset = (tmp_path / "site" / "explanation" / "equations.html").read_text(encoding="utf-8")
-    assert typeset.count("<math ") == len(re.findall(r"^\$\$$", text_of("docs/explanation/equations.md"), re.M)) / 2
+    assert (
+        typeset.count('class="equation"')
+        == len(re.findall(r"^\$\$$", text_of("docs/explanation/equations.md"), re.M)) / 2
+    )
     assert "$$" not in typeset

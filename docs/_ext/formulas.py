@@ -120,8 +120,8 @@ def formula(text: str) -> str | None:
     rows = [[latex(cell) for cell in re.split(r"\s{3,}", line.strip())] for line in lines if line.strip()]
     if any(cell is None for row in rows for cell in row) or wordy(rows):
         return None
-    if len(rows) == 1:
-        return r" \quad ".join(rows[0])
+    if len(rows) == 1 or len({len(row) for row in rows}) > 1:  # nothing stands below each other
+        return r" \quad ".join(cell for row in rows for cell in row)
     return r"\begin{matrix} " + r" \\ ".join(" & ".join(row) for row in rows) + r" \end{matrix}"
 
 

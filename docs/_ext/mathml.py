@@ -33,9 +33,17 @@ def inline(translator: object, node: nodes.math) -> None:
 
 
 def block(translator: object, node: nodes.math_block) -> None:
-    """A formula of its own: it scrolls where the page is narrower."""
-    translator.body.append(f'<div class="equation" tabindex="0">{converted(node.astext(), display=True)}</div>\n')
+    """A formula of its own: its parts stand on lines of their own where the page is narrower, and scroll there."""
+    maths = "".join(converted(part, display=True) for part in parts(node.astext()))
+    translator.body.append(f'<div class="equation" tabindex="0">{maths}</div>\n')
     raise nodes.SkipNode
+
+
+def parts(latex: str) -> list[str]:
+    """What stands between wide spaces; one whole if anything is aligned."""
+    if r"\begin{" in latex:
+        return [latex]
+    return [part for part in re.split(r"\\q?quad(?![a-z])", latex) if part.strip()]
 
 
 def setup(app: object) -> dict[str, bool]:
