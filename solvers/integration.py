@@ -54,6 +54,7 @@ from solvers.problem.friction import ACCOUNTS, BEGUN, CODE
 from solvers.problem.run_arguments import (
     check_laws,
     check_maps,
+    check_places,
     check_tangent,
     checked_start,
     latched_at_start,
@@ -150,6 +151,7 @@ def prepared_run(
     check_maps(system, method)
     check_tangent(tangent, method, system)
     z = checked_start(system, q0, q_dot0, method)
+    check_places(system, q0)
     times = output_times(duration, dt)
     check_laws(system)
     forcing = kept_forcing(system, duration, min(max(method.rtol, 1e-12), 1e-6))

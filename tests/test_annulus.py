@@ -269,6 +269,13 @@ def test_bad_contacts_are_refused(options, message):
         Contact(**given)
 
 
+@pytest.mark.parametrize("method", [SHARP, Exponential()], ids=["dormand", "exponential"])
+def test_a_start_at_the_centre_of_a_post_is_refused(method):
+    system = System(PLANE, NOTHING, PLANE, [hole(Hertz(1e4), 0.5, outer=True, centre=(0.1, 0.2))])
+    with pytest.raises(ValueError, match=r"contact 0 begins at the centre of its post, 0.5 m deep"):
+        integrate(system, [0.1, 0.2], [0.0, 0.0], 1.0, method=method)
+
+
 def test_an_annulus_of_another_size_is_refused():
     with pytest.raises(ValueError, match="direction of 2, the system 3"):
         System(np.eye(3), np.eye(3), np.eye(3), [hole(Hertz(1e6))])

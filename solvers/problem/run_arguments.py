@@ -39,6 +39,16 @@ def check_maps(system: System, method: Any) -> None:
             )
 
 
+def check_places(system: System, q0: ArrayLike) -> None:
+    """No place begins at the centre of its post, where nothing says which way it is pushed; q0 is (..., n)."""
+    for i, contact in enumerate(system.contacts):
+        if contact.outer and np.any(contact.indentation(q0) >= contact.gap):
+            raise ValueError(
+                f"the place of contact {i} begins at the centre of its post, {contact.gap:g} m deep, where no way "
+                "leads out of it: begin outside of the post"
+            )
+
+
 def check_slopes(system: System) -> None:
     """No law has an infinite slope at its surface, F ~ δ^r with r < 1 but for a declared jump or where it has none."""
     system.about_laws.get("finite slopes", lambda: _finite_slopes(system))
