@@ -2,7 +2,8 @@
 
 `problem` holds what is to be solved and what comes out, `compiled` what all compiled functions share. `stepping` has
 the methods of constant or controlled step, `exponential` the main method; `integration` runs any of them, `many` runs
-many starts. `orbits` finds periodic motion, `branches` continues it over a parameter. Imports: numpy, scipy, numba;
+many starts. `sensitivities` derives runs by their start and by parameters. `orbits` finds periodic motion, `branches`
+continues it over a parameter. Imports: numpy, scipy, numba;
 nothing is compiled or imported from numba before a method is used. Begin with `problem.system`, then `integration`.
 """
 
@@ -11,7 +12,18 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
-from solvers.problem import Contact, ContactLog, Cost, Energy, Parameter, Solution, SolverError, Status, System
+from solvers.problem import (
+    Contact,
+    ContactLog,
+    Cost,
+    Energy,
+    Friction,
+    Parameter,
+    Solution,
+    SolverError,
+    Status,
+    System,
+)
 
 _LATER = {
     "integrate": "integration",
@@ -25,6 +37,10 @@ _LATER = {
     "Newmark": "stepping.newmark",
     "GeneralizedAlpha": "stepping.newmark",
     "lumped": "stepping.newmark",
+    "sensitivity": "sensitivities.variation",
+    "Sensitivity": "sensitivities.variation",
+    "Nearby": "sensitivities.nearby",
+    "NoDerivativeError": "sensitivities.events",
     "lyapunov": "orbits.exponents",
     "orbit": "orbits.shooting",
     "Orbit": "orbits.periodic_orbit",
@@ -43,13 +59,17 @@ __all__ = [
     "DormandPrince",
     "Energy",
     "Exponential",
+    "Friction",
     "GeneralizedAlpha",
     "HenonRK2",
     "ManySolutions",
+    "Nearby",
     "Newmark",
+    "NoDerivativeError",
     "Orbit",
     "OrbitError",
     "Parameter",
+    "Sensitivity",
     "Solution",
     "SolverError",
     "Status",
@@ -60,6 +80,7 @@ __all__ = [
     "lumped",
     "lyapunov",
     "orbit",
+    "sensitivity",
 ]
 
 

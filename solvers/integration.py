@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from solvers.compiled.sliding import slider_force
 from solvers.compiled.state import (
     CALLS,
     EVENTS,
@@ -28,6 +29,7 @@ from solvers.compiled.state import (
     STEPS,
     T,
     event_row,
+    slider_row,
 )
 from solvers.exponential.energy.check import unbalanced
 from solvers.problem import (
@@ -36,6 +38,7 @@ from solvers.problem import (
     Cost,
     Energy,
     Forcing,
+    FrictionLog,
     Losses,
     Parameter,
     Solution,
@@ -47,6 +50,7 @@ from solvers.problem import (
     product,
 )
 from solvers.problem import event_list as at
+from solvers.problem.friction import ACCOUNTS, BEGUN, CODE
 from solvers.problem.run_arguments import (
     check_laws,
     check_maps,
@@ -245,14 +249,15 @@ class _Run:
             x = self.out[: self._sampled(status)]
             t, motion = self.times[: len(x)], product(x[:, :size], back.T)
         works = x[:, size:] if self.times is None else x[:, size:].copy()  # so that all the samples can be let go
+        works, rubbed = np.split(works, [2 + 2 * len(self.system.contacts)], axis=1)
         complete = self.engine.keeps_ledger(self.times is not None)
-        ledger = partial(_energy, self.system, works, complete, motion, back, self.initial)
+        ledger = partial(_energy, self.system, works, complete, motion, back, self.initial, self._balanced(rubbed))
         rows = self._rows()
         names = [contact.name for contact in self.system.contacts]
         log = partial(ContactLog.of_events, self._of_stops(rows), names)
         transitions = partial(Transitions.of_events, rows, self.system.contacts)
         first, last = (self.initial, self.latched), (state, latched)
-        lost = partial(Losses.of_run, self.system.contacts, back, first, last, works, transitions)
+        lost = partial(Losses.of_run, self.system.contacts, back, first, last, works, transitions, self._rubbed())
         if status is Status.DONE and not self._balances(works, complete, motion, rows):
             status = Status.UNBALANCED
         count = self.state.count.tolist()
@@ -261,7 +266,31 @@ class _Run:
         more: dict[str, Any] = {**self._derivatives()} if known else {}
         end = np.concatenate((end, *latched)) if self.system.latches else end.copy()
         more |= {"borders": transitions, "lost": lost, "memory": latched, "end": end}
+        more |= {"rubbing": partial(FrictionLog.of_events, rows, names)}
         return Solution(t, motion[:, :n], motion[:, n:], log, ledger, status, cost, **more)
+
+    def _balanced(self, rubbed: Array) -> tuple[Any, Any]:
+        """Works of friction and of spins at the samples, J; 0.0 without friction."""
+        laws: list[Any] = [contact.law for contact in self.system.contacts if contact.friction is not None]
+        if not laws:
+            return 0.0, 0.0
+        return rubbed[:, ::ACCOUNTS].sum(axis=1), rubbed[:, 1::ACCOUNTS] @ [law.arm * law.spin for law in laws]
+
+    def _rubbed(self) -> Array | None:
+        """(m, 3) loss by friction and work of the spin, J, and way of the slider, m; None without friction."""
+        contacts, problem, state = self.system.contacts, self.engine.problem, self.state
+        if not len(problem.friction):
+            return None
+        found = np.zeros((len(contacts), 3))
+        for s in np.flatnonzero(problem.friction[:, 0]).tolist():
+            law: Any = contacts[s].law
+            own, k_t = problem.parameters[s, law.place :], law.friction.stiffness
+            force = slider_force(problem, s, state.segment[s], state.entry_rate[s], state.now[T], state.x)
+            work, impulse, way = state.x[problem.friction[s, 1] :][:ACCOUNTS]
+            slips = state.segment[s] > 0 and abs(own[CODE]) == 1.0
+            stored = 0.5 * (force**2 - own[BEGUN] ** 2) / k_t
+            found[s] = work - stored, law.arm * law.spin * impulse, way - (abs(force) / k_t if slips else 0.0)
+        return found
 
     def _balances(self, works: Array, complete: bool, motion: Array, rows: Array) -> bool:
         """Whether the energy balance closes, where it is kept; methods without `gains` are checked step by step."""
@@ -299,7 +328,12 @@ class _Run:
         rows = np.empty((len(under_way), at.CODE + 1))
         for s, row in zip(under_way, rows, strict=True):
             event_row(self.engine.problem, self.state, s, math.nan, at.KNOT, math.nan, math.nan, row)
-        return np.concatenate((logged, rows))
+        rubbing = [s for s in under_way if self.system.contacts[s].friction is not None]
+        more = np.empty((len(rubbing), at.CODE + 1))
+        for s, row in zip(rubbing, more, strict=True):
+            slider_row(self.engine.problem, self.state, s, self.time, row)
+            row[[at.TIME, at.CLIPPED]] = math.nan, 0.0
+        return np.concatenate((logged, rows, more))
 
 
 def _exchanged(rows: Array) -> Array:
@@ -308,11 +342,13 @@ def _exchanged(rows: Array) -> Array:
     return ends[:, at.DEEPEST] * ends[:, at.LARGEST]
 
 
-def _energy(system: System, works: Array, complete: bool, motion: Array, back: Array, initial: Array) -> Energy:
+def _energy(
+    system: System, works: Array, complete: bool, motion: Array, back: Array, initial: Array, rubbed: tuple[Any, Any]
+) -> Energy:
     """The energy balance of a run; input and damping are NaN where it was not kept."""
     if not complete:
         works = np.hstack((np.full((len(works), 2), math.nan), works[:, 2:]))
-    return Energy.of_run(system.M, system.K, works, motion, back @ initial)
+    return Energy.of_run(system.M, system.K, works, motion, back @ initial, rubbed)
 
 
 def _end(system: System, q0: ArrayLike, q_dot0: ArrayLike, duration: float, method: Any, memory: Any) -> Array:

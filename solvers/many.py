@@ -177,6 +177,11 @@ def _gaps(system: System, gaps: ArrayLike | None, count: int) -> Array:
     if gaps is None:
         return np.empty((0, 0))
     rows: Array = _rows("gaps", gaps, count, len(system.contacts), "that of each contact")
+    circles = np.array([contact.map == "annulus" for contact in system.contacts], dtype=bool)
+    bad = np.argwhere((rows <= 0.0) & circles)
+    if bad.size:
+        which = f"contact {bad[0, 1]} in run {bad[0, 0]}"
+        raise ValueError(f"gaps: the clearance of an annulus must be positive, got {rows[tuple(bad[0])]} for {which}")
     return rows
 
 

@@ -2,10 +2,22 @@
 
 import numpy as np
 import pytest
+from bench.circle_flights import missed
 from scipy.integrate import solve_ivp
+from test_annulus_tangent import Tone, tube
 
-from contacts import Hertz, KelvinVoigt, WaltonBraun
-from solvers import CentralDifference, Contact, DormandPrince, Exponential, HenonRK2, Newmark, System, integrate
+from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, WaltonBraun
+from solvers import (
+    CentralDifference,
+    Contact,
+    DormandPrince,
+    Exponential,
+    HenonRK2,
+    Newmark,
+    System,
+    integrate,
+    integrate_many,
+)
 
 PLANE = np.eye(2)
 NOTHING = np.zeros((2, 2))
@@ -107,6 +119,130 @@ def test_turning_everything_turns_everything(method, outer):
     assert len(one.contacts.t_in) > 1
     np.testing.assert_allclose(other.q[-1], turn @ one.q[-1], rtol=0.0, atol=1e-8)
     np.testing.assert_allclose(other.contacts.t_out, one.contacts.t_out, rtol=0.0, atol=1e-8)
+
+
+LAWS = {
+    "linear": KelvinVoigt(1e5, 0.0),
+    "dashpot": KelvinVoigt(1e5, 20.0),
+    "strong dashpot": KelvinVoigt(1e5, 400.0),
+    "clamped": KelvinVoigt(1e5, 40.0, clamp=True),
+    "hertz": Hertz(1e7),
+    "lankarani": Hysteretic.lankarani_nikravesh(1e7, restitution=0.6),
+    "piecewise": PiecewiseLinear([1e5, 3e5], [4e-5]),
+}
+V = np.array([0.3, -0.2, 0.1, 0.4])
+
+
+def agree(one, other, rtol):
+    """Events one by one and the ends, in units of the largest."""
+    assert np.array_equal(one.contacts.stop, other.contacts.stop)
+    for name in ("t_in", "t_out", "speed_in", "peak_indentation", "peak_force", "impulse"):
+        a, b = getattr(one.contacts, name), getattr(other.contacts, name)
+        np.testing.assert_allclose(a, b, rtol=0.0, atol=rtol * np.nanmax(np.abs(b)), err_msg=name)
+    np.testing.assert_allclose(one.end, other.end, rtol=0.0, atol=rtol * np.abs(other.end).max())
+
+
+@pytest.mark.parametrize("outer", [False, True], ids=["hole", "post"])
+@pytest.mark.parametrize("name", LAWS)
+def test_two_planes_move_as_the_independent_method_says(name, outer):
+    system = tube(LAWS[name], outer=outer, gap=6e-4 if outer else 1e-3)
+    q = np.array([-1e-4, 9e-4, 0.0, 0.0]) if outer else np.zeros(4)
+    one, other = (integrate(system, q, V, 0.1, method=m) for m in (Exponential(1e-11), DormandPrince(1e-13, 1e-20)))
+    assert len(other.contacts.t_in) > 0
+    agree(one, other, 1e-7)
+
+
+def bundle(loads=()):
+    """A tube of two modes a plane in two holes, with a stop on one side: five rows."""
+    omega = np.array([30.0, 33.0, 190.0, 209.0])
+    first, second = [[1.0, 0.0, -0.8, 0.0], [0.0, 1.0, 0.0, -0.7]], [[0.6, 0.0, 0.9, 0.0], [0.0, 0.5, 0.0, 1.0]]
+    contacts = [
+        Contact(first, LAWS["dashpot"], 1e-3, map="annulus"),
+        Contact(second, LAWS["lankarani"], 8e-4, map="annulus", centre=(1e-4, 0.0)),
+        Contact([0.8, 0.3, 0.0, 0.0], Hertz(1e7), 5e-4),
+    ]
+    push = [1.0, 0.6, -0.5, 0.3]
+    return System.modal(omega, 0.02, contacts, [(push, Tone(3.0, 25.0)), *((push, load) for load in loads)])
+
+
+def test_many_holes_and_a_stop_move_as_the_independent_method_says():
+    one, other = (integrate(bundle(), np.zeros(4), V, 0.1, method=m) for m in (Exponential(1e-11), SHARP))
+    assert set(one.contacts.stop) == {0, 1, 2}
+    agree(one, other, 1e-6)
+
+
+def noise(t):
+    """A load without tones: it is sampled."""
+    return 4.0 * np.exp(-(((t - 0.04) / 0.03) ** 2)) * np.cos(80.0 * t)
+
+
+@pytest.mark.parametrize("outer", [False, True], ids=["hole", "post"])
+def test_sampled_loads_are_followed(outer):
+    plain = tube(LAWS["dashpot"], outer=outer, gap=6e-4 if outer else 1e-3)
+    system = plain.like(loads=[*plain.loads, ([1.0, -0.5, 0.0, 0.0], noise)])
+    q = np.array([-1e-4, 9e-4, 0.0, 0.0]) if outer else np.zeros(4)
+    one, other = (integrate(system, q, V, 0.15, method=m) for m in (Exponential(1e-10), SHARP))
+    assert len(one.contacts.t_in) > 0
+    agree(one, other, 1e-6)
+
+
+@pytest.mark.parametrize("name", ["linear", "dashpot", "lankarani"])
+@pytest.mark.parametrize("make", [tube, lambda law: bundle([noise])], ids=["tables", "blocks"])
+def test_the_energy_balance_closes(name, make):
+    run = integrate(make(LAWS[name]), np.zeros(4), V, 0.2, 1e-3, Exponential(1e-10))
+    handled = np.abs(run.energy.input).max() + run.energy.stored[0]
+    assert np.abs(run.energy.residual).max() < 1e-8 * handled
+    if name == "linear" and make is tube:
+        np.testing.assert_allclose(run.contacts.energy_loss, 0.0, atol=1e-9 * handled)
+
+
+def test_samples_lie_on_the_motion():
+    """Within contact steps, landings and flights."""
+    times = np.linspace(0.0, 0.05, 301)
+    one, other = (integrate(tube(LAWS["hertz"]), np.zeros(4), V, 0.05, times, m) for m in (Exponential(1e-10), SHARP))
+    np.testing.assert_allclose(one.q, other.q, rtol=0.0, atol=1e-8 * np.abs(other.q).max())
+    np.testing.assert_allclose(one.q_dot, other.q_dot, rtol=0.0, atol=1e-7 * np.abs(other.q_dot).max())
+
+
+def test_a_tighter_tolerance_brings_less_error():
+    system, errors = tube(LAWS["hertz"]), []
+    exact = integrate(system, np.zeros(4), V, 0.05, method=DormandPrince(1e-14, 1e-20)).end
+    for rtol in (1e-4, 1e-6, 1e-8, 1e-10):
+        end = integrate(system, np.zeros(4), V, 0.05, method=Exponential(rtol)).end
+        errors.append(np.abs(end - exact).max() / np.abs(exact).max())
+    assert all(error < 100.0 * rtol for error, rtol in zip(errors, (1e-4, 1e-6, 1e-8, 1e-10), strict=True))
+    assert errors[-1] < 1e-4 * errors[0]
+
+
+def test_a_run_goes_on_from_its_end_within_a_contact():
+    system = tube(LAWS["linear"])
+    log = integrate(system, np.zeros(4), V, 0.05, method=Exponential(1e-11)).contacts
+    middle = 0.5 * (log.t_in[0] + log.t_out[0])
+    half = integrate(system, np.zeros(4), V, middle, method=Exponential(1e-11))
+    assert len(half.contacts.t_in) == 1
+    assert np.isnan(half.contacts.t_out[0])
+    free = system.like(loads=[])
+    ends = [integrate(free, half.q[-1], half.q_dot[-1], 0.01, method=m).end for m in (Exponential(1e-11), SHARP)]
+    np.testing.assert_allclose(*ends, rtol=0.0, atol=1e-8 * np.abs(ends[1]).max())
+
+
+def test_many_starts_are_single_runs_with_their_own_clearances():
+    system, factors = tube(LAWS["dashpot"]), np.array([1.0, 0.8, 1.3])
+    gaps = 1e-3 * factors[::-1, None]
+    many = integrate_many(system, np.zeros((3, 4)), np.outer(factors, V), 0.05, gaps=gaps)
+    for i in range(3):
+        one = integrate(tube(LAWS["dashpot"], gap=gaps[i, 0]), np.zeros(4), factors[i] * V, 0.05)
+        assert np.array_equal(np.concatenate((many.q[i], many.q_dot[i])), one.end)
+        assert many.peak_force[i, 0] == one.contacts.peak_force.max()
+
+
+def test_many_starts_refuse_a_clearance_that_is_none():
+    with pytest.raises(ValueError, match="clearance"):
+        integrate_many(tube(LAWS["dashpot"]), np.zeros((2, 4)), np.zeros((2, 4)), 0.05, gaps=[[1e-3], [0.0]])
+
+
+def test_no_flight_misses_the_circle():
+    assert missed(300, seed=7) == (300, 0)
 
 
 @pytest.mark.parametrize(

@@ -203,6 +203,19 @@ def test_an_equation_that_cannot_be_read_is_named(formulas):
 
 
 @WITH_SPHINX
+def test_an_index_stands_beside_an_accented_letter(formulas):
+    """It stood below it, as under a sum."""
+    from mathml import converted
+
+    for latex in (r"\dot{q}_i", r"\ddot{q}_{12} + \hat{q}_{i j}", r"F(\dot{\delta}_s(t_j))"):
+        found = converted(latex, display=True)
+        assert "munder" not in found
+        assert found.count("<msub>") == latex.count("_")
+        assert found.count("<mover") == found.count("</mover>") == latex.count(r"{q}") + latex.count(r"{\delta}")
+    assert "munderover" in converted(r"\sum_{i=1}^n", display=True)
+
+
+@WITH_SPHINX
 def test_site(tmp_path):
     """Without running the examples, which have a test of their own; links within the site hold."""
     shutil.copytree(HOME, tmp_path / "here", ignore=shutil.ignore_patterns(".*", "_build", "gallery", "generated"))

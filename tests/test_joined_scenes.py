@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from frames import SPACE_L, turned
+from frames import PORTAL, SPACE_L, portal, turned
 
 import fembeam as fb
 import reduction
@@ -166,6 +166,59 @@ def test_hinge_between_bodies():
     members = [fb.Member("A", "B", plane), fb.Member("B", "C", plane, release="start rz")]
     whole = fb.Scene(fb.Frame(nodes, members), [fb.Clamped("A"), fb.Fixed("C", "y")])
     assert np.allclose(joined.reduce(3).omega, whole.reduce(3).omega, rtol=2e-6)
+
+
+def test_portal_in_three_pieces():
+    """Joints in a chain, parts of the outer scene on any body: frequencies of the exact dynamic stiffness."""
+    ends = [portal().members[i] for i in range(3)]
+    column, girder, other = (fb.Frame({n: PORTAL[n] for n in (one.a, one.b)}, [one]) for one in ends)
+    joints = [fb.Joint("B", (1, "B")), fb.Joint("C", (2, "C"), body=1)]
+    supports = [fb.Clamped("A"), fb.Clamped((2, "D"))]
+    stops = [fb.Stop((1, "C"), LAW, 1e-3, direction="x", name="eaves")]
+    scene = fb.Scene(column, supports, stops=stops, bodies=[fb.Scene(girder), fb.Scene(other)], joints=joints)
+    model = scene.reduce(4)
+    exact = [46.79676568080308, 137.6560947561103, 306.7971337148636, 327.2072572248291]
+    assert np.allclose(model.omega, exact, rtol=1e-6)
+    assert [row.name for row in model.contact_rows] == ["eaves"]
+    with pytest.raises(ValueError, match=r"must be of one body; bodies 1, 2 have it, got 'C' .*write \(1, 'C'\)"):
+        fb.Scene(scene.beam, supports, stops=[fb.Stop("C", LAW, direction="x")])
+
+
+def test_matrices_and_modes_of_other_programs():
+    """A structure along a member is its springs and its mass there; given modes are an oscillator."""
+    beam = fb.Frame({"A": (0, 0), "B": (4.0, 0)}, [fb.Member("A", "B", FLAT)])
+    place = ("A-B", 1.3)
+    body = Structure(np.diag([3e4, 2e4]), np.eye(2), labels=[("top", "x"), ("top", "y")])
+    joined = fb.Scene(beam, [fb.Clamped("A")], bodies=[fb.Scene(body)], joints=[fb.Joint(place, (1, "top"))])
+    springs = [fb.Spring(place, 3e4, direction="x"), fb.Spring(place, 2e4, direction="y")]
+    plain = fb.Scene(beam, [fb.Clamped("A")], [fb.LumpedMass(place, 1.0)], springs)
+    assert np.allclose(joined.reduce(3).omega, plain.reduce(3).omega, rtol=1e-9)
+    given = Structure.of_modes([30.0], [[1.0]], [("seat", "y")], {"y": [1.0]})
+    joined = fb.Scene(beam, [fb.Clamped("A")], bodies=[fb.Scene(given)], joints=[fb.Joint("B", (1, "seat"))])
+    sprung = fb.Scene(beam, [fb.Clamped("A")], [fb.LumpedMass("B", 1.0)], [fb.Spring("B", 900.0, direction="y")])
+    stretch = joined.reduce(4).omega  # the lumped mass moves along x, too
+    assert np.allclose(stretch[:2], sprung.reduce(4).omega[:2], rtol=1e-6)
+    assert joined.reduce(2).moved_along == ("y",)
+
+
+def test_shaft_in_two_pieces():
+    """Disks and unbalances on a joined shaft that spins: G and the loads of the shaft in one piece."""
+    section = fb.Section.circle(2.1e11, 7850.0, 0.04)
+    disk, unbalance = fb.Disk("B", mass=12.0, diametral=0.04, polar=0.075), fb.Unbalance("B", 1e-4)
+    whole = fb.Frame.straight(0.5, section, spin=300.0, bending_only=True)
+    half = fb.Frame.straight(0.25, section, spin=300.0, bending_only=True)
+    one = fb.Scene(whole, [fb.Clamped("A")], masses=[disk], forces=[unbalance])
+    bodies = [fb.Scene(half, masses=[disk], forces=[unbalance])]
+    two = fb.Scene(half, [fb.Clamped("A")], bodies=bodies, joints=[fb.Joint("B", to=(1, "A"))])
+    models = one.reduce(4, elements=8), two.reduce(4, elements=4)
+    sizes = [np.linalg.svd(model.turning, compute_uv=False) for model in models]
+    assert sizes[0][0] > 1.0
+    assert np.allclose(*sizes, rtol=1e-3)
+    pushes = [np.linalg.norm([vector for vector, _ in model.system.loads]) for model in models]  # of both planes
+    assert pushes[0] == pytest.approx(pushes[1], rel=1e-3)
+    assert [signal(0.1) for _, signal in models[0].system.loads] == [
+        signal(0.1) for _, signal in models[1].system.loads
+    ]
 
 
 def test_free_bodies_beside_joined_ones():

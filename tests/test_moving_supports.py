@@ -7,6 +7,7 @@ from frames import PORTAL, portal
 import fembeam as fb
 from contacts import Hertz, KelvinVoigt
 from fembeam import scene_file
+from fembeam.plot.bodies import displacements
 
 WAVE = fb.Harmonic(1e-3, 46.0, phase=0.7)
 DAMPED = {"damping": fb.ModalDamping(0.02)}
@@ -140,6 +141,17 @@ omega = 30.0
         fb.Clamped("A", motion={"x": WAVE}),
         fb.Fixed("D", "x", "y", motion={"x": fb.Harmonic(2e-3, 30.0)}),
     )
+
+
+def test_drawn():
+    """The rig says how supports move; a picture of the run has the feet where they are."""
+    scene = feet(WAVE, fb.Harmonic(1e-3, 20.0))
+    texts = " ".join(text.get_text().replace("\n", " ") for axes in scene.figure().axes for text in axes.texts)
+    assert "clamp at A, x: Harmonic, 1 mm, 46 rad/s" in texts
+    run = scene.reduce(2).simulate(0.1, 5e-3)
+    moved = displacements(run.shapes, run.with_supports(run.q, run.shapes.moving)[-1])
+    assert moved[run.shapes.known.index("A"), 0] == pytest.approx(WAVE(run.t[-1:])[0], rel=1e-12)
+    assert fb.plot.deflected(run).axes
 
 
 @pytest.mark.parametrize(("make", "says"), [

@@ -10,7 +10,19 @@ from matplotlib.text import Text
 from problems import PAPER_BEAM
 
 import fembeam as fb
-from contacts import PUBLISHED, Hertz, Hysteretic, Jenkins, bounce, identify
+from contacts import (
+    PUBLISHED,
+    BoucWen,
+    ElastoPlastic,
+    Hertz,
+    Hysteretic,
+    Iwan,
+    Jenkins,
+    KelvinVoigt,
+    Polynomial,
+    bounce,
+    identify,
+)
 from fembeam import plot, statistics
 from fembeam.plot.axis_names import axis_name
 from fembeam.plot.orbits import _widen
@@ -458,9 +470,40 @@ def test_the_linear_response_of_a_slider_is_that_of_a_stuck_one_for_every_level(
     for line, one in zip(drawn, found, strict=False):  # neither slips
         heights = [1e3 * plot.peak(orbit, 0.24445) for orbit in one.orbits]
         np.testing.assert_allclose(np.interp(one.parameter, *line.get_data()), heights, rtol=1e-3)
+    free = [line for line in axis.lines if line.get_label() == "linear, elements slipping"]
+    assert len(free) == 1
+    long = [line for line in axis.lines if len(line.get_xdata()) > 300]
+    slipping = [line for line in long if line not in drawn]
+    for line, one in zip(slipping, found, strict=True):  # of a slider nothing is left: the beam alone
+        model = dataclasses.replace(one.family.model.scene, elements=[]).reduce(1)
+        alone = model.frequency_response(line.get_xdata(), output=0.24445).amplitude * model.scene.base.amplitude
+        np.testing.assert_allclose(line.get_ydata(), 1e3 * alone, rtol=1e-5)  # of another mesh
     assert "linear, no contact, elements stuck" in {  # a stop beside the slider
         line.get_label() for line in plot.branch(replaced_stops(found[0], run.model.scene.stops)).axes[0].lines
     }
+
+
+def test_the_frequency_response_of_what_slips_keeps_the_springs_beside():
+    """Jenkins leaves nothing, hardening its spring, Bouc and Wen α k, Iwan its spring; dashpots and springs stay."""
+    steel = fb.Section.circle(2.1e11, 7800.0, 0.01)
+    scene = fb.Scene(fb.Beam(0.5, steel), [fb.Clamped(0.0)], damping=fb.ModalDamping(0.02))
+    pairs = [
+        (Jenkins(3e3, 2.0), []),
+        (ElastoPlastic(3e3, 2.0, 500.0), [Polynomial([500.0])]),
+        (Iwan([1e3, 2e3, 700.0], [1.0, 2.0, np.inf]), [Polynomial([700.0])]),
+        (BoucWen(3e3, 0.2, 1.0, 3e3, 1e3), [Polynomial([600.0])]),
+        (Jenkins(3e3, 2.0) + KelvinVoigt(400.0, 3.0), [KelvinVoigt(400.0, 3.0)]),
+    ]
+    omega = np.linspace(10.0, 500.0, 50)
+    for law, left in pairs:
+        one, other = (
+            dataclasses.replace(scene, elements=[fb.Element(0.4, each) for each in laws]).reduce(2)
+            for laws in ([law], left)
+        )
+        slipping = one.frequency_response(omega, 0.5, 0.5, slipping=True).values
+        np.testing.assert_allclose(slipping, other.frequency_response(omega, 0.5, 0.5).values, rtol=1e-6)
+        stuck = one.frequency_response(omega, 0.5, 0.5).values
+        assert not np.allclose(stuck, slipping, rtol=1e-2)
 
 
 def replaced_stops(branch, stops):

@@ -31,16 +31,17 @@ from fembeam.study.segments import Segments
 BEAM = fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01))
 PLAIN = {  # annotations of what is no signal
     *("float", "str", "str | None", "float | tuple[float, float, float]", "tuple[str, ...]"),
-    *("Of", "Place", "Second | None", "Direction | None"),
+    *("Of", "Place", "Second | None", "Direction | None", "float | Sequence[float]"),
 }
-STRUCTURE = {"z", "beam", "damping", "bodies", "law", *FEATURES}  # fields of other annotations that are none either
+STRUCTURE = {"z", "beam", "damping", "bodies", "joints", "law", *FEATURES}  # fields of other annotations that are none
+TABLES = {"motion"}  # signals by name, see below
 VALUES = {"z": 0.3, "stiffness": 1e3, "mass": 0.1, "velocity": 0.0, "damping": 0.1, "law": Hertz(1e8)}
 TONE, NOISE = fb.Harmonic(1e-5, 300.0), fb.BandNoise(1e-5, (0.0, 600.0), seed=3)
 
 
 def signal_fields(kind):
     """Fields that can hold a signal: all whose annotation or name does not say that they hold something else."""
-    return [f.name for f in fields(kind) if f.type not in PLAIN and f.name not in STRUCTURE and not f.kw_only]
+    return [f.name for f in fields(kind) if f.type not in PLAIN and f.name not in STRUCTURE | TABLES and not f.kw_only]
 
 
 def made(kind, key, signal):
@@ -69,13 +70,20 @@ def places():
                 yield f"bodies[0].{path}", lambda signal, alone=alone: scene_of(bodies=[alone(signal)])
 
 
-PLACES = list(places())
+def moved(signal):
+    """A frame whose support moves."""
+    section = fb.Section.circle(2.1e11, 7800.0, 0.01)
+    frame = fb.Frame({"A": (0, 0), "B": (0.5, 0)}, [fb.Member("A", "B", section)])
+    return Scene(frame, [fb.Clamped("A", motion={"y": signal})], damping=fb.ModalDamping(0.05))
+
+
+PLACES = [*places(), ("supports[0].motion.y", moved)]
 everywhere = pytest.mark.parametrize(("path", "scene_with"), PLACES, ids=[path for path, _ in PLACES])
 
 
 def test_the_places_are_found_by_the_fields_of_the_parts():
     parts = ["forces[0].signal", "forces[0].signal", "springs[0].foot"]  # of forces and of moments
-    assert sorted(path for path, _ in PLACES) == sorted(["base", *parts, *(f"bodies[0].{path}" for path in parts)])
+    assert sorted(path for path, _ in PLACES[:-1]) == sorted(["base", *parts, *(f"bodies[0].{path}" for path in parts)])
 
 
 @everywhere
@@ -85,7 +93,8 @@ def test_every_place_is_listed_changed_and_a_load(path, scene_with):
     assert signals_of(with_signals(scene, lambda signal: NOISE)) == {path: NOISE}
     assert with_signals(scene, lambda signal: signal) is scene
     loads = [signal for _, signal in scene.reduce(modes=1).system.loads]
-    assert loads == [TONE.derivative(2) if path == "base" else TONE]
+    of_support = [TONE, TONE.derivative(1), TONE.derivative(2)]
+    assert loads == (of_support if ".motion." in path else [TONE.derivative(2) if path == "base" else TONE])
 
 
 @everywhere

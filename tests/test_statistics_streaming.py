@@ -14,7 +14,7 @@ from fembeam.statistics.batches import MOST
 from fembeam.statistics.scales import KURTOSIS, LEVEL, LINEAR, SKEWNESS
 from fembeam.statistics.streaming import up_crossings
 from fembeam.study import segments, stationary
-from fembeam.study.segments import correlation_time
+from fembeam.study.decay import correlation_time
 
 
 def coloured(seed, n=40_000):

@@ -52,6 +52,40 @@ def reach(run):
 
 BLOW = {"duration": 0.3, "dt": 2e-4, "start": struck, "modes": 1, "elements": 4}
 
+# --- names ------------------------------------------------------------------------------------------------------------
+
+
+def frame(gap=1e-4):
+    """A clamped plane frame that meets two stops by name, shaken along two axes."""
+    body = fb.Frame.polyline({"A": (0, 0), "B": (1, 0)}, ROD)
+    stops = [fb.Stop("B", Hertz(1e7), 1.0, direction="-y"), fb.Stop("B", Hertz(1e7), gap, direction="y", name="wall")]
+    base = {"x": fb.Harmonic(1e-4, 50.0), "y": fb.Harmonic(1e-3, 50.0)}
+    return fb.Scene(body, [fb.Clamped("A")], stops=stops, damping=fb.ModalDamping(0.05), base=base)
+
+
+def test_stops_and_parameters_go_by_the_names_they_were_given():
+    runs = {"duration": 0.5, "dt": 1e-2, "modes": 1}
+    found = fb.study.vary(frame(), {"stops[wall].gap": [1e-4, 2e-4]}, PeakForce("wall"), **runs)
+    assert found.names == ("stops[wall].gap",)
+    plain = fb.study.vary(frame(), {"stops[1].gap": [1e-4, 2e-4]}, PeakForce(1), **runs)
+    assert plain.names == ("stops[1].gap",)
+    np.testing.assert_array_equal(found.values, plain.values)
+    assert np.all(found.values > 1.0)
+    best = fb.study.minimise(frame(), {"stops[wall].gap": (1e-4, 2e-4)}, PeakForce("wall"), tolerance=0.05, **runs)
+    assert list(best.at) == ["stops[wall].gap"]
+    for stop, said in (("wal", "the nearest is 'wall'"), (2, "stop must be below 2")):
+        with pytest.raises(ValueError, match=said):
+            fb.study.vary(frame(), {"stops[1].gap": [1e-4]}, PeakForce(stop), **runs)
+
+
+def test_axes_of_a_base_motion_name_its_direction_and_have_few_numbers():
+    values = {"base.x.amplitude": [1.25e-4, 2.5e-4, 3.75e-4], "base.y.amplitude": [1e-3, 2e-3]}
+    axis = fb.study.vary(frame(), values, "amplitude", duration=0.1, dt=1e-2, modes=1).figure().axes[0]
+    assert axis.get_xlabel() == "base amplitude along x / m"
+    assert axis.get_ylabel() == "base amplitude along y / m"
+    assert len(axis.get_xticks()) <= 7
+
+
 # --- closed answers ---------------------------------------------------------------------------------------------------
 
 

@@ -3,16 +3,27 @@
 Sphinx has no such output of its own. docutils, on which it stands, has the converter from LaTeX.
 """
 
+import re
+
 from docutils import nodes
 from docutils.utils.math.latex2mathml import tex2mathml
+
+ONE = r"\s*<(m\w+)[^>]*>(?:(?!<m(?:under)?over).)*?</{}>"
+LIMITS = re.compile(  # an accented letter with an index, taken for a sum with limits
+    r"<munderover>(\s*<mi[^>]*>[^<]*</mi>)("
+    + ONE.format(r"\3")
+    + r")(\s*<mo stretchy[^>]*>[^<]*</mo>\s*)</munderover>",
+    re.DOTALL,
+)
 
 
 def converted(latex: str, *, display: bool) -> str:
     """MathML of a formula; what cannot be read ends the build with the formula."""
     try:
-        return tex2mathml(latex, as_block=display)
+        found = tex2mathml(latex, as_block=display)
     except Exception as error:
         raise ValueError(f"no MathML can be made of the formula {latex!r}: {error}") from error
+    return LIMITS.sub(r'<msub><mover accent="true">\1\4</mover>\2</msub>', found)
 
 
 def inline(translator: object, node: nodes.math) -> None:

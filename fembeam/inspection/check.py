@@ -19,7 +19,7 @@ from fembeam.inspection import sampling, units
 from fembeam.inspection.trial import Touched, expected, fastest, of_contacts
 from fembeam.model.mode_table import mode_part, mode_rows
 from fembeam.scene import unit_of
-from fembeam.study.segments import correlation_time
+from fembeam.study.decay import correlation_time
 from fembeam.support import Part, Printed
 
 if TYPE_CHECKING:

@@ -239,15 +239,45 @@ class ModalEquations:
     @cached_property
     def linear_elements(self) -> tuple[Vector, Vector]:
         """Stiffness and damping (n, n) of the elements at d = -gap, nothing deflected: Σ w ∂F/∂d wᵀ, Σ w ∂F/∂ḋ wᵀ."""
+        return self._elements_with([tangent(one.law, -one.gap) for one in self.contact_rows if one.always])
+
+    @cached_property
+    def slipping_elements(self) -> tuple[Vector, Vector]:
+        """The same, with what is left of those that slip or yield once all of their sliders move."""
+        always = [one for one in self.contact_rows if one.always]
+        return self._elements_with([after_slip(one.law) or tangent(one.law, -one.gap) for one in always])
+
+    def _elements_with(self, slopes: list[tuple[float, float]]) -> tuple[Vector, Vector]:
+        """Stiffness and damping (n, n) of the elements from those of each."""
         pairs = zip(self.rows_of, self.contact_rows, strict=True)
-        always = [(self.directions[own][0], one) for own, one in pairs if one.always]
-        slopes = np.array([tangent(one.law, -one.gap) for _, one in always]).reshape(-1, 2)
-        W = np.array([w for w, _ in always]).reshape(-1, len(self.omega))
-        return (W.T * slopes[:, 0]) @ W, (W.T * slopes[:, 1]) @ W
+        W = np.array([self.directions[own][0] for own, one in pairs if one.always])
+        W, each = W.reshape(-1, len(self.omega)), np.array(slopes).reshape(-1, 2)
+        return (W.T * each[:, 0]) @ W, (W.T * each[:, 1]) @ W
 
     def rest(self) -> Vector:
         """The start [q, q_dot] (2n,) of everything undeflected and at rest but the impactors, at their velocity."""
         return initial_states.rest(self)
+
+
+def after_slip(law: Any) -> tuple[float, float] | None:
+    """Stiffness and damping of a law all of whose sliders move; None of one without a memory whose size is known.
+
+    The slope of its first loading far beyond them, that of a sum with its parts without memory at rest.
+    """
+    parts = getattr(law, "parts", (law,))
+    if not any(part.memory and part.reach > 0.0 for part in parts):
+        return None
+    found = [tangent(part, 0.0) if not (part.memory and part.reach > 0.0) else _far(part) for part in parts]
+    stiffness, damping = np.sum(found, axis=0)
+    return float(stiffness), float(damping)
+
+
+def _far(law: Any) -> tuple[float, float]:
+    """Slope of the first loading of a law with memory between 50 and 100 times its size."""
+    places = law.reach * np.array([50.0, 100.0])
+    low, high = law.along(places)
+    slope = (high - low) / (places[1] - places[0])
+    return float(slope) if abs(slope) > 1e-9 * abs(high) / places[1] else 0.0, 0.0
 
 
 def load_period(scene: Scene) -> float:

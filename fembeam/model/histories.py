@@ -240,6 +240,10 @@ class Histories:
             return self.names[stop]
         return str(stop) if alone else f"{'element' if always else 'stop'} {stop}" + " (rotation)" * bool(rotation)
 
+    def number(self, stop: int | str) -> int:
+        """The number of a stop or element, from 0, that is given by its name or number; ValueError if there is none."""
+        return self._stop(stop) % len(self.stops)
+
     def indentation(self, stop: int | str = 0) -> Vector:
         """δ(t) (k,) of a stop, m or rad; negative while it is open. Elements, then impactors, count on after the stops.
 

@@ -152,7 +152,7 @@ def onto_circle(contact: Any, speed: float) -> tuple[float, float]:
 
     |t w - o| = c,  δ̇ = ± (t w - o)·w ṫ/c;  of two such values the larger, of an outer circle that nearer to rest.
     """
-    w, o, sign = contact.direction[:, 0], np.array(contact.centre), np.sign(contact.radius)
+    w, o, sign = contact.direction[:, 0], np.array(contact.centre), -1.0 if contact.outer else 1.0
     a, b = w @ w, w @ o
     root = b * b - a * (o @ o - contact.gap**2)
     require(a > 0.0 and root > 0.0, "the first mode must reach the circle", root, "Model.strike", "simulate instead")

@@ -194,7 +194,7 @@ class Model(Printed, ModalEquations):
         ------
         ValueError for bad input before computing; solvers.SolverError when the method fails.
         """
-        from fembeam.model.run import Run
+        from fembeam.model.run import Made, Run
 
         require_no_text("Model.simulate", duration=duration, dt=dt, start=start)
         q, q_dot, memory = initial_states.split_start(self, self.rest() if start is None else start)
@@ -203,7 +203,7 @@ class Model(Printed, ModalEquations):
             solution = solvers.integrate(
                 model.system, q, q_dot, duration, dt, solver, progress=report, memory=memory or None
             )
-        run = Run.of(model, solution, memory, dt is not None)
+        run = Run.of(model, solution, memory, dt is not None, Made(np.concatenate((q, q_dot)), duration, solver))
         note("%r, integrated in %.3g s", run, run.cost.seconds)
         return run
 
@@ -214,6 +214,7 @@ class Model(Printed, ModalEquations):
         output: Any = None,
         absolute: bool = False,
         body: int = 0,
+        slipping: bool = False,
     ) -> FrequencyResponse:
         """Steady displacement per unit of a harmonic input, complex, of the linear scene: its contacts stay open.
 
@@ -228,6 +229,8 @@ class Model(Printed, ModalEquations):
         output : z in m, or (j,), or (place, direction), or a list;
             None: the first stop, else the tip. body : the beam it is on.
         absolute : add the frame's own motion (transmissibility); only for "base".
+        slipping : elements with sliders, and those that yield, act with the stiffness that is left once all of them
+            slip; False: with that at u = 0, stuck.
 
         Returns
         -------
@@ -245,7 +248,7 @@ class Model(Printed, ModalEquations):
         from fembeam.response import frequency_response
 
         places = observed(self) if output is None else output
-        return frequency_response(self, omega, input, places, absolute, body)
+        return frequency_response(self, omega, input, places, absolute, body, slipping)
 
     def orbit(self, period: int = 1, start: ArrayLike | Orbit | None = None, shots: int | None = None) -> Orbit:
         """Find a periodic motion by shooting.

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     from fembeam.model.model import Model
     from fembeam.model.run import Run
+    from fembeam.model.sensitivity import Sensitivity
 
 Vector = NDArray[np.float64]
 SAME = 1e-6  # relative distance below which two states are one
@@ -93,6 +94,29 @@ class Orbit(Printed):
 
         cycles = self.found.period * max(float(self.model.omega.max()), 1.0 / self.found.period) / (2.0 * math.pi)
         return Run.of(self.model, self.found.samples(max(400, math.ceil(24.0 * cycles))))
+
+    def sensitivity(self, parameter: str) -> Sensitivity:
+        """Exact derivative of the orbit by a number of its scene: of its state, period, peaks and contacts.
+
+        x(T; x₀, p) = x₀   gives   dx₀/dp = (I - Φ)⁻¹ (∂x/∂p + ẋ dT/dp)
+
+        Parameters
+        ----------
+        parameter : as for `Run.sensitivity`.
+
+        Returns
+        -------
+        Sensitivity : of `run`, one period: ``state``, ``period``, ``extremes(z)`` of the lowest and the highest
+            displacement, histories at fixed times since ``found.phase``, contacts.
+
+        Raises
+        ------
+        ValueError : as for `Run.sensitivity`. solvers.NoDerivativeError : a contact grazes. ArithmeticError : at a fold
+            or branch point.
+        """
+        from fembeam.model.sensitivity import of_orbit
+
+        return of_orbit(self, parameter)
 
     def extremes(self, z: float) -> tuple[float, float]:
         """Lowest and highest displacement (m, relative to the frame) at z over the period."""

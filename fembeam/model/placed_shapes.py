@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fembeam.scene import At, BodyMatrices, LocalCoordinate, is_pair, said, split, told
-from fembeam.structures import COMPONENTS, named, nearest, require_components
+from fembeam.structures import COMPONENTS, direction_of, named, nearest, require_components, turns
 from fembeam.support import is_whole, require
 
 Vector = NDArray[np.float64]
@@ -184,4 +184,5 @@ def _usual(body: BodyMatrices, loaded: Sequence[LocalCoordinate]) -> dict[str, A
     ask = getattr(body.beam, "components_at", lambda place: body.beam.components)
     points = getattr(body.beam, "points", {}) or _places(body)[-1:]
     found += [(place, c) for place in points for c in ask(place) if c in COMPONENTS[:3]]
-    return {said(at): at for at in dict.fromkeys(found)}
+    moved = [at for at in found if not turns(direction_of(at[1], "a place"))]  # figures of them are in m
+    return {said(at): at for at in dict.fromkeys(moved or found or [(p, c) for p in points for c in ask(p)])}

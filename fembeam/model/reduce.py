@@ -52,9 +52,9 @@ def reduced(
         modes = _enough(scene, elements, omega_max, mass_share)
     matrices, chosen = _chosen(scene, DEFAULT_MODES if modes is None else modes, elements, interface)
     bases = []
-    for body, (beam, own) in enumerate(zip(matrices.beams, chosen, strict=True)):
-        basis = _of_beam(beam, loaded(scene, body), own, residual, interface)
-        bases.append(_oriented(basis, beam, watched(scene, body)))
+    for body, (beam, listed) in enumerate(zip(matrices.beams, chosen, strict=True)):
+        one = _of_beam(beam, loaded(scene, body), listed, residual, interface)
+        bases.append(_oriented(one, beam, watched(scene, body)))
     if elements is not None and not isinstance(modes, str):
         _warn_of_the_mesh(matrices, max(basis.omega[min(len(chosen[0]), basis.count) - 1] for basis in bases))
     again = "all" if isinstance(modes, str) else len(chosen[0]) if interface else chosen[0]

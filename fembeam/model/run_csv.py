@@ -124,8 +124,12 @@ def _pair(at: Any) -> Any:
 
 def _unit(quantity: str, at: Any) -> str:
     """Unit of a quantity at a place: rad for m where the direction is a rotation."""
-    turning = isinstance(at, tuple) and isinstance(at[1], str) and at[1].lstrip("-").startswith("r")
-    return UNITS[quantity].replace("m", "rad", 1) if turning else UNITS[quantity]
+    return UNITS[quantity].replace("m", "rad", 1) if _turns(at) else UNITS[quantity]
+
+
+def _turns(at: Any) -> bool:
+    """Whether a place stands with a rotation."""
+    return isinstance(at, tuple) and isinstance(at[1], str) and at[1].lstrip("-").startswith("r")
 
 
 def _at(run: Run, quantity: str, z: Any) -> Vector:
@@ -214,9 +218,9 @@ def _digits(x: float) -> str:
 
 def parts(run: Run) -> list[Part]:
     """What print shows of a run: how it ended, its signals, the contacts of each stop."""
-    signals = {}
+    signals, places = {}, usual_places(run.shapes)
     if run.sampled:
-        signals = {f"displacement, {name}": run.displacement(z) for name, z in usual_places(run.shapes).items()}
+        signals = {f"displacement, {name}": run.displacement(z) for name, z in places.items()}
         signals |= {f"indentation, {run.name(i)}": run.indentation(i) for i in range(len(run.stops))}
     moved = [(name, *map(float, (x.mean(), x.std(), x.min(), x.max()))) for name, x in signals.items() if len(x)]
     log, rows = run.contacts, []
@@ -226,7 +230,8 @@ def parts(run: Run) -> list[Part]:
         numbers = (float(peak.max()), float(peak.mean()), float(entry.mean())) if mine.any() else (None,) * 3
         if not run.kinds[stop, 1]:
             rows.append((run.name(stop), int(mine.sum()), *numbers))
-    length, force, speed = unit_of("indentation", [False, *run.kinds[:, 0]]), run.unit("force"), run.unit("speed")
+    length = unit_of("indentation", [*map(_turns, places.values()), *run.kinds[:, 0]])
+    force, speed = run.unit("force"), run.unit("speed")
     found: list[Part] = [repr(run), (("", *(f"{name} / {length}" for name in ("mean", "std", "min", "max"))), moved)]
     head = "", "contacts", f"largest force / {force}", f"mean peak force / {force}", f"mean entry speed / {speed}"
     return [*found, *([(head, rows)] if rows else []), *_elements(run)]

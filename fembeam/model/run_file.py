@@ -90,7 +90,11 @@ def _contents(run: Run) -> tuple[str, dict[str, Any]]:
         **{f"nodes_{i}": _arrays_of(shapes)[0] for i, shapes in enumerate(run.others, 1)},
         **{f"shapes_{i}": _arrays_of(shapes)[1] for i, shapes in enumerate(run.others, 1)},
         **{f"contact_{name}": column for name, column in run.contacts.arrays().items()},
-        **{f"energy_{f.name}": getattr(run.energy, f.name) for f in fields(run.energy)},
+        **{
+            f"energy_{name}": values
+            for name, values in vars(run.energy).items()
+            if name == "initial" or np.ndim(values)
+        },
         **{f"file_{i}": np.frombuffer(content, dtype=np.uint8) for i, content in enumerate(carried)},
     }
     arrays |= {"circles": run.circles} if run.circles.any() else {}
@@ -222,10 +226,11 @@ def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run
     work, stored, slip = arrays["losses"].T
     names = _names(about, len(arrays["stops"]))
     log = (arrays[f"contact_{name}"] for name in columns_of(solvers.ContactLog))
+    energy = {name.removeprefix("energy_"): array for name, array in arrays.items() if name.startswith("energy_")}
     return Run(
         *(arrays["t"], arrays["q"], arrays["q_dot"]),
         contacts=solvers.ContactLog(*log, names=names),
-        ledger=partial(solvers.Energy, *(arrays[f"energy_{f.name}"] for f in fields(solvers.Energy))),
+        ledger=partial(solvers.Energy, **energy),
         status=about["status"],
         cost=solvers.Cost(**about["cost"]),
         shapes=shapes[0],

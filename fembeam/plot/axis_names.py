@@ -45,6 +45,8 @@ def axis_name(path: str, scene: Scene) -> str:
     if signal:
         turns = kind == "forces" and _turns(scene, beam, int(number))
         name, unit = _of_signal(kind, signal, last, turns)
+        along = re.match(r"(?:bodies\[\d+\]\.)?base\.([xyz])\.", path)
+        name += f" along {along[1]}" if name and along else ""
     elif kind == "dashpots" and last == "rotational":
         name, unit = f"rotational damping of {_owner(scene, beam, kind, int(number))}", "N m s/rad"
     else:

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike
 
+    from fembeam.study import Equivalent
+
 POINTS = 100  # between two turning points of a path
 COLOURS = 6  # of the library's style
 
@@ -76,6 +78,25 @@ def hysteresis(laws: Mapping[str, Law], path: ArrayLike | None = None, axes: Axe
     paths = {name: _turns(name, law, path) for name, law in laws.items()}
     curves = {name: (paths[name], law.along(paths[name])) for name, law in laws.items()}
     return _drawn(curves, ("δ / mm", "force"), "Force along a slow path", axes)
+
+
+@styled
+def equivalent(found: Equivalent, axes: Sequence[Axes] | None = None) -> Figure:
+    """Energy per cycle, equivalent stiffness and loss factor of a law over amplitude; see `study.equivalent`.
+
+    Parameters
+    ----------
+    found : what to draw. axes : three to draw into; None makes a figure.
+    """
+    figure, three = sheet(1, 3, (8.4, 2.6), axes)
+    columns = (found.energy, found.stiffness, found.loss_factor)
+    names = ("energy per cycle / J", "equivalent stiffness / N/m", "loss factor")
+    for axis, values, name in zip(three, columns, names, strict=True):
+        axis.plot(1e3 * found.amplitude, values)
+        axis.set(xlabel="amplitude of δ / mm", ylabel=name)
+        axis.set_ylim(bottom=min(0.0, float(np.nanmin(values))))
+    heading(three, f"{found.name} as a spring and a dashpot", axes is None)
+    return figure
 
 
 @styled

@@ -28,6 +28,7 @@ MARKS = {"fold": ("o", GREY), "flip": ("s", RED), "neimark-sacker": ("D", GREEN)
          "merging": ("^", ORANGE)}  # fmt: skip
 SPAN, CLOSED = "reached the end of the span", "closed"  # ends that are no surprise
 ENDS = "*Xhd8"  # marks of the others, one for each reason
+LIMITS: Any = {False: ("-", ":"), True: ((0, (8, 2)), (0, (1, 3)))}  # linear responses: of one level, of several
 BEHIND = 400  # points of the linear response
 FAR = 3.0  # times the branches: so high a linear response would press them down
 
@@ -44,9 +45,9 @@ def branch(
 
     Special orbits are marked, and where and why each direction ended: by a bar at an end of the span. Along the
     frequency of the only load the linear response of every level lies behind (all contacts open, elements stuck or
-    elastic), and for each period the backbone of the lowest mode: its free vibration against the stops, at the
-    frequency of the load that it answers in that period. Where the linear response reaches far above the branches a
-    figure of its own has a logarithmic axis.
+    elastic, and once more with all their sliders slipping), and for each period the backbone of the lowest mode: its
+    free vibration against the stops, at the frequency of the load that it answers in that period. Where the linear
+    response reaches far above the branches a figure of its own has a logarithmic axis.
 
     Parameters
     ----------
@@ -147,28 +148,47 @@ def _span(several: list[Branch]) -> tuple[float, float]:
 
 
 def _draw_linear(axis: Axes, several: list[Branch], z: Any, colours: list[str]) -> Vector:
-    """The linear response of every level along the frequency of the only load; all its heights (k,)."""
-    curves: list[tuple[Vector, Vector, str]] = []
-    for one, colour in zip(several, colours, strict=True):
-        model, path = one.family.model, _along_the_load(one)
-        if path:
-            omega = frequencies(model, *_span(several), BEHIND)
-            linear = model.frequency_response(omega, path, z).amplitude * abs(signals_of(model.scene)[path].amplitude)
-            if not any(len(y) == len(linear) and np.allclose(1e3 * linear, y) for _, y, _ in curves):
-                curves.append((omega, 1e3 * linear, colour))
-    if len(curves) == 1:
-        _behind(axis, *curves[0][:2], "-", _linear_name(several))
-    elif curves:
-        for omega, heights, colour in curves:
-            _behind(axis, omega, heights, ":", None, colour)
-        _behind(axis, np.empty(0), np.empty(0), ":", _linear_name(several))
-    return np.concatenate([np.empty(0), *(heights for _, heights, _ in curves)])
+    """The linear response of every level along the frequency of the only load; all its heights (k,).
+
+    Of elements with sliders both limits: stuck, which small motions come to, and slipping, which large ones do.
+    """
+    heights = np.empty(0)
+    for slipping in (False, True) if _sliders(several) else (False,):
+        curves: list[tuple[Vector, Vector, str]] = []
+        for one, colour in zip(several, colours, strict=True):
+            found = _linear_curve(one, _span(several), z, slipping)
+            if found and not any(len(y) == len(found[1]) and np.allclose(found[1], y) for _, y, _ in curves):
+                curves.append((*found, colour))
+        style, name = LIMITS[slipping][len(curves) > 1], _linear_name(several, slipping)
+        for omega, y, colour in curves:
+            _behind(axis, omega, y, style, name if len(curves) == 1 else None, GREY if len(curves) == 1 else colour)
+        if len(curves) > 1:
+            _behind(axis, np.empty(0), np.empty(0), style, name)
+        heights = np.concatenate([heights, *(y for _, y, _ in curves)])
+    return heights
 
 
-def _linear_name(several: list[Branch]) -> str:
-    """What the linear response leaves out: contacts are open, sliders stick, other elements with memory are elastic."""
+def _linear_curve(one: Branch, span: tuple[float, float], z: Any, slipping: bool) -> tuple[Vector, Vector] | None:
+    """(omega, |u| in mm) of a branch's linear response, if the frequency of its only load is what varies."""
+    model, path = one.family.model, _along_the_load(one)
+    if not path:
+        return None
+    omega = frequencies(model, *span, BEHIND)
+    H = model.frequency_response(omega, path, z, slipping=slipping)
+    return omega, 1e3 * H.amplitude * abs(signals_of(model.scene)[path].amplitude)
+
+
+def _sliders(several: list[Branch]) -> bool:
+    """Whether an element slips or yields."""
     rows = [row for one in several for row in one.family.model.contact_rows]
-    held = {"stuck" if "slip" in row.law.events else "elastic" for row in rows if row.always and row.remembers}
+    return any(row.always and row.remembers and row.law.reach > 0.0 for row in rows)
+
+
+def _linear_name(several: list[Branch], slipping: bool = False) -> str:
+    """What the linear response leaves out: contacts are open, sliders stick or slip, others with memory are elastic."""
+    rows = [row for one in several for row in one.family.model.contact_rows]
+    words = ("slipping", "yielding") if slipping else ("stuck", "elastic")
+    held = {words["slip" not in row.law.events] for row in rows if row.always and row.remembers}
     said = ["no contact"] * any(not row.always for row in rows) + [f"elements {' or '.join(sorted(held))}"] * bool(held)
     return ", ".join(["linear", *said])
 

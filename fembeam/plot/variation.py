@@ -74,6 +74,7 @@ def _line(axis: Axes, found: Variation, i: int, j: int) -> None:
     bars: dict[str, Any] = {"yerr": TWO_ERRORS * error} if np.isfinite(error).any() else {}
     axis.errorbar(x, found.values[:, i], fmt="o-" if len(found.axes) == 1 else "o", color=BLUE, markersize=3, **bars)
     axis.set_xlabel(found.titles[j])
+    axis.locator_params(axis="x", nbins=5 if len(found.titles) < 3 else 3)
 
 
 def _map(axis: Axes, found: Variation, i: int) -> None:
@@ -85,6 +86,7 @@ def _map(axis: Axes, found: Variation, i: int) -> None:
         image = axis.scatter(found.points[:, 0], found.points[:, 1], c=found.values[:, i], s=12)
     figure.colorbar(image, ax=axis, label=found.quantities[i])
     axis.set(xlabel=found.titles[0], ylabel=found.titles[1])
+    axis.locator_params(axis="x", nbins=5)  # long numbers would meet
 
 
 def _star(axis: Axes, points: np.ndarray, best: int | None, j: int, height: np.ndarray) -> None:

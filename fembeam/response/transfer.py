@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fembeam.scene import signals_of, split
-from fembeam.structures import COMPONENTS
+from fembeam.scene import signals_of, split, unit_of
+from fembeam.structures import COMPONENTS, turns
 from fembeam.support import is_finite, require
 
 if TYPE_CHECKING:
@@ -65,7 +65,13 @@ class FrequencyResponse:
 
 
 def frequency_response(
-    model: Model, omega: ArrayLike, driven: str | float, output: ArrayLike, absolute: bool, body: int
+    model: Model,
+    omega: ArrayLike,
+    driven: str | float,
+    output: ArrayLike,
+    absolute: bool,
+    body: int,
+    slipping: bool = False,
 ) -> FrequencyResponse:
     """The response of a model without its contacts; `Model.frequency_response` explains it."""
     driven = _named_base(model, driven)
@@ -73,17 +79,21 @@ def frequency_response(
     require(not absolute or moved, "absolute is for the input 'base'", driven, WHERE, "leave it out")
     if model.scene.named and isinstance(output, np.ndarray):
         output = output.tolist()
-    frequencies, places = _checked(omega, model), model.phi(output, 0, body)
+    frequencies, places = _checked(omega, model, slipping), model.phi(output, 0, body)
     if isinstance(driven, str) and driven.startswith("supports["):
-        return _of_support(model, frequencies, driven, output, body)
+        return _of_support(model, frequencies, driven, output, body, slipping)
     vector, power, said, unit = _driving(model, driven)
-    values = _solved(model, frequencies, vector) @ places.T
+    values = _solved(model, frequencies, vector, slipping) @ places.T
     values = (values.T * frequencies**power).T + (_carried_along(model, driven, output) if absolute else 0.0)
+    shapes: Any = (model.shapes, *model.others)[body]
+    if hasattr(shapes, "components"):
+        at = output if isinstance(output, list) else [output]
+        unit = unit.replace("m", unit_of("indentation", [turns(split(one, shapes.components)[1]) for one in at]), 1)
     shown: Any = output if model.scene.named else np.array(output, dtype=float)[()]
     return FrequencyResponse(frequencies, values, said, shown, absolute, unit, model.omega)
 
 
-def _of_support(model: Model, omega: Vector, driven: str, output: Any, body: int) -> FrequencyResponse:
+def _of_support(model: Model, omega: Vector, driven: str, output: Any, body: int, slipping: bool) -> FrequencyResponse:
     """The response to a unit motion of one dof of a support that moves: (v₀ + iω v₁ - ω² v₂) of its three loads."""
     names = [path for path in signals_of(model.scene) if ".motion." in path]
     require(driven in names, f"input must be one of {', '.join(names) or 'none, as no support moves'}", driven, WHERE,
@@ -92,7 +102,8 @@ def _of_support(model: Model, omega: Vector, driven: str, output: Any, body: int
     shapes = (model.shapes, *model.others)[body]
     rows = shapes.rows_with_supports(output if isinstance(output, list) else [output])
     n, k = len(model.omega), names.index(driven)
-    answers = [_solved(model, omega, np.asarray(model.system.loads[3 * number + order][0])) for order in range(3)]
+    vectors = [np.asarray(model.system.loads[3 * number + order][0]) for order in range(3)]
+    answers = [_solved(model, omega, vector, slipping) for vector in vectors]
     q = sum((1j * omega[:, None]) ** order * one for order, one in enumerate(answers))
     values = q @ rows[:, :n].T + rows[:, n + k]
     values = values if isinstance(output, list) else values[:, 0]
@@ -114,8 +125,8 @@ def _named_base(model: Model, driven: Any) -> Any:
     if driven != "base" or not model.scene.named:
         return driven
     known = tuple(model.scene.motions) or model.moved_along
-    require(len(known) == 1, "input must name the direction of the base", driven, WHERE,
-            f"write {' or '.join(f'base.{one}' for one in known)}")  # fmt: skip
+    write = " or ".join(f"base.{one}" for one in known) or "a place where a force acts, as no base moves this structure"
+    require(len(known) == 1, "input must name the direction of the base", driven, WHERE, f"write {write}")
     return f"base.{known[0]}"
 
 
@@ -127,7 +138,9 @@ def _driving(model: Model, driven: Any) -> tuple[Vector, int, str, str]:
         direction = driven.removeprefix("base.")
         return model.participation_along(direction), 2, f"displacement of the frame along {direction}", "m/m"
     if isinstance(driven, tuple):
-        return model.phi(driven), 0, f"force at {driven[0]} along {driven[1]}", "m/N"
+        turned = turns(split(driven, model.scene.beam.components)[1])
+        said, unit = ("moment at {} about {}", "m/(N m)") if turned else ("force at {} along {}", "m/N")
+        return model.phi(driven), 0, said.format(*driven), unit
     if is_finite(driven):
         return model.phi(float(driven)), 0, f"force at z = {driven} m", "m/N"
     names = [path for path in signals_of(model.scene) if path.split(".")[0] != "base"]  # in the order of the loads
@@ -140,12 +153,12 @@ def _driving(model: Model, driven: Any) -> tuple[Vector, int, str, str]:
     return vector, 0, inputs[number], "m/m" if inputs[number].endswith("foot") else "m per unit"
 
 
-def _checked(omega: ArrayLike, model: Model) -> Vector:
+def _checked(omega: ArrayLike, model: Model, slipping: bool) -> Vector:
     """Frequencies (k,) at which the system is not singular."""
     values = np.atleast_1d(np.array(omega, dtype=float))
     valid = values.ndim == 1 and values.size > 0 and bool(np.all(np.isfinite(values) & (values >= 0)))
     require(valid, "omega must be at least 0 and finite, (k,)", omega, WHERE, "give frequencies in rad/s")
-    C, K = _linear(model)
+    C, K = _linear(model, slipping)
     natural = np.sqrt(np.maximum(np.linalg.eigvalsh(K), 0.0)) if model.scene.elements else model.omega
     singular = np.isin(values, natural[natural == 0.0] if np.any(C) else natural)
     require(not singular.any(), "omega must not be an undamped natural frequency", values[singular][:1].tolist(),
@@ -153,15 +166,15 @@ def _checked(omega: ArrayLike, model: Model) -> Vector:
     return values
 
 
-def _linear(model: Model) -> tuple[Vector, Vector]:
-    """C + G and K with the tangents of the elements."""
-    K, C = model.linear_elements
+def _linear(model: Model, slipping: bool) -> tuple[Vector, Vector]:
+    """C + G and K with the tangents of the elements, stuck or slipping."""
+    K, C = model.slipping_elements if slipping else model.linear_elements
     return model.system.by_rate + C, model.system.K + K
 
 
-def _solved(model: Model, omega: Vector, vector: Vector) -> NDArray[np.complex128]:
+def _solved(model: Model, omega: Vector, vector: Vector, slipping: bool) -> NDArray[np.complex128]:
     """Coordinates (k, n) of (K + iωC - ω²) q = vector, some frequencies at a time."""
-    C, K, one = *_linear(model), np.eye(len(vector))
+    C, K, one = *_linear(model, slipping), np.eye(len(vector))
     answers = []
     for part in np.array_split(omega, len(omega) * len(vector) ** 2 // AT_ONCE + 1):
         w = part[:, None, None]

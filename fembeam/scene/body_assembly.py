@@ -17,7 +17,7 @@ from scipy import sparse
 
 import reduction
 from fembeam.scene.assembly import DEFAULT_MODES, Matrices, Vector
-from fembeam.scene.places import told
+from fembeam.scene.places import place_words, told
 from fembeam.scene.rotors import Disk, gyroscopic, turned
 from fembeam.scene.signals import support_motion
 from fembeam.structures import COMPONENTS, Assembled, Six, following
@@ -125,6 +125,7 @@ def body_matrices(scene: Scene, elements: int | None, modes: int | None, probes:
         carried = sparse.eye(M.shape[0], format="csr")[:, moved]
         found = replace(found, **_moving(M, K, assembled.C, found.spread, carried))
     _warn_of_massless(scene, found)
+    _check_moving(scene, found)
     return found
 
 
@@ -140,6 +141,19 @@ def _dof(scene: Scene, assembled: Assembled, support: Any, component: str) -> in
     """Number of the dof that a support holds."""
     row = assembled.rows(support.z).tocsr()[scene.beam.components.index(component)]
     return int(row.indices[0])
+
+
+def _check_moving(scene: Scene, matrices: BodyMatrices) -> None:
+    """Raise ValueError where a stop or element acts on nothing that can move against something else."""
+    for name in ("stops", "elements"):
+        for index, part in enumerate(getattr(scene, name)):
+            place = part.coordinate
+            if place.to is None or place.to[0] == 0:
+                moves = abs(place.row(matrices)).max() > UNIT
+                rule = "what stops and elements act on must be free to move"
+                at = place_words(part.z) + (f" on {place.to_words}" if place.to else "")
+                advice = "supports or joints hold it, or both ends are one; move it"
+                require(moves, rule, at, f"{name}[{index}]{part.quoted} of Scene", advice)
 
 
 def _warn_of_massless(scene: Scene, matrices: BodyMatrices) -> None:

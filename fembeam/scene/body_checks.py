@@ -49,6 +49,10 @@ def check_feature(body: Any, feature: Any, name: str, where: str) -> None:
         check_shaft(body, feature, where)
     if name == "masses":
         require(any(c in COMPONENTS[:3] for c in have), f"{what} must move to carry a mass", have, where, "move it")
+        number = not isinstance(feature.offset, tuple) and feature.offset != 0
+        rule = f"offset must be a vector: one number is along z, and {what} does not tilt that way"
+        tilts = "rx" in have or "ry" in have
+        require(tilts or not number, rule, feature.offset, where, "write offset=(0.1, 0.0)")
 
 
 def _check_support(support: Any, have: tuple[str, ...], where: str) -> None:

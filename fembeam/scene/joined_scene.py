@@ -7,8 +7,9 @@ from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any
 
 from fembeam.scene.body_checks import is_body
+from fembeam.scene.places import is_pair
 from fembeam.structures import JoinedBodies
-from fembeam.support import require
+from fembeam.support import is_whole, require
 
 if TYPE_CHECKING:
     from fembeam.scene.scene import Scene
@@ -62,9 +63,9 @@ def _moved(part: Any, number: int, count: int) -> Any:
     changes: dict[str, Any] = {"z": (number, part.z)} if number else {}
     known = {one.name for one in fields(part)}
     for key in SECOND:
-        to = part.coordinates[0].to if key in known else None
+        to = getattr(part, key) if key in known else None
         if to is not None:
-            body, place = to
+            body, place = to if is_pair(to) and is_whole(to[0]) else (0, to)
             if number:
                 changes[key] = (0, (number, place))
             elif 0 < body <= count:

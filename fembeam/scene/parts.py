@@ -142,8 +142,8 @@ class LumpedMass(ScenePart):
 
     `mass` m in kg, `inertia` J about its own centre in kg m², both ≥ 0; `offset` e in m: the centre sits
     ahead of z by e on a rigid arm, which may reach beyond the beam's end. On other bodies than a `Beam` the inertia is
-    that about every axis, or three numbers, about x, y and z, and the offset a vector. ValueError for a negative mass
-    or inertia.
+    that about every axis, or three numbers, about x, y and z, and the offset a vector (one number is its z). ValueError
+    for a negative mass or inertia.
 
     Examples
     --------
@@ -164,6 +164,7 @@ class LumpedMass(ScenePart):
         for name, check in (("inertia", require_non_negative), ("offset", require_finite)):
             value = getattr(self, name)
             if isinstance(value, (list, tuple)):
+                value = (*value, 0.0) if name == "offset" and len(value) == 2 else value
                 require(len(value) == 3, f"{name} must be one number, or three", value, where, "along x, y and z")
                 object.__setattr__(self, name, tuple(value))
             for one in value if isinstance(value, (list, tuple)) else (value,):

@@ -132,9 +132,15 @@ def check_shaft(body: Any, part: Any, where: str) -> None:
     """Raise ValueError unless a body is a shaft: a straight frame in space; for an unbalance, one that spins."""
     name, body = type(part).__name__, carrier(body, part.z)
     straight = getattr(body, "axis", None) is not None and {"rx", "ry"} <= set(getattr(body, "components", ()))
-    require(straight, f"{name} needs a shaft: a straight Frame in space", body, where, "use Frame.straight")
+    require(straight, f"{name} needs a shaft: a straight Frame in space", _kind(body), where, "use Frame.straight")
     spins = not isinstance(part, Unbalance) or body.spin != 0.0
     require(spins, f"{name} needs a shaft that spins", 0.0, where, "give the Frame a spin in rad/s")
+
+
+def _kind(body: Any) -> str:
+    """What a body is, for messages: a frame with all its members would fill a page."""
+    flat = "in the plane" if getattr(body, "in_plane", False) else "that is not straight"
+    return f"a Frame {flat}" if hasattr(body, "members") else f"a {type(body).__name__}"
 
 
 def driven(body: Any, forces: tuple[Any, ...]) -> tuple[Any, ...]:

@@ -123,8 +123,13 @@ class Scene:
     def __post_init__(self) -> None:
         if not isinstance(self.beam, Beam) and not is_body(self.beam):
             raise TypeError(f"beam must be a Beam, got {self.beam!r} in Scene; make one: Beam(length, section)")
-        for name, kinds in FEATURES.items():
+        for name, kinds in {**FEATURES, "bodies": (Scene,), "joints": (Joint,)}.items():
             object.__setattr__(self, name, _listed(name, getattr(self, name), kinds))
+        self._check_bodies()
+        if self.joints:  # one body with all parts, in the place of this scene's own
+            for name, value in merged(self, [*FEATURES]).items():
+                object.__setattr__(self, name, value)
+        for name in FEATURES:
             if name == "forces":
                 object.__setattr__(self, name, driven(self.beam, tuple(self.forces)))
             if name == "stops" and self.named:
@@ -134,12 +139,6 @@ class Scene:
             raise TypeError(f"damping must be ModalDamping or Rayleigh, got {self.damping!r} in Scene; "
                             "write ModalDamping(0.01)")  # fmt: skip
         object.__setattr__(self, "gravity", _fall(self.gravity, self.named))
-        object.__setattr__(self, "bodies", _listed("bodies", self.bodies, (Scene,)))
-        object.__setattr__(self, "joints", _listed("joints", self.joints, (Joint,)))
-        self._check_bodies()
-        if self.joints:
-            for name, value in merged(self, [*FEATURES]).items():
-                object.__setattr__(self, name, value)
         self._check_base()
         self._check_gravity()
         self._check_names()

@@ -1,6 +1,7 @@
 """Scene files: TOML tables in, a Scene and its studies out.
 
-    [beam] [[supports]] [[masses]] [[springs]] [[dashpots]] [[stops]] [[elements]] [[forces]] [[impactors]]
+    [beam], [frame] or [structure], [[bodies]] [[joints]]
+    [[supports]] [[masses]] [[springs]] [[dashpots]] [[stops]] [[elements]] [[forces]] [[impactors]]
     [damping] [base]
     gravity = 9.81
     [reduce] [simulate] [orbit] [branch] [basins] [mode_count] [smallest_model]

@@ -251,11 +251,19 @@ class JoinedMatrices(Assembled):
 
     def rows_at(self, place: Any) -> sparse.csr_matrix:
         """A row (c, N) for each of the components that any body has, of zeros for those that this one has not."""
-        number, own = self.body.located(place, "rows")
-        rows = (self.made[number].rows(own) @ self.of_body(number)).tocoo()
-        known = [self.body.components.index(name) for name in self.body.bodies[number].components]
-        shape = (len(self.body.components), rows.shape[1])
-        return sparse.csr_matrix((rows.data, (np.array(known, dtype=int)[rows.row], rows.col)), shape=shape)
+        return self.rows_of([place])
+
+    def rows_of(self, places: Sequence[Any]) -> sparse.csr_matrix:
+        """The same of several places, one below the other, each body at once."""
+        located, count = [self.body.located(place, "rows") for place in places], len(self.body.components)
+        found = sparse.csr_matrix((count * len(places), self.T.shape[1]))
+        for number in {number for number, _ in located}:
+            mine = [(i, own) for i, (on, own) in enumerate(located) if on == number]
+            known = [self.body.components.index(name) for name in self.body.bodies[number].components]
+            rows = (self.made[number].rows_of([own for _, own in mine]) @ self.of_body(number)).tocoo()
+            below = np.array([count * i + component for i, _ in mine for component in known], dtype=int)
+            found = found + sparse.csr_matrix((rows.data, (below[rows.row], rows.col)), shape=found.shape)
+        return found.tocsr()
 
     def of_body(self, number: int) -> sparse.csr_matrix:
         """T of one body's dofs."""

@@ -126,7 +126,13 @@ def _at_unit_spin(scene: Scene, modes: int, elements: int | None) -> tuple[reduc
     """Modes at standstill without rigid motions that do not tilt the shaft, G per rad/s, rows across the shaft."""
     body = scene.beam
     shaft = isinstance(body, Frame) and body.axis is not None and not body.in_plane and not scene.bodies
-    require(shaft, "a Campbell diagram needs one shaft: a straight Frame in space", body, WHERE, "use Frame.straight")
+    require(
+        shaft,
+        "a Campbell diagram needs one shaft: a straight Frame in space",
+        type(body).__name__,
+        WHERE,
+        "use Frame.straight",
+    )
     spun = replace(scene, beam=replace(body, spin=1.0), stops=(), elements=(), forces=(), base=None, gravity=0.0)
     wanted = 2 * modes + SPARE
     matrices: Any = spun.matrices(elements, wanted)

@@ -1,8 +1,8 @@
 """Named quantities of a run, shared by all studies: a number or an array of fixed shape each.
 
 A quantity is any function of a run. Those here say with `sampled` whether they need output samples; without, a run
-keeps its contact log only, which is the cheapest. The signal looked at is δ of a stop, or u at `z`, or u of the tip
-in a scene without stops.
+keeps its contact log only, which is the cheapest. `stop` is the number or the name of a stop or element. The signal
+looked at is δ of a stop, or u at `z`, or u of the tip in a scene without stops.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ PROBABILITIES = np.arange(1, 20) / 20
 class OfSignal:
     """What is read off δ of a stop, or u at `z`."""
 
-    stop: int = 0
+    stop: int | str = 0
     z: Place | None = None
     sampled: ClassVar[bool] = True
 
@@ -43,12 +43,12 @@ class OfSignal:
 class OfContacts:
     """What is read off the log of one stop's contacts."""
 
-    stop: int = 0
+    stop: int | str = 0
     sampled: ClassVar[bool] = False
 
     def mine(self, run: Run) -> Any:
         """(c,) which contacts of the log are those of the stop."""
-        return run.contacts.stop == self.stop
+        return run.contacts.stop == (run.number(self.stop) if self.stop or len(run.stops) else 0)
 
 
 class Amplitude(OfSignal):
@@ -111,7 +111,7 @@ class Psd:
 
     band: tuple[float, float] = (1.0, 1200.0)
     parts: int = 12
-    stop: int = 0
+    stop: int | str = 0
     z: Place | None = None
     sampled: ClassVar[bool] = True
 
@@ -160,13 +160,13 @@ class MeanEnergy:
 class Power:
     """Mean power that one stop or element takes, W: the work done on it over the time of the samples."""
 
-    stop: int = 0
+    stop: int | str = 0
     sampled: ClassVar[bool] = True
 
     def __call__(self, run: Run) -> float:
         """Value of a run."""
         require(len(run.t) > 1, "the run must have samples", len(run.t), "Power", "give dt")
-        work = run.losses.history[:, self.stop]
+        work = run.losses.history[:, run.number(self.stop)]
         return float((work[-1] - work[0]) / (run.t[-1] - run.t[0]))
 
 
@@ -223,7 +223,7 @@ def label(quantity: Quantity) -> str:
     return f"{name}({changed})" if changed else name
 
 
-def signal(run: Run, stop: int = 0, z: Place | None = None) -> tuple[Vector, Vector]:
+def signal(run: Run, stop: int | str = 0, z: Place | None = None) -> tuple[Vector, Vector]:
     """δ and its rate at a stop, or u and u̇ at z, or at the tip of a scene without stops."""
     require(len(run.t) > 1, "the run must have samples", len(run.t), "quantity", "give dt")
     if z is None and len(run.stops):

@@ -15,6 +15,7 @@ from fembeam.excitation import BandNoise
 from fembeam.model import Model, Run
 from fembeam.scene import signals_of
 from fembeam.statistics.initial_transient import FEWEST_BATCHES
+from fembeam.study.decay import correlation_time
 from fembeam.study.realisations import child, continued, noises, renewed
 
 Vector = NDArray[np.float64]
@@ -27,26 +28,6 @@ SHORTEST = 8.0  # correlation times
 LONGEST = 100.0  # correlation times, and eight segments of the spectrum: the lead-in costs at most 5 %
 RENEWAL = 5.0  # correlation times left out after noise was renewed: e^-5 of the old noise is left
 MOST_SAMPLES = 2_000_000  # of a segment
-
-
-def correlation_time(model: Model) -> float:
-    """Time constant 1/min(ζω) of the slowest decay of the linear structure, s.
-
-    The eigenvalues are those of the state (Ωr, r'), r undamped modal coordinates: its matrix holds frequencies, not
-    their squares, and so rounding (relative to the highest) stays below every decay that matters.
-    """
-    from scipy.linalg import eigh
-
-    system = model.system
-    square, shapes = eigh(system.K, system.M)
-    omega, damping = np.diag(np.sqrt(np.abs(square))), shapes.T @ system.by_rate @ shapes
-    A = np.block([[np.zeros_like(omega), omega], [-omega * np.sign(square), -damping]])
-    decay = -np.linalg.eigvals(A).real
-    if not decay.min() > 10.0 * len(A) * np.finfo(float).eps * np.abs(A).max():
-        raise ValueError(
-            f"a stationary response needs damping in every mode; the slowest decays at {decay.min():.3g} 1/s"
-        )
-    return 1.0 / float(decay.min())
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +67,9 @@ class Segments:
         cls, model: Model, duration: float, dt: float, discard: float | None, start: Any, solver: Any, segment: int
     ) -> Segments:
         """The plan for a model; a realisation holds two half-overlapping segments (samples) of the spectrum."""
-        tau, found = correlation_time(model), list(signals_of(model.scene).values())
+        state = model.rest() if start is None else np.array(start, dtype=float)
+        tau = correlation_time(model, lambda seconds: _pilot(model, seconds, dt, state, solver), duration)
+        found = list(signals_of(model.scene).values())
         repeats = all(isinstance(s, BandNoise) or hasattr(s, "tones") for s in found)
         random = bool(noises(model))
         longest = _longest(found, tau, dt) if repeats else math.inf
@@ -103,7 +86,6 @@ class Segments:
             )
         short = max(0.0, FEWEST_BATCHES * tau - longest)  # of what the transient is looked for in
         lead = LEAD_IN * tau + short if discard is None else discard
-        state = model.rest() if start is None else np.array(start, dtype=float)
         batches = 1 if repeats and random else BATCHES
         return cls(model, duration, dt, state, solver, tau, repeats, random, lead, longest, batches, shortest)
 
@@ -164,6 +146,14 @@ class Segments:
         assert run.end is not None
         self.state = run.end if whole else np.concatenate((run.q[piece.end], run.q_dot[piece.end]))
         self.time += self.dt * piece.end
+
+
+def _pilot(model: Model, duration: float, dt: float, state: Vector, solver: Any) -> Run:
+    """A run by which the level of the motion is seen."""
+    run = model.simulate(math.ceil(duration / dt - 1e-9) * dt, dt, state, solver)
+    if not run.complete:
+        raise KeyboardInterrupt
+    return run
 
 
 def _longest(found: list[Any], tau: float, dt: float) -> float:

@@ -1,8 +1,9 @@
 """A long run in constant memory: statistics of a stationary response with standard errors.
 
 The run is cut into segments. The noise is renewed in each (an independent realisation from the state reached) and the
-lead-in, five correlation times 1/min(ζω) of the linear structure, is left out; sums of tones continue from the last
-sample in free flight, so that no contact is cut. The statistics need no more storage than one segment.
+lead-in, five correlation times 1/min(ζω), is left out (of friction those at the level of a pilot run, see `decay`).
+Sums of tones continue from the last sample in free flight, so that no contact is cut. The statistics need no more
+storage than one segment.
 
 A standard error tells how results scatter from one seed to another. Noise here is a sum of lines of fixed power, so
 that parts of one realisation say little about it: over a period of the noise the variance of a linear response is the
@@ -162,6 +163,10 @@ def stationary(
     each; fewer where the duration allows no more. Intervals of 95 % hold 93 to 97 % from two realisations on. Records
     and other signals that cannot be continued are run as one segment of eight batches, a sum of tones in batches of
     about 50 correlation times. A response that switches between two regimes less often than that needs an `ensemble`.
+
+    A structure that only elements damp will do. Correlation times are then those with their dashpots, or with dashpots
+    that lose as much in a cycle as sliders do at the rms of a pilot run: a mode whose sliders stick at this level is
+    refused.
 
     Examples
     --------

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 import solvers
 from fembeam.model import Model, Run
 from fembeam.plot.axis_names import axis_name
-from fembeam.scene import Scene, changes_structure, path_of, with_value
+from fembeam.scene import Scene, changes_structure, numbered, path_of, with_value
 from fembeam.study.measure import Plan, runs, values_of
 from fembeam.study.quantities import Quantity, label, named
 from fembeam.support import require
@@ -84,17 +84,21 @@ class Trial:
     method: Any
     reduction: dict[str, Any]
     model: Model | None = field(default=None, compare=False)
+    called: tuple[str, ...] = ()  # the parameters as results have them: by the names of parts where these were given
 
     @classmethod
     def of(
         cls, scene: Scene | Maker, names: Sequence[str], asked: Asked, plan: Plan, reduction: dict[str, Any]
     ) -> Trial:
         """Checked, with full paths of the parameters."""
+        called = list(names)
         if isinstance(scene, Scene):
             names = [path_of(scene, name) for name in names]
+            by_number = (numbered(scene, name) == name for name in called)
+            called = [path if plain else name for name, path, plain in zip(called, names, by_number, strict=True)]
         require(len({*names}) == len(names), "parameters must differ", list(names), "study", "name each once")
         method = solvers.Exponential(ledger=False) if plan.solver is None else plan.solver
-        return cls(scene, tuple(names), Together.of(asked), plan, method, reduction)
+        return cls(scene, tuple(names), Together.of(asked), plan, method, reduction, called=tuple(called))
 
     @property
     def titles(self) -> tuple[str, ...]:
@@ -105,7 +109,7 @@ class Trial:
 
     def told(self, point: Sequence[float]) -> str:
         """A point as text."""
-        return ", ".join(f"{name} = {value:.6g}" for name, value in zip(self.names, point, strict=True))
+        return ", ".join(f"{name} = {value:.6g}" for name, value in zip(self.called, point, strict=True))
 
     def at(self, point: Sequence[float]) -> Scene:
         """The scene at a point; ValueError names the point."""

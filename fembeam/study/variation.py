@@ -219,7 +219,7 @@ def collected(
         if (one := kept.values.get(_key(point))) is not None:
             estimate = Estimate.of_mean(one["values"])
             values[i], errors[i] = estimate.value, estimate.standard_error
-    return Variation(trial.names, points, trial.asked.names, values, errors, axes, failures, trial.titles)
+    return Variation(trial.called, points, trial.asked.names, values, errors, axes, failures, trial.titles)
 
 
 def _key(point: Vector) -> str:

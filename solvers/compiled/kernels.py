@@ -1,19 +1,20 @@
 """Arrays of a problem, calls of contact laws, signals, and the right-hand side of the equations of motion.
 
-The state is x = [p (n), v (n), energy balance (2 + 2E)], with b the push and r the read row of a stop:
+The state is x = [p (n), v (n), energy balance (2 + 2E + 3F)], with b the push and r the read row of a stop:
 
     p' = v + b^p·F,   v' = -k p - c v + b^v·F + l·s(t),   δ_s = r_s·[p, v] - g_s
 
 Two ranges of indices: *elements* s, the stops and what else exerts forces, E in number, have laws and what these know;
 *rows* r, R in number, the coordinates on which they act, have vectors and motion. Element s has the rows from
 ``first[s]`` to before ``first[s + 1]``. Of a stop on a line the indentation is the displacement on the first of them,
-and there it pushes. The two rows of a circular clearance, which has a ``radius`` c, read the vector u from the place to
-the centre, r = |u|:
+and there it pushes. The first two rows of a circular clearance, which has a ``radius`` c, read the vector u from the
+place to the centre, r = |u|:
 
     δ = r - c,  δ̇ = u·u̇/r,  force on the rows N u/r;    of an outer one, where c is kept negative: δ = |c| - r, -N u/r
 
 The entries of the energy balance are the integrals of input power and damping power, then for every stop of force ×
-indentation rate (work done on the stop, J) and of force (impulse, N s).
+indentation rate (work done on the stop, J) and of force (impulse, N s). Behind them there are three for each with
+friction: of F_t ξ̇, of F_t, and of σ ξ̇ in slip, corrected by the spring to the way of the slider.
 """
 
 from __future__ import annotations
@@ -30,7 +31,9 @@ from solvers.compiled.decorators import entry as entry  # re-exported for files 
 from solvers.compiled.decorators import inlined, inner, kernel, reordered
 from solvers.compiled.decorators import merged as merged
 from solvers.compiled.fields import packed_type
+from solvers.compiled.friction import friction_force, slide, slide_acceleration
 from solvers.compiled.parts import RADIAL_ACCELERATION, RADIAL_MOTION, RADIAL_PUSH, part
+from solvers.problem.friction import ARM, CODE
 
 
 class Problem(NamedTuple):
@@ -47,6 +50,7 @@ class Problem(NamedTuple):
     read_rate: Annotated[Any, "R, 2*N"]  # its rate = read_rate·z, m/s
     gap: Annotated[Any, "R"]  # m; minus the centre's coordinates on the rows of a circle
     radius: Annotated[Any, "C"]  # m, (E,) of circular clearances, negative of outer ones, 0 on lines; or none at all
+    friction: Annotated[Any, "int F, 2"]  # (E, 2) place of a slider in parameters, or 0, and in x; or none at all
     first: Annotated[Any, "int E+1"]  # first row of each element, and the end
     element: Annotated[Any, "int R"]  # that each row belongs to
     own: Annotated[Any, "int E"]  # place of an element's δ: its first row, or behind all rows that of a circle
@@ -299,7 +303,90 @@ def rhs(problem, t, x, segment, entry_rate, rate, batch):
             rate[size + 2 + 2 * s] = force * delta_dot
             rate[size + 3 + 2 * s] = force
             calls += 1
+        if rubs(problem, s):
+            _add_friction(problem, s, t, segment[s] > 0, batch[2], x, rate)
     return calls
+
+
+@inlined
+def rubs(problem, s):
+    """Whether a stop has friction; where none has, this costs nothing."""
+    return problem.friction.shape[0] > 0 and problem.friction[s, 0] > 0
+
+
+@merged
+def slider_of(problem, s):
+    """The numbers of a slider, see `problem.friction`."""
+    return problem.parameters[s, problem.friction[s, 0] :]
+
+
+@inner
+def slide_of(problem, s, t, x):
+    """ξ and ξ̇ of a stop with friction in a state."""
+    first, size, turned, turning = problem.first[s], 2 * problem.k.size, 0.0, 0.0
+    u, u_dot = dot(problem.read[first], x, size) - problem.gap[first], dot(problem.read_rate[first], x, size)
+    w = dot(problem.read[first + 1], x, size) - problem.gap[first + 1]
+    w_dot = dot(problem.read_rate[first + 1], x, size)
+    if first + 2 < problem.first[s + 1]:
+        turned, turning = -dot(problem.read[first + 2], x, size), -dot(problem.read_rate[first + 2], x, size)
+    return slide(radius_of(problem, s), slider_of(problem, s), t, u, u_dot, w, w_dot, turned, turning)
+
+
+@inner
+def angle_of(problem, s, x):
+    """Angle, rad, at which a place is in its circle; NaN of a stop on a line."""
+    if not is_circle(problem, s):
+        return math.nan
+    first, size = problem.first[s], 2 * problem.k.size
+    u = dot(problem.read[first], x, size) - problem.gap[first]
+    w = dot(problem.read[first + 1], x, size) - problem.gap[first + 1]
+    return math.atan2(-w, -u)
+
+
+@inner
+def slide_acceleration_of(problem, s, x, rate):
+    """ξ̈ from the state and its rate."""
+    first, size, turning_rate = problem.first[s], 2 * problem.k.size, 0.0
+    u, u_dot = dot(problem.read[first], x, size) - problem.gap[first], dot(problem.read_rate[first], x, size)
+    w = dot(problem.read[first + 1], x, size) - problem.gap[first + 1]
+    w_dot = dot(problem.read_rate[first + 1], x, size)
+    u_twice, w_twice = dot(problem.read_rate[first], rate, size), dot(problem.read_rate[first + 1], rate, size)
+    if first + 2 < problem.first[s + 1]:
+        turning_rate = -dot(problem.read_rate[first + 2], rate, size)
+    own = slider_of(problem, s)
+    return slide_acceleration(radius_of(problem, s), own, u, u_dot, u_twice, w, w_dot, w_twice, turning_rate)
+
+
+@inner
+def _add_friction(problem, s, t, touches, normal, x, rate):
+    """Add what the friction of a stop in contact does to the state's rate, and its power."""
+    account = problem.friction[s, 1]
+    rate[account], rate[account + 1], rate[account + 2] = 0.0, 0.0, 0.0
+    if touches:
+        way, speed = slide_of(problem, s, t, x)
+        own = slider_of(problem, s)
+        force = friction_force(radius_of(problem, s), own, way, normal)
+        add_sideways(problem, s, force, x, rate)
+        rate[account], rate[account + 1], rate[account + 2] = force * speed, force, own[CODE] * speed
+
+
+@inner
+def add_sideways(problem, s, force, x, rate):
+    """Add what a tangential force F_t of stop s does to the state's rate."""
+    first, size = problem.first[s], 2 * problem.k.size
+    if not is_circle(problem, s):
+        for i in range(size):
+            rate[i] -= problem.push[first + 1, i] * force
+        return
+    u = dot(problem.read[first], x, size) - problem.gap[first]
+    w = dot(problem.read[first + 1], x, size) - problem.gap[first + 1]
+    share = force * abs(problem.radius[s]) / (u * u + w * w)
+    for i in range(size):
+        rate[i] += share * (problem.push[first + 1, i] * u - problem.push[first, i] * w)
+    if first + 2 < problem.first[s + 1]:
+        torque = slider_of(problem, s)[ARM] * force
+        for i in range(size):
+            rate[i] -= problem.push[first + 2, i] * torque
 
 
 @inlined
@@ -335,7 +422,7 @@ def indentation_rate(problem, s, x):
 def radial_motion(problem, s, x):
     """Indentation, m, and its rate, m/s, of a circular clearance; at the centre the rate is that of going outward."""
     square, product, speed, size = 0.0, 0.0, 0.0, 2 * problem.k.size
-    for r in range(problem.first[s], problem.first[s + 1]):
+    for r in range(problem.first[s], problem.first[s] + 2):
         u = dot(problem.read[r], x, size) - problem.gap[r]
         v = dot(problem.read_rate[r], x, size)
         square, product, speed = square + u * u, product + u * v, speed + v * v
@@ -354,7 +441,7 @@ def radial(square, product, speed, radius):
 def _radial_acceleration(problem, s, x, rate):
     """δ̈ = ±(u̇·u̇ + u·ü - ṙ²)/r of a circular clearance."""
     square, product, along, size = 0.0, 0.0, 0.0, 2 * problem.k.size
-    for r in range(problem.first[s], problem.first[s + 1]):
+    for r in range(problem.first[s], problem.first[s] + 2):
         u, v = dot(problem.read[r], x, size) - problem.gap[r], dot(problem.read_rate[r], x, size)
         square, product = square + u * u, product + u * v
         along += v * v + u * dot(problem.read_rate[r], rate, size)
@@ -366,10 +453,10 @@ def _radial_acceleration(problem, s, x, rate):
 def _add_radial_push(problem, s, force, x, rate):
     """Add what a radial force does to the state's rate."""
     square, first, size = 0.0, problem.first[s], 2 * problem.k.size
-    for r in range(first, problem.first[s + 1]):
+    for r in range(first, first + 2):
         square += (dot(problem.read[r], x, size) - problem.gap[r]) ** 2
     share = (force if problem.radius[s] > 0.0 else -force) / math.sqrt(square)
-    for r in range(first, problem.first[s + 1]):
+    for r in range(first, first + 2):
         part = share * (dot(problem.read[r], x, size) - problem.gap[r])
         for i in range(size):
             rate[i] += problem.push[r, i] * part

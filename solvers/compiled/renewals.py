@@ -1,7 +1,8 @@
 """Borders of laws with memory: their margins, and what is latched and logged where one is met.
 
 A law tells by margins b_j(δ, δ̇) how far the borders of its segment are; all are positive inside. Where one falls to
-zero the law renews the numbers it latches, which stand among its parameters, and another segment begins.
+zero the law renews the numbers it latches, which stand among its parameters, and another segment begins. Friction has
+one border, whose margin depends on more than δ and δ̇, see `sliding`.
 """
 
 from __future__ import annotations
@@ -15,7 +16,10 @@ from solvers.compiled.kernels import (
     indentation_rate,
     inlined,
     inner,
+    rubs,
+    slider_of,
 )
+from solvers.compiled.sliding import SLIPPED, renew_slider
 from solvers.compiled.state import (
     AT_ONCE,
     LAST_EVENT,
@@ -28,6 +32,7 @@ from solvers.compiled.state import (
     write_event,
 )
 from solvers.problem import event_list as at
+from solvers.problem.friction import STIFFNESS
 
 
 @inlined
@@ -61,6 +66,14 @@ def renew(problem, state, s, j, delta, rate, log):
     if state.event_record.shape[0]:
         write_event(state, RENEWAL, t, t, 0.0, s, j, state.x)
     event_row(problem, state, s, t, j, delta, rate, row)
+    if rubs(problem, s):
+        account, found = problem.friction[s, 1], row[at.DELTA : at.FORCE + 1]
+        row[at.CODE] = renew_slider(problem, s, state.entry_rate[s], state.segment[s], t, state.x, found)
+        row[at.WORK], row[at.IMPULSE] = state.x[account], state.x[account + 1]
+        held = abs(row[at.FORCE]) / slider_of(problem, s)[STIFFNESS]
+        state.x[account + 2] += held if row[at.CODE] == SLIPPED else -held
+        end_event(problem, state, s, row)
+        return
     force_at(problem, s, delta, rate, state.entry_rate[s], row[at.DELTA : at.FORCE + 1])
     row[at.CODE] = call_renewal(problem.renewal[s], j, delta, rate, state.entry_rate[s], problem.parameters[s])
     end_event(problem, state, s, row)
@@ -79,7 +92,7 @@ def note_event(state):
 @inlined
 def most_rows(problem):
     """How many rows of the log the events of one instant may take."""
-    rows = problem.law.size
+    rows = problem.law.size + problem.friction.shape[0]
     for count in problem.border_count:
         rows += count
     return rows

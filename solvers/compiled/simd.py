@@ -1,4 +1,4 @@
-"""Eight numbers as one value of compiled code (SIMD), with + - * and √.
+"""Eight numbers as one value of compiled code (SIMD), with + - * / and √.
 
 The compiler vectorises a loop only where it can prove that arrays do not overlap; then the entries beyond the last
 multiple of the vector's length are done one by one.
@@ -53,6 +53,7 @@ _operator(operator.add, "fadd")
 _operator(operator.iadd, "fadd")
 _operator(operator.sub, "fsub")
 _operator(operator.mul, "fmul")
+_operator(operator.truediv, "fdiv")
 
 
 def _place(context, builder, kind, array, offset=None):

@@ -9,10 +9,25 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from solvers.compiled.fields import packed_type, shapes_of
-from solvers.compiled.kernels import Problem, abs_dot, indentation, indentation_rate, inlined, inner, is_circle, kernel
+from solvers.compiled.kernels import (
+    Problem,
+    abs_dot,
+    angle_of,
+    indentation,
+    indentation_rate,
+    inlined,
+    inner,
+    is_circle,
+    kernel,
+    rubs,
+    slide_of,
+    slider_of,
+)
 from solvers.compiled.parts import ADDRESSES
+from solvers.compiled.sliding import begin_slider, end_slider, slider_force
 from solvers.problem import Array, Contact, Forcing, Law, Status, System
 from solvers.problem import event_list as at
+from solvers.problem.friction import ACCOUNTS, BEGUN, CODE, FREE, PEAK, STIFFNESS
 
 STATUSES = list(Status)
 DONE, RUNNING, STEP_TOO_SMALL, DIVERGED, CHATTER, LOG_FULL, LAW_NOT_FINITE, GAINED = (
@@ -114,6 +129,19 @@ def begin_contacts(problem, state):
         if segment > 0:
             open_contact(problem, state, s, state.now[T], rate)
             state.active[s, PEAK_DELTA] = delta
+            if rubs(problem, s):
+                _begin_in_contact(problem, state, s, delta > surface_tolerance(problem, s, state.x))
+
+
+@inner
+def _begin_in_contact(problem, state, s, under_way):
+    """Begin the friction of a contact that is closed as the run begins, or go on with what is latched already."""
+    own = slider_of(problem, s)
+    if own[CODE] == FREE:
+        begin_slider(problem, s, state.now[T], state.x, state.entry_rate[s], under_way)
+    own[BEGUN] = slider_force(problem, s, state.segment[s], state.entry_rate[s], state.now[T], state.x)
+    if own[CODE] != 0.0:
+        state.x[problem.friction[s, 1] + 2] = abs(own[BEGUN]) / own[STIFFNESS]
 
 
 @inlined
@@ -153,8 +181,30 @@ def end_event(problem, state, s, row):
     row[at.TO] = acting_segment(problem, state, s)
     if row[at.FROM] == 0.0 and row[at.TO] > 0.0:
         open_contact(problem, state, s, row[at.TIME], row[at.RATE])
+        if rubs(problem, s):
+            begin_slider(problem, s, row[at.TIME], state.x, state.entry_rate[s], False)
+    if row[at.TO] == 0.0 and rubs(problem, s):
+        end_slider(problem, s)
     state.count[LOGGED] += 1
     state.count[EVENTS] += 1
+
+
+@kernel
+def slider_row(problem, state, s, t, row):
+    """Write into a row of the log what the friction of stop s has done by now, as its contact begins or ends."""
+    account = problem.friction[s, 1]
+    row[at.ELEMENT], row[at.TIME], row[at.GUARD], row[at.FROM], row[at.TO] = s, t, at.FRICTION, 1.0, 1.0
+    row[at.DELTA], row[at.RATE] = angle_of(problem, s, state.x), slide_of(problem, s, t, state.x)[1]
+    row[at.WORK], row[at.IMPULSE], row[at.FORCE] = state.x[account], state.x[account + 1], state.x[account + 2]
+    row[at.DEEPEST], row[at.LARGEST], row[at.CODE] = 0.0, slider_of(problem, s)[PEAK], -1.0
+    row[at.CLIPPED] = 1.0 if state.segment[s] > 0 else 0.0
+
+
+@inner
+def log_slider(problem, state, s, log):
+    """Add such a row to the log."""
+    slider_row(problem, state, s, state.now[T], log[state.count[LOGGED]])
+    state.count[LOGGED] += 1
 
 
 @kernel
@@ -166,6 +216,8 @@ def log_begin(problem, state, log):
             event_row(problem, state, s, state.now[T], at.BEGIN, delta, indentation_rate(problem, s, state.x), row)
             row[at.FROM], row[at.TO] = 0.0, row[at.FROM]
             state.count[LOGGED] += 1
+            if rubs(problem, s):
+                log_slider(problem, state, s, log)
 
 
 @inner
@@ -178,6 +230,8 @@ def switch(problem, state, s, direction, log):
     event_row(problem, state, s, t, at.KNOT, level, indentation_rate(problem, s, state.x), row)
     state.segment[s] += direction
     end_event(problem, state, s, row)
+    if rubs(problem, s) and (state.segment[s] == 0 or row[at.FROM] == 0.0):
+        log_slider(problem, state, s, log)
     state.count[AT_ONCE] = state.count[AT_ONCE] + 1 if t == state.now[LAST_EVENT] else 0
     state.now[LAST_EVENT] = t
 
@@ -226,10 +280,10 @@ def begin_state(state: State, z: Any) -> None:
     state.entry_rate[:] = 1.0
 
 
-def new_state(z: Any, stops: int) -> State:
-    """State of a run at t = 0 from block coordinates."""
+def new_state(z: Any, stops: int, rubbing: int = 0) -> State:
+    """State of a run at t = 0 from block coordinates, with so many stops, some of them with friction."""
     kinds = [np.dtype(str(kind.dtype)) for kind in STATE.types]
-    shapes = shapes_of(State, {"X": len(z) + 2 + 2 * stops, "E": stops, "rows": 0, "record": 0})
+    shapes = shapes_of(State, {"X": len(z) + 2 + 2 * stops + ACCOUNTS * rubbing, "E": stops, "rows": 0, "record": 0})
     state = State._make(np.zeros(shape, kind) for shape, kind in zip(shapes, kinds, strict=True))
     begin_state(state, z)
     return state
@@ -284,8 +338,17 @@ def gaps_of(contacts: Sequence[Contact]) -> Array:
 
 def radii_of(contacts: Sequence[Contact]) -> Array:
     """(E,) radii of circular clearances, see `Problem`; (0,) if there is none."""
-    radii = np.array([c.radius for c in contacts], dtype=float)
+    radii = np.array([c.circle for c in contacts], dtype=float)
     return radii if radii.any() else np.empty(0)
+
+
+def frictions_of(contacts: Sequence[Contact], size: int) -> Any:
+    """(E, 2) see `Problem.friction`, behind a state of 2n = ``size``; (0, 2) if no contact has any."""
+    rubs = np.array([c.friction is not None for c in contacts], dtype=bool)
+    first = size + 2 + 2 * len(contacts)
+    place = [getattr(c.law, "place", 0) if c.friction else 0 for c in contacts]
+    table = np.column_stack((place, np.where(rubs, first + ACCOUNTS * (np.cumsum(rubs) - 1), 0))).astype(np.int64)
+    return table if rubs.any() else np.empty((0, 2), dtype=np.int64)
 
 
 def _vectors(system: System) -> Array:
@@ -305,6 +368,7 @@ def _problem(system: System, forcing: Forcing, linear: dict[str, Array]) -> Prob
         knots=knots,
         gap=gaps_of(contacts),
         radius=radii_of(contacts),
+        friction=frictions_of(contacts, 2 * len(linear["k"])),
         first=first_rows(contacts),
         element=np.repeat(np.arange(m), [len(c.rows) for c in contacts]).astype(np.int64),
         own=_own_places(contacts),
@@ -326,7 +390,7 @@ def _problem(system: System, forcing: Forcing, linear: dict[str, Array]) -> Prob
 
 def _own_places(contacts: Sequence[Contact]) -> Array:
     """(E,) see `Problem.own`."""
-    first, circle = first_rows(contacts), np.array([c.radius != 0.0 for c in contacts], dtype=bool)
+    first, circle = first_rows(contacts), np.array([c.circle != 0.0 for c in contacts], dtype=bool)
     places: Array = np.where(circle, first[-1] + np.cumsum(circle) - 1, first[:-1]).astype(np.int64)
     return places
 

@@ -215,7 +215,7 @@ def linearise_step(problem, ahead, behind, tables, past, scratch, derivatives, v
     for s in range(problem.law.size):
         if past.segment[s] > 0:
             if is_circle(problem, s):
-                radial_forces(problem, past, scratch, s)
+                radial_forces(problem, tables, past, scratch, s)
             motion = motion_of(problem, scratch, s)
             _by_parameter(ahead, behind, past, scratch, variation, derivatives, s)
             by_latched(problem, past, derivatives, s, S, motion[0], motion[1])

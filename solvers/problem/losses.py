@@ -33,6 +33,8 @@ class Losses:
         user's law in its segment "slip" if it has that and one "stick".
     history : (k, m) J, work done on each up to the samples. impulses : (k, m) N s (N m s), of each force likewise;
         None of a run read from a file. names : what each is called.
+    friction : (m,) J lost by friction under the contact's force, ∫F_t ξ̇ dt less the change of F_t²/2k_t. spin : (m,) J,
+        work of its prescribed spin.
 
     Notes
     -----
@@ -46,6 +48,8 @@ class Losses:
     history: Array
     impulses: Array | None = None
     names: tuple[str, ...] = field(default=(), kw_only=True)
+    friction: Any = field(default=0.0, kw_only=True)
+    spin: Any = field(default=0.0, kw_only=True)
 
     def __len__(self) -> int:
         return len(self.work)
@@ -55,7 +59,12 @@ class Losses:
 
     @property
     def loss(self) -> Array:
-        """(m,) J taken for good: work less what is stored."""
+        """(m,) J taken for good: work less what is stored, and what friction took."""
+        return self.impact + self.friction
+
+    @property
+    def impact(self) -> Array:
+        """(m,) J taken for good by the laws alone."""
         return self.work - self.stored
 
     def arrays(self) -> dict[str, Array]:
@@ -75,18 +84,24 @@ class Losses:
         end: Held,
         powers: Array,
         transitions: Callable[[], Transitions],
+        rubbed: Array | None = None,
     ) -> Losses:
         """From the states at begin and end and the integrated powers at the samples (k, 2 + 2m).
 
         ``back`` makes [q, q̇] of a state; its balance holds input, damping, and work and impulse of each contact.
+        ``rubbed`` are (m, 3) loss by friction, work of the spin and way of the slider, None without friction.
         """
         size, passed = begin[0].size, transitions()
         deltas = [_indentations(contacts, back.dot(x[:size])) for x, _ in (begin, end)]
         memories = _renewed_at_once(contacts, begin[1], passed), end[1]
         first, last = (_stored(contacts, *one) for one in zip(deltas, memories, strict=True))
         slip = _slipped(contacts, begin[1], passed, *deltas)
-        names = tuple(contact.name for contact in contacts)
-        return cls(end[0][size + 2 :: 2], last - first, slip, powers[:, 2::2], powers[:, 3::2], names=names)
+        more: dict[str, Any] = {"names": tuple(contact.name for contact in contacts)}
+        if rubbed is not None:
+            more |= {"friction": rubbed[:, 0], "spin": rubbed[:, 1]}
+            slip = slip + rubbed[:, 2]
+        work = end[0][size + 2 : size + 2 + 2 * len(contacts) : 2]
+        return cls(work, last - first, slip, powers[:, 2::2], powers[:, 3::2], **more)
 
     def part(self, kept: slice) -> Losses:
         """Of some of the samples: their work and impulses; what was stored and slip are not known there."""
@@ -102,6 +117,8 @@ def _renewed_at_once(contacts: Sequence[Contact], memory: Sequence[Array], passe
     found = [np.array(latched) for latched in memory]
     for row in np.flatnonzero(passed.t == 0.0).tolist():
         number = int(passed.contact[row])
+        if contacts[number].friction is not None:  # its slider is no part of the law
+            continue
         law: Any = contacts[number].law
         parameters = np.array(law.parameters, dtype=float)
         parameters[list(law.memory)] = found[number]
@@ -142,7 +159,7 @@ def _slipped(
     path = np.zeros(len(begin))
     for number, (contact, latched) in enumerate(zip(contacts, memory, strict=True)):
         mine = passed.contact == number
-        for borders, place, slip in _sliders(contact.law):
+        for borders, place, slip in _sliders(contact.law) if contact.friction is None else ():
             since = float(begin[number]) if abs(latched[place]) == slip else math.nan
             way = 0.0
             for row in np.flatnonzero(mine & np.isin(passed.border, borders)).tolist():

@@ -138,6 +138,54 @@ class ContactLog(Columns):
         return cls.of_rows(np.concatenate(moved), logs[0].names)
 
 
+@dataclass(frozen=True, eq=False)
+class FrictionLog(Columns):
+    """What friction did in the contacts that have it, in order of their end, one array entry each.
+
+    A contact still open at the end has t_out = NaN, angle_out and speed_out as then.
+
+    Attributes
+    ----------
+    contact : index of the contact. name : what it is called. t_in, t_out : s.
+    angle_in, angle_out : rad, of the place in its circular clearance; NaN of an oblique stop.
+    speed_in, speed_out : m/s, ξ̇ of the surface. peak_friction : N, the largest |F_t|. impulse : N s, ∫F_t dt.
+    slip : m, the way of the slider. energy_loss : J, lost by friction.
+    """
+
+    contact: Any
+    t_in: Array
+    t_out: Array
+    angle_in: Array
+    angle_out: Array
+    speed_in: Array
+    speed_out: Array
+    peak_friction: Array
+    impulse: Array
+    slip: Array
+    energy_loss: Array
+    names: tuple[str, ...] = field(default=(), kw_only=True)
+
+    def __len__(self) -> int:
+        return len(self.contact)
+
+    def __repr__(self) -> str:
+        return f"<friction of {counted(len(self), 'contact')}>"
+
+    @classmethod
+    def of_events(cls, rows: Array, names: Sequence[str] = ()) -> FrictionLog:
+        """From an event list in which every contact begins and ends."""
+        rows = rows[rows[:, at.GUARD] == at.FRICTION]
+        ends, begins = rows[rows[:, at.CLIPPED] == 0.0], rows[rows[:, at.CLIPPED] == 1.0]
+        first = np.empty_like(ends)
+        first[np.argsort(ends[:, at.ELEMENT], kind="stable")] = begins[np.argsort(begins[:, at.ELEMENT], kind="stable")]
+        both: list[Any] = [
+            part for c in (at.TIME, at.DELTA, at.RATE) for part in (first[:, c].copy(), ends[:, c].copy())
+        ]
+        changes: list[Any] = [ends[:, c] - first[:, c] for c in (at.IMPULSE, at.FORCE, at.WORK)]
+        columns: list[Any] = [ends[:, at.ELEMENT].astype(int), *both, ends[:, at.LARGEST].copy(), *changes]
+        return cls(*columns, names=tuple(names))
+
+
 def _make_whole(row: Array, rest: Array, later: float) -> None:
     """Add to a log row the rest of its contact, whose times count from ``later``."""
     row[2], row[4] = later + rest[2], rest[4]
@@ -203,10 +251,11 @@ class Transitions(Columns):
 
 @dataclass(frozen=True, eq=False)
 class Energy:
-    """Energy balance at the output times, J: stored - initial = input - damping - contact + residual.
+    """Energy balance at the output times, J: stored - initial = input + spin - damping - contact - friction + residual.
 
     ``input`` is the work of all loads, ``damping`` what C took, ``contact`` the work done on the stops (in a contact
-    it contains what the stop will give back), ``residual`` the error.
+    it contains what the stop will give back), ``friction`` that done on sliders and their springs, ∫F_t ξ̇ dt, ``spin``
+    the work of prescribed spins, ∫F_t R Ω dt, ``residual`` the error.
     """
 
     input: Array
@@ -214,12 +263,17 @@ class Energy:
     contact: Array
     stored: Array
     initial: float
+    friction: Any = 0.0
+    spin: Any = 0.0
 
     @classmethod
-    def of_run(cls, M: Any, K: Any, works: Array, motion: Array, start: Array) -> Energy:
-        """From the works (k, 2 + 2m) and the motion [q, q̇] (k, 2n), which began at (2n,)."""
+    def of_run(cls, M: Any, K: Any, works: Array, motion: Array, start: Array, rubbed: Any = (0.0, 0.0)) -> Energy:
+        """From the works (k, 2 + 2m) and the motion [q, q̇] (k, 2n), which began at (2n,).
+
+        ``rubbed`` are the works of friction and of spins, (k,) each.
+        """
         stored, initial = (stored_energy(M, K, *np.split(x, 2, axis=-1)) for x in (motion, start))
-        return cls(works[:, 0], works[:, 1], works[:, 2::2].sum(axis=1), stored, float(initial))
+        return cls(works[:, 0], works[:, 1], works[:, 2::2].sum(axis=1), stored, float(initial), *rubbed)
 
     def __repr__(self) -> str:
         return f"<energy balance of {counted(len(self.stored), 'sample')}>"
@@ -227,7 +281,7 @@ class Energy:
     @property
     def residual(self) -> Array:
         """What the energy balance does not account for."""
-        return self.stored - self.initial - self.input + self.damping + self.contact
+        return self.stored - self.initial - self.input + self.damping + self.contact + self.friction - self.spin
 
 
 @dataclass(frozen=True)
@@ -248,8 +302,9 @@ class Solution:
     Attributes
     ----------
     t : (k,) s. q, q_dot : (k, n) coordinates and rates then; without output samples k = 1, the end.
-    contacts : log, energy : energy balance, transitions and losses : what laws with memory met, what each contact took;
-        made when first looked at, by calling ``log``, ``ledger``, ``borders`` and ``lost``.
+    contacts : log, energy : energy balance, transitions and losses : what laws with memory met, what each contact took,
+        friction : log of what it did; made when first looked at, by calling ``log``, ``ledger``, ``borders``, ``lost``
+        and ``rubbing``.
     status : how it ended. cost : what it took.
     tangent : (2n, 2n or 2n + 1) derivative of the final [q, q̇], and rate : (2n,) its derivative by time; None unless
         asked for.
@@ -286,6 +341,7 @@ class Solution:
     borders: Callable[[], Transitions] = field(default=lambda: Transitions.of_events(at.NO_EVENTS, ()), repr=False)
     lost: Callable[[], Any] = field(default=lambda: None, repr=False)
     end: Array | None = field(default=None, repr=False)
+    rubbing: Callable[[], FrictionLog] = field(default=lambda: FrictionLog.of_events(at.NO_EVENTS), repr=False)
 
     def __repr__(self) -> str:
         reached = f"to t = {self.t[-1]:g} s" if len(self.t) else "without samples"
@@ -300,6 +356,11 @@ class Solution:
     def transitions(self) -> Transitions:
         """What laws with memory have met: the times of stick, slip and yield."""
         return self.borders()
+
+    @cached_property
+    def friction(self) -> FrictionLog:
+        """What friction did in each contact that has it."""
+        return self.rubbing()
 
     @cached_property
     def energy(self) -> Energy:

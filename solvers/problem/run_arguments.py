@@ -27,12 +27,13 @@ def check_tangent(tangent: Any, method: Any, system: System) -> None:
 
 
 def check_maps(system: System, method: Any) -> None:
-    """A method that does not follow circular clearances is not asked to."""
-    if getattr(method, "takes_annuli", False):
-        return
+    """A method that does not follow circular clearances, or friction under their force, is not asked to."""
+    annuli, friction = getattr(method, "takes_annuli", False), getattr(method, "takes_friction", False)
     for i, contact in enumerate(system.contacts):
-        if contact.map != "line":
-            name = type(method).__name__
+        name = type(method).__name__
+        if contact.friction is not None and not friction:
+            raise ValueError(f"{name} takes contacts without friction, and contact {i} has some; use DormandPrince")
+        if contact.map == "annulus" and not annuli:
             raise ValueError(
                 f"{name} takes scalar stops, and contact {i} is an annulus; use Exponential or DormandPrince"
             )

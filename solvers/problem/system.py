@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from solvers.problem.decoupling import Blocks, decouple
+from solvers.problem.friction import Friction, Rubbing, row_of
 from solvers.problem.matrices import Array, check_mass, dense, product, square_matrix
 from solvers.problem.memo import Memo
 
@@ -72,6 +73,12 @@ class Contact:
 
         δ = r - c,  δ̇ = d·ḋ/r,  force on the place -N(δ, δ̇) d/r;    outer: δ = c - r, the force +N d/r
 
+    `friction` acts along the tangential displacement ξ, by a force F_t against it whose power is F_t ξ̇. With
+    ``map="oblique"``, a stop on a line with a tangential row, ξ = tangent @ q. In an annulus, with d at the angle θ,
+    the place turned by φ = rotation @ q about its own axis and by the spin Ω beside, and touching at the radius R,
+
+        ξ = c θ + R (φ + Ω t),    force on the place -F_t (c/r) e_θ, torque -R F_t on φ;    outer: with -R for R
+
     Parameters
     ----------
     direction : (n,), the way the stop pushes; (2, n) of an annulus, whose rows read the two coordinates of the place.
@@ -80,9 +87,14 @@ class Contact:
     always : whether the law acts at both signs of ``delta``; its knots still count from ``delta = 0``. Of a
         law with memory for δ > 0 only, such as `contacts.WaltonBraun`, it is set: the law says where it is open.
     name : what logs call it; empty: "stop 0", "stop 1", … by its index.
-    map : "line", or "annulus" for a circular clearance.
+    map : "line", "oblique" for one with friction, or "annulus" for a circular clearance.
     centre : (2,) m, of an annulus: where direction @ q is at its centre.
     outer : of an annulus, whether the place is outside: a ring around a post of radius c.
+    friction : `Friction` of an oblique stop or an annulus, None for none.
+    tangent : (n,) of an oblique stop: the way along its surface.
+    rotation : (n,) of an annulus with friction: the row of φ, rad; None if it does not turn but by ``spin``.
+    radius : R > 0, m, of an annulus with friction, of the place's own surface: what rotation and spin need.
+    spin : Ω, rad/s, prescribed, of an annulus with friction.
 
     Examples
     --------
@@ -95,6 +107,11 @@ class Contact:
     >>> hole = Contact([[1.0, 0.0], [0.0, 1.0]], Hertz(1e9), gap=1e-3, map="annulus")
     >>> round(float(hole.indentation([0.9e-3, 0.6e-3])), 9)
     8.1665e-05
+
+    A ball that meets a wall at an angle, with friction along it:
+
+    >>> Contact([-1.0, 0.0], Hertz(1e9), map="oblique", tangent=[0.0, 1.0], friction=Friction(0.2, 1e6)).friction
+    Friction(mu=0.2, stiffness=1000000.0)
     """
 
     direction: Array
@@ -105,9 +122,16 @@ class Contact:
     map: str = "line"
     centre: tuple[float, float] = (0.0, 0.0)
     outer: bool = False
+    friction: Friction | None = None
+    tangent: Array | None = None
+    rotation: Array | None = None
+    radius: float | None = None
+    spin: float = 0.0
 
     def __post_init__(self) -> None:
         direction = np.array(self.direction, dtype=float, ndmin=1)
+        if isinstance(self.law, Rubbing):  # of a contact that this one is made of
+            object.__setattr__(self, "law", self.law.law)
         self._check_map(direction)
         if getattr(self.law, "memory", ()) and getattr(self.law, "one_sided", False):
             object.__setattr__(self, "always", True)  # its law itself says where it is open
@@ -121,12 +145,15 @@ class Contact:
         direction.setflags(write=False)
         object.__setattr__(self, "direction", direction)
         object.__setattr__(self, "gap", float(self.gap))
+        self._check_friction(direction)
 
     def _check_map(self, direction: Array) -> None:
         """Directions, clearance and centre fit the map."""
-        if self.map not in ("line", "annulus"):
-            raise ValueError(f'map of a Contact must be "line" or "annulus", got {self.map!r}')
-        if self.map == "line":
+        if self.map not in ("line", "annulus", "oblique"):
+            raise ValueError(
+                f'map of a Contact must be "line" or "annulus", or "oblique" with friction, got {self.map!r}'
+            )
+        if self.map != "annulus":
             if direction.ndim != 1 or not np.all(np.isfinite(direction)):
                 raise ValueError(f"direction of a Contact must be a finite vector, got {self.direction!r}")
             if self.outer or np.any(self.centre):
@@ -149,28 +176,63 @@ class Contact:
             raise ValueError(f"centre of an annulus must be two finite numbers (m), got {self.centre!r}")
         object.__setattr__(self, "centre", tuple(centre.tolist()))
 
+    def _check_friction(self, direction: Array) -> None:
+        """Friction has what it needs, and nothing is given for it where there is none."""
+        size = direction.shape[-1]
+        if self.friction is None and self.map == "oblique":
+            raise ValueError('map="oblique" is that of friction: give friction=Friction(mu, stiffness)')
+        wanted = {"tangent": "oblique", "rotation": "annulus", "radius": "annulus", "spin": "annulus"}
+        for name, of in wanted.items():
+            given: Any = getattr(self, name)
+            if given is None or (name == "spin" and given == 0.0):
+                continue
+            if self.map != of or self.friction is None:
+                raise ValueError(f'{name} of a Contact belongs to map="{of}" with friction, got {given!r}')
+            if name in ("tangent", "rotation"):
+                object.__setattr__(self, name, row_of(name, given, size))
+            elif not math.isfinite(given) or (name == "radius" and given <= 0.0):
+                least = "positive and finite (m)" if name == "radius" else "finite (rad/s)"
+                raise ValueError(f"{name} of a Contact must be {least}, got {given!r}")
+        if self.friction is None:
+            return
+        if not isinstance(self.friction, Friction):
+            raise TypeError(f"friction of a Contact must be a Friction(mu, stiffness), got {self.friction!r}")
+        if self.map == "line":
+            raise ValueError('friction of a stop on a line needs map="oblique" and tangent=, the way along its surface')
+        if self.map == "oblique" and self.tangent is None:
+            raise ValueError('map="oblique" needs tangent=, the way along the surface of the stop')
+        if self.tangent is not None and np.linalg.matrix_rank(np.stack((direction, self.tangent))) < 2:
+            raise ValueError(f"tangent of a Contact must not lie along its direction, got {self.tangent!r}")
+        if self.always or bool(getattr(self.law, "memory", ())):
+            raise ValueError(f"friction takes laws without memory that act for delta > 0, got {self.law!r}")
+        if self.radius is None and (self.rotation is not None or self.spin != 0.0):
+            raise ValueError("radius (m) of a Contact is missing: rotation and spin rub at a radius")
+        arm = 0.0 if self.radius is None else -self.radius if self.outer else self.radius
+        object.__setattr__(self, "law", Rubbing(self.law, self.friction, float(arm), float(self.spin)))
+
     @property
     def rows(self) -> Array:
         """(m, n) the coordinates it acts on, one row each."""
-        return np.atleast_2d(self.direction)
+        more = [row for row in (self.tangent, self.rotation) if row is not None]
+        return np.vstack((self.direction, *more)) if more else np.atleast_2d(self.direction)
 
     @property
     def row_gaps(self) -> Array:
         """(m,) of each row, in m, by which ``-rows @ q - row_gaps`` is δ, or -d of an annulus."""
         if self.map == "annulus":
-            return -np.array(self.centre)
+            return np.append(-np.array(self.centre), np.zeros(len(self.rows) - 2))
         return np.append(self.gap, np.zeros(len(self.rows) - 1))
 
     @property
-    def radius(self) -> float:
+    def circle(self) -> float:
         """Clearance of an annulus in m, negative of an outer one; 0 of a stop on a line."""
-        if self.map == "line":
+        if self.map != "annulus":
             return 0.0
         return -self.gap if self.outer else self.gap
 
     def indentation(self, q: ArrayLike) -> Array:
         """δ (...) in m at coordinates (..., n)."""
-        if self.map == "line":
+        if self.map != "annulus":
             return -np.asarray(q) @ self.direction - self.gap
         distance = np.linalg.norm(np.asarray(q) @ self.direction.T - self.centre, axis=-1)
         return self.gap - distance if self.outer else distance - self.gap
@@ -187,6 +249,16 @@ class Contact:
         outward = d / distance
         across = d_dot - (outward @ d_dot) * outward
         return sign * float(outward @ d_dot), sign * outward @ self.direction, sign / distance * across @ self.direction
+
+    def slide(self, q: ArrayLike, t: ArrayLike = 0.0) -> Array:
+        """ξ (...) in m at coordinates (..., n) and times; of an annulus with its angle in (-π, π]."""
+        q = np.asarray(q)
+        if self.tangent is not None:
+            return q @ self.tangent
+        x, y = np.moveaxis(q @ self.direction.T - self.centre, -1, 0)
+        arm = 0.0 if self.radius is None else -self.radius if self.outer else self.radius
+        turned = 0.0 if self.rotation is None else q @ self.rotation
+        return self.gap * np.arctan2(y, x) + arm * (turned + self.spin * np.asarray(t))
 
 
 @dataclass(frozen=True, eq=False)
@@ -283,7 +355,8 @@ class System:
         if len(self.loads) != len(other.loads):
             return False
         pairs: list[tuple[Any, Any]] = [
-            (a.direction, b.direction) for a, b in zip(self.contacts, other.contacts, strict=True)
+            (a.rows, b.rows) if a.friction or b.friction else (a.direction, b.direction)
+            for a, b in zip(self.contacts, other.contacts, strict=True)
         ]
         pairs += [(a, b) for (a, _), (b, _) in zip(self.loads, other.loads, strict=True)]
         return all(a is b or np.array_equal(a, b) for a, b in pairs)

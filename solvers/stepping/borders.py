@@ -13,10 +13,20 @@ from typing import Any
 
 import numpy as np
 
-from solvers.compiled.kernels import acceleration_of, dot, indentation, indentation_rate, inner, kernel
+from solvers.compiled.kernels import (
+    acceleration_of,
+    copy,
+    dot,
+    indentation,
+    indentation_rate,
+    inner,
+    kernel,
+    rubs,
+)
 from solvers.compiled.renewals import margins, margins_before, margins_in, note_event, renew
+from solvers.compiled.sliding import POINT, SPEED, WAY, move_point, point_of, slider_margin, way_tolerance
 from solvers.compiled.state import LAST_EVENT, T, most_borders, rate_tolerance, surface_tolerance
-from solvers.stepping.events import NONE, bisection, golden_section, motion_of, polynomial
+from solvers.stepping.events import NONE, bisection, golden_section, motion_of, point_at, polynomial
 
 _MISSED = 1e-3  # margin, in units of the largest of the step, by which a landing may have missed its border
 _NODES = np.array([0.0, *(2.0**i for i in (-20, -15, -11, -8, -7, -6, -5, -4, -3, -2)), *(np.arange(3, 9) / 8.0)])
@@ -28,17 +38,37 @@ _AHEAD = 1e-4  # part of a step over which the rate of a margin is differenced
 def border_space(problem: Any) -> list[Any]:
     """Working arrays: those of the borders among the fields of `loop.Space`, in order."""
     stops, most, n = problem.law.size, most_borders(problem), _NODES.size
-    return [np.empty(n * most), np.empty((2, n)), np.empty(2), np.empty(most), np.zeros((stops, 2))] + [
-        np.zeros((stops, most)) for _ in range(3)
-    ]
+    first = [np.empty(n * most), np.empty((2, n)), np.empty(2), np.empty(most), np.zeros((stops, 4))]
+    return [*first, *(np.zeros((stops, most)) for _ in range(3)), np.empty((2, POINT))]
 
 
 @inner
-def _present(problem, state, space, s, x):
+def _present_of_slider(problem, state, space, s, t, x, rate):
+    """The same of friction, from the state with its rate, at which it is."""
+    point, moved, scale = space.point[0], space.point[1], space.scale[s]
+    point_of(problem, s, t, x, rate, point)
+    scale[0] = max(scale[0], 4.0 * surface_tolerance(problem, s, x))
+    scale[1] = max(scale[1], rate_tolerance(problem, s, x))
+    way, speed = way_tolerance(problem, s, t, x)
+    scale[2], scale[3] = max(scale[2], 4.0 * way), max(scale[3], speed)
+    present = slider_margin(problem, s, state.segment[s], state.entry_rate[s], point)
+    space.present[s, 0], space.rounding[s, 0] = present, 1e-15 * abs(present)
+    for i in range(4):
+        copy(point, moved, POINT)
+        moved[i if i < 2 else WAY if i == 2 else SPEED] += scale[i]
+        value = slider_margin(problem, s, state.segment[s], state.entry_rate[s], moved)
+        space.rounding[s, 0] += abs(value - present)
+
+
+@inner
+def _present(problem, state, space, s, t, x, rate_of_x):
     """Margins of element s a rounding ahead of a state, and what rounding may make of them; returns δ and δ̇.
 
     Ahead is where the motion goes: a law that has not moved yet may look at the sign of δ.
     """
+    if rubs(problem, s):
+        _present_of_slider(problem, state, space, s, t, x, rate_of_x)
+        return space.point[0, 0], space.point[0, 1]
     delta, rate = indentation(problem, s, x), indentation_rate(problem, s, x)
     scale, count = space.scale[s], problem.border_count[s]
     scale[0] = max(scale[0], 4.0 * surface_tolerance(problem, s, x))
@@ -56,9 +86,13 @@ def _present(problem, state, space, s, x):
 
 
 @inner
-def _watch(problem, state, space, s):
-    """Margins of element s at the nodes of the step just tried."""
+def _watch(problem, state, space, h, s):
+    """Margins of element s at the nodes of the step of duration h just tried."""
     motion_of(problem, s, state.x, space.dense, space.coefficients)
+    if rubs(problem, s):
+        for i in range(_NODES.size):
+            space.margin[i] = _slider_margin_at(problem, state, space, h, s, _NODES[i])
+        return
     for i in range(_NODES.size):
         space.points[0, i] = polynomial(space.coefficients[0], _NODES[i])
         space.points[1, i] = polynomial(space.coefficients[1], _NODES[i])
@@ -66,9 +100,18 @@ def _watch(problem, state, space, s):
 
 
 @inner
+def _slider_margin_at(problem, state, space, h, s, theta):
+    """Margin of friction at θ of the step."""
+    point_at(problem, s, state.now[T], h, theta, space.coefficients, space.point[1])
+    return slider_margin(problem, s, state.segment[s], state.entry_rate[s], space.point[1])
+
+
+@inner
 def _beyond(known, theta):
     """Minus a margin at θ of the step."""
-    problem, state, space, s, j = known
+    problem, state, space, h, s, j = known
+    if rubs(problem, s):
+        return -_slider_margin_at(problem, state, space, h, s, theta)
     space.trial[0], space.trial[1] = polynomial(space.coefficients[0], theta), polynomial(space.coefficients[1], theta)
     margins(problem, state, s, 1, space.trial[0:1], space.trial[1:2], space.one)
     return -space.one[j]
@@ -85,13 +128,13 @@ def _lowest(known, values, i, rounding):
 
 
 @inner
-def _crossing(problem, state, space, s, j):
+def _crossing(problem, state, space, h, s, j):
     """First θ at which a margin of the element watched falls below zero, or NONE; 0 where it does so at once.
 
     Where the last landing has missed a border by more than rounding, its margin is negative at first, but little, and
     rises.
     """
-    known, n = (problem, state, space, s, j), _NODES.size
+    known, n = (problem, state, space, h, s, j), _NODES.size
     values, rounding = space.margin[n * j : n * j + n], space.rounding[s, j]
     inside, largest = values[0] > rounding, 0.0
     for value in values:
@@ -107,17 +150,23 @@ def _crossing(problem, state, space, s, j):
     return NONE
 
 
+@inner
+def _is_without(problem, state, s):
+    """Whether an element has no borders by now: friction has none while the contact is open."""
+    return problem.border_count[s] == 0 or (rubs(problem, s) and state.segment[s] == 0)
+
+
 @kernel
-def border_ahead(problem, state, space):
-    """(θ, element, border) of the first border on the step just tried; θ = NONE without one."""
+def border_ahead(problem, state, space, h):
+    """(θ, element, border) of the first border on the step of duration h just tried; θ = NONE without one."""
     theta, element, border = NONE, -1, -1
     for s in range(problem.law.size):
-        if problem.border_count[s] == 0:
+        if _is_without(problem, state, s):
             continue
-        _present(problem, state, space, s, state.x)
-        _watch(problem, state, space, s)
+        _present(problem, state, space, s, state.now[T], state.x, state.rate)
+        _watch(problem, state, space, h, s)
         for j in range(problem.border_count[s]):
-            found = _crossing(problem, state, space, s, j)
+            found = _crossing(problem, state, space, h, s, j)
             space.at_start[s, j] = space.present[s, j]
             if found < theta:
                 theta, element, border = found, s, j
@@ -127,19 +176,25 @@ def border_ahead(problem, state, space):
 @inner
 def border_apart(problem, state, space, h, s, j):
     """(distance beyond a border, its rate, its rounding) at the end of the step of duration h just tried."""
-    delta, rate = _present(problem, state, space, s, space.x_new)
-    time = _AHEAD * h
+    delta, rate = _present(problem, state, space, s, state.now[T] + h, space.x_new, space.rate_new)
+    time, present = _AHEAD * h, space.present[s, j]
+    if rubs(problem, s):
+        move_point(space.point[0], time, space.point[1])
+        later = slider_margin(problem, s, state.segment[s], state.entry_rate[s], space.point[1])
+        return -present, (present - later) / time, space.rounding[s, j]
     space.trial[0] = delta + time * dot(problem.read[problem.first[s]], space.rate_new, 2 * problem.k.size)
     space.trial[1] = rate + time * acceleration_of(problem, s, space.x_new, space.rate_new)
     margins(problem, state, s, 1, space.trial[0:1], space.trial[1:2], space.one)
-    present = space.present[s, j]
     return -present, (present - space.one[j]) / time, space.rounding[s, j]
 
 
 @inner
 def renew_border(problem, state, space, s, j, log):
     """Renew one border in the present state."""
-    delta, rate = margins_in(problem, state, s, state.x, space.trial, space.margin)
+    if rubs(problem, s):
+        delta, rate = 0.0, 0.0  # it looks for itself
+    else:
+        delta, rate = margins_in(problem, state, s, state.x, space.trial, space.margin)
     renew(problem, state, s, j, delta, rate, log)
     note_event(state)
 
@@ -152,10 +207,14 @@ def renew_together(problem, state, space, h, element, border, log):
     has risen and come back if its margin was above zero just before.
     """
     for s in range(problem.law.size):
-        if problem.border_count[s] == 0:
+        if _is_without(problem, state, s):
             continue
-        delta, rate = _present(problem, state, space, s, state.x)
-        margins_before(problem, state, s, delta, rate, _BEFORE * h, space.trial, space.one)
+        delta, rate = _present(problem, state, space, s, state.now[T], state.x, state.rate)
+        if rubs(problem, s):
+            move_point(space.point[0], -_BEFORE * h, space.point[1])
+            space.one[0] = slider_margin(problem, s, state.segment[s], state.entry_rate[s], space.point[1])
+        else:
+            margins_before(problem, state, s, delta, rate, _BEFORE * h, space.trial, space.one)
         for j in range(problem.border_count[s]):
             before, rounding = max(space.at_start[s, j], space.one[j]), space.rounding[s, j]
             reached = before > rounding and space.present[s, j] <= max(8.0 * rounding, _TOGETHER * before)
@@ -172,13 +231,13 @@ def renew_passed(problem, state, space, log):
     """
     found = False
     for s in range(problem.law.size):
-        if problem.border_count[s] == 0:
+        if problem.border_count[s] == 0 or rubs(problem, s):  # friction is for methods that locate
             continue
-        delta, rate = _present(problem, state, space, s, state.x)
+        delta, rate = _present(problem, state, space, s, state.now[T], state.x, state.rate)
         for j in range(problem.border_count[s]):
             if space.present[s, j] < -space.rounding[s, j]:
                 renew(problem, state, s, j, delta, rate, log)
-                _present(problem, state, space, s, state.x)
+                _present(problem, state, space, s, state.now[T], state.x, state.rate)
                 found = True
     if found:
         note_event(state)

@@ -100,7 +100,7 @@ class DormandPrince:
     Notes
     -----
     Explicit: steps are bounded by the fastest mode (about hω < 6), and in contact by the stop's stiffness. Borders of
-    laws with memory are located like entries and exits; those met at one instant are renewed together.
+    laws with memory and of friction are located like entries and exits; those met at one instant are renewed together.
 
     Examples
     --------
@@ -113,6 +113,7 @@ class DormandPrince:
 
     adaptive: ClassVar[bool] = True
     takes_annuli: ClassVar[bool] = True
+    takes_friction: ClassVar[bool] = True
     events: ClassVar[int] = LOCATED
     work_rows: ClassVar[int] = EXTENDED + 2
     constants: ClassVar[tuple[float, ...]] = ()

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from solvers.compiled.kernels import inner, kernel
+from solvers.compiled.kernels import inner, kernel, rubs, slider_of
 from solvers.problem import Array, Contact, System
+from solvers.problem.friction import ARM, BEGUN, SPIN, STIFFNESS
 from solvers.stepping.stability import is_dissipative, work_of
 
 NOW, BEGAN, LEAST, IN_A_ROW, MOST_INPUT, HELD = range(6)  # places in `Space.watch`, see `watched`
@@ -29,6 +30,10 @@ def gains(problem, state, space):
     given = watch[BEGAN] + watch[MOST_INPUT]
     for s in range(problem.law.size):  # a stop returns at most what it stored
         given += min(max(-state.x[ledger + 2 + 2 * s], 0.0), watch[HELD + s])
+        if rubs(problem, s):
+            own = slider_of(problem, s)
+            given += max(own[ARM] * own[SPIN] * state.x[problem.friction[s, 1] + 1], 0.0)
+            given += 0.5 * own[BEGUN] ** 2 / own[STIFFNESS]
     more = watch[NOW] > 2.0 * given + watch[LEAST]
     watch[IN_A_ROW] = watch[IN_A_ROW] + 1.0 if more else 0.0
     far = watch[NOW] > _FAR * (given + watch[LEAST])

@@ -45,7 +45,7 @@ class Engine:
         self.back = system.blocks.T
         if method.events == HENON:
             self.problem.knots[:, 1:] = math.inf  # kinks are not looked for
-        self.state: State = new_state(z, len(system.contacts))
+        self.state: State = new_state(z, len(system.contacts), sum(c.friction is not None for c in system.contacts))
         dt = 0.0 if method.adaptive else max(method.steps)
         least = negligible_energy(self.problem, np.sum(self.problem.load * self.problem.power, axis=1), dt)
         watch = watched(system, self.back @ z, least)

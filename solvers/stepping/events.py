@@ -5,9 +5,23 @@ Inside a step the displacement of every row is the polynomial of the method's de
 circular clearance ±(|u| - c) of two.
 """
 
+import math
+
 import numpy as np
 
-from solvers.compiled.kernels import dot, indentation, inlined, inner, is_circle, kernel, merged, radial, radius_of
+from solvers.compiled.friction import slide, slide_acceleration
+from solvers.compiled.kernels import (
+    dot,
+    indentation,
+    inlined,
+    inner,
+    kernel,
+    merged,
+    radial,
+    radius_of,
+    slider_of,
+)
+from solvers.compiled.sliding import ACCELERATION, DELTA, RATE, SPEED, WAY, WAY_ACCELERATION
 from solvers.compiled.state import surface_tolerance
 
 # finer near 0, where a contact just left may come back
@@ -31,15 +45,45 @@ def polynomial(coefficients, theta):
 
 @inner
 def motion_of(problem, s, x, dense, coefficients):
-    """Nested coefficients of the displacement on a stop's row and, in the second row, of its rate; of a circle's other
-    row behind them.
+    """Nested coefficients of the displacement on a stop's row and, in the second row, of its rate; of its other rows
+    behind them.
     """
-    row = problem.first[s]
-    _coefficients_of(problem.read[row], problem.gap[row], x, dense, coefficients[0])
-    _coefficients_of(problem.read_rate[row], 0.0, x, dense, coefficients[1])
-    if is_circle(problem, s):
-        _coefficients_of(problem.read[row + 1], problem.gap[row + 1], x, dense, coefficients[2])
-        _coefficients_of(problem.read_rate[row + 1], 0.0, x, dense, coefficients[3])
+    for r in range(problem.first[s], problem.first[s + 1]):
+        place = 2 * (r - problem.first[s])
+        _coefficients_of(problem.read[r], problem.gap[r], x, dense, coefficients[place])
+        _coefficients_of(problem.read_rate[r], 0.0, x, dense, coefficients[place + 1])
+
+
+@inner
+def _slope(coefficients, theta):
+    """Derivative by θ of the nested form."""
+    value, slope, u = coefficients[7], 0.0, 1.0 - theta
+    for i in range(7, 0, -1):
+        factor, change = (theta, 1.0) if i % 2 == 1 else (u, -1.0)
+        slope = slope * factor + value * change
+        value = coefficients[i - 1] + factor * value
+    return slope
+
+
+@inner
+def point_at(problem, s, t, h, theta, coefficients, point):
+    """Motion of an element with friction at θ of a step of duration h from t, see `compiled.sliding`."""
+    radius, own, turned, turning, turning_rate = radius_of(problem, s), slider_of(problem, s), 0.0, 0.0, 0.0
+    u, u_dot = polynomial(coefficients[0], theta), polynomial(coefficients[1], theta)
+    w, w_dot = polynomial(coefficients[2], theta), polynomial(coefficients[3], theta)
+    u_twice, w_twice = _slope(coefficients[1], theta) / h, _slope(coefficients[3], theta) / h
+    if problem.first[s] + 2 < problem.first[s + 1]:
+        turned, turning = -polynomial(coefficients[4], theta), -polynomial(coefficients[5], theta)
+        turning_rate = -_slope(coefficients[5], theta) / h
+    point[DELTA], point[RATE], point[ACCELERATION] = u, u_dot, u_twice
+    if radius != 0.0:
+        square, product, speed = u * u + w * w, u * u_dot + w * w_dot, u_dot * u_dot + w_dot * w_dot
+        point[DELTA], point[RATE] = radial(square, product, speed, radius)
+        along = speed + u * u_twice + w * w_twice
+        twice = (along - product * product / square) / math.sqrt(square)
+        point[ACCELERATION] = twice if radius > 0.0 else -twice
+    point[WAY], point[SPEED] = slide(radius, own, t + theta * h, u, u_dot, w, w_dot, turned, turning)
+    point[WAY_ACCELERATION] = slide_acceleration(radius, own, u, u_dot, u_twice, w, w_dot, w_twice, turning_rate)
 
 
 @inner

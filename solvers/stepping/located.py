@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from solvers.compiled.friction import friction_force
 from solvers.compiled.kernels import (
     copy,
     dot,
@@ -14,8 +15,11 @@ from solvers.compiled.kernels import (
     kernel,
     off_knots,
     radius_of,
+    rubs,
+    slider_of,
 )
 from solvers.compiled.renewals import most_rows
+from solvers.compiled.sliding import DELTA, RATE, WAY, normal_force
 from solvers.compiled.state import (
     AT_ONCE,
     CALLS,
@@ -38,6 +42,7 @@ from solvers.compiled.state import (
     switch,
     switch_on_surface,
 )
+from solvers.problem.friction import PEAK
 from solvers.stepping.borders import border_apart, renew_passed
 from solvers.stepping.events import (
     IGNORED,
@@ -49,6 +54,7 @@ from solvers.stepping.events import (
     golden_section,
     motion_of,
     nearer,
+    point_at,
     rate_at,
 )
 
@@ -60,7 +66,7 @@ NEAR_END = 1e-6  # share of a step: a kink as near to an end as that counts as r
 
 
 @inner
-def _peaks(problem, state, space):
+def _peaks(problem, state, space, h):
     """Largest indentation and force of the step just accepted, for every stop in contact."""
     for s in range(problem.law.size):
         if acting_segment(problem, state, s) == 0 or not begins_and_ends(problem, s):
@@ -77,6 +83,32 @@ def _peaks(problem, state, space):
                 a, b = _PEAK_NODES[max(place - 1, 0)], _PEAK_NODES[min(place + 1, _PEAK_NODES.size - 1)]
                 best = max(best, golden_section(_peak_value, known, a, b)[1])
                 state.active[s, column] = max(state.active[s, column], best)
+        if rubs(problem, s):
+            _peak_of_friction(problem, state, space, h, s)
+
+
+@inner
+def _peak_of_friction(problem, state, space, h, s):
+    """Largest |F_t| of the step just accepted; the motion is that of `motion_of`."""
+    known, best, place = (problem, state, space, h, s), -1.0, 0
+    for i in range(_PEAK_NODES.size):
+        value = _friction_at(known, _PEAK_NODES[i])
+        if value > best:
+            best, place = value, i
+    a, b = _PEAK_NODES[max(place - 1, 0)], _PEAK_NODES[min(place + 1, _PEAK_NODES.size - 1)]
+    own = slider_of(problem, s)
+    own[PEAK] = max(own[PEAK], best, golden_section(_friction_at, known, a, b)[1])
+
+
+@inner
+def _friction_at(known, theta):
+    """|F_t| at θ of the step."""
+    problem, state, space, h, s = known
+    point_at(problem, s, state.now[T], h, theta, space.coefficients, space.point[0])
+    normal = normal_force(
+        problem, s, state.segment[s], state.entry_rate[s], space.point[0, DELTA], space.point[0, RATE]
+    )
+    return abs(friction_force(radius_of(problem, s), slider_of(problem, s), space.point[0, WAY], normal))
 
 
 @inner
@@ -122,7 +154,8 @@ def _side(problem, state, space, s, theta, lowest, batch):
     delta, rate = delta_at(space.coefficients, radius, theta), rate_at(space.coefficients, radius, theta)
     side = 2 if space.kinks[s] & 2 and rate > 0.0 else 0
     if space.kinks[s] & 1 and delta > lowest:
-        side += 1 if force_at(problem, s, delta, rate, state.entry_rate[s], batch) == 0.0 else 0
+        force = force_at(problem, s, delta, rate, state.entry_rate[s], batch)
+        side += 1 if (force <= 0.0 if rubs(problem, s) else force == 0.0) else 0
     return side
 
 
@@ -228,7 +261,7 @@ def accept(problem, state, space, h, stop, direction, at_end, t_end, log, out, d
     if not np.isfinite(dot(space.x_new, space.x_new, space.x_new.size)):
         return LAW_NOT_FINITE if _law_fails(problem, state, space, h) else DIVERGED
     _sample(state, space, h, out, due)
-    _peaks(problem, state, space)
+    _peaks(problem, state, space, h)
     copy(space.x_new, state.x, state.x.size)
     copy(space.rate_new, state.rate, state.x.size)
     state.now[T] = t_end if at_end else state.now[T] + h

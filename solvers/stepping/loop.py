@@ -49,21 +49,22 @@ class Space(NamedTuple):
     rate_new: Any  # (x.size,)
     dense: Any  # (7, x.size) rows r of the interpolant, see `events`
     work: Any  # (rows, x.size) of the method
-    coefficients: Any  # (4, 8), see `events.motion_of`
+    coefficients: Any  # (6, 8), see `events.motion_of`
     watch: Any  # see `watched`
     kinks: Any  # (m,) where laws have kinks inside a segment, see `stability.kinks_of`; used under error control
     margin: Any  # (nodes × B,) margins of an element's borders, row by row, B the most of any; see `borders`
     points: Any  # (2, nodes) its δ and δ̇
     trial: Any  # (2,) δ and δ̇ at one point
     one: Any  # (B,) margins there
-    scale: Any  # (m, 2) what rounding may make of δ and δ̇, m and m/s
+    scale: Any  # (m, 4) what rounding may make of δ and δ̇, ξ and ξ̇, m and m/s
     at_start: Any  # (m, B) margins at the start of the step
     present: Any  # (m, B) margins in the state looked at last
     rounding: Any  # (m, B) what rounding may make of these
+    point: Any  # (2, 6) motion of an element with friction, see `compiled.sliding`
 
 
 SPACE = types.NamedTuple(
-    [VECTOR, VECTOR, MATRIX, MATRIX, MATRIX, VECTOR, INTEGERS, VECTOR, MATRIX, VECTOR, VECTOR, *[MATRIX] * 4], Space
+    [VECTOR, VECTOR, MATRIX, MATRIX, MATRIX, VECTOR, INTEGERS, VECTOR, MATRIX, VECTOR, VECTOR, *[MATRIX] * 5], Space
 )
 
 
@@ -76,11 +77,11 @@ def _renew_rate(problem, state, space):
 
 
 @merged
-def _first_event(problem, state, space, adaptive):
-    """(θ, stop, direction, level, border) of what comes first in a step; border -1 where that is an event of a stop."""
+def _first_event(problem, state, space, h, adaptive):
+    """(θ, stop, direction, level, border) of what comes first in a step of duration h; no border: -1."""
     theta, stop, direction, level = find(problem, state, space)
     if adaptive and theta != UNRESOLVED:
-        place, element, border = border_ahead(problem, state, space)
+        place, element, border = border_ahead(problem, state, space, h)
         if place == 0.0 or place < theta:
             return place, element, direction, level, border
     return theta, stop, direction, level, -1
@@ -175,7 +176,7 @@ def march(
         # --- events
         stop, direction, border, tried = -1, 0, -1, h
         if events == LOCATED:
-            theta, stop, direction, level, border = _first_event(problem, state, space, adaptive)
+            theta, stop, direction, level, border = _first_event(problem, state, space, h, adaptive)
             if border >= 0 and theta == 0.0:  # the step begins on the border and goes across
                 renew_border(problem, state, space, stop, border, log)
                 _renew_rate(problem, state, space)
@@ -238,7 +239,7 @@ def new_space(
         np.empty(size),
         np.zeros((7, size)),
         work,
-        np.empty((4, 8)),
+        np.empty((6, 8)),
         watch,
         np.array(kinks, dtype=np.int64),
         *border_space(problem),

@@ -18,7 +18,6 @@ from solvers.compiled.kernels import (
     inner,
     law_forces,
     merged,
-    radial,
     radial_motion,
     rhs,
 )
@@ -33,21 +32,27 @@ from solvers.compiled.parts import (
     CIRCLE_WORK,
     part,
 )
-from solvers.compiled.simd import load8, sum8
+from solvers.compiled.simd import load8, positive8, splat8, sqrt8, store8, sum8
 from solvers.compiled.state import CALLS, T, acts, surface_tolerance
 from solvers.compiled.sums import above, combine
 from solvers.exponential.contact.many_stops import pair_response
 from solvers.exponential.contact.nodes import S
+from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR, STIFFNESS
+
+_TINY = 1e-300  # m²: at the centre, where there is no direction, δ̇ becomes 0 instead of NaN
 
 
-@inner
+@inlined
 def _radial_nodes(problem, scratch, s):
-    """δ and δ̇ at the nodes from the motion of both rows."""
+    """δ and δ̇ at the nodes from the motion of both rows; returns σ e of both."""
     u, w, own = scratch.motion[problem.first[s]], scratch.motion[problem.first[s] + 1], scratch.motion[problem.own[s]]
-    for i in range(S):
-        square, product = u[0, i] * u[0, i] + w[0, i] * w[0, i], u[0, i] * u[1, i] + w[0, i] * w[1, i]
-        speed = u[1, i] * u[1, i] + w[1, i] * w[1, i]
-        own[0, i], own[1, i] = radial(square, product, speed, problem.radius[s])
+    along, across, sign = load8(u[0], 0), load8(w[0], 0), 1.0 if problem.radius[s] > 0.0 else -1.0
+    r = sqrt8(along * along + across * across + splat8(_TINY))
+    turned = splat8(sign) / r
+    along, across = along * turned, across * turned
+    store8(own[0], 0, splat8(sign) * r - splat8(problem.radius[s]))
+    store8(own[1], 0, along * load8(u[1], 0) + across * load8(w[1], 0))
+    return along, across
 
 
 @inlined
@@ -62,39 +67,39 @@ def radial_nodes(problem, scratch, s):
     _radial_nodes(problem, scratch, s)
 
 
-@inner
-def _radial_forces(problem, state, scratch, s):
+@inlined
+def _radial_forces(problem, tables, state, scratch, s):
     """Force at the nodes for the motion of both rows, and its components, into ``scratch.law_force``."""
-    _radial_nodes(problem, scratch, s)
+    along, across = _radial_nodes(problem, scratch, s)
     row, own = problem.first[s], problem.own[s]
-    motion, force, along, across = (
-        scratch.motion[own],
-        scratch.law_force[own],
-        scratch.motion[row],
-        scratch.motion[row + 1],
-    )
-    above(motion[0], problem.knots[s, 0], scratch.clipped)
-    law_forces(problem, s, S, scratch.clipped, motion[1], state.entry_rate[s], force)
+    motion, force = scratch.motion[own], scratch.law_force[own]
+    law = tables.power_law[s]
+    if law[EXPONENT] > 0.0:
+        deep, rate = positive8(load8(motion[0], 0)), load8(motion[1], 0)
+        deep = deep * sqrt8(deep) if law[EXPONENT] == 1.5 else deep
+        growth = splat8(1.0) + splat8(law[FACTOR] / state.entry_rate[s]) * rate
+        store8(force, 0, splat8(law[STIFFNESS]) * deep * growth + splat8(law[DAMPING]) * rate)
+    else:
+        above(motion[0], problem.knots[s, 0], scratch.clipped)
+        law_forces(problem, s, S, scratch.clipped, motion[1], state.entry_rate[s], force)
     state.count[CALLS] += S
-    for i in range(S):
-        r = math.sqrt(along[0, i] * along[0, i] + across[0, i] * across[0, i])
-        share = _signed(problem, s, force[i]) / r
-        scratch.law_force[row, i], scratch.law_force[row + 1, i] = share * along[0, i], share * across[0, i]
+    store8(scratch.law_force[row], 0, load8(force, 0) * along)
+    store8(scratch.law_force[row + 1], 0, load8(force, 0) * across)
 
 
 @part(CIRCLE_FORCES, types.void, types.int64)
-def radial_forces(problem, state, scratch, s):
+def radial_forces(problem, tables, state, scratch, s):
     """The same at an address."""
-    _radial_forces(problem, state, scratch, s)
+    _radial_forces(problem, tables, state, scratch, s)
 
 
 @part(CIRCLE_GUESS, types.void, types.int64)
-def guess_radial_forces(problem, state, scratch, s):
+def guess_radial_forces(problem, tables, state, scratch, s):
     """First guess of the components: the law for the free response."""
     for r in range(problem.first[s], problem.first[s] + 2):
         copy(scratch.free[r, 0], scratch.motion[r, 0], S)
         copy(scratch.free[r, 1], scratch.motion[r, 1], S)
-    _radial_forces(problem, state, scratch, s)
+    _radial_forces(problem, tables, state, scratch, s)
     for r in range(problem.first[s], problem.first[s] + 2):
         copy(scratch.law_force[r], scratch.force[r], S)
 

@@ -78,7 +78,7 @@ def _iterate(problem, tables, state, scratch, node_set, level):
             respond(problem, tables, state, scratch, node_set, level, r)
     for s in range(problem.law.size):
         if state.segment[s] > 0:
-            node_forces(problem, state, scratch, s)
+            node_forces(problem, tables, state, scratch, s)
             unit = 1.0 / scratch.force_tolerance[s] ** 2
             for r in range(problem.first[s], problem.first[s + 1]):
                 moved, size = replace_values(scratch.force[r], scratch.law_force[r])

@@ -104,7 +104,7 @@ def newton(problem, tables, state, scratch, node_set, level):
                 continue
             for r in range(problem.first[s], problem.first[s + 1]):
                 respond(problem, tables, state, scratch, node_set, level, r)
-            node_forces(problem, state, scratch, s)
+            node_forces(problem, tables, state, scratch, s)
             for r in range(problem.first[s], problem.first[s + 1]):
                 for i in range(S):
                     scratch.residual[place + i] = scratch.law_force[r, i] - scratch.force[r, i]

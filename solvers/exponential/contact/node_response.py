@@ -300,10 +300,10 @@ def rate_ripple_of(ripple_weight, k, alias, x, n):
 
 
 @inlined
-def node_forces(problem, state, scratch, s):
+def node_forces(problem, tables, state, scratch, s):
     """Forces of stop s on its rows at the nodes by its law, into ``scratch.law_force``."""
     if is_circle(problem, s):
-        radial_forces(problem, state, scratch, s)
+        radial_forces(problem, tables, state, scratch, s)
         return
     motion, force = motion_of(problem, scratch, s), scratch.law_force[problem.first[s]]
     above(motion[0], problem.knots[s, 0], scratch.clipped)

@@ -122,7 +122,7 @@ def _predict(problem, tables, state, scratch, level):
         if state.segment[s] == 0:
             continue
         if control[NEW] and is_circle(problem, s):
-            guess_radial_forces(problem, state, scratch, s)
+            guess_radial_forces(problem, tables, state, scratch, s)
             continue
         if control[NEW]:
             free, force = scratch.free[problem.first[s]], force_of(problem, scratch, s)

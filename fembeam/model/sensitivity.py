@@ -1,0 +1,339 @@
+"""How a run or an orbit changes with one number of its scene, or with its start: exact derivatives through all events.
+
+    u(z, t; p) = φ(z; p)·q(t; p),    du/dp = φ·dq/dp + dφ/dp·q
+
+The data of the reduced equations (frequencies, damping, shapes, gaps, laws, tones) are differenced by five-point
+formulas of the parameter; the motion is not: its derivative solves the variational equation, see
+`solvers.sensitivities`.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fembeam.model.equations import load_period
+from fembeam.model.histories import directed
+from fembeam.scene import changes_structure, path_of, replaced, value_of
+from fembeam.scene.signals import is_of_signal
+from fembeam.support import Part, Printed, require
+from solvers.orbits import codes, counts, delayed
+from solvers.problem import counted, dataframe
+from solvers.sensitivities import Nearby, sensitivity
+
+if TYPE_CHECKING:
+    import solvers
+    from fembeam.model.model import Model
+    from fembeam.model.orbit import Orbit
+    from fembeam.model.run import Run
+
+Vector = NDArray[np.float64]
+STRUCTURE, SIGNAL, OTHER = 1e-3, 1e-6, 1e-4  # steps of the data, in units of the value: modes are known less exactly
+UNIT = 1.0  # what stands for a value that is zero, of a load, a gap or a law
+FELT = 1e-6  # relative change of frequencies or shapes by which a step of a number that is zero is felt
+ROUGH = 1e-2  # by which differences of one and of two steps may differ, relatively
+CHAOS = 1e6  # growth of small changes above which a derivative says little
+LONGEST = 60  # contacts that are printed
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivity(Printed):
+    """Derivatives of a run, or of one period of an orbit, by a parameter p; per unit of p, in SI units.
+
+    Attributes
+    ----------
+    parameter : path of p; "start" of a direction in which the start moves. value : of p, NaN of a start.
+    run : whose derivatives these are. found : `solvers.sensitivities.Sensitivity` with all that is known.
+    period : s per unit of p, of an orbit; 0 of a run.
+    """
+
+    parameter: str
+    value: float
+    run: Run
+    found: Any
+    period: float = 0.0
+    models: Nearby | None = field(default=None, repr=False)  # where shapes change
+
+    @property
+    def t(self) -> Vector:
+        """(k,) s, the samples of the run; without samples its end. Derivatives are taken at these fixed times."""
+        return self.found.t  # type: ignore[no-any-return]
+
+    @property
+    def q(self) -> Vector:
+        """(k, n) of the coordinates."""
+        return np.asarray(np.split(self.found.states, 2, axis=1)[0])
+
+    @property
+    def q_dot(self) -> Vector:
+        """(k, n) of their rates."""
+        return np.asarray(np.split(self.found.states, 2, axis=1)[1])
+
+    @property
+    def state(self) -> Vector:
+        """(2n,) of the state at the start; of an orbit that of `Orbit.state`."""
+        return self.found.states[0]  # type: ignore[no-any-return]
+
+    @property
+    def contacts(self) -> solvers.ContactLog:
+        """The contacts to which the entries of `entries`, `exits`, `peak_force` and `impulse` belong."""
+        return self.found.contacts  # type: ignore[no-any-return]
+
+    @property
+    def entries(self) -> Vector:
+        """(c,) of the times t_in, s; 0 of a contact under way at the start."""
+        return self.found.entries  # type: ignore[no-any-return]
+
+    @property
+    def exits(self) -> Vector:
+        """(c,) of the times t_out, s; NaN of a contact that has not ended."""
+        return self.found.exits  # type: ignore[no-any-return]
+
+    @property
+    def peak_force(self) -> Vector:
+        """(c,) of the largest forces, N or N m."""
+        return self.found.peak_force  # type: ignore[no-any-return]
+
+    @property
+    def impulse(self) -> Vector:
+        """(c,) of the impulses, N s or N m s."""
+        return self.found.impulse  # type: ignore[no-any-return]
+
+    @property
+    def growth(self) -> float:
+        """Largest factor by which a small change of the start grows to the end, in the norm of energy."""
+        return self.found.growth  # type: ignore[no-any-return]
+
+    def displacement(self, z: Any, direction: Any = None, body: int = 0) -> Vector:
+        """Of u(z, t), m relative to the frame: (k,) at one z, (k, j) at z (j,); places as for `Run.displacement`."""
+        return self._of_motion(self.q, self.found.solution.q, z, direction, body)
+
+    def velocity(self, z: Any, direction: Any = None, body: int = 0) -> Vector:
+        """Of u̇(z, t), m/s, likewise."""
+        return self._of_motion(self.q_dot, self.found.solution.q_dot, z, direction, body)
+
+    def extremes(self, z: Any, direction: Any = None, body: int = 0) -> tuple[float, float]:
+        """Of the lowest and of the highest displacement at one z over the samples; sample finely.
+
+        Where a maximum is met inside the run u̇ = 0, so that its derivative is that of u at its fixed time. Of two equal
+        maxima it is the derivative of one.
+        """
+        u, v = (ask(z, direction, body) for ask in (self.run.displacement, self.run.velocity))
+        du, dv = (ask(z, direction, body) for ask in (self.displacement, self.velocity))
+        return tuple(_of_top(self.t, sign * u, sign * v, du, dv) for sign in (-1.0, 1.0))  # type: ignore[return-value]
+
+    def _of_motion(self, changed: Vector, motion: Vector, z: Any, direction: Any, body: int) -> Vector:
+        """φ·dq + dφ·q."""
+        model = self.run.readout.model
+        at = z if direction is None else directed(z, direction)
+        found = changed @ np.asarray(model.phi(at, 0, body)).T
+        if self.models is not None:
+            own = motion[np.searchsorted(self.found.solution.t, self.t).clip(max=len(motion) - 1)]
+            found = found + own @ self.models.derivative(lambda one: one.phi(at, 0, body)).T
+        return np.asarray(found)
+
+    def table(self) -> list[dict[str, Any]]:
+        """One contact a row: its name and times, and its derivatives."""
+        log = self.contacts
+        columns = {"contact": log.name, "t_in": log.t_in, "t_out": log.t_out, "entry": self.entries}
+        columns |= {"exit": self.exits, "peak force": self.peak_force, "impulse": self.impulse}
+        rows = zip(*(np.asarray(column).tolist() for column in columns.values()), strict=True)
+        return [dict(zip(columns, row, strict=True)) for row in rows]
+
+    def to_dataframe(self) -> Any:
+        """The table as one of pandas; ImportError without pandas."""
+        return dataframe(self.table())
+
+    def __repr__(self) -> str:
+        at = "" if np.isnan(self.value) else f" = {self.value:.6g}"
+        return f"<derivatives by {self.parameter}{at} over {self.run!r}>"
+
+    def _parts(self) -> list[Part]:
+        """What by, how far changes grow, and the table."""
+        head = f"derivatives by {self.parameter}" + ("" if np.isnan(self.value) else f" = {self.value:.9g}")
+        growth = f"small changes of the start grow by {self.growth:.3g} to the end"
+        rows = [tuple(row.values()) for row in self.table()[:LONGEST]]
+        names = "contact", "t_in / s", "t_out / s", "d t_in", "d t_out", "d peak force", "d impulse"
+        left = len(self.contacts) - len(rows)
+        more: list[Part] = [f"and {counted(left, 'contact')} more"] if left else []
+        return [head, growth, *([(names, rows)] if rows else []), *more]
+
+
+def _of_top(t: Vector, u: Vector, v: Vector, du: Vector, dv: Vector) -> float:
+    """Derivative of the highest value of the cubics through u and v, by those of u and v at fixed times."""
+    i = int(np.argmax(u))
+    best, found = u[i], float(du[i])
+    for j in (i - 1, i):
+        if not (0 <= j < len(t) - 1 and v[j] > 0.0 > v[j + 1]):
+            continue
+        h, places = t[j + 1] - t[j], np.linspace(0.0, 1.0, 2001)
+        top = int(np.argmax(_cubic(places, h, u[j : j + 2], v[j : j + 2])))
+        if _cubic(places[top], h, u[j : j + 2], v[j : j + 2]) > best:
+            best = _cubic(places[top], h, u[j : j + 2], v[j : j + 2])
+            found = float(_cubic(places[top], h, du[j : j + 2], dv[j : j + 2]))
+    return found
+
+
+def _cubic(x: Any, h: float, u: Vector, v: Vector) -> Any:
+    """The cubic through values and slopes at 0 and 1."""
+    rest = 1.0 - x
+    return rest**2 * ((1.0 + 2.0 * x) * u[0] + x * h * v[0]) + x**2 * ((3.0 - 2.0 * x) * u[1] - rest * h * v[1])
+
+
+@dataclass(frozen=True, eq=False)
+class _Varied:
+    """A model with one number of its scene varied."""
+
+    model: Model
+    path: str
+
+    @cached_property
+    def value(self) -> float:
+        """Its present value."""
+        return value_of(self.model.scene, self.path)
+
+    @cached_property
+    def models(self) -> Nearby | None:
+        """Models near the present one, where modes change."""
+        if not changes_structure(self.path):
+            return None
+        step = STRUCTURE * abs(self.value) or self._felt()
+        found = self._near(lambda value: self.model.again(self._scene(value)), step)
+        sizes = {len(one.omega) for one in found.systems}
+        require(sizes == {len(self.model.omega)}, "the number of coordinates must not change", sizes, self.path,
+                "name the modes by number, modes=3")  # fmt: skip
+        _check_smooth(found, self.path)
+        return found
+
+    @cached_property
+    def systems(self) -> Nearby:
+        """Systems near the present one."""
+        if self.models is not None:
+            return self.models.map(lambda one: one.system)
+        step = (SIGNAL if is_of_signal(self.path) else OTHER) * (abs(self.value) or UNIT)
+        return self._near(lambda value: self.model.system_like(self._scene(value)), step)
+
+    @cached_property
+    def lengthening(self) -> float:
+        """Change of the loads' period, s per unit."""
+        if not is_of_signal(self.path):
+            return 0.0
+        step = SIGNAL * (abs(self.value) or UNIT)
+        return float(self._near(lambda value: load_period(self._scene(value)), step).derivative(lambda one: one))
+
+    def _scene(self, value: float) -> Any:
+        return replaced(self.model.scene, self.path, value)
+
+    def _felt(self) -> float:
+        """A step of a number that is zero and changes modes, which they feel."""
+        step, here = FELT, self.model
+        while step < 1.0 / FELT:
+            there = here.again(self._scene(step))
+            pairs = ((here.omega**2, there.omega**2), (here.directions, there.directions), (here.zeta, there.zeta))
+            if any(np.abs(b - a).max(initial=0.0) > FELT * np.abs(a).max(initial=0.0) for a, b in pairs):
+                break
+            step *= 10.0
+        return step
+
+    def _near(self, make: Any, step: float) -> Nearby:
+        """What is made at five-point formulas' values."""
+        try:
+            return Nearby.of(make, self.value, step)
+        except ValueError as error:
+            raise ValueError(
+                f"no derivative by {self.path}: values near {self.value:.6g} are refused: {error}"
+            ) from None
+
+    def start(self, x: Vector) -> Vector | None:
+        """Derivative of the start: of rest that of rest, else zero in coordinates."""
+        if self.models is None or not np.array_equal(x, self.model.rest()):
+            return None
+        return self.models.derivative(lambda one: one.rest())
+
+
+def _check_smooth(models: Nearby, path: str) -> None:
+    """ValueError where frequencies jump between the values: the mesh or the order of modes changes."""
+    rough = max(models.disagreement(lambda one: one.omega**2), models.disagreement(lambda one: one.directions))
+    require(rough <= ROUGH, "modes must change smoothly with the parameter", path, "sensitivity",
+            "give elements, or other modes: two may change places here")  # fmt: skip
+
+
+def of_run(run: Run, parameter: str | None, start: ArrayLike | None) -> Sensitivity:
+    """See `Run.sensitivity`."""
+    made, model = run.made, run.model
+    if model is None or made is None:
+        raise ValueError("a run read from a file has no model to be derived from; simulate it again")
+    require((parameter is None) != (start is None), "give a parameter or a direction of the start", (parameter, start),
+            "Run.sensitivity", "e.g. 'stops[0].gap'")  # fmt: skip
+    times = run.t if run.sampled else np.array([made.duration])
+    x, n = made.start, len(model.omega)
+    options = {"method": made.solver, "memory": run.began or None}
+    if parameter is None:
+        direction = _direction(model, start)
+        found = sensitivity(model.system, x[:n], x[n:], made.duration, times, None, direction, **options)
+        return _warned(Sensitivity("start", float("nan"), run, found))
+    varied = _Varied(model, path_of(model.scene, parameter))
+    found = sensitivity(model.system, x[:n], x[n:], made.duration, times, varied.systems, varied.start(x), **options)
+    return _warned(Sensitivity(varied.path, varied.value, run, found, 0.0, varied.models))
+
+
+def _direction(model: Model, start: Any) -> Vector:
+    """A checked direction of the start."""
+    direction = np.asarray(start, dtype=float)
+    fits = direction.shape == (2 * len(model.omega),) and bool(np.isfinite(direction).all())
+    require(fits, f"start must be a direction of the start, ({2 * len(model.omega)},) finite numbers", start,
+            "Run.sensitivity", "e.g. model.state(displacement=lambda z: z)")  # fmt: skip
+    return direction
+
+
+def _warned(found: Sensitivity) -> Sensitivity:
+    """With a warning where the motion forgets its start too fast."""
+    if found.growth > CHAOS:
+        warnings.warn(
+            f"small changes of the start grow by {found.growth:.3g} to the end of the run: errors grow so too, and the "
+            "derivative holds for changes of the parameter so much smaller; shorten the run, or ask for statistics",
+            UserWarning,
+            stacklevel=4,
+        )
+    return found
+
+
+def of_orbit(orbit: Orbit, parameter: str) -> Sensitivity:
+    """See `Orbit.sensitivity`."""
+    model, found = orbit.model, orbit.found
+    varied, n = _Varied(model, path_of(model.scene, parameter)), len(model.omega)
+    later, system = varied.systems.map(lambda one: delayed(one, found.phase)), delayed(found.system, found.phase)
+    known = found.state[:n], found.state[n:], found.period
+    options: dict[str, Any] = {"method": found.method, "memory": found.memory or None}
+    once = sensitivity(system, *known, (), later, None, **options)
+    lengthening = orbit.period * varied.lengthening
+    change = once.end.copy()
+    change[: 2 * n] += once.rate * lengthening
+    start = _fixed_point(once.matrix, change, _free(found))
+    period = sensitivity(system, *known, orbit.run.t, later, start, **options)
+    return Sensitivity(varied.path, varied.value, orbit.run, period, lengthening, varied.models)
+
+
+def _free(found: Any) -> Any:
+    """Which entries of [q, q̇, latched] the orbit determines: no codes, and nothing that is never renewed."""
+    own = codes(found.system)
+    free = ~np.asarray(own) if found.memory else np.ones(2 * found.system.size, dtype=bool)
+    first = 2 * found.system.size + np.concatenate(([0], np.cumsum(counts(found.system)))).astype(int)
+    for contact, place in found.family:
+        free[int(first[contact]) + place] = False
+    return free
+
+
+def _fixed_point(matrix: Vector, change: Vector, free: Any) -> Vector:
+    """Dx from dx = Φ dx + change: the theorem of implicit functions."""
+    dx = np.zeros(len(change))
+    left = np.eye(int(free.sum())) - matrix[np.ix_(free, free)]
+    if np.linalg.cond(left) > 1e10:
+        raise ArithmeticError("no derivative: the orbit is at a fold or a branch point, where a multiplier is 1")
+    dx[free] = np.linalg.solve(left, change[free])
+    return dx

@@ -1,0 +1,125 @@
+"""Friction of a contact: one slider behind a spring, whose limit is μ times the contact's own force."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from solvers.problem.matrices import Array
+
+(MU, STIFFNESS, ARM, SPIN, CODE, SLIDER, PEAK, BEGUN, SCRATCH) = range(9)
+"""Places of a contact's friction behind its law's parameters: μ; k_t, N/m; R, m, negative where the place runs around a
+post; Ω, rad/s; code of the segment; s, m; largest |F_t| of the contact under way and F_t as the run began, N."""
+SIZE = 16  # the rest is scratch
+ACCOUNTS = 3  # numbers in the state behind the energy balance: ∫F_t ξ̇ dt, ∫F_t dt, and the way of the slider
+STICK, FREE = 0.0, 2.0  # codes; those of slip are -1 and 1, FREE is that of an open contact
+
+
+@dataclass(frozen=True)
+class Friction:
+    """Dry friction of a contact: a spring and a slider in series, with the limit μN(t) of the contact's force N.
+
+    With ξ the tangential displacement and s the slider's place,
+
+        stick: F_t = k_t (ξ - s) while |F_t| < μN;    slip: F_t = ±μN while the slider moves that way, ±(ξ̇ ∓ μṄ/k_t) > 0
+
+    The loss is ∫F_t ξ̇ dt - F_t²/2k_t. A contact begins in stick where N jumps at entry or grows quicker than the spring
+    is drawn, k_t |ξ̇| <= μṄ; else in slip, as laws of exponent above 1 always do. One under way as a run begins is
+    undrawn. A law that adheres, N < 0, has the limit 0 there: the slider follows without force.
+
+    Parameters
+    ----------
+    mu : μ >= 0, coefficient of friction.
+    stiffness : k_t > 0, N/m, tangential, of the contact; k_t/k_n = 2(1 - ν)/(2 - ν) of its normal stiffness for spheres
+        (Mindlin).
+
+    Notes
+    -----
+    R.D. Mindlin, J. Appl. Mech. 16 (1949) 259-268, for k_t, which does not follow N: one that does would make energy.
+    Friction without ``stiffness``, of the sign of ξ̇ alone, is not offered: what should roll would slip to and fro.
+
+    Examples
+    --------
+    >>> Friction(0.3, stiffness=2e6).mu
+    0.3
+    """
+
+    mu: float
+    stiffness: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("mu", "stiffness"):
+            value: Any = getattr(self, name)
+            if name == "stiffness" and value is None:
+                raise ValueError("Friction needs stiffness > 0, the tangential one of the contact (N/m)")
+            try:
+                number = float(value)
+            except (TypeError, ValueError):
+                raise TypeError(f"{name} of Friction must be a number, got {value!r}") from None
+            least = ">= 0" if name == "mu" else "> 0 (N/m)"
+            if not math.isfinite(number) or number < 0.0 or (name == "stiffness" and number == 0.0):
+                raise ValueError(f"{name} of Friction must be finite and {least}, got {value!r}")
+            object.__setattr__(self, name, number)
+
+
+class Rubbing:
+    """The law of a contact with its friction: the law itself, whose parameters go on with those of the slider.
+
+    To integrators a law with one border and two latched numbers, code and place of the slider; its border is not a C
+    function of δ and δ̇, see `compiled.sliding`.
+    """
+
+    borders = 1
+    events = ("stick", "slip")
+    segment_codes = ((-1.0, 0.0, 1.0, 2.0), ())
+
+    def __init__(self, law: Any, friction: Friction, arm: float, spin: float) -> None:
+        self.law, self.friction, self.arm, self.spin = law, friction, arm, spin
+
+    def __getattr__(self, name: str) -> Any:
+        """What the slider does not change is the law's."""
+        if name in ("law", "__setstate__"):  # of a copy that is being made
+            raise AttributeError(name)
+        return getattr(self.law, name)
+
+    def __repr__(self) -> str:
+        return f"{self.law!r} with {self.friction!r}"
+
+    @property
+    def place(self) -> int:
+        """Where the numbers of friction begin among the parameters: never at 0."""
+        return max(1, len(self.law.parameters))
+
+    @property
+    def memory(self) -> tuple[int, ...]:
+        """Places of code and slider."""
+        return self.place + CODE, self.place + SLIDER
+
+    @property
+    def parameters(self) -> Array:
+        """Those of the law, then of friction."""
+        numbers = np.zeros(self.place + SIZE)
+        own = np.asarray(self.law.parameters, dtype=float)
+        numbers[: own.size] = own
+        known = self.friction.mu, self.friction.stiffness, self.arm, self.spin, FREE
+        numbers[self.place : self.place + SLIDER] = known
+        return numbers
+
+    def stored(self, delta: float, parameters: Array) -> float:
+        """Energy of the law alone, J; that of the slider's spring is F_t²/2k_t."""
+        return float(self.law.stored(delta, np.asarray(self.law.parameters, dtype=float)))
+
+
+def row_of(name: str, given: ArrayLike, size: int) -> Array:
+    """A checked row of coordinates of a contact."""
+    row = np.array(given, dtype=float, ndmin=1)
+    if row.shape != (size,) or not np.all(np.isfinite(row)) or not row.any():
+        raise ValueError(
+            f"{name} of a Contact must be a finite row of {size} numbers that are not all 0, got {given!r}"
+        )
+    row.setflags(write=False)
+    return row

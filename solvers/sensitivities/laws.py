@@ -1,0 +1,93 @@
+"""Compiled laws called from Python: force, its derivatives, and what a memory does on a border."""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any
+
+import numpy as np
+
+from solvers.problem import Array
+
+_REALS = ctypes.POINTER(ctypes.c_double)
+_KNOWN = ctypes.c_int64, _REALS, _REALS, ctypes.c_double, _REALS
+_AT = ctypes.c_int64, ctypes.c_double, ctypes.c_double, ctypes.c_double, _REALS
+_ONE, _THREE = ctypes.CFUNCTYPE(None, *_KNOWN, _REALS), ctypes.CFUNCTYPE(None, *_KNOWN, *[_REALS] * 3)
+_MAPS = ctypes.CFUNCTYPE(None, *_AT, _REALS)
+_SHARE, _LEAST = 1e-7, 1e-10  # of differences of margins, which are nearly linear
+
+
+def _pointers(*arrays: Array) -> list[Any]:
+    """Addresses of numbers."""
+    return [array.ctypes.data_as(_REALS) for array in arrays]
+
+
+def _call(function: Any, row: Array, motion: tuple[Array, Array], entry_rate: float, *out: Array) -> None:
+    """Call a law at δ and δ̇ (k,)."""
+    delta, rate = (np.array(one, dtype=float, ndmin=1) for one in motion)
+    d, v, p, *results = _pointers(delta, rate, row, *out)
+    function(delta.size, d, v, entry_rate, p, *results)
+
+
+def force(law: Any, row: Array, motion: tuple[Any, Any], entry_rate: float) -> Array:
+    """F (k,)."""
+    out = np.zeros(np.size(motion[0]))
+    _call(_ONE(law.address), row, motion, entry_rate, out)
+    return out
+
+
+def slopes(law: Any, row: Array, motion: tuple[Any, Any], entry_rate: float) -> Array:
+    """∂F/∂δ, ∂F/∂δ̇ and ∂F/∂(entry rate), (3, k)."""
+    out = np.zeros((3, np.size(motion[0])))
+    _call(_THREE(law.gradient_address), row, motion, entry_rate, *out)
+    return out
+
+
+def by_latched(law: Any, row: Array, motion: tuple[Any, Any], entry_rate: float) -> Array:
+    """∂F/∂(latched numbers), (l, k)."""
+    out = np.zeros((len(getattr(law, "memory", ())), np.size(motion[0])))
+    if len(out):
+        _call(_ONE(law.memory_gradient_address), row, motion, entry_rate, out)
+    return out
+
+
+def margin(law: Any, row: Array, border: int, delta: float, rate: float, entry_rate: float) -> float:
+    """Margin of one border."""
+    out = np.zeros((law.borders, 1))
+    _call(_ONE(law.borders_address), row, (np.array(delta), np.array(rate)), entry_rate, out)
+    return float(out[border, 0])
+
+
+def margin_slopes(law: Any, row: Array, border: int, delta: float, rate: float, entry_rate: float) -> Array:
+    """Its derivatives (2 + l,) by δ, δ̇ and what is latched, by differences."""
+    places = list(law.memory)
+    at = np.array([delta, rate, *row[places]])
+
+    def value(x: Array) -> float:
+        other = row.copy()
+        other[places] = x[2:]
+        return margin(law, other, border, float(x[0]), float(x[1]), entry_rate)
+
+    found = np.zeros(at.size)
+    for i, step in enumerate(np.maximum(_SHARE * np.abs(at), _LEAST)):
+        unit = np.zeros(at.size)
+        unit[i] = step
+        found[i] = (value(at + unit) - value(at - unit)) / (2.0 * step)
+    return found
+
+
+def renewal_slopes(law: Any, row: Array, border: int, delta: float, rate: float, entry_rate: float) -> Array:
+    """Derivatives (l, 2 + l) of what is latched on a border by δ, δ̇ and what was latched."""
+    count = len(law.memory)
+    out = np.zeros((count, 2 + count))
+    _MAPS(law.renew_gradient_address)(border, delta, rate, entry_rate, *_pointers(row, out))
+    return out
+
+
+def renewed(law: Any, row: Array, border: int, delta: float, rate: float) -> Array:
+    """A row of parameters after a renewal."""
+    from solvers.problem import renew
+
+    after = row.copy()
+    renew(law, after, border, delta, rate)
+    return after

@@ -1,0 +1,188 @@
+"""A run divided at its events: which elements act from one to the next, with which latched numbers, and where its
+motion has to be known.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import groupby, pairwise
+from typing import Any
+
+import numpy as np
+
+from solvers.compiled.state import law_parameters
+from solvers.integration import prepared_run
+from solvers.problem import Array, Solution, SolverError, Status, System
+from solvers.problem import event_list as at
+from solvers.sensitivities import laws
+from solvers.sensitivities.panels import Clock, Panel
+
+_RADIANS = 1.5  # of the fastest motion in one panel
+_FEWEST = 2  # panels between two events, where elements act
+_MOST_NODES = 4_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Acting:
+    """What acts between two events: the segment of each element's law (0: none), its entry rate, its parameters."""
+
+    segment: tuple[int, ...]
+    entry_rate: tuple[float, ...]
+    rows: tuple[Array, ...]
+
+    @property
+    def elements(self) -> list[int]:
+        """Those that act."""
+        return [s for s, segment in enumerate(self.segment) if segment > 0]
+
+    def changed(self, s: int, **new: Any) -> Acting:
+        """With other values of one element."""
+        return replace(self, **{
+            name: tuple(value if i == s else old for i, old in enumerate(getattr(self, name)))
+            for name, value in new.items()
+        })  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """From one event to the next: what acts, and edges between panels, or between flights where there are none."""
+
+    start: float
+    end: float
+    acting: Acting
+    edges: Array  # times, start and end among them
+    panels: list[Panel] = field(default_factory=list)
+
+    @property
+    def times(self) -> list[Array]:
+        """Where the motion has to be known."""
+        return [self.edges, *(panel.times for panel in self.panels)]
+
+
+def replayed(
+    system: System, x: Array, duration: float, times: Any, method: Any, memory: Sequence[Any] | None
+) -> tuple[Solution, Array]:
+    """The run with its list of events (k, 14), a row an event."""
+    n = system.size
+    run = prepared_run(system, x[:n], x[n:], duration, times, method, False, memory)
+    status = run.to_the_end(None)
+    solution = run.solution(status, 0.0)
+    rows = run.log[: int(run.state.count[_LOGGED])].copy()
+    run.release()
+    if solution.status is not Status.DONE:
+        raise SolverError(f"the run has no derivative to its end: {solution.status.value}", solution)
+    return solution, rows
+
+
+_LOGGED = 4  # place of the number of events in `State.count`
+
+
+def acting_at_start(system: System, x: Array, rows: Array, memory: Sequence[Any] | None) -> Acting:
+    """What acts at t = 0, before events then."""
+    begun = {int(row[at.ELEMENT]): row for row in rows if row[at.GUARD] == at.BEGIN}
+    segment, entry_rate, parameters = [], [], list(law_parameters(system))
+    for s, contact in enumerate(system.contacts):
+        law: Any = contact.law
+        delta, rate = (-contact.direction @ part for part in np.split(x, 2))
+        begin = begun.get(s)
+        known = begin[at.TO] if begin is not None else 0.0
+        segment.append(1 + sum(delta - contact.gap > knot for knot in law.knots) if contact.always else int(known))
+        entry_rate.append(max(abs(rate), law.entry_rate_floor))
+        if memory is not None and memory[s] is not None:
+            parameters[s][list(law.memory)] = memory[s]
+    return Acting(tuple(segment), tuple(entry_rate), tuple(parameters))
+
+
+def after(system: System, acting: Acting, row: Array) -> Acting:
+    """What acts after an event."""
+    s, guard, rate = int(row[at.ELEMENT]), row[at.GUARD], row[at.RATE]
+    law: Any = system.contacts[s].law
+    if guard == at.BEGIN:
+        return acting
+    if row[at.FROM] == 0.0 and row[at.TO] > 0.0:
+        acting = acting.changed(s, entry_rate=max(abs(rate), law.entry_rate_floor))
+    if guard == at.KNOT:
+        return acting.changed(s, segment=acting.segment[s] + (1 if rate > 0.0 else -1))
+    return acting.changed(s, rows=laws.renewed(law, acting.rows[s], int(guard), row[at.DELTA], rate))
+
+
+def grouped(rows: Array) -> list[tuple[float, list[Array]]]:
+    """Events by their times."""
+    return [(float(t), list(group)) for t, group in groupby(rows, key=lambda row: row[at.TIME])]
+
+
+class Division:
+    """Stretches of a run, with panels fine enough for its modes and its laws."""
+
+    def __init__(self, system: System, forced: bool, samples: Array, depth: Array) -> None:
+        self.system, self.forced, self.samples = system, forced, samples
+        self.k, self.c = system.blocks.k, system.blocks.c
+        tones = [signal.tones()[0] for _, signal in system.loads if hasattr(signal, "tones")] if forced else []
+        speeds = np.sqrt(np.abs(self.k)), np.abs(self.c), *(np.abs(np.asarray(tone, float)) for tone in tones)
+        self.fastest = max((float(one.max(initial=0.0)) for one in speeds), default=0.0)
+        self.stiffest = [self._frequency(s, depth[s]) for s in range(len(system.contacts))]
+
+    def _frequency(self, s: int, depth: float) -> float:
+        """Estimated frequency of an element alone on the system's mass, rad/s."""
+        contact = self.system.contacts[s]
+        places = depth * np.linspace(0.05, 1.0, 7)
+        places = np.concatenate((-places, places)) if contact.always else places
+        row = law_parameters(self.system)[s]
+        found = laws.slopes(contact.law, row, (places, 0.0 * places), 1.0)
+        mobility = float(contact.direction @ np.linalg.solve(self.system.M, contact.direction))
+        stiffness, damping = (float(np.nanmax(np.abs(one), initial=0.0)) for one in found[:2])
+        return math.sqrt(stiffness * mobility) + damping * mobility
+
+    def stretches(self, acting: Acting, rows: Array, duration: float, refinement: int) -> Iterator[Stretch]:
+        """All of them, one after the other; events at one time are passed together."""
+        events = grouped(rows)
+        marks = [0.0, *(t for t, _ in events if t > 0.0), duration]
+        passed = dict(events)
+        for start, end in pairwise(marks):
+            for row in passed.get(start, ()):
+                acting = after(self.system, acting, row)
+            if end > start:
+                yield self._stretch(start, end, acting, refinement)
+
+    def _stretch(self, start: float, end: float, acting: Acting, refinement: int) -> Stretch:
+        """One, with its panels."""
+        inside = self.samples[(self.samples > start) & (self.samples < end)]
+        edges = np.concatenate(([start], inside, [end]))
+        if not (acting.elements or self.forced):
+            return Stretch(start, end, acting, edges)
+        clock = Clock(start, end, max([1, *(_power(self.system.contacts[s]) for s in acting.elements)]))
+        speed = max([self.fastest, *(self.stiffest[s] for s in acting.elements)])
+        count = refinement * (_FEWEST + math.ceil((end - start) * speed / _RADIANS))
+        if count * len(self.k) > _MOST_NODES:
+            raise ValueError(
+                f"a sensitivity over {end - start:g} s with motion of {speed:.3g} rad/s takes {count} panels; "
+                "keep fewer modes, or shorten the run"
+            )
+        between = np.linspace(0.0, 1.0, count + 1)[1:-1]
+        sigma = np.concatenate(([0.0], np.unique(np.concatenate((between, clock.place(inside)))), [1.0]))
+        panels = [Panel(self.k, self.c, clock, float(a), float(b)) for a, b in pairwise(sigma) if b > a]
+        return Stretch(start, end, acting, edges, panels)
+
+
+def _power(contact: Any) -> int:
+    """Power of the clock that makes the force at the ends of a contact smooth: 1 where all its exponents are whole."""
+    if contact.always:
+        return 1
+    powers = np.asarray(getattr(contact.law, "powers", (contact.law.exponent,)), dtype=float)
+    if np.all(powers == np.round(powers)):
+        return 1
+    return 2 if np.all(2.0 * powers == np.round(2.0 * powers)) else 6
+
+
+class Motion:
+    """The run's own motion at given times, [q, q̇]."""
+
+    def __init__(self, t: Array, x: Array) -> None:
+        self.t, self.x = t, x
+
+    def at(self, times: Any) -> Array:
+        """(2n,) or (2n, k), at times that were asked for."""
+        places = np.minimum(np.searchsorted(self.t, times), len(self.t) - 1)
+        return self.x[places].T

@@ -1,0 +1,291 @@
+"""Friction under a contact's own force: SciPy's DOP853 with its own events, closed forms, identities, energy."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from contacts import Hertz, Hysteretic, Jenkins, KelvinVoigt, PiecewiseLinear, Viscoelastic
+from solvers import RK4, CentralDifference, Contact, DormandPrince, Friction, System, integrate
+
+SHARP = DormandPrince(1e-12)
+METHODS = [SHARP]
+NAMES = ["dormand"]
+EYE = np.eye(3)
+every_method = pytest.mark.parametrize("method", METHODS, ids=NAMES)
+
+
+def wall(law=None, mu=0.25, k_t=3e5, mass=0.08):
+    """A mass in the plane that meets a wall in its first coordinate, at rest on 1 mm from it."""
+    law = KelvinVoigt(4e5, 0.0) if law is None else law
+    contact = Contact([-1.0, 0.0], law, map="oblique", tangent=[0.0, 1.0], friction=Friction(mu, k_t))
+    return System(mass * np.eye(2), np.zeros((2, 2)), np.zeros((2, 2)), [contact])
+
+
+def bounce(system, v_t, method, v_n=0.8):
+    return integrate(system, [-1e-3, 0.0], [v_n, v_t], 0.004, 1e-4, method)
+
+
+def disc(law=None, mu=0.25, spin=0.0, springs=0.0, outer=False, turns=True, loads=()):
+    """A disc of radius 0.4 m in (around) a circle of 1 m."""
+    law = KelvinVoigt(1e4, 0.0) if law is None else law
+    own = {"rotation": EYE[2]} if turns else {}
+    rub = Friction(mu, 5e3)
+    hole = Contact(EYE[:2], law, 1.0, map="annulus", outer=outer, radius=0.4, spin=spin, friction=rub, **own)
+    stiff = springs * np.diag([1.0, 1.0, 0.02])
+    return System(np.diag([1.0, 1.0, 0.08]), 0.02 * stiff, stiff, [hole], loads)
+
+
+def by_scipy(normal, growth, start, duration, spin=0.0, outer=False, springs=0.0, mu=0.25, k_t=5e3):
+    """(state, names of the segments passed) of the disc under N(δ, δ̇), Ṅ(δ, δ̇, δ̈): one piece after the other."""
+    arm, sigma = (-0.4, -1.0) if outer else (0.4, 1.0)
+    mass = np.array([1.0, 1.0, 0.08])
+    stiff = springs * np.array([1.0, 1.0, 0.02])
+
+    def look(t, y):
+        r = np.hypot(y[0], y[1])
+        swept = (y[0] * y[4] - y[1] * y[3]) / r**2
+        delta, rate = sigma * (r - 1.0), sigma * (y[0] * y[3] + y[1] * y[4]) / r
+        return r, delta, rate, np.arctan2(y[1], y[0]) + arm * (y[2] + spin * t), swept + arm * (y[5] + spin)
+
+    def forces(t, y, code, s):
+        r, delta, rate, way, _ = look(t, y)
+        if code is None:
+            return np.zeros(3), 0.0, 0.0
+        n = normal(delta, rate)
+        tangential = code * mu * n if code else k_t * (np.mod(way - s + np.pi, 2.0 * np.pi) - np.pi)
+        e_r, e_t = np.array([y[0], y[1]]) / r, np.array([-y[1], y[0]]) / r
+        return np.append(-sigma * n * e_r - tangential / r * e_t, -arm * tangential), n, tangential
+
+    def acceleration(t, y, code, s):
+        return (forces(t, y, code, s)[0] - stiff * y[:3] - 0.02 * stiff * y[3:]) / mass
+
+    def margin(t, y, code, s):
+        if code is None:
+            return -look(t, y)[1]
+        n, f = forces(t, y, code, s)[1:]
+        if code == 0:
+            return mu * n - abs(f)
+        r, delta, rate, _, speed = look(t, y)
+        a = acceleration(t, y, code, s)
+        twice = sigma * (y[3] ** 2 + y[4] ** 2 + y[0] * a[0] + y[1] * a[1] - rate**2) / r
+        return code * speed - mu / k_t * growth(delta, rate, twice)
+
+    t, y, code, s, passed = 0.0, np.array(start), None, 0.0, ["open"]
+    while t < duration:
+
+        def ends(t, y, code=code, s=s):
+            return margin(t, y, code, s)
+
+        def leaves(t, y):
+            return look(t, y)[1]
+
+        events = [ends] if code is None else [ends, leaves]
+        for event in events:
+            event.terminal, event.direction = True, -1.0
+        run = solve_ivp(
+            lambda t, y, code=code, s=s: np.append(y[3:], acceleration(t, y, code, s)),
+            *((t, duration), y, "DOP853"),
+            **{"rtol": 1e-13, "atol": 1e-15, "events": events, "max_step": duration if code is None else 1e-4},
+        )
+        t, y = run.t[-1], run.y[:, -1]
+        if run.status == 0:
+            break
+        _, _, rate, way, speed = look(t, y)
+        if code is None:
+            code = int(np.sign(speed)) if k_t * abs(speed) > mu * growth(0.0, rate, 0.0) else 0
+            s = way
+        elif len(run.t_events) > 1 and len(run.t_events[1]):
+            code = None
+        elif code == 0:
+            code = int(np.sign(forces(t, y, code, s)[2]))
+        else:
+            code, s = 0, way - forces(t, y, code, s)[2] / k_t
+        passed.append("open" if code is None else ["stick", "slip+", "slip-"][code])
+    return y, passed
+
+
+LAWS = {
+    "linear": (KelvinVoigt(1e4, 0.0), lambda d, v: 1e4 * d, lambda d, v, a: 1e4 * v),
+    "hertz": (Hertz(1e5), lambda d, v: 1e5 * max(d, 0.0) ** 1.5, lambda d, v, a: 1.5e5 * np.sqrt(max(d, 0.0)) * v),
+}
+
+
+@every_method
+@pytest.mark.parametrize(("v_t", "after"), [(0.1, -0.0865662391654), (0.6, 0.2), (1.5, 1.1)])
+def test_an_oblique_impact_sticks_or_slips(method, v_t, after):
+    """Slip throughout leaves v_t - μ(1 + e) v_n; a slow one sticks and recoils."""
+    run = bounce(wall(), v_t, method)
+    np.testing.assert_allclose(run.q_dot[-1], [-0.8, after], rtol=0.0, atol=1e-10)
+    assert run.transitions.event.tolist() == (["slip"] if v_t < 0.2 else [])
+
+
+@every_method
+def test_the_log_of_a_slipping_impact(method):
+    """N is half a sine: peaks, impulses, the loss and the way of the slider in closed form."""
+    run, slow = bounce(wall(), 1.5, method), bounce(wall(), 0.1, method)
+    log, peak = run.friction, 0.8 * np.sqrt(0.08 * 4e5)
+    assert log.peak_friction[0] == pytest.approx(0.25 * peak, rel=1e-9)
+    assert log.impulse[0] == pytest.approx(0.25 * 2.0 * 0.08 * 0.8, rel=1e-9)
+    assert log.energy_loss[0] == pytest.approx(0.04 * (1.5**2 - 1.1**2), rel=1e-9)
+    assert log.slip[0] == pytest.approx(0.5 * (1.5 + 1.1) * np.pi * np.sqrt(0.08 / 4e5), rel=1e-9)
+    assert (log.speed_in[0], log.speed_out[0]) == pytest.approx((1.5, 1.1), rel=1e-9)
+    assert np.isnan(log.angle_in[0])
+    assert 0.0 < slow.friction.slip[0] < 0.1 * 1.4e-3
+    taken = 0.04 * (0.1**2 - slow.q_dot[-1, 1] ** 2)
+    assert slow.friction.energy_loss[0] == pytest.approx(taken, rel=1e-8)
+    assert (slow.losses.friction[0], slow.losses.impact[0]) == pytest.approx((taken, 0.0), abs=1e-10)
+
+
+@every_method
+def test_a_disc_in_an_annulus(method):
+    run = integrate(disc(), [0.5, 0.0, 0.0], [0.2, 0.8, -1.5], 4.0, 0.01, method)
+    expected = [-0.31970493889, -0.41690718554, -4.7094931086, 0.49085306607, -0.67495046553, -1.3978741619]
+    np.testing.assert_allclose(run.end[:6], expected, rtol=0.0, atol=1e-9)
+    assert run.transitions.event.tolist() == ["slip", "slip"]
+    assert np.sign(run.transitions.force).tolist() == [1.0, -1.0]
+    (x, y, _), (v, w, turning) = run.q.T, run.q_dot.T
+    apart = np.hypot(x, y) < 1.0
+    assert np.ptp((x * w - y * v - 0.08 / 0.4 * turning)[apart]) < 1e-10  # L/c - Jφ'/R is kept
+    assert abs(run.energy.residual).max() < 1e-9
+    energy = 0.5 * np.sum([1.0, 1.0, 0.08] * run.q_dot**2, axis=1)
+    assert run.losses.friction[0] == pytest.approx(energy[0] - energy[-1], rel=1e-7)
+    np.testing.assert_allclose(run.friction.angle_in, [0.81937302, 2.71323681], atol=1e-7)
+
+
+@every_method
+@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("outer", [False, True])
+def test_a_driven_disc_follows_scipy(method, name, outer):
+    """On springs, with spin: some ten segments."""
+    law, normal, growth = LAWS[name]
+    start = [-1.5, 0.3, 0.0, 4.0, 0.9, -3.0] if outer else [0.5, 0.1, 0.0, 4.5, 1.8, -1.5]
+    options = {"spin": 6.0, "springs": 20.0, "outer": outer}
+    expected, passed = by_scipy(normal, growth, start, 1.2, **options)
+    run = integrate(disc(law, **options), start[:3], start[3:], 1.2, 0.01, method)
+    assert len(passed) > 4
+    assert len(run.contacts.t_in) == passed.count("open") - (passed[-1] == "open") + (passed[-1] != "open")
+    np.testing.assert_allclose(run.end[:6], expected, rtol=0.0, atol=2e-9)
+    assert abs(run.energy.residual).max() < 1e-8
+    assert abs(run.energy.spin[-1]) > 1e-3
+    assert run.losses.spin[0] == pytest.approx(run.energy.spin[-1], rel=1e-12)
+
+
+@every_method
+def test_without_friction_coefficient_nothing_rubs(method):
+    start = [0.5, 0.1, 0.0], [2.0, 0.8, -1.5]
+    plain = Contact(EYE[:2], Hertz(1e5), 1.0, map="annulus")
+    one = integrate(disc(Hertz(1e5), mu=0.0), *start, 2.0, method=method)
+    other = integrate(System(np.diag([1.0, 1.0, 0.08]), 0.0 * EYE, 0.0 * EYE, [plain]), *start, 2.0, method=method)
+    np.testing.assert_allclose(one.end[:6], other.end, rtol=0.0, atol=1e-9)
+    assert one.friction.peak_friction.max() == 0.0
+
+
+@every_method
+def test_a_planar_start_keeps_to_its_line(method):
+    """Nothing is drawn where nothing moves sideways."""
+    run = integrate(disc(Hertz(1e5)), [0.3, 0.4, 0.0], [1.2, 1.6, 0.0], 2.0, method=method)
+    assert len(run.contacts.t_in) > 1
+    assert abs(run.q[-1, 0] * 0.8 - run.q[-1, 1] * 0.6) < 1e-10
+    assert abs(run.q[-1, 2]) < 1e-10
+
+
+@every_method
+def test_a_run_goes_on_from_the_middle_of_a_stick(method):
+    system, end = wall(), 0.002
+    whole = bounce(system, 0.1, method)
+    part = integrate(system, [-1e-3, 0.0], [0.8, 0.1], end, method=method)
+    assert part.memory[0][0] == 0.0
+    rest = integrate(system, part.q[-1], part.q_dot[-1], 0.004 - end, method=method, memory=part.memory)
+    np.testing.assert_allclose(rest.end[:4], whole.end[:4], rtol=0.0, atol=1e-10)
+    both = part.losses.friction[0] + rest.losses.friction[0], part.losses.slip[0] + rest.losses.slip[0]
+    assert both == pytest.approx((whole.losses.friction[0], whole.losses.slip[0]), rel=1e-7)
+    assert np.isnan(part.friction.t_out).tolist() == [True]
+
+
+@every_method
+@pytest.mark.parametrize(
+    "law", [KelvinVoigt(4e5, 60.0), Hysteretic(1e7, 0.5), Viscoelastic(1e7, 500.0), PiecewiseLinear([2e5, 8e5], [1e-4])]
+)
+def test_energy_balances_with_dashpots_and_knots(method, law):
+    """A dashpot pulls as it opens, and the friction is 0 there."""
+    for v_t in (0.1, 0.4, 1.5):
+        run = bounce(wall(law), v_t, method)
+        assert len(run.contacts.t_out) == 1
+        assert abs(run.energy.residual).max() < 1e-8
+        gone = 0.04 * (0.8**2 + v_t**2 - np.sum(run.q_dot[-1] ** 2))
+        assert run.losses.loss[0] == pytest.approx(gone, rel=1e-6)
+        assert run.losses.friction[0] > 0.0
+
+
+def test_a_rub_slips_all_the_way():
+    """A place held off the centre by a load, driven by the spin: slip for ever, the way of the slider is R Ω t."""
+    system = disc(spin=50.0, springs=1e4, turns=False, loads=[(3e4 * EYE[0], np.ones_like)])
+    start = np.array([1.9, 0.0, 0.0])
+    run = integrate(system, start, np.zeros(3), 0.5, method=SHARP)
+    assert len(run.transitions) < 20
+    assert run.losses.slip[0] == pytest.approx(0.4 * 50.0 * 0.5, rel=0.1)
+    assert run.losses.spin[0] > 0.0
+    assert run.losses.friction[0] > 0.5 * run.losses.spin[0]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"friction": None}, 'map="oblique" is that of friction'),
+        ({"tangent": None}, "needs tangent="),
+        ({"tangent": [-2.0, 0.0]}, "must not lie along its direction"),
+        ({"tangent": [0.0, 1.0, 0.0]}, "finite row of 2 numbers"),
+        ({"tangent": [0.0, 0.0]}, "not all 0"),
+        ({"map": "line"}, 'belongs to map="oblique"'),
+        ({"map": "line", "tangent": None}, 'needs map="oblique" and tangent='),
+        ({"spin": 3.0}, 'spin of a Contact belongs to map="annulus"'),
+        ({"law": Jenkins(1e3, 1.0), "always": True}, "without memory"),
+    ],
+)
+def test_bad_oblique_contacts_are_refused(options, message):
+    given = {"direction": [-1.0, 0.0], "law": Hertz(1e6), "map": "oblique", "tangent": [0.0, 1.0]}
+    with pytest.raises(ValueError, match=message):
+        Contact(**{"friction": Friction(0.3, 1e5), **given, **options})
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"spin": 3.0}, "radius .* is missing"),
+        ({"rotation": EYE[2]}, "radius .* is missing"),
+        ({"radius": 0.0}, "positive and finite"),
+        ({"radius": 0.1, "spin": np.nan}, "must be finite"),
+        ({"radius": 0.1, "friction": None}, "with friction"),
+        ({"tangent": EYE[2]}, 'belongs to map="oblique"'),
+    ],
+)
+def test_bad_annuli_with_friction_are_refused(options, message):
+    given = {"direction": EYE[:2], "law": Hertz(1e6), "gap": 1e-3, "map": "annulus"}
+    with pytest.raises(ValueError, match=message):
+        Contact(**{"friction": Friction(0.3, 1e5), **given, **options})
+
+
+@pytest.mark.parametrize(
+    ("given", "kind", "message"),
+    [
+        ((-0.1, 1e5), ValueError, "mu of Friction must be finite and >= 0"),
+        ((0.1, 0.0), ValueError, "stiffness of Friction must be finite and > 0"),
+        ((0.1, np.inf), ValueError, "stiffness of Friction"),
+        ((0.1,), ValueError, "needs stiffness"),
+        (("much", 1e5), TypeError, "must be a number"),
+    ],
+)
+def test_bad_friction_is_refused(given, kind, message):
+    with pytest.raises(kind, match=message):
+        Friction(*given)
+
+
+def test_friction_must_be_one():
+    with pytest.raises(TypeError, match="must be a Friction"):
+        Contact([-1.0, 0.0], Hertz(1e6), map="oblique", tangent=[0.0, 1.0], friction=0.3)
+
+
+@pytest.mark.parametrize("method", [RK4(1e-4, 1e-5), CentralDifference(1e-4)])
+def test_other_methods_refuse(method):
+    with pytest.raises(ValueError, match="takes contacts without friction, and contact 0 has some"):
+        integrate(wall(), [0.0, 0.0], [1.0, 0.0], 1.0, method=method)

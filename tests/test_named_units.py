@@ -1,0 +1,81 @@
+"""Units of what turns, and parts that cannot act: bodies whose places have rotations."""
+
+import numpy as np
+import pytest
+
+import fembeam as fb
+from contacts import KelvinVoigt
+
+LAW = KelvinVoigt(1e4, 1.0)
+STEEL = fb.Section.rectangle(2.1e11, 7850.0, width=0.02, height=0.01)
+ELBOW = fb.Frame.polyline({"A": (0, 0), "B": (1, 0), "C": (1, 1)}, STEEL)
+TRAIN = fb.Structure(
+    1e3 * np.array([[2.0, -1.0], [-1.0, 1.0]]), np.diag([0.1, 0.3]), labels=[("gear", "rz"), ("wheel", "rz")]
+)
+TURNED = fb.PointMoment("wheel", fb.Harmonic(5.0, 40.0), direction="rz")
+
+
+def elbow(**parts):
+    return fb.Scene(ELBOW, [fb.Clamped("A")], damping=fb.ModalDamping(0.02), **parts)
+
+
+def test_tables_of_a_torsional_train_are_in_rad():
+    run = fb.Scene(TRAIN, forces=[TURNED]).reduce("all").simulate(0.1, 1e-2)
+    assert "mean / rad" in str(run)
+    assert "displacement, wheel, rz" in str(run)
+
+
+def test_tables_of_a_frame_show_displacements_where_a_moment_acts():
+    force = fb.PointMoment("B", fb.Harmonic(5.0, 40.0), direction="rz")
+    run = elbow(forces=[force]).reduce(2).simulate(0.1, 1e-2)
+    assert "mean / m " in str(run)
+    assert "rz" not in str(run)
+
+
+@pytest.mark.parametrize(
+    ("driven", "output", "unit", "said"),
+    [
+        (("C", "x"), ("B", "rz"), "rad/N", "force at C along x"),
+        (("C", "rz"), ("C", "x"), "m/(N m)", "moment at C about rz"),
+        (("C", "rz"), [("C", "x"), ("C", "rz")], "m or rad/(N m)", "moment at C about rz"),
+        ("base.x", ("C", "rz"), "rad/m", "displacement of the frame along x"),
+        ("base.x", ("C", "y"), "m/m", "displacement of the frame along x"),
+    ],
+)
+def test_units_of_frequency_responses(driven, output, unit, said):
+    found = elbow().reduce(2).frequency_response([3.0], driven, output)
+    assert (found.unit, found.input) == (unit, said)
+
+
+def test_a_base_that_moves_nothing_is_told():
+    with pytest.raises(ValueError, match=r"write a place where a force acts, as no base moves this structure"):
+        fb.Scene(TRAIN).reduce("all").frequency_response([3.0])
+
+
+@pytest.mark.parametrize(
+    ("parts", "message"),
+    [
+        ({"stops": [fb.Stop("A", LAW, direction="x", name="wall")]}, r"got 'A' in stops\[0\] 'wall' of Scene"),
+        ({"stops": [fb.Stop(("A-B", 0.0), LAW, direction="x")]}, r"got 'A-B \+ 0 m' in stops\[0\]"),
+        ({"elements": [fb.Element("A", LAW, direction="rz")]}, r"got 'A' in elements\[0\]"),
+        ({"stops": [fb.Stop("B", LAW, direction="x", on=("A-B", 1.0))]}, r"got 'B on A-B \+ 1 m' in stops\[0\]"),
+    ],
+)
+def test_parts_that_act_on_nothing_that_moves_are_refused(parts, message):
+    with pytest.raises(ValueError, match=r"what stops and elements act on must be free to move, " + message):
+        elbow(**parts).reduce(2)
+
+
+def test_offsets_in_the_plane():
+    with pytest.raises(ValueError, match=r"offset must be a vector: one number is along z, .* got 0.3 in masses\[0\]"):
+        elbow(masses=[fb.LumpedMass("C", 1.0, offset=0.3)])
+    mass = fb.LumpedMass("C", 1.0, offset=(0.3, 0.1))
+    assert mass == fb.LumpedMass("C", 1.0, offset=(0.3, 0.1, 0.0))
+    assert elbow(masses=[mass]).reduce(1).omega < elbow(masses=[fb.LumpedMass("C", 1.0)]).reduce(1).omega
+
+
+def test_messages_do_not_list_whole_frames():
+    for make in (lambda: elbow(masses=[fb.Disk("C", 1.0, 0.1, 0.1)]), lambda: elbow().campbell([1.0])):
+        with pytest.raises(ValueError, match=r"straight Frame in space") as said:
+            make()
+        assert len(str(said.value)) < 200

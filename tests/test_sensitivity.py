@@ -1,0 +1,389 @@
+"""Derivatives of runs and orbits: closed forms, differences of runs, homogeneity, the discrete tangent, refusals."""
+
+import math
+import warnings
+
+import numpy as np
+import pytest
+from oscillators import Tone
+
+import fembeam as fb
+from contacts import Hertz, Hysteretic, Iwan, Jenkins, KelvinVoigt, PiecewiseLinear, Viscoelastic
+from fembeam.scene import with_value
+from solvers import Contact, Exponential, Nearby, NoDerivativeError, System, integrate, sensitivity
+
+FINE = Exponential(1e-11)
+MASS, SPEED, GAP, STIFFNESS = 2.0, 0.7, 0.1, 5e3
+OF_CONTACTS = {"t_in": "entries", "t_out": "exits", "peak_force": "peak_force", "impulse": "impulse"}
+
+
+def ball(gap=GAP, law=None):
+    """A mass that flies towards a stop; δ = q - gap."""
+    law = PiecewiseLinear([STIFFNESS]) if law is None else law
+    return System([[MASS]], [[0.0]], [[0.0]], [Contact([-1.0], law, gap)])
+
+
+def thrown(make, value, **options):
+    """Derivatives of the flight from 0 at SPEED over half a second."""
+    nearby = Nearby.of(make, value, 1e-3 * value)
+    return sensitivity(make(value), [0.0], [SPEED], 0.5, [0.05, 0.5], nearby, method=FINE, **options)
+
+
+# --- closed forms ----------------------------------------------------------------------------------------------------
+
+
+def test_a_linear_spring_by_its_gap():
+    """t_in = g/v, t_out = t_in + π √(m/k), then q = g - v (t - t_out): everything moves with the gap."""
+    found = thrown(ball, GAP)
+    np.testing.assert_allclose(found.entries, 1.0 / SPEED, rtol=1e-9)
+    np.testing.assert_allclose(found.exits, 1.0 / SPEED, rtol=1e-9)
+    np.testing.assert_allclose(np.append(found.peak_force, found.impulse), 0.0, atol=1e-6)
+    np.testing.assert_allclose(found.states, [[0.0, 0.0], [2.0, 0.0]], atol=1e-8)
+
+
+def test_a_linear_spring_by_its_stiffness():
+    """Contact time π √(m/k), peak force v √(k m), impulse 2 m v."""
+    found = thrown(lambda k: ball(law=PiecewiseLinear([k])), STIFFNESS)
+    later = -0.5 * math.pi * math.sqrt(MASS / STIFFNESS) / STIFFNESS
+    assert found.entries[0] == 0.0
+    assert found.exits[0] == pytest.approx(later, rel=1e-8)
+    assert found.peak_force[0] == pytest.approx(0.5 * SPEED * math.sqrt(MASS / STIFFNESS), rel=1e-8)
+    assert found.impulse[0] == pytest.approx(0.0, abs=1e-9)
+    np.testing.assert_allclose(found.states[-1], [SPEED * later, 0.0], atol=1e-11)
+
+
+def test_a_linear_spring_by_the_speed():
+    found = sensitivity(ball(), [0.0], [SPEED], 0.5, [0.5], start=[0.0, 1.0], method=FINE)
+    assert found.entries[0] == pytest.approx(-GAP / SPEED**2, rel=1e-9)
+    assert found.peak_force[0] == pytest.approx(math.sqrt(STIFFNESS * MASS), rel=1e-8)
+    assert found.impulse[0] == pytest.approx(2.0 * MASS, rel=1e-8)
+
+
+def test_a_force_that_jumps_at_entry():
+    """A dashpot alone: v' = -c v/m from the entry on, so q = g + (m v/c)(1 - d), d = exp(-c (T - g/v)/m)."""
+    c = 3.0
+    found = thrown(lambda gap: ball(gap, KelvinVoigt(1e-9, c)), GAP)
+    decay = math.exp(-c * (0.5 - GAP / SPEED) / MASS)
+    np.testing.assert_allclose(found.states[-1], [1.0 - decay, c / MASS * decay], atol=1e-8)
+    assert found.impulse[0] == pytest.approx(-c * decay, abs=1e-8)
+    assert found.peak_force[0] == pytest.approx(0.0, abs=1e-6)  # c v, at the entry
+    assert np.isnan(found.exits[0])
+
+
+# --- differences of runs ---------------------------------------------------------------------------------------------
+
+OMEGA, ZETA = np.array([109.13, 790.6]), np.array([0.02, 0.01])
+PHI, GAMMA = np.array([6.2, -1.9]), np.array([0.16, 0.02])
+START = np.array([1.3e-4, -2e-5, -0.03, 0.02])
+
+
+def beam(law=None, amplitude=40.0, omega=195.0, gap=2e-5, zeta=1.0, sampled=False, turn=0.0, stiffer=1.0):
+    """Two modes between two stops."""
+    law = Hysteretic(2.1e8, damping_factor=0.5625) if law is None else law
+    contacts = [Contact(PHI + turn, law, gap), Contact(-0.8 * PHI, Hertz(2.1e8), 3e-4)]
+    tone = Tone(amplitude, omega)
+    signal = (lambda t: tone(t)) if sampled else tone
+    return System.modal(OMEGA * [1.0, stiffer], zeta * ZETA, contacts, [(GAMMA, signal)])
+
+
+CASES = {
+    "gap": (lambda p: beam(gap=p), 2e-5),
+    "stiffness": (lambda p: beam(Hysteretic(p, damping_factor=0.5)), 2.1e8),
+    "damping factor": (lambda p: beam(Hysteretic(2.1e8, damping_factor=p)), 0.5),
+    "dashpot": (lambda p: beam(KelvinVoigt(2e5, p)), 30.0),
+    "knot": (lambda p: beam(PiecewiseLinear([1e5, 4e5], knots=[p])), 1e-5),
+    "amplitude": (lambda p: beam(amplitude=p), 40.0),
+    "frequency": (lambda p: beam(omega=p), 195.0),
+    "frequency of a sampled signal": (lambda p: beam(omega=p, sampled=True), 195.0),
+    "damping": (lambda p: beam(zeta=p), 1.0),
+    "structure": (lambda p: beam(stiffer=p), 1.0),
+    "direction": (lambda p: beam(turn=p - 1.0), 1.0),
+}
+
+
+def five_points(function, step):
+    """Central differences of fourth order."""
+    a, b, c, d = (np.asarray(function(k * step)) for k in (-2, -1, 1, 2))
+    return (8.0 * (c - b) - (d - a)) / (12.0 * step)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_against_differences_of_runs(name):
+    """States, times, peaks and impulses of some six contacts with two stops, to 1e-6 of the largest of each."""
+    (make, value), duration, t = CASES[name], 0.025, [0.01, 0.02]
+
+    def run(step):
+        return integrate(make(value + step), START[:2], START[2:], duration, t, Exponential(1e-12))
+
+    found = sensitivity(
+        make(value), START[:2], START[2:], duration, t, Nearby.of(make, value, 1e-4 * value), method=FINE
+    )
+    step = 2e-5 * value
+    runs = {k * step: run(k * step) for k in (-2, -1, 1, 2)}
+    expected = five_points(lambda h: np.hstack((runs[h].q, runs[h].q_dot)), step)
+    np.testing.assert_allclose(found.states, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
+    assert len(found.contacts) >= 4
+    for logged, derived in OF_CONTACTS.items():
+        expected = five_points(lambda h, logged=logged: getattr(runs[h].contacts, logged), step)
+        size = np.nanmax(np.abs(expected))
+        np.testing.assert_allclose(getattr(found, derived), expected, rtol=0, atol=1e-6 * size, err_msg=logged)
+
+
+@pytest.mark.parametrize("name", ["gap", "dashpot", "knot", "damping"])
+def test_the_derivative_by_the_start_is_the_discrete_tangent(name):
+    """Two ways with nothing in common: collocation along the motion, and the integrator's own steps, linearised."""
+    make, value = CASES[name]
+    found = sensitivity(make(value), START[:2], START[2:], 0.025, method=FINE)
+    other = integrate(make(value), START[:2], START[2:], 0.025, method=FINE, tangent=True).tangent
+    np.testing.assert_allclose(found.matrix, other, rtol=0, atol=1e-8 * np.abs(other).max())
+
+
+def slider(limit):
+    """Three masses with friction in two places."""
+    laws = Jenkins(50.0, limit), Iwan([30.0, 20.0], [0.1, 0.3])
+    rows = [-1.0, -0.5, 0.3], [-0.2, 0.9, -0.5]
+    contacts = [Contact(row, law, always=True) for row, law in zip(rows, laws, strict=True)]
+    return System.modal([0.8, 2.0, 3.5], 0.01, contacts, [([1.0, 0.3, 0.0], Tone(0.4, 1.3))])
+
+
+def test_laws_with_memory():
+    """By the limit of a slider, through stick and slip, what is latched at the end included."""
+    limit, duration, q, v = 0.4, 8.0, np.zeros(3), np.array([1.0, -0.5, 0.3])
+    found = sensitivity(slider(limit), q, v, duration, nearby=Nearby.of(slider, limit, 1e-3), method=FINE)
+
+    def end(step):
+        return integrate(slider(limit + step), q, v, duration, method=Exponential(1e-12)).end
+
+    expected = five_points(end, 1e-5)
+    assert len(found.solution.transitions) > 8
+    np.testing.assert_allclose(found.end, expected, rtol=0, atol=1e-7 * np.abs(expected).max())
+    other = integrate(slider(limit), q, v, duration, method=FINE, tangent=True).memory_tangent
+    np.testing.assert_allclose(found.matrix, other, rtol=0, atol=1e-9 * np.abs(other).max())
+
+
+# --- invariants ------------------------------------------------------------------------------------------------------
+
+
+def test_euler_s_theorem_of_homogeneous_functions():
+    """With a linear law gap, load and start times λ give motion and forces times λ, at the same times of contact."""
+    law, gap, amplitude, t = PiecewiseLinear([3e5]), 2e-5, 40.0, [0.01, 0.02]
+
+    def derived(make, value, start=None):
+        nearby = None if make is None else Nearby.of(make, value, 1e-3 * value)
+        return sensitivity(one(gap, amplitude), START[:2], START[2:], 0.02, t, nearby, start, FINE)
+
+    def one(gap, amplitude):
+        return System.modal(OMEGA, ZETA, [Contact(PHI, law, gap)], [(GAMMA, Tone(amplitude, 195.0))])
+
+    parts = [
+        (gap, derived(lambda p: one(p, amplitude), gap)),
+        (amplitude, derived(lambda p: one(gap, p), amplitude)),
+        (1.0, derived(None, 0.0, START)),
+    ]
+    run = integrate(one(gap, amplitude), START[:2], START[2:], 0.02, t, FINE)
+    total = {name: sum(weight * getattr(part, name) for weight, part in parts) for name in OF_CONTACTS.values()}
+    states = sum(weight * part.states for weight, part in parts)
+    np.testing.assert_allclose(states, np.hstack((run.q, run.q_dot)), rtol=1e-7)
+    np.testing.assert_allclose(total["peak_force"], run.contacts.peak_force, rtol=1e-7)
+    np.testing.assert_allclose(total["impulse"], run.contacts.impulse, rtol=1e-7)
+    np.testing.assert_allclose(total["entries"], 0.0, atol=1e-10)
+
+
+def test_an_elastic_stop_keeps_the_volume_of_state_space():
+    found = sensitivity(beam(Hertz(2.1e8)), START[:2], START[2:], 0.02, method=FINE)
+    assert np.linalg.det(found.matrix) == pytest.approx(math.exp(-0.04 * np.sum(ZETA * OMEGA)), rel=1e-8)
+
+
+# --- where there is none ---------------------------------------------------------------------------------------------
+
+
+def swinging(gap):
+    """q = -cos t over a stop: δ = q - gap."""
+    return System([[1.0]], [[0.0]], [[1.0]], [Contact([-1.0], PiecewiseLinear([9.0]), gap)])
+
+
+@pytest.mark.parametrize(("gap", "words"), [(1.0 - 1e-11, "grazes"), (1.0 + 1e-11, "touched but not entered")])
+def test_a_graze_has_no_derivative(gap, words):
+    with pytest.raises(NoDerivativeError, match=words):
+        sensitivity(swinging(gap), [-1.0], [0.0], 5.0, method=FINE)
+    assert len(sensitivity(swinging(0.999), [-1.0], [0.0], 5.0, method=FINE).contacts) == 1
+
+
+def test_a_start_on_the_surface():
+    """By the gap it differs on both sides, by the stiffness it does not."""
+
+    def pushed(gap=0.0, stiffness=9.0):
+        stop = Contact([-1.0], PiecewiseLinear([stiffness]), gap)
+        return System([[1.0]], [[0.0]], [[1.0]], [stop], [([1.0], lambda t: -1.0 + 0.0 * t)])
+
+    with pytest.raises(NoDerivativeError, match="touched at the start"):
+        sensitivity(pushed(), [0.0], [0.0], 8.0, nearby=Nearby.of(pushed, 0.0, 1e-6), method=FINE)
+    by_stiffness = Nearby.of(lambda k: pushed(stiffness=k), 9.0, 1e-3)
+    assert np.all(sensitivity(pushed(), [0.0], [-0.1], 5.0, nearby=by_stiffness, method=FINE).peak_force > 0.0)
+
+
+def test_refusals_of_systems():
+    with pytest.raises(ValueError, match="slope is infinite"):
+        sensitivity(ball(law=Viscoelastic.tsuji(2e7, 0.6, 0.3)), [0.0], [SPEED], 0.5)
+    with pytest.raises(ValueError, match="duration must be positive"):
+        sensitivity(ball(), [0.0], [SPEED], -1.0)
+    with pytest.raises(ValueError, match="no such value"):
+        Nearby.of(lambda value: _refuse(), 1.0, 1e-3)
+
+
+def _refuse():
+    raise ValueError("no such value")
+
+
+def test_values_that_are_refused_on_one_side():
+    """A value at the end of its range: a one-sided formula of the same order."""
+
+    def positive(value):
+        if value < 0.0:
+            raise ValueError("negative")
+        return value
+
+    assert Nearby.of(positive, 0.0, 1e-3).derivative(math.exp) == pytest.approx(1.0, abs=1e-11)
+    assert Nearby.of(lambda value: positive(-value), 0.0, 1e-3).derivative(math.exp) == pytest.approx(-1.0, abs=1e-11)
+
+
+# --- scenes ----------------------------------------------------------------------------------------------------------
+
+PLACE = 0.2
+
+
+def scene(**other):
+    parts = {
+        "beam": fb.Beam(0.2599, fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)),
+        "supports": [fb.Clamped(0.0)],
+        "masses": [fb.LumpedMass(0.24445, mass=25.4e-3, inertia=3.0e-6)],
+        "stops": [fb.Stop(0.24445, Hysteretic(2.1e8, damping_factor=0.5), gap=1e-4, side="below", name="valve")],
+        "damping": fb.ModalDamping([0.02, 0.01]),
+        "base": fb.Harmonic(amplitude=1e-3, omega=195.0),
+    }
+    return fb.Scene(**{**parts, **other})
+
+
+@pytest.fixture(scope="module")
+def run():
+    return simulated(scene())
+
+
+def simulated(one, duration=0.06):
+    return one.reduce(modes=2).simulate(duration, dt=2e-3, solver=FINE)
+
+
+@pytest.mark.parametrize(
+    ("path", "share"),
+    [
+        ("stops[valve].gap", 1e-3),
+        ("base.amplitude", 1e-4),
+        ("omega", 1e-5),
+        ("damping.zeta[0]", 1e-3),
+        ("masses[0].mass", 1e-4),
+        ("beam.section.E", 1e-4),
+        ("beam.length", 1e-5),
+    ],
+)
+def test_a_run_of_a_scene(run, path, share):
+    found = run.sensitivity(path)
+    step = share * found.value
+    runs = {k * step: simulated(with_value(scene(), found.parameter, found.value + k * step)) for k in (-2, -1, 1, 2)}
+    for name in ("displacement", "velocity"):
+        expected = five_points(lambda h, name=name: getattr(runs[h], name)(PLACE), step)
+        derived = getattr(found, name)(PLACE)
+        np.testing.assert_allclose(derived, expected, rtol=0, atol=1e-5 * np.abs(expected).max(), err_msg=name)
+    for logged, derived in OF_CONTACTS.items():
+        expected = five_points(lambda h, logged=logged: getattr(runs[h].contacts, logged), step)
+        size = np.abs(expected).max()
+        np.testing.assert_allclose(getattr(found, derived), expected, rtol=0, atol=1e-6 * size, err_msg=logged)
+
+
+def test_what_it_prints_and_offers(run):
+    found = run.sensitivity("stops[valve].gap")
+    assert found.parameter == "stops[0].gap"
+    assert found.value == 1e-4
+    text = str(found)
+    assert "derivatives by stops[0].gap = 0.0001" in text
+    assert "valve" in text
+    rows = found.table()
+    assert [row["entry"] for row in rows] == found.entries.tolist()
+    assert found.displacement([0.1, PLACE]).shape == (len(run.t), 2)
+    np.testing.assert_allclose(found.displacement([0.1, PLACE])[:, 1], found.displacement(PLACE), rtol=1e-12)
+    assert found.q.shape == run.q.shape == found.q_dot.shape
+
+
+def test_a_direction_of_the_start(run):
+    """A start that moves along a field: against a run from a start moved along it."""
+    model = run.model
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # two modes miss a part of the field
+        way = model.state(velocity=lambda z: z)
+    found = run.sensitivity(start=way)
+    runs = {k: model.simulate(0.06, dt=2e-3, start=1e-4 * k * way, solver=FINE) for k in (-2, -1, 1, 2)}
+    expected = five_points(lambda h: runs[round(h * 1e4)].displacement(PLACE), 1e-4)
+    np.testing.assert_allclose(found.displacement(PLACE), expected, rtol=0, atol=1e-6 * np.abs(expected).max())
+
+
+def test_without_samples_the_end_is_derived(run):
+    model = run.model
+    plain = model.simulate(0.06, solver=FINE).sensitivity("stops[0].gap")
+    np.testing.assert_allclose(plain.q, run.sensitivity("stops[0].gap").q[-1:], rtol=1e-6)
+    assert plain.t.tolist() == [0.06]
+
+
+@pytest.mark.parametrize(("path", "share"), [("stops[0].gap", 1e-3), ("base.omega", 1e-5), ("masses[0].mass", 1e-4)])
+def test_an_orbit(path, share):
+    """State, period and highest displacement against orbits at other values."""
+    orbit = scene().reduce(modes=2).orbit()
+    found = orbit.sensitivity(path)
+    step = share * found.value
+    near = {
+        k: with_value(scene(), path, found.value + k * step).reduce(modes=2).orbit(start=orbit) for k in (-1.0, 1.0)
+    }
+    for ask, derived, allowed in (
+        (lambda one: one.state, found.state, 1e-5),
+        (lambda one: one.found.period, found.period, 1e-7),
+        (lambda one: np.array(one.extremes(PLACE)), np.array(found.extremes(PLACE)), 1e-3),
+    ):
+        expected = (ask(near[1.0]) - ask(near[-1.0])) / (2.0 * step)
+        np.testing.assert_allclose(derived, expected, rtol=0, atol=allowed * np.abs(expected).max() + 1e-15)
+
+
+def test_an_orbit_with_a_slider():
+    """The best limit of friction: where the amplitude's derivative by the limit changes its sign."""
+
+    def damped(limit):
+        damper = fb.Element(0.25, Jenkins(2e4, limit))
+        return scene(stops=[], elements=[damper], base=fb.Harmonic(2e-3, 109.0)).reduce(modes=2)
+
+    orbit = damped(1.0).orbit()
+    assert len(orbit.transitions) >= 4
+    found = orbit.sensitivity("elements[0].law.limit")
+    near = [damped(1.0 + h).orbit(start=orbit).state for h in (-1e-4, 1e-4)]
+    expected = (near[1] - near[0]) / 2e-4
+    np.testing.assert_allclose(found.state, expected, rtol=0, atol=1e-5 * np.abs(expected).max())
+
+
+def test_chaos_is_told():
+    """Between two elastic stops small changes grow over and over."""
+    rattling = scene(
+        stops=[fb.Stop(0.24445, Hertz(2.1e8), 1e-4, side) for side in ("below", "above")],
+        base=fb.Harmonic(3e-3, 195.0),
+    )
+    run = rattling.reduce(modes=2).simulate(0.12)
+    with pytest.warns(UserWarning, match="small changes of the start grow by"):
+        run.sensitivity("stops[0].gap")
+
+
+def test_refusals_of_runs(run, tmp_path):
+    with pytest.raises(ValueError, match=r"did you mean stops\[0\]\.gap"):
+        run.sensitivity("stops[0].gab")
+    with pytest.raises(ValueError, match="give a parameter or a direction"):
+        run.sensitivity()
+    with pytest.raises(ValueError, match="give a parameter or a direction"):
+        run.sensitivity("stops[0].gap", start=np.zeros(4))
+    with pytest.raises(ValueError, match=r"\(4,\) finite numbers"):
+        run.sensitivity(start=[1.0])
+    with pytest.raises(ValueError, match="read from a file"):
+        fb.load(run.save(tmp_path / "run.npz")).sensitivity("stops[0].gap")
