@@ -119,3 +119,13 @@ def test_rigs_in_space_of_unknown_places_and_of_several_bodies():
         both.figure(second)
     with pytest.raises(ValueError, match="the axes must be of three dimensions"):
         space.figure(second)
+
+
+def test_flat_frames_in_space_have_axes_whose_numbers_do_not_meet():
+    elbow = fb.Frame.polyline(
+        {"A": (0, 0, 0), "B": (0.5, 0, 0), "C": (0.5, 0.3, 0)}, fb.Section.circle(2e11, 7800.0, 0.02)
+    )
+    figure = fb.plot.mode_shapes(fb.Scene(elbow, [fb.Clamped("A")]).reduce(2, elements=4))
+    for axis in figure.axes:
+        assert np.ptp(axis.get_zlim()) > 0.25 * np.hypot(0.5, 0.3)
+        assert len(axis.get_zticks()) <= 4

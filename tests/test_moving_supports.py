@@ -102,6 +102,22 @@ def test_contacts():
     assert np.allclose(one.contacts.t_in[:3], two.contacts.t_in[:3], rtol=1e-7)
 
 
+def test_joined_pieces():
+    """Feet of three joined pieces: the run, reactions and section forces of the portal in one piece."""
+    pieces = [fb.Frame({n: PORTAL[n] for n in (one.a, one.b)}, [one]) for one in portal().members]
+    wave = fb.Harmonic(2e-3, 30.0)
+    supports = fb.Clamped("A", motion={"x": WAVE}), fb.Fixed("D", motion={"x": wave, "y": WAVE})
+    bodies = [fb.Scene(pieces[1]), fb.Scene(pieces[2], supports[1:])]
+    joints = [fb.Joint("B", (1, "B")), fb.Joint("C", (2, "C"), body=1)]
+    joined = fb.Scene(pieces[0], supports[:1], bodies=bodies, joints=joints, **DAMPED)
+    one, two = (s.reduce(4).simulate(0.2, 5e-3) for s in (fb.Scene(portal(), supports, **DAMPED), joined))
+    assert equal(one.displacement("C", "x"), two.displacement((2, "C"), "x"), 1e-9)
+    assert np.array_equal(one.displacement("D", "y"), two.displacement("D", "y"))
+    for mine, other in zip(one.reactions(), two.reactions(), strict=True):
+        assert all(equal(mine[c], other[c], 1e-7) for c in ("x", "y", "rz"))
+    assert equal(one.section_forces(("D-C", 1.0))["M"], two.section_forces((2, ("D-C", 1.0)))["M"], 1e-8)
+
+
 def test_names_of_signals():
     """Studies vary the motions by their paths; noise without a period gets one of the run."""
     scene = feet(WAVE, fb.Harmonic(1e-3, 20.0))

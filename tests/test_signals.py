@@ -31,7 +31,8 @@ from fembeam.study.segments import Segments
 BEAM = fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01))
 PLAIN = {  # annotations of what is no signal
     *("float", "str", "str | None", "float | tuple[float, float, float]", "tuple[str, ...]"),
-    *("Of", "Place", "Second | None", "Direction | None", "float | Sequence[float]"),
+    *("Of", "Place", "Second | None", "Direction | None", "float | Sequence[float]", "bool"),
+    *("tuple[float, float]", "tuple[Direction, Direction] | None"),
 }
 STRUCTURE = {"z", "beam", "damping", "bodies", "joints", "law", *FEATURES}  # fields of other annotations that are none
 TABLES = {"motion"}  # signals by name, see below

@@ -13,6 +13,7 @@ from scipy import stats
 import fembeam as fb
 from contacts import Hertz, Hysteretic
 from fembeam import cli, scene_file
+from fembeam.scene import with_value
 from fembeam.study.execution.executors import spread
 from fembeam.study.quantities import Amplitude, PeakForce
 
@@ -84,6 +85,16 @@ def test_axes_of_a_base_motion_name_its_direction_and_have_few_numbers():
     assert axis.get_xlabel() == "base amplitude along x / m"
     assert axis.get_ylabel() == "base amplitude along y / m"
     assert len(axis.get_xticks()) <= 7
+
+
+def test_one_frequency_of_a_base_in_several_directions_is_one_parameter():
+    shaken = with_value(frame(), "omega", 60.0)
+    assert [signal.omega for signal in shaken.base.values()] == [60.0, 60.0]
+    assert with_value(frame(), "base.x.omega", 60.0).base["y"].omega == 50.0
+    with pytest.raises(ValueError, match=r"ambiguous parameter: base.x.omega, base.y.omega"):
+        with_value(with_value(frame(), "base.x.omega", 60.0), "omega", 70.0)
+    orbits = frame(gap=1.0).reduce(1).branch("omega", (40.0, 60.0)).run().orbits
+    assert {orbit.parameter for orbit in orbits} >= {40.0, 60.0}
 
 
 # --- closed answers ---------------------------------------------------------------------------------------------------

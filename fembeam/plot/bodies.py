@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from fembeam.plot.figure import heading
@@ -22,6 +23,9 @@ Vector = NDArray[np.float64]
 MOST_SHAPES = 6
 SHOWN = 0.12  # of the body's size, the largest displacement drawn
 COLUMNS = 3
+SIDES = np.array([-1.0, 1.0])
+THIN = 0.25  # of the size of a body, the least half side of the box it is drawn in
+ZOOM = 0.72  # of the box of three axes, so that their names stay inside
 
 
 def in_space(shapes: PlacedShapes) -> bool:
@@ -73,15 +77,23 @@ def draw(axis: Any, shapes: PlacedShapes, moved: Vector | None, color: str, widt
     return list(axis.plot(*parted, color=color, linewidth=width))
 
 
-def finish(axis: Any, shapes: PlacedShapes) -> None:
-    """Equal scales and names of the axes."""
-    if in_space(shapes):
-        axis.set_aspect("equal")
-        axis.set_zlabel("z / m")
-    else:
-        axis.set_aspect("equal", adjustable="datalim")
-    axis.set_xlabel("x / m")
-    axis.set_ylabel("y / m")
+def finish(axis: Any, shapes: PlacedShapes, room: float = 0.0) -> None:
+    """Equal scales and names of the axes, with room around; in space no side so thin that its numbers would meet."""
+    space, size = in_space(shapes), size_of(shapes)
+    limits = np.array([getattr(axis, f"get_{name}lim")() for name in ("xyz" if space else "xy")])
+    limits += np.array([-room, room])
+    if space:
+        middle, half = limits.mean(axis=1), np.maximum(np.ptp(limits, axis=1) / 2, THIN * size)
+        axis.set(xlim=middle[0] + SIDES * half[0], ylim=middle[1] + SIDES * half[1], zlim=middle[2] + SIDES * half[2])
+        axis.set_box_aspect(half, zoom=ZOOM)
+        for one, share in zip((axis.xaxis, axis.yaxis, axis.zaxis), half / half.max(), strict=True):
+            one.set_major_locator(MaxNLocator(max(int(4 * share), 1), min_n_ticks=1))
+        axis.set_xlabel("x / m", labelpad=6)
+        axis.set_ylabel("y / m", labelpad=6)
+        axis.set_zlabel("z / m", labelpad=14)
+        return
+    axis.set(xlim=limits[0], ylim=limits[1], xlabel="x / m", ylabel="y / m")
+    axis.set_aspect("equal", adjustable="datalim")
     axis.locator_params(nbins=4)
 
 
@@ -131,10 +143,7 @@ class BodyStage:
         self.factor = _round(SHOWN * size / largest) if largest > 0 else 1.0
         self.figure, (self.axis,) = panels(shapes, 1)
         draw(self.axis, shapes, None, GREY, 0.8)
-        finish(self.axis, shapes)
-        for name in "xyz" if in_space(shapes) else "xy":
-            low, high = getattr(self.axis, f"get_{name}lim")()
-            getattr(self.axis, f"set_{name}lim")(low - SHOWN * size, high + SHOWN * size)
+        finish(self.axis, shapes, SHOWN * size)
         self.curves: list[Any] = []
 
     def show(self, number: int) -> list[Any]:

@@ -5,6 +5,8 @@ d = (W_1 u, W_2 u) - centre,    r = |d|,    δ = r - c,    force on the place -N
 Annotations are evaluated here, as in `part`.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
 from typing import Any
 

@@ -3,7 +3,7 @@
 A name is a path such as ``base.omega``, ``stops[0].gap``, ``stops[0].law.stiffness`` or ``masses[1].mass``; a part that
 has a name may be called by it, ``stops[valve].gap``. Its last part alone will do where no other path ends so; ``omega``
 and ``amplitude`` mean the base motion's first, and every name the scene's own part before that of a body,
-``bodies[0].stops[0].gap``.
+``bodies[0].stops[0].gap``. Of a base that moves in several directions ``base.omega`` is that of all, if it is one.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from fembeam.support import require
 if TYPE_CHECKING:
     from fembeam.scene.scene import Scene
 
+SHARED = "base.omega"
 LISTS = ("masses", "springs", "dashpots", "stops", "elements", "forces")
 
 
@@ -33,9 +34,19 @@ def scalars(scene: Scene, within: str = "") -> dict[str, float]:
             found.update(_numbers(f"{within}{path}", item))
     for i, support in enumerate(scene.supports):
         found.update(_numbers(f"{within}supports[{i}].motion", support_motion(support)))
+    if (shared := _shared_omega(scene)) is not None:
+        found[f"{within}{SHARED}"] = shared
     for i, body in enumerate(scene.bodies):
         found.update(scalars(body, f"{within}bodies[{i}]."))
     return found
+
+
+def _shared_omega(scene: Scene) -> float | None:
+    """The frequency of a base motion in several directions, if all of them have the same one."""
+    base = scene.base if isinstance(scene.base, dict) else {}
+    found = {getattr(signal, "omega", None) for signal in base.values()}
+    omega = found.pop() if len(found) == 1 and len(base) > 1 else None
+    return omega if isinstance(omega, float) else None
 
 
 def _numbers(path: str, item: Any) -> dict[str, float]:
@@ -66,6 +77,7 @@ def path_of(scene: Scene, name: str) -> str:
     ends = [path for path in known if path.endswith(f".{name}")]
     own = [path for path in ends if not path.startswith("bodies")]
     first = [path for path in ends if path.startswith("base.")] or own or ends
+    first = [SHARED] if SHARED in first else first
     near = get_close_matches(name, known, n=1, cutoff=0.5)
     advice = f"did you mean {near[0]}?" if near else "use one of these"
     require(bool(ends), f"no such parameter; the scene has {', '.join(known)}", name, "parameter", advice)
@@ -105,6 +117,8 @@ def _replaced(item: Any, path: list[str], value: float) -> Any:
         changed = list(item)
         changed[int(path[0])] = _replaced(item[int(path[0])], path[1:], value)
         return type(item)(changed)
+    if isinstance(item, dict) and path[0] not in item:  # of all directions
+        return {key: _replaced(part, path, value) for key, part in item.items()}
     if isinstance(item, dict):
         return {**item, path[0]: _replaced(item[path[0]], path[1:], value)}
     changed = _replaced(getattr(item, path[0]), path[1:], value)

@@ -56,6 +56,11 @@ class Flow:
         inside = self._inside(s, acting, *self.motion_of(t, s))
         return laws.force(self.system.contacts[s].law, acting.rows[s], inside, acting.entry_rate[s])
 
+    def bend(self, t: Array, s: int, acting: Acting) -> Array | None:
+        """What changes its sign at kinks of a law within its segment, at times; None without any."""
+        inside = self._inside(s, acting, *self.motion_of(t, s))
+        return laws.bend(self.system.contacts[s].law, inside, acting.entry_rate[s])
+
     def _inside(self, s: int, acting: Acting, delta: Any, rate: Any) -> tuple[Any, Any]:
         """δ kept within the segment of the law, and δ̇."""
         contact = self.system.contacts[s]

@@ -51,6 +51,14 @@ def by_latched(law: Any, row: Array, motion: tuple[Any, Any], entry_rate: float)
     return out
 
 
+def bend(law: Any, motion: tuple[Any, Any], entry_rate: float) -> Array | None:
+    """What changes its sign where a law has a kink that is no knot, (k,): the force without its cut, or δ̇."""
+    kind = getattr(law, "bend", None)
+    if kind == "rate":
+        return np.asarray(motion[1])
+    return force(law.uncut, np.array(law.uncut.parameters), motion, entry_rate) if kind == "force" else None
+
+
 def margin(law: Any, row: Array, border: int, delta: float, rate: float, entry_rate: float) -> float:
     """Margin of one border."""
     out = np.zeros((law.borders, 1))

@@ -18,6 +18,9 @@ from scipy.special import betainc, betaincinv
 from solvers.problem import Array
 
 S = 14  # nodes
+_BEYOND = (
+    1.02  # half widths of a panel from its middle: the outermost nodes are within, a zero may lie between two panels
+)
 _X, _W = np.polynomial.legendre.leggauss(S)
 X, W = 0.5 * (_X + 1.0), 0.5 * _W  # on [0, 1]
 
@@ -176,6 +179,13 @@ def largest(values: Array, ends: list[float]) -> tuple[float, float]:
     found = polynomial(places)
     best = int(np.argmax(found))
     return 0.5 * (float(places[best]) + 1.0), float(found[best])
+
+
+def zeros(values: Array) -> Array:
+    """Places of the zeros of the polynomial through values (S,) at the nodes, in [0, 1] and a little beyond."""
+    roots = np.polynomial.legendre.Legendre(coefficients(values)).roots()
+    real = roots[np.abs(roots.imag) < 1e-9].real
+    return 0.5 * (real[np.abs(real) < _BEYOND] + 1.0)
 
 
 def interpolated(place: float, values: Array) -> Array:

@@ -116,8 +116,8 @@ def grouped(rows: Array) -> list[tuple[float, list[Array]]]:
 class Division:
     """Stretches of a run, with panels fine enough for its modes and its laws."""
 
-    def __init__(self, system: System, forced: bool, samples: Array, depth: Array) -> None:
-        self.system, self.forced, self.samples = system, forced, samples
+    def __init__(self, system: System, forced: bool, samples: Array, depth: Array, bends: Array) -> None:
+        self.system, self.forced, self.samples, self.bends = system, forced, samples, bends
         self.k, self.c = system.blocks.k, system.blocks.c
         tones = [signal.tones()[0] for _, signal in system.loads if hasattr(signal, "tones")] if forced else []
         speeds = np.sqrt(np.abs(self.k)), np.abs(self.c), *(np.abs(np.asarray(tone, float)) for tone in tones)
@@ -161,7 +161,9 @@ class Division:
                 "keep fewer modes, or shorten the run"
             )
         between = np.linspace(0.0, 1.0, count + 1)[1:-1]
-        sigma = np.concatenate(([0.0], np.unique(np.concatenate((between, clock.place(inside)))), [1.0]))
+        bends = self.bends[(self.bends > start) & (self.bends < end)]
+        inner = np.unique(np.concatenate((between, clock.place(inside), clock.place(bends))))
+        sigma = np.concatenate(([0.0], inner, [1.0]))
         panels = [Panel(self.k, self.c, clock, float(a), float(b)) for a, b in pairwise(sigma) if b > a]
         return Stretch(start, end, acting, edges, panels)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from solvers.problem import event_list as at
 from solvers.sensitivities.events import GRAZING, NoDerivativeError, cross
 from solvers.sensitivities.flow import Flow, latched_columns
 from solvers.sensitivities.nearby import Change, Nearby
-from solvers.sensitivities.panels import coefficients, interpolated, largest
+from solvers.sensitivities.panels import coefficients, interpolated, largest, zeros
 from solvers.sensitivities.stretches import (
     Acting,
     Division,
@@ -26,7 +26,8 @@ from solvers.sensitivities.stretches import (
 )
 
 SMOOTH = 1e-3  # share of the last Legendre coefficients of forces' derivatives, above which panels are halved
-_FINEST = 4  # times
+_FINEST, _TWICE = 4, 2  # times
+_SAME_BEND = 1e-9  # of the duration: a kink found twice, on both of its sides
 _NEAR_TOP = 0.9  # of the largest force so far: a panel whose nodes stay below has no larger one
 _SAME = 1e-6  # of the duration: events of one run, made twice, may be so far apart
 _NEAR = 1e-3  # of the motion: stops that come so near are looked at closely
@@ -118,20 +119,33 @@ def sensitivity(
 
     check_slopes(system)
     asked = _Asked(system, _state(q0, q_dot0), duration, np.atleast_1d(np.asarray(times, dtype=float)))
-    asked.method, asked.memory = Exponential() if method is None else method, memory
+    method = Exponential() if method is None else method
+    asked.method = replace(method, ledger=False) if isinstance(method, Exponential) else method
+    asked.memory = memory
     asked.by = None if nearby is None else Change(system, nearby, duration)
     asked.start = np.zeros(2 * system.size) if start is None else np.asarray(start, dtype=float)
     log, rows = replayed(system, asked.x, duration, asked.looks(), asked.method, memory)
     asked.measure(log, rows)
-    refinement, best = 1, None
+    refinement, best, bends = 1, None, np.zeros(0)
     while best is None or (best.roughness > SMOOTH and refinement < _FINEST):
         if best is not None:
             refinement *= 2
-        found = _Walk(asked, rows, refinement).result()
+        walk = _Walk(asked, rows, refinement, bends)
+        found = walk.result()
+        for _ in range(_TWICE if walk.bends else 0):  # the second time they are known to rounding
+            bends = _apart(walk.bends, _SAME_BEND * duration)
+            walk = _Walk(asked, rows, refinement, bends)
+            found = walk.result()
         if best is not None and found.roughness >= best.roughness:
             break
         best = found
     return best
+
+
+def _apart(times: list[float], distance: float) -> Array:
+    """Times in order, of those nearer to each other than a distance the first."""
+    ordered = np.sort(np.array(times))
+    return ordered[np.diff(ordered, prepend=-np.inf) > distance]
 
 
 def _parts(values: Array, counts: list[int]) -> list[Array]:
@@ -248,12 +262,12 @@ class _Contact:
 class _Walk:
     """One pass over a run."""
 
-    def __init__(self, asked: _Asked, rows: Array, refinement: int) -> None:
+    def __init__(self, asked: _Asked, rows: Array, refinement: int, bends: Array) -> None:
         system = asked.system
         self.asked, self.rows, self.events = asked, rows, dict(grouped(rows))
         forced = asked.by is not None and asked.by.forced
         self.acting = acting_at_start(system, asked.x, rows, asked.memory)
-        division = Division(system, forced, asked.times, asked.depth)
+        division = Division(system, forced, asked.times, asked.depth, bends)
         self.stretches = list(division.stretches(self.acting, rows, asked.duration, refinement))
         wanted = [np.array([0.0, asked.duration]), asked.times, *(t for one in self.stretches for t in one.times)]
         times = np.unique(np.clip(np.concatenate(wanted), 0.0, asked.duration))
@@ -270,6 +284,7 @@ class _Walk:
         self.flow = Flow(system, self.motion, asked.by, start, latched)
         self.states = np.zeros((len(asked.times), n2))
         self.contacts: list[_Contact] = []
+        self.bends: list[float] = []  # times at which laws have kinks that are no knots
         self.open: dict[int, _Contact] = {}
 
     def result(self) -> Sensitivity:
@@ -355,6 +370,10 @@ class _Walk:
     def _look(self, panel: Any, forces: dict[int, Array], acting: Acting) -> None:
         """Peaks within a panel, and how rough the derivatives are there."""
         for s, change in forces.items():
+            bent = self.flow.bend(panel.times, s, acting)
+            if bent is not None:
+                places = panel.low + (panel.high - panel.low) * zeros(bent)
+                self.bends += panel.clock.time(np.clip(places, 0.0, 1.0)).tolist()
             size = np.abs(change).max(axis=0)
             tail = np.abs(coefficients(change)[-2:]).max(axis=0)
             scale = self._sizes.setdefault(s, np.zeros(len(size)))
