@@ -5,6 +5,7 @@ import pytest
 
 import fembeam as fb
 from contacts import KelvinVoigt
+from fembeam.inspection.units import doubts
 
 LAW = KelvinVoigt(1e4, 1.0)
 STEEL = fb.Section.rectangle(2.1e11, 7850.0, width=0.02, height=0.01)
@@ -79,3 +80,21 @@ def test_messages_do_not_list_whole_frames():
         with pytest.raises(ValueError, match=r"straight Frame in space") as said:
             make()
         assert len(str(said.value)) < 200
+
+
+def test_units_of_frames_that_look_wrong_are_told():
+    mill = fb.Section.rectangle(2.1e5, 7.85e-9, width=20.0, height=10.0)
+    frame = fb.Frame.polyline({"A": (0, 0), "B": (1000, 0), "C": (1000, 1)}, mill)
+    stop = fb.Stop("C", LAW, gap=500.0, direction="x", name="wall")
+    scene = fb.Scene(frame, [fb.Clamped("A")], masses=[fb.LumpedMass("C", 12.0)], stops=[stop])
+    said = doubts(scene.reduce(2))
+    assert said[:2] == [
+        "member 'A-B': E = 210000 N/m² looks like N/mm²: steel has 2.1e11 N/m²",
+        "member 'A-B': rho = 7.85e-09 kg/m³ looks like g/cm³ or t/mm³: steel has 7800 kg/m³",
+    ]
+    assert said[2:] == [
+        "member 'A-B': length = 1000 m looks like mm",
+        "masses[0] = 12 kg is 7.6e+03 times the frame: is it in grams?",
+        "stops[0] 'wall': a gap of 500 m on a frame of 1000 m: is it in mm?",
+    ]
+    assert doubts(elbow(stops=[fb.Stop("C", LAW, gap=1e-3, direction="x")]).reduce(2)) == []

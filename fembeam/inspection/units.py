@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -27,8 +27,33 @@ def doubts(model: Model) -> list[str]:
 
 
 def _of_body(scene: Scene) -> list[str]:
-    """Those about one beam and what stands on it; of a structure, about its damping."""
-    return of_damping(scene) if scene.named else [*of_beam(scene.beam), *of_features(scene)]
+    """Those about one beam or frame and what stands on it; of a structure, about its damping."""
+    if not scene.named:
+        return [*of_beam(scene.beam), *of_features(scene)]
+    frames = [one for one in getattr(scene.beam, "bodies", (scene.beam,)) if hasattr(one, "members")]
+    found = [said for frame in frames for said in of_frame(frame)]
+    size = sum(frame.size for frame in frames)
+    weight = sum(
+        one.section.rho * one.section.A * float(h) for f in frames for one, h in zip(f.members, f.lengths, strict=True)
+    )
+    return [*found, *(of_parts(scene, weight, size, "frame") if frames else []), *of_damping(scene)]
+
+
+def of_frame(frame: Any) -> list[str]:
+    """Modulus, density, section and length of members, each kind of doubt once.
+
+    Examples
+    --------
+    >>> from fembeam import Frame, Section
+    >>> of_frame(Frame.straight(0.3, Section.circle(E=2.1e5, rho=7800, diameter=0.01)))
+    ["member 'A-B': E = 210000 N/m² looks like N/mm²: steel has 2.1e11 N/m²"]
+    """
+    found: dict[str, str] = {}
+    for one, length in zip(frame.members, frame.lengths.tolist(), strict=True):
+        for said in of_beam(one.beam(length, frame.in_plane)):
+            if not said.startswith("the beam is"):  # short members are common, and may have shear
+                found.setdefault(said.split("=")[0], f"member {one.name!r}: {said}")
+    return list(found.values())
 
 
 def of_beam(beam: Beam) -> list[str]:
@@ -67,18 +92,23 @@ def of_beam(beam: Beam) -> list[str]:
 
 def of_features(scene: Scene) -> list[str]:
     """Masses, gaps and damping."""
-    found = []
     z = np.linspace(0, scene.beam.length, 101)
     weight = float(np.mean(scene.beam.line_mass(z)) * scene.beam.length)
+    return of_parts(scene, weight, scene.beam.length, "beam") + of_damping(scene)
+
+
+def of_parts(scene: Scene, weight: float, length: float, body: str) -> list[str]:
+    """Masses and gaps, against the mass and the length of what carries them."""
+    found = []
     for i, mass in enumerate(scene.masses):
         if mass.mass > 1000 * weight:
-            found.append(f"masses[{i}]{mass.quoted} = {mass.mass:g} kg is {mass.mass / weight:.2g} times the beam: "
+            found.append(f"masses[{i}]{mass.quoted} = {mass.mass:g} kg is {mass.mass / weight:.2g} times the {body}: "
                          "is it in grams?")  # fmt: skip
     for i, part in enumerate(scene.acting):
         count = len(scene.stops)
         at = f"stops[{i}]{part.quoted}" if i < count else f"elements[{i - count}]{part.quoted}"
-        found += [f"{at}: {said}" for said in [_of_gap(part, scene.beam.length)] if said]
-    return found + of_damping(scene)
+        found += [f"{at}: {said}" for said in [_of_gap(part, length, body)] if said]
+    return found
 
 
 def of_damping(scene: Scene) -> list[str]:
@@ -87,11 +117,13 @@ def of_damping(scene: Scene) -> list[str]:
     return [f"zeta = {ratios.max():g} looks like per cent: 1 is critical damping"] if ratios.max() >= 0.5 else []
 
 
-def _of_gap(part: Stop | AnnularStop | Element, length: float) -> str:
+def _of_gap(part: Stop | AnnularStop | Element, length: float, body: str) -> str:
     """What is wrong with a gap; small slopes are assumed up to about 20 degrees."""
     if part.coordinate.rotation:
         return f"a gap of {part.gap:g} rad is no small slope: is it in degrees?" if abs(part.gap) > STEEP else ""
-    return f"a gap of {part.gap:g} m on a beam of {length:g} m: is it in mm?" if abs(part.gap) > 0.2 * length else ""
+    return (
+        f"a gap of {part.gap:g} m on a {body} of {length:.4g} m: is it in mm?" if abs(part.gap) > 0.2 * length else ""
+    )
 
 
 def of_loads(scene: Scene, model: Model) -> list[str]:

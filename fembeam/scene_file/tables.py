@@ -223,7 +223,10 @@ class TableReader:
         found = {key: place(table[key]) for key in PLACES if key in table and is_place(table[key])}
         wrong = [key for key in PLACES if key in table and key not in found]
         if wrong:
-            self.fail(where, f"{wrong[0]} must be the name of a point or node, got {shown(table[wrong[0]])}")
+            self.fail(
+                where,
+                f"{wrong[0]} must be the name of a point or node, or [member, distance], got {shown(table[wrong[0]])}",
+            )
         if "at" not in found and keys["z"].default is inspect.Parameter.empty:
             self.fail(where, f"the key 'at' is missing (the name of a point or node); it needs {listed(known)}")
         rest = {key: value for key, value in table.items() if key not in PLACES}
