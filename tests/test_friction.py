@@ -5,7 +5,18 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from contacts import Hertz, Hysteretic, Jenkins, KelvinVoigt, PiecewiseLinear, Viscoelastic
-from solvers import RK4, CentralDifference, Contact, DormandPrince, Friction, System, integrate
+from solvers import (
+    RK4,
+    CentralDifference,
+    Contact,
+    DormandPrince,
+    Exponential,
+    Friction,
+    System,
+    integrate,
+    integrate_many,
+    orbit,
+)
 
 SHARP = DormandPrince(1e-12)
 METHODS = [SHARP]
@@ -332,7 +343,14 @@ def test_friction_must_be_one():
         Contact([-1.0, 0.0], Hertz(1e6), map="oblique", tangent=[0.0, 1.0], friction=0.3)
 
 
-@pytest.mark.parametrize("method", [RK4(1e-4, 1e-5), CentralDifference(1e-4)])
+@pytest.mark.parametrize("method", [RK4(1e-4, 1e-5), CentralDifference(1e-4), Exponential()])
 def test_other_methods_refuse(method):
     with pytest.raises(ValueError, match="takes contacts without friction, and contact 0 has some"):
         integrate(wall(), [0.0, 0.0], [1.0, 0.0], 1.0, method=method)
+
+
+def test_orbits_and_many_starts_refuse():
+    with pytest.raises(ValueError, match="orbits take contacts without friction, and contact 0 has some"):
+        orbit(wall(), 1.0, np.zeros(4))
+    with pytest.raises(ValueError, match="takes contacts without friction"):
+        integrate_many(wall(), np.zeros((2, 2)), np.ones((2, 2)), 1.0)
