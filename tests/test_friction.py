@@ -5,7 +5,18 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from contacts import Hertz, Hysteretic, Jenkins, KelvinVoigt, PiecewiseLinear, Viscoelastic
-from solvers import RK4, CentralDifference, Contact, DormandPrince, Friction, System, integrate
+from solvers import (
+    RK4,
+    CentralDifference,
+    Contact,
+    DormandPrince,
+    Exponential,
+    Friction,
+    System,
+    integrate,
+    integrate_many,
+    orbit,
+)
 
 SHARP = DormandPrince(1e-12)
 METHODS = [SHARP]
@@ -170,6 +181,53 @@ def test_a_driven_disc_follows_scipy(method, name, outer):
     assert run.losses.spin[0] == pytest.approx(run.energy.spin[-1], rel=1e-12)
 
 
+class Tone:
+    """a cos(ωt + phase)"""
+
+    def __init__(self, a, omega, phase=0.0):
+        self.a, self.omega = a * np.exp(1j * phase), omega
+
+    def __call__(self, t):
+        return np.real(self.a * np.exp(1j * self.omega * np.asarray(t)))
+
+    def tones(self):
+        return np.array([self.omega]), np.array([self.a])
+
+
+def shapes(beta, x):
+    """(2,) clamped-free shapes of unit modal mass at x of a length of 1."""
+    ratio = (np.cosh(beta) + np.cos(beta)) / (np.sinh(beta) + np.sin(beta))
+    return np.cosh(beta * x) - np.cos(beta * x) - ratio * (np.sinh(beta * x) - np.sin(beta * x))
+
+
+@every_method
+def test_a_tube_in_a_hole(method):
+    """Two modes a plane, a hole at the tip, forces at mid-span; the figures are of SciPy's DOP853."""
+    beta, none = np.array([1.8751040687119611, 4.694091132974175]), np.zeros(2)
+    tip, mid = shapes(beta, 1.0), shapes(beta, 0.5)
+    rows = np.array([np.append(tip, none), np.append(none, tip)])
+    hole = Contact(rows, KelvinVoigt(300.0, 0.0), 0.012, map="annulus", friction=Friction(0.2, 240.0))
+    loads = [(np.append(mid, none), Tone(1.5, 3.2, -0.5 * np.pi)), (np.append(none, mid), Tone(1.05, 3.9))]
+    run = integrate(System.modal(np.tile(beta**2, 2), 0.01, [hole], loads), [0.0] * 4, [0.0] * 4, 0.6, method=method)
+    np.testing.assert_allclose(rows @ run.q[-1], [9.106191672804725e-3, -5.789123389204e-3], atol=1e-11)
+    np.testing.assert_allclose(rows @ run.q_dot[-1], [0.11648029303735, -0.15887146589979], atol=1e-10)
+    np.testing.assert_allclose(run.contacts.t_in, [0.17926830372536, 0.31542356791999, 0.444297128478], atol=1e-10)
+
+
+@every_method
+@pytest.mark.parametrize("seed", range(4))
+def test_random_discs_follow_scipy(method, seed):
+    rng = np.random.default_rng(seed)
+    name, outer = ["linear", "hertz"][seed % 2], bool(seed // 2)
+    law, normal, growth = LAWS[name]
+    angle, r = rng.uniform(0.0, 2.0 * np.pi), rng.uniform(1.05, 1.3) if outer else rng.uniform(0.0, 0.9)
+    start = [r * np.cos(angle), r * np.sin(angle), 0.0, *(rng.normal(size=3) * [3.0, 3.0, 4.0])]
+    options = {"spin": 5.0 * rng.normal(), "springs": 20.0, "outer": outer, "mu": rng.choice([0.05, 0.8])}
+    expected, _ = by_scipy(normal, growth, start, 0.5, **options)
+    run = integrate(disc(law, **options), start[:3], start[3:], 0.5, method=method)
+    np.testing.assert_allclose(run.end[:6], expected, rtol=0.0, atol=1e-8)
+
+
 @every_method
 def test_without_friction_coefficient_nothing_rubs(method):
     start = [0.5, 0.1, 0.0], [2.0, 0.8, -1.5]
@@ -285,7 +343,14 @@ def test_friction_must_be_one():
         Contact([-1.0, 0.0], Hertz(1e6), map="oblique", tangent=[0.0, 1.0], friction=0.3)
 
 
-@pytest.mark.parametrize("method", [RK4(1e-4, 1e-5), CentralDifference(1e-4)])
+@pytest.mark.parametrize("method", [RK4(1e-4, 1e-5), CentralDifference(1e-4), Exponential()])
 def test_other_methods_refuse(method):
     with pytest.raises(ValueError, match="takes contacts without friction, and contact 0 has some"):
         integrate(wall(), [0.0, 0.0], [1.0, 0.0], 1.0, method=method)
+
+
+def test_orbits_and_many_starts_refuse():
+    with pytest.raises(ValueError, match="orbits take contacts without friction, and contact 0 has some"):
+        orbit(wall(), 1.0, np.zeros(4))
+    with pytest.raises(ValueError, match="takes contacts without friction"):
+        integrate_many(wall(), np.zeros((2, 2)), np.ones((2, 2)), 1.0)

@@ -37,7 +37,12 @@ def codes(system: System) -> Any:
 
 
 def _remembering(system: System) -> list[Any]:
-    """The contacts whose law has a memory."""
+    """The contacts whose law has a memory; ValueError if one has friction, whose slider is no C function."""
+    for i, contact in enumerate(system.contacts):
+        if contact.friction is not None:
+            raise ValueError(
+                f"orbits take contacts without friction, and contact {i} has some; run it by integrate, DormandPrince()"
+            )
     return [contact for contact, count in zip(system.contacts, counts(system), strict=True) if count]
 
 
