@@ -1,8 +1,6 @@
 """A circular clearance: a place in a hole, or a ring around a post; its force acts along two directions.
 
 d = (W_1 u, W_2 u) - centre,    r = |d|,    δ = r - c,    force on the place -N(δ, δ̇) d/r
-
-Annotations are evaluated here, as in `part`.
 """
 
 from __future__ import annotations
