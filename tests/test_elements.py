@@ -459,7 +459,7 @@ def test_pictures_of_rotation(mixed):
 def test_a_scene_is_printed_as_it_is_called():
     """Saved branches and runs know their scene by this text."""
     scene = beam([fb.Clamped(0.0)], stops=[fb.Stop(1.0, Hertz(1.0))])
-    assert repr(scene).endswith("gravity=0.0, elements=())")
+    assert repr(scene).endswith("gravity=0.0, elements=(), joints=())")
     shown = f"Stop(z=1.0, law={Hertz(1.0)!r}, gap=0.0, side='below', on=None, of='displacement')"
     assert repr(scene.stops[0]) == shown
 
@@ -527,11 +527,13 @@ def test_scene_files(tmp_path):
 
 
 def test_schema_names_the_tables():
-    tables = json_schema()["properties"]
-    keys = tables["elements"]["items"]["properties"]
-    assert keys["of"] == {"enum": ["displacement", "rotation"], "default": "displacement"}
-    assert keys["to"]["anyOf"][1]["items"] == {"type": "number"}
-    assert tables["stops"]["items"]["properties"]["of"]["enum"] == ["displacement", "rotation"]
+    """At a z, or at a place by name."""
+    for table in ("elements", "stops"):
+        kinds = [kind["properties"] for kind in json_schema()["properties"][table]["items"]["anyOf"]]
+        keys = next(one for one in kinds if "z" in one)
+        assert keys["of"] == {"enum": ["displacement", "rotation"], "default": "displacement"}
+        second = keys["to" if table == "elements" else "on"]
+        assert second["anyOf"][1]["items"] == {"type": "number"}
 
 
 # --- studies --------------------------------------------------------------------------------------------------------

@@ -330,9 +330,9 @@ def test_random_figures_have_units_bands_and_confidence():
     for part in np.split(x, 8):
         signal.add(part)
     orbits = [SimpleNamespace(extremes=lambda z: (-2e-3, 1e-3), mark=None) for _ in range(3)]
-    nothing = {"base": None, "forces": [], "springs": [], "bodies": []}
+    nothing = {"base": None, "forces": [], "springs": [], "bodies": [], "supports": []}
     stop = fb.Stop(0.25, Hertz(1e8))
-    model = SimpleNamespace(scene=SimpleNamespace(acting=[stop], named=False, **nothing))
+    model = SimpleNamespace(scene=SimpleNamespace(acting=[stop], named=False, **nothing), contact_rows=[])
     one = SimpleNamespace(
         family=SimpleNamespace(model=model, period=2, name="base.omega"),
         **{"parameter": np.array([100.0, 150.0, 200.0]), "stable": np.array([True, False, True])},
