@@ -108,13 +108,34 @@ def _slider_margin_at(problem, state, space, h, s, theta):
 
 @inner
 def _beyond(known, theta):
-    """Minus a margin at θ of the step."""
-    problem, state, space, h, s, j = known
-    if rubs(problem, s):
-        return -_slider_margin_at(problem, state, space, h, s, theta)
+    """Minus a margin of a law at θ of the step."""
+    problem, state, space, _, s, j = known
     space.trial[0], space.trial[1] = polynomial(space.coefficients[0], theta), polynomial(space.coefficients[1], theta)
     margins(problem, state, s, 1, space.trial[0:1], space.trial[1:2], space.one)
     return -space.one[j]
+
+
+@inner
+def _slider_beyond(known, theta):
+    """Minus the margin of friction at θ of the step."""
+    problem, state, space, h, s, _ = known
+    return -_slider_margin_at(problem, state, space, h, s, theta)
+
+
+@inner
+def _lowest_between(known, a, b):
+    """Place of the lowest margin on [a, b], and minus the lowest one met."""
+    if rubs(known[0], known[4]):
+        return golden_section(_slider_beyond, known, a, b)
+    return golden_section(_beyond, known, a, b)
+
+
+@inner
+def _zero_between(known, a, b):
+    """Where a margin falls below zero in [a, b]."""
+    if rubs(known[0], known[4]):
+        return bisection(_slider_beyond, known, a, b)
+    return bisection(_beyond, known, a, b)
 
 
 @inner
@@ -123,7 +144,7 @@ def _lowest(known, values, i, rounding):
     before, after = values[i - 1], values[min(i + 1, _NODES.size - 1)]
     if values[i] > before or values[i] > after or values[i] > 2.0 * (max(before, after) - values[i]):
         return NONE
-    place, beyond = golden_section(_beyond, known, _NODES[i - 1], _NODES[min(i + 1, _NODES.size - 1)])
+    place, beyond = _lowest_between(known, _NODES[i - 1], _NODES[min(i + 1, _NODES.size - 1)])
     return place if beyond > rounding else NONE
 
 
@@ -142,10 +163,10 @@ def _crossing(problem, state, space, h, s, j):
     missed = state.now[T] == state.now[LAST_EVENT] and state.now[T] > 0.0 and values[0] > -_MISSED * largest
     for i in range(1, n):
         if values[i] < -rounding and not (missed and values[i] > values[i - 1]):
-            return bisection(_beyond, known, _NODES[i - 1], _NODES[i]) if inside else 0.0
+            return _zero_between(known, _NODES[i - 1], _NODES[i]) if inside else 0.0
         lowest = _lowest(known, values, i, rounding)
         if lowest < NONE:
-            return bisection(_beyond, known, _NODES[i - 1], lowest) if inside else 0.0
+            return _zero_between(known, _NODES[i - 1], lowest) if inside else 0.0
         inside |= values[i] > rounding
     return NONE
 
