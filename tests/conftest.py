@@ -9,9 +9,12 @@ import pytest
 
 REALISATION = int(os.environ.get("FEMBEAM_REALISATION", "0"))  # 0 is the test's own
 
+_NAMES = "from solvers.compiled.kernels import *; from solvers.exponential.preparation import *; "
+_NAMES += "from solvers.exponential.method import advance_of; from solvers.stepping.loop import march_of; "
 KERNELS = [
-    "import solvers.exponential.method as m, solvers.compiled.parts as p; m.load_parts(range(len(p.ADDRESSES)))",
-    "import solvers.exponential.linearised, solvers.stepping.loop",
+    f"{_NAMES} load_parts(PROBLEM, range(26)); advance_of(False); march_of(True)",
+    f"{_NAMES} load_parts(PLANAR_PROBLEM, range(41)); advance_of(True); march_of(False)",
+    "import solvers.exponential.linearised",
 ]  # take equally long to compile
 
 

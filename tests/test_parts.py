@@ -20,6 +20,7 @@ BEGIN = """
 import numpy as np
 from contacts import Hertz, KelvinVoigt
 from solvers import Contact, Exponential, System, integrate
+from solvers.compiled.kernels import PlanarProblem, Problem
 from solvers.compiled.parts import *
 def run(law=Hertz(1e6), stops=1, **options):
     ball = System(M=[[2.0]], C=[[0.0]], K=[[0.0]], contacts=[Contact([1.0], law, 1e-4 * i) for i in range(stops)])
@@ -31,10 +32,10 @@ def run(law=Hertz(1e6), stops=1, **options):
 def problem(monkeypatch):
     """A problem whose table of parts has one of the test's own."""
     monkeypatch.setattr(parts, "_DECLARED", {})
-    monkeypatch.setattr(parts, "ADDRESSES", np.zeros_like(parts.ADDRESSES))
+    monkeypatch.setattr(parts, "_ADDRESSES", {})
     monkeypatch.setattr(parts, "_LOADED", {})
     arrays = [np.zeros((0,) * getattr(kind, "ndim", 0), str(kind.dtype)) for kind in PROBLEM.types]
-    return Packed.of(Problem(*arrays)._replace(gap=np.array([2.0, 3.0]), parts=parts.ADDRESSES), PROBLEM)
+    return Packed.of(Problem(*arrays)._replace(gap=np.array([2.0, 3.0]), parts=parts.addresses_of(Problem)), PROBLEM)
 
 
 def test_a_part_gets_its_arguments_and_returns_a_tuple(problem):
@@ -55,9 +56,9 @@ def test_a_part_gets_its_arguments_and_returns_a_tuple(problem):
     x = np.zeros(1)
     assert call(problem.address, x) == (7.0, 6, True)
     assert x[0] == 6.0
-    loaded = parts.ADDRESSES.copy()
+    loaded = parts.addresses_of(Problem).copy()
     parts.load({"problem": PROBLEM}, [PLACE])
-    assert np.array_equal(loaded, parts.ADDRESSES)
+    assert np.array_equal(loaded, parts.addresses_of(Problem))
     assert np.count_nonzero(loaded) == 1
 
 
@@ -74,14 +75,14 @@ def test_two_threads_compile_a_part_once(problem, monkeypatch):
     with ThreadPoolExecutor(4) as pool:
         list(pool.map(lambda _: parts.load({"problem": PROBLEM}, [PLACE]), range(4)))
     assert len(made) == 1
-    assert parts.ADDRESSES[PLACE] == 1
+    assert parts.addresses_of(Problem)[PLACE] == 1
 
 
 def test_every_place_has_a_function():
     importlib.import_module("solvers.exponential.method")
     groups = parts.EVERY_RUN, parts.ENERGY, parts.BORDERS, parts.TWO_STOPS, parts.MANY_STOPS, parts.CIRCLES
-    assert sorted(place for group in groups for place in group) == list(range(len(parts.ADDRESSES)))
-    assert sorted(parts._DECLARED) == list(range(len(parts.ADDRESSES)))
+    assert sorted(place for group in groups for place in group) == list(range(parts.PLACES))
+    assert sorted(parts._DECLARED) == list(range(parts.PLACES))
 
 
 @pytest.mark.parametrize(
@@ -96,6 +97,9 @@ def test_every_place_has_a_function():
         ("run(stops=4)", "[*EVERY_RUN, *TWO_STOPS, *MANY_STOPS]"),
     ],
 )
-def test_a_run_loads_what_it_needs(run, needed):
-    code = f"{BEGIN}\n{run}\nassert np.flatnonzero(ADDRESSES).tolist() == sorted({needed}), ADDRESSES\n"
+def test_a_run_loads_what_it_needs_and_nothing_of_circles(run, needed):
+    code = (
+        f"{BEGIN}\n{run}\nloaded = [np.flatnonzero(addresses_of(kind)).tolist() for kind in (Problem, PlanarProblem)]\n"
+    )
+    code += f"assert loaded == [sorted({needed}), []], loaded\n"
     subprocess.run([sys.executable, "-c", code], check=True)

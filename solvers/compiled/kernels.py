@@ -32,6 +32,7 @@ from solvers.compiled.decorators import inlined, inner, kernel, reordered
 from solvers.compiled.decorators import merged as merged
 from solvers.compiled.fields import packed_type
 from solvers.compiled.friction import friction_force, slide, slide_acceleration
+from solvers.compiled.packed import PackedType
 from solvers.compiled.parts import RADIAL_ACCELERATION, RADIAL_MOTION, RADIAL_PUSH, part
 from solvers.problem.friction import ARM, CODE
 
@@ -78,11 +79,33 @@ class Problem(NamedTuple):
     parts: Annotated[Any, "int parts"]  # addresses of what is compiled by itself, 0 where it is not; see `parts`
 
 
+class PlanarProblem(Problem):
+    """The same where an element has several rows, so that its contact is a circle or has friction.
+
+    It is another type to the compiler: code for a `Problem` has nothing of these.
+    """
+
+    __slots__ = ()
+
+
 REAL = types.float64
 VECTOR = types.Array(REAL, 1, "C")
 MATRIX = types.Array(REAL, 2, "C")
 INTEGERS = types.Array(types.int64, 1, "C")
-PROBLEM = packed_type(Problem)
+PROBLEM, PLANAR_PROBLEM = packed_type(Problem), packed_type(PlanarProblem)
+
+
+def type_of(problem: Problem) -> types.NamedTuple:
+    """The compiler's type of a problem."""
+    return PLANAR_PROBLEM if isinstance(problem, PlanarProblem) else PROBLEM
+
+
+@intrinsic
+def is_planar(typingctx, problem):
+    """Whether a problem is a `PlanarProblem`; a constant of the compiled code."""
+    kind = problem.kind if isinstance(problem, PackedType) else problem
+    planar = issubclass(kind.instance_class, PlanarProblem)
+    return types.boolean(problem), lambda context, *_: context.get_constant(types.boolean, planar)
 
 
 def _c_function(outputs):
@@ -170,7 +193,7 @@ def force_at(problem, s, delta, delta_dot, entry_rate, batch):
 def off_knots(problem, stop, segment, delta):
     """δ; where that is a knot to rounding, a point of the segment beside it: the force may jump at the knot."""
     lower, upper = problem.knots[stop, segment - 1], problem.knots[stop, segment]
-    near = _ROUNDING * abs(problem.gap[problem.first[stop]])
+    near = _ROUNDING * abs(problem.gap[row_of(problem, stop)])
     if lower > 0.0 and abs(delta - lower) <= near + _ON_KNOT * lower:
         return lower * (1.0 + 2.0 * _ON_KNOT)
     if upper < np.inf and abs(delta - upper) <= near + _ON_KNOT * upper:
@@ -309,9 +332,27 @@ def rhs(problem, t, x, segment, entry_rate, rate, batch):
 
 
 @inlined
+def row_of(problem, s):
+    """First row of an element, which is the element itself where all have one."""
+    return problem.first[s] if is_planar(problem) else s
+
+
+@inlined
+def element_of(problem, r):
+    """The element a row belongs to."""
+    return problem.element[r] if is_planar(problem) else r
+
+
+@inlined
+def place_of(problem, s):
+    """Place of an element's δ and force at the nodes, see `Problem.own`."""
+    return problem.own[s] if is_planar(problem) else s
+
+
+@inlined
 def rubs(problem, s):
-    """Whether a stop has friction; where none has, this costs nothing."""
-    return problem.friction.shape[0] > 0 and problem.friction[s, 0] > 0
+    """Whether a stop has friction."""
+    return is_planar(problem) and problem.friction.shape[0] > 0 and problem.friction[s, 0] > 0
 
 
 @merged
@@ -323,11 +364,11 @@ def slider_of(problem, s):
 @inner
 def slide_of(problem, s, t, x):
     """ξ and ξ̇ of a stop with friction in a state."""
-    first, size, turned, turning = problem.first[s], 2 * problem.k.size, 0.0, 0.0
+    first, size, turned, turning = row_of(problem, s), 2 * problem.k.size, 0.0, 0.0
     u, u_dot = dot(problem.read[first], x, size) - problem.gap[first], dot(problem.read_rate[first], x, size)
     w = dot(problem.read[first + 1], x, size) - problem.gap[first + 1]
     w_dot = dot(problem.read_rate[first + 1], x, size)
-    if first + 2 < problem.first[s + 1]:
+    if first + 2 < row_of(problem, s + 1):
         turned, turning = -dot(problem.read[first + 2], x, size), -dot(problem.read_rate[first + 2], x, size)
     return slide(radius_of(problem, s), slider_of(problem, s), t, u, u_dot, w, w_dot, turned, turning)
 
@@ -337,7 +378,7 @@ def angle_of(problem, s, x):
     """Angle, rad, at which a place is in its circle; NaN of a stop on a line."""
     if not is_circle(problem, s):
         return math.nan
-    first, size = problem.first[s], 2 * problem.k.size
+    first, size = row_of(problem, s), 2 * problem.k.size
     u = dot(problem.read[first], x, size) - problem.gap[first]
     w = dot(problem.read[first + 1], x, size) - problem.gap[first + 1]
     return math.atan2(-w, -u)
@@ -346,12 +387,12 @@ def angle_of(problem, s, x):
 @inner
 def slide_acceleration_of(problem, s, x, rate):
     """ξ̈ from the state and its rate."""
-    first, size, turning_rate = problem.first[s], 2 * problem.k.size, 0.0
+    first, size, turning_rate = row_of(problem, s), 2 * problem.k.size, 0.0
     u, u_dot = dot(problem.read[first], x, size) - problem.gap[first], dot(problem.read_rate[first], x, size)
     w = dot(problem.read[first + 1], x, size) - problem.gap[first + 1]
     w_dot = dot(problem.read_rate[first + 1], x, size)
     u_twice, w_twice = dot(problem.read_rate[first], rate, size), dot(problem.read_rate[first + 1], rate, size)
-    if first + 2 < problem.first[s + 1]:
+    if first + 2 < row_of(problem, s + 1):
         turning_rate = -dot(problem.read_rate[first + 2], rate, size)
     own = slider_of(problem, s)
     return slide_acceleration(radius_of(problem, s), own, u, u_dot, u_twice, w, w_dot, w_twice, turning_rate)
@@ -373,7 +414,7 @@ def _add_friction(problem, s, t, touches, normal, x, rate):
 @inner
 def add_sideways(problem, s, force, x, rate):
     """Add what a tangential force F_t of stop s does to the state's rate."""
-    first, size = problem.first[s], 2 * problem.k.size
+    first, size = row_of(problem, s), 2 * problem.k.size
     if not is_circle(problem, s):
         for i in range(size):
             rate[i] -= problem.push[first + 1, i] * force
@@ -383,7 +424,7 @@ def add_sideways(problem, s, force, x, rate):
     share = force * abs(problem.radius[s]) / (u * u + w * w)
     for i in range(size):
         rate[i] += share * (problem.push[first + 1, i] * u - problem.push[first, i] * w)
-    if first + 2 < problem.first[s + 1]:
+    if first + 2 < row_of(problem, s + 1):
         torque = slider_of(problem, s)[ARM] * force
         for i in range(size):
             rate[i] -= problem.push[first + 2, i] * torque
@@ -391,8 +432,8 @@ def add_sideways(problem, s, force, x, rate):
 
 @inlined
 def is_circle(problem, s):
-    """Whether a stop is a circular clearance; where there is none, this costs nothing."""
-    return problem.radius.size > 0 and problem.radius[s] != 0.0
+    """Whether a stop is a circular clearance."""
+    return is_planar(problem) and problem.radius.size > 0 and problem.radius[s] != 0.0
 
 
 @inlined
@@ -406,7 +447,7 @@ def indentation(problem, s, x):
     """Indentation of stop s, m."""
     if is_circle(problem, s):
         return radial_motion(problem, s, x)[0]
-    row = problem.first[s]
+    row = row_of(problem, s)
     return dot(problem.read[row], x, 2 * problem.k.size) - problem.gap[row]
 
 
@@ -415,14 +456,14 @@ def indentation_rate(problem, s, x):
     """Its rate, m/s."""
     if is_circle(problem, s):
         return radial_motion(problem, s, x)[1]
-    return dot(problem.read_rate[problem.first[s]], x, 2 * problem.k.size)
+    return dot(problem.read_rate[row_of(problem, s)], x, 2 * problem.k.size)
 
 
 @part(RADIAL_MOTION, types.UniTuple(REAL, 2), types.int64, VECTOR)
 def radial_motion(problem, s, x):
     """Indentation, m, and its rate, m/s, of a circular clearance; at the centre the rate is that of going outward."""
     square, product, speed, size = 0.0, 0.0, 0.0, 2 * problem.k.size
-    for r in range(problem.first[s], problem.first[s] + 2):
+    for r in range(row_of(problem, s), row_of(problem, s) + 2):
         u = dot(problem.read[r], x, size) - problem.gap[r]
         v = dot(problem.read_rate[r], x, size)
         square, product, speed = square + u * u, product + u * v, speed + v * v
@@ -441,7 +482,7 @@ def radial(square, product, speed, radius):
 def _radial_acceleration(problem, s, x, rate):
     """δ̈ = ±(u̇·u̇ + u·ü - ṙ²)/r of a circular clearance."""
     square, product, along, size = 0.0, 0.0, 0.0, 2 * problem.k.size
-    for r in range(problem.first[s], problem.first[s] + 2):
+    for r in range(row_of(problem, s), row_of(problem, s) + 2):
         u, v = dot(problem.read[r], x, size) - problem.gap[r], dot(problem.read_rate[r], x, size)
         square, product = square + u * u, product + u * v
         along += v * v + u * dot(problem.read_rate[r], rate, size)
@@ -452,7 +493,7 @@ def _radial_acceleration(problem, s, x, rate):
 @part(RADIAL_PUSH, types.void, types.int64, REAL, VECTOR, VECTOR)
 def _add_radial_push(problem, s, force, x, rate):
     """Add what a radial force does to the state's rate."""
-    square, first, size = 0.0, problem.first[s], 2 * problem.k.size
+    square, first, size = 0.0, row_of(problem, s), 2 * problem.k.size
     for r in range(first, first + 2):
         square += (dot(problem.read[r], x, size) - problem.gap[r]) ** 2
     share = (force if problem.radius[s] > 0.0 else -force) / math.sqrt(square)
@@ -467,7 +508,7 @@ def acceleration_of(problem, s, x, rate):
     """Second derivative of the indentation by time, m/s², from the state and its rate."""
     if is_circle(problem, s):
         return _radial_acceleration(problem, s, x, rate)
-    return dot(problem.read_rate[problem.first[s]], rate, 2 * problem.k.size)
+    return dot(problem.read_rate[row_of(problem, s)], rate, 2 * problem.k.size)
 
 
 @inlined
@@ -476,7 +517,7 @@ def add_push(problem, s, force, x, rate):
     if is_circle(problem, s):
         _add_radial_push(problem, s, force, x, rate)
         return
-    push = problem.push[problem.first[s]]
+    push = problem.push[row_of(problem, s)]
     for i in range(2 * problem.k.size):
         rate[i] += push[i] * force
 

@@ -4,8 +4,8 @@ numba links all that a function calls into it, and optimises it there once more,
 the time of compiling. A part is optimised once; and one that few runs need is compiled when the first of these is
 prepared. A call at an address costs some nanoseconds, and nothing of a part is inlined: parts are long, or rare.
 
-The addresses are in ``problem.parts``, 0 for what has not been loaded yet. Machine code that is kept holds the places
-named here, never an address.
+The addresses are in ``problem.parts``, 0 for what has not been loaded yet; every type of problem has its own, as its
+code is compiled for itself. Machine code that is kept holds the places named here, never an address.
 """
 
 from __future__ import annotations
@@ -34,10 +34,11 @@ EVERY_RUN, ENERGY = range(10), range(10, 14)
 BORDERS, TWO_STOPS, MANY_STOPS, CIRCLES = range(14, 19), range(19, 20), range(20, 26), range(26, 41)
 """What needs them: every run, those with an energy balance, with bends or memory in a law, with two or many stops, with
 circular clearances."""
-ADDRESSES = np.zeros(41, dtype=np.int64)
+PLACES = 41
 
 _DECLARED: dict[int, tuple[Any, Any, tuple[Any, ...]]] = {}
-_LOADED: dict[int, Any] = {}
+_LOADED: dict[tuple[type, int], Any] = {}
+_ADDRESSES: dict[type, Any] = {}
 _LOCK = threading.Lock()
 
 
@@ -55,14 +56,22 @@ def part(place: int, result: Any, *plain: Any) -> Callable[[Any], Any]:
     return declared
 
 
+def addresses_of(problem: type) -> Any:
+    """(parts,) addresses of what has been loaded for a type of problem; one array, which `load` fills."""
+    with _LOCK:
+        return _ADDRESSES.setdefault(problem, np.zeros(PLACES, dtype=np.int64))
+
+
 def load(kinds: Mapping[str, types.NamedTuple], places: Iterable[int]) -> None:
     """Compile parts, or load their machine code; ``kinds`` are the types of packed arguments by their names."""
+    problem = kinds["problem"].instance_class
+    addresses = addresses_of(problem)
     for place in places:
-        if not ADDRESSES[place]:
+        if not addresses[place]:
             with _LOCK:  # another thread may have been quicker; what one gave the address of must stay
-                if place not in _LOADED:
-                    _LOADED[place] = _compiled(kinds, *_DECLARED[place])
-                ADDRESSES[place] = _LOADED[place].address
+                if (problem, place) not in _LOADED:
+                    _LOADED[problem, place] = _compiled(kinds, *_DECLARED[place])
+                addresses[place] = _LOADED[problem, place].address
 
 
 def _compiled(kinds: Mapping[str, types.NamedTuple], function: Any, result: Any, plain: tuple[Any, ...]) -> Any:

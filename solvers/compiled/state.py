@@ -10,20 +10,23 @@ import numpy as np
 
 from solvers.compiled.fields import packed_type, shapes_of
 from solvers.compiled.kernels import (
+    PlanarProblem,
     Problem,
     abs_dot,
     angle_of,
+    element_of,
     indentation,
     indentation_rate,
     inlined,
     inner,
     is_circle,
     kernel,
+    row_of,
     rubs,
     slide_of,
     slider_of,
 )
-from solvers.compiled.parts import ADDRESSES
+from solvers.compiled.parts import addresses_of
 from solvers.compiled.sliding import begin_slider, end_slider, slider_force
 from solvers.problem import Array, Contact, Forcing, Law, Status, System
 from solvers.problem import event_list as at
@@ -68,7 +71,7 @@ STATE = packed_type(State)
 @inner
 def surface_tolerance(problem, s, x):
     """Distance, m, within which a stop counts as on a knot: rounding of δ."""
-    row = problem.first[s]
+    row = row_of(problem, s)
     size = abs(problem.gap[row]) + abs_dot(problem.read[row], x, 2 * problem.k.size)
     if is_circle(problem, s):
         size += abs(problem.radius[s]) + abs(problem.gap[row + 1])
@@ -83,9 +86,9 @@ def rate_tolerance(problem, s, x):
     A start at rest has velocities v of the blocks that are rounding themselves, up to 2e-15 √k |p| where dashpots
     couple the modes; without their share a stop pressed at rest would enter and leave its surface forever.
     """
-    found = _rounding_of_rate(problem, problem.first[s], x)
+    found = _rounding_of_rate(problem, row_of(problem, s), x)
     if is_circle(problem, s):
-        found += _rounding_of_rate(problem, problem.first[s] + 1, x)
+        found += _rounding_of_rate(problem, row_of(problem, s) + 1, x)
     return found
 
 
@@ -241,27 +244,29 @@ def switch_on_surface(problem, state, log, locates):
     """Switch every stop that is on an end of its segment and moves out of it; returns whether any did."""
     switched = False
     for s in range(problem.law.size):
-        delta = indentation(problem, s, state.x)
-        delta_dot = indentation_rate(problem, s, state.x)
-        tolerance = surface_tolerance(problem, s, state.x) if locates else 0.0
-        still = rate_tolerance(problem, s, state.x)
-        direction = 0
-        if delta >= problem.knots[s, state.segment[s]] - tolerance and delta_dot > still:
-            direction = 1
-        elif (
-            state.segment[s] > 0 and delta <= problem.knots[s, state.segment[s] - 1] + tolerance and delta_dot < -still
-        ):
-            direction = -1
-        if direction != 0:
+        direction = _way_out(problem, state, s, locates)
+        if direction != 0 and abs(indentation_rate(problem, s, state.x)) > rate_tolerance(problem, s, state.x):
             switch(problem, state, s, direction, log)
             switched = True
     return switched
 
 
 @inlined
+def _way_out(problem, state, s, locates):
+    """Direction in which a stop on an end of its segment moves out of it, or 0."""
+    delta, delta_dot = indentation(problem, s, state.x), indentation_rate(problem, s, state.x)
+    tolerance, segment = surface_tolerance(problem, s, state.x) if locates else 0.0, state.segment[s]
+    if delta >= problem.knots[s, segment] - tolerance and delta_dot > 0.0:
+        return 1
+    if segment > 0 and delta <= problem.knots[s, segment - 1] + tolerance and delta_dot < 0.0:
+        return -1
+    return 0
+
+
+@inlined
 def acts(problem, state, row):
     """Whether the element that a row belongs to is in contact."""
-    return state.segment[problem.element[row]] > 0
+    return state.segment[element_of(problem, row)] > 0
 
 
 @inlined
@@ -363,7 +368,8 @@ def _problem(system: System, forcing: Forcing, linear: dict[str, Array]) -> Prob
     knots = np.full((m, most + 1), math.inf)
     for i, contact in enumerate(contacts):
         knots[i, : len(contact.law.knots) + 1] = (-math.inf if contact.always else 0.0, *contact.law.knots)
-    return Problem(
+    kind = Problem if all(len(c.rows) == 1 for c in contacts) else PlanarProblem
+    return kind(
         **linear,
         knots=knots,
         gap=gaps_of(contacts),
@@ -383,7 +389,7 @@ def _problem(system: System, forcing: Forcing, linear: dict[str, Array]) -> Prob
         by_latched=_integers(contacts, "memory_gradient_address"),
         by_renewal=_integers(contacts, "renew_gradient_address"),
         opening=np.array([_opening(c.law) for c in contacts], dtype=np.int64),
-        parts=ADDRESSES,
+        parts=addresses_of(kind),
         **vars(forcing),
     )
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from solvers.compiled.kernels import dot, inlined, inner, is_circle
+from solvers.compiled.kernels import dot, inlined, inner, is_circle, row_of
 from solvers.compiled.state import rate_tolerance, surface_tolerance
 from solvers.exponential.circles.flight import radial_polynomial
 from solvers.exponential.flight import ORDER
@@ -15,7 +15,7 @@ from solvers.exponential.flight import ORDER
 @inlined
 def _polynomial(problem, s, terms, values):
     """Coefficients of δ in time."""
-    row, factorial = problem.first[s], 1.0
+    row, factorial = row_of(problem, s), 1.0
     for i in range(ORDER + 1):
         values[i] = dot(problem.read[row], terms[i], 2 * problem.k.size) / factorial
         factorial *= i + 1.0

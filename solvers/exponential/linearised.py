@@ -27,7 +27,7 @@ from numba import types
 
 from solvers.compiled.dop853_tableau import STAGES, A
 from solvers.compiled.kernels import (
-    PROBLEM,
+    PLANAR_PROBLEM,
     acceleration_of,
     add_push,
     call_gradient,
@@ -82,7 +82,8 @@ from solvers.exponential.responses import propagate
 _OFF = 1e-10  # relative distance from a knot at which a law is certainly on one side of it
 
 
-_problem, _tables, _state, _scratch = unpacker(PROBLEM), unpacker(TABLES), unpacker(STATE), unpacker(SCRATCH)
+_problem = unpacker(PLANAR_PROBLEM)  # whatever it is: both types have the same fields
+_tables, _state, _scratch = unpacker(TABLES), unpacker(STATE), unpacker(SCRATCH)
 _derivatives, _variation = unpacker(DERIVATIVES), unpacker(VARIATION)
 
 

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from solvers.compiled.kernels import INTEGERS, MATRIX, PROBLEM, REAL, VECTOR, copy, entry, inner, is_circle
+from solvers.compiled.kernels import INTEGERS, MATRIX, PLANAR_PROBLEM, REAL, VECTOR, copy, entry, inner, is_circle
 from solvers.compiled.packed import Packed, unpacker
 from solvers.compiled.state import (
     DIVERGED,
@@ -34,7 +34,7 @@ from solvers.compiled.state import (
 )
 from solvers.exponential.energy.check import ALLOWED, FACTOR, LAST, has_gained
 from solvers.exponential.energy.flight_tables import NO_ENERGY_TABLES
-from solvers.exponential.method import Engine, advance
+from solvers.exponential.method import ADVANCE, Engine
 from solvers.exponential.preparation import SCRATCH
 from solvers.problem import Array, Status
 from solvers.problem import event_list as at
@@ -43,9 +43,10 @@ NEXT, BEYOND, BEGUN = range(3)  # places in a cursor: present start, end of the 
 CODE, CONTACTS = range(2)  # columns of Outcomes.count
 REACHED, EXCHANGED, ENERGY = range(3)  # columns of Outcomes.number; three of energy, as in Scratch.energy
 _CUBE = types.Array(REAL, 3, "C")
-_RUN = types.FunctionType(advance.nopython_signatures[0])
+_RUN = types.FunctionType(ADVANCE)
 _NEVER, _NOWHERE = np.array([np.inf]), np.empty((0, 0))
-_problem, _state, _scratch = unpacker(PROBLEM), unpacker(STATE), unpacker(SCRATCH)
+_state, _scratch = unpacker(STATE), unpacker(SCRATCH)
+_problem = unpacker(PLANAR_PROBLEM)  # whatever it is: both types have the same fields
 
 
 class Outcomes(NamedTuple):
@@ -164,13 +165,14 @@ class Worker:
         self.engine, self.cursor, problem_at = engine, np.zeros(3, dtype=np.int64), engine.addresses[0]
         if gaps.size:  # those of the problem are shared with other runs
             self.own = Packed.of(
-                engine.problem._replace(gap=engine.problem.gap.copy(), radius=engine.problem.radius.copy()), PROBLEM
+                engine.problem._replace(gap=engine.problem.gap.copy(), radius=engine.problem.radius.copy()),
+                PLANAR_PROBLEM,
             )
             problem_at = self.own.address
         workspace, parameters = engine.workspace, engine.prepared.problem.value.parameters
         log = np.empty((max(256, 2 * len(engine.problem.law)), at.CODE + 1))
         self.arguments = (
-            *(advance, problem_at, *engine.addresses[1:], NO_ENERGY_TABLES.address),
+            *(engine.advance, problem_at, *engine.addresses[1:], NO_ENERGY_TABLES.address),
             *(workspace.numbers, workspace.rest, parameters, starts, gaps, self.cursor),
             *(engine.duration, budget, engine.method.rtol, engine.landing_reach, log, _NOWHERE, _NEVER, *outcomes),
         )

@@ -21,14 +21,24 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar
+from functools import lru_cache
+from typing import Any, ClassVar
 
 import numpy as np
 from numba import types
 
-from solvers.compiled.kernels import MATRIX, PROBLEM, REAL, VECTOR, entry
+from solvers.compiled.kernels import (
+    MATRIX,
+    PLANAR_PROBLEM,
+    PROBLEM,
+    REAL,
+    VECTOR,
+    PlanarProblem,
+    entry,
+    merged,
+    type_of,
+)
 from solvers.compiled.packed import Packed, unpacker
-from solvers.compiled.parts import EVERY_RUN
 from solvers.compiled.renewals import most_rows
 from solvers.compiled.state import (
     AT_ONCE,
@@ -56,26 +66,24 @@ from solvers.exponential.contact.step import advance_contact
 from solvers.exponential.energy.check import FIRST, has_gained, note_energy, own_energy
 from solvers.exponential.energy.flight_balance import account_state, start_account
 from solvers.exponential.energy.flight_tables import ENERGY_TABLES, NO_ENERGY_TABLES
-from solvers.exponential.preparation import SCRATCH, TABLES, load_parts, prepare_run
+from solvers.exponential.preparation import SCRATCH, TABLES, prepare_run
 from solvers.exponential.safe_steps import fly
 from solvers.problem import Array, Forcing, System
 
-_problem, _tables, _state, _scratch = unpacker(PROBLEM), unpacker(TABLES), unpacker(STATE), unpacker(SCRATCH)
-_energy_tables = unpacker(ENERGY_TABLES)
-load_parts(EVERY_RUN)
+_problem, _planar_problem, _tables = unpacker(PROBLEM), unpacker(PLANAR_PROBLEM), unpacker(TABLES)
+_state, _scratch, _energy_tables = unpacker(STATE), unpacker(SCRATCH), unpacker(ENERGY_TABLES)
+ADVANCE = types.int64(*[types.int64] * 5, REAL, types.int64, REAL, REAL, MATRIX, MATRIX, VECTOR)
 
 
-@entry(types.int64(*[types.int64] * 5, REAL, types.int64, REAL, REAL, MATRIX, MATRIX, VECTOR))
-def advance(
-    problem_at, tables_at, state_at, scratch_at, energy_tables_at, t_end, budget, rtol, landing_reach, log, out, due
-):
+@merged
+def _advance(problem, tables_at, state_at, scratch_at, energy_at, t_end, budget, rtol, landing_reach, log, out, due):
     """Advance the state to ``t_end`` or for about ``budget`` steps; returns a status code.
 
     Row i of ``out`` gets the state at the time ``due[i]``; the last of these times is infinite. ``log`` gets a row per
     event. ``landing_reach`` is that of `landing.landing_reach`.
     """
-    problem, tables, state, scratch = _problem(problem_at), _tables(tables_at), _state(state_at), _scratch(scratch_at)
-    energy_tables, control = _energy_tables(energy_tables_at), scratch.control
+    tables, state, scratch = _tables(tables_at), _state(state_at), _scratch(scratch_at)
+    energy_tables, control = _energy_tables(energy_at), scratch.control
     if not control[BEGUN]:
         control[BEGUN], scratch.landing_reach[0] = 1, landing_reach
         scratch.energy[FIRST] = own_energy(problem, tables, state.x)
@@ -113,6 +121,32 @@ def advance(
             switch(problem, state, stop, np.int64(1), log)  # a literal would be compiled for itself
             begin_steps(problem, tables, state, scratch, stop)
     return RUNNING
+
+
+def _advance_line(
+    problem_at, tables_at, state_at, scratch_at, energy_at, t_end, budget, rtol, landing_reach, log, out, due
+):
+    """The loop of a `Problem`."""
+    problem = _problem(problem_at)
+    return _advance(
+        problem, tables_at, state_at, scratch_at, energy_at, t_end, budget, rtol, landing_reach, log, out, due
+    )
+
+
+def _advance_plane(
+    problem_at, tables_at, state_at, scratch_at, energy_at, t_end, budget, rtol, landing_reach, log, out, due
+):
+    """That of a `PlanarProblem`."""
+    problem = _planar_problem(problem_at)
+    return _advance(
+        problem, tables_at, state_at, scratch_at, energy_at, t_end, budget, rtol, landing_reach, log, out, due
+    )
+
+
+@lru_cache(maxsize=2)
+def advance_of(planar: bool) -> Any:
+    """The compiled loop for a type of problem."""
+    return entry(ADVANCE)(_advance_plane if planar else _advance_line)
 
 
 @dataclass(frozen=True)
@@ -177,8 +211,9 @@ class Engine:
         if system.latches:  # laws latch numbers among their parameters
             own["parameters"] = prepared.problem.value.parameters.copy()
         if own:
-            packed = Packed.of(packed.value._replace(**own), PROBLEM)
+            packed = Packed.of(packed.value._replace(**own), type_of(packed.value))
         self.packed, self.problem, self.prepared = packed, packed.value, prepared
+        self.advance = advance_of(isinstance(packed.value, PlanarProblem))
         self.workspace = prepared.workspace()
         self.workspace.begin(z)
         self.addresses = packed.address, prepared.tables.address, *self.workspace.addresses
@@ -213,7 +248,7 @@ class Engine:
         energy_tables = (
             self.prepared.energy_tables_for(_spacing(due)) if self.keeps_ledger(len(out) > 0) else NO_ENERGY_TABLES
         )
-        return advance(
+        return self.advance(
             *(*self.addresses, energy_tables.address, self.duration, budget, self.method.rtol, self.landing_reach),
             *(log, out, due),
         )

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import lru_cache, partial
+from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba import types
 
 from solvers.compiled.fields import packed_type, shapes_of
-from solvers.compiled.kernels import PROBLEM, Problem
+from solvers.compiled.kernels import Problem, type_of
 from solvers.compiled.packed import Layout, Packed, PackedTemplate, aligned
-from solvers.compiled.parts import BORDERS, CIRCLES, ENERGY, MANY_STOPS, TWO_STOPS, load
+from solvers.compiled.parts import BORDERS, CIRCLES, ENERGY, EVERY_RUN, MANY_STOPS, TWO_STOPS, load
 from solvers.compiled.state import STATE, State, begin_state, gaps_of, most_borders, problem_of, radii_of
 from solvers.compiled.sums import padded
 from solvers.exponential.contact.many_stops import POOL
@@ -23,9 +24,12 @@ from solvers.exponential.tables import TONE_TABLES, Tables, build, doublings, fi
 from solvers.problem import Array, Contact, Forcing, Memo, System, on_one_grid
 
 TABLES, SCRATCH = packed_type(Tables), packed_type(Scratch)
-_KINDS = {"problem": PROBLEM, "tables": TABLES, "state": STATE, "scratch": SCRATCH, "energy_tables": ENERGY_TABLES}
-load_parts = partial(load, _KINDS)
-"""Compile functions that are called at their addresses, or load their machine code; see `compiled.parts`."""
+_KINDS = {"tables": TABLES, "state": STATE, "scratch": SCRATCH, "energy_tables": ENERGY_TABLES}
+
+
+def load_parts(problem: types.NamedTuple, places: Iterable[int]) -> None:
+    """Compile functions that are called at their addresses, or load their machine code; see `compiled.parts`."""
+    load({"problem": problem, **_KINDS}, places)
 
 
 class Workspace:
@@ -69,7 +73,7 @@ class Prepared(NamedTuple):
 
     def energy_tables_for(self, spacing: float) -> Packed:
         """Tables of the energy balance for outputs of a spacing, s; what reads them is compiled for the first."""
-        load_parts(ENERGY)
+        load_parts(type_of(self.problem.value), ENERGY)
         arrays = self.problem.value, self.tables.value
         made: Packed = self.kept.get((spacing, self.tones), lambda: energy_tables_for(*arrays, spacing))
         return made
@@ -154,17 +158,13 @@ class _SharedTables:
             **{"E": len(contacts), "R": len(problem.gap), "L": len(problem.load), "N": len(problem.k)},
             **{"tables": len(forcing.table_dt), "B": most_borders(problem), "A": int(np.count_nonzero(problem.radius))},
         }
-        if tables.bend.any() or problem.border_count.any():
-            load_parts(BORDERS)
-        if len(contacts) > 1:
-            load_parts(TWO_STOPS)
-        if tables.node_propagator.size:
-            load_parts(MANY_STOPS)
-        if problem.radius.any():
-            load_parts(CIRCLES)
+        bent = tables.bend.any() or problem.border_count.any()
+        needs = bent, len(contacts) > 1, tables.node_propagator.size, problem.radius.any()
+        for places, needed in zip((BORDERS, TWO_STOPS, MANY_STOPS, CIRCLES), needs, strict=True):
+            load_parts(type_of(problem), (*EVERY_RUN, *places) if needed else EVERY_RUN)
         self.layout = _layout(pool=POOL if tables.node_propagator.size else 0, **sizes)
         self.kept = Memo()
-        self.problem = PackedTemplate(problem, PROBLEM, ("gap", "radius", "k", "read", "read_rate", "power"))
+        self.problem = PackedTemplate(problem, type_of(problem), ("gap", "radius", "k", "read", "read_rate", "power"))
         self.tables = PackedTemplate(aligned(tables), TABLES, TONE_TABLES)
 
     @property

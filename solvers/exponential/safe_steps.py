@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from solvers.compiled.kernels import copy, dot, indentation, indentation_rate, inlined, inner, is_circle, merged
+from solvers.compiled.kernels import copy, dot, indentation, indentation_rate, inlined, inner, is_circle, merged, row_of
 from solvers.compiled.state import SAMPLED, STEPS, T
 from solvers.exponential.circles.flight import circle_is_near, span_of_circle, span_of_circle_at
 from solvers.exponential.energy.flight_balance import (
@@ -125,7 +125,7 @@ def _fly_unsampled(problem, tables, state, scratch, most, budget):
             if is_circle(problem, s):
                 span = min(span, span_of_circle(problem, tables, scratch, s, x))
                 continue
-            row = problem.first[s]
+            row = row_of(problem, s)
             delta, rate = motion_of_row(problem, tables, row, x)
             span = min(span, safe_time(-delta, -rate, scratch.per_row[row]))
         if span < tables.flight_step[tables.flight_step.size - 1] or count >= budget:
@@ -155,7 +155,7 @@ def _near(problem, tables, scratch, x):
     """Whether any stop is nearer than its error e, or the state is not finite."""
     near = False
     for s in range(problem.law.size):
-        row = problem.first[s]
+        row = row_of(problem, s)
         if is_circle(problem, s):
             near |= circle_is_near(problem, tables, scratch, s, x)
         else:
@@ -213,7 +213,7 @@ def _safe_span(problem, tables, state, scratch, span, rest, renew):
             span = min(span, span_of_circle_at(problem, state, scratch, s))
             continue
         g, v = -indentation(problem, s, state.x), -indentation_rate(problem, s, state.x)
-        span = min(span, safe_time(g, v, scratch.per_row[problem.first[s]]))
+        span = min(span, safe_time(g, v, scratch.per_row[row_of(problem, s)]))
     return span
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from solvers.compiled.dop853_tableau import STAGES
 from solvers.compiled.fields import shapes_of
-from solvers.compiled.kernels import PROBLEM, Problem
+from solvers.compiled.kernels import PLANAR_PROBLEM, Problem
 from solvers.compiled.packed import Layout, Packed
 from solvers.compiled.state import HEAD, STATE, State, T, begin_state, gaps_of, law_parameters, most_borders, radii_of
 from solvers.exponential.contact.nodes import S
@@ -55,11 +55,14 @@ class Tangent:
         self.latched[2 * n : 2 * n + own, self.places_latched[:own]] = np.eye(own)
         engine.record_events(np.empty((_ROWS, HEAD + width + rows * S)))
         self.packed = [
-            *(engine.packed if same is engine.problem else Packed.of(same, PROBLEM) for same in self.change.problems),
+            *(
+                engine.packed if same is engine.problem else Packed.of(same, PLANAR_PROBLEM)
+                for same in self.change.problems
+            ),
             Packed.of(self.change.variation, VARIATION),
         ]
         if problem is not engine.problem:
-            self.packed.append(Packed.of(problem, PROBLEM))
+            self.packed.append(Packed.of(problem, PLANAR_PROBLEM))
         derivatives, past = (words + start for start in layout.starts)
         ahead, behind, variation = (packed.address for packed in self.packed[:3])
         problem_at, *others = engine.addresses

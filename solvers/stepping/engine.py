@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from solvers.compiled.kernels import rhs
+from solvers.compiled.kernels import PlanarProblem, rhs
 from solvers.compiled.state import (
     CALLS,
     DONE,
@@ -24,7 +24,7 @@ from solvers.compiled.state import (
 from solvers.problem import Array, Forcing, Status, System
 from solvers.stepping.energy_gain import IN_A_ROW, NOW, STEPS_OF_GAIN, gains, largest_loads, negligible_energy, watched
 from solvers.stepping.events import HENON
-from solvers.stepping.loop import march, new_space
+from solvers.stepping.loop import march_of, new_space
 from solvers.stepping.stability import kinks_of, shortest_contact
 
 
@@ -42,7 +42,7 @@ class Engine:
     def __init__(self, method: Any, system: System, z: Array, forcing: Forcing, duration: float) -> None:
         self.method, self.duration, self.system = method, duration, system
         self.problem = problem_of(system, forcing)
-        self.back = system.blocks.T
+        self.back, self.loop = system.blocks.T, march_of(isinstance(self.problem, PlanarProblem))
         if method.events == HENON:
             self.problem.knots[:, 1:] = math.inf  # kinks are not looked for
         self.state: State = new_state(z, len(system.contacts), sum(c.friction is not None for c in system.contacts))
@@ -73,7 +73,7 @@ class Engine:
         """Advance by at most ``budget`` steps."""
         method = self.method
         dt_flight, dt_contact = (math.inf, math.inf) if method.adaptive else method.steps
-        code = march(
+        code = self.loop(
             *(method.step, self.problem, self.state, self.space, self.duration, budget),
             *(dt_flight, dt_contact, method.rtol, self.atol),
             *(method.adaptive, method.events, log, out, due),

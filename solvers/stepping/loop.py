@@ -5,12 +5,25 @@ A method is one compiled ``step`` of declared signature, so a new method does no
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
 
-from solvers.compiled.kernels import INTEGERS, MATRIX, PROBLEM, REAL, VECTOR, entry, inlined, inner, merged, rhs
+from solvers.compiled.kernels import (
+    INTEGERS,
+    MATRIX,
+    PLANAR_PROBLEM,
+    PROBLEM,
+    REAL,
+    VECTOR,
+    entry,
+    inlined,
+    inner,
+    merged,
+    rhs,
+)
 from solvers.compiled.state import (
     CALLS,
     GAINED,
@@ -34,12 +47,6 @@ from solvers.stepping.henon import land as henon_landing
 from solvers.stepping.located import NEAR_END, SWITCHED, accept, find, first_kink, land, look
 
 _MOST_NODES = 16.0  # of a signal on a step: a period of its fastest part has ten and more
-
-STEP_FUNCTION = types.FunctionType(
-    types.Tuple([REAL, types.int64])(
-        *[PROBLEM, REAL, REAL, VECTOR, VECTOR, INTEGERS, VECTOR], *[VECTOR, VECTOR, MATRIX, MATRIX, REAL, REAL]
-    )
-)
 
 
 class Space(NamedTuple):
@@ -132,13 +139,7 @@ def _entry_by_henon(problem, state, space, h):
     return duration, stop
 
 
-@entry(
-    types.int64(
-        *[STEP_FUNCTION, PROBLEM, STATE, SPACE, REAL, types.int64, REAL, REAL],
-        *[REAL, REAL, types.boolean, types.int64, MATRIX, MATRIX, VECTOR],
-    )
-)
-def march(
+def _march(
     step, problem, state, space, t_end, budget, dt_flight, dt_contact, rtol, atol, adaptive, events, log, out, due
 ):
     """Advance the state to ``t_end`` or for ``budget`` steps; returns a status code."""
@@ -225,6 +226,17 @@ def march(
         elif not adaptive:
             now[H_FLIGHT], now[H_CONTACT], by_hand = dt_flight, dt_contact, False
     return RUNNING
+
+
+@lru_cache(maxsize=2)
+def march_of(planar: bool) -> Any:
+    """The compiled loop for a type of problem."""
+    problem = PLANAR_PROBLEM if planar else PROBLEM
+    step = types.Tuple([REAL, types.int64])(
+        *[problem, REAL, REAL, VECTOR, VECTOR, INTEGERS, VECTOR], *[VECTOR, VECTOR, MATRIX, MATRIX, REAL, REAL]
+    )
+    known = types.FunctionType(step), problem, STATE, SPACE, REAL, types.int64, REAL, REAL
+    return entry(types.int64(*known, REAL, REAL, types.boolean, types.int64, MATRIX, MATRIX, VECTOR))(_march)
 
 
 def new_space(

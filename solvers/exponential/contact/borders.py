@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numba import types
 
-from solvers.compiled.kernels import VECTOR, indentation, indentation_rate, inlined, inner, merged, rhs
+from solvers.compiled.kernels import VECTOR, indentation, indentation_rate, inlined, inner, merged, rhs, row_of
 from solvers.compiled.parts import PASSED, part
 from solvers.compiled.renewals import margins, margins_before, margins_in, note_event, renew
 from solvers.compiled.state import LAST_EVENT, T, rate_tolerance, surface_tolerance
@@ -52,7 +52,7 @@ def _margins_on_step(problem, tables, state, scratch, s, node_set, level):
     yet may look at the sign of δ. It is looked at once more with rounding added to δ and to δ̇, and with their ripple.
     """
     n, delta, rate = problem.k.size, scratch.start_motion[s, 0], scratch.start_motion[s, 1]
-    weight, alias = tables.ripple_weight[problem.first[s]], tables.alias[tables.kind[node_set], level]
+    weight, alias = tables.ripple_weight[row_of(problem, s)], tables.alias[tables.kind[node_set], level]
     deltas, rates = scratch.local_motion[KNOWN, :ENDS], scratch.local_motion[KNOWN, ENDS : 2 * ENDS]
     ahead, rounding = math.copysign(1.0, rate), surface_tolerance(problem, s, state.x)
     for i in range(ENDS):

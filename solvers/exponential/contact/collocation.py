@@ -29,6 +29,7 @@ from solvers.compiled.kernels import (
     contact_forces,
     contact_gradient,
     copy,
+    element_of,
     indentation,
     indentation_rate,
     inlined,
@@ -36,6 +37,8 @@ from solvers.compiled.kernels import (
     is_circle,
     merged,
     off_knots,
+    place_of,
+    row_of,
 )
 from solvers.compiled.parts import ERROR, SOLVE, part
 from solvers.compiled.simd import largest8, load8
@@ -80,7 +83,7 @@ def _iterate(problem, tables, state, scratch, node_set, level):
         if state.segment[s] > 0:
             node_forces(problem, tables, state, scratch, s)
             unit = 1.0 / scratch.force_tolerance[s] ** 2
-            for r in range(problem.first[s], problem.first[s + 1]):
+            for r in range(row_of(problem, s), row_of(problem, s + 1)):
                 moved, size = replace_values(scratch.force[r], scratch.law_force[r])
                 change, largest = change + moved * unit, largest + size * unit
     return change, largest
@@ -96,9 +99,9 @@ def _set_accuracy(problem, tables, state, scratch, h, rtol):
     for s in range(problem.law.size):
         if state.segment[s] > 0:
             most = 1e-300
-            for u in range(problem.first[s], problem.first[s + 1]):
+            for u in range(row_of(problem, s), row_of(problem, s + 1)):
                 for r in range(problem.gap.size):
-                    most = max(most, abs(tables.accelerance[r, u]) / scratch.reference_speed[problem.element[r]])
+                    most = max(most, abs(tables.accelerance[r, u]) / scratch.reference_speed[element_of(problem, r)])
                 copy(scratch.force[u], scratch.guess[u], S)
             scratch.force_tolerance[s] = 0.05 * rtol / (h * most)
             stiff |= h * own_accelerance(problem, tables, s) * scratch.viscous[s] > 1.0
@@ -122,7 +125,7 @@ def solve_forces(problem, tables, state, scratch, node_set, level, rtol):
         return newton(problem, tables, state, scratch, node_set, level)
     before, alone = 0.0, _alone(problem, tables, state)
     law, unit = tables.power_law[max(alone, 0)], 1.0 / scratch.force_tolerance[max(alone, 0)] ** 2
-    row = problem.first[max(alone, 0)]
+    row = row_of(problem, max(alone, 0))
     own = pair_response(problem, tables, scratch, node_set, level, row, row)
     stiffness, rooted, damping = law[STIFFNESS], law[EXPONENT] == 1.5, law[DAMPING]
     factor = law[FACTOR] / state.entry_rate[max(alone, 0)]
@@ -171,12 +174,12 @@ def step_error(problem, tables, state, scratch, node_set, level, rtol):
     """
     n, h = problem.k.size, tables.contact_step[level]
     for u in range(problem.gap.size):
-        scratch.unresolved[u], s = 0.0, problem.element[u]
+        scratch.unresolved[u], s = 0.0, element_of(problem, u)
         if state.segment[s] == 0:
             continue
         combine(tables.summary[node_set], scratch.force[u], S, None, scratch.summary[u, 0])
-        if is_circle(problem, s) and u == problem.first[s]:
-            own = problem.own[s]
+        if is_circle(problem, s) and u == row_of(problem, s):
+            own = place_of(problem, s)
             combine(tables.summary[node_set], scratch.law_force[own], S, None, scratch.summary[own, 0])
         largest, stiffness = _largest(problem, tables, state, scratch, s)
         if node_set == 0 or s == node_set - 1:
@@ -184,7 +187,7 @@ def step_error(problem, tables, state, scratch, node_set, level, rtol):
         else:
             combine(tables.tail[node_set], scratch.force[u], S, None, scratch.trial)
             unresolved = unresolved_part(scratch.trial, largest, 1)
-        if node_set == 0 and u == problem.first[s] and tables.power_law[s, EXPONENT] == 0.0:
+        if node_set == 0 and u == row_of(problem, s) and tables.power_law[s, EXPONENT] == 0.0:
             unresolved += 0.01 * _hidden_kink(problem, state, scratch, s, largest)
         if unresolved == 0.0:
             continue
@@ -195,7 +198,7 @@ def step_error(problem, tables, state, scratch, node_set, level, rtol):
     _sum_errors(problem, tables, scratch, node_set, state.now[T], h)
     worst = 0.0
     for r in range(problem.gap.size):
-        speed = max(scratch.reference_speed[problem.element[r]], largest_size(scratch.motion[r, 1]))
+        speed = max(scratch.reference_speed[element_of(problem, r)], largest_size(scratch.motion[r, 1]))
         error = scratch.per_row[r] / (rtol * speed)
         if not error <= worst:
             worst = error
@@ -251,7 +254,7 @@ def _hidden_kink(problem, state, scratch, s, largest):
     delta[1] = off_knots(problem, s, state.segment[s], indentation(problem, s, state.x))
     rate[1] = indentation_rate(problem, s, state.x)
     contact_forces(problem, s, delta, rate, state.entry_rate[s], scratch.trial[2:4])
-    c = scratch.summary[problem.own[s], 0]
+    c = scratch.summary[place_of(problem, s), 0]
     apart = max(abs(scratch.trial[2] - c[5]), abs(scratch.trial[3] - c[4]))
     return apart if apart > 2.0 * max(abs(c[2]), abs(c[3])) + 1e-12 * largest else 0.0
 

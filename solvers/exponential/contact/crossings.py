@@ -31,6 +31,7 @@ from solvers.compiled.kernels import (
     is_circle,
     merged,
     push_of,
+    row_of,
 )
 from solvers.compiled.parts import BOUNDS, LEAVES, SIDE, part
 from solvers.compiled.simd import largest8, least8, load8, splat8, store8
@@ -130,7 +131,7 @@ def _stays_away(problem, state, scratch, s, h):
     """Whether a stop out of contact cannot be reached on the step; its motion is set to that at the start."""
     if is_circle(problem, s):
         return stays_in_circle(problem, state, scratch, s, h)
-    delta, rate, row = scratch.start_motion[s, 0], scratch.start_motion[s, 1], problem.first[s]
+    delta, rate, row = scratch.start_motion[s, 0], scratch.start_motion[s, 1], row_of(problem, s)
     store8(scratch.motion[row, 0], 0, splat8(delta))
     store8(scratch.motion[row, 1], 0, splat8(rate))
     return delta + h * max(rate, 0.0) + 0.5 * h * h * scratch.per_row[row] < 0.0
@@ -143,7 +144,7 @@ def _watch(problem, tables, state, scratch, node_set, level, s, carried):
     if through and not carried:
         add_block_motion(problem, tables, state, scratch, node_set, level, CONTINUING)
         add_block_motion(problem, tables, state, scratch, node_set, level, ENTERING)
-    for r in range(problem.first[s], problem.first[s + 1]):
+    for r in range(row_of(problem, s), row_of(problem, s + 1)):
         if through:
             motion_at_nodes(problem, scratch, r, problem.gap[r], scratch.motion[r])
         else:

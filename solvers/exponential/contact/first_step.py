@@ -7,7 +7,17 @@ import math
 import numpy as np
 from numba import types
 
-from solvers.compiled.kernels import dot, force_at, indentation, indentation_rate, inlined, inner, is_circle, merged
+from solvers.compiled.kernels import (
+    dot,
+    force_at,
+    indentation,
+    indentation_rate,
+    inlined,
+    inner,
+    is_circle,
+    merged,
+    row_of,
+)
 from solvers.compiled.parts import BEGIN, part
 from solvers.compiled.state import T_IN, T, surface_tolerance
 from solvers.exponential.contact.crossings import choose_sides
@@ -33,9 +43,9 @@ def begin_steps(problem, tables, state, scratch, stop):
         if before:
             scratch.reference_speed[s] = max(scratch.reference_speed[s], speed)
         else:
-            reached = 0.1 * dot(tables.rate_weight[problem.first[s]], scratch.norms, problem.k.size)
+            reached = 0.1 * dot(tables.rate_weight[row_of(problem, s)], scratch.norms, problem.k.size)
             if is_circle(problem, s):
-                across = dot(tables.rate_weight[problem.first[s] + 1], scratch.norms, problem.k.size)
+                across = dot(tables.rate_weight[row_of(problem, s) + 1], scratch.norms, problem.k.size)
                 reached = math.hypot(reached, 0.1 * across)
             pressed = _PRESSED * pressed_speed(problem, tables, state, s, scratch.trial)
             scratch.reference_speed[s] = max(speed, reached, pressed, _LEAST)

@@ -23,6 +23,7 @@ from solvers.compiled.dop853_tableau import E3, E5, STAGES
 from solvers.compiled.kernels import (
     abs_dot,
     copy,
+    element_of,
     indentation,
     indentation_rate,
     inlined,
@@ -31,6 +32,7 @@ from solvers.compiled.kernels import (
     merged,
     raised,
     rhs,
+    row_of,
 )
 from solvers.compiled.parts import PASSED
 from solvers.compiled.renewals import margins_before, margins_in
@@ -76,7 +78,7 @@ def _error(problem, scratch, part, rtol):
     combine(scratch.stages, E5, STAGES, None, scratch.stages[DIFFERENCE])
     for r in range(problem.gap.size):
         error = part * abs_dot(problem.read_rate[r], scratch.stages[DIFFERENCE], 2 * problem.k.size)
-        error /= rtol * scratch.reference_speed[problem.element[r]]
+        error /= rtol * scratch.reference_speed[element_of(problem, r)]
         if not error <= worst:
             worst = error
     return worst
@@ -99,7 +101,7 @@ def _error_in_time(problem, scratch, span, rtol):
         error = _difference(problem, r, fifth, span)
         if error > 0.0:
             error *= error / math.hypot(error, 0.1 * _difference(problem, r, third, span))
-        error /= rtol * scratch.reference_speed[problem.element[r]]
+        error /= rtol * scratch.reference_speed[element_of(problem, r)]
         if not error <= worst:
             worst = error
     return worst
@@ -205,7 +207,7 @@ def _slopes_by_forces(problem, tables, state, stop, w, x):
     for s in range(problem.law.size):
         if s != stop and state.segment[s] > 0 and tables.time_exponent[1 + s] > 1.0:
             deepest = max(indentation(problem, s, w), indentation(problem, s, x))
-            most = max(most, abs_dot(problem.read[problem.first[s]], w, 2 * problem.k.size) / max(deepest, 1e-300))
+            most = max(most, abs_dot(problem.read[row_of(problem, s)], w, 2 * problem.k.size) / max(deepest, 1e-300))
     return min(most, _MOST_SLOPE)
 
 

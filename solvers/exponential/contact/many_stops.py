@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from numba import types
 
-from solvers.compiled.kernels import MATRIX, REAL, VECTOR, inlined, inner, merged, push_of
+from solvers.compiled.kernels import MATRIX, REAL, VECTOR, element_of, inlined, inner, merged, push_of
 from solvers.compiled.parts import FREE_BLOCKS, PAIR, PUSHED_BLOCKS, PUSHED_END, STOP_AT_NODES, part
 from solvers.compiled.simd import load8, splat8, store8, sum8
 from solvers.compiled.state import acts
@@ -31,7 +31,7 @@ def uses_blocks(tables):
 @inlined
 def enters(problem, node_set, u):
     """Whether input u is a force of the element that enters on a step with given nodes."""
-    return u < problem.gap.size and problem.element[u] == node_set - 1
+    return u < problem.gap.size and element_of(problem, u) == node_set - 1
 
 
 @inlined

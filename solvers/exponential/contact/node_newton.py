@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import types
 
-from solvers.compiled.kernels import contact_gradient, copy, inner, is_circle, merged
+from solvers.compiled.kernels import contact_gradient, copy, element_of, inner, is_circle, merged, row_of
 from solvers.compiled.parts import NEWTON, part
 from solvers.compiled.state import CALLS, acts, rate_tolerance
 from solvers.exponential.circles.contact import linearise_circle
@@ -28,10 +28,10 @@ def linearise(problem, tables, state, scratch, node_set, level):
     size = 0
     for r in range(problem.gap.size):
         if acts(problem, state, r):
-            s = problem.element[r]
+            s = element_of(problem, r)
             if not is_circle(problem, s):
                 _linearise_row(problem, tables, state, scratch, node_set, level, r, size)
-            elif r == problem.first[s]:
+            elif r == row_of(problem, s):
                 linearise_circle(problem, tables, state, scratch, node_set, level, s, size)
             size += S
     return size
@@ -40,7 +40,7 @@ def linearise(problem, tables, state, scratch, node_set, level):
 @inner
 def _linearise_row(problem, tables, state, scratch, node_set, level, r, begin):
     """Write what row r adds to J, from its row ``begin`` on."""
-    slope, pushes, column = scratch.slope[problem.element[r]], r == problem.first[problem.element[r]], 0
+    slope, pushes, column = scratch.slope[element_of(problem, r)], r == row_of(problem, element_of(problem, r)), 0
     for u in range(problem.gap.size):
         if not acts(problem, state, u):
             continue
@@ -102,10 +102,10 @@ def newton(problem, tables, state, scratch, node_set, level):
         for s in range(problem.law.size):
             if state.segment[s] == 0:
                 continue
-            for r in range(problem.first[s], problem.first[s + 1]):
+            for r in range(row_of(problem, s), row_of(problem, s + 1)):
                 respond(problem, tables, state, scratch, node_set, level, r)
             node_forces(problem, tables, state, scratch, s)
-            for r in range(problem.first[s], problem.first[s + 1]):
+            for r in range(row_of(problem, s), row_of(problem, s + 1)):
                 for i in range(S):
                     scratch.residual[place + i] = scratch.law_force[r, i] - scratch.force[r, i]
                 place += S
@@ -115,7 +115,7 @@ def newton(problem, tables, state, scratch, node_set, level):
         found, place = True, 0
         _note_viscosity(state, scratch)
         for r in range(problem.gap.size):
-            s = problem.element[r]
+            s = element_of(problem, r)
             if state.segment[s] == 0:
                 continue
             change, largest = 0.0, 0.0

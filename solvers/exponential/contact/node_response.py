@@ -6,7 +6,17 @@ import math
 from typing import Annotated, Any, NamedTuple
 
 from solvers.compiled.dop853_tableau import STAGES
-from solvers.compiled.kernels import inlined, inner, is_circle, law_forces, merged, reordered, table_value
+from solvers.compiled.kernels import (
+    inlined,
+    inner,
+    is_circle,
+    law_forces,
+    merged,
+    place_of,
+    reordered,
+    row_of,
+    table_value,
+)
 from solvers.compiled.simd import largest8, load8, size8, splat8, store8
 from solvers.compiled.state import CALLS, T, acts
 from solvers.compiled.sums import above, combine
@@ -253,7 +263,7 @@ def respond(problem, tables, state, scratch, node_set, level, r):
 @inlined
 def own_accelerance(problem, tables, s):
     """-δ̈ of a stop per newton of its own, 1/kg; of a circle the larger one of its rows."""
-    row = problem.first[s]
+    row = row_of(problem, s)
     if is_circle(problem, s):
         return max(tables.accelerance[row, row], tables.accelerance[row + 1, row + 1])
     return tables.accelerance[row, row]
@@ -262,19 +272,19 @@ def own_accelerance(problem, tables, s):
 @merged
 def motion_of(problem, scratch, s):
     """(2, S) indentation and rate of stop s at the nodes."""
-    return scratch.motion[problem.own[s]]
+    return scratch.motion[place_of(problem, s)]
 
 
 @merged
 def force_of(problem, scratch, s):
     """(S,) force of stop s at the nodes."""
-    return scratch.force[problem.first[s]] if not is_circle(problem, s) else scratch.law_force[problem.own[s]]
+    return scratch.force[row_of(problem, s)] if not is_circle(problem, s) else scratch.law_force[place_of(problem, s)]
 
 
 @inlined
 def ripple_of_stop(problem, tables, s, alias, x):
     """The error of `ripple_of` of a stop's indentation."""
-    row, n = problem.first[s], problem.k.size
+    row, n = row_of(problem, s), problem.k.size
     ripple = ripple_of(tables.ripple_weight[row], alias, x, n)
     if is_circle(problem, s):
         ripple += ripple_of(tables.ripple_weight[row + 1], alias, x, n)
@@ -305,7 +315,7 @@ def node_forces(problem, tables, state, scratch, s):
     if is_circle(problem, s):
         radial_forces(problem, tables, state, scratch, s)
         return
-    motion, force = motion_of(problem, scratch, s), scratch.law_force[problem.first[s]]
+    motion, force = motion_of(problem, scratch, s), scratch.law_force[row_of(problem, s)]
     above(motion[0], problem.knots[s, 0], scratch.clipped)
     law_forces(problem, s, S, scratch.clipped, motion[1], state.entry_rate[s], force)
     state.count[CALLS] += S

@@ -19,6 +19,7 @@ from solvers.compiled.kernels import (
     inner,
     merged,
     off_knots,
+    place_of,
 )
 from solvers.compiled.simd import largest8, load8
 from solvers.compiled.state import PEAK_DELTA, PEAK_FORCE, acting_segment, begins_and_ends, surface_tolerance
@@ -126,7 +127,7 @@ def step_peaks(problem, tables, state, scratch, node_set, h, s, limit):
     seen, motion, force = -1, motion_of(problem, scratch, s)[0], force_of(problem, scratch, s)
     if limit >= 1.0 and _below(state, s, PEAK_FORCE, force) and _below(state, s, PEAK_DELTA, motion):
         return
-    summary = scratch.summary[problem.own[s]]
+    summary = scratch.summary[place_of(problem, s)]
     combine(tables.summary[node_set], motion, S, None, summary[1])
     for column, values, d in ((PEAK_FORCE, force, 0), (PEAK_DELTA, motion, 1)):
         known, slopes = state.active[s, column], summary[d]

@@ -24,6 +24,7 @@ from solvers.compiled.kernels import (
     is_circle,
     merged,
     rhs,
+    row_of,
 )
 from solvers.compiled.parts import ACCEPT, CONTACT, FIRST_END, PRESSED, part
 from solvers.compiled.state import (
@@ -125,12 +126,12 @@ def _predict(problem, tables, state, scratch, level):
             guess_radial_forces(problem, tables, state, scratch, s)
             continue
         if control[NEW]:
-            free, force = scratch.free[problem.first[s]], force_of(problem, scratch, s)
+            free, force = scratch.free[row_of(problem, s)], force_of(problem, scratch, s)
             copy(free[0], scratch.clipped, S)
             contact_forces(problem, s, scratch.clipped, free[1], state.entry_rate[s], force)
             state.count[CALLS] += S
             continue
-        for r in range(problem.first[s], problem.first[s + 1]):
+        for r in range(row_of(problem, s), row_of(problem, s + 1)):
             if 0 <= shift < tables.extrapolation.shape[1]:
                 combine(tables.extrapolation[control[NODE_SET], shift], scratch.previous[r], S, None, scratch.force[r])
             else:

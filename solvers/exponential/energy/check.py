@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from solvers.compiled.kernels import inner, is_circle, merged
+from solvers.compiled.kernels import inner, is_circle, merged, row_of
 from solvers.compiled.state import PEAK_FORCE, T
 from solvers.problem import Array, Energy, System, dense
 
@@ -47,7 +47,7 @@ def note_energy(problem, tables, state, scratch):
     allowed = scratch.energy[FIRST]
     for s in range(problem.law.size):
         steady = 0.0
-        for r in range(problem.first[s], problem.first[s] + (1 if not is_circle(problem, s) else 2)):
+        for r in range(row_of(problem, s), row_of(problem, s) + (1 if not is_circle(problem, s) else 2)):
             row = problem.read_rate[r]
             for b in range(int(tables.own_blocks), n):
                 speed = np.hypot(row[b], row[n + b] * np.sqrt(problem.k[b]))

@@ -20,6 +20,7 @@ from solvers.compiled.kernels import (
     push_of,
     raised,
     reordered,
+    row_of,
     table_value,
 )
 from solvers.compiled.parts import WITHIN_STEP, part
@@ -165,14 +166,14 @@ def _add_works(problem, tables, state, scratch, row):
     size = 2 * problem.k.size
     for s in range(problem.law.size):
         if state.segment[s] > 0:
-            row_of = problem.first[s]
+            r = row_of(problem, s)
             if is_circle(problem, s):
                 work, impulse = work_within_circle(problem, tables, scratch, s, _PACE + 1)
                 row[size + 2 + 2 * s] += work
                 row[size + 3 + 2 * s] += impulse
                 continue
-            combine(scratch.along, problem.read_rate[row_of], size, None, scratch.trial)
-            impulses = load8(tables.gauss[1], 0) * load8(scratch.between[_PACE + 1 + row_of], 0)
+            combine(scratch.along, problem.read_rate[r], size, None, scratch.trial)
+            impulses = load8(tables.gauss[1], 0) * load8(scratch.between[_PACE + 1 + r], 0)
             row[size + 2 + 2 * s] += sum8(impulses * load8(scratch.trial, 0))
             row[size + 3 + 2 * s] += sum8(impulses)
 
