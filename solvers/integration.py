@@ -260,7 +260,7 @@ class _Run:
         transitions = partial(Transitions.of_events, rows, self.system.contacts)
         first, last = (self.initial, self.latched), (state, latched)
         lost = partial(Losses.of_run, self.system.contacts, back, first, last, works, transitions, self._rubbed())
-        if status is Status.DONE and not self._balances(works, complete, motion, rows):
+        if status is Status.DONE and not self._balances(works, complete, motion, rows, self._balanced(rubbed)):
             status = Status.UNBALANCED
         count = self.state.count.tolist()
         cost = Cost(count[STEPS], count[REJECTED], count[CALLS], count[EVENTS], seconds)
@@ -294,14 +294,14 @@ class _Run:
             found[s] = work - stored, law.arm * law.spin * impulse, way - (abs(force) / k_t if slips else 0.0)
         return found
 
-    def _balances(self, works: Array, complete: bool, motion: Array, rows: Array) -> bool:
+    def _balances(self, works: Array, complete: bool, motion: Array, rows: Array, rubbed: tuple[Any, Any]) -> bool:
         """Whether the energy balance closes, where it is kept; methods without `gains` are checked step by step."""
         if not hasattr(self.engine, "gains"):
             return True
         if not complete or not len(motion):
             return not self.engine.gains(partial(_exchanged, rows))
         start = self.engine.back @ self.initial
-        return not unbalanced(self.system, works, motion, start, _exchanged(rows), self.engine.method.rtol)
+        return not unbalanced(self.system, works, motion, start, _exchanged(rows), self.engine.method.rtol, rubbed)
 
     def _of_stops(self, rows: Array) -> Array:
         """The events of elements whose contacts begin and end."""

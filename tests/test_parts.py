@@ -81,6 +81,7 @@ def test_two_threads_compile_a_part_once(problem, monkeypatch):
 def test_every_place_has_a_function():
     importlib.import_module("solvers.exponential.method")
     groups = parts.EVERY_RUN, parts.ENERGY, parts.BORDERS, parts.TWO_STOPS, parts.MANY_STOPS, parts.CIRCLES
+    groups += (parts.FRICTION,)
     assert sorted(place for group in groups for place in group) == list(range(parts.PLACES))
     assert sorted(parts._DECLARED) == list(range(parts.PLACES))
 

@@ -1,10 +1,10 @@
 """Friction of an element: its tangential displacement ξ, and the force of its slider.
 
 The numbers of a slider stand among the element's parameters from ``problem.friction[s, 0]`` on, see
-`problem.friction`. The rows of an oblique stop read -(δ + g) and minus ξ, those of a circular clearance u = -d and,
-where there is a third, -φ:
+`problem.friction`. The rows of an oblique stop read δ + g and minus ξ, those of a circular clearance u = -d and, where
+there is a third, -|R| φ:
 
-    ξ = c θ + R (φ + Ω t),   ξ̇ = c (u × u̇)/r² + R (φ̇ + Ω),   force F_t (c/r) (-u_y, u_x)/r, torque -R F_t on φ
+    ξ = c θ + R (φ + Ω t),   ξ̇ = c (u × u̇)/r² + R (φ̇ + Ω),   forces F_t (c/r) (-u_y, u_x)/r and, on |R| φ, -F_t R/|R|
 
 θ is known up to whole turns, and ξ - s of a slider that sticks is far below half a turn: that is how it is read.
 """
@@ -26,7 +26,8 @@ def slide(radius, own, t, u, u_dot, w, w_dot, turned, turning):
         return -w, -w_dot
     c = abs(radius)
     rate = c * (u * w_dot - w * u_dot) / (u * u + w * w)
-    return c * math.atan2(w, u) + own[ARM] * (turned + own[SPIN] * t), rate + own[ARM] * (turning + own[SPIN])
+    sign, surface = math.copysign(1.0, own[ARM]), own[ARM] * own[SPIN]
+    return c * math.atan2(w, u) + sign * turned + surface * t, rate + sign * turning + surface
 
 
 @inlined
@@ -36,7 +37,10 @@ def slide_acceleration(radius, own, u, u_dot, u_twice, w, w_dot, w_twice, turnin
         return -w_twice
     square, along = u * u + w * w, u * u_dot + w * w_dot
     rate = (u * w_dot - w * u_dot) / square
-    return abs(radius) * ((u * w_twice - w * u_twice) / square - 2.0 * rate * along / square) + own[ARM] * turning_rate
+    return (
+        abs(radius) * ((u * w_twice - w * u_twice) / square - 2.0 * rate * along / square)
+        + math.copysign(1.0, own[ARM]) * turning_rate
+    )
 
 
 @inlined

@@ -34,7 +34,7 @@ from solvers.compiled.fields import packed_type
 from solvers.compiled.friction import friction_force, slide, slide_acceleration
 from solvers.compiled.packed import PackedType
 from solvers.compiled.parts import RADIAL_ACCELERATION, RADIAL_MOTION, RADIAL_PUSH, part
-from solvers.problem.friction import ARM, CODE
+from solvers.problem.friction import ACCOUNTS, ARM, CODE
 
 
 class Problem(NamedTuple):
@@ -327,8 +327,19 @@ def rhs(problem, t, x, segment, entry_rate, rate, batch):
             rate[size + 3 + 2 * s] = force
             calls += 1
         if rubs(problem, s):
-            _add_friction(problem, s, t, segment[s] > 0, batch[2], x, rate)
+            add_friction(problem, s, t, segment[s] > 0, batch[2], x, rate)
     return calls
+
+
+@inlined
+def width_of(problem):
+    """Numbers of a state: of the blocks, of the energy balance, of friction."""
+    width = 2 * problem.k.size + 2 + 2 * problem.law.size
+    if is_planar(problem):
+        for s in range(problem.friction.shape[0]):
+            if problem.friction[s, 0] > 0:
+                width = problem.friction[s, 1] + ACCOUNTS
+    return width
 
 
 @inlined
@@ -399,7 +410,7 @@ def slide_acceleration_of(problem, s, x, rate):
 
 
 @inner
-def _add_friction(problem, s, t, touches, normal, x, rate):
+def add_friction(problem, s, t, touches, normal, x, rate):
     """Add what the friction of a stop in contact does to the state's rate, and its power."""
     account = problem.friction[s, 1]
     rate[account], rate[account + 1], rate[account + 2] = 0.0, 0.0, 0.0
@@ -425,9 +436,9 @@ def add_sideways(problem, s, force, x, rate):
     for i in range(size):
         rate[i] += share * (problem.push[first + 1, i] * u - problem.push[first, i] * w)
     if first + 2 < row_of(problem, s + 1):
-        torque = slider_of(problem, s)[ARM] * force
+        turns = math.copysign(1.0, slider_of(problem, s)[ARM]) * force
         for i in range(size):
-            rate[i] -= problem.push[first + 2, i] * torque
+            rate[i] -= problem.push[first + 2, i] * turns
 
 
 @inlined

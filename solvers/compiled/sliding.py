@@ -136,9 +136,8 @@ def way_tolerance(problem, s, t, x):
     own, first, size = slider_of(problem, s), problem.first[s], 2 * problem.k.size
     way, speed = TURN * abs(radius_of(problem, s)) + abs(own[ARM] * own[SPIN] * t), abs(own[ARM] * own[SPIN])
     for r in range(first, problem.first[s + 1]):
-        arm = abs(own[ARM]) if r > first + 1 else 1.0
-        way += abs(problem.gap[r]) + arm * abs_dot(problem.read[r], x, size)
-        speed += arm * abs_dot(problem.read_rate[r], x, size)
+        way += abs(problem.gap[r]) + abs_dot(problem.read[r], x, size)
+        speed += abs_dot(problem.read_rate[r], x, size)
     return 1e-15 * way + 1e-20, 1e-13 * speed
 
 

@@ -177,6 +177,7 @@ class Exponential:
     ledger: bool = True
     has_tangent: ClassVar[bool] = True
     takes_annuli: ClassVar[bool] = True
+    takes_friction: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         if not 1e-12 <= self.rtol <= 1e-2:

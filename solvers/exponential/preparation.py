@@ -12,8 +12,8 @@ from numba import types
 from solvers.compiled.fields import packed_type, shapes_of
 from solvers.compiled.kernels import Problem, type_of
 from solvers.compiled.packed import Layout, Packed, PackedTemplate, aligned
-from solvers.compiled.parts import BORDERS, CIRCLES, ENERGY, EVERY_RUN, MANY_STOPS, TWO_STOPS, load
-from solvers.compiled.state import STATE, State, begin_state, gaps_of, most_borders, problem_of, radii_of
+from solvers.compiled.parts import BORDERS, CIRCLES, ENERGY, EVERY_RUN, FRICTION, MANY_STOPS, TWO_STOPS, load
+from solvers.compiled.state import STATE, State, begin_state, frictions_of, gaps_of, most_borders, problem_of, radii_of
 from solvers.compiled.sums import padded
 from solvers.exponential.contact.many_stops import POOL
 from solvers.exponential.contact.node_response import START, Scratch
@@ -22,6 +22,7 @@ from solvers.exponential.energy.flight_tables import ENERGY_TABLES, energy_table
 from solvers.exponential.steady_response import steady_response, without_resonance
 from solvers.exponential.tables import TONE_TABLES, Tables, build, doublings, fill_tones, law_tables_of
 from solvers.problem import Array, Contact, Forcing, Memo, System, on_one_grid
+from solvers.problem.friction import ACCOUNTS
 
 TABLES, SCRATCH = packed_type(Tables), packed_type(Scratch)
 _KINDS = {"tables": TABLES, "state": STATE, "scratch": SCRATCH, "energy_tables": ENERGY_TABLES}
@@ -146,8 +147,9 @@ class _SharedTables:
         plain, self.tones = problem_of(system, forcing), len(forcing.tone_omega)
         self.k, self.c, self.load = plain.k, plain.c, plain.load  # not the whole, which holds the sampled signals
         contacts = system.contacts
+        rubbing = [c.friction is not None for c in contacts]
         self.series = tuple((1.0, 0.0) if c.always else series_of(c.law) for c in contacts)
-        problem, loss = _widened(plain, forcing), _loss_rows(plain)
+        problem, loss = _widened(plain, forcing, contacts), _loss_rows(plain)
         read_by = plain.read, plain.power, loss, system.blocks.T
         self.rows, ends = np.concatenate(read_by), np.cumsum([len(rows) for rows in read_by]).tolist()
         self.places = [slice(end - len(rows), end) for rows, end in zip(read_by, ends, strict=True)]
@@ -157,10 +159,11 @@ class _SharedTables:
         sizes = {
             **{"E": len(contacts), "R": len(problem.gap), "L": len(problem.load), "N": len(problem.k)},
             **{"tables": len(forcing.table_dt), "B": most_borders(problem), "A": int(np.count_nonzero(problem.radius))},
+            **{"G": len(contacts) if any(rubbing) else 0, "F": sum(rubbing)},
         }
         bent = tables.bend.any() or problem.border_count.any()
-        needs = bent, len(contacts) > 1, tables.node_propagator.size, problem.radius.any()
-        for places, needed in zip((BORDERS, TWO_STOPS, MANY_STOPS, CIRCLES), needs, strict=True):
+        needs = bent, len(contacts) > 1, tables.node_propagator.size, problem.radius.any() or any(rubbing), any(rubbing)
+        for places, needed in zip((BORDERS, TWO_STOPS, MANY_STOPS, CIRCLES, FRICTION), needs, strict=True):
             load_parts(type_of(problem), (*EVERY_RUN, *places) if needed else EVERY_RUN)
         self.layout = _layout(pool=POOL if tables.node_propagator.size else 0, **sizes)
         self.kept = Memo()
@@ -229,7 +232,8 @@ def _check_passive(system: System) -> bool:
 def _layout(**known: int) -> Layout:
     """Shapes and places of the arrays of `State` and `Scratch`; ``pool`` pairs of rows, 0 for a few of them."""
     blocks, pool, inputs = known["N"], known["pool"], known["R"] + known["L"]
-    width, own, many = 2 * blocks + 2 + 2 * known["E"], padded(blocks), blocks if pool else 0
+    own, many = padded(blocks), blocks if pool else 0
+    width = 2 * blocks + 2 + 2 * known["E"] + ACCOUNTS * known["F"]
     sizes = {
         **{"X": width, "X8": padded(width), "W8": max(padded(width + 2), 2 * own), "N8": own, "stages": START + 1},
         **{"S": S, "M": many, "M8": padded(2 * many), "rows": 0, "record": 0},
@@ -248,7 +252,7 @@ def _loss_rows(problem: Problem) -> Array:
     return np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
 
 
-def _widened(problem: Problem, forcing: Forcing) -> Problem:
+def _widened(problem: Problem, forcing: Forcing, contacts: Sequence[Contact]) -> Problem:
     """The problem with one block per tone, whose read rows are zero; tones and sampled values are removed."""
     tones, none = len(forcing.tone_omega), np.zeros(0)
     sampled = np.zeros_like(problem.load)
@@ -259,6 +263,7 @@ def _widened(problem: Problem, forcing: Forcing) -> Problem:
         c=np.concatenate((problem.c, np.zeros(tones))),
         loss=np.empty((0, 0)),
         load=among_tones(sampled, tones),
+        friction=frictions_of(contacts, 2 * (len(problem.k) + tones)),
         tone_omega=none,
         tone_amplitude=none.astype(complex),
         tone_load=none.astype(np.int64),

@@ -23,6 +23,9 @@ def check_tangent(tangent: Any, method: Any, system: System) -> None:
     if tangent and not getattr(method, "has_tangent", False):
         raise ValueError(f"tangent is not offered by {type(method).__name__}; use Exponential")
     if tangent:
+        for i, contact in enumerate(system.contacts):
+            if contact.friction is not None:
+                raise ValueError(f"tangents take contacts without friction, and contact {i} has some")
         check_slopes(system)
 
 
@@ -32,7 +35,9 @@ def check_maps(system: System, method: Any) -> None:
     for i, contact in enumerate(system.contacts):
         name = type(method).__name__
         if contact.friction is not None and not friction:
-            raise ValueError(f"{name} takes contacts without friction, and contact {i} has some; use DormandPrince")
+            raise ValueError(
+                f"{name} takes contacts without friction, and contact {i} has some; use Exponential or DormandPrince"
+            )
         if contact.map == "annulus" and not annuli:
             raise ValueError(
                 f"{name} takes scalar stops, and contact {i} is an annulus; use Exponential or DormandPrince"

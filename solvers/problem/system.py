@@ -212,8 +212,9 @@ class Contact:
 
     @property
     def rows(self) -> Array:
-        """(m, n) the coordinates it acts on, one row each."""
-        more = [row for row in (self.tangent, self.rotation) if row is not None]
+        """(m, n) the coordinates it acts on, one row each; of a rotation R φ."""
+        turned = None if self.rotation is None or self.radius is None else self.radius * self.rotation
+        more = [row for row in (self.tangent, turned) if row is not None]
         return np.vstack((self.direction, *more)) if more else np.atleast_2d(self.direction)
 
     @property

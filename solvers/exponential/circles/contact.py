@@ -189,11 +189,11 @@ def linearise_circle(problem, tables, state, scratch, node_set, level, s, begin)
 
 @part(CIRCLE_WORK, REAL, *[types.int64] * 3)
 def work_in_circle(problem, tables, state, scratch, node_set, level, s):
-    """Work, J, of the components over the step just found, each as that of a plain force; see `contact.outputs`."""
+    """Work, J, of the forces on all rows over the step just found, each as a plain force's; see `contact.outputs`."""
     size, h, work = 2 * problem.k.size, tables.contact_step[level], 0.0
     weighted = s == node_set - 1 and tables.weight_exponent[node_set] > 0.0
     weights = tables.weights[node_set] if weighted else tables.plain[node_set]
-    for r in range(problem.first[s], problem.first[s] + 2):
+    for r in range(problem.first[s], problem.first[s + 1]):
         force, motion = scratch.force[r], scratch.motion[r]
         if weighted or h * tables.fastest <= 1.0:
             work += h * sum8(load8(weights, 0) * load8(force, 0) * load8(motion[1], 0))

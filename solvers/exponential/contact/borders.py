@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numba import types
 
-from solvers.compiled.kernels import VECTOR, indentation, indentation_rate, inlined, inner, merged, rhs, row_of
+from solvers.compiled.kernels import VECTOR, indentation, indentation_rate, inlined, inner, merged, rhs, row_of, rubs
 from solvers.compiled.parts import PASSED, part
 from solvers.compiled.renewals import margins, margins_before, margins_in, note_event, renew
 from solvers.compiled.state import LAST_EVENT, T, rate_tolerance, surface_tolerance
@@ -22,8 +22,14 @@ from solvers.exponential.contact.crossings import extremum
 from solvers.exponential.contact.node_response import DELTAS, KNOWN, RATES, START, motion_of, rate_ripple_of, ripple_of
 from solvers.exponential.contact.nodes import LOCAL, S
 from solvers.exponential.contact.peaks import local_maximum, motion_around
+from solvers.exponential.contact.slider_margins import (
+    ENDS,
+    slider_margin_in,
+    slider_margins_around,
+    slider_margins_at_nodes,
+    slider_margins_on_step,
+)
 
-ENDS = 6  # points at which margins are evaluated besides the nodes
 UNRESOLVED = -2
 _ON = 1e-9  # margin, in units of the largest of the step, at which a step counts as begun on the border
 _SAME = 1e-11  # the same for the sign of a node
@@ -37,9 +43,38 @@ _ENDS_NEAR = 0.5  # lower end of a landing, in the same units, below which what 
 _CLEAR = 0.03  # the lowest margin between them, in the same units, that counts as above zero
 
 
+@inner
+def margins_of(problem, state, scratch, s, t, x, out):
+    """Margins of element s in the state x at time t; returns δ and δ̇."""
+    if rubs(problem, s):
+        out[0] = slider_margin_in(problem, state, scratch, s, t, x, 0.0)
+        return indentation(problem, s, x), indentation_rate(problem, s, x)
+    return margins_in(problem, state, s, x, scratch.trial, out)
+
+
+@inner
+def margins_later(problem, state, scratch, s, t, x, time, out):
+    """The same a time later than x, by the rates there."""
+    if rubs(problem, s):
+        out[0] = slider_margin_in(problem, state, scratch, s, t, x, time)
+        return
+    rhs(problem, t, x, state.segment, state.entry_rate, state.rate, scratch.trial)
+    delta, rate = indentation(problem, s, x), indentation_rate(problem, s, x)
+    margins_before(problem, state, s, delta, rate, -time, scratch.trial, out)
+
+
 @inlined
-def _margins_at_nodes(problem, state, scratch, s):
+def _is_without(problem, state, s):
+    """Whether an element has no borders by now: friction has none while the contact is open."""
+    return problem.border_count[s] == 0 or (rubs(problem, s) and state.segment[s] == 0)
+
+
+@inlined
+def _margins_at_nodes(problem, tables, state, scratch, s, node_set, h):
     """Margins at the nodes, into ``scratch.margin``."""
+    if rubs(problem, s):
+        slider_margins_at_nodes(problem, tables, state, scratch, s, node_set, h)
+        return
     motion = motion_of(problem, scratch, s)
     margins(problem, state, s, S, motion[0], motion[1], scratch.margin)
 
@@ -51,6 +86,9 @@ def _margins_on_step(problem, tables, state, scratch, s, node_set, level):
     The start is taken a rounding ahead of where it is, on the side to which the motion goes: a law that has not moved
     yet may look at the sign of δ. It is looked at once more with rounding added to δ and to δ̇, and with their ripple.
     """
+    if rubs(problem, s):
+        slider_margins_on_step(problem, tables, state, scratch, s, node_set, level)
+        return
     n, delta, rate = problem.k.size, scratch.start_motion[s, 0], scratch.start_motion[s, 1]
     weight, alias = tables.ripple_weight[row_of(problem, s)], tables.alias[tables.kind[node_set], level]
     deltas, rates = scratch.local_motion[KNOWN, :ENDS], scratch.local_motion[KNOWN, ENDS : 2 * ENDS]
@@ -63,7 +101,7 @@ def _margins_on_step(problem, tables, state, scratch, s, node_set, level):
     deltas[4] += ahead * ripple_of(weight, alias, state.x, n)
     rates[5] += ahead * rate_ripple_of(weight, problem.k, alias, state.x, n)
     margins(problem, state, s, ENDS, deltas, rates, scratch.ends)
-    _margins_at_nodes(problem, state, scratch, s)
+    _margins_at_nodes(problem, tables, state, scratch, s, node_set, tables.contact_step[level])
     for j in range(problem.border_count[s]):
         ends = scratch.ends[ENDS * j : ENDS * (j + 1)]
         largest = max(abs(ends[0]), abs(ends[1]))
@@ -76,9 +114,7 @@ def _margins_on_step(problem, tables, state, scratch, s, node_set, level):
 @merged
 def _soon(problem, state, scratch, s, j, time):
     """A margin so long after the start of the step, by the rates there."""
-    rhs(problem, state.now[T], state.x, state.segment, state.entry_rate, state.rate, scratch.trial)
-    delta, rate = scratch.start_motion[s, 0], scratch.start_motion[s, 1]
-    margins_before(problem, state, s, delta, rate, -time, scratch.trial, scratch.fired)
+    margins_later(problem, state, scratch, s, state.now[T], state.x, time, scratch.fired)
     return scratch.fired[j]
 
 
@@ -173,15 +209,18 @@ def _between_nodes(problem, tables, state, scratch, s, j, node_set, h):
 @inner
 def _dip(problem, tables, state, scratch, s, j, node_set, h, lowest):
     """The same around one node."""
-    motion_around(problem, tables, state, scratch, node_set, h, s, lowest)
-    margins(problem, state, s, S, scratch.local_motion[DELTAS], scratch.local_motion[RATES], scratch.margin)
+    if rubs(problem, s):
+        slider_margins_around(problem, tables, state, scratch, s, node_set, h, lowest)
+    else:
+        motion_around(problem, tables, state, scratch, node_set, h, s, lowest)
+        margins(problem, state, s, S, scratch.local_motion[DELTAS], scratch.local_motion[RATES], scratch.margin)
     below, deepest = scratch.trial, 0
     for i in range(S):
         below[i] = -scratch.margin[S * j + i]
         if below[deepest] <= 0.0 and below[i] > below[deepest]:
             deepest = i
     deep = local_maximum(below, 1.0, scratch.clipped)
-    _margins_at_nodes(problem, state, scratch, s)
+    _margins_at_nodes(problem, tables, state, scratch, s, node_set, h)
     if deep <= scratch.noise[s, j]:
         return np.inf
     begin, end = tables.local_interval[node_set, lowest, 0], tables.local_interval[node_set, lowest, 1]
@@ -208,7 +247,7 @@ def border_ahead(problem, tables, state, scratch, node_set, level):
     first, element, border, h = np.inf, -1, -1, tables.contact_step[level]
     for s in range(problem.law.size):
         count = problem.border_count[s]
-        if count == 0:
+        if _is_without(problem, state, s):
             continue
         _margins_on_step(problem, tables, state, scratch, s, node_set, level)
         for j in range(count):
@@ -233,10 +272,9 @@ def _dips(problem, state, scratch, s, landed, w, x):
     count, width, values = problem.border_count[s], state.x.size, scratch.ends
     d = x[width] - w[width]
     for end in range(2):
-        y, time = x if end else w, _BEFORE * (d if end else -d)
-        rhs(problem, y[width], y[:width], state.segment, state.entry_rate, state.rate, scratch.trial)
-        delta, rate = margins_in(problem, state, s, y, scratch.trial, values[2 * end * count :])
-        margins_before(problem, state, s, delta, rate, time, scratch.trial, values[(2 * end + 1) * count :])
+        y, time = x if end else w, _BEFORE * (-d if end else d)
+        margins_of(problem, state, scratch, s, y[width], y, values[2 * end * count :])
+        margins_later(problem, state, scratch, s, y[width], y, time, values[(2 * end + 1) * count :])
     for j in range(count):
         a, b = values[j], values[2 * count + j]
         fall, rise = (values[count + j] - a) / (_BEFORE * d), (b - values[3 * count + j]) / (_BEFORE * d)
@@ -255,11 +293,11 @@ def passed(problem, state, scratch, element, border, w, x):
     """
     worst, found, which, dips = -_TOGETHER, -1, -1, False
     for s in range(problem.law.size):
-        count = problem.border_count[s]
-        if count == 0:
+        count, size = problem.border_count[s], state.x.size
+        if _is_without(problem, state, s):
             continue
-        margins_in(problem, state, s, w, scratch.trial, scratch.ends)
-        margins_in(problem, state, s, x, scratch.trial, scratch.margin)
+        margins_of(problem, state, scratch, s, w[size], w, scratch.ends)
+        margins_of(problem, state, scratch, s, x[size], x, scratch.margin)
         near = False
         for j in range(count):
             if s == element and j == border:
@@ -277,7 +315,7 @@ def passed(problem, state, scratch, element, border, w, x):
 @inner
 def renew_border(problem, state, scratch, element, border, log):
     """Renew one border in the present state."""
-    delta, rate = margins_in(problem, state, element, state.x, scratch.trial, scratch.margin)
+    delta, rate = margins_of(problem, state, scratch, element, state.now[T], state.x, scratch.margin)
     renew(problem, state, element, border, delta, rate, log)
     note_event(state)
 
@@ -289,18 +327,18 @@ def renew_all(problem, state, scratch, element, border, log):
     Which ones is judged from the state alone, before any is renewed. One that began at zero, as after its own renewal,
     has risen and come back if its margin was above zero just before.
     """
-    margins_in(problem, state, element, state.x, scratch.trial, scratch.margin)
+    size = state.x.size
+    margins_of(problem, state, scratch, element, state.now[T], state.x, scratch.margin)
     missed = 2.0 * abs(scratch.margin[border]) / scratch.largest[element, border]
-    time = _BEFORE * (state.now[T] - scratch.stages[START, state.x.size])
-    rhs(problem, state.now[T], state.x, state.segment, state.entry_rate, state.rate, scratch.trial)
+    time = _BEFORE * (state.now[T] - scratch.stages[START, size])
     for s in range(problem.law.size):
         count = problem.border_count[s]
-        if count == 0:
+        if _is_without(problem, state, s):
             continue
         begun, just_before = scratch.ends[:count], scratch.ends[count : 2 * count]
-        margins_in(problem, state, s, scratch.stages[START], scratch.trial, begun)
-        delta, rate = margins_in(problem, state, s, state.x, scratch.trial, scratch.margin)
-        margins_before(problem, state, s, delta, rate, time, scratch.trial, just_before)
+        margins_of(problem, state, scratch, s, scratch.stages[START, size], scratch.stages[START], begun)
+        margins_later(problem, state, scratch, s, state.now[T], state.x, -time, just_before)
+        delta, rate = margins_of(problem, state, scratch, s, state.now[T], state.x, scratch.margin)
         for j in range(count):
             before, near = max(begun[j], just_before[j]), max(scratch.noise[s, j], missed * scratch.largest[s, j])
             near = max(near, _TOGETHER * before)

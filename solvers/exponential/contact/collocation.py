@@ -39,6 +39,8 @@ from solvers.compiled.kernels import (
     off_knots,
     place_of,
     row_of,
+    rubs,
+    slider_of,
 )
 from solvers.compiled.parts import ERROR, SOLVE, part
 from solvers.compiled.simd import largest8, load8
@@ -59,6 +61,7 @@ from solvers.exponential.contact.node_response import (
 )
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR, STIFFNESS
+from solvers.problem.friction import STIFFNESS as FRICTION_STIFFNESS
 
 
 @merged
@@ -69,6 +72,7 @@ def _alone(problem, tables, state):
         if state.segment[s] > 0:
             alone, count = s, count + 1
     inlined_law = count == 1 and tables.power_law[alone, EXPONENT] > 0.0 and not is_circle(problem, alone)
+    inlined_law &= not rubs(problem, alone)
     return alone if inlined_law else -1
 
 
@@ -193,6 +197,8 @@ def step_error(problem, tables, state, scratch, node_set, level, rtol):
             continue
         ripple = ripple_of(tables.ripple_weight[u], tables.alias[tables.kind[node_set], level], state.x, n)
         damped = scratch.viscous[s] > 0.0 and not is_circle(problem, s)  # across a circle's radius nothing damps
+        if rubs(problem, s):
+            damped, stiffness = False, max(stiffness, slider_of(problem, s)[FRICTION_STIFFNESS])
         span = h * _undamped_part(problem, tables, scratch, node_set, h, s) if damped else h
         scratch.unresolved[u] = span * (unresolved + 0.03 * stiffness * ripple)
     _sum_errors(problem, tables, scratch, node_set, state.now[T], h)

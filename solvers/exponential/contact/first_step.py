@@ -17,6 +17,7 @@ from solvers.compiled.kernels import (
     is_circle,
     merged,
     row_of,
+    rubs,
 )
 from solvers.compiled.parts import BEGIN, part
 from solvers.compiled.state import T_IN, T, surface_tolerance
@@ -44,7 +45,7 @@ def begin_steps(problem, tables, state, scratch, stop):
             scratch.reference_speed[s] = max(scratch.reference_speed[s], speed)
         else:
             reached = 0.1 * dot(tables.rate_weight[row_of(problem, s)], scratch.norms, problem.k.size)
-            if is_circle(problem, s):
+            if is_circle(problem, s) or rubs(problem, s):
                 across = dot(tables.rate_weight[row_of(problem, s) + 1], scratch.norms, problem.k.size)
                 reached = math.hypot(reached, 0.1 * across)
             pressed = _PRESSED * pressed_speed(problem, tables, state, s, scratch.trial)
@@ -54,7 +55,7 @@ def begin_steps(problem, tables, state, scratch, stop):
     if state.segment[stop] > 0 and state.active[stop, T_IN] == state.now[T]:
         wanted = _first_step(problem, tables, state, scratch, stop)
         control[NEXT_LEVEL] = max(wanted, control[NEXT_LEVEL]) if others else wanted
-        control[NODE_SET], control[NEW], control[STOP] = _entry_nodes(problem, tables, state, stop, wanted), ENTRY, stop
+        control[NODE_SET], control[NEW], control[STOP] = entry_nodes(problem, tables, state, stop, wanted), ENTRY, stop
     choose_sides(problem, tables, state, scratch)
     state_peaks(problem, state, scratch, state.x)
 
@@ -89,7 +90,7 @@ def _first_step(problem, tables, state, scratch, stop):
 
 
 @merged
-def _entry_nodes(problem, tables, state, stop, level):
+def entry_nodes(problem, tables, state, stop, level):
     """Node set of the next step: of an entry if a force with broken exponent has just begun, first that of ``stop``."""
     found, while_ago = 0, 1e-6 * tables.contact_step[level]
     for s in range(state.segment.size):

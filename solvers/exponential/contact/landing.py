@@ -31,11 +31,9 @@ from solvers.compiled.kernels import (
     is_circle,
     merged,
     raised,
-    rhs,
     row_of,
 )
 from solvers.compiled.parts import PASSED
-from solvers.compiled.renewals import margins_before, margins_in
 from solvers.compiled.state import (
     CALLS,
     LANDING,
@@ -49,7 +47,7 @@ from solvers.compiled.state import (
 )
 from solvers.compiled.sums import combine
 from solvers.exponential.circles.contact import land_on_circle
-from solvers.exponential.contact.borders import passed
+from solvers.exponential.contact.borders import margins_later, margins_of, passed
 from solvers.exponential.contact.crossings import CLEAR, TOO_LONG, before_landing, side_at
 from solvers.exponential.contact.landing_step import INDENTATION, ROOT, TIME, landing_step, start_landing
 from solvers.exponential.contact.node_response import BATCH, DIFFERENCE, LANDED, START
@@ -149,12 +147,12 @@ def _length_to(problem, tables, state, scratch, variable, stop, span, landed, ti
 
 
 @merged
-def _begin_peaks(state, scratch):
+def _begin_peaks(problem, state, scratch):
     """Raise the peak forces by those at the start of a landing, which its first stage has computed."""
-    work, size = scratch.stages, state.x.size
+    work, size, first = scratch.stages, state.x.size, 2 * problem.k.size + 3
     for s in range(state.segment.size):
         if state.segment[s] > 0:
-            column = size - 2 * state.segment.size + 2 * s + 1
+            column = first + 2 * s
             state.active[s, PEAK_FORCE] = max(state.active[s, PEAK_FORCE], work[0, column] / work[0, size])
 
 
@@ -163,7 +161,7 @@ def _accept(problem, tables, state, scratch, variable, stop, level, span, t_end,
     """Move the state to the landing in ``scratch.stages[LANDED]``, or to the end of the run; write samples between."""
     w, x, size = scratch.stages[START], scratch.stages[LANDED], state.x.size
     landed, t = x[size], state.now[T]
-    _begin_peaks(state, scratch)
+    _begin_peaks(problem, state, scratch)
     copy(x, state.x, size)
     while True:
         time = min(due[state.count[SAMPLED]], t_end)
@@ -281,7 +279,7 @@ def _apart(problem, tables, state, scratch, stop, border, x):
     if border < 0:
         value = side_at(problem, tables, state, stop, x, scratch.trial)
     else:
-        margins_in(problem, state, stop, x, scratch.trial, scratch.margin)
+        margins_of(problem, state, scratch, stop, x[state.x.size], x, scratch.margin)
         value = scratch.margin[border]
     return value
 
@@ -290,9 +288,8 @@ def _apart(problem, tables, state, scratch, stop, border, x):
 def _rises(problem, state, scratch, s, border, time):
     """Whether a margin was lower so long before the landing, by the rates there."""
     x, size = scratch.stages[LANDED], state.x.size
-    rhs(problem, x[size], x[:size], state.segment, state.entry_rate, state.rate, scratch.trial)
-    delta, rate = margins_in(problem, state, s, x, scratch.trial, scratch.margin)
-    margins_before(problem, state, s, delta, rate, time, scratch.trial, scratch.ends)
+    margins_of(problem, state, scratch, s, x[size], x, scratch.margin)
+    margins_later(problem, state, scratch, s, x[size], x, -time, scratch.ends)
     return scratch.ends[border] < scratch.margin[border]
 
 

@@ -12,6 +12,7 @@ from solvers.compiled.kernels import (
     MATRIX,
     REAL,
     VECTOR,
+    add_friction,
     add_push,
     call_force,
     copy,
@@ -22,7 +23,9 @@ from solvers.compiled.kernels import (
     merged,
     off_knots,
     raised,
+    rubs,
     table_value,
+    width_of,
 )
 from solvers.compiled.parts import LANDING_STEP, part
 from solvers.compiled.state import T
@@ -62,7 +65,7 @@ def _force(problem, tables, s, segment, delta, delta_dot, side, entry_rate, batc
 def _rate(problem, tables, with_energy, variable, stop, span, w, segment, entry_rate, side, out, batch):
     """Derivative of the unknowns ``w`` = [state, t, u] by the chosen variable, times its span; number of law calls."""
     n, calls = problem.k.size, 0
-    size, t = 2 * n, 2 * n + 2 + 2 * problem.law.size
+    size, t = 2 * n, width_of(problem)
     for b in range(n):
         out[b] = w[n + b]
         out[n + b] = -problem.k[b] * w[b] - problem.c[b] * w[n + b]
@@ -81,6 +84,8 @@ def _rate(problem, tables, with_energy, variable, stop, span, w, segment, entry_
             add_push(problem, s, force, w, out)
         out[size + 2 + 2 * s] = force * rate
         out[size + 3 + 2 * s] = force
+        if rubs(problem, s):
+            add_friction(problem, s, w[t], segment[s] > 0, force, w, out)
     delta_dot = indentation_rate(problem, stop, w)
     factor = span
     if variable == INDENTATION:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numba import types
 
-from solvers.compiled.kernels import contact_gradient, copy, element_of, inner, is_circle, merged, row_of
+from solvers.compiled.kernels import contact_gradient, copy, element_of, inner, is_circle, merged, row_of, rubs
 from solvers.compiled.parts import NEWTON, part
 from solvers.compiled.state import CALLS, acts, rate_tolerance
 from solvers.exponential.circles.contact import linearise_circle
+from solvers.exponential.circles.friction import linearise_rubbing
 from solvers.exponential.contact.many_stops import pair_response
 from solvers.exponential.contact.node_response import motion_of, node_forces, respond
 from solvers.exponential.contact.nodes import S
@@ -29,7 +30,10 @@ def linearise(problem, tables, state, scratch, node_set, level):
     for r in range(problem.gap.size):
         if acts(problem, state, r):
             s = element_of(problem, r)
-            if not is_circle(problem, s):
+            if rubs(problem, s):
+                if r == row_of(problem, s):
+                    linearise_rubbing(problem, tables, state, scratch, node_set, level, s, size)
+            elif not is_circle(problem, s):
                 _linearise_row(problem, tables, state, scratch, node_set, level, r, size)
             elif r == row_of(problem, s):
                 linearise_circle(problem, tables, state, scratch, node_set, level, s, size)

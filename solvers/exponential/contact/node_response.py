@@ -10,17 +10,20 @@ from solvers.compiled.kernels import (
     inlined,
     inner,
     is_circle,
+    is_planar,
     law_forces,
     merged,
     place_of,
     reordered,
     row_of,
+    rubs,
     table_value,
 )
 from solvers.compiled.simd import largest8, load8, size8, splat8, store8
 from solvers.compiled.state import CALLS, T, acts
 from solvers.compiled.sums import above, combine
 from solvers.exponential.circles.contact import radial_forces
+from solvers.exponential.circles.friction import rubbing_forces
 from solvers.exponential.contact.many_stops import (
     SIGNALS,
     add_block_motion,
@@ -91,6 +94,11 @@ class Scratch(NamedTuple):
     energy: Annotated[Any, "3"]  # J, see `energy.check`
     control: Annotated[Any, "int 6"]  # of the step control, places named in `step`
     start_motion: Annotated[Any, "E, 2"]  # δ and δ̇ at the start of the step
+    node_time: Annotated[Any, "S"]  # s, of the nodes of the step tried
+    slid: Annotated[Any, "G, 4, S"]  # ξ, ξ̇ and F_t at the nodes, then numbers of a moment; see `circles.friction`
+    row_slopes: Annotated[Any, "9*G, 2, S"]  # of forces on the rows of an element with friction, by these
+    point: Annotated[Any, "2, 6"]  # motion of an element with friction, see `compiled.sliding`
+    numbers: Annotated[Any, "S"]  # for a law call
     margin: Annotated[Any, "B*S"]  # margins of an element's borders at points, row by row; see `borders`
     ends: Annotated[Any, "6*B"]
     fired: Annotated[Any, "B"]
@@ -230,6 +238,9 @@ def free_response(problem, tables, state, scratch, node_set, level):
     With many rows it is done for those in contact only.
     """
     rows, size, through = problem.gap.size, 2 * problem.k.size, uses_blocks(tables)
+    if is_planar(problem):
+        for i in range(S):
+            scratch.node_time[i] = state.now[T] + tables.contact_step[level] * tables.times[node_set, i]
     if problem.table_dt.size:
         sample_signals(problem, tables, scratch, node_set, state.now[T], tables.contact_step[level])
     if through:
@@ -312,6 +323,9 @@ def rate_ripple_of(ripple_weight, k, alias, x, n):
 @inlined
 def node_forces(problem, tables, state, scratch, s):
     """Forces of stop s on its rows at the nodes by its law, into ``scratch.law_force``."""
+    if rubs(problem, s):
+        rubbing_forces(problem, tables, state, scratch, s)
+        return
     if is_circle(problem, s):
         radial_forces(problem, tables, state, scratch, s)
         return

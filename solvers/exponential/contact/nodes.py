@@ -269,3 +269,7 @@ def _extensions(node_set: _NodeSet, smooth: _NodeSet) -> Any:
         if node_set.weight_exponent:
             out[i] *= np.outer(sigma**node_set.weight_exponent, node_set.nodes ** (-node_set.weight_exponent))
     return out.transpose(0, 2, 1)
+
+
+LOCAL_SLOPES = np.array([*_differentiation(LOCAL).T, LOCAL])
+"""(S + 1, S) slopes at `LOCAL` of the polynomial through values there, one row per value; then these points."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from solvers.compiled.kernels import copy, indentation, inlined, inner, is_circle, merged
+from solvers.compiled.kernels import copy, indentation, inlined, inner, is_circle, merged, rubs
 from solvers.compiled.simd import load8, splat8, sum8
 from solvers.compiled.state import (
     HEAD,
@@ -20,9 +20,11 @@ from solvers.compiled.state import (
 )
 from solvers.compiled.sums import combine
 from solvers.exponential.circles.contact import work_in_circle
+from solvers.exponential.circles.friction import work_with_friction
 from solvers.exponential.contact.node_response import START, force_of, largest_size, motion_of
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.peaks import state_peaks, step_peaks
+from solvers.exponential.contact.slider_margins import peak_of_friction
 from solvers.exponential.energy.quadrature import state_within
 
 _BRIEF = 1.0  # radians of the fastest block in which nodes miss nothing of δ̇, and δ - δ₀ may be lost in the digits of δ
@@ -54,11 +56,14 @@ def end_run(problem, tables, state, scratch, node_set, level, t_end):
     for s in range(problem.law.size):
         if acting_segment(problem, state, s) > 0 and begins_and_ends(problem, s):
             step_peaks(problem, tables, state, scratch, node_set, tables.contact_step[level], s, min(place, 1.0))
+            if rubs(problem, s):
+                length = tables.contact_step[level]
+                peak_of_friction(problem, tables, state, scratch, node_set, length, s, min(place, 1.0))
     if state.event_record.shape[0]:
         record_forces(problem, state, scratch, PART, t_end, node_set, level)
     copy(x, state.x, state.x.size)
-    state_peaks(problem, state, scratch, x)
     state.now[T] = t_end
+    state_peaks(problem, state, scratch, x)
     state.count[STEPS] += 1
 
 
@@ -96,7 +101,11 @@ def finish_step(problem, tables, state, scratch, node_set, level):
             weighted = s == node_set - 1 and tables.weight_exponent[node_set] > 0.0
             weights = tables.weights[node_set] if weighted else tables.plain[node_set]
             impulses = load8(weights, 0) * load8(force, 0)
-            if is_circle(problem, s):
+            if rubs(problem, s):
+                work = work_with_friction(problem, tables, state, scratch, node_set, level, s)
+                peak_of_friction(problem, tables, state, scratch, node_set, h, s, 1.0)
+                state.x[size + 2 + 2 * s] += work
+            elif is_circle(problem, s):
                 state.x[size + 2 + 2 * s] += work_in_circle(problem, tables, state, scratch, node_set, level, s)
             elif weighted or brief:
                 state.x[size + 2 + 2 * s] += h * sum8(impulses * load8(motion[1], 0))

@@ -20,12 +20,16 @@ from solvers.compiled.kernels import (
     merged,
     off_knots,
     place_of,
+    rubs,
+    slider_of,
 )
 from solvers.compiled.simd import largest8, load8
-from solvers.compiled.state import PEAK_DELTA, PEAK_FORCE, acting_segment, begins_and_ends, surface_tolerance
+from solvers.compiled.sliding import slider_force
+from solvers.compiled.state import PEAK_DELTA, PEAK_FORCE, T, acting_segment, begins_and_ends, surface_tolerance
 from solvers.compiled.sums import combine
 from solvers.exponential.contact.node_response import DELTAS, FORCES, KNOWN, RATES, force_of, motion_of, own_accelerance
 from solvers.exponential.contact.nodes import LOCAL, MONOMIALS, S
+from solvers.problem.friction import PEAK
 
 _MOST = 6  # Newton steps to a maximum
 _LOWER = 0.95  # share of a peak below which node values have no higher one between them
@@ -174,6 +178,10 @@ def state_peaks(problem, state, scratch, x):
                 batch[0], batch[2] = abs(batch[0]), abs(batch[2])
             state.active[s, PEAK_DELTA] = max(state.active[s, PEAK_DELTA], batch[0])
             state.active[s, PEAK_FORCE] = max(state.active[s, PEAK_FORCE], batch[2])
+            if rubs(problem, s):
+                own = slider_of(problem, s)
+                force = slider_force(problem, s, state.segment[s], state.entry_rate[s], state.now[T], x)
+                own[PEAK] = max(own[PEAK], abs(force))
 
 
 @inner

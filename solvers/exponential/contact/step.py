@@ -25,6 +25,7 @@ from solvers.compiled.kernels import (
     merged,
     rhs,
     row_of,
+    rubs,
 )
 from solvers.compiled.parts import ACCEPT, CONTACT, FIRST_END, PRESSED, part
 from solvers.compiled.state import (
@@ -46,6 +47,7 @@ from solvers.compiled.state import (
 )
 from solvers.compiled.sums import combine
 from solvers.exponential.circles.contact import guess_radial_forces
+from solvers.exponential.circles.friction import guess_rubbing_forces
 from solvers.exponential.contact.borders import UNRESOLVED
 from solvers.exponential.contact.collocation import end_state, solve_forces, step_error
 from solvers.exponential.contact.crossings import leaves_segment
@@ -58,6 +60,7 @@ from solvers.exponential.contact.first_step import (
     SEGMENT,
     STOP,
     begin_steps,
+    entry_nodes,
     latest_entered,
     level_of,
 )
@@ -121,6 +124,9 @@ def _predict(problem, tables, state, scratch, level):
     shift = level - control[LEVEL] + 2
     for s in range(problem.law.size):
         if state.segment[s] == 0:
+            continue
+        if control[NEW] and rubs(problem, s):
+            guess_rubbing_forces(problem, tables, state, scratch, s)
             continue
         if control[NEW] and is_circle(problem, s):
             guess_radial_forces(problem, tables, state, scratch, s)
@@ -247,6 +253,8 @@ def advance_contact(problem, tables, energy_tables, state, scratch, t_end, rtol,
             if state.now[T] < t_end:
                 go_beyond(problem, state, scratch, bent, first == 0.0, log)
             control[NEW], control[NODE_SET], control[NEXT_LEVEL] = SEGMENT, 0, max(level, wanted)
+            if rubs(problem, bent):  # it may have stuck where its contact began
+                control[NODE_SET] = entry_nodes(problem, tables, state, bent, control[NEXT_LEVEL])
             return RUNNING
         if level == bottom:
             return LAW_NOT_FINITE if _law_fails(problem, state, scratch) else STEP_TOO_SMALL

@@ -21,9 +21,10 @@ from typing import Any
 
 import numpy as np
 
-from solvers.compiled.kernels import inner, is_circle, merged, row_of
+from solvers.compiled.kernels import inner, merged, row_of, rubs, slider_of
 from solvers.compiled.state import PEAK_FORCE, T
 from solvers.problem import Array, Energy, System, dense
+from solvers.problem.friction import ARM, MU, SPIN
 
 MULTIPLE, ROUNDING = 20.0, 1e-9
 FACTOR = 4.0
@@ -47,7 +48,7 @@ def note_energy(problem, tables, state, scratch):
     allowed = scratch.energy[FIRST]
     for s in range(problem.law.size):
         steady = 0.0
-        for r in range(row_of(problem, s), row_of(problem, s) + (1 if not is_circle(problem, s) else 2)):
+        for r in range(row_of(problem, s), row_of(problem, s + 1)):
             row = problem.read_rate[r]
             for b in range(int(tables.own_blocks), n):
                 speed = np.hypot(row[b], row[n + b] * np.sqrt(problem.k[b]))
@@ -55,6 +56,10 @@ def note_energy(problem, tables, state, scratch):
                     state.x[b], state.x[n + b] / np.sqrt(problem.k[b]) if problem.k[b] > 0.0 else 0.0
                 )
         work, impulse = state.x[2 * n + 2 + 2 * s], abs(state.x[2 * n + 3 + 2 * s])
+        if rubs(problem, s):  # |F_t| <= μN; the work of a prescribed spin is given
+            own, account = slider_of(problem, s), problem.friction[s, 1]
+            impulse *= 1.0 + own[MU]
+            work += state.x[account] - own[ARM] * own[SPIN] * state.x[account + 1]
         if problem.knots[s, 0] < 0.0:  # a force of both signs
             impulse = state.active[s, PEAK_FORCE] * state.now[T]
         allowed += 2.0 * steady * impulse - work
@@ -91,9 +96,18 @@ def has_gained(
     return bool(last > FACTOR * 0.5 * speed**2)
 
 
-def unbalanced(system: System, powers: Array, motion: Array, begin: Array, exchanged: Array, rtol: float) -> bool:
-    """Whether the energy of a run, given by powers and motion at its samples, is off by more than is tolerated."""
+def unbalanced(
+    system: System, powers: Array, motion: Array, begin: Array, exchanged: Array, rtol: float, rubbed: tuple[Any, Any]
+) -> bool:
+    """Whether the energy of a run, given by powers and motion at its samples, is off by more than is tolerated.
+
+    ``rubbed`` : works of friction and of spins at the samples, J, or zeros.
+    """
     rows = np.linspace(0, len(powers) - 1, _SAMPLES).astype(int)
-    balance = Energy.of_run(system.M, system.K, powers[rows], motion[rows], begin)
-    parts = balance.initial, *(np.abs(part).max() for part in (balance.stored, balance.input, balance.damping))
+    sampled = tuple(part[rows] if np.ndim(part) else part for part in rubbed)
+    balance = Energy.of_run(system.M, system.K, powers[rows], motion[rows], begin, sampled)
+    parts = [
+        balance.initial,
+        *(np.abs(part).max() for part in (balance.stored, balance.input, balance.damping, *rubbed)),
+    ]
     return not np.abs(balance.residual).max() <= tolerated_energy(sum(parts), exchanged, rtol)

@@ -21,6 +21,7 @@ from solvers.compiled.kernels import (
     raised,
     reordered,
     row_of,
+    rubs,
     table_value,
 )
 from solvers.compiled.parts import WITHIN_STEP, part
@@ -28,6 +29,7 @@ from solvers.compiled.simd import WIDTH, load8, splat8, store8, sum8
 from solvers.compiled.state import acts
 from solvers.compiled.sums import combine
 from solvers.exponential.circles.contact import work_within_circle
+from solvers.exponential.circles.friction import work_within_rubbing
 from solvers.exponential.contact.many_stops import enters
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.responses import propagate
@@ -167,6 +169,14 @@ def _add_works(problem, tables, state, scratch, row):
     for s in range(problem.law.size):
         if state.segment[s] > 0:
             r = row_of(problem, s)
+            if rubs(problem, s):
+                account = problem.friction[s, 1]
+                work, impulse, rubbed, drag, way = work_within_rubbing(problem, tables, scratch, s, _PACE + 1)
+                row[account], row[account + 1] = row[account] + rubbed, row[account + 1] + drag
+                row[account + 2] += way
+                row[size + 2 + 2 * s] += work
+                row[size + 3 + 2 * s] += impulse
+                continue
             if is_circle(problem, s):
                 work, impulse = work_within_circle(problem, tables, scratch, s, _PACE + 1)
                 row[size + 2 + 2 * s] += work

@@ -1,0 +1,268 @@
+"""Contacts with friction in a step: forces on their rows at the nodes, slopes of these, works.
+
+With y the motions that the rows of an element read, see `compiled.friction`,
+
+    force on the rows = N ∂δ/∂y + F_t ∂ξ/∂y,   it takes the power N δ̇ + F_t (ξ̇ - RΩ),
+
+F_t = k_t (ξ - s) in stick and ±μN in slip. The prescribed part RΩt of ξ is known at the nodes, nothing else is special:
+stick and slip are segments whose ends are borders, see `contact.slider_margins`.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import types
+
+from solvers.compiled.friction import TURN, drawn, friction_force
+from solvers.compiled.kernels import (
+    REAL,
+    copy,
+    inlined,
+    inner,
+    is_circle,
+    law_forces,
+    place_of,
+    radius_of,
+    row_of,
+    slide,
+    slide_of,
+    slider_of,
+)
+from solvers.compiled.parts import RUB_FORCES, RUB_GUESS, RUB_NEWTON, RUB_WITHIN, RUB_WORK, part
+from solvers.compiled.simd import load8, sum8
+from solvers.compiled.state import CALLS, T, acts
+from solvers.compiled.sums import above, combine
+from solvers.exponential.circles.contact import radial_forces, work_in_circle
+from solvers.exponential.contact.many_stops import pair_response
+from solvers.exponential.contact.nodes import S
+from solvers.problem.friction import ARM, CODE, MU, SPIN, STIFFNESS
+
+WAYS, SPEEDS, TANGENTIAL, SPARE = range(4)  # rows of `Scratch.slid`: ξ, ξ̇ and F_t at the nodes, and numbers of a moment
+_BRIEF = 1.0  # radians of the fastest block in which nodes miss nothing of a rate
+
+
+@inlined
+def count_of(problem, s):
+    """Number of rows of an element."""
+    return row_of(problem, s + 1) - row_of(problem, s)
+
+
+@inlined
+def nearest_way(way, known, radius):
+    """A way that is known up to whole turns, next to another one."""
+    if radius == 0.0:
+        return way
+    turn = TURN * abs(radius)
+    return way - turn * math.floor((way - known) / turn + 0.5)
+
+
+@inner
+def slide_at_nodes(problem, scratch, s):
+    """ξ and ξ̇ at the nodes from the motion of the rows; ξ does not jump by a turn between two nodes."""
+    first, own, radius = row_of(problem, s), slider_of(problem, s), radius_of(problem, s)
+    u, w, third, slid = scratch.motion[first], scratch.motion[first + 1], count_of(problem, s) > 2, scratch.slid[s]
+    turned, turning = 0.0, 0.0
+    for i in range(S):
+        if third:
+            turned, turning = -scratch.motion[first + 2, 0, i], -scratch.motion[first + 2, 1, i]
+        way, slid[SPEEDS, i] = slide(
+            radius, own, scratch.node_time[i], u[0, i], u[1, i], w[0, i], w[1, i], turned, turning
+        )
+        slid[WAYS, i] = nearest_way(way, slid[WAYS, i - 1], radius) if i > 0 else way
+
+
+@inlined
+def _add_sideways(problem, scratch, s, i, force):
+    """Add F_t ∂ξ/∂y to the forces on the rows at node i."""
+    first, out = row_of(problem, s), scratch.law_force
+    if not is_circle(problem, s):
+        out[first + 1, i] = -force
+        return
+    u, w = scratch.motion[first, 0, i], scratch.motion[first + 1, 0, i]
+    share = force * abs(radius_of(problem, s)) / (u * u + w * w)
+    out[first, i] -= share * w
+    out[first + 1, i] += share * u
+    if count_of(problem, s) > 2:
+        out[first + 2, i] = -math.copysign(force, force * slider_of(problem, s)[ARM])
+
+
+@inner
+def _forces(problem, tables, state, scratch, s):
+    """N, F_t and the forces on the rows at the nodes for the motion of the rows, into ``scratch.law_force``."""
+    own, radius, slid, place = slider_of(problem, s), radius_of(problem, s), scratch.slid[s], place_of(problem, s)
+    if is_circle(problem, s):
+        radial_forces(problem, tables, state, scratch, s)
+    else:
+        motion = scratch.motion[place]
+        above(motion[0], problem.knots[s, 0], scratch.clipped)
+        law_forces(problem, s, S, scratch.clipped, motion[1], state.entry_rate[s], scratch.law_force[place])
+        state.count[CALLS] += S
+    slide_at_nodes(problem, scratch, s)
+    for i in range(S):
+        slid[TANGENTIAL, i] = friction_force(radius, own, slid[WAYS, i], scratch.law_force[place, i])
+        _add_sideways(problem, scratch, s, i, slid[TANGENTIAL, i])
+
+
+@part(RUB_FORCES, types.void, types.int64)
+def rubbing_forces(problem, tables, state, scratch, s):
+    """The same at an address."""
+    _forces(problem, tables, state, scratch, s)
+
+
+@part(RUB_GUESS, types.void, types.int64)
+def guess_rubbing_forces(problem, tables, state, scratch, s):
+    """First guess of the forces on the rows: those for the free response."""
+    for r in range(row_of(problem, s), row_of(problem, s + 1)):
+        copy(scratch.free[r, 0], scratch.motion[r, 0], S)
+        copy(scratch.free[r, 1], scratch.motion[r, 1], S)
+    _forces(problem, tables, state, scratch, s)
+    for r in range(row_of(problem, s), row_of(problem, s + 1)):
+        copy(scratch.law_force[r], scratch.force[r], S)
+
+
+@inlined
+def _ways(sigma, radius, own, u, w, a):
+    """∂δ/∂y and ∂ξ/∂y by row a at a point, where σ is 0 of an oblique stop; u is (u, w)."""
+    if sigma == 0.0:
+        return (1.0, 0.0) if a == 0 else (0.0, -1.0)
+    if a == 2:
+        return 0.0, -math.copysign(1.0, own[ARM])
+    square = u * u + w * w
+    r, c = math.sqrt(square), abs(radius)
+    return (sigma * u / r, -c * w / square) if a == 0 else (sigma * w / r, c * u / square)
+
+
+@inlined
+def _bent(sigma, radius, u, w, a, b, normal, tangential):
+    """N ∂²δ/∂y_a∂y_b + F_t ∂²ξ/∂y_a∂y_b at a point."""
+    if sigma == 0.0 or a == 2 or b == 2:
+        return 0.0
+    square = u * u + w * w
+    along, across = u if a == 0 else w, u if b == 0 else w
+    same = 1.0 if a == b else 0.0
+    by_radius = sigma * (same - along * across / square) / math.sqrt(square)
+    sideways, c = -w if a == 0 else u, abs(radius)
+    turn = -1.0 if a == 0 and b == 1 else 1.0 if a == 1 and b == 0 else 0.0
+    return normal * by_radius + tangential * c * (turn - 2.0 * sideways * across / square) / square
+
+
+@inner
+def _slopes_at(problem, tables, state, scratch, s, i, out):
+    """Slopes of the forces on the rows at node i, by the rows' displacements and rates, into ``out``."""
+    first, own, radius, m = row_of(problem, s), slider_of(problem, s), radius_of(problem, s), count_of(problem, s)
+    sigma = math.copysign(1.0, radius) if is_circle(problem, s) else 0.0
+    u, w = scratch.motion[first, 0, i], scratch.motion[first + 1, 0, i]
+    normal, tangential = scratch.law_force[place_of(problem, s), i], scratch.slid[s, TANGENTIAL, i]
+    by_delta, by_rate, rate = scratch.slope[s, 0, i], scratch.slope[s, 1, i], scratch.motion[place_of(problem, s), 1, i]
+    r = math.sqrt(u * u + w * w)
+    drawn_by = own[STIFFNESS] if own[CODE] == 0.0 else 0.0
+    pressed_by = own[CODE] * own[MU] if own[CODE] != 0.0 and normal > 0.0 else 0.0
+    for b in range(m):
+        away, aside = _ways(sigma, radius, own, u, w, b)
+        turning = (sigma * scratch.motion[first + b, 1, i] - rate * sigma * away) / r if sigma != 0.0 and b < 2 else 0.0
+        for a in range(m):
+            press, rub = _ways(sigma, radius, own, u, w, a)
+            both = press + pressed_by * rub
+            slope = both * (by_delta * away + by_rate * turning) + rub * drawn_by * aside
+            out[a * m + b, 0, i] = slope + _bent(sigma, radius, u, w, a, b, normal, tangential)
+            out[a * m + b, 1, i] = both * by_rate * away
+
+
+@part(RUB_NEWTON, types.void, *[types.int64] * 4)
+def linearise_rubbing(problem, tables, state, scratch, node_set, level, s, begin):
+    """Write what the rows of an element with friction add to the matrix of Newton's method, from row ``begin`` on."""
+    first, m, slopes, column = row_of(problem, s), count_of(problem, s), scratch.row_slopes[9 * s : 9 * s + 9], 0
+    for i in range(S):
+        _slopes_at(problem, tables, state, scratch, s, i, slopes)
+    for u in range(problem.gap.size):
+        if not acts(problem, state, u):
+            continue
+        for a in range(m):
+            for i in range(S):
+                for j in range(S):
+                    own = u == first + a and i == j
+                    scratch.jacobian[begin + a * S + i, column + j] = 1.0 if own else 0.0
+        for b in range(m):
+            matrix = pair_response(problem, tables, scratch, node_set, level, first + b, u)
+            for a in range(m):
+                slope = slopes[a * m + b]
+                for i in range(S):
+                    for j in range(S):
+                        scratch.jacobian[begin + a * S + i, column + j] -= (
+                            slope[0, i] * matrix[j, i] + slope[1, i] * matrix[j, S + i]
+                        )
+        column += S
+
+
+@inner
+def _work_of_friction(problem, tables, scratch, node_set, level, s, begin, end):
+    """∫ F_t dξ over the step just found, ξ going from ``begin`` to ``end``; see `contact.outputs`."""
+    own, slid, h = slider_of(problem, s), scratch.slid[s], tables.contact_step[level]
+    if own[CODE] == 0.0:
+        radius = radius_of(problem, s)
+        first, last = drawn(radius, own, begin), drawn(radius, own, end)
+        return 0.5 * own[STIFFNESS] * (last - first) * (last + first)
+    if s == node_set - 1 and tables.weight_exponent[node_set] > 0.0:
+        return h * sum8(load8(tables.weights[node_set], 0) * load8(slid[TANGENTIAL], 0) * load8(slid[SPEEDS], 0))
+    if h * tables.fastest <= _BRIEF:
+        return h * sum8(load8(tables.plain[node_set], 0) * load8(slid[TANGENTIAL], 0) * load8(slid[SPEEDS], 0))
+    combine(tables.work[node_set], slid[TANGENTIAL], S, None, slid[SPARE])
+    work = sum8(load8(tables.work_end[node_set], 0) * load8(slid[TANGENTIAL], 0)) * (end - begin)
+    for i in range(S):
+        work += slid[SPARE, i] * (slid[WAYS, i] - begin)
+    return work
+
+
+@part(RUB_WORK, REAL, *[types.int64] * 3)
+def work_with_friction(problem, tables, state, scratch, node_set, level, s):
+    """Work of N, J, over the step just found; that of friction, its impulse and way go to the state."""
+    own, slid, h, radius = slider_of(problem, s), scratch.slid[s], tables.contact_step[level], radius_of(problem, s)
+    account, t = problem.friction[s, 1], state.now[T]
+    begin = nearest_way(slide_of(problem, s, t, state.x)[0], slid[WAYS, 0], radius)
+    end = nearest_way(slide_of(problem, s, t + h, scratch.x_new)[0], slid[WAYS, S - 1], radius)
+    work = _work_of_friction(problem, tables, scratch, node_set, level, s, begin, end)
+    weighted = s == node_set - 1 and tables.weight_exponent[node_set] > 0.0
+    weights = tables.weights[node_set] if weighted else tables.plain[node_set]
+    impulse = h * sum8(load8(weights, 0) * load8(slid[TANGENTIAL], 0))
+    state.x[account] += work
+    state.x[account + 1] += impulse
+    state.x[account + 2] += own[CODE] * (end - begin)
+    rows = work_in_circle(problem, tables, state, scratch, node_set, level, s)
+    return rows - work + own[ARM] * own[SPIN] * impulse
+
+
+@part(RUB_WITHIN, types.UniTuple(REAL, 5), types.int64, types.int64)
+def work_within_rubbing(problem, tables, scratch, s, first):
+    """(works, impulses of N, F_t; way) on a panel within a step; the rows' forces as in `work_within_circle`."""
+    size, row, radius, own, m = (
+        2 * problem.k.size,
+        row_of(problem, s),
+        radius_of(problem, s),
+        slider_of(problem, s),
+        count_of(problem, s),
+    )
+    weights, motion, along, pace = tables.gauss[1], scratch.row_slopes[9 * s], scratch.along, scratch.between[first - 1]
+    pressed, push, rubbed, drag, way = 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(S):
+        for a in range(m):
+            u, v = -problem.gap[row + a], 0.0
+            for e in range(size):
+                u += problem.read[row + a, e] * along[e, i]
+                v += problem.read_rate[row + a, e] * along[e, i]
+            motion[0, a], motion[1, a] = u, v
+        f, g = scratch.between[first + row, i], scratch.between[first + row + 1, i]
+        u, w = motion[0, 0], motion[0, 1]
+        turning = -motion[1, 2] if m > 2 else 0.0
+        speed = slide(radius, own, 0.0, u, motion[1, 0], w, motion[1, 1], 0.0, turning)[1]
+        rate, normal, tangential = motion[1, 0], f, -g
+        if radius != 0.0:
+            r = math.copysign(math.sqrt(u * u + w * w), radius)
+            rate, normal = (u * motion[1, 0] + w * motion[1, 1]) / r, (f * u + g * w) / r
+            tangential = (g * u - f * w) / abs(radius)
+        pressed += weights[i] * normal * rate
+        push += weights[i] * normal
+        rubbed += weights[i] * tangential * speed
+        drag += weights[i] * tangential
+        way += weights[i] * pace[i] * own[CODE] * speed
+    return pressed, push, rubbed, drag, way
