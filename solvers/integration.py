@@ -209,7 +209,14 @@ class _Run:
         if not self.system.latches:
             return (_NOTHING,) * len(self.system.contacts)
         rows = zip(self.system.contacts, self.engine.problem.parameters, strict=True)
-        return tuple(row[list(getattr(contact.law, "memory", ()))] for contact, row in rows)
+        found = tuple(row[list(getattr(contact.law, "memory", ()))] for contact, row in rows)
+        for contact, latched in zip(self.system.contacts, found, strict=True):
+            if (
+                contact.friction is not None
+            ):  # a slider is told as of a run that begins now; one that slips has no place
+                law: Any = contact.law
+                latched[1] = latched[1] - law.arm * law.spin * self.time if latched[0] == 0.0 else 0.0
+        return found
 
     @property
     def time(self) -> float:
@@ -251,7 +258,8 @@ class _Run:
             x = self.out[: self._sampled(status)]
             t, motion = self.times[: len(x)], product(x[:, :size], back.T)
         works = x[:, size:] if self.times is None else x[:, size:].copy()  # so that all the samples can be let go
-        works, rubbed = np.split(works, [2 + 2 * len(self.system.contacts)], axis=1)
+        own = 2 + 2 * len(self.system.contacts)
+        works, rubbed = works[:, :own], works[:, own:]
         complete = self.engine.keeps_ledger(self.times is not None)
         ledger = partial(_energy, self.system, works, complete, motion, back, self.initial, self._balanced(rubbed))
         rows = self._rows()
@@ -305,7 +313,7 @@ class _Run:
 
     def _of_stops(self, rows: Array) -> Array:
         """The events of elements whose contacts begin and end."""
-        always = np.array([c.always and not getattr(c.law, "opens", False) for c in self.system.contacts], dtype=bool)
+        always = self.system.about_laws.get("always", partial(_always, self.system))
         return rows[~always[rows[:, at.ELEMENT].astype(int)]] if always.any() else rows
 
     def release(self) -> None:
@@ -336,6 +344,11 @@ class _Run:
             slider_row(self.engine.problem, self.state, s, self.time, row)
             row[[at.TIME, at.CLIPPED]] = math.nan, 0.0
         return np.concatenate((logged, rows, more))
+
+
+def _always(system: System) -> Any:
+    """(m,) elements whose force acts at both signs of δ, and never ends."""
+    return np.array([c.always and not getattr(c.law, "opens", False) for c in system.contacts], dtype=bool)
 
 
 def _exchanged(rows: Array) -> Array:

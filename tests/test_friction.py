@@ -12,11 +12,13 @@ from solvers import (
     DormandPrince,
     Exponential,
     Friction,
+    OrbitError,
     System,
     integrate,
     integrate_many,
     orbit,
 )
+from solvers.sensitivities import sensitivity
 
 SHARP = DormandPrince(1e-12)
 METHODS = [SHARP, Exponential(1e-12)]
@@ -349,11 +351,14 @@ def test_other_methods_refuse(method):
         integrate(wall(), [0.0, 0.0], [1.0, 0.0], 1.0, method=method)
 
 
-def test_orbits_and_tangents_refuse():
-    with pytest.raises(ValueError, match="orbits take contacts without friction, and contact 0 has some"):
-        orbit(wall(), 1.0, np.zeros(4))
-    with pytest.raises(ValueError, match="tangents take contacts without friction, and contact 0 has some"):
-        integrate(wall(), [0.0, 0.0], [1.0, 0.0], 1.0, tangent=True)
+def test_sensitivities_refuse():
+    with pytest.raises(ValueError, match="sensitivities take contacts without friction, and contact 0 has some"):
+        sensitivity(wall(), [0.0, 0.0], [1.0, 0.0], 1.0)
+
+
+def test_a_whirl_without_loads_is_not_periodic_and_that_is_said():
+    with pytest.raises(OrbitError, match="relative periodic"):
+        orbit(disc(springs=20.0, turns=False), 1.3, np.array([0.9, 0.0, 0.0, 0.0, 4.0, 0.0]))
 
 
 def test_many_starts_are_single_runs_bit_for_bit():

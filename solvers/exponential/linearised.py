@@ -30,6 +30,7 @@ from solvers.compiled.kernels import (
     PLANAR_PROBLEM,
     acceleration_of,
     add_push,
+    add_sideways,
     call_gradient,
     contact_forces,
     contact_gradient,
@@ -43,6 +44,8 @@ from solvers.compiled.kernels import (
     is_circle,
     merged,
     rhs,
+    rubs,
+    slider_of,
 )
 from solvers.compiled.packed import unpacker
 from solvers.compiled.state import (
@@ -63,7 +66,14 @@ from solvers.compiled.state import (
     rate_tolerance,
 )
 from solvers.compiled.sums import combine
-from solvers.exponential.circles.derivative import add_radial_change, explicit_change, is_parameter
+from solvers.exponential.circles.derivative import add_radial_change, change_of, explicit_change, is_parameter
+from solvers.exponential.circles.friction import share_of
+from solvers.exponential.circles.friction_derivative import (
+    add_rubbing_change,
+    begin_rubbing,
+    end_rubbing,
+    latch_begin,
+)
 from solvers.exponential.contact.crossings import FORCE, side_at
 from solvers.exponential.contact.landing_step import landing_step, start_landing
 from solvers.exponential.contact.node_response import LANDED, START
@@ -73,11 +83,11 @@ from solvers.exponential.linearised_step import (
     VARIATION,
     by_latched,
     change_by_latched,
-    change_of,
     linearise_step,
 )
 from solvers.exponential.preparation import SCRATCH, TABLES
 from solvers.exponential.responses import propagate
+from solvers.problem.friction import CODE, FREE
 
 _OFF = 1e-10  # relative distance from a knot at which a law is certainly on one side of it
 
@@ -100,8 +110,11 @@ def _fly(problem, duration, y):
 
 
 @merged
-def _begin(problem, past, derivatives, variation):
+def _begin(problem, ahead, behind, past, scratch, derivatives, variation):
     """Find the segments of the stops as the run does at its start, and latch the derivatives of their rates."""
+    for s in range(problem.law.size):
+        if rubs(problem, s):
+            scratch.row_ways[6 * s, 0] = slider_of(problem, s)[CODE]
     begin_contacts(problem, past)
     for s in range(problem.law.size):
         if past.segment[s] > 0:
@@ -109,10 +122,12 @@ def _begin(problem, past, derivatives, variation):
             for c in range(derivatives.y.shape[0]):
                 change = change_of(problem, variation, derivatives, past.x, c, s, 1, 0.0)
                 derivatives.entry[c, s] = 0.0 if abs(rate) < problem.floor[s] else np.sign(rate) * change
+            if rubs(problem, s) and scratch.row_ways[6 * s, 0] == FREE:
+                latch_begin(problem, ahead, behind, past, derivatives, variation, s)
 
 
 @merged
-def _cross_knot(problem, past, derivatives, variation, s, direction):
+def _cross_knot(problem, ahead, behind, past, derivatives, variation, s, direction):
     """A stop passes a border of its segment."""
     t = past.now[T]
     rate = indentation_rate(problem, s, past.x)
@@ -138,7 +153,14 @@ def _cross_knot(problem, past, derivatives, variation, s, direction):
             derivatives.shift[c, s] = shift
             derivatives.entry[c, s] = 0.0 if floored else change
         add_push(problem, s, -jump * shift, past.x, derivatives.y[c])
+        if rubs(problem, s) and border > 0:
+            drag = share_of(slider_of(problem, s), 1.0) * jump
+            add_sideways(problem, s, -drag * shift, past.x, derivatives.y[c])
     past.segment[s] += direction
+    if rubs(problem, s) and entering:
+        begin_rubbing(problem, ahead, behind, past, derivatives, variation, s)
+    elif rubs(problem, s) and past.segment[s] == 0:
+        end_rubbing(problem, ahead, behind, derivatives, variation, s)
 
 
 @merged
@@ -201,6 +223,10 @@ def _stage_rates(problem, ahead, behind, tables, past, scratch, derivatives, var
         if variation.law_step > 0.0:
             contact_forces(ahead, s, batch[0:1], batch[1:2], rate, batch[5:6])
             contact_forces(behind, s, batch[0:1], batch[1:2], rate, batch[6:7])
+        if rubs(problem, s):
+            delta, known = _inside_segment(problem, past, s, w), past.entry_rate[s]
+            add_rubbing_change(problem, ahead, behind, derivatives, variation, s, known, w, t, delta, factor, out)
+            continue
         if is_circle(problem, s):
             by_law = (batch[5] - batch[6]) / (2.0 * variation.law_step) if variation.law_step > 0.0 else 0.0
             add_radial_change(problem, derivatives, variation, s, w, t, factor, force, by_law, out)
@@ -286,14 +312,15 @@ def linearise_run(
     state, scratch, past = _state(state_at), _scratch(scratch_at), _state(past_at)
     derivatives, variation = _derivatives(derivatives_at), _variation(variation_at)
     if begins:
-        _begin(problem, past, derivatives, variation)
+        _begin(problem, ahead, behind, past, scratch, derivatives, variation)
     for r in range(state.count[RECORDED]):
         row = state.event_record[r]
         _fly(problem, row[BEGAN] - past.now[T], derivatives.y)
         past.now[T] = row[BEGAN]
         copy(row[HEAD:], past.x, past.x.size)
         if row[KIND] == EVENT:
-            _cross_knot(problem, past, derivatives, variation, int(row[FIRST]), int(row[SECOND]))
+            stop, direction = int(row[FIRST]), int(row[SECOND])
+            _cross_knot(problem, ahead, behind, past, derivatives, variation, stop, direction)
         elif row[KIND] == RENEWAL:
             pass_border(problem, ahead, behind, past, derivatives, variation, int(row[FIRST]), int(row[SECOND]))
         elif row[KIND] == LANDING:

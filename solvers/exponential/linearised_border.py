@@ -21,10 +21,11 @@ from solvers.compiled.kernels import (
     inner,
     merged,
     rhs,
+    rubs,
 )
 from solvers.compiled.state import LAST_EVENT, T
-from solvers.exponential.circles.derivative import is_parameter
-from solvers.exponential.linearised_step import change_of
+from solvers.exponential.circles.derivative import change_of, is_parameter
+from solvers.exponential.circles.friction_derivative import pass_slider
 
 _BEHIND = 1e-6  # part of what a margin is made of, by which it is negative where it is not met but left behind
 _SHARE, _LEAST = 1e-7, 1e-10  # of differences: part of a number, and at least this in its unit; margins may bend
@@ -93,6 +94,9 @@ def _explicit(problem, ahead, behind, past, s, j, delta, rate, derivatives, vari
 @merged
 def pass_border(problem, ahead, behind, past, derivatives, variation, s, j):
     """A law with memory passes its border j: derivatives of what it latches, and of the motion if its force jumps."""
+    if rubs(problem, s):
+        pass_slider(problem, ahead, behind, past, derivatives, variation, s)
+        return
     t, most, width = past.now[T], problem.latched.shape[1], problem.parameters.shape[1]
     stops = problem.law.size
     delta, rate = indentation(problem, s, past.x), indentation_rate(problem, s, past.x)

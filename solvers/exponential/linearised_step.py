@@ -7,11 +7,12 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from solvers.compiled.fields import packed_type
-from solvers.compiled.kernels import call_force, contact_forces, copy, dot, inlined, is_circle, merged, rhs
+from solvers.compiled.kernels import call_force, contact_forces, copy, inlined, is_circle, merged, rhs, rubs
 from solvers.compiled.state import BEGAN, ENDED, FIRST, HEAD, KIND, PART, SECOND, SPAN, T, acts
 from solvers.compiled.sums import combine
 from solvers.exponential.circles.contact import radial_forces
-from solvers.exponential.circles.derivative import explicit_change, is_parameter, radial_change, radial_residual
+from solvers.exponential.circles.derivative import explicit_change, is_parameter, radial_residual
+from solvers.exponential.circles.friction_derivative import rubbing_by_parameter, rubbing_residual
 from solvers.exponential.contact.collocation import end_state
 from solvers.exponential.contact.many_stops import (
     add_end_response,
@@ -48,7 +49,9 @@ class Derivatives(NamedTuple):
     latched: Annotated[Any, "columns, E*l"]  # of what laws with memory have latched, see Problem.latched
     by_latched: Annotated[Any, "E, l*S"]  # derivatives of their forces by it, row by row
     renewed: Annotated[Any, "renewed"]  # working space of l (5 + l) + 4 P + 2 B numbers
-    turned: Annotated[Any, "5, 2, 1"]  # slopes of a circle's force at one moment, see `circles.contact.turn_slopes`
+    turned: Annotated[Any, "9, 2, 1"]  # slopes of forces on the rows of a circle at one moment, see `circles`
+    at_rows: Annotated[Any, "3, 2, 1"]  # motion of these rows
+    by_rows: Annotated[Any, "R, S"]  # ∂N/∂parameter, then ∂F_t/∂parameter at the nodes, of elements with friction
 
 
 class Variation(NamedTuple):
@@ -63,17 +66,6 @@ class Variation(NamedTuple):
 
 
 DERIVATIVES, VARIATION = packed_type(Derivatives), packed_type(Variation)
-
-
-@inlined
-def change_of(problem, variation, derivatives, x, column, s, d, t):
-    """Change of δ (d = 0) or δ̇ of a stop in the state x at fixed time, in one column."""
-    if is_circle(problem, s):
-        return radial_change(problem, variation, derivatives, x, column, s, d, t)
-    r = problem.first[s]
-    row = problem.read[r] if d == 0 else problem.read_rate[r]
-    value = dot(row, derivatives.y[column], 2 * problem.k.size)
-    return value + explicit_change(variation, r, d, t) if is_parameter(variation, derivatives, column) else value
 
 
 @inlined
@@ -144,6 +136,15 @@ def _solve(problem, tables, past, scratch, derivatives, variation, node_set, lev
             motion_at_nodes(problem, scratch, r, 0.0, motion)
         else:
             combine(tables.free[tables.kind[node_set], level, r], derivatives.y[column], size, None, motion)
+        if rubs(problem, s):
+            if r == problem.first[s + 1] - 1:  # all rows have moved
+                begin, all_rows = past.now[T], place - S * (r - problem.first[s])
+                rubbing_residual(
+                    *(problem, tables, scratch, derivatives, variation),
+                    *(node_set, level, begin, column, s, shift, all_rows, problem.own[s]),
+                )
+            place += S
+            continue
         if is_circle(problem, s):
             if r > problem.first[s]:  # both rows have moved
                 begin, both = past.now[T], place - S
@@ -214,6 +215,9 @@ def linearise_step(problem, ahead, behind, tables, past, scratch, derivatives, v
             respond(problem, tables, past, scratch, node_set, level, r)
     for s in range(problem.law.size):
         if past.segment[s] > 0:
+            if rubs(problem, s):
+                rubbing_by_parameter(problem, ahead, behind, tables, past, scratch, derivatives, variation, s)
+                continue
             if is_circle(problem, s):
                 radial_forces(problem, tables, past, scratch, s)
             motion = motion_of(problem, scratch, s)

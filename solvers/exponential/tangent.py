@@ -149,6 +149,9 @@ class _Change:
         count = sum(len(signal.tones()[0]) for _, signal in system.loads if hasattr(signal, "tones"))
         if len(engine.problem.k) != system.size + count:  # a tone is sampled, for resonance: it has no steady response
             return None
+        rubbing = any(contact.friction is not None for contact in system.contacts)
+        if rubbing and np.any(radii_of(sides[0].contacts) != radii_of(sides[1].contacts)):
+            return None  # the way along a circle changes with it
         tones = _tones(system, *sides)
         if tones is None or not all(_same_structure(system, side) for side in sides):
             return None

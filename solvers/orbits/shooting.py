@@ -91,7 +91,17 @@ def _near(system: System, period: float, x: Array, method: Any, shots: int | Non
             return with_doubts(_from_zero(orbit_of(problem, chain, residual, iterations)))
         except OrbitError as error:
             tried.append(f"{count} shot(s): {error}")
-    raise OrbitError("no orbit found near the start; tried " + "; ".join(tried))
+    raise OrbitError("no orbit found near the start; tried " + "; ".join(tried) + _round_and_unforced(system))
+
+
+def _round_and_unforced(system: System) -> str:
+    """Why a search in a circular clearance without any load may fail."""
+    if system.loads or all(contact.map != "annulus" for contact in system.contacts):
+        return ""
+    return (
+        "; without a load what whirls in a circular clearance repeats itself turned by an angle (relative periodic "
+        "motion), so that no period brings it back: give it a load, or look at it in the turning frame"
+    )
 
 
 def _from_zero(orbit: Orbit) -> Orbit:

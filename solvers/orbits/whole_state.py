@@ -17,6 +17,7 @@ from solvers.problem import Array, Parameter, Solution, System, Transitions, col
 
 _REALS = ctypes.POINTER(ctypes.c_double)
 _AT = ctypes.c_int64, ctypes.c_double, ctypes.c_double, ctypes.c_double, _REALS  # border, δ, δ̇, entry rate, parameters
+_OF_SLIDER = np.array([False, True])  # the code of friction and the place of its slider
 _SLOPES = ctypes.CFUNCTYPE(None, *_AT, _REALS)
 
 
@@ -29,20 +30,14 @@ def codes(system: System) -> Any:
     """Which entries of x are codes of segments."""
 
     def found() -> Any:
-        own = [_slopes(contact.law, np.array(contact.law.parameters)) for contact in _remembering(system)]
-        real = [np.diag(slopes[:, 2:]) != 0.0 for slopes in own]
+        real = [_OF_SLIDER if contact.friction else _reals(contact.law) for contact in _remembering(system)]
         return ~np.concatenate((np.ones(2 * system.size, dtype=bool), *real))
 
     return system.about_laws.get(("codes", system.size), found)
 
 
 def _remembering(system: System) -> list[Any]:
-    """The contacts whose law has a memory; ValueError if one has friction, whose slider is no C function."""
-    for i, contact in enumerate(system.contacts):
-        if contact.friction is not None:
-            raise ValueError(
-                f"orbits take contacts without friction, and contact {i} has some; run it by integrate, DormandPrince()"
-            )
+    """The contacts whose law has a memory."""
     return [contact for contact, count in zip(system.contacts, counts(system), strict=True) if count]
 
 
@@ -100,13 +95,23 @@ def units(system: System, x: Array, log: Transitions) -> Array:
         law: Any = system.contacts[number].law
         row, places, size = np.array(law.parameters, dtype=float), list(getattr(law, "memory", ())), np.abs(latched)
         row[places] = latched
-        for i in np.flatnonzero(log.contact == number) if places else ():
+        mine = np.flatnonzero(log.contact == number) if places else ()
+        if len(mine) and system.contacts[number].friction is not None:
+            size = np.maximum(
+                size, np.abs(log.delta[mine]).max() + np.abs(log.force[mine]).max() / law.friction.stiffness
+            )
+        for i in mine if system.contacts[number].friction is None else ():
             at = int(log.border[i]), float(log.delta[i]), float(log.delta_dot[i])
             taken = np.abs(_slopes(law, row, *at)[:, :2] * at[1:]).max(axis=1)
             renew(law, row, *at)
             size = np.maximum(size, np.maximum(taken, np.abs(row[places])))
         sizes.append(np.where(size > 0.0, size, 1.0))
     return np.concatenate((np.zeros(0), *sizes))
+
+
+def _reals(law: Any) -> Array:
+    """Which of the numbers a law latches are no codes."""
+    return np.asarray(np.diag(_slopes(law, np.array(law.parameters))[:, 2:]) != 0.0)
 
 
 def _slopes(law: Any, row: Array, border: int = -1, delta: float = 0.0, rate: float = 0.0) -> Array:

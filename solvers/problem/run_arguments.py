@@ -23,9 +23,6 @@ def check_tangent(tangent: Any, method: Any, system: System) -> None:
     if tangent and not getattr(method, "has_tangent", False):
         raise ValueError(f"tangent is not offered by {type(method).__name__}; use Exponential")
     if tangent:
-        for i, contact in enumerate(system.contacts):
-            if contact.friction is not None:
-                raise ValueError(f"tangents take contacts without friction, and contact {i} has some")
         check_slopes(system)
 
 

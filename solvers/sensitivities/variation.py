@@ -92,7 +92,7 @@ def sensitivity(
     Raises
     ------
     NoDerivativeError : a contact grazes, to 1e-9 of the motion, or comes as near without being met.
-    ValueError : bad input, a law with an infinite slope at its surface, panels beyond count.
+    ValueError : bad input, a law with an infinite slope at its surface, panels beyond count, friction.
     SolverError : the run fails.
 
     Notes
@@ -118,6 +118,12 @@ def sensitivity(
     from solvers.problem.run_arguments import check_slopes
 
     check_slopes(system)
+    for i, contact in enumerate(system.contacts):
+        if contact.friction is not None:
+            raise ValueError(
+                f"sensitivities take contacts without friction, and contact {i} has some; the derivative of the end is "
+                "given by integrate(tangent=True), or tangent=Parameter(...)"
+            )
     asked = _Asked(system, _state(q0, q_dot0), duration, np.atleast_1d(np.asarray(times, dtype=float)))
     method = Exponential() if method is None else method
     asked.method = replace(method, ledger=False) if isinstance(method, Exponential) else method

@@ -227,7 +227,7 @@ def work_within_circle(problem, tables, scratch, s, first):
             square[i] += u * u
     impulse = 0.0
     for i in range(S):
-        impulse += weights[i] * _signed(problem, s, product[i]) / math.sqrt(square[i])
+        impulse += weights[i] * _signed(problem, s, product[i]) / math.sqrt(square[i] + _TINY)
     return work, impulse
 
 

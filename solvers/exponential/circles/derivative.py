@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 
-from solvers.compiled.kernels import dot, inlined, inner
+from solvers.compiled.kernels import dot, inlined, inner, is_circle
 from solvers.exponential.circles.contact import turn_slopes, turned_of
 from solvers.exponential.contact.nodes import S
 
@@ -34,7 +34,7 @@ def is_parameter(variation, derivatives, column):
 
 
 @inner
-def _row_change(problem, variation, derivatives, y, c, r, d, t):
+def row_change(problem, variation, derivatives, y, c, r, d, t):
     """Change of a row's displacement (d = 0) or rate at fixed time, in column c, whose state is y."""
     value = dot(problem.read[r] if d == 0 else problem.read_rate[r], y, 2 * problem.k.size)
     return value + explicit_change(variation, r, d, t) if is_parameter(variation, derivatives, c) else value
@@ -50,13 +50,13 @@ def radial_change(problem, variation, derivatives, x, c, s, d, t):
     )
     r = math.sqrt(u * u + w * w)
     u, w = u / r, w / r
-    change = u * _row_change(problem, variation, derivatives, y, c, row, d, t)
-    change += w * _row_change(problem, variation, derivatives, y, c, row + 1, d, t)
+    change = u * row_change(problem, variation, derivatives, y, c, row, d, t)
+    change += w * row_change(problem, variation, derivatives, y, c, row + 1, d, t)
     if d == 1:
         u_dot, w_dot = dot(problem.read_rate[row], x, size), dot(problem.read_rate[row + 1], x, size)
         along = u * u_dot + w * w_dot
-        change += (u_dot - along * u) / r * _row_change(problem, variation, derivatives, y, c, row, 0, t)
-        change += (w_dot - along * w) / r * _row_change(problem, variation, derivatives, y, c, row + 1, 0, t)
+        change += (u_dot - along * u) / r * row_change(problem, variation, derivatives, y, c, row, 0, t)
+        change += (w_dot - along * w) / r * row_change(problem, variation, derivatives, y, c, row + 1, 0, t)
     change = change if problem.radius[s] > 0.0 else -change
     return change - _moved_radius(variation, derivatives, c, s) if d == 0 else change
 
@@ -65,6 +65,17 @@ def radial_change(problem, variation, derivatives, x, c, s, d, t):
 def _moved_radius(variation, derivatives, c, s):
     """Change of c'."""
     return variation.radius[s] if is_parameter(variation, derivatives, c) else 0.0
+
+
+@inlined
+def change_of(problem, variation, derivatives, x, column, s, d, t):
+    """Change of δ (d = 0) or δ̇ of a stop in the state x at fixed time, in one column."""
+    if is_circle(problem, s):
+        return radial_change(problem, variation, derivatives, x, column, s, d, t)
+    r = problem.first[s]
+    row = problem.read[r] if d == 0 else problem.read_rate[r]
+    value = dot(row, derivatives.y[column], 2 * problem.k.size)
+    return value + explicit_change(variation, r, d, t) if is_parameter(variation, derivatives, column) else value
 
 
 @inner
@@ -112,7 +123,7 @@ def add_radial_change(problem, derivatives, variation, s, w, t, factor, force, b
             change = along * turned[4, a, 0]
             for b in range(2):
                 for d in range(2):
-                    moved = _row_change(problem, variation, derivatives, y, c, row + b, d, t)
+                    moved = row_change(problem, variation, derivatives, y, c, row + b, d, t)
                     change += turned[2 * a + b, d, 0] * moved
             for e in range(size):
                 out[c, e] += factor * change * problem.push[row + a, e]

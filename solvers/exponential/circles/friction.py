@@ -39,6 +39,7 @@ from solvers.exponential.contact.nodes import S
 from solvers.problem.friction import ARM, CODE, MU, SPIN, STIFFNESS
 
 WAYS, SPEEDS, TANGENTIAL, SPARE = range(4)  # rows of `Scratch.slid`: ξ, ξ̇ and F_t at the nodes, and numbers of a moment
+_TINY = 1e-300  # m²
 _BRIEF = 1.0  # radians of the fastest block in which nodes miss nothing of a rate
 
 
@@ -147,20 +148,42 @@ def _bent(sigma, radius, u, w, a, b, normal, tangential):
     return normal * by_radius + tangential * c * (turn - 2.0 * sideways * across / square) / square
 
 
+@inlined
+def sigma_of(problem, s):
+    """1 of a circle, -1 of an outer one, 0 of an oblique stop."""
+    return math.copysign(1.0, problem.radius[s]) if is_circle(problem, s) else 0.0
+
+
+@inlined
+def ways_of(problem, s, u, w, a):
+    """∂δ/∂y and ∂ξ/∂y by row a of an element with friction, where its first two rows are at u and w."""
+    return _ways(sigma_of(problem, s), radius_of(problem, s), slider_of(problem, s), u, w, a)
+
+
+@inlined
+def spring_of(own):
+    """∂F_t/∂ξ."""
+    return own[STIFFNESS] if own[CODE] == 0.0 else 0.0
+
+
+@inlined
+def share_of(own, normal):
+    """∂F_t/∂N; at N = 0, where a landing ends, that of the contact."""
+    return own[CODE] * own[MU] if abs(own[CODE]) == 1.0 and normal >= 0.0 else 0.0
+
+
 @inner
-def _slopes_at(problem, tables, state, scratch, s, i, out):
-    """Slopes of the forces on the rows at node i, by the rows' displacements and rates, into ``out``."""
-    first, own, radius, m = row_of(problem, s), slider_of(problem, s), radius_of(problem, s), count_of(problem, s)
-    sigma = math.copysign(1.0, radius) if is_circle(problem, s) else 0.0
-    u, w = scratch.motion[first, 0, i], scratch.motion[first + 1, 0, i]
-    normal, tangential = scratch.law_force[place_of(problem, s), i], scratch.slid[s, TANGENTIAL, i]
-    by_delta, by_rate, rate = scratch.slope[s, 0, i], scratch.slope[s, 1, i], scratch.motion[place_of(problem, s), 1, i]
-    r = math.sqrt(u * u + w * w)
-    drawn_by = own[STIFFNESS] if own[CODE] == 0.0 else 0.0
-    pressed_by = own[CODE] * own[MU] if own[CODE] != 0.0 and normal > 0.0 else 0.0
+def row_slopes(problem, s, motion, i, rate, normal, tangential, by_delta, by_rate, out):
+    """Slopes of the forces on the rows at point i by the rows' displacements and rates, rows a m + b of ``out``.
+
+    ``motion`` (m, 2, points) is that of the rows, ``rate`` δ̇; the law's slopes are given.
+    """
+    own, radius, m, sigma = slider_of(problem, s), radius_of(problem, s), count_of(problem, s), sigma_of(problem, s)
+    u, w = motion[0, 0, i], motion[1, 0, i]
+    r, drawn_by, pressed_by = math.sqrt(u * u + w * w), spring_of(own), share_of(own, normal)
     for b in range(m):
         away, aside = _ways(sigma, radius, own, u, w, b)
-        turning = (sigma * scratch.motion[first + b, 1, i] - rate * sigma * away) / r if sigma != 0.0 and b < 2 else 0.0
+        turning = (sigma * motion[b, 1, i] - rate * sigma * away) / r if sigma != 0.0 and b < 2 else 0.0
         for a in range(m):
             press, rub = _ways(sigma, radius, own, u, w, a)
             both = press + pressed_by * rub
@@ -173,8 +196,12 @@ def _slopes_at(problem, tables, state, scratch, s, i, out):
 def linearise_rubbing(problem, tables, state, scratch, node_set, level, s, begin):
     """Write what the rows of an element with friction add to the matrix of Newton's method, from row ``begin`` on."""
     first, m, slopes, column = row_of(problem, s), count_of(problem, s), scratch.row_slopes[9 * s : 9 * s + 9], 0
+    place = place_of(problem, s)
     for i in range(S):
-        _slopes_at(problem, tables, state, scratch, s, i, slopes)
+        row_slopes(
+            *(problem, s, scratch.motion[first:], i, scratch.motion[place, 1, i], scratch.law_force[place, i]),
+            *(scratch.slid[s, TANGENTIAL, i], scratch.slope[s, 0, i], scratch.slope[s, 1, i], slopes),
+        )
     for u in range(problem.gap.size):
         if not acts(problem, state, u):
             continue
@@ -232,37 +259,38 @@ def work_with_friction(problem, tables, state, scratch, node_set, level, s):
     return rows - work + own[ARM] * own[SPIN] * impulse
 
 
+@inlined
+def _motion_at(problem, scratch, r, i):
+    """Displacement and rate of a row at point i of a panel."""
+    u, v = -problem.gap[r], 0.0
+    for e in range(2 * problem.k.size):
+        u += problem.read[r, e] * scratch.along[e, i]
+        v += problem.read_rate[r, e] * scratch.along[e, i]
+    return u, v
+
+
 @part(RUB_WITHIN, types.UniTuple(REAL, 5), types.int64, types.int64)
 def work_within_rubbing(problem, tables, scratch, s, first):
     """(works, impulses of N, F_t; way) on a panel within a step; the rows' forces as in `work_within_circle`."""
-    size, row, radius, own, m = (
-        2 * problem.k.size,
-        row_of(problem, s),
-        radius_of(problem, s),
-        slider_of(problem, s),
-        count_of(problem, s),
-    )
-    weights, motion, along, pace = tables.gauss[1], scratch.row_slopes[9 * s], scratch.along, scratch.between[first - 1]
-    pressed, push, rubbed, drag, way = 0.0, 0.0, 0.0, 0.0, 0.0
+    row, radius, own, weights = row_of(problem, s), radius_of(problem, s), slider_of(problem, s), tables.gauss[1]
+    pressed, push, rubbed, drag, way, turning = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(S):
-        for a in range(m):
-            u, v = -problem.gap[row + a], 0.0
-            for e in range(size):
-                u += problem.read[row + a, e] * along[e, i]
-                v += problem.read_rate[row + a, e] * along[e, i]
-            motion[0, a], motion[1, a] = u, v
+        u, u_dot = _motion_at(problem, scratch, row, i)
+        w, w_dot = _motion_at(problem, scratch, row + 1, i)
+        if count_of(problem, s) > 2:
+            turning = -_motion_at(problem, scratch, row + 2, i)[1]
         f, g = scratch.between[first + row, i], scratch.between[first + row + 1, i]
-        u, w = motion[0, 0], motion[0, 1]
-        turning = -motion[1, 2] if m > 2 else 0.0
-        speed = slide(radius, own, 0.0, u, motion[1, 0], w, motion[1, 1], 0.0, turning)[1]
-        rate, normal, tangential = motion[1, 0], f, -g
+        rate, normal, tangential, speed = u_dot, f, -g, -w_dot
         if radius != 0.0:
-            r = math.copysign(math.sqrt(u * u + w * w), radius)
-            rate, normal = (u * motion[1, 0] + w * motion[1, 1]) / r, (f * u + g * w) / r
+            square = u * u + w * w + _TINY  # the motion may be a change of one, for a derivative
+            r = math.copysign(math.sqrt(square), radius)
+            rate, normal = (u * u_dot + w * w_dot) / r, (f * u + g * w) / r
             tangential = (g * u - f * w) / abs(radius)
+            speed = abs(radius) * (u * w_dot - w * u_dot) / square + math.copysign(1.0, own[ARM]) * turning
+            speed += own[ARM] * own[SPIN]
         pressed += weights[i] * normal * rate
         push += weights[i] * normal
         rubbed += weights[i] * tangential * speed
         drag += weights[i] * tangential
-        way += weights[i] * pace[i] * own[CODE] * speed
+        way += weights[i] * scratch.between[first - 1, i] * own[CODE] * speed
     return pressed, push, rubbed, drag, way

@@ -97,6 +97,7 @@ class Scratch(NamedTuple):
     node_time: Annotated[Any, "S"]  # s, of the nodes of the step tried
     slid: Annotated[Any, "G, 4, S"]  # ξ, ξ̇ and F_t at the nodes, then numbers of a moment; see `circles.friction`
     row_slopes: Annotated[Any, "9*G, 2, S"]  # of forces on the rows of an element with friction, by these
+    row_ways: Annotated[Any, "6*G, S"]  # ∂δ/∂y and ∂ξ/∂y of each of its rows at the nodes, for the tangent
     point: Annotated[Any, "2, 6"]  # motion of an element with friction, see `compiled.sliding`
     numbers: Annotated[Any, "S"]  # for a law call
     margin: Annotated[Any, "B*S"]  # margins of an element's borders at points, row by row; see `borders`

@@ -1,0 +1,155 @@
+"""Derivatives of runs through contacts with friction, and periodic motion with it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import fsolve
+from test_friction import EYE, SHARP, Tone, disc, wall
+
+from contacts import Hertz, Hysteretic, Jenkins, KelvinVoigt, PiecewiseLinear
+from solvers import Contact, Exponential, Friction, Parameter, System, integrate, orbit
+
+FINE = Exponential(1e-11)
+
+
+def by_differences(system, q, q_dot, duration, step=1e-6):
+    """The derivative of the end by the start, by central differences of the independent method."""
+    x, columns = np.concatenate((q, q_dot)), []
+    for i in range(x.size):
+        ends = []
+        for sign in (1.0, -1.0):
+            moved = x.copy()
+            moved[i] += sign * step
+            ends.append(integrate(system, *np.split(moved, 2), duration, method=SHARP).end[: x.size])
+        columns.append((ends[0] - ends[1]) / (2.0 * step))
+    return np.array(columns).T
+
+
+RUNS = {
+    "stick and slip": (wall(), [-1e-3, 0.0], [0.8, 0.1], 0.004),
+    "slip": (wall(), [-1e-3, 0.0], [0.8, 1.5], 0.004),
+    "hertz, stick and slip": (wall(Hertz(1e8)), [-1e-3, 0.0], [0.8, 0.6], 0.006),
+    "hysteretic": (wall(Hysteretic(1e8, 0.5)), [-1e-3, 0.0], [0.8, 0.6], 0.006),
+    "knots": (wall(PiecewiseLinear([2e5, 8e5], [1e-4])), [-1e-3, 0.0], [0.8, 1.5], 0.004),
+    "disc": (disc(), [0.5, 0.0, 0.0], [0.2, 0.8, -1.5], 4.0),
+    "spin": (disc(Hertz(1e5), spin=6.0, springs=20.0), [0.5, 0.1, 0.0], [4.5, 1.8, -1.5], 1.2),
+    "post": (disc(Hertz(1e5), spin=6.0, springs=20.0, outer=True), [-1.5, 0.3, 0.0], [4.0, 0.9, -3.0], 0.8),
+}
+
+
+@pytest.mark.parametrize("name", RUNS)
+def test_the_tangent_is_that_of_differences(name):
+    system, q, q_dot, duration = RUNS[name]
+    run = integrate(system, q, q_dot, duration, method=FINE, tangent=True)
+    assert len(run.contacts.t_out) > 0
+    expected = by_differences(system, q, q_dot, duration)
+    assert abs(run.tangent - expected).max() < 2e-5 * abs(expected).max()
+
+
+def test_the_tangent_where_a_law_pulls_as_it_opens():
+    """The limit max(μN, 0) has a kink where N = 0; it lies within a step, whose derivative is off by its size."""
+    run = integrate(wall(KelvinVoigt(4e5, 60.0)), [-1e-3, 0.0], [0.8, 0.1], 0.004, method=FINE, tangent=True)
+    expected = by_differences(wall(KelvinVoigt(4e5, 60.0)), [-1e-3, 0.0], [0.8, 0.1], 0.004)
+    assert abs(run.tangent - expected).max() < 2e-3 * 500.0  # what a slip adds to the derivative, and takes away again
+
+
+def test_the_tangent_beside_other_elements():
+    """A hole with friction, a slider and a stop on the same place."""
+    hole = Contact(EYE[:2, :2], Hertz(1e6), 1e-2, map="annulus", friction=Friction(0.3, 5e4))
+    rest = [Contact([1.0, 0.0], Jenkins(2e3, 3.0), always=True), Contact([0.6, 0.8], Hertz(1e6), 8e-3)]
+    system = System(EYE[:2, :2], 0.5 * EYE[:2, :2], np.diag([400.0, 900.0]), [hole, *rest])
+    start = np.array([1e-3, 2e-3]), np.array([0.5, 0.2])
+    run = integrate(system, *start, 0.15, method=FINE, tangent=True)
+    assert len(run.transitions) > 3
+    assert set(run.contacts.stop.tolist()) == {0, 2}
+    expected = by_differences(system, *start, 0.15, step=1e-7)
+    assert abs(run.tangent - expected).max() < 1e-4 * abs(expected).max()
+
+
+CHANGES = {
+    "mu": lambda contact, d: replace(contact, friction=Friction(contact.friction.mu + d, contact.friction.stiffness)),
+    "stiffness": lambda contact, d: replace(
+        contact, friction=Friction(contact.friction.mu, contact.friction.stiffness * (1.0 + d))
+    ),
+    "law": lambda contact, d: replace(contact, law=Hertz(1e5 * (1.0 + d))),
+    "spin": lambda contact, d: replace(contact, spin=contact.spin + d),
+    "centre": lambda contact, d: replace(contact, centre=(d, 0.0)),
+    "clearance": lambda contact, d: replace(contact, gap=contact.gap + d),
+}
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_the_derivative_by_a_parameter(name):
+    system, q, q_dot, duration = RUNS["spin"]
+
+    def changed(d):
+        return System(system.M, system.C, system.K, [CHANGES[name](system.contacts[0], d)])
+
+    step = 1e-6
+    parameter = Parameter(changed(-step), changed(step), step)
+    run = integrate(system, q, q_dot, duration, method=FINE, tangent=parameter)
+    ends = [integrate(changed(d), q, q_dot, duration, method=SHARP).end[:6] for d in (step, -step)]
+    expected = (ends[0] - ends[1]) / (2.0 * step)
+    if run.tangent.shape[1] == 6:  # a clearance changes the way along the circle: left to differences
+        assert name == "clearance"
+        return
+    assert abs(run.tangent[:, 6] - expected).max() < 1e-4 * abs(expected).max()
+
+
+def rotor(spin):
+    """An unbalanced rotor of 2 kg on a spring and a dashpot in a clearance of 0.2 mm."""
+    friction = Friction(0.15, 1e6)
+    hole = Contact(EYE[:2, :2], KelvinVoigt(3e5, 0.0), 2e-4, map="annulus", friction=friction, radius=0.02, spin=spin)
+    size = 2.0 * 1e-4 * spin**2
+    loads = [(EYE[0, :2], Tone(size, spin)), (EYE[1, :2], Tone(size, spin, -0.5 * np.pi))]
+    return System(2.0 * EYE[:2, :2], 60.0 * EYE[:2, :2], 8e4 * EYE[:2, :2], [hole], loads)
+
+
+def rub(spin):
+    """Place in the turning frame of a synchronous rub in slip, a complex number, and its eigenvalues there.
+
+    m z'' + (c + 2imΩ) z' + (k - mΩ² + icΩ) z + N (1 + iμ c/r) z/r = m e Ω²,   N = k_c (r - c)
+    """
+
+    def excess(y):
+        z, r = y[0] + 1j * y[1], np.hypot(y[0], y[1])
+        push = 3e5 * (r - 2e-4) * (1.0 + 0.15j * 2e-4 / r) * z / r
+        left = (8e4 - 2.0 * spin**2 + 60.0j * spin) * z + push - 2.0 * 1e-4 * spin**2
+        return np.array([left.real, left.imag])
+
+    def slopes(y, step=1e-10):
+        return np.array([(excess(y + d) - excess(y - d)) / (2.0 * step) for d in step * np.eye(2)]).T
+
+    place = fsolve(excess, [2.2e-4, -1e-4], xtol=1e-11)
+    damping = np.array([[60.0, -4.0 * spin], [4.0 * spin, 60.0]])
+    matrix = np.block([[np.zeros((2, 2)), np.eye(2)], [-slopes(place) / 2.0, -damping / 2.0]])
+    return place[0] + 1j * place[1], np.linalg.eigvals(matrix)
+
+
+@pytest.mark.parametrize("spin", [180.0, 220.0])
+def test_a_synchronous_rub(spin):
+    """It is periodic, slips without end, and its multipliers are those of the equilibrium in the turning frame."""
+    period, (place, eigenvalues) = 2.0 * np.pi / spin, rub(spin)
+    start = np.array([place.real, place.imag, -spin * place.imag, spin * place.real])
+    found = orbit(rotor(spin), period, start, method=Exponential(1e-11))
+    np.testing.assert_allclose(found.state[:4], start, rtol=0.0, atol=1e-9 * abs(place) * spin)
+    for value in np.exp(eigenvalues * period):
+        assert abs(found.multipliers - value).min() < 1e-6
+    assert found.stable == (eigenvalues.real.max() < 0.0)
+
+
+def shaker(amplitude, mu=0.3):
+    """A mass on springs that is shaken against an oblique stop."""
+    stop = Contact([-1.0, 0.0], Hertz(1e9), 1e-4, map="oblique", tangent=[0.0, 1.0], friction=Friction(mu, 1e6))
+    loads = [([amplitude, 0.0], Tone(1.0, 130.0)), ([0.0, 0.5 * amplitude], Tone(1.0, 130.0, 0.7))]
+    return System(2.0 * EYE[:2, :2], 30.0 * EYE[:2, :2], np.diag([4e4, 5.2e4]), [stop], loads)
+
+
+@pytest.mark.parametrize("amplitude", [60.0, 150.0])
+def test_multipliers_of_a_driven_orbit(amplitude):
+    period = 2.0 * np.pi / 130.0
+    found = orbit(shaker(amplitude), period, np.zeros(4), method=FINE)
+    assert len(found.contacts.t_in) > 0
+    expected = np.linalg.eigvals(by_differences(shaker(amplitude), *np.split(found.state[:4], 2), period, 1e-7))
+    np.testing.assert_allclose(np.sort(np.abs(found.multipliers))[-2:], np.sort(np.abs(expected))[-2:], rtol=2e-4)
