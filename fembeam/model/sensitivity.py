@@ -164,6 +164,21 @@ class Sensitivity(Printed):
         return [head, growth, *([(names, rows)] if rows else []), *more]
 
 
+def _time_of_top(t: Vector, u: Vector, v: Vector) -> float:
+    """Time of the highest value of the cubics through u and v."""
+    i = int(np.argmax(u))
+    best, found = u[i], float(t[i])
+    for j in (i - 1, i):
+        if not (0 <= j < len(t) - 1 and v[j] > 0.0 > v[j + 1]):
+            continue
+        h, places = t[j + 1] - t[j], np.linspace(0.0, 1.0, 2001)
+        values = _cubic(places, h, u[j : j + 2], v[j : j + 2])
+        top = int(np.argmax(values))
+        if values[top] > best:
+            best, found = values[top], float(t[j] + places[top] * h)
+    return found
+
+
 def _of_top(t: Vector, u: Vector, v: Vector, du: Vector, dv: Vector) -> float:
     """Derivative of the highest value of the cubics through u and v, by those of u and v at fixed times."""
     i = int(np.argmax(u))
@@ -303,8 +318,21 @@ def _warned(found: Sensitivity) -> Sensitivity:
     return found
 
 
-def of_orbit(orbit: Orbit, parameter: str) -> Sensitivity:
-    """See `Orbit.sensitivity`."""
+def of_amplitude(orbit: Orbit, z: Any, parameter: str) -> float:
+    """Derivative of half the range of an orbit's displacement at z by a number of its scene, in m per unit.
+
+    That of the difference of u at the fixed times of both extremes, where u̇ = 0; far less work than `extremes` of the
+    whole period. Errors as for `Orbit.sensitivity`.
+    """
+    u, v = orbit.run.displacement(z), orbit.run.velocity(z)
+    highest, lowest = (_time_of_top(orbit.run.t, sign * u, sign * v) for sign in (1.0, -1.0))
+    found = of_orbit(orbit, parameter, np.unique([highest, lowest]))
+    du = found.displacement(z)
+    return 0.5 * float(du[np.searchsorted(found.t, highest)] - du[np.searchsorted(found.t, lowest)])
+
+
+def of_orbit(orbit: Orbit, parameter: str, times: Vector | None = None) -> Sensitivity:
+    """See `Orbit.sensitivity`; at ``times`` (s since ``found.phase``, ascending) instead of those of the run."""
     model, found = orbit.model, orbit.found
     varied, n = _Varied(model, path_of(model.scene, parameter)), len(model.omega)
     later, system = varied.systems.map(lambda one: delayed(one, found.phase)), delayed(found.system, found.phase)
@@ -315,7 +343,7 @@ def of_orbit(orbit: Orbit, parameter: str) -> Sensitivity:
     change = once.end.copy()
     change[: 2 * n] += once.rate * lengthening
     start = _fixed_point(once.matrix, change, _free(found))
-    period = sensitivity(system, *known, orbit.run.t, later, start, **options)
+    period = sensitivity(system, *known, orbit.run.t if times is None else times, later, start, **options)
     return Sensitivity(varied.path, varied.value, orbit.run, period, lengthening, varied.models)
 
 

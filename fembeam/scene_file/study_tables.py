@@ -25,6 +25,7 @@ from fembeam.study import (
     Campbell,
     Ensemble,
     Minimum,
+    Peak,
     SpeedAccuracy,
     Variation,
     basins,
@@ -32,12 +33,14 @@ from fembeam.study import (
     characteristics,
     ensemble,
     minimise,
+    peak,
     speed_accuracy,
     vary,
 )
 from fembeam.study.measure import Plan
 from fembeam.study.minimum import box_of
 from fembeam.study.mode_count import ModeCount, checked_counts, mode_count
+from fembeam.study.peak import check_peak
 from fembeam.study.quantities import Quantity, named
 from fembeam.study.result import Result, plain
 from fembeam.study.smallest_model import MOST, SmallestModel, check_goal, smallest_model
@@ -425,6 +428,33 @@ class CampbellTable:
         return campbell(file.scene, np.linspace(*self.spins, self.points), self.modes)
 
 
+@dataclass(frozen=True)
+class PeakTable:
+    """The table [peak]: the peak of a response curve over a second number; `fb.study.peak` explains the keys.
+
+    Parameters
+    ----------
+    over : the second number, such as "elements[damper].law.limit". values : of it, ascending, two or more.
+    span : (lowest, highest) value of the parameter.
+    z : place of the displacement; None: the first stop or element, else the tip.
+    """
+
+    over: str
+    values: Sequence[float]
+    span: tuple[float, float]
+    parameter: str = "omega"
+    z: Place | None = None
+
+    def check(self, scene: Scene) -> None:
+        """Raise ValueError for numbers that the scene does not have, or values that do not ascend."""
+        check_peak(scene, self.parameter, self.over, self.values, self.span)
+
+    def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Peak:
+        """The study."""
+        keys = {field.name: getattr(self, field.name) for field in fields(self)}
+        return peak(file.model(), **keys, progress=progress)
+
+
 Draw = Mapping[str, str | float]  # a distribution of `scipy.stats` by its kind, with its numbers
 
 
@@ -536,6 +566,7 @@ STUDIES: Constructors = {
     "branch": BranchTable,
     "basins": BasinsTable,
     "campbell": CampbellTable,
+    "peak": PeakTable,
     "ensemble": EnsembleTable,
     "mode_count": _table_of(mode_count),
     "smallest_model": _table_of(smallest_model),
