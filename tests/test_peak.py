@@ -6,14 +6,14 @@ from functools import cache
 
 import numpy as np
 import pytest
-from scipy.optimize import minimize_scalar
+from scipy.optimize import brentq, minimize_scalar
+from test_equivalent import jenkins
 
 import fembeam as fb
 from contacts import Jenkins, KelvinVoigt, Polynomial
 from fembeam import scene_file
 from fembeam.model.sensitivity import of_amplitude
 from fembeam.scene import with_value
-from fembeam.study import equivalent
 
 ROD, TIP = fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01)), 0.5
 SPRING, LIMIT, ZETA = 2e3, 1.0, 0.01
@@ -84,19 +84,15 @@ def by_harmonic_balance(limit):
     mode, phi = model.omega[0], model.phi(TIP)[0]
 
     def least_force(X):  # at the best frequency for X
-        slider = equivalent(Jenkins(SPRING, limit), [X])
-        k, c = float(slider.stiffness[0]), float(slider.loss_stiffness[0])
+        energy, k = jenkins(SPRING, limit, X)
+        c = energy / (math.pi * X**2)
 
         def force(omega):
             return X * math.hypot(k + (mode**2 - omega**2) / phi**2, c + 2.0 * ZETA * mode * omega / phi**2)
 
         return minimize_scalar(force, bounds=SPAN, method="bounded").fun
 
-    low, high = 1e-5, 1e-1
-    for _ in range(25):
-        middle = math.sqrt(low * high)
-        low, high = (middle, high) if least_force(middle) < 1.0 else (low, middle)
-    return low
+    return brentq(lambda X: least_force(X) - 1.0, limit / SPRING, 1e-1)
 
 
 def test_the_peak_of_a_friction_damper_is_that_of_harmonic_balance():
@@ -142,14 +138,17 @@ def test_force_and_limit_together_scale_the_motion():
 
 
 def test_a_hardening_curve_that_overhangs():
-    """Duffing: the peak lies on the backbone, ω² (1 - ζ²) + ¾ k₃ φ⁴ a² of one harmonic, beside a fold."""
-    model = driven(fb.Element(TIP, Polynomial([0.0, 0.0, 1e7])), zeta=0.01, force=0.5)
-    found = fb.study.peak(model, "omega", "forces[0].signal.amplitude", [0.4, 0.5], (150.0, 250.0))
-    branch = model.branch("omega", (150.0, 250.0), step=0.1).run()
-    heights = [0.5 * np.ptp(one) for one in branch.extremes(TIP)]
-    assert any(one.mark == "fold" for one in branch.special)
-    assert found.amplitude[1] >= max(heights)
-    assert found.amplitude[1] == pytest.approx(max(heights), rel=5e-4)
+    """Duffing: near F φ²/2ζω₀ω on the backbone (of one harmonic), just before a fold; the rise to it is far longer than the fall."""
+    force = 0.5
+    model = driven(fb.Element(TIP, Polynomial([0.0, 0.0, 1e7])), zeta=0.01, force=force)
+    found = fb.study.peak(model, "omega", "forces[0].signal.amplitude", [0.45, force], (150.0, 250.0))
+    one, phi = found.tops[1], model.phi(TIP)[0]
+    assert one.amplitude == pytest.approx(force * phi**2 / (0.02 * model.omega[0] * one.at), rel=1e-2)
+    assert one.at == pytest.approx(math.hypot(model.omega[0], math.sqrt(0.75e7) * phi * one.amplitude), rel=2e-3)
+    for share in (1.0 - 1e-3, 1.0 - 1e-4):
+        beside = replace(model, scene=with_value(model.scene, "omega", share * one.at)).orbit(start=one.orbit)
+        assert beside.extremes(TIP)[1] < one.amplitude
+    assert found.slope[1] == pytest.approx(np.diff(found.amplitude)[0] / 0.05, rel=0.05)
 
 
 def test_two_stops():

@@ -21,6 +21,7 @@ from fembeam.model.run_csv import Output
 from fembeam.scene import Place, path_of, split
 from fembeam.scene_file.keys import Constructors, parameters
 from fembeam.study import (
+    Backbone,
     Basins,
     Campbell,
     Ensemble,
@@ -28,6 +29,7 @@ from fembeam.study import (
     Peak,
     SpeedAccuracy,
     Variation,
+    backbone,
     basins,
     campbell,
     characteristics,
@@ -37,6 +39,7 @@ from fembeam.study import (
     speed_accuracy,
     vary,
 )
+from fembeam.study.backbone import check_backbone
 from fembeam.study.measure import Plan
 from fembeam.study.minimum import box_of
 from fembeam.study.mode_count import ModeCount, checked_counts, mode_count
@@ -455,6 +458,33 @@ class PeakTable:
         return peak(file.model(), **keys, progress=progress)
 
 
+@dataclass(frozen=True)
+class BackboneTable:
+    """The table [backbone]: frequency and damping over amplitude by phase resonance; `fb.study.backbone` explains more.
+
+    Parameters
+    ----------
+    levels : amplitudes of the tone, ascending, two or more. span : (lowest, highest) frequency about one resonance.
+    level, parameter : the tone's amplitude and frequency.
+    z : place of the displacement; None: the first stop or element, else the tip.
+    """
+
+    levels: Sequence[float]
+    span: tuple[float, float]
+    level: str = "amplitude"
+    parameter: str = "omega"
+    z: Place | None = None
+
+    def check(self, scene: Scene) -> None:
+        """Raise ValueError for numbers that the scene does not have, or levels that do not ascend."""
+        check_backbone(scene, self.levels, self.span, self.level, self.parameter)
+
+    def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Backbone:
+        """The study."""
+        keys = {field.name: getattr(self, field.name) for field in fields(self)}
+        return backbone(file.model(), **keys, progress=progress)
+
+
 Draw = Mapping[str, str | float]  # a distribution of `scipy.stats` by its kind, with its numbers
 
 
@@ -567,6 +597,7 @@ STUDIES: Constructors = {
     "basins": BasinsTable,
     "campbell": CampbellTable,
     "peak": PeakTable,
+    "backbone": BackboneTable,
     "ensemble": EnsembleTable,
     "mode_count": _table_of(mode_count),
     "smallest_model": _table_of(smallest_model),

@@ -19,22 +19,19 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import minimize_scalar
 
-import solvers
 from fembeam import plot
 from fembeam.model import Model, Orbit, observed
 from fembeam.model.branch import Family
 from fembeam.model.sensitivity import of_amplitude
 from fembeam.plot.axis_names import axis_name
 from fembeam.scene import Scene, numbered, path_of
+from fembeam.study.response_curve import ResponseCurve, Seen
 from fembeam.study.result import Result
 from fembeam.support import Part, counting, is_finite, require
 
 Vector = NDArray[np.float64]
 WHERE = "study.peak"
 ROUGHLY = 1e-6  # of ω: how near to the peak it is searched by amplitudes
-STEPS, CHANGE = 16, 0.3  # of a sweep: fewest, and the change of the amplitude in one
-SAME = 0.8  # of the change in a step: as large in half of it, it is a jump
-ARC = 0.2  # largest step of a branch, see `Model.branch`
 APART = 1e-3  # of the bracket: distance of two slopes through which the secant goes
 FAR = 30.0  # times what the search is sure of: a secant that leads further off meets a corner
 SURE = 1e-6  # of the least amplitude: by how much another value could lie below it
@@ -186,15 +183,17 @@ def peak(
     return Peak(called, called_over, tuple(tops), _least(search, tops), search.z, titles)
 
 
-def check_peak(scene: Scene, parameter: str, over: str, values: ArrayLike, span: Any) -> Vector:
+def check_peak(
+    scene: Scene, parameter: str, over: str, values: ArrayLike, span: Any, where: str = WHERE, name: str = "values"
+) -> Vector:
     """Values of p; ValueError for what `peak` refuses."""
     p = np.atleast_1d(np.array(values, dtype=float))
     valid = p.ndim == 1 and p.size > 1 and bool(np.isfinite(p).all() and np.all(np.diff(p) > 0.0))
-    require(valid, "values must be finite and ascending, two or more", values, WHERE, "e.g. np.geomspace(0.1, 10, 9)")
+    require(valid, f"{name} must be finite and ascending, two or more", values, where, "e.g. np.geomspace(0.1, 10, 9)")
     paths = [path_of(scene, name) for name in (parameter, over)]
-    require(paths[0] != paths[1], "over must be another number than the parameter", over, WHERE, "name both")
+    require(paths[0] != paths[1], "over must be another number than the parameter", over, where, "name both")
     pair = np.shape(span) == (2,) and all(map(is_finite, span)) and span[0] < span[1]
-    require(bool(pair), "span must be two values, ascending", span, WHERE, "give (lowest, highest)")
+    require(bool(pair), "span must be two values, ascending", span, where, "give (lowest, highest)")
     return p
 
 
@@ -209,117 +208,30 @@ class _Search:
 
     def top(self, value: float) -> Top:
         """The peak at one value of p."""
-        curve = _Curve(Family(self.models.at(value), self.parameter, 1), self.z)
+        curve = ResponseCurve(Family(self.models.at(value), self.parameter, 1), self.z)
         low, high = curve.around_largest(*self.span)
         if low == high:
             raise ValueError(
                 f"no peak along {self.parameter} within {self.span} at {self.over} = {value:.6g}: the amplitude is "
                 "largest at an end; widen the span"
             )
-        one = curve.top(low, high)
+        one = _top(curve, low, high)
         return Top(value, one.at, one.amplitude, _slope(one.orbit, self.z, self.over), one.orbit.stable, one.orbit)
 
 
-@dataclass(frozen=True)
-class _Seen:
-    """An orbit on a response curve."""
-
-    at: float
-    amplitude: float
-    orbit: Orbit
-
-
-@dataclass
-class _Curve:
-    """Amplitudes along ω."""
-
-    family: Family
-    z: Any
-    seen: list[_Seen] = field(default_factory=list)
-
-    def from_near(self, x: float, near: Orbit | None) -> _Seen | None:
-        """The orbit at ω to which one nearby leads, None a run from rest; None where there is none."""
-        try:
-            orbit = self.family.at(x).orbit(1, near)
-        except solvers.OrbitError:
-            if near is None:
-                raise
-            return None
-        return self.kept(x, orbit)
-
-    def kept(self, x: float, orbit: Orbit) -> _Seen:
-        """The orbit at ω, remembered."""
-        lowest, highest = orbit.extremes(self.z)
-        self.seen.append(_Seen(x, 0.5 * (highest - lowest), orbit))
-        return self.seen[-1]
-
-    def around_largest(self, low: float, high: float) -> tuple[float, float]:
-        """Bounds of ω about the highest point of the curve, the same twice where it is an end of the span."""
-        points, last = self.sweep(low, high)
-        if last is not None:
-            branch = last.orbit.model.branch(self.family.name, (low, high), 1, last.orbit, last.at, step=ARC)
-            points = [self.kept(one.parameter, one) for one in branch.run().orbits]
-        best = int(np.argmax([one.amplitude for one in points]))
-        beside = [points[i] for i in (best - 1, best + 1) if 0 <= i < len(points)]
-        if len(beside) == 2 and (beside[0].at > points[best].at) == (beside[1].at > points[best].at):
-            beside = sorted(beside, key=lambda one: one.orbit.stable)[1:]  # a fold: the sheet between folds is not it
-        elif len(beside) < 2:
-            return points[best].at, points[best].at
-        self.seen = [points[best], *beside]
-        places = [one.at for one in self.seen]
-        return min(places), max(places)
-
-    def sweep(self, start: float, end: float) -> tuple[list[_Seen], _Seen | None]:
-        """Orbits along ω, each begun from the last; where the amplitude jumps it ends with the orbit before."""
-        step = largest = (end - start) / STEPS
-        points, refused = [_known(self.from_near(start, None))], math.inf
-        while (last := points[-1]).at < end:
-            x = end if end - last.at <= 1.01 * step else last.at + step
-            one = self.from_near(x, last.orbit)
-            change = math.inf if one is None else abs(one.amplitude - last.amplitude)
-            if one is not None and change <= CHANGE * max(one.amplitude, last.amplitude):
-                points.append(one)
-                step = min(2.0 * step, largest) if change < 0.3 * CHANGE * last.amplitude else step
-                refused = math.inf
-            elif one is None or change > SAME * refused:
-                return points, last
-            else:
-                step, refused = 0.5 * step, change
-        return points, None
-
-    def amplitude(self, x: float) -> float:
-        """At ω, of the orbit to which the nearest high one leads; 0 where there is none."""
-        known = [one.amplitude for one in self.seen if one.at == x]
-        if not known:
-            half = 0.5 * max(one.amplitude for one in self.seen)
-            near = min((one for one in self.seen if one.amplitude >= half), key=lambda one: abs(one.at - x))
-            one = self.from_near(x, near.orbit)
-            return 0.0 if one is None else one.amplitude
-        return max(known)
-
-    def top(self, low: float, high: float) -> _Seen:
-        """The peak between two ω."""
-        sure = {"xatol": ROUGHLY * max(abs(low), abs(high))}
-        minimize_scalar(lambda x: -self.amplitude(float(x)), bounds=(low, high), method="bounded", options=sure)
-        best, parameter = max(self.seen, key=lambda one: one.amplitude), self.family.name
-        slope = _slope(best.orbit, self.z, parameter)
-        beside = best.at + math.copysign(APART * (high - low), slope)
-        if not (np.isfinite(slope) and self.amplitude(beside) > 0.0):
-            return best
-        change = (_slope(self.at(beside).orbit, self.z, parameter) - slope) / (beside - best.at)
-        x = best.at - slope / change
-        near = abs(x - best.at) <= FAR * ROUGHLY * abs(best.at) and self.amplitude(x) > 0.0
-        return self.at(x) if near else best
-
-    def at(self, x: float) -> _Seen:
-        """The highest orbit seen at ω."""
-        return max((one for one in self.seen if one.at == x), key=lambda one: one.amplitude)
-
-
-def _known(one: _Seen | None) -> _Seen:
-    """What is there."""
-    assert one is not None
-    return one
+def _top(curve: ResponseCurve, low: float, high: float) -> Seen:
+    """The peak between two ω."""
+    sure = {"xatol": ROUGHLY * max(abs(low), abs(high))}
+    minimize_scalar(lambda x: -curve.amplitude(float(x)), bounds=(low, high), method="bounded", options=sure)
+    best, parameter = max(curve.seen, key=lambda one: one.amplitude), curve.family.name
+    slope = _slope(best.orbit, curve.z, parameter)
+    beside = best.at + math.copysign(APART * (high - low), slope)
+    if not (np.isfinite(slope) and curve.amplitude(beside) > 0.0):
+        return best
+    change = (_slope(curve.at(beside).orbit, curve.z, parameter) - slope) / (beside - best.at)
+    x = best.at - slope / change
+    near = abs(x - best.at) <= FAR * ROUGHLY * abs(best.at) and curve.amplitude(x) > 0.0
+    return curve.at(x) if near else best
 
 
 def _slope(orbit: Orbit, z: Any, parameter: str) -> float:
