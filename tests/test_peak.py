@@ -138,7 +138,7 @@ def test_force_and_limit_together_scale_the_motion():
 
 
 def test_a_hardening_curve_that_overhangs():
-    """Duffing: near F φ²/2ζω₀ω on the backbone (of one harmonic), just before a fold; the rise to it is far longer than the fall."""
+    """Duffing: F φ²/2ζω₀ω on the backbone, of one harmonic, just before a fold."""
     force = 0.5
     model = driven(fb.Element(TIP, Polynomial([0.0, 0.0, 1e7])), zeta=0.01, force=force)
     found = fb.study.peak(model, "omega", "forces[0].signal.amplitude", [0.45, force], (150.0, 250.0))
