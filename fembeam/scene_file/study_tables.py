@@ -545,6 +545,7 @@ class MinimiseTable:
     seeds: int = 0
     tolerance: float = 1e-4
     most: int = 200
+    gradients: bool = False
     workers: int = 1
     solver: Any = None
 
@@ -555,7 +556,9 @@ class MinimiseTable:
 
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Minimum:
         """The search, with its checkpoint ``minimise.npz`` in the folder."""
-        keys = _plan_of(self) | {name: getattr(self, name) for name in ("constraints", "tolerance", "most")}
+        keys = _plan_of(self) | {
+            name: getattr(self, name) for name in ("constraints", "tolerance", "most", "gradients")
+        }
         keys |= {"checkpoint": folder / "minimise.npz", "progress": progress, **file.reduce}
         with _pool(self.workers) as pool:
             return minimise(file.scene, self.parameters, self.quantity, executor=pool, **keys)
