@@ -58,6 +58,7 @@ class Sensitivity(Printed):
     found: Any
     period: float = 0.0
     models: Nearby | None = field(default=None, repr=False)  # where shapes change
+    systems: Nearby | None = field(default=None, repr=False)  # by a parameter
 
     @property
     def t(self) -> Vector:
@@ -111,11 +112,43 @@ class Sensitivity(Printed):
 
     def displacement(self, z: Any, direction: Any = None, body: int = 0) -> Vector:
         """Of u(z, t), m relative to the frame: (k,) at one z, (k, j) at z (j,); places as for `Run.displacement`."""
-        return self._of_motion(self.q, self.found.solution.q, z, direction, body)
+        return self._of_motion(self.q, self._own.q, z, direction, body)
 
     def velocity(self, z: Any, direction: Any = None, body: int = 0) -> Vector:
         """Of u̇(z, t), m/s, likewise."""
-        return self._of_motion(self.q_dot, self.found.solution.q_dot, z, direction, body)
+        return self._of_motion(self.q_dot, self._own.q_dot, z, direction, body)
+
+    def indentation(self, stop: int | str = 0) -> Vector:
+        """Of δ(t) of a stop, (k,) m or rad, its gap's own change included; stops as for `Run.indentation`."""
+        return -self._of_element(self.q, self._own.q, stop, True)
+
+    def indentation_rate(self, stop: int | str = 0) -> Vector:
+        """Of δ̇(t), m/s or rad/s, likewise."""
+        return -self._of_element(self.q_dot, self._own.q_dot, stop, False)
+
+    @property
+    def _own(self) -> Any:
+        """The solution, of which the samples are part."""
+        return self.found.solution
+
+    def _of_element(self, changed: Vector, motion: Vector, stop: int | str, with_gap: bool) -> Vector:
+        """w·dq + dw·q, and the change of the gap."""
+        number = self.run.number(stop)
+        contact = self.run.readout.model.system.contacts[number]
+        require(contact.map == "line", "derivatives of an indentation are those of a stop on a line", stop,
+                "Sensitivity.indentation", "ask for displacements")  # fmt: skip
+        found = changed @ contact.direction
+        if self.systems is not None:
+            found = found + self._at_samples(motion) @ self.systems.derivative(
+                lambda one: one.contacts[number].direction
+            )
+            if with_gap:
+                found = found + self.systems.derivative(lambda one: one.contacts[number].gap)
+        return np.asarray(found)
+
+    def _at_samples(self, motion: Vector) -> Vector:
+        """Rows of the solution at the samples."""
+        return motion[np.searchsorted(self._own.t, self.t).clip(max=len(motion) - 1)]
 
     def extremes(self, z: Any, direction: Any = None, body: int = 0) -> tuple[float, float]:
         """Of the lowest and of the highest displacement at one z over the samples; sample finely.
@@ -125,7 +158,7 @@ class Sensitivity(Printed):
         """
         u, v = (ask(z, direction, body) for ask in (self.run.displacement, self.run.velocity))
         du, dv = (ask(z, direction, body) for ask in (self.displacement, self.velocity))
-        return tuple(_of_top(self.t, sign * u, sign * v, du, dv) for sign in (-1.0, 1.0))  # type: ignore[return-value]
+        return tuple(of_top(self.t, sign * u, sign * v, du, dv) for sign in (-1.0, 1.0))  # type: ignore[return-value]
 
     def _of_motion(self, changed: Vector, motion: Vector, z: Any, direction: Any, body: int) -> Vector:
         """φ·dq + dφ·q."""
@@ -133,8 +166,7 @@ class Sensitivity(Printed):
         at = z if direction is None else directed(z, direction)
         found = changed @ np.asarray(model.phi(at, 0, body)).T
         if self.models is not None:
-            own = motion[np.searchsorted(self.found.solution.t, self.t).clip(max=len(motion) - 1)]
-            found = found + own @ self.models.derivative(lambda one: one.phi(at, 0, body)).T
+            found = found + self._at_samples(motion) @ self.models.derivative(lambda one: one.phi(at, 0, body)).T
         return np.asarray(found)
 
     def table(self) -> list[dict[str, Any]]:
@@ -164,7 +196,22 @@ class Sensitivity(Printed):
         return [head, growth, *([(names, rows)] if rows else []), *more]
 
 
-def _of_top(t: Vector, u: Vector, v: Vector, du: Vector, dv: Vector) -> float:
+def _time_of_top(t: Vector, u: Vector, v: Vector) -> float:
+    """Time of the highest value of the cubics through u and v."""
+    i = int(np.argmax(u))
+    best, found = u[i], float(t[i])
+    for j in (i - 1, i):
+        if not (0 <= j < len(t) - 1 and v[j] > 0.0 > v[j + 1]):
+            continue
+        h, places = t[j + 1] - t[j], np.linspace(0.0, 1.0, 2001)
+        values = _cubic(places, h, u[j : j + 2], v[j : j + 2])
+        top = int(np.argmax(values))
+        if values[top] > best:
+            best, found = values[top], float(t[j] + places[top] * h)
+    return found
+
+
+def of_top(t: Vector, u: Vector, v: Vector, du: Vector, dv: Vector) -> float:
     """Derivative of the highest value of the cubics through u and v, by those of u and v at fixed times."""
     i = int(np.argmax(u))
     best, found = u[i], float(du[i])
@@ -279,7 +326,7 @@ def of_run(run: Run, parameter: str | None, start: ArrayLike | None) -> Sensitiv
         return _warned(Sensitivity("start", float("nan"), run, found))
     varied = _Varied(model, path_of(model.scene, parameter))
     found = sensitivity(model.system, x[:n], x[n:], made.duration, times, varied.systems, varied.start(x), **options)
-    return _warned(Sensitivity(varied.path, varied.value, run, found, 0.0, varied.models))
+    return _warned(Sensitivity(varied.path, varied.value, run, found, 0.0, varied.models, varied.systems))
 
 
 def _direction(model: Model, start: Any) -> Vector:
@@ -303,8 +350,21 @@ def _warned(found: Sensitivity) -> Sensitivity:
     return found
 
 
-def of_orbit(orbit: Orbit, parameter: str) -> Sensitivity:
-    """See `Orbit.sensitivity`."""
+def of_amplitude(orbit: Orbit, z: Any, parameter: str) -> float:
+    """Derivative of half the range of an orbit's displacement at z by a number of its scene, in m per unit.
+
+    That of the difference of u at the fixed times of both extremes, where u̇ = 0; far less work than `extremes` of the
+    whole period. Errors as for `Orbit.sensitivity`.
+    """
+    u, v = orbit.run.displacement(z), orbit.run.velocity(z)
+    highest, lowest = (_time_of_top(orbit.run.t, sign * u, sign * v) for sign in (1.0, -1.0))
+    found = of_orbit(orbit, parameter, np.unique([highest, lowest]))
+    du = found.displacement(z)
+    return 0.5 * float(du[np.searchsorted(found.t, highest)] - du[np.searchsorted(found.t, lowest)])
+
+
+def of_orbit(orbit: Orbit, parameter: str, times: Vector | None = None) -> Sensitivity:
+    """See `Orbit.sensitivity`; at ``times`` (s since ``found.phase``, ascending) instead of those of the run."""
     model, found = orbit.model, orbit.found
     varied, n = _Varied(model, path_of(model.scene, parameter)), len(model.omega)
     later, system = varied.systems.map(lambda one: delayed(one, found.phase)), delayed(found.system, found.phase)
@@ -315,8 +375,8 @@ def of_orbit(orbit: Orbit, parameter: str) -> Sensitivity:
     change = once.end.copy()
     change[: 2 * n] += once.rate * lengthening
     start = _fixed_point(once.matrix, change, _free(found))
-    period = sensitivity(system, *known, orbit.run.t, later, start, **options)
-    return Sensitivity(varied.path, varied.value, orbit.run, period, lengthening, varied.models)
+    period = sensitivity(system, *known, orbit.run.t if times is None else times, later, start, **options)
+    return Sensitivity(varied.path, varied.value, orbit.run, period, lengthening, varied.models, varied.systems)
 
 
 def _free(found: Any) -> Any:

@@ -2,8 +2,8 @@
 
 `response`, `bodies`, `clearance`, `spectra`, `contact_histograms` and `animation` hold those of one run, `laws` those
 of contact laws, `orbits` those of periodic motion, `campbell` that of rotors, `basins` maps of starts, `random` those
-of random motion, `linear` spectra and frequency response, `rig` that of a scene, `mode_count`, `methods` and
-`variation` those of studies; `run_signals`, `style` and `figure` are what they share. Imports: `statistics`, `model`
+of random motion, `linear` spectra and frequency response, `rig` that of a scene, `mode_count`, `methods`, `variation`
+and `peaks` those of studies; `run_signals`, `style` and `figure` are what they share. Imports: `statistics`, `model`
 and what they import. Begin with `response`.
 """
 
@@ -18,6 +18,7 @@ from fembeam.plot.linear import floor_spectrum, frequency_response, response_spe
 from fembeam.plot.methods import speed_accuracy, stability_map
 from fembeam.plot.mode_count import mode_count, smallest_model
 from fembeam.plot.orbits import bifurcation, branch, orbit, peak
+from fembeam.plot.peaks import backbone, peak_curve
 from fembeam.plot.random import random_densities, random_spectra
 from fembeam.plot.response import deflected, densities, mode_shapes, time_history
 from fembeam.plot.rig import rig
@@ -27,10 +28,10 @@ from fembeam.plot.style import one_legend, styled
 from fembeam.plot.variation import minimum, variation
 
 __all__ = [
-    "animate", "basins", "batches", "bifurcation", "branch", "campbell", "contacts", "deflected", "densities",
-    "equivalent", "floor_spectrum", "frame", "frequency_response", "hysteresis", "identification", "loops", "minimum",
-    "mode_count", "mode_shapes", "natural", "one_legend", "orbit", "orbit_in_clearance", "peak", "peaks", "places",
-    "random_densities", "random_spectra", "response_spectrum", "responses", "restitutions", "rig", "sampling_of",
-    "segment_for", "smallest_model", "spectra_of", "spectrum", "speed_accuracy", "stability_map", "stationary",
-    "styled", "time_history", "variation",
+    "animate", "backbone", "basins", "batches", "bifurcation", "branch", "campbell", "contacts", "deflected",
+    "densities", "equivalent", "floor_spectrum", "frame", "frequency_response", "hysteresis", "identification",
+    "loops", "minimum", "mode_count", "mode_shapes", "natural", "one_legend", "orbit", "orbit_in_clearance", "peak",
+    "peak_curve", "peaks", "places", "random_densities", "random_spectra", "response_spectrum", "responses",
+    "restitutions", "rig", "sampling_of", "segment_for", "smallest_model", "spectra_of", "spectrum", "speed_accuracy",
+    "stability_map", "stationary", "styled", "time_history", "variation",
 ]  # fmt: skip

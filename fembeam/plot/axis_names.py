@@ -10,7 +10,8 @@ if TYPE_CHECKING:
 
 SIGNALS = {"base": "base", "foot": "foot", "signal": "drive"}
 LAWS = {"stiffness": ("contact stiffness", "N/m^p"), "exponent": ("exponent of the contact law", ""),
-        "damping_factor": ("hysteresis factor", "s/m"), "damping": ("contact damping", "N s/m^p")}  # fmt: skip
+        "damping_factor": ("hysteresis factor", "s/m"), "damping": ("contact damping", "N s/m^p"),
+        "limit": ("limit of slip", "N")}  # fmt: skip
 PARTS = {
     "gap": ("gap", "m"), "clearance": ("clearance", "m"), "centre": ("centre of the circle", "m"),
     "z": ("place z", "m"), "mass": ("mass", "kg"), "inertia": ("rotary inertia", "kg m²"),
@@ -22,7 +23,7 @@ PARTS = {
     "velocity": ("velocity", "m/s"), "offset": ("offset of the centre of mass", "m"), "zeta": ("damping ratio ζ", ""),
     "on": ("second place", "m"), "to": ("second place", "m"),
 }  # fmt: skip
-TURNED = {"m": "rad", "N/m^p": "N m/rad^p", "s/m": "s/rad", "N s/m^p": "N m s/rad^p"}  # of rotation
+TURNED = {"m": "rad", "N": "N m", "N/m^p": "N m/rad^p", "s/m": "s/rad", "N s/m^p": "N m s/rad^p"}  # of rotation
 OWNERS = {"masses": "mass", "springs": "spring", "dashpots": "dashpot", "stops": "stop", "elements": "element",
           "forces": "force", "bodies": "beam"}  # fmt: skip
 

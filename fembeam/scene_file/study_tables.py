@@ -21,23 +21,29 @@ from fembeam.model.run_csv import Output
 from fembeam.scene import Place, path_of, split
 from fembeam.scene_file.keys import Constructors, parameters
 from fembeam.study import (
+    Backbone,
     Basins,
     Campbell,
     Ensemble,
     Minimum,
+    Peak,
     SpeedAccuracy,
     Variation,
+    backbone,
     basins,
     campbell,
     characteristics,
     ensemble,
     minimise,
+    peak,
     speed_accuracy,
     vary,
 )
+from fembeam.study.backbone import check_backbone
 from fembeam.study.measure import Plan
 from fembeam.study.minimum import box_of
 from fembeam.study.mode_count import ModeCount, checked_counts, mode_count
+from fembeam.study.peak import check_peak
 from fembeam.study.quantities import Quantity, named
 from fembeam.study.result import Result, plain
 from fembeam.study.smallest_model import MOST, SmallestModel, check_goal, smallest_model
@@ -425,6 +431,60 @@ class CampbellTable:
         return campbell(file.scene, np.linspace(*self.spins, self.points), self.modes)
 
 
+@dataclass(frozen=True)
+class PeakTable:
+    """The table [peak]: the peak of a response curve over a second number; `fb.study.peak` explains the keys.
+
+    Parameters
+    ----------
+    over : the second number, such as "elements[damper].law.limit". values : of it, ascending, two or more.
+    span : (lowest, highest) value of the parameter.
+    z : place of the displacement; None: the first stop or element, else the tip.
+    """
+
+    over: str
+    values: Sequence[float]
+    span: tuple[float, float]
+    parameter: str = "omega"
+    z: Place | None = None
+
+    def check(self, scene: Scene) -> None:
+        """Raise ValueError for numbers that the scene does not have, or values that do not ascend."""
+        check_peak(scene, self.parameter, self.over, self.values, self.span)
+
+    def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Peak:
+        """The study."""
+        keys = {field.name: getattr(self, field.name) for field in fields(self)}
+        return peak(file.model(), **keys, progress=progress)
+
+
+@dataclass(frozen=True)
+class BackboneTable:
+    """The table [backbone]: frequency and damping over amplitude by phase resonance; `fb.study.backbone` explains more.
+
+    Parameters
+    ----------
+    levels : amplitudes of the tone, ascending, two or more. span : (lowest, highest) frequency about one resonance.
+    level, parameter : the tone's amplitude and frequency.
+    z : place of the displacement; None: the first stop or element, else the tip.
+    """
+
+    levels: Sequence[float]
+    span: tuple[float, float]
+    level: str = "amplitude"
+    parameter: str = "omega"
+    z: Place | None = None
+
+    def check(self, scene: Scene) -> None:
+        """Raise ValueError for numbers that the scene does not have, or levels that do not ascend."""
+        check_backbone(scene, self.levels, self.span, self.level, self.parameter)
+
+    def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Backbone:
+        """The study."""
+        keys = {field.name: getattr(self, field.name) for field in fields(self)}
+        return backbone(file.model(), **keys, progress=progress)
+
+
 Draw = Mapping[str, str | float]  # a distribution of `scipy.stats` by its kind, with its numbers
 
 
@@ -485,6 +545,7 @@ class MinimiseTable:
     seeds: int = 0
     tolerance: float = 1e-4
     most: int = 200
+    gradients: bool = False
     workers: int = 1
     solver: Any = None
 
@@ -495,7 +556,9 @@ class MinimiseTable:
 
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Minimum:
         """The search, with its checkpoint ``minimise.npz`` in the folder."""
-        keys = _plan_of(self) | {name: getattr(self, name) for name in ("constraints", "tolerance", "most")}
+        keys = _plan_of(self) | {
+            name: getattr(self, name) for name in ("constraints", "tolerance", "most", "gradients")
+        }
         keys |= {"checkpoint": folder / "minimise.npz", "progress": progress, **file.reduce}
         with _pool(self.workers) as pool:
             return minimise(file.scene, self.parameters, self.quantity, executor=pool, **keys)
@@ -536,6 +599,8 @@ STUDIES: Constructors = {
     "branch": BranchTable,
     "basins": BasinsTable,
     "campbell": CampbellTable,
+    "peak": PeakTable,
+    "backbone": BackboneTable,
     "ensemble": EnsembleTable,
     "mode_count": _table_of(mode_count),
     "smallest_model": _table_of(smallest_model),

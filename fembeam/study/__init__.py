@@ -3,12 +3,14 @@
 How many modes (`mode_count`, `smallest_model`), which method and step (`speed_accuracy`, `stability_map`), what random
 motion looks like (`ensemble` of realisations, `stationary` for one long run in `segments`), where motion settles
 (`basins`, `bifurcation`), how a rotor whirls (`campbell`), how a law stiffens and damps over the amplitude
-(`equivalent`), what parameters change (`vary`) and where a quantity is least (`minimise`). A study is a function and
+(`equivalent`), how a resonance changes with amplitude (`backbone`) and with a second number (`peak`), what
+parameters change (`vary`) and where a quantity is least (`minimise`). A study is a function and
 its `Result`; `quantities` are the numbers that it can ask for, `measure` takes them, `realisations` gives every run its
 own noise, `execution` spreads runs over processes and keeps what was computed. Imports: `plot`, `model`, `statistics`
 and what they import. Begin with `measure`, then `ensemble`.
 """
 
+from fembeam.study.backbone import Backbone, Resonance, backbone
 from fembeam.study.basins import Basins, basins
 from fembeam.study.bifurcation import Bifurcation, bifurcation
 from fembeam.study.campbell import Campbell, campbell
@@ -16,6 +18,7 @@ from fembeam.study.ensemble import Ensemble, ensemble
 from fembeam.study.equivalent import Equivalent, equivalent
 from fembeam.study.minimum import Limit, Minimum, minimise
 from fembeam.study.mode_count import ModeCount, mode_count
+from fembeam.study.peak import Peak, Top, peak
 from fembeam.study.smallest_model import NotMetError, SmallestModel, smallest_model
 from fembeam.study.speed_accuracy import NoReferenceError, Point, SpeedAccuracy, speed_accuracy
 from fembeam.study.stability_map import StabilityMap, Verdict, stability_map
@@ -23,8 +26,9 @@ from fembeam.study.stationary import Response, characteristics, stationary
 from fembeam.study.variation import Variation, vary
 
 __all__ = [
-    "Basins", "Bifurcation", "Campbell", "Ensemble", "Equivalent", "Limit", "Minimum", "ModeCount", "NoReferenceError",
-    "NotMetError", "Point", "Response", "SmallestModel", "SpeedAccuracy", "StabilityMap", "Variation", "Verdict",
-    "basins", "bifurcation", "campbell", "characteristics", "ensemble", "equivalent", "minimise", "mode_count",
-    "smallest_model", "speed_accuracy", "stability_map", "stationary", "vary",
+    "Backbone", "Basins", "Bifurcation", "Campbell", "Ensemble", "Equivalent", "Limit", "Minimum", "ModeCount",
+    "NoReferenceError", "NotMetError", "Peak", "Point", "Resonance", "Response", "SmallestModel", "SpeedAccuracy",
+    "StabilityMap", "Top", "Variation", "Verdict", "backbone", "basins", "bifurcation", "campbell", "characteristics",
+    "ensemble", "equivalent", "minimise", "mode_count", "peak", "smallest_model", "speed_accuracy", "stability_map",
+    "stationary", "vary",
 ]  # fmt: skip

@@ -2,9 +2,10 @@
 
     minimise f(x)    low <= x <= high,    g(x) <= bound
 
-The box is first looked over at points spread evenly (Halton's sequence), then searched from the best of them by COBYQA,
-a trust-region method with quadratic models that needs no derivatives. Noise has the same seeds at every point, so that
-f is a function of x alone.
+The box is first looked over at points spread evenly (Halton's sequence), then searched from the best of them: by SLSQP,
+sequential quadratic programming, if exact gradients are asked for; else, and where that does not end at a smooth
+minimum, by COBYQA, a trust-region method with quadratic models that needs no derivatives. Noise has the same seeds at
+every point, so that f is a function of x alone.
 """
 
 from __future__ import annotations
@@ -17,24 +18,27 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import Bounds, NonlinearConstraint, minimize
+from scipy.optimize import Bounds, NonlinearConstraint, minimize, nnls
 from scipy.stats import qmc
 
 from fembeam import plot
 from fembeam.scene import Scene
 from fembeam.statistics import Estimate
 from fembeam.study.execution.checkpoint import Checkpoint
+from fembeam.study.gradients import NoGradientError, check_gradients, gradient
 from fembeam.study.measure import Plan, Start
 from fembeam.study.quantities import Quantity, label, named
 from fembeam.study.result import Result
 from fembeam.study.trial import Maker, Trial
 from fembeam.study.variation import Variation, collected, computed, identity_of
-from fembeam.support import Part, is_finite, is_whole, number, require
+from fembeam.support import Part, is_finite, is_whole, note, number, require
+from solvers.problem import counted
 
 Vector = NDArray[np.float64]
 WHERE = "minimise"
 LOOKS = 8  # points looked at first, for each parameter
 NEAR = 10.0  # tolerances: a bound so near to the minimum is active
+SMOOTH = 100.0  # tolerances: slope of the Lagrangian that is none, in units of the values' spread over the box
 
 
 @dataclass(frozen=True)
@@ -58,6 +62,7 @@ class Minimum(Result):
     active : paths of parameters at an end of their bounds, and names of limits that are active.
     converged : False where `most` evaluations were too few.
     tried : all points, in the order of their evaluation. number : that of the minimum among them.
+    gradients : how many exact ones the search used; 0 where it had none.
     """
 
     at: dict[str, float]
@@ -68,6 +73,7 @@ class Minimum(Result):
     converged: bool
     tried: Variation
     number: int
+    gradients: int = 0
 
     @property
     def evaluations(self) -> int:
@@ -84,8 +90,12 @@ class Minimum(Result):
         value = self.value if np.isnan(self.standard_error) else repr(Estimate(self.value, self.standard_error, 2))
         ends = [(path, x, "at its bound" if path in self.active else "") for path, x in self.at.items()]
         limits = [(one.name, one.value, f"at most {one.bound:g}{', active' * one.active}") for one in self.limits]
+        used = f", {counted(self.gradients, 'gradient')}" if self.gradients else ""
         done = "converged" if self.converged else "NOT CONVERGED: allow more evaluations"
-        return [(("", "least", ""), [(name, value, ""), *ends, *limits]), f"{self.evaluations} evaluations, {done}"]
+        return [
+            (("", "least", ""), [(name, value, ""), *ends, *limits]),
+            f"{self.evaluations} evaluations{used}, {done}",
+        ]
 
     def table(self) -> list[dict[str, Any]]:
         """All points tried, one a row."""
@@ -110,6 +120,7 @@ def minimise(
     seeds: Sequence[int] = (),
     tolerance: float = 1e-4,
     most: int = 200,
+    gradients: bool = False,
     start: Start | None = None,
     solver: Any = None,
     executor: Executor | None = None,
@@ -128,6 +139,10 @@ def minimise(
     seeds : of the noise, three or more, the same at every point: the minimum is that of these realisations.
     tolerance : of the parameters, relative to high - low, in (0, 0.1).
     most : evaluations allowed.
+    gradients : use exact ones: fewer evaluations, but a gradient costs some hundred times a short run. They are those
+        of `Run.sensitivity`, of a settled response of `Orbit.sensitivity`; amplitude, rms, peak_force, mean_force,
+        contact_time and energy have them, and quantities of your own with a method ``derivative(change)``, see
+        `fembeam.study.gradients`. Noise, functions that make scenes, and other methods than `Exponential` have none.
     executor : any `concurrent.futures.Executor`, for the first look over the box; the search is one after the other.
     checkpoint : file written whole after each point; what it holds is not computed again.
 
@@ -145,10 +160,14 @@ def minimise(
     The search is local: of several valleys it takes the one with the best of the first points. Where contacts begin or
     orbits change, quantities jump, and so may the minimum; look at `vary` over the same bounds.
 
+    A search by gradients ends where no slope is left that bounds and limits do not hold. Where it does not, as at a
+    kink, a graze or in chaos, it goes on without them.
+
     References
     ----------
     T.M. Ragonneau, Model-based derivative-free optimization methods and software, PhD thesis, Hong Kong Polytechnic
-    University (2022), chapters 5 to 7: COBYQA.
+    University (2022), chapters 5 to 7: COBYQA. D. Kraft, A software package for sequential quadratic programming,
+    DFVLR-FB 88-28 (1988): SLSQP.
 
     Examples
     --------
@@ -165,12 +184,15 @@ def minimise(
     require(is_whole(most) and most > looks, f"most must be above the {looks} first points", most, WHERE, "e.g. 200")
     plan = Plan(duration, dt, discard, tuple(seeds), start, solver)
     asked = [quantity, *(one for one, _ in limits)]
+    require(isinstance(gradients, (bool, np.bool_)), "gradients must be True or False", gradients, WHERE, "e.g. True")
     first = qmc.Halton(len(box), scramble=False).random(looks + 1)[1:]  # the sequence begins in a corner
     trial = Trial.of(scene, list(parameters), asked, plan, reduction).prepared(_within(box, first))
+    if gradients:
+        check_gradients(trial)
     kept = Checkpoint(checkpoint, {} if checkpoint is None else identity_of(trial))
     search = _Search(trial, box, np.array([bound for _, bound in limits]), kept)
     search.look(first, executor, WHERE if progress else None)
-    converged = search.descend(tolerance, most)
+    converged = search.descend(tolerance, most, gradients)
     return _found(search, tolerance, converged)
 
 
@@ -210,6 +232,8 @@ class _Search:
     kept: Checkpoint
     shares: list[Vector] = field(default_factory=list)
     values: list[Vector] = field(default_factory=list)  # (1 + c,) each
+    gradients: list[tuple[Vector, Vector]] = field(default_factory=list)  # shares, (1 + c, d)
+    pressing: Any = False  # (c,) limits that gradients tell to be active
 
     def look(self, shares: Vector, executor: Executor | None = None, progress: str | None = None) -> None:
         """Compute these points."""
@@ -247,8 +271,67 @@ class _Search:
         spread, size = np.ptp(values, axis=0), np.abs(values).max(axis=0)
         return np.where(spread > 0.0, spread, np.where(size > 0.0, size, 1.0))
 
-    def descend(self, tolerance: float, most: int) -> bool:
+    def gradient(self, x: Vector) -> Vector:
+        """(1 + c, d) exact derivatives by the shares."""
+        share = np.clip(x, 0.0, 1.0)
+        for known, value in self.gradients:
+            if np.array_equal(known, share):
+                return value
+        found = gradient(self.trial, _within(self.box, share[None])[0]) * (self.box[:, 1] - self.box[:, 0])
+        self.gradients.append((share, found))
+        return found
+
+    def descend(self, tolerance: float, most: int, gradients: bool) -> bool:
         """Search from the best point; whether it converged."""
+        if gradients:
+            try:
+                if self._by_gradients(tolerance, most):
+                    return True
+            except NoGradientError as error:
+                note("%s", error)
+        return self._by_models(tolerance, most)
+
+    def _by_gradients(self, tolerance: float, most: int) -> bool:
+        """SLSQP; whether it ends at a point where the Lagrangian is flat."""
+        size, sure, limited = self._sizes(), tolerance**2, list[Any]()
+        if len(self.bounds):
+            within = self.bounds / size[1:] - 2.0 * sure  # SLSQP keeps limits to its own accuracy only
+            limited.append({
+                "type": "ineq",
+                "fun": lambda x: within - self._counted(x, most)[1:] / size[1:],
+                "jac": lambda x: -self.gradient(x)[1:] / size[1:, None],
+            })  # fmt: skip
+        minimize(
+            lambda x: self._counted(x, most)[0] / size[0],
+            self.shares[self.best()],
+            jac=lambda x: self.gradient(x)[0] / size[0],
+            method="SLSQP",
+            bounds=Bounds(np.zeros(len(self.box)), np.ones(len(self.box))),
+            constraints=limited,
+            options={"ftol": sure, "maxiter": most},
+        )
+        return self._is_flat(tolerance, size)
+
+    def _counted(self, x: Vector, most: int) -> Vector:
+        """The values at shares x; NoGradientError beyond `most` evaluations, at which the search ends."""
+        if len(self.values) >= most:
+            raise NoGradientError(f"{most} evaluations were too few")
+        return self.value(x)
+
+    def _is_flat(self, tolerance: float, size: Vector) -> bool:
+        """Whether no way leads down from the best point: multipliers, none negative, leave no slope."""
+        best = self.best()
+        x, values = self.shares[best], self.values[best]
+        slopes = self.gradient(x) / size[:, None]
+        near = (self.bounds - values[1:]) / size[1:] <= NEAR * tolerance * np.abs(slopes[1:]).max(axis=1, initial=0.0)
+        unit = np.eye(len(x))
+        held = [*slopes[1:][near], *(-unit[x <= NEAR * tolerance]), *unit[1.0 - x <= NEAR * tolerance]]
+        self.pressing = near
+        left = nnls(np.array(held).T, -slopes[0])[1] if held else float(np.linalg.norm(slopes[0]))
+        return bool(np.all(values[1:] <= self.bounds)) and left <= SMOOTH * tolerance
+
+    def _by_models(self, tolerance: float, most: int) -> bool:
+        """COBYQA; whether it converged."""
         size, d, allowed = self._sizes(), len(self.box), list[NonlinearConstraint]()
         if len(self.bounds):
             limits = self.bounds / size[1:]
@@ -261,8 +344,9 @@ class _Search:
             method="COBYQA",
             bounds=Bounds(np.zeros(d), np.ones(d)),
             constraints=allowed,
-            options={**radii, "maxfev": most - len(self.values)},
+            options={**radii, "maxfev": max(most - len(self.values), 1)},
         )
+        self.pressing = np.zeros(len(self.bounds), dtype=bool)
         return bool(found.success)
 
 
@@ -276,11 +360,11 @@ def _found(search: _Search, tolerance: float, converged: bool) -> Minimum:
         where = search.trial.told(tried.points[best])
         raise RuntimeError(f"no point keeps the constraints; the nearest is {where} with {told}")
     around = np.abs(shares - shares[best]).max(axis=1) <= NEAR * tolerance
-    pressing = np.atleast_1d((values[around, 1:] > search.bounds).any(axis=0))
+    pressing = np.atleast_1d((values[around, 1:] > search.bounds).any(axis=0) | search.pressing)
     limits = tuple(Limit(*one, bool(near)) for one, near in zip(limited, pressing, strict=True))
     ends = np.minimum(shares[best], 1.0 - shares[best]) <= NEAR * tolerance
     active = [name for name, end in zip(tried.names, ends, strict=True) if end]
     active += [one.name for one in limits if one.active]
     at = dict(zip(tried.names, tried.points[best].tolist(), strict=True))
     value, error = float(tried.values[best, 0]), float(tried.standard_error[best, 0])
-    return Minimum(at, value, error, limits, tuple(active), converged, tried, best)
+    return Minimum(at, value, error, limits, tuple(active), converged, tried, best, len(search.gradients))

@@ -10,15 +10,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from itertools import pairwise
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fembeam.model import Run, extremes_of, places
+from fembeam.model.sensitivity import of_top
 from fembeam.scene import Place
 from fembeam.statistics import psd
 from fembeam.support import require
+
+if TYPE_CHECKING:
+    from fembeam.study.gradients import Change
 
 Vector = NDArray[np.float64]
 Quantity = Callable[[Run], Any]
@@ -37,6 +41,10 @@ class OfSignal:
     def signal(self, run: Run) -> tuple[Vector, Vector]:
         """The signal and its rate."""
         return signal(run, self.stop, self.z)
+
+    def change(self, change: Change) -> tuple[Vector, Vector]:
+        """Derivatives of the signal and of its rate."""
+        return change.signal(self.stop, self.z)
 
 
 @dataclass(frozen=True)
@@ -59,6 +67,11 @@ class Amplitude(OfSignal):
         lowest, highest = extremes_of(run.t, *self.signal(run))
         return (highest - lowest) / 2
 
+    def derivative(self, change: Change) -> float:
+        """By a parameter."""
+        (u, v), both = self.signal(change.run), self.change(change)
+        return (of_top(change.run.t, u, v, *both) - of_top(change.run.t, -u, -v, *both)) / 2
+
 
 class Rms(OfSignal):
     """Root mean square of δ (or u at `z`) about its mean, m; over the samples, so that their times matter."""
@@ -66,6 +79,12 @@ class Rms(OfSignal):
     def __call__(self, run: Run) -> float:
         """Value of a run."""
         return float(np.std(self.signal(run)[0]))
+
+    def derivative(self, change: Change) -> float:
+        """By a parameter, at samples whose times do not change."""
+        u = self.signal(change.run)[0]
+        u = u - u.mean()
+        return change.mean(u**2, 2.0 * u * self.change(change)[0]) / (2.0 * float(np.std(u)))
 
 
 class PeakForce(OfContacts):
@@ -75,6 +94,12 @@ class PeakForce(OfContacts):
         """Value of a run."""
         return float(run.contacts.peak_force[self.mine(run)].max(initial=0.0))
 
+    def derivative(self, change: Change) -> float:
+        """By a parameter: that of the contact with the largest force; 0 without contact."""
+        mine = self.mine(change.run)
+        forces, changes = change.run.contacts.peak_force[mine], change.of_contacts("peak_force")[mine]
+        return float(changes[np.argmax(forces)]) if len(forces) else 0.0
+
 
 class MeanForce(OfContacts):
     """Mean of the peak forces of one stop's contacts, N; NaN without contact. Random response: far less scatter."""
@@ -82,6 +107,10 @@ class MeanForce(OfContacts):
     def __call__(self, run: Run) -> float:
         """Value of a run."""
         return _mean(run.contacts.peak_force[self.mine(run)])
+
+    def derivative(self, change: Change) -> float:
+        """By a parameter, the number of contacts being the same."""
+        return _mean(change.of_contacts("peak_force")[self.mine(change.run)])
 
 
 class ContactTime(OfContacts):
@@ -92,6 +121,11 @@ class ContactTime(OfContacts):
         log = run.contacts
         durations = (log.t_out - log.t_in)[self.mine(run)]
         return _mean(durations[np.isfinite(durations)])
+
+    def derivative(self, change: Change) -> float:
+        """By a parameter, the number of contacts being the same."""
+        changes = (change.of_contacts("exits") - change.of_contacts("entries"))[self.mine(change.run)]
+        return _mean(changes[np.isfinite(changes)])
 
 
 class ImpactRate(OfContacts):
@@ -154,6 +188,15 @@ class MeanEnergy:
         """Value of a run."""
         assert run.model is not None
         return float(np.mean(np.sum(run.q_dot**2 + (run.q * run.model.omega) ** 2, axis=1)) / 2)
+
+    def derivative(self, change: Change) -> float:
+        """By a parameter."""
+        run = change.run
+        assert run.model is not None
+        omega = run.model.omega
+        energy = np.sum(run.q_dot**2 + (run.q * omega) ** 2, axis=1) / 2
+        potential = run.q * omega * (omega * change.q + run.q * change.omega)
+        return change.mean(energy, np.sum(run.q_dot * change.q_dot + potential, axis=1))
 
 
 @dataclass(frozen=True)
@@ -228,9 +271,14 @@ def signal(run: Run, stop: int | str = 0, z: Place | None = None) -> tuple[Vecto
     require(len(run.t) > 1, "the run must have samples", len(run.t), "quantity", "give dt")
     if z is None and len(run.stops):
         return run.indentation(stop), run.indentation_rate(stop)
-    last = getattr(run.shapes, "nodes", None)
-    place = z if z is not None else next(iter(places(run.shapes).values())) if last is None else float(last[-1])
+    place = place_of(run, z)
     return run.displacement(place), run.velocity(place)
+
+
+def place_of(run: Run, z: Place | None) -> Any:
+    """The place itself, or the tip."""
+    last = getattr(run.shapes, "nodes", None)
+    return z if z is not None else next(iter(places(run.shapes).values())) if last is None else float(last[-1])
 
 
 def _mean(values: Vector) -> float:

@@ -39,6 +39,7 @@ SHEETS = (
     "den_hartog",
     "stick_slip",
     "moon_shaw",
+    "jeffcott_rub",
     "shock_spectrum",
     "spectral_noise",
     "white_noise",

@@ -1,0 +1,108 @@
+"""Figures of a resonance: its peak over a second parameter, its frequency and damping over amplitude."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fembeam.plot.figure import heading, sheet
+from fembeam.plot.style import BLUE, RED, Vector, displacement_name, styled
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from fembeam.study import Backbone, Peak
+
+FINE = 24  # points between two values
+WIDE = 20.0  # ratio of the last value to the first, from which on the axis is logarithmic
+
+
+@styled
+def peak_curve(found: Peak, axes: Sequence[Axes] | None = None) -> Figure:
+    """Height of the peak over the second parameter, and where it lies; the least marked, unstable peaks hollow.
+
+    `axes` to draw into are two; None makes a figure.
+
+    Examples
+    --------
+    >>> import fembeam as fb
+    >>> scene = fb.Scene(fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01)), [fb.Clamped(0.0)],
+    ...                  forces=[fb.PointForce(0.5, fb.Harmonic(1.0, 200.0))], damping=fb.ModalDamping(0.05))
+    >>> found = fb.study.peak(scene.reduce(modes=1), "omega", "zeta[0]", [0.05, 0.1], (100.0, 300.0))
+    >>> peak_curve(found).axes[1].get_xlabel()
+    'damping ratio ζ'
+    """
+    figure, (upper, lower) = sheet(2, 1, (6.4, 4.8), axes, sharex=True, height_ratios=(3, 2))
+    tops = sorted([*found.tops, *([found.least] if found.least else [])], key=lambda one: one.value)
+    p, at = np.array([one.value for one in tops]), np.array([one.at for one in tops])
+    height = 1e3 * np.array([one.amplitude for one in tops])
+    stable = np.array([one.stable for one in tops])
+    upper.plot(*_between(p, height, 1e3 * np.array([one.slope for one in tops])), "-", color=BLUE)
+    lower.plot(p, at, "-", color=BLUE)
+    _dots(upper, p, height, stable)
+    _dots(lower, p, at, stable)
+    if found.least is not None:
+        label = f"least: {1e3 * found.least.amplitude:.4g} mm at {found.least.value:.4g}"
+        upper.plot(found.least.value, 1e3 * found.least.amplitude, "*", color=RED, markersize=11, label=label)
+        lower.plot(found.least.value, found.least.at, "*", color=RED, markersize=11)
+    if p[0] > 0.0 and p[-1] > WIDE * p[0]:
+        lower.set_xscale("log")
+    upper.set_ylabel(f"amplitude of {displacement_name(found.z)} / mm")
+    lower.set(xlabel=found.titles[0], ylabel=found.titles[1])
+    if found.least is not None or not stable.all():
+        upper.legend()
+    heading([upper, lower], "Peak of the response", axes is None)
+    return figure
+
+
+@styled
+def backbone(found: Backbone, axes: Sequence[Axes] | None = None) -> Figure:
+    """Frequency and damping of a resonance over the amplitude, unstable orbits hollow.
+
+    `axes` to draw into are two; None makes a figure.
+
+    Examples
+    --------
+    >>> import fembeam as fb
+    >>> scene = fb.Scene(fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01)), [fb.Clamped(0.0)],
+    ...                  forces=[fb.PointForce(0.5, fb.Harmonic(1.0, 200.0))], damping=fb.ModalDamping(0.05))
+    >>> backbone(fb.study.backbone(scene.reduce(modes=1), [0.1, 1.0], (100.0, 300.0))).axes[0].get_ylabel()
+    'ω / rad s⁻¹'
+    """
+    figure, (upper, lower) = sheet(2, 1, (6.4, 4.8), axes, sharex=True)
+    x, stable = 1e3 * found.amplitude, found.stable
+    for axis, y in ((upper, found.omega), (lower, found.zeta)):
+        axis.plot(x, y, "-", color=BLUE)
+        _dots(axis, x, y, stable)
+    if x.max() > WIDE * x.min():
+        lower.set_xscale("log")
+    upper.set_ylabel("ω / rad s⁻¹")
+    lower.set(xlabel=f"amplitude of {displacement_name(found.z)} / mm", ylabel="equivalent damping ratio ζ")
+    lower.set_ylim(bottom=0.0)
+    if not stable.all():
+        upper.legend()
+    heading([upper, lower], "Backbone by phase resonance", axes is None)
+    return figure
+
+
+def _dots(axis: Axes, x: Vector, y: Vector, stable: NDArray[np.bool_]) -> None:
+    """Dots, hollow where unstable."""
+    axis.plot(x[stable], y[stable], "o", color=BLUE, markersize=3)
+    if not stable.all():
+        axis.plot(x[~stable], y[~stable], "o", color=BLUE, markersize=4, markerfacecolor="white", label="unstable")
+
+
+def _between(x: Vector, y: Vector, slope: Vector) -> tuple[Vector, Vector]:
+    """A curve through values with their slopes; straight lines if one has none."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    if not np.isfinite(slope).all():
+        return x, y
+    fine = np.unique(np.concatenate([np.linspace(a, b, FINE) for a, b in pairwise(x)]))
+    return fine, CubicHermiteSpline(x, y, slope)(fine)
