@@ -50,6 +50,7 @@ def state(model: Model, displacement: Field | Sequence[Field], velocity: Field |
     start, n = rest(model), len(model.omega)
     for name, field, part in (("displacement", displacement, slice(0, n)), ("velocity", velocity, slice(n, 2 * n))):
         full = _nodal(model, field)
+        start[part][_given(model, field)] = 0.0
         start[part] += model.basis.project(model.matrices.M @ full)
         lost = _missed(model, full)
         if lost > MISSED:
@@ -90,6 +91,16 @@ def _nodal(model: Model, field: Field | Sequence[Field]) -> Vector:
             "give None for a beam at rest")  # fmt: skip
     parts = [_on_nodes(beam, one) for beam, one in zip(beams, fields, strict=True)]
     return np.concatenate([*parts, np.zeros(len(model.matrices.impactors))])
+
+
+def _given(model: Model, field: Field | Sequence[Field]) -> NDArray[np.bool_]:
+    """Coordinates (n,) of the beams whose field is given: it is all of u, with what follows supports that move."""
+    beams, fields = model.matrices.beams, list(field) if isinstance(field, Sequence) else [field]
+    found, done = np.zeros(len(model.omega), dtype=bool), 0
+    for beam, one, count in zip(beams, [*fields, *[None] * len(beams)], model.counts, strict=False):
+        found[done : done + sum(count)] = one is not None and not beam.named
+        done += sum(count)
+    return found
 
 
 def _on_nodes(beam: Matrices, field: Field) -> Vector:

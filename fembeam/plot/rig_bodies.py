@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from fembeam.plot.figure import heading
 from fembeam.plot.rig_symbols import BLACK, COLOURS, circle
-from fembeam.plot.rig_words import WIDE, gap_words, length, signal_words
+from fembeam.plot.rig_words import WIDE, gap_words, length, motion_words, signal_words
 from fembeam.plot.style import BLUE, GREEN
-from fembeam.scene import AnnularStop, Pinned, support_motion
+from fembeam.scene import AnnularStop, Pinned
 from fembeam.support import require
 
 if TYPE_CHECKING:
@@ -55,15 +55,6 @@ def rig_of_bodies(scene: Scene, axes: Axes | None) -> Figure:
     heading(drawn, "Rig, bodies to scale", axes is None)
     whole: Figure = figure
     return whole
-
-
-def _motions(support: Any) -> list[str]:
-    """How a support moves, in words."""
-    units = {True: "rad", False: "m"}
-    return [
-        f"{dof}: {signal_words(signal, units[dof.startswith('r')])}".replace("\n", " ")
-        for dof, signal in support_motion(support).items()
-    ]
 
 
 @dataclass(frozen=True)
@@ -140,7 +131,7 @@ class _Panel:
         scene = self.scene
         for support in scene.supports:
             self._mark(axis, support, "^" if support.dofs == Pinned.dofs else "s", BLACK)
-            yield support, ", ".join([self._label(support), *_motions(support)])
+            yield support, ", ".join([self._label(support), *motion_words(support)])
         for mass in scene.masses:
             self._mark(axis, mass, "o", COLOURS["mass"])
             yield mass, f"{self._label(mass)}, {mass.mass:.4g} kg"

@@ -155,9 +155,10 @@ def check_plain(feature: Any, name: str, where: str) -> None:
         require(name in ("stops", "elements"), "direction is for bodies that are not a Beam", direction, where,
                 "leave it out: u is along y")  # fmt: skip
     if name == "supports":
-        motion = getattr(feature, "motion", None)
-        require(motion is None, "motion of a support needs a Frame or Structure", motion, where,
-                "make the Beam a Frame.straight, or use a stiff Spring(..., foot=signal)")  # fmt: skip
+        astray = [dof for dof in support_motion(feature) if dof not in ("y", "rx")]
+        require(
+            not astray, "motion on a Beam must be of y, which is u, or rx, -u_z", astray, where, "leave the others out"
+        )
         beyond = [dof for dof in feature.dofs if dof not in ("y", "rx")]
         whole = feature.dofs in ((), COMPONENTS, COMPONENTS[:3])
         require(whole or not beyond, "a Beam bends in one plane: it has y and rx", beyond, where, "leave them out")

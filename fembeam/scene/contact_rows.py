@@ -13,10 +13,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from fembeam.excitation import Harmonic
 from fembeam.scene.annular_stop import AnnularStop
+from fembeam.scene.body_assembly import BodyMatrices
 from fembeam.scene.element import force_both_ways
 from fembeam.scene.local_coordinate import LocalCoordinate
 from fembeam.scene.signals import support_motion
@@ -26,6 +29,8 @@ if TYPE_CHECKING:
     from fembeam.scene.part import ScenePart
     from fembeam.scene.scene import Scene
 
+
+Vector = NDArray[np.float64]
 
 LINE = (0.0, 0.0, 0.0)  # no circle
 ON = ("frame", "body", "impactor")  # what a contact pushes from
@@ -167,10 +172,14 @@ def support_loads(scene: Scene, matrices: Matrices) -> list[tuple[sparse.csr_mat
     return rows
 
 
-def carried_by(scene: Scene, body: int) -> tuple[int, int]:
-    """Which of the dofs of supports that move, counted over all bodies, are of one: first and last + 1."""
+def carried_on(scene: Scene, beam: Matrices, body: int) -> Vector:
+    """(N_all, k): what each of the k dofs of supports that move, of all bodies, carries on the dofs of one."""
     counts = [sum(len(support_motion(s)) for s in part.supports) for part in (scene, *scene.bodies)]
-    return sum(counts[:body]), sum(counts[: body + 1])
+    first, size = sum(counts[:body]), beam.spread.shape[0] if isinstance(beam, BodyMatrices) else beam.dofs.size
+    found = np.zeros((size, sum(counts)))
+    if beam.carried is not None:
+        found[:, first : first + counts[body]] = beam.carried.toarray()
+    return found
 
 
 def weight(scene: Scene) -> dict[str, Harmonic]:
