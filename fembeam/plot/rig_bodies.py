@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 REACH = 0.12  # of the body's size, length of springs and arrows
+BESIDE = 0.5  # of it, where what strikes stands
 RING = 0.4  # of that, radius of a circular clearance
 FREE = 0.03  # the same, between a place and the arrow of a stop
 ZIGZAG = np.array([0, 0, 1, -1, 1, -1, 1, 0, 0]) * 0.12  # of the length of a spring
@@ -147,8 +148,10 @@ class _Panel:
             self._arrow(axis, force, self._way(force), COLOURS["load"])
             yield force, self._label(force)
         for impactor in scene.impactors:
-            self._mark(axis, impactor, "o", COLOURS["impactor"])
-            yield impactor, self._label(impactor)
+            for push in impactor.pushes:
+                self._mark(axis, impactor, "o", COLOURS["impactor"], -push * np.array(impactor.along))
+            facts = f"{impactor.mass:.4g} kg, {gap_words(impactor.gap, False)}"
+            yield impactor, f"{self._label(impactor)}, {facts}"
 
     def _acting(self, axis: Any, one: Any) -> str:
         """A stop as an arrow the way its gap closes, an element as a spring; a line to the second place."""
@@ -178,9 +181,10 @@ class _Panel:
         """A line through points (k, 3)."""
         axis.plot(*points.T[: 3 if self.space else 2], color=colour, linewidth=width, linestyle=style)
 
-    def _mark(self, axis: Any, part: Any, marker: str, colour: str) -> None:
-        """A part as a point."""
-        at = self.places[repr(part.z)][: 3 if self.space else 2, None]
+    def _mark(self, axis: Any, part: Any, marker: str, colour: str, beside: Vector | None = None) -> None:
+        """A part as a point, at its place or beside it along a direction."""
+        whole = self.places[repr(part.z)] + (0.0 if beside is None else BESIDE * REACH * self.size * beside[:3])
+        at = whole[: 3 if self.space else 2, None]
         axis.plot(*at, marker, color=colour, markersize=8, gid=part.label)
 
     def _shape(self, axis: Any, part: Any, way: Vector, shape: Vector, start: float, colour: str) -> None:

@@ -37,14 +37,14 @@ from fembeam.beams import (
     spread,
     wavenumber,
 )
-from fembeam.scene.local_coordinate import LocalCoordinate
 from fembeam.scene.places import place_words, told
 from fembeam.scene.signals import support_motion
-from fembeam.structures import Six, require_components
+from fembeam.structures import COMPONENTS, Six, require_components
 from fembeam.support import is_whole, require, require_finite
 
 if TYPE_CHECKING:
     from fembeam.scene.impactor import Impactor
+    from fembeam.scene.local_coordinate import LocalCoordinate
     from fembeam.scene.scene import Scene
 
 Vector = NDArray[np.float64]
@@ -245,9 +245,8 @@ def _check_beside(scene: Scene, beams: tuple[Matrices, ...]) -> None:
     for body, part in enumerate((scene, *scene.bodies)) if any(one.carried is not None for one in beams) else ():
         for name in ("stops", "elements", "impactors"):
             for index, one in enumerate(getattr(part, name)):
-                places = getattr(one, "coordinates", None) or (LocalCoordinate(one.z),)
-                ends = [(i, end) for i in range(len(beams)) for place in places for end in place.on_body(body, i)]
-                met = [end for i, end in ends if np.any(np.abs(beams[i].carried_row(end)) > UNIT)]
+                places = [(i, end) for i in range(len(beams)) for at in one.coordinates for end in at.on_body(body, i)]
+                met = [end for i, end in places if np.any(np.abs(beams[i].carried_row(end)) > UNIT)]
                 where = f"bodies[{body - 1}].{name}[{index}]" if body else f"{name}[{index}]"
                 require(not met, "what acts must not sit where a support moves", [place_words(end.z) for end in met],
                         f"{where}{one.quoted} of Scene", "put it at a place beside the support")  # fmt: skip
@@ -266,7 +265,7 @@ def _joined(beams: tuple[Matrices, ...], impactors: tuple[Impactor, ...]) -> Mat
     roots = [beam.root for beam in beams if beam.root is not None]
     turning = [sparse.csr_matrix(beam.M.shape) if beam.gyroscopic is None else beam.gyroscopic for beam in beams]
     spins = any(beam.gyroscopic is not None for beam in beams)
-    along = _base_loads(beams, mass)
+    along = _base_loads(beams, impactors)
     named: dict[str, Any] = {"along": along} if own.named else {}
     return replace(
         own,
@@ -283,13 +282,14 @@ def _joined(beams: tuple[Matrices, ...], impactors: tuple[Impactor, ...]) -> Mat
     )
 
 
-def _base_loads(beams: tuple[Matrices, ...], mass: Vector) -> dict[str, Vector]:
-    """The load of the frame's motion on all bodies; impactors move along y."""
+def _base_loads(beams: tuple[Matrices, ...], impactors: tuple[Impactor, ...]) -> dict[str, Vector]:
+    """The load of the frame's motion on all bodies; on impactors its part along their directions."""
     known = list(dict.fromkeys(direction for beam in beams for direction in beam.base_loads))
     found = {}
     for direction in known:
         parts = [beam.base_loads.get(direction, np.zeros(beam.M.shape[0])) for beam in beams]
-        found[direction] = np.concatenate([*parts, mass if direction == "y" else 0.0 * mass])
+        axis = COMPONENTS.index(direction)
+        found[direction] = np.concatenate([*parts, [one.mass * one.along[axis] for one in impactors]])
     return found
 
 

@@ -15,7 +15,7 @@ from fembeam.support import is_finite, require
 if TYPE_CHECKING:
     from fembeam.scene.scene import Scene
 
-DIRECTED = ("springs", "dashpots", "stops", "elements", "forces")
+DIRECTED = ("springs", "dashpots", "stops", "elements", "forces", "impactors")
 
 
 def is_body(value: Any) -> bool:
@@ -43,8 +43,6 @@ def check_feature(body: Any, feature: Any, name: str, where: str) -> None:
         write = f"add direction={'rz' if turn else 'x'!r} or so; {what} has {', '.join(have)}"
         require(feature.direction is not None, "a place by name needs a direction", None, where, write)
         require_components(direction_of(feature.direction, where), have, what, where)
-    require(name != "impactors", "impactors must strike a Beam", feature, where,
-            "make the mass a body of its own: Scene(Structure(...)) in bodies")  # fmt: skip
     if isinstance(feature, Disk):
         check_shaft(body, feature, where)
     if name == "masses":

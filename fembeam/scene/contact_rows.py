@@ -109,12 +109,13 @@ def _contact_rows(scene: Scene, matrices: Matrices) -> Iterator[ContactRow]:
             kind = place.rotation, one.always, *name, one.direction
             yield ContactRow(row, one.law, one.gap, one.push, body, one.z, on, *kind)
         for impactor in part.impactors:
-            row = matrices.interpolation(impactor.z, body=body) - matrices.impactor_row(count)
+            row = impactor.coordinates[0].row(matrices, body) - matrices.impactor_row(count)
             label, given = _name(impactor, body)
             for push in impactor.pushes:
                 side = {1.0: ", below", -1.0: ", above"}[push] if len(impactor.pushes) > 1 else ""
                 facing = body, impactor.z, ("impactor", count)
-                yield ContactRow(push * row, impactor.law, impactor.gap, push, *facing, name=label + side, given=given)
+                said: Any = {"name": label + side, "given": given, "direction": impactor.direction}
+                yield ContactRow(push * row, impactor.law, impactor.gap, push, *facing, **said)
             count += 1
 
 
@@ -190,9 +191,7 @@ def weight(scene: Scene) -> dict[str, Harmonic]:
 def watched(scene: Scene, body: int) -> LocalCoordinate | None:
     """Where the modes of a beam shall be positive: at its first stop, element, impactor, or where another meets it."""
     part = (scene, *scene.bodies)[body]
-    places = [place for one in part.acting for place in one.coordinates] + [
-        LocalCoordinate(impactor.z) for impactor in part.impactors
-    ]
+    places = [place for one in (*part.acting, *part.impactors) for place in one.coordinates]
     places += _from_the_first(scene, body)
     return replace(places[0], to=None) if places else None
 
@@ -206,7 +205,7 @@ def loaded(scene: Scene, body: int) -> list[LocalCoordinate]:
     places += [LocalCoordinate(spring.z, direction=spring.along) for spring in feet]
     places += [LocalCoordinate(d.z, direction=d.along) for d in part.dashpots if d.damping]
     places += [LocalCoordinate(dashpot.z, 1) for dashpot in part.dashpots if dashpot.rotational]
-    places += [LocalCoordinate(impactor.z) for impactor in part.impactors]
+    places += [impactor.coordinates[0] for impactor in part.impactors]
     return places + _from_the_first(scene, body)
 
 
