@@ -5,6 +5,7 @@ import math
 import os
 import pickle
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -97,6 +98,83 @@ def test_processes_compile_one_after_the_other(package):
         time.sleep(2.0)
         end = first.communicate("\n")[0]
         assert float(second.communicate()[0]) > float(end)
+
+
+FORKED = """
+import os, signal, solvers.compiled.cache as c, solvers.compiled.decorators as d
+with d._ONE_PROCESS.alone():
+    child = os.fork()
+    if not child:
+        os.close(1), os.close(2), signal.alarm(20)
+        signal.pause()
+    {}
+c._PATIENCE = 3.0
+print(c.lock_folder(print) is not None)
+os.kill(child, signal.SIGKILL)
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no such processes")
+def test_a_forked_process_does_not_keep_the_lock(package):
+    """What is forked while code is compiled has the file open too: the lock goes back all the same, also by a death."""
+    assert ran(FORKED.format("pass"), package.parent)[0] == ["True"]
+    left = ran(FORKED.format("print(child, flush=True); os._exit(0)"), package.parent)[0]
+    look = "import solvers.compiled.cache as c; c._PATIENCE = 3.0; print(c.lock_folder(print) is not None)"
+    assert ran(look, package.parent)[0] == ["True"]
+    os.kill(int(left[0]), signal.SIGKILL)
+
+
+def test_waiting_for_the_lock_can_be_stopped(monkeypatch):
+    """Ctrl-C then leaves nothing behind by which this process would never give the lock back."""
+    one = decorators._OneProcess()
+
+    def interrupted(_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(decorators, "lock_folder", interrupted)
+    with pytest.raises(KeyboardInterrupt), one.alone():
+        pass
+    assert one._depth == 0
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no such locks")
+def test_patience_with_a_process_that_hangs_ends(monkeypatch, tmp_path):
+    """Nothing is kept from then on, which is said, and nobody waits again."""
+    monkeypatch.setattr(cache, "FOLDER", tmp_path)
+    held, told = cache.lock_folder(print), []
+    monkeypatch.setattr(cache, "_PATIENCE", 0.1)
+    monkeypatch.setattr(cache, "_LOOKS", 2)
+    with pytest.warns(UserWarning, match=r"has kept .*lock for 0.1 s: machine code is compiled and not kept"):
+        assert cache.lock_folder(lambda: told.append(1)) is None
+    assert told == [1]
+    assert cache.FOLDER is None
+    assert not cache.is_current(cache.store)
+    cache.unlock_folder(held)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no such locks")
+def test_processes_killed_while_they_compile(package):
+    """Several begin with nothing kept, some are killed: the others end, with the right code, and so does who comes."""
+    entry = (
+        "from numba import float64\nfrom solvers.compiled.decorators import entry\nfrom solvers.inner import times\n"
+    )
+    for name in ("one", "two", "three"):
+        (package / f"{name}.py").write_text(entry + f"@entry(float64(float64))\ndef {name}(x): return times(x) + 1.0\n")
+    code = "import solvers.compiled.decorators\nprint(0, flush=True)\nimport solvers.one, solvers.two, solvers.three\n"
+    code += "print(solvers.one.one(1.0), solvers.two.two(2.0), solvers.three.three(3.0))"
+    environment = {**os.environ, "PYTHONPATH": str(package.parent), "NUMBA_CACHE_DIR": ""}
+    known = "{} {} {}\n".format(*(2.0 * x + 1.0 for x in (1.0, 2.0, 3.0)))
+    pipes: Any = {"stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL, "text": True}
+    each = [
+        subprocess.Popen([sys.executable, "-c", code], cwd=package.parent, env=environment, **pipes) for _ in range(4)
+    ]
+    for number, one in enumerate(each[:2]):
+        one.stdout.readline()
+        time.sleep(0.05 * number)
+        one.kill()
+        one.communicate()
+    assert [one.communicate(timeout=120)[0].splitlines()[-1] + "\n" for one in each[2:]] == 2 * [known]
+    assert " ".join(ran(code, package.parent)[0][1:]) + "\n" == known
 
 
 def test_a_lock_taken_before_the_import_does_not_keep_other_processes_waiting(monkeypatch, tmp_path):

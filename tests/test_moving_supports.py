@@ -175,7 +175,6 @@ def test_drawn():
     (lambda: fb.Clamped("A", motion=WAVE), "motion must name its dofs"),
     (lambda: fb.Clamped("A", motion={"x": np.sin}), "signals that know their derivatives"),
     (lambda: fb.Scene(portal(), [fb.Clamped("A", motion={"z": WAVE})]), r"has x, y, rz, got .'z'. in supports.0."),
-    (lambda: fb.Scene(fb.Beam(1.0, SPAN), [fb.Clamped(0.0, motion={"y": WAVE})]), "needs a Frame or Structure"),
     (lambda: feet(WAVE, WAVE, stops=[fb.Stop("D", Hertz(1e8), direction="x")]), r"moves along x, got 'D' in stops"),
 ])  # fmt: skip
 def test_refused(make, says):

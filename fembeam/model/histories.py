@@ -87,8 +87,8 @@ class Histories:
         """All components (k, c) of a place, m and rad: those of `shapes.components`; of a beam u and u_z."""
         shapes = self._beam(body)
         if isinstance(shapes, PlacedShapes):
-            return self.with_supports(self.q, shapes.moving) @ shapes.motion_with_supports(place).T
-        return self._at_samples(self.q) @ np.array([shapes(place), shapes(place, 1)]).T
+            return self._q_of(body) @ shapes.motion_with_supports(place).T
+        return self._q_of(body) @ np.array([shapes.rows_with_supports(place, i) for i in (0, 1)]).T
 
     def _motion(self, rates: Vector, z: Any, direction: Any, body: int, absolute: bool, order: int) -> Vector:
         """A derivative of u at z (k,) or (k, j), with that of the frame's motion if absolute."""
@@ -99,13 +99,12 @@ class Histories:
         shapes, at = self._beam(body), z
         if isinstance(shapes, PlacedShapes):
             at = directed(z, direction)
+            rows = shapes.rows_with_supports(at if isinstance(at, list) else [at])
+            rows = rows if isinstance(at, list) else rows[0]
         else:
             require(direction in (None, "y"), "a Beam moves along y", direction, "Run", "leave the direction out")
-        if isinstance(shapes, PlacedShapes):
-            rows = shapes.rows_with_supports(at if isinstance(at, list) else [at])
-            values = self.with_supports(rates, shapes.moving, order) @ (rows if isinstance(at, list) else rows[0]).T
-        else:
-            values = self._at_samples(rates) @ shapes(at).T
+            rows = shapes.rows_with_supports(at)
+        values = self.with_supports(rates, shapes.moving, order) @ rows.T
         if not absolute:
             return values
         if not isinstance(shapes, PlacedShapes):
@@ -173,11 +172,11 @@ class Histories:
             at = [given] if isinstance(given, tuple) else list(given)
             return extremes(self.t, self._q_of(body), *rows_of(self, quantity, at, body))
         places = shapes.nodes if z is None else np.atleast_1d(np.asarray(z, dtype=float))
-        return extremes(self.t, self._at_samples(self.q), *rows_of(self, quantity, places, body))
+        return extremes(self.t, self._q_of(body), *rows_of(self, quantity, places, body))
 
     def _q_of(self, body: int) -> Vector:
-        """Coordinates at the samples, with the support dofs that move where a body has places by name."""
-        return self.with_supports(self.q, getattr(self._beam(body), "moving", 0))
+        """Coordinates at the samples, with the support dofs that move."""
+        return self.with_supports(self.q, self._beam(body).moving)
 
     def _sections(self, body: int) -> list[Any]:
         """All nodes of the mesh of a frame, as (member, distance)."""
@@ -202,7 +201,7 @@ class Histories:
             return along if isinstance(z, list) else along[:, 0]
         places = np.asarray(z, dtype=float)
         shapes, _, offset = rows_of(self, quantity, np.atleast_1d(places), body)
-        values = self._at_samples(self.q) @ shapes.T + offset
+        values = self._q_of(body) @ shapes.T + offset
         return values if places.ndim else values[:, 0]
 
     def impactor_displacement(self, impactor: int = 0) -> Vector:

@@ -15,7 +15,7 @@ from scipy.sparse import linalg as sparse_linalg
 
 import reduction
 from contacts.path import borders
-from fembeam.scene import BodyMatrices, support_loads, tangent
+from fembeam.scene import BodyMatrices, support_loads, tangent, told
 from fembeam.support import require, require_finite
 
 if TYPE_CHECKING:
@@ -50,6 +50,7 @@ def state(model: Model, displacement: Field | Sequence[Field], velocity: Field |
     start, n = rest(model), len(model.omega)
     for name, field, part in (("displacement", displacement, slice(0, n)), ("velocity", velocity, slice(n, 2 * n))):
         full = _nodal(model, field)
+        start[part][_given(model, field)] = 0.0
         start[part] += model.basis.project(model.matrices.M @ full)
         lost = _missed(model, full)
         if lost > MISSED:
@@ -92,6 +93,16 @@ def _nodal(model: Model, field: Field | Sequence[Field]) -> Vector:
     return np.concatenate([*parts, np.zeros(len(model.matrices.impactors))])
 
 
+def _given(model: Model, field: Field | Sequence[Field]) -> NDArray[np.bool_]:
+    """Coordinates (n,) of the beams whose field is given: it is all of u, with what follows supports that move."""
+    beams, fields = model.matrices.beams, list(field) if isinstance(field, Sequence) else [field]
+    found, done = np.zeros(len(model.omega), dtype=bool), 0
+    for beam, one, count in zip(beams, [*fields, *[None] * len(beams)], model.counts, strict=False):
+        found[done : done + sum(count)] = one is not None and not beam.named
+        done += sum(count)
+    return found
+
+
 def _on_nodes(beam: Matrices, field: Field) -> Vector:
     """A field's values and slopes, those of a cubic spline through the nodes, on a beam's free dofs."""
     if field is None:
@@ -126,7 +137,8 @@ def _check_impactors(model: Model, q: Vector) -> None:
         if kind == "impactor" and model.matrices.impactors[number].stiffness == 0:
             delta = float(-direction @ q - contact.gap)
             scale = float(np.abs(direction) @ np.abs(q)) + contact.gap
-            require(delta <= 1e-9 * scale, f"impactor {number} (z = {contact.z} m) must start outside the beam: δ ≤ 0",
+            at = told(contact.z) + " m" * (contact.direction is None)
+            require(delta <= 1e-9 * scale, f"impactor {number} ({at}) must start outside the beam: δ ≤ 0",
                     delta, "Model.state", "widen its gap")  # fmt: skip
 
 

@@ -124,8 +124,8 @@ class Model(Printed, ModalEquations):
 
         Parameters
         ----------
-        displacement, velocity : functions of z (k,), relative to the frame; None is zero. A list gives one for each
-            beam. Impactors start in their places with their velocities.
+        displacement, velocity : functions of z (k,), relative to the frame; None is zero, or what follows supports
+            that move. A list gives one for each beam. Impactors start in their places with their velocities.
 
         Warns
         -----

@@ -137,20 +137,16 @@ def _motion_at(body: BodyMatrices, vectors: Vector, place: Any) -> Vector:
 
 
 def placed_shapes(
-    body: BodyMatrices, vectors: Vector, loaded: Sequence[LocalCoordinate], moving: tuple[int, int, int] = (0, 0, 0)
+    body: BodyMatrices, vectors: Vector, loaded: Sequence[LocalCoordinate], carried: Vector
 ) -> PlacedShapes:
-    """The shapes of a body from its part of the basis, (N, n); `moving` of all support dofs which are its own."""
+    """The shapes of a body from its part of the basis, (N, n), and what supports that move carry, (N_all, k)."""
     extra = [at.z for at in loaded] + [at.to[1] for at in loaded if at.to is not None and at.to[0] == 0]
     joined = list(getattr(body.beam, "edges", ()))
     drawn = [place for pair in joined for place in pair]
     names = list(dict.fromkeys([*_places(body), *(tuple(z) if isinstance(z, list) else z for z in extra), *drawn]))
     number = {name: i for i, name in enumerate(names)}
-    n, (count, first, last) = vectors.shape[1], moving
-    full = np.zeros((body.spread.shape[0], n + count))
-    full[:, :n] = body.spread @ vectors
-    if last > first:
-        full[:, n + first : n + last] = body.carried.toarray()
-    shape = (len(names), len(body.beam.components), n + count)
+    n, full = vectors.shape[1], np.hstack([body.spread @ vectors, carried])
+    shape = (len(names), len(body.beam.components), full.shape[1])
     values = np.asarray(body.assembled.rows_of(names) @ full).reshape(shape)
     at = [body.beam.position(place) for place in names]
     positions = np.array([3 * [np.nan] if x is None else x for x in at], dtype=float).reshape(-1, 3)

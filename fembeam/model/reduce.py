@@ -14,7 +14,7 @@ import reduction
 from fembeam.model.model import Model
 from fembeam.model.placed_shapes import PlacedShapes, placed_shapes
 from fembeam.model.shapes import Shapes
-from fembeam.scene import MOST_DENSE, BodyMatrices, LocalCoordinate, Matrices, carried_by, loaded, watched
+from fembeam.scene import MOST_DENSE, BodyMatrices, LocalCoordinate, Matrices, carried_on, loaded, watched
 from fembeam.structures import COMPONENTS
 from fembeam.support import is_whole, require
 from solvers.problem import counted
@@ -159,12 +159,11 @@ def _shapes_of_each(scene: Scene, matrices: Matrices, basis: reduction.Basis) ->
         size = beam.M.shape[0]
         mine = basis.vectors[done : done + size]
         if isinstance(beam, BodyMatrices):
-            every = carried_by(scene, len(scene.bodies))[1]
-            shapes.append(placed_shapes(beam, mine, loaded(scene, number), (every, *carried_by(scene, number))))
+            shapes.append(placed_shapes(beam, mine, loaded(scene, number), carried_on(scene, beam, number)))
         else:
             values = np.zeros((beam.dofs.size, basis.count))
             values[beam.dofs.ravel() >= 0] = mine
-            shapes.append(Shapes(beam.nodes, values))
+            shapes.append(Shapes(beam.nodes, values, carried_on(scene, beam, number)))
         done += size
     return shapes
 

@@ -75,7 +75,7 @@ def _contents(run: Run) -> tuple[str, dict[str, Any]]:
         "units": UNITS | ({"circles": CIRCLES} if run.circles.any() else {}),
         "versions": versions(),
         "acting": run.acting,
-        "bodies": [shapes.words if isinstance(shapes, PlacedShapes) else None for shapes in (run.shapes, *run.others)],
+        "bodies": [shapes.words for shapes in (run.shapes, *run.others)],
     }
     if run.source is not None:
         about["scene_file"] = {"name": run.source.path.name, "text": run.source.text,
@@ -112,10 +112,11 @@ def _arrays_of(shapes: Any) -> tuple[Any, Any]:
 
 def _shapes_of(words: Any, nodes: Any, values: Any) -> Any:
     """The shapes that these are of."""
-    count = 2 if words is None else len(words["components"])
+    placed = words is not None and "components" in words
+    count = len(words["components"]) if placed else 2
     if len(values) != count * len(nodes):
         raise ValueError(f"shapes must have {count} rows for each of {len(nodes)} places, there are {len(values)}")
-    return Shapes(nodes, values) if words is None else PlacedShapes.of_words(words, values)
+    return PlacedShapes.of_words(words, values) if placed else Shapes.of_words(words, nodes, values)
 
 
 def _means(run: Run) -> Any:

@@ -166,11 +166,12 @@ def _fields(run: Run) -> Callable[[int], dict[str, Vector]]:
     known = all(np.isfinite(f.beam.profile(f.nodes).fibre).all() for f in run.readout.section_forces)
     rows = {name: _rows(run, name) for name in ("displacement", *SECTION_FIELDS[: None if known else -1])}
     moved, _ = rows.pop("displacement")
+    q, q_dot = (run.with_supports(rates, run.shapes.moving, order) for order, rates in enumerate((run.q, run.q_dot)))
 
     def at(sample: int) -> dict[str, Vector]:
-        vectors = {"displacement": moved @ run.q[sample], "velocity": moved @ run.q_dot[sample]}
+        vectors = {"displacement": moved @ q[sample], "velocity": moved @ q_dot[sample]}
         still = np.zeros(len(moved))
-        numbers = {name: shapes @ run.q[sample] + constant for name, (shapes, constant) in rows.items()}
+        numbers = {name: shapes @ q[sample] + constant for name, (shapes, constant) in rows.items()}
         return {name: np.column_stack([still, up, still]) for name, up in vectors.items()} | numbers
 
     return at
@@ -180,7 +181,8 @@ def _rows(run: Run, quantity: str) -> tuple[Vector, Vector]:
     """What turns q into a field at the points: shapes (p, n) and a constant part (p,); impactors have displacement."""
     parts = [rows_of(run, quantity, one.nodes, body) for body, one in enumerate((run.shapes, *run.others))]
     count = len(run.impactor_masses)
-    impactors = np.eye(run.q.shape[1])[run.q.shape[1] - count :] / np.sqrt(run.impactor_masses)[:, None]
+    n = run.q.shape[1]
+    impactors = np.eye(n, n + run.shapes.moving)[n - count :] / np.sqrt(run.impactor_masses)[:, None]
     last = impactors if quantity == "displacement" else np.zeros_like(impactors)
     return np.vstack([*(shapes for shapes, _, _ in parts), last]), np.concatenate(
         [*(constant for _, _, constant in parts), np.zeros(count)]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,13 +17,47 @@ Vector = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Shapes:
-    """Shape functions φ_i(z): values (2m, n) of (u, u_z) at the nodes (m,), the elements' cubics between."""
+    """Shape functions φ_i(z): values (2m, n) of (u, u_z) at the nodes (m,), the elements' cubics between.
+
+    `carried` (2m, k): what supports that move carry by themselves, per unit of each of their k dofs, of all beams.
+    """
 
     nodes: Vector
     values: Vector
+    carried: Vector = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
 
     def __repr__(self) -> str:
         return f"<{self.values.shape[1]} shapes over {self.nodes[0]:g} to {self.nodes[-1]:g} m>"
+
+    @property
+    def moving(self) -> int:
+        """Number k of the dofs of supports that move, of all bodies."""
+        return int(self.carried.shape[1])
+
+    @property
+    def words(self) -> dict[str, Any] | None:
+        """For JSON what supports that move carry; None where none does."""
+        found = [[int(dof), int(i), float(self.carried[dof, i])] for dof, i in np.argwhere(self.carried)]
+        return {"moving": self.moving, "carried": found} if self.moving else None
+
+    @classmethod
+    def of_words(cls, words: Mapping[str, Any] | None, nodes: Vector, values: Vector) -> Shapes:
+        """The same of a file."""
+        if words is None:
+            return cls(nodes, values)
+        carried = np.zeros((2 * len(nodes), int(words["moving"])))
+        for dof, i, value in words["carried"]:
+            carried[dof, i] = value
+        return cls(nodes, values, carried)
+
+    def rows_with_supports(self, z: ArrayLike, derivative: int = 0) -> Vector:
+        """φ(z) (…, n + k), with what supports that move carry."""
+        own = self(z, derivative)
+        if not self.moving:
+            return own
+        places = np.asarray(z, dtype=float)
+        carried = hermite_rows(self.nodes, places.ravel(), derivative) @ self.carried
+        return np.concatenate([own, carried.reshape(*places.shape, self.moving)], axis=-1)
 
     def __call__(self, z: ArrayLike, derivative: int = 0) -> Vector:
         """φ(z): (n,) at one z, (k, n) at z (k,); derivative 1 is the slope, 2 the curvature."""

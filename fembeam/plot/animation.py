@@ -200,7 +200,8 @@ class _Stage:
         lines = []
         for shapes, height in zip((self.run.shapes, *self.run.others), self.beams, strict=True):
             z = np.linspace(shapes.nodes[0], shapes.nodes[-1], POINTS)
-            lines.append((z, height + (self.run.q[self.samples] @ shapes(z).T)))
+            q = self.run.with_supports(self.run.q, shapes.moving)[self.samples]
+            lines.append((z, height + (q @ shapes.rows_with_supports(z).T)))
         return lines
 
     @styled

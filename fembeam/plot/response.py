@@ -231,9 +231,9 @@ def _between_samples(run: Run, z: Any, body: int, lo: float, hi: float) -> tuple
 
     first, last = np.searchsorted(run.t, [lo, hi])
     kept = slice(max(0, first - 1), last + 1)
-    t, shape = run.t[kept], (run.shapes, *run.others)[body](z)
+    t, u, rate = run.t[kept], run.displacement(z, body=body)[kept], run.velocity(z, body=body)[kept]
     fine = np.linspace(t[0], t[-1], 8 * (len(t) - 1) + 1)
-    return fine, CubicHermiteSpline(t, run.q[kept] @ shape, run.q_dot[kept] @ shape)(fine)
+    return fine, CubicHermiteSpline(t, u, rate)(fine)
 
 
 def _shade_contacts(axes: list[Axes], run: Run, stops: NDArray[np.int64], lo: float, hi: float) -> None:

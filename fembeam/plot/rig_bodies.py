@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from fembeam.plot.figure import heading
 from fembeam.plot.rig_symbols import BLACK, COLOURS, circle
-from fembeam.plot.rig_words import WIDE, gap_words, length, signal_words
+from fembeam.plot.rig_words import WIDE, gap_words, length, motion_words, signal_words
 from fembeam.plot.style import BLUE, GREEN
-from fembeam.scene import AnnularStop, Pinned, support_motion
+from fembeam.scene import AnnularStop, Pinned
 from fembeam.support import require
 
 if TYPE_CHECKING:
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 REACH = 0.12  # of the body's size, length of springs and arrows
+BESIDE = 0.5  # of it, where what strikes stands
 RING = 0.4  # of that, radius of a circular clearance
 FREE = 0.03  # the same, between a place and the arrow of a stop
 ZIGZAG = np.array([0, 0, 1, -1, 1, -1, 1, 0, 0]) * 0.12  # of the length of a spring
@@ -55,15 +56,6 @@ def rig_of_bodies(scene: Scene, axes: Axes | None) -> Figure:
     heading(drawn, "Rig, bodies to scale", axes is None)
     whole: Figure = figure
     return whole
-
-
-def _motions(support: Any) -> list[str]:
-    """How a support moves, in words."""
-    units = {True: "rad", False: "m"}
-    return [
-        f"{dof}: {signal_words(signal, units[dof.startswith('r')])}".replace("\n", " ")
-        for dof, signal in support_motion(support).items()
-    ]
 
 
 @dataclass(frozen=True)
@@ -140,7 +132,7 @@ class _Panel:
         scene = self.scene
         for support in scene.supports:
             self._mark(axis, support, "^" if support.dofs == Pinned.dofs else "s", BLACK)
-            yield support, ", ".join([self._label(support), *_motions(support)])
+            yield support, ", ".join([self._label(support), *motion_words(support)])
         for mass in scene.masses:
             self._mark(axis, mass, "o", COLOURS["mass"])
             yield mass, f"{self._label(mass)}, {mass.mass:.4g} kg"
@@ -156,8 +148,10 @@ class _Panel:
             self._arrow(axis, force, self._way(force), COLOURS["load"])
             yield force, self._label(force)
         for impactor in scene.impactors:
-            self._mark(axis, impactor, "o", COLOURS["impactor"])
-            yield impactor, self._label(impactor)
+            for push in impactor.pushes:
+                self._mark(axis, impactor, "o", COLOURS["impactor"], -push * np.array(impactor.along))
+            facts = f"{impactor.mass:.4g} kg, {gap_words(impactor.gap, False)}"
+            yield impactor, f"{self._label(impactor)}, {facts}"
 
     def _acting(self, axis: Any, one: Any) -> str:
         """A stop as an arrow the way its gap closes, an element as a spring; a line to the second place."""
@@ -187,9 +181,10 @@ class _Panel:
         """A line through points (k, 3)."""
         axis.plot(*points.T[: 3 if self.space else 2], color=colour, linewidth=width, linestyle=style)
 
-    def _mark(self, axis: Any, part: Any, marker: str, colour: str) -> None:
-        """A part as a point."""
-        at = self.places[repr(part.z)][: 3 if self.space else 2, None]
+    def _mark(self, axis: Any, part: Any, marker: str, colour: str, beside: Vector | None = None) -> None:
+        """A part as a point, at its place or beside it along a direction."""
+        whole = self.places[repr(part.z)] + (0.0 if beside is None else BESIDE * REACH * self.size * beside[:3])
+        at = whole[: 3 if self.space else 2, None]
         axis.plot(*at, marker, color=colour, markersize=8, gid=part.label)
 
     def _shape(self, axis: Any, part: Any, way: Vector, shape: Vector, start: float, colour: str) -> None:

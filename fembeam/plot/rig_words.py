@@ -19,6 +19,7 @@ from fembeam.scene import (
     PointMoment,
     Spring,
     Stop,
+    support_motion,
 )
 from fembeam.support import is_finite
 
@@ -48,7 +49,7 @@ def _facts(part: Any) -> Iterator[str]:
     """The numbers of one part."""
     match part:
         case Clamped() | Pinned() | Guided() | Fixed():
-            return
+            yield from motion_words(part)
         case LumpedMass():
             yield f"{part.mass:.4g} kg"
             yield f"J = {part.inertia:.3g} kg m²" if is_finite(part.inertia) and part.inertia else ""
@@ -72,6 +73,22 @@ def _facts(part: Any) -> Iterator[str]:
             yield gap_words(part.gap, False)
             yield law_words(part.law)
             yield f"own spring {part.stiffness:.6g} N/m" if part.stiffness else ""
+
+
+def motion_words(support: Any) -> list[str]:
+    """How a support moves, in words.
+
+    Examples
+    --------
+    >>> from fembeam import Harmonic
+    >>> motion_words(Pinned(0.5, motion={"y": Harmonic(1e-3, 46.0)})), motion_words(Pinned(0.5))
+    (['y: Harmonic, 1 mm, 46 rad/s'], [])
+    """
+    units = {True: "rad", False: "m"}
+    return [
+        f"{dof}: {signal_words(signal, units[dof.startswith('r')])}".replace("\n", " ")
+        for dof, signal in support_motion(support).items()
+    ]
 
 
 def gap_words(gap: float, rotation: bool) -> str:

@@ -119,8 +119,8 @@ class Readout:
 
     @cached_property
     def impactor_places(self) -> Vector:
-        """Place z and height of each impactor (i, 2), m."""
-        along = [impactor.z for impactor in self.model.matrices.impactors]
+        """Place z and height of each impactor (i, 2), m; z is 0 where places have names."""
+        along = [one.z if one.direction is None else 0.0 for one in self.model.matrices.impactors]
         return np.array([along, heights(self.model.scene)[1]]).T.reshape(-1, 2)
 
 

@@ -103,7 +103,8 @@ def expected_readout(arrays: Mapping[str, Any]) -> dict[str, Shape]:
         if f"moments_{i}" not in arrays:  # a body without sections
             continue
         elements = arrays[f"nodes_{i}" if i else "nodes"].size - 1
-        shapes |= {f"{name}_{i}": (elements, 2, n) for name in ("moments", "shears")}
+        columns = max(arrays[f"moments_{i}"].shape[-1], n)  # with those of supports that move
+        shapes |= {f"{name}_{i}": (elements, 2, columns) for name in ("moments", "shears")}
     return shapes
 
 

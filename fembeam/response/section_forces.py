@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from fembeam.beams import Beam, element_matrices, joining, on_beam
-from fembeam.scene import BodyMatrices, carried_by, loaded
+from fembeam.scene import BodyMatrices, carried_on, loaded
 from fembeam.structures import FrameForces, JoinedForces
 from fembeam.support import require
 
@@ -46,7 +46,8 @@ class SectionForces:
     Attributes
     ----------
     beam : the beam. nodes : (e + 1,) m.
-    moments, shears : (e, 2, n) at both ends of every element, N m and N per unit of q.
+    moments, shears : (e, 2, n + k) at both ends of every element, N m and N per unit of q, then of each of the k dofs
+        of supports that move.
     """
 
     beam: Beam
@@ -94,26 +95,15 @@ def section_forces(model: ModalEquations, body: int = 0) -> SectionForces | Fram
     rows = sparse.vstack([sparse.csr_matrix((0, beam.M.shape[0])), *(at.row(beam) for at in loaded(model.scene, body))])
     if beam.coupling is not None:
         rows = sparse.vstack([rows, beam.coupling[::3]])
-    inertia = _inertia(beam, vectors, model.omega, rows.toarray().T)
+    inertia = _everywhere(beam, _inertia(beam, vectors, model.omega, rows.toarray().T))
+    moved = np.hstack([_everywhere(beam, vectors), carried_on(model.scene, beam, body)])
+    # less the inertia of the shapes which follow supports: they have none
+    inertia = np.hstack([inertia, -inertia @ model.following.T])
     if isinstance(beam, BodyMatrices):
         made: Any = beam.assembled
-        moved = _carried(model, beam, body)
-        own = beam.spread @ inertia  # less that of the shapes which follow supports: they have none
-        following = -own @ model.following.T
-        forces: FrameForces | JoinedForces | None = made.section_forces(
-            np.hstack([beam.spread @ vectors, moved]), np.hstack([own, following])
-        )
+        forces: FrameForces | JoinedForces | None = made.section_forces(moved, inertia)
         return forces
-    return _of_vectors(beam, vectors, inertia)
-
-
-def _carried(model: ModalEquations, beam: BodyMatrices, body: int) -> Vector:
-    """(N_all, k): what each of the k support dofs that move, of all bodies, carries on this one."""
-    every, (first, last) = carried_by(model.scene, len(model.scene.bodies))[1], carried_by(model.scene, body)
-    found = np.zeros((beam.spread.shape[0], every))
-    if last > first:
-        found[:, first:last] = beam.carried.toarray()
-    return found
+    return _of_vectors(beam, moved, inertia)
 
 
 def _inertia(beam: Matrices, vectors: Vector, omega: Vector, rows: Vector) -> Vector:
@@ -132,10 +122,10 @@ def _inertia(beam: Matrices, vectors: Vector, omega: Vector, rows: Vector) -> Ve
 
 
 def _of_vectors(beam: Matrices, vectors: Vector, inertia: Vector) -> SectionForces:
-    """End forces of every element."""
+    """End forces of every element, of vectors and their inertia (2m, n) on all dofs."""
     K, M, dofs = element_matrices(beam.beam, beam.nodes)
     h = np.diff(beam.nodes)
-    local, inner = (joining(h, dofs) @ _everywhere(beam, values) for values in (vectors, inertia))
+    local, inner = (joining(h, dofs) @ values for values in (vectors, inertia))
     forces = K @ local - M @ inner
     side = np.array([-1.0, 1.0])[None, :, None]
     push, turn, slope = (values.reshape(len(h), 2, -1) for values in (forces[dofs[0]], forces[dofs[1]], local[dofs[1]]))
@@ -148,7 +138,9 @@ def _of_vectors(beam: Matrices, vectors: Vector, inertia: Vector) -> SectionForc
 
 
 def _everywhere(beam: Matrices, values: Vector) -> Vector:
-    """Values (N, n) on free dofs as (2m, n) on all, zero at supports."""
+    """Values (N, n) on free dofs as (N_all, n) on all, zero at supports."""
+    if isinstance(beam, BodyMatrices):
+        return np.asarray(beam.spread @ values)
     full = np.zeros((beam.dofs.size, values.shape[1]))
     full[beam.dofs.ravel() >= 0] = values
     return full
@@ -208,7 +200,7 @@ def rows_of(run: Histories, quantity: str, z: Any, body: int) -> tuple[Vector, A
     known = ("displacement", "slope", "moment", "shear", "stress")
     require(quantity in known, f"quantity must be one of {', '.join(known)}", quantity, "Run", "choose one")
     if quantity in known[:2]:
-        return (run.shapes, *run.others)[body](z, known.index(quantity)), z, np.zeros(len(z))
+        return (run.shapes, *run.others)[body].rows_with_supports(z, known.index(quantity)), z, np.zeros(len(z))
     forces = run.readout.section_forces[body]
     rows = getattr(forces, quantity)(z)
     if quantity != "stress":

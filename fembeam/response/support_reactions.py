@@ -179,10 +179,10 @@ def reaction_rows(model: Model) -> tuple[list[tuple[Any, int]], Vector]:
     Of scenes with a body that is no `Beam` all six components (r, 6, c).
     """
     full = unsupported(model.scene, model.matrices)
-    columns = _acting(model, full)
+    columns, first = _acting(model, full), len(model.directions)  # where the loads begin
     parts, rows, done = [], [], 0
     named = any(beam.named for beam in full.beams)
-    feet = len(model.directions) + len(support_loads(model.scene, full))  # where the loads of feet begin
+    feet = last = first + len(support_loads(model.scene, full))  # where those of feet begin
     for body, scene in enumerate((model.scene, *model.scene.bodies)):
         size = full.beams[body].M.shape[0]
         mine, known, loose = columns[done : done + size], model.matrices.beams[body], full.beams[body]
@@ -194,6 +194,8 @@ def reaction_rows(model: Model) -> tuple[list[tuple[Any, int]], Vector]:
         feet += len(scene.forces)
         for part in (*scene.supports, *scene.springs):
             row = np.array(held.by(part))
+            if isinstance(part, Spring):
+                row[:, first:last:3] -= _with_supports(part, "stiffness", model, body)
             if isinstance(part, Spring) and part.foot is not None:  # a moving foot adds to the force of its spring
                 row[:, feet] += part.stiffness * np.array(part.along or (1.0, 0.0))
                 feet += 1
@@ -202,9 +204,20 @@ def reaction_rows(model: Model) -> tuple[list[tuple[Any, int]], Vector]:
         done += size
     for part, body, rates in _dashpots(model):
         parts.append((part, body))
-        one = np.outer(part.along, rates[0]) if part.along is not None else _six(rates) if named else rates
-        rows.append(np.hstack([np.zeros((len(one), columns.shape[1] - one.shape[1])), one]))
+        one = np.outer(part.along, rates[0]) if part.along is not None else rates
+        row = np.hstack([np.zeros((len(one), columns.shape[1] - one.shape[1])), one])
+        row[:, first + 1 : last : 3] -= _with_supports(part, "damping", model, body)
+        rows.append(_six(row) if named and len(row) == 2 else row)
     return parts, np.array(rows).reshape(len(rows), 6 if named else 2, columns.shape[1])
+
+
+def _with_supports(part: Any, name: str, model: Model, body: int) -> Vector:
+    """What a unit motion of each moving support dof by itself puts on a spring or dashpot: (2, k), or (6, k)."""
+    shapes, n, size = (model.shapes, *model.others)[body], len(model.omega), getattr(part, name)
+    if part.along is not None:
+        return size * np.outer(part.along, shapes.rows_with_supports([(part.z, part.direction)])[0, n:])
+    parts = (size, part.rotational)
+    return np.array([one * shapes.rows_with_supports(part.z, i)[n:] for i, one in enumerate(parts)])
 
 
 def _six(row: Vector) -> Vector:

@@ -80,16 +80,13 @@ def frequency_response(
     if model.scene.named and isinstance(output, np.ndarray):
         output = output.tolist()
     frequencies, places = _checked(omega, model, slipping), model.phi(output, 0, body)
-    if isinstance(driven, str) and driven.startswith("supports["):
+    if isinstance(driven, str) and ".motion" in driven:
         return _of_support(model, frequencies, driven, output, body, slipping)
     vector, power, said, unit = _driving(model, driven)
     values = _solved(model, frequencies, vector, slipping) @ places.T
     values = (values.T * frequencies**power).T + (_carried_along(model, driven, output) if absolute else 0.0)
     shapes: Any = (model.shapes, *model.others)[body]
-    if hasattr(shapes, "components"):
-        at = output if isinstance(output, list) else [output]
-        unit = unit.replace("m", unit_of("indentation", [turns(split(one, shapes.components)[1]) for one in at]), 1)
-    shown: Any = output if model.scene.named else np.array(output, dtype=float)[()]
+    shown, unit = _shown(shapes, output), _unit(unit, shapes, output)
     return FrequencyResponse(frequencies, values, said, shown, absolute, unit, model.omega)
 
 
@@ -98,16 +95,29 @@ def _of_support(model: Model, omega: Vector, driven: str, output: Any, body: int
     names = [path for path in signals_of(model.scene) if ".motion." in path]
     require(driven in names, f"input must be one of {', '.join(names) or 'none, as no support moves'}", driven, WHERE,
             "use one")  # fmt: skip
-    number = names.index(driven)
-    shapes = (model.shapes, *model.others)[body]
-    rows = shapes.rows_with_supports(output if isinstance(output, list) else [output])
-    n, k = len(model.omega), names.index(driven)
-    vectors = [np.asarray(model.system.loads[3 * number + order][0]) for order in range(3)]
+    shapes, n, k = (model.shapes, *model.others)[body], len(model.omega), names.index(driven)
+    alone = hasattr(shapes, "components") and not isinstance(output, list)
+    rows = shapes.rows_with_supports([output] if alone else output)
+    rows = rows[0] if alone else rows
+    vectors = [np.asarray(model.system.loads[3 * k + order][0]) for order in range(3)]
     answers = [_solved(model, omega, vector, slipping) for vector in vectors]
     q = sum((1j * omega[:, None]) ** order * one for order, one in enumerate(answers))
-    values = q @ rows[:, :n].T + rows[:, n + k]
-    values = values if isinstance(output, list) else values[:, 0]
-    return FrequencyResponse(omega, values, f"motion of {driven}", output, False, "m/m", model.omega)
+    values = q @ rows[..., :n].T + rows[..., n + k]
+    unit = _unit("m/rad" if driven.split(".")[-1].startswith("r") else "m/m", shapes, output)
+    return FrequencyResponse(omega, values, f"motion of {driven}", _shown(shapes, output), False, unit, model.omega)
+
+
+def _unit(unit: str, shapes: Any, output: Any) -> str:
+    """The unit with rad for m where rotations are asked for."""
+    if not hasattr(shapes, "components"):
+        return unit
+    at = output if isinstance(output, list) else [output]
+    return unit.replace("m", unit_of("indentation", [turns(split(one, shapes.components)[1]) for one in at]), 1)
+
+
+def _shown(shapes: Any, output: Any) -> Any:
+    """The places as they were named, of a beam as numbers."""
+    return output if hasattr(shapes, "components") else np.array(output, dtype=float)[()]
 
 
 def _carried_along(model: Model, driven: str | float, output: Any) -> Any:
@@ -143,14 +153,15 @@ def _driving(model: Model, driven: Any) -> tuple[Vector, int, str, str]:
         return model.phi(driven), 0, said.format(*driven), unit
     if is_finite(driven):
         return model.phi(float(driven)), 0, f"force at z = {driven} m", "m/N"
-    names = [path for path in signals_of(model.scene) if path.split(".")[0] != "base"]  # in the order of the loads
-    inputs = [name.removesuffix(".signal") for name in names]
+    names = [path for path in signals_of(model.scene) if path.split(".")[0] != "base"]
+    motions = [name for name in names if ".motion." in name]  # of supports come first, with three loads each
+    inputs = [name.removesuffix(".signal") for name in names if name not in motions]
     known = isinstance(driven, str) and driven.removesuffix(".signal") in inputs
-    require(known, f"input must be a place z in m, or one of {', '.join(['base', *inputs])}", driven, WHERE, "use one")
-    first = sum(".motion." in name for name in names)  # supports that move come first, with three loads each
-    number = 2 * first + inputs.index(str(driven).removesuffix(".signal"))
-    vector = np.asarray(model.system.loads[number][0], dtype=float)
-    return vector, 0, inputs[number], "m/m" if inputs[number].endswith("foot") else "m per unit"
+    require(known, f"input must be a place z in m, or one of {', '.join(['base', *motions, *inputs])}", driven,
+            WHERE, "use one")  # fmt: skip
+    said = str(driven).removesuffix(".signal")
+    vector = np.asarray(model.system.loads[3 * len(motions) + inputs.index(said)][0], dtype=float)
+    return vector, 0, said, "m/m" if said.endswith("foot") else "m per unit"
 
 
 def _checked(omega: ArrayLike, model: Model, slipping: bool) -> Vector:

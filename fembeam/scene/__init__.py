@@ -9,7 +9,7 @@ from fembeam.scene.assembly import MOST_DENSE, Matrices, unsupported
 from fembeam.scene.body_assembly import BodyMatrices, respun
 from fembeam.scene.contact_rows import (
     ON,
-    carried_by,
+    carried_on,
     contact_rows,
     heights,
     loaded,

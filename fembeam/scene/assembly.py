@@ -37,12 +37,14 @@ from fembeam.beams import (
     spread,
     wavenumber,
 )
-from fembeam.scene.places import told
-from fembeam.structures import Six, require_components
+from fembeam.scene.places import place_words, told
+from fembeam.scene.signals import support_motion
+from fembeam.structures import COMPONENTS, Six, require_components
 from fembeam.support import is_whole, require, require_finite
 
 if TYPE_CHECKING:
     from fembeam.scene.impactor import Impactor
+    from fembeam.scene.local_coordinate import LocalCoordinate
     from fembeam.scene.scene import Scene
 
 Vector = NDArray[np.float64]
@@ -52,6 +54,7 @@ MOST_MODES = 300  # 5400 elements, about a minute; a slender beam has lost its m
 MOST_DENSE = 2000  # free dofs of which all modes may be asked for, about ten seconds
 MOST_ELEMENTS = 10_000  # above it rounding of K hides the lowest frequencies
 DENSE = 200  # free dofs, below which the dense solver is quicker
+UNIT = 1e-12  # of 1: entries of a row that stands for one dof
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +77,8 @@ class Matrices:
     bodies : where there are several beams or impactors, the matrices of each beam by itself; else empty. `nodes` and
         `dofs` are those of the scene's own beam.
     impactors : of all bodies, one dof each, the last ones.
+    carried : (N_all, k) what the k dofs of supports that move carry along by themselves, on all dofs; None: none moves.
+    coupling : (3 k, N): for each of these dofs the loads of its displacement, speed and acceleration.
     """
 
     beam: Any
@@ -90,8 +95,9 @@ class Matrices:
     gyroscopic: sparse.csr_matrix | None = None
     bodies: tuple[Matrices, ...] = ()
     impactors: tuple[Impactor, ...] = ()
+    carried: sparse.csr_matrix | None = None
+    coupling: sparse.csr_matrix | None = None
     named = False  # whether its places have names and directions, see `BodyMatrices`
-    coupling: Any = None  # of supports that move, see `BodyMatrices`
 
     @property
     def base_loads(self) -> dict[str, Vector]:
@@ -108,7 +114,11 @@ class Matrices:
 
     def loosened(self, scene: Scene) -> Matrices:
         """The matrices of the scene's own body without its supports, on all dofs of the same mesh."""
-        return _on_nodes(scene, self.nodes, self.modes)
+        found = _on_nodes(scene, self.nodes, self.modes)
+        if self.carried is None:
+            return found
+        loads = moving(found.M, found.K, found.dashpots, sparse.eye(found.M.shape[0], format="csr"), self.carried)
+        return replace(found, **loads)
 
     @property
     def elements(self) -> int:
@@ -139,6 +149,19 @@ class Matrices:
         """The same on the body's own dofs: of a beam u along y and -u_z about x."""
         require_components(along, ("y", "rx"), "a Beam bends in one plane: its places", f"{told(place)} of a Beam")
         return along[1] * self.interpolation(place) - along[3] * self.interpolation(place, 1)
+
+    def carried_row(self, place: LocalCoordinate) -> Vector:
+        """What each dof of this body's supports that move adds to a coordinate of the body, (k,)."""
+        if self.carried is None:
+            return np.zeros(0)
+        first = self._row_on_all(place.z, place.along) @ self.carried
+        second = 0.0 if place.to is None else self._row_on_all(place.to[1], place.along) @ self.carried
+        return np.asarray((first - second).todense())[0]
+
+    def _row_on_all(self, place: Any, along: Six) -> sparse.csr_matrix:
+        """Row (1, N_all) of a place along a direction, supported dofs included."""
+        z = np.array([float(place)])
+        return along[1] * hermite_rows(self.nodes, z, 0) - along[3] * hermite_rows(self.nodes, z, 1)
 
     def among_all(self, rows: sparse.csr_matrix, body: int) -> sparse.csr_matrix:
         """Rows on a body's own dofs as rows on all."""
@@ -186,10 +209,12 @@ def assemble(scene: Scene, elements: int | None, modes: int | None, probes: Sequ
             "Scene.matrices", "ask for modes, or modes='all'")  # fmt: skip
     own = _one_beam(scene, elements, modes, probes)
     if not scene.bodies and not scene.impactors:
+        _check_beside(scene, (own,))
         return own
     second: list[tuple[int, Any]] = [part.coordinates[0].to or (0, 0.0) for part in scene.acting]
     met = [[z for number, z in second if number == b + 1] for b in range(len(scene.bodies))]
     others = [_one_beam(body, elements, modes, at) for body, at in zip(scene.bodies, met, strict=True)]
+    _check_beside(scene, (own, *others))
     return _joined((own, *others), tuple(i for body in (scene, *scene.bodies) for i in body.impactors))
 
 
@@ -215,6 +240,18 @@ def _one_beam(scene: Scene, elements: int | None, modes: int | None, probes: Seq
     return matrices
 
 
+def _check_beside(scene: Scene, beams: tuple[Matrices, ...]) -> None:
+    """Raise ValueError for contacts on supports that move, or so near that they share an element: δ has no motion."""
+    for body, part in enumerate((scene, *scene.bodies)) if any(one.carried is not None for one in beams) else ():
+        for name in ("stops", "elements", "impactors"):
+            for index, one in enumerate(getattr(part, name)):
+                places = [(i, end) for i in range(len(beams)) for at in one.coordinates for end in at.on_body(body, i)]
+                met = [end for i, end in places if np.any(np.abs(beams[i].carried_row(end)) > UNIT)]
+                where = f"bodies[{body - 1}].{name}[{index}]" if body else f"{name}[{index}]"
+                require(not met, "what acts must not sit where a support moves", [place_words(end.z) for end in met],
+                        f"{where}{one.quoted} of Scene", "put it at a place beside the support")  # fmt: skip
+
+
 def _joined(beams: tuple[Matrices, ...], impactors: tuple[Impactor, ...]) -> Matrices:
     """Several bodies as blocks of one problem, impactors last."""
     own = beams[0]
@@ -228,7 +265,7 @@ def _joined(beams: tuple[Matrices, ...], impactors: tuple[Impactor, ...]) -> Mat
     roots = [beam.root for beam in beams if beam.root is not None]
     turning = [sparse.csr_matrix(beam.M.shape) if beam.gyroscopic is None else beam.gyroscopic for beam in beams]
     spins = any(beam.gyroscopic is not None for beam in beams)
-    along = _base_loads(beams, mass)
+    along = _base_loads(beams, impactors)
     named: dict[str, Any] = {"along": along} if own.named else {}
     return replace(
         own,
@@ -245,13 +282,14 @@ def _joined(beams: tuple[Matrices, ...], impactors: tuple[Impactor, ...]) -> Mat
     )
 
 
-def _base_loads(beams: tuple[Matrices, ...], mass: Vector) -> dict[str, Vector]:
-    """The load of the frame's motion on all bodies; impactors move along y."""
+def _base_loads(beams: tuple[Matrices, ...], impactors: tuple[Impactor, ...]) -> dict[str, Vector]:
+    """The load of the frame's motion on all bodies; on impactors its part along their directions."""
     known = list(dict.fromkeys(direction for beam in beams for direction in beam.base_loads))
     found = {}
     for direction in known:
         parts = [beam.base_loads.get(direction, np.zeros(beam.M.shape[0])) for beam in beams]
-        found[direction] = np.concatenate([*parts, mass if direction == "y" else 0.0 * mass])
+        axis = COMPONENTS.index(direction)
+        found[direction] = np.concatenate([*parts, [one.mass * one.along[axis] for one in impactors]])
     return found
 
 
@@ -332,7 +370,27 @@ def _on_nodes(scene: Scene, nodes: Vector, modes: int | None) -> Matrices:
 
     r = np.tile([1.0, 0.0], len(nodes))
     M, K, C = (A.tocsr()[free][:, free] for A in (M_all, K_all, C_all))
-    return Matrices(scene.beam, M, K, root, C, scene.damping, r[free], (M_all @ r)[free], nodes, dofs, modes)
+    found = Matrices(scene.beam, M, K, root, C, scene.damping, r[free], (M_all @ r)[free], nodes, dofs, modes)
+    carried = _carried(scene, nodes)
+    if carried is None:
+        return found
+    return replace(found, **moving(M_all, K_all, C_all, sparse.eye(len(r), format="csr")[:, free], carried))
+
+
+def _carried(scene: Scene, nodes: Vector) -> sparse.csr_matrix | None:
+    """(2m, k): 1 on u, -1 on u_z (which is -rx) of each dof of supports that move; None where none does."""
+    moved = [(support.z, dof) for support in scene.supports for dof in support_motion(support)]
+    rows = [2 * int(np.argmin(np.abs(nodes - z))) + (dof == "rx") for z, dof in moved]
+    signs = [-1.0 if dof == "rx" else 1.0 for _, dof in moved]
+    shape = 2 * len(nodes), len(moved)
+    return sparse.csr_matrix((signs, (rows, range(len(moved)))), shape=shape) if moved else None
+
+
+def moving(M: Any, K: Any, C: Any, spread: Any, carried: Any) -> dict[str, Any]:
+    """What dofs of supports that move carry, and their loads -K e, -C e, -M e of displacement, speed, acceleration."""
+    each = [-(carried.T @ A @ spread).tocsr() for A in (K, C, M)]
+    order = np.arange(3 * carried.shape[1]).reshape(3, -1).T.ravel()
+    return {"carried": carried, "coupling": sparse.vstack(each, format="csr")[order]}
 
 
 def unsupported(scene: Scene, matrices: Matrices) -> Matrices:

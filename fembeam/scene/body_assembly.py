@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 
 import reduction
-from fembeam.scene.assembly import DEFAULT_MODES, Matrices, Vector
+from fembeam.scene.assembly import DEFAULT_MODES, UNIT, Matrices, Vector, moving
 from fembeam.scene.places import place_words, told
 from fembeam.scene.rotors import Disk, gyroscopic, turned
 from fembeam.scene.signals import support_motion
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from fembeam.scene.scene import Scene
 
 MOST_RIGID = 6
-UNIT = 1e-12  # of 1: entries of a row that stands for one dof
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,15 +37,11 @@ class BodyMatrices(Matrices):
     ----------
     beam : the body. assembled : what it gave, on all its dofs.
     spread : S (N_all, N) sparse: free dofs to all.
-    carried : (N_all, k) what the k dofs of supports that move carry along by themselves.
-    coupling : (3 k, N): for each of these dofs the loads of its displacement, speed and acceleration.
     along : {direction: base load (N,)}. massless : labels of dofs that follow the others statically.
     """
 
     assembled: Assembled = None  # type: ignore[assignment]
     spread: sparse.csr_matrix = None
-    carried: sparse.csr_matrix = None
-    coupling: sparse.csr_matrix = None
     along: dict[str, Vector] = field(default_factory=dict)
     massless: tuple[Any, ...] = ()
     named = True
@@ -64,11 +59,17 @@ class BodyMatrices(Matrices):
         """All components (c, N) of a place, on the body's own free dofs."""
         return (self.assembled.rows(place) @ self.spread).tocsr()
 
+    def _row_on_all(self, place: Any, along: Six) -> sparse.csr_matrix:
+        """Row (1, N_all) of a place along a direction, supported dofs included."""
+        return row_of(self.beam, self.assembled, place, along)
+
     def loosened(self, scene: Scene) -> Matrices:
         """The matrices without supports, on all dofs, those without mass too."""
         found = _of(scene, self.assembled, self.modes, held=np.zeros(0, dtype=int), condense=False)
-        moving = {} if self.carried is None else _moving(found.M, found.K, None, found.spread, self.carried)
-        return replace(found, **moving)
+        if self.carried is None:
+            return found
+        dashpots = _dashpots(scene, self.assembled)
+        return replace(found, **moving(found.M, found.K, dashpots, found.spread, self.carried))
 
     def frequency_error(self, omega: ArrayLike) -> Vector:
         """Zeros: the matrices are what the structure is."""
@@ -121,20 +122,12 @@ def body_matrices(scene: Scene, elements: int | None, modes: int | None, probes:
     if moved:
         require(not found.massless, "a support that moves needs mass on all dofs", found.massless[:3], "Scene",
                 "condense the structure first")  # fmt: skip
-        M, K, _, _ = _with_parts(scene, assembled)
+        M, K, C, _ = _with_parts(scene, assembled)
         carried = sparse.eye(M.shape[0], format="csr")[:, moved]
-        found = replace(found, **_moving(M, K, assembled.C, found.spread, carried))
+        found = replace(found, **moving(M, K, C, found.spread, carried))
     _warn_of_massless(scene, found)
     _check_moving(scene, found)
     return found
-
-
-def _moving(M: Any, K: Any, C: Any, spread: Any, carried: Any) -> dict[str, Any]:
-    """What dofs of supports that move carry, and their loads -K e, -C e, -M e of displacement, speed, acceleration."""
-    blank = sparse.csr_matrix(M.shape)
-    each = [-(carried.T @ (blank if A is None else A) @ spread).tocsr() for A in (K, C, M)]
-    order = np.arange(3 * carried.shape[1]).reshape(3, -1).T.ravel()
-    return {"carried": carried, "coupling": sparse.vstack(each, format="csr")[order]}
 
 
 def _dof(scene: Scene, assembled: Assembled, support: Any, component: str) -> int:
@@ -236,12 +229,17 @@ def _with_parts(scene: Scene, assembled: Assembled) -> tuple[Any, Any, Any, Any]
     size = assembled.M.shape[0]
     C = sparse.csr_matrix((size, size)) if assembled.C is None else assembled.C
     springs = _strengthened(scene, assembled, [(s, s.stiffness) for s in scene.springs])
-    dashpots = _strengthened(scene, assembled, [(d, d.damping) for d in scene.dashpots])
     masses = sparse.vstack([sparse.csr_matrix((0, size)), *(_arms(assembled, scene, m) for m in scene.masses)])
     root = assembled.root
     root = None if root is None else sparse.vstack([root, springs], format="csr")
     M = (assembled.M + masses.T @ masses).tocsr()
-    return M, (assembled.K + springs.T @ springs).tocsr(), (C + dashpots.T @ dashpots).tocsr(), root
+    return M, (assembled.K + springs.T @ springs).tocsr(), (C + _dashpots(scene, assembled)).tocsr(), root
+
+
+def _dashpots(scene: Scene, assembled: Assembled) -> sparse.csr_matrix:
+    """Σ c n nᵀ (N_all, N_all)."""
+    rows = _strengthened(scene, assembled, [(d, d.damping) for d in scene.dashpots])
+    return (rows.T @ rows).tocsr()
 
 
 def _strengthened(scene: Scene, assembled: Assembled, parts: list[tuple[Any, float]]) -> sparse.csr_matrix:

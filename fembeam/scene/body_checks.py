@@ -15,7 +15,7 @@ from fembeam.support import is_finite, require
 if TYPE_CHECKING:
     from fembeam.scene.scene import Scene
 
-DIRECTED = ("springs", "dashpots", "stops", "elements", "forces")
+DIRECTED = ("springs", "dashpots", "stops", "elements", "forces", "impactors")
 
 
 def is_body(value: Any) -> bool:
@@ -43,8 +43,6 @@ def check_feature(body: Any, feature: Any, name: str, where: str) -> None:
         write = f"add direction={'rz' if turn else 'x'!r} or so; {what} has {', '.join(have)}"
         require(feature.direction is not None, "a place by name needs a direction", None, where, write)
         require_components(direction_of(feature.direction, where), have, what, where)
-    require(name != "impactors", "impactors must strike a Beam", feature, where,
-            "make the mass a body of its own: Scene(Structure(...)) in bodies")  # fmt: skip
     if isinstance(feature, Disk):
         check_shaft(body, feature, where)
     if name == "masses":
@@ -155,9 +153,10 @@ def check_plain(feature: Any, name: str, where: str) -> None:
         require(name in ("stops", "elements"), "direction is for bodies that are not a Beam", direction, where,
                 "leave it out: u is along y")  # fmt: skip
     if name == "supports":
-        motion = getattr(feature, "motion", None)
-        require(motion is None, "motion of a support needs a Frame or Structure", motion, where,
-                "make the Beam a Frame.straight, or use a stiff Spring(..., foot=signal)")  # fmt: skip
+        astray = [dof for dof in support_motion(feature) if dof not in ("y", "rx")]
+        require(
+            not astray, "motion on a Beam must be of y, which is u, or rx, -u_z", astray, where, "leave the others out"
+        )
         beyond = [dof for dof in feature.dofs if dof not in ("y", "rx")]
         whole = feature.dofs in ((), COMPONENTS, COMPONENTS[:3])
         require(whole or not beyond, "a Beam bends in one plane: it has y and rx", beyond, where, "leave them out")

@@ -13,10 +13,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from fembeam.excitation import Harmonic
 from fembeam.scene.annular_stop import AnnularStop
+from fembeam.scene.body_assembly import BodyMatrices
 from fembeam.scene.element import force_both_ways
 from fembeam.scene.local_coordinate import LocalCoordinate
 from fembeam.scene.signals import support_motion
@@ -26,6 +29,8 @@ if TYPE_CHECKING:
     from fembeam.scene.part import ScenePart
     from fembeam.scene.scene import Scene
 
+
+Vector = NDArray[np.float64]
 
 LINE = (0.0, 0.0, 0.0)  # no circle
 ON = ("frame", "body", "impactor")  # what a contact pushes from
@@ -104,12 +109,13 @@ def _contact_rows(scene: Scene, matrices: Matrices) -> Iterator[ContactRow]:
             kind = place.rotation, one.always, *name, one.direction
             yield ContactRow(row, one.law, one.gap, one.push, body, one.z, on, *kind)
         for impactor in part.impactors:
-            row = matrices.interpolation(impactor.z, body=body) - matrices.impactor_row(count)
+            row = impactor.coordinates[0].row(matrices, body) - matrices.impactor_row(count)
             label, given = _name(impactor, body)
             for push in impactor.pushes:
                 side = {1.0: ", below", -1.0: ", above"}[push] if len(impactor.pushes) > 1 else ""
                 facing = body, impactor.z, ("impactor", count)
-                yield ContactRow(push * row, impactor.law, impactor.gap, push, *facing, name=label + side, given=given)
+                said: Any = {"name": label + side, "given": given, "direction": impactor.direction}
+                yield ContactRow(push * row, impactor.law, impactor.gap, push, *facing, **said)
             count += 1
 
 
@@ -167,10 +173,14 @@ def support_loads(scene: Scene, matrices: Matrices) -> list[tuple[sparse.csr_mat
     return rows
 
 
-def carried_by(scene: Scene, body: int) -> tuple[int, int]:
-    """Which of the dofs of supports that move, counted over all bodies, are of one: first and last + 1."""
+def carried_on(scene: Scene, beam: Matrices, body: int) -> Vector:
+    """(N_all, k): what each of the k dofs of supports that move, of all bodies, carries on the dofs of one."""
     counts = [sum(len(support_motion(s)) for s in part.supports) for part in (scene, *scene.bodies)]
-    return sum(counts[:body]), sum(counts[: body + 1])
+    first, size = sum(counts[:body]), beam.spread.shape[0] if isinstance(beam, BodyMatrices) else beam.dofs.size
+    found = np.zeros((size, sum(counts)))
+    if beam.carried is not None:
+        found[:, first : first + counts[body]] = beam.carried.toarray()
+    return found
 
 
 def weight(scene: Scene) -> dict[str, Harmonic]:
@@ -181,9 +191,7 @@ def weight(scene: Scene) -> dict[str, Harmonic]:
 def watched(scene: Scene, body: int) -> LocalCoordinate | None:
     """Where the modes of a beam shall be positive: at its first stop, element, impactor, or where another meets it."""
     part = (scene, *scene.bodies)[body]
-    places = [place for one in part.acting for place in one.coordinates] + [
-        LocalCoordinate(impactor.z) for impactor in part.impactors
-    ]
+    places = [place for one in (*part.acting, *part.impactors) for place in one.coordinates]
     places += _from_the_first(scene, body)
     return replace(places[0], to=None) if places else None
 
@@ -197,7 +205,7 @@ def loaded(scene: Scene, body: int) -> list[LocalCoordinate]:
     places += [LocalCoordinate(spring.z, direction=spring.along) for spring in feet]
     places += [LocalCoordinate(d.z, direction=d.along) for d in part.dashpots if d.damping]
     places += [LocalCoordinate(dashpot.z, 1) for dashpot in part.dashpots if dashpot.rotational]
-    places += [LocalCoordinate(impactor.z) for impactor in part.impactors]
+    places += [impactor.coordinates[0] for impactor in part.impactors]
     return places + _from_the_first(scene, body)
 
 

@@ -1,14 +1,18 @@
 """Rigid masses beside the beam that strike it: free, or on a spring of their own.
 
 m ẍ = -k x - c ẋ - m (ÿ + g) ± F(δ, δ̇),    δ = u(z) - x - gap from above,  δ = x - u(z) - gap from below
+
+On other bodies than a `Beam` along a direction n: u is n·u of the place, ÿ + g its part along n.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
+from fembeam.scene.local_coordinate import LocalCoordinate
 from fembeam.scene.part import ScenePart
+from fembeam.structures import UP, Direction, Six, direction_of, turns
 from fembeam.support import require, require_finite, require_non_negative, require_positive
 
 SIDES = {"above": (-1.0,), "below": (1.0,), "both": (1.0, -1.0)}
@@ -16,11 +20,11 @@ SIDES = {"above": (-1.0,), "below": (1.0,), "both": (1.0, -1.0)}
 
 @dataclass(frozen=True, repr=False)
 class Impactor(ScenePart):
-    """A rigid mass over or under the beam that moves across it and strikes it at z.
+    """A rigid mass over or under the beam that moves across it and strikes it at z; of other bodies along a direction.
 
     Parameters
     ----------
-    z : place on the beam, m.
+    z : place on the beam, m; of other bodies a place by name, or (member, distance).
     mass : kg, > 0.
     velocity : m/s at the start, relative to the frame, positive up: below 0 strikes from above.
     law : of the contact between mass and beam, such as `contacts.Hertz(stiffness)`.
@@ -28,17 +32,22 @@ class Impactor(ScenePart):
     side : "above", "below", or "both" (it embraces the beam with clearance `gap` on each side; two contacts, the
         one below first); None: above, unless it starts upwards.
     stiffness, damping : of its own spring (N/m) and dashpot (N s/m) to the frame, ≥ 0; 0 and 0: a free mass.
+    direction : keyword, on other bodies than a `Beam`, "x", "-y" or a vector: what is up for it. Its velocity is
+        positive that way, and "above" is ahead of the place.
     name : keyword, what the contact log, tables and figures call it, unique in a scene.
 
     Raises
     ------
-    ValueError : a value out of range, a law that is none, a free mass that starts inside the beam.
+    ValueError : a value out of range, a law that is none, a free mass that starts inside the beam, a direction that is
+        a rotation.
 
     Examples
     --------
     >>> from contacts import Hertz
     >>> Impactor(0.5, mass=0.1, velocity=-1.0, law=Hertz(1e9)).pushes
     (-1.0,)
+    >>> Impactor("lever", mass=0.1, velocity=-1.0, law=Hertz(1e9), direction="x").label
+    'impactor at lever, x, above'
     """
 
     mass: float
@@ -48,6 +57,7 @@ class Impactor(ScenePart):
     side: str | None = None
     stiffness: float = 0.0
     damping: float = 0.0
+    direction: Direction | None = field(default=None, kw_only=True)
     word = "impactor"
 
     def __post_init__(self) -> None:
@@ -64,6 +74,20 @@ class Impactor(ScenePart):
                 "gap must not be negative: the mass would start inside the beam", self.gap, where,
                 "lift it, or give it a spring that presses it on")  # fmt: skip
         check_law(self.law, where)
+        if isinstance(self.direction, list):
+            object.__setattr__(self, "direction", tuple(self.direction))
+        moves = self.direction is None or not turns(direction_of(self.direction, where))
+        require(moves, "direction of an impactor must be no rotation", self.direction, where, "write 'x', 'y' or 'z'")
+
+    @property
+    def along(self) -> Six:
+        """The direction that is up for it, on the six components."""
+        return UP if self.direction is None else direction_of(self.direction, self.where)
+
+    @property
+    def coordinates(self) -> tuple[LocalCoordinate, ...]:
+        """What it strikes: the one."""
+        return (LocalCoordinate(self.z, direction=None if self.direction is None else self.along),)
 
     @property
     def pushes(self) -> tuple[float, ...]:

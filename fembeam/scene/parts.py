@@ -50,14 +50,16 @@ def _checked_motion(motion: Any, dofs: tuple[str, ...], where: str) -> dict[str,
 class Clamped(_Holding):
     """u = 0 and u_z = 0 at z (m); of other bodies than a `Beam` no component of a place moves.
 
-    There `motion` makes components follow signals, in m and rad relative to the frame: {"y": signal}, so that supports
-    move apart. A structure starts as it follows them statically at t = 0, in place and speed, and damping ratios act on
-    the motion beside the one that follows them statically.
+    `motion` makes components follow signals, in m and rad relative to the frame: {"y": signal}, so that supports move
+    apart; of a `Beam` "y" is u and "rx" is -u_z. The structure starts as it follows them statically at t = 0, in place
+    and speed, and damping ratios act on the motion beside the one that follows them statically.
 
     Examples
     --------
     >>> Clamped(0.0).fixed  # displacement, slope
     (True, True)
+    >>> from fembeam import Harmonic
+    >>> shaken = Clamped(0.0, motion={"y": Harmonic(1e-3, 50.0)})
     """
 
     word = "clamp"

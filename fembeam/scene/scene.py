@@ -31,6 +31,7 @@ from fembeam.scene.parts import (
 )
 from fembeam.scene.rigid_motions import drifting, rigid_body_modes
 from fembeam.scene.rotors import Disk, Unbalance, driven
+from fembeam.scene.signals import support_motion
 from fembeam.structures import COMPONENTS, Joint
 from fembeam.support import is_finite, require, require_finite, require_non_negative, require_positive
 
@@ -432,7 +433,11 @@ class Scene:
         if place.to is not None:
             self._check_exists(*place.to, place.z, key, where)
         ends = [(0, place.z), *([] if place.to is None else [place.to])]
-        held = [_holding((self, *self.bodies)[body], z, place.derivative) for body, z in ends]
+        held = [_holding((self, *self.bodies)[body], z, int(place.rotation)) for body, z in ends]
+        dof = ("y", "rx")[place.rotation]
+        met = [one for end in held for one in end if dof in support_motion(one)]
+        require(not met, f"what acts must not sit where a support moves along {dof}", met, where,
+                "put it at a place beside the support")  # fmt: skip
         move = "turn" if place.rotation else "move"
         require(not all(held), f"the beam must be free to {move} at z", [one for end in held for one in end], where,
                 "support it by Pinned there" if place.rotation else "act away from the support")  # fmt: skip

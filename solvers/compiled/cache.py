@@ -32,6 +32,7 @@ KEPT = 4  # folders of other sources, versions or interpreters that stay, so tha
 DIGITS = 16  # of a digest
 UNUSED = 24 * 3600.0  # s without a start after which one beyond these is removed; until then a process may need it
 _LOOK, _LOOKS = 0.02, 100  # s between two looks whether another process still compiles, and how many in silence
+_PATIENCE = 300.0  # s to wait for it; one kernel takes seconds, so that a process that long at it is stopped or hangs
 _LOCK = threading.RLock()  # numba's setting belongs to the process
 
 
@@ -145,24 +146,40 @@ def is_current(function: Callable[..., Any]) -> bool:
 def lock_folder(waiting: Callable[[], None]) -> IO[bytes] | None:
     """Keep other processes from the folder until the returned file is closed; ``waiting`` is called if one has it long.
 
-    None where there is nothing to keep, or no locks: on Windows, on some network disks.
+    None where there is nothing to keep, or no locks: on Windows, on some network disks. Where another process keeps it
+    for minutes nothing is kept from then on, so that the caller may go on.
     """
+    global FOLDER
     if FOLDER is None:
         return None
     try:
         import fcntl
 
         file = open(FOLDER / "lock", "ab")  # noqa: SIM115  closed by who asked
-        for _ in range(_LOOKS):
+        began, looks = time.monotonic(), 0
+        while time.monotonic() - began < _PATIENCE:
             with suppress(BlockingIOError):
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 return file
             time.sleep(_LOOK)
-        waiting()
-        fcntl.flock(file, fcntl.LOCK_EX)
-        return file
+            looks += 1
+            if looks == _LOOKS:
+                waiting()
+        file.close()
+        FOLDER = None
+        _warn(f"another process has kept {file.name} for {_PATIENCE:g} s: machine code is compiled and not kept")
+        return None
     except (ImportError, OSError):
         return None
+
+
+def unlock_folder(file: IO[bytes]) -> None:
+    """Give the folder back, also where a process that was forked meanwhile still has the file open."""
+    with suppress(ImportError, OSError):
+        import fcntl
+
+        fcntl.flock(file, fcntl.LOCK_UN)
+    file.close()
 
 
 class _Store(FunctionCache):
@@ -180,6 +197,8 @@ class _Store(FunctionCache):
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep what was compiled."""
+        if FOLDER is None:  # sources changed, or others would not give the lock back
+            return
         try:
             super().save_overload(sig, data)
         except OSError as error:

@@ -28,6 +28,7 @@ from __future__ import annotations
 
 import gc
 import logging
+import os
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -39,7 +40,7 @@ from numba.core import event
 from numba.core.ccallback import CFunc
 from numba.core.sigutils import normalize_signature
 
-from solvers.compiled.cache import is_current, lock_folder, store
+from solvers.compiled.cache import is_current, lock_folder, store, unlock_folder
 
 if config.DISABLE_JIT:
     raise RuntimeError("NUMBA_DISABLE_JIT is set, but time integration runs as machine code only: unset it")
@@ -133,7 +134,7 @@ class _OneProcess(event.Listener):
         with self._guard:
             self._depth = max(self._depth - 1, 0)  # a lock taken before this module was imported is given back now
             if self._depth == 0 and self._file is not None:
-                self._file.close()
+                unlock_folder(self._file)
                 self._file = None
 
     @contextmanager
@@ -141,11 +142,17 @@ class _OneProcess(event.Listener):
         """Compile or load within, with no other process at it."""
         with self._guard:
             self._depth += 1
-            self.lock()
         try:
+            self.lock()  # which Ctrl-C may end
             yield
         finally:
             self.release()
+
+    def forget(self) -> None:
+        """In a forked process: the lock is its parent's, whatever thread took it."""
+        if self._file is not None:
+            self._file.close()  # of two copies one, which leaves the lock to the other
+        self._guard, self._depth, self._file = threading.RLock(), 0, None
 
     def _tell(self) -> None:
         """Say why nothing happens."""
@@ -153,6 +160,8 @@ class _OneProcess(event.Listener):
 
 
 _ONE_PROCESS = _OneProcess()
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_ONE_PROCESS.forget)
 event.register("numba:compiler_lock", _ONE_PROCESS)
 event.register("numba:compile", _ONE_PROCESS)
 

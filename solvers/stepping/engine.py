@@ -14,8 +14,10 @@ from solvers.compiled.state import (
     GAINED,
     H_CONTACT,
     H_FLIGHT,
+    LAW_NOT_FINITE,
     RUNNING,
     State,
+    T,
     begin_contacts,
     log_begin,
     new_state,
@@ -72,6 +74,8 @@ class Engine:
     def march(self, budget: int, log: Array, out: Array, due: Array) -> int:
         """Advance by at most ``budget`` steps."""
         method = self.method
+        if self.state.now[T] == 0.0 and not np.isfinite(self.state.rate).all():
+            return LAW_NOT_FINITE  # loads and starts were looked at before
         dt_flight, dt_contact = (math.inf, math.inf) if method.adaptive else method.steps
         code = self.loop(
             *(method.step, self.problem, self.state, self.space, self.duration, budget),

@@ -46,6 +46,7 @@ from solvers.stepping.henon import hermite
 from solvers.stepping.henon import land as henon_landing
 from solvers.stepping.located import NEAR_END, SWITCHED, accept, find, first_kink, land, look
 
+_LEAST_STEP = 1e-290  # s, at t = 0, where every step would still move the clock
 _MOST_NODES = 16.0  # of a signal on a step: a period of its fastest part has ten and more
 
 
@@ -161,7 +162,7 @@ def _march(
         h = min(now[phase], dt_contact if phase == H_CONTACT else dt_flight, t_end - now[T])
         if adaptive:
             h = _span_seen(problem, now[T], h)
-        if h < 4e-15 * now[T] and h < t_end - now[T]:
+        if h < max(4e-15 * now[T], _LEAST_STEP) and h < t_end - now[T]:
             return LAW_NOT_FINITE if not_finite else STEP_TOO_SMALL
         error, calls = step(
             *(problem, now[T], h, state.x, state.rate, state.segment, state.entry_rate),
