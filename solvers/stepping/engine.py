@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ from solvers.compiled.state import (
 from solvers.problem import Array, Forcing, Status, System
 from solvers.stepping.energy_gain import IN_A_ROW, NOW, STEPS_OF_GAIN, gains, largest_loads, negligible_energy, watched
 from solvers.stepping.events import HENON
-from solvers.stepping.loop import march, new_space
+from solvers.stepping.loop import march_modes, new_space
 from solvers.stepping.stability import kinks_of, shortest_contact
 
 
@@ -55,13 +56,14 @@ class Engine:
         self.atol = absolute_tolerance(method, self.problem, z, fastest)
         if not method.adaptive:
             self.state.now[[H_FLIGHT, H_CONTACT]] = method.steps
+        self.rate, self.loop = rhs, partial(march_modes, method.step)
 
     def start(self, log: Array) -> None:
         """Find the segment of every stop and evaluate the first rate."""
         state = self.state
         begin_contacts(self.problem, state)
         log_begin(self.problem, state, log)
-        state.count[CALLS] += rhs(
+        state.count[CALLS] += self.rate(
             *(self.problem, 0.0, state.x, state.segment, state.entry_rate, state.rate, self.space.work[0])
         )
 
@@ -72,10 +74,9 @@ class Engine:
     def march(self, budget: int, log: Array, out: Array, due: Array) -> int:
         """Advance by at most ``budget`` steps."""
         method = self.method
-        dt_flight, dt_contact = (math.inf, math.inf) if method.adaptive else method.steps
-        code = march(
-            *(method.step, self.problem, self.state, self.space, self.duration, budget),
-            *(dt_flight, dt_contact, method.rtol, self.atol),
+        steps = (math.inf, math.inf) if method.adaptive else method.steps
+        code = self.loop(
+            *(self.problem, self.state, self.space, self.duration, budget, steps, (method.rtol, self.atol)),
             *(method.adaptive, method.events, log, out, due),
         )
         return GAINED if code in (DONE, RUNNING) and self._gained() else code
